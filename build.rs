@@ -1,0 +1,59 @@
+//! Declares Debian's PETSc to Rust: an explicit list of functions, nothing else.
+
+use std::{env, path::PathBuf, process::Command};
+
+/// Everything the `petsc` module calls. A name that is not here does not exist for us.
+const FUNCTIONS: &str = "\
+    PetscInitializeNoArguments|PetscInitialize|PetscInitialized|PetscFinalize|\
+    PetscPushErrorHandler|PetscErrorMessage|PetscObjectGetComm|PetscOptionsInsertString|\
+    PetscOptionsSetValue|PetscOptionsClearValue|PetscOptionsHasName|PetscOptionsLeftGet|\
+    PetscOptionsLeftRestore|\
+    MPI_Comm_size|MPI_Comm_rank|\
+    VecCreateMPI|VecDestroy|VecDuplicate|VecGetArray|VecRestoreArray|VecGetArrayRead|\
+    VecRestoreArrayRead|VecGetLocalSize|VecAXPY|VecDot|VecNorm|VecCopy|VecSet|VecScale|\
+    MatCreate|MatDestroy|MatSetSizes|MatSetType|MatSetBlockSize|MatSetOption|\
+    MatSetPreallocationCOO|MatSetValuesCOO|MatMult|MatGetDiagonal|MatDuplicate|\
+    MatDiagonalSet|MatScale|MatGetInertia|MatGetInfo|\
+    KSPCreate|KSPDestroy|KSPSetOperators|KSPSetType|KSPGetPC|KSPSetUp|KSPSolve|\
+    KSPSetTolerances|KSPGetConvergedReason|KSPGetIterationNumber|KSPSetFromOptions|\
+    KSPSetOptionsPrefix|KSPSetErrorIfNotConverged|KSPSetReusePreconditioner|\
+    KSPSetInitialGuessNonzero|\
+    PCSetType|PCFactorSetMatSolverType|PCFactorGetMatrix|PCSetFromOptions|\
+    TaoCreate|TaoDestroy|TaoSetType|TaoSetSolution|TaoSetVariableBounds|\
+    TaoSetObjectiveAndGradient|TaoSetHessian|TaoSetFromOptions|TaoSetOptionsPrefix|\
+    TaoSetTolerances|TaoSetMaximumIterations|TaoSetMaximumFunctionEvaluations|TaoSolve|\
+    TaoGetSolutionStatus|TaoGetKSP|TaoGetLinearSolveIterations|TaoGetType|\
+    TaoSetInitialTrustRegionRadius|TaoGetConvergedReason";
+
+fn main() {
+    println!("cargo:rerun-if-changed=build.rs");
+    let petsc = pkg_config::probe_library("petsc").unwrap_or_else(|e| {
+        panic!("PETSc was not found by pkg-config; run `make deps` (Debian: petsc-dev)\n{e}")
+    });
+    println!("cargo:rustc-link-lib=mpi");
+
+    let mpi_flags = Command::new("mpicc")
+        .arg("--showme:compile")
+        .output()
+        .expect("mpicc did not run; `make deps` installs it (Debian: libopenmpi-dev)");
+    let mpi_flags = String::from_utf8_lossy(&mpi_flags.stdout).into_owned();
+
+    bindgen::Builder::default()
+        .header_contents("signorini.h", "#include <petsctao.h>\n")
+        .clang_args(
+            petsc
+                .include_paths
+                .iter()
+                .map(|p| format!("-I{}", p.display())),
+        )
+        .clang_args(mpi_flags.split_whitespace())
+        .allowlist_function(FUNCTIONS)
+        .allowlist_var("PETSC_COMM_WORLD|PETSC_DEFAULT_REAL|PETSC_VERSION_.*")
+        .default_enum_style(bindgen::EnumVariation::ModuleConsts)
+        .layout_tests(false)
+        .generate_comments(false)
+        .generate()
+        .expect("bindgen could not read petsctao.h (Debian: petsc-dev, libclang-dev)")
+        .write_to_file(PathBuf::from(env::var("OUT_DIR").unwrap_or_default()).join("petsc.rs"))
+        .expect("the build directory is writable");
+}

@@ -1,0 +1,10 @@
+//! **signorini**: an elastic body pressed against a rigid foundation while its
+//! material is damaged.
+//!
+//! The scheme is Problem VP^hk of Campo, Fernández and Silva, "Damageable contact
+//! between an elastic body and a rigid foundation". The modules stand in the order
+//! of their dependence: each uses only those above it.
+#![deny(unsafe_code)]
+
+pub mod mesh;
+pub mod model;

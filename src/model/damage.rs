@@ -1,0 +1,66 @@
+//! The damage source φ of the paper's section 4 with its truncations q* and η_*.
+
+/// Frémond's damage law: the source φ and the constants of equation (3).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DamageLaw {
+    /// Damage diffusion κ > 0, m²/s.
+    pub diffusion: f64,
+    /// λ_D, 1/s.
+    pub lambda_d: f64,
+    /// λ_U, 1/s.
+    pub lambda_u: f64,
+    /// λ_W, 1/s.
+    pub lambda_w: f64,
+    /// q*: |ε|² counts no more than this.
+    pub strain_cap: f64,
+    /// ζ_* in (0, 1): the least admissible damage.
+    pub threshold: f64,
+}
+
+impl DamageLaw {
+    /// The source φ(ε, ζ) = −(λ_D (1−ζ)/ζ + ½ λ_U Ψ_q*(ε) − λ_W)₊ ≤ 0, 1/s,
+    /// from |ε|² = Σ ε_ij² and ζ; ζ is truncated by η_* as in equation (3).
+    pub fn source(&self, strain_squared: f64, zeta: f64) -> f64 {
+        let zeta = self.truncate(zeta);
+        let psi = strain_squared.min(self.strain_cap);
+        let rate = self.lambda_d * (1.0 - zeta) / zeta + 0.5 * self.lambda_u * psi - self.lambda_w;
+        -rate.max(0.0)
+    }
+
+    /// η_*(ζ): ζ cut to [ζ_*, 1].
+    pub fn truncate(&self, zeta: f64) -> f64 {
+        zeta.clamp(self.threshold, 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LAW: DamageLaw = DamageLaw {
+        diffusion: 1.0,
+        lambda_d: 0.1,
+        lambda_u: 100.0,
+        lambda_w: 0.5,
+        strain_cap: 1000.0,
+        threshold: 0.01,
+    };
+
+    #[test]
+    fn source_never_heals_and_grows_with_strain_up_to_the_cap() {
+        assert_eq!(
+            LAW.source(0.0, 1.0),
+            0.0,
+            "λ_W protects the unstrained body"
+        );
+        assert!((LAW.source(0.02, 1.0) + 0.5).abs() < 1e-15);
+        assert!(LAW.source(0.03, 0.5) < LAW.source(0.02, 0.5));
+        assert_eq!(LAW.source(1000.0, 0.5), LAW.source(1e9, 0.5));
+    }
+
+    #[test]
+    fn truncation_makes_the_source_constant_outside_the_admissible_interval() {
+        assert_eq!(LAW.source(1.0, 0.01), LAW.source(1.0, -0.3));
+        assert_eq!(LAW.source(1.0, 1.0), LAW.source(1.0, 1.2));
+    }
+}
