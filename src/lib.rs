@@ -6,5 +6,8 @@
 //! of their dependence: each uses only those above it.
 #![deny(unsafe_code)]
 
+pub mod petsc;
 pub mod mesh;
 pub mod model;
+pub mod fem;
+pub mod contact;

@@ -48,11 +48,7 @@ mod tests {
 
     #[test]
     fn source_never_heals_and_grows_with_strain_up_to_the_cap() {
-        assert_eq!(
-            LAW.source(0.0, 1.0),
-            0.0,
-            "λ_W protects the unstrained body"
-        );
+        assert_eq!(LAW.source(0.0, 1.0), 0.0, "λ_W protects the unstrained body");
         assert!((LAW.source(0.02, 1.0) + 0.5).abs() < 1e-15);
         assert!(LAW.source(0.03, 0.5) < LAW.source(0.02, 0.5));
         assert_eq!(LAW.source(1000.0, 0.5), LAW.source(1e9, 0.5));

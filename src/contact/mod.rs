@@ -1,0 +1,36 @@
+//! Frictionless contact: the discrete problem (26), its solvers, and the residuals that judge them.
+//!
+//! A solver is one file that implements [`ContactSolver`]; [`solver`] knows them by name.
+
+mod certificate;
+mod constraints;
+mod linear;
+mod penalty_duality;
+mod problem;
+mod rigid;
+mod tao;
+
+pub use certificate::Kkt;
+pub use constraints::{Bound, ConstraintError, Constraints, FixedRow, GapRow};
+pub use problem::{ContactError, ContactProblem, ContactReport, ContactSolver};
+pub use rigid::{DrivenMotion, RigidMotion, RigidMotions};
+
+use crate::petsc::Session;
+
+/// The solvers a scene or `--solver` may name, the default first.
+pub const SOLVERS: [&str; 2] = ["tao", "penalty-duality"];
+
+/// The solver called `name`; `None` if there is none. Without bounds every name means
+/// one linear solve.
+pub fn solver<'s>(
+    session: &'s Session,
+    name: &str,
+    bounded: bool,
+) -> Option<Box<dyn ContactSolver + 's>> {
+    match name {
+        _ if !SOLVERS.contains(&name) => None,
+        _ if !bounded => Some(Box::new(linear::Linear::new(session))),
+        "penalty-duality" => Some(Box::new(penalty_duality::PenaltyDuality::new(session))),
+        _ => Some(Box::new(tao::Tao::new(session))),
+    }
+}

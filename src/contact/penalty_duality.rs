@@ -1,0 +1,204 @@
+//! The penalty-duality algorithm of Bermúdez and Moreno (Comput. Math. Appl. 7, 1981),
+//! the paper's reference [4].
+
+use super::{Bound, ContactError, ContactProblem, ContactReport, ContactSolver, Kkt};
+use crate::petsc::{LinearSolver, PetscError, Session, Vector};
+use nalgebra::DMatrix;
+
+/// With G = ∂I₍₋∞,g₎ and its Yosida approximation the contact law becomes a fixed point in q:
+///
+/// 1. solve (K + ω BᵀWB) u = f − BᵀW q,
+/// 2. r = Bu + λq,  y = min(g, r/(1 − λω)),  q ← (r − y)/λ.
+///
+/// B picks the bounded unknowns, W their shares of Γ_C; p = q + ω Bu is the contact pressure
+/// at the fixed point. λω = ½. One factorisation serves all iterations at one K; the next
+/// step starts from this one's q.
+pub(super) struct PenaltyDuality<'s> {
+    session: &'s Session,
+    /// ω, Pa/m, once estimated.
+    omega: Option<f64>,
+    factor: Option<(usize, LinearSolver)>,
+    /// q of the last solve, Pa.
+    q: Vec<f64>,
+}
+
+/// λω: the value for which Bermúdez and Moreno prove convergence, and the customary one.
+const LAMBDA_OMEGA: f64 = 0.5;
+/// ω√(s_min s_max), with s the extreme eigenvalues of the boundary compliance: measured best.
+const OMEGA_COMPLIANCE: f64 = 3.0;
+const ITERATIONS: usize = 20_000;
+/// Steps of the Lanczos process that estimates the compliance.
+const LANCZOS: usize = 25;
+
+impl<'s> PenaltyDuality<'s> {
+    pub(super) fn new(session: &'s Session) -> Self {
+        Self { session, omega: None, factor: None, q: Vec::new() }
+    }
+
+    /// Factorises K + ω BᵀWB.
+    fn factorise(&mut self, problem: &ContactProblem, omega: f64) -> Result<(), PetscError> {
+        let mut diagonal = Vector::zeros(self.session, problem.stiffness.owned())?;
+        diagonal.write(|d| problem.bounds.iter().for_each(|b| d[b.dof] = omega * b.weight))?;
+        let mut solver = match self.factor.take() {
+            Some((_, solver)) => solver,
+            None => LinearSolver::cholesky(self.session, "elastic_")?,
+        };
+        solver.factorise(&problem.stiffness.plus_diagonal(&diagonal)?)?;
+        self.factor = Some((problem.revision, solver));
+        Ok(())
+    }
+
+    /// Solves (K + ω BᵀWB) u = f − BᵀW q, f left out if `None`.
+    fn response(
+        &mut self,
+        problem: &ContactProblem,
+        with_load: bool,
+        q: &[f64],
+        rhs: &mut Vector,
+        u: &mut Vector,
+    ) -> Result<usize, ContactError> {
+        match with_load {
+            true => problem.load.read(|f| rhs.set(f))??,
+            false => rhs.write(|rhs| rhs.fill(0.0))?,
+        }
+        rhs.write(|rhs| {
+            problem.bounds.iter().zip(q).for_each(|(b, q)| rhs[b.dof] -= b.weight * q);
+        })?;
+        let Some((_, solver)) = &mut self.factor else { return Ok(0) };
+        let krylov = solver.solve(rhs, u, 1e-13)?;
+        match krylov.converged {
+            true => Ok(krylov.iterations),
+            false => Err(ContactError::NotConverged {
+                method: "penalty-duality",
+                iterations: krylov.iterations,
+                detail: "the penalised stiffness is not positive definite".into(),
+            }),
+        }
+    }
+
+    /// ω from the extreme eigenvalues of the compliance S = B K⁻¹BᵀW (normal displacement per
+    /// pressure). K may be singular, so the Lanczos process runs on
+    /// S_ω = B (K + ω BᵀWB)⁻¹ BᵀW = S (1 + ωS)⁻¹ with a trial ω, self-adjoint in W.
+    fn estimate_omega(
+        &mut self,
+        problem: &ContactProblem,
+        report: &mut ContactReport,
+    ) -> Result<f64, ContactError> {
+        let bounds = problem.bounds;
+        let length: f64 = bounds.iter().map(|b| b.weight).sum();
+        let trial = problem.stiffness_scale / length;
+        self.factorise(problem, trial)?;
+        report.factorisations += 1;
+        let dot = |a: &[f64], b: &[f64]| -> f64 {
+            bounds.iter().enumerate().map(|(i, bound)| bound.weight * a[i] * b[i]).sum()
+        };
+        let mut rhs = Vector::zeros(self.session, problem.load.owned())?;
+        let mut u = Vector::zeros(self.session, problem.load.owned())?;
+
+        // A start with all frequencies in it: smooth plus alternating.
+        let mut v: Vec<f64> = (0..bounds.len())
+            .map(|i| 1.0 + 0.3 * (i as f64).sin() + if i % 2 == 0 { 1.0 } else { -1.0 })
+            .collect();
+        let mut basis: Vec<Vec<f64>> = Vec::new();
+        let (mut alpha, mut beta) = (Vec::new(), Vec::<f64>::new());
+        for _ in 0..LANCZOS.min(bounds.len()) {
+            let norm = dot(&v, &v).sqrt();
+            if basis.len() == beta.len() + 1 {
+                beta.push(norm);
+            }
+            if norm <= 1e-10 * alpha.iter().fold(0.0, |m: f64, a: &f64| m.max(a.abs())) {
+                beta.pop();
+                break;
+            }
+            v.iter_mut().for_each(|v| *v /= norm);
+            basis.push(v.clone());
+            report.linear_iterations += self.response(problem, false, &v, &mut rhs, &mut u)?;
+            let mut w: Vec<f64> = u.read(|u| bounds.iter().map(|b| -u[b.dof]).collect())?;
+            alpha.push(dot(&w, &v));
+            for earlier in basis.iter().rev().chain(basis.iter().rev()) {
+                let share = dot(&w, earlier);
+                w.iter_mut().zip(earlier).for_each(|(w, e)| *w -= share * e);
+            }
+            v = w;
+        }
+        let steps = alpha.len();
+        let tridiagonal = DMatrix::from_fn(steps, steps, |i, j| match i.abs_diff(j) {
+            0 => alpha[i],
+            1 => beta[i.min(j)],
+            _ => 0.0,
+        });
+        let compliance = |theta: f64| theta / (1.0 - trial * theta).max(1e-12);
+        let eigenvalues = tridiagonal.symmetric_eigenvalues();
+        let (least, largest) = (compliance(eigenvalues.min()), compliance(eigenvalues.max()));
+        Ok(OMEGA_COMPLIANCE / (least * largest).sqrt())
+    }
+}
+
+impl ContactSolver for PenaltyDuality<'_> {
+    fn name(&self) -> &'static str {
+        "penalty-duality"
+    }
+
+    fn solve(
+        &mut self,
+        problem: &ContactProblem,
+        c: &mut Vector,
+    ) -> Result<ContactReport, ContactError> {
+        let mut report = ContactReport::default();
+        let omega = match self.omega {
+            Some(omega) => omega,
+            None => self.estimate_omega(problem, &mut report)?,
+        };
+        if self.omega.is_none()
+            || self.factor.as_ref().is_none_or(|(revision, _)| *revision != problem.revision)
+        {
+            self.omega = Some(omega);
+            self.factorise(problem, omega)?;
+            report.factorisations += 1;
+        }
+        let lambda = LAMBDA_OMEGA / omega;
+        let mut q = std::mem::take(&mut self.q);
+        q.resize(problem.bounds.len(), 0.0);
+        let mut rhs = Vector::zeros(self.session, c.owned())?;
+
+        let mut residuals = Kkt::default();
+        while report.iterations < ITERATIONS {
+            report.linear_iterations += self.response(problem, true, &q, &mut rhs, c)?;
+            report.iterations += 1;
+            let normal: Vec<f64> = c.read(|c| problem.bounds.iter().map(|b| c[b.dof]).collect())?;
+            let size = c.read(|c| c.iter().fold(0.0_f64, |m, v| m.max(v.abs())))?;
+            residuals = fixed_point_residuals(problem, omega, &q, &normal, size);
+            if residuals.within(0.1 * problem.tolerance) {
+                self.q = q;
+                return Ok(report);
+            }
+            for ((q, u), bound) in q.iter_mut().zip(&normal).zip(problem.bounds) {
+                let r = u + lambda * *q;
+                let y = bound.gap.min(r / (1.0 - LAMBDA_OMEGA));
+                *q = (r - y) / lambda;
+            }
+        }
+        Err(ContactError::NotConverged {
+            method: self.name(),
+            iterations: report.iterations,
+            detail: format!("{residuals}, ω = {omega:.3e} Pa/m"),
+        })
+    }
+}
+
+/// The KKT residuals of an iterate: its equation is solved, so the contact forces are
+/// W (q + ω Bu) and only the contact conditions are left to judge.
+fn fixed_point_residuals(
+    problem: &ContactProblem,
+    omega: f64,
+    q: &[f64],
+    normal: &[f64],
+    size: f64,
+) -> Kkt {
+    let local: Vec<Bound> = (problem.bounds.iter().enumerate())
+        .map(|(i, bound)| Bound { dof: i, ..bound.clone() })
+        .collect();
+    let force: Vec<f64> =
+        (0..q.len()).map(|i| -local[i].weight * (q[i] + omega * normal[i])).collect();
+    Kkt::of(&force, normal, &local, |_| false, problem.force_scale, size)
+}

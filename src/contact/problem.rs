@@ -1,0 +1,96 @@
+//! What a contact solver is given and what it answers.
+
+use super::{Bound, Kkt};
+use crate::petsc::{Matrix, PetscError, Session, Vector};
+
+/// min ½ cᵀKc − fᵀc  subject to  c_i ≤ g_i on the bounded unknowns.
+///
+/// The unknowns c are displacements in the frames of the constraints: each bound concerns
+/// one of them, prescribed ones have an identity row and load 0.
+pub struct ContactProblem<'a> {
+    /// K, N/m.
+    pub stiffness: &'a Matrix,
+    /// Counts the changes of K's values: a factor made at the same revision is still exact.
+    pub revision: usize,
+    /// The size of K's diagonal, N/m.
+    pub stiffness_scale: f64,
+    /// f, N: loads less the forces of prescribed displacements.
+    pub load: &'a Vector,
+    /// g_i and its node's share of Γ_C for each bounded unknown.
+    pub bounds: &'a [Bound],
+    /// Whether K is positive definite; else it has rigid motions that only contact holds.
+    pub definite: bool,
+    /// ‖·‖₂ of the forces that count as 1 in relative residuals, N.
+    pub force_scale: f64,
+    /// KKT residuals to reach, relative.
+    pub tolerance: f64,
+}
+
+impl ContactProblem<'_> {
+    /// The KKT residuals of `c` by the assembled K (the final word has
+    /// [`Kkt`] by element-wise forces).
+    pub fn residuals(&self, session: &Session, c: &Vector) -> Result<Kkt, PetscError> {
+        let mut product = Vector::zeros(session, c.owned())?;
+        self.stiffness.multiply(c, &mut product)?;
+        let load = self.load.read(<[f64]>::to_vec)?;
+        product.write(|p| p.iter_mut().zip(&load).for_each(|(p, f)| *p -= f))?;
+        let size = c.read(|c| c.iter().fold(0.0_f64, |m, v| m.max(v.abs())))?;
+        product
+            .read(|r| c.read(|c| Kkt::of(r, c, self.bounds, |_| false, self.force_scale, size)))?
+    }
+}
+
+/// A method for the contact problem.
+pub trait ContactSolver {
+    /// The name a scene or `--solver` calls it by.
+    fn name(&self) -> &'static str;
+
+    /// Solves from the start `c` and leaves the solution there.
+    ///
+    /// # Errors
+    /// The method stopped short of the tolerance, or PETSc failed.
+    fn solve(
+        &mut self,
+        problem: &ContactProblem,
+        c: &mut Vector,
+    ) -> Result<ContactReport, ContactError>;
+}
+
+/// What a contact solve took.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct ContactReport {
+    /// Iterations of the method itself.
+    pub iterations: usize,
+    /// Iterations of linear solvers inside, each a pair of triangular solves.
+    pub linear_iterations: usize,
+    /// Factorisations the method asked for; TAO's own are not visible from outside.
+    pub factorisations: usize,
+}
+
+/// A contact solve that did not end well.
+#[derive(Debug, thiserror::Error)]
+pub enum ContactError {
+    /// The method ended above the tolerance.
+    #[error("{method} stopped after {iterations} iterations: {detail}")]
+    NotConverged {
+        /// The solver's name.
+        method: &'static str,
+        /// Iterations done.
+        iterations: usize,
+        /// Why it stopped and where it stood.
+        detail: String,
+    },
+    /// The answer does not satisfy the KKT conditions.
+    #[error("{method}: the answer misses the KKT tolerance {tolerance:.1e}: {residuals}")]
+    NotCertified {
+        /// The solver's name.
+        method: &'static str,
+        /// The tolerance missed.
+        tolerance: f64,
+        /// The residuals found.
+        residuals: Kkt,
+    },
+    /// PETSc failed.
+    #[error(transparent)]
+    Petsc(#[from] PetscError),
+}

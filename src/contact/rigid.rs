@@ -1,0 +1,271 @@
+//! Rigid motions that nothing holds, that only contact holds, and whether the load drives them.
+
+use super::{Constraints, GapRow};
+use crate::fem::Body;
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use std::fmt;
+
+/// An infinitesimal rigid motion u(x) = a + θ e_z × (x − centre).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RigidMotion {
+    /// a, m.
+    pub translation: [f64; 2],
+    /// θ, rad.
+    pub rotation: f64,
+    /// The point that only translates, m.
+    pub centre: [f64; 2],
+}
+
+impl RigidMotion {
+    /// The displacement at a point.
+    pub fn at(&self, x: [f64; 2]) -> [f64; 2] {
+        [
+            self.translation[0] - self.rotation * (x[1] - self.centre[1]),
+            self.translation[1] + self.rotation * (x[0] - self.centre[0]),
+        ]
+    }
+
+    /// Its values at all nodes.
+    fn field(&self, nodes: &[[f64; 2]]) -> Vec<f64> {
+        nodes.iter().flat_map(|&x| self.at(x)).collect()
+    }
+}
+
+impl fmt::Display for RigidMotion {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let [ax, ay] = self.translation;
+        let size = ax.hypot(ay);
+        if self.rotation == 0.0 {
+            match (ax.abs() > 1e-6 * size, ay.abs() > 1e-6 * size) {
+                (true, false) => write!(f, "the horizontal translation"),
+                (false, _) => write!(f, "the vertical translation"),
+                _ => write!(f, "the translation along ({:.3}, {:.3})", ax / size, ay / size),
+            }
+        } else {
+            // Where the motion is at rest: a + θ e_z × (x − centre) = 0.
+            let x = self.centre[0] - ay / self.rotation;
+            let y = self.centre[1] + ax / self.rotation;
+            write!(f, "the rotation about ({x:.4}, {y:.4})")
+        }
+    }
+}
+
+/// The load does work on a rigid motion that nothing holds.
+#[derive(Debug, Clone, Copy, thiserror::Error)]
+#[error(
+    "nothing holds the body against {motion}, and the load drives it (resultant {force:.4e} N/m, \
+     moment about the body's centre {moment:.4e} N): hold it by a `displacement`, a `symmetry` \
+     axis or a `gap`, or balance the load"
+)]
+pub struct DrivenMotion {
+    /// The motion.
+    pub motion: RigidMotion,
+    /// Size of the load's resultant, N per metre of thickness.
+    pub force: f64,
+    /// The load's moment about the centre, N m per metre of thickness.
+    pub moment: f64,
+}
+
+/// The rigid motions that prescribed displacements leave free.
+#[derive(Debug, Clone)]
+pub struct RigidMotions {
+    /// Held by nothing, not even contact in either sense; orthonormal with respect to ∫u·v.
+    pub free: Vec<RigidMotion>,
+    /// Directions of motion that contact resists in one sense.
+    resisted: Vec<RigidMotion>,
+    /// u·ν of `resisted` at the contact nodes, one row per gap condition.
+    normal: DMatrix<f64>,
+    centre: [f64; 2],
+}
+
+/// Motions are compared after scaling to unit size: below this they are zero.
+const ROUNDING: f64 = 1e-9;
+
+impl RigidMotions {
+    /// From the fixed directions (node, d) and the gap conditions.
+    pub fn new(body: &Body, fixed: &[(usize, [f64; 2])], gaps: &[GapRow]) -> Self {
+        let nodes = &body.mesh.nodes;
+        let area: f64 = body.node_area.iter().sum();
+        let mean = |f: &dyn Fn(usize) -> f64| {
+            (0..nodes.len()).map(|i| body.node_area[i] * f(i)).sum::<f64>() / area
+        };
+        let centre = [mean(&|i| nodes[i][0]), mean(&|i| nodes[i][1])];
+        // Radius of gyration: a unit rotation then moves the body as far as a translation.
+        let radius =
+            mean(&|i| (nodes[i][0] - centre[0]).powi(2) + (nodes[i][1] - centre[1]).powi(2)).sqrt();
+        let motion = |v: &Vector3<f64>| RigidMotion {
+            translation: [v[0], v[1]],
+            rotation: if v[2].abs() < ROUNDING { 0.0 } else { v[2] / radius },
+            centre,
+        };
+        let row = |node: usize, d: [f64; 2]| {
+            let [x, y] = nodes[node];
+            Vector3::new(d[0], d[1], ((x - centre[0]) * d[1] - (y - centre[1]) * d[0]) / radius)
+        };
+
+        let gram = |rows: &mut dyn Iterator<Item = Vector3<f64>>| {
+            rows.fold(Matrix3::zeros(), |sum, r| sum + r * r.transpose())
+        };
+        let unheld = null_space(&gram(&mut fixed.iter().map(|(node, d)| row(*node, *d))));
+        let contact = DMatrix::from_row_iterator(
+            gaps.len(),
+            unheld.len(),
+            gaps.iter().flat_map(|g| {
+                let r = row(g.node, g.normal);
+                unheld.iter().map(move |m| r.dot(m)).collect::<Vec<_>>()
+            }),
+        );
+        let (mut free, mut resisted) = (Vec::new(), Vec::new());
+        let eigen = (contact.transpose() * &contact).symmetric_eigen();
+        for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            let v: Vector3<f64> = unheld.iter().zip(vector.iter()).map(|(m, c)| m * *c).sum();
+            match *value > ROUNDING * gaps.len() as f64 {
+                true => resisted.push(motion(&v)),
+                false => free.push(motion(&v)),
+            }
+        }
+        let along = |m: &RigidMotion, g: &GapRow| {
+            let u = m.at(nodes[g.node]);
+            u[0] * g.normal[0] + u[1] * g.normal[1]
+        };
+        let normal =
+            DMatrix::from_fn(gaps.len(), resisted.len(), |i, j| along(&resisted[j], &gaps[i]));
+        Self { free, resisted, normal, centre }
+    }
+
+    /// Whether prescribed displacements alone hold the body (K is then positive definite).
+    pub fn held(&self) -> bool {
+        self.free.is_empty() && self.resisted.is_empty()
+    }
+
+    /// Whether K stays singular after the free motions are pinned: contact must hold the rest.
+    pub fn resisted_by_contact_only(&self) -> bool {
+        !self.resisted.is_empty()
+    }
+
+    /// Checks that `load` (nodal forces) does no work on free motions and can be balanced by
+    /// contact forces p ≥ 0 on the resisted ones: the nearest such forces leave no remainder
+    /// (Farkas; the remainder itself is the motion that the load drives).
+    pub fn check(&self, body: &Body, load: &[f64]) -> Result<(), DrivenMotion> {
+        if self.held() {
+            return Ok(());
+        }
+        let nodes = &body.mesh.nodes;
+        let size: f64 = load.chunks(2).map(|f| f[0].hypot(f[1])).sum();
+        let work =
+            |m: &RigidMotion| -> f64 { m.field(nodes).iter().zip(load).map(|(u, f)| u * f).sum() };
+        let driven = |motion: RigidMotion| {
+            let sum = |k: usize| load.iter().skip(k).step_by(2).sum::<f64>();
+            let turn = RigidMotion { translation: [0.0, 0.0], rotation: 1.0, centre: self.centre };
+            DrivenMotion { motion, force: sum(0).hypot(sum(1)), moment: work(&turn) }
+        };
+        if let Some(motion) = self.free.iter().find(|m| work(m).abs() > ROUNDING * size) {
+            return Err(driven(*motion));
+        }
+        let work = DVector::from_iterator(self.resisted.len(), self.resisted.iter().map(work));
+        let remainder = &work - self.normal.transpose() * nonnegative(&self.normal, &work);
+        if remainder.norm() <= 1e-8 * size {
+            return Ok(());
+        }
+        let scaled = remainder.normalize();
+        let mut motion = RigidMotion { translation: [0.0; 2], rotation: 0.0, centre: self.centre };
+        for (m, c) in self.resisted.iter().zip(scaled.iter()) {
+            motion.translation[0] += c * m.translation[0];
+            motion.translation[1] += c * m.translation[1];
+            motion.rotation += c * m.rotation;
+        }
+        Err(driven(motion))
+    }
+
+    /// Pins one unknown for each free motion. The load being balanced, the pins carry no
+    /// force: any solution so found is exact up to the motion, which [`Self::remove_free`] takes out.
+    pub fn pin_free(&self, body: &Body, constraints: &mut Constraints) {
+        let mut fields: Vec<Vec<f64>> = self
+            .free
+            .iter()
+            .map(|m| {
+                let mut field = m.field(&body.mesh.nodes);
+                constraints.frames.displacement_to_frame(&mut field);
+                field
+            })
+            .collect();
+        // Gaussian elimination on the motions, the largest remaining entry as pivot.
+        while let Some(pivot_field) = fields.pop() {
+            let fixed = constraints.frames.fixed();
+            let largest = (0..pivot_field.len())
+                .filter(|&dof| !fixed[dof])
+                .max_by(|&a, &b| pivot_field[a].abs().total_cmp(&pivot_field[b].abs()));
+            let Some(dof) = largest else { return };
+            for field in &mut fields {
+                let factor = field[dof] / pivot_field[dof];
+                field.iter_mut().zip(&pivot_field).for_each(|(v, p)| *v -= factor * p);
+            }
+            constraints.frames.fix(dof);
+        }
+    }
+
+    /// Removes the free motions from u: the answer of least ∫|u|².
+    pub fn remove_free(&self, body: &Body, u: &mut [f64]) {
+        for motion in &self.free {
+            let field = motion.field(&body.mesh.nodes);
+            let area = |i: usize| body.node_area[i / 2];
+            let dot = |v: &[f64]| -> f64 { (0..v.len()).map(|i| area(i) * v[i] * field[i]).sum() };
+            let share = dot(u) / dot(&field);
+            u.iter_mut().zip(&field).for_each(|(v, r)| *v -= share * r);
+        }
+    }
+}
+
+/// An orthonormal basis of the null space of a Gram matrix of unit-sized rows.
+fn null_space(gram: &Matrix3<f64>) -> Vec<Vector3<f64>> {
+    let eigen = gram.symmetric_eigen();
+    let cut = ROUNDING * gram.trace().max(f64::MIN_POSITIVE);
+    let vectors = eigen.eigenvectors.column_iter();
+    eigen
+        .eigenvalues
+        .iter()
+        .zip(vectors)
+        .filter(|(v, _)| **v <= cut)
+        .map(|(_, v)| v.into())
+        .collect()
+}
+
+/// p ≥ 0 of least ‖Aᵀp − b‖ (Lawson and Hanson, Solving Least Squares Problems, ch. 23),
+/// for an A with at most three columns: at most three p_i are positive at a time.
+fn nonnegative(a: &DMatrix<f64>, b: &DVector<f64>) -> DVector<f64> {
+    let rows = a.nrows();
+    let mut p = DVector::zeros(rows);
+    let mut positive: Vec<usize> = Vec::new();
+    let cut = 1e-13 * b.norm() * a.amax();
+    for _ in 0..10 * (rows + 1) {
+        let gradient = a * (b - a.transpose() * &p);
+        let entering = (0..rows)
+            .filter(|i| !positive.contains(i))
+            .max_by(|&i, &j| gradient[i].total_cmp(&gradient[j]));
+        match entering {
+            Some(i) if gradient[i] > cut => positive.push(i),
+            _ => break,
+        }
+        loop {
+            let columns = a.select_rows(&positive).transpose();
+            let Ok(z) = columns.svd(true, true).solve(b, 1e-14) else { return p };
+            if z.iter().all(|&v| v > 0.0) {
+                p.fill(0.0);
+                positive.iter().zip(z.iter()).for_each(|(&i, &v)| p[i] = v);
+                break;
+            }
+            // Go towards z until the first p_i vanishes, and drop it.
+            let reach = |(&i, &v): (&usize, &f64)| match v <= 0.0 {
+                true => p[i] / (p[i] - v),
+                false => 1.0,
+            };
+            let step = positive.iter().zip(z.iter()).map(reach).fold(1.0, f64::min);
+            positive.iter().zip(z.iter()).for_each(|(&i, &v)| p[i] += step * (v - p[i]));
+            positive.retain(|&i| p[i] > 1e-14 * p.amax().max(f64::MIN_POSITIVE));
+            if positive.is_empty() {
+                break;
+            }
+        }
+    }
+    p
+}

@@ -1,0 +1,106 @@
+//! PETSc's TAO on the contact problem.
+
+use super::{ContactError, ContactProblem, ContactReport, ContactSolver};
+use crate::petsc::{BoundedQuadratic, Session, Vector};
+
+/// TAO's trust-region Newton method `tron` with a Cholesky factor inside; `-tao_type` chooses another.
+///
+/// TAO holds absolute tolerances, so it is given K/s, f/(sU) and c/U with s the size of K
+/// and U the size of the answer. U is unknown at first: TAO is called again with the U it
+/// found until the KKT residuals are met. Each call starts from the last answer.
+pub(super) struct Tao<'s> {
+    session: &'s Session,
+    tao: Option<BoundedQuadratic<'s>>,
+    /// U of the last solve, m.
+    size: f64,
+}
+
+/// Calls of TAO for one contact problem.
+const CALLS: usize = 8;
+/// Relative size of the proximal term that makes K definite where only contact holds the body.
+const PROXIMAL: f64 = 1e-7;
+
+impl<'s> Tao<'s> {
+    pub(super) fn new(session: &'s Session) -> Self {
+        Self { session, tao: None, size: 0.0 }
+    }
+}
+
+impl ContactSolver for Tao<'_> {
+    fn name(&self) -> &'static str {
+        "tao"
+    }
+
+    fn solve(
+        &mut self,
+        problem: &ContactProblem,
+        c: &mut Vector,
+    ) -> Result<ContactReport, ContactError> {
+        let tao = match self.tao.take() {
+            Some(tao) => tao,
+            None => BoundedQuadratic::new(self.session, "tron")?,
+        };
+        let tao = self.tao.insert(tao);
+        let mut report = ContactReport::default();
+        let owned = c.owned();
+        let load = problem.load.read(<[f64]>::to_vec)?;
+        let load_size = load.iter().fold(0.0_f64, |m, f| m.max(f.abs()));
+        if load_size == 0.0 && problem.definite {
+            // Nothing pushes and the gaps are not negative: c = 0, where a scale would be 0/0.
+            c.write(|c| c.fill(0.0))?;
+            return Ok(report);
+        }
+
+        let s = problem.stiffness_scale;
+        let proximal = if problem.definite { 0.0 } else { PROXIMAL };
+        let stiffness = problem.stiffness.scaled(1.0 / s, proximal)?;
+        let mut x = Vector::zeros(self.session, owned)?;
+        let mut f = Vector::zeros(self.session, owned)?;
+        let mut lower = Vector::zeros(self.session, owned)?;
+        let mut upper = Vector::zeros(self.session, owned)?;
+        lower.write(|v| v.fill(-INFINITE))?;
+
+        let mut size = if self.size > 0.0 { self.size } else { load_size / s };
+        let mut reason = 0;
+        for _ in 0..CALLS {
+            let start = c.read(<[f64]>::to_vec)?;
+            f.write(|v| {
+                for i in 0..owned {
+                    v[i] = load[i] / (s * size) + proximal * start[i] / size;
+                }
+            })?;
+            upper.write(|v| {
+                v.fill(INFINITE);
+                problem.bounds.iter().for_each(|b| v[b.dof] = b.gap / size);
+            })?;
+            x.write(|v| v.iter_mut().zip(&start).for_each(|(v, c)| *v = c / size))?;
+            let answer = tao.minimise(&stiffness, &f, &lower, &upper, &mut x)?;
+            report.iterations += answer.iterations;
+            report.linear_iterations += answer.linear_iterations;
+            reason = answer.reason;
+
+            let largest = x.read(|x| x.iter().fold(0.0_f64, |m, v| m.max(v.abs())))? * size;
+            let scale = size;
+            c.write(|c| x.read(|x| c.iter_mut().zip(x).for_each(|(c, x)| *c = x * scale)))??;
+            if largest > 0.0 {
+                size = largest;
+                self.size = largest;
+            }
+            if problem.residuals(self.session, c)?.within(0.1 * problem.tolerance) {
+                return Ok(report);
+            }
+        }
+        let residuals = problem.residuals(self.session, c)?;
+        if residuals.within(problem.tolerance) {
+            return Ok(report);
+        }
+        Err(ContactError::NotConverged {
+            method: self.name(),
+            iterations: report.iterations,
+            detail: format!("{residuals} (TaoConvergedReason {reason}) after {CALLS} calls"),
+        })
+    }
+}
+
+/// PETSC_INFINITY.
+const INFINITE: f64 = f64::MAX / 4.0;

@@ -1,0 +1,46 @@
+//! The body: its mesh, the geometry of its triangles, and its share on this rank.
+
+use super::{Partition, Triangle};
+use crate::mesh::Mesh;
+
+/// A triangulated body.
+#[derive(Debug)]
+pub struct Body {
+    /// The triangulation.
+    pub mesh: Mesh,
+    /// Area and gradients, one per triangle of the mesh.
+    pub triangles: Vec<Triangle>,
+    /// Ownership of the nodes.
+    pub partition: Partition,
+    /// ∫ λ_i, m²: the weight of each node in an integral.
+    pub node_area: Vec<f64>,
+}
+
+impl Body {
+    /// The whole of `mesh` on one rank.
+    pub fn new(mesh: Mesh) -> Self {
+        let corners = |t: &[usize; 3]| t.map(|node| mesh.nodes[node]);
+        let triangles: Vec<Triangle> =
+            mesh.triangles.iter().map(|t| Triangle::new(corners(t))).collect();
+        let partition = Partition::whole(mesh.nodes.len());
+        let mut node_area = vec![0.0; mesh.nodes.len()];
+        for (t, triangle) in mesh.triangles.iter().zip(&triangles) {
+            for &node in t {
+                node_area[node] += triangle.area / 3.0;
+            }
+        }
+        Self { mesh, triangles, partition, node_area }
+    }
+
+    /// The six displacements of a triangle out of a nodal field.
+    pub fn gather(&self, triangle: usize, u: &[f64]) -> [f64; 6] {
+        let [a, b, c] = self.mesh.triangles[triangle];
+        [u[2 * a], u[2 * a + 1], u[2 * b], u[2 * b + 1], u[2 * c], u[2 * c + 1]]
+    }
+
+    /// ∫ζ/|Ω| of a nodal field.
+    pub fn mean(&self, field: &[f64]) -> f64 {
+        let area: f64 = self.node_area.iter().sum();
+        self.partition.dot(&self.node_area, field, 1) / area
+    }
+}

@@ -1,0 +1,84 @@
+//! The damage system (28): (M + kκL) ζ_n = M ζ_{n−1} + k b(φ).
+
+use super::Body;
+use crate::{
+    model::DamageLaw,
+    petsc::{LinearSolver, Matrix, PetscError, Session, Vector},
+};
+
+/// The load b_i = ∫ φ λ_i of the damage source (25).
+///
+/// The strain is constant on a triangle; φ is taken at its vertices (nodal ζ, triangle
+/// strain) and the affine function through these values is integrated exactly.
+pub fn source_load(body: &Body, law: &DamageLaw, strain_squared: &[f64], zeta: &[f64]) -> Vec<f64> {
+    let mut load = vec![0.0; zeta.len()];
+    for ((nodes, triangle), e2) in
+        body.mesh.triangles.iter().zip(&body.triangles).zip(strain_squared)
+    {
+        let phi = nodes.map(|node| law.source(*e2, zeta[node]));
+        let sum: f64 = phi.iter().sum();
+        for (node, phi) in nodes.iter().zip(phi) {
+            load[*node] += triangle.area / 12.0 * (sum + phi);
+        }
+    }
+    load
+}
+
+/// M + kκL, factored once for the whole run, and M.
+pub struct DamageSystem {
+    mass: Matrix,
+    solver: LinearSolver,
+    rhs: Vector,
+    unknown: Vector,
+    step: f64,
+}
+
+impl DamageSystem {
+    /// Assembles and factorises for diffusion κ (m²/s) and step k (s).
+    pub fn new(
+        session: &Session,
+        body: &Body,
+        diffusion: f64,
+        step: f64,
+    ) -> Result<Self, PetscError> {
+        let owned = body.partition.owned();
+        let (mut rows, mut columns) = (Vec::new(), Vec::new());
+        let (mut mass_values, mut values) = (Vec::new(), Vec::new());
+        for (nodes, triangle) in body.mesh.triangles.iter().zip(&body.triangles) {
+            let (mass, laplace) = (triangle.mass(), triangle.laplace());
+            for i in 0..3 {
+                for j in 0..3 {
+                    rows.push(body.partition.row(nodes[i], 1, 0));
+                    columns.push(body.partition.global(nodes[j], 1, 0));
+                    mass_values.push(mass[(i, j)]);
+                    values.push(mass[(i, j)] + step * diffusion * laplace[(i, j)]);
+                }
+            }
+        }
+        let mut mass = Matrix::with_pattern(session, owned, 1, rows.clone(), columns.clone())?;
+        mass.set_values(&mass_values)?;
+        let mut matrix = Matrix::with_pattern(session, owned, 1, rows, columns)?;
+        matrix.set_values(&values)?;
+        let mut solver = LinearSolver::cholesky(session, "damage_")?;
+        solver.factorise(&matrix)?;
+        Ok(Self {
+            mass,
+            solver,
+            rhs: Vector::zeros(session, owned)?,
+            unknown: Vector::zeros(session, owned)?,
+            step,
+        })
+    }
+
+    /// Replaces ζ_{n−1} by ζ_n for the source load b; false if the linear solver failed.
+    pub fn advance(&mut self, load: &[f64], zeta: &mut [f64]) -> Result<bool, PetscError> {
+        let owned = self.rhs.owned();
+        self.unknown.set(&zeta[..owned])?;
+        self.mass.multiply(&self.unknown, &mut self.rhs)?;
+        let step = self.step;
+        self.rhs.write(|rhs| rhs.iter_mut().zip(load).for_each(|(r, b)| *r += step * b))?;
+        let krylov = self.solver.solve(&self.rhs, &mut self.unknown, 1e-13)?;
+        self.unknown.get(&mut zeta[..owned])?;
+        Ok(krylov.converged)
+    }
+}

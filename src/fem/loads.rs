@@ -1,0 +1,42 @@
+//! Nodal loads of body forces and tractions, (f, w)_V of the paper.
+
+use super::Body;
+
+/// Adds ∫ f_B·φ_i with f_B in N/m³ as a function of the point: the edge-midpoint rule,
+/// exact where f_B is affine.
+pub fn add_body_force(body: &Body, force: impl Fn([f64; 2]) -> [f64; 2], load: &mut [f64]) {
+    for (nodes, triangle) in body.mesh.triangles.iter().zip(&body.triangles) {
+        for side in 0..3 {
+            let (a, b) = (nodes[side], nodes[(side + 1) % 3]);
+            let (p, q) = (body.mesh.nodes[a], body.mesh.nodes[b]);
+            let f = force([0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])]);
+            // At a side's midpoint both its end functions are ½ and the third is 0.
+            for node in [a, b] {
+                load[2 * node] += triangle.area / 6.0 * f[0];
+                load[2 * node + 1] += triangle.area / 6.0 * f[1];
+            }
+        }
+    }
+}
+
+/// Adds ∫ f_N·φ_i over boundary `edges` with f_N in N/m² as a function of the point:
+/// two Gauss points an edge, exact where f_N is quadratic.
+pub fn add_traction(
+    body: &Body,
+    edges: &[[usize; 2]],
+    traction: impl Fn([f64; 2]) -> [f64; 2],
+    load: &mut [f64],
+) {
+    let offset = 0.5 / 3.0_f64.sqrt();
+    for &[a, b] in edges {
+        let (p, q) = (body.mesh.nodes[a], body.mesh.nodes[b]);
+        let length = (q[0] - p[0]).hypot(q[1] - p[1]);
+        for s in [0.5 - offset, 0.5 + offset] {
+            let f = traction([p[0] + s * (q[0] - p[0]), p[1] + s * (q[1] - p[1])]);
+            for (node, weight) in [(a, 1.0 - s), (b, s)] {
+                load[2 * node] += 0.5 * length * weight * f[0];
+                load[2 * node + 1] += 0.5 * length * weight * f[1];
+            }
+        }
+    }
+}

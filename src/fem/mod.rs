@@ -1,0 +1,21 @@
+//! Continuous piecewise affine finite elements (22), (23): from laws to matrices and vectors.
+//!
+//! Fields are plain slices over this rank's nodes, owned ones first, ghosts behind:
+//! one value per node (ζ) or two in turn (u_x, u_y). Which nodes are owned is known to
+//! [`Partition`] alone.
+
+mod triangle;
+mod partition;
+mod body;
+mod frames;
+mod elasticity;
+mod damage;
+mod loads;
+
+pub use body::Body;
+pub use damage::{DamageSystem, source_load};
+pub use elasticity::{Elasticity, Stiffness};
+pub use frames::Frames;
+pub use loads::{add_body_force, add_traction};
+pub use partition::Partition;
+pub use triangle::Triangle;

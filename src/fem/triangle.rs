@@ -1,0 +1,74 @@
+//! The P1 triangle.
+
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+
+/// Area and gradients of the three barycentric functions of one triangle.
+#[derive(Debug, Clone, Copy)]
+pub struct Triangle {
+    /// Area |T|, m².
+    pub area: f64,
+    /// ∇λ_i, constant on the triangle, 1/m.
+    pub gradients: [[f64; 2]; 3],
+}
+
+impl Triangle {
+    /// From the corners in counter-clockwise order.
+    pub fn new(corners: [[f64; 2]; 3]) -> Self {
+        let [a, b, c] = corners;
+        let twice = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
+        // ∇λ_a is the opposite side turned by 90° over twice the area.
+        let gradient = |p: [f64; 2], q: [f64; 2]| [(p[1] - q[1]) / twice, (q[0] - p[0]) / twice];
+        Self { area: 0.5 * twice, gradients: [gradient(b, c), gradient(c, a), gradient(a, b)] }
+    }
+
+    /// The 3×6 matrix B with (ε_xx, ε_yy, 2ε_xy) = B (u_1x, u_1y, …, u_3y).
+    pub fn strain_matrix(&self) -> SMatrix<f64, 3, 6> {
+        let mut b = SMatrix::zeros();
+        for (i, [dx, dy]) in self.gradients.iter().enumerate() {
+            b[(0, 2 * i)] = *dx;
+            b[(1, 2 * i + 1)] = *dy;
+            b[(2, 2 * i)] = *dy;
+            b[(2, 2 * i + 1)] = *dx;
+        }
+        b
+    }
+
+    /// ∫ Dε(φ_i):ε(φ_j), 6×6, N/m per metre of thickness.
+    pub fn stiffness(&self, d: &Matrix3<f64>) -> SMatrix<f64, 6, 6> {
+        let b = self.strain_matrix();
+        b.transpose() * d * b * self.area
+    }
+
+    /// The strain (ε_xx, ε_yy, 2ε_xy) of nodal displacements (u_1x, u_1y, …, u_3y).
+    pub fn strain(&self, u: &[f64; 6]) -> Vector3<f64> {
+        let mut strain = Vector3::zeros();
+        for (i, [dx, dy]) in self.gradients.iter().enumerate() {
+            strain[0] += dx * u[2 * i];
+            strain[1] += dy * u[2 * i + 1];
+            strain[2] += dy * u[2 * i] + dx * u[2 * i + 1];
+        }
+        strain
+    }
+
+    /// Nodal forces ∫ σ:ε(φ_i) of a constant stress (σ_xx, σ_yy, σ_xy).
+    pub fn force(&self, stress: &Vector3<f64>) -> SVector<f64, 6> {
+        let mut force = SVector::zeros();
+        for (i, [dx, dy]) in self.gradients.iter().enumerate() {
+            force[2 * i] = self.area * (dx * stress[0] + dy * stress[2]);
+            force[2 * i + 1] = self.area * (dy * stress[1] + dx * stress[2]);
+        }
+        force
+    }
+
+    /// ∫ λ_i λ_j, the consistent mass.
+    pub fn mass(&self) -> Matrix3<f64> {
+        let off = self.area / 12.0;
+        Matrix3::from_fn(|i, j| if i == j { 2.0 * off } else { off })
+    }
+
+    /// ∫ ∇λ_i·∇λ_j.
+    pub fn laplace(&self) -> Matrix3<f64> {
+        let g = &self.gradients;
+        Matrix3::from_fn(|i, j| self.area * (g[i][0] * g[j][0] + g[i][1] * g[j][1]))
+    }
+}

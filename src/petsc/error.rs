@@ -1,0 +1,59 @@
+//! PETSc's error codes with the message PETSc had for them.
+
+use super::raw;
+use std::{
+    ffi::{CStr, c_char, c_int, c_void},
+    sync::{Mutex, PoisonError},
+};
+
+/// A PETSc call failed.
+#[derive(Debug, Clone, thiserror::Error)]
+#[error("PETSc error {code}: {message}")]
+pub struct PetscError {
+    /// PETSc's error code (petscerror.h).
+    pub code: i32,
+    /// What PETSc said where the error arose.
+    pub message: String,
+}
+
+impl PetscError {
+    /// An error found by our own checks before PETSc was called.
+    pub(super) fn ours(message: impl Into<String>) -> Self {
+        Self { code: 0, message: message.into() }
+    }
+}
+
+/// The message of the last error; PETSc reports it through the handler, not the code.
+static MESSAGE: Mutex<String> = Mutex::new(String::new());
+
+/// Keeps the first message of an error trace instead of printing the trace (PetscPushErrorHandler).
+pub(super) unsafe extern "C" fn keep_message(
+    _comm: raw::MPI_Comm,
+    _line: c_int,
+    function: *const c_char,
+    _file: *const c_char,
+    code: raw::PetscErrorCode,
+    kind: raw::PetscErrorType::Type,
+    message: *const c_char,
+    _context: *mut c_void,
+) -> raw::PetscErrorCode {
+    if kind == raw::PetscErrorType::PETSC_ERROR_INITIAL {
+        let text = |p: *const c_char| match p.is_null() {
+            true => String::new(),
+            // SAFETY: PETSc passes NUL-terminated strings that live during this call.
+            false => unsafe { CStr::from_ptr(p) }.to_string_lossy().into_owned(),
+        };
+        let mut kept = MESSAGE.lock().unwrap_or_else(PoisonError::into_inner);
+        *kept = format!("{} (in {})", text(message).trim_end(), text(function));
+    }
+    code
+}
+
+/// Turns PETSc's return code into a result.
+pub(super) fn check(code: raw::PetscErrorCode) -> Result<(), PetscError> {
+    if code == 0 {
+        return Ok(());
+    }
+    let message = std::mem::take(&mut *MESSAGE.lock().unwrap_or_else(PoisonError::into_inner));
+    Err(PetscError { code, message })
+}

@@ -1,0 +1,115 @@
+//! Symmetric sparse matrices whose pattern is given once and whose values are refilled.
+
+use super::{
+    PetscError, Session, Vector, check, raw,
+    session::{Live, world},
+    vec::same_size,
+};
+use std::ptr;
+
+/// A square sparse matrix, rows distributed by ownership, filled through a COO pattern.
+pub struct Matrix {
+    pub(super) raw: raw::Mat,
+    owned: usize,
+    entries: usize,
+    _live: Live,
+}
+
+impl Matrix {
+    /// A symmetric matrix with `owned` rows on this rank and entries at the global positions
+    /// (`rows[k]`, `columns[k]`), repeated ones to be summed; negative ones are left out
+    /// (MatSetPreallocationCOO).
+    ///
+    /// # Errors
+    /// An index is outside the matrix, or PETSc fails.
+    pub fn with_pattern(
+        _session: &Session,
+        owned: usize,
+        block: usize,
+        mut rows: Vec<i32>,
+        mut columns: Vec<i32>,
+    ) -> Result<Self, PetscError> {
+        same_size(rows.len(), columns.len())?;
+        let local = i32::try_from(owned)
+            .map_err(|_| PetscError::ours(format!("{owned} rows exceed 32-bit indices")))?;
+        let entries = rows.len();
+        let mut matrix = Self { raw: ptr::null_mut(), owned, entries, _live: Live::new() };
+        // SAFETY: a fresh handle; the index arrays have `entries` values each (PETSc may reorder
+        // them, they are ours) and PETSc checks them against the sizes here.
+        unsafe {
+            check(raw::MatCreate(world(), &mut matrix.raw))?;
+            check(raw::MatSetSizes(matrix.raw, local, local, -1, -1))?;
+            check(raw::MatSetBlockSize(matrix.raw, block as i32))?;
+            check(raw::MatSetType(matrix.raw, c"aij".as_ptr()))?;
+            check(raw::MatSetPreallocationCOO(
+                matrix.raw,
+                entries as isize,
+                rows.as_mut_ptr(),
+                columns.as_mut_ptr(),
+            ))?;
+            for option in [raw::MatOption::MAT_SYMMETRIC, raw::MatOption::MAT_SYMMETRY_ETERNAL] {
+                check(raw::MatSetOption(matrix.raw, option, raw::PetscBool::PETSC_TRUE))?;
+            }
+        }
+        Ok(matrix)
+    }
+
+    /// Replaces all values: `values[k]` belongs to the pattern's k-th position (MatSetValuesCOO).
+    pub fn set_values(&mut self, values: &[f64]) -> Result<(), PetscError> {
+        same_size(self.entries, values.len())?;
+        // SAFETY: PETSc reads `entries` values.
+        check(unsafe {
+            raw::MatSetValuesCOO(self.raw, values.as_ptr(), raw::InsertMode::INSERT_VALUES)
+        })
+    }
+
+    /// `y` ← this · `x`.
+    pub fn multiply(&self, x: &Vector, y: &mut Vector) -> Result<(), PetscError> {
+        same_size(self.owned, x.owned())?;
+        same_size(self.owned, y.owned())?;
+        // SAFETY: three live handles of matching layout, `x` and `y` distinct by borrowing.
+        check(unsafe { raw::MatMult(self.raw, x.raw, y.raw) })
+    }
+
+    /// A copy scaled by `factor`, then with `shift` added to its diagonal.
+    pub fn scaled(&self, factor: f64, shift: f64) -> Result<Self, PetscError> {
+        let copy = self.duplicate()?;
+        // SAFETY: a live handle of our own.
+        unsafe {
+            check(raw::MatScale(copy.raw, factor))?;
+            check(raw::MatShift(copy.raw, shift))?;
+        }
+        Ok(copy)
+    }
+
+    /// A copy with `diagonal` (owned entries) added to its diagonal.
+    pub fn plus_diagonal(&self, diagonal: &Vector) -> Result<Self, PetscError> {
+        same_size(self.owned, diagonal.owned())?;
+        let copy = self.duplicate()?;
+        // SAFETY: live handles of matching layout.
+        check(unsafe { raw::MatDiagonalSet(copy.raw, diagonal.raw, raw::InsertMode::ADD_VALUES) })?;
+        Ok(copy)
+    }
+
+    fn duplicate(&self) -> Result<Self, PetscError> {
+        let mut copy =
+            Self { raw: ptr::null_mut(), owned: self.owned, entries: 0, _live: Live::new() };
+        // SAFETY: a live handle, a fresh one. The copy has no COO pattern: `entries` is 0.
+        check(unsafe {
+            raw::MatDuplicate(self.raw, raw::MatDuplicateOption::MAT_COPY_VALUES, &mut copy.raw)
+        })?;
+        Ok(copy)
+    }
+
+    /// Number of rows this rank owns.
+    pub fn owned(&self) -> usize {
+        self.owned
+    }
+}
+
+impl Drop for Matrix {
+    fn drop(&mut self) {
+        // SAFETY: the handle is ours; solvers that still use the matrix hold a reference of their own.
+        unsafe { raw::MatDestroy(&mut self.raw) };
+    }
+}

@@ -1,0 +1,144 @@
+//! PETSc's life in this process.
+
+use super::{PetscError, check, error, raw};
+use std::{
+    ffi::{CStr, CString, c_char, c_int},
+    ptr,
+    sync::{
+        Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicUsize, Ordering},
+    },
+};
+
+/// PETSc is not thread-safe: whoever holds this may call it.
+static TURN: Mutex<()> = Mutex::new(());
+/// Vectors, matrices and solvers not yet destroyed.
+static LIVE: AtomicUsize = AtomicUsize::new(0);
+
+/// The right to use PETSc; every object of this module is made from it.
+///
+/// PETSc is started by the first session of the process. Sessions of several threads
+/// (tests) take turns.
+pub struct Session {
+    _turn: MutexGuard<'static, ()>,
+}
+
+impl Session {
+    /// Starts PETSc with `options` (as on a PETSc command line), or waits for one's turn if
+    /// it runs already; then `options` are added to its options database.
+    ///
+    /// # Errors
+    /// PETSc or MPI could not be initialised, or rejected an option.
+    pub fn start(options: &[String]) -> Result<Self, PetscError> {
+        let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut running = raw::PetscBool::PETSC_FALSE;
+        // SAFETY: PetscInitialized may be called at any time.
+        check(unsafe { raw::PetscInitialized(&mut running) })?;
+        if running == raw::PetscBool::PETSC_FALSE {
+            initialize(options)?;
+        } else if !options.is_empty() {
+            let line = c_string(&options.join(" "))?;
+            // SAFETY: PETSc runs, the string lives during the call; null is the global database.
+            check(unsafe { raw::PetscOptionsInsertString(ptr::null_mut(), line.as_ptr()) })?;
+        }
+        Ok(Self { _turn: turn })
+    }
+
+    /// Number of ranks in the world communicator.
+    pub fn ranks(&self) -> usize {
+        let mut size: c_int = 1;
+        // SAFETY: MPI runs while a session exists.
+        unsafe { raw::MPI_Comm_size(world(), &mut size) };
+        size as usize
+    }
+
+    /// Options of the database that nothing has read: most likely misspelt.
+    pub fn unused_options(&self) -> Vec<String> {
+        let (mut count, mut names, mut values) = (0, ptr::null_mut(), ptr::null_mut());
+        let mut unused = Vec::new();
+        // SAFETY: PETSc fills `count` names that stay valid until they are given back.
+        unsafe {
+            let database = ptr::null_mut();
+            if raw::PetscOptionsLeftGet(database, &mut count, &mut names, &mut values) == 0 {
+                for i in 0..count as usize {
+                    let name = CStr::from_ptr(*names.add(i)).to_string_lossy();
+                    unused.push(format!("-{name}"));
+                }
+                raw::PetscOptionsLeftRestore(database, &mut count, &mut names, &mut values);
+            }
+        }
+        unused.retain(|name| name != "-no_signal_handler");
+        unused
+    }
+
+    /// Sets a default in the options database, unless the user has given that option.
+    pub(super) fn default_option(&self, name: &str, value: &str) -> Result<(), PetscError> {
+        let (name, value) = (c_string(name)?, c_string(value)?);
+        let mut given = raw::PetscBool::PETSC_FALSE;
+        let database = ptr::null_mut();
+        // SAFETY: the strings live during the calls; null is the global database.
+        unsafe {
+            check(raw::PetscOptionsHasName(database, ptr::null(), name.as_ptr(), &mut given))?;
+            if given == raw::PetscBool::PETSC_FALSE {
+                check(raw::PetscOptionsSetValue(database, name.as_ptr(), value.as_ptr()))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Ends PETSc and MPI. Call it last; without it MPI complains at exit.
+    ///
+    /// # Errors
+    /// Objects made from this session still live, or PETSc fails to finalize.
+    pub fn finalize(self) -> Result<(), PetscError> {
+        match LIVE.load(Ordering::Relaxed) {
+            // SAFETY: nothing of PETSc is alive any more.
+            0 => check(unsafe { raw::PetscFinalize() }),
+            n => Err(PetscError::ours(format!("{n} PETSc objects outlive their session"))),
+        }
+    }
+}
+
+fn initialize(options: &[String]) -> Result<(), PetscError> {
+    let mut arguments = vec![c_string("signorini")?, c_string("-no_signal_handler")?];
+    for option in options {
+        arguments.push(c_string(option)?);
+    }
+    let mut pointers: Vec<*mut c_char> = arguments.into_iter().map(CString::into_raw).collect();
+    pointers.push(ptr::null_mut());
+    let mut count = (pointers.len() - 1) as c_int;
+    // PETSc keeps the argument vector for the life of the process, so it is given away.
+    let mut argv = pointers.leak().as_mut_ptr();
+    // SAFETY: argc and argv describe a null-terminated array of strings that is never freed.
+    unsafe {
+        check(raw::PetscInitialize(&mut count, &mut argv, ptr::null(), ptr::null()))?;
+        check(raw::PetscPushErrorHandler(Some(error::keep_message), ptr::null_mut()))
+    }
+}
+
+/// `PETSC_COMM_WORLD`.
+pub(super) fn world() -> raw::MPI_Comm {
+    // SAFETY: written once by PetscInitialize, read-only afterwards.
+    unsafe { raw::PETSC_COMM_WORLD }
+}
+
+/// A C string; a NUL inside is the user's typing error.
+pub(super) fn c_string(text: &str) -> Result<CString, PetscError> {
+    CString::new(text).map_err(|_| PetscError::ours(format!("`{text}` holds a NUL character")))
+}
+
+/// Counts an object for as long as it lives.
+pub(super) struct Live;
+
+impl Live {
+    pub(super) fn new() -> Self {
+        LIVE.fetch_add(1, Ordering::Relaxed);
+        Self
+    }
+}
+
+impl Drop for Live {
+    fn drop(&mut self) {
+        LIVE.fetch_sub(1, Ordering::Relaxed);
+    }
+}
