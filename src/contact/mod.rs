@@ -20,17 +20,12 @@ use crate::petsc::Session;
 /// The solvers a scene or `--solver` may name, the default first.
 pub const SOLVERS: [&str; 2] = ["tao", "penalty-duality"];
 
-/// The solver called `name`; `None` if there is none. Without bounds every name means
-/// one linear solve.
-pub fn solver<'s>(
-    session: &'s Session,
-    name: &str,
-    bounded: bool,
-) -> Option<Box<dyn ContactSolver + 's>> {
+/// The solver called `name`, the default if there is none of that name. Without bounds
+/// every name means one linear solve.
+pub fn solver<'s>(session: &'s Session, name: &str, bounded: bool) -> Box<dyn ContactSolver + 's> {
     match name {
-        _ if !SOLVERS.contains(&name) => None,
-        _ if !bounded => Some(Box::new(linear::Linear::new(session))),
-        "penalty-duality" => Some(Box::new(penalty_duality::PenaltyDuality::new(session))),
-        _ => Some(Box::new(tao::Tao::new(session))),
+        _ if !bounded => Box::new(linear::Linear::new(session)),
+        "penalty-duality" => Box::new(penalty_duality::PenaltyDuality::new(session)),
+        _ => Box::new(tao::Tao::new(session)),
     }
 }

@@ -1,0 +1,221 @@
+//! The contact step (26): from ζ_n and f_n to a certified u_n.
+
+use super::{ContactPoint, Phases, RunError, Setting, State, Step, StepRecord};
+use crate::{
+    contact::{self, ContactError, ContactProblem, ContactReport, ContactSolver, Kkt},
+    fem::Stiffness,
+    petsc::{PetscError, Session, Vector},
+};
+use std::time::Instant;
+
+/// Solves the contact problems of a run, one after the other.
+pub struct Equilibrium<'a> {
+    setting: &'a Setting,
+    phases: &'a Phases,
+    solver: Box<dyn ContactSolver + 'a>,
+    stiffness: Stiffness,
+    /// The triangle means of η_*(ζ) that K was filled with, and how often it was.
+    zeta_mean: Vec<f64>,
+    revision: usize,
+    load: Vector,
+    c: Vector,
+    prescribed: Vec<bool>,
+}
+
+/// How often a solver is asked again, more precisely, when its answer misses the tolerance.
+const ATTEMPTS: usize = 3;
+
+impl<'a> Equilibrium<'a> {
+    /// With the contact solver called `solver`; an unknown name means the default.
+    pub fn new(
+        session: &'a Session,
+        setting: &'a Setting,
+        solver: &str,
+        phases: &'a Phases,
+    ) -> Result<Self, PetscError> {
+        let (body, constraints) = (&setting.body, &setting.constraints);
+        let owned = 2 * body.partition.owned();
+        let stiffness = phases.time("stiffness pattern", || {
+            Stiffness::new(session, body, &setting.elasticity, &constraints.frames)
+        })?;
+        Ok(Self {
+            setting,
+            phases,
+            solver: contact::solver(session, solver, !constraints.bounds.is_empty()),
+            stiffness,
+            zeta_mean: vec![1.0; body.triangles.len()],
+            revision: 0,
+            load: Vector::zeros(session, owned)?,
+            c: Vector::zeros(session, owned)?,
+            prescribed: constraints.is_prescribed(),
+        })
+    }
+
+    /// The name of the method in use.
+    pub fn method(&self) -> &'static str {
+        self.solver.name()
+    }
+
+    /// u_n at `time` for the nodal damage `zeta`, starting from u_{n−1}.
+    ///
+    /// # Errors
+    /// The solver failed, or no answer of its met the KKT tolerance.
+    pub fn solve(&mut self, step: usize, time: f64, zeta: &[f64]) -> Result<Step, RunError> {
+        let started = Instant::now();
+        let (setting, phases) = (self.setting, self.phases);
+        let zeta_mean = setting.triangle_means(zeta);
+        if zeta_mean != self.zeta_mean {
+            phases.time("stiffness refill", || self.stiffness.refill(&zeta_mean))?;
+            self.revision += 1;
+            self.zeta_mean = zeta_mean;
+        }
+        let external = phases.time("loads", || setting.loads.at(&setting.body, time));
+        let lift = setting.lift(time)?;
+        let force_scale = self.set_load(&external, &lift)?;
+
+        let mut total = ContactReport::default();
+        let mut tolerance = setting.tolerance;
+        let failed = |source| RunError::Contact { step, time, source };
+        for attempt in 1..=ATTEMPTS {
+            let report = self.solve_contact(force_scale, tolerance).map_err(failed)?;
+            total.iterations += report.iterations;
+            total.linear_iterations += report.linear_iterations;
+            let u = self.displacement(&lift)?;
+            let (kkt, contact) =
+                phases.time("certificate", || self.certify(&u, &external));
+            if kkt.within(setting.tolerance) {
+                let state = State {
+                    time,
+                    u,
+                    zeta: zeta.to_vec(),
+                    zeta_mean: self.zeta_mean.clone(),
+                    contact,
+                };
+                let mut record = figures(setting, step, &state, &external, &total, &kkt);
+                record.seconds = started.elapsed().as_secs_f64();
+                return Ok(Step { state, record });
+            }
+            if attempt == ATTEMPTS || kkt.worst().is_nan() {
+                return Err(failed(ContactError::NotCertified {
+                    method: self.solver.name(),
+                    tolerance: setting.tolerance,
+                    residuals: kkt,
+                }));
+            }
+            tolerance *= 0.3 * setting.tolerance / kkt.worst();
+        }
+        unreachable!("the last attempt returns")
+    }
+
+    /// Sets the load of the free unknowns, f − K u_D, and returns the size of forces.
+    fn set_load(&mut self, external: &[f64], lift: &[f64]) -> Result<f64, PetscError> {
+        let setting = self.setting;
+        let (body, frames) = (&setting.body, &setting.constraints.frames);
+        let mut load = external.to_vec();
+        let mut scale = body.partition.norm(&load, 2);
+        if lift.iter().any(|&v| v != 0.0) {
+            let mut u = lift.to_vec();
+            frames.displacement_from_frame(&mut u);
+            let internal = setting.elasticity.internal_force(body, &self.zeta_mean, &u);
+            load.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
+            scale = body.partition.norm(&load, 2);
+        }
+        frames.force_to_frame(&mut load);
+        load.iter_mut().zip(frames.fixed()).for_each(|(f, fixed)| *f = if *fixed { 0.0 } else { *f });
+        self.load.set(&load[..self.load.owned()])?;
+        Ok(scale)
+    }
+
+    fn solve_contact(
+        &mut self,
+        force_scale: f64,
+        tolerance: f64,
+    ) -> Result<ContactReport, ContactError> {
+        let setting = self.setting;
+        if self.load.read(|f| f.iter().all(|&f| f == 0.0))? {
+            // Nothing pushes and no gap is negative: the body rests.
+            self.c.write(|c| c.fill(0.0))?;
+            return Ok(ContactReport::default());
+        }
+        let problem = ContactProblem {
+            stiffness: &self.stiffness.matrix,
+            revision: self.revision,
+            stiffness_scale: self.stiffness.scale,
+            load: &self.load,
+            bounds: &setting.constraints.bounds,
+            definite: !setting.motions.resisted_by_contact_only(),
+            force_scale,
+            tolerance,
+        };
+        self.phases.time("contact", || self.solver.solve(&problem, &mut self.c))
+    }
+
+    /// u from the unknowns c and the prescribed ones, without free rigid motions.
+    fn displacement(&self, lift: &[f64]) -> Result<Vec<f64>, PetscError> {
+        let setting = self.setting;
+        let mut u = lift.to_vec();
+        self.c.read(|c| u.iter_mut().zip(c).for_each(|(u, c)| *u += c))?;
+        setting.constraints.frames.displacement_from_frame(&mut u);
+        setting.motions.remove_free(&setting.body, &mut u);
+        Ok(u)
+    }
+
+    /// The KKT residuals of u by element-wise forces, and the state of contact they imply.
+    fn certify(&self, u: &[f64], external: &[f64]) -> (Kkt, Vec<ContactPoint>) {
+        let setting = self.setting;
+        let (body, constraints) = (&setting.body, &setting.constraints);
+        let internal = setting.elasticity.internal_force(body, &self.zeta_mean, u);
+        let partition = &body.partition;
+        let force_scale = partition.norm(external, 2).max(partition.norm(&internal, 2));
+        let size = largest(u);
+
+        let mut residual: Vec<f64> = internal.iter().zip(external).map(|(r, f)| r - f).collect();
+        let mut c = u.to_vec();
+        constraints.frames.force_to_frame(&mut residual);
+        constraints.frames.displacement_to_frame(&mut c);
+        let bounds = &constraints.bounds;
+        let kkt =
+            Kkt::of(&residual, &c, bounds, |dof| self.prescribed[dof], force_scale, size);
+        let points = bounds.iter().map(|bound| {
+            let (force, gap) = (-residual[bound.dof], bound.gap - c[bound.dof]);
+            let active = force * size > gap * force_scale;
+            ContactPoint { node: bound.node, force, pressure: force / bound.weight, gap, active }
+        });
+        (kkt, points.collect())
+    }
+}
+
+/// The largest nodal |u|.
+fn largest(u: &[f64]) -> f64 {
+    u.chunks(2).map(|u| u[0].hypot(u[1])).fold(0.0, f64::max)
+}
+
+fn figures(
+    setting: &Setting,
+    step: usize,
+    state: &State,
+    external: &[f64],
+    report: &ContactReport,
+    kkt: &Kkt,
+) -> StepRecord {
+    let mut active: Vec<usize> =
+        state.contact.iter().filter(|point| point.active).map(|point| point.node).collect();
+    active.dedup();
+    StepRecord {
+        step,
+        time: state.time,
+        zeta_min: state.zeta.iter().copied().fold(f64::INFINITY, f64::min),
+        zeta_mean: setting.body.mean(&state.zeta),
+        displacement_max: largest(&state.u),
+        work: setting.body.partition.dot(external, &state.u, 2),
+        contact_force: state.contact.iter().map(|point| point.force).sum(),
+        active_nodes: active.len(),
+        iterations: report.iterations,
+        linear_iterations: report.linear_iterations,
+        kkt_stationarity: kkt.stationarity,
+        kkt_primal: kkt.primal,
+        kkt_dual: kkt.dual,
+        kkt_complementarity: kkt.complementarity,
+        seconds: 0.0,
+    }
+}

@@ -1,0 +1,244 @@
+//! The physical setting: a scene bound to its mesh, everything that does not change with time.
+
+use super::Loads;
+use crate::{
+    contact::{
+        ConstraintError, Constraints, DrivenMotion, FixedRow, GapRow, RigidMotion, RigidMotions,
+    },
+    fem::{Body, Elasticity},
+    mesh::{Mesh, boundary_nodes},
+    model::DamageLaw,
+    scene::{Scene, SceneError},
+};
+use std::path::PathBuf;
+
+/// A scene on its mesh, ready to be stepped.
+#[derive(Debug)]
+pub struct Setting {
+    /// The body.
+    pub body: Body,
+    /// The undamaged elastic operator.
+    pub elasticity: Elasticity,
+    /// Displacement conditions.
+    pub constraints: Constraints,
+    /// Rigid motions that Γ_D does not hold.
+    pub motions: RigidMotions,
+    /// Loads and prescribed displacements.
+    pub loads: Loads,
+    /// KKT tolerance.
+    pub tolerance: f64,
+    /// The foundation opposite Γ_C, in segments, m.
+    pub foundation: Vec<[[f64; 2]; 2]>,
+    scene: Scene,
+}
+
+/// The scene and its mesh do not make a problem: bad input.
+#[derive(Debug, thiserror::Error)]
+pub enum SetupError {
+    /// The scene does not fit the mesh.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// Displacement conditions contradict each other.
+    #[error("{scene}: {source}")]
+    Constraint {
+        /// The scene file.
+        scene: PathBuf,
+        /// What contradicts what.
+        source: ConstraintError,
+    },
+    /// The load drives a rigid motion.
+    #[error("{scene}: at t = {time}, {source}")]
+    Driven {
+        /// The scene file.
+        scene: PathBuf,
+        /// The first such time, s.
+        time: f64,
+        /// The motion.
+        source: DrivenMotion,
+    },
+}
+
+impl Setting {
+    /// Binds `scene` to `mesh` and checks that there is a solution at all times.
+    ///
+    /// # Errors
+    /// The scene does not fit the mesh, contradicts itself, or its load drives a rigid motion.
+    pub fn new(scene: Scene, mesh: Mesh) -> Result<Self, SetupError> {
+        scene.check_mesh(&mesh)?;
+        let body = Body::new(mesh);
+        let (fixed, prescribed) = fixed_rows(&scene, &body.mesh);
+        let gaps = gap_rows(&scene, &body.mesh);
+        let mut constraints = Constraints::new(&body.mesh.nodes, &fixed, &gaps)
+            .map_err(|source| SetupError::Constraint { scene: scene.path.clone(), source })?;
+        let directions: Vec<_> = fixed.iter().map(|row| (row.node, row.direction)).collect();
+        let motions = RigidMotions::new(&body, &directions, &gaps);
+        let loads = Loads::new(&scene, &body, prescribed);
+        motions.pin_free(&body, &mut constraints);
+
+        let setting = Self {
+            elasticity: Elasticity::new(scene.material),
+            constraints,
+            motions,
+            loads,
+            tolerance: scene.contact.tolerance,
+            foundation: foundation(&scene, &body.mesh),
+            body,
+            scene,
+        };
+        setting.check_times()?;
+        Ok(setting)
+    }
+
+    fn check_times(&self) -> Result<(), SetupError> {
+        for time in (0..=self.steps()).map(|n| self.time(n)) {
+            self.lift(time)?;
+            if !self.motions.held() {
+                let load = self.loads.at(&self.body, time);
+                self.motions.check(&self.body, &load).map_err(|source| SetupError::Driven {
+                    scene: self.scene.path.clone(),
+                    time,
+                    source,
+                })?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The prescribed unknowns at `time`, zero elsewhere.
+    ///
+    /// # Errors
+    /// Prescribed values contradict each other or go through the obstacle.
+    pub fn lift(&self, time: f64) -> Result<Vec<f64>, SetupError> {
+        let values = self.loads.prescribed_at(time);
+        self.constraints
+            .lift(&values, &self.body.mesh.nodes)
+            .map_err(|source| SetupError::Constraint { scene: self.scene.path.clone(), source })
+    }
+
+    /// Number of time steps N after the first solve.
+    pub fn steps(&self) -> usize {
+        self.scene.time.map_or(0, |grid| grid.steps)
+    }
+
+    /// t_n, s; without a time grid the one solve is at t = 1.
+    pub fn time(&self, n: usize) -> f64 {
+        match self.scene.time {
+            None => 1.0,
+            Some(grid) if n == grid.steps => grid.end,
+            Some(grid) => n as f64 * grid.step(),
+        }
+    }
+
+    /// The time step k, s, where the body can be damaged in time.
+    pub fn damage(&self) -> Option<(DamageLaw, f64)> {
+        Some((self.scene.damage.as_ref()?.law, self.scene.time?.step()))
+    }
+
+    /// ζ₀ at the nodes: π^h ζ₀, or 1 for a material that is not damaged.
+    pub fn initial_damage(&self) -> Vec<f64> {
+        let nodes = &self.body.mesh.nodes;
+        match &self.scene.damage {
+            Some(damage) => nodes.iter().map(|&[x, y]| damage.initial.eval(x, y, 0.0)).collect(),
+            None => vec![1.0; nodes.len()],
+        }
+    }
+
+    /// min ζ if it has reached ζ_*.
+    pub fn at_threshold(&self, zeta: &[f64]) -> Option<f64> {
+        let threshold = self.scene.damage.as_ref()?.law.threshold;
+        let least = zeta.iter().copied().fold(f64::INFINITY, f64::min);
+        (least.is_nan() || least <= threshold).then_some(least)
+    }
+
+    /// The mean of η_*(ζ) over each triangle.
+    pub fn triangle_means(&self, zeta: &[f64]) -> Vec<f64> {
+        let truncate = |z: f64| match &self.scene.damage {
+            Some(damage) => damage.law.truncate(z),
+            None => z,
+        };
+        let mean = |t: &[usize; 3]| t.iter().map(|&node| truncate(zeta[node])).sum::<f64>() / 3.0;
+        self.body.mesh.triangles.iter().map(mean).collect()
+    }
+
+    /// What the user should know about rigid motions.
+    pub fn notes(&self) -> Vec<String> {
+        let note = |motion: &RigidMotion| {
+            format!("nothing holds or drives {motion}: of all answers the one of least ∫|u|² is given")
+        };
+        self.motions.free.iter().map(note).collect()
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+}
+
+type Prescribed = Vec<Option<([f64; 2], crate::scene::Expression)>>;
+
+/// Prescribed components and symmetry axes as rows u·d = value, with their values' sources.
+fn fixed_rows(scene: &Scene, mesh: &Mesh) -> (Vec<FixedRow>, Prescribed) {
+    let (mut rows, mut sources) = (Vec::new(), Vec::new());
+    for boundary in &scene.boundaries {
+        let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
+        for point in boundary_nodes(mesh, &curve.edges) {
+            let node = point.node;
+            let components = boundary.displacement.iter().flatten();
+            for (component, direction) in components.zip([[1.0, 0.0], [0.0, 1.0]]) {
+                if let Some(value) = component {
+                    rows.push(FixedRow { node, direction });
+                    sources.push(Some((mesh.nodes[node], value.clone())));
+                }
+            }
+            if boundary.symmetry {
+                for face in &point.faces {
+                    rows.push(FixedRow { node, direction: face.normal });
+                    sources.push(None);
+                }
+            }
+        }
+    }
+    (rows, sources)
+}
+
+/// The gap conditions u·ν ≤ g of Γ_C, node by node.
+fn gap_rows(scene: &Scene, mesh: &Mesh) -> Vec<GapRow> {
+    let mut rows = Vec::new();
+    for boundary in &scene.boundaries {
+        let (Some(gap), Some(curve)) = (&boundary.gap, mesh.curves.get(&boundary.name)) else {
+            continue;
+        };
+        for point in boundary_nodes(mesh, &curve.edges) {
+            let [x, y] = mesh.nodes[point.node];
+            let distance = gap.distance.eval(x, y, 0.0);
+            let mut row = |normal, weight| {
+                rows.push(GapRow { node: point.node, normal, gap: distance, weight });
+            };
+            match gap.normal {
+                Some(normal) => row(normal, point.faces.iter().map(|f| f.length).sum()),
+                None => point.faces.iter().for_each(|face| row(face.normal, face.length)),
+            }
+        }
+    }
+    rows
+}
+
+/// Γ_C moved by the gap along the normal: what the body may not cross.
+fn foundation(scene: &Scene, mesh: &Mesh) -> Vec<[[f64; 2]; 2]> {
+    let mut segments = Vec::new();
+    for boundary in &scene.boundaries {
+        let (Some(gap), Some(curve)) = (&boundary.gap, mesh.curves.get(&boundary.name)) else {
+            continue;
+        };
+        for &[a, b] in &curve.edges {
+            let (p, q) = (mesh.nodes[a], mesh.nodes[b]);
+            let length = (q[0] - p[0]).hypot(q[1] - p[1]);
+            let n = gap.normal.unwrap_or([(q[1] - p[1]) / length, (p[0] - q[0]) / length]);
+            segments.push([p, q].map(|[x, y]| {
+                let g = gap.distance.eval(x, y, 0.0);
+                [x + g * n[0], y + g * n[1]]
+            }));
+        }
+    }
+    segments
+}

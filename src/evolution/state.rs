@@ -1,0 +1,90 @@
+//! An accepted step: its fields and its figures.
+
+use crate::contact::Kkt;
+use serde::Serialize;
+
+/// An accepted step.
+#[derive(Debug, Clone)]
+pub struct Step {
+    /// The fields.
+    pub state: State,
+    /// A row of `history.csv`.
+    pub record: StepRecord,
+}
+
+/// The fields of an accepted step.
+#[derive(Debug, Clone)]
+pub struct State {
+    /// t, s.
+    pub time: f64,
+    /// Displacements (u_x, u_y) in turn, m.
+    pub u: Vec<f64>,
+    /// ζ at the nodes.
+    pub zeta: Vec<f64>,
+    /// Mean of η_*(ζ) on each triangle: what multiplies the stiffness there.
+    pub zeta_mean: Vec<f64>,
+    /// The nodes of Γ_C that carry a gap condition; two entries at a corner.
+    pub contact: Vec<ContactPoint>,
+}
+
+/// A gap condition at a node and how it is met.
+#[derive(Debug, Clone, Copy)]
+pub struct ContactPoint {
+    /// The node.
+    pub node: usize,
+    /// Normal reaction, N per metre of thickness; positive presses.
+    pub force: f64,
+    /// The reaction over the node's share of Γ_C, Pa.
+    pub pressure: f64,
+    /// g − u·ν: the gap that is left, m.
+    pub gap: f64,
+    /// Whether the node presses rather than gapes, force against gap in relative size.
+    pub active: bool,
+}
+
+/// The figures of a step: a row of `history.csv`.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct StepRecord {
+    /// n.
+    pub step: usize,
+    /// t_n, s.
+    pub time: f64,
+    /// min ζ.
+    pub zeta_min: f64,
+    /// ∫ζ/|Ω|.
+    pub zeta_mean: f64,
+    /// Largest nodal |u|, m.
+    pub displacement_max: f64,
+    /// fᵀu, J per metre of thickness.
+    pub work: f64,
+    /// Σ normal reactions, N per metre of thickness.
+    pub contact_force: f64,
+    /// Contact nodes that press.
+    pub active_nodes: usize,
+    /// Iterations of the contact solver.
+    pub iterations: usize,
+    /// Iterations of the linear solvers inside it.
+    pub linear_iterations: usize,
+    /// Relative KKT residuals.
+    pub kkt_stationarity: f64,
+    /// See [`Kkt`].
+    pub kkt_primal: f64,
+    /// See [`Kkt`].
+    pub kkt_dual: f64,
+    /// See [`Kkt`].
+    pub kkt_complementarity: f64,
+    /// Wall time of the step, s.
+    pub seconds: f64,
+}
+
+impl StepRecord {
+    /// The step's KKT residuals.
+    pub fn kkt(&self) -> Kkt {
+        Kkt {
+            stationarity: self.kkt_stationarity,
+            primal: self.kkt_primal,
+            dual: self.kkt_dual,
+            complementarity: self.kkt_complementarity,
+        }
+    }
+}
