@@ -55,16 +55,14 @@ pub enum SceneError {
         problem: String,
     },
     /// A key or boundary that nothing reads.
-    #[error("{place}: unknown key {key}{}", suggestion(nearest.as_deref(), known))]
+    #[error("{place}: unknown key {key}{names}")]
     UnknownKey {
         /// Where it stands.
         place: Place,
         /// The key in full.
         key: String,
-        /// The known key that resembles it.
-        nearest: Option<String>,
-        /// All keys known at this place.
-        known: Vec<String>,
+        /// The keys known at this place.
+        names: Box<Names>,
     },
     /// A key that must be there is not.
     #[error("{place}: {key} is required but missing")]
@@ -85,16 +83,14 @@ pub enum SceneError {
         problem: String,
     },
     /// A boundary names no physical curve of the mesh.
-    #[error("{place}: {key} is no physical curve of the mesh{}", suggestion(nearest.as_deref(), known))]
+    #[error("{place}: {key} is no physical curve of the mesh{names}")]
     UnknownCurve {
         /// Where the boundary stands.
         place: Place,
         /// The boundary.
         key: String,
-        /// The curve that resembles it.
-        nearest: Option<String>,
         /// The curves of the mesh.
-        known: Vec<String>,
+        names: Box<Names>,
     },
 }
 
@@ -105,26 +101,20 @@ pub enum ExpressionError {
     #[error("is empty; write a number or an expression in x, y, t")]
     Empty,
     /// A name that is neither a variable nor π.
-    #[error(
-        "has the unknown variable `{name}`{}",
-        suggestion(nearest.as_deref(), &known_names())
-    )]
+    #[error("has the unknown variable `{name}`{names}")]
     UnknownVariable {
         /// The name as written.
         name: String,
-        /// The known name that resembles it.
-        nearest: Option<String>,
+        /// The known names.
+        names: Names,
     },
     /// A call of something that is no function.
-    #[error(
-        "has the unknown function `{name}`{}",
-        suggestion(nearest.as_deref(), &known_names())
-    )]
+    #[error("has the unknown function `{name}`{names}")]
     UnknownFunction {
         /// The name as written.
         name: String,
-        /// The known name that resembles it.
-        nearest: Option<String>,
+        /// The known names.
+        names: Names,
     },
     /// A function with too few or too many arguments.
     #[error("calls `{function}` with {given} arguments; it takes {needed}, in brackets")]
@@ -170,41 +160,58 @@ impl ExpressionError {
     pub(super) fn unknown_variable(name: &str) -> Self {
         Self::UnknownVariable {
             name: name.into(),
-            nearest: nearest(name, &known_names()),
+            names: known_names(name),
         }
     }
 
     pub(super) fn unknown_function(name: &str) -> Self {
         Self::UnknownFunction {
             name: name.into(),
-            nearest: nearest(name, &known_names()),
+            names: known_names(name),
         }
     }
 }
 
-fn known_names() -> Vec<String> {
+/// What can be named in an expression, by likeness to `name`.
+fn known_names(name: &str) -> Names {
     let variables = ["x", "y", "t", grammar::PI];
     let functions = grammar::UNARY.iter().chain(&grammar::BINARY);
-    variables
-        .iter()
-        .chain(functions)
-        .map(|n| (*n).into())
-        .collect()
+    let all = variables.iter().chain(functions);
+    Names::like(name, all.map(|n| (*n).to_owned()).collect())
 }
 
-/// The one of `known` most like `name`, if any is alike at all.
-pub(super) fn nearest(name: &str, known: &[String]) -> Option<String> {
-    let name = name.to_lowercase();
-    let alike = |k: &String| strsim::normalized_damerau_levenshtein(&name, &k.to_lowercase());
-    let best = known.iter().map(|k| (alike(k), k));
-    let best = best.reduce(|a, b| if b.0 > a.0 { b } else { a })?;
-    (best.0 >= 0.5).then(|| best.1.clone())
+/// The names known at some place, and the one that was perhaps meant.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Names {
+    /// The known name most like the one written, if any is alike at all.
+    pub nearest: Option<String>,
+    /// All known names.
+    pub known: Vec<String>,
 }
 
-fn suggestion(nearest: Option<&str>, known: &[String]) -> String {
-    let meant = nearest.map_or(String::new(), |n| format!("; did you mean `{n}`?"));
-    if known.is_empty() {
-        return format!("{meant} (there are none)");
+impl Names {
+    /// The `known` names, for someone who wrote `name`.
+    pub(super) fn like(name: &str, known: Vec<String>) -> Self {
+        let name = name.to_lowercase();
+        let alike = |k: &String| strsim::normalized_damerau_levenshtein(&name, &k.to_lowercase());
+        let best = known.iter().map(|k| (alike(k), k));
+        let best = best.reduce(|a, b| if b.0 > a.0 { b } else { a });
+        Self {
+            nearest: best.filter(|b| b.0 >= 0.5).map(|b| b.1.clone()),
+            known,
+        }
     }
-    format!("{meant} (known: {})", known.join(", "))
+}
+
+/// The tail of a message: what was perhaps meant, and all that is known.
+impl fmt::Display for Names {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(nearest) = &self.nearest {
+            write!(f, "; did you mean `{nearest}`?")?;
+        }
+        match self.known.as_slice() {
+            [] => f.write_str(" (there are none)"),
+            known => write!(f, " (known: {})", known.join(", ")),
+        }
+    }
 }
