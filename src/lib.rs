@@ -11,3 +11,6 @@ pub mod mesh;
 pub mod model;
 pub mod fem;
 pub mod contact;
+pub mod scene;
+pub mod evolution;
+pub mod output;

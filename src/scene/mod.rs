@@ -1,0 +1,184 @@
+//! Scenes: what to solve, read from a TOML file and checked before anything runs.
+//!
+//! [`Scene::read`] checks everything the file alone can tell; [`Scene::check_mesh`]
+//! checks what needs the mesh. Units are SI throughout.
+
+mod boundaries;
+mod check;
+mod error;
+mod expression;
+mod file;
+mod grammar;
+mod source;
+mod validate;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+pub use error::{ExpressionError, Names, Place, SceneError};
+pub use expression::Expression;
+
+use crate::model::{DamageLaw, Material};
+use source::Source;
+
+/// A problem to solve, as described by a scene file.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// The scene file, as given.
+    pub path: PathBuf,
+    /// The file's stem: results go to `out/<name>/`.
+    pub name: String,
+    /// One line for people; the name when the file has no `title`.
+    pub title: String,
+    /// Where the mesh comes from.
+    pub mesh: MeshSource,
+    /// The undamaged material.
+    pub material: Material,
+    /// The damage law and ζ₀; without it nothing is damaged.
+    pub damage: Option<Damage>,
+    /// The time grid; without it there is one static solve at t = 1.
+    pub time: Option<TimeGrid>,
+    /// Body force f_B, N/m³.
+    pub body_force: [Expression; 2],
+    /// How the contact problem is solved.
+    pub contact: ContactOptions,
+    /// What is written.
+    pub output: OutputOptions,
+    /// What holds on the named parts of the boundary; each name once.
+    pub boundaries: Vec<Boundary>,
+    source: Source,
+}
+
+/// A mesh file and, for a `.geo`, the constants it is meshed with.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeshSource {
+    /// A `.geo` or `.msh` file.
+    pub file: PathBuf,
+    /// Constants set in the `.geo`, by name; `size` is the mesh size, m.
+    pub parameters: BTreeMap<String, f64>,
+}
+
+impl MeshSource {
+    /// The mesh in `file`, with no parameters (`--mesh FILE`).
+    pub fn from_path(file: impl Into<PathBuf>) -> Self {
+        Self {
+            file: file.into(),
+            parameters: BTreeMap::new(),
+        }
+    }
+}
+
+/// How the material is damaged, and its state at t = 0.
+#[derive(Debug, Clone)]
+pub struct Damage {
+    /// The damage law.
+    pub law: DamageLaw,
+    /// ζ₀(x, y) in (ζ_*, 1].
+    pub initial: Expression,
+}
+
+/// Whether ζ is in (ζ_*, 1], as ζ₀ must be.
+fn may_start_at(law: &DamageLaw, zeta: f64) -> bool {
+    law.threshold < zeta && zeta <= 1.0
+}
+
+/// A uniform partition of [0, T].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TimeGrid {
+    /// T, s.
+    pub end: f64,
+    /// N, at least 1.
+    pub steps: usize,
+}
+
+impl TimeGrid {
+    /// The uniform partition (25) of [0, `end`] closest to `step` (both positive, s)
+    /// and not coarser. A step that divides the end up to rounding is kept.
+    pub fn new(end: f64, step: f64) -> Self {
+        let steps = (end / step - 1e-9).ceil().max(1.0);
+        Self {
+            end,
+            steps: steps as usize,
+        }
+    }
+
+    /// k = T/N, s.
+    pub fn step(&self) -> f64 {
+        self.end / self.steps as f64
+    }
+}
+
+/// How the contact problem is solved.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ContactOptions {
+    /// The solver's name, if the scene asks for one; who runs the scene knows the names.
+    pub solver: Option<String>,
+    /// Relative tolerance of the KKT residuals, in (0, 1).
+    pub tolerance: f64,
+}
+
+/// What is written while the scene runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OutputOptions {
+    /// Fields are written every so many steps, at least 1.
+    pub every: Option<usize>,
+}
+
+/// What holds on one physical curve.
+#[derive(Debug, Clone)]
+pub struct Boundary {
+    /// The physical curve.
+    pub name: String,
+    /// Γ_D: prescribed displacement by component, m; a `None` component is free (never
+    /// both). Stands alone or with a traction on the free component.
+    pub displacement: Option<[Option<Expression>; 2]>,
+    /// A symmetry axis: u·ν = 0.
+    pub symmetry: bool,
+    /// Γ_N: surface traction f_N, N/m².
+    pub traction: Option<[Expression; 2]>,
+    /// Γ_C: the obstacle.
+    pub gap: Option<Gap>,
+}
+
+/// A rigid obstacle.
+#[derive(Debug, Clone)]
+pub struct Gap {
+    /// g(x, y) ≥ 0 along the normal, m.
+    pub distance: Expression,
+    /// Unit vector towards the obstacle; the body's outward normal when absent.
+    pub normal: Option<[f64; 2]>,
+}
+
+impl Scene {
+    /// Reads and checks the scene at `path`.
+    ///
+    /// `overrides` are `--set` arguments, `time.step=0.005`: a dotted key and a TOML
+    /// value; a value that is not TOML is taken as a string. `boundary.NAME.key=…`
+    /// addresses a boundary by its name. Relative mesh files start at the scene's
+    /// directory, in the file and in `--set` alike.
+    ///
+    /// # Errors
+    /// The file cannot be read or is no TOML; a key is unknown, missing or of the wrong
+    /// type; a value is out of range or contradicts another. Every error tells the file,
+    /// the line (or the `--set`), the key and what to write instead.
+    pub fn read(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
+        let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
+        Self::parse(&text, path, overrides)
+    }
+
+    /// As [`Scene::read`], from the text of a file that would stand at `path`.
+    ///
+    /// # Errors
+    /// As [`Scene::read`], but for the reading itself.
+    pub fn parse(text: &str, path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
+        let documents = overrides.iter().map(|set| source::set_document(set));
+        let documents = documents.collect::<Result<Vec<_>, _>>()?;
+        let mut source = Source::new(path, text, overrides, &documents);
+        let root = source.table(text, &documents)?;
+        let file = file::read(root, &source)?;
+        validate::scene(file, path, source)
+    }
+}

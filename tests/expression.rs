@@ -1,0 +1,195 @@
+//! The laws of expressions: precedence, names, numbers, and what is refused.
+
+use signorini::scene::Expression;
+
+fn value(text: &str) -> f64 {
+    at(text, 0.0, 0.0, 0.0)
+}
+
+fn at(text: &str, x: f64, y: f64, t: f64) -> f64 {
+    let parsed = Expression::parse(text).unwrap_or_else(|e| panic!("`{text}` {e}"));
+    parsed.eval(x, y, t)
+}
+
+fn refusal(text: &str) -> String {
+    match Expression::parse(text) {
+        Ok(parsed) => panic!("`{text}` was read as {parsed:?}"),
+        Err(e) => e.to_string(),
+    }
+}
+
+#[test]
+fn precedence_and_associativity_are_those_of_mathematics() {
+    for (text, expected) in [
+        ("1+2*3", 7.0),
+        ("(1+2)*3", 9.0),
+        ("7-4-2", 1.0),
+        ("7-4+2", 5.0),
+        ("16/4/2", 2.0),
+        ("16/4*2", 8.0),
+        ("1-2*3^2/4+5", 1.5),
+        ("2^3^2", 512.0),
+        ("(2^3)^2", 64.0),
+        ("-3^2", -9.0),
+        ("(-3)^2", 9.0),
+        ("2*-3^2", -18.0),
+        ("2^-1", 0.5),
+        ("2^-2^2", 0.0625),
+        ("--3", 3.0),
+        ("-+3", -3.0),
+        ("4--3", 7.0),
+        ("-2*-3", 6.0),
+        ("-(1+2)^2", -9.0),
+        ("sqrt(9)^2", 9.0),
+        ("-sqrt(9)^2", -9.0),
+        ("2^sqrt(9)", 8.0),
+    ] {
+        assert_eq!(value(text), expected, "{text}");
+    }
+}
+
+#[test]
+fn two_argument_functions_nest_on_either_side() {
+    for (text, expected) in [
+        ("min(1,2)", 1.0),
+        ("min(1, max(2, 0))", 1.0),
+        ("min(max(2,0),1)", 1.0),
+        ("max(min(5,6), max(3,4))", 5.0),
+        ("min(max(min(3,2),1),max(0,min(7,9)))", 2.0),
+        ("1-min(1,2)*3", -2.0),
+        ("max(1+1,3*2)^2", 36.0),
+        ("-min(-1,(2))", 1.0),
+        ("sin(min(0,1))+max(sin(0),2)", 2.0),
+        ("max ( 3 , ( 1 + 2 ) * 2 ) * 10", 60.0),
+    ] {
+        assert_eq!(value(text), expected, "{text}");
+    }
+    assert_eq!(at("min(max(x,0),1)", -0.5, 0.0, 0.0), 0.0);
+    assert_eq!(at("min(max(x,0),1)", 0.25, 0.0, 0.0), 0.25);
+    assert_eq!(at("min(max(x,0),1)", 7.0, 0.0, 0.0), 1.0);
+    assert_eq!(at("atan2(y,x)", -1.0, 0.0, 0.0), std::f64::consts::PI);
+}
+
+#[test]
+fn every_function_is_the_one_its_name_says() {
+    let (x, y, t): (f64, f64, f64) = (0.7, -1.3, 0.4);
+    for (text, expected) in [
+        ("sin(x)", x.sin()),
+        ("cos(x)", x.cos()),
+        ("tan(x)", x.tan()),
+        ("sqrt(x)", x.sqrt()),
+        ("exp(y)", y.exp()),
+        ("log(x)", x.ln()),
+        ("abs(y)", 1.3),
+        ("atan2(y, x)", y.atan2(x)),
+        ("min(x, y)", y),
+        ("max(x, y)", x),
+        ("x^t", x.powf(t)),
+        ("t*10 + x - y", t * 10.0 + x - y),
+        ("cos(pi)", -1.0),
+    ] {
+        assert_eq!(at(text, x, y, t), expected, "{text}");
+    }
+}
+
+#[test]
+fn numbers_may_carry_a_point_and_an_exponent() {
+    for (text, expected) in [
+        ("1e-3", 1e-3),
+        ("2.5E+2", 250.0),
+        (".5", 0.5),
+        ("3.", 3.0),
+        ("1e3*2", 2000.0),
+        ("1e-3-1e-3", 0.0),
+        ("1e2^2", 1e4),
+    ] {
+        assert_eq!(value(text), expected, "{text}");
+    }
+}
+
+#[test]
+fn constants_and_time_are_recognised() {
+    let constant = |text: &str| Expression::parse(text).expect(text).as_constant();
+    assert_eq!(constant("2*pi/pi"), Some(2.0));
+    assert_eq!(constant("0*x"), None);
+    assert_eq!(Expression::constant(-3.5).as_constant(), Some(-3.5));
+    assert_eq!(Expression::constant(-3.5).eval(1.0, 2.0, 3.0), -3.5);
+    let timed = |text: &str| Expression::parse(text).expect(text).depends_on_time();
+    assert!(timed("x*tan(t)"));
+    assert!(!timed("tan(x)+sqrt(y)"));
+}
+
+#[test]
+fn what_is_undefined_stays_visible() {
+    assert!(value("0/0").is_nan());
+    assert!(value("1/0").is_infinite());
+    assert!(at("min(sqrt(x), 1)", -1.0, 0.0, 0.0).is_nan());
+    assert!(at("min(1, sqrt(x))", -1.0, 0.0, 0.0).is_nan());
+    assert!(at("max(sqrt(x), 1)", -1.0, 0.0, 0.0).is_nan());
+    assert!(at("max(1, sqrt(x))", -1.0, 0.0, 0.0).is_nan());
+}
+
+#[test]
+fn unknown_names_are_named_with_what_is_known() {
+    for (text, fragments) in [
+        ("2*z", ["unknown variable `z`", "known: x, y, t, pi, sin"]),
+        ("Pi*x", ["unknown variable `Pi`", "did you mean `pi`?"]),
+        ("E", ["unknown variable `E`", "known: x, y, t"]),
+        ("τ", ["unknown variable `τ`", "known: x, y, t"]),
+        ("{x}", ["`{` at column 1", "a number, a name"]),
+        (
+            "sinh(x)",
+            ["unknown function `sinh`", "did you mean `sin`?"],
+        ),
+        ("ln(x)", ["unknown function `ln`", "known: x"]),
+        ("x1", ["unknown variable `x1`", "did you mean `x`?"]),
+        ("pit", ["unknown variable `pit`", "did you mean `pi`?"]),
+    ] {
+        let refusal = refusal(text);
+        for fragment in fragments {
+            assert!(refusal.contains(fragment), "`{text}` {refusal}");
+        }
+    }
+}
+
+#[test]
+fn malformed_texts_are_refused_where_they_go_wrong() {
+    for (text, fragment) in [
+        ("", "is empty"),
+        ("  ", "is empty"),
+        ("2 x", "`x` at column 3"),
+        ("2x", "`x` at column 2"),
+        ("x(2)", "`(` at column 2"),
+        ("pi(2)", "`(` at column 3"),
+        ("(1+2", "the end at column 5"),
+        ("1+2)", "`)` at column 4"),
+        ("1+", "the end at column 3"),
+        ("x**2", "`*` at column 3"),
+        ("1,2", "`,` at column 2"),
+        ("1..2", "`.` at column 3"),
+        (".", "`.` at column 1"),
+        ("()", "`)` at column 2"),
+        ("sin x", "calls `sin` with 0 arguments; it takes 1"),
+        ("sin(1,2)", "calls `sin` with 2 arguments"),
+        ("min(1)", "calls `min` with 1 arguments; it takes 2"),
+        ("min(1,2,3)", "calls `min` with 3 arguments"),
+        ("1 min 2", "`m` at column 3"),
+        ("1e999", "1e999, which is too large"),
+        ("free", "unknown variable `free`"),
+    ] {
+        let refusal = refusal(text);
+        assert!(refusal.contains(fragment), "`{text}` {refusal}");
+    }
+}
+
+#[test]
+fn length_and_depth_do_not_exhaust_the_stack() {
+    let long = "x+".repeat(20_000) + "1";
+    assert_eq!(at(&long, 0.5, 0.0, 0.0), 10_001.0);
+    let deep = |n: usize| "(1+sin(".repeat(n) + "0" + &"))".repeat(n);
+    assert_eq!(value(&deep(1)), 1.0);
+    assert!(Expression::parse(&deep(30)).is_ok());
+    assert!(refusal(&deep(100_000)).contains("nested more than"));
+    assert!(refusal(&("-".repeat(100_000) + "1")).contains("nested"));
+    assert!(refusal(&("2^".repeat(100_000) + "1")).contains("nested"));
+}
