@@ -1,4 +1,50 @@
-//! The command line.
+//! The command line of signorini.
 #![forbid(unsafe_code)]
 
-fn main() {}
+mod command;
+
+use clap::{Parser, Subcommand};
+use command::Failure;
+use std::{path::PathBuf, process::ExitCode};
+
+/// Contact of a damageable elastic body with a rigid foundation (plane, quasistatic, frictionless).
+#[derive(Parser)]
+#[command(
+    version,
+    about,
+    after_help = "Exit codes: 0 finished or stopped at ζ_*, \
+    1 a solver missed its tolerance (state saved), 2 bad input."
+)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Solve a scene; results go to out/<scene>/.
+    Run(command::RunArguments),
+    /// Mesh the .geo files of scenes with gmsh, where their .msh is missing or older.
+    Mesh {
+        /// Scene files.
+        #[arg(required = true, value_name = "SCENE")]
+        scenes: Vec<PathBuf>,
+    },
+}
+
+fn main() -> ExitCode {
+    let result = match Arguments::parse().command {
+        Command::Run(arguments) => command::run(&arguments),
+        Command::Mesh { scenes } => command::mesh(&scenes),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("error: {failure}");
+            ExitCode::from(match failure {
+                Failure::Solver(_) => 1,
+                Failure::Input(_) => 2,
+            })
+        }
+    }
+}

@@ -81,8 +81,7 @@ impl<'a> Equilibrium<'a> {
             total.iterations += report.iterations;
             total.linear_iterations += report.linear_iterations;
             let u = self.displacement(&lift)?;
-            let (kkt, contact) =
-                phases.time("certificate", || self.certify(&u, &external));
+            let (kkt, contact) = phases.time("certificate", || self.certify(&u, &external));
             if kkt.within(setting.tolerance) {
                 let state = State {
                     time,
@@ -121,7 +120,9 @@ impl<'a> Equilibrium<'a> {
             scale = body.partition.norm(&load, 2);
         }
         frames.force_to_frame(&mut load);
-        load.iter_mut().zip(frames.fixed()).for_each(|(f, fixed)| *f = if *fixed { 0.0 } else { *f });
+        load.iter_mut()
+            .zip(frames.fixed())
+            .for_each(|(f, fixed)| *f = if *fixed { 0.0 } else { *f });
         self.load.set(&load[..self.load.owned()])?;
         Ok(scale)
     }
@@ -174,8 +175,7 @@ impl<'a> Equilibrium<'a> {
         constraints.frames.force_to_frame(&mut residual);
         constraints.frames.displacement_to_frame(&mut c);
         let bounds = &constraints.bounds;
-        let kkt =
-            Kkt::of(&residual, &c, bounds, |dof| self.prescribed[dof], force_scale, size);
+        let kkt = Kkt::of(&residual, &c, bounds, |dof| self.prescribed[dof], force_scale, size);
         let points = bounds.iter().map(|bound| {
             let (force, gap) = (-residual[bound.dof], bound.gap - c[bound.dof]);
             let active = force * size > gap * force_scale;

@@ -48,7 +48,9 @@ pub enum RunError {
         source: ContactError,
     },
     /// The damage system could not be solved.
-    #[error("step {step} (t = {time}): the damage system was not solved: its matrix is not positive definite")]
+    #[error(
+        "step {step} (t = {time}): the damage system was not solved: its matrix is not positive definite"
+    )]
     Damage {
         /// The step.
         step: usize,

@@ -163,7 +163,9 @@ impl Setting {
     /// What the user should know about rigid motions.
     pub fn notes(&self) -> Vec<String> {
         let note = |motion: &RigidMotion| {
-            format!("nothing holds or drives {motion}: of all answers the one of least ∫|u|² is given")
+            format!(
+                "nothing holds or drives {motion}: of all answers the one of least ∫|u|² is given"
+            )
         };
         self.motions.free.iter().map(note).collect()
     }

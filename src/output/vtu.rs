@@ -60,13 +60,11 @@ impl FieldWriter {
         let stress: Vec<_> = (state.zeta_mean.iter().enumerate())
             .map(|(t, zeta)| elasticity.stress(&setting.body, t, *zeta, &state.u))
             .collect();
-        let von_mises: Vec<f64> =
-            stress.iter().map(|s| elasticity.material.von_mises(s)).collect();
+        let von_mises: Vec<f64> = stress.iter().map(|s| elasticity.material.von_mises(s)).collect();
         let components: Vec<f64> = stress.iter().flat_map(|s| [s[0], s[1], s[2]]).collect();
         let (pressure, gap) = contact_fields(state);
-        let scalar = |name: &str, values: &[f64]| {
-            Attribute::scalars(name, 1).with_data(values.to_vec())
-        };
+        let scalar =
+            |name: &str, values: &[f64]| Attribute::scalars(name, 1).with_data(values.to_vec());
         Vtk {
             version: Version::new_xml(1, 0),
             title: String::new(),
