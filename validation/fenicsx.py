@@ -70,6 +70,7 @@ class Body:
             * ufl.dx
         )
         self.load_forms = [fem.form(form) for form in self._loads(w)]
+        self._must_be_held()
 
     def elasticity(self, strain):
         """A ε: the paper's plane-stress tensor (section 4), or plane strain."""
@@ -131,6 +132,17 @@ class Body:
         # A node on both Γ_D and Γ_C keeps its prescribed value.
         lower[fixed], upper[fixed] = -np.inf, np.inf
         return Bounds(fixed, value[fixed], lower, upper)
+
+    def _must_be_held(self):
+        """Refuses a body that can move rigidly even in full contact: u is not unique."""
+        bounds = self.bounds(0.0)
+        held = np.isfinite(bounds.lower) | np.isfinite(bounds.upper)
+        held[bounds.fixed] = True
+        held = held.reshape(-1, 2)[self.dof_of_node]
+        x, y = ((self.mesh.nodes - self.mesh.nodes.mean(axis=0)) / np.ptp(self.mesh.nodes)).T
+        motions = np.array([[1 + 0 * x, 0 * x], [0 * x, 1 + 0 * x], [-y, x]])
+        if np.linalg.matrix_rank(motions.transpose(0, 2, 1)[:, held]) < 3:
+            raise SceneError("the body may move rigidly, its displacement is not unique")
 
     def sides(self, boundary):
         """(nodes, component, sign) for each direction ν = sign·e of a straight boundary."""

@@ -80,7 +80,8 @@ def partial_contact(mesh):
     state, _ = evolve(scene, mesh)
     x, y = mesh.nodes.T
     contact = (y == 0) & (x > 0)
-    reaction, distance = state.residual[contact, 1], 1e-3 * x[contact] + state.displacement[contact, 1]
+    reaction = state.residual[contact, 1]
+    distance = 1e-3 * x[contact] + state.displacement[contact, 1]
     yield "KKT: penetration", max(0.0, -distance.min()), 1e-15
     yield "KKT: adhesion", max(0.0, -reaction.min()), 1e-12
     yield "KKT: complementarity", np.abs(reaction * distance).max(), 1e-12

@@ -86,11 +86,14 @@ def read_triangulation(path):
     return Triangulation(nodes, triangles, curves)
 
 
-def mesh_geometry(geometry, size, target):
-    """Meshes a .geo file into `target` with gmsh, edges no longer than `size` if given."""
+def mesh_geometry(geometry, table, target):
+    """Meshes a .geo file into `target` with gmsh; `table` is the scene's [mesh]."""
+    numbers = dict(table.get("parameters", {}))
+    if "size" in table:
+        numbers["size"] = table["size"]
     command = ["gmsh", "-2", str(geometry), "-o", str(target), "-v", "2"]
-    if size is not None:
-        command += ["-setnumber", "size", str(size), "-clmax", str(size)]
+    for name, value in numbers.items():
+        command += ["-setnumber", name, str(value)]
     try:
         done = subprocess.run(command, capture_output=True, text=True)
     except FileNotFoundError:
