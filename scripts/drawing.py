@@ -1,0 +1,150 @@
+"""What the figures share: style, maps with equal aspect, scales that can be read."""
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.patheffects import withTickedStroke
+from matplotlib.ticker import MaxNLocator
+
+from results import paths
+
+INK, FAINT, BLUE, RED = "#22262b", "#9aa3ad", "#2f6db3", "#c0392b"
+
+plt.rcParams.update({
+    "figure.dpi": 160,
+    "figure.constrained_layout.use": True,
+    "savefig.bbox": "tight",
+    "savefig.pad_inches": 0.1,
+    "font.size": 10,
+    "axes.titlesize": 10.5,
+    "axes.edgecolor": INK,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+})
+
+
+def amplification(size, largest):
+    """1, 2 or 5 times a power of ten that shows `largest` as some 4–10 % of `size`."""
+    if largest <= 0.0:
+        return 1.0
+    wanted = 0.1 * size / largest
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return max(1.0, power * max(m for m in (1, 2, 5) if m * power <= wanted * (1 + 1e-12)))
+
+
+def widest_gap(results):
+    """The largest initial distance between Γ_C and the obstacle, where it is known."""
+    pieces, widest = results.contact_pieces(), 0.0
+    for line in results.foundation():
+        piece, line = matching_piece(results.nodes, pieces, line)
+        if piece is not None:
+            away = np.linalg.norm(line - results.nodes[piece], axis=1)
+            widest = max(widest, float(away.max()))
+    return widest
+
+
+def map_size(extent, across):
+    """Inches of an equal-aspect map `across` wide over all; ticks and labels take their part."""
+    return across, float(np.clip((across - 1.0) * extent[1] / extent[0] + 0.9, 2.2, 8.0))
+
+
+def draw_outline(axes, points, results, **style):
+    """The body's boundary curves, unbroken so that dashes run on from edge to edge."""
+    curves = [points[path] for path in paths([tuple(edge) for edge in results.boundary().tolist()])]
+    axes.add_collection(LineCollection(curves, capstyle="round", **style))
+
+
+def draw_foundation(axes, results, factor=0.0):
+    """The obstacle as a thick line, hatched on its far side.
+
+    Where displacements are amplified by `factor` the initial gap must be too, or the
+    picture would show penetration that is not there.
+    """
+    pieces = results.contact_pieces()
+    for line in results.foundation():
+        piece, line = matching_piece(results.nodes, pieces, line)
+        if piece is not None and factor:
+            line = results.nodes[piece] + factor * (line - results.nodes[piece])
+        # The body is on the left of the line, so the strokes go to the right.
+        strokes = withTickedStroke(spacing=6, angle=-135, length=1.0, linewidth=0.8, foreground=INK)
+        axes.plot(*line.T, color=INK, linewidth=0.8, path_effects=[strokes], zorder=1.5)
+        axes.plot(*line.T, color=INK, linewidth=1.8, zorder=1.6, solid_capstyle="butt")
+
+
+def matching_piece(nodes, pieces, line):
+    """The piece of Γ_C a line of the obstacle faces, and the line run the same way.
+
+    A line with as many points as the piece was made from it point by point; the piece
+    is None where no piece has as many points.
+    """
+    best, best_distance, best_line = None, np.inf, line
+    for piece in pieces:
+        for candidate in (line, line[::-1]):
+            ends = candidate[[0, -1]] - nodes[piece][[0, -1]]
+            distance = np.linalg.norm(ends)
+            if distance < best_distance:
+                best, best_distance, best_line = piece, distance, candidate
+    return (best if best and len(best) == len(line) else None), best_line
+
+
+def frame(axes, points, size):
+    """Equal aspect, a little air, few ticks."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    air = 0.05 * size
+    axes.set_xlim(low[0] - air, high[0] + air)
+    axes.set_ylim(low[1] - air, high[1] + air)
+    axes.set_aspect("equal")
+    axes.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
+    axes.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
+    axes.set_xlabel("x (m)")
+    axes.set_ylabel("y (m)")
+
+
+def draw_colourbar(axes, image, label, extend="neither"):
+    """A bar exactly as high as the map."""
+    bar = axes.figure.colorbar(image, cax=axes.inset_axes([1.03, 0.0, 0.035, 1.0]), extend=extend)
+    bar.outline.set_linewidth(0.5)
+    bar.formatter.set_useOffset(False)
+    bar.set_label(label)
+
+
+def unit_prefix(value):
+    """The factor and the prefix that bring a stress to a number below a thousand."""
+    for factor, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
+        if value >= 2 * factor:
+            return factor, prefix
+    return 1.0, ""
+
+
+def damage_scale(zeta):
+    """What to show of ζ: values, label, colour map. Darker always means more damaged.
+
+    Where ζ hardly leaves 1 the loss 1 − ζ, in a power of ten, can be read; ζ cannot.
+    """
+    loss = 1.0 - zeta
+    if 0.0 < loss.max() < 0.1:
+        power = int(np.floor(np.log10(loss.max())))
+        return loss / 10.0**power, rf"damage  $1 - \zeta$  ($\times 10^{{{power}}}$)", "magma_r"
+    return zeta, r"damage field  $\zeta$", "magma"
+
+
+def least_zeta(low):
+    """ζ with as many digits as its distance from 1 needs."""
+    if low >= 1.0:
+        return "1"
+    return f"{low:.{max(3, 1 - int(np.floor(np.log10(1.0 - low))))}f}"
+
+
+def along(points):
+    """A coordinate along a path: x or y if the path follows that axis, else arclength."""
+    for k, (name, other) in enumerate(("xy", "yx")):
+        if np.ptp(points[:, 1 - k]) <= 1e-9 * np.ptp(points[:, k]):
+            return points[:, k], f"{name} (m) along {other} = {points[0, 1 - k]:g}"
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    return np.concatenate(([0.0], np.cumsum(steps))), "arclength along $\\Gamma_C$ (m)"

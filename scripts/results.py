@@ -1,0 +1,141 @@
+"""Reads a result folder: fields.pvd with its .vtu files, history.csv, summary.json."""
+
+import csv
+import json
+import xml.etree.ElementTree as ElementTree
+from collections import defaultdict
+from dataclasses import dataclass
+from pathlib import Path
+
+import meshio
+import numpy as np
+
+
+class ResultError(Exception):
+    """The folder does not hold what a figure needs: said in one line."""
+
+
+@dataclass
+class Results:
+    """The last accepted state, and what happened on the way to it."""
+
+    folder: Path
+    summary: dict
+    history: dict  # column → array
+    time: float
+    nodes: np.ndarray  # (n, 2), m
+    triangles: np.ndarray  # (m, 3)
+    displacement: np.ndarray  # (n, 2), m
+    zeta: np.ndarray  # (n,)
+    von_mises: np.ndarray  # (m,), Pa
+    pressure: np.ndarray  # (n,), Pa, −σ_ν
+    gap: np.ndarray  # (n,), m, NaN off Γ_C
+
+    @property
+    def title(self):
+        return self.summary.get("title") or self.summary.get("scene") or self.folder.name
+
+    @property
+    def size(self):
+        """The longer side of the body's bounding box."""
+        return float(np.ptp(self.nodes, axis=0).max())
+
+    def boundary(self):
+        """Boundary edges, each with the body on its left."""
+        t = self.triangles
+        edges = np.vstack((t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]))
+        _, first, count = np.unique(
+            np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
+        )
+        return edges[first[count == 1]]
+
+    def contact_pieces(self):
+        """Γ_C as node paths: its connected pieces, the body on the left."""
+        edges = self.boundary()
+        on = np.isfinite(self.gap)
+        return paths([tuple(edge) for edge in edges[on[edges].all(axis=1)].tolist()])
+
+    def foundation(self):
+        """The obstacle's edges as polylines; without them in the summary, Γ_C itself."""
+        lines = self.summary.get("foundation")
+        if not lines:
+            return [self.nodes[piece] for piece in self.contact_pieces()]
+        segments = [
+            tuple(map(tuple, np.round(pair, 12).tolist()))
+            for line in lines
+            for pair in zip(line[:-1], line[1:])
+        ]
+        return [np.array(path) for path in paths(segments)]
+
+
+def paths(edges):
+    """Joins edges (pairs of hashable ends) into paths as long as possible.
+
+    The first edge's direction is the path's: where all edges run the same way round,
+    so do the paths. A closed curve ends on the point it starts from.
+    """
+    at = defaultdict(list)
+    for k, edge in enumerate(edges):
+        for end in edge:
+            at[end].append(k)
+    unused = set(range(len(edges)))
+    found = []
+
+    def follow(point):
+        walked = []
+        while following := [k for k in at[point] if k in unused]:
+            unused.discard(following[0])
+            a, b = edges[following[0]]
+            point = b if a == point else a
+            walked.append(point)
+        return walked
+
+    for k, (a, b) in enumerate(edges):
+        if k in unused:
+            unused.discard(k)
+            forward = follow(b)
+            found.append([*reversed(follow(a)), a, b, *forward])
+    return found
+
+
+def read_results(folder):
+    """Everything a figure needs from one result folder."""
+    folder = Path(folder)
+    try:
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        with open(folder / "history.csv", newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        frames = ElementTree.parse(folder / "fields.pvd").findall(".//DataSet")
+        last = max(frames, key=lambda frame: float(frame.get("timestep")))
+        fields = meshio.read(folder / last.get("file"))
+        blocks = [k for k, block in enumerate(fields.cells) if block.type == "triangle"]
+        triangles = np.vstack([fields.cells[k].data for k in blocks])
+        return Results(
+            folder=folder,
+            summary=summary,
+            history={c: np.array([_number(r[c]) for r in rows]) for c in (rows or [{}])[0]},
+            time=float(last.get("timestep")),
+            nodes=fields.points[:, :2],
+            triangles=_counter_clockwise(fields.points, triangles),
+            displacement=fields.point_data["displacement"][:, :2],
+            zeta=np.ravel(fields.point_data["zeta"]),
+            von_mises=np.concatenate([np.ravel(fields.cell_data["von_mises"][k]) for k in blocks]),
+            pressure=np.ravel(fields.point_data["normal_pressure"]),
+            gap=np.ravel(fields.point_data["gap"]),
+        )
+    except OSError as error:
+        raise ResultError(f"{error.filename}: {error.strerror}") from None
+    except KeyError as error:
+        raise ResultError(f"{folder}: the field {error} is missing") from None
+    except (ValueError, ElementTree.ParseError, meshio.ReadError) as error:
+        raise ResultError(f"{folder}: {error}") from None
+
+
+def _number(text):
+    return float(text) if text else np.nan
+
+
+def _counter_clockwise(points, triangles):
+    a, b, c = (points[triangles[:, k], :2] for k in range(3))
+    turn = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
+    return np.where(turn[:, None], triangles[:, [0, 2, 1]], triangles)

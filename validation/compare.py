@@ -1,0 +1,216 @@
+#!/usr/bin/python3
+"""Compares signorini with FEniCSx, node by node.
+
+    /usr/bin/python3 validation/compare.py --binary target/release/signorini \
+        geo/square-mild.toml geo/lshape.toml geo/bridge-half.toml
+
+Both programs read the same mesh file and a scene derived from the given one:
+
+elastic   contact removed, no damage: one static solve at t = 1;
+contact   the gap as given, no damage: one static solve at t = 1, with each contact solver;
+damage    the whole scheme (25)–(28) in a few steps.
+
+The bodies must be held: a scene whose solution is not unique cannot be compared.
+Exit code 1 if any case fails.
+"""
+
+import argparse
+import copy
+import json
+import shutil
+import subprocess
+import sys
+import tempfile
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+from pathlib import Path
+
+import meshio
+import numpy as np
+
+try:
+    from contact import ContactError
+    from damage import evolve
+except ImportError as error:
+    sys.exit(f"{error}: the comparison needs FEniCSx; run `make deps-validate`")
+from scene import SceneError, read_scene, write_scene
+from triangulation import mesh_geometry, read_triangulation
+
+TOLERANCE = {"elastic": 1e-10, "contact": 1e-8, "damage": 1e-8}
+COLUMNS = (
+    "scene", "case", "solver", "nodes", "|Δu|/|u|", "|Δζ|", "ΔR/R", "tolerance", "verdict"
+)
+
+
+@dataclass
+class Answer:
+    """What is compared: nodal fields at the last accepted time, and the contact force."""
+
+    time: float
+    nodes: np.ndarray
+    displacement: np.ndarray
+    zeta: np.ndarray
+    contact_force: float
+
+
+class RunError(Exception):
+    """The program did not run, or its output is not as agreed."""
+
+
+def static(scene):
+    """The scene without damage and time: one solve at t = 1."""
+    return {key: value for key, value in scene.items() if key not in ("damage", "time")}
+
+
+def without_contact(scene, mesh):
+    """The elastic scene: gaps dropped, or held at zero if nothing else holds the body."""
+    scene = copy.deepcopy(static(scene))
+    scene.pop("contact", None)
+    held = any("displacement" in boundary for boundary in scene["boundary"])
+    for boundary in scene["boundary"]:
+        if boundary.pop("gap", None) is None:
+            continue
+        normal = np.abs(mesh.outward_normals(boundary["name"])[0]).mean(axis=0)
+        boundary.pop("normal", None)
+        if not held:
+            boundary["displacement"] = ["free", "0"] if normal[1] > normal[0] else ["0", "free"]
+    # A boundary that is left with its name alone says nothing.
+    scene["boundary"] = [b for b in scene["boundary"] if len(b) > 1]
+    return scene
+
+
+def in_few_steps(scene, steps):
+    """The scene with its time interval cut into `steps`."""
+    scene = copy.deepcopy(scene)
+    scene["time"]["step"] = scene["time"]["end"] / steps
+    return scene
+
+
+def reference(scene, mesh):
+    """FEniCSx's answer."""
+    state, _ = evolve(scene, mesh)
+    return Answer(state.time, mesh.nodes, state.displacement, state.zeta, state.contact_force)
+
+
+def program(binary, scene, directory, solver=None):
+    """signorini's answer, from the files it writes."""
+    path, out = directory / "scene.toml", directory / "out"
+    shutil.rmtree(out, ignore_errors=True)  # never read the answer to an earlier case
+    write_scene(scene, path)
+    command = [str(binary), "run", str(path), "--out", str(out)]
+    command += ["--solver", solver] if solver else []
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=1800)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise RunError(f"{binary}: {error}") from None
+    if done.returncode != 0:
+        said = done.stderr.strip() or done.stdout.strip() or "no message"
+        raise RunError(said.splitlines()[-1])
+    try:
+        last = ElementTree.parse(out / "fields.pvd").findall(".//DataSet")[-1]
+        fields = meshio.read(out / last.get("file"))
+        summary = json.loads((out / "summary.json").read_text())
+        return Answer(
+            float(last.get("timestep")),
+            fields.points[:, :2],
+            fields.point_data["displacement"][:, :2],
+            np.ravel(fields.point_data["zeta"]),
+            float(summary["contact_force"] or 0.0),
+        )
+    except (OSError, IndexError, KeyError, ElementTree.ParseError, meshio.ReadError) as error:
+        raise RunError(f"the output cannot be read: {error!r}") from None
+
+
+def same_order(ours, theirs):
+    """Indices that bring `theirs` into the order of `ours`; the nodes must coincide."""
+    if len(ours) != len(theirs):
+        raise RunError(f"{len(theirs)} nodes written, {len(ours)} in the mesh")
+    size = np.ptp(ours, axis=0).max()
+    if np.abs(ours - theirs).max() <= 1e-12 * size:
+        return np.arange(len(ours))
+    a, b = (np.lexsort(np.round(points / size, 9).T) for points in (ours, theirs))
+    order = np.empty(len(ours), np.int64)
+    order[a] = b
+    if np.abs(ours - theirs[order]).max() > 1e-9 * size:
+        raise RunError("the nodes written are not those of the mesh")
+    return order
+
+
+def differences(exact, answer):
+    """Largest nodal |Δu| over largest |u|, largest |Δζ|, and the relative change of R."""
+    if abs(answer.time - exact.time) > 1e-9 * max(exact.time, 1.0):
+        raise RunError(f"the last time is {answer.time:g}, FEniCSx's is {exact.time:g}")
+    order = same_order(exact.nodes, answer.nodes)
+
+    def largest(vectors):
+        return np.linalg.norm(vectors, axis=1).max()
+
+    du = largest(answer.displacement[order] - exact.displacement) / largest(exact.displacement)
+    dzeta = np.abs(answer.zeta[order] - exact.zeta).max()
+    if exact.contact_force == 0.0:
+        return du, dzeta, abs(answer.contact_force)
+    return du, dzeta, abs(answer.contact_force / exact.contact_force - 1.0)
+
+
+def cases(scene, mesh, arguments):
+    """(case, derived scene, contact solvers) for one scene."""
+    yield "elastic", without_contact(scene, mesh), [None]
+    yield "contact", static(scene), arguments.solvers
+    if "damage" in scene and "time" in scene:
+        yield "damage", in_few_steps(scene, arguments.steps), arguments.solvers[:1]
+
+
+def compare(path, arguments):
+    """Rows of the table for one scene."""
+    scene = read_scene(path)
+    with tempfile.TemporaryDirectory() as directory:
+        directory = Path(directory)
+        source = path.parent / scene["mesh"]["file"]
+        if source.suffix == ".geo":
+            mesh_geometry(source, scene["mesh"], directory / "mesh.msh")
+            source = directory / "mesh.msh"
+        scene["mesh"] = {"file": str(source.resolve())}
+        mesh = read_triangulation(source)
+        for case, derived, solvers in cases(scene, mesh, arguments):
+            tolerance = TOLERANCE[case]
+            exact = reference(derived, mesh)
+            for solver in solvers:
+                row = (path.stem, case, solver or "–", str(len(mesh.nodes)))
+                try:
+                    answer = program(arguments.binary, derived, directory, solver)
+                    errors = differences(exact, answer)
+                except RunError as error:
+                    yield False, (*row, "–", "–", "–", f"{tolerance:.0e}", f"FAILED: {error}")
+                    continue
+                good = max(errors) <= tolerance
+                numbers = (f"{error:.1e}" for error in errors)
+                yield good, (*row, *numbers, f"{tolerance:.0e}", "ok" if good else "FAILED")
+
+
+def main():
+    parser = argparse.ArgumentParser(description="Compare signorini with FEniCSx.")
+    parser.add_argument("scenes", nargs="+", type=Path, metavar="SCENE")
+    parser.add_argument("--binary", type=Path, default=Path("target/release/signorini"))
+    parser.add_argument("--solvers", nargs="+", default=["tao", "penalty-duality"],
+                        help="contact solvers; the first also runs the damage case")
+    parser.add_argument("--steps", type=int, default=10, help="time steps of the damage case")
+    arguments = parser.parse_args()
+    arguments.binary = arguments.binary.resolve()
+    if not arguments.binary.is_file():
+        sys.exit(f"{arguments.binary} does not exist: build it first, or name it with --binary")
+    line = "{:<14} {:<8} {:<16} {:>6}  {:>9} {:>9} {:>9}  {:>9}  {}"
+    print(line.format(*COLUMNS))
+    failed = False
+    for path in arguments.scenes:
+        try:
+            for good, row in compare(path, arguments):
+                failed |= not good
+                print(line.format(*row), flush=True)
+        except (SceneError, ContactError) as error:
+            failed = True
+            print(f"{path.stem}: {error}")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

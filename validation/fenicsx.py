@@ -1,0 +1,228 @@
+"""Problem VP^hk written independently in FEniCSx: forms in UFL, algebra in PETSc.
+
+Equation numbers are those of Campo, Fernández and Silva, "Damageable contact between
+an elastic body and a rigid foundation". All fields go in and come out in the node order
+of the triangulation. Written for dolfinx 0.5 (Debian 12).
+"""
+
+import logging
+from dataclasses import dataclass
+
+import dolfinx
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from contact import Bounds, solve_contact
+from scene import Expression, SceneError
+
+logging.disable(logging.INFO)  # the form compiler reports each of its builds
+
+UFL_FUNCTIONS = {
+    "pi": np.pi, "sin": ufl.sin, "cos": ufl.cos, "tan": ufl.tan, "sqrt": ufl.sqrt,
+    "exp": ufl.exp, "log": ufl.ln, "abs": abs,
+    "min": ufl.min_value, "max": ufl.max_value, "atan2": ufl.atan_2,
+}
+
+# The quadrature that defines the discrete loads: edge midpoints in a triangle, two Gauss
+# points on an edge.
+MIDPOINTS = {
+    "quadrature_rule": "custom",
+    "quadrature_degree": 2,
+    "quadrature_points": [[0.5, 0.0], [0.5, 0.5], [0.0, 0.5]],
+    "quadrature_weights": [1 / 6, 1 / 6, 1 / 6],
+}
+TWO_GAUSS_POINTS = {"quadrature_degree": 3}
+
+
+@dataclass
+class State:
+    """The fields at one time, in the node order of the triangulation."""
+
+    time: float
+    displacement: np.ndarray  # (n, 2)
+    zeta: np.ndarray  # (n,)
+    residual: np.ndarray  # (n, 2): K u − f
+    contact_force: float
+    active: int
+
+
+class Body:
+    """Spaces, forms and node maps of one scene on one triangulation."""
+
+    def __init__(self, scene, mesh):
+        self.scene, self.mesh = scene, mesh
+        domain = self.domain = _dolfinx_mesh(mesh)
+        self.time = fem.Constant(domain, PETSc.ScalarType(0.0))
+        self.V = fem.VectorFunctionSpace(domain, ("Lagrange", 1))
+        self.E = fem.FunctionSpace(domain, ("Lagrange", 1))
+        self.dof_of_node = _dof_of_node(domain, self.V)
+        self.zeta_dof_of_node = _dof_of_node(domain, self.E)
+        self.u, self.zeta = fem.Function(self.V), fem.Function(self.E)
+        self.boundaries = scene.get("boundary", [])
+
+        v, w = ufl.TrialFunction(self.V), ufl.TestFunction(self.V)
+        # For P1 strains, one point per triangle integrates ζ exactly: its mean.
+        self.stiffness_form = fem.form(
+            self.zeta * ufl.inner(self.elasticity(ufl.sym(ufl.grad(v))), ufl.sym(ufl.grad(w)))
+            * ufl.dx
+        )
+        self.load_forms = [fem.form(form) for form in self._loads(w)]
+        self._must_be_held()
+
+    def elasticity(self, strain):
+        """A ε: the paper's plane-stress tensor (section 4), or plane strain."""
+        material = self.scene["material"]
+        young, poisson = float(material["young"]), float(material["poisson"])
+        if material.get("plane", "stress") == "strain":
+            young, poisson = young / (1 - poisson**2), poisson / (1 - poisson)
+        young, poisson = (fem.Constant(self.domain, PETSc.ScalarType(c)) for c in (young, poisson))
+        return young / (1 + poisson) * (
+            poisson / (1 - poisson) * ufl.tr(strain) * ufl.Identity(2) + strain
+        )
+
+    def _loads(self, w):
+        """The terms of (f, w)_V: body force, and a traction on each boundary that has one."""
+        x = ufl.SpatialCoordinate(self.domain)
+
+        def vector(texts):
+            parts = [Expression(s)(x[0], x[1], self.time, UFL_FUNCTIONS) for s in texts]
+            return None if all(p == 0 for p in parts) else ufl.as_vector(parts)
+
+        force = vector(self.scene.get("body", {}).get("force", ["0", "0"]))
+        if force is not None:
+            yield ufl.dot(force, w) * ufl.dx(metadata=MIDPOINTS)
+        for boundary in self.boundaries:
+            traction = vector(boundary.get("traction", ["0", "0"]))
+            if traction is not None:
+                edges = _facet_tags(self.domain, self.mesh.edges(boundary["name"]))
+                ds = ufl.Measure("ds", self.domain, subdomain_data=edges)
+                yield ufl.dot(traction, w) * ds(1, metadata=TWO_GAUSS_POINTS)
+
+    def _unknowns(self, nodes, component):
+        return 2 * self.dof_of_node[nodes] + component
+
+    def bounds(self, t):
+        """Γ_D, symmetry and the gap as prescribed values and bounds on single unknowns."""
+        size = 2 * len(self.mesh.nodes)
+        value, lower, upper = np.full(size, np.nan), np.full(size, -np.inf), np.full(size, np.inf)
+        for boundary in self.boundaries:
+            name = boundary["name"]
+            nodes = np.unique(self.mesh.edges(name))
+            points = self.mesh.nodes[nodes]
+            if "displacement" in boundary:
+                for component, text in enumerate(boundary["displacement"]):
+                    if text != "free":
+                        value[self._unknowns(nodes, component)] = Expression(text).at(points, t)
+            if boundary.get("symmetry"):
+                for members, component, _ in self.sides(boundary):
+                    value[self._unknowns(members, component)] = 0.0
+            if "gap" in boundary:
+                for members, component, sign in self.sides(boundary):
+                    # ν = ± e: u·ν ≤ g bounds one component from above or below.
+                    gap = Expression(boundary["gap"]).at(self.mesh.nodes[members], t)
+                    k = self._unknowns(members, component)
+                    if sign > 0:
+                        upper[k] = np.minimum(upper[k], gap)
+                    else:
+                        lower[k] = np.maximum(lower[k], -gap)
+        fixed = np.flatnonzero(np.isfinite(value))
+        # A node on both Γ_D and Γ_C keeps its prescribed value.
+        lower[fixed], upper[fixed] = -np.inf, np.inf
+        return Bounds(fixed, value[fixed], lower, upper)
+
+    def _must_be_held(self):
+        """Refuses a body that can move rigidly even in full contact: u is not unique."""
+        bounds = self.bounds(0.0)
+        held = np.isfinite(bounds.lower) | np.isfinite(bounds.upper)
+        held[bounds.fixed] = True
+        held = held.reshape(-1, 2)[self.dof_of_node]
+        x, y = ((self.mesh.nodes - self.mesh.nodes.mean(axis=0)) / np.ptp(self.mesh.nodes)).T
+        motions = np.array([[1 + 0 * x, 0 * x], [0 * x, 1 + 0 * x], [-y, x]])
+        if np.linalg.matrix_rank(motions.transpose(0, 2, 1)[:, held]) < 3:
+            raise SceneError("the body may move rigidly, its displacement is not unique")
+
+    def sides(self, boundary):
+        """(nodes, component, sign) for each direction ν = sign·e of a straight boundary."""
+        name = boundary["name"]
+        edges = self.mesh.edges(name)
+        normals, _ = self.mesh.outward_normals(name)
+        if "normal" in boundary:
+            normals = np.broadcast_to(boundary_direction(boundary), normals.shape)
+        if (np.abs(normals).max(axis=1) < 1 - 1e-9).any():
+            raise SceneError(
+                f"boundary '{name}': this check knows only contact and symmetry along x or y"
+            )
+        component = np.abs(normals).argmax(axis=1)
+        sign = np.sign(normals[np.arange(len(normals)), component])
+        for c, s in sorted(set(zip(component, sign))):
+            yield np.unique(edges[(component == c) & (sign == s)]), int(c), int(s)
+
+    def equilibrium(self, t, zeta):
+        """Problem (26), or (27) at t = 0: the displacement for a given damage field."""
+        self.time.value = t
+        self.zeta.x.array[self.zeta_dof_of_node] = zeta
+        stiffness = fem.petsc.assemble_matrix(self.stiffness_form)
+        stiffness.assemble()
+        load = stiffness.createVecRight()
+        for form in self.load_forms:
+            load.axpy(1.0, fem.petsc.assemble_vector(form))
+        result = solve_contact(stiffness, load, self.bounds(t))
+        self.u.x.array[:] = result.displacement
+        return State(
+            t,
+            result.displacement.reshape(-1, 2)[self.dof_of_node],
+            np.array(zeta, float),
+            result.residual.reshape(-1, 2)[self.dof_of_node],
+            result.contact_force,
+            result.active,
+        )
+
+
+def boundary_direction(boundary):
+    """The obstacle's fixed direction as a unit vector."""
+    direction = np.array([float(Expression(s)(0.0, 0.0, 0.0)) for s in boundary["normal"]])
+    return direction / np.linalg.norm(direction)
+
+
+def _dolfinx_mesh(mesh):
+    element = ufl.VectorElement("Lagrange", ufl.triangle, 1)
+    return dolfinx.mesh.create_mesh(
+        MPI.COMM_SELF, mesh.triangles, mesh.nodes, ufl.Mesh(element)
+    )
+
+
+def _dof_of_node(domain, space):
+    """For each node of the triangulation its (blocked) degree of freedom.
+
+    dolfinx reorders twice: nodes when it builds the mesh, unknowns when it builds a space.
+    """
+    node_of_point = np.asarray(domain.geometry.input_global_indices)
+    dof = np.empty(len(node_of_point), np.int64)
+    for cell in range(domain.topology.index_map(2).size_local):
+        dof[node_of_point[domain.geometry.dofmap.links(cell)]] = space.dofmap.cell_dofs(cell)
+    return dof
+
+
+def _facet_tags(domain, edges):
+    """Tag 1 on the facets that are the given node pairs."""
+    topology, geometry = domain.topology, domain.geometry
+    topology.create_connectivity(1, 2)  # meshtags and ds need it
+    node_of_point = np.asarray(geometry.input_global_indices)
+    node_of_vertex = np.empty(topology.index_map(0).size_local, np.int64)
+    vertices_of_cell, vertices_of_facet = topology.connectivity(2, 0), topology.connectivity(1, 0)
+    for cell in range(topology.index_map(2).size_local):
+        vertices = vertices_of_cell.links(cell)
+        node_of_vertex[vertices] = node_of_point[geometry.dofmap.links(cell)]
+    wanted = {frozenset(edge) for edge in edges.tolist()}
+    found = np.array(
+        [
+            facet
+            for facet in range(topology.index_map(1).size_local)
+            if frozenset(node_of_vertex[vertices_of_facet.links(facet)].tolist()) in wanted
+        ],
+        np.int32,
+    )
+    return dolfinx.mesh.meshtags(domain, 1, found, np.ones(len(found), np.int32))

@@ -1,0 +1,100 @@
+"""Scene files: the same TOML the program reads, and its expressions in x, y, t.
+
+Only what a comparison needs is read here; the program itself judges whether a scene
+is well formed.
+"""
+
+import ast
+import json
+import tomllib
+from pathlib import Path
+
+import numpy as np
+
+
+class SceneError(Exception):
+    """Something the user can mend: said in one line, without a traceback."""
+
+
+NUMPY_FUNCTIONS = {
+    "pi": np.pi, "sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt,
+    "exp": np.exp, "log": np.log, "abs": np.abs,
+    "min": np.minimum, "max": np.maximum, "atan2": np.arctan2,
+}
+
+_ALLOWED = (
+    ast.Expression, ast.BinOp, ast.UnaryOp, ast.Call, ast.Name, ast.Load, ast.Constant,
+    ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.USub, ast.UAdd,
+)
+
+
+class Expression:
+    """A formula in x, y, t, evaluated in whatever arithmetic the names are bound to.
+
+    The same text serves nodal values (NumPy) and variational forms (UFL).
+    """
+
+    def __init__(self, text):
+        self.text = str(text)
+        try:
+            # Python writes ^ as **; its ^ would bind more loosely than +.
+            tree = ast.parse(self.text.strip().replace("^", "**"), mode="eval")
+        except SyntaxError as error:
+            raise SceneError(f"expression '{self.text}': {error.msg}") from None
+        names = set(NUMPY_FUNCTIONS) | {"x", "y", "t"}
+        for node in ast.walk(tree):
+            if not isinstance(node, _ALLOWED):
+                raise SceneError(f"expression '{self.text}': {type(node).__name__} is not allowed")
+            if isinstance(node, ast.Name) and node.id not in names:
+                raise SceneError(f"expression '{self.text}': unknown name '{node.id}'")
+        self._code = compile(tree, self.text, "eval")
+
+    def __call__(self, x, y, t, functions=NUMPY_FUNCTIONS):
+        return eval(self._code, {"__builtins__": {}}, {**functions, "x": x, "y": y, "t": t})
+
+    def at(self, points, t=0.0):
+        """Values at an (n, 2) array of points."""
+        with np.errstate(all="ignore"):
+            values = self(points[:, 0], points[:, 1], t)
+        return np.broadcast_to(np.asarray(values, float), len(points)).copy()
+
+
+def read_scene(path):
+    """The scene as nested dictionaries, keys as in the file."""
+    try:
+        with open(path, "rb") as file:
+            scene = tomllib.load(file)
+    except OSError as error:
+        raise SceneError(f"{path}: {error.strerror}") from None
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"{path}: {error}") from None
+    for table in ("mesh", "material"):
+        if table not in scene:
+            raise SceneError(f"{path}: the table [{table}] is missing")
+    return scene
+
+
+def write_scene(scene, path):
+    """Writes scalars, lists of scalars, tables and arrays of tables: all that scenes use."""
+    lines = []
+
+    def entries(table):
+        # JSON's strings, numbers, booleans and flat lists are TOML's.
+        lines.extend(f"{key} = {json.dumps(value)}" for key, value in table.items())
+
+    entries({k: v for k, v in scene.items() if not _is_table(v)})
+    for name, value in scene.items():
+        if isinstance(value, dict):
+            lines.append(f"\n[{name}]")
+            entries(value)
+        elif _is_table(value):
+            for table in value:
+                lines.append(f"\n[[{name}]]")
+                entries(table)
+    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _is_table(value):
+    return isinstance(value, dict) or (
+        isinstance(value, list) and bool(value) and isinstance(value[0], dict)
+    )

@@ -1,0 +1,102 @@
+"""Triangulations from gmsh, read by meshio: an independent reader of the same file."""
+
+import contextlib
+import io
+import subprocess
+from dataclasses import dataclass
+
+import meshio
+import numpy as np
+
+from scene import SceneError
+
+
+@dataclass
+class Triangulation:
+    """Nodes (n, 2), triangles (m, 3) counter-clockwise, and the edges of each named curve."""
+
+    nodes: np.ndarray
+    triangles: np.ndarray
+    curves: dict
+
+    def outward_normals(self, name):
+        """Unit outward normals and lengths of a curve's edges; all must be boundary edges."""
+        triangle_of = {}
+        for triangle in self.triangles:
+            for k in range(3):
+                a, b = triangle[k], triangle[(k + 1) % 3]
+                triangle_of.setdefault(frozenset((a, b)), []).append((a, b))
+        normals, lengths = [], []
+        for edge in self.edges(name):
+            sides = triangle_of.get(frozenset(edge), [])
+            if len(sides) != 1:
+                raise SceneError(f"curve '{name}' has an edge that is not on the boundary")
+            # Counter-clockwise: the body is left of a → b, so (dy, −dx) points outwards.
+            dx, dy = self.nodes[sides[0][1]] - self.nodes[sides[0][0]]
+            lengths.append(np.hypot(dx, dy))
+            normals.append((dy / lengths[-1], -dx / lengths[-1]))
+        return np.array(normals), np.array(lengths)
+
+    def edges(self, name):
+        """Node pairs of a curve."""
+        if name not in self.curves:
+            known = ", ".join(sorted(self.curves)) or "none"
+            raise SceneError(f"the mesh has no physical curve '{name}' (it has: {known})")
+        return self.curves[name]
+
+
+def read_triangulation(path):
+    """Nodes in the file's order, without those no triangle uses; all groups of each line.
+
+    A line may belong to several groups. The 4.1 format states this per entity, which
+    meshio gives as cell sets; the 2.2 format repeats the line with another tag.
+    """
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):  # meshio prints an empty line
+            mesh = meshio.read(path)
+    except (OSError, meshio.ReadError) as error:
+        raise SceneError(f"{path}: {error}") from None
+    blocks = [(k, b.data) for k, b in enumerate(mesh.cells)]
+    triangles = [data for k, data in blocks if mesh.cells[k].type == "triangle"]
+    if not triangles:
+        raise SceneError(f"{path}: no triangles")
+    triangles = np.vstack(triangles).astype(np.int64)
+
+    used = np.unique(triangles)
+    renumber = np.full(len(mesh.points), -1, np.int64)
+    renumber[used] = np.arange(len(used))
+    nodes, triangles = mesh.points[used, :2], renumber[triangles]
+
+    # A plane surface may be drawn clockwise: turn its triangles round.
+    ab, ac = (nodes[triangles[:, k]] - nodes[triangles[:, 0]] for k in (1, 2))
+    clockwise = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0] < 0
+    triangles[clockwise] = triangles[clockwise][:, [0, 2, 1]]
+
+    tags = mesh.cell_data.get("gmsh:physical", [[]] * len(mesh.cells))
+    curves = {}
+    for name, (tag, dimension) in mesh.field_data.items():
+        if dimension != 1:
+            continue
+        edges = []
+        for k, data in blocks:
+            if mesh.cells[k].type == "line":
+                inside = mesh.cell_sets[name][k] if name in mesh.cell_sets else tags[k] == tag
+                edges.append(renumber[data[inside]])
+        curves[name] = np.unique(np.sort(np.vstack(edges), axis=1), axis=0)
+    return Triangulation(nodes, triangles, curves)
+
+
+def mesh_geometry(geometry, table, target):
+    """Meshes a .geo file into `target` with gmsh; `table` is the scene's [mesh]."""
+    numbers = dict(table.get("parameters", {}))
+    if "size" in table:
+        numbers["size"] = table["size"]
+    command = ["gmsh", "-2", str(geometry), "-o", str(target), "-v", "2"]
+    for name, value in numbers.items():
+        command += ["-setnumber", name, str(value)]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True)
+    except FileNotFoundError:
+        raise SceneError("gmsh is not installed") from None
+    if done.returncode != 0 or not target.exists():
+        raise SceneError(f"gmsh could not mesh {geometry}: {(done.stderr or done.stdout).strip()}")
