@@ -6,11 +6,16 @@ use std::fmt;
 use serde::Deserialize;
 use serde::de::{Deserializer, Error, Visitor};
 use toml::Spanned;
-use toml::de::DeTable;
+use toml::de::{DeTable, DeValue};
 
 use super::error::{Names, SceneError};
 use super::source::Source;
 use crate::model::Plane;
+
+/// The tables that stand alone.
+const TABLES: [&str; 7] = [
+    "mesh", "material", "damage", "time", "body", "contact", "output",
+];
 
 type Number = Spanned<f64>;
 /// Two expressions; a list, because serde would ignore a third component.
@@ -130,9 +135,35 @@ impl<'de> Deserialize<'de> for Formula {
 
 /// Reads the tables out of `root`.
 pub(super) fn read(root: DeTable<'_>, source: &Source) -> Result<File, SceneError> {
+    for (name, value) in &root {
+        refuse_arrays(name.get_ref(), value, source)?;
+    }
     // The root has no span of its own; an empty one names no key.
     let root = Spanned::new(usize::MAX..usize::MAX, root);
     File::deserialize(toml::Deserializer::from(root)).map_err(|e| explain(&e, source))
+}
+
+/// serde would fill a struct from an array, `time = [1, 0.01]`, by position.
+fn refuse_arrays(
+    name: &str,
+    value: &Spanned<DeValue<'_>>,
+    source: &Source,
+) -> Result<(), SceneError> {
+    let (span, key) = match (name, value.get_ref()) {
+        ("boundary", DeValue::Array(list)) => {
+            match list.iter().find(|element| !element.get_ref().is_table()) {
+                Some(element) => (element.span(), source.key(&element.span())),
+                None => return Ok(()),
+            }
+        }
+        _ if TABLES.contains(&name) && value.get_ref().is_array() => (value.span(), name),
+        _ => return Ok(()),
+    };
+    Err(SceneError::Invalid {
+        place: source.place(&span),
+        key: key.trim_end_matches(": ").to_owned(),
+        problem: "must be a table".into(),
+    })
 }
 
 /// Says what serde found in the terms of the scene.
@@ -185,7 +216,7 @@ fn explain(error: &toml::de::Error, source: &Source) -> SceneError {
     }
 }
 
-/// serde's names of types in the words of TOML.
+/// serde's names of types and values in the words of TOML.
 fn in_words(kind: &str) -> &str {
     match kind {
         "f64" => "a number",
@@ -193,6 +224,10 @@ fn in_words(kind: &str) -> &str {
         "a sequence" | "sequence" => "an array",
         "map" => "a table",
         "a boolean" => "true or false",
-        other => other,
+        // A value says what it is: "string \"fast\"".
+        other => ["string ", "integer ", "floating point ", "boolean "]
+            .iter()
+            .find_map(|kind| other.strip_prefix(kind))
+            .unwrap_or(other),
     }
 }

@@ -1,0 +1,202 @@
+//! Scenes: the shipped ones, and what they turn into.
+
+mod boundaries;
+mod errors;
+mod expression;
+mod mesh;
+mod numbers;
+mod set;
+
+use std::path::{Path, PathBuf};
+
+use signorini::model::Plane;
+use signorini::scene::{MeshSource, Scene, TimeGrid};
+
+/// A complete scene; a test changes a line of it.
+const BASE: &str = include_str!("base.toml");
+
+fn geo(file: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("geo").join(file)
+}
+
+fn shipped(name: &str) -> Scene {
+    Scene::read(&geo(&format!("{name}.toml")), &[]).unwrap_or_else(|e| panic!("{e}"))
+}
+
+#[test]
+fn every_shipped_scene_is_read() {
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(geo("")).expect("geo/ is there") {
+        let path = entry.expect("geo/ is readable").path();
+        if path.extension().is_some_and(|e| e == "toml") {
+            let scene = Scene::read(&path, &[]).unwrap_or_else(|e| panic!("{e}"));
+            assert_eq!(scene.mesh.file.extension().expect("a file"), "geo");
+            assert_eq!(scene.mesh.file.parent(), path.parent());
+            names.push(scene.name);
+        }
+    }
+    for name in [
+        "square",
+        "square-mild",
+        "lshape",
+        "bridge",
+        "bridge-half",
+        "hertz",
+    ] {
+        assert!(names.iter().any(|n| n == name), "{name} is missing");
+    }
+}
+
+#[test]
+fn the_examples_carry_the_printed_data() {
+    type Example = (&'static str, [f64; 4], usize, &'static [&'static str]);
+    // (scene, [E, κ, λ_D, λ_U], steps, curves)
+    let examples: [Example; 5] = [
+        (
+            "square",
+            [80.0, 0.01, 0.1, 100.0],
+            5000,
+            &["left", "bottom", "right"],
+        ),
+        (
+            "square-mild",
+            [80.0, 0.01, 0.1, 2.0],
+            100,
+            &["left", "bottom", "right"],
+        ),
+        (
+            "lshape",
+            [1e5, 1.0, 0.25, 1e3],
+            100,
+            &["clamp", "foundation", "load"],
+        ),
+        (
+            "bridge",
+            [1e6, 1.0, 0.25, 1e3],
+            100,
+            &["foundation", "load"],
+        ),
+        (
+            "bridge-half",
+            [1e6, 1.0, 0.25, 1e3],
+            100,
+            &["axis", "foundation", "load"],
+        ),
+    ];
+    for (name, [young, diffusion, lambda_d, lambda_u], steps, curves) in examples {
+        let scene = shipped(name);
+        let law = scene.damage.as_ref().expect(name).law;
+        assert_eq!(
+            (scene.material.young, scene.material.poisson),
+            (young, 0.3),
+            "{name}"
+        );
+        assert_eq!(scene.material.plane, Plane::Stress, "{name}");
+        assert_eq!((law.diffusion, law.threshold), (diffusion, 0.01), "{name}");
+        assert_eq!(
+            (law.lambda_d, law.lambda_u, law.lambda_w),
+            (lambda_d, lambda_u, 0.0)
+        );
+        assert_eq!(law.strain_cap, 1000.0, "{name}");
+        assert_eq!(scene.time, Some(TimeGrid { end: 1.0, steps }), "{name}");
+        let names: Vec<&str> = scene.boundaries.iter().map(|b| b.name.as_str()).collect();
+        assert_eq!(names, curves, "{name}");
+        let load = scene.boundaries.iter().find_map(|b| b.traction.as_ref());
+        let [x, y] = load.expect("a load");
+        let load = [x.eval(1.0, 1.0, 0.5), y.eval(1.0, 1.0, 0.5)];
+        let square = name.starts_with("square");
+        assert_eq!(
+            load,
+            if square { [-10.0, -10.0] } else { [0.0, -40.0] },
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn hertz_is_elastic_static_and_carries_half_the_load() {
+    let scene = shipped("hertz");
+    assert!(scene.damage.is_none() && scene.time.is_none());
+    assert_eq!(scene.material.plane, Plane::Strain);
+    let boundary = |name: &str| {
+        let found = scene.boundaries.iter().find(|b| b.name == name);
+        found.unwrap_or_else(|| panic!("{name} is missing"))
+    };
+    assert!(boundary("axis").symmetry);
+    let gap = boundary("foundation").gap.as_ref().expect("a gap");
+    assert_eq!(gap.normal, Some([0.0, -1.0]));
+    assert_eq!(gap.distance.eval(0.01, 0.002, 1.0), 0.002);
+    let [_, y] = boundary("top").traction.as_ref().expect("a load");
+    let force = y.as_constant().expect("uniform") * 0.05;
+    assert!((force + 17.5e6).abs() < 1e-6, "{force}");
+}
+
+#[test]
+fn what_is_left_out_has_a_default() {
+    let text = "
+        mesh.file = 'm.msh'
+        material = { young = 1, poisson = 0, plane = 'strain' }
+        boundary = [{ name = 'b', displacement = ['free', 2], traction = ['x', 0] }]
+    ";
+    let scene = Scene::parse(text, Path::new("dir/tiny.toml"), &[]).expect("complete");
+    assert_eq!(
+        (scene.name.as_str(), scene.title.as_str()),
+        ("tiny", "tiny")
+    );
+    assert_eq!(scene.mesh, MeshSource::from_path("dir/m.msh"));
+    assert!(scene.damage.is_none() && scene.time.is_none());
+    assert!(
+        scene
+            .body_force
+            .iter()
+            .all(|f| f.as_constant() == Some(0.0))
+    );
+    assert_eq!(
+        (scene.contact.solver, scene.contact.tolerance),
+        (None, 1e-10)
+    );
+    assert_eq!(scene.output.every, None);
+    let [x, y] = scene.boundaries[0].displacement.as_ref().expect("given");
+    assert!(x.is_none());
+    assert_eq!(y.as_ref().and_then(|y| y.as_constant()), Some(2.0));
+}
+
+#[test]
+fn everything_written_is_read() {
+    let scene = Scene::parse(BASE, Path::new("dir/base.toml"), &[]).expect("complete");
+    assert_eq!(scene.title, "Base");
+    assert_eq!(scene.path, Path::new("dir/base.toml"));
+    assert_eq!(scene.mesh.file, Path::new("dir/base.geo"));
+    let parameters = scene.mesh.parameters.iter().map(|(k, v)| (k.as_str(), *v));
+    assert_eq!(
+        parameters.collect::<Vec<_>>(),
+        [("grading", 3.0), ("size", 0.25)]
+    );
+    assert_eq!(scene.body_force[1].eval(0.0, 0.0, 2.0), -2.0);
+    assert_eq!(scene.contact.solver.as_deref(), Some("tron"));
+    assert_eq!(scene.contact.tolerance, 1e-8);
+    assert_eq!(scene.output.every, Some(5));
+    let damage = scene.damage.expect("given");
+    assert_eq!(damage.initial.eval(0.5, 0.0, 0.0), 0.95);
+    let gap = scene.boundaries[2].gap.as_ref().expect("given");
+    assert_eq!(gap.normal, Some([0.6, -0.8]), "scaled to length 1");
+    assert!(scene.boundaries[2].traction.is_some(), "beside the gap");
+}
+
+#[test]
+fn the_time_grid_is_uniform_and_not_coarser_than_asked() {
+    for (end, step, steps) in [
+        (1.0, 0.01, 100),
+        (1.0, 0.001, 1000),
+        (0.3, 0.1, 3), // 0.3/0.1 rounds to 2.999…96 or 3.000…04: still three steps
+        (0.7, 0.1, 7),
+        (1.0, 0.3, 4),
+        (1.0, 1.0, 1),
+        (2.0, 1.999, 2),
+    ] {
+        let grid = TimeGrid::new(end, step);
+        assert_eq!(grid.steps, steps, "{end} by {step}");
+        assert!(grid.step() <= step * (1.0 + 1e-8));
+        assert_eq!(grid.end, end);
+    }
+}

@@ -1,0 +1,156 @@
+//! What a scene finds wrong with its mesh.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use signorini::mesh::{Curve, Mesh};
+use signorini::scene::Scene;
+
+use crate::BASE;
+
+/// The square [0, 2]² in two triangles, a side for each boundary of the base scene.
+fn square() -> Mesh {
+    let side = |a, b| Curve {
+        edges: vec![[a, b]],
+        interior_edges: 0,
+    };
+    Mesh {
+        nodes: vec![[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        curves: BTreeMap::from([
+            ("foundation".into(), side(0, 1)),
+            ("clamp".into(), side(1, 2)),
+            ("load".into(), side(2, 3)),
+            ("axis".into(), side(3, 0)),
+        ]),
+    }
+}
+
+fn verdict(old: &str, new: &str, mesh: &Mesh) -> Result<(), String> {
+    assert!(BASE.contains(old), "the base scene has no `{old}`");
+    let text = BASE.replacen(old, new, 1);
+    let scene = Scene::parse(&text, Path::new("bad.toml"), &[]).unwrap_or_else(|e| panic!("{e}"));
+    scene.check_mesh(mesh).map_err(|e| e.to_string())
+}
+
+#[test]
+fn a_fitting_mesh_is_accepted() {
+    assert_eq!(verdict("", "", &square()), Ok(()));
+}
+
+#[test]
+fn values_are_checked_where_they_are_used() {
+    for (old, new, expected) in [
+        (
+            "\"-80*t\"",
+            "\"sqrt(x-1)\"",
+            "bad.toml:33: boundary \"load\": traction[1] is NaN at (0, 2), t = 0",
+        ),
+        (
+            "\"-80*t\"",
+            "\"1/(1-t)\"",
+            "bad.toml:33: boundary \"load\": traction[1] is inf at (2, 2), t = 1",
+        ),
+        (
+            "displacement = [\"0\", \"0\"]",
+            "displacement = [\"free\", \"log(y)\"]",
+            "bad.toml:30: boundary \"clamp\": displacement[1] is -inf at (2, 0), t = 0",
+        ),
+        (
+            "[0, \"-t\"]",
+            "[0, \"1/y\"]",
+            "bad.toml:22: body.force[1] is inf at (0, 0), t = 0",
+        ),
+        (
+            "1 - 0.1*x",
+            "1 - 0.5*x",
+            "bad.toml:17: damage.initial is 0 at (2, 0); it must be in (0.01, 1]",
+        ),
+        (
+            "1 - 0.1*x",
+            "1 + 0.5*y",
+            "bad.toml:17: damage.initial is 2 at (2, 2); it must be in (0.01, 1]",
+        ),
+        (
+            "1 - 0.1*x",
+            "log(x)",
+            "bad.toml:17: damage.initial is -inf at (0, 0), t = 0",
+        ),
+        (
+            "x^2",
+            "1-x",
+            "bad.toml:36: boundary \"foundation\": gap is -1 at (2, 0); it must not be negative",
+        ),
+        (
+            "x^2",
+            "sqrt(x-1)",
+            "bad.toml:36: boundary \"foundation\": gap is NaN at (0, 0), t = 0",
+        ),
+    ] {
+        assert_eq!(
+            verdict(old, new, &square()),
+            Err(expected.into()),
+            "`{old}` → `{new}`"
+        );
+    }
+}
+
+#[test]
+fn what_is_undefined_elsewhere_does_not_matter() {
+    assert_eq!(verdict("x^2", "1/(2-y)", &square()), Ok(()));
+    // Rounding in the nodes of a curved foundation is no penetration.
+    assert_eq!(verdict("x^2", "-1e-15*x", &square()), Ok(()));
+}
+
+#[test]
+fn a_curve_must_be_there_and_on_the_boundary() {
+    let message = verdict("name = \"load\"", "name = \"laod\"", &square());
+    assert_eq!(
+        message,
+        Err(
+            "bad.toml:32: boundary \"laod\" is no physical curve of the mesh; \
+             did you mean `load`? (known: axis, clamp, foundation, load)"
+                .into()
+        )
+    );
+
+    let mut mesh = square();
+    mesh.curves.insert("load".into(), Curve::default());
+    let message = verdict("", "", &mesh).expect_err("an empty curve");
+    assert!(
+        message.starts_with("bad.toml:32: boundary \"load\" has no edges"),
+        "{message}"
+    );
+
+    mesh.curves.insert(
+        "load".into(),
+        Curve {
+            edges: vec![[2, 3]],
+            interior_edges: 2,
+        },
+    );
+    let message = verdict("", "", &mesh).expect_err("a curve inside");
+    assert!(
+        message.contains("\"load\" has 2 edges inside the body"),
+        "{message}"
+    );
+
+    mesh.curves.clear();
+    let message = verdict("", "", &mesh).expect_err("no curves");
+    assert!(
+        message.ends_with("is no physical curve of the mesh (there are none)"),
+        "{message}"
+    );
+}
+
+#[test]
+fn a_value_from_the_command_line_is_named_as_such() {
+    let sets = ["boundary.load.traction=[0, 'log(x)']".to_owned()];
+    let scene = Scene::parse(BASE, Path::new("base.toml"), &sets).expect("well formed");
+    let message = scene.check_mesh(&square()).expect_err("log(0)").to_string();
+    assert_eq!(
+        message,
+        "base.toml, --set boundary.load.traction=[0, 'log(x)']: \
+         boundary \"load\": traction[1] is -inf at (0, 2), t = 0"
+    );
+}
