@@ -80,7 +80,7 @@ fn phase_table(phases: &BTreeMap<&'static str, (usize, f64)>, wall: f64) -> Tabl
     rows.sort_by(|a, b| b.2.total_cmp(&a.2));
     let rest = wall - rows.iter().map(|(_, _, s)| s).sum::<f64>();
     let mut table = Table::new();
-    table.load_preset(presets::UTF8_HORIZONTAL_ONLY);
+    table.load_style(presets::NOTHING);
     table.set_header(["phase", "calls", "seconds", "share"]);
     let share = |s: f64| format!("{:.1} %", 100.0 * s / wall);
     for (name, calls, s) in rows {

@@ -2,6 +2,7 @@
 //!
 //! A solver is one file that implements [`ContactSolver`]; [`solver`] knows them by name.
 
+mod anderson;
 mod certificate;
 mod constraints;
 mod linear;

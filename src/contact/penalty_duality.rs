@@ -1,7 +1,9 @@
 //! The penalty-duality algorithm of Bermúdez and Moreno (Comput. Math. Appl. 7, 1981),
 //! the paper's reference [4].
 
-use super::{Bound, ContactError, ContactProblem, ContactReport, ContactSolver, Kkt};
+use super::{
+    Bound, ContactError, ContactProblem, ContactReport, ContactSolver, Kkt, anderson::Anderson,
+};
 use crate::petsc::{LinearSolver, PetscError, Session, Vector};
 use nalgebra::DMatrix;
 
@@ -11,8 +13,9 @@ use nalgebra::DMatrix;
 /// 2. r = Bu + λq,  y = min(g, r/(1 − λω)),  q ← (r − y)/λ.
 ///
 /// B picks the bounded unknowns, W their shares of Γ_C; p = q + ω Bu is the contact pressure
-/// at the fixed point. λω = ½. One factorisation serves all iterations at one K; the next
-/// step starts from this one's q.
+/// at the fixed point. One factorisation serves all iterations at one K; the next step starts
+/// from this one's q. The iteration is mixed by [`Anderson`]: measured on this project's
+/// scenes, 11 to 30 iterations instead of 200 to 600.
 pub(super) struct PenaltyDuality<'s> {
     session: &'s Session,
     /// ω, Pa/m, once estimated.
@@ -22,7 +25,9 @@ pub(super) struct PenaltyDuality<'s> {
     q: Vec<f64>,
 }
 
-/// λω: the value for which Bermúdez and Moreno prove convergence, and the customary one.
+/// λω. On a compliance eigenvalue s the error of q is multiplied by 1 − s/(λ(1 + ωs)) where all
+/// nodes press and by −λω/(1 − λω) · (1 − s/(λ(1 + ωs))) where none do: at most 1 in size for
+/// every s only if λω is ½.
 const LAMBDA_OMEGA: f64 = 0.5;
 /// ω√(s_min s_max), with s the extreme eigenvalues of the boundary compliance: measured best.
 const OMEGA_COMPLIANCE: f64 = 3.0;
@@ -127,10 +132,14 @@ impl<'s> PenaltyDuality<'s> {
             1 => beta[i.min(j)],
             _ => 0.0,
         });
-        let compliance = |theta: f64| theta / (1.0 - trial * theta).max(1e-12);
+        // θ = s/(1 + ωs); rigid motions that only contact holds have s = ∞ and do not count.
+        let compliance = |theta: f64| theta / (1.0 - trial * theta);
         let eigenvalues = tridiagonal.symmetric_eigenvalues();
-        let (least, largest) = (compliance(eigenvalues.min()), compliance(eigenvalues.max()));
-        Ok(OMEGA_COMPLIANCE / (least * largest).sqrt())
+        let finite = || eigenvalues.iter().filter(|theta| 1.0 - trial * **theta > 1e-6);
+        let least = compliance(finite().copied().fold(f64::INFINITY, f64::min));
+        let largest = compliance(finite().copied().fold(0.0, f64::max));
+        let omega = OMEGA_COMPLIANCE / (least * largest).sqrt();
+        Ok(if omega.is_finite() && omega > 0.0 { omega } else { trial })
     }
 }
 
@@ -162,6 +171,7 @@ impl ContactSolver for PenaltyDuality<'_> {
         let mut rhs = Vector::zeros(self.session, c.owned())?;
 
         let mut residuals = Kkt::default();
+        let mut anderson = Anderson::new(problem.bounds.iter().map(|b| b.weight));
         while report.iterations < ITERATIONS {
             report.linear_iterations += self.response(problem, true, &q, &mut rhs, c)?;
             report.iterations += 1;
@@ -172,11 +182,13 @@ impl ContactSolver for PenaltyDuality<'_> {
                 self.q = q;
                 return Ok(report);
             }
-            for ((q, u), bound) in q.iter_mut().zip(&normal).zip(problem.bounds) {
-                let r = u + lambda * *q;
+            let image = |(q, (u, bound)): (&f64, (&f64, &Bound))| {
+                let r = u + lambda * q;
                 let y = bound.gap.min(r / (1.0 - LAMBDA_OMEGA));
-                *q = (r - y) / lambda;
-            }
+                (r - y) / lambda
+            };
+            let images = q.iter().zip(normal.iter().zip(problem.bounds)).map(image).collect();
+            q = anderson.next(&q, images);
         }
         Err(ContactError::NotConverged {
             method: self.name(),

@@ -107,6 +107,9 @@ impl RigidMotions {
             rows.fold(Matrix3::zeros(), |sum, r| sum + r * r.transpose())
         };
         let unheld = null_space(&gram(&mut fixed.iter().map(|(node, d)| row(*node, *d))));
+        if unheld.is_empty() {
+            return Self { free: vec![], resisted: vec![], normal: DMatrix::zeros(0, 0), centre };
+        }
         let contact = DMatrix::from_row_iterator(
             gaps.len(),
             unheld.len(),

@@ -14,6 +14,8 @@ use std::{
 static TURN: Mutex<()> = Mutex::new(());
 /// Vectors, matrices and solvers not yet destroyed.
 static LIVE: AtomicUsize = AtomicUsize::new(0);
+/// Options we set ourselves; not the user's fault if nothing reads them.
+static DEFAULTS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
 /// The right to use PETSc; every object of this module is made from it.
 ///
@@ -67,12 +69,14 @@ impl Session {
                 raw::PetscOptionsLeftRestore(database, &mut count, &mut names, &mut values);
             }
         }
-        unused.retain(|name| name != "-no_signal_handler");
+        let defaults = DEFAULTS.lock().unwrap_or_else(PoisonError::into_inner);
+        unused.retain(|name| name != "-no_signal_handler" && !defaults.contains(name));
         unused
     }
 
     /// Sets a default in the options database, unless the user has given that option.
     pub(super) fn default_option(&self, name: &str, value: &str) -> Result<(), PetscError> {
+        DEFAULTS.lock().unwrap_or_else(PoisonError::into_inner).push(name.to_owned());
         let (name, value) = (c_string(name)?, c_string(value)?);
         let mut given = raw::PetscBool::PETSC_FALSE;
         let database = ptr::null_mut();

@@ -50,30 +50,16 @@ impl Check<'_> {
             name: table.name.get_ref().clone(),
             displacement: displacement.map(|d| self.displacement(d)).transpose()?,
             symmetry,
-            traction: table
-                .traction
-                .as_ref()
-                .map(|t| self.vector(t))
-                .transpose()?,
+            traction: table.traction.as_ref().map(|t| self.vector(t)).transpose()?,
             gap: self.gap(table)?,
         };
         match &boundary {
-            Boundary {
-                displacement: Some([Some(_), Some(_)]),
-                traction: Some(_),
-                ..
-            } => {
+            Boundary { displacement: Some([Some(_), Some(_)]), traction: Some(_), .. } => {
                 let problem = "has a traction, but both displacements are prescribed: \
                                leave the traction out or a component \"free\"";
                 Err(self.invalid(&span, problem))
             }
-            Boundary {
-                displacement: None,
-                symmetry: false,
-                traction: None,
-                gap: None,
-                ..
-            } => {
+            Boundary { displacement: None, symmetry: false, traction: None, gap: None, .. } => {
                 let problem = "has nothing in it: give it a displacement, symmetry = true, \
                                a traction or a gap, or remove it";
                 Err(self.invalid(&span, problem))

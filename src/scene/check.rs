@@ -83,12 +83,7 @@ impl Scene {
         let key = |key: &str| boundary_key(&boundary.name, key);
         for (i, component) in boundary.displacement.iter().flatten().enumerate() {
             if let Some(component) = component {
-                self.finite(
-                    &key(&format!("displacement[{i}]")),
-                    component,
-                    mesh,
-                    nodes(),
-                )?;
+                self.finite(&key(&format!("displacement[{i}]")), component, mesh, nodes())?;
             }
         }
         for (i, component) in boundary.traction.iter().flatten().enumerate() {
@@ -130,11 +125,7 @@ impl Scene {
     }
 
     fn at_key(&self, key: &str, problem: String) -> SceneError {
-        SceneError::Invalid {
-            place: self.source.place_of(key),
-            key: key.to_owned(),
-            problem,
-        }
+        SceneError::Invalid { place: self.source.place_of(key), key: key.to_owned(), problem }
     }
 }
 
@@ -146,9 +137,8 @@ fn coordinates(mesh: &Mesh, node: usize) -> Option<(f64, f64)> {
 fn extent(mesh: &Mesh) -> f64 {
     let side = |axis: usize| {
         let values = mesh.nodes.iter().map(|node| node[axis]);
-        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
-            (low.min(v), high.max(v))
-        });
+        let (low, high) = values
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
         high - low
     };
     side(0).max(side(1)).max(0.0)

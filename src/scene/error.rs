@@ -158,17 +158,11 @@ pub enum ExpressionError {
 
 impl ExpressionError {
     pub(super) fn unknown_variable(name: &str) -> Self {
-        Self::UnknownVariable {
-            name: name.into(),
-            names: known_names(name),
-        }
+        Self::UnknownVariable { name: name.into(), names: known_names(name) }
     }
 
     pub(super) fn unknown_function(name: &str) -> Self {
-        Self::UnknownFunction {
-            name: name.into(),
-            names: known_names(name),
-        }
+        Self::UnknownFunction { name: name.into(), names: known_names(name) }
     }
 }
 
@@ -196,10 +190,7 @@ impl Names {
         let alike = |k: &String| strsim::normalized_damerau_levenshtein(&name, &k.to_lowercase());
         let best = known.iter().map(|k| (alike(k), k));
         let best = best.reduce(|a, b| if b.0 > a.0 { b } else { a });
-        Self {
-            nearest: best.filter(|b| b.0 >= 0.5).map(|b| b.1.clone()),
-            known,
-        }
+        Self { nearest: best.filter(|b| b.0 >= 0.5).map(|b| b.1.clone()), known }
     }
 }
 

@@ -49,9 +49,7 @@ impl Expression {
             return Err(ExpressionError::Empty);
         }
         let bracketed = grammar::with_all_brackets(text)?;
-        let refused = |e: exmex::ExError| ExpressionError::Refused {
-            reason: e.to_string(),
-        };
+        let refused = |e: exmex::ExError| ExpressionError::Refused { reason: e.to_string() };
         let program = FlatEx::<f64, Operators, Numbers>::parse(&bracketed).map_err(refused)?;
         let code = if program.var_names().is_empty() {
             Code::Constant(program.eval(&[]).map_err(refused)?)
@@ -63,18 +61,12 @@ impl Expression {
                 program: Box::new(program),
             }
         };
-        Ok(Self {
-            text: text.trim().to_owned(),
-            code,
-        })
+        Ok(Self { text: text.trim().to_owned(), code })
     }
 
     /// The expression that is `value` everywhere.
     pub fn constant(value: f64) -> Self {
-        Self {
-            text: value.to_string(),
-            code: Code::Constant(value),
-        }
+        Self { text: value.to_string(), code: Code::Constant(value) }
     }
 
     /// The value at the point (x, y), m, and time t, s; NaN or infinite where the
@@ -112,9 +104,9 @@ impl Expression {
     pub fn depends_on_time(&self) -> bool {
         match &self.code {
             Code::Constant(_) => false,
-            Code::Formula { arguments, .. } => arguments
-                .iter()
-                .any(|&slot| grammar::VARIABLES[slot] == "t"),
+            Code::Formula { arguments, .. } => {
+                arguments.iter().any(|&slot| grammar::VARIABLES[slot] == "t")
+            }
         }
     }
 }
@@ -134,11 +126,7 @@ impl MakeOperators<f64> for Operators {
     fn make<'a>() -> Vec<Operator<'a, f64>> {
         // Brackets are all written out, so only `+ -` and `* /` ever stand side by
         // side. Nothing is declared commutative: exmex would reorder the sums.
-        let binary = |apply, prio| BinOp {
-            apply,
-            prio,
-            is_commutative: false,
-        };
+        let binary = |apply, prio| BinOp { apply, prio, is_commutative: false };
         let smaller = |a: f64, b: f64| if a < b || a.is_nan() { a } else { b };
         let larger = |a: f64, b: f64| if a > b || a.is_nan() { a } else { b };
         vec![

@@ -13,9 +13,7 @@ use super::source::Source;
 use crate::model::Plane;
 
 /// The tables that stand alone.
-const TABLES: [&str; 7] = [
-    "mesh", "material", "damage", "time", "body", "contact", "output",
-];
+const TABLES: [&str; 7] = ["mesh", "material", "damage", "time", "body", "contact", "output"];
 
 type Number = Spanned<f64>;
 /// Two expressions; a list, because serde would ignore a third component.
@@ -189,15 +187,8 @@ fn explain(error: &toml::de::Error, source: &Source) -> SceneError {
     if message.starts_with("missing field") {
         let missing = quoted.next().unwrap_or_default();
         // A boundary's key already ends in its colon.
-        let dot = if key.is_empty() || key.ends_with(": ") {
-            ""
-        } else {
-            "."
-        };
-        return SceneError::MissingKey {
-            place,
-            key: format!("{key}{dot}{missing}"),
-        };
+        let dot = if key.is_empty() || key.ends_with(": ") { "" } else { "." };
+        return SceneError::MissingKey { place, key: format!("{key}{dot}{missing}") };
     }
     let problem = match message.split_once(", expected ") {
         Some((found, expected)) => {
@@ -209,11 +200,7 @@ fn explain(error: &toml::de::Error, source: &Source) -> SceneError {
         }
         None => format!("is not understood: {message}"),
     };
-    SceneError::Invalid {
-        place,
-        key,
-        problem,
-    }
+    SceneError::Invalid { place, key, problem }
 }
 
 /// serde's names of types and values in the words of TOML.

@@ -52,11 +52,7 @@ pub(super) fn leading_number(text: &str) -> Option<&str> {
 /// # Errors
 /// A syntax error with its column, or a name that is not known.
 pub(super) fn with_all_brackets(text: &str) -> Result<String, ExpressionError> {
-    let mut reader = Reader {
-        text,
-        at: 0,
-        depth: 0,
-    };
+    let mut reader = Reader { text, at: 0, depth: 0 };
     let whole = reader.sum()?;
     match reader.peek() {
         None => Ok(whole),
@@ -95,11 +91,7 @@ impl<'a> Reader<'a> {
             written.push_str(&operand(self)?);
             single = false;
         }
-        Ok(if single {
-            written
-        } else {
-            format!("({written})")
-        })
+        Ok(if single { written } else { format!("({written})") })
     }
 
     /// `-a`, `+a`, `a^b`: a sign binds looser than the power to its right, so
@@ -137,16 +129,12 @@ impl<'a> Reader<'a> {
             Ok(inside)
         } else if let Some(number) = leading_number(rest) {
             if !number.parse().is_ok_and(f64::is_finite) {
-                return Err(ExpressionError::NumberTooLarge {
-                    number: number.into(),
-                });
+                return Err(ExpressionError::NumberTooLarge { number: number.into() });
             }
             self.at += number.len();
             Ok(number.to_owned())
         } else if first.is_alphabetic() || first == '_' {
-            let name = rest
-                .split(|c: char| !c.is_alphanumeric() && c != '_')
-                .next();
+            let name = rest.split(|c: char| !c.is_alphanumeric() && c != '_').next();
             self.name(name.unwrap_or(rest))
         } else {
             Err(self.unexpected("a number, a name or `(`"))

@@ -61,10 +61,7 @@ pub struct MeshSource {
 impl MeshSource {
     /// The mesh in `file`, with no parameters (`--mesh FILE`).
     pub fn from_path(file: impl Into<PathBuf>) -> Self {
-        Self {
-            file: file.into(),
-            parameters: BTreeMap::new(),
-        }
+        Self { file: file.into(), parameters: BTreeMap::new() }
     }
 }
 
@@ -96,10 +93,7 @@ impl TimeGrid {
     /// and not coarser. A step that divides the end up to rounding is kept.
     pub fn new(end: f64, step: f64) -> Self {
         let steps = (end / step - 1e-9).ceil().max(1.0);
-        Self {
-            end,
-            steps: steps as usize,
-        }
+        Self { end, steps: steps as usize }
     }
 
     /// k = T/N, s.
@@ -162,10 +156,8 @@ impl Scene {
     /// type; a value is out of range or contradicts another. Every error tells the file,
     /// the line (or the `--set`), the key and what to write instead.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
-        let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read {
-            path: path.to_owned(),
-            source,
-        })?;
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| SceneError::Read { path: path.to_owned(), source })?;
         Self::parse(&text, path, overrides)
     }
 

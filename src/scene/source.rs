@@ -40,19 +40,14 @@ impl Source {
         let breaks = text.bytes().enumerate().filter(|(_, b)| *b == b'\n');
         let mut start = text.len() + 1;
         let sets = sets.iter().zip(documents).map(|(argument, document)| {
-            let set = Set {
-                argument: argument.clone(),
-                start,
-            };
+            let set = Set { argument: argument.clone(), start };
             start += document.len() + 1;
             set
         });
         Self {
             path: path.to_owned(),
             sets: sets.collect(),
-            lines: std::iter::once(0)
-                .chain(breaks.map(|(i, _)| i + 1))
-                .collect(),
+            lines: std::iter::once(0).chain(breaks.map(|(i, _)| i + 1)).collect(),
             keys: Vec::new(),
         }
     }
@@ -65,9 +60,7 @@ impl Source {
         text: &'a str,
         documents: &'a [String],
     ) -> Result<DeTable<'a>, SceneError> {
-        let mut root = DeTable::parse(text)
-            .map_err(|e| self.not_toml(&e))?
-            .into_inner();
+        let mut root = DeTable::parse(text).map_err(|e| self.not_toml(&e))?.into_inner();
         for (set, document) in self.sets.iter().zip(documents) {
             let given = DeTable::parse(document).map_err(|e| self.not_toml(&e))?;
             let given = shifted_table(given.into_inner(), set.start);
@@ -104,11 +97,7 @@ impl Source {
 
     /// The file, no line in particular.
     pub(super) fn whole_file(&self) -> Place {
-        Place {
-            path: self.path.clone(),
-            line: None,
-            set: None,
-        }
+        Place { path: self.path.clone(), line: None, set: None }
     }
 
     fn not_toml(&self, error: &toml::de::Error) -> SceneError {
@@ -155,9 +144,8 @@ impl Source {
             _ => &mut DeArray::new(),
         };
         let known: Vec<String> = list.iter().filter_map(boundary_name).collect();
-        let named = list
-            .iter_mut()
-            .find(|b| boundary_name(b).as_deref() == Some(name.get_ref().as_ref()));
+        let named =
+            list.iter_mut().find(|b| boundary_name(b).as_deref() == Some(name.get_ref().as_ref()));
         let span = keys.span();
         match (named.map(Spanned::get_mut), keys.into_inner()) {
             (Some(DeValue::Table(boundary)), DeValue::Table(keys)) => {
@@ -203,10 +191,7 @@ pub(super) fn set_document(argument: &str) -> Result<String, SceneError> {
 fn merge<'a>(into: &mut DeTable<'a>, given: DeTable<'a>) {
     for (key, value) in given {
         let span = value.span();
-        match (
-            into.get_mut(key.get_ref().as_ref()).map(Spanned::get_mut),
-            value.into_inner(),
-        ) {
+        match (into.get_mut(key.get_ref().as_ref()).map(Spanned::get_mut), value.into_inner()) {
             (Some(DeValue::Table(old)), DeValue::Table(new)) => merge(old, new),
             (_, new) => {
                 // Out with the old key too: its span would point into the file.
@@ -243,14 +228,7 @@ fn shifted(value: Spanned<DeValue<'_>>, by: usize) -> Spanned<DeValue<'_>> {
 }
 
 fn boundary_name(boundary: &Spanned<DeValue<'_>>) -> Option<String> {
-    Some(
-        boundary
-            .get_ref()
-            .get("name")?
-            .get_ref()
-            .as_str()?
-            .to_owned(),
-    )
+    Some(boundary.get_ref().get("name")?.get_ref().as_str()?.to_owned())
 }
 
 fn remember_table(keys: &mut Vec<(Range<usize>, String)>, prefix: &str, table: &DeTable<'_>) {

@@ -38,9 +38,7 @@ pub(super) fn scene(file: File, path: &Path, source: Source) -> Result<Scene, Sc
         time: file.time.map(|t| check.time(&t)).transpose()?,
         body_force,
         contact: check.contact(file.contact)?,
-        output: OutputOptions {
-            every: file.output.every.map(Spanned::into_inner),
-        },
+        output: OutputOptions { every: file.output.every.map(Spanned::into_inner) },
         boundaries: check.boundaries(&file.boundary)?,
         source,
     })
@@ -146,10 +144,7 @@ impl Check<'_> {
             let problem = format!("has no effect: \"{written}\" is used as it is; name its .geo");
             return Err(self.invalid(&given.span(), problem));
         }
-        Ok(MeshSource {
-            file: scene.parent().unwrap_or(Path::new("")).join(written),
-            parameters,
-        })
+        Ok(MeshSource { file: scene.parent().unwrap_or(Path::new("")).join(written), parameters })
     }
 
     fn material(&self, table: &MaterialTable) -> Result<Material, SceneError> {

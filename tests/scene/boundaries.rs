@@ -5,26 +5,14 @@ use crate::errors::check;
 #[test]
 fn every_rule_names_file_line_and_boundary() {
     check(&[
-        (
-            "\"-80*t\"",
-            "\"1/0\"",
-            &["bad.toml:33: boundary \"load\": traction[1] must be finite"],
-        ),
+        ("\"-80*t\"", "\"1/0\"", &["bad.toml:33: boundary \"load\": traction[1] must be finite"]),
         (
             "\"-80*t\"",
             "nan",
             &["bad.toml:33: boundary \"load\": traction[1] must be finite, but is NaN"],
         ),
-        (
-            "\"-80*t\"",
-            "\"free\"",
-            &["bad.toml:33: boundary \"load\": traction[1] has the unknown"],
-        ),
-        (
-            "\"-80*t\"",
-            "\"sn(t)\"",
-            &["bad.toml:33", "unknown function `sn`; did you mean `sin`?"],
-        ),
+        ("\"-80*t\"", "\"free\"", &["bad.toml:33: boundary \"load\": traction[1] has the unknown"]),
+        ("\"-80*t\"", "\"sn(t)\"", &["bad.toml:33", "unknown function `sn`; did you mean `sin`?"]),
         (
             "name = \"load\"",
             "name = \"clamp\"",
@@ -70,24 +58,13 @@ fn every_rule_names_file_line_and_boundary() {
             "symmetry = true\ngap = 0",
             &["bad.toml:39: boundary \"axis\" has a symmetry and a gap"],
         ),
-        (
-            "x^2",
-            "x^2 + t",
-            &["bad.toml:36: boundary \"foundation\": gap depends on t"],
-        ),
+        ("x^2", "x^2 + t", &["bad.toml:36: boundary \"foundation\": gap depends on t"]),
         (
             "\"x^2\"",
             "-0.1",
-            &[
-                "bad.toml:36: boundary \"foundation\": gap must not be negative",
-                "-0.1",
-            ],
+            &["bad.toml:36: boundary \"foundation\": gap must not be negative", "-0.1"],
         ),
-        (
-            "gap = \"x^2\"\n",
-            "",
-            &["bad.toml:36: boundary \"foundation\": normal needs a gap"],
-        ),
+        ("gap = \"x^2\"\n", "", &["bad.toml:36: boundary \"foundation\": normal needs a gap"]),
         (
             "[\"3\", \"-4\"]",
             "[0, \"1-1\"]",

@@ -137,10 +137,7 @@ fn unknown_names_are_named_with_what_is_known() {
         ("E", ["unknown variable `E`", "known: x, y, t"]),
         ("τ", ["unknown variable `τ`", "known: x, y, t"]),
         ("{x}", ["`{` at column 1", "a number, a name"]),
-        (
-            "sinh(x)",
-            ["unknown function `sinh`", "did you mean `sin`?"],
-        ),
+        ("sinh(x)", ["unknown function `sinh`", "did you mean `sin`?"]),
         ("ln(x)", ["unknown function `ln`", "known: x"]),
         ("x1", ["unknown variable `x1`", "did you mean `x`?"]),
         ("pit", ["unknown variable `pit`", "did you mean `pi`?"]),

@@ -35,14 +35,7 @@ fn every_shipped_scene_is_read() {
             names.push(scene.name);
         }
     }
-    for name in [
-        "square",
-        "square-mild",
-        "lshape",
-        "bridge",
-        "bridge-half",
-        "hertz",
-    ] {
+    for name in ["square", "square-mild", "lshape", "bridge", "bridge-half", "hertz"] {
         assert!(names.iter().any(|n| n == name), "{name} is missing");
     }
 }
@@ -52,51 +45,19 @@ fn the_examples_carry_the_printed_data() {
     type Example = (&'static str, [f64; 4], usize, &'static [&'static str]);
     // (scene, [E, κ, λ_D, λ_U], steps, curves)
     let examples: [Example; 5] = [
-        (
-            "square",
-            [80.0, 0.01, 0.1, 100.0],
-            5000,
-            &["left", "bottom", "right"],
-        ),
-        (
-            "square-mild",
-            [80.0, 0.01, 0.1, 2.0],
-            100,
-            &["left", "bottom", "right"],
-        ),
-        (
-            "lshape",
-            [1e5, 1.0, 0.25, 1e3],
-            100,
-            &["clamp", "foundation", "load"],
-        ),
-        (
-            "bridge",
-            [1e6, 1.0, 0.25, 1e3],
-            100,
-            &["foundation", "load"],
-        ),
-        (
-            "bridge-half",
-            [1e6, 1.0, 0.25, 1e3],
-            100,
-            &["axis", "foundation", "load"],
-        ),
+        ("square", [80.0, 0.01, 0.1, 100.0], 5000, &["left", "bottom", "right"]),
+        ("square-mild", [80.0, 0.01, 0.1, 2.0], 100, &["left", "bottom", "right"]),
+        ("lshape", [1e5, 1.0, 0.25, 1e3], 100, &["clamp", "foundation", "load"]),
+        ("bridge", [1e6, 1.0, 0.25, 1e3], 100, &["foundation", "load"]),
+        ("bridge-half", [1e6, 1.0, 0.25, 1e3], 100, &["axis", "foundation", "load"]),
     ];
     for (name, [young, diffusion, lambda_d, lambda_u], steps, curves) in examples {
         let scene = shipped(name);
         let law = scene.damage.as_ref().expect(name).law;
-        assert_eq!(
-            (scene.material.young, scene.material.poisson),
-            (young, 0.3),
-            "{name}"
-        );
+        assert_eq!((scene.material.young, scene.material.poisson), (young, 0.3), "{name}");
         assert_eq!(scene.material.plane, Plane::Stress, "{name}");
         assert_eq!((law.diffusion, law.threshold), (diffusion, 0.01), "{name}");
-        assert_eq!(
-            (law.lambda_d, law.lambda_u, law.lambda_w),
-            (lambda_d, lambda_u, 0.0)
-        );
+        assert_eq!((law.lambda_d, law.lambda_u, law.lambda_w), (lambda_d, lambda_u, 0.0));
         assert_eq!(law.strain_cap, 1000.0, "{name}");
         assert_eq!(scene.time, Some(TimeGrid { end: 1.0, steps }), "{name}");
         let names: Vec<&str> = scene.boundaries.iter().map(|b| b.name.as_str()).collect();
@@ -105,11 +66,7 @@ fn the_examples_carry_the_printed_data() {
         let [x, y] = load.expect("a load");
         let load = [x.eval(1.0, 1.0, 0.5), y.eval(1.0, 1.0, 0.5)];
         let square = name.starts_with("square");
-        assert_eq!(
-            load,
-            if square { [-10.0, -10.0] } else { [0.0, -40.0] },
-            "{name}"
-        );
+        assert_eq!(load, if square { [-10.0, -10.0] } else { [0.0, -40.0] }, "{name}");
     }
 }
 
@@ -139,22 +96,11 @@ fn what_is_left_out_has_a_default() {
         boundary = [{ name = 'b', displacement = ['free', 2], traction = ['x', 0] }]
     ";
     let scene = Scene::parse(text, Path::new("dir/tiny.toml"), &[]).expect("complete");
-    assert_eq!(
-        (scene.name.as_str(), scene.title.as_str()),
-        ("tiny", "tiny")
-    );
+    assert_eq!((scene.name.as_str(), scene.title.as_str()), ("tiny", "tiny"));
     assert_eq!(scene.mesh, MeshSource::from_path("dir/m.msh"));
     assert!(scene.damage.is_none() && scene.time.is_none());
-    assert!(
-        scene
-            .body_force
-            .iter()
-            .all(|f| f.as_constant() == Some(0.0))
-    );
-    assert_eq!(
-        (scene.contact.solver, scene.contact.tolerance),
-        (None, 1e-10)
-    );
+    assert!(scene.body_force.iter().all(|f| f.as_constant() == Some(0.0)));
+    assert_eq!((scene.contact.solver, scene.contact.tolerance), (None, 1e-10));
     assert_eq!(scene.output.every, None);
     let [x, y] = scene.boundaries[0].displacement.as_ref().expect("given");
     assert!(x.is_none());
@@ -168,10 +114,7 @@ fn everything_written_is_read() {
     assert_eq!(scene.path, Path::new("dir/base.toml"));
     assert_eq!(scene.mesh.file, Path::new("dir/base.geo"));
     let parameters = scene.mesh.parameters.iter().map(|(k, v)| (k.as_str(), *v));
-    assert_eq!(
-        parameters.collect::<Vec<_>>(),
-        [("grading", 3.0), ("size", 0.25)]
-    );
+    assert_eq!(parameters.collect::<Vec<_>>(), [("grading", 3.0), ("size", 0.25)]);
     assert_eq!(scene.body_force[1].eval(0.0, 0.0, 2.0), -2.0);
     assert_eq!(scene.contact.solver.as_deref(), Some("tron"));
     assert_eq!(scene.contact.tolerance, 1e-8);

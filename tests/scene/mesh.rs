@@ -10,10 +10,7 @@ use crate::BASE;
 
 /// The square [0, 2]² in two triangles, a side for each boundary of the base scene.
 fn square() -> Mesh {
-    let side = |a, b| Curve {
-        edges: vec![[a, b]],
-        interior_edges: 0,
-    };
+    let side = |a, b| Curve { edges: vec![[a, b]], interior_edges: 0 };
     Mesh {
         nodes: vec![[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]],
         triangles: vec![[0, 1, 2], [0, 2, 3]],
@@ -56,11 +53,7 @@ fn values_are_checked_where_they_are_used() {
             "displacement = [\"free\", \"log(y)\"]",
             "bad.toml:30: boundary \"clamp\": displacement[1] is -inf at (2, 0), t = 0",
         ),
-        (
-            "[0, \"-t\"]",
-            "[0, \"1/y\"]",
-            "bad.toml:22: body.force[1] is inf at (0, 0), t = 0",
-        ),
+        ("[0, \"-t\"]", "[0, \"1/y\"]", "bad.toml:22: body.force[1] is inf at (0, 0), t = 0"),
         (
             "1 - 0.1*x",
             "1 - 0.5*x",
@@ -71,27 +64,15 @@ fn values_are_checked_where_they_are_used() {
             "1 + 0.5*y",
             "bad.toml:17: damage.initial is 2 at (2, 2); it must be in (0.01, 1]",
         ),
-        (
-            "1 - 0.1*x",
-            "log(x)",
-            "bad.toml:17: damage.initial is -inf at (0, 0), t = 0",
-        ),
+        ("1 - 0.1*x", "log(x)", "bad.toml:17: damage.initial is -inf at (0, 0), t = 0"),
         (
             "x^2",
             "1-x",
             "bad.toml:36: boundary \"foundation\": gap is -1 at (2, 0); it must not be negative",
         ),
-        (
-            "x^2",
-            "sqrt(x-1)",
-            "bad.toml:36: boundary \"foundation\": gap is NaN at (0, 0), t = 0",
-        ),
+        ("x^2", "sqrt(x-1)", "bad.toml:36: boundary \"foundation\": gap is NaN at (0, 0), t = 0"),
     ] {
-        assert_eq!(
-            verdict(old, new, &square()),
-            Err(expected.into()),
-            "`{old}` → `{new}`"
-        );
+        assert_eq!(verdict(old, new, &square()), Err(expected.into()), "`{old}` → `{new}`");
     }
 }
 
@@ -107,40 +88,23 @@ fn a_curve_must_be_there_and_on_the_boundary() {
     let message = verdict("name = \"load\"", "name = \"laod\"", &square());
     assert_eq!(
         message,
-        Err(
-            "bad.toml:32: boundary \"laod\" is no physical curve of the mesh; \
+        Err("bad.toml:32: boundary \"laod\" is no physical curve of the mesh; \
              did you mean `load`? (known: axis, clamp, foundation, load)"
-                .into()
-        )
+            .into())
     );
 
     let mut mesh = square();
     mesh.curves.insert("load".into(), Curve::default());
     let message = verdict("", "", &mesh).expect_err("an empty curve");
-    assert!(
-        message.starts_with("bad.toml:32: boundary \"load\" has no edges"),
-        "{message}"
-    );
+    assert!(message.starts_with("bad.toml:32: boundary \"load\" has no edges"), "{message}");
 
-    mesh.curves.insert(
-        "load".into(),
-        Curve {
-            edges: vec![[2, 3]],
-            interior_edges: 2,
-        },
-    );
+    mesh.curves.insert("load".into(), Curve { edges: vec![[2, 3]], interior_edges: 2 });
     let message = verdict("", "", &mesh).expect_err("a curve inside");
-    assert!(
-        message.contains("\"load\" has 2 edges inside the body"),
-        "{message}"
-    );
+    assert!(message.contains("\"load\" has 2 edges inside the body"), "{message}");
 
     mesh.curves.clear();
     let message = verdict("", "", &mesh).expect_err("no curves");
-    assert!(
-        message.ends_with("is no physical curve of the mesh (there are none)"),
-        "{message}"
-    );
+    assert!(message.ends_with("is no physical curve of the mesh (there are none)"), "{message}");
 }
 
 #[test]

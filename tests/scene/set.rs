@@ -30,10 +30,7 @@ fn set_replaces_adds_and_reaches_boundaries_by_name() {
     assert_eq!(scene.material.plane, Plane::Strain);
     assert_eq!(scene.mesh.parameters["grading"], 4.0);
     assert_eq!(scene.mesh.parameters["radius"], 2.0);
-    assert_eq!(
-        scene.damage.expect("given").initial.eval(0.0, 1.0, 0.0),
-        0.8
-    );
+    assert_eq!(scene.damage.expect("given").initial.eval(0.0, 1.0, 0.0), 0.8);
     assert_eq!(scene.title, "Another, with blanks");
     let [_, y] = scene.boundaries[1].traction.as_ref().expect("given");
     assert_eq!(y.eval(0.0, 0.0, 1.0), -40.0);
@@ -46,93 +43,36 @@ fn a_bad_set_is_named() {
     for (set, fragments) in [
         (
             "time.stp=1",
-            [
-                "base.toml, --set time.stp=1: unknown key time.stp",
-                "did you mean `step`",
-            ],
+            ["base.toml, --set time.stp=1: unknown key time.stp", "did you mean `step`"],
         ),
-        (
-            "tyme.step=1",
-            ["--set tyme.step=1: unknown key tyme", "did you mean `time`"],
-        ),
-        (
-            "time.step=-1",
-            [
-                "base.toml, --set time.step=-1: time.step must be positive",
-                "is -1",
-            ],
-        ),
-        (
-            "time.step=fast",
-            [
-                "--set time.step=fast: time.step must be a number",
-                "\"fast\"",
-            ],
-        ),
-        (
-            "time.step",
-            ["--set time.step: has no `=`", "--set KEY=VALUE"],
-        ),
-        (
-            "=3",
-            ["--set =3: the key is no dotted TOML key", "--set KEY=VALUE"],
-        ),
-        (
-            "a b=3",
-            [
-                "--set a b=3: the key is no dotted TOML key",
-                "quote odd names",
-            ],
-        ),
-        (
-            "time=3",
-            ["--set time=3: time must be a table", "--set time=3"],
-        ),
+        ("tyme.step=1", ["--set tyme.step=1: unknown key tyme", "did you mean `time`"]),
+        ("time.step=-1", ["base.toml, --set time.step=-1: time.step must be positive", "is -1"]),
+        ("time.step=fast", ["--set time.step=fast: time.step must be a number", "\"fast\""]),
+        ("time.step", ["--set time.step: has no `=`", "--set KEY=VALUE"]),
+        ("=3", ["--set =3: the key is no dotted TOML key", "--set KEY=VALUE"]),
+        ("a b=3", ["--set a b=3: the key is no dotted TOML key", "quote odd names"]),
+        ("time=3", ["--set time=3: time must be a table", "--set time=3"]),
         (
             "boundary.lod.gap=0",
-            [
-                "--set boundary.lod.gap=0: unknown key boundary.lod",
-                "mean `load`",
-            ],
+            ["--set boundary.lod.gap=0: unknown key boundary.lod", "mean `load`"],
         ),
         (
             "boundary.load.gaap=0",
-            [
-                "--set boundary.load.gaap=0: unknown key boundary \"load\": gaap",
-                "mean `gap`",
-            ],
+            ["--set boundary.load.gaap=0: unknown key boundary \"load\": gaap", "mean `gap`"],
         ),
-        (
-            "boundary.load.gap=t",
-            ["--set boundary.load.gap=t: boundary \"load\": gap", "on t"],
-        ),
-        (
-            "boundary.load=3",
-            ["boundary.load needs a key", "boundary.NAME.KEY=VALUE"],
-        ),
-        (
-            "boundary=3",
-            [
-                "boundary must be addressed by name",
-                "boundary.NAME.KEY=VALUE",
-            ],
-        ),
+        ("boundary.load.gap=t", ["--set boundary.load.gap=t: boundary \"load\": gap", "on t"]),
+        ("boundary.load=3", ["boundary.load needs a key", "boundary.NAME.KEY=VALUE"]),
+        ("boundary=3", ["boundary must be addressed by name", "boundary.NAME.KEY=VALUE"]),
         (
             "boundary.load.traction=[0,\"q\"]",
-            [
-                "boundary \"load\": traction[1] has the unknown variable `q`",
-                "--set boundary.load",
-            ],
+            ["boundary \"load\": traction[1] has the unknown variable `q`", "--set boundary.load"],
         ),
     ] {
         match with(&["time.step=0.02", set]) {
             Ok(_) => panic!("{set} was accepted"),
             Err(message) => {
                 for fragment in fragments {
-                    assert!(
-                        message.contains(fragment),
-                        "{set}\n{message}\nlacks {fragment}"
-                    );
+                    assert!(message.contains(fragment), "{set}\n{message}\nlacks {fragment}");
                 }
             }
         }
