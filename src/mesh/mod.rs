@@ -3,9 +3,11 @@
 use std::collections::BTreeMap;
 
 mod error;
+mod gmsh;
 mod msh;
 
 pub use error::{MeshError, Place, Problem};
+pub use gmsh::{load, mesh_geo};
 pub use msh::read;
 
 /// A conforming triangulation of the body, with the named parts of its boundary.
