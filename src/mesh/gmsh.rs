@@ -1,0 +1,162 @@
+//! Meshes `.geo` files with the gmsh command line.
+
+use std::{
+    collections::BTreeMap,
+    fs, io,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use super::{Mesh, MeshError, read};
+
+/// How many different error lines of gmsh are shown; it can repeat itself by the hundred.
+const SHOWN: usize = 5;
+
+/// Reads a mesh: a `.msh` as it is, a `.geo` through [`mesh_geo`].
+///
+/// `parameters` are for a `.geo` and have no meaning for a `.msh`.
+///
+/// # Errors
+/// Those of [`read`] and [`mesh_geo`], and any other extension.
+pub fn load(path: &Path, parameters: &BTreeMap<String, f64>) -> Result<Mesh, MeshError> {
+    let extension = path.extension().map(|e| e.to_ascii_lowercase());
+    match extension.as_ref().and_then(|e| e.to_str()) {
+        Some("msh") => read(path),
+        Some("geo") => read(&mesh_geo(path, parameters)?),
+        _ => Err(MeshError::Extension {
+            path: path.to_owned(),
+        }),
+    }
+}
+
+/// Meshes a `.geo` file and returns the path of the `.msh` beside it.
+///
+/// Each parameter is set over the `DefineConstant` of its name and appears in the name of
+/// the mesh, as in `bridge-grading3-size0.25.msh`. `size`, in m, also bounds the length of
+/// the edges. A mesh that is not older than its `.geo` is kept as it is; a new one appears
+/// complete or not at all.
+///
+/// # Errors
+/// The `.geo` cannot be read or the `.msh` written, a parameter makes no sense or occurs
+/// nowhere in the `.geo`, gmsh is missing, or gmsh reports an error.
+pub fn mesh_geo(geo: &Path, parameters: &BTreeMap<String, f64>) -> Result<PathBuf, MeshError> {
+    let io_error = |path: &Path| {
+        let path = path.to_owned();
+        move |source| MeshError::Io { path, source }
+    };
+    let text = fs::read(geo).map_err(io_error(geo))?;
+    check(geo, &String::from_utf8_lossy(&text), parameters)?;
+    let mesh = mesh_path(geo, parameters);
+    let modified = |path: &Path| fs::metadata(path).and_then(|data| data.modified());
+    if let Ok(meshed) = modified(&mesh)
+        && meshed >= modified(geo).map_err(io_error(geo))?
+    {
+        return Ok(mesh);
+    }
+
+    let folder = match geo.parent() {
+        Some(parent) if parent != Path::new("") => parent,
+        _ => Path::new("."),
+    };
+    // A directory rather than a file: gmsh creates the file with the usual permissions.
+    let scratch = tempfile::Builder::new()
+        .prefix(".meshing-")
+        .tempdir_in(folder)
+        .map_err(io_error(folder))?;
+    let fresh = scratch.path().join("fresh.msh");
+    run(geo, parameters, &fresh, folder)?;
+    fs::rename(&fresh, &mesh).map_err(io_error(&mesh))?;
+    Ok(mesh)
+}
+
+/// Refuses what gmsh would misread or silently ignore.
+fn check(geo: &Path, text: &str, parameters: &BTreeMap<String, f64>) -> Result<(), MeshError> {
+    let word = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    // An included file may define the parameter.
+    let includes = text.contains("Include") || text.contains("Merge");
+    for (name, &value) in parameters {
+        let reason = if !name.chars().all(word) || !name.starts_with(|c: char| !c.is_ascii_digit())
+        {
+            "the name must consist of letters, digits and underscores"
+        } else if !value.is_finite() {
+            "the value must be finite"
+        } else if name == "size" && value <= 0.0 {
+            "the size must be positive"
+        } else if name != "size" && !includes && !text.split(|c| !word(c)).any(|w| w == name) {
+            "the .geo file has no such parameter"
+        } else {
+            continue;
+        };
+        return Err(MeshError::Parameter {
+            path: geo.to_owned(),
+            name: name.clone(),
+            value,
+            reason,
+        });
+    }
+    Ok(())
+}
+
+fn mesh_path(geo: &Path, parameters: &BTreeMap<String, f64>) -> PathBuf {
+    let mut name = geo.file_stem().unwrap_or_default().to_owned();
+    for (parameter, value) in parameters {
+        name.push(format!("-{parameter}{value}"));
+    }
+    name.push(".msh");
+    geo.with_file_name(name)
+}
+
+/// Runs gmsh, which must leave `fresh` behind without a word of error.
+fn run(
+    geo: &Path,
+    parameters: &BTreeMap<String, f64>,
+    fresh: &Path,
+    folder: &Path,
+) -> Result<(), MeshError> {
+    let mut command = Command::new("gmsh");
+    // One thread: the same input then gives the same mesh, node by node.
+    command.args(["-2", "-format", "msh41", "-v", "1", "-nt", "1"]);
+    for (name, value) in parameters {
+        command.args(["-setnumber", name, &value.to_string()]);
+        if name == "size" {
+            command.args(["-clmax", &value.to_string()]);
+        }
+    }
+    // The folder keeps a file name that begins with a dash from being taken for an option.
+    let input = folder.join(geo.file_name().unwrap_or_default());
+    let output = command.arg("-o").arg(fresh).arg(input).output();
+    let output = output.map_err(|source| match source.kind() {
+        io::ErrorKind::NotFound => MeshError::GmshMissing {
+            path: geo.to_owned(),
+        },
+        _ => MeshError::Io {
+            path: PathBuf::from("gmsh"),
+            source,
+        },
+    })?;
+
+    // gmsh can report errors and still exit with success.
+    let said = [output.stdout, output.stderr].concat();
+    let said = String::from_utf8_lossy(&said);
+    let mut errors: Vec<&str> = Vec::new();
+    for line in said
+        .lines()
+        .filter(|line| line.trim_start().starts_with("Error"))
+    {
+        if !errors.contains(&line) && errors.len() < SHOWN {
+            errors.push(line);
+        }
+    }
+    if output.status.success() && errors.is_empty() && fresh.exists() {
+        return Ok(());
+    }
+    let message = match (errors.is_empty(), said.trim()) {
+        (false, _) => errors.join("\n"),
+        (true, "") => format!("no message, {}", output.status),
+        (true, said) => said.chars().take(2000).collect(),
+    };
+    Err(MeshError::GmshFailed {
+        path: geo.to_owned(),
+        message,
+    })
+}

@@ -1,0 +1,90 @@
+//! What the tests of the mesh share.
+#![allow(dead_code, reason = "each test program uses its part")]
+
+use std::{
+    collections::{BTreeMap, HashMap},
+    fs,
+    path::{Path, PathBuf},
+};
+
+use signorini::mesh::{Mesh, MeshError, read};
+
+pub fn fixture(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/msh");
+    folder.join(name).with_extension("msh")
+}
+
+/// Reads the bytes as a file called `x.msh`.
+pub fn read_bytes(bytes: impl AsRef<[u8]>) -> Result<Mesh, MeshError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.msh");
+    fs::write(&path, bytes).unwrap();
+    read(&path)
+}
+
+/// How many triangles each edge has.
+pub fn edges(mesh: &Mesh) -> HashMap<[usize; 2], usize> {
+    let mut edges = HashMap::new();
+    for [a, b, c] in &mesh.triangles {
+        for [p, q] in [[a, b], [b, c], [c, a]] {
+            *edges.entry([*p.min(q), *p.max(q)]).or_default() += 1;
+        }
+    }
+    edges
+}
+
+/// What every mesh must satisfy.
+pub fn check_laws(mesh: &Mesh, area: f64, perimeter: f64, holes: isize) {
+    assert!(mesh.triangles.iter().all(|&t| mesh.triangle_area(t) > 0.0));
+    close(mesh.area(), area);
+
+    let mut used = vec![false; mesh.nodes.len()];
+    mesh.triangles
+        .iter()
+        .flatten()
+        .for_each(|&i| used[i] = true);
+    assert!(
+        used.iter().all(|&used| used),
+        "a node belongs to no triangle"
+    );
+
+    let edges = edges(mesh);
+    assert!(edges.values().all(|&count| count <= 2));
+    let boundary: Vec<_> = edges
+        .iter()
+        .filter(|(_, n)| **n == 1)
+        .map(|(e, _)| *e)
+        .collect();
+    close(mesh.length(&boundary), perimeter);
+    let [v, e, f] = [mesh.nodes.len(), edges.len(), mesh.triangles.len()].map(usize::cast_signed);
+    assert_eq!(v - e + f, 1 - holes, "Euler characteristic");
+
+    // The triangle of a boundary edge must lie on its left.
+    for edge in mesh.curves.values().flat_map(|curve| &curve.edges) {
+        let [a, b] = *edge;
+        assert_eq!(
+            edges[&[a.min(b), a.max(b)]],
+            1,
+            "an inner edge among a curve's edges"
+        );
+        let left = |t: &&[usize; 3]| (0..3).any(|i| [t[i], t[(i + 1) % 3]] == *edge);
+        assert!(
+            mesh.triangles.iter().any(|t| left(&t)),
+            "the body is not on the left"
+        );
+    }
+}
+
+pub fn curve_length(mesh: &Mesh, name: &str) -> f64 {
+    mesh.length(&mesh.curves[name].edges)
+}
+
+#[track_caller]
+pub fn close(a: f64, b: f64) {
+    assert!((a - b).abs() <= 1e-12 * (1.0 + b.abs()), "{a} is not {b}");
+}
+
+/// Mesh parameters from pairs.
+pub fn parameters<const N: usize>(pairs: [(&str, f64); N]) -> BTreeMap<String, f64> {
+    pairs.map(|(name, value)| (name.to_owned(), value)).into()
+}

@@ -1,0 +1,332 @@
+//! The geometries of the examples, as gmsh meshes them, and the running of gmsh itself.
+
+mod common;
+
+use std::{
+    collections::{BTreeMap, HashSet},
+    env,
+    f64::consts::PI,
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+    time::{Duration, SystemTime},
+};
+
+use common::{check_laws, close, curve_length, edges, parameters};
+use signorini::mesh::{Mesh, MeshError, boundary_nodes, load, mesh_geo};
+use tempfile::TempDir;
+
+/// A copy of one of the geometries in a folder of its own: meshes appear beside them.
+fn copy(name: &str) -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let geo = folder.path().join(name).with_extension("geo");
+    let original = Path::new(env!("CARGO_MANIFEST_DIR")).join("geo").join(name);
+    fs::copy(original.with_extension("geo"), &geo).unwrap();
+    (folder, geo)
+}
+
+fn mesh<const N: usize>(name: &str, pairs: [(&str, f64); N]) -> Mesh {
+    let (_folder, geo) = copy(name);
+    load(&geo, &parameters(pairs)).unwrap()
+}
+
+fn node_count(mesh: &Mesh, curve: &str) -> usize {
+    boundary_nodes(mesh, &mesh.curves[curve].edges).len()
+}
+
+/// The smallest angle of the triangulation, in degrees.
+fn smallest_angle(mesh: &Mesh) -> f64 {
+    let angle = |[a, b, c]: [usize; 3]| {
+        let [a, b, c] = [a, b, c].map(|i| mesh.nodes[i]);
+        let (u, v) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
+        (u[0] * v[1] - u[1] * v[0]).atan2(u[0] * v[0] + u[1] * v[1])
+    };
+    let corners = mesh
+        .triangles
+        .iter()
+        .flat_map(|&[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]]);
+    corners.map(angle).fold(PI, f64::min).to_degrees()
+}
+
+/// Length of the longest edge at the node nearest to a point.
+fn edge_at(mesh: &Mesh, [x, y]: [f64; 2]) -> f64 {
+    let distance = |i: &usize| (mesh.nodes[*i][0] - x).hypot(mesh.nodes[*i][1] - y);
+    let node = (0..mesh.nodes.len())
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        .unwrap();
+    let edges = edges(mesh).into_keys().filter(|edge| edge.contains(&node));
+    edges
+        .map(|edge| mesh.edge_normal(edge).1)
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn square() {
+    for (pairs, nodes, n) in [
+        (
+            [("size", 0.125), ("grading", 1.0), ("diagonal", 0.0)],
+            81,
+            8,
+        ),
+        ([("n", 5.0), ("grading", 1.0), ("diagonal", 1.0)], 36, 5),
+        ([("n", 7.0), ("grading", 6.0), ("diagonal", 2.0)], 64, 7),
+        ([("n", 1.0), ("grading", 2.0), ("diagonal", 0.0)], 4, 1),
+    ] {
+        let mesh = mesh("square", pairs);
+        check_laws(&mesh, 1.0, 4.0, 0);
+        assert_eq!((mesh.nodes.len(), mesh.triangles.len()), (nodes, 2 * n * n));
+        for name in ["left", "right", "top", "bottom"] {
+            close(curve_length(&mesh, name), 1.0);
+            assert_eq!(mesh.curves[name].edges.len(), n);
+        }
+        let grading = pairs[1].1;
+        let widths = mesh.curves["bottom"]
+            .edges
+            .iter()
+            .map(|&edge| mesh.edge_normal(edge).1);
+        let (low, high) = widths.fold((1.0, 0.0), |(l, h), w| (w.min(l), w.max(h)));
+        if n > 1 {
+            close(high / low, grading);
+        }
+    }
+}
+
+#[test]
+fn diagonals_of_the_square() {
+    let slopes = |diagonal| {
+        let mesh = mesh("square", [("n", 4.0), ("diagonal", diagonal)]);
+        let slope = |[a, b]: [usize; 2]| {
+            let (a, b) = (mesh.nodes[a], mesh.nodes[b]);
+            ((b[0] - a[0]) * (b[1] - a[1]) * 16.0).round()
+        };
+        edges(&mesh).into_keys().map(slope).sum::<f64>()
+    };
+    assert_eq!([slopes(0.0), slopes(1.0), slopes(2.0)], [16.0, -16.0, 0.0]);
+}
+
+#[test]
+fn lshape() {
+    let uniform = mesh("lshape", [("size", 0.25), ("grading", 1.0)]);
+    assert_eq!(node_count(&uniform, "foundation"), 9);
+    let graded = mesh("lshape", [("size", 0.25), ("grading", 8.0)]);
+    for mesh in [&uniform, &graded] {
+        check_laws(mesh, 24.0, 28.0, 0);
+        for (name, length) in [("clamp", 2.0), ("foundation", 2.0), ("load", 8.0)] {
+            close(curve_length(mesh, name), length);
+        }
+        assert!(smallest_angle(mesh) > 25.0);
+    }
+    for point in [[2.0, 4.0], [6.0, 4.0], [8.0, 4.0], [0.0, 0.0], [2.0, 0.0]] {
+        let edge = edge_at(&graded, point) * 8.0 / 0.25;
+        assert!((0.6..1.6).contains(&edge), "{edge} at {point:?}");
+    }
+    assert!(edge_at(&graded, [8.0, 6.0]) > 0.2);
+}
+
+/// Nodes by their coordinates, rounded to 10⁻⁹ m, and triangles as sorted triples of these.
+fn canonical(mesh: &Mesh, place: impl Fn([f64; 2]) -> [f64; 2]) -> HashSet<[[i64; 2]; 3]> {
+    let round = |i: usize| place(mesh.nodes[i]).map(|x| (x * 1e9).round() as i64);
+    let triangle = |t: &[usize; 3]| {
+        let mut corners = t.map(round);
+        corners.sort_unstable();
+        corners
+    };
+    mesh.triangles.iter().map(triangle).collect()
+}
+
+#[test]
+fn bridge_is_two_mirrored_halves() {
+    for (size, grading) in [(0.25, 1.0), (0.25, 5.0), (0.13, 2.0)] {
+        let pairs = [("size", size), ("grading", grading)];
+        let (half, full) = (mesh("bridge-half", pairs), mesh("bridge", pairs));
+        check_laws(&half, 20.0, 24.0, 0);
+        check_laws(&full, 40.0, 44.0, 0);
+        for name in ["foundation", "load", "axis"] {
+            close(curve_length(&half, name), 2.0);
+        }
+        for name in ["foundation", "load"] {
+            close(curve_length(&full, name), 4.0);
+        }
+        assert!(smallest_angle(&half) > 25.0);
+
+        let axis = node_count(&half, "axis");
+        assert_eq!(full.nodes.len(), 2 * half.nodes.len() - axis);
+        assert_eq!(full.triangles.len(), 2 * half.triangles.len());
+        for node in &full.nodes {
+            let image = [12.0 - node[0], node[1]];
+            let same = |p: &[f64; 2], q: [f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]) < 1e-12;
+            assert!(
+                full.nodes.iter().any(|p| same(p, image)),
+                "no image of {node:?}"
+            );
+            let left = [node[0].min(image[0]), node[1]];
+            assert!(
+                half.nodes.iter().any(|p| same(p, left)),
+                "not in the half: {node:?}"
+            );
+        }
+        let (left, right) = (
+            canonical(&half, |p| p),
+            canonical(&half, |[x, y]| [12.0 - x, y]),
+        );
+        let both: HashSet<_> = left.union(&right).copied().collect();
+        assert!(canonical(&full, |p| p) == both);
+
+        if grading == 1.0 {
+            assert_eq!(
+                (
+                    node_count(&half, "foundation"),
+                    node_count(&full, "foundation")
+                ),
+                (9, 18)
+            );
+        } else {
+            for point in [[2.0, 4.0], [0.0, 0.0], [2.0, 0.0]] {
+                let edge = edge_at(&half, point) * grading / size;
+                assert!((0.6..1.6).contains(&edge), "{edge} at {point:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn hertz() {
+    let mesh = mesh("hertz", []);
+    let radius = 0.05;
+    assert!(
+        (1000..6000).contains(&mesh.nodes.len()),
+        "{} nodes",
+        mesh.nodes.len()
+    );
+    let polygon = mesh.area();
+    check_laws(
+        &mesh,
+        polygon,
+        mesh.curves
+            .keys()
+            .map(|name| curve_length(&mesh, name))
+            .sum(),
+        0,
+    );
+    assert!((polygon / (PI * radius * radius / 4.0) - 1.0).abs() < 1e-3);
+    assert!(smallest_angle(&mesh) > 25.0);
+    close(curve_length(&mesh, "top"), radius);
+    close(curve_length(&mesh, "axis"), radius);
+
+    for name in ["foundation", "side"] {
+        for node in boundary_nodes(&mesh, &mesh.curves[name].edges) {
+            let [x, y] = mesh.nodes[node.node];
+            assert!((x.hypot(y - radius) - radius).abs() < 1e-12);
+            assert_eq!(node.faces.len(), 1);
+            // Unequal edges of the polygon tilt the normal a little.
+            let [nx, ny] = node.faces[0].normal;
+            assert!((nx * (y - radius) - ny * x).abs() < 0.06 * radius);
+        }
+    }
+    for &[a, b] in &mesh.curves["foundation"].edges {
+        if mesh.nodes[a][0].min(mesh.nodes[b][0]) < 0.0075 {
+            let length = mesh.edge_normal([a, b]).1;
+            assert!((0.0001..0.0002).contains(&length), "{length}");
+        }
+    }
+}
+
+#[test]
+fn meshes_are_named_kept_and_renewed() {
+    let (folder, geo) = copy("square");
+    let name = |path: PathBuf| path.file_name().unwrap().to_str().unwrap().to_owned();
+    assert_eq!(
+        name(mesh_geo(&geo, &BTreeMap::new()).unwrap()),
+        "square.msh"
+    );
+    let sized = parameters([("size", 0.25), ("grading", 3.0)]);
+    let path = mesh_geo(&geo, &sized).unwrap();
+    assert_eq!(name(path.clone()), "square-grading3-size0.25.msh");
+    assert_eq!(
+        load(&path, &BTreeMap::new()).unwrap(),
+        load(&geo, &sized).unwrap()
+    );
+
+    fs::write(&path, "kept").unwrap();
+    mesh_geo(&geo, &sized).unwrap();
+    assert_eq!(fs::read_to_string(&path).unwrap(), "kept");
+    let later = SystemTime::now() + Duration::from_secs(10);
+    fs::File::options()
+        .append(true)
+        .open(&geo)
+        .unwrap()
+        .set_modified(later)
+        .unwrap();
+    assert_eq!(load(&geo, &sized).unwrap().nodes.len(), 25);
+    assert_eq!(
+        fs::read_dir(&folder).unwrap().count(),
+        3,
+        "something was left behind"
+    );
+}
+
+#[test]
+fn what_gmsh_rejects_is_told() {
+    let (folder, geo) = copy("square");
+    let fails = |pairs: &[(&str, f64)]| {
+        let parameters = pairs
+            .iter()
+            .map(|&(name, value)| (name.to_owned(), value))
+            .collect();
+        load(&geo, &parameters).unwrap_err().to_string()
+    };
+    assert!(fails(&[("n", 0.0)]).contains("n must be at least 1"));
+    assert!(
+        fails(&[("grdaing", 2.0)]).contains("`grdaing` = 2: the .geo file has no such parameter")
+    );
+    assert!(fails(&[("size", -1.0)]).contains("must be positive"));
+    assert!(fails(&[("n", f64::NAN)]).contains("must be finite"));
+    assert!(fails(&[("../n", 1.0)]).contains("letters, digits"));
+
+    fs::write(&geo, "Point(1) = {0, 0, 0};\nLine(1) = {1, ;\n").unwrap();
+    let message = fails(&[]);
+    assert!(
+        message.contains("gmsh could not mesh it") && message.contains("line 2"),
+        "{message}"
+    );
+    fs::write(&geo, "Point(1) = {0, 0, 0};\n").unwrap();
+    assert!(
+        fails(&[]).contains("square.msh"),
+        "an empty mesh is the reader's to refuse"
+    );
+    fs::remove_file(geo.with_extension("msh")).unwrap();
+    assert_eq!(
+        fs::read_dir(&folder).unwrap().count(),
+        1,
+        "something was left behind"
+    );
+
+    let none = load(&folder.path().join("none.geo"), &BTreeMap::new()).unwrap_err();
+    assert!(matches!(none, MeshError::Io { .. }));
+    let other = load(Path::new("body.stl"), &BTreeMap::new()).unwrap_err();
+    assert_eq!(
+        other.to_string(),
+        "body.stl: a mesh is a .msh file or a .geo file for gmsh"
+    );
+}
+
+#[test]
+fn missing_gmsh_says_what_to_install() {
+    // The search path is this process's own: look again from a child without one.
+    if env::var_os("PATH").is_some_and(|path| path.is_empty()) {
+        let (_folder, geo) = copy("square");
+        let message = load(&geo, &BTreeMap::new()).unwrap_err().to_string();
+        assert!(message.contains("make deps") && message.contains("apt install gmsh"));
+        return;
+    }
+    let child = Command::new(env::current_exe().unwrap())
+        .args(["--exact", "missing_gmsh_says_what_to_install"])
+        .env("PATH", "")
+        .output()
+        .unwrap();
+    assert!(
+        child.status.success(),
+        "{}",
+        String::from_utf8_lossy(&child.stdout)
+    );
+}
