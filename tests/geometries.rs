@@ -41,33 +41,22 @@ fn smallest_angle(mesh: &Mesh) -> f64 {
         let (u, v) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
         (u[0] * v[1] - u[1] * v[0]).atan2(u[0] * v[0] + u[1] * v[1])
     };
-    let corners = mesh
-        .triangles
-        .iter()
-        .flat_map(|&[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]]);
+    let corners = mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]]);
     corners.map(angle).fold(PI, f64::min).to_degrees()
 }
 
 /// Length of the longest edge at the node nearest to a point.
 fn edge_at(mesh: &Mesh, [x, y]: [f64; 2]) -> f64 {
     let distance = |i: &usize| (mesh.nodes[*i][0] - x).hypot(mesh.nodes[*i][1] - y);
-    let node = (0..mesh.nodes.len())
-        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-        .unwrap();
+    let node = (0..mesh.nodes.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap();
     let edges = edges(mesh).into_keys().filter(|edge| edge.contains(&node));
-    edges
-        .map(|edge| mesh.edge_normal(edge).1)
-        .fold(0.0, f64::max)
+    edges.map(|edge| mesh.edge_normal(edge).1).fold(0.0, f64::max)
 }
 
 #[test]
 fn square() {
     for (pairs, nodes, n) in [
-        (
-            [("size", 0.125), ("grading", 1.0), ("diagonal", 0.0)],
-            81,
-            8,
-        ),
+        ([("size", 0.125), ("grading", 1.0), ("diagonal", 0.0)], 81, 8),
         ([("n", 5.0), ("grading", 1.0), ("diagonal", 1.0)], 36, 5),
         ([("n", 7.0), ("grading", 6.0), ("diagonal", 2.0)], 64, 7),
         ([("n", 1.0), ("grading", 2.0), ("diagonal", 0.0)], 4, 1),
@@ -80,10 +69,7 @@ fn square() {
             assert_eq!(mesh.curves[name].edges.len(), n);
         }
         let grading = pairs[1].1;
-        let widths = mesh.curves["bottom"]
-            .edges
-            .iter()
-            .map(|&edge| mesh.edge_normal(edge).1);
+        let widths = mesh.curves["bottom"].edges.iter().map(|&edge| mesh.edge_normal(edge).1);
         let (low, high) = widths.fold((1.0, 0.0), |(l, h), w| (w.min(l), w.max(h)));
         if n > 1 {
             close(high / low, grading);
@@ -155,31 +141,16 @@ fn bridge_is_two_mirrored_halves() {
         for node in &full.nodes {
             let image = [12.0 - node[0], node[1]];
             let same = |p: &[f64; 2], q: [f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]) < 1e-12;
-            assert!(
-                full.nodes.iter().any(|p| same(p, image)),
-                "no image of {node:?}"
-            );
+            assert!(full.nodes.iter().any(|p| same(p, image)), "no image of {node:?}");
             let left = [node[0].min(image[0]), node[1]];
-            assert!(
-                half.nodes.iter().any(|p| same(p, left)),
-                "not in the half: {node:?}"
-            );
+            assert!(half.nodes.iter().any(|p| same(p, left)), "not in the half: {node:?}");
         }
-        let (left, right) = (
-            canonical(&half, |p| p),
-            canonical(&half, |[x, y]| [12.0 - x, y]),
-        );
+        let (left, right) = (canonical(&half, |p| p), canonical(&half, |[x, y]| [12.0 - x, y]));
         let both: HashSet<_> = left.union(&right).copied().collect();
         assert!(canonical(&full, |p| p) == both);
 
         if grading == 1.0 {
-            assert_eq!(
-                (
-                    node_count(&half, "foundation"),
-                    node_count(&full, "foundation")
-                ),
-                (9, 18)
-            );
+            assert_eq!((node_count(&half, "foundation"), node_count(&full, "foundation")), (9, 18));
         } else {
             for point in [[2.0, 4.0], [0.0, 0.0], [2.0, 0.0]] {
                 let edge = edge_at(&half, point) * grading / size;
@@ -193,21 +164,9 @@ fn bridge_is_two_mirrored_halves() {
 fn hertz() {
     let mesh = mesh("hertz", []);
     let radius = 0.05;
-    assert!(
-        (1000..6000).contains(&mesh.nodes.len()),
-        "{} nodes",
-        mesh.nodes.len()
-    );
+    assert!((1000..6000).contains(&mesh.nodes.len()), "{} nodes", mesh.nodes.len());
     let polygon = mesh.area();
-    check_laws(
-        &mesh,
-        polygon,
-        mesh.curves
-            .keys()
-            .map(|name| curve_length(&mesh, name))
-            .sum(),
-        0,
-    );
+    check_laws(&mesh, polygon, mesh.curves.keys().map(|name| curve_length(&mesh, name)).sum(), 0);
     assert!((polygon / (PI * radius * radius / 4.0) - 1.0).abs() < 1e-3);
     assert!(smallest_angle(&mesh) > 25.0);
     close(curve_length(&mesh, "top"), radius);
@@ -235,44 +194,26 @@ fn hertz() {
 fn meshes_are_named_kept_and_renewed() {
     let (folder, geo) = copy("square");
     let name = |path: PathBuf| path.file_name().unwrap().to_str().unwrap().to_owned();
-    assert_eq!(
-        name(mesh_geo(&geo, &BTreeMap::new()).unwrap()),
-        "square.msh"
-    );
+    assert_eq!(name(mesh_geo(&geo, &BTreeMap::new()).unwrap()), "square.msh");
     let sized = parameters([("size", 0.25), ("grading", 3.0)]);
     let path = mesh_geo(&geo, &sized).unwrap();
     assert_eq!(name(path.clone()), "square-grading3-size0.25.msh");
-    assert_eq!(
-        load(&path, &BTreeMap::new()).unwrap(),
-        load(&geo, &sized).unwrap()
-    );
+    assert_eq!(load(&path, &BTreeMap::new()).unwrap(), load(&geo, &sized).unwrap());
 
     fs::write(&path, "kept").unwrap();
     mesh_geo(&geo, &sized).unwrap();
     assert_eq!(fs::read_to_string(&path).unwrap(), "kept");
     let later = SystemTime::now() + Duration::from_secs(10);
-    fs::File::options()
-        .append(true)
-        .open(&geo)
-        .unwrap()
-        .set_modified(later)
-        .unwrap();
+    fs::File::options().append(true).open(&geo).unwrap().set_modified(later).unwrap();
     assert_eq!(load(&geo, &sized).unwrap().nodes.len(), 25);
-    assert_eq!(
-        fs::read_dir(&folder).unwrap().count(),
-        3,
-        "something was left behind"
-    );
+    assert_eq!(fs::read_dir(&folder).unwrap().count(), 3, "something was left behind");
 }
 
 #[test]
 fn what_gmsh_rejects_is_told() {
     let (folder, geo) = copy("square");
     let fails = |pairs: &[(&str, f64)]| {
-        let parameters = pairs
-            .iter()
-            .map(|&(name, value)| (name.to_owned(), value))
-            .collect();
+        let parameters = pairs.iter().map(|&(name, value)| (name.to_owned(), value)).collect();
         load(&geo, &parameters).unwrap_err().to_string()
     };
     assert!(fails(&[("n", 0.0)]).contains("n must be at least 1"));
@@ -285,29 +226,16 @@ fn what_gmsh_rejects_is_told() {
 
     fs::write(&geo, "Point(1) = {0, 0, 0};\nLine(1) = {1, ;\n").unwrap();
     let message = fails(&[]);
-    assert!(
-        message.contains("gmsh could not mesh it") && message.contains("line 2"),
-        "{message}"
-    );
+    assert!(message.contains("gmsh could not mesh it") && message.contains("line 2"), "{message}");
     fs::write(&geo, "Point(1) = {0, 0, 0};\n").unwrap();
-    assert!(
-        fails(&[]).contains("square.msh"),
-        "an empty mesh is the reader's to refuse"
-    );
+    assert!(fails(&[]).contains("square.msh"), "an empty mesh is the reader's to refuse");
     fs::remove_file(geo.with_extension("msh")).unwrap();
-    assert_eq!(
-        fs::read_dir(&folder).unwrap().count(),
-        1,
-        "something was left behind"
-    );
+    assert_eq!(fs::read_dir(&folder).unwrap().count(), 1, "something was left behind");
 
     let none = load(&folder.path().join("none.geo"), &BTreeMap::new()).unwrap_err();
     assert!(matches!(none, MeshError::Io { .. }));
     let other = load(Path::new("body.stl"), &BTreeMap::new()).unwrap_err();
-    assert_eq!(
-        other.to_string(),
-        "body.stl: a mesh is a .msh file or a .geo file for gmsh"
-    );
+    assert_eq!(other.to_string(), "body.stl: a mesh is a .msh file or a .geo file for gmsh");
 }
 
 #[test]
@@ -324,9 +252,5 @@ fn missing_gmsh_says_what_to_install() {
         .env("PATH", "")
         .output()
         .unwrap();
-    assert!(
-        child.status.success(),
-        "{}",
-        String::from_utf8_lossy(&child.stdout)
-    );
+    assert!(child.status.success(), "{}", String::from_utf8_lossy(&child.stdout));
 }

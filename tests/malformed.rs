@@ -27,10 +27,7 @@ const FIRST: &str = "1 2 2 1 1 1 2 3";
 fn complains(bytes: impl AsRef<[u8]>, fragments: &[&str]) {
     let message = read_bytes(bytes).expect_err("an error").to_string();
     for fragment in fragments {
-        assert!(
-            message.contains(fragment),
-            "`{fragment}` is not in `{message}`"
-        );
+        assert!(message.contains(fragment), "`{fragment}` is not in `{message}`");
     }
 }
 
@@ -42,10 +39,7 @@ fn files_that_are_no_mesh() {
     complains([0_u8, 159, 146, 150, 255, 1, 2], &["not a gmsh mesh"]);
     complains("$Mesh\n", &["x.msh:1: not a gmsh mesh"]);
     complains(HEAD, &["no $Nodes section"]);
-    complains(
-        format!("{HEAD}$Nodes\n0\n$EndNodes\n"),
-        &["no $Elements section"],
-    );
+    complains(format!("{HEAD}$Nodes\n0\n$EndNodes\n"), &["no $Elements section"]);
     complains(text(&NODES, &[]), &["there are no triangles", "gmsh -2"]);
     let missing = read(&fixture("there-is-none")).unwrap_err();
     assert!(matches!(missing, MeshError::Io { .. }));
@@ -55,70 +49,34 @@ fn files_that_are_no_mesh() {
 #[test]
 fn versions_and_byte_orders() {
     let export = "gmsh OLD.msh -save -format msh41";
-    complains(
-        fs::read(fixture("version-1")).unwrap(),
-        &["MSH version 1 ", export],
-    );
-    complains(
-        fs::read(fixture("version-40")).unwrap(),
-        &["MSH version 4 ", export, ":2:"],
-    );
-    complains(
-        fs::read(fixture("parametric-22")).unwrap(),
-        &["$ParametricNodes", ":15:"],
-    );
-    complains(
-        fs::read(fixture("partitioned")).unwrap(),
-        &["partitioned", "-part"],
-    );
-    complains(
-        "$MeshFormat\nabc 0 8\n",
-        &["x.msh:2: expected a version such as 4.1, found `abc`"],
-    );
-    complains(
-        "$MeshFormat\n4.1\n",
-        &["expected version, file type and data size"],
-    );
-    complains(
-        "$MeshFormat\n4.1 7 8\n",
-        &["file type 0 (text) or 1 (binary), found `7`"],
-    );
+    complains(fs::read(fixture("version-1")).unwrap(), &["MSH version 1 ", export]);
+    complains(fs::read(fixture("version-40")).unwrap(), &["MSH version 4 ", export, ":2:"]);
+    complains(fs::read(fixture("parametric-22")).unwrap(), &["$ParametricNodes", ":15:"]);
+    complains(fs::read(fixture("partitioned")).unwrap(), &["partitioned", "-part"]);
+    complains("$MeshFormat\nabc 0 8\n", &["x.msh:2: expected a version such as 4.1, found `abc`"]);
+    complains("$MeshFormat\n4.1\n", &["expected version, file type and data size"]);
+    complains("$MeshFormat\n4.1 7 8\n", &["file type 0 (text) or 1 (binary), found `7`"]);
 
     let mut bytes = fs::read(fixture("plate-41-binary")).unwrap();
     let one = "$MeshFormat\n4.1 1 8\n".len();
     bytes[one..one + 4].reverse();
-    complains(
-        &bytes,
-        &["byte 20 in $MeshFormat", "other byte order", export],
-    );
+    complains(&bytes, &["byte 20 in $MeshFormat", "other byte order", export]);
     bytes[one..one + 4].fill(7);
     complains(&bytes, &["expected the number 1, found `117901063`"]);
-    complains(
-        "$MeshFormat\n4.1 1 4\n\x01\0\0\0",
-        &["4-byte numbers", export],
-    );
+    complains("$MeshFormat\n4.1 1 4\n\x01\0\0\0", &["4-byte numbers", export]);
 }
 
 #[test]
 fn elements_nobody_can_use() {
     for (name, fragments) in [
         ("quadrangles", &["quadrangles (", "Recombine"][..]),
-        (
-            "second-order",
-            &["second-order lines (", "second-order triangles (26)"],
-        ),
-        (
-            "second-order-22-binary",
-            &["second-order triangles (", "ElementOrder", "in $Elements"],
-        ),
+        ("second-order", &["second-order lines (", "second-order triangles (26)"]),
+        ("second-order-22-binary", &["second-order triangles (", "ElementOrder", "in $Elements"]),
         ("tetrahedra", &["tetrahedra (", "gmsh -2"]),
     ] {
         complains(fs::read(fixture(name)).unwrap(), fragments);
     }
-    complains(
-        text(&NODES, &["1 99 2 1 1 1 2 3"]),
-        &["x.msh:14: unknown element type 99"],
-    );
+    complains(text(&NODES, &["1 99 2 1 1 1 2 3"]), &["x.msh:14: unknown element type 99"]);
 }
 
 #[test]
@@ -127,70 +85,37 @@ fn nodes() {
     assert!(read_bytes(with("3 1 1 0")).is_ok());
     complains(with("3 1 1 0.5"), &["x.msh:8: node 3 has z = 0.5"]);
     complains(with("2 1 1 0"), &["x.msh:8: node 2 is listed twice"]);
-    complains(
-        with("3 nan 1 0"),
-        &["x.msh:8: a coordinate of node 3 is not a finite"],
-    );
+    complains(with("3 nan 1 0"), &["x.msh:8: a coordinate of node 3 is not a finite"]);
     complains(with("3 1e999 1 0"), &["node 3 is not a finite"]);
-    complains(
-        with("3 one 1 0"),
-        &["x.msh:8: expected a number, found `one`"],
-    );
-    complains(
-        with("-3 1 1 0"),
-        &["x.msh:8: expected a node tag, found `-3`"],
-    );
-    complains(
-        with("4 1 1 0"),
-        &["x.msh:12: element 1 refers to node 3, which"],
-    );
+    complains(with("3 one 1 0"), &["x.msh:8: expected a number, found `one`"]);
+    complains(with("-3 1 1 0"), &["x.msh:8: expected a node tag, found `-3`"]);
+    complains(with("4 1 1 0"), &["x.msh:12: element 1 refers to node 3, which"]);
     complains(with("3 0.5 0 0"), &["x.msh:12: triangle 1 has no area"]);
     complains(with("3 0.5 1e-12 0"), &["triangle 1 has no area"]);
     complains(with("3 1e300 1e300 0"), &["triangle 1 has no area"]);
-    complains(
-        text(&NODES, &["1 2 2 1 1 1 2 2"]),
-        &["triangle 1 has no area"],
-    );
+    complains(text(&NODES, &["1 2 2 1 1 1 2 2"]), &["triangle 1 has no area"]);
 }
 
 #[test]
 fn overlapping_triangles() {
     let twice = text(&NODES, &[FIRST, "8 2 2 1 2 3 1 2"]);
     complains(twice, &["x.msh:15: triangles 1 and 8 are the same"]);
-    complains(
-        text(&NODES, &[FIRST, "8 2 2 1 1 1 2 3"]),
-        &["triangles 1 and 8 are the same"],
-    );
+    complains(text(&NODES, &[FIRST, "8 2 2 1 1 1 2 3"]), &["triangles 1 and 8 are the same"]);
     // A triangle of several groups is listed once for each, and is no duplicate.
     assert!(read_bytes(text(&NODES, &[FIRST, "8 2 2 2 1 1 2 3", "9 2 2 3 1 1 2 3"])).is_ok());
 
     let folded = text(&NODES, &[FIRST, "8 2 2 1 1 1 2 4"]);
-    complains(
-        folded,
-        &["triangles 1 and 8 lie on the same side", "nodes 1 and 2"],
-    );
+    complains(folded, &["triangles 1 and 8 lie on the same side", "nodes 1 and 2"]);
     let nodes = ["1 0 0 0", "2 1 0 0", "3 0 1 0", "4 0 -1 0", "5 0 2 0"];
     let three = [FIRST, "8 2 2 1 1 1 2 4", "9 2 2 1 1 1 2 5"];
-    complains(
-        text(&nodes, &three),
-        &["x.msh:16:", "nodes 1 and 2", "three triangles (1, 8, 9)"],
-    );
+    complains(text(&nodes, &three), &["x.msh:16:", "nodes 1 and 2", "three triangles (1, 8, 9)"]);
 }
 
 #[test]
 fn lines_off_the_body() {
     let stray = text(&NODES, &[FIRST, "2 1 2 7 1 2 5"]);
-    complains(
-        stray,
-        &[
-            "x.msh:15: line 2 of the physical curve `7`",
-            "nodes 2 and 5",
-        ],
-    );
-    complains(
-        text(&NODES, &[FIRST, "2 1 2 7 1 2 6"]),
-        &["element 2 refers to node 6"],
-    );
+    complains(stray, &["x.msh:15: line 2 of the physical curve `7`", "nodes 2 and 5"]);
+    complains(text(&NODES, &[FIRST, "2 1 2 7 1 2 6"]), &["element 2 refers to node 6"]);
 }
 
 #[test]
@@ -198,26 +123,14 @@ fn counts() {
     let valid = text(&NODES, &[FIRST]);
     assert!(read_bytes(&valid).is_ok());
     let huge = valid.replace("$Nodes\n5", "$Nodes\n18446744073709551615");
-    complains(
-        huge,
-        &["x.msh:5: 18446744073709551615 nodes are announced, more than"],
-    );
-    complains(
-        valid.replace("$Nodes\n5", "$Nodes\n-5"),
-        &["x.msh:5: expected a count, found `-5`"],
-    );
-    complains(
-        valid.replace("$Nodes\n5", "$Nodes\n6"),
-        &["expected a node tag, found `$EndNodes`"],
-    );
+    complains(huge, &["x.msh:5: 18446744073709551615 nodes are announced, more than"]);
+    complains(valid.replace("$Nodes\n5", "$Nodes\n-5"), &["x.msh:5: expected a count, found `-5`"]);
+    complains(valid.replace("$Nodes\n5", "$Nodes\n6"), &["expected a node tag, found `$EndNodes`"]);
     complains(
         valid.replace("$Nodes\n5", "$Nodes\n4"),
         &["x.msh:10: expected the end of the section"],
     );
-    complains(
-        valid.replace(" 2 2 1 1", " 2 2000000 1 1"),
-        &["x.msh:14: 2000000 element tags"],
-    );
+    complains(valid.replace(" 2 2 1 1", " 2 2000000 1 1"), &["x.msh:14: 2000000 element tags"]);
     complains(
         format!("{HEAD}$PhysicalNames\n1\n1 x \"a\"\n"),
         &["x.msh:6: expected dimension, tag"],
@@ -231,18 +144,13 @@ fn counts() {
     let mut bytes = fs::read(fixture("plate-41-binary")).unwrap();
     let at = bytes.windows(7).position(|w| w == b"$Nodes\n").unwrap() + 7;
     bytes[at..at + 8].fill(0x7f);
-    complains(
-        &bytes,
-        &["in $Nodes: 9187201950435737471 blocks of nodes are announced"],
-    );
+    complains(&bytes, &["in $Nodes: 9187201950435737471 blocks of nodes are announced"]);
 }
 
 #[test]
 fn places_are_typed() {
     let error = read_bytes(text(&NODES, &["1 99 0 1 2 3"])).unwrap_err();
-    let MeshError::File { place, .. } = error else {
-        panic!("{error}")
-    };
+    let MeshError::File { place, .. } = error else { panic!("{error}") };
     assert_eq!(place, Some(Place::Line(14)));
 }
 
@@ -261,32 +169,21 @@ const VALID: [&str; 8] = [
 fn a_truncated_file_is_an_error() {
     for name in VALID {
         let bytes = fs::read(fixture(name)).unwrap();
-        for cut in (0..bytes.len())
-            .step_by(23)
-            .chain(bytes.len() - 20..bytes.len())
-        {
+        for cut in (0..bytes.len()).step_by(23).chain(bytes.len() - 20..bytes.len()) {
             let complete = bytes[..cut].trim_ascii_end().ends_with(b"$EndElements");
-            assert_eq!(
-                read_bytes(&bytes[..cut]).is_ok(),
-                complete,
-                "{name} cut at {cut}"
-            );
+            assert_eq!(read_bytes(&bytes[..cut]).is_ok(), complete, "{name} cut at {cut}");
         }
     }
     let bytes = fs::read(fixture("plate-41")).unwrap();
-    complains(
-        &bytes[..bytes.len() - 4],
-        &["ends inside $Elements: it was cut off"],
-    );
+    complains(&bytes[..bytes.len() - 4], &["ends inside $Elements: it was cut off"]);
 }
 
 #[test]
 fn damaged_files_never_panic() {
     let mut state = 1_u64;
     let mut random = move |below: usize| {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 33) as usize % below
     };
     let folder = tempfile::tempdir().unwrap();

@@ -25,11 +25,7 @@ fn check_plate(mesh: &Mesh) {
         assert_eq!(mesh.curves[name].interior_edges, interior, "{name}");
     }
     // The normals point out of the body.
-    for (name, normal) in [
-        ("bottom", [0.0, -1.0]),
-        ("top", [0.0, 1.0]),
-        ("77", [1.0, 0.0]),
-    ] {
+    for (name, normal) in [("bottom", [0.0, -1.0]), ("top", [0.0, 1.0]), ("77", [1.0, 0.0])] {
         for &edge in &mesh.curves[name].edges {
             let (found, _) = mesh.edge_normal(edge);
             close(found[0], normal[0]);
@@ -39,10 +35,7 @@ fn check_plate(mesh: &Mesh) {
     for &edge in &mesh.curves["hole"].edges {
         let ([nx, ny], _) = mesh.edge_normal(edge);
         let [x, y] = mesh.nodes[edge[0]];
-        assert!(
-            nx * (0.5 - x) + ny * (0.5 - y) > 0.0,
-            "out of the body is into the hole"
-        );
+        assert!(nx * (0.5 - x) + ny * (0.5 - y) > 0.0, "out of the body is into the hole");
     }
 }
 
@@ -54,18 +47,10 @@ fn every_form_gives_the_same_mesh() {
         for form in FORMS {
             let other = read(&fixture(&format!("{writer}-{form}"))).unwrap();
             // Text keeps 16 digits.
-            for (p, q) in mesh
-                .nodes
-                .iter()
-                .flatten()
-                .zip(other.nodes.iter().flatten())
-            {
+            for (p, q) in mesh.nodes.iter().flatten().zip(other.nodes.iter().flatten()) {
                 assert!((p - q).abs() < 1e-15, "{writer}-{form}: {p} is not {q}");
             }
-            let other = Mesh {
-                nodes: mesh.nodes.clone(),
-                ..other
-            };
+            let other = Mesh { nodes: mesh.nodes.clone(), ..other };
             assert!(mesh == other, "{writer}-{form}");
         }
     }

@@ -39,18 +39,12 @@ pub fn boundary_nodes(mesh: &Mesh, edges: &[[usize; 2]]) -> Vec<BoundaryNode> {
     let mut faces: BTreeMap<usize, Vec<Face>> = BTreeMap::new();
     for &edge in edges {
         let (normal, length) = mesh.edge_normal(edge);
-        let half = Face {
-            normal,
-            length: 0.5 * length,
-        };
+        let half = Face { normal, length: 0.5 * length };
         for node in edge {
             add(faces.entry(node).or_default(), half);
         }
     }
-    faces
-        .into_iter()
-        .map(|(node, faces)| BoundaryNode { node, faces })
-        .collect()
+    faces.into_iter().map(|(node, faces)| BoundaryNode { node, faces }).collect()
 }
 
 /// Merges half an edge into the face it continues, or opens another face.
@@ -61,10 +55,7 @@ fn add(faces: &mut Vec<Face>, half: Face) {
         (a * d - b * c).abs().atan2(a * c + b * d)
     };
     // Round-off must not decide on a boundary whose edges turn by exactly 30°.
-    match faces
-        .iter_mut()
-        .find(|face| angle(face) <= CORNER_ANGLE + 1e-9)
-    {
+    match faces.iter_mut().find(|face| angle(face) <= CORNER_ANGLE + 1e-9) {
         Some(face) => {
             let sum: [f64; 2] = std::array::from_fn(|i| {
                 face.length * face.normal[i] + half.length * half.normal[i]
@@ -86,9 +77,7 @@ mod tests {
         let n = points.len();
         let edges: Vec<_> = (0..n).map(|i| [1 + i, 1 + (i + 1) % n]).collect();
         let mesh = Mesh {
-            nodes: std::iter::once(centre)
-                .chain(points.iter().copied())
-                .collect(),
+            nodes: std::iter::once(centre).chain(points.iter().copied()).collect(),
             triangles: edges.iter().map(|&[a, b]| [0, a, b]).collect(),
             curves: BTreeMap::new(),
         };
@@ -110,9 +99,7 @@ mod tests {
         let bottom = boundary_nodes(&mesh, &edges[..2]);
         assert_eq!(bottom.iter().map(|n| n.node).collect::<Vec<_>>(), [1, 2, 3]);
         for (node, length) in bottom.iter().zip([0.15, 0.5, 0.35]) {
-            let [face] = node.faces[..] else {
-                panic!("one face, not {:?}", node.faces)
-            };
+            let [face] = node.faces[..] else { panic!("one face, not {:?}", node.faces) };
             assert_eq!(face.normal, [0.0, -1.0]);
             close(face.length, length);
         }
@@ -158,19 +145,11 @@ mod tests {
             close(total(&nodes), mesh.length(&edges));
         }
         let points: Vec<_> = (0..11)
-            .map(|i| {
-                (std::f64::consts::TAU * f64::from(i) / 11.0)
-                    .sin_cos()
-                    .into()
-            })
+            .map(|i| (std::f64::consts::TAU * f64::from(i) / 11.0).sin_cos().into())
             .map(|[y, x]: [f64; 2]| [x, y])
             .collect();
         let (mesh, edges) = fan(&points, [0.0, 0.0]);
-        assert!(
-            boundary_nodes(&mesh, &edges)
-                .iter()
-                .all(|n| n.faces.len() == 2)
-        );
+        assert!(boundary_nodes(&mesh, &edges).iter().all(|n| n.faces.len() == 2));
     }
 
     #[test]

@@ -120,11 +120,7 @@ pub enum Problem {
     )]
     Count { what: &'static str, count: u64 },
     #[error("{announced} {what} are announced but {found} are listed")]
-    Total {
-        what: &'static str,
-        announced: usize,
-        found: usize,
-    },
+    Total { what: &'static str, announced: usize, found: usize },
     #[error("there is no ${0} section")]
     MissingSection(&'static str),
     #[error("$Entities must come before $Elements, or the physical groups are lost")]
@@ -172,25 +168,15 @@ pub enum Problem {
         "the edge between nodes {} and {} belongs to three triangles ({}, {}, {}): \
          surfaces overlap; keep one of them", nodes[0], nodes[1], triangles[0], triangles[1], triangles[2]
     )]
-    CrowdedEdge {
-        nodes: [u64; 2],
-        triangles: [u64; 3],
-    },
+    CrowdedEdge { nodes: [u64; 2], triangles: [u64; 3] },
     #[error(
         "triangles {} and {} lie on the same side of their common edge, nodes {} and {}: \
          the mesh folds over itself there", triangles[0], triangles[1], nodes[0], nodes[1]
     )]
-    Fold {
-        nodes: [u64; 2],
-        triangles: [u64; 2],
-    },
+    Fold { nodes: [u64; 2], triangles: [u64; 2] },
     #[error(
         "line {line} of the physical curve `{curve}`, nodes {} and {}, is no edge of any triangle \
          of the body; does its surface belong to a Physical Surface?", nodes[0], nodes[1]
     )]
-    StrayLine {
-        line: u64,
-        curve: String,
-        nodes: [u64; 2],
-    },
+    StrayLine { line: u64, curve: String, nodes: [u64; 2] },
 }

@@ -23,9 +23,7 @@ pub fn load(path: &Path, parameters: &BTreeMap<String, f64>) -> Result<Mesh, Mes
     match extension.as_ref().and_then(|e| e.to_str()) {
         Some("msh") => read(path),
         Some("geo") => read(&mesh_geo(path, parameters)?),
-        _ => Err(MeshError::Extension {
-            path: path.to_owned(),
-        }),
+        _ => Err(MeshError::Extension { path: path.to_owned() }),
     }
 }
 
@@ -126,23 +124,15 @@ fn run(
     let input = folder.join(geo.file_name().unwrap_or_default());
     let output = command.arg("-o").arg(fresh).arg(input).output();
     let output = output.map_err(|source| match source.kind() {
-        io::ErrorKind::NotFound => MeshError::GmshMissing {
-            path: geo.to_owned(),
-        },
-        _ => MeshError::Io {
-            path: PathBuf::from("gmsh"),
-            source,
-        },
+        io::ErrorKind::NotFound => MeshError::GmshMissing { path: geo.to_owned() },
+        _ => MeshError::Io { path: PathBuf::from("gmsh"), source },
     })?;
 
     // gmsh can report errors and still exit with success.
     let said = [output.stdout, output.stderr].concat();
     let said = String::from_utf8_lossy(&said);
     let mut errors: Vec<&str> = Vec::new();
-    for line in said
-        .lines()
-        .filter(|line| line.trim_start().starts_with("Error"))
-    {
+    for line in said.lines().filter(|line| line.trim_start().starts_with("Error")) {
         if !errors.contains(&line) && errors.len() < SHOWN {
             errors.push(line);
         }
@@ -155,8 +145,5 @@ fn run(
         (true, "") => format!("no message, {}", output.status),
         (true, said) => said.chars().take(2000).collect(),
     };
-    Err(MeshError::GmshFailed {
-        path: geo.to_owned(),
-        message,
-    })
+    Err(MeshError::GmshFailed { path: geo.to_owned(), message })
 }

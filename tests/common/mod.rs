@@ -39,22 +39,12 @@ pub fn check_laws(mesh: &Mesh, area: f64, perimeter: f64, holes: isize) {
     close(mesh.area(), area);
 
     let mut used = vec![false; mesh.nodes.len()];
-    mesh.triangles
-        .iter()
-        .flatten()
-        .for_each(|&i| used[i] = true);
-    assert!(
-        used.iter().all(|&used| used),
-        "a node belongs to no triangle"
-    );
+    mesh.triangles.iter().flatten().for_each(|&i| used[i] = true);
+    assert!(used.iter().all(|&used| used), "a node belongs to no triangle");
 
     let edges = edges(mesh);
     assert!(edges.values().all(|&count| count <= 2));
-    let boundary: Vec<_> = edges
-        .iter()
-        .filter(|(_, n)| **n == 1)
-        .map(|(e, _)| *e)
-        .collect();
+    let boundary: Vec<_> = edges.iter().filter(|(_, n)| **n == 1).map(|(e, _)| *e).collect();
     close(mesh.length(&boundary), perimeter);
     let [v, e, f] = [mesh.nodes.len(), edges.len(), mesh.triangles.len()].map(usize::cast_signed);
     assert_eq!(v - e + f, 1 - holes, "Euler characteristic");
@@ -62,16 +52,9 @@ pub fn check_laws(mesh: &Mesh, area: f64, perimeter: f64, holes: isize) {
     // The triangle of a boundary edge must lie on its left.
     for edge in mesh.curves.values().flat_map(|curve| &curve.edges) {
         let [a, b] = *edge;
-        assert_eq!(
-            edges[&[a.min(b), a.max(b)]],
-            1,
-            "an inner edge among a curve's edges"
-        );
+        assert_eq!(edges[&[a.min(b), a.max(b)]], 1, "an inner edge among a curve's edges");
         let left = |t: &&[usize; 3]| (0..3).any(|i| [t[i], t[(i + 1) % 3]] == *edge);
-        assert!(
-            mesh.triangles.iter().any(|t| left(&t)),
-            "the body is not on the left"
-        );
+        assert!(mesh.triangles.iter().any(|t| left(&t)), "the body is not on the left");
     }
 }
 

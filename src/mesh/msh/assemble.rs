@@ -45,18 +45,14 @@ pub(super) fn assemble(raw: Raw) -> Result<Mesh> {
 
 /// A fault at a byte of the file.
 pub(super) fn at<T>(at: usize, problem: Problem) -> Result<T> {
-    Err(Fault {
-        at: Some(at),
-        problem,
-    })
+    Err(Fault { at: Some(at), problem })
 }
 
 fn reject_unusable(raw: &Raw) -> Result<()> {
     if let Some((_, &(_, first))) = raw.unusable.iter().next() {
         let list = raw.unusable.iter();
-        let list: Vec<_> = list
-            .map(|(&number, (count, _))| format!("{} ({count})", name(number)))
-            .collect();
+        let list: Vec<_> =
+            list.map(|(&number, (count, _))| format!("{} ({count})", name(number))).collect();
         return at(first, Problem::Unusable(list.join(", ")));
     }
     if raw.triangles.is_empty() {
@@ -96,10 +92,7 @@ impl Index {
         let mut nodes = [0; N];
         for (place, tag) in nodes.iter_mut().zip(element.nodes) {
             let Some(node) = self.get(tag) else {
-                let missing = Problem::MissingNode {
-                    element: element.tag,
-                    node: tag,
-                };
+                let missing = Problem::MissingNode { element: element.tag, node: tag };
                 return at(element.at, missing);
             };
             *place = node;
@@ -127,23 +120,14 @@ fn body<'a>(raw: &'a Raw, index: &Index) -> Result<Vec<Triangle<'a>>> {
     }
     order.sort_unstable();
     let mut keep = vec![true; triangles.len()];
-    for same in order
-        .chunk_by(|a, b| a.0 == b.0)
-        .filter(|same| same.len() > 1)
-    {
+    for same in order.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() > 1) {
         let elements: Vec<_> = same.iter().map(|&(_, i)| triangles[i].0).collect();
         for (i, second) in elements.iter().enumerate().skip(1) {
             let twice =
                 |first: &&&Element<3>| first.entity != second.entity || first.group == second.group;
             if let Some(first) = elements[..i].iter().find(twice) {
                 let (first, second_tag) = (first.tag, second.tag);
-                return at(
-                    second.at,
-                    Problem::DuplicateTriangle {
-                        first,
-                        second: second_tag,
-                    },
-                );
+                return at(second.at, Problem::DuplicateTriangle { first, second: second_tag });
             }
             keep[same[i].1] = false;
         }
@@ -155,12 +139,7 @@ fn body<'a>(raw: &'a Raw, index: &Index) -> Result<Vec<Triangle<'a>>> {
 
 /// The nodes' x and y, after making sure that those of the body lie in the plane.
 fn planar_points(raw: &Raw, triangles: &[Triangle]) -> Result<Vec<[f64; 2]>> {
-    let used = || {
-        triangles
-            .iter()
-            .flat_map(|(_, t)| t)
-            .map(|&node| &raw.nodes[node])
-    };
+    let used = || triangles.iter().flat_map(|(_, t)| t).map(|&node| &raw.nodes[node]);
     let extent = (0..2)
         .map(|i| {
             let (low, high) = used().fold((f64::MAX, f64::MIN), |(low, high), node| {
@@ -170,18 +149,8 @@ fn planar_points(raw: &Raw, triangles: &[Triangle]) -> Result<Vec<[f64; 2]>> {
         })
         .fold(0.0, f64::max);
     match used().find(|node| node.point[2].abs() > PLANAR * extent) {
-        Some(node) => at(
-            node.at,
-            Problem::NotPlanar {
-                node: node.tag,
-                z: node.point[2],
-            },
-        ),
-        None => Ok(raw
-            .nodes
-            .iter()
-            .map(|node| [node.point[0], node.point[1]])
-            .collect()),
+        Some(node) => at(node.at, Problem::NotPlanar { node: node.tag, z: node.point[2] }),
+        None => Ok(raw.nodes.iter().map(|node| [node.point[0], node.point[1]]).collect()),
     }
 }
 
@@ -202,11 +171,7 @@ fn drop_unused(mesh: &mut Mesh) {
     for node in mesh.triangles.iter_mut().flatten() {
         *node = place[*node];
     }
-    for node in mesh
-        .curves
-        .values_mut()
-        .flat_map(|curve| curve.edges.iter_mut().flatten())
-    {
+    for node in mesh.curves.values_mut().flat_map(|curve| curve.edges.iter_mut().flatten()) {
         *node = place[*node];
     }
 }

@@ -51,10 +51,7 @@ impl Edges {
     fn get(&self, nodes: [usize; 2]) -> &[Side] {
         let Self(sides) = self;
         let start = sides.partition_point(|side| side.0 < nodes);
-        let count = sides[start..]
-            .iter()
-            .take_while(|side| side.0 == nodes)
-            .count();
+        let count = sides[start..].iter().take_while(|side| side.0 == nodes).count();
         &sides[start..start + count]
     }
 
@@ -69,14 +66,7 @@ impl Edges {
             let sides = self.get(nodes);
             if sides.is_empty() {
                 let (line, at_line, nodes) = (line.tag, line.at, line.nodes);
-                return at(
-                    at_line,
-                    Problem::StrayLine {
-                        line,
-                        curve: name,
-                        nodes,
-                    },
-                );
+                return at(at_line, Problem::StrayLine { line, curve: name, nodes });
             }
             let first = seen.insert((name.clone(), nodes));
             let curve = curves.entry(name).or_default();

@@ -25,10 +25,7 @@ use source::{Fault, Result, Source};
 /// # Errors
 /// The file cannot be read, or it is not the mesh of a plane body; the message says where.
 pub fn read(path: &Path) -> std::result::Result<Mesh, MeshError> {
-    let bytes = fs::read(path).map_err(|source| MeshError::Io {
-        path: path.to_owned(),
-        source,
-    })?;
+    let bytes = fs::read(path).map_err(|source| MeshError::Io { path: path.to_owned(), source })?;
     let mut source = Source::new(&bytes);
     let result = if bytes.trim_ascii().is_empty() {
         fault(Problem::Empty)
@@ -161,12 +158,6 @@ fn physical_name(line: &str) -> Option<(u8, i32, &str)> {
     let (dimension, rest) = line.split_once(blank)?;
     let (tag, name) = rest.trim_start().split_once(blank)?;
     let name = name.trim();
-    let quoted = name
-        .strip_prefix('"')
-        .and_then(|name| name.strip_suffix('"'));
-    Some((
-        dimension.parse().ok()?,
-        tag.parse().ok()?,
-        quoted.unwrap_or(name),
-    ))
+    let quoted = name.strip_prefix('"').and_then(|name| name.strip_suffix('"'));
+    Some((dimension.parse().ok()?, tag.parse().ok()?, quoted.unwrap_or(name)))
 }

@@ -23,12 +23,7 @@ pub(super) struct Source<'a> {
 
 impl<'a> Source<'a> {
     pub(super) fn new(bytes: &'a [u8]) -> Self {
-        Self {
-            bytes,
-            at: 0,
-            binary: false,
-            sections: Vec::new(),
-        }
+        Self { bytes, at: 0, binary: false, sections: Vec::new() }
     }
 
     /// Offset of the next item, past the blanks of a text file.
@@ -55,10 +50,7 @@ impl<'a> Source<'a> {
 
     /// A fault at a byte.
     pub(super) fn fault<T>(&self, at: usize, problem: Problem) -> Result<T> {
-        Err(Fault {
-            at: Some(at),
-            problem,
-        })
+        Err(Fault { at: Some(at), problem })
     }
 
     fn truncated<T>(&self) -> Result<T> {
@@ -175,29 +167,17 @@ impl<'a> Source<'a> {
 
     /// An `int`: four bytes in a binary file.
     pub(super) fn int(&mut self, what: &'static str) -> Result<i32> {
-        if self.binary {
-            Ok(i32::from_ne_bytes(self.take()?))
-        } else {
-            self.parse(what)
-        }
+        if self.binary { Ok(i32::from_ne_bytes(self.take()?)) } else { self.parse(what) }
     }
 
     /// A `size_t`: eight bytes in a binary file.
     pub(super) fn size(&mut self, what: &'static str) -> Result<u64> {
-        if self.binary {
-            Ok(u64::from_ne_bytes(self.take()?))
-        } else {
-            self.parse(what)
-        }
+        if self.binary { Ok(u64::from_ne_bytes(self.take()?)) } else { self.parse(what) }
     }
 
     /// A `double`, which may be infinite or not a number.
     pub(super) fn real(&mut self) -> Result<f64> {
-        if self.binary {
-            Ok(f64::from_ne_bytes(self.take()?))
-        } else {
-            self.parse("a number")
-        }
+        if self.binary { Ok(f64::from_ne_bytes(self.take()?)) } else { self.parse("a number") }
     }
 
     fn take<const N: usize>(&mut self) -> Result<[u8; N]> {

@@ -30,13 +30,7 @@ pub(super) fn elements(source: &mut Source, raw: &mut Raw) -> Result<()> {
             match usize::try_from(run) {
                 Ok(run @ 1..) if run <= left => (None, number, run),
                 _ => {
-                    return source.fault(
-                        at,
-                        Problem::Count {
-                            what: "elements",
-                            count: run,
-                        },
-                    );
+                    return source.fault(at, Problem::Count { what: "elements", count: run });
                 }
             }
         } else {
@@ -56,23 +50,11 @@ pub(super) fn elements(source: &mut Source, raw: &mut Raw) -> Result<()> {
             match kind {
                 Kind::Line => {
                     let nodes = tag_list(source)?;
-                    raw.lines.push(Element {
-                        tag,
-                        group,
-                        entity,
-                        nodes,
-                        at,
-                    });
+                    raw.lines.push(Element { tag, group, entity, nodes, at });
                 }
                 Kind::Triangle => {
                     let nodes = tag_list(source)?;
-                    raw.triangles.push(Element {
-                        tag,
-                        group,
-                        entity,
-                        nodes,
-                        at,
-                    });
+                    raw.triangles.push(Element { tag, group, entity, nodes, at });
                 }
                 Kind::Point | Kind::Other => {
                     for _ in 0..size {

@@ -95,25 +95,14 @@ pub(super) fn elements(source: &mut Source, raw: &mut Raw, groups: &Groups) -> R
             match kind {
                 Kind::Line => {
                     let nodes = tag_list(source)?;
-                    let lines = groups.iter().map(|&group| Element {
-                        tag,
-                        group,
-                        entity,
-                        nodes,
-                        at,
-                    });
+                    let lines =
+                        groups.iter().map(|&group| Element { tag, group, entity, nodes, at });
                     raw.lines.extend(lines);
                 }
                 Kind::Triangle => {
                     let group = groups.first().copied().unwrap_or(0);
                     let nodes = tag_list(source)?;
-                    raw.triangles.push(Element {
-                        tag,
-                        group,
-                        entity,
-                        nodes,
-                        at,
-                    });
+                    raw.triangles.push(Element { tag, group, entity, nodes, at });
                 }
                 Kind::Point | Kind::Other => {
                     for _ in 0..size {
@@ -155,12 +144,5 @@ fn total(
     if announced == found {
         return Ok(());
     }
-    source.fault(
-        at,
-        Problem::Total {
-            what,
-            announced,
-            found,
-        },
-    )
+    source.fault(at, Problem::Total { what, announced, found })
 }
