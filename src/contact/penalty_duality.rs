@@ -14,7 +14,7 @@ use nalgebra::DMatrix;
 ///
 /// B picks the bounded unknowns, W their shares of Γ_C; p = q + ω Bu is the contact pressure
 /// at the fixed point. One factorisation serves all iterations at one K; the next step starts
-/// from this one's q. The iteration is mixed by [`Anderson`]: measured on this project's
+/// from this one's q. The iteration is mixed by Anderson: measured on this project's
 /// scenes, 11 to 30 iterations instead of 200 to 600.
 pub(super) struct PenaltyDuality<'s> {
     session: &'s Session,
