@@ -1,6 +1,6 @@
 //! PETSc: the only unsafe code of the crate.
 //!
-//! [`raw`] holds the C names one to one (bindgen, an explicit list in `build.rs`);
+//! `raw` holds the C names one to one (bindgen, an explicit list in `build.rs`);
 //! the other files are small owners above them: every call's error code becomes a
 //! [`PetscError`] with PETSc's own message, every handle is destroyed on drop, and
 //! sizes are checked here because PETSc does not.
