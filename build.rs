@@ -9,12 +9,12 @@ const FUNCTIONS: &str = "\
     PetscOptionsLeftGet|PetscOptionsLeftRestore|\
     MPI_Comm_size|\
     VecCreateMPI|VecDestroy|VecGetArray|VecRestoreArray|VecGetArrayRead|VecRestoreArrayRead|\
-    VecAXPY|VecDot|\
+    VecAXPY|VecDot|VecNorm|\
     MatCreate|MatDestroy|MatSetSizes|MatSetType|MatSetBlockSize|MatSetOption|\
-    MatSetPreallocationCOO|MatSetValuesCOO|MatMult|MatDuplicate|MatScale|MatShift|MatDiagonalSet|\
+    MatSetPreallocationCOO|MatSetValuesCOO|MatMult|MatDuplicate|MatScale|MatShift|MatDiagonalSet|MatZeroRowsColumns|MatGetOwnershipRange|\
     KSPCreate|KSPDestroy|KSPSetOperators|KSPSetType|KSPGetPC|KSPSetUp|KSPSolve|\
     KSPSetTolerances|KSPGetConvergedReason|KSPGetIterationNumber|KSPSetFromOptions|\
-    KSPSetOptionsPrefix|PCSetType|PCFactorSetMatSolverType|\
+    KSPSetOptionsPrefix|KSPSetNormType|KSPSetInitialGuessNonzero|KSPSetReusePreconditioner|PCSetType|PCFactorSetMatSolverType|\
     TaoCreate|TaoDestroy|TaoSetType|TaoSetSolution|TaoSetVariableBounds|\
     TaoSetObjectiveAndGradient|TaoSetHessian|TaoSetFromOptions|TaoSetTolerances|\
     TaoSetMaximumIterations|TaoSolve|TaoGetSolutionStatus|TaoGetLinearSolveIterations";

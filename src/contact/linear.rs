@@ -36,7 +36,7 @@ impl ContactSolver for Linear<'_> {
             self.factor = Some((problem.revision, solver));
         }
         if let Some((_, solver)) = &mut self.factor {
-            let krylov = solver.solve(problem.load, c, 1e-13)?;
+            let krylov = solver.solve(problem.load, c, problem.linear_residual())?;
             report.linear_iterations = krylov.iterations;
             if !krylov.converged {
                 return Err(ContactError::NotConverged {

@@ -70,7 +70,11 @@ impl<'s> PenaltyDuality<'s> {
             problem.bounds.iter().zip(q).for_each(|(b, q)| rhs[b.dof] -= b.weight * q);
         })?;
         let Some((_, solver)) = &mut self.factor else { return Ok(0) };
-        let krylov = solver.solve(rhs, u, 1e-13)?;
+        let residual = match with_load {
+            true => problem.linear_residual(),
+            false => 1e-10 * rhs.norm()?,
+        };
+        let krylov = solver.solve(rhs, u, residual)?;
         match krylov.converged {
             true => Ok(krylov.iterations),
             false => Err(ContactError::NotConverged {

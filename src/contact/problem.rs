@@ -27,6 +27,11 @@ pub struct ContactProblem<'a> {
 }
 
 impl ContactProblem<'_> {
+    /// ‖residual‖₂ that linear systems are solved to, N: well below what the KKT residuals may be.
+    pub fn linear_residual(&self) -> f64 {
+        0.03 * self.tolerance * self.force_scale
+    }
+
     /// The KKT residuals of `c` by the assembled K (the final word has
     /// [`Kkt`] by element-wise forces).
     pub fn residuals(&self, session: &Session, c: &Vector) -> Result<Kkt, PetscError> {

@@ -77,7 +77,8 @@ impl DamageSystem {
         self.mass.multiply(&self.unknown, &mut self.rhs)?;
         let step = self.step;
         self.rhs.write(|rhs| rhs.iter_mut().zip(load).for_each(|(r, b)| *r += step * b))?;
-        let krylov = self.solver.solve(&self.rhs, &mut self.unknown, 1e-13)?;
+        let residual = 1e-13 * self.rhs.norm()?;
+        let krylov = self.solver.solve(&self.rhs, &mut self.unknown, residual)?;
         self.unknown.get(&mut zeta[..owned])?;
         Ok(krylov.converged)
     }

@@ -10,11 +10,15 @@ use std::ptr;
 /// Conjugate gradients preconditioned by a Cholesky factor (KSPCG, PCCHOLESKY).
 ///
 /// With a fresh factor CG needs one or two iterations: it removes the factor's rounding
-/// error and notices an indefinite matrix, which the factorisation alone does not.
+/// error and notices an indefinite matrix, which the factorisation alone does not. A factor
+/// of a matrix nearby costs a few iterations more.
 pub struct LinearSolver {
     raw: raw::KSP,
     _live: Live,
 }
+
+/// More than a factor worth keeping would need.
+const CG_ITERATIONS: i32 = 200;
 
 /// What a linear solve took.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,6 +43,8 @@ impl LinearSolver {
             check(raw::KSPCreate(world(), &mut solver.raw))?;
             check(raw::KSPSetOptionsPrefix(solver.raw, prefix.as_ptr()))?;
             check(raw::KSPSetType(solver.raw, c"cg".as_ptr()))?;
+            check(raw::KSPSetNormType(solver.raw, raw::KSPNormType::KSP_NORM_UNPRECONDITIONED))?;
+            check(raw::KSPSetInitialGuessNonzero(solver.raw, raw::PetscBool::PETSC_TRUE))?;
             check(raw::KSPGetPC(solver.raw, &mut pc))?;
             check(raw::PCSetType(pc, c"cholesky".as_ptr()))?;
             check(raw::PCFactorSetMatSolverType(pc, package.as_ptr()))?;
@@ -52,23 +58,34 @@ impl LinearSolver {
         // SAFETY: live handles. KSPSetOperators marks the values as new, else the
         // factorisation would wait for the next solve.
         unsafe {
+            check(raw::KSPSetReusePreconditioner(self.raw, raw::PetscBool::PETSC_FALSE))?;
             check(raw::KSPSetOperators(self.raw, matrix.raw, matrix.raw))?;
             check(raw::KSPSetUp(self.raw))
         }
     }
 
-    /// Solves for `x` to a residual of `tolerance`·‖b‖ (preconditioned norm).
+    /// Solves with `matrix` from now on, preconditioned by the factor of an earlier one.
+    pub fn keep_factor(&mut self, matrix: &Matrix) -> Result<(), PetscError> {
+        // SAFETY: live handles; the factor of the earlier matrix stays with the solver.
+        unsafe {
+            check(raw::KSPSetReusePreconditioner(self.raw, raw::PetscBool::PETSC_TRUE))?;
+            check(raw::KSPSetOperators(self.raw, matrix.raw, matrix.raw))
+        }
+    }
+
+    /// Solves from the start `x` until ‖b − Ax‖₂ ≤ `residual`.
     pub fn solve(
         &mut self,
         b: &Vector,
         x: &mut Vector,
-        tolerance: f64,
+        residual: f64,
     ) -> Result<Krylov, PetscError> {
         same_size(b.owned(), x.owned())?;
         let (mut reason, mut iterations) = (0, 0);
+        let limit = residual.max(f64::MIN_POSITIVE);
         // SAFETY: live handles of matching layout.
         unsafe {
-            check(raw::KSPSetTolerances(self.raw, tolerance, 1e-300, 1e5, 100))?;
+            check(raw::KSPSetTolerances(self.raw, 1e-300, limit, 1e5, CG_ITERATIONS))?;
             check(raw::KSPSolve(self.raw, b.raw, x.raw))?;
             check(raw::KSPGetConvergedReason(self.raw, &mut reason))?;
             check(raw::KSPGetIterationNumber(self.raw, &mut iterations))?;

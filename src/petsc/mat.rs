@@ -91,6 +91,36 @@ impl Matrix {
         Ok(copy)
     }
 
+    /// A copy with some unknowns set to the values `x` has there: their rows and columns are
+    /// replaced by `diagonal`, and `b` is made the matching right-hand side (MatZeroRowsColumns).
+    pub fn with_fixed(
+        &self,
+        unknowns: &[usize],
+        diagonal: f64,
+        x: &Vector,
+        b: &mut Vector,
+    ) -> Result<Self, PetscError> {
+        same_size(self.owned, x.owned())?;
+        same_size(self.owned, b.owned())?;
+        let copy = self.duplicate()?;
+        let (mut first, mut end) = (0, 0);
+        // SAFETY: live handles of matching layout; the rows are global numbers of owned ones.
+        unsafe {
+            check(raw::MatGetOwnershipRange(copy.raw, &mut first, &mut end))?;
+            let rows: Vec<i32> = unknowns.iter().map(|&dof| first + dof as i32).collect();
+            let count = rows.len() as i32;
+            check(raw::MatZeroRowsColumns(
+                copy.raw,
+                count,
+                rows.as_ptr(),
+                diagonal,
+                x.raw,
+                b.raw,
+            ))?;
+        }
+        Ok(copy)
+    }
+
     fn duplicate(&self) -> Result<Self, PetscError> {
         let mut copy =
             Self { raw: ptr::null_mut(), owned: self.owned, entries: 0, _live: Live::new() };

@@ -60,6 +60,14 @@ impl Vector {
         self.read(|data| values.copy_from_slice(data))
     }
 
+    /// ‖·‖₂ over all ranks.
+    pub fn norm(&self) -> Result<f64, PetscError> {
+        let mut norm = 0.0;
+        // SAFETY: a live handle.
+        check(unsafe { raw::VecNorm(self.raw, raw::NormType::NORM_2, &mut norm) })?;
+        Ok(norm)
+    }
+
     /// Number of entries this rank owns.
     pub fn owned(&self) -> usize {
         self.owned
