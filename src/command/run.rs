@@ -3,7 +3,7 @@
 use super::{Failure, screen::Screen};
 use clap::Args;
 use signorini::{
-    contact::SOLVERS,
+    contact::{SOLVERS, TAO_TYPES, is_solver},
     evolution::{self, Outcome, Phases, RunError, Setting, Step},
     mesh,
     output::{self, FieldWriter, History, Summary},
@@ -26,7 +26,8 @@ pub struct RunArguments {
     /// Folder for the results [default: out/<scene>].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Contact solver: tao, penalty-duality [default: the scene's, else tao].
+    /// Contact solver: active-set, penalty-duality, tao, tao:TYPE [default: the scene's, else
+    /// active-set].
     #[arg(long, value_name = "NAME")]
     solver: Option<String>,
     /// Override a key of the scene, e.g. --set time.step=0.005; may be repeated.
@@ -85,11 +86,13 @@ fn solver_name(arguments: &RunArguments, scene: &Scene) -> Result<String, Failur
         (None, Some(name)) => (name.as_str(), format!("{}: contact.solver", scene.path.display())),
         (None, None) => return Ok(SOLVERS[0].to_owned()),
     };
-    match SOLVERS.contains(&asked) {
+    match is_solver(asked) {
         true => Ok(asked.to_owned()),
         false => Err(Failure::Input(format!(
-            "{place}: there is no contact solver `{asked}`; there are {}",
-            SOLVERS.join(", ")
+            "{place}: there is no contact solver `{asked}`; there are {}, and tao:TYPE with TYPE \
+             one of {}",
+            SOLVERS.join(", "),
+            TAO_TYPES.join(", ")
         ))),
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! A solver is one file that implements [`ContactSolver`]; [`solver`] knows them by name.
 
+mod active_set;
 mod anderson;
 mod certificate;
 mod constraints;
@@ -19,14 +20,28 @@ pub use rigid::{DrivenMotion, RigidMotion, RigidMotions};
 use crate::petsc::Session;
 
 /// The solvers a scene or `--solver` may name, the default first.
-pub const SOLVERS: [&str; 2] = ["tao", "penalty-duality"];
+pub const SOLVERS: [&str; 3] = ["active-set", "penalty-duality", "tao"];
+
+/// TAO's types for bounded variables, reached as `tao:TYPE`; some of them stall or err on
+/// contact problems, which their KKT residuals then tell.
+pub const TAO_TYPES: [&str; 12] = [
+    "tron", "bnls", "bntr", "bntl", "gpcg", "blmvm", "bqnls", "bqnktr", "bqnktl", "bqnkls", "bncg",
+    "bqpip",
+];
+
+/// Whether `name` is a solver: one of [`SOLVERS`], or `tao:` and one of [`TAO_TYPES`].
+pub fn is_solver(name: &str) -> bool {
+    SOLVERS.contains(&name) || name.strip_prefix("tao:").is_some_and(|t| TAO_TYPES.contains(&t))
+}
 
 /// The solver called `name`, the default if there is none of that name. Without bounds
 /// every name means one linear solve.
 pub fn solver<'s>(session: &'s Session, name: &str, bounded: bool) -> Box<dyn ContactSolver + 's> {
-    match name {
+    let (family, kind) = name.split_once(':').unwrap_or((name, "tron"));
+    match family {
         _ if !bounded => Box::new(linear::Linear::new(session)),
         "penalty-duality" => Box::new(penalty_duality::PenaltyDuality::new(session)),
-        _ => Box::new(tao::Tao::new(session)),
+        "tao" => Box::new(tao::Tao::new(session, kind)),
+        _ => Box::new(active_set::ActiveSet::new(session)),
     }
 }

@@ -2,6 +2,7 @@
 
 use super::{Bound, Kkt};
 use crate::petsc::{Matrix, PetscError, Session, Vector};
+use nalgebra::DMatrix;
 
 /// min ½ cᵀKc − fᵀc  subject to  c_i ≤ g_i on the bounded unknowns.
 ///
@@ -18,8 +19,9 @@ pub struct ContactProblem<'a> {
     pub load: &'a Vector,
     /// g_i and its node's share of Γ_C for each bounded unknown.
     pub bounds: &'a [Bound],
-    /// Whether K is positive definite; else it has rigid motions that only contact holds.
-    pub definite: bool,
+    /// u·ν of the rigid motions that only contact holds, one row per bound; no columns where
+    /// K is positive definite.
+    pub rigid: &'a DMatrix<f64>,
     /// ‖·‖₂ of the forces that count as 1 in relative residuals, N.
     pub force_scale: f64,
     /// KKT residuals to reach, relative.
@@ -35,13 +37,33 @@ impl ContactProblem<'_> {
     /// The KKT residuals of `c` by the assembled K (the final word has
     /// [`Kkt`] by element-wise forces).
     pub fn residuals(&self, session: &Session, c: &Vector) -> Result<Kkt, PetscError> {
-        let mut product = Vector::zeros(session, c.owned())?;
-        self.stiffness.multiply(c, &mut product)?;
-        let load = self.load.read(<[f64]>::to_vec)?;
-        product.write(|p| p.iter_mut().zip(&load).for_each(|(p, f)| *p -= f))?;
+        let residual = self.residual(session, c)?;
         let size = c.read(|c| c.iter().fold(0.0_f64, |m, v| m.max(v.abs())))?;
-        product
+        residual
             .read(|r| c.read(|c| Kkt::of(r, c, self.bounds, |_| false, self.force_scale, size)))?
+    }
+
+    /// Kc − f.
+    pub fn residual(&self, session: &Session, c: &Vector) -> Result<Vector, PetscError> {
+        let mut residual = Vector::zeros(session, c.owned())?;
+        self.stiffness.multiply(c, &mut residual)?;
+        self.load
+            .read(|f| residual.write(|r| r.iter_mut().zip(f).for_each(|(r, f)| *r -= f)))??;
+        Ok(residual)
+    }
+
+    /// Whether K is positive definite.
+    pub fn definite(&self) -> bool {
+        self.rigid.ncols() == 0
+    }
+
+    /// Whether no rigid motion is left when u_ν is prescribed on the `pressing` bounds.
+    pub fn held_by(&self, pressing: &[bool]) -> bool {
+        let rows = self.rigid.row_iter().zip(pressing).filter(|(_, on)| **on);
+        let motions = self.rigid.ncols();
+        let gram = rows
+            .fold(DMatrix::zeros(motions, motions), |sum, (row, _)| sum + row.transpose() * row);
+        motions == 0 || gram.symmetric_eigenvalues().min() > 1e-10 * self.rigid.norm_squared()
     }
 }
 
@@ -70,6 +92,8 @@ pub struct ContactReport {
     pub linear_iterations: usize,
     /// Factorisations the method asked for; TAO's own are not visible from outside.
     pub factorisations: usize,
+    /// Times the method had to leave its fast path for a slower one that always ends.
+    pub fallbacks: usize,
 }
 
 /// A contact solve that did not end well.

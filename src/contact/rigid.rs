@@ -1,6 +1,6 @@
 //! Rigid motions that nothing holds, that only contact holds, and whether the load drives them.
 
-use super::{Constraints, GapRow};
+use super::{Bound, Constraints, GapRow};
 use crate::fem::Body;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use std::fmt;
@@ -141,9 +141,12 @@ impl RigidMotions {
         self.free.is_empty() && self.resisted.is_empty()
     }
 
-    /// Whether K stays singular after the free motions are pinned: contact must hold the rest.
-    pub fn resisted_by_contact_only(&self) -> bool {
-        !self.resisted.is_empty()
+    /// u·ν at `bounds` (rows) of the motions that only contact holds (columns).
+    pub fn normal_at(&self, body: &Body, bounds: &[Bound]) -> DMatrix<f64> {
+        DMatrix::from_fn(bounds.len(), self.resisted.len(), |i, j| {
+            let u = self.resisted[j].at(body.mesh.nodes[bounds[i].node]);
+            u[0] * bounds[i].normal[0] + u[1] * bounds[i].normal[1]
+        })
     }
 
     /// Checks that `load` (nodal forces) does no work on free motions and can be balanced by

@@ -10,6 +10,7 @@ use crate::petsc::{BoundedQuadratic, Session, Vector};
 /// found until the KKT residuals are met. Each call starts from the last answer.
 pub(super) struct Tao<'s> {
     session: &'s Session,
+    method: String,
     tao: Option<BoundedQuadratic<'s>>,
     /// U of the last solve, m.
     size: f64,
@@ -21,8 +22,9 @@ const CALLS: usize = 8;
 const PROXIMAL: f64 = 1e-7;
 
 impl<'s> Tao<'s> {
-    pub(super) fn new(session: &'s Session) -> Self {
-        Self { session, tao: None, size: 0.0 }
+    /// With TAO's type `method` (`-tao_type` overrules it).
+    pub(super) fn new(session: &'s Session, method: &str) -> Self {
+        Self { session, method: method.to_owned(), tao: None, size: 0.0 }
     }
 }
 
@@ -38,21 +40,16 @@ impl ContactSolver for Tao<'_> {
     ) -> Result<ContactReport, ContactError> {
         let tao = match self.tao.take() {
             Some(tao) => tao,
-            None => BoundedQuadratic::new(self.session, "tron")?,
+            None => BoundedQuadratic::new(self.session, &self.method)?,
         };
         let tao = self.tao.insert(tao);
         let mut report = ContactReport::default();
         let owned = c.owned();
         let load = problem.load.read(<[f64]>::to_vec)?;
         let load_size = load.iter().fold(0.0_f64, |m, f| m.max(f.abs()));
-        if load_size == 0.0 && problem.definite {
-            // Nothing pushes and the gaps are not negative: c = 0, where a scale would be 0/0.
-            c.write(|c| c.fill(0.0))?;
-            return Ok(report);
-        }
 
         let s = problem.stiffness_scale;
-        let proximal = if problem.definite { 0.0 } else { PROXIMAL };
+        let proximal = if problem.definite() { 0.0 } else { PROXIMAL };
         let stiffness = problem.stiffness.scaled(1.0 / s, proximal)?;
         let mut x = Vector::zeros(self.session, owned)?;
         let mut f = Vector::zeros(self.session, owned)?;

@@ -6,6 +6,7 @@ use crate::{
     fem::Stiffness,
     petsc::{PetscError, Session, Vector},
 };
+use nalgebra::DMatrix;
 use std::time::Instant;
 
 /// Solves the contact problems of a run, one after the other.
@@ -20,6 +21,7 @@ pub struct Equilibrium<'a> {
     load: Vector,
     c: Vector,
     prescribed: Vec<bool>,
+    rigid: DMatrix<f64>,
 }
 
 /// How often a solver is asked again, more precisely, when its answer misses the tolerance.
@@ -48,6 +50,7 @@ impl<'a> Equilibrium<'a> {
             load: Vector::zeros(session, owned)?,
             c: Vector::zeros(session, owned)?,
             prescribed: constraints.is_prescribed(),
+            rigid: setting.motions.normal_at(body, &constraints.bounds),
         })
     }
 
@@ -80,6 +83,8 @@ impl<'a> Equilibrium<'a> {
             let report = self.solve_contact(force_scale, tolerance).map_err(failed)?;
             total.iterations += report.iterations;
             total.linear_iterations += report.linear_iterations;
+            total.factorisations += report.factorisations;
+            total.fallbacks += report.fallbacks;
             let u = self.displacement(&lift)?;
             let (kkt, contact) = phases.time("certificate", || self.certify(&u, &external));
             if kkt.within(setting.tolerance) {
@@ -144,7 +149,7 @@ impl<'a> Equilibrium<'a> {
             stiffness_scale: self.stiffness.scale,
             load: &self.load,
             bounds: &setting.constraints.bounds,
-            definite: !setting.motions.resisted_by_contact_only(),
+            rigid: &self.rigid,
             force_scale,
             tolerance,
         };
@@ -212,6 +217,8 @@ fn figures(
         active_nodes: active.len(),
         iterations: report.iterations,
         linear_iterations: report.linear_iterations,
+        factorisations: report.factorisations,
+        fallbacks: report.fallbacks,
         kkt_stationarity: kkt.stationarity,
         kkt_primal: kkt.primal,
         kkt_dual: kkt.dual,

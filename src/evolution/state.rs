@@ -65,6 +65,10 @@ pub struct StepRecord {
     pub iterations: usize,
     /// Iterations of the linear solvers inside it.
     pub linear_iterations: usize,
+    /// Factorisations it asked for (TAO's own do not show).
+    pub factorisations: usize,
+    /// Times it left its fast path.
+    pub fallbacks: usize,
     /// Relative KKT residuals.
     pub kkt_stationarity: f64,
     /// See [`Kkt`].

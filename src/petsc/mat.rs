@@ -109,14 +109,7 @@ impl Matrix {
             check(raw::MatGetOwnershipRange(copy.raw, &mut first, &mut end))?;
             let rows: Vec<i32> = unknowns.iter().map(|&dof| first + dof as i32).collect();
             let count = rows.len() as i32;
-            check(raw::MatZeroRowsColumns(
-                copy.raw,
-                count,
-                rows.as_ptr(),
-                diagonal,
-                x.raw,
-                b.raw,
-            ))?;
+            check(raw::MatZeroRowsColumns(copy.raw, count, rows.as_ptr(), diagonal, x.raw, b.raw))?;
         }
         Ok(copy)
     }

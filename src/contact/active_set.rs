@@ -1,0 +1,213 @@
+//! The primal-dual active set method.
+
+use super::{ContactError, ContactProblem, ContactReport, ContactSolver, tao::Tao};
+use crate::petsc::{LinearSolver, PetscError, Session, Vector};
+
+/// Guess which nodes press, solve with u_ν = g there, and exchange the nodes where the guess was
+/// wrong: pressing ones that are pulled, open ones that penetrate (Hintermüller, Ito, Kunisch,
+/// SIAM J. Optim. 13, 2003: a semismooth Newton method). The guess of the last step is the
+/// first of this one.
+///
+/// Exchanging all wrong nodes may return to an earlier set. [`Exchange`] sees that the number
+/// of wrong nodes falls, and else exchanges one at a time, which ends for every positive
+/// definite K. Where K is singular (only contact holds the body) and a guess does not hold it,
+/// or if the exchanges run out, TAO solves the problem instead.
+pub(super) struct ActiveSet<'s> {
+    session: &'s Session,
+    pressing: Vec<bool>,
+    factor: Option<LinearSolver>,
+    /// CG iterations of the last solve with the present factor.
+    wear: usize,
+    rescue: Tao<'s>,
+}
+
+/// A factor of an earlier step or set that costs more CG iterations than this is renewed:
+/// a factorisation costs about as much as ten pairs of triangular solves.
+const WORN: usize = 8;
+
+impl<'s> ActiveSet<'s> {
+    pub(super) fn new(session: &'s Session) -> Self {
+        Self {
+            session,
+            pressing: Vec::new(),
+            factor: None,
+            wear: 0,
+            rescue: Tao::new(session, "tron"),
+        }
+    }
+
+    /// The set to begin with: the last one, or the nodes that touch at the start.
+    fn first_guess(&mut self, problem: &ContactProblem, c: &Vector) -> Result<(), PetscError> {
+        if self.pressing.len() != problem.bounds.len() {
+            let touches = |c: &[f64]| problem.bounds.iter().map(|b| c[b.dof] >= b.gap).collect();
+            self.pressing = c.read(touches)?;
+        }
+        if !problem.held_by(&self.pressing) {
+            self.pressing.fill(true);
+        }
+        Ok(())
+    }
+
+    /// Minimises with c = g on the pressing nodes and no other bound.
+    fn solve_pressing(
+        &mut self,
+        problem: &ContactProblem,
+        c: &mut Vector,
+        report: &mut ContactReport,
+    ) -> Result<(), PetscError> {
+        let pressing = || problem.bounds.iter().zip(&self.pressing).filter(|(_, on)| **on);
+        let dofs: Vec<usize> = pressing().map(|(bound, _)| bound.dof).collect();
+        c.write(|c| pressing().for_each(|(bound, _)| c[bound.dof] = bound.gap))?;
+        let mut rhs = Vector::zeros(self.session, c.owned())?;
+        problem.load.read(|f| rhs.set(f))??;
+        let scale = problem.stiffness_scale;
+        let matrix = problem.stiffness.with_fixed(&dofs, scale, c, &mut rhs)?;
+
+        let solver = match (self.factor.take(), self.wear <= WORN) {
+            (Some(mut solver), true) => {
+                solver.keep_factor(&matrix)?;
+                solver
+            }
+            (old, _) => {
+                let mut solver = match old {
+                    Some(solver) => solver,
+                    None => LinearSolver::cholesky(self.session, "elastic_")?,
+                };
+                solver.factorise(&matrix)?;
+                report.factorisations += 1;
+                solver
+            }
+        };
+        let krylov = self.factor.insert(solver).solve(&rhs, c, problem.linear_residual())?;
+        report.linear_iterations += krylov.iterations;
+        self.wear = if krylov.converged { krylov.iterations } else { usize::MAX };
+        Ok(())
+    }
+
+    /// The nodes where the guess was wrong, beyond what the KKT tolerance allows.
+    fn wrong(&self, problem: &ContactProblem, c: &Vector) -> Result<Vec<usize>, PetscError> {
+        let residual = problem.residual(self.session, c)?;
+        let size = c.read(|c| c.iter().fold(0.0_f64, |m, v| m.max(v.abs())))?;
+        let slack = 0.1 * problem.tolerance;
+        let pull = slack * problem.force_scale / (problem.bounds.len() as f64).sqrt();
+        c.read(|c| {
+            residual.read(|r| {
+                let wrong = |i: &usize| {
+                    let bound = &problem.bounds[*i];
+                    match self.pressing[*i] {
+                        true => r[bound.dof] > pull,
+                        false => c[bound.dof] - bound.gap > slack * size,
+                    }
+                };
+                (0..problem.bounds.len()).filter(wrong).collect()
+            })
+        })?
+    }
+
+    /// Exchanges the chosen nodes; false if the body would then not be held.
+    fn exchange(&mut self, problem: &ContactProblem, nodes: &[usize]) -> bool {
+        let old = self.pressing.clone();
+        nodes.iter().for_each(|&i| self.pressing[i] = !self.pressing[i]);
+        if problem.held_by(&self.pressing) {
+            return true;
+        }
+        // Keep those that were pressing: only close gaps.
+        self.pressing.iter_mut().zip(&old).for_each(|(new, old)| *new |= *old);
+        self.pressing != old
+    }
+
+    fn rescue(
+        &mut self,
+        problem: &ContactProblem,
+        c: &mut Vector,
+        mut report: ContactReport,
+    ) -> Result<ContactReport, ContactError> {
+        c.write(|c| c.fill(0.0))?;
+        let rescued = self.rescue.solve(problem, c)?;
+        report.iterations += rescued.iterations;
+        report.linear_iterations += rescued.linear_iterations;
+        report.fallbacks += 1;
+        let touches = |c: &[f64]| problem.bounds.iter().map(|b| c[b.dof] >= b.gap).collect();
+        self.pressing = c.read(touches)?;
+        self.wear = usize::MAX;
+        Ok(report)
+    }
+}
+
+impl ContactSolver for ActiveSet<'_> {
+    fn name(&self) -> &'static str {
+        "active-set"
+    }
+
+    fn solve(
+        &mut self,
+        problem: &ContactProblem,
+        c: &mut Vector,
+    ) -> Result<ContactReport, ContactError> {
+        let mut report = ContactReport::default();
+        let mut choice = Exchange::new();
+        self.first_guess(problem, c)?;
+        while report.iterations < 30 + 5 * problem.bounds.len() {
+            self.solve_pressing(problem, c, &mut report)?;
+            report.iterations += 1;
+            if self.wear == usize::MAX {
+                break;
+            }
+            let wrong = self.wrong(problem, c)?;
+            if wrong.is_empty() {
+                return Ok(report);
+            }
+            let chosen = choice.of(&wrong);
+            report.fallbacks += usize::from(chosen.len() < wrong.len());
+            if !self.exchange(problem, chosen) {
+                break;
+            }
+        }
+        self.rescue(problem, c, report)
+    }
+}
+
+/// Block principal pivoting (Júdice and Pires, Comput. Oper. Res. 21, 1994): all wrong nodes
+/// are exchanged while their number falls, or for a few times more; then only the last of them
+/// (Murty's rule, finite for positive definite matrices) until it has fallen.
+struct Exchange {
+    fewest: usize,
+    patience: usize,
+}
+
+const PATIENCE: usize = 5;
+
+impl Exchange {
+    fn new() -> Self {
+        Self { fewest: usize::MAX, patience: PATIENCE }
+    }
+
+    fn of<'w>(&mut self, wrong: &'w [usize]) -> &'w [usize] {
+        if wrong.len() < self.fewest {
+            (self.fewest, self.patience) = (wrong.len(), PATIENCE);
+            wrong
+        } else if self.patience > 0 {
+            self.patience -= 1;
+            wrong
+        } else {
+            &wrong[wrong.len() - 1..]
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exchanges_one_node_when_the_number_of_wrong_ones_stops_falling() {
+        let mut choice = Exchange::new();
+        let (a, b) = ([0, 1, 2], [3, 4, 5]);
+        assert_eq!(choice.of(&a).len(), 3);
+        for _ in 0..PATIENCE {
+            assert_eq!(choice.of(&b).len(), 3);
+        }
+        assert_eq!(choice.of(&b), [5]);
+        assert_eq!(choice.of(&a[..2]), [0, 1], "progress restores the block exchange");
+    }
+}
