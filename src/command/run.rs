@@ -8,7 +8,7 @@ use signorini::{
     mesh,
     output::{self, FieldWriter, History, Summary},
     petsc::Session,
-    scene::{MeshSource, Scene},
+    scene::{MeshSource, Scene, Stepping, TimeGrid},
 };
 use std::{
     path::{Path, PathBuf},
@@ -109,6 +109,14 @@ struct Recorder<'a> {
     last: Option<Step>,
 }
 
+/// Every how many steps a frame is written unless the scene says it.
+fn default_every(time: Option<TimeGrid>) -> usize {
+    match time.map(|grid| grid.stepping) {
+        Some(Stepping::Uniform { steps }) => steps.div_ceil(FRAMES).max(1),
+        _ => 1,
+    }
+}
+
 /// Frames written when the scene does not say how often.
 const FRAMES: usize = 20;
 
@@ -118,7 +126,7 @@ impl<'a> Recorder<'a> {
         setting: &'a Setting,
         phases: &'a Phases,
     ) -> Result<Self, output::OutputError> {
-        let every = setting.scene().output.every.unwrap_or(setting.steps().div_ceil(FRAMES).max(1));
+        let every = setting.scene().output.every.unwrap_or(default_every(setting.scene().time));
         Ok(Self {
             folder,
             setting,
@@ -164,9 +172,11 @@ impl<'a> Recorder<'a> {
         {
             notes.push(format!(
                 "the damage solve was skipped in {} of {} steps: no source, uniform ζ",
-                outcome.undamaged_steps,
-                setting.steps()
+                outcome.undamaged_steps, record.step
             ));
+        }
+        if let Some(outcome) = outcome.filter(|o| o.undone > 0) {
+            notes.push(format!("{} steps were undone and tried again, shorter", outcome.undone));
         }
         let mut contact_nodes: Vec<usize> = state.contact.iter().map(|p| p.node).collect();
         contact_nodes.dedup();
@@ -181,7 +191,8 @@ impl<'a> Recorder<'a> {
             triangles: setting.body.mesh.triangles.len(),
             steps: record.step,
             end_time: record.time,
-            stopped_at: outcome.and_then(|o| o.stopped).map(|(time, _)| time),
+            stopped_at: outcome.and_then(|o| o.stopped).map(|stop| stop.time),
+            stopped_uncertainty: outcome.and_then(|o| o.stopped).map(|stop| stop.uncertainty),
             zeta_min: record.zeta_min,
             zeta_mean: record.zeta_mean,
             displacement_max: record.displacement_max,

@@ -11,24 +11,29 @@ use std::{collections::BTreeMap, path::Path};
 /// The terminal of a run; the bar is silent when standard error is no terminal.
 pub struct Screen {
     bar: ProgressBar,
+    end: f64,
 }
+
+/// The bar counts thousandths of the time to be run.
+const LENGTH: u64 = 1000;
 
 impl Screen {
     pub fn new(setting: &Setting) -> Self {
-        let bar = ProgressBar::new(setting.steps() as u64);
-        let template = "{bar:30} {pos}/{len} {msg}  {elapsed} (about {eta} left)";
+        let end = setting.scene().time.map_or(1.0, |grid| grid.end);
+        let bar = ProgressBar::new(LENGTH);
+        let template = "{bar:30} {msg}  {elapsed} (about {eta} left)";
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
-        Self { bar }
+        Self { bar, end }
     }
 
     /// Time, min ζ, active nodes and iterations of an accepted step.
     pub fn show(&self, record: &StepRecord) {
-        self.bar.set_position(record.step as u64);
+        self.bar.set_position((LENGTH as f64 * record.time / self.end) as u64);
         self.bar.set_message(format!(
-            "t = {:.4}  min ζ = {:.6}  active {}  iterations {}",
-            record.time, record.zeta_min, record.active_nodes, record.iterations
+            "step {}  t = {:.4}  min ζ = {:.6}  active {}  iterations {}",
+            record.step, record.time, record.zeta_min, record.active_nodes, record.iterations
         ));
     }
 
@@ -66,10 +71,10 @@ impl Screen {
 fn ending(s: &Summary, outcome: Option<&Outcome>) -> String {
     match outcome.map(|o| o.stopped) {
         None => format!("FAILED after t = {}; the state there is saved", s.end_time),
-        Some(Some((time, zeta_min))) => format!(
-            "STOPPED at ζ_*: min ζ would be {zeta_min:.4} at t = {time:.6}; \
+        Some(Some(stop)) => format!(
+            "STOPPED at ζ_* at t = {:.6} ± {:.1e} (min ζ would be {:.4}); \
              last admissible state t = {:.6} (step {})",
-            s.end_time, s.steps
+            stop.time, stop.uncertainty, stop.zeta_min, s.end_time, s.steps
         ),
         Some(None) => format!("finished at t = {} after {} steps", s.end_time, s.steps),
     }

@@ -139,6 +139,14 @@ impl ContactSolver for ActiveSet<'_> {
         "active-set"
     }
 
+    fn warm_start(&self) -> Vec<f64> {
+        self.pressing.iter().map(|&on| if on { 1.0 } else { 0.0 }).collect()
+    }
+
+    fn set_warm_start(&mut self, kept: &[f64]) {
+        self.pressing = kept.iter().map(|&on| on != 0.0).collect();
+    }
+
     fn solve(
         &mut self,
         problem: &ContactProblem,

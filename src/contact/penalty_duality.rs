@@ -152,6 +152,14 @@ impl ContactSolver for PenaltyDuality<'_> {
         "penalty-duality"
     }
 
+    fn warm_start(&self) -> Vec<f64> {
+        self.q.clone()
+    }
+
+    fn set_warm_start(&mut self, kept: &[f64]) {
+        self.q = kept.to_vec();
+    }
+
     fn solve(
         &mut self,
         problem: &ContactProblem,

@@ -72,6 +72,12 @@ pub trait ContactSolver {
     /// The name a scene or `--solver` calls it by.
     fn name(&self) -> &'static str;
 
+    /// What the method keeps for the next solve besides `c` (a set, a multiplier), as numbers.
+    fn warm_start(&self) -> Vec<f64>;
+
+    /// Goes back to an earlier [`Self::warm_start`]: the solves since then have not happened.
+    fn set_warm_start(&mut self, kept: &[f64]);
+
     /// Solves from the start `c` and leaves the solution there.
     ///
     /// # Errors

@@ -33,6 +33,14 @@ impl ContactSolver for Tao<'_> {
         "tao"
     }
 
+    fn warm_start(&self) -> Vec<f64> {
+        vec![self.size]
+    }
+
+    fn set_warm_start(&mut self, kept: &[f64]) {
+        self.size = kept.first().copied().unwrap_or(0.0);
+    }
+
     fn solve(
         &mut self,
         problem: &ContactProblem,

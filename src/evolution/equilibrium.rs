@@ -22,6 +22,8 @@ pub struct Equilibrium<'a> {
     c: Vector,
     prescribed: Vec<bool>,
     rigid: DMatrix<f64>,
+    /// c and the solver's warm start at the last accepted step.
+    accepted: (Vec<f64>, Vec<f64>),
 }
 
 /// How often a solver is asked again, more precisely, when its answer misses the tolerance.
@@ -51,6 +53,7 @@ impl<'a> Equilibrium<'a> {
             c: Vector::zeros(session, owned)?,
             prescribed: constraints.is_prescribed(),
             rigid: setting.motions.normal_at(body, &constraints.bounds),
+            accepted: (vec![0.0; owned], Vec::new()),
         })
     }
 
@@ -74,6 +77,9 @@ impl<'a> Equilibrium<'a> {
         }
         let external = phases.time("loads", || setting.loads.at(&setting.body, time));
         let lift = setting.lift(time)?;
+        if !setting.motions.held() {
+            setting.check_load(time, &external)?;
+        }
         let force_scale = self.set_load(&external, &lift)?;
 
         let mut total = ContactReport::default();
@@ -109,6 +115,19 @@ impl<'a> Equilibrium<'a> {
             tolerance *= 0.3 * setting.tolerance / kkt.worst();
         }
         unreachable!("the last attempt returns")
+    }
+
+    /// The last solve belongs to an accepted step.
+    pub fn accept(&mut self) -> Result<(), PetscError> {
+        self.accepted = (self.c.read(<[f64]>::to_vec)?, self.solver.warm_start());
+        Ok(())
+    }
+
+    /// The solves since the last accepted step have not happened.
+    pub fn undo(&mut self) -> Result<(), PetscError> {
+        self.c.set(&self.accepted.0)?;
+        self.solver.set_warm_start(&self.accepted.1);
+        Ok(())
     }
 
     /// Sets the load of the free unknowns, f − K u_D, and returns the size of forces.

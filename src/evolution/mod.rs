@@ -1,7 +1,9 @@
 //! Problem VP^hk: damage and contact in turn, step by step.
 
+mod clock;
 mod damage_step;
 mod equilibrium;
+mod estimate;
 mod loads;
 mod phases;
 mod setting;
@@ -18,7 +20,9 @@ use crate::{
     output::OutputError,
     petsc::{PetscError, Session},
 };
+use clock::Clock;
 use damage_step::{DamageStep, Driving};
+use estimate::Estimate;
 use std::time::Instant;
 
 /// How a run ended that did not fail.
@@ -26,12 +30,26 @@ use std::time::Instant;
 pub struct Outcome {
     /// The last accepted step.
     pub last: Step,
-    /// Time at which min ζ ≤ ζ_* was found and that min ζ, if it was.
-    pub stopped: Option<(f64, f64)>,
+    /// The stop at ζ_*, if it was reached.
+    pub stopped: Option<Stop>,
     /// Worst KKT residuals of all steps.
     pub kkt: Kkt,
     /// Steps without a damage solve, because nothing drove the damage.
     pub undamaged_steps: usize,
+    /// Steps undone and tried again, shorter.
+    pub undone: usize,
+}
+
+/// The stop at ζ_*.
+#[derive(Debug, Clone, Copy)]
+pub struct Stop {
+    /// When, s: the first t_n with min ζ ≤ ζ_*; where steps are chosen, the interpolated time less
+    /// the estimated delay of the steps.
+    pub time: f64,
+    /// The min ζ found there, not accepted.
+    pub zeta_min: f64,
+    /// How far off the time may be, s: the last step, and all of the delay taken off.
+    pub uncertainty: f64,
 }
 
 /// Why a run ended early.
@@ -81,34 +99,90 @@ pub fn run(
     accepted: &mut dyn FnMut(&Step) -> Result<(), OutputError>,
 ) -> Result<Outcome, RunError> {
     let mut equilibrium = Equilibrium::new(session, setting, solver, phases)?;
-    let mut damage = DamageStep::new(session, setting, phases)?;
-    let mut zeta = setting.initial_damage();
+    let mut damage = DamageStep::new(session, setting, phases);
 
     // (27): the displacement at t = 0, or the only one where there is no time.
-    let mut last = equilibrium.solve(0, setting.time(0), &zeta)?;
+    let last = equilibrium.solve(0, setting.start(), &setting.initial_damage())?;
+    equilibrium.accept()?;
     accepted(&last)?;
-    let mut outcome = Outcome { kkt: last.record.kkt(), last, stopped: None, undamaged_steps: 0 };
+    let mut clock = Clock::new(setting.scene().time, damage.rate(&last.state.u, &last.state.zeta));
+    let mut estimate = Estimate::default();
+    let mut outcome = Outcome::new(last);
 
-    for n in 1..=setting.steps() {
-        let (time, started) = (setting.time(n), Instant::now());
+    while let Some((time, step)) = clock.propose() {
+        let (started, n) = (Instant::now(), outcome.last.record.step + 1);
+        let old = &outcome.last.state;
 
-        // (28): ζ_n from u_{n−1} and ζ_{n−1}; the program stops when ζ_* is reached.
-        match damage.advance(&outcome.last.state.u, &mut zeta)? {
-            Driving::Solved => {}
-            Driving::Nothing => outcome.undamaged_steps += 1,
-            Driving::Failed => return Err(RunError::Damage { step: n, time }),
+        // (28): ζ_n from u_{n−1} and ζ_{n−1}.
+        let mut zeta = old.zeta.clone();
+        let driving = damage.advance(&old.u, &mut zeta, step)?;
+        if driving == Driving::Failed || zeta.iter().any(|z| z.is_nan()) {
+            if clock.cut(step, 0.5) {
+                outcome.undone += 1;
+                continue;
+            }
+            return Err(RunError::Damage { step: n, time });
         }
-        if let Some(zeta_min) = setting.at_threshold(&zeta) {
-            outcome.stopped = Some((time, zeta_min));
+
+        // The program stops when ζ_* is reached; chosen steps land there.
+        if let Some(reached) = setting.at_threshold(&zeta) {
+            let (from, level) = (outcome.last.record.zeta_min, setting.threshold());
+            let share = ((from - level) / (from - reached)).clamp(0.0, 1.0);
+            let landed = clock.tolerance().is_none_or(|tolerance| from - level <= tolerance);
+            if !landed && clock.cut(step, (0.9 * share).max(0.01)) {
+                outcome.undone += 1;
+                continue;
+            }
+            let stop = match clock.tolerance() {
+                None => Stop { time, zeta_min: reached, uncertainty: step },
+                Some(_) => Stop {
+                    time: old.time + share * step - estimate.delay(&zeta),
+                    zeta_min: reached,
+                    uncertainty: estimate.delay(&zeta).abs() + step,
+                },
+            };
+            outcome.stopped = Some(stop);
             break;
+        }
+        let error = estimate.of(&old.zeta, &zeta, step);
+        if clock.tolerance().is_some_and(|tolerance| error.largest > tolerance)
+            && clock.cut(step, clock.reduction(error.largest))
+        {
+            outcome.undone += 1;
+            continue;
         }
 
         // (26): u_n from ζ_n.
-        last = equilibrium.solve(n, time, &zeta)?;
+        let mut last = match equilibrium.solve(n, time, &zeta) {
+            Ok(last) => last,
+            Err(failure @ RunError::Contact { .. }) => {
+                equilibrium.undo()?;
+                if clock.cut(step, 0.5) {
+                    outcome.undone += 1;
+                    continue;
+                }
+                return Err(failure);
+            }
+            Err(other) => return Err(other),
+        };
+        equilibrium.accept()?;
+        clock.accept(time, step, Some(error.largest));
+        estimate.accept(error);
         last.record.seconds = started.elapsed().as_secs_f64();
         accepted(&last)?;
-        outcome.kkt = outcome.kkt.max(&last.record.kkt());
-        outcome.last = last;
+        outcome.accept(last, driving);
     }
     Ok(outcome)
+}
+
+impl Outcome {
+    fn new(first: Step) -> Self {
+        Self { kkt: first.record.kkt(), last: first, stopped: None, undamaged_steps: 0, undone: 0 }
+    }
+
+    fn accept(&mut self, last: Step, driving: Driving) {
+        self.kkt = self.kkt.max(&last.record.kkt());
+        self.undamaged_steps += usize::from(driving == Driving::Nothing);
+        self.last = last;
+    }
 }

@@ -8,7 +8,7 @@ use crate::{
     fem::{Body, Elasticity},
     mesh::{Mesh, boundary_nodes},
     model::DamageLaw,
-    scene::{Scene, SceneError},
+    scene::{Scene, SceneError, Stepping, TimeGrid},
 };
 use std::path::PathBuf;
 
@@ -89,19 +89,32 @@ impl Setting {
         Ok(setting)
     }
 
+    /// Checks the times known beforehand, so that bad input is refused before anything is written.
     fn check_times(&self) -> Result<(), SetupError> {
-        for time in (0..=self.steps()).map(|n| self.time(n)) {
+        let (end, steps) = match self.scene.time {
+            None => (1.0, 1),
+            Some(TimeGrid { end, stepping: Stepping::Uniform { steps } }) => (end, steps),
+            Some(TimeGrid { end, stepping: Stepping::Auto { .. } }) => (end, 100),
+        };
+        for time in (0..=steps).map(|n| end * n as f64 / steps as f64) {
             self.lift(time)?;
             if !self.motions.held() {
-                let load = self.loads.at(&self.body, time);
-                self.motions.check(&self.body, &load).map_err(|source| SetupError::Driven {
-                    scene: self.scene.path.clone(),
-                    time,
-                    source,
-                })?;
+                self.check_load(time, &self.loads.at(&self.body, time))?;
             }
         }
         Ok(())
+    }
+
+    /// Checks that the load at `time` drives no rigid motion.
+    ///
+    /// # Errors
+    /// It does; the error names the motion.
+    pub fn check_load(&self, time: f64, load: &[f64]) -> Result<(), SetupError> {
+        self.motions.check(&self.body, load).map_err(|source| SetupError::Driven {
+            scene: self.scene.path.clone(),
+            time,
+            source,
+        })
     }
 
     /// The prescribed unknowns at `time`, zero elsewhere.
@@ -115,23 +128,15 @@ impl Setting {
             .map_err(|source| SetupError::Constraint { scene: self.scene.path.clone(), source })
     }
 
-    /// Number of time steps N after the first solve.
-    pub fn steps(&self) -> usize {
-        self.scene.time.map_or(0, |grid| grid.steps)
+    /// The time of the first solve, s: 0, or 1 where there is no time.
+    pub fn start(&self) -> f64 {
+        if self.scene.time.is_some() { 0.0 } else { 1.0 }
     }
 
-    /// t_n, s; without a time grid the one solve is at t = 1.
-    pub fn time(&self, n: usize) -> f64 {
-        match self.scene.time {
-            None => 1.0,
-            Some(grid) if n == grid.steps => grid.end,
-            Some(grid) => n as f64 * grid.step(),
-        }
-    }
-
-    /// The time step k, s, where the body can be damaged in time.
-    pub fn damage(&self) -> Option<(DamageLaw, f64)> {
-        Some((self.scene.damage.as_ref()?.law, self.scene.time?.step()))
+    /// The damage law, where the material can be damaged in time.
+    pub fn damage(&self) -> Option<DamageLaw> {
+        self.scene.time?;
+        self.scene.damage.as_ref().map(|damage| damage.law)
     }
 
     /// ζ₀ at the nodes: π^h ζ₀, or 1 for a material that is not damaged.
@@ -143,11 +148,15 @@ impl Setting {
         }
     }
 
+    /// ζ_*, 0 for a material that is not damaged.
+    pub fn threshold(&self) -> f64 {
+        self.scene.damage.as_ref().map_or(0.0, |damage| damage.law.threshold)
+    }
+
     /// min ζ if it has reached ζ_*.
     pub fn at_threshold(&self, zeta: &[f64]) -> Option<f64> {
-        let threshold = self.scene.damage.as_ref()?.law.threshold;
         let least = zeta.iter().copied().fold(f64::INFINITY, f64::min);
-        (least.is_nan() || least <= threshold).then_some(least)
+        (least <= self.threshold()).then_some(least)
     }
 
     /// The mean of η_*(ζ) over each triangle.

@@ -24,12 +24,16 @@ pub fn source_load(body: &Body, law: &DamageLaw, strain_squared: &[f64], zeta: &
     load
 }
 
-/// M + kκL, factored once for the whole run, and M.
+/// M + kκL, factored once for each step length, and M.
 pub struct DamageSystem {
     mass: Matrix,
+    matrix: Matrix,
+    mass_values: Vec<f64>,
+    laplace_values: Vec<f64>,
     solver: LinearSolver,
     rhs: Vector,
     unknown: Vector,
+    diffusion: f64,
     step: f64,
 }
 
@@ -43,7 +47,7 @@ impl DamageSystem {
     ) -> Result<Self, PetscError> {
         let owned = body.partition.owned();
         let (mut rows, mut columns) = (Vec::new(), Vec::new());
-        let (mut mass_values, mut values) = (Vec::new(), Vec::new());
+        let (mut mass_values, mut laplace_values) = (Vec::new(), Vec::new());
         for (nodes, triangle) in body.mesh.triangles.iter().zip(&body.triangles) {
             let (mass, laplace) = (triangle.mass(), triangle.laplace());
             for i in 0..3 {
@@ -51,23 +55,34 @@ impl DamageSystem {
                     rows.push(body.partition.row(nodes[i], 1, 0));
                     columns.push(body.partition.global(nodes[j], 1, 0));
                     mass_values.push(mass[(i, j)]);
-                    values.push(mass[(i, j)] + step * diffusion * laplace[(i, j)]);
+                    laplace_values.push(laplace[(i, j)]);
                 }
             }
         }
         let mut mass = Matrix::with_pattern(session, owned, 1, rows.clone(), columns.clone())?;
         mass.set_values(&mass_values)?;
-        let mut matrix = Matrix::with_pattern(session, owned, 1, rows, columns)?;
-        matrix.set_values(&values)?;
-        let mut solver = LinearSolver::cholesky(session, "damage_")?;
-        solver.factorise(&matrix)?;
-        Ok(Self {
+        let mut system = Self {
             mass,
-            solver,
+            matrix: Matrix::with_pattern(session, owned, 1, rows, columns)?,
+            mass_values,
+            laplace_values,
+            solver: LinearSolver::cholesky(session, "damage_")?,
             rhs: Vector::zeros(session, owned)?,
             unknown: Vector::zeros(session, owned)?,
+            diffusion,
             step,
-        })
+        };
+        system.set_step(step)?;
+        Ok(system)
+    }
+
+    /// Refills and factorises the matrix for another step length k, s.
+    pub fn set_step(&mut self, step: f64) -> Result<(), PetscError> {
+        let factor = step * self.diffusion;
+        let sum = self.mass_values.iter().zip(&self.laplace_values).map(|(m, l)| m + factor * l);
+        self.matrix.set_values(&sum.collect::<Vec<_>>())?;
+        self.step = step;
+        self.solver.factorise(&self.matrix)
     }
 
     /// Replaces ζ_{n−1} by ζ_n for the source load b; false if the linear solver failed.

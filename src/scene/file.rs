@@ -69,7 +69,8 @@ pub(super) struct DamageTable {
 #[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct TimeTable {
     pub(super) end: Number,
-    pub(super) step: Number,
+    pub(super) step: Spanned<Formula>,
+    pub(super) tolerance: Option<Number>,
 }
 
 #[derive(Deserialize, Default)]

@@ -79,26 +79,36 @@ fn may_start_at(law: &DamageLaw, zeta: f64) -> bool {
     law.threshold < zeta && zeta <= 1.0
 }
 
-/// A uniform partition of [0, T].
+/// The time of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimeGrid {
     /// T, s.
     pub end: f64,
-    /// N, at least 1.
-    pub steps: usize,
+    /// How [0, T] is divided.
+    pub stepping: Stepping,
+}
+
+/// How a time interval is divided.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Stepping {
+    /// Uniformly, as in (25).
+    Uniform {
+        /// N, at least 1.
+        steps: usize,
+    },
+    /// By an estimate of each step's error.
+    Auto {
+        /// The error of ζ allowed in a step, and how near ζ_* a run must land.
+        tolerance: f64,
+    },
 }
 
 impl TimeGrid {
     /// The uniform partition (25) of [0, `end`] closest to `step` (both positive, s)
     /// and not coarser. A step that divides the end up to rounding is kept.
-    pub fn new(end: f64, step: f64) -> Self {
-        let steps = (end / step - 1e-9).ceil().max(1.0);
-        Self { end, steps: steps as usize }
-    }
-
-    /// k = T/N, s.
-    pub fn step(&self) -> f64 {
-        self.end / self.steps as f64
+    pub fn uniform(end: f64, step: f64) -> Self {
+        let steps = (end / step - 1e-9).ceil().max(1.0) as usize;
+        Self { end, stepping: Stepping::Uniform { steps } }
     }
 }
 

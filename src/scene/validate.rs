@@ -12,11 +12,15 @@ use super::file::{
     ContactTable, DamageTable, File, Formula, MaterialTable, MeshTable, TimeTable, Vector,
 };
 use super::source::Source;
-use super::{ContactOptions, Damage, MeshSource, OutputOptions, Scene, TimeGrid, may_start_at};
+use super::{
+    ContactOptions, Damage, MeshSource, OutputOptions, Scene, Stepping, TimeGrid, may_start_at,
+};
 use crate::model::{DamageLaw, Material};
 
 /// More steps than this are a slip of the pen.
 const MOST_STEPS: f64 = 1e9;
+/// The error of ζ per step that `step = "auto"` allows unless told otherwise.
+const STEP_TOLERANCE: f64 = 2e-4;
 
 pub(super) fn scene(file: File, path: &Path, source: Source) -> Result<Scene, SceneError> {
     let check = Check { source: &source };
@@ -181,13 +185,29 @@ impl Check<'_> {
 
     fn time(&self, table: &TimeTable) -> Result<TimeGrid, SceneError> {
         let end = self.positive(&table.end, "s")?;
+        let step = match table.step.get_ref() {
+            Formula::Text(text) if text == "auto" => {
+                let in_range = "between 0 and 1, both excluded";
+                let given = |n| self.number(n, in_range, |v| 0.0 < v && v < 1.0);
+                let tolerance = table.tolerance.as_ref().map_or(Ok(STEP_TOLERANCE), given)?;
+                return Ok(TimeGrid { end, stepping: Stepping::Auto { tolerance } });
+            }
+            Formula::Text(text) => {
+                let problem = format!("must be a number (s) or \"auto\", but is \"{text}\"");
+                return Err(self.invalid(&table.step.span(), problem));
+            }
+            Formula::Number(step) => Spanned::new(table.step.span(), *step),
+        };
+        if let Some(tolerance) = &table.tolerance {
+            return Err(self.invalid(&tolerance.span(), "has no effect unless step = \"auto\""));
+        }
         let rule = format!("positive and at most the end, {end} s");
-        let step = self.number(&table.step, &rule, |v| 0.0 < v && v <= end)?;
+        let step = self.number(&step, &rule, |v| 0.0 < v && v <= end)?;
         if end / step > MOST_STEPS {
             let problem = format!("is {step}: more than {MOST_STEPS:e} steps to {end} s");
             return Err(self.invalid(&table.step.span(), problem));
         }
-        Ok(TimeGrid::new(end, step))
+        Ok(TimeGrid::uniform(end, step))
     }
 
     fn contact(&self, table: ContactTable) -> Result<ContactOptions, SceneError> {
