@@ -14,6 +14,7 @@ mod tao;
 
 pub use certificate::Kkt;
 pub use constraints::{Bound, ConstraintError, Constraints, FixedRow, GapRow};
+pub use penalty_duality::PenaltyOptions;
 pub use problem::{ContactError, ContactProblem, ContactReport, ContactSolver};
 pub use rigid::{DrivenMotion, RigidMotion, RigidMotions};
 
@@ -36,11 +37,16 @@ pub fn is_solver(name: &str) -> bool {
 
 /// The solver called `name`, the default if there is none of that name. Without bounds
 /// every name means one linear solve.
-pub fn solver<'s>(session: &'s Session, name: &str, bounded: bool) -> Box<dyn ContactSolver + 's> {
+pub fn solver<'s>(
+    session: &'s Session,
+    name: &str,
+    bounded: bool,
+    penalty: PenaltyOptions,
+) -> Box<dyn ContactSolver + 's> {
     let (family, kind) = name.split_once(':').unwrap_or((name, "tron"));
     match family {
         _ if !bounded => Box::new(linear::Linear::new(session)),
-        "penalty-duality" => Box::new(penalty_duality::PenaltyDuality::new(session)),
+        "penalty-duality" => Box::new(penalty_duality::PenaltyDuality::new(session, penalty)),
         "tao" => Box::new(tao::Tao::new(session, kind)),
         _ => Box::new(active_set::ActiveSet::new(session)),
     }

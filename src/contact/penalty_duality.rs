@@ -18,6 +18,7 @@ use nalgebra::DMatrix;
 /// scenes, 11 to 30 iterations instead of 200 to 600.
 pub(super) struct PenaltyDuality<'s> {
     session: &'s Session,
+    options: PenaltyOptions,
     /// ω, Pa/m, once estimated.
     omega: Option<f64>,
     factor: Option<(usize, LinearSolver)>,
@@ -25,19 +26,35 @@ pub(super) struct PenaltyDuality<'s> {
     q: Vec<f64>,
 }
 
-/// λω. On a compliance eigenvalue s the error of q is multiplied by 1 − s/(λ(1 + ωs)) where all
-/// nodes press and by −λω/(1 − λω) · (1 − s/(λ(1 + ωs))) where none do: at most 1 in size for
-/// every s only if λω is ½.
-const LAMBDA_OMEGA: f64 = 0.5;
 /// ω√(s_min s_max), with s the extreme eigenvalues of the boundary compliance: measured best.
 const OMEGA_COMPLIANCE: f64 = 3.0;
-const ITERATIONS: usize = 20_000;
 /// Steps of the Lanczos process that estimates the compliance.
 const LANCZOS: usize = 25;
 
+/// The method's parameters, `[contact.penalty_duality]` of a scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PenaltyOptions {
+    /// ω > 0, Pa/m; estimated from the boundary compliance when absent.
+    pub omega: Option<f64>,
+    /// λω in (0, 1). On a compliance eigenvalue s the error of q is multiplied by
+    /// 1 − s/(λ(1 + ωs)) where all nodes press and by −λω/(1 − λω) · (1 − s/(λ(1 + ωs))) where
+    /// none do: at most 1 in size for every s only if λω is ½, the default.
+    pub lambda_omega: f64,
+    /// Whether Anderson mixes the iterates.
+    pub accelerate: bool,
+    /// Iterations allowed for one contact problem.
+    pub iterations: usize,
+}
+
+impl Default for PenaltyOptions {
+    fn default() -> Self {
+        Self { omega: None, lambda_omega: 0.5, accelerate: true, iterations: 20_000 }
+    }
+}
+
 impl<'s> PenaltyDuality<'s> {
-    pub(super) fn new(session: &'s Session) -> Self {
-        Self { session, omega: None, factor: None, q: Vec::new() }
+    pub(super) fn new(session: &'s Session, options: PenaltyOptions) -> Self {
+        Self { session, options, omega: options.omega, factor: None, q: Vec::new() }
     }
 
     /// Factorises K + ω BᵀWB.
@@ -177,14 +194,14 @@ impl ContactSolver for PenaltyDuality<'_> {
             self.factorise(problem, omega)?;
             report.factorisations += 1;
         }
-        let lambda = LAMBDA_OMEGA / omega;
+        let lambda = self.options.lambda_omega / omega;
         let mut q = std::mem::take(&mut self.q);
         q.resize(problem.bounds.len(), 0.0);
         let mut rhs = Vector::zeros(self.session, c.owned())?;
 
-        let mut residuals = Kkt::default();
+        let (mut residuals, mut first_change) = (Kkt::default(), 0.0);
         let mut anderson = Anderson::new(problem.bounds.iter().map(|b| b.weight));
-        while report.iterations < ITERATIONS {
+        while report.iterations < self.options.iterations {
             report.linear_iterations += self.response(problem, true, &q, &mut rhs, c)?;
             report.iterations += 1;
             let normal: Vec<f64> = c.read(|c| problem.bounds.iter().map(|b| c[b.dof]).collect())?;
@@ -196,11 +213,18 @@ impl ContactSolver for PenaltyDuality<'_> {
             }
             let image = |(q, (u, bound)): (&f64, (&f64, &Bound))| {
                 let r = u + lambda * q;
-                let y = bound.gap.min(r / (1.0 - LAMBDA_OMEGA));
+                let y = bound.gap.min(r / (1.0 - self.options.lambda_omega));
                 (r - y) / lambda
             };
             let images = q.iter().zip(normal.iter().zip(problem.bounds)).map(image).collect();
-            q = anderson.next(&q, images);
+            let images: Vec<f64> = images;
+            let change = (images.iter().zip(&q)).fold(0.0_f64, |m, (t, q)| m.max((t - q).abs()));
+            first_change = if report.iterations == 1 { change } else { first_change };
+            if report.iterations > 1 && change > 0.0 {
+                let steps = (report.iterations - 1) as f64;
+                report.contraction = Some((change / first_change).powf(1.0 / steps));
+            }
+            q = if self.options.accelerate { anderson.next(&q, images) } else { images };
         }
         Err(ContactError::NotConverged {
             method: self.name(),

@@ -90,7 +90,7 @@ pub trait ContactSolver {
 }
 
 /// What a contact solve took.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ContactReport {
     /// Iterations of the method itself.
     pub iterations: usize,
@@ -100,6 +100,9 @@ pub struct ContactReport {
     pub factorisations: usize,
     /// Times the method had to leave its fast path for a slower one that always ends.
     pub fallbacks: usize,
+    /// Mean factor by which an iteration shrank the change of the multiplier, where the method
+    /// is a fixed-point iteration.
+    pub contraction: Option<f64>,
 }
 
 /// A contact solve that did not end well.

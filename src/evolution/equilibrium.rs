@@ -45,7 +45,12 @@ impl<'a> Equilibrium<'a> {
         Ok(Self {
             setting,
             phases,
-            solver: contact::solver(session, solver, !constraints.bounds.is_empty()),
+            solver: contact::solver(
+                session,
+                solver,
+                !constraints.bounds.is_empty(),
+                setting.scene().contact.penalty_duality,
+            ),
             stiffness,
             zeta_mean: vec![1.0; body.triangles.len()],
             revision: 0,
@@ -91,6 +96,7 @@ impl<'a> Equilibrium<'a> {
             total.linear_iterations += report.linear_iterations;
             total.factorisations += report.factorisations;
             total.fallbacks += report.fallbacks;
+            total.contraction = report.contraction;
             let u = self.displacement(&lift)?;
             let (kkt, contact) = phases.time("certificate", || self.certify(&u, &external));
             if kkt.within(setting.tolerance) {
@@ -238,6 +244,7 @@ fn figures(
         linear_iterations: report.linear_iterations,
         factorisations: report.factorisations,
         fallbacks: report.fallbacks,
+        contraction: report.contraction,
         kkt_stationarity: kkt.stationarity,
         kkt_primal: kkt.primal,
         kkt_dual: kkt.dual,

@@ -69,6 +69,8 @@ pub struct StepRecord {
     pub factorisations: usize,
     /// Times it left its fast path.
     pub fallbacks: usize,
+    /// Contraction per iteration of a fixed-point method; empty for others.
+    pub contraction: Option<f64>,
     /// Relative KKT residuals.
     pub kkt_stationarity: f64,
     /// See [`Kkt`].

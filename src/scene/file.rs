@@ -84,6 +84,17 @@ pub(super) struct BodyTable {
 pub(super) struct ContactTable {
     pub(super) solver: Option<String>,
     pub(super) tolerance: Option<Number>,
+    #[serde(default)]
+    pub(super) penalty_duality: PenaltyTable,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct PenaltyTable {
+    pub(super) omega: Option<Number>,
+    pub(super) lambda_omega: Option<Number>,
+    pub(super) accelerate: Option<bool>,
+    pub(super) iterations: Option<Spanned<usize>>,
 }
 
 #[derive(Deserialize, Default)]

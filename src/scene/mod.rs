@@ -18,7 +18,10 @@ use std::path::{Path, PathBuf};
 pub use error::{ExpressionError, Names, Place, SceneError};
 pub use expression::Expression;
 
-use crate::model::{DamageLaw, Material};
+use crate::{
+    contact::PenaltyOptions,
+    model::{DamageLaw, Material},
+};
 use source::Source;
 
 /// A problem to solve, as described by a scene file.
@@ -119,6 +122,8 @@ pub struct ContactOptions {
     pub solver: Option<String>,
     /// Relative tolerance of the KKT residuals, in (0, 1).
     pub tolerance: f64,
+    /// Parameters of the penalty-duality method.
+    pub penalty_duality: PenaltyOptions,
 }
 
 /// What is written while the scene runs.

@@ -15,7 +15,10 @@ use super::source::Source;
 use super::{
     ContactOptions, Damage, MeshSource, OutputOptions, Scene, Stepping, TimeGrid, may_start_at,
 };
-use crate::model::{DamageLaw, Material};
+use crate::{
+    contact::PenaltyOptions,
+    model::{DamageLaw, Material},
+};
 
 /// More steps than this are a slip of the pen.
 const MOST_STEPS: f64 = 1e9;
@@ -212,9 +215,18 @@ impl Check<'_> {
 
     fn contact(&self, table: ContactTable) -> Result<ContactOptions, SceneError> {
         let in_range = |n| self.number(n, "between 0 and 1, both excluded", |v| 0.0 < v && v < 1.0);
+        let (given, default) = (table.penalty_duality, PenaltyOptions::default());
+        let lambda_omega = given.lambda_omega.as_ref().map(in_range).transpose()?;
+        let penalty_duality = PenaltyOptions {
+            omega: given.omega.as_ref().map(|n| self.positive(n, "Pa/m")).transpose()?,
+            lambda_omega: lambda_omega.unwrap_or(default.lambda_omega),
+            accelerate: given.accelerate.unwrap_or(default.accelerate),
+            iterations: given.iterations.map_or(default.iterations, Spanned::into_inner),
+        };
         Ok(ContactOptions {
             solver: table.solver,
             tolerance: table.tolerance.as_ref().map_or(Ok(1e-10), in_range)?,
+            penalty_duality,
         })
     }
 }
