@@ -14,3 +14,4 @@ pub mod contact;
 pub mod scene;
 pub mod evolution;
 pub mod output;
+pub mod study;

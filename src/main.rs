@@ -24,6 +24,10 @@ struct Arguments {
 enum Command {
     /// Solve a scene; results go to out/<scene>/.
     Run(command::RunArguments),
+    /// Run scenes with every contact solver and compare cost and answers.
+    Compare(command::CompareArguments),
+    /// Make the maps of where methods fail.
+    Stability(command::StabilityArguments),
     /// Mesh the .geo files of scenes with gmsh, where their .msh is missing or older.
     Mesh {
         /// Scene files.
@@ -35,6 +39,8 @@ enum Command {
 fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Run(arguments) => command::run(&arguments),
+        Command::Compare(arguments) => command::compare_scenes(&arguments),
+        Command::Stability(arguments) => command::stability(&arguments),
         Command::Mesh { scenes } => command::mesh(&scenes),
     };
     match result {

@@ -191,7 +191,7 @@ def main():
     parser = argparse.ArgumentParser(description="Compare signorini with FEniCSx.")
     parser.add_argument("scenes", nargs="+", type=Path, metavar="SCENE")
     parser.add_argument("--binary", type=Path, default=Path("target/release/signorini"))
-    parser.add_argument("--solvers", nargs="+", default=["tao", "penalty-duality"],
+    parser.add_argument("--solvers", nargs="+", default=["active-set", "penalty-duality", "tao"],
                         help="contact solvers; the first also runs the damage case")
     parser.add_argument("--steps", type=int, default=10, help="time steps of the damage case")
     arguments = parser.parse_args()

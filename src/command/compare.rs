@@ -1,6 +1,6 @@
 //! `signorini compare`: all contact solvers on the same scenes.
 
-use super::Failure;
+use super::{Failure, screen::say};
 use clap::Args;
 use comfy_table::{CellAlignment, Table, presets};
 use signorini::{
@@ -11,7 +11,7 @@ use signorini::{
     scene::Scene,
     study::{Entry, compare},
 };
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Arguments of `signorini compare`.
 #[derive(Args)]
@@ -59,10 +59,10 @@ pub fn compare_scenes(arguments: &CompareArguments) -> Result<(), Failure> {
         entries.extend(comparison.entries);
     }
     session.finalize().map_err(Failure::solver)?;
-    println!("{}", table(&entries));
+    say(&table(&entries).to_string());
     let path = arguments.out.join("comparison.csv");
     output::write_table(&path, &entries).map_err(Failure::solver)?;
-    println!("written to {}", Path::new(&path).display());
+    say(&format!("written to {}", path.display()));
     let failed: Vec<_> = entries.iter().filter_map(|e| e.error.as_deref()).collect();
     match failed.is_empty() {
         true => Ok(()),
@@ -74,8 +74,18 @@ fn table(entries: &[Entry]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN);
     table.set_header([
-        "scene", "solver", "steps", "its", "factors", "solve pairs", "fallbacks", "seconds",
-        "worst KKT", "Δu", "Δζ", "Δp",
+        "scene",
+        "solver",
+        "steps",
+        "its",
+        "factors",
+        "solve pairs",
+        "fallbacks",
+        "seconds",
+        "worst KKT",
+        "Δu",
+        "Δζ",
+        "Δp",
     ]);
     for e in entries {
         let small = |v: f64| format!("{v:.1e}");

@@ -1,9 +1,13 @@
 //! What the subcommands do.
 
+mod compare;
 mod run;
 mod screen;
+mod stability;
 
+pub use compare::{CompareArguments, compare_scenes};
 pub use run::{RunArguments, run};
+pub use stability::{StabilityArguments, stability};
 
 use signorini::{mesh, scene::Scene};
 use std::{fmt, path::PathBuf};
@@ -40,7 +44,8 @@ pub fn mesh(scenes: &[PathBuf]) -> Result<(), Failure> {
     for path in scenes {
         let scene = Scene::read(path, &[]).map_err(Failure::input)?;
         let mesh = mesh::load(&scene.mesh.file, &scene.mesh.parameters).map_err(Failure::input)?;
-        println!("{}: {} nodes, {} triangles", scene.name, mesh.nodes.len(), mesh.triangles.len());
+        let (nodes, triangles) = (mesh.nodes.len(), mesh.triangles.len());
+        screen::say(&format!("{}: {nodes} nodes, {triangles} triangles", scene.name));
     }
     Ok(())
 }

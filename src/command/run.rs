@@ -38,10 +38,31 @@ pub struct RunArguments {
     petsc: Vec<String>,
 }
 
+impl RunArguments {
+    /// Refuses what would silently have no effect.
+    fn check(&self) -> Result<(), Failure> {
+        let meshes = |set: &&String| set.trim_start().starts_with("mesh.");
+        if let (Some(file), Some(set)) = (&self.mesh, self.set.iter().find(meshes)) {
+            return Err(Failure::Input(format!(
+                "--set {set} has no effect beside --mesh {0}, which replaces the scene's [mesh]; \
+                 write --set mesh.file={0} instead (relative to the scene)",
+                file.display()
+            )));
+        }
+        match self.petsc.first() {
+            Some(word) if !word.starts_with('-') => Err(Failure::Input(format!(
+                "PETSc options begin with a dash, but the first is `{word}`"
+            ))),
+            _ => Ok(()),
+        }
+    }
+}
+
 /// Runs a scene.
 pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let started = Instant::now();
     let phases = Phases::default();
+    arguments.check()?;
     let mut scene = Scene::read(&arguments.scene, &arguments.set).map_err(Failure::input)?;
     if let Some(file) = &arguments.mesh {
         scene.mesh = MeshSource::from_path(file);
@@ -53,7 +74,6 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         .time("mesh", || mesh::load(&scene.mesh.file, &scene.mesh.parameters))
         .map_err(Failure::input)?;
     let setting = phases.time("setting", || Setting::new(scene, mesh)).map_err(Failure::input)?;
-    output::prepare(&folder).map_err(Failure::input)?;
     let session =
         phases.time("petsc start", || Session::start(&arguments.petsc)).map_err(Failure::solver)?;
     if session.ranks() > 1 {
@@ -62,7 +82,8 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
             session.ranks()
         )));
     }
-
+    // Now that all input is good: the results of an earlier run go.
+    output::prepare(&folder).map_err(Failure::input)?;
     let mut recorder = Recorder::new(&folder, &setting, &phases).map_err(Failure::input)?;
     let result =
         evolution::run(&session, &setting, &solver, &phases, &mut |step| recorder.accept(step));

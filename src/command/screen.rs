@@ -1,12 +1,16 @@
 //! What a run shows: a progress bar, the result in a few lines, a table of phases.
 
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::{CellAlignment, LineStyle, Table, presets};
 use indicatif::{ProgressBar, ProgressStyle};
 use signorini::{
     evolution::{Outcome, Setting, StepRecord},
     output::Summary,
 };
-use std::{collections::BTreeMap, path::Path};
+use std::{
+    collections::BTreeMap,
+    io::{self, Write},
+    path::Path,
+};
 
 /// The terminal of a run; the bar is silent when standard error is no terminal.
 pub struct Screen {
@@ -21,7 +25,7 @@ impl Screen {
     pub fn new(setting: &Setting) -> Self {
         let end = setting.scene().time.map_or(1.0, |grid| grid.end);
         let bar = ProgressBar::new(LENGTH);
-        let template = "{bar:30} {msg}  {elapsed} (about {eta} left)";
+        let template = "{bar:20} {wide_msg} {elapsed}, {eta} left";
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
@@ -46,38 +50,76 @@ impl Screen {
         folder: &Path,
     ) {
         self.bar.finish_and_clear();
-        let s = summary;
-        println!("{} ({}, {} nodes, {} triangles)", s.title, s.solver, s.nodes, s.triangles);
-        println!("  {}", ending(s, outcome));
-        println!(
-            "  min ζ {:.6}, mean ζ {:.6}, max |u| {:.6e} m, work {:.6e} J/m",
-            s.zeta_min, s.zeta_mean, s.displacement_max, s.work
-        );
-        if s.contact_nodes > 0 {
-            println!(
-                "  contact: {} of {} nodes active, force {:.6e} N/m",
-                s.active_nodes, s.contact_nodes, s.contact_force
-            );
-        }
-        println!("  worst KKT residuals: {}", s.kkt);
-        for note in &s.notes {
-            println!("  note: {note}");
-        }
-        println!("{}", phase_table(phases, s.wall_seconds));
-        println!("  results in {}", folder.display());
+        say(&report(summary, outcome, phases, folder));
     }
+}
+
+/// Prints to standard output; a reader that has gone (`… | head`) is no reason to panic.
+pub fn say(text: &str) {
+    let _ = writeln!(io::stdout(), "{text}");
+}
+
+fn report(
+    s: &Summary,
+    outcome: Option<&Outcome>,
+    phases: &BTreeMap<&'static str, (usize, f64)>,
+    folder: &Path,
+) -> String {
+    let mut lines = vec![
+        s.title.clone(),
+        row("mesh", format!("{} nodes, {} triangles", s.nodes, s.triangles)),
+        row("solver", s.solver.clone()),
+        row("end", ending(s, outcome)),
+        match s.zeta_min {
+            1.0 => row("damage", "none".to_owned()),
+            least => row("damage", format!("min ζ {least:.6}, mean ζ {:.6}", s.zeta_mean)),
+        },
+        row("displacement", format!("largest {:.6e} m", s.displacement_max)),
+        row("work", format!("{:.6e} J/m", s.work)),
+    ];
+    if s.contact_nodes > 0 {
+        lines.push(row(
+            "contact",
+            format!(
+                "{} of {} nodes active, force {:.6e} N/m",
+                s.active_nodes, s.contact_nodes, s.contact_force
+            ),
+        ));
+    }
+    lines.push(row("residuals", format!("{}", s.kkt)));
+    lines.extend(s.notes.iter().map(|note| row("note", note.clone())));
+    lines.push(row("results", folder.display().to_string()));
+    // The table pads its last column too.
+    let table = phase_table(phases, s.wall_seconds).to_string();
+    lines.push(String::new());
+    lines.extend(table.lines().map(|line| format!(" {}", line.trim_end())));
+    lines.join("\n")
+}
+
+fn row(name: &str, value: String) -> String {
+    format!("  {name:<13} {value}")
 }
 
 fn ending(s: &Summary, outcome: Option<&Outcome>) -> String {
     match outcome.map(|o| o.stopped) {
-        None => format!("FAILED after t = {}; the state there is saved", s.end_time),
+        None => format!("FAILED after t = {}; the state there is saved", time(s.end_time)),
         Some(Some(stop)) => format!(
-            "STOPPED at ζ_* at t = {:.6} ± {:.1e} (min ζ would be {:.4}); \
-             last admissible state t = {:.6} (step {})",
-            stop.time, stop.uncertainty, stop.zeta_min, s.end_time, s.steps
+            "STOPPED at t = {} ± {:.1e}: min ζ = {:.4} there reaches ζ_*; \
+             saved is the state before, t = {} (step {})",
+            time(stop.time),
+            stop.uncertainty,
+            stop.zeta_min,
+            time(s.end_time),
+            s.steps
         ),
-        Some(None) => format!("finished at t = {} after {} steps", s.end_time, s.steps),
+        Some(None) if s.steps == 0 => format!("solved at t = {}", time(s.end_time)),
+        Some(None) => format!("finished at t = {} after {} steps", time(s.end_time), s.steps),
     }
+}
+
+/// A time without the rounding of its last digits: 0.0248, not 0.024800000000000003.
+fn time(t: f64) -> f64 {
+    format!("{t:.9e}").parse().unwrap_or(t)
 }
 
 fn phase_table(phases: &BTreeMap<&'static str, (usize, f64)>, wall: f64) -> Table {
@@ -85,7 +127,8 @@ fn phase_table(phases: &BTreeMap<&'static str, (usize, f64)>, wall: f64) -> Tabl
     rows.sort_by(|a, b| b.2.total_cmp(&a.2));
     let rest = wall - rows.iter().map(|(_, _, s)| s).sum::<f64>();
     let mut table = Table::new();
-    table.load_style(presets::NOTHING);
+    let rule = LineStyle::none().fill('─').junction('─');
+    table.load_style(presets::NOTHING.header_separator(rule));
     table.set_header(["phase", "calls", "seconds", "share"]);
     let share = |s: f64| format!("{:.1} %", 100.0 * s / wall);
     for (name, calls, s) in rows {

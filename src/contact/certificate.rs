@@ -62,6 +62,16 @@ impl Kkt {
         self.named().iter().all(|(_, value)| *value <= tolerance)
     }
 
+    /// Which residuals miss `tolerance`, and by what factor.
+    pub fn missed(&self, tolerance: f64) -> String {
+        let missed =
+            self.named().into_iter().filter(|(_, value)| value.is_nan() || *value > tolerance);
+        let told =
+            |(name, value)| format!("{name} {value:.1e} ({:.1e} times it)", value / tolerance);
+        let missed: Vec<String> = missed.map(told).collect();
+        format!("the tolerance {tolerance:.1e} is missed by {}", missed.join(", "))
+    }
+
     /// The larger of each residual of two answers.
     pub fn max(&self, other: &Self) -> Self {
         Self {

@@ -229,7 +229,7 @@ impl ContactSolver for PenaltyDuality<'_> {
         Err(ContactError::NotConverged {
             method: self.name(),
             iterations: report.iterations,
-            detail: format!("{residuals}, ω = {omega:.3e} Pa/m"),
+            detail: format!("{} (ω = {omega:.3e} Pa/m)", residuals.missed(0.1 * problem.tolerance)),
         })
     }
 }

@@ -119,7 +119,7 @@ pub enum ContactError {
         detail: String,
     },
     /// The answer does not satisfy the KKT conditions.
-    #[error("{method}: the answer misses the KKT tolerance {tolerance:.1e}: {residuals}")]
+    #[error("{method} gave an answer, but {}", residuals.missed(*tolerance))]
     NotCertified {
         /// The solver's name.
         method: &'static str,

@@ -102,7 +102,10 @@ impl ContactSolver for Tao<'_> {
         Err(ContactError::NotConverged {
             method: self.name(),
             iterations: report.iterations,
-            detail: format!("{residuals} (TaoConvergedReason {reason}) after {CALLS} calls"),
+            detail: format!(
+                "{} (TaoConvergedReason {reason}, {CALLS} calls)",
+                residuals.missed(problem.tolerance)
+            ),
         })
     }
 }

@@ -238,7 +238,8 @@ fn figures(
         zeta_mean: setting.body.mean(&state.zeta),
         displacement_max: largest(&state.u),
         work: setting.body.partition.dot(external, &state.u, 2),
-        contact_force: state.contact.iter().map(|point| point.force).sum(),
+        // An empty sum is -0.0, and so is one of reactions of nothing.
+        contact_force: state.contact.iter().map(|point| point.force).sum::<f64>() + 0.0,
         active_nodes: active.len(),
         iterations: report.iterations,
         linear_iterations: report.linear_iterations,

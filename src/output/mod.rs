@@ -27,14 +27,23 @@ impl OutputError {
     }
 }
 
+/// Creates `folder`.
+///
+/// # Errors
+/// The folder cannot be created or written to.
+pub fn create(folder: &Path) -> Result<(), OutputError> {
+    std::fs::create_dir_all(folder).map_err(|e| OutputError::new(folder, e))?;
+    // Whether it can be written to shows only by writing.
+    tempfile::tempfile_in(folder).map_err(|e| OutputError::new(folder, e))?;
+    Ok(())
+}
+
 /// Creates `folder` and removes the results of an earlier run, so that none are mistaken for new.
 ///
 /// # Errors
 /// The folder cannot be created or written to.
 pub fn prepare(folder: &Path) -> Result<(), OutputError> {
-    std::fs::create_dir_all(folder).map_err(|e| OutputError::new(folder, e))?;
-    // Whether it can be written to shows only by writing.
-    tempfile::tempfile_in(folder).map_err(|e| OutputError::new(folder, e))?;
+    create(folder)?;
     let entries = std::fs::read_dir(folder).map_err(|e| OutputError::new(folder, e))?;
     for path in entries.flatten().map(|entry| entry.path()) {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -45,6 +54,19 @@ pub fn prepare(folder: &Path) -> Result<(), OutputError> {
         }
     }
     Ok(())
+}
+
+/// Writes a CSV file with a row per element, whole or not at all.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_table<T: serde::Serialize>(path: &Path, rows: &[T]) -> Result<(), OutputError> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        writer.serialize(row).map_err(|e| OutputError::new(path, e))?;
+    }
+    let content = writer.into_inner().map_err(|e| OutputError::new(path, e))?;
+    write_whole(path, &content)
 }
 
 /// Writes a file whole or not at all: a temporary neighbour is renamed when complete.

@@ -1,0 +1,69 @@
+# On Debian 12 every target first installs what it lacks; that is silent and quick when
+# nothing is lacking.
+
+PYTHON ?= /usr/bin/python3
+# Which scenes to run, with which contact solver and other arguments of `signorini run`.
+SCENE ?= $(sort $(wildcard geo/*.toml))
+SOLVER ?=
+ARGS ?=
+
+# petsc-dev brings MPI and a C compiler, libclang-dev the headers that bindgen reads.
+PACKAGES := petsc-dev libopenblas0-serial libclang-dev pkg-config gcc gmsh \
+    python3-meshio python3-matplotlib
+PACKAGES_VALIDATE := python3-dolfinx-real
+
+BINARY := target/release/signorini
+# rustup puts cargo where a shell opened before does not look.
+export PATH := $(PATH):$(HOME)/.cargo/bin
+
+.PHONY: help deps deps-validate build mesh run figures test validate clean
+
+help:
+	@echo 'make mesh && make run   mesh and solve the scenes of geo/, draw their figures into out/'
+	@echo
+	@echo 'make deps       install the Debian packages that are missing'
+	@echo 'make build      $(BINARY)'
+	@echo 'make mesh       the .msh of every scene'
+	@echo 'make run        every scene; or SCENE="geo/a.toml …" SOLVER=name ARGS="--set time.step=0.005"'
+	@echo 'make figures    the figures of every run in out/, again'
+	@echo 'make test       format, lints, documentation, tests'
+	@echo 'make validate   the comparison with FEniCSx (installs it: make deps-validate)'
+	@echo 'make clean      remove the build, the results and the meshes'
+
+deps:
+	@scripts/deps.sh $(PACKAGES)
+
+deps-validate: deps
+	@scripts/deps.sh $(PACKAGES_VALIDATE)
+
+build: deps
+	cargo build --release --locked
+
+mesh: build
+	$(BINARY) mesh $(SCENE)
+
+# A run that stops at ζ_* has finished; one that fails ends the loop with its exit code.
+run: build
+	@set -e; for scene in $(SCENE); do \
+	    $(BINARY) run $$scene $(if $(SOLVER),--solver $(SOLVER)) $(ARGS); \
+	    $(PYTHON) scripts/figures.py out/$$(basename $$scene .toml); \
+	    echo; \
+	done
+
+figures: deps
+	$(PYTHON) scripts/figures.py $(patsubst %/summary.json,%,$(wildcard out/*/summary.json))
+
+test: deps
+	cargo fmt --check
+	cargo clippy --locked --all-targets -- -D warnings
+	RUSTDOCFLAGS='-D warnings' cargo doc --locked --no-deps
+	cargo test --locked
+	$(PYTHON) -m compileall -q scripts validation
+
+validate: build deps-validate
+	$(PYTHON) validation/selfcheck.py
+	$(PYTHON) validation/compare.py --binary $(BINARY) $(addprefix geo/, \
+	    square-mild.toml lshape.toml bridge-half.toml hertz.toml)
+
+clean:
+	rm -rf target out geo/*.msh scripts/__pycache__ validation/__pycache__

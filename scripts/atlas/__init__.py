@@ -1,0 +1,1 @@
+"""The figures of the atlas of failure, one module per map."""

@@ -1,0 +1,96 @@
+//! The atlas of failure: sweeps into the places where methods break.
+//!
+//! A map is a table; each of its cells is *correct*, *refused* with a reason, or *wrong*.
+//! The page `validation/STABILITY.md` tells what the maps show.
+
+mod step_size;
+mod maximum_principle;
+mod penalty;
+mod tao_types;
+mod random_contact;
+mod conditioning;
+mod lost_contact;
+
+use crate::{
+    evolution::{RunError, SetupError},
+    mesh::MeshError,
+    output::OutputError,
+    petsc::{PetscError, Session},
+    scene::SceneError,
+};
+use serde::Serialize;
+use std::path::Path;
+
+/// Makes one map: writes `<name>.csv` into the folder.
+pub type Map = fn(&Session, &Path) -> Result<Counts, StudyError>;
+
+/// The maps by name.
+pub const MAPS: [(&str, Map); 7] = [
+    ("step-size", step_size::run),
+    ("maximum-principle", maximum_principle::run),
+    ("penalty-duality", penalty::run),
+    ("tao-types", tao_types::run),
+    ("active-set", random_contact::run),
+    ("conditioning", conditioning::run),
+    ("lost-contact", lost_contact::run),
+];
+
+/// What a cell of a map turned out to be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// The answer is right to the accuracy promised.
+    Correct,
+    /// The program gave no answer and said why.
+    Refused,
+    /// The program gave a wrong answer without saying so.
+    Wrong,
+}
+
+/// How many cells of a map were of which kind.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Right answers.
+    pub correct: usize,
+    /// Refusals with a reason.
+    pub refused: usize,
+    /// Wrong answers that the program did not report.
+    pub wrong: usize,
+}
+
+impl FromIterator<Verdict> for Counts {
+    fn from_iter<I: IntoIterator<Item = Verdict>>(verdicts: I) -> Self {
+        let mut counts = Self::default();
+        for verdict in verdicts {
+            match verdict {
+                Verdict::Correct => counts.correct += 1,
+                Verdict::Refused => counts.refused += 1,
+                Verdict::Wrong => counts.wrong += 1,
+            }
+        }
+        counts
+    }
+}
+
+/// A study could not be carried out.
+#[derive(Debug, thiserror::Error)]
+pub enum StudyError {
+    /// A scene of the study is wrong.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A mesh of the study is wrong.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// A scene of the study does not fit its mesh.
+    #[error(transparent)]
+    Setup(#[from] SetupError),
+    /// A run ended in a way the study does not expect.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// PETSc failed.
+    #[error(transparent)]
+    Petsc(#[from] PetscError),
+    /// The table could not be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}

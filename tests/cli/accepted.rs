@@ -1,0 +1,241 @@
+//! Runs that go well: exit code 0, what is said, and the files.
+
+use crate::desk::{Desk, square};
+use serde_json::Value;
+use std::process::Stdio;
+
+const KEYS: [&str; 21] = [
+    "scene",
+    "title",
+    "solver",
+    "nodes",
+    "triangles",
+    "steps",
+    "end_time",
+    "stopped_at",
+    "zeta_min",
+    "zeta_mean",
+    "displacement_max",
+    "work",
+    "contact_force",
+    "active_nodes",
+    "contact_nodes",
+    "kkt",
+    "wall_seconds",
+    "seconds_per_step",
+    "phases",
+    "foundation",
+    "notes",
+];
+const COLUMNS: [&str; 17] = [
+    "step",
+    "time",
+    "zeta_min",
+    "zeta_mean",
+    "displacement_max",
+    "work",
+    "contact_force",
+    "active_nodes",
+    "iterations",
+    "linear_iterations",
+    "factorisations",
+    "fallbacks",
+    "kkt_stationarity",
+    "kkt_primal",
+    "kkt_dual",
+    "kkt_complementarity",
+    "seconds",
+];
+
+fn keys(value: &Value) -> Vec<&str> {
+    let mut keys: Vec<&str> = value.as_object().expect("an object").keys().map(|k| &**k).collect();
+    keys.sort_unstable();
+    keys
+}
+
+fn sorted<const N: usize>(mut names: [&str; N]) -> [&str; N] {
+    names.sort_unstable();
+    names
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().expect("a number")
+}
+
+#[test]
+fn summary() {
+    let desk = Desk::new();
+    let said = desk.run(&[]);
+    assert_eq!(said.err, "", "nothing to warn of, and no bar without a terminal");
+    for fragment in ["Pressed square", "finished at t = 1 after 10 steps", "5 of 5 nodes active"] {
+        assert!(said.out.contains(fragment), "{}", said.out);
+    }
+    assert!(said.out.contains("phase") && said.out.contains("results       out/scene"));
+    assert!(said.out.lines().all(|line| line.trim_end() == line), "blanks at line ends");
+
+    let summary = desk.summary("out/scene");
+    assert_eq!(keys(&summary), sorted(KEYS));
+    let kkt = &summary["kkt"];
+    assert_eq!(keys(kkt), sorted(["stationarity", "primal", "dual", "complementarity"]));
+    assert!(kkt.as_object().expect("an object").values().all(|v| number(v) <= 1e-10));
+    assert_eq!(summary["scene"], "scene");
+    assert_eq!(summary["title"], "Pressed square");
+    assert_eq!(summary["solver"], "active-set");
+    assert_eq!((&summary["nodes"], &summary["triangles"]), (&25.into(), &32.into()));
+    assert_eq!((&summary["steps"], &summary["end_time"]), (&10.into(), &1.0.into()));
+    assert_eq!(summary["stopped_at"], Value::Null);
+    assert_eq!((&summary["contact_nodes"], &summary["active_nodes"]), (&5.into(), &5.into()));
+    assert!((number(&summary["contact_force"]) - 3.0).abs() < 1e-8);
+    let (least, mean) = (number(&summary["zeta_min"]), number(&summary["zeta_mean"]));
+    assert!(0.9 < least && least <= mean && mean < 1.0, "{least} {mean}");
+    // u_y = −p y/(ζE) at the top, u_x = νp x/(ζE): ζ is uniform here.
+    let top = 3.0 / 80.0 * 1.0_f64.hypot(0.3) / mean;
+    assert!((number(&summary["displacement_max"]) / top - 1.0).abs() < 1e-6);
+    assert!((number(&summary["work"]) / (9.0 / 80.0 / mean) - 1.0).abs() < 1e-6);
+    let phases = summary["phases"].as_object().expect("an object");
+    let seconds: f64 = phases.values().map(number).sum();
+    let wall = number(&summary["wall_seconds"]);
+    assert!(phases.contains_key("contact") && seconds <= wall);
+    assert!((number(&summary["seconds_per_step"]) * 10.0 / wall - 1.0).abs() < 1e-9);
+    let foundation = summary["foundation"].as_array().expect("segments");
+    assert_eq!(foundation.len(), 4);
+    assert!(foundation.iter().flat_map(|s| s.as_array()).flatten().all(|p| p[1] == 0.0));
+    assert!(summary["notes"].as_array().is_some());
+}
+
+#[test]
+fn history() {
+    let desk = Desk::new();
+    desk.run(&[]);
+    let (names, rows) = desk.history("out/scene");
+    assert_eq!(names, COLUMNS);
+    assert_eq!(rows.len(), 11);
+    let column = |name: &str| names.iter().position(|n| n == name).expect("a column");
+    for (n, row) in rows.iter().enumerate() {
+        assert_eq!(row[0], n as f64);
+        assert!((row[1] - 0.1 * n as f64).abs() < 1e-12);
+        assert!((row[column("contact_force")] - 0.3 * n as f64).abs() < 1e-8);
+    }
+    let summary = desk.summary("out/scene");
+    let last = rows.last().expect("rows");
+    for name in ["zeta_min", "zeta_mean", "displacement_max", "work", "contact_force"] {
+        // serde_json's numbers may be off in the last digit.
+        let (a, b) = (number(&summary[name]), last[column(name)]);
+        assert!((a - b).abs() <= 1e-15 * b.abs(), "{name}: {a} is not {b}");
+    }
+}
+
+#[test]
+fn stopped_at_the_threshold() {
+    let desk = Desk::new();
+    let said = desk.run(&["--set", "damage.lambda_u=1e4"]);
+    assert!(said.out.contains("STOPPED") && said.out.contains("ζ_*"), "{}", said.out);
+    let summary = desk.summary("out/scene");
+    let (stopped, end) = (number(&summary["stopped_at"]), number(&summary["end_time"]));
+    assert!(0.0 < end && end < stopped && stopped < 1.0);
+    assert!((stopped - end - 0.1).abs() < 1e-12, "one step after the state kept");
+    assert!(number(&summary["zeta_min"]) > 0.01, "the state kept is admissible");
+    assert_eq!(keys(&summary), sorted(KEYS), "no error");
+    let (_, rows) = desk.history("out/scene");
+    assert_eq!(rows.len() as u64, summary["steps"].as_u64().expect("a number") + 1);
+    assert_eq!(desk.frames("out/scene").last().expect("frames").0, end);
+}
+
+#[test]
+fn static_and_elastic() {
+    let desk = Desk::new();
+    let scene = desk.read("scene.toml");
+    let (damage, contact) = (scene.find("[damage]"), scene.find("[contact]"));
+    let (damage, contact) = (damage.expect("a table"), contact.expect("a table"));
+    desk.write("scene.toml", &format!("{}{}", &scene[..damage], &scene[contact..]));
+    let said = desk.run(&[]);
+    assert!(said.out.contains("solved at t = 1"), "{}", said.out);
+    let summary = desk.summary("out/scene");
+    assert_eq!((&summary["steps"], &summary["end_time"]), (&0.into(), &1.0.into()));
+    assert!((number(&summary["displacement_max"]) - 3.0 / 80.0 * 1.09_f64.sqrt()).abs() < 1e-12);
+    assert_eq!(desk.frames("out/scene").len(), 1);
+    assert_eq!(desk.history("out/scene").1.len(), 1);
+}
+
+#[test]
+fn options_are_honoured() {
+    let desk = Desk::new();
+    desk.write("other/fine.msh", &square(6));
+    let said = desk.run(&[
+        "--mesh",
+        "other/fine.msh",
+        "--out",
+        "my/results",
+        "--solver",
+        "penalty-duality",
+        "--set",
+        "time.step=0.25",
+        "--set",
+        "boundary.top.traction=[0, '-8*t']",
+    ]);
+    assert!(said.out.contains("results       my/results"), "{}", said.out);
+    assert!(!desk.path("out").exists());
+    let summary = desk.summary("my/results");
+    assert_eq!(summary["nodes"], 49);
+    assert_eq!(summary["solver"], "penalty-duality");
+    assert_eq!(summary["steps"], 4);
+    assert!((number(&summary["contact_force"]) - 8.0).abs() < 1e-6);
+}
+
+/// Pressed on one half of the top and pulled on the other.
+const PARTLY_OPEN: [&str; 4] = [
+    "--set",
+    "boundary.top.traction=[0, '-40 + 50*max(0, min(1, 1e9*(x - 0.5)))']",
+    "--set",
+    "time.end=0.2",
+];
+
+#[test]
+fn solvers_and_petsc_options_agree() {
+    let desk = Desk::new();
+    desk.write("square.msh", &square(8));
+    let mut answers = Vec::new();
+    for arguments in [
+        &["--solver", "active-set"][..],
+        &["--solver", "penalty-duality"],
+        &["--solver", "tao"],
+        &["--solver", "tao", "--", "-tao_type", "bnls"],
+    ] {
+        let said = desk.run(&[&PARTLY_OPEN[..], arguments].concat());
+        assert_eq!(said.err, "", "{arguments:?}");
+        let summary = desk.summary("out/scene");
+        let active = number(&summary["active_nodes"]);
+        assert!(0.0 < active && active < number(&summary["contact_nodes"]), "{active}");
+        answers.push([
+            number(&summary["displacement_max"]),
+            number(&summary["work"]),
+            number(&summary["zeta_min"]),
+            active,
+        ]);
+    }
+    for answer in &answers {
+        for (a, b) in answer.iter().zip(&answers[0]) {
+            assert!((a / b - 1.0).abs() < 1e-7, "{answers:?}");
+        }
+    }
+}
+
+#[test]
+fn a_reader_that_leaves_early_is_no_error() {
+    let desk = Desk::new();
+    let mut command = desk.command(&["run", "scene.toml"]);
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("started");
+    drop(child.stdout.take());
+    let output = child.wait_with_output().expect("an end");
+    assert_eq!(String::from_utf8_lossy(&output.stderr), "");
+    assert_eq!(output.status.code(), Some(0));
+}
+
+#[test]
+fn unused_petsc_options_are_told() {
+    let desk = Desk::new();
+    let said = desk.run(&["--", "-tao_monitr", "-no_such_thing", "3"]);
+    assert!(said.err.starts_with("warning: PETSc options that nothing read: "), "{}", said.err);
+    assert!(said.err.contains("-tao_monitr") && said.err.contains("-no_such_thing"));
+    assert_eq!(said.err.lines().count(), 1);
+}

@@ -1,0 +1,185 @@
+//! A folder with a scene and a mesh, and the program run in it.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+};
+use tempfile::TempDir;
+
+/// A square pressed on its foundation: a scene that takes ten quick steps.
+pub const SCENE: &str = include_str!("scene.toml");
+
+/// A temporary folder that holds `scene.toml` and `square.msh`.
+pub struct Desk(TempDir);
+
+/// What the program said, and its exit code.
+#[derive(Debug)]
+pub struct Said {
+    pub code: Option<i32>,
+    pub out: String,
+    pub err: String,
+}
+
+impl Desk {
+    pub fn new() -> Self {
+        let desk = Self(tempfile::tempdir().expect("a temporary folder"));
+        desk.write("scene.toml", SCENE);
+        desk.write("square.msh", &square(4));
+        desk
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    pub fn write(&self, name: &str, content: &str) {
+        let path = self.path(name);
+        fs::create_dir_all(path.parent().expect("a folder")).expect("the desk is writable");
+        fs::write(path, content).expect("the desk is writable");
+    }
+
+    pub fn read(&self, name: &str) -> String {
+        fs::read_to_string(self.path(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+    }
+
+    pub fn summary(&self, folder: &str) -> serde_json::Value {
+        serde_json::from_str(&self.read(&format!("{folder}/summary.json"))).expect("JSON")
+    }
+
+    /// `history.csv`: column names, and the rows as numbers.
+    pub fn history(&self, folder: &str) -> (Vec<String>, Vec<Vec<f64>>) {
+        let text = self.read(&format!("{folder}/history.csv"));
+        let mut reader = csv::Reader::from_reader(text.as_bytes());
+        let names = reader.headers().expect("a header").iter().map(str::to_owned).collect();
+        let rows = reader.deserialize().map(|row| row.expect("numbers")).collect();
+        (names, rows)
+    }
+
+    /// Times and files in `fields.pvd`.
+    pub fn frames(&self, folder: &str) -> Vec<(f64, String)> {
+        let text = self.read(&format!("{folder}/fields.pvd"));
+        let attribute = |line: &str, name: &str| {
+            let rest = line.split(&format!("{name}=\"")).nth(1).expect("the attribute");
+            rest.split('"').next().expect("its end").to_owned()
+        };
+        let sets = text.lines().filter(|line| line.contains("<DataSet"));
+        sets.map(|l| (attribute(l, "timestep").parse().expect("a time"), attribute(l, "file")))
+            .collect()
+    }
+
+    /// The names of the files in a folder, sorted.
+    pub fn names(&self, folder: &str) -> Vec<String> {
+        let entries = fs::read_dir(self.path(folder)).expect("the folder is there");
+        let mut names: Vec<String> =
+            entries.flatten().map(|e| e.file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+
+    /// All files below the desk with their content.
+    pub fn everything(&self) -> BTreeMap<PathBuf, Vec<u8>> {
+        fn add(folder: &Path, all: &mut BTreeMap<PathBuf, Vec<u8>>) {
+            for path in fs::read_dir(folder).expect("readable").flatten().map(|e| e.path()) {
+                if path.is_dir() {
+                    add(&path, all);
+                    all.insert(path, Vec::new());
+                } else {
+                    let content = fs::read(&path).expect("readable");
+                    all.insert(path, content);
+                }
+            }
+        }
+        let mut all = BTreeMap::new();
+        add(self.0.path(), &mut all);
+        all
+    }
+
+    /// The program with these arguments; no terminal, English messages.
+    pub fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_signorini"));
+        command.args(arguments).current_dir(self.0.path()).stdin(Stdio::null()).env("LC_ALL", "C");
+        command
+    }
+
+    pub fn say(&self, arguments: &[&str]) -> Said {
+        Said::of(&mut self.command(arguments))
+    }
+
+    /// Runs the scene, which must go well.
+    #[track_caller]
+    pub fn run(&self, arguments: &[&str]) -> Said {
+        let said = self.say(&[&["run", "scene.toml"], arguments].concat());
+        assert_eq!(said.code, Some(0), "{said:?}");
+        said
+    }
+}
+
+impl Said {
+    pub fn of(command: &mut Command) -> Self {
+        let output = command.output().expect("the program starts");
+        let text = |bytes| String::from_utf8(bytes).expect("UTF-8");
+        let said =
+            Self { code: output.status.code(), out: text(output.stdout), err: text(output.stderr) };
+        assert!(!said.err.contains("panicked"), "{}", said.err);
+        assert!(!said.out.contains('\x1b') && !said.err.contains('\x1b'), "escape codes: {said:?}");
+        said
+    }
+
+    /// It failed with `code` and one error on standard error that has all `fragments`.
+    #[track_caller]
+    pub fn fails(&self, code: i32, fragments: &[&str]) {
+        assert_eq!(self.code, Some(code), "{self:?}");
+        assert!(self.err.starts_with("error: "), "{self:?}");
+        for fragment in fragments {
+            assert!(self.err.contains(fragment), "`{fragment}` is not in: {}", self.err);
+        }
+    }
+}
+
+/// The unit square in n × n cells of two triangles, MSH 2.2, sides and body named.
+pub fn square(n: usize) -> String {
+    let node = |i: usize, j: usize| j * (n + 1) + i + 1;
+    let mut nodes = Vec::new();
+    for (j, i) in (0..=n).flat_map(|j| (0..=n).map(move |i| (j, i))) {
+        let (x, y) = (i as f64 / n as f64, j as f64 / n as f64);
+        nodes.push(format!("{} {x} {y} 0", node(i, j)));
+    }
+    let mut elements = Vec::new();
+    let mut add = |kind: &str, nodes: String| {
+        elements.push(format!("{} {kind} {nodes}", elements.len() + 1));
+    };
+    for k in 0..n {
+        for (group, a, b) in [
+            (1, node(k, 0), node(k + 1, 0)),
+            (2, node(n, k), node(n, k + 1)),
+            (3, node(k, n), node(k + 1, n)),
+            (4, node(0, k), node(0, k + 1)),
+        ] {
+            add(&format!("1 2 {group} {group}"), format!("{a} {b}"));
+        }
+    }
+    for (j, i) in (0..n).flat_map(|j| (0..n).map(move |i| (j, i))) {
+        let [a, b, c, d] = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)];
+        add("2 2 5 1", format!("{a} {b} {c}"));
+        add("2 2 5 1", format!("{a} {c} {d}"));
+    }
+    msh(&nodes, &elements)
+}
+
+/// A text file of version 2.2 with these nodes and elements.
+pub fn msh(nodes: &[impl AsRef<str>], elements: &[impl AsRef<str>]) -> String {
+    let section = |name: &str, lines: &[String]| {
+        format!("${name}\n{}\n{}\n$End{name}\n", lines.len(), lines.join("\n"))
+    };
+    let names = ["1 1 \"bottom\"", "1 2 \"right\"", "1 3 \"top\"", "1 4 \"left\"", "2 5 \"body\""];
+    let own = |line: &str| line.to_owned();
+    [
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n".to_owned(),
+        section("PhysicalNames", &names.map(own)),
+        section("Nodes", &nodes.iter().map(|l| own(l.as_ref())).collect::<Vec<_>>()),
+        section("Elements", &elements.iter().map(|l| own(l.as_ref())).collect::<Vec<_>>()),
+    ]
+    .concat()
+}

@@ -1,0 +1,121 @@
+//! `fields.pvd` and its frames, read back.
+
+use crate::desk::Desk;
+use std::path::Path;
+use vtkio::model::{Attribute, DataSet, Piece, Vtk};
+
+/// Names, values and components of point and cell data; the points; the number of cells.
+struct Frame {
+    points: Vec<f64>,
+    cells: usize,
+    point_data: Vec<(String, Vec<f64>)>,
+    cell_data: Vec<(String, Vec<f64>)>,
+}
+
+fn arrays(attributes: Vec<Attribute>) -> Vec<(String, Vec<f64>)> {
+    let array = |attribute| match attribute {
+        Attribute::DataArray(array) => {
+            (array.name, array.data.cast_into::<f64>().expect("real numbers"))
+        }
+        Attribute::Field { name, .. } => panic!("{name} is a field"),
+    };
+    attributes.into_iter().map(array).collect()
+}
+
+fn frame(path: &Path) -> Frame {
+    let vtk = Vtk::import(path).unwrap_or_else(|e| panic!("{}: {e:?}", path.display()));
+    let DataSet::UnstructuredGrid { mut pieces, .. } = vtk.data else { panic!("another data set") };
+    let Some(Piece::Inline(piece)) = pieces.pop() else { panic!("no piece") };
+    Frame {
+        cells: piece.cells.types.len(),
+        points: piece.points.cast_into().expect("real numbers"),
+        point_data: arrays(piece.data.point),
+        cell_data: arrays(piece.data.cell),
+    }
+}
+
+fn field<'a>(data: &'a [(String, Vec<f64>)], name: &str) -> &'a [f64] {
+    &data.iter().find(|(n, _)| n == name).unwrap_or_else(|| panic!("no {name}")).1
+}
+
+fn close(a: f64, b: f64) {
+    assert!((a - b).abs() <= 1e-9 * (1.0 + b.abs()), "{a} is not {b}");
+}
+
+#[test]
+fn the_last_frame_is_the_state_of_the_summary() {
+    let desk = Desk::new();
+    desk.run(&[]);
+    let (time, file) = desk.frames("out/scene").pop().expect("frames");
+    assert_eq!(time, 1.0);
+    let frame = frame(&desk.path(&format!("out/scene/{file}")));
+    assert_eq!((frame.points.len(), frame.cells), (3 * 25, 32));
+    let sizes = |data: &[(String, Vec<f64>)], count: usize| -> Vec<(String, usize)> {
+        data.iter().map(|(name, values)| (name.clone(), values.len() / count)).collect()
+    };
+    let named = |pairs: &[(&str, usize)]| -> Vec<(String, usize)> {
+        pairs.iter().map(|(name, n)| ((*name).to_owned(), *n)).collect()
+    };
+    let expected = [("displacement", 3), ("zeta", 1), ("normal_pressure", 1), ("gap", 1)];
+    assert_eq!(sizes(&frame.point_data, 25), named(&expected));
+    assert_eq!(sizes(&frame.cell_data, 32), named(&[("von_mises", 1), ("stress", 3)]));
+
+    let summary = desk.summary("out/scene");
+    let zeta = field(&frame.point_data, "zeta");
+    let least = zeta.iter().copied().fold(f64::INFINITY, f64::min);
+    close(least, summary["zeta_min"].as_f64().expect("a number"));
+    let u = field(&frame.point_data, "displacement");
+    let largest = u.chunks(3).map(|u| u[0].hypot(u[1])).fold(0.0, f64::max);
+    close(largest, summary["displacement_max"].as_f64().expect("a number"));
+    assert!(u.chunks(3).all(|u| u[2] == 0.0));
+
+    // Uniform pressure 3: σ_yy = −3 everywhere, the reaction at the bottom and nowhere else.
+    for stress in field(&frame.cell_data, "stress").chunks(3) {
+        stress.iter().zip([0.0, -3.0, 0.0]).for_each(|(a, b)| close(*a, b));
+    }
+    field(&frame.cell_data, "von_mises").iter().for_each(|s| close(*s, 3.0));
+    let (pressure, gap) =
+        (field(&frame.point_data, "normal_pressure"), field(&frame.point_data, "gap"));
+    for (i, x) in frame.points.chunks(3).enumerate() {
+        match x[1] == 0.0 {
+            true => {
+                close(pressure[i], 3.0);
+                close(gap[i], 0.0);
+            }
+            false => assert!(pressure[i] == 0.0 && gap[i].is_nan()),
+        }
+    }
+}
+
+#[test]
+fn frames_are_as_many_as_asked_for() {
+    let desk = Desk::new();
+    // Steps 0 … 10: all of them, every third and the last, the ends.
+    for (every, times) in [
+        (None, (0..=10).collect::<Vec<_>>()),
+        (Some(3), vec![0, 3, 6, 9, 10]),
+        (Some(50), vec![0, 10]),
+    ] {
+        let set = every.map(|n| format!("output.every={n}"));
+        let arguments: Vec<&str> = set.iter().flat_map(|s| ["--set", s]).collect();
+        desk.run(&arguments);
+        let frames = desk.frames("out/scene");
+        let tenths: Vec<i32> = frames.iter().map(|(t, _)| (10.0 * t).round() as i32).collect();
+        assert_eq!(tenths, times);
+        // An earlier run's frames are gone, and there is nothing else.
+        let mut files: Vec<String> = frames.into_iter().map(|(_, file)| file).collect();
+        files.extend(["fields.pvd", "history.csv", "summary.json"].map(str::to_owned));
+        files.sort();
+        assert_eq!(desk.names("out/scene"), files);
+    }
+}
+
+#[test]
+fn what_others_put_into_the_folder_stays() {
+    let desk = Desk::new();
+    desk.write("out/scene/notes.txt", "mine");
+    desk.write("out/scene/deformed.png", "mine");
+    desk.run(&["--set", "time.end=0.1"]);
+    assert_eq!(desk.read("out/scene/notes.txt"), "mine");
+    assert_eq!(desk.read("out/scene/deformed.png"), "mine");
+}

@@ -1,0 +1,51 @@
+//! `signorini mesh`, and scenes that name a `.geo`.
+
+use crate::desk::{Desk, SCENE};
+use std::fs;
+
+const GEO: &str = r#"
+DefineConstant[ size = 0.5 ];
+Point(1) = {0, 0, 0, size}; Point(2) = {1, 0, 0, size};
+Point(3) = {1, 1, 0, size}; Point(4) = {0, 1, 0, size};
+Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 4}; Line(4) = {4, 1};
+Curve Loop(1) = {1, 2, 3, 4};
+Plane Surface(1) = {1};
+Physical Surface("body") = {1};
+Physical Curve("bottom") = {1}; Physical Curve("top") = {3}; Physical Curve("left") = {4};
+"#;
+
+fn desk() -> Desk {
+    let desk = Desk::new();
+    desk.write("geo/square.geo", GEO);
+    desk.write("geo/scene.toml", &SCENE.replace("square.msh", "square.geo"));
+    desk
+}
+
+#[test]
+fn meshes_appear_beside_their_geo() {
+    let desk = desk();
+    desk.write("geo/fine.toml", &SCENE.replace("\"square.msh\"", "\"square.geo\"\nsize = 0.25"));
+    let said = desk.say(&["mesh", "geo/scene.toml", "geo/fine.toml"]);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let lines: Vec<&str> = said.out.lines().collect();
+    assert!(lines[0].starts_with("scene: ") && lines[0].contains(" nodes, "), "{lines:?}");
+    assert!(lines[1].starts_with("fine: "), "{lines:?}");
+    let files = ["fine.toml", "scene.toml", "square-size0.25.msh", "square.geo", "square.msh"];
+    assert_eq!(desk.names("geo"), files);
+    assert!(!desk.path("out").exists());
+
+    // A mesh that is there is kept.
+    let meshed = |name| fs::metadata(desk.path(name)).and_then(|m| m.modified()).expect("a file");
+    let before = meshed("geo/square.msh");
+    assert_eq!(desk.say(&["mesh", "geo/scene.toml"]).code, Some(0));
+    assert_eq!(meshed("geo/square.msh"), before);
+}
+
+#[test]
+fn run_meshes_what_is_missing() {
+    let desk = desk();
+    let said = desk.say(&["run", "geo/scene.toml", "--set", "time.end=0.1"]);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    assert!(desk.path("geo/square.msh").exists());
+    assert!(desk.path("out/scene/summary.json").exists());
+}

@@ -1,0 +1,188 @@
+//! Bad input: exit code 2, a message that names the place, and nothing touched.
+
+use crate::desk::{Desk, SCENE, Said, msh, square};
+
+/// Runs the scene twice, over the results of an earlier run and into a new folder: both must
+/// be refused and change nothing.
+#[track_caller]
+fn refused(desk: &Desk, arguments: &[&str], fragments: &[&str]) {
+    for name in ["fields.pvd", "fields_0000.vtu", "history.csv", "summary.json"] {
+        desk.write(&format!("out/scene/{name}"), "of an earlier run");
+    }
+    let before = desk.everything();
+    for out in [&[][..], &["--out", "new/folder"]] {
+        let said = desk.say(&[&["run", "scene.toml"], out, arguments].concat());
+        said.fails(2, fragments);
+        assert_eq!(said.out, "");
+        assert!(desk.everything() == before, "files were touched: {fragments:?}");
+    }
+}
+
+/// The scene with one text replaced by another.
+fn changed(old: &str, new: &str) -> Desk {
+    assert!(SCENE.contains(old), "the scene has no `{old}`");
+    let desk = Desk::new();
+    desk.write("scene.toml", &SCENE.replacen(old, new, 1));
+    desk
+}
+
+/// (a text of the scene, what replaces it, what the message says)
+const SCENES: &[(&str, &str, &[&str])] = &[
+    ("young", "yuong", &["scene.toml:5: unknown key material.yuong", "did you mean `young`?"]),
+    ("young = 80", "young = \"80\"", &["scene.toml:5: material.young must be a number"]),
+    ("young = 80\n", "", &["scene.toml:4: material.young is required but missing"]),
+    ("[time]", "[time", &["scene.toml:16: not valid TOML"]),
+    ("young = 80", "young = -80", &["scene.toml:5: material.young must be positive"]),
+    ("poisson = 0.3", "poisson = 0.5", &["scene.toml:6: material.poisson must be between"]),
+    ("poisson = 0.3", "poisson = -1", &["scene.toml:6: material.poisson must be between"]),
+    ("diffusion = 0.01", "diffusion = 0", &["scene.toml:9: damage.diffusion must be positive"]),
+    ("diffusion = 0.01", "diffusion = -1", &["scene.toml:9: damage.diffusion must be positive"]),
+    ("initial = 1", "initial = 0", &["scene.toml:15: damage.initial must be in (0.01, 1]"]),
+    ("initial = 1", "initial = 1.1", &["scene.toml:15: damage.initial must be in (0.01, 1]"]),
+    ("initial = 1", "initial = \"1 - x\"", &["scene.toml:15: damage.initial is 0 at (1, 0)"]),
+    ("step = 0.1", "step = 0", &["scene.toml:18: time.step must be positive"]),
+    ("step = 0.1", "step = -0.1", &["scene.toml:18: time.step must be positive"]),
+    ("step = 0.1", "step = 2", &["scene.toml:18: time.step must be positive and at most the end"]),
+    ("gap = \"0\"", "gap = \"-0.1\"", &["scene.toml:26: boundary \"bottom\": gap must not be"]),
+    ("gap = \"0\"", "gap = \"x-1\"", &["scene.toml:26: ", "gap is -1 at (0, 0)"]),
+    (
+        "\"-3*t\"",
+        "\"-3*\"",
+        &["scene.toml:29: boundary \"top\": traction[1] has the end at column"],
+    ),
+    ("\"-3*t\"", "\"-3*s\"", &["scene.toml:29: ", "unknown", "`s`"]),
+    ("\"-3*t\"", "\"log(0)\"", &["scene.toml:29: ", "traction[1] must be finite"]),
+    ("\"-3*t\"", "\"sqrt(x-2)\"", &["scene.toml:29: ", "traction[1] is NaN at"]),
+    (
+        "name = \"top\"",
+        "name = \"toop\"",
+        &["scene.toml:28: ", "\"toop\" is no physical curve", "`top`", "bottom, left, right, top"],
+    ),
+    (
+        "name = \"top\"\ntraction",
+        "name = \"left\"\ntraction",
+        &["scene.toml:27: boundary \"left\"", "is given twice, first at scene.toml:22"],
+    ),
+    ("symmetry = true\n", "", &["scene.toml:21: boundary \"left\"", "has nothing in it"]),
+    ("square.msh", "square.stl", &["scene.toml:3: mesh.file must be a .geo or .msh file"]),
+    ("square.msh", "none.msh", &["none.msh: No such file"]),
+    ("square.msh", "none.geo", &["none.geo: No such file"]),
+    ("[contact]", "[contact]\nsolver = \"simplex\"", &["scene.toml: contact.solver", "`simplex`"]),
+    // Held by nothing: the message names the motion.
+    (
+        "[\"0\", \"-3*t\"]",
+        "[\"0\", \"3*t\"]",
+        &["scene.toml: at t = 0.1, nothing holds the body against the vertical translation"],
+    ),
+    (
+        "name = \"left\"\nsymmetry = true",
+        "name = \"right\"\ntraction = [\"t\", \"0\"]",
+        &["nothing holds the body against the horizontal translation", "the load drives it"],
+    ),
+    (
+        "gap = \"0\"",
+        "traction = [\"0\", \"3*t + 1e-3\"]",
+        &["scene.toml: at t = 0, nothing holds the body against the vertical translation"],
+    ),
+];
+
+#[test]
+fn scenes() {
+    for (old, new, fragments) in SCENES {
+        refused(&changed(old, new), &[], fragments);
+    }
+}
+
+#[test]
+fn a_boundary_held_through_the_obstacle() {
+    // The lower left node is on both: prescribed below the foundation.
+    let scene = changed("symmetry = true", "displacement = [0, \"-t\"]");
+    refused(&scene, &[], &["scene.toml: ", "(0, 0)"]);
+}
+
+#[test]
+fn meshes() {
+    let good = square(4);
+    let corners = ["1 0 0 0", "2 1 0 0", "3 1 1 0", "4 0 1 0"];
+    let sides = ["1 1 2 1 1 1 2", "2 1 2 3 3 3 4", "3 1 2 4 4 4 1"];
+    let with = |element: &str| msh(&corners, &[&sides[..], &[element]].concat());
+    for (mesh, fragments) in [
+        ("", &["square.msh: the file is empty"][..]),
+        ("<html>404</html>", &["square.msh:1: not a gmsh mesh"]),
+        ("\u{0}\u{1}\u{2}\u{3}", &["square.msh:1: not a gmsh mesh"]),
+        (&good[..good.len() / 2], &["square.msh:", "it was cut off"]),
+        (&good[..good.len() - 6], &["square.msh", "it was cut off"]),
+        (&with("4 2 2 5 1 1 2 2"), &["square.msh:", "triangle 4 has no area"]),
+        (&with("4 3 2 5 1 1 2 3 4"), &["square.msh", "quadrangles", "Recombine"]),
+        (&with("4 15 2 5 1 1"), &["square.msh", "there are no triangles"]),
+    ] {
+        let desk = Desk::new();
+        desk.write("square.msh", mesh);
+        refused(&desk, &[], fragments);
+    }
+}
+
+#[test]
+fn arguments() {
+    let desk = Desk::new();
+    for (arguments, fragments) in [
+        (&["--solver", "simplex"][..], &["--solver: ", "`simplex`", "active-set", "tao"][..]),
+        (&["--set", "time.step"], &["--set time.step: has no `=`"]),
+        (&["--set", "time.stp=1"], &["--set time.stp=1: unknown key time.stp", "`step`"]),
+        (&["--set", "time.step=0"], &["--set time.step=0: time.step must be positive"]),
+        (&["--set", "boundary.topp.gap=0"], &["unknown key boundary.topp", "`top`"]),
+        (&["--mesh", "none.msh"], &["none.msh: No such file"]),
+        (&["--mesh", "scene.toml"], &["scene.toml: a mesh is a .msh file or a .geo file"]),
+        (&["--mesh", "square.geo", "--set", "mesh.size=1"], &["--set mesh.size=1 has no effect"]),
+        (&["--", "tao_monitor"], &["PETSc options begin with a dash", "`tao_monitor`"]),
+        (&["--slver", "tao"], &["unexpected argument '--slver'", "'--solver'"]),
+    ] {
+        refused(&desk, arguments, fragments);
+    }
+    desk.say(&["run"]).fails(2, &["<SCENE>"]);
+    desk.say(&["rnu", "scene.toml"]).fails(2, &["unrecognized subcommand 'rnu'"]);
+    desk.say(&["run", "none.toml"]).fails(2, &["none.toml: the scene cannot be read"]);
+    desk.say(&["mesh", "none.toml"]).fails(2, &["none.toml: the scene cannot be read"]);
+    assert_eq!(desk.say(&[]).code, Some(2));
+}
+
+#[test]
+fn help_and_version_are_no_errors() {
+    let desk = Desk::new();
+    for (arguments, fragment) in
+        [(&["--help"][..], "Exit codes"), (&["run", "--help"], "--set"), (&["--version"], "0.")]
+    {
+        let said = desk.say(arguments);
+        assert_eq!(said.code, Some(0));
+        assert!(said.out.contains(fragment) && said.err.is_empty(), "{said:?}");
+    }
+}
+
+#[test]
+fn folders_nobody_can_write_to() {
+    // Root may write anywhere; below a file nobody can.
+    let desk = Desk::new();
+    let before = desk.everything();
+    let said = desk.say(&["run", "scene.toml", "--out", "scene.toml/results"]);
+    said.fails(2, &["cannot write scene.toml/results: Not a directory"]);
+    assert!(desk.everything() == before);
+
+    desk.write("out", "a file");
+    desk.say(&["run", "scene.toml"]).fails(2, &["cannot write out/scene: "]);
+    assert_eq!(desk.read("out"), "a file");
+}
+
+#[test]
+fn gmsh_missing_or_failing() {
+    let desk = changed("square.msh", "square.geo");
+    desk.write("square.geo", "Point(1) = {0, 0, 0};\nLine(1) = {1, ;\n");
+    refused(&desk, &[], &["square.geo: gmsh could not mesh it", "line 2"]);
+    desk.say(&["mesh", "scene.toml"]).fails(2, &["square.geo: gmsh could not mesh it", "line 2"]);
+
+    let before = desk.everything();
+    for arguments in [["run", "scene.toml"], ["mesh", "scene.toml"]] {
+        let said = Said::of(desk.command(&arguments).env("PATH", ""));
+        said.fails(2, &["square.geo: gmsh is needed", "make deps", "apt install gmsh"]);
+    }
+    assert!(desk.everything() == before);
+}
