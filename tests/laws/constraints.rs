@@ -205,3 +205,24 @@ fn a_third_gap_or_a_gap_along_a_held_direction_takes_no_unknown() {
     assert!(constraints.lift(&[-0.11], &origin).is_err());
     assert!(constraints.lift(&[0.11], &origin).is_ok());
 }
+
+#[test]
+fn a_body_carried_along_by_its_prescribed_side_feels_no_force() {
+    // A rigid displacement of the left side, u = (0.3 − 0.2 y, 0.1), with nothing in the way.
+    let text = "displacement = ['0.3*t - 0.2*t*y', '0.1*t + 0.2*t*x']";
+    for rest in ["", "{ name = 'bottom', gap = 1 },"] {
+        for solver in SOLVERS {
+            let setting = bounded(&format!(
+                "time = {{ end = 1, step = 0.5 }}
+                 boundary = [{{ name = 'left', {text} }}, {rest}]"
+            ))
+            .unwrap();
+            let last = run(&setting, solver).last;
+            for (u, [x, y]) in last.state.u.chunks(2).zip(&setting.body.mesh.nodes) {
+                assert!((u[0] - 0.3 + 0.2 * y).abs() < 1e-13);
+                assert!((u[1] - 0.1 - 0.2 * x).abs() < 1e-13);
+            }
+            assert!(last.record.contact_force.abs() < 1e-10 && last.record.active_nodes == 0);
+        }
+    }
+}
