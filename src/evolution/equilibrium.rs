@@ -81,7 +81,8 @@ impl<'a> Equilibrium<'a> {
             total.iterations += report.iterations;
             total.linear_iterations += report.linear_iterations;
             let u = self.displacement(&lift)?;
-            let (kkt, contact) = phases.time("certificate", || self.certify(&u, &external, force_scale));
+            let (kkt, contact) =
+                phases.time("certificate", || self.certify(&u, &external, force_scale));
             if kkt.within(setting.tolerance) {
                 let state = State {
                     time,
