@@ -145,7 +145,8 @@ fn three_independent_conditions_at_a_node_are_an_error() {
     let [x, y] = mesh.nodes[corner[0]];
     match setting(mesh, &text) {
         Err(SetupError::Constraint {
-            source: ConstraintError::TooMany { x: at_x, y: at_y }, ..
+            source: ConstraintError::TooMany { x: at_x, y: at_y },
+            ..
         }) => assert_eq!((at_x, at_y), (x, y)),
         other => panic!("{other:?}"),
     }
@@ -189,10 +190,7 @@ fn a_third_gap_or_a_gap_along_a_held_direction_takes_no_unknown() {
     let held = |direction| FixedRow { node: 0, direction };
     let origin = [[0.0, 0.0]];
     let three = [gap([0.0, -1.0], 0.0), gap([1.0, 0.0], 0.0), gap([-1.0, 0.0], 0.0)];
-    assert!(matches!(
-        Constraints::new(&origin, &[], &three),
-        Err(ConstraintError::TooMany { .. })
-    ));
+    assert!(matches!(Constraints::new(&origin, &[], &three), Err(ConstraintError::TooMany { .. })));
     // Held along the normal: no bound, but the value is checked against the gap.
     let constraints =
         Constraints::new(&origin, &[held([0.0, -1.0])], &[gap([0.0, -1.0], 0.1)]).unwrap();

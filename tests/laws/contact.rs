@@ -3,7 +3,10 @@
 use crate::support::{
     Random, close, close_to, difference, distorted, history, largest, run, setting, shipped,
 };
-use signorini::{contact::SOLVERS, evolution::{Setting, State}};
+use signorini::{
+    contact::SOLVERS,
+    evolution::{Setting, State},
+};
 
 /// A bending L over an obstacle from which its arm partly lifts off, elastic and static.
 fn lshape(sets: &[&str]) -> Setting {
@@ -70,10 +73,8 @@ fn no_feasible_displacement_has_less_energy() {
 fn contact_pushes_where_it_touches_and_nowhere_pulls_or_overlaps() {
     for solver in SOLVERS {
         let state = run(&lshape(&[]), solver).last.state;
-        let (most, size) = (
-            state.contact.iter().map(|p| p.pressure).fold(0.0, f64::max),
-            largest(&state.u),
-        );
+        let (most, size) =
+            (state.contact.iter().map(|p| p.pressure).fold(0.0, f64::max), largest(&state.u));
         assert!(most > 0.0);
         for point in &state.contact {
             assert!(point.pressure >= -1e-8 * most, "{solver}: {point:?}");

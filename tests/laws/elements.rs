@@ -168,9 +168,8 @@ fn forces_turn_with_the_body() {
     let mut random = Random(6);
     let zeta: Vec<f64> = mesh.triangles.iter().map(|_| 1.5 + random.next()).collect();
     let u = random.field(2 * mesh.nodes.len());
-    let turned = |v: &[f64]| -> Vec<f64> {
-        v.chunks(2).flat_map(|v| turn(angle, [v[0], v[1]])).collect()
-    };
+    let turned =
+        |v: &[f64]| -> Vec<f64> { v.chunks(2).flat_map(|v| turn(angle, [v[0], v[1]])).collect() };
     let elasticity = elasticity(Plane::Stress);
     let force = elasticity.internal_force(&Body::new(mesh.clone()), &zeta, &u);
     let body = Body::new(moved(mesh, |x| turn(angle, x)));

@@ -80,7 +80,8 @@ fn the_whole_bridge_is_symmetric_and_twice_its_half() {
         }
         // Nothing holds the bridge sideways: the answer given has ∫u_x = 0.
         let area: f64 = whole.body.node_area.iter().sum();
-        let drift: f64 = (0..nodes.len()).map(|i| whole.body.node_area[i] * full.state.u[2 * i]).sum();
+        let drift: f64 =
+            (0..nodes.len()).map(|i| whole.body.node_area[i] * full.state.u[2 * i]).sum();
         assert!(drift.abs() < 1e-14 * area * size, "{drift}");
         // 80 N/m² over 4 m, at t = 1.
         close_to(full.record.contact_force, 320.0, 1e-10);

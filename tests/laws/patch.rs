@@ -1,6 +1,8 @@
 //! The patch test: a body under uniform stress is solved exactly on any mesh.
 
-use crate::support::{close_to, difference, distorted, moved, run, setting, square, turn, unstructured};
+use crate::support::{
+    close_to, difference, distorted, moved, run, setting, square, turn, unstructured,
+};
 use signorini::{
     contact::SOLVERS,
     evolution::{Setting, State},
@@ -147,8 +149,8 @@ fn all_round_pressure_into_a_corner_of_the_foundation() {
             );
             // The shift w that closes both gaps: w·ν_bottom = g_bottom, w·ν_right = g_right.
             let ([a, b], [c, d]) = (normal("bottom"), normal("right"));
-            let w = [d * gaps[0] - b * gaps[1], a * gaps[1] - c * gaps[0]]
-                .map(|w| w / (a * d - b * c));
+            let w =
+                [d * gaps[0] - b * gaps[1], a * gaps[1] - c * gaps[0]].map(|w| w / (a * d - b * c));
             let corner = turn(angle, [1.0, 0.0]);
             let shrink = -p * (1.0 - POISSON) / YOUNG;
             let expected: Vec<f64> = (mesh.nodes.iter())

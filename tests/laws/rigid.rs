@@ -60,7 +60,8 @@ fn a_body_on_a_foundation_may_slide_but_not_sink_or_turn() {
     for solver in SOLVERS {
         // Of all answers the one that does not slide on average.
         let u = run(&setting, solver).last.state.u;
-        let mean: f64 = (setting.body.node_area.iter().enumerate()).map(|(i, a)| a * u[2 * i]).sum();
+        let mean: f64 =
+            (setting.body.node_area.iter().enumerate()).map(|(i, a)| a * u[2 * i]).sum();
         assert!(mean.abs() < 1e-15 && largest(&u) > 1e-3);
     }
 }
@@ -138,7 +139,8 @@ fn a_body_that_nothing_holds_takes_balanced_loads() {
         assert!(error < 1e-12, "{error}");
         // Σ area_i u_i·m(x_i) = 0 for each free motion m.
         for motion in &setting.motions.free {
-            let nodes = setting.body.mesh.nodes.iter().zip(&setting.body.node_area).zip(u.chunks(2));
+            let nodes =
+                setting.body.mesh.nodes.iter().zip(&setting.body.node_area).zip(u.chunks(2));
             let share: f64 = nodes
                 .map(|((x, area), u)| {
                     let m = motion.at(*x);
