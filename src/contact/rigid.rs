@@ -76,6 +76,8 @@ pub struct RigidMotions {
     /// u·ν of `resisted` at the contact nodes, one row per gap condition.
     normal: DMatrix<f64>,
     centre: [f64; 2],
+    /// Radius of gyration, m.
+    radius: f64,
 }
 
 /// Motions are compared after scaling to unit size: below this they are zero.
@@ -108,7 +110,8 @@ impl RigidMotions {
         };
         let unheld = null_space(&gram(&mut fixed.iter().map(|(node, d)| row(*node, *d))));
         if unheld.is_empty() {
-            return Self { free: vec![], resisted: vec![], normal: DMatrix::zeros(0, 0), centre };
+            let normal = DMatrix::zeros(0, 0);
+            return Self { free: vec![], resisted: vec![], normal, centre, radius };
         }
         let contact = DMatrix::from_row_iterator(
             gaps.len(),
@@ -133,7 +136,7 @@ impl RigidMotions {
         };
         let normal =
             DMatrix::from_fn(gaps.len(), resisted.len(), |i, j| along(&resisted[j], &gaps[i]));
-        Self { free, resisted, normal, centre }
+        Self { free, resisted, normal, centre, radius }
     }
 
     /// Whether prescribed displacements alone hold the body (K is then positive definite).
@@ -179,6 +182,9 @@ impl RigidMotions {
             motion.translation[0] += c * m.translation[0];
             motion.translation[1] += c * m.translation[1];
             motion.rotation += c * m.rotation;
+        }
+        if (motion.rotation * self.radius).abs() < ROUNDING {
+            motion.rotation = 0.0;
         }
         Err(driven(motion))
     }

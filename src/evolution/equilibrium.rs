@@ -98,7 +98,8 @@ impl<'a> Equilibrium<'a> {
             total.fallbacks += report.fallbacks;
             total.contraction = report.contraction;
             let u = self.displacement(&lift)?;
-            let (kkt, contact) = phases.time("certificate", || self.certify(&u, &external));
+            let (kkt, contact) =
+                phases.time("certificate", || self.certify(&u, &external, force_scale));
             if kkt.within(setting.tolerance) {
                 let state = State {
                     time,
@@ -192,12 +193,15 @@ impl<'a> Equilibrium<'a> {
     }
 
     /// The KKT residuals of u by element-wise forces, and the state of contact they imply.
-    fn certify(&self, u: &[f64], external: &[f64]) -> (Kkt, Vec<ContactPoint>) {
+    /// `load_size` keeps the scale of forces where a prescribed displacement carries the
+    /// body along without stress.
+    fn certify(&self, u: &[f64], external: &[f64], load_size: f64) -> (Kkt, Vec<ContactPoint>) {
         let setting = self.setting;
         let (body, constraints) = (&setting.body, &setting.constraints);
         let internal = setting.elasticity.internal_force(body, &self.zeta_mean, u);
         let partition = &body.partition;
-        let force_scale = partition.norm(external, 2).max(partition.norm(&internal, 2));
+        let forces = partition.norm(external, 2).max(partition.norm(&internal, 2));
+        let force_scale = forces.max(load_size);
         let size = largest(u);
 
         let mut residual: Vec<f64> = internal.iter().zip(external).map(|(r, f)| r - f).collect();

@@ -1,0 +1,291 @@
+//! One triangle, and the operators assembled from many.
+
+use crate::support::{Random, close, difference, distorted, largest, moved, turn, unstructured};
+use nalgebra::{Matrix2, Matrix3, SVector};
+use signorini::{
+    fem::{Body, DamageSystem, Elasticity, Frames, Stiffness, Triangle, source_load},
+    mesh::Mesh,
+    model::{DamageLaw, Material, Plane},
+    petsc::{Session, Vector},
+};
+
+const YOUNG: f64 = 2.1e5;
+const POISSON: f64 = 0.3;
+
+fn elasticity(plane: Plane) -> Elasticity {
+    Elasticity::new(Material { young: YOUNG, poisson: POISSON, plane })
+}
+
+/// Counter-clockwise triangles of all shapes that are not too thin.
+fn triangles() -> Vec<Triangle> {
+    let mut random = Random(1);
+    let mut point = || [random.next(), random.next()];
+    let triangles = (0..200).map(|_| Triangle::new([point(), point(), point()]));
+    triangles.filter(|t| t.area > 0.02).collect()
+}
+
+/// (E, ν) for which plane stress is `plane` with (YOUNG, POISSON).
+fn sheet(plane: Plane) -> (f64, f64) {
+    match plane {
+        Plane::Stress => (YOUNG, POISSON),
+        Plane::Strain => (YOUNG / (1.0 - POISSON * POISSON), POISSON / (1.0 - POISSON)),
+    }
+}
+
+/// ½ ∫ ζ̄ Aε(u):ε(u) with A as printed in the paper, (Aτ):τ = Er/(1−r²) tr²τ + E/(1+r) |τ|²,
+/// and ∇u solved from the differences along two sides of each triangle.
+fn energy(mesh: &Mesh, plane: Plane, zeta: &[f64], u: &[f64]) -> f64 {
+    let (e, r) = sheet(plane);
+    let density = |&[a, b, c]: &[usize; 3]| {
+        let x = |i: usize, k: usize| mesh.nodes[i][k];
+        let v = |i: usize, k: usize| u[2 * i + k];
+        let sides = Matrix2::from_fn(|k, l| x([b, c][l], k) - x(a, k));
+        let differences = Matrix2::from_fn(|k, l| v([b, c][l], k) - v(a, k));
+        let gradient = differences * sides.try_inverse().unwrap();
+        let strain = 0.5 * (gradient + gradient.transpose());
+        let trace = strain.trace();
+        let square = e * r / (1.0 - r * r) * trace * trace + e / (1.0 + r) * strain.norm_squared();
+        0.25 * sides.determinant() * square
+    };
+    mesh.triangles.iter().zip(zeta).map(|(t, zeta)| zeta * density(t)).sum()
+}
+
+#[test]
+fn the_element_stiffness_is_symmetric_and_vanishes_on_three_rigid_motions_only() {
+    for plane in [Plane::Stress, Plane::Strain] {
+        let d = elasticity(plane).material.stiffness();
+        for triangle in triangles() {
+            let k = triangle.stiffness(&d);
+            assert!((k - k.transpose()).amax() <= 1e-15 * k.amax());
+            let mut values: Vec<f64> = k.symmetric_eigenvalues().iter().copied().collect();
+            values.sort_by(f64::total_cmp);
+            let most = values[5];
+            assert!(values[..3].iter().all(|v| v.abs() < 1e-13 * most), "{values:?}");
+            // Flat triangles are soft against shear along themselves, but not this soft.
+            assert!(values[3] > 1e-6 * most, "{values:?}");
+        }
+    }
+}
+
+#[test]
+fn element_forces_are_the_stiffness_times_the_displacements() {
+    let d = elasticity(Plane::Stress).material.stiffness();
+    let mut random = Random(2);
+    for triangle in triangles() {
+        let u = SVector::<f64, 6>::from_fn(|_, _| random.next());
+        let strain = triangle.strain(u.as_ref());
+        assert!((triangle.strain_matrix() * u - strain).amax() <= 1e-14 * strain.amax());
+        let force = triangle.force(&(d * strain));
+        let error = (triangle.stiffness(&d) * u - force).amax();
+        assert!(error <= 1e-13 * force.amax(), "{error}");
+    }
+}
+
+#[test]
+fn mass_is_a_partition_of_unity_and_laplace_sees_gradients_only() {
+    let mut random = Random(3);
+    for triangle in triangles() {
+        let area = triangle.area;
+        let (mass, laplace) = (triangle.mass(), triangle.laplace());
+        for i in 0..3 {
+            // Σ_j ∫λ_i λ_j = ∫λ_i = area/3, and ∇Σλ_j = 0.
+            close(mass.row(i).sum() / area, 1.0 / 3.0, 1e-15);
+            assert!(laplace.row(i).sum().abs() <= 1e-14 * laplace.amax());
+        }
+        // ∫(a·x)² over the triangle by its side midpoints; |∇(a·x)|² = |a|².
+        let corners = corners(&triangle);
+        let a = [random.next(), random.next()];
+        let value = SVector::<f64, 3>::from_fn(|i, _| a[0] * corners[i][0] + a[1] * corners[i][1]);
+        let middle = |i: usize| (0.5 * (value[i] + value[(i + 1) % 3])).powi(2);
+        let square = area / 3.0 * (0..3).map(middle).sum::<f64>();
+        close(value.dot(&(mass * value)), square, 1e-14);
+        let norm = a[0] * a[0] + a[1] * a[1];
+        close(value.dot(&(laplace * value)), norm * area, 1e-12);
+    }
+}
+
+/// A triangle of the same gradients with its first corner at the origin.
+fn corners(triangle: &Triangle) -> [[f64; 2]; 3] {
+    let [_, b, c] = triangle.gradients;
+    // ∇λ_b·(x_b − x_a) = 1 and ∇λ_c·(x_b − x_a) = 0, and so on.
+    let sides = Matrix2::new(b[0], b[1], c[0], c[1]).try_inverse().unwrap();
+    [[0.0; 2], sides.column(0).into_owned().into(), sides.column(1).into_owned().into()]
+}
+
+#[test]
+fn rigid_motions_have_neither_strain_nor_force() {
+    let body = Body::new(unstructured(0.2));
+    let zeta: Vec<f64> = Random(4).field(body.triangles.len()).iter().map(|z| 1.5 + z).collect();
+    let elasticity = elasticity(Plane::Strain);
+    // u = a + θ e_z × x
+    let u: Vec<f64> =
+        body.mesh.nodes.iter().flat_map(|[x, y]| [0.3 - 0.7 * y, -1.1 + 0.7 * x]).collect();
+    assert!(largest(&elasticity.strain_squared(&body, &u)) < 1e-26);
+    assert!(largest(&elasticity.internal_force(&body, &zeta, &u)) < 1e-12 * YOUNG);
+    let stretched: Vec<f64> = body.mesh.nodes.iter().flat_map(|[x, _]| [1e-3 * x, 0.0]).collect();
+    for e2 in elasticity.strain_squared(&body, &stretched) {
+        close(e2 * 1e6, 1.0, 1e-12);
+    }
+}
+
+#[test]
+fn shear_counts_twice_in_the_size_of_strain() {
+    // u = (γ y, 0): ε_xy = ε_yx = γ/2, |ε|² = 2 (γ/2)².
+    let body = Body::new(distorted(3));
+    let u: Vec<f64> = body.mesh.nodes.iter().flat_map(|[_, y]| [0.4 * y, 0.0]).collect();
+    for e2 in elasticity(Plane::Stress).strain_squared(&body, &u) {
+        close(e2, 2.0 * 0.2_f64.powi(2), 1e-13);
+    }
+}
+
+#[test]
+fn internal_forces_are_the_gradient_of_the_energy() {
+    let body = Body::new(unstructured(0.2));
+    let mut random = Random(5);
+    for plane in [Plane::Stress, Plane::Strain] {
+        let zeta: Vec<f64> = body.triangles.iter().map(|_| 1.5 + random.next()).collect();
+        let u = random.field(2 * body.mesh.nodes.len());
+        let force = elasticity(plane).internal_force(&body, &zeta, &u);
+        // Twice the energy is u·F, and central differences of a quadratic are exact.
+        let work: f64 = force.iter().zip(&u).map(|(f, u)| f * u).sum();
+        close(work / (2.0 * energy(&body.mesh, plane, &zeta, &u)), 1.0, 1e-13);
+        for _ in 0..5 {
+            let v = random.field(u.len());
+            let at = |s: f64| {
+                let moved: Vec<f64> = u.iter().zip(&v).map(|(u, v)| u + s * v).collect();
+                energy(&body.mesh, plane, &zeta, &moved)
+            };
+            let slope: f64 = force.iter().zip(&v).map(|(f, v)| f * v).sum();
+            close((at(1.0) - at(-1.0)) / 2.0 / work, slope / work, 1e-12);
+        }
+    }
+}
+
+#[test]
+fn forces_turn_with_the_body() {
+    // F(Ru) on the body turned by R is R F(u).
+    let (mesh, angle) = (distorted(4), 1.234);
+    let mut random = Random(6);
+    let zeta: Vec<f64> = mesh.triangles.iter().map(|_| 1.5 + random.next()).collect();
+    let u = random.field(2 * mesh.nodes.len());
+    let turned =
+        |v: &[f64]| -> Vec<f64> { v.chunks(2).flat_map(|v| turn(angle, [v[0], v[1]])).collect() };
+    let elasticity = elasticity(Plane::Stress);
+    let force = elasticity.internal_force(&Body::new(mesh.clone()), &zeta, &u);
+    let body = Body::new(moved(mesh, |x| turn(angle, x)));
+    let error = difference(&elasticity.internal_force(&body, &zeta, &turned(&u)), &turned(&force));
+    assert!(error < 1e-13, "{error}");
+}
+
+/// Frames at a third of the nodes, orthonormal and oblique, and a fixed unknown at some.
+fn frames(nodes: usize, random: &mut Random) -> Frames {
+    let mut frames = Frames::identity(nodes);
+    for node in (0..nodes).step_by(3) {
+        let angle = 3.0 * random.next();
+        let opening = if node % 2 == 0 { 0.5 * std::f64::consts::PI } else { 0.8 };
+        let (s, c) = angle.sin_cos();
+        let (t, d) = (angle + opening).sin_cos();
+        frames.set(node, Matrix2::new(c, s, d, t));
+        if node % 4 == 0 {
+            frames.fix(2 * node + 1);
+        }
+    }
+    frames.fix(2);
+    frames
+}
+
+#[test]
+fn frames_keep_work_and_give_back_what_they_take() {
+    let mut random = Random(7);
+    let frames = frames(30, &mut random);
+    let (u, r) = (random.field(60), random.field(60));
+    let (mut c, mut s) = (u.clone(), r.clone());
+    frames.displacement_to_frame(&mut c);
+    frames.force_to_frame(&mut s);
+    let work = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+    assert!(difference(&c, &u) > 0.1);
+    close(work(&s, &c), work(&r, &u), 1e-13);
+    frames.displacement_from_frame(&mut c);
+    assert!(difference(&c, &u) < 1e-14);
+}
+
+#[test]
+fn the_assembled_stiffness_is_the_matrix_free_force_in_the_frames() {
+    let session = Session::start(&[]).unwrap();
+    let body = Body::new(unstructured(0.2));
+    let (nodes, elasticity) = (body.mesh.nodes.len(), elasticity(Plane::Stress));
+    let mut random = Random(8);
+    let frames = frames(nodes, &mut random);
+    let mut stiffness = Stiffness::new(&session, &body, &elasticity, &frames).unwrap();
+    for _ in 0..3 {
+        let zeta: Vec<f64> = body.triangles.iter().map(|_| 1.5 + random.next()).collect();
+        stiffness.refill(&zeta).unwrap();
+        let fixed = frames.fixed();
+        let c: Vec<f64> =
+            (0..2 * nodes).map(|i| if fixed[i] { 0.0 } else { random.next() }).collect();
+        let (mut x, mut y) = (vector(&session, &c), vector(&session, &c));
+        stiffness.matrix.multiply(&x, &mut y).unwrap();
+        let product = y.read(<[f64]>::to_vec).unwrap();
+
+        // K c = D⁻ᵀ F(D⁻¹ c) on the free unknowns, and the fixed are decoupled from them.
+        let mut u = c.clone();
+        frames.displacement_from_frame(&mut u);
+        let mut force = elasticity.internal_force(&body, &zeta, &u);
+        frames.force_to_frame(&mut force);
+        force.iter_mut().zip(fixed).for_each(|(f, fixed)| *f = if *fixed { 0.0 } else { *f });
+        let error = difference(&product, &force);
+        assert!(error < 1e-13, "{error}");
+
+        let only_fixed: Vec<f64> = fixed.iter().map(|f| if *f { 1.0 } else { 0.0 }).collect();
+        x.set(&only_fixed).unwrap();
+        stiffness.matrix.multiply(&x, &mut y).unwrap();
+        let product = y.read(<[f64]>::to_vec).unwrap();
+        let expected: Vec<f64> = only_fixed.iter().map(|f| f * stiffness.scale).collect();
+        assert_eq!(product, expected);
+    }
+}
+
+fn vector(session: &Session, values: &[f64]) -> Vector {
+    let mut vector = Vector::zeros(session, values.len()).unwrap();
+    vector.set(values).unwrap();
+    vector
+}
+
+#[test]
+fn a_damage_step_solves_the_assembled_system() {
+    // (M + kκL) ζ_n = M ζ_{n−1} + k b with M and L summed from the elements in a dense
+    // matrix, and b = ∫ φ λ_i of the affine φ through its values at the vertices.
+    let session = Session::start(&[]).unwrap();
+    let body = Body::new(distorted(3));
+    let law = DamageLaw {
+        diffusion: 0.7,
+        lambda_d: 0.3,
+        lambda_u: 2.0,
+        lambda_w: 0.1,
+        strain_cap: 0.8,
+        threshold: 0.01,
+    };
+    let (n, step, mut random) = (body.mesh.nodes.len(), 0.05, Random(9));
+    let zeta: Vec<f64> = (0..n).map(|_| 0.6 + 0.3 * random.next()).collect();
+    let strain: Vec<f64> = body.triangles.iter().map(|_| random.next().abs()).collect();
+    let mut left = nalgebra::DMatrix::<f64>::zeros(n, n);
+    let mut right = nalgebra::DVector::<f64>::zeros(n);
+    for ((nodes, triangle), e2) in body.mesh.triangles.iter().zip(&body.triangles).zip(&strain) {
+        let (mass, laplace): (Matrix3<f64>, Matrix3<f64>) = (triangle.mass(), triangle.laplace());
+        for i in 0..3 {
+            for j in 0..3 {
+                left[(nodes[i], nodes[j])] += mass[(i, j)] + step * law.diffusion * laplace[(i, j)];
+                let z = zeta[nodes[j]];
+                let rate = law.lambda_d * (1.0 - z) / z + 0.5 * law.lambda_u * e2.min(0.8) - 0.1;
+                right[nodes[i]] += mass[(i, j)] * (z - step * rate.max(0.0));
+            }
+        }
+    }
+    let expected = left.lu().solve(&right).unwrap();
+    let mut next = zeta.clone();
+    let load = source_load(&body, &law, &strain, &zeta);
+    let mut system = DamageSystem::new(&session, &body, law.diffusion, step).unwrap();
+    assert!(system.advance(&load, &mut next).unwrap());
+    let error = difference(&next, expected.as_slice());
+    assert!(error < 1e-13, "{error}");
+}

@@ -1,0 +1,19 @@
+//! The laws of the discrete problem: what must hold to round-off, at a known order, or
+//! between two ways of computing the same thing.
+//!
+//! Meshes are small and made here or by gmsh in a temporary folder; a tolerance that is not
+//! round-off says where it comes from.
+
+mod support;
+
+mod constraints;
+mod contact;
+mod damage;
+mod elements;
+mod geometries;
+mod hertz;
+mod loads;
+mod orders;
+mod patch;
+mod regression;
+mod rigid;

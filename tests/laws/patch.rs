@@ -1,0 +1,171 @@
+//! The patch test: a body under uniform stress is solved exactly on any mesh.
+
+use crate::support::{
+    close_to, difference, distorted, moved, run, setting, square, turn, unstructured,
+};
+use signorini::{
+    contact::SOLVERS,
+    evolution::{Setting, State},
+    mesh::Mesh,
+    model::Plane,
+};
+
+const YOUNG: f64 = 200.0;
+const POISSON: f64 = 0.3;
+/// Round-off times the condition number, here about 10³.
+const TOLERANCE: f64 = 1e-12;
+
+/// [material] with a KKT tolerance near round-off.
+fn material(plane: Plane) -> String {
+    let plane = match plane {
+        Plane::Stress => "stress",
+        Plane::Strain => "strain",
+    };
+    format!(
+        "material = {{ young = {YOUNG}, poisson = {POISSON}, plane = '{plane}' }}
+         contact.tolerance = 1e-13\n"
+    )
+}
+
+/// ε_yy and ε_xx of σ_yy = −1 alone: −1/E and ν/E in plane stress,
+/// −(1−ν²)/E and ν(1+ν)/E in plane strain.
+fn strain(plane: Plane) -> [f64; 2] {
+    let [yy, xx] = match plane {
+        Plane::Stress => [1.0, POISSON],
+        Plane::Strain => [1.0 - POISSON * POISSON, POISSON * (1.0 + POISSON)],
+    };
+    [-yy / YOUNG, xx / YOUNG]
+}
+
+fn meshes() -> [(&'static str, Mesh); 3] {
+    [("structured", square(5)), ("distorted", distorted(6)), ("unstructured", unstructured(0.15))]
+}
+
+/// Each contact node carries `pressure`.
+#[track_caller]
+fn check_pressures(state: &State, pressure: f64) {
+    assert!(!state.contact.is_empty());
+    for point in &state.contact {
+        close_to(point.pressure, pressure, 1e-9);
+        assert!(point.active && point.gap.abs() < 1e-12, "{point:?}");
+    }
+}
+
+/// Pressed by p from the top on a foundation, with a symmetry axis at the left; the whole
+/// turned by `angle` about the origin.
+fn pressed(mesh: Mesh, angle: f64, plane: Plane, p: f64, more: &str) -> Setting {
+    let text = format!(
+        "{more}\n{}
+         boundary = [
+            {{ name = 'left', symmetry = true }},
+            {{ name = 'bottom', gap = 0 }},
+            {{ name = 'top', traction = {:?} }},
+         ]",
+        material(plane),
+        turn(angle, [0.0, -p]),
+    );
+    setting(moved(mesh, |x| turn(angle, x)), &text).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// u = p (ε_xx x, ε_yy y) turned by `angle`.
+fn exact(setting: &Setting, angle: f64, p: f64, [yy, xx]: [f64; 2]) -> Vec<f64> {
+    let place = |x: &[f64; 2]| {
+        let [x, y] = turn(-angle, *x);
+        turn(angle, [p * xx * x, p * yy * y])
+    };
+    setting.body.mesh.nodes.iter().flat_map(place).collect()
+}
+
+#[test]
+fn uniform_pressure_on_a_foundation() {
+    let p = 7.0;
+    for plane in [Plane::Stress, Plane::Strain] {
+        for (name, mesh) in meshes() {
+            for angle in [0.0, 0.7, -2.5] {
+                for solver in SOLVERS {
+                    let setting = pressed(mesh.clone(), angle, plane, p, "");
+                    let state = run(&setting, solver).last.state;
+                    let error = difference(&state.u, &exact(&setting, angle, p, strain(plane)));
+                    assert!(error < TOLERANCE, "{solver}, {name}, {angle}: {error:.1e}");
+                    check_pressures(&state, p);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn stress_is_the_pressure_along_the_load_and_nothing_else() {
+    for (_, mesh) in meshes() {
+        let setting = pressed(mesh, 0.0, Plane::Stress, 3.0, "");
+        let u = run(&setting, SOLVERS[0]).last.state.u;
+        for t in 0..setting.body.triangles.len() {
+            let s = setting.elasticity.stress(&setting.body, t, 1.0, &u);
+            assert!((s[1] + 3.0).abs().max(s[0].abs()).max(s[2].abs()) < 1e-10, "{s}");
+        }
+    }
+}
+
+#[test]
+fn uniform_damage_softens_the_whole_patch() {
+    // ζ = ½: twice the displacement under the same pressure.
+    let damage = "damage = { diffusion = 1, lambda_d = 0, lambda_u = 1, lambda_w = 0, \
+                             strain_cap = 1, threshold = 0.01, initial = 0.5 }";
+    for solver in SOLVERS {
+        let setting = pressed(distorted(6), 0.7, Plane::Stress, 7.0, damage);
+        let state = run(&setting, solver).last.state;
+        let error = difference(&state.u, &exact(&setting, 0.7, 14.0, strain(Plane::Stress)));
+        assert!(error < TOLERANCE, "{solver}: {error:.1e}");
+        assert!(state.zeta.iter().all(|z| *z == 0.5));
+        check_pressures(&state, 7.0);
+    }
+}
+
+#[test]
+fn all_round_pressure_into_a_corner_of_the_foundation() {
+    // Two sides of a parallelogram on the foundation, p on the other two: σ = −p I, and the
+    // body shrinks towards the corner, u = −p (1−ν)/E (x − corner) in plane stress. The
+    // corner has two normals, oblique where the sides are; gaps shift the body into it.
+    let p = 7.0;
+    for (slope, angle) in [(0.0, 0.0), (0.4, 0.0), (-0.5, 1.1)] {
+        for gaps in [[0.0, 0.0], [0.01, 0.03]] {
+            // The corner is (1, 0), where the bottom meets the right side.
+            let mesh = moved(distorted(6), |[x, y]| turn(angle, [x + slope * y, y]));
+            let normal = |curve: &str| mesh.edge_normal(mesh.curves[curve].edges[0]).0;
+            let load = |curve: &str| normal(curve).map(|n| -p * n);
+            let text = format!(
+                "{}
+                 boundary = [
+                    {{ name = 'bottom', gap = {} }},
+                    {{ name = 'right', gap = {} }},
+                    {{ name = 'top', traction = {:?} }},
+                    {{ name = 'left', traction = {:?} }},
+                 ]",
+                material(Plane::Stress),
+                gaps[0],
+                gaps[1],
+                load("top"),
+                load("left"),
+            );
+            // The shift w that closes both gaps: w·ν_bottom = g_bottom, w·ν_right = g_right.
+            let ([a, b], [c, d]) = (normal("bottom"), normal("right"));
+            let w =
+                [d * gaps[0] - b * gaps[1], a * gaps[1] - c * gaps[0]].map(|w| w / (a * d - b * c));
+            let corner = turn(angle, [1.0, 0.0]);
+            let shrink = -p * (1.0 - POISSON) / YOUNG;
+            let expected: Vec<f64> = (mesh.nodes.iter())
+                .flat_map(|x| [0, 1].map(|k| w[k] + shrink * (x[k] - corner[k])))
+                .collect();
+            for solver in SOLVERS {
+                let setting = setting(mesh.clone(), &text).unwrap();
+                let state = run(&setting, solver).last.state;
+                let error = difference(&state.u, &expected);
+                assert!(error < TOLERANCE, "{solver}, slope {slope}, {gaps:?}: {error:.1e}");
+                check_pressures(&state, p);
+                let corner = setting.body.mesh.curves["right"].edges[0][0];
+                let faces = state.contact.iter().filter(|point| point.node == corner);
+                assert_eq!(faces.count(), 2);
+            }
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! The figures of every shipped scene at its shipped settings, as they were when the laws
+//! beside this file held. A change here is a change of what users get.
+//!
+//! To regenerate the table after a change that is meant:
+//! `cargo test --test laws regression -- --nocapture`, and paste the rows it prints.
+//!
+//! The unstructured meshes are those of gmsh 4.8.4. Another release may triangulate
+//! otherwise; then their figures are held to the discretisation error only.
+
+use crate::support::{run, shipped, shipped_names};
+use signorini::contact::SOLVERS;
+use std::process::Command;
+
+/// `active_nodes` and `stopped` as in the summary; the losses are 1 − min ζ and 1 − mean ζ.
+struct Figures {
+    scene: &'static str,
+    greatest_loss: f64,
+    mean_loss: f64,
+    displacement_max: f64,
+    work: f64,
+    contact_force: f64,
+    active_nodes: usize,
+    stopped: Option<f64>,
+}
+
+#[rustfmt::skip]
+const TABLE: &[Figures] = &[
+    Figures { scene: "bridge", greatest_loss: 4.309887556e-5, mean_loss: 9.688414117e-6, displacement_max: 7.303604853e-3, work: 2.029522743e0, contact_force: 3.200000000e2, active_nodes: 4, stopped: None },
+    Figures { scene: "bridge-half", greatest_loss: 4.309887556e-5, mean_loss: 9.688414121e-6, displacement_max: 7.303604853e-3, work: 1.014761371e0, contact_force: 1.600000000e2, active_nodes: 2, stopped: None },
+    Figures { scene: "hertz", greatest_loss: 0.000000000e0, mean_loss: 0.000000000e0, displacement_max: 1.353938970e-3, work: 1.750222618e4, contact_force: 1.750000000e7, active_nodes: 34, stopped: None },
+    Figures { scene: "lshape", greatest_loss: 1.598864637e-3, mean_loss: 4.042507753e-4, displacement_max: 1.702937783e-2, work: 5.092688858e0, contact_force: 3.568442075e2, active_nodes: 5, stopped: None },
+    Figures { scene: "square", greatest_loss: 9.841058733e-1, mean_loss: 3.755233454e-2, displacement_max: 2.472740206e-1, work: 2.684630536e0, contact_force: 1.196051485e1, active_nodes: 32, stopped: Some(0.025) },
+    Figures { scene: "square-mild", greatest_loss: 1.877844455e-1, mean_loss: 3.095517597e-2, displacement_max: 2.401717955e-1, work: 2.594413377e0, contact_force: 1.193463088e1, active_nodes: 32, stopped: None },
+];
+
+/// Rounding, the KKT tolerance and the order of sums: solvers differ by 10⁻⁹ here.
+const SAME_MESH: f64 = 1e-6;
+/// Another mesh of the same size.
+const OTHER_MESH: f64 = 2e-2;
+
+fn gmsh_is_the_tables() -> bool {
+    let output = Command::new("gmsh").arg("--version").output().unwrap();
+    String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).contains("4.8.4")
+}
+
+#[test]
+fn the_shipped_scenes_give_the_figures_they_gave() {
+    let mut wrong = Vec::new();
+    for name in shipped_names() {
+        let outcome = run(&shipped(&name, &[]), SOLVERS[0]);
+        let record = outcome.last.record;
+        let stopped = outcome.stopped.map(|(time, _)| time);
+        let found = [
+            1.0 - record.zeta_min,
+            1.0 - record.zeta_mean,
+            record.displacement_max,
+            record.work,
+            record.contact_force,
+        ];
+        let [greatest_loss, mean_loss, displacement_max, work, contact_force] = found;
+        println!(
+            "    Figures {{ scene: {name:?}, greatest_loss: {greatest_loss:.9e}, \
+             mean_loss: {mean_loss:.9e}, displacement_max: {displacement_max:.9e}, \
+             work: {work:.9e}, contact_force: {contact_force:.9e}, \
+             active_nodes: {}, stopped: {stopped:?} }},",
+            record.active_nodes
+        );
+        let Some(row) = TABLE.iter().find(|row| row.scene == name) else {
+            wrong.push(format!("{name} is not in the table"));
+            continue;
+        };
+        // square.geo is structured: the same for every gmsh.
+        let same = name.starts_with("square") || gmsh_is_the_tables();
+        let tolerance = if same { SAME_MESH } else { OTHER_MESH };
+        let expected =
+            [row.greatest_loss, row.mean_loss, row.displacement_max, row.work, row.contact_force];
+        for (found, expected) in found.iter().zip(expected) {
+            let error = (found - expected).abs();
+            if error.is_nan() || error > tolerance * expected.abs() {
+                wrong.push(format!("{name}: {found:e} was {expected:e}"));
+            }
+        }
+        if same && record.active_nodes != row.active_nodes {
+            wrong.push(format!("{name}: {} nodes active, not as before", record.active_nodes));
+        }
+        if stopped.is_some() != row.stopped.is_some()
+            || stopped.zip(row.stopped).is_some_and(|(a, b)| (a - b).abs() > 1e-9)
+        {
+            wrong.push(format!("{name}: stopped at {stopped:?}, not at {:?}", row.stopped));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    for row in TABLE {
+        let known = shipped_names().iter().any(|name| name == row.scene);
+        assert!(known, "{} is no longer shipped", row.scene);
+    }
+}

@@ -1,0 +1,245 @@
+//! Rigid motions: which are held, which only contact resists, which the load drives.
+
+use crate::support::{close, difference, distorted, largest, moved, run, setting, square, turn};
+use signorini::{
+    contact::{GapRow, RigidMotion, RigidMotions, SOLVERS},
+    evolution::{Setting, SetupError},
+    fem::Body,
+    mesh::{Curve, Mesh},
+};
+use std::collections::BTreeMap;
+
+const MATERIAL: &str = "material = { young = 100, poisson = 0.3, plane = 'stress' }";
+
+fn bounded(mesh: Mesh, boundaries: &str) -> Result<Setting, SetupError> {
+    setting(mesh, &format!("{MATERIAL}\nboundary = [{boundaries}]"))
+}
+
+/// The motions of a scene that stands.
+fn motions(mesh: Mesh, boundaries: &str) -> RigidMotions {
+    bounded(mesh, boundaries).unwrap_or_else(|e| panic!("{e}")).motions
+}
+
+/// The motion that the load drives, in words.
+#[track_caller]
+fn driven(mesh: Mesh, boundaries: &str) -> String {
+    match bounded(mesh, boundaries) {
+        Err(SetupError::Driven { source, .. }) => source.motion.to_string(),
+        Err(other) => panic!("{other}"),
+        Ok(_) => panic!("the load was accepted"),
+    }
+}
+
+/// The square with two more curves: the parts of the top and the bottom within `foot` and
+/// `load` in x.
+fn footed(foot: [f64; 2], load: [f64; 2]) -> Mesh {
+    let mut mesh = square(10);
+    for (name, whole, [from, to]) in [("foot", "bottom", foot), ("load", "top", load)] {
+        let middle = |e: &&[usize; 2]| 0.5 * (mesh.nodes[e[0]][0] + mesh.nodes[e[1]][0]);
+        let within = |e: &&[usize; 2]| from < middle(e) && middle(e) < to;
+        let edges = mesh.curves[whole].edges.iter().filter(within).copied().collect();
+        mesh.curves.insert(name.into(), Curve { edges, interior_edges: 0 });
+    }
+    mesh
+}
+
+#[test]
+fn a_clamped_side_holds_the_body() {
+    let motions = motions(square(3), "{ name = 'left', displacement = [0, 0] }");
+    assert!(motions.held() && motions.free.is_empty() && !motions.resisted_by_contact_only());
+}
+
+#[test]
+fn a_body_on_a_foundation_may_slide_but_not_sink_or_turn() {
+    let down = "{ name = 'bottom', gap = 0 }, { name = 'top', traction = [0, -1] }";
+    let setting = bounded(distorted(4), down).unwrap();
+    assert!(!setting.motions.held() && setting.motions.resisted_by_contact_only());
+    let names: Vec<_> = setting.motions.free.iter().map(RigidMotion::to_string).collect();
+    assert_eq!(names, ["the horizontal translation"]);
+    assert_eq!(setting.notes().len(), 1);
+    for solver in SOLVERS {
+        // Of all answers the one that does not slide on average.
+        let u = run(&setting, solver).last.state.u;
+        let mean: f64 =
+            (setting.body.node_area.iter().enumerate()).map(|(i, a)| a * u[2 * i]).sum();
+        assert!(mean.abs() < 1e-15 && largest(&u) > 1e-3);
+    }
+}
+
+#[test]
+fn loads_that_nothing_balances_are_named_by_the_motion_they_drive() {
+    let on_ground = |load: &str| {
+        let ground = "{ name = 'bottom', gap = 0 }, { name = 'top', traction = ";
+        driven(square(4), &format!("{ground}{load} }}"))
+    };
+    assert_eq!(on_ground("[1, -1]"), "the horizontal translation");
+    assert_eq!(on_ground("[1e-6, -1]"), "the horizontal translation");
+    assert_eq!(on_ground("[0, 1]"), "the vertical translation");
+    let couple = "{ name = 'left', traction = [0, -1] }, { name = 'right', traction = [0, 1] }";
+    assert!(driven(square(4), couple).starts_with("the rotation about (0.5000, 0.5000)"));
+    // Held against sliding by an axis, a body is still lifted.
+    let lifted = "{ name = 'left', symmetry = true }, { name = 'bottom', gap = 0 },
+                  { name = 'top', traction = [0, 1] }";
+    assert_eq!(driven(square(4), lifted), "the vertical translation");
+}
+
+#[test]
+fn a_load_tips_the_body_as_soon_as_its_resultant_leaves_the_support() {
+    // The foot is 0.3 ≤ x ≤ 0.7, the load 0.2 wide around its centre.
+    let scene = "{ name = 'foot', gap = 0 }, { name = 'load', traction = [0, -1] }";
+    for centre in [0.3, 0.4, 0.5, 0.7] {
+        let mesh = footed([0.3, 0.7], [centre - 0.1, centre + 0.1]);
+        assert!(bounded(mesh, scene).is_ok(), "{centre}");
+    }
+    for centre in [0.1, 0.2, 0.8, 0.9] {
+        let name = driven(footed([0.3, 0.7], [centre - 0.1, centre + 0.1]), scene);
+        assert!(name.starts_with("the rotation about"), "{name}");
+    }
+}
+
+#[test]
+fn a_body_about_to_tip_stands_on_one_edge() {
+    // The load 0.6 ≤ x ≤ 0.8 has its resultant above the end of the foot: all of the
+    // reaction, 0.2, is in that one node.
+    let scene = "{ name = 'foot', gap = 0 }, { name = 'load', traction = [0, -1] }";
+    for solver in SOLVERS {
+        let setting = bounded(footed([0.3, 0.7], [0.6, 0.8]), scene).unwrap();
+        let last = run(&setting, solver).last;
+        close(last.record.contact_force, 0.2, 1e-9);
+        for point in &last.state.contact {
+            let [x, _] = setting.body.mesh.nodes[point.node];
+            let force = if (x - 0.7).abs() < 1e-9 { 0.2 } else { 0.0 };
+            close(point.force, force, 1e-9);
+        }
+    }
+}
+
+#[test]
+fn a_body_that_nothing_holds_takes_balanced_loads() {
+    // Pulled by ±σ on opposite sides of a square turned by any angle: u = (σ/E)(x − x̄) along
+    // the pull and −ν as much across, less what of it is a rigid motion.
+    for angle in [0.0, 0.6, 2.0] {
+        let mesh = moved(distorted(5), |x| turn(angle, x));
+        let text = format!(
+            "{{ name = 'left', traction = {:?} }}, {{ name = 'right', traction = {:?} }}",
+            turn(angle, [-2.0, 0.0]),
+            turn(angle, [2.0, 0.0])
+        );
+        let setting = bounded(mesh, &text).unwrap();
+        assert_eq!(setting.motions.free.len(), 3);
+        let mut expected: Vec<f64> = (setting.body.mesh.nodes.iter())
+            .flat_map(|x| {
+                let [x, y] = turn(-angle, *x);
+                turn(angle, [0.02 * (x - 0.5), -0.006 * (y - 0.5)])
+            })
+            .collect();
+        setting.motions.remove_free(&setting.body, &mut expected);
+        let u = run(&setting, SOLVERS[0]).last.state.u;
+        let error = difference(&u, &expected);
+        assert!(error < 1e-12, "{error}");
+        // Σ area_i u_i·m(x_i) = 0 for each free motion m.
+        for motion in &setting.motions.free {
+            let nodes =
+                setting.body.mesh.nodes.iter().zip(&setting.body.node_area).zip(u.chunks(2));
+            let share: f64 = nodes
+                .map(|((x, area), u)| {
+                    let m = motion.at(*x);
+                    area * (m[0] * u[0] + m[1] * u[1])
+                })
+                .sum();
+            assert!(share.abs() < 1e-15, "{share}");
+        }
+    }
+}
+
+#[test]
+fn a_body_without_load_rests() {
+    let setting = bounded(square(4), "{ name = 'top', traction = [0, 0] }").unwrap();
+    assert_eq!(setting.motions.free.len(), 3);
+    assert_eq!(setting.notes().len(), 3);
+    for solver in SOLVERS {
+        let outcome = run(&setting, solver);
+        assert!(outcome.last.state.u.iter().all(|u| *u == 0.0));
+        assert_eq!(outcome.kkt.worst(), 0.0);
+    }
+}
+
+#[test]
+fn free_motions_are_orthonormal_over_the_body() {
+    let setting = bounded(distorted(4), "{ name = 'top', traction = [0, 0] }").unwrap();
+    let (body, free) = (&setting.body, &setting.motions.free);
+    for (i, a) in free.iter().enumerate() {
+        for (j, b) in free.iter().enumerate() {
+            let product: f64 = (body.mesh.nodes.iter().zip(&body.node_area))
+                .map(|(x, area)| {
+                    let (a, b) = (a.at(*x), b.at(*x));
+                    area * (a[0] * b[0] + a[1] * b[1])
+                })
+                .sum();
+            // The square's area is 1, so a unit translation has length 1.
+            close(product, if i == j { 1.0 } else { 0.0 }, 1e-12);
+        }
+    }
+}
+
+#[test]
+fn an_axis_leaves_the_translation_along_it() {
+    let free = |mesh: Mesh, boundaries: &str| -> Vec<String> {
+        motions(mesh, boundaries).free.iter().map(RigidMotion::to_string).collect()
+    };
+    let left = "{ name = 'left', symmetry = true }";
+    let bottom = "{ name = 'bottom', symmetry = true }";
+    assert_eq!(free(square(3), left), ["the vertical translation"]);
+    assert_eq!(free(square(3), bottom), ["the horizontal translation"]);
+    let turned = moved(square(3), |x| turn(0.25 * std::f64::consts::PI, x));
+    let [name] = &free(turned, left)[..] else { panic!("one motion") };
+    assert!(name.contains("0.707"), "{name}");
+    assert!(motions(square(3), &format!("{left}, {bottom}")).held());
+    // u_y = 0 along x = 0 leaves the translation in x and turning about a point of that side.
+    let component = motions(square(3), "{ name = 'left', displacement = ['free', 0] }");
+    assert_eq!(component.free.len(), 2);
+    for motion in &component.free {
+        assert!((0..5).all(|i| motion.at([0.0, f64::from(i)])[1].abs() < 1e-12), "{motion}");
+    }
+}
+
+#[test]
+fn a_disc_in_a_ring_can_only_turn() {
+    // A regular polygon, its boundary all axis or all foundation: every normal passes
+    // through the centre.
+    let corners = 16;
+    let point = |i: usize| {
+        let (s, c) = (std::f64::consts::TAU * i as f64 / corners as f64).sin_cos();
+        [3.0 + c, 2.0 + s]
+    };
+    let edges: Vec<_> = (0..corners).map(|i| [1 + i, 1 + (i + 1) % corners]).collect();
+    let mesh = Mesh {
+        nodes: std::iter::once([3.0, 2.0]).chain((0..corners).map(point)).collect(),
+        triangles: edges.iter().map(|&[a, b]| [0, a, b]).collect(),
+        curves: BTreeMap::from([("rim".to_owned(), Curve { edges, interior_edges: 0 })]),
+    };
+    for held in ["symmetry = true", "gap = 0"] {
+        let motions = motions(mesh.clone(), &format!("{{ name = 'rim', {held} }}"));
+        let names: Vec<_> = motions.free.iter().map(RigidMotion::to_string).collect();
+        assert_eq!(names, ["the rotation about (3.0000, 2.0000)"], "{held}");
+        assert_eq!(motions.resisted_by_contact_only(), held == "gap = 0");
+    }
+}
+
+#[test]
+fn contact_on_opposite_sides_resists_both_ways_on_one_side_only_one() {
+    // Farkas: a load is balanced by p ≥ 0 if no motion that contact allows does work.
+    let body = Body::new(square(2));
+    let gap = |node: usize, normal| GapRow { node, normal, gap: 0.0, weight: 1.0 };
+    let load = |force: [f64; 2]| -> Vec<f64> {
+        (0..9).flat_map(|i| if i == 4 { force } else { [0.0; 2] }).collect()
+    };
+    // Nodes 3 and 5 are (0, ½) and (1, ½), 4 is the centre.
+    let between = RigidMotions::new(&body, &[], &[gap(3, [-1.0, 0.0]), gap(5, [1.0, 0.0])]);
+    assert!(between.check(&body, &load([1.0, 0.0])).is_ok());
+    assert!(between.check(&body, &load([-1.0, 0.0])).is_ok());
+    assert!(between.check(&body, &load([0.0, 1.0])).is_err());
+    let against = RigidMotions::new(&body, &[], &[gap(5, [1.0, 0.0])]);
+    assert!(against.check(&body, &load([1.0, 0.0])).is_ok());
+    assert!(against.check(&body, &load([-1.0, 0.0])).is_err());
+}

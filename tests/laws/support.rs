@@ -1,0 +1,183 @@
+//! Meshes, scenes and runs for the laws.
+
+use signorini::{
+    evolution::{self, Outcome, Phases, Setting, SetupError, Step},
+    mesh::{self, Curve, Mesh},
+    petsc::Session,
+    scene::Scene,
+};
+use std::{fs, path::Path};
+
+/// Numbers between −1 and 1, the same at every run (SplitMix64).
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+
+    pub fn field(&mut self, length: usize) -> Vec<f64> {
+        (0..length).map(|_| self.next()).collect()
+    }
+}
+
+/// The unit square, n×n cells cut along the rising diagonal, with its four sides.
+pub fn square(n: usize) -> Mesh {
+    let node = |i: usize, j: usize| i + (n + 1) * j;
+    let at = |k: usize| k as f64 / n as f64;
+    let nodes = (0..=n).flat_map(|j| (0..=n).map(move |i| [at(i), at(j)])).collect();
+    let cells = (0..n).flat_map(|j| (0..n).map(move |i| (i, j)));
+    let cut = |(i, j): (usize, usize)| {
+        let [a, b, c, d] = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)];
+        [[a, b, c], [a, c, d]]
+    };
+    let side = |edge: &dyn Fn(usize) -> [usize; 2]| Curve {
+        edges: (0..n).map(edge).collect(),
+        interior_edges: 0,
+    };
+    let curves = [
+        ("bottom", side(&|i| [node(i, 0), node(i + 1, 0)])),
+        ("right", side(&|j| [node(n, j), node(n, j + 1)])),
+        ("top", side(&|i| [node(i + 1, n), node(i, n)])),
+        ("left", side(&|j| [node(0, j + 1), node(0, j)])),
+    ];
+    Mesh {
+        nodes,
+        triangles: cells.flat_map(cut).collect(),
+        curves: curves.map(|(name, curve)| (name.to_owned(), curve)).into(),
+    }
+}
+
+/// The same with its inner nodes moved at random, by up to 0.3 cells in x and y, and those
+/// on the sides along them.
+pub fn distorted(n: usize) -> Mesh {
+    let (mut mesh, mut random) = (square(n), Random(n as u64));
+    let reach = 0.3 / n as f64;
+    for node in &mut mesh.nodes {
+        for x in node {
+            let shift = reach * random.next();
+            if *x > 0.0 && *x < 1.0 {
+                *x += shift;
+            }
+        }
+    }
+    mesh
+}
+
+/// The unit square as gmsh triangulates it.
+pub fn unstructured(size: f64) -> Mesh {
+    let folder = tempfile::tempdir().unwrap();
+    let geo = folder.path().join("square.geo");
+    let corners = "Point(1) = {0,0,0}; Point(2) = {1,0,0}; Point(3) = {1,1,0}; Point(4) = {0,1,0};";
+    let sides = "Line(1) = {1,2}; Line(2) = {2,3}; Line(3) = {3,4}; Line(4) = {4,1};";
+    let names = ["bottom", "right", "top", "left"];
+    let named: String = (names.iter().enumerate())
+        .map(|(i, name)| format!("Physical Curve(\"{name}\") = {{{}}};\n", i + 1))
+        .collect();
+    let body = "Curve Loop(1) = {1:4}; Plane Surface(1) = {1}; Physical Surface(\"body\") = {1};";
+    fs::write(&geo, [corners, sides, body, &named].join("\n")).unwrap();
+    mesh::load(&geo, &[("size".to_owned(), size)].into()).unwrap()
+}
+
+/// `mesh` with its nodes moved; the map must keep the orientation.
+pub fn moved(mut mesh: Mesh, place: impl Fn([f64; 2]) -> [f64; 2]) -> Mesh {
+    mesh.nodes.iter_mut().for_each(|x| *x = place(*x));
+    mesh
+}
+
+/// x turned by `angle` about the origin.
+pub fn turn(angle: f64, [x, y]: [f64; 2]) -> [f64; 2] {
+    let (s, c) = angle.sin_cos();
+    [c * x - s * y, s * x + c * y]
+}
+
+/// The scene `text` (TOML without `mesh`) on `mesh`.
+pub fn setting(mesh: Mesh, text: &str) -> Result<Setting, SetupError> {
+    let text = format!("mesh.file = 'given.msh'\n{text}");
+    let scene = Scene::parse(&text, Path::new("law.toml"), &[]).unwrap_or_else(|e| panic!("{e}"));
+    Setting::new(scene, mesh)
+}
+
+/// A shipped scene with `--set` arguments.
+pub fn shipped(name: &str, sets: &[&str]) -> Setting {
+    let geo = Path::new(env!("CARGO_MANIFEST_DIR")).join("geo");
+    // Meshes appear beside the geometry, so it is copied.
+    let folder = tempfile::tempdir().unwrap();
+    for entry in fs::read_dir(geo).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "geo" || e == "toml") {
+            fs::copy(&path, folder.path().join(path.file_name().unwrap())).unwrap();
+        }
+    }
+    let sets: Vec<String> = sets.iter().map(|s| (*s).to_owned()).collect();
+    let scene = folder.path().join(name).with_extension("toml");
+    let scene = Scene::read(&scene, &sets).unwrap_or_else(|e| panic!("{e}"));
+    let mesh = mesh::load(&scene.mesh.file, &scene.mesh.parameters).unwrap();
+    Setting::new(scene, mesh).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// The names of all shipped scenes.
+pub fn shipped_names() -> Vec<String> {
+    let geo = Path::new(env!("CARGO_MANIFEST_DIR")).join("geo");
+    let paths = fs::read_dir(geo).unwrap().map(|entry| entry.unwrap().path());
+    let scenes = paths.filter(|path| path.extension().is_some_and(|e| e == "toml"));
+    let mut names: Vec<_> =
+        scenes.map(|path| path.file_stem().unwrap().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+/// All accepted steps and the outcome.
+pub fn history(setting: &Setting, solver: &str) -> (Vec<Step>, Outcome) {
+    let session = Session::start(&[]).unwrap();
+    let mut steps = Vec::new();
+    let outcome = evolution::run(&session, setting, solver, &Phases::default(), &mut |step| {
+        steps.push(step.clone());
+        Ok(())
+    });
+    let scene = &setting.scene().name;
+    (steps, outcome.unwrap_or_else(|e| panic!("{scene} by {solver}: {e}")))
+}
+
+/// The outcome alone.
+pub fn run(setting: &Setting, solver: &str) -> Outcome {
+    history(setting, solver).1
+}
+
+/// ‖a − b‖ / ‖b‖.
+pub fn difference(a: &[f64], b: &[f64]) -> f64 {
+    let norm = |v: &mut dyn Iterator<Item = f64>| v.map(|v| v * v).sum::<f64>().sqrt();
+    norm(&mut a.iter().zip(b).map(|(a, b)| a - b)) / norm(&mut b.iter().copied())
+}
+
+/// The largest |v|.
+pub fn largest(v: &[f64]) -> f64 {
+    v.iter().fold(0.0, |m, v| m.max(v.abs()))
+}
+
+#[track_caller]
+pub fn close(value: f64, expected: f64, tolerance: f64) {
+    let error = (value - expected).abs();
+    // Not `error > …`: NaN must fail.
+    assert!(error <= tolerance * expected.abs().max(1.0), "{value} is not {expected}");
+}
+
+/// The same against the size of `expected` alone, however small it is.
+#[track_caller]
+pub fn close_to(value: f64, expected: f64, tolerance: f64) {
+    let error = (value - expected).abs() / expected.abs();
+    assert!(error <= tolerance, "{value} is not {expected}: {error:.1e} > {tolerance:.1e}");
+}
+
+/// Least-squares slope of log error over log size: the order of convergence.
+pub fn order(sizes: &[f64], errors: &[f64]) -> f64 {
+    let points: Vec<_> = sizes.iter().zip(errors).map(|(h, e)| (h.ln(), e.ln())).collect();
+    let n = points.len() as f64;
+    let (x, y) = points.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
+    let over: f64 = points.iter().map(|(a, b)| (a - x) * (b - y)).sum();
+    over / points.iter().map(|(a, _)| (a - x) * (a - x)).sum::<f64>()
+}
