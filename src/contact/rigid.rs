@@ -144,6 +144,11 @@ impl RigidMotions {
         self.free.is_empty() && self.resisted.is_empty()
     }
 
+    /// Number of motions that contact alone holds: the dimension of K's null space.
+    pub fn resisted(&self) -> usize {
+        self.resisted.len()
+    }
+
     /// u·ν at `bounds` (rows) of the motions that only contact holds (columns).
     pub fn normal_at(&self, body: &Body, bounds: &[Bound]) -> DMatrix<f64> {
         DMatrix::from_fn(bounds.len(), self.resisted.len(), |i, j| {

@@ -24,8 +24,7 @@ pub struct Summary {
     pub end_time: f64,
     /// Time at which ζ_* was reached, s; null if it was not.
     pub stopped_at: Option<f64>,
-    /// How far off `stopped_at` may be, s.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// How far off `stopped_at` may be, s; null if ζ_* was not reached.
     pub stopped_uncertainty: Option<f64>,
     /// min ζ.
     pub zeta_min: f64,

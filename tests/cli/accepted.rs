@@ -4,7 +4,7 @@ use crate::desk::{Desk, square};
 use serde_json::Value;
 use std::process::Stdio;
 
-const KEYS: [&str; 21] = [
+const KEYS: [&str; 22] = [
     "scene",
     "title",
     "solver",
@@ -13,6 +13,7 @@ const KEYS: [&str; 21] = [
     "steps",
     "end_time",
     "stopped_at",
+    "stopped_uncertainty",
     "zeta_min",
     "zeta_mean",
     "displacement_max",
@@ -27,7 +28,7 @@ const KEYS: [&str; 21] = [
     "foundation",
     "notes",
 ];
-const COLUMNS: [&str; 17] = [
+const COLUMNS: [&str; 18] = [
     "step",
     "time",
     "zeta_min",
@@ -40,6 +41,7 @@ const COLUMNS: [&str; 17] = [
     "linear_iterations",
     "factorisations",
     "fallbacks",
+    "contraction",
     "kkt_stationarity",
     "kkt_primal",
     "kkt_dual",

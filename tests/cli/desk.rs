@@ -48,12 +48,15 @@ impl Desk {
         serde_json::from_str(&self.read(&format!("{folder}/summary.json"))).expect("JSON")
     }
 
-    /// `history.csv`: column names, and the rows as numbers.
+    /// `history.csv`: column names, and the rows as numbers, NaN where a cell is empty.
     pub fn history(&self, folder: &str) -> (Vec<String>, Vec<Vec<f64>>) {
         let text = self.read(&format!("{folder}/history.csv"));
         let mut reader = csv::Reader::from_reader(text.as_bytes());
         let names = reader.headers().expect("a header").iter().map(str::to_owned).collect();
-        let rows = reader.deserialize().map(|row| row.expect("numbers")).collect();
+        let rows: Vec<Vec<Option<f64>>> =
+            reader.deserialize().map(|row| row.expect("numbers")).collect();
+        let rows =
+            rows.into_iter().map(|r| r.iter().map(|v| v.unwrap_or(f64::NAN)).collect()).collect();
         (names, rows)
     }
 

@@ -3,7 +3,7 @@
 use crate::support::{close, close_to, distorted, history, order, run, setting, shipped, square};
 use signorini::{
     contact::SOLVERS,
-    evolution::{Setting, Step},
+    evolution::{Setting, Step, Stop},
     fem::source_load,
     mesh::Mesh,
 };
@@ -79,7 +79,7 @@ fn the_run_stops_at_the_threshold_with_the_last_admissible_state() {
     let s = 500.0 * STRAIN_SQUARED;
     let (steps, outcome) = history(&strained(square(3), "1", damage, 0.05), SOLVERS[0]);
     let first = (0.2 / s / 0.05).ceil();
-    let (time, least) = outcome.stopped.unwrap();
+    let Stop { time, zeta_min: least, .. } = outcome.stopped.unwrap();
     close(time, 0.05 * first, 1e-14);
     close(least, 0.9 - s * time, 1e-13);
     assert!(least <= 0.7);
@@ -208,7 +208,7 @@ fn uniform_damage_converges_to_its_differential_equation_with_order_one() {
 fn the_loss_of_damage_is_the_integral_of_the_source() {
     // Testing (28) with 1: ∫ζ_n − ∫ζ_{n−1} = k ∫φ_{n−1}, with the damage far from uniform.
     let setting = shipped("square-mild", &["mesh.size=0.125", "time.step=0.1"]);
-    let (law, k) = setting.damage().unwrap();
+    let (law, k) = (setting.damage().unwrap(), 0.1);
     let (steps, _) = history(&setting, SOLVERS[0]);
     assert_eq!(steps.len(), 11);
     for pair in steps.windows(2) {

@@ -25,7 +25,7 @@ fn all_solvers_agree_on_every_shipped_scene() {
             let (steps, outcome) = history(&setting, solver);
             assert!(outcome.kkt.within(1e-10), "{name}, {solver}: {}", outcome.kkt);
             assert_eq!(steps.len(), first.len(), "{name}, {solver}");
-            let stopped = |o: &signorini::evolution::Outcome| o.stopped.map(|(time, _)| time);
+            let stopped = |o: &signorini::evolution::Outcome| o.stopped.map(|stop| stop.time);
             assert_eq!(stopped(&outcome), stopped(&first_outcome), "{name}, {solver}");
             let (mut worst_u, mut worst_zeta) = (0.0_f64, 0.0_f64);
             for (step, other) in steps.iter().zip(&first) {

@@ -49,7 +49,7 @@ fn the_shipped_scenes_give_the_figures_they_gave() {
     for name in shipped_names() {
         let outcome = run(&shipped(&name, &[]), SOLVERS[0]);
         let record = outcome.last.record;
-        let stopped = outcome.stopped.map(|(time, _)| time);
+        let stopped = outcome.stopped.map(|stop| stop.time);
         let found = [
             1.0 - record.zeta_min,
             1.0 - record.zeta_mean,
