@@ -16,7 +16,7 @@ BINARY := target/release/signorini
 # rustup puts cargo where a shell opened before does not look.
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
-.PHONY: help deps deps-validate build mesh run figures test validate clean
+.PHONY: help deps deps-validate build mesh run figures test validate compare stability clean
 
 help:
 	@echo 'make mesh && make run   mesh and solve the scenes of geo/, draw their figures into out/'
@@ -28,6 +28,8 @@ help:
 	@echo 'make figures    the figures of every run in out/, again'
 	@echo 'make test       format, lints, documentation, tests'
 	@echo 'make validate   the comparison with FEniCSx (installs it: make deps-validate)'
+	@echo 'make compare    all contact solvers on all scenes, side by side'
+	@echo 'make stability  the maps of where methods fail; or MAPS="step-size …"'
 	@echo 'make clean      remove the build, the results and the meshes'
 
 deps:
@@ -64,6 +66,14 @@ validate: build deps-validate
 	$(PYTHON) validation/selfcheck.py
 	$(PYTHON) validation/compare.py --binary $(BINARY) $(addprefix geo/, \
 	    square-mild.toml lshape.toml bridge-half.toml hertz.toml)
+
+# Every solver on every scene: a table on the screen and in out/compare/comparison.csv.
+compare: build
+	$(BINARY) compare $(SCENE) $(ARGS)
+
+stability: build
+	$(BINARY) stability $(MAPS)
+	$(PYTHON) scripts/stability.py out/stability $(MAPS)
 
 clean:
 	rm -rf target out geo/*.msh scripts/__pycache__ validation/__pycache__
