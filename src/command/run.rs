@@ -86,7 +86,13 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     output::prepare(&folder).map_err(Failure::input)?;
     let mut recorder = Recorder::new(&folder, &setting, &phases).map_err(Failure::input)?;
     let result =
-        evolution::run(&session, &setting, &solver, &phases, &mut |step| recorder.accept(step));
+        evolution::run(
+            &session,
+            &setting,
+            &solver,
+            &phases,
+            &mut |step| Ok(recorder.accept(step)?),
+        );
     let summary = recorder.finish(&setting, &solver, &result, started);
     let unused = session.unused_options();
     session.finalize().map_err(Failure::solver)?;

@@ -90,7 +90,9 @@ impl<'a> Equilibrium<'a> {
         let mut total = ContactReport::default();
         let mut tolerance = setting.tolerance;
         let failed = |source| RunError::Contact { step, time, source };
-        for attempt in 1..=ATTEMPTS {
+        let mut attempts = 0;
+        loop {
+            attempts += 1;
             let report = self.solve_contact(force_scale, tolerance).map_err(failed)?;
             total.iterations += report.iterations;
             total.linear_iterations += report.linear_iterations;
@@ -112,7 +114,7 @@ impl<'a> Equilibrium<'a> {
                 record.seconds = started.elapsed().as_secs_f64();
                 return Ok(Step { state, record });
             }
-            if attempt == ATTEMPTS || kkt.worst().is_nan() {
+            if attempts == ATTEMPTS || kkt.worst().is_nan() {
                 return Err(failed(ContactError::NotCertified {
                     method: self.solver.name(),
                     tolerance: setting.tolerance,
@@ -121,7 +123,6 @@ impl<'a> Equilibrium<'a> {
             }
             tolerance *= 0.3 * setting.tolerance / kkt.worst();
         }
-        unreachable!("the last attempt returns")
     }
 
     /// The last solve belongs to an accepted step.

@@ -17,7 +17,6 @@ pub use state::{ContactPoint, State, Step, StepRecord};
 
 use crate::{
     contact::{ContactError, Kkt},
-    output::OutputError,
     petsc::{PetscError, Session},
 };
 use clock::Clock;
@@ -81,10 +80,13 @@ pub enum RunError {
     /// PETSc failed.
     #[error(transparent)]
     Petsc(#[from] PetscError),
-    /// The results could not be written.
+    /// Whoever was shown an accepted step could not go on (results that cannot be written).
     #[error(transparent)]
-    Output(#[from] OutputError),
+    Observer(Box<dyn std::error::Error + Send + Sync>),
 }
+
+/// The answer of whoever is shown an accepted step: an error ends the run.
+pub type Observed = Result<(), Box<dyn std::error::Error + Send + Sync>>;
 
 /// Runs `setting` with the contact solver called `solver`; `accepted` sees every accepted
 /// step, n = 0 included.
@@ -96,7 +98,7 @@ pub fn run(
     setting: &Setting,
     solver: &str,
     phases: &Phases,
-    accepted: &mut dyn FnMut(&Step) -> Result<(), OutputError>,
+    accepted: &mut dyn FnMut(&Step) -> Observed,
 ) -> Result<Outcome, RunError> {
     let mut equilibrium = Equilibrium::new(session, setting, solver, phases)?;
     let mut damage = DamageStep::new(session, setting, phases);
@@ -104,7 +106,7 @@ pub fn run(
     // (27): the displacement at t = 0, or the only one where there is no time.
     let last = equilibrium.solve(0, setting.start(), &setting.initial_damage())?;
     equilibrium.accept()?;
-    accepted(&last)?;
+    accepted(&last).map_err(RunError::Observer)?;
     let mut clock = Clock::new(setting.scene().time, damage.rate(&last.state.u, &last.state.zeta));
     let mut estimate = Estimate::default();
     let mut outcome = Outcome::new(last);
@@ -169,7 +171,7 @@ pub fn run(
         clock.accept(time, step, Some(error.largest));
         estimate.accept(error);
         last.record.seconds = started.elapsed().as_secs_f64();
-        accepted(&last)?;
+        accepted(&last).map_err(RunError::Observer)?;
         outcome.accept(last, driving);
     }
     Ok(outcome)
