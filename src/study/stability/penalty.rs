@@ -35,7 +35,7 @@ traction = ["0", "-15 + 25*max(-1, min(1, 1e6*(x - 0.5)))"]
 /// A horizontal soft band whose stiffness is 1/contrast.
 const BAND: &str = r#"
 [damage]
-diffusion = 0
+diffusion = 1
 lambda_d = 0
 lambda_u = 0
 lambda_w = 0
@@ -118,7 +118,7 @@ fn fill(session: &Session, sweep: &Sweep, table: &mut Vec<Cell>) -> Result<(), S
             contrast => D40.to_owned() + &BAND.replace("SOFT", &(1.0 / contrast).to_string()),
         };
         let setting = setting(&text, &overrides, (1.0, 1.0, sweep.cells, sweep.cells))?;
-        Ok::<_, StudyError>(statics(session, &setting, solver)?)
+        statics(session, &setting, solver)
     };
     let (reference, _) = solve("active-set", &[])?.map_err(StudyError::Run)?;
     let (_, found) = solve("penalty-duality", &[])?.map_err(StudyError::Run)?;
