@@ -90,9 +90,7 @@ impl<'a> Equilibrium<'a> {
         }
         let external = phases.time("loads", || setting.loads.at(&setting.body, time));
         let lift = setting.lift(time)?;
-        if !setting.motions.held() {
-            setting.check_load(time, &external)?;
-        }
+        setting.check_load(time, &external)?;
         let force_scale = self.set_load(&external, &lift)?;
 
         let mut total = ContactReport::default();

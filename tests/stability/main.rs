@@ -1,6 +1,7 @@
 //! Small copies of the maps of the atlas of failure.
 
 mod penalty;
+mod step_size;
 mod tao_types;
 
 use signorini::{
@@ -12,7 +13,7 @@ use signorini::{
 };
 use std::path::Path;
 
-/// The square of map 3 on n × n cells, pressed on the left and lifted on the right.
+/// The square of map 2 on n × n cells, pressed on the left and lifted on the right.
 fn solve(
     session: &Session,
     n: usize,

@@ -1,15 +1,21 @@
 //! The time of failure, with its error bar.
 
-use crate::{SQUARE_BREAKS, setting};
 use signorini::{
     contact::SOLVERS,
-    evolution::{self, Outcome, Phases},
+    evolution::{self, Outcome, Phases, Setting},
     petsc::Session,
+    scene::Scene,
+    study::rectangle,
 };
+use std::path::Path;
 
+/// The printed data of Example I on 8 × 8 cells.
 fn run(set: &[&str]) -> Outcome {
     let session = Session::start(&[]).unwrap();
-    let setting = setting(SQUARE_BREAKS, set, 8);
+    let set: Vec<String> = set.iter().map(|key| (*key).to_owned()).collect();
+    let text = include_str!("../../geo/square.toml");
+    let scene = Scene::parse(text, Path::new("square.toml"), &set).unwrap();
+    let setting = Setting::new(scene, rectangle(1.0, 1.0, 8, 8)).unwrap();
     evolution::run(&session, &setting, SOLVERS[0], &Phases::default(), &mut |_| Ok(())).unwrap()
 }
 
@@ -24,7 +30,8 @@ fn chosen_steps_land_above_the_threshold_within_the_tolerance() {
 #[test]
 fn the_failure_time_is_right_to_its_error_bar() {
     let reference = run(&["time.step=2e-5"]).stopped.unwrap();
-    for set in [&["time.step=auto", "time.tolerance=2e-3"][..], &["time.step=0.01"], &["time.step=1e-3"]]
+    for set in
+        [&["time.step=auto", "time.tolerance=2e-3"][..], &["time.step=0.01"], &["time.step=1e-3"]]
     {
         let stop = run(set).stopped.unwrap();
         let off = (stop.time - reference.time).abs();

@@ -109,8 +109,7 @@ fn fail(
 /// error, of first order in k, extrapolated away.
 fn limit(session: &Session, n: usize) -> Result<f64, StudyError> {
     let crossing = |k: f64| -> Result<f64, StudyError> {
-        let scene =
-            Scene::parse(SCENE, Path::new("square.toml"), &[format!("time.step={k:e}")])?;
+        let scene = Scene::parse(SCENE, Path::new("square.toml"), &[format!("time.step={k:e}")])?;
         let setting = Setting::new(scene, rectangle(1.0, 1.0, n, n))?;
         let outcome =
             evolution::run(session, &setting, SOLVERS[0], &Phases::default(), &mut |_| Ok(()))?;
