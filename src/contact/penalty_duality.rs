@@ -28,7 +28,8 @@ pub(super) struct PenaltyDuality<'s> {
 
 /// ω√(s_min s_max), with s the extreme eigenvalues of the boundary compliance: measured best.
 const OMEGA_COMPLIANCE: f64 = 3.0;
-/// A change of q this many times the first one means that the iteration diverges.
+/// A change of q this many times the first one, and the mean pressure of the load, means that
+/// the iteration diverges.
 const DIVERGED: f64 = 1e12;
 /// Steps of the Lanczos process that estimates the compliance.
 const LANCZOS: usize = 25;
@@ -203,6 +204,8 @@ impl ContactSolver for PenaltyDuality<'_> {
         let mut rhs = Vector::zeros(self.session, c.owned())?;
 
         let (mut residuals, mut first_change) = (Kkt::default(), 0.0_f64);
+        let length: f64 = problem.bounds.iter().map(|b| b.weight).sum();
+        let pressure = problem.force_scale / length;
         let mut anderson = Anderson::new(problem.bounds.iter().map(|b| b.weight));
         while report.iterations < self.options.iterations {
             report.linear_iterations += self.response(problem, true, &q, &mut rhs, c)?;
@@ -222,7 +225,7 @@ impl ContactSolver for PenaltyDuality<'_> {
             let images = q.iter().zip(normal.iter().zip(problem.bounds)).map(image).collect();
             let images: Vec<f64> = images;
             let change = (images.iter().zip(&q)).fold(0.0_f64, |m, (t, q)| m.max((t - q).abs()));
-            if !(change.is_finite() && change <= DIVERGED * first_change.max(f64::MIN_POSITIVE))
+            if !(change.is_finite() && change <= DIVERGED * first_change.max(pressure))
                 && report.iterations > 1
             {
                 break;
