@@ -11,24 +11,12 @@ import matplotlib
 
 matplotlib.use("Agg")
 
-from atlas import (  # noqa: E402
-    conditioning,
-    lost_contact,
-    maximum_principle,
-    penalty,
-    random_contact,
-    step_size,
-    tao_types,
-)
+from atlas import penalty, step_size, tao_types  # noqa: E402
 
 MAPS = {
     "step-size": step_size,
-    "maximum-principle": maximum_principle,
     "penalty-duality": penalty,
     "tao-types": tao_types,
-    "active-set": random_contact,
-    "conditioning": conditioning,
-    "lost-contact": lost_contact,
 }
 
 

@@ -22,6 +22,9 @@ const DEPTH: usize = 10;
 const OVERSHOOT: f64 = 10.0;
 /// Differences of iterates smaller than this, relative to the largest, are rounding.
 const RANK: f64 = 1e-10;
+/// Residuals that hardly differ (a free body drifting towards its foundation) would be
+/// extrapolated out of sight; beyond this many times a difference the plain step is taken.
+const FARTHEST: f64 = 1e6;
 
 impl Anderson {
     pub(super) fn new(weights: impl Iterator<Item = f64>) -> Self {
@@ -62,6 +65,9 @@ impl Anderson {
         let svd = differences.svd(true, true);
         let cut = RANK * svd.singular_values.max();
         let Ok(share) = svd.solve(&target, cut) else { return next };
+        if share.amax() > FARTHEST {
+            return next;
+        }
         for (j, share) in share.iter().enumerate() {
             let (new, old) = (&self.history[j + 1].0, &self.history[j].0);
             next.iter_mut().zip(new.iter().zip(old)).for_each(|(v, (n, o))| *v -= share * (n - o));

@@ -28,6 +28,9 @@ pub(super) struct PenaltyDuality<'s> {
 
 /// ω√(s_min s_max), with s the extreme eigenvalues of the boundary compliance: measured best.
 const OMEGA_COMPLIANCE: f64 = 3.0;
+/// A change of q this many times the first one, and the mean pressure of the load, means that
+/// the iteration diverges.
+const DIVERGED: f64 = 1e12;
 /// Steps of the Lanczos process that estimates the compliance.
 const LANCZOS: usize = 25;
 
@@ -194,12 +197,15 @@ impl ContactSolver for PenaltyDuality<'_> {
             self.factorise(problem, omega)?;
             report.factorisations += 1;
         }
+        report.omega = Some(omega);
         let lambda = self.options.lambda_omega / omega;
         let mut q = std::mem::take(&mut self.q);
         q.resize(problem.bounds.len(), 0.0);
         let mut rhs = Vector::zeros(self.session, c.owned())?;
 
-        let (mut residuals, mut first_change) = (Kkt::default(), 0.0);
+        let (mut residuals, mut first_change) = (Kkt::default(), 0.0_f64);
+        let length: f64 = problem.bounds.iter().map(|b| b.weight).sum();
+        let pressure = problem.force_scale / length;
         let mut anderson = Anderson::new(problem.bounds.iter().map(|b| b.weight));
         while report.iterations < self.options.iterations {
             report.linear_iterations += self.response(problem, true, &q, &mut rhs, c)?;
@@ -219,6 +225,11 @@ impl ContactSolver for PenaltyDuality<'_> {
             let images = q.iter().zip(normal.iter().zip(problem.bounds)).map(image).collect();
             let images: Vec<f64> = images;
             let change = (images.iter().zip(&q)).fold(0.0_f64, |m, (t, q)| m.max((t - q).abs()));
+            if !(change.is_finite() && change <= DIVERGED * first_change.max(pressure))
+                && report.iterations > 1
+            {
+                break;
+            }
             first_change = if report.iterations == 1 { change } else { first_change };
             if report.iterations > 1 && change > 0.0 {
                 let steps = (report.iterations - 1) as f64;

@@ -103,6 +103,10 @@ pub struct ContactReport {
     /// Mean factor by which an iteration shrank the change of the multiplier, where the method
     /// is a fixed-point iteration.
     pub contraction: Option<f64>,
+    /// ω of penalty-duality, Pa/m.
+    pub omega: Option<f64>,
+    /// Calls of TAO that claimed convergence to an answer which the KKT residuals rejected.
+    pub false_claims: usize,
 }
 
 /// A contact solve that did not end well.
@@ -127,6 +131,35 @@ pub enum ContactError {
         tolerance: f64,
         /// The residuals found.
         residuals: Kkt,
+    },
+    /// One of TAO's types ended above the tolerance.
+    #[error(
+        "tao:{kind} stopped after {iterations} iterations: {} (TaoConvergedReason {reason}, \
+        {false_claims} false claims of convergence)", residuals.missed(*tolerance)
+    )]
+    TaoStopped {
+        /// TAO's type.
+        kind: String,
+        /// Iterations done, all calls together.
+        iterations: usize,
+        /// Iterations of the linear solver inside.
+        linear_iterations: usize,
+        /// TaoConvergedReason of the last call.
+        reason: i32,
+        /// Calls that claimed convergence although the KKT residuals reject the answer.
+        false_claims: usize,
+        /// The tolerance missed.
+        tolerance: f64,
+        /// The residuals where it stood.
+        residuals: Kkt,
+    },
+    /// PETSc failed inside one of TAO's types.
+    #[error("tao:{kind} cannot solve this: {source}")]
+    TaoFailed {
+        /// TAO's type.
+        kind: String,
+        /// What PETSc said.
+        source: PetscError,
     },
     /// PETSc failed.
     #[error(transparent)]

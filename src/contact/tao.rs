@@ -1,6 +1,6 @@
 //! PETSc's TAO on the contact problem.
 
-use super::{ContactError, ContactProblem, ContactReport, ContactSolver};
+use super::{ContactError, ContactProblem, ContactReport, ContactSolver, Kkt};
 use crate::petsc::{BoundedQuadratic, Session, Vector};
 
 /// TAO's trust-region Newton method `tron` with a Cholesky factor inside; `-tao_type` chooses another.
@@ -63,10 +63,14 @@ impl ContactSolver for Tao<'_> {
         let mut f = Vector::zeros(self.session, owned)?;
         let mut lower = Vector::zeros(self.session, owned)?;
         let mut upper = Vector::zeros(self.session, owned)?;
-        lower.write(|v| v.fill(-INFINITE))?;
+        let infinite = match self.method.as_str() {
+            "bqpip" => BOX,
+            _ => INFINITE,
+        };
+        lower.write(|v| v.fill(-infinite))?;
 
         let mut size = if self.size > 0.0 { self.size } else { load_size / s };
-        let mut reason = 0;
+        let (mut reason, mut residuals) = (0, Kkt::default());
         for _ in 0..CALLS {
             let start = c.read(<[f64]>::to_vec)?;
             f.write(|v| {
@@ -75,11 +79,13 @@ impl ContactSolver for Tao<'_> {
                 }
             })?;
             upper.write(|v| {
-                v.fill(INFINITE);
-                problem.bounds.iter().for_each(|b| v[b.dof] = b.gap / size);
+                v.fill(infinite);
+                problem.bounds.iter().for_each(|b| v[b.dof] = (b.gap / size).min(infinite));
             })?;
             x.write(|v| v.iter_mut().zip(&start).for_each(|(v, c)| *v = c / size))?;
-            let answer = tao.minimise(&stiffness, &f, &lower, &upper, &mut x)?;
+            let answer = tao
+                .minimise(&stiffness, &f, &lower, &upper, &mut x)
+                .map_err(|source| ContactError::TaoFailed { kind: self.method.clone(), source })?;
             report.iterations += answer.iterations;
             report.linear_iterations += answer.linear_iterations;
             reason = answer.reason;
@@ -91,24 +97,32 @@ impl ContactSolver for Tao<'_> {
                 size = largest;
                 self.size = largest;
             }
-            if problem.residuals(self.session, c)?.within(0.1 * problem.tolerance) {
+            residuals = problem.residuals(self.session, c)?;
+            if residuals.within(0.1 * problem.tolerance) {
                 return Ok(report);
             }
+            report.false_claims += usize::from(reason > 0 && !residuals.within(problem.tolerance));
+            if residuals.worst().is_nan() {
+                break;
+            }
         }
-        let residuals = problem.residuals(self.session, c)?;
         if residuals.within(problem.tolerance) {
             return Ok(report);
         }
-        Err(ContactError::NotConverged {
-            method: self.name(),
+        Err(ContactError::TaoStopped {
+            kind: self.method.clone(),
             iterations: report.iterations,
-            detail: format!(
-                "{} (TaoConvergedReason {reason}, {CALLS} calls)",
-                residuals.missed(problem.tolerance)
-            ),
+            linear_iterations: report.linear_iterations,
+            reason,
+            false_claims: report.false_claims,
+            tolerance: problem.tolerance,
+            residuals,
         })
     }
 }
 
+/// Stands for infinity, in sizes of the answer, where the interior-point method cannot bear it;
+/// an answer that touches this box is not stationary, so the residuals reject it.
+const BOX: f64 = 1e2;
 /// PETSC_INFINITY.
 const INFINITE: f64 = f64::MAX / 4.0;

@@ -24,6 +24,8 @@ pub struct Equilibrium<'a> {
     rigid: DMatrix<f64>,
     /// c and the solver's warm start at the last accepted step.
     accepted: (Vec<f64>, Vec<f64>),
+    /// What the last solve took.
+    report: ContactReport,
 }
 
 /// How often a solver is asked again, more precisely, when its answer misses the tolerance.
@@ -59,12 +61,18 @@ impl<'a> Equilibrium<'a> {
             prescribed: constraints.is_prescribed(),
             rigid: setting.motions.normal_at(body, &constraints.bounds),
             accepted: (vec![0.0; owned], Vec::new()),
+            report: ContactReport::default(),
         })
     }
 
     /// The name of the method in use.
     pub fn method(&self) -> &'static str {
         self.solver.name()
+    }
+
+    /// What the last solve took that gave an answer.
+    pub fn report(&self) -> &ContactReport {
+        &self.report
     }
 
     /// u_n at `time` for the nodal damage `zeta`, starting from u_{n−1}.
@@ -82,9 +90,7 @@ impl<'a> Equilibrium<'a> {
         }
         let external = phases.time("loads", || setting.loads.at(&setting.body, time));
         let lift = setting.lift(time)?;
-        if !setting.motions.held() {
-            setting.check_load(time, &external)?;
-        }
+        setting.check_load(time, &external)?;
         let force_scale = self.set_load(&external, &lift)?;
 
         let mut total = ContactReport::default();
@@ -99,6 +105,9 @@ impl<'a> Equilibrium<'a> {
             total.factorisations += report.factorisations;
             total.fallbacks += report.fallbacks;
             total.contraction = report.contraction;
+            total.omega = report.omega;
+            total.false_claims += report.false_claims;
+            self.report = total;
             let u = self.displacement(&lift)?;
             let (kkt, contact) =
                 phases.time("certificate", || self.certify(&u, &external, force_scale));

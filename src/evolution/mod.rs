@@ -47,7 +47,7 @@ pub struct Stop {
     pub time: f64,
     /// The min ζ found there, not accepted.
     pub zeta_min: f64,
-    /// How far off the time may be, s: the last step, and all of the delay taken off.
+    /// How far off the time may be, s: the last step and the estimated delay of all steps.
     pub uncertainty: f64,
 }
 
@@ -135,14 +135,17 @@ pub fn run(
                 outcome.undone += 1;
                 continue;
             }
-            let stop = match clock.tolerance() {
-                None => Stop { time, zeta_min: reached, uncertainty: step },
-                Some(_) => Stop {
-                    time: old.time + share * step - estimate.delay(&zeta),
-                    zeta_min: reached,
-                    uncertainty: estimate.delay(&zeta).abs() + step,
-                },
+            // The step that failed tells of the acceleration too.
+            estimate.accept(estimate.of(&old.zeta, &zeta, step));
+            let delay = estimate.delay(&zeta);
+            let time = match clock.tolerance() {
+                None => time,
+                Some(_) => old.time + share * step - delay,
             };
+            // A uniform run is late by its delay, of which the estimate is good to a factor of 2.
+            let margin = if clock.tolerance().is_none() { 2.0 } else { 1.0 };
+            let uncertainty = step + margin * delay.abs();
+            let stop = Stop { time, zeta_min: reached, uncertainty };
             outcome.stopped = Some(stop);
             break;
         }

@@ -46,6 +46,17 @@ pub enum SetupError {
         /// What contradicts what.
         source: ConstraintError,
     },
+    /// A load is NaN or infinite.
+    #[error(
+        "{scene}: a traction or the body force is not finite at t = {time}; check its expression \
+         for divisions by zero, roots and logarithms of negative numbers"
+    )]
+    NotFinite {
+        /// The scene file.
+        scene: PathBuf,
+        /// The time, s.
+        time: f64,
+    },
     /// The load drives a rigid motion.
     #[error("{scene}: at t = {time}, {source}")]
     Driven {
@@ -105,11 +116,17 @@ impl Setting {
         Ok(())
     }
 
-    /// Checks that the load at `time` drives no rigid motion.
+    /// Checks that the load at `time` is finite and drives no rigid motion that nothing holds.
     ///
     /// # Errors
-    /// It does; the error names the motion.
+    /// It is not, or it does; the error then names the motion.
     pub fn check_load(&self, time: f64, load: &[f64]) -> Result<(), SetupError> {
+        if !load.iter().all(|f| f.is_finite()) {
+            return Err(SetupError::NotFinite { scene: self.scene.path.clone(), time });
+        }
+        if self.motions.held() {
+            return Ok(());
+        }
         self.motions.check(&self.body, load).map_err(|source| SetupError::Driven {
             scene: self.scene.path.clone(),
             time,

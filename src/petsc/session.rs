@@ -74,17 +74,23 @@ impl Session {
         unused
     }
 
-    /// Sets a default in the options database, unless the user has given that option.
+    /// Sets a default in the options database, unless the user has given that option; a default
+    /// of ours from before is replaced.
     pub(super) fn default_option(&self, name: &str, value: &str) -> Result<(), PetscError> {
-        DEFAULTS.lock().unwrap_or_else(PoisonError::into_inner).push(name.to_owned());
+        let mut defaults = DEFAULTS.lock().unwrap_or_else(PoisonError::into_inner);
+        let ours = defaults.iter().any(|known| known == name);
+        let text = name;
         let (name, value) = (c_string(name)?, c_string(value)?);
         let mut given = raw::PetscBool::PETSC_FALSE;
         let database = ptr::null_mut();
         // SAFETY: the strings live during the calls; null is the global database.
         unsafe {
             check(raw::PetscOptionsHasName(database, ptr::null(), name.as_ptr(), &mut given))?;
-            if given == raw::PetscBool::PETSC_FALSE {
+            if ours || given == raw::PetscBool::PETSC_FALSE {
                 check(raw::PetscOptionsSetValue(database, name.as_ptr(), value.as_ptr()))?;
+                if !ours {
+                    defaults.push(text.to_owned());
+                }
             }
         }
         Ok(())

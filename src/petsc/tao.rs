@@ -56,6 +56,11 @@ impl<'s> BoundedQuadratic<'s> {
             session.default_option(&format!("{prefix}pc_type"), "cholesky")?;
             session.default_option(&format!("{prefix}pc_factor_mat_solver_type"), package)?;
         }
+        // The quasi-Newton Krylov methods read the second prefix too, but their Hessian is an
+        // approximation without entries, which nothing can factorise.
+        if method.starts_with("bqnk") {
+            session.default_option("-tao_bnk_pc_type", "lmvm")?;
+        }
         Ok(Self { session, method: method.to_owned() })
     }
 

@@ -36,7 +36,7 @@ fn a_tolerance_below_rounding() {
 fn a_solver_kept_from_iterating() {
     fails_at_the_third_step(
         &["--solver", "tao", "--", "-tao_max_it", "0"],
-        &["tao stopped after 0 iterations", "stationarity 1.0e0 (1.0e10 times it)"],
+        &["tao:tron stopped after 0 iterations", "stationarity 1.0e0 (1.0e10 times it)"],
     );
 }
 

@@ -25,7 +25,11 @@ const CASES: &[(&str, &str, &[&str])] = &[
     ),
     ("[contact]", "[contcat]", &["bad.toml:23: unknown key contcat", "did you mean `contact`?"]),
     ("every", "evry", &["bad.toml:27: unknown key output.evry", "did you mean `every`?"]),
-    ("solver", "qqq", &["bad.toml:24: unknown key contact.qqq (known: solver, tolerance)"]),
+    (
+        "solver",
+        "qqq",
+        &["bad.toml:24: unknown key contact.qqq (known: solver, tolerance, penalty_duality)"],
+    ),
     (
         "traction = [\"0\", \"-80*t\"]",
         "tracton = [\"0\", \"-80*t\"]",

@@ -4,12 +4,8 @@
 //! The page `validation/STABILITY.md` tells what the maps show.
 
 mod step_size;
-mod maximum_principle;
 mod penalty;
 mod tao_types;
-mod random_contact;
-mod conditioning;
-mod lost_contact;
 
 use crate::{
     evolution::{RunError, SetupError},
@@ -25,14 +21,10 @@ use std::path::Path;
 pub type Map = fn(&Session, &Path) -> Result<Counts, StudyError>;
 
 /// The maps by name.
-pub const MAPS: [(&str, Map); 7] = [
+pub const MAPS: [(&str, Map); 3] = [
     ("step-size", step_size::run),
-    ("maximum-principle", maximum_principle::run),
     ("penalty-duality", penalty::run),
     ("tao-types", tao_types::run),
-    ("active-set", random_contact::run),
-    ("conditioning", conditioning::run),
-    ("lost-contact", lost_contact::run),
 ];
 
 /// What a cell of a map turned out to be.

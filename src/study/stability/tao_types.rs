@@ -1,10 +1,178 @@
 //! Map 4. TAO's types.
 
-use super::{Counts, StudyError};
-use crate::petsc::Session;
-use std::path::Path;
+use super::{
+    Counts, StudyError, Verdict,
+    penalty::{D40, difference, setting, statics},
+};
+use crate::{
+    contact::{ContactError, TAO_TYPES},
+    evolution::RunError,
+    output,
+    petsc::Session,
+};
+use serde::Serialize;
+use std::{path::Path, time::Instant};
+
+/// A beam clamped left over a gap that opens, pressed down in the middle, lifted at its tip.
+const BEAM: &str = r#"
+title = "beam"
+[mesh]
+file = "beam.msh"
+[material]
+young = 80
+poisson = 0.3
+plane = "stress"
+[[boundary]]
+name = "left"
+displacement = ["0", "0"]
+[[boundary]]
+name = "bottom"
+gap = "0.005*x"
+[[boundary]]
+name = "top"
+traction = ["0", "-max(0, 1 - abs(x - 1.5)) + 0.3*max(0, x - 3)"]
+"#;
+
+/// Example I's square without its damage.
+const SQUARE: &str = r#"
+title = "square"
+[mesh]
+file = "square.msh"
+[material]
+young = 80
+poisson = 0.3
+plane = "stress"
+[[boundary]]
+name = "left"
+displacement = ["0", "0"]
+[[boundary]]
+name = "bottom"
+gap = "0"
+[[boundary]]
+name = "right"
+traction = ["-10", "-10"]
+"#;
+
+/// Half of a block that only contact holds up.
+const BLOCK: &str = r#"
+title = "block"
+[mesh]
+file = "block.msh"
+[material]
+young = 80
+poisson = 0.3
+plane = "stress"
+[[boundary]]
+name = "left"
+symmetry = true
+[[boundary]]
+name = "bottom"
+gap = "0"
+[[boundary]]
+name = "top"
+traction = ["0", "-6*max(0, 1 - 2*x) + 0.5*x"]
+"#;
+
+/// Name, text, and rectangle of each scene.
+type Case = (&'static str, &'static str, (f64, f64, usize, usize));
+const SCENES: [Case; 4] = [
+    ("d40", D40, (1.0, 1.0, 32, 32)),
+    ("beam", BEAM, (4.0, 1.0, 64, 16)),
+    ("square", SQUARE, (1.0, 1.0, 32, 32)),
+    ("block", BLOCK, (1.0, 1.0, 32, 32)),
+];
+const TOLERANCES: [f64; 3] = [1e-6, 1e-8, 1e-10];
+/// How far a certified answer may be from the active set's, in tolerances: the conditioning.
+const CONDITIONING: f64 = 1e3;
+
+#[derive(Serialize)]
+struct Cell {
+    r#type: &'static str,
+    scene: &'static str,
+    tolerance: f64,
+    outcome: &'static str,
+    claimed: usize,
+    iterations: Option<usize>,
+    linear_iterations: Option<usize>,
+    kkt: Option<f64>,
+    difference: Option<f64>,
+    seconds: f64,
+    verdict: Verdict,
+    message: Option<String>,
+}
 
 /// Makes the map.
-pub(super) fn run(_session: &Session, _folder: &Path) -> Result<Counts, StudyError> {
-    Ok(Counts::default())
+pub(super) fn run(session: &Session, folder: &Path) -> Result<Counts, StudyError> {
+    let mut table = Vec::new();
+    for (scene, text, size) in SCENES {
+        let exact = setting(text, &[], size)?;
+        let (reference, _) = statics(session, &exact, "active-set")??;
+        for kind in TAO_TYPES {
+            for tolerance in TOLERANCES {
+                let setting = setting(text, &[format!("contact.tolerance={tolerance:e}")], size)?;
+                let started = Instant::now();
+                let answer = statics(session, &setting, &format!("tao:{kind}"))?;
+                let mut cell = Cell {
+                    r#type: kind,
+                    scene,
+                    tolerance,
+                    outcome: "failed",
+                    claimed: 0,
+                    iterations: None,
+                    linear_iterations: None,
+                    kkt: None,
+                    difference: None,
+                    seconds: started.elapsed().as_secs_f64(),
+                    verdict: Verdict::Refused,
+                    message: None,
+                };
+                match answer {
+                    Ok((state, report)) => {
+                        let apart = difference(&state.u, &reference.u);
+                        cell.outcome = "certified";
+                        cell.claimed = report.false_claims;
+                        cell.iterations = Some(report.iterations);
+                        cell.linear_iterations = Some(report.linear_iterations);
+                        cell.difference = Some(apart);
+                        cell.verdict = match apart <= CONDITIONING * tolerance {
+                            true => Verdict::Correct,
+                            false => Verdict::Wrong,
+                        };
+                    }
+                    Err(failure) => cell.refused(&failure),
+                }
+                table.push(cell);
+            }
+        }
+        // Written after each scene: what is measured is kept.
+        output::write_table(&folder.join("tao-types.csv"), &table)?;
+    }
+    Ok(table.iter().map(|cell| cell.verdict).collect())
+}
+
+impl Cell {
+    fn refused(&mut self, failure: &RunError) {
+        self.message = Some(failure.to_string());
+        let RunError::Contact { source, .. } = failure else { return };
+        match source {
+            ContactError::TaoStopped {
+                iterations,
+                linear_iterations,
+                false_claims,
+                residuals,
+                ..
+            } => {
+                self.outcome = if *false_claims > 0 { "claimed" } else { "stalled" };
+                self.claimed = *false_claims;
+                self.iterations = Some(*iterations);
+                self.linear_iterations = Some(*linear_iterations);
+                self.kkt = Some(residuals.worst());
+            }
+            ContactError::NotCertified { residuals, .. } => {
+                self.outcome = "uncertified";
+                self.kkt = Some(residuals.worst());
+            }
+            _ => {}
+        }
+    }
 }

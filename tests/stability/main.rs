@@ -1,0 +1,35 @@
+//! Small copies of the maps of the atlas of failure.
+
+mod penalty;
+mod step_size;
+mod tao_types;
+
+use signorini::{
+    contact::ContactReport,
+    evolution::{Equilibrium, Phases, RunError, Setting, State},
+    petsc::Session,
+    scene::Scene,
+    study::rectangle,
+};
+use std::path::Path;
+
+/// The square of map 2 on n × n cells, pressed on the left and lifted on the right.
+fn solve(
+    session: &Session,
+    n: usize,
+    solver: &str,
+    keys: &[String],
+) -> Result<(State, ContactReport), RunError> {
+    let scene = Scene::parse(include_str!("d40.toml"), Path::new("d40.toml"), keys).unwrap();
+    let setting = Setting::new(scene, rectangle(1.0, 1.0, n, n)).unwrap();
+    let phases = Phases::default();
+    let mut equilibrium = Equilibrium::new(session, &setting, solver, &phases).unwrap();
+    let step = equilibrium.solve(0, setting.start(), &setting.initial_damage())?;
+    Ok((step.state, *equilibrium.report()))
+}
+
+/// max |a − b| / max |b|.
+fn difference(a: &[f64], b: &[f64]) -> f64 {
+    let size = b.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    a.iter().zip(b).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs())) / size
+}
