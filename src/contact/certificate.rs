@@ -51,10 +51,9 @@ impl Kkt {
 
     /// The largest of the four; NaN if any is.
     pub fn worst(&self) -> f64 {
-        self.named().iter().fold(0.0, |worst, (_, v)| match v.is_nan() {
-            true => f64::NAN,
-            false => f64::max(worst, *v),
-        })
+        // f64::max would forget a NaN.
+        let values = self.named().map(|(_, value)| value);
+        values.into_iter().fold(0.0, |worst, v| if v > worst || v.is_nan() { v } else { worst })
     }
 
     /// Whether all are at most `tolerance` (NaN is not).

@@ -6,6 +6,7 @@
 
 mod support;
 
+mod certificate;
 mod constraints;
 mod contact;
 mod damage;
