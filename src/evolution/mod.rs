@@ -47,7 +47,7 @@ pub struct Stop {
     pub time: f64,
     /// The min ζ found there, not accepted.
     pub zeta_min: f64,
-    /// How far off the time may be, s: the last step and the estimated delay of all steps.
+    /// How far off the time may be, s: the last step and twice the estimated delay of all steps.
     pub uncertainty: f64,
 }
 
@@ -142,9 +142,8 @@ pub fn run(
                 None => time,
                 Some(_) => old.time + share * step - delay,
             };
-            // A uniform run is late by its delay, of which the estimate is good to a factor of 2.
-            let margin = if clock.tolerance().is_none() { 2.0 } else { 1.0 };
-            let uncertainty = step + margin * delay.abs();
+            // The estimate of the delay is good to a factor of 2.
+            let uncertainty = step + 2.0 * delay.abs();
             let stop = Stop { time, zeta_min: reached, uncertainty };
             outcome.stopped = Some(stop);
             break;
