@@ -70,6 +70,12 @@ impl<'a> Equilibrium<'a> {
         self.solver.name()
     }
 
+    /// Gives the solver a warm start as its own `warm_start` would: for the active set a 1
+    /// for each bound that is guessed to press, else 0.
+    pub fn set_warm_start(&mut self, kept: &[f64]) {
+        self.solver.set_warm_start(kept);
+    }
+
     /// What the last solve took that gave an answer.
     pub fn report(&self) -> &ContactReport {
         &self.report

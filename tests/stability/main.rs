@@ -1,6 +1,7 @@
 //! Small copies of the maps of the atlas of failure.
 
 mod penalty;
+mod random_contact;
 mod step_size;
 mod tao_types;
 

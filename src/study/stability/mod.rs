@@ -6,6 +6,9 @@
 mod step_size;
 mod penalty;
 mod tao_types;
+mod random_contact;
+
+pub use random_contact::sample as random_sample;
 
 use crate::{
     evolution::{RunError, SetupError},
@@ -21,10 +24,11 @@ use std::path::Path;
 pub type Map = fn(&Session, &Path) -> Result<Counts, StudyError>;
 
 /// The maps by name.
-pub const MAPS: [(&str, Map); 3] = [
+pub const MAPS: [(&str, Map); 4] = [
     ("step-size", step_size::run),
     ("penalty-duality", penalty::run),
     ("tao-types", tao_types::run),
+    ("active-set", random_contact::run),
 ];
 
 /// What a cell of a map turned out to be.
