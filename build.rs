@@ -9,12 +9,15 @@ const FUNCTIONS: &str = "\
     PetscOptionsLeftGet|PetscOptionsLeftRestore|\
     MPI_Comm_size|\
     VecCreateMPI|VecDestroy|VecGetArray|VecRestoreArray|VecGetArrayRead|VecRestoreArrayRead|\
-    VecAXPY|VecDot|VecNorm|\
+    VecAXPY|VecAYPX|VecCopy|VecDot|VecNorm|\
     MatCreate|MatDestroy|MatSetSizes|MatSetType|MatSetBlockSize|MatSetOption|\
-    MatSetPreallocationCOO|MatSetValuesCOO|MatMult|MatDuplicate|MatScale|MatShift|MatDiagonalSet|MatZeroRowsColumns|MatGetOwnershipRange|\
+    MatSetPreallocationCOO|MatSetValuesCOO|MatMult|MatDuplicate|MatCopy|MatScale|MatShift|\
+    MatDiagonalSet|MatZeroRowsColumns|MatGetOwnershipRange|\
     KSPCreate|KSPDestroy|KSPSetOperators|KSPSetType|KSPGetPC|KSPSetUp|KSPSolve|\
     KSPSetTolerances|KSPGetConvergedReason|KSPGetIterationNumber|KSPSetFromOptions|\
-    KSPSetOptionsPrefix|KSPSetNormType|KSPSetInitialGuessNonzero|KSPSetReusePreconditioner|PCSetType|PCFactorSetMatSolverType|\
+    KSPSetOptionsPrefix|KSPSetNormType|KSPSetInitialGuessNonzero|\
+    PCCreate|PCDestroy|PCSetType|PCSetOptionsPrefix|PCSetFromOptions|PCSetOperators|PCSetUp|PCApply|\
+    PCFactorSetMatSolverType|\
     TaoCreate|TaoDestroy|TaoSetType|TaoSetSolution|TaoSetVariableBounds|\
     TaoSetObjectiveAndGradient|TaoSetHessian|TaoSetFromOptions|TaoSetTolerances|\
     TaoSetMaximumIterations|TaoSolve|TaoGetSolutionStatus|TaoGetLinearSolveIterations";

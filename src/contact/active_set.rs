@@ -1,7 +1,11 @@
 //! The primal-dual active set method.
 
-use super::{ContactError, ContactProblem, ContactReport, ContactSolver, tao::Tao};
-use crate::petsc::{LinearSolver, PetscError, Session, Vector};
+use super::{
+    ContactError, ContactProblem, ContactReport, ContactSolver,
+    elastic::{ElasticSolver, System},
+    tao::Tao,
+};
+use crate::petsc::{PetscError, Session, Vector};
 
 /// Guess which nodes press, solve with u_ν = g there, and exchange the nodes where the guess was
 /// wrong: pressing ones that are pulled, open ones that penetrate (Hintermüller, Ito, Kunisch,
@@ -13,25 +17,16 @@ use crate::petsc::{LinearSolver, PetscError, Session, Vector};
 /// definite K. Where K is singular (only contact holds the body) and a guess does not hold it,
 /// or if the exchanges run out, TAO solves the problem instead.
 pub(super) struct ActiveSet<'s> {
-    session: &'s Session,
     pressing: Vec<bool>,
-    factor: Option<LinearSolver>,
-    /// CG iterations of the last solve with the present factor.
-    wear: usize,
+    elastic: ElasticSolver<'s>,
     rescue: Tao<'s>,
 }
-
-/// A factor of an earlier step or set that costs more CG iterations than this is renewed:
-/// a factorisation costs about as much as ten pairs of triangular solves.
-const WORN: usize = 8;
 
 impl<'s> ActiveSet<'s> {
     pub(super) fn new(session: &'s Session) -> Self {
         Self {
-            session,
             pressing: Vec::new(),
-            factor: None,
-            wear: 0,
+            elastic: ElasticSolver::new(session),
             rescue: Tao::new(session, "tron"),
         }
     }
@@ -48,54 +43,31 @@ impl<'s> ActiveSet<'s> {
         Ok(())
     }
 
-    /// Minimises with c = g on the pressing nodes and no other bound.
+    /// Minimises with c = g on the pressing nodes and no other bound; false if that failed.
     fn solve_pressing(
         &mut self,
         problem: &ContactProblem,
         c: &mut Vector,
         report: &mut ContactReport,
-    ) -> Result<(), PetscError> {
+    ) -> Result<bool, PetscError> {
         let pressing = || problem.bounds.iter().zip(&self.pressing).filter(|(_, on)| **on);
-        let dofs: Vec<usize> = pressing().map(|(bound, _)| bound.dof).collect();
+        let held: Vec<usize> = pressing().map(|(bound, _)| bound.dof).collect();
         c.write(|c| pressing().for_each(|(bound, _)| c[bound.dof] = bound.gap))?;
-        let mut rhs = Vector::zeros(self.session, c.owned())?;
-        problem.load.read(|f| rhs.set(f))??;
-        let scale = problem.stiffness_scale;
-        let matrix = problem.stiffness.with_fixed(&dofs, scale, c, &mut rhs)?;
-
-        let solver = match (self.factor.take(), self.wear <= WORN) {
-            (Some(mut solver), true) => {
-                solver.keep_factor(&matrix)?;
-                solver
-            }
-            (old, _) => {
-                let mut solver = match old {
-                    Some(solver) => solver,
-                    None => LinearSolver::cholesky(self.session, "elastic_")?,
-                };
-                solver.factorise(&matrix)?;
-                report.factorisations += 1;
-                solver
-            }
-        };
-        let krylov = self.factor.insert(solver).solve(&rhs, c, problem.linear_residual())?;
-        report.linear_iterations += krylov.iterations;
-        self.wear = if krylov.converged { krylov.iterations } else { usize::MAX };
-        Ok(())
+        let system = System { held: &held, added: &[] };
+        self.elastic.solve(problem, system, problem.load, c, problem.linear_residual(), report)
     }
 
     /// The nodes where the guess was wrong, beyond what the KKT tolerance allows.
     fn wrong(&self, problem: &ContactProblem, c: &Vector) -> Result<Vec<usize>, PetscError> {
-        let residual = problem.residual(self.session, c)?;
         let size = c.read(|c| c.iter().fold(0.0_f64, |m, v| m.max(v.abs())))?;
         let slack = 0.1 * problem.tolerance;
         let pull = slack * problem.force_scale / (problem.bounds.len() as f64).sqrt();
         c.read(|c| {
-            residual.read(|r| {
+            self.elastic.forces(|p| {
                 let wrong = |i: &usize| {
                     let bound = &problem.bounds[*i];
                     match self.pressing[*i] {
-                        true => r[bound.dof] > pull,
+                        true => p[bound.dof] < -pull,
                         false => c[bound.dof] - bound.gap > slack * size,
                     }
                 };
@@ -129,7 +101,6 @@ impl<'s> ActiveSet<'s> {
         report.fallbacks += 1;
         let touches = |c: &[f64]| problem.bounds.iter().map(|b| c[b.dof] >= b.gap).collect();
         self.pressing = c.read(touches)?;
-        self.wear = usize::MAX;
         Ok(report)
     }
 }
@@ -156,9 +127,8 @@ impl ContactSolver for ActiveSet<'_> {
         let mut choice = Exchange::new();
         self.first_guess(problem, c)?;
         while report.iterations < 30 + 5 * problem.bounds.len() {
-            self.solve_pressing(problem, c, &mut report)?;
             report.iterations += 1;
-            if self.wear == usize::MAX {
+            if !self.solve_pressing(problem, c, &mut report)? {
                 break;
             }
             let wrong = self.wrong(problem, c)?;

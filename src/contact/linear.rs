@@ -1,17 +1,19 @@
 //! No obstacle: one linear solve.
 
-use super::{ContactError, ContactProblem, ContactReport, ContactSolver};
-use crate::petsc::{LinearSolver, Session, Vector};
+use super::{
+    ContactError, ContactProblem, ContactReport, ContactSolver,
+    elastic::{ElasticSolver, System},
+};
+use crate::petsc::{Session, Vector};
 
-/// K c = f by a Cholesky factor that is kept while K does not change.
+/// K c = f.
 pub(super) struct Linear<'s> {
-    session: &'s Session,
-    factor: Option<(usize, LinearSolver)>,
+    elastic: ElasticSolver<'s>,
 }
 
 impl<'s> Linear<'s> {
     pub(super) fn new(session: &'s Session) -> Self {
-        Self { session, factor: None }
+        Self { elastic: ElasticSolver::new(session) }
     }
 }
 
@@ -32,28 +34,17 @@ impl ContactSolver for Linear<'_> {
         c: &mut Vector,
     ) -> Result<ContactReport, ContactError> {
         let mut report = ContactReport { iterations: 1, ..Default::default() };
-        if self.factor.as_ref().is_none_or(|(revision, _)| *revision != problem.revision) {
-            let mut solver = match self.factor.take() {
-                Some((_, solver)) => solver,
-                None => LinearSolver::cholesky(self.session, "elastic_")?,
-            };
-            solver.factorise(problem.stiffness)?;
-            report.factorisations = 1;
-            self.factor = Some((problem.revision, solver));
+        let system = System { held: &[], added: &[] };
+        let (f, limit) = (problem.load, problem.linear_residual());
+        match self.elastic.solve(problem, system, f, c, limit, &mut report)? {
+            true => Ok(report),
+            false => Err(ContactError::NotConverged {
+                method: self.name(),
+                iterations: report.linear_iterations,
+                detail: "conjugate gradients on the factored stiffness did not converge: the \
+                         matrix is not positive definite"
+                    .into(),
+            }),
         }
-        if let Some((_, solver)) = &mut self.factor {
-            let krylov = solver.solve(problem.load, c, problem.linear_residual())?;
-            report.linear_iterations = krylov.iterations;
-            if !krylov.converged {
-                return Err(ContactError::NotConverged {
-                    method: self.name(),
-                    iterations: krylov.iterations,
-                    detail: "conjugate gradients on the factored stiffness did not converge: \
-                             the matrix is not positive definite"
-                        .into(),
-                });
-            }
-        }
-        Ok(report)
     }
 }

@@ -6,6 +6,7 @@ mod active_set;
 mod anderson;
 mod certificate;
 mod constraints;
+mod elastic;
 mod linear;
 mod penalty_duality;
 mod problem;

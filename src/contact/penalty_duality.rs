@@ -2,9 +2,11 @@
 //! the paper's reference [4].
 
 use super::{
-    Bound, ContactError, ContactProblem, ContactReport, ContactSolver, Kkt, anderson::Anderson,
+    Bound, ContactError, ContactProblem, ContactReport, ContactSolver, Kkt,
+    anderson::Anderson,
+    elastic::{ElasticSolver, System},
 };
-use crate::petsc::{LinearSolver, PetscError, Session, Vector};
+use crate::petsc::{PetscError, Session, Vector};
 use nalgebra::DMatrix;
 
 /// With G = ∂I₍₋∞,g₎ and its Yosida approximation the contact law becomes a fixed point in q:
@@ -13,17 +15,14 @@ use nalgebra::DMatrix;
 /// 2. r = Bu + λq,  y = min(g, r/(1 − λω)),  q ← (r − y)/λ.
 ///
 /// B picks the bounded unknowns, W their shares of Γ_C; p = q + ω Bu is the contact pressure
-/// at the fixed point. One factorisation serves all iterations at one K; the next step starts
-/// from this one's q. The iteration is mixed by Anderson: measured on this project's
+/// at the fixed point, which gives the first q from the start u. The iteration is mixed by Anderson: measured on this project's
 /// scenes, 11 to 30 iterations instead of 200 to 600.
 pub(super) struct PenaltyDuality<'s> {
     session: &'s Session,
     options: PenaltyOptions,
     /// ω, Pa/m, once estimated.
     omega: Option<f64>,
-    factor: Option<(usize, LinearSolver)>,
-    /// q of the last solve, Pa.
-    q: Vec<f64>,
+    elastic: ElasticSolver<'s>,
 }
 
 /// ω√(s_min s_max), with s the extreme eigenvalues of the boundary compliance: measured best.
@@ -57,52 +56,50 @@ impl Default for PenaltyOptions {
 
 impl<'s> PenaltyDuality<'s> {
     pub(super) fn new(session: &'s Session, options: PenaltyOptions) -> Self {
-        Self { session, options, omega: options.omega, factor: None, q: Vec::new() }
+        Self { session, options, omega: options.omega, elastic: ElasticSolver::new(session) }
     }
 
-    /// Factorises K + ω BᵀWB.
-    fn factorise(&mut self, problem: &ContactProblem, omega: f64) -> Result<(), PetscError> {
-        let mut diagonal = Vector::zeros(self.session, problem.stiffness.owned())?;
-        diagonal.write(|d| problem.bounds.iter().for_each(|b| d[b.dof] = omega * b.weight))?;
-        let mut solver = match self.factor.take() {
-            Some((_, solver)) => solver,
-            None => LinearSolver::cholesky(self.session, "elastic_")?,
-        };
-        solver.factorise(&problem.stiffness.plus_diagonal(&diagonal)?)?;
-        self.factor = Some((problem.revision, solver));
-        Ok(())
-    }
-
-    /// Solves (K + ω BᵀWB) u = f − BᵀW q, f left out if `None`.
+    /// Solves (K + ω BᵀWB) u = f − BᵀW q from the start u.
     fn response(
         &mut self,
         problem: &ContactProblem,
-        with_load: bool,
+        omega: f64,
+        f: Option<&Vector>,
         q: &[f64],
-        rhs: &mut Vector,
         u: &mut Vector,
-    ) -> Result<usize, ContactError> {
-        match with_load {
-            true => problem.load.read(|f| rhs.set(f))??,
-            false => rhs.write(|rhs| rhs.fill(0.0))?,
+        report: &mut ContactReport,
+    ) -> Result<(), ContactError> {
+        let mut rhs = Vector::zeros(self.session, u.owned())?;
+        if let Some(f) = f {
+            rhs.copy(f)?;
         }
         rhs.write(|rhs| {
             problem.bounds.iter().zip(q).for_each(|(b, q)| rhs[b.dof] -= b.weight * q);
         })?;
-        let Some((_, solver)) = &mut self.factor else { return Ok(0) };
-        let residual = match with_load {
-            true => problem.linear_residual(),
-            false => 1e-10 * rhs.norm()?,
+        let limit = match f {
+            Some(_) => problem.linear_residual(),
+            None => 1e-10 * rhs.norm()?,
         };
-        let krylov = solver.solve(rhs, u, residual)?;
-        match krylov.converged {
-            true => Ok(krylov.iterations),
+        let added: Vec<_> = problem.bounds.iter().map(|b| (b.dof, omega * b.weight)).collect();
+        let system = System { held: &[], added: &added };
+        match self.elastic.solve(problem, system, &rhs, u, limit, report)? {
+            true => Ok(()),
             false => Err(ContactError::NotConverged {
                 method: "penalty-duality",
-                iterations: krylov.iterations,
+                iterations: report.iterations,
                 detail: "the penalised stiffness is not positive definite".into(),
             }),
         }
+    }
+
+    /// q = p − ω Bu with the contact pressure p = W⁻¹B (f − Ku) of the start u.
+    fn first(&self, problem: &ContactProblem, omega: f64, u: &Vector) -> Result<Vec<f64>, PetscError> {
+        let residual = problem.residual(self.session, u)?;
+        let q = |u: &[f64], r: &[f64]| {
+            let at = |b: &Bound| -r[b.dof] / b.weight - omega * u[b.dof];
+            problem.bounds.iter().map(at).collect()
+        };
+        u.read(|u| residual.read(|r| q(u, r)))?
     }
 
     /// ω from the extreme eigenvalues of the compliance S = B K⁻¹BᵀW (normal displacement per
@@ -116,12 +113,9 @@ impl<'s> PenaltyDuality<'s> {
         let bounds = problem.bounds;
         let length: f64 = bounds.iter().map(|b| b.weight).sum();
         let trial = problem.stiffness_scale / length;
-        self.factorise(problem, trial)?;
-        report.factorisations += 1;
         let dot = |a: &[f64], b: &[f64]| -> f64 {
             bounds.iter().enumerate().map(|(i, bound)| bound.weight * a[i] * b[i]).sum()
         };
-        let mut rhs = Vector::zeros(self.session, problem.load.owned())?;
         let mut u = Vector::zeros(self.session, problem.load.owned())?;
 
         // A start with all frequencies in it: smooth plus alternating.
@@ -141,7 +135,7 @@ impl<'s> PenaltyDuality<'s> {
             }
             v.iter_mut().for_each(|v| *v /= norm);
             basis.push(v.clone());
-            report.linear_iterations += self.response(problem, false, &v, &mut rhs, &mut u)?;
+            self.response(problem, trial, None, &v, &mut u, report)?;
             let mut w: Vec<f64> = u.read(|u| bounds.iter().map(|b| -u[b.dof]).collect())?;
             alpha.push(dot(&w, &v));
             for earlier in basis.iter().rev().chain(basis.iter().rev()) {
@@ -173,12 +167,10 @@ impl ContactSolver for PenaltyDuality<'_> {
     }
 
     fn warm_start(&self) -> Vec<f64> {
-        self.q.clone()
+        Vec::new()
     }
 
-    fn set_warm_start(&mut self, kept: &[f64]) {
-        self.q = kept.to_vec();
-    }
+    fn set_warm_start(&mut self, _kept: &[f64]) {}
 
     fn solve(
         &mut self,
@@ -190,31 +182,22 @@ impl ContactSolver for PenaltyDuality<'_> {
             Some(omega) => omega,
             None => self.estimate_omega(problem, &mut report)?,
         };
-        if self.omega.is_none()
-            || self.factor.as_ref().is_none_or(|(revision, _)| *revision != problem.revision)
-        {
-            self.omega = Some(omega);
-            self.factorise(problem, omega)?;
-            report.factorisations += 1;
-        }
+        self.omega = Some(omega);
         report.omega = Some(omega);
         let lambda = self.options.lambda_omega / omega;
-        let mut q = std::mem::take(&mut self.q);
-        q.resize(problem.bounds.len(), 0.0);
-        let mut rhs = Vector::zeros(self.session, c.owned())?;
+        let mut q = self.first(problem, omega, c)?;
 
         let (mut residuals, mut first_change) = (Kkt::default(), 0.0_f64);
         let length: f64 = problem.bounds.iter().map(|b| b.weight).sum();
         let pressure = problem.force_scale / length;
         let mut anderson = Anderson::new(problem.bounds.iter().map(|b| b.weight));
         while report.iterations < self.options.iterations {
-            report.linear_iterations += self.response(problem, true, &q, &mut rhs, c)?;
+            self.response(problem, omega, Some(problem.load), &q, c, &mut report)?;
             report.iterations += 1;
             let normal: Vec<f64> = c.read(|c| problem.bounds.iter().map(|b| c[b.dof]).collect())?;
             let size = c.read(|c| c.iter().fold(0.0_f64, |m, v| m.max(v.abs())))?;
             residuals = fixed_point_residuals(problem, omega, &q, &normal, size);
             if residuals.within(0.1 * problem.tolerance) {
-                self.q = q;
                 return Ok(report);
             }
             let image = |(q, (u, bound)): (&f64, (&f64, &Bound))| {

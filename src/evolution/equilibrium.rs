@@ -1,6 +1,8 @@
 //! The contact step (26): from ζ_n and f_n to a certified u_n.
 
-use super::{ContactPoint, Phases, RunError, Setting, State, Step, StepRecord};
+use super::{
+    ContactPoint, Phases, RunError, Setting, State, Step, StepRecord, extrapolation::Extrapolation,
+};
 use crate::{
     contact::{self, ContactError, ContactProblem, ContactReport, ContactSolver, Kkt},
     fem::Stiffness,
@@ -22,8 +24,9 @@ pub struct Equilibrium<'a> {
     c: Vector,
     prescribed: Vec<bool>,
     rigid: DMatrix<f64>,
-    /// c and the solver's warm start at the last accepted step.
-    accepted: (Vec<f64>, Vec<f64>),
+    /// c of the accepted steps, and the solver's warm start at the last.
+    evolution: Extrapolation,
+    warm_start: Vec<f64>,
     /// What the last solve took.
     report: ContactReport,
 }
@@ -60,7 +63,8 @@ impl<'a> Equilibrium<'a> {
             c: Vector::zeros(session, owned)?,
             prescribed: constraints.is_prescribed(),
             rigid: setting.motions.normal_at(body, &constraints.bounds),
-            accepted: (vec![0.0; owned], Vec::new()),
+            evolution: Extrapolation::new(owned),
+            warm_start: Vec::new(),
             report: ContactReport::default(),
         })
     }
@@ -81,7 +85,7 @@ impl<'a> Equilibrium<'a> {
         &self.report
     }
 
-    /// u_n at `time` for the nodal damage `zeta`, starting from u_{n−1}.
+    /// u_n at `time` for the nodal damage `zeta`, starting from where the last steps lead.
     ///
     /// # Errors
     /// The solver failed, or no answer of its met the KKT tolerance.
@@ -99,6 +103,7 @@ impl<'a> Equilibrium<'a> {
         setting.check_load(time, &external)?;
         let force_scale = self.set_load(&external, &lift)?;
 
+        self.c.set(&self.evolution.at(time))?;
         let mut total = ContactReport::default();
         let mut tolerance = setting.tolerance;
         let failed = |source| RunError::Contact { step, time, source };
@@ -140,16 +145,17 @@ impl<'a> Equilibrium<'a> {
         }
     }
 
-    /// The last solve belongs to an accepted step.
-    pub fn accept(&mut self) -> Result<(), PetscError> {
-        self.accepted = (self.c.read(<[f64]>::to_vec)?, self.solver.warm_start());
+    /// The last solve, at `time`, belongs to an accepted step.
+    pub fn accept(&mut self, time: f64) -> Result<(), PetscError> {
+        self.evolution.accept(time, self.c.read(<[f64]>::to_vec)?);
+        self.warm_start = self.solver.warm_start();
         Ok(())
     }
 
     /// The solves since the last accepted step have not happened.
     pub fn undo(&mut self) -> Result<(), PetscError> {
-        self.c.set(&self.accepted.0)?;
-        self.solver.set_warm_start(&self.accepted.1);
+        self.c.set(self.evolution.last())?;
+        self.solver.set_warm_start(&self.warm_start);
         Ok(())
     }
 

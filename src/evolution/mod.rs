@@ -4,6 +4,7 @@ mod clock;
 mod damage_step;
 mod equilibrium;
 mod estimate;
+mod extrapolation;
 mod loads;
 mod phases;
 mod setting;
@@ -105,7 +106,7 @@ pub fn run(
 
     // (27): the displacement at t = 0, or the only one where there is no time.
     let last = equilibrium.solve(0, setting.start(), &setting.initial_damage())?;
-    equilibrium.accept()?;
+    equilibrium.accept(setting.start())?;
     accepted(&last).map_err(RunError::Observer)?;
     let mut clock = Clock::new(setting.scene().time, damage.rate(&last.state.u, &last.state.zeta));
     let mut estimate = Estimate::default();
@@ -169,7 +170,7 @@ pub fn run(
             }
             Err(other) => return Err(other),
         };
-        equilibrium.accept()?;
+        equilibrium.accept(time)?;
         clock.accept(time, step, Some(error.largest));
         estimate.accept(error);
         last.record.seconds = started.elapsed().as_secs_f64();

@@ -10,14 +10,13 @@ use std::ptr;
 /// Conjugate gradients preconditioned by a Cholesky factor (KSPCG, PCCHOLESKY).
 ///
 /// With a fresh factor CG needs one or two iterations: it removes the factor's rounding
-/// error and notices an indefinite matrix, which the factorisation alone does not. A factor
-/// of a matrix nearby costs a few iterations more.
+/// error and notices an indefinite matrix, which the factorisation alone does not.
 pub struct LinearSolver {
     raw: raw::KSP,
     _live: Live,
 }
 
-/// More than a factor worth keeping would need.
+/// More than a factor of the matrix itself needs.
 const CG_ITERATIONS: i32 = 200;
 
 /// What a linear solve took.
@@ -58,18 +57,8 @@ impl LinearSolver {
         // SAFETY: live handles. KSPSetOperators marks the values as new, else the
         // factorisation would wait for the next solve.
         unsafe {
-            check(raw::KSPSetReusePreconditioner(self.raw, raw::PetscBool::PETSC_FALSE))?;
             check(raw::KSPSetOperators(self.raw, matrix.raw, matrix.raw))?;
             check(raw::KSPSetUp(self.raw))
-        }
-    }
-
-    /// Solves with `matrix` from now on, preconditioned by the factor of an earlier one.
-    pub fn keep_factor(&mut self, matrix: &Matrix) -> Result<(), PetscError> {
-        // SAFETY: live handles; the factor of the earlier matrix stays with the solver.
-        unsafe {
-            check(raw::KSPSetReusePreconditioner(self.raw, raw::PetscBool::PETSC_TRUE))?;
-            check(raw::KSPSetOperators(self.raw, matrix.raw, matrix.raw))
         }
     }
 

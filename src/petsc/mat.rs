@@ -82,39 +82,37 @@ impl Matrix {
         Ok(copy)
     }
 
-    /// A copy with `diagonal` (owned entries) added to its diagonal.
-    pub fn plus_diagonal(&self, diagonal: &Vector) -> Result<Self, PetscError> {
-        same_size(self.owned, diagonal.owned())?;
-        let copy = self.duplicate()?;
-        // SAFETY: live handles of matching layout.
-        check(unsafe { raw::MatDiagonalSet(copy.raw, diagonal.raw, raw::InsertMode::ADD_VALUES) })?;
-        Ok(copy)
+    /// Takes over the values of `other`, which has the same pattern.
+    pub fn copy(&mut self, other: &Self) -> Result<(), PetscError> {
+        same_size(self.owned, other.owned)?;
+        let pattern = raw::MatStructure::SAME_NONZERO_PATTERN;
+        // SAFETY: live handles, distinct by borrowing; PETSc compares the patterns' sizes.
+        check(unsafe { raw::MatCopy(other.raw, self.raw, pattern) })
     }
 
-    /// A copy with some unknowns set to the values `x` has there: their rows and columns are
-    /// replaced by `diagonal`, and `b` is made the matching right-hand side (MatZeroRowsColumns).
-    pub fn with_fixed(
-        &self,
-        unknowns: &[usize],
-        diagonal: f64,
-        x: &Vector,
-        b: &mut Vector,
-    ) -> Result<Self, PetscError> {
-        same_size(self.owned, x.owned())?;
-        same_size(self.owned, b.owned())?;
-        let copy = self.duplicate()?;
+    /// Adds `diagonal` (owned entries) to the diagonal.
+    pub fn add_diagonal(&mut self, diagonal: &Vector) -> Result<(), PetscError> {
+        same_size(self.owned, diagonal.owned())?;
+        let add = raw::InsertMode::ADD_VALUES;
+        // SAFETY: live handles of matching layout.
+        check(unsafe { raw::MatDiagonalSet(self.raw, diagonal.raw, add) })
+    }
+
+    /// Replaces the rows and columns of some owned unknowns by `diagonal` (MatZeroRowsColumns).
+    pub fn hold(&mut self, unknowns: &[usize], diagonal: f64) -> Result<(), PetscError> {
         let (mut first, mut end) = (0, 0);
-        // SAFETY: live handles of matching layout; the rows are global numbers of owned ones.
+        let unused = ptr::null_mut();
+        // SAFETY: a live handle; the rows are global numbers of owned ones.
         unsafe {
-            check(raw::MatGetOwnershipRange(copy.raw, &mut first, &mut end))?;
+            check(raw::MatGetOwnershipRange(self.raw, &mut first, &mut end))?;
             let rows: Vec<i32> = unknowns.iter().map(|&dof| first + dof as i32).collect();
             let count = rows.len() as i32;
-            check(raw::MatZeroRowsColumns(copy.raw, count, rows.as_ptr(), diagonal, x.raw, b.raw))?;
+            check(raw::MatZeroRowsColumns(self.raw, count, rows.as_ptr(), diagonal, unused, unused))
         }
-        Ok(copy)
     }
 
-    fn duplicate(&self) -> Result<Self, PetscError> {
+    /// A copy; its values can no longer be set through the pattern.
+    pub fn duplicate(&self) -> Result<Self, PetscError> {
         let mut copy =
             Self { raw: ptr::null_mut(), owned: self.owned, entries: 0, _live: Live::new() };
         // SAFETY: a live handle, a fresh one. The copy has no COO pattern: `entries` is 0.

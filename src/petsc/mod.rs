@@ -9,6 +9,7 @@
 #![allow(unsafe_code)]
 
 mod error;
+mod factor;
 mod ksp;
 mod mat;
 mod session;
@@ -29,6 +30,7 @@ mod raw {
 }
 
 pub use error::PetscError;
+pub use factor::Factor;
 pub use ksp::{Krylov, LinearSolver};
 pub use mat::Matrix;
 pub use session::Session;

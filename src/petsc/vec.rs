@@ -68,6 +68,36 @@ impl Vector {
         Ok(norm)
     }
 
+    /// Inner product over all ranks.
+    pub fn dot(&self, other: &Self) -> Result<f64, PetscError> {
+        same_size(self.owned, other.owned)?;
+        let mut product = 0.0;
+        // SAFETY: live handles of matching layout.
+        check(unsafe { raw::VecDot(self.raw, other.raw, &mut product) })?;
+        Ok(product)
+    }
+
+    /// this ← this + `factor` · `other`.
+    pub fn add(&mut self, factor: f64, other: &Self) -> Result<(), PetscError> {
+        same_size(self.owned, other.owned)?;
+        // SAFETY: live handles of matching layout, distinct by borrowing.
+        check(unsafe { raw::VecAXPY(self.raw, factor, other.raw) })
+    }
+
+    /// this ← `factor` · this + `other`.
+    pub fn scale_add(&mut self, factor: f64, other: &Self) -> Result<(), PetscError> {
+        same_size(self.owned, other.owned)?;
+        // SAFETY: live handles of matching layout, distinct by borrowing.
+        check(unsafe { raw::VecAYPX(self.raw, factor, other.raw) })
+    }
+
+    /// this ← `other`.
+    pub fn copy(&mut self, other: &Self) -> Result<(), PetscError> {
+        same_size(self.owned, other.owned)?;
+        // SAFETY: live handles of matching layout, distinct by borrowing.
+        check(unsafe { raw::VecCopy(other.raw, self.raw) })
+    }
+
     /// Number of entries this rank owns.
     pub fn owned(&self) -> usize {
         self.owned

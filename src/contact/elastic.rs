@@ -1,0 +1,248 @@
+//! The linear systems inside contact solvers, on a factor that is kept while that pays.
+
+use super::{ContactProblem, ContactReport};
+use crate::petsc::{Factor, Matrix, PetscError, Session, Vector};
+use std::time::Instant;
+
+/// (K + D) c = f on the unknowns that are not held.
+#[derive(Clone, Copy)]
+pub(super) struct System<'a> {
+    /// The unknowns that keep the values they have in c.
+    pub held: &'a [usize],
+    /// The nonzero entries of the diagonal D, N/m.
+    pub added: &'a [(usize, f64)],
+}
+
+/// Conjugate gradients, preconditioned by the Cholesky factor of an earlier system: other damage,
+/// other held unknowns, another diagonal. An ageing factor costs iterations; it is renewed when the
+/// time so lost since it was made reaches the time a new one takes. Where the loss per solve grows
+/// evenly, that is the cheapest moment; otherwise it costs at most twice the cheapest.
+pub(super) struct ElasticSolver<'s> {
+    session: &'s Session,
+    engine: Option<Engine>,
+}
+
+impl<'s> ElasticSolver<'s> {
+    pub(super) fn new(session: &'s Session) -> Self {
+        Self { session, engine: None }
+    }
+
+    /// Solves from the start `c` for the load `f` until the forces left on the free unknowns are
+    /// at most `limit` in ‖·‖₂, N. False if they do not get there: the system is not positive
+    /// definite, or too ill-conditioned for this limit.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub(super) fn solve(
+        &mut self,
+        problem: &ContactProblem,
+        system: System,
+        f: &Vector,
+        c: &mut Vector,
+        limit: f64,
+        report: &mut ContactReport,
+    ) -> Result<bool, PetscError> {
+        let mut engine = match self.engine.take() {
+            Some(engine) => engine,
+            None => Engine::new(self.session, problem)?,
+        };
+        engine.start(problem, system, f, c)?;
+        let mut solved = engine.remaining(system)? <= limit;
+        if !solved && !engine.costs.worn() {
+            let most = engine.costs.allowance();
+            let iterations;
+            (solved, iterations) = engine.iterate(problem, system, c, limit, most)?;
+            engine.costs.lose(iterations);
+            report.linear_iterations += iterations;
+        }
+        if !solved {
+            engine.renew(problem, system)?;
+            report.factorisations += 1;
+            let iterations;
+            (solved, iterations) = engine.iterate(problem, system, c, limit, FRESH)?;
+            report.linear_iterations += iterations;
+        }
+        self.engine = Some(engine);
+        Ok(solved)
+    }
+
+    /// f − (K + D)c of the last solve, N, on all unknowns: on held ones the forces that hold them.
+    pub(super) fn forces<R>(&self, reader: impl FnOnce(&[f64]) -> R) -> Result<R, PetscError> {
+        match &self.engine {
+            Some(engine) => engine.residual.read(reader),
+            None => Ok(reader(&[])),
+        }
+    }
+}
+
+/// CG iterations that a factor of the system itself may need: it removes the factor's rounding
+/// error, which is large where the stiffness varies by many orders.
+const FRESH: usize = 200;
+/// CG iterations an old factor is given at least.
+const STALE: usize = 3;
+
+struct Engine {
+    factor: Factor,
+    /// The system that was factorised.
+    matrix: Matrix,
+    costs: Costs,
+    residual: Vector,
+    /// The residual with 0 on held unknowns.
+    free: Vector,
+    preconditioned: Vector,
+    direction: Vector,
+    image: Vector,
+}
+
+impl Engine {
+    fn new(session: &Session, problem: &ContactProblem) -> Result<Self, PetscError> {
+        let zeros = || Vector::zeros(session, problem.stiffness.owned());
+        Ok(Self {
+            factor: Factor::new(session, "elastic_")?,
+            matrix: problem.stiffness.duplicate()?,
+            costs: Costs::default(),
+            residual: zeros()?,
+            free: zeros()?,
+            preconditioned: zeros()?,
+            direction: zeros()?,
+            image: zeros()?,
+        })
+    }
+
+    /// The residual of the start.
+    fn start(
+        &mut self,
+        problem: &ContactProblem,
+        system: System,
+        f: &Vector,
+        c: &Vector,
+    ) -> Result<(), PetscError> {
+        multiply(problem, system, c, &mut self.residual)?;
+        self.residual.scale_add(-1.0, f)
+    }
+
+    /// ‖residual‖₂ on the free unknowns.
+    fn remaining(&mut self, system: System) -> Result<f64, PetscError> {
+        self.free.copy(&self.residual)?;
+        clear(&mut self.free, system.held)?;
+        self.free.norm()
+    }
+
+    /// Factorises the system at hand.
+    fn renew(&mut self, problem: &ContactProblem, system: System) -> Result<(), PetscError> {
+        let started = Instant::now();
+        self.matrix.copy(problem.stiffness)?;
+        if !system.added.is_empty() {
+            self.image.write(|d| {
+                d.fill(0.0);
+                system.added.iter().for_each(|&(dof, value)| d[dof] += value);
+            })?;
+            self.matrix.add_diagonal(&self.image)?;
+        }
+        self.matrix.hold(system.held, problem.stiffness_scale)?;
+        self.factor.factorise(&self.matrix)?;
+        self.costs.renewed(started.elapsed().as_secs_f64());
+        Ok(())
+    }
+
+    /// Conjugate gradients (Hestenes and Stiefel, J. Res. Nat. Bur. Standards 49, 1952) on the
+    /// free unknowns: whether the limit was reached, and after how many iterations.
+    fn iterate(
+        &mut self,
+        problem: &ContactProblem,
+        system: System,
+        c: &mut Vector,
+        limit: f64,
+        most: usize,
+    ) -> Result<(bool, usize), PetscError> {
+        let started = Instant::now();
+        let mut energy = 0.0;
+        for iteration in 1..=most {
+            self.factor.apply(&self.free, &mut self.preconditioned)?;
+            clear(&mut self.preconditioned, system.held)?;
+            let previous = energy;
+            energy = self.free.dot(&self.preconditioned)?;
+            match iteration {
+                1 => self.direction.copy(&self.preconditioned)?,
+                _ => self.direction.scale_add(energy / previous, &self.preconditioned)?,
+            }
+            multiply(problem, system, &self.direction, &mut self.image)?;
+            let stiffness = self.direction.dot(&self.image)?;
+            if !(stiffness > 0.0 && energy > 0.0) {
+                return Ok((false, iteration));
+            }
+            c.add(energy / stiffness, &self.direction)?;
+            self.residual.add(-energy / stiffness, &self.image)?;
+            if self.remaining(system)? <= limit {
+                self.costs.took(started.elapsed().as_secs_f64(), iteration);
+                return Ok((true, iteration));
+            }
+        }
+        Ok((false, most))
+    }
+}
+
+/// `y` ← (K + D) `x`.
+fn multiply(
+    problem: &ContactProblem,
+    system: System,
+    x: &Vector,
+    y: &mut Vector,
+) -> Result<(), PetscError> {
+    problem.stiffness.multiply(x, y)?;
+    match system.added {
+        [] => Ok(()),
+        added => x.read(|x| y.write(|y| added.iter().for_each(|&(i, d)| y[i] += d * x[i])))?,
+    }
+}
+
+fn clear(vector: &mut Vector, held: &[usize]) -> Result<(), PetscError> {
+    vector.write(|v| held.iter().for_each(|&dof| v[dof] = 0.0))
+}
+
+/// What a factor and its age cost, s.
+struct Costs {
+    factorisation: f64,
+    /// All CG iterations so far, and their number.
+    iterations: (f64, usize),
+    /// Lost to the age of the factor.
+    lost: f64,
+}
+
+impl Default for Costs {
+    /// Before the first factorisation: worn.
+    fn default() -> Self {
+        Self { factorisation: 0.0, iterations: (0.0, 0), lost: f64::INFINITY }
+    }
+}
+
+impl Costs {
+    fn renewed(&mut self, seconds: f64) {
+        (self.factorisation, self.lost) = (seconds, 0.0);
+    }
+
+    fn took(&mut self, seconds: f64, iterations: usize) {
+        self.iterations.0 += seconds;
+        self.iterations.1 += iterations;
+    }
+
+    /// Seconds of an iteration.
+    fn iteration(&self) -> f64 {
+        self.iterations.0 / self.iterations.1.max(1) as f64
+    }
+
+    /// A solve with an old factor took so many iterations; a new one would have taken one.
+    fn lose(&mut self, iterations: usize) {
+        self.lost += self.iteration() * iterations.saturating_sub(1) as f64;
+    }
+
+    fn worn(&self) -> bool {
+        self.lost >= self.factorisation
+    }
+
+    /// Iterations after which a solve would have lost a factorisation.
+    fn allowance(&self) -> usize {
+        let affordable = (self.factorisation - self.lost) / self.iteration();
+        1 + (affordable as usize).clamp(STALE, FRESH)
+    }
+}

@@ -1,0 +1,92 @@
+//! Where the next solution is likely to be.
+
+use std::collections::VecDeque;
+
+/// Polynomials in time through the last accepted solutions, as starts for iterative solvers.
+///
+/// Which degree predicts best depends on how smooth the evolution is and on how precisely
+/// the solutions are known: that of the best prediction of the last solution is used.
+pub(super) struct Extrapolation {
+    /// (time, solution), the latest first.
+    history: VecDeque<(f64, Vec<f64>)>,
+    degree: usize,
+}
+
+/// Above this degree the tolerance of the solutions, magnified by 2^(degree + 1), prevails.
+const HIGHEST: usize = 4;
+
+impl Extrapolation {
+    /// Before any solution: 0.
+    pub(super) fn new(size: usize) -> Self {
+        Self { history: VecDeque::from([(f64::NEG_INFINITY, vec![0.0; size])]), degree: 0 }
+    }
+
+    /// The last accepted solution.
+    pub(super) fn last(&self) -> &[f64] {
+        &self.history[0].1
+    }
+
+    /// The likely solution at `time`.
+    pub(super) fn at(&self, time: f64) -> Vec<f64> {
+        self.polynomial(self.degree, time)
+    }
+
+    /// A solution is accepted.
+    pub(super) fn accept(&mut self, time: f64, solution: Vec<f64>) {
+        if self.history[0].0 == f64::NEG_INFINITY {
+            self.history.clear();
+        }
+        let miss = |degree: usize| -> f64 {
+            let predicted = self.polynomial(degree, time);
+            predicted.iter().zip(&solution).map(|(p, s)| (p - s).powi(2)).sum()
+        };
+        let misses: Vec<f64> = (0..self.history.len().min(HIGHEST + 1)).map(miss).collect();
+        let best = (0..misses.len()).min_by(|&a, &b| misses[a].total_cmp(&misses[b]));
+        // One degree more than was possible so far is tried as soon as the highest was best.
+        self.degree = match best {
+            Some(degree) if degree + 1 == misses.len() && degree < HIGHEST => degree + 1,
+            Some(degree) => degree,
+            None => 0,
+        };
+        self.history.push_front((time, solution));
+        self.history.truncate(HIGHEST + 1);
+    }
+
+    /// The value at `time` of the polynomial through the last `degree` + 1 solutions.
+    fn polynomial(&self, degree: usize, time: f64) -> Vec<f64> {
+        let times: Vec<f64> = self.history.iter().take(degree + 1).map(|(t, _)| *t).collect();
+        let mut value = vec![0.0; self.history[0].1.len()];
+        for (i, (_, solution)) in self.history.iter().take(degree + 1).enumerate() {
+            let others = || times.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, t)| t);
+            let share: f64 = others().map(|t| (time - t) / (times[i] - t)).product();
+            value.iter_mut().zip(solution).for_each(|(v, s)| *v += share * s);
+        }
+        value
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quadratic_evolution_is_predicted_exactly_from_uneven_times() {
+        let solution = |t: f64| vec![1.0 + t * t, 3.0 * t];
+        let mut extrapolation = Extrapolation::new(2);
+        assert_eq!(extrapolation.at(0.0), [0.0, 0.0]);
+        for t in [0.0, 0.1, 0.3, 0.35, 0.5, 0.6] {
+            extrapolation.accept(t, solution(t));
+        }
+        let (found, expected) = (extrapolation.at(0.8), solution(0.8));
+        assert!((0..2).all(|i| (found[i] - expected[i]).abs() < 1e-13), "{found:?}");
+    }
+
+    #[test]
+    fn a_jump_lowers_the_degree() {
+        let mut extrapolation = Extrapolation::new(1);
+        for (t, s) in [(0.0, 0.0), (1.0, 1.0), (2.0, 2.0), (3.0, 2.0), (4.0, 2.0)] {
+            extrapolation.accept(t, vec![s]);
+        }
+        assert_eq!(extrapolation.at(5.0), [2.0]);
+    }
+}

@@ -1,0 +1,59 @@
+//! A factorisation that outlives the matrix values it was made from.
+
+use super::{
+    Matrix, PetscError, Session, Vector, check, raw,
+    session::{Live, c_string, world},
+    vec::same_size,
+};
+use std::ptr;
+
+/// A Cholesky factor (PCCHOLESKY): CHOLMOD's on one rank, MUMPS' on several.
+///
+/// Fill-reducing ordering and symbolic factorisation are done once, with the first values. A
+/// factorisation does not notice that a matrix is not positive definite; whoever uses the
+/// factor has to (conjugate gradients do).
+pub struct Factor {
+    raw: raw::PC,
+    _live: Live,
+}
+
+impl Factor {
+    /// A factor whose PETSc options carry `prefix` (`-elastic_pc_type …`).
+    pub fn new(session: &Session, prefix: &str) -> Result<Self, PetscError> {
+        let mut factor = Self { raw: ptr::null_mut(), _live: Live::new() };
+        let prefix = c_string(prefix)?;
+        let package = if session.ranks() == 1 { c"cholmod" } else { c"mumps" };
+        // SAFETY: a fresh handle, strings that live during the calls.
+        unsafe {
+            check(raw::PCCreate(world(), &mut factor.raw))?;
+            check(raw::PCSetOptionsPrefix(factor.raw, prefix.as_ptr()))?;
+            check(raw::PCSetType(factor.raw, c"cholesky".as_ptr()))?;
+            check(raw::PCFactorSetMatSolverType(factor.raw, package.as_ptr()))?;
+            check(raw::PCSetFromOptions(factor.raw))?;
+        }
+        Ok(factor)
+    }
+
+    /// Factorises the present values of `matrix`.
+    pub fn factorise(&mut self, matrix: &Matrix) -> Result<(), PetscError> {
+        // SAFETY: live handles; PETSc keeps a reference to the matrix.
+        unsafe {
+            check(raw::PCSetOperators(self.raw, matrix.raw, matrix.raw))?;
+            check(raw::PCSetUp(self.raw))
+        }
+    }
+
+    /// `z` ← the factored matrix' inverse · `r`.
+    pub fn apply(&self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
+        same_size(r.owned(), z.owned())?;
+        // SAFETY: live handles of matching layout, distinct by borrowing.
+        check(unsafe { raw::PCApply(self.raw, r.raw, z.raw) })
+    }
+}
+
+impl Drop for Factor {
+    fn drop(&mut self) {
+        // SAFETY: the handle is ours and not used afterwards.
+        unsafe { raw::PCDestroy(&mut self.raw) };
+    }
+}
