@@ -93,7 +93,12 @@ impl<'s> PenaltyDuality<'s> {
     }
 
     /// q = p − ω Bu with the contact pressure p = W⁻¹B (f − Ku) of the start u.
-    fn first(&self, problem: &ContactProblem, omega: f64, u: &Vector) -> Result<Vec<f64>, PetscError> {
+    fn first(
+        &self,
+        problem: &ContactProblem,
+        omega: f64,
+        u: &Vector,
+    ) -> Result<Vec<f64>, PetscError> {
         let residual = problem.residual(self.session, u)?;
         let q = |u: &[f64], r: &[f64]| {
             let at = |b: &Bound| -r[b.dof] / b.weight - omega * u[b.dof];

@@ -1,0 +1,154 @@
+#!/usr/bin/python3
+"""Times the scheme as a FEniCSx user would write it: loop.py SCENE MESH [--steps N]
+
+dolfinx forms, the damage factor kept, SNES `vinewtonrsls` with MUMPS started from the last step;
+no second solves or checks as in the validation. Prints one JSON object: seconds per time step
+(the first, from a cold start, apart), the worst relative KKT residual and the last state's figures.
+"""
+
+import argparse
+import json
+import time
+from pathlib import Path
+
+import numpy as np
+from dolfinx import fem
+from petsc4py import PETSc
+
+from damage import DEFAULTS, Damage
+from fenicsx import Body
+from scene import Expression, read_scene
+from triangulation import read_triangulation
+
+
+class Loop:
+    """Everything that is made once for a scene."""
+
+    def __init__(self, scene, mesh):
+        self.body = body = Body(scene, mesh)
+        self.damage = Damage(body, float(scene["time"]["step"]))
+        self.factor = PETSc.KSP().create(PETSc.COMM_SELF)
+        self.factor.setOperators(self.damage.matrix)
+        self.factor.setType("preonly")
+        self.factor.getPC().setType("cholesky")
+        self.factor.getPC().setFactorSolverType("mumps")
+        self.stiffness = fem.petsc.create_matrix(body.stiffness_form)
+        self.load = fem.petsc.create_vector(body.load_forms[0])
+        self.u, self.residual = self.stiffness.createVecRight(), self.stiffness.createVecRight()
+        self.kkt = 0.0
+        bounds = self.bounds = body.bounds(0.0)
+        self.fixed = np.asarray(bounds.fixed, PETSc.IntType)
+        self.reduced = None
+
+        lower, upper = self.u.duplicate(), self.u.duplicate()
+        lower.array[:] = np.where(np.isfinite(bounds.lower), bounds.lower, PETSc.NINFINITY)
+        upper.array[:] = np.where(np.isfinite(bounds.upper), bounds.upper, PETSc.INFINITY)
+        self.lower, self.upper = lower, upper
+
+    def start_solver(self):
+        """The SNES, once the stiffness has its first values."""
+        snes = self.snes = PETSc.SNES().create(PETSc.COMM_SELF)
+        snes.setType("vinewtonrsls")
+        snes.setFunction(self.function, self.residual)
+        snes.setJacobian(lambda *_: None, self.reduced)
+        snes.setVariableBounds(self.lower, self.upper)
+        ksp = snes.getKSP()
+        ksp.setType("preonly")
+        ksp.getPC().setType("cholesky")
+        ksp.getPC().setFactorSolverType("mumps")
+        PETSc.Options()["snes_vi_zero_tolerance"] = 0.0
+        snes.setFromOptions()
+
+    def function(self, _snes, x, out):
+        """K u − f; the prescribed unknowns are u themselves, in scale."""
+        self.stiffness.mult(x, out)
+        out.axpy(-1.0, self.load)
+        out.array[self.fixed] = self.scale * (x.array_r[self.fixed] - self.bounds.values)
+
+    def contact(self, t, zeta):
+        """u for the damage ζ, from the last u."""
+        body = self.body
+        body.time.value = t
+        body.zeta.x.array[body.zeta_dof_of_node] = zeta
+        self.stiffness.zeroEntries()
+        fem.petsc.assemble_matrix(self.stiffness, body.stiffness_form)
+        self.stiffness.assemble()
+        self.load.array[:] = 0.0
+        for form in body.load_forms:
+            fem.petsc.assemble_vector(self.load, form)
+        if self.reduced is None:
+            self.scale = self.stiffness.getDiagonal().norm(PETSc.NormType.NORM_INFINITY)
+            self.reduced = self.stiffness.copy()
+        else:
+            self.stiffness.copy(self.reduced, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        self.reduced.zeroRowsColumns(self.fixed, diag=self.scale)
+        if not hasattr(self, "snes"):
+            self.start_solver()
+        self.snes.setTolerances(rtol=0.0, atol=5e-11 * self.load.norm(), stol=0.0, max_it=200)
+        self.snes.solve(None, self.u)
+        if self.snes.getConvergedReason() <= 0:
+            raise SystemExit(f"SNES stopped with reason {self.snes.getConvergedReason()}")
+        body.u.x.array[:] = self.u.array_r
+        self.certify()
+
+    def certify(self):
+        """Worst relative KKT residual, as signorini measures it."""
+        self.function(None, self.u, self.residual)
+        r, u = self.residual.array_r, self.u.array_r
+        force, size = self.load.norm(), np.abs(u).max()
+        below, above = np.isfinite(self.bounds.lower), np.isfinite(self.bounds.upper)
+        free = ~(below | above)
+        free[self.fixed] = False
+        gap = np.where(below, u - self.bounds.lower, self.bounds.upper - u)
+        pull = np.where(below, np.minimum(r, 0), np.minimum(-r, 0))
+        bounded = below | above
+        self.kkt = max(
+            self.kkt,
+            np.linalg.norm(r[free]) / force,
+            max(-gap[bounded].min(initial=0.0), 0.0) / size,
+            np.linalg.norm(pull[bounded]) / force,
+            np.abs(r[bounded] * gap[bounded]).sum() / (force * size),
+        )
+
+    def damage_step(self):
+        """ζ of the next step, by the factor kept."""
+        damage, body = self.damage, self.body
+        damage.source.interpolate(damage.source_at_corners)
+        right = fem.petsc.assemble_vector(damage.right_side)
+        zeta = right.duplicate()
+        self.factor.solve(right, zeta)
+        return zeta.array[body.zeta_dof_of_node]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("scene", type=Path)
+    parser.add_argument("mesh", type=Path)
+    parser.add_argument("--steps", type=int, default=10)
+    arguments = parser.parse_args()
+    began = time.perf_counter()
+    scene, mesh = read_scene(arguments.scene), read_triangulation(arguments.mesh)
+    loop = Loop(scene, mesh)
+    zeta = Expression({**DEFAULTS, **scene["damage"]}["initial"]).at(mesh.nodes)
+    loop.contact(0.0, zeta)
+    step = float(scene["time"]["step"])
+    seconds = []
+    for n in range(1, arguments.steps + 1):
+        started = time.perf_counter()
+        zeta = loop.damage_step()
+        loop.contact(n * step, zeta)
+        seconds.append(time.perf_counter() - started)
+    print(json.dumps({
+        "nodes": len(mesh.nodes),
+        "steps": arguments.steps,
+        "seconds_per_step": float(np.mean(seconds)),
+        "seconds": seconds,
+        "whole_seconds": time.perf_counter() - began,
+        "kkt": loop.kkt,
+        "zeta_min": float(zeta.min()),
+        "displacement_max": float(np.hypot(*loop.u.array_r.reshape(-1, 2).T).max()),
+    }))
+
+
+if __name__ == "__main__":
+    main()
