@@ -12,15 +12,16 @@ const FUNCTIONS: &str = "\
     VecAXPY|VecAYPX|VecCopy|VecDot|VecNorm|\
     MatCreate|MatDestroy|MatSetSizes|MatSetType|MatSetBlockSize|MatSetOption|\
     MatSetPreallocationCOO|MatSetValuesCOO|MatMult|MatDuplicate|MatCopy|MatScale|MatShift|\
-    MatDiagonalSet|MatZeroRowsColumns|MatGetOwnershipRange|\
+    MatDiagonalSet|MatZeroRowsColumns|MatGetOwnershipRange|MatGetSize|\
     KSPCreate|KSPDestroy|KSPSetOperators|KSPSetType|KSPGetPC|KSPSetUp|KSPSolve|\
     KSPSetTolerances|KSPGetConvergedReason|KSPGetIterationNumber|KSPSetFromOptions|\
     KSPSetOptionsPrefix|KSPSetNormType|KSPSetInitialGuessNonzero|\
     PCCreate|PCDestroy|PCSetType|PCSetOptionsPrefix|PCSetFromOptions|PCSetOperators|PCSetUp|PCApply|\
-    PCFactorSetMatSolverType|\
+    PCFactorSetMatSolverType|PCReset|PCSetReusePreconditioner|PCGetOperators|PCShellSetContext|PCShellGetContext|\
+    PCShellSetApply|PCShellSetSetUp|\
     TaoCreate|TaoDestroy|TaoSetType|TaoSetSolution|TaoSetVariableBounds|\
     TaoSetObjectiveAndGradient|TaoSetHessian|TaoSetFromOptions|TaoSetTolerances|\
-    TaoSetMaximumIterations|TaoSolve|TaoGetSolutionStatus|TaoGetLinearSolveIterations";
+    TaoSetMaximumIterations|TaoSolve|TaoGetSolutionStatus|TaoGetLinearSolveIterations|TaoGetKSP";
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");

@@ -94,7 +94,7 @@ fn table(entries: &[Entry]) -> Table {
             e.solver.clone(),
             e.steps.to_string(),
             e.iterations.to_string(),
-            if e.solver.starts_with("tao") { "–".into() } else { e.factorisations.to_string() },
+            e.factorisations.to_string(),
             e.triangular_solves.to_string(),
             e.fallbacks.to_string(),
             format!("{:.3}", e.seconds),

@@ -1,7 +1,7 @@
 //! The linear systems inside contact solvers, on a factor that is kept while that pays.
 
 use super::{ContactProblem, ContactReport};
-use crate::petsc::{Factor, Matrix, PetscError, Session, Vector};
+use crate::petsc::{Factor, Matrix, PetscError, Session, Vector, Wear};
 use std::time::Instant;
 
 /// (K + D) c = f on the unknowns that are not held.
@@ -14,9 +14,7 @@ pub(super) struct System<'a> {
 }
 
 /// Conjugate gradients, preconditioned by the Cholesky factor of an earlier system: other damage,
-/// other held unknowns, another diagonal. An ageing factor costs iterations; it is renewed when the
-/// time so lost since it was made reaches the time a new one takes. Where the loss per solve grows
-/// evenly, that is the cheapest moment; otherwise it costs at most twice the cheapest.
+/// other held unknowns, another diagonal. [`Wear`] tells when to renew it.
 pub(super) struct ElasticSolver<'s> {
     session: &'s Session,
     engine: Option<Engine>,
@@ -48,11 +46,11 @@ impl<'s> ElasticSolver<'s> {
         };
         engine.start(problem, system, f, c)?;
         let mut solved = engine.remaining(system)? <= limit;
-        if !solved && !engine.costs.worn() {
-            let most = engine.costs.allowance();
+        if !solved && !engine.wear.worn() {
+            let most = engine.wear.allowance();
             let iterations;
             (solved, iterations) = engine.iterate(problem, system, c, limit, most)?;
-            engine.costs.lose(iterations);
+            engine.wear.lose(iterations);
             report.linear_iterations += iterations;
         }
         if !solved {
@@ -78,14 +76,12 @@ impl<'s> ElasticSolver<'s> {
 /// CG iterations that a factor of the system itself may need: it removes the factor's rounding
 /// error, which is large where the stiffness varies by many orders.
 const FRESH: usize = 200;
-/// CG iterations an old factor is given at least.
-const STALE: usize = 3;
 
 struct Engine {
     factor: Factor,
     /// The system that was factorised.
     matrix: Matrix,
-    costs: Costs,
+    wear: Wear,
     residual: Vector,
     /// The residual with 0 on held unknowns.
     free: Vector,
@@ -100,7 +96,7 @@ impl Engine {
         Ok(Self {
             factor: Factor::new(session, "elastic_")?,
             matrix: problem.stiffness.duplicate()?,
-            costs: Costs::default(),
+            wear: Wear::default(),
             residual: zeros()?,
             free: zeros()?,
             preconditioned: zeros()?,
@@ -141,7 +137,7 @@ impl Engine {
         }
         self.matrix.hold(system.held, problem.stiffness_scale)?;
         self.factor.factorise(&self.matrix)?;
-        self.costs.renewed(started.elapsed().as_secs_f64());
+        self.wear.renewed(started.elapsed().as_secs_f64());
         Ok(())
     }
 
@@ -174,7 +170,7 @@ impl Engine {
             c.add(energy / stiffness, &self.direction)?;
             self.residual.add(-energy / stiffness, &self.image)?;
             if self.remaining(system)? <= limit {
-                self.costs.took(started.elapsed().as_secs_f64(), iteration);
+                self.wear.took(started.elapsed().as_secs_f64(), iteration);
                 return Ok((true, iteration));
             }
         }
@@ -198,51 +194,4 @@ fn multiply(
 
 fn clear(vector: &mut Vector, held: &[usize]) -> Result<(), PetscError> {
     vector.write(|v| held.iter().for_each(|&dof| v[dof] = 0.0))
-}
-
-/// What a factor and its age cost, s.
-struct Costs {
-    factorisation: f64,
-    /// All CG iterations so far, and their number.
-    iterations: (f64, usize),
-    /// Lost to the age of the factor.
-    lost: f64,
-}
-
-impl Default for Costs {
-    /// Before the first factorisation: worn.
-    fn default() -> Self {
-        Self { factorisation: 0.0, iterations: (0.0, 0), lost: f64::INFINITY }
-    }
-}
-
-impl Costs {
-    fn renewed(&mut self, seconds: f64) {
-        (self.factorisation, self.lost) = (seconds, 0.0);
-    }
-
-    fn took(&mut self, seconds: f64, iterations: usize) {
-        self.iterations.0 += seconds;
-        self.iterations.1 += iterations;
-    }
-
-    /// Seconds of an iteration.
-    fn iteration(&self) -> f64 {
-        self.iterations.0 / self.iterations.1.max(1) as f64
-    }
-
-    /// A solve with an old factor took so many iterations; a new one would have taken one.
-    fn lose(&mut self, iterations: usize) {
-        self.lost += self.iteration() * iterations.saturating_sub(1) as f64;
-    }
-
-    fn worn(&self) -> bool {
-        self.lost >= self.factorisation
-    }
-
-    /// Iterations after which a solve would have lost a factorisation.
-    fn allowance(&self) -> usize {
-        let affordable = (self.factorisation - self.lost) / self.iteration();
-        1 + (affordable as usize).clamp(STALE, FRESH)
-    }
 }

@@ -31,7 +31,7 @@ pub struct ContactProblem<'a> {
 impl ContactProblem<'_> {
     /// ‖residual‖₂ that linear systems are solved to, N: well below what the KKT residuals may be.
     pub fn linear_residual(&self) -> f64 {
-        0.03 * self.tolerance * self.force_scale
+        0.1 * self.tolerance * self.force_scale
     }
 
     /// The KKT residuals of `c` by the assembled K (the final word has
@@ -96,7 +96,7 @@ pub struct ContactReport {
     pub iterations: usize,
     /// Iterations of linear solvers inside, each a pair of triangular solves.
     pub linear_iterations: usize,
-    /// Factorisations the method asked for; TAO's own are not visible from outside.
+    /// Factorisations (not those of a preconditioner chosen by PETSc options).
     pub factorisations: usize,
     /// Times the method had to leave its fast path for a slower one that always ends.
     pub fallbacks: usize,

@@ -3,7 +3,7 @@
 use super::{ContactError, ContactProblem, ContactReport, ContactSolver, Kkt};
 use crate::petsc::{BoundedQuadratic, Session, Vector};
 
-/// TAO's trust-region Newton method `tron` with a Cholesky factor inside; `-tao_type` chooses another.
+/// TAO's trust-region Newton method `tron` on a kept Cholesky factor; `-tao_type` chooses another.
 ///
 /// TAO holds absolute tolerances, so it is given K/s, f/(sU) and c/U with s the size of K
 /// and U the size of the answer. U is unknown at first: TAO is called again with the U it
@@ -11,7 +11,7 @@ use crate::petsc::{BoundedQuadratic, Session, Vector};
 pub(super) struct Tao<'s> {
     session: &'s Session,
     method: String,
-    tao: Option<BoundedQuadratic<'s>>,
+    tao: Option<BoundedQuadratic>,
     /// U of the last solve, m.
     size: f64,
 }
@@ -48,7 +48,7 @@ impl ContactSolver for Tao<'_> {
     ) -> Result<ContactReport, ContactError> {
         let tao = match self.tao.take() {
             Some(tao) => tao,
-            None => BoundedQuadratic::new(self.session, &self.method)?,
+            None => BoundedQuadratic::new(self.session, &self.method, c.owned())?,
         };
         let tao = self.tao.insert(tao);
         let mut report = ContactReport::default();
@@ -83,11 +83,13 @@ impl ContactSolver for Tao<'_> {
                 problem.bounds.iter().for_each(|b| v[b.dof] = (b.gap / size).min(infinite));
             })?;
             x.write(|v| v.iter_mut().zip(&start).for_each(|(v, c)| *v = c / size))?;
+            let limit = problem.linear_residual() / (s * size);
             let answer = tao
-                .minimise(&stiffness, &f, &lower, &upper, &mut x)
+                .minimise(&stiffness, &f, [&lower, &upper], &mut x, limit)
                 .map_err(|source| ContactError::TaoFailed { kind: self.method.clone(), source })?;
             report.iterations += answer.iterations;
             report.linear_iterations += answer.linear_iterations;
+            report.factorisations += answer.factorisations;
             reason = answer.reason;
 
             let largest = x.read(|x| x.iter().fold(0.0_f64, |m, v| m.max(v.abs())))? * size;

@@ -65,7 +65,7 @@ pub struct StepRecord {
     pub iterations: usize,
     /// Iterations of the linear solvers inside it.
     pub linear_iterations: usize,
-    /// Factorisations it asked for (TAO's own do not show).
+    /// Factorisations (not those of a preconditioner chosen by PETSc options).
     pub factorisations: usize,
     /// Times it left its fast path.
     pub fallbacks: usize,

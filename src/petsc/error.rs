@@ -21,6 +21,14 @@ impl PetscError {
     pub(super) fn ours(message: impl Into<String>) -> Self {
         Self { code: 0, message: message.into() }
     }
+
+    /// The code for PETSc to pass on from a callback; the message waits for the caller's `check`.
+    pub(super) fn pass_on(self) -> raw::PetscErrorCode {
+        /// PETSC_ERR_LIB, for errors PETSc has no code for.
+        const LIBRARY: raw::PetscErrorCode = 76;
+        *MESSAGE.lock().unwrap_or_else(PoisonError::into_inner) = self.message;
+        if self.code == 0 { LIBRARY } else { self.code }
+    }
 }
 
 /// The message of the last error; PETSc reports it through the handler, not the code.

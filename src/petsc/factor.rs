@@ -36,10 +36,29 @@ impl Factor {
 
     /// Factorises the present values of `matrix`.
     pub fn factorise(&mut self, matrix: &Matrix) -> Result<(), PetscError> {
-        // SAFETY: live handles; PETSc keeps a reference to the matrix.
+        // SAFETY: a live handle.
+        unsafe { self.factorise_raw(matrix.raw, false) }
+    }
+
+    /// As `factorise`; a matrix of another `pattern` than the last needs a new ordering.
+    ///
+    /// # Safety
+    /// `matrix` is a live handle.
+    pub(super) unsafe fn factorise_raw(
+        &mut self,
+        matrix: raw::Mat,
+        pattern: bool,
+    ) -> Result<(), PetscError> {
+        // SAFETY: live handles; PETSc keeps a reference to the matrix. Without the last call it
+        // would factorise again when that matrix changes.
         unsafe {
-            check(raw::PCSetOperators(self.raw, matrix.raw, matrix.raw))?;
-            check(raw::PCSetUp(self.raw))
+            if pattern {
+                check(raw::PCReset(self.raw))?;
+            }
+            check(raw::PCSetReusePreconditioner(self.raw, raw::PetscBool::PETSC_FALSE))?;
+            check(raw::PCSetOperators(self.raw, matrix, matrix))?;
+            check(raw::PCSetUp(self.raw))?;
+            check(raw::PCSetReusePreconditioner(self.raw, raw::PetscBool::PETSC_TRUE))
         }
     }
 
@@ -47,7 +66,14 @@ impl Factor {
     pub fn apply(&self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
         same_size(r.owned(), z.owned())?;
         // SAFETY: live handles of matching layout, distinct by borrowing.
-        check(unsafe { raw::PCApply(self.raw, r.raw, z.raw) })
+        unsafe { self.apply_raw(r.raw, z.raw) }
+    }
+
+    /// # Safety
+    /// Live handles of the factored matrix' layout.
+    pub(super) unsafe fn apply_raw(&self, r: raw::Vec, z: raw::Vec) -> Result<(), PetscError> {
+        // SAFETY: the caller's promise.
+        check(unsafe { raw::PCApply(self.raw, r, z) })
     }
 }
 

@@ -13,8 +13,10 @@ mod factor;
 mod ksp;
 mod mat;
 mod session;
+mod shell;
 mod tao;
 mod vec;
+mod wear;
 
 #[allow(
     non_camel_case_types,
@@ -36,5 +38,6 @@ pub use mat::Matrix;
 pub use session::Session;
 pub use tao::{BoundedQuadratic, TaoReport};
 pub use vec::Vector;
+pub use wear::Wear;
 
 use error::check;

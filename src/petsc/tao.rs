@@ -3,6 +3,7 @@
 use super::{
     Matrix, PetscError, Session, Vector, check, raw,
     session::{Live, c_string, world},
+    shell::KeptFactor,
     vec::same_size,
 };
 use std::{ffi::c_void, ptr};
@@ -10,9 +11,11 @@ use std::{ffi::c_void, ptr};
 /// Minimises ½ xᵀKx − fᵀx over lower ≤ x ≤ upper with one of TAO's methods.
 ///
 /// PETSc options without a prefix reach it: `-tao_type bnls`, `-tao_monitor`, `-ksp_type …`.
-pub struct BoundedQuadratic<'s> {
-    session: &'s Session,
-    method: String,
+pub struct BoundedQuadratic {
+    // Destroyed in this order: the Tao uses the factor.
+    tao: Handle,
+    factor: Option<Box<KeptFactor>>,
+    gradient: Vector,
 }
 
 /// What TAO says of a solve; whether it is true is for the KKT residuals to tell.
@@ -22,6 +25,8 @@ pub struct TaoReport {
     pub iterations: usize,
     /// Iterations of the linear solver inside.
     pub linear_iterations: usize,
+    /// Factorisations inside; methods with another preconditioner do none.
+    pub factorisations: usize,
     /// TaoConvergedReason: positive when TAO believes it has converged.
     pub reason: i32,
 }
@@ -32,7 +37,7 @@ struct Quadratic {
     f: raw::Vec,
 }
 
-/// Destroys the Tao at the end of a solve, also on an early return.
+/// Destroys the Tao.
 struct Handle(raw::Tao, #[allow(dead_code)] Live);
 
 impl Drop for Handle {
@@ -42,66 +47,84 @@ impl Drop for Handle {
     }
 }
 
-impl<'s> BoundedQuadratic<'s> {
-    /// TAO's `method` (`tron`, `bnls`, …), its inner linear solver a Cholesky factorisation.
-    pub fn new(session: &'s Session, method: &str) -> Result<Self, PetscError> {
-        let package = if session.ranks() == 1 { "cholmod" } else { "mumps" };
-        // tron reads the first prefix, the bounded Newton family (bnls, …) the second. The
-        // factor being exact, Steihaug's CG takes the Newton step unless the trust region cuts it.
+impl BoundedQuadratic {
+    /// TAO's `method` (`tron`, `bnls`, …) for `size` unknowns on this rank.
+    ///
+    /// Its Newton systems are solved by Steihaug's conjugate gradients, which take the whole step
+    /// unless the trust region cuts it, on a Cholesky factor that is kept while that pays.
+    pub fn new(session: &Session, method: &str, size: usize) -> Result<Self, PetscError> {
+        // tron reads the first prefix, the bounded Newton family (bnls, …) the second.
         for prefix in ["-ksp_", "-tao_bnk_ksp_"] {
             session.default_option(&format!("{prefix}type"), "stcg")?;
-            session.default_option(&format!("{prefix}rtol"), "1e-12")?;
+            session.default_option(&format!("{prefix}norm_type"), "unpreconditioned")?;
         }
-        for prefix in ["-", "-tao_bnk_"] {
-            session.default_option(&format!("{prefix}pc_type"), "cholesky")?;
-            session.default_option(&format!("{prefix}pc_factor_mat_solver_type"), package)?;
+        // Systems of the full size whatever is active, so that a factor fits the next one.
+        session.default_option("-tao_subset_type", "mask")?;
+        // The quasi-Newton Krylov methods' Hessian is an approximation without entries, which
+        // nothing can factorise; they bring their own preconditioner.
+        let quasi_newton = method.starts_with("bqnk");
+        let factor = (!quasi_newton).then(|| KeptFactor::new(session)).transpose()?;
+        let gradient = Vector::zeros(session, size)?;
+        let tao = Handle(ptr::null_mut(), Live::new());
+        let mut this = Self { tao, factor, gradient };
+        let method = c_string(method)?;
+        let (mut ksp, mut pc) = (ptr::null_mut(), ptr::null_mut());
+        // SAFETY: a fresh handle; its solver, if the method has one, lives as long.
+        unsafe {
+            check(raw::TaoCreate(world(), &mut this.tao.0))?;
+            check(raw::TaoSetType(this.tao.0, method.as_ptr()))?;
+            check(raw::TaoGetKSP(this.tao.0, &mut ksp))?;
+            if let (Some(factor), false) = (&mut this.factor, ksp.is_null()) {
+                check(raw::KSPGetPC(ksp, &mut pc))?;
+                factor.attach(pc)?;
+            }
+            check(raw::TaoSetMaximumIterations(this.tao.0, 200))?;
+            check(raw::TaoSetFromOptions(this.tao.0))?;
         }
-        // The quasi-Newton Krylov methods read the second prefix too, but their Hessian is an
-        // approximation without entries, which nothing can factorise.
-        if method.starts_with("bqnk") {
-            session.default_option("-tao_bnk_pc_type", "lmvm")?;
-        }
-        Ok(Self { session, method: method.to_owned() })
+        Ok(this)
     }
 
-    /// Minimises from the start `x` and leaves the minimiser there; bounds may be ±infinite.
+    /// Minimises from the start `x` until the gradient is about `limit` in ‖·‖₂, and leaves the
+    /// minimiser there; bounds may be ±infinite.
     ///
     /// # Errors
-    /// Sizes differ, the method's name is unknown to PETSc, or PETSc fails. That TAO did not
-    /// converge is no error but a negative `reason`.
+    /// Sizes differ, or PETSc fails. That TAO did not converge is no error but a negative `reason`.
     pub fn minimise(
-        &self,
+        &mut self,
         k: &Matrix,
         f: &Vector,
-        lower: &Vector,
-        upper: &Vector,
+        [lower, upper]: [&Vector; 2],
         x: &mut Vector,
+        limit: f64,
     ) -> Result<TaoReport, PetscError> {
-        for size in [f.owned(), lower.owned(), upper.owned(), x.owned()] {
-            same_size(k.owned(), size)?;
+        let own = self.gradient.owned();
+        for size in [k.owned(), f.owned(), lower.owned(), upper.owned(), x.owned()] {
+            same_size(own, size)?;
         }
-        let gradient = Vector::zeros(self.session, x.owned())?;
+        let tao = self.tao.0;
         let mut quadratic = Quadratic { k: k.raw, f: f.raw };
         let context = ptr::from_mut(&mut quadratic).cast::<c_void>();
-        let method = c_string(&self.method)?;
-        let mut tao = Handle(ptr::null_mut(), Live::new());
         let (mut iterations, mut linear, mut reason) = (0, 0, 0);
+        let mut ksp = ptr::null_mut();
+        let factorisations = || self.factor.as_ref().map_or(0, |factor| factor.factorisations);
+        let before = factorisations();
         let unused = ptr::null_mut();
         // SAFETY: live handles of matching layout; the context outlives the solve, in which
         // alone the callbacks run.
         unsafe {
-            check(raw::TaoCreate(world(), &mut tao.0))?;
-            check(raw::TaoSetType(tao.0, method.as_ptr()))?;
-            check(raw::TaoSetSolution(tao.0, x.raw))?;
-            check(raw::TaoSetVariableBounds(tao.0, lower.raw, upper.raw))?;
-            check(raw::TaoSetObjectiveAndGradient(tao.0, gradient.raw, Some(evaluate), context))?;
-            check(raw::TaoSetHessian(tao.0, k.raw, k.raw, Some(keep_hessian), unused))?;
-            check(raw::TaoSetTolerances(tao.0, 1e-13, 1e-13, 0.0))?;
-            check(raw::TaoSetMaximumIterations(tao.0, 200))?;
-            check(raw::TaoSetFromOptions(tao.0))?;
-            check(raw::TaoSolve(tao.0))?;
+            check(raw::TaoSetSolution(tao, x.raw))?;
+            check(raw::TaoSetVariableBounds(tao, lower.raw, upper.raw))?;
+            let gradient = self.gradient.raw;
+            check(raw::TaoSetObjectiveAndGradient(tao, gradient, Some(evaluate), context))?;
+            check(raw::TaoSetHessian(tao, k.raw, k.raw, Some(keep_hessian), unused))?;
+            check(raw::TaoSetTolerances(tao, limit, 1e-13, 0.0))?;
+            check(raw::TaoGetKSP(tao, &mut ksp))?;
+            if !ksp.is_null() {
+                check(raw::KSPSetTolerances(ksp, 1e-12, 0.5 * limit, f64::MAX, 200))?;
+            }
+            check(raw::TaoSolve(tao))?;
             check(raw::TaoGetSolutionStatus(
-                tao.0,
+                tao,
                 &mut iterations,
                 ptr::null_mut(),
                 ptr::null_mut(),
@@ -109,11 +132,12 @@ impl<'s> BoundedQuadratic<'s> {
                 ptr::null_mut(),
                 &mut reason,
             ))?;
-            check(raw::TaoGetLinearSolveIterations(tao.0, &mut linear))?;
+            check(raw::TaoGetLinearSolveIterations(tao, &mut linear))?;
         }
         Ok(TaoReport {
             iterations: iterations as usize,
             linear_iterations: linear as usize,
+            factorisations: factorisations() - before,
             reason,
         })
     }

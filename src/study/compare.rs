@@ -25,7 +25,7 @@ pub struct Entry {
     pub steps: usize,
     /// Iterations of the solver, all steps together.
     pub iterations: usize,
-    /// Factorisations it asked for (TAO's own do not show).
+    /// Factorisations (not those of a preconditioner chosen by PETSc options).
     pub factorisations: usize,
     /// Pairs of triangular solves.
     pub triangular_solves: usize,

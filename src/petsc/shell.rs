@@ -1,0 +1,92 @@
+//! A kept factor as the preconditioner inside one of PETSc's own solvers.
+
+use super::{Factor, PetscError, Session, Wear, check, raw};
+use std::{ffi::c_void, time::Instant};
+
+/// A PCSHELL that factorises the operators it is given only when its factor is worn out.
+pub(super) struct KeptFactor {
+    factor: Factor,
+    wear: Wear,
+    /// Rows of the factored matrix.
+    size: i32,
+    /// Applications since the operators last changed.
+    applications: usize,
+    /// All factorisations so far.
+    pub(super) factorisations: usize,
+}
+
+impl KeptFactor {
+    /// In a box, because PETSc keeps its address.
+    pub(super) fn new(session: &Session) -> Result<Box<Self>, PetscError> {
+        let factor = Factor::new(session, "elastic_")?;
+        let wear = Wear::default();
+        Ok(Box::new(Self { factor, wear, size: 0, applications: 0, factorisations: 0 }))
+    }
+
+    /// Makes `pc` apply this factor.
+    ///
+    /// # Safety
+    /// `pc` is a live handle that must not be used after this box is dropped.
+    pub(super) unsafe fn attach(self: &mut Box<Self>, pc: raw::PC) -> Result<(), PetscError> {
+        // SAFETY: the caller keeps the promise above.
+        unsafe {
+            check(raw::PCSetType(pc, c"shell".as_ptr()))?;
+            check(raw::PCShellSetContext(pc, (&raw mut **self).cast()))?;
+            check(raw::PCShellSetSetUp(pc, Some(set_up)))?;
+            check(raw::PCShellSetApply(pc, Some(apply)))
+        }
+    }
+
+    /// New operators: whether the factor still serves is judged by the iterations it has cost.
+    unsafe fn set_up(&mut self, pc: raw::PC) -> Result<(), PetscError> {
+        let (mut matrix, mut size) = (std::ptr::null_mut(), 0);
+        // SAFETY: PETSc calls with a live preconditioner that has operators.
+        unsafe {
+            check(raw::PCGetOperators(pc, std::ptr::null_mut(), &mut matrix))?;
+            check(raw::MatGetSize(matrix, &mut size, std::ptr::null_mut()))?;
+        }
+        self.wear.lose(std::mem::take(&mut self.applications));
+        if size == self.size && !self.wear.worn() {
+            return Ok(());
+        }
+        let started = Instant::now();
+        // SAFETY: a live matrix.
+        unsafe { self.factor.factorise_raw(matrix, size != self.size)? };
+        self.size = size;
+        self.factorisations += 1;
+        self.wear.renewed(started.elapsed().as_secs_f64());
+        Ok(())
+    }
+}
+
+/// The context PETSc keeps for `pc`.
+unsafe fn context<'a>(pc: raw::PC) -> Result<&'a mut KeptFactor, PetscError> {
+    let mut context: *mut c_void = std::ptr::null_mut();
+    // SAFETY: `attach` set it to a KeptFactor that lives as long as `pc` is used.
+    unsafe {
+        check(raw::PCShellGetContext(pc, (&raw mut context).cast()))?;
+        Ok(&mut *context.cast::<KeptFactor>())
+    }
+}
+
+unsafe extern "C" fn set_up(pc: raw::PC) -> raw::PetscErrorCode {
+    // SAFETY: PETSc passes the preconditioner this was attached to.
+    match unsafe { context(pc).and_then(|kept| kept.set_up(pc)) } {
+        Ok(()) => 0,
+        Err(error) => error.pass_on(),
+    }
+}
+
+unsafe extern "C" fn apply(pc: raw::PC, r: raw::Vec, z: raw::Vec) -> raw::PetscErrorCode {
+    let started = Instant::now();
+    // SAFETY: PETSc passes the preconditioner this was attached to and live vectors.
+    let applied = unsafe { context(pc).and_then(|kept| kept.factor.apply_raw(r, z).map(|()| kept)) };
+    match applied {
+        Ok(kept) => {
+            kept.applications += 1;
+            kept.wear.took(started.elapsed().as_secs_f64(), 1);
+            0
+        }
+        Err(error) => error.pass_on(),
+    }
+}
