@@ -4,7 +4,7 @@ use crate::support::{close, close_to, distorted, history, order, run, setting, s
 use signorini::{
     contact::SOLVERS,
     evolution::{Setting, Step, Stop},
-    fem::source_load,
+    fem::{self, Mass, source_load},
     mesh::Mesh,
 };
 use std::f64::consts::PI;
@@ -214,8 +214,8 @@ fn the_loss_of_damage_is_the_integral_of_the_source() {
     for pair in steps.windows(2) {
         let (before, after) = (&pair[0], &pair[1]);
         let strain = setting.elasticity.strain_squared(&setting.body, &before.state.u);
-        let source: f64 =
-            source_load(&setting.body, &law, &strain, &before.state.zeta).iter().sum();
+        let phi = fem::source(&setting.body, &law, &strain, &before.state.zeta);
+        let source: f64 = source_load(&setting.body, Mass::Consistent, &phi).iter().sum();
         assert!(source < -1e-3);
         // The square's area is 1.
         close(after.record.zeta_mean - before.record.zeta_mean, k * source, 1e-13);
