@@ -8,9 +8,9 @@ ROUNDING = 1e-10
 PANELS = {
     ("soft square", "rise"): "soft square: ζ above max ζ before",
     ("soft square", "undershoot"): "soft square: ζ below its bound",
-    ("nearly broken square", "undershoot"): "nearly broken square: ζ below its bound\n(×: false stop at ζ*)",
+    ("nearly broken square", "undershoot"): "nearly broken square: ζ below its bound\n(×: early stop at ζ*)",
     ("corner", "rise"): "corner: ζ above max ζ before",
-    ("corner", "undershoot"): "corner: ζ below its bound\n(×: false stop at ζ*)",
+    ("corner", "undershoot"): "corner: ζ below its bound\n(×: early stop at ζ*)",
     ("soft square, obtuse mesh", "rise"): "soft square, obtuse mesh: ζ above max ζ before",
 }
 
@@ -25,9 +25,9 @@ def scatter(axis, rows, quantity):
                 marker, fillstyle=fill, markersize=4, color=COLOURS[round(1 / h)],
                 label=f"h = 1/{round(1 / h)}, {mass}",
             )
-    false = [r for r in rows if r["false_stop"] == "true"]
+    early = [r for r in rows if r["early_stop"] == "true"]
     axis.plot(
-        [float(r["ratio"]) for r in false], [max(float(r[quantity]), ROUNDING) for r in false],
+        [float(r["ratio"]) for r in early], [max(float(r[quantity]), ROUNDING) for r in early],
         "x", color="black", markersize=9, markeredgewidth=0.8,
     )
     for ratio in (1 / 6, 0.55):

@@ -52,7 +52,7 @@ pub struct Stop {
     pub time: f64,
     /// The min ζ found there, not accepted.
     pub zeta_min: f64,
-    /// The least ζ that the sources so far allow: above ζ_* the stop is not the material's.
+    /// The least ζ that the sources so far allow: above ζ_* the stop comes too early.
     pub floor: f64,
     /// How far off the time may be, s: the last step and twice the estimated delay of all steps.
     pub uncertainty: f64,
@@ -209,7 +209,7 @@ impl Outcome {
         let mut notes = Vec::new();
         if let Some(stop) = self.stopped.filter(|stop| stop.floor > setting.threshold()) {
             notes.push(format!(
-                "the stop at ζ_* is not the material's but the discretisation's: the sources up to \
+                "ζ_* was reached too early, or should not be reached at all: the sources up to \
                  there allow no ζ below {:.4}",
                 stop.floor
             ));

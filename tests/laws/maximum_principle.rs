@@ -148,18 +148,18 @@ fn what_many_small_steps_add_up_is_seen() {
 }
 
 #[test]
-fn a_stop_that_only_the_mass_matrix_causes_is_named() {
+fn a_stop_that_the_sources_do_not_allow_is_named() {
     // No source: ζ cannot fall below 0.02, and ζ_* = 0.01.
     let (consistent, notes) = outcome(0.02, 0.1, "");
     let stop = consistent.stopped.unwrap();
     close(stop.floor, 0.02, 1e-14);
-    assert!(notes[0].contains("is not the material's") && notes[0].contains("0.0200"), "{notes:?}");
+    assert!(notes[0].contains("too early") && notes[0].contains("0.0200"), "{notes:?}");
     let (lumped, notes) = outcome(0.02, 0.1, ", mass = 'lumped'");
     assert!(lumped.stopped.is_none() && notes.is_empty());
 }
 
 #[test]
-fn a_stop_that_the_source_causes_is_not() {
+fn a_stop_that_they_allow_is_not() {
     let text = "
         material = { young = 80, poisson = 0.3, plane = 'stress' }
         damage = { diffusion = 1, lambda_d = 0, lambda_u = 2000, lambda_w = 0, strain_cap = 1000,

@@ -95,7 +95,7 @@ struct Cell {
     /// Whether ζ_* was reached.
     stopped: bool,
     /// Whether the sources did not allow ζ_* to be reached there.
-    false_stop: bool,
+    early_stop: bool,
     /// Whether the program says that bounds were left.
     noted: bool,
     verdict: Verdict,
@@ -134,7 +134,7 @@ fn cell(
             Ok(())
         })?;
     let seen = Seen::of(&setting, &history, step);
-    let false_stop = outcome.stopped.is_some() && seen.next_floor > setting.threshold();
+    let early_stop = outcome.stopped.is_some() && seen.next_floor > setting.threshold();
     let undershoot = match outcome.stopped {
         Some(stop) => seen.undershoot.max(seen.next_floor - stop.zeta_min),
         None => seen.undershoot,
@@ -142,7 +142,7 @@ fn cell(
     let violated = seen.rise.max(undershoot) > ROUNDING;
     let notes = outcome.notes(&setting);
     let says = |what: &str| notes.iter().any(|note| note.contains(what));
-    let (noted, stop_noted) = (says("left the bounds"), says("is not the material's"));
+    let (noted, stop_noted) = (says("left the bounds"), says("too early"));
     Ok(Cell {
         scene: case.name,
         h: 1.0 / case.cells as f64,
@@ -154,10 +154,10 @@ fn cell(
         rise: seen.rise,
         undershoot,
         stopped: outcome.stopped.is_some(),
-        false_stop,
+        early_stop,
         noted,
         verdict: match violated {
-            true if noted && false_stop == stop_noted => Verdict::Refused,
+            true if noted && early_stop == stop_noted => Verdict::Refused,
             false if !noted && !stop_noted => Verdict::Correct,
             _ => Verdict::Wrong,
         },
