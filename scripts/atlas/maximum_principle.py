@@ -8,9 +8,9 @@ ROUNDING = 1e-10
 PANELS = {
     ("soft square", "rise"): "soft square: ζ above max ζ before",
     ("soft square", "undershoot"): "soft square: ζ below its bound",
-    ("nearly broken square", "undershoot"): "nearly broken square: ζ below its bound\n(×: early stop at ζ*)",
+    ("nearly broken square", "undershoot"): "nearly broken square: ζ below its bound",
     ("corner", "rise"): "corner: ζ above max ζ before",
-    ("corner", "undershoot"): "corner: ζ below its bound\n(×: early stop at ζ*)",
+    ("corner", "undershoot"): "corner: ζ below its bound",
     ("soft square, obtuse mesh", "rise"): "soft square, obtuse mesh: ζ above max ζ before",
 }
 
@@ -46,6 +46,6 @@ def draw(table, path):
     axes[0, 0].legend(frameon=False, fontsize=8, loc="upper left")
     counts = {v: sum(r["verdict"] == v for r in table) for v in ("correct", "refused", "wrong")}
     named = ", ".join(f"{n} {v}" for v, n in counts.items())
-    figure.suptitle(f"{named}; dotted: kκ/h² = 1/6 and 0.55")
+    figure.suptitle(f"{named}; dotted: kκ/h² = 1/6 and 0.55; ×: ζ* reached too early")
     figure.savefig(path, dpi=130)
     plt.close(figure)
