@@ -11,10 +11,11 @@ import matplotlib
 
 matplotlib.use("Agg")
 
-from atlas import penalty, random_contact, step_size, tao_types  # noqa: E402
+from atlas import maximum_principle, penalty, random_contact, step_size, tao_types  # noqa: E402
 
 MAPS = {
     "step-size": step_size,
+    "maximum-principle": maximum_principle,
     "penalty-duality": penalty,
     "tao-types": tao_types,
     "active-set": random_contact,

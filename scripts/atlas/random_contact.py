@@ -1,4 +1,4 @@
-"""Figure of the active set on random problems."""
+"""Figure of map 5, the active set on random problems."""
 
 import matplotlib.pyplot as plt
 

@@ -194,17 +194,7 @@ impl<'a> Recorder<'a> {
         let (wall, scene) = (started.elapsed().as_secs_f64(), setting.scene());
         let mut notes = setting.notes();
         let outcome = result.as_ref().ok();
-        if let Some(outcome) =
-            outcome.filter(|o| o.undamaged_steps > 0 && setting.damage().is_some())
-        {
-            notes.push(format!(
-                "the damage solve was skipped in {} of {} steps: no source, uniform ζ",
-                outcome.undamaged_steps, record.step
-            ));
-        }
-        if let Some(outcome) = outcome.filter(|o| o.undone > 0) {
-            notes.push(format!("{} steps were undone and tried again, shorter", outcome.undone));
-        }
+        notes.extend(outcome.iter().flat_map(|outcome| outcome.notes(setting)));
         let mut contact_nodes: Vec<usize> = state.contact.iter().map(|p| p.node).collect();
         contact_nodes.dedup();
         let summary = Summary {

@@ -2,7 +2,7 @@
 
 use super::{Phases, Setting};
 use crate::{
-    fem::{DamageSystem, source_load},
+    fem::{DamageSystem, source, source_load},
     model::DamageLaw,
     petsc::{PetscError, Session},
 };
@@ -18,14 +18,24 @@ pub(super) struct DamageStep<'a> {
 }
 
 /// What became of a damage step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Driving {
-    /// The system was solved.
-    Solved,
+    /// The system was solved; with the least φ, 1/s.
+    Solved(f64),
     /// No source and a uniform ζ: ζ_n = ζ_{n−1} without a solve.
     Nothing,
     /// The linear solver failed.
     Failed,
+}
+
+impl Driving {
+    /// The least φ of the step, 1/s.
+    pub(super) fn least_source(self) -> f64 {
+        match self {
+            Self::Solved(least) => least,
+            Self::Nothing | Self::Failed => 0.0,
+        }
+    }
 }
 
 impl<'a> DamageStep<'a> {
@@ -33,19 +43,21 @@ impl<'a> DamageStep<'a> {
         Self { session, setting, phases, law: setting.damage(), system: None }
     }
 
-    /// The source load b of u and ζ, where there is a damage law.
-    fn source(&self, u: &[f64], zeta: &[f64]) -> Option<Vec<f64>> {
+    /// The source load b of u and ζ, and its least φ, where there is a damage law.
+    fn source(&self, u: &[f64], zeta: &[f64]) -> Option<(Vec<f64>, f64)> {
         let (law, body) = (self.law?, &self.setting.body);
         Some(self.phases.time("damage source", || {
             let strain = self.setting.elasticity.strain_squared(body, u);
-            source_load(body, &law, &strain, zeta)
+            let phi = source(body, &law, &strain, zeta);
+            let least = phi.iter().flatten().copied().fold(0.0, f64::min);
+            (source_load(body, self.setting.mass(), &phi), least)
         }))
     }
 
     /// About the largest |dζ/dt| that the source of u and ζ causes, 1/s.
     pub(super) fn rate(&self, u: &[f64], zeta: &[f64]) -> f64 {
         let area = &self.setting.body.node_area;
-        let load = self.source(u, zeta).unwrap_or_default();
+        let (load, _) = self.source(u, zeta).unwrap_or_default();
         load.iter().zip(area).map(|(b, a)| b.abs() / a).fold(0.0, f64::max)
     }
 
@@ -56,7 +68,7 @@ impl<'a> DamageStep<'a> {
         zeta: &mut [f64],
         step: f64,
     ) -> Result<Driving, PetscError> {
-        let (Some(law), Some(load)) = (self.law, self.source(u, zeta)) else {
+        let (Some(law), Some((load, least))) = (self.law, self.source(u, zeta)) else {
             return Ok(Driving::Nothing);
         };
         if load.iter().all(|&b| b == 0.0) && zeta.iter().all(|&z| z == zeta[0]) {
@@ -69,11 +81,12 @@ impl<'a> DamageStep<'a> {
                 system
             }
             None => self.phases.time("damage factor", || {
-                DamageSystem::new(self.session, &self.setting.body, law.diffusion, step)
+                let (body, mass) = (&self.setting.body, self.setting.mass());
+                DamageSystem::new(self.session, body, mass, law.diffusion, step)
             })?,
         };
         let solved = self.phases.time("damage solve", || system.advance(&load, zeta))?;
         self.system = Some((step, system));
-        Ok(if solved { Driving::Solved } else { Driving::Failed })
+        Ok(if solved { Driving::Solved(least) } else { Driving::Failed })
     }
 }

@@ -1,5 +1,6 @@
 //! Problem VP^hk: damage and contact in turn, step by step.
 
+mod bounds;
 mod clock;
 mod damage_step;
 mod equilibrium;
@@ -10,6 +11,7 @@ mod phases;
 mod setting;
 mod state;
 
+pub use bounds::Excess;
 pub use equilibrium::Equilibrium;
 pub use loads::Loads;
 pub use phases::Phases;
@@ -20,6 +22,7 @@ use crate::{
     contact::{ContactError, Kkt},
     petsc::{PetscError, Session},
 };
+use bounds::Bounds;
 use clock::Clock;
 use damage_step::{DamageStep, Driving};
 use estimate::Estimate;
@@ -38,6 +41,8 @@ pub struct Outcome {
     pub undamaged_steps: usize,
     /// Steps undone and tried again, shorter.
     pub undone: usize,
+    /// Where ζ left the bounds of its equation.
+    pub excess: Excess,
 }
 
 /// The stop at ζ_*.
@@ -48,6 +53,8 @@ pub struct Stop {
     pub time: f64,
     /// The min ζ found there, not accepted.
     pub zeta_min: f64,
+    /// The least ζ that the sources so far allow: above ζ_* the stop comes too early.
+    pub floor: f64,
     /// How far off the time may be, s: the last step and twice the estimated delay of all steps.
     pub uncertainty: f64,
 }
@@ -110,6 +117,7 @@ pub fn run(
     accepted(&last).map_err(RunError::Observer)?;
     let mut clock = Clock::new(setting.scene().time, damage.rate(&last.state.u, &last.state.zeta));
     let mut estimate = Estimate::default();
+    let mut bounds = Bounds::of(&last.state.zeta);
     let mut outcome = Outcome::new(last);
 
     while let Some((time, step)) = clock.propose() {
@@ -126,6 +134,8 @@ pub fn run(
             }
             return Err(RunError::Damage { step: n, time });
         }
+
+        let allowed = bounds.after(driving.least_source(), step);
 
         // The program stops when ζ_* is reached; chosen steps land there.
         if let Some(reached) = setting.at_threshold(&zeta) {
@@ -145,8 +155,9 @@ pub fn run(
             };
             // The estimate of the delay is good to a factor of 2.
             let uncertainty = step + 2.0 * delay.abs();
-            let stop = Stop { time, zeta_min: reached, uncertainty };
-            outcome.stopped = Some(stop);
+            outcome.excess.observe(allowed, &zeta, n, time);
+            let floor = allowed.floor();
+            outcome.stopped = Some(Stop { time, zeta_min: reached, floor, uncertainty });
             break;
         }
         let error = estimate.of(&old.zeta, &zeta, step);
@@ -173,6 +184,8 @@ pub fn run(
         equilibrium.accept(time)?;
         clock.accept(time, step, Some(error.largest));
         estimate.accept(error);
+        outcome.excess.observe(allowed, &zeta, n, time);
+        bounds = allowed.tightened(&zeta);
         last.record.seconds = started.elapsed().as_secs_f64();
         accepted(&last).map_err(RunError::Observer)?;
         outcome.accept(last, driving);
@@ -182,7 +195,37 @@ pub fn run(
 
 impl Outcome {
     fn new(first: Step) -> Self {
-        Self { kkt: first.record.kkt(), last: first, stopped: None, undamaged_steps: 0, undone: 0 }
+        Self {
+            kkt: first.record.kkt(),
+            last: first,
+            stopped: None,
+            undamaged_steps: 0,
+            undone: 0,
+            excess: Excess::default(),
+        }
+    }
+
+    /// What the user should know about the run of `setting`.
+    pub fn notes(&self, setting: &Setting) -> Vec<String> {
+        let mut notes = Vec::new();
+        if let Some(stop) = self.stopped.filter(|stop| stop.floor > setting.threshold()) {
+            notes.push(format!(
+                "ζ_* was reached too early, or should not be reached at all: the sources up to \
+                 there allow no ζ below {:.4}",
+                stop.floor
+            ));
+        }
+        notes.extend(self.excess.note(setting.mass()));
+        if self.undamaged_steps > 0 && setting.damage().is_some() {
+            notes.push(format!(
+                "the damage solve was skipped in {} of {} steps: no source, uniform ζ",
+                self.undamaged_steps, self.last.record.step
+            ));
+        }
+        if self.undone > 0 {
+            notes.push(format!("{} steps were undone and tried again, shorter", self.undone));
+        }
+        notes
     }
 
     fn accept(&mut self, last: Step, driving: Driving) {

@@ -5,7 +5,7 @@ use crate::{
     contact::{
         ConstraintError, Constraints, DrivenMotion, FixedRow, GapRow, RigidMotion, RigidMotions,
     },
-    fem::{Body, Elasticity},
+    fem::{Body, Elasticity, Mass},
     mesh::{Mesh, boundary_nodes},
     model::DamageLaw,
     scene::{Scene, SceneError, Stepping, TimeGrid},
@@ -154,6 +154,11 @@ impl Setting {
     pub fn damage(&self) -> Option<DamageLaw> {
         self.scene.time?;
         self.scene.damage.as_ref().map(|damage| damage.law)
+    }
+
+    /// How the damage steps are integrated.
+    pub fn mass(&self) -> Mass {
+        self.scene.damage.as_ref().map(|damage| damage.mass).unwrap_or_default()
     }
 
     /// ζ₀ at the nodes: π^h ζ₀, or 1 for a material that is not damaged.

@@ -1,24 +1,49 @@
 //! The damage system (28): (M + kκL) ζ_n = M ζ_{n−1} + k b(φ).
 
-use super::Body;
+use super::{Body, Triangle};
 use crate::{
     model::DamageLaw,
     petsc::{LinearSolver, Matrix, PetscError, Session, Vector},
 };
+use nalgebra::{Matrix3, Vector3};
 
-/// The load b_i = ∫ φ λ_i of the damage source (25).
-///
-/// The strain is constant on a triangle; φ is taken at its vertices (nodal ζ, triangle
-/// strain) and the affine function through these values is integrated exactly.
-pub fn source_load(body: &Body, law: &DamageLaw, strain_squared: &[f64], zeta: &[f64]) -> Vec<f64> {
-    let mut load = vec![0.0; zeta.len()];
-    for ((nodes, triangle), e2) in
-        body.mesh.triangles.iter().zip(&body.triangles).zip(strain_squared)
-    {
-        let phi = nodes.map(|node| law.source(*e2, zeta[node]));
-        let sum: f64 = phi.iter().sum();
-        for (node, phi) in nodes.iter().zip(phi) {
-            load[*node] += triangle.area / 12.0 * (sum + phi);
+/// How (28) integrates products with a test function λ_i: the mass M and the source load b.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Mass {
+    /// Exactly, as in the paper.
+    #[default]
+    Consistent,
+    /// By the values at the vertices: M is diagonal (its rows summed). Where L has no positive
+    /// entry off its diagonal (no obtuse angles), ζ obeys the maximum principle for every k.
+    Lumped,
+}
+
+impl Mass {
+    /// The mass of one triangle, m².
+    fn of(self, triangle: &Triangle) -> Matrix3<f64> {
+        match self {
+            Self::Consistent => triangle.mass(),
+            Self::Lumped => Matrix3::from_diagonal_element(triangle.area / 3.0),
+        }
+    }
+}
+
+/// The damage source φ of (25) at the vertices of each triangle, from nodal ζ and the
+/// triangle's |ε|², 1/s.
+pub fn source(body: &Body, law: &DamageLaw, strain_squared: &[f64], zeta: &[f64]) -> Vec<[f64; 3]> {
+    let at_vertices =
+        |(nodes, e2): (&[usize; 3], &f64)| nodes.map(|node| law.source(*e2, zeta[node]));
+    body.mesh.triangles.iter().zip(strain_squared).map(at_vertices).collect()
+}
+
+/// The load b_i = ∫ φ λ_i of a source given at the vertices and affine between them, m²/s.
+pub fn source_load(body: &Body, mass: Mass, source: &[[f64; 3]]) -> Vec<f64> {
+    let mut load = vec![0.0; body.mesh.nodes.len()];
+    for ((nodes, triangle), phi) in body.mesh.triangles.iter().zip(&body.triangles).zip(source) {
+        let b = mass.of(triangle) * Vector3::from(*phi);
+        for (node, b) in nodes.iter().zip(b.iter()) {
+            load[*node] += b;
         }
     }
     load
@@ -42,6 +67,7 @@ impl DamageSystem {
     pub fn new(
         session: &Session,
         body: &Body,
+        mass: Mass,
         diffusion: f64,
         step: f64,
     ) -> Result<Self, PetscError> {
@@ -49,7 +75,7 @@ impl DamageSystem {
         let (mut rows, mut columns) = (Vec::new(), Vec::new());
         let (mut mass_values, mut laplace_values) = (Vec::new(), Vec::new());
         for (nodes, triangle) in body.mesh.triangles.iter().zip(&body.triangles) {
-            let (mass, laplace) = (triangle.mass(), triangle.laplace());
+            let (mass, laplace) = (mass.of(triangle), triangle.laplace());
             for i in 0..3 {
                 for j in 0..3 {
                     rows.push(body.partition.row(nodes[i], 1, 0));

@@ -13,7 +13,7 @@ mod damage;
 mod loads;
 
 pub use body::Body;
-pub use damage::{DamageSystem, source_load};
+pub use damage::{DamageSystem, Mass, source, source_load};
 pub use elasticity::{Elasticity, Stiffness};
 pub use frames::Frames;
 pub use loads::{add_body_force, add_traction};

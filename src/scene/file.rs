@@ -10,7 +10,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::error::{Names, SceneError};
 use super::source::Source;
-use crate::model::Plane;
+use crate::{fem::Mass, model::Plane};
 
 /// The tables that stand alone.
 const TABLES: [&str; 7] = ["mesh", "material", "damage", "time", "body", "contact", "output"];
@@ -63,6 +63,8 @@ pub(super) struct DamageTable {
     pub(super) strain_cap: Number,
     pub(super) threshold: Number,
     pub(super) initial: Spanned<Formula>,
+    #[serde(default)]
+    pub(super) mass: Mass,
 }
 
 #[derive(Deserialize)]

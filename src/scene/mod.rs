@@ -20,6 +20,7 @@ pub use expression::Expression;
 
 use crate::{
     contact::PenaltyOptions,
+    fem::Mass,
     model::{DamageLaw, Material},
 };
 use source::Source;
@@ -75,6 +76,8 @@ pub struct Damage {
     pub law: DamageLaw,
     /// ζ₀(x, y) in (ζ_*, 1].
     pub initial: Expression,
+    /// How (28) is integrated.
+    pub mass: Mass,
 }
 
 /// Whether ζ is in (ζ_*, 1], as ζ₀ must be.

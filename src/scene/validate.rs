@@ -182,7 +182,7 @@ impl Check<'_> {
                 let problem = format!("must be in ({}, 1], but is {value}", law.threshold);
                 Err(self.invalid(&table.initial.span(), problem))
             }
-            _ => Ok(Damage { law, initial }),
+            _ => Ok(Damage { law, initial, mass: table.mass }),
         }
     }
 

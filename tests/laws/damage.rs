@@ -4,7 +4,7 @@ use crate::support::{close, close_to, distorted, history, order, run, setting, s
 use signorini::{
     contact::SOLVERS,
     evolution::{Setting, Step, Stop},
-    fem::source_load,
+    fem::{self, source_load},
     mesh::Mesh,
 };
 use std::f64::consts::PI;
@@ -89,11 +89,12 @@ fn the_run_stops_at_the_threshold_with_the_last_admissible_state() {
 }
 
 /// No load and λ_D = 0: ζ only diffuses from c + a cos(πx).
-fn diffusing(mesh: Mesh, diffusion: f64, step: f64) -> Setting {
+fn diffusing(mesh: Mesh, diffusion: f64, step: f64, mass: &str) -> Setting {
     let text = format!(
         "{MATERIAL}
          damage = {{ diffusion = {diffusion:?}, lambda_d = 0, lambda_u = 1, lambda_w = 0,
-                     strain_cap = 1, threshold = 0.01, initial = '0.7 + 0.25*cos(pi*x)' }}
+                     strain_cap = 1, threshold = 0.01, initial = '0.7 + 0.25*cos(pi*x)',
+                     mass = '{mass}' }}
          time = {{ end = 1, step = {step:?} }}
          boundary = [{{ name = 'left', displacement = [0, 0] }}]"
     );
@@ -122,7 +123,8 @@ fn damage_without_strain_decays_as_the_cosine_mode_with_order_one_in_time() {
     // ζ = c + a e^(−κπ²t) cos(πx), on a mesh whose own error is a few percent of the last step's.
     let steps = [0.1, 0.05, 0.025];
     let amplitude = 0.25 * (-DIFFUSION * PI * PI).exp();
-    let errors = steps.map(|step| distance(&diffusing(square(64), DIFFUSION, step), amplitude));
+    let errors = steps
+        .map(|step| distance(&diffusing(square(64), DIFFUSION, step, "consistent"), amplitude));
     let order = order(&steps, &errors);
     println!("errors {errors:?}: order {order:.3} in k");
     assert!((order - 1.0).abs() < 0.05, "{order}: {errors:?}");
@@ -133,10 +135,13 @@ fn damage_without_strain_decays_as_the_cosine_mode_with_order_two_in_space() {
     // Euler's N steps multiply the mode by exactly (1 + kκπ²)^−N: what is left is in h.
     let amplitude = 0.25 * (1.0 + 0.125 * DIFFUSION * PI * PI).powi(-8);
     let cells = [12, 24, 48];
-    let errors = cells.map(|n| distance(&diffusing(distorted(n), DIFFUSION, 0.125), amplitude));
-    let order = order(&cells.map(|n| 1.0 / n as f64), &errors);
-    println!("errors {errors:?}: order {order:.3} in h");
-    assert!((order - 2.0).abs() < 0.15, "{order}: {errors:?}");
+    for mass in ["consistent", "lumped"] {
+        let end = |n| distance(&diffusing(distorted(n), DIFFUSION, 0.125, mass), amplitude);
+        let errors = cells.map(end);
+        let order = order(&cells.map(|n| 1.0 / n as f64), &errors);
+        println!("{mass}: errors {errors:?}: order {order:.3} in h");
+        assert!((order - 2.0).abs() < 0.15, "{mass}: {order}: {errors:?}");
+    }
 }
 
 /// λ_D and λ_U of the uniaxial tests, 1/s, and the pressure on the top at t = 1, Pa.
@@ -207,18 +212,20 @@ fn uniform_damage_converges_to_its_differential_equation_with_order_one() {
 #[test]
 fn the_loss_of_damage_is_the_integral_of_the_source() {
     // Testing (28) with 1: ∫ζ_n − ∫ζ_{n−1} = k ∫φ_{n−1}, with the damage far from uniform.
-    let setting = shipped("square-mild", &["mesh.size=0.125", "time.step=0.1"]);
-    let (law, k) = (setting.damage().unwrap(), 0.1);
-    let (steps, _) = history(&setting, SOLVERS[0]);
-    assert_eq!(steps.len(), 11);
-    for pair in steps.windows(2) {
-        let (before, after) = (&pair[0], &pair[1]);
-        let strain = setting.elasticity.strain_squared(&setting.body, &before.state.u);
-        let source: f64 =
-            source_load(&setting.body, &law, &strain, &before.state.zeta).iter().sum();
-        assert!(source < -1e-3);
-        // The square's area is 1.
-        close(after.record.zeta_mean - before.record.zeta_mean, k * source, 1e-13);
+    for set in ["damage.mass=consistent", "damage.mass=lumped"] {
+        let setting = shipped("square-mild", &["mesh.size=0.125", "time.step=0.1", set]);
+        let (law, k) = (setting.damage().unwrap(), 0.1);
+        let (steps, _) = history(&setting, SOLVERS[0]);
+        assert_eq!(steps.len(), 11);
+        for pair in steps.windows(2) {
+            let (before, after) = (&pair[0], &pair[1]);
+            let strain = setting.elasticity.strain_squared(&setting.body, &before.state.u);
+            let phi = fem::source(&setting.body, &law, &strain, &before.state.zeta);
+            let source: f64 = source_load(&setting.body, setting.mass(), &phi).iter().sum();
+            assert!(source < -1e-3);
+            // The square's area is 1.
+            close(after.record.zeta_mean - before.record.zeta_mean, k * source, 1e-13);
+        }
     }
 }
 

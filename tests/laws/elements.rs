@@ -3,7 +3,7 @@
 use crate::support::{Random, close, difference, distorted, largest, moved, turn, unstructured};
 use nalgebra::{Matrix2, Matrix3, SVector};
 use signorini::{
-    fem::{Body, DamageSystem, Elasticity, Frames, Stiffness, Triangle, source_load},
+    fem::{Body, DamageSystem, Elasticity, Frames, Mass, Stiffness, Triangle, source, source_load},
     mesh::Mesh,
     model::{DamageLaw, Material, Plane},
     petsc::{Session, Vector},
@@ -283,8 +283,9 @@ fn a_damage_step_solves_the_assembled_system() {
     }
     let expected = left.lu().solve(&right).unwrap();
     let mut next = zeta.clone();
-    let load = source_load(&body, &law, &strain, &zeta);
-    let mut system = DamageSystem::new(&session, &body, law.diffusion, step).unwrap();
+    let load = source_load(&body, Mass::Consistent, &source(&body, &law, &strain, &zeta));
+    let mut system =
+        DamageSystem::new(&session, &body, Mass::Consistent, law.diffusion, step).unwrap();
     assert!(system.advance(&load, &mut next).unwrap());
     let error = difference(&next, expected.as_slice());
     assert!(error < 1e-13, "{error}");

@@ -9,6 +9,7 @@ mod set;
 
 use std::path::{Path, PathBuf};
 
+use signorini::fem::Mass;
 use signorini::model::Plane;
 use signorini::scene::{MeshSource, Scene, Stepping, TimeGrid};
 
@@ -122,6 +123,7 @@ fn everything_written_is_read() {
     assert_eq!(scene.output.every, Some(5));
     let damage = scene.damage.expect("given");
     assert_eq!(damage.initial.eval(0.5, 0.0, 0.0), 0.95);
+    assert_eq!(damage.mass, Mass::Consistent, "as in the paper unless told otherwise");
     let gap = scene.boundaries[2].gap.as_ref().expect("given");
     assert_eq!(gap.normal, Some([0.6, -0.8]), "scaled to length 1");
     assert!(scene.boundaries[2].traction.is_some(), "beside the gap");

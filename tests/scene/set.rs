@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use signorini::fem::Mass;
 use signorini::model::Plane;
 use signorini::scene::{Scene, TimeGrid};
 
@@ -77,4 +78,10 @@ fn a_bad_set_is_named() {
             }
         }
     }
+}
+
+#[test]
+fn the_mass_is_chosen_by_its_name() {
+    let scene = with(&["damage.mass=lumped"]).expect("complete");
+    assert_eq!(scene.damage.expect("given").mass, Mass::Lumped);
 }

@@ -14,7 +14,7 @@ use signorini::{
 };
 use std::path::Path;
 
-/// The square of map 2 on n × n cells, pressed on the left and lifted on the right.
+/// The square of map 3 on n × n cells, pressed on the left and lifted on the right.
 fn solve(
     session: &Session,
     n: usize,

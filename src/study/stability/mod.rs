@@ -4,6 +4,7 @@
 //! The page `validation/STABILITY.md` tells what the maps show.
 
 mod step_size;
+mod maximum_principle;
 mod penalty;
 mod tao_types;
 mod random_contact;
@@ -24,8 +25,9 @@ use std::path::Path;
 pub type Map = fn(&Session, &Path) -> Result<Counts, StudyError>;
 
 /// The maps by name.
-pub const MAPS: [(&str, Map); 4] = [
+pub const MAPS: [(&str, Map); 5] = [
     ("step-size", step_size::run),
+    ("maximum-principle", maximum_principle::run),
     ("penalty-duality", penalty::run),
     ("tao-types", tao_types::run),
     ("active-set", random_contact::run),

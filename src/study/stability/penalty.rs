@@ -1,4 +1,4 @@
-//! Map 2. Penalty-duality: ω against λω.
+//! Map 3. Penalty-duality: ω against λω.
 
 use super::{Counts, StudyError, Verdict};
 use crate::{

@@ -1,4 +1,4 @@
-//! Active set on random problems: loads, gaps, stiffness and first guesses drawn at random.
+//! Map 5. Active set on random problems: loads, gaps, stiffness and first guesses drawn at random.
 
 use super::{Counts, StudyError, Verdict, penalty::difference};
 use crate::{

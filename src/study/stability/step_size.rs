@@ -88,7 +88,7 @@ fn fail(
     let setting = Setting::new(scene, rectangle(1.0, 1.0, n, n))?;
     let outcome =
         evolution::run(session, &setting, SOLVERS[0], &Phases::default(), &mut |_| Ok(()))?;
-    let missed = Stop { time: f64::NAN, zeta_min: f64::NAN, uncertainty: 0.0 };
+    let missed = Stop { time: f64::NAN, zeta_min: f64::NAN, floor: f64::NAN, uncertainty: 0.0 };
     let stop = outcome.stopped.unwrap_or(missed);
     Ok(Row {
         n,

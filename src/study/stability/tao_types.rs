@@ -1,4 +1,4 @@
-//! Map 3. TAO's types.
+//! Map 4. TAO's types.
 
 use super::{
     Counts, StudyError, Verdict,
