@@ -160,7 +160,7 @@ impl<'a> Recorder<'a> {
             phases,
             every,
             history: History::create(folder)?,
-            fields: FieldWriter::new(folder, setting),
+            fields: FieldWriter::new(folder, setting)?,
             screen: Screen::new(setting),
             last: None,
         })

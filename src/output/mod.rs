@@ -1,5 +1,6 @@
 //! What a run leaves behind: `fields.pvd` with its `.vtu` files, `history.csv`, `summary.json`.
 
+mod array;
 mod history;
 mod summary;
 mod vtu;

@@ -80,7 +80,8 @@ unsafe extern "C" fn set_up(pc: raw::PC) -> raw::PetscErrorCode {
 unsafe extern "C" fn apply(pc: raw::PC, r: raw::Vec, z: raw::Vec) -> raw::PetscErrorCode {
     let started = Instant::now();
     // SAFETY: PETSc passes the preconditioner this was attached to and live vectors.
-    let applied = unsafe { context(pc).and_then(|kept| kept.factor.apply_raw(r, z).map(|()| kept)) };
+    let applied =
+        unsafe { context(pc).and_then(|kept| kept.factor.apply_raw(r, z).map(|()| kept)) };
     match applied {
         Ok(kept) => {
             kept.applications += 1;
