@@ -187,7 +187,7 @@ impl<'a> Recorder<'a> {
         result: &Result<Outcome, RunError>,
         started: Instant,
     ) -> Result<(), output::OutputError> {
-        let Some(Step { state, record }) = self.last.take() else { return Ok(()) };
+        let Some(Step { state, record, .. }) = self.last.take() else { return Ok(()) };
         if self.fields.last_time() != Some(state.time) {
             self.phases.time("output", || self.fields.add(setting, &state))?;
         }
@@ -205,6 +205,7 @@ impl<'a> Recorder<'a> {
         if let Some(outcome) = outcome.filter(|o| o.undone > 0) {
             notes.push(format!("{} steps were undone and tried again, shorter", outcome.undone));
         }
+        notes.extend(outcome.iter().flat_map(|o| &o.notes).map(ToString::to_string));
         let mut contact_nodes: Vec<usize> = state.contact.iter().map(|p| p.node).collect();
         contact_nodes.dedup();
         let summary = Summary {

@@ -2,7 +2,7 @@
 
 use super::{Bound, Kkt};
 use crate::petsc::{Matrix, PetscError, Session, Vector};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// min ½ cᵀKc − fᵀc  subject to  c_i ≤ g_i on the bounded unknowns.
 ///
@@ -59,12 +59,24 @@ impl ContactProblem<'_> {
 
     /// Whether no rigid motion is left when u_ν is prescribed on the `pressing` bounds.
     pub fn held_by(&self, pressing: &[bool]) -> bool {
-        let rows = self.rigid.row_iter().zip(pressing).filter(|(_, on)| **on);
-        let motions = self.rigid.ncols();
-        let gram = rows
-            .fold(DMatrix::zeros(motions, motions), |sum, (row, _)| sum + row.transpose() * row);
-        motions == 0 || gram.symmetric_eigenvalues().min() > 1e-10 * self.rigid.norm_squared()
+        unheld(self.rigid, pressing).is_none()
     }
+}
+
+/// The combination of the motions `rigid` (u·ν at the bounds, a column each) that is left when
+/// u_ν is prescribed on the `pressing` bounds; the least held one if there are several.
+pub(crate) fn unheld(rigid: &DMatrix<f64>, pressing: &[bool]) -> Option<DVector<f64>> {
+    let motions = rigid.ncols();
+    if motions == 0 {
+        return None;
+    }
+    let rows = rigid.row_iter().zip(pressing).filter(|(_, on)| **on);
+    let gram =
+        rows.fold(DMatrix::zeros(motions, motions), |sum, (row, _)| sum + row.transpose() * row);
+    let eigen = gram.symmetric_eigen();
+    let least = eigen.eigenvalues.imin();
+    let held = eigen.eigenvalues[least] > 1e-10 * rigid.norm_squared();
+    (!held).then(|| eigen.eigenvectors.column(least).into_owned())
 }
 
 /// A method for the contact problem.

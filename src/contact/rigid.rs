@@ -181,9 +181,13 @@ impl RigidMotions {
         if remainder.norm() <= 1e-8 * size {
             return Ok(());
         }
-        let scaled = remainder.normalize();
+        Err(driven(self.combined(&remainder.normalize())))
+    }
+
+    /// The motion whose shares (a unit vector) of those that only contact holds are given.
+    pub fn combined(&self, shares: &DVector<f64>) -> RigidMotion {
         let mut motion = RigidMotion { translation: [0.0; 2], rotation: 0.0, centre: self.centre };
-        for (m, c) in self.resisted.iter().zip(scaled.iter()) {
+        for (m, c) in self.resisted.iter().zip(shares.iter()) {
             motion.translation[0] += c * m.translation[0];
             motion.translation[1] += c * m.translation[1];
             motion.rotation += c * m.rotation;
@@ -191,7 +195,7 @@ impl RigidMotions {
         if (motion.rotation * self.radius).abs() < ROUNDING {
             motion.rotation = 0.0;
         }
-        Err(driven(motion))
+        motion
     }
 
     /// Pins one unknown for each free motion. The load being balanced, the pins carry no

@@ -2,7 +2,9 @@
 
 use super::{ContactPoint, Phases, RunError, Setting, State, Step, StepRecord};
 use crate::{
-    contact::{self, ContactError, ContactProblem, ContactReport, ContactSolver, Kkt},
+    contact::{
+        self, ContactError, ContactProblem, ContactReport, ContactSolver, Kkt, RigidMotion,
+    },
     fem::Stiffness,
     petsc::{PetscError, Session, Vector},
 };
@@ -127,7 +129,8 @@ impl<'a> Equilibrium<'a> {
                 };
                 let mut record = figures(setting, step, &state, &external, &total, &kkt);
                 record.seconds = started.elapsed().as_secs_f64();
-                return Ok(Step { state, record });
+                let unheld = self.unheld(&state.contact, force_scale);
+                return Ok(Step { state, record, unheld });
             }
             if attempts == ATTEMPTS || kkt.worst().is_nan() {
                 return Err(failed(ContactError::NotCertified {
@@ -232,6 +235,15 @@ impl<'a> Equilibrium<'a> {
             ContactPoint { node: bound.node, force, pressure: force / bound.weight, gap, active }
         });
         (kkt, points.collect())
+    }
+
+    /// A rigid motion that no node holds which presses by more than the tolerance. A body
+    /// without load rests where it is, which needs no holding.
+    fn unheld(&self, contact: &[ContactPoint], force_scale: f64) -> Option<RigidMotion> {
+        let pressing = |p: &ContactPoint| p.force > self.setting.tolerance * force_scale;
+        let pressing: Vec<bool> = contact.iter().map(pressing).collect();
+        let shares = contact::unheld(&self.rigid, &pressing).filter(|_| force_scale > 0.0)?;
+        Some(self.setting.motions.combined(&shares))
     }
 }
 

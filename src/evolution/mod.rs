@@ -5,12 +5,14 @@ mod damage_step;
 mod equilibrium;
 mod estimate;
 mod loads;
+mod note;
 mod phases;
 mod setting;
 mod state;
 
 pub use equilibrium::Equilibrium;
 pub use loads::Loads;
+pub use note::Note;
 pub use phases::Phases;
 pub use setting::{Setting, SetupError};
 pub use state::{ContactPoint, State, Step, StepRecord};
@@ -22,7 +24,7 @@ use crate::{
 use clock::Clock;
 use damage_step::{DamageStep, Driving};
 use estimate::Estimate;
-use std::time::Instant;
+use std::{mem::discriminant, time::Instant};
 
 /// How a run ended that did not fail.
 #[derive(Debug, Clone)]
@@ -37,6 +39,8 @@ pub struct Outcome {
     pub undamaged_steps: usize,
     /// Steps undone and tried again, shorter.
     pub undone: usize,
+    /// What the user should know about the answers: of each kind the first.
+    pub notes: Vec<Note>,
 }
 
 /// The stop at ζ_*.
@@ -181,12 +185,36 @@ pub fn run(
 
 impl Outcome {
     fn new(first: Step) -> Self {
-        Self { kkt: first.record.kkt(), last: first, stopped: None, undamaged_steps: 0, undone: 0 }
+        let mut outcome = Self {
+            kkt: first.record.kkt(),
+            last: first,
+            stopped: None,
+            undamaged_steps: 0,
+            undone: 0,
+            notes: Vec::new(),
+        };
+        outcome.note_last();
+        outcome
     }
 
     fn accept(&mut self, last: Step, driving: Driving) {
         self.kkt = self.kkt.max(&last.record.kkt());
         self.undamaged_steps += usize::from(driving == Driving::Nothing);
         self.last = last;
+        self.note_last();
+    }
+
+    /// Notes what there is to say about the last step.
+    fn note_last(&mut self) {
+        if let Some(motion) = self.last.unheld {
+            self.note(Note::Unheld { time: self.last.record.time, motion });
+        }
+    }
+
+    /// Keeps the first note of each kind.
+    fn note(&mut self, note: Note) {
+        if !self.notes.iter().any(|known| discriminant(known) == discriminant(&note)) {
+            self.notes.push(note);
+        }
     }
 }
