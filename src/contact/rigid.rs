@@ -29,6 +29,11 @@ impl RigidMotion {
     fn field(&self, nodes: &[[f64; 2]]) -> Vec<f64> {
         nodes.iter().flat_map(|&x| self.at(x)).collect()
     }
+
+    /// The work of nodal forces on it.
+    fn work(&self, nodes: &[[f64; 2]], load: &[f64]) -> f64 {
+        self.field(nodes).iter().zip(load).map(|(u, f)| u * f).sum()
+    }
 }
 
 impl fmt::Display for RigidMotion {
@@ -157,6 +162,12 @@ impl RigidMotions {
         })
     }
 
+    /// The work of `load` (nodal forces) on the motions that only contact holds.
+    pub fn work(&self, body: &Body, load: &[f64]) -> DVector<f64> {
+        let work = |i: usize, _| self.resisted[i].work(&body.mesh.nodes, load);
+        DVector::from_fn(self.resisted.len(), work)
+    }
+
     /// Checks that `load` (nodal forces) does no work on free motions and can be balanced by
     /// contact forces p ≥ 0 on the resisted ones: the nearest such forces leave no remainder
     /// (Farkas; the remainder itself is the motion that the load drives).
@@ -166,8 +177,7 @@ impl RigidMotions {
         }
         let nodes = &body.mesh.nodes;
         let size: f64 = load.chunks(2).map(|f| f[0].hypot(f[1])).sum();
-        let work =
-            |m: &RigidMotion| -> f64 { m.field(nodes).iter().zip(load).map(|(u, f)| u * f).sum() };
+        let work = |m: &RigidMotion| m.work(nodes, load);
         let driven = |motion: RigidMotion| {
             let sum = |k: usize| load.iter().skip(k).step_by(2).sum::<f64>();
             let turn = RigidMotion { translation: [0.0, 0.0], rotation: 1.0, centre: self.centre };
@@ -176,7 +186,7 @@ impl RigidMotions {
         if let Some(motion) = self.free.iter().find(|m| work(m).abs() > ROUNDING * size) {
             return Err(driven(*motion));
         }
-        let work = DVector::from_iterator(self.resisted.len(), self.resisted.iter().map(work));
+        let work = self.work(body, load);
         let remainder = &work - self.normal.transpose() * nonnegative(&self.normal, &work);
         if remainder.norm() <= 1e-8 * size {
             return Ok(());

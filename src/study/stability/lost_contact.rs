@@ -25,11 +25,13 @@ boundary = [
 "#;
 /// Cells along a side.
 const CELLS: usize = 16;
+/// KKT tolerance of the scenes (the default of the program).
+const TOLERANCE: f64 = 1e-10;
 /// How far two answers may differ, relative to the largest |u|: a residual at the tolerance
-/// 1e-10 moves u by the condition number of K times as much.
-const AGREEMENT: f64 = 1e-6;
+/// moves u by the condition number of K times as much.
+const AGREEMENT: f64 = 1e-7;
 /// How far contact forces may be from balancing the load, relative to its size: the tolerance
-/// 1e-10 on a norm, summed over the nodes.
+/// on a norm, summed over the nodes.
 const BALANCE: f64 = 1e-8;
 
 /// A square and what is changed about its load.
@@ -57,8 +59,21 @@ const AROUND: [f64; 16] = [
 const BESIDE: [f64; 13] =
     [0.0, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
 const ECCENTRICITIES: [f64; 15] = [
-    0.0, 0.1, 0.3, 0.4, 0.49, 0.499, 0.499_999, 0.499_999_99, 0.5, 0.500_000_01, 0.500_001, 0.501,
-    0.51, 0.6, 1.0,
+    0.0,
+    0.1,
+    0.3,
+    0.4,
+    0.49,
+    0.499,
+    0.499_999,
+    0.499_999_99,
+    0.5,
+    0.500_000_01,
+    0.500_001,
+    0.501,
+    0.51,
+    0.6,
+    1.0,
 ];
 
 /// A pressure of resultant 1 whose centre is at x = ½ + e.
@@ -66,7 +81,7 @@ fn eccentric(e: f64) -> String {
     format!("-1 - 12*({e:e})*(x - 0.5)")
 }
 
-const SWEEPS: [Sweep; 6] = [
+const SWEEPS: [Sweep; 7] = [
     Sweep {
         name: "clamped, lifted",
         values: &AROUND,
@@ -81,7 +96,7 @@ const SWEEPS: [Sweep; 6] = [
         name: "free, lifted",
         values: &AROUND,
         many: Some(0.0),
-        young: 1e5,
+        young: 1e4,
         weight: -1.0,
         side: "",
         gap: "0",
@@ -91,37 +106,47 @@ const SWEEPS: [Sweep; 6] = [
         name: "one point and an axis",
         values: &[0.0, 0.3, 0.6],
         many: None,
-        young: 1e5,
+        young: 1e4,
         weight: 0.0,
         side: AXIS,
-        gap: "0.1*x",
+        gap: "0.01*x",
         load: eccentric,
     },
     Sweep {
         name: "on a wedge",
         values: &BESIDE,
         many: Some(0.0),
-        young: 1e5,
+        young: 1e4,
         weight: 0.0,
         side: "",
-        gap: "0.1*abs(x - 0.5)",
+        gap: "0.01*abs(x - 0.5)",
         load: eccentric,
     },
     Sweep {
         name: "on a curve",
         values: &BESIDE,
         many: Some(0.0),
-        young: 1e5,
+        young: 1e4,
         weight: 0.0,
         side: "",
         gap: "0.1*(x - 0.5)^2",
         load: eccentric,
     },
     Sweep {
+        name: "on a wedge, lighter",
+        values: &[1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8],
+        many: None,
+        young: 1e4,
+        weight: 0.0,
+        side: "",
+        gap: "0.01*abs(x - 0.5)",
+        load: |size| format!("{size:e}*({})", eccentric(1e-3)),
+    },
+    Sweep {
         name: "on a flat foot",
         values: &ECCENTRICITIES,
         many: Some(0.5),
-        young: 1e5,
+        young: 1e4,
         weight: 0.0,
         side: "",
         gap: "0",
@@ -280,7 +305,11 @@ impl Row {
         } else {
             self.outcome = "noted";
         }
-        let agrees = self.difference.is_none_or(|difference| difference <= AGREEMENT);
+        // The last node that holds the body presses with a share of about margin/h; p (g − u·ν)
+        // within the tolerance then leaves its gap uncertain by the tolerance over that.
+        let margin = sweep.many.map_or(f64::INFINITY, |value| (self.value - value).abs());
+        let allowed = AGREEMENT.max(TOLERANCE / (margin * CELLS as f64));
+        let agrees = self.difference.is_none_or(|difference| difference <= allowed);
         self.verdict = match (balanced && agrees, unheld.is_some(), many) {
             (false, _, _) | (true, false, true) => Verdict::Wrong,
             (true, true, false) => Verdict::Refused,
