@@ -48,8 +48,10 @@ impl fmt::Display for RigidMotion {
             }
         } else {
             // Where the motion is at rest: a + θ e_z × (x − centre) = 0.
-            let x = self.centre[0] - ay / self.rotation;
-            let y = self.centre[1] + ax / self.rotation;
+            let (dx, dy) = (-ay / self.rotation, ax / self.rotation);
+            // Rounded before it is printed: no -0.0000.
+            let [x, y] =
+                [self.centre[0] + dx, self.centre[1] + dy].map(|v| (1e4 * v).round() / 1e4 + 0.0);
             write!(f, "the rotation about ({x:.4}, {y:.4})")
         }
     }
