@@ -26,9 +26,8 @@ def text(row):
 def label(value):
     """Short, but tells 0.499999 from 0.5."""
     number = float(value)
-    for edge in (0.5,):
-        if 0 < abs(number - edge) < 5e-3:
-            return f"0.5{number - edge:+.0e}".replace("e-0", "e-")
+    if 0 < abs(number - 0.5) < 5e-3:
+        return f"0.5{number - 0.5:+.0e}".replace("e-0", "e-")
     return f"{number:g}".replace("e-0", "e-")
 
 
@@ -46,7 +45,8 @@ def draw(table, path):
             axis.add_patch(cell)
             told = "setup" if r["solver"] == "all" else text(r)
             axis.text(x + 0.5, first + height / 2, told, ha="center", va="center", fontsize=8)
-        axis.set(xlim=(0, 16), ylim=(3, 0), xlabel=AXES[sweep])
+        axis.set(xlim=(0, 16), ylim=(3, 0))
+        axis.set_xlabel(AXES[sweep], loc="left", fontsize=9)
         axis.set_title(sweep, loc="left", fontsize=10, fontweight="bold")
         axis.set_xticks([i + 0.5 for i in range(len(values))], [label(v) for v in values], fontsize=8)
         axis.set_yticks([0.5, 1.5, 2.5], SOLVERS)

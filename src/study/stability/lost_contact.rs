@@ -1,9 +1,13 @@
 //! Losing contact: bodies pulled off their foundation, resting on one point, about to tip over.
 
-use super::{Counts, StudyError, Verdict, penalty::difference};
+use super::{
+    Counts, StudyError, Verdict,
+    penalty::{difference, statics},
+    random_contact::solve,
+};
 use crate::{
     contact::{ContactReport, SOLVERS},
-    evolution::{ContactPoint, Equilibrium, Phases, RunError, Setting, SetupError, State, Step},
+    evolution::{ContactPoint, Setting, SetupError, State, Step},
     output,
     petsc::Session,
     scene::Scene,
@@ -39,8 +43,8 @@ struct Sweep {
     name: &'static str,
     /// Of the parameter of `load`.
     values: &'static [f64],
-    /// The value at which there are many answers.
-    many: Option<f64>,
+    /// The values from, to which there are many answers.
+    many: Option<[f64; 2]>,
     young: f64,
     weight: f64,
     side: &'static str,
@@ -50,6 +54,8 @@ struct Sweep {
 
 const CLAMPED: &str = r#"{ name = "left", displacement = [0, 0] },"#;
 const AXIS: &str = r#"{ name = "left", symmetry = true },"#;
+
+const WEDGE: &str = "0.01*abs(x - 0.5)";
 
 /// Around a threshold at 0: beyond it for positive values.
 const AROUND: [f64; 16] = [
@@ -81,77 +87,53 @@ fn eccentric(e: f64) -> String {
     format!("-1 - 12*({e:e})*(x - 0.5)")
 }
 
+const SWEEP: Sweep = Sweep {
+    name: "",
+    values: &BESIDE,
+    many: None,
+    young: 1e4,
+    weight: 0.0,
+    side: "",
+    gap: "0",
+    load: eccentric,
+};
+
 const SWEEPS: [Sweep; 7] = [
     Sweep {
         name: "clamped, lifted",
         values: &AROUND,
-        many: None,
         young: 80.0,
-        weight: 0.0,
         side: CLAMPED,
         gap: "0.01",
         load: |lift| format!("-TOUCH*(1 - ({lift:e}))"),
+        ..SWEEP
     },
     Sweep {
         name: "free, lifted",
         values: &AROUND,
-        many: Some(0.0),
-        young: 1e4,
+        // Tension draws in the foot until it rests on its middle node alone.
+        many: Some([-1e-6, 0.0]),
         weight: -1.0,
-        side: "",
-        gap: "0",
-        load: |pull| format!("1 + ({pull:e})"),
+        load: |lift| format!("1 + ({lift:e})"),
+        ..SWEEP
     },
     Sweep {
         name: "one point and an axis",
         values: &[0.0, 0.3, 0.6],
-        many: None,
-        young: 1e4,
-        weight: 0.0,
         side: AXIS,
         gap: "0.01*x",
-        load: eccentric,
+        ..SWEEP
     },
-    Sweep {
-        name: "on a wedge",
-        values: &BESIDE,
-        many: Some(0.0),
-        young: 1e4,
-        weight: 0.0,
-        side: "",
-        gap: "0.01*abs(x - 0.5)",
-        load: eccentric,
-    },
-    Sweep {
-        name: "on a curve",
-        values: &BESIDE,
-        many: Some(0.0),
-        young: 1e4,
-        weight: 0.0,
-        side: "",
-        gap: "0.1*(x - 0.5)^2",
-        load: eccentric,
-    },
+    Sweep { name: "on a wedge", many: Some([0.0; 2]), gap: WEDGE, ..SWEEP },
+    Sweep { name: "on a curve", many: Some([0.0; 2]), gap: "0.1*(x - 0.5)^2", ..SWEEP },
     Sweep {
         name: "on a wedge, lighter",
         values: &[1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8],
-        many: None,
-        young: 1e4,
-        weight: 0.0,
-        side: "",
-        gap: "0.01*abs(x - 0.5)",
+        gap: WEDGE,
         load: |size| format!("{size:e}*({})", eccentric(1e-3)),
+        ..SWEEP
     },
-    Sweep {
-        name: "on a flat foot",
-        values: &ECCENTRICITIES,
-        many: Some(0.5),
-        young: 1e4,
-        weight: 0.0,
-        side: "",
-        gap: "0",
-        load: eccentric,
-    },
+    Sweep { name: "on a flat foot", values: &ECCENTRICITIES, many: Some([0.5; 2]), ..SWEEP },
 ];
 
 #[derive(Serialize)]
@@ -198,12 +180,12 @@ struct Lifted {
 impl Lifted {
     fn new(session: &Session, sweep: &Sweep) -> Result<Self, StudyError> {
         let setting = sweep.setting("-1", false)?;
-        let (step, _) = solve(session, &setting, SOLVERS[0])??;
+        let (state, _) = statics(session, &setting, SOLVERS[0])??;
         let mesh = &setting.body.mesh;
         let bottom = mesh.curves["bottom"].edges.iter().flatten();
-        let deepest = bottom.map(|&node| -step.state.u[2 * node + 1]).fold(0.0, f64::max);
+        let deepest = bottom.map(|&node| -state.u[2 * node + 1]).fold(0.0, f64::max);
         let touch = sweep.gap.parse::<f64>().unwrap_or(f64::NAN) / deepest;
-        Ok(Self { touch, u: step.state.u.iter().map(|u| touch * u).collect() })
+        Ok(Self { touch, u: state.u.iter().map(|u| touch * u).collect() })
     }
 }
 
@@ -240,7 +222,7 @@ fn rows(
         }
         Err(other) => return Err(other.into()),
     };
-    let answers = SOLVERS.map(|solver| solve(session, &setting, solver));
+    let answers = SOLVERS.map(|solver| solve(session, &setting, solver, None));
     let [a, b, c] = answers;
     let answers = [a?, b?, c?];
     let open = lifted.filter(|_| value >= 0.0);
@@ -248,7 +230,7 @@ fn rows(
     let row = |(i, solver): (usize, &&'static str)| {
         let mut row = Row::new(sweep, value, solver);
         match &answers[i] {
-            Err(failure) => row.message = Some(failure.to_string()),
+            Err(failure) => row.message = Some(failure.clone()),
             Ok((step, report)) => {
                 let others = answers.iter().enumerate().filter(|(j, _)| *j != i);
                 let mut unique = others.filter_map(|(_, answer)| answer.as_ref().ok());
@@ -295,19 +277,16 @@ impl Row {
         self.kkt = Some(record.kkt().worst());
         self.unbalanced = (sweep.side != CLAMPED).then(|| unbalanced(setting, state));
         let balanced = self.unbalanced.is_none_or(|error| error <= BALANCE);
-        let many = sweep.many == Some(self.value);
+        let many = sweep.many.is_some_and(|[from, to]| (from..=to).contains(&self.value));
         if unheld.is_none() {
             self.outcome = "certified";
-            self.difference = other.map(|other| match *other == state.u {
-                true => 0.0,
-                false => difference(&state.u, other),
-            });
+            self.difference = other.map(|other| difference(&state.u, other));
         } else {
             self.outcome = "noted";
         }
         // The last node that holds the body presses with a share of about margin/h; p (g − u·ν)
         // within the tolerance then leaves its gap uncertain by the tolerance over that.
-        let margin = sweep.many.map_or(f64::INFINITY, |value| (self.value - value).abs());
+        let margin = sweep.many.map_or(f64::INFINITY, |[_, to]| (self.value - to).abs());
         let allowed = AGREEMENT.max(TOLERANCE / (margin * CELLS as f64));
         let agrees = self.difference.is_none_or(|difference| difference <= allowed);
         self.verdict = match (balanced && agrees, unheld.is_some(), many) {
@@ -335,19 +314,4 @@ fn unbalanced(setting: &Setting, state: &State) -> f64 {
     }
     let turns = setting.motions.resisted() > 1;
     (if turns { force.abs().max(moment.abs()) } else { force.abs() }) / size
-}
-
-/// One static solve; the inner error is the contact solver's.
-fn solve(
-    session: &Session,
-    setting: &Setting,
-    solver: &str,
-) -> Result<Result<(Step, ContactReport), RunError>, StudyError> {
-    let phases = Phases::default();
-    let mut equilibrium = Equilibrium::new(session, setting, solver, &phases)?;
-    match equilibrium.solve(0, setting.start(), &setting.initial_damage()) {
-        Ok(step) => Ok(Ok((step, *equilibrium.report()))),
-        Err(failure @ RunError::Contact { .. }) => Ok(Err(failure)),
-        Err(other) => Err(other.into()),
-    }
 }
