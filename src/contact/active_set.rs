@@ -60,6 +60,7 @@ impl<'s> ActiveSet<'s> {
             let left = unheld(problem.rigid, &self.pressing);
             let Some(any) = left.first() else { return Ok(true) };
             let driven = left.iter().map(|m| m * m.dot(problem.work)).sum::<DVector<f64>>();
+            // Where the load drives none of them, any will do.
             let motion = if driven.amax() > 0.0 { driven } else { any.clone() };
             let normal = problem.rigid * motion.normalize();
             let closing = |i: &usize| !self.pressing[*i] && normal[*i] > 1e-6 * normal.amax();

@@ -243,8 +243,9 @@ impl<'a> Equilibrium<'a> {
     /// A rigid motion that the pressing nodes leave. A body without load rests where it is,
     /// which needs no holding.
     fn unheld(&self, contact: &[ContactPoint], force_scale: f64) -> Option<RigidMotion> {
-        // A residual at the tolerance has a moment of up to that times √N (Cauchy and Schwarz);
-        // a node one of √N mesh widths beside the only support may owe its force to it.
+        // A residual at the tolerance does work of up to √N times that on a motion (Cauchy and
+        // Schwarz), which at the lever of one mesh width, 1/√N of the body, is a force √N times
+        // as large: a smaller one holds nothing for certain.
         let nodes = self.setting.body.mesh.nodes.len() as f64;
         let least = nodes * self.setting.tolerance * force_scale;
         let pressing: Vec<bool> = contact.iter().map(|point| point.force > least).collect();
