@@ -11,7 +11,14 @@ import matplotlib
 
 matplotlib.use("Agg")
 
-from atlas import maximum_principle, penalty, random_contact, step_size, tao_types  # noqa: E402
+from atlas import (  # noqa: E402
+    lost_contact,
+    maximum_principle,
+    penalty,
+    random_contact,
+    step_size,
+    tao_types,
+)
 
 MAPS = {
     "step-size": step_size,
@@ -19,6 +26,7 @@ MAPS = {
     "penalty-duality": penalty,
     "tao-types": tao_types,
     "active-set": random_contact,
+    "lost-contact": lost_contact,
 }
 
 

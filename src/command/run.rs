@@ -187,7 +187,7 @@ impl<'a> Recorder<'a> {
         result: &Result<Outcome, RunError>,
         started: Instant,
     ) -> Result<(), output::OutputError> {
-        let Some(Step { state, record }) = self.last.take() else { return Ok(()) };
+        let Some(Step { state, record, .. }) = self.last.take() else { return Ok(()) };
         if self.fields.last_time() != Some(state.time) {
             self.phases.time("output", || self.fields.add(setting, &state))?;
         }

@@ -24,7 +24,7 @@ pub struct StabilityArguments {
 /// # Errors
 /// An unknown map, a study that cannot be carried out, or a wrong cell.
 pub fn stability(arguments: &StabilityArguments) -> Result<(), Failure> {
-    let names = MAPS.map(|(name, _)| name);
+    let names: Vec<&str> = MAPS.iter().map(|(name, _)| *name).collect();
     if let Some(unknown) = arguments.maps.iter().find(|m| !names.contains(&m.as_str())) {
         let known = names.join(", ");
         return Err(Failure::Input(format!("there is no map `{unknown}`; there are {known}")));

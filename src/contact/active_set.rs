@@ -3,9 +3,11 @@
 use super::{
     ContactError, ContactProblem, ContactReport, ContactSolver,
     elastic::{ElasticSolver, System},
+    problem::unheld,
     tao::Tao,
 };
 use crate::petsc::{PetscError, Session, Vector};
+use nalgebra::DVector;
 
 /// Guess which nodes press, solve with u_ν = g there, and exchange the nodes where the guess was
 /// wrong: pressing ones that are pulled, open ones that penetrate (Hintermüller, Ito, Kunisch,
@@ -14,8 +16,9 @@ use crate::petsc::{PetscError, Session, Vector};
 ///
 /// Exchanging all wrong nodes may return to an earlier set. [`Exchange`] sees that the number
 /// of wrong nodes falls, and else exchanges one at a time, which ends for every positive
-/// definite K. Where K is singular (only contact holds the body) and a guess does not hold it,
-/// or if the exchanges run out, TAO solves the problem instead.
+/// definite K. Where K is singular (only contact holds the body) and a set does not hold it,
+/// the body moves as the load drives it until further nodes press. If the exchanges run out,
+/// TAO solves the problem instead.
 pub(super) struct ActiveSet<'s> {
     pressing: Vec<bool>,
     elastic: ElasticSolver<'s>,
@@ -37,10 +40,37 @@ impl<'s> ActiveSet<'s> {
             let touches = |c: &[f64]| problem.bounds.iter().map(|b| c[b.dof] >= b.gap).collect();
             self.pressing = c.read(touches)?;
         }
-        if !problem.held_by(&self.pressing) {
+        if !self.hold(problem, c)? {
             self.pressing.fill(true);
         }
         Ok(())
+    }
+
+    /// Where the pressing nodes leave the body a rigid motion: lets it move as the load drives
+    /// it until a further node closes its gap. False if none does; the load being balanced, it
+    /// is then rounding that drives the motion.
+    fn hold(&mut self, problem: &ContactProblem, c: &Vector) -> Result<bool, PetscError> {
+        loop {
+            let left = unheld(problem.rigid, &self.pressing);
+            let Some(any) = left.first() else { return Ok(true) };
+            let driven = left.iter().map(|m| m * m.dot(problem.work)).sum::<DVector<f64>>();
+            // Where the load drives none of them, any will do.
+            let motion = if driven.amax() > 0.0 { driven } else { any.clone() };
+            let normal = problem.rigid * motion.normalize();
+            let closing = |i: &usize| !self.pressing[*i] && normal[*i] > 1e-6 * normal.amax();
+            let nearest = c.read(|c| {
+                let way = |i: usize| {
+                    let bound = &problem.bounds[i];
+                    (i, (bound.gap - c[bound.dof]) / normal[i])
+                };
+                let ways = (0..normal.len()).filter(closing).map(way);
+                ways.min_by(|a, b| a.1.total_cmp(&b.1))
+            })?;
+            match nearest {
+                Some((node, _)) => self.pressing[node] = true,
+                None => return Ok(false),
+            }
+        }
     }
 
     /// Minimises with c = g on the pressing nodes and no other bound; false if that failed.
@@ -76,16 +106,20 @@ impl<'s> ActiveSet<'s> {
         })?
     }
 
-    /// Exchanges the chosen nodes; false if the body would then not be held.
-    fn exchange(&mut self, problem: &ContactProblem, nodes: &[usize]) -> bool {
+    /// Exchanges the chosen nodes; false if that changes nothing.
+    fn exchange(
+        &mut self,
+        problem: &ContactProblem,
+        c: &Vector,
+        nodes: &[usize],
+    ) -> Result<bool, PetscError> {
         let old = self.pressing.clone();
         nodes.iter().for_each(|&i| self.pressing[i] = !self.pressing[i]);
-        if problem.held_by(&self.pressing) {
-            return true;
+        if !self.hold(problem, c)? {
+            // Keep those that were pressing: only close gaps.
+            self.pressing.iter_mut().zip(&old).for_each(|(new, old)| *new |= *old);
         }
-        // Keep those that were pressing: only close gaps.
-        self.pressing.iter_mut().zip(&old).for_each(|(new, old)| *new |= *old);
-        self.pressing != old
+        Ok(self.pressing != old)
     }
 
     fn rescue(
@@ -137,8 +171,10 @@ impl ContactSolver for ActiveSet<'_> {
             }
             let chosen = choice.of(&wrong);
             report.fallbacks += usize::from(chosen.len() < wrong.len());
-            if !self.exchange(problem, chosen) {
-                break;
+            if !self.exchange(problem, c, chosen)? {
+                // The forces of nodes that hold a balanced body are rounding; the certificate
+                // judges them.
+                return Ok(report);
             }
         }
         self.rescue(problem, c, report)

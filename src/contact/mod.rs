@@ -16,6 +16,7 @@ mod tao;
 pub use certificate::Kkt;
 pub use constraints::{Bound, ConstraintError, Constraints, FixedRow, GapRow};
 pub use penalty_duality::PenaltyOptions;
+pub(crate) use problem::unheld;
 pub use problem::{ContactError, ContactProblem, ContactReport, ContactSolver};
 pub use rigid::{DrivenMotion, RigidMotion, RigidMotions};
 

@@ -2,7 +2,7 @@
 
 use super::{Bound, Kkt};
 use crate::petsc::{Matrix, PetscError, Session, Vector};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// min ½ cᵀKc − fᵀc  subject to  c_i ≤ g_i on the bounded unknowns.
 ///
@@ -22,6 +22,8 @@ pub struct ContactProblem<'a> {
     /// u·ν of the rigid motions that only contact holds, one row per bound; no columns where
     /// K is positive definite.
     pub rigid: &'a DMatrix<f64>,
+    /// The work of the load on each of these motions.
+    pub work: &'a DVector<f64>,
     /// ‖·‖₂ of the forces that count as 1 in relative residuals, N.
     pub force_scale: f64,
     /// KKT residuals to reach, relative.
@@ -56,15 +58,22 @@ impl ContactProblem<'_> {
     pub fn definite(&self) -> bool {
         self.rigid.ncols() == 0
     }
+}
 
-    /// Whether no rigid motion is left when u_ν is prescribed on the `pressing` bounds.
-    pub fn held_by(&self, pressing: &[bool]) -> bool {
-        let rows = self.rigid.row_iter().zip(pressing).filter(|(_, on)| **on);
-        let motions = self.rigid.ncols();
-        let gram = rows
-            .fold(DMatrix::zeros(motions, motions), |sum, (row, _)| sum + row.transpose() * row);
-        motions == 0 || gram.symmetric_eigenvalues().min() > 1e-10 * self.rigid.norm_squared()
+/// The combinations (orthonormal) of the motions `rigid`, u·ν at the bounds, a column each, that
+/// are left when u_ν is prescribed on the `pressing` bounds.
+pub(crate) fn unheld(rigid: &DMatrix<f64>, pressing: &[bool]) -> Vec<DVector<f64>> {
+    let motions = rigid.ncols();
+    if motions == 0 {
+        return Vec::new();
     }
+    let rows = rigid.row_iter().zip(pressing).filter(|(_, on)| **on);
+    let gram =
+        rows.fold(DMatrix::zeros(motions, motions), |sum, (row, _)| sum + row.transpose() * row);
+    let eigen = gram.symmetric_eigen();
+    let cut = 1e-10 * rigid.norm_squared();
+    let pairs = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());
+    pairs.filter(|(value, _)| **value <= cut).map(|(_, vector)| vector.into_owned()).collect()
 }
 
 /// A method for the contact problem.

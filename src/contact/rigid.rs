@@ -29,6 +29,11 @@ impl RigidMotion {
     fn field(&self, nodes: &[[f64; 2]]) -> Vec<f64> {
         nodes.iter().flat_map(|&x| self.at(x)).collect()
     }
+
+    /// The work of nodal forces on it.
+    fn work(&self, nodes: &[[f64; 2]], load: &[f64]) -> f64 {
+        self.field(nodes).iter().zip(load).map(|(u, f)| u * f).sum()
+    }
 }
 
 impl fmt::Display for RigidMotion {
@@ -43,8 +48,10 @@ impl fmt::Display for RigidMotion {
             }
         } else {
             // Where the motion is at rest: a + θ e_z × (x − centre) = 0.
-            let x = self.centre[0] - ay / self.rotation;
-            let y = self.centre[1] + ax / self.rotation;
+            let (dx, dy) = (-ay / self.rotation, ax / self.rotation);
+            // Rounded before it is printed: no -0.0000.
+            let [x, y] =
+                [self.centre[0] + dx, self.centre[1] + dy].map(|v| (1e4 * v).round() / 1e4 + 0.0);
             write!(f, "the rotation about ({x:.4}, {y:.4})")
         }
     }
@@ -157,6 +164,12 @@ impl RigidMotions {
         })
     }
 
+    /// The work of `load` (nodal forces) on the motions that only contact holds.
+    pub fn work(&self, body: &Body, load: &[f64]) -> DVector<f64> {
+        let work = |i: usize, _| self.resisted[i].work(&body.mesh.nodes, load);
+        DVector::from_fn(self.resisted.len(), work)
+    }
+
     /// Checks that `load` (nodal forces) does no work on free motions and can be balanced by
     /// contact forces p ≥ 0 on the resisted ones: the nearest such forces leave no remainder
     /// (Farkas; the remainder itself is the motion that the load drives).
@@ -166,8 +179,7 @@ impl RigidMotions {
         }
         let nodes = &body.mesh.nodes;
         let size: f64 = load.chunks(2).map(|f| f[0].hypot(f[1])).sum();
-        let work =
-            |m: &RigidMotion| -> f64 { m.field(nodes).iter().zip(load).map(|(u, f)| u * f).sum() };
+        let work = |m: &RigidMotion| m.work(nodes, load);
         let driven = |motion: RigidMotion| {
             let sum = |k: usize| load.iter().skip(k).step_by(2).sum::<f64>();
             let turn = RigidMotion { translation: [0.0, 0.0], rotation: 1.0, centre: self.centre };
@@ -176,14 +188,18 @@ impl RigidMotions {
         if let Some(motion) = self.free.iter().find(|m| work(m).abs() > ROUNDING * size) {
             return Err(driven(*motion));
         }
-        let work = DVector::from_iterator(self.resisted.len(), self.resisted.iter().map(work));
+        let work = self.work(body, load);
         let remainder = &work - self.normal.transpose() * nonnegative(&self.normal, &work);
         if remainder.norm() <= 1e-8 * size {
             return Ok(());
         }
-        let scaled = remainder.normalize();
+        Err(driven(self.combined(&remainder.normalize())))
+    }
+
+    /// The motion whose shares (a unit vector) of those that only contact holds are given.
+    pub fn combined(&self, shares: &DVector<f64>) -> RigidMotion {
         let mut motion = RigidMotion { translation: [0.0; 2], rotation: 0.0, centre: self.centre };
-        for (m, c) in self.resisted.iter().zip(scaled.iter()) {
+        for (m, c) in self.resisted.iter().zip(shares.iter()) {
             motion.translation[0] += c * m.translation[0];
             motion.translation[1] += c * m.translation[1];
             motion.rotation += c * m.rotation;
@@ -191,7 +207,7 @@ impl RigidMotions {
         if (motion.rotation * self.radius).abs() < ROUNDING {
             motion.rotation = 0.0;
         }
-        Err(driven(motion))
+        motion
     }
 
     /// Pins one unknown for each free motion. The load being balanced, the pins carry no

@@ -4,11 +4,11 @@ use super::{
     ContactPoint, Phases, RunError, Setting, State, Step, StepRecord, extrapolation::Extrapolation,
 };
 use crate::{
-    contact::{self, ContactError, ContactProblem, ContactReport, ContactSolver, Kkt},
+    contact::{self, ContactError, ContactProblem, ContactReport, ContactSolver, Kkt, RigidMotion},
     fem::Stiffness,
     petsc::{PetscError, Session, Vector},
 };
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use std::time::Instant;
 
 /// Solves the contact problems of a run, one after the other.
@@ -24,6 +24,7 @@ pub struct Equilibrium<'a> {
     c: Vector,
     prescribed: Vec<bool>,
     rigid: DMatrix<f64>,
+    work: DVector<f64>,
     /// c of the accepted steps, and the solver's warm start at the last.
     evolution: Extrapolation,
     warm_start: Vec<f64>,
@@ -63,6 +64,7 @@ impl<'a> Equilibrium<'a> {
             c: Vector::zeros(session, owned)?,
             prescribed: constraints.is_prescribed(),
             rigid: setting.motions.normal_at(body, &constraints.bounds),
+            work: DVector::zeros(setting.motions.resisted()),
             evolution: Extrapolation::new(owned),
             warm_start: Vec::new(),
             report: ContactReport::default(),
@@ -132,7 +134,8 @@ impl<'a> Equilibrium<'a> {
                 };
                 let mut record = figures(setting, step, &state, &external, &total, &kkt);
                 record.seconds = started.elapsed().as_secs_f64();
-                return Ok(Step { state, record });
+                let unheld = self.unheld(&state.contact, force_scale);
+                return Ok(Step { state, record, unheld });
             }
             if attempts == ATTEMPTS || kkt.worst().is_nan() {
                 return Err(failed(ContactError::NotCertified {
@@ -177,6 +180,8 @@ impl<'a> Equilibrium<'a> {
             .zip(frames.fixed())
             .for_each(|(f, fixed)| *f = if *fixed { 0.0 } else { *f });
         self.load.set(&load[..self.load.owned()])?;
+        // Prescribed displacements do no work on motions that they hold.
+        self.work = setting.motions.work(body, external);
         Ok(scale)
     }
 
@@ -198,6 +203,7 @@ impl<'a> Equilibrium<'a> {
             load: &self.load,
             bounds: &setting.constraints.bounds,
             rigid: &self.rigid,
+            work: &self.work,
             force_scale,
             tolerance,
         };
@@ -238,6 +244,20 @@ impl<'a> Equilibrium<'a> {
             ContactPoint { node: bound.node, force, pressure: force / bound.weight, gap, active }
         });
         (kkt, points.collect())
+    }
+
+    /// A rigid motion that the pressing nodes leave. A body without load rests where it is,
+    /// which needs no holding.
+    fn unheld(&self, contact: &[ContactPoint], force_scale: f64) -> Option<RigidMotion> {
+        // A residual at the tolerance does work of up to √N times that on a motion (Cauchy and
+        // Schwarz), which at the lever of one mesh width, 1/√N of the body, is a force √N times
+        // as large: a smaller one holds nothing for certain.
+        let nodes = self.setting.body.mesh.nodes.len() as f64;
+        let least = nodes * self.setting.tolerance * force_scale;
+        let pressing: Vec<bool> = contact.iter().map(|point| point.force > least).collect();
+        let unheld = contact::unheld(&self.rigid, &pressing);
+        let first = unheld.first().filter(|_| force_scale > 0.0)?;
+        Some(self.setting.motions.combined(first))
     }
 }
 

@@ -19,7 +19,7 @@ pub use setting::{Setting, SetupError};
 pub use state::{ContactPoint, State, Step, StepRecord};
 
 use crate::{
-    contact::{ContactError, Kkt},
+    contact::{ContactError, Kkt, RigidMotion},
     petsc::{PetscError, Session},
 };
 use bounds::Bounds;
@@ -43,6 +43,8 @@ pub struct Outcome {
     pub undone: usize,
     /// Where ζ left the bounds of its equation.
     pub excess: Excess,
+    /// When first no pressing node held the body against a rigid motion, s, and which.
+    pub unheld: Option<(f64, RigidMotion)>,
 }
 
 /// The stop at ζ_*.
@@ -196,6 +198,7 @@ pub fn run(
 impl Outcome {
     fn new(first: Step) -> Self {
         Self {
+            unheld: first.unheld.map(|motion| (first.record.time, motion)),
             kkt: first.record.kkt(),
             last: first,
             stopped: None,
@@ -216,6 +219,13 @@ impl Outcome {
             ));
         }
         notes.extend(self.excess.note(setting.mass()));
+        if let Some((time, motion)) = self.unheld {
+            // Nodes that touch without force may still be in the way.
+            notes.push(format!(
+                "at t = {time}, no pressing node holds the body against {motion}: the answer may \
+                 be one of many"
+            ));
+        }
         if self.undamaged_steps > 0 && setting.damage().is_some() {
             notes.push(format!(
                 "the damage solve was skipped in {} of {} steps: no source, uniform ζ",
@@ -231,6 +241,7 @@ impl Outcome {
     fn accept(&mut self, last: Step, driving: Driving) {
         self.kkt = self.kkt.max(&last.record.kkt());
         self.undamaged_steps += usize::from(driving == Driving::Nothing);
+        self.unheld = self.unheld.or(last.unheld.map(|motion| (last.record.time, motion)));
         self.last = last;
     }
 }

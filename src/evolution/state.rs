@@ -1,6 +1,6 @@
 //! An accepted step: its fields and its figures.
 
-use crate::contact::Kkt;
+use crate::contact::{Kkt, RigidMotion};
 use serde::Serialize;
 
 /// An accepted step.
@@ -10,6 +10,8 @@ pub struct Step {
     pub state: State,
     /// A row of `history.csv`.
     pub record: StepRecord,
+    /// A motion that no pressing node holds, if there is one.
+    pub unheld: Option<RigidMotion>,
 }
 
 /// The fields of an accepted step.

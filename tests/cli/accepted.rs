@@ -1,6 +1,6 @@
 //! Runs that go well: exit code 0, what is said, and the files.
 
-use crate::desk::{Desk, square};
+use crate::desk::{Desk, SCENE, square};
 use serde_json::Value;
 use std::process::Stdio;
 
@@ -240,4 +240,19 @@ fn unused_petsc_options_are_told() {
     assert!(said.err.starts_with("warning: PETSc options that nothing read: "), "{}", said.err);
     assert!(said.err.contains("-tao_monitr") && said.err.contains("-no_such_thing"));
     assert_eq!(said.err.lines().count(), 1);
+}
+
+#[test]
+fn a_body_balanced_on_one_point_is_noted() {
+    let desk = Desk::new();
+    let scene = SCENE
+        .replace("young = 80", "young = 8e4")
+        .replace("[[boundary]]\nname = \"left\"\nsymmetry = true\n", "")
+        .replace("gap = \"0\"", "gap = \"(x - 0.5)^2\"");
+    desk.write("scene.toml", &scene);
+    let said = desk.run(&[]);
+    let note = "at t = 0.1, no pressing node holds the body against the rotation about";
+    assert_eq!(said.out.matches(note).count(), 1, "{said:?}");
+    let notes = desk.summary("out/scene")["notes"].to_string();
+    assert_eq!(notes.matches(note).count(), 1, "{notes}");
 }

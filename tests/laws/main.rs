@@ -14,6 +14,7 @@ mod elements;
 mod geometries;
 mod hertz;
 mod loads;
+mod lost_contact;
 mod maximum_principle;
 mod orders;
 mod patch;

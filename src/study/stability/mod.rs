@@ -8,6 +8,7 @@ mod maximum_principle;
 mod penalty;
 mod tao_types;
 mod random_contact;
+mod lost_contact;
 
 pub use random_contact::sample as random_sample;
 
@@ -25,12 +26,13 @@ use std::path::Path;
 pub type Map = fn(&Session, &Path) -> Result<Counts, StudyError>;
 
 /// The maps by name.
-pub const MAPS: [(&str, Map); 5] = [
+pub const MAPS: &[(&str, Map)] = &[
     ("step-size", step_size::run),
     ("maximum-principle", maximum_principle::run),
     ("penalty-duality", penalty::run),
     ("tao-types", tao_types::run),
     ("active-set", random_contact::run),
+    ("lost-contact", lost_contact::run),
 ];
 
 /// What a cell of a map turned out to be.

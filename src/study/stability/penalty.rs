@@ -190,8 +190,11 @@ pub(super) fn statics(
     }
 }
 
-/// max |a − b| / max |b|.
+/// max |a − b| / max |b|; 0 for equal ones, also where both are 0.
 pub(super) fn difference(a: &[f64], b: &[f64]) -> f64 {
+    if a == b {
+        return 0.0;
+    }
     let size = b.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     a.iter().zip(b).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs())) / size
 }

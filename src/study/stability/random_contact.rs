@@ -140,10 +140,7 @@ fn row(session: &Session, id: u64) -> Result<Row, StudyError> {
     for method in ["penalty-duality", "tao"] {
         if let Ok((other, _)) = solve(session, setting, method, None)? {
             row.reference = method;
-            row.difference = Some(match answer.state.u == other.state.u {
-                true => 0.0,
-                false => difference(&answer.state.u, &other.state.u),
-            });
+            row.difference = Some(difference(&answer.state.u, &other.state.u));
             break;
         }
     }
@@ -154,7 +151,7 @@ fn row(session: &Session, id: u64) -> Result<Row, StudyError> {
 }
 
 /// One static solve; the inner error is the contact solver's or that of the load check.
-fn solve(
+pub(super) fn solve(
     session: &Session,
     setting: &Setting,
     solver: &str,

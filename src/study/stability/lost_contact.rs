@@ -1,0 +1,317 @@
+//! Losing contact: bodies pulled off their foundation, resting on one point, about to tip over.
+
+use super::{
+    Counts, StudyError, Verdict,
+    penalty::{difference, statics},
+    random_contact::solve,
+};
+use crate::{
+    contact::{ContactReport, SOLVERS},
+    evolution::{ContactPoint, Setting, SetupError, State, Step},
+    output,
+    petsc::Session,
+    scene::Scene,
+    study::rectangle,
+};
+use serde::Serialize;
+use std::path::Path;
+
+/// A unit square; BOUNDARY and LOAD are filled in.
+const SCENE: &str = r#"
+mesh = { file = "square.msh" }
+material = { young = YOUNG, poisson = 0.3, plane = "stress" }
+body = { force = [0, "WEIGHT"] }
+boundary = [
+    SIDE
+    { name = "bottom", gap = "GAP" },
+    { name = "top", traction = [0, "LOAD"] },
+]
+"#;
+/// Cells along a side.
+const CELLS: usize = 16;
+/// KKT tolerance of the scenes (the default of the program).
+const TOLERANCE: f64 = 1e-10;
+/// How far two answers may differ, relative to the largest |u|: a residual at the tolerance
+/// moves u by the condition number of K times as much.
+const AGREEMENT: f64 = 1e-7;
+/// How far contact forces may be from balancing the load, relative to its size: the tolerance
+/// on a norm, summed over the nodes.
+const BALANCE: f64 = 1e-8;
+
+/// A square and what is changed about its load.
+struct Sweep {
+    name: &'static str,
+    /// Of the parameter of `load`.
+    values: &'static [f64],
+    /// The values from, to which there are many answers.
+    many: Option<[f64; 2]>,
+    young: f64,
+    weight: f64,
+    side: &'static str,
+    gap: &'static str,
+    load: fn(f64) -> String,
+}
+
+const CLAMPED: &str = r#"{ name = "left", displacement = [0, 0] },"#;
+const AXIS: &str = r#"{ name = "left", symmetry = true },"#;
+
+const WEDGE: &str = "0.01*abs(x - 0.5)";
+
+/// Around a threshold at 0: beyond it for positive values.
+const AROUND: [f64; 16] = [
+    -1.0, -0.1, -1e-3, -1e-6, -1e-8, -1e-10, -1e-12, 0.0, 1e-12, 1e-10, 1e-8, 1e-6, 1e-3, 0.1, 1.0,
+    2.0,
+];
+const BESIDE: [f64; 13] =
+    [0.0, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
+const ECCENTRICITIES: [f64; 15] = [
+    0.0,
+    0.1,
+    0.3,
+    0.4,
+    0.49,
+    0.499,
+    0.499_999,
+    0.499_999_99,
+    0.5,
+    0.500_000_01,
+    0.500_001,
+    0.501,
+    0.51,
+    0.6,
+    1.0,
+];
+
+/// A pressure of resultant 1 whose centre is at x = ½ + e.
+fn eccentric(e: f64) -> String {
+    format!("-1 - 12*({e:e})*(x - 0.5)")
+}
+
+const SWEEP: Sweep = Sweep {
+    name: "",
+    values: &BESIDE,
+    many: None,
+    young: 1e4,
+    weight: 0.0,
+    side: "",
+    gap: "0",
+    load: eccentric,
+};
+
+const SWEEPS: [Sweep; 7] = [
+    Sweep {
+        name: "clamped, lifted",
+        values: &AROUND,
+        young: 80.0,
+        side: CLAMPED,
+        gap: "0.01",
+        load: |lift| format!("-TOUCH*(1 - ({lift:e}))"),
+        ..SWEEP
+    },
+    Sweep {
+        name: "free, lifted",
+        values: &AROUND,
+        // Tension draws in the foot until it rests on its middle node alone.
+        many: Some([-1e-6, 0.0]),
+        weight: -1.0,
+        load: |lift| format!("1 + ({lift:e})"),
+        ..SWEEP
+    },
+    Sweep {
+        name: "one point and an axis",
+        values: &[0.0, 0.3, 0.6],
+        side: AXIS,
+        gap: "0.01*x",
+        ..SWEEP
+    },
+    Sweep { name: "on a wedge", many: Some([0.0; 2]), gap: WEDGE, ..SWEEP },
+    Sweep { name: "on a curve", many: Some([0.0; 2]), gap: "0.1*(x - 0.5)^2", ..SWEEP },
+    Sweep {
+        name: "on a wedge, lighter",
+        values: &[1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8],
+        gap: WEDGE,
+        load: |size| format!("{size:e}*({})", eccentric(1e-3)),
+        ..SWEEP
+    },
+    Sweep { name: "on a flat foot", values: &ECCENTRICITIES, many: Some([0.5; 2]), ..SWEEP },
+];
+
+#[derive(Serialize)]
+struct Row {
+    sweep: &'static str,
+    value: f64,
+    solver: &'static str,
+    outcome: &'static str,
+    active: Option<usize>,
+    iterations: Option<usize>,
+    fallbacks: Option<usize>,
+    kkt: Option<f64>,
+    /// Largest error of force and moment balance; empty where Γ_D takes its share.
+    unbalanced: Option<f64>,
+    /// From the answer of another solver, or without contact of the linear solve.
+    difference: Option<f64>,
+    verdict: Verdict,
+    message: Option<String>,
+}
+
+/// Makes the map.
+pub(super) fn run(session: &Session, folder: &Path) -> Result<Counts, StudyError> {
+    let mut table = Vec::new();
+    for sweep in &SWEEPS {
+        let lifted = match sweep.side {
+            CLAMPED => Some(Lifted::new(session, sweep)?),
+            _ => None,
+        };
+        for &value in sweep.values {
+            table.append(&mut rows(session, sweep, lifted.as_ref(), value)?);
+        }
+    }
+    output::write_table(&folder.join("lost-contact.csv"), &table)?;
+    Ok(table.iter().map(|row| row.verdict).collect())
+}
+
+/// The clamped square that does not touch: u is proportional to the load.
+struct Lifted {
+    /// The load at which the first node touches, and u there.
+    touch: f64,
+    u: Vec<f64>,
+}
+
+impl Lifted {
+    fn new(session: &Session, sweep: &Sweep) -> Result<Self, StudyError> {
+        let setting = sweep.setting("-1", false)?;
+        let (state, _) = statics(session, &setting, SOLVERS[0])??;
+        let mesh = &setting.body.mesh;
+        let bottom = mesh.curves["bottom"].edges.iter().flatten();
+        let deepest = bottom.map(|&node| -state.u[2 * node + 1]).fold(0.0, f64::max);
+        let touch = sweep.gap.parse::<f64>().unwrap_or(f64::NAN) / deepest;
+        Ok(Self { touch, u: state.u.iter().map(|u| touch * u).collect() })
+    }
+}
+
+impl Sweep {
+    fn setting(&self, load: &str, contact: bool) -> Result<Setting, SetupError> {
+        let text = SCENE
+            .replace("YOUNG", &self.young.to_string())
+            .replace("WEIGHT", &self.weight.to_string())
+            .replace("SIDE", self.side)
+            .replace("LOAD", load);
+        let text = match contact {
+            true => text.replace("GAP", self.gap),
+            false => text.replace(r#"{ name = "bottom", gap = "GAP" },"#, ""),
+        };
+        let scene = Scene::parse(&text, Path::new("square.toml"), &[])?;
+        Setting::new(scene, rectangle(1.0, 1.0, CELLS, CELLS))
+    }
+}
+
+/// One value of the parameter: the refusal at setup, or the answer of each solver.
+fn rows(
+    session: &Session,
+    sweep: &Sweep,
+    lifted: Option<&Lifted>,
+    value: f64,
+) -> Result<Vec<Row>, StudyError> {
+    let touch = lifted.map_or(f64::NAN, |lifted| lifted.touch);
+    let load = (sweep.load)(value).replace("TOUCH", &format!("{touch:e}"));
+    let setting = match sweep.setting(&load, true) {
+        Ok(setting) => setting,
+        Err(refusal @ SetupError::Driven { .. }) => {
+            let message = Some(refusal.to_string());
+            return Ok(vec![Row { outcome: "setup", message, ..Row::new(sweep, value, "all") }]);
+        }
+        Err(other) => return Err(other.into()),
+    };
+    let answers = SOLVERS.map(|solver| solve(session, &setting, solver, None));
+    let [a, b, c] = answers;
+    let answers = [a?, b?, c?];
+    let open = lifted.filter(|_| value >= 0.0);
+    let open = open.map(|l| l.u.iter().map(|u| u * (1.0 - value)).collect::<Vec<_>>());
+    let row = |(i, solver): (usize, &&'static str)| {
+        let mut row = Row::new(sweep, value, solver);
+        match &answers[i] {
+            Err(failure) => row.message = Some(failure.clone()),
+            Ok((step, report)) => {
+                let others = answers.iter().enumerate().filter(|(j, _)| *j != i);
+                let mut unique = others.filter_map(|(_, answer)| answer.as_ref().ok());
+                let other = unique.find(|(s, _)| s.unheld.is_none()).map(|(s, _)| &s.state.u);
+                row.judge(&setting, sweep, step, report, open.as_ref().or(other));
+            }
+        }
+        row
+    };
+    Ok(SOLVERS.iter().enumerate().map(row).collect())
+}
+
+impl Row {
+    fn new(sweep: &Sweep, value: f64, solver: &'static str) -> Self {
+        Self {
+            sweep: sweep.name,
+            value,
+            solver,
+            outcome: "failed",
+            active: None,
+            iterations: None,
+            fallbacks: None,
+            kkt: None,
+            unbalanced: None,
+            difference: None,
+            verdict: Verdict::Refused,
+            message: None,
+        }
+    }
+
+    /// Judges an answer, which is certified: by balance where only contact carries the load, by
+    /// `other` where there is but one answer, by its note where there are many.
+    fn judge(
+        &mut self,
+        setting: &Setting,
+        sweep: &Sweep,
+        Step { state, record, unheld }: &Step,
+        report: &ContactReport,
+        other: Option<&Vec<f64>>,
+    ) {
+        self.active = Some(record.active_nodes);
+        self.iterations = Some(report.iterations);
+        self.fallbacks = Some(report.fallbacks);
+        self.kkt = Some(record.kkt().worst());
+        self.unbalanced = (sweep.side != CLAMPED).then(|| unbalanced(setting, state));
+        let balanced = self.unbalanced.is_none_or(|error| error <= BALANCE);
+        let many = sweep.many.is_some_and(|[from, to]| (from..=to).contains(&self.value));
+        if unheld.is_none() {
+            self.outcome = "certified";
+            self.difference = other.map(|other| difference(&state.u, other));
+        } else {
+            self.outcome = "noted";
+        }
+        // The last node that holds the body presses with a share of about margin/h; p (g − u·ν)
+        // within the tolerance then leaves its gap uncertain by the tolerance over that.
+        let margin = sweep.many.map_or(f64::INFINITY, |[_, to]| (self.value - to).abs());
+        let allowed = AGREEMENT.max(TOLERANCE / (margin * CELLS as f64));
+        let agrees = self.difference.is_none_or(|difference| difference <= allowed);
+        self.verdict = match (balanced && agrees, unheld.is_some(), many) {
+            (false, _, _) | (true, false, true) => Verdict::Wrong,
+            (true, true, false) => Verdict::Refused,
+            (true, true, true) | (true, false, false) => Verdict::Correct,
+        };
+    }
+}
+
+/// The larger error of the balance of forces across the foundation and of moments, where the
+/// body may turn, relative to the size of the load.
+fn unbalanced(setting: &Setting, state: &State) -> f64 {
+    let nodes = &setting.body.mesh.nodes;
+    let load = setting.loads.at(&setting.body, state.time);
+    let size: f64 = load.chunks(2).map(|f| f[0].hypot(f[1])).sum();
+    // The normal of the foundation is −e_y: contact pushes up.
+    let up = |point: &ContactPoint| (nodes[point.node], [0.0, point.force]);
+    let contact = state.contact.iter().map(up);
+    let load = nodes.iter().zip(load.chunks(2)).map(|(x, f)| (*x, [f[0], f[1]]));
+    let (mut force, mut moment) = (0.0, 0.0);
+    for ([x, y], [fx, fy]) in load.chain(contact) {
+        force += fy;
+        moment += x * fy - y * fx;
+    }
+    let turns = setting.motions.resisted() > 1;
+    (if turns { force.abs().max(moment.abs()) } else { force.abs() }) / size
+}
