@@ -10,12 +10,17 @@ use std::ptr;
 /// Conjugate gradients preconditioned by a Cholesky factor (KSPCG, PCCHOLESKY).
 ///
 /// With a fresh factor CG needs one or two iterations: it removes the factor's rounding
-/// error and notices an indefinite matrix, which the factorisation alone does not. A factor
-/// of a matrix nearby costs a few iterations more.
+/// error. A factor of a matrix nearby costs a few iterations more. A matrix that is not positive
+/// definite has no factor LLᵀ: solves with it do not converge.
 pub struct LinearSolver {
     raw: raw::KSP,
+    /// Whether the last factorisation found only positive pivots.
+    definite: bool,
     _live: Live,
 }
+
+/// PETSC_ERR_MAT_CH_ZRPVT: a pivot of the Cholesky factorisation is not positive.
+const NOT_DEFINITE: i32 = 81;
 
 /// More than a factor worth keeping would need.
 const CG_ITERATIONS: i32 = 200;
@@ -34,7 +39,12 @@ impl LinearSolver {
     ///
     /// The factorisation is CHOLMOD's on one rank and MUMPS' on several.
     pub fn cholesky(session: &Session, prefix: &str) -> Result<Self, PetscError> {
-        let mut solver = Self { raw: ptr::null_mut(), _live: Live::new() };
+        // Left to itself CHOLMOD makes LDLᵀ of a small matrix, accepts negative pivots, and prints
+        // its warnings into the results.
+        for (option, value) in [("final_asis", "0"), ("final_ll", "1"), ("print", "0")] {
+            session.default_option(&format!("-{prefix}mat_cholmod_{option}"), value)?;
+        }
+        let mut solver = Self { raw: ptr::null_mut(), definite: false, _live: Live::new() };
         let prefix = c_string(prefix)?;
         let package = if session.ranks() == 1 { c"cholmod" } else { c"mumps" };
         let mut pc = ptr::null_mut();
@@ -53,14 +63,20 @@ impl LinearSolver {
         Ok(solver)
     }
 
-    /// Factorises `matrix` now; the solver keeps a reference to it.
+    /// Factorises `matrix` now; the solver keeps a reference to it. A matrix that is not positive
+    /// definite is no error here: the solves tell.
     pub fn factorise(&mut self, matrix: &Matrix) -> Result<(), PetscError> {
         // SAFETY: live handles. KSPSetOperators marks the values as new, else the
         // factorisation would wait for the next solve.
-        unsafe {
+        let done = unsafe {
             check(raw::KSPSetReusePreconditioner(self.raw, raw::PetscBool::PETSC_FALSE))?;
             check(raw::KSPSetOperators(self.raw, matrix.raw, matrix.raw))?;
             check(raw::KSPSetUp(self.raw))
+        };
+        self.definite = done.is_ok();
+        match done {
+            Err(error) if error.code == NOT_DEFINITE => Ok(()),
+            done => done,
         }
     }
 
@@ -73,7 +89,7 @@ impl LinearSolver {
         }
     }
 
-    /// Solves from the start `x` until ‖b − Ax‖₂ ≤ `residual`.
+    /// Solves from the start `x` until ‖b − Ax‖₂ ≤ `residual`; without a factor `x` is left alone.
     pub fn solve(
         &mut self,
         b: &Vector,
@@ -81,6 +97,9 @@ impl LinearSolver {
         residual: f64,
     ) -> Result<Krylov, PetscError> {
         same_size(b.owned(), x.owned())?;
+        if !self.definite {
+            return Ok(Krylov { iterations: 0, converged: false });
+        }
         let (mut reason, mut iterations) = (0, 0);
         let limit = residual.max(f64::MIN_POSITIVE);
         // SAFETY: live handles of matching layout.
@@ -99,5 +118,61 @@ impl Drop for LinearSolver {
     fn drop(&mut self) {
         // SAFETY: the handle is ours and not used afterwards.
         unsafe { raw::KSPDestroy(&mut self.raw) };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A diagonal of these blocks [[a, b], [b, a]]: eigenvalues a ± b.
+    fn blocks(session: &Session, blocks: &[[f64; 2]]) -> Matrix {
+        let (mut rows, mut columns, mut values) = (Vec::new(), Vec::new(), Vec::new());
+        for (i, &[a, b]) in blocks.iter().enumerate() {
+            let i = 2 * i as i32;
+            rows.extend([i, i, i + 1, i + 1]);
+            columns.extend([i, i + 1, i, i + 1]);
+            values.extend([a, b, b, a]);
+        }
+        let size = 2 * blocks.len();
+        let mut matrix = Matrix::with_pattern(session, size, 1, rows, columns).unwrap();
+        matrix.set_values(&values).unwrap();
+        matrix
+    }
+
+    /// Whether the solve with right-hand side 1 converges, and the first unknown.
+    fn solve(session: &Session, solver: &mut LinearSolver, size: usize) -> (bool, f64) {
+        let mut b = Vector::zeros(session, size).unwrap();
+        let mut x = Vector::zeros(session, size).unwrap();
+        b.write(|b| b.fill(1.0)).unwrap();
+        let krylov = solver.solve(&b, &mut x, 1e-12).unwrap();
+        (krylov.converged, x.read(|x| x[0]).unwrap())
+    }
+
+    #[test]
+    fn what_is_not_positive_definite_does_not_converge_and_does_no_harm() {
+        let session = Session::start(&[]).unwrap();
+        let good = [[2.0, 1.0]; 3];
+        let mut solver = LinearSolver::cholesky(&session, "test_").unwrap();
+        for bad in [[1.0, 2.0], [-2.0, 1.0], [1.0, 1.0], [0.0, 0.0], [f64::NAN, 0.0]] {
+            // First of all, and after a factorisation that went well.
+            for _ in 0..2 {
+                let matrix = blocks(&session, &[good[0], bad, good[2]]);
+                solver.factorise(&matrix).unwrap();
+                assert!(!solve(&session, &mut solver, 6).0, "{bad:?}");
+                solver.factorise(&blocks(&session, &good)).unwrap();
+                let (converged, x) = solve(&session, &mut solver, 6);
+                assert!(converged && (x - 1.0 / 3.0).abs() < 1e-15, "after {bad:?}: {x}");
+            }
+        }
+    }
+
+    #[test]
+    fn all_pivots_negative_are_noticed_too() {
+        // CG alone would not notice: r·z and p·Ap keep their sign.
+        let session = Session::start(&[]).unwrap();
+        let mut solver = LinearSolver::cholesky(&session, "test_").unwrap();
+        solver.factorise(&blocks(&session, &[[-2.0, 1.0]; 3])).unwrap();
+        assert!(!solve(&session, &mut solver, 6).0);
     }
 }
