@@ -16,5 +16,6 @@ mod hertz;
 mod loads;
 mod orders;
 mod patch;
+mod pivoting;
 mod regression;
 mod rigid;
