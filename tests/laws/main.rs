@@ -19,3 +19,4 @@ mod patch;
 mod pivoting;
 mod regression;
 mod rigid;
+mod undo;
