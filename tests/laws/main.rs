@@ -20,3 +20,4 @@ mod pivoting;
 mod regression;
 mod rigid;
 mod undo;
+mod units;
