@@ -140,10 +140,10 @@ impl<'a> Recorder<'a> {
     /// 4, … steps are added for the runs that do not come far.
     fn is_frame(&self, n: usize) -> bool {
         match (self.every, self.setting.scene().time.map(|grid| grid.stepping)) {
-            (Some(every), _) => n % every == 0,
+            (Some(every), _) => n.is_multiple_of(every),
             (None, Some(Stepping::Uniform { steps })) => {
                 let every = steps.div_ceil(FRAMES);
-                n % every == 0 || (n < every && n.is_power_of_two())
+                n.is_multiple_of(every) || (n < every && n.is_power_of_two())
             }
             (None, _) => true,
         }
