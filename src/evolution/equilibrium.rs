@@ -30,6 +30,8 @@ pub struct Equilibrium<'a> {
 
 /// How often a solver is asked again, more precisely, when its answer misses the tolerance.
 const ATTEMPTS: usize = 3;
+/// A cosine between u and its elastic forces below this is more than rounding.
+const NEGATIVE_ENERGY: f64 = -1e-10;
 
 impl<'a> Equilibrium<'a> {
     /// With the contact solver called `solver`; an unknown name means the default.
@@ -118,7 +120,7 @@ impl<'a> Equilibrium<'a> {
             let (kkt, energy, contact) =
                 phases.time("certificate", || self.certify(&u, &external, force_scale));
             // Then a KKT point need not be a minimum, and which solver would notice is chance.
-            if energy < -setting.tolerance {
+            if energy < NEGATIVE_ENERGY {
                 return Err(failed(ContactError::NotDefinite { method: self.solver.name() }));
             }
             if kkt.within(setting.tolerance) {
