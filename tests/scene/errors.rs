@@ -43,6 +43,7 @@ const CASES: &[(&str, &str, &[&str])] = &[
     ("[material]", "[body.extra]", &["bad.toml:6: unknown key body.extra"]),
     ("young = 1e6", "young = \"1e6\"", &["bad.toml:7: material.young must be a number", "1e6"]),
     ("\"stress\"", "\"strss\"", &["bad.toml:9: material.plane must be `stress` or `strain`"]),
+    ("tao:tron", "tao:trn", &["bad.toml:24: contact.solver must be a contact solver", "bqpip"]),
     ("every = 5", "every = 0.5", &["bad.toml:27: output.every must be a whole number"]),
     ("every = 5", "every = -5", &["bad.toml:27: output.every must be a whole number"]),
     ("every = 5", "every = 0", &["bad.toml:27: output.every must be at least 1, but is 0"]),
