@@ -67,9 +67,11 @@ validate: build deps-validate
 	$(PYTHON) validation/compare.py --binary $(BINARY) $(addprefix geo/, \
 	    square-mild.toml lshape.toml bridge-half.toml hertz.toml)
 
-# Every solver on every scene: a table on the screen and in out/compare/comparison.csv.
+# Every solver on every scene: a table on the screen and in out/compare/comparison.csv, and its
+# figure, also where a solver failed (exit code 1); bad input (2) writes no table.
 compare: build
-	$(BINARY) compare $(SCENE) $(ARGS)
+	@$(BINARY) compare $(SCENE) $(ARGS); code=$$?; \
+	[ $$code -eq 2 ] || $(PYTHON) scripts/comparison.py out/compare; exit $$code
 
 stability: build
 	$(BINARY) stability $(MAPS)

@@ -1,10 +1,10 @@
 //! `signorini compare`: all contact solvers on the same scenes.
 
-use super::{Failure, screen::say};
+use super::{Failure, check_petsc, check_solver, screen::say};
 use clap::Args;
 use comfy_table::{CellAlignment, Table, presets};
 use signorini::{
-    contact::{SOLVERS, is_solver},
+    contact::SOLVERS,
     evolution::Setting,
     mesh, output,
     petsc::Session,
@@ -39,9 +39,8 @@ pub struct CompareArguments {
 /// Bad input, or a solver that failed (the table is complete all the same).
 pub fn compare_scenes(arguments: &CompareArguments) -> Result<(), Failure> {
     let mut solvers: Vec<&str> = arguments.solvers.iter().map(String::as_str).collect();
-    if let Some(unknown) = solvers.iter().find(|name| !is_solver(name)) {
-        return Err(Failure::Input(format!("--solvers: there is no contact solver `{unknown}`")));
-    }
+    solvers.iter().try_for_each(|name| check_solver("--solvers", name))?;
+    check_petsc(&arguments.petsc)?;
     if solvers.is_empty() {
         solvers = SOLVERS.to_vec();
     }

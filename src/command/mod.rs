@@ -9,7 +9,11 @@ pub use compare::{CompareArguments, compare_scenes};
 pub use run::{RunArguments, run};
 pub use stability::{StabilityArguments, stability};
 
-use signorini::{mesh, scene::Scene};
+use signorini::{
+    contact::{TAO_TYPES, is_solver, solver_names},
+    mesh,
+    scene::Scene,
+};
 use std::{fmt, path::PathBuf};
 
 /// Why a command failed, by whose turn it is now.
@@ -36,6 +40,32 @@ impl fmt::Display for Failure {
         match self {
             Self::Input(text) | Self::Solver(text) => f.write_str(text),
         }
+    }
+}
+
+/// Refuses a solver that `option` names and nobody knows.
+fn check_solver(option: &str, name: &str) -> Result<(), Failure> {
+    match is_solver(name) {
+        true => Ok(()),
+        false => Err(Failure::Input(format!(
+            "{option}: there is no contact solver `{name}`; there are {}",
+            solver_names()
+        ))),
+    }
+}
+
+/// Refuses PETSc options that would end a run after its first results are written.
+fn check_petsc(options: &[String]) -> Result<(), Failure> {
+    if let Some(word) = options.first().filter(|word| !word.starts_with('-')) {
+        let problem = format!("PETSc options begin with a dash, but the first is `{word}`");
+        return Err(Failure::Input(problem));
+    }
+    match options.windows(2).find(|pair| pair[0] == "-tao_type") {
+        Some([_, kind]) if !TAO_TYPES.contains(&kind.as_str()) => Err(Failure::Input(format!(
+            "-tao_type: `{kind}` is none of TAO's types for bounds: {}",
+            TAO_TYPES.join(", ")
+        ))),
+        _ => Ok(()),
     }
 }
 

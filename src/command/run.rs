@@ -1,14 +1,14 @@
 //! `signorini run`: a scene from its file to its results.
 
-use super::{Failure, screen::Screen};
+use super::{Failure, check_petsc, check_solver, screen::Screen};
 use clap::Args;
 use signorini::{
-    contact::{SOLVERS, TAO_TYPES, is_solver},
+    contact::SOLVERS,
     evolution::{self, Outcome, Phases, RunError, Setting, Step},
     mesh,
     output::{self, FieldWriter, History, Summary},
     petsc::Session,
-    scene::{MeshSource, Scene, Stepping, TimeGrid},
+    scene::{MeshSource, Scene, Stepping},
 };
 use std::{
     path::{Path, PathBuf},
@@ -49,12 +49,8 @@ impl RunArguments {
                 file.display()
             )));
         }
-        match self.petsc.first() {
-            Some(word) if !word.starts_with('-') => Err(Failure::Input(format!(
-                "PETSc options begin with a dash, but the first is `{word}`"
-            ))),
-            _ => Ok(()),
-        }
+        self.solver.iter().try_for_each(|name| check_solver("--solver", name))?;
+        check_petsc(&self.petsc)
     }
 }
 
@@ -67,7 +63,8 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     if let Some(file) = &arguments.mesh {
         scene.mesh = MeshSource::from_path(file);
     }
-    let solver = solver_name(arguments, &scene)?;
+    let asked = arguments.solver.clone().or_else(|| scene.contact.solver.clone());
+    let solver = asked.unwrap_or_else(|| SOLVERS[0].to_owned());
     let folder = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
 
     let mesh = phases
@@ -106,45 +103,19 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     }
 }
 
-/// The solver asked for on the command line or in the scene, else the default.
-fn solver_name(arguments: &RunArguments, scene: &Scene) -> Result<String, Failure> {
-    let (asked, place) = match (&arguments.solver, &scene.contact.solver) {
-        (Some(name), _) => (name.as_str(), "--solver".to_owned()),
-        (None, Some(name)) => (name.as_str(), format!("{}: contact.solver", scene.path.display())),
-        (None, None) => return Ok(SOLVERS[0].to_owned()),
-    };
-    match is_solver(asked) {
-        true => Ok(asked.to_owned()),
-        false => Err(Failure::Input(format!(
-            "{place}: there is no contact solver `{asked}`; there are {}, and tao:TYPE with TYPE \
-             one of {}",
-            SOLVERS.join(", "),
-            TAO_TYPES.join(", ")
-        ))),
-    }
-}
-
 /// Shows and writes the accepted steps.
 struct Recorder<'a> {
     folder: &'a Path,
     setting: &'a Setting,
     phases: &'a Phases,
-    every: usize,
+    every: Option<usize>,
     history: History,
     fields: FieldWriter,
     screen: Screen,
     last: Option<Step>,
 }
 
-/// Every how many steps a frame is written unless the scene says it.
-fn default_every(time: Option<TimeGrid>) -> usize {
-    match time.map(|grid| grid.stepping) {
-        Some(Stepping::Uniform { steps }) => steps.div_ceil(FRAMES).max(1),
-        _ => 1,
-    }
-}
-
-/// Frames written when the scene does not say how often.
+/// Frames written, about, when the scene does not say how often.
 const FRAMES: usize = 20;
 
 impl<'a> Recorder<'a> {
@@ -153,12 +124,11 @@ impl<'a> Recorder<'a> {
         setting: &'a Setting,
         phases: &'a Phases,
     ) -> Result<Self, output::OutputError> {
-        let every = setting.scene().output.every.unwrap_or(default_every(setting.scene().time));
         Ok(Self {
             folder,
             setting,
             phases,
-            every,
+            every: setting.scene().output.every,
             history: History::create(folder)?,
             fields: FieldWriter::new(folder, setting)?,
             screen: Screen::new(setting),
@@ -166,20 +136,33 @@ impl<'a> Recorder<'a> {
         })
     }
 
+    /// Whether a frame is written of step `n`. Unless the scene says how often, those after 1, 2,
+    /// 4, … steps are added for the runs that do not come far.
+    fn is_frame(&self, n: usize) -> bool {
+        match (self.every, self.setting.scene().time.map(|grid| grid.stepping)) {
+            (Some(every), _) => n.is_multiple_of(every),
+            (None, Some(Stepping::Uniform { steps })) => {
+                let every = steps.div_ceil(FRAMES);
+                n.is_multiple_of(every) || (n < every && n.is_power_of_two())
+            }
+            (None, _) => true,
+        }
+    }
+
     fn accept(&mut self, step: &Step) -> Result<(), output::OutputError> {
         self.screen.show(&step.record);
         self.phases.time("output", || {
             self.history.add(&step.record)?;
-            match step.record.step % self.every {
-                0 => self.fields.add(self.setting, &step.state),
-                _ => Ok(()),
+            match self.is_frame(step.record.step) {
+                true => self.fields.add(self.setting, &step.state),
+                false => Ok(()),
             }
         })?;
         self.last = Some(step.clone());
         Ok(())
     }
 
-    /// Writes the last accepted state and the summary, also of a run that failed.
+    /// Writes the last accepted state, if there is one, and the summary, also of a run that failed.
     fn finish(
         mut self,
         setting: &Setting,
@@ -187,15 +170,20 @@ impl<'a> Recorder<'a> {
         result: &Result<Outcome, RunError>,
         started: Instant,
     ) -> Result<(), output::OutputError> {
-        let Some(Step { state, record, .. }) = self.last.take() else { return Ok(()) };
-        if self.fields.last_time() != Some(state.time) {
-            self.phases.time("output", || self.fields.add(setting, &state))?;
+        let last = self.last.take();
+        if let Some(Step { state, .. }) = &last
+            && self.fields.last_time() != Some(state.time)
+        {
+            self.phases.time("output", || self.fields.add(setting, state))?;
         }
+        let record = last.map(|step| step.record);
+        let steps = record.map_or(0, |r| r.step);
         let (wall, scene) = (started.elapsed().as_secs_f64(), setting.scene());
         let mut notes = setting.notes();
         let outcome = result.as_ref().ok();
         notes.extend(outcome.iter().flat_map(|outcome| outcome.notes(setting)));
-        let mut contact_nodes: Vec<usize> = state.contact.iter().map(|p| p.node).collect();
+        let bounds = &setting.constraints.bounds;
+        let mut contact_nodes: Vec<usize> = bounds.iter().map(|bound| bound.node).collect();
         contact_nodes.dedup();
         let summary = Summary {
             scene: scene.name.clone(),
@@ -206,20 +194,20 @@ impl<'a> Recorder<'a> {
             },
             nodes: setting.body.mesh.nodes.len(),
             triangles: setting.body.mesh.triangles.len(),
-            steps: record.step,
-            end_time: record.time,
+            steps,
+            end_time: record.map(|r| r.time),
             stopped_at: outcome.and_then(|o| o.stopped).map(|stop| stop.time),
             stopped_uncertainty: outcome.and_then(|o| o.stopped).map(|stop| stop.uncertainty),
-            zeta_min: record.zeta_min,
-            zeta_mean: record.zeta_mean,
-            displacement_max: record.displacement_max,
-            work: record.work,
-            contact_force: record.contact_force,
-            active_nodes: record.active_nodes,
+            zeta_min: record.map(|r| r.zeta_min),
+            zeta_mean: record.map(|r| r.zeta_mean),
+            displacement_max: record.map(|r| r.displacement_max),
+            work: record.map(|r| r.work),
+            contact_force: record.map(|r| r.contact_force),
+            active_nodes: record.map(|r| r.active_nodes),
             contact_nodes: contact_nodes.len(),
-            kkt: outcome.map_or(record.kkt(), |o| o.kkt),
+            kkt: outcome.map(|o| o.kkt).or(record.map(|r| r.kkt())),
             wall_seconds: wall,
-            seconds_per_step: wall / (record.step.max(1)) as f64,
+            seconds_per_step: wall / steps.max(1) as f64,
             phases: self.phases.table().into_iter().map(|(name, (_, s))| (name, s)).collect(),
             foundation: setting.foundation.clone(),
             notes,

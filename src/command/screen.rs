@@ -70,23 +70,8 @@ fn report(
         row("mesh", format!("{} nodes, {} triangles", s.nodes, s.triangles)),
         row("solver", s.solver.clone()),
         row("end", ending(s, outcome)),
-        match s.zeta_min {
-            1.0 => row("damage", "none".to_owned()),
-            least => row("damage", format!("min ζ {least:.6}, mean ζ {:.6}", s.zeta_mean)),
-        },
-        row("displacement", format!("largest {:.6e} m", s.displacement_max)),
-        row("work", format!("{:.6e} J/m", s.work)),
     ];
-    if s.contact_nodes > 0 {
-        lines.push(row(
-            "contact",
-            format!(
-                "{} of {} nodes active, force {:.6e} N/m",
-                s.active_nodes, s.contact_nodes, s.contact_force
-            ),
-        ));
-    }
-    lines.push(row("residuals", format!("{}", s.kkt)));
+    lines.extend(result(s).into_iter().flatten());
     lines.extend(s.notes.iter().map(|note| row("note", note.clone())));
     lines.push(row("results", folder.display().to_string()));
     // The table pads its last column too.
@@ -96,24 +81,47 @@ fn report(
     lines.join("\n")
 }
 
+/// What the last accepted state tells, if there is one.
+fn result(s: &Summary) -> Option<Vec<String>> {
+    let mut lines = vec![
+        match s.zeta_min? {
+            1.0 => row("damage", "none".to_owned()),
+            least => row("damage", format!("min ζ {least:.6}, mean ζ {:.6}", s.zeta_mean?)),
+        },
+        row("displacement", format!("largest {:.6e} m", s.displacement_max?)),
+        row("work", format!("{:.6e} J/m", s.work?)),
+    ];
+    if s.contact_nodes > 0 {
+        let (active, nodes, force) = (s.active_nodes?, s.contact_nodes, s.contact_force?);
+        lines.push(row(
+            "contact",
+            format!("{active} of {nodes} nodes active, force {force:.6e} N/m"),
+        ));
+    }
+    lines.push(row("residuals", s.kkt?.to_string()));
+    Some(lines)
+}
+
 fn row(name: &str, value: String) -> String {
     format!("  {name:<13} {value}")
 }
 
 fn ending(s: &Summary, outcome: Option<&Outcome>) -> String {
+    let Some(end) = s.end_time.map(time) else {
+        return "FAILED at the first solve; there is no state to save".to_owned();
+    };
     match outcome.map(|o| o.stopped) {
-        None => format!("FAILED after t = {}; the state there is saved", time(s.end_time)),
+        None => format!("FAILED after t = {end}; the state there is saved"),
         Some(Some(stop)) => format!(
             "STOPPED at t = {} ± {:.1e}: min ζ = {:.4} there reaches ζ_*; \
-             saved is the state before, t = {} (step {})",
+             saved is the state before, t = {end} (step {})",
             time(stop.time),
             stop.uncertainty,
             stop.zeta_min,
-            time(s.end_time),
             s.steps
         ),
-        Some(None) if s.steps == 0 => format!("solved at t = {}", time(s.end_time)),
-        Some(None) => format!("finished at t = {} after {} steps", time(s.end_time), s.steps),
+        Some(None) if s.steps == 0 => format!("solved at t = {end}"),
+        Some(None) => format!("finished at t = {end} after {} steps", s.steps),
     }
 }
 

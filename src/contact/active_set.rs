@@ -128,7 +128,9 @@ impl<'s> ActiveSet<'s> {
         c: &mut Vector,
         mut report: ContactReport,
     ) -> Result<ContactReport, ContactError> {
+        // From nothing, so that the answer does not depend on steps that were undone.
         c.write(|c| c.fill(0.0))?;
+        self.rescue.set_warm_start(&[]);
         let rescued = self.rescue.solve(problem, c)?;
         report.iterations += rescued.iterations;
         report.linear_iterations += rescued.linear_iterations;

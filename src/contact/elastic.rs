@@ -54,11 +54,12 @@ impl<'s> ElasticSolver<'s> {
             report.linear_iterations += iterations;
         }
         if !solved {
-            engine.renew(problem, system)?;
             report.factorisations += 1;
-            let iterations;
-            (solved, iterations) = engine.iterate(problem, system, c, limit, FRESH)?;
-            report.linear_iterations += iterations;
+            if engine.renew(problem, system)? {
+                let iterations;
+                (solved, iterations) = engine.iterate(problem, system, c, limit, FRESH)?;
+                report.linear_iterations += iterations;
+            }
         }
         self.engine = Some(engine);
         Ok(solved)
@@ -124,8 +125,8 @@ impl Engine {
         self.free.norm()
     }
 
-    /// Factorises the system at hand.
-    fn renew(&mut self, problem: &ContactProblem, system: System) -> Result<(), PetscError> {
+    /// Factorises the system at hand; false if it is not positive definite.
+    fn renew(&mut self, problem: &ContactProblem, system: System) -> Result<bool, PetscError> {
         let started = Instant::now();
         self.matrix.copy(problem.stiffness)?;
         if !system.added.is_empty() {
@@ -136,9 +137,12 @@ impl Engine {
             self.matrix.add_diagonal(&self.image)?;
         }
         self.matrix.hold(system.held, problem.stiffness_scale)?;
-        self.factor.factorise(&self.matrix)?;
-        self.wear.renewed(started.elapsed().as_secs_f64());
-        Ok(())
+        let definite = self.factor.factorise(&self.matrix)?;
+        match definite {
+            true => self.wear.renewed(started.elapsed().as_secs_f64()),
+            false => self.wear = Wear::default(),
+        }
+        Ok(definite)
     }
 
     /// Conjugate gradients (Hestenes and Stiefel, J. Res. Nat. Bur. Standards 49, 1952) on the

@@ -37,6 +37,11 @@ pub fn is_solver(name: &str) -> bool {
     SOLVERS.contains(&name) || name.strip_prefix("tao:").is_some_and(|t| TAO_TYPES.contains(&t))
 }
 
+/// What [`is_solver`] accepts, in words.
+pub fn solver_names() -> String {
+    format!("{}, and tao:TYPE with TYPE one of {}", SOLVERS.join(", "), TAO_TYPES.join(", "))
+}
+
 /// The solver called `name`, the default if there is none of that name. Without bounds
 /// every name means one linear solve.
 pub fn solver<'s>(

@@ -141,6 +141,14 @@ pub enum ContactError {
         /// The residuals found.
         residuals: Kkt,
     },
+    /// The answer satisfies the KKT conditions of a stiffness that is not positive definite.
+    #[error(
+        "{method} gave an answer that stores negative energy: the stiffness is not positive definite"
+    )]
+    NotDefinite {
+        /// The solver's name.
+        method: &'static str,
+    },
     /// One of TAO's types ended above the tolerance.
     #[error(
         "tao:{kind} stopped after {iterations} iterations: {} (TaoConvergedReason {reason}, \

@@ -61,10 +61,10 @@ impl Clock {
     }
 
     /// The step to `time` of length `step` holds; its error in ζ was `error`.
-    pub(super) fn accept(&mut self, time: f64, step: f64, error: Option<f64>) {
+    pub(super) fn accept(&mut self, time: f64, step: f64, error: f64) {
         self.accepted += 1;
         self.time = time;
-        if let (Some(tolerance), Some(error)) = (self.tolerance(), error) {
+        if let Some(tolerance) = self.tolerance() {
             self.next = step * growth(tolerance, error).min(2.0);
         }
     }

@@ -34,6 +34,8 @@ pub struct Equilibrium<'a> {
 
 /// How often a solver is asked again, more precisely, when its answer misses the tolerance.
 const ATTEMPTS: usize = 3;
+/// A cosine between u and its elastic forces below this is more than rounding.
+const NEGATIVE_ENERGY: f64 = -1e-10;
 
 impl<'a> Equilibrium<'a> {
     /// With the contact solver called `solver`; an unknown name means the default.
@@ -122,8 +124,12 @@ impl<'a> Equilibrium<'a> {
             total.false_claims += report.false_claims;
             self.report = total;
             let u = self.displacement(&lift)?;
-            let (kkt, contact) =
+            let (kkt, energy, contact) =
                 phases.time("certificate", || self.certify(&u, &external, force_scale));
+            // Then a KKT point need not be a minimum, and which solver would notice is chance.
+            if energy < NEGATIVE_ENERGY {
+                return Err(failed(ContactError::NotDefinite { method: self.solver.name() }));
+            }
             if kkt.within(setting.tolerance) {
                 let state = State {
                     time,
@@ -220,10 +226,15 @@ impl<'a> Equilibrium<'a> {
         Ok(u)
     }
 
-    /// The KKT residuals of u by element-wise forces, and the state of contact they imply.
-    /// `load_size` keeps the scale of forces where a prescribed displacement carries the
-    /// body along without stress.
-    fn certify(&self, u: &[f64], external: &[f64], load_size: f64) -> (Kkt, Vec<ContactPoint>) {
+    /// The KKT residuals of u by element-wise forces, the cosine between u and these forces (the
+    /// sign of the energy), and the state of contact they imply. `load_size` keeps the scale of
+    /// forces where a prescribed displacement carries the body along without stress.
+    fn certify(
+        &self,
+        u: &[f64],
+        external: &[f64],
+        load_size: f64,
+    ) -> (Kkt, f64, Vec<ContactPoint>) {
         let setting = self.setting;
         let (body, constraints) = (&setting.body, &setting.constraints);
         let internal = setting.elasticity.internal_force(body, &self.zeta_mean, u);
@@ -231,6 +242,8 @@ impl<'a> Equilibrium<'a> {
         let forces = partition.norm(external, 2).max(partition.norm(&internal, 2));
         let force_scale = forces.max(load_size);
         let size = largest(u);
+        let energy = partition.dot(&internal, u, 2)
+            / (force_scale * partition.norm(u, 2)).max(f64::MIN_POSITIVE);
 
         let mut residual: Vec<f64> = internal.iter().zip(external).map(|(r, f)| r - f).collect();
         let mut c = u.to_vec();
@@ -243,7 +256,7 @@ impl<'a> Equilibrium<'a> {
             let active = force * size > gap * force_scale;
             ContactPoint { node: bound.node, force, pressure: force / bound.weight, gap, active }
         });
-        (kkt, points.collect())
+        (kkt, energy, points.collect())
     }
 
     /// A rigid motion that the pressing nodes leave. A body without load rests where it is,

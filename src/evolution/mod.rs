@@ -74,9 +74,10 @@ pub enum RunError {
         /// What failed.
         source: ContactError,
     },
-    /// The damage system could not be solved.
+    /// The damage step has no answer.
     #[error(
-        "step {step} (t = {time}): the damage system was not solved: its matrix is not positive definite"
+        "step {step} (t = {time}): the damage equation has no finite answer: its source overflows \
+         or its matrix is not positive definite; look for extreme numbers in [damage] and the loads"
     )]
     Damage {
         /// The step.
@@ -129,7 +130,7 @@ pub fn run(
         // (28): ζ_n from u_{n−1} and ζ_{n−1}.
         let mut zeta = old.zeta.clone();
         let driving = damage.advance(&old.u, &mut zeta, step)?;
-        if driving == Driving::Failed || zeta.iter().any(|z| z.is_nan()) {
+        if driving == Driving::Failed || !zeta.iter().all(|z| z.is_finite()) {
             if clock.cut(step, 0.5) {
                 outcome.undone += 1;
                 continue;
@@ -184,7 +185,7 @@ pub fn run(
             Err(other) => return Err(other),
         };
         equilibrium.accept(time)?;
-        clock.accept(time, step, Some(error.largest));
+        clock.accept(time, step, error.largest);
         estimate.accept(error);
         outcome.excess.observe(allowed, &zeta, n, time);
         bounds = allowed.tightened(&zeta);

@@ -5,7 +5,8 @@ use crate::contact::Kkt;
 use serde::Serialize;
 use std::{collections::BTreeMap, path::Path};
 
-/// The keys of `summary.json`; values are those of the last accepted state unless said otherwise.
+/// The keys of `summary.json`; values are those of the last accepted state unless said otherwise,
+/// null where there is none because the first solve failed.
 #[derive(Debug, Clone, Serialize)]
 pub struct Summary {
     /// Name of the scene file without extension.
@@ -21,27 +22,27 @@ pub struct Summary {
     /// Accepted time steps after t = 0.
     pub steps: usize,
     /// Time of the last accepted state, s.
-    pub end_time: f64,
+    pub end_time: Option<f64>,
     /// Time at which ζ_* was reached, s; null if it was not.
     pub stopped_at: Option<f64>,
     /// How far off `stopped_at` may be, s; null if ζ_* was not reached.
     pub stopped_uncertainty: Option<f64>,
     /// min ζ.
-    pub zeta_min: f64,
+    pub zeta_min: Option<f64>,
     /// ∫ζ/|Ω|.
-    pub zeta_mean: f64,
+    pub zeta_mean: Option<f64>,
     /// Largest nodal |u|, m.
-    pub displacement_max: f64,
+    pub displacement_max: Option<f64>,
     /// fᵀu, J per metre of thickness.
-    pub work: f64,
+    pub work: Option<f64>,
     /// Σ nodal normal reactions of Γ_C, N per metre of thickness.
-    pub contact_force: f64,
+    pub contact_force: Option<f64>,
     /// Contact nodes that press on the foundation.
-    pub active_nodes: usize,
+    pub active_nodes: Option<usize>,
     /// Nodes with a gap condition (prescribed ones not counted).
     pub contact_nodes: usize,
     /// Worst relative KKT residuals over all steps.
-    pub kkt: Kkt,
+    pub kkt: Option<Kkt>,
     /// Wall time of the whole run, s.
     pub wall_seconds: f64,
     /// Wall time per time step, s.

@@ -9,9 +9,7 @@ use std::ptr;
 
 /// A Cholesky factor (PCCHOLESKY): CHOLMOD's on one rank, MUMPS' on several.
 ///
-/// Fill-reducing ordering and symbolic factorisation are done once, with the first values. A
-/// factorisation does not notice that a matrix is not positive definite; whoever uses the
-/// factor has to (conjugate gradients do).
+/// Fill-reducing ordering and symbolic factorisation are done once, with the first values.
 pub struct Factor {
     raw: raw::PC,
     _live: Live,
@@ -20,6 +18,7 @@ pub struct Factor {
 impl Factor {
     /// A factor whose PETSc options carry `prefix` (`-elastic_pc_type …`).
     pub fn new(session: &Session, prefix: &str) -> Result<Self, PetscError> {
+        cholesky_options(session, prefix)?;
         let mut factor = Self { raw: ptr::null_mut(), _live: Live::new() };
         let prefix = c_string(prefix)?;
         let package = if session.ranks() == 1 { c"cholmod" } else { c"mumps" };
@@ -34,10 +33,10 @@ impl Factor {
         Ok(factor)
     }
 
-    /// Factorises the present values of `matrix`.
-    pub fn factorise(&mut self, matrix: &Matrix) -> Result<(), PetscError> {
+    /// Factorises the present values of `matrix`; false if it is not positive definite.
+    pub fn factorise(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
         // SAFETY: a live handle.
-        unsafe { self.factorise_raw(matrix.raw, false) }
+        definite(unsafe { self.factorise_raw(matrix.raw, false) })
     }
 
     /// As `factorise`; a matrix of another `pattern` than the last needs a new ordering.
@@ -74,6 +73,26 @@ impl Factor {
     pub(super) unsafe fn apply_raw(&self, r: raw::Vec, z: raw::Vec) -> Result<(), PetscError> {
         // SAFETY: the caller's promise.
         check(unsafe { raw::PCApply(self.raw, r, z) })
+    }
+}
+
+/// Left to itself CHOLMOD makes LDLᵀ of a small matrix, accepts negative pivots, and prints its
+/// warnings into the results.
+pub(super) fn cholesky_options(session: &Session, prefix: &str) -> Result<(), PetscError> {
+    for (option, value) in [("final_asis", "0"), ("final_ll", "1"), ("print", "0")] {
+        session.default_option(&format!("-{prefix}mat_cholmod_{option}"), value)?;
+    }
+    Ok(())
+}
+
+/// Tells a matrix that is not positive definite from other failures of its factorisation.
+pub(super) fn definite(factorised: Result<(), PetscError>) -> Result<bool, PetscError> {
+    /// PETSC_ERR_MAT_CH_ZRPVT: a pivot of the Cholesky factorisation is not positive.
+    const NOT_DEFINITE: i32 = 81;
+    match factorised {
+        Ok(()) => Ok(true),
+        Err(error) if error.code == NOT_DEFINITE => Ok(false),
+        Err(other) => Err(other),
     }
 }
 

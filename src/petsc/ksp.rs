@@ -1,7 +1,9 @@
 //! Linear systems by a Cholesky factor, polished by conjugate gradients.
 
 use super::{
-    Matrix, PetscError, Session, Vector, check, raw,
+    Matrix, PetscError, Session, Vector, check,
+    factor::{cholesky_options, definite},
+    raw,
     session::{Live, c_string, world},
     vec::same_size,
 };
@@ -10,9 +12,11 @@ use std::ptr;
 /// Conjugate gradients preconditioned by a Cholesky factor (KSPCG, PCCHOLESKY).
 ///
 /// With a fresh factor CG needs one or two iterations: it removes the factor's rounding
-/// error and notices an indefinite matrix, which the factorisation alone does not.
+/// error. A matrix that is not positive definite has no factor LLᵀ: solves with it do not converge.
 pub struct LinearSolver {
     raw: raw::KSP,
+    /// Whether the last factorisation found only positive pivots.
+    definite: bool,
     _live: Live,
 }
 
@@ -33,7 +37,8 @@ impl LinearSolver {
     ///
     /// The factorisation is CHOLMOD's on one rank and MUMPS' on several.
     pub fn cholesky(session: &Session, prefix: &str) -> Result<Self, PetscError> {
-        let mut solver = Self { raw: ptr::null_mut(), _live: Live::new() };
+        cholesky_options(session, prefix)?;
+        let mut solver = Self { raw: ptr::null_mut(), definite: false, _live: Live::new() };
         let prefix = c_string(prefix)?;
         let package = if session.ranks() == 1 { c"cholmod" } else { c"mumps" };
         let mut pc = ptr::null_mut();
@@ -52,17 +57,20 @@ impl LinearSolver {
         Ok(solver)
     }
 
-    /// Factorises `matrix` now; the solver keeps a reference to it.
+    /// Factorises `matrix` now; the solver keeps a reference to it. A matrix that is not positive
+    /// definite is no error here: the solves tell.
     pub fn factorise(&mut self, matrix: &Matrix) -> Result<(), PetscError> {
         // SAFETY: live handles. KSPSetOperators marks the values as new, else the
         // factorisation would wait for the next solve.
-        unsafe {
+        let done = unsafe {
             check(raw::KSPSetOperators(self.raw, matrix.raw, matrix.raw))?;
             check(raw::KSPSetUp(self.raw))
-        }
+        };
+        self.definite = definite(done)?;
+        Ok(())
     }
 
-    /// Solves from the start `x` until ‖b − Ax‖₂ ≤ `residual`.
+    /// Solves from the start `x` until ‖b − Ax‖₂ ≤ `residual`; without a factor `x` is left alone.
     pub fn solve(
         &mut self,
         b: &Vector,
@@ -70,6 +78,9 @@ impl LinearSolver {
         residual: f64,
     ) -> Result<Krylov, PetscError> {
         same_size(b.owned(), x.owned())?;
+        if !self.definite {
+            return Ok(Krylov { iterations: 0, converged: false });
+        }
         let (mut reason, mut iterations) = (0, 0);
         let limit = residual.max(f64::MIN_POSITIVE);
         // SAFETY: live handles of matching layout.
@@ -88,5 +99,61 @@ impl Drop for LinearSolver {
     fn drop(&mut self) {
         // SAFETY: the handle is ours and not used afterwards.
         unsafe { raw::KSPDestroy(&mut self.raw) };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A diagonal of these blocks [[a, b], [b, a]]: eigenvalues a ± b.
+    fn blocks(session: &Session, blocks: &[[f64; 2]]) -> Matrix {
+        let (mut rows, mut columns, mut values) = (Vec::new(), Vec::new(), Vec::new());
+        for (i, &[a, b]) in blocks.iter().enumerate() {
+            let i = 2 * i as i32;
+            rows.extend([i, i, i + 1, i + 1]);
+            columns.extend([i, i + 1, i, i + 1]);
+            values.extend([a, b, b, a]);
+        }
+        let size = 2 * blocks.len();
+        let mut matrix = Matrix::with_pattern(session, size, 1, rows, columns).unwrap();
+        matrix.set_values(&values).unwrap();
+        matrix
+    }
+
+    /// Whether the solve with right-hand side 1 converges, and the first unknown.
+    fn solve(session: &Session, solver: &mut LinearSolver, size: usize) -> (bool, f64) {
+        let mut b = Vector::zeros(session, size).unwrap();
+        let mut x = Vector::zeros(session, size).unwrap();
+        b.write(|b| b.fill(1.0)).unwrap();
+        let krylov = solver.solve(&b, &mut x, 1e-12).unwrap();
+        (krylov.converged, x.read(|x| x[0]).unwrap())
+    }
+
+    #[test]
+    fn what_is_not_positive_definite_does_not_converge_and_does_no_harm() {
+        let session = Session::start(&[]).unwrap();
+        let good = [[2.0, 1.0]; 3];
+        let mut solver = LinearSolver::cholesky(&session, "test_").unwrap();
+        for bad in [[1.0, 2.0], [-2.0, 1.0], [1.0, 1.0], [0.0, 0.0], [f64::NAN, 0.0]] {
+            // First of all, and after a factorisation that went well.
+            for _ in 0..2 {
+                let matrix = blocks(&session, &[good[0], bad, good[2]]);
+                solver.factorise(&matrix).unwrap();
+                assert!(!solve(&session, &mut solver, 6).0, "{bad:?}");
+                solver.factorise(&blocks(&session, &good)).unwrap();
+                let (converged, x) = solve(&session, &mut solver, 6);
+                assert!(converged && (x - 1.0 / 3.0).abs() < 1e-15, "after {bad:?}: {x}");
+            }
+        }
+    }
+
+    #[test]
+    fn all_pivots_negative_are_noticed_too() {
+        // CG alone would not notice: r·z and p·Ap keep their sign.
+        let session = Session::start(&[]).unwrap();
+        let mut solver = LinearSolver::cholesky(&session, "test_").unwrap();
+        solver.factorise(&blocks(&session, &[[-2.0, 1.0]; 3])).unwrap();
+        assert!(!solve(&session, &mut solver, 6).0);
     }
 }

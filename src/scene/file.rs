@@ -84,7 +84,7 @@ pub(super) struct BodyTable {
 #[derive(Deserialize, Default)]
 #[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct ContactTable {
-    pub(super) solver: Option<String>,
+    pub(super) solver: Option<Spanned<String>>,
     pub(super) tolerance: Option<Number>,
     #[serde(default)]
     pub(super) penalty_duality: PenaltyTable,

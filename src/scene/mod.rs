@@ -121,7 +121,7 @@ impl TimeGrid {
 /// How the contact problem is solved.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactOptions {
-    /// The solver's name, if the scene asks for one; who runs the scene knows the names.
+    /// The solver's name, if the scene asks for one: see [`is_solver`](crate::contact::is_solver).
     pub solver: Option<String>,
     /// Relative tolerance of the KKT residuals, in (0, 1).
     pub tolerance: f64,

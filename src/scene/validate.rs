@@ -16,7 +16,7 @@ use super::{
     ContactOptions, Damage, MeshSource, OutputOptions, Scene, Stepping, TimeGrid, may_start_at,
 };
 use crate::{
-    contact::PenaltyOptions,
+    contact::{PenaltyOptions, is_solver, solver_names},
     model::{DamageLaw, Material},
 };
 
@@ -223,8 +223,14 @@ impl Check<'_> {
             accelerate: given.accelerate.unwrap_or(default.accelerate),
             iterations: given.iterations.map_or(default.iterations, Spanned::into_inner),
         };
+        if let Some(solver) = table.solver.as_ref().filter(|name| !is_solver(name.get_ref())) {
+            let (found, known) = (solver.get_ref(), solver_names());
+            let problem =
+                format!("must be a contact solver, but is \"{found}\"; there are {known}");
+            return Err(self.invalid(&solver.span(), problem));
+        }
         Ok(ContactOptions {
-            solver: table.solver,
+            solver: table.solver.map(Spanned::into_inner),
             tolerance: table.tolerance.as_ref().map_or(Ok(1e-10), in_range)?,
             penalty_duality,
         })

@@ -41,8 +41,55 @@ fn a_solver_kept_from_iterating() {
 }
 
 #[test]
-fn a_method_petsc_does_not_have() {
+fn penalty_duality_kept_from_iterating() {
+    fails_at_the_third_step(
+        &["--solver", "penalty-duality", "--set", "contact.penalty_duality.iterations=1"],
+        &["penalty-duality stopped after 1 iterations", "the tolerance 1.0e-10 is missed by"],
+    );
+}
+
+#[test]
+fn the_first_solve_fails() {
     let desk = Desk::new();
-    let said = desk.say(&["run", "scene.toml", "--solver", "tao", "--", "-tao_type", "none"]);
-    said.fails(1, &["PETSc error", "Unable to find requested Tao type none"]);
+    let load = "boundary.top.traction=[0, -3]";
+    let said = desk.say(&["run", "scene.toml", "--set", load, "--set", "contact.tolerance=1e-30"]);
+    said.fails(1, &["step 0 (t = 0): active-set", "the tolerance 1.0e-30 is missed by"]);
+    assert!(said.out.contains("FAILED at the first solve; there is no state to save"));
+
+    let summary = desk.summary("out/scene");
+    assert_eq!(said.err, format!("error: {}\n", summary["error"].as_str().expect("the error")));
+    assert_eq!(summary["steps"], 0);
+    for of_a_state in ["end_time", "zeta_min", "displacement_max", "active_nodes", "kkt"] {
+        assert!(summary[of_a_state].is_null(), "{of_a_state}");
+    }
+    assert_eq!(desk.names("out/scene"), ["history.csv", "summary.json"]);
+}
+
+/// A strain that makes λ_U |ε|² overflow.
+const OVERFLOWING: [&str; 6] = [
+    "--set",
+    "boundary.top.traction=[0, '-1e5*max(0, t - 0.2)']",
+    "--set",
+    "damage.lambda_u=1e308",
+    "--set",
+    "damage.strain_cap=1e308",
+];
+
+#[test]
+fn damage_that_is_not_finite() {
+    let desk = Desk::new();
+    let said = desk.say(&[&["run", "scene.toml"], &OVERFLOWING[..]].concat());
+    said.fails(1, &["step 4 (t = 0.4): the damage equation has no finite answer"]);
+    assert!(said.out.contains("FAILED after t = 0.3"), "{}", said.out);
+    let summary = desk.summary("out/scene");
+    assert_eq!((&summary["steps"], &summary["zeta_min"]), (&3.into(), &1.0.into()));
+    assert_eq!(desk.history("out/scene").1.len(), 4);
+
+    // Chosen steps are cut until it is hopeless, and not one bad state is kept.
+    let auto = ["--set", "time.step=auto"];
+    let said = desk.say(&[&["run", "scene.toml"], &OVERFLOWING[..], &auto].concat());
+    said.fails(1, &["the damage equation has no finite answer"]);
+    let (_, rows) = desk.history("out/scene");
+    assert!(rows.len() > 2 && rows.iter().all(|row| row[2] == 1.0), "ζ as it was");
+    assert_eq!(desk.summary("out/scene")["end_time"], rows.last().expect("rows")[1]);
 }

@@ -111,6 +111,21 @@ fn frames_are_as_many_as_asked_for() {
 }
 
 #[test]
+fn a_run_that_does_not_come_far_has_frames_of_its_beginning() {
+    let desk = Desk::new();
+    // 200 steps: every tenth, and before the first of these the steps 1, 2, 4 and 8.
+    let stopping = ["--set", "time.step=0.005", "--set", "damage.lambda_u=1e5"];
+    desk.run(&stopping);
+    let frames = desk.frames("out/scene");
+    let steps: Vec<i32> = frames.iter().map(|(t, _)| (200.0 * t).round() as i32).collect();
+    let last = desk.summary("out/scene")["steps"].as_i64().expect("a number") as i32;
+    assert!(last < 100, "it stopped at ζ_*: {last}");
+    let expected = [0, 1, 2, 4, 8].into_iter().chain((1..20).map(|n| 10 * n));
+    let expected: Vec<i32> = expected.filter(|n| *n < last).chain([last]).collect();
+    assert_eq!(steps, expected);
+}
+
+#[test]
 fn what_others_put_into_the_folder_stays() {
     let desk = Desk::new();
     desk.write("out/scene/notes.txt", "mine");

@@ -67,7 +67,14 @@ const SCENES: &[(&str, &str, &[&str])] = &[
     ("square.msh", "square.stl", &["scene.toml:3: mesh.file must be a .geo or .msh file"]),
     ("square.msh", "none.msh", &["none.msh: No such file"]),
     ("square.msh", "none.geo", &["none.geo: No such file"]),
-    ("[contact]", "[contact]\nsolver = \"simplex\"", &["scene.toml: contact.solver", "`simplex`"]),
+    (
+        "[contact]",
+        "[contact]\nsolver = \"simplex\"",
+        &[
+            "scene.toml:20: contact.solver must be a contact solver, but is \"simplex\"",
+            "penalty-dual",
+        ],
+    ),
     // Held by nothing: the message names the motion.
     (
         "[\"0\", \"-3*t\"]",
@@ -134,11 +141,18 @@ fn arguments() {
         (&["--mesh", "none.msh"], &["none.msh: No such file"]),
         (&["--mesh", "scene.toml"], &["scene.toml: a mesh is a .msh file or a .geo file"]),
         (&["--mesh", "square.geo", "--set", "mesh.size=1"], &["--set mesh.size=1 has no effect"]),
+        (
+            &["--", "-tao_type", "none"],
+            &["-tao_type: `none` is none of TAO's types", "tron", "bqpip"],
+        ),
         (&["--", "tao_monitor"], &["PETSc options begin with a dash", "`tao_monitor`"]),
         (&["--slver", "tao"], &["unexpected argument '--slver'", "'--solver'"]),
     ] {
         refused(&desk, arguments, fragments);
     }
+    let said = desk.say(&["compare", "scene.toml", "--solvers", "tao,simplex"]);
+    said.fails(2, &["--solvers: ", "`simplex`", "active-set, penalty-duality, tao", "tao:TYPE"]);
+    assert!(!desk.path("out/compare").exists());
     desk.say(&["run"]).fails(2, &["<SCENE>"]);
     desk.say(&["rnu", "scene.toml"]).fails(2, &["unrecognized subcommand 'rnu'"]);
     desk.say(&["run", "none.toml"]).fails(2, &["none.toml: the scene cannot be read"]);

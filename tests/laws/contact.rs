@@ -105,50 +105,6 @@ fn more_load_presses_more() {
 }
 
 #[test]
-fn stiffness_and_loads_scaled_alike_leave_the_displacement() {
-    for solver in SOLVERS {
-        let plain = run(&lshape(&["time.step=0.25"]), solver).last;
-        for scale in [1e9, 1e-6] {
-            let young = format!("material.young={:e}", 1e5 * scale);
-            let load = format!("boundary.load.traction=[0, '-{}*t']", 80.0 * scale);
-            let scaled = run(&lshape(&["time.step=0.25", &young, &load]), solver).last;
-            let error = difference(&scaled.state.u, &plain.state.u);
-            assert!(error < 1e-9, "{solver}, {scale:e}: {error:.1e}");
-            close_to(scaled.record.contact_force, scale * plain.record.contact_force, 1e-9);
-            assert_eq!(scaled.record.active_nodes, plain.record.active_nodes);
-        }
-    }
-}
-
-#[test]
-fn lengths_scaled_alike_leave_the_stress() {
-    // x, u and g in millimetres instead of metres: stresses, hence pressures, stay.
-    for solver in SOLVERS {
-        let [metres, millimetres] = [1.0, 1e-3].map(|scale| {
-            let mesh = crate::support::moved(distorted(6), |x| x.map(|x| scale * x));
-            let text = format!(
-                "material = {{ young = 100, poisson = 0.3, plane = 'strain' }}
-                 boundary = [
-                    {{ name = 'left', displacement = [0, 0] }},
-                    {{ name = 'bottom', gap = {:e} }},
-                    {{ name = 'top', traction = [0, -5] }},
-                 ]",
-                0.02 * scale
-            );
-            run(&setting(mesh, &text).unwrap(), solver).last.state
-        });
-        let scaled: Vec<f64> = millimetres.u.iter().map(|u| 1e3 * u).collect();
-        assert!(difference(&scaled, &metres.u) < 1e-9);
-        assert!(metres.contact.iter().any(|p| p.active));
-        assert!(metres.contact.iter().any(|p| !p.active));
-        let most = metres.contact.iter().map(|p| p.pressure).fold(0.0, f64::max);
-        for (a, b) in millimetres.contact.iter().zip(&metres.contact) {
-            close(a.pressure / most, b.pressure / most, 1e-8);
-        }
-    }
-}
-
-#[test]
 fn a_uniform_gap_closes_when_the_top_has_come_down_by_it() {
     // The top moves down by t, the gap is g = 0.35: free fall up to t = g, then uniaxial
     // compression ε_yy = −(t − g), σ_yy = E ε_yy in plane stress; E = 100.

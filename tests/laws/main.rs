@@ -18,5 +18,8 @@ mod lost_contact;
 mod maximum_principle;
 mod orders;
 mod patch;
+mod pivoting;
 mod regression;
 mod rigid;
+mod undo;
+mod units;

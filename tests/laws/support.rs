@@ -181,3 +181,14 @@ pub fn order(sizes: &[f64], errors: &[f64]) -> f64 {
     let over: f64 = points.iter().map(|(a, b)| (a - x) * (b - y)).sum();
     over / points.iter().map(|(a, _)| (a - x) * (a - x)).sum::<f64>()
 }
+
+/// Checks iterations of one problem solved twice. Factors are renewed when measured times say so,
+/// which is never twice the same: sets do not depend on that, but what the other methods see
+/// of their linear solves differs within the tolerance.
+pub fn same_iterations(solver: &str, a: usize, b: usize) {
+    let apart = a.abs_diff(b);
+    match solver {
+        "active-set" => assert_eq!(a, b),
+        _ => assert!(apart <= 2 + a.max(b) / 4, "{solver}: {a} and {b} iterations"),
+    }
+}

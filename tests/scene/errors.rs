@@ -48,6 +48,7 @@ const CASES: &[(&str, &str, &[&str])] = &[
         "\"1 - 0.1*x\"\nmass = \"lump\"",
         &["bad.toml:18: damage.mass must be `consistent` or `lumped`, but is `lump`"],
     ),
+    ("tao:tron", "tao:trn", &["bad.toml:24: contact.solver must be a contact solver", "bqpip"]),
     ("every = 5", "every = 0.5", &["bad.toml:27: output.every must be a whole number"]),
     ("every = 5", "every = -5", &["bad.toml:27: output.every must be a whole number"]),
     ("every = 5", "every = 0", &["bad.toml:27: output.every must be at least 1, but is 0"]),

@@ -118,7 +118,7 @@ fn everything_written_is_read() {
     let parameters = scene.mesh.parameters.iter().map(|(k, v)| (k.as_str(), *v));
     assert_eq!(parameters.collect::<Vec<_>>(), [("grading", 3.0), ("size", 0.25)]);
     assert_eq!(scene.body_force[1].eval(0.0, 0.0, 2.0), -2.0);
-    assert_eq!(scene.contact.solver.as_deref(), Some("tron"));
+    assert_eq!(scene.contact.solver.as_deref(), Some("tao:tron"));
     assert_eq!(scene.contact.tolerance, 1e-8);
     assert_eq!(scene.output.every, Some(5));
     let damage = scene.damage.expect("given");

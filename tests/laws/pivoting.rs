@@ -1,0 +1,160 @@
+//! The active set where exchanging all wrong nodes at once does not end, on hand-made problems.
+
+use crate::support::close;
+use nalgebra::{DMatrix, DVector};
+use signorini::{
+    contact::{Bound, ContactProblem, ContactReport, PenaltyOptions, SOLVERS, solver},
+    petsc::{Matrix, Session, Vector},
+};
+
+const TOLERANCE: f64 = 1e-10;
+
+/// min ½ cᵀKc − fᵀc for c ≤ g.
+struct Small {
+    stiffness: DMatrix<f64>,
+    load: Vec<f64>,
+    gaps: Vec<f64>,
+    rigid: DMatrix<f64>,
+    work: DVector<f64>,
+}
+
+impl Small {
+    fn solve(&self, name: &str, guess: &[f64]) -> (Vec<f64>, ContactReport) {
+        let session = Session::start(&[]).unwrap();
+        let size = self.load.len();
+        let indices = || 0..size as i32;
+        let rows = indices().flat_map(|i| indices().map(move |_| i)).collect();
+        let columns = indices().flat_map(|_| indices()).collect();
+        let mut matrix = Matrix::with_pattern(&session, size, 1, rows, columns).unwrap();
+        matrix.set_values(self.stiffness.as_slice()).unwrap();
+        let (mut load, mut c) =
+            (Vector::zeros(&session, size).unwrap(), Vector::zeros(&session, size).unwrap());
+        load.set(&self.load).unwrap();
+        let bound = |(dof, gap): (usize, &f64)| Bound {
+            dof,
+            node: dof,
+            normal: [0.0, 1.0],
+            gap: *gap,
+            weight: 1.0,
+        };
+        let bounds: Vec<_> = self.gaps.iter().enumerate().map(bound).collect();
+        let problem = ContactProblem {
+            stiffness: &matrix,
+            revision: 0,
+            stiffness_scale: self.stiffness.trace() / size as f64,
+            load: &load,
+            bounds: &bounds,
+            rigid: &self.rigid,
+            work: &self.work,
+            force_scale: self.load.iter().map(|f| f * f).sum::<f64>().sqrt(),
+            tolerance: TOLERANCE,
+        };
+        let mut solver = solver(&session, name, true, PenaltyOptions::default());
+        if name == "active-set" {
+            solver.set_warm_start(guess);
+        }
+        let report = solver.solve(&problem, &mut c).unwrap_or_else(|e| panic!("{name}: {e}"));
+        (c.read(<[f64]>::to_vec).unwrap(), report)
+    }
+
+    /// Minimises with c = g on the pressing unknowns and no other bound; Kc − f there.
+    fn solve_pressing(&self, pressing: &[bool]) -> (DVector<f64>, DVector<f64>) {
+        let size = self.load.len();
+        let a = DMatrix::from_fn(size, size, |i, j| match pressing[i] {
+            true => f64::from(u8::from(i == j)),
+            false => self.stiffness[(i, j)],
+        });
+        let value = |i: usize| if pressing[i] { self.gaps[i] } else { self.load[i] };
+        let c = a.lu().solve(&DVector::from_fn(size, |i, _| value(i))).unwrap();
+        let residual = &self.stiffness * &c - DVector::from_row_slice(&self.load);
+        (c, residual)
+    }
+
+    /// The set after an exchange of all wrong unknowns.
+    fn exchange_all(&self, pressing: [bool; 3]) -> [bool; 3] {
+        let (c, residual) = self.solve_pressing(&pressing);
+        [0, 1, 2].map(|i| match pressing[i] {
+            true => residual[i] <= 1e-12,
+            false => c[i] > self.gaps[i] + 1e-12,
+        })
+    }
+
+    /// Whether exchanges of all wrong unknowns from this guess never end.
+    fn cycles(&self, guess: [bool; 3]) -> bool {
+        // There are eight sets: who has not ended after eight exchanges returns to one.
+        let last = (0..8).fold(guess, |set, _| self.exchange_all(set));
+        self.exchange_all(last) != last
+    }
+
+    /// The answer: the set that an exchange leaves alone.
+    fn enumerate(&self) -> Vec<f64> {
+        let sets = (0..8).map(|set| [0, 1, 2].map(|i| set >> i & 1 == 1));
+        let right: Vec<_> = sets.filter(|set| self.exchange_all(*set) == *set).collect();
+        self.solve_pressing(&right[0]).0.as_slice().to_vec()
+    }
+}
+
+/// The example of Kunisch and Rendl (SIAM J. Optim. 14, 2003): positive definite, but for some
+/// guesses the exchange of all wrong unknowns comes back to them.
+fn cycling() -> Small {
+    let stiffness = [4.0, 5.0, -5.0, 5.0, 9.0, -5.0, -5.0, -5.0, 7.0];
+    Small {
+        stiffness: DMatrix::from_row_slice(3, 3, &stiffness),
+        load: vec![-2.0, -1.0, 3.0],
+        gaps: vec![0.0; 3],
+        rigid: DMatrix::zeros(3, 0),
+        work: DVector::zeros(0),
+    }
+}
+
+#[test]
+fn single_exchanges_end_where_block_exchanges_cycle() {
+    let small = cycling();
+    let exact = small.enumerate();
+    let mut left_the_fast_path = 0;
+    for set in 0..8 {
+        let guess = [0, 1, 2].map(|i| f64::from(set >> i & 1));
+        let (c, report) = small.solve("active-set", &guess);
+        c.iter().zip(&exact).for_each(|(c, e)| close(*c, *e, 1e-9));
+        assert_eq!(report.fallbacks > 0, small.cycles(guess.map(|on| on == 1.0)), "{guess:?}");
+        left_the_fast_path += usize::from(report.fallbacks > 0);
+        assert!(report.iterations < 30, "ended by itself, not by the rescue: {report:?}");
+    }
+    assert!(left_the_fast_path > 0);
+}
+
+/// A beam of three nodes that bends but is held by nothing: (1, 1, 1) and (−1, 0, 1) are free of
+/// energy. It lies on nodes 0 and 1, and the load beyond them tips it until node 2 meets its
+/// obstacle: c = (−1, 0, 1).
+fn beam() -> Small {
+    let bending = [1.0, -2.0, 1.0, -2.0, 4.0, -2.0, 1.0, -2.0, 1.0];
+    let load = vec![0.0, 0.2, 1.0];
+    let rigid = DMatrix::from_row_slice(3, 2, &[1.0, -1.0, 1.0, 0.0, 1.0, 1.0]);
+    Small {
+        stiffness: 10.0 * DMatrix::from_row_slice(3, 3, &bending),
+        work: rigid.transpose() * DVector::from_row_slice(&load),
+        load,
+        gaps: vec![0.0, 0.0, 1.0],
+        rigid,
+    }
+}
+
+#[test]
+fn a_body_that_its_nodes_do_not_hold_moves_to_the_next() {
+    let beam = beam();
+    for name in SOLVERS {
+        // Node 0 is pulled, node 2 is not reached: without 0 the beam turns about 1.
+        let (c, report) = beam.solve(name, &[1.0, 1.0, 0.0]);
+        c.iter().zip([-1.0, 0.0, 1.0]).for_each(|(c, exact)| close(*c, exact, 1e-9));
+        assert_eq!(report.fallbacks, 0, "{name}: {report:?}");
+    }
+}
+
+#[test]
+fn a_stiffness_that_no_factor_fits_is_rescued() {
+    // Nobody says that the beam is held by contact alone: without node 0 its stiffness is singular.
+    let untold = Small { rigid: DMatrix::zeros(3, 0), work: DVector::zeros(0), ..beam() };
+    let (c, report) = untold.solve("active-set", &[1.0, 1.0, 0.0]);
+    c.iter().zip([-1.0, 0.0, 1.0]).for_each(|(c, exact)| close(*c, exact, 1e-9));
+    assert_eq!(report.fallbacks, 1, "{report:?}");
+}

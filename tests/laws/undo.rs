@@ -1,0 +1,139 @@
+//! A step that fails has not happened: what follows it is what would have followed without it.
+
+use crate::support::{Random, close, difference, distorted, history, same_iterations, setting};
+use signorini::{
+    contact::SOLVERS,
+    evolution::{self, Equilibrium, Phases, RunError, Setting, Step},
+    petsc::Session,
+};
+
+/// Pressed on a wavy foundation until t = 1, harder on the left; then torn off it on the right.
+/// Where the left is an axis, only contact holds the body.
+fn scene(left: &str) -> Setting {
+    let text = format!(
+        "material = {{ young = 100, poisson = 0.3, plane = 'strain' }}
+         time = {{ end = 2, step = 0.1 }}
+         boundary = [
+            {{ name = 'left', {left} }},
+            {{ name = 'bottom', gap = '0.01 + 0.01*cos(9*x)' }},
+            {{ name = 'top', traction = ['0.5*t', '-3*t*(1.2 - x) + 3*max(0, t - 1)*x'] }},
+         ]"
+    );
+    setting(distorted(8), &text).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// ζ around `mean` at the nodes.
+fn zeta(setting: &Setting, mean: f64) -> Vec<f64> {
+    let field = Random(7).field(setting.body.mesh.nodes.len());
+    field.iter().map(|v| mean + 0.1 * v).collect()
+}
+
+/// Two accepted steps by one solver, with `tries` (time, ζ, whether it succeeds) made and undone
+/// between them; the second step.
+fn second_step(setting: &Setting, solver: &str, tries: &[(f64, Vec<f64>, bool)]) -> Step {
+    let (session, phases) = (Session::start(&[]).unwrap(), Phases::default());
+    let mut equilibrium = Equilibrium::new(&session, setting, solver, &phases).unwrap();
+    equilibrium.solve(1, 0.9, &zeta(setting, 0.9)).unwrap();
+    equilibrium.accept(0.9).unwrap();
+    for (time, zeta, succeeds) in tries {
+        let tried = equilibrium.solve(2, *time, zeta);
+        match tried {
+            Ok(_) => assert!(succeeds, "{solver} solved with ζ = {} …", zeta[0]),
+            Err(RunError::Contact { .. }) => assert!(!succeeds, "{solver}, ζ = {} …", zeta[0]),
+            Err(other) => panic!("{solver}: {other}"),
+        }
+        equilibrium.undo().unwrap();
+    }
+    equilibrium.solve(2, 1.0, &zeta(setting, 0.88)).unwrap_or_else(|e| panic!("{solver}: {e}"))
+}
+
+#[test]
+fn a_step_undone_leaves_no_trace() {
+    for left in ["displacement = [0, 0]", "symmetry = true"] {
+        let setting = scene(left);
+        // Another contact zone; a stiffness that is not positive definite; none at all.
+        let torn = (1.8, zeta(&setting, 0.4), true);
+        let negative = (1.0, zeta(&setting, -0.5), false);
+        let none = (1.0, vec![f64::NAN; setting.body.mesh.nodes.len()], false);
+        for solver in SOLVERS {
+            let plain = second_step(&setting, solver, &[]);
+            for tries in [
+                vec![torn.clone()],
+                vec![negative.clone()],
+                vec![none.clone()],
+                vec![none.clone(), torn.clone(), negative.clone()],
+            ] {
+                let step = second_step(&setting, solver, &tries);
+                let active: Vec<bool> = step.state.contact.iter().map(|p| p.active).collect();
+                assert!(active.iter().eq(plain.state.contact.iter().map(|p| &p.active)));
+                assert!(active.contains(&true) && active.contains(&false));
+                same_iterations(solver, step.record.iterations, plain.record.iterations);
+                // The factor may be of another step, which conjugate gradients make up for.
+                let apart = difference(&step.state.u, &plain.state.u);
+                assert!(apart < 1e-10, "{left} {solver}: {apart}");
+            }
+        }
+    }
+}
+
+/// Pressed on the foundation and let go by a solver of little patience: penalty-duality without
+/// acceleration needs fewer iterations the nearer the last step is, and about 220 for the last
+/// of a few steps, in which the foundation is nearly left.
+fn released(stepping: &str, iterations: usize) -> Setting {
+    let text = format!(
+        "material = {{ young = 100, poisson = 0.3, plane = 'stress' }}
+         damage = {{ diffusion = 0.2, lambda_d = 0, lambda_u = 1, lambda_w = 0,
+                     strain_cap = 1000, threshold = 0.01, initial = 1 }}
+         time = {{ end = 1, {stepping} }}
+         contact.penalty_duality = {{ accelerate = false, iterations = {iterations} }}
+         boundary = [
+            {{ name = 'left', displacement = [0, 0] }},
+            {{ name = 'bottom', gap = 0.1 }},
+            {{ name = 'top', traction = [0, '-21 + 20*t'] }},
+         ]"
+    );
+    setting(distorted(6), &text).unwrap_or_else(|e| panic!("{e}"))
+}
+
+const AUTO: &str = "step = 'auto', tolerance = 0.01";
+
+#[test]
+fn a_chosen_step_whose_contact_fails_is_tried_again_shorter() {
+    let (patient, outcome) = history(&released(AUTO, 1000), "penalty-duality");
+    assert_eq!(outcome.undone, 0);
+    assert!(patient.iter().any(|step| step.record.iterations > 185), "there is something to fail");
+    let (steps, outcome) = history(&released(AUTO, 185), "penalty-duality");
+    assert!(outcome.undone > 0 && steps.len() > patient.len());
+    assert!(steps.iter().all(|step| step.record.iterations <= 185));
+    for (n, step) in steps.iter().enumerate() {
+        assert_eq!(step.record.step, n, "a step undone is not counted");
+    }
+    // The steps before the first failure are those of the patient run.
+    let same =
+        steps.iter().zip(&patient).take_while(|(a, b)| (a.state.time - b.state.time).abs() < 1e-9);
+    let mut common = 0;
+    for (a, b) in same {
+        assert!(difference(&a.state.u, &b.state.u) < 1e-9);
+        assert!(difference(&a.state.zeta, &b.state.zeta) < 1e-9);
+        common += 1;
+    }
+    assert!(common > 2, "{common}");
+    // Both come to the same end, but for the error that each step may have.
+    let last = [&steps, &patient].map(|steps| steps.last().unwrap().state.clone());
+    close(last[0].time, 1.0, 0.0);
+    let apart = last[0].zeta.iter().zip(&last[1].zeta).map(|(a, b)| (a - b).abs());
+    assert!(apart.fold(0.0, f64::max) < 0.01);
+}
+
+#[test]
+fn a_given_step_whose_contact_fails_ends_the_run_with_the_steps_before() {
+    let (session, phases) = (Session::start(&[]).unwrap(), Phases::default());
+    let mut times = Vec::new();
+    let setting = released("step = 0.2", 185);
+    let run = evolution::run(&session, &setting, "penalty-duality", &phases, &mut |step| {
+        times.push(step.state.time);
+        Ok(())
+    });
+    assert!(matches!(run, Err(RunError::Contact { step: 5, .. })), "{run:?}");
+    assert_eq!(times.len(), 5);
+}
