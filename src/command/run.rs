@@ -194,6 +194,7 @@ impl<'a> Recorder<'a> {
         let (wall, scene) = (started.elapsed().as_secs_f64(), setting.scene());
         let mut notes = setting.notes();
         let outcome = result.as_ref().ok();
+        notes.extend(outcome.into_iter().flat_map(|o| o.accuracy.notes(setting.tolerance)));
         if let Some(outcome) =
             outcome.filter(|o| o.undamaged_steps > 0 && setting.damage().is_some())
         {

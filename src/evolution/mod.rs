@@ -5,12 +5,14 @@ mod damage_step;
 mod equilibrium;
 mod estimate;
 mod loads;
+mod notes;
 mod phases;
 mod setting;
 mod state;
 
 pub use equilibrium::Equilibrium;
 pub use loads::Loads;
+pub use notes::Accuracy;
 pub use phases::Phases;
 pub use setting::{Setting, SetupError};
 pub use state::{ContactPoint, State, Step, StepRecord};
@@ -37,6 +39,8 @@ pub struct Outcome {
     pub undamaged_steps: usize,
     /// Steps undone and tried again, shorter.
     pub undone: usize,
+    /// Estimated errors of the last accepted step.
+    pub accuracy: Accuracy,
 }
 
 /// The stop at ζ_*.
@@ -176,12 +180,20 @@ pub fn run(
         accepted(&last).map_err(RunError::Observer)?;
         outcome.accept(last, driving);
     }
+    outcome.accuracy = phases.time("accuracy", || equilibrium.accuracy(&outcome.last.state))?;
     Ok(outcome)
 }
 
 impl Outcome {
     fn new(first: Step) -> Self {
-        Self { kkt: first.record.kkt(), last: first, stopped: None, undamaged_steps: 0, undone: 0 }
+        Self {
+            kkt: first.record.kkt(),
+            last: first,
+            stopped: None,
+            undamaged_steps: 0,
+            undone: 0,
+            accuracy: Accuracy { displacement: 0.0, energy: 0.0 },
+        }
     }
 
     fn accept(&mut self, last: Step, driving: Driving) {

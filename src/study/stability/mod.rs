@@ -7,6 +7,7 @@ mod step_size;
 mod penalty;
 mod tao_types;
 mod random_contact;
+mod conditioning;
 
 pub use random_contact::sample as random_sample;
 
@@ -24,11 +25,12 @@ use std::path::Path;
 pub type Map = fn(&Session, &Path) -> Result<Counts, StudyError>;
 
 /// The maps by name.
-pub const MAPS: [(&str, Map); 4] = [
+pub const MAPS: [(&str, Map); 5] = [
     ("step-size", step_size::run),
     ("penalty-duality", penalty::run),
     ("tao-types", tao_types::run),
     ("active-set", random_contact::run),
+    ("conditioning", conditioning::run),
 ];
 
 /// What a cell of a map turned out to be.
