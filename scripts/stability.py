@@ -11,13 +11,14 @@ import matplotlib
 
 matplotlib.use("Agg")
 
-from atlas import penalty, random_contact, step_size, tao_types  # noqa: E402
+from atlas import conditioning, penalty, random_contact, step_size, tao_types  # noqa: E402
 
 MAPS = {
     "step-size": step_size,
     "penalty-duality": penalty,
     "tao-types": tao_types,
     "active-set": random_contact,
+    "conditioning": conditioning,
 }
 
 

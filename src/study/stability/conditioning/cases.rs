@@ -16,7 +16,8 @@ pub(super) struct Case {
     /// Cells along x and y.
     pub cells: [usize; 2],
     pub parameter: f64,
-    pub tolerance: f64,
+    /// KKT tolerances to solve to.
+    pub tolerances: &'static [f64],
     pub exact: Option<Exact>,
     text: String,
     mesh: Mesh,
@@ -32,29 +33,28 @@ pub(super) enum Exact {
 
 /// Young's modulus of all scenes, Pa.
 const YOUNG: f64 = 80.0;
-const TOLERANCES: [f64; 2] = [1e-10, 1e-6];
+const TOLERANCES: &[f64] = &[1e-10, 1e-6];
 /// Size of the curl, m.
 const CURL: f64 = 0.01;
 
 /// The cases in the order of the table.
 pub(super) fn all() -> Vec<Case> {
     let mut cases = Vec::new();
-    for tolerance in TOLERANCES {
-        for n in [16, 32] {
-            cases.extend((1..=6).map(|power| hole(n, 10f64.powi(-power), tolerance)));
+    for n in [16, 32] {
+        cases.extend((1..=6).map(|power| hole(n, 10f64.powi(-power))));
+    }
+    for angle in [10.0, 3.0, 1.0, 0.3, 0.1, 0.01, 1e-3, 1e-4] {
+        cases.extend([needles(angle), cap(angle)]);
+    }
+    for aspect in [10, 100] {
+        for ny in [1, 2, 4] {
+            cases.extend(slender(aspect, [aspect * ny, ny]));
+            cases.push(weightless(aspect, [aspect * ny, ny]));
         }
-        for angle in [10.0, 3.0, 1.0, 0.3, 0.1, 0.01, 1e-3, 1e-4] {
-            cases.extend([needles(angle, tolerance), cap(angle, tolerance)]);
-        }
-        for aspect in [10, 100] {
-            for ny in [1, 2, 4] {
-                cases.extend(slender(aspect, [aspect * ny, ny], tolerance));
-            }
-        }
-        // Square cells, cells ten times as long as the body is high, and smaller ones.
-        for cells in [[1000, 1], [100, 1], [100, 4], [250, 4]] {
-            cases.extend(slender(1000, cells, tolerance));
-        }
+    }
+    // Square cells, cells ten times as long as the body is high, and smaller ones.
+    for cells in [[1000, 1], [100, 1], [100, 4], [250, 4]] {
+        cases.extend(slender(1000, cells));
     }
     for n in [8, 16, 32] {
         let ratios = [0.3, 0.4, 0.45, 0.47, 0.49, 0.499, 0.4999];
@@ -65,10 +65,10 @@ pub(super) fn all() -> Vec<Case> {
 
 impl Case {
     /// The case as the program sees it.
-    pub fn setting(&self) -> Result<Setting, StudyError> {
+    pub fn setting(&self, tolerance: f64) -> Result<Setting, StudyError> {
         let set = [
-            format!("contact.tolerance={:e}", self.tolerance),
-            "contact.penalty_duality.iterations=2000".to_owned(),
+            format!("contact.tolerance={tolerance:e}"),
+            "contact.penalty_duality.iterations=4000".to_owned(),
         ];
         let scene = Scene::parse(&self.text, Path::new("study.toml"), &set)?;
         Ok(Setting::new(scene, self.mesh.clone())?)
@@ -104,11 +104,11 @@ impl Exact {
     }
 
     /// A beam may be off by a tenth of the gap (its theory leaves out shear, 1 % at 1:10); a
-    /// curl by three times what a compressible body is at this n.
+    /// curl by three times what a body with ν = 0.3 is, which was found to be 7 to 9 over n².
     pub fn allowed(&self) -> f64 {
         match *self {
             Self::Beam { .. } => 0.1,
-            Self::Curl { n, .. } => 9.0 / (n * n) as f64,
+            Self::Curl { n, .. } => 25.0 / (n * n) as f64,
         }
     }
 }
@@ -129,7 +129,7 @@ const PRESSED: &str = r#"
 "#;
 
 /// A disc in the middle is soft.
-fn hole(n: usize, zeta: f64, tolerance: f64) -> Case {
+fn hole(n: usize, zeta: f64) -> Case {
     let damage = format!(
         "damage = {{ diffusion = 1, lambda_d = 0, lambda_u = 0, lambda_w = 0, strain_cap = 1, \
          threshold = {:e}, initial = '{zeta:e} + (1 - {zeta:e})*min(1, max(0, \
@@ -141,7 +141,7 @@ fn hole(n: usize, zeta: f64, tolerance: f64) -> Case {
         name: "hole",
         cells: [n, n],
         parameter: zeta,
-        tolerance,
+        tolerances: TOLERANCES,
         exact: None,
         text: scene(0.3, "stress", &damage, PRESSED),
         mesh: rectangle(1.0, 1.0, n, n),
@@ -151,11 +151,11 @@ fn hole(n: usize, zeta: f64, tolerance: f64) -> Case {
 const SLIVER_CELLS: usize = 16;
 
 /// One column of cells, down to the contact, is narrow.
-fn needles(angle: f64, tolerance: f64) -> Case {
+fn needles(angle: f64) -> Case {
     let (n, column) = (SLIVER_CELLS as f64, 7.0);
     let narrow = angle.to_radians().tan() / n;
     let wide = (1.0 - narrow) / (n - 1.0);
-    let mut case = sliver("needles", angle, tolerance);
+    let mut case = sliver("needles", angle);
     for [x, _] in &mut case.mesh.nodes {
         let i = (*x * n).round();
         *x = if i <= column { i * wide } else { (i - 1.0) * wide + narrow };
@@ -164,31 +164,31 @@ fn needles(angle: f64, tolerance: f64) -> Case {
 }
 
 /// One inner node lies close to the opposite edge of a triangle: two small angles.
-fn cap(angle: f64, tolerance: f64) -> Case {
+fn cap(angle: f64) -> Case {
     let n = SLIVER_CELLS;
     let (h, i) = (1.0 / n as f64, n / 2);
-    let mut case = sliver("cap", angle, tolerance);
+    let mut case = sliver("cap", angle);
     // The diagonal of the cell to the lower right, and how far the node stays above it.
     let (middle, off) = (0.5 + 0.5 * h, 0.5 * h * angle.to_radians().tan());
     case.mesh.nodes[i * (n + 1) + i] = [middle - off, middle - h + off];
     case
 }
 
-fn sliver(name: &'static str, angle: f64, tolerance: f64) -> Case {
+fn sliver(name: &'static str, angle: f64) -> Case {
     Case {
         sweep: "slivers",
         name,
         cells: [SLIVER_CELLS; 2],
         parameter: angle,
-        tolerance,
+        tolerances: TOLERANCES,
         exact: None,
         text: scene(0.3, "stress", "", PRESSED),
         mesh: rectangle(1.0, 1.0, SLIVER_CELLS, SLIVER_CELLS),
     }
 }
 
-/// Strips of height 1 above a foundation.
-fn slender(aspect: usize, cells: [usize; 2], tolerance: f64) -> [Case; 4] {
+/// Strips of height 1 above a foundation: bent down to it, pushed along it, and lying on it.
+fn slender(aspect: usize, cells: [usize; 2]) -> [Case; 3] {
     let length = aspect as f64;
     let (beam, bent) = bent(length);
     let pushed = format!(
@@ -196,30 +196,44 @@ fn slender(aspect: usize, cells: [usize; 2], tolerance: f64) -> [Case; 4] {
          {{ name = 'right', traction = [-1, 0] }}",
         0.01 * length
     );
-    let lying = |weight: f64| {
-        format!(
-            "{{ name = 'left', symmetry = true }}, {{ name = 'bottom', gap = 0 }}, \
-             {{ name = 'top', traction = [0, '-{weight} - max(0, 1 - abs(x - {})/{})'] }}",
-            0.5 * length,
-            0.05 * length
-        )
-    };
-    let case = |name, exact, boundaries: &str| Case {
+    [
+        strip("bent", length, cells, Some(beam), &bent),
+        strip("pushed along", length, cells, None, &pushed),
+        strip("lying", length, cells, None, &lying(length, 0.01)),
+    ]
+}
+
+/// Only a local load presses: the far ends of the strip hardly touch.
+fn weightless(aspect: usize, cells: [usize; 2]) -> Case {
+    strip("weightless", aspect as f64, cells, None, &lying(aspect as f64, 0.0))
+}
+
+fn lying(length: f64, weight: f64) -> String {
+    format!(
+        "{{ name = 'left', symmetry = true }}, {{ name = 'bottom', gap = 0 }}, \
+         {{ name = 'top', traction = [0, '-{weight} - max(0, 1 - abs(x - {})/{})'] }}",
+        0.5 * length,
+        0.05 * length
+    )
+}
+
+fn strip(
+    name: &'static str,
+    length: f64,
+    cells: [usize; 2],
+    exact: Option<Exact>,
+    boundaries: &str,
+) -> Case {
+    Case {
         sweep: "slender",
         name,
         cells,
         parameter: length,
-        tolerance,
+        tolerances: TOLERANCES,
         exact,
         text: scene(0.3, "stress", "", boundaries),
         mesh: rectangle(length, 1.0, cells[0], cells[1]),
-    };
-    [
-        case("bent", Some(beam), &bent),
-        case("pushed along", None, &pushed),
-        case("lying", None, &lying(0.01)),
-        case("weightless", None, &lying(0.0)),
-    ]
+    }
 }
 
 /// Clamped left and loaded so that it lies on the foundation from x = s = 0.6 L on. The free part
@@ -264,7 +278,7 @@ fn incompressible(n: usize, poisson: f64) -> Case {
         name: "curl",
         cells: [n, n],
         parameter: poisson,
-        tolerance: TOLERANCES[0],
+        tolerances: &TOLERANCES[..1],
         exact: Some(Exact::Curl { strain, n }),
         text: scene(poisson, "strain", &force, &boundaries),
         mesh: rectangle(1.0, 1.0, n, n),
