@@ -74,7 +74,7 @@ def strips(axis, table):
 
 def draw(table, path):
     """Draws the rows of conditioning.csv (dictionaries) into the PNG file at path."""
-    figure, axes = plt.subplots(2, 2, figsize=(13, 9.5), layout="constrained")
+    figure, axes = plt.subplots(2, 2, figsize=(13, 9.5))
     tight = of(table, tolerance="1e-10")
     differences(axes[0, 0], of(tight, sweep="hole"), {
         lambda r: r["nx"] == "16": ("n = 16", "--"), lambda r: r["nx"] == "32": ("n = 32", "-")})
@@ -89,8 +89,9 @@ def draw(table, path):
     handles = [plt.Line2D([], [], ls="", marker=m, color="grey", label=s) for s, m in SOLVERS.items()]
     handles += [plt.Line2D([], [], ls="", marker="o", color=c, label=v) for v, c in VERDICTS.items()]
     handles += [plt.Line2D([], [], ls="", marker="o", mec="grey", mfc="none", label="hollow: noted")]
-    figure.legend(handles=handles, loc="outside lower center", ncols=7, frameon=False)
+    figure.legend(handles=handles, loc="lower center", ncol=7, frameon=False)
     counts = {v: sum(r["verdict"] == v for r in table) for v in VERDICTS}
     figure.suptitle(", ".join(f"{n} {v}" for v, n in counts.items()))
+    figure.tight_layout(rect=(0, 0.04, 1, 0.98))
     figure.savefig(path, dpi=130)
     plt.close(figure)

@@ -73,15 +73,20 @@ fn fill(session: &Session, case: &Case, table: &mut Vec<Row>) -> Result<(), Stud
     }
     for (row, (solver, answer)) in table[first..].iter_mut().zip(&answers) {
         let Some(answer) = answer else { continue };
-        let others = answers.iter().filter(|(other, _)| other != solver);
-        let best = others
+        // An equal u is the active set's rescue by TAO: the same answer, no reference.
+        let others = answers
+            .iter()
+            .filter(|(other, _)| other != solver)
             .filter_map(|(_, other)| other.as_ref())
-            .min_by(|a, b| a.accuracy.displacement.total_cmp(&b.accuracy.displacement));
+            .filter(|other| other.last.state.u != answer.last.state.u);
+        let best =
+            others.min_by(|a, b| a.accuracy.displacement.total_cmp(&b.accuracy.displacement));
         if let Some(best) = best {
             row.difference = Some(difference(&answer.last.state.u, &best.last.state.u));
-            // A reference that is less exact than the answer should be cannot tell more.
-            let own = (2.0 * best.accuracy.displacement).min(REFERENCE);
-            row.agreement = row.agreement.max(own);
+            // Where nothing was noted a reference that is itself less exact cannot tell more.
+            if row.notes == 0 && best.accuracy.displacement <= REFERENCE {
+                row.agreement = row.agreement.max(2.0 * best.accuracy.displacement);
+            }
         }
         row.verdict = row.judge();
     }
