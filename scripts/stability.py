@@ -12,6 +12,7 @@ import matplotlib
 matplotlib.use("Agg")
 
 from atlas import (  # noqa: E402
+    conditioning,
     lost_contact,
     maximum_principle,
     penalty,
@@ -26,6 +27,7 @@ MAPS = {
     "penalty-duality": penalty,
     "tao-types": tao_types,
     "active-set": random_contact,
+    "conditioning": conditioning,
     "lost-contact": lost_contact,
 }
 

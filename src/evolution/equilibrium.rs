@@ -1,5 +1,7 @@
 //! The contact step (26): from ζ_n and f_n to a certified u_n.
 
+mod accuracy;
+
 use super::{
     ContactPoint, Phases, RunError, Setting, State, Step, StepRecord, extrapolation::Extrapolation,
 };
@@ -13,6 +15,7 @@ use std::time::Instant;
 
 /// Solves the contact problems of a run, one after the other.
 pub struct Equilibrium<'a> {
+    session: &'a Session,
     setting: &'a Setting,
     phases: &'a Phases,
     solver: Box<dyn ContactSolver + 'a>,
@@ -51,6 +54,7 @@ impl<'a> Equilibrium<'a> {
             Stiffness::new(session, body, &setting.elasticity, &constraints.frames)
         })?;
         Ok(Self {
+            session,
             setting,
             phases,
             solver: contact::solver(
@@ -96,12 +100,7 @@ impl<'a> Equilibrium<'a> {
     pub fn solve(&mut self, step: usize, time: f64, zeta: &[f64]) -> Result<Step, RunError> {
         let started = Instant::now();
         let (setting, phases) = (self.setting, self.phases);
-        let zeta_mean = setting.triangle_means(zeta);
-        if zeta_mean != self.zeta_mean {
-            phases.time("stiffness refill", || self.stiffness.refill(&zeta_mean))?;
-            self.revision += 1;
-            self.zeta_mean = zeta_mean;
-        }
+        self.fill(&setting.triangle_means(zeta))?;
         let external = phases.time("loads", || setting.loads.at(&setting.body, time));
         let lift = setting.lift(time)?;
         setting.check_load(time, &external)?;
@@ -152,6 +151,16 @@ impl<'a> Equilibrium<'a> {
             }
             tolerance *= 0.3 * setting.tolerance / kkt.worst();
         }
+    }
+
+    /// Fills K for the triangle means of η_*(ζ).
+    fn fill(&mut self, zeta_mean: &[f64]) -> Result<(), PetscError> {
+        if zeta_mean != self.zeta_mean {
+            self.phases.time("stiffness refill", || self.stiffness.refill(zeta_mean))?;
+            self.revision += 1;
+            self.zeta_mean = zeta_mean.to_vec();
+        }
+        Ok(())
     }
 
     /// The last solve, at `time`, belongs to an accepted step.

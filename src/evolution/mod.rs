@@ -7,6 +7,7 @@ mod equilibrium;
 mod estimate;
 mod extrapolation;
 mod loads;
+mod notes;
 mod phases;
 mod setting;
 mod state;
@@ -14,6 +15,7 @@ mod state;
 pub use bounds::Excess;
 pub use equilibrium::Equilibrium;
 pub use loads::Loads;
+pub use notes::Accuracy;
 pub use phases::Phases;
 pub use setting::{Setting, SetupError};
 pub use state::{ContactPoint, State, Step, StepRecord};
@@ -45,6 +47,8 @@ pub struct Outcome {
     pub excess: Excess,
     /// When first no pressing node held the body against a rigid motion, s, and which.
     pub unheld: Option<(f64, RigidMotion)>,
+    /// Estimated errors of the last accepted step.
+    pub accuracy: Accuracy,
 }
 
 /// The stop at ζ_*.
@@ -193,6 +197,7 @@ pub fn run(
         accepted(&last).map_err(RunError::Observer)?;
         outcome.accept(last, driving);
     }
+    outcome.accuracy = phases.time("accuracy", || equilibrium.accuracy(&outcome.last.state))?;
     Ok(outcome)
 }
 
@@ -206,37 +211,8 @@ impl Outcome {
             undamaged_steps: 0,
             undone: 0,
             excess: Excess::default(),
+            accuracy: Accuracy { displacement: 0.0, energy: 0.0 },
         }
-    }
-
-    /// What the user should know about the run of `setting`.
-    pub fn notes(&self, setting: &Setting) -> Vec<String> {
-        let mut notes = Vec::new();
-        if let Some(stop) = self.stopped.filter(|stop| stop.floor > setting.threshold()) {
-            notes.push(format!(
-                "ζ_* was reached too early, or should not be reached at all: the sources up to \
-                 there allow no ζ below {:.4}",
-                stop.floor
-            ));
-        }
-        notes.extend(self.excess.note(setting.mass()));
-        if let Some((time, motion)) = self.unheld {
-            // Nodes that touch without force may still be in the way.
-            notes.push(format!(
-                "at t = {time}, no pressing node holds the body against {motion}: the answer may \
-                 be one of many"
-            ));
-        }
-        if self.undamaged_steps > 0 && setting.damage().is_some() {
-            notes.push(format!(
-                "the damage solve was skipped in {} of {} steps: no source, uniform ζ",
-                self.undamaged_steps, self.last.record.step
-            ));
-        }
-        if self.undone > 0 {
-            notes.push(format!("{} steps were undone and tried again, shorter", self.undone));
-        }
-        notes
     }
 
     fn accept(&mut self, last: Step, driving: Driving) {

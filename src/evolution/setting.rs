@@ -2,9 +2,7 @@
 
 use super::Loads;
 use crate::{
-    contact::{
-        ConstraintError, Constraints, DrivenMotion, FixedRow, GapRow, RigidMotion, RigidMotions,
-    },
+    contact::{ConstraintError, Constraints, DrivenMotion, FixedRow, GapRow, RigidMotions},
     fem::{Body, Elasticity, Mass},
     mesh::{Mesh, boundary_nodes},
     model::DamageLaw,
@@ -189,16 +187,6 @@ impl Setting {
         };
         let mean = |t: &[usize; 3]| t.iter().map(|&node| truncate(zeta[node])).sum::<f64>() / 3.0;
         self.body.mesh.triangles.iter().map(mean).collect()
-    }
-
-    /// What the user should know about rigid motions.
-    pub fn notes(&self) -> Vec<String> {
-        let note = |motion: &RigidMotion| {
-            format!(
-                "nothing holds or drives {motion}: of all answers the one of least ∫|u|² is given"
-            )
-        };
-        self.motions.free.iter().map(note).collect()
     }
 
     /// The scene.

@@ -11,7 +11,7 @@ use nalgebra::{Matrix2, Matrix3, SMatrix, Vector3};
 /// Strains, stresses and internal forces of a displacement field, triangle by triangle.
 #[derive(Debug, Clone, Copy)]
 pub struct Elasticity {
-    d: Matrix3<f64>,
+    pub(super) d: Matrix3<f64>,
     /// The material.
     pub material: Material,
 }

@@ -9,6 +9,7 @@ mod partition;
 mod body;
 mod frames;
 mod elasticity;
+mod recovery;
 mod damage;
 mod loads;
 

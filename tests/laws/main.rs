@@ -7,6 +7,7 @@
 mod support;
 
 mod certificate;
+mod conditioning;
 mod constraints;
 mod contact;
 mod damage;

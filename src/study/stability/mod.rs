@@ -8,6 +8,7 @@ mod maximum_principle;
 mod penalty;
 mod tao_types;
 mod random_contact;
+mod conditioning;
 mod lost_contact;
 
 pub use random_contact::sample as random_sample;
@@ -32,6 +33,7 @@ pub const MAPS: &[(&str, Map)] = &[
     ("penalty-duality", penalty::run),
     ("tao-types", tao_types::run),
     ("active-set", random_contact::run),
+    ("conditioning", conditioning::run),
     ("lost-contact", lost_contact::run),
 ];
 

@@ -1,0 +1,150 @@
+//! What the user should know about an answer that its residuals do not tell.
+
+use super::{Outcome, Setting};
+use crate::{contact::RigidMotion, model::Plane};
+
+/// In plane strain with ν above this, P1 triangles lock: measured in the atlas of failure.
+const LOCKING: f64 = 0.45;
+/// Triangles with a smaller angle are told, degrees.
+const SLIVER: f64 = 1.0;
+/// Displacements are promised to this, relative, or to `TOLERANCES` times the KKT tolerance.
+const DISPLACEMENT: f64 = 1e-6;
+const TOLERANCES: f64 = 100.0;
+/// A mesh is too coarse if the energy norm is estimated to be off by more than this: the
+/// displacement under the load is then too small by about the square of it.
+const COARSE: f64 = 0.5;
+
+/// Estimated errors of an answer, relative.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Accuracy {
+    /// Of the largest displacement, against the exact answer of the discrete problem with the
+    /// same pressing nodes. The KKT residuals bound forces; where K is ill-conditioned small
+    /// forces move u far. Infinite where the pressing nodes alone do not hold the body.
+    pub displacement: f64,
+    /// Of the discretisation, in the energy norm: [`crate::fem::Elasticity::energy_error`].
+    pub energy: f64,
+}
+
+impl Accuracy {
+    /// How exact displacements should be, relative, at a KKT tolerance.
+    pub fn promised(tolerance: f64) -> f64 {
+        DISPLACEMENT.max(TOLERANCES * tolerance)
+    }
+
+    /// What to tell of these errors at a KKT tolerance; nothing if they are small.
+    pub fn notes(&self, tolerance: f64) -> Vec<String> {
+        let mut notes = Vec::new();
+        if self.displacement.is_infinite() {
+            notes.push(
+                "the nodes that press do not hold the body by themselves: how exact the \
+                 displacements are cannot be estimated"
+                    .to_owned(),
+            );
+        } else if self.displacement > Self::promised(tolerance) {
+            notes.push(format!(
+                "the stiffness is ill-conditioned (a slender or very soft part?): the residuals \
+                 are within the tolerance, but displacements are exact only to about {:.0e} of \
+                 the largest",
+                self.displacement
+            ));
+        }
+        if self.energy > COARSE {
+            notes.push(format!(
+                "the mesh is too coarse for this answer: strains jump from triangle to triangle \
+                 by about {:.0} % (energy norm), and displacements may be far too small; use \
+                 smaller or less stretched triangles, several across a part that bends",
+                100.0 * self.energy
+            ));
+        }
+        notes
+    }
+}
+
+impl Outcome {
+    /// What the user should know about the run of `setting`.
+    pub fn notes(&self, setting: &Setting) -> Vec<String> {
+        let mut notes = Vec::new();
+        if let Some(stop) = self.stopped.filter(|stop| stop.floor > setting.threshold()) {
+            notes.push(format!(
+                "ζ_* was reached too early, or should not be reached at all: the sources up to \
+                 there allow no ζ below {:.4}",
+                stop.floor
+            ));
+        }
+        notes.extend(self.excess.note(setting.mass()));
+        if let Some((time, motion)) = self.unheld {
+            // Nodes that touch without force may still be in the way.
+            notes.push(format!(
+                "at t = {time}, no pressing node holds the body against {motion}: the answer may \
+                 be one of many"
+            ));
+        }
+        // That a body which is not held has no one answer is said already.
+        if self.unheld.is_none() || self.accuracy.displacement.is_finite() {
+            notes.extend(self.accuracy.notes(setting.tolerance));
+        }
+        if self.undamaged_steps > 0 && setting.damage().is_some() {
+            notes.push(format!(
+                "the damage solve was skipped in {} of {} steps: no source, uniform ζ",
+                self.undamaged_steps, self.last.record.step
+            ));
+        }
+        if self.undone > 0 {
+            notes.push(format!("{} steps were undone and tried again, shorter", self.undone));
+        }
+        notes
+    }
+}
+
+impl Setting {
+    /// What the user should know before any solve: rigid motions that nothing holds, a material
+    /// or triangles that make the discretisation poor.
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes: Vec<String> = self.motions.free.iter().map(free_motion).collect();
+        notes.extend(self.locking());
+        notes.extend(self.sliver());
+        notes
+    }
+
+    fn locking(&self) -> Option<String> {
+        let material = self.scene().material;
+        let locks = material.plane == Plane::Strain && material.poisson > LOCKING;
+        locks.then(|| {
+            format!(
+                "nearly incompressible (plane strain, ν = {} > {LOCKING}): linear triangles lock, \
+                 displacements may be far too small; compare with a mesh half as fine",
+                material.poisson
+            )
+        })
+    }
+
+    /// The triangle with the smallest angle, if that is small.
+    fn sliver(&self) -> Option<String> {
+        let nodes = &self.body.mesh.nodes;
+        let angles =
+            self.body.mesh.triangles.iter().map(|t| (smallest_angle(t.map(|i| nodes[i])), t));
+        let (angle, triangle) = angles.min_by(|(a, _), (b, _)| a.total_cmp(b))?;
+        let [x, y] = nodes[triangle[0]];
+        (angle < SLIVER).then(|| {
+            format!(
+                "a triangle at ({x:.4}, {y:.4}) has an angle of {angle:.1e}°: round-off grows as \
+                 angles shrink; mend the mesh there if that is not meant"
+            )
+        })
+    }
+}
+
+fn free_motion(motion: &RigidMotion) -> String {
+    format!("nothing holds or drives {motion}: of all answers the one of least ∫|u|² is given")
+}
+
+/// Degrees.
+fn smallest_angle(corners: [[f64; 2]; 3]) -> f64 {
+    let at = |i: usize| {
+        let [a, b, c] = [0, 1, 2].map(|k| corners[(i + k) % 3]);
+        let (p, q) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
+        // The cosine alone would lose small angles to rounding.
+        (p[0] * q[1] - p[1] * q[0]).atan2(p[0] * q[0] + p[1] * q[1]).to_degrees()
+    };
+    at(0).min(at(1)).min(at(2))
+}

@@ -1,0 +1,164 @@
+//! Where the conditioning or the discretisation is poor: answers stay right, or notes say not.
+
+use crate::support::{close, difference, distorted, moved, run, setting, square};
+use signorini::{contact::SOLVERS, evolution::Setting, mesh::Mesh, study::rectangle};
+use std::f64::consts::PI;
+
+/// Clamped left, pressed down on the left half of the top and pulled up on the right.
+const PRESSED: &str = "
+    { name = 'left', displacement = [0, 0] },
+    { name = 'bottom', gap = 0 },
+    { name = 'top', traction = [0, '-15 + 25*max(-1, min(1, 1e6*(x - 0.5)))'] },";
+
+/// A body with Young's modulus 80 of the material `law`.
+fn body(mesh: Mesh, law: &str, more: &str, boundaries: &str) -> Setting {
+    let text = format!("material = {{ young = 80, {law} }}\n{more}\nboundary = [{boundaries}]");
+    setting(mesh, &text).unwrap_or_else(|e| panic!("{e}"))
+}
+
+const STRESS: &str = "poisson = 0.3, plane = 'stress'";
+
+/// The square with one column of cells so narrow that its triangles have the angle, in degrees.
+fn needles(n: usize, angle: f64) -> Mesh {
+    let (cells, column) = (n as f64, (n / 2) as f64);
+    let narrow = angle.to_radians().tan() / cells;
+    let wide = (1.0 - narrow) / (cells - 1.0);
+    moved(square(n), |[x, y]| {
+        let i = (x * cells).round();
+        [if i <= column { i * wide } else { (i - 1.0) * wide + narrow }, y]
+    })
+}
+
+/// A strip of length 100 and height 1 on a foundation, pressed in its middle only.
+fn strip(tolerance: f64) -> Setting {
+    let contact = format!("contact = {{ tolerance = {tolerance:e} }}");
+    let boundaries = "{ name = 'left', symmetry = true }, { name = 'bottom', gap = 0 },
+        { name = 'top', traction = [0, '-max(0, 1 - abs(x - 50)/5)'] }";
+    body(rectangle(100.0, 1.0, 100, 1), STRESS, &contact, boundaries)
+}
+
+#[test]
+fn nearly_incompressible_plane_strain_is_told_and_nothing_else() {
+    for (law, told) in [
+        ("poisson = 0.4, plane = 'strain'", false),
+        ("poisson = 0.45, plane = 'strain'", false),
+        ("poisson = 0.46, plane = 'strain'", true),
+        ("poisson = 0.49, plane = 'strain'", true),
+        ("poisson = 0.49, plane = 'stress'", false),
+    ] {
+        let notes = body(distorted(4), law, "", PRESSED).notes();
+        assert_eq!(notes.len(), usize::from(told), "{law}: {notes:?}");
+        assert!(notes.iter().all(|note| note.contains("linear triangles lock")), "{notes:?}");
+    }
+}
+
+#[test]
+fn slivers_are_told_with_their_place() {
+    assert!(body(needles(4, 2.0), STRESS, "", PRESSED).notes().is_empty());
+    let notes = body(needles(4, 0.1), STRESS, "", PRESSED).notes();
+    assert!(notes.len() == 1 && notes[0].contains("angle of 1.0e-1°"), "{notes:?}");
+    // A node almost on the opposite edge: the smallest angle is at the edge's ends.
+    let mut cap = square(2);
+    cap.nodes[4] = [0.749, 0.251];
+    let notes = body(cap, STRESS, "", PRESSED).notes();
+    assert!(notes.len() == 1 && notes[0].contains("angle of 2.3e-1°"), "{notes:?}");
+}
+
+/// The curl of ψ = sin²(πx) sin(πy)/100 prescribed on the boundary of the square, with the body
+/// force that makes it the exact answer: the relative error of u at the nodes.
+fn curl_error(n: usize, poisson: f64) -> f64 {
+    let u = "['pi*sin(pi*x)^2*cos(pi*y)/100', '-pi*sin(2*pi*x)*sin(pi*y)/100']";
+    // div u = 0: f = −μΔu.
+    let f = 0.01 * PI.powi(3) * 80.0 / (2.0 * (1.0 + poisson));
+    let force = format!(
+        "body = {{ force = ['-{f}*(2*cos(2*pi*x) - sin(pi*x)^2)*cos(pi*y)', \
+         '-{f}*5*sin(2*pi*x)*sin(pi*y)'] }}"
+    );
+    let sides = ["left", "right", "bottom", "top"];
+    let sides = sides.map(|name| format!("{{ name = '{name}', displacement = {u} }}")).join(",");
+    let law = format!("poisson = {poisson}, plane = 'strain'");
+    let setting = body(square(n), &law, &force, &sides);
+    let exact = |&[x, y]: &[f64; 2]| {
+        let (a, b) = ((PI * x).sin().powi(2), (2.0 * PI * x).sin());
+        [a * (PI * y).cos(), -b * (PI * y).sin()].map(|v| 0.01 * PI * v)
+    };
+    let exact: Vec<f64> = setting.body.mesh.nodes.iter().flat_map(exact).collect();
+    difference(&run(&setting, SOLVERS[0]).last.state.u, &exact)
+}
+
+#[test]
+fn linear_triangles_lock_as_poissons_ratio_goes_to_a_half() {
+    for n in [8, 16] {
+        let errors = [0.3, 0.45, 0.49, 0.499, 0.4999].map(|nu| curl_error(n, nu));
+        assert!(errors.is_sorted() && errors[4] > 0.4, "{errors:?}");
+        // Up to where no note is given the error stays that of a coarse mesh.
+        assert!(errors[1] < 3.0 * errors[0] && errors[0] < 8.0 / (n * n) as f64, "{errors:?}");
+    }
+}
+
+#[test]
+fn soft_holes_and_slivers_do_not_spoil_certified_answers() {
+    let hole = "damage = { diffusion = 1, lambda_d = 0, lambda_u = 0, lambda_w = 0, \
+        strain_cap = 1, threshold = 1e-7, \
+        initial = '1e-6 + (1 - 1e-6)*min(1, max(0, 20*(hypot - 0.2)))' }"
+        .replace("hypot", "sqrt((x - 0.5)^2 + (y - 0.5)^2)");
+    for problem in
+        [body(square(12), STRESS, &hole, PRESSED), body(needles(12, 0.1), STRESS, "", PRESSED)]
+    {
+        let answers = SOLVERS.map(|solver| run(&problem, solver));
+        for answer in &answers {
+            assert!(answer.kkt.within(1e-10));
+            assert!(answer.accuracy.displacement < 1e-8, "{:?}", answer.accuracy);
+            assert!(answer.accuracy.notes(1e-10).is_empty());
+            let off = difference(&answer.last.state.u, &answers[0].last.state.u);
+            assert!(off < 1e-8, "{off}");
+        }
+    }
+}
+
+#[test]
+fn the_estimated_error_of_displacements_is_the_true_one() {
+    // Forces of a relative 1e-6 move the far ends of a slender strip by much more.
+    let exact = run(&strip(1e-10), "active-set");
+    assert!(exact.accuracy.displacement < 1e-6 && exact.accuracy.notes(1e-10).is_empty());
+    for solver in ["penalty-duality", "tao"] {
+        let answer = run(&strip(1e-6), solver);
+        assert!(answer.kkt.within(1e-6), "certified");
+        let (found, u) = (answer.accuracy.displacement, &answer.last.state.u);
+        let largest = |v: &mut dyn Iterator<Item = f64>| v.fold(0.0_f64, |m, v| m.max(v.abs()));
+        let off = largest(&mut u.iter().zip(&exact.last.state.u).map(|(a, b)| a - b));
+        let off = off / largest(&mut exact.last.state.u.iter().copied());
+        assert!(off > 1e-4, "{solver}: the case is to be hard, but {off}");
+        assert!(0.2 * off < found && found < 5.0 * off, "{solver}: {found} for {off}");
+        let notes = answer.accuracy.notes(1e-6);
+        assert!(notes.len() == 1 && notes[0].contains("ill-conditioned"), "{notes:?}");
+    }
+}
+
+#[test]
+fn the_energy_error_vanishes_for_a_linear_field_and_halves_with_the_mesh() {
+    let linear = "{ name = 'left', symmetry = true }, { name = 'bottom', gap = 0 },
+        { name = 'top', traction = [0, -1] }";
+    let patch = run(&body(distorted(5), STRESS, "", linear), SOLVERS[0]);
+    assert!(patch.accuracy.energy < 1e-10, "{:?}", patch.accuracy);
+    // A smooth load on a body that may shear freely along both axes.
+    let smooth = "{ name = 'left', symmetry = true }, { name = 'bottom', gap = 0 },
+        { name = 'top', traction = [0, '-2 - cos(pi*x)'] }";
+    let [coarse, fine] =
+        [16, 32].map(|n| run(&body(square(n), STRESS, "", smooth), SOLVERS[0]).accuracy.energy);
+    close(coarse / fine, 2.0, 0.1);
+}
+
+#[test]
+fn a_strip_one_triangle_high_that_bends_is_told() {
+    let bent = |ny: usize| {
+        let clamped = "{ name = 'left', displacement = [0, 0] }, { name = 'bottom', gap = 1 },
+            { name = 'top', traction = [0, -1e-3] }";
+        let outcome =
+            run(&body(rectangle(10.0, 1.0, 10 * ny, ny), STRESS, "", clamped), SOLVERS[0]);
+        (outcome.last.record.displacement_max, outcome.accuracy.notes(1e-10))
+    };
+    let ((one, told), (eight, silent)) = (bent(1), bent(8));
+    assert!(one < 0.6 * eight, "{one} against {eight}");
+    assert!(told.len() == 1 && told[0].contains("too coarse") && silent.is_empty(), "{told:?}");
+}
