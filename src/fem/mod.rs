@@ -9,14 +9,16 @@ mod partition;
 mod body;
 mod frames;
 mod elasticity;
+mod stiffness;
 mod recovery;
 mod damage;
 mod loads;
 
 pub use body::Body;
 pub use damage::{DamageSystem, Mass, source, source_load};
-pub use elasticity::{Elasticity, Stiffness};
+pub use elasticity::Elasticity;
 pub use frames::Frames;
 pub use loads::{add_body_force, add_traction};
 pub use partition::Partition;
+pub use stiffness::Stiffness;
 pub use triangle::Triangle;

@@ -1,6 +1,6 @@
 //! The P1 triangle.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix2, Matrix3, Matrix3x2, SVector, Vector3};
 
 /// Area and gradients of the three barycentric functions of one triangle.
 #[derive(Debug, Clone, Copy)]
@@ -21,22 +21,15 @@ impl Triangle {
         Self { area: 0.5 * twice, gradients: [gradient(b, c), gradient(c, a), gradient(a, b)] }
     }
 
-    /// The 3×6 matrix B with (ε_xx, ε_yy, 2ε_xy) = B (u_1x, u_1y, …, u_3y).
-    pub fn strain_matrix(&self) -> SMatrix<f64, 3, 6> {
-        let mut b = SMatrix::zeros();
-        for (i, [dx, dy]) in self.gradients.iter().enumerate() {
-            b[(0, 2 * i)] = *dx;
-            b[(1, 2 * i + 1)] = *dy;
-            b[(2, 2 * i)] = *dy;
-            b[(2, 2 * i + 1)] = *dx;
-        }
-        b
+    /// The 3×2 matrix B_i with (ε_xx, ε_yy, 2ε_xy) = Σ B_i u_i over the corners.
+    fn strain_matrix(&self, i: usize) -> Matrix3x2<f64> {
+        let [dx, dy] = self.gradients[i];
+        Matrix3x2::new(dx, 0.0, 0.0, dy, dy, dx)
     }
 
-    /// ∫ Dε(φ_i):ε(φ_j), 6×6, N/m per metre of thickness.
-    pub fn stiffness(&self, d: &Matrix3<f64>) -> SMatrix<f64, 6, 6> {
-        let b = self.strain_matrix();
-        b.transpose() * d * b * self.area
+    /// ∫ Dε(φ_i):ε(φ_j) of two corners, 2×2, N/m per metre of thickness.
+    pub fn stiffness(&self, d: &Matrix3<f64>, i: usize, j: usize) -> Matrix2<f64> {
+        self.strain_matrix(i).transpose() * d * self.strain_matrix(j) * self.area
     }
 
     /// The strain (ε_xx, ε_yy, 2ε_xy) of nodal displacements (u_1x, u_1y, …, u_3y).

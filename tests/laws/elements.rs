@@ -1,7 +1,7 @@
 //! One triangle, and the operators assembled from many.
 
 use crate::support::{Random, close, difference, distorted, largest, moved, turn, unstructured};
-use nalgebra::{Matrix2, Matrix3, SVector};
+use nalgebra::{Matrix2, Matrix3, SMatrix, SVector};
 use signorini::{
     fem::{Body, DamageSystem, Elasticity, Frames, Mass, Stiffness, Triangle, source, source_load},
     mesh::Mesh,
@@ -22,6 +22,11 @@ fn triangles() -> Vec<Triangle> {
     let mut point = || [random.next(), random.next()];
     let triangles = (0..200).map(|_| Triangle::new([point(), point(), point()]));
     triangles.filter(|t| t.area > 0.02).collect()
+}
+
+/// The 6×6 stiffness of a triangle from its 2×2 blocks.
+fn stiffness(triangle: &Triangle, d: &Matrix3<f64>) -> SMatrix<f64, 6, 6> {
+    SMatrix::from_fn(|i, j| triangle.stiffness(d, i / 2, j / 2)[(i % 2, j % 2)])
 }
 
 /// (E, ν) for which plane stress is `plane` with (YOUNG, POISSON).
@@ -55,7 +60,7 @@ fn the_element_stiffness_is_symmetric_and_vanishes_on_three_rigid_motions_only()
     for plane in [Plane::Stress, Plane::Strain] {
         let d = elasticity(plane).material.stiffness();
         for triangle in triangles() {
-            let k = triangle.stiffness(&d);
+            let k = stiffness(&triangle, &d);
             assert!((k - k.transpose()).amax() <= 1e-15 * k.amax());
             let mut values: Vec<f64> = k.symmetric_eigenvalues().iter().copied().collect();
             values.sort_by(f64::total_cmp);
@@ -74,9 +79,8 @@ fn element_forces_are_the_stiffness_times_the_displacements() {
     for triangle in triangles() {
         let u = SVector::<f64, 6>::from_fn(|_, _| random.next());
         let strain = triangle.strain(u.as_ref());
-        assert!((triangle.strain_matrix() * u - strain).amax() <= 1e-14 * strain.amax());
         let force = triangle.force(&(d * strain));
-        let error = (triangle.stiffness(&d) * u - force).amax();
+        let error = (stiffness(&triangle, &d) * u - force).amax();
         assert!(error <= 1e-13 * force.amax(), "{error}");
     }
 }
