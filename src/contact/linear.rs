@@ -22,12 +22,6 @@ impl ContactSolver for Linear<'_> {
         "linear"
     }
 
-    fn warm_start(&self) -> Vec<f64> {
-        Vec::new()
-    }
-
-    fn set_warm_start(&mut self, _kept: &[f64]) {}
-
     fn solve(
         &mut self,
         problem: &ContactProblem,

@@ -171,12 +171,6 @@ impl ContactSolver for PenaltyDuality<'_> {
         "penalty-duality"
     }
 
-    fn warm_start(&self) -> Vec<f64> {
-        Vec::new()
-    }
-
-    fn set_warm_start(&mut self, _kept: &[f64]) {}
-
     fn solve(
         &mut self,
         problem: &ContactProblem,

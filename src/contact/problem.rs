@@ -82,10 +82,12 @@ pub trait ContactSolver {
     fn name(&self) -> &'static str;
 
     /// What the method keeps for the next solve besides `c` (a set, a multiplier), as numbers.
-    fn warm_start(&self) -> Vec<f64>;
+    fn warm_start(&self) -> Vec<f64> {
+        Vec::new()
+    }
 
     /// Goes back to an earlier [`Self::warm_start`]: the solves since then have not happened.
-    fn set_warm_start(&mut self, kept: &[f64]);
+    fn set_warm_start(&mut self, _kept: &[f64]) {}
 
     /// Solves from the start `c` and leaves the solution there.
     ///

@@ -2,7 +2,7 @@
 
 mod cases;
 
-use super::{Counts, StudyError, Verdict, penalty::difference};
+use super::{Counts, StudyError, Verdict, statics::difference};
 use crate::{
     contact::SOLVERS,
     evolution::{self, Accuracy, Outcome, Phases, RunError, Setting},

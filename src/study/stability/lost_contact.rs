@@ -2,8 +2,7 @@
 
 use super::{
     Counts, StudyError, Verdict,
-    penalty::{difference, statics},
-    random_contact::solve,
+    statics::{difference, solve},
 };
 use crate::{
     contact::{ContactReport, SOLVERS},
@@ -180,7 +179,7 @@ struct Lifted {
 impl Lifted {
     fn new(session: &Session, sweep: &Sweep) -> Result<Self, StudyError> {
         let setting = sweep.setting("-1", false)?;
-        let (state, _) = statics(session, &setting, SOLVERS[0])??;
+        let (Step { state, .. }, _) = solve(session, &setting, SOLVERS[0], None)??;
         let mesh = &setting.body.mesh;
         let bottom = mesh.curves["bottom"].edges.iter().flatten();
         let deepest = bottom.map(|&node| -state.u[2 * node + 1]).fold(0.0, f64::max);
@@ -230,7 +229,7 @@ fn rows(
     let row = |(i, solver): (usize, &&'static str)| {
         let mut row = Row::new(sweep, value, solver);
         match &answers[i] {
-            Err(failure) => row.message = Some(failure.clone()),
+            Err(failure) => row.message = Some(failure.to_string()),
             Ok((step, report)) => {
                 let others = answers.iter().enumerate().filter(|(j, _)| *j != i);
                 let mut unique = others.filter_map(|(_, answer)| answer.as_ref().ok());

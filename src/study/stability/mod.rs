@@ -3,6 +3,7 @@
 //! A map is a table; each of its cells is *correct*, *refused* with a reason, or *wrong*.
 //! The page `validation/STABILITY.md` tells what the maps show.
 
+mod statics;
 mod step_size;
 mod maximum_principle;
 mod penalty;

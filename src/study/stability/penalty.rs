@@ -1,47 +1,24 @@
 //! Map 3. Penalty-duality: ω against λω.
 
-use super::{Counts, StudyError, Verdict};
-use crate::{
-    contact::ContactReport,
-    evolution::{Equilibrium, Phases, RunError, Setting, State},
-    output,
-    petsc::Session,
-    scene::Scene,
-    study::rectangle,
+use super::{
+    Counts, StudyError, Verdict,
+    statics::{self, difference, setting},
 };
+use crate::{output, petsc::Session};
 use serde::Serialize;
 use std::path::Path;
 
 /// Square clamped left, pressed down on the left half of its top and pulled up on the right.
 pub(super) const D40: &str = r#"
-title = "D40"
-[mesh]
-file = "square.msh"
-[material]
-young = 80
-poisson = 0.3
-plane = "stress"
-[[boundary]]
-name = "left"
-displacement = ["0", "0"]
-[[boundary]]
-name = "bottom"
-gap = "0"
-[[boundary]]
-name = "top"
-traction = ["0", "-15 + 25*max(-1, min(1, 1e6*(x - 0.5)))"]
+boundary = [
+    { name = "left", displacement = [0, 0] },
+    { name = "bottom", gap = 0 },
+    { name = "top", traction = [0, "-15 + 25*max(-1, min(1, 1e6*(x - 0.5)))"] },
+]
 "#;
-
 /// A horizontal soft band whose stiffness is 1/contrast.
 const BAND: &str = r#"
-[damage]
-diffusion = 1
-lambda_d = 0
-lambda_u = 0
-lambda_w = 0
-strain_cap = 1
-threshold = 1e-6
-initial = "SOFT + (1 - SOFT)*min(1, max(0, 8*abs(y - 0.5) - 1))"
+damage = { diffusion = 1, lambda_d = 0, lambda_u = 0, lambda_w = 0, strain_cap = 1, threshold = 1e-6, initial = "SOFT + (1 - SOFT)*min(1, max(0, 8*abs(y - 0.5) - 1))" }
 "#;
 
 /// Answers agree when they differ by less, relative to the largest |u|.
@@ -118,10 +95,10 @@ fn fill(session: &Session, sweep: &Sweep, table: &mut Vec<Cell>) -> Result<(), S
             contrast => D40.to_owned() + &BAND.replace("SOFT", &(1.0 / contrast).to_string()),
         };
         let setting = setting(&text, &overrides, (1.0, 1.0, sweep.cells, sweep.cells))?;
-        statics(session, &setting, solver)
+        statics::solve(session, &setting, solver, None)
     };
-    let (reference, _) = solve("active-set", &[])?.map_err(StudyError::Run)?;
-    let (_, found) = solve("penalty-duality", &[])?.map_err(StudyError::Run)?;
+    let (reference, _) = solve("active-set", &[])??;
+    let (_, found) = solve("penalty-duality", &[])??;
     let automatic = found.omega.unwrap_or(f64::NAN);
     for accelerate in [false, true] {
         for &lambda_omega in sweep.lambdas {
@@ -147,8 +124,8 @@ fn fill(session: &Session, sweep: &Sweep, table: &mut Vec<Cell>) -> Result<(), S
                     difference: None,
                     verdict: Verdict::Refused,
                 };
-                if let Ok((state, report)) = answer {
-                    let difference = difference(&state.u, &reference.u);
+                if let Ok((step, report)) = answer {
+                    let difference = difference(&step.state.u, &reference.state.u);
                     cell.converged = true;
                     cell.iterations = report.iterations;
                     cell.contraction = report.contraction;
@@ -163,38 +140,4 @@ fn fill(session: &Session, sweep: &Sweep, table: &mut Vec<Cell>) -> Result<(), S
         }
     }
     Ok(())
-}
-
-/// A scene's text on a rectangle (width, height, cells along each).
-pub(super) fn setting(
-    text: &str,
-    overrides: &[String],
-    (width, height, nx, ny): (f64, f64, usize, usize),
-) -> Result<Setting, StudyError> {
-    let scene = Scene::parse(text, Path::new("study.toml"), overrides)?;
-    Ok(Setting::new(scene, rectangle(width, height, nx, ny))?)
-}
-
-/// One static solve from a cold start; the inner error is the contact solver's.
-pub(super) fn statics(
-    session: &Session,
-    setting: &Setting,
-    solver: &str,
-) -> Result<Result<(State, ContactReport), RunError>, StudyError> {
-    let phases = Phases::default();
-    let mut equilibrium = Equilibrium::new(session, setting, solver, &phases)?;
-    match equilibrium.solve(0, setting.start(), &setting.initial_damage()) {
-        Ok(step) => Ok(Ok((step.state, *equilibrium.report()))),
-        Err(failure @ RunError::Contact { .. }) => Ok(Err(failure)),
-        Err(other) => Err(other.into()),
-    }
-}
-
-/// max |a − b| / max |b|; 0 for equal ones, also where both are 0.
-pub(super) fn difference(a: &[f64], b: &[f64]) -> f64 {
-    if a == b {
-        return 0.0;
-    }
-    let size = b.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-    a.iter().zip(b).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs())) / size
 }

@@ -1,14 +1,10 @@
 //! Map 5. Active set on random problems: loads, gaps, stiffness and first guesses drawn at random.
 
-use super::{Counts, StudyError, Verdict, penalty::difference};
-use crate::{
-    contact::ContactReport,
-    evolution::{Equilibrium, Phases, RunError, Setting, Step},
-    output,
-    petsc::Session,
-    scene::Scene,
-    study::rectangle,
+use super::{
+    Counts, StudyError, Verdict,
+    statics::{difference, solve},
 };
+use crate::{evolution::Setting, output, petsc::Session, scene::Scene, study::rectangle};
 use serde::Serialize;
 use std::path::Path;
 
@@ -126,7 +122,7 @@ fn row(session: &Session, id: u64) -> Result<Row, StudyError> {
     let (answer, report) = match solve(session, setting, "active-set", problem.guess.as_deref())? {
         Ok(answer) => answer,
         Err(message) => {
-            row.message = Some(message);
+            row.message = Some(message.to_string());
             return Ok(row);
         }
     };
@@ -148,25 +144,6 @@ fn row(session: &Session, id: u64) -> Result<Row, StudyError> {
     let agrees = row.difference.is_some_and(|d| d <= row.allowed);
     row.verdict = if certified && agrees { Verdict::Correct } else { Verdict::Wrong };
     Ok(row)
-}
-
-/// One static solve; the inner error is the contact solver's or that of the load check.
-pub(super) fn solve(
-    session: &Session,
-    setting: &Setting,
-    solver: &str,
-    guess: Option<&[f64]>,
-) -> Result<Result<(Step, ContactReport), String>, StudyError> {
-    let phases = Phases::default();
-    let mut equilibrium = Equilibrium::new(session, setting, solver, &phases)?;
-    if let Some(guess) = guess {
-        equilibrium.set_warm_start(guess);
-    }
-    match equilibrium.solve(0, setting.start(), &setting.initial_damage()) {
-        Ok(step) => Ok(Ok((step, *equilibrium.report()))),
-        Err(failure @ RunError::Contact { .. }) => Ok(Err(failure.to_string())),
-        Err(other) => Err(other.into()),
-    }
 }
 
 fn problem(id: u64) -> Result<Problem, StudyError> {

@@ -2,7 +2,8 @@
 
 use super::{
     Counts, StudyError, Verdict,
-    penalty::{D40, difference, setting, statics},
+    penalty::D40,
+    statics::{difference, setting, solve},
 };
 use crate::{
     contact::{ContactError, TAO_TYPES},
@@ -15,62 +16,27 @@ use std::{path::Path, time::Instant};
 
 /// A beam clamped left over a gap that opens, pressed down in the middle, lifted at its tip.
 const BEAM: &str = r#"
-title = "beam"
-[mesh]
-file = "beam.msh"
-[material]
-young = 80
-poisson = 0.3
-plane = "stress"
-[[boundary]]
-name = "left"
-displacement = ["0", "0"]
-[[boundary]]
-name = "bottom"
-gap = "0.005*x"
-[[boundary]]
-name = "top"
-traction = ["0", "-max(0, 1 - abs(x - 1.5)) + 0.3*max(0, x - 3)"]
+boundary = [
+    { name = "left", displacement = [0, 0] },
+    { name = "bottom", gap = "0.005*x" },
+    { name = "top", traction = [0, "-max(0, 1 - abs(x - 1.5)) + 0.3*max(0, x - 3)"] },
+]
 "#;
-
 /// Example I's square without its damage.
 const SQUARE: &str = r#"
-title = "square"
-[mesh]
-file = "square.msh"
-[material]
-young = 80
-poisson = 0.3
-plane = "stress"
-[[boundary]]
-name = "left"
-displacement = ["0", "0"]
-[[boundary]]
-name = "bottom"
-gap = "0"
-[[boundary]]
-name = "right"
-traction = ["-10", "-10"]
+boundary = [
+    { name = "left", displacement = [0, 0] },
+    { name = "bottom", gap = 0 },
+    { name = "right", traction = [-10, -10] },
+]
 "#;
-
 /// Half of a block that only contact holds up.
 const BLOCK: &str = r#"
-title = "block"
-[mesh]
-file = "block.msh"
-[material]
-young = 80
-poisson = 0.3
-plane = "stress"
-[[boundary]]
-name = "left"
-symmetry = true
-[[boundary]]
-name = "bottom"
-gap = "0"
-[[boundary]]
-name = "top"
-traction = ["0", "-6*max(0, 1 - 2*x) + 0.5*x"]
+boundary = [
+    { name = "left", symmetry = true },
+    { name = "bottom", gap = 0 },
+    { name = "top", traction = [0, "-6*max(0, 1 - 2*x) + 0.5*x"] },
+]
 "#;
 
 /// Name, text, and rectangle of each scene.
@@ -106,12 +72,12 @@ pub(super) fn run(session: &Session, folder: &Path) -> Result<Counts, StudyError
     let mut table = Vec::new();
     for (scene, text, size) in SCENES {
         let exact = setting(text, &[], size)?;
-        let (reference, _) = statics(session, &exact, "active-set")??;
+        let (reference, _) = solve(session, &exact, "active-set", None)??;
         for kind in TAO_TYPES {
             for tolerance in TOLERANCES {
                 let setting = setting(text, &[format!("contact.tolerance={tolerance:e}")], size)?;
                 let started = Instant::now();
-                let answer = statics(session, &setting, &format!("tao:{kind}"))?;
+                let answer = solve(session, &setting, &format!("tao:{kind}"), None)?;
                 let mut cell = Cell {
                     r#type: kind,
                     scene,
@@ -127,8 +93,8 @@ pub(super) fn run(session: &Session, folder: &Path) -> Result<Counts, StudyError
                     message: None,
                 };
                 match answer {
-                    Ok((state, report)) => {
-                        let apart = difference(&state.u, &reference.u);
+                    Ok((step, report)) => {
+                        let apart = difference(&step.state.u, &reference.state.u);
                         cell.outcome = "certified";
                         cell.claimed = report.false_claims;
                         cell.iterations = Some(report.iterations);
