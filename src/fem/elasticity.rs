@@ -86,14 +86,15 @@ impl Stiffness {
                     rows.push(if skip { -1 } else { row });
                     columns.push(if skip { -1 } else { column });
                 }
-                trace += if fixed[dof(i)] { 0.0 } else { unit[7 * i] };
+                trace += if row < 0 { 0.0 } else { unit[7 * i] };
             }
         }
         for &dof in &diagonal {
             rows.push(partition.row(dof / 2, 2, dof % 2));
             columns.push(partition.row(dof / 2, 2, dof % 2));
         }
-        let free = 2 * partition.owned() - diagonal.len();
+        let trace = partition.ranks().total(trace);
+        let free = partition.ranks().count(2 * partition.owned() - diagonal.len());
         let scale = if trace > 0.0 { trace / free as f64 } else { elasticity.material.young };
 
         let matrix = Matrix::with_pattern(session, 2 * partition.owned(), 2, rows, columns)?;

@@ -7,6 +7,7 @@
 mod triangle;
 mod partition;
 mod body;
+mod share;
 mod frames;
 mod elasticity;
 mod recovery;
@@ -19,4 +20,5 @@ pub use elasticity::{Elasticity, Stiffness};
 pub use frames::Frames;
 pub use loads::{add_body_force, add_traction};
 pub use partition::Partition;
+pub use share::Share;
 pub use triangle::Triangle;
