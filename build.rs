@@ -7,17 +7,23 @@ const FUNCTIONS: &str = "\
     PetscInitialize|PetscInitialized|PetscFinalize|PetscPushErrorHandler|\
     PetscOptionsInsertString|PetscOptionsSetValue|PetscOptionsHasName|\
     PetscOptionsLeftGet|PetscOptionsLeftRestore|\
-    MPI_Comm_size|\
+    MPI_Comm_size|MPI_Comm_rank|MPI_Allreduce|MPI_Type_contiguous|MPI_Type_commit|MPI_Type_free|\
+    MPI_Ibarrier|MPI_Test|MPI_Abort|\
+    PetscSFCreate|PetscSFDestroy|PetscSFSetGraph|PetscSFBcastBegin|PetscSFBcastEnd|\
+    MatPartitioningCreate|MatPartitioningDestroy|MatPartitioningSetType|\
+    MatPartitioningSetAdjacency|MatPartitioningSetFromOptions|MatPartitioningApply|\
+    ISAllGather|ISGetIndices|ISRestoreIndices|ISDestroy|\
     VecCreateMPI|VecDestroy|VecGetArray|VecRestoreArray|VecGetArrayRead|VecRestoreArrayRead|\
     VecAXPY|VecAYPX|VecCopy|VecDot|VecNorm|\
     MatCreate|MatDestroy|MatSetSizes|MatSetType|MatSetBlockSize|MatSetOption|\
     MatSetPreallocationCOO|MatSetValuesCOO|MatMult|MatDuplicate|MatCopy|MatScale|MatShift|\
-    MatDiagonalSet|MatZeroRowsColumns|MatGetOwnershipRange|MatGetSize|\
+    MatDiagonalSet|MatZeroRowsColumns|MatGetOwnershipRange|MatGetSize|MatMumpsGetInfog|\
+    MatNullSpaceCreate|MatNullSpaceDestroy|MatSetNearNullSpace|MatGetNearNullSpace|\
     KSPCreate|KSPDestroy|KSPSetOperators|KSPSetType|KSPGetPC|KSPSetUp|KSPSolve|\
     KSPSetTolerances|KSPGetConvergedReason|KSPGetIterationNumber|KSPSetFromOptions|\
     KSPSetOptionsPrefix|KSPSetNormType|KSPSetInitialGuessNonzero|\
     PCCreate|PCDestroy|PCSetType|PCSetOptionsPrefix|PCSetFromOptions|PCSetOperators|PCSetUp|PCApply|\
-    PCFactorSetMatSolverType|PCReset|PCSetReusePreconditioner|PCGetOperators|PCShellSetContext|PCShellGetContext|\
+    PCFactorSetMatSolverType|PCFactorGetMatrix|PCFactorGetMatSolverType|PCGetFailedReason|PCReset|PCSetReusePreconditioner|PCGetOperators|PCShellSetContext|PCShellGetContext|\
     PCShellSetApply|PCShellSetSetUp|\
     TaoCreate|TaoDestroy|TaoSetType|TaoSetSolution|TaoSetVariableBounds|\
     TaoSetObjectiveAndGradient|TaoSetHessian|TaoSetFromOptions|TaoSetTolerances|\
@@ -37,11 +43,13 @@ fn main() {
     let mpi_flags = String::from_utf8_lossy(&mpi_flags.stdout).into_owned();
 
     bindgen::Builder::default()
-        .header_contents("signorini.h", "#include <petsctao.h>\n")
+        .header_contents("signorini.h", "#include <petsctao.h>\n#include <petscsf.h>\n")
         .clang_args(petsc.include_paths.iter().map(|p| format!("-I{}", p.display())))
         .clang_args(mpi_flags.split_whitespace())
         .allowlist_function(FUNCTIONS)
         .allowlist_var("PETSC_COMM_WORLD")
+        // Debian's MPI is Open MPI, whose constants are the addresses of these.
+        .allowlist_var("ompi_mpi_double|ompi_mpi_op_(sum|max|replace)")
         .default_enum_style(bindgen::EnumVariation::ModuleConsts)
         .layout_tests(false)
         .generate_comments(false)

@@ -37,7 +37,17 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let result = match Arguments::parse().command {
+    let command = Arguments::parse().command;
+    let alone = match &command {
+        Command::Run(_) => Ok(()),
+        Command::Compare(_) => command::refuse_ranks("compare"),
+        Command::Stability(_) => command::refuse_ranks("stability"),
+        Command::Mesh { .. } => command::refuse_ranks("mesh"),
+    };
+    if let Err(code) = alone {
+        return code;
+    }
+    let result = match command {
         Command::Run(arguments) => command::run(&arguments),
         Command::Compare(arguments) => command::compare_scenes(&arguments),
         Command::Stability(arguments) => command::stability(&arguments),
@@ -45,12 +55,10 @@ fn main() -> ExitCode {
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
+        Err(Failure::Told(code)) => ExitCode::from(code),
         Err(failure) => {
             eprintln!("error: {failure}");
-            ExitCode::from(match failure {
-                Failure::Solver(_) => 1,
-                Failure::Input(_) => 2,
-            })
+            ExitCode::from(failure.code())
         }
     }
 }

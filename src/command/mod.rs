@@ -1,11 +1,13 @@
 //! What the subcommands do.
 
 mod compare;
+mod ranks;
 mod run;
 mod screen;
 mod stability;
 
 pub use compare::{CompareArguments, compare_scenes};
+pub use ranks::refuse_ranks;
 pub use run::{RunArguments, run};
 pub use stability::{StabilityArguments, stability};
 
@@ -23,6 +25,10 @@ pub enum Failure {
     Input(String),
     /// The solver's: it did not reach its tolerance.
     Solver(String),
+    /// Another rank's.
+    Elsewhere,
+    /// One rank has told it for all; with the exit code.
+    Told(u8),
 }
 
 impl Failure {
@@ -33,12 +39,22 @@ impl Failure {
     fn solver(error: impl fmt::Display) -> Self {
         Self::Solver(error.to_string())
     }
+
+    /// The exit code.
+    pub fn code(&self) -> u8 {
+        match self {
+            Self::Solver(_) | Self::Elsewhere => 1,
+            Self::Input(_) => 2,
+            Self::Told(code) => *code,
+        }
+    }
 }
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             Self::Input(text) | Self::Solver(text) => f.write_str(text),
+            Self::Elsewhere | Self::Told(_) => f.write_str("another rank failed"),
         }
     }
 }

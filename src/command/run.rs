@@ -1,13 +1,17 @@
 //! `signorini run`: a scene from its file to its results.
 
-use super::{Failure, check_petsc, check_solver, screen::Screen};
+use super::{
+    Failure, check_petsc, check_solver,
+    ranks::{rejoin, together},
+    screen::Screen,
+};
 use clap::Args;
 use signorini::{
     contact::SOLVERS,
     evolution::{self, Outcome, Phases, RunError, Setting, Step},
     mesh,
     output::{self, FieldWriter, History, Summary},
-    petsc::Session,
+    petsc::{Ranks, Session},
     scene::{MeshSource, Scene, Stepping},
 };
 use std::{
@@ -54,64 +58,108 @@ impl RunArguments {
     }
 }
 
-/// Runs a scene.
+/// Runs a scene, on as many ranks as `mpiexec` has started.
 pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let started = Instant::now();
     let phases = Phases::default();
-    arguments.check()?;
-    let mut scene = Scene::read(&arguments.scene, &arguments.set).map_err(Failure::input)?;
-    if let Some(file) = &arguments.mesh {
-        scene.mesh = MeshSource::from_path(file);
-    }
-    let asked = arguments.solver.clone().or_else(|| scene.contact.solver.clone());
-    let solver = asked.unwrap_or_else(|| SOLVERS[0].to_owned());
-    let folder = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
-
-    let mesh = phases
-        .time("mesh", || mesh::load(&scene.mesh.file, &scene.mesh.parameters))
-        .map_err(Failure::input)?;
-    let setting = phases.time("setting", || Setting::new(scene, mesh)).map_err(Failure::input)?;
-    let session =
-        phases.time("petsc start", || Session::start(&arguments.petsc)).map_err(Failure::solver)?;
-    if session.ranks() > 1 {
-        return Err(Failure::Input(format!(
-            "{} ranks: this version runs on one; start it without mpiexec",
-            session.ranks()
-        )));
-    }
-    // Now that all input is good: the results of an earlier run go.
-    output::prepare(&folder).map_err(Failure::input)?;
-    let mut recorder = Recorder::new(&folder, &setting, &phases).map_err(Failure::input)?;
-    let result =
-        evolution::run(
-            &session,
-            &setting,
-            &solver,
-            &phases,
-            &mut |step| Ok(recorder.accept(step)?),
-        );
-    let summary = recorder.finish(&setting, &solver, &result, started);
+    let start = |options: &[String]| {
+        phases.time("petsc start", || Session::start(options)).map_err(Failure::solver)
+    };
+    let checked = arguments.check();
+    // One rank tells bad input before PETSc starts; several need it to speak with one voice.
+    let early = match (Ranks::launched(), &checked) {
+        (1, _) => None,
+        (_, Ok(())) => Some(start(&arguments.petsc)?),
+        (_, Err(_)) => Some(start(&[])?),
+    };
+    let ranks = early.as_ref().map_or(Ranks::alone(), Session::ranks);
+    let task = together(ranks, checked).and_then(|()| Task::read(arguments, ranks, &phases));
+    let session = match (early, &task) {
+        (Some(session), _) => session,
+        (None, Err(_)) => return task.map(|_| ()),
+        (None, Ok(_)) => start(&arguments.petsc)?,
+    };
+    let speaks = task.is_ok() && session.ranks().is_first();
+    let result = task.and_then(|task| task.solve(&session, &phases, started));
     let unused = session.unused_options();
-    session.finalize().map_err(Failure::solver)?;
-    if !unused.is_empty() {
+    let ended = session.finalize().map_err(Failure::solver);
+    if speaks && !unused.is_empty() {
         eprintln!("warning: PETSc options that nothing read: {}", unused.join(" "));
     }
-    match (result, summary) {
-        (Ok(_), written) => written.map_err(Failure::solver),
-        (Err(RunError::Setup(error)), _) => Err(Failure::input(error)),
-        (Err(error), _) => Err(Failure::solver(error)),
+    result.and(ended)
+}
+
+/// What is to be done, all input being good.
+struct Task {
+    setting: Setting,
+    solver: String,
+    folder: PathBuf,
+}
+
+impl Task {
+    /// Reads scene and mesh. Every rank reads both; the first also makes the mesh, where it is to
+    /// be made. Collective.
+    fn read(arguments: &RunArguments, ranks: Ranks, phases: &Phases) -> Result<Self, Failure> {
+        let scene = Scene::read(&arguments.scene, &arguments.set).map_err(Failure::input);
+        let mut scene = together(ranks, scene)?;
+        if let Some(file) = &arguments.mesh {
+            scene.mesh = MeshSource::from_path(file);
+        }
+        let asked = arguments.solver.clone().or_else(|| scene.contact.solver.clone());
+        let solver = asked.unwrap_or_else(|| SOLVERS[0].to_owned());
+        let folder = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
+
+        let load = || {
+            phases
+                .time("mesh", || mesh::load(&scene.mesh.file, &scene.mesh.parameters))
+                .map_err(Failure::input)
+        };
+        let first = ranks.is_first().then(load).transpose();
+        let loaded = together(ranks, first)?.map_or_else(load, Ok);
+        let mesh = together(ranks, loaded)?;
+        let setting = phases.time("setting", || Setting::new(scene, mesh)).map_err(Failure::input);
+        Ok(Self { setting: together(ranks, setting)?, solver, folder })
+    }
+
+    /// Solves and writes the results. Collective.
+    fn solve(self, session: &Session, phases: &Phases, started: Instant) -> Result<(), Failure> {
+        let ranks = session.ranks();
+        let Self { setting, solver, folder } = self;
+        let setting = phases.time("partition", || setting.share(session)).map_err(Failure::solver);
+        let setting = together(ranks, setting)?;
+        // Now that all input is good: the results of an earlier run go.
+        let prepared = if ranks.is_first() { output::prepare(&folder) } else { Ok(()) };
+        together(ranks, prepared.map_err(Failure::input))?;
+        let recorder = Recorder::new(&folder, &setting, phases).map_err(Failure::input);
+        let mut recorder = together(ranks, recorder)?;
+
+        let result = evolution::run(session, &setting, &solver, phases, &mut |step| {
+            Ok(recorder.accept(step)?)
+        });
+        let failure = result.as_ref().map(|_| ()).map_err(failure);
+        rejoin(ranks, &failure);
+        let written = recorder.finish(&setting, &solver, &result, started);
+        together(ranks, failure.and(written.map_err(Failure::solver)))
     }
 }
 
-/// Shows and writes the accepted steps.
+/// By whose turn it is now.
+fn failure(error: &RunError) -> Failure {
+    match error {
+        RunError::Setup(error) => Failure::input(error),
+        RunError::Elsewhere => Failure::Elsewhere,
+        error => Failure::solver(error),
+    }
+}
+
+/// Shows and writes the accepted steps; of several ranks only the first shows them.
 struct Recorder<'a> {
     folder: &'a Path,
     setting: &'a Setting,
     phases: &'a Phases,
     every: Option<usize>,
-    history: History,
     fields: FieldWriter,
-    screen: Screen,
+    shown: Option<(History, Screen)>,
     last: Option<Step>,
 }
 
@@ -129,9 +177,11 @@ impl<'a> Recorder<'a> {
             setting,
             phases,
             every: setting.scene().output.every,
-            history: History::create(folder)?,
             fields: FieldWriter::new(folder, setting)?,
-            screen: Screen::new(setting),
+            shown: match setting.body.partition.ranks().is_first() {
+                true => Some((History::create(folder)?, Screen::new(setting))),
+                false => None,
+            },
             last: None,
         })
     }
@@ -150,19 +200,23 @@ impl<'a> Recorder<'a> {
     }
 
     fn accept(&mut self, step: &Step) -> Result<(), output::OutputError> {
-        self.screen.show(&step.record);
-        self.phases.time("output", || {
-            self.history.add(&step.record)?;
+        let written = self.phases.time("output", || {
+            let shown = self.shown.as_mut().map_or(Ok(()), |(history, screen)| {
+                screen.show(&step.record);
+                history.add(&step.record)
+            });
+            // All ranks write a frame, whatever became of the row.
             match self.is_frame(step.record.step) {
-                true => self.fields.add(self.setting, &step.state),
-                false => Ok(()),
+                true => shown.and(self.fields.add(self.setting, &step.state)),
+                false => shown,
             }
-        })?;
+        });
         self.last = Some(step.clone());
-        Ok(())
+        written
     }
 
     /// Writes the last accepted state, if there is one, and the summary, also of a run that failed.
+    /// Collective.
     fn finish(
         mut self,
         setting: &Setting,
@@ -171,11 +225,12 @@ impl<'a> Recorder<'a> {
         started: Instant,
     ) -> Result<(), output::OutputError> {
         let last = self.last.take();
-        if let Some(Step { state, .. }) = &last
-            && self.fields.last_time() != Some(state.time)
-        {
-            self.phases.time("output", || self.fields.add(setting, state))?;
-        }
+        let written = match &last {
+            Some(Step { state, .. }) if self.fields.last_time() != Some(state.time) => {
+                self.phases.time("output", || self.fields.add(setting, state))
+            }
+            _ => Ok(()),
+        };
         let record = last.map(|step| step.record);
         let steps = record.map_or(0, |r| r.step);
         let (wall, scene) = (started.elapsed().as_secs_f64(), setting.scene());
@@ -185,15 +240,18 @@ impl<'a> Recorder<'a> {
         let bounds = &setting.constraints.bounds;
         let mut contact_nodes: Vec<usize> = bounds.iter().map(|bound| bound.node).collect();
         contact_nodes.dedup();
+        let (body, ranks) = (&setting.body, setting.body.partition.ranks());
+        let contact_nodes = ranks.count(contact_nodes.len());
         let summary = Summary {
             scene: scene.name.clone(),
             title: scene.title.clone(),
-            solver: match contact_nodes.is_empty() {
+            solver: match contact_nodes == 0 {
                 true => "linear".to_owned(),
                 false => solver.to_owned(),
             },
-            nodes: setting.body.mesh.nodes.len(),
-            triangles: setting.body.mesh.triangles.len(),
+            ranks: ranks.size(),
+            nodes: body.partition.total(),
+            triangles: ranks.count(body.own_triangles),
             steps,
             end_time: record.map(|r| r.time),
             stopped_at: outcome.and_then(|o| o.stopped).map(|stop| stop.time),
@@ -204,7 +262,7 @@ impl<'a> Recorder<'a> {
             work: record.map(|r| r.work),
             contact_force: record.map(|r| r.contact_force),
             active_nodes: record.map(|r| r.active_nodes),
-            contact_nodes: contact_nodes.len(),
+            contact_nodes,
             kkt: outcome.map(|o| o.kkt).or(record.map(|r| r.kkt())),
             wall_seconds: wall,
             seconds_per_step: wall / steps.max(1) as f64,
@@ -213,8 +271,9 @@ impl<'a> Recorder<'a> {
             notes,
             error: result.as_ref().err().map(ToString::to_string),
         };
+        let Some((_, screen)) = &self.shown else { return written };
         summary.write(self.folder)?;
-        self.screen.close(&summary, outcome, &self.phases.table(), self.folder);
-        Ok(())
+        screen.close(&summary, outcome, &self.phases.table(), self.folder);
+        written
     }
 }

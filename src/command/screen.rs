@@ -65,9 +65,13 @@ fn report(
     phases: &BTreeMap<&'static str, (usize, f64)>,
     folder: &Path,
 ) -> String {
+    let mut mesh = format!("{} nodes, {} triangles", s.nodes, s.triangles);
+    if s.ranks > 1 {
+        mesh += &format!(", on {} ranks", s.ranks);
+    }
     let mut lines = vec![
         s.title.clone(),
-        row("mesh", format!("{} nodes, {} triangles", s.nodes, s.triangles)),
+        row("mesh", mesh),
         row("solver", s.solver.clone()),
         row("end", ending(s, outcome)),
     ];

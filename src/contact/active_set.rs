@@ -6,7 +6,7 @@ use super::{
     problem::unheld,
     tao::Tao,
 };
-use crate::petsc::{PetscError, Session, Vector};
+use crate::petsc::{PetscError, Ranks, Session, Vector};
 use nalgebra::DVector;
 
 /// Guess which nodes press, solve with u_ν = g there, and exchange the nodes where the guess was
@@ -51,13 +51,14 @@ impl<'s> ActiveSet<'s> {
     /// is then rounding that drives the motion.
     fn hold(&mut self, problem: &ContactProblem, c: &Vector) -> Result<bool, PetscError> {
         loop {
-            let left = unheld(problem.rigid, &self.pressing);
+            let left = unheld(problem.ranks, problem.rigid, &self.pressing);
             let Some(any) = left.first() else { return Ok(true) };
             let driven = left.iter().map(|m| m * m.dot(problem.work)).sum::<DVector<f64>>();
             // Where the load drives none of them, any will do.
             let motion = if driven.amax() > 0.0 { driven } else { any.clone() };
             let normal = problem.rigid * motion.normalize();
-            let closing = |i: &usize| !self.pressing[*i] && normal[*i] > 1e-6 * normal.amax();
+            let most = problem.ranks.max(normal.iter().fold(0.0, |m: f64, v| m.max(v.abs())));
+            let closing = |i: &usize| !self.pressing[*i] && normal[*i] > 1e-6 * most;
             let nearest = c.read(|c| {
                 let way = |i: usize| {
                     let bound = &problem.bounds[i];
@@ -66,9 +67,11 @@ impl<'s> ActiveSet<'s> {
                 let ways = (0..normal.len()).filter(closing).map(way);
                 ways.min_by(|a, b| a.1.total_cmp(&b.1))
             })?;
+            let (way, rank) = problem.ranks.least(nearest.map_or(f64::INFINITY, |(_, way)| way));
             match nearest {
-                Some((node, _)) => self.pressing[node] = true,
-                None => return Ok(false),
+                _ if way == f64::INFINITY => return Ok(false),
+                Some((node, _)) if rank == problem.ranks.rank() => self.pressing[node] = true,
+                _ => {}
             }
         }
     }
@@ -83,15 +86,15 @@ impl<'s> ActiveSet<'s> {
         let pressing = || problem.bounds.iter().zip(&self.pressing).filter(|(_, on)| **on);
         let held: Vec<usize> = pressing().map(|(bound, _)| bound.dof).collect();
         c.write(|c| pressing().for_each(|(bound, _)| c[bound.dof] = bound.gap))?;
-        let system = System { held: &held, added: &[] };
+        let system = System { held: &held, added: None };
         self.elastic.solve(problem, system, problem.load, c, problem.linear_residual(), report)
     }
 
     /// The nodes where the guess was wrong, beyond what the KKT tolerance allows.
     fn wrong(&self, problem: &ContactProblem, c: &Vector) -> Result<Vec<usize>, PetscError> {
-        let size = c.read(|c| c.iter().fold(0.0_f64, |m, v| m.max(v.abs())))?;
+        let size = problem.size(c)?;
         let slack = 0.1 * problem.tolerance;
-        let pull = slack * problem.force_scale / (problem.bounds.len() as f64).sqrt();
+        let pull = slack * problem.force_scale / (problem.all_bounds() as f64).sqrt();
         c.read(|c| {
             self.elastic.forces(|p| {
                 let wrong = |i: &usize| {
@@ -119,7 +122,7 @@ impl<'s> ActiveSet<'s> {
             // Keep those that were pressing: only close gaps.
             self.pressing.iter_mut().zip(&old).for_each(|(new, old)| *new |= *old);
         }
-        Ok(self.pressing != old)
+        Ok(problem.ranks.any(self.pressing != old))
     }
 
     fn rescue(
@@ -162,17 +165,20 @@ impl ContactSolver for ActiveSet<'_> {
         let mut report = ContactReport::default();
         let mut choice = Exchange::new();
         self.first_guess(problem, c)?;
-        while report.iterations < 30 + 5 * problem.bounds.len() {
+        let most = 30 + 5 * problem.all_bounds();
+        while report.iterations < most {
             report.iterations += 1;
             if !self.solve_pressing(problem, c, &mut report)? {
                 break;
             }
             let wrong = self.wrong(problem, c)?;
-            if wrong.is_empty() {
+            let all_wrong = problem.ranks.count(wrong.len());
+            if all_wrong == 0 {
                 return Ok(report);
             }
-            let chosen = choice.of(&wrong);
-            report.fallbacks += usize::from(chosen.len() < wrong.len());
+            let single = choice.single(all_wrong);
+            report.fallbacks += usize::from(single && all_wrong > 1);
+            let chosen = if single { last(problem.ranks, &wrong) } else { &wrong };
             if !self.exchange(problem, c, chosen)? {
                 // The forces of nodes that hold a balanced body are rounding; the certificate
                 // judges them.
@@ -198,17 +204,23 @@ impl Exchange {
         Self { fewest: usize::MAX, patience: PATIENCE }
     }
 
-    fn of<'w>(&mut self, wrong: &'w [usize]) -> &'w [usize] {
-        if wrong.len() < self.fewest {
-            (self.fewest, self.patience) = (wrong.len(), PATIENCE);
-            wrong
-        } else if self.patience > 0 {
-            self.patience -= 1;
-            wrong
-        } else {
-            &wrong[wrong.len() - 1..]
+    /// Whether only one of so many wrong nodes is to be exchanged.
+    fn single(&mut self, wrong: usize) -> bool {
+        if wrong < self.fewest {
+            (self.fewest, self.patience) = (wrong, PATIENCE);
+            return false;
         }
+        let single = self.patience == 0;
+        self.patience = self.patience.saturating_sub(1);
+        single
     }
+}
+
+/// The last of all ranks' `wrong` nodes, which are numbered rank by rank; nothing on the others.
+fn last(ranks: Ranks, wrong: &[usize]) -> &[usize] {
+    let holder = if wrong.is_empty() { -1.0 } else { ranks.rank() as f64 };
+    let holds = ranks.max(holder) == ranks.rank() as f64;
+    if holds { &wrong[wrong.len().saturating_sub(1)..] } else { &[] }
 }
 
 #[cfg(test)]
@@ -218,12 +230,12 @@ mod tests {
     #[test]
     fn exchanges_one_node_when_the_number_of_wrong_ones_stops_falling() {
         let mut choice = Exchange::new();
-        let (a, b) = ([0, 1, 2], [3, 4, 5]);
-        assert_eq!(choice.of(&a).len(), 3);
+        assert!(!choice.single(3));
         for _ in 0..PATIENCE {
-            assert_eq!(choice.of(&b).len(), 3);
+            assert!(!choice.single(3));
         }
-        assert_eq!(choice.of(&b), [5]);
-        assert_eq!(choice.of(&a[..2]), [0, 1], "progress restores the block exchange");
+        assert!(choice.single(3));
+        assert_eq!(last(Ranks::alone(), &[3, 4, 5]), [5]);
+        assert!(!choice.single(2), "progress restores the block exchange");
     }
 }

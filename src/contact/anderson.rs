@@ -1,5 +1,6 @@
 //! Anderson acceleration of a fixed-point iteration q ← T(q).
 
+use crate::petsc::Ranks;
 use nalgebra::{DMatrix, DVector};
 
 /// Anderson's mixing of the last few iterates (J. ACM 12, 1965; Walker and Ni, SIAM J. Numer.
@@ -15,6 +16,8 @@ pub(super) struct Anderson {
     /// (T(q), T(q) − q) of the last iterates, oldest first.
     history: Vec<(Vec<f64>, Vec<f64>)>,
     best: f64,
+    /// The ranks among which q is divided.
+    ranks: Ranks,
 }
 
 /// Iterates mixed: more than ten no longer pays on the scenes of this project.
@@ -27,8 +30,9 @@ const RANK: f64 = 1e-10;
 const FARTHEST: f64 = 1e6;
 
 impl Anderson {
-    pub(super) fn new(weights: impl Iterator<Item = f64>) -> Self {
-        Self { weights: weights.map(f64::sqrt).collect(), history: Vec::new(), best: f64::INFINITY }
+    pub(super) fn new(ranks: Ranks, weights: impl Iterator<Item = f64>) -> Self {
+        let weights = weights.map(f64::sqrt).collect();
+        Self { weights, history: Vec::new(), best: f64::INFINITY, ranks }
     }
 
     /// The next iterate from `q` and its image T(q).
@@ -62,6 +66,7 @@ impl Anderson {
             (self.history[j + 1].1[i] - self.history[j].1[i]) * w[i]
         });
         let target = DVector::from_fn(w.len(), |i, _| residual[i] * w[i]);
+        let (differences, target) = self.condensed(differences, target);
         let svd = differences.svd(true, true);
         let cut = RANK * svd.singular_values.max();
         let Ok(share) = svd.solve(&target, cut) else { return next };
@@ -75,8 +80,31 @@ impl Anderson {
         next
     }
 
+    /// A least squares problem of the same answer whose rows all ranks have: of each rank the
+    /// triangle that an orthogonal transformation makes of its rows (Demmel, Grigori, Hoemmen and
+    /// Langou, SIAM J. Sci. Comput. 34, 2012).
+    fn condensed(&self, a: DMatrix<f64>, b: DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
+        if self.ranks.is_alone() {
+            return (a, b);
+        }
+        let columns = a.ncols() + 1;
+        let mut rows = a.insert_column(columns - 1, 0.0);
+        rows.set_column(columns - 1, &b);
+        // At least as many rows as columns, so that all ranks have triangles of one size.
+        let missing = columns.saturating_sub(rows.nrows());
+        let r = rows.insert_rows(0, missing, 0.0).qr().r();
+        let all = DMatrix::from_column_slice(
+            columns,
+            columns * self.ranks.size(),
+            &self.ranks.gather(r.transpose().as_slice()),
+        )
+        .transpose();
+        (all.columns(0, columns - 1).into_owned(), all.column(columns - 1).into_owned())
+    }
+
     fn norm(&self, v: &[f64]) -> f64 {
-        v.iter().zip(&self.weights).map(|(v, w)| (v * w).powi(2)).sum::<f64>().sqrt()
+        let squares = v.iter().zip(&self.weights).map(|(v, w)| (v * w).powi(2)).sum::<f64>();
+        self.ranks.total(squares).sqrt()
     }
 }
 
@@ -89,7 +117,7 @@ mod tests {
         // T(q) = Mq + b with a spectral radius of 0.99: plain iteration needs over 2000 steps.
         let m = DMatrix::from_row_slice(3, 3, &[0.9, 0.3, 0.0, -0.3, 0.9, 0.1, 0.0, 0.1, -0.8]);
         let b = DVector::from_row_slice(&[1.0, 2.0, 3.0]);
-        let mut anderson = Anderson::new([1.0, 2.0, 0.5].into_iter());
+        let mut anderson = Anderson::new(Ranks::alone(), [1.0, 2.0, 0.5].into_iter());
         let mut q = vec![0.0; 3];
         for _ in 0..5 {
             let image = &m * DVector::from_row_slice(&q) + &b;
@@ -102,7 +130,7 @@ mod tests {
 
     #[test]
     fn an_overshoot_restarts_from_the_mean() {
-        let mut anderson = Anderson::new([1.0].into_iter());
+        let mut anderson = Anderson::new(Ranks::alone(), [1.0].into_iter());
         assert_eq!(anderson.next(&[0.0], vec![1e-3]), vec![1e-3]);
         assert_eq!(anderson.next(&[1.0], vec![3.0]), vec![2.0]);
     }

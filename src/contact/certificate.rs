@@ -1,6 +1,7 @@
 //! The Karush–Kuhn–Tucker residuals of an answer, whoever computed it.
 
 use super::Bound;
+use crate::petsc::Ranks;
 use std::fmt;
 
 /// Relative KKT residuals of u: forces against the force scale F, displacements against
@@ -19,7 +20,8 @@ pub struct Kkt {
 }
 
 impl Kkt {
-    /// From r = Ku − f and u, both in the frames' unknowns; `prescribed` ones do not count.
+    /// From r = Ku − f and u, both in the frames' unknowns that this rank owns; `prescribed` ones
+    /// do not count.
     pub fn of(
         residual: &[f64],
         c: &[f64],
@@ -27,6 +29,7 @@ impl Kkt {
         prescribed: impl Fn(usize) -> bool,
         force_scale: f64,
         displacement_scale: f64,
+        ranks: Ranks,
     ) -> Self {
         let mut bounded = vec![false; residual.len()];
         let (mut primal, mut dual, mut complementarity) = (0.0_f64, 0.0, 0.0);
@@ -41,6 +44,10 @@ impl Kkt {
             .filter(|&dof| !bounded[dof] && !prescribed(dof))
             .map(|dof| residual[dof].powi(2))
             .sum();
+        let mut sums = [stationarity, dual, complementarity];
+        ranks.sum(&mut sums);
+        let [stationarity, dual, complementarity] = sums;
+        let primal = ranks.max(primal);
         Self {
             stationarity: relative(stationarity.sqrt(), force_scale),
             primal: relative(primal, displacement_scale),

@@ -1,6 +1,6 @@
 //! From directions and values at nodes to frames, prescribed unknowns and bounds.
 
-use crate::fem::Frames;
+use crate::fem::{Frames, Share};
 use nalgebra::{Matrix2, Vector2};
 use std::collections::BTreeMap;
 
@@ -224,6 +224,34 @@ impl Constraints {
             }
         }
         Ok(c)
+    }
+
+    /// The conditions at the nodes of a rank's share; bounds are their owners'. The fixed rows
+    /// keep their numbers.
+    pub fn share(&self, share: &Share) -> Self {
+        let local = |node: usize, dof: usize| share.local(node).map(|local| 2 * local + dof % 2);
+        let bound = |bound: &Bound| {
+            let node = share.owned(bound.node)?;
+            Some(Bound { node, dof: 2 * node + bound.dof % 2, ..*bound })
+        };
+        let mut bounds: Vec<Bound> = self.bounds.iter().filter_map(bound).collect();
+        bounds.sort_by_key(|bound| bound.node);
+        let rows = self.implied.iter().zip(&self.implied_rows);
+        let (implied, implied_rows) = rows
+            .filter_map(|(row, &index)| {
+                Some((FixedRow { node: share.local(row.node)?, ..*row }, index))
+            })
+            .unzip();
+        let held = |gap: &GapRow| Some(GapRow { node: share.local(gap.node)?, ..*gap });
+        let prescribed = |&(dof, row): &(usize, usize)| Some((local(dof / 2, dof)?, row));
+        Self {
+            frames: self.frames.share(share),
+            bounds,
+            prescribed: self.prescribed.iter().filter_map(prescribed).collect(),
+            implied,
+            implied_rows,
+            held_gaps: self.held_gaps.iter().filter_map(held).collect(),
+        }
     }
 
     /// Whether the unknown is prescribed (pins are not).

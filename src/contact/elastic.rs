@@ -9,8 +9,8 @@ use std::time::Instant;
 pub(super) struct System<'a> {
     /// The unknowns that keep the values they have in c.
     pub held: &'a [usize],
-    /// The nonzero entries of the diagonal D, N/m.
-    pub added: &'a [(usize, f64)],
+    /// The nonzero entries of the diagonal D, N/m; `None` where it has none on any rank.
+    pub added: Option<&'a [(usize, f64)]>,
 }
 
 /// Conjugate gradients, preconditioned by the Cholesky factor of an earlier system: other damage,
@@ -97,7 +97,7 @@ impl Engine {
         Ok(Self {
             factor: Factor::new(session, "elastic_")?,
             matrix: problem.stiffness.duplicate()?,
-            wear: Wear::default(),
+            wear: Wear::new(problem.ranks),
             residual: zeros()?,
             free: zeros()?,
             preconditioned: zeros()?,
@@ -129,10 +129,10 @@ impl Engine {
     fn renew(&mut self, problem: &ContactProblem, system: System) -> Result<bool, PetscError> {
         let started = Instant::now();
         self.matrix.copy(problem.stiffness)?;
-        if !system.added.is_empty() {
+        if let Some(added) = system.added {
             self.image.write(|d| {
                 d.fill(0.0);
-                system.added.iter().for_each(|&(dof, value)| d[dof] += value);
+                added.iter().for_each(|&(dof, value)| d[dof] += value);
             })?;
             self.matrix.add_diagonal(&self.image)?;
         }
@@ -140,7 +140,7 @@ impl Engine {
         let definite = self.factor.factorise(&self.matrix)?;
         match definite {
             true => self.wear.renewed(started.elapsed().as_secs_f64()),
-            false => self.wear = Wear::default(),
+            false => self.wear = Wear::new(problem.ranks),
         }
         Ok(definite)
     }
@@ -191,8 +191,10 @@ fn multiply(
 ) -> Result<(), PetscError> {
     problem.stiffness.multiply(x, y)?;
     match system.added {
-        [] => Ok(()),
-        added => x.read(|x| y.write(|y| added.iter().for_each(|&(i, d)| y[i] += d * x[i])))?,
+        None => Ok(()),
+        Some(added) => {
+            x.read(|x| y.write(|y| added.iter().for_each(|&(i, d)| y[i] += d * x[i])))?
+        }
     }
 }
 

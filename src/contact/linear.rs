@@ -28,7 +28,7 @@ impl ContactSolver for Linear<'_> {
         c: &mut Vector,
     ) -> Result<ContactReport, ContactError> {
         let mut report = ContactReport { iterations: 1, ..Default::default() };
-        let system = System { held: &[], added: &[] };
+        let system = System { held: &[], added: None };
         let (f, limit) = (problem.load, problem.linear_residual());
         match self.elastic.solve(problem, system, f, c, limit, &mut report)? {
             true => Ok(report),

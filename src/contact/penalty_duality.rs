@@ -81,7 +81,7 @@ impl<'s> PenaltyDuality<'s> {
             None => 1e-10 * rhs.norm()?,
         };
         let added: Vec<_> = problem.bounds.iter().map(|b| (b.dof, omega * b.weight)).collect();
-        let system = System { held: &[], added: &added };
+        let system = System { held: &[], added: Some(&added) };
         match self.elastic.solve(problem, system, &rhs, u, limit, report)? {
             true => Ok(()),
             false => Err(ContactError::NotConverged {
@@ -116,10 +116,11 @@ impl<'s> PenaltyDuality<'s> {
         report: &mut ContactReport,
     ) -> Result<f64, ContactError> {
         let bounds = problem.bounds;
-        let length: f64 = bounds.iter().map(|b| b.weight).sum();
+        let length = contact_length(problem);
         let trial = problem.stiffness_scale / length;
         let dot = |a: &[f64], b: &[f64]| -> f64 {
-            bounds.iter().enumerate().map(|(i, bound)| bound.weight * a[i] * b[i]).sum()
+            let products = bounds.iter().enumerate().map(|(i, bound)| bound.weight * a[i] * b[i]);
+            problem.ranks.total(products.sum())
         };
         let mut u = Vector::zeros(self.session, problem.load.owned())?;
 
@@ -129,7 +130,7 @@ impl<'s> PenaltyDuality<'s> {
             .collect();
         let mut basis: Vec<Vec<f64>> = Vec::new();
         let (mut alpha, mut beta) = (Vec::new(), Vec::<f64>::new());
-        for _ in 0..LANCZOS.min(bounds.len()) {
+        for _ in 0..LANCZOS.min(problem.all_bounds()) {
             let norm = dot(&v, &v).sqrt();
             if basis.len() == beta.len() + 1 {
                 beta.push(norm);
@@ -187,14 +188,13 @@ impl ContactSolver for PenaltyDuality<'_> {
         let mut q = self.first(problem, omega, c)?;
 
         let (mut residuals, mut first_change) = (Kkt::default(), 0.0_f64);
-        let length: f64 = problem.bounds.iter().map(|b| b.weight).sum();
-        let pressure = problem.force_scale / length;
-        let mut anderson = Anderson::new(problem.bounds.iter().map(|b| b.weight));
+        let pressure = problem.force_scale / contact_length(problem);
+        let mut anderson = Anderson::new(problem.ranks, problem.bounds.iter().map(|b| b.weight));
         while report.iterations < self.options.iterations {
             self.response(problem, omega, Some(problem.load), &q, c, &mut report)?;
             report.iterations += 1;
             let normal: Vec<f64> = c.read(|c| problem.bounds.iter().map(|b| c[b.dof]).collect())?;
-            let size = c.read(|c| c.iter().fold(0.0_f64, |m, v| m.max(v.abs())))?;
+            let size = problem.size(c)?;
             residuals = fixed_point_residuals(problem, omega, &q, &normal, size);
             if residuals.within(0.1 * problem.tolerance) {
                 return Ok(report);
@@ -207,6 +207,7 @@ impl ContactSolver for PenaltyDuality<'_> {
             let images = q.iter().zip(normal.iter().zip(problem.bounds)).map(image).collect();
             let images: Vec<f64> = images;
             let change = (images.iter().zip(&q)).fold(0.0_f64, |m, (t, q)| m.max((t - q).abs()));
+            let change = problem.ranks.max(change);
             if !(change.is_finite() && change <= DIVERGED * first_change.max(pressure))
                 && report.iterations > 1
             {
@@ -230,6 +231,11 @@ impl ContactSolver for PenaltyDuality<'_> {
     }
 }
 
+/// |Γ_C|, m.
+fn contact_length(problem: &ContactProblem) -> f64 {
+    problem.ranks.total(problem.bounds.iter().map(|b| b.weight).sum())
+}
+
 /// The KKT residuals of an iterate: its equation is solved, so the contact forces are
 /// W (q + ω Bu) and only the contact conditions are left to judge.
 fn fixed_point_residuals(
@@ -244,5 +250,5 @@ fn fixed_point_residuals(
         .collect();
     let force: Vec<f64> =
         (0..q.len()).map(|i| -local[i].weight * (q[i] + omega * normal[i])).collect();
-    Kkt::of(&force, normal, &local, |_| false, problem.force_scale, size)
+    Kkt::of(&force, normal, &local, |_| false, problem.force_scale, size, problem.ranks)
 }

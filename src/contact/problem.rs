@@ -1,7 +1,7 @@
 //! What a contact solver is given and what it answers.
 
 use super::{Bound, Kkt};
-use crate::petsc::{Matrix, PetscError, Session, Vector};
+use crate::petsc::{Matrix, PetscError, Ranks, Session, Vector};
 use nalgebra::{DMatrix, DVector};
 
 /// min ½ cᵀKc − fᵀc  subject to  c_i ≤ g_i on the bounded unknowns.
@@ -28,6 +28,9 @@ pub struct ContactProblem<'a> {
     pub force_scale: f64,
     /// KKT residuals to reach, relative.
     pub tolerance: f64,
+    /// The ranks among which the unknowns are divided: bounds are their owners', what is
+    /// decided is decided by all.
+    pub ranks: Ranks,
 }
 
 impl ContactProblem<'_> {
@@ -40,9 +43,21 @@ impl ContactProblem<'_> {
     /// [`Kkt`] by element-wise forces).
     pub fn residuals(&self, session: &Session, c: &Vector) -> Result<Kkt, PetscError> {
         let residual = self.residual(session, c)?;
-        let size = c.read(|c| c.iter().fold(0.0_f64, |m, v| m.max(v.abs())))?;
-        residual
-            .read(|r| c.read(|c| Kkt::of(r, c, self.bounds, |_| false, self.force_scale, size)))?
+        let size = self.size(c)?;
+        let kkt = |r: &[f64], c: &[f64]| {
+            Kkt::of(r, c, self.bounds, |_| false, self.force_scale, size, self.ranks)
+        };
+        residual.read(|r| c.read(|c| kkt(r, c)))?
+    }
+
+    /// The largest entry in absolute value.
+    pub fn size(&self, c: &Vector) -> Result<f64, PetscError> {
+        Ok(self.ranks.max(c.read(|c| c.iter().fold(0.0_f64, |m, v| m.max(v.abs())))?))
+    }
+
+    /// Number of bounds, of all ranks.
+    pub fn all_bounds(&self) -> usize {
+        self.ranks.count(self.bounds.len())
     }
 
     /// Kc − f.
@@ -62,16 +77,17 @@ impl ContactProblem<'_> {
 
 /// The combinations (orthonormal) of the motions `rigid`, u·ν at the bounds, a column each, that
 /// are left when u_ν is prescribed on the `pressing` bounds.
-pub(crate) fn unheld(rigid: &DMatrix<f64>, pressing: &[bool]) -> Vec<DVector<f64>> {
+pub(crate) fn unheld(ranks: Ranks, rigid: &DMatrix<f64>, pressing: &[bool]) -> Vec<DVector<f64>> {
     let motions = rigid.ncols();
     if motions == 0 {
         return Vec::new();
     }
     let rows = rigid.row_iter().zip(pressing).filter(|(_, on)| **on);
-    let gram =
+    let mut gram =
         rows.fold(DMatrix::zeros(motions, motions), |sum, (row, _)| sum + row.transpose() * row);
+    ranks.sum(gram.as_mut_slice());
     let eigen = gram.symmetric_eigen();
-    let cut = 1e-10 * rigid.norm_squared();
+    let cut = 1e-10 * ranks.total(rigid.norm_squared());
     let pairs = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());
     pairs.filter(|(value, _)| **value <= cut).map(|(_, vector)| vector.into_owned()).collect()
 }

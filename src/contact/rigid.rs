@@ -31,8 +31,8 @@ impl RigidMotion {
     }
 
     /// The work of nodal forces on it.
-    fn work(&self, nodes: &[[f64; 2]], load: &[f64]) -> f64 {
-        self.field(nodes).iter().zip(load).map(|(u, f)| u * f).sum()
+    fn work(&self, body: &Body, load: &[f64]) -> f64 {
+        body.partition.dot(&self.field(&body.mesh.nodes), load, 2)
     }
 }
 
@@ -166,7 +166,7 @@ impl RigidMotions {
 
     /// The work of `load` (nodal forces) on the motions that only contact holds.
     pub fn work(&self, body: &Body, load: &[f64]) -> DVector<f64> {
-        let work = |i: usize, _| self.resisted[i].work(&body.mesh.nodes, load);
+        let work = |i: usize, _| self.resisted[i].work(body, load);
         DVector::from_fn(self.resisted.len(), work)
     }
 
@@ -177,11 +177,12 @@ impl RigidMotions {
         if self.held() {
             return Ok(());
         }
-        let nodes = &body.mesh.nodes;
-        let size: f64 = load.chunks(2).map(|f| f[0].hypot(f[1])).sum();
-        let work = |m: &RigidMotion| m.work(nodes, load);
+        let ranks = body.partition.ranks();
+        let owned = &load[..2 * body.partition.owned()];
+        let size = ranks.total(owned.chunks(2).map(|f| f[0].hypot(f[1])).sum());
+        let work = |m: &RigidMotion| m.work(body, load);
         let driven = |motion: RigidMotion| {
-            let sum = |k: usize| load.iter().skip(k).step_by(2).sum::<f64>();
+            let sum = |k: usize| ranks.total(owned.iter().skip(k).step_by(2).sum());
             let turn = RigidMotion { translation: [0.0, 0.0], rotation: 1.0, centre: self.centre };
             DrivenMotion { motion, force: sum(0).hypot(sum(1)), moment: work(&turn) }
         };
@@ -241,8 +242,9 @@ impl RigidMotions {
     pub fn remove_free(&self, body: &Body, u: &mut [f64]) {
         for motion in &self.free {
             let field = motion.field(&body.mesh.nodes);
-            let area = |i: usize| body.node_area[i / 2];
-            let dot = |v: &[f64]| -> f64 { (0..v.len()).map(|i| area(i) * v[i] * field[i]).sum() };
+            let weighted: Vec<f64> =
+                field.iter().enumerate().map(|(i, r)| body.node_area[i / 2] * r).collect();
+            let dot = |v: &[f64]| body.partition.dot(&weighted, v, 2);
             let share = dot(u) / dot(&field);
             u.iter_mut().zip(&field).for_each(|(v, r)| *v -= share * r);
         }

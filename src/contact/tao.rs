@@ -54,7 +54,7 @@ impl ContactSolver for Tao<'_> {
         let mut report = ContactReport::default();
         let owned = c.owned();
         let load = problem.load.read(<[f64]>::to_vec)?;
-        let load_size = load.iter().fold(0.0_f64, |m, f| m.max(f.abs()));
+        let load_size = problem.size(problem.load)?;
 
         let s = problem.stiffness_scale;
         let proximal = if problem.definite() { 0.0 } else { PROXIMAL };
@@ -92,7 +92,7 @@ impl ContactSolver for Tao<'_> {
             report.factorisations += answer.factorisations;
             reason = answer.reason;
 
-            let largest = x.read(|x| x.iter().fold(0.0_f64, |m, v| m.max(v.abs())))? * size;
+            let largest = problem.size(&x)? * size;
             let scale = size;
             c.write(|c| x.read(|x| c.iter_mut().zip(x).for_each(|(c, x)| *c = x * scale)))??;
             if largest > 0.0 {

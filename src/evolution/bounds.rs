@@ -16,8 +16,8 @@ pub(super) struct Bounds {
 const ROUNDING: f64 = 1e-10;
 
 impl Bounds {
-    pub(super) fn of(zeta: &[f64]) -> Self {
-        let (floor, ceiling) = extremes(zeta);
+    /// From the least and the largest ζ.
+    pub(super) fn of((floor, ceiling): (f64, f64)) -> Self {
         Self { floor, ceiling }
     }
 
@@ -26,9 +26,8 @@ impl Bounds {
         Self { floor: self.floor + step * least, ..self }
     }
 
-    /// As tight as the ζ that was reached shows them.
-    pub(super) fn tightened(self, zeta: &[f64]) -> Self {
-        let (low, high) = extremes(zeta);
+    /// As tight as the extremes of the ζ that was reached show them.
+    pub(super) fn tightened(self, (low, high): (f64, f64)) -> Self {
         Self { floor: self.floor.max(low), ceiling: self.ceiling.min(high) }
     }
 
@@ -36,12 +35,6 @@ impl Bounds {
     pub(super) fn floor(self) -> f64 {
         self.floor
     }
-}
-
-/// (min, max).
-fn extremes(zeta: &[f64]) -> (f64, f64) {
-    zeta.iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &z| (low.min(z), high.max(z)))
 }
 
 /// By how much ζ left the bounds of its equation in a run.
@@ -56,9 +49,14 @@ pub struct Excess {
 }
 
 impl Excess {
-    /// Looks at the ζ of a step.
-    pub(super) fn observe(&mut self, bounds: Bounds, zeta: &[f64], step: usize, time: f64) {
-        let (low, high) = extremes(zeta);
+    /// Looks at the extremes of ζ of a step.
+    pub(super) fn observe(
+        &mut self,
+        bounds: Bounds,
+        (low, high): (f64, f64),
+        step: usize,
+        time: f64,
+    ) {
         let (above, below) = (high - bounds.ceiling, bounds.floor - low);
         if above.max(below) > ROUNDING {
             self.above = self.above.max(above);

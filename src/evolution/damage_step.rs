@@ -50,15 +50,17 @@ impl<'a> DamageStep<'a> {
             let strain = self.setting.elasticity.strain_squared(body, u);
             let phi = source(body, &law, &strain, zeta);
             let least = phi.iter().flatten().copied().fold(0.0, f64::min);
+            let least = body.partition.ranks().min(least);
             (source_load(body, self.setting.mass(), &phi), least)
         }))
     }
 
     /// About the largest |dζ/dt| that the source of u and ζ causes, 1/s.
     pub(super) fn rate(&self, u: &[f64], zeta: &[f64]) -> f64 {
-        let area = &self.setting.body.node_area;
+        let body = &self.setting.body;
         let (load, _) = self.source(u, zeta).unwrap_or_default();
-        load.iter().zip(area).map(|(b, a)| b.abs() / a).fold(0.0, f64::max)
+        let rates = load.iter().zip(&body.node_area).map(|(b, a)| b.abs() / a);
+        body.partition.ranks().max(rates.take(body.partition.owned()).fold(0.0, f64::max))
     }
 
     /// Replaces ζ_{n−1} by ζ_n, `step` s later.
@@ -71,7 +73,9 @@ impl<'a> DamageStep<'a> {
         let (Some(law), Some((load, least))) = (self.law, self.source(u, zeta)) else {
             return Ok(Driving::Nothing);
         };
-        if load.iter().all(|&b| b == 0.0) && zeta.iter().all(|&z| z == zeta[0]) {
+        let partition = &self.setting.body.partition;
+        let (low, high) = partition.extremes(zeta);
+        if low == high && partition.ranks().all(load.iter().all(|&b| b == 0.0)) {
             return Ok(Driving::Nothing);
         }
         let mut system = match self.system.take() {
@@ -86,6 +90,7 @@ impl<'a> DamageStep<'a> {
             })?,
         };
         let solved = self.phases.time("damage solve", || system.advance(&load, zeta))?;
+        partition.update(zeta, 1)?;
         self.system = Some((step, system));
         Ok(if solved { Driving::Solved(least) } else { Driving::Failed })
     }

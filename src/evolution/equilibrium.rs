@@ -3,7 +3,8 @@
 mod accuracy;
 
 use super::{
-    ContactPoint, Phases, RunError, Setting, State, Step, StepRecord, extrapolation::Extrapolation,
+    ContactPoint, Phases, RunError, Setting, State, Step, StepRecord, agreed,
+    extrapolation::Extrapolation,
 };
 use crate::{
     contact::{self, ContactError, ContactProblem, ContactReport, ContactSolver, Kkt, RigidMotion},
@@ -60,7 +61,7 @@ impl<'a> Equilibrium<'a> {
             solver: contact::solver(
                 session,
                 solver,
-                !constraints.bounds.is_empty(),
+                body.partition.ranks().any(!constraints.bounds.is_empty()),
                 setting.scene().contact.penalty_duality,
             ),
             stiffness,
@@ -71,7 +72,7 @@ impl<'a> Equilibrium<'a> {
             prescribed: constraints.is_prescribed(),
             rigid: setting.motions.normal_at(body, &constraints.bounds),
             work: DVector::zeros(setting.motions.resisted()),
-            evolution: Extrapolation::new(owned),
+            evolution: Extrapolation::new(body.partition.ranks(), owned),
             warm_start: Vec::new(),
             report: ContactReport::default(),
         })
@@ -102,7 +103,7 @@ impl<'a> Equilibrium<'a> {
         let (setting, phases) = (self.setting, self.phases);
         self.fill(&setting.triangle_means(zeta))?;
         let external = phases.time("loads", || setting.loads.at(&setting.body, time));
-        let lift = setting.lift(time)?;
+        let lift = agreed(setting.body.partition.ranks(), setting.lift(time))?;
         setting.check_load(time, &external)?;
         let force_scale = self.set_load(&external, &lift)?;
 
@@ -155,7 +156,7 @@ impl<'a> Equilibrium<'a> {
 
     /// Fills K for the triangle means of η_*(ζ).
     fn fill(&mut self, zeta_mean: &[f64]) -> Result<(), PetscError> {
-        if zeta_mean != self.zeta_mean {
+        if self.setting.body.partition.ranks().any(zeta_mean != self.zeta_mean) {
             self.phases.time("stiffness refill", || self.stiffness.refill(zeta_mean))?;
             self.revision += 1;
             self.zeta_mean = zeta_mean.to_vec();
@@ -183,7 +184,7 @@ impl<'a> Equilibrium<'a> {
         let (body, frames) = (&setting.body, &setting.constraints.frames);
         let mut load = external.to_vec();
         let mut scale = body.partition.norm(&load, 2);
-        if lift.iter().any(|&v| v != 0.0) {
+        if body.partition.ranks().any(lift.iter().any(|&v| v != 0.0)) {
             let mut u = lift.to_vec();
             frames.displacement_from_frame(&mut u);
             let internal = setting.elasticity.internal_force(body, &self.zeta_mean, &u);
@@ -206,7 +207,8 @@ impl<'a> Equilibrium<'a> {
         tolerance: f64,
     ) -> Result<ContactReport, ContactError> {
         let setting = self.setting;
-        if self.load.read(|f| f.iter().all(|&f| f == 0.0))? {
+        let ranks = setting.body.partition.ranks();
+        if ranks.all(self.load.read(|f| f.iter().all(|&f| f == 0.0))?) {
             // Nothing pushes and no gap is negative: the body rests.
             self.c.write(|c| c.fill(0.0))?;
             return Ok(ContactReport::default());
@@ -221,6 +223,7 @@ impl<'a> Equilibrium<'a> {
             work: &self.work,
             force_scale,
             tolerance,
+            ranks,
         };
         self.phases.time("contact", || self.solver.solve(&problem, &mut self.c))
     }
@@ -231,6 +234,7 @@ impl<'a> Equilibrium<'a> {
         let mut u = lift.to_vec();
         self.c.read(|c| u.iter_mut().zip(c).for_each(|(u, c)| *u += c))?;
         setting.constraints.frames.displacement_from_frame(&mut u);
+        setting.body.partition.update(&mut u, 2)?;
         setting.motions.remove_free(&setting.body, &mut u);
         Ok(u)
     }
@@ -250,7 +254,7 @@ impl<'a> Equilibrium<'a> {
         let partition = &body.partition;
         let forces = partition.norm(external, 2).max(partition.norm(&internal, 2));
         let force_scale = forces.max(load_size);
-        let size = largest(u);
+        let size = partition.largest(u);
         let energy = partition.dot(&internal, u, 2)
             / (force_scale * partition.norm(u, 2)).max(f64::MIN_POSITIVE);
 
@@ -259,7 +263,9 @@ impl<'a> Equilibrium<'a> {
         constraints.frames.force_to_frame(&mut residual);
         constraints.frames.displacement_to_frame(&mut c);
         let bounds = &constraints.bounds;
-        let kkt = Kkt::of(&residual, &c, bounds, |dof| self.prescribed[dof], force_scale, size);
+        let owned = &residual[..2 * partition.owned()];
+        let prescribed = |dof: usize| self.prescribed[dof];
+        let kkt = Kkt::of(owned, &c, bounds, prescribed, force_scale, size, partition.ranks());
         let points = bounds.iter().map(|bound| {
             let (force, gap) = (-residual[bound.dof], bound.gap - c[bound.dof]);
             let active = force * size > gap * force_scale;
@@ -274,18 +280,14 @@ impl<'a> Equilibrium<'a> {
         // A residual at the tolerance does work of up to √N times that on a motion (Cauchy and
         // Schwarz), which at the lever of one mesh width, 1/√N of the body, is a force √N times
         // as large: a smaller one holds nothing for certain.
-        let nodes = self.setting.body.mesh.nodes.len() as f64;
+        let partition = &self.setting.body.partition;
+        let nodes = partition.total() as f64;
         let least = nodes * self.setting.tolerance * force_scale;
         let pressing: Vec<bool> = contact.iter().map(|point| point.force > least).collect();
-        let unheld = contact::unheld(&self.rigid, &pressing);
+        let unheld = contact::unheld(partition.ranks(), &self.rigid, &pressing);
         let first = unheld.first().filter(|_| force_scale > 0.0)?;
         Some(self.setting.motions.combined(first))
     }
-}
-
-/// The largest nodal |u|.
-fn largest(u: &[f64]) -> f64 {
-    u.chunks(2).map(|u| u[0].hypot(u[1])).fold(0.0, f64::max)
 }
 
 fn figures(
@@ -299,16 +301,18 @@ fn figures(
     let mut active: Vec<usize> =
         state.contact.iter().filter(|point| point.active).map(|point| point.node).collect();
     active.dedup();
+    let partition = &setting.body.partition;
+    let ranks = partition.ranks();
     StepRecord {
         step,
         time: state.time,
-        zeta_min: state.zeta.iter().copied().fold(f64::INFINITY, f64::min),
+        zeta_min: partition.extremes(&state.zeta).0,
         zeta_mean: setting.body.mean(&state.zeta),
-        displacement_max: largest(&state.u),
-        work: setting.body.partition.dot(external, &state.u, 2),
+        displacement_max: partition.largest(&state.u),
+        work: partition.dot(external, &state.u, 2),
         // An empty sum is -0.0, and so is one of reactions of nothing.
-        contact_force: state.contact.iter().map(|point| point.force).sum::<f64>() + 0.0,
-        active_nodes: active.len(),
+        contact_force: ranks.total(state.contact.iter().map(|point| point.force).sum()) + 0.0,
+        active_nodes: ranks.count(active.len()),
         iterations: report.iterations,
         linear_iterations: report.linear_iterations,
         factorisations: report.factorisations,

@@ -1,8 +1,11 @@
 //! The error of a time step in ζ, and what it means for the time of failure.
 
+use crate::fem::Partition;
+
 /// Rates of ζ of the last accepted step, for the estimate of the next.
-#[derive(Debug, Default)]
-pub(super) struct Estimate {
+#[derive(Debug)]
+pub(super) struct Estimate<'a> {
+    partition: &'a Partition,
     /// dζ/dt at the nodes, 1/s, and the step it was taken over, s.
     last: Option<(Vec<f64>, f64)>,
     /// Of each node, Σ of local errors over rates: how late it reaches a given ζ, s. (An error
@@ -18,7 +21,12 @@ pub(super) struct StepError {
     step: f64,
 }
 
-impl Estimate {
+impl<'a> Estimate<'a> {
+    /// Before any step.
+    pub(super) fn new(partition: &'a Partition) -> Self {
+        Self { partition, last: None, delay: Vec::new() }
+    }
+
     /// ½ k² ζ'' of the Euler step from `old` to `new` of length `step`. The source is taken at a
     /// step's beginning, so the rates of two steps are as far apart as the first is long.
     /// Nothing is known of the first step.
@@ -29,7 +37,7 @@ impl Estimate {
             Some((before, step_before)) => {
                 let curvature = |(r, b): (&f64, &f64)| (r - b).abs() / step_before;
                 let largest = rate.iter().zip(before).map(curvature).fold(0.0, f64::max);
-                0.5 * step * step * largest
+                0.5 * step * step * self.partition.ranks().max(largest)
             }
         };
         StepError { largest, rate, step }
@@ -50,7 +58,11 @@ impl Estimate {
 
     /// How late the node of least `zeta` is, s.
     pub(super) fn delay(&self, zeta: &[f64]) -> f64 {
-        let weakest = (0..zeta.len()).min_by(|&a, &b| zeta[a].total_cmp(&zeta[b]));
-        weakest.and_then(|i| self.delay.get(i)).copied().unwrap_or(0.0)
+        let owned = 0..self.partition.owned();
+        let weakest = owned.min_by(|&a, &b| zeta[a].total_cmp(&zeta[b]));
+        let delay = weakest.and_then(|i| self.delay.get(i)).copied().unwrap_or(0.0);
+        let ranks = self.partition.ranks();
+        let (_, rank) = ranks.least(weakest.map_or(f64::INFINITY, |i| zeta[i]));
+        ranks.value_of(rank, delay)
     }
 }

@@ -1,5 +1,6 @@
 //! Where the next solution is likely to be.
 
+use crate::petsc::Ranks;
 use std::collections::VecDeque;
 
 /// Polynomials in time through the last accepted solutions, as starts for iterative solvers.
@@ -10,6 +11,8 @@ pub(super) struct Extrapolation {
     /// (time, solution), the latest first.
     history: VecDeque<(f64, Vec<f64>)>,
     degree: usize,
+    /// The ranks among which solutions are divided.
+    ranks: Ranks,
 }
 
 /// Above this degree the tolerance of the solutions, magnified by 2^(degree + 1), prevails.
@@ -17,8 +20,9 @@ const HIGHEST: usize = 4;
 
 impl Extrapolation {
     /// Before any solution: 0.
-    pub(super) fn new(size: usize) -> Self {
-        Self { history: VecDeque::from([(f64::NEG_INFINITY, vec![0.0; size])]), degree: 0 }
+    pub(super) fn new(ranks: Ranks, size: usize) -> Self {
+        let history = VecDeque::from([(f64::NEG_INFINITY, vec![0.0; size])]);
+        Self { history, degree: 0, ranks }
     }
 
     /// The last accepted solution.
@@ -40,7 +44,8 @@ impl Extrapolation {
             let predicted = self.polynomial(degree, time);
             predicted.iter().zip(&solution).map(|(p, s)| (p - s).powi(2)).sum()
         };
-        let misses: Vec<f64> = (0..self.history.len().min(HIGHEST + 1)).map(miss).collect();
+        let mut misses: Vec<f64> = (0..self.history.len().min(HIGHEST + 1)).map(miss).collect();
+        self.ranks.sum(&mut misses);
         let best = (0..misses.len()).min_by(|&a, &b| misses[a].total_cmp(&misses[b]));
         // One degree more than was possible so far is tried as soon as the highest was best.
         self.degree = match best {
@@ -72,7 +77,7 @@ mod tests {
     #[test]
     fn a_quadratic_evolution_is_predicted_exactly_from_uneven_times() {
         let solution = |t: f64| vec![1.0 + t * t, 3.0 * t];
-        let mut extrapolation = Extrapolation::new(2);
+        let mut extrapolation = Extrapolation::new(Ranks::alone(), 2);
         assert_eq!(extrapolation.at(0.0), [0.0, 0.0]);
         for t in [0.0, 0.1, 0.3, 0.35, 0.5, 0.6] {
             extrapolation.accept(t, solution(t));
@@ -83,7 +88,7 @@ mod tests {
 
     #[test]
     fn a_jump_lowers_the_degree() {
-        let mut extrapolation = Extrapolation::new(1);
+        let mut extrapolation = Extrapolation::new(Ranks::alone(), 1);
         for (t, s) in [(0.0, 0.0), (1.0, 1.0), (2.0, 2.0), (3.0, 2.0), (4.0, 2.0)] {
             extrapolation.accept(t, vec![s]);
         }

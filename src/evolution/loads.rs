@@ -1,7 +1,7 @@
 //! The loads and prescribed displacements of a scene as functions of time.
 
 use crate::{
-    fem::{Body, add_body_force, add_traction},
+    fem::{Body, Share, add_body_force, add_traction},
     scene::{Boundary, Expression, Scene},
 };
 
@@ -37,6 +37,16 @@ impl Loads {
             loads.constant = Some(loads.assemble(body, 0.0));
         }
         loads
+    }
+
+    /// The loads on a rank's share. Values of the fixed rows are needed wherever one is known.
+    pub fn share(self, share: &Share) -> Self {
+        let edges = |(edges, f): (Vec<[usize; 2]>, _)| (share.edges(&edges), f);
+        Self {
+            tractions: self.tractions.into_iter().map(edges).collect(),
+            constant: self.constant.map(|load| share.field(&load, 2)),
+            ..self
+        }
     }
 
     /// Nodal loads at time t, N per metre of thickness.

@@ -22,7 +22,7 @@ pub use state::{ContactPoint, State, Step, StepRecord};
 
 use crate::{
     contact::{ContactError, Kkt, RigidMotion},
-    petsc::{PetscError, Session},
+    petsc::{PetscError, Ranks, Session},
 };
 use bounds::Bounds;
 use clock::Clock;
@@ -92,6 +92,9 @@ pub enum RunError {
     /// The scene contradicts itself at some time.
     #[error(transparent)]
     Setup(#[from] SetupError),
+    /// Another rank failed where this one did not.
+    #[error("another rank failed")]
+    Elsewhere,
     /// PETSc failed.
     #[error(transparent)]
     Petsc(#[from] PetscError),
@@ -121,10 +124,12 @@ pub fn run(
     // (27): the displacement at t = 0, or the only one where there is no time.
     let last = equilibrium.solve(0, setting.start(), &setting.initial_damage())?;
     equilibrium.accept(setting.start())?;
-    accepted(&last).map_err(RunError::Observer)?;
+    agreed(setting.body.partition.ranks(), accepted(&last).map_err(RunError::Observer))?;
     let mut clock = Clock::new(setting.scene().time, damage.rate(&last.state.u, &last.state.zeta));
-    let mut estimate = Estimate::default();
-    let mut bounds = Bounds::of(&last.state.zeta);
+    let partition = &setting.body.partition;
+    let ranks = partition.ranks();
+    let mut estimate = Estimate::new(partition);
+    let mut bounds = Bounds::of(partition.extremes(&last.state.zeta));
     let mut outcome = Outcome::new(last);
 
     while let Some((time, step)) = clock.propose() {
@@ -134,7 +139,8 @@ pub fn run(
         // (28): ζ_n from u_{n−1} and ζ_{n−1}.
         let mut zeta = old.zeta.clone();
         let driving = damage.advance(&old.u, &mut zeta, step)?;
-        if driving == Driving::Failed || !zeta.iter().all(|z| z.is_finite()) {
+        let finite = ranks.all(zeta.iter().all(|z| z.is_finite()));
+        if driving == Driving::Failed || !finite {
             if clock.cut(step, 0.5) {
                 outcome.undone += 1;
                 continue;
@@ -142,10 +148,11 @@ pub fn run(
             return Err(RunError::Damage { step: n, time });
         }
 
+        let extremes = partition.extremes(&zeta);
         let allowed = bounds.after(driving.least_source(), step);
 
         // The program stops when ζ_* is reached; chosen steps land there.
-        if let Some(reached) = setting.at_threshold(&zeta) {
+        if let Some(reached) = Some(extremes.0).filter(|least| *least <= setting.threshold()) {
             let (from, level) = (outcome.last.record.zeta_min, setting.threshold());
             let share = ((from - level) / (from - reached)).clamp(0.0, 1.0);
             let landed = clock.tolerance().is_none_or(|tolerance| from - level <= tolerance);
@@ -162,7 +169,7 @@ pub fn run(
             };
             // The estimate of the delay is good to a factor of 2.
             let uncertainty = step + 2.0 * delay.abs();
-            outcome.excess.observe(allowed, &zeta, n, time);
+            outcome.excess.observe(allowed, extremes, n, time);
             let floor = allowed.floor();
             outcome.stopped = Some(Stop { time, zeta_min: reached, floor, uncertainty });
             break;
@@ -191,14 +198,23 @@ pub fn run(
         equilibrium.accept(time)?;
         clock.accept(time, step, error.largest);
         estimate.accept(error);
-        outcome.excess.observe(allowed, &zeta, n, time);
-        bounds = allowed.tightened(&zeta);
+        outcome.excess.observe(allowed, extremes, n, time);
+        bounds = allowed.tightened(extremes);
         last.record.seconds = started.elapsed().as_secs_f64();
-        accepted(&last).map_err(RunError::Observer)?;
+        agreed(ranks, accepted(&last).map_err(RunError::Observer))?;
         outcome.accept(last, driving);
     }
     outcome.accuracy = phases.time("accuracy", || equilibrium.accuracy(&outcome.last.state))?;
     Ok(outcome)
+}
+
+/// All ranks go on, or none. Collective.
+fn agreed<T, E: Into<RunError>>(ranks: Ranks, result: Result<T, E>) -> Result<T, RunError> {
+    let failed = ranks.any(result.is_err());
+    match result {
+        Ok(_) if failed => Err(RunError::Elsewhere),
+        result => result.map_err(E::into),
+    }
 }
 
 impl Outcome {

@@ -123,8 +123,11 @@ impl Setting {
         let nodes = &self.body.mesh.nodes;
         let angles =
             self.body.mesh.triangles.iter().map(|t| (smallest_angle(t.map(|i| nodes[i])), t));
-        let (angle, triangle) = angles.min_by(|(a, _), (b, _)| a.total_cmp(b))?;
-        let [x, y] = nodes[triangle[0]];
+        let least = angles.min_by(|(a, _), (b, _)| a.total_cmp(b));
+        let ranks = self.body.partition.ranks();
+        let (angle, rank) = ranks.least(least.map_or(f64::INFINITY, |(angle, _)| angle));
+        let at = least.map_or([0.0; 2], |(_, triangle)| nodes[triangle[0]]);
+        let [x, y] = at.map(|coordinate| ranks.value_of(rank, coordinate));
         (angle < SLIVER).then(|| {
             format!(
                 "a triangle at ({x:.4}, {y:.4}) has an angle of {angle:.1e}°: round-off grows as \

@@ -3,9 +3,10 @@
 use super::Loads;
 use crate::{
     contact::{ConstraintError, Constraints, DrivenMotion, FixedRow, GapRow, RigidMotions},
-    fem::{Body, Elasticity, Mass},
+    fem::{Body, Elasticity, Mass, Share},
     mesh::{Mesh, boundary_nodes},
     model::DamageLaw,
+    petsc::{PetscError, Session},
     scene::{Scene, SceneError, Stepping, TimeGrid},
 };
 use std::path::PathBuf;
@@ -98,6 +99,20 @@ impl Setting {
         Ok(setting)
     }
 
+    /// This rank's share of a setting that every rank has made. Collective.
+    ///
+    /// # Errors
+    /// PETSc cannot divide the mesh.
+    pub fn share(self, session: &Session) -> Result<Self, PetscError> {
+        let Some(share) = Share::of(session, &self.body.mesh)? else { return Ok(self) };
+        Ok(Self {
+            constraints: self.constraints.share(&share),
+            loads: self.loads.share(&share),
+            body: share.body(&self.body),
+            ..self
+        })
+    }
+
     /// Checks the times known beforehand, so that bad input is refused before anything is written.
     fn check_times(&self) -> Result<(), SetupError> {
         let (end, steps) = match self.scene.time {
@@ -119,7 +134,8 @@ impl Setting {
     /// # Errors
     /// It is not, or it does; the error then names the motion.
     pub fn check_load(&self, time: f64, load: &[f64]) -> Result<(), SetupError> {
-        if !load.iter().all(|f| f.is_finite()) {
+        let ranks = self.body.partition.ranks();
+        if !ranks.all(load.iter().all(|f| f.is_finite())) {
             return Err(SetupError::NotFinite { scene: self.scene.path.clone(), time });
         }
         if self.motions.held() {
@@ -171,12 +187,6 @@ impl Setting {
     /// ζ_*, 0 for a material that is not damaged.
     pub fn threshold(&self) -> f64 {
         self.scene.damage.as_ref().map_or(0.0, |damage| damage.law.threshold)
-    }
-
-    /// min ζ if it has reached ζ_*.
-    pub fn at_threshold(&self, zeta: &[f64]) -> Option<f64> {
-        let least = zeta.iter().copied().fold(f64::INFINITY, f64::min);
-        (least <= self.threshold()).then_some(least)
     }
 
     /// The mean of η_*(ζ) over each triangle.

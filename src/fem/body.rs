@@ -10,10 +10,14 @@ pub struct Body {
     pub mesh: Mesh,
     /// Area and gradients, one per triangle of the mesh.
     pub triangles: Vec<Triangle>,
+    /// Of these, the first so many are this rank's own: every triangle is one rank's.
+    pub own_triangles: usize,
     /// Ownership of the nodes.
     pub partition: Partition,
     /// ∫ λ_i, m²: the weight of each node in an integral.
     pub node_area: Vec<f64>,
+    /// |Ω| of the whole body, m².
+    pub area: f64,
 }
 
 impl Body {
@@ -29,7 +33,8 @@ impl Body {
                 node_area[node] += triangle.area / 3.0;
             }
         }
-        Self { mesh, triangles, partition, node_area }
+        let (own_triangles, area) = (triangles.len(), node_area.iter().sum());
+        Self { mesh, triangles, own_triangles, partition, node_area, area }
     }
 
     /// The six displacements of a triangle out of a nodal field.
@@ -40,7 +45,6 @@ impl Body {
 
     /// ∫ζ/|Ω| of a nodal field.
     pub fn mean(&self, field: &[f64]) -> f64 {
-        let area: f64 = self.node_area.iter().sum();
-        self.partition.dot(&self.node_area, field, 1) / area
+        self.partition.dot(&self.node_area, field, 1) / self.area
     }
 }

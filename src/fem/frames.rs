@@ -1,5 +1,6 @@
 //! Local bases at constrained nodes, so that every constraint concerns one unknown.
 
+use super::Share;
 use nalgebra::{Matrix2, Vector2};
 
 /// At some nodes the unknowns are c = D u with the rows of D the constrained directions
@@ -20,6 +21,21 @@ impl Frames {
     /// The identity at each of `nodes` nodes, nothing fixed.
     pub fn identity(nodes: usize) -> Self {
         Self { directions: Vec::new(), index: vec![IDENTITY; nodes], fixed: vec![false; 2 * nodes] }
+    }
+
+    /// The frames of the nodes of a rank's share.
+    pub(crate) fn share(&self, share: &Share) -> Self {
+        let mut frames = Self {
+            directions: Vec::new(),
+            index: share.field(&vec![IDENTITY; self.index.len()], 1),
+            fixed: share.field(&self.fixed, 2),
+        };
+        for (node, directions, _) in &self.directions {
+            if let Some(node) = share.local(*node) {
+                frames.set(node, *directions);
+            }
+        }
+        frames
     }
 
     /// Makes the rows of `directions` the basis at `node`; they must be independent.

@@ -7,6 +7,7 @@
 mod triangle;
 mod partition;
 mod body;
+mod share;
 mod frames;
 mod elasticity;
 mod stiffness;
@@ -20,5 +21,6 @@ pub use elasticity::Elasticity;
 pub use frames::Frames;
 pub use loads::{add_body_force, add_traction};
 pub use partition::Partition;
+pub use share::Share;
 pub use stiffness::Stiffness;
 pub use triangle::Triangle;

@@ -64,7 +64,8 @@ impl Stiffness {
             rows.push(partition.row(dof / 2, 2, dof % 2));
             columns.push(partition.row(dof / 2, 2, dof % 2));
         }
-        let free = 2 * partition.owned() - diagonal.len();
+        let trace = partition.ranks().total(trace);
+        let free = partition.ranks().count(2 * partition.owned() - diagonal.len());
         let scale = if trace > 0.0 { trace / free as f64 } else { elasticity.material.young };
 
         let values = vec![scale; rows.len()];
@@ -101,14 +102,16 @@ impl Stiffness {
 /// A triangle and two of its corners.
 type Place = (u32, u8, u8);
 
-/// All pairs of nodes {a ≥ b} with a common triangle, each with the end of its places in the
-/// first list.
+/// All pairs of nodes {a ≥ b} with a common triangle, one of them owned, each with the end of its
+/// places in the first list.
 fn pairs(body: &Body) -> (Vec<Place>, Vec<([usize; 2], u32)>) {
     let mut found: Vec<([u32; 2], Place)> = Vec::with_capacity(6 * body.triangles.len());
     for (t, nodes) in body.mesh.triangles.iter().enumerate() {
         for (i, j) in [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)] {
             let (i, j) = if nodes[i] >= nodes[j] { (i, j) } else { (j, i) };
-            found.push(([nodes[i] as u32, nodes[j] as u32], (t as u32, i as u8, j as u8)));
+            if nodes[j] < body.partition.owned() {
+                found.push(([nodes[i] as u32, nodes[j] as u32], (t as u32, i as u8, j as u8)));
+            }
         }
     }
     found.sort_unstable();

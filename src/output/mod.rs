@@ -1,7 +1,8 @@
-//! What a run leaves behind: `fields.pvd` with its `.vtu` files, `history.csv`, `summary.json`.
+//! What a run leaves behind: `fields.pvd` with its frames, `history.csv`, `summary.json`.
 
 mod array;
 mod history;
+mod pieces;
 mod summary;
 mod vtu;
 
@@ -48,7 +49,8 @@ pub fn prepare(folder: &Path) -> Result<(), OutputError> {
     let entries = std::fs::read_dir(folder).map_err(|e| OutputError::new(folder, e))?;
     for path in entries.flatten().map(|entry| entry.path()) {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let ours = (name.starts_with("fields_") && name.ends_with(".vtu"))
+        let frame = name.ends_with(".vtu") || name.ends_with(".pvtu");
+        let ours = (name.starts_with("fields_") && frame)
             || ["fields.pvd", "history.csv", "summary.json"].contains(&name.as_ref());
         if ours {
             std::fs::remove_file(&path).map_err(|e| OutputError::new(&path, e))?;

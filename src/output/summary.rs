@@ -15,6 +15,8 @@ pub struct Summary {
     pub title: String,
     /// The contact solver.
     pub solver: String,
+    /// Ranks among which the mesh was divided.
+    pub ranks: usize,
     /// Nodes of the mesh.
     pub nodes: usize,
     /// Triangles of the mesh.

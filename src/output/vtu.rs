@@ -6,14 +6,21 @@
 use super::{
     OutputError,
     array::{data_array, head},
+    pieces::{Piece, list, piece_name},
     write_whole,
 };
-use crate::evolution::{Setting, State};
+use crate::{
+    evolution::{Setting, State},
+    petsc::{PetscError, Ranks},
+};
 use std::path::{Path, PathBuf};
 
-/// Writes `fields_NNNN.vtu` frames and keeps `fields.pvd` their list.
+/// Writes `fields_NNNN.vtu` frames and keeps `fields.pvd` their list. Of several ranks each writes
+/// its piece `fields_NNNN_R.vtu`, and the first the lists: `fields_NNNN.pvtu` and `fields.pvd`.
 pub struct FieldWriter {
     folder: PathBuf,
+    ranks: Ranks,
+    piece: Piece,
     /// Points and cells, the same in every frame.
     mesh: String,
     frames: Vec<(f64, String)>,
@@ -21,6 +28,16 @@ pub struct FieldWriter {
 
 /// VTK_TRIANGLE.
 const TRIANGLE: u8 = 5;
+/// The arrays of every frame: name, VTK's type, components.
+const AT_POINTS: [(&str, &str, usize); 4] = [
+    ("displacement", "Float64", 3),
+    ("zeta", "Float64", 1),
+    ("normal_pressure", "Float64", 1),
+    ("gap", "Float64", 1),
+];
+const IN_CELLS: [(&str, &str, usize); 2] = [("von_mises", "Float64", 1), ("stress", "Float64", 3)];
+/// The number of a node in the whole body, by which pieces can be joined.
+const NUMBER: (&str, &str, usize) = ("global_node", "Int32", 1);
 
 impl FieldWriter {
     /// A writer for the body of `setting` into `folder`.
@@ -28,8 +45,11 @@ impl FieldWriter {
     /// # Errors
     /// The mesh cannot be encoded.
     pub fn new(folder: &Path, setting: &Setting) -> Result<Self, OutputError> {
-        let mesh = mesh(setting).map_err(|e| OutputError::new(folder, e))?;
-        Ok(Self { folder: folder.to_owned(), mesh, frames: Vec::new() })
+        let body = &setting.body;
+        let piece = Piece::of(body);
+        let mesh = mesh(&piece, &body.mesh.nodes).map_err(|e| OutputError::new(folder, e))?;
+        let ranks = body.partition.ranks();
+        Ok(Self { folder: folder.to_owned(), ranks, piece, mesh, frames: Vec::new() })
     }
 
     /// Time of the last frame written.
@@ -37,25 +57,37 @@ impl FieldWriter {
         self.frames.last().map(|(time, _)| *time)
     }
 
-    /// Writes a frame and the collection that names it.
+    /// Writes a frame and the collection that names it. Collective.
     ///
     /// # Errors
     /// A file cannot be written.
     pub fn add(&mut self, setting: &Setting, state: &State) -> Result<(), OutputError> {
-        let name = format!("fields_{:04}.vtu", self.frames.len());
-        let path = self.folder.join(&name);
-        let data = fields(setting, state).map_err(|e| OutputError::new(&path, e))?;
-        let body = &setting.body.mesh;
+        let stem = format!("fields_{:04}", self.frames.len());
+        let (piece, frame) = match self.ranks.is_alone() {
+            true => (format!("{stem}.vtu"), format!("{stem}.vtu")),
+            false => (piece_name(&stem, self.ranks.rank()), format!("{stem}.pvtu")),
+        };
+        self.frames.push((state.time, frame.clone()));
+        let path = self.folder.join(&piece);
+        let contact = contact_fields(setting, state).map_err(|e| OutputError::new(&path, e))?;
+        let data = self.fields(setting, state, contact).map_err(|e| OutputError::new(&path, e))?;
         let content = format!(
             "{}<UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n{}{data}\
              </Piece>\n</UnstructuredGrid>\n</VTKFile>\n",
             head("UnstructuredGrid"),
-            body.nodes.len(),
-            body.triangles.len(),
+            self.piece.nodes.len(),
+            self.piece.corners.len(),
             self.mesh
         );
         write_whole(&path, content.as_bytes())?;
-        self.frames.push((state.time, name));
+        if !self.ranks.is_first() {
+            return Ok(());
+        }
+        if !self.ranks.is_alone() {
+            let points = [&AT_POINTS[..], &[NUMBER]].concat();
+            let text = list(&stem, self.ranks.size(), &points, &IN_CELLS);
+            write_whole(&self.folder.join(frame), text.as_bytes())?;
+        }
         write_whole(&self.folder.join("fields.pvd"), self.collection().as_bytes())
     }
 
@@ -65,52 +97,66 @@ impl FieldWriter {
             .collect();
         format!("{}<Collection>\n{frames}</Collection>\n</VTKFile>\n", head("Collection"))
     }
+
+    /// `<PointData>` and `<CellData>`.
+    fn fields(
+        &self,
+        setting: &Setting,
+        state: &State,
+        (pressure, gap): (Vec<f64>, Vec<f64>),
+    ) -> std::io::Result<String> {
+        let (elasticity, piece) = (&setting.elasticity, &self.piece);
+        let stress: Vec<_> = (state.zeta_mean.iter().enumerate().take(piece.corners.len()))
+            .map(|(t, zeta)| elasticity.stress(&setting.body, t, *zeta, &state.u))
+            .collect();
+        let u = &state.u;
+        let displacement = piece.nodes.iter().flat_map(|&i| [u[2 * i], u[2 * i + 1], 0.0]);
+        let von_mises = stress.iter().map(|s| elasticity.material.von_mises(s));
+        let components = stress.iter().flat_map(|s| [s[0], s[1], s[2]]);
+        let number = |&node: &usize| setting.body.partition.global(node, 1, 0);
+        let [(u, _, width), (zeta, ..), (p, ..), (g, ..)] = AT_POINTS;
+        let [(mises, ..), (sigma, _, parts)] = IN_CELLS;
+        Ok([
+            "<PointData>\n".to_owned(),
+            data_array(u, width, displacement)?,
+            data_array(zeta, 1, piece.values(&state.zeta))?,
+            data_array(p, 1, piece.values(&pressure))?,
+            data_array(g, 1, piece.values(&gap))?,
+            match self.ranks.is_alone() {
+                true => String::new(),
+                false => data_array(NUMBER.0, 1, piece.nodes.iter().map(number))?,
+            },
+            "</PointData>\n<CellData>\n".to_owned(),
+            data_array(mises, 1, von_mises)?,
+            data_array(sigma, parts, components)?,
+            "</CellData>\n".to_owned(),
+        ]
+        .concat())
+    }
 }
 
 /// `<Points>` and `<Cells>`.
-fn mesh(setting: &Setting) -> std::io::Result<String> {
-    let mesh = &setting.body.mesh;
-    let cells = mesh.triangles.len();
-    let points = data_array("Points", 3, mesh.nodes.iter().flat_map(|&[x, y]| [x, y, 0.0]))?;
-    let corners = mesh.triangles.iter().flatten().map(|&node| node as i32);
+fn mesh(piece: &Piece, nodes: &[[f64; 2]]) -> std::io::Result<String> {
+    let cells = piece.corners.len();
+    let points = data_array("Points", 3, piece.values(nodes).flat_map(|[x, y]| [x, y, 0.0]))?;
+    let corners = piece.corners.iter().flatten().map(|&node| node as i32);
     let connectivity = data_array("connectivity", 1, corners)?;
     let offsets = data_array("offsets", 1, (1..=cells).map(|t| 3 * t as i32))?;
     let types = data_array("types", 1, (0..cells).map(|_| TRIANGLE))?;
     Ok(format!("<Points>\n{points}</Points>\n<Cells>\n{connectivity}{offsets}{types}</Cells>\n"))
 }
 
-/// `<PointData>` and `<CellData>`.
-fn fields(setting: &Setting, state: &State) -> std::io::Result<String> {
-    let elasticity = &setting.elasticity;
-    let stress: Vec<_> = (state.zeta_mean.iter().enumerate())
-        .map(|(t, zeta)| elasticity.stress(&setting.body, t, *zeta, &state.u))
-        .collect();
-    let (pressure, gap) = contact_fields(state);
-    let displacement = state.u.chunks(2).flat_map(|u| [u[0], u[1], 0.0]);
-    let von_mises = stress.iter().map(|s| elasticity.material.von_mises(s));
-    let components = stress.iter().flat_map(|s| [s[0], s[1], s[2]]);
-    Ok([
-        "<PointData>\n".to_owned(),
-        data_array("displacement", 3, displacement)?,
-        data_array("zeta", 1, state.zeta.iter().copied())?,
-        data_array("normal_pressure", 1, pressure.into_iter())?,
-        data_array("gap", 1, gap.into_iter())?,
-        "</PointData>\n<CellData>\n".to_owned(),
-        data_array("von_mises", 1, von_mises)?,
-        data_array("stress", 3, components)?,
-        "</CellData>\n".to_owned(),
-    ]
-    .concat())
-}
-
 /// Contact pressure (0 off Γ_C) and remaining gap (NaN off Γ_C) at the nodes; where two
 /// conditions meet at a corner, the larger pressure and the smaller gap.
-fn contact_fields(state: &State) -> (Vec<f64>, Vec<f64>) {
+fn contact_fields(setting: &Setting, state: &State) -> Result<(Vec<f64>, Vec<f64>), PetscError> {
     let mut pressure = vec![0.0_f64; state.zeta.len()];
     let mut gap = vec![f64::NAN; state.zeta.len()];
     for point in &state.contact {
         pressure[point.node] = pressure[point.node].max(point.pressure);
         gap[point.node] = gap[point.node].min(point.gap);
     }
-    (pressure, gap)
+    let partition = &setting.body.partition;
+    partition.update(&mut pressure, 1)?;
+    partition.update(&mut gap, 1)?;
+    Ok((pressure, gap))
 }

@@ -5,7 +5,7 @@ use super::{
     session::{Live, c_string, world},
     vec::same_size,
 };
-use std::ptr;
+use std::{ffi::CStr, ptr};
 
 /// A Cholesky factor (PCCHOLESKY): CHOLMOD's on one rank, MUMPS' on several.
 ///
@@ -21,7 +21,7 @@ impl Factor {
         cholesky_options(session, prefix)?;
         let mut factor = Self { raw: ptr::null_mut(), _live: Live::new() };
         let prefix = c_string(prefix)?;
-        let package = if session.ranks() == 1 { c"cholmod" } else { c"mumps" };
+        let package = package(session);
         // SAFETY: a fresh handle, strings that live during the calls.
         unsafe {
             check(raw::PCCreate(world(), &mut factor.raw))?;
@@ -36,7 +36,7 @@ impl Factor {
     /// Factorises the present values of `matrix`; false if it is not positive definite.
     pub fn factorise(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
         // SAFETY: a live handle.
-        definite(unsafe { self.factorise_raw(matrix.raw, false) })
+        unsafe { self.factorise_raw(matrix.raw, false) }
     }
 
     /// As `factorise`; a matrix of another `pattern` than the last needs a new ordering.
@@ -47,7 +47,7 @@ impl Factor {
         &mut self,
         matrix: raw::Mat,
         pattern: bool,
-    ) -> Result<(), PetscError> {
+    ) -> Result<bool, PetscError> {
         // SAFETY: live handles; PETSc keeps a reference to the matrix. Without the last call it
         // would factorise again when that matrix changes.
         unsafe {
@@ -56,8 +56,9 @@ impl Factor {
             }
             check(raw::PCSetReusePreconditioner(self.raw, raw::PetscBool::PETSC_FALSE))?;
             check(raw::PCSetOperators(self.raw, matrix, matrix))?;
-            check(raw::PCSetUp(self.raw))?;
-            check(raw::PCSetReusePreconditioner(self.raw, raw::PetscBool::PETSC_TRUE))
+            let definite = definite(self.raw, check(raw::PCSetUp(self.raw)))?;
+            check(raw::PCSetReusePreconditioner(self.raw, raw::PetscBool::PETSC_TRUE))?;
+            Ok(definite)
         }
     }
 
@@ -77,23 +78,58 @@ impl Factor {
 }
 
 /// Left to itself CHOLMOD makes LDLᵀ of a small matrix, accepts negative pivots, and prints its
-/// warnings into the results.
+/// warnings into the results. MUMPS' guess of the memory it needs is now and then too small.
 pub(super) fn cholesky_options(session: &Session, prefix: &str) -> Result<(), PetscError> {
-    for (option, value) in [("final_asis", "0"), ("final_ll", "1"), ("print", "0")] {
-        session.default_option(&format!("-{prefix}mat_cholmod_{option}"), value)?;
+    let options = match session.ranks().is_alone() {
+        true => {
+            &[("cholmod_final_asis", "0"), ("cholmod_final_ll", "1"), ("cholmod_print", "0")][..]
+        }
+        false => &[("mumps_icntl_14", "100")],
+    };
+    for (option, value) in options {
+        session.default_option(&format!("-{prefix}mat_{option}"), value)?;
     }
     Ok(())
 }
 
-/// Tells a matrix that is not positive definite from other failures of its factorisation.
-pub(super) fn definite(factorised: Result<(), PetscError>) -> Result<bool, PetscError> {
-    /// PETSC_ERR_MAT_CH_ZRPVT: a pivot of the Cholesky factorisation is not positive.
+/// The package that makes Cholesky factors.
+pub(super) fn package(session: &Session) -> &'static CStr {
+    if session.ranks().is_alone() { c"cholmod" } else { c"mumps" }
+}
+
+/// Tells a matrix that is not positive definite from other failures of setting up `pc`.
+///
+/// # Safety
+/// `pc` is a live handle.
+pub(super) unsafe fn definite(
+    pc: raw::PC,
+    set_up: Result<(), PetscError>,
+) -> Result<bool, PetscError> {
+    /// PETSC_ERR_MAT_CH_ZRPVT: a pivot of CHOLMOD's factorisation is not positive.
     const NOT_DEFINITE: i32 = 81;
-    match factorised {
-        Ok(()) => Ok(true),
-        Err(error) if error.code == NOT_DEFINITE => Ok(false),
-        Err(other) => Err(other),
+    /// Where MUMPS counts negative pivots (INFOG(12)): it makes LDLᵀ and does not mind them.
+    const NEGATIVE: i32 = 12;
+    match set_up {
+        Ok(()) => {}
+        Err(error) if error.code == NOT_DEFINITE => return Ok(false),
+        Err(other) => return Err(other),
     }
+    let mut reason = raw::PCFailedReason::PC_NOERROR;
+    let (mut factor, mut package, mut negative) = (ptr::null_mut(), ptr::null(), 0);
+    // SAFETY: a live handle; the package's name is a constant of PETSc.
+    unsafe {
+        check(raw::PCGetFailedReason(pc, &mut reason))?;
+        if reason != raw::PCFailedReason::PC_NOERROR {
+            return Ok(false);
+        }
+        // Other preconditioners leave the name as it is.
+        check(raw::PCFactorGetMatSolverType(pc, &mut package))?;
+        if !package.is_null() && CStr::from_ptr(package) == c"mumps" {
+            check(raw::PCFactorGetMatrix(pc, &mut factor))?;
+            check(raw::MatMumpsGetInfog(factor, NEGATIVE, &mut negative))?;
+        }
+    }
+    Ok(negative == 0)
 }
 
 impl Drop for Factor {

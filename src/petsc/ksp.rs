@@ -2,7 +2,7 @@
 
 use super::{
     Matrix, PetscError, Session, Vector, check,
-    factor::{cholesky_options, definite},
+    factor::{cholesky_options, definite, package},
     raw,
     session::{Live, c_string, world},
     vec::same_size,
@@ -40,7 +40,7 @@ impl LinearSolver {
         cholesky_options(session, prefix)?;
         let mut solver = Self { raw: ptr::null_mut(), definite: false, _live: Live::new() };
         let prefix = c_string(prefix)?;
-        let package = if session.ranks() == 1 { c"cholmod" } else { c"mumps" };
+        let package = package(session);
         let mut pc = ptr::null_mut();
         // SAFETY: a fresh handle, strings that live during the calls.
         unsafe {
@@ -62,11 +62,12 @@ impl LinearSolver {
     pub fn factorise(&mut self, matrix: &Matrix) -> Result<(), PetscError> {
         // SAFETY: live handles. KSPSetOperators marks the values as new, else the
         // factorisation would wait for the next solve.
-        let done = unsafe {
+        self.definite = unsafe {
+            let mut pc = ptr::null_mut();
+            check(raw::KSPGetPC(self.raw, &mut pc))?;
             check(raw::KSPSetOperators(self.raw, matrix.raw, matrix.raw))?;
-            check(raw::KSPSetUp(self.raw))
+            definite(pc, check(raw::KSPSetUp(self.raw)))?
         };
-        self.definite = definite(done)?;
         Ok(())
     }
 

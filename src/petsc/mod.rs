@@ -10,8 +10,11 @@
 
 mod error;
 mod factor;
+mod ghosts;
+mod graph;
 mod ksp;
 mod mat;
+mod ranks;
 mod session;
 mod shell;
 mod tao;
@@ -33,8 +36,11 @@ mod raw {
 
 pub use error::PetscError;
 pub use factor::Factor;
+pub use ghosts::Ghosts;
+pub use graph::divide;
 pub use ksp::{Krylov, LinearSolver};
 pub use mat::Matrix;
+pub use ranks::Ranks;
 pub use session::Session;
 pub use tao::{BoundedQuadratic, TaoReport};
 pub use vec::Vector;

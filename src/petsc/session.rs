@@ -1,6 +1,6 @@
 //! PETSc's life in this process.
 
-use super::{PetscError, check, error, raw};
+use super::{PetscError, Ranks, check, error, raw};
 use std::{
     ffi::{CStr, CString, c_char, c_int},
     ptr,
@@ -46,12 +46,9 @@ impl Session {
         Ok(Self { _turn: turn })
     }
 
-    /// Number of ranks in the world communicator.
-    pub fn ranks(&self) -> usize {
-        let mut size: c_int = 1;
-        // SAFETY: MPI runs while a session exists.
-        unsafe { raw::MPI_Comm_size(world(), &mut size) };
-        size as usize
+    /// The ranks of the world communicator.
+    pub fn ranks(&self) -> Ranks {
+        Ranks::of_world()
     }
 
     /// Options of the database that nothing has read: most likely misspelt.

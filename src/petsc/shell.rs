@@ -19,7 +19,7 @@ impl KeptFactor {
     /// In a box, because PETSc keeps its address.
     pub(super) fn new(session: &Session) -> Result<Box<Self>, PetscError> {
         let factor = Factor::new(session, "elastic_")?;
-        let wear = Wear::default();
+        let wear = Wear::new(session.ranks());
         Ok(Box::new(Self { factor, wear, size: 0, applications: 0, factorisations: 0 }))
     }
 
@@ -51,7 +51,9 @@ impl KeptFactor {
         }
         let started = Instant::now();
         // SAFETY: a live matrix.
-        unsafe { self.factor.factorise_raw(matrix, size != self.size)? };
+        if !unsafe { self.factor.factorise_raw(matrix, size != self.size)? } {
+            return Err(PetscError::ours("the matrix is not positive definite"));
+        }
         self.size = size;
         self.factorisations += 1;
         self.wear.renewed(started.elapsed().as_secs_f64());

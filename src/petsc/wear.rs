@@ -1,12 +1,16 @@
 //! When a factor that preconditions other matrices than its own is to be renewed.
 
+use super::Ranks;
+
 /// What a factor and its age cost.
 ///
 /// An ageing factor costs iterations. It is worn out when the time so lost since it was made
 /// reaches the time a new one takes: where the loss per solve grows evenly, that is the cheapest
-/// moment; otherwise it costs at most twice the cheapest.
+/// moment; otherwise it costs at most twice the cheapest. Ranks measure different times but decide
+/// alike.
 #[derive(Debug)]
 pub struct Wear {
+    ranks: Ranks,
     /// Seconds of the last factorisation.
     factorisation: f64,
     /// Seconds of all iterations so far, and their number.
@@ -19,14 +23,12 @@ pub struct Wear {
 const FEWEST: usize = 3;
 const MOST: usize = 200;
 
-impl Default for Wear {
-    /// Before the first factorisation: worn out.
-    fn default() -> Self {
-        Self { factorisation: 0.0, iterations: (0.0, 0), lost: f64::INFINITY }
-    }
-}
-
 impl Wear {
+    /// Before the first factorisation: worn out.
+    pub fn new(ranks: Ranks) -> Self {
+        Self { ranks, factorisation: 0.0, iterations: (0.0, 0), lost: f64::INFINITY }
+    }
+
     /// A factorisation took so many seconds.
     pub fn renewed(&mut self, seconds: f64) {
         (self.factorisation, self.lost) = (seconds, 0.0);
@@ -43,15 +45,15 @@ impl Wear {
         self.lost += self.iteration() * iterations.saturating_sub(1) as f64;
     }
 
-    /// Whether a new factor is due.
+    /// Whether a new factor is due. Collective.
     pub fn worn(&self) -> bool {
-        self.lost >= self.factorisation
+        self.ranks.any(self.lost >= self.factorisation)
     }
 
-    /// Iterations after which a solve has lost what a new factor costs.
+    /// Iterations after which a solve has lost what a new factor costs. Collective.
     pub fn allowance(&self) -> usize {
         let affordable = (self.factorisation - self.lost) / self.iteration();
-        1 + (affordable as usize).clamp(FEWEST, MOST)
+        1 + (self.ranks.min(affordable) as usize).clamp(FEWEST, MOST)
     }
 
     /// Seconds of an iteration, on the mean.
@@ -66,7 +68,7 @@ mod tests {
 
     #[test]
     fn a_factor_is_renewed_when_its_age_has_cost_as_much_as_a_new_one() {
-        let mut wear = Wear::default();
+        let mut wear = Wear::new(Ranks::alone());
         assert!(wear.worn(), "there is none yet");
         wear.renewed(10.0);
         wear.took(8.0, 4);

@@ -4,7 +4,7 @@ use crate::desk::{Desk, SCENE, square};
 use serde_json::Value;
 use std::process::Stdio;
 
-const KEYS: [&str; 22] = [
+const KEYS: [&str; 23] = [
     "scene",
     "title",
     "solver",
@@ -25,6 +25,7 @@ const KEYS: [&str; 22] = [
     "wall_seconds",
     "seconds_per_step",
     "phases",
+    "ranks",
     "foundation",
     "notes",
 ];

@@ -1,7 +1,10 @@
 //! The residuals that judge every answer: each fault shows in its own figure and no other.
 
 use crate::support::close_to;
-use signorini::contact::{Bound, Kkt};
+use signorini::{
+    contact::{Bound, Kkt},
+    petsc::Ranks,
+};
 
 /// Four unknowns with bounds on 1 and 3, forces in units of 10 and displacements of 2:
 /// unknown 1 presses with 6 at its gap, 3 gapes by 0.5.
@@ -11,7 +14,15 @@ fn judge(change: impl Fn(&mut [f64], &mut [f64])) -> Kkt {
     // The residual Ku − f is minus the contact force.
     let (mut residual, mut c) = (vec![0.0, -6.0, 0.0, 0.0], vec![2.0, 0.25, -1.0, 0.5]);
     change(&mut residual, &mut c);
-    Kkt::of(&residual, &c, &[bound(1, 0.25), bound(3, 1.0)], |dof| dof == 0, 10.0, 2.0)
+    Kkt::of(
+        &residual,
+        &c,
+        &[bound(1, 0.25), bound(3, 1.0)],
+        |dof| dof == 0,
+        10.0,
+        2.0,
+        Ranks::alone(),
+    )
 }
 
 #[test]

@@ -39,6 +39,7 @@ impl Small {
         };
         let bounds: Vec<_> = self.gaps.iter().enumerate().map(bound).collect();
         let problem = ContactProblem {
+            ranks: session.ranks(),
             stiffness: &matrix,
             revision: 0,
             stiffness_scale: self.stiffness.trace() / size as f64,

@@ -1,6 +1,6 @@
 //! How far an answer may be off although its KKT residuals are small.
 
-use super::{Equilibrium, largest};
+use super::Equilibrium;
 use crate::{
     evolution::{Accuracy, State},
     petsc::{LinearSolver, PetscError, Vector},
@@ -14,7 +14,7 @@ impl Equilibrium<'_> {
     /// PETSc failed.
     pub fn accuracy(self, state: &State) -> Result<Accuracy, PetscError> {
         let setting = self.setting;
-        let energy = setting.elasticity.energy_error(&setting.body, &state.zeta_mean, &state.u);
+        let energy = setting.elasticity.energy_error(&setting.body, &state.zeta_mean, &state.u)?;
         let displacement = self.displacement_error(state)?;
         Ok(Accuracy { displacement, energy })
     }
@@ -22,7 +22,8 @@ impl Equilibrium<'_> {
     /// max |K⁻¹(f − Ku)| / max |u|, the pressing nodes held: the correction that the residual
     /// forces ask for.
     fn displacement_error(mut self, state: &State) -> Result<f64, PetscError> {
-        let (setting, size) = (self.setting, largest(&state.u));
+        let setting = self.setting;
+        let size = setting.body.partition.largest(&state.u);
         if size == 0.0 {
             return Ok(0.0);
         }
@@ -49,9 +50,9 @@ impl Equilibrium<'_> {
         if !solver.solve(&rhs, &mut correction, 0.1 * rhs.norm()?)?.converged {
             return Ok(f64::INFINITY);
         }
-        let mut correction = correction.read(<[f64]>::to_vec)?;
+        let mut correction = body.partition.field(correction.read(<[f64]>::to_vec)?, 2)?;
         constraints.frames.displacement_from_frame(&mut correction);
         setting.motions.remove_free(body, &mut correction);
-        Ok(largest(&correction) / size)
+        Ok(body.partition.largest(&correction) / size)
     }
 }

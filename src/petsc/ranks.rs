@@ -1,0 +1,208 @@
+//! The ranks that share a run, and what they must know of each other.
+
+use super::{raw, session::world};
+use std::{
+    ffi::{c_int, c_void},
+    ptr,
+    time::{Duration, Instant},
+};
+
+/// This rank among all: sums and decisions over the whole body go through it.
+///
+/// Every reduction is collective: all ranks call it, at the same point of the run, and all get the
+/// same answer to the last bit. Alone, a rank does nothing for it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Ranks {
+    rank: usize,
+    size: usize,
+}
+
+impl Ranks {
+    /// One rank that holds everything.
+    pub fn alone() -> Self {
+        Self { rank: 0, size: 1 }
+    }
+
+    /// The ranks of the world communicator; MPI runs.
+    pub(super) fn of_world() -> Self {
+        let (mut rank, mut size): (c_int, c_int) = (0, 1);
+        // SAFETY: MPI runs while a session exists, which alone calls this.
+        unsafe {
+            raw::MPI_Comm_rank(world(), &mut rank);
+            raw::MPI_Comm_size(world(), &mut size);
+        }
+        Self { rank: rank as usize, size: size as usize }
+    }
+
+    /// How many `mpiexec` has started, as it tells its processes; known before MPI runs.
+    pub fn launched() -> usize {
+        // Open MPI, and the process managers of MPICH.
+        let told = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"].map(|name| std::env::var(name).ok());
+        told.into_iter().flatten().find_map(|size| size.parse().ok()).unwrap_or(1)
+    }
+
+    /// The number of this rank, from 0.
+    pub fn rank(self) -> usize {
+        self.rank
+    }
+
+    /// How many there are.
+    pub fn size(self) -> usize {
+        self.size
+    }
+
+    /// Whether this is the only one.
+    pub fn is_alone(self) -> bool {
+        self.size == 1
+    }
+
+    /// Whether this is the rank that speaks and writes for all.
+    pub fn is_first(self) -> bool {
+        self.rank == 0
+    }
+
+    /// Replaces each value by its sum over the ranks.
+    pub fn sum(self, values: &mut [f64]) {
+        self.reduce(values, Operation::Sum);
+    }
+
+    /// The sum of the ranks' values.
+    pub fn total(self, value: f64) -> f64 {
+        self.reduced(value, Operation::Sum)
+    }
+
+    /// The sum of the ranks' counts.
+    pub fn count(self, value: usize) -> usize {
+        self.total(value as f64) as usize
+    }
+
+    /// The largest of the ranks' values; NaN counts as −∞.
+    pub fn max(self, value: f64) -> f64 {
+        match self.is_alone() {
+            true => value,
+            false => {
+                let value = if value.is_nan() { f64::NEG_INFINITY } else { value };
+                self.reduced(value, Operation::Max)
+            }
+        }
+    }
+
+    /// The least of the ranks' values; NaN counts as ∞.
+    pub fn min(self, value: f64) -> f64 {
+        if self.is_alone() { value } else { -self.max(-value) }
+    }
+
+    /// The least of the ranks' values and the first rank that has it.
+    pub fn least(self, value: f64) -> (f64, usize) {
+        let least = self.min(value);
+        let first = self.min(if value == least { self.rank as f64 } else { f64::INFINITY });
+        (least, first as usize)
+    }
+
+    /// The value of the rank numbered `from`.
+    pub fn value_of(self, from: usize, value: f64) -> f64 {
+        self.total(if self.rank == from { value } else { 0.0 })
+    }
+
+    /// Whether it holds on some rank.
+    pub fn any(self, on_this: bool) -> bool {
+        if self.is_alone() { on_this } else { self.max(f64::from(u8::from(on_this))) > 0.0 }
+    }
+
+    /// Whether it holds on every rank.
+    pub fn all(self, on_this: bool) -> bool {
+        !self.any(!on_this)
+    }
+
+    /// The values of all ranks, one after the other; each gives as many.
+    pub fn gather(self, values: &[f64]) -> Vec<f64> {
+        let mut all = vec![0.0; self.size * values.len()];
+        all[self.rank * values.len()..][..values.len()].copy_from_slice(values);
+        self.sum(&mut all);
+        all
+    }
+
+    /// Waits until all ranks have come here, for at most `patience` if one is given. Collective, or
+    /// false: then some rank waits elsewhere for what this one will not do.
+    pub fn meet(self, patience: Option<Duration>) -> bool {
+        if self.is_alone() {
+            return true;
+        }
+        let started = Instant::now();
+        let mut request = ptr::null_mut();
+        let mut met = 0;
+        // SAFETY: MPI runs on several ranks; the request lives until all have met or the run ends.
+        unsafe {
+            raw::MPI_Ibarrier(world(), &mut request);
+            loop {
+                raw::MPI_Test(&mut request, &mut met, ptr::null_mut());
+                if met != 0 || patience.is_some_and(|patience| started.elapsed() > patience) {
+                    return met != 0;
+                }
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        }
+    }
+
+    /// Ends all ranks at once with an exit code, wherever they are.
+    pub fn abort(self, code: u8) -> ! {
+        if !self.is_alone() {
+            // SAFETY: MPI runs on several ranks.
+            unsafe { raw::MPI_Abort(world(), i32::from(code)) };
+        }
+        std::process::exit(i32::from(code))
+    }
+
+    fn reduced(self, value: f64, operation: Operation) -> f64 {
+        let mut values = [value];
+        self.reduce(&mut values, operation);
+        values[0]
+    }
+
+    fn reduce(self, values: &mut [f64], operation: Operation) {
+        if self.is_alone() {
+            return;
+        }
+        // SAFETY: more ranks than one come from `of_world`; MPI reads its own `count` values and
+        // writes as many. Its error handler ends the run.
+        unsafe {
+            let operation = match operation {
+                Operation::Sum => &raw const raw::ompi_mpi_op_sum,
+                Operation::Max => &raw const raw::ompi_mpi_op_max,
+            };
+            let sent = values.to_vec();
+            raw::MPI_Allreduce(
+                sent.as_ptr().cast::<c_void>(),
+                values.as_mut_ptr().cast::<c_void>(),
+                values.len() as c_int,
+                double(),
+                operation.cast_mut().cast(),
+                world(),
+            );
+        }
+    }
+}
+
+enum Operation {
+    Sum,
+    Max,
+}
+
+/// MPI_DOUBLE.
+pub(super) fn double() -> raw::MPI_Datatype {
+    (&raw const raw::ompi_mpi_double).cast_mut().cast()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn alone_every_reduction_is_the_value_itself() {
+        let alone = Ranks::alone();
+        assert_eq!((alone.total(0.1), alone.max(0.2), alone.min(0.3)), (0.1, 0.2, 0.3));
+        assert_eq!((alone.least(-1.0), alone.value_of(0, 5.0)), ((-1.0, 0), 5.0));
+        assert_eq!((alone.any(true), alone.all(false), alone.count(7)), (true, false, 7));
+        assert_eq!(alone.gather(&[1.0, 2.0]), [1.0, 2.0]);
+    }
+}

@@ -1,0 +1,181 @@
+//! The program on several ranks, from outside: the same answers, whole results, one voice.
+
+mod pieces;
+
+#[path = "../cli/desk.rs"]
+#[allow(dead_code, reason = "the command line's tests use the rest of it")]
+mod desk;
+
+use desk::{Desk, Said};
+use std::{fs, path::Path, process::Command};
+
+/// Answers on several ranks may differ by this, relative to the largest value of a run.
+const SAME: f64 = 1e-8;
+
+/// The program on `ranks` ranks, on a machine that may have fewer cores.
+pub fn on_ranks(desk: &Desk, ranks: usize, arguments: &[&str]) -> Command {
+    let mut command = Command::new("mpiexec");
+    command
+        .args(["-n", &ranks.to_string(), "--oversubscribe", env!("CARGO_BIN_EXE_signorini")])
+        .args(arguments)
+        .current_dir(desk.path(""))
+        .envs([("OMPI_ALLOW_RUN_AS_ROOT", "1"), ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")])
+        .env("LC_ALL", "C");
+    command
+}
+
+/// A desk with a scene of `geo/` called `scene.toml` and its geometry.
+fn example(name: &str) -> Desk {
+    let desk = Desk::new();
+    let geo = Path::new(env!("CARGO_MANIFEST_DIR")).join("geo");
+    let scene = fs::read_to_string(geo.join(format!("{name}.toml"))).expect("the scene");
+    for entry in fs::read_dir(&geo).expect("the folder").flatten() {
+        let file = entry.file_name().to_string_lossy().into_owned();
+        if file.ends_with(".geo") && scene.contains(&file) {
+            desk.write(&file, &fs::read_to_string(entry.path()).expect("the geometry"));
+        }
+    }
+    desk.write("scene.toml", &scene);
+    desk
+}
+
+/// Columns of `history.csv` that tell the answer and not how it was found.
+const ANSWER: [&str; 8] = [
+    "step",
+    "time",
+    "zeta_min",
+    "zeta_mean",
+    "displacement_max",
+    "work",
+    "contact_force",
+    "active_nodes",
+];
+
+#[track_caller]
+fn same_history(desk: &Desk, folder: &str, reference: &str) {
+    let (names, rows) = desk.history(folder);
+    let (_, expected) = desk.history(reference);
+    assert_eq!(rows.len(), expected.len(), "{folder}");
+    for name in ANSWER {
+        let column = names.iter().position(|n| n == name).expect("the column");
+        let size = expected.iter().fold(f64::MIN_POSITIVE, |m, row| m.max(row[column].abs()));
+        for (row, expected) in rows.iter().zip(&expected) {
+            let off = (row[column] - expected[column]).abs() / size;
+            assert!(off <= SAME, "{folder}: {name} at t = {} is off by {off:.1e}", row[1]);
+        }
+    }
+}
+
+/// A scene of `geo/` with every solver on one to four ranks, with so few steps that this is quick.
+fn every_solver(name: &str, few: &[&str]) {
+    let desk = example(name);
+    for solver in ["active-set", "penalty-duality", "tao"] {
+        for ranks in 1..=4 {
+            let out = format!("out/{name}-{solver}-{ranks}");
+            let run = ["run", "scene.toml", "--solver", solver, "--out", &out];
+            let arguments = [&run[..], few].concat();
+            let said = match ranks {
+                1 => desk.say(&arguments),
+                _ => Said::of(&mut on_ranks(&desk, ranks, &arguments)),
+            };
+            assert_eq!(said.code, Some(0), "{out}: {said:?}");
+            assert!(said.err.is_empty(), "{out}: {said:?}");
+            same_history(&desk, &out, &format!("out/{name}-{solver}-1"));
+        }
+    }
+}
+
+#[test]
+fn the_square_that_stops() {
+    // The printed scene reaches ζ_* in the first steps.
+    every_solver("square", &["--set", "mesh.size=0.125", "--set", "time.step=0.02"]);
+}
+
+#[test]
+fn the_mild_square() {
+    every_solver("square-mild", &["--set", "mesh.size=0.125", "--set", "time.step=0.25"]);
+}
+
+#[test]
+fn the_lshape() {
+    every_solver("lshape", &["--set", "time.step=0.25"]);
+}
+
+#[test]
+fn the_half_bridge() {
+    every_solver("bridge-half", &["--set", "time.step=0.25"]);
+}
+
+#[test]
+fn the_bridge_that_may_slide() {
+    every_solver("bridge", &["--set", "time.step=0.25"]);
+}
+
+#[test]
+fn the_disc() {
+    every_solver("hertz", &[]);
+}
+
+#[test]
+fn chosen_steps_are_the_same_on_all_ranks() {
+    let desk = Desk::new();
+    let chosen = ["--set", "time.step=\"auto\"", "--set", "time.tolerance=1e-3"];
+    desk.run(&[&chosen[..], &["--out", "one"]].concat());
+    let arguments = [&["run", "scene.toml", "--out", "three"], &chosen[..]].concat();
+    assert_eq!(Said::of(&mut on_ranks(&desk, 3, &arguments)).code, Some(0));
+    same_history(&desk, "three", "one");
+}
+
+#[test]
+fn the_first_rank_makes_the_mesh_for_all() {
+    let desk = example("square-mild");
+    let arguments = ["run", "scene.toml", "--set", "mesh.size=0.25", "--set", "time.step=0.5"];
+    let said = Said::of(&mut on_ranks(&desk, 3, &arguments));
+    assert_eq!(said.code, Some(0), "{said:?}");
+    assert!(said.out.contains("25 nodes, 32 triangles, on 3 ranks"), "{}", said.out);
+}
+
+/// One message, whatever `mpiexec` adds of its own.
+#[track_caller]
+fn one_message(said: &Said, code: i32, fragment: &str) {
+    assert_eq!(said.code, Some(code), "{said:?}");
+    let told: Vec<&str> = said.err.lines().filter(|line| line.starts_with("error: ")).collect();
+    assert!(told.len() == 1 && told[0].contains(fragment), "{said:?}");
+}
+
+#[test]
+fn bad_input_is_told_once() {
+    let desk = Desk::new();
+    let run = |arguments: &[&str]| {
+        let arguments = [&["run", "scene.toml"], arguments].concat();
+        Said::of(&mut on_ranks(&desk, 2, &arguments))
+    };
+    one_message(&run(&["--set", "material.young=-1"]), 2, "material.young");
+    one_message(&run(&["--solver", "magic"]), 2, "magic");
+    one_message(&run(&["--mesh", "none.msh"]), 2, "none.msh");
+    assert!(!desk.path("out").exists(), "nothing is written");
+}
+
+#[test]
+fn a_solver_that_fails_is_told_once_and_the_state_before_is_saved() {
+    let desk = Desk::new();
+    let arguments = [
+        "run",
+        "scene.toml",
+        "--set",
+        "contact.tolerance=1e-30",
+        "--set",
+        "boundary.top.traction=[0, '-max(0, t - 0.2)']",
+    ];
+    let said = Said::of(&mut on_ranks(&desk, 2, &arguments));
+    one_message(&said, 1, "the tolerance 1.0e-30 is missed by");
+    assert_eq!(desk.summary("out/scene")["end_time"], 0.2);
+    assert_eq!(desk.frames("out/scene").pop().expect("frames").0, 0.2);
+}
+
+#[test]
+fn other_commands_refuse_ranks() {
+    let desk = Desk::new();
+    let said = Said::of(&mut on_ranks(&desk, 2, &["compare", "scene.toml"]));
+    one_message(&said, 2, "without mpiexec");
+}

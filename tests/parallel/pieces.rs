@@ -1,0 +1,108 @@
+//! Frames in pieces: together they are the frame that one rank writes.
+
+use crate::{
+    desk::{Desk, Said},
+    on_ranks,
+};
+use std::{collections::BTreeMap, path::Path};
+use vtkio::model::{Attribute, DataSet, Piece, Vtk};
+
+/// Values at a point by the name of their array.
+type Values = BTreeMap<String, Vec<f64>>;
+
+/// What a file holds at its points and in its cells, by where these are.
+#[derive(Default)]
+struct Frame {
+    points: BTreeMap<[i64; 2], Values>,
+    cells: BTreeMap<[i64; 2], Values>,
+}
+
+/// Coordinates in millionths: two points are one if they have the same.
+fn place(x: &[f64]) -> [i64; 2] {
+    [0, 1].map(|i| (1e6 * x[i]).round() as i64)
+}
+
+/// Adds a file's points and cells; those that are there already must have the same values.
+fn add(path: &Path, frame: &mut Frame) {
+    let vtk = Vtk::import(path).unwrap_or_else(|e| panic!("{}: {e:?}", path.display()));
+    let DataSet::UnstructuredGrid { mut pieces, .. } = vtk.data else { panic!("another data set") };
+    let Some(Piece::Inline(piece)) = pieces.pop() else { panic!("no piece") };
+    let points: Vec<f64> = piece.points.cast_into().expect("real numbers");
+    let at = |i: usize| &points[3 * i..3 * i + 2];
+    let values = |attributes: &[Attribute], count: usize| -> Vec<Values> {
+        let mut all = vec![Values::new(); count];
+        for attribute in attributes {
+            let Attribute::DataArray(array) = attribute else { panic!("a field") };
+            if array.name == "global_node" {
+                continue;
+            }
+            let data: Vec<f64> = array.data.clone().cast_into().expect("real numbers");
+            let width = data.len() / count;
+            for (values, data) in all.iter_mut().zip(data.chunks(width)) {
+                values.insert(array.name.clone(), data.to_vec());
+            }
+        }
+        all
+    };
+    for (i, new) in values(&piece.data.point, points.len() / 3).into_iter().enumerate() {
+        let old = frame.points.entry(place(at(i))).or_insert_with(|| new.clone());
+        close(&new, old);
+    }
+    let (_, corners) = piece.cells.cell_verts.into_legacy();
+    let corners: Vec<usize> = corners.into_iter().map(|i| i as usize).collect();
+    let triangles: Vec<&[usize]> = corners.chunks(4).map(|t| &t[1..]).collect();
+    for (t, new) in triangles.iter().zip(values(&piece.data.cell, triangles.len())) {
+        let middle = [0, 1].map(|k| t.iter().map(|&i| at(i)[k]).sum::<f64>() / 3.0);
+        assert!(frame.cells.insert(place(&middle), new).is_none(), "a triangle in two pieces");
+    }
+}
+
+fn close(a: &Values, b: &Values) {
+    assert!(a.keys().eq(b.keys()));
+    for (name, (a, b)) in a.iter().map(|(name, a)| (name, (a, &b[name]))) {
+        for (a, b) in a.iter().zip(b) {
+            let same = a.is_nan() && b.is_nan() || (a - b).abs() <= 1e-8 * (1.0 + b.abs());
+            assert!(same, "{name}: {a} is not {b}");
+        }
+    }
+}
+
+#[test]
+fn pieces_together_are_the_frame_of_one_rank() {
+    let desk = Desk::new();
+    // A frame of an earlier run on more ranks must not stay.
+    desk.write("many/fields_0001_7.vtu", "old");
+    desk.write("many/fields_0099.pvtu", "old");
+    // Not uniform, and pressed on a part of the bottom.
+    let load = ["--set", "boundary.top.traction=['t', '-2*t*x']", "--set", "time.step=0.5"];
+    desk.run(&[&load[..], &["--out", "one"]].concat());
+    let arguments = [&["run", "scene.toml", "--out", "many"], &load[..]].concat();
+    let said = Said::of(&mut on_ranks(&desk, 3, &arguments));
+    assert_eq!(said.code, Some(0), "{said:?}");
+
+    let (frames, lists) = (desk.frames("one"), desk.frames("many"));
+    assert_eq!(frames.len(), lists.len());
+    let mut expected_names = vec!["fields.pvd".into(), "history.csv".into(), "summary.json".into()];
+    for ((time, file), (listed, list)) in frames.iter().zip(&lists) {
+        assert_eq!(time, listed);
+        let mut whole = Frame::default();
+        add(&desk.path(&format!("one/{file}")), &mut whole);
+        let text = desk.read(&format!("many/{list}"));
+        let sources: Vec<&str> =
+            text.split("Source=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect();
+        assert_eq!(sources.len(), 3);
+        let mut joined = Frame::default();
+        sources.iter().for_each(|file| add(&desk.path(&format!("many/{file}")), &mut joined));
+        assert!(whole.points.keys().eq(joined.points.keys()));
+        assert!(whole.cells.keys().eq(joined.cells.keys()));
+        whole.points.iter().for_each(|(at, values)| close(&joined.points[at], values));
+        whole.cells.iter().for_each(|(at, values)| close(&joined.cells[at], values));
+        for name in whole.points.values().chain(whole.cells.values()).flat_map(Values::keys) {
+            assert!(text.contains(&format!("Name=\"{name}\"")), "{name} is not listed");
+        }
+        expected_names.extend(sources.iter().map(|&name| name.to_owned()));
+        expected_names.push(list.clone());
+    }
+    expected_names.sort();
+    assert_eq!(desk.names("many"), expected_names);
+}
