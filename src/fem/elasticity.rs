@@ -4,7 +4,7 @@
 use super::{Body, Frames};
 use crate::{
     model::Material,
-    petsc::{Matrix, PetscError, Session},
+    petsc::{Matrix, PetscError, Session, Vector},
 };
 use nalgebra::{Matrix2, Matrix3, SMatrix, Vector3};
 
@@ -97,7 +97,8 @@ impl Stiffness {
         let free = partition.ranks().count(2 * partition.owned() - diagonal.len());
         let scale = if trace > 0.0 { trace / free as f64 } else { elasticity.material.young };
 
-        let matrix = Matrix::with_pattern(session, 2 * partition.owned(), 2, rows, columns)?;
+        let mut matrix = Matrix::with_pattern(session, 2 * partition.owned(), 2, rows, columns)?;
+        matrix.set_near_null_space(rigid_motions(session, body, frames)?)?;
         let mut values = vec![scale; entries];
         values[..36 * unit.len()].fill(0.0);
         let mut stiffness = Self { matrix, scale, unit, values };
@@ -114,6 +115,25 @@ impl Stiffness {
         }
         self.matrix.set_values(&self.values)
     }
+}
+
+/// The translations and the rotation in the unknowns of `frames`, 0 on fixed ones: what multigrid
+/// must represent on its coarse levels.
+fn rigid_motions(
+    session: &Session,
+    body: &Body,
+    frames: &Frames,
+) -> Result<Vec<Vector>, PetscError> {
+    let motions: [fn([f64; 2]) -> [f64; 2]; 3] = [|_| [1.0, 0.0], |_| [0.0, 1.0], |[x, y]| [-y, x]];
+    let vector = |motion: fn([f64; 2]) -> [f64; 2]| {
+        let mut field: Vec<f64> = body.mesh.nodes.iter().flat_map(|&x| motion(x)).collect();
+        frames.displacement_to_frame(&mut field);
+        field.iter_mut().zip(frames.fixed()).filter(|(_, on)| **on).for_each(|(v, _)| *v = 0.0);
+        let mut vector = Vector::zeros(session, 2 * body.partition.owned())?;
+        vector.set(&field[..2 * body.partition.owned()])?;
+        Ok(vector)
+    };
+    motions.into_iter().map(vector).collect()
 }
 
 /// The element stiffness in the unknowns of `frames`, row by row.
