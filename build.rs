@@ -23,7 +23,7 @@ const FUNCTIONS: &str = "\
     KSPSetTolerances|KSPGetConvergedReason|KSPGetIterationNumber|KSPSetFromOptions|\
     KSPSetOptionsPrefix|KSPSetNormType|KSPSetInitialGuessNonzero|\
     PCCreate|PCDestroy|PCSetType|PCSetOptionsPrefix|PCSetFromOptions|PCSetOperators|PCSetUp|PCApply|\
-    PCFactorSetMatSolverType|PCFactorGetMatrix|PCFactorGetMatSolverType|PCGetFailedReason|PCReset|PCSetReusePreconditioner|PCGetOperators|PCShellSetContext|PCShellGetContext|\
+    PCFactorSetMatSolverType|PCFactorGetMatrix|PCFactorGetMatSolverType|PCGetFailedReason|PCGetType|PCReset|PCSetReusePreconditioner|PCGetOperators|PCShellSetContext|PCShellGetContext|\
     PCShellSetApply|PCShellSetSetUp|\
     TaoCreate|TaoDestroy|TaoSetType|TaoSetSolution|TaoSetVariableBounds|\
     TaoSetObjectiveAndGradient|TaoSetHessian|TaoSetFromOptions|TaoSetTolerances|\

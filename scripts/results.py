@@ -1,4 +1,4 @@
-"""Reads a result folder: fields.pvd with its .vtu files, history.csv, summary.json."""
+"""Reads a result folder: fields.pvd with its frames, history.csv, summary.json."""
 
 import csv
 import json
@@ -107,7 +107,7 @@ def read_results(folder):
             rows = list(csv.DictReader(file))
         frames = ElementTree.parse(folder / "fields.pvd").findall(".//DataSet")
         last = max(frames, key=lambda frame: float(frame.get("timestep")))
-        fields = meshio.read(folder / last.get("file"))
+        fields = read_frame(folder / last.get("file"))
         blocks = [k for k, block in enumerate(fields.cells) if block.type == "triangle"]
         triangles = np.vstack([fields.cells[k].data for k in blocks])
         return Results(
@@ -129,6 +129,42 @@ def read_results(folder):
         raise ResultError(f"{folder}: the field {error} is missing") from None
     except (ValueError, ElementTree.ParseError, meshio.ReadError) as error:
         raise ResultError(f"{folder}: {error}") from None
+
+
+def read_frame(path):
+    """A frame: a .vtu file, or the .pvtu list of the pieces that several ranks have written.
+
+    meshio does not read lists; nodes that pieces share are joined by their numbers.
+    """
+    if path.suffix != ".pvtu":
+        return meshio.read(path)
+    sources = [piece.get("Source") for piece in ElementTree.parse(path).findall(".//Piece")]
+    # A rank that has no triangles leaves an empty piece.
+    pieces = [piece for piece in (meshio.read(path.parent / s) for s in sources) if piece.cells]
+    numbers = [np.ravel(piece.point_data["global_node"]) for piece in pieces]
+    _, first, place = np.unique(np.concatenate(numbers), return_index=True, return_inverse=True)
+    starts = np.cumsum([0, *map(len, numbers)])
+
+    def joined(arrays):
+        return np.concatenate(arrays)[first]
+
+    cells = [
+        place[start + block.data]
+        for piece, start in zip(pieces, starts)
+        for block in piece.cells
+    ]
+    return meshio.Mesh(
+        joined([piece.points for piece in pieces]),
+        [("triangle", np.concatenate(cells))],
+        point_data={
+            name: joined([piece.point_data[name] for piece in pieces])
+            for name in pieces[0].point_data
+        },
+        cell_data={
+            name: [np.concatenate([block for piece in pieces for block in piece.cell_data[name]])]
+            for name in pieces[0].cell_data
+        },
+    )
 
 
 def _number(text):

@@ -58,6 +58,9 @@ impl<'s> ElasticSolver<'s> {
             if engine.renew(problem, system)? {
                 let iterations;
                 (solved, iterations) = engine.iterate(problem, system, c, limit, FRESH)?;
+                if !engine.factor.is_direct()? {
+                    engine.wear.expect(iterations);
+                }
                 report.linear_iterations += iterations;
             }
         }
@@ -94,8 +97,9 @@ struct Engine {
 impl Engine {
     fn new(session: &Session, problem: &ContactProblem) -> Result<Self, PetscError> {
         let zeros = || Vector::zeros(session, problem.stiffness.owned());
+        let unknowns = problem.ranks.count(problem.stiffness.owned());
         Ok(Self {
-            factor: Factor::new(session, "elastic_")?,
+            factor: Factor::new(session, "elastic_", unknowns)?,
             matrix: problem.stiffness.duplicate()?,
             wear: Wear::new(problem.ranks),
             residual: zeros()?,

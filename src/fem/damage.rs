@@ -92,7 +92,7 @@ impl DamageSystem {
             matrix: Matrix::with_pattern(session, owned, 1, rows, columns)?,
             mass_values,
             laplace_values,
-            solver: LinearSolver::cholesky(session, "damage_")?,
+            solver: LinearSolver::cholesky(session, "damage_", body.partition.total())?,
             rhs: Vector::zeros(session, owned)?,
             unknown: Vector::zeros(session, owned)?,
             diffusion,

@@ -1,7 +1,7 @@
 //! The damaged elastic operator (ζ Aε(u), ε(v)) of (26) as a matrix for solvers.
 
 use super::{Body, Elasticity, Frames};
-use crate::petsc::{Matrix, PetscError, Session};
+use crate::petsc::{Matrix, PetscError, Session, Vector};
 use nalgebra::Matrix2;
 
 /// The stiffness matrix K(ζ) in the unknowns of a [`Frames`]; pattern once, values refilled.
@@ -69,7 +69,8 @@ impl Stiffness {
         let scale = if trace > 0.0 { trace / free as f64 } else { elasticity.material.young };
 
         let values = vec![scale; rows.len()];
-        let matrix = Matrix::with_pattern(session, 2 * partition.owned(), 2, rows, columns)?;
+        let mut matrix = Matrix::with_pattern(session, 2 * partition.owned(), 2, rows, columns)?;
+        matrix.set_near_null_space(rigid_motions(session, body, frames)?)?;
         let pairs = pairs.iter().map(|&([a, b], end)| (end, a == b)).collect();
         let mut stiffness = Self { matrix, scale, pairs, contributions, values };
         stiffness.refill(&vec![1.0; body.triangles.len()])?;
@@ -97,6 +98,25 @@ impl Stiffness {
         }
         self.matrix.set_values(&self.values)
     }
+}
+
+/// The translations and the rotation in the unknowns of `frames`, 0 on fixed ones: what multigrid
+/// must represent on its coarse levels.
+fn rigid_motions(
+    session: &Session,
+    body: &Body,
+    frames: &Frames,
+) -> Result<Vec<Vector>, PetscError> {
+    let motions: [fn([f64; 2]) -> [f64; 2]; 3] = [|_| [1.0, 0.0], |_| [0.0, 1.0], |[x, y]| [-y, x]];
+    let vector = |motion: fn([f64; 2]) -> [f64; 2]| {
+        let mut field: Vec<f64> = body.mesh.nodes.iter().flat_map(|&x| motion(x)).collect();
+        frames.displacement_to_frame(&mut field);
+        field.iter_mut().zip(frames.fixed()).filter(|(_, on)| **on).for_each(|(v, _)| *v = 0.0);
+        let mut vector = Vector::zeros(session, 2 * body.partition.owned())?;
+        vector.set(&field[..2 * body.partition.owned()])?;
+        Ok(vector)
+    };
+    motions.into_iter().map(vector).collect()
 }
 
 /// A triangle and two of its corners.

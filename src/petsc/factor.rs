@@ -7,7 +7,8 @@ use super::{
 };
 use std::{ffi::CStr, ptr};
 
-/// A Cholesky factor (PCCHOLESKY): CHOLMOD's on one rank, MUMPS' on several.
+/// A Cholesky factor (PCCHOLESKY): CHOLMOD's on one rank, MUMPS' on several; in its place a cycle
+/// of algebraic multigrid (PCGAMG) for very large matrices on several.
 ///
 /// Fill-reducing ordering and symbolic factorisation are done once, with the first values.
 pub struct Factor {
@@ -16,8 +17,9 @@ pub struct Factor {
 }
 
 impl Factor {
-    /// A factor whose PETSc options carry `prefix` (`-elastic_pc_type …`).
-    pub fn new(session: &Session, prefix: &str) -> Result<Self, PetscError> {
+    /// A factor of matrices with `unknowns` rows on all ranks together, whose PETSc options carry
+    /// `prefix` (`-elastic_pc_type …`).
+    pub fn new(session: &Session, prefix: &str, unknowns: usize) -> Result<Self, PetscError> {
         cholesky_options(session, prefix)?;
         let mut factor = Self { raw: ptr::null_mut(), _live: Live::new() };
         let prefix = c_string(prefix)?;
@@ -26,11 +28,21 @@ impl Factor {
         unsafe {
             check(raw::PCCreate(world(), &mut factor.raw))?;
             check(raw::PCSetOptionsPrefix(factor.raw, prefix.as_ptr()))?;
-            check(raw::PCSetType(factor.raw, c"cholesky".as_ptr()))?;
+            check(raw::PCSetType(factor.raw, method(session, unknowns).as_ptr()))?;
             check(raw::PCFactorSetMatSolverType(factor.raw, package.as_ptr()))?;
             check(raw::PCSetFromOptions(factor.raw))?;
         }
         Ok(factor)
+    }
+
+    /// Whether it is a factor of the matrix, and not a multigrid cycle in its place.
+    pub fn is_direct(&self) -> Result<bool, PetscError> {
+        let mut kind = ptr::null();
+        // SAFETY: a live handle; the name lives as long.
+        unsafe {
+            check(raw::PCGetType(self.raw, &mut kind))?;
+            Ok(!kind.is_null() && CStr::from_ptr(kind) == c"cholesky")
+        }
     }
 
     /// Factorises the present values of `matrix`; false if it is not positive definite.
@@ -92,10 +104,24 @@ pub(super) fn cholesky_options(session: &Session, prefix: &str) -> Result<(), Pe
     Ok(())
 }
 
+/// Rows above which several ranks use multigrid: the factors of this many need about 8 GiB.
+const LARGE: usize = 2_500_000;
+
+/// PETSc's type of preconditioner for so many rows on all ranks together.
+pub(super) fn method(session: &Session, unknowns: usize) -> &'static CStr {
+    match session.ranks().is_alone() || unknowns < LARGE {
+        true => c"cholesky",
+        false => c"gamg",
+    }
+}
+
 /// The package that makes Cholesky factors.
 pub(super) fn package(session: &Session) -> &'static CStr {
     if session.ranks().is_alone() { c"cholmod" } else { c"mumps" }
 }
+
+/// PETSC_ERR_MAT_CH_ZRPVT: a pivot of CHOLMOD's factorisation is not positive.
+pub(super) const NOT_DEFINITE: i32 = 81;
 
 /// Tells a matrix that is not positive definite from other failures of setting up `pc`.
 ///
@@ -105,8 +131,6 @@ pub(super) unsafe fn definite(
     pc: raw::PC,
     set_up: Result<(), PetscError>,
 ) -> Result<bool, PetscError> {
-    /// PETSC_ERR_MAT_CH_ZRPVT: a pivot of CHOLMOD's factorisation is not positive.
-    const NOT_DEFINITE: i32 = 81;
     /// Where MUMPS counts negative pivots (INFOG(12)): it makes LDLᵀ and does not mind them.
     const NEGATIVE: i32 = 12;
     match set_up {

@@ -2,7 +2,7 @@
 
 use super::{
     Matrix, PetscError, Session, Vector, check,
-    factor::{cholesky_options, definite, package},
+    factor::{cholesky_options, definite, method, package},
     raw,
     session::{Live, c_string, world},
     vec::same_size,
@@ -33,10 +33,12 @@ pub struct Krylov {
 }
 
 impl LinearSolver {
-    /// A solver whose PETSc options carry `prefix` (`-damage_ksp_type …`).
+    /// A solver of systems with `unknowns` rows on all ranks together, whose PETSc options carry
+    /// `prefix` (`-damage_ksp_type …`).
     ///
-    /// The factorisation is CHOLMOD's on one rank and MUMPS' on several.
-    pub fn cholesky(session: &Session, prefix: &str) -> Result<Self, PetscError> {
+    /// The factorisation is CHOLMOD's on one rank and MUMPS' on several, which use multigrid for
+    /// very large systems.
+    pub fn cholesky(session: &Session, prefix: &str, unknowns: usize) -> Result<Self, PetscError> {
         cholesky_options(session, prefix)?;
         let mut solver = Self { raw: ptr::null_mut(), definite: false, _live: Live::new() };
         let prefix = c_string(prefix)?;
@@ -50,7 +52,7 @@ impl LinearSolver {
             check(raw::KSPSetNormType(solver.raw, raw::KSPNormType::KSP_NORM_UNPRECONDITIONED))?;
             check(raw::KSPSetInitialGuessNonzero(solver.raw, raw::PetscBool::PETSC_TRUE))?;
             check(raw::KSPGetPC(solver.raw, &mut pc))?;
-            check(raw::PCSetType(pc, c"cholesky".as_ptr()))?;
+            check(raw::PCSetType(pc, method(session, unknowns).as_ptr()))?;
             check(raw::PCFactorSetMatSolverType(pc, package.as_ptr()))?;
             check(raw::KSPSetFromOptions(solver.raw))?;
         }
@@ -135,7 +137,7 @@ mod tests {
     fn what_is_not_positive_definite_does_not_converge_and_does_no_harm() {
         let session = Session::start(&[]).unwrap();
         let good = [[2.0, 1.0]; 3];
-        let mut solver = LinearSolver::cholesky(&session, "test_").unwrap();
+        let mut solver = LinearSolver::cholesky(&session, "test_", 6).unwrap();
         for bad in [[1.0, 2.0], [-2.0, 1.0], [1.0, 1.0], [0.0, 0.0], [f64::NAN, 0.0]] {
             // First of all, and after a factorisation that went well.
             for _ in 0..2 {
@@ -153,7 +155,7 @@ mod tests {
     fn all_pivots_negative_are_noticed_too() {
         // CG alone would not notice: r·z and p·Ap keep their sign.
         let session = Session::start(&[]).unwrap();
-        let mut solver = LinearSolver::cholesky(&session, "test_").unwrap();
+        let mut solver = LinearSolver::cholesky(&session, "test_", 6).unwrap();
         solver.factorise(&blocks(&session, &[[-2.0, 1.0]; 3])).unwrap();
         assert!(!solve(&session, &mut solver, 6).0);
     }

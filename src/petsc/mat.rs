@@ -111,14 +111,48 @@ impl Matrix {
         }
     }
 
+    /// Tells multigrid the fields that the matrix without boundary conditions maps to zero
+    /// (MatSetNearNullSpace).
+    pub fn set_near_null_space(&mut self, mut fields: Vec<Vector>) -> Result<(), PetscError> {
+        // PETSc wants them orthonormal.
+        let mut basis: Vec<Vector> = Vec::new();
+        for mut field in fields.drain(..) {
+            same_size(self.owned, field.owned())?;
+            let size = field.norm()?;
+            for earlier in &basis {
+                field.add(-field.dot(earlier)?, earlier)?;
+            }
+            let norm = field.norm()?;
+            if norm > 1e-8 * size {
+                field.write(|v| v.iter_mut().for_each(|v| *v /= norm))?;
+                basis.push(field);
+            }
+        }
+        let raw: Vec<raw::Vec> = basis.iter().map(|vector| vector.raw).collect();
+        let mut space = ptr::null_mut();
+        // SAFETY: live handles; PETSc keeps references to the vectors and the space.
+        unsafe {
+            let constant = raw::PetscBool::PETSC_FALSE;
+            let count = raw.len() as i32;
+            check(raw::MatNullSpaceCreate(world(), constant, count, raw.as_ptr(), &mut space))?;
+            check(raw::MatSetNearNullSpace(self.raw, space))?;
+            check(raw::MatNullSpaceDestroy(&mut space))
+        }
+    }
+
     /// A copy; its values can no longer be set through the pattern.
     pub fn duplicate(&self) -> Result<Self, PetscError> {
         let mut copy =
             Self { raw: ptr::null_mut(), owned: self.owned, entries: 0, _live: Live::new() };
+        let (values, mut space) = (raw::MatDuplicateOption::MAT_COPY_VALUES, ptr::null_mut());
         // SAFETY: a live handle, a fresh one. The copy has no COO pattern: `entries` is 0.
-        check(unsafe {
-            raw::MatDuplicate(self.raw, raw::MatDuplicateOption::MAT_COPY_VALUES, &mut copy.raw)
-        })?;
+        unsafe {
+            check(raw::MatDuplicate(self.raw, values, &mut copy.raw))?;
+            check(raw::MatGetNearNullSpace(self.raw, &mut space))?;
+            if !space.is_null() {
+                check(raw::MatSetNearNullSpace(copy.raw, space))?;
+            }
+        }
         Ok(copy)
     }
 

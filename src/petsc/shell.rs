@@ -1,6 +1,6 @@
 //! A kept factor as the preconditioner inside one of PETSc's own solvers.
 
-use super::{Factor, PetscError, Session, Wear, check, raw};
+use super::{Factor, PetscError, Session, Wear, check, factor::NOT_DEFINITE, raw};
 use std::{ffi::c_void, time::Instant};
 
 /// A PCSHELL that factorises the operators it is given only when its factor is worn out.
@@ -17,8 +17,8 @@ pub(super) struct KeptFactor {
 
 impl KeptFactor {
     /// In a box, because PETSc keeps its address.
-    pub(super) fn new(session: &Session) -> Result<Box<Self>, PetscError> {
-        let factor = Factor::new(session, "elastic_")?;
+    pub(super) fn new(session: &Session, unknowns: usize) -> Result<Box<Self>, PetscError> {
+        let factor = Factor::new(session, "elastic_", unknowns)?;
         let wear = Wear::new(session.ranks());
         Ok(Box::new(Self { factor, wear, size: 0, applications: 0, factorisations: 0 }))
     }
@@ -52,7 +52,8 @@ impl KeptFactor {
         let started = Instant::now();
         // SAFETY: a live matrix.
         if !unsafe { self.factor.factorise_raw(matrix, size != self.size)? } {
-            return Err(PetscError::ours("the matrix is not positive definite"));
+            let message = "the matrix is not positive definite".to_owned();
+            return Err(PetscError { code: NOT_DEFINITE, message });
         }
         self.size = size;
         self.factorisations += 1;

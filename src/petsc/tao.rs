@@ -63,7 +63,9 @@ impl BoundedQuadratic {
         // The quasi-Newton Krylov methods' Hessian is an approximation without entries, which
         // nothing can factorise; they bring their own preconditioner.
         let quasi_newton = method.starts_with("bqnk");
-        let factor = (!quasi_newton).then(|| KeptFactor::new(session)).transpose()?;
+        let factor = (!quasi_newton)
+            .then(|| KeptFactor::new(session, session.ranks().count(size)))
+            .transpose()?;
         let gradient = Vector::zeros(session, size)?;
         let tao = Handle(ptr::null_mut(), Live::new());
         let mut this = Self { tao, factor, gradient };

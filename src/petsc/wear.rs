@@ -15,6 +15,8 @@ pub struct Wear {
     factorisation: f64,
     /// Seconds of all iterations so far, and their number.
     iterations: (f64, usize),
+    /// Iterations that a solve with a new factor takes.
+    fresh: usize,
     /// Seconds lost to the age of the factor.
     lost: f64,
 }
@@ -26,7 +28,7 @@ const MOST: usize = 200;
 impl Wear {
     /// Before the first factorisation: worn out.
     pub fn new(ranks: Ranks) -> Self {
-        Self { ranks, factorisation: 0.0, iterations: (0.0, 0), lost: f64::INFINITY }
+        Self { ranks, factorisation: 0.0, iterations: (0.0, 0), fresh: 1, lost: f64::INFINITY }
     }
 
     /// A factorisation took so many seconds.
@@ -40,9 +42,14 @@ impl Wear {
         self.iterations.1 += iterations;
     }
 
-    /// A solve with an old factor took so many iterations; with a new one it would have been one.
+    /// A solve with a new factor takes so many iterations; one, unless this is told.
+    pub fn expect(&mut self, iterations: usize) {
+        self.fresh = iterations;
+    }
+
+    /// A solve with an old factor took so many iterations.
     pub fn lose(&mut self, iterations: usize) {
-        self.lost += self.iteration() * iterations.saturating_sub(1) as f64;
+        self.lost += self.iteration() * iterations.saturating_sub(self.fresh) as f64;
     }
 
     /// Whether a new factor is due. Collective.
@@ -53,7 +60,7 @@ impl Wear {
     /// Iterations after which a solve has lost what a new factor costs. Collective.
     pub fn allowance(&self) -> usize {
         let affordable = (self.factorisation - self.lost) / self.iteration();
-        1 + (self.ranks.min(affordable) as usize).clamp(FEWEST, MOST)
+        self.fresh + (self.ranks.min(affordable) as usize).clamp(FEWEST, MOST)
     }
 
     /// Seconds of an iteration, on the mean.

@@ -44,7 +44,8 @@ impl Equilibrium<'_> {
         rhs.set(&residual[..rhs.owned()])?;
         drop(self.solver);
         self.stiffness.matrix.hold(&pressing, self.stiffness.scale)?;
-        let mut solver = LinearSolver::cholesky(self.session, "elastic_")?;
+        let mut solver =
+            LinearSolver::cholesky(self.session, "elastic_", 2 * body.partition.total())?;
         solver.factorise(&self.stiffness.matrix)?;
         // One digit of an error is enough.
         if !solver.solve(&rhs, &mut correction, 0.1 * rhs.norm()?)?.converged {
