@@ -32,7 +32,11 @@ impl Extrapolation {
 
     /// The likely solution at `time`.
     pub(super) fn at(&self, time: f64) -> Vec<f64> {
-        self.polynomial(self.degree, time)
+        let shares = self.shares(self.degree, time);
+        let value = |i: usize| -> f64 {
+            self.history.iter().zip(shares).map(|((_, solution), share)| share * solution[i]).sum()
+        };
+        (0..self.last().len()).map(value).collect()
     }
 
     /// A solution is accepted.
@@ -40,12 +44,7 @@ impl Extrapolation {
         if self.history[0].0 == f64::NEG_INFINITY {
             self.history.clear();
         }
-        let miss = |degree: usize| -> f64 {
-            let predicted = self.polynomial(degree, time);
-            predicted.iter().zip(&solution).map(|(p, s)| (p - s).powi(2)).sum()
-        };
-        let mut misses: Vec<f64> = (0..self.history.len().min(HIGHEST + 1)).map(miss).collect();
-        self.ranks.sum(&mut misses);
+        let misses = self.misses(time, &solution);
         let best = (0..misses.len()).min_by(|&a, &b| misses[a].total_cmp(&misses[b]));
         // One degree more than was possible so far is tried as soon as the highest was best.
         self.degree = match best {
@@ -57,16 +56,35 @@ impl Extrapolation {
         self.history.truncate(HIGHEST + 1);
     }
 
-    /// The value at `time` of the polynomial through the last `degree` + 1 solutions.
-    fn polynomial(&self, degree: usize, time: f64) -> Vec<f64> {
-        let times: Vec<f64> = self.history.iter().take(degree + 1).map(|(t, _)| *t).collect();
-        let mut value = vec![0.0; self.history[0].1.len()];
-        for (i, (_, solution)) in self.history.iter().take(degree + 1).enumerate() {
-            let others = || times.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, t)| t);
-            let share: f64 = others().map(|t| (time - t) / (times[i] - t)).product();
-            value.iter_mut().zip(solution).for_each(|(v, s)| *v += share * s);
+    /// For every possible degree, the squared distance of its prediction from the `solution` at
+    /// `time`; all in one pass over the solutions, which are long.
+    fn misses(&self, time: f64, solution: &[f64]) -> Vec<f64> {
+        let shares: Vec<_> =
+            (0..self.history.len()).map(|degree| self.shares(degree, time)).collect();
+        let mut misses = [0.0; HIGHEST + 1];
+        let mut values = [0.0; HIGHEST + 1];
+        for (i, exact) in solution.iter().enumerate() {
+            values.iter_mut().zip(&self.history).for_each(|(value, (_, old))| *value = old[i]);
+            for (miss, shares) in misses.iter_mut().zip(&shares) {
+                let predicted: f64 = shares.iter().zip(values).map(|(s, v)| s * v).sum();
+                *miss += (predicted - exact).powi(2);
+            }
         }
-        value
+        let mut misses = misses[..self.history.len()].to_vec();
+        self.ranks.sum(&mut misses);
+        misses
+    }
+
+    /// What each solution contributes at `time` to the polynomial through the last `degree` + 1
+    /// (Lagrange); the earlier ones nothing.
+    fn shares(&self, degree: usize, time: f64) -> [f64; HIGHEST + 1] {
+        let mut shares = [0.0; HIGHEST + 1];
+        let times = || self.history.iter().take(degree + 1).map(|(time, _)| *time).enumerate();
+        for (i, own) in times() {
+            let others = times().filter(|(j, _)| *j != i);
+            shares[i] = others.map(|(_, other)| (time - other) / (own - other)).product();
+        }
+        shares
     }
 }
 
