@@ -8,6 +8,7 @@ mod certificate;
 mod constraints;
 mod elastic;
 mod linear;
+mod nonnegative;
 mod penalty_duality;
 mod problem;
 mod rigid;

@@ -11,8 +11,6 @@ use nalgebra::{DMatrix, DVector};
 pub struct ContactProblem<'a> {
     /// K, N/m.
     pub stiffness: &'a Matrix,
-    /// Counts the changes of K's values: a factor made at the same revision is still exact.
-    pub revision: usize,
     /// The size of K's diagonal, N/m.
     pub stiffness_scale: f64,
     /// f, N: loads less the forces of prescribed displacements.

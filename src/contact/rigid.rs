@@ -1,6 +1,6 @@
 //! Rigid motions that nothing holds, that only contact holds, and whether the load drives them.
 
-use super::{Bound, Constraints, GapRow};
+use super::{Bound, Constraints, GapRow, nonnegative::nonnegative};
 use crate::fem::Body;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use std::fmt;
@@ -263,44 +263,4 @@ fn null_space(gram: &Matrix3<f64>) -> Vec<Vector3<f64>> {
         .filter(|(v, _)| **v <= cut)
         .map(|(_, v)| v.into())
         .collect()
-}
-
-/// p ≥ 0 of least ‖Aᵀp − b‖ (Lawson and Hanson, Solving Least Squares Problems, ch. 23),
-/// for an A with at most three columns: at most three p_i are positive at a time.
-fn nonnegative(a: &DMatrix<f64>, b: &DVector<f64>) -> DVector<f64> {
-    let rows = a.nrows();
-    let mut p = DVector::zeros(rows);
-    let mut positive: Vec<usize> = Vec::new();
-    let cut = 1e-13 * b.norm() * a.amax();
-    for _ in 0..10 * (rows + 1) {
-        let gradient = a * (b - a.transpose() * &p);
-        let entering = (0..rows)
-            .filter(|i| !positive.contains(i))
-            .max_by(|&i, &j| gradient[i].total_cmp(&gradient[j]));
-        match entering {
-            Some(i) if gradient[i] > cut => positive.push(i),
-            _ => break,
-        }
-        loop {
-            let columns = a.select_rows(&positive).transpose();
-            let Ok(z) = columns.svd(true, true).solve(b, 1e-14) else { return p };
-            if z.iter().all(|&v| v > 0.0) {
-                p.fill(0.0);
-                positive.iter().zip(z.iter()).for_each(|(&i, &v)| p[i] = v);
-                break;
-            }
-            // Go towards z until the first p_i vanishes, and drop it.
-            let reach = |(&i, &v): (&usize, &f64)| match v <= 0.0 {
-                true => p[i] / (p[i] - v),
-                false => 1.0,
-            };
-            let step = positive.iter().zip(z.iter()).map(reach).fold(1.0, f64::min);
-            positive.iter().zip(z.iter()).for_each(|(&i, &v)| p[i] += step * (v - p[i]));
-            positive.retain(|&i| p[i] > 1e-14 * p.amax().max(f64::MIN_POSITIVE));
-            if positive.is_empty() {
-                break;
-            }
-        }
-    }
-    p
 }

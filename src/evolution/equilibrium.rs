@@ -1,13 +1,11 @@
 //! The contact step (26): from ζ_n and f_n to a certified u_n.
 
 mod accuracy;
+mod certificate;
 
-use super::{
-    ContactPoint, Phases, RunError, Setting, State, Step, StepRecord, agreed,
-    extrapolation::Extrapolation,
-};
+use super::{Phases, RunError, Setting, State, Step, agreed, extrapolation::Extrapolation};
 use crate::{
-    contact::{self, ContactError, ContactProblem, ContactReport, ContactSolver, Kkt, RigidMotion},
+    contact::{self, ContactError, ContactProblem, ContactReport, ContactSolver},
     fem::Stiffness,
     petsc::{PetscError, Session, Vector},
 };
@@ -21,9 +19,8 @@ pub struct Equilibrium<'a> {
     phases: &'a Phases,
     solver: Box<dyn ContactSolver + 'a>,
     stiffness: Stiffness,
-    /// The triangle means of η_*(ζ) that K was filled with, and how often it was.
+    /// The triangle means of η_*(ζ) that K was filled with.
     zeta_mean: Vec<f64>,
-    revision: usize,
     load: Vector,
     c: Vector,
     prescribed: Vec<bool>,
@@ -66,7 +63,6 @@ impl<'a> Equilibrium<'a> {
             ),
             stiffness,
             zeta_mean: vec![1.0; body.triangles.len()],
-            revision: 0,
             load: Vector::zeros(session, owned)?,
             c: Vector::zeros(session, owned)?,
             prescribed: constraints.is_prescribed(),
@@ -138,7 +134,8 @@ impl<'a> Equilibrium<'a> {
                     zeta_mean: self.zeta_mean.clone(),
                     contact,
                 };
-                let mut record = figures(setting, step, &state, &external, &total, &kkt);
+                let mut record =
+                    certificate::figures(setting, step, &state, &external, &total, &kkt);
                 record.seconds = started.elapsed().as_secs_f64();
                 let unheld = self.unheld(&state.contact, force_scale);
                 return Ok(Step { state, record, unheld });
@@ -158,7 +155,6 @@ impl<'a> Equilibrium<'a> {
     fn fill(&mut self, zeta_mean: &[f64]) -> Result<(), PetscError> {
         if self.setting.body.partition.ranks().any(zeta_mean != self.zeta_mean) {
             self.phases.time("stiffness refill", || self.stiffness.refill(zeta_mean))?;
-            self.revision += 1;
             self.zeta_mean = zeta_mean.to_vec();
         }
         Ok(())
@@ -215,7 +211,6 @@ impl<'a> Equilibrium<'a> {
         }
         let problem = ContactProblem {
             stiffness: &self.stiffness.matrix,
-            revision: self.revision,
             stiffness_scale: self.stiffness.scale,
             load: &self.load,
             bounds: &setting.constraints.bounds,
@@ -237,91 +232,5 @@ impl<'a> Equilibrium<'a> {
         setting.body.partition.update(&mut u, 2)?;
         setting.motions.remove_free(&setting.body, &mut u);
         Ok(u)
-    }
-
-    /// The KKT residuals of u by element-wise forces, the cosine between u and these forces (the
-    /// sign of the energy), and the state of contact they imply. `load_size` keeps the scale of
-    /// forces where a prescribed displacement carries the body along without stress.
-    fn certify(
-        &self,
-        u: &[f64],
-        external: &[f64],
-        load_size: f64,
-    ) -> (Kkt, f64, Vec<ContactPoint>) {
-        let setting = self.setting;
-        let (body, constraints) = (&setting.body, &setting.constraints);
-        let internal = setting.elasticity.internal_force(body, &self.zeta_mean, u);
-        let partition = &body.partition;
-        let forces = partition.norm(external, 2).max(partition.norm(&internal, 2));
-        let force_scale = forces.max(load_size);
-        let size = partition.largest(u);
-        let energy = partition.dot(&internal, u, 2)
-            / (force_scale * partition.norm(u, 2)).max(f64::MIN_POSITIVE);
-
-        let mut residual: Vec<f64> = internal.iter().zip(external).map(|(r, f)| r - f).collect();
-        let mut c = u.to_vec();
-        constraints.frames.force_to_frame(&mut residual);
-        constraints.frames.displacement_to_frame(&mut c);
-        let bounds = &constraints.bounds;
-        let owned = &residual[..2 * partition.owned()];
-        let prescribed = |dof: usize| self.prescribed[dof];
-        let kkt = Kkt::of(owned, &c, bounds, prescribed, force_scale, size, partition.ranks());
-        let points = bounds.iter().map(|bound| {
-            let (force, gap) = (-residual[bound.dof], bound.gap - c[bound.dof]);
-            let active = force * size > gap * force_scale;
-            ContactPoint { node: bound.node, force, pressure: force / bound.weight, gap, active }
-        });
-        (kkt, energy, points.collect())
-    }
-
-    /// A rigid motion that the pressing nodes leave. A body without load rests where it is,
-    /// which needs no holding.
-    fn unheld(&self, contact: &[ContactPoint], force_scale: f64) -> Option<RigidMotion> {
-        // A residual at the tolerance does work of up to √N times that on a motion (Cauchy and
-        // Schwarz), which at the lever of one mesh width, 1/√N of the body, is a force √N times
-        // as large: a smaller one holds nothing for certain.
-        let partition = &self.setting.body.partition;
-        let nodes = partition.total() as f64;
-        let least = nodes * self.setting.tolerance * force_scale;
-        let pressing: Vec<bool> = contact.iter().map(|point| point.force > least).collect();
-        let unheld = contact::unheld(partition.ranks(), &self.rigid, &pressing);
-        let first = unheld.first().filter(|_| force_scale > 0.0)?;
-        Some(self.setting.motions.combined(first))
-    }
-}
-
-fn figures(
-    setting: &Setting,
-    step: usize,
-    state: &State,
-    external: &[f64],
-    report: &ContactReport,
-    kkt: &Kkt,
-) -> StepRecord {
-    let mut active: Vec<usize> =
-        state.contact.iter().filter(|point| point.active).map(|point| point.node).collect();
-    active.dedup();
-    let partition = &setting.body.partition;
-    let ranks = partition.ranks();
-    StepRecord {
-        step,
-        time: state.time,
-        zeta_min: partition.extremes(&state.zeta).0,
-        zeta_mean: setting.body.mean(&state.zeta),
-        displacement_max: partition.largest(&state.u),
-        work: partition.dot(external, &state.u, 2),
-        // An empty sum is -0.0, and so is one of reactions of nothing.
-        contact_force: ranks.total(state.contact.iter().map(|point| point.force).sum()) + 0.0,
-        active_nodes: ranks.count(active.len()),
-        iterations: report.iterations,
-        linear_iterations: report.linear_iterations,
-        factorisations: report.factorisations,
-        fallbacks: report.fallbacks,
-        contraction: report.contraction,
-        kkt_stationarity: kkt.stationarity,
-        kkt_primal: kkt.primal,
-        kkt_dual: kkt.dual,
-        kkt_complementarity: kkt.complementarity,
-        seconds: 0.0,
     }
 }

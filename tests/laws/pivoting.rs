@@ -41,7 +41,6 @@ impl Small {
         let problem = ContactProblem {
             ranks: session.ranks(),
             stiffness: &matrix,
-            revision: 0,
             stiffness_scale: self.stiffness.trace() / size as f64,
             load: &load,
             bounds: &bounds,
