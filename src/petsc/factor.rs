@@ -45,6 +45,11 @@ impl Factor {
         Ok(factor)
     }
 
+    /// Whether it is divided among the ranks, unless that turns out not to pay.
+    pub(super) fn divides(&self) -> bool {
+        self.divides
+    }
+
     /// Whether it is a factor of the matrix, and not a multigrid cycle in its place.
     pub fn is_direct(&self) -> Result<bool, PetscError> {
         let mut kind = ptr::null();
