@@ -10,10 +10,13 @@ const FUNCTIONS: &str = "\
     MPI_Comm_size|MPI_Comm_rank|MPI_Allreduce|MPI_Type_contiguous|MPI_Type_commit|MPI_Type_free|\
     MPI_Ibarrier|MPI_Test|MPI_Abort|\
     PetscSFCreate|PetscSFDestroy|PetscSFSetGraph|PetscSFBcastBegin|PetscSFBcastEnd|\
+    MatGetRow|MatRestoreRow|\
+    cholmod_l_start|cholmod_l_finish|cholmod_l_analyze|cholmod_l_analyze_p|cholmod_l_factorize|\
+    cholmod_l_solve2|cholmod_l_free_factor|cholmod_l_free_dense|\
     MatPartitioningCreate|MatPartitioningDestroy|MatPartitioningSetType|\
     MatPartitioningSetAdjacency|MatPartitioningSetFromOptions|MatPartitioningApply|\
     ISAllGather|ISGetIndices|ISRestoreIndices|ISDestroy|\
-    VecCreateMPI|VecDestroy|VecGetArray|VecRestoreArray|VecGetArrayRead|VecRestoreArrayRead|\
+    VecCreateMPI|VecGetLocalSize|VecDestroy|VecGetArray|VecRestoreArray|VecGetArrayRead|VecRestoreArrayRead|\
     VecAXPY|VecAYPX|VecCopy|VecDot|VecNorm|\
     MatCreate|MatDestroy|MatSetSizes|MatSetType|MatSetBlockSize|MatSetOption|\
     MatSetPreallocationCOO|MatSetValuesCOO|MatMult|MatDuplicate|MatCopy|MatScale|MatShift|\
@@ -35,6 +38,7 @@ fn main() {
         panic!("PETSc was not found by pkg-config; run `make deps` (Debian: petsc-dev)\n{e}")
     });
     println!("cargo:rustc-link-lib=mpi");
+    println!("cargo:rustc-link-lib=cholmod");
 
     let mpi_flags = Command::new("mpicc")
         .arg("--showme:compile")
@@ -43,12 +47,16 @@ fn main() {
     let mpi_flags = String::from_utf8_lossy(&mpi_flags.stdout).into_owned();
 
     bindgen::Builder::default()
-        .header_contents("signorini.h", "#include <petsctao.h>\n#include <petscsf.h>\n")
+        .header_contents(
+            "signorini.h",
+            "#include <petsctao.h>\n#include <petscsf.h>\n#include <suitesparse/cholmod.h>\n",
+        )
         .clang_args(petsc.include_paths.iter().map(|p| format!("-I{}", p.display())))
         .clang_args(mpi_flags.split_whitespace())
         .allowlist_function(FUNCTIONS)
         .allowlist_var("PETSC_COMM_WORLD")
         // Debian's MPI is Open MPI, whose constants are the addresses of these.
+        .allowlist_var("CHOLMOD_(L|Lt|A|LONG|REAL|DOUBLE|SUPERNODAL|GIVEN)")
         .allowlist_var("ompi_mpi_double|ompi_mpi_op_(sum|max|replace)")
         .default_enum_style(bindgen::EnumVariation::ModuleConsts)
         .layout_tests(false)

@@ -1,11 +1,12 @@
 //! A factorisation that outlives the matrix values it was made from.
 
 use super::{
-    Matrix, PetscError, Session, Vector, check, raw,
+    Matrix, PetscError, Ranks, Session, Vector, check, raw,
     session::{Live, c_string, world},
+    substructure::Substructure,
     vec::same_size,
 };
-use std::{ffi::CStr, ptr};
+use std::{ffi::CStr, ptr, slice};
 
 /// A Cholesky factor (PCCHOLESKY): CHOLMOD's on one rank, MUMPS' on several; in its place a cycle
 /// of algebraic multigrid (PCGAMG) for very large matrices on several.
@@ -13,6 +14,11 @@ use std::{ffi::CStr, ptr};
 /// Fill-reducing ordering and symbolic factorisation are done once, with the first values.
 pub struct Factor {
     raw: raw::PC,
+    /// In the place of MUMPS, where PETSc options do not ask for something else.
+    parts: Option<Substructure>,
+    ranks: Ranks,
+    /// Whether `parts` is to be tried.
+    divides: bool,
     _live: Live,
 }
 
@@ -21,7 +27,11 @@ impl Factor {
     /// `prefix` (`-elastic_pc_type …`).
     pub fn new(session: &Session, prefix: &str, unknowns: usize) -> Result<Self, PetscError> {
         cholesky_options(session, prefix)?;
-        let mut factor = Self { raw: ptr::null_mut(), _live: Live::new() };
+        let ranks = session.ranks();
+        let asked = session.has_option(&format!("-{prefix}pc_type"))?;
+        let divides = !ranks.is_alone() && !asked && unknowns < LARGE;
+        let raw = ptr::null_mut();
+        let mut factor = Self { raw, parts: None, ranks, divides, _live: Live::new() };
         let prefix = c_string(prefix)?;
         let package = package(session);
         // SAFETY: a fresh handle, strings that live during the calls.
@@ -33,6 +43,11 @@ impl Factor {
             check(raw::PCSetFromOptions(factor.raw))?;
         }
         Ok(factor)
+    }
+
+    /// Whether it is divided among the ranks, unless that turns out not to pay.
+    pub(super) fn divides(&self) -> bool {
+        self.divides
     }
 
     /// Whether it is a factor of the matrix, and not a multigrid cycle in its place.
@@ -60,6 +75,15 @@ impl Factor {
         matrix: raw::Mat,
         pattern: bool,
     ) -> Result<bool, PetscError> {
+        if self.divides && (pattern || self.parts.is_none()) {
+            // SAFETY: the caller's promise.
+            self.parts = unsafe { Substructure::new(self.ranks, matrix)? };
+            self.divides = self.parts.is_some();
+        }
+        if let Some(parts) = &mut self.parts {
+            // SAFETY: the caller's promise.
+            return unsafe { parts.factorise(matrix) };
+        }
         // SAFETY: live handles; PETSc keeps a reference to the matrix. Without the last call it
         // would factorise again when that matrix changes.
         unsafe {
@@ -75,7 +99,7 @@ impl Factor {
     }
 
     /// `z` ← the factored matrix' inverse · `r`.
-    pub fn apply(&self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
+    pub fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
         same_size(r.owned(), z.owned())?;
         // SAFETY: live handles of matching layout, distinct by borrowing.
         unsafe { self.apply_raw(r.raw, z.raw) }
@@ -83,7 +107,23 @@ impl Factor {
 
     /// # Safety
     /// Live handles of the factored matrix' layout.
-    pub(super) unsafe fn apply_raw(&self, r: raw::Vec, z: raw::Vec) -> Result<(), PetscError> {
+    pub(super) unsafe fn apply_raw(&mut self, r: raw::Vec, z: raw::Vec) -> Result<(), PetscError> {
+        if let Some(parts) = &mut self.parts {
+            let (mut size, mut from, mut to) = (0, ptr::null(), ptr::null_mut());
+            // SAFETY: the caller's promise; PETSc lends `size` values of each until they are given back.
+            unsafe {
+                check(raw::VecGetLocalSize(r, &mut size))?;
+                check(raw::VecGetArrayRead(r, &mut from))?;
+                check(raw::VecGetArray(z, &mut to))?;
+                let applied = parts.apply(
+                    slice::from_raw_parts(from, size as usize),
+                    slice::from_raw_parts_mut(to, size as usize),
+                );
+                check(raw::VecRestoreArray(z, &mut to))?;
+                check(raw::VecRestoreArrayRead(r, &mut from))?;
+                return applied;
+            }
+        }
         // SAFETY: the caller's promise.
         check(unsafe { raw::PCApply(self.raw, r, z) })
     }

@@ -1,10 +1,11 @@
 //! Linear systems by a Cholesky factor, polished by conjugate gradients.
 
 use super::{
-    Matrix, PetscError, Session, Vector, check,
+    Factor, Matrix, PetscError, Session, Vector, check,
     factor::{cholesky_options, definite, method, package},
     raw,
     session::{Live, c_string, world},
+    shell::KeptFactor,
     vec::same_size,
 };
 use std::ptr;
@@ -17,6 +18,8 @@ pub struct LinearSolver {
     raw: raw::KSP,
     /// Whether the last factorisation found only positive pivots.
     definite: bool,
+    /// What several ranks factorise with, where PETSc options do not ask for something else.
+    _factor: Option<Box<KeptFactor>>,
     _live: Live,
 }
 
@@ -40,8 +43,9 @@ impl LinearSolver {
     /// very large systems.
     pub fn cholesky(session: &Session, prefix: &str, unknowns: usize) -> Result<Self, PetscError> {
         cholesky_options(session, prefix)?;
-        let mut solver = Self { raw: ptr::null_mut(), definite: false, _live: Live::new() };
-        let prefix = c_string(prefix)?;
+        let mut solver =
+            Self { raw: ptr::null_mut(), definite: false, _factor: None, _live: Live::new() };
+        let (text, prefix) = (prefix, c_string(prefix)?);
         let package = package(session);
         let mut pc = ptr::null_mut();
         // SAFETY: a fresh handle, strings that live during the calls.
@@ -55,6 +59,14 @@ impl LinearSolver {
             check(raw::PCSetType(pc, method(session, unknowns).as_ptr()))?;
             check(raw::PCFactorSetMatSolverType(pc, package.as_ptr()))?;
             check(raw::KSPSetFromOptions(solver.raw))?;
+            if !session.ranks().is_alone() {
+                let factor = Factor::new(session, text, unknowns)?;
+                if factor.divides() {
+                    let mut factor = KeptFactor::new(factor, None);
+                    factor.attach(pc)?;
+                    solver._factor = Some(factor);
+                }
+            }
         }
         Ok(solver)
     }

@@ -8,6 +8,7 @@
 //! All objects live on `PETSC_COMM_WORLD`; sizes and slices are those owned by this rank.
 #![allow(unsafe_code)]
 
+mod cholmod;
 mod error;
 mod factor;
 mod ghosts;
@@ -17,6 +18,7 @@ mod mat;
 mod ranks;
 mod session;
 mod shell;
+mod substructure;
 mod tao;
 mod vec;
 mod wear;

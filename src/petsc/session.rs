@@ -71,6 +71,17 @@ impl Session {
         unused
     }
 
+    /// Whether the user has given an option.
+    pub(super) fn has_option(&self, name: &str) -> Result<bool, PetscError> {
+        let name = c_string(name)?;
+        let mut given = raw::PetscBool::PETSC_FALSE;
+        // SAFETY: the string lives during the call; null is the global database.
+        check(unsafe {
+            raw::PetscOptionsHasName(ptr::null_mut(), ptr::null(), name.as_ptr(), &mut given)
+        })?;
+        Ok(given == raw::PetscBool::PETSC_TRUE)
+    }
+
     /// Sets a default in the options database, unless the user has given that option; a default
     /// of ours from before is replaced.
     pub(super) fn default_option(&self, name: &str, value: &str) -> Result<(), PetscError> {

@@ -1,12 +1,13 @@
 //! A kept factor as the preconditioner inside one of PETSc's own solvers.
 
-use super::{Factor, PetscError, Session, Wear, check, factor::NOT_DEFINITE, raw};
+use super::{Factor, PetscError, Wear, check, factor::NOT_DEFINITE, raw};
 use std::{ffi::c_void, time::Instant};
 
-/// A PCSHELL that factorises the operators it is given only when its factor is worn out.
+/// A PCSHELL that factorises the operators it is given: all of them, or only when its factor is worn
+/// out.
 pub(super) struct KeptFactor {
     factor: Factor,
-    wear: Wear,
+    wear: Option<Wear>,
     /// Rows of the factored matrix.
     size: i32,
     /// Applications since the operators last changed.
@@ -16,11 +17,10 @@ pub(super) struct KeptFactor {
 }
 
 impl KeptFactor {
-    /// In a box, because PETSc keeps its address.
-    pub(super) fn new(session: &Session, unknowns: usize) -> Result<Box<Self>, PetscError> {
-        let factor = Factor::new(session, "elastic_", unknowns)?;
-        let wear = Wear::new(session.ranks());
-        Ok(Box::new(Self { factor, wear, size: 0, applications: 0, factorisations: 0 }))
+    /// Factorises every matrix, or those that `wear` finds due. In a box, because PETSc keeps its
+    /// address.
+    pub(super) fn new(factor: Factor, wear: Option<Wear>) -> Box<Self> {
+        Box::new(Self { factor, wear, size: 0, applications: 0, factorisations: 0 })
     }
 
     /// Makes `pc` apply this factor.
@@ -45,9 +45,12 @@ impl KeptFactor {
             check(raw::PCGetOperators(pc, std::ptr::null_mut(), &mut matrix))?;
             check(raw::MatGetSize(matrix, &mut size, std::ptr::null_mut()))?;
         }
-        self.wear.lose(std::mem::take(&mut self.applications));
-        if size == self.size && !self.wear.worn() {
-            return Ok(());
+        let applications = std::mem::take(&mut self.applications);
+        if let Some(wear) = &mut self.wear {
+            wear.lose(applications);
+            if size == self.size && !wear.worn() {
+                return Ok(());
+            }
         }
         let started = Instant::now();
         // SAFETY: a live matrix.
@@ -57,7 +60,9 @@ impl KeptFactor {
         }
         self.size = size;
         self.factorisations += 1;
-        self.wear.renewed(started.elapsed().as_secs_f64());
+        if let Some(wear) = &mut self.wear {
+            wear.renewed(started.elapsed().as_secs_f64());
+        }
         Ok(())
     }
 }
@@ -88,7 +93,9 @@ unsafe extern "C" fn apply(pc: raw::PC, r: raw::Vec, z: raw::Vec) -> raw::PetscE
     match applied {
         Ok(kept) => {
             kept.applications += 1;
-            kept.wear.took(started.elapsed().as_secs_f64(), 1);
+            if let Some(wear) = &mut kept.wear {
+                wear.took(started.elapsed().as_secs_f64(), 1);
+            }
             0
         }
         Err(error) => error.pass_on(),

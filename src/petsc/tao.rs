@@ -1,7 +1,7 @@
 //! TAO on a quadratic function with bounds.
 
 use super::{
-    Matrix, PetscError, Session, Vector, check, raw,
+    Factor, Matrix, PetscError, Session, Vector, Wear, check, raw,
     session::{Live, c_string, world},
     shell::KeptFactor,
     vec::same_size,
@@ -64,7 +64,10 @@ impl BoundedQuadratic {
         // nothing can factorise; they bring their own preconditioner.
         let quasi_newton = method.starts_with("bqnk");
         let factor = (!quasi_newton)
-            .then(|| KeptFactor::new(session, session.ranks().count(size)))
+            .then(|| {
+                let factor = Factor::new(session, "elastic_", session.ranks().count(size))?;
+                Ok(KeptFactor::new(factor, Some(Wear::new(session.ranks()))))
+            })
             .transpose()?;
         let gradient = Vector::zeros(session, size)?;
         let tao = Handle(ptr::null_mut(), Live::new());

@@ -4,7 +4,7 @@ use crate::support::close;
 use nalgebra::{DMatrix, DVector};
 use signorini::{
     contact::{Bound, ContactProblem, ContactReport, PenaltyOptions, SOLVERS, solver},
-    petsc::{Matrix, Session, Vector},
+    petsc::{Matrix, Ranks, Session, Vector},
 };
 
 const TOLERANCE: f64 = 1e-10;
@@ -48,6 +48,7 @@ impl Small {
             work: &self.work,
             force_scale: self.load.iter().map(|f| f * f).sum::<f64>().sqrt(),
             tolerance: TOLERANCE,
+            ranks: Ranks::alone(),
         };
         let mut solver = solver(&session, name, true, PenaltyOptions::default());
         if name == "active-set" {

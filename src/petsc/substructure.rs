@@ -1,0 +1,279 @@
+//! A Cholesky factor over several ranks: each eliminates its own unknowns, all share the rest.
+
+use super::{
+    PetscError, Ranks, check,
+    cholmod::{Cholesky, Half, Lower},
+    raw,
+};
+use nalgebra::{DMatrix, DVector};
+use std::{ptr, slice};
+
+/// The factor of a matrix whose unknowns are divided: the interior ones of a rank have no
+/// neighbours on other ranks; the interface B, between the ranks, separates them
+/// (Przemieniecki, AIAA J. 1, 1963).
+///
+/// With the Schur complement S = K_BB − Σ K_BI K_II⁻¹ K_IB, dense and the same on all ranks, a
+/// solve is a forward solve in each rank's interior, one with S, and a backward solve. A rank's
+/// factor holds its part of the interface last, with c 1 for K_BB: the last block L_S of it then
+/// tells the rank's part of S, L_S L_Sᵀ = c 1 − K_BI K_II⁻¹ K_IB, and couples interior and
+/// interface.
+pub(super) struct Substructure {
+    ranks: Ranks,
+    parts: Parts,
+    local: Cholesky,
+    /// The factor of S, where there is an interface.
+    shared: Option<Cholesky>,
+    /// L_S.
+    coupling: DMatrix<f64>,
+}
+
+/// What the unknowns of a rank are.
+struct Parts {
+    /// Of each owned unknown its place among the interior or the interface ones.
+    role: Vec<Role>,
+    /// Global numbers of all ranks' interface unknowns, in increasing order.
+    interface: Vec<i32>,
+    /// Places in `interface` of those next to this rank's interior.
+    near: Vec<usize>,
+    interior: usize,
+}
+
+#[derive(Clone, Copy)]
+enum Role {
+    Interior(usize),
+    Interface(usize),
+}
+
+/// Interface unknowns up to which a dense Schur complement on every rank pays.
+const WIDEST: usize = 6000;
+
+impl Substructure {
+    /// Divides and orders the unknowns of a matrix; `None` if the interface is too wide. Collective.
+    ///
+    /// # Safety
+    /// `matrix` is a live handle.
+    pub(super) unsafe fn new(ranks: Ranks, matrix: raw::Mat) -> Result<Option<Self>, PetscError> {
+        let (mut first, mut end) = (0, 0);
+        // SAFETY: the caller's promise.
+        check(unsafe { raw::MatGetOwnershipRange(matrix, &mut first, &mut end) })?;
+        // Of two neighbours on different ranks, that on the higher one is in the interface.
+        let mut own = Vec::new();
+        let mut role = Vec::new();
+        for row in first..end {
+            // SAFETY: an owned row.
+            let lower =
+                unsafe { with_row(matrix, row, |columns, _| columns.iter().any(|&j| j < first)) }?;
+            role.push(match lower {
+                true => Role::Interface(own.len()),
+                false => Role::Interior(role.len() - own.len()),
+            });
+            if lower {
+                own.push(row);
+            }
+        }
+        let counts = ranks.gather(&[own.len() as f64]);
+        let width = counts.iter().sum::<f64>() as usize;
+        if width > WIDEST {
+            return Ok(None);
+        }
+        let before = counts[..ranks.rank()].iter().sum::<f64>() as usize;
+        let mut interface = vec![0.0; width];
+        own.iter().enumerate().for_each(|(i, &row)| interface[before + i] = f64::from(row));
+        ranks.sum(&mut interface);
+        let interface: Vec<i32> = interface.into_iter().map(|row| row as i32).collect();
+        for role in &mut role {
+            if let Role::Interface(i) = role {
+                *i += before;
+            }
+        }
+
+        let interior = role.len() - own.len();
+        let mut near = Vec::new();
+        for (row, role) in (first..end).zip(&role) {
+            if let Role::Interior(_) = role {
+                // SAFETY: an owned row.
+                unsafe {
+                    with_row(matrix, row, |columns, _| {
+                        near.extend(columns.iter().filter_map(|j| interface.binary_search(j).ok()));
+                    })?;
+                }
+            }
+        }
+        near.sort_unstable();
+        near.dedup();
+
+        let parts = Parts { role, interface, near, interior };
+        // The interior in CHOLMOD's order, then the interface.
+        // SAFETY: the caller's promise.
+        let mut inside = unsafe { parts.eliminated(matrix, first, None)? };
+        let order = Cholesky::analyse(&mut inside, None)?.order().to_vec();
+        let last = (interior..interior + parts.near.len()).map(|i| i as i64);
+        let order = order.into_iter().chain(last.clone()).collect();
+        // SAFETY: the caller's promise.
+        let mut whole = unsafe { parts.eliminated(matrix, first, Some(1.0))? };
+        let local = Cholesky::analyse(&mut whole, Some(order))?;
+        let kept = local.order()[interior..].iter().copied().eq(last);
+        let coupling = DMatrix::zeros(0, 0);
+        Ok(ranks.all(kept).then_some(Self { ranks, parts, local, shared: None, coupling }))
+    }
+
+    /// Factorises the present values of `matrix`; false if it is not positive definite. Collective.
+    ///
+    /// # Safety
+    /// `matrix` is a live handle with the pattern this was made for.
+    pub(super) unsafe fn factorise(&mut self, matrix: raw::Mat) -> Result<bool, PetscError> {
+        let parts = &self.parts;
+        let width = parts.interface.len();
+        let (mut first, mut end) = (0, 0);
+        // SAFETY: the caller's promise.
+        check(unsafe { raw::MatGetOwnershipRange(matrix, &mut first, &mut end) })?;
+        let mut schur = DMatrix::zeros(width, width);
+        let mut size = 0.0_f64;
+        for (row, role) in (first..end).zip(&parts.role) {
+            let Role::Interface(i) = *role else { continue };
+            // SAFETY: an owned row.
+            unsafe {
+                with_row(matrix, row, |columns, values| {
+                    let mut sum = 0.0;
+                    for (column, value) in columns.iter().zip(values) {
+                        if let Ok(j) = parts.interface.binary_search(column) {
+                            schur[(i, j)] = *value;
+                            sum += value.abs();
+                        }
+                    }
+                    size = size.max(sum);
+                })?;
+            }
+        }
+        // K_BI K_II⁻¹ K_IB is at most K_BB: with this the rank's matrix is definite.
+        let c = 2.0 * self.ranks.max(size);
+        // SAFETY: the caller's promise.
+        let mut whole = unsafe { parts.eliminated(matrix, first, Some(c))? };
+        let definite = self.local.factorise(&mut whole)?;
+        if !self.ranks.all(definite) {
+            return Ok(false);
+        }
+        let near = parts.near.len();
+        self.coupling = DMatrix::from_vec(near, near, self.local.trailing(near));
+        let part = &self.coupling * self.coupling.transpose();
+        for (j, &to) in parts.near.iter().enumerate() {
+            parts.near.iter().enumerate().for_each(|(i, &at)| schur[(at, to)] += part[(i, j)]);
+            schur[(to, to)] -= c;
+        }
+        if width == 0 {
+            return Ok(true);
+        }
+        self.ranks.sum(schur.as_mut_slice());
+        let mut lower = Lower::new();
+        for j in 0..width {
+            (j..width).for_each(|i| lower.push(i, schur[(i, j)]));
+            lower.end_column();
+        }
+        let mut shared = match self.shared.take() {
+            Some(shared) => shared,
+            None => Cholesky::analyse(&mut lower, Some((0..width as i64).collect()))?,
+        };
+        let definite = shared.factorise(&mut lower)?;
+        self.shared = Some(shared);
+        Ok(self.ranks.all(definite))
+    }
+
+    /// `z` ← the factored matrix' inverse · `r`. Collective.
+    pub(super) fn apply(&mut self, r: &[f64], z: &mut [f64]) -> Result<(), PetscError> {
+        let Parts { role: roles, interface, near, interior } = &self.parts;
+        let mut shared = vec![0.0; interface.len()];
+        let mut inside = vec![0.0; interior + near.len()];
+        for (r, role) in r.iter().zip(roles) {
+            match *role {
+                Role::Interior(i) => inside[i] = *r,
+                Role::Interface(i) => shared[i] = *r,
+            }
+        }
+        let order = self.local.order().to_vec();
+        let mut y: Vec<f64> = order.iter().map(|&i| inside[i as usize]).collect();
+        self.local.solve(Half::Forward, &mut y)?;
+        // −K_BI K_II⁻¹ r_I = L_S y_B.
+        let ours = &self.coupling * DVector::from_column_slice(&y[*interior..]);
+        near.iter().zip(&ours).for_each(|(&at, ours)| shared[at] += ours);
+        self.ranks.sum(&mut shared);
+        if let Some(factor) = &mut self.shared {
+            factor.solve(Half::Whole, &mut shared)?;
+        }
+        let ours = DVector::from_iterator(near.len(), near.iter().map(|&at| shared[at]));
+        y[*interior..].copy_from_slice(self.coupling.tr_mul(&ours).as_slice());
+        self.local.solve(Half::Backward, &mut y)?;
+        order.iter().zip(&y).for_each(|(&i, y)| inside[i as usize] = *y);
+        for (z, role) in z.iter_mut().zip(roles) {
+            *z = match *role {
+                Role::Interior(i) => inside[i],
+                Role::Interface(i) => shared[i],
+            };
+        }
+        Ok(())
+    }
+}
+
+impl Parts {
+    /// The rank's interior, with its interface behind it and c on the diagonal there, if one is given.
+    /// The pattern of that block is full, so that no ordering moves it.
+    unsafe fn eliminated(
+        &self,
+        matrix: raw::Mat,
+        first: i32,
+        c: Option<f64>,
+    ) -> Result<Lower, PetscError> {
+        let mut lower = Lower::new();
+        for (row, role) in self.role.iter().enumerate() {
+            let Role::Interior(i) = *role else { continue };
+            let add = |columns: &[i32], values: &[f64]| {
+                for (&column, &value) in columns.iter().zip(values) {
+                    let own = usize::try_from(column - first).ok().and_then(|j| self.role.get(j));
+                    match own {
+                        Some(Role::Interior(j)) if *j >= i => lower.push(*j, value),
+                        Some(Role::Interior(_)) => {}
+                        _ if c.is_some() => {
+                            let found = self.interface.binary_search(&column).ok();
+                            if let Some(at) = found.and_then(|b| self.near.binary_search(&b).ok()) {
+                                lower.push(self.interior + at, value);
+                            }
+                        }
+                        _ => {}
+                    }
+                }
+            };
+            // SAFETY: the caller passes a live matrix whose rows begin at `first`.
+            unsafe { with_row(matrix, first + row as i32, add)? };
+            lower.end_column();
+        }
+        if let Some(c) = c {
+            for j in 0..self.near.len() {
+                lower.push(self.interior + j, c);
+                (j + 1..self.near.len()).for_each(|i| lower.push(self.interior + i, 0.0));
+                lower.end_column();
+            }
+        }
+        Ok(lower)
+    }
+}
+
+/// Lends the columns and values of an owned row.
+unsafe fn with_row<R>(
+    matrix: raw::Mat,
+    row: i32,
+    reader: impl FnOnce(&[i32], &[f64]) -> R,
+) -> Result<R, PetscError> {
+    let (mut count, mut columns, mut values) = (0, ptr::null(), ptr::null());
+    // SAFETY: the caller passes a live matrix and a row that it owns; PETSc lends `count` entries.
+    unsafe {
+        check(raw::MatGetRow(matrix, row, &mut count, &mut columns, &mut values))?;
+        let result = match count {
+            0 => reader(&[], &[]),
+            _ => reader(
+                slice::from_raw_parts(columns, count as usize),
+                slice::from_raw_parts(values, count as usize),
+            ),
+        };
+        check(raw::MatRestoreRow(matrix, row, &mut count, &mut columns, &mut values))?;
+        Ok(result)
+    }
+}
