@@ -28,6 +28,10 @@ enum Command {
     Compare(command::CompareArguments),
     /// Make the maps of where methods fail.
     Stability(command::StabilityArguments),
+    /// Compute the reference solution of `converge` and `chart`, unless it is there.
+    Reference(command::ReferenceArguments),
+    /// The errors of the paper's grid of n and k against the reference: Table 1, Figure 3.
+    Converge(command::ConvergeArguments),
     /// Mesh the .geo files of scenes with gmsh, where their .msh is missing or older.
     Mesh {
         /// Scene files.
@@ -41,6 +45,8 @@ fn main() -> ExitCode {
         Command::Run(arguments) => command::run(&arguments),
         Command::Compare(arguments) => command::compare_scenes(&arguments),
         Command::Stability(arguments) => command::stability(&arguments),
+        Command::Reference(arguments) => command::reference(&arguments),
+        Command::Converge(arguments) => command::convergence(&arguments),
         Command::Mesh { scenes } => command::mesh(&scenes),
     };
     match result {

@@ -1,11 +1,15 @@
 //! What the subcommands do.
 
 mod compare;
+mod converge;
+mod reference;
 mod run;
 mod screen;
 mod stability;
 
 pub use compare::{CompareArguments, compare_scenes};
+pub use converge::{ConvergeArguments, convergence};
+pub use reference::{ReferenceArguments, reference};
 pub use run::{RunArguments, run};
 pub use stability::{StabilityArguments, stability};
 
