@@ -32,6 +32,8 @@ enum Command {
     Reference(command::ReferenceArguments),
     /// The errors of the paper's grid of n and k against the reference: Table 1, Figure 3.
     Converge(command::ConvergeArguments),
+    /// Error against seconds: solvers, meshes, steps and tolerances, with the Pareto front.
+    Chart(command::ChartArguments),
     /// Mesh the .geo files of scenes with gmsh, where their .msh is missing or older.
     Mesh {
         /// Scene files.
@@ -47,6 +49,7 @@ fn main() -> ExitCode {
         Command::Stability(arguments) => command::stability(&arguments),
         Command::Reference(arguments) => command::reference(&arguments),
         Command::Converge(arguments) => command::convergence(&arguments),
+        Command::Chart(arguments) => command::speed_chart(&arguments),
         Command::Mesh { scenes } => command::mesh(&scenes),
     };
     match result {

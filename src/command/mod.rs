@@ -1,5 +1,6 @@
 //! What the subcommands do.
 
+mod chart;
 mod compare;
 mod converge;
 mod reference;
@@ -7,6 +8,7 @@ mod run;
 mod screen;
 mod stability;
 
+pub use chart::{ChartArguments, speed_chart};
 pub use compare::{CompareArguments, compare_scenes};
 pub use converge::{ConvergeArguments, convergence};
 pub use reference::{ReferenceArguments, reference};
