@@ -74,11 +74,11 @@ fn table(study: &Convergence, (name, measure): &Measure) -> String {
     for column in table.column_iter_mut() {
         column.set_cell_alignment(CellAlignment::Right);
     }
+    let (all, in_h) = (study.order(*measure), study.order_in_h(*measure));
+    let in_k = study.growth_in_k(*measure);
     format!(
-        "{name}: largest over time\n{table}\norder {:.2} in h + k over all runs; {:.2} in h at the \
-         least k\n",
-        study.order(*measure),
-        study.order_in_h(*measure)
+        "{name}: largest over time\n{table}\norder {all:.2} in h + k over all runs; {in_h:.2} in h \
+         at the least k; at the largest n it grows with k by {in_k:.1e} per second\n"
     )
 }
 

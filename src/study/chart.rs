@@ -1,6 +1,10 @@
 //! Speed against accuracy: what a run costs and how far its answer is from the reference.
 
-use super::{Grid, Norms, Reference, StudyError, front::Front, trial::Trial};
+use super::{
+    Grid, Norms, Reference, StudyError,
+    front::Front,
+    trial::{Trace, Trial},
+};
 use crate::{
     contact::SOLVERS,
     evolution::{RunError, StepRecord},
@@ -26,6 +30,9 @@ enum Steps {
     /// The tolerance on ζ of steps chosen by the program.
     Auto(f64),
 }
+
+/// Runs below this are made three times, s.
+const SHORT: f64 = 0.5;
 
 /// What one cannot say without choosing: the shipped scene's mesh and step, the program's solver
 /// and tolerance.
@@ -56,7 +63,7 @@ pub struct ChartRow {
     pub kkt: f64,
     /// Time steps.
     pub steps: usize,
-    /// Wall time of mesh, set-up and steps of one run, s.
+    /// Wall time of mesh, set-up and steps, s; of a short run the least of three.
     pub seconds: f64,
     /// Largest ‖ε(Δu)‖ + ‖Δζ‖ over time.
     pub sum: f64,
@@ -192,7 +199,7 @@ fn run(session: &Session, reference: &Reference, choice: &Choice) -> Result<Char
         knee_zeta: false,
         error: None,
     };
-    let trace = match trial.run(session, &reference.times, &mut |_| ()) {
+    let trace = match fastest(session, &trial, &reference.times) {
         Ok(trace) => trace,
         Err(StudyError::Run(error @ RunError::Contact { .. })) => {
             row.error = Some(error.to_string());
@@ -217,6 +224,17 @@ fn run(session: &Session, reference: &Reference, choice: &Choice) -> Result<Char
         displacement_max,
         ..row
     })
+}
+
+/// Runs `trial`; again where it is short, for then other programs' moments count.
+fn fastest(session: &Session, trial: &Trial, times: &[f64]) -> Result<Trace, StudyError> {
+    let mut best = trial.run(session, times, &mut |_| ())?;
+    if best.seconds < SHORT {
+        for _ in 0..2 {
+            best.seconds = best.seconds.min(trial.run(session, times, &mut |_| ())?.seconds);
+        }
+    }
+    Ok(best)
 }
 
 /// Marks the Pareto fronts and their knees.

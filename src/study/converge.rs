@@ -132,20 +132,27 @@ impl Convergence {
 
     /// The order p of an error ~ (h + k)^p, fitted to all rows.
     pub fn order(&self, measure: fn(&ErrorRow) -> f64) -> f64 {
-        slope(self.rows.iter().map(|row| (row.h_plus_k, measure(row))))
+        slope(self.rows.iter().map(|row| (row.h_plus_k.ln(), measure(row).ln())))
     }
 
     /// The order p of an error ~ h^p, fitted to the rows of the least k.
     pub fn order_in_h(&self, measure: fn(&ErrorRow) -> f64) -> f64 {
         let least = self.rows.iter().map(|row| row.k).fold(f64::INFINITY, f64::min);
         let rows = self.rows.iter().filter(|row| row.k == least);
-        slope(rows.map(|row| (1.0 / row.n as f64, measure(row))))
+        slope(rows.map(|row| (-(row.n as f64).ln(), measure(row).ln())))
+    }
+
+    /// How much the error grows with k, per s, at the largest n: there h hides it least.
+    pub fn growth_in_k(&self, measure: fn(&ErrorRow) -> f64) -> f64 {
+        let most = self.rows.iter().map(|row| row.n).max();
+        let rows = self.rows.iter().filter(|row| Some(row.n) == most);
+        slope(rows.map(|row| (row.k, measure(row))))
     }
 }
 
-/// The slope of log y over log x by least squares.
+/// The slope of y over x by least squares.
 fn slope(points: impl Iterator<Item = (f64, f64)>) -> f64 {
-    let points: Vec<_> = points.map(|(x, y)| (x.ln(), y.ln())).collect();
+    let points: Vec<_> = points.collect();
     let mean =
         |value: fn(&(f64, f64)) -> f64| points.iter().map(value).sum::<f64>() / points.len() as f64;
     let (x, y) = (mean(|p| p.0), mean(|p| p.1));
