@@ -15,11 +15,13 @@ from drawing import FAINT, INK
 
 COLOURS = ["#2f6db3", "#d08a1d", "#3d8f5a", "#8e5aa8", "#c0392b"]
 MEASURES = {
-    "strain": r"$\|\varepsilon(\Delta u)\|_{L^2}$",
-    "gradient": r"$|\Delta u|_{H^1}$",
-    "zeta_gradient": r"$|\Delta\zeta|_{H^1}$",
-    "zeta": r"$\|\Delta\zeta\|_{L^2}$",
+    "strain": "‖ε(Δu)‖",
+    "gradient": "|Δu| in H¹",
+    "zeta_gradient": "|Δζ| in H¹",
+    "zeta": "‖Δζ‖",
 }
+# Ticks of h + k and h.
+TICKS = [0.02, 0.03, 0.05, 0.1, 0.2, 0.3]
 
 
 def slope(x, y):
@@ -29,6 +31,8 @@ def slope(x, y):
 
 
 def grid(axes):
+    axes.set_xticks(TICKS, [f"{tick:g}" for tick in TICKS])
+    axes.set_xticks([], minor=True)
     axes.grid(which="both", color=FAINT, alpha=0.3, linewidth=0.5)
     axes.set_axisbelow(True)
 
@@ -46,8 +50,7 @@ def draw_figure_3(axes, rows):
     axes.loglog(ends, factor * ends**order, color=INK, lw=1.2, label=f"fit: order {order:.2f}")
     axes.loglog(ends, 0.6 * factor * ends[1] ** (order - 1) * ends, color=INK, lw=1, ls=":",
                 label="order 1")
-    axes.set(xlabel="h + k,  h = √2/n", ylabel=r"$\max_t\ \|\varepsilon(\Delta u)\|_{L^2} "
-             r"+ \|\Delta\zeta\|_{L^2}$")
+    axes.set(xlabel="h + k,  h = √2/n", ylabel="largest ‖ε(Δu)‖ + ‖Δζ‖ over time")
     axes.set_title("Figure 3: error of Table 1 against h + k\n"
                    "(points of one n: k from 0.02 down)", loc="left")
     axes.legend()
