@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
+from matplotlib.ticker import LogFormatterSciNotation
 
 from drawing import BLUE, FAINT, INK, RED
 
@@ -48,7 +49,8 @@ def matched(fenicsx, rows):
         apart = max(abs(row[key] / twin[key] - 1) for key in ("zeta_min", "displacement_max"))
         if apart > SAME:
             sys.exit(f"FEniCSx differs by {apart:.1e} at n = {row['n']:g}, k = {row['step']:g}")
-        yield {**row, "sum": twin["sum"], "zeta": twin["zeta"], "faster": row["seconds"] / twin["seconds"]}
+        times = row["seconds"] / twin["seconds"]
+        yield {**row, "sum": twin["sum"], "zeta": twin["zeta"], "times": times}
 
 
 def kinds(rows):
@@ -87,15 +89,16 @@ def draw(axes, rows, fenicsx, error, suffix, label):
                    key=lambda row: row["seconds"])
     axes.step([row["seconds"] for row in front], [row[error] for row in front], where="post",
               color=RED, lw=1.3, label="Pareto front", zorder=1)
-    marks = [("knee", row, (-12, -34), "right") for row in rows if row["knee" + suffix] == "true"]
-    marks += [("defaults", row, (30, 30), "left") for row in rows if row["default"] == "true"]
+    marks = [("knee", row, (-25, -45), "center") for row in rows if row["knee" + suffix] == "true"]
+    marks += [("defaults", row, (45, 75), "left") for row in rows if row["default"] == "true"]
     for title, row, offset, side in marks:
         axes.annotate(f"{title}\n{name(row)}", (row["seconds"], row[error]), offset,
                       textcoords="offset points", fontsize=8.5, ha=side, va="center",
                       arrowprops={"arrowstyle": "->", "color": INK, "lw": 0.9},
                       bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1})
     axes.set(xscale="log", yscale="log", xlabel="wall time of mesh, set-up and steps (s)",
-             ylabel=label)
+             ylabel=label, xlim=(4e-4, None))
+    axes.yaxis.set_minor_formatter(LogFormatterSciNotation(minor_thresholds=(3, 0.6)))
     axes.grid(which="both", color=FAINT, alpha=0.3, linewidth=0.5)
     axes.set_axisbelow(True)
 
@@ -111,12 +114,12 @@ def main(folder):
     draw(right, rows, fenicsx, "zeta", "_zeta", "largest ‖Δζ‖ over time")
     left.set_title("error of displacement and damage: the mesh decides", loc="left")
     right.set_title("error of the damage alone: steps count as well", loc="left")
-    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    left.legend(loc="lower left", fontsize=8.5)
     picture = table.with_suffix(".png")
     figure.savefig(picture)
     print(picture)
     for row in fenicsx:
-        print(f"FEniCSx n = {row['n']:g}, k = {row['step']:g}: {row['faster']:.1f} times the "
+        print(f"FEniCSx n = {row['n']:g}, k = {row['step']:g}: {row['times']:.1f} times the "
               "seconds of active-set")
 
 

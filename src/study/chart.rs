@@ -131,7 +131,7 @@ fn choices(finest: usize) -> Vec<Choice> {
     // Graded meshes.
     for grading in [2.0, 4.0, 8.0, 16.0, 32.0] {
         for n in [8, 16, 32, 64, 128] {
-            for k in [0.1, 0.05, 0.02, 0.01] {
+            for k in [0.1, 0.05, 0.02, 0.01, 0.005, 0.002] {
                 choices.push(Choice { n, grading, steps: Steps::Uniform(k), ..DEFAULT });
             }
         }
