@@ -55,7 +55,7 @@ pub fn reference(arguments: &ReferenceArguments) -> Result<(), Failure> {
         }
         Err(ReferenceError::Missing { .. }) => {}
         Err(error @ (ReferenceError::Other { .. } | ReferenceError::Damaged { .. })) => {
-            eprintln!("warning: {error}; this is done now");
+            eprintln!("warning: {error}");
         }
         Err(error) => return Err(Failure::input(error)),
     }

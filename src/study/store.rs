@@ -29,7 +29,10 @@ pub enum ReferenceError {
     #[error("{0}")]
     Plan(String),
     /// It has not been computed.
-    #[error("{path}: there is no such reference yet; compute it with `signorini reference`")]
+    #[error(
+        "{path}: there is no such reference yet; compute it with `signorini reference` and the \
+         same options"
+    )]
     Missing {
         /// The file.
         path: PathBuf,
@@ -37,7 +40,7 @@ pub enum ReferenceError {
     /// It belongs to another problem.
     #[error(
         "{path}: this reference belongs to another scene or mesh (hash {found:.12}, here \
-         {expected:.12}); `signorini reference` computes it anew"
+         {expected:.12}); `signorini reference` with the same options computes it anew"
     )]
     Other {
         /// The file.
@@ -48,7 +51,10 @@ pub enum ReferenceError {
         expected: String,
     },
     /// The file is not what was written.
-    #[error("{path}: the file is damaged ({reason}); `signorini reference` computes it anew")]
+    #[error(
+        "{path}: the file is damaged ({reason}); `signorini reference` with the same options \
+         computes it anew"
+    )]
     Damaged {
         /// The file.
         path: PathBuf,
