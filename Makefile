@@ -16,7 +16,8 @@ BINARY := target/release/signorini
 # rustup puts cargo where a shell opened before does not look.
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
-.PHONY: help deps deps-validate build mesh run figures test validate compare stability clean
+.PHONY: help deps deps-validate build mesh run figures test validate compare stability \
+    reference converge chart clean
 
 help:
 	@echo 'make mesh && make run   mesh and solve the scenes of geo/, draw their figures into out/'
@@ -30,6 +31,9 @@ help:
 	@echo 'make validate   the comparison with FEniCSx (installs it: make deps-validate)'
 	@echo 'make compare    all contact solvers on all scenes, side by side'
 	@echo 'make stability  the maps of where methods fail; or MAPS="step-size …"'
+	@echo 'make reference  the reference solution of the convergence study, unless it is there (minutes)'
+	@echo 'make converge   errors against it on the paper'"'"'s grid of n and k: Table 1, Figure 3'
+	@echo 'make chart      error against seconds: solvers, meshes, steps, tolerances, FEniCSx'
 	@echo 'make clean      remove the build, the results and the meshes'
 
 deps:
@@ -76,6 +80,22 @@ compare: build
 stability: build
 	$(BINARY) stability $(MAPS)
 	$(PYTHON) scripts/stability.py out/stability $(MAPS)
+
+reference: build
+	$(BINARY) reference
+
+converge: reference
+	$(BINARY) converge
+	$(PYTHON) scripts/converge.py out/converge
+
+# The chart compares uniform meshes with graded ones: a graded reference is nearer to both.
+CHART_REFERENCE := --cells 256 --grading 4 --step 5e-4
+
+chart: build deps-validate
+	$(BINARY) reference $(CHART_REFERENCE)
+	$(BINARY) chart $(CHART_REFERENCE)
+	$(PYTHON) validation/timing.py geo/square-mild.toml out/chart
+	$(PYTHON) scripts/chart.py out/chart
 
 clean:
 	rm -rf target out geo/*.msh scripts/__pycache__ validation/__pycache__

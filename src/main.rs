@@ -28,6 +28,12 @@ enum Command {
     Compare(command::CompareArguments),
     /// Make the maps of where methods fail.
     Stability(command::StabilityArguments),
+    /// Compute the reference solution of `converge` and `chart`, unless it is there.
+    Reference(command::ReferenceArguments),
+    /// The errors of the paper's grid of n and k against the reference: Table 1, Figure 3.
+    Converge(command::ConvergeArguments),
+    /// Error against seconds: solvers, meshes, steps and tolerances, with the Pareto front.
+    Chart(command::ChartArguments),
     /// Mesh the .geo files of scenes with gmsh, where their .msh is missing or older.
     Mesh {
         /// Scene files.
@@ -43,6 +49,9 @@ fn main() -> ExitCode {
         Command::Compare(_) => command::refuse_ranks("compare"),
         Command::Stability(_) => command::refuse_ranks("stability"),
         Command::Mesh { .. } => command::refuse_ranks("mesh"),
+        Command::Reference(_) => command::refuse_ranks("reference"),
+        Command::Converge(_) => command::refuse_ranks("converge"),
+        Command::Chart(_) => command::refuse_ranks("chart"),
     };
     if let Err(code) = alone {
         return code;
@@ -51,6 +60,9 @@ fn main() -> ExitCode {
         Command::Run(arguments) => command::run(&arguments),
         Command::Compare(arguments) => command::compare_scenes(&arguments),
         Command::Stability(arguments) => command::stability(&arguments),
+        Command::Reference(arguments) => command::reference(&arguments),
+        Command::Converge(arguments) => command::convergence(&arguments),
+        Command::Chart(arguments) => command::speed_chart(&arguments),
         Command::Mesh { scenes } => command::mesh(&scenes),
     };
     match result {

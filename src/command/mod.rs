@@ -1,13 +1,19 @@
 //! What the subcommands do.
 
+mod chart;
 mod compare;
+mod converge;
 mod ranks;
+mod reference;
 mod run;
 mod screen;
 mod stability;
 
+pub use chart::{ChartArguments, speed_chart};
 pub use compare::{CompareArguments, compare_scenes};
+pub use converge::{ConvergeArguments, convergence};
 pub use ranks::refuse_ranks;
+pub use reference::{ReferenceArguments, reference};
 pub use run::{RunArguments, run};
 pub use stability::{StabilityArguments, stability};
 

@@ -23,7 +23,11 @@ const LENGTH: u64 = 1000;
 
 impl Screen {
     pub fn new(setting: &Setting) -> Self {
-        let end = setting.scene().time.map_or(1.0, |grid| grid.end);
+        Self::until(setting.scene().time.map_or(1.0, |grid| grid.end))
+    }
+
+    /// Of a run to t = `end`, s.
+    pub fn until(end: f64) -> Self {
         let bar = ProgressBar::new(LENGTH);
         let template = "{bar:20} {wide_msg} {elapsed}, {eta} left";
         if let Ok(style) = ProgressStyle::with_template(template) {
@@ -41,6 +45,11 @@ impl Screen {
         ));
     }
 
+    /// Removes the bar.
+    pub fn clear(&self) {
+        self.bar.finish_and_clear();
+    }
+
     /// Replaces the bar by the result and where the time went.
     pub fn close(
         &self,
@@ -51,6 +60,29 @@ impl Screen {
     ) {
         self.bar.finish_and_clear();
         say(&report(summary, outcome, phases, folder));
+    }
+}
+
+/// The bar of many runs.
+pub struct Counter(ProgressBar);
+
+impl Counter {
+    pub fn new(of: &'static str) -> Self {
+        let bar = ProgressBar::new(1);
+        let template = format!("{{bar:20}} {{pos}} of {{len}} {of} {{elapsed}}, {{eta}} left");
+        if let Ok(style) = ProgressStyle::with_template(&template) {
+            bar.set_style(style);
+        }
+        Self(bar)
+    }
+
+    pub fn show(&self, done: usize, all: usize) {
+        self.0.set_length(all as u64);
+        self.0.set_position(done as u64);
+    }
+
+    pub fn clear(&self) {
+        self.0.finish_and_clear();
     }
 }
 

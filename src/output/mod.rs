@@ -24,7 +24,7 @@ pub struct OutputError {
 }
 
 impl OutputError {
-    fn new(path: &Path, reason: impl ToString) -> Self {
+    pub(crate) fn new(path: &Path, reason: impl ToString) -> Self {
         Self { path: path.to_owned(), reason: reason.to_string() }
     }
 }
@@ -73,7 +73,10 @@ pub fn write_table<T: serde::Serialize>(path: &Path, rows: &[T]) -> Result<(), O
 }
 
 /// Writes a file whole or not at all: a temporary neighbour is renamed when complete.
-fn write_whole(path: &Path, content: &[u8]) -> Result<(), OutputError> {
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_whole(path: &Path, content: &[u8]) -> Result<(), OutputError> {
     let failed = |e: &dyn ToString| OutputError::new(path, e.to_string());
     let folder = path.parent().unwrap_or(Path::new("."));
     let mut file = tempfile::Builder::new()

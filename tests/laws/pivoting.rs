@@ -39,7 +39,6 @@ impl Small {
         };
         let bounds: Vec<_> = self.gaps.iter().enumerate().map(bound).collect();
         let problem = ContactProblem {
-            ranks: session.ranks(),
             stiffness: &matrix,
             stiffness_scale: self.stiffness.trace() / size as f64,
             load: &load,

@@ -14,13 +14,8 @@ mod lost_contact;
 
 pub use random_contact::sample as random_sample;
 
-use crate::{
-    evolution::{RunError, SetupError},
-    mesh::MeshError,
-    output::OutputError,
-    petsc::{PetscError, Session},
-    scene::SceneError,
-};
+use super::StudyError;
+use crate::petsc::Session;
 use serde::Serialize;
 use std::path::Path;
 
@@ -73,27 +68,4 @@ impl FromIterator<Verdict> for Counts {
         }
         counts
     }
-}
-
-/// A study could not be carried out.
-#[derive(Debug, thiserror::Error)]
-pub enum StudyError {
-    /// A scene of the study is wrong.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// A mesh of the study is wrong.
-    #[error(transparent)]
-    Mesh(#[from] MeshError),
-    /// A scene of the study does not fit its mesh.
-    #[error(transparent)]
-    Setup(#[from] SetupError),
-    /// A run ended in a way the study does not expect.
-    #[error(transparent)]
-    Run(#[from] RunError),
-    /// PETSc failed.
-    #[error(transparent)]
-    Petsc(#[from] PetscError),
-    /// The table could not be written.
-    #[error(transparent)]
-    Output(#[from] OutputError),
 }

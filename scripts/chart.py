@@ -1,0 +1,129 @@
+"""Draws the chart of speed against accuracy: chart.py FOLDER
+
+Reads FOLDER/chart.csv as `signorini chart` writes it and, where validation/timing.py has left it,
+FOLDER/fenicsx.csv, and draws FOLDER/chart.png.
+
+The FEniCSx loop solves the same discrete problem: its error is that of our run with the same n and
+k, provided both end with the same min ζ and largest |u|, which is checked here.
+"""
+
+import csv
+import sys
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+from matplotlib.ticker import LogFormatterSciNotation
+
+from drawing import BLUE, FAINT, INK, RED
+
+# The least two answers of the same discrete problem agree to, at KKT residuals of 1e-10.
+SAME = 1e-6
+SOLVERS = {"active-set": BLUE, "penalty-duality": "#d08a1d", "tao": "#3d8f5a"}
+FENICSX = "#8e5aa8"
+
+
+def read(path):
+    """The rows of a table, with numbers where there are any."""
+    def value(text):
+        try:
+            return float(text)
+        except ValueError:
+            return text
+    with open(path, newline="") as file:
+        return [{key: value(text) for key, text in row.items()} for row in csv.DictReader(file)]
+
+
+def is_plain(row):
+    """Uniform mesh and steps, default tolerance: what FEniCSx is compared with."""
+    return row["grading"] == 1 and row["step"] != "" and row["tolerance"] == 1e-10
+
+
+def matched(fenicsx, rows):
+    """FEniCSx's rows with the errors of our runs of the same problem."""
+    ours = {(row["n"], row["step"]): row for row in rows
+            if row["solver"] == "active-set" and is_plain(row)}
+    for row in fenicsx:
+        twin = ours.get((row["n"], row["step"]))
+        if twin is None:
+            continue
+        apart = max(abs(row[key] / twin[key] - 1) for key in ("zeta_min", "displacement_max"))
+        if apart > SAME:
+            sys.exit(f"FEniCSx differs by {apart:.1e} at n = {row['n']:g}, k = {row['step']:g}")
+        times = row["seconds"] / twin["seconds"]
+        yield {**row, "sum": twin["sum"], "zeta": twin["zeta"], "times": times, "apart": apart}
+
+
+def kinds(rows):
+    """(label, rows, style): each run under what sets it apart."""
+    def of(solver):
+        return [row for row in rows if row["solver"] == solver and is_plain(row)]
+    active = [row for row in rows if row["solver"] == "active-set"]
+    for solver, colour in SOLVERS.items():
+        yield f"{solver}, uniform mesh", of(solver), {"marker": "o", "color": colour}
+    graded = [row for row in active if row["grading"] != 1 and row["step"] != ""]
+    yield "active-set, graded mesh", [row for row in graded if row["tolerance"] == 1e-10], {
+        "marker": "^", "color": "#4fa3a5"}
+    yield "active-set, chosen steps", [row for row in active if row["step"] == ""], {
+        "marker": "D", "color": "#a3554f"}
+    yield "loose KKT tolerance", [row for row in rows if row["tolerance"] != 1e-10], {
+        "marker": "x", "color": INK, "linewidths": 0.9}
+
+
+def steps(row):
+    return f"k = {row['step']:g}" if row["step"] != "" else f"auto {row['step_tolerance']:g}"
+
+
+def name(row):
+    mesh = "uniform" if row["grading"] == 1 else f"graded {row['grading']:g}"
+    return f"n = {row['n']:g}, {mesh}, {steps(row)}"
+
+
+def draw(axes, rows, fenicsx, error, suffix, label):
+    for kind, of_kind, style in kinds(rows):
+        axes.scatter([row["seconds"] for row in of_kind], [row[error] for row in of_kind],
+                     s=16, alpha=0.75, label=kind, **style)
+    if fenicsx:
+        axes.scatter([row["seconds"] for row in fenicsx], [row[error] for row in fenicsx], s=18,
+                     marker="s", color=FENICSX, label="FEniCSx loop, uniform mesh")
+    front = sorted((row for row in rows if row["front" + suffix] == "true"),
+                   key=lambda row: row["seconds"])
+    axes.step([row["seconds"] for row in front], [row[error] for row in front], where="post",
+              color=RED, lw=1.3, label="Pareto front", zorder=1)
+    marks = [("knee", row, (-25, -45), "center") for row in rows if row["knee" + suffix] == "true"]
+    marks += [("defaults", row, (45, 75), "left") for row in rows if row["default"] == "true"]
+    for title, row, offset, side in marks:
+        axes.annotate(f"{title}\n{name(row)}", (row["seconds"], row[error]), offset,
+                      textcoords="offset points", fontsize=8.5, ha=side, va="center",
+                      arrowprops={"arrowstyle": "->", "color": INK, "lw": 0.9},
+                      bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1})
+    axes.set(xscale="log", yscale="log", xlabel="wall time of mesh, set-up and steps (s)",
+             ylabel=label, xlim=(4e-4, None))
+    axes.yaxis.set_minor_formatter(LogFormatterSciNotation(minor_thresholds=(3, 0.6)))
+    axes.grid(which="both", color=FAINT, alpha=0.3, linewidth=0.5)
+    axes.set_axisbelow(True)
+
+
+def main(folder):
+    table, others = Path(folder) / "chart.csv", Path(folder) / "fenicsx.csv"
+    if not table.exists():
+        sys.exit(f"no {table}: run `signorini chart` first")
+    rows = [row for row in read(table) if not row["error"]]
+    fenicsx = list(matched(read(others), rows)) if others.exists() else []
+    figure, (left, right) = plt.subplots(1, 2, figsize=(13, 6))
+    draw(left, rows, fenicsx, "sum", "", "largest ‖ε(Δu)‖ + ‖Δζ‖ over time (that of Table 1)")
+    draw(right, rows, fenicsx, "zeta", "_zeta", "largest ‖Δζ‖ over time")
+    left.set_title("error of displacement and damage: the mesh decides", loc="left")
+    right.set_title("error of the damage alone: steps count as well", loc="left")
+    left.legend(loc="lower left", fontsize=8.5)
+    picture = table.with_suffix(".png")
+    figure.savefig(picture)
+    print(picture)
+    for row in fenicsx:
+        print(f"FEniCSx n = {row['n']:g}, k = {row['step']:g}: {row['times']:.1f} times the "
+              f"seconds of active-set, answers {row['apart']:.0e} apart")
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    main(sys.argv[1])
