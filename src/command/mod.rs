@@ -1,6 +1,7 @@
 //! What the subcommands do.
 
 mod compare;
+mod profile;
 mod run;
 mod screen;
 mod stability;

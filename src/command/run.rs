@@ -1,6 +1,6 @@
 //! `signorini run`: a scene from its file to its results.
 
-use super::{Failure, check_petsc, check_solver, screen::Screen};
+use super::{Failure, check_petsc, check_solver, profile, screen::Screen};
 use clap::Args;
 use signorini::{
     contact::SOLVERS,
@@ -33,6 +33,9 @@ pub struct RunArguments {
     /// Override a key of the scene, e.g. --set time.step=0.005; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Close with all that was timed: counts, times per call, bytes moved, unavoidable work.
+    #[arg(long)]
+    profile: bool,
     /// PETSc options, e.g. -- -tao_monitor -log_view.
     #[arg(last = true, value_name = "PETSC OPTIONS")]
     petsc: Vec<String>,
@@ -81,7 +84,8 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     }
     // Now that all input is good: the results of an earlier run go.
     output::prepare(&folder).map_err(Failure::input)?;
-    let mut recorder = Recorder::new(&folder, &setting, &phases).map_err(Failure::input)?;
+    let mut recorder =
+        Recorder::new(&folder, &setting, &phases, arguments.profile).map_err(Failure::input)?;
     let result =
         evolution::run(
             &session,
@@ -108,6 +112,9 @@ struct Recorder<'a> {
     folder: &'a Path,
     setting: &'a Setting,
     phases: &'a Phases,
+    profile: bool,
+    /// Seconds of all accepted steps after n = 0.
+    stepping: f64,
     every: Option<usize>,
     history: History,
     fields: FieldWriter,
@@ -123,11 +130,14 @@ impl<'a> Recorder<'a> {
         folder: &'a Path,
         setting: &'a Setting,
         phases: &'a Phases,
+        profile: bool,
     ) -> Result<Self, output::OutputError> {
         Ok(Self {
             folder,
             setting,
             phases,
+            profile,
+            stepping: 0.0,
             every: setting.scene().output.every,
             history: History::create(folder)?,
             fields: FieldWriter::new(folder, setting)?,
@@ -151,6 +161,9 @@ impl<'a> Recorder<'a> {
 
     fn accept(&mut self, step: &Step) -> Result<(), output::OutputError> {
         self.screen.show(&step.record);
+        if step.record.step > 0 {
+            self.stepping += step.record.seconds;
+        }
         self.phases.time("output", || {
             self.history.add(&step.record)?;
             match self.is_frame(step.record.step) {
@@ -208,13 +221,21 @@ impl<'a> Recorder<'a> {
             kkt: outcome.map(|o| o.kkt).or(record.map(|r| r.kkt())),
             wall_seconds: wall,
             seconds_per_step: wall / steps.max(1) as f64,
-            phases: self.phases.table().into_iter().map(|(name, (_, s))| (name, s)).collect(),
+            phases: profile::whole(&self.phases.table())
+                .into_iter()
+                .map(|(name, phase)| (name, phase.seconds))
+                .collect(),
             foundation: setting.foundation.clone(),
             notes,
             error: result.as_ref().err().map(ToString::to_string),
         };
         summary.write(self.folder)?;
-        self.screen.close(&summary, outcome, &self.phases.table(), self.folder);
+        let phases = self.phases.table();
+        let table = match self.profile {
+            true => profile::report(&phases, wall, steps, self.stepping),
+            false => profile::short(&phases, wall),
+        };
+        self.screen.close(&summary, outcome, &table, self.folder);
         Ok(())
     }
 }

@@ -1,7 +1,10 @@
 //! What a contact solver is given and what it answers.
 
 use super::{Bound, Kkt};
-use crate::petsc::{Matrix, PetscError, Session, Vector};
+use crate::{
+    petsc::{Matrix, PetscError, Session, Vector},
+    phases::Phases,
+};
 use nalgebra::{DMatrix, DVector};
 
 /// min ½ cᵀKc − fᵀc  subject to  c_i ≤ g_i on the bounded unknowns.
@@ -28,6 +31,8 @@ pub struct ContactProblem<'a> {
     pub force_scale: f64,
     /// KKT residuals to reach, relative.
     pub tolerance: f64,
+    /// Where the parts of the solve book their time, as `contact/…`.
+    pub phases: &'a Phases,
 }
 
 impl ContactProblem<'_> {

@@ -156,7 +156,9 @@ impl<'a> Equilibrium<'a> {
     /// Fills K for the triangle means of η_*(ζ).
     fn fill(&mut self, zeta_mean: &[f64]) -> Result<(), PetscError> {
         if zeta_mean != self.zeta_mean {
-            self.phases.time("stiffness refill", || self.stiffness.refill(zeta_mean))?;
+            let bytes = self.stiffness.refill_traffic();
+            self.phases
+                .time_moving("stiffness refill", bytes, || self.stiffness.refill(zeta_mean))?;
             self.revision += 1;
             self.zeta_mean = zeta_mean.to_vec();
         }
@@ -221,6 +223,7 @@ impl<'a> Equilibrium<'a> {
             work: &self.work,
             force_scale,
             tolerance,
+            phases: self.phases,
         };
         self.phases.time("contact", || self.solver.solve(&problem, &mut self.c))
     }

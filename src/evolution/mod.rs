@@ -8,15 +8,14 @@ mod estimate;
 mod extrapolation;
 mod loads;
 mod notes;
-mod phases;
 mod setting;
 mod state;
 
+pub use crate::phases::Phases;
 pub use bounds::Excess;
 pub use equilibrium::Equilibrium;
 pub use loads::Loads;
 pub use notes::Accuracy;
-pub use phases::Phases;
 pub use setting::{Setting, SetupError};
 pub use state::{ContactPoint, State, Step, StepRecord};
 

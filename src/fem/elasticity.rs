@@ -104,6 +104,13 @@ impl Stiffness {
         Ok(stiffness)
     }
 
+    /// Bytes that a refill moves: element matrices, ζ̄, the values written, read again with their
+    /// places (PETSc keeps 8 bytes each), and K's own values.
+    pub fn refill_traffic(&self) -> f64 {
+        let (unit, values) = (36 * self.unit.len(), self.values.len());
+        8.0 * (unit + unit / 36 + 3 * values) as f64 + self.matrix.values_traffic()
+    }
+
     /// K(ζ) from the mean ζ̄ of each triangle: exact, the strains being constant there.
     pub fn refill(&mut self, zeta: &[f64]) -> Result<(), PetscError> {
         for ((values, unit), z) in self.values.chunks_exact_mut(36).zip(&self.unit).zip(zeta) {

@@ -1,7 +1,9 @@
 //! A factorisation that outlives the matrix values it was made from.
 
 use super::{
-    Matrix, PetscError, Session, Vector, check, raw,
+    Matrix, PetscError, Session, Vector, check,
+    mat::entries,
+    raw,
     session::{Live, c_string, world},
     vec::same_size,
 };
@@ -12,6 +14,8 @@ use std::ptr;
 /// Fill-reducing ordering and symbolic factorisation are done once, with the first values.
 pub struct Factor {
     raw: raw::PC,
+    /// Entries of the triangle, where its package tells.
+    entries: f64,
     _live: Live,
 }
 
@@ -19,7 +23,7 @@ impl Factor {
     /// A factor whose PETSc options carry `prefix` (`-elastic_pc_type …`).
     pub fn new(session: &Session, prefix: &str) -> Result<Self, PetscError> {
         cholesky_options(session, prefix)?;
-        let mut factor = Self { raw: ptr::null_mut(), _live: Live::new() };
+        let mut factor = Self { raw: ptr::null_mut(), entries: 0.0, _live: Live::new() };
         let prefix = c_string(prefix)?;
         let package = if session.ranks() == 1 { c"cholmod" } else { c"mumps" };
         // SAFETY: a fresh handle, strings that live during the calls.
@@ -57,8 +61,20 @@ impl Factor {
             check(raw::PCSetReusePreconditioner(self.raw, raw::PetscBool::PETSC_FALSE))?;
             check(raw::PCSetOperators(self.raw, matrix, matrix))?;
             check(raw::PCSetUp(self.raw))?;
-            check(raw::PCSetReusePreconditioner(self.raw, raw::PetscBool::PETSC_TRUE))
+            check(raw::PCSetReusePreconditioner(self.raw, raw::PetscBool::PETSC_TRUE))?;
+            // A preconditioner that PETSc options put in its place has no triangle.
+            let mut triangle = ptr::null_mut();
+            self.entries = match check(raw::PCFactorGetMatrix(self.raw, &mut triangle)) {
+                Ok(()) => entries(triangle),
+                Err(_) => 0.0,
+            };
         }
+        Ok(())
+    }
+
+    /// Bytes of values that a pair of triangular solves reads on this rank; 0 where unknown.
+    pub fn traffic(&self) -> f64 {
+        2.0 * 8.0 * self.entries
     }
 
     /// `z` ← the factored matrix' inverse · `r`.
