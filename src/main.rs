@@ -28,6 +28,8 @@ enum Command {
     Compare(command::CompareArguments),
     /// Make the maps of where methods fail.
     Stability(command::StabilityArguments),
+    /// Time the work of a scene's step that no method can avoid, in isolation (JSON).
+    Floor(command::FloorArguments),
     /// Mesh the .geo files of scenes with gmsh, where their .msh is missing or older.
     Mesh {
         /// Scene files.
@@ -41,6 +43,7 @@ fn main() -> ExitCode {
         Command::Run(arguments) => command::run(&arguments),
         Command::Compare(arguments) => command::compare_scenes(&arguments),
         Command::Stability(arguments) => command::stability(&arguments),
+        Command::Floor(arguments) => command::floor(&arguments),
         Command::Mesh { scenes } => command::mesh(&scenes),
     };
     match result {

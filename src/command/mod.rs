@@ -1,12 +1,14 @@
 //! What the subcommands do.
 
 mod compare;
+mod floor;
 mod profile;
 mod run;
 mod screen;
 mod stability;
 
 pub use compare::{CompareArguments, compare_scenes};
+pub use floor::{FloorArguments, floor};
 pub use run::{RunArguments, run};
 pub use stability::{StabilityArguments, stability};
 

@@ -57,15 +57,25 @@ impl RunArguments {
     }
 }
 
+/// The scene at `path` with keys overridden by `set`, on another mesh if one is given.
+pub(super) fn read_scene(
+    path: &Path,
+    mesh: Option<&Path>,
+    set: &[String],
+) -> Result<Scene, Failure> {
+    let mut scene = Scene::read(path, set).map_err(Failure::input)?;
+    if let Some(file) = mesh {
+        scene.mesh = MeshSource::from_path(file);
+    }
+    Ok(scene)
+}
+
 /// Runs a scene.
 pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let started = Instant::now();
     let phases = Phases::default();
     arguments.check()?;
-    let mut scene = Scene::read(&arguments.scene, &arguments.set).map_err(Failure::input)?;
-    if let Some(file) = &arguments.mesh {
-        scene.mesh = MeshSource::from_path(file);
-    }
+    let scene = read_scene(&arguments.scene, arguments.mesh.as_deref(), &arguments.set)?;
     let asked = arguments.solver.clone().or_else(|| scene.contact.solver.clone());
     let solver = asked.unwrap_or_else(|| SOLVERS[0].to_owned());
     let folder = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
