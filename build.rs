@@ -7,7 +7,7 @@ const FUNCTIONS: &str = "\
     PetscInitialize|PetscInitialized|PetscFinalize|PetscPushErrorHandler|\
     PetscOptionsInsertString|PetscOptionsSetValue|PetscOptionsHasName|\
     PetscOptionsLeftGet|PetscOptionsLeftRestore|\
-    MPI_Comm_size|\
+    MPI_Comm_size|mallopt|\
     VecCreateMPI|VecDestroy|VecGetArray|VecRestoreArray|VecGetArrayRead|VecRestoreArrayRead|\
     VecAXPY|VecAYPX|VecCopy|VecDot|VecNorm|\
     MatCreate|MatDestroy|MatSetSizes|MatSetType|MatSetBlockSize|MatSetOption|\
@@ -37,11 +37,11 @@ fn main() {
     let mpi_flags = String::from_utf8_lossy(&mpi_flags.stdout).into_owned();
 
     bindgen::Builder::default()
-        .header_contents("signorini.h", "#include <petsctao.h>\n")
+        .header_contents("signorini.h", "#include <petsctao.h>\n#include <malloc.h>\n")
         .clang_args(petsc.include_paths.iter().map(|p| format!("-I{}", p.display())))
         .clang_args(mpi_flags.split_whitespace())
         .allowlist_function(FUNCTIONS)
-        .allowlist_var("PETSC_COMM_WORLD")
+        .allowlist_var("PETSC_COMM_WORLD|M_MMAP_MAX|M_MMAP_THRESHOLD")
         .default_enum_style(bindgen::EnumVariation::ModuleConsts)
         .layout_tests(false)
         .generate_comments(false)
