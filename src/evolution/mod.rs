@@ -196,6 +196,8 @@ pub fn run(
         accepted(&last).map_err(RunError::Observer)?;
         outcome.accept(last, driving);
     }
+    // Makes room for another factorisation.
+    drop(damage);
     outcome.accuracy = phases.time("accuracy", || equilibrium.accuracy(&outcome.last.state))?;
     Ok(outcome)
 }

@@ -111,6 +111,11 @@ impl Stiffness {
         8.0 * (unit + unit / 36 + 3 * values) as f64 + self.matrix.values_traffic()
     }
 
+    /// K alone, as last filled; what only refills need is given up.
+    pub fn into_matrix(self) -> Matrix {
+        self.matrix
+    }
+
     /// K(ζ) from the mean ζ̄ of each triangle: exact, the strains being constant there.
     pub fn refill(&mut self, zeta: &[f64]) -> Result<(), PetscError> {
         for ((values, unit), z) in self.values.chunks_exact_mut(36).zip(&self.unit).zip(zeta) {
