@@ -16,7 +16,7 @@ BINARY := target/release/signorini
 # rustup puts cargo where a shell opened before does not look.
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
-.PHONY: help deps deps-validate build mesh run figures test validate compare stability clean
+.PHONY: help deps deps-validate build mesh run figures test validate compare bench stability clean
 
 help:
 	@echo 'make mesh && make run   mesh and solve the scenes of geo/, draw their figures into out/'
@@ -29,6 +29,7 @@ help:
 	@echo 'make test       format, lints, documentation, tests'
 	@echo 'make validate   the comparison with FEniCSx (installs it: make deps-validate)'
 	@echo 'make compare    all contact solvers on all scenes, side by side'
+	@echo 'make bench      speed against FEniCSx, the floor, growth; or ARGS=--quick'
 	@echo 'make stability  the maps of where methods fail; or MAPS="step-size …"'
 	@echo 'make clean      remove the build, the results and the meshes'
 
@@ -72,6 +73,11 @@ validate: build deps-validate
 compare: build
 	@$(BINARY) compare $(SCENE) $(ARGS); code=$$?; \
 	[ $$code -eq 2 ] || $(PYTHON) scripts/comparison.py out/compare; exit $$code
+
+# Side by side on this machine: `make bench ARGS=--quick` for small meshes, one round.
+bench: build deps-validate
+	$(PYTHON) validation/bench.py --binary $(BINARY) $(ARGS)
+	$(PYTHON) scripts/bench.py out/bench
 
 stability: build
 	$(BINARY) stability $(MAPS)

@@ -9,6 +9,7 @@ floor    the same against `signorini floor`, the work that no step can avoid, at
 growth   time per step, peak memory and iterations from n = 32 to 1024 in one process each
 ranks    1 → 2 ranks at n = 512, iterations over 1 … 4 ranks
 
+A step is the mean of all but the first, which makes what the others keep.
 Programs take turns (A B A B …), because the machine may be shared: a ratio is the median over the
 rounds of the ratio within a round, with the least and the largest beside it. All use the same mesh
 files, tolerance and BLAS, and one thread per process. Writes OUT/bench.csv and OUT/bench.md.
@@ -45,7 +46,8 @@ class Sizes:
 
     meshes: list = field(default_factory=lambda: [64, 128, 256])
     rounds: int = 3
-    # Steps of signorini and of the loop; the loop's cost the same one after the other.
+    # Steps of signorini, with the factorisations that fall into them, and of the loop, whose steps
+    # cost the same one after the other.
     steps: int = 100
     loop_steps: dict = field(default_factory=lambda: {64: 40, 128: 20, 256: 10})
     floor: list = field(default_factory=lambda: [128, 256])
@@ -99,7 +101,8 @@ class Bench:
             seconds = time.perf_counter() - began
         if process.returncode != 0:
             lines = (complaint.strip() or said.strip() or "no message").splitlines()
-            raise Failure(f"{' '.join(command[:3])} … failed: {lines[-1]}")
+            told = [line for line in lines if line.startswith("error:")] or lines[-1:]
+            raise Failure(f"{Path(command[0]).name} … failed: {told[0]}")
         return said, seconds
 
     def signorini(self, n, solver="active-set", steps=None, ranks=None, frames=False):
@@ -116,16 +119,18 @@ class Bench:
         summary = json.loads((folder / "summary.json").read_text())
         with open(folder / "history.csv", newline="") as file:
             history = [{k: float(v or "nan") for k, v in row.items()} for row in csv.DictReader(file)]
-        after = history[1:]
+        # The first step also makes what all others keep.
+        after = history[2:]
         total = lambda key: int(sum(row[key] for row in after))
         row = {
             "program": "signorini", "method": solver, "n": n, "ranks": ranks or 1,
             "nodes": summary["nodes"], "steps": len(after),
+            "unknowns": 2 * summary["nodes"],
             "seconds_per_step": sum(row["seconds"] for row in after) / len(after),
             "whole_seconds": whole, "iterations": total("iterations"),
             "linear_iterations": total("linear_iterations"),
             "factorisations": total("factorisations"), "kkt": max(summary["kkt"].values()),
-            "peak_mb": peak(said),
+            "peak_mb": peak(said), "frames": frames,
         }
         return self.keep(row), history
 
@@ -139,9 +144,10 @@ class Bench:
         answer = json.loads(said.strip().splitlines()[-1])
         row = {
             "program": "FEniCSx", "method": factor, "n": n, "ranks": 1, "nodes": answer["nodes"],
-            "steps": answer["steps"],
-            "seconds_per_step": sum(answer["seconds"]) / answer["steps"],
-            "whole_seconds": whole, "iterations": answer["iterations"], "kkt": answer["kkt"],
+            "unknowns": 2 * answer["nodes"], "steps": answer["steps"] - 1,
+            "seconds_per_step": float(np.mean(answer["seconds"][1:])),
+            "whole_seconds": whole, "iterations": sum(answer["iterations"][1:]),
+            "kkt": answer["kkt"], "frames": frames,
         }
         return self.keep(row), answer
 
@@ -149,7 +155,7 @@ class Bench:
         """The unavoidable work in isolation."""
         said, _ = self.start([self.binary, "floor", SCENE, "--mesh", self.mesh(n)])
         answer = json.loads(said)
-        self.keep({"program": "floor", "n": n, "ranks": 1, "nodes": answer["nodes"],
+        self.keep({"program": "floor", "method": "", "n": n, "ranks": 1, "nodes": answer["nodes"],
                    "seconds_per_step": answer["seconds"]})
         return answer
 
@@ -273,13 +279,13 @@ def growth(bench):
     runs = [bench.signorini(n, steps=bench.sizes.growth_steps)[0] for n in bench.sizes.growth]
     bench.say(f"## Growth, active-set, {bench.sizes.growth_steps} steps, one process each\n")
     fitted = lambda key, chosen: np.polyfit(
-        np.log([r["nodes"] for r in chosen]), np.log([r[key] for r in chosen]), 1)[0]
+        np.log([r["unknowns"] for r in chosen]), np.log([r[key] for r in chosen]), 1)[0]
     local = [""] + [f"{fitted('seconds_per_step', pair):.2f}" for pair in zip(runs, runs[1:])]
     bench.table(
         ["n", "unknowns", "ms per step", "local exponent", "peak memory, MB", "bytes per unknown",
          "its per step", "solve pairs per step", "factorisations"],
-        [[r["n"], 2 * r["nodes"], f"{1e3 * r['seconds_per_step']:.3g}", exponent,
-          f"{r['peak_mb']:.0f}", f"{1e6 * r['peak_mb'] / (2 * r['nodes']):.0f}",
+        [[r["n"], r["unknowns"], f"{1e3 * r['seconds_per_step']:.3g}", exponent,
+          f"{r['peak_mb']:.0f}", f"{1e6 * r['peak_mb'] / r['unknowns']:.0f}",
           f"{r['iterations'] / r['steps']:.2f}", f"{r['linear_iterations'] / r['steps']:.2f}",
           r["factorisations"]] for r, exponent in zip(runs, local)])
     large = [r for r in runs if r["n"] >= 64]
@@ -293,7 +299,7 @@ def ranks(bench):
     bench.say("## Ranks\n")
     small = min(bench.sizes.meshes)
     try:
-        bench.signorini(small, steps=1, ranks=2)
+        bench.signorini(small, steps=2, ranks=2)
     except (Failure, FileNotFoundError) as failure:
         bench.say(f"Left out: {failure}\n")
         return

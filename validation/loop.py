@@ -154,13 +154,13 @@ def main():
     step = float(scene["time"]["step"])
     fields = Fields(arguments.out, loop.body) if arguments.out else None
     every = -(-arguments.steps // 20)
-    seconds, iterations = [], 0
+    seconds, iterations = [], []
     for n in range(1, arguments.steps + 1):
         started = time.perf_counter()
         zeta = loop.damage_step()
         loop.contact(n * step, zeta)
         seconds.append(time.perf_counter() - started)
-        iterations += loop.snes.getIterationNumber()
+        iterations.append(loop.snes.getIterationNumber())
         if fields and n % every == 0:
             fields.write(n * step)
     print(json.dumps({
