@@ -42,9 +42,10 @@ class Sizes:
 
     meshes: list = field(default_factory=lambda: [64, 128, 256])
     rounds: int = 3
-    # Steps of signorini, with the factorisations that fall into them, and of the loop, whose steps
-    # cost the same one after the other.
+    # Steps of the default, with the factorisations that fall into them; of the other solvers, and
+    # of the loop, whose steps cost the same one after the other.
     steps: int = 100
+    other_steps: dict = field(default_factory=lambda: {64: 100, 128: 50, 256: 25})
     loop_steps: dict = field(default_factory=lambda: {64: 40, 128: 20, 256: 10})
     floor: list = field(default_factory=lambda: [128, 256])
     growth: list = field(default_factory=lambda: [32, 64, 128, 256, 512, 1024])
@@ -54,7 +55,8 @@ class Sizes:
 
 
 QUICK = Sizes(
-    meshes=[64, 128], rounds=1, steps=20, loop_steps={64: 10, 128: 5}, floor=[128],
+    meshes=[64, 128], rounds=1, steps=20, other_steps={64: 20, 128: 10},
+    loop_steps={64: 10, 128: 5}, floor=[128],
     growth=[32, 64, 128, 256], growth_steps=10, ranks=128, ranks_steps=10,
 )
 
@@ -82,8 +84,13 @@ def steps(bench):
         seconds, last = {p: [] for p in programs}, {}
         for _ in range(bench.sizes.rounds):
             for program, method in programs:
-                run = bench.signorini if program == "signorini" else bench.loop
-                last[program, method] = row, told = run(n, method)
+                if program == "FEniCSx":
+                    row, told = bench.loop(n, method)
+                else:
+                    default = method == SOLVERS[0]
+                    count = bench.sizes.steps if default else bench.sizes.other_steps[n]
+                    row, told = bench.signorini(n, method, count)
+                last[program, method] = row, told
                 seconds[program, method].append(row["seconds_per_step"])
         history = last[programs[0]][1]
         for key in programs:

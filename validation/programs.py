@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -116,6 +117,8 @@ class Bench:
         if row.get("kkt", 0.0) > TOLERANCE:
             raise Failure(f"{row['program']} {row['method']}: KKT {row['kkt']:.1e} at n = {row['n']}")
         self.rows.append({"part": self.part, **row})
+        name = f"{self.part}, n = {row['n']}: {row['program']} {row['method']}"
+        print(f"{name} {1e3 * row['seconds_per_step']:.3g} ms per step", file=sys.stderr)
         return row
 
     def table(self, header, rows):
