@@ -11,7 +11,7 @@ const FUNCTIONS: &str = "\
     VecCreateMPI|VecDestroy|VecGetArray|VecRestoreArray|VecGetArrayRead|VecRestoreArrayRead|\
     VecAXPY|VecAYPX|VecCopy|VecDot|VecNorm|\
     MatCreate|MatDestroy|MatSetSizes|MatSetType|MatSetBlockSize|MatSetOption|\
-    MatSetPreallocationCOO|MatSetValuesCOO|MatMult|MatDuplicate|MatCopy|MatScale|MatShift|\
+    MatSetPreallocationCOO|MatSetValuesCOO|MatMult|MatDuplicate|MatCopy|MatAXPY|MatScale|MatShift|\
     MatDiagonalSet|MatZeroRowsColumns|MatGetOwnershipRange|MatGetSize|MatGetInfo|\
     KSPCreate|KSPDestroy|KSPSetOperators|KSPSetType|KSPGetPC|KSPSetUp|KSPSolve|\
     KSPSetTolerances|KSPGetConvergedReason|KSPGetIterationNumber|KSPSetFromOptions|\

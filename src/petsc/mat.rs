@@ -90,6 +90,14 @@ impl Matrix {
         check(unsafe { raw::MatCopy(other.raw, self.raw, pattern) })
     }
 
+    /// this ← this + `factor` · `other`, which has the same pattern.
+    pub fn add(&mut self, factor: f64, other: &Self) -> Result<(), PetscError> {
+        same_size(self.owned, other.owned)?;
+        let pattern = raw::MatStructure::SAME_NONZERO_PATTERN;
+        // SAFETY: live handles, distinct by borrowing; PETSc compares the patterns' sizes.
+        check(unsafe { raw::MatAXPY(self.raw, factor, other.raw, pattern) })
+    }
+
     /// Adds `diagonal` (owned entries) to the diagonal.
     pub fn add_diagonal(&mut self, diagonal: &Vector) -> Result<(), PetscError> {
         same_size(self.owned, diagonal.owned())?;
