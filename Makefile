@@ -16,7 +16,7 @@ BINARY := target/release/signorini
 # rustup puts cargo where a shell opened before does not look.
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
-.PHONY: help deps deps-validate build mesh run figures test validate compare stability \
+.PHONY: help deps deps-validate build mesh run figures test validate compare bench stability \
     reference converge chart clean
 
 help:
@@ -30,6 +30,7 @@ help:
 	@echo 'make test       format, lints, documentation, tests'
 	@echo 'make validate   the comparison with FEniCSx (installs it: make deps-validate)'
 	@echo 'make compare    all contact solvers on all scenes, side by side'
+	@echo 'make bench      speed against FEniCSx, the floor, growth; or ARGS=--quick'
 	@echo 'make stability  the maps of where methods fail; or MAPS="step-size …"'
 	@echo 'make reference  the reference solution of the convergence study, unless it is there (minutes)'
 	@echo 'make converge   errors against it on the paper'"'"'s grid of n and k: Table 1, Figure 3'
@@ -76,6 +77,11 @@ validate: build deps-validate
 compare: build
 	@$(BINARY) compare $(SCENE) $(ARGS); code=$$?; \
 	[ $$code -eq 2 ] || $(PYTHON) scripts/comparison.py out/compare; exit $$code
+
+# Side by side on this machine: `make bench ARGS=--quick` for small meshes, one round.
+bench: build deps-validate
+	$(PYTHON) validation/bench.py --binary $(BINARY) $(ARGS)
+	$(PYTHON) scripts/bench.py out/bench
 
 stability: build
 	$(BINARY) stability $(MAPS)

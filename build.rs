@@ -8,25 +8,26 @@ const FUNCTIONS: &str = "\
     PetscOptionsInsertString|PetscOptionsSetValue|PetscOptionsHasName|\
     PetscOptionsLeftGet|PetscOptionsLeftRestore|\
     MPI_Comm_size|MPI_Comm_rank|MPI_Allreduce|MPI_Type_contiguous|MPI_Type_commit|MPI_Type_free|\
-    MPI_Ibarrier|MPI_Test|MPI_Abort|\
+    MPI_Ibarrier|MPI_Test|MPI_Abort|mallopt|\
     PetscSFCreate|PetscSFDestroy|PetscSFSetGraph|PetscSFBcastBegin|PetscSFBcastEnd|\
-    MatGetRow|MatRestoreRow|\
     cholmod_l_start|cholmod_l_finish|cholmod_l_analyze|cholmod_l_analyze_p|cholmod_l_factorize|\
     cholmod_l_solve2|cholmod_l_free_factor|cholmod_l_free_dense|\
     MatPartitioningCreate|MatPartitioningDestroy|MatPartitioningSetType|\
     MatPartitioningSetAdjacency|MatPartitioningSetFromOptions|MatPartitioningApply|\
     ISAllGather|ISGetIndices|ISRestoreIndices|ISDestroy|\
-    VecCreateMPI|VecGetLocalSize|VecDestroy|VecGetArray|VecRestoreArray|VecGetArrayRead|VecRestoreArrayRead|\
-    VecAXPY|VecAYPX|VecCopy|VecDot|VecNorm|\
+    VecCreateMPI|VecGetLocalSize|VecDestroy|VecGetArray|VecRestoreArray|VecGetArrayRead|\
+    VecRestoreArrayRead|VecAXPY|VecAYPX|VecCopy|VecDot|VecNorm|\
     MatCreate|MatDestroy|MatSetSizes|MatSetType|MatSetBlockSize|MatSetOption|\
-    MatSetPreallocationCOO|MatSetValuesCOO|MatMult|MatDuplicate|MatCopy|MatScale|MatShift|\
-    MatDiagonalSet|MatZeroRowsColumns|MatGetOwnershipRange|MatGetSize|MatMumpsGetInfog|\
+    MatSetPreallocationCOO|MatSetValuesCOO|MatMult|MatDuplicate|MatCopy|MatAXPY|MatScale|MatShift|\
+    MatDiagonalSet|MatZeroRowsColumns|MatGetOwnershipRange|MatGetSize|MatGetInfo|MatMumpsGetInfog|\
+    MatGetRow|MatRestoreRow|\
     MatNullSpaceCreate|MatNullSpaceDestroy|MatSetNearNullSpace|MatGetNearNullSpace|\
     KSPCreate|KSPDestroy|KSPSetOperators|KSPSetType|KSPGetPC|KSPSetUp|KSPSolve|\
     KSPSetTolerances|KSPGetConvergedReason|KSPGetIterationNumber|KSPSetFromOptions|\
     KSPSetOptionsPrefix|KSPSetNormType|KSPSetInitialGuessNonzero|\
     PCCreate|PCDestroy|PCSetType|PCSetOptionsPrefix|PCSetFromOptions|PCSetOperators|PCSetUp|PCApply|\
-    PCFactorSetMatSolverType|PCFactorGetMatrix|PCFactorGetMatSolverType|PCGetFailedReason|PCGetType|PCReset|PCSetReusePreconditioner|PCGetOperators|PCShellSetContext|PCShellGetContext|\
+    PCFactorSetMatSolverType|PCFactorGetMatrix|PCFactorGetMatSolverType|PCGetFailedReason|PCGetType|\
+    PCReset|PCSetReusePreconditioner|PCGetOperators|PCShellSetContext|PCShellGetContext|\
     PCShellSetApply|PCShellSetSetUp|\
     TaoCreate|TaoDestroy|TaoSetType|TaoSetSolution|TaoSetVariableBounds|\
     TaoSetObjectiveAndGradient|TaoSetHessian|TaoSetFromOptions|TaoSetTolerances|\
@@ -49,12 +50,13 @@ fn main() {
     bindgen::Builder::default()
         .header_contents(
             "signorini.h",
-            "#include <petsctao.h>\n#include <petscsf.h>\n#include <suitesparse/cholmod.h>\n",
+            "#include <petsctao.h>\n#include <petscsf.h>\n#include <suitesparse/cholmod.h>\n\
+             #include <malloc.h>\n",
         )
         .clang_args(petsc.include_paths.iter().map(|p| format!("-I{}", p.display())))
         .clang_args(mpi_flags.split_whitespace())
         .allowlist_function(FUNCTIONS)
-        .allowlist_var("PETSC_COMM_WORLD")
+        .allowlist_var("PETSC_COMM_WORLD|M_MMAP_MAX|M_MMAP_THRESHOLD")
         // Debian's MPI is Open MPI, whose constants are the addresses of these.
         .allowlist_var("CHOLMOD_(L|Lt|A|LONG|REAL|DOUBLE|SUPERNODAL|GIVEN)")
         .allowlist_var("ompi_mpi_double|ompi_mpi_op_(sum|max|replace)")

@@ -6,6 +6,7 @@
 //! of their dependence: each uses only those above it.
 #![deny(unsafe_code)]
 
+pub mod phases;
 pub mod petsc;
 pub mod mesh;
 pub mod model;

@@ -34,6 +34,8 @@ enum Command {
     Converge(command::ConvergeArguments),
     /// Error against seconds: solvers, meshes, steps and tolerances, with the Pareto front.
     Chart(command::ChartArguments),
+    /// Time the work of a scene's step that no method can avoid, in isolation (JSON).
+    Floor(command::FloorArguments),
     /// Mesh the .geo files of scenes with gmsh, where their .msh is missing or older.
     Mesh {
         /// Scene files.
@@ -52,6 +54,7 @@ fn main() -> ExitCode {
         Command::Reference(_) => command::refuse_ranks("reference"),
         Command::Converge(_) => command::refuse_ranks("converge"),
         Command::Chart(_) => command::refuse_ranks("chart"),
+        Command::Floor(_) => command::refuse_ranks("floor"),
     };
     if let Err(code) = alone {
         return code;
@@ -63,6 +66,7 @@ fn main() -> ExitCode {
         Command::Reference(arguments) => command::reference(&arguments),
         Command::Converge(arguments) => command::convergence(&arguments),
         Command::Chart(arguments) => command::speed_chart(&arguments),
+        Command::Floor(arguments) => command::floor(&arguments),
         Command::Mesh { scenes } => command::mesh(&scenes),
     };
     match result {

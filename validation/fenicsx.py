@@ -17,6 +17,7 @@ from petsc4py import PETSc
 
 from contact import Bounds, solve_contact
 from scene import Expression, SceneError
+from triangulation import edge_keys
 
 logging.disable(logging.INFO)  # the form compiler reports each of its builds
 
@@ -201,8 +202,7 @@ def _dof_of_node(domain, space):
     """
     node_of_point = np.asarray(domain.geometry.input_global_indices)
     dof = np.empty(len(node_of_point), np.int64)
-    for cell in range(domain.topology.index_map(2).size_local):
-        dof[node_of_point[domain.geometry.dofmap.links(cell)]] = space.dofmap.cell_dofs(cell)
+    dof[node_of_point[domain.geometry.dofmap.array]] = space.dofmap.list.array
     return dof
 
 
@@ -212,17 +212,9 @@ def _facet_tags(domain, edges):
     topology.create_connectivity(1, 2)  # meshtags and ds need it
     node_of_point = np.asarray(geometry.input_global_indices)
     node_of_vertex = np.empty(topology.index_map(0).size_local, np.int64)
-    vertices_of_cell, vertices_of_facet = topology.connectivity(2, 0), topology.connectivity(1, 0)
-    for cell in range(topology.index_map(2).size_local):
-        vertices = vertices_of_cell.links(cell)
-        node_of_vertex[vertices] = node_of_point[geometry.dofmap.links(cell)]
-    wanted = {frozenset(edge) for edge in edges.tolist()}
-    found = np.array(
-        [
-            facet
-            for facet in range(topology.index_map(1).size_local)
-            if frozenset(node_of_vertex[vertices_of_facet.links(facet)].tolist()) in wanted
-        ],
-        np.int32,
-    )
+    node_of_vertex[topology.connectivity(2, 0).array] = node_of_point[geometry.dofmap.array]
+    facets = node_of_vertex[topology.connectivity(1, 0).array.reshape(-1, 2)]
+    size = len(node_of_vertex)
+    wanted = np.isin(edge_keys(facets, size), edge_keys(edges, size))
+    found = np.flatnonzero(wanted).astype(np.int32)
     return dolfinx.mesh.meshtags(domain, 1, found, np.ones(len(found), np.int32))

@@ -21,21 +21,17 @@ class Triangulation:
 
     def outward_normals(self, name):
         """Unit outward normals and lengths of a curve's edges; all must be boundary edges."""
-        triangle_of = {}
-        for triangle in self.triangles:
-            for k in range(3):
-                a, b = triangle[k], triangle[(k + 1) % 3]
-                triangle_of.setdefault(frozenset((a, b)), []).append((a, b))
-        normals, lengths = [], []
-        for edge in self.edges(name):
-            sides = triangle_of.get(frozenset(edge), [])
-            if len(sides) != 1:
-                raise SceneError(f"curve '{name}' has an edge that is not on the boundary")
-            # Counter-clockwise: the body is left of a → b, so (dy, −dx) points outwards.
-            dx, dy = self.nodes[sides[0][1]] - self.nodes[sides[0][0]]
-            lengths.append(np.hypot(dx, dy))
-            normals.append((dy / lengths[-1], -dx / lengths[-1]))
-        return np.array(normals), np.array(lengths)
+        sides = np.vstack([self.triangles[:, [k, (k + 1) % 3]] for k in range(3)])
+        keys = edge_keys(sides, len(self.nodes))
+        order = np.argsort(keys)
+        wanted = edge_keys(self.edges(name), len(self.nodes))
+        first = np.searchsorted(keys, wanted, sorter=order)
+        if (np.searchsorted(keys, wanted, "right", sorter=order) - first != 1).any():
+            raise SceneError(f"curve '{name}' has an edge that is not on the boundary")
+        a, b = self.nodes[sides[order[first]]].transpose(1, 0, 2)
+        # Counter-clockwise: the body is left of a → b, so (dy, −dx) points outwards.
+        (dx, dy), lengths = (b - a).T, np.linalg.norm(b - a, axis=1)
+        return np.column_stack([dy, -dx]) / lengths[:, None], lengths
 
     def edges(self, name):
         """Node pairs of a curve."""
@@ -43,6 +39,11 @@ class Triangulation:
             known = ", ".join(sorted(self.curves)) or "none"
             raise SceneError(f"the mesh has no physical curve '{name}' (it has: {known})")
         return self.curves[name]
+
+
+def edge_keys(edges, nodes):
+    """A number for each edge of a mesh of so many nodes, whichever end comes first."""
+    return edges.min(axis=1) * nodes + edges.max(axis=1)
 
 
 def read_triangulation(path):

@@ -3,6 +3,8 @@
 mod chart;
 mod compare;
 mod converge;
+mod floor;
+mod profile;
 mod ranks;
 mod reference;
 mod run;
@@ -12,6 +14,7 @@ mod stability;
 pub use chart::{ChartArguments, speed_chart};
 pub use compare::{CompareArguments, compare_scenes};
 pub use converge::{ConvergeArguments, convergence};
+pub use floor::{FloorArguments, floor};
 pub use ranks::refuse_ranks;
 pub use reference::{ReferenceArguments, reference};
 pub use run::{RunArguments, run};

@@ -1,7 +1,7 @@
 //! `signorini run`: a scene from its file to its results.
 
 use super::{
-    Failure, check_petsc, check_solver,
+    Failure, check_petsc, check_solver, profile,
     ranks::{rejoin, together},
     screen::Screen,
 };
@@ -37,6 +37,9 @@ pub struct RunArguments {
     /// Override a key of the scene, e.g. --set time.step=0.005; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Close with all that was timed: counts, times per call, bytes moved, unavoidable work.
+    #[arg(long)]
+    profile: bool,
     /// PETSc options, e.g. -- -tao_monitor -log_view.
     #[arg(last = true, value_name = "PETSC OPTIONS")]
     petsc: Vec<String>,
@@ -56,6 +59,19 @@ impl RunArguments {
         self.solver.iter().try_for_each(|name| check_solver("--solver", name))?;
         check_petsc(&self.petsc)
     }
+}
+
+/// The scene at `path` with keys overridden by `set`, on another mesh if one is given.
+pub(super) fn read_scene(
+    path: &Path,
+    mesh: Option<&Path>,
+    set: &[String],
+) -> Result<Scene, Failure> {
+    let mut scene = Scene::read(path, set).map_err(Failure::input)?;
+    if let Some(file) = mesh {
+        scene.mesh = MeshSource::from_path(file);
+    }
+    Ok(scene)
 }
 
 /// Runs a scene, on as many ranks as `mpiexec` has started.
@@ -94,17 +110,15 @@ struct Task {
     setting: Setting,
     solver: String,
     folder: PathBuf,
+    profile: bool,
 }
 
 impl Task {
     /// Reads scene and mesh. Every rank reads both; the first also makes the mesh, where it is to
     /// be made. Collective.
     fn read(arguments: &RunArguments, ranks: Ranks, phases: &Phases) -> Result<Self, Failure> {
-        let scene = Scene::read(&arguments.scene, &arguments.set).map_err(Failure::input);
-        let mut scene = together(ranks, scene)?;
-        if let Some(file) = &arguments.mesh {
-            scene.mesh = MeshSource::from_path(file);
-        }
+        let scene = read_scene(&arguments.scene, arguments.mesh.as_deref(), &arguments.set);
+        let scene = together(ranks, scene)?;
         let asked = arguments.solver.clone().or_else(|| scene.contact.solver.clone());
         let solver = asked.unwrap_or_else(|| SOLVERS[0].to_owned());
         let folder = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
@@ -118,19 +132,20 @@ impl Task {
         let loaded = together(ranks, first)?.map_or_else(load, Ok);
         let mesh = together(ranks, loaded)?;
         let setting = phases.time("setting", || Setting::new(scene, mesh)).map_err(Failure::input);
-        Ok(Self { setting: together(ranks, setting)?, solver, folder })
+        let profile = arguments.profile;
+        Ok(Self { setting: together(ranks, setting)?, solver, folder, profile })
     }
 
     /// Solves and writes the results. Collective.
     fn solve(self, session: &Session, phases: &Phases, started: Instant) -> Result<(), Failure> {
         let ranks = session.ranks();
-        let Self { setting, solver, folder } = self;
+        let Self { setting, solver, folder, profile } = self;
         let setting = phases.time("partition", || setting.share(session)).map_err(Failure::solver);
         let setting = together(ranks, setting)?;
         // Now that all input is good: the results of an earlier run go.
         let prepared = if ranks.is_first() { output::prepare(&folder) } else { Ok(()) };
         together(ranks, prepared.map_err(Failure::input))?;
-        let recorder = Recorder::new(&folder, &setting, phases).map_err(Failure::input);
+        let recorder = Recorder::new(&folder, &setting, phases, profile).map_err(Failure::input);
         let mut recorder = together(ranks, recorder)?;
 
         let result = evolution::run(session, &setting, &solver, phases, &mut |step| {
@@ -157,6 +172,9 @@ struct Recorder<'a> {
     folder: &'a Path,
     setting: &'a Setting,
     phases: &'a Phases,
+    profile: bool,
+    /// Seconds of all accepted steps after n = 0.
+    stepping: f64,
     every: Option<usize>,
     fields: FieldWriter,
     shown: Option<(History, Screen)>,
@@ -171,11 +189,14 @@ impl<'a> Recorder<'a> {
         folder: &'a Path,
         setting: &'a Setting,
         phases: &'a Phases,
+        profile: bool,
     ) -> Result<Self, output::OutputError> {
         Ok(Self {
             folder,
             setting,
             phases,
+            profile,
+            stepping: 0.0,
             every: setting.scene().output.every,
             fields: FieldWriter::new(folder, setting)?,
             shown: match setting.body.partition.ranks().is_first() {
@@ -200,6 +221,9 @@ impl<'a> Recorder<'a> {
     }
 
     fn accept(&mut self, step: &Step) -> Result<(), output::OutputError> {
+        if step.record.step > 0 {
+            self.stepping += step.record.seconds;
+        }
         let written = self.phases.time("output", || {
             let shown = self.shown.as_mut().map_or(Ok(()), |(history, screen)| {
                 screen.show(&step.record);
@@ -266,14 +290,22 @@ impl<'a> Recorder<'a> {
             kkt: outcome.map(|o| o.kkt).or(record.map(|r| r.kkt())),
             wall_seconds: wall,
             seconds_per_step: wall / steps.max(1) as f64,
-            phases: self.phases.table().into_iter().map(|(name, (_, s))| (name, s)).collect(),
+            phases: profile::whole(&self.phases.table())
+                .into_iter()
+                .map(|(name, phase)| (name, phase.seconds))
+                .collect(),
             foundation: setting.foundation.clone(),
             notes,
             error: result.as_ref().err().map(ToString::to_string),
         };
         let Some((_, screen)) = &self.shown else { return written };
         summary.write(self.folder)?;
-        screen.close(&summary, outcome, &self.phases.table(), self.folder);
+        let phases = self.phases.table();
+        let table = match self.profile {
+            true => profile::report(&phases, wall, steps, self.stepping),
+            false => profile::short(&phases, wall),
+        };
+        screen.close(&summary, outcome, &table, self.folder);
         written
     }
 }

@@ -1,13 +1,11 @@
 //! What a run shows: a progress bar, the result in a few lines, a table of phases.
 
-use comfy_table::{CellAlignment, LineStyle, Table, presets};
 use indicatif::{ProgressBar, ProgressStyle};
 use signorini::{
     evolution::{Outcome, Setting, StepRecord},
     output::Summary,
 };
 use std::{
-    collections::BTreeMap,
     io::{self, Write},
     path::Path,
 };
@@ -50,12 +48,12 @@ impl Screen {
         self.bar.finish_and_clear();
     }
 
-    /// Replaces the bar by the result and where the time went.
+    /// Replaces the bar by the result and the table of `phases`.
     pub fn close(
         &self,
         summary: &Summary,
         outcome: Option<&Outcome>,
-        phases: &BTreeMap<&'static str, (usize, f64)>,
+        phases: &[String],
         folder: &Path,
     ) {
         self.bar.finish_and_clear();
@@ -91,12 +89,7 @@ pub fn say(text: &str) {
     let _ = writeln!(io::stdout(), "{text}");
 }
 
-fn report(
-    s: &Summary,
-    outcome: Option<&Outcome>,
-    phases: &BTreeMap<&'static str, (usize, f64)>,
-    folder: &Path,
-) -> String {
+fn report(s: &Summary, outcome: Option<&Outcome>, phases: &[String], folder: &Path) -> String {
     let mut mesh = format!("{} nodes, {} triangles", s.nodes, s.triangles);
     if s.ranks > 1 {
         mesh += &format!(", on {} ranks", s.ranks);
@@ -110,10 +103,8 @@ fn report(
     lines.extend(result(s).into_iter().flatten());
     lines.extend(s.notes.iter().map(|note| row("note", note.clone())));
     lines.push(row("results", folder.display().to_string()));
-    // The table pads its last column too.
-    let table = phase_table(phases, s.wall_seconds).to_string();
     lines.push(String::new());
-    lines.extend(table.lines().map(|line| format!(" {}", line.trim_end())));
+    lines.extend_from_slice(phases);
     lines.join("\n")
 }
 
@@ -164,24 +155,4 @@ fn ending(s: &Summary, outcome: Option<&Outcome>) -> String {
 /// A time without the rounding of its last digits: 0.0248, not 0.024800000000000003.
 fn time(t: f64) -> f64 {
     format!("{t:.9e}").parse().unwrap_or(t)
-}
-
-fn phase_table(phases: &BTreeMap<&'static str, (usize, f64)>, wall: f64) -> Table {
-    let mut rows: Vec<_> = phases.iter().map(|(name, &(calls, s))| (*name, calls, s)).collect();
-    rows.sort_by(|a, b| b.2.total_cmp(&a.2));
-    let rest = wall - rows.iter().map(|(_, _, s)| s).sum::<f64>();
-    let mut table = Table::new();
-    let rule = LineStyle::none().fill('─').junction('─');
-    table.load_style(presets::NOTHING.header_separator(rule));
-    table.set_header(["phase", "calls", "seconds", "share"]);
-    let share = |s: f64| format!("{:.1} %", 100.0 * s / wall);
-    for (name, calls, s) in rows {
-        table.add_row([name.to_owned(), calls.to_string(), format!("{s:.3}"), share(s)]);
-    }
-    table.add_row(["other".to_owned(), String::new(), format!("{rest:.3}"), share(rest)]);
-    table.add_row(["all".to_owned(), String::new(), format!("{wall:.3}"), share(wall)]);
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    table
 }

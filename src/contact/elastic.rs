@@ -55,7 +55,7 @@ impl<'s> ElasticSolver<'s> {
         }
         if !solved {
             report.factorisations += 1;
-            if engine.renew(problem, system)? {
+            if problem.phases.time("contact/factorisation", || engine.renew(problem, system))? {
                 let iterations;
                 (solved, iterations) = engine.iterate(problem, system, c, limit, FRESH)?;
                 if !engine.factor.is_direct()? {
@@ -162,7 +162,10 @@ impl Engine {
         let started = Instant::now();
         let mut energy = 0.0;
         for iteration in 1..=most {
-            self.factor.apply(&self.free, &mut self.preconditioned)?;
+            let traffic = self.factor.traffic();
+            problem.phases.time_moving("contact/triangular solves", traffic, || {
+                self.factor.apply(&self.free, &mut self.preconditioned)
+            })?;
             clear(&mut self.preconditioned, system.held)?;
             let previous = energy;
             energy = self.free.dot(&self.preconditioned)?;
@@ -193,7 +196,8 @@ fn multiply(
     x: &Vector,
     y: &mut Vector,
 ) -> Result<(), PetscError> {
-    problem.stiffness.multiply(x, y)?;
+    let traffic = problem.stiffness.traffic();
+    problem.phases.time_moving("contact/products", traffic, || problem.stiffness.multiply(x, y))?;
     match system.added {
         None => Ok(()),
         Some(added) => {

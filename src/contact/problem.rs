@@ -1,7 +1,10 @@
 //! What a contact solver is given and what it answers.
 
 use super::{Bound, Kkt};
-use crate::petsc::{Matrix, PetscError, Ranks, Session, Vector};
+use crate::{
+    petsc::{Matrix, PetscError, Ranks, Session, Vector},
+    phases::Phases,
+};
 use nalgebra::{DMatrix, DVector};
 
 /// min ½ cᵀKc − fᵀc  subject to  c_i ≤ g_i on the bounded unknowns.
@@ -29,6 +32,8 @@ pub struct ContactProblem<'a> {
     /// The ranks among which the unknowns are divided: bounds are their owners', what is
     /// decided is decided by all.
     pub ranks: Ranks,
+    /// Where the parts of the solve book their time, as `contact/…`.
+    pub phases: &'a Phases,
 }
 
 impl ContactProblem<'_> {

@@ -154,7 +154,9 @@ impl<'a> Equilibrium<'a> {
     /// Fills K for the triangle means of η_*(ζ).
     fn fill(&mut self, zeta_mean: &[f64]) -> Result<(), PetscError> {
         if self.setting.body.partition.ranks().any(zeta_mean != self.zeta_mean) {
-            self.phases.time("stiffness refill", || self.stiffness.refill(zeta_mean))?;
+            let bytes = self.stiffness.refill_traffic();
+            self.phases
+                .time_moving("stiffness refill", bytes, || self.stiffness.refill(zeta_mean))?;
             self.zeta_mean = zeta_mean.to_vec();
         }
         Ok(())
@@ -219,6 +221,7 @@ impl<'a> Equilibrium<'a> {
             force_scale,
             tolerance,
             ranks,
+            phases: self.phases,
         };
         self.phases.time("contact", || self.solver.solve(&problem, &mut self.c))
     }

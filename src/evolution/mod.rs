@@ -8,15 +8,14 @@ mod estimate;
 mod extrapolation;
 mod loads;
 mod notes;
-mod phases;
 mod setting;
 mod state;
 
+pub use crate::phases::Phases;
 pub use bounds::Excess;
 pub use equilibrium::Equilibrium;
 pub use loads::Loads;
 pub use notes::Accuracy;
-pub use phases::Phases;
 pub use setting::{Setting, SetupError};
 pub use state::{ContactPoint, State, Step, StepRecord};
 
@@ -204,6 +203,8 @@ pub fn run(
         agreed(ranks, accepted(&last).map_err(RunError::Observer))?;
         outcome.accept(last, driving);
     }
+    // Makes room for another factorisation.
+    drop(damage);
     outcome.accuracy = phases.time("accuracy", || equilibrium.accuracy(&outcome.last.state))?;
     Ok(outcome)
 }

@@ -49,12 +49,11 @@ pub fn source_load(body: &Body, mass: Mass, source: &[[f64; 3]]) -> Vec<f64> {
     load
 }
 
-/// M + kκL, factored once for each step length, and M.
+/// M + kκL, factored once for each step length, M and L.
 pub struct DamageSystem {
     mass: Matrix,
+    laplace: Matrix,
     matrix: Matrix,
-    mass_values: Vec<f64>,
-    laplace_values: Vec<f64>,
     solver: LinearSolver,
     rhs: Vector,
     unknown: Vector,
@@ -85,13 +84,17 @@ impl DamageSystem {
                 }
             }
         }
-        let mut mass = Matrix::with_pattern(session, owned, 1, rows.clone(), columns.clone())?;
-        mass.set_values(&mass_values)?;
+        let mut filled = Matrix::with_pattern(session, owned, 1, rows, columns)?;
+        let mut with = |values: Vec<f64>| {
+            filled.set_values(&values)?;
+            // A copy does without the pattern's bookkeeping, which is larger than the matrix.
+            filled.duplicate()
+        };
+        let (mass, laplace) = (with(mass_values)?, with(laplace_values)?);
         let mut system = Self {
+            matrix: mass.duplicate()?,
             mass,
-            matrix: Matrix::with_pattern(session, owned, 1, rows, columns)?,
-            mass_values,
-            laplace_values,
+            laplace,
             solver: LinearSolver::cholesky(session, "damage_", body.partition.total())?,
             rhs: Vector::zeros(session, owned)?,
             unknown: Vector::zeros(session, owned)?,
@@ -104,9 +107,8 @@ impl DamageSystem {
 
     /// Refills and factorises the matrix for another step length k, s.
     pub fn set_step(&mut self, step: f64) -> Result<(), PetscError> {
-        let factor = step * self.diffusion;
-        let sum = self.mass_values.iter().zip(&self.laplace_values).map(|(m, l)| m + factor * l);
-        self.matrix.set_values(&sum.collect::<Vec<_>>())?;
+        self.matrix.copy(&self.mass)?;
+        self.matrix.add(step * self.diffusion, &self.laplace)?;
         self.step = step;
         self.solver.factorise(&self.matrix)
     }

@@ -77,6 +77,18 @@ impl Stiffness {
         Ok(stiffness)
     }
 
+    /// Bytes that a refill moves: contributions and pairs, ζ̄ once, the values written, read again
+    /// with their places (PETSc keeps two numbers of 8 bytes each), and K's own values.
+    pub fn refill_traffic(&self) -> f64 {
+        let read = 40 * self.contributions.len() + 8 * self.pairs.len();
+        read as f64 + 32.0 * self.values.len() as f64 + self.matrix.values_traffic()
+    }
+
+    /// K alone, as last filled; what only refills need is given up.
+    pub fn into_matrix(self) -> Matrix {
+        self.matrix
+    }
+
     /// K(ζ) from the mean ζ̄ of each triangle: exact, the strains being constant there.
     pub fn refill(&mut self, zeta: &[f64]) -> Result<(), PetscError> {
         let mut values = self.values.chunks_exact_mut(4);

@@ -117,7 +117,23 @@ impl Session {
     }
 }
 
+/// Lets large blocks of memory be given back when they are freed: a library below Debian's PETSc
+/// (SuperLU_DIST) switches that off when it is loaded, so that what one part of a run has freed
+/// is lost in fragments for the next.
+fn give_memory_back() {
+    /// The number of blocks malloc allows by default.
+    const BLOCKS: c_int = 65536;
+    /// The largest threshold malloc knows: smaller arrays come and go with every step.
+    const LARGE: c_int = 32 << 20;
+    // SAFETY: mallopt only sets parameters of malloc, and before PETSc has threads.
+    unsafe {
+        raw::mallopt(raw::M_MMAP_THRESHOLD as c_int, LARGE);
+        raw::mallopt(raw::M_MMAP_MAX as c_int, BLOCKS);
+    }
+}
+
 fn initialize(options: &[String]) -> Result<(), PetscError> {
+    give_memory_back();
     let mut arguments = vec![c_string("signorini")?, c_string("-no_signal_handler")?];
     for option in options {
         arguments.push(c_string(option)?);

@@ -122,7 +122,7 @@ fn run(
         factorisations: sum(|r| r.factorisations),
         triangular_solves: sum(|r| r.linear_iterations),
         fallbacks: sum(|r| r.fallbacks),
-        seconds: phases.table().get("contact").map_or(0.0, |(_, seconds)| *seconds),
+        seconds: phases.table().get("contact").map_or(0.0, |phase| phase.seconds),
         kkt_stationarity: kkt.stationarity,
         kkt_primal: kkt.primal,
         kkt_dual: kkt.dual,

@@ -257,3 +257,35 @@ fn a_body_balanced_on_one_point_is_noted() {
     let notes = desk.summary("out/scene")["notes"].to_string();
     assert_eq!(notes.matches(note).count(), 1, "{notes}");
 }
+
+#[test]
+fn profile() {
+    let desk = Desk::new();
+    let out = desk.run(&["--profile"]).out;
+    for fragment in ["ms per call", "GB/s", "unavoidable work", "peak memory"] {
+        assert!(out.contains(fragment), "no `{fragment}` in: {out}");
+    }
+    // Seconds are the first number with a point behind the name.
+    let seconds = |name: &str| -> f64 {
+        let line = out.lines().map(str::trim).find(|line| line.starts_with(name));
+        let row = line.unwrap_or_else(|| panic!("no `{name}` in: {out}"));
+        let number = row.split_whitespace().find(|word| word.contains('.'));
+        number.and_then(|word| word.parse().ok()).expect("seconds")
+    };
+    let parts = ["factorisation", "triangular solves", "products"].map(seconds);
+    assert!(parts.iter().sum::<f64>() <= seconds("contact  ") + 2e-3, "{parts:?}: {out}");
+    assert!(!desk.run(&[]).out.contains("GB/s"), "only when asked for");
+}
+
+#[test]
+fn floor() {
+    let desk = Desk::new();
+    let said = desk.say(&["floor", "scene.toml", "--rounds", "3"]);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let floor: Value = serde_json::from_str(&said.out).expect("JSON");
+    assert_eq!(floor["nodes"], 25);
+    let parts = floor["parts"].as_array().expect("parts");
+    let each: Vec<f64> = parts.iter().map(|part| number(&part["seconds"])).collect();
+    assert!(each.len() == 4 && each.iter().all(|&s| s > 0.0), "{each:?}");
+    assert!(!desk.path("out").exists(), "it writes nothing");
+}

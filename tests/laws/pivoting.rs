@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use signorini::{
     contact::{Bound, ContactProblem, ContactReport, PenaltyOptions, SOLVERS, solver},
     petsc::{Matrix, Ranks, Session, Vector},
+    phases::Phases,
 };
 
 const TOLERANCE: f64 = 1e-10;
@@ -48,6 +49,7 @@ impl Small {
             force_scale: self.load.iter().map(|f| f * f).sum::<f64>().sqrt(),
             tolerance: TOLERANCE,
             ranks: Ranks::alone(),
+            phases: &Phases::default(),
         };
         let mut solver = solver(&session, name, true, PenaltyOptions::default());
         if name == "active-set" {

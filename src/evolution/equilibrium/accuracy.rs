@@ -43,10 +43,12 @@ impl Equilibrium<'_> {
         let mut correction = Vector::zeros(self.session, self.c.owned())?;
         rhs.set(&residual[..rhs.owned()])?;
         drop(self.solver);
-        self.stiffness.matrix.hold(&pressing, self.stiffness.scale)?;
+        let scale = self.stiffness.scale;
+        let mut matrix = self.stiffness.into_matrix();
+        matrix.hold(&pressing, scale)?;
         let mut solver =
             LinearSolver::cholesky(self.session, "elastic_", 2 * body.partition.total())?;
-        solver.factorise(&self.stiffness.matrix)?;
+        solver.factorise(&matrix)?;
         // One digit of an error is enough.
         if !solver.solve(&rhs, &mut correction, 0.1 * rhs.norm()?)?.converged {
             return Ok(f64::INFINITY);

@@ -1,0 +1,169 @@
+"""Draws the measurements of `make bench`: bench.py FOLDER
+
+Reads FOLDER/bench.csv and draws FOLDER/bench.png: the time of a step of every program, how much
+faster signorini is and how far from the floor, and growth of time and memory.
+"""
+
+import csv
+import sys
+from pathlib import Path
+from statistics import median
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from drawing import FAINT, INK, RED
+
+STYLES = {
+    ("signorini", "active-set"): ("#2f6db3", "o", "-"),
+    ("signorini", "penalty-duality"): ("#d08a1d", "s", "-"),
+    ("signorini", "tao"): ("#3d8f5a", "^", "-"),
+    ("FEniCSx", "lu"): ("#8e5aa8", "D", "--"),
+    ("FEniCSx", "cholesky"): ("#a3554f", "v", "--"),
+    ("floor", ""): (INK, "_", ":"),
+}
+DEFAULT = ("signorini", "active-set")
+GIBIBYTES = 1024.0**3
+
+
+def read(path):
+    """The runs with numbers where there are any."""
+    def value(text):
+        try:
+            return float(text)
+        except ValueError:
+            return text
+
+    with open(path, newline="", encoding="utf-8") as file:
+        return [{key: value(text) for key, text in row.items()} for row in csv.DictReader(file)]
+
+
+def rounds(rows, part, key):
+    """Milliseconds per step of a program, by n, round after round."""
+    found = {}
+    for row in rows:
+        if row["part"] == part and (row["program"], row["method"]) == key and not is_whole(row):
+            found.setdefault(int(row["n"]), []).append(1e3 * row["seconds_per_step"])
+    return found
+
+
+def is_whole(row):
+    """Runs that wrote output; their steps are not compared."""
+    return row["frames"] == "True"
+
+
+def line(axes, values, key, **style):
+    """Medians over n with the range of the rounds."""
+    colour, marker, dashes = STYLES[key]
+    n = sorted(values)
+    middle = [median(values[m]) for m in n]
+    apart = [[v - min(values[m]) for m, v in zip(n, middle)],
+             [max(values[m]) - v for m, v in zip(n, middle)]]
+    axes.errorbar(n, middle, apart, color=colour, marker=marker, ls=dashes, ms=6, capsize=2,
+                  lw=1.2, label=" ".join(key).strip(), **style)
+
+
+def time(axes, rows):
+    """Milliseconds per step of every program."""
+    for key in STYLES:
+        if values := rounds(rows, "floor" if key[0] == "floor" else "steps", key):
+            line(axes, values, key)
+    axes.set(xscale="log", yscale="log", xlabel="n", ylabel="ms per step")
+    axes.set_title("a step of square-mild, k = 0.01", loc="left")
+    ticks(axes, rows, "steps")
+    axes.legend(fontsize=8)
+
+
+def ratios(axes, rows):
+    """How many times longer FEniCSx takes than each solver, and the default than the floor."""
+    ours = {key: rounds(rows, "steps", key) for key in STYLES if key[0] == "signorini"}
+    for key in STYLES:
+        theirs = rounds(rows, "steps", key) if key[0] == "FEniCSx" else {}
+        same = {n: [a / b for a, b in zip(theirs[n], ours[DEFAULT][n])] for n in theirs}
+        if same:
+            line(axes, same, key)
+    below, steps = rounds(rows, "floor", ("floor", "")), rounds(rows, "floor", DEFAULT)
+    if below:
+        same = {n: [a / b for a, b in zip(steps[n], below[n])] for n in below}
+        colour = STYLES[DEFAULT][0]
+        axes.plot(list(same), [median(r) for r in same.values()], "*", color=colour, ms=10,
+                  label="active-set / floor")
+    for n, least in ((128, 12), (256, 15)):
+        axes.plot([0.85 * n, 1.18 * n], [least, least], color=RED, lw=2)
+    axes.plot([0.85 * 256, 1.18 * 256], [2.5, 2.5], color=RED, lw=2, label="demanded")
+    axes.set(xscale="log", xlabel="n", ylabel="times")
+    axes.set_ylim(0, 1.35 * axes.get_ylim()[1])
+    axes.set_title("FEniCSx against active-set, and active-set against the floor", loc="left")
+    ticks(axes, rows, "steps")
+    axes.legend(fontsize=8, loc="upper left")
+
+
+def growth(axes, rows, key, scale, title, demanded):
+    """One quantity over the number of unknowns, with the fitted exponent."""
+    runs = middle([row for row in rows if row["part"] == "growth"])
+    if not runs:
+        axes.set_visible(False)
+        return
+    n, values = (np.array([row[k] for row in runs]) for k in ("unknowns", key))
+    values = values * scale
+    axes.loglog(n, values, "o-", color=STYLES[DEFAULT][0], ms=6, lw=1.2)
+    large = [i for i, row in enumerate(runs) if row["n"] >= 64]
+    slope, start = np.polyfit(np.log(n[large]), np.log(values[large]), 1)
+    axes.loglog(n[large], np.exp(start) * n[large] ** slope, ":", color=INK, lw=1,
+                label=f"fitted from n = 64: N^{slope:.2f}")
+    demanded(axes, n, values)
+    axes.set(xlabel="unknowns of u", ylabel=title)
+    axes.set_title(f"growth: {title}", loc="left")
+    axes.legend(fontsize=8)
+
+
+def middle(runs):
+    """For each n the median run."""
+    sizes = dict.fromkeys(row["n"] for row in runs)
+    same = [sorted((r for r in runs if r["n"] == n), key=lambda r: r["seconds_per_step"])
+            for n in sizes]
+    return [group[len(group) // 2] for group in same]
+
+
+def slope_allowed(axes, n, values):
+    """N^1.25 through the run at n = 64."""
+    at = min(1, len(n) - 1)
+    axes.loglog(n[at:], values[at] * (n[at:] / n[at]) ** 1.25, color=RED, lw=1, label="N^1.25")
+
+
+def memory_allowed(axes, _n, _values):
+    axes.axhline(8 * GIBIBYTES / 1e6, color=RED, lw=1, label="8 GiB")
+
+
+def ticks(axes, rows, part):
+    sizes = sorted({int(row["n"]) for row in rows if row["part"] == part})
+    axes.set_xticks(sizes, [str(n) for n in sizes])
+    axes.minorticks_off()
+
+
+def draw(rows, path):
+    figure, ((a, b), (c, d)) = plt.subplots(2, 2, figsize=(11, 8))
+    time(a, rows)
+    ratios(b, rows)
+    growth(c, rows, "seconds_per_step", 1e3, "ms per step", slope_allowed)
+    growth(d, rows, "peak_mb", 1.0, "peak memory, MB", memory_allowed)
+    for axes in (a, b, c, d):
+        axes.grid(color=FAINT, alpha=0.35, linewidth=0.6)
+        axes.set_axisbelow(True)
+    figure.savefig(path)
+    plt.close(figure)
+
+
+def main(folder):
+    table = Path(folder) / "bench.csv"
+    if not table.exists():
+        sys.exit(f"no {table}: run `make bench` first")
+    picture = table.with_suffix(".png")
+    draw(read(table), picture)
+    print(picture)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    main(sys.argv[1])

@@ -1,0 +1,45 @@
+//! Where the time goes.
+
+use std::{cell::RefCell, collections::BTreeMap, time::Instant};
+
+/// What was booked under one name.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Phase {
+    /// Times the phase was entered.
+    pub calls: usize,
+    /// Wall seconds of all calls.
+    pub seconds: f64,
+    /// Bytes that all calls moved between memory and processor, where that is known.
+    pub bytes: f64,
+}
+
+/// Named phases of a run. A name with a slash (`contact/products`) is a part of the phase before
+/// the slash, which contains its time.
+#[derive(Debug, Default)]
+pub struct Phases(RefCell<BTreeMap<&'static str, Phase>>);
+
+impl Phases {
+    /// Runs `work` and books its wall time under `name`.
+    pub fn time<R>(&self, name: &'static str, work: impl FnOnce() -> R) -> R {
+        self.time_moving(name, 0.0, work)
+    }
+
+    /// As [`Self::time`], for work that moves so many `bytes`: every array it goes through counted
+    /// once, as if caches kept nothing from call to call and lost nothing within one.
+    pub fn time_moving<R>(&self, name: &'static str, bytes: f64, work: impl FnOnce() -> R) -> R {
+        let started = Instant::now();
+        let result = work();
+        let seconds = started.elapsed().as_secs_f64();
+        let mut phases = self.0.borrow_mut();
+        let phase = phases.entry(name).or_default();
+        phase.calls += 1;
+        phase.seconds += seconds;
+        phase.bytes += bytes;
+        result
+    }
+
+    /// Phases and parts of phases by name.
+    pub fn table(&self) -> BTreeMap<&'static str, Phase> {
+        self.0.borrow().clone()
+    }
+}

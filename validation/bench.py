@@ -1,0 +1,252 @@
+#!/usr/bin/python3
+"""Measures speed, everything side by side in one run, and says it as ratios.
+
+    /usr/bin/python3 validation/bench.py --binary target/release/signorini [--quick] [PART…]
+
+steps    seconds per step of square-mild (k = 0.01) at n = 64, 128, 256: each contact solver and the
+         FEniCSx loop (loop.py, MUMPS by LU and by Cholesky); the whole process at n = 64
+floor    the same against `signorini floor`, the work that no step can avoid, at n = 128 and 256
+growth   time per step, peak memory and iterations from n = 32 to 1024 in one process each
+ranks    1 → 2 ranks at n = 512, iterations over 1 … 4 ranks
+
+A step is the mean of all but the first, which makes what the others keep.
+Programs take turns (A B A B …), because the machine may be shared: a ratio is the median over the
+rounds of the ratio within a round, with the least and the largest beside it. All use the same mesh
+files, tolerance and BLAS, and one thread per process. Writes OUT/bench.csv and OUT/bench.md.
+"""
+
+import argparse
+import os
+import platform
+import subprocess
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+
+from programs import Bench, Failure
+
+SOLVERS = ["active-set", "penalty-duality", "tao"]
+FACTORS = ["lu", "cholesky"]
+PARTS = ["steps", "floor", "growth", "ranks"]
+# FEniCSx / active-set asked for, by n.
+DEMANDED = {256: 15.0, 128: 12.0}
+
+
+@dataclass
+class Sizes:
+    """How much is measured."""
+
+    meshes: list = field(default_factory=lambda: [64, 128, 256])
+    rounds: int = 3
+    # Steps of the default, with the factorisations that fall into them; of the other solvers, and
+    # of the loop, whose steps cost the same one after the other.
+    steps: int = 100
+    other_steps: dict = field(default_factory=lambda: {64: 100, 128: 50, 256: 25})
+    loop_steps: dict = field(default_factory=lambda: {64: 40, 128: 20, 256: 10})
+    floor: list = field(default_factory=lambda: [128, 256])
+    growth: list = field(default_factory=lambda: [32, 64, 128, 256, 512, 1024])
+    growth_steps: int = 20
+    ranks: int = 512
+    ranks_steps: int = 20
+
+
+QUICK = Sizes(
+    meshes=[64, 128], rounds=1, steps=20, other_steps={64: 20, 128: 10},
+    loop_steps={64: 10, 128: 5}, floor=[128],
+    growth=[32, 64, 128, 256], growth_steps=10, ranks=128, ranks_steps=10,
+)
+
+
+def milliseconds(rounds):
+    return f"{1e3 * median(rounds):.3g}"
+
+
+def ratio(above, below):
+    """The median of the ratios round by round, and their range."""
+    ratios = [a / b for a, b in zip(above, below)]
+    text = f"{median(ratios):.2f}"
+    return text if len(ratios) == 1 else f"{text} ({min(ratios):.2f}–{max(ratios):.2f})"
+
+
+def steps(bench):
+    """Seconds per step of every program, in turn."""
+    programs = [("signorini", s) for s in SOLVERS] + [("FEniCSx", f) for f in FACTORS]
+    have_loop = subprocess.run(["/usr/bin/python3", "-c", "import dolfinx"], capture_output=True)
+    if have_loop.returncode != 0:
+        bench.say("FEniCSx is not installed (make deps-validate): its loop is left out.\n")
+        programs = programs[: len(SOLVERS)]
+    rows = []
+    for n in bench.sizes.meshes:
+        seconds, last = {p: [] for p in programs}, {}
+        for _ in range(bench.sizes.rounds):
+            for program, method in programs:
+                if program == "FEniCSx":
+                    row, told = bench.loop(n, method)
+                else:
+                    default = method == SOLVERS[0]
+                    count = bench.sizes.steps if default else bench.sizes.other_steps[n]
+                    row, told = bench.signorini(n, method, count)
+                last[program, method] = row, told
+                seconds[program, method].append(row["seconds_per_step"])
+        history = last[programs[0]][1]
+        for key in programs:
+            row, told = last[key]
+            times = [ratio(seconds[key], seconds[other]) for other in programs[:1]]
+            against = [ratio(seconds["FEniCSx", f], seconds[key]) if len(programs) > len(SOLVERS)
+                       and key[0] == "signorini" else "" for f in FACTORS]
+            rows.append([n, *key, row["steps"], milliseconds(seconds[key]), *times, *against,
+                         f"{row['iterations'] / row['steps']:.2f}", f"{row['kkt']:.0e}"])
+            if key[0] == "FEniCSx":
+                same_answer(told, history[told["steps"]])
+    bench.say("## Seconds per step, square-mild, k = 0.01\n")
+    bench.table(["n", "program", "method", "steps", "ms per step", "times active-set",
+                 "FEniCSx LU / this", "FEniCSx Cholesky / this", "its per step", "KKT"], rows)
+    demanded = ", ".join(f"{d:.0f} at n = {n}" for n, d in DEMANDED.items())
+    bench.say(f"Demanded of the default: {demanded}.\n")
+    if len(programs) > len(SOLVERS):
+        whole_process(bench)
+
+
+def same_answer(told, row):
+    """The loop and signorini solve the same problem."""
+    for key in ("zeta_min", "displacement_max"):
+        if abs(told[key] - row[key]) > 1e-8 * abs(row[key]):
+            raise Failure(f"{key} differs: FEniCSx {told[key]!r}, signorini {row[key]!r}")
+
+
+def whole_process(bench):
+    """From the start of the process to its end, 100 steps, about 20 frames written."""
+    n, count = bench.sizes.meshes[0], bench.sizes.steps
+    seconds = {"signorini": [], **{factor: [] for factor in FACTORS}}
+    for _ in range(bench.sizes.rounds):
+        seconds["signorini"].append(bench.signorini(n, frames=True)[0]["whole_seconds"])
+        for factor in FACTORS:
+            seconds[factor].append(bench.loop(n, factor, count, frames=True)[0]["whole_seconds"])
+    bench.say(f"## Whole process, n = {n}, {count} steps, with output\n")
+    rows = [["signorini", f"{median(seconds['signorini']):.2f}", ""]]
+    rows += [[f"FEniCSx {f}", f"{median(seconds[f]):.2f}", ratio(seconds[f], seconds["signorini"])]
+             for f in FACTORS]
+    bench.table(["program", "seconds", "times signorini"], rows)
+    bench.say("Demanded: 8.\n")
+
+
+def floor(bench):
+    """Steps against the work that none can avoid."""
+    rows, parts = [], []
+    for n in bench.sizes.floor:
+        seconds, floors, answers = [], [], []
+        for _ in range(bench.sizes.rounds):
+            answers.append(bench.floor(n))
+            floors.append(answers[-1]["seconds"])
+            seconds.append(bench.signorini(n)[0]["seconds_per_step"])
+        rows.append([n, milliseconds(seconds), milliseconds(floors), ratio(seconds, floors)])
+        copy = median(answer["copy_bytes_per_second"] for answer in answers)
+        for part in answers[0]["parts"]:
+            same = [p for a in answers for p in a["parts"] if p["name"] == part["name"]]
+            time_, moved = median(p["seconds"] for p in same), part["bytes"]
+            parts.append([n, part["name"], f"{1e3 * time_:.2f}",
+                          f"{1e-6 * moved:.1f}" if moved else "",
+                          f"{1e-9 * moved / time_:.1f}" if moved else "", f"{1e-9 * copy:.1f}"])
+    bench.say("## Against the floor\n")
+    bench.table(["n", "ms per step", "floor, ms", "step / floor"], rows)
+    bench.say("Demanded: at most 2.5 at n = 256. The floor in parts:\n")
+    bench.table(["n", "part", "ms", "MB moved", "GB/s", "copy, GB/s"], parts)
+
+
+def growth(bench):
+    """Time, memory and iterations over the size."""
+    def middle(n):
+        """The median run; of the large ones there is one."""
+        rounds = bench.sizes.rounds if n <= 256 else 1
+        runs = [bench.signorini(n, steps=bench.sizes.growth_steps)[0] for _ in range(rounds)]
+        return sorted(runs, key=lambda r: r["seconds_per_step"])[len(runs) // 2]
+
+    runs = [middle(n) for n in bench.sizes.growth]
+    bench.say(f"## Growth, active-set, {bench.sizes.growth_steps} steps, one process each\n")
+    fitted = lambda key, chosen: np.polyfit(
+        np.log([r["unknowns"] for r in chosen]), np.log([r[key] for r in chosen]), 1)[0]
+    local = [""] + [f"{fitted('seconds_per_step', pair):.2f}" for pair in zip(runs, runs[1:])]
+    bench.table(
+        ["n", "unknowns", "ms per step", "local exponent", "peak memory, MB", "bytes per unknown",
+         "its per step", "solve pairs per step", "factorisations"],
+        [[r["n"], r["unknowns"], f"{1e3 * r['seconds_per_step']:.3g}", exponent,
+          f"{r['peak_mb']:.0f}", f"{1e6 * r['peak_mb'] / r['unknowns']:.0f}",
+          f"{r['iterations'] / r['steps']:.2f}", f"{r['linear_iterations'] / r['steps']:.2f}",
+          r["factorisations"]] for r, exponent in zip(runs, local)])
+    large = [r for r in runs if r["n"] >= 64]
+    bench.say(f"Fitted from n = 64 up: time per step ~ N^{fitted('seconds_per_step', large):.2f}, "
+              f"peak memory ~ N^{fitted('peak_mb', large):.2f}. "
+              "Demanded: at most N^1.25 and 8590 MB (8 GiB) at n = 1024.\n")
+
+
+def ranks(bench):
+    """1 → 2 ranks, and iterations over ranks."""
+    bench.say("## Ranks\n")
+    small = min(bench.sizes.meshes)
+    try:
+        bench.signorini(small, steps=2, ranks=2)
+    except (Failure, FileNotFoundError) as failure:
+        bench.say(f"Left out: {failure}\n")
+        return
+    n, count = bench.sizes.ranks, bench.sizes.ranks_steps
+    seconds = {1: [], 2: []}
+    for _ in range(bench.sizes.rounds):
+        for p in seconds:
+            seconds[p].append(bench.signorini(n, steps=count, ranks=p)[0]["seconds_per_step"])
+    bench.table(["n", "1 rank, ms per step", "2 ranks, ms per step", "1 / 2"],
+                [[n, *map(milliseconds, seconds.values()), ratio(seconds[1], seconds[2])]])
+    bench.say("Demanded: at least 1.5.\n")
+    n = min(n, 128)
+    runs = [bench.signorini(n, steps=count, ranks=p) for p in (1, 2, 3, 4)]
+    reference = runs[0][1][-1]
+    apart = lambda last: max(abs(last[key] / reference[key] - 1) for key in
+                             ("displacement_max", "zeta_min", "work", "contact_force"))
+    bench.table(["n", "ranks", "its", "solve pairs", "factorisations", "apart from 1 rank"],
+                [[n, r["ranks"], r["iterations"], r["linear_iterations"], r["factorisations"],
+                  f"{apart(history[-1]):.0e}"] for r, history in runs])
+
+
+def machine(bench):
+    """What it ran on, and whether it had the machine for itself."""
+    cpu = next((line.split(":")[1].strip() for line in open("/proc/cpuinfo", encoding="utf-8")
+                if line.startswith("model name")), platform.machine())
+    blas = os.path.realpath("/usr/lib/x86_64-linux-gnu/libblas.so.3")
+    bench.say(f"{cpu}, {os.cpu_count()} cores; BLAS {blas}; one thread per process.")
+    load = os.getloadavg()[0]
+    if load > 0.5:
+        bench.say(f"The machine is shared (load {load:.1f} at the start): times are too long, and "
+                  "ratios less certain.")
+    bench.say()
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}")
+    parser.add_argument("--binary", type=Path, required=True)
+    parser.add_argument("--out", type=Path, default=Path("out/bench"))
+    parser.add_argument("--quick", action="store_true", help="small meshes, one round")
+    arguments = parser.parse_args()
+    if unknown := set(arguments.parts) - set(PARTS):
+        parser.error(f"there is no part {', '.join(unknown)}; there are {', '.join(PARTS)}")
+    sizes = QUICK if arguments.quick else Sizes()
+    bench = Bench(arguments.binary.resolve(), arguments.out.resolve(), sizes)
+    began = time.perf_counter()
+    machine(bench)
+    try:
+        for part in PARTS:
+            if not arguments.parts or part in arguments.parts:
+                bench.part = part
+                globals()[part](bench)
+    except Failure as failure:
+        sys.exit(f"error: {failure}")
+    finally:
+        bench.write()
+    print(f"{bench.out / 'bench.csv'}, bench.md: {time.perf_counter() - began:.0f} s")
+
+
+if __name__ == "__main__":
+    main()

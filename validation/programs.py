@@ -1,0 +1,148 @@
+"""Runs what `bench.py` compares, and keeps what it took."""
+
+import csv
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent
+SCENE = ROOT / "geo" / "square-mild.toml"
+LOOP = ROOT / "validation" / "loop.py"
+TOLERANCE = 1e-10
+
+
+class Failure(Exception):
+    """A program that did not do what it was asked: said in one line."""
+
+
+class Bench:
+    """Runs the programs in turn and keeps what they took, a row each."""
+
+    def __init__(self, binary, out, sizes):
+        self.binary, self.out, self.sizes = str(binary), out, sizes
+        self.rows, self.text, self.part = [], [], None
+        self.environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+        out.mkdir(parents=True, exist_ok=True)
+
+    def say(self, line=""):
+        print(line, flush=True)
+        self.text.append(line)
+
+    def mesh(self, n):
+        """The square with n cells per side, meshed once."""
+        path = self.out / f"square-{n}.msh"
+        if not path.exists():
+            part = path.with_suffix(".part.msh")
+            command = ["gmsh", "-2", ROOT / "geo" / "square.geo", "-setnumber", "n", n,
+                       "-o", part, "-v", "1"]
+            self.start(command)
+            part.rename(path)
+        return path
+
+    def start(self, command):
+        """Runs a command to its end: its output and wall seconds."""
+        command = [str(word) for word in command]
+        began = time.perf_counter()
+        with subprocess.Popen(command, env=self.environment, text=True, cwd=self.out,
+                              stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+            said, complaint = process.communicate()
+            seconds = time.perf_counter() - began
+        if process.returncode != 0:
+            lines = (complaint.strip() or said.strip() or "no message").splitlines()
+            told = [line for line in lines if line.startswith("error:")] or lines[-1:]
+            raise Failure(f"{Path(command[0]).name} … failed: {told[0]}")
+        return said, seconds
+
+    def signorini(self, n, solver="active-set", steps=None, ranks=None, frames=False):
+        """A run of so many steps of k = 0.01."""
+        steps = steps or self.sizes.steps
+        folder = self.out / "run"
+        command = [self.binary, "run", SCENE, "--mesh", self.mesh(n), "--solver", solver,
+                   "--set", f"time.end={steps / 100}", "--out", folder, "--profile"]
+        if not frames:
+            command += ["--set", "output.every=100000"]
+        if ranks is not None:
+            command = ["mpiexec", "--allow-run-as-root", "--oversubscribe", "-n", ranks, *command]
+        said, whole = self.start(command)
+        summary = json.loads((folder / "summary.json").read_text())
+        with open(folder / "history.csv", newline="") as file:
+            history = [{k: float(v or "nan") for k, v in row.items()} for row in csv.DictReader(file)]
+        # The first step also makes what all others keep.
+        after = history[2:]
+        total = lambda key: int(sum(row[key] for row in after))
+        row = {
+            "program": "signorini", "method": solver, "n": n, "ranks": ranks or 1,
+            "nodes": summary["nodes"], "steps": len(after),
+            "unknowns": 2 * summary["nodes"],
+            "seconds_per_step": sum(row["seconds"] for row in after) / len(after),
+            "whole_seconds": whole, "iterations": total("iterations"),
+            "linear_iterations": total("linear_iterations"),
+            "factorisations": total("factorisations"), "kkt": max(summary["kkt"].values()),
+            "peak_mb": peak(said), "frames": frames,
+        }
+        return self.keep(row), history
+
+    def loop(self, n, factor, steps=None, frames=False):
+        """The FEniCSx loop."""
+        command = ["/usr/bin/python3", LOOP, SCENE, self.mesh(n), "--factor", factor,
+                   "--steps", steps or self.sizes.loop_steps[n]]
+        if frames:
+            command += ["--out", self.out / "run" / "loop.xdmf"]
+        said, whole = self.start(command)
+        answer = json.loads(said.strip().splitlines()[-1])
+        row = {
+            "program": "FEniCSx", "method": factor, "n": n, "ranks": 1, "nodes": answer["nodes"],
+            "unknowns": 2 * answer["nodes"], "steps": answer["steps"] - 1,
+            "seconds_per_step": float(np.mean(answer["seconds"][1:])),
+            "whole_seconds": whole, "iterations": sum(answer["iterations"][1:]),
+            "kkt": answer["kkt"], "frames": frames,
+        }
+        return self.keep(row), answer
+
+    def floor(self, n):
+        """The unavoidable work in isolation."""
+        said, _ = self.start([self.binary, "floor", SCENE, "--mesh", self.mesh(n)])
+        answer = json.loads(said)
+        self.keep({"program": "floor", "method": "", "n": n, "ranks": 1, "nodes": answer["nodes"],
+                   "seconds_per_step": answer["seconds"]})
+        return answer
+
+    def keep(self, row):
+        """Notes a run, whose answer must satisfy the KKT conditions."""
+        if row.get("kkt", 0.0) > TOLERANCE:
+            raise Failure(f"{row['program']} {row['method']}: KKT {row['kkt']:.1e} at n = {row['n']}")
+        self.rows.append({"part": self.part, **row})
+        name = f"{self.part}, n = {row['n']}: {row['program']} {row['method']}"
+        print(f"{name} {1e3 * row['seconds_per_step']:.3g} ms per step", file=sys.stderr)
+        return row
+
+    def table(self, header, rows):
+        """A Markdown table."""
+        rows = [[str(cell) for cell in row] for row in rows]
+        width = [max(map(len, column)) for column in zip(header, *rows)]
+        line = lambda row: "| " + " | ".join(c.rjust(w) for c, w in zip(row, width)) + " |"
+        self.say(line(header))
+        self.say("|" + "|".join("-" * (w + 1) + ":" for w in width) + "|")
+        for row in rows:
+            self.say(line(row))
+        self.say()
+
+    def write(self):
+        """The table of all runs, and what was said."""
+        columns = list(dict.fromkeys(key for row in self.rows for key in row))
+        with open(self.out / "bench.csv", "w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, columns)
+            writer.writeheader()
+            writer.writerows(self.rows)
+        (self.out / "bench.md").write_text("\n".join(self.text), encoding="utf-8")
+
+
+def peak(said):
+    """MB, from the last line of a profile."""
+    lines = [line for line in said.splitlines() if "peak memory" in line]
+    return float(lines[-1].split()[2]) if lines else None
