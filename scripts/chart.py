@@ -114,7 +114,8 @@ def main(folder):
     draw(right, rows, fenicsx, "zeta", "_zeta", "largest ‖Δζ‖ over time")
     left.set_title("error of displacement and damage: the mesh decides", loc="left")
     right.set_title("error of the damage alone: steps count as well", loc="left")
-    left.legend(loc="lower left", fontsize=8.5)
+    figure.legend(*left.get_legend_handles_labels(), loc="upper center", ncols=4,
+                  bbox_to_anchor=(0.5, 0.0))
     picture = table.with_suffix(".png")
     figure.savefig(picture)
     print(picture)

@@ -36,6 +36,9 @@ pub fn speed_chart(arguments: &ChartArguments) -> Result<(), Failure> {
     counter.clear();
     session.finalize().map_err(Failure::solver)?;
     let rows = rows.map_err(Failure::solver)?;
+    if rows.is_empty() {
+        return Err(Failure::Input("no mesh of the chart is coarser than this reference".into()));
+    }
     let mut fronts = [Vec::new(), Vec::new()];
     for row in &rows {
         if row.front || row.default {

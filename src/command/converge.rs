@@ -9,7 +9,7 @@ use comfy_table::{CellAlignment, Table, presets};
 use signorini::{
     output,
     petsc::Session,
-    study::{Convergence, MEASURES, Measure, converge},
+    study::{Convergence, MEASURES, Measure, Norms, converge},
 };
 use std::path::PathBuf;
 
@@ -50,7 +50,7 @@ pub fn convergence(arguments: &ConvergeArguments) -> Result<(), Failure> {
         return Err(Failure::Input(problem.to_owned()));
     }
     for measure in &MEASURES {
-        say(&table(&study, measure));
+        say(&table(&study, &reference.size, measure));
     }
     say(NOT_REPRODUCIBLE);
     let path = arguments.out.join("converge.csv");
@@ -60,7 +60,7 @@ pub fn convergence(arguments: &ConvergeArguments) -> Result<(), Failure> {
 }
 
 /// An error in the layout of Table 1, with its orders.
-fn table(study: &Convergence, (name, measure): &Measure) -> String {
+fn table(study: &Convergence, size: &Norms, (name, measure, norm): &Measure) -> String {
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN);
     let steps = study.steps();
@@ -77,8 +77,9 @@ fn table(study: &Convergence, (name, measure): &Measure) -> String {
     let (all, in_h) = (study.order(*measure), study.order_in_h(*measure));
     let in_k = study.growth_in_k(*measure);
     format!(
-        "{name}: largest over time\n{table}\norder {all:.2} in h + k over all runs; {in_h:.2} in h \
-         at the least k; at the largest n it grows with k by {in_k:.1e} per second\n"
+        "{name}: largest over time; of the reference itself {}\n{table}\norder {all:.2} in h + k over all runs; {in_h:.2} in h \
+         at the least k; at the largest n it grows with k by {in_k:.1e} per second\n",
+        four_digits(norm(size))
     )
 }
 
