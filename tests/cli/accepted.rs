@@ -4,10 +4,11 @@ use crate::desk::{Desk, SCENE, square};
 use serde_json::Value;
 use std::process::Stdio;
 
-const KEYS: [&str; 22] = [
+const KEYS: [&str; 23] = [
     "scene",
     "title",
     "solver",
+    "ranks",
     "nodes",
     "triangles",
     "steps",
