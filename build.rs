@@ -1,4 +1,4 @@
-//! Declares Debian's PETSc to Rust: an explicit list of functions, nothing else.
+//! Declares Debian's PETSc, MPI and CHOLMOD to Rust: an explicit list of functions, nothing else.
 
 use std::{env, path::PathBuf, process::Command};
 

@@ -5,6 +5,8 @@
 //! [`PetscError`] with PETSc's own message, every handle is destroyed on drop, and
 //! sizes are checked here because PETSc does not.
 //!
+//! Beside PETSc it calls MPI, for sums over ranks, and CHOLMOD, for halves of solves.
+//!
 //! All objects live on `PETSC_COMM_WORLD`; sizes and slices are those owned by this rank.
 #![allow(unsafe_code)]
 

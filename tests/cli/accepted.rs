@@ -8,6 +8,7 @@ const KEYS: [&str; 23] = [
     "scene",
     "title",
     "solver",
+    "ranks",
     "nodes",
     "triangles",
     "steps",

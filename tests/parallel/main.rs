@@ -24,6 +24,14 @@ pub fn on_ranks(desk: &Desk, ranks: usize, arguments: &[&str]) -> Command {
     command
 }
 
+/// The program on two ranks with arguments of their own.
+fn unlike(desk: &Desk, first: &[&str], second: &[&str]) -> Said {
+    let program = env!("CARGO_BIN_EXE_signorini");
+    let mut command = on_ranks(desk, 1, &[&["run", "scene.toml"], first].concat());
+    command.args([":", "-n", "1", program, "run", "scene.toml"]).args(second);
+    Said::of(&mut command)
+}
+
 /// A desk with a scene of `geo/` called `scene.toml` and its geometry.
 fn example(name: &str) -> Desk {
     let desk = Desk::new();
@@ -171,6 +179,33 @@ fn a_solver_that_fails_is_told_once_and_the_state_before_is_saved() {
     one_message(&said, 1, "the tolerance 1.0e-30 is missed by");
     assert_eq!(desk.summary("out/scene")["end_time"], 0.2);
     assert_eq!(desk.frames("out/scene").pop().expect("frames").0, 0.2);
+}
+
+#[test]
+fn what_fails_on_one_rank_ends_all_with_its_message() {
+    let desk = Desk::new();
+    // While it reads, while it writes, and in the middle of what needs both.
+    let said = unlike(&desk, &[], &["--set", "material.young=-1"]);
+    one_message(&said, 2, "material.young");
+    let said = unlike(&desk, &[], &["--out", "/proc/nowhere"]);
+    one_message(&said, 1, "cannot write /proc/nowhere/fields_0000_1.vtu");
+    let said = unlike(&desk, &[], &["--", "-elastic_pc_type", "none_such"]);
+    one_message(&said, 1, "rank 1 of 2: ");
+    assert!(said.err.contains("none_such"), "{said:?}");
+}
+
+#[test]
+fn every_kind_of_factor_gives_the_same_answer() {
+    let desk = example("square-mild");
+    let few = ["--set", "mesh.size=0.0625", "--set", "time.step=0.25"];
+    desk.run(&[&few[..], &["--out", "one"]].concat());
+    for kind in ["cholesky", "gamg"] {
+        let options = ["--", "-elastic_pc_type", kind, "-damage_pc_type", kind];
+        let arguments = [&["run", "scene.toml", "--out", kind], &few[..], &options].concat();
+        let said = Said::of(&mut on_ranks(&desk, 3, &arguments));
+        assert_eq!((said.code, said.err.as_str()), (Some(0), ""), "{said:?}");
+        same_history(&desk, kind, "one");
+    }
 }
 
 #[test]
