@@ -26,7 +26,6 @@ const KEYS: [&str; 23] = [
     "wall_seconds",
     "seconds_per_step",
     "phases",
-    "ranks",
     "foundation",
     "notes",
 ];
