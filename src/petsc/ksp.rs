@@ -39,8 +39,7 @@ impl LinearSolver {
     /// A solver of systems with `unknowns` rows on all ranks together, whose PETSc options carry
     /// `prefix` (`-damage_ksp_type …`).
     ///
-    /// The factorisation is CHOLMOD's on one rank and MUMPS' on several, which use multigrid for
-    /// very large systems.
+    /// What factorises is told at [`Factor`].
     pub fn cholesky(session: &Session, prefix: &str, unknowns: usize) -> Result<Self, PetscError> {
         cholesky_options(session, prefix)?;
         let mut solver =
