@@ -8,7 +8,7 @@ SOLVER ?=
 ARGS ?=
 
 # petsc-dev brings MPI and a C compiler, libclang-dev the headers that bindgen reads.
-PACKAGES := petsc-dev libopenblas0-serial libclang-dev pkg-config gcc gmsh \
+PACKAGES := petsc-dev libsuitesparse-dev libopenblas0-serial libclang-dev pkg-config gcc gmsh \
     python3-meshio python3-matplotlib
 PACKAGES_VALIDATE := python3-dolfinx-real
 
