@@ -6,6 +6,7 @@ mod converge;
 mod floor;
 mod profile;
 mod ranks;
+mod recorder;
 mod reference;
 mod run;
 mod screen;

@@ -1,18 +1,17 @@
 //! `signorini run`: a scene from its file to its results.
 
 use super::{
-    Failure, check_petsc, check_solver, profile,
+    Failure, check_petsc, check_solver,
     ranks::{rejoin, together},
-    screen::Screen,
+    recorder::Recorder,
 };
 use clap::Args;
 use signorini::{
     contact::SOLVERS,
-    evolution::{self, Outcome, Phases, RunError, Setting, Step},
-    mesh,
-    output::{self, FieldWriter, History, Summary},
+    evolution::{self, Phases, RunError, Setting},
+    mesh, output,
     petsc::{Ranks, Session},
-    scene::{MeshSource, Scene, Stepping},
+    scene::{MeshSource, Scene},
 };
 use std::{
     path::{Path, PathBuf},
@@ -164,148 +163,5 @@ fn failure(error: &RunError) -> Failure {
         RunError::Setup(error) => Failure::input(error),
         RunError::Elsewhere => Failure::Elsewhere,
         error => Failure::solver(error),
-    }
-}
-
-/// Shows and writes the accepted steps; of several ranks only the first shows them.
-struct Recorder<'a> {
-    folder: &'a Path,
-    setting: &'a Setting,
-    phases: &'a Phases,
-    profile: bool,
-    /// Seconds of all accepted steps after n = 0.
-    stepping: f64,
-    every: Option<usize>,
-    fields: FieldWriter,
-    shown: Option<(History, Screen)>,
-    last: Option<Step>,
-}
-
-/// Frames written, about, when the scene does not say how often.
-const FRAMES: usize = 20;
-
-impl<'a> Recorder<'a> {
-    fn new(
-        folder: &'a Path,
-        setting: &'a Setting,
-        phases: &'a Phases,
-        profile: bool,
-    ) -> Result<Self, output::OutputError> {
-        Ok(Self {
-            folder,
-            setting,
-            phases,
-            profile,
-            stepping: 0.0,
-            every: setting.scene().output.every,
-            fields: FieldWriter::new(folder, setting)?,
-            shown: match setting.body.partition.ranks().is_first() {
-                true => Some((History::create(folder)?, Screen::new(setting))),
-                false => None,
-            },
-            last: None,
-        })
-    }
-
-    /// Whether a frame is written of step `n`. Unless the scene says how often, those after 1, 2,
-    /// 4, … steps are added for the runs that do not come far.
-    fn is_frame(&self, n: usize) -> bool {
-        match (self.every, self.setting.scene().time.map(|grid| grid.stepping)) {
-            (Some(every), _) => n.is_multiple_of(every),
-            (None, Some(Stepping::Uniform { steps })) => {
-                let every = steps.div_ceil(FRAMES);
-                n.is_multiple_of(every) || (n < every && n.is_power_of_two())
-            }
-            (None, _) => true,
-        }
-    }
-
-    fn accept(&mut self, step: &Step) -> Result<(), output::OutputError> {
-        if step.record.step > 0 {
-            self.stepping += step.record.seconds;
-        }
-        let written = self.phases.time("output", || {
-            let shown = self.shown.as_mut().map_or(Ok(()), |(history, screen)| {
-                screen.show(&step.record);
-                history.add(&step.record)
-            });
-            // All ranks write a frame, whatever became of the row.
-            match self.is_frame(step.record.step) {
-                true => shown.and(self.fields.add(self.setting, &step.state)),
-                false => shown,
-            }
-        });
-        self.last = Some(step.clone());
-        written
-    }
-
-    /// Writes the last accepted state, if there is one, and the summary, also of a run that failed.
-    /// Collective.
-    fn finish(
-        mut self,
-        setting: &Setting,
-        solver: &str,
-        result: &Result<Outcome, RunError>,
-        started: Instant,
-    ) -> Result<(), output::OutputError> {
-        let last = self.last.take();
-        let written = match &last {
-            Some(Step { state, .. }) if self.fields.last_time() != Some(state.time) => {
-                self.phases.time("output", || self.fields.add(setting, state))
-            }
-            _ => Ok(()),
-        };
-        let record = last.map(|step| step.record);
-        let steps = record.map_or(0, |r| r.step);
-        let (wall, scene) = (started.elapsed().as_secs_f64(), setting.scene());
-        let mut notes = setting.notes();
-        let outcome = result.as_ref().ok();
-        notes.extend(outcome.iter().flat_map(|outcome| outcome.notes(setting)));
-        let bounds = &setting.constraints.bounds;
-        let mut contact_nodes: Vec<usize> = bounds.iter().map(|bound| bound.node).collect();
-        contact_nodes.dedup();
-        let (body, ranks) = (&setting.body, setting.body.partition.ranks());
-        let contact_nodes = ranks.count(contact_nodes.len());
-        let summary = Summary {
-            scene: scene.name.clone(),
-            title: scene.title.clone(),
-            solver: match contact_nodes == 0 {
-                true => "linear".to_owned(),
-                false => solver.to_owned(),
-            },
-            ranks: ranks.size(),
-            nodes: body.partition.total(),
-            triangles: ranks.count(body.own_triangles),
-            steps,
-            end_time: record.map(|r| r.time),
-            stopped_at: outcome.and_then(|o| o.stopped).map(|stop| stop.time),
-            stopped_uncertainty: outcome.and_then(|o| o.stopped).map(|stop| stop.uncertainty),
-            zeta_min: record.map(|r| r.zeta_min),
-            zeta_mean: record.map(|r| r.zeta_mean),
-            displacement_max: record.map(|r| r.displacement_max),
-            work: record.map(|r| r.work),
-            contact_force: record.map(|r| r.contact_force),
-            active_nodes: record.map(|r| r.active_nodes),
-            contact_nodes,
-            kkt: outcome.map(|o| o.kkt).or(record.map(|r| r.kkt())),
-            wall_seconds: wall,
-            seconds_per_step: wall / steps.max(1) as f64,
-            phases: profile::whole(&self.phases.table())
-                .into_iter()
-                .map(|(name, phase)| (name, phase.seconds))
-                .collect(),
-            foundation: setting.foundation.clone(),
-            notes,
-            error: result.as_ref().err().map(ToString::to_string),
-        };
-        let Some((_, screen)) = &self.shown else { return written };
-        summary.write(self.folder)?;
-        let phases = self.phases.table();
-        let table = match self.profile {
-            true => profile::report(&phases, wall, steps, self.stepping),
-            false => profile::short(&phases, wall),
-        };
-        screen.close(&summary, outcome, &table, self.folder);
-        written
     }
 }
