@@ -49,7 +49,10 @@ pub(super) fn all() -> Vec<Case> {
     for aspect in [10, 100] {
         for ny in [1, 2, 4] {
             cases.extend(slender(aspect, [aspect * ny, ny]));
-            cases.push(weightless(aspect, [aspect * ny, ny]));
+            // Beyond, too few solvers end for an answer to be compared with another's.
+            if aspect * ny <= 200 {
+                cases.push(weightless(aspect, [aspect * ny, ny]));
+            }
         }
     }
     // Square cells, cells ten times as long as the body is high, and smaller ones.
