@@ -4,7 +4,6 @@ Reads FOLDER/bench.csv and draws FOLDER/bench.png: the time of a step of every p
 faster signorini is and how far from the floor, and growth of time and memory.
 """
 
-import csv
 import sys
 from pathlib import Path
 from statistics import median
@@ -13,6 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from drawing import FAINT, INK, RED
+from results import read_table
 
 STYLES = {
     ("signorini", "active-set"): ("#2f6db3", "o", "-"),
@@ -24,18 +24,6 @@ STYLES = {
 }
 DEFAULT = ("signorini", "active-set")
 GIBIBYTES = 1024.0**3
-
-
-def read(path):
-    """The runs with numbers where there are any."""
-    def value(text):
-        try:
-            return float(text)
-        except ValueError:
-            return text
-
-    with open(path, newline="", encoding="utf-8") as file:
-        return [{key: value(text) for key, text in row.items()} for row in csv.DictReader(file)]
 
 
 def rounds(rows, part, key):
@@ -159,7 +147,7 @@ def main(folder):
     if not table.exists():
         sys.exit(f"no {table}: run `make bench` first")
     picture = table.with_suffix(".png")
-    draw(read(table), picture)
+    draw(read_table(table), picture)
     print(picture)
 
 

@@ -7,7 +7,6 @@ The FEniCSx loop solves the same discrete problem: its error is that of our run 
 k, provided both end with the same min ζ and largest |u|, which is checked here.
 """
 
-import csv
 import sys
 from pathlib import Path
 
@@ -15,22 +14,12 @@ import matplotlib.pyplot as plt
 from matplotlib.ticker import LogFormatterSciNotation
 
 from drawing import BLUE, FAINT, INK, RED
+from results import read_table
 
 # The least two answers of the same discrete problem agree to, at KKT residuals of 1e-10.
 SAME = 1e-6
 SOLVERS = {"active-set": BLUE, "penalty-duality": "#d08a1d", "tao": "#3d8f5a"}
 FENICSX = "#8e5aa8"
-
-
-def read(path):
-    """The rows of a table, with numbers where there are any."""
-    def value(text):
-        try:
-            return float(text)
-        except ValueError:
-            return text
-    with open(path, newline="") as file:
-        return [{key: value(text) for key, text in row.items()} for row in csv.DictReader(file)]
 
 
 def is_plain(row):
@@ -107,8 +96,8 @@ def main(folder):
     table, others = Path(folder) / "chart.csv", Path(folder) / "fenicsx.csv"
     if not table.exists():
         sys.exit(f"no {table}: run `signorini chart` first")
-    rows = [row for row in read(table) if not row["error"]]
-    fenicsx = list(matched(read(others), rows)) if others.exists() else []
+    rows = [row for row in read_table(table) if not row["error"]]
+    fenicsx = list(matched(read_table(others), rows)) if others.exists() else []
     figure, (left, right) = plt.subplots(1, 2, figsize=(13, 6))
     draw(left, rows, fenicsx, "sum", "", "largest ‖ε(Δu)‖ + ‖Δζ‖ over time (that of Table 1)")
     draw(right, rows, fenicsx, "zeta", "_zeta", "largest ‖Δζ‖ over time")

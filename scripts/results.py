@@ -11,6 +11,18 @@ import meshio
 import numpy as np
 
 
+def read_table(path):
+    """The rows of a CSV file as dictionaries, with numbers where there are any."""
+    def value(text):
+        try:
+            return float(text)
+        except ValueError:
+            return text
+
+    with open(path, newline="", encoding="utf-8") as file:
+        return [{key: value(text) for key, text in row.items()} for row in csv.DictReader(file)]
+
+
 class ResultError(Exception):
     """The folder does not hold what a figure needs: said in one line."""
 

@@ -96,7 +96,7 @@ impl Small {
     }
 }
 
-/// The example of Kunisch and Rendl (SIAM J. Optim. 14, 2003): positive definite, but for some
+/// Positive definite, but with positive entries off its diagonal: for some
 /// guesses the exchange of all wrong unknowns comes back to them.
 fn cycling() -> Small {
     let stiffness = [4.0, 5.0, -5.0, 5.0, 9.0, -5.0, -5.0, -5.0, 7.0];
