@@ -11,7 +11,7 @@ const FUNCTIONS: &str = "\
     MPI_Ibarrier|MPI_Test|MPI_Abort|mallopt|\
     PetscSFCreate|PetscSFDestroy|PetscSFSetGraph|PetscSFBcastBegin|PetscSFBcastEnd|\
     cholmod_l_start|cholmod_l_finish|cholmod_l_analyze|cholmod_l_analyze_p|cholmod_l_factorize|\
-    cholmod_l_solve2|cholmod_l_free_factor|cholmod_l_free_dense|\
+    cholmod_l_change_factor|cholmod_l_free_factor|\
     MatPartitioningCreate|MatPartitioningDestroy|MatPartitioningSetType|\
     MatPartitioningSetAdjacency|MatPartitioningSetFromOptions|MatPartitioningApply|\
     ISAllGather|ISGetIndices|ISRestoreIndices|ISDestroy|\
@@ -56,9 +56,9 @@ fn main() {
         .clang_args(petsc.include_paths.iter().map(|p| format!("-I{}", p.display())))
         .clang_args(mpi_flags.split_whitespace())
         .allowlist_function(FUNCTIONS)
-        .allowlist_var("PETSC_COMM_WORLD|M_MMAP_MAX|M_MMAP_THRESHOLD")
+        .allowlist_var("PETSC_COMM_WORLD|M_MMAP_MAX|M_MMAP_THRESHOLD|M_TRIM_THRESHOLD")
         // Debian's MPI is Open MPI, whose constants are the addresses of these.
-        .allowlist_var("CHOLMOD_(L|Lt|A|LONG|REAL|DOUBLE|SUPERNODAL|GIVEN)")
+        .allowlist_var("CHOLMOD_(LONG|REAL|DOUBLE|SUPERNODAL|GIVEN|PATTERN)")
         .allowlist_var("ompi_mpi_double|ompi_mpi_op_(sum|max|replace)")
         .default_enum_style(bindgen::EnumVariation::ModuleConsts)
         .layout_tests(false)

@@ -1,7 +1,7 @@
 //! The linear systems inside contact solvers, on a factor that is kept while that pays.
 
 use super::{ContactProblem, ContactReport};
-use crate::petsc::{Factor, Matrix, PetscError, Session, Vector, Wear};
+use crate::petsc::{Factor, Matrix, PetscError, Precision, Session, Vector, Wear};
 use std::time::Instant;
 
 /// (K + D) c = f on the unknowns that are not held.
@@ -50,7 +50,7 @@ impl<'s> ElasticSolver<'s> {
             let most = engine.wear.allowance();
             let iterations;
             (solved, iterations) = engine.iterate(problem, system, c, limit, most)?;
-            engine.wear.lose(iterations);
+            engine.wear.solved(iterations);
             report.linear_iterations += iterations;
         }
         if !solved {
@@ -58,9 +58,7 @@ impl<'s> ElasticSolver<'s> {
             if problem.phases.time("contact/factorisation", || engine.renew(problem, system))? {
                 let iterations;
                 (solved, iterations) = engine.iterate(problem, system, c, limit, FRESH)?;
-                if !engine.factor.is_direct()? {
-                    engine.wear.expect(iterations);
-                }
+                engine.wear.solved(iterations);
                 report.linear_iterations += iterations;
             }
         }
@@ -99,7 +97,7 @@ impl Engine {
         let zeros = || Vector::zeros(session, problem.stiffness.owned());
         let unknowns = problem.ranks.count(problem.stiffness.owned());
         Ok(Self {
-            factor: Factor::new(session, "elastic_", unknowns)?,
+            factor: Factor::new(session, "elastic_", unknowns, Precision::Preconditioner)?,
             matrix: problem.stiffness.duplicate()?,
             wear: Wear::new(problem.ranks),
             residual: zeros()?,

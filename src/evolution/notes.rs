@@ -80,9 +80,9 @@ impl Outcome {
             ));
         }
         // That a body which is not held has no one answer is said already.
-        if self.unheld.is_none() || self.accuracy.displacement.is_finite() {
-            notes.extend(self.accuracy.notes(setting.tolerance));
-        }
+        let displacement = if self.unheld.is_none() { self.accuracy.displacement } else { 0.0 };
+        let accuracy = Accuracy { displacement, ..self.accuracy };
+        notes.extend(accuracy.notes(setting.tolerance));
         if self.undamaged_steps > 0 && setting.damage().is_some() {
             notes.push(format!(
                 "the damage solve was skipped in {} of {} steps: no source, uniform ζ",

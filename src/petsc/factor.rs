@@ -1,43 +1,47 @@
 //! A factorisation that outlives the matrix values it was made from.
 
 use super::{
-    Matrix, PetscError, Ranks, Session, Vector, check,
-    mat::entries,
-    raw,
+    Matrix, PetscError, Precision, Ranks, Session, Vector, check, raw,
     session::{Live, c_string, world},
     substructure::Substructure,
     vec::same_size,
 };
 use std::{ffi::CStr, ptr, slice};
 
-/// A Cholesky factor: CHOLMOD's (PCCHOLESKY) on one rank, on several one
-/// by substructures or, where their interface is too wide, MUMPS'; in its place a cycle of algebraic multigrid (PCGAMG) for very
-/// large matrices on several.
+/// A Cholesky factor, by substructures where there are several ranks; MUMPS' (PCCHOLESKY) where
+/// their interface is too wide, or a cycle of algebraic multigrid (PCGAMG) for very large matrices;
+/// or what PETSc options ask for, CHOLMOD on one rank.
 ///
 /// Fill-reducing ordering and symbolic factorisation are done once, with the first values.
 pub struct Factor {
     raw: raw::PC,
-    /// In the place of MUMPS, where PETSc options do not ask for something else.
+    /// In the place of `raw`, once factorised.
     parts: Option<Substructure>,
     ranks: Ranks,
+    precision: Precision,
     /// Whether `parts` is to be tried.
     divides: bool,
-    /// Entries of the triangle, where its package tells.
-    entries: f64,
     _live: Live,
 }
 
 impl Factor {
     /// A factor of matrices with `unknowns` rows on all ranks together, whose PETSc options carry
     /// `prefix` (`-elastic_pc_type …`).
-    pub fn new(session: &Session, prefix: &str, unknowns: usize) -> Result<Self, PetscError> {
-        cholesky_options(session, prefix)?;
+    pub fn new(
+        session: &Session,
+        prefix: &str,
+        unknowns: usize,
+        precision: Precision,
+    ) -> Result<Self, PetscError> {
         let ranks = session.ranks();
-        let asked = session.has_option(&format!("-{prefix}pc_type"))?;
-        let divides = !ranks.is_alone() && !asked && unknowns < LARGE;
+        let mut asked = false;
+        for option in ["pc_type", "pc_factor_mat_solver_type"] {
+            asked |= session.has_option(&format!("-{prefix}{option}"))?;
+        }
+        let divides = !asked && (ranks.is_alone() || unknowns < LARGE);
         let raw = ptr::null_mut();
-        let mut factor =
-            Self { raw, parts: None, ranks, divides, entries: 0.0, _live: Live::new() };
+        let mut factor = Self { raw, parts: None, ranks, precision, divides, _live: Live::new() };
+        cholesky_options(session, prefix)?;
         let prefix = c_string(prefix)?;
         let package = package(session);
         // SAFETY: a fresh handle, strings that live during the calls.
@@ -49,21 +53,6 @@ impl Factor {
             check(raw::PCSetFromOptions(factor.raw))?;
         }
         Ok(factor)
-    }
-
-    /// Whether it is divided among the ranks, unless that turns out not to pay.
-    pub(super) fn divides(&self) -> bool {
-        self.divides
-    }
-
-    /// Whether it is a factor of the matrix, and not a multigrid cycle in its place.
-    pub fn is_direct(&self) -> Result<bool, PetscError> {
-        let mut kind = ptr::null();
-        // SAFETY: a live handle; the name lives as long.
-        unsafe {
-            check(raw::PCGetType(self.raw, &mut kind))?;
-            Ok(!kind.is_null() && CStr::from_ptr(kind) == c"cholesky")
-        }
     }
 
     /// Factorises the present values of `matrix`; false if it is not positive definite.
@@ -83,7 +72,7 @@ impl Factor {
     ) -> Result<bool, PetscError> {
         if self.divides && (pattern || self.parts.is_none()) {
             // SAFETY: the caller's promise.
-            self.parts = unsafe { Substructure::new(self.ranks, matrix)? };
+            self.parts = unsafe { Substructure::new(self.ranks, matrix, self.precision)? };
             self.divides = self.parts.is_some();
         }
         if let Some(parts) = &mut self.parts {
@@ -100,19 +89,13 @@ impl Factor {
             check(raw::PCSetOperators(self.raw, matrix, matrix))?;
             let definite = definite(self.raw, check(raw::PCSetUp(self.raw)))?;
             check(raw::PCSetReusePreconditioner(self.raw, raw::PetscBool::PETSC_TRUE))?;
-            // A preconditioner that PETSc options put in its place has no triangle.
-            let mut triangle = ptr::null_mut();
-            self.entries = match check(raw::PCFactorGetMatrix(self.raw, &mut triangle)) {
-                Ok(()) if definite => entries(triangle),
-                _ => 0.0,
-            };
             Ok(definite)
         }
     }
 
-    /// Bytes of values that a pair of triangular solves reads on this rank; 0 where unknown.
+    /// Bytes that a pair of triangular solves reads on this rank; 0 where unknown.
     pub fn traffic(&self) -> f64 {
-        2.0 * 8.0 * self.entries
+        self.parts.as_ref().map_or(0.0, Substructure::traffic)
     }
 
     /// `z` ← the factored matrix' inverse · `r`.
@@ -132,13 +115,12 @@ impl Factor {
                 check(raw::VecGetLocalSize(r, &mut size))?;
                 check(raw::VecGetArrayRead(r, &mut from))?;
                 check(raw::VecGetArray(z, &mut to))?;
-                let applied = parts.apply(
+                parts.apply(
                     slice::from_raw_parts(from, size as usize),
                     slice::from_raw_parts_mut(to, size as usize),
                 );
                 check(raw::VecRestoreArray(z, &mut to))?;
-                check(raw::VecRestoreArrayRead(r, &mut from))?;
-                return applied;
+                return check(raw::VecRestoreArrayRead(r, &mut from));
             }
         }
         // SAFETY: the caller's promise.

@@ -1,8 +1,8 @@
 //! Linear systems by a Cholesky factor, polished by conjugate gradients.
 
 use super::{
-    Factor, Matrix, PetscError, Session, Vector, check,
-    factor::{cholesky_options, definite, method, package},
+    Factor, Matrix, PetscError, Precision, Session, Vector, check,
+    factor::NOT_DEFINITE,
     raw,
     session::{Live, c_string, world},
     shell::KeptFactor,
@@ -10,7 +10,7 @@ use super::{
 };
 use std::ptr;
 
-/// Conjugate gradients preconditioned by a Cholesky factor (KSPCG, PCCHOLESKY).
+/// Conjugate gradients preconditioned by a Cholesky factor (KSPCG).
 ///
 /// With a fresh factor CG needs one or two iterations: it removes the factor's rounding
 /// error. A matrix that is not positive definite has no factor LLᵀ: solves with it do not converge.
@@ -18,8 +18,8 @@ pub struct LinearSolver {
     raw: raw::KSP,
     /// Whether the last factorisation found only positive pivots.
     definite: bool,
-    /// What several ranks factorise with, where PETSc options do not ask for something else.
-    _factor: Option<Box<KeptFactor>>,
+    /// Its address is PETSc's preconditioner.
+    _factor: Box<KeptFactor>,
     _live: Live,
 }
 
@@ -41,31 +41,22 @@ impl LinearSolver {
     ///
     /// What factorises is told at [`Factor`].
     pub fn cholesky(session: &Session, prefix: &str, unknowns: usize) -> Result<Self, PetscError> {
-        cholesky_options(session, prefix)?;
+        let factor = Factor::new(session, prefix, unknowns, Precision::Full)?;
+        let factor = KeptFactor::new(factor, None);
         let mut solver =
-            Self { raw: ptr::null_mut(), definite: false, _factor: None, _live: Live::new() };
-        let (text, prefix) = (prefix, c_string(prefix)?);
-        let package = package(session);
+            Self { raw: ptr::null_mut(), definite: false, _factor: factor, _live: Live::new() };
+        let prefix = c_string(prefix)?;
         let mut pc = ptr::null_mut();
-        // SAFETY: a fresh handle, strings that live during the calls.
+        // SAFETY: a fresh handle, a string that lives during the calls, a factor that lives as long.
         unsafe {
             check(raw::KSPCreate(world(), &mut solver.raw))?;
             check(raw::KSPSetOptionsPrefix(solver.raw, prefix.as_ptr()))?;
             check(raw::KSPSetType(solver.raw, c"cg".as_ptr()))?;
             check(raw::KSPSetNormType(solver.raw, raw::KSPNormType::KSP_NORM_UNPRECONDITIONED))?;
             check(raw::KSPSetInitialGuessNonzero(solver.raw, raw::PetscBool::PETSC_TRUE))?;
-            check(raw::KSPGetPC(solver.raw, &mut pc))?;
-            check(raw::PCSetType(pc, method(session, unknowns).as_ptr()))?;
-            check(raw::PCFactorSetMatSolverType(pc, package.as_ptr()))?;
             check(raw::KSPSetFromOptions(solver.raw))?;
-            if !session.ranks().is_alone() {
-                let factor = Factor::new(session, text, unknowns)?;
-                if factor.divides() {
-                    let mut factor = KeptFactor::new(factor, None);
-                    factor.attach(pc)?;
-                    solver._factor = Some(factor);
-                }
-            }
+            check(raw::KSPGetPC(solver.raw, &mut pc))?;
+            solver._factor.attach(pc)?;
         }
         Ok(solver)
     }
@@ -75,11 +66,14 @@ impl LinearSolver {
     pub fn factorise(&mut self, matrix: &Matrix) -> Result<(), PetscError> {
         // SAFETY: live handles. KSPSetOperators marks the values as new, else the
         // factorisation would wait for the next solve.
-        self.definite = unsafe {
-            let mut pc = ptr::null_mut();
-            check(raw::KSPGetPC(self.raw, &mut pc))?;
+        let set_up = unsafe {
             check(raw::KSPSetOperators(self.raw, matrix.raw, matrix.raw))?;
-            definite(pc, check(raw::KSPSetUp(self.raw)))?
+            check(raw::KSPSetUp(self.raw))
+        };
+        self.definite = match set_up {
+            Ok(()) => true,
+            Err(error) if error.code == NOT_DEFINITE => false,
+            Err(other) => return Err(other),
         };
         Ok(())
     }

@@ -5,7 +5,7 @@
 //! [`PetscError`] with PETSc's own message, every handle is destroyed on drop, and
 //! sizes are checked here because PETSc does not.
 //!
-//! Beside PETSc it calls MPI, for sums over ranks, and CHOLMOD, for halves of solves.
+//! Beside PETSc it calls MPI, for sums over ranks, and CHOLMOD, for factors whose solves are ours.
 //!
 //! All objects live on `PETSC_COMM_WORLD`; sizes and slices are those owned by this rank.
 #![allow(unsafe_code)]
@@ -21,7 +21,9 @@ mod ranks;
 mod session;
 mod shell;
 mod substructure;
+mod supernodal;
 mod tao;
+mod tiles;
 mod vec;
 mod wear;
 
@@ -38,6 +40,7 @@ mod raw {
     include!(concat!(env!("OUT_DIR"), "/petsc.rs"));
 }
 
+pub use cholmod::Precision;
 pub use error::PetscError;
 pub use factor::Factor;
 pub use ghosts::Ghosts;

@@ -129,6 +129,7 @@ fn give_memory_back() {
     // SAFETY: mallopt only sets parameters of malloc, and before PETSc has threads.
     unsafe {
         raw::mallopt(raw::M_MMAP_THRESHOLD as c_int, LARGE);
+        raw::mallopt(raw::M_TRIM_THRESHOLD as c_int, 2 * LARGE);
         raw::mallopt(raw::M_MMAP_MAX as c_int, BLOCKS);
     }
 }

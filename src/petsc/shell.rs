@@ -47,7 +47,7 @@ impl KeptFactor {
         }
         let applications = std::mem::take(&mut self.applications);
         if let Some(wear) = &mut self.wear {
-            wear.lose(applications);
+            wear.solved(applications);
             if size == self.size && !wear.worn() {
                 return Ok(());
             }

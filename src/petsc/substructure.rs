@@ -1,8 +1,8 @@
-//! A Cholesky factor over several ranks: each eliminates its own unknowns, all share the rest.
+//! A Cholesky factor over the ranks: each eliminates its own unknowns, all share the rest.
 
 use super::{
-    PetscError, Ranks, check,
-    cholmod::{Cholesky, Half, Lower},
+    PetscError, Precision, Ranks, check,
+    cholmod::{Cholesky, Lower},
     raw,
 };
 use nalgebra::{DMatrix, DVector};
@@ -16,9 +16,10 @@ use std::{ptr, slice};
 /// solve is a forward solve in each rank's interior, one with S, and a backward solve. A rank's
 /// factor holds its part of the interface last, with c 1 for K_BB: the last block L_S of it then
 /// tells the rank's part of S, L_S L_Sᵀ = c 1 − K_BI K_II⁻¹ K_IB, and couples interior and
-/// interface.
+/// interface. On one rank all is interior.
 pub(super) struct Substructure {
     ranks: Ranks,
+    precision: Precision,
     parts: Parts,
     local: Cholesky,
     /// The factor of S, where there is an interface.
@@ -52,7 +53,11 @@ impl Substructure {
     ///
     /// # Safety
     /// `matrix` is a live handle.
-    pub(super) unsafe fn new(ranks: Ranks, matrix: raw::Mat) -> Result<Option<Self>, PetscError> {
+    pub(super) unsafe fn new(
+        ranks: Ranks,
+        matrix: raw::Mat,
+        precision: Precision,
+    ) -> Result<Option<Self>, PetscError> {
         let (mut first, mut end) = (0, 0);
         // SAFETY: the caller's promise.
         check(unsafe { raw::MatGetOwnershipRange(matrix, &mut first, &mut end) })?;
@@ -106,15 +111,22 @@ impl Substructure {
         // The interior in CHOLMOD's order, then the interface.
         // SAFETY: the caller's promise.
         let mut inside = unsafe { parts.eliminated(matrix, first, None)? };
-        let order = Cholesky::analyse(&mut inside, None)?.order().to_vec();
+        let mut local = Cholesky::analyse(&mut inside, None, precision)?;
         let last = (interior..interior + parts.near.len()).map(|i| i as i64);
-        let order = order.into_iter().chain(last.clone()).collect();
-        // SAFETY: the caller's promise.
-        let mut whole = unsafe { parts.eliminated(matrix, first, Some(1.0))? };
-        let local = Cholesky::analyse(&mut whole, Some(order))?;
+        if !parts.near.is_empty() {
+            let order = local.order().iter().copied().chain(last.clone()).collect();
+            // SAFETY: the caller's promise.
+            let mut whole = unsafe { parts.eliminated(matrix, first, Some(1.0))? };
+            local = Cholesky::analyse(&mut whole, Some(order), precision)?;
+        }
         let kept = local.order()[interior..].iter().copied().eq(last);
-        let coupling = DMatrix::zeros(0, 0);
-        Ok(ranks.all(kept).then_some(Self { ranks, parts, local, shared: None, coupling }))
+        let (shared, coupling) = (None, DMatrix::zeros(0, 0));
+        Ok(ranks.all(kept).then_some(Self { ranks, precision, parts, local, shared, coupling }))
+    }
+
+    /// Bytes that a solve reads on this rank.
+    pub(super) fn traffic(&self) -> f64 {
+        self.local.traffic() + self.shared.as_ref().map_or(0.0, Cholesky::traffic)
     }
 
     /// Factorises the present values of `matrix`; false if it is not positive definite. Collective.
@@ -149,12 +161,12 @@ impl Substructure {
         let c = 2.0 * self.ranks.max(size);
         // SAFETY: the caller's promise.
         let mut whole = unsafe { parts.eliminated(matrix, first, Some(c))? };
-        let definite = self.local.factorise(&mut whole)?;
-        if !self.ranks.all(definite) {
+        let near = parts.near.len();
+        let block = self.local.factorise(&mut whole, near)?;
+        if !self.ranks.all(block.is_some()) {
             return Ok(false);
         }
-        let near = parts.near.len();
-        self.coupling = DMatrix::from_vec(near, near, self.local.trailing(near));
+        self.coupling = DMatrix::from_vec(near, near, block.unwrap_or_default());
         let part = &self.coupling * self.coupling.transpose();
         for (j, &to) in parts.near.iter().enumerate() {
             parts.near.iter().enumerate().for_each(|(i, &at)| schur[(at, to)] += part[(i, j)]);
@@ -171,16 +183,24 @@ impl Substructure {
         }
         let mut shared = match self.shared.take() {
             Some(shared) => shared,
-            None => Cholesky::analyse(&mut lower, Some((0..width as i64).collect()))?,
+            None => {
+                let order = Some((0..width as i64).collect());
+                Cholesky::analyse(&mut lower, order, self.precision)?
+            }
         };
-        let definite = shared.factorise(&mut lower)?;
+        let definite = shared.factorise(&mut lower, 0)?.is_some();
         self.shared = Some(shared);
         Ok(self.ranks.all(definite))
     }
 
     /// `z` ← the factored matrix' inverse · `r`. Collective.
-    pub(super) fn apply(&mut self, r: &[f64], z: &mut [f64]) -> Result<(), PetscError> {
+    pub(super) fn apply(&mut self, r: &[f64], z: &mut [f64]) {
+        let local = self.local.triangle();
         let Parts { role: roles, interface, near, interior } = &self.parts;
+        if interface.is_empty() {
+            local.forward(r);
+            return local.backward(z);
+        }
         let mut shared = vec![0.0; interface.len()];
         let mut inside = vec![0.0; interior + near.len()];
         for (r, role) in r.iter().zip(roles) {
@@ -189,27 +209,24 @@ impl Substructure {
                 Role::Interface(i) => shared[i] = *r,
             }
         }
-        let order = self.local.order().to_vec();
-        let mut y: Vec<f64> = order.iter().map(|&i| inside[i as usize]).collect();
-        self.local.solve(Half::Forward, &mut y)?;
+        local.forward(&inside);
         // −K_BI K_II⁻¹ r_I = L_S y_B.
-        let ours = &self.coupling * DVector::from_column_slice(&y[*interior..]);
+        let ours = &self.coupling * DVector::from_vec(local.last(near.len()));
         near.iter().zip(&ours).for_each(|(&at, ours)| shared[at] += ours);
         self.ranks.sum(&mut shared);
         if let Some(factor) = &mut self.shared {
-            factor.solve(Half::Whole, &mut shared)?;
+            factor.triangle().forward(&shared);
+            factor.triangle().backward(&mut shared);
         }
         let ours = DVector::from_iterator(near.len(), near.iter().map(|&at| shared[at]));
-        y[*interior..].copy_from_slice(self.coupling.tr_mul(&ours).as_slice());
-        self.local.solve(Half::Backward, &mut y)?;
-        order.iter().zip(&y).for_each(|(&i, y)| inside[i as usize] = *y);
+        local.set_last(self.coupling.tr_mul(&ours).as_slice());
+        local.backward(&mut inside);
         for (z, role) in z.iter_mut().zip(roles) {
             *z = match *role {
                 Role::Interior(i) => inside[i],
                 Role::Interface(i) => shared[i],
             };
         }
-        Ok(())
     }
 }
 

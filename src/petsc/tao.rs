@@ -1,7 +1,7 @@
 //! TAO on a quadratic function with bounds.
 
 use super::{
-    Factor, Matrix, PetscError, Session, Vector, Wear, check, raw,
+    Factor, Matrix, PetscError, Precision, Session, Vector, Wear, check, raw,
     session::{Live, c_string, world},
     shell::KeptFactor,
     vec::same_size,
@@ -65,7 +65,8 @@ impl BoundedQuadratic {
         let quasi_newton = method.starts_with("bqnk");
         let factor = (!quasi_newton)
             .then(|| {
-                let factor = Factor::new(session, "elastic_", session.ranks().count(size))?;
+                let (all, enough) = (session.ranks().count(size), Precision::Preconditioner);
+                let factor = Factor::new(session, "elastic_", all, enough)?;
                 Ok(KeptFactor::new(factor, Some(Wear::new(session.ranks()))))
             })
             .transpose()?;

@@ -15,8 +15,8 @@ pub struct Wear {
     factorisation: f64,
     /// Seconds of all iterations so far, and their number.
     iterations: (f64, usize),
-    /// Iterations that a solve with a new factor takes.
-    fresh: usize,
+    /// Iterations of the best solve since the last factorisation.
+    best: usize,
     /// Seconds lost to the age of the factor.
     lost: f64,
 }
@@ -24,16 +24,18 @@ pub struct Wear {
 /// Iterations an old factor is given at least, and at most.
 const FEWEST: usize = 3;
 const MOST: usize = 200;
+/// More than any solve takes.
+const NONE: usize = usize::MAX;
 
 impl Wear {
     /// Before the first factorisation: worn out.
     pub fn new(ranks: Ranks) -> Self {
-        Self { ranks, factorisation: 0.0, iterations: (0.0, 0), fresh: 1, lost: f64::INFINITY }
+        Self { ranks, factorisation: 0.0, iterations: (0.0, 0), best: NONE, lost: f64::INFINITY }
     }
 
     /// A factorisation took so many seconds.
     pub fn renewed(&mut self, seconds: f64) {
-        (self.factorisation, self.lost) = (seconds, 0.0);
+        (self.factorisation, self.lost, self.best) = (seconds, 0.0, NONE);
     }
 
     /// Iterations took so many seconds.
@@ -42,14 +44,11 @@ impl Wear {
         self.iterations.1 += iterations;
     }
 
-    /// A solve with a new factor takes so many iterations; one, unless this is told.
-    pub fn expect(&mut self, iterations: usize) {
-        self.fresh = iterations;
-    }
-
-    /// A solve with an old factor took so many iterations.
-    pub fn lose(&mut self, iterations: usize) {
-        self.lost += self.iteration() * iterations.saturating_sub(self.fresh) as f64;
+    /// A solve took so many iterations: what the best one since the last factorisation did not need
+    /// is lost.
+    pub fn solved(&mut self, iterations: usize) {
+        self.best = self.best.min(iterations);
+        self.lost += self.iteration() * (iterations - self.best) as f64;
     }
 
     /// Whether a new factor is due. Collective.
@@ -60,7 +59,7 @@ impl Wear {
     /// Iterations after which a solve has lost what a new factor costs. Collective.
     pub fn allowance(&self) -> usize {
         let affordable = (self.factorisation - self.lost) / self.iteration();
-        self.fresh + (self.ranks.min(affordable) as usize).clamp(FEWEST, MOST)
+        self.best + (self.ranks.min(affordable) as usize).clamp(FEWEST, MOST)
     }
 
     /// Seconds of an iteration, on the mean.
@@ -79,12 +78,13 @@ mod tests {
         assert!(wear.worn(), "there is none yet");
         wear.renewed(10.0);
         wear.took(8.0, 4);
-        assert_eq!(wear.allowance(), 6);
-        wear.lose(1);
-        assert!(!wear.worn(), "one iteration is what a new factor needs too");
-        wear.lose(4);
-        assert!(!wear.worn());
-        wear.lose(3);
+        wear.solved(4);
+        assert!(!wear.worn(), "the first one tells what a new factor needs");
+        wear.solved(1);
+        wear.solved(4);
+        assert!(!wear.worn(), "three iterations lost, 6 s of 10");
+        assert_eq!(wear.allowance(), 1 + FEWEST);
+        wear.solved(3);
         assert!(wear.worn());
     }
 }

@@ -3,7 +3,7 @@
 use crate::{
     evolution::Setting,
     fem::{DamageSystem, Stiffness},
-    petsc::{Factor, PetscError, Session, Vector},
+    petsc::{Factor, PetscError, Precision, Session, Vector},
     scene::Stepping,
 };
 use serde::Serialize;
@@ -47,7 +47,8 @@ pub fn floor(session: &Session, setting: &Setting, rounds: usize) -> Result<Floo
     let mut held = stiffness.matrix.duplicate()?;
     let bounded: Vec<usize> = constraints.bounds.iter().map(|bound| bound.dof).collect();
     held.hold(&bounded, stiffness.scale)?;
-    let mut factor = Factor::new(session, "elastic_", 2 * setting.body.partition.total())?;
+    let unknowns = 2 * setting.body.partition.total();
+    let mut factor = Factor::new(session, "elastic_", unknowns, Precision::Preconditioner)?;
     factor.factorise(&held)?;
 
     let zeros = || Vector::zeros(session, stiffness.matrix.owned());

@@ -6,7 +6,7 @@ use signorini::{
     contact::SOLVERS,
     evolution::{Equilibrium, Setting},
     fem::{DamageSystem, Stiffness, source, source_load},
-    petsc::{Factor, Session, Vector},
+    petsc::{Factor, Precision, Session, Vector},
     phases::Phases,
     scene::Scene,
     study,
@@ -38,7 +38,8 @@ fn stiffness(c: &mut Criterion) {
     let mut k = Stiffness::new(&session, &setting.body, &setting.elasticity, frames).unwrap();
     let mut held = k.matrix.duplicate().unwrap();
     let bounded: Vec<usize> = setting.constraints.bounds.iter().map(|bound| bound.dof).collect();
-    let mut factor = Factor::new(&session, "elastic_", k.matrix.owned()).unwrap();
+    let mut factor =
+        Factor::new(&session, "elastic_", k.matrix.owned(), Precision::Preconditioner).unwrap();
     // The values count as new only when they are written.
     let mut renew = |k: &Stiffness, factor: &mut Factor| {
         held.copy(&k.matrix).unwrap();
