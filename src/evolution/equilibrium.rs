@@ -103,7 +103,7 @@ impl<'a> Equilibrium<'a> {
         setting.check_load(time, &external)?;
         let force_scale = self.set_load(&external, &lift)?;
 
-        self.c.set(&self.evolution.at(time))?;
+        phases.time("extrapolation", || self.c.set(&self.evolution.at(time)))?;
         let mut total = ContactReport::default();
         let mut tolerance = setting.tolerance;
         let failed = |source| RunError::Contact { step, time, source };
@@ -134,8 +134,9 @@ impl<'a> Equilibrium<'a> {
                     zeta_mean: self.zeta_mean.clone(),
                     contact,
                 };
-                let mut record =
-                    certificate::figures(setting, step, &state, &external, &total, &kkt);
+                let mut record = phases.time("figures", || {
+                    certificate::figures(setting, step, &state, &external, &total, &kkt)
+                });
                 record.seconds = started.elapsed().as_secs_f64();
                 let unheld = self.unheld(&state.contact, force_scale);
                 return Ok(Step { state, record, unheld });
@@ -164,7 +165,8 @@ impl<'a> Equilibrium<'a> {
 
     /// The last solve, at `time`, belongs to an accepted step.
     pub fn accept(&mut self, time: f64) -> Result<(), PetscError> {
-        self.evolution.accept(time, self.c.read(<[f64]>::to_vec)?);
+        let c = self.c.read(<[f64]>::to_vec)?;
+        self.phases.time("extrapolation", || self.evolution.accept(time, c));
         self.warm_start = self.solver.warm_start();
         Ok(())
     }

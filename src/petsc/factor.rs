@@ -1,9 +1,10 @@
 //! A factorisation that outlives the matrix values it was made from.
 
 use super::{
-    Matrix, PetscError, Precision, Ranks, Session, Vector, check, raw,
+    Matrix, PetscError, Precision, Ranks, Session, Vector, check,
+    direct::Substructure,
+    raw,
     session::{Live, c_string, world},
-    substructure::Substructure,
     vec::same_size,
 };
 use std::{ffi::CStr, ptr, slice};

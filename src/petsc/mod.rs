@@ -10,7 +10,7 @@
 //! All objects live on `PETSC_COMM_WORLD`; sizes and slices are those owned by this rank.
 #![allow(unsafe_code)]
 
-mod cholmod;
+mod direct;
 mod error;
 mod factor;
 mod ghosts;
@@ -20,10 +20,7 @@ mod mat;
 mod ranks;
 mod session;
 mod shell;
-mod substructure;
-mod supernodal;
 mod tao;
-mod tiles;
 mod vec;
 mod wear;
 
@@ -40,7 +37,7 @@ mod raw {
     include!(concat!(env!("OUT_DIR"), "/petsc.rs"));
 }
 
-pub use cholmod::Precision;
+pub use direct::Precision;
 pub use error::PetscError;
 pub use factor::Factor;
 pub use ghosts::Ghosts;

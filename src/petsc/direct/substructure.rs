@@ -1,10 +1,7 @@
 //! A Cholesky factor over the ranks: each eliminates its own unknowns, all share the rest.
 
-use super::{
-    PetscError, Precision, Ranks, check,
-    cholmod::{Cholesky, Lower},
-    raw,
-};
+use super::{Cholesky, Lower, Precision};
+use crate::petsc::{PetscError, Ranks, check, raw};
 use nalgebra::{DMatrix, DVector};
 use std::{ptr, slice};
 
@@ -17,7 +14,7 @@ use std::{ptr, slice};
 /// factor holds its part of the interface last, with c 1 for K_BB: the last block L_S of it then
 /// tells the rank's part of S, L_S L_Sᵀ = c 1 − K_BI K_II⁻¹ K_IB, and couples interior and
 /// interface. On one rank all is interior.
-pub(super) struct Substructure {
+pub(in crate::petsc) struct Substructure {
     ranks: Ranks,
     precision: Precision,
     parts: Parts,
@@ -53,7 +50,7 @@ impl Substructure {
     ///
     /// # Safety
     /// `matrix` is a live handle.
-    pub(super) unsafe fn new(
+    pub(in crate::petsc) unsafe fn new(
         ranks: Ranks,
         matrix: raw::Mat,
         precision: Precision,
@@ -125,7 +122,7 @@ impl Substructure {
     }
 
     /// Bytes that a solve reads on this rank.
-    pub(super) fn traffic(&self) -> f64 {
+    pub(in crate::petsc) fn traffic(&self) -> f64 {
         self.local.traffic() + self.shared.as_ref().map_or(0.0, Cholesky::traffic)
     }
 
@@ -133,7 +130,10 @@ impl Substructure {
     ///
     /// # Safety
     /// `matrix` is a live handle with the pattern this was made for.
-    pub(super) unsafe fn factorise(&mut self, matrix: raw::Mat) -> Result<bool, PetscError> {
+    pub(in crate::petsc) unsafe fn factorise(
+        &mut self,
+        matrix: raw::Mat,
+    ) -> Result<bool, PetscError> {
         let parts = &self.parts;
         let width = parts.interface.len();
         let (mut first, mut end) = (0, 0);
@@ -194,7 +194,7 @@ impl Substructure {
     }
 
     /// `z` ← the factored matrix' inverse · `r`. Collective.
-    pub(super) fn apply(&mut self, r: &[f64], z: &mut [f64]) {
+    pub(in crate::petsc) fn apply(&mut self, r: &[f64], z: &mut [f64]) {
         let local = self.local.triangle();
         let Parts { role: roles, interface, near, interior } = &self.parts;
         if interface.is_empty() {

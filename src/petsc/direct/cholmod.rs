@@ -1,9 +1,10 @@
 //! CHOLMOD's Cholesky factors of matrices that one rank holds.
 
 use super::{
-    PetscError, raw,
+    Lower,
     supernodal::{Structure, Supernodal, Supernode, Triangle},
 };
+use crate::petsc::{PetscError, raw};
 use std::{ffi::c_void, ptr, slice};
 
 /// A sparse symmetric positive definite matrix' factor: P A Pᵀ = L Lᵀ (supernodal).
@@ -24,69 +25,6 @@ pub enum Precision {
     Preconditioner,
     /// Sixteen.
     Full,
-}
-
-/// The lower triangle by columns: rows `rows[starts[j]..starts[j + 1]]`, all at least j.
-#[derive(Default)]
-pub(super) struct Lower {
-    pub(super) starts: Vec<i64>,
-    pub(super) rows: Vec<i64>,
-    pub(super) values: Vec<f64>,
-}
-
-impl Lower {
-    /// Of `size` rows, to be filled column by column.
-    pub(super) fn new() -> Self {
-        Self { starts: vec![0], ..Self::default() }
-    }
-
-    pub(super) fn push(&mut self, row: usize, value: f64) {
-        self.rows.push(row as i64);
-        self.values.push(value);
-    }
-
-    pub(super) fn end_column(&mut self) {
-        self.starts.push(self.rows.len() as i64);
-    }
-
-    fn size(&self) -> usize {
-        self.starts.len() - 1
-    }
-
-    /// The symmetric matrix' product with `x`.
-    fn multiply(&self, x: &[f64]) -> Vec<f64> {
-        let mut y = vec![0.0; x.len()];
-        for (j, span) in self.starts.windows(2).enumerate() {
-            for k in span[0] as usize..span[1] as usize {
-                let (i, value) = (self.rows[k] as usize, self.values[k]);
-                y[i] += value * x[j];
-                if i != j {
-                    y[j] += value * x[i];
-                }
-            }
-        }
-        y
-    }
-
-    /// What CHOLMOD reads; valid while this is not changed.
-    fn view(&mut self) -> raw::cholmod_sparse {
-        raw::cholmod_sparse {
-            nrow: self.size(),
-            ncol: self.size(),
-            nzmax: self.rows.len(),
-            p: self.starts.as_mut_ptr().cast::<c_void>(),
-            i: self.rows.as_mut_ptr().cast::<c_void>(),
-            nz: ptr::null_mut(),
-            x: self.values.as_mut_ptr().cast::<c_void>(),
-            z: ptr::null_mut(),
-            stype: -1,
-            itype: raw::CHOLMOD_LONG as i32,
-            xtype: raw::CHOLMOD_REAL as i32,
-            dtype: raw::CHOLMOD_DOUBLE as i32,
-            sorted: 0,
-            packed: 1,
-        }
-    }
 }
 
 /// The share of a load that a solve may leave over, for a factor of few digits to be kept.
@@ -255,6 +193,110 @@ impl Drop for Cholesky {
         unsafe {
             raw::cholmod_l_free_factor(&mut self.factor, &mut *self.common);
             raw::cholmod_l_finish(&mut *self.common);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{DMatrix, DVector};
+
+    const BOTH: [Precision; 2] = [Precision::Preconditioner, Precision::Full];
+
+    /// The part of a dense matrix that is not zero, from the diagonal down.
+    fn lower(a: &DMatrix<f64>) -> Lower {
+        let mut lower = Lower::new();
+        for j in 0..a.ncols() {
+            (j..a.nrows()).filter(|&i| a[(i, j)] != 0.0).for_each(|i| lower.push(i, a[(i, j)]));
+            lower.end_column();
+        }
+        lower
+    }
+
+    /// A definite matrix of rows coupled at random, `sparsity` of 8 entries missing.
+    fn coupled(size: usize, sparsity: usize) -> DMatrix<f64> {
+        let number = |i: usize, j: usize| (i * 31 + j * 17 + i * j) % 101;
+        let entry = |i: usize, j: usize| match number(i.max(j), i.min(j)) {
+            n if n % 8 < sparsity => 0.0,
+            n => n as f64 / 101.0 - 0.4,
+        };
+        let mut a = DMatrix::from_fn(size, size, entry);
+        (0..size).for_each(|i| a[(i, i)] = 1.0 + a.row(i).abs().sum());
+        a
+    }
+
+    fn factor(a: &DMatrix<f64>, precision: Precision) -> Cholesky {
+        let mut cholesky = Cholesky::analyse(&mut lower(a), None, precision).unwrap();
+        // Twice: values are replaced, not added.
+        assert!(cholesky.factorise(&mut lower(&(a * 2.0)), 0).unwrap().is_some());
+        assert!(cholesky.factorise(&mut lower(a), 0).unwrap().is_some());
+        cholesky
+    }
+
+    /// max |b − A x| / max |b|.
+    fn left(a: &DMatrix<f64>, cholesky: &mut Cholesky, b: &DVector<f64>) -> f64 {
+        let mut x = DVector::zeros(b.len());
+        cholesky.triangle().forward(b.as_slice());
+        cholesky.triangle().backward(x.as_mut_slice());
+        (b - a * x).amax() / b.amax()
+    }
+
+    #[test]
+    fn solves_solve_whatever_the_shape_of_the_supernodes() {
+        for size in (1..30).chain([100, 211]) {
+            for sparsity in [0, 3, 6, 7, 8] {
+                let a = coupled(size, sparsity);
+                // Loads of any size: exponents of single precision end at 1e±38.
+                for scale in [1.0, 1e-200, 1e200] {
+                    let b = DVector::from_fn(size, |i, _| scale * (i as f64 + 1.0).sin());
+                    for (precision, rounding) in BOTH.into_iter().zip([3e-6, 1e-14]) {
+                        let left = left(&a, &mut factor(&a, precision), &b);
+                        assert!(left < rounding, "{size} {sparsity} {precision:?}: {left:e}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn halves_make_the_energy_of_the_solution() {
+        // |L⁻¹Pb|² = b A⁻¹ b.
+        let a = coupled(50, 5);
+        let b = DVector::from_element(50, 1.0);
+        let energy = b.dot(&a.clone().cholesky().unwrap().solve(&b));
+        for (precision, rounding) in BOTH.into_iter().zip([1e-6, 1e-14]) {
+            let mut cholesky = factor(&a, precision);
+            cholesky.triangle().forward(b.as_slice());
+            let y = DVector::from_vec(cholesky.triangle().last(50));
+            assert!((y.norm_squared() / energy - 1.0).abs() < rounding);
+        }
+    }
+
+    #[test]
+    fn a_matrix_that_needs_all_digits_gets_them() {
+        // Springs in a row, the last held by almost nothing: condition 1e12.
+        let mut a = DMatrix::from_fn(40, 40, |i, j| match i.abs_diff(j) {
+            0 => 2.0,
+            1 => -1.0,
+            _ => 0.0,
+        });
+        (a[(0, 0)], a[(39, 39)]) = (1.0, 1.0 + 1e-9);
+        let mut cholesky = factor(&a, Precision::Preconditioner);
+        assert_eq!(cholesky.precision, Precision::Full);
+        assert!(left(&a, &mut cholesky, &DVector::from_element(40, 1.0)) < 1e-5);
+    }
+
+    #[test]
+    fn a_matrix_that_is_not_definite_is_told_and_forgotten() {
+        let good = coupled(20, 4);
+        let mut bad = good.clone();
+        bad[(7, 7)] = -1.0;
+        for precision in BOTH {
+            let mut cholesky = factor(&good, precision);
+            assert!(cholesky.factorise(&mut lower(&bad), 0).unwrap().is_none());
+            assert!(cholesky.factorise(&mut lower(&good), 0).unwrap().is_some());
+            assert!(left(&good, &mut cholesky, &DVector::from_element(20, 1.0)) < 1e-5);
         }
     }
 }
