@@ -40,8 +40,13 @@ impl LinearSolver {
     /// `prefix` (`-damage_ksp_type …`).
     ///
     /// What factorises is told at [`Factor`].
-    pub fn cholesky(session: &Session, prefix: &str, unknowns: usize) -> Result<Self, PetscError> {
-        let factor = Factor::new(session, prefix, unknowns, Precision::Full)?;
+    pub fn cholesky(
+        session: &Session,
+        prefix: &str,
+        unknowns: usize,
+        precision: Precision,
+    ) -> Result<Self, PetscError> {
+        let factor = Factor::new(session, prefix, unknowns, precision)?;
         let factor = KeptFactor::new(factor, None);
         let mut solver =
             Self { raw: ptr::null_mut(), definite: false, _factor: factor, _live: Live::new() };
@@ -142,7 +147,7 @@ mod tests {
     fn what_is_not_positive_definite_does_not_converge_and_does_no_harm() {
         let session = Session::start(&[]).unwrap();
         let good = [[2.0, 1.0]; 3];
-        let mut solver = LinearSolver::cholesky(&session, "test_", 6).unwrap();
+        let mut solver = LinearSolver::cholesky(&session, "test_", 6, Precision::Full).unwrap();
         for bad in [[1.0, 2.0], [-2.0, 1.0], [1.0, 1.0], [0.0, 0.0], [f64::NAN, 0.0]] {
             // First of all, and after a factorisation that went well.
             for _ in 0..2 {
@@ -160,7 +165,7 @@ mod tests {
     fn all_pivots_negative_are_noticed_too() {
         // CG alone would not notice: r·z and p·Ap keep their sign.
         let session = Session::start(&[]).unwrap();
-        let mut solver = LinearSolver::cholesky(&session, "test_", 6).unwrap();
+        let mut solver = LinearSolver::cholesky(&session, "test_", 6, Precision::Full).unwrap();
         solver.factorise(&blocks(&session, &[[-2.0, 1.0]; 3])).unwrap();
         assert!(!solve(&session, &mut solver, 6).0);
     }

@@ -15,6 +15,8 @@ pub(super) struct Cholesky {
     common: Box<raw::cholmod_common>,
     factor: *mut raw::cholmod_factor,
     precision: Precision,
+    /// The columns of L that are solved with, the first ones.
+    solved: usize,
     triangle: Box<dyn Triangle>,
 }
 
@@ -31,17 +33,20 @@ pub enum Precision {
 const LEFT: f64 = 1e-1;
 
 impl Cholesky {
-    /// Orders and analyses `a`: in the `order` given (place → row), else by CHOLMOD's choice.
+    /// Orders and analyses `a`: in the `order` given (place → row), else by CHOLMOD's choice. The last
+    /// `kept` rows, the last in the order too, are not eliminated in solves.
     pub(super) fn analyse(
         a: &mut Lower,
         order: Option<Vec<i64>>,
+        kept: usize,
         precision: Precision,
     ) -> Result<Self, PetscError> {
         // SAFETY: plain data that cholmod_l_start fills.
         let common = unsafe { Box::new(std::mem::zeroed::<raw::cholmod_common>()) };
         let nothing = Structure { order: Vec::new(), supernodes: Vec::new(), rows: Vec::new() };
         let triangle = Box::new(Supernodal::<f64>::new(nothing));
-        let mut this = Self { common, factor: ptr::null_mut(), precision, triangle };
+        let (factor, solved) = (ptr::null_mut(), a.size() - kept);
+        let mut this = Self { common, factor, precision, solved, triangle };
         let mut view = a.view();
         // SAFETY: `common` stays where it is; the view describes arrays that live during the call,
         // and `order` has as many entries as there are rows.
@@ -69,13 +74,9 @@ impl Cholesky {
         Ok(this)
     }
 
-    /// Factorises `a`, which has the pattern that was analysed: the last `trailing` rows and columns
-    /// of L, dense by columns; `None` if it is not positive definite.
-    pub(super) fn factorise(
-        &mut self,
-        a: &mut Lower,
-        trailing: usize,
-    ) -> Result<Option<Vec<f64>>, PetscError> {
+    /// Factorises `a`, which has the pattern that was analysed: the block of L in the rows and columns
+    /// that are kept, dense by columns; `None` if it is not positive definite.
+    pub(super) fn factorise(&mut self, a: &mut Lower) -> Result<Option<Vec<f64>>, PetscError> {
         let mut view = a.view();
         // SAFETY: live handles; the view describes arrays that live during the call.
         unsafe {
@@ -86,7 +87,7 @@ impl Cholesky {
                 return Ok(None);
             }
         }
-        let block = self.trailing(trailing);
+        let block = self.kept_block();
         self.take_over();
         if self.precision == Precision::Preconditioner && !self.serves(a) {
             self.precision = Precision::Full;
@@ -115,8 +116,10 @@ impl Cholesky {
         let load: Vec<f64> = (0..a.size()).map(|i| 1.0 + (i as f64).sin()).collect();
         let mut x = vec![0.0; load.len()];
         self.triangle.forward(&load);
+        self.triangle.set_last(&vec![0.0; load.len() - self.solved]);
         self.triangle.backward(&mut x);
-        let left: f64 = a.multiply(&x).iter().zip(&load).map(|(ax, b)| (b - ax).powi(2)).sum();
+        let load = &load[..self.solved];
+        let left: f64 = a.multiply(&x).iter().zip(load).map(|(ax, b)| (b - ax).powi(2)).sum();
         left <= LEFT * LEFT * load.iter().map(|b| b * b).sum::<f64>()
     }
 
@@ -136,22 +139,24 @@ impl Cholesky {
         };
         let (mut supernodes, mut below) = (Vec::new(), Vec::new());
         for (columns, span) in starts.windows(2).zip(heights.windows(2)) {
-            let (first, columns) = (columns[0] as usize, (columns[1] - columns[0]) as usize);
-            let rows = &rows[span[0] as usize + columns..span[1] as usize];
-            supernodes.push(Supernode { first, columns, below: rows.len() });
-            below.extend(rows.iter().map(|&row| row as u32));
+            let (first, end) = (columns[0] as usize, self.solved.min(columns[1] as usize));
+            if first < end {
+                let rows = &rows[span[0] as usize + end - first..span[1] as usize];
+                supernodes.push(Supernode { first, columns: end - first, below: rows.len() });
+                below.extend(rows.iter().map(|&row| row as u32));
+            }
         }
         let order = self.order().iter().map(|&row| row as u32).collect();
         Structure { order, supernodes, rows: below }
     }
 
-    /// The last `size` rows and columns of L, dense by columns.
-    fn trailing(&self, size: usize) -> Vec<f64> {
-        let mut block = vec![0.0; size * size];
+    /// The block of L in the rows and columns that are kept, dense by columns.
+    fn kept_block(&self) -> Vec<f64> {
         // SAFETY: a factorised supernodal factor: CHOLMOD's guide, section "supernodal".
         unsafe {
             let l = &*self.factor;
-            let first = l.n - size;
+            let (first, size) = (self.solved, l.n - self.solved);
+            let mut block = vec![0.0; size * size];
             let at = |array: *mut c_void, i: usize| *array.cast::<i64>().add(i) as usize;
             for s in 0..l.nsuper {
                 let (start, end) = (at(l.super_, s), at(l.super_, s + 1));
@@ -165,8 +170,8 @@ impl Cholesky {
                     }
                 }
             }
+            block
         }
-        block
     }
 
     /// What solves with L.
@@ -227,10 +232,10 @@ mod tests {
     }
 
     fn factor(a: &DMatrix<f64>, precision: Precision) -> Cholesky {
-        let mut cholesky = Cholesky::analyse(&mut lower(a), None, precision).unwrap();
+        let mut cholesky = Cholesky::analyse(&mut lower(a), None, 0, precision).unwrap();
         // Twice: values are replaced, not added.
-        assert!(cholesky.factorise(&mut lower(&(a * 2.0)), 0).unwrap().is_some());
-        assert!(cholesky.factorise(&mut lower(a), 0).unwrap().is_some());
+        assert!(cholesky.factorise(&mut lower(&(a * 2.0))).unwrap().is_some());
+        assert!(cholesky.factorise(&mut lower(a)).unwrap().is_some());
         cholesky
     }
 
@@ -294,8 +299,8 @@ mod tests {
         bad[(7, 7)] = -1.0;
         for precision in BOTH {
             let mut cholesky = factor(&good, precision);
-            assert!(cholesky.factorise(&mut lower(&bad), 0).unwrap().is_none());
-            assert!(cholesky.factorise(&mut lower(&good), 0).unwrap().is_some());
+            assert!(cholesky.factorise(&mut lower(&bad)).unwrap().is_none());
+            assert!(cholesky.factorise(&mut lower(&good)).unwrap().is_some());
             assert!(left(&good, &mut cholesky, &DVector::from_element(20, 1.0)) < 1e-5);
         }
     }

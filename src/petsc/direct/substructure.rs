@@ -2,7 +2,7 @@
 
 use super::{Cholesky, Lower, Precision};
 use crate::petsc::{PetscError, Ranks, check, raw};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use std::{ptr, slice};
 
 /// The factor of a matrix whose unknowns are divided: the interior ones of a rank have no
@@ -12,8 +12,7 @@ use std::{ptr, slice};
 /// With the Schur complement S = K_BB − Σ K_BI K_II⁻¹ K_IB, dense and the same on all ranks, a
 /// solve is a forward solve in each rank's interior, one with S, and a backward solve. A rank's
 /// factor holds its part of the interface last, with c 1 for K_BB: the last block L_S of it then
-/// tells the rank's part of S, L_S L_Sᵀ = c 1 − K_BI K_II⁻¹ K_IB, and couples interior and
-/// interface. On one rank all is interior.
+/// tells the rank's part of S, L_S L_Sᵀ = c 1 − K_BI K_II⁻¹ K_IB. On one rank all is interior.
 pub(in crate::petsc) struct Substructure {
     ranks: Ranks,
     precision: Precision,
@@ -21,8 +20,6 @@ pub(in crate::petsc) struct Substructure {
     local: Cholesky,
     /// The factor of S, where there is an interface.
     shared: Option<Cholesky>,
-    /// L_S.
-    coupling: DMatrix<f64>,
 }
 
 /// What the unknowns of a rank are.
@@ -105,20 +102,18 @@ impl Substructure {
         near.dedup();
 
         let parts = Parts { role, interface, near, interior };
-        // The interior in CHOLMOD's order, then the interface.
+        // In CHOLMOD's order, the interface moved to the end.
         // SAFETY: the caller's promise.
-        let mut inside = unsafe { parts.eliminated(matrix, first, None)? };
-        let mut local = Cholesky::analyse(&mut inside, None, precision)?;
+        let mut whole = unsafe { parts.eliminated(matrix, first, 1.0)? };
+        let mut local = Cholesky::analyse(&mut whole, None, 0, precision)?;
         let last = (interior..interior + parts.near.len()).map(|i| i as i64);
         if !parts.near.is_empty() {
-            let order = local.order().iter().copied().chain(last.clone()).collect();
-            // SAFETY: the caller's promise.
-            let mut whole = unsafe { parts.eliminated(matrix, first, Some(1.0))? };
-            local = Cholesky::analyse(&mut whole, Some(order), precision)?;
+            let order = local.order().iter().copied().filter(|&i| i < interior as i64);
+            let order = order.chain(last.clone()).collect();
+            local = Cholesky::analyse(&mut whole, Some(order), parts.near.len(), precision)?;
         }
         let kept = local.order()[interior..].iter().copied().eq(last);
-        let (shared, coupling) = (None, DMatrix::zeros(0, 0));
-        Ok(ranks.all(kept).then_some(Self { ranks, precision, parts, local, shared, coupling }))
+        Ok(ranks.all(kept).then_some(Self { ranks, precision, parts, local, shared: None }))
     }
 
     /// Bytes that a solve reads on this rank.
@@ -160,14 +155,14 @@ impl Substructure {
         // K_BI K_II⁻¹ K_IB is at most K_BB: with this the rank's matrix is definite.
         let c = 2.0 * self.ranks.max(size);
         // SAFETY: the caller's promise.
-        let mut whole = unsafe { parts.eliminated(matrix, first, Some(c))? };
+        let mut whole = unsafe { parts.eliminated(matrix, first, c)? };
         let near = parts.near.len();
-        let block = self.local.factorise(&mut whole, near)?;
+        let block = self.local.factorise(&mut whole)?;
         if !self.ranks.all(block.is_some()) {
             return Ok(false);
         }
-        self.coupling = DMatrix::from_vec(near, near, block.unwrap_or_default());
-        let part = &self.coupling * self.coupling.transpose();
+        let block = DMatrix::from_vec(near, near, block.unwrap_or_default());
+        let part = &block * block.transpose();
         for (j, &to) in parts.near.iter().enumerate() {
             parts.near.iter().enumerate().for_each(|(i, &at)| schur[(at, to)] += part[(i, j)]);
             schur[(to, to)] -= c;
@@ -185,10 +180,10 @@ impl Substructure {
             Some(shared) => shared,
             None => {
                 let order = Some((0..width as i64).collect());
-                Cholesky::analyse(&mut lower, order, self.precision)?
+                Cholesky::analyse(&mut lower, order, 0, self.precision)?
             }
         };
-        let definite = shared.factorise(&mut lower, 0)?.is_some();
+        let definite = shared.factorise(&mut lower)?.is_some();
         self.shared = Some(shared);
         Ok(self.ranks.all(definite))
     }
@@ -210,16 +205,16 @@ impl Substructure {
             }
         }
         local.forward(&inside);
-        // −K_BI K_II⁻¹ r_I = L_S y_B.
-        let ours = &self.coupling * DVector::from_vec(local.last(near.len()));
-        near.iter().zip(&ours).for_each(|(&at, ours)| shared[at] += ours);
+        // −K_BI K_II⁻¹ r_I.
+        let eliminated = local.last(near.len());
+        near.iter().zip(&eliminated).for_each(|(&at, eliminated)| shared[at] += eliminated);
         self.ranks.sum(&mut shared);
         if let Some(factor) = &mut self.shared {
             factor.triangle().forward(&shared);
             factor.triangle().backward(&mut shared);
         }
-        let ours = DVector::from_iterator(near.len(), near.iter().map(|&at| shared[at]));
-        local.set_last(self.coupling.tr_mul(&ours).as_slice());
+        let solved: Vec<f64> = near.iter().map(|&at| shared[at]).collect();
+        local.set_last(&solved);
         local.backward(&mut inside);
         for (z, role) in z.iter_mut().zip(roles) {
             *z = match *role {
@@ -231,14 +226,9 @@ impl Substructure {
 }
 
 impl Parts {
-    /// The rank's interior, with its interface behind it and c on the diagonal there, if one is given.
-    /// The pattern of that block is full, so that no ordering moves it.
-    unsafe fn eliminated(
-        &self,
-        matrix: raw::Mat,
-        first: i32,
-        c: Option<f64>,
-    ) -> Result<Lower, PetscError> {
+    /// The rank's interior, behind it its interface with c on the diagonal. The pattern of that block is
+    /// full, as that of S.
+    unsafe fn eliminated(&self, matrix: raw::Mat, first: i32, c: f64) -> Result<Lower, PetscError> {
         let mut lower = Lower::new();
         for (row, role) in self.role.iter().enumerate() {
             let Role::Interior(i) = *role else { continue };
@@ -248,13 +238,12 @@ impl Parts {
                     match own {
                         Some(Role::Interior(j)) if *j >= i => lower.push(*j, value),
                         Some(Role::Interior(_)) => {}
-                        _ if c.is_some() => {
+                        _ => {
                             let found = self.interface.binary_search(&column).ok();
                             if let Some(at) = found.and_then(|b| self.near.binary_search(&b).ok()) {
                                 lower.push(self.interior + at, value);
                             }
                         }
-                        _ => {}
                     }
                 }
             };
@@ -262,12 +251,10 @@ impl Parts {
             unsafe { with_row(matrix, first + row as i32, add)? };
             lower.end_column();
         }
-        if let Some(c) = c {
-            for j in 0..self.near.len() {
-                lower.push(self.interior + j, c);
-                (j + 1..self.near.len()).for_each(|i| lower.push(self.interior + i, 0.0));
-                lower.end_column();
-            }
+        for j in 0..self.near.len() {
+            lower.push(self.interior + j, c);
+            (j + 1..self.near.len()).for_each(|i| lower.push(self.interior + i, 0.0));
+            lower.end_column();
         }
         Ok(lower)
     }
