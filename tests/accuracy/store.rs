@@ -23,8 +23,8 @@ fn states_come_back_bit_by_bit_and_start_from_a_sound_body() {
     assert!(reference.states[0].zeta.iter().all(|&zeta| zeta == 1.0));
     for (state, record) in reference.states.iter().zip(&seen) {
         let least = state.zeta.iter().copied().fold(f64::INFINITY, f64::min);
-        let largest = state.u.chunks(2).map(|u| u[0].hypot(u[1])).fold(0.0, f64::max);
-        assert_eq!((least, largest), (record.zeta_min, record.displacement_max));
+        let largest = state.u.chunks(2).map(|u| u[0] * u[0] + u[1] * u[1]).fold(0.0, f64::max);
+        assert_eq!((least, largest.sqrt()), (record.zeta_min, record.displacement_max));
     }
     assert!(seen[50].zeta_min < 0.99, "nothing was damaged");
 }
