@@ -4,13 +4,16 @@ use super::tiles::{Number, Panel, TALL, Tile, WIDE, products, subtract};
 use nalgebra::{convert, convert_unchecked};
 use std::mem::take;
 
-/// What solves with a factor L of P A Pᵀ = L Lᵀ: forwards, then backwards.
+/// What solves with the first columns of a factor L of P A Pᵀ = L Lᵀ: forwards, then backwards.
+///
+/// Where these are not all, with L₁₁ and L₂₁ in them, a forward solve leaves b₂ − L₂₁ y₁ in the last
+/// entries, and a backward one takes x₂ from there.
 pub(super) trait Triangle {
     /// Takes over the values of L: of each supernode its columns from the diagonal block down,
     /// whatever stands above the diagonal.
     fn set_values(&mut self, values: &[f64]);
 
-    /// y ← L⁻¹ P `b`.
+    /// y₁ ← L₁₁⁻¹ P `b`₁.
     fn forward(&mut self, b: &[f64]);
 
     /// The last entries of y.
@@ -19,7 +22,7 @@ pub(super) trait Triangle {
     /// Replaces the last entries of y.
     fn set_last(&mut self, values: &[f64]);
 
-    /// `x` ← Pᵀ L⁻ᵀ y; destroys y.
+    /// P `x`₁ ← L₁₁⁻ᵀ (y₁ − L₂₁ᵀ x₂); destroys y.
     fn backward(&mut self, x: &mut [f64]);
 
     /// Bytes that both solves read.
@@ -100,6 +103,8 @@ impl<T: Number> Supernodal<T> {
         }
     }
 
+    /// The forward solve: each supernode solves for its part of y and subtracts its share from the rows
+    /// below.
     fn eliminate(&mut self) {
         let Structure { supernodes, rows, .. } = &self.structure;
         let (mut panels, mut tiles, mut rows) = (&self.panels[..], &self.tiles[..], &rows[..]);
@@ -129,6 +134,8 @@ impl<T: Number> Supernodal<T> {
         }
     }
 
+    /// The backward solve: each supernode fetches the rows below, which are solved, and solves for its
+    /// own.
     fn substitute(&mut self) {
         let Structure { supernodes, rows, .. } = &self.structure;
         let (mut panels, mut tiles, mut rows) = (&self.panels[..], &self.tiles[..], &rows[..]);
