@@ -8,7 +8,7 @@ const FUNCTIONS: &str = "\
     PetscOptionsInsertString|PetscOptionsSetValue|PetscOptionsHasName|\
     PetscOptionsLeftGet|PetscOptionsLeftRestore|\
     MPI_Comm_size|MPI_Comm_rank|MPI_Allreduce|MPI_Type_contiguous|MPI_Type_commit|MPI_Type_free|\
-    MPI_Ibarrier|MPI_Test|MPI_Abort|mallopt|\
+    MPI_Ibarrier|MPI_Test|MPI_Abort|mallopt|omp_set_max_active_levels|\
     PetscSFCreate|PetscSFDestroy|PetscSFSetGraph|PetscSFBcastBegin|PetscSFBcastEnd|\
     cholmod_l_start|cholmod_l_finish|cholmod_l_analyze|cholmod_l_analyze_p|cholmod_l_factorize|\
     cholmod_l_change_factor|cholmod_l_free_factor|\
@@ -40,6 +40,7 @@ fn main() {
     });
     println!("cargo:rustc-link-lib=mpi");
     println!("cargo:rustc-link-lib=cholmod");
+    println!("cargo:rustc-link-lib=gomp");
 
     let mpi_flags = Command::new("mpicc")
         .arg("--showme:compile")
@@ -51,7 +52,7 @@ fn main() {
         .header_contents(
             "signorini.h",
             "#include <petsctao.h>\n#include <petscsf.h>\n#include <suitesparse/cholmod.h>\n\
-             #include <malloc.h>\n",
+             #include <malloc.h>\nvoid omp_set_max_active_levels(int);\n",
         )
         .clang_args(petsc.include_paths.iter().map(|p| format!("-I{}", p.display())))
         .clang_args(mpi_flags.split_whitespace())
