@@ -87,6 +87,8 @@ def draw(axes, rows, fenicsx, error, suffix, label):
                       bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1})
     axes.set(xscale="log", yscale="log", xlabel="wall time of mesh, set-up and steps (s)",
              ylabel=label, xlim=(4e-4, None))
+    low, high = axes.get_ylim()
+    axes.set_ylim(0.5 * low, high)
     axes.yaxis.set_minor_formatter(LogFormatterSciNotation(minor_thresholds=(3, 0.6)))
     axes.grid(which="both", color=FAINT, alpha=0.3, linewidth=0.5)
     axes.set_axisbelow(True)

@@ -52,10 +52,13 @@ const PASSES: usize = 3;
 const DEFAULT: Choice = Choice {
     solver: SOLVERS[0],
     n: 32,
-    grading: 1.0,
+    grading: 4.0,
     steps: Steps::Uniform(0.01),
     tolerance: 1e-10,
 };
+
+/// The paper's mesh instead.
+const UNIFORM: Choice = Choice { grading: 1.0, ..DEFAULT };
 
 /// A run of the chart.
 #[derive(Debug, Clone, Serialize)]
@@ -148,7 +151,8 @@ fn choices(finest: usize) -> Vec<Choice> {
             for k in [0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001] {
                 // The other solvers show where they stand on smaller meshes.
                 if solver == SOLVERS[0] || (n <= 64 && k >= 0.002) {
-                    choices.push(Choice { solver, n, steps: Steps::Uniform(k), ..DEFAULT });
+                    let steps = Steps::Uniform(k);
+                    choices.push(Choice { solver, n, steps, ..UNIFORM });
                 }
             }
         }
@@ -162,7 +166,7 @@ fn choices(finest: usize) -> Vec<Choice> {
         }
     }
     // Chosen steps.
-    for grading in [1.0, 8.0] {
+    for grading in [UNIFORM.grading, DEFAULT.grading] {
         for n in [8, 16, 32, 64, 128] {
             for tolerance in [1e-2, 3e-3, 1e-3, 2e-4, 5e-5] {
                 choices.push(Choice { n, grading, steps: Steps::Auto(tolerance), ..DEFAULT });
@@ -173,9 +177,9 @@ fn choices(finest: usize) -> Vec<Choice> {
     for tolerance in [1e-4, 1e-6, 1e-8] {
         for n in [16, 32, 64] {
             for solver in SOLVERS {
-                choices.push(Choice { solver, n, tolerance, ..DEFAULT });
+                choices.push(Choice { solver, n, tolerance, ..UNIFORM });
             }
-            choices.push(Choice { n, tolerance, grading: 8.0, ..DEFAULT });
+            choices.push(Choice { n, tolerance, ..DEFAULT });
         }
     }
     let mut once: Vec<Choice> = Vec::new();

@@ -111,7 +111,10 @@ impl Plan {
     fn label(&self) -> Label {
         let trial = self.trial();
         // Text that is no TOML is refused before anything is kept.
-        let scene = SCENE.parse::<toml::Table>().unwrap_or_default().to_string();
+        let mut scene = SCENE.parse::<toml::Table>().unwrap_or_default();
+        // The study brings its own meshes.
+        scene.remove("mesh");
+        let scene = scene.to_string();
         let mesh = trial.grid.mesh();
         let mut hash = Sha256::new();
         for text in [&scene, &trial.solver, &trial.set.join(" ")] {

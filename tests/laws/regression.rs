@@ -30,7 +30,7 @@ const TABLE: &[Figures] = &[
     Figures { scene: "hertz", greatest_loss: 0.000000000e0, mean_loss: 0.000000000e0, displacement_max: 1.353938970e-3, work: 1.750222618e4, contact_force: 1.750000000e7, active_nodes: 34, stopped: None },
     Figures { scene: "lshape", greatest_loss: 1.598864637e-3, mean_loss: 4.042507753e-4, displacement_max: 1.702937783e-2, work: 5.092688858e0, contact_force: 3.568442075e2, active_nodes: 5, stopped: None },
     Figures { scene: "square", greatest_loss: 9.841058733e-1, mean_loss: 3.755233454e-2, displacement_max: 2.472740206e-1, work: 2.684630536e0, contact_force: 1.196051485e1, active_nodes: 32, stopped: Some(0.025) },
-    Figures { scene: "square-mild", greatest_loss: 1.877844455e-1, mean_loss: 3.095517597e-2, displacement_max: 2.401717955e-1, work: 2.594413377e0, contact_force: 1.193463088e1, active_nodes: 32, stopped: None },
+    Figures { scene: "square-mild", greatest_loss: 1.916826814e-1, mean_loss: 3.099979741e-2, displacement_max: 2.442266919e-1, work: 2.597053915e0, contact_force: 1.196901233e1, active_nodes: 32, stopped: None },
 ];
 
 /// Rounding, the KKT tolerance and the order of sums: solvers differ by 10⁻⁹ here.
