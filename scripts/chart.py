@@ -64,7 +64,8 @@ def steps(row):
 
 def name(row):
     mesh = "uniform" if row["grading"] == 1 else f"graded {row['grading']:g}"
-    return f"n = {row['n']:g}, {mesh}, {steps(row)}"
+    loose = "" if row["tolerance"] == 1e-10 else f", tolerance {row['tolerance']:g}"
+    return f"n = {row['n']:g}, {mesh}, {steps(row)}{loose}"
 
 
 def draw(axes, rows, fenicsx, error, suffix, label):
@@ -88,7 +89,7 @@ def draw(axes, rows, fenicsx, error, suffix, label):
     axes.set(xscale="log", yscale="log", xlabel="wall time of mesh, set-up and steps (s)",
              ylabel=label, xlim=(4e-4, None))
     low, high = axes.get_ylim()
-    axes.set_ylim(0.5 * low, high)
+    axes.set_ylim(0.6 * low, high)
     axes.yaxis.set_minor_formatter(LogFormatterSciNotation(minor_thresholds=(3, 0.6)))
     axes.grid(which="both", color=FAINT, alpha=0.3, linewidth=0.5)
     axes.set_axisbelow(True)

@@ -36,6 +36,8 @@ def run(scene, mesh, step, folder):
 
 def main(path, target):
     path, scene = Path(path), read_scene(path)
+    # The meshes are made here, uniform.
+    scene["mesh"].pop("parameters", None)
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         folder = Path(folder)

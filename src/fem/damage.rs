@@ -3,7 +3,7 @@
 use super::{Body, Triangle};
 use crate::{
     model::DamageLaw,
-    petsc::{LinearSolver, Matrix, PetscError, Precision, Session, Vector},
+    petsc::{LinearSolver, Matrix, PetscError, Session, Vector},
 };
 use nalgebra::{Matrix3, Vector3};
 
@@ -91,13 +91,11 @@ impl DamageSystem {
             filled.duplicate()
         };
         let (mass, laplace) = (with(mass_values)?, with(laplace_values)?);
-        let nodes = body.partition.total();
         let mut system = Self {
             matrix: mass.duplicate()?,
             mass,
             laplace,
-            // One iteration with all digits costs less than two with half of them.
-            solver: LinearSolver::cholesky(session, "damage_", nodes, Precision::Full)?,
+            solver: LinearSolver::cholesky(session, "damage_", body.partition.total())?,
             rhs: Vector::zeros(session, owned)?,
             unknown: Vector::zeros(session, owned)?,
             diffusion,

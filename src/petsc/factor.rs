@@ -9,9 +9,9 @@ use super::{
 };
 use std::{ffi::CStr, ptr, slice};
 
-/// A Cholesky factor, by substructures where there are several ranks; MUMPS' (PCCHOLESKY) where
-/// their interface is too wide, or a cycle of algebraic multigrid (PCGAMG) for very large matrices;
-/// or what PETSc options ask for, CHOLMOD on one rank.
+/// A Cholesky factor: CHOLMOD's with solves of our own, by substructures where there are several
+/// ranks. There MUMPS takes its place (PCCHOLESKY) where the interface is too wide, a cycle of
+/// algebraic multigrid (PCGAMG) where the matrix is very large. PETSc options can ask for any PC.
 ///
 /// Fill-reducing ordering and symbolic factorisation are done once, with the first values.
 pub struct Factor {
@@ -21,7 +21,7 @@ pub struct Factor {
     ranks: Ranks,
     precision: Precision,
     /// Whether `parts` is to be tried.
-    divides: bool,
+    ours: bool,
     _live: Live,
 }
 
@@ -39,9 +39,9 @@ impl Factor {
         for option in ["pc_type", "pc_factor_mat_solver_type"] {
             asked |= session.has_option(&format!("-{prefix}{option}"))?;
         }
-        let divides = !asked && (ranks.is_alone() || unknowns < LARGE);
+        let ours = !asked && (ranks.is_alone() || unknowns < LARGE);
         let raw = ptr::null_mut();
-        let mut factor = Self { raw, parts: None, ranks, precision, divides, _live: Live::new() };
+        let mut factor = Self { raw, parts: None, ranks, precision, ours, _live: Live::new() };
         cholesky_options(session, prefix)?;
         let prefix = c_string(prefix)?;
         let package = package(session);
@@ -71,10 +71,10 @@ impl Factor {
         matrix: raw::Mat,
         pattern: bool,
     ) -> Result<bool, PetscError> {
-        if self.divides && (pattern || self.parts.is_none()) {
+        if self.ours && (pattern || self.parts.is_none()) {
             // SAFETY: the caller's promise.
             self.parts = unsafe { Substructure::new(self.ranks, matrix, self.precision)? };
-            self.divides = self.parts.is_some();
+            self.ours = self.parts.is_some();
         }
         if let Some(parts) = &mut self.parts {
             // SAFETY: the caller's promise.
@@ -131,7 +131,7 @@ impl Factor {
 
 /// Left to itself CHOLMOD makes LDLᵀ of a small matrix, accepts negative pivots, and prints its
 /// warnings into the results. MUMPS' guess of the memory it needs is now and then too small.
-pub(super) fn cholesky_options(session: &Session, prefix: &str) -> Result<(), PetscError> {
+fn cholesky_options(session: &Session, prefix: &str) -> Result<(), PetscError> {
     let options = match session.ranks().is_alone() {
         true => {
             &[("cholmod_final_asis", "0"), ("cholmod_final_ll", "1"), ("cholmod_print", "0")][..]
@@ -149,7 +149,7 @@ pub(super) fn cholesky_options(session: &Session, prefix: &str) -> Result<(), Pe
 const LARGE: usize = 2_500_000;
 
 /// PETSc's type of preconditioner for so many rows on all ranks together.
-pub(super) fn method(session: &Session, unknowns: usize) -> &'static CStr {
+fn method(session: &Session, unknowns: usize) -> &'static CStr {
     match session.ranks().is_alone() || unknowns < LARGE {
         true => c"cholesky",
         false => c"gamg",
@@ -157,7 +157,7 @@ pub(super) fn method(session: &Session, unknowns: usize) -> &'static CStr {
 }
 
 /// The package that makes Cholesky factors.
-pub(super) fn package(session: &Session) -> &'static CStr {
+fn package(session: &Session) -> &'static CStr {
     if session.ranks().is_alone() { c"cholmod" } else { c"mumps" }
 }
 
@@ -168,10 +168,7 @@ pub(super) const NOT_DEFINITE: i32 = 81;
 ///
 /// # Safety
 /// `pc` is a live handle.
-pub(super) unsafe fn definite(
-    pc: raw::PC,
-    set_up: Result<(), PetscError>,
-) -> Result<bool, PetscError> {
+unsafe fn definite(pc: raw::PC, set_up: Result<(), PetscError>) -> Result<bool, PetscError> {
     /// Where MUMPS counts negative pivots (INFOG(12)): it makes LDLᵀ and does not mind them.
     const NEGATIVE: i32 = 12;
     match set_up {

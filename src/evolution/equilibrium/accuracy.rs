@@ -3,7 +3,7 @@
 use super::Equilibrium;
 use crate::{
     evolution::{Accuracy, State},
-    petsc::{LinearSolver, PetscError, Precision, Vector},
+    petsc::{LinearSolver, PetscError, Vector},
 };
 
 impl Equilibrium<'_> {
@@ -46,8 +46,8 @@ impl Equilibrium<'_> {
         let scale = self.stiffness.scale;
         let mut matrix = self.stiffness.into_matrix();
         matrix.hold(&pressing, scale)?;
-        let (unknowns, enough) = (2 * body.partition.total(), Precision::Preconditioner);
-        let mut solver = LinearSolver::cholesky(self.session, "elastic_", unknowns, enough)?;
+        let mut solver =
+            LinearSolver::cholesky(self.session, "elastic_", 2 * body.partition.total())?;
         solver.factorise(&matrix)?;
         // One digit of an error is enough.
         if !solver.solve(&rhs, &mut correction, 0.1 * rhs.norm()?)?.converged {
