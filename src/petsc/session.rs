@@ -34,7 +34,7 @@ impl Session {
     /// PETSc or MPI could not be initialised, or rejected an option.
     pub fn start(options: &[String]) -> Result<Self, PetscError> {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-        // CHOLMOD asks OpenMP for 4 threads in loops so short that most of a factorisation's time
+        // CHOLMOD asks OpenMP for 4 threads in loops so short that a third of a factorisation's time
         // went into waking them, whatever OMP_NUM_THREADS says. A setting of each thread.
         // SAFETY: only sets a parameter.
         unsafe { raw::omp_set_max_active_levels(0) };

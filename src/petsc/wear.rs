@@ -45,8 +45,11 @@ impl Wear {
     }
 
     /// A solve took so many iterations: what the best one since the last factorisation did not need
-    /// is lost.
+    /// is lost. None tell nothing.
     pub fn solved(&mut self, iterations: usize) {
+        if iterations == 0 {
+            return;
+        }
         self.best = self.best.min(iterations);
         self.lost += self.iteration() * (iterations - self.best) as f64;
     }
@@ -81,6 +84,7 @@ mod tests {
         wear.solved(4);
         assert!(!wear.worn(), "the first one tells what a new factor needs");
         wear.solved(1);
+        wear.solved(0);
         wear.solved(4);
         assert!(!wear.worn(), "three iterations lost, 6 s of 10");
         assert_eq!(wear.allowance(), 1 + FEWEST);

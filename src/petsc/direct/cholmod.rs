@@ -9,8 +9,8 @@ use std::{ffi::c_void, ptr, slice};
 
 /// A sparse symmetric positive definite matrix' factor: P A Pᵀ = L Lᵀ (supernodal).
 ///
-/// CHOLMOD orders and factorises; the solves are ours: they read L three times as fast, in half
-/// the bytes where that is enough, and their halves are apart.
+/// CHOLMOD orders and factorises; the solves are ours: they read L twice as fast, in half the bytes
+/// where that is enough, and their halves are apart.
 pub(super) struct Cholesky {
     common: Box<raw::cholmod_common>,
     factor: *mut raw::cholmod_factor,
