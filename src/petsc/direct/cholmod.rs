@@ -29,7 +29,8 @@ pub enum Precision {
     Full,
 }
 
-/// The share of a load that a solve may leave over, for a factor of few digits to be kept.
+/// The share of a load that a solve may leave over, for a factor of few digits to be kept: each
+/// iteration then gains a digit or more. With 3e-3 (the unit square, n = 256) they were no more.
 const LEFT: f64 = 1e-1;
 
 impl Cholesky {
