@@ -1,128 +1,159 @@
 //! The primal-dual active set method.
 
 use super::{
-    ContactError, ContactProblem, ContactReport, ContactSolver,
+    Bound, ContactError, ContactProblem, ContactReport, ContactSolver,
+    approach::approach,
     elastic::{ElasticSolver, System},
-    problem::unheld,
     tao::Tao,
 };
 use crate::petsc::{PetscError, Ranks, Session, Vector};
-use nalgebra::DVector;
 
-/// Guess which nodes press, solve with u_ν = g there, and exchange the nodes where the guess was
-/// wrong: pressing ones that are pulled, open ones that penetrate (Hintermüller, Ito, Kunisch,
-/// SIAM J. Optim. 13, 2003: a semismooth Newton method). The guess of the last step is the
-/// first of this one.
+/// Guess which bounds are active, solve with u_ν at these bounds, and pivot on the indices that
+/// violate the conditions: release active ones that are pulled, fix open ones that penetrate
+/// (Hintermüller, Ito, Kunisch, SIAM J. Optim. 13, 2003: a semismooth Newton method). The active
+/// set of the last step is the first of this one.
 ///
-/// Exchanging all wrong nodes may return to an earlier set. [`Exchange`] sees that the number
-/// of wrong nodes falls, and else exchanges one at a time, which ends for every positive
-/// definite K. Where K is singular (only contact holds the body) and a set does not hold it,
-/// the body moves as the load drives it until further nodes press. If the exchanges run out,
-/// TAO solves the problem instead.
+/// Pivoting on all violating indices may return to an earlier set. [`Pivoting`] sees that their
+/// number falls, and else takes one at a time, which ends for every positive definite K. Where K
+/// is singular (only contact holds the body) and a set does not hold it, the body moves as the
+/// load drives it until further bounds are reached. If the pivots run out, TAO solves the problem
+/// instead.
 pub(super) struct ActiveSet<'s> {
-    pressing: Vec<bool>,
+    active: Vec<Side>,
     elastic: ElasticSolver<'s>,
     rescue: Tao<'s>,
+}
+
+/// Where an unknown is, by the present guess.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Side {
+    Lower,
+    Open,
+    Upper,
+}
+
+impl Side {
+    /// Where `c` is.
+    fn of(bound: &Bound, c: f64) -> Self {
+        match c {
+            _ if c >= bound.upper => Self::Upper,
+            _ if c <= bound.lower => Self::Lower,
+            _ => Self::Open,
+        }
+    }
+
+    /// The value of an active unknown.
+    fn value(self, bound: &Bound) -> Option<f64> {
+        match self {
+            Self::Lower => Some(bound.lower),
+            Self::Open => None,
+            Self::Upper => Some(bound.upper),
+        }
+    }
 }
 
 impl<'s> ActiveSet<'s> {
     pub(super) fn new(session: &'s Session) -> Self {
         Self {
-            pressing: Vec::new(),
+            active: Vec::new(),
             elastic: ElasticSolver::new(session),
             rescue: Tao::new(session, "tron"),
         }
     }
 
-    /// The set to begin with: the last one, or the nodes that touch at the start.
+    /// The set to begin with: the last one, or the bounds that the start reaches.
     fn first_guess(&mut self, problem: &ContactProblem, c: &Vector) -> Result<(), PetscError> {
-        if self.pressing.len() != problem.bounds.len() {
-            let touches = |c: &[f64]| problem.bounds.iter().map(|b| c[b.dof] >= b.gap).collect();
-            self.pressing = c.read(touches)?;
+        if self.active.len() != problem.bounds.len() {
+            self.active = reached(problem, c)?;
         }
-        if !self.hold(problem, c)? {
-            self.pressing.fill(true);
+        // A lower bound may have been one for the last problem only.
+        for (side, bound) in self.active.iter_mut().zip(problem.bounds) {
+            if *side == Side::Lower && bound.lower.is_infinite() {
+                *side = Side::Open;
+            }
+        }
+        if !self.support(problem, c)? {
+            self.active.fill(Side::Upper);
         }
         Ok(())
     }
 
-    /// Where the pressing nodes leave the body a rigid motion: lets it move as the load drives
-    /// it until a further node closes its gap. False if none does; the load being balanced, it
-    /// is then rounding that drives the motion.
-    fn hold(&mut self, problem: &ContactProblem, c: &Vector) -> Result<bool, PetscError> {
-        loop {
-            let left = unheld(problem.ranks, problem.rigid, &self.pressing);
-            let Some(any) = left.first() else { return Ok(true) };
-            let driven = left.iter().map(|m| m * m.dot(problem.work)).sum::<DVector<f64>>();
-            // Where the load drives none of them, any will do.
-            let motion = if driven.amax() > 0.0 { driven } else { any.clone() };
-            let normal = problem.rigid * motion.normalize();
-            let most = problem.ranks.max(normal.iter().fold(0.0, |m: f64, v| m.max(v.abs())));
-            let closing = |i: &usize| !self.pressing[*i] && normal[*i] > 1e-6 * most;
-            let nearest = c.read(|c| {
-                let way = |i: usize| {
-                    let bound = &problem.bounds[i];
-                    (i, (bound.gap - c[bound.dof]) / normal[i])
-                };
-                let ways = (0..normal.len()).filter(closing).map(way);
-                ways.min_by(|a, b| a.1.total_cmp(&b.1))
-            })?;
-            let (way, rank) = problem.ranks.least(nearest.map_or(f64::INFINITY, |(_, way)| way));
-            match nearest {
-                _ if way == f64::INFINITY => return Ok(false),
-                Some((node, _)) if rank == problem.ranks.rank() => self.pressing[node] = true,
-                _ => {}
-            }
+    /// Where the active set leaves the body a rigid motion: lets it move as the load drives it
+    /// until it reaches a further bound. False if there is none; the load being balanced, it is
+    /// then rounding that drives the motion.
+    fn support(&mut self, problem: &ContactProblem, c: &Vector) -> Result<bool, PetscError> {
+        let active = self.active.iter().map(|side| *side != Side::Open).collect();
+        let motions = (problem.rigid, problem.work);
+        let way = c.read(|c| approach(problem.ranks, motions, problem.bounds, c, active))?;
+        for (i, upper) in way.reached {
+            self.active[i] = if upper { Side::Upper } else { Side::Lower };
         }
+        Ok(way.supported)
     }
 
-    /// Minimises with c = g on the pressing nodes and no other bound; false if that failed.
-    fn solve_pressing(
+    /// Minimises with the active unknowns at their bounds and no other bound; false if that failed.
+    fn solve_equality(
         &mut self,
         problem: &ContactProblem,
         c: &mut Vector,
         report: &mut ContactReport,
     ) -> Result<bool, PetscError> {
-        let pressing = || problem.bounds.iter().zip(&self.pressing).filter(|(_, on)| **on);
-        let held: Vec<usize> = pressing().map(|(bound, _)| bound.dof).collect();
-        c.write(|c| pressing().for_each(|(bound, _)| c[bound.dof] = bound.gap))?;
+        let value = |(bound, side): (&Bound, &Side)| Some((bound.dof, side.value(bound)?));
+        let active: Vec<(usize, f64)> =
+            problem.bounds.iter().zip(&self.active).filter_map(value).collect();
+        let held: Vec<usize> = active.iter().map(|(dof, _)| *dof).collect();
+        c.write(|c| active.iter().for_each(|&(dof, value)| c[dof] = value))?;
         let system = System { held: &held, added: None };
         self.elastic.solve(problem, system, problem.load, c, problem.linear_residual(), report)
     }
 
-    /// The nodes where the guess was wrong, beyond what the KKT tolerance allows.
-    fn wrong(&self, problem: &ContactProblem, c: &Vector) -> Result<Vec<usize>, PetscError> {
-        let size = problem.size(c)?;
+    /// Where the guess violates the conditions, beyond what the KKT tolerance allows, and the side
+    /// that each of these indices belongs to: p = f − Kc is at least 0 at an upper bound and at
+    /// most 0 at a lower one, and lower ≤ c ≤ upper elsewhere.
+    fn violating(
+        &self,
+        problem: &ContactProblem,
+        c: &Vector,
+    ) -> Result<Vec<(usize, Side)>, PetscError> {
         let slack = 0.1 * problem.tolerance;
-        let pull = slack * problem.force_scale / (problem.all_bounds() as f64).sqrt();
+        let depth = slack * problem.scales(c)?.displacement;
+        let pull = slack * problem.scales.force / (problem.all_bounds() as f64).sqrt();
         c.read(|c| {
             self.elastic.forces(|p| {
-                let wrong = |i: &usize| {
-                    let bound = &problem.bounds[*i];
-                    match self.pressing[*i] {
-                        true => p[bound.dof] < -pull,
-                        false => c[bound.dof] - bound.gap > slack * size,
-                    }
+                let violation = |i: usize| {
+                    let bound = &problem.bounds[i];
+                    let (c, p) = (c[bound.dof], p[bound.dof]);
+                    let other = match self.active[i] {
+                        // Either side carries a force of either sign.
+                        Side::Upper | Side::Lower if bound.is_equality() => return None,
+                        Side::Upper => (p < -pull).then_some(Side::Open),
+                        Side::Lower => (p > pull).then_some(Side::Open),
+                        Side::Open if c - bound.upper > depth => Some(Side::Upper),
+                        Side::Open => (bound.lower - c > depth).then_some(Side::Lower),
+                    };
+                    other.map(|side| (i, side))
                 };
-                (0..problem.bounds.len()).filter(wrong).collect()
+                (0..problem.bounds.len()).filter_map(violation).collect()
             })
         })?
     }
 
-    /// Exchanges the chosen nodes; false if that changes nothing.
-    fn exchange(
+    /// Pivots on the chosen indices; false if that changes nothing.
+    fn pivot(
         &mut self,
         problem: &ContactProblem,
         c: &Vector,
-        nodes: &[usize],
+        chosen: &[(usize, Side)],
     ) -> Result<bool, PetscError> {
-        let old = self.pressing.clone();
-        nodes.iter().for_each(|&i| self.pressing[i] = !self.pressing[i]);
-        if !self.hold(problem, c)? {
-            // Keep those that were pressing: only close gaps.
-            self.pressing.iter_mut().zip(&old).for_each(|(new, old)| *new |= *old);
+        let old = self.active.clone();
+        chosen.iter().for_each(|&(i, side)| self.active[i] = side);
+        if !self.support(problem, c)? {
+            // Keep those that were active: only fix open ones.
+            for (new, old) in self.active.iter_mut().zip(&old) {
+                *new = if *new == Side::Open { *old } else { *new };
+            }
         }
-        Ok(problem.ranks.any(self.pressing != old))
+        Ok(problem.ranks.any(self.active != old))
     }
 
     fn rescue(
@@ -138,8 +169,7 @@ impl<'s> ActiveSet<'s> {
         report.iterations += rescued.iterations;
         report.linear_iterations += rescued.linear_iterations;
         report.fallbacks += 1;
-        let touches = |c: &[f64]| problem.bounds.iter().map(|b| c[b.dof] >= b.gap).collect();
-        self.pressing = c.read(touches)?;
+        self.active = reached(problem, c)?;
         Ok(report)
     }
 }
@@ -150,11 +180,21 @@ impl ContactSolver for ActiveSet<'_> {
     }
 
     fn warm_start(&self) -> Vec<f64> {
-        self.pressing.iter().map(|&on| if on { 1.0 } else { 0.0 }).collect()
+        let value = |side: &Side| match side {
+            Side::Lower => -1.0,
+            Side::Open => 0.0,
+            Side::Upper => 1.0,
+        };
+        self.active.iter().map(value).collect()
     }
 
     fn set_warm_start(&mut self, kept: &[f64]) {
-        self.pressing = kept.iter().map(|&on| on != 0.0).collect();
+        let side = |&kept: &f64| match kept {
+            _ if kept > 0.0 => Side::Upper,
+            _ if kept < 0.0 => Side::Lower,
+            _ => Side::Open,
+        };
+        self.active = kept.iter().map(side).collect();
     }
 
     fn solve(
@@ -163,24 +203,24 @@ impl ContactSolver for ActiveSet<'_> {
         c: &mut Vector,
     ) -> Result<ContactReport, ContactError> {
         let mut report = ContactReport::default();
-        let mut choice = Exchange::new();
+        let mut rule = Pivoting::new();
         self.first_guess(problem, c)?;
         let most = 30 + 5 * problem.all_bounds();
         while report.iterations < most {
             report.iterations += 1;
-            if !self.solve_pressing(problem, c, &mut report)? {
+            if !self.solve_equality(problem, c, &mut report)? {
                 break;
             }
-            let wrong = self.wrong(problem, c)?;
-            let all_wrong = problem.ranks.count(wrong.len());
-            if all_wrong == 0 {
+            let violating = self.violating(problem, c)?;
+            let count = problem.ranks.count(violating.len());
+            if count == 0 {
                 return Ok(report);
             }
-            let single = choice.single(all_wrong);
-            report.fallbacks += usize::from(single && all_wrong > 1);
-            let chosen = if single { last(problem.ranks, &wrong) } else { &wrong };
-            if !self.exchange(problem, c, chosen)? {
-                // The forces of nodes that hold a balanced body are rounding; the certificate
+            let single = rule.single(count);
+            report.fallbacks += usize::from(single && count > 1);
+            let chosen = if single { last(problem.ranks, &violating) } else { &violating };
+            if !self.pivot(problem, c, chosen)? {
+                // The forces of bounds that support a balanced body are rounding; the certificate
                 // judges them.
                 return Ok(report);
             }
@@ -189,25 +229,30 @@ impl ContactSolver for ActiveSet<'_> {
     }
 }
 
-/// Block principal pivoting (Júdice and Pires, Comput. Oper. Res. 21, 1994): all wrong nodes
-/// are exchanged while their number falls, or for a few times more; then only the last of them
+/// The bounds that `c` has reached.
+fn reached(problem: &ContactProblem, c: &Vector) -> Result<Vec<Side>, PetscError> {
+    c.read(|c| problem.bounds.iter().map(|bound| Side::of(bound, c[bound.dof])).collect())
+}
+
+/// Block principal pivoting (Júdice and Pires, Comput. Oper. Res. 21, 1994): on all violating
+/// indices while their number falls, or for a few times more; then only on the last of them
 /// (Murty's rule, finite for positive definite matrices) until it has fallen.
-struct Exchange {
+struct Pivoting {
     fewest: usize,
     patience: usize,
 }
 
 const PATIENCE: usize = 5;
 
-impl Exchange {
+impl Pivoting {
     fn new() -> Self {
         Self { fewest: usize::MAX, patience: PATIENCE }
     }
 
-    /// Whether only one of so many wrong nodes is to be exchanged.
-    fn single(&mut self, wrong: usize) -> bool {
-        if wrong < self.fewest {
-            (self.fewest, self.patience) = (wrong, PATIENCE);
+    /// Whether to pivot on only one of so many violating indices.
+    fn single(&mut self, violating: usize) -> bool {
+        if violating < self.fewest {
+            (self.fewest, self.patience) = (violating, PATIENCE);
             return false;
         }
         let single = self.patience == 0;
@@ -216,11 +261,12 @@ impl Exchange {
     }
 }
 
-/// The last of all ranks' `wrong` nodes, which are numbered rank by rank; nothing on the others.
-fn last(ranks: Ranks, wrong: &[usize]) -> &[usize] {
-    let holder = if wrong.is_empty() { -1.0 } else { ranks.rank() as f64 };
+/// The last of all ranks' `violating` indices, which are numbered rank by rank; nothing on the
+/// others.
+fn last<T>(ranks: Ranks, violating: &[T]) -> &[T] {
+    let holder = if violating.is_empty() { -1.0 } else { ranks.rank() as f64 };
     let holds = ranks.max(holder) == ranks.rank() as f64;
-    if holds { &wrong[wrong.len().saturating_sub(1)..] } else { &[] }
+    if holds { &violating[violating.len().saturating_sub(1)..] } else { &[] }
 }
 
 #[cfg(test)]
@@ -228,14 +274,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn exchanges_one_node_when_the_number_of_wrong_ones_stops_falling() {
-        let mut choice = Exchange::new();
+    fn pivots_on_one_index_when_the_number_of_violating_ones_stops_falling() {
+        let mut choice = Pivoting::new();
         assert!(!choice.single(3));
         for _ in 0..PATIENCE {
             assert!(!choice.single(3));
         }
         assert!(choice.single(3));
         assert_eq!(last(Ranks::alone(), &[3, 4, 5]), [5]);
-        assert!(!choice.single(2), "progress restores the block exchange");
+        assert!(!choice.single(2), "progress restores the block pivots");
     }
 }

@@ -1,111 +1,264 @@
-//! The Karush–Kuhn–Tucker residuals of an answer, whoever computed it.
+//! Judges an answer in global coordinates, by the conditions as they were posed.
+//!
+//! Nothing here comes from a solver: no nodal basis, no bound on an unknown, no mask of prescribed
+//! ones. A fault in any of these makes u wrong, and cannot hide here.
 
-use super::Bound;
-use crate::petsc::Ranks;
-use std::fmt;
+use super::{FixedRow, GapRow, Kkt, Scales};
+use crate::{fem::Share, petsc::Ranks};
+use nalgebra::Vector2;
 
-/// Relative KKT residuals of u: forces against the force scale F, displacements against
-/// the largest displacement U. The multiplier is the contact force that u itself implies,
-/// p_i = (f − Ku)_i on the bounded unknowns.
-#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
-pub struct Kkt {
-    /// ‖(Ku − f) on the unknowns without a bound‖₂ / F.
-    pub stationarity: f64,
-    /// max (u_ν − g)₊ / U.
-    pub primal: f64,
-    /// ‖(−p)₊‖₂ / F: tensile contact forces.
-    pub dual: f64,
-    /// Σ |p_i (g_i − u_i)| / (F U).
-    pub complementarity: f64,
+/// The conditions of a body, node by node, for the nodes that this rank owns.
+#[derive(Debug, Clone)]
+pub struct Certificate {
+    nodes: Vec<Conditions>,
+    /// Conditions of the whole body.
+    posed: usize,
 }
 
-impl Kkt {
-    /// From r = Ku − f and u, both in the frames' unknowns that this rank owns; `prescribed` ones
-    /// do not count.
-    pub fn of(
-        residual: &[f64],
-        c: &[f64],
-        bounds: &[Bound],
-        prescribed: impl Fn(usize) -> bool,
-        force_scale: f64,
-        displacement_scale: f64,
+/// The conditions at a node.
+#[derive(Debug, Clone, Default)]
+struct Conditions {
+    node: usize,
+    /// Directions d in which u·d is prescribed, and the numbers of these rows.
+    fixed: Vec<(Vector2<f64>, usize)>,
+    gaps: Vec<GapRow>,
+}
+
+/// A gap condition at a node and how it is met.
+#[derive(Debug, Clone, Copy)]
+pub struct ContactPoint {
+    /// The node.
+    pub node: usize,
+    /// ν, towards the obstacle.
+    pub normal: [f64; 2],
+    /// Normal reaction p, N per metre of thickness; positive presses.
+    pub force: f64,
+    /// The reaction over the node's tributary length, Pa.
+    pub pressure: f64,
+    /// g − u·ν: the gap that is left, m.
+    pub gap: f64,
+    /// Whether the node presses rather than gapes, p/F > (g − u·ν)/U.
+    pub active: bool,
+}
+
+/// An answer: u = `rigid` + `elastic` at each node.
+#[derive(Debug, Clone, Copy)]
+pub struct Answer<'a> {
+    /// A rigid motion of each piece of the body, m; empty if it is zero.
+    pub rigid: &'a [f64],
+    /// The rest, which alone causes forces, m.
+    pub elastic: &'a [f64],
+    /// f − Ku, N per metre of thickness: what supports and obstacles must carry.
+    pub unbalanced: &'a [f64],
+    /// The values of the prescribed rows, m.
+    pub prescribed: &'a [f64],
+}
+
+/// A normal that has less than this outside the prescribed directions acts along them.
+const ALONG: f64 = 1e-6;
+/// Prescribed values that agree to this have no difference, relative to the largest of them.
+const ROUNDING: f64 = 1e-12;
+
+impl Certificate {
+    /// From the rows of the whole body.
+    pub fn new(fixed: &[FixedRow], gaps: &[GapRow]) -> Self {
+        let mut nodes = std::collections::BTreeMap::<usize, Conditions>::new();
+        for (number, row) in fixed.iter().enumerate() {
+            nodes.entry(row.node).or_default().fixed.push((row.direction.into(), number));
+        }
+        for gap in gaps {
+            nodes.entry(gap.node).or_default().gaps.push(gap.clone());
+        }
+        let nodes = nodes.into_iter().map(|(node, at)| Conditions { node, ..at }).collect();
+        Self { nodes, posed: fixed.len() + gaps.len() }
+    }
+
+    /// The conditions at the nodes that a rank owns.
+    pub fn share(&self, share: &Share) -> Self {
+        let local = |at: &Conditions| {
+            let node = share.owned(at.node)?;
+            let gaps = at.gaps.iter().map(|gap| GapRow { node, ..gap.clone() }).collect();
+            Some(Conditions { node, gaps, fixed: at.fixed.clone() })
+        };
+        let mut nodes: Vec<_> = self.nodes.iter().filter_map(local).collect();
+        nodes.sort_by_key(|at| at.node);
+        Self { nodes, posed: self.posed }
+    }
+
+    /// The residuals of an answer at the nodes `0..owned` and how its gap conditions are met.
+    /// Collective.
+    ///
+    /// Of f − Ku at a node, prescribed directions carry their part, and gap conditions what lies in
+    /// the cone Σ p ν, p ≥ 0, of their normals. What remains is a pull (dual) where the normals
+    /// span the rest of the plane, else it is split: along the normal a pull, across it unbalanced.
+    /// Where some condition is judged by no rank, no residual is a number.
+    pub fn judge(
+        &self,
+        answer: Answer,
+        owned: usize,
+        scales: Scales,
         ranks: Ranks,
-    ) -> Self {
-        let mut bounded = vec![false; residual.len()];
-        let (mut primal, mut dual, mut complementarity) = (0.0_f64, 0.0, 0.0);
-        for bound in bounds {
-            let (gap, p) = (bound.gap - c[bound.dof], -residual[bound.dof]);
-            bounded[bound.dof] = true;
-            primal = primal.max(-gap);
-            dual += p.min(0.0).powi(2);
-            complementarity += (p * gap).abs();
+    ) -> (Kkt, Vec<ContactPoint>) {
+        let mut points = Vec::new();
+        let (mut dual, mut supported) = (0.0, 0.0);
+        let (mut primal, mut complementarity) = (0.0_f64, 0.0_f64);
+        let mut next = 0;
+        let mut stationarity = 0.0;
+        let free = |nodes: std::ops::Range<usize>| {
+            answer.unbalanced[2 * nodes.start..2 * nodes.end].iter().map(|f| f * f).sum::<f64>()
+        };
+        for at in &self.nodes {
+            stationarity += free(next..at.node);
+            next = at.node + 1;
+            primal = worse(primal, at.prescribed_error(answer, scales));
+            let left = at.gaps_left(answer);
+            let carried = at.carry(vector(answer.unbalanced, at.node), &left);
+            dual += carried.pull;
+            supported += carried.across;
+            for ((gap, left), force) in at.gaps.iter().zip(&left).zip(carried.forces) {
+                let depth = if force.is_some() || -left > ROUNDING * gap.gap { -left } else { 0.0 };
+                primal =
+                    worse(primal, scales.of_displacement(if depth <= 0.0 { 0.0 } else { depth }));
+                let Some(force) = force else { continue };
+                complementarity = worse(complementarity, scales.natural(force, *left));
+                points.push(ContactPoint {
+                    node: at.node,
+                    normal: gap.normal,
+                    force,
+                    pressure: force / gap.weight,
+                    gap: *left,
+                    active: force > 0.0 && force * scales.displacement > left * scales.force,
+                });
+            }
         }
-        let stationarity: f64 = (0..residual.len())
-            .filter(|&dof| !bounded[dof] && !prescribed(dof))
-            .map(|dof| residual[dof].powi(2))
-            .sum();
-        let mut sums = [stationarity, dual, complementarity];
+        stationarity += free(next..owned) + supported;
+        let judged: usize = self.nodes.iter().map(|at| at.fixed.len() + at.gaps.len()).sum();
+        let mut sums = [stationarity, dual, judged as f64];
         ranks.sum(&mut sums);
-        let [stationarity, dual, complementarity] = sums;
-        let primal = ranks.max(primal);
-        Self {
-            stationarity: relative(stationarity.sqrt(), force_scale),
-            primal: relative(primal, displacement_scale),
-            dual: relative(dual.sqrt(), force_scale),
-            complementarity: relative(complementarity, force_scale * displacement_scale),
+        if sums[2] as usize != self.posed {
+            return (Kkt::UNKNOWN, points);
         }
-    }
-
-    /// The largest of the four; NaN if any is.
-    pub fn worst(&self) -> f64 {
-        // f64::max would forget a NaN.
-        let values = self.named().map(|(_, value)| value);
-        values.into_iter().fold(0.0, |worst, v| if v > worst || v.is_nan() { v } else { worst })
-    }
-
-    /// Whether all are at most `tolerance` (NaN is not).
-    pub fn within(&self, tolerance: f64) -> bool {
-        self.named().iter().all(|(_, value)| *value <= tolerance)
-    }
-
-    /// Which residuals miss `tolerance`, and by what factor.
-    pub fn missed(&self, tolerance: f64) -> String {
-        let missed =
-            self.named().into_iter().filter(|(_, value)| value.is_nan() || *value > tolerance);
-        let told =
-            |(name, value)| format!("{name} {value:.1e} ({:.1e} times it)", value / tolerance);
-        let missed: Vec<String> = missed.map(told).collect();
-        format!("the tolerance {tolerance:.1e} is missed by {}", missed.join(", "))
-    }
-
-    /// The larger of each residual of two answers.
-    pub fn max(&self, other: &Self) -> Self {
-        Self {
-            stationarity: self.stationarity.max(other.stationarity),
-            primal: self.primal.max(other.primal),
-            dual: self.dual.max(other.dual),
-            complementarity: self.complementarity.max(other.complementarity),
-        }
-    }
-
-    fn named(&self) -> [(&'static str, f64); 4] {
-        [
-            ("stationarity", self.stationarity),
-            ("primal", self.primal),
-            ("dual", self.dual),
-            ("complementarity", self.complementarity),
-        ]
+        let kkt = Kkt {
+            stationarity: scales.of_force(sums[0].sqrt()),
+            primal: ranks.max(primal),
+            dual: scales.of_force(sums[1].sqrt()),
+            complementarity: ranks.max(complementarity),
+        };
+        (kkt, points)
     }
 }
 
-impl fmt::Display for Kkt {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let parts = self.named().map(|(name, value)| format!("{name} {value:.1e}"));
-        f.write_str(&parts.join(", "))
+/// What becomes of f − Ku at a node.
+struct Carried {
+    /// p of each gap condition; `None` where the normal displacement is prescribed.
+    forces: Vec<Option<f64>>,
+    /// |·|² of the part against the normals.
+    pull: f64,
+    /// |·|² of the part that nothing can carry.
+    across: f64,
+}
+
+impl Conditions {
+    /// By how much the prescribed rows are missed, relative.
+    fn prescribed_error(&self, answer: Answer, scales: Scales) -> f64 {
+        let error = |(direction, row): &(Vector2<f64>, usize)| {
+            let value = answer.prescribed[*row];
+            let rigid = direction.dot(&self.rigid(answer));
+            let off = (value - rigid) - direction.dot(&vector(answer.elastic, self.node));
+            let rounding = ROUNDING * value.abs().max(rigid.abs());
+            scales.of_displacement(if off.abs() <= rounding { 0.0 } else { off.abs() })
+        };
+        self.fixed.iter().map(error).fold(0.0, worse)
+    }
+
+    fn rigid(&self, answer: Answer) -> Vector2<f64> {
+        match answer.rigid {
+            [] => Vector2::zeros(),
+            rigid => vector(rigid, self.node),
+        }
+    }
+
+    /// g − u·ν of each gap condition, the rigid part first: both are large where the gap is.
+    fn gaps_left(&self, answer: Answer) -> Vec<f64> {
+        let (rigid, elastic) = (self.rigid(answer), vector(answer.elastic, self.node));
+        let left = |gap: &GapRow| {
+            let normal = Vector2::from(gap.normal);
+            (gap.gap - normal.dot(&rigid)) - normal.dot(&elastic)
+        };
+        self.gaps.iter().map(left).collect()
+    }
+
+    /// Splits `force` among the conditions, whose gaps have `left`.
+    fn carry(&self, force: Vector2<f64>, left: &[f64]) -> Carried {
+        // Prescribed directions carry whatever acts along them.
+        let free: Vec<Vector2<f64>> = match self.fixed.split_first() {
+            None => vec![Vector2::x(), Vector2::y()],
+            Some(((d, _), others)) if others.iter().all(|(e, _)| d.perp(e).abs() <= ALONG) => {
+                vec![Vector2::new(-d.y, d.x)]
+            }
+            Some(_) => vec![],
+        };
+        let project = |v: Vector2<f64>| free.iter().map(|t| t * t.dot(&v)).sum::<Vector2<f64>>();
+        let force = project(force);
+        let normals: Vec<_> = self.gaps.iter().map(|gap| project(gap.normal.into())).collect();
+        let bears = |i: &usize| normals[*i].norm() > ALONG;
+        let bearing: Vec<usize> = (0..normals.len()).filter(bears).collect();
+        let (shares, rest) = cone(force, &normals, &bearing, left);
+        let forces = (0..normals.len()).map(|i| bears(&i).then_some(shares[i])).collect();
+        let along = match bearing[..] {
+            [] => Vector2::zeros(),
+            [first, ..] => {
+                let n = normals[first].normalize();
+                match bearing.iter().all(|&i| n.perp(&normals[i]).abs() <= ALONG) {
+                    true => n * n.dot(&rest),
+                    false => rest,
+                }
+            }
+        };
+        Carried { forces, pull: along.norm_squared(), across: (rest - along).norm_squared() }
     }
 }
 
-/// A residual over its scale; nothing over nothing is nothing.
-fn relative(residual: f64, scale: f64) -> f64 {
-    if residual == 0.0 { 0.0 } else { residual / scale }
+/// Shares p ≥ 0 of the `bearing` normals whose Σ p ν is nearest to `force`, and what is left of it.
+/// A vector in the plane lies in the cone of at most two of them; of several such pairs, the one
+/// whose gaps have the least `left`.
+fn cone(
+    force: Vector2<f64>,
+    normals: &[Vector2<f64>],
+    bearing: &[usize],
+    left: &[f64],
+) -> (Vec<f64>, Vector2<f64>) {
+    let mut best = (vec![0.0; normals.len()], force, 0.0);
+    let rounding = 1e-12 * force.norm();
+    let mut offer = |shares: &[(usize, f64)]| {
+        let carried: Vector2<f64> = shares.iter().map(|&(i, p)| normals[i] * p).sum();
+        let rest = force - carried;
+        let work: f64 = shares.iter().map(|&(i, p)| p * left[i].abs()).sum();
+        let gain = best.1.norm() - rest.norm();
+        if gain > rounding || (gain > -rounding && work < best.2) {
+            let mut all = vec![0.0; normals.len()];
+            shares.iter().for_each(|&(i, p)| all[i] = p);
+            best = (all, rest, work);
+        }
+    };
+    for (place, &i) in bearing.iter().enumerate() {
+        offer(&[(i, (normals[i].dot(&force) / normals[i].norm_squared()).max(0.0))]);
+        for &j in &bearing[..place] {
+            let area = normals[i].perp(&normals[j]);
+            let (p, q) = (force.perp(&normals[j]) / area, normals[i].perp(&force) / area);
+            if p > 0.0 && q > 0.0 {
+                offer(&[(i, p), (j, q)]);
+            }
+        }
+    }
+    (best.0, best.1)
+}
+
+fn vector(field: &[f64], node: usize) -> Vector2<f64> {
+    Vector2::new(field[2 * node], field[2 * node + 1])
+}
+
+/// The larger; NaN if either is, which f64::max would forget.
+fn worse(a: f64, b: f64) -> f64 {
+    if b > a || b.is_nan() { b } else { a }
 }

@@ -4,9 +4,11 @@
 
 mod active_set;
 mod anderson;
+mod approach;
 mod certificate;
 mod constraints;
 mod elastic;
+mod kkt;
 mod linear;
 mod nonnegative;
 mod penalty_duality;
@@ -14,8 +16,10 @@ mod problem;
 mod rigid;
 mod tao;
 
-pub use certificate::Kkt;
+pub(crate) use approach::approach;
+pub use certificate::{Answer, Certificate, ContactPoint};
 pub use constraints::{Bound, ConstraintError, Constraints, FixedRow, GapRow};
+pub use kkt::{Kkt, Scales};
 pub use penalty_duality::PenaltyOptions;
 pub(crate) use problem::unheld;
 pub use problem::{ContactError, ContactProblem, ContactReport, ContactSolver};

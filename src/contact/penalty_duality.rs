@@ -9,10 +9,10 @@ use super::{
 use crate::petsc::{PetscError, Session, Vector};
 use nalgebra::DMatrix;
 
-/// With G = ∂I₍₋∞,g₎ and its Yosida approximation the contact law becomes a fixed point in q:
+/// With G = ∂I₍ₗ,ᵤ₎ of the bounds l ≤ Bu ≤ u (mostly l = −∞, u = g) and its Yosida approximation the contact law becomes a fixed point in q:
 ///
 /// 1. solve (K + ω BᵀWB) u = f − BᵀW q,
-/// 2. r = Bu + λq,  y = min(g, r/(1 − λω)),  q ← (r − y)/λ.
+/// 2. r = Bu + λq,  y = r/(1 − λω) or the bound nearest to it,  q ← (r − y)/λ.
 ///
 /// B picks the bounded unknowns, W their shares of Γ_C; p = q + ω Bu is the contact pressure
 /// at the fixed point, which gives the first q from the start u. The iteration is mixed by Anderson: measured on this project's
@@ -188,20 +188,23 @@ impl ContactSolver for PenaltyDuality<'_> {
         let mut q = self.first(problem, omega, c)?;
 
         let (mut residuals, mut first_change) = (Kkt::default(), 0.0_f64);
-        let pressure = problem.force_scale / contact_length(problem);
+        let pressure = problem.scales.force / contact_length(problem);
         let mut anderson = Anderson::new(problem.ranks, problem.bounds.iter().map(|b| b.weight));
         while report.iterations < self.options.iterations {
             self.response(problem, omega, Some(problem.load), &q, c, &mut report)?;
             report.iterations += 1;
             let normal: Vec<f64> = c.read(|c| problem.bounds.iter().map(|b| c[b.dof]).collect())?;
-            let size = problem.size(c)?;
-            residuals = fixed_point_residuals(problem, omega, &q, &normal, size);
+            // The equation is solved: only the contact conditions are left to judge, with the
+            // contact forces W (q + ω Bu).
+            let at = |((q, u), bound): ((&f64, &f64), &Bound)| (bound.weight * (q + omega * u), *u);
+            let bounded = q.iter().zip(&normal).zip(problem.bounds).map(at);
+            residuals = problem.kkt(0.0, bounded, problem.scales(c)?);
             if residuals.within(0.1 * problem.tolerance) {
                 return Ok(report);
             }
             let image = |(q, (u, bound)): (&f64, (&f64, &Bound))| {
                 let r = u + lambda * q;
-                let y = bound.gap.min(r / (1.0 - self.options.lambda_omega));
+                let y = bound.nearest(r / (1.0 - self.options.lambda_omega));
                 (r - y) / lambda
             };
             let images = q.iter().zip(normal.iter().zip(problem.bounds)).map(image).collect();
@@ -234,21 +237,4 @@ impl ContactSolver for PenaltyDuality<'_> {
 /// |Γ_C|, m.
 fn contact_length(problem: &ContactProblem) -> f64 {
     problem.ranks.total(problem.bounds.iter().map(|b| b.weight).sum())
-}
-
-/// The KKT residuals of an iterate: its equation is solved, so the contact forces are
-/// W (q + ω Bu) and only the contact conditions are left to judge.
-fn fixed_point_residuals(
-    problem: &ContactProblem,
-    omega: f64,
-    q: &[f64],
-    normal: &[f64],
-    size: f64,
-) -> Kkt {
-    let local: Vec<Bound> = (problem.bounds.iter().enumerate())
-        .map(|(i, bound)| Bound { dof: i, ..bound.clone() })
-        .collect();
-    let force: Vec<f64> =
-        (0..q.len()).map(|i| -local[i].weight * (q[i] + omega * normal[i])).collect();
-    Kkt::of(&force, normal, &local, |_| false, problem.force_scale, size, problem.ranks)
 }

@@ -1,15 +1,15 @@
 //! What a contact solver is given and what it answers.
 
-use super::{Bound, Kkt};
+use super::{Bound, Kkt, Scales};
 use crate::{
     petsc::{Matrix, PetscError, Ranks, Session, Vector},
     phases::Phases,
 };
 use nalgebra::{DMatrix, DVector};
 
-/// min ½ cᵀKc − fᵀc  subject to  c_i ≤ g_i on the bounded unknowns.
+/// min ½ cᵀKc − fᵀc  subject to  lower_i ≤ c_i ≤ upper_i on the bounded unknowns.
 ///
-/// The unknowns c are displacements in the frames of the constraints: each bound concerns
+/// The unknowns c are displacements in the nodal bases of the constraints: each bound concerns
 /// one of them, prescribed ones have an identity row and load 0.
 pub struct ContactProblem<'a> {
     /// K, N/m.
@@ -18,15 +18,15 @@ pub struct ContactProblem<'a> {
     pub stiffness_scale: f64,
     /// f, N: loads less the forces of prescribed displacements.
     pub load: &'a Vector,
-    /// g_i and its node's share of Γ_C for each bounded unknown.
+    /// The bounded unknowns.
     pub bounds: &'a [Bound],
     /// u·ν of the rigid motions that only contact holds, one row per bound; no columns where
     /// K is positive definite.
     pub rigid: &'a DMatrix<f64>,
     /// The work of the load on each of these motions.
     pub work: &'a DVector<f64>,
-    /// ‖·‖₂ of the forces that count as 1 in relative residuals, N.
-    pub force_scale: f64,
+    /// What counts as 1 in relative residuals; displacements larger than its own raise it.
+    pub scales: Scales,
     /// KKT residuals to reach, relative.
     pub tolerance: f64,
     /// The ranks among which the unknowns are divided: bounds are their owners', what is
@@ -39,18 +39,52 @@ pub struct ContactProblem<'a> {
 impl ContactProblem<'_> {
     /// ‖residual‖₂ that linear systems are solved to, N: well below what the KKT residuals may be.
     pub fn linear_residual(&self) -> f64 {
-        0.1 * self.tolerance * self.force_scale
+        0.1 * self.tolerance * self.scales.force
     }
 
-    /// The KKT residuals of `c` by the assembled K (the final word has
-    /// [`Kkt`] by element-wise forces).
+    /// The scales for an iterate.
+    pub fn scales(&self, c: &Vector) -> Result<Scales, PetscError> {
+        let displacement = self.scales.displacement.max(self.size(c)?);
+        Ok(Scales { displacement, ..self.scales })
+    }
+
+    /// The KKT residuals of `c` by the assembled K (the final word has the
+    /// [`Certificate`](super::Certificate)).
     pub fn residuals(&self, session: &Session, c: &Vector) -> Result<Kkt, PetscError> {
         let residual = self.residual(session, c)?;
-        let size = self.size(c)?;
-        let kkt = |r: &[f64], c: &[f64]| {
-            Kkt::of(r, c, self.bounds, |_| false, self.force_scale, size, self.ranks)
-        };
-        residual.read(|r| c.read(|c| kkt(r, c)))?
+        let scales = self.scales(c)?;
+        residual.read(|r| {
+            c.read(|c| {
+                let at = |bound: &Bound| (-r[bound.dof], c[bound.dof]);
+                let mut free = r.to_vec();
+                self.bounds.iter().for_each(|bound| free[bound.dof] = 0.0);
+                let free = free.iter().map(|r| r * r).sum();
+                self.kkt(free, self.bounds.iter().map(at), scales)
+            })
+        })?
+    }
+
+    /// The KKT residuals when |r|² of the unbounded unknowns of this rank is `free`, N², and the
+    /// contact force and the unknown of each bound are (p, c). Collective.
+    pub fn kkt(&self, free: f64, bounded: impl Iterator<Item = (f64, f64)>, scales: Scales) -> Kkt {
+        let (mut primal, mut pull, mut complementarity) = (0.0_f64, 0.0, 0.0_f64);
+        for (bound, (p, c)) in self.bounds.iter().zip(bounded) {
+            let (above, below) = (bound.upper - c, c - bound.lower);
+            primal = primal.max(-above.min(below));
+            complementarity = complementarity.max(scales.natural(p, above));
+            match bound.lower.is_finite() {
+                true => complementarity = complementarity.max(scales.natural(-p, below)),
+                false => pull += p.min(0.0).powi(2),
+            }
+        }
+        let mut sums = [free, pull];
+        self.ranks.sum(&mut sums);
+        Kkt {
+            stationarity: scales.of_force(sums[0].sqrt()),
+            primal: scales.of_displacement(self.ranks.max(primal)),
+            dual: scales.of_force(sums[1].sqrt()),
+            complementarity: self.ranks.max(complementarity),
+        }
     }
 
     /// The largest entry in absolute value.
@@ -139,6 +173,19 @@ pub struct ContactReport {
     pub false_claims: usize,
 }
 
+impl ContactReport {
+    /// Adds what a further solve of the same problem took.
+    pub fn add(&mut self, further: &Self) {
+        self.iterations += further.iterations;
+        self.linear_iterations += further.linear_iterations;
+        self.factorisations += further.factorisations;
+        self.fallbacks += further.fallbacks;
+        self.contraction = further.contraction;
+        self.omega = further.omega;
+        self.false_claims += further.false_claims;
+    }
+}
+
 /// A contact solve that did not end well.
 #[derive(Debug, thiserror::Error)]
 pub enum ContactError {
@@ -161,6 +208,18 @@ pub enum ContactError {
         tolerance: f64,
         /// The residuals found.
         residuals: Kkt,
+    },
+    /// Rounding keeps the answer from the tolerance.
+    #[error(
+        "{source}; double precision reaches only about {attainable:.0e} here (triangles or parts much \
+         longer than wide, nearly incompressible or almost broken material): set contact.tolerance \
+         to that, or mend the mesh"
+    )]
+    Limited {
+        /// How the solve ended.
+        source: Box<Self>,
+        /// The tolerance that rounding allows, about.
+        attainable: f64,
     },
     /// The answer satisfies the KKT conditions of a stiffness that is not positive definite.
     #[error(

@@ -67,7 +67,6 @@ impl ContactSolver for Tao<'_> {
             "bqpip" => BOX,
             _ => INFINITE,
         };
-        lower.write(|v| v.fill(-infinite))?;
 
         let mut size = if self.size > 0.0 { self.size } else { load_size / s };
         let (mut reason, mut residuals) = (0, Kkt::default());
@@ -78,9 +77,14 @@ impl ContactSolver for Tao<'_> {
                     v[i] = load[i] / (s * size) + proximal * start[i] / size;
                 }
             })?;
+            let limit = |value: f64| (value / size).clamp(-infinite, infinite);
+            lower.write(|v| {
+                v.fill(-infinite);
+                problem.bounds.iter().for_each(|b| v[b.dof] = limit(b.lower));
+            })?;
             upper.write(|v| {
                 v.fill(infinite);
-                problem.bounds.iter().for_each(|b| v[b.dof] = (b.gap / size).min(infinite));
+                problem.bounds.iter().for_each(|b| v[b.dof] = limit(b.upper));
             })?;
             x.write(|v| v.iter_mut().zip(&start).for_each(|(v, c)| *v = c / size))?;
             let limit = problem.linear_residual() / (s * size);

@@ -11,13 +11,14 @@ mod notes;
 mod setting;
 mod state;
 
+pub use crate::contact::ContactPoint;
 pub use crate::phases::Phases;
 pub use bounds::Excess;
 pub use equilibrium::Equilibrium;
 pub use loads::Loads;
 pub use notes::Accuracy;
 pub use setting::{Setting, SetupError};
-pub use state::{ContactPoint, State, Step, StepRecord};
+pub use state::{State, Step, StepRecord};
 
 use crate::{
     contact::{ContactError, Kkt, RigidMotion},

@@ -2,7 +2,10 @@
 
 use super::Loads;
 use crate::{
-    contact::{ConstraintError, Constraints, DrivenMotion, FixedRow, GapRow, RigidMotions},
+    contact::{
+        Bound, Certificate, ConstraintError, Constraints, DrivenMotion, FixedRow, GapRow,
+        RigidMotions,
+    },
     fem::{Body, Elasticity, Mass, Share},
     mesh::{Mesh, boundary_nodes},
     model::DamageLaw,
@@ -18,8 +21,10 @@ pub struct Setting {
     pub body: Body,
     /// The undamaged elastic operator.
     pub elasticity: Elasticity,
-    /// Displacement conditions.
+    /// Displacement conditions as unknowns and bounds, for the solvers.
     pub constraints: Constraints,
+    /// The same conditions as posed, to judge answers by.
+    pub certificate: Certificate,
     /// Rigid motions that Γ_D does not hold.
     pub motions: RigidMotions,
     /// Loads and prescribed displacements.
@@ -86,6 +91,7 @@ impl Setting {
         motions.pin_free(&body, &mut constraints);
 
         let setting = Self {
+            certificate: Certificate::new(&fixed, &constraints.gaps),
             elasticity: Elasticity::new(scene.material),
             constraints,
             motions,
@@ -107,6 +113,7 @@ impl Setting {
         let Some(share) = Share::of(session, &self.body.mesh)? else { return Ok(self) };
         Ok(Self {
             constraints: self.constraints.share(&share),
+            certificate: self.certificate.share(&share),
             loads: self.loads.share(&share),
             body: share.body(&self.body),
             ..self
@@ -121,7 +128,7 @@ impl Setting {
             Some(TimeGrid { end, stepping: Stepping::Auto { .. } }) => (end, 100),
         };
         for time in (0..=steps).map(|n| end * n as f64 / steps as f64) {
-            self.lift(time)?;
+            self.posed(time)?;
             if !self.motions.held() {
                 self.check_load(time, &self.loads.at(&self.body, time))?;
             }
@@ -157,6 +164,19 @@ impl Setting {
         self.constraints
             .lift(&values, &self.body.mesh.nodes)
             .map_err(|source| SetupError::Constraint { scene: self.scene.path.clone(), source })
+    }
+
+    /// The prescribed unknowns at `time`, and the bounds on the others.
+    ///
+    /// # Errors
+    /// Those of [`Self::lift`], and obstacles that leave a node no room.
+    pub fn posed(&self, time: f64) -> Result<(Vec<f64>, Vec<Bound>), SetupError> {
+        let lift = self.lift(time)?;
+        let bounds = self
+            .constraints
+            .bounds_at(&lift, &self.body.mesh.nodes)
+            .map_err(|source| SetupError::Constraint { scene: self.scene.path.clone(), source })?;
+        Ok((lift, bounds))
     }
 
     /// The time of the first solve, s: 0, or 1 where there is no time.

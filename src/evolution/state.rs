@@ -1,6 +1,6 @@
 //! An accepted step: its fields and its figures.
 
-use crate::contact::{Kkt, RigidMotion};
+use crate::contact::{ContactPoint, Kkt, RigidMotion};
 use serde::Serialize;
 
 /// An accepted step.
@@ -27,21 +27,6 @@ pub struct State {
     pub zeta_mean: Vec<f64>,
     /// The nodes of Γ_C that carry a gap condition; two entries at a corner.
     pub contact: Vec<ContactPoint>,
-}
-
-/// A gap condition at a node and how it is met.
-#[derive(Debug, Clone, Copy)]
-pub struct ContactPoint {
-    /// The node.
-    pub node: usize,
-    /// Normal reaction, N per metre of thickness; positive presses.
-    pub force: f64,
-    /// The reaction over the node's share of Γ_C, Pa.
-    pub pressure: f64,
-    /// g − u·ν: the gap that is left, m.
-    pub gap: f64,
-    /// Whether the node presses rather than gapes, force against gap in relative size.
-    pub active: bool,
 }
 
 /// The figures of a step: a row of `history.csv`.

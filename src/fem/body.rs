@@ -37,6 +37,18 @@ impl Body {
         Self { mesh, triangles, own_triangles, partition, node_area, area }
     }
 
+    /// Whether the triangles known here are all those around the nodes owned: their shares of the
+    /// areas of these nodes add up.
+    pub fn is_covered(&self) -> bool {
+        let mut area = vec![0.0; self.mesh.nodes.len()];
+        for (t, triangle) in self.mesh.triangles.iter().zip(&self.triangles) {
+            t.iter().for_each(|&node| area[node] += triangle.area / 3.0);
+        }
+        let owned = self.partition.owned();
+        let mut both = area[..owned].iter().zip(&self.node_area);
+        both.all(|(found, whole)| (found - whole).abs() <= 1e-9 * whole)
+    }
+
     /// The six displacements of a triangle out of a nodal field.
     pub fn gather(&self, triangle: usize, u: &[f64]) -> [f64; 6] {
         let [a, b, c] = self.mesh.triangles[triangle];

@@ -3,7 +3,7 @@
 
 use super::Body;
 use crate::model::Material;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 
 /// Strains, stresses and internal forces of a displacement field, triangle by triangle.
 #[derive(Debug, Clone, Copy)]
@@ -43,5 +43,24 @@ impl Elasticity {
             }
         }
         force
+    }
+
+    /// The rounding that double precision leaves in the internal forces of u: ε Σ |K||u| over the
+    /// triangles at each node, N per metre of thickness (Oettli and Prager, Numer. Math. 6, 1964).
+    pub fn force_rounding(&self, body: &Body, zeta: &[f64], u: &[f64]) -> Vec<f64> {
+        let mut rounding = vec![0.0; u.len()];
+        for (t, nodes) in body.mesh.triangles.iter().enumerate() {
+            let local = body.gather(t, u);
+            for i in 0..3 {
+                for j in 0..3 {
+                    let k = body.triangles[t].stiffness(&self.d, i, j).abs();
+                    let force = k * Vector2::new(local[2 * j].abs(), local[2 * j + 1].abs());
+                    let size = f64::EPSILON * zeta[t].abs();
+                    rounding[2 * nodes[i]] += size * force[0];
+                    rounding[2 * nodes[i] + 1] += size * force[1];
+                }
+            }
+        }
+        rounding
     }
 }

@@ -30,20 +30,24 @@ impl Frames {
             index: share.field(&vec![IDENTITY; self.index.len()], 1),
             fixed: share.field(&self.fixed, 2),
         };
-        for (node, directions, _) in &self.directions {
+        for (node, directions, inverse) in &self.directions {
             if let Some(node) = share.local(*node) {
-                frames.set(node, *directions);
+                frames.add(node, *directions, *inverse);
             }
         }
         frames
     }
 
-    /// Makes the rows of `directions` the basis at `node`; they must be independent.
-    pub fn set(&mut self, node: usize, directions: Matrix2<f64>) {
-        if let Some(inverse) = directions.try_inverse() {
-            self.index[node] = self.directions.len() as u32;
-            self.directions.push((node, directions, inverse));
-        }
+    /// Makes the rows of `directions` the basis at `node`; `None` if they are dependent.
+    #[must_use]
+    pub fn set(&mut self, node: usize, directions: Matrix2<f64>) -> Option<()> {
+        self.add(node, directions, directions.try_inverse()?);
+        Some(())
+    }
+
+    fn add(&mut self, node: usize, directions: Matrix2<f64>, inverse: Matrix2<f64>) {
+        self.index[node] = self.directions.len() as u32;
+        self.directions.push((node, directions, inverse));
     }
 
     /// Takes unknown `dof` (2·node + component) out of the system.

@@ -12,6 +12,7 @@ mod frames;
 mod elasticity;
 mod stiffness;
 mod recovery;
+mod rigid_part;
 mod damage;
 mod loads;
 
@@ -21,6 +22,7 @@ pub use elasticity::Elasticity;
 pub use frames::Frames;
 pub use loads::{add_body_force, add_traction};
 pub use partition::Partition;
+pub use rigid_part::RigidPart;
 pub use share::Share;
 pub use stiffness::Stiffness;
 pub use triangle::Triangle;

@@ -1,77 +1,159 @@
-//! The residuals that judge every answer: each fault shows in its own figure and no other.
+//! The residuals that judge every answer: each fault shows in its own figure and no other, and a
+//! fault of the unknowns that a solver works with cannot hide.
 
-use crate::support::close_to;
+use crate::support::{close, close_to, difference, run, setting, square, try_run};
+use nalgebra::Matrix2;
 use signorini::{
-    contact::{Bound, Kkt},
+    contact::{Answer, Certificate, ContactPoint, FixedRow, GapRow, Kkt, SOLVERS, Scales},
+    evolution::Setting,
     petsc::Ranks,
 };
 
-/// Four unknowns with bounds on 1 and 3, forces in units of 10 and displacements of 2:
-/// unknown 1 presses with 6 at its gap, 3 gapes by 0.5.
-fn judge(change: impl Fn(&mut [f64], &mut [f64])) -> Kkt {
-    let bound =
-        |dof: usize, gap: f64| Bound { dof, node: dof / 2, normal: [0.0, 1.0], gap, weight: 1.0 };
-    // The residual Ku − f is minus the contact force.
-    let (mut residual, mut c) = (vec![0.0, -6.0, 0.0, 0.0], vec![2.0, 0.25, -1.0, 0.5]);
-    change(&mut residual, &mut c);
-    Kkt::of(
-        &residual,
-        &c,
-        &[bound(1, 0.25), bound(3, 1.0)],
-        |dof| dof == 0,
-        10.0,
-        2.0,
-        Ranks::alone(),
-    )
+const SCALES: Scales = Scales { force: 10.0, displacement: 2.0 };
+
+fn gap(node: usize, normal: [f64; 2], gap: f64) -> GapRow {
+    GapRow { node, normal, gap, weight: 1.0 }
+}
+
+/// Judges u and f − Ku at two nodes: u_x of node 0 is prescribed (2), node 0 presses with 6 at its
+/// gap along y, node 1 gapes by 0.5.
+fn judge(change: impl Fn(&mut [f64], &mut [f64])) -> (Kkt, Vec<ContactPoint>) {
+    let (mut unbalanced, mut u) = (vec![0.0, 6.0, 0.0, 0.0], vec![2.0, 0.25, -1.0, 0.5]);
+    change(&mut unbalanced, &mut u);
+    let fixed = [FixedRow { node: 0, direction: [1.0, 0.0] }];
+    let gaps = [gap(0, [0.0, 1.0], 0.25), gap(1, [0.0, 1.0], 1.0)];
+    let answer = Answer { rigid: &[], elastic: &u, unbalanced: &unbalanced, prescribed: &[2.0] };
+    Certificate::new(&fixed, &gaps).judge(answer, 2, SCALES, Ranks::alone())
 }
 
 #[test]
 fn a_solution_has_no_residual() {
-    assert_eq!(judge(|_, _| {}), Kkt::default());
-    // Forces that hold a prescribed unknown are no fault.
-    assert_eq!(judge(|residual, _| residual[0] = 1e3), Kkt::default());
+    let (kkt, points) = judge(|_, _| {});
+    assert_eq!(kkt, Kkt::default());
+    assert_eq!(
+        points.iter().map(|p| (p.force, p.gap)).collect::<Vec<_>>(),
+        [(6.0, 0.0), (0.0, 0.5)]
+    );
+    assert_eq!(points.iter().map(|p| p.active).collect::<Vec<_>>(), [true, false]);
+    // Forces along a prescribed direction are no fault.
+    assert_eq!(judge(|force, _| force[0] = 1e3).0, Kkt::default());
 }
 
 #[test]
-fn a_free_unknown_out_of_balance_shows_in_stationarity() {
-    let kkt = judge(|residual, _| residual[2] = 0.3);
+fn an_unbalanced_force_shows_in_stationarity() {
+    let (kkt, _) = judge(|force, _| force[2] = 0.3);
     assert_eq!(kkt, Kkt { stationarity: 0.03, ..Kkt::default() });
 }
 
 #[test]
 fn an_overlap_shows_in_the_primal_residual() {
-    // Unknown 3, without force: its overlap alone counts.
-    let kkt = judge(|_, c| c[3] = 1.25);
+    // Node 1, without force: its overlap alone counts.
+    let (kkt, _) = judge(|_, u| u[3] = 1.25);
     assert_eq!(kkt, Kkt { primal: 0.125, ..Kkt::default() });
 }
 
 #[test]
+fn a_prescribed_displacement_that_is_missed_shows_in_the_primal_residual() {
+    let (kkt, _) = judge(|_, u| u[0] = 2.5);
+    assert_eq!(kkt, Kkt { primal: 0.25, ..Kkt::default() });
+}
+
+#[test]
 fn a_pull_shows_in_the_dual_residual() {
-    // At a closed gap, so that it does no complementary work.
-    let kkt = judge(|residual, _| residual[1] = 2.0);
+    let (kkt, _) = judge(|force, _| force[1] = -2.0);
     assert_eq!(kkt, Kkt { dual: 0.2, ..Kkt::default() });
 }
 
 #[test]
-fn a_force_across_a_gap_shows_in_complementarity() {
-    // 0.8 over 0.5, relative to 10 · 2; overlap times force counts as well.
-    let kkt = judge(|residual, _| residual[3] = -0.8);
-    close_to(kkt.complementarity, 0.02, 1e-15);
+fn a_force_across_a_gap_is_judged_by_the_smaller_of_both_whatever_the_other_is() {
+    // 0.8 of 10 across 0.5 of 2.
+    let (kkt, _) = judge(|force, _| force[3] = 0.8);
+    close_to(kkt.complementarity, 0.08, 1e-15);
     assert_eq!((kkt.stationarity, kkt.primal, kkt.dual), (0.0, 0.0, 0.0));
-    let kkt = judge(|_, c| c[1] = 0.35);
-    close_to(kkt.complementarity, 0.03, 1e-14);
-    close_to(kkt.primal, 0.05, 1e-14);
+    // A wider gap makes a small force no worse, a larger force a small gap no worse.
+    let (kkt, _) = judge(|force, u| (force[3], u[3]) = (0.8, -1e9));
+    close_to(kkt.complementarity, 0.08, 1e-15);
+    let (kkt, _) = judge(|force, u| (force[3], u[3]) = (1e9, 1.0 - 1e-3));
+    close_to(kkt.complementarity, 5e-4, 1e-12);
+}
+
+#[test]
+fn a_force_in_the_cone_of_a_corners_normals_is_carried_and_no_other() {
+    let normals = [[0.0, -1.0], [0.6, -0.8], [0.0, 1.0]];
+    let force_of = |shares: [f64; 3]| {
+        let along = |k: usize| (0..3).map(|i| shares[i] * normals[i][k]).sum();
+        [along(0), along(1)]
+    };
+    let judged = |force: [f64; 2]| {
+        let gaps = normals.map(|normal| gap(0, normal, 0.0));
+        let answer =
+            Answer { rigid: &[], elastic: &[0.0, 0.0], unbalanced: &force, prescribed: &[] };
+        Certificate::new(&[], &gaps).judge(answer, 1, SCALES, Ranks::alone())
+    };
+    for shares in [[3.0, 2.0, 0.0], [0.0, 2.0, 1.0], [0.0, 0.0, 5.0], [4.0, 0.0, 0.0]] {
+        let (kkt, points) = judged(force_of(shares));
+        assert!(kkt.within(1e-15), "{kkt}");
+        points.iter().zip(shares).for_each(|(point, share)| close(point.force, share, 1e-13));
+    }
+    // The nearest that the cone has to (−1, 0) is nothing.
+    close_to(judged([-1.0, 0.0]).0.dual, 0.1, 1e-15);
 }
 
 #[test]
 fn what_is_not_a_number_is_never_within_a_tolerance() {
     for fault in 0..4 {
-        let kkt = judge(|residual, _| residual[fault] = f64::NAN);
-        assert_eq!(kkt.within(1e300), fault == 0, "residual {fault}: {kkt}");
-        assert_eq!(kkt.worst().is_nan(), fault != 0, "residual {fault}: {kkt}");
+        let (kkt, _) = judge(|force, _| force[fault] = f64::NAN);
+        assert!(!kkt.within(1e300) && kkt.worst().is_nan(), "force {fault}: {kkt}");
     }
-    for fault in [1, 3] {
-        let kkt = judge(|_, c| c[fault] = f64::NAN);
-        assert!(!kkt.within(1e300) && kkt.worst().is_nan(), "unknown {fault}: {kkt}");
+    for fault in [0, 1, 3] {
+        let (kkt, _) = judge(|_, u| u[fault] = f64::NAN);
+        assert!(!kkt.within(1e300) && kkt.worst().is_nan(), "displacement {fault}: {kkt}");
+    }
+}
+
+/// A turned square on a foundation, pressed on its right half and pulled on its left.
+fn turned() -> Setting {
+    let text = "
+        material = { young = 100, poisson = 0.3, plane = 'stress' }
+        boundary = [
+            { name = 'left', displacement = [0, 0] },
+            { name = 'bottom', gap = '0.01*x', normal = [0.6, -0.8] },
+            { name = 'top', traction = ['5', '8-20*x'] },
+        ]";
+    setting(square(6), text).unwrap()
+}
+
+#[test]
+fn a_fault_in_bases_or_bounds_cannot_certify_itself() {
+    for solver in SOLVERS {
+        let right = run(&turned(), solver).last.state;
+        assert!(right.contact.iter().any(|p| p.active) && right.contact.iter().any(|p| !p.active));
+        let active = right.contact.iter().position(|p| p.active).unwrap();
+        let node = right.contact[active].node;
+        let faults: [(&str, &dyn Fn(&mut Setting)); 4] = [
+            ("a bound is forgotten", &|s| {
+                s.constraints.bounds.retain(|bound| bound.node != node);
+            }),
+            ("a gap is mistaken", &|s| {
+                s.constraints.bounds.iter_mut().for_each(|b| b.upper *= 1.5)
+            }),
+            ("a free unknown is taken for a prescribed one", &|s| {
+                s.constraints.frames.fix(2 * node + 1);
+            }),
+            ("a basis is lost, so that the bound is one on u_x", &|s| {
+                s.constraints.frames.set(node, Matrix2::identity()).unwrap();
+            }),
+        ];
+        for (fault, plant) in faults {
+            let mut faulty = turned();
+            plant(&mut faulty);
+            match try_run(&faulty, solver) {
+                Err(error) => assert!(error.to_string().contains("tolerance"), "{fault}: {error}"),
+                Ok(outcome) => {
+                    let off = difference(&outcome.last.state.u, &right.u);
+                    panic!("{solver} certified an answer {off:.1e} off: {fault}");
+                }
+            }
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! Conditions that meet at one node.
 
-use crate::support::{moved, run, setting, square, turn};
+use crate::support::{run, setting, square};
 use signorini::{
     contact::{ConstraintError, Constraints, FixedRow, GapRow, SOLVERS},
     evolution::SetupError,
@@ -127,29 +127,65 @@ fn contradictory_values_at_a_common_node_are_an_error() {
 }
 
 #[test]
-fn three_independent_conditions_at_a_node_are_an_error() {
-    // The corner (1, 0) of a turned square: two contact normals and a held direction that
-    // is neither. The held side is a curve of its own that ends in the corner.
-    let mut mesh = moved(square(4), |x| turn(0.3, x));
-    let corner = mesh.curves["right"].edges[0];
-    let end = signorini::mesh::Curve { edges: vec![corner], interior_edges: 0 };
-    mesh.curves.insert("end".into(), end);
-    let text = format!(
-        "{MATERIAL}
-         boundary = [
-            {{ name = 'end', displacement = [0, 'free'] }},
-            {{ name = 'right', gap = 0 }},
-            {{ name = 'bottom', gap = 0 }},
-         ]"
-    );
-    let [x, y] = mesh.nodes[corner[0]];
-    match setting(mesh, &text) {
-        Err(SetupError::Constraint {
-            source: ConstraintError::TooMany { x: at_x, y: at_y },
-            ..
-        }) => assert_eq!((at_x, at_y), (x, y)),
-        other => panic!("{other:?}"),
+fn a_node_between_two_plates_has_one_unknown_with_two_bounds() {
+    let gap = |normal, gap| GapRow { node: 0, normal, gap, weight: 1.0 };
+    let limits = |angle: f64, lower: f64, upper: f64| {
+        let n = [angle.sin(), -angle.cos()];
+        let rows = [gap(n, upper), gap(n.map(|v| -v), lower)];
+        let constraints = Constraints::new(&[[0.0, 0.0]], &[], &rows).unwrap();
+        let [bound] = &constraints.bounds[..] else { panic!("{constraints:?}") };
+        assert_eq!((bound.normal, bound.lower, bound.upper), (n, -lower, upper));
+        bound.is_equality()
+    };
+    for angle in [0.0, 0.4, 2.0] {
+        assert!(!limits(angle, 0.2, 0.1));
+        assert!(limits(angle, 0.0, 0.0), "plates that meet leave no freedom along their normal");
     }
+    // Tilted by less than coordinates can tell they are parallel, by a little more nobody can say,
+    // beyond that they are two conditions.
+    let tilted = |tilt: f64| {
+        let rows = [gap([0.0, -1.0], 0.1), gap([tilt.sin(), tilt.cos()], 0.1)];
+        Constraints::new(&[[3.0, 4.0]], &[], &rows)
+    };
+    assert_eq!(tilted(1e-12).unwrap().bounds.len(), 1);
+    match tilted(1e-6).unwrap_err() {
+        ConstraintError::Dependent { x, y, angle } => {
+            assert_eq!((x, y), (3.0, 4.0));
+            assert!((angle - 1e-6).abs() < 1e-12);
+        }
+        other => panic!("{other}"),
+    }
+    assert_eq!(tilted(1e-3).unwrap().bounds.len(), 2);
+}
+
+#[test]
+fn two_normals_at_a_node_with_a_prescribed_direction_bound_its_other_unknown() {
+    // u_x = v is prescribed; u_y is kept by (0.6, −0.8)·u ≤ 0.2 from below and by
+    // (0.8, 0.6)·u ≤ 0.1 from above.
+    let origin = [[0.0, 0.0]];
+    let rows = [([0.6, -0.8], 0.2), ([0.8, 0.6], 0.1)].map(|(normal, gap)| GapRow {
+        node: 0,
+        normal,
+        gap,
+        weight: 1.0,
+    });
+    let fixed = [FixedRow { node: 0, direction: [1.0, 0.0] }];
+    let constraints = Constraints::new(&origin, &fixed, &rows).unwrap();
+    for v in [-0.3, 0.0, 0.15] {
+        let lift = constraints.lift(&[v], &origin).unwrap();
+        let bounds = constraints.bounds_at(&lift, &origin).unwrap();
+        let [bound] = &bounds[..] else { panic!("{bounds:?}") };
+        // The unknown is the first row's normal displacement.
+        let u_y = |c: f64| (0.6 * v - c) / 0.8;
+        let (low, high) = ((0.6 * v - 0.2) / 0.8, (0.1 - 0.8 * v) / 0.6);
+        assert!((u_y(bound.upper) - low).abs() < 1e-14 && (u_y(bound.lower) - high).abs() < 1e-14);
+    }
+    // Carried further there is no room between them.
+    let lift = constraints.lift(&[0.5], &origin).unwrap();
+    assert!(matches!(
+        constraints.bounds_at(&lift, &origin),
+        Err(ConstraintError::NoRoom { x: 0.0, y: 0.0, .. })
+    ));
 }
 
 #[test]
@@ -164,7 +200,7 @@ fn gaps_of_one_smooth_boundary_become_one_bound_and_those_of_a_corner_two() {
         ];
         let constraints = Constraints::new(&[[0.0, 0.0]], &[], &rows).unwrap();
         assert_eq!(constraints.bounds.len(), bounds);
-        let gaps: Vec<f64> = constraints.bounds.iter().map(|b| b.gap).collect();
+        let gaps: Vec<f64> = constraints.bounds.iter().map(|b| b.upper).collect();
         let weight: f64 = constraints.bounds.iter().map(|b| b.weight).sum();
         assert_eq!(weight, 4.0);
         if bounds == 1 {
@@ -189,7 +225,7 @@ fn a_third_gap_or_a_gap_along_a_held_direction_takes_no_unknown() {
     let gap = |normal, gap| GapRow { node: 0, normal, gap, weight: 1.0 };
     let held = |direction| FixedRow { node: 0, direction };
     let origin = [[0.0, 0.0]];
-    let three = [gap([0.0, -1.0], 0.0), gap([1.0, 0.0], 0.0), gap([-1.0, 0.0], 0.0)];
+    let three = [gap([0.0, -1.0], 0.0), gap([1.0, 0.0], 0.0), gap([-0.6, 0.8], 0.0)];
     assert!(matches!(Constraints::new(&origin, &[], &three), Err(ConstraintError::TooMany { .. })));
     // Held along the normal: no bound, but the value is checked against the gap.
     let constraints =

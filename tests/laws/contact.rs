@@ -31,7 +31,7 @@ fn project(setting: &Setting, u: &[f64], v: &mut [f64]) {
         let along = |w: &[f64]| {
             w[2 * bound.node] * bound.normal[0] + w[2 * bound.node + 1] * bound.normal[1]
         };
-        let excess = (along(u) + along(v) - bound.gap).max(0.0);
+        let excess = (along(u) + along(v) - bound.upper).max(0.0);
         for k in 0..2 {
             v[2 * bound.node + k] -= excess * bound.normal[k];
         }

@@ -189,7 +189,7 @@ fn frames(nodes: usize, random: &mut Random) -> Frames {
         let opening = if node % 2 == 0 { 0.5 * std::f64::consts::PI } else { 0.8 };
         let (s, c) = angle.sin_cos();
         let (t, d) = (angle + opening).sin_cos();
-        frames.set(node, Matrix2::new(c, s, d, t));
+        frames.set(node, Matrix2::new(c, s, d, t)).unwrap();
         if node % 4 == 0 {
             frames.fix(2 * node + 1);
         }

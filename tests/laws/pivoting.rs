@@ -3,7 +3,7 @@
 use crate::support::close;
 use nalgebra::{DMatrix, DVector};
 use signorini::{
-    contact::{Bound, ContactProblem, ContactReport, PenaltyOptions, SOLVERS, solver},
+    contact::{Bound, ContactProblem, ContactReport, PenaltyOptions, SOLVERS, Scales, solver},
     petsc::{Matrix, Ranks, Session, Vector},
     phases::Phases,
 };
@@ -35,7 +35,8 @@ impl Small {
             dof,
             node: dof,
             normal: [0.0, 1.0],
-            gap: *gap,
+            lower: f64::NEG_INFINITY,
+            upper: *gap,
             weight: 1.0,
         };
         let bounds: Vec<_> = self.gaps.iter().enumerate().map(bound).collect();
@@ -46,7 +47,10 @@ impl Small {
             bounds: &bounds,
             rigid: &self.rigid,
             work: &self.work,
-            force_scale: self.load.iter().map(|f| f * f).sum::<f64>().sqrt(),
+            scales: Scales {
+                force: self.load.iter().map(|f| f * f).sum::<f64>().sqrt(),
+                displacement: 0.0,
+            },
             tolerance: TOLERANCE,
             ranks: Ranks::alone(),
             phases: &Phases::default(),

@@ -1,7 +1,7 @@
 //! Meshes, scenes and runs for the laws.
 
 use signorini::{
-    evolution::{self, Outcome, Phases, Setting, SetupError, Step},
+    evolution::{self, Outcome, Phases, RunError, Setting, SetupError, Step},
     mesh::{self, Curve, Mesh},
     petsc::Session,
     scene::Scene,
@@ -146,6 +146,12 @@ pub fn history(setting: &Setting, solver: &str) -> (Vec<Step>, Outcome) {
 /// The outcome alone.
 pub fn run(setting: &Setting, solver: &str) -> Outcome {
     history(setting, solver).1
+}
+
+/// The outcome or why there is none.
+pub fn try_run(setting: &Setting, solver: &str) -> Result<Outcome, RunError> {
+    let session = Session::start(&[]).unwrap();
+    evolution::run(&session, setting, solver, &Phases::default(), &mut |_| Ok(()))
 }
 
 /// ‖a − b‖ / ‖b‖.

@@ -33,8 +33,10 @@ impl Equilibrium<'_> {
         let external = setting.loads.at(body, state.time);
         let mut residual: Vec<f64> = external.iter().zip(&internal).map(|(f, r)| f - r).collect();
         constraints.frames.force_to_frame(&mut residual);
-        let pressing = constraints.bounds.iter().zip(&state.contact).filter(|(_, p)| p.active);
-        let pressing: Vec<usize> = pressing.map(|(bound, _)| bound.dof).collect();
+        let active = state.contact.iter().filter(|point| point.active);
+        let bounds = active.filter_map(|p| constraints.bound_along(p.node, p.normal));
+        let mut pressing: Vec<usize> = bounds.map(|i| constraints.bounds[i].dof).collect();
+        pressing.dedup();
         pressing.iter().for_each(|&dof| residual[dof] = 0.0);
         let fixed = constraints.frames.fixed();
         residual.iter_mut().zip(fixed).filter(|(_, on)| **on).for_each(|(r, _)| *r = 0.0);

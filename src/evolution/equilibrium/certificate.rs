@@ -1,45 +1,74 @@
 //! What an answer is worth, from the displacement alone: residuals, contact, figures.
 
-use super::Equilibrium;
+use super::{Equilibrium, ROUNDED};
 use crate::{
-    contact::{self, ContactReport, Kkt, RigidMotion},
-    evolution::{ContactPoint, Setting, State, StepRecord},
+    contact::{self, Answer, ContactError, ContactPoint, ContactReport, Kkt, RigidMotion, Scales},
+    evolution::{Setting, State, StepRecord},
+    fem::RigidPart,
 };
 
-impl Equilibrium<'_> {
-    /// The KKT residuals of u by element-wise forces, the cosine between u and these forces (the
-    /// sign of the energy), and the state of contact they imply. `load_size` keeps the scale of
-    /// forces where a prescribed displacement carries the body along without stress.
-    pub(super) fn certify(
-        &self,
-        u: &[f64],
-        external: &[f64],
-        load_size: f64,
-    ) -> (Kkt, f64, Vec<ContactPoint>) {
-        let setting = self.setting;
-        let (body, constraints) = (&setting.body, &setting.constraints);
-        let internal = setting.elasticity.internal_force(body, &self.zeta_mean, u);
-        let partition = &body.partition;
-        let forces = partition.norm(external, 2).max(partition.norm(&internal, 2));
-        let force_scale = forces.max(load_size);
-        let size = partition.largest(u);
-        let energy = partition.dot(&internal, u, 2)
-            / (force_scale * partition.norm(u, 2)).max(f64::MIN_POSITIVE);
+/// What the certificate found.
+pub(super) struct Judged {
+    pub(super) kkt: Kkt,
+    /// The scales of the residuals: of the run so far, this answer included.
+    pub(super) scales: Scales,
+    /// The size of the forces of this answer, N per metre of thickness.
+    pub(super) force: f64,
+    /// The cosine between u and its elastic forces: the sign of the energy.
+    pub(super) energy: f64,
+    pub(super) contact: Vec<ContactPoint>,
+    /// The rigid part of u, and the sizes of it and of the rest, m.
+    pub(super) rigid: RigidPart,
+    pub(super) sizes: [f64; 2],
+}
 
-        let mut residual: Vec<f64> = internal.iter().zip(external).map(|(r, f)| r - f).collect();
-        let mut c = u.to_vec();
-        constraints.frames.force_to_frame(&mut residual);
-        constraints.frames.displacement_to_frame(&mut c);
-        let bounds = &constraints.bounds;
-        let owned = &residual[..2 * partition.owned()];
-        let prescribed = |dof: usize| self.prescribed[dof];
-        let kkt = Kkt::of(owned, &c, bounds, prescribed, force_scale, size, partition.ranks());
-        let points = bounds.iter().map(|bound| {
-            let (force, gap) = (-residual[bound.dof], bound.gap - c[bound.dof]);
-            let active = force * size > gap * force_scale;
-            ContactPoint { node: bound.node, force, pressure: force / bound.weight, gap, active }
-        });
-        (kkt, energy, points.collect())
+impl Equilibrium<'_> {
+    /// Judges u, measured from the datum, by element-wise forces.
+    pub(super) fn certify(&self, u: &[f64], external: &[f64], prescribed: &[f64]) -> Judged {
+        let setting = self.setting;
+        let (body, partition) = (&setting.body, &setting.body.partition);
+        let internal = setting.elasticity.internal_force(body, &self.zeta_mean, u);
+        let force = partition.norm(external, 2).max(partition.norm(&internal, 2));
+        let rigid = RigidPart::of(body, u);
+        let sizes = rigid.sizes(body, u);
+        let scales = self.scales.max(Scales { force, displacement: sizes[1] });
+        let energy = partition.dot(&internal, u, 2)
+            / (scales.force * partition.norm(u, 2)).max(f64::MIN_POSITIVE);
+        let unbalanced: Vec<f64> = external.iter().zip(&internal).map(|(f, r)| f - r).collect();
+        let answer =
+            Answer { rigid: &self.datum.field, elastic: u, unbalanced: &unbalanced, prescribed };
+        let ranks = partition.ranks();
+        let (mut kkt, contact) =
+            setting.certificate.judge(answer, partition.owned(), scales, ranks);
+        if !self.covered {
+            kkt.stationarity = f64::NAN;
+        }
+        Judged { kkt, scales, force, energy, contact, rigid, sizes }
+    }
+
+    /// Adds to an error what double precision can reach, where that is less than was asked for: the
+    /// rounding of the internal forces alone, relative to forces of size `force`.
+    pub(super) fn limited(&self, error: ContactError, force: f64, u: &[f64]) -> ContactError {
+        let setting = self.setting;
+        let rounding = setting.elasticity.force_rounding(&setting.body, &self.zeta_mean, u);
+        let size = force.max(self.scales.force);
+        let attainable = ROUNDED * setting.body.partition.norm(&rounding, 2) / size;
+        match attainable > setting.tolerance {
+            true => ContactError::Limited { source: Box::new(error), attainable },
+            false => error,
+        }
+    }
+
+    /// Which bounds a contact force above `least`, N/m, acts on.
+    pub(super) fn active_bounds(&self, contact: &[ContactPoint], least: f64) -> Vec<bool> {
+        let constraints = &self.setting.constraints;
+        let mut active = vec![false; constraints.bounds.len()];
+        for point in contact.iter().filter(|point| point.active && point.force > least) {
+            if let Some(bound) = constraints.bound_along(point.node, point.normal) {
+                active[bound] = true;
+            }
+        }
+        active
     }
 
     /// A rigid motion that the pressing nodes leave. A body without load rests where it is,
@@ -51,7 +80,7 @@ impl Equilibrium<'_> {
         let partition = &self.setting.body.partition;
         let nodes = partition.total() as f64;
         let least = nodes * self.setting.tolerance * force_scale;
-        let pressing: Vec<bool> = contact.iter().map(|point| point.force > least).collect();
+        let pressing = self.active_bounds(contact, least);
         let unheld = contact::unheld(partition.ranks(), &self.rigid, &pressing);
         let first = unheld.first().filter(|_| force_scale > 0.0)?;
         Some(self.setting.motions.combined(first))

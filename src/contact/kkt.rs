@@ -1,0 +1,117 @@
+//! The Karush–Kuhn–Tucker residuals of an answer, whoever computed it.
+
+use std::fmt;
+
+/// What counts as 1 in relative residuals: the sizes of forces and of displacements in a run so
+/// far, so that a load that passes zero, or a gap much wider than a displacement, changes nothing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scales {
+    /// F: the largest ‖·‖₂ of the nodal loads and of the internal forces, N per metre of thickness.
+    pub force: f64,
+    /// U: the largest displacement of a node against the rigid motion of its piece, m.
+    pub displacement: f64,
+}
+
+impl Scales {
+    /// The larger of each.
+    pub fn max(self, other: Self) -> Self {
+        Self {
+            force: self.force.max(other.force),
+            displacement: self.displacement.max(other.displacement),
+        }
+    }
+
+    /// ‖·‖₂ of forces over F.
+    pub(super) fn of_force(self, force: f64) -> f64 {
+        relative(force, self.force)
+    }
+
+    /// A displacement over U.
+    pub(super) fn of_displacement(self, displacement: f64) -> f64 {
+        relative(displacement, self.displacement)
+    }
+
+    /// The natural residual min(p/F, (g − u·ν)/U) of a force p > 0 across an open gap: it means
+    /// the same for every gap and load (Facchinei and Pang, Finite-Dimensional Variational
+    /// Inequalities and Complementarity Problems I, section 1.5.1: the min function).
+    pub fn natural(self, force: f64, gap: f64) -> f64 {
+        self.of_force(force.max(0.0)).min(self.of_displacement(gap.max(0.0)))
+    }
+}
+
+/// Relative KKT residuals of u. The multiplier p of a gap condition is the contact force that u
+/// itself implies.
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
+pub struct Kkt {
+    /// ‖the part of f − Ku that no support can carry‖₂ / F.
+    pub stationarity: f64,
+    /// max (u·ν − g)₊ / U.
+    pub primal: f64,
+    /// ‖(−p)₊‖₂ / F: contact forces that pull.
+    pub dual: f64,
+    /// max min(p/F, (g − u·ν)/U) over the gap conditions.
+    pub complementarity: f64,
+}
+
+impl Kkt {
+    /// Of an answer that cannot be judged.
+    pub(super) const UNKNOWN: Self = Self {
+        stationarity: f64::NAN,
+        primal: f64::NAN,
+        dual: f64::NAN,
+        complementarity: f64::NAN,
+    };
+
+    /// The largest of the four; NaN if any is.
+    pub fn worst(&self) -> f64 {
+        // f64::max would forget a NaN.
+        let values = self.named().map(|(_, value)| value);
+        values.into_iter().fold(0.0, |worst, v| if v > worst || v.is_nan() { v } else { worst })
+    }
+
+    /// Whether all are at most `tolerance` (NaN is not).
+    pub fn within(&self, tolerance: f64) -> bool {
+        self.named().iter().all(|(_, value)| *value <= tolerance)
+    }
+
+    /// Which residuals miss `tolerance`, and by what factor.
+    pub fn missed(&self, tolerance: f64) -> String {
+        let missed =
+            self.named().into_iter().filter(|(_, value)| value.is_nan() || *value > tolerance);
+        let told =
+            |(name, value)| format!("{name} {value:.1e} ({:.1e} times it)", value / tolerance);
+        let missed: Vec<String> = missed.map(told).collect();
+        format!("the tolerance {tolerance:.1e} is missed by {}", missed.join(", "))
+    }
+
+    /// The larger of each residual of two answers.
+    pub fn max(&self, other: &Self) -> Self {
+        Self {
+            stationarity: self.stationarity.max(other.stationarity),
+            primal: self.primal.max(other.primal),
+            dual: self.dual.max(other.dual),
+            complementarity: self.complementarity.max(other.complementarity),
+        }
+    }
+
+    fn named(&self) -> [(&'static str, f64); 4] {
+        [
+            ("stationarity", self.stationarity),
+            ("primal", self.primal),
+            ("dual", self.dual),
+            ("complementarity", self.complementarity),
+        ]
+    }
+}
+
+impl fmt::Display for Kkt {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let parts = self.named().map(|(name, value)| format!("{name} {value:.1e}"));
+        f.write_str(&parts.join(", "))
+    }
+}
+
+/// A residual over its scale; nothing over nothing is nothing.
+fn relative(residual: f64, scale: f64) -> f64 {
+    if residual == 0.0 { 0.0 } else { residual / scale }
+}
