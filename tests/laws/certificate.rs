@@ -123,6 +123,9 @@ fn turned() -> Setting {
     setting(square(6), text).unwrap()
 }
 
+/// What is done to a setting, in words and in deed.
+type Fault<'a> = (&'static str, &'a dyn Fn(&mut Setting));
+
 #[test]
 fn a_fault_in_bases_or_bounds_cannot_certify_itself() {
     for solver in SOLVERS {
@@ -130,7 +133,7 @@ fn a_fault_in_bases_or_bounds_cannot_certify_itself() {
         assert!(right.contact.iter().any(|p| p.active) && right.contact.iter().any(|p| !p.active));
         let active = right.contact.iter().position(|p| p.active).unwrap();
         let node = right.contact[active].node;
-        let faults: [(&str, &dyn Fn(&mut Setting)); 4] = [
+        let faults: [Fault; 4] = [
             ("a bound is forgotten", &|s| {
                 s.constraints.bounds.retain(|bound| bound.node != node);
             }),

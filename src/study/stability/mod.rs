@@ -11,6 +11,7 @@ mod tao_types;
 mod random_contact;
 mod conditioning;
 mod lost_contact;
+mod scales;
 
 pub use random_contact::sample as random_sample;
 
@@ -31,6 +32,7 @@ pub const MAPS: &[(&str, Map)] = &[
     ("active-set", random_contact::run),
     ("conditioning", conditioning::run),
     ("lost-contact", lost_contact::run),
+    ("scales", scales::run),
 ];
 
 /// What a cell of a map turned out to be.
