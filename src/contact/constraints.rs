@@ -1,136 +1,9 @@
 //! From directions and values at nodes to frames, prescribed unknowns and bounds.
 
+use super::{Bound, ConstraintError, FixedRow, GapRow};
 use crate::fem::{Frames, Share};
 use nalgebra::{Matrix2, Vector2};
 use std::collections::BTreeMap;
-
-/// u·d is prescribed at a node (a displacement component, or 0 across a symmetry axis).
-#[derive(Debug, Clone)]
-pub struct FixedRow {
-    /// The node.
-    pub node: usize,
-    /// d, a unit vector.
-    pub direction: [f64; 2],
-}
-
-/// u·ν ≤ g at a node of Γ_C.
-#[derive(Debug, Clone)]
-pub struct GapRow {
-    /// The node.
-    pub node: usize,
-    /// ν, a unit vector.
-    pub normal: [f64; 2],
-    /// g ≥ 0, m.
-    pub gap: f64,
-    /// The node's share of Γ_C, m.
-    pub weight: f64,
-}
-
-/// Gap conditions of a node as bounds on one unknown: lower ≤ c_dof ≤ upper.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Bound {
-    /// The unknown, 2·node + component in the node's basis.
-    pub dof: usize,
-    /// The node.
-    pub node: usize,
-    /// ν: the unknown is u·ν.
-    pub normal: [f64; 2],
-    /// Least u·ν, m: −∞ unless an obstacle stands on the other side too.
-    pub lower: f64,
-    /// Largest u·ν, m.
-    pub upper: f64,
-    /// The node's tributary length of Γ_C, m.
-    pub weight: f64,
-}
-
-impl Bound {
-    /// Whether the obstacles leave the unknown one value.
-    pub fn is_equality(&self) -> bool {
-        self.lower == self.upper
-    }
-
-    /// The value nearest to `c` that both sides admit, m.
-    pub fn nearest(&self, c: f64) -> f64 {
-        c.max(self.lower).min(self.upper)
-    }
-}
-
-/// Conditions at a node that cannot hold together.
-#[derive(Debug, Clone, thiserror::Error)]
-pub enum ConstraintError {
-    /// A prescribed displacement goes through the obstacle.
-    #[error(
-        "the displacement prescribed at node ({x}, {y}) goes {depth:.3e} m through the obstacle \
-         there: a node that is both held and in contact keeps its prescribed value, which must \
-         respect the gap"
-    )]
-    Penetrates {
-        /// Coordinates of the node.
-        x: f64,
-        /// Coordinates of the node.
-        y: f64,
-        /// How far beyond the gap, m.
-        depth: f64,
-    },
-    /// Two prescribed values contradict each other.
-    #[error(
-        "two boundaries prescribe different displacements at their common node ({x}, {y}): \
-         {first} and {second} m along ({dx:.3}, {dy:.3})"
-    )]
-    Contradicts {
-        /// Coordinates of the node.
-        x: f64,
-        /// Coordinates of the node.
-        y: f64,
-        /// The value kept, m.
-        first: f64,
-        /// The value that differs, m.
-        second: f64,
-        /// The common direction.
-        dx: f64,
-        /// The common direction.
-        dy: f64,
-    },
-    /// Two obstacles leave a node no place.
-    #[error(
-        "the obstacles on both sides of node ({x}, {y}) leave it no room: it would have to be {depth:.3e} m \
-         inside one of them; widen a gap or change the displacement prescribed there"
-    )]
-    NoRoom {
-        /// Coordinates of the node.
-        x: f64,
-        /// Coordinates of the node.
-        y: f64,
-        /// How much the gaps lack, m.
-        depth: f64,
-    },
-    /// Directions too near to each other to be unknowns of their own, too far apart to be one.
-    #[error(
-        "two conditions at node ({x}, {y}) (prescribed directions or contact normals) differ from \
-         one line by an angle of only {angle:.1e}: double precision cannot tell their effects apart; \
-         open the wedge there beyond {DEPENDENT:e} rad, or let one boundary end before the node"
-    )]
-    Dependent {
-        /// Coordinates of the node.
-        x: f64,
-        /// Coordinates of the node.
-        y: f64,
-        /// The angle between the directions' lines, rad.
-        angle: f64,
-    },
-    /// More independent conditions than the two unknowns of a node.
-    #[error(
-        "more than two independent conditions (prescribed directions and contact normals) meet at \
-         node ({x}, {y}): a node of the plane has two unknowns; free one of them or separate \
-         the boundaries"
-    )]
-    TooMany {
-        /// Coordinates of the node.
-        x: f64,
-        /// Coordinates of the node.
-        y: f64,
-    },
-}
 
 /// All displacement conditions of a body.
 #[derive(Debug, Clone)]
@@ -170,7 +43,7 @@ const PARALLEL: f64 = 1e-8;
 /// Directions closer than this angle, rad, but not one, are refused: the basis they make at a node
 /// loses as many digits as the angle has zeros. (A contact solve reaches the default tolerance
 /// down to here.)
-const DEPENDENT: f64 = 1e-4;
+pub(super) const DEPENDENT: f64 = 1e-4;
 /// Contact normals closer than 30° belong to one smooth boundary.
 const CORNER_COSINE: f64 = 0.866_025_403_784_438_6;
 /// Prescribed values may differ by this much of the largest, and a gap may lack this much of the

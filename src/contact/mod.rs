@@ -6,6 +6,7 @@ mod active_set;
 mod anderson;
 mod approach;
 mod certificate;
+mod constraint_error;
 mod constraints;
 mod elastic;
 mod kkt;
@@ -14,16 +15,19 @@ mod nonnegative;
 mod penalty_duality;
 mod problem;
 mod rigid;
+mod rows;
 mod tao;
 
 pub(crate) use approach::approach;
 pub use certificate::{Answer, Certificate, ContactPoint};
-pub use constraints::{Bound, ConstraintError, Constraints, FixedRow, GapRow};
+pub use constraint_error::ConstraintError;
+pub use constraints::Constraints;
 pub use kkt::{Kkt, Scales};
 pub use penalty_duality::PenaltyOptions;
 pub(crate) use problem::unheld;
 pub use problem::{ContactError, ContactProblem, ContactReport, ContactSolver};
 pub use rigid::{DrivenMotion, RigidMotion, RigidMotions};
+pub use rows::{Bound, FixedRow, GapRow};
 
 use crate::petsc::Session;
 

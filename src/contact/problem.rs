@@ -186,11 +186,14 @@ impl ContactReport {
     }
 }
 
+/// What to try where a method has missed the tolerance.
+const ADVICE: &str = "; try another contact.solver, shorter steps or a larger contact.tolerance";
+
 /// A contact solve that did not end well.
 #[derive(Debug, thiserror::Error)]
 pub enum ContactError {
     /// The method ended above the tolerance.
-    #[error("{method} stopped after {iterations} iterations: {detail}")]
+    #[error("{method} stopped after {iterations} iterations: {detail}{ADVICE}")]
     NotConverged {
         /// The solver's name.
         method: &'static str,
@@ -200,7 +203,7 @@ pub enum ContactError {
         detail: String,
     },
     /// The answer does not satisfy the KKT conditions.
-    #[error("{method} gave an answer, but {}", residuals.missed(*tolerance))]
+    #[error("{method} gave an answer, but {}{ADVICE}", residuals.missed(*tolerance))]
     NotCertified {
         /// The solver's name.
         method: &'static str,
@@ -213,7 +216,7 @@ pub enum ContactError {
     #[error(
         "{source}; double precision reaches only about {attainable:.0e} here (triangles or parts much \
          longer than wide, nearly incompressible or almost broken material): set contact.tolerance \
-         to that, or mend the mesh"
+         to that or more, or mend the mesh"
     )]
     Limited {
         /// How the solve ended.
@@ -232,7 +235,7 @@ pub enum ContactError {
     /// One of TAO's types ended above the tolerance.
     #[error(
         "tao:{kind} stopped after {iterations} iterations: {} (TaoConvergedReason {reason}, \
-        {false_claims} false claims of convergence)", residuals.missed(*tolerance)
+        {false_claims} false claims of convergence){ADVICE}", residuals.missed(*tolerance)
     )]
     TaoStopped {
         /// TAO's type.

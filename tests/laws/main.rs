@@ -22,5 +22,6 @@ mod patch;
 mod pivoting;
 mod regression;
 mod rigid;
+mod scales;
 mod undo;
 mod units;
