@@ -38,15 +38,9 @@ def amplification(size, largest):
     return max(1.0, power * max(m for m in (1, 2, 5) if m * power <= wanted * (1 + 1e-12)))
 
 
-def widest_gap(results):
-    """The largest initial distance between Γ_C and the obstacle, where it is known."""
-    pieces, widest = results.contact_pieces(), 0.0
-    for line in results.foundation():
-        piece, line = matching_piece(results.nodes, pieces, line)
-        if piece is not None:
-            away = np.linalg.norm(line - results.nodes[piece], axis=1)
-            widest = max(widest, float(away.max()))
-    return widest
+def headline(results, text):
+    """The title, what the figure shows, and that the run ended early if it did."""
+    return "\n".join(filter(None, (results.title, results.ending, text)))
 
 
 def map_size(extent, across):
@@ -60,37 +54,17 @@ def draw_outline(axes, points, results, **style):
     axes.add_collection(LineCollection(curves, capstyle="round", **style))
 
 
-def draw_foundation(axes, results, factor=0.0):
+def draw_foundation(axes, results, factor=None):
     """The obstacle as a thick line, hatched on its far side.
 
-    Where displacements are amplified by `factor` the initial gap must be too, or the
-    picture would show penetration that is not there.
+    Where displacements are amplified by `factor` its distance from Γ_C is too: the body then
+    touches it where the gap is closed and nowhere crosses it.
     """
-    pieces = results.contact_pieces()
-    for line in results.foundation():
-        piece, line = matching_piece(results.nodes, pieces, line)
-        if piece is not None and factor:
-            line = results.nodes[piece] + factor * (line - results.nodes[piece])
+    for line in results.foundation(factor):
         # The body is on the left of the line, so the strokes go to the right.
         strokes = withTickedStroke(spacing=6, angle=-135, length=1.0, linewidth=0.8, foreground=INK)
         axes.plot(*line.T, color=INK, linewidth=0.8, path_effects=[strokes], zorder=1.5)
         axes.plot(*line.T, color=INK, linewidth=1.8, zorder=1.6, solid_capstyle="butt")
-
-
-def matching_piece(nodes, pieces, line):
-    """The piece of Γ_C a line of the obstacle faces, and the line run the same way.
-
-    A line with as many points as the piece was made from it point by point; the piece
-    is None where no piece has as many points.
-    """
-    best, best_distance, best_line = None, np.inf, line
-    for piece in pieces:
-        for candidate in (line, line[::-1]):
-            ends = candidate[[0, -1]] - nodes[piece][[0, -1]]
-            distance = np.linalg.norm(ends)
-            if distance < best_distance:
-                best, best_distance, best_line = piece, distance, candidate
-    return (best if best and len(best) == len(line) else None), best_line
 
 
 def frame(axes, points, size):
@@ -123,15 +97,20 @@ def unit_prefix(value):
 
 
 def damage_scale(zeta):
-    """What to show of ζ: values, label, colour map. Darker always means more damaged.
+    """What to show of ζ: values, label, colour map, limits. Darker always means more damaged.
 
-    Where ζ hardly leaves 1 the loss 1 − ζ, in a power of ten, can be read; ζ cannot.
+    Where ζ hardly leaves 1 the loss 1 − ζ, in a power of ten, can be read; ζ cannot. Where ζ is
+    uniform the colours would show the round-off between nodes, unless they have limits.
     """
     loss = 1.0 - zeta
+    uniform = np.ptp(loss) <= 1e-9 * loss.max()
     if 0.0 < loss.max() < 0.1:
         power = int(np.floor(np.log10(loss.max())))
-        return loss / 10.0**power, rf"damage  $1 - \zeta$  ($\times 10^{{{power}}}$)", "magma_r"
-    return zeta, r"damage field  $\zeta$", "magma"
+        label = rf"damage  $1 - \zeta$  ($\times 10^{{{power}}}$)"
+        limits = {"vmin": 0.0, "vmax": 10.0} if uniform else {}
+        return loss / 10.0**power, label, "magma_r", limits
+    limits = {"vmin": 0.0, "vmax": 1.0} if uniform else {}
+    return zeta, r"damage field  $\zeta$", "magma", limits
 
 
 def least_zeta(low):

@@ -20,19 +20,23 @@ from matplotlib.tri import Triangulation
 
 from drawing import (
     BLUE, FAINT, INK, RED, along, amplification, damage_scale, draw_colourbar, draw_foundation,
-    draw_outline, frame, least_zeta, map_size, unit_prefix, widest_gap,
+    draw_outline, frame, headline, least_zeta, map_size, unit_prefix,
 )
 from results import ResultError, read_results
+
+# ζ closer to 1 than this is undamaged.
+ROUNDING = 1e-12
 
 
 def draw_deformed(results, factor=None):
     """The deformed mesh over the initial outline and the foundation.
 
-    Sliding is amplified too: beside Γ_C the body may seem to pass the obstacle's end.
+    The obstacle is drawn opposite the nodes of Γ_C, which slide: it seems to slide with them.
     """
     largest = np.linalg.norm(results.displacement, axis=1).max()
     # The obstacle moves away by as much: it must keep its shape, and stay in sight.
-    factor = factor or amplification(results.size, max(largest, widest_gap(results)))
+    widest = np.linalg.norm(results.obstacle - results.contact, axis=2).max(initial=0.0)
+    factor = factor or amplification(results.size, max(largest, widest))
     moved = results.nodes + factor * results.displacement
     both = np.vstack((results.nodes, moved))
     extent = np.ptp(both, axis=0)
@@ -50,10 +54,9 @@ def draw_deformed(results, factor=None):
     )
     draw_foundation(axes, results, factor)
     frame(axes, both, results.size)
-    axes.set_title(
-        f"{results.title}\ndeformed mesh at t = {results.time:g} s, displacements × {factor:g} "
-        f"(largest {largest:.3g} m); dashed: initial outline"
-    )
+    moves = f"displacements × {factor:g} (largest {largest:.3g} m); dashed: initial outline"
+    moves = "unloaded" if results.unloaded else moves
+    axes.set_title(headline(results, f"deformed mesh at t = {results.time:g} s, {moves}"))
     return figure
 
 
@@ -63,7 +66,7 @@ def draw_stress_and_damage(results):
     An undamaged body has only its stress to show.
     """
     extent = np.ptp(results.nodes, axis=0)
-    damaged = np.abs(1.0 - results.zeta).max() > 0.0
+    damaged = np.abs(1.0 - results.zeta).max() > ROUNDING
     if not damaged:
         width, height = map_size(extent, 6.0)
         figure, left = plt.subplots(figsize=(width + 0.9, height + 0.5))
@@ -87,8 +90,8 @@ def draw_stress_and_damage(results):
     left.set_title(f"von Mises stress, largest {largest / factor:.3g} {prefix}Pa")
 
     if damaged:
-        values, label, colours = damage_scale(results.zeta)
-        damage = right.tripcolor(mesh, values, shading="gouraud", cmap=colours)
+        values, label, colours, limits = damage_scale(results.zeta)
+        damage = right.tripcolor(mesh, values, shading="gouraud", cmap=colours, **limits)
         draw_colourbar(right, damage, label)
         right.set_title(rf"damage, least $\zeta$ = {least_zeta(results.zeta.min())}")
 
@@ -96,7 +99,7 @@ def draw_stress_and_damage(results):
         draw_outline(axes, results.nodes, results, color=INK, linewidth=0.7)
         draw_foundation(axes, results)
         frame(axes, results.nodes, results.size)
-    figure.suptitle(f"{results.title}, t = {results.time:g} s", fontsize=11.5)
+    figure.suptitle(headline(results, f"t = {results.time:g} s"), fontsize=11.5)
     return figure
 
 
@@ -138,34 +141,31 @@ def draw_pressure(results):
         rows[0, -1].scatter([], [], s=25, facecolor=face, edgecolor=BLUE, linewidth=0.8, label=name)
     rows[0, -1].legend(loc="best")
     active, nodes = (results.summary.get(f"{kind}_nodes", "?") for kind in ("active", "contact"))
-    figure.suptitle(
-        f"{results.title}: contact at t = {results.time:g} s, {active} of {nodes} nodes active",
-        fontsize=11,
-    )
+    text = "unloaded" if results.unloaded else f"{active} of {nodes} nodes active"
+    text = f"contact at t = {results.time:g} s, {text}"
+    figure.suptitle(headline(results, text), fontsize=11)
     return figure
 
 
 def draw_damage_history(results):
     """min ζ and mean ζ in time, and the moment ζ_* was reached."""
     time, least = results.history.get("time"), results.history.get("zeta_min")
-    if time is None or least is None or len(time) < 3 or np.nanmin(least) >= 1.0:
+    if time is None or least is None or len(time) < 3 or np.nanmin(least) >= 1.0 - ROUNDING:
         return None
     figure, axes = plt.subplots(figsize=(6.4, 3.8))
     axes.plot(time, results.history["zeta_mean"], color=FAINT, linewidth=1.4, label="mean ζ")
     axes.plot(time, least, color=BLUE, linewidth=1.8, label="min ζ")
-    title = results.title
     stopped = results.summary.get("stopped_at")
     if stopped is not None:
         axes.axvline(stopped, color=RED, linewidth=1.0, linestyle=(0, (4, 2)),
                      label=f"ζ$_*$ reached at t = {stopped:.4g} s")
-        title += ": stopped"
         axes.set_ylim(bottom=0.0)
     axes.set_xlim(left=0.0)
     plain = ScalarFormatter(useOffset=False)
     axes.yaxis.set_major_formatter(plain)
     axes.set_xlabel("time t (s)")
     axes.set_ylabel("damage field ζ")
-    axes.set_title(title)
+    axes.set_title(headline(results, ""))
     axes.legend(loc="lower left")
     return figure
 
@@ -196,10 +196,13 @@ def main():
             continue
         for name, draw in figures.items():
             figure = draw(results)
-            if figure is not None:
-                figure.savefig(results.folder / name)
-                plt.close(figure)
-                print(results.folder / name)
+            if figure is None:
+                # One of an earlier run would be taken for this one's.
+                (results.folder / name).unlink(missing_ok=True)
+                continue
+            figure.savefig(results.folder / name)
+            plt.close(figure)
+            print(results.folder / name)
     return 1 if failed else 0
 
 

@@ -4,7 +4,7 @@ import csv
 import json
 import xml.etree.ElementTree as ElementTree
 from collections import defaultdict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import meshio
@@ -42,10 +42,26 @@ class Results:
     von_mises: np.ndarray  # (m,), Pa
     pressure: np.ndarray  # (n,), Pa, −σ_ν
     gap: np.ndarray  # (n,), m, NaN off Γ_C
+    contact: np.ndarray  # (k, 2, 2): both ends of the edges of Γ_C, m
+    tangents: np.ndarray  # (k, 2, 2): along which the body slides there, 0 where it cannot
+    obstacle: np.ndarray  # (k, 2, 2): what is opposite them, m
 
     @property
     def title(self):
         return self.summary.get("title") or self.summary.get("scene") or self.folder.name
+
+    @property
+    def ending(self):
+        """That the run did not reach its end, and when it ended; nothing if it did."""
+        stopped = self.summary.get("stopped_at")
+        if self.summary.get("error"):
+            return f"the run FAILED after t = {self.time:g} s"
+        return "" if stopped is None else f"stopped: ζ$_*$ reached at t = {stopped:.4g} s"
+
+    @property
+    def unloaded(self):
+        """Whether nothing has moved: see `without_roundoff`."""
+        return not self.displacement.any()
 
     @property
     def size(self):
@@ -67,17 +83,21 @@ class Results:
         on = np.isfinite(self.gap)
         return paths([tuple(edge) for edge in edges[on[edges].all(axis=1)].tolist()])
 
-    def foundation(self):
-        """The obstacle's edges as polylines; without them in the summary, Γ_C itself."""
-        lines = self.summary.get("foundation")
-        if not lines:
-            return [self.nodes[piece] for piece in self.contact_pieces()]
-        segments = [
-            tuple(map(tuple, np.round(pair, 12).tolist()))
-            for line in lines
-            for pair in zip(line[:-1], line[1:])
-        ]
-        return [np.array(path) for path in paths(segments)]
+    def foundation(self, factor=None):
+        """The obstacle as polylines; with a factor, as the body deformed so many times meets it.
+
+        A node of Γ_C touches the obstacle where u·ν = g, so what is opposite it moves to
+        x + factor (g ν + (u·τ) τ): it goes along with the sliding of the body.
+        """
+        lines = self.obstacle
+        if factor is not None:
+            at = {tuple(x): u for x, u in zip(self.nodes.tolist(), self.displacement)}
+            u = np.array([at[tuple(x)] for x in self.contact.reshape(-1, 2).tolist()])
+            u = u.reshape(self.contact.shape)
+            sliding = (u * self.tangents).sum(axis=2, keepdims=True) * self.tangents
+            lines = self.contact + factor * (self.obstacle - self.contact + sliding)
+        lines = np.round(lines, 12)
+        return [np.array(path) for path in paths([tuple(map(tuple, l)) for l in lines.tolist()])]
 
 
 def paths(edges):
@@ -112,7 +132,7 @@ def paths(edges):
 
 def read_results(folder):
     """Everything a figure needs from one result folder."""
-    folder = Path(folder)
+    folder, summary = Path(folder), {}
     try:
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
         with open(folder / "history.csv", newline="", encoding="utf-8") as file:
@@ -122,7 +142,7 @@ def read_results(folder):
         fields = read_frame(folder / last.get("file"))
         blocks = [k for k, block in enumerate(fields.cells) if block.type == "triangle"]
         triangles = np.vstack([fields.cells[k].data for k in blocks])
-        return Results(
+        results = Results(
             folder=folder,
             summary=summary,
             history={c: np.array([_number(r[c]) for r in rows]) for c in (rows or [{}])[0]},
@@ -134,13 +154,33 @@ def read_results(folder):
             von_mises=np.concatenate([np.ravel(fields.cell_data["von_mises"][k]) for k in blocks]),
             pressure=np.ravel(fields.point_data["normal_pressure"]),
             gap=np.ravel(fields.point_data["gap"]),
+            contact=_segments(summary["contact_boundary"]),
+            tangents=_segments(summary["contact_tangents"]),
+            obstacle=_segments(summary["foundation"]),
         )
+        return without_roundoff(results)
     except OSError as error:
+        if failed := summary.get("error"):
+            raise ResultError(f"{folder}: nothing to draw, the run failed: {failed}") from None
         raise ResultError(f"{error.filename}: {error.strerror}") from None
     except KeyError as error:
         raise ResultError(f"{folder}: the field {error} is missing") from None
     except (ValueError, ElementTree.ParseError, meshio.ReadError) as error:
         raise ResultError(f"{folder}: {error}") from None
+
+
+def without_roundoff(results):
+    """The results, with zeros in the place of what round-off leaves of an unloaded state.
+
+    That is a state whose displacements are below the rounding of coordinates, or a billion times
+    smaller than earlier in the run (solvers are exact to about 1e-10).
+    """
+    largest = np.linalg.norm(results.displacement, axis=1).max()
+    earlier = np.nanmax(results.history.get("displacement_max", [0.0]), initial=0.0)
+    if largest > max(1e-14 * results.size, 1e-9 * earlier):
+        return results
+    names = ("displacement", "von_mises", "pressure")
+    return replace(results, **{name: 0.0 * getattr(results, name) for name in names})
 
 
 def read_frame(path):
@@ -177,6 +217,10 @@ def read_frame(path):
             for name in pieces[0].cell_data
         },
     )
+
+
+def _segments(lists):
+    return np.array(lists, dtype=float).reshape(-1, 2, 2)
 
 
 def _number(text):

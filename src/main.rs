@@ -13,7 +13,7 @@ use std::{path::PathBuf, process::ExitCode};
     version,
     about,
     after_help = "Exit codes: 0 finished or stopped at ζ_*, \
-    1 a solver missed its tolerance (state saved), 2 bad input."
+    1 the run ended early, e.g. a solver missed its tolerance (state saved), 2 bad input."
 )]
 struct Arguments {
     #[command(subcommand)]

@@ -22,7 +22,7 @@ pub use run::{RunArguments, run};
 pub use stability::{StabilityArguments, stability};
 
 use signorini::{
-    contact::{TAO_TYPES, is_solver, solver_names},
+    contact::{TAO_TYPES, UnknownSolver, is_solver},
     mesh,
     scene::Scene,
 };
@@ -73,10 +73,7 @@ impl fmt::Display for Failure {
 fn check_solver(option: &str, name: &str) -> Result<(), Failure> {
     match is_solver(name) {
         true => Ok(()),
-        false => Err(Failure::Input(format!(
-            "{option}: there is no contact solver `{name}`; there are {}",
-            solver_names()
-        ))),
+        false => Err(Failure::Input(format!("{option}: {}", UnknownSolver(name.to_owned())))),
     }
 }
 

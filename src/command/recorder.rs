@@ -13,7 +13,11 @@ pub(super) struct Recorder<'a> {
     folder: &'a Path,
     setting: &'a Setting,
     phases: &'a Phases,
+    solver: &'a str,
     profile: bool,
+    /// Triangles, and nodes with a gap condition, of the whole body.
+    triangles: usize,
+    contact_nodes: usize,
     /// Seconds of all accepted steps after n = 0.
     stepping: f64,
     every: Option<usize>,
@@ -26,24 +30,36 @@ pub(super) struct Recorder<'a> {
 const FRAMES: usize = 20;
 
 impl<'a> Recorder<'a> {
+    /// Of a run by the contact solver called `solver`; shows what is to be solved. Collective.
     pub(super) fn new(
         folder: &'a Path,
         setting: &'a Setting,
+        solver: &'a str,
         phases: &'a Phases,
         profile: bool,
     ) -> Result<Self, output::OutputError> {
+        let (body, ranks) = (&setting.body, setting.body.partition.ranks());
+        let bounds = &setting.constraints.bounds;
+        let mut contact_nodes: Vec<usize> = bounds.iter().map(|bound| bound.node).collect();
+        contact_nodes.dedup();
+        let contact_nodes = ranks.count(contact_nodes.len());
+        let triangles = ranks.count(body.own_triangles);
+        let show = || -> Result<_, output::OutputError> {
+            let history = History::create(folder)?;
+            Ok((history, Screen::open(setting, solver, triangles, contact_nodes)))
+        };
         Ok(Self {
             folder,
             setting,
             phases,
+            solver,
             profile,
+            triangles,
+            contact_nodes,
             stepping: 0.0,
             every: setting.scene().output.every,
             fields: FieldWriter::new(folder, setting)?,
-            shown: match setting.body.partition.ranks().is_first() {
-                true => Some((History::create(folder)?, Screen::new(setting))),
-                false => None,
-            },
+            shown: ranks.is_first().then(show).transpose()?,
             last: None,
         })
     }
@@ -84,12 +100,10 @@ impl<'a> Recorder<'a> {
     /// Collective.
     pub(super) fn finish(
         mut self,
-        setting: &Setting,
-        solver: &str,
         result: &Result<Outcome, RunError>,
         started: Instant,
     ) -> Result<(), output::OutputError> {
-        let last = self.last.take();
+        let (setting, last) = (self.setting, self.last.take());
         let written = match &last {
             Some(Step { state, .. }) if self.fields.last_time() != Some(state.time) => {
                 self.phases.time("output", || self.fields.add(setting, state))
@@ -102,21 +116,14 @@ impl<'a> Recorder<'a> {
         let mut notes = setting.notes();
         let outcome = result.as_ref().ok();
         notes.extend(outcome.iter().flat_map(|outcome| outcome.notes(setting)));
-        let bounds = &setting.constraints.bounds;
-        let mut contact_nodes: Vec<usize> = bounds.iter().map(|bound| bound.node).collect();
-        contact_nodes.dedup();
-        let (body, ranks) = (&setting.body, setting.body.partition.ranks());
-        let contact_nodes = ranks.count(contact_nodes.len());
+        let partition = &setting.body.partition;
         let summary = Summary {
             scene: scene.name.clone(),
             title: scene.title.clone(),
-            solver: match contact_nodes == 0 {
-                true => "linear".to_owned(),
-                false => solver.to_owned(),
-            },
-            ranks: ranks.size(),
-            nodes: body.partition.total(),
-            triangles: ranks.count(body.own_triangles),
+            solver: self.solver.to_owned(),
+            ranks: partition.ranks().size(),
+            nodes: partition.total(),
+            triangles: self.triangles,
             steps,
             end_time: record.map(|r| r.time),
             stopped_at: outcome.and_then(|o| o.stopped).map(|stop| stop.time),
@@ -127,7 +134,7 @@ impl<'a> Recorder<'a> {
             work: record.map(|r| r.work),
             contact_force: record.map(|r| r.contact_force),
             active_nodes: record.map(|r| r.active_nodes),
-            contact_nodes,
+            contact_nodes: self.contact_nodes,
             kkt: outcome.map(|o| o.kkt).or(record.map(|r| r.kkt())),
             wall_seconds: wall,
             seconds_per_step: wall / steps.max(1) as f64,
@@ -135,7 +142,9 @@ impl<'a> Recorder<'a> {
                 .into_iter()
                 .map(|(name, phase)| (name, phase.seconds))
                 .collect(),
-            foundation: setting.foundation.clone(),
+            contact_boundary: setting.foundation.contact_boundary.clone(),
+            contact_tangents: setting.foundation.tangents.clone(),
+            foundation: setting.foundation.segments.clone(),
             notes,
             error: result.as_ref().err().map(ToString::to_string),
         };

@@ -144,23 +144,22 @@ impl Task {
         // Now that all input is good: the results of an earlier run go.
         let prepared = if ranks.is_first() { output::prepare(&folder) } else { Ok(()) };
         together(ranks, prepared.map_err(Failure::input))?;
-        let recorder = Recorder::new(&folder, &setting, phases, profile).map_err(Failure::input);
-        let mut recorder = together(ranks, recorder)?;
+        let recorder = Recorder::new(&folder, &setting, &solver, phases, profile);
+        let mut recorder = together(ranks, recorder.map_err(Failure::input))?;
 
         let result = evolution::run(session, &setting, &solver, phases, &mut |step| {
             Ok(recorder.accept(step)?)
         });
         let failure = result.as_ref().map(|_| ()).map_err(failure);
         rejoin(ranks, &failure);
-        let written = recorder.finish(&setting, &solver, &result, started);
+        let written = recorder.finish(&result, started);
         together(ranks, failure.and(written.map_err(Failure::solver)))
     }
 }
 
-/// By whose turn it is now.
+/// The run has begun, so what was accepted is saved, whoever is to blame.
 fn failure(error: &RunError) -> Failure {
     match error {
-        RunError::Setup(error) => Failure::input(error),
         RunError::Elsewhere => Failure::Elsewhere,
         error => Failure::solver(error),
     }

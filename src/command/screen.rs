@@ -4,6 +4,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use signorini::{
     evolution::{Outcome, Setting, StepRecord},
     output::Summary,
+    scene::{Stepping, TimeGrid},
 };
 use std::{
     io::{self, Write},
@@ -20,8 +21,23 @@ pub struct Screen {
 const LENGTH: u64 = 1000;
 
 impl Screen {
-    pub fn new(setting: &Setting) -> Self {
-        Self::until(setting.scene().time.map_or(1.0, |grid| grid.end))
+    /// Shows what is to be solved, at once.
+    pub fn open(setting: &Setting, solver: &str, triangles: usize, contact_nodes: usize) -> Self {
+        let (scene, partition) = (setting.scene(), &setting.body.partition);
+        let mut mesh = format!("{} nodes, {triangles} triangles", partition.total());
+        if !partition.ranks().is_alone() {
+            mesh += &format!(", on {} ranks", partition.ranks().size());
+        }
+        let solver = match contact_nodes {
+            0 => format!("{solver} (no contact: one linear solve a step)"),
+            _ => solver.to_owned(),
+        };
+        let lines = [scene.title.clone(), row("mesh", mesh), row("solver", solver)];
+        let time = scene.time.map(|grid| row("time", steps(grid)));
+        say(&lines.into_iter().chain(time).collect::<Vec<_>>().join("\n"));
+        let screen = Self::until(scene.time.map_or(1.0, |grid| grid.end));
+        screen.bar.set_message("the first solve");
+        screen
     }
 
     /// Of a run to t = `end`, s.
@@ -90,22 +106,25 @@ pub fn say(text: &str) {
 }
 
 fn report(s: &Summary, outcome: Option<&Outcome>, phases: &[String], folder: &Path) -> String {
-    let mut mesh = format!("{} nodes, {} triangles", s.nodes, s.triangles);
-    if s.ranks > 1 {
-        mesh += &format!(", on {} ranks", s.ranks);
-    }
-    let mut lines = vec![
-        s.title.clone(),
-        row("mesh", mesh),
-        row("solver", s.solver.clone()),
-        row("end", ending(s, outcome)),
-    ];
+    let mut lines = vec![row("end", ending(s, outcome))];
     lines.extend(result(s).into_iter().flatten());
     lines.extend(s.notes.iter().map(|note| row("note", note.clone())));
     lines.push(row("results", folder.display().to_string()));
     lines.push(String::new());
     lines.extend_from_slice(phases);
     lines.join("\n")
+}
+
+fn steps(grid: TimeGrid) -> String {
+    let end = grid.end;
+    match grid.stepping {
+        Stepping::Uniform { steps } => {
+            format!("{steps} steps of {} s to t = {end}", time(end / steps as f64))
+        }
+        Stepping::Auto { tolerance } => {
+            format!("to t = {end} in steps as the error of ζ, {tolerance:e} each, allows")
+        }
+    }
 }
 
 /// What the last accepted state tells, if there is one.

@@ -169,6 +169,7 @@ impl<'s> ActiveSet<'s> {
         report.iterations += rescued.iterations;
         report.linear_iterations += rescued.linear_iterations;
         report.fallbacks += 1;
+        report.rescues += 1;
         self.active = reached(problem, c)?;
         Ok(report)
     }

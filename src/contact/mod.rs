@@ -46,24 +46,34 @@ pub fn is_solver(name: &str) -> bool {
     SOLVERS.contains(&name) || name.strip_prefix("tao:").is_some_and(|t| TAO_TYPES.contains(&t))
 }
 
+/// A name that [`is_solver`] does not accept.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("there is no contact solver `{0}`; there are {names}", names = solver_names())]
+pub struct UnknownSolver(pub String);
+
 /// What [`is_solver`] accepts, in words.
 pub fn solver_names() -> String {
     format!("{}, and tao:TYPE with TYPE one of {}", SOLVERS.join(", "), TAO_TYPES.join(", "))
 }
 
-/// The solver called `name`, the default if there is none of that name. Without bounds
-/// every name means one linear solve.
+/// The solver called `name`. Without bounds every name means one linear solve.
+///
+/// # Errors
+/// There is none of that name.
 pub fn solver<'s>(
     session: &'s Session,
     name: &str,
     bounded: bool,
     penalty: PenaltyOptions,
-) -> Box<dyn ContactSolver + 's> {
-    let (family, kind) = name.split_once(':').unwrap_or((name, "tron"));
-    match family {
-        _ if !bounded => Box::new(linear::Linear::new(session)),
-        "penalty-duality" => Box::new(penalty_duality::PenaltyDuality::new(session, penalty)),
-        "tao" => Box::new(tao::Tao::new(session, kind)),
-        _ => Box::new(active_set::ActiveSet::new(session)),
+) -> Result<Box<dyn ContactSolver + 's>, UnknownSolver> {
+    if !is_solver(name) {
+        return Err(UnknownSolver(name.to_owned()));
     }
+    let (family, kind) = name.split_once(':').unwrap_or((name, "tron"));
+    Ok(match family {
+        _ if !bounded => Box::new(linear::Linear::new(session)),
+        "active-set" => Box::new(active_set::ActiveSet::new(session)),
+        "penalty-duality" => Box::new(penalty_duality::PenaltyDuality::new(session, penalty)),
+        _ => Box::new(tao::Tao::new(session, kind)),
+    })
 }

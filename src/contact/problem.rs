@@ -164,6 +164,8 @@ pub struct ContactReport {
     pub factorisations: usize,
     /// Times the method had to leave its fast path for a slower one that always ends.
     pub fallbacks: usize,
+    /// Of these, the times TAO gave the answer in the place of the active set.
+    pub rescues: usize,
     /// Mean factor by which an iteration shrank the change of the multiplier, where the method
     /// is a fixed-point iteration.
     pub contraction: Option<f64>,
@@ -180,6 +182,7 @@ impl ContactReport {
         self.linear_iterations += further.linear_iterations;
         self.factorisations += further.factorisations;
         self.fallbacks += further.fallbacks;
+        self.rescues += further.rescues;
         self.contraction = further.contraction;
         self.omega = further.omega;
         self.false_claims += further.false_claims;

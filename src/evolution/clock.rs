@@ -37,9 +37,7 @@ impl Clock {
         match grid.stepping {
             Stepping::Uniform { steps } if self.accepted >= steps => None,
             Stepping::Uniform { steps } => {
-                let step = grid.end / steps as f64;
-                let last = self.accepted + 1 == steps;
-                Some((if last { grid.end } else { (self.accepted + 1) as f64 * step }, step))
+                Some((grid.time(self.accepted + 1, steps), grid.end / steps as f64))
             }
             Stepping::Auto { .. } if self.time >= grid.end => None,
             // A remainder below half a step is taken along.

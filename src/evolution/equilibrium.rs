@@ -65,13 +65,16 @@ const ATTEMPTS: usize = 3;
 const NEGATIVE_ENERGY: f64 = -1e-10;
 
 impl<'a> Equilibrium<'a> {
-    /// With the contact solver called `solver`; an unknown name means the default.
+    /// With the contact solver called `solver`.
+    ///
+    /// # Errors
+    /// There is no solver of that name, or PETSc failed.
     pub fn new(
         session: &'a Session,
         setting: &'a Setting,
         solver: &str,
         phases: &'a Phases,
-    ) -> Result<Self, PetscError> {
+    ) -> Result<Self, RunError> {
         let (body, constraints) = (&setting.body, &setting.constraints);
         let owned = 2 * body.partition.owned();
         let stiffness = phases.time("stiffness pattern", || {
@@ -86,7 +89,7 @@ impl<'a> Equilibrium<'a> {
                 solver,
                 body.partition.ranks().any(!constraints.bounds.is_empty()),
                 setting.scene().contact.penalty_duality,
-            ),
+            )?,
             stiffness,
             zeta_mean: vec![1.0; body.triangles.len()],
             load: Vector::zeros(session, owned)?,

@@ -49,6 +49,17 @@ impl Loads {
         }
     }
 
+    /// Whether a load or a prescribed displacement depends on time.
+    pub fn depend_on_time(&self) -> bool {
+        let mut prescribed = self.prescribed.iter().flatten().map(|(_, expression)| expression);
+        self.constant.is_none() || prescribed.any(Expression::depends_on_time)
+    }
+
+    /// Whether the body force depends on time.
+    pub fn body_force_depends_on_time(&self) -> bool {
+        self.body_force.iter().flatten().any(Expression::depends_on_time)
+    }
+
     /// Nodal loads at time t, N per metre of thickness.
     pub fn at(&self, body: &Body, t: f64) -> Vec<f64> {
         self.constant.clone().unwrap_or_else(|| self.assemble(body, t))

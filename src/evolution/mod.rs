@@ -6,6 +6,7 @@ mod damage_step;
 mod equilibrium;
 mod estimate;
 mod extrapolation;
+mod foundation;
 mod loads;
 mod notes;
 mod setting;
@@ -15,13 +16,14 @@ pub use crate::contact::ContactPoint;
 pub use crate::phases::Phases;
 pub use bounds::Excess;
 pub use equilibrium::Equilibrium;
+pub use foundation::Foundation;
 pub use loads::Loads;
 pub use notes::Accuracy;
 pub use setting::{Setting, SetupError};
 pub use state::{State, Step, StepRecord};
 
 use crate::{
-    contact::{ContactError, Kkt, RigidMotion},
+    contact::{ContactError, ContactReport, Kkt, RigidMotion, UnknownSolver},
     petsc::{PetscError, Ranks, Session},
 };
 use bounds::Bounds;
@@ -43,6 +45,10 @@ pub struct Outcome {
     pub undamaged_steps: usize,
     /// Steps undone and tried again, shorter.
     pub undone: usize,
+    /// Steps in which the contact solver left its fast path.
+    pub fallbacks: usize,
+    /// Of these, steps in which TAO gave the answer in the place of the active set.
+    pub rescued: usize,
     /// Where ζ left the bounds of its equation.
     pub excess: Excess,
     /// When first no pressing node held the body against a rigid motion, s, and which.
@@ -89,6 +95,9 @@ pub enum RunError {
         /// Its time, s.
         time: f64,
     },
+    /// The contact solver has no such name.
+    #[error(transparent)]
+    Solver(#[from] UnknownSolver),
     /// The scene contradicts itself at some time.
     #[error(transparent)]
     Setup(#[from] SetupError),
@@ -131,6 +140,7 @@ pub fn run(
     let mut estimate = Estimate::new(partition);
     let mut bounds = Bounds::of(partition.extremes(&last.state.zeta));
     let mut outcome = Outcome::new(last);
+    outcome.count(equilibrium.report());
 
     while let Some((time, step)) = clock.propose() {
         let (started, n) = (Instant::now(), outcome.last.record.step + 1);
@@ -203,6 +213,7 @@ pub fn run(
         last.record.seconds = started.elapsed().as_secs_f64();
         agreed(ranks, accepted(&last).map_err(RunError::Observer))?;
         outcome.accept(last, driving);
+        outcome.count(equilibrium.report());
     }
     // Makes room for another factorisation.
     drop(damage);
@@ -228,9 +239,16 @@ impl Outcome {
             stopped: None,
             undamaged_steps: 0,
             undone: 0,
+            fallbacks: 0,
+            rescued: 0,
             excess: Excess::default(),
             accuracy: Accuracy { displacement: 0.0, energy: 0.0 },
         }
+    }
+
+    fn count(&mut self, report: &ContactReport) {
+        self.fallbacks += usize::from(report.fallbacks > 0);
+        self.rescued += usize::from(report.rescues > 0);
     }
 
     fn accept(&mut self, last: Step, driving: Driving) {

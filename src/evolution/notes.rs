@@ -13,6 +13,11 @@ const TOLERANCES: f64 = 100.0;
 /// A mesh is too coarse if the energy norm is estimated to be off by more than this: the
 /// displacement under the load is then too small by about the square of it.
 const COARSE: f64 = 0.5;
+/// Infinitesimal strain theory supposes |∇u| ≪ 1. At `LARGE` the term ½ ∇uᵀ∇u of the strain, which
+/// it leaves out, is up to a twentieth of ∇u. A smaller part of the body than `NOTICEABLE` may be
+/// a corner where the strain is singular, in every load.
+const LARGE: f64 = 0.1;
+const NOTICEABLE: f64 = 0.01;
 
 /// Estimated errors of an answer, relative.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,12 +88,14 @@ impl Outcome {
         let displacement = if self.unheld.is_none() { self.accuracy.displacement } else { 0.0 };
         let accuracy = Accuracy { displacement, ..self.accuracy };
         notes.extend(accuracy.notes(setting.tolerance));
+        notes.extend(setting.large_gradients(&self.last.state.u));
         if self.undamaged_steps > 0 && setting.damage().is_some() {
             notes.push(format!(
                 "the damage solve was skipped in {} of {} steps: no source, uniform ζ",
                 self.undamaged_steps, self.last.record.step
             ));
         }
+        notes.extend(self.slow_path());
         if self.undone > 0 {
             notes.push(format!("{} steps were undone and tried again, shorter", self.undone));
         }
@@ -96,14 +103,49 @@ impl Outcome {
     }
 }
 
+impl Outcome {
+    /// That answers came another way than the one the solver's name stands for.
+    fn slow_path(&self) -> Option<String> {
+        let steps = |n: usize| if n == 1 { "1 step".to_owned() } else { format!("{n} steps") };
+        let rescued = match self.rescued {
+            0 => String::new(),
+            n => format!("; in {} TAO gave the answer in its place", steps(n)),
+        };
+        (self.fallbacks > 0).then(|| {
+            format!(
+                "in {} the contact solver left its fast path (single pivoting){rescued}",
+                steps(self.fallbacks)
+            )
+        })
+    }
+}
+
 impl Setting {
-    /// What the user should know before any solve: rigid motions that nothing holds, a material
-    /// or triangles that make the discretisation poor.
+    /// What the user should know before any solve: what was not taken as it is written, rigid
+    /// motions that nothing holds, a material or triangles that make the discretisation poor.
     pub fn notes(&self) -> Vec<String> {
-        let mut notes: Vec<String> = self.motions.free.iter().map(free_motion).collect();
+        let mut notes = self.scene().notes.clone();
+        notes.extend(self.motions.free.iter().map(free_motion));
         notes.extend(self.locking());
         notes.extend(self.sliver());
         notes
+    }
+
+    /// Whether u is too large for infinitesimal strains and rotations: |∇u| (Frobenius) above
+    /// `LARGE` in a noticeable part of the body. A translation, however far, is not.
+    fn large_gradients(&self, u: &[f64]) -> Option<String> {
+        let body = &self.body;
+        let gradient = |t: usize| body.triangles[t].gradient(&body.gather(t, u)).norm();
+        let own = 0..body.own_triangles;
+        let large = own.filter(|&t| gradient(t) > LARGE).map(|t| body.triangles[t].area).sum();
+        let part = body.partition.ranks().total(large) / body.area;
+        (part > NOTICEABLE).then(|| {
+            format!(
+                "|∇u| exceeds {LARGE} in {:.0} % of the body: strains or rotations are not small, \
+                 and linear elasticity, which supposes they are, is a poor model of this load",
+                100.0 * part
+            )
+        })
     }
 
     fn locking(&self) -> Option<String> {

@@ -1,6 +1,6 @@
 //! The physical setting: a scene bound to its mesh, everything that does not change with time.
 
-use super::Loads;
+use super::{Foundation, Loads};
 use crate::{
     contact::{
         Bound, Certificate, ConstraintError, Constraints, DrivenMotion, FixedRow, GapRow,
@@ -10,7 +10,7 @@ use crate::{
     mesh::{Mesh, boundary_nodes},
     model::DamageLaw,
     petsc::{PetscError, Session},
-    scene::{Scene, SceneError, Stepping, TimeGrid},
+    scene::{Scene, SceneError},
 };
 use std::path::PathBuf;
 
@@ -31,8 +31,8 @@ pub struct Setting {
     pub loads: Loads,
     /// KKT tolerance.
     pub tolerance: f64,
-    /// The foundation opposite Γ_C, in segments, m.
-    pub foundation: Vec<[[f64; 2]; 2]>,
+    /// The foundation opposite Γ_C.
+    pub foundation: Foundation,
     scene: Scene,
 }
 
@@ -50,10 +50,11 @@ pub enum SetupError {
         /// What contradicts what.
         source: ConstraintError,
     },
-    /// A load is NaN or infinite.
+    /// A load or a prescribed displacement is not finite, and this rank cannot tell where.
     #[error(
-        "{scene}: a traction or the body force is not finite at t = {time}; check its expression \
-         for divisions by zero, roots and logarithms of negative numbers"
+        "{scene}: a traction, the body force or a prescribed displacement is not finite or too \
+         large at t = {time}; check its expression for divisions by zero, roots and logarithms \
+         of negative numbers"
     )]
     NotFinite {
         /// The scene file.
@@ -91,13 +92,13 @@ impl Setting {
         motions.pin_free(&body, &mut constraints);
 
         let setting = Self {
+            foundation: Foundation::new(&scene, &body.mesh, &constraints),
             certificate: Certificate::new(&fixed, &constraints.gaps),
             elasticity: Elasticity::new(scene.material),
             constraints,
             motions,
             loads,
             tolerance: scene.contact.tolerance,
-            foundation: foundation(&scene, &body.mesh),
             body,
             scene,
         };
@@ -120,14 +121,14 @@ impl Setting {
         })
     }
 
-    /// Checks the times known beforehand, so that bad input is refused before anything is written.
+    /// Checks what depends on time, where times are known beforehand
+    /// ([`Scene::sample_times`]), so that bad input is refused before anything is written.
     fn check_times(&self) -> Result<(), SetupError> {
-        let (end, steps) = match self.scene.time {
-            None => (1.0, 1),
-            Some(TimeGrid { end, stepping: Stepping::Uniform { steps } }) => (end, steps),
-            Some(TimeGrid { end, stepping: Stepping::Auto { .. } }) => (end, 100),
-        };
-        for time in (0..=steps).map(|n| end * n as f64 / steps as f64) {
+        // A body force is as much work as the loads of a step.
+        let most = if self.loads.body_force_depends_on_time() { 100 } else { 1000 };
+        let mut times = self.scene.sample_times(most);
+        times.truncate(if self.loads.depend_on_time() { usize::MAX } else { 1 });
+        for time in times {
             self.posed(time)?;
             if !self.motions.held() {
                 self.check_load(time, &self.loads.at(&self.body, time))?;
@@ -143,7 +144,7 @@ impl Setting {
     pub fn check_load(&self, time: f64, load: &[f64]) -> Result<(), SetupError> {
         let ranks = self.body.partition.ranks();
         if !ranks.all(load.iter().all(|f| f.is_finite())) {
-            return Err(SetupError::NotFinite { scene: self.scene.path.clone(), time });
+            return Err(self.not_finite(time));
         }
         if self.motions.held() {
             return Ok(());
@@ -155,12 +156,23 @@ impl Setting {
         })
     }
 
+    /// Which value is not finite at `time`, as far as this rank knows.
+    fn not_finite(&self, time: f64) -> SetupError {
+        match self.scene.check_values(&self.body.mesh, &[time]) {
+            Err(error) => error.into(),
+            Ok(()) => SetupError::NotFinite { scene: self.scene.path.clone(), time },
+        }
+    }
+
     /// The prescribed unknowns at `time`, zero elsewhere.
     ///
     /// # Errors
-    /// Prescribed values contradict each other or go through the obstacle.
+    /// Prescribed values are not finite, contradict each other or go through the obstacle.
     pub fn lift(&self, time: f64) -> Result<Vec<f64>, SetupError> {
         let values = self.loads.prescribed_at(time);
+        if !values.iter().all(|value| value.is_finite()) {
+            return Err(self.not_finite(time));
+        }
         self.constraints
             .lift(&values, &self.body.mesh.nodes)
             .map_err(|source| SetupError::Constraint { scene: self.scene.path.clone(), source })
@@ -272,24 +284,4 @@ fn gap_rows(scene: &Scene, mesh: &Mesh) -> Vec<GapRow> {
         }
     }
     rows
-}
-
-/// Γ_C moved by the gap along the normal: what the body may not cross.
-fn foundation(scene: &Scene, mesh: &Mesh) -> Vec<[[f64; 2]; 2]> {
-    let mut segments = Vec::new();
-    for boundary in &scene.boundaries {
-        let (Some(gap), Some(curve)) = (&boundary.gap, mesh.curves.get(&boundary.name)) else {
-            continue;
-        };
-        for &[a, b] in &curve.edges {
-            let (p, q) = (mesh.nodes[a], mesh.nodes[b]);
-            let length = (q[0] - p[0]).hypot(q[1] - p[1]);
-            let n = gap.normal.unwrap_or([(q[1] - p[1]) / length, (p[0] - q[0]) / length]);
-            segments.push([p, q].map(|[x, y]| {
-                let g = gap.distance.eval(x, y, 0.0);
-                [x + g * n[0], y + g * n[1]]
-            }));
-        }
-    }
-    segments
 }

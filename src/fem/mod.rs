@@ -20,7 +20,7 @@ pub use body::Body;
 pub use damage::{DamageSystem, Mass, source, source_load};
 pub use elasticity::Elasticity;
 pub use frames::Frames;
-pub use loads::{add_body_force, add_traction};
+pub use loads::{add_body_force, add_traction, gauss_points, midpoint};
 pub use partition::Partition;
 pub use rigid_part::RigidPart;
 pub use share::Share;

@@ -43,6 +43,12 @@ impl Triangle {
         strain
     }
 
+    /// ∇u, entry (i, j) = ∂u_i/∂x_j, of nodal displacements (u_1x, u_1y, …, u_3y).
+    pub fn gradient(&self, u: &[f64; 6]) -> Matrix2<f64> {
+        let entry = |i, j| (0..3).map(|k| u[2 * k + i] * self.gradients[k][j]).sum();
+        Matrix2::from_fn(entry)
+    }
+
     /// Nodal forces ∫ σ:ε(φ_i) of a constant stress (σ_xx, σ_yy, σ_xy).
     pub fn force(&self, stress: &Vector3<f64>) -> SVector<f64, 6> {
         let mut force = SVector::zeros();

@@ -13,7 +13,7 @@ pub struct Summary {
     pub scene: String,
     /// The scene's title.
     pub title: String,
-    /// The contact solver.
+    /// The contact solver that was asked for.
     pub solver: String,
     /// Ranks among which the mesh was divided.
     pub ranks: usize,
@@ -51,7 +51,11 @@ pub struct Summary {
     pub seconds_per_step: f64,
     /// Seconds spent in each phase.
     pub phases: BTreeMap<&'static str, f64>,
-    /// The foundation opposite Γ_C: segments [[x, y], [x, y]], m.
+    /// The edges of Γ_C as segments [[x, y], [x, y]], m.
+    pub contact_boundary: Vec<[[f64; 2]; 2]>,
+    /// Unit vectors along which the body slides at their ends; [0, 0] at corners.
+    pub contact_tangents: Vec<[[f64; 2]; 2]>,
+    /// Opposite each of them the foundation, m: its segments meet at the nodes.
     pub foundation: Vec<[[f64; 2]; 2]>,
     /// What the program noticed and the user should know.
     pub notes: Vec<String>,

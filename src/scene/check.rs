@@ -3,32 +3,67 @@
 use super::error::{Names, SceneError};
 use super::expression::Expression;
 use super::source::boundary_key;
-use super::{Boundary, Damage, Scene, may_start_at};
-use crate::mesh::{Curve, Mesh};
+use super::{Boundary, Damage, Gap, Scene, may_start_at};
+use crate::{
+    fem::{gauss_points, midpoint},
+    mesh::{Curve, Mesh},
+};
 
 /// A gap may be this much below zero, relative to the size of the body: nodes on
 /// curved boundaries carry the mesh generator's rounding.
 const ROUNDING: f64 = 1e-12;
 
+/// Evaluations of an expression in space and time before a run, about: less than a second.
+const EVALUATIONS: usize = 4_000_000;
+
 impl Scene {
     /// Checks the scene against its mesh: every boundary names a physical curve on the
     /// boundary of the body, ζ₀ is in (ζ_*, 1] and the gap not negative at their nodes,
-    /// and all expressions are finite where they are used, at t = 0 and at the end.
+    /// and all expressions are finite where and when they are used, as far as times are
+    /// known beforehand (a thousand of them at most).
     ///
     /// # Errors
-    /// The first of these that fails, with its line, key, node and time.
+    /// The first of these that fails, with its line, key, point and time.
     pub fn check_mesh(&self, mesh: &Mesh) -> Result<(), SceneError> {
-        let all = || 0..mesh.nodes.len();
-        for (i, force) in self.body_force.iter().enumerate() {
-            self.finite(&format!("body.force[{i}]"), force, mesh, all())?;
-        }
         if let Some(damage) = &self.damage {
             self.check_initial(damage, mesh)?;
         }
         let extent = extent(mesh);
         for boundary in &self.boundaries {
             let curve = self.curve(boundary, mesh)?;
-            self.check_boundary(boundary, curve, mesh, extent)?;
+            if let Some(gap) = &boundary.gap {
+                self.check_gap(&boundary_key(&boundary.name, "gap"), gap, curve, mesh, extent)?;
+            }
+        }
+        self.check_values(mesh, &self.sample_times(1000))
+    }
+
+    /// Checks that the body force, the tractions and the prescribed displacements are finite at
+    /// `times`, at the points where they are used: midpoints of triangle sides, Gauss points of
+    /// edges, nodes.
+    ///
+    /// # Errors
+    /// One that is not, with its line, key, point and time.
+    pub fn check_values(&self, mesh: &Mesh, times: &[f64]) -> Result<(), SceneError> {
+        let at = |nodes: [usize; 2]| nodes.map(|node| mesh.nodes[node]);
+        let sides = || mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+        let midpoints = || sides().map(at).map(|[p, q]| midpoint(p, q));
+        for (i, force) in self.body_force.iter().enumerate() {
+            self.finite(&format!("body.force[{i}]"), force, midpoints(), times)?;
+        }
+        for boundary in &self.boundaries {
+            let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
+            let edges = || curve.edges.iter().copied().map(at);
+            let key = |what, i| boundary_key(&boundary.name, &format!("{what}[{i}]"));
+            for (i, component) in boundary.displacement.iter().flatten().enumerate() {
+                if let Some(component) = component {
+                    self.finite(&key("displacement", i), component, edges().flatten(), times)?;
+                }
+            }
+            for (i, component) in boundary.traction.iter().flatten().enumerate() {
+                let points = edges().flat_map(|[p, q]| gauss_points(p, q));
+                self.finite(&key("traction", i), component, points, times)?;
+            }
         }
         Ok(())
     }
@@ -60,7 +95,7 @@ impl Scene {
 
     fn check_initial(&self, damage: &Damage, mesh: &Mesh) -> Result<(), SceneError> {
         let key = "damage.initial";
-        self.finite(key, &damage.initial, mesh, 0..mesh.nodes.len())?;
+        self.finite(key, &damage.initial, mesh.nodes.iter().copied(), &[0.0])?;
         for &[x, y] in &mesh.nodes {
             let zeta = damage.initial.eval(x, y, 0.0);
             if !may_start_at(&damage.law, zeta) {
@@ -72,52 +107,48 @@ impl Scene {
         Ok(())
     }
 
-    fn check_boundary(
+    fn check_gap(
         &self,
-        boundary: &Boundary,
+        key: &str,
+        gap: &Gap,
         curve: &Curve,
         mesh: &Mesh,
         extent: f64,
     ) -> Result<(), SceneError> {
-        let nodes = || curve.edges.iter().flatten().copied();
-        let key = |key: &str| boundary_key(&boundary.name, key);
-        for (i, component) in boundary.displacement.iter().flatten().enumerate() {
-            if let Some(component) = component {
-                self.finite(&key(&format!("displacement[{i}]")), component, mesh, nodes())?;
-            }
-        }
-        for (i, component) in boundary.traction.iter().flatten().enumerate() {
-            self.finite(&key(&format!("traction[{i}]")), component, mesh, nodes())?;
-        }
-        let Some(gap) = &boundary.gap else {
-            return Ok(());
-        };
-        self.finite(&key("gap"), &gap.distance, mesh, nodes())?;
-        for (x, y) in nodes().filter_map(|node| coordinates(mesh, node)) {
+        let nodes = || curve.edges.iter().flatten().map(|&node| mesh.nodes[node]);
+        self.finite(key, &gap.distance, nodes(), &[0.0])?;
+        for [x, y] in nodes() {
             let distance = gap.distance.eval(x, y, 0.0);
             if distance < -ROUNDING * extent {
                 let problem = format!("is {distance} at ({x}, {y}); it must not be negative");
-                return Err(self.at_key(&key("gap"), problem));
+                return Err(self.at_key(key, problem));
             }
         }
         Ok(())
     }
 
-    /// Whether `expression` is finite at `nodes`, at t = 0 and at the end.
+    /// Whether `expression` is finite at `points` and `times`; what does not depend on one of
+    /// them is evaluated once. Where these are too many, all points are taken at the first and the
+    /// last time only, in between a part of them, in turn.
     fn finite(
         &self,
         key: &str,
         expression: &Expression,
-        mesh: &Mesh,
-        nodes: impl Iterator<Item = usize>,
+        points: impl Iterator<Item = [f64; 2]>,
+        times: &[f64],
     ) -> Result<(), SceneError> {
-        let end = self.time.map_or(1.0, |time| time.end);
-        for (x, y) in nodes.filter_map(|node| coordinates(mesh, node)) {
-            for t in [0.0, end] {
+        let (in_time, in_space) = (expression.depends_on_time(), expression.depends_on_space());
+        let times = if in_time { times } else { &times[..times.len().min(1)] };
+        let points: Vec<_> = points.take(if in_space { usize::MAX } else { 1 }).collect();
+        let parts = (points.len() * times.len()).div_ceil(EVALUATIONS).max(1);
+        for (i, &t) in times.iter().enumerate() {
+            let all = i == 0 || i + 1 == times.len();
+            let parts = if all { 1 } else { parts };
+            for &[x, y] in points.iter().skip(i % parts).step_by(parts) {
                 let value = expression.eval(x, y, t);
                 if !value.is_finite() {
-                    let problem = format!("is {value} at ({x}, {y}), t = {t}");
-                    return Err(self.at_key(key, problem));
+                    let when = if in_time { format!(", t = {t}") } else { String::new() };
+                    return Err(self.at_key(key, format!("is {value} at ({x}, {y}){when}")));
                 }
             }
         }
@@ -127,10 +158,6 @@ impl Scene {
     fn at_key(&self, key: &str, problem: String) -> SceneError {
         SceneError::Invalid { place: self.source.place_of(key), key: key.to_owned(), problem }
     }
-}
-
-fn coordinates(mesh: &Mesh, node: usize) -> Option<(f64, f64)> {
-    mesh.nodes.get(node).map(|&[x, y]| (x, y))
 }
 
 /// The longer side of the box around the mesh, m.

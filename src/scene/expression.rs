@@ -102,10 +102,19 @@ impl Expression {
 
     /// Whether the expression names t.
     pub fn depends_on_time(&self) -> bool {
+        self.names(|variable| variable == "t")
+    }
+
+    /// Whether the expression names x or y.
+    pub fn depends_on_space(&self) -> bool {
+        self.names(|variable| variable != "t")
+    }
+
+    fn names(&self, which: impl Fn(&str) -> bool) -> bool {
         match &self.code {
             Code::Constant(_) => false,
             Code::Formula { arguments, .. } => {
-                arguments.iter().any(|&slot| grammar::VARIABLES[slot] == "t")
+                arguments.iter().any(|&slot| which(grammar::VARIABLES[slot]))
             }
         }
     }

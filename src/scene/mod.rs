@@ -50,6 +50,8 @@ pub struct Scene {
     pub output: OutputOptions,
     /// What holds on the named parts of the boundary; each name once.
     pub boundaries: Vec<Boundary>,
+    /// What was not taken as it is written.
+    pub notes: Vec<String>,
     source: Source,
 }
 
@@ -116,6 +118,22 @@ impl TimeGrid {
         let steps = (end / step - 1e-9).ceil().max(1.0) as usize;
         Self { end, stepping: Stepping::Uniform { steps } }
     }
+
+    /// t_n of `steps` equal steps, s; the last is the end without rounding.
+    pub fn time(&self, n: usize, steps: usize) -> f64 {
+        if n == steps { self.end } else { n as f64 * (self.end / steps as f64) }
+    }
+
+    /// Times that stand for the whole run, s, 0 and the end among them: the t_n of a uniform
+    /// partition, at most `most` + 1; a hundred parts of [0, T] where steps are chosen.
+    fn sample(&self, most: usize) -> Vec<f64> {
+        let steps = match self.stepping {
+            Stepping::Uniform { steps } => steps,
+            Stepping::Auto { .. } => 100,
+        };
+        let parts = steps.min(most);
+        (0..=parts).map(|i| self.time(i * steps / parts, steps)).collect()
+    }
 }
 
 /// How the contact problem is solved.
@@ -162,6 +180,12 @@ pub struct Gap {
 }
 
 impl Scene {
+    /// The times at which values are judged before the run, s: all t_n, or some `most` (at least 1)
+    /// evenly chosen ones; a hundred times where steps are chosen; t = 1 where there is no time.
+    pub fn sample_times(&self, most: usize) -> Vec<f64> {
+        self.time.map_or(vec![1.0], |grid| grid.sample(most.max(1)))
+    }
+
     /// Reads and checks the scene at `path`.
     ///
     /// `overrides` are `--set` arguments, `time.step=0.005`: a dotted key and a TOML

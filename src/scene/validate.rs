@@ -35,6 +35,8 @@ pub(super) fn scene(file: File, path: &Path, source: Source) -> Result<Scene, Sc
     if let Some(every) = file.output.every.as_ref().filter(|e| *e.get_ref() == 0) {
         return Err(check.invalid(&every.span(), "must be at least 1, but is 0"));
     }
+    let time = file.time.as_ref().map(|t| check.time(t)).transpose()?;
+    let notes = file.time.iter().zip(time).filter_map(|(t, grid)| other_step(t, grid)).collect();
     Ok(Scene {
         path: path.to_owned(),
         title: file.title.unwrap_or_else(|| name.clone().into_owned()),
@@ -42,12 +44,31 @@ pub(super) fn scene(file: File, path: &Path, source: Source) -> Result<Scene, Sc
         mesh: check.mesh(file.mesh, path)?,
         material: check.material(&file.material)?,
         damage: file.damage.map(|d| check.damage(&d)).transpose()?,
-        time: file.time.map(|t| check.time(&t)).transpose()?,
+        time,
         body_force,
         contact: check.contact(file.contact)?,
         output: OutputOptions { every: file.output.every.map(Spanned::into_inner) },
         boundaries: check.boundaries(&file.boundary)?,
+        notes,
         source,
+    })
+}
+
+/// What to tell where the step that is written does not divide the end.
+fn other_step(table: &TimeTable, grid: TimeGrid) -> Option<String> {
+    let (Formula::Number(asked), Stepping::Uniform { steps }) =
+        (table.step.get_ref(), grid.stepping)
+    else {
+        return None;
+    };
+    let (end, step) = (grid.end, grid.end / steps as f64);
+    (asked - step > 1e-6 * step).then(|| {
+        // Six digits: no 0.30000000000000004.
+        let step: f64 = format!("{step:.5e}").parse().unwrap_or(step);
+        format!(
+            "time.step = {asked} s does not divide time.end = {end} s: {steps} steps of {step} s \
+             are made"
+        )
     })
 }
 

@@ -4,7 +4,7 @@ use crate::desk::{Desk, SCENE, square};
 use serde_json::Value;
 use std::process::Stdio;
 
-const KEYS: [&str; 23] = [
+const KEYS: [&str; 25] = [
     "scene",
     "title",
     "solver",
@@ -21,7 +21,9 @@ const KEYS: [&str; 23] = [
     "work",
     "contact_force",
     "active_nodes",
+    "contact_boundary",
     "contact_nodes",
+    "contact_tangents",
     "kkt",
     "wall_seconds",
     "seconds_per_step",
@@ -256,6 +258,21 @@ fn a_body_balanced_on_one_point_is_noted() {
     assert_eq!(said.out.matches(note).count(), 1, "{said:?}");
     let notes = desk.summary("out/scene")["notes"].to_string();
     assert_eq!(notes.matches(note).count(), 1, "{notes}");
+}
+
+#[test]
+fn a_step_that_does_not_divide_the_end_is_noted() {
+    let desk = Desk::new();
+    let note = "time.step = 0.3 s does not divide time.end = 1 s: 4 steps of 0.25 s are made";
+    let said = desk.run(&["--set", "time.step=0.3"]);
+    assert!(said.out.contains(note), "{said:?}");
+    assert!(said.out.contains("time          4 steps of 0.25 s to t = 1"), "{said:?}");
+    assert!(desk.summary("out/scene")["notes"].to_string().contains(note));
+    // Written with rounding, thirds divide the end.
+    for step in ["0.1", "0.333333333333"] {
+        let said = desk.run(&["--set", &format!("time.step={step}")]);
+        assert!(!said.out.contains("does not divide"), "{said:?}");
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Solvers that miss their tolerance: exit code 1, and the state before is saved.
 
-use crate::desk::Desk;
+use crate::desk::{Desk, SCENE};
 
 /// At rest until t = 0.2, so that steps 0 to 2 need no solver; the third does.
 const LATE: &str = "boundary.top.traction=[0, '-max(0, t - 0.2)']";
@@ -63,6 +63,29 @@ fn the_first_solve_fails() {
         assert!(summary[of_a_state].is_null(), "{of_a_state}");
     }
     assert_eq!(desk.names("out/scene"), ["history.csv", "summary.json"]);
+}
+
+#[test]
+fn a_load_that_is_not_finite_between_the_times_checked_beforehand() {
+    // 10⁴ steps, of which every tenth is checked: 0.0014 to 0.0016 are not.
+    let value = "-0.01*t + 0*sqrt(abs(t - 0.0015) - 0.00015)";
+    for key in ["traction", "displacement"] {
+        let desk = Desk::new();
+        desk.write(
+            "scene.toml",
+            &SCENE
+                .replace("traction = [\"0\", \"-3*t\"]", &format!("{key} = [\"0\", \"{value}\"]")),
+        );
+        let said = desk.say(&["run", "scene.toml", "--set", "time.step=1e-4"]);
+        let place = format!("scene.toml:29: boundary \"top\": {key}[1] is NaN at (");
+        said.fails(1, &[&place, "t = 0.0014"]);
+        assert!(said.out.contains("FAILED after t = 0.0013; the state there is saved"), "{said:?}");
+        assert_eq!(desk.history("out/scene").1.len(), 14);
+        let (time, _) = desk.frames("out/scene").pop().expect("frames");
+        assert!((time - 0.0013).abs() < 1e-12);
+        let error = &desk.summary("out/scene")["error"];
+        assert_eq!(said.err, format!("error: {}\n", error.as_str().expect("the error")));
+    }
 }
 
 /// A strain that makes λ_U |ε|² overflow.

@@ -75,6 +75,21 @@ const SCENES: &[(&str, &str, &[&str])] = &[
             "penalty-dual",
         ],
     ),
+    (
+        "\"-3*t\"",
+        "\"1/(t-0.5)\"",
+        &["scene.toml:29: boundary \"top\": traction[1] is inf at (", "t = 0.5"],
+    ),
+    (
+        "traction = [\"0\", \"-3*t\"]",
+        "displacement = [\"0\", \"0.01/(t-0.5)\"]",
+        &["scene.toml:29: boundary \"top\": displacement[1] is inf at (0.25, 1), t = 0.5"],
+    ),
+    (
+        "[contact]",
+        "[body]\nforce = [\"0\", \"log(0.65 - t)\"]\n[contact]",
+        &["scene.toml:20: body.force[1] is NaN at (", "t = 0.7"],
+    ),
     // Held by nothing: the message names the motion.
     (
         "[\"0\", \"-3*t\"]",

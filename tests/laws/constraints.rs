@@ -260,3 +260,61 @@ fn a_body_carried_along_by_its_prescribed_side_feels_no_force() {
         }
     }
 }
+
+#[test]
+fn the_segments_of_the_foundation_meet_where_the_conditions_of_a_node_put_them() {
+    // Fixed normals below and above; the left ends are prescribed and keep their gaps.
+    let setting = bounded(
+        "boundary = [
+            { name = 'left', displacement = [0, 0] },
+            { name = 'bottom', gap = '0.1 + x', normal = [0.6, -0.8] },
+            { name = 'right', gap = 0.2 },
+            { name = 'top', gap = 0.3, normal = [0.6, 0.8] },
+         ]",
+    )
+    .unwrap();
+    let opposite = |[x, y]: [f64; 2]| -> Vec<[f64; 2]> {
+        let ends = (setting.foundation.contact_boundary.iter().flatten())
+            .zip(setting.foundation.segments.iter().flatten());
+        let here = ends.filter(|(body, _)| **body == [x, y]);
+        here.map(|(_, there)| [there[0] - x, there[1] - y]).collect()
+    };
+    assert_eq!(setting.foundation.segments.len(), 12);
+    for (place, d, edges) in [
+        ([0.5, 0.0], [0.36, -0.48], 2),
+        ([0.0, 0.0], [0.06, -0.08], 1),
+        ([1.0, 0.5], [0.2, 0.0], 2),
+        // Corners: 0.6 · 0.2 − 0.8 d_y = 1.1, and 0.6 · 0.2 + 0.8 d_y = 0.3.
+        ([1.0, 0.0], [0.2, -1.225], 2),
+        ([1.0, 1.0], [0.2, 0.225], 2),
+    ] {
+        let found = opposite(place);
+        assert_eq!(found.len(), edges, "{place:?}");
+        for way in found {
+            way.iter().zip(d).for_each(|(way, d)| assert!((way - d).abs() < 1e-12, "{place:?}"));
+        }
+    }
+    // Different gaps on one line: the smaller counts at their common node, for both edges.
+    let steps = footed_steps();
+    for (body, there) in steps.foundation.contact_boundary.iter().zip(&steps.foundation.segments) {
+        for (body, there) in body.iter().zip(there) {
+            let gap = if body[0] <= 0.5 { 0.0 } else { 0.01 };
+            assert_eq!([there[0], there[1]], [body[0], body[1] - gap]);
+        }
+    }
+}
+
+/// The bottom in two halves, the right one 0.01 above its foundation.
+fn footed_steps() -> signorini::evolution::Setting {
+    let mut mesh = square(4);
+    let (left, right) = mesh.curves["bottom"].edges.split_at(2);
+    let halves = [("first", left.to_vec()), ("second", right.to_vec())];
+    for (name, edges) in halves {
+        mesh.curves.insert(name.into(), signorini::mesh::Curve { edges, interior_edges: 0 });
+    }
+    let boundaries = "boundary = [
+        { name = 'left', displacement = [0, 0] },
+        { name = 'first', gap = 0 }, { name = 'second', gap = 0.01 },
+    ]";
+    setting(mesh, &format!("{MATERIAL}\n{boundaries}")).unwrap()
+}

@@ -17,6 +17,7 @@ mod hertz;
 mod loads;
 mod lost_contact;
 mod maximum_principle;
+mod notes;
 mod orders;
 mod patch;
 mod pivoting;

@@ -162,12 +162,12 @@ fn a_stop_that_the_sources_do_not_allow_is_named() {
 fn a_stop_that_they_allow_is_not() {
     let text = "
         material = { young = 80, poisson = 0.3, plane = 'stress' }
-        damage = { diffusion = 1, lambda_d = 0, lambda_u = 2000, lambda_w = 0, strain_cap = 1000,
+        damage = { diffusion = 1, lambda_d = 0, lambda_u = 2e7, lambda_w = 0, strain_cap = 1000,
                    threshold = 0.01, initial = 1, mass = 'lumped' }
         time = { end = 1, step = 0.01 }
         boundary = [
             { name = 'left', displacement = [0, 0] },
-            { name = 'right', traction = [-10, -10] },
+            { name = 'right', traction = [-0.1, -0.1] },
         ]";
     let setting = setting(square(8), text).unwrap();
     let outcome = run(&setting, "active-set");

@@ -41,19 +41,19 @@ fn values_are_checked_where_they_are_used() {
         (
             "\"-80*t\"",
             "\"sqrt(x-1)\"",
-            "bad.toml:33: boundary \"load\": traction[1] is NaN at (0, 2), t = 0",
+            "bad.toml:33: boundary \"load\": traction[1] is NaN at (0.42264973081037427, 2)",
         ),
         (
             "\"-80*t\"",
             "\"1/(1-t)\"",
-            "bad.toml:33: boundary \"load\": traction[1] is inf at (2, 2), t = 1",
+            "bad.toml:33: boundary \"load\": traction[1] is inf at (1.5773502691896257, 2), t = 1",
         ),
         (
             "displacement = [\"0\", \"0\"]",
             "displacement = [\"free\", \"log(y)\"]",
-            "bad.toml:30: boundary \"clamp\": displacement[1] is -inf at (2, 0), t = 0",
+            "bad.toml:30: boundary \"clamp\": displacement[1] is -inf at (2, 0)",
         ),
-        ("[0, \"-t\"]", "[0, \"1/y\"]", "bad.toml:22: body.force[1] is inf at (0, 0), t = 0"),
+        ("[0, \"-t\"]", "[0, \"1/y\"]", "bad.toml:22: body.force[1] is inf at (1, 0)"),
         (
             "1 - 0.1*x",
             "1 - 0.5*x",
@@ -64,21 +64,47 @@ fn values_are_checked_where_they_are_used() {
             "1 + 0.5*y",
             "bad.toml:17: damage.initial is 2 at (2, 2); it must be in (0.01, 1]",
         ),
-        ("1 - 0.1*x", "log(x)", "bad.toml:17: damage.initial is -inf at (0, 0), t = 0"),
+        ("1 - 0.1*x", "log(x)", "bad.toml:17: damage.initial is -inf at (0, 0)"),
         (
             "x^2",
             "1-x",
             "bad.toml:36: boundary \"foundation\": gap is -1 at (2, 0); it must not be negative",
         ),
-        ("x^2", "sqrt(x-1)", "bad.toml:36: boundary \"foundation\": gap is NaN at (0, 0), t = 0"),
+        ("x^2", "sqrt(x-1)", "bad.toml:36: boundary \"foundation\": gap is NaN at (0, 0)"),
     ] {
         assert_eq!(verdict(old, new, &square()), Err(expected.into()), "`{old}` → `{new}`");
     }
 }
 
 #[test]
+fn values_are_checked_at_all_times_known_beforehand() {
+    let at = |load: &str, time: &str| {
+        let sets = ["boundary.load.traction=[0, 'LOAD']", "time=TIME"];
+        let sets = sets.map(|set| set.replace("LOAD", load).replace("TIME", time));
+        let scene = Scene::parse(BASE, Path::new("base.toml"), &sets);
+        let scene = scene.unwrap_or_else(|e| panic!("{e}"));
+        scene.check_mesh(&square()).map_err(|e| e.to_string())
+    };
+    let refused = |load: &str, time: &str, at_time: &str| {
+        let message = at(load, time).expect_err(time);
+        assert!(message.contains("boundary \"load\": traction[1] is "), "{message}");
+        assert!(message.ends_with(&format!(", t = {at_time}")), "{message}");
+    };
+    // Every t_n, 1/3 too, and no other.
+    refused("1/(t - 0.37)", "{ end = 1, step = 0.01 }", "0.37");
+    refused("1/(t - 1/3)", "{ end = 1, step = 0.333333333333 }", "0.3333333333333333");
+    assert_eq!(at("1/(t - 0.37)", "{ end = 1, step = 0.1 }"), Ok(()));
+    // A thousand of too many, the ends among them; a hundred where steps are chosen.
+    refused("1/(t - 0.5)", "{ end = 1, step = 1e-9 }", "0.5");
+    refused("1/(1 - t)", "{ end = 1, step = 1.1e-4 }", "1");
+    refused("sqrt(0.555 - t)", "{ end = 1, step = 'auto' }", "0.56");
+}
+
+#[test]
 fn what_is_undefined_elsewhere_does_not_matter() {
     assert_eq!(verdict("x^2", "1/(2-y)", &square()), Ok(()));
+    // Infinite at a node, but tractions are taken at Gauss points.
+    assert_eq!(verdict("\"-80*t\"", "\"1/sqrt(x)\"", &square()), Ok(()));
     // Rounding in the nodes of a curved foundation is no penetration.
     assert_eq!(verdict("x^2", "-1e-15*x", &square()), Ok(()));
 }
@@ -109,12 +135,12 @@ fn a_curve_must_be_there_and_on_the_boundary() {
 
 #[test]
 fn a_value_from_the_command_line_is_named_as_such() {
-    let sets = ["boundary.load.traction=[0, 'log(x)']".to_owned()];
+    let sets = ["boundary.load.traction=[0, 'log(x-1)']".to_owned()];
     let scene = Scene::parse(BASE, Path::new("base.toml"), &sets).expect("well formed");
-    let message = scene.check_mesh(&square()).expect_err("log(0)").to_string();
+    let message = scene.check_mesh(&square()).expect_err("log(-0.6)").to_string();
     assert_eq!(
         message,
-        "base.toml, --set boundary.load.traction=[0, 'log(x)']: \
-         boundary \"load\": traction[1] is -inf at (0, 2), t = 0"
+        "base.toml, --set boundary.load.traction=[0, 'log(x-1)']: \
+         boundary \"load\": traction[1] is NaN at (0.42264973081037427, 2)"
     );
 }

@@ -1,0 +1,74 @@
+//! What is told of an answer, or refused, besides its residuals.
+
+use crate::support::{run, setting, square};
+use signorini::{
+    contact::SOLVERS,
+    evolution::{self, Phases, RunError, Setting, SetupError},
+    petsc::Session,
+};
+
+const MATERIAL: &str = "material = { young = 100, poisson = 0.3, plane = 'stress' }";
+
+/// The square on a foundation `gap` below it, against sliding held by an axis, pressed by
+/// `traction`; static.
+fn pressed(gap: f64, traction: &str) -> Result<Setting, SetupError> {
+    let text = format!(
+        "{MATERIAL}
+         boundary = [{{ name = 'left', symmetry = true }}, {{ name = 'bottom', gap = {gap} }},
+                     {{ name = 'top', traction = [0, '{traction}'] }}]"
+    );
+    setting(square(4), &text)
+}
+
+#[test]
+fn large_strains_and_rotations_are_noted_and_long_ways_are_not() {
+    let notes = |setting: Setting| run(&setting, SOLVERS[0]).notes(&setting);
+    // |∇u| = (p/E) √(1 + ν²).
+    assert_eq!(notes(pressed(0.0, "-9").unwrap()), [""; 0]);
+    let large = notes(pressed(0.0, "-10").unwrap());
+    assert!(large.len() == 1 && large[0].starts_with("|∇u| exceeds 0.1 in 100 % of"), "{large:?}");
+    // Ten times the body's size down to the foundation.
+    assert_eq!(notes(pressed(10.0, "-9").unwrap()), [""; 0]);
+    // A linearised rotation of θ has |∇u| = √2 θ, whatever the strain.
+    for (angle, told) in [(0.07, 0), (0.0708, 1)] {
+        let turned = format!(
+            "{MATERIAL}
+             boundary = [{{ name = 'left', displacement = ['-{angle}*y', '{angle}*x'] }},
+                         {{ name = 'right', displacement = ['-{angle}*y', '{angle}*x'] }}]"
+        );
+        let notes = notes(setting(square(4), &turned).unwrap());
+        assert_eq!(notes.iter().filter(|n| n.contains("|∇u|")).count(), told, "{angle}: {notes:?}");
+    }
+}
+
+#[test]
+fn steps_off_the_fast_path_are_noted() {
+    let setting = pressed(0.0, "-1").unwrap();
+    let mut outcome = run(&setting, SOLVERS[0]);
+    assert_eq!((outcome.fallbacks, outcome.rescued), (0, 0));
+    outcome.fallbacks = 3;
+    let [note] = &outcome.notes(&setting)[..] else { panic!("one note") };
+    assert!(note.starts_with("in 3 steps the contact solver left its fast path"), "{note}");
+    assert!(!note.contains("TAO"));
+    outcome.rescued = 1;
+    assert!(outcome.notes(&setting)[0].ends_with("; in 1 step TAO gave the answer in its place"));
+}
+
+#[test]
+fn an_unknown_solver_is_an_error() {
+    let (session, setting) = (Session::start(&[]).unwrap(), pressed(0.0, "-1").unwrap());
+    for name in ["simplex", "active-set:tron", "tao:", ""] {
+        let run = evolution::run(&session, &setting, name, &Phases::default(), &mut |_| Ok(()));
+        assert!(matches!(run, Err(RunError::Solver(unknown)) if unknown.0 == name), "{name}");
+    }
+}
+
+#[test]
+fn a_static_scene_is_judged_at_its_only_time() {
+    // t = 1: what would lift the body or is infinite at t = 0 does not matter.
+    assert!(pressed(0.0, "1 - 2*t").is_ok());
+    assert!(pressed(0.0, "-1/t").is_ok());
+    assert!(matches!(pressed(0.0, "-1 + 2*t"), Err(SetupError::Driven { time: 1.0, .. })));
+    let refused = pressed(0.0, "-1/(1 - t)").unwrap_err().to_string();
+    assert!(refused.contains("traction[1] is -inf at") && refused.ends_with("t = 1"), "{refused}");
+}
