@@ -3,17 +3,21 @@
 use super::error::{Names, SceneError};
 use super::expression::Expression;
 use super::source::boundary_key;
-use super::{Boundary, Damage, Scene, may_start_at};
+use super::{Boundary, Damage, Gap, Scene, may_start_at};
 use crate::mesh::{Curve, Mesh};
 
 /// A gap may be this much below zero, relative to the size of the body: nodes on
-/// curved boundaries carry the mesh generator's rounding.
+/// curved boundaries carry the mesh generator's rounding, differences like `0.3-0.1*3` their own.
 const ROUNDING: f64 = 1e-12;
+/// A fixed normal whose cosine with an edge's outward normal is at most this does not point out of
+/// the body: gmsh places nodes to about 1e-8 of an edge.
+const ALONG: f64 = 1e-6;
 
 impl Scene {
     /// Checks the scene against its mesh: every boundary names a physical curve on the
-    /// boundary of the body, ζ₀ is in (ζ_*, 1] and the gap not negative at their nodes,
-    /// and all expressions are finite where they are used, at t = 0 and at the end.
+    /// boundary of the body, ζ₀ is in (ζ_*, 1] and the gap not negative at their nodes, fixed
+    /// normals point out of the body, and all expressions are finite where they are used, at
+    /// t = 0 and at the end, or at t = 1 where there is no time.
     ///
     /// # Errors
     /// The first of these that fails, with its line, key, node and time.
@@ -100,10 +104,43 @@ impl Scene {
                 return Err(self.at_key(&key("gap"), problem));
             }
         }
-        Ok(())
+        self.check_normal(gap, &key("normal"), curve, mesh)
     }
 
-    /// Whether `expression` is finite at `nodes`, at t = 0 and at the end.
+    /// Whether the gap's normal, if fixed, points out of the body all along the curve. Elsewhere
+    /// u·n ≤ g would hold the body back on the wrong side, or let it sink into the obstacle.
+    fn check_normal(
+        &self,
+        gap: &Gap,
+        key: &str,
+        curve: &Curve,
+        mesh: &Mesh,
+    ) -> Result<(), SceneError> {
+        let Some([nx, ny]) = gap.normal else { return Ok(()) };
+        let cosine = |edge: &[usize; 2]| {
+            let ([x, y], _) = mesh.edge_normal(*edge);
+            nx * x + ny * y
+        };
+        let wrong = curve.edges.iter().filter(|edge| cosine(edge) <= ALONG);
+        let Some(worst) = wrong.clone().min_by(|a, b| cosine(a).total_cmp(&cosine(b))) else {
+            return Ok(());
+        };
+        let ([px, py], [qx, qy]) = (mesh.nodes[worst[0]], mesh.nodes[worst[1]]);
+        let (x, y, ([vx, vy], _)) = (0.5 * (px + qx), 0.5 * (py + qy), mesh.edge_normal(*worst));
+        // Adding 0 turns -0 into 0.
+        let [vx, vy] = [vx + 0.0, vy + 0.0];
+        let how = if cosine(worst) < -ALONG { "into the body" } else { "along the boundary" };
+        let mend = match wrong.count() == curve.edges.len() {
+            true => "turn it round, so that it points from the body towards the obstacle",
+            false => "restrict the physical curve to where the body faces the obstacle",
+        };
+        let problem = format!(
+            "points {how} at ({x}, {y}), where the outward normal is ({vx:.4}, {vy:.4}); {mend}"
+        );
+        Err(self.at_key(key, problem))
+    }
+
+    /// Whether `expression` is finite at `nodes`, at t = 0 and at the end, or at the only time.
     fn finite(
         &self,
         key: &str,
@@ -111,9 +148,9 @@ impl Scene {
         mesh: &Mesh,
         nodes: impl Iterator<Item = usize>,
     ) -> Result<(), SceneError> {
-        let end = self.time.map_or(1.0, |time| time.end);
+        let times = self.time.map_or([1.0; 2], |time| [0.0, time.end]);
         for (x, y) in nodes.filter_map(|node| coordinates(mesh, node)) {
-            for t in [0.0, end] {
+            for t in times {
                 let value = expression.eval(x, y, t);
                 if !value.is_finite() {
                     let problem = format!("is {value} at ({x}, {y}), t = {t}");

@@ -161,6 +161,13 @@ pub struct Gap {
     pub normal: Option<[f64; 2]>,
 }
 
+impl Gap {
+    /// g at a point, m. What [`Scene::check_mesh`] accepts below 0 is rounding.
+    pub fn at(&self, [x, y]: [f64; 2]) -> f64 {
+        self.distance.eval(x, y, 0.0).max(0.0)
+    }
+}
+
 impl Scene {
     /// Reads and checks the scene at `path`.
     ///
