@@ -18,12 +18,13 @@ mod tao;
 
 pub(crate) use approach::approach;
 pub use certificate::{Answer, Certificate, ContactPoint};
+pub(crate) use constraints::join_gap;
 pub use constraints::{Bound, ConstraintError, Constraints, FixedRow, GapRow};
 pub use kkt::{Kkt, Scales};
 pub use penalty_duality::PenaltyOptions;
 pub(crate) use problem::unheld;
 pub use problem::{ContactError, ContactProblem, ContactReport, ContactSolver};
-pub use rigid::{DrivenMotion, RigidMotion, RigidMotions};
+pub use rigid::{DrivenMotion, Mover, PartMotion, RigidMotion, RigidMotions};
 
 use crate::petsc::Session;
 

@@ -72,7 +72,7 @@ impl Outcome {
             ));
         }
         notes.extend(self.excess.note(setting.mass()));
-        if let Some((time, motion)) = self.unheld {
+        if let Some((time, motion)) = &self.unheld {
             // Nodes that touch without force may still be in the way.
             notes.push(format!(
                 "at t = {time}, no pressing node holds the body against {motion}: the answer may \
@@ -100,10 +100,24 @@ impl Setting {
     /// What the user should know before any solve: rigid motions that nothing holds, a material
     /// or triangles that make the discretisation poor.
     pub fn notes(&self) -> Vec<String> {
-        let mut notes: Vec<String> = self.motions.free.iter().map(free_motion).collect();
+        let mut notes: Vec<String> = self.pieces().into_iter().chain(self.hinge()).collect();
+        notes.extend(self.motions.free.iter().map(free_motion));
         notes.extend(self.locking());
         notes.extend(self.sliver());
         notes
+    }
+
+    fn pieces(&self) -> Option<String> {
+        let pieces = self.motions.pieces;
+        (pieces > 1).then(|| {
+            format!("the mesh has {pieces} pieces (gmsh: Coherence joins those that touch)")
+        })
+    }
+
+    fn hinge(&self) -> Option<String> {
+        self.motions.hinge.map(|[x, y]| {
+            format!("parts of the mesh meet in a single node, a hinge, as at ({x:.4}, {y:.4})")
+        })
     }
 
     fn locking(&self) -> Option<String> {

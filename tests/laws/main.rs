@@ -19,6 +19,7 @@ mod lost_contact;
 mod maximum_principle;
 mod orders;
 mod patch;
+mod pieces;
 mod pivoting;
 mod regression;
 mod rigid;
