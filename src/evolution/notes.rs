@@ -7,6 +7,8 @@ use crate::{contact::RigidMotion, model::Plane};
 const LOCKING: f64 = 0.45;
 /// Triangles with a smaller angle are told, degrees.
 const SLIVER: f64 = 1.0;
+/// So many free motions are told one by one.
+const TOLD: usize = 6;
 /// Displacements are promised to this, relative, or to `TOLERANCES` times the KKT tolerance.
 const DISPLACEMENT: f64 = 1e-6;
 const TOLERANCES: f64 = 100.0;
@@ -101,7 +103,11 @@ impl Setting {
     /// or triangles that make the discretisation poor.
     pub fn notes(&self) -> Vec<String> {
         let mut notes: Vec<String> = self.pieces().into_iter().chain(self.hinge()).collect();
-        notes.extend(self.motions.free.iter().map(free_motion));
+        let free = &self.motions.free;
+        notes.extend(free.iter().take(TOLD).map(free_motion));
+        if free.len() > TOLD {
+            notes.push(format!("nothing holds or drives {} more such motions", free.len() - TOLD));
+        }
         notes.extend(self.locking());
         notes.extend(self.sliver());
         notes
