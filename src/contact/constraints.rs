@@ -278,7 +278,7 @@ impl Constraints {
 
 /// Adds a gap row to those of its node: rows of one smooth boundary become one, their
 /// normals averaged by length; across a corner both stay.
-fn join_gap(rows: &mut Vec<GapRow>, new: &GapRow) {
+pub(crate) fn join_gap(rows: &mut Vec<GapRow>, new: &GapRow) {
     let (n, w) = (Vector2::from(new.normal), new.weight);
     match rows.iter_mut().find(|row| Vector2::from(row.normal).dot(&n) > CORNER_COSINE) {
         None => rows.push(new.clone()),

@@ -22,11 +22,12 @@ pub(crate) use approach::approach;
 pub use certificate::{Answer, Certificate, ContactPoint};
 pub use constraint_error::ConstraintError;
 pub use constraints::Constraints;
+pub(crate) use constraints::join_gap;
 pub use kkt::{Kkt, Scales};
 pub use penalty_duality::PenaltyOptions;
 pub(crate) use problem::unheld;
 pub use problem::{ContactError, ContactProblem, ContactReport, ContactSolver};
-pub use rigid::{DrivenMotion, RigidMotion, RigidMotions};
+pub use rigid::{DrivenMotion, Mover, PartMotion, RigidMotion, RigidMotions};
 pub use rows::{Bound, FixedRow, GapRow};
 
 use crate::petsc::Session;

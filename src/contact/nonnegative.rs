@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 /// p ≥ 0 of least ‖Aᵀp − b‖ (Lawson and Hanson, Solving Least Squares Problems, ch. 23),
-/// for an A with at most three columns: at most three p_i are positive at a time.
+/// for an A with few columns: at most as many p_i are positive at a time.
 pub(super) fn nonnegative(a: &DMatrix<f64>, b: &DVector<f64>) -> DVector<f64> {
     let rows = a.nrows();
     let mut p = DVector::zeros(rows);

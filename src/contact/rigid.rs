@@ -1,154 +1,148 @@
-//! Rigid motions that nothing holds, that only contact holds, and whether the load drives them.
+//! Rigid motions that nothing holds and that only contact holds, piece by piece of the mesh.
 
-use super::{Bound, Constraints, GapRow, nonnegative::nonnegative};
-use crate::fem::Body;
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
-use std::fmt;
+mod free;
+mod load;
+mod motion;
 
-/// An infinitesimal rigid motion u(x) = a + θ e_z × (x − centre).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RigidMotion {
-    /// a, m.
-    pub translation: [f64; 2],
-    /// θ, rad.
-    pub rotation: f64,
-    /// The point that only translates, m.
-    pub centre: [f64; 2],
-}
+pub use motion::{DrivenMotion, Mover, PartMotion, RigidMotion};
 
-impl RigidMotion {
-    /// The displacement at a point.
-    pub fn at(&self, x: [f64; 2]) -> [f64; 2] {
-        [
-            self.translation[0] - self.rotation * (x[1] - self.centre[1]),
-            self.translation[1] + self.rotation * (x[0] - self.centre[0]),
-        ]
-    }
-
-    /// Its values at all nodes.
-    fn field(&self, nodes: &[[f64; 2]]) -> Vec<f64> {
-        nodes.iter().flat_map(|&x| self.at(x)).collect()
-    }
-
-    /// The work of nodal forces on it.
-    fn work(&self, body: &Body, load: &[f64]) -> f64 {
-        body.partition.dot(&self.field(&body.mesh.nodes), load, 2)
-    }
-}
-
-impl fmt::Display for RigidMotion {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let [ax, ay] = self.translation;
-        let size = ax.hypot(ay);
-        if self.rotation == 0.0 {
-            match (ax.abs() > 1e-6 * size, ay.abs() > 1e-6 * size) {
-                (true, false) => write!(f, "the horizontal translation"),
-                (false, _) => write!(f, "the vertical translation"),
-                _ => write!(f, "the translation along ({:.3}, {:.3})", ax / size, ay / size),
-            }
-        } else {
-            // Where the motion is at rest: a + θ e_z × (x − centre) = 0.
-            let (dx, dy) = (-ay / self.rotation, ax / self.rotation);
-            // Rounded before it is printed: no -0.0000.
-            let [x, y] =
-                [self.centre[0] + dx, self.centre[1] + dy].map(|v| (1e4 * v).round() / 1e4 + 0.0);
-            write!(f, "the rotation about ({x:.4}, {y:.4})")
-        }
-    }
-}
-
-/// The load does work on a rigid motion that nothing holds.
-#[derive(Debug, Clone, Copy, thiserror::Error)]
-#[error(
-    "nothing holds the body against {motion}, and the load drives it (resultant {force:.4e} N/m, \
-     moment about the body's centre {moment:.4e} N): hold it by a `displacement`, a `symmetry` \
-     axis or a `gap`, or balance the load"
-)]
-pub struct DrivenMotion {
-    /// The motion.
-    pub motion: RigidMotion,
-    /// Size of the load's resultant, N per metre of thickness.
-    pub force: f64,
-    /// The load's moment about the centre, N m per metre of thickness.
-    pub moment: f64,
-}
+use super::{Bound, GapRow};
+use crate::{
+    fem::{Body, Share},
+    mesh::Components,
+};
+use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
 
 /// The rigid motions that prescribed displacements leave free.
+///
+/// Those of a piece are orthonormal with respect to ∫u·v, divided by the area of the piece.
 #[derive(Debug, Clone)]
 pub struct RigidMotions {
-    /// Held by nothing, not even contact in either sense; orthonormal with respect to ∫u·v.
+    /// Held by nothing, not even contact in either sense.
     pub free: Vec<RigidMotion>,
     /// Directions of motion that contact resists in one sense.
     resisted: Vec<RigidMotion>,
-    /// u·ν of `resisted` at the contact nodes, one row per gap condition.
+    /// The pieces that prescribed displacements do not hold.
+    unheld: Vec<Unheld>,
+    parts: Vec<Part>,
+    part_of_node: Vec<usize>,
+    /// Number of pieces of the mesh.
+    pub pieces: usize,
+    /// Where parts of a piece meet in a node, the first such place.
+    pub hinge: Option<[f64; 2]>,
+}
+
+/// A piece of the mesh that prescribed displacements do not hold.
+#[derive(Debug, Clone)]
+struct Unheld {
+    parts: Vec<usize>,
+    /// Its motions among the free and among the resisted ones.
+    free: Range<usize>,
+    resisted: Range<usize>,
+    /// u·ν of its resisted motions, one row per gap condition.
     normal: DMatrix<f64>,
+}
+
+/// A part of the mesh that hangs together through edges.
+#[derive(Debug, Clone, Copy, Default)]
+struct Part {
+    area: f64,
     centre: [f64; 2],
-    /// Radius of gyration, m.
+    /// Radius of gyration, m: a rotation by 1/radius moves the part as far as a unit translation.
     radius: f64,
 }
 
-/// Motions are compared after scaling to unit size: below this they are zero.
+/// Squares of motions are zero below this, relative, that is motions below 3e-5. gmsh cuts a
+/// circle into edges that are equal to 1e-8, by which a disc in a bore turns freely to 5e-10
+/// (measured); forces within the KKT tolerance 1e-10 cannot tell motions below 1e-5 from none;
+/// and one node among a thousand that stops a motion squarely is still 1e-3.
 const ROUNDING: f64 = 1e-9;
 
-impl RigidMotions {
-    /// From the fixed directions (node, d) and the gap conditions.
-    pub fn new(body: &Body, fixed: &[(usize, [f64; 2])], gaps: &[GapRow]) -> Self {
-        let nodes = &body.mesh.nodes;
-        let area: f64 = body.node_area.iter().sum();
-        let mean = |f: &dyn Fn(usize) -> f64| {
-            (0..nodes.len()).map(|i| body.node_area[i] * f(i)).sum::<f64>() / area
-        };
-        let centre = [mean(&|i| nodes[i][0]), mean(&|i| nodes[i][1])];
-        // Radius of gyration: a unit rotation then moves the body as far as a translation.
-        let radius =
-            mean(&|i| (nodes[i][0] - centre[0]).powi(2) + (nodes[i][1] - centre[1]).powi(2)).sqrt();
-        let motion = |v: &Vector3<f64>| RigidMotion {
-            translation: [v[0], v[1]],
-            rotation: if v[2].abs() < ROUNDING { 0.0 } else { v[2] / radius },
-            centre,
-        };
-        let row = |node: usize, d: [f64; 2]| {
-            let [x, y] = nodes[node];
-            Vector3::new(d[0], d[1], ((x - centre[0]) * d[1] - (y - centre[1]) * d[0]) / radius)
-        };
+/// What concerns one piece: fixed directions, gap conditions, hinges.
+type Rows<'a> = (Vec<(usize, [f64; 2])>, Vec<&'a GapRow>, Vec<(usize, [usize; 2])>);
 
-        let gram = |rows: &mut dyn Iterator<Item = Vector3<f64>>| {
-            rows.fold(Matrix3::zeros(), |sum, r| sum + r * r.transpose())
-        };
-        let unheld = null_space(&gram(&mut fixed.iter().map(|(node, d)| row(*node, *d))));
-        if unheld.is_empty() {
-            let normal = DMatrix::zeros(0, 0);
-            return Self { free: vec![], resisted: vec![], normal, centre, radius };
+impl RigidMotions {
+    /// From the fixed directions (node, d) and the gap conditions, joined node by node as in the
+    /// bounds.
+    pub fn new(body: &Body, fixed: &[(usize, [f64; 2])], gaps: &[GapRow]) -> Self {
+        let Components { part_of_node, pieces, hinges } = body.mesh.components();
+        let parts = parts(body, &part_of_node);
+        let mut piece_of_part = vec![0; parts.len()];
+        for (piece, parts) in pieces.iter().enumerate() {
+            parts.iter().for_each(|&part| piece_of_part[part] = piece);
         }
-        let contact = DMatrix::from_row_iterator(
-            gaps.len(),
-            unheld.len(),
-            gaps.iter().flat_map(|g| {
-                let r = row(g.node, g.normal);
-                unheld.iter().map(move |m| r.dot(m)).collect::<Vec<_>>()
-            }),
-        );
-        let (mut free, mut resisted) = (Vec::new(), Vec::new());
-        let eigen = (contact.transpose() * &contact).symmetric_eigen();
-        for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
-            let v: Vector3<f64> = unheld.iter().zip(vector.iter()).map(|(m, c)| m * *c).sum();
-            match *value > ROUNDING * gaps.len() as f64 {
-                true => resisted.push(motion(&v)),
-                false => free.push(motion(&v)),
+        let piece = |node: usize| piece_of_part[part_of_node[node]];
+        let mut rows: Vec<Rows> = vec![Rows::default(); pieces.len()];
+        fixed.iter().for_each(|row| rows[piece(row.0)].0.push(*row));
+        gaps.iter().for_each(|row| rows[piece(row.node)].1.push(row));
+        hinges.iter().for_each(|hinge| rows[piece(hinge.0)].2.push(*hinge));
+        let mut motions = Self {
+            free: Vec::new(),
+            resisted: Vec::new(),
+            unheld: Vec::new(),
+            parts,
+            part_of_node,
+            pieces: pieces.len(),
+            hinge: hinges.first().map(|&(node, _)| body.mesh.nodes[node]),
+        };
+        for (parts, rows) in pieces.into_iter().zip(rows) {
+            motions.add_piece(&body.mesh.nodes, parts, &rows);
+        }
+        motions
+    }
+
+    /// Finds and sorts the motions of the piece of these `parts`.
+    fn add_piece(&mut self, nodes: &[[f64; 2]], parts: Vec<usize>, (fixed, gaps, hinges): &Rows) {
+        let piece = Piece { all: &self.parts, parts: &parts, whole: self.pieces == 1 };
+        let mut gram = DMatrix::zeros(3 * parts.len(), 3 * parts.len());
+        let mut add = |row: DVector<f64>| gram.ger(1.0, &row, &row, 1.0);
+        for &(node, d) in fixed {
+            let part = self.part_of_node[node];
+            add(piece.row(part, nodes[node], d) * piece.weight(part));
+        }
+        for &(node, [a, b]) in hinges {
+            for d in [[1.0, 0.0], [0.0, 1.0]] {
+                add((piece.row(a, nodes[node], d) - piece.row(b, nodes[node], d)).normalize());
             }
         }
-        let along = |m: &RigidMotion, g: &GapRow| {
-            let u = m.at(nodes[g.node]);
-            u[0] * g.normal[0] + u[1] * g.normal[1]
+        let basis = null_space(gram);
+        if basis.is_empty() {
+            return;
+        }
+        let normals = |motions: &[RigidMotion]| {
+            DMatrix::from_fn(gaps.len(), motions.len(), |i, j| {
+                let (node, [x, y]) = (gaps[i].node, gaps[i].normal);
+                let u = motions[j].at(self.part_of_node[node], nodes[node]);
+                u[0] * x + u[1] * y
+            })
         };
-        let normal =
-            DMatrix::from_fn(gaps.len(), resisted.len(), |i, j| along(&resisted[j], &gaps[i]));
-        Self { free, resisted, normal, centre, radius }
+        let contact = normals(&basis.iter().map(|v| piece.motion(v)).collect::<Vec<_>>());
+        let eigen = (contact.transpose() * &contact).symmetric_eigen();
+        let (mut free, mut resisted) = (Vec::new(), Vec::new());
+        for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            let v: DVector<f64> = basis.iter().zip(vector.iter()).map(|(m, c)| m * *c).sum();
+            match *value > ROUNDING * gaps.len() as f64 {
+                true => resisted.push(piece.motion(&v)),
+                false => free.push(piece.motion(&v)),
+            }
+        }
+        let normal = normals(&resisted);
+        let range = |old: &[RigidMotion], new: &[RigidMotion]| old.len()..old.len() + new.len();
+        let (new_free, new_resisted) = (range(&self.free, &free), range(&self.resisted, &resisted));
+        self.free.extend(free);
+        self.resisted.extend(resisted);
+        self.unheld.push(Unheld { parts, free: new_free, resisted: new_resisted, normal });
+    }
+
+    /// Those of a rank's share of the body.
+    pub fn share(self, share: &Share) -> Self {
+        Self { part_of_node: share.field(&self.part_of_node, 1), ..self }
     }
 
     /// Whether prescribed displacements alone hold the body (K is then positive definite).
     pub fn held(&self) -> bool {
-        self.free.is_empty() && self.resisted.is_empty()
+        self.unheld.is_empty()
     }
 
     /// Number of motions that contact alone holds: the dimension of K's null space.
@@ -156,111 +150,101 @@ impl RigidMotions {
         self.resisted.len()
     }
 
+    /// A motion at a node.
+    fn at(&self, motion: &RigidMotion, body: &Body, node: usize) -> [f64; 2] {
+        motion.at(self.part_of_node[node], body.mesh.nodes[node])
+    }
+
+    /// A motion at all nodes.
+    pub fn field(&self, motion: &RigidMotion, body: &Body) -> Vec<f64> {
+        (0..body.mesh.nodes.len()).flat_map(|node| self.at(motion, body, node)).collect()
+    }
+
+    /// The nodal displacements of the motions that only contact holds, with these amplitudes.
+    pub fn displacement(&self, body: &Body, amplitudes: &DVector<f64>) -> Vec<f64> {
+        let mut u = vec![0.0; 2 * body.mesh.nodes.len()];
+        for (motion, amplitude) in self.resisted.iter().zip(amplitudes.iter()) {
+            u.iter_mut().zip(self.field(motion, body)).for_each(|(u, m)| *u += amplitude * m);
+        }
+        u
+    }
+
     /// u·ν at `bounds` (rows) of the motions that only contact holds (columns).
     pub fn normal_at(&self, body: &Body, bounds: &[Bound]) -> DMatrix<f64> {
         DMatrix::from_fn(bounds.len(), self.resisted.len(), |i, j| {
-            let u = self.resisted[j].at(body.mesh.nodes[bounds[i].node]);
+            let u = self.at(&self.resisted[j], body, bounds[i].node);
             u[0] * bounds[i].normal[0] + u[1] * bounds[i].normal[1]
         })
     }
+}
 
-    /// The work of `load` (nodal forces) on the motions that only contact holds.
-    pub fn work(&self, body: &Body, load: &[f64]) -> DVector<f64> {
-        let work = |i: usize, _| self.resisted[i].work(body, load);
-        DVector::from_fn(self.resisted.len(), work)
+/// Area, centre and radius of all parts by the areas of their nodes: orthogonality is then exact
+/// in the sums over nodes that take the place of integrals.
+fn parts(body: &Body, part_of_node: &[usize]) -> Vec<Part> {
+    let count = part_of_node.iter().max().map_or(0, |last| last + 1);
+    let mut parts = vec![Part::default(); count];
+    let nodes = || part_of_node.iter().zip(&body.mesh.nodes).zip(&body.node_area);
+    for ((&part, [x, y]), area) in nodes() {
+        let Part { area: sum, centre: [cx, cy], .. } = &mut parts[part];
+        (*sum, *cx, *cy) = (*sum + area, *cx + area * x, *cy + area * y);
+    }
+    parts.iter_mut().for_each(|part| part.centre = part.centre.map(|v| v / part.area));
+    for ((&part, [x, y]), area) in nodes() {
+        let part = &mut parts[part];
+        part.radius += area * ((x - part.centre[0]).powi(2) + (y - part.centre[1]).powi(2));
+    }
+    parts.iter_mut().for_each(|part| part.radius = (part.radius / part.area).sqrt());
+    parts
+}
+
+/// Coordinates for the motions of one piece: of part k √w_k (a_x, a_y, r_k θ) with w_k its share
+/// of the piece's area, so that |v|² is the mean of |u|² over the piece.
+struct Piece<'a> {
+    all: &'a [Part],
+    parts: &'a [usize],
+    /// The only one of the mesh.
+    whole: bool,
+}
+
+impl Piece<'_> {
+    /// √w_k of a part.
+    fn weight(&self, part: usize) -> f64 {
+        let area: f64 = self.parts.iter().map(|&part| self.all[part].area).sum();
+        (self.all[part].area / area).sqrt()
     }
 
-    /// Checks that `load` (nodal forces) does no work on free motions and can be balanced by
-    /// contact forces p ≥ 0 on the resisted ones: the nearest such forces leave no remainder
-    /// (Farkas; the remainder itself is the motion that the load drives).
-    pub fn check(&self, body: &Body, load: &[f64]) -> Result<(), DrivenMotion> {
-        if self.held() {
-            return Ok(());
+    /// The vector r for which r·v is u·d at a point of a part.
+    fn row(&self, part: usize, [x, y]: [f64; 2], d: [f64; 2]) -> DVector<f64> {
+        let (Part { centre, radius, .. }, weight) = (self.all[part], self.weight(part));
+        let turn = ((x - centre[0]) * d[1] - (y - centre[1]) * d[0]) / radius;
+        let mut row = DVector::zeros(3 * self.parts.len());
+        if let Ok(k) = self.parts.binary_search(&part) {
+            row.as_mut_slice()[3 * k..3 * k + 3]
+                .copy_from_slice(&[d[0], d[1], turn].map(|v| v / weight));
         }
-        let ranks = body.partition.ranks();
-        let owned = &load[..2 * body.partition.owned()];
-        let size = ranks.total(owned.chunks(2).map(|f| f[0].hypot(f[1])).sum());
-        let work = |m: &RigidMotion| m.work(body, load);
-        let driven = |motion: RigidMotion| {
-            let sum = |k: usize| ranks.total(owned.iter().skip(k).step_by(2).sum());
-            let turn = RigidMotion { translation: [0.0, 0.0], rotation: 1.0, centre: self.centre };
-            DrivenMotion { motion, force: sum(0).hypot(sum(1)), moment: work(&turn) }
+        row
+    }
+
+    /// The motion with the coordinates v.
+    fn motion(&self, v: &DVector<f64>) -> RigidMotion {
+        let part = |(v, &part): (&[f64], &usize)| {
+            let (Part { centre, radius, .. }, weight) = (self.all[part], self.weight(part));
+            let [ax, ay, turn] = [v[0], v[1], v[2]].map(|v| v / weight);
+            PartMotion { part, translation: [ax, ay], rotation: turn / radius, centre, radius }
         };
-        if let Some(motion) = self.free.iter().find(|m| work(m).abs() > ROUNDING * size) {
-            return Err(driven(*motion));
-        }
-        let work = self.work(body, load);
-        let remainder = &work - self.normal.transpose() * nonnegative(&self.normal, &work);
-        if remainder.norm() <= 1e-8 * size {
-            return Ok(());
-        }
-        Err(driven(self.combined(&remainder.normalize())))
-    }
-
-    /// The motion whose shares (a unit vector) of those that only contact holds are given.
-    pub fn combined(&self, shares: &DVector<f64>) -> RigidMotion {
-        let mut motion = RigidMotion { translation: [0.0; 2], rotation: 0.0, centre: self.centre };
-        for (m, c) in self.resisted.iter().zip(shares.iter()) {
-            motion.translation[0] += c * m.translation[0];
-            motion.translation[1] += c * m.translation[1];
-            motion.rotation += c * m.rotation;
-        }
-        if (motion.rotation * self.radius).abs() < ROUNDING {
-            motion.rotation = 0.0;
-        }
-        motion
-    }
-
-    /// Pins one unknown for each free motion. The load being balanced, the pins carry no
-    /// force: any solution so found is exact up to the motion, which [`Self::remove_free`] takes out.
-    pub fn pin_free(&self, body: &Body, constraints: &mut Constraints) {
-        let mut fields: Vec<Vec<f64>> = self
-            .free
-            .iter()
-            .map(|m| {
-                let mut field = m.field(&body.mesh.nodes);
-                constraints.frames.displacement_to_frame(&mut field);
-                field
-            })
-            .collect();
-        // Gaussian elimination on the motions, the largest remaining entry as pivot.
-        while let Some(pivot_field) = fields.pop() {
-            let fixed = constraints.frames.fixed();
-            let largest = (0..pivot_field.len())
-                .filter(|&dof| !fixed[dof])
-                .max_by(|&a, &b| pivot_field[a].abs().total_cmp(&pivot_field[b].abs()));
-            let Some(dof) = largest else { return };
-            for field in &mut fields {
-                let factor = field[dof] / pivot_field[dof];
-                field.iter_mut().zip(&pivot_field).for_each(|(v, p)| *v -= factor * p);
-            }
-            constraints.frames.fix(dof);
-        }
-    }
-
-    /// Removes the free motions from u: the answer of least ∫|u|².
-    pub fn remove_free(&self, body: &Body, u: &mut [f64]) {
-        for motion in &self.free {
-            let field = motion.field(&body.mesh.nodes);
-            let weighted: Vec<f64> =
-                field.iter().enumerate().map(|(i, r)| body.node_area[i / 2] * r).collect();
-            let dot = |v: &[f64]| body.partition.dot(&weighted, v, 2);
-            let share = dot(u) / dot(&field);
-            u.iter_mut().zip(&field).for_each(|(v, r)| *v -= share * r);
-        }
+        let mover = match (self.parts.len(), self.whole) {
+            (1, true) => Mover::Body,
+            (1, false) => Mover::Piece,
+            _ => Mover::Part,
+        };
+        RigidMotion { parts: v.as_slice().chunks(3).zip(self.parts).map(part).collect(), mover }
     }
 }
 
 /// An orthonormal basis of the null space of a Gram matrix of unit-sized rows.
-fn null_space(gram: &Matrix3<f64>) -> Vec<Vector3<f64>> {
-    let eigen = gram.symmetric_eigen();
+fn null_space(gram: DMatrix<f64>) -> Vec<DVector<f64>> {
     let cut = ROUNDING * gram.trace().max(f64::MIN_POSITIVE);
-    let vectors = eigen.eigenvectors.column_iter();
-    eigen
-        .eigenvalues
-        .iter()
-        .zip(vectors)
-        .filter(|(v, _)| **v <= cut)
-        .map(|(_, v)| v.into())
-        .collect()
+    let eigen = gram.symmetric_eigen();
+    let pairs = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());
+    pairs.filter(|(value, _)| **value <= cut).map(|(_, v)| v.into_owned()).collect()
 }

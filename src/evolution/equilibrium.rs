@@ -135,6 +135,7 @@ impl<'a> Equilibrium<'a> {
         self.fill(&setting.triangle_means(zeta))?;
         let external = phases.time("loads", || setting.loads.at(&setting.body, time));
         setting.check_load(time, &external)?;
+        let external = setting.motions.balanced(&setting.body, external);
         let prescribed = setting.loads.prescribed_at(time);
         let posed = agreed(setting.body.partition.ranks(), setting.posed(time))?;
 
@@ -247,9 +248,8 @@ impl<'a> Equilibrium<'a> {
         let way = self.c.read(|c| {
             contact::approach(ranks, (&self.rigid, &work), &bounds, c, self.active.clone())
         })?;
-        let motion = setting.motions.combined(&way.amplitudes);
         // The start c moves along.
-        self.datum.add(setting, |x| motion.at(x));
+        self.datum.add(setting, &setting.motions.displacement(body, &way.amplitudes));
         Ok(())
     }
 
@@ -260,7 +260,9 @@ impl<'a> Equilibrium<'a> {
         if rigid <= DOMINANT * rest {
             return Ok(false);
         }
-        self.datum.add(self.setting, |x| judged.rigid.at(x));
+        let nodes = &self.setting.body.mesh.nodes;
+        let motion: Vec<f64> = nodes.iter().flat_map(|&x| judged.rigid.at(x)).collect();
+        self.datum.add(self.setting, &motion);
         self.c.set(&self.datum.relative(self.setting, c))?;
         Ok(true)
     }

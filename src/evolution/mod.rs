@@ -233,7 +233,7 @@ fn agreed<T, E: Into<RunError>>(ranks: Ranks, result: Result<T, E>) -> Result<T,
 impl Outcome {
     fn new(first: Step) -> Self {
         Self {
-            unheld: first.unheld.map(|motion| (first.record.time, motion)),
+            unheld: first.unheld.clone().map(|motion| (first.record.time, motion)),
             kkt: first.record.kkt(),
             last: first,
             stopped: None,
@@ -254,7 +254,9 @@ impl Outcome {
     fn accept(&mut self, last: Step, driving: Driving) {
         self.kkt = self.kkt.max(&last.record.kkt());
         self.undamaged_steps += usize::from(driving == Driving::Nothing);
-        self.unheld = self.unheld.or(last.unheld.map(|motion| (last.record.time, motion)));
+        if self.unheld.is_none() {
+            self.unheld = last.unheld.clone().map(|motion| (last.record.time, motion));
+        }
         self.last = last;
     }
 }

@@ -7,6 +7,8 @@ use crate::{contact::RigidMotion, model::Plane};
 const LOCKING: f64 = 0.45;
 /// Triangles with a smaller angle are told, degrees.
 const SLIVER: f64 = 1.0;
+/// So many free motions are told one by one.
+const TOLD: usize = 6;
 /// Displacements are promised to this, relative, or to `TOLERANCES` times the KKT tolerance.
 const DISPLACEMENT: f64 = 1e-6;
 const TOLERANCES: f64 = 100.0;
@@ -77,7 +79,7 @@ impl Outcome {
             ));
         }
         notes.extend(self.excess.note(setting.mass()));
-        if let Some((time, motion)) = self.unheld {
+        if let Some((time, motion)) = &self.unheld {
             // Nodes that touch without force may still be in the way.
             notes.push(format!(
                 "at t = {time}, no pressing node holds the body against {motion}: the answer may \
@@ -125,7 +127,12 @@ impl Setting {
     /// motions that nothing holds, a material or triangles that make the discretisation poor.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = self.scene().notes.clone();
-        notes.extend(self.motions.free.iter().map(free_motion));
+        notes.extend(self.pieces().into_iter().chain(self.hinge()));
+        let free = &self.motions.free;
+        notes.extend(free.iter().take(TOLD).map(free_motion));
+        if free.len() > TOLD {
+            notes.push(format!("nothing holds or drives {} more such motions", free.len() - TOLD));
+        }
         notes.extend(self.locking());
         notes.extend(self.sliver());
         notes
@@ -145,6 +152,19 @@ impl Setting {
                  and linear elasticity, which supposes they are, is a poor model of this load",
                 100.0 * part
             )
+        })
+    }
+
+    fn pieces(&self) -> Option<String> {
+        let pieces = self.motions.pieces;
+        (pieces > 1).then(|| {
+            format!("the mesh has {pieces} pieces (gmsh: Coherence joins those that touch)")
+        })
+    }
+
+    fn hinge(&self) -> Option<String> {
+        self.motions.hinge.map(|[x, y]| {
+            format!("parts of the mesh meet in a single node, a hinge, as at ({x:.4}, {y:.4})")
         })
     }
 

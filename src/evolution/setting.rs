@@ -4,7 +4,7 @@ use super::{Foundation, Loads};
 use crate::{
     contact::{
         Bound, Certificate, ConstraintError, Constraints, DrivenMotion, FixedRow, GapRow,
-        RigidMotions,
+        RigidMotions, join_gap,
     },
     fem::{Body, Elasticity, Mass, Share},
     mesh::{Mesh, boundary_nodes},
@@ -12,7 +12,7 @@ use crate::{
     petsc::{PetscError, Session},
     scene::{Scene, SceneError},
 };
-use std::path::PathBuf;
+use std::{collections::BTreeMap, path::PathBuf};
 
 /// A scene on its mesh, ready to be stepped.
 #[derive(Debug)]
@@ -82,12 +82,18 @@ impl Setting {
     pub fn new(scene: Scene, mesh: Mesh) -> Result<Self, SetupError> {
         scene.check_mesh(&mesh)?;
         let body = Body::new(mesh);
-        let (fixed, prescribed) = fixed_rows(&scene, &body.mesh);
-        let gaps = gap_rows(&scene, &body.mesh);
-        let mut constraints = Constraints::new(&body.mesh.nodes, &fixed, &gaps)
-            .map_err(|source| SetupError::Constraint { scene: scene.path.clone(), source })?;
+        let (mut fixed, prescribed) = fixed_rows(&scene, &body.mesh);
+        let mut gaps = gap_rows(&scene, &body.mesh);
         let directions: Vec<_> = fixed.iter().map(|row| (row.node, row.direction)).collect();
         let motions = RigidMotions::new(&body, &directions, &gaps);
+        let axes = fixed.iter_mut().zip(&prescribed).filter(|(_, value)| value.is_none());
+        axes.for_each(|(row, _)| {
+            row.direction = motions.tangential(&body, row.node, row.direction);
+        });
+        gaps.iter_mut()
+            .for_each(|row| row.normal = motions.tangential(&body, row.node, row.normal));
+        let mut constraints = Constraints::new(&body.mesh.nodes, &fixed, &gaps)
+            .map_err(|source| SetupError::Constraint { scene: scene.path.clone(), source })?;
         let loads = Loads::new(&scene, &body, prescribed);
         motions.pin_free(&body, &mut constraints);
 
@@ -115,6 +121,7 @@ impl Setting {
         Ok(Self {
             constraints: self.constraints.share(&share),
             certificate: self.certificate.share(&share),
+            motions: self.motions.share(&share),
             loads: self.loads.share(&share),
             body: share.body(&self.body),
             ..self
@@ -264,18 +271,19 @@ fn fixed_rows(scene: &Scene, mesh: &Mesh) -> (Vec<FixedRow>, Prescribed) {
     (rows, sources)
 }
 
-/// The gap conditions u·ν ≤ g of Γ_C, node by node.
+/// The gap conditions u·ν ≤ g of Γ_C, node by node, joined where boundaries meet smoothly.
 fn gap_rows(scene: &Scene, mesh: &Mesh) -> Vec<GapRow> {
-    let mut rows = Vec::new();
+    let mut rows: BTreeMap<usize, Vec<GapRow>> = BTreeMap::new();
     for boundary in &scene.boundaries {
         let (Some(gap), Some(curve)) = (&boundary.gap, mesh.curves.get(&boundary.name)) else {
             continue;
         };
         for point in boundary_nodes(mesh, &curve.edges) {
-            let [x, y] = mesh.nodes[point.node];
-            let distance = gap.distance.eval(x, y, 0.0);
+            let node = point.node;
+            let distance = gap.at(mesh.nodes[node]);
+            let rows = rows.entry(node).or_default();
             let mut row = |normal, weight| {
-                rows.push(GapRow { node: point.node, normal, gap: distance, weight });
+                join_gap(rows, &GapRow { node, normal, gap: distance, weight });
             };
             match gap.normal {
                 Some(normal) => row(normal, point.faces.iter().map(|f| f.length).sum()),
@@ -283,5 +291,5 @@ fn gap_rows(scene: &Scene, mesh: &Mesh) -> Vec<GapRow> {
             }
         }
     }
-    rows
+    rows.into_values().flatten().collect()
 }

@@ -3,11 +3,13 @@
 use std::collections::BTreeMap;
 
 mod boundary;
+mod components;
 mod error;
 mod gmsh;
 mod msh;
 
 pub use boundary::{BoundaryNode, CORNER_ANGLE, Face, boundary_nodes};
+pub use components::Components;
 pub use error::{MeshError, Place, Problem};
 pub use gmsh::{load, mesh_geo};
 pub use msh::read;

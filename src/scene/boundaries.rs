@@ -91,10 +91,6 @@ impl Check<'_> {
             };
         };
         let distance = self.in_space(gap)?;
-        if let Some(value) = distance.as_constant().filter(|v| *v < 0.0) {
-            let problem = format!("must not be negative (m), but is {value}");
-            return Err(self.invalid(&gap.span(), problem));
-        }
         let normal = table.normal.as_ref().map(|n| self.normal(n)).transpose()?;
         Ok(Some(Gap { distance, normal }))
     }

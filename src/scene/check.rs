@@ -10,17 +10,20 @@ use crate::{
 };
 
 /// A gap may be this much below zero, relative to the size of the body: nodes on
-/// curved boundaries carry the mesh generator's rounding.
+/// curved boundaries carry the mesh generator's rounding, differences like `0.3-0.1*3` their own.
 const ROUNDING: f64 = 1e-12;
+/// A fixed normal whose cosine with an edge's outward normal is at most this does not point out of
+/// the body: gmsh places nodes to about 1e-8 of an edge.
+const ALONG: f64 = 1e-6;
 
 /// Evaluations of an expression in space and time before a run, about: less than a second.
 const EVALUATIONS: usize = 4_000_000;
 
 impl Scene {
     /// Checks the scene against its mesh: every boundary names a physical curve on the
-    /// boundary of the body, ζ₀ is in (ζ_*, 1] and the gap not negative at their nodes,
-    /// and all expressions are finite where and when they are used, as far as times are
-    /// known beforehand (a thousand of them at most).
+    /// boundary of the body, ζ₀ is in (ζ_*, 1] and the gap not negative at their nodes, fixed
+    /// normals point out of the body, and all expressions are finite where and when they are
+    /// used, as far as times are known beforehand (a thousand of them at most).
     ///
     /// # Errors
     /// The first of these that fails, with its line, key, point and time.
@@ -33,6 +36,7 @@ impl Scene {
             let curve = self.curve(boundary, mesh)?;
             if let Some(gap) = &boundary.gap {
                 self.check_gap(&boundary_key(&boundary.name, "gap"), gap, curve, mesh, extent)?;
+                self.check_normal(gap, &boundary_key(&boundary.name, "normal"), curve, mesh)?;
             }
         }
         self.check_values(mesh, &self.sample_times(1000))
@@ -125,6 +129,39 @@ impl Scene {
             }
         }
         Ok(())
+    }
+
+    /// Whether the gap's normal, if fixed, points out of the body all along the curve. Elsewhere
+    /// u·n ≤ g would hold the body back on the wrong side, or let it sink into the obstacle.
+    fn check_normal(
+        &self,
+        gap: &Gap,
+        key: &str,
+        curve: &Curve,
+        mesh: &Mesh,
+    ) -> Result<(), SceneError> {
+        let Some([nx, ny]) = gap.normal else { return Ok(()) };
+        let cosine = |edge: &[usize; 2]| {
+            let ([x, y], _) = mesh.edge_normal(*edge);
+            nx * x + ny * y
+        };
+        let wrong = curve.edges.iter().filter(|edge| cosine(edge) <= ALONG);
+        let Some(worst) = wrong.clone().min_by(|a, b| cosine(a).total_cmp(&cosine(b))) else {
+            return Ok(());
+        };
+        let ([px, py], [qx, qy]) = (mesh.nodes[worst[0]], mesh.nodes[worst[1]]);
+        let (x, y, ([vx, vy], _)) = (0.5 * (px + qx), 0.5 * (py + qy), mesh.edge_normal(*worst));
+        // Adding 0 turns -0 into 0.
+        let [vx, vy] = [vx + 0.0, vy + 0.0];
+        let how = if cosine(worst) < -ALONG { "into the body" } else { "along the boundary" };
+        let mend = match wrong.count() == curve.edges.len() {
+            true => "turn it round, so that it points from the body towards the obstacle",
+            false => "restrict the physical curve to where the body faces the obstacle",
+        };
+        let problem = format!(
+            "points {how} at ({x}, {y}), where the outward normal is ({vx:.4}, {vy:.4}); {mend}"
+        );
+        Err(self.at_key(key, problem))
     }
 
     /// Whether `expression` is finite at `points` and `times`; what does not depend on one of

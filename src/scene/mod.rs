@@ -179,6 +179,13 @@ pub struct Gap {
     pub normal: Option<[f64; 2]>,
 }
 
+impl Gap {
+    /// g at a point, m. What [`Scene::check_mesh`] accepts below 0 is rounding.
+    pub fn at(&self, [x, y]: [f64; 2]) -> f64 {
+        self.distance.eval(x, y, 0.0).max(0.0)
+    }
+}
+
 impl Scene {
     /// The times at which values are judged before the run, s: all t_n, or some `most` (at least 1)
     /// evenly chosen ones; a hundred times where steps are chosen; t = 1 where there is no time.

@@ -20,6 +20,7 @@ mod maximum_principle;
 mod notes;
 mod orders;
 mod patch;
+mod pieces;
 mod pivoting;
 mod regression;
 mod rigid;

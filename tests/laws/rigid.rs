@@ -143,7 +143,7 @@ fn a_body_that_nothing_holds_takes_balanced_loads() {
                 setting.body.mesh.nodes.iter().zip(&setting.body.node_area).zip(u.chunks(2));
             let share: f64 = nodes
                 .map(|((x, area), u)| {
-                    let m = motion.at(*x);
+                    let m = motion.at(0, *x);
                     area * (m[0] * u[0] + m[1] * u[1])
                 })
                 .sum();
@@ -172,7 +172,7 @@ fn free_motions_are_orthonormal_over_the_body() {
         for (j, b) in free.iter().enumerate() {
             let product: f64 = (body.mesh.nodes.iter().zip(&body.node_area))
                 .map(|(x, area)| {
-                    let (a, b) = (a.at(*x), b.at(*x));
+                    let (a, b) = (a.at(0, *x), b.at(0, *x));
                     area * (a[0] * b[0] + a[1] * b[1])
                 })
                 .sum();
@@ -199,7 +199,7 @@ fn an_axis_leaves_the_translation_along_it() {
     let component = motions(square(3), "{ name = 'left', displacement = ['free', 0] }");
     assert_eq!(component.free.len(), 2);
     for motion in &component.free {
-        assert!((0..5).all(|i| motion.at([0.0, f64::from(i)])[1].abs() < 1e-12), "{motion}");
+        assert!((0..5).all(|i| motion.at(0, [0.0, f64::from(i)])[1].abs() < 1e-12), "{motion}");
     }
 }
 

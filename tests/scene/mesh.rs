@@ -71,6 +71,18 @@ fn values_are_checked_where_they_are_used() {
             "bad.toml:36: boundary \"foundation\": gap is -1 at (2, 0); it must not be negative",
         ),
         ("x^2", "sqrt(x-1)", "bad.toml:36: boundary \"foundation\": gap is NaN at (0, 0)"),
+        (
+            "\"x^2\"",
+            "-0.1",
+            "bad.toml:36: boundary \"foundation\": gap is -0.1 at (0, 0); it must not be negative",
+        ),
+        (
+            "[\"3\", \"-4\"]",
+            "[0, 1]",
+            "bad.toml:37: boundary \"foundation\": normal points into the body at (1, 0), where the \
+             outward normal is (0.0000, -1.0000); turn it round, so that it points from the body \
+             towards the obstacle",
+        ),
     ] {
         assert_eq!(verdict(old, new, &square()), Err(expected.into()), "`{old}` → `{new}`");
     }
@@ -107,6 +119,29 @@ fn what_is_undefined_elsewhere_does_not_matter() {
     assert_eq!(verdict("\"-80*t\"", "\"1/sqrt(x)\"", &square()), Ok(()));
     // Rounding in the nodes of a curved foundation is no penetration.
     assert_eq!(verdict("x^2", "-1e-15*x", &square()), Ok(()));
+}
+
+#[test]
+fn a_fixed_normal_points_out_of_the_body_all_along_its_curve() {
+    let mut mesh = square();
+    mesh.curves
+        .insert("foundation".into(), Curve { edges: vec![[0, 1], [3, 0]], interior_edges: 0 });
+    let normal = |normal: &str| verdict("[\"3\", \"-4\"]", normal, &mesh);
+    let refused = |text: &str, how: &str| {
+        let message = normal(text).expect_err("a normal that does not point out");
+        let place = format!("\"foundation\": normal points {how} at (0, 1), where the outward");
+        assert!(message.contains(&place), "{message}");
+        assert!(
+            message.contains("normal is (-1.0000, 0.0000); restrict the physical"),
+            "{message}"
+        );
+    };
+    refused("[3, -4]", "into the body");
+    // Along the left side, exactly or by rounding; a thousandth out of it is enough.
+    refused("[0, -1]", "along the boundary");
+    refused("[-1e-9, -1]", "along the boundary");
+    assert_eq!(normal("[-1e-3, -1]"), Ok(()));
+    assert_eq!(normal("[-3, -4]"), Ok(()));
 }
 
 #[test]

@@ -57,12 +57,10 @@ impl Datum {
         u
     }
 
-    /// Moves on by a rigid motion.
-    pub(super) fn add(&mut self, setting: &Setting, motion: impl Fn([f64; 2]) -> [f64; 2]) {
-        self.field.resize(2 * setting.body.mesh.nodes.len(), 0.0);
-        for (own, &node) in self.field.chunks_exact_mut(2).zip(&setting.body.mesh.nodes) {
-            own.iter_mut().zip(motion(node)).for_each(|(own, more)| *own += more);
-        }
+    /// Moves on by a rigid motion of each piece of the mesh, in nodal displacements.
+    pub(super) fn add(&mut self, setting: &Setting, motion: &[f64]) {
+        self.field.resize(motion.len(), 0.0);
+        self.field.iter_mut().zip(motion).for_each(|(own, more)| *own += more);
         self.unknowns = self.field.clone();
         setting.constraints.frames.displacement_to_frame(&mut self.unknowns);
     }

@@ -1,0 +1,94 @@
+//! What becomes of the motions that nothing holds and nothing drives.
+
+use super::{Part, PartMotion, RigidMotions, load::Resultant};
+use crate::{contact::Constraints, fem::Body};
+
+/// Normals turn by at most this (rad) to be tangential to free motions.
+const TURN: f64 = 1e-3;
+
+impl RigidMotions {
+    /// The direction ν at a node without what is rounding of u·ν for the free motions u, so that
+    /// they leave contact and symmetry axes exactly as they are.
+    pub fn tangential(&self, body: &Body, node: usize, normal: [f64; 2]) -> [f64; 2] {
+        self.free.iter().fold(normal, |[nx, ny], motion| {
+            let [x, y] = self.at(motion, body, node);
+            let (along, size) = (x * nx + y * ny, x.hypot(y));
+            if along.abs() <= 1e-14 || along.abs() > TURN * size {
+                return [nx, ny];
+            }
+            let [nx, ny] = [nx - along / size * (x / size), ny - along / size * (y / size)];
+            let length = nx.hypot(ny);
+            [nx / length, ny / length]
+        })
+    }
+
+    /// Pins one unknown for each free motion. The load being balanced, the pins carry no
+    /// force: any solution so found is exact up to the motion, which [`Self::remove_free`] takes out.
+    pub fn pin_free(&self, body: &Body, constraints: &mut Constraints) {
+        for piece in &self.unheld {
+            let motions = self.free[piece.free.clone()].iter();
+            let mut fields: Vec<Vec<f64>> = motions.map(|m| self.field(m, body)).collect();
+            fields.iter_mut().for_each(|f| constraints.frames.displacement_to_frame(f));
+            // Gaussian elimination on the motions, the largest remaining entry as pivot.
+            while let Some(pivot_field) = fields.pop() {
+                let fixed = constraints.frames.fixed();
+                let largest = (0..pivot_field.len())
+                    .filter(|&dof| !fixed[dof])
+                    .max_by(|&a, &b| pivot_field[a].abs().total_cmp(&pivot_field[b].abs()));
+                let Some(dof) = largest else { return };
+                for field in &mut fields {
+                    let factor = field[dof] / pivot_field[dof];
+                    field.iter_mut().zip(&pivot_field).for_each(|(v, p)| *v -= factor * p);
+                }
+                constraints.frames.fix(dof);
+            }
+        }
+    }
+
+    /// Removes the free motions from u: the answer of least ∫|u|².
+    pub fn remove_free(&self, body: &Body, u: &mut [f64]) {
+        if self.free.is_empty() {
+            return;
+        }
+        let momentum = |i: usize| [u[2 * i], u[2 * i + 1]].map(|u| body.node_area[i] * u);
+        let removed = self.projection(&self.resultants(body, momentum));
+        for (node, u) in u.as_chunks_mut::<2>().0.iter_mut().enumerate() {
+            let [x, y] = removed[self.part_of_node[node]].at(body.mesh.nodes[node]);
+            *u = [u[0] - x, u[1] - y];
+        }
+    }
+
+    /// `load` (nodal forces) less the body force that does the same work on free motions. That
+    /// work is rounding where [`Self::check`] accepts the load, and no pin then carries it.
+    pub fn balanced(&self, body: &Body, mut load: Vec<f64>) -> Vec<f64> {
+        if self.free.is_empty() {
+            return load;
+        }
+        let excess = self.projection(&self.resultants(body, |i| [load[2 * i], load[2 * i + 1]]));
+        for (node, f) in load.as_chunks_mut::<2>().0.iter_mut().enumerate() {
+            let [x, y] = excess[self.part_of_node[node]].at(body.mesh.nodes[node]);
+            let area = body.node_area[node];
+            *f = [f[0] - area * x, f[1] - area * y];
+        }
+        load
+    }
+
+    /// Part by part the combination m of free motions with ∫m·v = f·v for all free motions v, from the
+    /// resultants of f: they are orthogonal, so each has its own share.
+    fn projection(&self, sums: &[Resultant]) -> Vec<PartMotion> {
+        let zero = |(part, Part { centre, radius, .. }): (usize, &Part)| PartMotion {
+            part,
+            translation: [0.0; 2],
+            rotation: 0.0,
+            centre: *centre,
+            radius: *radius,
+        };
+        let mut parts: Vec<_> = self.parts.iter().enumerate().map(zero).collect();
+        for motion in &self.free {
+            let square = |part: &PartMotion| self.parts[part.part].area * part.mean_square();
+            let share = motion.work(sums) / motion.parts.iter().map(square).sum::<f64>();
+            motion.parts.iter().for_each(|part| parts[part.part].add(share, part));
+        }
+        parts
+    }
+}
