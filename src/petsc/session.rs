@@ -150,8 +150,8 @@ const ALONE: [(&str, &str); 3] = [
     ("OMPI_MCA_orte_create_session_dirs", "0"),
 ];
 
-/// PTScotch starts a thread for each core of the machine in every rank, which wait for each other
-/// actively: a hundred times slower where the cores have ranks already.
+/// PTScotch starts a thread for each core of the machine in every rank: too many by the number of
+/// ranks, and slow because they wait for each other.
 fn one_scotch_thread() {
     /// Read by Scotch 7 whenever it divides a graph.
     const THREADS: &str = "SCOTCH_PTHREAD_NUMBER";
