@@ -1,8 +1,7 @@
 //! The linear systems inside contact solvers, on a factor that is kept while that pays.
 
 use super::{ContactProblem, ContactReport};
-use crate::petsc::{Factor, Matrix, PetscError, Precision, Session, Vector, Wear};
-use std::time::Instant;
+use crate::petsc::{Factor, Matrix, PetscError, Precision, Refactorisation, Session, Vector};
 
 /// (K + D) c = f on the unknowns that are not held.
 #[derive(Clone, Copy)]
@@ -14,7 +13,7 @@ pub(super) struct System<'a> {
 }
 
 /// Conjugate gradients, preconditioned by the Cholesky factor of an earlier system: other damage,
-/// other held unknowns, another diagonal. [`Wear`] tells when to renew it.
+/// other held unknowns, another diagonal. [`Refactorisation`] tells when to renew it.
 pub(super) struct ElasticSolver<'s> {
     session: &'s Session,
     engine: Option<Engine>,
@@ -46,11 +45,11 @@ impl<'s> ElasticSolver<'s> {
         };
         engine.start(problem, system, f, c)?;
         let mut solved = engine.remaining(system)? <= limit;
-        if !solved && !engine.wear.worn() {
-            let most = engine.wear.allowance();
+        if !solved && !engine.policy.due() {
+            let most = engine.policy.iteration_limit();
             let iterations;
             (solved, iterations) = engine.iterate(problem, system, c, limit, most)?;
-            engine.wear.solved(iterations);
+            engine.policy.solved(iterations);
             report.linear_iterations += iterations;
         }
         if !solved {
@@ -58,7 +57,7 @@ impl<'s> ElasticSolver<'s> {
             if problem.phases.time("contact/factorisation", || engine.renew(problem, system))? {
                 let iterations;
                 (solved, iterations) = engine.iterate(problem, system, c, limit, FRESH)?;
-                engine.wear.solved(iterations);
+                engine.policy.solved(iterations);
                 report.linear_iterations += iterations;
             }
         }
@@ -83,7 +82,7 @@ struct Engine {
     factor: Factor,
     /// The system that was factorised.
     matrix: Matrix,
-    wear: Wear,
+    policy: Refactorisation,
     residual: Vector,
     /// The residual with 0 on held unknowns.
     free: Vector,
@@ -99,7 +98,7 @@ impl Engine {
         Ok(Self {
             factor: Factor::new(session, "elastic_", unknowns, Precision::Preconditioner)?,
             matrix: problem.stiffness.duplicate()?,
-            wear: Wear::new(problem.ranks),
+            policy: Refactorisation::default(),
             residual: zeros()?,
             free: zeros()?,
             preconditioned: zeros()?,
@@ -129,7 +128,6 @@ impl Engine {
 
     /// Factorises the system at hand; false if it is not positive definite.
     fn renew(&mut self, problem: &ContactProblem, system: System) -> Result<bool, PetscError> {
-        let started = Instant::now();
         self.matrix.copy(problem.stiffness)?;
         if let Some(added) = system.added {
             self.image.write(|d| {
@@ -141,8 +139,8 @@ impl Engine {
         self.matrix.hold(system.held, problem.stiffness_scale)?;
         let definite = self.factor.factorise(&self.matrix)?;
         match definite {
-            true => self.wear.renewed(started.elapsed().as_secs_f64()),
-            false => self.wear = Wear::new(problem.ranks),
+            true => self.policy.done(self.factor.cost()),
+            false => self.policy = Refactorisation::default(),
         }
         Ok(definite)
     }
@@ -157,7 +155,6 @@ impl Engine {
         limit: f64,
         most: usize,
     ) -> Result<(bool, usize), PetscError> {
-        let started = Instant::now();
         let mut energy = 0.0;
         for iteration in 1..=most {
             let traffic = self.factor.traffic();
@@ -179,7 +176,6 @@ impl Engine {
             c.add(energy / stiffness, &self.direction)?;
             self.residual.add(-energy / stiffness, &self.image)?;
             if self.remaining(system)? <= limit {
-                self.wear.took(started.elapsed().as_secs_f64(), iteration);
                 return Ok((true, iteration));
             }
         }

@@ -187,7 +187,7 @@ impl Matrix {
 ///
 /// # Safety
 /// `matrix` is a live handle.
-unsafe fn entries(matrix: raw::Mat) -> f64 {
+pub(super) unsafe fn entries(matrix: raw::Mat) -> f64 {
     let mut info = MaybeUninit::<raw::MatInfo>::zeroed();
     let kind = raw::MatInfoType::MAT_LOCAL;
     // SAFETY: the caller's promise; zeros are numbers, and PETSc fills them.

@@ -18,11 +18,11 @@ mod graph;
 mod ksp;
 mod mat;
 mod ranks;
+mod refactorisation;
 mod session;
 mod shell;
 mod tao;
 mod vec;
-mod wear;
 
 #[allow(
     non_camel_case_types,
@@ -45,9 +45,9 @@ pub use graph::divide;
 pub use ksp::{Krylov, LinearSolver};
 pub use mat::Matrix;
 pub use ranks::Ranks;
+pub use refactorisation::Refactorisation;
 pub use session::Session;
 pub use tao::{BoundedQuadratic, TaoReport};
 pub use vec::Vector;
-pub use wear::Wear;
 
 use error::check;

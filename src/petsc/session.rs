@@ -141,10 +141,25 @@ fn give_memory_back() {
 /// What tells a process that it is one of several ranks, by the launchers Open MPI knows.
 const RANKS: [&str; 4] = ["OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"];
 
-/// Settings of Open MPI with which a process of its own starts no daemon and opens no network:
-/// two thirds of the time it takes PETSc to start.
-const ALONE: [(&str, &str); 2] =
-    [("OMPI_MCA_ess_singleton_isolated", "1"), ("OMPI_MCA_pml", "ob1")];
+/// Settings of Open MPI with which a process of its own starts no daemon, opens no network (two
+/// thirds of the time it takes PETSc to start) and makes no directory of temporary files: all such
+/// processes of a user would share one, and one that ends removes what another has just made.
+const ALONE: [(&str, &str); 3] = [
+    ("OMPI_MCA_ess_singleton_isolated", "1"),
+    ("OMPI_MCA_pml", "ob1"),
+    ("OMPI_MCA_orte_create_session_dirs", "0"),
+];
+
+/// PTScotch starts a thread for each core of the machine in every rank: too many by the number of
+/// ranks, and slow because they wait for each other.
+fn one_scotch_thread() {
+    /// Read by Scotch 7 whenever it divides a graph.
+    const THREADS: &str = "SCOTCH_PTHREAD_NUMBER";
+    if env::var_os(THREADS).is_none() {
+        // SAFETY: PETSc has no threads yet; those of tests read the environment through std.
+        unsafe { env::set_var(THREADS, "1") };
+    }
+}
 
 /// Starts PETSc by `start`, without what only several ranks need if this process is alone.
 fn start_alone<R>(start: impl FnOnce() -> R) -> R {
@@ -162,6 +177,7 @@ fn start_alone<R>(start: impl FnOnce() -> R) -> R {
 
 fn initialize(options: &[String]) -> Result<(), PetscError> {
     give_memory_back();
+    one_scotch_thread();
     let mut arguments = vec![c_string("signorini")?, c_string("-no_signal_handler")?];
     for option in options {
         arguments.push(c_string(option)?);

@@ -1,13 +1,13 @@
 //! A kept factor as the preconditioner inside one of PETSc's own solvers.
 
-use super::{Factor, PetscError, Wear, check, factor::NOT_DEFINITE, raw};
-use std::{ffi::c_void, time::Instant};
+use super::{Factor, PetscError, Refactorisation, check, factor::NOT_DEFINITE, raw};
+use std::ffi::c_void;
 
-/// A PCSHELL that factorises the operators it is given: all of them, or only when its factor is worn
-/// out.
+/// A PCSHELL that factorises the operators it is given: all of them, or only when a new
+/// factor is due.
 pub(super) struct KeptFactor {
     factor: Factor,
-    wear: Option<Wear>,
+    policy: Option<Refactorisation>,
     /// Rows of the factored matrix.
     size: i32,
     /// Applications since the operators last changed.
@@ -17,10 +17,10 @@ pub(super) struct KeptFactor {
 }
 
 impl KeptFactor {
-    /// Factorises every matrix, or those that `wear` finds due. In a box, because PETSc keeps its
-    /// address.
-    pub(super) fn new(factor: Factor, wear: Option<Wear>) -> Box<Self> {
-        Box::new(Self { factor, wear, size: 0, applications: 0, factorisations: 0 })
+    /// Factorises every matrix, or only when `policy` finds it due. In a box, because PETSc keeps
+    /// its address.
+    pub(super) fn new(factor: Factor, policy: Option<Refactorisation>) -> Box<Self> {
+        Box::new(Self { factor, policy, size: 0, applications: 0, factorisations: 0 })
     }
 
     /// Makes `pc` apply this factor.
@@ -46,22 +46,22 @@ impl KeptFactor {
             check(raw::MatGetSize(matrix, &mut size, std::ptr::null_mut()))?;
         }
         let applications = std::mem::take(&mut self.applications);
-        if let Some(wear) = &mut self.wear {
-            wear.solved(applications);
-            if size == self.size && !wear.worn() {
+        if let Some(policy) = &mut self.policy {
+            policy.solved(applications);
+            if size == self.size && !policy.due() {
                 return Ok(());
             }
         }
-        let started = Instant::now();
         // SAFETY: a live matrix.
         if !unsafe { self.factor.factorise_raw(matrix, size != self.size)? } {
+            self.policy = self.policy.is_some().then(Refactorisation::default);
             let message = "the matrix is not positive definite".to_owned();
             return Err(PetscError { code: NOT_DEFINITE, message });
         }
         self.size = size;
         self.factorisations += 1;
-        if let Some(wear) = &mut self.wear {
-            wear.renewed(started.elapsed().as_secs_f64());
+        if let Some(policy) = &mut self.policy {
+            policy.done(self.factor.cost());
         }
         Ok(())
     }
@@ -86,16 +86,12 @@ unsafe extern "C" fn set_up(pc: raw::PC) -> raw::PetscErrorCode {
 }
 
 unsafe extern "C" fn apply(pc: raw::PC, r: raw::Vec, z: raw::Vec) -> raw::PetscErrorCode {
-    let started = Instant::now();
     // SAFETY: PETSc passes the preconditioner this was attached to and live vectors.
     let applied =
         unsafe { context(pc).and_then(|kept| kept.factor.apply_raw(r, z).map(|()| kept)) };
     match applied {
         Ok(kept) => {
             kept.applications += 1;
-            if let Some(wear) = &mut kept.wear {
-                wear.took(started.elapsed().as_secs_f64(), 1);
-            }
             0
         }
         Err(error) => error.pass_on(),

@@ -1,7 +1,7 @@
 //! TAO on a quadratic function with bounds.
 
 use super::{
-    Factor, Matrix, PetscError, Precision, Session, Vector, Wear, check, raw,
+    Factor, Matrix, PetscError, Precision, Refactorisation, Session, Vector, check, raw,
     session::{Live, c_string, world},
     shell::KeptFactor,
     vec::same_size,
@@ -67,7 +67,7 @@ impl BoundedQuadratic {
             .then(|| {
                 let (all, enough) = (session.ranks().count(size), Precision::Preconditioner);
                 let factor = Factor::new(session, "elastic_", all, enough)?;
-                Ok(KeptFactor::new(factor, Some(Wear::new(session.ranks()))))
+                Ok(KeptFactor::new(factor, Some(Refactorisation::default())))
             })
             .transpose()?;
         let gradient = Vector::zeros(session, size)?;

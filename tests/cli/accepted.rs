@@ -1,6 +1,6 @@
 //! Runs that go well: exit code 0, what is said, and the files.
 
-use crate::desk::{Desk, SCENE, square};
+use crate::desk::{Desk, SCENE, Said, square};
 use serde_json::Value;
 use std::process::Stdio;
 
@@ -305,4 +305,13 @@ fn floor() {
     let each: Vec<f64> = parts.iter().map(|part| number(&part["seconds"])).collect();
     assert!(each.len() == 4 && each.iter().all(|&s| s > 0.0), "{each:?}");
     assert!(!desk.path("out").exists(), "it writes nothing");
+}
+
+#[test]
+fn a_process_alone_needs_no_directory_of_temporary_files() {
+    // Open MPI's is common to all processes of a user, who would make and remove it at the same time.
+    let desk = Desk::new();
+    let mut command = desk.command(&["run", "scene.toml"]);
+    let said = Said::of(command.env("TMPDIR", "/proc/none"));
+    assert_eq!((said.code, said.err.as_str()), (Some(0), ""), "{said:?}");
 }

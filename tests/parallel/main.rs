@@ -1,6 +1,7 @@
 //! The program on several ranks, from outside: the same answers, whole results, one voice.
 
 mod pieces;
+mod repeat;
 
 #[path = "../cli/desk.rs"]
 #[allow(dead_code, reason = "the command line's tests use the rest of it")]

@@ -33,6 +33,13 @@ pub enum Precision {
 /// iteration then gains a digit or more. With 3e-3 (the unit square, n = 256) they were no more.
 const LEFT: f64 = 1e-1;
 
+/// Bytes that a solve reads in the time of one floating-point operation of a factorisation, and of the
+/// work per entry of L that is none (assembly, copies). Seconds of a factorisation were
+/// 0.065 ns · operations + 16.5 ns · entries within 6 % (square and L, 4,000 to 530,000 unknowns, one
+/// core of a Xeon with AVX-512, OpenBLAS), those of an iteration 0.06 to 0.13 ns per byte.
+const FLOP: f64 = 0.8;
+const ENTRY: f64 = 200.0;
+
 impl Cholesky {
     /// Orders and analyses `a`: in the `order` given (place → row), else by CHOLMOD's choice. The last
     /// `kept` rows, the last in the order too, are not eliminated in solves.
@@ -178,6 +185,13 @@ impl Cholesky {
     /// What solves with L.
     pub(super) fn triangle(&mut self) -> &mut dyn Triangle {
         &mut *self.triangle
+    }
+
+    /// The work of a factorisation, in bytes that a solve reads in the same time.
+    pub(super) fn work(&self) -> f64 {
+        // SAFETY: an analysed supernodal factor tells how many values it will have.
+        let entries = unsafe { (*self.factor).xsize };
+        FLOP * self.common.fl + ENTRY * entries as f64
     }
 
     /// Bytes that a solve reads.

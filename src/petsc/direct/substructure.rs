@@ -117,6 +117,11 @@ impl Substructure {
         Ok(ranks.all(kept).then_some(Self { ranks, precision, parts, local, shared: None }))
     }
 
+    /// The work of a factorisation on this rank, in bytes that a solve reads in the same time.
+    pub(in crate::petsc) fn work(&self) -> f64 {
+        self.local.work() + self.shared.as_ref().map_or(0.0, Cholesky::work)
+    }
+
     /// Bytes that a solve reads on this rank.
     pub(in crate::petsc) fn traffic(&self) -> f64 {
         self.local.traffic() + self.shared.as_ref().map_or(0.0, Cholesky::traffic)
