@@ -35,7 +35,7 @@ const LEFT: f64 = 1e-1;
 
 /// Bytes that a solve reads in the time of one floating-point operation of a factorisation, and of the
 /// work per entry of L that is none (assembly, copies). Seconds of a factorisation were
-/// 0.065 ns · operations + 16.5 ns · entries within 6 % (square and L, 4,000 to 530,000 unknowns, one
+/// 0.065 ns · operations + 16.5 ns · entries within 10 % (square and L, 4,000 to 530,000 unknowns, one
 /// core of a Xeon with AVX-512, OpenBLAS), those of an iteration 0.06 to 0.13 ns per byte.
 const FLOP: f64 = 0.8;
 const ENTRY: f64 = 200.0;
