@@ -43,7 +43,7 @@ const SCENES: &[(&str, &str, &[&str])] = &[
     ("step = 0.1", "step = 0", &["scene.toml:18: time.step must be positive"]),
     ("step = 0.1", "step = -0.1", &["scene.toml:18: time.step must be positive"]),
     ("step = 0.1", "step = 2", &["scene.toml:18: time.step must be positive and at most the end"]),
-    ("gap = \"0\"", "gap = \"-0.1\"", &["scene.toml:26: boundary \"bottom\": gap must not be"]),
+    ("gap = \"0\"", "gap = \"-0.1\"", &["scene.toml:26: boundary \"bottom\": gap is -0.1 at"]),
     ("gap = \"0\"", "gap = \"x-1\"", &["scene.toml:26: ", "gap is -1 at (0, 0)"]),
     (
         "\"-3*t\"",
