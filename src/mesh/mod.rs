@@ -6,6 +6,7 @@ mod boundary;
 mod error;
 mod gmsh;
 mod msh;
+mod refine;
 
 pub use boundary::{BoundaryNode, CORNER_ANGLE, Face, boundary_nodes};
 pub use error::{MeshError, Place, Problem};
