@@ -6,6 +6,10 @@ PYTHON ?= /usr/bin/python3
 SCENE ?= $(sort $(wildcard geo/*.toml))
 SOLVER ?=
 ARGS ?=
+# The scene of `make reference` and `make converge`; the scenes of `make chart`.
+STUDY ?= geo/square-table1.toml
+STUDY_NAME = $(basename $(notdir $(firstword $(STUDY))))
+CHART ?= geo/square-mild.toml geo/square-table1.toml
 
 # petsc-dev brings MPI and a C compiler, libclang-dev the headers that bindgen reads.
 PACKAGES := petsc-dev libsuitesparse-dev libopenblas0-serial libclang-dev pkg-config gcc gmsh \
@@ -32,9 +36,9 @@ help:
 	@echo 'make compare    all contact solvers on all scenes, side by side'
 	@echo 'make bench      speed against FEniCSx, the floor, growth; or ARGS=--quick'
 	@echo 'make stability  the maps of where methods fail; or MAPS="step-size …"'
-	@echo 'make reference  the reference solution of the convergence study, unless it is there (minutes)'
-	@echo 'make converge   errors against it on the paper'"'"'s grid of n and k: Table 1, Figure 3'
-	@echo 'make chart      error against seconds: solvers, meshes, steps, tolerances, FEniCSx'
+	@echo 'make reference  the reference solution of a scene, unless it is there (minutes); or STUDY=geo/a.toml'
+	@echo 'make converge   errors against it on nested meshes: Table 1, Figure 3; or STUDY=geo/a.toml'
+	@echo 'make chart      error against seconds: solvers, meshes, steps, FEniCSx; or CHART="geo/a.toml …"'
 	@echo 'make clean      remove the build, the results and the meshes'
 
 deps:
@@ -88,20 +92,24 @@ stability: build
 	$(PYTHON) scripts/stability.py out/stability $(MAPS)
 
 reference: build
-	$(BINARY) reference
+	$(BINARY) reference $(STUDY)
 
 converge: reference
-	$(BINARY) converge
-	$(PYTHON) scripts/converge.py out/converge
+	$(BINARY) converge $(STUDY)
+	$(PYTHON) scripts/converge.py out/converge/$(STUDY_NAME)
 
-# The chart compares uniform meshes with graded ones: a graded reference is nearer to both.
-CHART_REFERENCE := --cells 256 --grading 4 --step 5e-4
+# The chart compares uniform meshes with graded ones: a graded reference is nearer to both. The
+# FEniCSx loop is timed on square.geo alone, with n cells a side.
+CHART_REFERENCE := --grading 4 --step 5e-4
 
 chart: build deps-validate
-	$(BINARY) reference $(CHART_REFERENCE)
-	$(BINARY) chart $(CHART_REFERENCE)
-	$(PYTHON) validation/timing.py geo/square-mild.toml out/chart
-	$(PYTHON) scripts/chart.py out/chart
+	@set -e; for scene in $(CHART); do \
+	    out=out/chart/$$(basename $$scene .toml); \
+	    $(BINARY) reference $$scene $(CHART_REFERENCE); \
+	    $(BINARY) chart $$scene $(CHART_REFERENCE); \
+	    ! grep -q '"square.geo"' $$scene || $(PYTHON) validation/timing.py $$scene $$out; \
+	    $(PYTHON) scripts/chart.py $$out; \
+	done
 
 clean:
 	rm -rf target out geo/*.msh scripts/__pycache__ validation/__pycache__

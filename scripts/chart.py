@@ -28,8 +28,8 @@ def is_plain(row):
 
 
 def matched(fenicsx, rows):
-    """FEniCSx's rows with the errors of our runs of the same problem."""
-    ours = {(row["n"], row["step"]): row for row in rows
+    """FEniCSx's rows with the errors of our runs of the same problem, on squares of n = 1/size."""
+    ours = {(round(1 / row["size"]), row["step"]): row for row in rows
             if row["solver"] == "active-set" and is_plain(row)}
     for row in fenicsx:
         twin = ours.get((row["n"], row["step"]))
@@ -63,9 +63,11 @@ def steps(row):
 
 
 def name(row):
+    parts = 1 / row["size"]
+    size = f"1/{parts:g}" if parts > 1 and parts == round(parts) else f"{row['size']:g}"
     mesh = "uniform" if row["grading"] == 1 else f"graded {row['grading']:g}"
     loose = "" if row["tolerance"] == 1e-10 else f", tolerance {row['tolerance']:g}"
-    return f"n = {row['n']:g}, {mesh}, {steps(row)}{loose}"
+    return f"size {size}, {mesh}, {steps(row)}{loose}"
 
 
 def draw(axes, rows, fenicsx, error, suffix, label):
@@ -86,7 +88,7 @@ def draw(axes, rows, fenicsx, error, suffix, label):
                       textcoords="offset points", fontsize=8.5, ha=side, va="center",
                       arrowprops={"arrowstyle": "->", "color": INK, "lw": 0.9},
                       bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1})
-    axes.set(xscale="log", yscale="log", xlabel="wall time of mesh, set-up and steps (s)",
+    axes.set(xscale="log", yscale="log", xlabel="wall time of reading the mesh, set-up and steps (s)",
              ylabel=label, xlim=(4e-4, None))
     low, high = axes.get_ylim()
     axes.set_ylim(0.6 * low, high)
@@ -104,8 +106,8 @@ def main(folder):
     figure, (left, right) = plt.subplots(1, 2, figsize=(13, 6))
     draw(left, rows, fenicsx, "sum", "", "largest ‖ε(Δu)‖ + ‖Δζ‖ over time (that of Table 1)")
     draw(right, rows, fenicsx, "zeta", "_zeta", "largest ‖Δζ‖ over time")
-    left.set_title("error of displacement and damage: the mesh decides", loc="left")
-    right.set_title("error of the damage alone: steps count as well", loc="left")
+    left.set_title(f"{table.parent.name}: error of displacement and damage", loc="left")
+    right.set_title("error of the damage alone", loc="left")
     figure.legend(*left.get_legend_handles_labels(), loc="upper center", ncols=4,
                   bbox_to_anchor=(0.5, 0.0))
     picture = table.with_suffix(".png")

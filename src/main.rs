@@ -30,7 +30,7 @@ enum Command {
     Stability(command::StabilityArguments),
     /// Compute the reference solution of `converge` and `chart`, unless it is there.
     Reference(command::ReferenceArguments),
-    /// The errors of the paper's grid of n and k against the reference: Table 1, Figure 3.
+    /// Errors on nested meshes against the reference; by default the paper's Table 1 and Figure 3.
     Converge(command::ConvergeArguments),
     /// Error against seconds: solvers, meshes, steps and tolerances, with the Pareto front.
     Chart(command::ChartArguments),

@@ -18,9 +18,9 @@ use std::path::PathBuf;
 pub struct ChartArguments {
     #[command(flatten)]
     reference: ReferenceArguments,
-    /// Folder for chart.csv.
-    #[arg(long, value_name = "DIR", default_value = "out/chart")]
-    out: PathBuf,
+    /// Folder for chart.csv [default: out/chart/<scene>].
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
 }
 
 /// Runs the chart, prints its Pareto front and writes its table.
@@ -29,7 +29,8 @@ pub struct ChartArguments {
 /// There is no reference, or a run failed for which no solver is to blame.
 pub fn speed_chart(arguments: &ChartArguments) -> Result<(), Failure> {
     let reference = arguments.reference.load()?;
-    output::create(&arguments.out).map_err(Failure::input)?;
+    let folder = arguments.reference.folder("chart", arguments.out.as_ref());
+    output::create(&folder).map_err(Failure::input)?;
     let session = Session::start(&[]).map_err(Failure::solver)?;
     let counter = Counter::new("runs");
     let rows = chart(&session, &reference, &mut |done, all| counter.show(done, all));
@@ -57,7 +58,7 @@ pub fn speed_chart(arguments: &ChartArguments) -> Result<(), Failure> {
     if failed > 0 {
         say(&format!("{failed} of {} runs failed; the table says why", rows.len()));
     }
-    let path = arguments.out.join("chart.csv");
+    let path = folder.join("chart.csv");
     output::write_table(&path, &rows).map_err(Failure::solver)?;
     say(&format!("written to {}", path.display()));
     Ok(())
@@ -73,8 +74,9 @@ fn table(
     table.load_style(presets::ASCII_MARKDOWN);
     table.set_header([
         "solver",
-        "n",
+        "size",
         "grading",
+        "nodes",
         "steps",
         "number",
         "tolerance",
@@ -93,8 +95,9 @@ fn table(
         let marks: Vec<_> = marks.iter().filter(|(is, _)| *is).map(|(_, name)| *name).collect();
         table.add_row([
             row.solver.clone(),
-            row.n.to_string(),
+            row.size.to_string(),
             row.grading.to_string(),
+            row.nodes.to_string(),
             steps,
             row.steps.to_string(),
             format!("{:e}", row.tolerance),
@@ -103,7 +106,7 @@ fn table(
             marks.join(", "),
         ]);
     }
-    for column in [1, 2, 4, 5, 6, 7] {
+    for column in [1, 2, 3, 5, 6, 7, 8] {
         if let Some(column) = table.column_mut(column) {
             column.set_cell_alignment(CellAlignment::Right);
         }

@@ -1,4 +1,4 @@
-//! `signorini reference`: the reference solution of the convergence study.
+//! `signorini reference`: the reference solution of `converge` and `chart`.
 
 use super::{
     Failure,
@@ -8,35 +8,53 @@ use clap::Args;
 use signorini::{
     output,
     petsc::Session,
-    study::{Plan, Reference, ReferenceError},
+    study::{Reference, ReferenceError, ReferenceOptions, ReferenceSpec, StudyError},
 };
 use std::{path::PathBuf, time::Instant};
 
 /// Which reference, and where it is kept.
 #[derive(Args)]
 pub struct ReferenceArguments {
-    /// Cells per side of the reference.
-    #[arg(long, value_name = "N", default_value_t = 256)]
-    cells: usize,
-    /// Time step of the reference, s; it must divide 0.02.
-    #[arg(long, value_name = "K", default_value_t = 1e-4)]
-    step: f64,
-    /// Grading of the reference's grid, as of geo/square.geo; 1: uniform, as in the paper.
-    #[arg(long, value_name = "RATIO", default_value_t = 1.0)]
-    grading: f64,
+    /// Scene file (TOML).
+    #[arg(default_value = "geo/square-table1.toml")]
+    scene: PathBuf,
+    /// Override a key of the scene, e.g. --set time.end=0.5; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Mesh size of the coarsest mesh, m [default: 8 times the scene's].
+    #[arg(long, value_name = "M")]
+    size: Option<f64>,
+    /// Grading of the coarsest mesh (mesh.parameters.grading) [default: the scene's].
+    #[arg(long, value_name = "RATIO")]
+    grading: Option<f64>,
+    /// How often the coarsest mesh is refined to the mesh of the reference; each time halves all
+    /// edges.
+    #[arg(long, value_name = "R", default_value_t = ReferenceOptions::default().refinements)]
+    refinements: usize,
+    /// Time step of the reference, s; it must divide T/50 [default: T/10000].
+    #[arg(long, value_name = "K")]
+    step: Option<f64>,
     /// Folder of the references.
     #[arg(long, value_name = "DIR", default_value = "out/reference")]
     kept: PathBuf,
 }
 
 impl ReferenceArguments {
-    fn plan(&self) -> Plan {
-        Plan { cells: self.cells, grading: self.grading, step: self.step }
+    fn spec(&self) -> Result<ReferenceSpec, Failure> {
+        let Self { size, grading, refinements, step, .. } = *self;
+        let options = ReferenceOptions { size, grading, refinements, step };
+        ReferenceSpec::new(&self.scene, &self.set, &options).map_err(Failure::input)
     }
 
     /// The reference that has been computed.
     pub fn load(&self) -> Result<Reference, Failure> {
-        self.plan().load(&self.kept).map_err(Failure::input)
+        self.spec()?.load(&self.kept).map_err(Failure::input)
+    }
+
+    /// Where a study of this scene writes to, if not elsewhere.
+    pub fn folder(&self, study: &str, out: Option<&PathBuf>) -> PathBuf {
+        let name = self.scene.file_stem().unwrap_or_default();
+        out.cloned().unwrap_or_else(|| PathBuf::from("out").join(study).join(name))
     }
 }
 
@@ -45,24 +63,24 @@ impl ReferenceArguments {
 /// # Errors
 /// Bad input, or the run failed.
 pub fn reference(arguments: &ReferenceArguments) -> Result<(), Failure> {
-    let (plan, kept) = (arguments.plan(), &arguments.kept);
-    let path = plan.path(kept);
-    match plan.load(kept) {
+    let (spec, kept) = (arguments.spec()?, &arguments.kept);
+    let path = spec.path(kept);
+    match spec.load(kept) {
         Ok(reference) => {
             let states = reference.states.len();
             say(&format!("{}: {states} states, as the scene and mesh want them", path.display()));
             return Ok(());
         }
-        Err(ReferenceError::Missing { .. }) => {}
-        Err(error @ (ReferenceError::Other { .. } | ReferenceError::Damaged { .. })) => {
-            eprintln!("warning: {error}");
-        }
+        Err(StudyError::Reference(ReferenceError::Missing { .. })) => {}
+        Err(StudyError::Reference(
+            error @ (ReferenceError::Other { .. } | ReferenceError::Damaged { .. }),
+        )) => eprintln!("warning: {error}"),
         Err(error) => return Err(Failure::input(error)),
     }
     output::create(kept).map_err(Failure::input)?;
     let session = Session::start(&[]).map_err(Failure::solver)?;
-    let (started, screen) = (Instant::now(), Screen::until(1.0));
-    let computed = plan.compute(&session, kept, &mut |record| screen.show(record));
+    let (started, screen) = (Instant::now(), Screen::until(spec.end));
+    let computed = spec.compute(&session, kept, &mut |record| screen.show(record));
     screen.clear();
     session.finalize().map_err(Failure::solver)?;
     computed.map_err(Failure::solver)?;

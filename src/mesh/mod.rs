@@ -7,6 +7,7 @@ mod components;
 mod error;
 mod gmsh;
 mod msh;
+mod refine;
 
 pub use boundary::{BoundaryNode, CORNER_ANGLE, Face, boundary_nodes};
 pub use components::Components;

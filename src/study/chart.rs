@@ -1,10 +1,16 @@
 //! Speed against accuracy: what a run costs and how far its answer is from the reference.
 
-use super::{Grid, Norms, Reference, StudyError, front::Front, trial::Trial};
+use super::{
+    Norms, Reference, ReferenceSpec, StudyError,
+    front::Front,
+    study_run::{History, StudyRun},
+};
 use crate::{
     contact::SOLVERS,
     evolution::{RunError, StepRecord},
+    mesh::MeshError,
     petsc::Session,
+    scene::{Stepping, TimeGrid},
 };
 use serde::Serialize;
 
@@ -12,33 +18,51 @@ use serde::Serialize;
 #[derive(Debug, Clone, PartialEq)]
 struct Choice {
     solver: &'static str,
-    n: usize,
+    /// `mesh.size`, m.
+    size: f64,
+    /// `mesh.parameters.grading`.
     grading: f64,
-    steps: Steps,
+    stepping: Stepping,
     /// KKT tolerance.
     tolerance: f64,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Steps {
-    /// k, s.
-    Uniform(f64),
-    /// The tolerance on ζ of steps chosen by the program.
-    Auto(f64),
-}
-
 impl Choice {
-    fn trial(&self) -> Trial {
-        let mut set = vec![format!("contact.tolerance={:e}", self.tolerance)];
-        match self.steps {
-            Steps::Uniform(k) => set.push(format!("time.step={k:e}")),
-            Steps::Auto(tolerance) => {
-                set.push("time.step=auto".to_owned());
-                set.push(format!("time.tolerance={tolerance:e}"));
-            }
+    /// The scene as it is.
+    fn of(spec: &ReferenceSpec) -> Result<Self, StudyError> {
+        let scene = &spec.scene;
+        let parameters = &scene.mesh.parameters;
+        let (Some(&size), Some(TimeGrid { stepping, .. })) = (parameters.get("size"), scene.time)
+        else {
+            return Err(StudyError::Unsuitable {
+                path: scene.path.clone(),
+                problem: "the chart varies mesh.size, which this scene does not set; it needs a \
+                          .geo and its size"
+                    .to_owned(),
+            });
+        };
+        let grading = parameters.get("grading").copied().unwrap_or(1.0);
+        let tolerance = scene.contact.tolerance;
+        Ok(Self { solver: SOLVERS[0], size, grading, stepping, tolerance })
+    }
+
+    /// Whether the mesh is coarser than that of the reference, at its finest places too.
+    fn is_coarser(&self, spec: &ReferenceSpec) -> bool {
+        let finest = spec.finest_size().unwrap_or_default();
+        self.size > 1.001 * finest && self.size / self.grading > 0.999 * finest / spec.grading()
+    }
+
+    fn run(&self, spec: &ReferenceSpec) -> StudyRun {
+        let mut scene = spec.scene.clone();
+        let parameters = &mut scene.mesh.parameters;
+        parameters.insert("size".to_owned(), self.size);
+        // A .geo need not know a grading.
+        if self.grading != 1.0 || parameters.contains_key("grading") {
+            parameters.insert("grading".to_owned(), self.grading);
         }
-        let grid = Grid::square(self.n, self.grading);
-        Trial { grid, solver: self.solver.to_owned(), set }
+        scene.contact.tolerance = self.tolerance;
+        scene.time = Some(TimeGrid { end: spec.end, stepping: self.stepping });
+        StudyRun { scene, refinements: 0, solver: self.solver.to_owned() }
     }
 }
 
@@ -47,28 +71,24 @@ const SHORT: f64 = 1.0;
 /// How often.
 const PASSES: usize = 3;
 
-/// What one cannot say without choosing: the shipped scene's mesh and step, the program's solver
-/// and tolerance.
-const DEFAULT: Choice = Choice {
-    solver: SOLVERS[0],
-    n: 32,
-    grading: 4.0,
-    steps: Steps::Uniform(0.01),
-    tolerance: 1e-10,
-};
-
-/// The paper's mesh instead.
-const UNIFORM: Choice = Choice { grading: 1.0, ..DEFAULT };
+/// The mesh sizes over that of the scene.
+const SIZES: [f64; 5] = [4.0, 2.0, 1.0, 0.5, 0.25];
+/// Gradings besides 1.
+const GRADINGS: [f64; 5] = [2.0, 4.0, 8.0, 16.0, 32.0];
+/// T/k of uniform steps.
+const STEPS: [usize; 7] = [10, 20, 50, 100, 200, 500, 1000];
 
 /// A run of the chart.
 #[derive(Debug, Clone, Serialize)]
 pub struct ChartRow {
     /// The contact solver.
     pub solver: String,
-    /// Cells per side.
-    pub n: usize,
-    /// Widest over narrowest cell.
+    /// `mesh.size`, m.
+    pub size: f64,
+    /// `mesh.parameters.grading`.
     pub grading: f64,
+    /// Nodes of the mesh.
+    pub nodes: usize,
     /// k, s; empty where steps are chosen.
     pub step: Option<f64>,
     /// Tolerance of chosen steps.
@@ -79,7 +99,7 @@ pub struct ChartRow {
     pub kkt: f64,
     /// Time steps.
     pub steps: usize,
-    /// Wall time of mesh, set-up and steps, s; of a short run the least of three.
+    /// Wall time of reading the mesh, set-up and steps, s; of a short run the least of three.
     pub seconds: f64,
     /// Largest ‖ε(Δu)‖ + ‖Δζ‖ over time.
     pub sum: f64,
@@ -118,10 +138,11 @@ pub fn chart(
     reference: &Reference,
     done: &mut dyn FnMut(usize, usize),
 ) -> Result<Vec<ChartRow>, StudyError> {
-    let choices = choices(reference.plan.cells);
+    let spec = &reference.spec;
+    let choices = choices(spec)?;
     // The first run of a process pays for what the others find ready.
     if let Some(choice) = choices.first() {
-        choice.trial().run(session, &[], &mut |_| ())?;
+        attempt(session, choice, reference)?.ok();
     }
     let mut rows = Vec::new();
     for choice in &choices {
@@ -133,7 +154,7 @@ pub fn chart(
         done(pass * choices.len(), PASSES * choices.len());
         for (row, choice) in rows.iter_mut().zip(&choices) {
             if row.seconds < SHORT {
-                let again = choice.trial().run(session, &[], &mut |_| ())?;
+                let again = choice.run(spec).run(session, &[], &mut |_| ())?;
                 row.seconds = row.seconds.min(again.seconds);
             }
         }
@@ -142,65 +163,93 @@ pub fn chart(
     Ok(rows)
 }
 
-/// The runs, for a reference of `finest` cells a side: all must be coarser.
-fn choices(finest: usize) -> Vec<Choice> {
-    let mut choices = vec![DEFAULT];
+/// The runs: all meshes are coarser than that of the reference, at the finest places too.
+fn choices(spec: &ReferenceSpec) -> Result<Vec<Choice>, StudyError> {
+    let default = Choice::of(spec)?;
+    let uniform = Choice { grading: 1.0, ..default.clone() };
+    let graded = gradings(spec, &default)?;
+    let mut choices = vec![default.clone()];
     // Solvers, meshes and uniform steps.
     for solver in SOLVERS {
-        for n in [8, 16, 32, 64, 128] {
-            for k in [0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001] {
+        for ratio in SIZES {
+            for steps in STEPS {
                 // The other solvers show where they stand on smaller meshes.
-                if solver == SOLVERS[0] || (n <= 64 && k >= 0.002) {
-                    let steps = Steps::Uniform(k);
-                    choices.push(Choice { solver, n, steps, ..UNIFORM });
+                if solver == SOLVERS[0] || (ratio >= 0.5 && steps <= 500) {
+                    let size = ratio * default.size;
+                    let stepping = Stepping::Uniform { steps };
+                    choices.push(Choice { solver, size, stepping, ..uniform });
                 }
             }
         }
     }
-    // Graded meshes.
-    for grading in [2.0, 4.0, 8.0, 16.0, 32.0] {
-        for n in [8, 16, 32, 64, 128] {
-            for k in [0.1, 0.05, 0.02, 0.01, 0.005, 0.002] {
-                choices.push(Choice { n, grading, steps: Steps::Uniform(k), ..DEFAULT });
+    for size in SIZES.map(|ratio| ratio * default.size) {
+        // Graded meshes.
+        for &grading in &graded {
+            for steps in STEPS.into_iter().filter(|steps| *steps <= 500) {
+                let stepping = Stepping::Uniform { steps };
+                choices.push(Choice { size, grading, stepping, ..default });
             }
         }
-    }
-    // Chosen steps.
-    for grading in [UNIFORM.grading, DEFAULT.grading] {
-        for n in [8, 16, 32, 64, 128] {
+        // Chosen steps.
+        for grading in [uniform.grading, default.grading] {
             for tolerance in [1e-2, 3e-3, 1e-3, 2e-4, 5e-5] {
-                choices.push(Choice { n, grading, steps: Steps::Auto(tolerance), ..DEFAULT });
+                let stepping = Stepping::Auto { tolerance };
+                choices.push(Choice { size, grading, stepping, ..default });
             }
         }
     }
     // Loose tolerances.
     for tolerance in [1e-4, 1e-6, 1e-8] {
-        for n in [16, 32, 64] {
+        for size in SIZES[1..4].iter().map(|ratio| ratio * default.size) {
             for solver in SOLVERS {
-                choices.push(Choice { solver, n, tolerance, ..UNIFORM });
+                choices.push(Choice { solver, size, tolerance, ..uniform });
             }
-            choices.push(Choice { n, tolerance, ..DEFAULT });
+            choices.push(Choice { size, tolerance, ..default });
         }
     }
     let mut once: Vec<Choice> = Vec::new();
-    for choice in choices.into_iter().filter(|choice| choice.n < finest) {
+    for choice in choices.into_iter().filter(|choice| choice.is_coarser(spec)) {
         if !once.contains(&choice) {
             once.push(choice);
         }
     }
-    once
+    Ok(once)
+}
+
+/// The gradings besides 1 that the scene's .geo knows.
+fn gradings(spec: &ReferenceSpec, default: &Choice) -> Result<Vec<f64>, StudyError> {
+    match (Choice { grading: GRADINGS[0], ..default.clone() }).run(spec).mesh() {
+        Ok(_) => Ok(GRADINGS.to_vec()),
+        Err(MeshError::Parameter { .. }) => Ok(Vec::new()),
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// Runs a choice; the inner error is a run that did not reach T.
+fn attempt(
+    session: &Session,
+    choice: &Choice,
+    reference: &Reference,
+) -> Result<Result<History, String>, StudyError> {
+    match choice.run(&reference.spec).run(session, &reference.times, &mut |_| ()) {
+        Ok(history) => Ok(Ok(history)),
+        Err(error @ (StudyError::Run(RunError::Contact { .. }) | StudyError::Stopped { .. })) => {
+            Ok(Err(error.to_string()))
+        }
+        Err(other) => Err(other),
+    }
 }
 
 fn run(session: &Session, reference: &Reference, choice: &Choice) -> Result<ChartRow, StudyError> {
-    let (step, step_tolerance) = match choice.steps {
-        Steps::Uniform(k) => (Some(k), None),
-        Steps::Auto(tolerance) => (None, Some(tolerance)),
+    let (step, step_tolerance) = match choice.stepping {
+        Stepping::Uniform { steps } => (Some(reference.spec.end / steps as f64), None),
+        Stepping::Auto { tolerance } => (None, Some(tolerance)),
     };
-    let trial = choice.trial();
     let mut row = ChartRow {
         solver: choice.solver.to_owned(),
-        n: choice.n,
+        size: choice.size,
         grading: choice.grading,
+        nodes: 0,
         step,
         step_tolerance,
         tolerance: choice.tolerance,
@@ -214,26 +263,27 @@ fn run(session: &Session, reference: &Reference, choice: &Choice) -> Result<Char
         zeta_gradient: f64::NAN,
         zeta_min: f64::NAN,
         displacement_max: f64::NAN,
-        default: *choice == DEFAULT,
+        default: *choice == Choice::of(&reference.spec)?,
         front: false,
         knee: false,
         front_zeta: false,
         knee_zeta: false,
         error: None,
     };
-    let trace = match trial.run(session, &reference.times, &mut |_| ()) {
-        Ok(trace) => trace,
-        Err(StudyError::Run(error @ RunError::Contact { .. })) => {
-            row.error = Some(error.to_string());
+    let history = match attempt(session, choice, reference)? {
+        Ok(history) => history,
+        Err(error) => {
+            row.error = Some(error);
             return Ok(row);
         }
-        Err(other) => return Err(other),
     };
-    let (error, sum, _) = reference.errors(&trial.grid, &trace.states);
-    let StepRecord { step: steps, zeta_min, displacement_max, .. } = trace.last;
+    let (error, sum, _) = reference.errors(&history.body, &history.states);
+    let StepRecord { step: steps, zeta_min, displacement_max, .. } = history.last;
     let Norms { strain, gradient, zeta, zeta_gradient } = error;
-    let (kkt, seconds) = (trace.kkt.worst(), trace.seconds);
+    let nodes = history.body.mesh.nodes.len();
+    let (kkt, seconds) = (history.kkt.worst(), history.seconds);
     Ok(ChartRow {
+        nodes,
         kkt,
         steps,
         seconds,

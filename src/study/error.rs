@@ -8,6 +8,7 @@ use crate::{
     petsc::PetscError,
     scene::SceneError,
 };
+use std::path::PathBuf;
 
 /// A study could not be carried out.
 #[derive(Debug, thiserror::Error)]
@@ -24,9 +25,24 @@ pub enum StudyError {
     /// A run ended in a way the study does not expect.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// A run that was to reach T = 1 did not.
-    #[error("a run of the study stopped at ζ_* at t = {time}; it was to reach T = 1")]
+    /// The scene or the options do not suit a study.
+    #[error("{path}: {problem}")]
+    Unsuitable {
+        /// The scene file.
+        path: PathBuf,
+        /// What is wrong, and what to do.
+        problem: String,
+    },
+    /// A run that was to reach T did not.
+    #[error(
+        "{path}: on {nodes} nodes the run stops at ζ_* at t = {time}; a study compares runs that \
+         reach the end: choose a scene, a time.end or a step that does"
+    )]
     Stopped {
+        /// The scene file.
+        path: PathBuf,
+        /// Nodes of its mesh.
+        nodes: usize,
         /// When, s.
         time: f64,
     },

@@ -1,9 +1,9 @@
-//! Norms of the difference between fields on two grids of the same square.
+//! Norms of the difference between fields on two meshes of the same body.
 
-use super::Grid;
+use super::locate::Locator;
 use crate::fem::Body;
 
-/// The fields of one time at the nodes of a grid.
+/// The fields of one time at the nodes of a mesh.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fields {
     /// Displacements (u_x, u_y) in turn, m.
@@ -49,15 +49,15 @@ impl Norms {
     }
 }
 
-/// The functions of a grid seen from the triangles of a fine mesh.
+/// The P1 functions of a coarse mesh seen from the triangles of a fine one.
 ///
 /// Integrals are taken over the fine triangles by three inner points, exact for squares of P1
-/// functions: without error where the fine mesh refines the grid, else but for the triangles
-/// that a line of the grid crosses.
+/// functions: without error where the fine mesh refines the coarse one, else but for the fine
+/// triangles that an edge of the coarse mesh crosses.
 pub struct Embedding<'a> {
     fine: &'a Body,
-    coarse: Body,
-    /// For each point: the triangle of the grid it is in and its barycentric coordinates there.
+    coarse: &'a Body,
+    /// For each point: the coarse triangle it is in and its barycentric coordinates there.
     points: Vec<(usize, [f64; 3])>,
 }
 
@@ -66,24 +66,23 @@ const POINTS: [[f64; 3]; 3] = [[4.0, 1.0, 1.0], [1.0, 4.0, 1.0], [1.0, 1.0, 4.0]
 const SIXTH: f64 = 1.0 / 6.0;
 
 impl<'a> Embedding<'a> {
-    /// Of `grid` in `fine`, a triangulation of the same rectangle.
-    pub fn new(fine: &'a Body, grid: &Grid) -> Self {
+    /// Of `coarse` in `fine`, two triangulations of the same body.
+    pub fn new(fine: &'a Body, coarse: &'a Body) -> Self {
+        let locator = Locator::new(coarse);
         let points = fine.mesh.triangles.iter().flat_map(|nodes| {
             let corners = nodes.map(|node| fine.mesh.nodes[node]);
-            POINTS.map(|weights| {
-                let at = |axis: usize| -> f64 {
-                    SIXTH * (0..3).map(|i| weights[i] * corners[i][axis]).sum::<f64>()
-                };
-                grid.locate([at(0), at(1)])
-            })
+            let at = |weights: &[f64; 3], axis: usize| -> f64 {
+                SIXTH * (0..3).map(|i| weights[i] * corners[i][axis]).sum::<f64>()
+            };
+            POINTS.map(|weights| locator.locate([at(&weights, 0), at(&weights, 1)]))
         });
-        Self { fine, points: points.collect(), coarse: Body::new(grid.mesh()) }
+        Self { fine, coarse, points: points.collect() }
     }
 
-    /// The norms of `fine` − `coarse`, fields on the fine mesh and on the grid.
+    /// The norms of `fine` − `coarse`, fields on the fine and on the coarse mesh.
     pub fn difference(&self, fine: &Fields, coarse: &Fields) -> Norms {
         let gradients: Vec<_> =
-            (0..self.coarse.triangles.len()).map(|t| gradients(&self.coarse, t, coarse)).collect();
+            (0..self.coarse.triangles.len()).map(|t| gradients(self.coarse, t, coarse)).collect();
         let mut squares = [0.0; 4];
         for (t, points) in self.points.chunks_exact(3).enumerate() {
             let slopes = self::gradients(self.fine, t, fine);

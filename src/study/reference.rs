@@ -1,142 +1,204 @@
-//! The reference solution of the convergence study: the paper's "exact solution", computed once.
+//! The reference solution of a scene: what the studies take for the exact one, computed once.
 
 use super::{
-    Embedding, Fields, Grid, Norms, ReferenceError, StudyError,
+    Embedding, Fields, Norms, StudyError,
     store::{self, Label},
-    trial::{END, SCENE, Trial},
+    study_run::StudyRun,
 };
-use crate::{contact::SOLVERS, evolution::StepRecord, fem::Body, petsc::Session};
+use crate::{
+    contact::SOLVERS,
+    evolution::StepRecord,
+    fem::Body,
+    petsc::Session,
+    scene::{Scene, TimeGrid},
+};
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
-/// How fine a reference is.
+/// What can be chosen of a reference.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Plan {
-    /// Cells per side, n.
-    pub cells: usize,
-    /// Grading of the grid as of `geo/square.geo`; 1: uniform.
-    pub grading: f64,
-    /// k, s.
-    pub step: f64,
+pub struct ReferenceOptions {
+    /// Mesh size of the coarsest mesh, m; without it 8 times the scene's.
+    pub size: Option<f64>,
+    /// `mesh.parameters.grading` of the coarsest mesh, if not the scene's.
+    pub grading: Option<f64>,
+    /// How often the coarsest mesh is refined.
+    pub refinements: usize,
+    /// k, s; without it T/10000.
+    pub step: Option<f64>,
 }
 
-/// The states kept are this far apart, s: the times that all k of the paper's grid have in common.
-const SPACING: f64 = 0.02;
+impl Default for ReferenceOptions {
+    /// The paper's "exact solution" on Example I: n = 4·2⁶ = 256, k = 10⁻⁴ s.
+    fn default() -> Self {
+        Self { size: None, grading: None, refinements: 6, step: None }
+    }
+}
+
+/// The coarsest mesh is so many times as coarse as the scene's: n = 4 where the scene has 32.
+const COARSER: f64 = 8.0;
+/// The states kept are T divided by this apart: times that all k of the paper's Table 1 meet.
+const INTERVALS: usize = 50;
+
+/// A reference solution specified: a scene, its nested meshes and a time step.
+#[derive(Debug, Clone)]
+pub struct ReferenceSpec {
+    /// The scene as given.
+    pub scene: Scene,
+    /// T, s.
+    pub end: f64,
+    /// How often the coarsest mesh is refined.
+    pub refinements: usize,
+    /// k, s.
+    pub step: f64,
+    /// The scene on the coarsest mesh.
+    coarsest: Scene,
+    /// What the states depend on but the mesh and the times: the scene's tables and the overrides.
+    problem: String,
+}
 
 /// A reference solution.
 #[derive(Debug)]
 pub struct Reference {
     /// What it was computed with.
-    pub plan: Plan,
+    pub spec: ReferenceSpec,
     /// Times of the states, s.
     pub times: Vec<f64>,
     /// The states.
     pub states: Vec<Fields>,
-    /// Its mesh.
+    /// The body on the finest mesh.
     pub body: Body,
     /// The largest norms of the states.
     pub size: Norms,
 }
 
-impl Plan {
-    /// Refuses a plan whose steps do not meet the times of the states.
+impl ReferenceSpec {
+    /// Of the scene at `path` with keys overridden by `set`.
     ///
     /// # Errors
-    /// It is such a plan.
-    pub fn check(&self) -> Result<(), ReferenceError> {
-        let steps = SPACING / self.step;
-        let meets = steps.is_finite() && steps > 0.5 && (steps - steps.round()).abs() < 1e-6;
-        match (self.cells, meets) {
-            (2.., true) if self.grading > 0.0 => Ok(()),
-            (2.., true) => Err(ReferenceError::Plan("the grading must be positive".to_owned())),
-            (2.., false) => Err(ReferenceError::Plan(format!(
-                "the step {} must divide {SPACING}, the distance of the states compared",
-                self.step
-            ))),
-            _ => Err(ReferenceError::Plan("the reference needs at least 2 cells a side".into())),
+    /// The scene is wrong or has no time, or the options do not suit it.
+    pub fn new(
+        path: &Path,
+        set: &[String],
+        options: &ReferenceOptions,
+    ) -> Result<Self, StudyError> {
+        let scene = Scene::read(path, set)?;
+        let unsuitable =
+            |problem: String| StudyError::Unsuitable { path: path.to_owned(), problem };
+        let Some(TimeGrid { end, .. }) = scene.time else {
+            return Err(unsuitable("a study needs a scene with [time]".to_owned()));
+        };
+        let step = options.step.unwrap_or(end / 10_000.0);
+        let steps = end / INTERVALS as f64 / step;
+        if !(steps.is_finite() && steps > 0.5 && (steps - steps.round()).abs() < 1e-6) {
+            let spacing = end / INTERVALS as f64;
+            let problem = format!("the reference's step must divide {spacing} s, but is {step}");
+            return Err(unsuitable(problem));
         }
+        let mut coarsest = scene.clone();
+        let parameters = &mut coarsest.mesh.parameters;
+        let size = options.size.or(parameters.get("size").map(|size| COARSER * size));
+        for (name, value) in [("size", size), ("grading", options.grading)] {
+            if let Some(value) = value {
+                parameters.insert(name.to_owned(), value);
+            }
+        }
+        let is_msh = scene.mesh.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("msh"));
+        if is_msh && !coarsest.mesh.parameters.is_empty() {
+            let problem = "a size or grading of the coarsest mesh has no effect on a .msh; this \
+                           mesh itself is the coarsest";
+            return Err(unsuitable(problem.to_owned()));
+        }
+        let problem = problem(path, set);
+        Ok(Self { scene, end, refinements: options.refinements, step, coarsest, problem })
     }
 
-    /// Where the reference of this plan is kept in `folder`.
+    /// Where the reference is kept in `folder`.
     pub fn path(&self, folder: &Path) -> PathBuf {
-        let Self { cells, grading, step } = self;
-        let graded = if *grading == 1.0 { String::new() } else { format!("-grading{grading}") };
-        folder.join(format!("square-mild-n{cells}{graded}-k{step:e}.states"))
+        let parameters = self.coarsest.mesh.parameters.iter();
+        let mesh: String = parameters.map(|(name, value)| format!("-{name}{value}")).collect();
+        let Self { scene, refinements, step, .. } = self;
+        folder.join(format!("{}{mesh}-refined{refinements}-k{step:e}.states", scene.name))
     }
 
-    /// Computes the states of this plan and keeps them in `folder`; `accepted` sees every step.
+    /// Computes the states and keeps them in `folder`; `accepted` sees every step.
     ///
     /// # Errors
-    /// The plan makes no sense, the run failed, or its states cannot be written.
+    /// The run failed, or its states cannot be written.
     pub fn compute(
         &self,
         session: &Session,
         folder: &Path,
         accepted: &mut dyn FnMut(&StepRecord),
     ) -> Result<(), StudyError> {
-        self.check()?;
-        let trace = self.trial().run(session, &times(), accepted)?;
-        store::write(&self.path(folder), &self.label(), &trace.states)?;
+        let run = self.run(self.refinements, self.step);
+        let history = run.run(session, &self.times(), accepted)?;
+        store::write(&self.path(folder), &self.label(&history.body), &history.states)?;
         Ok(())
     }
 
-    /// Reads the states of this plan from `folder`.
+    /// Reads the states from `folder`.
     ///
     /// # Errors
-    /// There are none, they belong to another scene or mesh, or the file is damaged.
-    pub fn load(&self, folder: &Path) -> Result<Reference, ReferenceError> {
-        self.check()?;
-        let states = store::read(&self.path(folder), &self.label())?;
-        let body = Body::new(self.grid().mesh());
-        // The norms of a field are those of its difference from zero, on any grid.
-        let cell = Embedding::new(&body, &Grid::square(1, 1.0));
-        let norms = |state| cell.difference(state, &Fields::zero(4));
+    /// There are none, they belong to another scene or mesh, or the file is damaged; or the mesh
+    /// cannot be made.
+    pub fn load(&self, folder: &Path) -> Result<Reference, StudyError> {
+        let body = Body::new(self.run(self.refinements, self.step).mesh()?);
+        let states = store::read(&self.path(folder), &self.label(&body))?;
+        let zero = Fields::zero(body.mesh.nodes.len());
+        let own = Embedding::new(&body, &body);
+        let norms = |state| own.difference(state, &zero);
         let size = states.iter().map(norms).fold(Norms::default(), |a, b| a.max(&b));
-        Ok(Reference { plan: *self, times: times(), states, body, size })
+        Ok(Reference { spec: self.clone(), times: self.times(), states, body, size })
     }
 
-    fn grid(&self) -> Grid {
-        Grid::square(self.cells, self.grading)
+    /// The mesh size of the finest mesh, where gmsh makes the coarsest by a size, m.
+    pub(super) fn finest_size(&self) -> Option<f64> {
+        let size = self.coarsest.mesh.parameters.get("size")?;
+        Some(size / 2.0_f64.powi(self.refinements as i32))
     }
 
-    fn trial(&self) -> Trial {
-        Trial {
-            grid: self.grid(),
-            solver: SOLVERS[0].to_owned(),
-            set: vec![format!("time.step={:e}", self.step), "contact.tolerance=1e-10".to_owned()],
-        }
+    /// The grading of the meshes; 1 where the scene names none.
+    pub(super) fn grading(&self) -> f64 {
+        self.coarsest.mesh.parameters.get("grading").copied().unwrap_or(1.0)
     }
 
-    /// The hash of everything the states depend on. Comments in the scene are not among it.
-    fn label(&self) -> Label {
-        let trial = self.trial();
-        // Text that is no TOML is refused before anything is kept.
-        let mut scene = SCENE.parse::<toml::Table>().unwrap_or_default();
-        // The study brings its own meshes.
-        scene.remove("mesh");
-        let scene = scene.to_string();
-        let mesh = trial.grid.mesh();
+    /// A run on the coarsest mesh refined so often, with uniform steps k.
+    pub(super) fn run(&self, refinements: usize, step: f64) -> StudyRun {
+        let mut scene = self.coarsest.clone();
+        scene.time = Some(TimeGrid::uniform(self.end, step));
+        StudyRun { scene, refinements, solver: SOLVERS[0].to_owned() }
+    }
+
+    /// The times of the states, s: 0, T/50, …, T.
+    fn times(&self) -> Vec<f64> {
+        (0..=INTERVALS).map(|j| self.end * j as f64 / INTERVALS as f64).collect()
+    }
+
+    /// The hash of everything the states depend on.
+    fn label(&self, body: &Body) -> Label {
         let mut hash = Sha256::new();
-        for text in [&scene, &trial.solver, &trial.set.join(" ")] {
+        for text in [&self.problem, SOLVERS[0], &format!("{:e}", self.step)] {
             hash.update(text);
             hash.update([0]);
         }
+        let (mesh, times) = (&body.mesh, self.times());
         mesh.nodes.iter().flatten().for_each(|x| hash.update(x.to_le_bytes()));
         mesh.triangles.iter().flatten().for_each(|&n| hash.update((n as u64).to_le_bytes()));
-        times().iter().for_each(|t| hash.update(t.to_le_bytes()));
+        times.iter().for_each(|t| hash.update(t.to_le_bytes()));
         Label {
             hash: hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect(),
-            states: times().len(),
+            states: times.len(),
             nodes: mesh.nodes.len(),
         }
     }
 }
 
 impl Reference {
-    /// The largest errors over the times of `states`, which belong to the nodes of `grid`, each
+    /// The largest errors over the times of `states`, which belong to the nodes of `body`, each
     /// time all norms; and the largest ‖Δu‖_V + ‖Δζ‖_Y with the time it is reached at.
-    pub fn errors(&self, grid: &Grid, states: &[Fields]) -> (Norms, f64, f64) {
-        let embedding = Embedding::new(&self.body, grid);
+    pub fn errors(&self, body: &Body, states: &[Fields]) -> (Norms, f64, f64) {
+        let embedding = Embedding::new(&self.body, body);
         let (mut worst, mut sum, mut at) = (Norms::default(), 0.0, 0.0);
         for ((time, exact), state) in self.times.iter().zip(&self.states).zip(states) {
             let norms = embedding.difference(exact, state);
@@ -149,8 +211,19 @@ impl Reference {
     }
 }
 
-/// The times of the states, s: 0, 0.02, …, 1.
-fn times() -> Vec<f64> {
-    let count = (END / SPACING).round();
-    (0..=count as usize).map(|j| END * j as f64 / count).collect()
+/// The tables of the scene file and the overrides that decide on the states, without comments and
+/// without what the study chooses itself or what only concerns the output.
+fn problem(path: &Path, set: &[String]) -> String {
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    let mut tables = text.parse::<toml::Table>().unwrap_or_default();
+    for name in ["title", "mesh", "time", "output"] {
+        tables.remove(name);
+    }
+    let decides = |set: &&String| {
+        !["mesh.", "time.", "output.", "title"]
+            .iter()
+            .any(|start| set.trim_start().starts_with(start))
+    };
+    let overrides: Vec<_> = set.iter().filter(decides).cloned().collect();
+    format!("{tables}\n{}", overrides.join("\n"))
 }

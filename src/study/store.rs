@@ -25,9 +25,6 @@ pub(super) struct Label {
 /// A reference solution cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ReferenceError {
-    /// It cannot be computed as asked.
-    #[error("{0}")]
-    Plan(String),
     /// It has not been computed.
     #[error(
         "{path}: there is no such reference yet; compute it with `signorini reference` and the \

@@ -1,22 +1,32 @@
 //! A small chart: n = 8 against n = 16.
 
+use super::{Study, options};
 use signorini::{
     petsc::Session,
-    study::{ChartRow, Plan, chart},
+    study::{ChartRow, chart},
 };
 
 #[test]
 fn what_changes_the_cost_alone_does_not_change_the_error() {
-    let folder = tempfile::tempdir().unwrap();
-    let plan = Plan { cells: 16, grading: 1.0, step: 0.001 };
+    let study = Study::of("square-mild", "square.geo");
+    // The scene as it stands has n = 8, so that n = 2 and 4 go with it.
+    let spec = study.try_spec(&["mesh.size=0.125"], options(0.25, 2, 0.001)).unwrap();
     let session = Session::start(&[]).unwrap();
-    plan.compute(&session, folder.path(), &mut |_| ()).unwrap();
-    let rows = chart(&session, &plan.load(folder.path()).unwrap(), &mut |_, _| ()).unwrap();
-    assert!(rows.iter().all(|row| row.error.is_none() && row.kkt <= row.tolerance && row.n == 8));
+    spec.compute(&session, study.folder.path(), &mut |_| ()).unwrap();
+    let reference = spec.load(study.folder.path()).unwrap();
+    let rows = chart(&session, &reference, &mut |_, _| ()).unwrap();
+    assert!(rows.iter().all(|row| row.error.is_none() && row.kkt <= row.tolerance));
+    assert!(rows.iter().all(|row| row.size >= 0.125), "coarser than the reference");
+    let finest = |row: &&ChartRow| row.size / row.grading < 0.999 * 0.0625 / 4.0;
+    assert!(!rows.iter().any(|row| finest(&row)), "coarser at the walls too");
+    let default: Vec<_> = rows.iter().filter(|row| row.default).collect();
+    assert_eq!(default.len(), 1);
+    assert_eq!((default[0].size, default[0].grading, default[0].step), (0.125, 4.0, Some(0.01)));
 
     let uniform = |solver: &str, k: f64| -> &ChartRow {
-        let same =
-            |row: &&ChartRow| row.solver == solver && row.step == Some(k) && row.grading == 1.0;
+        let same = |row: &&ChartRow| {
+            row.solver == solver && row.step == Some(k) && row.grading == 1.0 && row.size == 0.125
+        };
         rows.iter().find(same).unwrap()
     };
     for k in [0.1, 0.01, 0.002] {
@@ -28,7 +38,10 @@ fn what_changes_the_cost_alone_does_not_change_the_error() {
     }
     // Chosen steps err in time as uniform ones do: less as their tolerance tightens.
     let auto = |tolerance: f64| {
-        rows.iter().find(|row| row.step_tolerance == Some(tolerance) && row.grading == 1.0).unwrap()
+        let same = |row: &&ChartRow| {
+            row.step_tolerance == Some(tolerance) && row.grading == 1.0 && row.size == 0.125
+        };
+        rows.iter().find(same).unwrap()
     };
     let limit = uniform("active-set", 0.001);
     let off = |row: &ChartRow| (row.zeta / limit.zeta - 1.0).abs();

@@ -1,37 +1,33 @@
-//! One run of the convergence study, seen at given times and timed.
+//! One run of a study, seen at given times and timed.
 
-use super::{Fields, Grid, StudyError};
+use super::{Fields, StudyError};
 use crate::{
     contact::Kkt,
     evolution::{self, Phases, Setting, State, StepRecord},
+    fem::Body,
+    mesh::{self, Mesh, MeshError},
     petsc::Session,
     scene::Scene,
 };
-use std::{
-    path::Path,
-    time::{Duration, Instant},
-};
+use std::time::{Duration, Instant};
 
-/// Example I with λ_U = 2: with the data as printed no run comes to T = 1.
-pub(super) const SCENE: &str = include_str!("../../geo/square-mild.toml");
-/// T, s.
-pub(super) const END: f64 = 1.0;
-
-/// A run: the scene of the study on a grid, with a solver and settings.
+/// A run of a scene on its mesh or a refinement of it.
 #[derive(Debug, Clone)]
-pub(super) struct Trial {
-    pub(super) grid: Grid,
+pub(super) struct StudyRun {
+    pub(super) scene: Scene,
+    /// How often the scene's mesh is refined.
+    pub(super) refinements: usize,
     pub(super) solver: String,
-    /// As of `--set`.
-    pub(super) set: Vec<String>,
 }
 
 /// What a run gave.
 #[derive(Debug)]
-pub(super) struct Trace {
+pub(super) struct History {
+    /// The body it was computed on.
+    pub(super) body: Body,
     /// The fields at the times asked for.
     pub(super) states: Vec<Fields>,
-    /// Wall time of mesh, setting and all steps, s, without looking on.
+    /// Wall time of reading the mesh, set-up and all steps, s, without looking on.
     pub(super) seconds: f64,
     /// The last step.
     pub(super) last: StepRecord,
@@ -39,7 +35,16 @@ pub(super) struct Trace {
     pub(super) kkt: Kkt,
 }
 
-impl Trial {
+impl StudyRun {
+    /// Its mesh.
+    ///
+    /// # Errors
+    /// The scene's mesh cannot be made or read.
+    pub(super) fn mesh(&self) -> Result<Mesh, MeshError> {
+        let mesh = mesh::load(&self.scene.mesh.file, &self.scene.mesh.parameters)?;
+        Ok((0..self.refinements).fold(mesh, |mesh, _| mesh.refined()))
+    }
+
     /// Runs it; `accepted` sees every step, `times` (rising, from 0) are those of the states.
     ///
     /// # Errors
@@ -49,10 +54,11 @@ impl Trial {
         session: &Session,
         times: &[f64],
         accepted: &mut dyn FnMut(&StepRecord),
-    ) -> Result<Trace, StudyError> {
+    ) -> Result<History, StudyError> {
+        // The time gmsh may need is not the program's.
+        self.mesh()?;
         let started = Instant::now();
-        let scene = Scene::parse(SCENE, Path::new("square-mild.toml"), &self.set)?;
-        let setting = Setting::new(scene, self.grid.mesh())?;
+        let setting = Setting::new(self.scene.clone(), self.mesh()?)?;
         let mut sampler = Sampler { times, before: None, states: Vec::new() };
         let mut aside = Duration::ZERO;
         let outcome =
@@ -65,8 +71,12 @@ impl Trial {
             })?;
         let seconds = (started.elapsed() - aside).as_secs_f64();
         match outcome.stopped {
-            Some(stop) => Err(StudyError::Stopped { time: stop.time }),
-            None => Ok(Trace {
+            Some(stop) => {
+                let (body, path) = (&setting.body, self.scene.path.clone());
+                Err(StudyError::Stopped { path, nodes: body.mesh.nodes.len(), time: stop.time })
+            }
+            None => Ok(History {
+                body: setting.body,
                 states: sampler.states,
                 seconds,
                 last: outcome.last.record,
@@ -75,7 +85,6 @@ impl Trial {
         }
     }
 }
-
 /// Takes the fields at given times out of a run, between two steps on the line through both.
 struct Sampler<'a> {
     times: &'a [f64],
@@ -86,7 +95,7 @@ struct Sampler<'a> {
 impl Sampler<'_> {
     fn observe(&mut self, state: &State) {
         // Uniform steps meet the times but for rounding.
-        let rounding = 1e-9 * END;
+        let rounding = 1e-9 * self.times.last().unwrap_or(&0.0);
         while let Some(&time) = self.times.get(self.states.len())
             && time <= state.time + rounding
         {
