@@ -31,6 +31,11 @@ impl Bounds {
         Self { floor: self.floor.max(low), ceiling: self.ceiling.min(high) }
     }
 
+    /// After a correction of ζ by a field of these extremes.
+    pub(super) fn shifted(self, (low, high): (f64, f64)) -> Self {
+        Self { floor: self.floor + low.min(0.0), ceiling: self.ceiling + high.max(0.0) }
+    }
+
     /// The least ζ.
     pub(super) fn floor(self) -> f64 {
         self.floor

@@ -1,4 +1,4 @@
-//! Time steps: uniform as in (25), or chosen from an error estimate.
+//! Time steps: uniform as in (25), or chosen from error estimates.
 
 use crate::scene::{Stepping, TimeGrid};
 
@@ -19,15 +19,9 @@ const COARSEST: f64 = 0.05;
 const FINEST: f64 = 1e-12;
 
 impl Clock {
-    /// `rate` is the largest |dζ/dt| at the start, 1/s: it gives the first chosen step.
-    pub(super) fn new(grid: Option<TimeGrid>, rate: f64) -> Self {
-        let next = match grid {
-            Some(TimeGrid { end, stepping: Stepping::Auto { tolerance } }) => {
-                let first = 0.1 * tolerance / rate.max(f64::MIN_POSITIVE);
-                first.clamp(1e-6 * end, COARSEST * end)
-            }
-            _ => 0.0,
-        };
+    /// `first` is the first step to try where steps are chosen, s.
+    pub(super) fn new(grid: Option<TimeGrid>, first: f64) -> Self {
+        let next = grid.map_or(0.0, |grid| first.min(COARSEST * grid.end));
         Self { grid, accepted: 0, time: 0.0, next }
     }
 
@@ -40,17 +34,19 @@ impl Clock {
                 Some((grid.time(self.accepted + 1, steps), grid.end / steps as f64))
             }
             Stepping::Auto { .. } if self.time >= grid.end => None,
-            // A remainder below half a step is taken along.
-            Stepping::Auto { .. } if self.time + 1.5 * self.next >= grid.end => {
-                let step = (grid.end - self.time).min(self.next.max(0.5 * (grid.end - self.time)));
-                let end = if self.time + step >= grid.end { grid.end } else { self.time + step };
-                Some((end, step))
+            Stepping::Auto { .. } => {
+                let rest = grid.end - self.time;
+                // The last two steps are equal rather than one of them small.
+                match rest / self.next {
+                    steps if steps <= 1.0 => Some((grid.end, rest)),
+                    steps if steps < 2.0 => Some((self.time + 0.5 * rest, 0.5 * rest)),
+                    _ => Some((self.time + self.next, self.next)),
+                }
             }
-            Stepping::Auto { .. } => Some((self.time + self.next, self.next)),
         }
     }
 
-    /// The tolerance on ζ of chosen steps.
+    /// The relative tolerance of chosen steps.
     pub(super) fn tolerance(&self) -> Option<f64> {
         match self.grid?.stepping {
             Stepping::Auto { tolerance } => Some(tolerance),
@@ -58,12 +54,12 @@ impl Clock {
         }
     }
 
-    /// The step to `time` of length `step` holds; its error in ζ was `error`.
+    /// The step to `time` of length `step` is accepted; `error` is its error over the allowed one.
     pub(super) fn accept(&mut self, time: f64, step: f64, error: f64) {
         self.accepted += 1;
         self.time = time;
-        if let Some(tolerance) = self.tolerance() {
-            self.next = step * growth(tolerance, error).min(2.0);
+        if let Some(grid) = self.grid {
+            self.next = (step * growth(error).min(2.0)).min(COARSEST * grid.end);
         }
     }
 
@@ -75,13 +71,14 @@ impl Clock {
         self.next > FINEST * grid.end
     }
 
-    /// By what to cut a step whose error was too large.
-    pub(super) fn reduction(&self, error: f64) -> f64 {
-        self.tolerance().map_or(1.0, |tolerance| growth(tolerance, error).clamp(0.2, 0.9))
+    /// By what to cut a step whose error is so many times the allowed one.
+    pub(super) fn reduction(error: f64) -> f64 {
+        growth(error).clamp(0.2, 0.9)
     }
 }
 
-/// An error of second order in the step reaches the tolerance, with a margin, at this factor.
-fn growth(tolerance: f64, error: f64) -> f64 {
-    0.8 * (tolerance / error.max(1e-300)).sqrt()
+/// By this factor a step becomes one with the allowed error, of third order in its length, but for a
+/// margin.
+fn growth(error: f64) -> f64 {
+    0.9 / error.max(1e-300).cbrt()
 }

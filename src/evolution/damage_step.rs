@@ -2,7 +2,7 @@
 
 use super::{Phases, Setting};
 use crate::{
-    fem::{DamageSystem, source, source_load},
+    fem::{self, DamageCertificate, DamageSystem},
     model::DamageLaw,
     petsc::{PetscError, Session},
 };
@@ -17,23 +17,33 @@ pub(super) struct DamageStep<'a> {
     system: Option<(f64, DamageSystem)>,
 }
 
+/// The source of a state.
+pub(super) struct Source {
+    /// b, m²/s.
+    pub(super) load: Vec<f64>,
+    /// The least φ, 1/s.
+    pub(super) least: f64,
+}
+
 /// What became of a damage step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Driving {
-    /// The system was solved; with the least φ, 1/s.
-    Solved(f64),
+    /// The system was solved; what the solution is worth.
+    Solved(DamageCertificate),
     /// No source and a uniform ζ: ζ_n = ζ_{n−1} without a solve.
     Nothing,
     /// The linear solver failed.
     Failed,
+    /// The solution misses the tolerance by this residual.
+    Missed(f64),
 }
 
 impl Driving {
-    /// The least φ of the step, 1/s.
-    pub(super) fn least_source(self) -> f64 {
+    /// What ζ_n is worth; without a solve it is exact.
+    pub(super) fn certificate(self) -> DamageCertificate {
         match self {
-            Self::Solved(least) => least,
-            Self::Nothing | Self::Failed => 0.0,
+            Self::Solved(certificate) => certificate,
+            Self::Nothing | Self::Failed | Self::Missed(_) => DamageCertificate::default(),
         }
     }
 }
@@ -43,55 +53,90 @@ impl<'a> DamageStep<'a> {
         Self { session, setting, phases, law: setting.damage(), system: None }
     }
 
-    /// The source load b of u and ζ, and its least φ, where there is a damage law.
-    fn source(&self, u: &[f64], zeta: &[f64]) -> Option<(Vec<f64>, f64)> {
+    /// The source of u and ζ, where there is a damage law.
+    pub(super) fn source(&self, u: &[f64], zeta: &[f64]) -> Option<Source> {
         let (law, body) = (self.law?, &self.setting.body);
         Some(self.phases.time("damage source", || {
             let strain = self.setting.elasticity.strain_squared(body, u);
-            let phi = source(body, &law, &strain, zeta);
+            let phi = fem::source(body, &law, &strain, zeta);
             let least = phi.iter().flatten().copied().fold(0.0, f64::min);
             let least = body.partition.ranks().min(least);
-            (source_load(body, self.setting.mass(), &phi), least)
+            Source { load: fem::source_load(body, self.setting.mass(), &phi), least }
         }))
     }
 
-    /// About the largest |dζ/dt| that the source of u and ζ causes, 1/s.
-    pub(super) fn rate(&self, u: &[f64], zeta: &[f64]) -> f64 {
-        let body = &self.setting.body;
-        let (load, _) = self.source(u, zeta).unwrap_or_default();
-        let rates = load.iter().zip(&body.node_area).map(|(b, a)| b.abs() / a);
-        body.partition.ranks().max(rates.take(body.partition.owned()).fold(0.0, f64::max))
-    }
-
-    /// Replaces ζ_{n−1} by ζ_n, `step` s later.
+    /// ζ_n, `step` s after ζ_{n−1} = `start`, for the source load b = `load`.
     pub(super) fn advance(
         &mut self,
-        u: &[f64],
-        zeta: &mut [f64],
+        load: Option<&[f64]>,
+        start: &[f64],
         step: f64,
-    ) -> Result<Driving, PetscError> {
-        let (Some(law), Some((load, least))) = (self.law, self.source(u, zeta)) else {
-            return Ok(Driving::Nothing);
+    ) -> Result<(Vec<f64>, Driving), PetscError> {
+        let mut zeta = start.to_vec();
+        let (Some(law), Some(load)) = (self.law, load) else {
+            return Ok((zeta, Driving::Nothing));
         };
-        let partition = &self.setting.body.partition;
-        let (low, high) = partition.extremes(zeta);
+        let setting = self.setting;
+        let partition = &setting.body.partition;
+        let (low, high) = partition.extremes(start);
         if low == high && partition.ranks().all(load.iter().all(|&b| b == 0.0)) {
-            return Ok(Driving::Nothing);
+            return Ok((zeta, Driving::Nothing));
         }
-        let mut system = match self.system.take() {
+        let phases = self.phases;
+        let system = self.system(&law, step)?;
+        if !phases.time("damage solve", || system.advance(load, &mut zeta))? {
+            return Ok((zeta, Driving::Failed));
+        }
+        let largest = system.largest_residual()?;
+        partition.update(&mut zeta, 1)?;
+        let certificate = phases.time("damage certificate", || {
+            let (body, fields) = (&setting.body, [start, &zeta]);
+            DamageCertificate::of(body, setting.mass(), law.diffusion, step, load, fields)
+        });
+        let driving = match certificate.residual {
+            residual if !residual.is_finite() => Driving::Failed,
+            residual if residual > largest => Driving::Missed(residual),
+            _ => Driving::Solved(certificate),
+        };
+        Ok((zeta, driving))
+    }
+
+    /// By how much ζ_n changes if the source load of a step of `step` s changes by `load`. `None` if
+    /// that has no finite answer.
+    pub(super) fn correction(
+        &mut self,
+        load: &[f64],
+        step: f64,
+    ) -> Result<Option<Vec<f64>>, PetscError> {
+        let partition = &self.setting.body.partition;
+        let nothing = partition.ranks().all(load.iter().all(|&b| b == 0.0));
+        let Some(law) = self.law.filter(|_| !nothing) else {
+            return Ok(Some(vec![0.0; partition.local()]));
+        };
+        let phases = self.phases;
+        let system = self.system(&law, step)?;
+        let solved = phases.time("damage solve", || system.correction(load))?;
+        let Some(mut change) = solved else { return Ok(None) };
+        change.resize(partition.local(), 0.0);
+        partition.update(&mut change, 1)?;
+        let finite = partition.ranks().all(change.iter().all(|z| z.is_finite()));
+        Ok(finite.then_some(change))
+    }
+
+    /// The damage system of a step of `step` s.
+    fn system(&mut self, law: &DamageLaw, step: f64) -> Result<&mut DamageSystem, PetscError> {
+        let (session, setting, phases) = (self.session, self.setting, self.phases);
+        let made = match self.system.take() {
             Some((k, system)) if k == step => system,
             Some((_, mut system)) => {
-                self.phases.time("damage factor", || system.set_step(step))?;
+                phases.time("damage factor", || system.set_step(step))?;
                 system
             }
-            None => self.phases.time("damage factor", || {
-                let (body, mass) = (&self.setting.body, self.setting.mass());
-                DamageSystem::new(self.session, body, mass, law.diffusion, step)
+            None => phases.time("damage factor", || {
+                let (body, mass) = (&setting.body, setting.mass());
+                DamageSystem::new(session, body, mass, law.diffusion, step)
             })?,
         };
-        let solved = self.phases.time("damage solve", || system.advance(&load, zeta))?;
-        partition.update(zeta, 1)?;
-        self.system = Some((step, system));
-        Ok(if solved { Driving::Solved(least) } else { Driving::Failed })
+        Ok(&mut self.system.insert((step, made)).1)
     }
 }

@@ -1,6 +1,7 @@
 //! Problem VP^hk: damage and contact in turn, step by step.
 
 mod bounds;
+mod chosen;
 mod clock;
 mod damage_step;
 mod equilibrium;
@@ -11,6 +12,7 @@ mod loads;
 mod notes;
 mod setting;
 mod state;
+mod time_loop;
 
 pub use crate::contact::ContactPoint;
 pub use crate::phases::Phases;
@@ -26,11 +28,8 @@ use crate::{
     contact::{ContactError, ContactReport, Kkt, RigidMotion, UnknownSolver},
     petsc::{PetscError, Ranks, Session},
 };
-use bounds::Bounds;
-use clock::Clock;
-use damage_step::{DamageStep, Driving};
-use estimate::Estimate;
-use std::time::Instant;
+use damage_step::Driving;
+use time_loop::{Attempt, TimeLoop};
 
 /// How a run ended that did not fail.
 #[derive(Debug, Clone)]
@@ -53,15 +52,19 @@ pub struct Outcome {
     pub excess: Excess,
     /// When first no pressing node held the body against a rigid motion, s, and which.
     pub unheld: Option<(f64, RigidMotion)>,
-    /// Estimated errors of the last accepted step.
+    /// Estimated errors of the answers.
     pub accuracy: Accuracy,
+    /// Estimated error of the last ζ over the damage done, where steps are chosen.
+    pub damage_error: Option<f64>,
+    /// The accepted step before the last one whose u is likely to be the least exact, if it is less
+    /// exact than the last: its stationarity residual and its fields.
+    worst: Option<(f64, State)>,
 }
 
 /// The stop at ζ_*.
 #[derive(Debug, Clone, Copy)]
 pub struct Stop {
-    /// When, s: the first t_n with min ζ ≤ ζ_*; where steps are chosen, the interpolated time less
-    /// the estimated delay of the steps.
+    /// When, s: the first t_n with min ζ ≤ ζ_*; where steps are chosen, the interpolated time.
     pub time: f64,
     /// The min ζ found there, not accepted.
     pub zeta_min: f64,
@@ -98,6 +101,31 @@ pub enum RunError {
     /// The contact solver has no such name.
     #[error(transparent)]
     Solver(#[from] UnknownSolver),
+    /// The damage solve misses its tolerance.
+    #[error(
+        "step {step} (t = {time}): the damage equation was solved only to a residual of {residual:.1e} \
+         of its right-hand side; look for extreme numbers in [damage], for slivers in the mesh, and \
+         for PETSc options that loosen -damage_ksp_"
+    )]
+    DamageMissed {
+        /// The step.
+        step: usize,
+        /// Its time, s.
+        time: f64,
+        /// The relative residual.
+        residual: f64,
+    },
+    /// Chosen steps cannot keep their tolerance.
+    #[error(
+        "step {step} (t = {time}): the damage changes too fast for time.tolerance, however short the \
+         step; does a load jump there? Set time.step to a number"
+    )]
+    Steps {
+        /// The step.
+        step: usize,
+        /// Its time, s.
+        time: f64,
+    },
     /// The scene contradicts itself at some time.
     #[error(transparent)]
     Setup(#[from] SetupError),
@@ -110,6 +138,13 @@ pub enum RunError {
     /// Whoever was shown an accepted step could not go on (results that cannot be written).
     #[error(transparent)]
     Observer(Box<dyn std::error::Error + Send + Sync>),
+}
+
+impl RunError {
+    /// Whether a shorter step may do better.
+    fn is_of_a_step(&self) -> bool {
+        matches!(self, Self::Contact { .. } | Self::Damage { .. } | Self::DamageMissed { .. })
+    }
 }
 
 /// The answer of whoever is shown an accepted step: an error ends the run.
@@ -127,98 +162,19 @@ pub fn run(
     phases: &Phases,
     accepted: &mut dyn FnMut(&Step) -> Observed,
 ) -> Result<Outcome, RunError> {
-    let mut equilibrium = Equilibrium::new(session, setting, solver, phases)?;
-    let mut damage = DamageStep::new(session, setting, phases);
-
-    // (27): the displacement at t = 0, or the only one where there is no time.
-    let last = equilibrium.solve(0, setting.start(), &setting.initial_damage())?;
-    equilibrium.accept(setting.start())?;
-    agreed(setting.body.partition.ranks(), accepted(&last).map_err(RunError::Observer))?;
-    let mut clock = Clock::new(setting.scene().time, damage.rate(&last.state.u, &last.state.zeta));
-    let partition = &setting.body.partition;
-    let ranks = partition.ranks();
-    let mut estimate = Estimate::new(partition);
-    let mut bounds = Bounds::of(partition.extremes(&last.state.zeta));
-    let mut outcome = Outcome::new(last);
-    outcome.count(equilibrium.report());
-
-    while let Some((time, step)) = clock.propose() {
-        let (started, n) = (Instant::now(), outcome.last.record.step + 1);
-        let old = &outcome.last.state;
-
-        // (28): ζ_n from u_{n−1} and ζ_{n−1}.
-        let mut zeta = old.zeta.clone();
-        let driving = damage.advance(&old.u, &mut zeta, step)?;
-        let finite = ranks.all(zeta.iter().all(|z| z.is_finite()));
-        if driving == Driving::Failed || !finite {
-            if clock.cut(step, 0.5) {
-                outcome.undone += 1;
-                continue;
-            }
-            return Err(RunError::Damage { step: n, time });
+    let mut run = TimeLoop::start(session, setting, solver, phases)?;
+    let mut show = |step: &Step| {
+        let shown = accepted(step).map_err(RunError::Observer);
+        agreed(setting.body.partition.ranks(), shown)
+    };
+    show(&run.outcome.last)?;
+    loop {
+        match run.next()? {
+            Some(Attempt::Accepted) => show(&run.outcome.last)?,
+            Some(Attempt::Undone) => (),
+            Some(Attempt::Stopped) | None => return run.finish(phases),
         }
-
-        let extremes = partition.extremes(&zeta);
-        let allowed = bounds.after(driving.least_source(), step);
-
-        // The program stops when ζ_* is reached; chosen steps land there.
-        if let Some(reached) = Some(extremes.0).filter(|least| *least <= setting.threshold()) {
-            let (from, level) = (outcome.last.record.zeta_min, setting.threshold());
-            let share = ((from - level) / (from - reached)).clamp(0.0, 1.0);
-            let landed = clock.tolerance().is_none_or(|tolerance| from - level <= tolerance);
-            if !landed && clock.cut(step, (0.9 * share).max(0.01)) {
-                outcome.undone += 1;
-                continue;
-            }
-            // The step that failed tells of the acceleration too.
-            estimate.accept(estimate.of(&old.zeta, &zeta, step));
-            let delay = estimate.delay(&zeta);
-            let time = match clock.tolerance() {
-                None => time,
-                Some(_) => old.time + share * step - delay,
-            };
-            // The estimate of the delay is good to a factor of 2.
-            let uncertainty = step + 2.0 * delay.abs();
-            outcome.excess.observe(allowed, extremes, n, time);
-            let floor = allowed.floor();
-            outcome.stopped = Some(Stop { time, zeta_min: reached, floor, uncertainty });
-            break;
-        }
-        let error = estimate.of(&old.zeta, &zeta, step);
-        if clock.tolerance().is_some_and(|tolerance| error.largest > tolerance)
-            && clock.cut(step, clock.reduction(error.largest))
-        {
-            outcome.undone += 1;
-            continue;
-        }
-
-        // (26): u_n from ζ_n.
-        let mut last = match equilibrium.solve(n, time, &zeta) {
-            Ok(last) => last,
-            Err(failure @ RunError::Contact { .. }) => {
-                equilibrium.undo()?;
-                if clock.cut(step, 0.5) {
-                    outcome.undone += 1;
-                    continue;
-                }
-                return Err(failure);
-            }
-            Err(other) => return Err(other),
-        };
-        equilibrium.accept(time)?;
-        clock.accept(time, step, error.largest);
-        estimate.accept(error);
-        outcome.excess.observe(allowed, extremes, n, time);
-        bounds = allowed.tightened(extremes);
-        last.record.seconds = started.elapsed().as_secs_f64();
-        agreed(ranks, accepted(&last).map_err(RunError::Observer))?;
-        outcome.accept(last, driving);
-        outcome.count(equilibrium.report());
     }
-    // Makes room for another factorisation.
-    drop(damage);
-    outcome.accuracy = phases.time("accuracy", || equilibrium.accuracy(&outcome.last.state))?;
-    Ok(outcome)
 }
 
 /// All ranks go on, or none. Collective.
@@ -242,7 +198,9 @@ impl Outcome {
             fallbacks: 0,
             rescued: 0,
             excess: Excess::default(),
-            accuracy: Accuracy { displacement: 0.0, energy: 0.0 },
+            accuracy: Accuracy::default(),
+            damage_error: None,
+            worst: None,
         }
     }
 
@@ -257,6 +215,10 @@ impl Outcome {
         if self.unheld.is_none() {
             self.unheld = last.unheld.clone().map(|motion| (last.record.time, motion));
         }
-        self.last = last;
+        let before = std::mem::replace(&mut self.last, last);
+        let residual = before.record.kkt_stationarity;
+        if self.worst.as_ref().is_none_or(|(worst, _)| residual > *worst) {
+            self.worst = Some((residual, before.state));
+        }
     }
 }

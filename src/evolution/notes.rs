@@ -1,7 +1,7 @@
 //! What the user should know about an answer that its residuals do not tell.
 
 use super::{Outcome, Setting};
-use crate::{contact::RigidMotion, model::Plane};
+use crate::{contact::RigidMotion, model::Plane, scene::Stepping};
 
 /// In plane strain with ν above this, P1 triangles lock: measured in the atlas of failure.
 const LOCKING: f64 = 0.45;
@@ -22,13 +22,17 @@ const LARGE: f64 = 0.1;
 const NOTICEABLE: f64 = 0.01;
 
 /// Estimated errors of an answer, relative.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Accuracy {
     /// Of the largest displacement, against the exact answer of the discrete problem with the
     /// same pressing nodes. The KKT residuals bound forces; where K is ill-conditioned small
     /// forces move u far. Infinite where the pressing nodes alone do not hold the body.
+    ///
+    /// The larger of two: of the last step, and of the step with the largest stationarity residual.
     pub displacement: f64,
-    /// Of the discretisation, in the energy norm: [`crate::fem::Elasticity::energy_error`].
+    /// The time of the step of which `displacement` is, s.
+    pub time: f64,
+    /// Of the last step's discretisation, in the energy norm: [`crate::fem::Elasticity::energy_error`].
     pub energy: f64,
 }
 
@@ -42,17 +46,17 @@ impl Accuracy {
     pub fn notes(&self, tolerance: f64) -> Vec<String> {
         let mut notes = Vec::new();
         if self.displacement.is_infinite() {
-            notes.push(
-                "the nodes that press do not hold the body by themselves: how exact the \
-                 displacements are cannot be estimated"
-                    .to_owned(),
-            );
+            notes.push(format!(
+                "at t = {:.4e}, the nodes that press do not hold the body by themselves: how exact \
+                 the displacements are cannot be estimated",
+                self.time
+            ));
         } else if self.displacement > Self::promised(tolerance) {
             notes.push(format!(
                 "the stiffness is ill-conditioned (a slender or very soft part?): the residuals \
                  are within the tolerance, but displacements are exact only to about {:.0e} of \
-                 the largest",
-                self.displacement
+                 the largest at t = {:.4e}",
+                self.displacement, self.time
             ));
         }
         if self.energy > COARSE {
@@ -101,7 +105,24 @@ impl Outcome {
         if self.undone > 0 {
             notes.push(format!("{} steps were undone and tried again, shorter", self.undone));
         }
+        notes.extend(self.chosen_steps(setting));
         notes
+    }
+
+    /// How many steps were chosen, and how exact the damage is for it.
+    fn chosen_steps(&self, setting: &Setting) -> Option<String> {
+        let error = self.damage_error.filter(|_| setting.damage().is_some())?;
+        let Stepping::Auto { tolerance } = setting.scene().time?.stepping else { return None };
+        let steps = self.last.record.step;
+        let verdict = match error > tolerance {
+            true => format!(", more than time.tolerance = {tolerance}: lower it"),
+            false => String::new(),
+        };
+        Some(format!(
+            "{steps} steps chosen: the damage is exact in time to about {:.1} % of the damage \
+             done{verdict}",
+            100.0 * error
+        ))
     }
 }
 

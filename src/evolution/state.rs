@@ -66,6 +66,10 @@ pub struct StepRecord {
     pub kkt_dual: f64,
     /// See [`Kkt`].
     pub kkt_complementarity: f64,
+    /// Residual of the damage system over its right-hand side.
+    pub zeta_residual: f64,
+    /// Upper bound of the error of ζ that this residual allows.
+    pub zeta_error: f64,
     /// Wall time of the step, s.
     pub seconds: f64,
 }

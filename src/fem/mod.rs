@@ -17,7 +17,7 @@ mod damage;
 mod loads;
 
 pub use body::Body;
-pub use damage::{DamageSystem, Mass, source, source_load};
+pub use damage::{DamageCertificate, DamageSystem, Mass, source, source_load};
 pub use elasticity::Elasticity;
 pub use frames::Frames;
 pub use loads::{add_body_force, add_traction, gauss_points, midpoint};

@@ -104,9 +104,10 @@ pub enum Stepping {
         /// N, at least 1.
         steps: usize,
     },
-    /// By an estimate of each step's error.
+    /// By an estimate of each step's error, with a formula of second order.
     Auto {
-        /// The error of ζ allowed in a step, and how near ζ_* a run must land.
+        /// The error of ζ over the damage done, at any node and in the mean, that the steps may cause;
+        /// a run that fails must land so near ζ_*.
         tolerance: f64,
     },
 }

@@ -22,8 +22,8 @@ use crate::{
 
 /// More steps than this are a slip of the pen.
 const MOST_STEPS: f64 = 1e9;
-/// The error of ζ per step that `step = "auto"` allows unless told otherwise.
-const STEP_TOLERANCE: f64 = 2e-4;
+/// The error of ζ over the damage done that `step = "auto"` allows unless told otherwise.
+const STEP_TOLERANCE: f64 = 0.01;
 
 pub(super) fn scene(file: File, path: &Path, source: Source) -> Result<Scene, SceneError> {
     let check = Check { source: &source };

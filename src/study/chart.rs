@@ -192,7 +192,7 @@ fn choices(spec: &ReferenceSpec) -> Result<Vec<Choice>, StudyError> {
         }
         // Chosen steps.
         for grading in [uniform.grading, default.grading] {
-            for tolerance in [1e-2, 3e-3, 1e-3, 2e-4, 5e-5] {
+            for tolerance in [0.1, 0.03, 0.01, 3e-3, 1e-3] {
                 let stepping = Stepping::Auto { tolerance };
                 choices.push(Choice { size, grading, stepping, ..default });
             }

@@ -31,7 +31,7 @@ const KEYS: [&str; 25] = [
     "foundation",
     "notes",
 ];
-const COLUMNS: [&str; 18] = [
+const COLUMNS: [&str; 20] = [
     "step",
     "time",
     "zeta_min",
@@ -49,6 +49,8 @@ const COLUMNS: [&str; 18] = [
     "kkt_primal",
     "kkt_dual",
     "kkt_complementarity",
+    "zeta_residual",
+    "zeta_error",
     "seconds",
 ];
 

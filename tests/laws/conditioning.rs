@@ -1,6 +1,6 @@
 //! Where the conditioning or the discretisation is poor: answers stay right, or notes say not.
 
-use crate::support::{close, difference, distorted, moved, run, setting, square};
+use crate::support::{close, difference, distorted, history, moved, run, setting, square};
 use signorini::{contact::SOLVERS, evolution::Setting, mesh::Mesh, study::rectangle};
 use std::f64::consts::PI;
 
@@ -161,4 +161,34 @@ fn a_strip_one_triangle_high_that_bends_is_told() {
     let ((one, told), (eight, silent)) = (bent(1), bent(8));
     assert!(one < 0.6 * eight, "{one} against {eight}");
     assert!(told.len() == 1 && told[0].contains("too coarse") && silent.is_empty(), "{told:?}");
+}
+
+#[test]
+fn the_estimated_error_of_displacements_is_that_of_the_worst_step() {
+    // Solved to a residual of 1e-6 of each step's forces. At t = 0.5 the strip is only pulled, which
+    // moves it little, and the residual bends it; at the end it is only bent, and moves much.
+    let pulled_and_bent = |tolerance: f64, solver: &str| {
+        let text = format!(
+            "material = {{ young = 80, {STRESS} }}
+             contact.tolerance = {tolerance:e}
+             time = {{ end = 1, step = 0.25 }}
+             boundary = [
+                {{ name = 'left', displacement = [0, 0] }},
+                {{ name = 'bottom', gap = 1 }},
+                {{ name = 'right', traction = ['40*max(0, 1 - 2*abs(t - 0.5))', '-0.04*abs(t - 0.5)'] }},
+             ]"
+        );
+        let mesh = rectangle(10.0, 0.5, 60, 3);
+        history(&setting(mesh, &text).unwrap_or_else(|e| panic!("{e}")), solver)
+    };
+    let (exact, _) = pulled_and_bent(1e-11, "active-set");
+    let (steps, outcome) = pulled_and_bent(1e-6, "penalty-duality");
+    let errors: Vec<f64> =
+        steps.iter().zip(&exact).map(|(a, b)| difference(&a.state.u, &b.state.u)).collect();
+    let worst = errors.iter().copied().fold(0.0, f64::max);
+    let at = steps.iter().position(|s| s.state.time == outcome.accuracy.time).unwrap();
+    assert!(errors[4] < 0.01 * worst, "the last step is not the worst: {errors:?}");
+    assert!(errors[at] > 0.1 * worst, "t = {}: {errors:?}", outcome.accuracy.time);
+    let found = outcome.accuracy.displacement;
+    assert!(0.1 * worst < found && found < 10.0 * worst, "{found} for {worst}");
 }

@@ -1,11 +1,14 @@
 //! The damage equation where its solution is known.
 
-use crate::support::{close, close_to, distorted, history, order, run, setting, shipped, square};
+use crate::support::{
+    Random, close, close_to, distorted, history, order, run, setting, shipped, square,
+};
 use signorini::{
     contact::SOLVERS,
     evolution::{Setting, Step, Stop},
-    fem::{self, source_load},
+    fem::{self, Body, DamageCertificate, DamageSystem, Mass, source_load},
     mesh::Mesh,
+    petsc::Session,
 };
 use std::f64::consts::PI;
 
@@ -250,4 +253,62 @@ fn nothing_that_drives_damage_leaves_it_bit_for_bit() {
     let outcome = run(&setting, SOLVERS[0]);
     assert_eq!(outcome.undamaged_steps, 6);
     assert!(outcome.last.record.zeta_min < 0.7);
+}
+
+#[test]
+fn the_certificate_of_a_damage_step_bounds_its_error_and_catches_a_planted_one() {
+    let (session, body) = (Session::start(&[]).unwrap(), Body::new(distorted(8)));
+    let (diffusion, step) = (0.3, 0.05);
+    let mut random = Random(3);
+    let nodes = body.mesh.nodes.len();
+    let before: Vec<f64> = random.field(nodes).iter().map(|v| 0.6 + 0.3 * v).collect();
+    let load: Vec<f64> =
+        random.field(nodes).iter().zip(&body.node_area).map(|(v, area)| -v.abs() * area).collect();
+    for mass in [Mass::Consistent, Mass::Lumped] {
+        let mut system = DamageSystem::new(&session, &body, mass, diffusion, step).unwrap();
+        let mut zeta = before.clone();
+        assert!(system.advance(&load, &mut zeta).unwrap());
+        let judge = |zeta: &[f64]| {
+            DamageCertificate::of(&body, mass, diffusion, step, &load, [&before, zeta])
+        };
+        let good = judge(&zeta);
+        let largest = system.largest_residual().unwrap();
+        assert!(good.residual < 1e-12 && good.residual < largest, "{good:?}");
+        assert!(good.error < 1e-10, "{good:?}");
+        // One node, or all a little.
+        for (node, by) in [(Some(0), 1e-6), (Some(40), -1e-8), (None, 1e-7)] {
+            let mut wrong = zeta.clone();
+            (0..nodes).filter(|&i| node.is_none_or(|n| n == i)).for_each(|i| wrong[i] += by);
+            let found = judge(&wrong);
+            assert!(found.residual > largest, "{mass:?} {by}: {found:?}");
+            let bound = found.error / by.abs();
+            assert!(1.0 < bound && bound < 1e3, "{mass:?} {by}: {found:?}");
+        }
+        // The solution of another step, diffusion, or source.
+        let other =
+            DamageCertificate::of(&body, mass, diffusion, 1.01 * step, &load, [&before, &zeta]);
+        assert!(other.residual > 1e-4, "{other:?}");
+    }
+}
+
+#[test]
+fn every_damage_solve_of_a_run_is_certified() {
+    for (stepping, solved) in [("step = 0.1", 9), ("step = 'auto'", 20)] {
+        let text = format!(
+            "{MATERIAL}
+             damage = {{ diffusion = 0.3, lambda_d = 0.1, lambda_u = 50, lambda_w = 0,
+                         strain_cap = 1000, threshold = 0.01, initial = 1 }}
+             time = {{ end = 1, {stepping} }}
+             boundary = [
+                {{ name = 'left', displacement = [0, 0] }},
+                {{ name = 'right', traction = ['4*t', 0] }},
+             ]"
+        );
+        let setting = setting(distorted(6), &text).unwrap_or_else(|e| panic!("{e}"));
+        let (steps, _) = history(&setting, SOLVERS[0]);
+        let records = steps.iter().map(|step| step.record);
+        // The first damage step has nothing to solve.
+        assert!(records.clone().filter(|r| r.zeta_residual > 0.0).count() >= solved);
+        assert!(records.clone().all(|r| r.zeta_residual < 1e-12 && r.zeta_error < 1e-10));
+    }
 }

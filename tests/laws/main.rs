@@ -7,6 +7,7 @@
 mod support;
 
 mod certificate;
+mod chosen_steps;
 mod conditioning;
 mod constraints;
 mod contact;

@@ -104,16 +104,16 @@ fn patience(steps: &[Step]) -> usize {
     last.record.iterations - 30
 }
 
-const AUTO: &str = "step = 'auto', tolerance = 0.01";
+const AUTO: &str = "step = 'auto', tolerance = 0.3";
 
 #[test]
 fn a_chosen_step_whose_contact_fails_is_tried_again_shorter() {
     let (patient, outcome) = history(&released(AUTO, 1000), "penalty-duality");
     assert_eq!(outcome.undone, 0);
-    let limit = patience(&patient);
-    let (steps, outcome) = history(&released(AUTO, limit), "penalty-duality");
+    assert!(patient.iter().any(|step| step.record.iterations > 125), "there is something to fail");
+    let (steps, outcome) = history(&released(AUTO, 125), "penalty-duality");
     assert!(outcome.undone > 0 && steps.len() > patient.len());
-    assert!(steps.iter().all(|step| step.record.iterations <= limit));
+    assert!(steps.iter().all(|step| step.record.iterations <= 125));
     for (n, step) in steps.iter().enumerate() {
         assert_eq!(step.record.step, n, "a step undone is not counted");
     }

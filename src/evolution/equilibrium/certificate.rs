@@ -120,6 +120,8 @@ pub(super) fn figures(
         kkt_primal: kkt.primal,
         kkt_dual: kkt.dual,
         kkt_complementarity: kkt.complementarity,
+        zeta_residual: 0.0,
+        zeta_error: 0.0,
         seconds: 0.0,
     }
 }

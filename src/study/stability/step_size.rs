@@ -26,7 +26,7 @@ boundary = [
 "#;
 const CELLS: [usize; 4] = [8, 16, 32, 64];
 const STEPS: [f64; 10] = [0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4];
-const TOLERANCES: [f64; 5] = [1e-2, 3e-3, 1e-3, 2e-4, 1e-4];
+const TOLERANCES: [f64; 5] = [0.1, 0.03, 0.01, 3e-3, 1e-3];
 
 /// A run of the map.
 #[derive(Debug, Serialize)]

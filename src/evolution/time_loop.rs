@@ -1,0 +1,244 @@
+//! One step after the other: damage (28), then contact (26).
+
+use super::{
+    Equilibrium, Outcome, Phases, RunError, Setting, State, Stop,
+    bounds::Bounds,
+    chosen::{Chosen, Plan},
+    clock::Clock,
+    damage_step::{DamageStep, Driving, Source},
+    estimate::Estimate,
+};
+use crate::{
+    petsc::Session,
+    scene::{Stepping, TimeGrid},
+};
+use std::time::Instant;
+
+/// What the steps of a run share.
+pub(super) struct TimeLoop<'a> {
+    setting: &'a Setting,
+    equilibrium: Equilibrium<'a>,
+    damage: DamageStep<'a>,
+    clock: Clock,
+    /// The source at the last accepted step, once it is known.
+    source: Option<Source>,
+    bounds: Bounds,
+    /// The delay of uniform steps, or what chosen ones need.
+    estimate: Estimate<'a>,
+    chosen: Option<Chosen<'a>>,
+    pub(super) outcome: Outcome,
+}
+
+/// What became of a step.
+#[derive(PartialEq)]
+pub(super) enum Attempt {
+    /// It is accepted: the last one of the outcome.
+    Accepted,
+    /// It is undone; a shorter one is to be tried.
+    Undone,
+    /// ζ_* is reached.
+    Stopped,
+}
+
+/// The answer of a damage step.
+struct Damaged {
+    zeta: Vec<f64>,
+    /// How it was found, where steps are chosen.
+    plan: Option<Plan>,
+    driving: Driving,
+    /// min ζ and max ζ, and the bounds that the source allows.
+    extremes: (f64, f64),
+    allowed: Bounds,
+}
+
+impl<'a> TimeLoop<'a> {
+    /// Solves (27): the displacement at t = 0, or the only one where there is no time.
+    pub(super) fn start(
+        session: &'a Session,
+        setting: &'a Setting,
+        solver: &str,
+        phases: &'a Phases,
+    ) -> Result<Self, RunError> {
+        let mut equilibrium = Equilibrium::new(session, setting, solver, phases)?;
+        let first = equilibrium.solve(0, setting.start(), &setting.initial_damage())?;
+        equilibrium.accept(setting.start())?;
+        let (grid, zeta, body) = (setting.scene().time, &first.state.zeta, &setting.body);
+        let chosen = match grid {
+            Some(TimeGrid { end, stepping: Stepping::Auto { tolerance } }) => {
+                Some(Chosen::new(body, zeta, tolerance, end))
+            }
+            _ => None,
+        };
+        let bounds = Bounds::of(body.partition.extremes(zeta));
+        let mut outcome = Outcome::new(first);
+        outcome.count(equilibrium.report());
+        Ok(Self {
+            setting,
+            equilibrium,
+            damage: DamageStep::new(session, setting, phases),
+            clock: Clock::new(grid, chosen.as_ref().map_or(0.0, Chosen::first_step)),
+            source: None,
+            bounds,
+            estimate: Estimate::new(&body.partition),
+            chosen,
+            outcome,
+        })
+    }
+
+    /// Tries the next step; `None` at the end of time.
+    ///
+    /// # Errors
+    /// The step failed, and shorter ones are not ours to choose or have become hopelessly small.
+    pub(super) fn next(&mut self) -> Result<Option<Attempt>, RunError> {
+        let Some((time, step)) = self.clock.propose() else { return Ok(None) };
+        match self.attempt(time, step) {
+            Err(failure) if failure.is_of_a_step() => {
+                if self.undo(step, 0.5)? {
+                    Ok(Some(Attempt::Undone))
+                } else {
+                    Err(failure)
+                }
+            }
+            other => other.map(Some),
+        }
+    }
+
+    /// The step of length `step` has not happened; the next is shorter by `factor`. False if it
+    /// cannot be.
+    fn undo(&mut self, step: f64, factor: f64) -> Result<bool, RunError> {
+        self.equilibrium.undo()?;
+        let cut = self.clock.cut(step, factor);
+        self.outcome.undone += usize::from(cut);
+        Ok(cut)
+    }
+
+    fn attempt(&mut self, time: f64, step: f64) -> Result<Attempt, RunError> {
+        let started = Instant::now();
+        let n = self.outcome.last.record.step + 1;
+        let damaged = self.damage(n, time, step)?;
+        if damaged.extremes.0 <= self.setting.threshold() {
+            return self.stop(&damaged, n, time, step);
+        }
+
+        // (26): u_n from ζ_n.
+        let mut last = self.equilibrium.solve(n, time, &damaged.zeta)?;
+        let size = self.judge(&damaged, &last.state, step)?;
+        if size > 1.0 {
+            return match self.undo(step, Clock::reduction(size))? {
+                true => Ok(Attempt::Undone),
+                false => Err(RunError::Steps { step: n, time }),
+            };
+        }
+        self.equilibrium.accept(time)?;
+        self.clock.accept(time, step, size);
+        self.outcome.excess.observe(damaged.allowed, damaged.extremes, n, time);
+        let certificate = damaged.driving.certificate();
+        last.record.zeta_residual = certificate.residual;
+        last.record.zeta_error = certificate.error;
+        last.record.seconds = started.elapsed().as_secs_f64();
+        self.outcome.accept(last, damaged.driving);
+        self.outcome.count(self.equilibrium.report());
+        Ok(Attempt::Accepted)
+    }
+
+    /// Finds the error of the step to `damaged` and u_n, over the allowed one; 0 for uniform steps.
+    /// What the next step needs of this one is kept, unless the error is above 1.
+    fn judge(&mut self, damaged: &Damaged, new: &State, step: f64) -> Result<f64, RunError> {
+        let bounds = damaged.allowed.tightened(damaged.extremes);
+        let (Some(chosen), Some(plan)) = (&mut self.chosen, &damaged.plan) else {
+            self.estimate.accept(&self.outcome.last.state.zeta, &new.zeta, step);
+            (self.source, self.bounds) = (None, bounds);
+            return Ok(0.0);
+        };
+        let after = self.damage.source(&new.u, &new.zeta);
+        let change = |from: &[f64]| -> Vec<f64> {
+            let after = after.as_ref().map_or(&[][..], |source| &source.load);
+            after.iter().zip(from).map(|(after, from)| after - from).collect()
+        };
+        let missed = self.damage.correction(&change(&plan.load), plan.step)?;
+        let failed = RunError::Damage { step: self.outcome.last.record.step + 1, time: new.time };
+        let missed = missed.ok_or(failed)?;
+        let error = chosen.judge(plan, &new.zeta, &missed, [step, new.time]);
+        let ratio = error.ratio;
+        if ratio <= 1.0 {
+            let before = self.source.as_ref().map_or(&[][..], |source| &source.load);
+            chosen.accept(&new.zeta, &missed, error, step, change(before));
+            self.bounds = bounds.shifted(self.setting.body.partition.extremes(&missed));
+            self.source = after;
+        }
+        Ok(ratio)
+    }
+
+    /// The program stops when ζ_* is reached; chosen steps land there.
+    fn stop(
+        &mut self,
+        damaged: &Damaged,
+        n: usize,
+        time: f64,
+        step: f64,
+    ) -> Result<Attempt, RunError> {
+        let (reached, level) = (damaged.extremes.0, self.setting.threshold());
+        let started = self.outcome.last.state.time;
+        let (time, uncertainty) = match &self.chosen {
+            None => {
+                // The step that failed tells of the acceleration too.
+                self.estimate.accept(&self.outcome.last.state.zeta, &damaged.zeta, step);
+                (time, step + 2.0 * self.estimate.delay(&damaged.zeta).abs())
+            }
+            Some(chosen) => {
+                let from = self.setting.body.partition.extremes(chosen.start()).0;
+                let part = if from > level { (from - level) / (from - reached) } else { 0.0 };
+                let (landing, delay) = (chosen.landing(), chosen.delay(&damaged.zeta));
+                if from - level > landing && self.undo(step, (0.9 * part).max(0.01))? {
+                    return Ok(Attempt::Undone);
+                }
+                (started + part * step, step + delay)
+            }
+        };
+        self.outcome.excess.observe(damaged.allowed, damaged.extremes, n, time);
+        let floor = damaged.allowed.floor();
+        self.outcome.stopped = Some(Stop { time, zeta_min: reached, floor, uncertainty });
+        Ok(Attempt::Stopped)
+    }
+
+    /// (28): ζ_n from u_{n−1} and ζ_{n−1}, or as [`Chosen`] plans it.
+    fn damage(&mut self, n: usize, time: f64, step: f64) -> Result<Damaged, RunError> {
+        let old = &self.outcome.last.state;
+        if self.source.is_none() {
+            self.source = self.damage.source(&old.u, &old.zeta);
+        }
+        let least = self.source.as_ref().map_or(0.0, |source| source.least);
+        let load = self.source.as_ref().map(|source| &source.load[..]);
+        let plan = self.chosen.as_ref().zip(load).map(|(chosen, load)| chosen.plan(step, load));
+        let partition = &self.setting.body.partition;
+        let ((zeta, driving), allowed) = match &plan {
+            None => (self.damage.advance(load, &old.zeta, step)?, self.bounds.after(least, step)),
+            Some(plan) => {
+                let bounds = self.bounds.shifted(partition.extremes(&plan.shift));
+                let solved = self.damage.advance(Some(&plan.load), &plan.start, plan.step)?;
+                (solved, bounds.after(plan.growth * least, plan.step))
+            }
+        };
+        match driving {
+            Driving::Missed(residual) => Err(RunError::DamageMissed { step: n, time, residual }),
+            Driving::Failed => Err(RunError::Damage { step: n, time }),
+            _ => {
+                let extremes = partition.extremes(&zeta);
+                Ok(Damaged { zeta, plan, driving, extremes, allowed })
+            }
+        }
+    }
+
+    /// Ends the run: estimates the errors of its answers.
+    pub(super) fn finish(self, phases: &Phases) -> Result<Outcome, RunError> {
+        let Self { damage, equilibrium, chosen, mut outcome, .. } = self;
+        // Makes room for another factorisation.
+        drop(damage);
+        outcome.damage_error = chosen.map(|chosen| chosen.relative_error());
+        let worst = outcome.worst.take();
+        let states: Vec<&State> =
+            std::iter::once(&outcome.last.state).chain(worst.as_ref().map(|(_, s)| s)).collect();
+        outcome.accuracy = phases.time("accuracy", || equilibrium.accuracy(&states))?;
+        Ok(outcome)
+    }
+}

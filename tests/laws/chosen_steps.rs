@@ -1,0 +1,109 @@
+//! Chosen steps keep their tolerance, and no more steps are made than that takes.
+
+use crate::support::{distorted, history, setting, shipped};
+use signorini::{
+    contact::SOLVERS,
+    evolution::{Outcome, Setting, Step},
+};
+
+/// Damage done at the end, at the worst node and in the mean.
+fn done(steps: &[Step]) -> [f64; 2] {
+    let [first, last] = [steps.first(), steps.last()].map(|step| step.unwrap().record);
+    [first.zeta_min - last.zeta_min, first.zeta_mean - last.zeta_mean]
+}
+
+/// Example II on a coarse mesh.
+fn lshape(stepping: &str, load: &str) -> (Vec<Step>, Outcome) {
+    let load = format!("boundary.load.traction=['0', '{load}']");
+    let gap = "boundary.foundation.gap=1e-3";
+    let scene = shipped("lshape", &["mesh.size=1", stepping, &load, gap]);
+    history(&scene, SOLVERS[0])
+}
+
+/// The largest error of the damage done, relative, against two fine uniform runs whose first-order
+/// error is extrapolated away.
+fn error(steps: &[Step], load: &str) -> f64 {
+    let [coarse, fine] = ["time.step=0.002", "time.step=0.001"].map(|k| done(&lshape(k, load).0));
+    let found = done(steps);
+    let error = |i: usize| (found[i] / (2.0 * fine[i] - coarse[i]) - 1.0).abs();
+    error(0).max(error(1))
+}
+
+#[test]
+fn the_damage_done_is_within_the_tolerance_with_fewer_steps_than_uniform_ones() {
+    // A load that grows, one that swings, and one that rolls over the arm: at its end the errors of
+    // uniform steps have cancelled.
+    let rolling = "-160*max(0, 1 - abs(x - 8*t)/2)";
+    for load in ["-80*t", "-80*sin(4*t)", rolling] {
+        let (steps, outcome) = lshape("time.step=auto", load);
+        let made = outcome.last.record.step + outcome.undone;
+        let error = error(&steps, load);
+        println!("{load}: {made} steps, {} undone, error {error:.2e}", outcome.undone);
+        assert!(error < 0.01, "{load}: {error}");
+        let uniform = lshape(&format!("time.step={}", 1.0 / made as f64), load).0;
+        let uniform = self::error(&uniform, load);
+        let better = error < uniform || load == rolling;
+        assert!(better, "{load}: {error} in {made} steps, uniform {uniform}");
+    }
+}
+
+#[test]
+fn a_load_that_closes_the_gap_between_two_steps_is_noticed() {
+    // Nothing for half of the run, then all at once: the body falls on the foundation.
+    let load = "-80*min(1, max(0, 1000*(t - 0.503)))";
+    let (steps, outcome) = lshape("time.step=auto", load);
+    let [before, after] = [0, steps.len() - 1].map(|n| steps[n].record.active_nodes);
+    assert!(before == 0 && after > 0 && outcome.undone > 0, "{before} {after}");
+    // Less than half of the steps before, where nothing happens.
+    let early = steps.iter().filter(|step| step.state.time < 0.5).count();
+    assert!(2 * early < steps.len(), "{early} of {}", steps.len());
+    let error = error(&steps, load);
+    assert!(error < 0.01, "{error} in {} steps", steps.len());
+}
+
+/// A square that is bent down on a foundation, with this λ_U.
+fn bent(lambda_u: f64, stepping: &str) -> Setting {
+    let text = format!(
+        "material = {{ young = 80, poisson = 0.3, plane = 'stress' }}
+         damage = {{ diffusion = 0.1, lambda_d = 0.25, lambda_u = {lambda_u:e}, lambda_w = 0,
+                     strain_cap = 1000, threshold = 0.01, initial = 1 }}
+         time = {{ end = 1, {stepping} }}
+         boundary = [
+            {{ name = 'left', displacement = [0, 0] }},
+            {{ name = 'bottom', gap = '0.1*x^2' }},
+            {{ name = 'top', traction = [0, '-3*t'] }},
+         ]"
+    );
+    setting(distorted(6), &text).unwrap_or_else(|e| panic!("{e}"))
+}
+
+#[test]
+fn a_sound_body_takes_few_steps() {
+    let count = |lambda_u: f64, tolerance: f64| {
+        let stepping = format!("step = 'auto', tolerance = {tolerance:e}");
+        let (_, outcome) = history(&bent(lambda_u, &stepping), SOLVERS[0]);
+        outcome.last.record.step + outcome.undone
+    };
+    // No damage, negligible damage, damage.
+    let [none, negligible, some] = [0.0, 1e-6, 10.0].map(|lambda_u| count(lambda_u, 1e-3));
+    assert!(none == negligible && none < 40, "{none} {negligible}");
+    assert!(some > 2 * none, "{some} against {none}");
+}
+
+#[test]
+fn the_note_of_a_run_tells_its_steps_and_their_error() {
+    let scene = bent(10.0, "step = 'auto', tolerance = 0.01");
+    let (steps, outcome) = history(&scene, SOLVERS[0]);
+    let error = outcome.damage_error.unwrap();
+    assert!(0.0 < error && error < 0.01, "{error}");
+    let notes = outcome.notes(&scene);
+    let told = format!("{} steps chosen", steps.len() - 1);
+    assert!(notes.iter().any(|note| note.contains(&told)), "{notes:?}");
+    // A tolerance that its steps miss is told.
+    let mut missed = outcome;
+    missed.damage_error = Some(0.02);
+    let notes = missed.notes(&scene);
+    assert!(notes.iter().any(|note| note.contains("lower it")), "{notes:?}");
+    let uniform = history(&bent(10.0, "step = 0.1"), SOLVERS[0]).1;
+    assert_eq!(uniform.damage_error, None);
+}
