@@ -45,7 +45,7 @@ fn chosen_steps_are_fewer_than_uniform_ones_equally_close() {
     let limit = run(&["time.step=2e-5"]).stopped.unwrap().time;
     let off = |outcome: &Outcome| (outcome.stopped.unwrap().time / limit - 1.0).abs();
     let auto = run(&["time.step=auto"]);
-    let uniform = run(&["time.step=2e-4"]);
+    let uniform = run(&["time.step=5e-4"]);
     assert!(off(&auto) < off(&uniform), "{} against {}", off(&auto), off(&uniform));
     assert!(2 * (auto.last.record.step + auto.undone) < uniform.last.record.step);
 }
