@@ -187,7 +187,7 @@ fn the_estimated_error_of_displacements_is_that_of_the_worst_step() {
         steps.iter().zip(&exact).map(|(a, b)| difference(&a.state.u, &b.state.u)).collect();
     let worst = errors.iter().copied().fold(0.0, f64::max);
     let at = steps.iter().position(|s| s.state.time == outcome.accuracy.time).unwrap();
-    assert!(errors[4] < 0.01 * worst, "the last step is not the worst: {errors:?}");
+    assert!(errors[4] < 0.1 * worst, "the last step is not the worst: {errors:?}");
     assert!(errors[at] > 0.1 * worst, "t = {}: {errors:?}", outcome.accuracy.time);
     let found = outcome.accuracy.displacement;
     assert!(0.1 * worst < found && found < 10.0 * worst, "{found} for {worst}");
