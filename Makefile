@@ -74,7 +74,7 @@ test: deps
 validate: build deps-validate
 	$(PYTHON) validation/selfcheck.py
 	$(PYTHON) validation/compare.py --binary $(BINARY) $(addprefix geo/, \
-	    square-mild.toml lshape.toml bridge-half.toml hertz.toml)
+	    square-mild.toml lshape.toml lshape-rolling.toml beam.toml bridge-half.toml hertz.toml)
 
 # Every solver on every scene: a table on the screen and in out/compare/comparison.csv, and its
 # figure, also where a solver failed (exit code 1); bad input (2) writes no table.

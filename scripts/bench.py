@@ -1,7 +1,8 @@
 """Draws the measurements of `make bench`: bench.py FOLDER
 
-Reads FOLDER/bench.csv and draws FOLDER/bench.png: the time of a step of every program, how much
-faster signorini is and how far from the floor, and growth of time and memory.
+Reads FOLDER/bench.csv and draws FOLDER/bench.png: the time of a step of every program and how much
+faster signorini is, where contact stays and where it moves; how far a step is from the floor; growth
+of time and memory.
 """
 
 import sys
@@ -51,25 +52,46 @@ def line(axes, values, key, **style):
                   lw=1.2, label=" ".join(key).strip(), **style)
 
 
-def time(axes, rows):
-    """Milliseconds per step of every program."""
+def time(axes, rows, part, title):
+    """Milliseconds per step of every program; the floor is that of the part `steps`."""
     for key in STYLES:
-        if values := rounds(rows, "floor" if key[0] == "floor" else "steps", key):
+        source = part if key[0] != "floor" else "floor" if part == "steps" else None
+        if values := rounds(rows, source, key):
             line(axes, values, key)
+    if not axes.has_data():
+        axes.set_visible(False)
+        return
     axes.set(xscale="log", yscale="log", xlabel="n", ylabel="ms per step")
-    axes.set_title("a step of square-mild, k = 0.01", loc="left")
-    ticks(axes, rows, "steps")
+    axes.set_title(title, loc="left")
+    ticks(axes, rows, part)
     axes.legend(fontsize=8)
 
 
-def ratios(axes, rows):
-    """How many times longer FEniCSx takes than each solver, and the default than the floor."""
-    ours = {key: rounds(rows, "steps", key) for key in STYLES if key[0] == "signorini"}
+def ratios(axes, rows, part):
+    """How many times longer FEniCSx takes than the default; where contact stays, what is demanded,
+    and the default against the floor."""
+    ours = rounds(rows, part, DEFAULT)
     for key in STYLES:
-        theirs = rounds(rows, "steps", key) if key[0] == "FEniCSx" else {}
-        same = {n: [a / b for a, b in zip(theirs[n], ours[DEFAULT][n])] for n in theirs}
+        theirs = rounds(rows, part, key) if key[0] == "FEniCSx" else {}
+        same = {n: [a / b for a, b in zip(theirs[n], ours[n])] for n in theirs}
         if same:
             line(axes, same, key)
+    if not axes.has_data():
+        axes.set_visible(False)
+        return
+    title = "FEniCSx against active-set"
+    if part == "steps":
+        against_floor(axes, rows)
+        title += ", and active-set against the floor"
+    axes.set(xscale="log", xlabel="n", ylabel="times")
+    axes.set_ylim(0, 1.35 * axes.get_ylim()[1])
+    axes.set_title(title, loc="left")
+    ticks(axes, rows, part)
+    axes.legend(fontsize=8, loc="upper left")
+
+
+def against_floor(axes, rows):
+    """The default over the floor, and what is demanded of both ratios."""
     below, steps = rounds(rows, "floor", ("floor", "")), rounds(rows, "floor", DEFAULT)
     if below:
         same = {n: [a / b for a, b in zip(steps[n], below[n])] for n in below}
@@ -79,11 +101,6 @@ def ratios(axes, rows):
     for n, least in ((128, 12), (256, 15)):
         axes.plot([0.85 * n, 1.18 * n], [least, least], color=RED, lw=2)
     axes.plot([0.85 * 256, 1.18 * 256], [2.5, 2.5], color=RED, lw=2, label="demanded")
-    axes.set(xscale="log", xlabel="n", ylabel="times")
-    axes.set_ylim(0, 1.35 * axes.get_ylim()[1])
-    axes.set_title("FEniCSx against active-set, and active-set against the floor", loc="left")
-    ticks(axes, rows, "steps")
-    axes.legend(fontsize=8, loc="upper left")
 
 
 def growth(axes, rows, key, scale, title, demanded):
@@ -130,12 +147,15 @@ def ticks(axes, rows, part):
 
 
 def draw(rows, path):
-    figure, ((a, b), (c, d)) = plt.subplots(2, 2, figsize=(11, 8))
-    time(a, rows)
-    ratios(b, rows)
-    growth(c, rows, "seconds_per_step", 1e3, "ms per step", slope_allowed)
-    growth(d, rows, "peak_mb", 1.0, "peak memory, MB", memory_allowed)
-    for axes in (a, b, c, d):
+    figure, all_axes = plt.subplots(3, 2, figsize=(11, 12))
+    (a, b), (c, d), (e, f) = all_axes
+    time(a, rows, "steps", "contact stays: a step of square-mild")
+    ratios(b, rows, "steps")
+    time(c, rows, "moving", "contact moves: a step of lshape-rolling")
+    ratios(d, rows, "moving")
+    growth(e, rows, "seconds_per_step", 1e3, "ms per step", slope_allowed)
+    growth(f, rows, "peak_mb", 1.0, "peak memory, MB", memory_allowed)
+    for axes in all_axes.flat:
         axes.grid(color=FAINT, alpha=0.35, linewidth=0.6)
         axes.set_axisbelow(True)
     figure.savefig(path)

@@ -109,6 +109,24 @@ fn lshape() {
     assert!(edge_at(&graded, [8.0, 6.0]) > 0.2);
 }
 
+#[test]
+fn beam() {
+    let uniform = mesh("beam", [("size", 0.125), ("grading", 1.0)]);
+    assert_eq!(node_count(&uniform, "foundation"), 65);
+    let graded = mesh("beam", [("size", 0.125), ("grading", 8.0)]);
+    for mesh in [&uniform, &graded] {
+        check_laws(mesh, 4.0, 17.0, 0);
+        for (name, length) in [("clamp", 1.0), ("foundation", 8.0), ("load", 8.0)] {
+            close(curve_length(mesh, name), length);
+        }
+        assert!(smallest_angle(mesh) > 25.0);
+    }
+    for point in [[0.0, 0.0], [8.0, 0.0], [8.0, 0.5], [0.0, 0.5]] {
+        let edge = edge_at(&graded, point) * 8.0 / 0.125;
+        assert!((0.6..1.6).contains(&edge), "{edge} at {point:?}");
+    }
+}
+
 /// Nodes by their coordinates, rounded to 10⁻⁹ m, and triangles as sorted triples of these.
 fn canonical(mesh: &Mesh, place: impl Fn([f64; 2]) -> [f64; 2]) -> HashSet<[[i64; 2]; 3]> {
     let round = |i: usize| place(mesh.nodes[i]).map(|x| (x * 1e9).round() as i64);

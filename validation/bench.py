@@ -3,8 +3,11 @@
 
     /usr/bin/python3 validation/bench.py --binary target/release/signorini [--quick] [PART…]
 
-steps    seconds per step of square-mild (k = 0.01) at n = 64, 128, 256: each contact solver and the
-         FEniCSx loop (loop.py, MUMPS by LU and by Cholesky); the whole process at n = 64
+steps    seconds per step of square-mild (k = 0.01) at n = 64, 128, 256, whose contact set never
+         changes: each contact solver and the FEniCSx loop (loop.py, MUMPS by LU and by Cholesky);
+         the whole process at n = 64
+moving   the same for lshape-rolling, whose contact set goes from no node to all and back, with n
+         edges along the contact; every program makes all 100 steps, because they cost differently
 floor    the same against `signorini floor`, the work that no step can avoid, at n = 128 and 256
 growth   time per step, peak memory and iterations from n = 32 to 1024 in one process each
 ranks    1 → 2 ranks at n = 512, iterations over 1 … 4 ranks
@@ -21,32 +24,43 @@ import platform
 import subprocess
 import sys
 import time
+from collections import namedtuple
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
 
 import numpy as np
 
-from programs import Bench, Failure
+from programs import FROZEN, MOVING, Bench, Failure
 
 SOLVERS = ["active-set", "penalty-duality", "tao"]
 FACTORS = ["lu", "cholesky"]
-PARTS = ["steps", "floor", "growth", "ranks"]
+PARTS = ["steps", "moving", "floor", "growth", "ranks"]
 # FEniCSx / active-set asked for, by n.
 DEMANDED = {256: 15.0, 128: 12.0}
 
 
+# How often all programs take turns, and how many steps the default, the other solvers and the
+# FEniCSx loop make.
+Turns = namedtuple("Turns", "rounds default others loop")
+
+
 @dataclass
 class Sizes:
-    """How much is measured."""
+    """How much is measured, by n."""
 
-    meshes: list = field(default_factory=lambda: [64, 128, 256])
+    # The default makes many steps, with the factorisations that fall into them; the others' cost
+    # the same one after the other.
+    steps: dict = field(default_factory=lambda: {
+        64: Turns(3, 100, 100, 40), 128: Turns(3, 100, 50, 20), 256: Turns(3, 100, 25, 10),
+    })
+    # About as many unknowns as at n = 64 and 128 above, and twice as many.
+    moving: dict = field(default_factory=lambda: {
+        24: Turns(3, 100, 100, 100), 48: Turns(3, 100, 100, 100), 68: Turns(1, 100, 100, 100),
+    })
+    # Of the parts below.
     rounds: int = 3
-    # Steps of the default, with the factorisations that fall into them; of the other solvers, and
-    # of the loop, whose steps cost the same one after the other.
-    steps: int = 100
-    other_steps: dict = field(default_factory=lambda: {64: 100, 128: 50, 256: 25})
-    loop_steps: dict = field(default_factory=lambda: {64: 40, 128: 20, 256: 10})
+    default_steps: int = 100
     floor: list = field(default_factory=lambda: [128, 256])
     growth: list = field(default_factory=lambda: [32, 64, 128, 256, 512, 1024])
     growth_steps: int = 20
@@ -57,8 +71,8 @@ class Sizes:
 
 
 QUICK = Sizes(
-    meshes=[64, 128], rounds=1, steps=20, other_steps={64: 20, 128: 10},
-    loop_steps={64: 10, 128: 5}, floor=[128],
+    steps={64: Turns(1, 20, 20, 10), 128: Turns(1, 20, 10, 5)},
+    moving={16: Turns(1, 100, 100, 100)}, rounds=1, default_steps=20, floor=[128],
     growth=[32, 64, 128, 256], growth_steps=10, ranks=128, ranks_steps=10, ranks_rounds=1,
 )
 
@@ -75,23 +89,36 @@ def ratio(above, below):
 
 
 def steps(bench):
-    """Seconds per step of every program, in turn."""
+    """Steps whose contact set never changes."""
+    bench.say("## Seconds per step where contact does not move: square-mild, k = 0.01\n")
+    side_by_side(bench, FROZEN, bench.sizes.steps)
+    demanded = ", ".join(f"{d:.0f} at n = {n}" for n, d in DEMANDED.items())
+    bench.say(f"Demanded of the default: {demanded}; of its whole process: 8.\n")
+
+
+def moving(bench):
+    """Steps whose contact set travels."""
+    bench.say("## Seconds per step where contact moves: lshape-rolling, k = 0.01\n")
+    side_by_side(bench, MOVING, bench.sizes.moving)
+
+
+def side_by_side(bench, case, sizes):
+    """Seconds per step of every program, in turn, and of the whole process on the first mesh."""
     programs = [("signorini", s) for s in SOLVERS] + [("FEniCSx", f) for f in FACTORS]
     have_loop = subprocess.run(["/usr/bin/python3", "-c", "import dolfinx"], capture_output=True)
     if have_loop.returncode != 0:
         bench.say("FEniCSx is not installed (make deps-validate): its loop is left out.\n")
         programs = programs[: len(SOLVERS)]
     rows = []
-    for n in bench.sizes.meshes:
+    for n, turns in sizes.items():
         seconds, last = {p: [] for p in programs}, {}
-        for _ in range(bench.sizes.rounds):
+        for _ in range(turns.rounds):
             for program, method in programs:
                 if program == "FEniCSx":
-                    row, told = bench.loop(n, method)
+                    row, told = bench.loop(n, method, turns.loop, case=case)
                 else:
-                    default = method == SOLVERS[0]
-                    count = bench.sizes.steps if default else bench.sizes.other_steps[n]
-                    row, told = bench.signorini(n, method, count)
+                    count = turns.default if method == SOLVERS[0] else turns.others
+                    row, told = bench.signorini(n, method, count, case=case)
                 last[program, method] = row, told
                 seconds[program, method].append(row["seconds_per_step"])
         history = last[programs[0]][1]
@@ -100,17 +127,23 @@ def steps(bench):
             times = [ratio(seconds[key], seconds[other]) for other in programs[:1]]
             against = [ratio(seconds["FEniCSx", f], seconds[key]) if len(programs) > len(SOLVERS)
                        and key[0] == "signorini" else "" for f in FACTORS]
-            rows.append([n, *key, row["steps"], milliseconds(seconds[key]), *times, *against,
-                         f"{row['iterations'] / row['steps']:.2f}", f"{row['kkt']:.0e}"])
+            per_step = [f"{row[count] / row['steps']:.2f}" if count in row else "" for count in
+                        ("iterations", "linear_iterations")]
+            rows.append([n, row["nodes"], *key, row["steps"], milliseconds(seconds[key]), *times,
+                         *against, *per_step, row.get("factorisations", ""), f"{row['kkt']:.0e}"])
             if key[0] == "FEniCSx":
                 same_answer(told, history[told["steps"]])
-    bench.say("## Seconds per step, square-mild, k = 0.01\n")
-    bench.table(["n", "program", "method", "steps", "ms per step", "times active-set",
-                 "FEniCSx LU / this", "FEniCSx Cholesky / this", "its per step", "KKT"], rows)
-    demanded = ", ".join(f"{d:.0f} at n = {n}" for n, d in DEMANDED.items())
-    bench.say(f"Demanded of the default: {demanded}.\n")
+        active = [int(row["active_nodes"]) for row in history[2:]]
+        changes = sum(a != b for a, b in zip(active, active[1:]))
+        bench.say(f"n = {n}: {min(active)} to {max(active)} active nodes; their number changes in "
+                  f"{changes} of {len(active)} steps.")
+    bench.say()
+    bench.table(["n", "nodes", "program", "method", "steps", "ms per step", "times active-set",
+                 "FEniCSx LU / this", "FEniCSx Cholesky / this", "its per step",
+                 "solve pairs per step", "factorisations", "KKT"], rows)
     if len(programs) > len(SOLVERS):
-        whole_process(bench)
+        n, turns = next(iter(sizes.items()))
+        whole_process(bench, case, n, turns)
 
 
 def same_answer(told, row):
@@ -120,20 +153,50 @@ def same_answer(told, row):
             raise Failure(f"{key} differs: FEniCSx {told[key]!r}, signorini {row[key]!r}")
 
 
-def whole_process(bench):
-    """From the start of the process to its end, 100 steps, about 20 frames written."""
-    n, count = bench.sizes.meshes[0], bench.sizes.steps
+def whole_process(bench, case, n, turns):
+    """From the start of the process to its end, about 20 frames written."""
+    count = turns.default
     seconds = {"signorini": [], **{factor: [] for factor in FACTORS}}
-    for _ in range(bench.sizes.rounds):
-        seconds["signorini"].append(bench.signorini(n, frames=True)[0]["whole_seconds"])
+    for _ in range(turns.rounds):
+        row, _ = bench.signorini(n, steps=count, frames=True, case=case)
+        seconds["signorini"].append(row["whole_seconds"])
         for factor in FACTORS:
-            seconds[factor].append(bench.loop(n, factor, count, frames=True)[0]["whole_seconds"])
-    bench.say(f"## Whole process, n = {n}, {count} steps, with output\n")
+            row, _ = bench.loop(n, factor, count, frames=True, case=case)
+            seconds[factor].append(row["whole_seconds"])
+    bench.say(f"The whole process, n = {n}, {count} steps, with output:\n")
     rows = [["signorini", f"{median(seconds['signorini']):.2f}", ""]]
     rows += [[f"FEniCSx {f}", f"{median(seconds[f]):.2f}", ratio(seconds[f], seconds["signorini"])]
              for f in FACTORS]
     bench.table(["program", "seconds", "times signorini"], rows)
-    bench.say("Demanded: 8.\n")
+
+
+def summary(bench):
+    """What the README says of steps: the medians, contact that stays beside contact that moves."""
+    columns = list(dict.fromkeys((row["part"], row["n"]) for row in bench.rows
+                                 if row["part"] in ("steps", "moving")))
+
+    def rounds(column, method, key="seconds_per_step"):
+        """The rounds of a program, without (or for whole processes with) output."""
+        return [row[key] for row in bench.rows if (row["part"], row["n"], row["method"]) ==
+                (*column, method) and row["frames"] == (key == "whole_seconds")]
+
+    def against(column, factor, *key):
+        both = [rounds(column, method, *key) for method in (factor, SOLVERS[0])]
+        return f"{median(a / b for a, b in zip(*both)):.3g}" if all(both) else ""
+
+    names = {"lu": "FEniCSx, MUMPS LU", "cholesky": "FEniCSx, MUMPS Cholesky"}
+    rows = [[names.get(method, method),
+             *(milliseconds(found) if (found := rounds(column, method)) else ""
+               for column in columns)] for method in SOLVERS + FACTORS]
+    for factor in FACTORS:
+        rows.append([f"{names[factor]} / active-set", *(against(c, factor) for c in columns)])
+        rows.append(["… of the whole process, with output",
+                     *(against(c, factor, "whole_seconds") for c in columns)])
+    if not columns:
+        return
+    titles = {"steps": "contact stays", "moving": "contact moves"}
+    bench.say("## In short: ms per step\n")
+    bench.table(["", *(f"{titles[part]}, n = {n}" for part, n in columns)], rows)
 
 
 def floor(bench):
@@ -144,7 +207,8 @@ def floor(bench):
         for _ in range(bench.sizes.rounds):
             answers.append(bench.floor(n))
             floors.append(answers[-1]["seconds"])
-            seconds.append(bench.signorini(n)[0]["seconds_per_step"])
+            seconds.append(
+                bench.signorini(n, steps=bench.sizes.default_steps)[0]["seconds_per_step"])
         rows.append([n, milliseconds(seconds), milliseconds(floors), ratio(seconds, floors)])
         copy = median(answer["copy_bytes_per_second"] for answer in answers)
         for part in answers[0]["parts"]:
@@ -188,7 +252,7 @@ def growth(bench):
 def ranks(bench):
     """1 → 2 ranks, and iterations over ranks."""
     bench.say("## Ranks\n")
-    small = min(bench.sizes.meshes)
+    small = min(bench.sizes.steps)
     try:
         bench.signorini(small, steps=2, ranks=2)
     except (Failure, FileNotFoundError) as failure:
@@ -243,6 +307,7 @@ def main():
             if not arguments.parts or part in arguments.parts:
                 bench.part = part
                 globals()[part](bench)
+        summary(bench)
     except Failure as failure:
         sys.exit(f"error: {failure}")
     finally:

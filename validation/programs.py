@@ -6,18 +6,37 @@ import os
 import subprocess
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
-SCENE = ROOT / "geo" / "square-mild.toml"
 LOOP = ROOT / "validation" / "loop.py"
 TOLERANCE = 1e-10
 
 
 class Failure(Exception):
     """A program that did not do what it was asked: said in one line."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene of geo/ on meshes made for it: their parameter for a given n."""
+
+    scene: str
+    geometry: str
+    parameter: str
+    value: callable
+
+    def file(self):
+        return ROOT / "geo" / f"{self.scene}.toml"
+
+
+# n cells a side; the contact set is the same in all steps.
+FROZEN = Case("square-mild", "square", "n", lambda n: n)
+# n edges across the leg and along the contact; the contact set changes with the steps.
+MOVING = Case("lshape-rolling", "lshape", "size", lambda n: 2 / n)
 
 
 class Bench:
@@ -33,13 +52,13 @@ class Bench:
         print(line, flush=True)
         self.text.append(line)
 
-    def mesh(self, n):
-        """The square with n cells per side, meshed once."""
-        path = self.out / f"square-{n}.msh"
+    def mesh(self, case, n):
+        """The mesh of a case, made once."""
+        path = self.out / f"{case.geometry}-{n}.msh"
         if not path.exists():
             part = path.with_suffix(".part.msh")
-            command = ["gmsh", "-2", ROOT / "geo" / "square.geo", "-setnumber", "n", n,
-                       "-o", part, "-v", "1"]
+            command = ["gmsh", "-2", ROOT / "geo" / f"{case.geometry}.geo", "-setnumber",
+                       case.parameter, case.value(n), "-o", part, "-v", "1"]
             self.start(command)
             part.rename(path)
         return path
@@ -58,12 +77,11 @@ class Bench:
             raise Failure(f"{Path(command[0]).name} … failed: {told[0]}")
         return said, seconds
 
-    def signorini(self, n, solver="active-set", steps=None, ranks=None, frames=False):
+    def signorini(self, n, solver="active-set", steps=100, ranks=None, frames=False, case=FROZEN):
         """A run of so many steps of k = 0.01."""
-        steps = steps or self.sizes.steps
         folder = self.out / "run"
-        command = [self.binary, "run", SCENE, "--mesh", self.mesh(n), "--solver", solver,
-                   "--set", f"time.end={steps / 100}", "--out", folder, "--profile"]
+        command = [self.binary, "run", case.file(), "--mesh", self.mesh(case, n),
+                   "--solver", solver, "--set", f"time.end={steps / 100}", "--out", folder, "--profile"]
         if not frames:
             command += ["--set", "output.every=100000"]
         if ranks is not None:
@@ -76,8 +94,8 @@ class Bench:
         after = history[2:]
         total = lambda key: int(sum(row[key] for row in after))
         row = {
-            "program": "signorini", "method": solver, "n": n, "ranks": ranks or 1,
-            "nodes": summary["nodes"], "steps": len(after),
+            "program": "signorini", "method": solver, "scene": case.scene, "n": n,
+            "ranks": ranks or 1, "nodes": summary["nodes"], "steps": len(after),
             "unknowns": 2 * summary["nodes"],
             "seconds_per_step": sum(row["seconds"] for row in after) / len(after),
             "whole_seconds": whole, "iterations": total("iterations"),
@@ -87,17 +105,17 @@ class Bench:
         }
         return self.keep(row), history
 
-    def loop(self, n, factor, steps=None, frames=False):
+    def loop(self, n, factor, steps, frames=False, case=FROZEN):
         """The FEniCSx loop."""
-        command = ["/usr/bin/python3", LOOP, SCENE, self.mesh(n), "--factor", factor,
-                   "--steps", steps or self.sizes.loop_steps[n]]
+        command = ["/usr/bin/python3", LOOP, case.file(), self.mesh(case, n), "--factor", factor,
+                   "--steps", steps]
         if frames:
             command += ["--out", self.out / "run" / "loop.xdmf"]
         said, whole = self.start(command)
         answer = json.loads(said.strip().splitlines()[-1])
         row = {
-            "program": "FEniCSx", "method": factor, "n": n, "ranks": 1, "nodes": answer["nodes"],
-            "unknowns": 2 * answer["nodes"], "steps": answer["steps"] - 1,
+            "program": "FEniCSx", "method": factor, "scene": case.scene, "n": n, "ranks": 1,
+            "nodes": answer["nodes"], "unknowns": 2 * answer["nodes"], "steps": answer["steps"] - 1,
             "seconds_per_step": float(np.mean(answer["seconds"][1:])),
             "whole_seconds": whole, "iterations": sum(answer["iterations"][1:]),
             "kkt": answer["kkt"], "frames": frames,
@@ -106,7 +124,7 @@ class Bench:
 
     def floor(self, n):
         """The unavoidable work in isolation."""
-        said, _ = self.start([self.binary, "floor", SCENE, "--mesh", self.mesh(n)])
+        said, _ = self.start([self.binary, "floor", FROZEN.file(), "--mesh", self.mesh(FROZEN, n)])
         answer = json.loads(said)
         self.keep({"program": "floor", "method": "", "n": n, "ranks": 1, "nodes": answer["nodes"],
                    "seconds_per_step": answer["seconds"]})

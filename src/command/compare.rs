@@ -76,11 +76,13 @@ fn table(entries: &[Entry]) -> Table {
         "scene",
         "solver",
         "steps",
+        "contact moves",
         "its",
         "factors",
         "solve pairs",
         "fallbacks",
         "seconds",
+        "times first",
         "worst KKT",
         "Δu",
         "Δζ",
@@ -88,15 +90,18 @@ fn table(entries: &[Entry]) -> Table {
     ]);
     for e in entries {
         let small = |v: f64| format!("{v:.1e}");
+        let first = entries.iter().find(|other| other.scene == e.scene).unwrap_or(e);
         table.add_row([
             e.scene.clone(),
             e.solver.clone(),
             e.steps.to_string(),
+            e.contact_changes.to_string(),
             e.iterations.to_string(),
             e.factorisations.to_string(),
             e.triangular_solves.to_string(),
             e.fallbacks.to_string(),
             format!("{:.3}", e.seconds),
+            format!("{:.1}", e.seconds / first.seconds),
             if e.error.is_some() { "FAILED".into() } else { small(e.kkt().worst()) },
             small(e.difference_u),
             small(e.difference_zeta),

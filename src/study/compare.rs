@@ -23,6 +23,8 @@ pub struct Entry {
     pub solver: String,
     /// Accepted time steps.
     pub steps: usize,
+    /// Steps after which another number of nodes is active than before.
+    pub contact_changes: usize,
     /// Iterations of the solver, all steps together.
     pub iterations: usize,
     /// Factorisations (not those of a preconditioner chosen by PETSc options).
@@ -118,6 +120,10 @@ fn run(
         scene: setting.scene().name.clone(),
         solver: solver.to_owned(),
         steps: records.last().map_or(0, |r| r.step),
+        contact_changes: records
+            .windows(2)
+            .filter(|pair| pair[0].active_nodes != pair[1].active_nodes)
+            .count(),
         iterations: sum(|r| r.iterations),
         factorisations: sum(|r| r.factorisations),
         triangular_solves: sum(|r| r.linear_iterations),

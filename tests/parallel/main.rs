@@ -76,7 +76,7 @@ fn same_history(desk: &Desk, folder: &str, reference: &str) {
 }
 
 /// A scene of `geo/` with every solver on one to four ranks, with so few steps that this is quick.
-fn every_solver(name: &str, few: &[&str]) {
+fn every_solver(name: &str, few: &[&str]) -> Desk {
     let desk = example(name);
     for solver in ["active-set", "penalty-duality", "tao"] {
         for ranks in 1..=4 {
@@ -92,6 +92,7 @@ fn every_solver(name: &str, few: &[&str]) {
             same_history(&desk, &out, &format!("out/{name}-{solver}-1"));
         }
     }
+    desk
 }
 
 #[test]
@@ -108,6 +109,28 @@ fn the_mild_square() {
 #[test]
 fn the_lshape() {
     every_solver("lshape", &["--set", "time.step=0.25"]);
+}
+
+/// Whether the number of active nodes changes from step to step.
+#[track_caller]
+fn contact_travels(desk: &Desk, folder: &str) {
+    let (names, rows) = desk.history(folder);
+    let column = names.iter().position(|n| n == "active_nodes").expect("the column");
+    let changes = rows.windows(2).filter(|pair| pair[0][column] != pair[1][column]).count();
+    assert!(changes >= 5, "{folder}: the contact set changes in {changes} steps only");
+}
+
+#[test]
+fn the_lshape_under_a_rolling_load() {
+    let desk =
+        every_solver("lshape-rolling", &["--set", "mesh.size=0.25", "--set", "time.step=0.1"]);
+    contact_travels(&desk, "out/lshape-rolling-active-set-1");
+}
+
+#[test]
+fn the_beam_under_a_wave() {
+    let desk = every_solver("beam", &["--set", "mesh.size=0.25", "--set", "time.step=0.125"]);
+    contact_travels(&desk, "out/beam-active-set-1");
 }
 
 #[test]
