@@ -39,12 +39,20 @@ class Verdict:
     word: str
     reason: str
     difference: float = 0.0
+    traits: str = ""
 
 
 def judge(folder, code, output):
     """The verdict on a run of folder/scene.toml into folder/out with an exit code and output."""
     scene = read_scene(folder / "scene.toml")
     discrete = Discrete(scene, read_triangulation(folder / scene["mesh"]["file"]))
+    verdict = verdict_on(discrete, folder / "out", code, output)
+    verdict.traits = traits(discrete)
+    return verdict
+
+
+def verdict_on(discrete, out, code, output):
+    """First by the exit code against what the data ask for, then by the frames."""
     refusal, either = expectation(discrete)
     said = message(output)
     if code == 2:
@@ -56,15 +64,32 @@ def judge(folder, code, output):
     if refusal and not either:
         word = "gave up" if code == 1 else "wrong"
         return Verdict(word, f"should be refused ({refusal}), exit code {code}: {said}")
-    frames = read_frames(discrete.mesh, folder / "out")
+    frames = read_frames(discrete.mesh, out)
     if not frames and code == 0:
         return Verdict("wrong", "no frames")
     found = judge_frames(discrete, frames, output)
-    if code == 1 and found.word != "wrong":
+    if found.word == "wrong":
+        return found
+    if code == 1:
         return Verdict("refused wrongly", f"exit code 1: {said}")
-    if found.word != "wrong":
-        return judge_stop(discrete, frames, folder / "out") or found
-    return found
+    return judge_stop(discrete, frames, out) or found
+
+
+def traits(discrete):
+    """What is unusual about a scene, in words to count by."""
+    rows, words = discrete.contact, []
+    held = {node for node, _, _ in discrete.prescribed}
+    for node in np.unique(rows.node):
+        n = rows.direction[rows.node == node]
+        if len(n) > 1 and node not in held:
+            words.append("opposite" if (n @ n.T).min() < -0.99 else "corner")
+        if len(n) > 2 or len(n) > 1 and node in held:
+            words.append("many rows")
+    if discrete.clusters()[0] > 1:
+        words.append("pieces")
+    if "time" not in discrete.scene and "t" in re.findall(r"\b[a-z]+\b", str(discrete.scene)):
+        words.append("static with t")
+    return " ".join(sorted(set(words)))
 
 
 def expectation(discrete):
@@ -141,16 +166,17 @@ def residuals(step, u, scale=(0.0, 0.0)):
     length = max(np.abs(u).max(), HISTORY * scale[1])
     slack = step.rows.value - along(step.rows, u)
     places = np.r_[-slack, np.abs(along(step.held, u) - step.held.value), 0.0].max()
+    force, length = force or 1.0, length or 1.0
     reaction = (step.f - step.k @ u).reshape(-1, 2)
     off = np.linalg.norm(reaction, axis=1)
     touching = slack <= PLACE * length
     for node in np.unique(np.r_[step.rows.node[touching], step.held.node]):
         d = step.held.direction[step.held.node == node]
         normals = step.rows.direction[(step.rows.node == node) & touching]
-        off[node] = nnls(np.vstack([normals, d, -d]).T, reaction[node])[1]
+        off[node] = force * nnls(np.vstack([normals, d, -d]).T, reaction[node] / force)[1]
     # Element forces of a large rigid motion are rounding.
     off = np.maximum(off - 1e-14 * rounding.reshape(-1, 2).sum(1), 0.0)
-    return off.max() / (force or 1.0), places / (length or 1.0), (force, length)
+    return off.max() / force, places / length, (force, length)
 
 
 def judge_step(step, u, scale):

@@ -36,7 +36,8 @@ LIMIT = 120  # seconds a run may take, on a busy machine
 ENVIRONMENT = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
                "OMPI_MCA_mpi_yield_when_idle": "1"}
 BAD = ("wrong", "refused wrongly", "no verdict")
-FIELDS = ("id", "kind", "solver", "ranks", "nodes", "verdict", "difference", "seconds", "reason")
+FIELDS = ("id", "kind", "solver", "ranks", "nodes", "traits", "verdict", "difference", "seconds",
+          "reason")
 
 
 def run(binary, folder, solver, ranks):
@@ -82,7 +83,8 @@ def one(binary, out, seed, number):
         write_scene(case.scene, folder / "scene.toml")
         verdict, seconds = examine(folder, binary, case.solver, case.ranks)
         row = {"id": f"{seed}-{number}", "kind": case.kind, "solver": case.solver,
-               "ranks": case.ranks, "nodes": len(case.mesh.nodes), "verdict": verdict.word,
+               "ranks": case.ranks, "nodes": len(case.mesh.nodes),
+               "traits": verdict.traits, "verdict": verdict.word,
                "difference": f"{verdict.difference:.1e}", "seconds": f"{seconds:.2f}",
                "reason": verdict.reason}
         if verdict.word in BAD:
@@ -103,8 +105,8 @@ def summarise(rows):
     reasons = Counter((row["verdict"], row["reason"].split(" at t =")[0]) for row in rows
                       if row["verdict"].startswith("refused"))
     lines += [f"{count:5} {word}: {reason}" for (word, reason), count in reasons.most_common()]
-    lines += [f"{row['id']} {row['kind']} {row['solver']} x{row['ranks']} {row['verdict']}: "
-              f"{row['reason']}" for row in rows if row["verdict"] in BAD]
+    lines += [f"{row['id']} {row['kind']} [{row['traits']}] {row['solver']} x{row['ranks']} "
+              f"{row['verdict']}: {row['reason']}" for row in rows if row["verdict"] in BAD]
     return "\n".join(lines)
 
 

@@ -1,20 +1,16 @@
 """The contact step (26) solved in the judge's own way: min ½uᵀKu − fᵀu, Du = d, Au ≤ g.
 
-Prescribed rows are eliminated node by node with an orthonormal basis of what they leave. With N
-the rigid motions that remain and G the inverse of K with as many unknowns pinned, v = G(q − Aᵀλ)
-+ Nα, and what is left is dense and as small as Γ_C:
-
-    s = Sλ + c − Bα ≥ 0,   λ ≥ 0,   λᵀs = 0,   Bᵀλ = Nᵀq,   S = AGAᵀ, B = AN, c = b − AGq.
-
-An interior-point method (Mehrotra's predictor and corrector) finds the active set, one least-squares
-solve on it gives the answer. Neither knows of degenerate nodes: parallel, opposite and redundant
-rows are allowed. Whether there is a solution, and only one, is told by ranks and by Farkas.
+Prescribed rows are eliminated node by node with an orthonormal basis of what they leave, u = lift +
+Zv. An interior-point method then finds the active set, and one linear solve on it, refined, the
+answer. Neither knows of degenerate nodes: parallel, opposite and redundant rows are allowed.
+Whether there is a solution, and only one, is told by the ranks of the rigid motions of all pieces
+and by Farkas.
 """
 
 import numpy as np
 from scipy.linalg import null_space, qr
 from scipy.optimize import nnls
-from scipy.sparse import coo_matrix
+from scipy.sparse import bmat, coo_matrix, diags, identity
 from scipy.sparse.linalg import splu
 
 RANK = 1e-9  # singular values of unit-sized rows below this are zero
@@ -120,120 +116,93 @@ class Step:
 
     def solve(self):
         """u, and what tells of its accuracy; needs a step that has a solution."""
-        pins = []
-        if self.n.size:
-            pins = qr(self.n.T, pivoting=True, mode="economic")[2][:self.n.shape[1]]
-        self.open = np.setdiff1d(np.arange(len(self.q)), pins)
-        self.h = (self.z.T @ self.k @ self.z).tocsc()
-        self.factor = splu(self.h[self.open][:, self.open]) if len(self.open) else None
-        a = self.a.toarray()
-        self.ga = np.column_stack([self._inverse(row) for row in a]) if len(a) else a.T
-        s = 0.5 * (a @ self.ga + (a @ self.ga).T)
-        gq = self._inverse(self.q)
-        e = self.n_contact.T @ self.q
-        self.force = max(np.abs(self.q).max(initial=0.0), np.finfo(float).tiny)
-        self.s = s
-        lam, alpha = complementarity(s, self.b - a @ gq, self.bn, e, self.force)
-        self.active = np.flatnonzero(lam > 0)
-        v = self._inverse(self.q - a.T @ lam) + self.n_contact @ alpha
-        strict = lam > 1e-8 * self.force
-        self.loose = self.z @ (self.n @ kernel((self.a @ self.n)[strict], self.n.shape[1]))
-        self.u = self.lift + self.z @ v
-        return self.u
+        h = (self.z.T @ self.k @ self.z).tocsc()
+        self.size = h.diagonal().max(initial=0.0) or 1.0
+        # A load that does no work on the free motions lets as many unknowns be pinned.
+        pins = qr(self.free.T, pivoting=True, mode="economic")[2] if self.free.size else []
+        self.h = h + self.size * diags(np.isin(np.arange(len(self.q)), pins[:self.free.shape[1]]) * 1.0)
+        force = np.abs(self.q).max(initial=0.0)
+        v, self.active = np.zeros(len(self.q)), np.zeros(len(self.b), bool)
+        lam = np.zeros(len(self.b))
+        if force > 0.0:
+            near, self.active = interior_point(self.h, self.q, self.a, self.b, force, self.size)
+            for _ in range(5):  # tidied until the signs agree
+                v, lam = self._on_active_set(self.q, self.b[self.active], near)
+                slack = self.b - self.a @ v
+                wrong = np.where(self.active, lam < -1e-12 * force, slack < -1e-12 * np.abs(v).max())
+                if not wrong.any():
+                    break
+                self.active = self.active ^ wrong
+            v, lam = self._on_active_set(self.q, self.b[self.active], near)
+        motions = self.n.shape[1]
+        self.loose = self.z @ (self.n @ kernel((self.a @ self.n)[lam > 1e-8 * force], motions))
+        return self.lift + self.z @ v
 
-    def _inverse(self, right):
-        """G: K⁻¹ with the pins held, once refined."""
-        out = np.zeros(len(right))
-        if self.factor is not None:
-            out[self.open] = self.factor.solve(right[self.open])
-            residual = (right - self.h @ out)[self.open]
-            out[self.open] += self.factor.solve(residual)
-        return out
-
-    def response(self, force):
-        """The displacement that small extra forces cause while the active set stays."""
-        a = self.a.toarray()[self.active]
-        s, b = self.s[np.ix_(self.active, self.active)], self.bn[self.active]
-        q = self.z.T @ force
-        g = self._inverse(q)
-        lam, alpha = saddle(s, b, a @ g, self.n_contact.T @ q)
-        return self.z @ (self._inverse(q - a.T @ lam) + self.n_contact @ alpha)
+    def _on_active_set(self, q, b, v):
+        """Hv + Aᵀλ = q, Av = b on the active set, near v. A little regularisation lets rows be
+        redundant and motions be free, which stay as they are in v; refinement takes it out
+        again. λ is 0 elsewhere."""
+        a, n = self.a[self.active] * self.size, len(q)
+        small = 1e-10 * self.size
+        m = a.shape[0]
+        factor = splu(bmat([[self.h + small * identity(n), a.T],
+                            [a, -small * identity(m)]]).tocsc())
+        lam = np.zeros(m)
+        for _ in range(10):
+            step = factor.solve(np.r_[q - self.h @ v - a.T @ lam, self.size * b - a @ v])
+            v, lam = v + step[:n], lam + step[n:]
+        everywhere = np.zeros(len(self.b))
+        everywhere[self.active] = self.size * lam
+        return v, everywhere
 
     def sensitivity(self):
-        """About the largest |u| per ‖force‖₂: a few power iterations on the response."""
-        force = np.random.default_rng(0).standard_normal(len(self.f))
-        largest = 0.0
+        """About the largest |u| per ‖force‖₂ while the active set stays: a few power iterations."""
+        force, largest = np.random.default_rng(0).standard_normal(len(self.q)), 0.0
         for _ in range(4):
             force /= max(np.linalg.norm(force), np.finfo(float).tiny)
-            u = without(self.response(force), self.loose)
-            largest, force = max(largest, np.abs(u).max()), u
+            v, _ = self._on_active_set(force, np.zeros(self.active.sum()), np.zeros(len(force)))
+            u = without(self.z @ v, self.loose)
+            largest, force = max(largest, np.abs(u).max()), self.z.T @ u
         return largest
 
 
-def complementarity(s, c, b, e, force):
-    """λ and α of the problem at the head of this page, in units of its own."""
-    m, k = b.shape
+def interior_point(h, q, a, b, force, size):
+    """Near v and its active set of Hv + Aᵀλ = q, s = b − Av ≥ 0, λ ≥ 0, λᵀs = 0 by Mehrotra's predictor and
+    corrector: (H + AᵀDA) dv = …, D = λ/s, in which no pinning loses digits of a thin body."""
+    m = len(b)
     if m == 0:
-        return np.zeros(0), np.zeros(k)
-    compliance = s.diagonal().max() or 1.0
-    length = compliance * force
-    c, s, e = c / length, s / compliance, e / force
-    lam, slack, alpha = np.ones(m), np.maximum(1.0, c), np.zeros(k)
-    best, since = (np.inf, lam, alpha, slack), 0
+        return np.zeros(len(q)), np.zeros(0, bool)
+    v = splu((h + size * (a.T @ a)).tocsc()).solve(q + size * (a.T @ b))
+    length = max(np.abs(v).max(), np.abs(a @ v - b).min())
+    lam, slack = np.full(m, force), np.maximum(b - a @ v, length)
+    best, since = (np.inf, v, lam > slack), 0
     for _ in range(150):
-        r1, r2 = s @ lam + c - b @ alpha - slack, b.T @ lam - e
+        rd, rp = h @ v - q + a.T @ lam, a @ v + slack - b
         mu = lam @ slack / m
-        merit = mu + np.abs(r1).max() + np.abs(r2).max(initial=0.0)
+        merit = mu / (force * length) + np.abs(rd).max() / force + np.abs(rp).max() / length
         since += 1
         if merit < best[0]:
-            best, since = (merit, lam, alpha, slack), 0
-        if mu < 1e-22 or since > 10 or not np.isfinite(merit):
+            best, since = (merit, v, lam / force > slack / length), 0
+        if mu < 1e-24 * force * length or since > 15 or not np.isfinite(merit):
             break
-        ratio = np.minimum(slack / np.maximum(lam, 1e-200), 1e40)
-        matrix = np.block([[s + np.diag(ratio), -b], [b.T, np.zeros((k, k))]])
+        d = np.clip(lam / slack, 1e-20 * size, 1e20 * size)
+        try:
+            factor = splu((h + a.T @ diags(d) @ a).tocsc())
+        except RuntimeError:  # singular in the last digits
+            break
         aim, correction = 0.0, 0.0
         for _ in range(2):  # predictor, then corrector
-            rest = (aim - lam * slack - correction) / lam
-            step = balanced(matrix, np.r_[rest - r1, -r2])
-            dl, da = step[:m], step[m:]
-            ds = rest - ratio * dl
-            length_l, length_s = (min(1.0, 0.999 * (-x[d < 0] / d[d < 0]).min(initial=2.0))
-                                  for x, d in ((lam, dl), (slack, ds)))
+            t = (aim - correction) / slack - lam
+            dv = factor.solve(-rd - a.T @ (t + d * rp))
+            ds = -rp - a @ dv
+            dl = t - d * ds
+            length_l, length_s = (min(1.0, 0.999 * (-x[g < 0] / g[g < 0]).min(initial=2.0))
+                                  for x, g in ((lam, dl), (slack, ds)))
             ahead = (lam + length_l * dl) @ (slack + length_s * ds) / m
-            aim, correction = mu * (ahead / mu) ** 3, dl * ds
-        size = min(length_l, length_s)
-        lam, slack, alpha = lam + size * dl, slack + size * ds, alpha + size * da
-    _, lam, alpha, slack = best
-    active = lam > slack
-    for _ in range(10):  # tidied until signs agree
-        tidy = np.zeros(m)
-        tidy[active], shift = saddle(s[np.ix_(active, active)], b[active], -c[active], e)
-        gap = s @ tidy + c - b @ shift
-        wrong = (active & (tidy < 0)) | (~active & (gap < -1e-14 * np.abs(c).max()))
-        if not wrong.any():
-            break
-        active = active ^ wrong
-    lost = max(-tidy.min(), -(gap / max(1.0, np.abs(c).max())).min())
-    if lost < 1e-9 or lost < best[0]:
-        lam, alpha = np.where(active, tidy, 0.0), shift
-    return lam * force, alpha * length
-
-
-def balanced(matrix, right):
-    """A linear solve whose rows and columns are first scaled by the diagonal."""
-    d = 1 / np.sqrt(np.where(matrix.diagonal() > 0, matrix.diagonal(), 1.0))
-    return d * np.linalg.lstsq(d[:, None] * matrix * d, d * right, rcond=1e-16)[0]
-
-
-def saddle(s, b, right, e):
-    """Sλ − Bα = right, Bᵀλ = e in the least-squares sense; returns λ, α."""
-    m, k = b.shape
-    if m + k == 0:
-        return np.zeros(0), np.zeros(0)
-    unit_size = s.diagonal().max(initial=0.0) or 1.0
-    matrix = np.block([[s / unit_size, -b], [b.T, np.zeros((k, k))]])
-    out = np.linalg.lstsq(matrix, np.r_[right / unit_size, e], rcond=1e-13)[0]
-    return out[:m], out[m:] * unit_size
+            aim, correction = mu * min(ahead / mu, 1.0) ** 3, dl * ds
+        step = min(length_l, length_s)
+        v, lam, slack = v + step * dv, lam + step * dl, slack + step * ds
+    return best[1:]
 
 
 def kernel(rows, size):
