@@ -12,7 +12,7 @@ from scipy.sparse import coo_matrix, diags
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
 
-from scene import Expression, SceneError
+from scene import Expression
 
 CORNER = np.pi / 6  # edges further apart meet in a corner
 DAMAGE = {"lambda_w": 0.0, "strain_cap": 1000.0, "threshold": 0.01, "initial": 1.0,
@@ -21,11 +21,13 @@ DAMAGE = {"lambda_w": 0.0, "strain_cap": 1000.0, "threshold": 0.01, "initial": 1
 
 @dataclass
 class Rows:
-    """Conditions d·u = value (or ≤ value), a row each: node, unit direction, value."""
+    """Conditions d·u = value (or ≤ value), a row each: node, unit direction, value, and of contact
+    rows the tributary length."""
 
     node: np.ndarray
     direction: np.ndarray
     value: np.ndarray
+    weight: np.ndarray
 
 
 class Discrete:
@@ -121,8 +123,8 @@ class Discrete:
                 if fixed is not None:
                     faces = [(fixed, sum(length for _, length in faces))]
                 rows.setdefault(node, []).extend((n, w, g) for n, w in faces)
-        found = [(node, n, g) for node, parts in sorted(rows.items())
-                 for n, g in merged_gaps(parts)]
+        found = [(node, n, g, w) for node, parts in sorted(rows.items())
+                 for n, w, g in merged_gaps(parts)]
         return as_rows(found)
 
     def _prescribed(self):
@@ -248,15 +250,13 @@ def merged_gaps(parts):
                 break
         else:
             rows.append((normal, length, gap))
-    return [(n, g) for n, _, g in rows]
+    return rows
 
 
 def as_rows(found):
-    """Rows from a list of (node, direction, value)."""
+    """Rows from a list of (node, direction, value[, weight])."""
     if not found:
-        return Rows(np.zeros(0, int), np.zeros((0, 2)), np.zeros(0))
-    node, direction, value = zip(*found)
-    return Rows(np.array(node), np.array(direction, float), np.array(value, float))
-
-
-__all__ = ["Discrete", "Rows", "SceneError"]
+        return Rows(np.zeros(0, int), np.zeros((0, 2)), np.zeros(0), np.zeros(0))
+    node, direction, value, *weight = zip(*found)
+    return Rows(np.array(node), np.array(direction, float), np.array(value, float),
+                np.array(weight[0] if weight else np.ones(len(node))))

@@ -23,6 +23,7 @@ from variational import Step, along, without
 
 FORCE = 1e-8  # residual forces, relative to the largest sum of absolute element forces at a node
 PLACE = 1e-8  # violations of gaps, relative to the largest displacement
+TOUCH = 1e-6  # a gap so small, relative to it, may carry a force: displacements are as exact as that
 ANSWER = 1e-6  # displacements, relative
 ENERGY = 1e-4  # strains in the energy norm, relative
 HISTORY = 1e-9  # of the largest force and displacement so far: a load may cross zero
@@ -40,6 +41,19 @@ class Verdict:
     reason: str
     difference: float = 0.0
     traits: str = ""
+
+
+@dataclass
+class Frame:
+    """Time, displacement, ζ, remaining gap and pressure, and by how much pieces of several ranks
+    differ at their common nodes."""
+
+    time: float
+    u: np.ndarray
+    zeta: np.ndarray
+    gap: np.ndarray
+    pressure: np.ndarray
+    apart: float
 
 
 def judge(folder, code, output):
@@ -63,7 +77,7 @@ def verdict_on(discrete, out, code, output):
         return Verdict("wrong", f"exit code {code}: {said}")
     if refusal and not either:
         word = "gave up" if code == 1 else "wrong"
-        return Verdict(word, f"should be refused ({refusal}), exit code {code}: {said}")
+        return Verdict(word, f"should be refused ({refusal}), exit code {code}")
     frames = read_frames(discrete.mesh, out)
     if not frames and code == 0:
         return Verdict("wrong", "no frames")
@@ -71,8 +85,44 @@ def verdict_on(discrete, out, code, output):
     if found.word == "wrong":
         return found
     if code == 1:
-        return Verdict("refused wrongly", f"exit code 1: {said}")
+        return Verdict("refused wrongly", said + missed(discrete, frames))
     return judge_stop(discrete, frames, out) or found
+
+
+def missed(discrete, frames):
+    """What is known of the step that a solver failed at: whether rounding alone explains it."""
+    damaged = "damage" in discrete.scene
+    if frames:
+        last = frames[-1]
+        zeta, later = last.zeta, [t for t in times(discrete.scene) if t > last.time * (1 + 1e-9)]
+        if not later:
+            return ""
+        if damaged:
+            zeta = discrete.damage_step(last.u, zeta, later[0] - last.time)
+    else:
+        later, zeta = times(discrete.scene), initial(discrete)
+    step = Step(discrete, zeta, later[0])
+    own = step.solve()
+    forces, places, (force, _) = residuals(step, own)
+    if forces > FORCE or places > PLACE:
+        return " (nor has the judge a good answer)"
+    level = 1e-16 * discrete.element_sizes(zeta, own)[1].max() / force
+    return " (rounding alone is near the tolerance)" if level > 0.01 * TOLERANCE else ""
+
+
+def times(scene):
+    """The times of the contact steps."""
+    if "time" not in scene:
+        return [1.0]
+    end, step = (float(scene["time"][key]) for key in ("end", "step"))
+    count = round(end / step)
+    return [end * n / count for n in range(count + 1)]
+
+
+def initial(discrete):
+    """ζ₀ at the nodes."""
+    damaged = "damage" in discrete.scene
+    return Expression(discrete.law["initial"] if damaged else 1.0).at(discrete.mesh.nodes)
 
 
 def traits(discrete):
@@ -99,12 +149,7 @@ def expectation(discrete):
         return reason, False
     zeta = np.ones(len(discrete.mesh.nodes))
     worst = None
-    steps = [1.0]
-    if "time" in discrete.scene:
-        end, step = (float(discrete.scene["time"][key]) for key in ("end", "step"))
-        count = round(end / step)
-        steps = [end * n / count for n in range(count + 1)]
-    for t in steps:
+    for t in times(discrete.scene):
         step = Step(discrete, zeta, t)
         size = np.abs(step.held.value).max(initial=0.0)
         for name, value, low, high in (
@@ -123,28 +168,55 @@ def judge_frames(discrete, frames, output):
     """Every frame written: the damage step, then the contact step."""
     worst, scale, before = Verdict("right", ""), (0.0, 0.0), None
     damaged = "damage" in discrete.scene
-    start = Expression(discrete.law["initial"] if damaged else 1.0).at(discrete.mesh.nodes)
-    for time, u, zeta, apart in frames:
+    start = initial(discrete)
+    for frame in frames:
         expected = start
         if before is not None:
-            expected = before[2]
+            expected = before.zeta
             if damaged:
-                expected = discrete.damage_step(before[1], before[2], time - before[0])
-        off = np.abs(zeta - expected).max()
-        if not np.isfinite(u).all() or not off <= DAMAGE or apart:
-            reason = f"ζ differs by {off:.1e}, ranks by {apart:.1e}, or values are missing"
-            return Verdict("wrong", f"t = {time:g}: {reason}")
-        found, scale = judge_step(Step(discrete, zeta, time), u, scale)
-        found.reason = f"t = {time:g}: {found.reason}"
+                expected = discrete.damage_step(before.u, before.zeta, frame.time - before.time)
+        off = np.abs(frame.zeta - expected).max()
+        if not np.isfinite(frame.u).all() or not off <= DAMAGE or frame.apart:
+            reason = f"ζ differs by {off:.1e}, ranks by {frame.apart:.1e}, or values are missing"
+            return Verdict("wrong", f"t = {frame.time:g}: {reason}")
+        step = Step(discrete, frame.zeta, frame.time)
+        found, scale = judge_step(step, frame.u, scale)
+        found.reason = f"t = {frame.time:g}: {found.reason}"
+        if found.word == "right" and (fault := shown(step, frame, scale)):
+            found = Verdict("wrong", f"t = {frame.time:g}: {fault}")
         if found.word == "wrong":
             return found
         if found.word == "imprecise" or found.difference > worst.difference:
             worst = found
-        before = (time, u, zeta)
+        before = frame
     told = re.search(r"exact only|cannot be estimated|one of many", output)
     if worst.word == "imprecise" and told:
         worst.word = "right"
     return worst
+
+
+def shown(step, frame, scale):
+    """What is wrong with the gap and the pressure written: g − u·ν, the least of a node's rows, and
+    the nodal reaction over the tributary length, where a node has one row and is not held."""
+    rows, (force, length) = step.rows, scale
+    slack = np.full(len(frame.gap), np.inf)
+    np.minimum.at(slack, rows.node, rows.value - along(rows, frame.u))
+    seen = np.isfinite(frame.gap)
+    if (np.abs(frame.gap - slack)[seen] > PLACE * length).any():
+        return "the gap field is not what the displacement leaves"
+    single = np.bincount(rows.node, minlength=len(seen)) == 1
+    single[step.held.node] = False
+    if not seen[single].all():
+        return "the gap field lacks a node of Γ_C"
+    reaction = along(rows, step.f - step.k @ frame.u)
+    rounding = step.discrete.element_sizes(step.zeta, frame.u)[1].reshape(-1, 2).sum(1)
+    off = np.abs(frame.pressure[rows.node] * rows.weight - reaction) - 1e-14 * rounding[rows.node]
+    if (off[single[rows.node]] > FORCE * force).any():
+        return "the pressure field is not the nodal reaction over its length"
+    off_contact = np.setdiff1d(np.arange(len(seen)), rows.node)
+    if frame.pressure[off_contact].any() or seen[off_contact].any():
+        return "pressure or gap off Γ_C"
+    return ""
 
 
 def judge_stop(discrete, frames, out):
@@ -152,8 +224,8 @@ def judge_stop(discrete, frames, out):
     stopped = json.loads((out / "summary.json").read_text()).get("stopped_at")
     if stopped is None:
         return None
-    time, u, zeta, _ = frames[-1]
-    least = discrete.damage_step(u, zeta, stopped - time).min()
+    last = frames[-1]
+    least = discrete.damage_step(last.u, last.zeta, stopped - last.time).min()
     if least <= discrete.law["threshold"] + DAMAGE:
         return None
     return Verdict("wrong", f"stopped at ζ_* at t = {stopped:g}, but min ζ = {least:.3e}")
@@ -169,13 +241,15 @@ def residuals(step, u, scale=(0.0, 0.0)):
     force, length = force or 1.0, length or 1.0
     reaction = (step.f - step.k @ u).reshape(-1, 2)
     off = np.linalg.norm(reaction, axis=1)
-    touching = slack <= PLACE * length
+    touching = slack <= TOUCH * length
     for node in np.unique(np.r_[step.rows.node[touching], step.held.node]):
         d = step.held.direction[step.held.node == node]
         normals = step.rows.direction[(step.rows.node == node) & touching]
         off[node] = force * nnls(np.vstack([normals, d, -d]).T, reaction[node] / force)[1]
-    # Element forces of a large rigid motion are rounding.
-    off = np.maximum(off - 1e-14 * rounding.reshape(-1, 2).sum(1), 0.0)
+    # Element forces of a large rigid motion are rounding; where a prescribed displacement carries
+    # the body along, the scale of forces is what it would take alone.
+    carried = 10 * TOLERANCE * np.abs(step.k @ step.lift).max()
+    off = np.maximum(off - 1e-14 * rounding.reshape(-1, 2).sum(1) - carried, 0.0)
     return off.max() / force, places / length, (force, length)
 
 
@@ -196,7 +270,7 @@ def judge_step(step, u, scale):
     by = np.abs(apart).max() / length
     # ‖Ku − f‖₂ may be the tolerance times ‖f‖₂: what that moves, twice.
     norm = np.linalg.norm(step.discrete.element_sizes(step.zeta, own)[0]) + np.linalg.norm(step.f)
-    norm = max(norm, HISTORY * scale[0])
+    norm = max(norm, HISTORY * scale[0], np.linalg.norm(step.k @ step.lift))
     move = 2 * TOLERANCE * norm * step.sensitivity()
     rounding = step.discrete.element_sizes(step.zeta, own)[1]
     energy, whole = apart @ (step.k @ apart), own @ (step.k @ own)
@@ -209,34 +283,31 @@ def judge_step(step, u, scale):
 
 
 def read_frames(mesh, out):
-    """(time, u, ζ, largest difference at nodes that several pieces share) of every frame, nodes as
-    in `mesh`; pieces are matched triangle by triangle, as slits have two nodes at one point."""
+    """Every frame written, nodes as in `mesh`; pieces are matched triangle by triangle, as slits
+    have two nodes at one point."""
     place = {key(mesh.nodes[t]): t for t in mesh.triangles}
-    frames = []
     collection = out / "fields.pvd"
     if not collection.exists():
-        return frames
+        return []
+    frames = []
     for entry in ElementTree.parse(collection).iter("DataSet"):
-        path = out / entry.get("file")
-        pieces = [path]
-        if path.suffix == ".pvtu":
-            tree = ElementTree.parse(path)
-            pieces = [out / piece.get("Source") for piece in tree.iter("Piece")]
-        values, apart, seen = np.full((len(mesh.nodes), 3), np.nan), 0.0, 0
-        for piece in pieces:
-            data = meshio.read(piece)
-            field = np.column_stack([data.point_data["displacement"][:, :2], data.point_data["zeta"]])
-            for cell in np.vstack([b.data for b in data.cells]):
+        pieces = [out / entry.get("file")]
+        if pieces[0].suffix == ".pvtu":
+            pieces = [out / p.get("Source") for p in ElementTree.parse(pieces[0]).iter("Piece")]
+        values, apart, seen = np.full((len(mesh.nodes), 5), np.nan), 0.0, 0
+        for data in map(meshio.read, pieces):
+            names = ("displacement", "zeta", "gap", "normal_pressure")
+            field = np.column_stack([data.point_data[name] for name in names])[:, [0, 1, 3, 4, 5]]
+            for cell in np.vstack([block.data for block in data.cells]):
                 nodes = place[key(data.points[cell, :2])]
                 # Both lists in the order of their points.
                 a, b = (order(points) for points in (mesh.nodes[nodes], data.points[cell, :2]))
-                old, new = values[nodes[a]], field[cell[b]]
-                apart = max(apart, np.nanmax(np.abs(old - new), initial=0.0))
-                values[nodes[a]] = new
+                apart = max(apart, np.nanmax(np.abs(values[nodes[a]] - field[cell[b]]), initial=0.0))
+                values[nodes[a]] = field[cell[b]]
                 seen += 1
-        if seen != len(mesh.triangles):
-            values[:] = np.nan
-        frames.append((float(entry.get("timestep")), values[:, :2].ravel(), values[:, 2], apart))
+        values[:] = values if seen == len(mesh.triangles) else np.nan
+        u, (zeta, gap, pressure) = values[:, :2].ravel(), values[:, 2:].T
+        frames.append(Frame(float(entry.get("timestep")), u, zeta, gap, pressure, apart))
     return frames
 
 
@@ -252,6 +323,6 @@ def order(points):
 
 def message(output):
     """The error of a run without its numbers, so that like errors count together."""
-    text = " ".join(output.split())
-    text = text[text.find("error:"):] if "error:" in text else text[-200:]
-    return re.sub(r"[-+]?\d[\d.e+-]*", "#", text)[:200]
+    lines = [line for line in output.splitlines() if line.startswith("error:")] or ["no error"]
+    text = re.sub(r"[-+]?\d[\d.e+-]*", "#", lines[0].replace("scene.toml: ", ""))
+    return re.sub(r" \(# times it\)| #(?=,|$)", "", text)[:160]

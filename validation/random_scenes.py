@@ -11,6 +11,7 @@ import argparse
 import csv
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -102,7 +103,7 @@ def summarise(rows):
     for kind in [*sorted({row["kind"] for row in rows}), "all"]:
         of = Counter(row["verdict"] for row in rows if kind in ("all", row["kind"]))
         lines.append(f"{kind:<12}" + "".join(f"{of[word]:>17}" for word in words))
-    reasons = Counter((row["verdict"], row["reason"].split(" at t =")[0]) for row in rows
+    reasons = Counter((row["verdict"], re.sub(" at t = [0-9.e-]+", "", row["reason"])) for row in rows
                       if row["verdict"].startswith("refused"))
     lines += [f"{count:5} {word}: {reason}" for (word, reason), count in reasons.most_common()]
     lines += [f"{row['id']} {row['kind']} [{row['traits']}] {row['solver']} x{row['ranks']} "
