@@ -29,7 +29,7 @@ os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", SCOTCH_PTHREAD_
 from judge import Verdict, judge  # noqa: E402
 from random_bodies import write_msh  # noqa: E402
 from random_draw import draw  # noqa: E402
-from scene import write_scene  # noqa: E402
+from scene import read_scene, write_scene  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent.parent
 LIMIT = 120  # seconds a run may take, on a busy machine
@@ -70,9 +70,29 @@ def examine(folder, binary, solver, ranks):
     try:
         if code is None:
             return Verdict("wrong", f"no end within {LIMIT} s"), seconds
-        return judge(folder, code, output), seconds
+        verdict = judge(folder, code, output)
+        advised = re.search(r"double precision reaches only about (\S+) here", output)
+        if verdict.word == "refused wrongly" and advised:
+            return follow(folder, binary, solver, ranks, float(advised[1])), seconds
+        return verdict, seconds
     except Exception:  # a fault of the judge must be seen, not end the others
         return Verdict("no verdict", traceback.format_exc(limit=-2).replace("\n", " | ")), seconds
+
+
+def follow(folder, binary, solver, ranks, tolerance):
+    """Does what the program advised where rounding is larger than the tolerance: the scene once
+    more at the tolerance it named, and a little."""
+    advised = folder / "advised"
+    advised.mkdir(exist_ok=True)
+    shutil.copy(folder / "mesh.msh", advised)
+    scene = read_scene(folder / "scene.toml")
+    write_scene({**scene, "contact": {"tolerance": 2 * tolerance}}, advised / "scene.toml")
+    verdict = judge(advised, *run(binary, advised, solver, ranks))
+    if verdict.word in BAD:
+        verdict.reason = f"after the advice to set the tolerance: {verdict.reason}"
+        return verdict
+    verdict.word = "right as advised"
+    return verdict
 
 
 def one(binary, out, seed, number):
@@ -98,11 +118,11 @@ def one(binary, out, seed, number):
 
 def summarise(rows):
     """Per kind how many of each verdict; then every reason that a refusal or a failure had."""
-    words = ("right", "imprecise", "either", "refused rightly", "gave up", *BAD)
-    lines = [f"{'':<12}" + "".join(f"{word:>17}" for word in words)]
+    words = ("right", "right as advised", "imprecise", "either", "refused rightly", "gave up", *BAD)
+    lines = [f"{'':<12}" + "".join(f"{word:>18}" for word in words)]
     for kind in [*sorted({row["kind"] for row in rows}), "all"]:
         of = Counter(row["verdict"] for row in rows if kind in ("all", row["kind"]))
-        lines.append(f"{kind:<12}" + "".join(f"{of[word]:>17}" for word in words))
+        lines.append(f"{kind:<12}" + "".join(f"{of[word]:>18}" for word in words))
     reasons = Counter((row["verdict"], re.sub(" at t = [0-9.e-]+", "", row["reason"])) for row in rows
                       if row["verdict"].startswith("refused"))
     lines += [f"{count:5} {word}: {reason}" for (word, reason), count in reasons.most_common()]
