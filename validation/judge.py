@@ -279,9 +279,9 @@ def judge_step(step, u, scale):
     norm = max(norm, HISTORY * scale[0], np.linalg.norm(step.k @ step.lift))
     easing = ease(step.discrete)
     move = 2 * TOLERANCE * easing * norm * step.sensitivity()
-    rounding = step.discrete.element_sizes(step.zeta, own)[1]
+    rounding = step.discrete.element_sizes(step.zeta, np.abs(u) + np.abs(own))[1]
     energy, whole = apart @ (step.k @ apart), own @ (step.k @ own)
-    floor = 1e-14 * (np.abs(own) @ rounding) + TOLERANCE * easing * norm * move
+    floor = 1e-14 * ((np.abs(u) + np.abs(own)) @ rounding) + TOLERANCE * easing * norm * move
     floor += HISTORY**2 * scale[0] * scale[1]
     strain = np.sqrt(max(energy, 0.0) / max(whole, np.finfo(float).tiny))
     figures = f"u differs by {by:.1e}, strains by {strain:.1e}"
