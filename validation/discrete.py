@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import coo_matrix, diags
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import spsolve
+from scipy.sparse.linalg import splu
 
 from scene import Expression
 
@@ -181,7 +181,8 @@ class Discrete:
 
     def damage_step(self, u, zeta, step):
         """ζ_n of (28): (M + kκL) ζ_n = M ζ_{n−1} + k b(φ(ε(u_{n−1}), ζ_{n−1})), φ at the three
-        vertices of a triangle and then integrated with the same M."""
+        vertices of a triangle and then integrated with the same M; and how much of it may be
+        rounding, where triangles are very thin."""
         t, law = self.mesh.triangles, self.law
         strain = np.einsum("eki,ei->ek", self.b, u[self.dof])
         squared = strain[:, 0] ** 2 + strain[:, 1] ** 2 + 0.5 * strain[:, 2] ** 2
@@ -200,10 +201,14 @@ class Discrete:
         m, l = (coo_matrix((v.ravel(), (rows, columns)), (n, n)).tocsc() for v in (mass, laplace))
         right = m @ zeta
         np.add.at(right, t, step * np.einsum("eij,ej->ei", mass, phi))
-        # Jacobi scaling keeps pieces of very different size apart from rounding.
         matrix = m + step * law["diffusion"] * l
+        # Jacobi scaling keeps pieces of very different size apart from rounding.
         scale = diags(1 / np.sqrt(matrix.diagonal()))
-        return scale @ spsolve((scale @ matrix @ scale).tocsc(), scale @ right)
+        factor = splu((scale @ matrix @ scale).tocsc())
+        solution = scale @ factor.solve(scale @ right)
+        signs = np.where(np.arange(n) % 2, 1.0, -1.0)
+        noise = factor.solve(scale @ (2e-15 * signs * (abs(matrix) @ np.abs(solution))))
+        return solution, np.abs(scale @ noise).max()
 
 
 def elasticity(material):
