@@ -198,7 +198,8 @@ class Discrete:
         rows, columns = (np.broadcast_to(v, mass.shape).ravel() for v in
                          (t[:, :, None], t[:, None, :]))
         n = len(zeta)
-        m, l = (coo_matrix((v.ravel(), (rows, columns)), (n, n)).tocsc() for v in (mass, laplace))
+        assemble = lambda v: coo_matrix((v.ravel(), (rows, columns)), (n, n)).tocsc()
+        m, l = assemble(mass), assemble(laplace)
         right = m @ zeta
         np.add.at(right, t, step * np.einsum("eij,ej->ei", mass, phi))
         matrix = m + step * law["diffusion"] * l

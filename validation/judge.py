@@ -10,20 +10,19 @@ written obeys (28) from the frame before.
 import json
 import re
 from dataclasses import dataclass
-from xml.etree import ElementTree
 
-import meshio
 import numpy as np
 from scipy.optimize import nnls
 
 from discrete import Discrete
+from frames import read_frames
 from scene import Expression, read_scene
 from triangulation import read_triangulation
 from variational import Step, along, without
 
 FORCE = 1e-8  # residual forces, relative to the largest sum of absolute element forces at a node
 PLACE = 1e-8  # violations of gaps, relative to the largest displacement
-TOUCH = 1e-6  # a gap so small, relative to it, may carry a force: displacements are as exact as that
+TOUCH = 1e-6  # a gap that small, relative to it, may carry a force: u is exact to that
 ANSWER = 1e-6  # displacements, relative
 ENERGY = 1e-4  # strains in the energy norm, relative
 HISTORY = 1e-9  # of the largest force and displacement so far: a load may cross zero
@@ -41,19 +40,6 @@ class Verdict:
     reason: str
     difference: float = 0.0
     traits: str = ""
-
-
-@dataclass
-class Frame:
-    """Time, displacement, ζ, remaining gap and pressure, and by how much pieces of several ranks
-    differ at their common nodes."""
-
-    time: float
-    u: np.ndarray
-    zeta: np.ndarray
-    gap: np.ndarray
-    pressure: np.ndarray
-    apart: float
 
 
 def judge(folder, code, output):
@@ -291,45 +277,6 @@ def judge_step(step, u, scale):
     if by > allowed and by * length > move or energy > ENERGY**2 * whole + floor:
         return Verdict("wrong", figures, by), scale
     return Verdict("imprecise" if by > allowed else "right", figures, by), scale
-
-
-def read_frames(mesh, out):
-    """Every frame written, nodes as in `mesh`; pieces are matched triangle by triangle, as slits
-    have two nodes at one point."""
-    place = {key(mesh.nodes[t]): t for t in mesh.triangles}
-    collection = out / "fields.pvd"
-    if not collection.exists():
-        return []
-    frames = []
-    for entry in ElementTree.parse(collection).iter("DataSet"):
-        pieces = [out / entry.get("file")]
-        if pieces[0].suffix == ".pvtu":
-            pieces = [out / p.get("Source") for p in ElementTree.parse(pieces[0]).iter("Piece")]
-        values, apart, seen = np.full((len(mesh.nodes), 5), np.nan), 0.0, 0
-        for data in map(meshio.read, pieces):
-            names = ("displacement", "zeta", "gap", "normal_pressure")
-            field = np.column_stack([data.point_data[name] for name in names])[:, [0, 1, 3, 4, 5]]
-            for cell in np.vstack([block.data for block in data.cells]):
-                nodes = place[key(data.points[cell, :2])]
-                # Both lists in the order of their points.
-                a, b = (order(points) for points in (mesh.nodes[nodes], data.points[cell, :2]))
-                apart = max(apart, np.nanmax(np.abs(values[nodes[a]] - field[cell[b]]), initial=0.0))
-                values[nodes[a]] = field[cell[b]]
-                seen += 1
-        values[:] = values if seen == len(mesh.triangles) else np.nan
-        u, (zeta, gap, pressure) = values[:, :2].ravel(), values[:, 2:].T
-        frames.append(Frame(float(entry.get("timestep")), u, zeta, gap, pressure, apart))
-    return frames
-
-
-def key(points):
-    """A triangle by the coordinates of its corners."""
-    return tuple(map(tuple, (points[order(points)] + 0.0).tolist()))
-
-
-def order(points):
-    """Corners sorted by their coordinates."""
-    return np.lexsort((points[:, 1], points[:, 0]))
 
 
 def message(output):

@@ -43,7 +43,8 @@ def block(rng, n=None):
     aspect = 10 ** rng.uniform(-0.8, 0.8)
     nx = int(rng.integers(4, 14)) if n is None else n
     ny = int(np.clip(round(nx / aspect), 2, 20))
-    shear, bulge = rng.choice([0, rng.uniform(-0.5, 0.5)]), rng.choice([0, rng.uniform(-0.15, 0.15)])
+    shear = rng.choice([0, rng.uniform(-0.5, 0.5)])
+    bulge = rng.choice([0, rng.uniform(-0.15, 0.15)])
 
     def point(s, t):
         y = t / aspect + bulge * 4 * s * (1 - s) * (1 - t)
@@ -138,7 +139,8 @@ def cells(rng):
     cell = np.stack(np.divmod(np.arange(nx * ny), ny), 1) // r
     triangles = triangles[np.repeat(keep[cell[:, 0], cell[:, 1]], 2)]
     pairs = np.vstack([triangles[:, [k, (k + 1) % 3]] for k in range(3)])
-    _, first, count = np.unique(edge_keys(pairs, len(points)), return_index=True, return_counts=True)
+    keys = edge_keys(pairs, len(points))
+    _, first, count = np.unique(keys, return_index=True, return_counts=True)
     edges = pairs[first[count == 1]]
     d = points[edges[:, 1]] - points[edges[:, 0]]
     facing = np.round(2 / np.pi * np.arctan2(-d[:, 0], d[:, 1])).astype(int) % 4
@@ -181,7 +183,8 @@ def finish(rng, body, length, turn):
 
 def write_msh(mesh, path):
     """MSH 2.2, text: numbers as Python prints them, which reads back exactly."""
-    lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(mesh.curves) + 1)]
+    lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat"]
+    lines += ["$PhysicalNames", str(len(mesh.curves) + 1)]
     lines += [f'1 {k} "{name}"' for k, name in enumerate(mesh.curves, 2)] + ['2 1 "body"']
     lines += ["$EndPhysicalNames", "$Nodes", str(len(mesh.nodes))]
     lines += [f"{i} {x!r} {y!r} 0" for i, (x, y) in enumerate(mesh.nodes.tolist(), 1)]

@@ -123,8 +123,8 @@ def summarise(rows):
     for kind in [*sorted({row["kind"] for row in rows}), "all"]:
         of = Counter(row["verdict"] for row in rows if kind in ("all", row["kind"]))
         lines.append(f"{kind:<12}" + "".join(f"{of[word]:>18}" for word in words))
-    reasons = Counter((row["verdict"], re.sub(" at t = [0-9.e-]+", "", row["reason"])) for row in rows
-                      if row["verdict"].startswith("refused"))
+    reasons = Counter((row["verdict"], re.sub(" at t = [0-9.e-]+", "", row["reason"]))
+                      for row in rows if row["verdict"].startswith("refused"))
     lines += [f"{count:5} {word}: {reason}" for (word, reason), count in reasons.most_common()]
     lines += [f"{row['id']} {row['kind']} [{row['traits']}] {row['solver']} x{row['ranks']} "
               f"{row['verdict']}: {row['reason']}" for row in rows if row["verdict"] in BAD]

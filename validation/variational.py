@@ -120,7 +120,8 @@ class Step:
         self.size = h.diagonal().max(initial=0.0) or 1.0
         # A load that does no work on the free motions lets as many unknowns be pinned.
         pins = qr(self.free.T, pivoting=True, mode="economic")[2] if self.free.size else []
-        self.h = h + self.size * diags(np.isin(np.arange(len(self.q)), pins[:self.free.shape[1]]) * 1.0)
+        pinned = np.isin(np.arange(len(self.q)), pins[:self.free.shape[1]])
+        self.h = h + self.size * diags(pinned * 1.0)
         force = np.abs(self.q).max(initial=0.0)
         v, self.active = np.zeros(len(self.q)), np.zeros(len(self.b), bool)
         lam = np.zeros(len(self.b))
@@ -129,7 +130,8 @@ class Step:
             for _ in range(5):  # tidied until the signs agree
                 v, lam = self._on_active_set(self.q, self.b[self.active], near)
                 slack = self.b - self.a @ v
-                wrong = np.where(self.active, lam < -1e-12 * force, slack < -1e-12 * np.abs(v).max())
+                length = np.abs(v).max()
+                wrong = np.where(self.active, lam < -1e-12 * force, slack < -1e-12 * length)
                 if not wrong.any():
                     break
                 self.active = self.active ^ wrong
@@ -160,15 +162,17 @@ class Step:
         force, largest = np.random.default_rng(0).standard_normal(len(self.q)), 0.0
         for _ in range(4):
             force /= max(np.linalg.norm(force), np.finfo(float).tiny)
-            v, _ = self._on_active_set(force, np.zeros(self.active.sum()), np.zeros(len(force)))
+            at_rest = np.zeros(len(force))
+            v, _ = self._on_active_set(force, np.zeros(self.active.sum()), at_rest)
             u = without(self.z @ v, self.loose)
             largest, force = max(largest, np.abs(u).max()), self.z.T @ u
         return largest
 
 
 def interior_point(h, q, a, b, force, size):
-    """Near v and its active set of Hv + Aᵀλ = q, s = b − Av ≥ 0, λ ≥ 0, λᵀs = 0 by Mehrotra's predictor and
-    corrector: (H + AᵀDA) dv = …, D = λ/s, in which no pinning loses digits of a thin body."""
+    """About v, and the active set, of Hv + Aᵀλ = q, s = b − Av ≥ 0, λ ≥ 0, λᵀs = 0 by Mehrotra's
+    predictor and corrector: (H + AᵀDA) dv = …, D = λ/s, in which no pinning loses digits of a
+    thin body."""
     m = len(b)
     if m == 0:
         return np.zeros(len(q)), np.zeros(0, bool)
