@@ -132,7 +132,8 @@ class Draw:
             waves = [self.number(-6, 6) / self.length for _ in range(2)]
             initial = f"0.7 + {self.number(0, 0.29)!r}*sin({waves[0]!r}*x + {waves[1]!r}*y)"
         return {"diffusion": self.length**2 * 10 ** self.number(-4, 1),
-                "lambda_d": self.number(0, 0.3), "lambda_u": 10 ** self.number(-2, 0.3) / self.strain**2,
+                "lambda_d": self.number(0, 0.3),
+                "lambda_u": 10 ** self.number(-2, 0.3) / self.strain**2,
                 "lambda_w": float(self.rng.choice([0.0, 0.05])), "strain_cap": 1000.0,
                 "threshold": 0.01, "initial": initial,
                 "mass": str(self.rng.choice(["consistent", "lumped"]))}

@@ -95,9 +95,10 @@ def follow(folder, binary, solver, ranks, tolerance):
     return verdict
 
 
-def one(binary, out, seed, number):
+def one(binary, out, seed, number, solver):
     """Draws, runs and judges scene `number`; keeps its files if it failed."""
     case = draw(seed, number)
+    case.solver = solver or case.solver
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         write_msh(case.mesh, folder / "mesh.msh")
@@ -117,12 +118,13 @@ def one(binary, out, seed, number):
 
 
 def summarise(rows):
-    """Per kind how many of each verdict; then every reason that a refusal or a failure had."""
+    """Per kind, solver and number of ranks how many of each verdict; then every reason that a refusal or a failure had."""
     words = ("right", "right as advised", "imprecise", "either", "refused rightly", "gave up", *BAD)
-    lines = [f"{'':<12}" + "".join(f"{word:>18}" for word in words)]
-    for kind in [*sorted({row["kind"] for row in rows}), "all"]:
-        of = Counter(row["verdict"] for row in rows if kind in ("all", row["kind"]))
-        lines.append(f"{kind:<12}" + "".join(f"{of[word]:>18}" for word in words))
+    lines = [f"{'':<16}" + "".join(f"{word:>18}" for word in words)]
+    for column in ("kind", "solver", "ranks"):
+        for name in sorted({str(row[column]) for row in rows}):
+            of = Counter(row["verdict"] for row in rows if str(row[column]) == name)
+            lines.append(f"{name:<16}" + "".join(f"{of[word]:>18}" for word in words))
     reasons = Counter((row["verdict"], re.sub(" at t = [0-9.e-]+", "", row["reason"]))
                       for row in rows if row["verdict"].startswith("refused"))
     lines += [f"{count:5} {word}: {reason}" for (word, reason), count in reasons.most_common()]
@@ -136,6 +138,7 @@ def main():
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--first", type=int, default=0, help="number of the first scene")
+    parser.add_argument("--solver", help="this one instead of the one drawn")
     parser.add_argument("--binary", type=Path, default=ROOT / "target" / "release" / "signorini")
     parser.add_argument("--out", type=Path, default=ROOT / "out" / "random")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
@@ -152,7 +155,7 @@ def main():
     numbers = range(arguments.first, arguments.first + arguments.count)
     rows = []
     with ProcessPoolExecutor(arguments.jobs) as pool:
-        runs = [pool.submit(one, binary, out, arguments.seed, n) for n in numbers]
+        runs = [pool.submit(one, binary, out, arguments.seed, n, arguments.solver) for n in numbers]
         for done in as_completed(runs):
             rows.append(done.result())
     rows.sort(key=lambda row: int(row["id"].split("-")[1]))
