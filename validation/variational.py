@@ -104,14 +104,17 @@ class Step:
         return worst
 
     def _driven(self):
-        """How much of the load, relative, no contact force λ ≥ 0 balances (Farkas)."""
+        """How much of the load, relative, no contact force λ ≥ 0 balances (Farkas). Forces 1e11
+        times the load do not count: they would live on the rounding of opposite normals."""
         size = max(np.abs(self.q).sum(), np.abs(self.f).sum())
         if size == 0.0 or self.n.shape[1] == 0:
             return 0.0
         left = np.abs(self.free.T @ self.q).max(initial=0.0)
         work = self.n_contact.T @ self.q / size
         if len(work):
-            left = max(left, nnls(self.bn.T, work, maxiter=1000 * len(self.b))[1] * size)
+            rows = np.vstack([self.bn.T, 1e-11 * np.eye(len(self.b))])
+            lam, _ = nnls(rows, np.r_[work, np.zeros(len(self.b))], maxiter=1000 * len(self.b))
+            left = max(left, np.linalg.norm(self.bn.T @ lam - work) * size)
         return left / size
 
     def solve(self):
