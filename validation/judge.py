@@ -166,6 +166,8 @@ def judge_frames(discrete, frames, output):
             return Verdict("wrong", f"t = {frame.time:g}: {reason}")
         step = Step(discrete, frame.zeta, frame.time)
         found, scale = judge_step(step, frame.u, scale)
+        if found.word == "moved":  # by little force: right if the program says that it may be
+            found.word = "right" if "one of many" in output else "wrong"
         found.reason = f"t = {frame.time:g}: {found.reason}"
         if found.word == "right" and (fault := shown(step, frame, scale)):
             found = Verdict("wrong", f"t = {frame.time:g}: {fault}")
@@ -274,9 +276,10 @@ def judge_step(step, u, scale):
     strain = np.sqrt(max(energy, 0.0) / max(whole, np.finfo(float).tiny))
     figures = f"u differs by {by:.1e}, strains by {strain:.1e}"
     allowed = ANSWER * easing
-    if by > allowed and by * length > move or energy > ENERGY**2 * whole + floor:
+    if energy > ENERGY**2 * whole + floor:
         return Verdict("wrong", figures, by), scale
-    return Verdict("imprecise" if by > allowed else "right", figures, by), scale
+    word = "right" if by <= allowed else "imprecise" if by * length <= move else "moved"
+    return Verdict(word, figures, by), scale
 
 
 def message(output):

@@ -62,7 +62,7 @@ def planted():
     faults = {"scaled": 1.001 * exact, "lifted": exact + 1e-5 * up, "through": exact - 1e-5 * up,
               "one node": exact + one, "other gap": pressed("0.02")[1], "zero": 0 * exact}
     for name, u in faults.items():
-        yield f"planted: {name}", float(judge_step(step, u, (0, 0))[0].word != "wrong"), 0.5
+        yield f"planted: {name}", float(judge_step(step, u, (0, 0))[0].word == "right"), 0.5
     yield "exact is right", float(judge_step(step, exact, (0, 0))[0].word != "right"), 0.5
     # Pulled off its foundation: an answer that sticks to it has tensile contact forces.
     pull = [{"name": "north", "displacement": ["0", "0.1"]}, {"name": "south", "gap": "0"}]
