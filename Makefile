@@ -15,13 +15,14 @@ CHART ?= geo/square-mild.toml geo/square-table1.toml
 PACKAGES := petsc-dev libsuitesparse-dev libopenblas0-serial libclang-dev pkg-config gcc gmsh \
     python3-meshio python3-matplotlib
 PACKAGES_VALIDATE := python3-dolfinx-real
+PACKAGES_RANDOM := python3-scipy
 
 BINARY := target/release/signorini
 # rustup puts cargo where a shell opened before does not look.
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
-.PHONY: help deps deps-validate build mesh run figures test validate compare bench stability \
-    reference converge chart clean
+.PHONY: help deps deps-validate deps-random build mesh run figures test validate random compare \
+    bench stability reference converge chart clean
 
 help:
 	@echo 'make mesh && make run   mesh and solve the scenes of geo/, draw their figures into out/'
@@ -33,6 +34,7 @@ help:
 	@echo 'make figures    the figures of every run in out/, again'
 	@echo 'make test       format, lints, documentation, tests'
 	@echo 'make validate   the comparison with FEniCSx (installs it: make deps-validate)'
+	@echo 'make random     a thousand random scenes, judged by code of their own; or ARGS="--count 50 --seed 3"'
 	@echo 'make compare    all contact solvers on all scenes, side by side'
 	@echo 'make bench      speed against FEniCSx, the floor, growth; or ARGS=--quick'
 	@echo 'make stability  the maps of where methods fail; or MAPS="step-size …"'
@@ -46,6 +48,9 @@ deps:
 
 deps-validate: deps
 	@scripts/deps.sh $(PACKAGES_VALIDATE)
+
+deps-random: deps
+	@scripts/deps.sh $(PACKAGES_RANDOM)
 
 build: deps
 	cargo build --release --locked
@@ -75,6 +80,11 @@ validate: build deps-validate
 	$(PYTHON) validation/selfcheck.py
 	$(PYTHON) validation/compare.py --binary $(BINARY) $(addprefix geo/, \
 	    square-mild.toml lshape.toml lshape-rolling.toml beam.toml bridge-half.toml hertz.toml)
+
+# The judge proves itself first; exit code 1 if a scene is judged wrong or wrongly refused.
+random: build deps-random
+	$(PYTHON) validation/judge_check.py
+	$(PYTHON) validation/random_scenes.py --binary $(BINARY) $(ARGS)
 
 # Every solver on every scene: a table on the screen and in out/compare/comparison.csv, and its
 # figure, also where a solver failed (exit code 1); bad input (2) writes no table.

@@ -1,0 +1,268 @@
+"""The discrete problem of a scene, assembled for the judge of `random_scenes.py`.
+
+P1 stiffness, loads, prescribed rows, contact rows and the damage step (28), written from the
+method's description alone (README.md, the paper's sections 2 to 4): nothing here was taken from
+the program, so that a fault of its assembly, bases or constraints shows as a difference.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix, diags
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
+
+from scene import Expression
+
+CORNER = np.pi / 6  # edges further apart meet in a corner
+DAMAGE = {"lambda_w": 0.0, "strain_cap": 1000.0, "threshold": 0.01, "initial": 1.0,
+          "mass": "consistent"}
+
+
+@dataclass
+class Rows:
+    """Conditions d·u = value (or ≤ value), a row each: node, unit direction, value, and of contact
+    rows the tributary length."""
+
+    node: np.ndarray
+    direction: np.ndarray
+    value: np.ndarray
+    weight: np.ndarray
+
+
+class Discrete:
+    """A scene on its triangulation."""
+
+    def __init__(self, scene, mesh):
+        self.scene, self.mesh = scene, mesh
+        x, t = mesh.nodes, mesh.triangles
+        # ∇λ_i of a triangle is its opposite side turned by 90° over twice the area.
+        side = x[np.roll(t, -2, 1)] - x[np.roll(t, -1, 1)]
+        a, b = x[t[:, 1]] - x[t[:, 0]], x[t[:, 2]] - x[t[:, 0]]
+        self.area = 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+        self.gradient = np.stack([-side[..., 1], side[..., 0]], -1) / (2 * self.area)[:, None, None]
+        # (ε_xx, ε_yy, 2ε_xy) = B u_e
+        self.b = np.zeros((len(t), 3, 6))
+        self.b[:, 0, 0::2] = self.b[:, 2, 1::2] = self.gradient[..., 0]
+        self.b[:, 1, 1::2] = self.b[:, 2, 0::2] = self.gradient[..., 1]
+        self.dof = np.stack([2 * t, 2 * t + 1], -1).reshape(-1, 6)
+        self.law = {**DAMAGE, **scene.get("damage", {})}
+        self.d = elasticity(scene["material"])
+        self.element = np.einsum("eki,kl,elj,e->eij", self.b, self.d, self.b, self.area)
+        self.boundaries = scene.get("boundary", [])
+        self.contact = self._contact_rows()
+        self.prescribed = self._prescribed()
+
+    def zeta_mean(self, zeta):
+        """η_*(ζ) is exact at the triangle's mean of the nodal values: ε is constant."""
+        if "damage" in self.scene:
+            zeta = np.clip(zeta, self.law["threshold"], 1.0)
+        return zeta[self.mesh.triangles].mean(1)
+
+    def stiffness(self, zeta):
+        """K(ζ) = Σ ζ̄ |T| Bᵀ D B."""
+        k = self.element * self.zeta_mean(zeta)[:, None, None]
+        rows, columns = (np.broadcast_to(v, k.shape) for v in
+                         (self.dof[:, :, None], self.dof[:, None, :]))
+        n = 2 * len(self.mesh.nodes)
+        return coo_matrix((k.ravel(), (rows.ravel(), columns.ravel())), (n, n)).tocsc()
+
+    def element_sizes(self, zeta, u):
+        """Per unknown Σ_T |f_T| and Σ_T |K_T||u_T|: the scales of forces and of their rounding."""
+        k, v = self.element * self.zeta_mean(zeta)[:, None, None], u[self.dof]
+        force, rounding = np.zeros_like(u), np.zeros_like(u)
+        np.add.at(force, self.dof, np.abs(np.einsum("eij,ej->ei", k, v)))
+        np.add.at(rounding, self.dof, np.einsum("eij,ej->ei", np.abs(k), np.abs(v)))
+        return force, rounding
+
+    def load(self, t):
+        """∫ f_B·v by the edge-midpoint rule and ∫ f_N·v by two Gauss points an edge."""
+        x, tri = self.mesh.nodes, self.mesh.triangles
+        load = np.zeros((len(x), 2))
+        if "body" in self.scene:
+            for k in range(3):
+                p, q = tri[:, k], tri[:, (k + 1) % 3]
+                force = pair(self.scene["body"]["force"], 0.5 * (x[p] + x[q]), t)
+                for node in (p, q):
+                    np.add.at(load, node, force * (self.area / 6)[:, None])
+        for boundary in self.boundaries:
+            if "traction" not in boundary:
+                continue
+            p, q = self.mesh.edges(boundary["name"]).T
+            length = np.linalg.norm(x[q] - x[p], axis=1)[:, None]
+            for s in 0.5 + 0.5 / np.sqrt(3) * np.array([-1, 1]):
+                force = pair(boundary["traction"], x[p] + s * (x[q] - x[p]), t)
+                np.add.at(load, p, 0.5 * length * (1 - s) * force)
+                np.add.at(load, q, 0.5 * length * s * force)
+        return load.ravel()
+
+    def faces(self, name):
+        """Per node of a curve the (normal, length) it sees: the length-weighted mean of the
+        adjacent edges' outward normals, or one for each side of a corner."""
+        edges = self.mesh.edges(name)
+        normals, lengths = self.mesh.outward_normals(name)
+        halves = {}
+        for edge, normal, length in zip(edges, normals, lengths):
+            for node in edge:
+                halves.setdefault(int(node), []).append((normal, 0.5 * length))
+        return {node: merged(parts) for node, parts in halves.items()}
+
+    def _contact_rows(self):
+        """u·ν ≤ g: a fixed normal or those of the faces; where curves meet smoothly one row of
+        the mean normal and the smaller gap."""
+        rows = {}
+        for boundary in self.boundaries:
+            if "gap" not in boundary:
+                continue
+            gap, fixed = Expression(boundary["gap"]), boundary.get("normal")
+            if fixed is not None:
+                fixed = np.array([float(Expression(c)(0.0, 0.0, 0.0)) for c in fixed])
+                fixed = fixed / np.linalg.norm(fixed)
+            for node, faces in self.faces(boundary["name"]).items():
+                g = float(gap.at(self.mesh.nodes[[node]])[0])
+                if fixed is not None:
+                    faces = [(fixed, sum(length for _, length in faces))]
+                rows.setdefault(node, []).extend((n, w, g) for n, w in faces)
+        found = [(node, n, g, w) for node, parts in sorted(rows.items())
+                 for n, w, g in merged_gaps(parts)]
+        return as_rows(found)
+
+    def _prescribed(self):
+        """(node, direction, expression or None for a symmetry's 0)."""
+        rows = []
+        for boundary in self.boundaries:
+            if boundary.get("symmetry"):
+                rows += [(node, n, None) for node, faces in self.faces(boundary["name"]).items()
+                         for n, _ in faces]
+            for axis, text in enumerate(boundary.get("displacement", [])):
+                if str(text).strip() != "free":
+                    value, d = Expression(text), np.eye(2)[axis]
+                    rows += [(int(node), d, value)
+                             for node in np.unique(self.mesh.edges(boundary["name"]))]
+        return rows
+
+    def prescribed_rows(self, t):
+        """The prescribed rows with their values at time t."""
+        value = lambda node, e: 0.0 if e is None else float(e.at(self.mesh.nodes[[node]], t)[0])
+        return as_rows([(node, d, value(node, e)) for node, d, e in self.prescribed])
+
+    def bad_input(self):
+        """A reason why the scene must be refused whatever its loads, or None; then whether a
+        fixed normal points into the body at some of its edges only (either answer will do)."""
+        some = False
+        for boundary in self.boundaries:
+            if "gap" not in boundary:
+                continue
+            gap = Expression(boundary["gap"]).at(
+                self.mesh.nodes[np.unique(self.mesh.edges(boundary["name"]))])
+            size = np.ptp(self.mesh.nodes, axis=0).max()
+            if not np.isfinite(gap).all() or (gap < -1e-9 * size).any():
+                return "gap negative", False
+            if "normal" in boundary:
+                n = np.array([float(Expression(c)(0.0, 0.0, 0.0)) for c in boundary["normal"]])
+                cosine = self.mesh.outward_normals(boundary["name"])[0] @ n / np.linalg.norm(n)
+                if (cosine < -1e-6).all():
+                    return "normal into the body", False
+                some |= bool((cosine < 1e-6).any())
+        return None, some
+
+    def clusters(self):
+        """Of each triangle the number of its piece: triangles hang together by common edges (a
+        common node alone is a hinge)."""
+        t = self.mesh.triangles
+        sides = np.sort(np.vstack([t[:, [k, (k + 1) % 3]] for k in range(3)]), 1)
+        owner = np.tile(np.arange(len(t)), 3)
+        _, edge = np.unique(sides, axis=0, return_inverse=True)
+        order = np.argsort(edge.ravel(), kind="stable")
+        same = np.diff(edge.ravel()[order]) == 0
+        i, j = owner[order][:-1][same], owner[order][1:][same]
+        graph = coo_matrix((np.ones(len(i)), (i, j)), (len(t), len(t)))
+        return connected_components(graph, directed=False)
+
+    def damage_step(self, u, zeta, step):
+        """ζ_n of (28): (M + kκL) ζ_n = M ζ_{n−1} + k b(φ(ε(u_{n−1}), ζ_{n−1})), φ at the three
+        vertices of a triangle and then integrated with the same M; and how much of it may be
+        rounding, where triangles are very thin."""
+        t, law = self.mesh.triangles, self.law
+        strain = np.einsum("eki,ei->ek", self.b, u[self.dof])
+        squared = strain[:, 0] ** 2 + strain[:, 1] ** 2 + 0.5 * strain[:, 2] ** 2
+        psi = np.minimum(squared, law["strain_cap"])[:, None]
+        eta = np.clip(zeta[t], law["threshold"], 1.0)
+        rate = law["lambda_d"] * (1 - eta) / eta + 0.5 * law["lambda_u"] * psi - law["lambda_w"]
+        phi = -np.maximum(rate, 0.0)
+        local = (np.ones((3, 3)) + np.eye(3)) / 12
+        if law["mass"] == "lumped":
+            local = np.eye(3) / 3
+        mass = self.area[:, None, None] * local
+        laplace = np.einsum("eik,ejk,e->eij", self.gradient, self.gradient, self.area)
+        rows, columns = (np.broadcast_to(v, mass.shape).ravel() for v in
+                         (t[:, :, None], t[:, None, :]))
+        n = len(zeta)
+        assemble = lambda v: coo_matrix((v.ravel(), (rows, columns)), (n, n)).tocsc()
+        m, l = assemble(mass), assemble(laplace)
+        right = m @ zeta
+        np.add.at(right, t, step * np.einsum("eij,ej->ei", mass, phi))
+        matrix = m + step * law["diffusion"] * l
+        # Jacobi scaling keeps pieces of very different size apart from rounding.
+        scale = diags(1 / np.sqrt(matrix.diagonal()))
+        factor = splu((scale @ matrix @ scale).tocsc())
+        solution = scale @ factor.solve(scale @ right)
+        signs = np.where(np.arange(n) % 2, 1.0, -1.0)
+        noise = factor.solve(scale @ (2e-15 * signs * (abs(matrix) @ np.abs(solution))))
+        return solution, np.abs(scale @ noise).max()
+
+
+def elasticity(material):
+    """D of plane stress; plane strain by E/(1−ν²) and ν/(1−ν)."""
+    e, nu = float(material["young"]), float(material["poisson"])
+    if material.get("plane", "stress") == "strain":
+        e, nu = e / (1 - nu**2), nu / (1 - nu)
+    shear = 0.5 * (1 - nu)
+    return e / (1 - nu**2) * np.array([[1, nu, 0], [nu, 1, 0], [0, 0, shear]])
+
+
+def pair(texts, points, t):
+    """Two expressions at points, (n, 2)."""
+    return np.stack([Expression(text).at(points, t) for text in texts], -1)
+
+
+def angle(a, b):
+    """The angle between two directions, exact also where it is small."""
+    return np.arctan2(abs(a[0] * b[1] - a[1] * b[0]), a @ b)
+
+
+def merged(parts):
+    """Joins (normal, length) of edges no further apart than a corner."""
+    faces = []
+    for normal, length in parts:
+        for k, (n, w) in enumerate(faces):
+            if angle(n, normal) <= CORNER + 1e-9:
+                mean = w * n + length * normal
+                faces[k] = (mean / np.linalg.norm(mean), w + length)
+                break
+        else:
+            faces.append((normal, length))
+    return faces
+
+
+def merged_gaps(parts):
+    """Joins (normal, length, gap) of curves that meet smoothly: the smaller gap holds."""
+    rows = []
+    for normal, length, gap in parts:
+        for k, (n, w, g) in enumerate(rows):
+            if angle(n, normal) < CORNER:
+                mean = w * n + length * normal
+                rows[k] = (mean / np.linalg.norm(mean), w + length, min(g, gap))
+                break
+        else:
+            rows.append((normal, length, gap))
+    return rows
+
+
+def as_rows(found):
+    """Rows from a list of (node, direction, value[, weight])."""
+    if not found:
+        return Rows(np.zeros(0, int), np.zeros((0, 2)), np.zeros(0), np.zeros(0))
+    node, direction, value, *weight = zip(*found)
+    return Rows(np.array(node), np.array(direction, float), np.array(value, float),
+                np.array(weight[0] if weight else np.ones(len(node))))

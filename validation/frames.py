@@ -1,0 +1,60 @@
+"""The frames that a run of the program wrote, on one rank or several, by the mesh's nodes."""
+
+from dataclasses import dataclass
+from xml.etree import ElementTree
+
+import meshio
+import numpy as np
+
+
+@dataclass
+class Frame:
+    """Time, displacement, ζ, remaining gap and pressure, and by how much pieces of several ranks
+    differ at their common nodes."""
+
+    time: float
+    u: np.ndarray
+    zeta: np.ndarray
+    gap: np.ndarray
+    pressure: np.ndarray
+    apart: float
+
+
+def read_frames(mesh, out):
+    """Every frame written, nodes as in `mesh`; pieces are matched triangle by triangle, as slits
+    have two nodes at one point."""
+    place = {key(mesh.nodes[t]): t for t in mesh.triangles}
+    collection = out / "fields.pvd"
+    if not collection.exists():
+        return []
+    frames = []
+    for entry in ElementTree.parse(collection).iter("DataSet"):
+        pieces = [out / entry.get("file")]
+        if pieces[0].suffix == ".pvtu":
+            pieces = [out / p.get("Source") for p in ElementTree.parse(pieces[0]).iter("Piece")]
+        values, apart, seen = np.full((len(mesh.nodes), 5), np.nan), 0.0, 0
+        for data in map(meshio.read, pieces):
+            names = ("displacement", "zeta", "gap", "normal_pressure")
+            field = np.column_stack([data.point_data[name] for name in names])[:, [0, 1, 3, 4, 5]]
+            for cell in np.vstack([block.data for block in data.cells]):
+                nodes = place[key(data.points[cell, :2])]
+                # Both lists in the order of their points.
+                a, b = (order(points) for points in (mesh.nodes[nodes], data.points[cell, :2]))
+                old, new = values[nodes[a]], field[cell[b]]
+                apart = max(apart, np.nanmax(np.abs(old - new), initial=0.0))
+                values[nodes[a]] = new
+                seen += 1
+        values[:] = values if seen == len(mesh.triangles) else np.nan
+        u, (zeta, gap, pressure) = values[:, :2].ravel(), values[:, 2:].T
+        frames.append(Frame(float(entry.get("timestep")), u, zeta, gap, pressure, apart))
+    return frames
+
+
+def key(points):
+    """A triangle by the coordinates of its corners."""
+    return tuple(map(tuple, (points[order(points)] + 0.0).tolist()))
+
+
+def order(points):
+    """Corners sorted by their coordinates."""
+    return np.lexsort((points[:, 1], points[:, 0]))

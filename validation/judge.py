@@ -1,0 +1,289 @@
+"""Judges what a run of the program wrote: right, refused (rightly or not), wrong.
+
+Two tests, of which the first needs no other answer: (i) the displacement written keeps the contact
+rows and the prescribed values, and at every node Ku − f is a force that they may exert: zero where
+there are none, in the cone of the touching normals elsewhere; (ii) it is the judge's own answer, in
+the largest displacement and in the energy, up to motions that the problem leaves open. The damage
+written obeys (28) from the frame before.
+"""
+
+import json
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import nnls
+
+from discrete import Discrete
+from frames import read_frames
+from scene import Expression, read_scene
+from triangulation import read_triangulation
+from variational import Step, along, without
+
+FORCE = 1e-8  # residual forces, relative to the largest sum of absolute element forces at a node
+PLACE = 1e-8  # violations of gaps, relative to the largest displacement
+TOUCH = 1e-6  # a gap that small, relative to it, may carry a force: u is exact to that
+ANSWER = 1e-6  # displacements, relative
+ENERGY = 1e-4  # strains in the energy norm, relative
+HISTORY = 1e-9  # of the largest force and displacement so far: a load may cross zero
+TOLERANCE = 1e-10  # KKT tolerance of a run; all above but ENERGY are for this and grow with it
+DAMAGE = 1e-8
+
+
+@dataclass
+class Verdict:
+    """A word; why; the largest relative difference of u found. `right`; `refused rightly`;
+    `either`: refusing is as good; `gave up`: a solver failed on a scene that has no solution;
+    `imprecise`: off by what the residuals allow, untold; `refused wrongly`; `wrong`."""
+
+    word: str
+    reason: str
+    difference: float = 0.0
+    traits: str = ""
+
+
+def judge(folder, code, output):
+    """The verdict on a run of folder/scene.toml into folder/out with an exit code and output."""
+    scene = read_scene(folder / "scene.toml")
+    discrete = Discrete(scene, read_triangulation(folder / scene["mesh"]["file"]))
+    verdict = verdict_on(discrete, folder / "out", code, output)
+    verdict.traits = traits(discrete)
+    return verdict
+
+
+def verdict_on(discrete, out, code, output):
+    """First by the exit code against what the data ask for, then by the frames."""
+    refusal, either = expectation(discrete)
+    said = message(output)
+    if code == 2:
+        if either:
+            return Verdict("either", said)
+        return Verdict("refused rightly" if refusal else "refused wrongly", refusal or said)
+    if code not in (0, 1):
+        return Verdict("wrong", f"exit code {code}: {said}")
+    if refusal and not either:
+        word = "gave up" if code == 1 else "wrong"
+        return Verdict(word, f"should be refused ({refusal}), exit code {code}")
+    frames = read_frames(discrete.mesh, out)
+    if not frames and code == 0:
+        return Verdict("wrong", "no frames")
+    found = judge_frames(discrete, frames, output)
+    if found.word == "wrong":
+        return found
+    if code == 1:
+        return Verdict("refused wrongly", said + missed(discrete, frames))
+    return judge_stop(discrete, frames, out) or found
+
+
+def missed(discrete, frames):
+    """What is known of the step that a solver failed at: whether rounding alone explains it."""
+    damaged = "damage" in discrete.scene
+    if frames:
+        last = frames[-1]
+        zeta, later = last.zeta, [t for t in times(discrete.scene) if t > last.time * (1 + 1e-9)]
+        if not later:
+            return ""
+        if damaged:
+            zeta, _ = discrete.damage_step(last.u, zeta, later[0] - last.time)
+    else:
+        later, zeta = times(discrete.scene), initial(discrete)
+    step = Step(discrete, zeta, later[0])
+    own = step.solve()
+    forces, places, (force, _) = residuals(step, own)
+    if forces > FORCE or places > PLACE:
+        return " (nor has the judge a good answer)"
+    level = 1e-16 * discrete.element_sizes(zeta, own)[1].max() / force
+    return " (rounding alone is near the tolerance)" if level > 0.01 * TOLERANCE else ""
+
+
+def times(scene):
+    """The times of the contact steps."""
+    if "time" not in scene:
+        return [1.0]
+    end, step = (float(scene["time"][key]) for key in ("end", "step"))
+    count = round(end / step)
+    return [end * n / count for n in range(count + 1)]
+
+
+def initial(discrete):
+    """ζ₀ at the nodes."""
+    damaged = "damage" in discrete.scene
+    return Expression(discrete.law["initial"] if damaged else 1.0).at(discrete.mesh.nodes)
+
+
+def traits(discrete):
+    """What is unusual about a scene, in words to count by."""
+    rows, words = discrete.contact, []
+    held = {node for node, _, _ in discrete.prescribed}
+    for node in np.unique(rows.node):
+        n = rows.direction[rows.node == node]
+        if len(n) > 1 and node not in held:
+            words.append("opposite" if (n @ n.T).min() < -0.99 else "corner")
+        if len(n) > 2 or len(n) > 1 and node in held:
+            words.append("many rows")
+    if discrete.clusters()[0] > 1:
+        words.append("pieces")
+    if "time" not in discrete.scene and "t" in re.findall(r"\b[a-z]+\b", str(discrete.scene)):
+        words.append("static with t")
+    return " ".join(sorted(set(words)))
+
+
+def expectation(discrete):
+    """(reason to refuse the scene or None, whether either will do): by data and by the ranks."""
+    reason, either = discrete.bad_input()
+    if reason:
+        return reason, False
+    zeta = np.ones(len(discrete.mesh.nodes))
+    worst = None
+    for t in times(discrete.scene):
+        step = Step(discrete, zeta, t)
+        size = np.abs(step.held.value).max(initial=0.0)
+        for name, value, low, high in (
+            ("prescribed values contradict", step.contradiction, 1e-11 * size, 1e-7 * size),
+            ("prescribed through the obstacle", step.penetration, 1e-13 * size, 1e-9 * size),
+            ("driven", step.driven, 1e-11, 1e-7),
+        ):
+            if value > high:
+                return f"{name} at t = {t:g}", either
+            if value > low:
+                worst, either = f"{name}, barely", True
+    return worst, either
+
+
+def judge_frames(discrete, frames, output):
+    """Every frame written: the damage step, then the contact step."""
+    worst, scale, before = Verdict("right", ""), (0.0, 0.0), None
+    damaged = "damage" in discrete.scene
+    start = initial(discrete)
+    for frame in frames:
+        expected, allowed = start if before is None else before.zeta, DAMAGE
+        if before is not None and damaged:
+            expected, unsure = discrete.damage_step(before.u, before.zeta, frame.time - before.time)
+            allowed += unsure
+        off = np.abs(frame.zeta - expected).max()
+        if not np.isfinite(frame.u).all() or not off <= allowed or frame.apart:
+            reason = f"ζ differs by {off:.1e}, ranks by {frame.apart:.1e}, or values are missing"
+            return Verdict("wrong", f"t = {frame.time:g}: {reason}")
+        step = Step(discrete, frame.zeta, frame.time)
+        found, scale = judge_step(step, frame.u, scale)
+        if found.word == "moved":  # by little force: right if the program says that it may be
+            found.word = "right" if "one of many" in output else "wrong"
+        found.reason = f"t = {frame.time:g}: {found.reason}"
+        if found.word == "right" and (fault := shown(step, frame, scale)):
+            found = Verdict("wrong", f"t = {frame.time:g}: {fault}")
+        if found.word == "wrong":
+            return found
+        if found.word == "imprecise" or found.difference > worst.difference:
+            worst = found
+        before = frame
+    told = re.search(r"exact only|cannot be estimated|one of many", output)
+    if worst.word == "imprecise" and told:
+        worst.word = "right"
+    return worst
+
+
+def shown(step, frame, scale):
+    """What is wrong with the gap and the pressure written: g − u·ν, the least of a node's rows, and
+    the nodal reaction over the tributary length, where a node has one row and is not held."""
+    rows, (force, length) = step.rows, scale
+    slack = np.full(len(frame.gap), np.inf)
+    np.minimum.at(slack, rows.node, rows.value - along(rows, frame.u))
+    seen = np.isfinite(frame.gap)
+    if (np.abs(frame.gap - slack)[seen] > PLACE * length + 1e-15 * slack[seen]).any():
+        return "the gap field is not what the displacement leaves"
+    single = np.bincount(rows.node, minlength=len(seen)) == 1
+    single[step.held.node] = False
+    if not seen[single].all():
+        return "the gap field lacks a node of Γ_C"
+    reaction = along(rows, step.f - step.k @ frame.u)
+    rounding = step.discrete.element_sizes(step.zeta, frame.u)[1].reshape(-1, 2).sum(1)
+    off = np.abs(frame.pressure[rows.node] * rows.weight - reaction) - 1e-14 * rounding[rows.node]
+    if (off[single[rows.node]] > FORCE * ease(step.discrete) * force).any():
+        return "the pressure field is not the nodal reaction over its length"
+    off_contact = np.setdiff1d(np.arange(len(seen)), rows.node)
+    if frame.pressure[off_contact].any() or seen[off_contact].any():
+        return "pressure or gap off Γ_C"
+    return ""
+
+
+def judge_stop(discrete, frames, out):
+    """A stop at ζ_* must be one; None if it is, or there is none."""
+    stopped = json.loads((out / "summary.json").read_text()).get("stopped_at")
+    if stopped is None:
+        return None
+    last = frames[-1]
+    zeta, unsure = discrete.damage_step(last.u, last.zeta, stopped - last.time)
+    least = zeta.min()
+    if least <= discrete.law["threshold"] + DAMAGE + unsure:
+        return None
+    return Verdict("wrong", f"stopped at ζ_* at t = {stopped:g}, but min ζ = {least:.3e}")
+
+
+def ease(discrete):
+    """By how much a scene's KKT tolerance is larger than the usual one."""
+    return discrete.scene.get("contact", {}).get("tolerance", TOLERANCE) / TOLERANCE
+
+
+def residuals(step, u, scale=(0.0, 0.0)):
+    """(forces, places): test (i), relative; and the scales (force, length) it used."""
+    sizes, rounding = step.discrete.element_sizes(step.zeta, u)
+    force = max((sizes + np.abs(step.f)).max(), HISTORY / FORCE * scale[0])
+    length = max(np.abs(u).max(), HISTORY / PLACE * scale[1])
+    easing = ease(step.discrete)
+    slack = step.rows.value - along(step.rows, u)
+    places = np.r_[-slack, np.abs(along(step.held, u) - step.held.value), 0.0].max()
+    force, length = force or 1.0, length or 1.0
+    reaction = (step.f - step.k @ u).reshape(-1, 2)
+    off = np.linalg.norm(reaction, axis=1)
+    touching = slack <= TOUCH * easing * length
+    for node in np.unique(np.r_[step.rows.node[touching], step.held.node]):
+        d = step.held.direction[step.held.node == node]
+        normals = step.rows.direction[(step.rows.node == node) & touching]
+        off[node] = force * nnls(np.vstack([normals, d, -d]).T, reaction[node] / force)[1]
+    # Element forces of a large rigid motion are rounding; where a prescribed displacement carries
+    # the body along, the scale of forces is what it would take alone.
+    alone = np.abs(step.k @ step.lift).max()
+    carried = 10 * TOLERANCE * easing * alone
+    off = np.maximum(off - 1e-14 * rounding.reshape(-1, 2).sum(1) - carried, 0.0)
+    return off.max() / force / easing, places / length / easing, (max(force, 0.1 * alone), length)
+
+
+def judge_step(step, u, scale):
+    """The verdict on u, and the largest (force, length) so far."""
+    forces, places, size = residuals(step, u, scale)
+    scale = max(scale[0], size[0]), max(scale[1], size[1])
+    if forces > FORCE or places > PLACE:
+        return Verdict("wrong", f"forces off by {forces:.1e}, gaps by {places:.1e}"), scale
+    own = step.solve()
+    own_forces, own_places, _ = residuals(step, own, scale)
+    if own_forces > FORCE or own_places > PLACE:
+        return Verdict("right", "the judge's own answer is not good enough to compare"), scale
+    length = max(np.abs(own).max(), np.abs(u).max(), HISTORY / ANSWER * scale[1])
+    if length == 0.0:
+        return Verdict("right", ""), scale
+    apart = without(u - own, step.loose)
+    by = np.abs(apart).max() / length
+    # ‖Ku − f‖₂ may be the tolerance times ‖f‖₂: what that moves, twice.
+    norm = np.linalg.norm(step.discrete.element_sizes(step.zeta, own)[0]) + np.linalg.norm(step.f)
+    norm = max(norm, HISTORY * scale[0], np.linalg.norm(step.k @ step.lift))
+    easing = ease(step.discrete)
+    rounding = step.discrete.element_sizes(step.zeta, np.abs(u) + np.abs(own))[1]
+    unsure = 2 * TOLERANCE * easing * norm + 1e-15 * np.linalg.norm(rounding)
+    move = unsure * step.sensitivity()
+    energy, whole = apart @ (step.k @ apart), own @ (step.k @ own)
+    floor = 1e-14 * ((np.abs(u) + np.abs(own)) @ rounding) + TOLERANCE * easing * norm * move
+    floor += HISTORY**2 * scale[0] * scale[1]
+    strain = np.sqrt(max(energy, 0.0) / max(whole, np.finfo(float).tiny))
+    figures = f"u differs by {by:.1e}, strains by {strain:.1e}"
+    allowed = ANSWER * easing
+    if energy > ENERGY**2 * whole + floor:
+        return Verdict("wrong", figures, by), scale
+    word = "right" if by <= allowed else "imprecise" if by * length <= move else "moved"
+    return Verdict(word, figures, by), scale
+
+
+def message(output):
+    """The error of a run without its numbers, so that like errors count together."""
+    lines = [line for line in output.splitlines() if line.startswith("error:")] or ["no error"]
+    text = re.sub(r"[-+]?\d[\d.e+-]*", "#", lines[0].replace("scene.toml: ", ""))
+    return re.sub(r" \(# times it\)| #(?=,|$)", "", text)[:160]

@@ -1,0 +1,153 @@
+"""Checks the judge itself, without the program: exact answers pass, planted faults do not.
+
+Run: /usr/bin/python3 validation/judge_check.py
+"""
+
+import sys
+
+import numpy as np
+
+import random_bodies as bodies
+from discrete import Discrete
+from judge import expectation, judge_step, residuals
+from variational import Step, along
+
+SCENE = {"material": {"young": 80.0, "poisson": 0.3}}
+
+
+def square(turn=0.0):
+    """The unit square with its sides, turned."""
+    rng = np.random.default_rng(5)
+    points, node, triangles = bodies.grid(rng, 8, 8, lambda s, t: (s, t))
+    return bodies.finish(rng, (points, triangles, bodies.sides(node)), 1.0, turn)
+
+
+def step_of(mesh, boundary, t=1.0, **more):
+    """A contact step of a scene on a mesh, undamaged."""
+    discrete = Discrete({**SCENE, "boundary": boundary, **more}, mesh)
+    return Step(discrete, np.ones(len(mesh.nodes)), t)
+
+
+def pressed(gap="0.01"):
+    """A square under pressure 3, held by a symmetry axis and contact, and its exact answer
+    u_y = −p y/E − g, u_x = νp x/E."""
+    mesh = square()
+    step = step_of(mesh, [{"name": "west", "symmetry": True}, {"name": "south", "gap": gap},
+                          {"name": "north", "traction": ["0", "-3"]}])
+    x, y = mesh.nodes.T
+    return step, np.stack((0.3 * 3 / 80 * x, -3 / 80 * y - float(gap)), 1).ravel()
+
+
+def patch_test():
+    """The exact field keeps every condition and is the judge's own answer, also turned."""
+    step, exact = pressed()
+    yield "patch test: residuals of the exact field", max(residuals(step, exact)[:2]), 1e-14
+    yield "patch test: own answer", np.abs(step.solve() - exact).max(), 1e-14
+    mesh = square(0.7)
+    direction = [repr(float(3 * c)) for c in -mesh.outward_normals("north")[0].mean(0)]
+    step = step_of(mesh, [{"name": "west", "symmetry": True}, {"name": "south", "gap": "0"},
+                          {"name": "north", "traction": direction}])
+    own = step.solve()
+    yield "patch test, turned: residuals", max(residuals(step, own)[:2]), 1e-13
+
+
+def planted():
+    """What is not the answer is called wrong: scaled, lifted, through the obstacle, glued, one node
+    off by 1e-5 of the answer, the answer of another gap."""
+    step, exact = pressed()
+    x = step.discrete.mesh.nodes
+    one = np.zeros_like(exact)
+    one[2 * int(np.argmin(np.hypot(*(x - 0.5).T)))] = 1e-5 * np.abs(exact).max()
+    up = np.tile([0.0, 1.0], len(x))
+    faults = {"scaled": 1.001 * exact, "lifted": exact + 1e-5 * up, "through": exact - 1e-5 * up,
+              "one node": exact + one, "other gap": pressed("0.02")[1], "zero": 0 * exact}
+    for name, u in faults.items():
+        yield f"planted: {name}", float(judge_step(step, u, (0, 0))[0].word == "right"), 0.5
+    yield "exact is right", float(judge_step(step, exact, (0, 0))[0].word != "right"), 0.5
+    # Pulled off its foundation: an answer that sticks to it has tensile contact forces.
+    pull = [{"name": "north", "displacement": ["0", "0.1"]}, {"name": "south", "gap": "0"}]
+    free = step_of(square(), pull)
+    glued = step_of(square(), [pull[0], {"name": "south", "displacement": ["free", "0"]}])
+    yield "glued is wrong", float(judge_step(free, glued.solve(), (0, 0))[0].word != "wrong"), 0.5
+
+
+def opposite():
+    """A tip between two plates with gaps of 0.001: the triangle (0,0), (2,∓0.4) clamped at its
+    end. Both rows hold, and the force of the touching plate is a pressure."""
+    rng = np.random.default_rng(3)
+    shape = lambda s, t: (2 * s, 0.4 * s * (2 * t - 1))
+    points, node, triangles = bodies.grid(rng, 10, 4, shape)
+    triangles = np.where(np.isin(triangles, node[0]), node[0, 0], triangles)
+    triangles = triangles[[len(set(t)) == 3 for t in triangles.tolist()]]
+    lines = {"lower": bodies.chain(np.r_[node[0, 0], node[1:, 0]]), "end": bodies.chain(node[-1]),
+             "upper": bodies.chain(np.r_[node[0, 0], node[1:, -1]])}
+    mesh = bodies.finish(rng, (points, triangles, lines), 1.0, 0.0)
+    plates = [{"name": "end", "displacement": ["0", "0"]},
+              {"name": "lower", "gap": "0.001", "normal": ["0", "-1"]},
+              {"name": "upper", "gap": "0.001", "normal": ["0", "1"]}]
+    material = {"young": 1.0, "poisson": 0.3}
+    step = step_of(mesh, plates, material=material, body={"force": ["0.01", "0.003"]})
+    own = step.solve()
+    yield "wedge between plates: residuals", max(residuals(step, own)[:2]), 1e-12
+    yield "wedge: the upper plate holds", abs((along(step.rows, own) - 0.001).max()), 1e-15
+    large = np.linalg.norm(own.reshape(-1, 2), axis=1).max()
+    yield "wedge: largest displacement near 9.9e-3", abs(large - 9.9e-3), 1e-3
+
+
+def ranks():
+    """Rigid motions by pieces and hinges; loads that contact can and cannot balance."""
+    corner = {"name": "south", "gap": "0"}
+    mesh = square()
+    yield "a free square has 3 motions", abs(step_of(mesh, [corner]).n.shape[1] - 3.0), 0.0
+    # Two triangles with a common node: 3 + 3 motions, two of them tied.
+    two = bodies.Triangulation(
+        np.array([[0, 0], [1, -1], [1, 1], [-1, 1], [-1, -1]], float),
+        np.array([[0, 1, 2], [0, 3, 4]]), {"south": np.array([[1, 2]])})
+    yield "a hinge leaves 4 motions", abs(step_of(two, [corner]).n.shape[1] - 4.0), 0.0
+    for name, force, driven in (("down", "-1", 0.0), ("up", "1", 1.0)):
+        step = step_of(mesh, [corner], body={"force": ["0", force]})
+        yield f"pushed {name}: driven or not", abs((step.driven > 1e-7) - driven), 0.0
+    scene = {**SCENE, "boundary": [corner], "body": {"force": ["0", "1-2*t"]}}
+    refused = expectation(Discrete(scene, mesh))[0] is not None
+    yield "only the time of the solve counts", float(refused), 0.0
+    yield "one motion is left loose", abs(loose(mesh, corner) - 1.0), 0.0
+
+
+def loose(mesh, corner):
+    """How many motions an answer leaves open: sliding, on a flat foundation."""
+    step = step_of(mesh, [corner], body={"force": ["0", "-1"]})
+    step.solve()
+    return step.loose.shape[1]
+
+
+def damage():
+    """Uniform strain: ζ obeys the scalar Euler recursion; without a source ∫ζ is conserved."""
+    step, exact = pressed()
+    law = {"diffusion": 0.5, "lambda_d": 0.1, "lambda_u": 20.0}
+    discrete = Discrete({**step.discrete.scene, "damage": law}, step.discrete.mesh)
+    zeta = np.full(len(discrete.mesh.nodes), 0.8)
+    squared = (3 / 80) ** 2 * (1 + 0.3**2)
+    exact_zeta = 0.8 - 0.1 * (0.1 * 0.2 / 0.8 + 10.0 * squared)
+    found, _ = discrete.damage_step(exact, zeta, 0.1)
+    yield "uniform damage", np.abs(found - exact_zeta).max(), 1e-14
+    law["lambda_d"] = law["lambda_u"] = 0.0
+    for law["mass"] in ("consistent", "lumped"):
+        discrete = Discrete({**step.discrete.scene, "damage": law}, step.discrete.mesh)
+        zeta = 0.5 + 0.4 * discrete.mesh.nodes[:, 0] ** 2
+        mean = lambda z: (z[discrete.mesh.triangles].mean(1) * discrete.area).sum()
+        lost = mean(discrete.damage_step(0 * exact, zeta, 0.1)[0]) - mean(zeta)
+        yield f"no source: ∫ζ stays, {law['mass']}", abs(lost), 1e-14
+
+
+def main():
+    failed = 0
+    for check in (patch_test, planted, opposite, ranks, damage):
+        for name, error, tolerance in check():
+            good = error <= tolerance
+            failed += not good
+            print(f"{name:<42} {error:9.1e} ≤ {tolerance:.0e}  {'ok' if good else 'FAILED'}")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,196 @@
+"""Random bodies for `random_scenes.py`: triangulated blocks, wedges, discs, arches, slit blocks,
+bodies cut from a grid of cells (corners, holes, pinches) and several of them together.
+
+A body is a `Triangulation` whose curves are its sides. Nodes and triangles are numbered at random,
+so that nothing may rest on their order.
+"""
+
+import numpy as np
+
+from triangulation import Triangulation, edge_keys
+
+
+def grid(rng, nx, ny, point):
+    """nx × ny cells of two triangles, mapped by point(s, t) from the unit square; a cell's diagonal
+    is drawn. Returns (points, node[i, j], triangles)."""
+    node = np.arange((nx + 1) * (ny + 1)).reshape(nx + 1, ny + 1)
+    s, t = np.meshgrid(np.arange(nx + 1) / nx, np.arange(ny + 1) / ny, indexing="ij")
+    # Inner nodes are moved a little: no two triangles need be alike.
+    shift = 0.2 * rng.uniform(-1, 1, (2, nx + 1, ny + 1))
+    shift[:, [0, -1]] = shift[:, :, [0, -1]] = 0.0
+    points = np.stack(point(s + shift[0] / nx, t + shift[1] / ny), -1).reshape(-1, 2)
+    triangles = []
+    for i in range(nx):
+        for j in range(ny):
+            a, b, c, d = node[i, j], node[i + 1, j], node[i + 1, j + 1], node[i, j + 1]
+            triangles += [(a, b, c), (a, c, d)] if rng.random() < 0.5 else [(a, b, d), (b, c, d)]
+    return points, node, np.array(triangles)
+
+
+def chain(nodes):
+    """Edges along a list of nodes."""
+    return np.stack((nodes[:-1], nodes[1:]), 1)
+
+
+def sides(node):
+    """The four sides of a grid."""
+    return {"south": chain(node[:, 0]), "east": chain(node[-1]), "north": chain(node[:, -1]),
+            "west": chain(node[0])}
+
+
+def block(rng, n=None):
+    """A rectangle, sheared or with a curved foot; sides south, east, north, west."""
+    aspect = 10 ** rng.uniform(-0.8, 0.8)
+    nx = int(rng.integers(4, 14)) if n is None else n
+    ny = int(np.clip(round(nx / aspect), 2, 20))
+    shear = rng.choice([0, rng.uniform(-0.5, 0.5)])
+    bulge = rng.choice([0, rng.uniform(-0.15, 0.15)])
+
+    def point(s, t):
+        y = t / aspect + bulge * 4 * s * (1 - s) * (1 - t)
+        return s + shear * y, y
+
+    points, node, triangles = grid(rng, nx, ny, point)
+    return points, triangles, sides(node)
+
+
+def wedge(rng):
+    """A triangle with its tip at the origin, from 1e-3 to 60 degrees; sides lower, end, upper."""
+    half = 0.5 * np.radians(rng.choice([10 ** rng.uniform(-3, 0), rng.uniform(1, 60)]))
+    nr, na = int(rng.integers(5, 20)), int(rng.integers(1, 6))
+    points, node, triangles = grid(
+        rng, nr, na, lambda s, t: (s * np.cos(half * (2 * t - 1)), s * np.sin(half * (2 * t - 1))))
+    tip = node[0, 0]
+    triangles = np.where(np.isin(triangles, node[0]), tip, triangles)
+    triangles = triangles[[len(set(t)) == 3 for t in triangles.tolist()]]
+    lines = sides(node)
+    lower, upper = (np.where(np.isin(lines[k], node[0]), tip, lines[k]) for k in ("south", "north"))
+    return points, triangles, {"lower": lower, "end": lines["east"], "upper": upper}
+
+
+def disc(rng):
+    """A disc, its rim in three arcs (south, east, west, of which south is centred below)."""
+    n, rings = int(rng.integers(15, 48)), int(rng.integers(2, 7))
+    start = -0.5 * np.pi - rng.uniform(0.3, 1.2)
+    turn = lambda s: start + 2 * np.pi * s
+    points, node, triangles = grid(
+        rng, n, rings, lambda s, t: (t * np.cos(turn(s)), t * np.sin(turn(s))))
+    triangles = np.where(np.isin(triangles, node[:, 0]), node[0, 0], triangles)
+    for j in range(rings + 1):
+        triangles[triangles == node[-1, j]] = node[0, j]
+    triangles = triangles[[len(set(t)) == 3 for t in triangles.tolist()]]
+    rim = np.r_[node[:-1, -1], node[0, -1]]
+    cut = max(2, round(n * 2 * (-0.5 * np.pi - start) / (2 * np.pi)))
+    middle = int(rng.integers(cut + 1, n))
+    parts = {"south": rim[:cut + 1], "east": rim[cut:middle + 1], "west": rim[middle:]}
+    return points, triangles, {name: chain(part) for name, part in parts.items()}
+
+
+def arch(rng):
+    """A half ring standing on two feet: sides inner, right, outer, left."""
+    inner, span = rng.uniform(0.3, 0.8), rng.uniform(0.5, 1.0) * np.pi
+    n, m = int(rng.integers(10, 30)), int(rng.integers(2, 6))
+    first = 0.5 * (np.pi - span)
+
+    def point(s, t):
+        r, a = inner + (1 - inner) * t, first + span * (1 - s)
+        return r * np.cos(a), r * np.sin(a)
+
+    points, node, triangles = grid(rng, n, m, point)
+    lines = sides(node)
+    return points, triangles, {"inner": lines["south"], "right": lines["east"],
+                               "outer": lines["north"], "left": lines["west"]}
+
+
+def slit(rng):
+    """A block cut from the west side (or within): the nodes of the cut are doubled, its tips are
+    not. Sides as of a block, and lips lower and upper."""
+    nx, ny = int(rng.integers(5, 14)), 2 * int(rng.integers(2, 6))
+    height = 10 ** rng.uniform(-0.5, 0.3)
+    points, node, triangles = grid(rng, nx, ny, lambda s, t: (s, height * (t - 0.5)))
+    points[node[:, ny // 2], 1] = 0.0
+    last = int(rng.integers(3, nx))
+    first = 0 if rng.random() < 0.6 else int(rng.integers(1, last - 1))
+    inner = node[first if first == 0 else first + 1:last, ny // 2]
+    twin = np.arange(len(points))
+    twin[inner] = len(points) + np.arange(len(inner))
+    points = np.vstack([points, points[inner]])
+    above = points[triangles, 1].mean(1) > 0
+    triangles[above] = twin[triangles[above]]
+    lines = sides(node)
+    cut = chain(node[first:last + 1, ny // 2])
+    lines["lip_low"], lines["lip_high"] = cut, twin[cut]
+    west = lines["west"]
+    above = points[west, 1].mean(1) > 0
+    west[above] = twin[west[above]]
+    return points, triangles, lines
+
+
+def cells(rng):
+    """Cells of a grid, some left out: re-entrant corners, holes, and parts that hang together by a
+    common node. Its sides are named by the directions they face, and split by chance."""
+    shape = rng.integers(2, 5, 2)
+    keep = rng.random(shape) < 0.75
+    keep[tuple(rng.integers(0, shape))] = True
+    r = int(rng.integers(2, 5))
+    nx, ny = shape * r
+    tilt = rng.choice([0, rng.uniform(-0.4, 0.4)])
+    points, _, triangles = grid(rng, nx, ny, lambda s, t: (s * shape[0] + tilt * t, t * shape[1]))
+    cell = np.stack(np.divmod(np.arange(nx * ny), ny), 1) // r
+    triangles = triangles[np.repeat(keep[cell[:, 0], cell[:, 1]], 2)]
+    pairs = np.vstack([triangles[:, [k, (k + 1) % 3]] for k in range(3)])
+    keys = edge_keys(pairs, len(points))
+    _, first, count = np.unique(keys, return_index=True, return_counts=True)
+    edges = pairs[first[count == 1]]
+    d = points[edges[:, 1]] - points[edges[:, 0]]
+    facing = np.round(2 / np.pi * np.arctan2(-d[:, 0], d[:, 1])).astype(int) % 4
+    split = points[edges].mean(1) @ rng.uniform(-1, 1, 2) > rng.uniform(-1, 1)
+    lines = {}
+    for k, name in enumerate(("east", "north", "west", "south")):
+        lines[name] = edges[(facing == k) & split]
+        lines[f"{name}2"] = edges[(facing == k) & ~split]
+    return points, triangles, {name: part for name, part in lines.items() if len(part)}
+
+
+def several(rng):
+    """Two or three bodies beside each other; their sides carry the number of the body."""
+    points, triangles, lines, x = np.zeros((0, 2)), np.zeros((0, 3), int), {}, 0.0
+    for k in range(int(rng.integers(2, 4))):
+        p, t, l = [block, disc, wedge][int(rng.integers(3))](rng)
+        p = p * 10 ** rng.uniform(-0.5, 0.5)
+        p[:, 0] += x - p[:, 0].min()
+        x = p[:, 0].max() + 0.3
+        lines.update({f"{name}_{k}": edges + len(points) for name, edges in l.items()})
+        points, triangles = np.vstack([points, p]), np.vstack([triangles, t + len(points)])
+    return points, triangles, lines
+
+
+def finish(rng, body, length, turn):
+    """The body in its own size, turned, without unused nodes, numbered at random."""
+    points, triangles, lines = body
+    used = np.unique(triangles)
+    number = np.full(len(points), -1)
+    number[used] = rng.permutation(len(used))
+    c, s = np.cos(turn), np.sin(turn)
+    nodes = np.empty((len(used), 2))
+    nodes[number[used]] = length * points[used] @ np.array([[c, s], [-s, c]])
+    triangles = number[triangles][rng.permutation(len(triangles))]
+    a, b = (nodes[triangles[:, k]] - nodes[triangles[:, 0]] for k in (1, 2))
+    clockwise = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0] < 0
+    triangles[clockwise] = triangles[clockwise][:, [0, 2, 1]]
+    return Triangulation(nodes, triangles, {name: number[edges] for name, edges in lines.items()})
+
+
+def write_msh(mesh, path):
+    """MSH 2.2, text: numbers as Python prints them, which reads back exactly."""
+    lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat"]
+    lines += ["$PhysicalNames", str(len(mesh.curves) + 1)]
+    lines += [f'1 {k} "{name}"' for k, name in enumerate(mesh.curves, 2)] + ['2 1 "body"']
+    lines += ["$EndPhysicalNames", "$Nodes", str(len(mesh.nodes))]
+    lines += [f"{i} {x!r} {y!r} 0" for i, (x, y) in enumerate(mesh.nodes.tolist(), 1)]
+    elements = [f"1 2 {k} {k} {a + 1} {b + 1}" for k, edges in enumerate(mesh.curves.values(), 2)
+                for a, b in edges]
+    elements += [f"2 2 1 1 {a + 1} {b + 1} {c + 1}" for a, b, c in mesh.triangles]
+    lines += ["$EndNodes", "$Elements", str(len(elements))]
+    lines += [f"{i} {element}" for i, element in enumerate(elements, 1)]
+    path.write_text("\n".join([*lines, "$EndElements", ""]), encoding="utf-8")

@@ -1,0 +1,171 @@
+#!/usr/bin/python3
+"""Judges the program on random scenes: random_scenes.py [--count N] [--seed S] [--binary FILE]
+
+Each scene (`random_draw`) is run with a drawn solver on one to three ranks, and its answer judged
+by code that shares nothing with the program (`judge`). Writes out/random/scenes.csv; scenes judged
+wrong or wrongly refused are kept in out/random/failures/ID with what was run, and make the exit
+code 1. `--again ID` runs a kept one once more; `--check` tries the judge itself (`judge_check`).
+"""
+
+import argparse
+import csv
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+
+# The judge's matrices are small: threads would only wait for each other.
+os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", SCOTCH_PTHREAD_NUMBER="1")
+
+from judge import Verdict, judge  # noqa: E402
+from random_bodies import write_msh  # noqa: E402
+from random_draw import draw  # noqa: E402
+from scene import read_scene, write_scene  # noqa: E402
+
+ROOT = Path(__file__).resolve().parent.parent
+LIMIT = 120  # seconds a run may take, on a busy machine
+# Ranks that wait for each other leave the cores to others.
+ENVIRONMENT = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+               "OMPI_MCA_mpi_yield_when_idle": "1"}
+BAD = ("wrong", "refused wrongly", "no verdict")
+FIELDS = ("id", "kind", "solver", "ranks", "nodes", "traits", "verdict", "difference", "seconds",
+          "reason")
+
+
+def run(binary, folder, solver, ranks):
+    """Runs folder/scene.toml into folder/out; returns (exit code, output), None out of time."""
+    command = [str(binary), "run", "scene.toml", "--out", "out", "--solver", solver]
+    if ranks > 1:
+        command = ["mpiexec", "--oversubscribe", "-n", str(ranks), *command]
+    (folder / "command").write_text(" ".join(command) + "\n")
+    output = folder / "log"
+    with open(output, "w") as log:
+        process = subprocess.Popen(command, cwd=folder, stdout=log, stderr=log, env=ENVIRONMENT,
+                                   start_new_session=True)
+        try:
+            code = process.wait(LIMIT)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGTERM)  # mpiexec ends its ranks
+            process.wait()
+            code = None
+    return code, output.read_text(errors="replace")
+
+
+def examine(folder, binary, solver, ranks):
+    """Runs and judges the scene in a folder; returns the verdict and the seconds of the run."""
+    started = time.perf_counter()
+    code, output = run(binary, folder, solver, ranks)
+    if code == 1 and "MPI_INIT" in output:  # Open MPI did not start: not the program's fault
+        code, output = run(binary, folder, solver, ranks)
+    seconds = time.perf_counter() - started
+    try:
+        if code is None:
+            return Verdict("wrong", f"no end within {LIMIT} s"), seconds
+        verdict = judge(folder, code, output)
+        advised = re.search(r"double precision reaches only about (\S+) here", output)
+        if verdict.word == "refused wrongly" and advised:
+            return follow(folder, binary, solver, ranks, float(advised[1])), seconds
+        return verdict, seconds
+    except Exception:  # a fault of the judge must be seen, not end the others
+        return Verdict("no verdict", traceback.format_exc(limit=-2).replace("\n", " | ")), seconds
+
+
+def follow(folder, binary, solver, ranks, tolerance):
+    """Does what the program advised where rounding is larger than the tolerance: the scene once
+    more at the tolerance it named, and a little."""
+    advised = folder / "advised"
+    advised.mkdir(exist_ok=True)
+    shutil.copy(folder / "mesh.msh", advised)
+    scene = read_scene(folder / "scene.toml")
+    write_scene({**scene, "contact": {"tolerance": 2 * tolerance}}, advised / "scene.toml")
+    verdict = judge(advised, *run(binary, advised, solver, ranks))
+    if verdict.word in BAD:
+        verdict.reason = f"after the advice to set the tolerance: {verdict.reason}"
+        return verdict
+    verdict.word = "right as advised"
+    return verdict
+
+
+def one(binary, out, seed, number, solver):
+    """Draws, runs and judges scene `number`; keeps its files if it failed."""
+    case = draw(seed, number)
+    case.solver = solver or case.solver
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        write_msh(case.mesh, folder / "mesh.msh")
+        write_scene(case.scene, folder / "scene.toml")
+        verdict, seconds = examine(folder, binary, case.solver, case.ranks)
+        row = {"id": f"{seed}-{number}", "kind": case.kind, "solver": case.solver,
+               "ranks": case.ranks, "nodes": len(case.mesh.nodes),
+               "traits": verdict.traits, "verdict": verdict.word,
+               "difference": f"{verdict.difference:.1e}", "seconds": f"{seconds:.2f}",
+               "reason": verdict.reason}
+        if verdict.word in BAD:
+            kept = out / "failures" / row["id"]
+            shutil.rmtree(kept, ignore_errors=True)
+            shutil.copytree(folder, kept)
+            (kept / "verdict.json").write_text(json.dumps(row, indent=1) + "\n")
+    return row
+
+
+def summarise(rows):
+    """Per kind, solver and number of ranks how many of each verdict; then every reason that a refusal or a failure had."""
+    words = ("right", "right as advised", "imprecise", "either", "refused rightly", "gave up", *BAD)
+    lines = [f"{'':<16}" + "".join(f"{word:>18}" for word in words)]
+    for column in ("kind", "solver", "ranks"):
+        for name in sorted({str(row[column]) for row in rows}):
+            of = Counter(row["verdict"] for row in rows if str(row[column]) == name)
+            lines.append(f"{name:<16}" + "".join(f"{of[word]:>18}" for word in words))
+    reasons = Counter((row["verdict"], re.sub(" at t = [0-9.e-]+", "", row["reason"]))
+                      for row in rows if row["verdict"].startswith("refused"))
+    lines += [f"{count:5} {word}: {reason}" for (word, reason), count in reasons.most_common()]
+    lines += [f"{row['id']} {row['kind']} [{row['traits']}] {row['solver']} x{row['ranks']} "
+              f"{row['verdict']}: {row['reason']}" for row in rows if row["verdict"] in BAD]
+    return "\n".join(lines)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--count", type=int, default=1000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--first", type=int, default=0, help="number of the first scene")
+    parser.add_argument("--solver", help="this one instead of the one drawn")
+    parser.add_argument("--binary", type=Path, default=ROOT / "target" / "release" / "signorini")
+    parser.add_argument("--out", type=Path, default=ROOT / "out" / "random")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--again", help="run a kept scene once more")
+    arguments = parser.parse_args()
+    binary, out = arguments.binary.resolve(), arguments.out.resolve()
+    if arguments.again:
+        folder = out / "failures" / arguments.again
+        row = json.loads((folder / "verdict.json").read_text())
+        verdict, _ = examine(folder, binary, row["solver"], row["ranks"])
+        print(f"{verdict.word}: {verdict.reason}")
+        return int(verdict.word in BAD)
+    out.mkdir(parents=True, exist_ok=True)
+    numbers = range(arguments.first, arguments.first + arguments.count)
+    rows = []
+    with ProcessPoolExecutor(arguments.jobs) as pool:
+        runs = [pool.submit(one, binary, out, arguments.seed, n, arguments.solver) for n in numbers]
+        for done in as_completed(runs):
+            rows.append(done.result())
+    rows.sort(key=lambda row: int(row["id"].split("-")[1]))
+    with open(out / "scenes.csv", "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, FIELDS)
+        writer.writeheader()
+        writer.writerows(rows)
+    print(summarise(rows))
+    return int(any(row["verdict"] in BAD for row in rows))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
