@@ -18,6 +18,10 @@ pub struct Body {
     pub node_area: Vec<f64>,
     /// |Ω| of the whole body, m².
     pub area: f64,
+    /// Its centroid x̄, m.
+    pub centroid: [f64; 2],
+    /// ∫|x − x̄|², m⁴.
+    pub polar_inertia: f64,
 }
 
 impl Body {
@@ -33,8 +37,15 @@ impl Body {
                 node_area[node] += triangle.area / 3.0;
             }
         }
-        let (own_triangles, area) = (triangles.len(), node_area.iter().sum());
-        Self { mesh, triangles, own_triangles, partition, node_area, area }
+        let (own_triangles, area) = (triangles.len(), node_area.iter().sum::<f64>());
+        let mean = |of: &dyn Fn([f64; 2]) -> f64| {
+            let weighted = mesh.nodes.iter().zip(&node_area).map(|(&x, a)| a * of(x));
+            weighted.sum::<f64>() / area
+        };
+        let centroid = [mean(&|x| x[0]), mean(&|x| x[1])];
+        let polar = |[x, y]: [f64; 2]| (x - centroid[0]).powi(2) + (y - centroid[1]).powi(2);
+        let polar_inertia = area * mean(&polar);
+        Self { mesh, triangles, own_triangles, partition, node_area, area, centroid, polar_inertia }
     }
 
     /// Whether the triangles known here are all those around the nodes owned: their shares of the
@@ -50,6 +61,7 @@ impl Body {
     }
 
     /// The six displacements of a triangle out of a nodal field.
+    #[inline(always)]
     pub fn gather(&self, triangle: usize, u: &[f64]) -> [f64; 6] {
         let [a, b, c] = self.mesh.triangles[triangle];
         [u[2 * a], u[2 * a + 1], u[2 * b], u[2 * b + 1], u[2 * c], u[2 * c + 1]]

@@ -35,8 +35,9 @@ impl Elasticity {
     /// Internal nodal forces ∫ ζ̄ Aε(u):ε(φ_i) of nodal u, with the mean ζ̄ per triangle.
     pub fn internal_force(&self, body: &Body, zeta: &[f64], u: &[f64]) -> Vec<f64> {
         let mut force = vec![0.0; u.len()];
-        for (t, nodes) in body.mesh.triangles.iter().enumerate() {
-            let f = body.triangles[t].force(&self.stress(body, t, zeta[t], u));
+        let triangles = body.mesh.triangles.iter().zip(&body.triangles).zip(zeta);
+        for (t, ((nodes, triangle), zeta)) in triangles.enumerate() {
+            let f = triangle.force(&(self.d * triangle.strain(&body.gather(t, u)) * *zeta));
             for (i, node) in nodes.iter().enumerate() {
                 force[2 * node] += f[2 * i];
                 force[2 * node + 1] += f[2 * i + 1];

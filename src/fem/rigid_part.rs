@@ -13,25 +13,17 @@ pub struct RigidPart {
 impl RigidPart {
     /// Of the nodal displacements u, m: a = ∫u/|Ω|, θ = ∫ (x − x̄) × u / ∫|x − x̄|². Collective.
     pub fn of(body: &Body, u: &[f64]) -> Self {
-        let owned = body.partition.owned();
-        let nodes = || body.mesh.nodes[..owned].iter().zip(&body.node_area);
-        let mut sums = [0.0; 4];
-        for (([x, y], area), u) in nodes().zip(u.chunks_exact(2)) {
-            for (sum, value) in sums.iter_mut().zip([*x, *y, u[0], u[1]]) {
-                *sum += area * value;
-            }
+        let [cx, cy] = body.centroid;
+        let mut sums = [0.0; 3];
+        let nodes = body.mesh.nodes.iter().zip(&body.node_area).zip(u.as_chunks::<2>().0);
+        for ((&[x, y], area), &[ux, uy]) in nodes.take(body.partition.owned()) {
+            sums[0] += area * ux;
+            sums[1] += area * uy;
+            sums[2] += area * ((x - cx) * uy - (y - cy) * ux);
         }
-        let ranks = body.partition.ranks();
-        ranks.sum(&mut sums);
-        let [cx, cy, ax, ay] = sums.map(|sum| sum / body.area);
-        let mut turns = [0.0; 2];
-        for (([x, y], area), u) in nodes().zip(u.chunks_exact(2)) {
-            let (dx, dy) = (x - cx, y - cy);
-            turns[0] += area * (dx * (u[1] - ay) - dy * (u[0] - ax));
-            turns[1] += area * (dx * dx + dy * dy);
-        }
-        ranks.sum(&mut turns);
-        Self { translation: [ax, ay], rotation: turns[0] / turns[1], centre: [cx, cy] }
+        body.partition.ranks().sum(&mut sums);
+        let translation = [sums[0] / body.area, sums[1] / body.area];
+        Self { translation, rotation: sums[2] / body.polar_inertia, centre: body.centroid }
     }
 
     /// The motion at a point, m.
@@ -42,14 +34,13 @@ impl RigidPart {
 
     /// The largest |·| of the motion and of what it leaves of u, m. Collective.
     pub fn sizes(&self, body: &Body, u: &[f64]) -> [f64; 2] {
-        let mut squares = [0.0_f64; 2];
-        let nodes = &body.mesh.nodes[..body.partition.owned()];
-        for (&point, u) in nodes.iter().zip(u.chunks_exact(2)) {
+        let (mut rigid, mut rest) = (0.0_f64, 0.0_f64);
+        let nodes = body.mesh.nodes.iter().zip(u.as_chunks::<2>().0);
+        for (&point, &[ux, uy]) in nodes.take(body.partition.owned()) {
             let [x, y] = self.at(point);
-            let rest = [u[0] - x, u[1] - y];
-            squares[0] = squares[0].max(x * x + y * y);
-            squares[1] = squares[1].max(rest[0] * rest[0] + rest[1] * rest[1]);
+            rigid = rigid.max(x * x + y * y);
+            rest = rest.max((ux - x) * (ux - x) + (uy - y) * (uy - y));
         }
-        squares.map(|square| body.partition.ranks().max(square).sqrt())
+        [rigid, rest].map(|square| body.partition.ranks().max(square).sqrt())
     }
 }

@@ -109,6 +109,8 @@ impl Share {
             own_triangles: self.own_triangles,
             node_area: self.field(&whole.node_area, 1),
             area: whole.area,
+            centroid: whole.centroid,
+            polar_inertia: whole.polar_inertia,
             partition: self.partition,
         }
     }

@@ -33,6 +33,7 @@ impl Triangle {
     }
 
     /// The strain (ε_xx, ε_yy, 2ε_xy) of nodal displacements (u_1x, u_1y, …, u_3y).
+    #[inline(always)]
     pub fn strain(&self, u: &[f64; 6]) -> Vector3<f64> {
         let mut strain = Vector3::zeros();
         for (i, [dx, dy]) in self.gradients.iter().enumerate() {
@@ -50,6 +51,7 @@ impl Triangle {
     }
 
     /// Nodal forces ∫ σ:ε(φ_i) of a constant stress (σ_xx, σ_yy, σ_xy).
+    #[inline(always)]
     pub fn force(&self, stress: &Vector3<f64>) -> SVector<f64, 6> {
         let mut force = SVector::zeros();
         for (i, [dx, dy]) in self.gradients.iter().enumerate() {

@@ -28,13 +28,22 @@ impl Equilibrium<'_> {
         let setting = self.setting;
         let (body, partition) = (&setting.body, &setting.body.partition);
         let internal = setting.elasticity.internal_force(body, &self.zeta_mean, u);
-        let force = partition.norm(external, 2).max(partition.norm(&internal, 2));
         let rigid = RigidPart::of(body, u);
         let sizes = rigid.sizes(body, u);
+        // |f|², |Ku|², u·Ku and |u|².
+        let mut sums = [0.0; 4];
+        let mut unbalanced = internal;
+        for ((r, f), u) in unbalanced.iter_mut().zip(external).zip(u).take(2 * partition.owned()) {
+            sums[0] += f * f;
+            sums[1] += *r * *r;
+            sums[2] += u * *r;
+            sums[3] += u * u;
+            *r = f - *r;
+        }
+        partition.ranks().sum(&mut sums);
+        let force = sums[0].max(sums[1]).sqrt();
         let scales = self.scales.max(Scales { force, displacement: sizes[1] });
-        let energy = partition.dot(&internal, u, 2)
-            / (scales.force * partition.norm(u, 2)).max(f64::MIN_POSITIVE);
-        let unbalanced: Vec<f64> = external.iter().zip(&internal).map(|(f, r)| f - r).collect();
+        let energy = sums[2] / (scales.force * sums[3].sqrt()).max(f64::MIN_POSITIVE);
         let answer =
             Answer { rigid: &self.datum.field, elastic: u, unbalanced: &unbalanced, prescribed };
         let ranks = partition.ranks();
