@@ -236,9 +236,8 @@ impl<'a> TimeLoop<'a> {
         drop(damage);
         outcome.damage_error = chosen.map(|chosen| chosen.relative_error());
         let worst = outcome.worst.take();
-        let states: Vec<&State> =
-            std::iter::once(&outcome.last.state).chain(worst.as_ref().map(|(_, s)| s)).collect();
-        outcome.accuracy = phases.time("accuracy", || equilibrium.accuracy(&states))?;
+        let estimate = || equilibrium.accuracy(&outcome.last, worst.as_ref());
+        outcome.accuracy = phases.time("accuracy", estimate)?;
         Ok(outcome)
     }
 }
