@@ -17,6 +17,7 @@ from atlas import (  # noqa: E402
     maximum_principle,
     penalty,
     random_contact,
+    scales,
     step_size,
     tao_types,
 )
@@ -29,6 +30,7 @@ MAPS = {
     "active-set": random_contact,
     "conditioning": conditioning,
     "lost-contact": lost_contact,
+    "scales": scales,
 }
 
 
