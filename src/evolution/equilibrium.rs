@@ -139,18 +139,10 @@ impl<'a> Equilibrium<'a> {
         let prescribed = setting.loads.prescribed_at(time);
         let posed = agreed(setting.body.partition.ranks(), setting.posed(time))?;
 
-        phases.time("extrapolation", || {
-            self.c.set(&self.datum.relative(setting, self.evolution.at(time)))
-        })?;
-        let mut total = ContactReport::default();
-        let mut tolerance = setting.tolerance;
-        let ranks = setting.body.partition.ranks();
-        if ranks.all(external.iter().chain(&posed.0).all(|&value| value == 0.0)) {
-            self.datum = Datum::default();
-        }
+        self.start(time, &external, &posed)?;
         let failed = |source| RunError::Contact { step, time, source };
-        self.approach(&external, &posed)?;
-        let mut attempts = 0;
+        let mut total = ContactReport::default();
+        let (mut tolerance, mut attempts) = (setting.tolerance, 0);
         loop {
             attempts += 1;
             let (lift, bounds) = self.datum.pose(setting, &posed);
@@ -160,15 +152,15 @@ impl<'a> Equilibrium<'a> {
             let judged = phases.time("certificate", || self.certify(&u, &external, &prescribed));
             // Rounding of a long way hides a small deformation: measured from the way's end it
             // has all its digits.
-            let poor = solved.is_err() || !judged.kkt.within(setting.tolerance);
-            if poor && attempts < FOLLOWED && self.follow(&judged)? {
+            let certified = judged.kkt.within(setting.tolerance);
+            if !certified && attempts < FOLLOWED && self.follow(&judged)? {
                 continue;
             }
             match solved {
                 Ok(report) => total.add(&report),
                 // What a solver thinks of its answer is not asked if the certificate holds.
                 Err(ContactError::NotConverged { .. } | ContactError::TaoStopped { .. })
-                    if !poor => {}
+                    if certified => {}
                 Err(error) => return Err(failed(self.limited(error, force, &u))),
             }
             self.report = total;
@@ -176,18 +168,17 @@ impl<'a> Equilibrium<'a> {
             if judged.energy < NEGATIVE_ENERGY {
                 return Err(failed(ContactError::NotDefinite { method: self.solver.name() }));
             }
-            if judged.kkt.within(setting.tolerance) {
+            if certified {
                 let Judged { kkt, scales, force, contact, .. } = judged;
                 self.next_scales = scales;
                 self.next_active = self.active_bounds(&contact, 0.0);
-                let u = self.datum.total(u);
-                let zeta_mean = self.zeta_mean.clone();
+                let unheld = self.unheld(&contact, force);
+                let (u, zeta_mean) = (self.datum.total(u), self.zeta_mean.clone());
                 let state = State { time, u, zeta: zeta.to_vec(), zeta_mean, contact };
                 let mut record = phases.time("figures", || {
                     certificate::figures(setting, step, &state, &external, &total, &kkt)
                 });
                 record.seconds = started.elapsed().as_secs_f64();
-                let unheld = self.unheld(&state.contact, force);
                 return Ok(Step { state, record, unheld });
             }
             if attempts == ATTEMPTS || judged.kkt.worst().is_nan() {
@@ -198,6 +189,24 @@ impl<'a> Equilibrium<'a> {
             }
             tolerance *= 0.3 * setting.tolerance / judged.kkt.worst();
         }
+    }
+
+    /// Sets the start c of a solve at `time`, and where displacements are measured from.
+    fn start(
+        &mut self,
+        time: f64,
+        external: &[f64],
+        posed: &(Vec<f64>, Vec<Bound>),
+    ) -> Result<(), PetscError> {
+        let setting = self.setting;
+        let nothing = external.iter().chain(&posed.0).all(|&value| value == 0.0);
+        if setting.body.partition.ranks().all(nothing) {
+            self.datum = Datum::default();
+        }
+        self.phases.time("extrapolation", || {
+            self.c.set(&self.datum.relative(setting, self.evolution.at(time)))
+        })?;
+        self.approach(external, posed)
     }
 
     /// Fills K for the triangle means of η_*(ζ).
