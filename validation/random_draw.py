@@ -243,7 +243,9 @@ def loose(d, mesh):
     for name in touching:
         d.gap(name)
     if d.chance(0.7):
-        d.pressed = sum(d.normal(mesh, name, 0.0) for name in touching)
+        pressed = sum(d.normal(mesh, name, 0.0) for name in touching)
+        if np.linalg.norm(pressed) > 0.1:  # opposite sides leave only rounding
+            d.pressed = pressed
     for name in names:
         if d.chance(0.4 if d.pressed is None else 0.1):
             d.traction(name, mesh)
