@@ -203,8 +203,10 @@ def several(d, mesh):
                 d.gap(name)
         if way < 0.95 and d.chance(0.6):
             d.traction(names[-1], mesh)
+    free = [name for name in mesh.curves if not {"gap", "displacement", "symmetry"}
+            & set(d.boundary.get(name, {}))]
     if not any("gap" in b for b in d.boundary.values()):
-        d.put(list(mesh.curves)[0], gap="0")
+        d.put(free[0], gap="0")
 
 
 def rounded(d, mesh):
