@@ -281,7 +281,8 @@ def judge_step(step, u, scale):
     unsure = 2 * TOLERANCE * easing * norm + 1e-15 * np.linalg.norm(rounding)
     move = unsure * step.sensitivity()
     energy, whole = apart @ (step.k @ apart), own @ (step.k @ own)
-    floor = 1e-14 * ((np.abs(u) + np.abs(own)) @ rounding) + TOLERANCE * easing * norm * move
+    # rᵀK⁻¹r ≤ ‖r‖₂ √N max|K⁻¹r|
+    floor = 1e-14 * ((np.abs(u) + np.abs(own)) @ rounding) + unsure * np.sqrt(len(u)) * move
     floor += HISTORY**2 * scale[0] * scale[1]
     strain = np.sqrt(max(energy, 0.0) / whole) if whole > 0.0 else 0.0
     figures = f"u differs by {by:.1e}, strains by {strain:.1e}"
