@@ -25,8 +25,8 @@ PLACE = 1e-8  # violations of gaps, relative to the largest displacement
 TOUCH = 1e-6  # a gap that small, relative to it, may carry a force: u is exact to that
 ANSWER = 1e-6  # displacements, relative
 ENERGY = 1e-4  # strains in the energy norm, relative
-HISTORY = 1e-9  # of the largest force and displacement so far: a load may cross zero
-TOLERANCE = 1e-10  # KKT tolerance of a run; all above but ENERGY are for this and grow with it
+PAST = 0.1  # a load may cross zero: scales fall no lower than this share of the largest so far
+TOLERANCE = 1e-10  # KKT tolerance of a run; relative limits are for this and grow with it
 DAMAGE = 1e-8
 
 
@@ -202,7 +202,7 @@ def shown(step, frame, scale):
     if not seen[single].all():
         return "the gap field lacks a node of Γ_C"
     reaction = along(rows, step.f - step.k @ frame.u)
-    past = np.abs(frame.u) + 0.1 * length
+    past = np.abs(frame.u) + PAST * length
     rounding = step.discrete.element_sizes(step.zeta, past)[1].reshape(-1, 2).sum(1)
     off = np.abs(frame.pressure[rows.node] * rows.weight - reaction) - 1e-14 * rounding[rows.node]
     if (off[single[rows.node]] > FORCE * ease(step.discrete) * force).any():
@@ -234,8 +234,8 @@ def ease(discrete):
 def residuals(step, u, scale=(0.0, 0.0)):
     """(forces, places): test (i), relative; and the scales (force, length) it used."""
     sizes, rounding = step.discrete.element_sizes(step.zeta, u)
-    force = max((sizes + np.abs(step.f)).max(), HISTORY / FORCE * scale[0])
-    length = max(np.abs(u).max(), HISTORY / PLACE * scale[1])
+    force = max((sizes + np.abs(step.f)).max(), PAST * scale[0])
+    length = max(np.abs(u).max(), PAST * scale[1])
     easing = ease(step.discrete)
     slack = step.rows.value - along(step.rows, u)
     places = np.r_[-slack, np.abs(along(step.held, u) - step.held.value), 0.0].max()
@@ -251,7 +251,7 @@ def residuals(step, u, scale=(0.0, 0.0)):
     # the body along, the scale of forces is what it would take alone.
     alone = np.abs(step.k @ step.lift).max()
     carried = 10 * TOLERANCE * easing * alone
-    travelled = step.discrete.element_sizes(step.zeta, np.full_like(u, 0.1 * scale[1]))[1]
+    travelled = step.discrete.element_sizes(step.zeta, np.full_like(u, PAST * scale[1]))[1]
     noise = 1e-14 * (rounding + travelled).reshape(-1, 2).sum(1)
     off = np.maximum(off - noise - carried, 0.0)
     return off.max() / force / easing, places / length / easing, (max(force, 0.1 * alone), length)
@@ -268,7 +268,7 @@ def judge_step(step, u, scale):
     noise = 1e-14 * step.discrete.element_sizes(step.zeta, own)[1].max()
     if own_forces > FORCE or own_places > PLACE or noise > 0.01 * scale[0]:
         return Verdict("right", "the judge's own answer is not good enough to compare"), scale
-    length = max(np.abs(own).max(), np.abs(u).max(), HISTORY / ANSWER * scale[1])
+    length = max(np.abs(own).max(), np.abs(u).max(), PAST * scale[1])
     if length == 0.0:
         return Verdict("right", ""), scale
     apart = without(u - own, step.loose)
@@ -283,7 +283,7 @@ def judge_step(step, u, scale):
     energy, whole = apart @ (step.k @ apart), own @ (step.k @ own)
     # rᵀK⁻¹r ≤ ‖r‖₂ √N max|K⁻¹r|
     floor = 1e-14 * ((np.abs(u) + np.abs(own)) @ rounding) + unsure * np.sqrt(len(u)) * move
-    floor += HISTORY**2 * scale[0] * scale[1]
+    floor += (PAST * ANSWER) ** 2 * scale[0] * scale[1]
     strain = np.sqrt(max(energy, 0.0) / whole) if whole > 0.0 else 0.0
     figures = f"u differs by {by:.1e}, strains by {strain:.1e}"
     allowed = ANSWER * easing
