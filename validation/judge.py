@@ -247,8 +247,8 @@ def residuals(step, u, scale=(0.0, 0.0)):
         d = step.held.direction[step.held.node == node]
         normals = step.rows.direction[(step.rows.node == node) & touching]
         off[node] = force * nnls(np.vstack([normals, d, -d]).T, reaction[node] / force)[1]
-    # Element forces of a large rigid motion, now or before, are rounding; where a prescribed displacement carries
-    # the body along, the scale of forces is what it would take alone.
+    # Element forces of a large rigid motion, now or before, are rounding; where a prescribed
+    # displacement carries the body along, the scale of forces is what it would take alone.
     alone = np.abs(step.k @ step.lift).max()
     carried = 10 * TOLERANCE * easing * alone
     travelled = step.discrete.element_sizes(step.zeta, np.full_like(u, PAST * scale[1]))[1]
