@@ -203,8 +203,10 @@ def several(d, mesh):
                 d.gap(name)
         if way < 0.95 and d.chance(0.6):
             d.traction(names[-1], mesh)
+    free = [name for name in mesh.curves if not {"gap", "displacement", "symmetry"}
+            & set(d.boundary.get(name, {}))]
     if not any("gap" in b for b in d.boundary.values()):
-        d.put(list(mesh.curves)[0], gap="0")
+        d.put(free[0], gap="0")
 
 
 def rounded(d, mesh):
@@ -243,7 +245,9 @@ def loose(d, mesh):
     for name in touching:
         d.gap(name)
     if d.chance(0.7):
-        d.pressed = sum(d.normal(mesh, name, 0.0) for name in touching)
+        pressed = sum(d.normal(mesh, name, 0.0) for name in touching)
+        if np.linalg.norm(pressed) > 0.1:  # opposite sides leave only rounding
+            d.pressed = pressed
     for name in names:
         if d.chance(0.4 if d.pressed is None else 0.1):
             d.traction(name, mesh)
