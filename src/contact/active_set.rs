@@ -84,7 +84,7 @@ impl<'s> ActiveSet<'s> {
     fn support(&mut self, problem: &ContactProblem, c: &Vector) -> Result<bool, PetscError> {
         let active = self.active.iter().map(|side| *side != Side::Open).collect();
         let motions = (problem.rigid, problem.work);
-        let way = c.read(|c| approach(problem.ranks, motions, problem.bounds, c, active))?;
+        let way = c.read(|c| approach(problem.ranks, motions, problem.bounds, c, active, true))?;
         for (i, upper) in way.reached {
             self.active[i] = if upper { Side::Upper } else { Side::Lower };
         }

@@ -14,18 +14,22 @@ pub(crate) struct Approach {
     pub(crate) supported: bool,
 }
 
+/// Work on a motion below this part of the load's work on all is rounding.
+const ROUNDING: f64 = 1e-12;
+
 /// Lets the body move from c, with u_ν kept at the `active` bounds, as the load drives it until it
 /// reaches a further bound, and again until it is supported. `rigid` are the u_ν of its motions at
 /// the bounds, a column each, `work` that of the load on them. Collective.
 ///
-/// Where the load drives none of the motions left, any of them will do: the load being balanced,
-/// rounding drives it.
+/// Where the load drives none of the motions left, the body stays, or if it is to be supported,
+/// `whatever` drives it, any motion does.
 pub(crate) fn approach(
     ranks: Ranks,
     (rigid, work): (&DMatrix<f64>, &DVector<f64>),
     bounds: &[Bound],
     c: &[f64],
     mut active: Vec<bool>,
+    whatever: bool,
 ) -> Approach {
     let mut amplitudes = DVector::zeros(rigid.ncols());
     let mut reached = Vec::new();
@@ -35,7 +39,11 @@ pub(crate) fn approach(
             return Approach { amplitudes, reached, supported: true };
         };
         let driven = left.iter().map(|m| m * m.dot(work)).sum::<DVector<f64>>();
-        let motion = if driven.amax() > 0.0 { driven } else { any.clone() }.normalize();
+        let motion = match driven.amax() > ROUNDING * work.amax() {
+            true => driven.normalize(),
+            false if whatever => any.normalize(),
+            false => return Approach { amplitudes, reached, supported: false },
+        };
         let (speed, gone) = (rigid * &motion, rigid * &amplitudes);
         let most = ranks.max(speed.iter().fold(0.0, |m: f64, v| m.max(v.abs())));
         let way = |i: usize| {

@@ -113,7 +113,11 @@ impl Constraints {
         }
         let prescribed = basis.len();
         for mut gap in gaps {
-            let line = parallel(&basis, gap.normal, [x, y])?;
+            // Where nothing is left to move, no unknown is needed.
+            let line = match prescribed {
+                2 => None,
+                _ => parallel(&basis, gap.normal, [x, y])?,
+            };
             if let Some(line) = line {
                 // Exactly this line, so that its rows cannot contradict each other by rounding.
                 gap.normal = along(basis[line], gap.normal);

@@ -99,14 +99,16 @@ impl RigidMotions {
         let mut add = |row: DVector<f64>| gram.ger(1.0, &row, &row, 1.0);
         for &(node, d) in fixed {
             let part = self.part_of_node[node];
-            add(piece.row(part, nodes[node], d) * piece.weight(part));
+            // An axis is exact, the normal of a polygon is not.
+            let weight = if d.contains(&0.0) { 1.0 } else { (HELD / ROUNDING).sqrt() };
+            add(piece.row(part, nodes[node], d) * piece.weight(part) * weight);
         }
         for &(node, [a, b]) in hinges {
             for d in [[1.0, 0.0], [0.0, 1.0]] {
                 add((piece.row(a, nodes[node], d) - piece.row(b, nodes[node], d)).normalize());
             }
         }
-        let basis = null_space(gram);
+        let basis = null_space(gram, fixed.len() + 2 * hinges.len());
         if basis.is_empty() {
             return;
         }
@@ -241,9 +243,13 @@ impl Piece<'_> {
     }
 }
 
-/// An orthonormal basis of the null space of a Gram matrix of unit-sized rows.
-fn null_space(gram: DMatrix<f64>) -> Vec<DVector<f64>> {
-    let cut = ROUNDING * gram.trace().max(f64::MIN_POSITIVE);
+/// Squares of motions that prescribed displacements hold are above this, relative: rounding of the
+/// Gram matrix and its eigenvalues. A clamp as short as 1e-6 of the body still holds its rotation.
+const HELD: f64 = 1e-14;
+
+/// An orthonormal basis of the null space of a Gram matrix of so many `rows` of unit size at most.
+fn null_space(gram: DMatrix<f64>, rows: usize) -> Vec<DVector<f64>> {
+    let cut = HELD * rows as f64;
     let eigen = gram.symmetric_eigen();
     let pairs = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());
     pairs.filter(|(value, _)| **value <= cut).map(|(_, v)| v.into_owned()).collect()

@@ -16,8 +16,9 @@ pub(super) struct Tao<'s> {
     size: f64,
 }
 
-/// Calls of TAO for one contact problem.
-const CALLS: usize = 8;
+/// Calls of TAO for one contact problem, and of these how many in turn may not halve the residual.
+const CALLS: usize = 40;
+const STALLED: usize = 7;
 /// Relative size of the proximal term that makes K definite where only contact holds the body.
 const PROXIMAL: f64 = 1e-7;
 
@@ -70,6 +71,7 @@ impl ContactSolver for Tao<'_> {
 
         let mut size = if self.size > 0.0 { self.size } else { load_size / s };
         let (mut reason, mut residuals) = (0, Kkt::default());
+        let (mut best, mut stalled) = (f64::INFINITY, 0);
         for _ in 0..CALLS {
             let start = c.read(<[f64]>::to_vec)?;
             f.write(|v| {
@@ -108,7 +110,10 @@ impl ContactSolver for Tao<'_> {
                 return Ok(report);
             }
             report.false_claims += usize::from(reason > 0 && !residuals.within(problem.tolerance));
-            if residuals.worst().is_nan() {
+            let worst = residuals.worst();
+            stalled = if worst < 0.5 * best { 0 } else { stalled + 1 };
+            best = best.min(worst);
+            if worst.is_nan() || stalled == STALLED {
                 break;
             }
         }

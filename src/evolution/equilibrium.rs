@@ -48,6 +48,10 @@ pub struct Equilibrium<'a> {
 
 /// The rigid part of an answer is worth removing if it is so many times the rest.
 const DOMINANT: f64 = 10.0;
+/// … and from a datum that has been left behind, u is measured anew from so many times on.
+const FAR: f64 = 1e3;
+/// A deformation below this part of the way that a body is carried is rounding.
+const CARRIED: f64 = 1e-14;
 /// How often displacements may be measured from another datum for one answer.
 const FOLLOWED: usize = 3;
 /// A force limit below this part of the forces that prescribed displacements cause is rounding.
@@ -153,7 +157,8 @@ impl<'a> Equilibrium<'a> {
             // Rounding of a long way hides a small deformation: measured from the way's end it
             // has all its digits.
             let certified = judged.kkt.within(setting.tolerance);
-            if !certified && attempts < FOLLOWED && self.follow(&judged)? {
+            let far = !self.datum.field.is_empty() && judged.sizes[0] > FAR * judged.sizes[1];
+            if (far || !certified) && attempts < FOLLOWED && self.follow(&judged)? {
                 continue;
             }
             match solved {
@@ -161,7 +166,7 @@ impl<'a> Equilibrium<'a> {
                 // What a solver thinks of its answer is not asked if the certificate holds.
                 Err(ContactError::NotConverged { .. } | ContactError::TaoStopped { .. })
                     if certified => {}
-                Err(error) => return Err(failed(self.limited(error, force, &u))),
+                Err(error) => return Err(failed(self.limited(error, &judged, &u))),
             }
             self.report = total;
             // Then a KKT point need not be a minimum, and which solver would notice is chance.
@@ -185,10 +190,19 @@ impl<'a> Equilibrium<'a> {
                 let (method, tolerance) = (self.solver.name(), setting.tolerance);
                 let residuals = judged.kkt;
                 let error = ContactError::NotCertified { method, tolerance, residuals };
-                return Err(failed(self.limited(error, judged.scales.force, &u)));
+                return Err(failed(self.limited(error, &judged, &u)));
             }
             tolerance *= 0.3 * setting.tolerance / judged.kkt.worst();
         }
+    }
+
+    /// The scales that the way of the datum hides: a body that is only carried along has no others.
+    fn rounding(&self) -> Scales {
+        if self.datum.field.is_empty() {
+            return Scales { force: 0.0, displacement: 0.0 };
+        }
+        let displacement = CARRIED * self.setting.body.partition.largest(&self.datum.field);
+        Scales { force: self.stiffness.scale * displacement, displacement }
     }
 
     /// Sets the start c of a solve at `time`, and where displacements are measured from.
@@ -200,13 +214,14 @@ impl<'a> Equilibrium<'a> {
     ) -> Result<(), PetscError> {
         let setting = self.setting;
         let nothing = external.iter().chain(&posed.0).all(|&value| value == 0.0);
-        if setting.body.partition.ranks().all(nothing) {
+        let rests = setting.body.partition.ranks().all(nothing);
+        if rests {
             self.datum = Datum::default();
         }
         self.phases.time("extrapolation", || {
             self.c.set(&self.datum.relative(setting, self.evolution.at(time)))
         })?;
-        self.approach(external, posed)
+        if rests { Ok(()) } else { self.approach(external, posed) }
     }
 
     /// Fills K for the triangle means of η_*(ζ).
@@ -255,7 +270,7 @@ impl<'a> Equilibrium<'a> {
         let work = setting.motions.work(body, external);
         let (_, bounds) = self.datum.pose(setting, posed);
         let way = self.c.read(|c| {
-            contact::approach(ranks, (&self.rigid, &work), &bounds, c, self.active.clone())
+            contact::approach(ranks, (&self.rigid, &work), &bounds, c, self.active.clone(), false)
         })?;
         // The start c moves along.
         self.datum.add(setting, &setting.motions.displacement(body, &way.amplitudes));
@@ -321,7 +336,7 @@ impl<'a> Equilibrium<'a> {
             bounds,
             rigid: &self.rigid,
             work: &self.work,
-            scales: Scales { force: force.max(self.scales.force), ..self.scales },
+            scales: self.scales.max(Scales { force, displacement: 0.0 }).max(self.rounding()),
             tolerance,
             ranks,
             phases: self.phases,

@@ -42,7 +42,7 @@ impl Equilibrium<'_> {
         }
         partition.ranks().sum(&mut sums);
         let force = sums[0].max(sums[1]).sqrt();
-        let scales = self.scales.max(Scales { force, displacement: sizes[1] });
+        let scales = self.scales.max(Scales { force, displacement: sizes[1] }).max(self.rounding());
         let energy = sums[2] / (scales.force * sums[3].sqrt()).max(f64::MIN_POSITIVE);
         let answer =
             Answer { rigid: &self.datum.field, elastic: u, unbalanced: &unbalanced, prescribed };
@@ -55,14 +55,14 @@ impl Equilibrium<'_> {
         Judged { kkt, scales, force, energy, contact, rigid, sizes }
     }
 
-    /// Adds to an error what double precision can reach, where that is less than was asked for: the
-    /// rounding of the internal forces alone, relative to forces of size `force`.
-    pub(super) fn limited(&self, error: ContactError, force: f64, u: &[f64]) -> ContactError {
+    /// Adds to an error what double precision can reach, where that is less than was asked for and
+    /// what was reached: the rounding of the internal forces of u alone.
+    pub(super) fn limited(&self, error: ContactError, judged: &Judged, u: &[f64]) -> ContactError {
         let setting = self.setting;
         let rounding = setting.elasticity.force_rounding(&setting.body, &self.zeta_mean, u);
-        let size = force.max(self.scales.force);
-        let attainable = ROUNDED * setting.body.partition.norm(&rounding, 2) / size;
-        match attainable > setting.tolerance {
+        let rounding = setting.body.partition.norm(&rounding, 2) / judged.scales.force;
+        let attainable = ROUNDED * rounding;
+        match attainable > setting.tolerance && judged.kkt.within(attainable) && attainable < 1.0 {
             true => ContactError::Limited { source: Box::new(error), attainable },
             false => error,
         }
