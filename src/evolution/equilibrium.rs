@@ -59,8 +59,6 @@ const LIFTED: f64 = 1e-2;
 /// Loads below this part of the largest of the run count as so much, or an answer to rounding
 /// (sin(pi) = 1.2e-16) would have to have as many digits as any other.
 const LEAST_LOAD: f64 = 1e-6;
-/// Times at which the loads of a run are looked at for the largest.
-const SAMPLES: usize = 8;
 /// Residuals are refused by rounding if they are no more than this many times its estimate.
 const ROUNDED: f64 = 10.0;
 /// How often a solver is asked again, more precisely, when its answer misses the tolerance.
@@ -100,7 +98,7 @@ impl<'a> Equilibrium<'a> {
             c: Vector::zeros(session, owned)?,
             datum: Datum::default(),
             accepted_datum: Datum::default(),
-            scales: Scales { force: least_force(setting), displacement: 0.0 },
+            scales: Scales { force: LEAST_LOAD * setting.largest_load, displacement: 0.0 },
             next_scales: Scales { force: 0.0, displacement: 0.0 },
             active: vec![false; constraints.bounds.len()],
             next_active: Vec::new(),
@@ -137,7 +135,7 @@ impl<'a> Equilibrium<'a> {
         let started = Instant::now();
         let (setting, phases) = (self.setting, self.phases);
         self.fill(&setting.triangle_means(zeta))?;
-        let external = phases.time("loads", || setting.loads.at(&setting.body, time));
+        let external = phases.time("loads", || setting.load(time));
         setting.check_load(time, &external)?;
         let external = setting.motions.balanced(&setting.body, external);
         let prescribed = setting.loads.prescribed_at(time);
@@ -196,13 +194,17 @@ impl<'a> Equilibrium<'a> {
         }
     }
 
-    /// The scales that the way of the datum hides: a body that is only carried along has no others.
-    fn rounding(&self) -> Scales {
-        if self.datum.field.is_empty() {
-            return Scales { force: 0.0, displacement: 0.0 };
-        }
-        let displacement = CARRIED * self.setting.body.partition.largest(&self.datum.field);
-        Scales { force: self.stiffness.scale * displacement, displacement }
+    /// The scales of an answer, not below those of the run so far, nor below rounding: of the way of
+    /// the datum (a body that is only carried along has no other scales), and with displacements not
+    /// below those that the forces cause at least.
+    fn with_floors(&self, own: Scales) -> Scales {
+        let way = match self.datum.field[..] {
+            [] => 0.0,
+            _ => CARRIED * self.setting.body.partition.largest(&self.datum.field),
+        };
+        let force = own.force.max(self.scales.force).max(self.stiffness.scale * way);
+        let least = way.max(force / self.stiffness.scale);
+        Scales { force, displacement: own.displacement.max(self.scales.displacement).max(least) }
     }
 
     /// Sets the start c of a solve at `time`, and where displacements are measured from.
@@ -336,7 +338,7 @@ impl<'a> Equilibrium<'a> {
             bounds,
             rigid: &self.rigid,
             work: &self.work,
-            scales: self.scales.max(Scales { force, displacement: 0.0 }).max(self.rounding()),
+            scales: self.with_floors(Scales { force, displacement: 0.0 }),
             tolerance,
             ranks,
             phases: self.phases,
@@ -354,13 +356,4 @@ impl<'a> Equilibrium<'a> {
         setting.motions.remove_free(&setting.body, &mut u);
         Ok(u)
     }
-}
-
-/// The least size of forces in a run, N per metre of thickness: a part of its largest load.
-fn least_force(setting: &Setting) -> f64 {
-    let body = &setting.body;
-    let Some(grid) = setting.scene().time else { return 0.0 };
-    let times = (0..=SAMPLES).map(|i| grid.end * i as f64 / SAMPLES as f64);
-    let sizes = times.map(|time| body.partition.norm(&setting.loads.at(body, time), 2));
-    LEAST_LOAD * sizes.filter(|size| size.is_finite()).fold(0.0, f64::max)
 }

@@ -59,6 +59,8 @@ pub struct Outcome {
     /// The accepted step before the last one whose u is likely to be the least exact, if it is less
     /// exact than the last: its stationarity residual and its fields.
     worst: Option<(f64, State)>,
+    /// The largest displacement before the last step, m, if larger than in that, and its state.
+    largest: Option<(f64, State)>,
 }
 
 /// The stop at ζ_*.
@@ -201,6 +203,7 @@ impl Outcome {
             accuracy: Accuracy::default(),
             damage_error: None,
             worst: None,
+            largest: None,
         }
     }
 
@@ -216,6 +219,12 @@ impl Outcome {
             self.unheld = last.unheld.clone().map(|motion| (last.record.time, motion));
         }
         let before = std::mem::replace(&mut self.last, last);
+        let size = before.record.displacement_max;
+        if size > self.last.record.displacement_max
+            && self.largest.as_ref().is_none_or(|(largest, _)| size > *largest)
+        {
+            self.largest = Some((size, before.state.clone()));
+        }
         let residual = before.record.kkt_stationarity;
         if self.worst.as_ref().is_none_or(|(worst, _)| residual > *worst) {
             self.worst = Some((residual, before.state));

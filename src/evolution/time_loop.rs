@@ -235,8 +235,8 @@ impl<'a> TimeLoop<'a> {
         // Makes room for another factorisation.
         drop(damage);
         outcome.damage_error = chosen.map(|chosen| chosen.relative_error());
-        let worst = outcome.worst.take();
-        let estimate = || equilibrium.accuracy(&outcome.last, worst.as_ref());
+        let (worst, largest) = (outcome.worst.take(), outcome.largest.take());
+        let estimate = || equilibrium.accuracy(&outcome.last, worst.as_ref(), largest.as_ref());
         outcome.accuracy = phases.time("accuracy", estimate)?;
         Ok(outcome)
     }

@@ -3,18 +3,20 @@
 use super::Equilibrium;
 use crate::{
     evolution::{Accuracy, Setting, State, Step},
-    fem::Stiffness,
+    fem::{RigidPart, Stiffness},
     petsc::{LinearSolver, PetscError, Session, Vector},
 };
 
+/// A deformation below this part of a rigid motion is taken for rounding.
+const CARRIED: f64 = 1e-11;
 /// A part of the promised error that an estimate may reach before another is made.
 const SAFE: f64 = 0.1;
 
 impl Equilibrium<'_> {
     /// Estimates the errors of the `last` answer of a run, and of the `worst` one before it, whose
-    /// stationarity is given. Costs a factorisation, in the place of the solver's own; a second one
-    /// if the first error, enlarged as the residual of the worst answer is, comes near to what is
-    /// promised.
+    /// stationarity is given, relative to the displacements of the `largest` one. Costs a
+    /// factorisation, in the place of the solver's own; a second one if the first error, enlarged as
+    /// the residual of the worst answer is, comes near to what is promised.
     ///
     /// # Errors
     /// PETSc failed.
@@ -22,12 +24,20 @@ impl Equilibrium<'_> {
         self,
         last: &Step,
         worst: Option<&(f64, State)>,
+        largest: Option<&(f64, State)>,
     ) -> Result<Accuracy, PetscError> {
         let (session, setting, stiffness) = (self.session, self.setting, self.stiffness);
         let (body, elasticity, state) = (&setting.body, &setting.elasticity, &last.state);
         drop(self.solver);
-        let energy = elasticity.energy_error(body, &state.zeta_mean, &state.u)?;
-        let displacement = displacement_error(session, setting, stiffness, state)?;
+        let last_size = (last.record.displacement_max, state);
+        let (size, resolved) = largest.map_or(last_size, |(size, state)| (*size, state));
+        let [rigid, rest] = RigidPart::of(body, &resolved.u).sizes(body, &resolved.u);
+        // What is only carried along has no strains but rounding.
+        let energy = match rest > CARRIED * rigid {
+            true => elasticity.energy_error(body, &resolved.zeta_mean, &resolved.u)?,
+            false => 0.0,
+        };
+        let displacement = displacement_error(session, setting, stiffness, state, size)?;
         let accuracy = Accuracy { displacement, energy, time: state.time };
         let Some((residual, state)) = worst else { return Ok(accuracy) };
         let expected = displacement * (residual / last.record.kkt_stationarity).max(1.0);
@@ -35,7 +45,7 @@ impl Equilibrium<'_> {
             return Ok(accuracy);
         }
         let stiffness = Stiffness::new(session, body, elasticity, &setting.constraints.frames)?;
-        let displacement = displacement_error(session, setting, stiffness, state)?;
+        let displacement = displacement_error(session, setting, stiffness, state, size)?;
         Ok(match displacement > accuracy.displacement {
             true => Accuracy { displacement, time: state.time, ..accuracy },
             false => accuracy,
@@ -43,22 +53,22 @@ impl Equilibrium<'_> {
     }
 }
 
-/// max |K⁻¹(f − Ku)| / max |u|, the pressing nodes held: the correction that the residual
-/// forces ask for.
+/// max |K⁻¹(f − Ku)| / `size`, the active nodes fixed: the correction that the residual forces ask
+/// for.
 fn displacement_error(
     session: &Session,
     setting: &Setting,
     mut stiffness: Stiffness,
     state: &State,
+    size: f64,
 ) -> Result<f64, PetscError> {
-    let size = setting.body.partition.largest(&state.u);
-    if size == 0.0 {
+    if size == 0.0 || setting.body.partition.largest(&state.u) == 0.0 {
         return Ok(0.0);
     }
     stiffness.refill(&state.zeta_mean)?;
     let (body, constraints) = (&setting.body, &setting.constraints);
     let internal = setting.elasticity.internal_force(body, &state.zeta_mean, &state.u);
-    let external = setting.loads.at(body, state.time);
+    let external = setting.load(state.time);
     let mut residual: Vec<f64> = external.iter().zip(&internal).map(|(f, r)| f - r).collect();
     constraints.frames.force_to_frame(&mut residual);
     let active = state.contact.iter().filter(|point| point.active);

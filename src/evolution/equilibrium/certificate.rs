@@ -42,7 +42,7 @@ impl Equilibrium<'_> {
         }
         partition.ranks().sum(&mut sums);
         let force = sums[0].max(sums[1]).sqrt();
-        let scales = self.scales.max(Scales { force, displacement: sizes[1] }).max(self.rounding());
+        let scales = self.with_floors(Scales { force, displacement: sizes[1] });
         let energy = sums[2] / (scales.force * sums[3].sqrt()).max(f64::MIN_POSITIVE);
         let answer =
             Answer { rigid: &self.datum.field, elastic: u, unbalanced: &unbalanced, prescribed };
