@@ -16,8 +16,10 @@ pub(super) struct Tao<'s> {
     size: f64,
 }
 
-/// Calls of TAO for one contact problem, and of these how many in turn may not halve the residual.
-const CALLS: usize = 40;
+/// Calls of TAO for one contact problem, more where the proximal term slows them; and of these how
+/// many in turn may not halve the residual.
+const CALLS: usize = 8;
+const PROXIMAL_CALLS: usize = 40;
 const STALLED: usize = 7;
 /// Relative size of the proximal term that makes K definite where only contact holds the body.
 const PROXIMAL: f64 = 1e-7;
@@ -72,7 +74,8 @@ impl ContactSolver for Tao<'_> {
         let mut size = if self.size > 0.0 { self.size } else { load_size / s };
         let (mut reason, mut residuals) = (0, Kkt::default());
         let (mut best, mut stalled) = (f64::INFINITY, 0);
-        for _ in 0..CALLS {
+        let calls = if problem.definite() { CALLS } else { PROXIMAL_CALLS };
+        for _ in 0..calls {
             let start = c.read(<[f64]>::to_vec)?;
             f.write(|v| {
                 for i in 0..owned {
