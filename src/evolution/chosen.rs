@@ -67,6 +67,8 @@ const NEGLIGIBLE: f64 = 1e-6;
 /// An error is compared with the damage that the present rate will have done after this part of the
 /// run: at its beginning there is none yet.
 const HORIZON: f64 = 0.1;
+/// … but of no more than so many steps: the rate in a pulse, which takes short ones, does not last;
+const STEPS: f64 = 20.0;
 /// … which is at most this: a body that fails does so faster and faster, and early errors grow.
 const FORESEEN: f64 = 0.1;
 /// The error of a step may be this part of the tolerance, as truncation errors add up.
@@ -140,7 +142,7 @@ impl<'a> Chosen<'a> {
         let damage = self.norms(|i| zeta[i] - self.initial[i]);
         let size = self.norms(|i| missed[i] + truncation[i]);
         let rates = self.norms(|i| rate[i]);
-        let ahead = (HORIZON * self.end).min(self.end - time);
+        let ahead = (HORIZON * self.end).min(STEPS * step).min(self.end - time);
         let ratio = |j: usize| {
             let reference = damage[j] + (ahead * rates[j]).clamp(NEGLIGIBLE, FORESEEN);
             size[j] / (SHARE * self.tolerance * reference)

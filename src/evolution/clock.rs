@@ -15,6 +15,9 @@ pub(super) struct Clock {
 
 /// A chosen step is at most this part of the run…
 const COARSEST: f64 = 0.05;
+/// … those that do not follow the loads are halved down to this part: a jump has no step short
+/// enough…
+const FOLLOWING: f64 = 1.0 / 2000.0;
 /// … and a run whose step falls below this part has failed.
 const FINEST: f64 = 1e-12;
 
@@ -69,6 +72,13 @@ impl Clock {
         let (Some(grid), Some(_)) = (self.grid, self.tolerance()) else { return false };
         self.next = step * factor;
         self.next > FINEST * grid.end
+    }
+
+    /// The loads are not followed by a step of length `step`: the next is half as long. False if it
+    /// is as short as that is tried.
+    pub(super) fn halve(&mut self, step: f64) -> bool {
+        let long = self.grid.is_some_and(|grid| step > FOLLOWING * grid.end);
+        long && self.cut(step, 0.5)
     }
 
     /// By what to cut a step whose error is so many times the allowed one.

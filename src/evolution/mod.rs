@@ -8,6 +8,7 @@ mod equilibrium;
 mod estimate;
 mod extrapolation;
 mod foundation;
+mod load_curve;
 mod loads;
 mod notes;
 mod setting;

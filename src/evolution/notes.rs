@@ -120,7 +120,7 @@ impl Outcome {
         };
         Some(format!(
             "{steps} steps chosen: the damage is exact in time to about {:.1} % of the damage \
-             done{verdict}",
+             done (two or three times that where the load swings or jumps){verdict}",
             100.0 * error
         ))
     }

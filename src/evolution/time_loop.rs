@@ -7,6 +7,7 @@ use super::{
     clock::Clock,
     damage_step::{DamageStep, Driving, Source},
     estimate::Estimate,
+    load_curve::LoadCurve,
 };
 use crate::{
     petsc::Session,
@@ -20,6 +21,8 @@ pub(super) struct TimeLoop<'a> {
     equilibrium: Equilibrium<'a>,
     damage: DamageStep<'a>,
     clock: Clock,
+    /// What chosen steps have to follow, where it depends on time.
+    load_curve: Option<LoadCurve<'a>>,
     /// The source at the last accepted step, once it is known.
     source: Option<Source>,
     bounds: Bounds,
@@ -77,6 +80,7 @@ impl<'a> TimeLoop<'a> {
             equilibrium,
             damage: DamageStep::new(session, setting, phases),
             clock: Clock::new(grid, chosen.as_ref().map_or(0.0, Chosen::first_step)),
+            load_curve: chosen.as_ref().and_then(|_| LoadCurve::new(setting)),
             source: None,
             bounds,
             estimate: Estimate::new(&body.partition),
@@ -90,7 +94,7 @@ impl<'a> TimeLoop<'a> {
     /// # Errors
     /// The step failed, and shorter ones are not ours to choose or have become hopelessly small.
     pub(super) fn next(&mut self) -> Result<Option<Attempt>, RunError> {
-        let Some((time, step)) = self.clock.propose() else { return Ok(None) };
+        let Some((time, step)) = self.propose() else { return Ok(None) };
         match self.attempt(time, step) {
             Err(failure) if failure.is_of_a_step() => {
                 if self.undo(step, 0.5)? {
@@ -100,6 +104,20 @@ impl<'a> TimeLoop<'a> {
                 }
             }
             other => other.map(Some),
+        }
+    }
+
+    /// The next step's end and length, s: a chosen one follows the loads.
+    fn propose(&mut self) -> Option<(f64, f64)> {
+        loop {
+            let (time, step) = self.clock.propose()?;
+            let follows = match &mut self.load_curve {
+                Some(curve) => curve.is_nearly_linear(self.outcome.last.state.time, time),
+                None => true,
+            };
+            if follows || !self.clock.halve(step) {
+                return Some((time, step));
+            }
         }
     }
 

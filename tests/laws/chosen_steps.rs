@@ -1,6 +1,6 @@
 //! Chosen steps keep their tolerance, and no more steps are made than that takes.
 
-use crate::support::{distorted, history, setting, shipped};
+use crate::support::{distorted, history, setting, shipped, square};
 use signorini::{
     contact::SOLVERS,
     evolution::{Outcome, Setting, Step},
@@ -59,6 +59,40 @@ fn a_load_that_closes_the_gap_between_two_steps_is_noticed() {
     assert!(2 * early < steps.len(), "{early} of {}", steps.len());
     let error = error(&steps, load);
     assert!(error < 0.01, "{error} in {} steps", steps.len());
+}
+
+#[test]
+fn a_pulse_between_the_ends_of_a_step_is_noticed() {
+    // A hundredth of the run up and another down, as a traction, a body force and a displacement.
+    let pulse = "max(0, 1 - abs(t - 0.5031)*100)";
+    let traction = |load: String| format!("{{ name = 'top', traction = [0, '{load}'] }}");
+    let still = "body.force = [0, 0]";
+    let cases = [
+        (still.to_owned(), traction(format!("-1e5 - 3e6*{pulse}"))),
+        (still.to_owned(), traction(format!("-3e6*{pulse}"))),
+        (format!("body.force = [0, '-6e6*{pulse}']"), traction("-1e5".to_owned())),
+        (still.to_owned(), format!("{{ name = 'top', displacement = [0, '-3e-3*{pulse}'] }}")),
+    ];
+    for (force, top) in cases {
+        let run = |step: &str| {
+            let text = format!(
+                "{force}
+                 material = {{ young = 1e9, poisson = 0.3, plane = 'stress' }}
+                 damage = {{ diffusion = 0.01, lambda_d = 0.25, lambda_u = 2e5, lambda_w = 0,
+                             strain_cap = 1000, threshold = 0.01, initial = 1 }}
+                 time = {{ end = 1, step = {step} }}
+                 boundary = [{{ name = 'left', symmetry = true }}, {{ name = 'bottom', gap = 0 }},
+                             {top}]"
+            );
+            let setting = setting(square(2), &text).unwrap_or_else(|e| panic!("{e}"));
+            history(&setting, SOLVERS[0]).0
+        };
+        let [chosen, uniform] = ["'auto'", "2e-4"].map(run);
+        let [found, expected] = [&chosen, &uniform].map(|steps| done(steps)[0]);
+        println!("{force} {top}: {} steps, {found:e} of {expected:e}", chosen.len());
+        assert!(expected > 1e-3 && (found / expected - 1.0).abs() < 0.02, "{found} {expected}");
+        assert!(chosen.len() < 150, "{}", chosen.len());
+    }
 }
 
 /// A square that is bent down on a foundation, with this λ_U.
