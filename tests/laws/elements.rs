@@ -215,8 +215,8 @@ fn frames_keep_work_and_give_back_what_they_take() {
 
 #[test]
 fn the_assembled_stiffness_is_the_matrix_free_force_in_the_frames() {
-    let session = Session::start(&[]).unwrap();
     let body = Body::new(unstructured(0.2));
+    let session = Session::start(&[]).unwrap();
     let (nodes, elasticity) = (body.mesh.nodes.len(), elasticity(Plane::Stress));
     let mut random = Random(8);
     let frames = frames(nodes, &mut random);

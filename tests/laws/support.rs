@@ -6,7 +6,7 @@ use signorini::{
     petsc::Session,
     scene::Scene,
 };
-use std::{fs, path::Path};
+use std::{collections::BTreeMap, fs, path::Path};
 
 /// Numbers between −1 and 1, the same at every run (SplitMix64).
 pub struct Random(pub u64);
@@ -80,7 +80,14 @@ pub fn unstructured(size: f64) -> Mesh {
         .collect();
     let body = "Curve Loop(1) = {1:4}; Plane Surface(1) = {1}; Physical Surface(\"body\") = {1};";
     fs::write(&geo, [corners, sides, body, &named].join("\n")).unwrap();
-    mesh::load(&geo, &[("size".to_owned(), size)].into()).unwrap()
+    meshed(&geo, &[("size".to_owned(), size)].into())
+}
+
+/// A mesh by gmsh (not while a session is held), which cannot be started while MPI, as it starts in another test, changes the
+/// environment.
+fn meshed(file: &Path, parameters: &BTreeMap<String, f64>) -> Mesh {
+    drop(Session::start(&[]).unwrap());
+    mesh::load(file, parameters).unwrap()
 }
 
 /// `mesh` with its nodes moved; the map must keep the orientation.
@@ -116,7 +123,7 @@ pub fn shipped(name: &str, sets: &[&str]) -> Setting {
     let sets: Vec<String> = sets.iter().map(|s| (*s).to_owned()).collect();
     let scene = folder.path().join(name).with_extension("toml");
     let scene = Scene::read(&scene, &sets).unwrap_or_else(|e| panic!("{e}"));
-    let mesh = mesh::load(&scene.mesh.file, &scene.mesh.parameters).unwrap();
+    let mesh = meshed(&scene.mesh.file, &scene.mesh.parameters);
     Setting::new(scene, mesh).unwrap_or_else(|e| panic!("{e}"))
 }
 
