@@ -189,14 +189,13 @@ impl ContactReport {
     }
 }
 
-/// What to try where a method has missed the tolerance.
-const ADVICE: &str = "; try another contact.solver, shorter steps or a larger contact.tolerance";
-
 /// A contact solve that did not end well.
+///
+/// [`RunError`](crate::evolution::RunError) adds what to try, which depends on the scene.
 #[derive(Debug, thiserror::Error)]
 pub enum ContactError {
     /// The method ended above the tolerance.
-    #[error("{method} stopped after {iterations} iterations: {detail}{ADVICE}")]
+    #[error("{method} stopped after {iterations} iterations: {detail}")]
     NotConverged {
         /// The solver's name.
         method: &'static str,
@@ -206,7 +205,7 @@ pub enum ContactError {
         detail: String,
     },
     /// The answer does not satisfy the KKT conditions.
-    #[error("{method} gave an answer, but {}{ADVICE}", residuals.missed(*tolerance))]
+    #[error("{method} gave an answer, but {}", residuals.missed(*tolerance))]
     NotCertified {
         /// The solver's name.
         method: &'static str,
@@ -238,7 +237,7 @@ pub enum ContactError {
     /// One of TAO's types ended above the tolerance.
     #[error(
         "tao:{kind} stopped after {iterations} iterations: {} (TaoConvergedReason {reason}, \
-        {false_claims} false claims of convergence){ADVICE}", residuals.missed(*tolerance)
+        {false_claims} false claims of convergence)", residuals.missed(*tolerance)
     )]
     TaoStopped {
         /// TAO's type.
@@ -267,4 +266,14 @@ pub enum ContactError {
     /// PETSc failed.
     #[error(transparent)]
     Petsc(#[from] PetscError),
+}
+
+impl ContactError {
+    /// Whether the method has missed a tolerance that may not be out of reach.
+    pub fn is_missed(&self) -> bool {
+        matches!(
+            self,
+            Self::NotConverged { .. } | Self::NotCertified { .. } | Self::TaoStopped { .. }
+        )
+    }
 }

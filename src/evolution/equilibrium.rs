@@ -142,7 +142,7 @@ impl<'a> Equilibrium<'a> {
         let posed = agreed(setting.body.partition.ranks(), setting.posed(time))?;
 
         self.start(time, &external, &posed)?;
-        let failed = |source| RunError::Contact { step, time, source };
+        let failed = |source| RunError::contact(setting.scene(), step, time, source);
         let mut total = ContactReport::default();
         let (mut tolerance, mut attempts) = (setting.tolerance, 0);
         loop {

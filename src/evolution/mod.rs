@@ -11,6 +11,7 @@ mod foundation;
 mod load_curve;
 mod loads;
 mod notes;
+mod resultants;
 mod setting;
 mod state;
 mod time_loop;
@@ -28,6 +29,7 @@ pub use state::{State, Step, StepRecord};
 use crate::{
     contact::{ContactError, ContactReport, Kkt, RigidMotion, UnknownSolver},
     petsc::{PetscError, Ranks, Session},
+    scene::Scene,
 };
 use damage_step::Driving;
 use time_loop::{Attempt, TimeLoop};
@@ -81,14 +83,16 @@ pub struct Stop {
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// A contact step failed; the steps before it are accepted.
-    #[error("step {step} (t = {time}): {source}")]
+    #[error("{}{source}{advice}", time.map_or(String::new(), |t| format!("step {step} (t = {t}): ")))]
     Contact {
         /// The step.
         step: usize,
-        /// Its time, s.
-        time: f64,
+        /// Its time, s; none where there is no time.
+        time: Option<f64>,
         /// What failed.
-        source: ContactError,
+        source: Box<ContactError>,
+        /// What to try, to follow the source; empty where that says it.
+        advice: &'static str,
     },
     /// The damage step has no answer.
     #[error(
@@ -144,6 +148,23 @@ pub enum RunError {
 }
 
 impl RunError {
+    /// The failed contact step n = `step`; its advice is of what the scene has: another solver helps
+    /// where there is contact, shorter steps help after the first solve.
+    fn contact(scene: &Scene, step: usize, time: f64, source: ContactError) -> Self {
+        let contact = scene.boundaries.iter().any(|boundary| boundary.gap.is_some());
+        let advice = match (source.is_missed(), contact, step > 0) {
+            (false, ..) => "",
+            (_, true, true) => {
+                "; try another contact.solver, shorter steps or a larger contact.tolerance"
+            }
+            (_, true, false) => "; try another contact.solver or a larger contact.tolerance",
+            (_, false, true) => "; try shorter steps or a larger contact.tolerance",
+            (_, false, false) => "; try a larger contact.tolerance",
+        };
+        let time = scene.time.map(|_| time);
+        Self::Contact { step, time, source: Box::new(source), advice }
+    }
+
     /// Whether a shorter step may do better.
     fn is_of_a_step(&self) -> bool {
         matches!(self, Self::Contact { .. } | Self::Damage { .. } | Self::DamageMissed { .. })

@@ -119,9 +119,9 @@ impl Outcome {
             false => String::new(),
         };
         Some(format!(
-            "{steps} steps chosen: the damage is exact in time to about {:.1} % of the damage \
+            "{steps} steps chosen: the damage is exact in time to about {} of the damage \
              done (two or three times that where the load swings or jumps){verdict}",
-            100.0 * error
+            percent(error)
         ))
     }
 }
@@ -145,7 +145,8 @@ impl Outcome {
 
 impl Setting {
     /// What the user should know before any solve: what was not taken as it is written, rigid
-    /// motions that nothing holds, a material or triangles that make the discretisation poor.
+    /// motions that nothing holds, tractions, a material or triangles that make the discretisation
+    /// poor.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = self.scene().notes.clone();
         notes.extend(self.pieces().into_iter().chain(self.hinge()));
@@ -154,6 +155,8 @@ impl Setting {
         if free.len() > TOLD {
             notes.push(format!("nothing holds or drives {} more such motions", free.len() - TOLD));
         }
+        notes.extend(self.unresolved.iter().cloned());
+        notes.extend(self.static_damage());
         notes.extend(self.locking());
         notes.extend(self.sliver());
         notes
@@ -189,6 +192,13 @@ impl Setting {
         })
     }
 
+    fn static_damage(&self) -> Option<String> {
+        let scene = self.scene();
+        (scene.damage.is_some() && scene.time.is_none()).then(|| {
+            "[damage] without [time]: in this static solve ζ stays damage.initial".to_owned()
+        })
+    }
+
     fn locking(&self) -> Option<String> {
         let material = self.scene().material;
         let locks = material.plane == Plane::Strain && material.poisson > LOCKING;
@@ -217,6 +227,14 @@ impl Setting {
                  angles shrink; mend the mesh there if that is not meant"
             )
         })
+    }
+}
+
+/// A part of 1 in percent: with two decimals, or three figures where these would say too little.
+fn percent(part: f64) -> String {
+    match 100.0 * part {
+        percent if percent > 0.0 && percent < 0.1 => format!("{percent:.2e} %"),
+        percent => format!("{percent:.2} %"),
     }
 }
 

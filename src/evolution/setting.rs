@@ -1,6 +1,6 @@
 //! The physical setting: a scene bound to its mesh, everything that does not change with time.
 
-use super::{Foundation, Loads};
+use super::{Foundation, Loads, resultants};
 use crate::{
     contact::{
         Bound, Certificate, ConstraintError, Constraints, DrivenMotion, FixedRow, GapRow,
@@ -35,6 +35,8 @@ pub struct Setting {
     pub tolerance: f64,
     /// The foundation opposite Γ_C.
     pub foundation: Foundation,
+    /// Notes on tractions that the mesh does not resolve.
+    pub(super) unresolved: Vec<String>,
     scene: Scene,
 }
 
@@ -110,6 +112,7 @@ impl Setting {
         let setting = Self {
             largest_load,
             foundation: Foundation::new(&scene, &body.mesh, &constraints),
+            unresolved: resultants::unresolved(&scene, &body.mesh),
             certificate: Certificate::new(&fixed, &constraints.gaps),
             elasticity: Elasticity::new(scene.material),
             constraints,

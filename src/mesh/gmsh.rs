@@ -5,6 +5,7 @@ use std::{
     fs, io,
     path::{Path, PathBuf},
     process::Command,
+    time::SystemTime,
 };
 
 use super::{Mesh, MeshError, read};
@@ -31,8 +32,8 @@ pub fn load(path: &Path, parameters: &BTreeMap<String, f64>) -> Result<Mesh, Mes
 ///
 /// Each parameter is set over the `DefineConstant` of its name and appears in the name of
 /// the mesh, as in `bridge-grading3-size0.25.msh`. `size`, in m, also bounds the length of
-/// the edges. A mesh that is not older than its `.geo` is kept as it is; a new one appears
-/// complete or not at all.
+/// the edges. A mesh that is not older than its `.geo` and the files this takes in by `Include` and
+/// `Merge` is kept as it is; a new one appears complete or not at all.
 ///
 /// # Errors
 /// The `.geo` cannot be read or the `.msh` written, a parameter makes no sense or occurs
@@ -45,9 +46,8 @@ pub fn mesh_geo(geo: &Path, parameters: &BTreeMap<String, f64>) -> Result<PathBu
     let text = fs::read(geo).map_err(io_error(geo))?;
     check(geo, &String::from_utf8_lossy(&text), parameters)?;
     let mesh = mesh_path(geo, parameters);
-    let modified = |path: &Path| fs::metadata(path).and_then(|data| data.modified());
     if let Ok(meshed) = modified(&mesh)
-        && meshed >= modified(geo).map_err(io_error(geo))?
+        && meshed >= last_change(geo).map_err(io_error(geo))?
     {
         return Ok(mesh);
     }
@@ -65,6 +65,43 @@ pub fn mesh_geo(geo: &Path, parameters: &BTreeMap<String, f64>) -> Result<PathBu
     run(geo, parameters, &fresh, folder)?;
     fs::rename(&fresh, &mesh).map_err(io_error(&mesh))?;
     Ok(mesh)
+}
+
+fn modified(path: &Path) -> io::Result<SystemTime> {
+    fs::metadata(path).and_then(|data| data.modified())
+}
+
+/// When the `.geo`, or a file that it takes in, directly or through others, was last changed. Files
+/// that are not there are for gmsh to tell.
+fn last_change(geo: &Path) -> io::Result<SystemTime> {
+    let mut last = modified(geo)?;
+    let mut files = vec![fs::canonicalize(geo)?];
+    let mut next = 0;
+    while let Some(file) = files.get(next).cloned() {
+        next += 1;
+        last = last.max(modified(&file)?);
+        let text = fs::read(&file)?;
+        for name in taken_in(&String::from_utf8_lossy(&text)) {
+            // Names are relative to the file they stand in.
+            if let Ok(path) = fs::canonicalize(file.with_file_name(name))
+                && path.is_file()
+                && !files.contains(&path)
+            {
+                files.push(path);
+            }
+        }
+    }
+    Ok(last)
+}
+
+/// The names in `Include "name"` and `Merge "name"`.
+fn taken_in(text: &str) -> Vec<&str> {
+    let after = |keyword| text.split(keyword).skip(1);
+    let names = after("Include").chain(after("Merge")).filter_map(|rest| {
+        let name = rest.trim_start().strip_prefix('"')?;
+        name.split_once('"').map(|(name, _)| name)
+    });
+    names.collect()
 }
 
 /// Refuses what gmsh would misread or silently ignore.

@@ -111,3 +111,18 @@ impl Check<'_> {
         }
     }
 }
+
+/// What `a` and `b`, two boundaries on the same edge, have that cannot both hold there; as within
+/// one boundary.
+pub(super) fn contradiction(a: &Boundary, b: &Boundary) -> Option<[&'static str; 2]> {
+    let one_way = |a: &Boundary, b: &Boundary| match (&a.displacement, a.symmetry) {
+        (Some(_), _) if b.gap.is_some() => Some(["a displacement", "a gap"]),
+        (Some(_), _) if b.symmetry => Some(["a displacement", "a symmetry"]),
+        (Some([Some(_), Some(_)]), _) if b.traction.is_some() => {
+            Some(["both displacements prescribed", "a traction"])
+        }
+        (_, true) if b.gap.is_some() => Some(["a symmetry", "a gap"]),
+        _ => None,
+    };
+    one_way(a, b).or_else(|| one_way(b, a).map(|[of_b, of_a]| [of_a, of_b]))
+}

@@ -1,5 +1,8 @@
 //! What only the mesh can tell: names, and values at the nodes.
 
+use std::collections::BTreeMap;
+
+use super::boundaries::contradiction;
 use super::error::{Names, SceneError};
 use super::expression::Expression;
 use super::source::boundary_key;
@@ -21,7 +24,7 @@ const EVALUATIONS: usize = 4_000_000;
 
 impl Scene {
     /// Checks the scene against its mesh: every boundary names a physical curve on the
-    /// boundary of the body, ζ₀ is in (ζ_*, 1] and the gap not negative at their nodes, fixed
+    /// boundary of the body, boundaries that share edges do not contradict each other, ζ₀ is in (ζ_*, 1] and the gap not negative at their nodes, fixed
     /// normals point out of the body, and all expressions are finite where and when they are
     /// used, as far as times are known beforehand (a thousand of them at most).
     ///
@@ -39,6 +42,7 @@ impl Scene {
                 self.check_normal(gap, &boundary_key(&boundary.name, "normal"), curve, mesh)?;
             }
         }
+        self.check_shared_edges(mesh)?;
         self.check_values(mesh, &self.sample_times(1000))
     }
 
@@ -95,6 +99,33 @@ impl Scene {
             key: format!("boundary \"{name}\""),
             problem,
         })
+    }
+
+    /// Whether boundaries of different names that share an edge can both hold there. Shared nodes,
+    /// where curves meet, are the business of the constraints.
+    fn check_shared_edges(&self, mesh: &Mesh) -> Result<(), SceneError> {
+        let mut boundaries_of: BTreeMap<[usize; 2], Vec<&Boundary>> = BTreeMap::new();
+        for boundary in &self.boundaries {
+            let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
+            for &edge in &curve.edges {
+                let others = boundaries_of.entry(edge).or_default();
+                for other in others.iter() {
+                    let Some([has, others]) = contradiction(boundary, other) else { continue };
+                    let [x, y] = midpoint(mesh.nodes[edge[0]], mesh.nodes[edge[1]]);
+                    let problem = format!(
+                        "has {has}, but boundary \"{}\" on the same edge at ({x}, {y}) has \
+                         {others}; only one of them can hold there: take the edge out of one of \
+                         the two physical curves",
+                        other.name
+                    );
+                    let place = self.source.place_of(&boundary_key(&boundary.name, "name"));
+                    let key = format!("boundary \"{}\"", boundary.name);
+                    return Err(SceneError::Invalid { place, key, problem });
+                }
+                others.push(boundary);
+            }
+        }
+        Ok(())
     }
 
     fn check_initial(&self, damage: &Damage, mesh: &Mesh) -> Result<(), SceneError> {

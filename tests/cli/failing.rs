@@ -66,6 +66,24 @@ fn the_first_solve_fails() {
 }
 
 #[test]
+fn a_static_solve_fails_without_a_word_of_steps() {
+    let desk = Desk::new();
+    let text = SCENE.replace("[time]\nend = 1\nstep = 0.1\n", "");
+    desk.write("scene.toml", &text);
+    let said = desk.say(&["run", "scene.toml", "--solver", "tao", "--", "-tao_max_it", "0"]);
+    said.fails(
+        1,
+        &["error: tao:tron stopped after 0 iterations", "; try another contact.solver or"],
+    );
+    assert!(!said.err.contains("step"), "{}", said.err);
+    // Nor of solvers where there is no contact.
+    desk.write("scene.toml", &text.replace("gap = \"0\"", "symmetry = true"));
+    let said = desk.say(&["run", "scene.toml", "--set", "contact.tolerance=1e-30"]);
+    said.fails(1, &["error: "]);
+    assert!(!said.err.contains("step") && !said.err.contains("solver"), "{}", said.err);
+}
+
+#[test]
 fn a_load_that_is_not_finite_between_the_times_checked_beforehand() {
     // 10⁴ steps, of which every tenth is checked: 0.0014 to 0.0016 are not.
     let value = "-0.01*t + 0*sqrt(abs(t - 0.0015) - 0.00015)";

@@ -1,7 +1,10 @@
 //! `signorini mesh`, and scenes that name a `.geo`.
 
 use crate::desk::{Desk, SCENE};
-use std::fs;
+use std::{
+    fs,
+    time::{Duration, SystemTime},
+};
 
 const GEO: &str = r#"
 DefineConstant[ size = 0.5 ];
@@ -39,6 +42,25 @@ fn meshes_appear_beside_their_geo() {
     let before = meshed("geo/square.msh");
     assert_eq!(desk.say(&["mesh", "geo/scene.toml"]).code, Some(0));
     assert_eq!(meshed("geo/square.msh"), before);
+}
+
+#[test]
+fn a_change_in_an_included_file_is_meshed() {
+    let desk = desk();
+    desk.write("geo/square.geo", "Include \"parts/square.geo\";\n");
+    desk.write("geo/parts/square.geo", "Include \"body.geo\";\n");
+    desk.write("geo/parts/body.geo", GEO);
+    let meshed = || {
+        assert_eq!(desk.say(&["mesh", "geo/scene.toml"]).code, Some(0));
+        desk.read("geo/square.msh")
+    };
+    let coarse = meshed();
+    let body = desk.path("geo/parts/body.geo");
+    desk.write("geo/parts/body.geo", &GEO.replace("size = 0.5", "size = 0.25"));
+    // Clocks of file systems are coarse: that it is older or newer must not hang on them.
+    let later = SystemTime::now() + Duration::from_secs(10);
+    fs::File::options().append(true).open(body).unwrap().set_modified(later).unwrap();
+    assert!(meshed().len() > coarse.len());
 }
 
 #[test]

@@ -42,6 +42,43 @@ fn large_strains_and_rotations_are_noted_and_long_ways_are_not() {
 }
 
 #[test]
+fn a_traction_narrower_than_the_edges_is_noted() {
+    // Of 4 edges; the Gauss points next to ½ are 0.053 from it. A hat of half width w.
+    let notes = |traction: &str| pressed(0.0, traction).unwrap().notes();
+    let [note] = &notes("-100*max(0, 1 - abs(x - 0.5)/0.05)")[..] else { panic!("one note") };
+    let told = "the traction of boundary \"top\" varies within the mesh's edges: its resultant on \
+                this mesh is (0.0000e0, 0.0000e0) N/m, integrated finely (0.0000e0, -4.98";
+    assert!(note.starts_with(told) && note.ends_with("; refine there"), "{note}");
+    // Balanced, of no resultant in truth; smooth on the mesh; constant.
+    assert_eq!(notes("-1 - cos(8*pi*(x - 0.0528))").len(), 1);
+    for resolved in ["-1 - x^3", "-1 - sin(2*pi*x)", "-2"] {
+        assert_eq!(notes(resolved), [""; 0], "{resolved}");
+    }
+    // It runs over the top and is 0 at first.
+    let running = "-t*max(0, 1 - abs(x - t)/0.05)";
+    let text = format!(
+        "{MATERIAL}
+         time = {{ end = 1, step = 0.1 }}
+         boundary = [{{ name = 'left', symmetry = true }}, {{ name = 'bottom', gap = 0 }},
+                     {{ name = 'top', traction = [0, '{running}'] }}]"
+    );
+    let notes = setting(square(4), &text).unwrap().notes();
+    assert!(notes.len() == 1 && notes[0].contains(" N/m at t = "), "{notes:?}");
+}
+
+#[test]
+fn damage_without_time_is_noted() {
+    let text = format!(
+        "{MATERIAL}
+         damage = {{ diffusion = 1, lambda_d = 0, lambda_u = 1, lambda_w = 0, strain_cap = 1,
+                     threshold = 0.01, initial = 0.5 }}
+         boundary = [{{ name = 'left', displacement = [0, 0] }}]"
+    );
+    let notes = setting(square(2), &text).unwrap().notes();
+    assert!(notes.len() == 1 && notes[0].starts_with("[damage] without [time]"), "{notes:?}");
+}
+
+#[test]
 fn steps_off_the_fast_path_are_noted() {
     let setting = pressed(0.0, "-1").unwrap();
     let mut outcome = run(&setting, SOLVERS[0]);

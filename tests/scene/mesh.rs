@@ -126,6 +126,8 @@ fn a_fixed_normal_points_out_of_the_body_all_along_its_curve() {
     let mut mesh = square();
     mesh.curves
         .insert("foundation".into(), Curve { edges: vec![[0, 1], [3, 0]], interior_edges: 0 });
+    // The axis out of the way.
+    mesh.curves.insert("axis".into(), Curve { edges: vec![[2, 3]], interior_edges: 0 });
     let normal = |normal: &str| verdict("[\"3\", \"-4\"]", normal, &mesh);
     let refused = |text: &str, how: &str| {
         let message = normal(text).expect_err("a normal that does not point out");
@@ -166,6 +168,34 @@ fn a_curve_must_be_there_and_on_the_boundary() {
     mesh.curves.clear();
     let message = verdict("", "", &mesh).expect_err("no curves");
     assert!(message.ends_with("is no physical curve of the mesh (there are none)"), "{message}");
+}
+
+#[test]
+fn boundaries_that_share_an_edge_do_not_contradict_each_other() {
+    let mut mesh = square();
+    // All around the body, in the place of the axis; the curves of the others lie on it.
+    let edges = vec![[1, 2], [2, 3], [3, 0], [0, 1]];
+    mesh.curves.insert("axis".into(), Curve { edges, interior_edges: 0 });
+    let around = |what: &str| verdict("symmetry = true", what, &mesh);
+    let refused = |what: &str, told: &str| {
+        let message = around(what).expect_err(what);
+        assert!(message.starts_with("bad.toml:40: boundary \"axis\" has "), "{message}");
+        assert!(message.contains(told), "{message}");
+    };
+    refused(
+        "symmetry = true",
+        "has a symmetry, but boundary \"clamp\" on the same edge at (2, 1) has a displacement; \
+         only one of them can hold there: take the edge out of one of the two physical curves",
+    );
+    refused("gap = 0", "a gap, but boundary \"clamp\" on the same edge at (2, 1) has a disp");
+    refused("traction = [0, 1]", "\"clamp\" on the same edge at (2, 1) has both displacements");
+    refused("displacement = [0, \"free\"]", "\"foundation\" on the same edge at (1, 0) has a gap");
+    // Without the clamp: tractions add up, and one acts beside the gap.
+    let edges = vec![[0, 1], [2, 3], [3, 0]];
+    mesh.curves.insert("axis".into(), Curve { edges, interior_edges: 0 });
+    assert_eq!(verdict("symmetry = true", "traction = [0, 1]", &mesh), Ok(()));
+    let message = verdict("", "", &mesh).expect_err("a symmetry and a gap");
+    assert!(message.contains("a symmetry, but boundary \"foundation\""), "{message}");
 }
 
 #[test]

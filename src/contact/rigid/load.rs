@@ -13,6 +13,8 @@ const BALANCED: f64 = 1e-9;
 const REMAINDER: f64 = 1e-8;
 /// A piece that carries less than this of all the load carries rounding.
 const UNLOADED: f64 = 1e-14;
+/// A component of the resultant below this, relative to Σ|f|, is not told.
+const ROUNDING: f64 = 1e-12;
 
 impl RigidMotions {
     /// Checks that `load` (nodal forces) does no work on free motions and can be balanced by
@@ -73,13 +75,14 @@ impl RigidMotions {
 
     fn driven(&self, piece: &Unheld, motion: RigidMotion, sums: &[Resultant]) -> DrivenMotion {
         let [x, y] = motion.largest().map_or([0.0; 2], |largest| largest.centre);
-        let [mut fx, mut fy, mut moment] = [0.0; 3];
+        let [mut fx, mut fy, mut moment, mut size] = [0.0; 4];
         for &part in &piece.parts {
-            let ([cx, cy], [px, py, turn, _]) = (self.parts[part].centre, sums[part]);
-            (fx, fy) = (fx + px, fy + py);
+            let ([cx, cy], [px, py, turn, all]) = (self.parts[part].centre, sums[part]);
+            (fx, fy, size) = (fx + px, fy + py, size + all);
             moment += turn + (cx - x) * py - (cy - y) * px;
         }
-        DrivenMotion { motion, force: fx.hypot(fy), moment, pieces: self.pieces }
+        let force = [fx, fy].map(|f| if f.abs() > ROUNDING * size { f } else { 0.0 });
+        DrivenMotion { motion, force, moment, pieces: self.pieces }
     }
 
     /// The motion with these shares (a unit vector) of those that only contact holds. Where it

@@ -132,16 +132,16 @@ fn place(x: [f64; 2]) -> String {
 /// The load does work on a rigid motion that nothing holds.
 #[derive(Debug, Clone, thiserror::Error)]
 #[error(
-    "{}nothing holds {} against {}, and the load drives it (resultant {force:.4e} N/m, moment \
-     about its centre {moment:.4e} N): hold it by a `displacement`, a `symmetry` axis or a `gap`, \
+    "{}nothing holds {} against {}, and the load drives it (resultant ({:.4e}, {:.4e}) N/m, \
+     moment about its centre {moment:.4e} N): hold it by a `displacement`, a `symmetry` axis or a `gap`, \
      or balance the load",
-    disjoint(*pieces, motion.mover), motion.what_moves(), motion.how_it_moves()
+    disjoint(*pieces, motion.mover), motion.what_moves(), motion.how_it_moves(), force[0], force[1]
 )]
 pub struct DrivenMotion {
     /// The motion.
     pub motion: RigidMotion,
-    /// Size of the load's resultant on what moves and hangs on it, N per metre of thickness.
-    pub force: f64,
+    /// The load's resultant on what moves and hangs on it, N per metre of thickness.
+    pub force: [f64; 2],
     /// The load's moment about the centre of what moves, N m per metre of thickness.
     pub moment: f64,
     /// Number of pieces of the mesh.

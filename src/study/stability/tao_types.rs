@@ -120,7 +120,7 @@ impl Cell {
     fn refused(&mut self, failure: &RunError) {
         self.message = Some(failure.to_string());
         let RunError::Contact { source, .. } = failure else { return };
-        match source {
+        match &**source {
             ContactError::TaoStopped {
                 iterations,
                 linear_iterations,
