@@ -34,11 +34,12 @@ impl Refactorisation {
     }
 
     /// A solve took so many iterations: those that the best one since the last factorisation did
-    /// not need are lost. A solve without iterations tells nothing.
+    /// not need are lost, and all beyond half a factorisation: matrices that differ so much (those
+    /// of an interior-point method) need one each. A solve without iterations tells nothing.
     pub fn solved(&mut self, iterations: usize) {
         if iterations > 0 {
             self.best = self.best.min(iterations);
-            self.lost += iterations - self.best;
+            self.lost += iterations - self.best.min((0.5 * self.cost) as usize);
         }
     }
 
@@ -62,15 +63,18 @@ mod tests {
     fn a_factor_is_replaced_when_its_age_has_cost_as_much_as_a_new_one() {
         let mut policy = Refactorisation::default();
         assert!(policy.due(), "there is none yet");
-        policy.done(5.0);
+        policy.done(8.0);
         policy.solved(4);
         assert!(!policy.due(), "the first solve tells what a new factor needs");
         policy.solved(1);
         policy.solved(0);
         policy.solved(4);
-        assert!(!policy.due(), "3 iterations lost of 5");
-        assert_eq!(policy.iteration_limit(), 1 + FEWEST);
-        policy.solved(3);
+        assert!(!policy.due(), "3 iterations lost of 8");
+        assert_eq!(policy.iteration_limit(), 1 + 5);
+        policy.solved(6);
         assert!(policy.due());
+        policy.done(8.0);
+        policy.solved(13);
+        assert!(policy.due(), "a factor that helps so little is due at once");
     }
 }
