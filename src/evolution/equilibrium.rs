@@ -149,7 +149,13 @@ impl<'a> Equilibrium<'a> {
             attempts += 1;
             let (lift, bounds) = self.datum.pose(setting, &posed);
             let force = self.set_load(&external, &lift)?;
-            let solved = self.solve_contact(&bounds, force, tolerance);
+            let solved = match self.solve_contact(&bounds, force, tolerance) {
+                // All ranks know that the method stopped short; other errors may be one rank's.
+                Err(e @ (ContactError::NotConverged { .. } | ContactError::TaoStopped { .. })) => {
+                    Err(e)
+                }
+                other => Ok(other.map_err(failed)?),
+            };
             let u = self.displacement(&lift)?;
             let judged = phases.time("certificate", || self.certify(&u, &external, &prescribed));
             // Rounding of a long way hides a small deformation: measured from the way's end it
@@ -162,8 +168,7 @@ impl<'a> Equilibrium<'a> {
             match solved {
                 Ok(report) => total.add(&report),
                 // What a solver thinks of its answer is not asked if the certificate holds.
-                Err(ContactError::NotConverged { .. } | ContactError::TaoStopped { .. })
-                    if certified => {}
+                Err(_) if certified => {}
                 Err(error) => return Err(failed(self.limited(error, &judged, &u))),
             }
             self.report = total;
