@@ -207,7 +207,9 @@ impl<'a> TimeLoop<'a> {
                 let from = self.setting.body.partition.extremes(chosen.start()).0;
                 let part = if from > level { (from - level) / (from - reached) } else { 0.0 };
                 let (landing, delay) = (chosen.landing(), chosen.delay(&damaged.zeta));
-                if from - level > landing && self.undo(step, (0.9 * part).max(0.01))? {
+                // The corrected start is not what is written.
+                let written = self.outcome.last.record.zeta_min;
+                if from.max(written) - level > landing && self.undo(step, (0.9 * part).max(0.01))? {
                     return Ok(Attempt::Undone);
                 }
                 (started + part * step, step + delay)
