@@ -5,7 +5,7 @@ use clap::Args;
 use comfy_table::{CellAlignment, Table, presets};
 use signorini::{
     contact::SOLVERS,
-    evolution::Setting,
+    evolution::DiscreteProblem,
     mesh, output,
     petsc::Session,
     scene::Scene,
@@ -48,13 +48,13 @@ pub fn compare_scenes(arguments: &CompareArguments) -> Result<(), Failure> {
     for path in &arguments.scenes {
         let scene = Scene::read(path, &arguments.set).map_err(Failure::input)?;
         let mesh = mesh::load(&scene.mesh.file, &scene.mesh.parameters).map_err(Failure::input)?;
-        settings.push(Setting::new(scene, mesh).map_err(Failure::input)?);
+        settings.push(DiscreteProblem::new(scene, mesh).map_err(Failure::input)?);
     }
     output::create(&arguments.out).map_err(Failure::input)?;
     let session = Session::start(&arguments.petsc).map_err(Failure::solver)?;
     let mut entries = Vec::new();
-    for setting in &settings {
-        let comparison = compare(&session, setting, &solvers).map_err(Failure::solver)?;
+    for problem in &settings {
+        let comparison = compare(&session, problem, &solvers).map_err(Failure::solver)?;
         entries.extend(comparison.entries);
     }
     session.finalize().map_err(Failure::solver)?;

@@ -2,7 +2,7 @@
 
 use super::{Failure, run::read_scene, screen::say};
 use clap::Args;
-use signorini::{evolution::Setting, mesh, petsc::Session, study};
+use signorini::{evolution::DiscreteProblem, mesh, petsc::Session, study};
 use std::path::PathBuf;
 
 /// Arguments of `signorini floor`.
@@ -31,10 +31,10 @@ pub struct FloorArguments {
 pub fn floor(arguments: &FloorArguments) -> Result<(), Failure> {
     let scene = read_scene(&arguments.scene, arguments.mesh.as_deref(), &arguments.set)?;
     let mesh = mesh::load(&scene.mesh.file, &scene.mesh.parameters).map_err(Failure::input)?;
-    let setting = Setting::new(scene, mesh).map_err(Failure::input)?;
+    let problem = DiscreteProblem::new(scene, mesh).map_err(Failure::input)?;
     let session = Session::start(&arguments.petsc).map_err(Failure::solver)?;
     let floor =
-        study::floor(&session, &setting, arguments.rounds.max(1)).map_err(Failure::solver)?;
+        study::floor(&session, &problem, arguments.rounds.max(1)).map_err(Failure::solver)?;
     say(&serde_json::to_string_pretty(&floor).map_err(Failure::solver)?);
     session.finalize().map_err(Failure::solver)
 }

@@ -36,9 +36,9 @@ pub enum Failure {
     /// The solver's: it did not reach its tolerance.
     Solver(String),
     /// Another rank's.
-    Elsewhere,
+    OnAnotherRank,
     /// One rank has told it for all; with the exit code.
-    Told(u8),
+    AlreadyReported(u8),
 }
 
 impl Failure {
@@ -53,9 +53,9 @@ impl Failure {
     /// The exit code.
     pub fn code(&self) -> u8 {
         match self {
-            Self::Solver(_) | Self::Elsewhere => 1,
+            Self::Solver(_) | Self::OnAnotherRank => 1,
             Self::Input(_) => 2,
-            Self::Told(code) => *code,
+            Self::AlreadyReported(code) => *code,
         }
     }
 }
@@ -64,7 +64,7 @@ impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             Self::Input(text) | Self::Solver(text) => f.write_str(text),
-            Self::Elsewhere | Self::Told(_) => f.write_str("another rank failed"),
+            Self::OnAnotherRank | Self::AlreadyReported(_) => f.write_str("another rank failed"),
         }
     }
 }

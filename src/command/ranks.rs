@@ -1,7 +1,7 @@
 //! Several ranks, one program: they go on together or end together, with one message.
 
 use super::Failure;
-use signorini::petsc::Ranks;
+use signorini::petsc::Communicator;
 use std::{process::ExitCode, time::Duration};
 
 /// How long a rank that failed waits for the others to notice. Where what failed is known to all,
@@ -12,41 +12,41 @@ const PATIENCE: Duration = Duration::from_secs(10);
 /// says why, and all end with its exit code. Collective.
 ///
 /// # Errors
-/// On several ranks [`Failure::Told`].
-pub fn together<T>(ranks: Ranks, result: Result<T, Failure>) -> Result<T, Failure> {
-    if ranks.is_alone() {
+/// On several ranks [`Failure::AlreadyReported`].
+pub fn together<T>(comm: Communicator, result: Result<T, Failure>) -> Result<T, Failure> {
+    if comm.is_serial() {
         return result;
     }
-    let failed = ranks.any(result.is_err());
+    let failed = comm.any(result.is_err());
     let failure = match result {
         Ok(value) if !failed => return Ok(value),
-        Ok(_) => Failure::Elsewhere,
+        Ok(_) => Failure::OnAnotherRank,
         Err(failure) => failure,
     };
-    let silent = matches!(failure, Failure::Elsewhere);
-    let (_, speaker) = ranks.least(if silent { 1.0 } else { 0.0 });
-    if ranks.rank() == speaker {
+    let silent = matches!(failure, Failure::OnAnotherRank);
+    let (_, speaker) = comm.min_with_rank(if silent { 1.0 } else { 0.0 });
+    if comm.rank() == speaker {
         eprintln!("error: {failure}");
     }
     // Only when it is said: the first process that ends with an error ends the others.
-    Err(Failure::Told(ranks.value_of(speaker, f64::from(failure.code())) as u8))
+    Err(Failure::AlreadyReported(comm.broadcast(speaker, f64::from(failure.code())) as u8))
 }
 
 /// Waits for the other ranks. Where this one has failed and they do not come, because it has
 /// failed alone while they wait for it, it says so and ends them all. Collective.
-pub fn rejoin<T>(ranks: Ranks, result: &Result<T, Failure>) {
+pub fn rejoin<T>(comm: Communicator, result: &Result<T, Failure>) {
     let patience = result.is_err().then_some(PATIENCE);
-    if !ranks.meet(patience)
+    if !comm.barrier(patience)
         && let Err(failure) = result
     {
-        eprintln!("error: rank {} of {}: {failure}", ranks.rank(), ranks.size());
-        ranks.abort(failure.code());
+        eprintln!("error: rank {} of {}: {failure}", comm.rank(), comm.size());
+        comm.abort(failure.code());
     }
 }
 
 /// Refuses to do something else than a run on several ranks.
 pub fn refuse_ranks(command: &str) -> Result<(), ExitCode> {
-    if Ranks::launched() == 1 {
+    if Communicator::launched() == 1 {
         return Ok(());
     }
     // Every rank comes here; that one speaks needs no communication.

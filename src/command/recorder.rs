@@ -2,7 +2,7 @@
 
 use super::{profile, screen::Screen};
 use signorini::{
-    evolution::{Outcome, Phases, RunError, Setting, Step},
+    evolution::{DiscreteProblem, Outcome, Phases, RunError, Step},
     output::{self, FieldWriter, History, Summary},
     scene::Stepping,
 };
@@ -11,7 +11,7 @@ use std::{path::Path, time::Instant};
 /// Shows and writes the accepted steps; of several ranks only the first shows them.
 pub(super) struct Recorder<'a> {
     folder: &'a Path,
-    setting: &'a Setting,
+    problem: &'a DiscreteProblem,
     phases: &'a Phases,
     solver: &'a str,
     profile: bool,
@@ -33,33 +33,33 @@ impl<'a> Recorder<'a> {
     /// Of a run by the contact solver called `solver`; shows what is to be solved. Collective.
     pub(super) fn new(
         folder: &'a Path,
-        setting: &'a Setting,
+        problem: &'a DiscreteProblem,
         solver: &'a str,
         phases: &'a Phases,
         profile: bool,
     ) -> Result<Self, output::OutputError> {
-        let (body, ranks) = (&setting.body, setting.body.partition.ranks());
-        let bounds = &setting.constraints.bounds;
+        let (body, comm) = (&problem.body, problem.body.partition.comm());
+        let bounds = &problem.constraints.bounds;
         let mut contact_nodes: Vec<usize> = bounds.iter().map(|bound| bound.node).collect();
         contact_nodes.dedup();
-        let contact_nodes = ranks.count(contact_nodes.len());
-        let triangles = ranks.count(body.own_triangles);
+        let contact_nodes = comm.count(contact_nodes.len());
+        let triangles = comm.count(body.own_triangles);
         let show = || -> Result<_, output::OutputError> {
             let history = History::create(folder)?;
-            Ok((history, Screen::open(setting, solver, triangles, contact_nodes)))
+            Ok((history, Screen::open(problem, solver, triangles, contact_nodes)))
         };
         Ok(Self {
             folder,
-            setting,
+            problem,
             phases,
             solver,
             profile,
             triangles,
             contact_nodes,
             stepping: 0.0,
-            every: setting.scene().output.every,
-            fields: FieldWriter::new(folder, setting)?,
-            shown: ranks.is_first().then(show).transpose()?,
+            every: problem.scene().output.every,
+            fields: FieldWriter::new(folder, problem)?,
+            shown: comm.is_root().then(show).transpose()?,
             last: None,
         })
     }
@@ -67,7 +67,7 @@ impl<'a> Recorder<'a> {
     /// Whether a frame is written of step `n`. Unless the scene says how often, those after 1, 2,
     /// 4, … steps are added for the runs that do not come far.
     fn is_frame(&self, n: usize) -> bool {
-        match (self.every, self.setting.scene().time.map(|grid| grid.stepping)) {
+        match (self.every, self.problem.scene().time.map(|grid| grid.stepping)) {
             (Some(every), _) => n.is_multiple_of(every),
             (None, Some(Stepping::Uniform { steps })) => {
                 let every = steps.div_ceil(FRAMES);
@@ -88,7 +88,7 @@ impl<'a> Recorder<'a> {
             });
             // All ranks write a frame, whatever became of the row.
             match self.is_frame(step.record.step) {
-                true => shown.and(self.fields.add(self.setting, &step.state)),
+                true => shown.and(self.fields.add(self.problem, &step.state)),
                 false => shown,
             }
         });
@@ -103,25 +103,25 @@ impl<'a> Recorder<'a> {
         result: &Result<Outcome, RunError>,
         started: Instant,
     ) -> Result<(), output::OutputError> {
-        let (setting, last) = (self.setting, self.last.take());
+        let (problem, last) = (self.problem, self.last.take());
         let written = match &last {
             Some(Step { state, .. }) if self.fields.last_time() != Some(state.time) => {
-                self.phases.time("output", || self.fields.add(setting, state))
+                self.phases.time("output", || self.fields.add(problem, state))
             }
             _ => Ok(()),
         };
         let record = last.map(|step| step.record);
         let steps = record.map_or(0, |r| r.step);
-        let (wall, scene) = (started.elapsed().as_secs_f64(), setting.scene());
-        let mut notes = setting.notes();
+        let (wall, scene) = (started.elapsed().as_secs_f64(), problem.scene());
+        let mut notes = problem.notes();
         let outcome = result.as_ref().ok();
-        notes.extend(outcome.iter().flat_map(|outcome| outcome.notes(setting)));
-        let partition = &setting.body.partition;
+        notes.extend(outcome.iter().flat_map(|outcome| outcome.notes(problem)));
+        let partition = &problem.body.partition;
         let summary = Summary {
             scene: scene.name.clone(),
             title: scene.title.clone(),
             solver: self.solver.to_owned(),
-            ranks: partition.ranks().size(),
+            ranks: partition.comm().size(),
             nodes: partition.total(),
             triangles: self.triangles,
             steps,
@@ -142,9 +142,9 @@ impl<'a> Recorder<'a> {
                 .into_iter()
                 .map(|(name, phase)| (name, phase.seconds))
                 .collect(),
-            contact_boundary: setting.foundation.contact_boundary.clone(),
-            contact_tangents: setting.foundation.tangents.clone(),
-            foundation: setting.foundation.segments.clone(),
+            contact_boundary: problem.foundation.contact_boundary.clone(),
+            contact_tangents: problem.foundation.tangents.clone(),
+            foundation: problem.foundation.segments.clone(),
             notes,
             error: result.as_ref().err().map(ToString::to_string),
         };

@@ -8,9 +8,9 @@ use super::{
 use clap::Args;
 use signorini::{
     contact::SOLVERS,
-    evolution::{self, Phases, RunError, Setting},
+    evolution::{self, DiscreteProblem, Phases, RunError},
     mesh, output,
-    petsc::{Ranks, Session},
+    petsc::{Communicator, Session},
     scene::{MeshSource, Scene},
 };
 use std::{
@@ -82,19 +82,19 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     };
     let checked = arguments.check();
     // One rank tells bad input before PETSc starts; several need it to speak with one voice.
-    let early = match (Ranks::launched(), &checked) {
+    let early = match (Communicator::launched(), &checked) {
         (1, _) => None,
         (_, Ok(())) => Some(start(&arguments.petsc)?),
         (_, Err(_)) => Some(start(&[])?),
     };
-    let ranks = early.as_ref().map_or(Ranks::alone(), Session::ranks);
-    let task = together(ranks, checked).and_then(|()| Task::read(arguments, ranks, &phases));
+    let comm = early.as_ref().map_or(Communicator::serial(), Session::comm);
+    let task = together(comm, checked).and_then(|()| Task::read(arguments, comm, &phases));
     let session = match (early, &task) {
         (Some(session), _) => session,
         (None, Err(_)) => return task.map(|_| ()),
         (None, Ok(_)) => start(&arguments.petsc)?,
     };
-    let speaks = task.is_ok() && session.ranks().is_first();
+    let speaks = task.is_ok() && session.comm().is_root();
     let result = task.and_then(|task| task.solve(&session, &phases, started));
     let unused = session.unused_options();
     let ended = session.finalize().map_err(Failure::solver);
@@ -106,7 +106,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
 
 /// What is to be done, all input being good.
 struct Task {
-    setting: Setting,
+    problem: DiscreteProblem,
     solver: String,
     folder: PathBuf,
     profile: bool,
@@ -115,9 +115,13 @@ struct Task {
 impl Task {
     /// Reads scene and mesh. Every rank reads both; the first also makes the mesh, where it is to
     /// be made. Collective.
-    fn read(arguments: &RunArguments, ranks: Ranks, phases: &Phases) -> Result<Self, Failure> {
+    fn read(
+        arguments: &RunArguments,
+        comm: Communicator,
+        phases: &Phases,
+    ) -> Result<Self, Failure> {
         let scene = read_scene(&arguments.scene, arguments.mesh.as_deref(), &arguments.set);
-        let scene = together(ranks, scene)?;
+        let scene = together(comm, scene)?;
         let asked = arguments.solver.clone().or_else(|| scene.contact.solver.clone());
         let solver = asked.unwrap_or_else(|| SOLVERS[0].to_owned());
         let folder = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
@@ -127,40 +131,42 @@ impl Task {
                 .time("mesh", || mesh::load(&scene.mesh.file, &scene.mesh.parameters))
                 .map_err(Failure::input)
         };
-        let first = ranks.is_first().then(load).transpose();
-        let loaded = together(ranks, first)?.map_or_else(load, Ok);
-        let mesh = together(ranks, loaded)?;
-        let setting = phases.time("setting", || Setting::new(scene, mesh)).map_err(Failure::input);
+        let first = comm.is_root().then(load).transpose();
+        let loaded = together(comm, first)?.map_or_else(load, Ok);
+        let mesh = together(comm, loaded)?;
+        let problem =
+            phases.time("setting", || DiscreteProblem::new(scene, mesh)).map_err(Failure::input);
         let profile = arguments.profile;
-        Ok(Self { setting: together(ranks, setting)?, solver, folder, profile })
+        Ok(Self { problem: together(comm, problem)?, solver, folder, profile })
     }
 
     /// Solves and writes the results. Collective.
     fn solve(self, session: &Session, phases: &Phases, started: Instant) -> Result<(), Failure> {
-        let ranks = session.ranks();
-        let Self { setting, solver, folder, profile } = self;
-        let setting = phases.time("partition", || setting.share(session)).map_err(Failure::solver);
-        let setting = together(ranks, setting)?;
+        let comm = session.comm();
+        let Self { problem, solver, folder, profile } = self;
+        let problem =
+            phases.time("partition", || problem.restrict(session)).map_err(Failure::solver);
+        let problem = together(comm, problem)?;
         // Now that all input is good: the results of an earlier run go.
-        let prepared = if ranks.is_first() { output::prepare(&folder) } else { Ok(()) };
-        together(ranks, prepared.map_err(Failure::input))?;
-        let recorder = Recorder::new(&folder, &setting, &solver, phases, profile);
-        let mut recorder = together(ranks, recorder.map_err(Failure::input))?;
+        let prepared = if comm.is_root() { output::prepare(&folder) } else { Ok(()) };
+        together(comm, prepared.map_err(Failure::input))?;
+        let recorder = Recorder::new(&folder, &problem, &solver, phases, profile);
+        let mut recorder = together(comm, recorder.map_err(Failure::input))?;
 
-        let result = evolution::run(session, &setting, &solver, phases, &mut |step| {
+        let result = evolution::run(session, &problem, &solver, phases, &mut |step| {
             Ok(recorder.accept(step)?)
         });
         let failure = result.as_ref().map(|_| ()).map_err(failure);
-        rejoin(ranks, &failure);
+        rejoin(comm, &failure);
         let written = recorder.finish(&result, started);
-        together(ranks, failure.and(written.map_err(Failure::solver)))
+        together(comm, failure.and(written.map_err(Failure::solver)))
     }
 }
 
 /// The run has begun, so what was accepted is saved, whoever is to blame.
 fn failure(error: &RunError) -> Failure {
     match error {
-        RunError::Elsewhere => Failure::Elsewhere,
+        RunError::OnAnotherRank => Failure::OnAnotherRank,
         error => Failure::solver(error),
     }
 }

@@ -2,7 +2,7 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 use signorini::{
-    evolution::{Outcome, Setting, StepRecord},
+    evolution::{DiscreteProblem, Outcome, StepRecord},
     output::Summary,
     scene::{Stepping, TimeGrid},
 };
@@ -22,11 +22,16 @@ const LENGTH: u64 = 1000;
 
 impl Screen {
     /// Shows what is to be solved, at once.
-    pub fn open(setting: &Setting, solver: &str, triangles: usize, contact_nodes: usize) -> Self {
-        let (scene, partition) = (setting.scene(), &setting.body.partition);
+    pub fn open(
+        problem: &DiscreteProblem,
+        solver: &str,
+        triangles: usize,
+        contact_nodes: usize,
+    ) -> Self {
+        let (scene, partition) = (problem.scene(), &problem.body.partition);
         let mut mesh = format!("{} nodes, {triangles} triangles", partition.total());
-        if !partition.ranks().is_alone() {
-            mesh += &format!(", on {} ranks", partition.ranks().size());
+        if !partition.comm().is_serial() {
+            mesh += &format!(", on {} ranks", partition.comm().size());
         }
         let solver = match contact_nodes {
             0 => format!("{solver} (no contact: one linear solve a step)"),

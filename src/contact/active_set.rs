@@ -6,7 +6,7 @@ use super::{
     elastic::{ElasticSolver, System},
     tao::Tao,
 };
-use crate::petsc::{PetscError, Ranks, Session, Vector};
+use crate::petsc::{Communicator, PetscError, Session, Vector};
 
 /// Guess which bounds are active, solve with u_ν at these bounds, and pivot on the indices that
 /// violate the conditions: release active ones that are pulled, fix open ones that penetrate
@@ -84,7 +84,7 @@ impl<'s> ActiveSet<'s> {
     fn support(&mut self, problem: &ContactProblem, c: &Vector) -> Result<bool, PetscError> {
         let active = self.active.iter().map(|side| *side != Side::Open).collect();
         let motions = (problem.rigid, problem.work);
-        let way = c.read(|c| approach(problem.ranks, motions, problem.bounds, c, active, true))?;
+        let way = c.read(|c| approach(problem.comm, motions, problem.bounds, c, active, true))?;
         for (i, upper) in way.reached {
             self.active[i] = if upper { Side::Upper } else { Side::Lower };
         }
@@ -153,7 +153,7 @@ impl<'s> ActiveSet<'s> {
                 *new = if *new == Side::Open { *old } else { *new };
             }
         }
-        Ok(problem.ranks.any(self.active != old))
+        Ok(problem.comm.any(self.active != old))
     }
 
     fn rescue(
@@ -213,13 +213,13 @@ impl ContactSolver for ActiveSet<'_> {
                 break;
             }
             let violating = self.violating(problem, c)?;
-            let count = problem.ranks.count(violating.len());
+            let count = problem.comm.count(violating.len());
             if count == 0 {
                 return Ok(report);
             }
             let single = rule.single(count);
             report.fallbacks += usize::from(single && count > 1);
-            let chosen = if single { last(problem.ranks, &violating) } else { &violating };
+            let chosen = if single { last(problem.comm, &violating) } else { &violating };
             if !self.pivot(problem, c, chosen)? {
                 // The forces of bounds that support a balanced body are rounding; the certificate
                 // judges them.
@@ -264,9 +264,9 @@ impl Pivoting {
 
 /// The last of all ranks' `violating` indices, which are numbered rank by rank; nothing on the
 /// others.
-fn last<T>(ranks: Ranks, violating: &[T]) -> &[T] {
-    let holder = if violating.is_empty() { -1.0 } else { ranks.rank() as f64 };
-    let holds = ranks.max(holder) == ranks.rank() as f64;
+fn last<T>(comm: Communicator, violating: &[T]) -> &[T] {
+    let holder = if violating.is_empty() { -1.0 } else { comm.rank() as f64 };
+    let holds = comm.max(holder) == comm.rank() as f64;
     if holds { &violating[violating.len().saturating_sub(1)..] } else { &[] }
 }
 
@@ -282,7 +282,7 @@ mod tests {
             assert!(!choice.single(3));
         }
         assert!(choice.single(3));
-        assert_eq!(last(Ranks::alone(), &[3, 4, 5]), [5]);
+        assert_eq!(last(Communicator::serial(), &[3, 4, 5]), [5]);
         assert!(!choice.single(2), "progress restores the block pivots");
     }
 }

@@ -1,6 +1,6 @@
 //! Anderson acceleration of a fixed-point iteration q ← T(q).
 
-use crate::petsc::Ranks;
+use crate::petsc::Communicator;
 use nalgebra::{DMatrix, DVector};
 
 /// Anderson's mixing of the last few iterates (J. ACM 12, 1965; Walker and Ni, SIAM J. Numer.
@@ -17,7 +17,7 @@ pub(super) struct Anderson {
     history: Vec<(Vec<f64>, Vec<f64>)>,
     best: f64,
     /// The ranks among which q is divided.
-    ranks: Ranks,
+    comm: Communicator,
 }
 
 /// Iterates mixed: more than ten no longer pays on the scenes of this project.
@@ -30,9 +30,9 @@ const RANK: f64 = 1e-10;
 const FARTHEST: f64 = 1e6;
 
 impl Anderson {
-    pub(super) fn new(ranks: Ranks, weights: impl Iterator<Item = f64>) -> Self {
+    pub(super) fn new(comm: Communicator, weights: impl Iterator<Item = f64>) -> Self {
         let weights = weights.map(f64::sqrt).collect();
-        Self { weights, history: Vec::new(), best: f64::INFINITY, ranks }
+        Self { weights, history: Vec::new(), best: f64::INFINITY, comm }
     }
 
     /// The next iterate from `q` and its image T(q).
@@ -84,7 +84,7 @@ impl Anderson {
     /// triangle that an orthogonal transformation makes of its rows (Demmel, Grigori, Hoemmen and
     /// Langou, SIAM J. Sci. Comput. 34, 2012).
     fn condensed(&self, a: DMatrix<f64>, b: DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
-        if self.ranks.is_alone() {
+        if self.comm.is_serial() {
             return (a, b);
         }
         let columns = a.ncols() + 1;
@@ -95,8 +95,8 @@ impl Anderson {
         let r = rows.insert_rows(0, missing, 0.0).qr().r();
         let all = DMatrix::from_column_slice(
             columns,
-            columns * self.ranks.size(),
-            &self.ranks.gather(r.transpose().as_slice()),
+            columns * self.comm.size(),
+            &self.comm.gather(r.transpose().as_slice()),
         )
         .transpose();
         (all.columns(0, columns - 1).into_owned(), all.column(columns - 1).into_owned())
@@ -104,7 +104,7 @@ impl Anderson {
 
     fn norm(&self, v: &[f64]) -> f64 {
         let squares = v.iter().zip(&self.weights).map(|(v, w)| (v * w).powi(2)).sum::<f64>();
-        self.ranks.total(squares).sqrt()
+        self.comm.total(squares).sqrt()
     }
 }
 
@@ -117,7 +117,7 @@ mod tests {
         // T(q) = Mq + b with a spectral radius of 0.99: plain iteration needs over 2000 steps.
         let m = DMatrix::from_row_slice(3, 3, &[0.9, 0.3, 0.0, -0.3, 0.9, 0.1, 0.0, 0.1, -0.8]);
         let b = DVector::from_row_slice(&[1.0, 2.0, 3.0]);
-        let mut anderson = Anderson::new(Ranks::alone(), [1.0, 2.0, 0.5].into_iter());
+        let mut anderson = Anderson::new(Communicator::serial(), [1.0, 2.0, 0.5].into_iter());
         let mut q = vec![0.0; 3];
         for _ in 0..5 {
             let image = &m * DVector::from_row_slice(&q) + &b;
@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn an_overshoot_restarts_from_the_mean() {
-        let mut anderson = Anderson::new(Ranks::alone(), [1.0].into_iter());
+        let mut anderson = Anderson::new(Communicator::serial(), [1.0].into_iter());
         assert_eq!(anderson.next(&[0.0], vec![1e-3]), vec![1e-3]);
         assert_eq!(anderson.next(&[1.0], vec![3.0]), vec![2.0]);
     }

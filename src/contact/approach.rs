@@ -1,7 +1,7 @@
 //! The way that a load drives a body until contact supports it.
 
 use super::{Bound, problem::unheld};
-use crate::petsc::Ranks;
+use crate::petsc::Communicator;
 use nalgebra::{DMatrix, DVector};
 
 /// A rigid motion of a body that only contact supports, and the bounds it ends at.
@@ -24,7 +24,7 @@ const ROUNDING: f64 = 1e-12;
 /// Where the load drives none of the motions left, the body stays, or if it is to be supported,
 /// `whatever` drives it, any motion does.
 pub(crate) fn approach(
-    ranks: Ranks,
+    comm: Communicator,
     (rigid, work): (&DMatrix<f64>, &DVector<f64>),
     bounds: &[Bound],
     c: &[f64],
@@ -34,7 +34,7 @@ pub(crate) fn approach(
     let mut amplitudes = DVector::zeros(rigid.ncols());
     let mut reached = Vec::new();
     loop {
-        let left = unheld(ranks, rigid, &active);
+        let left = unheld(comm, rigid, &active);
         let Some(any) = left.first() else {
             return Approach { amplitudes, reached, supported: true };
         };
@@ -45,7 +45,7 @@ pub(crate) fn approach(
             false => return Approach { amplitudes, reached, supported: false },
         };
         let (speed, gone) = (rigid * &motion, rigid * &amplitudes);
-        let most = ranks.max(speed.iter().fold(0.0, |m: f64, v| m.max(v.abs())));
+        let most = comm.max(speed.iter().fold(0.0, |m: f64, v| m.max(v.abs())));
         let way = |i: usize| {
             let bound = &bounds[i];
             let value = if speed[i] > 0.0 { bound.upper } else { bound.lower };
@@ -54,12 +54,12 @@ pub(crate) fn approach(
         let moving = |i: &usize| !active[*i] && speed[*i].abs() > 1e-6 * most;
         let ways = (0..bounds.len()).filter(moving).map(way).filter(|way| way.1.is_finite());
         let nearest = ways.min_by(|a, b| a.1.total_cmp(&b.1));
-        let (way, rank) = ranks.least(nearest.map_or(f64::INFINITY, |(_, way)| way));
+        let (way, rank) = comm.min_with_rank(nearest.map_or(f64::INFINITY, |(_, way)| way));
         if way == f64::INFINITY {
             return Approach { amplitudes, reached, supported: false };
         }
         amplitudes += way * motion;
-        if let Some((i, _)) = nearest.filter(|_| rank == ranks.rank()) {
+        if let Some((i, _)) = nearest.filter(|_| rank == comm.rank()) {
             active[i] = true;
             reached.push((i, speed[i] > 0.0));
         }

@@ -4,7 +4,7 @@
 //! ones. A fault in any of these makes u wrong, and cannot hide here.
 
 use super::{FixedRow, GapRow, Kkt, Scales};
-use crate::{fem::Share, petsc::Ranks};
+use crate::{fem::Subdomain, petsc::Communicator};
 use nalgebra::Vector2;
 
 /// The conditions of a body, node by node, for the nodes that this rank owns.
@@ -74,9 +74,9 @@ impl Certificate {
     }
 
     /// The conditions at the nodes that a rank owns.
-    pub fn share(&self, share: &Share) -> Self {
+    pub fn restrict(&self, subdomain: &Subdomain) -> Self {
         let local = |at: &Conditions| {
-            let node = share.owned(at.node)?;
+            let node = subdomain.owned(at.node)?;
             let gaps = at.gaps.iter().map(|gap| GapRow { node, ..gap.clone() }).collect();
             Some(Conditions { node, gaps, fixed: at.fixed.clone() })
         };
@@ -97,7 +97,7 @@ impl Certificate {
         answer: Answer,
         owned: usize,
         scales: Scales,
-        ranks: Ranks,
+        comm: Communicator,
     ) -> (Kkt, Vec<ContactPoint>) {
         let mut points = Vec::new();
         let (mut dual, mut supported) = (0.0, 0.0);
@@ -125,7 +125,7 @@ impl Certificate {
                     node: at.node,
                     normal: gap.normal,
                     force,
-                    pressure: force / gap.weight,
+                    pressure: force / gap.tributary_length,
                     gap: *left,
                     active: force > 0.0 && force * scales.displacement > left * scales.force,
                 });
@@ -134,15 +134,15 @@ impl Certificate {
         stationarity += free(next..owned) + supported;
         let judged: usize = self.nodes.iter().map(|at| at.fixed.len() + at.gaps.len()).sum();
         let mut sums = [stationarity, dual, judged as f64];
-        ranks.sum(&mut sums);
+        comm.sum(&mut sums);
         if sums[2] as usize != self.posed {
             return (Kkt::UNKNOWN, points);
         }
         let kkt = Kkt {
             stationarity: scales.of_force(sums[0].sqrt()),
-            primal: ranks.max(primal),
+            primal: comm.max(primal),
             dual: scales.of_force(sums[1].sqrt()),
-            complementarity: ranks.max(complementarity),
+            complementarity: comm.max(complementarity),
         };
         (kkt, points)
     }

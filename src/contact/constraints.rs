@@ -1,7 +1,7 @@
 //! From directions and values at nodes to frames, prescribed unknowns and bounds.
 
 use super::{Bound, ConstraintError, FixedRow, GapRow};
-use crate::fem::{Frames, Share};
+use crate::fem::{NodalBases, Subdomain};
 use nalgebra::{Matrix2, Vector2};
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone)]
 pub struct Constraints {
     /// The nodal bases; prescribed unknowns are fixed there (and later the pins of free motions).
-    pub frames: Frames,
+    pub bases: NodalBases,
     /// The bounded unknowns, rising; [`Self::bounds_at`] adds what prescribed displacements change.
     pub bounds: Vec<Bound>,
     /// The gap conditions as posed: one per node and smooth boundary, by node.
@@ -68,7 +68,7 @@ impl Constraints {
             join_gap(&mut at.entry(gap.node).or_default().1, gap);
         }
         let mut constraints = Self {
-            frames: Frames::identity(coordinates.len()),
+            bases: NodalBases::identity(coordinates.len()),
             bounds: Vec::new(),
             gaps: Vec::new(),
             prescribed: Vec::new(),
@@ -104,7 +104,7 @@ impl Constraints {
             let d = fixed[row].direction;
             if basis.len() < 2 && basis.iter().all(|b| cross(*b, d).abs() > PARALLEL) {
                 self.prescribed.push((2 * node + basis.len(), row));
-                self.frames.fix(2 * node + basis.len());
+                self.bases.fix(2 * node + basis.len());
                 basis.push(d);
             } else {
                 self.implied.push(fixed[row].clone());
@@ -133,7 +133,7 @@ impl Constraints {
                         normal: gap.normal,
                         lower: f64::NEG_INFINITY,
                         upper: gap.gap,
-                        weight: gap.weight,
+                        tributary_length: gap.tributary_length,
                     });
                     basis.push(gap.normal);
                 }
@@ -148,7 +148,7 @@ impl Constraints {
             let directions = Matrix2::new(a[0], a[1], b[0], b[1]);
             if directions != Matrix2::identity() {
                 let angle = cross(a, b).abs();
-                self.frames.set(node, directions).ok_or(ConstraintError::Dependent {
+                self.bases.set(node, directions).ok_or(ConstraintError::Dependent {
                     x,
                     y,
                     angle,
@@ -222,7 +222,7 @@ impl Constraints {
             return Ok(c);
         }
         let mut u = c.clone();
-        self.frames.displacement_from_frame(&mut u);
+        self.bases.displacement_to_global(&mut u);
         let along = |node: usize, d: [f64; 2]| u[2 * node] * d[0] + u[2 * node + 1] * d[1];
         let size = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         for (row, &index) in self.implied.iter().zip(&self.implied_rows) {
@@ -244,31 +244,31 @@ impl Constraints {
 
     /// The conditions at the nodes of a rank's share; bounds are their owners'. The fixed rows
     /// keep their numbers.
-    pub fn share(&self, share: &Share) -> Self {
-        let local = |dof: usize| share.local(dof / 2).map(|node| 2 * node + dof % 2);
+    pub fn restrict(&self, subdomain: &Subdomain) -> Self {
+        let local = |dof: usize| subdomain.local(dof / 2).map(|node| 2 * node + dof % 2);
         let bound = |bound: &Bound| {
-            let node = share.owned(bound.node)?;
+            let node = subdomain.owned(bound.node)?;
             Some(Bound { node, dof: 2 * node + bound.dof % 2, ..*bound })
         };
         let mut bounds: Vec<Bound> = self.bounds.iter().filter_map(bound).collect();
         bounds.sort_by_key(|bound| bound.dof);
-        let gap = |gap: &GapRow| Some(GapRow { node: share.owned(gap.node)?, ..*gap });
+        let gap = |gap: &GapRow| Some(GapRow { node: subdomain.owned(gap.node)?, ..*gap });
         let mut gaps: Vec<GapRow> = self.gaps.iter().filter_map(gap).collect();
         gaps.sort_by_key(|gap| gap.node);
         let side = |side: &Side| {
-            let dof = share.owned(side.dof / 2).map(|node| 2 * node + side.dof % 2)?;
+            let dof = subdomain.owned(side.dof / 2).map(|node| 2 * node + side.dof % 2)?;
             Some(Side { dof, fixed: side.fixed.and_then(local), ..*side })
         };
         let rows = self.implied.iter().zip(&self.implied_rows);
         let (implied, implied_rows) = rows
             .filter_map(|(row, &index)| {
-                Some((FixedRow { node: share.local(row.node)?, ..*row }, index))
+                Some((FixedRow { node: subdomain.local(row.node)?, ..*row }, index))
             })
             .unzip();
-        let known = |gap: &GapRow| Some(GapRow { node: share.local(gap.node)?, ..*gap });
+        let known = |gap: &GapRow| Some(GapRow { node: subdomain.local(gap.node)?, ..*gap });
         let prescribed = |&(dof, row): &(usize, usize)| Some((local(dof)?, row));
         Self {
-            frames: self.frames.share(share),
+            bases: self.bases.restrict(subdomain),
             bounds,
             gaps,
             prescribed: self.prescribed.iter().filter_map(prescribed).collect(),
@@ -283,13 +283,13 @@ impl Constraints {
 /// Adds a gap row to those of its node: rows of one smooth boundary become one, their
 /// normals averaged by length; across a corner both stay.
 pub(crate) fn join_gap(rows: &mut Vec<GapRow>, new: &GapRow) {
-    let (n, w) = (Vector2::from(new.normal), new.weight);
+    let (n, w) = (Vector2::from(new.normal), new.tributary_length);
     match rows.iter_mut().find(|row| Vector2::from(row.normal).dot(&n) > CORNER_COSINE) {
         None => rows.push(new.clone()),
         Some(row) => {
-            let mean = (Vector2::from(row.normal) * row.weight + n * w).normalize();
+            let mean = (Vector2::from(row.normal) * row.tributary_length + n * w).normalize();
             row.normal = mean.into();
-            row.weight += w;
+            row.tributary_length += w;
             row.gap = row.gap.min(new.gap);
         }
     }

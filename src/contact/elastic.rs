@@ -94,7 +94,7 @@ struct Engine {
 impl Engine {
     fn new(session: &Session, problem: &ContactProblem) -> Result<Self, PetscError> {
         let zeros = || Vector::zeros(session, problem.stiffness.owned());
-        let unknowns = problem.ranks.count(problem.stiffness.owned());
+        let unknowns = problem.comm.count(problem.stiffness.owned());
         Ok(Self {
             factor: Factor::new(session, "elastic_", unknowns, Precision::Preconditioner)?,
             matrix: problem.stiffness.duplicate()?,

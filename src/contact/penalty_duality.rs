@@ -74,13 +74,14 @@ impl<'s> PenaltyDuality<'s> {
             rhs.copy(f)?;
         }
         rhs.write(|rhs| {
-            problem.bounds.iter().zip(q).for_each(|(b, q)| rhs[b.dof] -= b.weight * q);
+            problem.bounds.iter().zip(q).for_each(|(b, q)| rhs[b.dof] -= b.tributary_length * q);
         })?;
         let limit = match f {
             Some(_) => problem.linear_residual(),
             None => 1e-10 * rhs.norm()?,
         };
-        let added: Vec<_> = problem.bounds.iter().map(|b| (b.dof, omega * b.weight)).collect();
+        let added: Vec<_> =
+            problem.bounds.iter().map(|b| (b.dof, omega * b.tributary_length)).collect();
         let system = System { held: &[], added: Some(&added) };
         match self.elastic.solve(problem, system, &rhs, u, limit, report)? {
             true => Ok(()),
@@ -101,7 +102,7 @@ impl<'s> PenaltyDuality<'s> {
     ) -> Result<Vec<f64>, PetscError> {
         let residual = problem.residual(self.session, u)?;
         let q = |u: &[f64], r: &[f64]| {
-            let at = |b: &Bound| -r[b.dof] / b.weight - omega * u[b.dof];
+            let at = |b: &Bound| -r[b.dof] / b.tributary_length - omega * u[b.dof];
             problem.bounds.iter().map(at).collect()
         };
         u.read(|u| residual.read(|r| q(u, r)))?
@@ -119,8 +120,9 @@ impl<'s> PenaltyDuality<'s> {
         let length = contact_length(problem);
         let trial = problem.stiffness_scale / length;
         let dot = |a: &[f64], b: &[f64]| -> f64 {
-            let products = bounds.iter().enumerate().map(|(i, bound)| bound.weight * a[i] * b[i]);
-            problem.ranks.total(products.sum())
+            let products =
+                bounds.iter().enumerate().map(|(i, bound)| bound.tributary_length * a[i] * b[i]);
+            problem.comm.total(products.sum())
         };
         let mut u = Vector::zeros(self.session, problem.load.owned())?;
 
@@ -189,14 +191,17 @@ impl ContactSolver for PenaltyDuality<'_> {
 
         let (mut residuals, mut first_change) = (Kkt::default(), 0.0_f64);
         let pressure = problem.scales.force / contact_length(problem);
-        let mut anderson = Anderson::new(problem.ranks, problem.bounds.iter().map(|b| b.weight));
+        let mut anderson =
+            Anderson::new(problem.comm, problem.bounds.iter().map(|b| b.tributary_length));
         while report.iterations < self.options.iterations {
             self.response(problem, omega, Some(problem.load), &q, c, &mut report)?;
             report.iterations += 1;
             let normal: Vec<f64> = c.read(|c| problem.bounds.iter().map(|b| c[b.dof]).collect())?;
             // The equation is solved: only the contact conditions are left to judge, with the
             // contact forces W (q + ω Bu).
-            let at = |((q, u), bound): ((&f64, &f64), &Bound)| (bound.weight * (q + omega * u), *u);
+            let at = |((q, u), bound): ((&f64, &f64), &Bound)| {
+                (bound.tributary_length * (q + omega * u), *u)
+            };
             let bounded = q.iter().zip(&normal).zip(problem.bounds).map(at);
             residuals = problem.kkt(0.0, bounded, problem.scales(c)?);
             if residuals.within(0.1 * problem.tolerance) {
@@ -210,7 +215,7 @@ impl ContactSolver for PenaltyDuality<'_> {
             let images = q.iter().zip(normal.iter().zip(problem.bounds)).map(image).collect();
             let images: Vec<f64> = images;
             let change = (images.iter().zip(&q)).fold(0.0_f64, |m, (t, q)| m.max((t - q).abs()));
-            let change = problem.ranks.max(change);
+            let change = problem.comm.max(change);
             if !(change.is_finite() && change <= DIVERGED * first_change.max(pressure))
                 && report.iterations > 1
             {
@@ -236,5 +241,5 @@ impl ContactSolver for PenaltyDuality<'_> {
 
 /// |Γ_C|, m.
 fn contact_length(problem: &ContactProblem) -> f64 {
-    problem.ranks.total(problem.bounds.iter().map(|b| b.weight).sum())
+    problem.comm.total(problem.bounds.iter().map(|b| b.tributary_length).sum())
 }

@@ -2,7 +2,7 @@
 
 use super::{Bound, Kkt, Scales};
 use crate::{
-    petsc::{Matrix, PetscError, Ranks, Session, Vector},
+    petsc::{Communicator, Matrix, PetscError, Session, Vector},
     phases::Phases,
 };
 use nalgebra::{DMatrix, DVector};
@@ -31,7 +31,7 @@ pub struct ContactProblem<'a> {
     pub tolerance: f64,
     /// The ranks among which the unknowns are divided: bounds are their owners', what is
     /// decided is decided by all.
-    pub ranks: Ranks,
+    pub comm: Communicator,
     /// Where the parts of the solve book their time, as `contact/…`.
     pub phases: &'a Phases,
 }
@@ -78,23 +78,23 @@ impl ContactProblem<'_> {
             }
         }
         let mut sums = [free, pull];
-        self.ranks.sum(&mut sums);
+        self.comm.sum(&mut sums);
         Kkt {
             stationarity: scales.of_force(sums[0].sqrt()),
-            primal: scales.of_displacement(self.ranks.max(primal)),
+            primal: scales.of_displacement(self.comm.max(primal)),
             dual: scales.of_force(sums[1].sqrt()),
-            complementarity: self.ranks.max(complementarity),
+            complementarity: self.comm.max(complementarity),
         }
     }
 
     /// The largest entry in absolute value.
     pub fn size(&self, c: &Vector) -> Result<f64, PetscError> {
-        Ok(self.ranks.max(c.read(|c| c.iter().fold(0.0_f64, |m, v| m.max(v.abs())))?))
+        Ok(self.comm.max(c.read(|c| c.iter().fold(0.0_f64, |m, v| m.max(v.abs())))?))
     }
 
     /// Number of bounds, of all ranks.
     pub fn all_bounds(&self) -> usize {
-        self.ranks.count(self.bounds.len())
+        self.comm.count(self.bounds.len())
     }
 
     /// Kc − f.
@@ -114,7 +114,11 @@ impl ContactProblem<'_> {
 
 /// The combinations (orthonormal) of the motions `rigid`, u·ν at the bounds, a column each, that
 /// are left when u_ν is prescribed on the `pressing` bounds.
-pub(crate) fn unheld(ranks: Ranks, rigid: &DMatrix<f64>, pressing: &[bool]) -> Vec<DVector<f64>> {
+pub(crate) fn unheld(
+    comm: Communicator,
+    rigid: &DMatrix<f64>,
+    pressing: &[bool],
+) -> Vec<DVector<f64>> {
     let motions = rigid.ncols();
     if motions == 0 {
         return Vec::new();
@@ -122,9 +126,9 @@ pub(crate) fn unheld(ranks: Ranks, rigid: &DMatrix<f64>, pressing: &[bool]) -> V
     let rows = rigid.row_iter().zip(pressing).filter(|(_, on)| **on);
     let mut gram =
         rows.fold(DMatrix::zeros(motions, motions), |sum, (row, _)| sum + row.transpose() * row);
-    ranks.sum(gram.as_mut_slice());
+    comm.sum(gram.as_mut_slice());
     let eigen = gram.symmetric_eigen();
-    let cut = 1e-10 * ranks.total(rigid.norm_squared());
+    let cut = 1e-10 * comm.total(rigid.norm_squared());
     let pairs = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());
     pairs.filter(|(value, _)| **value <= cut).map(|(_, vector)| vector.into_owned()).collect()
 }

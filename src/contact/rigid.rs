@@ -8,7 +8,7 @@ pub use motion::{DrivenMotion, Mover, PartMotion, RigidMotion};
 
 use super::{Bound, GapRow};
 use crate::{
-    fem::{Body, Share},
+    fem::{Body, Subdomain},
     mesh::Components,
 };
 use nalgebra::{DMatrix, DVector};
@@ -138,8 +138,8 @@ impl RigidMotions {
     }
 
     /// Those of a rank's share of the body.
-    pub fn share(self, share: &Share) -> Self {
-        Self { part_of_node: share.field(&self.part_of_node, 1), ..self }
+    pub fn restrict(self, subdomain: &Subdomain) -> Self {
+        Self { part_of_node: subdomain.field(&self.part_of_node, 1), ..self }
     }
 
     /// Whether prescribed displacements alone hold the body (K is then positive definite).

@@ -19,7 +19,7 @@ pub struct GapRow {
     /// g ≥ 0, m.
     pub gap: f64,
     /// The node's share of Γ_C, m.
-    pub weight: f64,
+    pub tributary_length: f64,
 }
 
 /// Gap conditions of a node as bounds on one unknown: lower ≤ c_dof ≤ upper.
@@ -36,7 +36,7 @@ pub struct Bound {
     /// Largest u·ν, m.
     pub upper: f64,
     /// The node's tributary length of Γ_C, m.
-    pub weight: f64,
+    pub tributary_length: f64,
 }
 
 impl Bound {

@@ -192,7 +192,7 @@ impl<'a> Chosen<'a> {
             largest = largest.max(size);
             integral += self.body.node_area[i] * size;
         }
-        let ranks = self.body.partition.ranks();
-        [ranks.max(largest), ranks.total(integral) / self.body.area]
+        let comm = self.body.partition.comm();
+        [comm.max(largest), comm.total(integral) / self.body.area]
     }
 }

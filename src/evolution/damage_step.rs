@@ -1,6 +1,6 @@
 //! The damage step (28).
 
-use super::{Phases, Setting};
+use super::{DiscreteProblem, Phases};
 use crate::{
     fem::{self, DamageCertificate, DamageSystem},
     model::DamageLaw,
@@ -10,7 +10,7 @@ use crate::{
 /// ζ_n from ζ_{n−1} and u_{n−1}; does nothing for a material that is not damaged.
 pub(super) struct DamageStep<'a> {
     session: &'a Session,
-    setting: &'a Setting,
+    problem: &'a DiscreteProblem,
     phases: &'a Phases,
     law: Option<DamageLaw>,
     /// M + kκL, made when a step needs it, and its k.
@@ -27,7 +27,7 @@ pub(super) struct Source {
 
 /// What became of a damage step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Driving {
+pub(super) enum DamageUpdate {
     /// The system was solved; what the solution is worth.
     Solved(DamageCertificate),
     /// No source and a uniform ζ: ζ_n = ζ_{n−1} without a solve.
@@ -38,7 +38,7 @@ pub(super) enum Driving {
     Missed(f64),
 }
 
-impl Driving {
+impl DamageUpdate {
     /// What ζ_n is worth; without a solve it is exact.
     pub(super) fn certificate(self) -> DamageCertificate {
         match self {
@@ -49,19 +49,23 @@ impl Driving {
 }
 
 impl<'a> DamageStep<'a> {
-    pub(super) fn new(session: &'a Session, setting: &'a Setting, phases: &'a Phases) -> Self {
-        Self { session, setting, phases, law: setting.damage(), system: None }
+    pub(super) fn new(
+        session: &'a Session,
+        problem: &'a DiscreteProblem,
+        phases: &'a Phases,
+    ) -> Self {
+        Self { session, problem, phases, law: problem.damage(), system: None }
     }
 
     /// The source of u and ζ, where there is a damage law.
     pub(super) fn source(&self, u: &[f64], zeta: &[f64]) -> Option<Source> {
-        let (law, body) = (self.law?, &self.setting.body);
+        let (law, body) = (self.law?, &self.problem.body);
         Some(self.phases.time("damage source", || {
-            let strain = self.setting.elasticity.strain_squared(body, u);
+            let strain = self.problem.elasticity.strain_squared(body, u);
             let phi = fem::source(body, &law, &strain, zeta);
             let least = phi.iter().flatten().copied().fold(0.0, f64::min);
-            let least = body.partition.ranks().min(least);
-            Source { load: fem::source_load(body, self.setting.mass(), &phi), least }
+            let least = body.partition.comm().min(least);
+            Source { load: fem::source_load(body, self.problem.mass(), &phi), least }
         }))
     }
 
@@ -71,32 +75,32 @@ impl<'a> DamageStep<'a> {
         load: Option<&[f64]>,
         start: &[f64],
         step: f64,
-    ) -> Result<(Vec<f64>, Driving), PetscError> {
+    ) -> Result<(Vec<f64>, DamageUpdate), PetscError> {
         let mut zeta = start.to_vec();
         let (Some(law), Some(load)) = (self.law, load) else {
-            return Ok((zeta, Driving::Nothing));
+            return Ok((zeta, DamageUpdate::Nothing));
         };
-        let setting = self.setting;
-        let partition = &setting.body.partition;
+        let problem = self.problem;
+        let partition = &problem.body.partition;
         let (low, high) = partition.extremes(start);
-        if low == high && partition.ranks().all(load.iter().all(|&b| b == 0.0)) {
-            return Ok((zeta, Driving::Nothing));
+        if low == high && partition.comm().all(load.iter().all(|&b| b == 0.0)) {
+            return Ok((zeta, DamageUpdate::Nothing));
         }
         let phases = self.phases;
         let system = self.system(&law, step)?;
         if !phases.time("damage solve", || system.advance(load, &mut zeta))? {
-            return Ok((zeta, Driving::Failed));
+            return Ok((zeta, DamageUpdate::Failed));
         }
         let largest = system.largest_residual()?;
         partition.update(&mut zeta, 1)?;
         let certificate = phases.time("damage certificate", || {
-            let (body, fields) = (&setting.body, [start, &zeta]);
-            DamageCertificate::of(body, setting.mass(), law.diffusion, step, load, fields)
+            let (body, fields) = (&problem.body, [start, &zeta]);
+            DamageCertificate::of(body, problem.mass(), law.diffusion, step, load, fields)
         });
         let driving = match certificate.residual {
-            residual if !residual.is_finite() => Driving::Failed,
-            residual if residual > largest => Driving::Missed(residual),
-            _ => Driving::Solved(certificate),
+            residual if !residual.is_finite() => DamageUpdate::Failed,
+            residual if residual > largest => DamageUpdate::Missed(residual),
+            _ => DamageUpdate::Solved(certificate),
         };
         Ok((zeta, driving))
     }
@@ -108,8 +112,8 @@ impl<'a> DamageStep<'a> {
         load: &[f64],
         step: f64,
     ) -> Result<Option<Vec<f64>>, PetscError> {
-        let partition = &self.setting.body.partition;
-        let nothing = partition.ranks().all(load.iter().all(|&b| b == 0.0));
+        let partition = &self.problem.body.partition;
+        let nothing = partition.comm().all(load.iter().all(|&b| b == 0.0));
         let Some(law) = self.law.filter(|_| !nothing) else {
             return Ok(Some(vec![0.0; partition.local()]));
         };
@@ -119,13 +123,13 @@ impl<'a> DamageStep<'a> {
         let Some(mut change) = solved else { return Ok(None) };
         change.resize(partition.local(), 0.0);
         partition.update(&mut change, 1)?;
-        let finite = partition.ranks().all(change.iter().all(|z| z.is_finite()));
+        let finite = partition.comm().all(change.iter().all(|z| z.is_finite()));
         Ok(finite.then_some(change))
     }
 
     /// The damage system of a step of `step` s.
     fn system(&mut self, law: &DamageLaw, step: f64) -> Result<&mut DamageSystem, PetscError> {
-        let (session, setting, phases) = (self.session, self.setting, self.phases);
+        let (session, problem, phases) = (self.session, self.problem, self.phases);
         let made = match self.system.take() {
             Some((k, system)) if k == step => system,
             Some((_, mut system)) => {
@@ -133,7 +137,7 @@ impl<'a> DamageStep<'a> {
                 system
             }
             None => phases.time("damage factor", || {
-                let (body, mass) = (&setting.body, setting.mass());
+                let (body, mass) = (&problem.body, problem.mass());
                 DamageSystem::new(session, body, mass, law.diffusion, step)
             })?,
         };

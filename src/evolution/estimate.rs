@@ -44,7 +44,7 @@ impl<'a> Estimate<'a> {
 pub(super) fn at_weakest(partition: &Partition, zeta: &[f64], values: &[f64]) -> f64 {
     let weakest = (0..partition.owned()).min_by(|&a, &b| zeta[a].total_cmp(&zeta[b]));
     let value = weakest.and_then(|i| values.get(i)).copied().unwrap_or(0.0);
-    let ranks = partition.ranks();
-    let (_, rank) = ranks.least(weakest.map_or(f64::INFINITY, |i| zeta[i]));
-    ranks.value_of(rank, value)
+    let comm = partition.comm();
+    let (_, rank) = comm.min_with_rank(weakest.map_or(f64::INFINITY, |i| zeta[i]));
+    comm.broadcast(rank, value)
 }

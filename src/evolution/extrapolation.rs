@@ -1,6 +1,6 @@
 //! Where the next solution is likely to be.
 
-use crate::petsc::Ranks;
+use crate::petsc::Communicator;
 use std::collections::VecDeque;
 
 /// Polynomials in time through the last accepted solutions, as starts for iterative solvers.
@@ -12,7 +12,7 @@ pub(super) struct Extrapolation {
     history: VecDeque<(f64, Vec<f64>)>,
     degree: usize,
     /// The ranks among which solutions are divided.
-    ranks: Ranks,
+    comm: Communicator,
 }
 
 /// Above this degree the tolerance of the solutions, magnified by 2^(degree + 1), prevails.
@@ -22,9 +22,9 @@ const SAMPLE: usize = 4096;
 
 impl Extrapolation {
     /// Before any solution: 0.
-    pub(super) fn new(ranks: Ranks, size: usize) -> Self {
+    pub(super) fn new(comm: Communicator, size: usize) -> Self {
         let history = VecDeque::from([(f64::NEG_INFINITY, vec![0.0; size])]);
-        Self { history, degree: 0, ranks }
+        Self { history, degree: 0, comm }
     }
 
     /// The last accepted solution.
@@ -75,7 +75,7 @@ impl Extrapolation {
             }
         }
         let mut misses = misses[..self.history.len()].to_vec();
-        self.ranks.sum(&mut misses);
+        self.comm.sum(&mut misses);
         misses
     }
 
@@ -99,7 +99,7 @@ mod tests {
     #[test]
     fn a_quadratic_evolution_is_predicted_exactly_from_uneven_times() {
         let solution = |t: f64| vec![1.0 + t * t, 3.0 * t];
-        let mut extrapolation = Extrapolation::new(Ranks::alone(), 2);
+        let mut extrapolation = Extrapolation::new(Communicator::serial(), 2);
         assert_eq!(extrapolation.at(0.0), [0.0, 0.0]);
         for t in [0.0, 0.1, 0.3, 0.35, 0.5, 0.6] {
             extrapolation.accept(t, solution(t));
@@ -110,7 +110,7 @@ mod tests {
 
     #[test]
     fn a_jump_lowers_the_degree() {
-        let mut extrapolation = Extrapolation::new(Ranks::alone(), 1);
+        let mut extrapolation = Extrapolation::new(Communicator::serial(), 1);
         for (t, s) in [(0.0, 0.0), (1.0, 1.0), (2.0, 2.0), (3.0, 2.0), (4.0, 2.0)] {
             extrapolation.accept(t, vec![s]);
         }

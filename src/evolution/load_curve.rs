@@ -1,12 +1,12 @@
 //! Whether a chosen step follows the loads, which a solve at its two ends alone cannot tell.
 
-use super::Setting;
+use super::DiscreteProblem;
 
 /// The loads and prescribed displacements of a run, looked at between the ends of its steps.
 ///
 /// Every rank looks at those of the whole body, so that all come to the same steps.
 pub(super) struct LoadCurve<'a> {
-    setting: &'a Setting,
+    problem: &'a DiscreteProblem,
     /// Σ|·| of the forces and of the prescribed displacements, each the largest seen.
     largest: [f64; 2],
 }
@@ -18,12 +18,12 @@ const POINTS: usize = 16;
 
 impl<'a> LoadCurve<'a> {
     /// Looks at times of the whole run; `None` where nothing depends on time.
-    pub(super) fn new(setting: &'a Setting) -> Option<Self> {
-        let mut curve = Self { setting, largest: [0.0; 2] };
-        if !setting.loads.depend_on_time() {
+    pub(super) fn new(problem: &'a DiscreteProblem) -> Option<Self> {
+        let mut curve = Self { problem, largest: [0.0; 2] };
+        if !problem.loads.depend_on_time() {
             return None;
         }
-        for time in setting.scene().sample_times(100) {
+        for time in problem.scene().sample_times(100) {
             curve.observe(&curve.values(time));
         }
         Some(curve)
@@ -60,7 +60,7 @@ impl<'a> LoadCurve<'a> {
 
     /// Forces and prescribed displacements at `time`.
     fn values(&self, time: f64) -> [Vec<f64>; 2] {
-        let loads = &self.setting.loads;
+        let loads = &self.problem.loads;
         [loads.sampled_at(time), loads.prescribed_at(time)]
     }
 }

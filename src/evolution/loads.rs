@@ -1,7 +1,7 @@
 //! The loads and prescribed displacements of a scene as functions of time.
 
 use crate::{
-    fem::{Body, Share, add_body_force, add_traction, midpoint},
+    fem::{Body, Subdomain, add_body_force, add_traction, midpoint},
     scene::{Boundary, Expression, Scene},
 };
 
@@ -52,11 +52,11 @@ impl Loads {
     }
 
     /// The loads on a rank's share. Values of the fixed rows are needed wherever one is known.
-    pub fn share(self, share: &Share) -> Self {
-        let edges = |(edges, f): (Vec<[usize; 2]>, _)| (share.edges(&edges), f);
+    pub fn restrict(self, subdomain: &Subdomain) -> Self {
+        let edges = |(edges, f): (Vec<[usize; 2]>, _)| (subdomain.edges(&edges), f);
         Self {
             tractions: self.tractions.into_iter().map(edges).collect(),
-            constant: self.constant.map(|load| share.field(&load, 2)),
+            constant: self.constant.map(|load| subdomain.field(&load, 2)),
             ..self
         }
     }

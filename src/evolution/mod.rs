@@ -1,10 +1,10 @@
 //! Problem VP^hk: damage and contact in turn, step by step.
 
-mod bounds;
+mod bound_violation;
 mod chosen;
 mod clock;
 mod damage_step;
-mod equilibrium;
+mod contact_step;
 mod estimate;
 mod extrapolation;
 mod foundation;
@@ -12,26 +12,26 @@ mod load_curve;
 mod loads;
 mod notes;
 mod resultants;
-mod setting;
+mod discrete_problem;
 mod state;
 mod time_loop;
 
 pub use crate::contact::ContactPoint;
 pub use crate::phases::Phases;
-pub use bounds::Excess;
-pub use equilibrium::Equilibrium;
+pub use bound_violation::BoundViolation;
+pub use contact_step::ContactStep;
+pub use discrete_problem::{DiscreteProblem, SetupError};
 pub use foundation::Foundation;
 pub use loads::Loads;
 pub use notes::Accuracy;
-pub use setting::{Setting, SetupError};
 pub use state::{State, Step, StepRecord};
 
 use crate::{
     contact::{ContactError, ContactReport, Kkt, RigidMotion, UnknownSolver},
-    petsc::{PetscError, Ranks, Session},
+    petsc::{Communicator, PetscError, Session},
     scene::Scene,
 };
-use damage_step::Driving;
+use damage_step::DamageUpdate;
 use time_loop::{Attempt, TimeLoop};
 
 /// How a run ended that did not fail.
@@ -44,7 +44,7 @@ pub struct Outcome {
     /// Worst KKT residuals of all steps.
     pub kkt: Kkt,
     /// Steps without a damage solve, because nothing drove the damage.
-    pub undamaged_steps: usize,
+    pub skipped_damage_solves: usize,
     /// Steps undone and tried again, shorter.
     pub undone: usize,
     /// Steps in which the contact solver left its fast path.
@@ -52,7 +52,7 @@ pub struct Outcome {
     /// Of these, steps in which TAO gave the answer in the place of the active set.
     pub rescued: usize,
     /// Where ζ left the bounds of its equation.
-    pub excess: Excess,
+    pub bound_violation: BoundViolation,
     /// When first no pressing node held the body against a rigid motion, s, and which.
     pub unheld: Option<(f64, RigidMotion)>,
     /// Estimated errors of the answers.
@@ -138,7 +138,7 @@ pub enum RunError {
     Setup(#[from] SetupError),
     /// Another rank failed where this one did not.
     #[error("another rank failed")]
-    Elsewhere,
+    OnAnotherRank,
     /// PETSc failed.
     #[error(transparent)]
     Petsc(#[from] PetscError),
@@ -174,22 +174,22 @@ impl RunError {
 /// The answer of whoever is shown an accepted step: an error ends the run.
 pub type Observed = Result<(), Box<dyn std::error::Error + Send + Sync>>;
 
-/// Runs `setting` with the contact solver called `solver`; `accepted` sees every accepted
+/// Runs `problem` with the contact solver called `solver`; `accepted` sees every accepted
 /// step, n = 0 included.
 ///
 /// # Errors
 /// See [`RunError`]; every accepted step has been seen by then.
 pub fn run(
     session: &Session,
-    setting: &Setting,
+    problem: &DiscreteProblem,
     solver: &str,
     phases: &Phases,
     accepted: &mut dyn FnMut(&Step) -> Observed,
 ) -> Result<Outcome, RunError> {
-    let mut run = TimeLoop::start(session, setting, solver, phases)?;
+    let mut run = TimeLoop::start(session, problem, solver, phases)?;
     let mut show = |step: &Step| {
         let shown = accepted(step).map_err(RunError::Observer);
-        agreed(setting.body.partition.ranks(), shown)
+        agreed(problem.body.partition.comm(), shown)
     };
     show(&run.outcome.last)?;
     loop {
@@ -202,10 +202,10 @@ pub fn run(
 }
 
 /// All ranks go on, or none. Collective.
-fn agreed<T, E: Into<RunError>>(ranks: Ranks, result: Result<T, E>) -> Result<T, RunError> {
-    let failed = ranks.any(result.is_err());
+fn agreed<T, E: Into<RunError>>(comm: Communicator, result: Result<T, E>) -> Result<T, RunError> {
+    let failed = comm.any(result.is_err());
     match result {
-        Ok(_) if failed => Err(RunError::Elsewhere),
+        Ok(_) if failed => Err(RunError::OnAnotherRank),
         result => result.map_err(E::into),
     }
 }
@@ -217,11 +217,11 @@ impl Outcome {
             kkt: first.record.kkt(),
             last: first,
             stopped: None,
-            undamaged_steps: 0,
+            skipped_damage_solves: 0,
             undone: 0,
             fallbacks: 0,
             rescued: 0,
-            excess: Excess::default(),
+            bound_violation: BoundViolation::default(),
             accuracy: Accuracy::default(),
             damage_error: None,
             worst: None,
@@ -234,9 +234,9 @@ impl Outcome {
         self.rescued += usize::from(report.rescues > 0);
     }
 
-    fn accept(&mut self, last: Step, driving: Driving) {
+    fn accept(&mut self, last: Step, driving: DamageUpdate) {
         self.kkt = self.kkt.max(&last.record.kkt());
-        self.undamaged_steps += usize::from(driving == Driving::Nothing);
+        self.skipped_damage_solves += usize::from(driving == DamageUpdate::Nothing);
         if self.unheld.is_none() {
             self.unheld = last.unheld.clone().map(|motion| (last.record.time, motion));
         }

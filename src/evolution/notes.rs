@@ -1,6 +1,6 @@
 //! What the user should know about an answer that its residuals do not tell.
 
-use super::{Outcome, Setting};
+use super::{DiscreteProblem, Outcome};
 use crate::{contact::RigidMotion, model::Plane, scene::Stepping};
 
 /// In plane strain with ν above this, P1 triangles lock: measured in the atlas of failure.
@@ -72,17 +72,17 @@ impl Accuracy {
 }
 
 impl Outcome {
-    /// What the user should know about the run of `setting`.
-    pub fn notes(&self, setting: &Setting) -> Vec<String> {
+    /// What the user should know about the run of `problem`.
+    pub fn notes(&self, problem: &DiscreteProblem) -> Vec<String> {
         let mut notes = Vec::new();
-        if let Some(stop) = self.stopped.filter(|stop| stop.floor > setting.threshold()) {
+        if let Some(stop) = self.stopped.filter(|stop| stop.floor > problem.threshold()) {
             notes.push(format!(
                 "ζ_* was reached too early, or should not be reached at all: the sources up to \
                  there allow no ζ below {:.4}",
                 stop.floor
             ));
         }
-        notes.extend(self.excess.note(setting.mass()));
+        notes.extend(self.bound_violation.note(problem.mass()));
         if let Some((time, motion)) = &self.unheld {
             // Nodes that touch without force may still be in the way.
             notes.push(format!(
@@ -93,26 +93,26 @@ impl Outcome {
         // That a body which is not held has no one answer is said already.
         let displacement = if self.unheld.is_none() { self.accuracy.displacement } else { 0.0 };
         let accuracy = Accuracy { displacement, ..self.accuracy };
-        notes.extend(accuracy.notes(setting.tolerance));
-        notes.extend(setting.large_gradients(&self.last.state.u));
-        if self.undamaged_steps > 0 && setting.damage().is_some() {
+        notes.extend(accuracy.notes(problem.tolerance));
+        notes.extend(problem.large_gradients(&self.last.state.u));
+        if self.skipped_damage_solves > 0 && problem.damage().is_some() {
             notes.push(format!(
                 "the damage solve was skipped in {} of {} steps: no source, uniform ζ",
-                self.undamaged_steps, self.last.record.step
+                self.skipped_damage_solves, self.last.record.step
             ));
         }
         notes.extend(self.slow_path());
         if self.undone > 0 {
             notes.push(format!("{} steps were undone and tried again, shorter", self.undone));
         }
-        notes.extend(self.chosen_steps(setting));
+        notes.extend(self.chosen_steps(problem));
         notes
     }
 
     /// How many steps were chosen, and how exact the damage is for it.
-    fn chosen_steps(&self, setting: &Setting) -> Option<String> {
-        let error = self.damage_error.filter(|_| setting.damage().is_some())?;
-        let Stepping::Auto { tolerance } = setting.scene().time?.stepping else { return None };
+    fn chosen_steps(&self, problem: &DiscreteProblem) -> Option<String> {
+        let error = self.damage_error.filter(|_| problem.damage().is_some())?;
+        let Stepping::Auto { tolerance } = problem.scene().time?.stepping else { return None };
         let steps = self.last.record.step;
         let verdict = match error > tolerance {
             true => format!(", more than time.tolerance = {tolerance}: lower it"),
@@ -143,7 +143,7 @@ impl Outcome {
     }
 }
 
-impl Setting {
+impl DiscreteProblem {
     /// What the user should know before any solve: what was not taken as it is written, rigid
     /// motions that nothing holds, tractions, a material or triangles that make the discretisation
     /// poor.
@@ -169,7 +169,7 @@ impl Setting {
         let gradient = |t: usize| body.triangles[t].gradient(&body.gather(t, u)).norm();
         let own = 0..body.own_triangles;
         let large = own.filter(|&t| gradient(t) > LARGE).map(|t| body.triangles[t].area).sum();
-        let part = body.partition.ranks().total(large) / body.area;
+        let part = body.partition.comm().total(large) / body.area;
         (part > NOTICEABLE).then(|| {
             format!(
                 "|∇u| exceeds {LARGE} in {:.0} % of the body: strains or rotations are not small, \
@@ -217,10 +217,10 @@ impl Setting {
         let angles =
             self.body.mesh.triangles.iter().map(|t| (smallest_angle(t.map(|i| nodes[i])), t));
         let least = angles.min_by(|(a, _), (b, _)| a.total_cmp(b));
-        let ranks = self.body.partition.ranks();
-        let (angle, rank) = ranks.least(least.map_or(f64::INFINITY, |(angle, _)| angle));
+        let comm = self.body.partition.comm();
+        let (angle, rank) = comm.min_with_rank(least.map_or(f64::INFINITY, |(angle, _)| angle));
         let at = least.map_or([0.0; 2], |(_, triangle)| nodes[triangle[0]]);
-        let [x, y] = at.map(|coordinate| ranks.value_of(rank, coordinate));
+        let [x, y] = at.map(|coordinate| comm.broadcast(rank, coordinate));
         (angle < SLIVER).then(|| {
             format!(
                 "a triangle at ({x:.4}, {y:.4}) has an angle of {angle:.1e}°: round-off grows as \

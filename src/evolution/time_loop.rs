@@ -1,11 +1,11 @@
 //! One step after the other: damage (28), then contact (26).
 
 use super::{
-    Equilibrium, Outcome, Phases, RunError, Setting, State, Stop,
-    bounds::Bounds,
+    ContactStep, DiscreteProblem, Outcome, Phases, RunError, State, Stop,
+    bound_violation::Bounds,
     chosen::{Chosen, Plan},
     clock::Clock,
-    damage_step::{DamageStep, Driving, Source},
+    damage_step::{DamageStep, DamageUpdate, Source},
     estimate::Estimate,
     load_curve::LoadCurve,
 };
@@ -17,8 +17,8 @@ use std::time::Instant;
 
 /// What the steps of a run share.
 pub(super) struct TimeLoop<'a> {
-    setting: &'a Setting,
-    equilibrium: Equilibrium<'a>,
+    problem: &'a DiscreteProblem,
+    contact_step: ContactStep<'a>,
     damage: DamageStep<'a>,
     clock: Clock,
     /// What chosen steps have to follow, where it depends on time.
@@ -48,7 +48,7 @@ struct Damaged {
     zeta: Vec<f64>,
     /// How it was found, where steps are chosen.
     plan: Option<Plan>,
-    driving: Driving,
+    driving: DamageUpdate,
     /// min ζ and max ζ, and the bounds that the source allows.
     extremes: (f64, f64),
     allowed: Bounds,
@@ -58,14 +58,14 @@ impl<'a> TimeLoop<'a> {
     /// Solves (27): the displacement at t = 0, or the only one where there is no time.
     pub(super) fn start(
         session: &'a Session,
-        setting: &'a Setting,
+        problem: &'a DiscreteProblem,
         solver: &str,
         phases: &'a Phases,
     ) -> Result<Self, RunError> {
-        let mut equilibrium = Equilibrium::new(session, setting, solver, phases)?;
-        let first = equilibrium.solve(0, setting.start(), &setting.initial_damage())?;
-        equilibrium.accept(setting.start())?;
-        let (grid, zeta, body) = (setting.scene().time, &first.state.zeta, &setting.body);
+        let mut contact_step = ContactStep::new(session, problem, solver, phases)?;
+        let first = contact_step.solve(0, problem.start(), &problem.initial_damage())?;
+        contact_step.accept(problem.start())?;
+        let (grid, zeta, body) = (problem.scene().time, &first.state.zeta, &problem.body);
         let chosen = match grid {
             Some(TimeGrid { end, stepping: Stepping::Auto { tolerance } }) => {
                 Some(Chosen::new(body, zeta, tolerance, end))
@@ -74,13 +74,13 @@ impl<'a> TimeLoop<'a> {
         };
         let bounds = Bounds::of(body.partition.extremes(zeta));
         let mut outcome = Outcome::new(first);
-        outcome.count(equilibrium.report());
+        outcome.count(contact_step.report());
         Ok(Self {
-            setting,
-            equilibrium,
-            damage: DamageStep::new(session, setting, phases),
+            problem,
+            contact_step,
+            damage: DamageStep::new(session, problem, phases),
             clock: Clock::new(grid, chosen.as_ref().map_or(0.0, Chosen::first_step)),
-            load_curve: chosen.as_ref().and_then(|_| LoadCurve::new(setting)),
+            load_curve: chosen.as_ref().and_then(|_| LoadCurve::new(problem)),
             source: None,
             bounds,
             estimate: Estimate::new(&body.partition),
@@ -124,7 +124,7 @@ impl<'a> TimeLoop<'a> {
     /// The step of length `step` has not happened; the next is shorter by `factor`. False if it
     /// cannot be.
     fn undo(&mut self, step: f64, factor: f64) -> Result<bool, RunError> {
-        self.equilibrium.undo()?;
+        self.contact_step.undo()?;
         let cut = self.clock.cut(step, factor);
         self.outcome.undone += usize::from(cut);
         Ok(cut)
@@ -134,12 +134,12 @@ impl<'a> TimeLoop<'a> {
         let started = Instant::now();
         let n = self.outcome.last.record.step + 1;
         let damaged = self.damage(n, time, step)?;
-        if damaged.extremes.0 <= self.setting.threshold() {
+        if damaged.extremes.0 <= self.problem.threshold() {
             return self.stop(&damaged, n, time, step);
         }
 
         // (26): u_n from ζ_n.
-        let mut last = self.equilibrium.solve(n, time, &damaged.zeta)?;
+        let mut last = self.contact_step.solve(n, time, &damaged.zeta)?;
         let size = self.judge(&damaged, &last.state, step)?;
         if size > 1.0 {
             return match self.undo(step, Clock::reduction(size))? {
@@ -147,15 +147,15 @@ impl<'a> TimeLoop<'a> {
                 false => Err(RunError::Steps { step: n, time }),
             };
         }
-        self.equilibrium.accept(time)?;
+        self.contact_step.accept(time)?;
         self.clock.accept(time, step, size);
-        self.outcome.excess.observe(damaged.allowed, damaged.extremes, n, time);
+        self.outcome.bound_violation.observe(damaged.allowed, damaged.extremes, n, time);
         let certificate = damaged.driving.certificate();
         last.record.zeta_residual = certificate.residual;
         last.record.zeta_error = certificate.error;
         last.record.seconds = started.elapsed().as_secs_f64();
         self.outcome.accept(last, damaged.driving);
-        self.outcome.count(self.equilibrium.report());
+        self.outcome.count(self.contact_step.report());
         Ok(Attempt::Accepted)
     }
 
@@ -181,7 +181,7 @@ impl<'a> TimeLoop<'a> {
         if ratio <= 1.0 {
             let before = self.source.as_ref().map_or(&[][..], |source| &source.load);
             chosen.accept(&new.zeta, &missed, error, step, change(before));
-            self.bounds = bounds.shifted(self.setting.body.partition.extremes(&missed));
+            self.bounds = bounds.shifted(self.problem.body.partition.extremes(&missed));
             self.source = after;
         }
         Ok(ratio)
@@ -195,7 +195,7 @@ impl<'a> TimeLoop<'a> {
         time: f64,
         step: f64,
     ) -> Result<Attempt, RunError> {
-        let (reached, level) = (damaged.extremes.0, self.setting.threshold());
+        let (reached, level) = (damaged.extremes.0, self.problem.threshold());
         let started = self.outcome.last.state.time;
         let (time, uncertainty) = match &self.chosen {
             None => {
@@ -204,7 +204,7 @@ impl<'a> TimeLoop<'a> {
                 (time, step + 2.0 * self.estimate.delay(&damaged.zeta).abs())
             }
             Some(chosen) => {
-                let from = self.setting.body.partition.extremes(chosen.start()).0;
+                let from = self.problem.body.partition.extremes(chosen.start()).0;
                 let part = if from > level { (from - level) / (from - reached) } else { 0.0 };
                 let (landing, delay) = (chosen.landing(), chosen.delay(&damaged.zeta));
                 // The corrected start is not what is written.
@@ -215,7 +215,7 @@ impl<'a> TimeLoop<'a> {
                 (started + part * step, step + delay)
             }
         };
-        self.outcome.excess.observe(damaged.allowed, damaged.extremes, n, time);
+        self.outcome.bound_violation.observe(damaged.allowed, damaged.extremes, n, time);
         let floor = damaged.allowed.floor();
         self.outcome.stopped = Some(Stop { time, zeta_min: reached, floor, uncertainty });
         Ok(Attempt::Stopped)
@@ -230,7 +230,7 @@ impl<'a> TimeLoop<'a> {
         let least = self.source.as_ref().map_or(0.0, |source| source.least);
         let load = self.source.as_ref().map(|source| &source.load[..]);
         let plan = self.chosen.as_ref().zip(load).map(|(chosen, load)| chosen.plan(step, load));
-        let partition = &self.setting.body.partition;
+        let partition = &self.problem.body.partition;
         let ((zeta, driving), allowed) = match &plan {
             None => (self.damage.advance(load, &old.zeta, step)?, self.bounds.after(least, step)),
             Some(plan) => {
@@ -240,8 +240,10 @@ impl<'a> TimeLoop<'a> {
             }
         };
         match driving {
-            Driving::Missed(residual) => Err(RunError::DamageMissed { step: n, time, residual }),
-            Driving::Failed => Err(RunError::Damage { step: n, time }),
+            DamageUpdate::Missed(residual) => {
+                Err(RunError::DamageMissed { step: n, time, residual })
+            }
+            DamageUpdate::Failed => Err(RunError::Damage { step: n, time }),
             _ => {
                 let extremes = partition.extremes(&zeta);
                 Ok(Damaged { zeta, plan, driving, extremes, allowed })
@@ -251,12 +253,12 @@ impl<'a> TimeLoop<'a> {
 
     /// Ends the run: estimates the errors of its answers.
     pub(super) fn finish(self, phases: &Phases) -> Result<Outcome, RunError> {
-        let Self { damage, equilibrium, chosen, mut outcome, .. } = self;
+        let Self { damage, contact_step, chosen, mut outcome, .. } = self;
         // Makes room for another factorisation.
         drop(damage);
         outcome.damage_error = chosen.map(|chosen| chosen.relative_error());
         let (worst, largest) = (outcome.worst.take(), outcome.largest.take());
-        let estimate = || equilibrium.accuracy(&outcome.last, worst.as_ref(), largest.as_ref());
+        let estimate = || contact_step.accuracy(&outcome.last, worst.as_ref(), largest.as_ref());
         outcome.accuracy = phases.time("accuracy", estimate)?;
         Ok(outcome)
     }

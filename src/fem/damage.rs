@@ -85,9 +85,9 @@ impl DamageCertificate {
             rhs += (area * before[i] + b).powi(2);
             least = area.min(least);
         }
-        let ranks = body.partition.ranks();
+        let comm = body.partition.comm();
         let mut sums = [squares, weighted, rhs];
-        ranks.sum(&mut sums);
+        comm.sum(&mut sums);
         let [squares, weighted, rhs] = sums;
         let factor = match mass {
             Mass::Consistent => 4.0,
@@ -95,7 +95,7 @@ impl DamageCertificate {
         };
         Self {
             residual: (squares / rhs.max(f64::MIN_POSITIVE)).sqrt(),
-            error: factor * (weighted / ranks.min(least)).sqrt(),
+            error: factor * (weighted / comm.min(least)).sqrt(),
         }
     }
 }

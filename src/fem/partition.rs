@@ -1,6 +1,6 @@
 //! Which nodes this rank owns, and what it must ask the others. Nothing else in the program knows.
 
-use crate::petsc::{Ghosts, PetscError, Ranks};
+use crate::petsc::{Communicator, Ghosts, PetscError};
 
 /// The nodes of this rank: owned ones first, then ghosts, with their global numbers.
 ///
@@ -13,7 +13,7 @@ pub struct Partition {
     /// Nodes of the whole body.
     total: usize,
     global: Vec<i32>,
-    ranks: Ranks,
+    comm: Communicator,
     /// None where one rank owns everything.
     ghosts: Option<Ghosts>,
 }
@@ -22,23 +22,23 @@ impl Partition {
     /// One rank that owns everything.
     pub fn whole(nodes: usize) -> Self {
         let global = (0..nodes as i32).collect();
-        Self { owned: nodes, total: nodes, global, ranks: Ranks::alone(), ghosts: None }
+        Self { owned: nodes, total: nodes, global, comm: Communicator::serial(), ghosts: None }
     }
 
     /// One of several ranks, with the global numbers of its nodes, `owned` of them its own.
     pub(super) fn part(
-        ranks: Ranks,
+        comm: Communicator,
         owned: usize,
         total: usize,
         global: Vec<i32>,
         ghosts: Ghosts,
     ) -> Self {
-        Self { owned, total, global, ranks, ghosts: Some(ghosts) }
+        Self { owned, total, global, comm, ghosts: Some(ghosts) }
     }
 
     /// The ranks among which the body is divided.
-    pub fn ranks(&self) -> Ranks {
-        self.ranks
+    pub fn comm(&self) -> Communicator {
+        self.comm
     }
 
     /// Number of nodes owned.
@@ -84,20 +84,20 @@ impl Partition {
     /// ‖·‖₂ of a field over the whole body, from its local values with `block` components.
     pub fn norm(&self, field: &[f64], block: usize) -> f64 {
         let squares = field[..self.owned * block].iter().map(|v| v * v).sum::<f64>();
-        self.ranks.total(squares).sqrt()
+        self.comm.total(squares).sqrt()
     }
 
     /// Inner product of two fields over the whole body.
     pub fn dot(&self, a: &[f64], b: &[f64], block: usize) -> f64 {
         let owned = self.owned * block;
-        self.ranks.total(a[..owned].iter().zip(&b[..owned]).map(|(a, b)| a * b).sum())
+        self.comm.total(a[..owned].iter().zip(&b[..owned]).map(|(a, b)| a * b).sum())
     }
 
     /// The largest |·| of a field with two components, over the whole body.
     pub fn largest(&self, u: &[f64]) -> f64 {
         let (owned, _) = u[..2 * self.owned].as_chunks::<2>();
         let square = owned.iter().map(|[x, y]| x * x + y * y).fold(0.0, f64::max);
-        self.ranks.max(square).sqrt()
+        self.comm.max(square).sqrt()
     }
 
     /// (min, max) of a field over the whole body.
@@ -105,6 +105,6 @@ impl Partition {
         let owned = field[..self.owned].iter();
         let (low, high) = owned
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &z| (low.min(z), high.max(z)));
-        (self.ranks.min(low), self.ranks.max(high))
+        (self.comm.min(low), self.comm.max(high))
     }
 }

@@ -42,7 +42,7 @@ impl Elasticity {
             energy += weight * squared(&strains[t]);
         }
         let mut both = [jump, energy];
-        body.partition.ranks().sum(&mut both);
+        body.partition.comm().sum(&mut both);
         let [jump, energy] = both;
         Ok(if jump == 0.0 { 0.0 } else { (jump / energy).sqrt() })
     }

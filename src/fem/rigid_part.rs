@@ -21,7 +21,7 @@ impl RigidPart {
             sums[1] += area * uy;
             sums[2] += area * ((x - cx) * uy - (y - cy) * ux);
         }
-        body.partition.ranks().sum(&mut sums);
+        body.partition.comm().sum(&mut sums);
         let translation = [sums[0] / body.area, sums[1] / body.area];
         Self { translation, rotation: sums[2] / body.polar_inertia, centre: body.centroid }
     }
@@ -41,6 +41,6 @@ impl RigidPart {
             rigid = rigid.max(x * x + y * y);
             rest = rest.max((ux - x) * (ux - x) + (uy - y) * (uy - y));
         }
-        [rigid, rest].map(|square| body.partition.ranks().max(square).sqrt())
+        [rigid, rest].map(|square| body.partition.comm().max(square).sqrt())
     }
 }

@@ -1,10 +1,10 @@
 //! The damaged elastic operator (ζ Aε(u), ε(v)) of (26) as a matrix for solvers.
 
-use super::{Body, Elasticity, Frames};
+use super::{Body, Elasticity, NodalBases};
 use crate::petsc::{Matrix, PetscError, Session, Vector};
 use nalgebra::Matrix2;
 
-/// The stiffness matrix K(ζ) in the unknowns of a [`Frames`]; pattern once, values refilled.
+/// The stiffness matrix K(ζ) in the unknowns of a [`NodalBases`]; pattern once, values refilled.
 ///
 /// K consists of 2×2 blocks, one for each pair of nodes with a common triangle. Every pair {a, b}
 /// keeps what its triangles contribute without damage: a refill reads these once, in order.
@@ -26,17 +26,17 @@ impl Stiffness {
         session: &Session,
         body: &Body,
         elasticity: &Elasticity,
-        frames: &Frames,
+        bases: &NodalBases,
     ) -> Result<Self, PetscError> {
         let partition = &body.partition;
         let (places, pairs) = pairs(body);
         let contributions: Vec<_> = places
             .iter()
-            .map(|&(t, i, j)| (t, block(body, t as usize, [i, j], elasticity, frames)))
+            .map(|&(t, i, j)| (t, block(body, t as usize, [i, j], elasticity, bases)))
             .collect();
         drop(places);
 
-        let fixed = frames.fixed();
+        let fixed = bases.fixed();
         let (mut rows, mut columns) = (Vec::new(), Vec::new());
         let mut place = |a: usize, b: usize| {
             for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
@@ -64,13 +64,13 @@ impl Stiffness {
             rows.push(partition.row(dof / 2, 2, dof % 2));
             columns.push(partition.row(dof / 2, 2, dof % 2));
         }
-        let trace = partition.ranks().total(trace);
-        let free = partition.ranks().count(2 * partition.owned() - diagonal.len());
+        let trace = partition.comm().total(trace);
+        let free = partition.comm().count(2 * partition.owned() - diagonal.len());
         let scale = if trace > 0.0 { trace / free as f64 } else { elasticity.material.young };
 
         let values = vec![scale; rows.len()];
         let mut matrix = Matrix::with_pattern(session, 2 * partition.owned(), 2, rows, columns)?;
-        matrix.set_near_null_space(rigid_motions(session, body, frames)?)?;
+        matrix.set_near_null_space(rigid_motions(session, body, bases)?)?;
         let pairs = pairs.iter().map(|&([a, b], end)| (end, a == b)).collect();
         let mut stiffness = Self { matrix, scale, pairs, contributions, values };
         stiffness.refill(&vec![1.0; body.triangles.len()])?;
@@ -112,18 +112,18 @@ impl Stiffness {
     }
 }
 
-/// The translations and the rotation in the unknowns of `frames`, 0 on fixed ones: what multigrid
+/// The translations and the rotation in the unknowns of `bases`, 0 on fixed ones: what multigrid
 /// must represent on its coarse levels.
 fn rigid_motions(
     session: &Session,
     body: &Body,
-    frames: &Frames,
+    bases: &NodalBases,
 ) -> Result<Vec<Vector>, PetscError> {
     let motions: [fn([f64; 2]) -> [f64; 2]; 3] = [|_| [1.0, 0.0], |_| [0.0, 1.0], |[x, y]| [-y, x]];
     let vector = |motion: fn([f64; 2]) -> [f64; 2]| {
         let mut field: Vec<f64> = body.mesh.nodes.iter().flat_map(|&x| motion(x)).collect();
-        frames.displacement_to_frame(&mut field);
-        field.iter_mut().zip(frames.fixed()).filter(|(_, on)| **on).for_each(|(v, _)| *v = 0.0);
+        bases.displacement_to_local(&mut field);
+        field.iter_mut().zip(bases.fixed()).filter(|(_, on)| **on).for_each(|(v, _)| *v = 0.0);
         let mut vector = Vector::zeros(session, 2 * body.partition.owned())?;
         vector.set(&field[..2 * body.partition.owned()])?;
         Ok(vector)
@@ -158,17 +158,17 @@ fn pairs(body: &Body) -> (Vec<Place>, Vec<([usize; 2], u32)>) {
     (found.into_iter().map(|(_, place)| place).collect(), pairs)
 }
 
-/// The block of two corners of triangle `t` in the unknowns of `frames`, row by row.
+/// The block of two corners of triangle `t` in the unknowns of `bases`, row by row.
 fn block(
     body: &Body,
     t: usize,
     corners: [u8; 2],
     elasticity: &Elasticity,
-    frames: &Frames,
+    bases: &NodalBases,
 ) -> [f64; 4] {
     let [i, j] = corners.map(usize::from);
     let mut k = body.triangles[t].stiffness(&elasticity.d, i, j);
-    let turn = |i: usize| frames.inverse(body.mesh.triangles[t][i]);
+    let turn = |i: usize| bases.inverse(body.mesh.triangles[t][i]);
     if let Some(inverse) = turn(i) {
         k = inverse.transpose() * k;
     }

@@ -16,7 +16,7 @@ impl Piece {
     /// The triangles that this rank owns, with their nodes.
     pub(super) fn of(body: &Body) -> Self {
         let triangles = &body.mesh.triangles[..body.own_triangles];
-        let mut used = vec![body.partition.ranks().is_alone(); body.mesh.nodes.len()];
+        let mut used = vec![body.partition.comm().is_serial(); body.mesh.nodes.len()];
         triangles.iter().flatten().for_each(|&node| used[node] = true);
         let nodes: Vec<usize> = (0..used.len()).filter(|&node| used[node]).collect();
         let mut place = vec![0; used.len()];

@@ -10,8 +10,8 @@ use super::{
     write_whole,
 };
 use crate::{
-    evolution::{Setting, State},
-    petsc::{PetscError, Ranks},
+    evolution::{DiscreteProblem, State},
+    petsc::{Communicator, PetscError},
 };
 use std::path::{Path, PathBuf};
 
@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 /// its piece `fields_NNNN_R.vtu`, and the first the lists: `fields_NNNN.pvtu` and `fields.pvd`.
 pub struct FieldWriter {
     folder: PathBuf,
-    ranks: Ranks,
+    comm: Communicator,
     piece: Piece,
     /// Points and cells, the same in every frame.
     mesh: String,
@@ -40,16 +40,16 @@ const IN_CELLS: [(&str, &str, usize); 2] = [("von_mises", "Float64", 1), ("stres
 const NUMBER: (&str, &str, usize) = ("global_node", "Int32", 1);
 
 impl FieldWriter {
-    /// A writer for the body of `setting` into `folder`.
+    /// A writer for the body of `problem` into `folder`.
     ///
     /// # Errors
     /// The mesh cannot be encoded.
-    pub fn new(folder: &Path, setting: &Setting) -> Result<Self, OutputError> {
-        let body = &setting.body;
+    pub fn new(folder: &Path, problem: &DiscreteProblem) -> Result<Self, OutputError> {
+        let body = &problem.body;
         let piece = Piece::of(body);
         let mesh = mesh(&piece, &body.mesh.nodes).map_err(|e| OutputError::new(folder, e))?;
-        let ranks = body.partition.ranks();
-        Ok(Self { folder: folder.to_owned(), ranks, piece, mesh, frames: Vec::new() })
+        let comm = body.partition.comm();
+        Ok(Self { folder: folder.to_owned(), comm, piece, mesh, frames: Vec::new() })
     }
 
     /// Time of the last frame written.
@@ -61,16 +61,16 @@ impl FieldWriter {
     ///
     /// # Errors
     /// A file cannot be written.
-    pub fn add(&mut self, setting: &Setting, state: &State) -> Result<(), OutputError> {
+    pub fn add(&mut self, problem: &DiscreteProblem, state: &State) -> Result<(), OutputError> {
         let stem = format!("fields_{:04}", self.frames.len());
-        let (piece, frame) = match self.ranks.is_alone() {
+        let (piece, frame) = match self.comm.is_serial() {
             true => (format!("{stem}.vtu"), format!("{stem}.vtu")),
-            false => (piece_name(&stem, self.ranks.rank()), format!("{stem}.pvtu")),
+            false => (piece_name(&stem, self.comm.rank()), format!("{stem}.pvtu")),
         };
         self.frames.push((state.time, frame.clone()));
         let path = self.folder.join(&piece);
-        let contact = contact_fields(setting, state).map_err(|e| OutputError::new(&path, e))?;
-        let data = self.fields(setting, state, contact).map_err(|e| OutputError::new(&path, e))?;
+        let contact = contact_fields(problem, state).map_err(|e| OutputError::new(&path, e))?;
+        let data = self.fields(problem, state, contact).map_err(|e| OutputError::new(&path, e))?;
         let content = format!(
             "{}<UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n{}{data}\
              </Piece>\n</UnstructuredGrid>\n</VTKFile>\n",
@@ -80,12 +80,12 @@ impl FieldWriter {
             self.mesh
         );
         write_whole(&path, content.as_bytes())?;
-        if !self.ranks.is_first() {
+        if !self.comm.is_root() {
             return Ok(());
         }
-        if !self.ranks.is_alone() {
+        if !self.comm.is_serial() {
             let points = [&AT_POINTS[..], &[NUMBER]].concat();
-            let text = list(&stem, self.ranks.size(), &points, &IN_CELLS);
+            let text = list(&stem, self.comm.size(), &points, &IN_CELLS);
             write_whole(&self.folder.join(frame), text.as_bytes())?;
         }
         write_whole(&self.folder.join("fields.pvd"), self.collection().as_bytes())
@@ -101,19 +101,19 @@ impl FieldWriter {
     /// `<PointData>` and `<CellData>`.
     fn fields(
         &self,
-        setting: &Setting,
+        problem: &DiscreteProblem,
         state: &State,
         (pressure, gap): (Vec<f64>, Vec<f64>),
     ) -> std::io::Result<String> {
-        let (elasticity, piece) = (&setting.elasticity, &self.piece);
+        let (elasticity, piece) = (&problem.elasticity, &self.piece);
         let stress: Vec<_> = (state.zeta_mean.iter().enumerate().take(piece.corners.len()))
-            .map(|(t, zeta)| elasticity.stress(&setting.body, t, *zeta, &state.u))
+            .map(|(t, zeta)| elasticity.stress(&problem.body, t, *zeta, &state.u))
             .collect();
         let u = &state.u;
         let displacement = piece.nodes.iter().flat_map(|&i| [u[2 * i], u[2 * i + 1], 0.0]);
         let von_mises = stress.iter().map(|s| elasticity.material.von_mises(s));
         let components = stress.iter().flat_map(|s| [s[0], s[1], s[2]]);
-        let number = |&node: &usize| setting.body.partition.global(node, 1, 0);
+        let number = |&node: &usize| problem.body.partition.global(node, 1, 0);
         let [(u, _, width), (zeta, ..), (p, ..), (g, ..)] = AT_POINTS;
         let [(mises, ..), (sigma, _, parts)] = IN_CELLS;
         Ok([
@@ -122,7 +122,7 @@ impl FieldWriter {
             data_array(zeta, 1, piece.values(&state.zeta))?,
             data_array(p, 1, piece.values(&pressure))?,
             data_array(g, 1, piece.values(&gap))?,
-            match self.ranks.is_alone() {
+            match self.comm.is_serial() {
                 true => String::new(),
                 false => data_array(NUMBER.0, 1, piece.nodes.iter().map(number))?,
             },
@@ -148,14 +148,17 @@ fn mesh(piece: &Piece, nodes: &[[f64; 2]]) -> std::io::Result<String> {
 
 /// Contact pressure (0 off Γ_C) and remaining gap (NaN off Γ_C) at the nodes; where two
 /// conditions meet at a corner, the larger pressure and the smaller gap.
-fn contact_fields(setting: &Setting, state: &State) -> Result<(Vec<f64>, Vec<f64>), PetscError> {
+fn contact_fields(
+    problem: &DiscreteProblem,
+    state: &State,
+) -> Result<(Vec<f64>, Vec<f64>), PetscError> {
     let mut pressure = vec![0.0_f64; state.zeta.len()];
     let mut gap = vec![f64::NAN; state.zeta.len()];
     for point in &state.contact {
         pressure[point.node] = pressure[point.node].max(point.pressure);
         gap[point.node] = gap[point.node].min(point.gap);
     }
-    let partition = &setting.body.partition;
+    let partition = &problem.body.partition;
     partition.update(&mut pressure, 1)?;
     partition.update(&mut gap, 1)?;
     Ok((pressure, gap))

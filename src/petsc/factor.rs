@@ -1,7 +1,7 @@
 //! A factorisation that outlives the matrix values it was made from.
 
 use super::{
-    Matrix, PetscError, Precision, Ranks, Session, Vector, check,
+    Communicator, Matrix, PetscError, Precision, Session, Vector, check,
     direct::Substructure,
     mat::entries,
     raw,
@@ -19,7 +19,7 @@ pub struct Factor {
     raw: raw::PC,
     /// In the place of `raw`, once factorised.
     parts: Option<Substructure>,
-    ranks: Ranks,
+    comm: Communicator,
     precision: Precision,
     /// Whether `parts` is to be tried.
     ours: bool,
@@ -36,15 +36,15 @@ impl Factor {
         unknowns: usize,
         precision: Precision,
     ) -> Result<Self, PetscError> {
-        let ranks = session.ranks();
+        let comm = session.comm();
         let mut asked = false;
         for option in ["pc_type", "pc_factor_mat_solver_type"] {
             asked |= session.has_option(&format!("-{prefix}{option}"))?;
         }
-        let ours = !asked && (ranks.is_alone() || unknowns < LARGE);
+        let ours = !asked && (comm.is_serial() || unknowns < LARGE);
         let raw = ptr::null_mut();
         let mut factor =
-            Self { raw, parts: None, ranks, precision, ours, cost: COST, _live: Live::new() };
+            Self { raw, parts: None, comm, precision, ours, cost: COST, _live: Live::new() };
         cholesky_options(session, prefix)?;
         let prefix = c_string(prefix)?;
         let package = package(session);
@@ -76,7 +76,7 @@ impl Factor {
     ) -> Result<bool, PetscError> {
         if self.ours && (pattern || self.parts.is_none()) {
             // SAFETY: the caller's promise.
-            self.parts = unsafe { Substructure::new(self.ranks, matrix, self.precision)? };
+            self.parts = unsafe { Substructure::new(self.comm, matrix, self.precision)? };
             self.ours = self.parts.is_some();
         }
         if let Some(parts) = &mut self.parts {
@@ -85,7 +85,7 @@ impl Factor {
             // SAFETY: the caller's promise.
             let product = 12.0 * unsafe { entries(matrix) };
             self.cost =
-                self.ranks.max(parts.work()) / self.ranks.max(parts.traffic() + product).max(1.0);
+                self.comm.max(parts.work()) / self.comm.max(parts.traffic() + product).max(1.0);
             return Ok(definite);
         }
         // SAFETY: live handles; PETSc keeps a reference to the matrix. Without the last call it
@@ -150,7 +150,7 @@ const COST: f64 = 10.0;
 /// Left to itself CHOLMOD makes LDLᵀ of a small matrix, accepts negative pivots, and prints its
 /// warnings into the results. MUMPS' guess of the memory it needs is now and then too small.
 fn cholesky_options(session: &Session, prefix: &str) -> Result<(), PetscError> {
-    let options = match session.ranks().is_alone() {
+    let options = match session.comm().is_serial() {
         true => {
             &[("cholmod_final_asis", "0"), ("cholmod_final_ll", "1"), ("cholmod_print", "0")][..]
         }
@@ -169,7 +169,7 @@ const LARGE: usize = 2_500_000;
 
 /// PETSc's type of preconditioner for so many rows on all ranks together.
 fn method(session: &Session, unknowns: usize) -> &'static CStr {
-    match session.ranks().is_alone() || unknowns < LARGE {
+    match session.comm().is_serial() || unknowns < LARGE {
         true => c"cholesky",
         false => c"gamg",
     }
@@ -177,7 +177,7 @@ fn method(session: &Session, unknowns: usize) -> &'static CStr {
 
 /// The package that makes Cholesky factors.
 fn package(session: &Session) -> &'static CStr {
-    if session.ranks().is_alone() { c"cholmod" } else { c"mumps" }
+    if session.comm().is_serial() { c"cholmod" } else { c"mumps" }
 }
 
 /// PETSC_ERR_MAT_CH_ZRPVT: a pivot of CHOLMOD's factorisation is not positive.

@@ -2,7 +2,7 @@
 
 use super::{
     PetscError, Session, check,
-    ranks::double,
+    communicator::double,
     raw,
     session::{Live, world},
     vec::same_size,

@@ -14,10 +14,9 @@ pub fn divide(
     nodes: usize,
     cells: &[[usize; 3]],
 ) -> Result<Vec<usize>, PetscError> {
-    let ranks = session.ranks();
+    let comm = session.comm();
     // Each rank gives the rows of an even share.
-    let (start, end) =
-        (nodes * ranks.rank() / ranks.size(), nodes * (ranks.rank() + 1) / ranks.size());
+    let (start, end) = (nodes * comm.rank() / comm.size(), nodes * (comm.rank() + 1) / comm.size());
     let (mut rows, mut columns) = (Vec::new(), Vec::new());
     for cell in cells {
         for &i in cell.iter().filter(|i| (start..end).contains(i)) {

@@ -17,7 +17,7 @@ mod ghosts;
 mod graph;
 mod ksp;
 mod mat;
-mod ranks;
+mod communicator;
 mod refactorisation;
 mod session;
 mod shell;
@@ -37,6 +37,7 @@ mod raw {
     include!(concat!(env!("OUT_DIR"), "/petsc.rs"));
 }
 
+pub use communicator::Communicator;
 pub use direct::Precision;
 pub use error::PetscError;
 pub use factor::Factor;
@@ -44,7 +45,6 @@ pub use ghosts::Ghosts;
 pub use graph::divide;
 pub use ksp::{Krylov, LinearSolver};
 pub use mat::Matrix;
-pub use ranks::Ranks;
 pub use refactorisation::Refactorisation;
 pub use session::Session;
 pub use tao::{BoundedQuadratic, TaoReport};

@@ -1,6 +1,6 @@
 //! PETSc's life in this process.
 
-use super::{PetscError, Ranks, check, error, raw};
+use super::{Communicator, PetscError, check, error, raw};
 use std::{
     env,
     ffi::{CStr, CString, c_char, c_int},
@@ -52,8 +52,8 @@ impl Session {
     }
 
     /// The ranks of the world communicator.
-    pub fn ranks(&self) -> Ranks {
-        Ranks::of_world()
+    pub fn comm(&self) -> Communicator {
+        Communicator::of_world()
     }
 
     /// Options of the database that nothing has read: most likely misspelt.

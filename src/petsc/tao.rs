@@ -65,7 +65,7 @@ impl BoundedQuadratic {
         let quasi_newton = method.starts_with("bqnk");
         let factor = (!quasi_newton)
             .then(|| {
-                let (all, enough) = (session.ranks().count(size), Precision::Preconditioner);
+                let (all, enough) = (session.comm().count(size), Precision::Preconditioner);
                 let factor = Factor::new(session, "elastic_", all, enough)?;
                 Ok(KeptFactor::new(factor, Some(Refactorisation::default())))
             })

@@ -2,7 +2,7 @@
 
 use crate::{
     contact::Kkt,
-    evolution::{self, Phases, RunError, Setting, State, StepRecord},
+    evolution::{self, DiscreteProblem, Phases, RunError, State, StepRecord},
     petsc::Session,
 };
 use serde::Serialize;
@@ -53,19 +53,19 @@ pub struct Entry {
     pub error: Option<String>,
 }
 
-/// Runs `setting` with each of `solvers` and compares the final states with that of the
+/// Runs `problem` with each of `solvers` and compares the final states with that of the
 /// smallest KKT residuals. A failed run is an entry with its error.
 ///
 /// # Errors
 /// Only what no solver is to blame for: PETSc or bad input.
 pub fn compare(
     session: &Session,
-    setting: &Setting,
+    problem: &DiscreteProblem,
     solvers: &[&str],
 ) -> Result<Comparison, RunError> {
     let mut runs = Vec::new();
     for solver in solvers {
-        runs.push(run(session, setting, solver)?);
+        runs.push(run(session, problem, solver)?);
     }
     let worst = |run: &(Entry, Option<State>)| run.0.kkt().worst();
     let best = runs
@@ -98,13 +98,13 @@ impl Entry {
 
 fn run(
     session: &Session,
-    setting: &Setting,
+    problem: &DiscreteProblem,
     solver: &str,
 ) -> Result<(Entry, Option<State>), RunError> {
     let phases = Phases::default();
     let mut records: Vec<StepRecord> = Vec::new();
     let mut state = None;
-    let result = evolution::run(session, setting, solver, &phases, &mut |step| {
+    let result = evolution::run(session, problem, solver, &phases, &mut |step| {
         records.push(step.record);
         state = Some(step.state.clone());
         Ok(())
@@ -117,7 +117,7 @@ fn run(
     let sum = |count: fn(&StepRecord) -> usize| records.iter().map(count).sum();
     let kkt = records.iter().fold(Kkt::default(), |worst, r| worst.max(&r.kkt()));
     let entry = Entry {
-        scene: setting.scene().name.clone(),
+        scene: problem.scene().name.clone(),
         solver: solver.to_owned(),
         steps: records.last().map_or(0, |r| r.step),
         contact_changes: records

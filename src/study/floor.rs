@@ -1,7 +1,7 @@
 //! What a time step costs at least: the work that no step can avoid, timed in isolation.
 
 use crate::{
-    evolution::Setting,
+    evolution::DiscreteProblem,
     fem::{DamageSystem, Stiffness},
     petsc::{Factor, PetscError, Precision, Session, Vector},
     scene::Stepping,
@@ -41,13 +41,17 @@ const COPIED: usize = 1 << 24;
 ///
 /// # Errors
 /// PETSc failed.
-pub fn floor(session: &Session, setting: &Setting, rounds: usize) -> Result<Floor, PetscError> {
-    let (body, constraints) = (&setting.body, &setting.constraints);
-    let mut stiffness = Stiffness::new(session, body, &setting.elasticity, &constraints.frames)?;
+pub fn floor(
+    session: &Session,
+    problem: &DiscreteProblem,
+    rounds: usize,
+) -> Result<Floor, PetscError> {
+    let (body, constraints) = (&problem.body, &problem.constraints);
+    let mut stiffness = Stiffness::new(session, body, &problem.elasticity, &constraints.bases)?;
     let mut held = stiffness.matrix.duplicate()?;
     let bounded: Vec<usize> = constraints.bounds.iter().map(|bound| bound.dof).collect();
     held.hold(&bounded, stiffness.scale)?;
-    let unknowns = 2 * setting.body.partition.total();
+    let unknowns = 2 * problem.body.partition.total();
     let mut factor = Factor::new(session, "elastic_", unknowns, Precision::Preconditioner)?;
     factor.factorise(&held)?;
 
@@ -56,10 +60,10 @@ pub fn floor(session: &Session, setting: &Setting, rounds: usize) -> Result<Floo
     x.write(|x| x.iter_mut().enumerate().for_each(|(i, x)| *x = (i as f64).sin()))?;
     let mut zeta = vec![0.99; body.mesh.nodes.len()];
     let (means, load) = (vec![0.99; body.triangles.len()], vec![-0.1; zeta.len()]);
-    let mut damage = match (setting.damage(), setting.scene().time.map(|grid| grid.stepping)) {
+    let mut damage = match (problem.damage(), problem.scene().time.map(|grid| grid.stepping)) {
         (Some(law), Some(Stepping::Uniform { steps })) => {
-            let step = setting.scene().time.map_or(1.0, |grid| grid.end) / steps as f64;
-            Some(DamageSystem::new(session, body, setting.mass(), law.diffusion, step)?)
+            let step = problem.scene().time.map_or(1.0, |grid| grid.end) / steps as f64;
+            Some(DamageSystem::new(session, body, problem.mass(), law.diffusion, step)?)
         }
         _ => None,
     };

@@ -3,7 +3,7 @@
 use super::{Fields, StudyError};
 use crate::{
     contact::Kkt,
-    evolution::{self, Phases, Setting, State, StepRecord},
+    evolution::{self, DiscreteProblem, Phases, State, StepRecord},
     fem::Body,
     mesh::{self, Mesh, MeshError},
     petsc::Session,
@@ -58,11 +58,11 @@ impl StudyRun {
         // The time gmsh may need is not the program's.
         self.mesh()?;
         let started = Instant::now();
-        let setting = Setting::new(self.scene.clone(), self.mesh()?)?;
+        let problem = DiscreteProblem::new(self.scene.clone(), self.mesh()?)?;
         let mut sampler = Sampler { times, before: None, states: Vec::new() };
         let mut aside = Duration::ZERO;
         let outcome =
-            evolution::run(session, &setting, &self.solver, &Phases::default(), &mut |step| {
+            evolution::run(session, &problem, &self.solver, &Phases::default(), &mut |step| {
                 let paused = Instant::now();
                 sampler.observe(&step.state);
                 accepted(&step.record);
@@ -72,11 +72,11 @@ impl StudyRun {
         let seconds = (started.elapsed() - aside).as_secs_f64();
         match outcome.stopped {
             Some(stop) => {
-                let (body, path) = (&setting.body, self.scene.path.clone());
+                let (body, path) = (&problem.body, self.scene.path.clone());
                 Err(StudyError::Stopped { path, nodes: body.mesh.nodes.len(), time: stop.time })
             }
             None => Ok(History {
-                body: setting.body,
+                body: problem.body,
                 states: sampler.states,
                 seconds,
                 last: outcome.last.record,

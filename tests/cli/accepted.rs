@@ -1,6 +1,6 @@
 //! Runs that go well: exit code 0, what is said, and the files.
 
-use crate::desk::{Desk, SCENE, Said, square};
+use crate::test_directory::{ProgramOutput, SCENE, TestDirectory, square};
 use serde_json::Value;
 use std::process::Stdio;
 
@@ -71,8 +71,8 @@ fn number(value: &Value) -> f64 {
 
 #[test]
 fn summary() {
-    let desk = Desk::new();
-    let said = desk.run(&[]);
+    let test_directory = TestDirectory::new();
+    let said = test_directory.run(&[]);
     assert_eq!(said.err, "", "nothing to warn of, and no bar without a terminal");
     for fragment in ["Pressed square", "finished at t = 1 after 10 steps", "5 of 5 nodes active"] {
         assert!(said.out.contains(fragment), "{}", said.out);
@@ -80,7 +80,7 @@ fn summary() {
     assert!(said.out.contains("phase") && said.out.contains("results       out/scene"));
     assert!(said.out.lines().all(|line| line.trim_end() == line), "blanks at line ends");
 
-    let summary = desk.summary("out/scene");
+    let summary = test_directory.summary("out/scene");
     assert_eq!(keys(&summary), sorted(KEYS));
     let kkt = &summary["kkt"];
     assert_eq!(keys(kkt), sorted(["stationarity", "primal", "dual", "complementarity"]));
@@ -112,9 +112,9 @@ fn summary() {
 
 #[test]
 fn history() {
-    let desk = Desk::new();
-    desk.run(&[]);
-    let (names, rows) = desk.history("out/scene");
+    let test_directory = TestDirectory::new();
+    test_directory.run(&[]);
+    let (names, rows) = test_directory.history("out/scene");
     assert_eq!(names, COLUMNS);
     assert_eq!(rows.len(), 11);
     let column = |name: &str| names.iter().position(|n| n == name).expect("a column");
@@ -123,7 +123,7 @@ fn history() {
         assert!((row[1] - 0.1 * n as f64).abs() < 1e-12);
         assert!((row[column("contact_force")] - 0.3 * n as f64).abs() < 1e-8);
     }
-    let summary = desk.summary("out/scene");
+    let summary = test_directory.summary("out/scene");
     let last = rows.last().expect("rows");
     for name in ["zeta_min", "zeta_mean", "displacement_max", "work", "contact_force"] {
         // serde_json's numbers may be off in the last digit.
@@ -134,41 +134,41 @@ fn history() {
 
 #[test]
 fn stopped_at_the_threshold() {
-    let desk = Desk::new();
-    let said = desk.run(&["--set", "damage.lambda_u=1e4"]);
+    let test_directory = TestDirectory::new();
+    let said = test_directory.run(&["--set", "damage.lambda_u=1e4"]);
     assert!(said.out.contains("STOPPED") && said.out.contains("ζ_*"), "{}", said.out);
-    let summary = desk.summary("out/scene");
+    let summary = test_directory.summary("out/scene");
     let (stopped, end) = (number(&summary["stopped_at"]), number(&summary["end_time"]));
     assert!(0.0 < end && end < stopped && stopped < 1.0);
     assert!((stopped - end - 0.1).abs() < 1e-12, "one step after the state kept");
     assert!(number(&summary["zeta_min"]) > 0.01, "the state kept is admissible");
     assert_eq!(keys(&summary), sorted(KEYS), "no error");
-    let (_, rows) = desk.history("out/scene");
+    let (_, rows) = test_directory.history("out/scene");
     assert_eq!(rows.len() as u64, summary["steps"].as_u64().expect("a number") + 1);
-    assert_eq!(desk.frames("out/scene").last().expect("frames").0, end);
+    assert_eq!(test_directory.frames("out/scene").last().expect("frames").0, end);
 }
 
 #[test]
 fn static_and_elastic() {
-    let desk = Desk::new();
-    let scene = desk.read("scene.toml");
+    let test_directory = TestDirectory::new();
+    let scene = test_directory.read("scene.toml");
     let (damage, contact) = (scene.find("[damage]"), scene.find("[contact]"));
     let (damage, contact) = (damage.expect("a table"), contact.expect("a table"));
-    desk.write("scene.toml", &format!("{}{}", &scene[..damage], &scene[contact..]));
-    let said = desk.run(&[]);
+    test_directory.write("scene.toml", &format!("{}{}", &scene[..damage], &scene[contact..]));
+    let said = test_directory.run(&[]);
     assert!(said.out.contains("solved at t = 1"), "{}", said.out);
-    let summary = desk.summary("out/scene");
+    let summary = test_directory.summary("out/scene");
     assert_eq!((&summary["steps"], &summary["end_time"]), (&0.into(), &1.0.into()));
     assert!((number(&summary["displacement_max"]) - 3.0 / 80.0 * 1.09_f64.sqrt()).abs() < 1e-12);
-    assert_eq!(desk.frames("out/scene").len(), 1);
-    assert_eq!(desk.history("out/scene").1.len(), 1);
+    assert_eq!(test_directory.frames("out/scene").len(), 1);
+    assert_eq!(test_directory.history("out/scene").1.len(), 1);
 }
 
 #[test]
 fn options_are_honoured() {
-    let desk = Desk::new();
-    desk.write("other/fine.msh", &square(6));
-    let said = desk.run(&[
+    let test_directory = TestDirectory::new();
+    test_directory.write("other/fine.msh", &square(6));
+    let said = test_directory.run(&[
         "--mesh",
         "other/fine.msh",
         "--out",
@@ -181,8 +181,8 @@ fn options_are_honoured() {
         "boundary.top.traction=[0, '-8*t']",
     ]);
     assert!(said.out.contains("results       my/results"), "{}", said.out);
-    assert!(!desk.path("out").exists());
-    let summary = desk.summary("my/results");
+    assert!(!test_directory.path("out").exists());
+    let summary = test_directory.summary("my/results");
     assert_eq!(summary["nodes"], 49);
     assert_eq!(summary["solver"], "penalty-duality");
     assert_eq!(summary["steps"], 4);
@@ -199,8 +199,8 @@ const PARTLY_OPEN: [&str; 4] = [
 
 #[test]
 fn solvers_and_petsc_options_agree() {
-    let desk = Desk::new();
-    desk.write("square.msh", &square(8));
+    let test_directory = TestDirectory::new();
+    test_directory.write("square.msh", &square(8));
     let mut answers = Vec::new();
     for arguments in [
         &["--solver", "active-set"][..],
@@ -208,9 +208,9 @@ fn solvers_and_petsc_options_agree() {
         &["--solver", "tao"],
         &["--solver", "tao", "--", "-tao_type", "bnls"],
     ] {
-        let said = desk.run(&[&PARTLY_OPEN[..], arguments].concat());
+        let said = test_directory.run(&[&PARTLY_OPEN[..], arguments].concat());
         assert_eq!(said.err, "", "{arguments:?}");
-        let summary = desk.summary("out/scene");
+        let summary = test_directory.summary("out/scene");
         let active = number(&summary["active_nodes"]);
         assert!(0.0 < active && active < number(&summary["contact_nodes"]), "{active}");
         answers.push([
@@ -229,8 +229,8 @@ fn solvers_and_petsc_options_agree() {
 
 #[test]
 fn a_reader_that_leaves_early_is_no_error() {
-    let desk = Desk::new();
-    let mut command = desk.command(&["run", "scene.toml"]);
+    let test_directory = TestDirectory::new();
+    let mut command = test_directory.command(&["run", "scene.toml"]);
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("started");
     drop(child.stdout.take());
     let output = child.wait_with_output().expect("an end");
@@ -240,8 +240,8 @@ fn a_reader_that_leaves_early_is_no_error() {
 
 #[test]
 fn unused_petsc_options_are_told() {
-    let desk = Desk::new();
-    let said = desk.run(&["--", "-tao_monitr", "-no_such_thing", "3"]);
+    let test_directory = TestDirectory::new();
+    let said = test_directory.run(&["--", "-tao_monitr", "-no_such_thing", "3"]);
     assert!(said.err.starts_with("warning: PETSc options that nothing read: "), "{}", said.err);
     assert!(said.err.contains("-tao_monitr") && said.err.contains("-no_such_thing"));
     assert_eq!(said.err.lines().count(), 1);
@@ -249,38 +249,38 @@ fn unused_petsc_options_are_told() {
 
 #[test]
 fn a_body_balanced_on_one_point_is_noted() {
-    let desk = Desk::new();
+    let test_directory = TestDirectory::new();
     let scene = SCENE
         .replace("young = 80", "young = 8e4")
         .replace("[[boundary]]\nname = \"left\"\nsymmetry = true\n", "")
         .replace("gap = \"0\"", "gap = \"(x - 0.5)^2\"");
-    desk.write("scene.toml", &scene);
-    let said = desk.run(&[]);
+    test_directory.write("scene.toml", &scene);
+    let said = test_directory.run(&[]);
     let note = "at t = 0.1, no pressing node holds the body against the rotation about";
     assert_eq!(said.out.matches(note).count(), 1, "{said:?}");
-    let notes = desk.summary("out/scene")["notes"].to_string();
+    let notes = test_directory.summary("out/scene")["notes"].to_string();
     assert_eq!(notes.matches(note).count(), 1, "{notes}");
 }
 
 #[test]
 fn a_step_that_does_not_divide_the_end_is_noted() {
-    let desk = Desk::new();
+    let test_directory = TestDirectory::new();
     let note = "time.step = 0.3 s does not divide time.end = 1 s: 4 steps of 0.25 s are made";
-    let said = desk.run(&["--set", "time.step=0.3"]);
+    let said = test_directory.run(&["--set", "time.step=0.3"]);
     assert!(said.out.contains(note), "{said:?}");
     assert!(said.out.contains("time          4 steps of 0.25 s to t = 1"), "{said:?}");
-    assert!(desk.summary("out/scene")["notes"].to_string().contains(note));
+    assert!(test_directory.summary("out/scene")["notes"].to_string().contains(note));
     // Written with rounding, thirds divide the end.
     for step in ["0.1", "0.333333333333"] {
-        let said = desk.run(&["--set", &format!("time.step={step}")]);
+        let said = test_directory.run(&["--set", &format!("time.step={step}")]);
         assert!(!said.out.contains("does not divide"), "{said:?}");
     }
 }
 
 #[test]
 fn profile() {
-    let desk = Desk::new();
-    let out = desk.run(&["--profile"]).out;
+    let test_directory = TestDirectory::new();
+    let out = test_directory.run(&["--profile"]).out;
     for fragment in ["ms per call", "GB/s", "unavoidable work", "peak memory"] {
         assert!(out.contains(fragment), "no `{fragment}` in: {out}");
     }
@@ -293,27 +293,27 @@ fn profile() {
     };
     let parts = ["factorisation", "triangular solves", "products"].map(seconds);
     assert!(parts.iter().sum::<f64>() <= seconds("contact  ") + 2e-3, "{parts:?}: {out}");
-    assert!(!desk.run(&[]).out.contains("GB/s"), "only when asked for");
+    assert!(!test_directory.run(&[]).out.contains("GB/s"), "only when asked for");
 }
 
 #[test]
 fn floor() {
-    let desk = Desk::new();
-    let said = desk.say(&["floor", "scene.toml", "--rounds", "3"]);
+    let test_directory = TestDirectory::new();
+    let said = test_directory.say(&["floor", "scene.toml", "--rounds", "3"]);
     assert_eq!(said.code, Some(0), "{said:?}");
     let floor: Value = serde_json::from_str(&said.out).expect("JSON");
     assert_eq!(floor["nodes"], 25);
     let parts = floor["parts"].as_array().expect("parts");
     let each: Vec<f64> = parts.iter().map(|part| number(&part["seconds"])).collect();
     assert!(each.len() == 4 && each.iter().all(|&s| s > 0.0), "{each:?}");
-    assert!(!desk.path("out").exists(), "it writes nothing");
+    assert!(!test_directory.path("out").exists(), "it writes nothing");
 }
 
 #[test]
 fn a_process_alone_needs_no_directory_of_temporary_files() {
     // Open MPI's is common to all processes of a user, who would make and remove it at the same time.
-    let desk = Desk::new();
-    let mut command = desk.command(&["run", "scene.toml"]);
-    let said = Said::of(command.env("TMPDIR", "/proc/none"));
+    let test_directory = TestDirectory::new();
+    let mut command = test_directory.command(&["run", "scene.toml"]);
+    let said = ProgramOutput::of(command.env("TMPDIR", "/proc/none"));
     assert_eq!((said.code, said.err.as_str()), (Some(0), ""), "{said:?}");
 }

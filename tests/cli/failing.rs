@@ -1,25 +1,25 @@
 //! Solvers that miss their tolerance: exit code 1, and the state before is saved.
 
-use crate::desk::{Desk, SCENE};
+use crate::test_directory::{SCENE, TestDirectory};
 
 /// At rest until t = 0.2, so that steps 0 to 2 need no solver; the third does.
 const LATE: &str = "boundary.top.traction=[0, '-max(0, t - 0.2)']";
 
 #[track_caller]
 fn fails_at_the_third_step(arguments: &[&str], fragments: &[&str]) {
-    let desk = Desk::new();
-    let said = desk.say(&[&["run", "scene.toml", "--set", LATE], arguments].concat());
+    let test_directory = TestDirectory::new();
+    let said = test_directory.say(&[&["run", "scene.toml", "--set", LATE], arguments].concat());
     said.fails(1, &[&["step 3 (t = 0.3", " times it)"], fragments].concat());
     assert!(said.out.contains("FAILED after t = 0.2; the state there is saved"), "{}", said.out);
 
-    let summary = desk.summary("out/scene");
+    let summary = test_directory.summary("out/scene");
     let error = summary["error"].as_str().expect("the error");
     assert_eq!(said.err, format!("error: {error}\n"));
     assert_eq!((&summary["steps"], &summary["end_time"]), (&2.into(), &0.2.into()));
-    assert_eq!(desk.history("out/scene").1.len(), 3);
-    let (time, file) = desk.frames("out/scene").pop().expect("frames");
+    assert_eq!(test_directory.history("out/scene").1.len(), 3);
+    let (time, file) = test_directory.frames("out/scene").pop().expect("frames");
     assert_eq!(time, 0.2);
-    assert!(desk.path(&format!("out/scene/{file}")).exists());
+    assert!(test_directory.path(&format!("out/scene/{file}")).exists());
 }
 
 #[test]
@@ -50,35 +50,43 @@ fn penalty_duality_kept_from_iterating() {
 
 #[test]
 fn the_first_solve_fails() {
-    let desk = Desk::new();
+    let test_directory = TestDirectory::new();
     let load = "boundary.top.traction=[0, -3]";
-    let said = desk.say(&["run", "scene.toml", "--set", load, "--set", "contact.tolerance=1e-30"]);
+    let said = test_directory.say(&[
+        "run",
+        "scene.toml",
+        "--set",
+        load,
+        "--set",
+        "contact.tolerance=1e-30",
+    ]);
     said.fails(1, &["step 0 (t = 0): active-set", "the tolerance 1.0e-30 is missed by"]);
     assert!(said.out.contains("FAILED at the first solve; there is no state to save"));
 
-    let summary = desk.summary("out/scene");
+    let summary = test_directory.summary("out/scene");
     assert_eq!(said.err, format!("error: {}\n", summary["error"].as_str().expect("the error")));
     assert_eq!(summary["steps"], 0);
     for of_a_state in ["end_time", "zeta_min", "displacement_max", "active_nodes", "kkt"] {
         assert!(summary[of_a_state].is_null(), "{of_a_state}");
     }
-    assert_eq!(desk.names("out/scene"), ["history.csv", "summary.json"]);
+    assert_eq!(test_directory.names("out/scene"), ["history.csv", "summary.json"]);
 }
 
 #[test]
 fn a_static_solve_fails_without_a_word_of_steps() {
-    let desk = Desk::new();
+    let test_directory = TestDirectory::new();
     let text = SCENE.replace("[time]\nend = 1\nstep = 0.1\n", "");
-    desk.write("scene.toml", &text);
-    let said = desk.say(&["run", "scene.toml", "--solver", "tao", "--", "-tao_max_it", "0"]);
+    test_directory.write("scene.toml", &text);
+    let said =
+        test_directory.say(&["run", "scene.toml", "--solver", "tao", "--", "-tao_max_it", "0"]);
     said.fails(
         1,
         &["error: tao:tron stopped after 0 iterations", "; try another contact.solver or"],
     );
     assert!(!said.err.contains("step"), "{}", said.err);
     // Nor of solvers where there is no contact.
-    desk.write("scene.toml", &text.replace("gap = \"0\"", "symmetry = true"));
-    let said = desk.say(&["run", "scene.toml", "--set", "contact.tolerance=1e-30"]);
+    test_directory.write("scene.toml", &text.replace("gap = \"0\"", "symmetry = true"));
+    let said = test_directory.say(&["run", "scene.toml", "--set", "contact.tolerance=1e-30"]);
     said.fails(1, &["error: "]);
     assert!(!said.err.contains("step") && !said.err.contains("solver"), "{}", said.err);
 }
@@ -88,20 +96,20 @@ fn a_load_that_is_not_finite_between_the_times_checked_beforehand() {
     // 10⁴ steps, of which every tenth is checked: 0.0014 to 0.0016 are not.
     let value = "-0.01*t + 0*sqrt(abs(t - 0.0015) - 0.00015)";
     for key in ["traction", "displacement"] {
-        let desk = Desk::new();
-        desk.write(
+        let test_directory = TestDirectory::new();
+        test_directory.write(
             "scene.toml",
             &SCENE
                 .replace("traction = [\"0\", \"-3*t\"]", &format!("{key} = [\"0\", \"{value}\"]")),
         );
-        let said = desk.say(&["run", "scene.toml", "--set", "time.step=1e-4"]);
+        let said = test_directory.say(&["run", "scene.toml", "--set", "time.step=1e-4"]);
         let place = format!("scene.toml:29: boundary \"top\": {key}[1] is NaN at (");
         said.fails(1, &[&place, "t = 0.0014"]);
         assert!(said.out.contains("FAILED after t = 0.0013; the state there is saved"), "{said:?}");
-        assert_eq!(desk.history("out/scene").1.len(), 14);
-        let (time, _) = desk.frames("out/scene").pop().expect("frames");
+        assert_eq!(test_directory.history("out/scene").1.len(), 14);
+        let (time, _) = test_directory.frames("out/scene").pop().expect("frames");
         assert!((time - 0.0013).abs() < 1e-12);
-        let error = &desk.summary("out/scene")["error"];
+        let error = &test_directory.summary("out/scene")["error"];
         assert_eq!(said.err, format!("error: {}\n", error.as_str().expect("the error")));
     }
 }
@@ -118,19 +126,19 @@ const OVERFLOWING: [&str; 6] = [
 
 #[test]
 fn damage_that_is_not_finite() {
-    let desk = Desk::new();
-    let said = desk.say(&[&["run", "scene.toml"], &OVERFLOWING[..]].concat());
+    let test_directory = TestDirectory::new();
+    let said = test_directory.say(&[&["run", "scene.toml"], &OVERFLOWING[..]].concat());
     said.fails(1, &["step 4 (t = 0.4): the damage equation has no finite answer"]);
     assert!(said.out.contains("FAILED after t = 0.3"), "{}", said.out);
-    let summary = desk.summary("out/scene");
+    let summary = test_directory.summary("out/scene");
     assert_eq!((&summary["steps"], &summary["zeta_min"]), (&3.into(), &1.0.into()));
-    assert_eq!(desk.history("out/scene").1.len(), 4);
+    assert_eq!(test_directory.history("out/scene").1.len(), 4);
 
     // Chosen steps are cut until it is hopeless, and not one bad state is kept.
     let auto = ["--set", "time.step=auto"];
-    let said = desk.say(&[&["run", "scene.toml"], &OVERFLOWING[..], &auto].concat());
+    let said = test_directory.say(&[&["run", "scene.toml"], &OVERFLOWING[..], &auto].concat());
     said.fails(1, &["the damage equation has no finite answer"]);
-    let (_, rows) = desk.history("out/scene");
+    let (_, rows) = test_directory.history("out/scene");
     assert!(rows.len() > 2 && rows.iter().all(|row| row[2] == 1.0), "ζ as it was");
-    assert_eq!(desk.summary("out/scene")["end_time"], rows.last().expect("rows")[1]);
+    assert_eq!(test_directory.summary("out/scene")["end_time"], rows.last().expect("rows")[1]);
 }

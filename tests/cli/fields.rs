@@ -1,6 +1,6 @@
 //! `fields.pvd` and its frames, read back.
 
-use crate::desk::Desk;
+use crate::test_directory::TestDirectory;
 use std::path::Path;
 use vtkio::model::{Attribute, DataSet, Piece, Vtk};
 
@@ -44,11 +44,11 @@ fn close(a: f64, b: f64) {
 
 #[test]
 fn the_last_frame_is_the_state_of_the_summary() {
-    let desk = Desk::new();
-    desk.run(&[]);
-    let (time, file) = desk.frames("out/scene").pop().expect("frames");
+    let test_directory = TestDirectory::new();
+    test_directory.run(&[]);
+    let (time, file) = test_directory.frames("out/scene").pop().expect("frames");
     assert_eq!(time, 1.0);
-    let frame = frame(&desk.path(&format!("out/scene/{file}")));
+    let frame = frame(&test_directory.path(&format!("out/scene/{file}")));
     assert_eq!((frame.points.len(), frame.cells), (3 * 25, 32));
     let sizes = |data: &[(String, Vec<f64>)], count: usize| -> Vec<(String, usize)> {
         data.iter().map(|(name, values)| (name.clone(), values.len() / count)).collect()
@@ -60,7 +60,7 @@ fn the_last_frame_is_the_state_of_the_summary() {
     assert_eq!(sizes(&frame.point_data, 25), named(&expected));
     assert_eq!(sizes(&frame.cell_data, 32), named(&[("von_mises", 1), ("stress", 3)]));
 
-    let summary = desk.summary("out/scene");
+    let summary = test_directory.summary("out/scene");
     let zeta = field(&frame.point_data, "zeta");
     let least = zeta.iter().copied().fold(f64::INFINITY, f64::min);
     close(least, summary["zeta_min"].as_f64().expect("a number"));
@@ -89,7 +89,7 @@ fn the_last_frame_is_the_state_of_the_summary() {
 
 #[test]
 fn frames_are_as_many_as_asked_for() {
-    let desk = Desk::new();
+    let test_directory = TestDirectory::new();
     // Steps 0 … 10: all of them, every third and the last, the ends.
     for (every, times) in [
         (None, (0..=10).collect::<Vec<_>>()),
@@ -98,27 +98,27 @@ fn frames_are_as_many_as_asked_for() {
     ] {
         let set = every.map(|n| format!("output.every={n}"));
         let arguments: Vec<&str> = set.iter().flat_map(|s| ["--set", s]).collect();
-        desk.run(&arguments);
-        let frames = desk.frames("out/scene");
+        test_directory.run(&arguments);
+        let frames = test_directory.frames("out/scene");
         let tenths: Vec<i32> = frames.iter().map(|(t, _)| (10.0 * t).round() as i32).collect();
         assert_eq!(tenths, times);
         // An earlier run's frames are gone, and there is nothing else.
         let mut files: Vec<String> = frames.into_iter().map(|(_, file)| file).collect();
         files.extend(["fields.pvd", "history.csv", "summary.json"].map(str::to_owned));
         files.sort();
-        assert_eq!(desk.names("out/scene"), files);
+        assert_eq!(test_directory.names("out/scene"), files);
     }
 }
 
 #[test]
 fn a_run_that_does_not_come_far_has_frames_of_its_beginning() {
-    let desk = Desk::new();
+    let test_directory = TestDirectory::new();
     // 200 steps: every tenth, and before the first of these the steps 1, 2, 4 and 8.
     let stopping = ["--set", "time.step=0.005", "--set", "damage.lambda_u=1e5"];
-    desk.run(&stopping);
-    let frames = desk.frames("out/scene");
+    test_directory.run(&stopping);
+    let frames = test_directory.frames("out/scene");
     let steps: Vec<i32> = frames.iter().map(|(t, _)| (200.0 * t).round() as i32).collect();
-    let last = desk.summary("out/scene")["steps"].as_i64().expect("a number") as i32;
+    let last = test_directory.summary("out/scene")["steps"].as_i64().expect("a number") as i32;
     assert!(last < 100, "it stopped at ζ_*: {last}");
     let expected = [0, 1, 2, 4, 8].into_iter().chain((1..20).map(|n| 10 * n));
     let expected: Vec<i32> = expected.filter(|n| *n < last).chain([last]).collect();
@@ -127,10 +127,10 @@ fn a_run_that_does_not_come_far_has_frames_of_its_beginning() {
 
 #[test]
 fn what_others_put_into_the_folder_stays() {
-    let desk = Desk::new();
-    desk.write("out/scene/notes.txt", "mine");
-    desk.write("out/scene/deformed.png", "mine");
-    desk.run(&["--set", "time.end=0.1"]);
-    assert_eq!(desk.read("out/scene/notes.txt"), "mine");
-    assert_eq!(desk.read("out/scene/deformed.png"), "mine");
+    let test_directory = TestDirectory::new();
+    test_directory.write("out/scene/notes.txt", "mine");
+    test_directory.write("out/scene/deformed.png", "mine");
+    test_directory.run(&["--set", "time.end=0.1"]);
+    assert_eq!(test_directory.read("out/scene/notes.txt"), "mine");
+    assert_eq!(test_directory.read("out/scene/deformed.png"), "mine");
 }

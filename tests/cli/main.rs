@@ -1,7 +1,7 @@
 //! The program from outside: exit codes, messages, and the files it leaves.
 
 mod accepted;
-mod desk;
+mod test_directory;
 mod failing;
 mod fields;
 mod meshes;

@@ -1,6 +1,6 @@
 //! `signorini mesh`, and scenes that name a `.geo`.
 
-use crate::desk::{Desk, SCENE};
+use crate::test_directory::{SCENE, TestDirectory};
 use std::{
     fs,
     time::{Duration, SystemTime},
@@ -17,46 +17,48 @@ Physical Surface("body") = {1};
 Physical Curve("bottom") = {1}; Physical Curve("top") = {3}; Physical Curve("left") = {4};
 "#;
 
-fn desk() -> Desk {
-    let desk = Desk::new();
-    desk.write("geo/square.geo", GEO);
-    desk.write("geo/scene.toml", &SCENE.replace("square.msh", "square.geo"));
-    desk
+fn test_directory() -> TestDirectory {
+    let test_directory = TestDirectory::new();
+    test_directory.write("geo/square.geo", GEO);
+    test_directory.write("geo/scene.toml", &SCENE.replace("square.msh", "square.geo"));
+    test_directory
 }
 
 #[test]
 fn meshes_appear_beside_their_geo() {
-    let desk = desk();
-    desk.write("geo/fine.toml", &SCENE.replace("\"square.msh\"", "\"square.geo\"\nsize = 0.25"));
-    let said = desk.say(&["mesh", "geo/scene.toml", "geo/fine.toml"]);
+    let test_directory = test_directory();
+    test_directory
+        .write("geo/fine.toml", &SCENE.replace("\"square.msh\"", "\"square.geo\"\nsize = 0.25"));
+    let said = test_directory.say(&["mesh", "geo/scene.toml", "geo/fine.toml"]);
     assert_eq!(said.code, Some(0), "{said:?}");
     let lines: Vec<&str> = said.out.lines().collect();
     assert!(lines[0].starts_with("scene: ") && lines[0].contains(" nodes, "), "{lines:?}");
     assert!(lines[1].starts_with("fine: "), "{lines:?}");
     let files = ["fine.toml", "scene.toml", "square-size0.25.msh", "square.geo", "square.msh"];
-    assert_eq!(desk.names("geo"), files);
-    assert!(!desk.path("out").exists());
+    assert_eq!(test_directory.names("geo"), files);
+    assert!(!test_directory.path("out").exists());
 
     // A mesh that is there is kept.
-    let meshed = |name| fs::metadata(desk.path(name)).and_then(|m| m.modified()).expect("a file");
+    let meshed =
+        |name| fs::metadata(test_directory.path(name)).and_then(|m| m.modified()).expect("a file");
     let before = meshed("geo/square.msh");
-    assert_eq!(desk.say(&["mesh", "geo/scene.toml"]).code, Some(0));
+    assert_eq!(test_directory.say(&["mesh", "geo/scene.toml"]).code, Some(0));
     assert_eq!(meshed("geo/square.msh"), before);
 }
 
 #[test]
 fn a_change_in_an_included_file_is_meshed() {
-    let desk = desk();
-    desk.write("geo/square.geo", "Include \"parts/square.geo\";\n");
-    desk.write("geo/parts/square.geo", "Include \"body.geo\";\n");
-    desk.write("geo/parts/body.geo", GEO);
+    let test_directory = test_directory();
+    test_directory.write("geo/square.geo", "Include \"parts/square.geo\";\n");
+    test_directory.write("geo/parts/square.geo", "Include \"body.geo\";\n");
+    test_directory.write("geo/parts/body.geo", GEO);
     let meshed = || {
-        assert_eq!(desk.say(&["mesh", "geo/scene.toml"]).code, Some(0));
-        desk.read("geo/square.msh")
+        assert_eq!(test_directory.say(&["mesh", "geo/scene.toml"]).code, Some(0));
+        test_directory.read("geo/square.msh")
     };
     let coarse = meshed();
-    let body = desk.path("geo/parts/body.geo");
-    desk.write("geo/parts/body.geo", &GEO.replace("size = 0.5", "size = 0.25"));
+    let body = test_directory.path("geo/parts/body.geo");
+    test_directory.write("geo/parts/body.geo", &GEO.replace("size = 0.5", "size = 0.25"));
     // Clocks of file systems are coarse: that it is older or newer must not hang on them.
     let later = SystemTime::now() + Duration::from_secs(10);
     fs::File::options().append(true).open(body).unwrap().set_modified(later).unwrap();
@@ -65,9 +67,9 @@ fn a_change_in_an_included_file_is_meshed() {
 
 #[test]
 fn run_meshes_what_is_missing() {
-    let desk = desk();
-    let said = desk.say(&["run", "geo/scene.toml", "--set", "time.end=0.1"]);
+    let test_directory = test_directory();
+    let said = test_directory.say(&["run", "geo/scene.toml", "--set", "time.end=0.1"]);
     assert_eq!(said.code, Some(0), "{said:?}");
-    assert!(desk.path("geo/square.msh").exists());
-    assert!(desk.path("out/scene/summary.json").exists());
+    assert!(test_directory.path("geo/square.msh").exists());
+    assert!(test_directory.path("out/scene/summary.json").exists());
 }

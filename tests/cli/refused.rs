@@ -1,29 +1,29 @@
 //! Bad input: exit code 2, a message that names the place, and nothing touched.
 
-use crate::desk::{Desk, SCENE, Said, msh, square};
+use crate::test_directory::{ProgramOutput, SCENE, TestDirectory, msh, square};
 
 /// Runs the scene twice, over the results of an earlier run and into a new folder: both must
 /// be refused and change nothing.
 #[track_caller]
-fn refused(desk: &Desk, arguments: &[&str], fragments: &[&str]) {
+fn refused(test_directory: &TestDirectory, arguments: &[&str], fragments: &[&str]) {
     for name in ["fields.pvd", "fields_0000.vtu", "history.csv", "summary.json"] {
-        desk.write(&format!("out/scene/{name}"), "of an earlier run");
+        test_directory.write(&format!("out/scene/{name}"), "of an earlier run");
     }
-    let before = desk.everything();
+    let before = test_directory.everything();
     for out in [&[][..], &["--out", "new/folder"]] {
-        let said = desk.say(&[&["run", "scene.toml"], out, arguments].concat());
+        let said = test_directory.say(&[&["run", "scene.toml"], out, arguments].concat());
         said.fails(2, fragments);
         assert_eq!(said.out, "");
-        assert!(desk.everything() == before, "files were touched: {fragments:?}");
+        assert!(test_directory.everything() == before, "files were touched: {fragments:?}");
     }
 }
 
 /// The scene with one text replaced by another.
-fn changed(old: &str, new: &str) -> Desk {
+fn changed(old: &str, new: &str) -> TestDirectory {
     assert!(SCENE.contains(old), "the scene has no `{old}`");
-    let desk = Desk::new();
-    desk.write("scene.toml", &SCENE.replacen(old, new, 1));
-    desk
+    let test_directory = TestDirectory::new();
+    test_directory.write("scene.toml", &SCENE.replacen(old, new, 1));
+    test_directory
 }
 
 /// (a text of the scene, what replaces it, what the message says)
@@ -138,15 +138,15 @@ fn meshes() {
         (&with("4 3 2 5 1 1 2 3 4"), &["square.msh", "quadrangles", "Recombine"]),
         (&with("4 15 2 5 1 1"), &["square.msh", "there are no triangles"]),
     ] {
-        let desk = Desk::new();
-        desk.write("square.msh", mesh);
-        refused(&desk, &[], fragments);
+        let test_directory = TestDirectory::new();
+        test_directory.write("square.msh", mesh);
+        refused(&test_directory, &[], fragments);
     }
 }
 
 #[test]
 fn arguments() {
-    let desk = Desk::new();
+    let test_directory = TestDirectory::new();
     for (arguments, fragments) in [
         (&["--solver", "simplex"][..], &["--solver: ", "`simplex`", "active-set", "tao"][..]),
         (&["--set", "time.step"], &["--set time.step: has no `=`"]),
@@ -163,25 +163,25 @@ fn arguments() {
         (&["--", "tao_monitor"], &["PETSc options begin with a dash", "`tao_monitor`"]),
         (&["--slver", "tao"], &["unexpected argument '--slver'", "'--solver'"]),
     ] {
-        refused(&desk, arguments, fragments);
+        refused(&test_directory, arguments, fragments);
     }
-    let said = desk.say(&["compare", "scene.toml", "--solvers", "tao,simplex"]);
+    let said = test_directory.say(&["compare", "scene.toml", "--solvers", "tao,simplex"]);
     said.fails(2, &["--solvers: ", "`simplex`", "active-set, penalty-duality, tao", "tao:TYPE"]);
-    assert!(!desk.path("out/compare").exists());
-    desk.say(&["run"]).fails(2, &["<SCENE>"]);
-    desk.say(&["rnu", "scene.toml"]).fails(2, &["unrecognized subcommand 'rnu'"]);
-    desk.say(&["run", "none.toml"]).fails(2, &["none.toml: the scene cannot be read"]);
-    desk.say(&["mesh", "none.toml"]).fails(2, &["none.toml: the scene cannot be read"]);
-    assert_eq!(desk.say(&[]).code, Some(2));
+    assert!(!test_directory.path("out/compare").exists());
+    test_directory.say(&["run"]).fails(2, &["<SCENE>"]);
+    test_directory.say(&["rnu", "scene.toml"]).fails(2, &["unrecognized subcommand 'rnu'"]);
+    test_directory.say(&["run", "none.toml"]).fails(2, &["none.toml: the scene cannot be read"]);
+    test_directory.say(&["mesh", "none.toml"]).fails(2, &["none.toml: the scene cannot be read"]);
+    assert_eq!(test_directory.say(&[]).code, Some(2));
 }
 
 #[test]
 fn help_and_version_are_no_errors() {
-    let desk = Desk::new();
+    let test_directory = TestDirectory::new();
     for (arguments, fragment) in
         [(&["--help"][..], "Exit codes"), (&["run", "--help"], "--set"), (&["--version"], "0.")]
     {
-        let said = desk.say(arguments);
+        let said = test_directory.say(arguments);
         assert_eq!(said.code, Some(0));
         assert!(said.out.contains(fragment) && said.err.is_empty(), "{said:?}");
     }
@@ -190,28 +190,30 @@ fn help_and_version_are_no_errors() {
 #[test]
 fn folders_nobody_can_write_to() {
     // Root may write anywhere; below a file nobody can.
-    let desk = Desk::new();
-    let before = desk.everything();
-    let said = desk.say(&["run", "scene.toml", "--out", "scene.toml/results"]);
+    let test_directory = TestDirectory::new();
+    let before = test_directory.everything();
+    let said = test_directory.say(&["run", "scene.toml", "--out", "scene.toml/results"]);
     said.fails(2, &["cannot write scene.toml/results: Not a directory"]);
-    assert!(desk.everything() == before);
+    assert!(test_directory.everything() == before);
 
-    desk.write("out", "a file");
-    desk.say(&["run", "scene.toml"]).fails(2, &["cannot write out/scene: "]);
-    assert_eq!(desk.read("out"), "a file");
+    test_directory.write("out", "a file");
+    test_directory.say(&["run", "scene.toml"]).fails(2, &["cannot write out/scene: "]);
+    assert_eq!(test_directory.read("out"), "a file");
 }
 
 #[test]
 fn gmsh_missing_or_failing() {
-    let desk = changed("square.msh", "square.geo");
-    desk.write("square.geo", "Point(1) = {0, 0, 0};\nLine(1) = {1, ;\n");
-    refused(&desk, &[], &["square.geo: gmsh could not mesh it", "line 2"]);
-    desk.say(&["mesh", "scene.toml"]).fails(2, &["square.geo: gmsh could not mesh it", "line 2"]);
+    let test_directory = changed("square.msh", "square.geo");
+    test_directory.write("square.geo", "Point(1) = {0, 0, 0};\nLine(1) = {1, ;\n");
+    refused(&test_directory, &[], &["square.geo: gmsh could not mesh it", "line 2"]);
+    test_directory
+        .say(&["mesh", "scene.toml"])
+        .fails(2, &["square.geo: gmsh could not mesh it", "line 2"]);
 
-    let before = desk.everything();
+    let before = test_directory.everything();
     for arguments in [["run", "scene.toml"], ["mesh", "scene.toml"]] {
-        let said = Said::of(desk.command(&arguments).env("PATH", ""));
+        let said = ProgramOutput::of(test_directory.command(&arguments).env("PATH", ""));
         said.fails(2, &["square.geo: gmsh is needed", "make deps", "apt install gmsh"]);
     }
-    assert!(desk.everything() == before);
+    assert!(test_directory.everything() == before);
 }

@@ -4,7 +4,7 @@
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use signorini::{
     contact::SOLVERS,
-    evolution::{Equilibrium, Setting},
+    evolution::{ContactStep, DiscreteProblem},
     fem::{DamageSystem, Stiffness, source, source_load},
     petsc::{Factor, Precision, Session, Vector},
     phases::Phases,
@@ -15,29 +15,29 @@ use std::{hint::black_box, path::Path, time::Duration};
 
 const CELLS: usize = 128;
 
-fn setting() -> Setting {
+fn problem() -> DiscreteProblem {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("geo/square-mild.toml");
     let scene = Scene::read(&path, &[]).expect("a scene of this project");
-    Setting::new(scene, study::rectangle(1.0, 1.0, CELLS, CELLS)).expect("a mesh for it")
+    DiscreteProblem::new(scene, study::rectangle(1.0, 1.0, CELLS, CELLS)).expect("a mesh for it")
 }
 
 /// A damage field such as the scene's at the given time: worst at the corner (1, 0).
-fn damaged(setting: &Setting, time: f64) -> Vec<f64> {
+fn damaged(problem: &DiscreteProblem, time: f64) -> Vec<f64> {
     let at = |&[x, y]: &[f64; 2]| 1.0 - 0.2 * time * (-4.0 * ((1.0 - x).hypot(y))).exp();
-    setting.body.mesh.nodes.iter().map(at).collect()
+    problem.body.mesh.nodes.iter().map(at).collect()
 }
 
 /// A displacement that strains every triangle differently.
-fn displaced(setting: &Setting) -> Vec<f64> {
-    setting.body.mesh.nodes.iter().flat_map(|&[x, y]| [0.1 * x * y, -0.2 * x * x]).collect()
+fn displaced(problem: &DiscreteProblem) -> Vec<f64> {
+    problem.body.mesh.nodes.iter().flat_map(|&[x, y]| [0.1 * x * y, -0.2 * x * x]).collect()
 }
 
 fn stiffness(c: &mut Criterion) {
-    let (session, setting) = (Session::start(&[]).unwrap(), setting());
-    let frames = &setting.constraints.frames;
-    let mut k = Stiffness::new(&session, &setting.body, &setting.elasticity, frames).unwrap();
+    let (session, problem) = (Session::start(&[]).unwrap(), problem());
+    let bases = &problem.constraints.bases;
+    let mut k = Stiffness::new(&session, &problem.body, &problem.elasticity, bases).unwrap();
     let mut held = k.matrix.duplicate().unwrap();
-    let bounded: Vec<usize> = setting.constraints.bounds.iter().map(|bound| bound.dof).collect();
+    let bounded: Vec<usize> = problem.constraints.bounds.iter().map(|bound| bound.dof).collect();
     let mut factor =
         Factor::new(&session, "elastic_", k.matrix.owned(), Precision::Preconditioner).unwrap();
     // The values count as new only when they are written.
@@ -48,10 +48,10 @@ fn stiffness(c: &mut Criterion) {
     };
     renew(&k, &mut factor);
 
-    let means = setting.triangle_means(&damaged(&setting, 0.5));
+    let means = problem.triangle_means(&damaged(&problem, 0.5));
     let mut x = Vector::zeros(&session, k.matrix.owned()).unwrap();
     let mut y = Vector::zeros(&session, k.matrix.owned()).unwrap();
-    x.set(&displaced(&setting)).unwrap();
+    x.set(&displaced(&problem)).unwrap();
     c.bench_function("stiffness refill", |b| b.iter(|| k.refill(black_box(&means)).unwrap()));
     c.bench_function("product", |b| b.iter(|| k.matrix.multiply(&x, &mut y).unwrap()));
     c.bench_function("triangular solves", |b| b.iter(|| factor.apply(&x, &mut y).unwrap()));
@@ -59,19 +59,19 @@ fn stiffness(c: &mut Criterion) {
 }
 
 fn certificate(c: &mut Criterion) {
-    let setting = setting();
-    let (means, u) = (setting.triangle_means(&damaged(&setting, 0.5)), displaced(&setting));
+    let problem = problem();
+    let (means, u) = (problem.triangle_means(&damaged(&problem, 0.5)), displaced(&problem));
     c.bench_function("internal force", |b| {
-        b.iter(|| setting.elasticity.internal_force(&setting.body, &means, black_box(&u)));
+        b.iter(|| problem.elasticity.internal_force(&problem.body, &means, black_box(&u)));
     });
 }
 
 fn damage(c: &mut Criterion) {
-    let (session, setting) = (Session::start(&[]).unwrap(), setting());
-    let (body, mass, law) = (&setting.body, setting.mass(), setting.damage().unwrap());
-    let (u, zeta) = (displaced(&setting), damaged(&setting, 0.5));
+    let (session, problem) = (Session::start(&[]).unwrap(), problem());
+    let (body, mass, law) = (&problem.body, problem.mass(), problem.damage().unwrap());
+    let (u, zeta) = (displaced(&problem), damaged(&problem, 0.5));
     let load = |u: &[f64]| {
-        let strain = setting.elasticity.strain_squared(body, u);
+        let strain = problem.elasticity.strain_squared(body, u);
         source_load(body, mass, &source(body, &law, &strain, &zeta))
     };
     c.bench_function("damage source", |b| b.iter(|| load(black_box(&u))));
@@ -85,20 +85,20 @@ fn damage(c: &mut Criterion) {
 /// A step from an accepted one to damage 1 % further on or back, on the factor that is kept as
 /// in a run, renewals included.
 fn contact(c: &mut Criterion) {
-    let (session, setting, phases) = (Session::start(&[]).unwrap(), setting(), Phases::default());
+    let (session, problem, phases) = (Session::start(&[]).unwrap(), problem(), Phases::default());
     let mut group = c.benchmark_group("contact step");
-    let accepted = damaged(&setting, 0.5);
-    let next = [0.45, 0.55].map(|time| damaged(&setting, time));
+    let accepted = damaged(&problem, 0.5);
+    let next = [0.45, 0.55].map(|time| damaged(&problem, time));
     for solver in SOLVERS {
-        let mut equilibrium = Equilibrium::new(&session, &setting, solver, &phases).unwrap();
-        equilibrium.solve(0, 0.5, &accepted).unwrap();
-        equilibrium.accept(0.5).unwrap();
+        let mut contact_step = ContactStep::new(&session, &problem, solver, &phases).unwrap();
+        contact_step.solve(0, 0.5, &accepted).unwrap();
+        contact_step.accept(0.5).unwrap();
         let mut turn = 0;
         group.bench_function(BenchmarkId::from_parameter(solver), |b| {
             b.iter(|| {
                 turn += 1;
-                let step = equilibrium.solve(1, 0.51, &next[turn % 2]).unwrap();
-                equilibrium.undo().unwrap();
+                let step = contact_step.solve(1, 0.51, &next[turn % 2]).unwrap();
+                contact_step.undo().unwrap();
                 step.record.zeta_min
             });
         });

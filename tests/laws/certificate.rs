@@ -1,18 +1,18 @@
 //! The residuals that judge every answer: each fault shows in its own figure and no other, and a
 //! fault of the unknowns that a solver works with cannot hide.
 
-use crate::support::{close, close_to, difference, run, setting, square, try_run};
+use crate::support::{close, close_to, difference, problem, run, square, try_run};
 use nalgebra::Matrix2;
 use signorini::{
     contact::{Answer, Certificate, ContactPoint, FixedRow, GapRow, Kkt, SOLVERS, Scales},
-    evolution::Setting,
-    petsc::Ranks,
+    evolution::DiscreteProblem,
+    petsc::Communicator,
 };
 
 const SCALES: Scales = Scales { force: 10.0, displacement: 2.0 };
 
 fn gap(node: usize, normal: [f64; 2], gap: f64) -> GapRow {
-    GapRow { node, normal, gap, weight: 1.0 }
+    GapRow { node, normal, gap, tributary_length: 1.0 }
 }
 
 /// Judges u and f − Ku at two nodes: u_x of node 0 is prescribed (2), node 0 presses with 6 at its
@@ -23,7 +23,7 @@ fn judge(change: impl Fn(&mut [f64], &mut [f64])) -> (Kkt, Vec<ContactPoint>) {
     let fixed = [FixedRow { node: 0, direction: [1.0, 0.0] }];
     let gaps = [gap(0, [0.0, 1.0], 0.25), gap(1, [0.0, 1.0], 1.0)];
     let answer = Answer { rigid: &[], elastic: &u, unbalanced: &unbalanced, prescribed: &[2.0] };
-    Certificate::new(&fixed, &gaps).judge(answer, 2, SCALES, Ranks::alone())
+    Certificate::new(&fixed, &gaps).judge(answer, 2, SCALES, Communicator::serial())
 }
 
 #[test]
@@ -88,7 +88,7 @@ fn a_force_in_the_cone_of_a_corners_normals_is_carried_and_no_other() {
         let gaps = normals.map(|normal| gap(0, normal, 0.0));
         let answer =
             Answer { rigid: &[], elastic: &[0.0, 0.0], unbalanced: &force, prescribed: &[] };
-        Certificate::new(&[], &gaps).judge(answer, 1, SCALES, Ranks::alone())
+        Certificate::new(&[], &gaps).judge(answer, 1, SCALES, Communicator::serial())
     };
     for shares in [[3.0, 2.0, 0.0], [0.0, 2.0, 1.0], [0.0, 0.0, 5.0], [4.0, 0.0, 0.0]] {
         let (kkt, points) = judged(force_of(shares));
@@ -112,7 +112,7 @@ fn what_is_not_a_number_is_never_within_a_tolerance() {
 }
 
 /// A turned square on a foundation, pressed on its right half and pulled on its left.
-fn turned() -> Setting {
+fn turned() -> DiscreteProblem {
     let text = "
         material = { young = 100, poisson = 0.3, plane = 'stress' }
         boundary = [
@@ -120,11 +120,11 @@ fn turned() -> Setting {
             { name = 'bottom', gap = '0.01*x', normal = [0.6, -0.8] },
             { name = 'top', traction = ['5', '8-20*x'] },
         ]";
-    setting(square(6), text).unwrap()
+    problem(square(6), text).unwrap()
 }
 
 /// What is done to a setting, in words and in deed.
-type Fault<'a> = (&'static str, &'a dyn Fn(&mut Setting));
+type Fault<'a> = (&'static str, &'a dyn Fn(&mut DiscreteProblem));
 
 #[test]
 fn a_fault_in_bases_or_bounds_cannot_certify_itself() {
@@ -141,10 +141,10 @@ fn a_fault_in_bases_or_bounds_cannot_certify_itself() {
                 s.constraints.bounds.iter_mut().for_each(|b| b.upper *= 1.5)
             }),
             ("a free unknown is taken for a prescribed one", &|s| {
-                s.constraints.frames.fix(2 * node + 1);
+                s.constraints.bases.fix(2 * node + 1);
             }),
             ("a basis is lost, so that the bound is one on u_x", &|s| {
-                s.constraints.frames.set(node, Matrix2::identity()).unwrap();
+                s.constraints.bases.set(node, Matrix2::identity()).unwrap();
             }),
         ];
         for (fault, plant) in faults {

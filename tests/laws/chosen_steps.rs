@@ -1,9 +1,9 @@
 //! Chosen steps keep their tolerance, and no more steps are made than that takes.
 
-use crate::support::{distorted, history, setting, shipped, square};
+use crate::support::{distorted, history, problem, shipped, square};
 use signorini::{
     contact::SOLVERS,
-    evolution::{Outcome, Setting, Step},
+    evolution::{DiscreteProblem, Outcome, Step},
 };
 
 /// Damage done at the end, at the worst node and in the mean.
@@ -84,8 +84,8 @@ fn a_pulse_between_the_ends_of_a_step_is_noticed() {
                  boundary = [{{ name = 'left', symmetry = true }}, {{ name = 'bottom', gap = 0 }},
                              {top}]"
             );
-            let setting = setting(square(2), &text).unwrap_or_else(|e| panic!("{e}"));
-            history(&setting, SOLVERS[0]).0
+            let problem = problem(square(2), &text).unwrap_or_else(|e| panic!("{e}"));
+            history(&problem, SOLVERS[0]).0
         };
         let [chosen, uniform] = ["'auto'", "2e-4"].map(run);
         let [found, expected] = [&chosen, &uniform].map(|steps| done(steps)[0]);
@@ -96,7 +96,7 @@ fn a_pulse_between_the_ends_of_a_step_is_noticed() {
 }
 
 /// A square that is bent down on a foundation, with this λ_U.
-fn bent(lambda_u: f64, stepping: &str) -> Setting {
+fn bent(lambda_u: f64, stepping: &str) -> DiscreteProblem {
     let text = format!(
         "material = {{ young = 80, poisson = 0.3, plane = 'stress' }}
          damage = {{ diffusion = 0.1, lambda_d = 0.25, lambda_u = {lambda_u:e}, lambda_w = 0,
@@ -108,7 +108,7 @@ fn bent(lambda_u: f64, stepping: &str) -> Setting {
             {{ name = 'top', traction = [0, '-3*t'] }},
          ]"
     );
-    setting(distorted(6), &text).unwrap_or_else(|e| panic!("{e}"))
+    problem(distorted(6), &text).unwrap_or_else(|e| panic!("{e}"))
 }
 
 #[test]

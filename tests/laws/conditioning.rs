@@ -1,7 +1,7 @@
 //! Where the conditioning or the discretisation is poor: answers stay right, or notes say not.
 
-use crate::support::{close, difference, distorted, history, moved, run, setting, square};
-use signorini::{contact::SOLVERS, evolution::Setting, mesh::Mesh, study::rectangle};
+use crate::support::{close, difference, distorted, history, moved, problem, run, square};
+use signorini::{contact::SOLVERS, evolution::DiscreteProblem, mesh::Mesh, study::rectangle};
 use std::f64::consts::PI;
 
 /// Clamped left, pressed down on the left half of the top and pulled up on the right.
@@ -11,9 +11,9 @@ const PRESSED: &str = "
     { name = 'top', traction = [0, '-15 + 25*max(-1, min(1, 1e6*(x - 0.5)))'] },";
 
 /// A body with Young's modulus 80 of the material `law`.
-fn body(mesh: Mesh, law: &str, more: &str, boundaries: &str) -> Setting {
+fn body(mesh: Mesh, law: &str, more: &str, boundaries: &str) -> DiscreteProblem {
     let text = format!("material = {{ young = 80, {law} }}\n{more}\nboundary = [{boundaries}]");
-    setting(mesh, &text).unwrap_or_else(|e| panic!("{e}"))
+    problem(mesh, &text).unwrap_or_else(|e| panic!("{e}"))
 }
 
 const STRESS: &str = "poisson = 0.3, plane = 'stress'";
@@ -30,7 +30,7 @@ fn needles(n: usize, angle: f64) -> Mesh {
 }
 
 /// A strip of length 100 and height 1 on a foundation, pressed in its middle only.
-fn strip(tolerance: f64) -> Setting {
+fn strip(tolerance: f64) -> DiscreteProblem {
     let contact = format!("contact = {{ tolerance = {tolerance:e} }}");
     let boundaries = "{ name = 'left', symmetry = true }, { name = 'bottom', gap = 0 },
         { name = 'top', traction = [0, '-max(0, 1 - abs(x - 50)/5)'] }";
@@ -77,13 +77,13 @@ fn curl_error(n: usize, poisson: f64) -> f64 {
     let sides = ["left", "right", "bottom", "top"];
     let sides = sides.map(|name| format!("{{ name = '{name}', displacement = {u} }}")).join(",");
     let law = format!("poisson = {poisson}, plane = 'strain'");
-    let setting = body(square(n), &law, &force, &sides);
+    let problem = body(square(n), &law, &force, &sides);
     let exact = |&[x, y]: &[f64; 2]| {
         let (a, b) = ((PI * x).sin().powi(2), (2.0 * PI * x).sin());
         [a * (PI * y).cos(), -b * (PI * y).sin()].map(|v| 0.01 * PI * v)
     };
-    let exact: Vec<f64> = setting.body.mesh.nodes.iter().flat_map(exact).collect();
-    difference(&run(&setting, SOLVERS[0]).last.state.u, &exact)
+    let exact: Vec<f64> = problem.body.mesh.nodes.iter().flat_map(exact).collect();
+    difference(&run(&problem, SOLVERS[0]).last.state.u, &exact)
 }
 
 #[test]
@@ -179,7 +179,7 @@ fn the_estimated_error_of_displacements_is_that_of_the_worst_step() {
              ]"
         );
         let mesh = rectangle(10.0, 0.5, 60, 3);
-        history(&setting(mesh, &text).unwrap_or_else(|e| panic!("{e}")), solver)
+        history(&problem(mesh, &text).unwrap_or_else(|e| panic!("{e}")), solver)
     };
     let (exact, _) = pulled_and_bent(1e-11, "active-set");
     let (steps, outcome) = pulled_and_bent(1e-6, "penalty-duality");

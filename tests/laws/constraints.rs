@@ -1,6 +1,6 @@
 //! Conditions that meet at one node.
 
-use crate::support::{run, setting, square};
+use crate::support::{problem, run, square};
 use signorini::{
     contact::{ConstraintError, Constraints, FixedRow, GapRow, SOLVERS},
     evolution::SetupError,
@@ -10,8 +10,8 @@ use signorini::{
 const MATERIAL: &str = "material = { young = 100, poisson = 0.3, plane = 'stress' }";
 
 /// A square with these boundaries.
-fn bounded(boundaries: &str) -> Result<signorini::evolution::Setting, SetupError> {
-    setting(square(4), &format!("{MATERIAL}\n{boundaries}"))
+fn bounded(boundaries: &str) -> Result<signorini::evolution::DiscreteProblem, SetupError> {
+    problem(square(4), &format!("{MATERIAL}\n{boundaries}"))
 }
 
 fn constraint_error(boundaries: &str) -> ConstraintError {
@@ -29,7 +29,7 @@ fn node(mesh: &Mesh, place: [f64; 2]) -> usize {
 fn a_held_node_on_the_contact_boundary_keeps_its_value() {
     // Node (0, 0) is lifted by 0.01 with the left side; the bottom next to it touches.
     for solver in SOLVERS {
-        let setting = bounded(
+        let problem = bounded(
             "boundary = [
                 { name = 'left', displacement = [0.02, 0.01] },
                 { name = 'bottom', gap = 0 },
@@ -37,14 +37,14 @@ fn a_held_node_on_the_contact_boundary_keeps_its_value() {
              ]",
         )
         .unwrap();
-        let last = run(&setting, solver).last;
-        for [a, b] in &setting.body.mesh.curves["left"].edges {
+        let last = run(&problem, solver).last;
+        for [a, b] in &problem.body.mesh.curves["left"].edges {
             for node in [a, b] {
                 assert_eq!(last.state.u[2 * node..2 * node + 2], [0.02, 0.01]);
             }
         }
         // It is no contact node: it counts in no reaction.
-        let held = node(&setting.body.mesh, [0.0, 0.0]);
+        let held = node(&problem.body.mesh, [0.0, 0.0]);
         assert_eq!(last.state.contact.len(), 4);
         assert!(last.state.contact.iter().all(|point| point.node != held));
         assert!(last.record.active_nodes > 0);
@@ -55,7 +55,7 @@ fn a_held_node_on_the_contact_boundary_keeps_its_value() {
 fn a_node_held_across_the_normal_still_meets_the_foundation() {
     // Horizontal displacement prescribed at the left only: (0, 0) may slide down to the gap.
     for solver in SOLVERS {
-        let setting = bounded(
+        let problem = bounded(
             "boundary = [
                 { name = 'left', displacement = [0.02, 'free'] },
                 { name = 'bottom', gap = 0.1 },
@@ -63,8 +63,8 @@ fn a_node_held_across_the_normal_still_meets_the_foundation() {
              ]",
         )
         .unwrap();
-        let state = run(&setting, solver).last.state;
-        let corner = node(&setting.body.mesh, [0.0, 0.0]);
+        let state = run(&problem, solver).last.state;
+        let corner = node(&problem.body.mesh, [0.0, 0.0]);
         assert_eq!(state.u[2 * corner], 0.02);
         assert!((state.u[2 * corner + 1] + 0.1).abs() < 1e-12);
         assert_eq!(state.contact.len(), 5);
@@ -128,7 +128,7 @@ fn contradictory_values_at_a_common_node_are_an_error() {
 
 #[test]
 fn a_node_between_two_plates_has_one_unknown_with_two_bounds() {
-    let gap = |normal, gap| GapRow { node: 0, normal, gap, weight: 1.0 };
+    let gap = |normal, gap| GapRow { node: 0, normal, gap, tributary_length: 1.0 };
     let limits = |angle: f64, lower: f64, upper: f64| {
         let n = [angle.sin(), -angle.cos()];
         let rows = [gap(n, upper), gap(n.map(|v| -v), lower)];
@@ -167,7 +167,7 @@ fn two_normals_at_a_node_with_a_prescribed_direction_bound_its_other_unknown() {
         node: 0,
         normal,
         gap,
-        weight: 1.0,
+        tributary_length: 1.0,
     });
     let fixed = [FixedRow { node: 0, direction: [1.0, 0.0] }];
     let constraints = Constraints::new(&origin, &fixed, &rows).unwrap();
@@ -195,14 +195,14 @@ fn gaps_of_one_smooth_boundary_become_one_bound_and_those_of_a_corner_two() {
     for (half, bounds) in [(0.2_f64, 1), (0.3, 2)] {
         let normal = |side: f64| [side * half.sin(), -half.cos()];
         let rows = [
-            GapRow { node: 0, normal: normal(-1.0), gap: 0.1, weight: 2.0 },
-            GapRow { node: 0, normal: normal(1.0), gap: 0.2, weight: 2.0 },
+            GapRow { node: 0, normal: normal(-1.0), gap: 0.1, tributary_length: 2.0 },
+            GapRow { node: 0, normal: normal(1.0), gap: 0.2, tributary_length: 2.0 },
         ];
         let constraints = Constraints::new(&[[0.0, 0.0]], &[], &rows).unwrap();
         assert_eq!(constraints.bounds.len(), bounds);
         let gaps: Vec<f64> = constraints.bounds.iter().map(|b| b.upper).collect();
-        let weight: f64 = constraints.bounds.iter().map(|b| b.weight).sum();
-        assert_eq!(weight, 4.0);
+        let tributary_length: f64 = constraints.bounds.iter().map(|b| b.tributary_length).sum();
+        assert_eq!(tributary_length, 4.0);
         if bounds == 1 {
             assert_eq!(gaps, [0.1]);
             let [x, y] = constraints.bounds[0].normal;
@@ -211,7 +211,7 @@ fn gaps_of_one_smooth_boundary_become_one_bound_and_those_of_a_corner_two() {
             assert_eq!(gaps, [0.1, 0.2]);
             // Each bound is one unknown: c = D u gives u·ν of both.
             let mut u = vec![0.3, -0.7];
-            constraints.frames.displacement_to_frame(&mut u);
+            constraints.bases.displacement_to_local(&mut u);
             for bound in &constraints.bounds {
                 let [x, y] = bound.normal;
                 assert!((u[bound.dof] - (0.3 * x - 0.7 * y)).abs() < 1e-15);
@@ -222,7 +222,7 @@ fn gaps_of_one_smooth_boundary_become_one_bound_and_those_of_a_corner_two() {
 
 #[test]
 fn a_third_gap_or_a_gap_along_a_held_direction_takes_no_unknown() {
-    let gap = |normal, gap| GapRow { node: 0, normal, gap, weight: 1.0 };
+    let gap = |normal, gap| GapRow { node: 0, normal, gap, tributary_length: 1.0 };
     let held = |direction| FixedRow { node: 0, direction };
     let origin = [[0.0, 0.0]];
     let three = [gap([0.0, -1.0], 0.0), gap([1.0, 0.0], 0.0), gap([-0.6, 0.8], 0.0)];
@@ -246,13 +246,13 @@ fn a_body_carried_along_by_its_prescribed_side_feels_no_force() {
     let text = "displacement = ['0.3*t - 0.2*t*y', '0.1*t + 0.2*t*x']";
     for rest in ["", "{ name = 'bottom', gap = 1 },"] {
         for solver in SOLVERS {
-            let setting = bounded(&format!(
+            let problem = bounded(&format!(
                 "time = {{ end = 1, step = 0.5 }}
                  boundary = [{{ name = 'left', {text} }}, {rest}]"
             ))
             .unwrap();
-            let last = run(&setting, solver).last;
-            for (u, [x, y]) in last.state.u.chunks(2).zip(&setting.body.mesh.nodes) {
+            let last = run(&problem, solver).last;
+            for (u, [x, y]) in last.state.u.chunks(2).zip(&problem.body.mesh.nodes) {
                 assert!((u[0] - 0.3 + 0.2 * y).abs() < 1e-13);
                 assert!((u[1] - 0.1 - 0.2 * x).abs() < 1e-13);
             }
@@ -264,7 +264,7 @@ fn a_body_carried_along_by_its_prescribed_side_feels_no_force() {
 #[test]
 fn the_segments_of_the_foundation_meet_where_the_conditions_of_a_node_put_them() {
     // Fixed normals below and above; the left ends are prescribed and keep their gaps.
-    let setting = bounded(
+    let problem = bounded(
         "boundary = [
             { name = 'left', displacement = [0, 0] },
             { name = 'bottom', gap = '0.1 + x', normal = [0.6, -0.8] },
@@ -274,12 +274,12 @@ fn the_segments_of_the_foundation_meet_where_the_conditions_of_a_node_put_them()
     )
     .unwrap();
     let opposite = |[x, y]: [f64; 2]| -> Vec<[f64; 2]> {
-        let ends = (setting.foundation.contact_boundary.iter().flatten())
-            .zip(setting.foundation.segments.iter().flatten());
+        let ends = (problem.foundation.contact_boundary.iter().flatten())
+            .zip(problem.foundation.segments.iter().flatten());
         let here = ends.filter(|(body, _)| **body == [x, y]);
         here.map(|(_, there)| [there[0] - x, there[1] - y]).collect()
     };
-    assert_eq!(setting.foundation.segments.len(), 12);
+    assert_eq!(problem.foundation.segments.len(), 12);
     for (place, d, edges) in [
         ([0.5, 0.0], [0.36, -0.48], 2),
         ([0.0, 0.0], [0.06, -0.08], 1),
@@ -305,7 +305,7 @@ fn the_segments_of_the_foundation_meet_where_the_conditions_of_a_node_put_them()
 }
 
 /// The bottom in two halves, the right one 0.01 above its foundation.
-fn footed_steps() -> signorini::evolution::Setting {
+fn footed_steps() -> signorini::evolution::DiscreteProblem {
     let mut mesh = square(4);
     let (left, right) = mesh.curves["bottom"].edges.split_at(2);
     let halves = [("first", left.to_vec()), ("second", right.to_vec())];
@@ -316,5 +316,5 @@ fn footed_steps() -> signorini::evolution::Setting {
         { name = 'left', displacement = [0, 0] },
         { name = 'first', gap = 0 }, { name = 'second', gap = 0.01 },
     ]";
-    setting(mesh, &format!("{MATERIAL}\n{boundaries}")).unwrap()
+    problem(mesh, &format!("{MATERIAL}\n{boundaries}")).unwrap()
 }

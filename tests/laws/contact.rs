@@ -1,39 +1,39 @@
 //! What a solution of the contact problem must be, whoever computes it.
 
 use crate::support::{
-    Random, close, close_to, difference, distorted, history, largest, run, setting, shipped,
+    Random, close, close_to, difference, distorted, history, largest, problem, run, shipped,
 };
 use signorini::{
     contact::SOLVERS,
-    evolution::{Setting, State},
+    evolution::{DiscreteProblem, State},
 };
 
 /// A bending L over an obstacle from which its arm partly lifts off, elastic and static.
-fn lshape(sets: &[&str]) -> Setting {
+fn lshape(sets: &[&str]) -> DiscreteProblem {
     let sets = [&["mesh.size=0.5", "time.step=1"], sets].concat();
     shipped("lshape", &sets)
 }
 
 /// ½ uᵀKu − fᵀu and Ku − f at the state.
-fn energy(setting: &Setting, state: &State, u: &[f64]) -> (f64, Vec<f64>) {
-    let internal = setting.elasticity.internal_force(&setting.body, &state.zeta_mean, u);
-    let load = setting.loads.at(&setting.body, state.time);
+fn energy(problem: &DiscreteProblem, state: &State, u: &[f64]) -> (f64, Vec<f64>) {
+    let internal = problem.elasticity.internal_force(&problem.body, &state.zeta_mean, u);
+    let load = problem.loads.at(&problem.body, state.time);
     let energy = (0..u.len()).map(|i| (0.5 * internal[i] - load[i]) * u[i]).sum();
     (energy, internal.iter().zip(&load).map(|(r, f)| r - f).collect())
 }
 
 /// Makes u + v feasible: v = 0 on the clamp and (u + v)·ν ≤ g on Γ_C.
-fn project(setting: &Setting, u: &[f64], v: &mut [f64]) {
-    for [a, b] in &setting.body.mesh.curves["clamp"].edges {
+fn project(problem: &DiscreteProblem, u: &[f64], v: &mut [f64]) {
+    for [a, b] in &problem.body.mesh.curves["clamp"].edges {
         [a, b].into_iter().for_each(|&node| v[2 * node..2 * node + 2].fill(0.0));
     }
-    for bound in &setting.constraints.bounds {
+    for bound in &problem.constraints.bounds {
         let along = |w: &[f64]| {
             w[2 * bound.node] * bound.normal[0] + w[2 * bound.node + 1] * bound.normal[1]
         };
-        let excess = (along(u) + along(v) - bound.upper).max(0.0);
+        let overlap = (along(u) + along(v) - bound.upper).max(0.0);
         for k in 0..2 {
-            v[2 * bound.node + k] -= excess * bound.normal[k];
+            v[2 * bound.node + k] -= overlap * bound.normal[k];
         }
     }
 }
@@ -41,9 +41,9 @@ fn project(setting: &Setting, u: &[f64], v: &mut [f64]) {
 #[test]
 fn no_feasible_displacement_has_less_energy() {
     for solver in SOLVERS {
-        let setting = lshape(&[]);
-        let state = run(&setting, solver).last.state;
-        let (least, residual) = energy(&setting, &state, &state.u);
+        let problem = lshape(&[]);
+        let state = run(&problem, solver).last.state;
+        let (least, residual) = energy(&problem, &state, &state.u);
         let (mut random, size) = (Random(11), largest(&state.u));
         let count = |active: bool| state.contact.iter().filter(|p| p.active == active).count();
         assert!(count(true) > 0 && count(false) > 0, "some nodes press and some gape");
@@ -51,12 +51,12 @@ fn no_feasible_displacement_has_less_energy() {
             for _ in 0..50 {
                 let mut v = random.field(state.u.len());
                 v.iter_mut().for_each(|v| *v *= scale * size);
-                project(&setting, &state.u, &mut v);
+                project(&problem, &state.u, &mut v);
                 // The variational inequality (26): (Ku − f)·v ≥ 0.
                 let slope: f64 = residual.iter().zip(&v).map(|(r, v)| r * v).sum();
                 assert!(slope >= -1e-9 * scale * least.abs(), "{solver}: {slope}");
                 let moved: Vec<f64> = state.u.iter().zip(&v).map(|(u, v)| u + v).collect();
-                let more = energy(&setting, &state, &moved).0 - least;
+                let more = energy(&problem, &state, &moved).0 - least;
                 assert!(more > 0.0, "{solver}: lower by {more}");
             }
         }
@@ -65,7 +65,7 @@ fn no_feasible_displacement_has_less_energy() {
         let point = state.contact.iter().max_by(|a, b| a.force.total_cmp(&b.force)).unwrap();
         let mut inside = state.u.clone();
         inside[2 * point.node + 1] -= 1e-3 * size;
-        assert!(energy(&setting, &state, &inside).0 < least);
+        assert!(energy(&problem, &state, &inside).0 < least);
     }
 }
 
@@ -89,8 +89,8 @@ fn more_load_presses_more() {
     // A load kt on a linear body whose contact set does not change with k: u and the
     // pressures are proportional to it (g = 0: the problem is positively homogeneous).
     for solver in SOLVERS {
-        let setting = lshape(&["time.step=0.25", "damage.lambda_u=0", "damage.lambda_d=0"]);
-        let (steps, _) = history(&setting, solver);
+        let problem = lshape(&["time.step=0.25", "damage.lambda_u=0", "damage.lambda_d=0"]);
+        let (steps, _) = history(&problem, solver);
         let last = &steps[4];
         assert!(largest(&steps[0].state.u) == 0.0, "no load at t = 0");
         for step in &steps[1..] {
@@ -117,8 +117,8 @@ fn a_uniform_gap_closes_when_the_top_has_come_down_by_it() {
             { name = 'bottom', gap = 0.35 },
         ]";
     for solver in SOLVERS {
-        let setting = setting(distorted(5), text).unwrap();
-        for step in history(&setting, solver).0 {
+        let problem = problem(distorted(5), text).unwrap();
+        for step in history(&problem, solver).0 {
             let t = step.state.time;
             let (gap, pressure) = ((0.35 - t).max(0.0), 100.0 * (t - 0.35).max(0.0));
             for point in &step.state.contact {
@@ -145,13 +145,13 @@ fn an_inclined_foundation_is_met_along_its_normal() {
             { name = 'bottom', gap = 0.001, normal = [3, -4], traction = [3, -4] },
         ]";
     for solver in SOLVERS {
-        let setting = setting(distorted(6), text).unwrap();
-        let state = run(&setting, solver).last.state;
-        let (_, residual) = energy(&setting, &state, &state.u);
+        let problem = problem(distorted(6), text).unwrap();
+        let state = run(&problem, solver).last.state;
+        let (_, residual) = energy(&problem, &state, &state.u);
         assert!(state.contact.iter().filter(|p| p.active).count() > 2);
         for point in &state.contact {
             let (i, held) = (2 * point.node, [0.6, -0.8]);
-            if setting.body.mesh.nodes[point.node][1] > 0.0 {
+            if problem.body.mesh.nodes[point.node][1] > 0.0 {
                 continue;
             }
             // f − Ku = p ν

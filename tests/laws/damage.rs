@@ -1,11 +1,11 @@
 //! The damage equation where its solution is known.
 
 use crate::support::{
-    Random, close, close_to, distorted, history, order, run, setting, shipped, square,
+    Random, close, close_to, distorted, history, order, problem, run, shipped, square,
 };
 use signorini::{
     contact::SOLVERS,
-    evolution::{Setting, Step, Stop},
+    evolution::{DiscreteProblem, Step, Stop},
     fem::{self, Body, DamageCertificate, DamageSystem, Mass, source_load},
     mesh::Mesh,
     petsc::Session,
@@ -20,7 +20,7 @@ const STRAIN_SQUARED: f64 = 0.02 * 0.02 + 0.01 * 0.01 + 2.0 * 0.015 * 0.015;
 
 /// The strain above times `factor` (an expression in t) prescribed on all sides: with a
 /// uniform ζ it is the strain of the whole body.
-fn strained(mesh: Mesh, factor: &str, damage: &str, step: f64) -> Setting {
+fn strained(mesh: Mesh, factor: &str, damage: &str, step: f64) -> DiscreteProblem {
     let u = format!("['({factor})*(0.02*x + 0.02*y)', '({factor})*(0.01*x - 0.01*y)']");
     let text = format!(
         "{MATERIAL}\n{damage}
@@ -32,7 +32,7 @@ fn strained(mesh: Mesh, factor: &str, damage: &str, step: f64) -> Setting {
             {{ name = 'bottom', displacement = {u} }},
          ]"
     );
-    setting(mesh, &text).unwrap_or_else(|e| panic!("{e}"))
+    problem(mesh, &text).unwrap_or_else(|e| panic!("{e}"))
 }
 
 #[track_caller]
@@ -52,7 +52,7 @@ fn a_constant_source_is_exact_under_euler() {
         );
         let s = 250.0 * STRAIN_SQUARED.min(cap) - lambda_w;
         let (steps, outcome) = history(&strained(distorted(4), "1", &damage, 0.1), SOLVERS[0]);
-        assert_eq!((steps.len(), outcome.undamaged_steps), (11, 0));
+        assert_eq!((steps.len(), outcome.skipped_damage_solves), (11, 0));
         for step in &steps {
             check_uniform(step, 0.9 - s * step.state.time);
         }
@@ -65,7 +65,7 @@ fn the_source_is_that_of_the_step_before() {
     let damage = "damage = { diffusion = 0.3, lambda_d = 0, lambda_u = 1000, lambda_w = 0,
                              strain_cap = 1000, threshold = 0.01, initial = 1 }";
     let (steps, outcome) = history(&strained(distorted(4), "t", damage, 0.125), SOLVERS[0]);
-    assert_eq!(outcome.undamaged_steps, 1);
+    assert_eq!(outcome.skipped_damage_solves, 1);
     let mut zeta = 1.0;
     for pair in steps.windows(2) {
         zeta -= 0.125 * 500.0 * STRAIN_SQUARED * pair[0].state.time.powi(2);
@@ -92,7 +92,7 @@ fn the_run_stops_at_the_threshold_with_the_last_admissible_state() {
 }
 
 /// No load and λ_D = 0: ζ only diffuses from c + a cos(πx).
-fn diffusing(mesh: Mesh, diffusion: f64, step: f64, mass: &str) -> Setting {
+fn diffusing(mesh: Mesh, diffusion: f64, step: f64, mass: &str) -> DiscreteProblem {
     let text = format!(
         "{MATERIAL}
          damage = {{ diffusion = {diffusion:?}, lambda_d = 0, lambda_u = 1, lambda_w = 0,
@@ -101,21 +101,21 @@ fn diffusing(mesh: Mesh, diffusion: f64, step: f64, mass: &str) -> Setting {
          time = {{ end = 1, step = {step:?} }}
          boundary = [{{ name = 'left', displacement = [0, 0] }}]"
     );
-    setting(mesh, &text).unwrap_or_else(|e| panic!("{e}"))
+    problem(mesh, &text).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// The distance in L² of ζ from 0.7 + `amplitude` cos(πx) at the end, by nodal values.
-fn distance(setting: &Setting, amplitude: f64) -> f64 {
-    let outcome = run(setting, SOLVERS[0]);
-    assert_eq!(outcome.undamaged_steps, 0, "ζ that is not uniform diffuses without a source");
+fn distance(problem: &DiscreteProblem, amplitude: f64) -> f64 {
+    let outcome = run(problem, SOLVERS[0]);
+    assert_eq!(outcome.skipped_damage_solves, 0, "ζ that is not uniform diffuses without a source");
     // ∫φ = 0: the mean stays.
-    let initial = setting.body.mean(&setting.initial_damage());
+    let initial = problem.body.mean(&problem.initial_damage());
     close(outcome.last.record.zeta_mean, initial, 1e-13);
     let error = |([x, _], z): (&[f64; 2], &f64)| (z - 0.7 - amplitude * (PI * x).cos()).powi(2);
-    let nodes = setting.body.mesh.nodes.iter().zip(&outcome.last.state.zeta);
+    let nodes = problem.body.mesh.nodes.iter().zip(&outcome.last.state.zeta);
     let squares: Vec<f64> = nodes.map(error).collect();
     // The area of the square is 1.
-    setting.body.mean(&squares).sqrt()
+    problem.body.mean(&squares).sqrt()
 }
 
 /// κ of the diffusion tests, m²/s: e^(−κπ²) ≈ 0.37.
@@ -153,7 +153,7 @@ const LAMBDA_U: f64 = 90.0;
 const PRESSURE: f64 = 6.0;
 
 /// Pressed on the foundation by p = t PRESSURE, ζ₀ = 0.95.
-fn uniaxial(mesh: Mesh, step: f64) -> Setting {
+fn uniaxial(mesh: Mesh, step: f64) -> DiscreteProblem {
     let text = format!(
         "{MATERIAL}
          damage = {{ diffusion = 0.2, lambda_d = {LAMBDA_D}, lambda_u = {LAMBDA_U}, lambda_w = 0,
@@ -165,7 +165,7 @@ fn uniaxial(mesh: Mesh, step: f64) -> Setting {
             {{ name = 'top', traction = [0, '-{PRESSURE}*t'] }},
          ]"
     );
-    setting(mesh, &text).unwrap_or_else(|e| panic!("{e}"))
+    problem(mesh, &text).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// ζ' = φ under σ_yy = −t PRESSURE: |ε|² = (1 + ν²)(σ/(ζE))² in plane stress.
@@ -216,15 +216,15 @@ fn uniform_damage_converges_to_its_differential_equation_with_order_one() {
 fn the_loss_of_damage_is_the_integral_of_the_source() {
     // Testing (28) with 1: ∫ζ_n − ∫ζ_{n−1} = k ∫φ_{n−1}, with the damage far from uniform.
     for set in ["damage.mass=consistent", "damage.mass=lumped"] {
-        let setting = shipped("square-mild", &["mesh.size=0.125", "time.step=0.1", set]);
-        let (law, k) = (setting.damage().unwrap(), 0.1);
-        let (steps, _) = history(&setting, SOLVERS[0]);
+        let problem = shipped("square-mild", &["mesh.size=0.125", "time.step=0.1", set]);
+        let (law, k) = (problem.damage().unwrap(), 0.1);
+        let (steps, _) = history(&problem, SOLVERS[0]);
         assert_eq!(steps.len(), 11);
         for pair in steps.windows(2) {
             let (before, after) = (&pair[0], &pair[1]);
-            let strain = setting.elasticity.strain_squared(&setting.body, &before.state.u);
-            let phi = fem::source(&setting.body, &law, &strain, &before.state.zeta);
-            let source: f64 = source_load(&setting.body, setting.mass(), &phi).iter().sum();
+            let strain = problem.elasticity.strain_squared(&problem.body, &before.state.u);
+            let phi = fem::source(&problem.body, &law, &strain, &before.state.zeta);
+            let source: f64 = source_load(&problem.body, problem.mass(), &phi).iter().sum();
             assert!(source < -1e-3);
             // The square's area is 1.
             close(after.record.zeta_mean - before.record.zeta_mean, k * source, 1e-13);
@@ -242,16 +242,16 @@ fn nothing_that_drives_damage_leaves_it_bit_for_bit() {
         )
     };
     let rate = 50.0 * STRAIN_SQUARED;
-    let setting = strained(distorted(4), "t", &damage(1.01 * rate), 0.1);
-    let (steps, outcome) = history(&setting, SOLVERS[0]);
-    assert_eq!(outcome.undamaged_steps, 10);
+    let problem = strained(distorted(4), "t", &damage(1.01 * rate), 0.1);
+    let (steps, outcome) = history(&problem, SOLVERS[0]);
+    assert_eq!(outcome.skipped_damage_solves, 10);
     assert!(steps.iter().flat_map(|s| &s.state.zeta).all(|z| z.to_bits() == 0.7_f64.to_bits()));
 
     // With a quarter of that λ_W damage begins beyond t = ½: t_m² > 0.2525 from t_6 = 0.6 on,
     // which the steps 7 to 10 see.
-    let setting = strained(distorted(4), "t", &damage(0.2525 * rate), 0.1);
-    let outcome = run(&setting, SOLVERS[0]);
-    assert_eq!(outcome.undamaged_steps, 6);
+    let problem = strained(distorted(4), "t", &damage(0.2525 * rate), 0.1);
+    let outcome = run(&problem, SOLVERS[0]);
+    assert_eq!(outcome.skipped_damage_solves, 6);
     assert!(outcome.last.record.zeta_min < 0.7);
 }
 
@@ -304,8 +304,8 @@ fn every_damage_solve_of_a_run_is_certified() {
                 {{ name = 'right', traction = ['4*t', 0] }},
              ]"
         );
-        let setting = setting(distorted(6), &text).unwrap_or_else(|e| panic!("{e}"));
-        let (steps, _) = history(&setting, SOLVERS[0]);
+        let problem = problem(distorted(6), &text).unwrap_or_else(|e| panic!("{e}"));
+        let (steps, _) = history(&problem, SOLVERS[0]);
         let records = steps.iter().map(|step| step.record);
         // The first damage step has nothing to solve.
         assert!(records.clone().filter(|r| r.zeta_residual > 0.0).count() >= solved);

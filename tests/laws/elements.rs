@@ -3,7 +3,9 @@
 use crate::support::{Random, close, difference, distorted, largest, moved, turn, unstructured};
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector};
 use signorini::{
-    fem::{Body, DamageSystem, Elasticity, Frames, Mass, Stiffness, Triangle, source, source_load},
+    fem::{
+        Body, DamageSystem, Elasticity, Mass, NodalBases, Stiffness, Triangle, source, source_load,
+    },
     mesh::Mesh,
     model::{DamageLaw, Material, Plane},
     petsc::{Session, Vector},
@@ -182,34 +184,34 @@ fn forces_turn_with_the_body() {
 }
 
 /// Frames at a third of the nodes, orthonormal and oblique, and a fixed unknown at some.
-fn frames(nodes: usize, random: &mut Random) -> Frames {
-    let mut frames = Frames::identity(nodes);
+fn bases(nodes: usize, random: &mut Random) -> NodalBases {
+    let mut bases = NodalBases::identity(nodes);
     for node in (0..nodes).step_by(3) {
         let angle = 3.0 * random.next();
         let opening = if node % 2 == 0 { 0.5 * std::f64::consts::PI } else { 0.8 };
         let (s, c) = angle.sin_cos();
         let (t, d) = (angle + opening).sin_cos();
-        frames.set(node, Matrix2::new(c, s, d, t)).unwrap();
+        bases.set(node, Matrix2::new(c, s, d, t)).unwrap();
         if node % 4 == 0 {
-            frames.fix(2 * node + 1);
+            bases.fix(2 * node + 1);
         }
     }
-    frames.fix(2);
-    frames
+    bases.fix(2);
+    bases
 }
 
 #[test]
 fn frames_keep_work_and_give_back_what_they_take() {
     let mut random = Random(7);
-    let frames = frames(30, &mut random);
+    let bases = bases(30, &mut random);
     let (u, r) = (random.field(60), random.field(60));
     let (mut c, mut s) = (u.clone(), r.clone());
-    frames.displacement_to_frame(&mut c);
-    frames.force_to_frame(&mut s);
+    bases.displacement_to_local(&mut c);
+    bases.force_to_local(&mut s);
     let work = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
     assert!(difference(&c, &u) > 0.1);
     close(work(&s, &c), work(&r, &u), 1e-13);
-    frames.displacement_from_frame(&mut c);
+    bases.displacement_to_global(&mut c);
     assert!(difference(&c, &u) < 1e-14);
 }
 
@@ -219,12 +221,12 @@ fn the_assembled_stiffness_is_the_matrix_free_force_in_the_frames() {
     let session = Session::start(&[]).unwrap();
     let (nodes, elasticity) = (body.mesh.nodes.len(), elasticity(Plane::Stress));
     let mut random = Random(8);
-    let frames = frames(nodes, &mut random);
-    let mut stiffness = Stiffness::new(&session, &body, &elasticity, &frames).unwrap();
+    let bases = bases(nodes, &mut random);
+    let mut stiffness = Stiffness::new(&session, &body, &elasticity, &bases).unwrap();
     for _ in 0..3 {
         let zeta: Vec<f64> = body.triangles.iter().map(|_| 1.5 + random.next()).collect();
         stiffness.refill(&zeta).unwrap();
-        let fixed = frames.fixed();
+        let fixed = bases.fixed();
         let c: Vec<f64> =
             (0..2 * nodes).map(|i| if fixed[i] { 0.0 } else { random.next() }).collect();
         let (mut x, mut y) = (vector(&session, &c), vector(&session, &c));
@@ -233,9 +235,9 @@ fn the_assembled_stiffness_is_the_matrix_free_force_in_the_frames() {
 
         // K c = D⁻ᵀ F(D⁻¹ c) on the free unknowns, and the fixed are decoupled from them.
         let mut u = c.clone();
-        frames.displacement_from_frame(&mut u);
+        bases.displacement_to_global(&mut u);
         let mut force = elasticity.internal_force(&body, &zeta, &u);
-        frames.force_to_frame(&mut force);
+        bases.force_to_local(&mut force);
         force.iter_mut().zip(fixed).for_each(|(f, fixed)| *f = if *fixed { 0.0 } else { *f });
         let error = difference(&product, &force);
         assert!(error < 1e-13, "{error}");

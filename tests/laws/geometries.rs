@@ -4,12 +4,12 @@
 use crate::support::{close, close_to, difference, history, largest, run, shipped, shipped_names};
 use signorini::{
     contact::SOLVERS,
-    evolution::{Setting, Step},
+    evolution::{DiscreteProblem, Step},
 };
 use std::collections::BTreeSet;
 
 /// Overrides that make a shipped scene quick.
-fn quick(name: &str) -> Setting {
+fn quick(name: &str) -> DiscreteProblem {
     let sets: &[&str] = match name {
         // It breaks at t = 0.04 on this mesh, in the eighth of these steps.
         "square" => &["mesh.size=0.0625", "time.end=0.05", "time.step=0.005"],
@@ -25,12 +25,12 @@ fn quick(name: &str) -> Setting {
 #[test]
 fn all_solvers_agree_on_every_shipped_scene() {
     for name in shipped_names() {
-        let setting = quick(&name);
-        let (first, first_outcome) = history(&setting, SOLVERS[0]);
+        let problem = quick(&name);
+        let (first, first_outcome) = history(&problem, SOLVERS[0]);
         // A body that is lifted off has no contact force to be relative to.
         let force = first.iter().map(|step| step.record.contact_force).fold(0.0, f64::max);
         for solver in SOLVERS {
-            let (steps, outcome) = history(&setting, solver);
+            let (steps, outcome) = history(&problem, solver);
             assert!(outcome.kkt.within(1e-10), "{name}, {solver}: {}", outcome.kkt);
             assert_eq!(steps.len(), first.len(), "{name}, {solver}");
             let stopped = |o: &signorini::evolution::Outcome| o.stopped.map(|stop| stop.time);
@@ -61,9 +61,9 @@ fn all_solvers_agree_on_every_shipped_scene() {
 fn contact_travels_where_a_scene_says_so() {
     // From no node to all of them and back; from part of them to all, to none, to part.
     for (name, turns) in [("lshape-rolling", "none all"), ("beam", "all none")] {
-        let setting = quick(name);
-        let steps = history(&setting, SOLVERS[0]).0;
-        let all = setting.constraints.bounds.len();
+        let problem = quick(name);
+        let steps = history(&problem, SOLVERS[0]).0;
+        let all = problem.constraints.bounds.len();
         let at = |nodes: usize| steps.iter().position(|s| s.record.active_nodes == nodes);
         let (first_all, first_none) = (at(all).expect(name), at(0).expect(name));
         assert_eq!(first_none < first_all, turns == "none all", "{name}");
@@ -76,21 +76,21 @@ fn contact_travels_where_a_scene_says_so() {
 
 #[test]
 fn contact_comes_in_several_pieces_under_a_wave() {
-    let setting = quick("beam");
-    let x = |node: usize| setting.body.mesh.nodes[node][0];
+    let problem = quick("beam");
+    let x = |node: usize| problem.body.mesh.nodes[node][0];
     let pieces = |step: &Step| {
         let mut contact = step.state.contact.clone();
         contact.sort_by(|a, b| x(a.node).total_cmp(&x(b.node)));
         contact.chunk_by(|a, b| a.active == b.active).filter(|piece| piece[0].active).count()
     };
-    let counts: BTreeSet<_> = history(&setting, SOLVERS[0]).0.iter().map(pieces).collect();
+    let counts: BTreeSet<_> = history(&problem, SOLVERS[0]).0.iter().map(pieces).collect();
     assert!(counts.is_superset(&[0, 1, 2].into()), "{counts:?}");
 }
 
-/// The node of `setting` at a point.
-fn node_at(setting: &Setting, [x, y]: [f64; 2]) -> usize {
+/// The node of `problem` at a point.
+fn node_at(problem: &DiscreteProblem, [x, y]: [f64; 2]) -> usize {
     let near = |p: &[f64; 2]| (p[0] - x).hypot(p[1] - y) < 1e-8;
-    setting.body.mesh.nodes.iter().position(near).unwrap_or_else(|| panic!("no node at {x}, {y}"))
+    problem.body.mesh.nodes.iter().position(near).unwrap_or_else(|| panic!("no node at {x}, {y}"))
 }
 
 #[test]
@@ -134,12 +134,12 @@ fn the_whole_bridge_is_symmetric_and_twice_its_half() {
 fn contact_and_clamp_together_carry_the_load() {
     // Σ of all nodal residuals is minus the load: ∫f_N = (0, −80 t · 8) on the L.
     for solver in SOLVERS {
-        let setting = quick("lshape");
-        let state = run(&setting, solver).last.state;
-        let internal = setting.elasticity.internal_force(&setting.body, &state.zeta_mean, &state.u);
-        let load = setting.loads.at(&setting.body, state.time);
+        let problem = quick("lshape");
+        let state = run(&problem, solver).last.state;
+        let internal = problem.elasticity.internal_force(&problem.body, &state.zeta_mean, &state.u);
+        let load = problem.loads.at(&problem.body, state.time);
         let clamp: Vec<usize> =
-            setting.body.mesh.curves["clamp"].edges.iter().flatten().copied().collect();
+            problem.body.mesh.curves["clamp"].edges.iter().flatten().copied().collect();
         let reaction = |k: usize| -> f64 {
             let mut nodes = clamp.clone();
             nodes.sort_unstable();

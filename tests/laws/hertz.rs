@@ -8,8 +8,8 @@ use std::f64::consts::PI;
 fn a_disc_on_a_plane_has_the_pressure_of_hertz() {
     // a = √(4FR/(πE*)), p₀ = √(FE*/(πR)), p(x) = p₀ √(1 − x²/a²), E* = E/(1−ν²): the
     // plane is rigid. F = 35 kN per mm of the whole disc.
-    let setting = shipped("hertz", &[]);
-    let material = setting.elasticity.material;
+    let problem = shipped("hertz", &[]);
+    let material = problem.elasticity.material;
     let (force, radius) = (35e6, 0.05);
     let e = material.young / (1.0 - material.poisson * material.poisson);
     let half_width = (4.0 * force * radius / (PI * e)).sqrt();
@@ -17,12 +17,12 @@ fn a_disc_on_a_plane_has_the_pressure_of_hertz() {
     assert!((half_width - 5.382e-3).abs() < 1e-6 && (peak - 4140e6).abs() < 1e6);
 
     for solver in SOLVERS {
-        let last = run(&setting, solver).last;
+        let last = run(&problem, solver).last;
         // Vertical equilibrium of the half that is modelled.
         close_to(last.record.contact_force, 0.5 * force, 1e-9);
 
         let mut points: Vec<_> = (last.state.contact.iter())
-            .map(|point| (setting.body.mesh.nodes[point.node][0], point))
+            .map(|point| (problem.body.mesh.nodes[point.node][0], point))
             .collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         let most = points.iter().map(|(_, p)| p.pressure).fold(0.0, f64::max);

@@ -1,9 +1,9 @@
 //! The maximum principle of the damage step: φ ≤ 0, so max ζ never rises and min ζ falls by
 //! no more than k min φ.
 
-use crate::support::{Random, close, distorted, largest, moved, run, setting, square};
+use crate::support::{Random, close, distorted, largest, moved, problem, run, square};
 use signorini::{
-    evolution::{Outcome, Setting},
+    evolution::{DiscreteProblem, Outcome},
     fem::{Body, DamageSystem, Mass, source, source_load},
     mesh::Mesh,
     model::DamageLaw,
@@ -24,7 +24,7 @@ const H: f64 = 0.1;
 
 /// By how much a step with kκ = `ratio` h² leaves the bounds at most, over random ζ and
 /// strains; ζ is at most 1.
-fn excess(body: &Body, mass: Mass, ratio: f64) -> f64 {
+fn violation(body: &Body, mass: Mass, ratio: f64) -> f64 {
     let session = Session::start(&[]).unwrap();
     let n = body.mesh.nodes.len();
     let step = ratio * H * H / LAW.diffusion;
@@ -60,8 +60,8 @@ const ABOVE: [f64; 3] = [0.6, 1.0, 100.0];
 fn the_lumped_mass_keeps_the_bounds_for_every_step_without_obtuse_angles() {
     let body = Body::new(square(10));
     for ratio in BELOW.into_iter().chain(ABOVE) {
-        let excess = excess(&body, Mass::Lumped, ratio);
-        assert!(excess < 1e-12, "kκ/h² = {ratio}: {excess}");
+        let violation = violation(&body, Mass::Lumped, ratio);
+        assert!(violation < 1e-12, "kκ/h² = {ratio}: {violation}");
     }
 }
 
@@ -70,20 +70,20 @@ fn the_consistent_mass_leaves_the_bounds_where_diffusion_is_small() {
     let body = Body::new(square(10));
     for ratio in BELOW {
         // Diffusion alone leaves them by some kκ/h² where that is small.
-        let excess = excess(&body, Mass::Consistent, ratio);
-        assert!(excess > 0.1 * ratio, "kκ/h² = {ratio}: {excess}");
+        let violation = violation(&body, Mass::Consistent, ratio);
+        assert!(violation > 0.1 * ratio, "kκ/h² = {ratio}: {violation}");
     }
     for ratio in ABOVE {
-        let excess = excess(&body, Mass::Consistent, ratio);
-        assert!(excess < 1e-12, "kκ/h² = {ratio}: {excess}");
+        let violation = violation(&body, Mass::Consistent, ratio);
+        assert!(violation < 1e-12, "kκ/h² = {ratio}: {violation}");
     }
 }
 
 #[test]
 fn obtuse_angles_break_the_lumped_mass_too() {
     let body = Body::new(moved(square(10), |[x, y]| [x + y, y]));
-    let excess = excess(&body, Mass::Lumped, 0.1);
-    assert!(excess > 1e-3, "{excess}");
+    let violation = violation(&body, Mass::Lumped, 0.1);
+    assert!(violation > 1e-3, "{violation}");
 }
 
 #[test]
@@ -102,7 +102,7 @@ fn both_masses_integrate_constants_alike() {
 }
 
 /// A soft square in an unloaded body, ζ = `low` in it: kκ/h² is `ratio` for ten steps.
-fn soft_square(mesh: Mesh, low: f64, ratio: f64, mass: &str) -> Setting {
+fn soft_square(mesh: Mesh, low: f64, ratio: f64, mass: &str) -> DiscreteProblem {
     let distance = "max(abs(x - 0.5), abs(y - 0.5)) - 0.26";
     let initial = format!("{low} + {}*min(1, max(0, 1e6*({distance})))", 1.0 - low);
     let text = format!(
@@ -113,21 +113,25 @@ fn soft_square(mesh: Mesh, low: f64, ratio: f64, mass: &str) -> Setting {
          boundary = [{{ name = 'left', displacement = [0, 0] }}]",
         10.0 * ratio / 64.0
     );
-    setting(mesh, &text).unwrap_or_else(|e| panic!("{e}"))
+    problem(mesh, &text).unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn outcome(low: f64, ratio: f64, mass: &str) -> (Outcome, Vec<String>) {
-    let setting = soft_square(square(8), low, ratio, mass);
-    let outcome = run(&setting, "active-set");
-    let notes = outcome.notes(&setting);
+    let problem = soft_square(square(8), low, ratio, mass);
+    let outcome = run(&problem, "active-set");
+    let notes = outcome.notes(&problem);
     (outcome, notes)
 }
 
 #[test]
 fn a_run_says_when_it_leaves_the_bounds_and_only_then() {
     let (outcome, notes) = outcome(0.1, 0.1, "");
-    assert_eq!(outcome.excess.first, Some((1, 0.1)));
-    assert!(outcome.excess.above > 1e-3 && outcome.excess.below > 1e-3, "{:?}", outcome.excess);
+    assert_eq!(outcome.bound_violation.first, Some((1, 0.1)));
+    assert!(
+        outcome.bound_violation.above > 1e-3 && outcome.bound_violation.below > 1e-3,
+        "{:?}",
+        outcome.bound_violation
+    );
     let [note] = notes.as_slice() else { panic!("{notes:?}") };
     for said in ["above by ", "below by ", "step 1 ", "damage.mass = \"lumped\""] {
         assert!(note.contains(said), "{note}");
@@ -140,11 +144,11 @@ fn a_run_says_when_it_leaves_the_bounds_and_only_then() {
 fn what_many_small_steps_add_up_is_seen() {
     // The excess is that over the start, not that over the step before.
     let (outcome, _) = outcome(0.1, 1e-7, "");
-    let setting = soft_square(square(8), 0.1, 1e-7, "");
+    let problem = soft_square(square(8), 0.1, 1e-7, "");
     let rise = outcome.last.state.zeta.iter().copied().fold(f64::MIN, f64::max)
-        - setting.initial_damage().iter().copied().fold(f64::MIN, f64::max);
+        - problem.initial_damage().iter().copied().fold(f64::MIN, f64::max);
     assert!(rise > 1e-7, "{rise}");
-    close(outcome.excess.above / rise, 1.0, 1e-12);
+    close(outcome.bound_violation.above / rise, 1.0, 1e-12);
 }
 
 #[test]
@@ -169,8 +173,8 @@ fn a_stop_that_they_allow_is_not() {
             { name = 'left', displacement = [0, 0] },
             { name = 'right', traction = [-0.1, -0.1] },
         ]";
-    let setting = setting(square(8), text).unwrap();
-    let outcome = run(&setting, "active-set");
+    let problem = problem(square(8), text).unwrap();
+    let outcome = run(&problem, "active-set");
     assert!(outcome.stopped.unwrap().floor <= 0.01);
-    assert_eq!(outcome.notes(&setting), [""; 0]);
+    assert_eq!(outcome.notes(&problem), [""; 0]);
 }

@@ -1,9 +1,9 @@
 //! What is told of an answer, or refused, besides its residuals.
 
-use crate::support::{run, setting, square};
+use crate::support::{problem, run, square};
 use signorini::{
     contact::SOLVERS,
-    evolution::{self, Phases, RunError, Setting, SetupError},
+    evolution::{self, DiscreteProblem, Phases, RunError, SetupError},
     petsc::Session,
 };
 
@@ -11,18 +11,18 @@ const MATERIAL: &str = "material = { young = 100, poisson = 0.3, plane = 'stress
 
 /// The square on a foundation `gap` below it, against sliding held by an axis, pressed by
 /// `traction`; static.
-fn pressed(gap: f64, traction: &str) -> Result<Setting, SetupError> {
+fn pressed(gap: f64, traction: &str) -> Result<DiscreteProblem, SetupError> {
     let text = format!(
         "{MATERIAL}
          boundary = [{{ name = 'left', symmetry = true }}, {{ name = 'bottom', gap = {gap} }},
                      {{ name = 'top', traction = [0, '{traction}'] }}]"
     );
-    setting(square(4), &text)
+    problem(square(4), &text)
 }
 
 #[test]
 fn large_strains_and_rotations_are_noted_and_long_ways_are_not() {
-    let notes = |setting: Setting| run(&setting, SOLVERS[0]).notes(&setting);
+    let notes = |problem: DiscreteProblem| run(&problem, SOLVERS[0]).notes(&problem);
     // |∇u| = (p/E) √(1 + ν²).
     assert_eq!(notes(pressed(0.0, "-9").unwrap()), [""; 0]);
     let large = notes(pressed(0.0, "-10").unwrap());
@@ -36,7 +36,7 @@ fn large_strains_and_rotations_are_noted_and_long_ways_are_not() {
              boundary = [{{ name = 'left', displacement = ['-{angle}*y', '{angle}*x'] }},
                          {{ name = 'right', displacement = ['-{angle}*y', '{angle}*x'] }}]"
         );
-        let notes = notes(setting(square(4), &turned).unwrap());
+        let notes = notes(problem(square(4), &turned).unwrap());
         assert_eq!(notes.iter().filter(|n| n.contains("|∇u|")).count(), told, "{angle}: {notes:?}");
     }
 }
@@ -62,7 +62,7 @@ fn a_traction_narrower_than_the_edges_is_noted() {
          boundary = [{{ name = 'left', symmetry = true }}, {{ name = 'bottom', gap = 0 }},
                      {{ name = 'top', traction = [0, '{running}'] }}]"
     );
-    let notes = setting(square(4), &text).unwrap().notes();
+    let notes = problem(square(4), &text).unwrap().notes();
     assert!(notes.len() == 1 && notes[0].contains(" N/m at t = "), "{notes:?}");
 }
 
@@ -74,28 +74,28 @@ fn damage_without_time_is_noted() {
                      threshold = 0.01, initial = 0.5 }}
          boundary = [{{ name = 'left', displacement = [0, 0] }}]"
     );
-    let notes = setting(square(2), &text).unwrap().notes();
+    let notes = problem(square(2), &text).unwrap().notes();
     assert!(notes.len() == 1 && notes[0].starts_with("[damage] without [time]"), "{notes:?}");
 }
 
 #[test]
 fn steps_off_the_fast_path_are_noted() {
-    let setting = pressed(0.0, "-1").unwrap();
-    let mut outcome = run(&setting, SOLVERS[0]);
+    let problem = pressed(0.0, "-1").unwrap();
+    let mut outcome = run(&problem, SOLVERS[0]);
     assert_eq!((outcome.fallbacks, outcome.rescued), (0, 0));
     outcome.fallbacks = 3;
-    let [note] = &outcome.notes(&setting)[..] else { panic!("one note") };
+    let [note] = &outcome.notes(&problem)[..] else { panic!("one note") };
     assert!(note.starts_with("in 3 steps the contact solver left its fast path"), "{note}");
     assert!(!note.contains("TAO"));
     outcome.rescued = 1;
-    assert!(outcome.notes(&setting)[0].ends_with("; in 1 step TAO gave the answer in its place"));
+    assert!(outcome.notes(&problem)[0].ends_with("; in 1 step TAO gave the answer in its place"));
 }
 
 #[test]
 fn an_unknown_solver_is_an_error() {
-    let (session, setting) = (Session::start(&[]).unwrap(), pressed(0.0, "-1").unwrap());
+    let (session, problem) = (Session::start(&[]).unwrap(), pressed(0.0, "-1").unwrap());
     for name in ["simplex", "active-set:tron", "tao:", ""] {
-        let run = evolution::run(&session, &setting, name, &Phases::default(), &mut |_| Ok(()));
+        let run = evolution::run(&session, &problem, name, &Phases::default(), &mut |_| Ok(()));
         assert!(matches!(run, Err(RunError::Solver(unknown)) if unknown.0 == name), "{name}");
     }
 }

@@ -1,7 +1,7 @@
 //! Orders of convergence to smooth manufactured solutions.
 
-use crate::support::{distorted, order, run, setting, unstructured};
-use signorini::{contact::SOLVERS, evolution::Setting, mesh::Mesh};
+use crate::support::{distorted, order, problem, run, unstructured};
+use signorini::{contact::SOLVERS, evolution::DiscreteProblem, mesh::Mesh};
 use std::fmt::Write;
 
 const YOUNG: f64 = 50.0;
@@ -26,7 +26,7 @@ fn exact([x, y]: [f64; 2]) -> [f64; 2] {
 /// The scene in which u is the solution for ζ = 1 − dx, by f_B = −div(ζ σ(u)):
 /// −div σ = −μ Δu − (λ+μ) ∇div u with div u = (A + CB) cos ax cos by, Δu = −(A² + B²) u,
 /// and −∇ζ·σ = d (σ_xx, σ_xy).
-fn manufactured(mesh: Mesh, plane: &str, d: f64) -> Setting {
+fn manufactured(mesh: Mesh, plane: &str, d: f64) -> DiscreteProblem {
     let mu = 0.5 * YOUNG / (1.0 + POISSON);
     let lambda = match plane {
         "stress" => YOUNG * POISSON / (1.0 - POISSON * POISSON),
@@ -52,12 +52,12 @@ fn manufactured(mesh: Mesh, plane: &str, d: f64) -> Setting {
         let value = format!("['{sx}*{cy}', '{C}*{cx}*{sy}']");
         writeln!(text, "[[boundary]]\nname = '{side}'\ndisplacement = {value}").unwrap();
     }
-    setting(mesh, &text).unwrap_or_else(|e| panic!("{e}"))
+    problem(mesh, &text).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// ‖u − u_h‖ in L² and |u − u_h| in H¹, by the midpoints of the sides of each triangle.
-fn errors(setting: &Setting, u: &[f64]) -> [f64; 2] {
-    let (body, mut squares) = (&setting.body, [0.0; 2]);
+fn errors(problem: &DiscreteProblem, u: &[f64]) -> [f64; 2] {
+    let (body, mut squares) = (&problem.body, [0.0; 2]);
     for (t, (nodes, triangle)) in body.mesh.triangles.iter().zip(&body.triangles).enumerate() {
         let values = body.gather(t, u);
         let slope = |k: usize, l: usize| -> f64 {
@@ -85,8 +85,8 @@ fn check(meshes: [Mesh; 3], plane: &str, d: f64) {
     let size = |mesh: &Mesh| (mesh.triangles.len() as f64).powf(-0.5);
     let sizes = [size(&meshes[0]), size(&meshes[1]), size(&meshes[2])];
     let errors = meshes.map(|mesh| {
-        let setting = manufactured(mesh, plane, d);
-        errors(&setting, &run(&setting, SOLVERS[0]).last.state.u)
+        let problem = manufactured(mesh, plane, d);
+        errors(&problem, &run(&problem, SOLVERS[0]).last.state.u)
     });
     for (k, expected) in [2.0, 1.0].into_iter().enumerate() {
         let errors = [errors[0][k], errors[1][k], errors[2][k]];

@@ -1,11 +1,11 @@
 //! The patch test: a body under uniform stress is solved exactly on any mesh.
 
 use crate::support::{
-    close_to, difference, distorted, moved, run, setting, square, turn, unstructured,
+    close_to, difference, distorted, moved, problem, run, square, turn, unstructured,
 };
 use signorini::{
     contact::SOLVERS,
-    evolution::{Setting, State},
+    evolution::{DiscreteProblem, State},
     mesh::Mesh,
     model::Plane,
 };
@@ -53,7 +53,7 @@ fn check_pressures(state: &State, pressure: f64) {
 
 /// Pressed by p from the top on a foundation, with a symmetry axis at the left; the whole
 /// turned by `angle` about the origin.
-fn pressed(mesh: Mesh, angle: f64, plane: Plane, p: f64, more: &str) -> Setting {
+fn pressed(mesh: Mesh, angle: f64, plane: Plane, p: f64, more: &str) -> DiscreteProblem {
     let text = format!(
         "{more}\n{}
          boundary = [
@@ -64,16 +64,16 @@ fn pressed(mesh: Mesh, angle: f64, plane: Plane, p: f64, more: &str) -> Setting 
         material(plane),
         turn(angle, [0.0, -p]),
     );
-    setting(moved(mesh, |x| turn(angle, x)), &text).unwrap_or_else(|e| panic!("{e}"))
+    problem(moved(mesh, |x| turn(angle, x)), &text).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// u = p (ε_xx x, ε_yy y) turned by `angle`.
-fn exact(setting: &Setting, angle: f64, p: f64, [yy, xx]: [f64; 2]) -> Vec<f64> {
+fn exact(problem: &DiscreteProblem, angle: f64, p: f64, [yy, xx]: [f64; 2]) -> Vec<f64> {
     let place = |x: &[f64; 2]| {
         let [x, y] = turn(-angle, *x);
         turn(angle, [p * xx * x, p * yy * y])
     };
-    setting.body.mesh.nodes.iter().flat_map(place).collect()
+    problem.body.mesh.nodes.iter().flat_map(place).collect()
 }
 
 #[test]
@@ -83,9 +83,9 @@ fn uniform_pressure_on_a_foundation() {
         for (name, mesh) in meshes() {
             for angle in [0.0, 0.7, -2.5] {
                 for solver in SOLVERS {
-                    let setting = pressed(mesh.clone(), angle, plane, p, "");
-                    let state = run(&setting, solver).last.state;
-                    let error = difference(&state.u, &exact(&setting, angle, p, strain(plane)));
+                    let problem = pressed(mesh.clone(), angle, plane, p, "");
+                    let state = run(&problem, solver).last.state;
+                    let error = difference(&state.u, &exact(&problem, angle, p, strain(plane)));
                     assert!(error < TOLERANCE, "{solver}, {name}, {angle}: {error:.1e}");
                     check_pressures(&state, p);
                 }
@@ -97,10 +97,10 @@ fn uniform_pressure_on_a_foundation() {
 #[test]
 fn stress_is_the_pressure_along_the_load_and_nothing_else() {
     for (_, mesh) in meshes() {
-        let setting = pressed(mesh, 0.0, Plane::Stress, 3.0, "");
-        let u = run(&setting, SOLVERS[0]).last.state.u;
-        for t in 0..setting.body.triangles.len() {
-            let s = setting.elasticity.stress(&setting.body, t, 1.0, &u);
+        let problem = pressed(mesh, 0.0, Plane::Stress, 3.0, "");
+        let u = run(&problem, SOLVERS[0]).last.state.u;
+        for t in 0..problem.body.triangles.len() {
+            let s = problem.elasticity.stress(&problem.body, t, 1.0, &u);
             assert!((s[1] + 3.0).abs().max(s[0].abs()).max(s[2].abs()) < 1e-10, "{s}");
         }
     }
@@ -112,9 +112,9 @@ fn uniform_damage_softens_the_whole_patch() {
     let damage = "damage = { diffusion = 1, lambda_d = 0, lambda_u = 1, lambda_w = 0, \
                              strain_cap = 1, threshold = 0.01, initial = 0.5 }";
     for solver in SOLVERS {
-        let setting = pressed(distorted(6), 0.7, Plane::Stress, 7.0, damage);
-        let state = run(&setting, solver).last.state;
-        let error = difference(&state.u, &exact(&setting, 0.7, 14.0, strain(Plane::Stress)));
+        let problem = pressed(distorted(6), 0.7, Plane::Stress, 7.0, damage);
+        let state = run(&problem, solver).last.state;
+        let error = difference(&state.u, &exact(&problem, 0.7, 14.0, strain(Plane::Stress)));
         assert!(error < TOLERANCE, "{solver}: {error:.1e}");
         assert!(state.zeta.iter().all(|z| *z == 0.5));
         check_pressures(&state, 7.0);
@@ -157,12 +157,12 @@ fn all_round_pressure_into_a_corner_of_the_foundation() {
                 .flat_map(|x| [0, 1].map(|k| w[k] + shrink * (x[k] - corner[k])))
                 .collect();
             for solver in SOLVERS {
-                let setting = setting(mesh.clone(), &text).unwrap();
-                let state = run(&setting, solver).last.state;
+                let problem = problem(mesh.clone(), &text).unwrap();
+                let state = run(&problem, solver).last.state;
                 let error = difference(&state.u, &expected);
                 assert!(error < TOLERANCE, "{solver}, slope {slope}, {gaps:?}: {error:.1e}");
                 check_pressures(&state, p);
-                let corner = setting.body.mesh.curves["right"].edges[0][0];
+                let corner = problem.body.mesh.curves["right"].edges[0][0];
                 let faces = state.contact.iter().filter(|point| point.node == corner);
                 assert_eq!(faces.count(), 2);
             }

@@ -1,10 +1,10 @@
 //! Meshes of several pieces, and parts that meet in one node: each piece stands, is held by contact
 //! or moves by itself.
 
-use crate::support::{close, difference, distorted, moved, run, setting, square, turn};
+use crate::support::{close, difference, distorted, moved, problem, run, square, turn};
 use signorini::{
     contact::{Mover, SOLVERS},
-    evolution::{Setting, SetupError},
+    evolution::{DiscreteProblem, SetupError},
     mesh::{Curve, Mesh},
 };
 use std::collections::BTreeMap;
@@ -39,11 +39,11 @@ fn at(mesh: Mesh, [x, y]: [f64; 2]) -> Mesh {
     moved(mesh, |[a, b]| [a + x, b + y])
 }
 
-fn bounded(mesh: Mesh, boundaries: &str) -> Result<Setting, SetupError> {
-    setting(mesh, &format!("{MATERIAL}\nboundary = [{boundaries}]"))
+fn bounded(mesh: Mesh, boundaries: &str) -> Result<DiscreteProblem, SetupError> {
+    problem(mesh, &format!("{MATERIAL}\nboundary = [{boundaries}]"))
 }
 
-fn stands(mesh: Mesh, boundaries: &str) -> Setting {
+fn stands(mesh: Mesh, boundaries: &str) -> DiscreteProblem {
     bounded(mesh, boundaries).unwrap_or_else(|e| panic!("{e}"))
 }
 
@@ -149,16 +149,16 @@ fn curves_of_one_name_on_several_pieces_hold_each() {
         let curve = Curve { edges: edges.collect(), interior_edges: 0 };
         mesh.curves.insert(name.into(), curve);
     }
-    let setting =
+    let problem =
         stands(mesh, "{ name = 'bottom', gap = 0 }, { name = 'top', traction = [0, -1] }");
-    assert_eq!((setting.motions.free.len(), setting.motions.resisted()), (2, 4));
+    assert_eq!((problem.motions.free.len(), problem.motions.resisted()), (2, 4));
     for solver in SOLVERS {
-        let last = run(&setting, solver).last;
+        let last = run(&problem, solver).last;
         close(last.record.contact_force, 2.0, 1e-9);
         // Σ area u·m = 0 for each free motion m.
-        for motion in &setting.motions.free {
-            let field = setting.motions.field(motion, &setting.body);
-            let dot = |i: usize| setting.body.node_area[i / 2] * field[i] * last.state.u[i];
+        for motion in &problem.motions.free {
+            let field = problem.motions.field(motion, &problem.body);
+            let dot = |i: usize| problem.body.node_area[i / 2] * field[i] * last.state.u[i];
             assert!((0..field.len()).map(dot).sum::<f64>().abs() < 1e-14);
         }
     }
@@ -173,17 +173,17 @@ fn a_part_turns_about_the_node_it_hangs_on() {
 
     // A load through the hinge: the part rests but for what is free.
     let along = "{ name = 'top2', traction = [0, 1] }, { name = 'right2', traction = [1, 0] }";
-    let setting = stands(hinged(), &format!("{CLAMPED}, {along}"));
-    let [motion] = &setting.motions.free[..] else { panic!("one motion") };
+    let problem = stands(hinged(), &format!("{CLAMPED}, {along}"));
+    let [motion] = &problem.motions.free[..] else { panic!("one motion") };
     assert_eq!(motion.mover, Mover::Part);
-    assert!(setting.notes()[0].contains("meet in a single node, a hinge, as at (1.0000, 1.0000)"));
+    assert!(problem.notes()[0].contains("meet in a single node, a hinge, as at (1.0000, 1.0000)"));
     for solver in SOLVERS {
-        assert!(run(&setting, solver).kkt.within(1e-10));
+        assert!(run(&problem, solver).kkt.within(1e-10));
     }
     // The motion has no strain: no forces.
-    let field = setting.motions.field(motion, &setting.body);
-    let zeta = vec![1.0; setting.body.triangles.len()];
-    let force = setting.elasticity.internal_force(&setting.body, &zeta, &field);
+    let field = problem.motions.field(motion, &problem.body);
+    let zeta = vec![1.0; problem.body.triangles.len()];
+    let force = problem.elasticity.internal_force(&problem.body, &zeta, &field);
     assert!(force.iter().all(|f| f.abs() < 1e-12), "{force:?}");
 }
 
@@ -191,10 +191,10 @@ fn a_part_turns_about_the_node_it_hangs_on() {
 fn contact_holds_a_part_at_its_hinge_like_a_lever() {
     // The gap is closed at (2, 1) only; the load 1 has its resultant half way to the hinge.
     let lever = "{ name = 'bottom2', gap = '2 - x' }, { name = 'top2', traction = [0, -1] }";
-    let setting = stands(hinged(), &format!("{CLAMPED}, {lever}"));
-    assert_eq!((setting.motions.free.len(), setting.motions.resisted()), (0, 1));
+    let problem = stands(hinged(), &format!("{CLAMPED}, {lever}"));
+    assert_eq!((problem.motions.free.len(), problem.motions.resisted()), (0, 1));
     for solver in SOLVERS {
-        close(run(&setting, solver).last.record.contact_force, 0.5, 1e-9);
+        close(run(&problem, solver).last.record.contact_force, 0.5, 1e-9);
     }
 }
 
@@ -220,7 +220,7 @@ fn what_is_free_does_not_depend_on_units_or_on_the_size_of_other_pieces() {
     for length in [1.0, 1e3, 1e-3] {
         let scaled = |mesh: Mesh| moved(mesh, |x| x.map(|v| length * v));
         let decided = |mesh: Mesh, boundaries: &str| match bounded(scaled(mesh), boundaries) {
-            Ok(setting) => Ok((setting.motions.free.len(), setting.motions.resisted())),
+            Ok(problem) => Ok((problem.motions.free.len(), problem.motions.resisted())),
             Err(SetupError::Driven { source, .. }) => Err(source.motion.mover),
             Err(other) => panic!("{other}"),
         };
@@ -283,18 +283,18 @@ fn a_disc_in_a_bore_turns_freely_although_its_edges_are_only_nearly_equal() {
                 held.collect::<String>()
             );
             let mesh = moved(disc(24, uneven, curves), |x| x.map(|v| length * v));
-            let setting = setting(mesh, &text).unwrap_or_else(|e| panic!("{e}"));
-            assert_eq!((setting.motions.free.len(), setting.motions.resisted()), (1, 2));
-            assert!(setting.motions.free[0].to_string().starts_with("the rotation about"));
+            let problem = problem(mesh, &text).unwrap_or_else(|e| panic!("{e}"));
+            assert_eq!((problem.motions.free.len(), problem.motions.resisted()), (1, 2));
+            assert!(problem.motions.free[0].to_string().starts_with("the rotation about"));
             // The bore leaves the motion exactly free.
-            let field = setting.motions.field(&setting.motions.free[0], &setting.body);
-            for bound in &setting.constraints.bounds {
+            let field = problem.motions.field(&problem.motions.free[0], &problem.body);
+            for bound in &problem.constraints.bounds {
                 let [nx, ny] = bound.normal;
                 let slope = field[2 * bound.node] * nx + field[2 * bound.node + 1] * ny;
                 assert!(slope.abs() < 1e-13, "{slope}");
             }
             if length == 1.0 {
-                let answers = SOLVERS.map(|solver| run(&setting, solver));
+                let answers = SOLVERS.map(|solver| run(&problem, solver));
                 for answer in &answers {
                     let u = &answers[0].last.state.u;
                     assert!(difference(&answer.last.state.u, u) < 1e-8, "{uneven}, {curves}");
@@ -311,8 +311,8 @@ fn a_keyway_or_a_flat_stops_the_disc() {
     let mut mesh = disc(24, 0.0, 1);
     let rim = mesh.curves["rim0"].edges[5][0];
     mesh.nodes[rim][0] += 0.01;
-    let setting = stands(mesh, "{ name = 'rim0', gap = 0 }");
-    assert_eq!((setting.motions.free.len(), setting.motions.resisted()), (0, 3));
+    let problem = stands(mesh, "{ name = 'rim0', gap = 0 }");
+    assert_eq!((problem.motions.free.len(), problem.motions.resisted()), (0, 3));
 }
 
 #[test]
@@ -323,7 +323,7 @@ fn without_time_only_the_time_of_the_one_solve_is_judged() {
             "{MATERIAL}\n{time}\nbody = {{ force = [0, '0.001*(1 - 2*t)'] }}
              boundary = [{{ name = 'bottom', gap = 0 }}, {{ name = 'top', traction = [0, '-1/t'] }}]"
         );
-        setting(square(3), &text)
+        problem(square(3), &text)
     };
     close(run(&scene("").unwrap(), SOLVERS[0]).last.record.contact_force, 1.001, 1e-12);
     assert!(matches!(scene("time = { end = 1, step = 0.5 }"), Err(SetupError::Scene(_))));
@@ -339,7 +339,7 @@ fn a_gap_below_zero_by_rounding_is_none() {
     let (none, rounding) = (gap("0").unwrap(), gap("'0.3-0.1*3'").unwrap());
     assert!(rounding.constraints.bounds.iter().all(|bound| bound.upper == 0.0));
     for solver in SOLVERS {
-        let [a, b] = [&none, &rounding].map(|setting| run(setting, solver).last.state.u);
+        let [a, b] = [&none, &rounding].map(|problem| run(problem, solver).last.state.u);
         assert!(difference(&a, &b) < 1e-10);
     }
     assert!(matches!(gap("-1e-9"), Err(SetupError::Scene(_))));

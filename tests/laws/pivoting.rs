@@ -4,7 +4,7 @@ use crate::support::close;
 use nalgebra::{DMatrix, DVector};
 use signorini::{
     contact::{Bound, ContactProblem, ContactReport, PenaltyOptions, SOLVERS, Scales, solver},
-    petsc::{Matrix, Ranks, Session, Vector},
+    petsc::{Communicator, Matrix, Session, Vector},
     phases::Phases,
 };
 
@@ -37,7 +37,7 @@ impl Small {
             normal: [0.0, 1.0],
             lower: f64::NEG_INFINITY,
             upper: *gap,
-            weight: 1.0,
+            tributary_length: 1.0,
         };
         let bounds: Vec<_> = self.gaps.iter().enumerate().map(bound).collect();
         let problem = ContactProblem {
@@ -52,7 +52,7 @@ impl Small {
                 displacement: 0.0,
             },
             tolerance: TOLERANCE,
-            ranks: Ranks::alone(),
+            comm: Communicator::serial(),
             phases: &Phases::default(),
         };
         let mut solver = solver(&session, name, true, PenaltyOptions::default()).unwrap();

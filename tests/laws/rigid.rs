@@ -1,9 +1,9 @@
 //! Rigid motions: which are held, which only contact resists, which the load drives.
 
-use crate::support::{close, difference, distorted, largest, moved, run, setting, square, turn};
+use crate::support::{close, difference, distorted, largest, moved, problem, run, square, turn};
 use signorini::{
     contact::{GapRow, RigidMotion, RigidMotions, SOLVERS},
-    evolution::{Setting, SetupError},
+    evolution::{DiscreteProblem, SetupError},
     fem::Body,
     mesh::{Curve, Mesh},
 };
@@ -11,8 +11,8 @@ use std::collections::BTreeMap;
 
 const MATERIAL: &str = "material = { young = 100, poisson = 0.3, plane = 'stress' }";
 
-fn bounded(mesh: Mesh, boundaries: &str) -> Result<Setting, SetupError> {
-    setting(mesh, &format!("{MATERIAL}\nboundary = [{boundaries}]"))
+fn bounded(mesh: Mesh, boundaries: &str) -> Result<DiscreteProblem, SetupError> {
+    problem(mesh, &format!("{MATERIAL}\nboundary = [{boundaries}]"))
 }
 
 /// The motions of a scene that stands.
@@ -52,16 +52,16 @@ fn a_clamped_side_holds_the_body() {
 #[test]
 fn a_body_on_a_foundation_may_slide_but_not_sink_or_turn() {
     let down = "{ name = 'bottom', gap = 0 }, { name = 'top', traction = [0, -1] }";
-    let setting = bounded(distorted(4), down).unwrap();
-    assert!(!setting.motions.held() && setting.motions.resisted() == 2);
-    let names: Vec<_> = setting.motions.free.iter().map(RigidMotion::to_string).collect();
+    let problem = bounded(distorted(4), down).unwrap();
+    assert!(!problem.motions.held() && problem.motions.resisted() == 2);
+    let names: Vec<_> = problem.motions.free.iter().map(RigidMotion::to_string).collect();
     assert_eq!(names, ["the horizontal translation"]);
-    assert_eq!(setting.notes().len(), 1);
+    assert_eq!(problem.notes().len(), 1);
     for solver in SOLVERS {
         // Of all answers the one that does not slide on average.
-        let u = run(&setting, solver).last.state.u;
+        let u = run(&problem, solver).last.state.u;
         let mean: f64 =
-            (setting.body.node_area.iter().enumerate()).map(|(i, a)| a * u[2 * i]).sum();
+            (problem.body.node_area.iter().enumerate()).map(|(i, a)| a * u[2 * i]).sum();
         assert!(mean.abs() < 1e-15 && largest(&u) > 1e-3);
     }
 }
@@ -103,11 +103,11 @@ fn a_body_about_to_tip_stands_on_one_edge() {
     // reaction, 0.2, is in that one node.
     let scene = "{ name = 'foot', gap = 0 }, { name = 'load', traction = [0, -1] }";
     for solver in SOLVERS {
-        let setting = bounded(footed([0.3, 0.7], [0.6, 0.8]), scene).unwrap();
-        let last = run(&setting, solver).last;
+        let problem = bounded(footed([0.3, 0.7], [0.6, 0.8]), scene).unwrap();
+        let last = run(&problem, solver).last;
         close(last.record.contact_force, 0.2, 1e-9);
         for point in &last.state.contact {
-            let [x, _] = setting.body.mesh.nodes[point.node];
+            let [x, _] = problem.body.mesh.nodes[point.node];
             let force = if (x - 0.7).abs() < 1e-9 { 0.2 } else { 0.0 };
             close(point.force, force, 1e-9);
         }
@@ -125,22 +125,22 @@ fn a_body_that_nothing_holds_takes_balanced_loads() {
             turn(angle, [-2.0, 0.0]),
             turn(angle, [2.0, 0.0])
         );
-        let setting = bounded(mesh, &text).unwrap();
-        assert_eq!(setting.motions.free.len(), 3);
-        let mut expected: Vec<f64> = (setting.body.mesh.nodes.iter())
+        let problem = bounded(mesh, &text).unwrap();
+        assert_eq!(problem.motions.free.len(), 3);
+        let mut expected: Vec<f64> = (problem.body.mesh.nodes.iter())
             .flat_map(|x| {
                 let [x, y] = turn(-angle, *x);
                 turn(angle, [0.02 * (x - 0.5), -0.006 * (y - 0.5)])
             })
             .collect();
-        setting.motions.remove_free(&setting.body, &mut expected);
-        let u = run(&setting, SOLVERS[0]).last.state.u;
+        problem.motions.remove_free(&problem.body, &mut expected);
+        let u = run(&problem, SOLVERS[0]).last.state.u;
         let error = difference(&u, &expected);
         assert!(error < 1e-12, "{error}");
         // Σ area_i u_i·m(x_i) = 0 for each free motion m.
-        for motion in &setting.motions.free {
+        for motion in &problem.motions.free {
             let nodes =
-                setting.body.mesh.nodes.iter().zip(&setting.body.node_area).zip(u.chunks(2));
+                problem.body.mesh.nodes.iter().zip(&problem.body.node_area).zip(u.chunks(2));
             let share: f64 = nodes
                 .map(|((x, area), u)| {
                     let m = motion.at(0, *x);
@@ -154,11 +154,11 @@ fn a_body_that_nothing_holds_takes_balanced_loads() {
 
 #[test]
 fn a_body_without_load_rests() {
-    let setting = bounded(square(4), "{ name = 'top', traction = [0, 0] }").unwrap();
-    assert_eq!(setting.motions.free.len(), 3);
-    assert_eq!(setting.notes().len(), 3);
+    let problem = bounded(square(4), "{ name = 'top', traction = [0, 0] }").unwrap();
+    assert_eq!(problem.motions.free.len(), 3);
+    assert_eq!(problem.notes().len(), 3);
     for solver in SOLVERS {
-        let outcome = run(&setting, solver);
+        let outcome = run(&problem, solver);
         assert!(outcome.last.state.u.iter().all(|u| *u == 0.0));
         assert_eq!(outcome.kkt.worst(), 0.0);
     }
@@ -166,8 +166,8 @@ fn a_body_without_load_rests() {
 
 #[test]
 fn free_motions_are_orthonormal_over_the_body() {
-    let setting = bounded(distorted(4), "{ name = 'top', traction = [0, 0] }").unwrap();
-    let (body, free) = (&setting.body, &setting.motions.free);
+    let problem = bounded(distorted(4), "{ name = 'top', traction = [0, 0] }").unwrap();
+    let (body, free) = (&problem.body, &problem.motions.free);
     for (i, a) in free.iter().enumerate() {
         for (j, b) in free.iter().enumerate() {
             let product: f64 = (body.mesh.nodes.iter().zip(&body.node_area))
@@ -230,7 +230,7 @@ fn a_disc_in_a_ring_can_only_turn() {
 fn contact_on_opposite_sides_resists_both_ways_on_one_side_only_one() {
     // Farkas: a load is balanced by p ≥ 0 if no motion that contact allows does work.
     let body = Body::new(square(2));
-    let gap = |node: usize, normal| GapRow { node, normal, gap: 0.0, weight: 1.0 };
+    let gap = |node: usize, normal| GapRow { node, normal, gap: 0.0, tributary_length: 1.0 };
     let load = |force: [f64; 2]| -> Vec<f64> {
         (0..9).flat_map(|i| if i == 4 { force } else { [0.0; 2] }).collect()
     };

@@ -1,21 +1,21 @@
 //! What counts as large: gaps much wider than displacements, loads that pass zero, and obstacles
 //! on both sides of a node. No right answer is refused.
 
-use crate::support::{close, difference, distorted, history, largest, moved, run, setting, turn};
+use crate::support::{close, difference, distorted, history, largest, moved, problem, run, turn};
 use signorini::{
     contact::SOLVERS,
-    evolution::Setting,
+    evolution::DiscreteProblem,
     mesh::{Curve, Mesh},
 };
 
 /// A block on rollers at its left, falling onto a level foundation under its weight.
-fn falling(gap: f64) -> Setting {
+fn falling(gap: f64) -> DiscreteProblem {
     let text = format!(
         "material = {{ young = 30e9, poisson = 0.2, plane = 'strain' }}
          body.force = [0, -25e3]
          boundary = [{{ name = 'left', symmetry = true }}, {{ name = 'bottom', gap = {gap:e} }}]"
     );
-    setting(distorted(6), &text).unwrap()
+    problem(distorted(6), &text).unwrap()
 }
 
 #[test]
@@ -50,8 +50,8 @@ fn a_load_that_passes_zero_leaves_what_a_linear_body_leaves_nothing() {
             { name = 'top', traction = [0, '-1e4*sin(2*pi*t)'] },
         ]";
     for solver in SOLVERS {
-        let setting = setting(distorted(5), text).unwrap();
-        let (steps, _) = history(&setting, solver);
+        let problem = problem(distorted(5), text).unwrap();
+        let (steps, _) = history(&problem, solver);
         let most = &steps[2].state.u;
         for step in &steps {
             let factor = (std::f64::consts::TAU * step.state.time).sin();
@@ -67,7 +67,7 @@ fn a_load_that_passes_zero_leaves_what_a_linear_body_leaves_nothing() {
 }
 
 /// A wedge, its tip at the origin, between two plates along its axis; turned by an angle.
-fn wedge(angle: f64, slope: f64, gap: f64) -> Setting {
+fn wedge(angle: f64, slope: f64, gap: f64) -> DiscreteProblem {
     let n = 8;
     // Row i of the wedge has i + 1 nodes.
     let first = |i: usize| i * (i + 1) / 2;
@@ -104,7 +104,7 @@ fn wedge(angle: f64, slope: f64, gap: f64) -> Setting {
          ]",
         -nx, -ny
     );
-    setting(moved(mesh, |x| turn(angle, x)), &text).unwrap()
+    problem(moved(mesh, |x| turn(angle, x)), &text).unwrap()
 }
 
 #[test]

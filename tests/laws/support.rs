@@ -1,7 +1,7 @@
 //! Meshes, scenes and runs for the laws.
 
 use signorini::{
-    evolution::{self, Outcome, Phases, RunError, Setting, SetupError, Step},
+    evolution::{self, DiscreteProblem, Outcome, Phases, RunError, SetupError, Step},
     mesh::{self, Curve, Mesh},
     petsc::Session,
     scene::Scene,
@@ -103,14 +103,14 @@ pub fn turn(angle: f64, [x, y]: [f64; 2]) -> [f64; 2] {
 }
 
 /// The scene `text` (TOML without `mesh`) on `mesh`.
-pub fn setting(mesh: Mesh, text: &str) -> Result<Setting, SetupError> {
+pub fn problem(mesh: Mesh, text: &str) -> Result<DiscreteProblem, SetupError> {
     let text = format!("mesh.file = 'given.msh'\n{text}");
     let scene = Scene::parse(&text, Path::new("law.toml"), &[]).unwrap_or_else(|e| panic!("{e}"));
-    Setting::new(scene, mesh)
+    DiscreteProblem::new(scene, mesh)
 }
 
 /// A shipped scene with `--set` arguments.
-pub fn shipped(name: &str, sets: &[&str]) -> Setting {
+pub fn shipped(name: &str, sets: &[&str]) -> DiscreteProblem {
     let geo = Path::new(env!("CARGO_MANIFEST_DIR")).join("geo");
     // Meshes appear beside the geometry, so it is copied.
     let folder = tempfile::tempdir().unwrap();
@@ -124,7 +124,7 @@ pub fn shipped(name: &str, sets: &[&str]) -> Setting {
     let scene = folder.path().join(name).with_extension("toml");
     let scene = Scene::read(&scene, &sets).unwrap_or_else(|e| panic!("{e}"));
     let mesh = meshed(&scene.mesh.file, &scene.mesh.parameters);
-    Setting::new(scene, mesh).unwrap_or_else(|e| panic!("{e}"))
+    DiscreteProblem::new(scene, mesh).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// The names of all shipped scenes.
@@ -139,26 +139,26 @@ pub fn shipped_names() -> Vec<String> {
 }
 
 /// All accepted steps and the outcome.
-pub fn history(setting: &Setting, solver: &str) -> (Vec<Step>, Outcome) {
+pub fn history(problem: &DiscreteProblem, solver: &str) -> (Vec<Step>, Outcome) {
     let session = Session::start(&[]).unwrap();
     let mut steps = Vec::new();
-    let outcome = evolution::run(&session, setting, solver, &Phases::default(), &mut |step| {
+    let outcome = evolution::run(&session, problem, solver, &Phases::default(), &mut |step| {
         steps.push(step.clone());
         Ok(())
     });
-    let scene = &setting.scene().name;
+    let scene = &problem.scene().name;
     (steps, outcome.unwrap_or_else(|e| panic!("{scene} by {solver}: {e}")))
 }
 
 /// The outcome alone.
-pub fn run(setting: &Setting, solver: &str) -> Outcome {
-    history(setting, solver).1
+pub fn run(problem: &DiscreteProblem, solver: &str) -> Outcome {
+    history(problem, solver).1
 }
 
 /// The outcome or why there is none.
-pub fn try_run(setting: &Setting, solver: &str) -> Result<Outcome, RunError> {
+pub fn try_run(problem: &DiscreteProblem, solver: &str) -> Result<Outcome, RunError> {
     let session = Session::start(&[]).unwrap();
-    evolution::run(&session, setting, solver, &Phases::default(), &mut |_| Ok(()))
+    evolution::run(&session, problem, solver, &Phases::default(), &mut |_| Ok(()))
 }
 
 /// ‖a − b‖ / ‖b‖.

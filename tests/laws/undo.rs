@@ -1,15 +1,15 @@
 //! A step that fails has not happened: what follows it is what would have followed without it.
 
-use crate::support::{Random, close, difference, distorted, history, same_iterations, setting};
+use crate::support::{Random, close, difference, distorted, history, problem, same_iterations};
 use signorini::{
     contact::SOLVERS,
-    evolution::{self, Equilibrium, Phases, RunError, Setting, Step},
+    evolution::{self, ContactStep, DiscreteProblem, Phases, RunError, Step},
     petsc::Session,
 };
 
 /// Pressed on a wavy foundation until t = 1, harder on the left; then torn off it on the right.
 /// Where the left is an axis, only contact holds the body.
-fn scene(left: &str) -> Setting {
+fn scene(left: &str) -> DiscreteProblem {
     let text = format!(
         "material = {{ young = 100, poisson = 0.3, plane = 'strain' }}
          time = {{ end = 2, step = 0.1 }}
@@ -19,51 +19,51 @@ fn scene(left: &str) -> Setting {
             {{ name = 'top', traction = ['0.5*t', '-3*t*(1.2 - x) + 3*max(0, t - 1)*x'] }},
          ]"
     );
-    setting(distorted(8), &text).unwrap_or_else(|e| panic!("{e}"))
+    problem(distorted(8), &text).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// ζ around `mean` at the nodes.
-fn zeta(setting: &Setting, mean: f64) -> Vec<f64> {
-    let field = Random(7).field(setting.body.mesh.nodes.len());
+fn zeta(problem: &DiscreteProblem, mean: f64) -> Vec<f64> {
+    let field = Random(7).field(problem.body.mesh.nodes.len());
     field.iter().map(|v| mean + 0.1 * v).collect()
 }
 
 /// Two accepted steps by one solver, with `tries` (time, ζ, whether it succeeds) made and undone
 /// between them; the second step.
-fn second_step(setting: &Setting, solver: &str, tries: &[(f64, Vec<f64>, bool)]) -> Step {
+fn second_step(problem: &DiscreteProblem, solver: &str, tries: &[(f64, Vec<f64>, bool)]) -> Step {
     let (session, phases) = (Session::start(&[]).unwrap(), Phases::default());
-    let mut equilibrium = Equilibrium::new(&session, setting, solver, &phases).unwrap();
-    equilibrium.solve(1, 0.9, &zeta(setting, 0.9)).unwrap();
-    equilibrium.accept(0.9).unwrap();
+    let mut contact_step = ContactStep::new(&session, problem, solver, &phases).unwrap();
+    contact_step.solve(1, 0.9, &zeta(problem, 0.9)).unwrap();
+    contact_step.accept(0.9).unwrap();
     for (time, zeta, succeeds) in tries {
-        let tried = equilibrium.solve(2, *time, zeta);
+        let tried = contact_step.solve(2, *time, zeta);
         match tried {
             Ok(_) => assert!(succeeds, "{solver} solved with ζ = {} …", zeta[0]),
             Err(RunError::Contact { .. }) => assert!(!succeeds, "{solver}, ζ = {} …", zeta[0]),
             Err(other) => panic!("{solver}: {other}"),
         }
-        equilibrium.undo().unwrap();
+        contact_step.undo().unwrap();
     }
-    equilibrium.solve(2, 1.0, &zeta(setting, 0.88)).unwrap_or_else(|e| panic!("{solver}: {e}"))
+    contact_step.solve(2, 1.0, &zeta(problem, 0.88)).unwrap_or_else(|e| panic!("{solver}: {e}"))
 }
 
 #[test]
 fn a_step_undone_leaves_no_trace() {
     for left in ["displacement = [0, 0]", "symmetry = true"] {
-        let setting = scene(left);
+        let problem = scene(left);
         // Another contact zone; a stiffness that is not positive definite; none at all.
-        let torn = (1.8, zeta(&setting, 0.4), true);
-        let negative = (1.0, zeta(&setting, -0.5), false);
-        let none = (1.0, vec![f64::NAN; setting.body.mesh.nodes.len()], false);
+        let torn = (1.8, zeta(&problem, 0.4), true);
+        let negative = (1.0, zeta(&problem, -0.5), false);
+        let none = (1.0, vec![f64::NAN; problem.body.mesh.nodes.len()], false);
         for solver in SOLVERS {
-            let plain = second_step(&setting, solver, &[]);
+            let plain = second_step(&problem, solver, &[]);
             for tries in [
                 vec![torn.clone()],
                 vec![negative.clone()],
                 vec![none.clone()],
                 vec![none.clone(), torn.clone(), negative.clone()],
             ] {
-                let step = second_step(&setting, solver, &tries);
+                let step = second_step(&problem, solver, &tries);
                 let active: Vec<bool> = step.state.contact.iter().map(|p| p.active).collect();
                 assert!(active.iter().eq(plain.state.contact.iter().map(|p| &p.active)));
                 assert!(active.contains(&true) && active.contains(&false));
@@ -79,7 +79,7 @@ fn a_step_undone_leaves_no_trace() {
 /// Pressed on the foundation and let go by a solver of little patience: penalty-duality without
 /// acceleration needs fewer iterations the nearer the last step is, and about 220 for the last
 /// of a few steps, in which the foundation is nearly left.
-fn released(stepping: &str, iterations: usize) -> Setting {
+fn released(stepping: &str, iterations: usize) -> DiscreteProblem {
     let text = format!(
         "material = {{ young = 100, poisson = 0.3, plane = 'stress' }}
          damage = {{ diffusion = 0.2, lambda_d = 0, lambda_u = 1, lambda_w = 0,
@@ -92,7 +92,7 @@ fn released(stepping: &str, iterations: usize) -> Setting {
             {{ name = 'top', traction = [0, '-21 + 20*t'] }},
          ]"
     );
-    setting(distorted(6), &text).unwrap_or_else(|e| panic!("{e}"))
+    problem(distorted(6), &text).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// Fewer iterations than the last of `steps` needs, but more than those before: it has not even
@@ -140,8 +140,8 @@ fn a_given_step_whose_contact_fails_ends_the_run_with_the_steps_before() {
     let limit = patience(&history(&released(uniform, 1000), "penalty-duality").0);
     let (session, phases) = (Session::start(&[]).unwrap(), Phases::default());
     let mut times = Vec::new();
-    let setting = released(uniform, limit);
-    let run = evolution::run(&session, &setting, "penalty-duality", &phases, &mut |step| {
+    let problem = released(uniform, limit);
+    let run = evolution::run(&session, &problem, "penalty-duality", &phases, &mut |step| {
         times.push(step.state.time);
         Ok(())
     });

@@ -2,7 +2,7 @@
 //! gigapascals, or made of stiffer stuff under larger loads takes the same iterations to the
 //! same answer, by every solver, in the damage loop too.
 
-use crate::support::{close, difference, distorted, history, moved, same_iterations, setting};
+use crate::support::{close, difference, distorted, history, moved, problem, same_iterations};
 use signorini::{contact::SOLVERS, evolution::Step};
 
 /// All steps of a small square that is bent down and damaged on a foundation that falls away from
@@ -25,7 +25,7 @@ fn scene(length: f64, stress: f64, stepping: &str, solver: &str) -> Vec<Step> {
         3.0 * stress,
     );
     let mesh = moved(distorted(8), |x| x.map(|x| length * x));
-    history(&setting(mesh, &text).unwrap_or_else(|e| panic!("{e}")), solver).0
+    history(&problem(mesh, &text).unwrap_or_else(|e| panic!("{e}")), solver).0
 }
 
 #[test]

@@ -3,49 +3,49 @@
 mod pieces;
 mod repeat;
 
-#[path = "../cli/desk.rs"]
+#[path = "../cli/test_directory.rs"]
 #[allow(dead_code, reason = "the command line's tests use the rest of it")]
-mod desk;
+mod test_directory;
 
-use desk::{Desk, Said};
 use std::{fs, path::Path, process::Command};
+use test_directory::{ProgramOutput, TestDirectory};
 
 /// Answers on several ranks may differ by this, relative to the largest value of a run.
 const SAME: f64 = 1e-8;
 
 /// The program on `ranks` ranks, on a machine that may have fewer cores.
-pub fn on_ranks(desk: &Desk, ranks: usize, arguments: &[&str]) -> Command {
+pub fn on_ranks(test_directory: &TestDirectory, ranks: usize, arguments: &[&str]) -> Command {
     let mut command = Command::new("mpiexec");
     command
         .args(["-n", &ranks.to_string(), "--oversubscribe", env!("CARGO_BIN_EXE_signorini")])
         .args(arguments)
-        .current_dir(desk.path(""))
+        .current_dir(test_directory.path(""))
         .envs([("OMPI_ALLOW_RUN_AS_ROOT", "1"), ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")])
         .env("LC_ALL", "C");
     command
 }
 
 /// The program on two ranks with arguments of their own.
-fn unlike(desk: &Desk, first: &[&str], second: &[&str]) -> Said {
+fn unlike(test_directory: &TestDirectory, first: &[&str], second: &[&str]) -> ProgramOutput {
     let program = env!("CARGO_BIN_EXE_signorini");
-    let mut command = on_ranks(desk, 1, &[&["run", "scene.toml"], first].concat());
+    let mut command = on_ranks(test_directory, 1, &[&["run", "scene.toml"], first].concat());
     command.args([":", "-n", "1", program, "run", "scene.toml"]).args(second);
-    Said::of(&mut command)
+    ProgramOutput::of(&mut command)
 }
 
-/// A desk with a scene of `geo/` called `scene.toml` and its geometry.
-fn example(name: &str) -> Desk {
-    let desk = Desk::new();
+/// A test_directory with a scene of `geo/` called `scene.toml` and its geometry.
+fn example(name: &str) -> TestDirectory {
+    let test_directory = TestDirectory::new();
     let geo = Path::new(env!("CARGO_MANIFEST_DIR")).join("geo");
     let scene = fs::read_to_string(geo.join(format!("{name}.toml"))).expect("the scene");
     for entry in fs::read_dir(&geo).expect("the folder").flatten() {
         let file = entry.file_name().to_string_lossy().into_owned();
         if file.ends_with(".geo") && scene.contains(&file) {
-            desk.write(&file, &fs::read_to_string(entry.path()).expect("the geometry"));
+            test_directory.write(&file, &fs::read_to_string(entry.path()).expect("the geometry"));
         }
     }
-    desk.write("scene.toml", &scene);
-    desk
+    test_directory.write("scene.toml", &scene);
+    test_directory
 }
 
 /// Columns of `history.csv` that tell the answer and not how it was found.
@@ -61,9 +61,9 @@ const ANSWER: [&str; 8] = [
 ];
 
 #[track_caller]
-fn same_history(desk: &Desk, folder: &str, reference: &str) {
-    let (names, rows) = desk.history(folder);
-    let (_, expected) = desk.history(reference);
+fn same_history(test_directory: &TestDirectory, folder: &str, reference: &str) {
+    let (names, rows) = test_directory.history(folder);
+    let (_, expected) = test_directory.history(reference);
     assert_eq!(rows.len(), expected.len(), "{folder}");
     for name in ANSWER {
         let column = names.iter().position(|n| n == name).expect("the column");
@@ -76,23 +76,23 @@ fn same_history(desk: &Desk, folder: &str, reference: &str) {
 }
 
 /// A scene of `geo/` with every solver on one to four ranks, with so few steps that this is quick.
-fn every_solver(name: &str, few: &[&str]) -> Desk {
-    let desk = example(name);
+fn every_solver(name: &str, few: &[&str]) -> TestDirectory {
+    let test_directory = example(name);
     for solver in ["active-set", "penalty-duality", "tao"] {
         for ranks in 1..=4 {
             let out = format!("out/{name}-{solver}-{ranks}");
             let run = ["run", "scene.toml", "--solver", solver, "--out", &out];
             let arguments = [&run[..], few].concat();
             let said = match ranks {
-                1 => desk.say(&arguments),
-                _ => Said::of(&mut on_ranks(&desk, ranks, &arguments)),
+                1 => test_directory.say(&arguments),
+                _ => ProgramOutput::of(&mut on_ranks(&test_directory, ranks, &arguments)),
             };
             assert_eq!(said.code, Some(0), "{out}: {said:?}");
             assert!(said.err.is_empty(), "{out}: {said:?}");
-            same_history(&desk, &out, &format!("out/{name}-{solver}-1"));
+            same_history(&test_directory, &out, &format!("out/{name}-{solver}-1"));
         }
     }
-    desk
+    test_directory
 }
 
 #[test]
@@ -113,8 +113,8 @@ fn the_lshape() {
 
 /// Whether the number of active nodes changes from step to step.
 #[track_caller]
-fn contact_travels(desk: &Desk, folder: &str) {
-    let (names, rows) = desk.history(folder);
+fn contact_travels(test_directory: &TestDirectory, folder: &str) {
+    let (names, rows) = test_directory.history(folder);
     let column = names.iter().position(|n| n == "active_nodes").expect("the column");
     let changes = rows.windows(2).filter(|pair| pair[0][column] != pair[1][column]).count();
     assert!(changes >= 5, "{folder}: the contact set changes in {changes} steps only");
@@ -122,15 +122,16 @@ fn contact_travels(desk: &Desk, folder: &str) {
 
 #[test]
 fn the_lshape_under_a_rolling_load() {
-    let desk =
+    let test_directory =
         every_solver("lshape-rolling", &["--set", "mesh.size=0.25", "--set", "time.step=0.1"]);
-    contact_travels(&desk, "out/lshape-rolling-active-set-1");
+    contact_travels(&test_directory, "out/lshape-rolling-active-set-1");
 }
 
 #[test]
 fn the_beam_under_a_wave() {
-    let desk = every_solver("beam", &["--set", "mesh.size=0.25", "--set", "time.step=0.125"]);
-    contact_travels(&desk, "out/beam-active-set-1");
+    let test_directory =
+        every_solver("beam", &["--set", "mesh.size=0.25", "--set", "time.step=0.125"]);
+    contact_travels(&test_directory, "out/beam-active-set-1");
 }
 
 #[test]
@@ -173,8 +174,8 @@ Physical Curve("pulled right") = {14}; Physical Curve("pulled left") = {16};
 
 #[test]
 fn pieces_and_a_hinge() {
-    let desk = Desk::new();
-    desk.write("pieces.geo", PIECES);
+    let test_directory = TestDirectory::new();
+    test_directory.write("pieces.geo", PIECES);
     let scene = |lid: &str| {
         format!(
             "mesh.file = 'pieces.geo'
@@ -189,45 +190,45 @@ fn pieces_and_a_hinge() {
              ]"
         )
     };
-    desk.write("scene.toml", &scene("[0, '-t']"));
+    test_directory.write("scene.toml", &scene("[0, '-t']"));
     for solver in ["active-set", "penalty-duality", "tao"] {
         for ranks in 1..=2 {
             let out = format!("{solver}-{ranks}");
             let arguments = ["run", "scene.toml", "--solver", solver, "--out", &out];
-            let said = Said::of(&mut on_ranks(&desk, ranks, &arguments));
+            let said = ProgramOutput::of(&mut on_ranks(&test_directory, ranks, &arguments));
             assert_eq!(said.code, Some(0), "{out}: {said:?}");
             assert!(said.out.contains("the mesh has 3 pieces"), "{}", said.out);
             assert!(said.out.contains("a hinge, as at (3.0000, 1.0000)"), "{}", said.out);
-            same_history(&desk, &out, "active-set-1");
+            same_history(&test_directory, &out, "active-set-1");
         }
     }
-    desk.write("scene.toml", &scene("[0, 't']"));
-    let said = Said::of(&mut on_ranks(&desk, 2, &["run", "scene.toml"]));
+    test_directory.write("scene.toml", &scene("[0, 't']"));
+    let said = ProgramOutput::of(&mut on_ranks(&test_directory, 2, &["run", "scene.toml"]));
     one_message(&said, 2, "against the rotation about (3.0000, 1.0000)");
 }
 
 #[test]
 fn chosen_steps_are_the_same_on_all_ranks() {
-    let desk = Desk::new();
+    let test_directory = TestDirectory::new();
     let chosen = ["--set", "time.step=\"auto\"", "--set", "time.tolerance=1e-3"];
-    desk.run(&[&chosen[..], &["--out", "one"]].concat());
+    test_directory.run(&[&chosen[..], &["--out", "one"]].concat());
     let arguments = [&["run", "scene.toml", "--out", "three"], &chosen[..]].concat();
-    assert_eq!(Said::of(&mut on_ranks(&desk, 3, &arguments)).code, Some(0));
-    same_history(&desk, "three", "one");
+    assert_eq!(ProgramOutput::of(&mut on_ranks(&test_directory, 3, &arguments)).code, Some(0));
+    same_history(&test_directory, "three", "one");
 }
 
 #[test]
 fn the_first_rank_makes_the_mesh_for_all() {
-    let desk = example("square-mild");
+    let test_directory = example("square-mild");
     let arguments = ["run", "scene.toml", "--set", "mesh.size=0.25", "--set", "time.step=0.5"];
-    let said = Said::of(&mut on_ranks(&desk, 3, &arguments));
+    let said = ProgramOutput::of(&mut on_ranks(&test_directory, 3, &arguments));
     assert_eq!(said.code, Some(0), "{said:?}");
     assert!(said.out.contains("25 nodes, 32 triangles, on 3 ranks"), "{}", said.out);
 }
 
 /// One message, whatever `mpiexec` adds of its own.
 #[track_caller]
-fn one_message(said: &Said, code: i32, fragment: &str) {
+fn one_message(said: &ProgramOutput, code: i32, fragment: &str) {
     assert_eq!(said.code, Some(code), "{said:?}");
     let told: Vec<&str> = said.err.lines().filter(|line| line.starts_with("error: ")).collect();
     assert!(told.len() == 1 && told[0].contains(fragment), "{said:?}");
@@ -235,20 +236,20 @@ fn one_message(said: &Said, code: i32, fragment: &str) {
 
 #[test]
 fn bad_input_is_told_once() {
-    let desk = Desk::new();
+    let test_directory = TestDirectory::new();
     let run = |arguments: &[&str]| {
         let arguments = [&["run", "scene.toml"], arguments].concat();
-        Said::of(&mut on_ranks(&desk, 2, &arguments))
+        ProgramOutput::of(&mut on_ranks(&test_directory, 2, &arguments))
     };
     one_message(&run(&["--set", "material.young=-1"]), 2, "material.young");
     one_message(&run(&["--solver", "magic"]), 2, "magic");
     one_message(&run(&["--mesh", "none.msh"]), 2, "none.msh");
-    assert!(!desk.path("out").exists(), "nothing is written");
+    assert!(!test_directory.path("out").exists(), "nothing is written");
 }
 
 #[test]
 fn a_solver_that_fails_is_told_once_and_the_state_before_is_saved() {
-    let desk = Desk::new();
+    let test_directory = TestDirectory::new();
     let arguments = [
         "run",
         "scene.toml",
@@ -257,42 +258,42 @@ fn a_solver_that_fails_is_told_once_and_the_state_before_is_saved() {
         "--set",
         "boundary.top.traction=[0, '-max(0, t - 0.2)']",
     ];
-    let said = Said::of(&mut on_ranks(&desk, 2, &arguments));
+    let said = ProgramOutput::of(&mut on_ranks(&test_directory, 2, &arguments));
     one_message(&said, 1, "the tolerance 1.0e-30 is missed by");
-    assert_eq!(desk.summary("out/scene")["end_time"], 0.2);
-    assert_eq!(desk.frames("out/scene").pop().expect("frames").0, 0.2);
+    assert_eq!(test_directory.summary("out/scene")["end_time"], 0.2);
+    assert_eq!(test_directory.frames("out/scene").pop().expect("frames").0, 0.2);
 }
 
 #[test]
 fn what_fails_on_one_rank_ends_all_with_its_message() {
-    let desk = Desk::new();
+    let test_directory = TestDirectory::new();
     // While it reads, while it writes, and in the middle of what needs both.
-    let said = unlike(&desk, &[], &["--set", "material.young=-1"]);
+    let said = unlike(&test_directory, &[], &["--set", "material.young=-1"]);
     one_message(&said, 2, "material.young");
-    let said = unlike(&desk, &[], &["--out", "/proc/nowhere"]);
+    let said = unlike(&test_directory, &[], &["--out", "/proc/nowhere"]);
     one_message(&said, 1, "cannot write /proc/nowhere/fields_0000_1.vtu");
-    let said = unlike(&desk, &[], &["--", "-elastic_pc_type", "none_such"]);
+    let said = unlike(&test_directory, &[], &["--", "-elastic_pc_type", "none_such"]);
     one_message(&said, 1, "rank 1 of 2: ");
     assert!(said.err.contains("none_such"), "{said:?}");
 }
 
 #[test]
 fn every_kind_of_factor_gives_the_same_answer() {
-    let desk = example("square-mild");
+    let test_directory = example("square-mild");
     let few = ["--set", "mesh.size=0.0625", "--set", "time.step=0.25"];
-    desk.run(&[&few[..], &["--out", "one"]].concat());
+    test_directory.run(&[&few[..], &["--out", "one"]].concat());
     for kind in ["cholesky", "gamg"] {
         let options = ["--", "-elastic_pc_type", kind, "-damage_pc_type", kind];
         let arguments = [&["run", "scene.toml", "--out", kind], &few[..], &options].concat();
-        let said = Said::of(&mut on_ranks(&desk, 3, &arguments));
+        let said = ProgramOutput::of(&mut on_ranks(&test_directory, 3, &arguments));
         assert_eq!((said.code, said.err.as_str()), (Some(0), ""), "{said:?}");
-        same_history(&desk, kind, "one");
+        same_history(&test_directory, kind, "one");
     }
 }
 
 #[test]
 fn other_commands_refuse_ranks() {
-    let desk = Desk::new();
-    let said = Said::of(&mut on_ranks(&desk, 2, &["compare", "scene.toml"]));
+    let test_directory = TestDirectory::new();
+    let said = ProgramOutput::of(&mut on_ranks(&test_directory, 2, &["compare", "scene.toml"]));
     one_message(&said, 2, "without mpiexec");
 }

@@ -1,8 +1,8 @@
 //! Frames in pieces: together they are the frame that one rank writes.
 
 use crate::{
-    desk::{Desk, Said},
     on_ranks,
+    test_directory::{ProgramOutput, TestDirectory},
 };
 use std::{collections::BTreeMap, path::Path};
 use vtkio::model::{Attribute, DataSet, Piece, Vtk};
@@ -69,30 +69,32 @@ fn close(a: &Values, b: &Values) {
 
 #[test]
 fn pieces_together_are_the_frame_of_one_rank() {
-    let desk = Desk::new();
+    let test_directory = TestDirectory::new();
     // A frame of an earlier run on more ranks must not stay.
-    desk.write("many/fields_0001_7.vtu", "old");
-    desk.write("many/fields_0099.pvtu", "old");
+    test_directory.write("many/fields_0001_7.vtu", "old");
+    test_directory.write("many/fields_0099.pvtu", "old");
     // Not uniform, and pressed on a part of the bottom.
     let load = ["--set", "boundary.top.traction=['t', '-2*t*x']", "--set", "time.step=0.5"];
-    desk.run(&[&load[..], &["--out", "one"]].concat());
+    test_directory.run(&[&load[..], &["--out", "one"]].concat());
     let arguments = [&["run", "scene.toml", "--out", "many"], &load[..]].concat();
-    let said = Said::of(&mut on_ranks(&desk, 3, &arguments));
+    let said = ProgramOutput::of(&mut on_ranks(&test_directory, 3, &arguments));
     assert_eq!(said.code, Some(0), "{said:?}");
 
-    let (frames, lists) = (desk.frames("one"), desk.frames("many"));
+    let (frames, lists) = (test_directory.frames("one"), test_directory.frames("many"));
     assert_eq!(frames.len(), lists.len());
     let mut expected_names = vec!["fields.pvd".into(), "history.csv".into(), "summary.json".into()];
     for ((time, file), (listed, list)) in frames.iter().zip(&lists) {
         assert_eq!(time, listed);
         let mut whole = Frame::default();
-        add(&desk.path(&format!("one/{file}")), &mut whole);
-        let text = desk.read(&format!("many/{list}"));
+        add(&test_directory.path(&format!("one/{file}")), &mut whole);
+        let text = test_directory.read(&format!("many/{list}"));
         let sources: Vec<&str> =
             text.split("Source=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect();
         assert_eq!(sources.len(), 3);
         let mut joined = Frame::default();
-        sources.iter().for_each(|file| add(&desk.path(&format!("many/{file}")), &mut joined));
+        sources
+            .iter()
+            .for_each(|file| add(&test_directory.path(&format!("many/{file}")), &mut joined));
         assert!(whole.points.keys().eq(joined.points.keys()));
         assert!(whole.cells.keys().eq(joined.cells.keys()));
         whole.points.iter().for_each(|(at, values)| close(&joined.points[at], values));
@@ -104,5 +106,5 @@ fn pieces_together_are_the_frame_of_one_rank() {
         expected_names.push(list.clone());
     }
     expected_names.sort();
-    assert_eq!(desk.names("many"), expected_names);
+    assert_eq!(test_directory.names("many"), expected_names);
 }

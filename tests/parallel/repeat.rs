@@ -1,8 +1,8 @@
 //! Equal runs give equal files to the last bit, alone and on several ranks.
 
 use super::{
-    desk::{Desk, Said},
     example, on_ranks,
+    test_directory::{ProgramOutput, TestDirectory},
 };
 use std::collections::BTreeMap;
 
@@ -10,34 +10,34 @@ use std::collections::BTreeMap;
 const TIMES: [&str; 3] = ["wall_seconds", "seconds_per_step", "phases"];
 
 /// The files of a run's folder by name, without what tells seconds.
-fn results(desk: &Desk, folder: &str) -> BTreeMap<String, Vec<u8>> {
+fn results(test_directory: &TestDirectory, folder: &str) -> BTreeMap<String, Vec<u8>> {
     let content = |name: String| {
         let path = format!("{folder}/{name}");
         let bytes = match &name[..] {
             "summary.json" => {
-                let mut summary = desk.summary(folder);
+                let mut summary = test_directory.summary(folder);
                 let entries = summary.as_object_mut().expect("an object");
                 TIMES.iter().for_each(|key| assert!(entries.remove(*key).is_some(), "{key}"));
                 summary.to_string().into_bytes()
             }
             "history.csv" => {
-                let text = desk.read(&path);
+                let text = test_directory.read(&path);
                 assert!(text.lines().next().is_some_and(|header| header.ends_with(",seconds")));
                 let rows = text.lines().map(|row| row.rsplit_once(',').expect("columns").0);
                 rows.collect::<Vec<_>>().join("\n").into_bytes()
             }
-            _ => std::fs::read(desk.path(&path)).expect("readable"),
+            _ => std::fs::read(test_directory.path(&path)).expect("readable"),
         };
         (name, bytes)
     };
-    desk.names(folder).into_iter().map(content).collect()
+    test_directory.names(folder).into_iter().map(content).collect()
 }
 
 #[test]
 fn a_run_repeats_itself_to_the_last_bit() {
     // The load and with it the contact travel: factors age, and are replaced many times.
     let travelling = r#"boundary.load.traction=["0","-160*max(0,1-abs(x-8*t)/2)"]"#;
-    let desk = example("lshape");
+    let test_directory = example("lshape");
     for solver in ["active-set", "penalty-duality", "tao"] {
         for ranks in [1, 2] {
             let run = |out: &str| {
@@ -45,11 +45,11 @@ fn a_run_repeats_itself_to_the_last_bit() {
                 let arguments = ["run", "scene.toml", "--solver", solver, "--out", out];
                 let arguments = [&arguments[..], &set].concat();
                 let said = match ranks {
-                    1 => desk.say(&arguments),
-                    _ => Said::of(&mut on_ranks(&desk, ranks, &arguments)),
+                    1 => test_directory.say(&arguments),
+                    _ => ProgramOutput::of(&mut on_ranks(&test_directory, ranks, &arguments)),
                 };
                 assert_eq!(said.code, Some(0), "{said:?}");
-                results(&desk, out)
+                results(&test_directory, out)
             };
             // Names of other lengths move what is allocated behind them.
             let first = run(&format!("{solver}-{ranks}"));

@@ -7,7 +7,7 @@ mod tao_types;
 
 use signorini::{
     contact::ContactReport,
-    evolution::{Equilibrium, Phases, RunError, Setting, State},
+    evolution::{ContactStep, DiscreteProblem, Phases, RunError, State},
     petsc::Session,
     scene::Scene,
     study::rectangle,
@@ -22,11 +22,11 @@ fn solve(
     keys: &[String],
 ) -> Result<(State, ContactReport), RunError> {
     let scene = Scene::parse(include_str!("d40.toml"), Path::new("d40.toml"), keys).unwrap();
-    let setting = Setting::new(scene, rectangle(1.0, 1.0, n, n)).unwrap();
+    let problem = DiscreteProblem::new(scene, rectangle(1.0, 1.0, n, n)).unwrap();
     let phases = Phases::default();
-    let mut equilibrium = Equilibrium::new(session, &setting, solver, &phases).unwrap();
-    let step = equilibrium.solve(0, setting.start(), &setting.initial_damage())?;
-    Ok((step.state, *equilibrium.report()))
+    let mut contact_step = ContactStep::new(session, &problem, solver, &phases).unwrap();
+    let step = contact_step.solve(0, problem.start(), &problem.initial_damage())?;
+    Ok((step.state, *contact_step.report()))
 }
 
 /// max |a − b| / max |b|.

@@ -2,7 +2,7 @@
 
 use signorini::{
     contact::SOLVERS,
-    evolution::{self, Outcome, Phases, Setting},
+    evolution::{self, DiscreteProblem, Outcome, Phases},
     petsc::Session,
     scene::Scene,
     study::rectangle,
@@ -15,8 +15,8 @@ fn run(set: &[&str]) -> Outcome {
     let set: Vec<String> = set.iter().map(|key| (*key).to_owned()).collect();
     let text = include_str!("../../geo/square.toml");
     let scene = Scene::parse(text, Path::new("square.toml"), &set).unwrap();
-    let setting = Setting::new(scene, rectangle(1.0, 1.0, 8, 8)).unwrap();
-    evolution::run(&session, &setting, SOLVERS[0], &Phases::default(), &mut |_| Ok(())).unwrap()
+    let problem = DiscreteProblem::new(scene, rectangle(1.0, 1.0, 8, 8)).unwrap();
+    evolution::run(&session, &problem, SOLVERS[0], &Phases::default(), &mut |_| Ok(())).unwrap()
 }
 
 #[test]

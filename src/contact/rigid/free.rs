@@ -28,10 +28,10 @@ impl RigidMotions {
         for piece in &self.unheld {
             let motions = self.free[piece.free.clone()].iter();
             let mut fields: Vec<Vec<f64>> = motions.map(|m| self.field(m, body)).collect();
-            fields.iter_mut().for_each(|f| constraints.frames.displacement_to_frame(f));
+            fields.iter_mut().for_each(|f| constraints.bases.displacement_to_local(f));
             // Gaussian elimination on the motions, the largest remaining entry as pivot.
             while let Some(pivot_field) = fields.pop() {
-                let fixed = constraints.frames.fixed();
+                let fixed = constraints.bases.fixed();
                 let largest = (0..pivot_field.len())
                     .filter(|&dof| !fixed[dof])
                     .max_by(|&a, &b| pivot_field[a].abs().total_cmp(&pivot_field[b].abs()));
@@ -40,7 +40,7 @@ impl RigidMotions {
                     let factor = field[dof] / pivot_field[dof];
                     field.iter_mut().zip(&pivot_field).for_each(|(v, p)| *v -= factor * p);
                 }
-                constraints.frames.fix(dof);
+                constraints.bases.fix(dof);
             }
         }
     }
@@ -64,9 +64,9 @@ impl RigidMotions {
         if self.free.is_empty() {
             return load;
         }
-        let excess = self.projection(&self.resultants(body, |i| [load[2 * i], load[2 * i + 1]]));
+        let balance = self.projection(&self.resultants(body, |i| [load[2 * i], load[2 * i + 1]]));
         for (node, f) in load.as_chunks_mut::<2>().0.iter_mut().enumerate() {
-            let [x, y] = excess[self.part_of_node[node]].at(body.mesh.nodes[node]);
+            let [x, y] = balance[self.part_of_node[node]].at(body.mesh.nodes[node]);
             let area = body.node_area[node];
             *f = [f[0] - area * x, f[1] - area * y];
         }

@@ -69,7 +69,7 @@ impl RigidMotions {
             let more = [fx, fy, (x - cx) * fy - (y - cy) * fx, fx.hypot(fy)];
             sums[part].iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
         }
-        body.partition.ranks().sum(sums.as_flattened_mut());
+        body.partition.comm().sum(sums.as_flattened_mut());
         sums
     }
 
@@ -88,10 +88,10 @@ impl RigidMotions {
     /// The motion with these shares (a unit vector) of those that only contact holds. Where it
     /// moves several pieces, what it does to the one that moves most, which is as little held.
     pub fn combined(&self, shares: &DVector<f64>) -> RigidMotion {
-        let share = |piece: &Unheld| &shares.as_slice()[piece.resisted.clone()];
-        let square = |piece: &Unheld| share(piece).iter().map(|c| c * c).sum::<f64>();
+        let subdomain = |piece: &Unheld| &shares.as_slice()[piece.resisted.clone()];
+        let square = |piece: &Unheld| subdomain(piece).iter().map(|c| c * c).sum::<f64>();
         match self.unheld.iter().max_by(|a, b| square(a).total_cmp(&square(b))) {
-            Some(piece) => sum(&self.resisted[piece.resisted.clone()], share(piece)),
+            Some(piece) => sum(&self.resisted[piece.resisted.clone()], subdomain(piece)),
             None => RigidMotion { parts: Vec::new(), mover: Mover::Body },
         }
     }
@@ -112,13 +112,13 @@ impl RigidMotion {
 /// Σ share·motion of motions of one piece.
 fn sum(motions: &[RigidMotion], shares: &[f64]) -> RigidMotion {
     let mut pairs = motions.iter().zip(shares);
-    let Some((first, share)) = pairs.next() else {
+    let Some((first, subdomain)) = pairs.next() else {
         return RigidMotion { parts: Vec::new(), mover: Mover::Body };
     };
     let mut sum = first.clone();
-    sum.parts.iter_mut().for_each(|part| part.scale(*share));
-    for (motion, share) in pairs {
-        sum.parts.iter_mut().zip(&motion.parts).for_each(|(part, more)| part.add(*share, more));
+    sum.parts.iter_mut().for_each(|part| part.scale(*subdomain));
+    for (motion, subdomain) in pairs {
+        sum.parts.iter_mut().zip(&motion.parts).for_each(|(part, more)| part.add(*subdomain, more));
     }
     sum
 }

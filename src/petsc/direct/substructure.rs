@@ -1,7 +1,7 @@
 //! A Cholesky factor over the ranks: each eliminates its own unknowns, all share the rest.
 
 use super::{Cholesky, Lower, Precision};
-use crate::petsc::{PetscError, Ranks, check, raw};
+use crate::petsc::{Communicator, PetscError, check, raw};
 use nalgebra::DMatrix;
 use std::{ptr, slice};
 
@@ -14,7 +14,7 @@ use std::{ptr, slice};
 /// factor holds its part of the interface last, with c 1 for K_BB: the last block L_S of it then
 /// tells the rank's part of S, L_S L_Sᵀ = c 1 − K_BI K_II⁻¹ K_IB. On one rank all is interior.
 pub(in crate::petsc) struct Substructure {
-    ranks: Ranks,
+    comm: Communicator,
     precision: Precision,
     parts: Parts,
     local: Cholesky,
@@ -49,7 +49,7 @@ impl Substructure {
     /// # Safety
     /// `matrix` is a live handle.
     pub(in crate::petsc) unsafe fn new(
-        ranks: Ranks,
+        comm: Communicator,
         matrix: raw::Mat,
         precision: Precision,
     ) -> Result<Option<Self>, PetscError> {
@@ -71,15 +71,15 @@ impl Substructure {
                 own.push(row);
             }
         }
-        let counts = ranks.gather(&[own.len() as f64]);
+        let counts = comm.gather(&[own.len() as f64]);
         let width = counts.iter().sum::<f64>() as usize;
         if width > WIDEST {
             return Ok(None);
         }
-        let before = counts[..ranks.rank()].iter().sum::<f64>() as usize;
+        let before = counts[..comm.rank()].iter().sum::<f64>() as usize;
         let mut interface = vec![0.0; width];
         own.iter().enumerate().for_each(|(i, &row)| interface[before + i] = f64::from(row));
-        ranks.sum(&mut interface);
+        comm.sum(&mut interface);
         let interface: Vec<i32> = interface.into_iter().map(|row| row as i32).collect();
         for role in &mut role {
             if let Role::Interface(i) = role {
@@ -114,7 +114,7 @@ impl Substructure {
             local = Cholesky::analyse(&mut whole, Some(order), parts.near.len(), precision)?;
         }
         let kept = local.order()[interior..].iter().copied().eq(last);
-        Ok(ranks.all(kept).then_some(Self { ranks, precision, parts, local, shared: None }))
+        Ok(comm.all(kept).then_some(Self { comm, precision, parts, local, shared: None }))
     }
 
     /// The work of a factorisation on this rank, in bytes that a solve reads in the same time.
@@ -159,12 +159,12 @@ impl Substructure {
             }
         }
         // K_BI K_II⁻¹ K_IB is at most K_BB: with this the rank's matrix is definite.
-        let c = 2.0 * self.ranks.max(size);
+        let c = 2.0 * self.comm.max(size);
         // SAFETY: the caller's promise.
         let mut whole = unsafe { parts.eliminated(matrix, first, c)? };
         let near = parts.near.len();
         let block = self.local.factorise(&mut whole)?;
-        if !self.ranks.all(block.is_some()) {
+        if !self.comm.all(block.is_some()) {
             return Ok(false);
         }
         let block = DMatrix::from_vec(near, near, block.unwrap_or_default());
@@ -176,7 +176,7 @@ impl Substructure {
         if width == 0 {
             return Ok(true);
         }
-        self.ranks.sum(schur.as_mut_slice());
+        self.comm.sum(schur.as_mut_slice());
         let mut lower = Lower::new();
         for j in 0..width {
             (j..width).for_each(|i| lower.push(i, schur[(i, j)]));
@@ -191,7 +191,7 @@ impl Substructure {
         };
         let definite = shared.factorise(&mut lower)?.is_some();
         self.shared = Some(shared);
-        Ok(self.ranks.all(definite))
+        Ok(self.comm.all(definite))
     }
 
     /// `z` ← the factored matrix' inverse · `r`. Collective.
@@ -214,7 +214,7 @@ impl Substructure {
         // −K_BI K_II⁻¹ r_I.
         let eliminated = local.last(near.len());
         near.iter().zip(&eliminated).for_each(|(&at, eliminated)| shared[at] += eliminated);
-        self.ranks.sum(&mut shared);
+        self.comm.sum(&mut shared);
         if let Some(factor) = &mut self.shared {
             factor.triangle().forward(&shared);
             factor.triangle().backward(&mut shared);

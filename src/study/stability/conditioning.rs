@@ -5,7 +5,7 @@ mod cases;
 use super::{Counts, StudyError, Verdict, statics::difference};
 use crate::{
     contact::SOLVERS,
-    evolution::{self, Accuracy, Outcome, Phases, RunError, Setting},
+    evolution::{self, Accuracy, DiscreteProblem, Outcome, Phases, RunError},
     output::write_table,
     petsc::Session,
 };
@@ -64,9 +64,9 @@ pub(super) fn run(session: &Session, folder: &Path) -> Result<Counts, StudyError
 fn fill(session: &Session, case: &Case, table: &mut Vec<Row>) -> Result<(), StudyError> {
     let (first, mut answers) = (table.len(), Vec::new());
     for &tolerance in case.tolerances {
-        let setting = case.setting(tolerance)?;
+        let problem = case.problem(tolerance)?;
         for solver in SOLVERS {
-            let (row, answer) = solve(session, case, &setting, solver)?;
+            let (row, answer) = solve(session, case, &problem, solver)?;
             table.push(row);
             answers.push((solver, answer));
         }
@@ -97,24 +97,24 @@ fn fill(session: &Session, case: &Case, table: &mut Vec<Row>) -> Result<(), Stud
 fn solve(
     session: &Session,
     case: &Case,
-    setting: &Setting,
+    problem: &DiscreteProblem,
     solver: &'static str,
 ) -> Result<(Row, Option<Outcome>), StudyError> {
-    let mut row = Row::new(case, setting.tolerance, solver);
+    let mut row = Row::new(case, problem.tolerance, solver);
     let started = Instant::now();
-    let solved = evolution::run(session, setting, solver, &Phases::default(), &mut |_| Ok(()));
+    let solved = evolution::run(session, problem, solver, &Phases::default(), &mut |_| Ok(()));
     row.seconds = started.elapsed().as_secs_f64();
     match solved {
         Ok(outcome) => {
-            let mut notes = setting.notes();
-            notes.extend(outcome.accuracy.notes(setting.tolerance));
+            let mut notes = problem.notes();
+            notes.extend(outcome.accuracy.notes(problem.tolerance));
             row.notes = notes.len();
             row.message = notes.into_iter().next();
             row.iterations = Some(outcome.last.record.iterations);
             row.kkt = Some(outcome.kkt.worst());
             row.estimate = Some(outcome.accuracy.displacement);
             row.energy_error = Some(outcome.accuracy.energy);
-            row.error = case.exact.as_ref().map(|exact| exact.error(setting, &outcome));
+            row.error = case.exact.as_ref().map(|exact| exact.error(problem, &outcome));
             Ok((row, Some(outcome)))
         }
         Err(failure @ RunError::Contact { .. }) => {

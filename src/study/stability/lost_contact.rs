@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     contact::{ContactReport, SOLVERS},
-    evolution::{ContactPoint, Setting, SetupError, State, Step},
+    evolution::{ContactPoint, DiscreteProblem, SetupError, State, Step},
     output,
     petsc::Session,
 };
@@ -68,9 +68,9 @@ struct Lifted {
 
 impl Lifted {
     fn new(session: &Session, sweep: &Sweep) -> Result<Self, StudyError> {
-        let setting = sweep.setting("-1", false)?;
-        let (Step { state, .. }, _) = solve(session, &setting, SOLVERS[0], None)??;
-        let mesh = &setting.body.mesh;
+        let problem = sweep.problem("-1", false)?;
+        let (Step { state, .. }, _) = solve(session, &problem, SOLVERS[0], None)??;
+        let mesh = &problem.body.mesh;
         let bottom = mesh.curves["bottom"].edges.iter().flatten();
         let deepest = bottom.map(|&node| -state.u[2 * node + 1]).fold(0.0, f64::max);
         let touch = sweep.gap.parse::<f64>().unwrap_or(f64::NAN) / deepest;
@@ -87,15 +87,15 @@ fn rows(
 ) -> Result<Vec<Row>, StudyError> {
     let touch = lifted.map_or(f64::NAN, |lifted| lifted.touch);
     let load = (sweep.load)(value).replace("TOUCH", &format!("{touch:e}"));
-    let setting = match sweep.setting(&load, true) {
-        Ok(setting) => setting,
+    let problem = match sweep.problem(&load, true) {
+        Ok(problem) => problem,
         Err(refusal @ SetupError::Driven { .. }) => {
             let message = Some(refusal.to_string());
             return Ok(vec![Row { outcome: "setup", message, ..Row::new(sweep, value, "all") }]);
         }
         Err(other) => return Err(other.into()),
     };
-    let answers = SOLVERS.map(|solver| solve(session, &setting, solver, None));
+    let answers = SOLVERS.map(|solver| solve(session, &problem, solver, None));
     let [a, b, c] = answers;
     let answers = [a?, b?, c?];
     let open = lifted.filter(|_| value >= 0.0);
@@ -108,7 +108,7 @@ fn rows(
                 let others = answers.iter().enumerate().filter(|(j, _)| *j != i);
                 let mut unique = others.filter_map(|(_, answer)| answer.as_ref().ok());
                 let other = unique.find(|(s, _)| s.unheld.is_none()).map(|(s, _)| &s.state.u);
-                row.judge(&setting, sweep, step, report, open.as_ref().or(other));
+                row.judge(&problem, sweep, step, report, open.as_ref().or(other));
             }
         }
         row
@@ -138,7 +138,7 @@ impl Row {
     /// `other` where there is but one answer, by its note where there are many.
     fn judge(
         &mut self,
-        setting: &Setting,
+        problem: &DiscreteProblem,
         sweep: &Sweep,
         Step { state, record, unheld }: &Step,
         report: &ContactReport,
@@ -148,7 +148,7 @@ impl Row {
         self.iterations = Some(report.iterations);
         self.fallbacks = Some(report.fallbacks);
         self.kkt = Some(record.kkt().worst());
-        self.unbalanced = (sweep.side != CLAMPED).then(|| unbalanced(setting, state));
+        self.unbalanced = (sweep.side != CLAMPED).then(|| unbalanced(problem, state));
         let balanced = self.unbalanced.is_none_or(|error| error <= BALANCE);
         let many = sweep.many.is_some_and(|[from, to]| (from..=to).contains(&self.value));
         if unheld.is_none() {
@@ -172,9 +172,9 @@ impl Row {
 
 /// The larger error of the balance of forces across the foundation and of moments, where the
 /// body may turn, relative to the size of the load.
-fn unbalanced(setting: &Setting, state: &State) -> f64 {
-    let nodes = &setting.body.mesh.nodes;
-    let load = setting.loads.at(&setting.body, state.time);
+fn unbalanced(problem: &DiscreteProblem, state: &State) -> f64 {
+    let nodes = &problem.body.mesh.nodes;
+    let load = problem.loads.at(&problem.body, state.time);
     let size: f64 = load.chunks(2).map(|f| f[0].hypot(f[1])).sum();
     // The normal of the foundation is −e_y: contact pushes up.
     let up = |point: &ContactPoint| (nodes[point.node], [0.0, point.force]);
@@ -185,6 +185,6 @@ fn unbalanced(setting: &Setting, state: &State) -> f64 {
         force += fy;
         moment += x * fy - y * fx;
     }
-    let turns = setting.motions.resisted() > 1;
+    let turns = problem.motions.resisted() > 1;
     (if turns { force.abs().max(moment.abs()) } else { force.abs() }) / size
 }

@@ -3,7 +3,7 @@
 use super::{Counts, StudyError, Verdict};
 use crate::{
     contact::SOLVERS,
-    evolution::{self, Phases, Setting, Step},
+    evolution::{self, DiscreteProblem, Phases, Step},
     fem,
     output::write_table,
     petsc::Session,
@@ -126,21 +126,21 @@ fn cell(
     step: f64,
     mass: &'static str,
 ) -> Result<Cell, StudyError> {
-    let setting = setting(case, diffusion, step, mass)?;
+    let problem = problem(case, diffusion, step, mass)?;
     let mut history = Vec::new();
     let outcome =
-        evolution::run(session, &setting, SOLVERS[0], &Phases::default(), &mut |accepted| {
+        evolution::run(session, &problem, SOLVERS[0], &Phases::default(), &mut |accepted| {
             history.push(accepted.clone());
             Ok(())
         })?;
-    let seen = Seen::of(&setting, &history, step);
-    let early_stop = outcome.stopped.is_some() && seen.next_floor > setting.threshold();
+    let seen = Seen::of(&problem, &history, step);
+    let early_stop = outcome.stopped.is_some() && seen.next_floor > problem.threshold();
     let undershoot = match outcome.stopped {
         Some(stop) => seen.undershoot.max(seen.next_floor - stop.zeta_min),
         None => seen.undershoot,
     };
     let violated = seen.rise.max(undershoot) > ROUNDING;
-    let notes = outcome.notes(&setting);
+    let notes = outcome.notes(&problem);
     let says = |what: &str| notes.iter().any(|note| note.contains(what));
     let (noted, stop_noted) = (says("left the bounds"), says("too early"));
     Ok(Cell {
@@ -164,7 +164,12 @@ fn cell(
     })
 }
 
-fn setting(case: Case, diffusion: f64, step: f64, mass: &str) -> Result<Setting, StudyError> {
+fn problem(
+    case: Case,
+    diffusion: f64,
+    step: f64,
+    mass: &str,
+) -> Result<DiscreteProblem, StudyError> {
     let overrides = [
         format!("damage.diffusion={diffusion:e}"),
         format!("damage.mass={mass}"),
@@ -176,7 +181,7 @@ fn setting(case: Case, diffusion: f64, step: f64, mass: &str) -> Result<Setting,
     let scene = Scene::parse(&text, Path::new("study.toml"), &overrides)?;
     let mut mesh = rectangle(1.0, 1.0, case.cells, case.cells);
     mesh.nodes.iter_mut().for_each(|[x, y]| *x += case.shear * *y);
-    Ok(Setting::new(scene, mesh)?)
+    Ok(DiscreteProblem::new(scene, mesh)?)
 }
 
 /// What a history shows, found from its states alone.
@@ -188,7 +193,7 @@ struct Seen {
 }
 
 impl Seen {
-    fn of(setting: &Setting, history: &[Step], length: f64) -> Self {
+    fn of(problem: &DiscreteProblem, history: &[Step], length: f64) -> Self {
         let mut seen = Self { rise: 0.0, undershoot: 0.0, next_floor: 0.0 };
         let (mut floor, mut ceiling) = (f64::NEG_INFINITY, f64::INFINITY);
         for step in history {
@@ -198,7 +203,7 @@ impl Seen {
             seen.rise = seen.rise.max(high - ceiling);
             seen.undershoot = seen.undershoot.max(floor - low);
             ceiling = ceiling.min(high);
-            floor = floor.max(low) + length * least_source(setting, step);
+            floor = floor.max(low) + length * least_source(problem, step);
         }
         seen.next_floor = floor;
         seen
@@ -206,9 +211,9 @@ impl Seen {
 }
 
 /// min φ at a state, 1/s.
-fn least_source(setting: &Setting, step: &Step) -> f64 {
-    let Some(law) = setting.damage() else { return 0.0 };
-    let strain = setting.elasticity.strain_squared(&setting.body, &step.state.u);
-    let phi = fem::source(&setting.body, &law, &strain, &step.state.zeta);
+fn least_source(problem: &DiscreteProblem, step: &Step) -> f64 {
+    let Some(law) = problem.damage() else { return 0.0 };
+    let strain = problem.elasticity.strain_squared(&problem.body, &step.state.u);
+    let phi = fem::source(&problem.body, &law, &strain, &step.state.zeta);
     phi.iter().flatten().copied().fold(0.0, f64::min)
 }

@@ -2,7 +2,7 @@
 
 use super::{
     Counts, StudyError, Verdict,
-    statics::{self, difference, setting},
+    statics::{self, difference, problem},
 };
 use crate::{output, petsc::Session};
 use serde::Serialize;
@@ -94,8 +94,8 @@ fn fill(session: &Session, sweep: &Sweep, table: &mut Vec<Cell>) -> Result<(), S
             1.0 => D40.to_owned(),
             contrast => D40.to_owned() + &BAND.replace("SOFT", &(1.0 / contrast).to_string()),
         };
-        let setting = setting(&text, &overrides, (1.0, 1.0, sweep.cells, sweep.cells))?;
-        statics::solve(session, &setting, solver, None)
+        let problem = problem(&text, &overrides, (1.0, 1.0, sweep.cells, sweep.cells))?;
+        statics::solve(session, &problem, solver, None)
     };
     let (reference, _) = solve("active-set", &[])??;
     let (_, found) = solve("penalty-duality", &[])??;

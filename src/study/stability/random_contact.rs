@@ -4,7 +4,7 @@ use super::{
     Counts, StudyError, Verdict,
     statics::{difference, solve},
 };
-use crate::{evolution::Setting, output, petsc::Session, scene::Scene, study::rectangle};
+use crate::{evolution::DiscreteProblem, output, petsc::Session, scene::Scene, study::rectangle};
 use serde::Serialize;
 use std::path::Path;
 
@@ -52,7 +52,7 @@ impl Random {
 struct Problem {
     kind: &'static str,
     contrast: f64,
-    setting: Setting,
+    discrete: DiscreteProblem,
     /// A random first guess of the pressing nodes, for every other problem.
     guess: Option<Vec<f64>>,
 }
@@ -95,13 +95,13 @@ pub fn sample(session: &Session, count: u64) -> Result<Counts, StudyError> {
 
 fn row(session: &Session, id: u64) -> Result<Row, StudyError> {
     let problem = problem(id)?;
-    let setting = &problem.setting;
-    let bounds = &setting.constraints.bounds;
-    let cells = (setting.body.mesh.triangles.len() / 2) as f64;
+    let discrete = &problem.discrete;
+    let bounds = &discrete.constraints.bounds;
+    let cells = (discrete.body.mesh.triangles.len() / 2) as f64;
     let mut row = Row {
         id,
         kind: problem.kind,
-        nodes: setting.body.mesh.nodes.len(),
+        nodes: discrete.body.mesh.nodes.len(),
         contact_nodes: bounds.len(),
         active: None,
         contrast: problem.contrast,
@@ -119,7 +119,7 @@ fn row(session: &Session, id: u64) -> Result<Row, StudyError> {
         verdict: Verdict::Refused,
         message: None,
     };
-    let (answer, report) = match solve(session, setting, "active-set", problem.guess.as_deref())? {
+    let (answer, report) = match solve(session, discrete, "active-set", problem.guess.as_deref())? {
         Ok(answer) => answer,
         Err(message) => {
             row.message = Some(message.to_string());
@@ -134,7 +134,7 @@ fn row(session: &Session, id: u64) -> Result<Row, StudyError> {
     row.kkt = Some(answer.record.kkt().worst());
     // The first of two methods that share nothing with the active set and can do it.
     for method in ["penalty-duality", "tao"] {
-        if let Ok((other, _)) = solve(session, setting, method, None)? {
+        if let Ok((other, _)) = solve(session, discrete, method, None)? {
             row.reference = method;
             row.difference = Some(difference(&answer.state.u, &other.state.u));
             break;
@@ -224,10 +224,10 @@ traction = {right}
 "#
     );
     let scene = Scene::parse(&text, Path::new("random.toml"), &[])?;
-    let setting = Setting::new(scene, rectangle(1.0, 1.0, n, n))?;
+    let discrete = DiscreteProblem::new(scene, rectangle(1.0, 1.0, n, n))?;
     let guess = (id % 2 == 1)
-        .then(|| setting.constraints.bounds.iter().map(|_| random.one_of(2) as f64).collect());
-    Ok(Problem { kind, contrast, setting, guess })
+        .then(|| discrete.constraints.bounds.iter().map(|_| random.one_of(2) as f64).collect());
+    Ok(Problem { kind, contrast, discrete, guess })
 }
 
 const CLAMPED: &str = "displacement = [\"0\", \"0\"]";

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     contact::SOLVERS,
-    evolution::{self, Phases, RunError, Setting, State},
+    evolution::{self, DiscreteProblem, Phases, RunError, State},
     output,
     petsc::Session,
     scene::Scene,
@@ -126,7 +126,7 @@ fn scene(
     stress: f64,
     length: f64,
     gap: f64,
-) -> Result<Setting, StudyError> {
+) -> Result<DiscreteProblem, StudyError> {
     let (young, pressure, gap) = (100.0 * stress, 0.02 * stress, gap * length);
     let (factor, time) = match kind {
         "swinging" => ("*sin(2*pi*t)", "time = { end = 0.75, step = 0.125 }"),
@@ -144,17 +144,21 @@ boundary = [
 ]"#
     );
     let scene = Scene::parse(&text, Path::new("scales.toml"), &[])?;
-    Ok(Setting::new(scene, rectangle(2.0 * length, length, 12, 6))?)
+    Ok(DiscreteProblem::new(scene, rectangle(2.0 * length, length, 12, 6))?)
 }
 
 /// The last state and the worst residual.
-fn last(session: &Session, setting: &Setting, solver: &str) -> Result<(State, f64), StudyError> {
-    if setting.scene().time.is_none() {
-        let (step, _) = solve(session, setting, solver, None)??;
+fn last(
+    session: &Session,
+    problem: &DiscreteProblem,
+    solver: &str,
+) -> Result<(State, f64), StudyError> {
+    if problem.scene().time.is_none() {
+        let (step, _) = solve(session, problem, solver, None)??;
         return Ok((step.state, step.record.kkt().worst()));
     }
     let phases = Phases::default();
-    let outcome = evolution::run(session, setting, solver, &phases, &mut |_| Ok(()))?;
+    let outcome = evolution::run(session, problem, solver, &phases, &mut |_| Ok(()))?;
     Ok((outcome.last.state, outcome.kkt.worst()))
 }
 

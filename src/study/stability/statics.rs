@@ -3,7 +3,7 @@
 use super::StudyError;
 use crate::{
     contact::ContactReport,
-    evolution::{Equilibrium, Phases, RunError, Setting, Step},
+    evolution::{ContactStep, DiscreteProblem, Phases, RunError, Step},
     petsc::Session,
     scene::Scene,
     study::rectangle,
@@ -16,30 +16,30 @@ mesh = { file = "case.msh" }
 material = { young = 80, poisson = 0.3, plane = "stress" }
 "#;
 /// The rest of a static scene on a rectangle (width, height, cells along each).
-pub(super) fn setting(
+pub(super) fn problem(
     text: &str,
     overrides: &[String],
     (width, height, nx, ny): (f64, f64, usize, usize),
-) -> Result<Setting, StudyError> {
+) -> Result<DiscreteProblem, StudyError> {
     let scene = Scene::parse(&format!("{HEAD}{text}"), Path::new("study.toml"), overrides)?;
-    Ok(Setting::new(scene, rectangle(width, height, nx, ny))?)
+    Ok(DiscreteProblem::new(scene, rectangle(width, height, nx, ny))?)
 }
 
 /// One static solve, from a first guess of the pressing nodes if there is one; the inner error
 /// is the contact solver's.
 pub(super) fn solve(
     session: &Session,
-    setting: &Setting,
+    problem: &DiscreteProblem,
     solver: &str,
     guess: Option<&[f64]>,
 ) -> Result<Result<(Step, ContactReport), RunError>, StudyError> {
     let phases = Phases::default();
-    let mut equilibrium = Equilibrium::new(session, setting, solver, &phases)?;
+    let mut contact_step = ContactStep::new(session, problem, solver, &phases)?;
     if let Some(guess) = guess {
-        equilibrium.set_warm_start(guess);
+        contact_step.set_warm_start(guess);
     }
-    match equilibrium.solve(0, setting.start(), &setting.initial_damage()) {
-        Ok(step) => Ok(Ok((step, *equilibrium.report()))),
+    match contact_step.solve(0, problem.start(), &problem.initial_damage()) {
+        Ok(step) => Ok(Ok((step, *contact_step.report()))),
         Err(failure @ RunError::Contact { .. }) => Ok(Err(failure)),
         Err(other) => Err(other.into()),
     }

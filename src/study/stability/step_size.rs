@@ -3,7 +3,7 @@
 use super::{Counts, StudyError, Verdict};
 use crate::{
     contact::SOLVERS,
-    evolution::{self, Phases, Setting, Stop},
+    evolution::{self, DiscreteProblem, Phases, Stop},
     output::write_table,
     petsc::Session,
     scene::Scene,
@@ -85,9 +85,9 @@ fn fail(
 ) -> Result<Row, StudyError> {
     let started = Instant::now();
     let scene = Scene::parse(SCENE, Path::new("square.toml"), set)?;
-    let setting = Setting::new(scene, rectangle(1.0, 1.0, n, n))?;
+    let problem = DiscreteProblem::new(scene, rectangle(1.0, 1.0, n, n))?;
     let outcome =
-        evolution::run(session, &setting, SOLVERS[0], &Phases::default(), &mut |_| Ok(()))?;
+        evolution::run(session, &problem, SOLVERS[0], &Phases::default(), &mut |_| Ok(()))?;
     let missed = Stop { time: f64::NAN, zeta_min: f64::NAN, floor: f64::NAN, uncertainty: 0.0 };
     let stop = outcome.stopped.unwrap_or(missed);
     Ok(Row {
@@ -98,7 +98,7 @@ fn fail(
         undone: outcome.undone,
         failure_time: stop.time,
         uncertainty: stop.uncertainty,
-        overshoot: setting.threshold() - stop.zeta_min,
+        overshoot: problem.threshold() - stop.zeta_min,
         seconds: started.elapsed().as_secs_f64(),
         reference: f64::NAN,
         verdict: Verdict::Wrong,
@@ -110,10 +110,10 @@ fn fail(
 fn limit(session: &Session, n: usize) -> Result<f64, StudyError> {
     let crossing = |k: f64| -> Result<f64, StudyError> {
         let scene = Scene::parse(SCENE, Path::new("square.toml"), &[format!("time.step={k:e}")])?;
-        let setting = Setting::new(scene, rectangle(1.0, 1.0, n, n))?;
+        let problem = DiscreteProblem::new(scene, rectangle(1.0, 1.0, n, n))?;
         let outcome =
-            evolution::run(session, &setting, SOLVERS[0], &Phases::default(), &mut |_| Ok(()))?;
-        let (record, level) = (outcome.last.record, setting.threshold());
+            evolution::run(session, &problem, SOLVERS[0], &Phases::default(), &mut |_| Ok(()))?;
+        let (record, level) = (outcome.last.record, problem.threshold());
         let below = outcome.stopped.map_or(f64::NAN, |stop| stop.zeta_min);
         Ok(record.time + k * (record.zeta_min - level) / (record.zeta_min - below))
     };

@@ -3,7 +3,7 @@
 use super::{
     Counts, StudyError, Verdict,
     penalty::D40,
-    statics::{difference, setting, solve},
+    statics::{difference, problem, solve},
 };
 use crate::{
     contact::{ContactError, TAO_TYPES},
@@ -71,13 +71,13 @@ struct Cell {
 pub(super) fn run(session: &Session, folder: &Path) -> Result<Counts, StudyError> {
     let mut table = Vec::new();
     for (scene, text, size) in SCENES {
-        let exact = setting(text, &[], size)?;
+        let exact = problem(text, &[], size)?;
         let (reference, _) = solve(session, &exact, "active-set", None)??;
         for kind in TAO_TYPES {
             for tolerance in TOLERANCES {
-                let setting = setting(text, &[format!("contact.tolerance={tolerance:e}")], size)?;
+                let problem = problem(text, &[format!("contact.tolerance={tolerance:e}")], size)?;
                 let started = Instant::now();
-                let answer = solve(session, &setting, &format!("tao:{kind}"), None)?;
+                let answer = solve(session, &problem, &format!("tao:{kind}"), None)?;
                 let mut cell = Cell {
                     r#type: kind,
                     scene,

@@ -2,7 +2,7 @@
 
 use super::super::StudyError;
 use crate::{
-    evolution::{Outcome, Setting},
+    evolution::{DiscreteProblem, Outcome},
     mesh::Mesh,
     scene::Scene,
     study::rectangle,
@@ -68,21 +68,21 @@ pub(super) fn all() -> Vec<Case> {
 
 impl Case {
     /// The case as the program sees it.
-    pub fn setting(&self, tolerance: f64) -> Result<Setting, StudyError> {
+    pub fn problem(&self, tolerance: f64) -> Result<DiscreteProblem, StudyError> {
         let set = [
             format!("contact.tolerance={tolerance:e}"),
             "contact.penalty_duality.iterations=4000".to_owned(),
         ];
         let scene = Scene::parse(&self.text, Path::new("study.toml"), &set)?;
-        Ok(Setting::new(scene, self.mesh.clone())?)
+        Ok(DiscreteProblem::new(scene, self.mesh.clone())?)
     }
 }
 
 impl Exact {
     /// max |u_y − exact| over the gap of a beam; of a curl ‖u − exact‖ at the nodes over that
     /// of the curl.
-    pub fn error(&self, setting: &Setting, outcome: &Outcome) -> f64 {
-        let nodes = setting.body.mesh.nodes.iter().zip(outcome.last.state.u.chunks(2));
+    pub fn error(&self, problem: &DiscreteProblem, outcome: &Outcome) -> f64 {
+        let nodes = problem.body.mesh.nodes.iter().zip(outcome.last.state.u.chunks(2));
         match *self {
             Self::Beam { span, gap, load } => {
                 let deflection = |x: f64| {

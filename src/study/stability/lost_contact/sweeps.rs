@@ -1,7 +1,7 @@
 //! The bodies of the map, and what changes along each of its rows.
 
 use crate::{
-    evolution::{Setting, SetupError},
+    evolution::{DiscreteProblem, SetupError},
     scene::Scene,
     study::rectangle,
 };
@@ -119,7 +119,7 @@ pub(super) const SWEEPS: [Sweep; 7] = [
 ];
 
 impl Sweep {
-    pub(super) fn setting(&self, load: &str, contact: bool) -> Result<Setting, SetupError> {
+    pub(super) fn problem(&self, load: &str, contact: bool) -> Result<DiscreteProblem, SetupError> {
         let text = SCENE
             .replace("YOUNG", &self.young.to_string())
             .replace("WEIGHT", &self.weight.to_string())
@@ -130,6 +130,6 @@ impl Sweep {
             false => text.replace(r#"{ name = "bottom", gap = "GAP" },"#, ""),
         };
         let scene = Scene::parse(&text, Path::new("square.toml"), &[])?;
-        Setting::new(scene, rectangle(1.0, 1.0, CELLS, CELLS))
+        DiscreteProblem::new(scene, rectangle(1.0, 1.0, CELLS, CELLS))
     }
 }

@@ -1,6 +1,6 @@
 //! Local bases at constrained nodes, so that every constraint concerns one unknown.
 
-use super::Share;
+use super::Subdomain;
 use nalgebra::{Matrix2, Vector2};
 
 /// At some nodes the unknowns are c = D u with the rows of D the constrained directions
@@ -9,7 +9,7 @@ use nalgebra::{Matrix2, Vector2};
 /// D need not be orthogonal (a corner of Γ_C has two normals), so forces transform with
 /// D⁻ᵀ: a force r does the work r·u = (D⁻ᵀr)·c.
 #[derive(Debug, Clone)]
-pub struct Frames {
+pub struct NodalBases {
     directions: Vec<(usize, Matrix2<f64>, Matrix2<f64>)>,
     index: Vec<u32>,
     fixed: Vec<bool>,
@@ -17,25 +17,25 @@ pub struct Frames {
 
 const IDENTITY: u32 = u32::MAX;
 
-impl Frames {
+impl NodalBases {
     /// The identity at each of `nodes` nodes, nothing fixed.
     pub fn identity(nodes: usize) -> Self {
         Self { directions: Vec::new(), index: vec![IDENTITY; nodes], fixed: vec![false; 2 * nodes] }
     }
 
     /// The frames of the nodes of a rank's share.
-    pub(crate) fn share(&self, share: &Share) -> Self {
-        let mut frames = Self {
+    pub(crate) fn restrict(&self, subdomain: &Subdomain) -> Self {
+        let mut bases = Self {
             directions: Vec::new(),
-            index: share.field(&vec![IDENTITY; self.index.len()], 1),
-            fixed: share.field(&self.fixed, 2),
+            index: subdomain.field(&vec![IDENTITY; self.index.len()], 1),
+            fixed: subdomain.field(&self.fixed, 2),
         };
         for (node, directions, inverse) in &self.directions {
-            if let Some(node) = share.local(*node) {
-                frames.add(node, *directions, *inverse);
+            if let Some(node) = subdomain.local(*node) {
+                bases.add(node, *directions, *inverse);
             }
         }
-        frames
+        bases
     }
 
     /// Makes the rows of `directions` the basis at `node`; `None` if they are dependent.
@@ -66,17 +66,17 @@ impl Frames {
     }
 
     /// c = D u, in place.
-    pub fn displacement_to_frame(&self, field: &mut [f64]) {
+    pub fn displacement_to_local(&self, field: &mut [f64]) {
         self.transform(field, |d, _| *d);
     }
 
     /// u = D⁻¹ c, in place.
-    pub fn displacement_from_frame(&self, field: &mut [f64]) {
+    pub fn displacement_to_global(&self, field: &mut [f64]) {
         self.transform(field, |_, inverse| *inverse);
     }
 
     /// Forces conjugate to c from forces conjugate to u: D⁻ᵀ r, in place.
-    pub fn force_to_frame(&self, field: &mut [f64]) {
+    pub fn force_to_local(&self, field: &mut [f64]) {
         self.transform(field, |_, inverse| inverse.transpose());
     }
 

@@ -1,6 +1,6 @@
 //! Where displacements are measured from.
 
-use crate::{contact::Bound, evolution::Setting};
+use crate::{contact::Bound, evolution::DiscreteProblem};
 
 /// A rigid motion of the body. It causes no forces, so (26) holds for the rest of u as it stands,
 /// with gaps and prescribed values less the motion.
@@ -19,12 +19,12 @@ impl Datum {
     /// The prescribed unknowns `lift` and the `bounds`, measured from here.
     pub(super) fn pose(
         &self,
-        setting: &Setting,
+        problem: &DiscreteProblem,
         (lift, bounds): &(Vec<f64>, Vec<Bound>),
     ) -> (Vec<f64>, Vec<Bound>) {
         let (mut lift, mut bounds) = (lift.clone(), bounds.clone());
         if !self.field.is_empty() {
-            setting.constraints.prescribed().for_each(|dof| lift[dof] -= self.unknowns[dof]);
+            problem.constraints.prescribed().for_each(|dof| lift[dof] -= self.unknowns[dof]);
             for bound in &mut bounds {
                 bound.lower -= self.unknowns[bound.dof];
                 bound.upper -= self.unknowns[bound.dof];
@@ -34,17 +34,17 @@ impl Datum {
     }
 
     /// Free unknowns measured from here, of unknowns c measured from zero.
-    pub(super) fn relative(&self, setting: &Setting, c: Vec<f64>) -> Vec<f64> {
-        self.shifted(setting, c, -1.0)
+    pub(super) fn relative(&self, problem: &DiscreteProblem, c: Vec<f64>) -> Vec<f64> {
+        self.shifted(problem, c, -1.0)
     }
 
     /// The inverse of [`Self::relative`].
-    pub(super) fn absolute(&self, setting: &Setting, c: Vec<f64>) -> Vec<f64> {
-        self.shifted(setting, c, 1.0)
+    pub(super) fn absolute(&self, problem: &DiscreteProblem, c: Vec<f64>) -> Vec<f64> {
+        self.shifted(problem, c, 1.0)
     }
 
-    fn shifted(&self, setting: &Setting, mut c: Vec<f64>, sign: f64) -> Vec<f64> {
-        let fixed = setting.constraints.frames.fixed();
+    fn shifted(&self, problem: &DiscreteProblem, mut c: Vec<f64>, sign: f64) -> Vec<f64> {
+        let fixed = problem.constraints.bases.fixed();
         for ((c, own), _) in c.iter_mut().zip(&self.unknowns).zip(fixed).filter(|(_, on)| !**on) {
             *c += sign * own;
         }
@@ -58,10 +58,10 @@ impl Datum {
     }
 
     /// Moves on by a rigid motion of each piece of the mesh, in nodal displacements.
-    pub(super) fn add(&mut self, setting: &Setting, motion: &[f64]) {
+    pub(super) fn add(&mut self, problem: &DiscreteProblem, motion: &[f64]) {
         self.field.resize(motion.len(), 0.0);
         self.field.iter_mut().zip(motion).for_each(|(own, more)| *own += more);
         self.unknowns = self.field.clone();
-        setting.constraints.frames.displacement_to_frame(&mut self.unknowns);
+        problem.constraints.bases.displacement_to_local(&mut self.unknowns);
     }
 }

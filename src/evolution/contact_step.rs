@@ -4,7 +4,7 @@ mod accuracy;
 mod certificate;
 mod datum;
 
-use super::{Phases, RunError, Setting, State, Step, agreed, extrapolation::Extrapolation};
+use super::{DiscreteProblem, Phases, RunError, State, Step, agreed, extrapolation::Extrapolation};
 use crate::{
     contact::{self, Bound, ContactError, ContactProblem, ContactReport, ContactSolver, Scales},
     fem::Stiffness,
@@ -16,9 +16,9 @@ use nalgebra::{DMatrix, DVector};
 use std::time::Instant;
 
 /// Solves the contact problems of a run, one after the other.
-pub struct Equilibrium<'a> {
+pub struct ContactStep<'a> {
     session: &'a Session,
-    setting: &'a Setting,
+    problem: &'a DiscreteProblem,
     phases: &'a Phases,
     solver: Box<dyn ContactSolver + 'a>,
     stiffness: Stiffness,
@@ -66,31 +66,31 @@ const ATTEMPTS: usize = 3;
 /// A cosine between u and its elastic forces below this is more than rounding.
 const NEGATIVE_ENERGY: f64 = -1e-10;
 
-impl<'a> Equilibrium<'a> {
+impl<'a> ContactStep<'a> {
     /// With the contact solver called `solver`.
     ///
     /// # Errors
     /// There is no solver of that name, or PETSc failed.
     pub fn new(
         session: &'a Session,
-        setting: &'a Setting,
+        problem: &'a DiscreteProblem,
         solver: &str,
         phases: &'a Phases,
     ) -> Result<Self, RunError> {
-        let (body, constraints) = (&setting.body, &setting.constraints);
+        let (body, constraints) = (&problem.body, &problem.constraints);
         let owned = 2 * body.partition.owned();
         let stiffness = phases.time("stiffness pattern", || {
-            Stiffness::new(session, body, &setting.elasticity, &constraints.frames)
+            Stiffness::new(session, body, &problem.elasticity, &constraints.bases)
         })?;
         Ok(Self {
             session,
-            setting,
+            problem,
             phases,
             solver: contact::solver(
                 session,
                 solver,
-                body.partition.ranks().any(!constraints.bounds.is_empty()),
-                setting.scene().contact.penalty_duality,
+                body.partition.comm().any(!constraints.bounds.is_empty()),
+                problem.scene().contact.penalty_duality,
             )?,
             stiffness,
             zeta_mean: vec![1.0; body.triangles.len()],
@@ -98,14 +98,14 @@ impl<'a> Equilibrium<'a> {
             c: Vector::zeros(session, owned)?,
             datum: Datum::default(),
             accepted_datum: Datum::default(),
-            scales: Scales { force: LEAST_LOAD * setting.largest_load, displacement: 0.0 },
+            scales: Scales { force: LEAST_LOAD * problem.largest_load, displacement: 0.0 },
             next_scales: Scales { force: 0.0, displacement: 0.0 },
             active: vec![false; constraints.bounds.len()],
             next_active: Vec::new(),
-            covered: body.partition.ranks().all(body.is_covered()),
-            rigid: setting.motions.normal_at(body, &constraints.bounds),
-            work: DVector::zeros(setting.motions.resisted()),
-            evolution: Extrapolation::new(body.partition.ranks(), owned),
+            covered: body.partition.comm().all(body.is_covered()),
+            rigid: problem.motions.normal_at(body, &constraints.bounds),
+            work: DVector::zeros(problem.motions.resisted()),
+            evolution: Extrapolation::new(body.partition.comm(), owned),
             warm_start: Vec::new(),
             report: ContactReport::default(),
         })
@@ -133,21 +133,21 @@ impl<'a> Equilibrium<'a> {
     /// The solver failed, or no answer of its met the KKT tolerance.
     pub fn solve(&mut self, step: usize, time: f64, zeta: &[f64]) -> Result<Step, RunError> {
         let started = Instant::now();
-        let (setting, phases) = (self.setting, self.phases);
-        self.fill(&setting.triangle_means(zeta))?;
-        let external = phases.time("loads", || setting.load(time));
-        setting.check_load(time, &external)?;
-        let external = setting.motions.balanced(&setting.body, external);
-        let prescribed = setting.loads.prescribed_at(time);
-        let posed = agreed(setting.body.partition.ranks(), setting.posed(time))?;
+        let (problem, phases) = (self.problem, self.phases);
+        self.fill(&problem.triangle_means(zeta))?;
+        let external = phases.time("loads", || problem.load(time));
+        problem.check_load(time, &external)?;
+        let external = problem.motions.balanced(&problem.body, external);
+        let prescribed = problem.loads.prescribed_at(time);
+        let posed = agreed(problem.body.partition.comm(), problem.posed(time))?;
 
         self.start(time, &external, &posed)?;
-        let failed = |source| RunError::contact(setting.scene(), step, time, source);
+        let failed = |source| RunError::contact(problem.scene(), step, time, source);
         let mut total = ContactReport::default();
-        let (mut tolerance, mut attempts) = (setting.tolerance, 0);
+        let (mut tolerance, mut attempts) = (problem.tolerance, 0);
         loop {
             attempts += 1;
-            let (lift, bounds) = self.datum.pose(setting, &posed);
+            let (lift, bounds) = self.datum.pose(problem, &posed);
             let force = self.set_load(&external, &lift)?;
             let solved = match self.solve_contact(&bounds, force, tolerance) {
                 // All ranks know that the method stopped short; other errors may be one rank's.
@@ -160,7 +160,7 @@ impl<'a> Equilibrium<'a> {
             let judged = phases.time("certificate", || self.certify(&u, &external, &prescribed));
             // Rounding of a long way hides a small deformation: measured from the way's end it
             // has all its digits.
-            let certified = judged.kkt.within(setting.tolerance);
+            let certified = judged.kkt.within(problem.tolerance);
             let far = !self.datum.field.is_empty() && judged.sizes[0] > FAR * judged.sizes[1];
             if (far || !certified) && attempts < FOLLOWED && self.follow(&judged)? {
                 continue;
@@ -184,18 +184,18 @@ impl<'a> Equilibrium<'a> {
                 let (u, zeta_mean) = (self.datum.total(u), self.zeta_mean.clone());
                 let state = State { time, u, zeta: zeta.to_vec(), zeta_mean, contact };
                 let mut record = phases.time("figures", || {
-                    certificate::figures(setting, step, &state, &external, &total, &kkt)
+                    certificate::figures(problem, step, &state, &external, &total, &kkt)
                 });
                 record.seconds = started.elapsed().as_secs_f64();
                 return Ok(Step { state, record, unheld });
             }
             if attempts == ATTEMPTS || judged.kkt.worst().is_nan() {
-                let (method, tolerance) = (self.solver.name(), setting.tolerance);
+                let (method, tolerance) = (self.solver.name(), problem.tolerance);
                 let residuals = judged.kkt;
                 let error = ContactError::NotCertified { method, tolerance, residuals };
                 return Err(failed(self.limited(error, &judged, &u)));
             }
-            tolerance *= 0.3 * setting.tolerance / judged.kkt.worst();
+            tolerance *= 0.3 * problem.tolerance / judged.kkt.worst();
         }
     }
 
@@ -205,7 +205,7 @@ impl<'a> Equilibrium<'a> {
     fn with_floors(&self, own: Scales) -> Scales {
         let way = match self.datum.field[..] {
             [] => 0.0,
-            _ => CARRIED * self.setting.body.partition.largest(&self.datum.field),
+            _ => CARRIED * self.problem.body.partition.largest(&self.datum.field),
         };
         let force = own.force.max(self.scales.force).max(self.stiffness.scale * way);
         let least = way.max(force / self.stiffness.scale);
@@ -219,21 +219,21 @@ impl<'a> Equilibrium<'a> {
         external: &[f64],
         posed: &(Vec<f64>, Vec<Bound>),
     ) -> Result<(), PetscError> {
-        let setting = self.setting;
+        let problem = self.problem;
         let nothing = external.iter().chain(&posed.0).all(|&value| value == 0.0);
-        let rests = setting.body.partition.ranks().all(nothing);
+        let rests = problem.body.partition.comm().all(nothing);
         if rests {
             self.datum = Datum::default();
         }
         self.phases.time("extrapolation", || {
-            self.c.set(&self.datum.relative(setting, self.evolution.at(time)))
+            self.c.set(&self.datum.relative(problem, self.evolution.at(time)))
         })?;
         if rests { Ok(()) } else { self.approach(external, posed) }
     }
 
     /// Fills K for the triangle means of η_*(ζ).
     fn fill(&mut self, zeta_mean: &[f64]) -> Result<(), PetscError> {
-        if self.setting.body.partition.ranks().any(zeta_mean != self.zeta_mean) {
+        if self.problem.body.partition.comm().any(zeta_mean != self.zeta_mean) {
             let bytes = self.stiffness.refill_traffic();
             self.phases
                 .time_moving("stiffness refill", bytes, || self.stiffness.refill(zeta_mean))?;
@@ -244,7 +244,7 @@ impl<'a> Equilibrium<'a> {
 
     /// The last solve, at `time`, belongs to an accepted step.
     pub fn accept(&mut self, time: f64) -> Result<(), PetscError> {
-        let c = self.datum.absolute(self.setting, self.c.read(<[f64]>::to_vec)?);
+        let c = self.datum.absolute(self.problem, self.c.read(<[f64]>::to_vec)?);
         self.accepted_datum = self.datum.clone();
         self.scales = self.next_scales;
         self.active.clone_from(&self.next_active);
@@ -268,56 +268,56 @@ impl<'a> Equilibrium<'a> {
         external: &[f64],
         posed: &(Vec<f64>, Vec<Bound>),
     ) -> Result<(), PetscError> {
-        let setting = self.setting;
-        let (body, ranks) = (&setting.body, setting.body.partition.ranks());
-        if contact::unheld(ranks, &self.rigid, &self.active).is_empty() {
+        let problem = self.problem;
+        let (body, comm) = (&problem.body, problem.body.partition.comm());
+        if contact::unheld(comm, &self.rigid, &self.active).is_empty() {
             return Ok(());
         }
         // Prescribed displacements do no work on motions that they prevent.
-        let work = setting.motions.work(body, external);
-        let (_, bounds) = self.datum.pose(setting, posed);
+        let work = problem.motions.work(body, external);
+        let (_, bounds) = self.datum.pose(problem, posed);
         let way = self.c.read(|c| {
-            contact::approach(ranks, (&self.rigid, &work), &bounds, c, self.active.clone(), false)
+            contact::approach(comm, (&self.rigid, &work), &bounds, c, self.active.clone(), false)
         })?;
         // The start c moves along.
-        self.datum.add(setting, &setting.motions.displacement(body, &way.amplitudes));
+        self.datum.add(problem, &problem.motions.displacement(body, &way.amplitudes));
         Ok(())
     }
 
     /// Measures displacements from further on if the answer is mostly a rigid motion.
     fn follow(&mut self, judged: &Judged) -> Result<bool, PetscError> {
-        let c = self.datum.absolute(self.setting, self.c.read(<[f64]>::to_vec)?);
+        let c = self.datum.absolute(self.problem, self.c.read(<[f64]>::to_vec)?);
         let [rigid, rest] = judged.sizes;
         if rigid <= DOMINANT * rest {
             return Ok(false);
         }
-        let nodes = &self.setting.body.mesh.nodes;
+        let nodes = &self.problem.body.mesh.nodes;
         let motion: Vec<f64> = nodes.iter().flat_map(|&x| judged.rigid.at(x)).collect();
-        self.datum.add(self.setting, &motion);
-        self.c.set(&self.datum.relative(self.setting, c))?;
+        self.datum.add(self.problem, &motion);
+        self.c.set(&self.datum.relative(self.problem, c))?;
         Ok(true)
     }
 
     /// Sets the load of the free unknowns, f − K u_D, and returns the size of forces.
     fn set_load(&mut self, external: &[f64], lift: &[f64]) -> Result<f64, PetscError> {
-        let setting = self.setting;
-        let (body, frames) = (&setting.body, &setting.constraints.frames);
+        let problem = self.problem;
+        let (body, bases) = (&problem.body, &problem.constraints.bases);
         let mut load = external.to_vec();
         let mut scale = body.partition.norm(&load, 2);
-        if body.partition.ranks().any(lift.iter().any(|&v| v != 0.0)) {
+        if body.partition.comm().any(lift.iter().any(|&v| v != 0.0)) {
             let mut u = lift.to_vec();
-            frames.displacement_from_frame(&mut u);
-            let internal = setting.elasticity.internal_force(body, &self.zeta_mean, &u);
+            bases.displacement_to_global(&mut u);
+            let internal = problem.elasticity.internal_force(body, &self.zeta_mean, &u);
             load.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
             scale = scale.max(LIFTED * body.partition.norm(&load, 2));
         }
-        frames.force_to_frame(&mut load);
+        bases.force_to_local(&mut load);
         load.iter_mut()
-            .zip(frames.fixed())
+            .zip(bases.fixed())
             .for_each(|(f, fixed)| *f = if *fixed { 0.0 } else { *f });
         self.load.set(&load[..self.load.owned()])?;
         // Prescribed displacements do no work on motions that they hold.
-        self.work = setting.motions.work(body, external);
+        self.work = problem.motions.work(body, external);
         Ok(scale)
     }
 
@@ -328,15 +328,15 @@ impl<'a> Equilibrium<'a> {
         force: f64,
         tolerance: f64,
     ) -> Result<ContactReport, ContactError> {
-        let setting = self.setting;
-        let ranks = setting.body.partition.ranks();
+        let problem = self.problem;
+        let comm = problem.body.partition.comm();
         let rests = |bound: &Bound| bound.nearest(0.0) == 0.0;
-        if ranks.all(self.load.read(|f| f.iter().all(|&f| f == 0.0))? && bounds.iter().all(rests)) {
+        if comm.all(self.load.read(|f| f.iter().all(|&f| f == 0.0))? && bounds.iter().all(rests)) {
             // Nothing pushes and no obstacle is in the way: the body rests.
             self.c.write(|c| c.fill(0.0))?;
             return Ok(ContactReport::default());
         }
-        let problem = ContactProblem {
+        let contact = ContactProblem {
             stiffness: &self.stiffness.matrix,
             stiffness_scale: self.stiffness.scale,
             load: &self.load,
@@ -345,20 +345,20 @@ impl<'a> Equilibrium<'a> {
             work: &self.work,
             scales: self.with_floors(Scales { force, displacement: 0.0 }),
             tolerance,
-            ranks,
+            comm,
             phases: self.phases,
         };
-        self.phases.time("contact", || self.solver.solve(&problem, &mut self.c))
+        self.phases.time("contact", || self.solver.solve(&contact, &mut self.c))
     }
 
     /// u from the unknowns c and the prescribed ones, without free rigid motions.
     fn displacement(&self, lift: &[f64]) -> Result<Vec<f64>, PetscError> {
-        let setting = self.setting;
+        let problem = self.problem;
         let mut u = lift.to_vec();
         self.c.read(|c| u.iter_mut().zip(c).for_each(|(u, c)| *u += c))?;
-        setting.constraints.frames.displacement_from_frame(&mut u);
-        setting.body.partition.update(&mut u, 2)?;
-        setting.motions.remove_free(&setting.body, &mut u);
+        problem.constraints.bases.displacement_to_global(&mut u);
+        problem.body.partition.update(&mut u, 2)?;
+        problem.motions.remove_free(&problem.body, &mut u);
         Ok(u)
     }
 }

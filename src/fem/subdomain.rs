@@ -10,7 +10,7 @@ use std::collections::HashMap;
 /// The nodes and triangles of a whole body that a rank keeps: the nodes it owns, the triangles
 /// around them, and the other nodes of these as ghosts.
 #[derive(Debug)]
-pub struct Share {
+pub struct Subdomain {
     /// Whole numbers of the rank's nodes, owned ones first.
     nodes: Vec<usize>,
     owned: usize,
@@ -22,47 +22,47 @@ pub struct Share {
     partition: Partition,
 }
 
-impl Share {
+impl Subdomain {
     /// Divides the nodes of `mesh`; `None` where one rank keeps it all. Collective.
     ///
     /// # Errors
     /// PETSc cannot divide it.
     pub fn of(session: &Session, mesh: &Mesh) -> Result<Option<Self>, PetscError> {
-        let ranks = session.ranks();
-        if ranks.is_alone() {
+        let comm = session.comm();
+        if comm.is_serial() {
             return Ok(None);
         }
         let total = mesh.nodes.len();
         let owner = divide(session, total, &mesh.triangles)?;
-        let mut nodes: Vec<usize> = (0..total).filter(|&i| owner[i] == ranks.rank()).collect();
+        let mut nodes: Vec<usize> = (0..total).filter(|&i| owner[i] == comm.rank()).collect();
         let owned = nodes.len();
         // A triangle belongs to the owner of its first node.
-        let around = |t: &usize| mesh.triangles[*t].iter().any(|&i| owner[i] == ranks.rank());
-        let own = |t: &usize| owner[mesh.triangles[*t][0]] == ranks.rank();
+        let around = |t: &usize| mesh.triangles[*t].iter().any(|&i| owner[i] == comm.rank());
+        let own = |t: &usize| owner[mesh.triangles[*t][0]] == comm.rank();
         let mut triangles: Vec<usize> = (0..mesh.triangles.len()).filter(own).collect();
         let own_triangles = triangles.len();
         triangles.extend((0..mesh.triangles.len()).filter(|t| around(t) && !own(t)));
 
         let corners = triangles.iter().flat_map(|&t| mesh.triangles[t]);
-        let mut ghosts: Vec<usize> = corners.filter(|&i| owner[i] != ranks.rank()).collect();
+        let mut ghosts: Vec<usize> = corners.filter(|&i| owner[i] != comm.rank()).collect();
         ghosts.sort_unstable();
         ghosts.dedup();
         nodes.extend(&ghosts);
 
         // Numbers among the nodes of the same owner, and the first number of each owner.
-        let mut counts = vec![0; ranks.size()];
+        let mut counts = vec![0; comm.size()];
         let mut place = vec![0; total];
         for (place, &owner) in place.iter_mut().zip(&owner) {
             *place = counts[owner];
             counts[owner] += 1;
         }
-        let first: Vec<usize> = (0..ranks.size()).map(|r| counts[..r].iter().sum()).collect();
+        let first: Vec<usize> = (0..comm.size()).map(|r| counts[..r].iter().sum()).collect();
         let global = nodes.iter().map(|&i| (first[owner[i]] + place[i]) as i32).collect();
         let roots: Vec<_> = ghosts.iter().map(|&i| (owner[i], place[i])).collect();
         let ghosts = Ghosts::new(session, owned, &roots)?;
         Ok(Some(Self {
             local: nodes.iter().enumerate().map(|(local, &whole)| (whole, local)).collect(),
-            partition: Partition::part(ranks, owned, total, global, ghosts),
+            partition: Partition::part(comm, owned, total, global, ghosts),
             nodes,
             owned,
             triangles,

@@ -6,7 +6,7 @@ use crate::{
         Bound, Certificate, ConstraintError, Constraints, DrivenMotion, FixedRow, GapRow,
         RigidMotions, join_gap,
     },
-    fem::{Body, Elasticity, Mass, Share},
+    fem::{Body, Elasticity, Mass, Subdomain},
     mesh::{Mesh, boundary_nodes},
     model::DamageLaw,
     petsc::{PetscError, Session},
@@ -16,7 +16,7 @@ use std::{collections::BTreeMap, path::PathBuf};
 
 /// A scene on its mesh, ready to be stepped.
 #[derive(Debug)]
-pub struct Setting {
+pub struct DiscreteProblem {
     /// The body.
     pub body: Body,
     /// The undamaged elastic operator.
@@ -83,7 +83,7 @@ pub enum SetupError {
     },
 }
 
-impl Setting {
+impl DiscreteProblem {
     /// Binds `scene` to `mesh` and checks that there is a solution at all times.
     ///
     /// # Errors
@@ -109,7 +109,7 @@ impl Setting {
         let sizes = scene.sample_times(SAMPLES).into_iter();
         let sizes = sizes.map(|time| body.partition.norm(&loads.at(&body, time), 2));
         let largest_load = sizes.filter(|size| size.is_finite()).fold(0.0, f64::max);
-        let setting = Self {
+        let problem = Self {
             largest_load,
             foundation: Foundation::new(&scene, &body.mesh, &constraints),
             unresolved: resultants::unresolved(&scene, &body.mesh),
@@ -122,22 +122,22 @@ impl Setting {
             body,
             scene,
         };
-        setting.check_times()?;
-        Ok(setting)
+        problem.check_times()?;
+        Ok(problem)
     }
 
     /// This rank's share of a setting that every rank has made. Collective.
     ///
     /// # Errors
     /// PETSc cannot divide the mesh.
-    pub fn share(self, session: &Session) -> Result<Self, PetscError> {
-        let Some(share) = Share::of(session, &self.body.mesh)? else { return Ok(self) };
+    pub fn restrict(self, session: &Session) -> Result<Self, PetscError> {
+        let Some(subdomain) = Subdomain::of(session, &self.body.mesh)? else { return Ok(self) };
         Ok(Self {
-            constraints: self.constraints.share(&share),
-            certificate: self.certificate.share(&share),
-            motions: self.motions.share(&share),
-            loads: self.loads.share(&share),
-            body: share.body(&self.body),
+            constraints: self.constraints.restrict(&subdomain),
+            certificate: self.certificate.restrict(&subdomain),
+            motions: self.motions.restrict(&subdomain),
+            loads: self.loads.restrict(&subdomain),
+            body: subdomain.body(&self.body),
             ..self
         })
     }
@@ -174,8 +174,8 @@ impl Setting {
     /// # Errors
     /// It is not, or it does; the error then names the motion.
     pub fn check_load(&self, time: f64, load: &[f64]) -> Result<(), SetupError> {
-        let ranks = self.body.partition.ranks();
-        if !ranks.all(load.iter().all(|f| f.is_finite())) {
+        let comm = self.body.partition.comm();
+        if !comm.all(load.iter().all(|f| f.is_finite())) {
             return Err(self.not_finite(time));
         }
         if self.motions.held() {
@@ -307,8 +307,8 @@ fn gap_rows(scene: &Scene, mesh: &Mesh) -> Vec<GapRow> {
             let node = point.node;
             let distance = gap.at(mesh.nodes[node]);
             let rows = rows.entry(node).or_default();
-            let mut row = |normal, weight| {
-                join_gap(rows, &GapRow { node, normal, gap: distance, weight });
+            let mut row = |normal, tributary_length| {
+                join_gap(rows, &GapRow { node, normal, gap: distance, tributary_length });
             };
             match gap.normal {
                 Some(normal) => row(normal, point.faces.iter().map(|f| f.length).sum()),

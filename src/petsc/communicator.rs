@@ -12,14 +12,14 @@ use std::{
 /// Every reduction is collective: all ranks call it, at the same point of the run, and all get the
 /// same answer to the last bit. Alone, a rank does nothing for it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Ranks {
+pub struct Communicator {
     rank: usize,
     size: usize,
 }
 
-impl Ranks {
+impl Communicator {
     /// One rank that holds everything.
-    pub fn alone() -> Self {
+    pub fn serial() -> Self {
         Self { rank: 0, size: 1 }
     }
 
@@ -52,12 +52,12 @@ impl Ranks {
     }
 
     /// Whether this is the only one.
-    pub fn is_alone(self) -> bool {
+    pub fn is_serial(self) -> bool {
         self.size == 1
     }
 
     /// Whether this is the rank that speaks and writes for all.
-    pub fn is_first(self) -> bool {
+    pub fn is_root(self) -> bool {
         self.rank == 0
     }
 
@@ -78,7 +78,7 @@ impl Ranks {
 
     /// The largest of the ranks' values; NaN counts as −∞.
     pub fn max(self, value: f64) -> f64 {
-        match self.is_alone() {
+        match self.is_serial() {
             true => value,
             false => {
                 let value = if value.is_nan() { f64::NEG_INFINITY } else { value };
@@ -89,24 +89,24 @@ impl Ranks {
 
     /// The least of the ranks' values; NaN counts as ∞.
     pub fn min(self, value: f64) -> f64 {
-        if self.is_alone() { value } else { -self.max(-value) }
+        if self.is_serial() { value } else { -self.max(-value) }
     }
 
     /// The least of the ranks' values and the first rank that has it.
-    pub fn least(self, value: f64) -> (f64, usize) {
+    pub fn min_with_rank(self, value: f64) -> (f64, usize) {
         let least = self.min(value);
         let first = self.min(if value == least { self.rank as f64 } else { f64::INFINITY });
         (least, first as usize)
     }
 
     /// The value of the rank numbered `from`.
-    pub fn value_of(self, from: usize, value: f64) -> f64 {
+    pub fn broadcast(self, from: usize, value: f64) -> f64 {
         self.total(if self.rank == from { value } else { 0.0 })
     }
 
     /// Whether it holds on some rank.
     pub fn any(self, on_this: bool) -> bool {
-        if self.is_alone() { on_this } else { self.max(f64::from(u8::from(on_this))) > 0.0 }
+        if self.is_serial() { on_this } else { self.max(f64::from(u8::from(on_this))) > 0.0 }
     }
 
     /// Whether it holds on every rank.
@@ -124,8 +124,8 @@ impl Ranks {
 
     /// Waits until all ranks have come here, for at most `patience` if one is given. Collective, or
     /// false: then some rank waits elsewhere for what this one will not do.
-    pub fn meet(self, patience: Option<Duration>) -> bool {
-        if self.is_alone() {
+    pub fn barrier(self, patience: Option<Duration>) -> bool {
+        if self.is_serial() {
             return true;
         }
         let started = Instant::now();
@@ -146,7 +146,7 @@ impl Ranks {
 
     /// Ends all ranks at once with an exit code, wherever they are.
     pub fn abort(self, code: u8) -> ! {
-        if !self.is_alone() {
+        if !self.is_serial() {
             // SAFETY: MPI runs on several ranks.
             unsafe { raw::MPI_Abort(world(), i32::from(code)) };
         }
@@ -160,7 +160,7 @@ impl Ranks {
     }
 
     fn reduce(self, values: &mut [f64], operation: Operation) {
-        if self.is_alone() {
+        if self.is_serial() {
             return;
         }
         // SAFETY: more ranks than one come from `of_world`; MPI reads its own `count` values and
@@ -199,9 +199,9 @@ mod tests {
 
     #[test]
     fn alone_every_reduction_is_the_value_itself() {
-        let alone = Ranks::alone();
+        let alone = Communicator::serial();
         assert_eq!((alone.total(0.1), alone.max(0.2), alone.min(0.3)), (0.1, 0.2, 0.3));
-        assert_eq!((alone.least(-1.0), alone.value_of(0, 5.0)), ((-1.0, 0), 5.0));
+        assert_eq!((alone.min_with_rank(-1.0), alone.broadcast(0, 5.0)), ((-1.0, 0), 5.0));
         assert_eq!((alone.any(true), alone.all(false), alone.count(7)), (true, false, 7));
         assert_eq!(alone.gather(&[1.0, 2.0]), [1.0, 2.0]);
     }

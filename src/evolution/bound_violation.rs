@@ -44,7 +44,7 @@ impl Bounds {
 
 /// By how much ζ left the bounds of its equation in a run.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Excess {
+pub struct BoundViolation {
     /// Largest ζ beyond the least max ζ before it.
     pub above: f64,
     /// Largest gap from ζ up to what the sources before it allow.
@@ -53,7 +53,7 @@ pub struct Excess {
     pub first: Option<(usize, f64)>,
 }
 
-impl Excess {
+impl BoundViolation {
     /// Looks at the extremes of ζ of a step.
     pub(super) fn observe(
         &mut self,

@@ -1,8 +1,8 @@
 //! How far an answer may be off although its KKT residuals are small.
 
-use super::Equilibrium;
+use super::ContactStep;
 use crate::{
-    evolution::{Accuracy, Setting, State, Step},
+    evolution::{Accuracy, DiscreteProblem, State, Step},
     fem::{RigidPart, Stiffness},
     petsc::{LinearSolver, PetscError, Session, Vector},
 };
@@ -12,7 +12,7 @@ const CARRIED: f64 = 1e-11;
 /// A part of the promised error that an estimate may reach before another is made.
 const SAFE: f64 = 0.1;
 
-impl Equilibrium<'_> {
+impl ContactStep<'_> {
     /// Estimates the errors of the `last` answer of a run, and of the `worst` one before it, whose
     /// stationarity is given, relative to the displacements of the `largest` one. Costs a
     /// factorisation, in the place of the solver's own; a second one if the first error, enlarged as
@@ -26,8 +26,8 @@ impl Equilibrium<'_> {
         worst: Option<&(f64, State)>,
         largest: Option<&(f64, State)>,
     ) -> Result<Accuracy, PetscError> {
-        let (session, setting, stiffness) = (self.session, self.setting, self.stiffness);
-        let (body, elasticity, state) = (&setting.body, &setting.elasticity, &last.state);
+        let (session, problem, stiffness) = (self.session, self.problem, self.stiffness);
+        let (body, elasticity, state) = (&problem.body, &problem.elasticity, &last.state);
         drop(self.solver);
         let last_size = (last.record.displacement_max, state);
         let (size, resolved) = largest.map_or(last_size, |(size, state)| (*size, state));
@@ -37,15 +37,15 @@ impl Equilibrium<'_> {
             true => elasticity.energy_error(body, &resolved.zeta_mean, &resolved.u)?,
             false => 0.0,
         };
-        let displacement = displacement_error(session, setting, stiffness, state, size)?;
+        let displacement = displacement_error(session, problem, stiffness, state, size)?;
         let accuracy = Accuracy { displacement, energy, time: state.time };
         let Some((residual, state)) = worst else { return Ok(accuracy) };
         let expected = displacement * (residual / last.record.kkt_stationarity).max(1.0);
-        if expected <= SAFE * Accuracy::promised(setting.tolerance) {
+        if expected <= SAFE * Accuracy::promised(problem.tolerance) {
             return Ok(accuracy);
         }
-        let stiffness = Stiffness::new(session, body, elasticity, &setting.constraints.frames)?;
-        let displacement = displacement_error(session, setting, stiffness, state, size)?;
+        let stiffness = Stiffness::new(session, body, elasticity, &problem.constraints.bases)?;
+        let displacement = displacement_error(session, problem, stiffness, state, size)?;
         Ok(match displacement > accuracy.displacement {
             true => Accuracy { displacement, time: state.time, ..accuracy },
             false => accuracy,
@@ -57,26 +57,26 @@ impl Equilibrium<'_> {
 /// for.
 fn displacement_error(
     session: &Session,
-    setting: &Setting,
+    problem: &DiscreteProblem,
     mut stiffness: Stiffness,
     state: &State,
     size: f64,
 ) -> Result<f64, PetscError> {
-    if size == 0.0 || setting.body.partition.largest(&state.u) == 0.0 {
+    if size == 0.0 || problem.body.partition.largest(&state.u) == 0.0 {
         return Ok(0.0);
     }
     stiffness.refill(&state.zeta_mean)?;
-    let (body, constraints) = (&setting.body, &setting.constraints);
-    let internal = setting.elasticity.internal_force(body, &state.zeta_mean, &state.u);
-    let external = setting.load(state.time);
+    let (body, constraints) = (&problem.body, &problem.constraints);
+    let internal = problem.elasticity.internal_force(body, &state.zeta_mean, &state.u);
+    let external = problem.load(state.time);
     let mut residual: Vec<f64> = external.iter().zip(&internal).map(|(f, r)| f - r).collect();
-    constraints.frames.force_to_frame(&mut residual);
+    constraints.bases.force_to_local(&mut residual);
     let active = state.contact.iter().filter(|point| point.active);
     let bounds = active.filter_map(|p| constraints.bound_along(p.node, p.normal));
     let mut pressing: Vec<usize> = bounds.map(|i| constraints.bounds[i].dof).collect();
     pressing.dedup();
     pressing.iter().for_each(|&dof| residual[dof] = 0.0);
-    let fixed = constraints.frames.fixed();
+    let fixed = constraints.bases.fixed();
     residual.iter_mut().zip(fixed).filter(|(_, on)| **on).for_each(|(r, _)| *r = 0.0);
 
     let mut rhs = Vector::zeros(session, 2 * body.partition.owned())?;
@@ -92,7 +92,7 @@ fn displacement_error(
         return Ok(f64::INFINITY);
     }
     let mut correction = body.partition.field(correction.read(<[f64]>::to_vec)?, 2)?;
-    constraints.frames.displacement_from_frame(&mut correction);
-    setting.motions.remove_free(body, &mut correction);
+    constraints.bases.displacement_to_global(&mut correction);
+    problem.motions.remove_free(body, &mut correction);
     Ok(body.partition.largest(&correction) / size)
 }

@@ -1,9 +1,9 @@
 //! What an answer is worth, from the displacement alone: residuals, contact, figures.
 
-use super::{Equilibrium, ROUNDED};
+use super::{ContactStep, ROUNDED};
 use crate::{
     contact::{self, Answer, ContactError, ContactPoint, ContactReport, Kkt, RigidMotion, Scales},
-    evolution::{Setting, State, StepRecord},
+    evolution::{DiscreteProblem, State, StepRecord},
     fem::RigidPart,
 };
 
@@ -22,12 +22,12 @@ pub(super) struct Judged {
     pub(super) sizes: [f64; 2],
 }
 
-impl Equilibrium<'_> {
+impl ContactStep<'_> {
     /// Judges u, measured from the datum, by element-wise forces.
     pub(super) fn certify(&self, u: &[f64], external: &[f64], prescribed: &[f64]) -> Judged {
-        let setting = self.setting;
-        let (body, partition) = (&setting.body, &setting.body.partition);
-        let internal = setting.elasticity.internal_force(body, &self.zeta_mean, u);
+        let problem = self.problem;
+        let (body, partition) = (&problem.body, &problem.body.partition);
+        let internal = problem.elasticity.internal_force(body, &self.zeta_mean, u);
         let rigid = RigidPart::of(body, u);
         let sizes = rigid.sizes(body, u);
         // |f|², |Ku|², u·Ku and |u|².
@@ -40,15 +40,14 @@ impl Equilibrium<'_> {
             sums[3] += u * u;
             *r = f - *r;
         }
-        partition.ranks().sum(&mut sums);
+        partition.comm().sum(&mut sums);
         let force = sums[0].max(sums[1]).sqrt();
         let scales = self.with_floors(Scales { force, displacement: sizes[1] });
         let energy = sums[2] / (scales.force * sums[3].sqrt()).max(f64::MIN_POSITIVE);
         let answer =
             Answer { rigid: &self.datum.field, elastic: u, unbalanced: &unbalanced, prescribed };
-        let ranks = partition.ranks();
-        let (mut kkt, contact) =
-            setting.certificate.judge(answer, partition.owned(), scales, ranks);
+        let comm = partition.comm();
+        let (mut kkt, contact) = problem.certificate.judge(answer, partition.owned(), scales, comm);
         if !self.covered {
             kkt.stationarity = f64::NAN;
         }
@@ -58,11 +57,11 @@ impl Equilibrium<'_> {
     /// Adds to an error what double precision can reach, where that is less than was asked for and
     /// what was reached: the rounding of the internal forces of u alone.
     pub(super) fn limited(&self, error: ContactError, judged: &Judged, u: &[f64]) -> ContactError {
-        let setting = self.setting;
-        let rounding = setting.elasticity.force_rounding(&setting.body, &self.zeta_mean, u);
-        let rounding = setting.body.partition.norm(&rounding, 2) / judged.scales.force;
+        let problem = self.problem;
+        let rounding = problem.elasticity.force_rounding(&problem.body, &self.zeta_mean, u);
+        let rounding = problem.body.partition.norm(&rounding, 2) / judged.scales.force;
         let attainable = ROUNDED * rounding;
-        match attainable > setting.tolerance && judged.kkt.within(attainable) && attainable < 1.0 {
+        match attainable > problem.tolerance && judged.kkt.within(attainable) && attainable < 1.0 {
             true => ContactError::Limited { source: Box::new(error), attainable },
             false => error,
         }
@@ -70,7 +69,7 @@ impl Equilibrium<'_> {
 
     /// Which bounds a contact force above `least`, N/m, acts on.
     pub(super) fn active_bounds(&self, contact: &[ContactPoint], least: f64) -> Vec<bool> {
-        let constraints = &self.setting.constraints;
+        let constraints = &self.problem.constraints;
         let mut active = vec![false; constraints.bounds.len()];
         for point in contact.iter().filter(|point| point.active && point.force > least) {
             if let Some(bound) = constraints.bound_along(point.node, point.normal) {
@@ -86,19 +85,19 @@ impl Equilibrium<'_> {
         // A residual at the tolerance does work of up to √N times that on a motion (Cauchy and
         // Schwarz), which at the lever of one mesh width, 1/√N of the body, is a force √N times
         // as large: a smaller one holds nothing for certain.
-        let partition = &self.setting.body.partition;
+        let partition = &self.problem.body.partition;
         let nodes = partition.total() as f64;
-        let least = nodes * self.setting.tolerance * force_scale;
+        let least = nodes * self.problem.tolerance * force_scale;
         let pressing = self.active_bounds(contact, least);
-        let unheld = contact::unheld(partition.ranks(), &self.rigid, &pressing);
+        let unheld = contact::unheld(partition.comm(), &self.rigid, &pressing);
         let first = unheld.first().filter(|_| force_scale > 0.0)?;
-        Some(self.setting.motions.combined(first))
+        Some(self.problem.motions.combined(first))
     }
 }
 
 /// The row of an answer in the history.
 pub(super) fn figures(
-    setting: &Setting,
+    problem: &DiscreteProblem,
     step: usize,
     state: &State,
     external: &[f64],
@@ -108,18 +107,18 @@ pub(super) fn figures(
     let mut active: Vec<usize> =
         state.contact.iter().filter(|point| point.active).map(|point| point.node).collect();
     active.dedup();
-    let partition = &setting.body.partition;
-    let ranks = partition.ranks();
+    let partition = &problem.body.partition;
+    let comm = partition.comm();
     StepRecord {
         step,
         time: state.time,
         zeta_min: partition.extremes(&state.zeta).0,
-        zeta_mean: setting.body.mean(&state.zeta),
+        zeta_mean: problem.body.mean(&state.zeta),
         displacement_max: partition.largest(&state.u),
         work: partition.dot(external, &state.u, 2),
         // An empty sum is -0.0, and so is one of reactions of nothing.
-        contact_force: ranks.total(state.contact.iter().map(|point| point.force).sum()) + 0.0,
-        active_nodes: ranks.count(active.len()),
+        contact_force: comm.total(state.contact.iter().map(|point| point.force).sum()) + 0.0,
+        active_nodes: comm.count(active.len()),
         iterations: report.iterations,
         linear_iterations: report.linear_iterations,
         factorisations: report.factorisations,

@@ -12,22 +12,22 @@ use tempfile::TempDir;
 pub const SCENE: &str = include_str!("scene.toml");
 
 /// A temporary folder that holds `scene.toml` and `square.msh`.
-pub struct Desk(TempDir);
+pub struct TestDirectory(TempDir);
 
 /// What the program said, and its exit code.
 #[derive(Debug)]
-pub struct Said {
+pub struct ProgramOutput {
     pub code: Option<i32>,
     pub out: String,
     pub err: String,
 }
 
-impl Desk {
+impl TestDirectory {
     pub fn new() -> Self {
-        let desk = Self(tempfile::tempdir().expect("a temporary folder"));
-        desk.write("scene.toml", SCENE);
-        desk.write("square.msh", &square(4));
-        desk
+        let test_directory = Self(tempfile::tempdir().expect("a temporary folder"));
+        test_directory.write("scene.toml", SCENE);
+        test_directory.write("square.msh", &square(4));
+        test_directory
     }
 
     pub fn path(&self, name: &str) -> PathBuf {
@@ -36,8 +36,9 @@ impl Desk {
 
     pub fn write(&self, name: &str, content: &str) {
         let path = self.path(name);
-        fs::create_dir_all(path.parent().expect("a folder")).expect("the desk is writable");
-        fs::write(path, content).expect("the desk is writable");
+        fs::create_dir_all(path.parent().expect("a folder"))
+            .expect("the test_directory is writable");
+        fs::write(path, content).expect("the test_directory is writable");
     }
 
     pub fn read(&self, name: &str) -> String {
@@ -81,7 +82,7 @@ impl Desk {
         names
     }
 
-    /// All files below the desk with their content.
+    /// All files below the test_directory with their content.
     pub fn everything(&self) -> BTreeMap<PathBuf, Vec<u8>> {
         fn add(folder: &Path, all: &mut BTreeMap<PathBuf, Vec<u8>>) {
             for path in fs::read_dir(folder).expect("readable").flatten().map(|e| e.path()) {
@@ -106,20 +107,20 @@ impl Desk {
         command
     }
 
-    pub fn say(&self, arguments: &[&str]) -> Said {
-        Said::of(&mut self.command(arguments))
+    pub fn say(&self, arguments: &[&str]) -> ProgramOutput {
+        ProgramOutput::of(&mut self.command(arguments))
     }
 
     /// Runs the scene, which must go well.
     #[track_caller]
-    pub fn run(&self, arguments: &[&str]) -> Said {
+    pub fn run(&self, arguments: &[&str]) -> ProgramOutput {
         let said = self.say(&[&["run", "scene.toml"], arguments].concat());
         assert_eq!(said.code, Some(0), "{said:?}");
         said
     }
 }
 
-impl Said {
+impl ProgramOutput {
     pub fn of(command: &mut Command) -> Self {
         let output = command.output().expect("the program starts");
         let text = |bytes| String::from_utf8(bytes).expect("UTF-8");
