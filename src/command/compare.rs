@@ -1,15 +1,14 @@
 //! `signorini compare`: all contact solvers on the same scenes.
 
-use super::{Failure, check_petsc, check_solver, screen::say};
+use super::{
+    Failure, check_petsc, check_solver,
+    comparison::{Entry, compare},
+    screen::say,
+};
 use clap::Args;
 use comfy_table::{CellAlignment, Table, presets};
 use signorini::{
-    contact::SOLVERS,
-    evolution::DiscreteProblem,
-    mesh, output,
-    petsc::Session,
-    scene::Scene,
-    study::{Entry, compare},
+    contact::SOLVERS, evolution::DiscreteProblem, mesh, output, petsc::Session, scene::Scene,
 };
 use std::path::PathBuf;
 

@@ -2,6 +2,7 @@
 
 mod chart;
 mod compare;
+mod comparison;
 mod converge;
 mod floor;
 mod profile;

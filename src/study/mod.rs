@@ -1,7 +1,6 @@
 //! Studies: many runs and what they say together.
 
 mod chart;
-mod compare;
 mod converge;
 mod error;
 mod floor;
@@ -15,7 +14,6 @@ mod store;
 mod study_run;
 
 pub use chart::{ChartRow, chart};
-pub use compare::{Comparison, Entry, compare};
 pub use converge::{Convergence, ErrorRow, MEASURES, Measure, converge};
 pub use error::StudyError;
 pub use floor::{Floor, Part, floor};

@@ -1,11 +1,11 @@
 //! All contact solvers on one scene, side by side.
 
-use crate::{
+use serde::Serialize;
+use signorini::{
     contact::Kkt,
     evolution::{self, DiscreteProblem, Phases, RunError, State, StepRecord},
     petsc::Session,
 };
-use serde::Serialize;
 
 /// The solvers of one scene, in the order they were named.
 #[derive(Debug)]
