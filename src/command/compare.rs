@@ -53,8 +53,7 @@ pub fn compare_scenes(arguments: &CompareArguments) -> Result<(), Failure> {
     let session = Session::start(&arguments.petsc).map_err(Failure::solver)?;
     let mut entries = Vec::new();
     for problem in &settings {
-        let comparison = compare(&session, problem, &solvers).map_err(Failure::solver)?;
-        entries.extend(comparison.entries);
+        entries.extend(compare(&session, problem, &solvers).map_err(Failure::solver)?);
     }
     session.finalize().map_err(Failure::solver)?;
     say(&table(&entries).to_string());

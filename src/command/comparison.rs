@@ -7,13 +7,6 @@ use signorini::{
     petsc::Session,
 };
 
-/// The solvers of one scene, in the order they were named.
-#[derive(Debug)]
-pub struct Comparison {
-    /// One entry per solver.
-    pub entries: Vec<Entry>,
-}
-
 /// What a solver took for a whole run, and how its answer differs from the most accurate one.
 #[derive(Debug, Clone, Serialize)]
 pub struct Entry {
@@ -54,7 +47,8 @@ pub struct Entry {
 }
 
 /// Runs `problem` with each of `solvers` and compares the final states with that of the
-/// smallest KKT residuals. A failed run is an entry with its error.
+/// smallest KKT residuals: an entry per solver, in their order. A failed run is an entry with its
+/// error.
 ///
 /// # Errors
 /// Only what no solver is to blame for: PETSc or bad input.
@@ -62,7 +56,7 @@ pub fn compare(
     session: &Session,
     problem: &DiscreteProblem,
     solvers: &[&str],
-) -> Result<Comparison, RunError> {
+) -> Result<Vec<Entry>, RunError> {
     let mut runs = Vec::new();
     for solver in solvers {
         runs.push(run(session, problem, solver)?);
@@ -81,7 +75,7 @@ pub fn compare(
         }
         entry
     };
-    Ok(Comparison { entries: runs.into_iter().map(measured).collect() })
+    Ok(runs.into_iter().map(measured).collect())
 }
 
 impl Entry {

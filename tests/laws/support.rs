@@ -1,23 +1,32 @@
 //! Meshes, scenes and runs for the laws.
 
+use rand_xoshiro::{
+    SplitMix64,
+    rand_core::{Rng, SeedableRng},
+};
 use signorini::{
     evolution::{self, DiscreteProblem, Outcome, Phases, RunError, SetupError, Step},
-    mesh::{self, Curve, Mesh},
+    mesh::{self, Mesh},
     petsc::Session,
     scene::Scene,
 };
+use slope::slope;
 use std::{collections::BTreeMap, fs, path::Path};
 
-/// Numbers between −1 and 1, the same at every run (SplitMix64).
-pub struct Random(pub u64);
+// The studies fit orders too.
+#[path = "../../validation/study/src/slope.rs"]
+mod slope;
+
+/// Numbers between −1 and 1, the same at every run.
+pub struct Random(SplitMix64);
 
 impl Random {
+    pub fn new(seed: u64) -> Self {
+        Self(SplitMix64::seed_from_u64(seed))
+    }
+
     pub fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        (self.0.next_u64() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
     }
 
     pub fn field(&mut self, length: usize) -> Vec<f64> {
@@ -27,35 +36,13 @@ impl Random {
 
 /// The unit square, n×n cells cut along the rising diagonal, with its four sides.
 pub fn square(n: usize) -> Mesh {
-    let node = |i: usize, j: usize| i + (n + 1) * j;
-    let at = |k: usize| k as f64 / n as f64;
-    let nodes = (0..=n).flat_map(|j| (0..=n).map(move |i| [at(i), at(j)])).collect();
-    let cells = (0..n).flat_map(|j| (0..n).map(move |i| (i, j)));
-    let cut = |(i, j): (usize, usize)| {
-        let [a, b, c, d] = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)];
-        [[a, b, c], [a, c, d]]
-    };
-    let side = |edge: &dyn Fn(usize) -> [usize; 2]| Curve {
-        edges: (0..n).map(edge).collect(),
-        interior_edges: 0,
-    };
-    let curves = [
-        ("bottom", side(&|i| [node(i, 0), node(i + 1, 0)])),
-        ("right", side(&|j| [node(n, j), node(n, j + 1)])),
-        ("top", side(&|i| [node(i + 1, n), node(i, n)])),
-        ("left", side(&|j| [node(0, j + 1), node(0, j)])),
-    ];
-    Mesh {
-        nodes,
-        triangles: cells.flat_map(cut).collect(),
-        curves: curves.map(|(name, curve)| (name.to_owned(), curve)).into(),
-    }
+    Mesh::rectangle(1.0, 1.0, n, n)
 }
 
 /// The same with its inner nodes moved at random, by up to 0.3 cells in x and y, and those
 /// on the sides along them.
 pub fn distorted(n: usize) -> Mesh {
-    let (mut mesh, mut random) = (square(n), Random(n as u64));
+    let (mut mesh, mut random) = (square(n), Random::new(n as u64));
     let reach = 0.3 / n as f64;
     for node in &mut mesh.nodes {
         for x in node {
@@ -186,13 +173,9 @@ pub fn close_to(value: f64, expected: f64, tolerance: f64) {
     assert!(error <= tolerance, "{value} is not {expected}: {error:.1e} > {tolerance:.1e}");
 }
 
-/// Least-squares slope of log error over log size: the order of convergence.
+/// The order of convergence: the fitted slope of log error over log size.
 pub fn order(sizes: &[f64], errors: &[f64]) -> f64 {
-    let points: Vec<_> = sizes.iter().zip(errors).map(|(h, e)| (h.ln(), e.ln())).collect();
-    let n = points.len() as f64;
-    let (x, y) = points.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
-    let over: f64 = points.iter().map(|(a, b)| (a - x) * (b - y)).sum();
-    over / points.iter().map(|(a, _)| (a - x) * (a - x)).sum::<f64>()
+    slope(sizes.iter().zip(errors).map(|(h, e)| (h.ln(), e.ln())))
 }
 
 /// Checks iterations of one problem solved twice. Factors are renewed when measured times say so,
