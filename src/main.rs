@@ -42,7 +42,7 @@ fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            failure.report();
+            failure.message.iter().for_each(|message| eprintln!("error: {message}"));
             ExitCode::from(failure.code)
         }
     }

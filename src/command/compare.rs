@@ -21,7 +21,8 @@ pub struct CompareArguments {
     /// Scene files.
     #[arg(required = true, value_name = "SCENE")]
     scenes: Vec<PathBuf>,
-    #[arg(long, value_name = "NAME", value_delimiter = ',', help = solvers_help())]
+    #[arg(long, value_name = "NAME", value_delimiter = ',', default_values = SOLVERS,
+        help = format!("Solvers to compare, of {}", solver_names()))]
     solvers: Vec<String>,
     /// Override a key of the scenes, e.g. --set time.step=0.005; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -34,32 +35,23 @@ pub struct CompareArguments {
     petsc: Vec<String>,
 }
 
-fn solvers_help() -> String {
-    format!("Solvers to compare [default: {}]: {}", SOLVERS.join(","), solver_names())
-}
-
 /// `signorini compare SCENE…`: runs every scene with every solver, prints and writes the table, which
 /// is complete also where a solver fails.
 pub fn compare(arguments: &CompareArguments) -> Result<(), Failure> {
     require_one_process()?;
-    let mut solvers: Vec<&str> = arguments.solvers.iter().map(String::as_str).collect();
-    solvers.iter().try_for_each(|name| check_solver("--solvers", name))?;
+    arguments.solvers.iter().try_for_each(|name| check_solver("--solvers", name))?;
     check_petsc(&arguments.petsc)?;
-    if solvers.is_empty() {
-        solvers = SOLVERS.to_vec();
-    }
-    let problem = |path| {
+    let mut problems = Vec::new();
+    for path in &arguments.scenes {
         let (scene, mesh) = read(path, None, &arguments.set)?;
-        DiscreteProblem::new(scene, mesh).map_err(Failure::input)
-    };
-    let problems =
-        arguments.scenes.iter().map(|path| problem(path)).collect::<Result<Vec<_>, _>>()?;
+        problems.push(DiscreteProblem::new(scene, mesh).map_err(Failure::input)?);
+    }
     output::create(&arguments.out).map_err(Failure::input)?;
 
     let session = Session::start(&arguments.petsc).map_err(Failure::solver)?;
     let mut entries = Vec::new();
     for problem in &problems {
-        let compared = compare_solvers(&session, problem, &solvers);
+        let compared = compare_solvers(&session, problem, &arguments.solvers);
         entries.extend(compared.map_err(Failure::solver)?);
     }
     session.finalize().map_err(Failure::solver)?;
@@ -68,10 +60,7 @@ pub fn compare(arguments: &CompareArguments) -> Result<(), Failure> {
     output::write_table(&path, &entries).map_err(Failure::solver)?;
     say(&format!("written to {}", path.display()));
     let failed: Vec<_> = entries.iter().filter_map(|entry| entry.error.as_deref()).collect();
-    match failed.is_empty() {
-        true => Ok(()),
-        false => Err(Failure::solver(failed.join("\n       "))),
-    }
+    if failed.is_empty() { Ok(()) } else { Err(Failure::solver(failed.join("\n       "))) }
 }
 
 /// A row of `comparison.csv`: what a solver took for a whole run, and how its answer differs from the
@@ -127,7 +116,7 @@ impl Entry {
 fn compare_solvers(
     session: &Session,
     problem: &DiscreteProblem,
-    solvers: &[&str],
+    solvers: &[String],
 ) -> Result<Vec<Entry>, RunError> {
     let runs = solvers.iter().map(|solver| run(session, problem, solver));
     let mut runs = runs.collect::<Result<Vec<_>, _>>()?;

@@ -26,12 +26,12 @@ use std::{
 pub struct Failure {
     /// The exit code: 2 for bad input, 1 for a run that ended early.
     pub code: u8,
-    /// What to tell the user; none where another rank tells it.
-    message: Option<String>,
+    /// What to tell the user; none where a rank has told it for all.
+    pub message: Option<String>,
 }
 
 impl Failure {
-    /// Another rank failed, and reports why.
+    /// Another rank failed, which tells why.
     const ON_ANOTHER_RANK: Self = Self { code: 1, message: None };
 
     /// The user has to change the input.
@@ -42,13 +42,6 @@ impl Failure {
     /// A solver missed its tolerance, or the results could not be written.
     fn solver(error: impl fmt::Display) -> Self {
         Self { code: 1, message: Some(error.to_string()) }
-    }
-
-    /// Prints the message, if this rank has it to tell.
-    pub fn report(&self) {
-        if let Some(message) = &self.message {
-            eprintln!("error: {message}");
-        }
     }
 }
 

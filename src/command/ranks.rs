@@ -2,14 +2,17 @@
 //! message and one exit code.
 
 use super::Failure;
-use signorini::petsc::{Communicator, Session};
+use signorini::{
+    evolution::RunError,
+    petsc::{Communicator, Session},
+};
 use std::time::Duration;
 
 /// How long a rank that has failed waits for the others. Where they know of the failure they come at
 /// once.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// Agreement on a step of the program, as by MPI_Comm_agree of MPI 5: all ranks go on with their
+/// Agreement on a step of the program (as by Open MPI's MPIX_Comm_agree): all ranks go on with their
 /// values, or all fail. Of the ranks with an error of their own the first reports it, and all end
 /// with its exit code. Collective.
 pub fn agree<T>(comm: Communicator, result: Result<T, Failure>) -> Result<T, Failure> {
@@ -24,23 +27,21 @@ pub fn agree<T>(comm: Communicator, result: Result<T, Failure>) -> Result<T, Fai
     };
     let (_, reporter) = comm.min_with_rank(if failure.message.is_some() { 0.0 } else { 1.0 });
     if comm.rank() == reporter {
-        failure.report();
+        eprintln!("error: {}", failure.message.as_deref().unwrap_or("another rank failed"));
     }
     // This comes after the report, because mpiexec ends all ranks as soon as one ends with an error.
     let code = comm.broadcast(reporter, f64::from(failure.code)) as u8;
     Err(Failure { code, message: None })
 }
 
-/// A barrier behind work in which one rank may fail alone, while the others wait for it in some
+/// A barrier behind a run in which one rank may fail alone, while the others wait for it in some
 /// collective call: after [`PATIENCE`] it then reports its failure and aborts them all. Collective.
-pub fn barrier_or_abort<T>(comm: Communicator, result: &Result<T, Failure>) {
-    let patience = result.is_err().then_some(PATIENCE);
-    if !comm.barrier(patience)
-        && let Err(Failure { code, message }) = result
+pub fn barrier_or_abort(comm: Communicator, failure: Option<&RunError>) {
+    if !comm.barrier(failure.map(|_| PATIENCE))
+        && let Some(error) = failure
     {
-        let message = message.as_deref().unwrap_or("another rank failed");
-        eprintln!("error: rank {} of {}: {message}", comm.rank(), comm.size());
-        comm.abort(*code);
+        eprintln!("error: rank {} of {}: {error}", comm.rank(), comm.size());
+        comm.abort(Failure::solver(error).code);
     }
 }
 

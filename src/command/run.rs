@@ -29,7 +29,9 @@ pub struct RunArguments {
     /// Folder for the results [default: out/<scene>].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    #[arg(long, value_name = "NAME", help = solver_help())]
+    #[arg(long, value_name = "NAME", help = format!(
+        "Contact solver [default: the scene's, else {}]: {}", SOLVERS[0], solver_names()
+    ))]
     solver: Option<String>,
     /// Override a key of the scene, e.g. --set time.step=0.005; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -40,10 +42,6 @@ pub struct RunArguments {
     /// PETSc options, e.g. -- -tao_monitor -log_view.
     #[arg(last = true, value_name = "PETSC OPTIONS")]
     petsc: Vec<String>,
-}
-
-fn solver_help() -> String {
-    format!("Contact solver [default: the scene's, else {}]: {}", SOLVERS[0], solver_names())
 }
 
 impl RunArguments {
@@ -145,12 +143,13 @@ impl<'a> Task<'a> {
         let result = evolution::run(session, problem, &self.solver, phases, &mut |step| {
             Ok(recorder.accept(step)?)
         });
-        let ended = result.as_ref().map(|_| ()).map_err(|error| match error {
-            RunError::OnAnotherRank => Failure::ON_ANOTHER_RANK,
-            error => Failure::solver(error),
-        });
-        barrier_or_abort(comm, &ended);
+        barrier_or_abort(comm, result.as_ref().err());
         let written = recorder.finish(&result);
-        agree(comm, ended.and(written.map_err(Failure::solver)))
+        let ended = match result {
+            Ok(_) => written.map_err(Failure::solver),
+            Err(RunError::OnAnotherRank) => Err(Failure::ON_ANOTHER_RANK),
+            Err(error) => Err(Failure::solver(error)),
+        };
+        agree(comm, ended)
     }
 }
