@@ -1,6 +1,7 @@
 //! Norms of the difference between fields on two meshes of the same body.
 
 use super::locate::Locator;
+use nalgebra::{Matrix3x2, RowVector2, Vector2, Vector3, Vector4};
 use signorini::fem::Body;
 
 /// The fields of one time at the nodes of a mesh.
@@ -58,11 +59,12 @@ pub struct Embedding<'a> {
     fine: &'a Body,
     coarse: &'a Body,
     /// For each point: the coarse triangle it is in and its barycentric coordinates there.
-    points: Vec<(usize, [f64; 3])>,
+    points: Vec<(usize, Vector3<f64>)>,
 }
 
 /// Barycentric coordinates of the points in the fine triangle; their weights are equal.
-const POINTS: [[f64; 3]; 3] = [[4.0, 1.0, 1.0], [1.0, 4.0, 1.0], [1.0, 1.0, 4.0]];
+const POINTS: [Vector3<f64>; 3] =
+    [Vector3::new(4.0, 1.0, 1.0), Vector3::new(1.0, 4.0, 1.0), Vector3::new(1.0, 1.0, 4.0)];
 const SIXTH: f64 = 1.0 / 6.0;
 
 impl<'a> Embedding<'a> {
@@ -70,59 +72,53 @@ impl<'a> Embedding<'a> {
     pub fn new(fine: &'a Body, coarse: &'a Body) -> Self {
         let locator = Locator::new(coarse);
         let points = fine.mesh.triangles.iter().flat_map(|nodes| {
-            let corners = nodes.map(|node| fine.mesh.nodes[node]);
-            let at = |weights: &[f64; 3], axis: usize| -> f64 {
-                SIXTH * (0..3).map(|i| weights[i] * corners[i][axis]).sum::<f64>()
+            let corners = nodes.map(|node| Vector2::from(fine.mesh.nodes[node]));
+            let at = |weights: Vector3<f64>| -> Vector2<f64> {
+                SIXTH * (0..3).map(|i| weights[i] * corners[i]).sum::<Vector2<f64>>()
             };
-            POINTS.map(|weights| locator.locate([at(&weights, 0), at(&weights, 1)]))
+            POINTS.map(|weights| locator.locate(at(weights).into()))
         });
         Self { fine, coarse, points: points.collect() }
     }
 
     /// The norms of `fine` − `coarse`, fields on the fine and on the coarse mesh.
     pub fn difference(&self, fine: &Fields, coarse: &Fields) -> Norms {
-        let gradients: Vec<_> =
-            (0..self.coarse.triangles.len()).map(|t| gradients(self.coarse, t, coarse)).collect();
-        let mut squares = [0.0; 4];
+        let triangles = 0..self.coarse.triangles.len();
+        let coarse_gradients: Vec<_> =
+            triangles.map(|t| gradients(self.coarse, t, coarse)).collect();
+        let mut squares = Vector4::zeros();
         for (t, points) in self.points.chunks_exact(3).enumerate() {
-            let slopes = self::gradients(self.fine, t, fine);
-            let zeta = self.fine.mesh.triangles[t].map(|node| fine.zeta[node]);
-            let mut of_triangle = [0.0; 4];
-            for ((triangle, place), weights) in points.iter().zip(&POINTS) {
-                let below = self.coarse.mesh.triangles[*triangle].map(|node| coarse.zeta[node]);
-                let [ux, uy, z] = difference(&slopes, &gradients[*triangle]);
-                let shear = ux[1] + uy[0];
-                let value = SIXTH * dot(weights, &zeta) - dot(place, &below);
-                of_triangle[0] += ux[0] * ux[0] + uy[1] * uy[1] + 0.5 * shear * shear;
-                of_triangle[1] += ux[0] * ux[0] + ux[1] * ux[1] + uy[0] * uy[0] + uy[1] * uy[1];
-                of_triangle[2] += value * value;
-                of_triangle[3] += z[0] * z[0] + z[1] * z[1];
+            let (fine_gradients, zeta) =
+                (gradients(self.fine, t, fine), corners(self.fine, t, fine));
+            let mut of_triangle = Vector4::zeros();
+            for ((coarse_t, place), weights) in points.iter().zip(&POINTS) {
+                let below = corners(self.coarse, *coarse_t, coarse);
+                let value = SIXTH * zeta.dot(weights) - below.dot(place);
+                let gradients = fine_gradients - coarse_gradients[*coarse_t];
+                let u = gradients.fixed_rows::<2>(0);
+                let strain = 0.5 * (u + u.transpose());
+                of_triangle += Vector4::new(
+                    strain.norm_squared(),
+                    u.norm_squared(),
+                    value * value,
+                    gradients.row(2).norm_squared(),
+                );
             }
-            let weight = self.fine.triangles[t].area / 3.0;
-            squares.iter_mut().zip(of_triangle).for_each(|(sum, part)| *sum += weight * part);
+            squares += self.fine.triangles[t].area / 3.0 * of_triangle;
         }
-        let [strain, gradient, zeta, zeta_gradient] = squares.map(f64::sqrt);
+        let [strain, gradient, zeta, zeta_gradient] = squares.map(f64::sqrt).into();
         Norms { strain, gradient, zeta, zeta_gradient }
     }
 }
 
-/// ∇u_x, ∇u_y and ∇ζ on triangle `t`.
-fn gradients(body: &Body, t: usize, fields: &Fields) -> [[f64; 2]; 3] {
-    let mut gradients = [[0.0; 2]; 3];
-    for (&node, slope) in body.mesh.triangles[t].iter().zip(&body.triangles[t].gradients) {
-        let values = [fields.u[2 * node], fields.u[2 * node + 1], fields.zeta[node]];
-        for (gradient, value) in gradients.iter_mut().zip(values) {
-            gradient[0] += slope[0] * value;
-            gradient[1] += slope[1] * value;
-        }
-    }
-    gradients
+/// The rows ∇u_x, ∇u_y and ∇ζ on triangle `t`: Σ (u_x, u_y, ζ)_i ∇λ_iᵀ.
+fn gradients(body: &Body, t: usize, fields: &Fields) -> Matrix3x2<f64> {
+    let nodes = body.mesh.triangles[t].iter().zip(body.triangles[t].gradients);
+    let values = |i: usize| Vector3::new(fields.u[2 * i], fields.u[2 * i + 1], fields.zeta[i]);
+    nodes.map(|(&node, slope)| values(node) * RowVector2::from(slope)).sum()
 }
 
-fn difference(a: &[[f64; 2]; 3], b: &[[f64; 2]; 3]) -> [[f64; 2]; 3] {
-    [0, 1, 2].map(|i| [a[i][0] - b[i][0], a[i][1] - b[i][1]])
-}
-
-fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+/// ζ at the corners of triangle `t`.
+fn corners(body: &Body, t: usize, fields: &Fields) -> Vector3<f64> {
+    body.mesh.triangles[t].map(|node| fields.zeta[node]).into()
 }

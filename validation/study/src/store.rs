@@ -19,40 +19,19 @@ pub enum ReferenceError {
     /// It has not been computed.
     #[error(
         "{path}: there is no such reference yet; compute it with `signorini-study reference` and \
-         the same options"
+         the same options",
+        path = .0.display()
     )]
-    Missing {
-        /// The file.
-        path: PathBuf,
-    },
-    /// It belongs to another problem.
+    Missing(PathBuf),
+    /// It belongs to another scene or mesh, or the file is damaged: which, says the text.
     #[error(
-        "{path}: this reference belongs to another scene or mesh; `signorini-study reference` with \
-         the same options computes it anew"
+        "{path}: {1}; `signorini-study reference` with the same options computes it anew",
+        path = .0.display()
     )]
-    Foreign {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The file is not what was written.
-    #[error(
-        "{path}: the file is damaged ({reason}); `signorini-study reference` with the same options \
-         computes it anew"
-    )]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// In what way.
-        reason: String,
-    },
+    Useless(PathBuf, String),
     /// The file cannot be opened, or its content not be made.
-    #[error("{path}: {source}")]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
+    #[error("{path}: {1}", path = .0.display())]
+    Io(PathBuf, io::Error),
 }
 
 /// Writes the states whole or not at all.
@@ -67,8 +46,8 @@ pub(super) fn write(path: &Path, hash: &Hash, states: &[Fields]) -> Result<(), S
         }
         stream.finish()
     };
-    let io = |source| ReferenceError::Io { path: path.to_owned(), source };
-    Ok(write_whole(path, &compressed().map_err(io)?)?)
+    let content = compressed().map_err(|error| ReferenceError::Io(path.to_owned(), error))?;
+    Ok(write_whole(path, &content)?)
 }
 
 /// Reads so many states on so many `nodes`, which [`write`] wrote with this `hash`.
@@ -78,28 +57,32 @@ pub(super) fn read(
     states: usize,
     nodes: usize,
 ) -> Result<Vec<Fields>, ReferenceError> {
-    let path = path.to_owned();
-    let file = match File::open(&path) {
-        Ok(file) => file,
-        Err(e) if e.kind() == ErrorKind::NotFound => return Err(ReferenceError::Missing { path }),
-        Err(source) => return Err(ReferenceError::Io { path, source }),
-    };
+    let useless = |reason: String| Err(ReferenceError::Useless(path.to_owned(), reason));
+    let file = File::open(path).map_err(|error| match error.kind() {
+        ErrorKind::NotFound => ReferenceError::Missing(path.to_owned()),
+        _ => ReferenceError::Io(path.to_owned(), error),
+    })?;
     let mut content = Vec::new();
     if let Err(error) = ZlibDecoder::new(file).read_to_end(&mut content) {
-        return Err(ReferenceError::Damaged { path, reason: error.to_string() });
+        return useless(format!("the file is damaged ({error})"));
     }
-    let Some(bytes) = content.strip_prefix(hash.as_slice()) else {
-        return Err(ReferenceError::Foreign { path });
-    };
-    if bytes.len() != states * 3 * nodes * size_of::<f64>() {
-        let reason = format!("it has not the {states} states of {nodes} nodes");
-        return Err(ReferenceError::Damaged { path, reason });
+    let length = hash.len() + states * 3 * nodes * size_of::<f64>();
+    match content.split_first_chunk() {
+        Some((found, _)) if found != hash => {
+            useless("this reference belongs to another scene or mesh".to_owned())
+        }
+        Some((_, bytes)) if content.len() == length => Ok(fields(bytes, nodes)),
+        _ => useless("the file is damaged (it ends too early)".to_owned()),
     }
+}
+
+/// The states that `bytes` are, on so many `nodes`.
+fn fields(bytes: &[u8], nodes: usize) -> Vec<Fields> {
     let (numbers, _) = bytes.as_chunks();
     let numbers: Vec<f64> = numbers.iter().map(|&number| f64::from_le_bytes(number)).collect();
     let fields = |state: &[f64]| {
         let (u, zeta) = state.split_at(2 * nodes);
         Fields { u: u.to_vec(), zeta: zeta.to_vec() }
     };
-    Ok(numbers.chunks_exact(3 * nodes).map(fields).collect())
+    numbers.chunks_exact(3 * nodes).map(fields).collect()
 }

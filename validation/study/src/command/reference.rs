@@ -64,10 +64,10 @@ pub fn reference(arguments: &ReferenceArguments) -> Result<(), StudyError> {
             say(&format!("{}: {states} states, as the scene and mesh want them", path.display()));
             return Ok(());
         }
-        Err(StudyError::Reference(ReferenceError::Missing { .. })) => {}
-        Err(StudyError::Reference(
-            error @ (ReferenceError::Foreign { .. } | ReferenceError::Damaged { .. }),
-        )) => eprintln!("warning: {error}"),
+        Err(StudyError::Reference(ReferenceError::Missing(_))) => {}
+        Err(StudyError::Reference(error @ ReferenceError::Useless(..))) => {
+            eprintln!("warning: {error}");
+        }
         Err(error) => return Err(error),
     }
     output::create(kept)?;

@@ -121,66 +121,27 @@ fn problem(id: u64) -> Result<Problem, StudyError> {
         0 => 1.0,
         _ => 10f64.powf(random.between(0.0, 4.0)),
     };
-    let highest = if kind == "rough" { n } else { 3 };
-    let load = random.waves('x', 10.0, highest);
-    let pull = random.waves('y', 5.0, highest);
-    let opening = 10f64.powf(random.between(-4.0, -1.5));
-    let gap = format!("max(0,{})", random.waves('x', opening, highest));
-    let tangential = format!("{:.6}", random.between(-10.0, 10.0));
-    let (left, bottom, top, right) = match kind {
-        // Just touching: no gap on a part or everywhere, and a load that is zero there, along
-        // the foundation, or nothing at all.
-        "grazing" => {
-            let gap = ["0".into(), "max(0, x-0.5)".into(), gap][random.one_of(3) as usize].clone();
-            let top = match random.one_of(4) {
-                0 => ["0".into(), "0".into()],
-                1 => [tangential, "0".into()],
-                2 => ["0".into(), format!("-min(0, x-0.7)*({tangential})")],
-                _ => [tangential.clone(), format!("({tangential})*(x-0.5)")],
-            };
-            (CLAMPED, gap, top, ["0".into(), "0".into()])
-        }
-        // The waves lift by less than 9 + 5: 40 downwards keep the body on the foundation, and
-        // the symmetry axis holds everything else.
-        "held by contact" => {
-            (SYMMETRIC, gap, [tangential, format!("-40+{load}")], ["0".into(), pull])
-        }
-        _ => (CLAMPED, gap, ["0".into(), format!("-10+{load}")], [pull, tangential]),
-    };
+    let Boundaries { left, bottom, opening, top, right } = Boundaries::new(kind, n, &mut random);
     let rough = random.one_of(2) == 0;
     let shape = match rough {
         true => "0.5+0.5*sin(9*x+1)*cos(11*y)",
         false => "max(0, min(1, 20*(0.3-sqrt((x-0.5)^2+(y-0.3)^2))))",
     };
     let side = match kind {
-        "two sides" => format!("gap = \"abs({})\"", random.waves('y', opening, 2)),
+        "two sides" => format!(", gap = \"abs({})\"", random.waves('y', opening, 2)),
         _ => String::new(),
     };
     let quoted = |[a, b]: [String; 2]| format!("[\"{a}\", \"{b}\"]");
     let (top, right, log) = (quoted(top), quoted(right), contrast.ln());
     let text = format!(
         r#"
-[damage]
-diffusion = 1
-lambda_d = 1
-lambda_u = 1
-lambda_w = 0
-strain_cap = 1000
-threshold = 1e-6
-initial = "exp(-({log:.6})*({shape}))"
-[[boundary]]
-name = "left"
-{left}
-[[boundary]]
-name = "bottom"
-gap = "{bottom}"
-[[boundary]]
-name = "top"
-traction = {top}
-[[boundary]]
-name = "right"
-traction = {right}
-{side}
+damage = {{ diffusion = 1, lambda_d = 1, lambda_u = 1, lambda_w = 0, strain_cap = 1000, threshold = 1e-6, initial = "exp(-({log:.6})*({shape}))" }}
+boundary = [
+    {{ name = "left", {left} }},
+    {{ name = "bottom", gap = "{bottom}" }},
+    {{ name = "top", traction = {top} }},
+    {{ name = "right", traction = {right}{side} }},
+]
 "#
     );
     let discrete = square(n, &text, &[])?;
@@ -191,3 +152,47 @@ traction = {right}
 
 const CLAMPED: &str = "displacement = [\"0\", \"0\"]";
 const SYMMETRIC: &str = "symmetry = true";
+
+/// What happens on the sides of the square.
+struct Boundaries {
+    left: &'static str,
+    /// The gap, and its size (m).
+    bottom: String,
+    opening: f64,
+    /// Tractions.
+    top: [String; 2],
+    right: [String; 2],
+}
+
+impl Boundaries {
+    fn new(kind: &str, n: usize, random: &mut Random) -> Self {
+        let highest = if kind == "rough" { n } else { 3 };
+        let load = random.waves('x', 10.0, highest);
+        let pull = random.waves('y', 5.0, highest);
+        let opening = 10f64.powf(random.between(-4.0, -1.5));
+        let gap = format!("max(0,{})", random.waves('x', opening, highest));
+        let tangential = format!("{:.6}", random.between(-10.0, 10.0));
+        let none = || "0".to_owned();
+        let (left, bottom, top, right) = match kind {
+            // Just touching: no gap on a part or everywhere, and a load that is zero there, along
+            // the foundation, or nothing at all.
+            "grazing" => {
+                let gap = [none(), "max(0, x-0.5)".into(), gap][random.one_of(3) as usize].clone();
+                let top = match random.one_of(4) {
+                    0 => [none(), none()],
+                    1 => [tangential, none()],
+                    2 => [none(), format!("-min(0, x-0.7)*({tangential})")],
+                    _ => [tangential.clone(), format!("({tangential})*(x-0.5)")],
+                };
+                (CLAMPED, gap, top, [none(), none()])
+            }
+            // The waves lift by less than 9 + 5: 40 downwards keep the body on the foundation, and
+            // the symmetry axis holds everything else.
+            "held by contact" => {
+                (SYMMETRIC, gap, [tangential, format!("-40+{load}")], [none(), pull])
+            }
+            _ => (CLAMPED, gap, [none(), format!("-10+{load}")], [pull, tangential]),
+        };
+        Self { left, bottom, opening, top, right }
+    }
+}

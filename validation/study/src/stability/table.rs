@@ -54,8 +54,7 @@ pub struct Table {
     path: PathBuf,
     /// In the order of their first cells.
     columns: Vec<&'static str>,
-    rows: Vec<Row>,
-    counts: Counts,
+    rows: Vec<(Row, Verdict)>,
 }
 
 impl Table {
@@ -66,23 +65,20 @@ impl Table {
 
     /// Adds a row.
     pub(super) fn push(&mut self, row: Row, verdict: Verdict) {
-        match verdict {
-            Verdict::Correct => self.counts.correct += 1,
-            Verdict::Refused => self.counts.refused += 1,
-            Verdict::Wrong => self.counts.wrong += 1,
-        }
-        let row = row.with("verdict", verdict);
         for (column, _) in &row.0 {
             if !self.columns.contains(column) {
                 self.columns.push(column);
             }
         }
-        self.rows.push(row);
+        self.rows.push((row, verdict));
     }
 
     /// Its verdicts.
     pub(super) fn counts(&self) -> Counts {
-        self.counts
+        let of = |kind: Verdict| self.rows.iter().filter(|(_, verdict)| *verdict == kind).count();
+        let [correct, refused, wrong] =
+            [Verdict::Correct, Verdict::Refused, Verdict::Wrong].map(of);
+        Counts { correct, refused, wrong }
     }
 
     /// Writes the CSV file, if there are rows. Maps that take minutes do so now and then: what is
@@ -91,14 +87,16 @@ impl Table {
         if self.rows.is_empty() {
             return Ok(());
         }
-        let cell = |row: &Row, column: &&str| {
-            let found = row.0.iter().find(|(name, _)| name == column);
+        let cell = |row: &Row, column: &str| {
+            let found = row.0.iter().find(|(name, _)| *name == column);
             found.map_or(Value::Null, |(_, value)| value.clone())
         };
-        let header = self.columns.iter().map(|&column| column.into()).collect();
-        let rows = self.rows.iter();
-        let rows = rows.map(|row| self.columns.iter().map(|column| cell(row, column)).collect());
-        let lines: Vec<Vec<Value>> = std::iter::once(header).chain(rows).collect();
+        let mut lines: Vec<Vec<Value>> =
+            vec![self.columns.iter().chain(&["verdict"]).map(|&column| column.into()).collect()];
+        for (row, verdict) in &self.rows {
+            let cells = self.columns.iter().map(|column| cell(row, column));
+            lines.push(cells.chain(serde_json::to_value(verdict)).collect());
+        }
         Ok(output::write_table(&self.path, &lines)?)
     }
 }

@@ -56,14 +56,14 @@ fn a_file_that_is_missing_foreign_or_damaged_is_refused() {
         StudyError::Reference(error) => error,
         other => panic!("{other}"),
     };
-    assert!(matches!(load(&spec), ReferenceError::Missing { .. }));
+    assert!(matches!(load(&spec), ReferenceError::Missing(_)));
     assert!(load(&spec).to_string().contains("signorini-study reference"));
 
     // Another mesh under this name.
     let other = study.spec(ReferenceOptions { grading: Some(2.0), ..options(0.25, 0, 0.02) });
     compute(&other, &study);
     fs::rename(other.path(folder), &path).unwrap();
-    assert!(matches!(load(&spec), ReferenceError::Foreign { .. }), "{}", load(&spec));
+    assert!(matches!(load(&spec), ReferenceError::Useless(..)), "{}", load(&spec));
     assert!(load(&spec).to_string().contains("another scene or mesh"));
 
     compute(&spec, &study);
@@ -71,12 +71,12 @@ fn a_file_that_is_missing_foreign_or_damaged_is_refused() {
     spec.load(folder).unwrap();
     for length in [0, 10, 150, whole.len() / 2, whole.len() - 5, whole.len() - 1] {
         fs::write(&path, &whole[..length]).unwrap();
-        assert!(matches!(load(&spec), ReferenceError::Damaged { .. }), "cut to {length} bytes");
+        assert!(load(&spec).to_string().contains("is damaged"), "cut to {length} bytes");
     }
     let mut flipped = whole.clone();
     flipped[whole.len() / 2] ^= 1;
     fs::write(&path, &flipped).unwrap();
-    assert!(matches!(load(&spec), ReferenceError::Damaged { .. }), "a flipped bit");
+    assert!(load(&spec).to_string().contains("is damaged"), "a flipped bit");
 }
 
 #[test]
@@ -91,7 +91,7 @@ fn what_the_states_depend_on_makes_a_reference_foreign_and_nothing_else_does() {
     let load_traction = "boundary.right.traction=[\"-1\", \"0\"]";
     for other in ["damage.lambda_u=3", "contact.tolerance=1e-8", load_traction] {
         let error = load(&[other]).unwrap_err();
-        let foreign = matches!(error, StudyError::Reference(ReferenceError::Foreign { .. }));
+        let foreign = error.to_string().contains("another scene or mesh");
         assert!(foreign, "{other}: {error}");
     }
     // Comments are not among it; a material is.

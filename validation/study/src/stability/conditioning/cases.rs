@@ -35,7 +35,6 @@ pub(super) enum Exact {
 /// Young's modulus of the scenes, Pa.
 const YOUNG: f64 = 80.0;
 const TOLERANCES: &[f64] = &[1e-10, 1e-6];
-const STRESS: (f64, &str) = (0.3, "stress");
 /// Size of the curl, m.
 const CURL: f64 = 0.01;
 
@@ -69,6 +68,19 @@ pub(super) fn all() -> Vec<Case> {
 }
 
 impl Case {
+    /// Plane stress with ν = 0.3 on [0, length] × [0, 1] in so many cells, to all tolerances.
+    fn new(
+        (sweep, name): (&'static str, &'static str),
+        parameter: f64,
+        length: f64,
+        cells: [usize; 2],
+        text: String,
+    ) -> Self {
+        let mesh = Mesh::rectangle(length, 1.0, cells[0], cells[1]);
+        let (material, tolerances) = ((0.3, "stress"), TOLERANCES);
+        Self { sweep, name, cells, parameter, tolerances, exact: None, material, text, mesh }
+    }
+
     /// The case as the program sees it.
     pub fn problem(&self, tolerance: f64) -> Result<DiscreteProblem, StudyError> {
         let (poisson, plane) = self.material;
@@ -128,17 +140,8 @@ fn hole(n: usize, zeta: f64) -> Case {
          20*(sqrt((x - 0.5)^2 + (y - 0.5)^2) - 0.2)))' }}",
         0.5 * zeta
     );
-    Case {
-        sweep: "hole",
-        name: "hole",
-        cells: [n, n],
-        parameter: zeta,
-        tolerances: TOLERANCES,
-        exact: None,
-        material: STRESS,
-        text: format!("{damage}{PRESSED_AND_LIFTED}"),
-        mesh: Mesh::rectangle(1.0, 1.0, n, n),
-    }
+    let text = format!("{damage}{PRESSED_AND_LIFTED}");
+    Case::new(("hole", "hole"), zeta, 1.0, [n, n], text)
 }
 
 const SLIVER_CELLS: usize = 16;
@@ -168,17 +171,8 @@ fn cap(angle: f64) -> Case {
 }
 
 fn sliver(name: &'static str, angle: f64) -> Case {
-    Case {
-        sweep: "slivers",
-        name,
-        cells: [SLIVER_CELLS; 2],
-        parameter: angle,
-        tolerances: TOLERANCES,
-        exact: None,
-        material: STRESS,
-        text: PRESSED_AND_LIFTED.to_owned(),
-        mesh: Mesh::rectangle(1.0, 1.0, SLIVER_CELLS, SLIVER_CELLS),
-    }
+    let text = PRESSED_AND_LIFTED.to_owned();
+    Case::new(("slivers", name), angle, 1.0, [SLIVER_CELLS; 2], text)
 }
 
 /// Strips of height 1 above a foundation: bent down to it, pushed along it, and lying on it.
@@ -218,17 +212,8 @@ fn strip(
     exact: Option<Exact>,
     boundaries: &str,
 ) -> Case {
-    Case {
-        sweep: "slender",
-        name,
-        cells,
-        parameter: length,
-        tolerances: TOLERANCES,
-        exact,
-        material: STRESS,
-        text: format!("boundary = [{boundaries}]"),
-        mesh: Mesh::rectangle(length, 1.0, cells[0], cells[1]),
-    }
+    let text = format!("boundary = [{boundaries}]");
+    Case { exact, ..Case::new(("slender", name), length, length, cells, text) }
 }
 
 /// Clamped left and loaded so that it lies on the foundation from x = s = 0.6 L on. The free part
@@ -268,15 +253,11 @@ fn incompressible(n: usize, poisson: f64) -> Case {
          {{ name = 'bottom', gap = 0 }}, \
          {{ name = 'top', traction = [0, '-{pressure:e} + {wave:e}*sin(2*pi*x)'] }}"
     );
+    let text = format!("{force}\nboundary = [{boundaries}]");
     Case {
-        sweep: "incompressible",
-        name: "curl",
-        cells: [n, n],
-        parameter: poisson,
         tolerances: &TOLERANCES[..1],
         exact: Some(Exact::Curl { strain, n }),
         material: (poisson, "strain"),
-        text: format!("{force}\nboundary = [{boundaries}]"),
-        mesh: Mesh::rectangle(1.0, 1.0, n, n),
+        ..Case::new(("incompressible", "curl"), poisson, 1.0, [n, n], text)
     }
 }
