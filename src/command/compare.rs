@@ -167,7 +167,7 @@ fn run(
         factorisations: sum(|record| record.factorisations),
         triangular_solves: sum(|record| record.linear_iterations),
         fallbacks: sum(|record| record.fallbacks),
-        seconds: phases.table().get("contact").map_or(0.0, |phase| phase.seconds),
+        seconds: phases.get("contact").map_or(0.0, |phase| phase.seconds),
         kkt_stationarity: kkt.stationarity,
         kkt_primal: kkt.primal,
         kkt_dual: kkt.dual,

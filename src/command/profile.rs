@@ -1,10 +1,8 @@
 //! Where the time of a run went: the closing table, short or with all that was measured.
 
 use comfy_table::{CellAlignment, LineStyle, Table, presets};
-use signorini::phases::Phase;
-use std::{collections::BTreeMap, fs};
-
-type Phases = BTreeMap<&'static str, Phase>;
+use signorini::phases::{Phase, Phases};
+use std::fs;
 
 /// What no time step can do without: the values of K, a product with K, a pair of triangular solves,
 /// and the damage.
@@ -15,16 +13,6 @@ const UNAVOIDABLE: [&str; 4] =
 const COLUMNS: [&str; 7] =
     ["phase", "calls", "seconds", "share", "ms per call", "MB per call", "GB/s"];
 const SHORT: usize = 4;
-
-/// The phases whose names are `prefix` and one more word, by that word: with the prefix "" those that
-/// are not parts of others, with "contact/" the parts of the phase "contact".
-pub fn parts(phases: &Phases, prefix: &str) -> Vec<(&'static str, Phase)> {
-    let parts = phases.iter().filter_map(|(name, phase)| {
-        let part = name.strip_prefix(prefix)?;
-        (!part.contains('/')).then_some((part, *phase))
-    });
-    parts.collect()
-}
 
 /// The table of phases, longest first, for a run of `wall` seconds; in full it has the parts of
 /// phases too, milliseconds per call and bytes moved.
@@ -37,14 +25,10 @@ pub fn table(phases: &Phases, wall: f64, full: bool) -> Vec<String> {
     let mut add = |name: &str, phase: Phase| {
         table.add_row(cells(name, phase, wall).into_iter().take(columns));
     };
-    for (name, phase) in with_rest(parts(phases, ""), wall) {
+    for (name, phase) in rows(phases, "", wall) {
         add(name, phase);
-        let parts = parts(phases, &format!("{name}/"));
-        if full && !parts.is_empty() {
-            for (part, phase) in with_rest(parts, phase.seconds) {
-                add(&format!("  {part}"), phase);
-            }
-        }
+        let parts = if full { rows(phases, name, phase.seconds) } else { Vec::new() };
+        parts.into_iter().for_each(|(part, phase)| add(&format!("  {part}"), phase));
     }
     add("all", Phase { seconds: wall, ..Phase::default() });
     for column in table.column_iter_mut().skip(1) {
@@ -54,12 +38,15 @@ pub fn table(phases: &Phases, wall: f64, full: bool) -> Vec<String> {
     table.to_string().lines().map(|line| format!(" {}", line.trim_end())).collect()
 }
 
-/// Phases, longest first, and what they leave of the `wall` seconds around them.
-fn with_rest(mut phases: Vec<(&'static str, Phase)>, wall: f64) -> Vec<(&'static str, Phase)> {
-    phases.sort_by(|a, b| b.1.seconds.total_cmp(&a.1.seconds));
-    let measured: f64 = phases.iter().map(|(_, phase)| phase.seconds).sum();
-    phases.push(("other", Phase { seconds: wall - measured, ..Phase::default() }));
-    phases
+/// The parts of the phase called `whole`, longest first, and what they leave of its `seconds`.
+fn rows(phases: &Phases, whole: &str, seconds: f64) -> Vec<(&'static str, Phase)> {
+    let mut rows = phases.parts(whole);
+    if !rows.is_empty() {
+        rows.sort_by(|(_, a), (_, b)| b.seconds.total_cmp(&a.seconds));
+        let measured: f64 = rows.iter().map(|(_, phase)| phase.seconds).sum();
+        rows.push(("other", Phase { seconds: seconds - measured, ..Phase::default() }));
+    }
+    rows
 }
 
 /// A row of the table; cells of what was not measured are empty.

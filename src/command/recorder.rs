@@ -3,8 +3,9 @@
 use super::{
     profile,
     run::Task,
-    screen::{Screen, conclusion},
+    screen::{self, say},
 };
+use indicatif::ProgressBar;
 use serde_json::{Value, json};
 use signorini::{
     evolution::{Outcome, RunError, Step, StepRecord},
@@ -22,7 +23,7 @@ pub(super) struct Recorder<'a> {
     task: &'a Task<'a>,
     fields: FieldWriter,
     /// On the first rank only.
-    history: Option<(History, Screen)>,
+    history: Option<(History, ProgressBar)>,
     last: Option<Step>,
     /// Seconds of all accepted steps after n = 0.
     stepping: f64,
@@ -33,7 +34,7 @@ impl<'a> Recorder<'a> {
     pub(super) fn new(task: &'a Task) -> Result<Self, OutputError> {
         let fields = FieldWriter::new(&task.folder, &task.problem)?;
         let history = match task.problem.body.partition.comm().is_root() {
-            true => Some((History::create(&task.folder)?, Screen::open(task))),
+            true => Some((History::create(&task.folder)?, screen::open(task))),
             false => None,
         };
         Ok(Self { task, fields, history, last: None, stepping: 0.0 })
@@ -59,8 +60,9 @@ impl<'a> Recorder<'a> {
             self.stepping += step.record.seconds;
         }
         let written = self.task.phases.time("output", || {
-            let row = self.history.as_mut().map_or(Ok(()), |(history, screen)| {
-                screen.show(&step.record);
+            let end = self.task.problem.scene().time.map_or(1.0, |grid| grid.end);
+            let row = self.history.as_mut().map_or(Ok(()), |(history, bar)| {
+                screen::progress(bar, &step.record, end);
                 history.add(&step.record)
             });
             // All ranks write the frame together, also where the row could not be written.
@@ -86,23 +88,23 @@ impl<'a> Recorder<'a> {
         let outcome = result.as_ref().ok();
         let mut notes = task.problem.notes();
         notes.extend(outcome.iter().flat_map(|outcome| outcome.notes(&task.problem)));
-        let Some((_, screen)) = &self.history else { return written };
+        let Some((_, bar)) = &self.history else { return written };
 
         let record = last.map(|step| step.record);
         let wall = task.started.elapsed().as_secs_f64();
         let summary = summary(task, record, result, &notes, wall);
         let path = task.folder.join("summary.json");
         write_whole(&path, format!("{summary:#}\n").as_bytes())?;
-        let mut lines = conclusion(task, record, outcome, &notes);
+        let mut lines = screen::conclusion(task, record, outcome, &notes);
         lines.push(String::new());
-        let phases = task.phases.table();
-        lines.extend(profile::table(&phases, wall, task.profile));
+        lines.extend(profile::table(task.phases, wall, task.profile));
         if task.profile {
             let steps = record.map_or(0, |record| record.step);
             lines.push(String::new());
-            lines.extend(profile::remarks(&phases, steps, self.stepping));
+            lines.extend(profile::remarks(task.phases, steps, self.stepping));
         }
-        screen.close(&lines);
+        bar.finish_and_clear();
+        say(&lines.join("\n"));
         written
     }
 }
@@ -121,8 +123,7 @@ fn summary(
     let outcome = result.as_ref().ok();
     let stopped = outcome.and_then(|outcome| outcome.stopped);
     let steps = last.map_or(0, |record| record.step);
-    let phases = profile::parts(&task.phases.table(), "");
-    let seconds = phases.iter().map(|(name, phase)| (name, phase.seconds));
+    let seconds = task.phases.parts("").into_iter().map(|(name, phase)| (name, phase.seconds));
     let mut summary = json!({
         "scene": scene.name,
         "title": scene.title,

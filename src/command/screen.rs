@@ -13,55 +13,39 @@ pub fn say(text: &str) {
     let _ = writeln!(io::stdout(), "{text}");
 }
 
-/// The progress bar of a run; silent when standard error is no terminal.
-pub struct Screen {
-    bar: ProgressBar,
-    /// T, s.
-    end: f64,
-}
-
-/// The bar counts thousandths of [0, T].
+/// The progress bar counts thousandths of [0, T].
 const LENGTH: u64 = 1000;
 
-impl Screen {
-    /// Shows what is to be solved, and the bar.
-    pub fn open(task: &Task) -> Self {
-        let (scene, partition) = (task.problem.scene(), &task.problem.body.partition);
-        let mut mesh = format!("{} nodes, {} triangles", partition.total(), task.triangles);
-        if !partition.comm().is_serial() {
-            mesh += &format!(", on {} ranks", partition.comm().size());
-        }
-        let solver = match task.contact_nodes {
-            0 => format!("{} (no contact: one linear solve a step)", task.solver),
-            _ => task.solver.clone(),
-        };
-        let mut lines = vec![scene.title.clone(), row("mesh", mesh), row("solver", solver)];
-        lines.extend(scene.time.map(|grid| row("time", steps(grid))));
-        say(&lines.join("\n"));
-
-        let bar = ProgressBar::new(LENGTH);
-        let template = "{bar:20} {wide_msg} {elapsed}, {eta} left";
-        if let Ok(style) = ProgressStyle::with_template(template) {
-            bar.set_style(style);
-        }
-        bar.set_message("the first solve");
-        Self { bar, end: scene.time.map_or(1.0, |grid| grid.end) }
+/// Shows what is to be solved, and a progress bar, which is silent when standard error is no terminal.
+pub fn open(task: &Task) -> ProgressBar {
+    let (scene, partition) = (task.problem.scene(), &task.problem.body.partition);
+    let mut mesh = format!("{} nodes, {} triangles", partition.total(), task.triangles);
+    if !partition.comm().is_serial() {
+        mesh += &format!(", on {} ranks", partition.comm().size());
     }
+    let solver = match task.contact_nodes {
+        0 => format!("{} (no contact: one linear solve a step)", task.solver),
+        _ => task.solver.clone(),
+    };
+    let mut lines = vec![scene.title.clone(), row("mesh", mesh), row("solver", solver)];
+    lines.extend(scene.time.map(|grid| row("time", steps(grid))));
+    say(&lines.join("\n"));
 
-    /// Time, min ζ, active nodes and iterations of an accepted step.
-    pub fn show(&self, record: &StepRecord) {
-        self.bar.set_position((LENGTH as f64 * record.time / self.end) as u64);
-        self.bar.set_message(format!(
-            "step {}  t = {:.4}  min ζ = {:.6}  active {}  iterations {}",
-            record.step, record.time, record.zeta_min, record.active_nodes, record.iterations
-        ));
+    let bar = ProgressBar::new(LENGTH);
+    let template = "{bar:20} {wide_msg} {elapsed}, {eta} left";
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
     }
+    bar.with_message("the first solve")
+}
 
-    /// Replaces the bar by `lines`.
-    pub fn close(&self, lines: &[String]) {
-        self.bar.finish_and_clear();
-        say(&lines.join("\n"));
-    }
+/// Shows an accepted step of a run to t = `end`.
+pub fn progress(bar: &ProgressBar, record: &StepRecord, end: f64) {
+    bar.set_position((LENGTH as f64 * record.time / end) as u64);
+    bar.set_message(format!(
+        "step {}  t = {:.4}  min ζ = {:.6}  active {}  iterations {}",
+        record.step, record.time, record.zeta_min, record.active_nodes, record.iterations
+    ));
 }
 
 /// How a run ended and what its last accepted state tells, a line each; `outcome` is none if the run
