@@ -10,7 +10,7 @@ use crate::{
     mesh::{Mesh, boundary_nodes},
     model::DamageLaw,
     petsc::{PetscError, Session},
-    scene::{Scene, SceneError},
+    scene::{Condition, Scene, SceneError},
 };
 use std::{collections::BTreeMap, path::PathBuf};
 
@@ -278,17 +278,22 @@ fn fixed_rows(scene: &Scene, mesh: &Mesh) -> (Vec<FixedRow>, Prescribed) {
         let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
         for point in boundary_nodes(mesh, &curve.edges) {
             let node = point.node;
-            let components = boundary.displacement.iter().flatten();
-            for (component, direction) in components.zip([[1.0, 0.0], [0.0, 1.0]]) {
-                if let Some(value) = component {
-                    rows.push(FixedRow { node, direction });
-                    sources.push(Some((mesh.nodes[node], value.clone())));
-                }
-            }
-            if boundary.symmetry {
-                for face in &point.faces {
-                    rows.push(FixedRow { node, direction: face.normal });
-                    sources.push(None);
+            for condition in &boundary.conditions {
+                match condition {
+                    Condition::Displacement(components) => {
+                        for (value, direction) in components.iter().zip([[1.0, 0.0], [0.0, 1.0]]) {
+                            let Some(value) = value else { continue };
+                            rows.push(FixedRow { node, direction });
+                            sources.push(Some((mesh.nodes[node], value.clone())));
+                        }
+                    }
+                    Condition::Symmetry => {
+                        for face in &point.faces {
+                            rows.push(FixedRow { node, direction: face.normal });
+                            sources.push(None);
+                        }
+                    }
+                    Condition::Gap(_) | Condition::Traction(_) => {}
                 }
             }
         }
@@ -300,7 +305,7 @@ fn fixed_rows(scene: &Scene, mesh: &Mesh) -> (Vec<FixedRow>, Prescribed) {
 fn gap_rows(scene: &Scene, mesh: &Mesh) -> Vec<GapRow> {
     let mut rows: BTreeMap<usize, Vec<GapRow>> = BTreeMap::new();
     for boundary in &scene.boundaries {
-        let (Some(gap), Some(curve)) = (&boundary.gap, mesh.curves.get(&boundary.name)) else {
+        let (Some(gap), Some(curve)) = (boundary.gap(), mesh.curves.get(&boundary.name)) else {
             continue;
         };
         for point in boundary_nodes(mesh, &curve.edges) {

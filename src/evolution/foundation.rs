@@ -27,7 +27,7 @@ impl Foundation {
         };
         let mut foundation = Self::default();
         for boundary in &scene.boundaries {
-            let (Some(gap), Some(curve)) = (&boundary.gap, mesh.curves.get(&boundary.name)) else {
+            let (Some(gap), Some(curve)) = (boundary.gap(), mesh.curves.get(&boundary.name)) else {
                 continue;
             };
             for &edge in &curve.edges {

@@ -36,7 +36,7 @@ impl Loads {
             body.mesh.curves.get(&b.name).map(|curve| curve.edges.clone()).unwrap_or_default()
         };
         let tractions: Vec<_> = (scene.boundaries.iter())
-            .filter_map(|b| b.traction.as_ref().map(|f| (edges(b), f.clone())))
+            .filter_map(|b| b.traction().map(|f| (edges(b), f.clone())))
             .collect();
         let body_force = (!zero(&scene.body_force)).then(|| scene.body_force.clone());
         let samples = (tractions.iter())

@@ -151,7 +151,7 @@ impl RunError {
     /// The failed contact step n = `step`; its advice is of what the scene has: another solver helps
     /// where there is contact, shorter steps help after the first solve.
     fn contact(scene: &Scene, step: usize, time: f64, source: ContactError) -> Self {
-        let contact = scene.boundaries.iter().any(|boundary| boundary.gap.is_some());
+        let contact = scene.boundaries.iter().any(|boundary| boundary.gap().is_some());
         let advice = match (source.is_missed(), contact, step > 0) {
             (false, ..) => "",
             (_, true, true) => {

@@ -19,7 +19,7 @@ const TIMES: usize = 8;
 pub(super) fn unresolved(scene: &Scene, mesh: &Mesh) -> Vec<String> {
     let mut notes = Vec::new();
     for boundary in &scene.boundaries {
-        let (Some(f), Some(curve)) = (&boundary.traction, mesh.curves.get(&boundary.name)) else {
+        let (Some(f), Some(curve)) = (boundary.traction(), mesh.curves.get(&boundary.name)) else {
             continue;
         };
         if !f.iter().any(Expression::depends_on_space) {

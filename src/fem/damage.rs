@@ -8,8 +8,7 @@ use crate::{
 use nalgebra::{Matrix3, Vector3};
 
 /// How (28) integrates products with a test function λ_i: the mass M and the source load b.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Mass {
     /// Exactly, as in the paper.
     #[default]

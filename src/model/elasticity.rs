@@ -3,8 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 /// Which plane reduction of three-dimensional elasticity holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Plane {
     /// σ_zz = 0: a thin sheet (the paper's choice).
     Stress,

@@ -3,27 +3,27 @@
 //! [`Scene::read`] checks everything the file alone can tell; [`Scene::check_mesh`]
 //! checks what needs the mesh. Units are SI throughout.
 
-mod boundaries;
+mod boundary;
 mod check;
+mod document;
 mod error;
 mod expression;
-mod file;
-mod grammar;
-mod source;
-mod validate;
+mod reader;
+mod tables;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-pub use error::{ExpressionError, Names, Place, SceneError};
-pub use expression::Expression;
+pub use boundary::{Boundary, Condition, Gap};
+pub use error::SceneError;
+pub use expression::{Expression, ExpressionError};
 
 use crate::{
     contact::PenaltyOptions,
     fem::Mass,
     model::{DamageLaw, Material},
 };
-use source::Source;
+use document::SceneText;
 
 /// A problem to solve, as described by a scene file.
 #[derive(Debug, Clone)]
@@ -52,7 +52,7 @@ pub struct Scene {
     pub boundaries: Vec<Boundary>,
     /// What was not taken as it is written.
     pub notes: Vec<String>,
-    source: Source,
+    text: SceneText,
 }
 
 /// A mesh file and, for a `.geo`, the constants it is meshed with.
@@ -148,43 +148,17 @@ pub struct ContactOptions {
     pub penalty_duality: PenaltyOptions,
 }
 
+impl Default for ContactOptions {
+    fn default() -> Self {
+        Self { solver: None, tolerance: 1e-10, penalty_duality: PenaltyOptions::default() }
+    }
+}
+
 /// What is written while the scene runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct OutputOptions {
     /// Fields are written every so many steps, at least 1.
     pub every: Option<usize>,
-}
-
-/// What holds on one physical curve.
-#[derive(Debug, Clone)]
-pub struct Boundary {
-    /// The physical curve.
-    pub name: String,
-    /// Γ_D: prescribed displacement by component, m; a `None` component is free (never
-    /// both). Stands alone or with a traction on the free component.
-    pub displacement: Option<[Option<Expression>; 2]>,
-    /// A symmetry axis: u·ν = 0.
-    pub symmetry: bool,
-    /// Γ_N: surface traction f_N, N/m².
-    pub traction: Option<[Expression; 2]>,
-    /// Γ_C: the obstacle.
-    pub gap: Option<Gap>,
-}
-
-/// A rigid obstacle.
-#[derive(Debug, Clone)]
-pub struct Gap {
-    /// g(x, y) ≥ 0 along the normal, m.
-    pub distance: Expression,
-    /// Unit vector towards the obstacle; the body's outward normal when absent.
-    pub normal: Option<[f64; 2]>,
-}
-
-impl Gap {
-    /// g at a point, m. What [`Scene::check_mesh`] accepts below 0 is rounding.
-    pub fn at(&self, [x, y]: [f64; 2]) -> f64 {
-        self.distance.eval(x, y, 0.0).max(0.0)
-    }
 }
 
 impl Scene {
@@ -202,9 +176,9 @@ impl Scene {
     /// directory, in the file and in `--set` alike.
     ///
     /// # Errors
-    /// The file cannot be read or is no TOML; a key is unknown, missing or of the wrong
-    /// type; a value is out of range or contradicts another. Every error tells the file,
-    /// the line (or the `--set`), the key and what to write instead.
+    /// The file cannot be read or is no TOML; keys are unknown, missing or of the wrong
+    /// type; values are out of range or contradict others. All problems of a file are told at
+    /// once, each with the line (or the `--set`), the key and what to write instead.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
         let text = std::fs::read_to_string(path)
             .map_err(|source| SceneError::Read { path: path.to_owned(), source })?;
@@ -216,11 +190,13 @@ impl Scene {
     /// # Errors
     /// As [`Scene::read`], but for the reading itself.
     pub fn parse(text: &str, path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
-        let documents = overrides.iter().map(|set| source::set_document(set));
-        let documents = documents.collect::<Result<Vec<_>, _>>()?;
-        let mut source = Source::new(path, text, overrides, &documents);
-        let root = source.table(text, &documents)?;
-        let file = file::read(root, &source)?;
-        validate::scene(file, path, source)
+        let text = SceneText {
+            path: path.to_owned(),
+            text: text.to_owned(),
+            sets: overrides.to_vec(),
+            origins: BTreeMap::new(),
+        };
+        let root = document::parse(&text)?;
+        reader::read(text, &root, |table| tables::scene(table, path))
     }
 }

@@ -61,7 +61,7 @@ const SCENES: &[(&str, &str, &[&str])] = &[
     (
         "name = \"top\"\ntraction",
         "name = \"left\"\ntraction",
-        &["scene.toml:27: boundary \"left\"", "is given twice, first at scene.toml:22"],
+        &["scene.toml:27: boundary \"left\"", "is given twice, first at scene.toml:21"],
     ),
     ("symmetry = true\n", "", &["scene.toml:21: boundary \"left\"", "has nothing in it"]),
     ("square.msh", "square.stl", &["scene.toml:3: mesh.file must be a .geo or .msh file"]),

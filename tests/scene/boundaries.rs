@@ -16,7 +16,7 @@ fn every_rule_names_file_line_and_boundary() {
         (
             "name = \"load\"",
             "name = \"clamp\"",
-            &["bad.toml:31: boundary \"clamp\" is given twice, first at bad.toml:29"],
+            &["bad.toml:31: boundary \"clamp\" is given twice, first at bad.toml:28"],
         ),
         (
             "displacement = [\"0\", \"0\"]",
@@ -41,7 +41,10 @@ fn every_rule_names_file_line_and_boundary() {
         (
             "displacement = [\"0\", \"0\"]",
             "displacement = [0, 0]\ntraction = [0, 1]",
-            &["bad.toml:28: boundary \"clamp\" has a traction, but both displacements"],
+            &[
+                "bad.toml:28: boundary \"clamp\" has both displacements prescribed",
+                "and a traction; only",
+            ],
         ),
         (
             "displacement = [\"0\", \"0\"]",

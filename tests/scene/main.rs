@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use signorini::fem::Mass;
 use signorini::model::Plane;
-use signorini::scene::{MeshSource, Scene, Stepping, TimeGrid};
+use signorini::scene::{Condition, MeshSource, Scene, Stepping, TimeGrid};
 
 /// A complete scene; a test changes a line of it.
 const BASE: &str = include_str!("base.toml");
@@ -67,7 +67,7 @@ fn the_examples_carry_the_printed_data() {
         assert_eq!(scene.time, Some(TimeGrid { end: 1.0, stepping }), "{name}");
         let names: Vec<&str> = scene.boundaries.iter().map(|b| b.name.as_str()).collect();
         assert_eq!(names, curves, "{name}");
-        let load = scene.boundaries.iter().find_map(|b| b.traction.as_ref());
+        let load = scene.boundaries.iter().find_map(|b| b.traction());
         let [x, y] = load.expect("a load");
         let load = [x.eval(1.0, 1.0, 0.5), y.eval(1.0, 1.0, 0.5)];
         let expected = match name {
@@ -89,11 +89,11 @@ fn hertz_is_elastic_static_and_carries_half_the_load() {
         let found = scene.boundaries.iter().find(|b| b.name == name);
         found.unwrap_or_else(|| panic!("{name} is missing"))
     };
-    assert!(boundary("axis").symmetry);
-    let gap = boundary("foundation").gap.as_ref().expect("a gap");
+    assert!(matches!(boundary("axis").conditions[..], [Condition::Symmetry]));
+    let gap = boundary("foundation").gap().expect("a gap");
     assert_eq!(gap.normal, Some([0.0, -1.0]));
     assert_eq!(gap.distance.eval(0.01, 0.002, 1.0), 0.002);
-    let [_, y] = boundary("top").traction.as_ref().expect("a load");
+    let [_, y] = boundary("top").traction().expect("a load");
     let force = y.as_constant().expect("uniform") * 0.05;
     assert!((force + 17.5e6).abs() < 1e-6, "{force}");
 }
@@ -112,9 +112,12 @@ fn what_is_left_out_has_a_default() {
     assert!(scene.body_force.iter().all(|f| f.as_constant() == Some(0.0)));
     assert_eq!((scene.contact.solver, scene.contact.tolerance), (None, 1e-10));
     assert_eq!(scene.output.every, None);
-    let [x, y] = scene.boundaries[0].displacement.as_ref().expect("given");
-    assert!(x.is_none());
-    assert_eq!(y.as_ref().and_then(|y| y.as_constant()), Some(2.0));
+    let [Condition::Displacement([None, Some(y)]), Condition::Traction(_)] =
+        &scene.boundaries[0].conditions[..]
+    else {
+        panic!("a displacement, free in x, and a traction")
+    };
+    assert_eq!(y.as_constant(), Some(2.0));
 }
 
 #[test]
@@ -132,9 +135,9 @@ fn everything_written_is_read() {
     let damage = scene.damage.expect("given");
     assert_eq!(damage.initial.eval(0.5, 0.0, 0.0), 0.95);
     assert_eq!(damage.mass, Mass::Consistent, "as in the paper unless told otherwise");
-    let gap = scene.boundaries[2].gap.as_ref().expect("given");
+    let gap = scene.boundaries[2].gap().expect("given");
     assert_eq!(gap.normal, Some([0.6, -0.8]), "scaled to length 1");
-    assert!(scene.boundaries[2].traction.is_some(), "beside the gap");
+    assert!(scene.boundaries[2].traction().is_some(), "beside the gap");
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use signorini::mesh::{Curve, Mesh};
-use signorini::scene::Scene;
+use signorini::scene::{Scene, SceneError};
 
 use crate::BASE;
 
@@ -23,11 +23,16 @@ fn square() -> Mesh {
     }
 }
 
+fn first_line(error: &SceneError) -> String {
+    error.to_string().lines().next().expect("a line").to_owned()
+}
+
+/// What is said first about the base scene with one text replaced, on this mesh.
 fn verdict(old: &str, new: &str, mesh: &Mesh) -> Result<(), String> {
     assert!(BASE.contains(old), "the base scene has no `{old}`");
     let text = BASE.replacen(old, new, 1);
     let scene = Scene::parse(&text, Path::new("bad.toml"), &[]).unwrap_or_else(|e| panic!("{e}"));
-    scene.check_mesh(mesh).map_err(|e| e.to_string())
+    scene.check_mesh(mesh).map_err(|e| first_line(&e))
 }
 
 #[test]
@@ -64,13 +69,21 @@ fn values_are_checked_where_they_are_used() {
             "1 + 0.5*y",
             "bad.toml:17: damage.initial is 2 at (2, 2); it must be in (0.01, 1]",
         ),
-        ("1 - 0.1*x", "log(x)", "bad.toml:17: damage.initial is -inf at (0, 0)"),
+        (
+            "1 - 0.1*x",
+            "log(x)",
+            "bad.toml:17: damage.initial is -inf at (0, 0); it must be in (0.01, 1]",
+        ),
         (
             "x^2",
             "1-x",
             "bad.toml:36: boundary \"foundation\": gap is -1 at (2, 0); it must not be negative",
         ),
-        ("x^2", "sqrt(x-1)", "bad.toml:36: boundary \"foundation\": gap is NaN at (0, 0)"),
+        (
+            "x^2",
+            "sqrt(x-1)",
+            "bad.toml:36: boundary \"foundation\": gap is NaN at (0, 0); it must not be negative",
+        ),
         (
             "\"x^2\"",
             "-0.1",
@@ -95,7 +108,7 @@ fn values_are_checked_at_all_times_known_beforehand() {
         let sets = sets.map(|set| set.replace("LOAD", load).replace("TIME", time));
         let scene = Scene::parse(BASE, Path::new("base.toml"), &sets);
         let scene = scene.unwrap_or_else(|e| panic!("{e}"));
-        scene.check_mesh(&square()).map_err(|e| e.to_string())
+        scene.check_mesh(&square()).map_err(|e| first_line(&e))
     };
     let refused = |load: &str, time: &str, at_time: &str| {
         let message = at(load, time).expect_err(time);
@@ -208,4 +221,19 @@ fn a_value_from_the_command_line_is_named_as_such() {
         "base.toml, --set boundary.load.traction=[0, 'log(x-1)']: \
          boundary \"load\": traction[1] is NaN at (0.42264973081037427, 2)"
     );
+}
+
+#[test]
+fn all_that_is_wrong_is_told_at_once() {
+    let text = BASE
+        .replace("\"1 - 0.1*x\"", "\"1 - 0.5*x\"")
+        .replace("\"x^2\"", "\"x - 1\"")
+        .replace("name = \"axis\"", "name = \"axes\"");
+    let scene = Scene::parse(&text, Path::new("bad.toml"), &[]).expect("well formed");
+    let message = scene.check_mesh(&square()).expect_err("three problems").to_string();
+    let places: Vec<_> = message.lines().filter(|line| line.contains("bad.toml:")).collect();
+    assert_eq!(places.len(), 3, "{message}");
+    assert!(places[0].starts_with("bad.toml:17: damage.initial is 0"), "{message}");
+    assert!(places[1].starts_with("error: bad.toml:36: boundary \"foundation\": gap is -1"));
+    assert!(places[2].starts_with("error: bad.toml:40: boundary \"axes\" is no physical"));
 }

@@ -50,12 +50,12 @@ fn every_rule_names_file_line_and_key() {
         // Time.
         ("end = 1.0", "end = 0", &["bad.toml:19: time.end must be positive (s), but is 0"]),
         ("end = 1.0", "end = inf", &["bad.toml:19: time.end must be positive"]),
+        ("step = 0.01", "step = 0", &["bad.toml:20: time.step must be positive (s), but is 0"]),
         (
             "step = 0.01",
-            "step = 0",
-            &["bad.toml:20: time.step must be positive and at most the end"],
+            "step = 1.5",
+            &["bad.toml:20: time.step must be positive and at most the end, 1 s, but is 1.5"],
         ),
-        ("step = 0.01", "step = 1.5", &["bad.toml:20: time.step must be", "1 s, but is 1.5"]),
         ("step = 0.01", "step = 1e-300", &["bad.toml:20: time.step is", "more than 1e9 steps"]),
         // Contact.
         ("1e-8", "0", &["bad.toml:25: contact.tolerance must be between 0 and 1"]),

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use signorini::fem::Mass;
 use signorini::model::Plane;
-use signorini::scene::{Scene, TimeGrid};
+use signorini::scene::{Condition, Scene, TimeGrid};
 
 use crate::BASE;
 
@@ -33,10 +33,10 @@ fn set_replaces_adds_and_reaches_boundaries_by_name() {
     assert_eq!(scene.mesh.parameters["radius"], 2.0);
     assert_eq!(scene.damage.expect("given").initial.eval(0.0, 1.0, 0.0), 0.8);
     assert_eq!(scene.title, "Another, with blanks");
-    let [_, y] = scene.boundaries[1].traction.as_ref().expect("given");
+    let [_, y] = scene.boundaries[1].traction().expect("given");
     assert_eq!(y.eval(0.0, 0.0, 1.0), -40.0);
-    let [x, _] = scene.boundaries[0].displacement.as_ref().expect("given");
-    assert!(x.is_none());
+    let clamp = &scene.boundaries[0].conditions[..];
+    assert!(matches!(clamp, [Condition::Displacement([None, Some(_)])]), "{clamp:?}");
 }
 
 #[test]
@@ -48,7 +48,7 @@ fn a_bad_set_is_named() {
         ),
         ("tyme.step=1", ["--set tyme.step=1: unknown key tyme", "did you mean `time`"]),
         ("time.step=-1", ["base.toml, --set time.step=-1: time.step must be positive", "is -1"]),
-        ("time.step=fast", ["--set time.step=fast: time.step must be a number", "\"fast\""]),
+        ("time.step=fast", ["--set time.step=fast: time.step must be a number", "\"auto\""]),
         ("time.step", ["--set time.step: has no `=`", "--set KEY=VALUE"]),
         ("=3", ["--set =3: the key is no dotted TOML key", "--set KEY=VALUE"]),
         ("a b=3", ["--set a b=3: the key is no dotted TOML key", "quote odd names"]),
@@ -63,7 +63,7 @@ fn a_bad_set_is_named() {
         ),
         ("boundary.load.gap=t", ["--set boundary.load.gap=t: boundary \"load\": gap", "on t"]),
         ("boundary.load=3", ["boundary.load needs a key", "boundary.NAME.KEY=VALUE"]),
-        ("boundary=3", ["boundary must be addressed by name", "boundary.NAME.KEY=VALUE"]),
+        ("boundary=3", ["--set boundary=3: boundary must be an array", "--set boundary=3"]),
         (
             "boundary.load.traction=[0,\"q\"]",
             ["boundary \"load\": traction[1] has the unknown variable `q`", "--set boundary.load"],

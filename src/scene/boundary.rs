@@ -1,0 +1,161 @@
+//! What may hold on the parts of the boundary, and what may not hold together.
+
+use std::collections::BTreeMap;
+
+use super::document::{Content, Node};
+use super::expression::Expression;
+use super::reader::{Reading, Table, Value};
+
+/// A physical curve and what holds on it.
+#[derive(Debug, Clone)]
+pub struct Boundary {
+    /// The physical curve.
+    pub name: String,
+    /// At least one; none contradicts another.
+    pub conditions: Vec<Condition>,
+}
+
+/// A boundary condition.
+#[derive(Debug, Clone)]
+pub enum Condition {
+    /// Γ_D: the prescribed displacement by component, m; `None` leaves a component free (never
+    /// both).
+    Displacement([Option<Expression>; 2]),
+    /// A symmetry axis: u·ν = 0.
+    Symmetry,
+    /// Γ_C: u·ν ≤ g.
+    Gap(Gap),
+    /// Γ_N: the surface traction f_N, N/m².
+    Traction([Expression; 2]),
+}
+
+/// A rigid obstacle.
+#[derive(Debug, Clone)]
+pub struct Gap {
+    /// g(x, y) ≥ 0 along the normal, m.
+    pub distance: Expression,
+    /// Unit vector towards the obstacle; the body's outward normal when absent.
+    pub normal: Option<[f64; 2]>,
+}
+
+impl Gap {
+    /// g at a point, m. What [`Scene::check_mesh`](super::Scene::check_mesh) accepts below 0 is
+    /// rounding.
+    pub fn at(&self, [x, y]: [f64; 2]) -> f64 {
+        self.distance.eval(x, y, 0.0).max(0.0)
+    }
+}
+
+impl Boundary {
+    /// The obstacle, on Γ_C.
+    pub fn gap(&self) -> Option<&Gap> {
+        self.conditions.iter().find_map(|condition| match condition {
+            Condition::Gap(gap) => Some(gap),
+            _ => None,
+        })
+    }
+
+    /// The surface traction, on Γ_N.
+    pub fn traction(&self) -> Option<&[Expression; 2]> {
+        self.conditions.iter().find_map(|condition| match condition {
+            Condition::Traction(traction) => Some(traction),
+            _ => None,
+        })
+    }
+}
+
+/// What of the conditions of `a` and `b`, which hold on the same edge, cannot both hold there.
+pub(super) fn contradiction(a: &[Condition], b: &[Condition]) -> Option<[&'static str; 2]> {
+    use Condition::{Displacement, Gap, Symmetry, Traction};
+    let one_way = |a: &Condition, b: &Condition| match (a, b) {
+        (Displacement(_), Gap(_)) => Some(["a displacement", "a gap"]),
+        (Displacement(_), Symmetry) => Some(["a displacement", "a symmetry"]),
+        (Displacement([Some(_), Some(_)]), Traction(_)) => {
+            Some(["both displacements prescribed (no component is \"free\")", "a traction"])
+        }
+        (Symmetry, Gap(_)) => Some(["a symmetry", "a gap"]),
+        _ => None,
+    };
+    let mut pairs = a.iter().flat_map(|a| b.iter().map(move |b| (a, b)));
+    pairs.find_map(|(a, b)| one_way(a, b).or_else(|| one_way(b, a).map(|[b, a]| [a, b])))
+}
+
+/// The key of something on a boundary, as it is written in messages.
+pub(super) fn boundary_key(name: &str, key: &str) -> String {
+    format!("boundary \"{name}\": {key}")
+}
+
+pub(super) fn boundaries(list: &Value) -> Reading<Vec<Boundary>> {
+    let key = |i: usize, table: &Node| match table.name() {
+        Some(name) => format!("boundary \"{name}\""),
+        None => format!("boundary number {}", i + 1),
+    };
+    let mut first: BTreeMap<&str, String> = BTreeMap::new();
+    let mut boundaries = Vec::new();
+    for value in list.array(key)? {
+        boundaries.push(value.table(": ", boundary));
+        let Some(name) = value.node.name() else { continue };
+        if let Some(earlier) = first.insert(name, value.place()) {
+            value.refuse(format!("is given twice, first at {earlier}; merge the two"));
+        }
+    }
+    if boundaries.is_empty() {
+        return Err(list.refuse("must hold at least one boundary"));
+    }
+    boundaries.into_iter().collect()
+}
+
+fn boundary(table: &mut Table) -> Reading<Boundary> {
+    let name = table.required("name", Value::text);
+    let displacement = table.optional("displacement", displacement);
+    let symmetry = table.optional("symmetry", Value::flag);
+    let gap = table.optional("gap", Value::expression_in_space);
+    let normal = table.optional("normal", normal);
+    let traction = table.optional("traction", |value| value.pair(Value::expression));
+
+    let (gap, normal) = (gap?, normal?);
+    if normal.is_some() && gap.is_none() {
+        return Err(table.refuse("normal", "needs a gap beside it"));
+    }
+    let conditions = [
+        displacement?.map(Condition::Displacement),
+        symmetry?.unwrap_or(false).then_some(Condition::Symmetry),
+        gap.map(|distance| Condition::Gap(Gap { distance, normal })),
+        traction?.map(Condition::Traction),
+    ];
+    let conditions: Vec<_> = conditions.into_iter().flatten().collect();
+    if let Some([one, other]) = contradiction(&conditions, &conditions) {
+        let problem = format!("has {one} and {other}; only one of them can hold");
+        return Err(table.value.refuse(problem));
+    }
+    if conditions.is_empty() {
+        let problem = "has nothing in it: give it a displacement, symmetry = true, a traction or \
+                       a gap, or remove it";
+        return Err(table.value.refuse(problem));
+    }
+    Ok(Boundary { name: name?, conditions })
+}
+
+fn displacement(value: &Value) -> Reading<[Option<Expression>; 2]> {
+    let components = value.pair(|component| match &component.node.content {
+        Content::Text(text) if text.trim() == "free" => Ok(None),
+        _ => component.expression().map(Some),
+    })?;
+    match components {
+        [None, None] => Err(value.refuse("is \"free\" in both components; leave it out")),
+        components => Ok(components),
+    }
+}
+
+/// A constant direction, scaled to length 1.
+fn normal(value: &Value) -> Reading<[f64; 2]> {
+    let [x, y] = value.pair(|component| {
+        let constant = component.expression()?.as_constant();
+        constant.ok_or_else(|| component.refuse("must be a constant"))
+    })?;
+    let length = x.hypot(y);
+    match length > 0.0 && length.is_finite() {
+        true => Ok([x / length, y / length]),
+        false => Err(value.refuse("has no direction: its length is zero")),
+    }
+}
