@@ -68,7 +68,38 @@ impl Mesh {
     }
 }
 
-/// Twice the signed area of the triangle abc, positive when counter-clockwise.
-fn twice_area(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
+/// The smallest box around some points, its sides parallel to the axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BoundingBox {
+    /// Least x and y, m; +∞ if there is no point.
+    pub min: [f64; 2],
+    /// Greatest x and y, m; −∞ if there is no point.
+    pub max: [f64; 2],
+}
+
+impl BoundingBox {
+    /// Around `points`.
+    #[must_use]
+    pub fn of(points: impl IntoIterator<Item = [f64; 2]>) -> Self {
+        let mut of = Self { min: [f64::INFINITY; 2], max: [f64::NEG_INFINITY; 2] };
+        for point in points {
+            for axis in 0..2 {
+                of.min[axis] = of.min[axis].min(point[axis]);
+                of.max[axis] = of.max[axis].max(point[axis]);
+            }
+        }
+        of
+    }
+
+    /// Length of the longer side, m; 0 if there is no point.
+    #[must_use]
+    pub fn longer_side(&self) -> f64 {
+        (self.max[0] - self.min[0]).max(self.max[1] - self.min[1]).max(0.0)
+    }
+}
+
+/// Twice the signed area of the triangle abc, m², positive when counter-clockwise.
+#[must_use]
+pub fn twice_area(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
 }

@@ -1,4 +1,4 @@
-//! What the tests of the mesh share.
+//! What several test programs share.
 #![allow(dead_code, reason = "each test program uses its part")]
 
 use std::{
@@ -7,7 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use signorini::mesh::{Mesh, MeshError, read};
+use signorini::mesh::{Curve, Mesh, MeshError, read};
 
 pub fn fixture(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/msh");
@@ -70,4 +70,53 @@ pub fn close(a: f64, b: f64) {
 /// Mesh parameters from pairs.
 pub fn parameters<const N: usize>(pairs: [(&str, f64); N]) -> BTreeMap<String, f64> {
     pairs.map(|(name, value)| (name.to_owned(), value)).into()
+}
+
+/// Numbers between −1 and 1, the same at every run (SplitMix64).
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+
+    /// An index below `count`.
+    pub fn below(&mut self, count: usize) -> usize {
+        (0.5 * (self.next() + 1.0) * count as f64) as usize
+    }
+
+    pub fn field(&mut self, length: usize) -> Vec<f64> {
+        (0..length).map(|_| self.next()).collect()
+    }
+}
+
+/// The unit square, n×n cells cut along the rising diagonal, with its four sides.
+pub fn square(n: usize) -> Mesh {
+    let node = |i: usize, j: usize| i + (n + 1) * j;
+    let at = |k: usize| k as f64 / n as f64;
+    let nodes = (0..=n).flat_map(|j| (0..=n).map(move |i| [at(i), at(j)])).collect();
+    let cells = (0..n).flat_map(|j| (0..n).map(move |i| (i, j)));
+    let cut = |(i, j): (usize, usize)| {
+        let [a, b, c, d] = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)];
+        [[a, b, c], [a, c, d]]
+    };
+    let side = |edge: &dyn Fn(usize) -> [usize; 2]| Curve {
+        edges: (0..n).map(edge).collect(),
+        interior_edges: 0,
+    };
+    let curves = [
+        ("bottom", side(&|i| [node(i, 0), node(i + 1, 0)])),
+        ("right", side(&|j| [node(n, j), node(n, j + 1)])),
+        ("top", side(&|i| [node(i + 1, n), node(i, n)])),
+        ("left", side(&|j| [node(0, j + 1), node(0, j)])),
+    ];
+    Mesh {
+        nodes,
+        triangles: cells.flat_map(cut).collect(),
+        curves: curves.map(|(name, curve)| (name.to_owned(), curve)).into(),
+    }
 }

@@ -1,59 +1,20 @@
 //! Meshes, scenes and runs for the laws.
 
+#[path = "../common/mod.rs"]
+mod common;
+
+pub use common::{Random, square};
+
 use signorini::{
     evolution::{self, DiscreteProblem, Outcome, Phases, RunError, SetupError, Step},
-    mesh::{self, Curve, Mesh},
+    mesh::{self, Mesh},
     petsc::Session,
     scene::Scene,
 };
 use std::{collections::BTreeMap, fs, path::Path};
 
-/// Numbers between −1 and 1, the same at every run (SplitMix64).
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-
-    pub fn field(&mut self, length: usize) -> Vec<f64> {
-        (0..length).map(|_| self.next()).collect()
-    }
-}
-
-/// The unit square, n×n cells cut along the rising diagonal, with its four sides.
-pub fn square(n: usize) -> Mesh {
-    let node = |i: usize, j: usize| i + (n + 1) * j;
-    let at = |k: usize| k as f64 / n as f64;
-    let nodes = (0..=n).flat_map(|j| (0..=n).map(move |i| [at(i), at(j)])).collect();
-    let cells = (0..n).flat_map(|j| (0..n).map(move |i| (i, j)));
-    let cut = |(i, j): (usize, usize)| {
-        let [a, b, c, d] = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)];
-        [[a, b, c], [a, c, d]]
-    };
-    let side = |edge: &dyn Fn(usize) -> [usize; 2]| Curve {
-        edges: (0..n).map(edge).collect(),
-        interior_edges: 0,
-    };
-    let curves = [
-        ("bottom", side(&|i| [node(i, 0), node(i + 1, 0)])),
-        ("right", side(&|j| [node(n, j), node(n, j + 1)])),
-        ("top", side(&|i| [node(i + 1, n), node(i, n)])),
-        ("left", side(&|j| [node(0, j + 1), node(0, j)])),
-    ];
-    Mesh {
-        nodes,
-        triangles: cells.flat_map(cut).collect(),
-        curves: curves.map(|(name, curve)| (name.to_owned(), curve)).into(),
-    }
-}
-
-/// The same with its inner nodes moved at random, by up to 0.3 cells in x and y, and those
-/// on the sides along them.
+/// The [`square`] with its inner nodes moved at random, by up to 0.3 cells in x and y, and those on
+/// the sides along them.
 pub fn distorted(n: usize) -> Mesh {
     let (mut mesh, mut random) = (square(n), Random(n as u64));
     let reach = 0.3 / n as f64;
@@ -83,8 +44,8 @@ pub fn unstructured(size: f64) -> Mesh {
     meshed(&geo, &[("size".to_owned(), size)].into())
 }
 
-/// A mesh by gmsh (not while a session is held), which cannot be started while MPI, as it starts in another test, changes the
-/// environment.
+/// A mesh by gmsh. It cannot be started while MPI, as it starts in another test, changes the
+/// environment: so this waits for its turn at a session (and must not be called with one held).
 fn meshed(file: &Path, parameters: &BTreeMap<String, f64>) -> Mesh {
     drop(Session::start(&[]).unwrap());
     mesh::load(file, parameters).unwrap()

@@ -1,6 +1,6 @@
 //! The program on several ranks, from outside: the same answers, whole results, one voice.
 
-mod pieces;
+mod vtu_pieces;
 mod repeat;
 
 #[path = "../cli/test_directory.rs"]

@@ -1,7 +1,5 @@
 //! The geometries of the examples, as gmsh meshes them, and the running of gmsh itself.
 
-mod common;
-
 use std::{
     collections::{BTreeMap, HashSet},
     env,
@@ -12,7 +10,7 @@ use std::{
     time::{Duration, SystemTime},
 };
 
-use common::{check_laws, close, curve_length, edges, parameters};
+use crate::common::{check_laws, close, curve_length, edges, parameters};
 use signorini::mesh::{Mesh, MeshError, boundary_nodes, load, mesh_geo};
 use tempfile::TempDir;
 
@@ -266,7 +264,7 @@ fn missing_gmsh_says_what_to_install() {
         return;
     }
     let child = Command::new(env::current_exe().unwrap())
-        .args(["--exact", "missing_gmsh_says_what_to_install"])
+        .args(["--exact", "geometries::missing_gmsh_says_what_to_install"])
         .env("PATH", "")
         .output()
         .unwrap();

@@ -1,8 +1,6 @@
 //! What every mesh file must give, whatever its version, its form and its writer.
 
-mod common;
-
-use common::{check_laws, close, curve_length, fixture, read_bytes};
+use crate::common::{check_laws, close, curve_length, fixture, read_bytes};
 use signorini::mesh::{Mesh, read};
 
 const FORMS: [&str; 4] = ["41", "41-binary", "22", "22-binary"];
