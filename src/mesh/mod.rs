@@ -39,19 +39,6 @@ pub struct Curve {
 }
 
 impl Mesh {
-    /// Area of one triangle, m².
-    #[must_use]
-    pub fn triangle_area(&self, triangle: [usize; 3]) -> f64 {
-        let [a, b, c] = triangle.map(|node| self.nodes[node]);
-        0.5 * twice_area(a, b, c)
-    }
-
-    /// Area of the body, m².
-    #[must_use]
-    pub fn area(&self) -> f64 {
-        self.triangles.iter().map(|&t| self.triangle_area(t)).sum()
-    }
-
     /// Outward unit normal and length (m) of a boundary edge that has the body on its left.
     #[must_use]
     pub fn edge_normal(&self, [from, to]: [usize; 2]) -> ([f64; 2], f64) {
@@ -60,42 +47,16 @@ impl Mesh {
         let length = dx.hypot(dy);
         ([dy / length, -dx / length], length)
     }
-
-    /// Total length of a set of edges, m.
-    #[must_use]
-    pub fn length(&self, edges: &[[usize; 2]]) -> f64 {
-        edges.iter().map(|&edge| self.edge_normal(edge).1).sum()
-    }
 }
 
-/// The smallest box around some points, its sides parallel to the axes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BoundingBox {
-    /// Least x and y, m; +∞ if there is no point.
-    pub min: [f64; 2],
-    /// Greatest x and y, m; −∞ if there is no point.
-    pub max: [f64; 2],
-}
-
-impl BoundingBox {
-    /// Around `points`.
-    #[must_use]
-    pub fn of(points: impl IntoIterator<Item = [f64; 2]>) -> Self {
-        let mut of = Self { min: [f64::INFINITY; 2], max: [f64::NEG_INFINITY; 2] };
-        for point in points {
-            for axis in 0..2 {
-                of.min[axis] = of.min[axis].min(point[axis]);
-                of.max[axis] = of.max[axis].max(point[axis]);
-            }
-        }
-        of
-    }
-
-    /// Length of the longer side, m; 0 if there is no point.
-    #[must_use]
-    pub fn longer_side(&self) -> f64 {
-        (self.max[0] - self.min[0]).max(self.max[1] - self.min[1]).max(0.0)
-    }
+/// The longer side of the box around `points`, m.
+#[must_use]
+pub fn extent(points: &[[f64; 2]]) -> f64 {
+    let side = |axis: usize| {
+        let low = points.iter().fold(f64::INFINITY, |low, point| low.min(point[axis]));
+        points.iter().fold(f64::NEG_INFINITY, |high, point| high.max(point[axis])) - low
+    };
+    side(0).max(side(1)).max(0.0)
 }
 
 /// Twice the signed area of the triangle abc, m², positive when counter-clockwise.

@@ -11,9 +11,9 @@ pub struct DamageLaw {
     pub lambda_u: f64,
     /// λ_W, 1/s.
     pub lambda_w: f64,
-    /// q*: |ε|² counts no more than this.
+    /// q*, the largest |ε|² that counts: Ψ_q*(ε) = min(|ε|², q*).
     pub strain_cap: f64,
-    /// ζ_* in (0, 1): the least admissible damage.
+    /// ζ_* in (0, 1), the least admissible ζ.
     pub threshold: f64,
 }
 

@@ -1,5 +1,6 @@
 //! Normals and tributary lengths at the nodes of a boundary.
 
+use crate::common::length;
 use signorini::mesh::{BoundaryNode, Mesh, boundary_nodes};
 use std::collections::BTreeMap;
 
@@ -74,7 +75,7 @@ fn a_polygonal_circle_points_radially() {
             close(node.faces[0].normal[0], point[0] / 0.05);
             close(node.faces[0].normal[1], point[1] / 0.05);
         }
-        close(total(&nodes), mesh.length(&edges));
+        close(total(&nodes), length(&mesh, &edges));
     }
     let points: Vec<_> = (0..11)
         .map(|i| (std::f64::consts::TAU * f64::from(i) / 11.0).sin_cos().into())

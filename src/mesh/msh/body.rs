@@ -1,7 +1,7 @@
 //! Turns what a file lists into the mesh of a plane body, or says why it is none.
 
 use super::{
-    super::{BoundingBox, Curve, Mesh, error::Problem, twice_area},
+    super::{Curve, Mesh, error::Problem, extent, twice_area},
     byte_reader::{Result, fault},
     contents::{Contents, Element, Node},
 };
@@ -19,12 +19,16 @@ pub fn mesh(contents: &Contents) -> Result<Mesh> {
         return fault(None, Problem::NoTriangles);
     }
     let (index, nodes) = number_nodes(contents, &elements)?;
-    check_planar(&nodes)?;
-    let counter_clockwise = |element: &&Element<3>| counter_clockwise(element, &index, &nodes);
+    let points: Vec<[f64; 2]> = nodes.iter().map(|node| [node.point[0], node.point[1]]).collect();
+    let limit = PLANAR * extent(&points);
+    if let Some(node) = nodes.iter().find(|node| node.point[2].abs() > limit) {
+        return fault(node.at, Problem::NotPlanar { node: node.tag, z: node.point[2] });
+    }
+    let counter_clockwise = |element: &&Element<3>| counter_clockwise(element, &index, &points);
     let triangles = elements.iter().map(counter_clockwise).collect::<Result<Vec<_>>>()?;
     let half_edges = half_edges(&elements, &triangles, &nodes)?;
     let curves = curves(contents, &index, &half_edges)?;
-    Ok(Mesh { nodes: nodes.into_iter().map(Node::in_plane).collect(), triangles, curves })
+    Ok(Mesh { nodes: points, triangles, curves })
 }
 
 /// The triangles of the body: those of its physical surfaces, if there are any.
@@ -68,22 +72,18 @@ fn number_nodes<'a>(
     Ok((index, nodes))
 }
 
-fn check_planar(nodes: &[&Node]) -> Result<()> {
-    let extent = BoundingBox::of(nodes.iter().map(|node| node.in_plane())).longer_side();
-    match nodes.iter().find(|node| node.point[2].abs() > PLANAR * extent) {
-        Some(node) => fault(node.at, Problem::NotPlanar { node: node.tag, z: node.point[2] }),
-        None => Ok(()),
-    }
-}
-
 /// The nodes of a triangle in counter-clockwise order.
-fn counter_clockwise(element: &Element<3>, index: &Index, nodes: &[&Node]) -> Result<[usize; 3]> {
+fn counter_clockwise(
+    element: &Element<3>,
+    index: &Index,
+    points: &[[f64; 2]],
+) -> Result<[usize; 3]> {
     let mut triangle = element.nodes.map(|tag| index[&tag]);
     if let Some(missing) = triangle.iter().position(|&node| node == UNLISTED) {
         let (element_tag, node) = (element.tag, element.nodes[missing]);
         return fault(element.at, Problem::MissingNode { element: element_tag, node });
     }
-    let [a, b, c] = triangle.map(|node| nodes[node].in_plane());
+    let [a, b, c] = triangle.map(|node| points[node]);
     let twice = twice_area(a, b, c);
     let length = |p: [f64; 2], q: [f64; 2]| (q[0] - p[0]).hypot(q[1] - p[1]);
     let longest = length(a, b).max(length(b, c)).max(length(c, a));

@@ -15,13 +15,6 @@ pub struct Node {
     pub at: usize,
 }
 
-impl Node {
-    /// Its x and y.
-    pub fn in_plane(&self) -> [f64; 2] {
-        [self.point[0], self.point[1]]
-    }
-}
-
 /// An element with N nodes in one physical group.
 pub struct Element<const N: usize> {
     pub tag: u64,
