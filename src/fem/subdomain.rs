@@ -10,17 +10,17 @@ use std::collections::HashMap;
 /// The nodes and triangles that a rank keeps: the nodes it owns, the triangles around them, and
 /// the other nodes of these as ghosts.
 ///
-/// Here *global* nodes and triangles are those of the undivided mesh, with its indices; *local*
-/// ones are the rank's.
+/// *Local* indices count these nodes and triangles; all others are indices in the undivided mesh.
+/// (PETSc numbers the nodes a third way, see [`Partition`].)
 #[derive(Debug)]
 pub struct Subdomain {
-    /// Global index of each local node, owned ones first.
+    /// Index in the undivided mesh of each local node, owned ones first.
     nodes: Vec<usize>,
     owned: usize,
-    /// Global index of each local triangle; first those that belong to the rank.
+    /// The same of each local triangle; first those that belong to the rank.
     triangles: Vec<usize>,
     own_triangles: usize,
-    /// Local index by global index of the nodes.
+    /// Local index of each of `nodes`.
     local: HashMap<usize, usize>,
     partition: Partition,
 }
@@ -65,7 +65,7 @@ impl Subdomain {
         let roots: Vec<_> = ghosts.iter().map(|&i| (owner[i], index[i])).collect();
         let ghosts = Ghosts::new(session, owned, &roots)?;
         Ok(Some(Self {
-            local: nodes.iter().enumerate().map(|(local, &global)| (global, local)).collect(),
+            local: nodes.iter().enumerate().map(|(local, &node)| (node, local)).collect(),
             partition: Partition::distributed(comm, owned, total, petsc, ghosts),
             nodes,
             owned,
@@ -74,33 +74,33 @@ impl Subdomain {
         }))
     }
 
-    /// The local index of a global node, if the rank keeps it.
+    /// The local index of a node, if the rank keeps it.
     pub fn local(&self, node: usize) -> Option<usize> {
         self.local.get(&node).copied()
     }
 
-    /// The local index of a global node, if the rank owns it.
+    /// The local index of a node, if the rank owns it.
     pub fn owned(&self, node: usize) -> Option<usize> {
         self.local(node).filter(|&local| local < self.owned)
     }
 
-    /// The local part of a global nodal field with `block` components.
-    pub fn field<T: Copy>(&self, global: &[T], block: usize) -> Vec<T> {
-        self.nodes.iter().flat_map(|&i| &global[block * i..block * (i + 1)]).copied().collect()
+    /// The local part of a nodal field of the undivided body with `block` components.
+    pub fn field<T: Copy>(&self, undivided: &[T], block: usize) -> Vec<T> {
+        self.nodes.iter().flat_map(|&i| &undivided[block * i..block * (i + 1)]).copied().collect()
     }
 
-    /// Those of some global edges that have a node which the rank owns, with local indices.
-    pub fn edges(&self, global: &[[usize; 2]]) -> Vec<[usize; 2]> {
+    /// The edges that have a node which the rank owns, with local indices.
+    pub fn edges(&self, undivided: &[[usize; 2]]) -> Vec<[usize; 2]> {
         let local = |&[a, b]: &[usize; 2]| match (self.local(a), self.local(b)) {
             (Some(a), Some(b)) if a.min(b) < self.owned => Some([a, b]),
             _ => None,
         };
-        global.iter().filter_map(local).collect()
+        undivided.iter().filter_map(local).collect()
     }
 
     /// The local part of the undivided body.
-    pub fn body(self, global: &Body) -> Body {
-        let mesh = &global.mesh;
+    pub fn body(self, undivided: &Body) -> Body {
+        let mesh = &undivided.mesh;
         let curve = |curve: &Curve| Curve { edges: self.edges(&curve.edges), ..*curve };
         let corner = |i: usize| self.local[&i];
         Body {
@@ -109,12 +109,12 @@ impl Subdomain {
                 triangles: self.triangles.iter().map(|&t| mesh.triangles[t].map(corner)).collect(),
                 curves: mesh.curves.iter().map(|(n, c)| (n.clone(), curve(c))).collect(),
             },
-            triangles: self.triangles.iter().map(|&t| global.triangles[t]).collect(),
+            triangles: self.triangles.iter().map(|&t| undivided.triangles[t]).collect(),
             own_triangles: self.own_triangles,
-            node_area: self.field(&global.node_area, 1),
-            area: global.area,
-            centroid: global.centroid,
-            polar_inertia: global.polar_inertia,
+            node_area: self.field(&undivided.node_area, 1),
+            area: undivided.area,
+            centroid: undivided.centroid,
+            polar_inertia: undivided.polar_inertia,
             partition: self.partition,
         }
     }
