@@ -9,7 +9,7 @@ use std::{
     time::SystemTime,
 };
 
-/// How many different error lines of gmsh are shown; it can repeat itself by the hundred.
+/// How many different lines of gmsh are shown; it can repeat an error by the hundred.
 const SHOWN: usize = 5;
 
 /// Reads a mesh: a `.msh` as it is, a `.geo` through [`mesh_geo`].
@@ -155,20 +155,18 @@ fn run(
         _ => MeshError::io(Path::new("gmsh"))(source),
     })?;
 
-    // gmsh can report errors and still exit with success.
     let said = [output.stdout, output.stderr].concat();
     let said = String::from_utf8_lossy(&said);
-    let mut errors: Vec<&str> =
-        said.lines().filter(|line| line.trim_start().starts_with("Error")).collect();
-    if output.status.success() && errors.is_empty() && fresh.exists() {
+    // gmsh can report errors and still exit with success.
+    let is_error = |line: &str| line.trim_start().starts_with("Error");
+    if output.status.success() && fresh.exists() && !said.lines().any(is_error) {
         return Ok(());
     }
-    let mut shown = HashSet::new();
-    errors.retain(|line| shown.insert(*line) && shown.len() <= SHOWN);
-    let message = match (errors.is_empty(), said.trim()) {
-        (false, _) => errors.join("\n"),
-        (true, "") => format!("no message, {}", output.status),
-        (true, said) => said.chars().take(2000).collect(),
+    let mut seen = HashSet::new();
+    let lines: Vec<&str> = said.lines().filter(|line| seen.insert(*line)).take(SHOWN).collect();
+    let message = match lines.is_empty() {
+        true => format!("no message, {}", output.status),
+        false => lines.join("\n"),
     };
     Err(MeshError::meshing(geo, format!("gmsh could not mesh it:\n{message}")))
 }
