@@ -18,6 +18,8 @@ PACKAGES_VALIDATE := python3-dolfinx-real
 PACKAGES_RANDOM := python3-scipy
 
 BINARY := target/release/signorini
+# The studies: a program of their own in validation/study.
+STUDIES := target/release/signorini-study
 # rustup puts cargo where a shell opened before does not look.
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
@@ -28,7 +30,7 @@ help:
 	@echo 'make mesh && make run   mesh and solve the scenes of geo/, draw their figures into out/'
 	@echo
 	@echo 'make deps       install the Debian packages that are missing'
-	@echo 'make build      $(BINARY)'
+	@echo 'make build      $(BINARY) and $(notdir $(STUDIES))'
 	@echo 'make mesh       the .msh of every scene'
 	@echo 'make run        every scene; or SCENE="geo/a.toml …" SOLVER=name ARGS="--set time.step=0.005"'
 	@echo 'make figures    the figures of every run in out/, again'
@@ -36,7 +38,7 @@ help:
 	@echo 'make validate   the comparison with FEniCSx (installs it: make deps-validate)'
 	@echo 'make random     a thousand random scenes, judged by code of their own; or ARGS="--count 50 --seed 3"'
 	@echo 'make compare    all contact solvers on all scenes, side by side'
-	@echo 'make bench      speed against FEniCSx, the floor, growth; or ARGS=--quick'
+	@echo 'make bench      speed against FEniCSx and the unavoidable work, growth; or ARGS=--quick'
 	@echo 'make stability  the maps of where methods fail; or MAPS="step-size …"'
 	@echo 'make reference  the reference solution of a scene, unless it is there (minutes); or STUDY=geo/a.toml'
 	@echo 'make converge   errors against it on nested meshes: Table 1, Figure 3; or STUDY=geo/a.toml'
@@ -70,7 +72,7 @@ figures: deps
 	$(PYTHON) scripts/figures.py $(patsubst %/summary.json,%,$(wildcard out/*/summary.json))
 
 test: deps
-	cargo fmt --check
+	cargo fmt --all --check
 	cargo clippy --locked --all-targets -- -D warnings
 	RUSTDOCFLAGS='-D warnings' cargo doc --locked --no-deps
 	cargo test --locked
@@ -98,14 +100,14 @@ bench: build deps-validate
 	$(PYTHON) scripts/bench.py out/bench
 
 stability: build
-	$(BINARY) stability $(MAPS)
+	$(STUDIES) stability $(MAPS)
 	$(PYTHON) scripts/stability.py out/stability $(MAPS)
 
 reference: build
-	$(BINARY) reference $(STUDY)
+	$(STUDIES) reference $(STUDY)
 
 converge: reference
-	$(BINARY) converge $(STUDY)
+	$(STUDIES) converge $(STUDY)
 	$(PYTHON) scripts/converge.py out/converge/$(STUDY_NAME)
 
 # The chart compares uniform meshes with graded ones: a graded reference is nearer to both. The
@@ -115,8 +117,8 @@ CHART_REFERENCE := --grading 4 --step 5e-4
 chart: build deps-validate
 	@set -e; for scene in $(CHART); do \
 	    out=out/chart/$$(basename $$scene .toml); \
-	    $(BINARY) reference $$scene $(CHART_REFERENCE); \
-	    $(BINARY) chart $$scene $(CHART_REFERENCE); \
+	    $(STUDIES) reference $$scene $(CHART_REFERENCE); \
+	    $(STUDIES) chart $$scene $(CHART_REFERENCE); \
 	    ! grep -q '"square.geo"' $$scene || $(PYTHON) validation/timing.py $$scene $$out; \
 	    $(PYTHON) scripts/chart.py $$out; \
 	done

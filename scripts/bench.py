@@ -1,8 +1,8 @@
 """Draws the measurements of `make bench`: bench.py FOLDER
 
 Reads FOLDER/bench.csv and draws FOLDER/bench.png: the time of a step of every program and how much
-faster signorini is, where contact stays and where it moves; how far a step is from the floor; growth
-of time and memory.
+faster signorini is, where contact stays and where it moves; how far a step is from the work that
+none can avoid; growth of time and memory.
 """
 
 import sys
@@ -21,7 +21,7 @@ STYLES = {
     ("signorini", "tao"): ("#3d8f5a", "^", "-"),
     ("FEniCSx", "lu"): ("#8e5aa8", "D", "--"),
     ("FEniCSx", "cholesky"): ("#a3554f", "v", "--"),
-    ("floor", ""): (INK, "_", ":"),
+    ("unavoidable", ""): (INK, "_", ":"),
 }
 DEFAULT = ("signorini", "active-set")
 GIBIBYTES = 1024.0**3
@@ -53,9 +53,9 @@ def line(axes, values, key, **style):
 
 
 def time(axes, rows, part, title):
-    """Milliseconds per step of every program; the floor is that of the part `steps`."""
+    """Milliseconds per step of every program; the work that none can avoid is that of `steps`."""
     for key in STYLES:
-        source = part if key[0] != "floor" else "floor" if part == "steps" else None
+        source = part if key[0] != "unavoidable" else "kernels" if part == "steps" else None
         if values := rounds(rows, source, key):
             line(axes, values, key)
     if not axes.has_data():
@@ -69,7 +69,7 @@ def time(axes, rows, part, title):
 
 def ratios(axes, rows, part):
     """How many times longer FEniCSx takes than the default; where contact stays, what is demanded,
-    and the default against the floor."""
+    and the default against the work that no step can avoid."""
     ours = rounds(rows, part, DEFAULT)
     for key in STYLES:
         theirs = rounds(rows, part, key) if key[0] == "FEniCSx" else {}
@@ -81,8 +81,8 @@ def ratios(axes, rows, part):
         return
     title = "FEniCSx against active-set"
     if part == "steps":
-        against_floor(axes, rows)
-        title += ", and active-set against the floor"
+        against_unavoidable(axes, rows)
+        title += ", and active-set against the unavoidable work"
     axes.set(xscale="log", xlabel="n", ylabel="times")
     axes.set_ylim(0, 1.35 * axes.get_ylim()[1])
     axes.set_title(title, loc="left")
@@ -90,14 +90,15 @@ def ratios(axes, rows, part):
     axes.legend(fontsize=8, loc="upper left")
 
 
-def against_floor(axes, rows):
-    """The default over the floor, and what is demanded of both ratios."""
-    below, steps = rounds(rows, "floor", ("floor", "")), rounds(rows, "floor", DEFAULT)
+def against_unavoidable(axes, rows):
+    """The default over the unavoidable work, and what is demanded of both ratios."""
+    below = rounds(rows, "kernels", ("unavoidable", ""))
+    steps = rounds(rows, "kernels", DEFAULT)
     if below:
         same = {n: [a / b for a, b in zip(steps[n], below[n])] for n in below}
         colour = STYLES[DEFAULT][0]
         axes.plot(list(same), [median(r) for r in same.values()], "*", color=colour, ms=10,
-                  label="active-set / floor")
+                  label="active-set / unavoidable")
     for n, least in ((128, 12), (256, 15)):
         axes.plot([0.85 * n, 1.18 * n], [least, least], color=RED, lw=2)
     axes.plot([0.85 * 256, 1.18 * 256], [2.5, 2.5], color=RED, lw=2, label="demanded")

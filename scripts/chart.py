@@ -1,6 +1,6 @@
 """Draws the chart of speed against accuracy: chart.py FOLDER
 
-Reads FOLDER/chart.csv as `signorini chart` writes it and, where validation/timing.py has left it,
+Reads FOLDER/chart.csv as `signorini-study chart` writes it and, where validation/timing.py has left it,
 FOLDER/fenicsx.csv, and draws FOLDER/chart.png.
 
 The FEniCSx loop solves the same discrete problem: its error is that of our run with the same n and
@@ -100,7 +100,7 @@ def draw(axes, rows, fenicsx, error, suffix, label):
 def main(folder):
     table, others = Path(folder) / "chart.csv", Path(folder) / "fenicsx.csv"
     if not table.exists():
-        sys.exit(f"no {table}: run `signorini chart` first")
+        sys.exit(f"no {table}: run `signorini-study chart` first")
     rows = [row for row in read_table(table) if not row["error"]]
     fenicsx = list(matched(read_table(others), rows)) if others.exists() else []
     figure, (left, right) = plt.subplots(1, 2, figsize=(13, 6))

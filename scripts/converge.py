@@ -1,4 +1,4 @@
-"""Draws the errors of `signorini converge` as the paper's Figure 3: converge.py FOLDER
+"""Draws the errors of `signorini-study converge` as the paper's Figure 3: converge.py FOLDER
 
 Reads FOLDER/converge.csv and draws FOLDER/converge.png: the error of Table 1 against h + k, beside
 the printed one where there is one, and all errors against h at the least k.
@@ -86,7 +86,7 @@ def draw_orders(axes, rows):
 def main(folder):
     table = Path(folder) / "converge.csv"
     if not table.exists():
-        sys.exit(f"no {table}: run `signorini converge` first")
+        sys.exit(f"no {table}: run `signorini-study converge` first")
     rows = read_table(table)
     if len({row["h"] for row in rows}) < 2:
         sys.exit(f"{table}: an order needs two meshes; refine the reference more often")

@@ -1,6 +1,6 @@
-"""Draws the maps of the atlas of failure: stability.py FOLDER [MAP...]
+"""Draws the maps of the stability study: stability.py FOLDER [MAP...]
 
-Reads FOLDER/<map>.csv as `signorini stability` writes it, and draws FOLDER/<map>.png.
+Reads FOLDER/<map>.csv as `signorini-study stability` writes it, and draws FOLDER/<map>.png.
 """
 
 import csv
@@ -11,7 +11,7 @@ import matplotlib
 
 matplotlib.use("Agg")
 
-from atlas import (  # noqa: E402
+from stability import (  # noqa: E402
     conditioning,
     lost_contact,
     maximum_principle,
@@ -38,7 +38,7 @@ def main(folder, names):
     for name in names or MAPS:
         table = Path(folder) / f"{name}.csv"
         if not table.exists():
-            print(f"no {table}: run `signorini stability {name}` first", file=sys.stderr)
+            print(f"no {table}: run `signorini-study stability {name}` first", file=sys.stderr)
             continue
         with open(table, newline="") as rows:
             MAPS[name].draw(list(csv.DictReader(rows)), table.with_suffix(".png"))

@@ -15,4 +15,3 @@ pub mod contact;
 pub mod scene;
 pub mod evolution;
 pub mod output;
-pub mod study;

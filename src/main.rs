@@ -26,16 +26,6 @@ enum Command {
     Run(command::RunArguments),
     /// Run scenes with every contact solver and compare cost and answers.
     Compare(command::CompareArguments),
-    /// Make the maps of where methods fail.
-    Stability(command::StabilityArguments),
-    /// Compute the reference solution of `converge` and `chart`, unless it is there.
-    Reference(command::ReferenceArguments),
-    /// Errors on nested meshes against the reference; by default the paper's Table 1 and Figure 3.
-    Converge(command::ConvergeArguments),
-    /// Error against seconds: solvers, meshes, steps and tolerances, with the Pareto front.
-    Chart(command::ChartArguments),
-    /// Time the work of a scene's step that no method can avoid, in isolation (JSON).
-    Floor(command::FloorArguments),
     /// Mesh the .geo files of scenes with gmsh, where their .msh is missing or older.
     Mesh {
         /// Scene files.
@@ -49,12 +39,7 @@ fn main() -> ExitCode {
     let alone = match &command {
         Command::Run(_) => Ok(()),
         Command::Compare(_) => command::refuse_ranks("compare"),
-        Command::Stability(_) => command::refuse_ranks("stability"),
         Command::Mesh { .. } => command::refuse_ranks("mesh"),
-        Command::Reference(_) => command::refuse_ranks("reference"),
-        Command::Converge(_) => command::refuse_ranks("converge"),
-        Command::Chart(_) => command::refuse_ranks("chart"),
-        Command::Floor(_) => command::refuse_ranks("floor"),
     };
     if let Err(code) = alone {
         return code;
@@ -62,11 +47,6 @@ fn main() -> ExitCode {
     let result = match command {
         Command::Run(arguments) => command::run(&arguments),
         Command::Compare(arguments) => command::compare_scenes(&arguments),
-        Command::Stability(arguments) => command::stability(&arguments),
-        Command::Reference(arguments) => command::reference(&arguments),
-        Command::Converge(arguments) => command::convergence(&arguments),
-        Command::Chart(arguments) => command::speed_chart(&arguments),
-        Command::Floor(arguments) => command::floor(&arguments),
         Command::Mesh { scenes } => command::mesh(&scenes),
     };
     match result {

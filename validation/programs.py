@@ -14,6 +14,8 @@ import numpy as np
 ROOT = Path(__file__).resolve().parent.parent
 LOOP = ROOT / "validation" / "loop.py"
 TOLERANCE = 1e-10
+# The kernels of a step.
+KERNELS = ["stiffness refill", "product", "triangular solves", "damage solve"]
 
 
 class Failure(Exception):
@@ -63,11 +65,12 @@ class Bench:
             part.rename(path)
         return path
 
-    def start(self, command):
+    def start(self, command, environment=None):
         """Runs a command to its end: its output and wall seconds."""
         command = [str(word) for word in command]
+        environment = {**self.environment, **(environment or {})}
         began = time.perf_counter()
-        with subprocess.Popen(command, env=self.environment, text=True, cwd=self.out,
+        with subprocess.Popen(command, env=environment, text=True, cwd=self.out,
                               stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
             said, complaint = process.communicate()
             seconds = time.perf_counter() - began
@@ -122,13 +125,19 @@ class Bench:
         }
         return self.keep(row), answer
 
-    def floor(self, n):
-        """The unavoidable work in isolation."""
-        said, _ = self.start([self.binary, "floor", FROZEN.file(), "--mesh", self.mesh(FROZEN, n)])
-        answer = json.loads(said)
-        self.keep({"program": "floor", "method": "", "n": n, "ranks": 1, "nodes": answer["nodes"],
-                   "seconds_per_step": answer["seconds"]})
-        return answer
+    def kernels(self, n):
+        """What no step can do without, in isolation: `cargo bench --bench kernels` times it."""
+        home = self.out / "kernels"
+        environment = {"CRITERION_HOME": str(home), "PATH": os.pathsep.join(
+            [os.environ["PATH"], str(Path.home() / ".cargo" / "bin")])}
+        self.start(["cargo", "bench", "--locked", "--manifest-path", ROOT / "Cargo.toml",
+                    "--bench", "kernels", "--", f"^unavoidable/(.*/{n}|copy)$"], environment)
+        group = home / "unavoidable"
+        everything = timed(group / "all" / str(n))
+        self.keep({"program": "unavoidable", "method": "", "n": n, "ranks": 1,
+                   "nodes": everything["Elements"], "seconds_per_step": everything["seconds"]})
+        parts = {name: timed(group / name / str(n)) for name in KERNELS}
+        return everything["seconds"], parts, timed(group / "copy")
 
     def keep(self, row):
         """Notes a run, whose answer must satisfy the KKT conditions."""
@@ -158,6 +167,14 @@ class Bench:
             writer.writeheader()
             writer.writerows(self.rows)
         (self.out / "bench.md").write_text("\n".join(self.text), encoding="utf-8")
+
+
+def timed(benchmark):
+    """The median seconds that Criterion measured, and the elements or bytes it was told of."""
+    result = benchmark / "new"
+    estimates = json.loads((result / "estimates.json").read_text())
+    throughput = json.loads((result / "benchmark.json").read_text())["throughput"] or {}
+    return {"seconds": 1e-9 * estimates["median"]["point_estimate"], **throughput}
 
 
 def peak(said):

@@ -1,15 +1,14 @@
 //! `signorini compare`: all contact solvers on the same scenes.
 
-use super::{Failure, check_petsc, check_solver, screen::say};
+use super::{
+    Failure, check_petsc, check_solver,
+    comparison::{Entry, compare},
+    screen::say,
+};
 use clap::Args;
 use comfy_table::{CellAlignment, Table, presets};
 use signorini::{
-    contact::SOLVERS,
-    evolution::DiscreteProblem,
-    mesh, output,
-    petsc::Session,
-    scene::Scene,
-    study::{Entry, compare},
+    contact::SOLVERS, evolution::DiscreteProblem, mesh, output, petsc::Session, scene::Scene,
 };
 use std::path::PathBuf;
 
@@ -54,8 +53,7 @@ pub fn compare_scenes(arguments: &CompareArguments) -> Result<(), Failure> {
     let session = Session::start(&arguments.petsc).map_err(Failure::solver)?;
     let mut entries = Vec::new();
     for problem in &settings {
-        let comparison = compare(&session, problem, &solvers).map_err(Failure::solver)?;
-        entries.extend(comparison.entries);
+        entries.extend(compare(&session, problem, &solvers).map_err(Failure::solver)?);
     }
     session.finalize().map_err(Failure::solver)?;
     say(&table(&entries).to_string());

@@ -1,25 +1,16 @@
 //! What the subcommands do.
 
-mod chart;
 mod compare;
-mod converge;
-mod floor;
+mod comparison;
 mod profile;
 mod ranks;
 mod recorder;
-mod reference;
 mod run;
 mod screen;
-mod stability;
 
-pub use chart::{ChartArguments, speed_chart};
 pub use compare::{CompareArguments, compare_scenes};
-pub use converge::{ConvergeArguments, convergence};
-pub use floor::{FloorArguments, floor};
 pub use ranks::refuse_ranks;
-pub use reference::{ReferenceArguments, reference};
 pub use run::{RunArguments, run};
-pub use stability::{StabilityArguments, stability};
 
 use signorini::{
     contact::{TAO_TYPES, UnknownSolver, is_solver},

@@ -61,11 +61,7 @@ impl RunArguments {
 }
 
 /// The scene at `path` with keys overridden by `set`, on another mesh if one is given.
-pub(super) fn read_scene(
-    path: &Path,
-    mesh: Option<&Path>,
-    set: &[String],
-) -> Result<Scene, Failure> {
+fn read_scene(path: &Path, mesh: Option<&Path>, set: &[String]) -> Result<Scene, Failure> {
     let mut scene = Scene::read(path, set).map_err(Failure::input)?;
     if let Some(file) = mesh {
         scene.mesh = MeshSource::from_path(file);

@@ -40,18 +40,13 @@ impl Screen {
         let lines = [scene.title.clone(), row("mesh", mesh), row("solver", solver)];
         let time = scene.time.map(|grid| row("time", steps(grid)));
         say(&lines.into_iter().chain(time).collect::<Vec<_>>().join("\n"));
-        let screen = Self::until(scene.time.map_or(1.0, |grid| grid.end));
-        screen.bar.set_message("the first solve");
-        screen
-    }
-
-    /// Of a run to t = `end`, s.
-    pub fn until(end: f64) -> Self {
+        let end = scene.time.map_or(1.0, |grid| grid.end);
         let bar = ProgressBar::new(LENGTH);
         let template = "{bar:20} {wide_msg} {elapsed}, {eta} left";
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
+        bar.set_message("the first solve");
         Self { bar, end }
     }
 
@@ -64,11 +59,6 @@ impl Screen {
         ));
     }
 
-    /// Removes the bar.
-    pub fn clear(&self) {
-        self.bar.finish_and_clear();
-    }
-
     /// Replaces the bar by the result and the table of `phases`.
     pub fn close(
         &self,
@@ -79,29 +69,6 @@ impl Screen {
     ) {
         self.bar.finish_and_clear();
         say(&report(summary, outcome, phases, folder));
-    }
-}
-
-/// The bar of many runs.
-pub struct Counter(ProgressBar);
-
-impl Counter {
-    pub fn new(of: &'static str) -> Self {
-        let bar = ProgressBar::new(1);
-        let template = format!("{{bar:20}} {{pos}} of {{len}} {of} {{elapsed}}, {{eta}} left");
-        if let Ok(style) = ProgressStyle::with_template(&template) {
-            bar.set_style(style);
-        }
-        Self(bar)
-    }
-
-    pub fn show(&self, done: usize, all: usize) {
-        self.0.set_length(all as u64);
-        self.0.set_position(done as u64);
-    }
-
-    pub fn clear(&self) {
-        self.0.finish_and_clear();
     }
 }
 

@@ -3,7 +3,7 @@
 use super::{DiscreteProblem, Outcome};
 use crate::{contact::RigidMotion, model::Plane, scene::Stepping};
 
-/// In plane strain with ν above this, P1 triangles lock: measured in the atlas of failure.
+/// In plane strain with ν above this, P1 triangles lock: measured in the stability study.
 const LOCKING: f64 = 0.45;
 /// Triangles with a smaller angle are told, degrees.
 const SLIVER: f64 = 1.0;

@@ -7,7 +7,7 @@ mod components;
 mod error;
 mod gmsh;
 mod msh;
-mod refine;
+mod rectangle;
 
 pub use boundary::{BoundaryNode, CORNER_ANGLE, Face, boundary_nodes};
 pub use components::Components;

@@ -297,19 +297,6 @@ fn profile() {
 }
 
 #[test]
-fn floor() {
-    let test_directory = TestDirectory::new();
-    let said = test_directory.say(&["floor", "scene.toml", "--rounds", "3"]);
-    assert_eq!(said.code, Some(0), "{said:?}");
-    let floor: Value = serde_json::from_str(&said.out).expect("JSON");
-    assert_eq!(floor["nodes"], 25);
-    let parts = floor["parts"].as_array().expect("parts");
-    let each: Vec<f64> = parts.iter().map(|part| number(&part["seconds"])).collect();
-    assert!(each.len() == 4 && each.iter().all(|&s| s > 0.0), "{each:?}");
-    assert!(!test_directory.path("out").exists(), "it writes nothing");
-}
-
-#[test]
 fn a_process_alone_needs_no_directory_of_temporary_files() {
     // Open MPI's is common to all processes of a user, who would make and remove it at the same time.
     let test_directory = TestDirectory::new();

@@ -1,13 +1,16 @@
 //! What several test programs share.
 #![allow(dead_code, reason = "each test program uses its part")]
 
+use rand_xoshiro::{
+    SplitMix64,
+    rand_core::{Rng, SeedableRng},
+};
+use signorini::mesh::{Mesh, MeshError, read, twice_area};
 use std::{
     collections::{BTreeMap, HashMap},
     fs,
     path::{Path, PathBuf},
 };
-
-use signorini::mesh::{Curve, Mesh, MeshError, read, twice_area};
 
 pub fn fixture(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/msh");
@@ -83,21 +86,21 @@ pub fn parameters<const N: usize>(pairs: [(&str, f64); N]) -> BTreeMap<String, f
     pairs.map(|(name, value)| (name.to_owned(), value)).into()
 }
 
-/// Numbers between −1 and 1, the same at every run (SplitMix64).
-pub struct Random(pub u64);
+/// Numbers between −1 and 1, the same at every run.
+pub struct Random(SplitMix64);
 
 impl Random {
+    pub fn new(seed: u64) -> Self {
+        Self(SplitMix64::seed_from_u64(seed))
+    }
+
     pub fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        (self.0.next_u64() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
     }
 
     /// An index below `count`.
     pub fn below(&mut self, count: usize) -> usize {
-        (0.5 * (self.next() + 1.0) * count as f64) as usize
+        (self.0.next_u64() % count as u64) as usize
     }
 
     pub fn field(&mut self, length: usize) -> Vec<f64> {
@@ -107,27 +110,5 @@ impl Random {
 
 /// The unit square, n×n cells cut along the rising diagonal, with its four sides.
 pub fn square(n: usize) -> Mesh {
-    let node = |i: usize, j: usize| i + (n + 1) * j;
-    let at = |k: usize| k as f64 / n as f64;
-    let nodes = (0..=n).flat_map(|j| (0..=n).map(move |i| [at(i), at(j)])).collect();
-    let cells = (0..n).flat_map(|j| (0..n).map(move |i| (i, j)));
-    let cut = |(i, j): (usize, usize)| {
-        let [a, b, c, d] = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)];
-        [[a, b, c], [a, c, d]]
-    };
-    let side = |edge: &dyn Fn(usize) -> [usize; 2]| Curve {
-        edges: (0..n).map(edge).collect(),
-        interior_edges: 0,
-    };
-    let curves = [
-        ("bottom", side(&|i| [node(i, 0), node(i + 1, 0)])),
-        ("right", side(&|j| [node(n, j), node(n, j + 1)])),
-        ("top", side(&|i| [node(i + 1, n), node(i, n)])),
-        ("left", side(&|j| [node(0, j + 1), node(0, j)])),
-    ];
-    Mesh {
-        nodes,
-        triangles: cells.flat_map(cut).collect(),
-        curves: curves.map(|(name, curve)| (name.to_owned(), curve)).into(),
-    }
+    Mesh::rectangle(1.0, 1.0, n, n)
 }

@@ -1,24 +1,31 @@
-//! What a time step is made of, on Example I with n = 128: `cargo bench`, compared with the last
-//! time it ran. `make bench` measures whole steps.
+//! What a time step is made of, on Example I: `cargo bench`, compared with the last time it ran.
+//! `make bench` measures whole steps, and holds them against the group `unavoidable`.
 
-use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use signorini::{
     contact::SOLVERS,
     evolution::{ContactStep, DiscreteProblem},
     fem::{DamageSystem, Stiffness, source, source_load},
-    petsc::{Factor, Precision, Session, Vector},
+    mesh::Mesh,
+    petsc::{Factor, Matrix, Precision, Session, Vector},
     phases::Phases,
     scene::Scene,
-    study,
 };
 use std::{hint::black_box, path::Path, time::Duration};
 
+/// Cells a side of the square.
 const CELLS: usize = 128;
+/// The same, of the work that no step can do without.
+const UNAVOIDABLE: [usize; 2] = [128, 256];
+/// Doubles that no cache holds.
+const COPIED: usize = 1 << 24;
+/// k, s.
+const STEP: f64 = 0.01;
 
-fn problem() -> DiscreteProblem {
+fn problem(cells: usize) -> DiscreteProblem {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("geo/square-mild.toml");
     let scene = Scene::read(&path, &[]).expect("a scene of this project");
-    DiscreteProblem::new(scene, study::rectangle(1.0, 1.0, CELLS, CELLS)).expect("a mesh for it")
+    DiscreteProblem::new(scene, Mesh::rectangle(1.0, 1.0, cells, cells)).expect("a mesh for it")
 }
 
 /// A damage field such as the scene's at the given time: worst at the corner (1, 0).
@@ -32,60 +39,120 @@ fn displaced(problem: &DiscreteProblem) -> Vec<f64> {
     problem.body.mesh.nodes.iter().flat_map(|&[x, y]| [0.1 * x * y, -0.2 * x * x]).collect()
 }
 
-fn stiffness(c: &mut Criterion) {
-    let (session, problem) = (Session::start(&[]).unwrap(), problem());
-    let bases = &problem.constraints.bases;
-    let mut k = Stiffness::new(&session, &problem.body, &problem.elasticity, bases).unwrap();
-    let mut held = k.matrix.duplicate().unwrap();
-    let bounded: Vec<usize> = problem.constraints.bounds.iter().map(|bound| bound.dof).collect();
-    let mut factor =
-        Factor::new(&session, "elastic_", k.matrix.owned(), Precision::Preconditioner).unwrap();
-    // The values count as new only when they are written.
-    let mut renew = |k: &Stiffness, factor: &mut Factor| {
-        held.copy(&k.matrix).unwrap();
-        held.hold(&bounded, k.scale).unwrap();
-        factor.factorise(&held).unwrap()
-    };
-    renew(&k, &mut factor);
+/// b(φ(ε(u), ζ)).
+fn damage_load(problem: &DiscreteProblem, u: &[f64], zeta: &[f64]) -> Vec<f64> {
+    let (body, law) = (&problem.body, problem.damage().unwrap());
+    let strain = problem.elasticity.strain_squared(body, u);
+    source_load(body, problem.mass(), &source(body, &law, &strain, zeta))
+}
 
-    let means = problem.triangle_means(&damaged(&problem, 0.5));
-    let mut x = Vector::zeros(&session, k.matrix.owned()).unwrap();
-    let mut y = Vector::zeros(&session, k.matrix.owned()).unwrap();
-    x.set(&displaced(&problem)).unwrap();
-    c.bench_function("stiffness refill", |b| b.iter(|| k.refill(black_box(&means)).unwrap()));
-    c.bench_function("product", |b| b.iter(|| k.matrix.multiply(&x, &mut y).unwrap()));
-    c.bench_function("triangular solves", |b| b.iter(|| factor.apply(&x, &mut y).unwrap()));
-    c.bench_function("factorisation", |b| b.iter(|| renew(&k, &mut factor)));
+fn damage_system(session: &Session, problem: &DiscreteProblem) -> DamageSystem {
+    let diffusion = problem.damage().unwrap().diffusion;
+    DamageSystem::new(session, &problem.body, problem.mass(), diffusion, STEP).unwrap()
+}
+
+/// K, its copy with the contact unknowns prescribed, and the factor of that.
+struct Elastic {
+    k: Stiffness,
+    prescribed: Matrix,
+    bounded: Vec<usize>,
+    factor: Factor,
+}
+
+impl Elastic {
+    fn new(session: &Session, problem: &DiscreteProblem) -> Self {
+        let constraints = &problem.constraints;
+        let k = Stiffness::new(session, &problem.body, &problem.elasticity, &constraints.bases);
+        let k = k.unwrap();
+        let prescribed = k.matrix.duplicate().unwrap();
+        let bounded = constraints.bounds.iter().map(|bound| bound.dof).collect();
+        let unknowns = k.matrix.owned();
+        let factor = Factor::new(session, "elastic_", unknowns, Precision::Preconditioner).unwrap();
+        let mut elastic = Self { k, prescribed, bounded, factor };
+        elastic.factorise();
+        elastic
+    }
+
+    /// The values count as new only when they are written.
+    fn factorise(&mut self) {
+        self.prescribed.copy(&self.k.matrix).unwrap();
+        self.prescribed.hold(&self.bounded, self.k.scale).unwrap();
+        self.factor.factorise(&self.prescribed).unwrap();
+    }
+}
+
+/// What no step can do without, kernel by kernel and all in turn, as a step finds the caches; and
+/// the speed of memory, as a large copy reads and writes it.
+fn unavoidable(c: &mut Criterion) {
+    let session = Session::start(&[]).unwrap();
+    let mut group = c.benchmark_group("unavoidable");
+    for n in UNAVOIDABLE {
+        let problem = problem(n);
+        let Elastic { k, factor, .. } = &mut Elastic::new(&session, &problem);
+        let mut damage = damage_system(&session, &problem);
+        let (u, zeta) = (displaced(&problem), damaged(&problem, 0.5));
+        let (means, load) = (problem.triangle_means(&zeta), damage_load(&problem, &u, &zeta));
+        let vector = || Vector::zeros(&session, k.matrix.owned()).unwrap();
+        let (mut x, mut y, mut z) = (vector(), vector(), vector());
+        x.set(&u).unwrap();
+        k.matrix.multiply(&x, &mut y).unwrap();
+
+        group.throughput(Throughput::Elements(problem.body.mesh.nodes.len() as u64));
+        group.bench_function(BenchmarkId::new("all", n), |b| {
+            b.iter(|| {
+                k.refill(&means).unwrap();
+                k.matrix.multiply(&x, &mut y).unwrap();
+                factor.apply(&y, &mut z).unwrap();
+                damage.advance(&load, &mut zeta.clone()).unwrap()
+            });
+        });
+        group.bench_function(BenchmarkId::new("damage solve", n), |b| {
+            b.iter(|| damage.advance(&load, &mut zeta.clone()).unwrap());
+        });
+        group.throughput(Throughput::Bytes(k.refill_traffic() as u64));
+        group.bench_function(BenchmarkId::new("stiffness refill", n), |b| {
+            b.iter(|| k.refill(black_box(&means)).unwrap());
+        });
+        group.throughput(Throughput::Bytes(k.matrix.traffic() as u64));
+        group.bench_function(BenchmarkId::new("product", n), |b| {
+            b.iter(|| k.matrix.multiply(&x, &mut y).unwrap());
+        });
+        group.throughput(Throughput::Bytes(factor.traffic() as u64));
+        group.bench_function(BenchmarkId::new("triangular solves", n), |b| {
+            b.iter(|| factor.apply(&y, &mut z).unwrap());
+        });
+    }
+    let (from, mut to) = (vec![1.0_f64; COPIED], vec![0.0_f64; COPIED]);
+    group.throughput(Throughput::Bytes(16 * COPIED as u64));
+    group.bench_function("copy", |b| b.iter(|| black_box(&mut to).copy_from_slice(&from)));
+    group.finish();
+}
+
+fn factorisation(c: &mut Criterion) {
+    let (session, problem) = (Session::start(&[]).unwrap(), problem(CELLS));
+    let mut elastic = Elastic::new(&session, &problem);
+    c.bench_function("factorisation", |b| b.iter(|| elastic.factorise()));
+}
+
+fn damage_source(c: &mut Criterion) {
+    let problem = problem(CELLS);
+    let (u, zeta) = (displaced(&problem), damaged(&problem, 0.5));
+    c.bench_function("damage source", |b| b.iter(|| damage_load(&problem, black_box(&u), &zeta)));
 }
 
 fn certificate(c: &mut Criterion) {
-    let problem = problem();
+    let problem = problem(CELLS);
     let (means, u) = (problem.triangle_means(&damaged(&problem, 0.5)), displaced(&problem));
     c.bench_function("internal force", |b| {
         b.iter(|| problem.elasticity.internal_force(&problem.body, &means, black_box(&u)));
     });
 }
 
-fn damage(c: &mut Criterion) {
-    let (session, problem) = (Session::start(&[]).unwrap(), problem());
-    let (body, mass, law) = (&problem.body, problem.mass(), problem.damage().unwrap());
-    let (u, zeta) = (displaced(&problem), damaged(&problem, 0.5));
-    let load = |u: &[f64]| {
-        let strain = problem.elasticity.strain_squared(body, u);
-        source_load(body, mass, &source(body, &law, &strain, &zeta))
-    };
-    c.bench_function("damage source", |b| b.iter(|| load(black_box(&u))));
-    let mut system = DamageSystem::new(&session, body, mass, law.diffusion, 0.01).unwrap();
-    let load = load(&u);
-    c.bench_function("damage solve", |b| {
-        b.iter(|| system.advance(&load, &mut zeta.clone()).unwrap());
-    });
-}
-
 /// A step from an accepted one to damage 1 % further on or back, on the factor that is kept as
 /// in a run, renewals included.
 fn contact(c: &mut Criterion) {
-    let (session, problem, phases) = (Session::start(&[]).unwrap(), problem(), Phases::default());
+    let (session, problem, phases) =
+        (Session::start(&[]).unwrap(), problem(CELLS), Phases::default());
     let mut group = c.benchmark_group("contact step");
     let accepted = damaged(&problem, 0.5);
     let next = [0.45, 0.55].map(|time| damaged(&problem, time));
@@ -111,5 +178,5 @@ fn brief() -> Criterion {
     criterion.warm_up_time(Duration::from_millis(500)).measurement_time(Duration::from_secs(2))
 }
 
-criterion_group! { name = kernels; config = brief(); targets = stiffness, certificate, damage, contact }
+criterion_group! { name = kernels; config = brief(); targets = unavoidable, factorisation, certificate, damage_source, contact }
 criterion_main!(kernels);

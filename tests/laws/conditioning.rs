@@ -1,7 +1,7 @@
 //! Where the conditioning or the discretisation is poor: answers stay right, or notes say not.
 
 use crate::support::{close, difference, distorted, history, moved, problem, run, square};
-use signorini::{contact::SOLVERS, evolution::DiscreteProblem, mesh::Mesh, study::rectangle};
+use signorini::{contact::SOLVERS, evolution::DiscreteProblem, mesh::Mesh};
 use std::f64::consts::PI;
 
 /// Clamped left, pressed down on the left half of the top and pulled up on the right.
@@ -34,7 +34,7 @@ fn strip(tolerance: f64) -> DiscreteProblem {
     let contact = format!("contact = {{ tolerance = {tolerance:e} }}");
     let boundaries = "{ name = 'left', symmetry = true }, { name = 'bottom', gap = 0 },
         { name = 'top', traction = [0, '-max(0, 1 - abs(x - 50)/5)'] }";
-    body(rectangle(100.0, 1.0, 100, 1), STRESS, &contact, boundaries)
+    body(Mesh::rectangle(100.0, 1.0, 100, 1), STRESS, &contact, boundaries)
 }
 
 #[test]
@@ -157,7 +157,7 @@ fn a_strip_one_triangle_high_that_bends_is_told() {
         let clamped = "{ name = 'left', displacement = [0, 0] }, { name = 'bottom', gap = 1 },
             { name = 'top', traction = [0, -1e-3] }";
         let outcome =
-            run(&body(rectangle(10.0, 1.0, 10 * ny, ny), STRESS, "", clamped), SOLVERS[0]);
+            run(&body(Mesh::rectangle(10.0, 1.0, 10 * ny, ny), STRESS, "", clamped), SOLVERS[0]);
         (outcome.last.record.displacement_max, outcome.accuracy.notes(1e-10))
     };
     let ((one, told), (eight, silent)) = (bent(1), bent(8));
@@ -180,7 +180,7 @@ fn the_estimated_error_of_displacements_is_that_of_the_worst_step() {
                 {{ name = 'right', traction = ['40*max(0, 1 - 2*abs(t - 0.5))', '-0.04*abs(t - 0.5)'] }},
              ]"
         );
-        let mesh = rectangle(10.0, 0.5, 60, 3);
+        let mesh = Mesh::rectangle(10.0, 0.5, 60, 3);
         history(&problem(mesh, &text).unwrap_or_else(|e| panic!("{e}")), solver)
     };
     let (exact, _) = pulled_and_bent(1e-11, "active-set");

@@ -44,7 +44,7 @@ fn no_feasible_displacement_has_less_energy() {
         let problem = lshape(&[]);
         let state = run(&problem, solver).last.state;
         let (least, residual) = energy(&problem, &state, &state.u);
-        let (mut random, size) = (Random(11), largest(&state.u));
+        let (mut random, size) = (Random::new(11), largest(&state.u));
         let count = |active: bool| state.contact.iter().filter(|p| p.active == active).count();
         assert!(count(true) > 0 && count(false) > 0, "some nodes press and some gape");
         for scale in [1.0, 1e-1, 1e-2, 1e-3] {

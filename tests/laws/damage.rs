@@ -259,7 +259,7 @@ fn nothing_that_drives_damage_leaves_it_bit_for_bit() {
 fn the_certificate_of_a_damage_step_bounds_its_error_and_catches_a_planted_one() {
     let (session, body) = (Session::start(&[]).unwrap(), Body::new(distorted(8)));
     let (diffusion, step) = (0.3, 0.05);
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     let nodes = body.mesh.nodes.len();
     let before: Vec<f64> = random.field(nodes).iter().map(|v| 0.6 + 0.3 * v).collect();
     let load: Vec<f64> =

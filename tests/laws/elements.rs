@@ -20,7 +20,7 @@ fn elasticity(plane: Plane) -> Elasticity {
 
 /// Counter-clockwise triangles of all shapes that are not too thin.
 fn triangles() -> Vec<Triangle> {
-    let mut random = Random(1);
+    let mut random = Random::new(1);
     let mut point = || [random.next(), random.next()];
     let triangles = (0..200).map(|_| Triangle::new([point(), point(), point()]));
     triangles.filter(|t| t.area > 0.02).collect()
@@ -77,7 +77,7 @@ fn the_element_stiffness_is_symmetric_and_vanishes_on_three_rigid_motions_only()
 #[test]
 fn element_forces_are_the_stiffness_times_the_displacements() {
     let d = elasticity(Plane::Stress).material.stiffness();
-    let mut random = Random(2);
+    let mut random = Random::new(2);
     for triangle in triangles() {
         let u = SVector::<f64, 6>::from_fn(|_, _| random.next());
         let strain = triangle.strain(u.as_ref());
@@ -89,7 +89,7 @@ fn element_forces_are_the_stiffness_times_the_displacements() {
 
 #[test]
 fn mass_is_a_partition_of_unity_and_laplace_sees_gradients_only() {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     for triangle in triangles() {
         let area = triangle.area;
         let (mass, laplace) = (triangle.mass(), triangle.laplace());
@@ -121,7 +121,8 @@ fn corners(triangle: &Triangle) -> [[f64; 2]; 3] {
 #[test]
 fn rigid_motions_have_neither_strain_nor_force() {
     let body = Body::new(unstructured(0.2));
-    let zeta: Vec<f64> = Random(4).field(body.triangles.len()).iter().map(|z| 1.5 + z).collect();
+    let zeta: Vec<f64> =
+        Random::new(4).field(body.triangles.len()).iter().map(|z| 1.5 + z).collect();
     let elasticity = elasticity(Plane::Strain);
     // u = a + θ e_z × x
     let u: Vec<f64> =
@@ -147,7 +148,7 @@ fn shear_counts_twice_in_the_size_of_strain() {
 #[test]
 fn internal_forces_are_the_gradient_of_the_energy() {
     let body = Body::new(unstructured(0.2));
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     for plane in [Plane::Stress, Plane::Strain] {
         let zeta: Vec<f64> = body.triangles.iter().map(|_| 1.5 + random.next()).collect();
         let u = random.field(2 * body.mesh.nodes.len());
@@ -171,7 +172,7 @@ fn internal_forces_are_the_gradient_of_the_energy() {
 fn forces_turn_with_the_body() {
     // F(Ru) on the body turned by R is R F(u).
     let (mesh, angle) = (distorted(4), 1.234);
-    let mut random = Random(6);
+    let mut random = Random::new(6);
     let zeta: Vec<f64> = mesh.triangles.iter().map(|_| 1.5 + random.next()).collect();
     let u = random.field(2 * mesh.nodes.len());
     let turned =
@@ -202,7 +203,7 @@ fn bases(nodes: usize, random: &mut Random) -> NodalBases {
 
 #[test]
 fn nodal_bases_keep_work_and_give_back_what_they_take() {
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     let bases = bases(30, &mut random);
     let (u, r) = (random.field(60), random.field(60));
     let (mut c, mut s) = (u.clone(), r.clone());
@@ -220,7 +221,7 @@ fn the_assembled_stiffness_is_the_matrix_free_force_in_the_nodal_bases() {
     let body = Body::new(unstructured(0.2));
     let session = Session::start(&[]).unwrap();
     let (nodes, elasticity) = (body.mesh.nodes.len(), elasticity(Plane::Stress));
-    let mut random = Random(8);
+    let mut random = Random::new(8);
     let bases = bases(nodes, &mut random);
     let mut stiffness = Stiffness::new(&session, &body, &elasticity, &bases).unwrap();
     for _ in 0..3 {
@@ -271,7 +272,7 @@ fn a_damage_step_solves_the_assembled_system() {
         strain_cap: 0.8,
         threshold: 0.01,
     };
-    let (n, step, mut random) = (body.mesh.nodes.len(), 0.05, Random(9));
+    let (n, step, mut random) = (body.mesh.nodes.len(), 0.05, Random::new(9));
     let zeta: Vec<f64> = (0..n).map(|_| 0.6 + 0.3 * random.next()).collect();
     let strain: Vec<f64> = body.triangles.iter().map(|_| random.next().abs()).collect();
     let mut left = nalgebra::DMatrix::<f64>::zeros(n, n);

@@ -29,7 +29,7 @@ fn violation(body: &Body, mass: Mass, ratio: f64) -> f64 {
     let n = body.mesh.nodes.len();
     let step = ratio * H * H / LAW.diffusion;
     let mut system = DamageSystem::new(&session, body, mass, LAW.diffusion, step).unwrap();
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     let mut worst = f64::NEG_INFINITY;
     for _ in 0..20 {
         let zeta: Vec<f64> = random.field(n).iter().map(|v| 0.55 + 0.45 * v.signum()).collect();
@@ -89,7 +89,7 @@ fn obtuse_angles_break_the_lumped_mass_too() {
 #[test]
 fn both_masses_integrate_constants_alike() {
     let body = Body::new(distorted(6));
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     let strain: Vec<f64> = random.field(body.triangles.len()).iter().map(|v| v * v).collect();
     let zeta: Vec<f64> =
         random.field(body.mesh.nodes.len()).iter().map(|v| 0.6 + 0.3 * v).collect();

@@ -11,12 +11,17 @@ use signorini::{
     petsc::Session,
     scene::Scene,
 };
+use slope::slope;
 use std::{collections::BTreeMap, fs, path::Path};
+
+// The studies fit orders too.
+#[path = "../../validation/study/src/slope.rs"]
+mod slope;
 
 /// The [`square`] with its inner nodes moved at random, by up to 0.3 cells in x and y, and those on
 /// the sides along them.
 pub fn distorted(n: usize) -> Mesh {
-    let (mut mesh, mut random) = (square(n), Random(n as u64));
+    let (mut mesh, mut random) = (square(n), Random::new(n as u64));
     let reach = 0.3 / n as f64;
     for node in &mut mesh.nodes {
         for x in node {
@@ -147,13 +152,9 @@ pub fn close_to(value: f64, expected: f64, tolerance: f64) {
     assert!(error <= tolerance, "{value} is not {expected}: {error:.1e} > {tolerance:.1e}");
 }
 
-/// Least-squares slope of log error over log size: the order of convergence.
+/// The order of convergence: the fitted slope of log error over log size.
 pub fn order(sizes: &[f64], errors: &[f64]) -> f64 {
-    let points: Vec<_> = sizes.iter().zip(errors).map(|(h, e)| (h.ln(), e.ln())).collect();
-    let n = points.len() as f64;
-    let (x, y) = points.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
-    let over: f64 = points.iter().map(|(a, b)| (a - x) * (b - y)).sum();
-    over / points.iter().map(|(a, _)| (a - x) * (a - x)).sum::<f64>()
+    slope(sizes.iter().zip(errors).map(|(h, e)| (h.ln(), e.ln())))
 }
 
 /// Checks iterations of one problem solved twice. Factors are renewed when measured times say so,

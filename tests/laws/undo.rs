@@ -24,7 +24,7 @@ fn scene(left: &str) -> DiscreteProblem {
 
 /// ζ around `mean` at the nodes.
 fn zeta(problem: &DiscreteProblem, mean: f64) -> Vec<f64> {
-    let field = Random(7).field(problem.body.mesh.nodes.len());
+    let field = Random::new(7).field(problem.body.mesh.nodes.len());
     field.iter().map(|v| mean + 0.1 * v).collect()
 }
 

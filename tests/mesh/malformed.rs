@@ -184,7 +184,7 @@ fn a_truncated_file_is_an_error() {
 
 #[test]
 fn damaged_files_never_panic() {
-    let mut random = Random(1);
+    let mut random = Random::new(1);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("x.msh");
     for name in VALID {

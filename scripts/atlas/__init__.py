@@ -1,1 +1,0 @@
-"""The figures of the atlas of failure, one module per map."""

@@ -1,0 +1,102 @@
+//! The table of a map: rows of named cells, each with its verdict.
+
+use crate::StudyError;
+use serde::Serialize;
+use serde_json::Value;
+use signorini::output;
+use std::path::PathBuf;
+
+/// What a row of a map turned out to be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// The answer is right to the accuracy promised.
+    Correct,
+    /// The program gave no answer and said why.
+    Refused,
+    /// The program gave a wrong answer without saying so.
+    Wrong,
+}
+
+impl Verdict {
+    /// Of an answer that the program gave without a reservation.
+    pub(super) fn of_answer(right: bool) -> Self {
+        if right { Self::Correct } else { Self::Wrong }
+    }
+}
+
+/// How many rows of a map were of which kind.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Right answers.
+    pub correct: usize,
+    /// Refusals with a reason.
+    pub refused: usize,
+    /// Wrong answers that the program did not report.
+    pub wrong: usize,
+}
+
+/// What was tried and what came of it: cells by their columns.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Row(Vec<(&'static str, Value)>);
+
+impl Row {
+    /// With one more cell; `None` and NaN leave it empty.
+    pub(super) fn with(mut self, column: &'static str, value: impl Serialize) -> Self {
+        self.0.push((column, serde_json::to_value(value).unwrap_or_default()));
+        self
+    }
+}
+
+/// The rows of a map so far.
+#[derive(Debug, Default)]
+pub struct Table {
+    path: PathBuf,
+    /// In the order of their first cells.
+    columns: Vec<&'static str>,
+    rows: Vec<(Row, Verdict)>,
+}
+
+impl Table {
+    /// An empty table, to be written to `path`.
+    pub(super) fn new(path: PathBuf) -> Self {
+        Self { path, ..Self::default() }
+    }
+
+    /// Adds a row.
+    pub(super) fn push(&mut self, row: Row, verdict: Verdict) {
+        for (column, _) in &row.0 {
+            if !self.columns.contains(column) {
+                self.columns.push(column);
+            }
+        }
+        self.rows.push((row, verdict));
+    }
+
+    /// Its verdicts.
+    pub(super) fn counts(&self) -> Counts {
+        let of = |kind: Verdict| self.rows.iter().filter(|(_, verdict)| *verdict == kind).count();
+        let [correct, refused, wrong] =
+            [Verdict::Correct, Verdict::Refused, Verdict::Wrong].map(of);
+        Counts { correct, refused, wrong }
+    }
+
+    /// Writes the CSV file, if there are rows. Maps that take minutes do so now and then: what is
+    /// measured is kept.
+    pub(super) fn write(&self) -> Result<(), StudyError> {
+        if self.rows.is_empty() {
+            return Ok(());
+        }
+        let cell = |row: &Row, column: &str| {
+            let found = row.0.iter().find(|(name, _)| *name == column);
+            found.map_or(Value::Null, |(_, value)| value.clone())
+        };
+        let mut lines: Vec<Vec<Value>> =
+            vec![self.columns.iter().chain(&["verdict"]).map(|&column| column.into()).collect()];
+        for (row, verdict) in &self.rows {
+            let cells = self.columns.iter().map(|column| cell(row, column));
+            lines.push(cells.chain(serde_json::to_value(verdict)).collect());
+        }
+        Ok(output::write_table(&self.path, &lines)?)
+    }
+}

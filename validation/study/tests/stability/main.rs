@@ -1,0 +1,25 @@
+//! Small copies of the maps of the stability study.
+
+mod penalty;
+mod random_contact;
+mod step_size;
+mod tao_types;
+
+use signorini::{
+    contact::ContactReport,
+    evolution::{RunError, State},
+    petsc::Session,
+};
+use signorini_study::stability::problems::{self, PRESSED_AND_LIFTED};
+
+/// The square of map 3 on n × n cells, pressed on the left and lifted on the right.
+fn solve(
+    session: &Session,
+    n: usize,
+    solver: &str,
+    set: &[String],
+) -> Result<(State, ContactReport), RunError> {
+    let problem = problems::square(n, PRESSED_AND_LIFTED, set)?;
+    let answer = problems::solve(session, &problem, solver, None).unwrap_or_else(|e| panic!("{e}"));
+    answer.map(|(step, report)| (step.state, report))
+}
