@@ -37,7 +37,8 @@ impl Elasticity {
         let mut force = vec![0.0; u.len()];
         let triangles = body.mesh.triangles.iter().zip(&body.triangles).zip(zeta);
         for (t, ((nodes, triangle), zeta)) in triangles.enumerate() {
-            let f = triangle.force(&self.stress(body, t, *zeta, u));
+            let strain = triangle.strain(&body.gather(t, u));
+            let f = triangle.force(&(self.d * strain * *zeta));
             for (i, node) in nodes.iter().enumerate() {
                 force[2 * node] += f[2 * i];
                 force[2 * node + 1] += f[2 * i + 1];

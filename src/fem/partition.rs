@@ -110,8 +110,8 @@ impl Partition {
     /// (min, max) of a field with one component over the undivided body. Collective.
     pub fn extremes(&self, field: &[f64]) -> (f64, f64) {
         let owned = field[..self.owned].iter();
-        let min = owned.clone().fold(f64::INFINITY, |min, &z| min.min(z));
-        let max = owned.fold(f64::NEG_INFINITY, |max, &z| max.max(z));
+        let (min, max) = owned
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(min, max), &z| (min.min(z), max.max(z)));
         (self.comm.min(min), self.comm.max(max))
     }
 }
