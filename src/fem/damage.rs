@@ -7,8 +7,7 @@ use crate::{
 };
 use nalgebra::{Matrix3, Vector3};
 
-/// How (28) integrates products with the test functions λ_i: those of the mass M and of the source
-/// load b.
+/// How (28) integrates products with a test function λ_i: the mass M and the source load b.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Mass {
