@@ -124,4 +124,4 @@ chart: build deps-validate
 	done
 
 clean:
-	rm -rf target out geo/*.msh scripts/__pycache__ validation/__pycache__
+	rm -rf target out geo/*.msh scripts/__pycache__ scripts/*/__pycache__ validation/__pycache__

@@ -4,7 +4,6 @@
 mod command;
 
 use clap::{Parser, Subcommand};
-use command::Failure;
 use std::{path::PathBuf, process::ExitCode};
 
 /// Contact of a damageable elastic body with a rigid foundation (plane, quasistatic, frictionless).
@@ -35,26 +34,16 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let command = Arguments::parse().command;
-    let alone = match &command {
-        Command::Run(_) => Ok(()),
-        Command::Compare(_) => command::refuse_ranks("compare"),
-        Command::Mesh { .. } => command::refuse_ranks("mesh"),
-    };
-    if let Err(code) = alone {
-        return code;
-    }
-    let result = match command {
+    let result = match Arguments::parse().command {
         Command::Run(arguments) => command::run(&arguments),
-        Command::Compare(arguments) => command::compare_scenes(&arguments),
+        Command::Compare(arguments) => command::compare(&arguments),
         Command::Mesh { scenes } => command::mesh(&scenes),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
-        Err(Failure::AlreadyReported(code)) => ExitCode::from(code),
         Err(failure) => {
-            eprintln!("error: {failure}");
-            ExitCode::from(failure.code())
+            failure.message.iter().for_each(|message| eprintln!("error: {message}"));
+            ExitCode::from(failure.code)
         }
     }
 }

@@ -38,8 +38,18 @@ impl Phases {
         result
     }
 
-    /// Phases and parts of phases by name.
-    pub fn table(&self) -> BTreeMap<&'static str, Phase> {
-        self.0.borrow().clone()
+    /// What was booked under `name`, if anything.
+    pub fn get(&self, name: &str) -> Option<Phase> {
+        self.0.borrow().get(name).copied()
+    }
+
+    /// The parts of the phase called `whole` by their names; with "" the phases that are no parts.
+    pub fn parts(&self, whole: &str) -> Vec<(&'static str, Phase)> {
+        let phases = self.0.borrow();
+        let parts = phases.iter().filter_map(|(name, phase)| {
+            let (before, part) = name.rsplit_once('/').unwrap_or(("", name));
+            (before == whole).then_some((part, *phase))
+        });
+        parts.collect()
     }
 }

@@ -1,14 +1,17 @@
 //! `signorini compare`: all contact solvers on the same scenes.
 
 use super::{
-    Failure, check_petsc, check_solver,
-    comparison::{Entry, compare},
-    screen::say,
+    Failure, SOLVERS, check_petsc, check_solver, ranks::require_one_process, read, screen::say,
+    solver_names,
 };
 use clap::Args;
 use comfy_table::{CellAlignment, Table, presets};
+use serde::Serialize;
 use signorini::{
-    contact::SOLVERS, evolution::DiscreteProblem, mesh, output, petsc::Session, scene::Scene,
+    contact::Kkt,
+    evolution::{self, DiscreteProblem, Phases, RunError, State, StepRecord},
+    output,
+    petsc::Session,
 };
 use std::path::PathBuf;
 
@@ -18,8 +21,8 @@ pub struct CompareArguments {
     /// Scene files.
     #[arg(required = true, value_name = "SCENE")]
     scenes: Vec<PathBuf>,
-    /// Solvers to compare [default: active-set, penalty-duality, tao].
-    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    #[arg(long, value_name = "NAME", value_delimiter = ',', default_values = SOLVERS,
+        help = format!("Solvers to compare, of {}", solver_names()))]
     solvers: Vec<String>,
     /// Override a key of the scenes, e.g. --set time.step=0.005; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -32,79 +35,192 @@ pub struct CompareArguments {
     petsc: Vec<String>,
 }
 
-/// Runs every scene with every solver, prints and writes the table.
-///
-/// # Errors
-/// Bad input, or a solver that failed (the table is complete all the same).
-pub fn compare_scenes(arguments: &CompareArguments) -> Result<(), Failure> {
-    let mut solvers: Vec<&str> = arguments.solvers.iter().map(String::as_str).collect();
-    solvers.iter().try_for_each(|name| check_solver("--solvers", name))?;
+/// `signorini compare SCENE…`: runs every scene with every solver, prints and writes the table, which
+/// is complete also where a solver fails.
+pub fn compare(arguments: &CompareArguments) -> Result<(), Failure> {
+    require_one_process()?;
+    arguments.solvers.iter().try_for_each(|name| check_solver("--solvers", name))?;
     check_petsc(&arguments.petsc)?;
-    if solvers.is_empty() {
-        solvers = SOLVERS.to_vec();
-    }
-    let mut settings = Vec::new();
+    let mut problems = Vec::new();
     for path in &arguments.scenes {
-        let scene = Scene::read(path, &arguments.set).map_err(Failure::input)?;
-        let mesh = mesh::load(&scene.mesh.file, &scene.mesh.parameters).map_err(Failure::input)?;
-        settings.push(DiscreteProblem::new(scene, mesh).map_err(Failure::input)?);
+        let (scene, mesh) = read(path, None, &arguments.set)?;
+        problems.push(DiscreteProblem::new(scene, mesh).map_err(Failure::input)?);
     }
     output::create(&arguments.out).map_err(Failure::input)?;
+
     let session = Session::start(&arguments.petsc).map_err(Failure::solver)?;
     let mut entries = Vec::new();
-    for problem in &settings {
-        entries.extend(compare(&session, problem, &solvers).map_err(Failure::solver)?);
+    for problem in &problems {
+        let compared = compare_solvers(&session, problem, &arguments.solvers);
+        entries.extend(compared.map_err(Failure::solver)?);
     }
     session.finalize().map_err(Failure::solver)?;
     say(&table(&entries).to_string());
     let path = arguments.out.join("comparison.csv");
     output::write_table(&path, &entries).map_err(Failure::solver)?;
     say(&format!("written to {}", path.display()));
-    let failed: Vec<_> = entries.iter().filter_map(|e| e.error.as_deref()).collect();
-    match failed.is_empty() {
-        true => Ok(()),
-        false => Err(Failure::Solver(failed.join("\n       "))),
+    let failed: Vec<_> = entries.iter().filter_map(|entry| entry.error.as_deref()).collect();
+    if failed.is_empty() { Ok(()) } else { Err(Failure::solver(failed.join("\n       "))) }
+}
+
+/// A row of `comparison.csv`: what a solver took for a whole run, and how its answer differs from the
+/// most accurate one.
+#[derive(Debug, Serialize)]
+struct Entry {
+    scene: String,
+    solver: String,
+    /// Accepted time steps.
+    steps: usize,
+    /// Steps after which another number of nodes is active than before.
+    contact_changes: usize,
+    /// Iterations of the solver, all steps together; so are the next four.
+    iterations: usize,
+    /// Factorisations (not those of a preconditioner chosen by PETSc options).
+    factorisations: usize,
+    /// Pairs of triangular solves.
+    triangular_solves: usize,
+    /// Times the solver left its fast path.
+    fallbacks: usize,
+    /// Seconds in the solver.
+    seconds: f64,
+    /// The worst relative KKT residuals of all steps: see [`Kkt`].
+    kkt_stationarity: f64,
+    kkt_primal: f64,
+    kkt_dual: f64,
+    kkt_complementarity: f64,
+    /// max |u − u_ref| / max |u_ref| at the end.
+    difference_u: f64,
+    /// max |ζ − ζ_ref| at the end.
+    difference_zeta: f64,
+    /// max |p − p_ref| / max |p_ref| at the end, p the contact pressure.
+    difference_pressure: f64,
+    /// Why the run ended early, if it failed.
+    error: Option<String>,
+}
+
+impl Entry {
+    /// The largest of the four residuals.
+    fn worst_residual(&self) -> f64 {
+        Kkt {
+            stationarity: self.kkt_stationarity,
+            primal: self.kkt_primal,
+            dual: self.kkt_dual,
+            complementarity: self.kkt_complementarity,
+        }
+        .worst()
     }
 }
 
+/// Runs `problem` with each of `solvers` and compares the final states with the one that has the
+/// smallest KKT residuals. A failed run is an entry with its error.
+fn compare_solvers(
+    session: &Session,
+    problem: &DiscreteProblem,
+    solvers: &[String],
+) -> Result<Vec<Entry>, RunError> {
+    let runs = solvers.iter().map(|solver| run(session, problem, solver));
+    let mut runs = runs.collect::<Result<Vec<_>, _>>()?;
+    let reference = runs
+        .iter()
+        .filter(|(entry, _)| entry.error.is_none())
+        .min_by(|(a, _), (b, _)| a.worst_residual().total_cmp(&b.worst_residual()))
+        .and_then(|(_, state)| state.clone());
+    for (entry, state) in &mut runs {
+        if let (Some(state), Some(reference)) = (state, &reference) {
+            entry.difference_u = relative(&state.u, &reference.u);
+            entry.difference_zeta = difference(&state.zeta, &reference.zeta);
+            entry.difference_pressure = relative(&pressure(state), &pressure(reference));
+        }
+    }
+    Ok(runs.into_iter().map(|(entry, _)| entry).collect())
+}
+
+/// The run of one solver, and its last accepted state.
+fn run(
+    session: &Session,
+    problem: &DiscreteProblem,
+    solver: &str,
+) -> Result<(Entry, Option<State>), RunError> {
+    let phases = Phases::default();
+    let mut records: Vec<StepRecord> = Vec::new();
+    let mut state = None;
+    let result = evolution::run(session, problem, solver, &phases, &mut |step| {
+        records.push(step.record);
+        state = Some(step.state.clone());
+        Ok(())
+    });
+    let error = match result {
+        Ok(_) => None,
+        Err(failure @ RunError::Contact { .. }) => Some(failure.to_string()),
+        Err(other) => return Err(other),
+    };
+    let sum = |count: fn(&StepRecord) -> usize| records.iter().map(count).sum();
+    let kkt = records.iter().fold(Kkt::default(), |worst, r| worst.max(&r.kkt()));
+    let changes =
+        records.windows(2).filter(|pair| pair[0].active_nodes != pair[1].active_nodes).count();
+    let entry = Entry {
+        scene: problem.scene().name.clone(),
+        solver: solver.to_owned(),
+        steps: records.last().map_or(0, |record| record.step),
+        contact_changes: changes,
+        iterations: sum(|record| record.iterations),
+        factorisations: sum(|record| record.factorisations),
+        triangular_solves: sum(|record| record.linear_iterations),
+        fallbacks: sum(|record| record.fallbacks),
+        seconds: phases.get("contact").map_or(0.0, |phase| phase.seconds),
+        kkt_stationarity: kkt.stationarity,
+        kkt_primal: kkt.primal,
+        kkt_dual: kkt.dual,
+        kkt_complementarity: kkt.complementarity,
+        difference_u: f64::NAN,
+        difference_zeta: f64::NAN,
+        difference_pressure: f64::NAN,
+        error,
+    };
+    Ok((entry, state))
+}
+
+fn pressure(state: &State) -> Vec<f64> {
+    state.contact.iter().map(|point| point.pressure).collect()
+}
+
+/// ‖a − b‖ in the max norm.
+fn difference(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+/// ‖a − b‖ / ‖b‖ in the max norm, ‖a − b‖ where b vanishes.
+fn relative(a: &[f64], b: &[f64]) -> f64 {
+    let norm = b.iter().fold(0.0_f64, |norm, value| norm.max(value.abs()));
+    if norm == 0.0 { difference(a, b) } else { difference(a, b) / norm }
+}
+
+/// A table in Markdown.
 fn table(entries: &[Entry]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN);
-    table.set_header([
-        "scene",
-        "solver",
-        "steps",
-        "contact moves",
-        "its",
-        "factors",
-        "solve pairs",
-        "fallbacks",
-        "seconds",
-        "times first",
-        "worst KKT",
-        "Δu",
-        "Δζ",
-        "Δp",
-    ]);
-    for e in entries {
-        let small = |v: f64| format!("{v:.1e}");
-        let first = entries.iter().find(|other| other.scene == e.scene).unwrap_or(e);
-        table.add_row([
-            e.scene.clone(),
-            e.solver.clone(),
-            e.steps.to_string(),
-            e.contact_changes.to_string(),
-            e.iterations.to_string(),
-            e.factorisations.to_string(),
-            e.triangular_solves.to_string(),
-            e.fallbacks.to_string(),
-            format!("{:.3}", e.seconds),
-            format!("{:.1}", e.seconds / first.seconds),
-            if e.error.is_some() { "FAILED".into() } else { small(e.kkt().worst()) },
-            small(e.difference_u),
-            small(e.difference_zeta),
-            small(e.difference_pressure),
-        ]);
+    for entry in entries {
+        let small = |value: f64| format!("{value:.1e}");
+        let failed = entry.error.is_some();
+        let first = entries.iter().find(|other| other.scene == entry.scene).unwrap_or(entry);
+        let row = [
+            ("scene", entry.scene.clone()),
+            ("solver", entry.solver.clone()),
+            ("steps", entry.steps.to_string()),
+            ("contact moves", entry.contact_changes.to_string()),
+            ("its", entry.iterations.to_string()),
+            ("factors", entry.factorisations.to_string()),
+            ("solve pairs", entry.triangular_solves.to_string()),
+            ("fallbacks", entry.fallbacks.to_string()),
+            ("seconds", format!("{:.3}", entry.seconds)),
+            ("times first", format!("{:.1}", entry.seconds / first.seconds)),
+            ("worst KKT", if failed { "FAILED".into() } else { small(entry.worst_residual()) }),
+            ("Δu", small(entry.difference_u)),
+            ("Δζ", small(entry.difference_zeta)),
+            ("Δp", small(entry.difference_pressure)),
+        ];
+        table.set_header(row.iter().map(|(title, _)| *title));
+        table.add_row(row.map(|(_, cell)| cell));
     }
     for column in table.column_iter_mut().skip(2) {
         column.set_cell_alignment(CellAlignment::Right);

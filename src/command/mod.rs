@@ -1,81 +1,66 @@
 //! What the subcommands do.
 
 mod compare;
-mod comparison;
 mod profile;
 mod ranks;
 mod recorder;
 mod run;
 mod screen;
 
-pub use compare::{CompareArguments, compare_scenes};
-pub use ranks::refuse_ranks;
+pub use compare::{CompareArguments, compare};
 pub use run::{RunArguments, run};
 
+use ranks::require_one_process;
 use signorini::{
-    contact::{TAO_TYPES, UnknownSolver, is_solver},
-    mesh,
-    scene::Scene,
+    contact::{SOLVERS, TAO_TYPES, UnknownSolver, is_solver, solver_names},
+    mesh::{self, Mesh},
+    scene::{MeshSource, Scene},
 };
-use std::{fmt, path::PathBuf};
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+};
 
-/// Why a command failed, by whose turn it is now.
+/// Why a command failed.
 #[derive(Debug)]
-pub enum Failure {
-    /// The user's: bad input.
-    Input(String),
-    /// The solver's: it did not reach its tolerance.
-    Solver(String),
-    /// Another rank's.
-    OnAnotherRank,
-    /// One rank has told it for all; with the exit code.
-    AlreadyReported(u8),
+pub struct Failure {
+    /// The exit code: 2 for bad input, 1 for a run that ended early.
+    pub code: u8,
+    /// What to tell the user; none where a rank has told it for all.
+    pub message: Option<String>,
 }
 
 impl Failure {
+    /// Another rank failed, which tells why.
+    const ON_ANOTHER_RANK: Self = Self { code: 1, message: None };
+
+    /// The user has to change the input.
     fn input(error: impl fmt::Display) -> Self {
-        Self::Input(error.to_string())
+        Self { code: 2, message: Some(error.to_string()) }
     }
 
+    /// A solver missed its tolerance, or the results could not be written.
     fn solver(error: impl fmt::Display) -> Self {
-        Self::Solver(error.to_string())
-    }
-
-    /// The exit code.
-    pub fn code(&self) -> u8 {
-        match self {
-            Self::Solver(_) | Self::OnAnotherRank => 1,
-            Self::Input(_) => 2,
-            Self::AlreadyReported(code) => *code,
-        }
+        Self { code: 1, message: Some(error.to_string()) }
     }
 }
 
-impl fmt::Display for Failure {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        match self {
-            Self::Input(text) | Self::Solver(text) => f.write_str(text),
-            Self::OnAnotherRank | Self::AlreadyReported(_) => f.write_str("another rank failed"),
-        }
-    }
-}
-
-/// Refuses a solver that `option` names and nobody knows.
+/// Refuses an unknown solver, which `option` names.
 fn check_solver(option: &str, name: &str) -> Result<(), Failure> {
     match is_solver(name) {
         true => Ok(()),
-        false => Err(Failure::Input(format!("{option}: {}", UnknownSolver(name.to_owned())))),
+        false => Err(Failure::input(format!("{option}: {}", UnknownSolver(name.to_owned())))),
     }
 }
 
-/// Refuses PETSc options that would end a run after its first results are written.
+/// Refuses PETSc options that would end a run only after the results of an earlier run are removed.
 fn check_petsc(options: &[String]) -> Result<(), Failure> {
     if let Some(word) = options.first().filter(|word| !word.starts_with('-')) {
         let problem = format!("PETSc options begin with a dash, but the first is `{word}`");
-        return Err(Failure::Input(problem));
+        return Err(Failure::input(problem));
     }
     match options.windows(2).find(|pair| pair[0] == "-tao_type") {
-        Some([_, kind]) if !TAO_TYPES.contains(&kind.as_str()) => Err(Failure::Input(format!(
+        Some([_, kind]) if !TAO_TYPES.contains(&kind.as_str()) => Err(Failure::input(format!(
             "-tao_type: `{kind}` is none of TAO's types for bounds: {}",
             TAO_TYPES.join(", ")
         ))),
@@ -83,11 +68,22 @@ fn check_petsc(options: &[String]) -> Result<(), Failure> {
     }
 }
 
+/// The scene at `path` with keys overridden by `set`, and its mesh, or another one in `file`; it is made
+/// where it is not there.
+fn read(path: &Path, file: Option<&Path>, set: &[String]) -> Result<(Scene, Mesh), Failure> {
+    let mut scene = Scene::read(path, set).map_err(Failure::input)?;
+    if let Some(file) = file {
+        scene.mesh = MeshSource::from_path(file);
+    }
+    let mesh = mesh::load(&scene.mesh.file, &scene.mesh.parameters).map_err(Failure::input)?;
+    Ok((scene, mesh))
+}
+
 /// `signorini mesh SCENE…`.
 pub fn mesh(scenes: &[PathBuf]) -> Result<(), Failure> {
+    require_one_process()?;
     for path in scenes {
-        let scene = Scene::read(path, &[]).map_err(Failure::input)?;
-        let mesh = mesh::load(&scene.mesh.file, &scene.mesh.parameters).map_err(Failure::input)?;
+        let (scene, mesh) = read(path, None, &[])?;
         let (nodes, triangles) = (mesh.nodes.len(), mesh.triangles.len());
         screen::say(&format!("{}: {nodes} nodes, {triangles} triangles", scene.name));
     }

@@ -1,61 +1,59 @@
-//! Several ranks, one program: they go on together or end together, with one message.
+//! Several ranks fail as one program: they agree that one of them has failed, and all end with one
+//! message and one exit code.
 
 use super::Failure;
-use signorini::petsc::Communicator;
-use std::{process::ExitCode, time::Duration};
+use signorini::{
+    evolution::RunError,
+    petsc::{Communicator, Session},
+};
+use std::time::Duration;
 
-/// How long a rank that failed waits for the others to notice. Where what failed is known to all,
-/// they come at once.
+/// How long a rank that has failed waits for the others. Where they know of the failure they come at
+/// once.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// All ranks go on with their values, or none: the first rank that failed for a reason of its own
-/// says why, and all end with its exit code. Collective.
-///
-/// # Errors
-/// On several ranks [`Failure::AlreadyReported`].
-pub fn together<T>(comm: Communicator, result: Result<T, Failure>) -> Result<T, Failure> {
+/// Agreement on a step of the program (as by Open MPI's MPIX_Comm_agree): all ranks go on with their
+/// values, or all fail. Of the ranks with an error of their own the first reports it, and all end
+/// with its exit code. Collective.
+pub fn agree<T>(comm: Communicator, result: Result<T, Failure>) -> Result<T, Failure> {
     if comm.is_serial() {
         return result;
     }
     let failed = comm.any(result.is_err());
     let failure = match result {
         Ok(value) if !failed => return Ok(value),
-        Ok(_) => Failure::OnAnotherRank,
+        Ok(_) => Failure::ON_ANOTHER_RANK,
         Err(failure) => failure,
     };
-    let silent = matches!(failure, Failure::OnAnotherRank);
-    let (_, speaker) = comm.min_with_rank(if silent { 1.0 } else { 0.0 });
-    if comm.rank() == speaker {
-        eprintln!("error: {failure}");
+    let (_, reporter) = comm.min_with_rank(if failure.message.is_some() { 0.0 } else { 1.0 });
+    if comm.rank() == reporter {
+        eprintln!("error: {}", failure.message.as_deref().unwrap_or("another rank failed"));
     }
-    // Only when it is said: the first process that ends with an error ends the others.
-    Err(Failure::AlreadyReported(comm.broadcast(speaker, f64::from(failure.code())) as u8))
+    // This comes after the report, because mpiexec ends all ranks as soon as one ends with an error.
+    let code = comm.broadcast(reporter, f64::from(failure.code)) as u8;
+    Err(Failure { code, message: None })
 }
 
-/// Waits for the other ranks. Where this one has failed and they do not come, because it has
-/// failed alone while they wait for it, it says so and ends them all. Collective.
-pub fn rejoin<T>(comm: Communicator, result: &Result<T, Failure>) {
-    let patience = result.is_err().then_some(PATIENCE);
-    if !comm.barrier(patience)
-        && let Err(failure) = result
+/// A barrier behind a run in which one rank may fail alone, while the others wait for it in some
+/// collective call: after [`PATIENCE`] it then reports its failure and aborts them all. Collective.
+pub fn barrier_or_abort(comm: Communicator, failure: Option<&RunError>) {
+    if !comm.barrier(failure.map(|_| PATIENCE))
+        && let Some(error) = failure
     {
-        eprintln!("error: rank {} of {}: {failure}", comm.rank(), comm.size());
-        comm.abort(failure.code());
+        eprintln!("error: rank {} of {}: {error}", comm.rank(), comm.size());
+        comm.abort(Failure::solver(error).code);
     }
 }
 
-/// Refuses to do something else than a run on several ranks.
-pub fn refuse_ranks(command: &str) -> Result<(), ExitCode> {
+/// Refuses what is not `signorini run` where `mpiexec` has started several processes.
+pub fn require_one_process() -> Result<(), Failure> {
     if Communicator::launched() == 1 {
         return Ok(());
     }
-    // Every rank comes here; that one speaks needs no communication.
-    let first = ["OMPI_COMM_WORLD_RANK", "PMI_RANK"]
-        .into_iter()
-        .find_map(|name| std::env::var(name).ok())
-        .is_none_or(|rank| rank == "0");
-    if first {
-        eprintln!("error: `signorini {command}` runs in one process; start it without mpiexec");
-    }
-    Err(ExitCode::from(2))
+    let session = Session::start(&[]).map_err(Failure::solver)?;
+    let problem =
+        "only `signorini run` uses several processes; start other commands without mpiexec";
+    let refused = agree(session.comm(), Err(Failure::input(problem)));
+    session.finalize().map_err(Failure::solver)?;
+    refused
 }

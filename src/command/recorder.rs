@@ -1,73 +1,50 @@
-//! What a run shows and writes.
+//! What a run writes and shows.
 
-use super::{profile, screen::Screen};
+use super::{
+    profile,
+    run::Task,
+    screen::{self, say},
+};
+use indicatif::ProgressBar;
+use serde_json::{Value, json};
 use signorini::{
-    evolution::{DiscreteProblem, Outcome, Phases, RunError, Step},
-    output::{self, FieldWriter, History, Summary},
+    evolution::{Outcome, RunError, Step, StepRecord},
+    output::{FieldWriter, History, OutputError, write_whole},
     scene::Stepping,
 };
-use std::{path::Path, time::Instant};
+use std::collections::BTreeMap;
 
-/// Shows and writes the accepted steps; of several ranks only the first shows them.
-pub(super) struct Recorder<'a> {
-    folder: &'a Path,
-    problem: &'a DiscreteProblem,
-    phases: &'a Phases,
-    solver: &'a str,
-    profile: bool,
-    /// Triangles, and nodes with a gap condition, of the whole body.
-    triangles: usize,
-    contact_nodes: usize,
-    /// Seconds of all accepted steps after n = 0.
-    stepping: f64,
-    every: Option<usize>,
-    fields: FieldWriter,
-    shown: Option<(History, Screen)>,
-    last: Option<Step>,
-}
-
-/// Frames written, about, when the scene does not say how often.
+/// Frames that are written, about, when the scene does not say how often.
 const FRAMES: usize = 20;
 
+/// Writes and shows the accepted steps. Every rank writes its piece of the fields; the first one also
+/// writes the rest and shows the run.
+pub(super) struct Recorder<'a> {
+    task: &'a Task<'a>,
+    fields: FieldWriter,
+    /// On the first rank only.
+    history: Option<(History, ProgressBar)>,
+    last: Option<Step>,
+    /// Seconds of all accepted steps after n = 0.
+    stepping: f64,
+}
+
 impl<'a> Recorder<'a> {
-    /// Of a run by the contact solver called `solver`; shows what is to be solved. Collective.
-    pub(super) fn new(
-        folder: &'a Path,
-        problem: &'a DiscreteProblem,
-        solver: &'a str,
-        phases: &'a Phases,
-        profile: bool,
-    ) -> Result<Self, output::OutputError> {
-        let (body, comm) = (&problem.body, problem.body.partition.comm());
-        let bounds = &problem.constraints.bounds;
-        let mut contact_nodes: Vec<usize> = bounds.iter().map(|bound| bound.node).collect();
-        contact_nodes.dedup();
-        let contact_nodes = comm.count(contact_nodes.len());
-        let triangles = comm.count(body.own_triangles);
-        let show = || -> Result<_, output::OutputError> {
-            let history = History::create(folder)?;
-            Ok((history, Screen::open(problem, solver, triangles, contact_nodes)))
+    /// Shows what is to be solved, and starts the files.
+    pub(super) fn new(task: &'a Task) -> Result<Self, OutputError> {
+        let fields = FieldWriter::new(&task.folder, &task.problem)?;
+        let history = match task.problem.body.partition.comm().is_root() {
+            true => Some((History::create(&task.folder)?, screen::open(task))),
+            false => None,
         };
-        Ok(Self {
-            folder,
-            problem,
-            phases,
-            solver,
-            profile,
-            triangles,
-            contact_nodes,
-            stepping: 0.0,
-            every: problem.scene().output.every,
-            fields: FieldWriter::new(folder, problem)?,
-            shown: comm.is_root().then(show).transpose()?,
-            last: None,
-        })
+        Ok(Self { task, fields, history, last: None, stepping: 0.0 })
     }
 
-    /// Whether a frame is written of step `n`. Unless the scene says how often, those after 1, 2,
-    /// 4, … steps are added for the runs that do not come far.
+    /// Whether a frame is written of step `n`. Unless the scene says how often, runs that do not come
+    /// far get additional frames after 1, 2, 4, … steps.
     fn is_frame(&self, n: usize) -> bool {
-        match (self.every, self.problem.scene().time.map(|grid| grid.stepping)) {
+        let scene = self.task.problem.scene();
+        match (scene.output.every, scene.time.map(|grid| grid.stepping)) {
             (Some(every), _) => n.is_multiple_of(every),
             (None, Some(Stepping::Uniform { steps })) => {
                 let every = steps.div_ceil(FRAMES);
@@ -77,85 +54,112 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    pub(super) fn accept(&mut self, step: &Step) -> Result<(), output::OutputError> {
+    /// Writes and shows an accepted step. Collective.
+    pub(super) fn accept(&mut self, step: &Step) -> Result<(), OutputError> {
         if step.record.step > 0 {
             self.stepping += step.record.seconds;
         }
-        let written = self.phases.time("output", || {
-            let shown = self.shown.as_mut().map_or(Ok(()), |(history, screen)| {
-                screen.show(&step.record);
+        let written = self.task.phases.time("output", || {
+            let end = self.task.problem.scene().time.map_or(1.0, |grid| grid.end);
+            let row = self.history.as_mut().map_or(Ok(()), |(history, bar)| {
+                screen::progress(bar, &step.record, end);
                 history.add(&step.record)
             });
-            // All ranks write a frame, whatever became of the row.
+            // All ranks write the frame together, also where the row could not be written.
             match self.is_frame(step.record.step) {
-                true => shown.and(self.fields.add(self.problem, &step.state)),
-                false => shown,
+                true => row.and(self.fields.add(&self.task.problem, &step.state)),
+                false => row,
             }
         });
         self.last = Some(step.clone());
         written
     }
 
-    /// Writes the last accepted state, if there is one, and the summary, also of a run that failed.
-    /// Collective.
-    pub(super) fn finish(
-        mut self,
-        result: &Result<Outcome, RunError>,
-        started: Instant,
-    ) -> Result<(), output::OutputError> {
-        let (problem, last) = (self.problem, self.last.take());
+    /// Writes the last accepted state, if there is one, and the summary, also of a run that failed;
+    /// shows the result. Collective.
+    pub(super) fn finish(mut self, result: &Result<Outcome, RunError>) -> Result<(), OutputError> {
+        let (task, last) = (self.task, self.last.take());
         let written = match &last {
             Some(Step { state, .. }) if self.fields.last_time() != Some(state.time) => {
-                self.phases.time("output", || self.fields.add(problem, state))
+                task.phases.time("output", || self.fields.add(&task.problem, state))
             }
             _ => Ok(()),
         };
-        let record = last.map(|step| step.record);
-        let steps = record.map_or(0, |r| r.step);
-        let (wall, scene) = (started.elapsed().as_secs_f64(), problem.scene());
-        let mut notes = problem.notes();
         let outcome = result.as_ref().ok();
-        notes.extend(outcome.iter().flat_map(|outcome| outcome.notes(problem)));
-        let partition = &problem.body.partition;
-        let summary = Summary {
-            scene: scene.name.clone(),
-            title: scene.title.clone(),
-            solver: self.solver.to_owned(),
-            ranks: partition.comm().size(),
-            nodes: partition.total(),
-            triangles: self.triangles,
-            steps,
-            end_time: record.map(|r| r.time),
-            stopped_at: outcome.and_then(|o| o.stopped).map(|stop| stop.time),
-            stopped_uncertainty: outcome.and_then(|o| o.stopped).map(|stop| stop.uncertainty),
-            zeta_min: record.map(|r| r.zeta_min),
-            zeta_mean: record.map(|r| r.zeta_mean),
-            displacement_max: record.map(|r| r.displacement_max),
-            work: record.map(|r| r.work),
-            contact_force: record.map(|r| r.contact_force),
-            active_nodes: record.map(|r| r.active_nodes),
-            contact_nodes: self.contact_nodes,
-            kkt: outcome.map(|o| o.kkt).or(record.map(|r| r.kkt())),
-            wall_seconds: wall,
-            seconds_per_step: wall / steps.max(1) as f64,
-            phases: profile::whole(&self.phases.table())
-                .into_iter()
-                .map(|(name, phase)| (name, phase.seconds))
-                .collect(),
-            contact_boundary: problem.foundation.contact_boundary.clone(),
-            contact_tangents: problem.foundation.tangents.clone(),
-            foundation: problem.foundation.segments.clone(),
-            notes,
-            error: result.as_ref().err().map(ToString::to_string),
-        };
-        let Some((_, screen)) = &self.shown else { return written };
-        summary.write(self.folder)?;
-        let phases = self.phases.table();
-        let table = match self.profile {
-            true => profile::report(&phases, wall, steps, self.stepping),
-            false => profile::short(&phases, wall),
-        };
-        screen.close(&summary, outcome, &table, self.folder);
+        let mut notes = task.problem.notes();
+        notes.extend(outcome.iter().flat_map(|outcome| outcome.notes(&task.problem)));
+        let Some((_, bar)) = &self.history else { return written };
+
+        let record = last.map(|step| step.record);
+        let wall = task.started.elapsed().as_secs_f64();
+        let summary = summary(task, record, result, &notes, wall);
+        let path = task.folder.join("summary.json");
+        write_whole(&path, format!("{summary:#}\n").as_bytes())?;
+        let mut lines = screen::conclusion(task, record, outcome, &notes);
+        lines.push(String::new());
+        lines.extend(profile::table(task.phases, wall, task.profile));
+        if task.profile {
+            let steps = record.map_or(0, |record| record.step);
+            lines.push(String::new());
+            lines.extend(profile::remarks(task.phases, steps, self.stepping));
+        }
+        bar.finish_and_clear();
+        say(&lines.join("\n"));
         written
     }
+}
+
+/// `summary.json` of a run that took `wall` seconds. What tells of the last accepted state is null
+/// where there is none because the first solve failed.
+fn summary(
+    task: &Task,
+    last: Option<StepRecord>,
+    result: &Result<Outcome, RunError>,
+    notes: &[String],
+    wall: f64,
+) -> Value {
+    let Task { problem, triangles, contact_nodes, solver, .. } = task;
+    let (scene, partition) = (problem.scene(), &problem.body.partition);
+    let outcome = result.as_ref().ok();
+    let stopped = outcome.and_then(|outcome| outcome.stopped);
+    let steps = last.map_or(0, |record| record.step);
+    let seconds = task.phases.parts("").into_iter().map(|(name, phase)| (name, phase.seconds));
+    let mut summary = json!({
+        "scene": scene.name,
+        "title": scene.title,
+        "solver": solver,
+        "ranks": partition.comm().size(),
+        // Of the whole body; contact nodes have a gap condition and no prescribed displacement.
+        "nodes": partition.total(),
+        "triangles": triangles,
+        "contact_nodes": contact_nodes,
+        // Accepted steps after t = 0, and the last time, s.
+        "steps": steps,
+        "end_time": last.map(|record| record.time),
+        // When ζ_* was reached, s, and how far off that time may be; null if it was not reached.
+        "stopped_at": stopped.map(|stop| stop.time),
+        "stopped_uncertainty": stopped.map(|stop| stop.uncertainty),
+        // As in history.csv.
+        "zeta_min": last.map(|record| record.zeta_min),
+        "zeta_mean": last.map(|record| record.zeta_mean),
+        "displacement_max": last.map(|record| record.displacement_max),
+        "work": last.map(|record| record.work),
+        "contact_force": last.map(|record| record.contact_force),
+        "active_nodes": last.map(|record| record.active_nodes),
+        // The worst of all steps.
+        "kkt": outcome.map(|outcome| outcome.kkt).or(last.map(|record| record.kkt())),
+        "wall_seconds": wall,
+        "seconds_per_step": wall / steps.max(1) as f64,
+        "phases": seconds.collect::<BTreeMap<_, _>>(),
+        // The edges of Γ_C as segments [[x, y], [x, y]], m; unit vectors along which the body slides
+        // at their ends, [0, 0] at corners; opposite each edge the foundation, m.
+        "contact_boundary": problem.foundation.contact_boundary,
+        "contact_tangents": problem.foundation.tangents,
+        "foundation": problem.foundation.segments,
+        "notes": notes,
+    });
+    if let Err(error) = result {
+        summary["error"] = json!(error.to_string());
+    }
+    summary
 }

@@ -1,17 +1,17 @@
 //! `signorini run`: a scene from its file to its results.
 
 use super::{
-    Failure, check_petsc, check_solver,
-    ranks::{rejoin, together},
+    Failure, SOLVERS, check_petsc, check_solver,
+    ranks::{agree, barrier_or_abort},
+    read,
     recorder::Recorder,
+    solver_names,
 };
 use clap::Args;
 use signorini::{
-    contact::SOLVERS,
     evolution::{self, DiscreteProblem, Phases, RunError},
-    mesh, output,
-    petsc::{Communicator, Session},
-    scene::{MeshSource, Scene},
+    output,
+    petsc::Session,
 };
 use std::{
     path::{Path, PathBuf},
@@ -29,9 +29,9 @@ pub struct RunArguments {
     /// Folder for the results [default: out/<scene>].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Contact solver: active-set, penalty-duality, tao, tao:TYPE [default: the scene's, else
-    /// active-set].
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help = format!(
+        "Contact solver [default: the scene's, else {}]: {}", SOLVERS[0], solver_names()
+    ))]
     solver: Option<String>,
     /// Override a key of the scene, e.g. --set time.step=0.005; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -47,9 +47,9 @@ pub struct RunArguments {
 impl RunArguments {
     /// Refuses what would silently have no effect.
     fn check(&self) -> Result<(), Failure> {
-        let meshes = |set: &&String| set.trim_start().starts_with("mesh.");
-        if let (Some(file), Some(set)) = (&self.mesh, self.set.iter().find(meshes)) {
-            return Err(Failure::Input(format!(
+        let is_of_mesh = |set: &&String| set.trim_start().starts_with("mesh.");
+        if let (Some(file), Some(set)) = (&self.mesh, self.set.iter().find(is_of_mesh)) {
+            return Err(Failure::input(format!(
                 "--set {set} has no effect beside --mesh {0}, which replaces the scene's [mesh]; \
                  write --set mesh.file={0} instead (relative to the scene)",
                 file.display()
@@ -60,109 +60,96 @@ impl RunArguments {
     }
 }
 
-/// The scene at `path` with keys overridden by `set`, on another mesh if one is given.
-fn read_scene(path: &Path, mesh: Option<&Path>, set: &[String]) -> Result<Scene, Failure> {
-    let mut scene = Scene::read(path, set).map_err(Failure::input)?;
-    if let Some(file) = mesh {
-        scene.mesh = MeshSource::from_path(file);
-    }
-    Ok(scene)
-}
-
-/// Runs a scene, on as many ranks as `mpiexec` has started.
+/// `signorini run SCENE`, on as many ranks as `mpiexec` has started.
 pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
-    let started = Instant::now();
-    let phases = Phases::default();
-    let start = |options: &[String]| {
-        phases.time("petsc start", || Session::start(options)).map_err(Failure::solver)
-    };
+    let (started, phases) = (Instant::now(), Phases::default());
     let checked = arguments.check();
-    // One rank tells bad input before PETSc starts; several need it to speak with one voice.
-    let early = match (Communicator::launched(), &checked) {
-        (1, _) => None,
-        (_, Ok(())) => Some(start(&arguments.petsc)?),
-        (_, Err(_)) => Some(start(&[])?),
-    };
-    let comm = early.as_ref().map_or(Communicator::serial(), Session::comm);
-    let task = together(comm, checked).and_then(|()| Task::read(arguments, comm, &phases));
-    let session = match (early, &task) {
-        (Some(session), _) => session,
-        (None, Err(_)) => return task.map(|_| ()),
-        (None, Ok(_)) => start(&arguments.petsc)?,
-    };
-    let speaks = task.is_ok() && session.comm().is_root();
-    let result = task.and_then(|task| task.solve(&session, &phases, started));
+    let options = if checked.is_ok() { &arguments.petsc[..] } else { &[] };
+    let session =
+        phases.time("petsc start", || Session::start(options)).map_err(Failure::solver)?;
+    let task = agree(session.comm(), checked)
+        .and_then(|()| Task::read(arguments, &session, &phases, started));
+    let warns = task.is_ok() && session.comm().is_root();
+    let result = task.and_then(|task| task.solve(&session));
     let unused = session.unused_options();
-    let ended = session.finalize().map_err(Failure::solver);
-    if speaks && !unused.is_empty() {
+    let finalized = session.finalize().map_err(Failure::solver);
+    if warns && !unused.is_empty() {
         eprintln!("warning: PETSc options that nothing read: {}", unused.join(" "));
     }
-    result.and(ended)
+    result.and(finalized)
 }
 
-/// What is to be done, all input being good.
-struct Task {
-    problem: DiscreteProblem,
-    solver: String,
-    folder: PathBuf,
-    profile: bool,
+/// A run whose input is good.
+pub(super) struct Task<'a> {
+    /// This rank's subdomain of it.
+    pub(super) problem: DiscreteProblem,
+    /// Triangles of the whole body, and its nodes with a gap condition.
+    pub(super) triangles: usize,
+    pub(super) contact_nodes: usize,
+    /// The name of the contact solver.
+    pub(super) solver: String,
+    /// Where the results go.
+    pub(super) folder: PathBuf,
+    /// Whether the closing table has all that was timed.
+    pub(super) profile: bool,
+    pub(super) phases: &'a Phases,
+    pub(super) started: Instant,
 }
 
-impl Task {
-    /// Reads scene and mesh. Every rank reads both; the first also makes the mesh, where it is to
-    /// be made. Collective.
+impl<'a> Task<'a> {
+    /// Reads scene and mesh and removes the results of an earlier run. Every rank reads both files;
+    /// where the mesh is yet to be made, the first rank makes it. Collective.
     fn read(
         arguments: &RunArguments,
-        comm: Communicator,
-        phases: &Phases,
+        session: &Session,
+        phases: &'a Phases,
+        started: Instant,
     ) -> Result<Self, Failure> {
-        let scene = read_scene(&arguments.scene, arguments.mesh.as_deref(), &arguments.set);
-        let scene = together(comm, scene)?;
-        let asked = arguments.solver.clone().or_else(|| scene.contact.solver.clone());
-        let solver = asked.unwrap_or_else(|| SOLVERS[0].to_owned());
+        let comm = session.comm();
+        let mesh = arguments.mesh.as_deref();
+        let load = || phases.time("mesh", || read(&arguments.scene, mesh, &arguments.set));
+        let of_root = agree(comm, comm.is_root().then(load).transpose())?;
+        let (scene, mesh) = agree(comm, of_root.map_or_else(load, Ok))?;
+        let solver = arguments.solver.as_ref().or(scene.contact.solver.as_ref());
+        let solver = solver.map_or(SOLVERS[0], String::as_str).to_owned();
         let folder = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
+        let problem = phases.time("discrete problem", || DiscreteProblem::new(scene, mesh));
+        let problem = agree(comm, problem.map_err(Failure::input))?;
+        let problem = phases.time("partition", || problem.restrict(session));
+        let problem = agree(comm, problem.map_err(Failure::solver))?;
+        let prepared = if comm.is_root() { output::prepare(&folder) } else { Ok(()) };
+        agree(comm, prepared.map_err(Failure::input))?;
 
-        let load = || {
-            phases
-                .time("mesh", || mesh::load(&scene.mesh.file, &scene.mesh.parameters))
-                .map_err(Failure::input)
-        };
-        let first = comm.is_root().then(load).transpose();
-        let loaded = together(comm, first)?.map_or_else(load, Ok);
-        let mesh = together(comm, loaded)?;
-        let problem =
-            phases.time("setting", || DiscreteProblem::new(scene, mesh)).map_err(Failure::input);
-        let profile = arguments.profile;
-        Ok(Self { problem: together(comm, problem)?, solver, folder, profile })
+        let mut contact_nodes: Vec<usize> =
+            problem.constraints.bounds.iter().map(|bound| bound.node).collect();
+        contact_nodes.dedup();
+        Ok(Self {
+            triangles: comm.count(problem.body.own_triangles),
+            contact_nodes: comm.count(contact_nodes.len()),
+            problem,
+            solver,
+            folder,
+            profile: arguments.profile,
+            phases,
+            started,
+        })
     }
 
     /// Solves and writes the results. Collective.
-    fn solve(self, session: &Session, phases: &Phases, started: Instant) -> Result<(), Failure> {
+    fn solve(self, session: &Session) -> Result<(), Failure> {
         let comm = session.comm();
-        let Self { problem, solver, folder, profile } = self;
-        let problem =
-            phases.time("partition", || problem.restrict(session)).map_err(Failure::solver);
-        let problem = together(comm, problem)?;
-        // Now that all input is good: the results of an earlier run go.
-        let prepared = if comm.is_root() { output::prepare(&folder) } else { Ok(()) };
-        together(comm, prepared.map_err(Failure::input))?;
-        let recorder = Recorder::new(&folder, &problem, &solver, phases, profile);
-        let mut recorder = together(comm, recorder.map_err(Failure::input))?;
-
-        let result = evolution::run(session, &problem, &solver, phases, &mut |step| {
+        let mut recorder = agree(comm, Recorder::new(&self).map_err(Failure::input))?;
+        let (problem, phases) = (&self.problem, self.phases);
+        let result = evolution::run(session, problem, &self.solver, phases, &mut |step| {
             Ok(recorder.accept(step)?)
         });
-        let failure = result.as_ref().map(|_| ()).map_err(failure);
-        rejoin(comm, &failure);
-        let written = recorder.finish(&result, started);
-        together(comm, failure.and(written.map_err(Failure::solver)))
-    }
-}
-
-/// The run has begun, so what was accepted is saved, whoever is to blame.
-fn failure(error: &RunError) -> Failure {
-    match error {
-        RunError::OnAnotherRank => Failure::OnAnotherRank,
-        error => Failure::solver(error),
+        barrier_or_abort(comm, result.as_ref().err());
+        let written = recorder.finish(&result);
+        let ended = match result {
+            Ok(_) => written.map_err(Failure::solver),
+            Err(RunError::OnAnotherRank) => Err(Failure::ON_ANOTHER_RANK),
+            Err(error) => Err(Failure::solver(error)),
+        };
+        agree(comm, ended)
     }
 }

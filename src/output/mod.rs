@@ -1,17 +1,16 @@
 //! What a run leaves behind: `fields.pvd` with its frames, `history.csv`, `summary.json`.
 
-mod array;
-mod history;
-mod pieces;
-mod summary;
+mod data_array;
 mod vtu;
 
-pub use history::History;
-pub use summary::Summary;
 pub use vtu::FieldWriter;
 
+use crate::evolution::StepRecord;
+use serde::Serialize;
 use std::{
+    fs::{self, File, Permissions},
     io::Write,
+    os::unix::fs::PermissionsExt,
     path::{Path, PathBuf},
 };
 
@@ -34,8 +33,8 @@ impl OutputError {
 /// # Errors
 /// The folder cannot be created or written to.
 pub fn create(folder: &Path) -> Result<(), OutputError> {
-    std::fs::create_dir_all(folder).map_err(|e| OutputError::new(folder, e))?;
-    // Whether it can be written to shows only by writing.
+    fs::create_dir_all(folder).map_err(|e| OutputError::new(folder, e))?;
+    // Whether a folder can be written to shows only by writing.
     tempfile::tempfile_in(folder).map_err(|e| OutputError::new(folder, e))?;
     Ok(())
 }
@@ -46,24 +45,51 @@ pub fn create(folder: &Path) -> Result<(), OutputError> {
 /// The folder cannot be created or written to.
 pub fn prepare(folder: &Path) -> Result<(), OutputError> {
     create(folder)?;
-    let entries = std::fs::read_dir(folder).map_err(|e| OutputError::new(folder, e))?;
-    for path in entries.flatten().map(|entry| entry.path()) {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let frame = name.ends_with(".vtu") || name.ends_with(".pvtu");
-        let ours = (name.starts_with("fields_") && frame)
-            || ["fields.pvd", "history.csv", "summary.json"].contains(&name.as_ref());
-        if ours {
-            std::fs::remove_file(&path).map_err(|e| OutputError::new(&path, e))?;
+    let entries = fs::read_dir(folder).map_err(|e| OutputError::new(folder, e))?;
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        let is_frame =
+            name.starts_with("fields_") && (name.ends_with(".vtu") || name.ends_with(".pvtu"));
+        if is_frame || ["fields.pvd", "history.csv", "summary.json"].contains(&&*name) {
+            fs::remove_file(entry.path()).map_err(|e| OutputError::new(&entry.path(), e))?;
         }
     }
     Ok(())
+}
+
+/// Writes `history.csv`: a row per accepted step, at once, so that a run can be followed.
+pub struct History {
+    path: PathBuf,
+    writer: csv::Writer<File>,
+}
+
+impl History {
+    /// Starts `history.csv` in `folder`.
+    ///
+    /// # Errors
+    /// The file cannot be created.
+    pub fn create(folder: &Path) -> Result<Self, OutputError> {
+        let path = folder.join("history.csv");
+        let writer = csv::Writer::from_path(&path).map_err(|e| OutputError::new(&path, e))?;
+        Ok(Self { path, writer })
+    }
+
+    /// Appends the row of a step.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn add(&mut self, record: &StepRecord) -> Result<(), OutputError> {
+        self.writer.serialize(record).map_err(|e| OutputError::new(&self.path, e))?;
+        self.writer.flush().map_err(|e| OutputError::new(&self.path, e))
+    }
 }
 
 /// Writes a CSV file with a row per element, whole or not at all.
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn write_table<T: serde::Serialize>(path: &Path, rows: &[T]) -> Result<(), OutputError> {
+pub fn write_table<T: Serialize>(path: &Path, rows: &[T]) -> Result<(), OutputError> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for row in rows {
         writer.serialize(row).map_err(|e| OutputError::new(path, e))?;
@@ -72,18 +98,18 @@ pub fn write_table<T: serde::Serialize>(path: &Path, rows: &[T]) -> Result<(), O
     write_whole(path, &content)
 }
 
-/// Writes a file whole or not at all: a temporary neighbour is renamed when complete.
+/// Writes a file whole or not at all: a temporary file beside it is renamed when complete.
 ///
 /// # Errors
 /// The file cannot be written.
 pub fn write_whole(path: &Path, content: &[u8]) -> Result<(), OutputError> {
-    let failed = |e: &dyn ToString| OutputError::new(path, e.to_string());
     let folder = path.parent().unwrap_or(Path::new("."));
-    let mut file = tempfile::Builder::new()
-        .permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644))
+    let written = tempfile::Builder::new()
+        .permissions(Permissions::from_mode(0o644))
         .tempfile_in(folder)
-        .map_err(|e| failed(&e))?;
-    file.write_all(content).map_err(|e| failed(&e))?;
-    file.persist(path).map_err(|e| failed(&e))?;
-    Ok(())
+        .and_then(|mut file| {
+            file.write_all(content)?;
+            Ok(file.persist(path)?)
+        });
+    written.map(|_| ()).map_err(|e| OutputError::new(path, e))
 }

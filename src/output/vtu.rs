@@ -1,43 +1,38 @@
 //! Fields for ParaView: VTK XML unstructured grids and their collection over time.
 //!
-//! The arrays are encoded here and not by the VTK crate, which reads these files back in the tests:
-//! it compresses value by value and took 0.9 s for a frame of 66,049 nodes.
+//! The files are written here and not by the VTK crate, which reads them back in the tests: it
+//! compresses value by value and took 0.9 s for a frame of 66,049 nodes.
 
-use super::{
-    OutputError,
-    array::{data_array, head},
-    pieces::{Piece, list, piece_name},
-    write_whole,
-};
+use super::{OutputError, data_array::DataArray, write_whole};
 use crate::{
     evolution::{DiscreteProblem, State},
-    petsc::{Communicator, PetscError},
+    fem::Body,
+    petsc::PetscError,
 };
-use std::path::{Path, PathBuf};
-
-/// Writes `fields_NNNN.vtu` frames and keeps `fields.pvd` their list. Of several ranks each writes
-/// its piece `fields_NNNN_R.vtu`, and the first the lists: `fields_NNNN.pvtu` and `fields.pvd`.
-pub struct FieldWriter {
-    folder: PathBuf,
-    comm: Communicator,
-    piece: Piece,
-    /// Points and cells, the same in every frame.
-    mesh: String,
-    frames: Vec<(f64, String)>,
-}
+use std::{
+    fmt, io, iter,
+    path::{Path, PathBuf},
+};
 
 /// VTK_TRIANGLE.
 const TRIANGLE: u8 = 5;
-/// The arrays of every frame: name, VTK's type, components.
-const AT_POINTS: [(&str, &str, usize); 4] = [
-    ("displacement", "Float64", 3),
-    ("zeta", "Float64", 1),
-    ("normal_pressure", "Float64", 1),
-    ("gap", "Float64", 1),
-];
-const IN_CELLS: [(&str, &str, usize); 2] = [("von_mises", "Float64", 1), ("stress", "Float64", 3)];
-/// The number of a node in the whole body, by which pieces can be joined.
-const NUMBER: (&str, &str, usize) = ("global_node", "Int32", 1);
+/// VTK's names of the types of numbers.
+const REAL: &str = "Float64";
+const INTEGER: &str = "Int32";
+const BYTE: &str = "UInt8";
+
+/// Writes frames `fields_NNNN.vtu` and their list over time, `fields.pvd`. Of several ranks each
+/// writes its piece of a frame, `fields_NNNN_R.vtu`, and the first one the lists:
+/// `fields_NNNN.pvtu` names the pieces, `fields.pvd` the frames.
+///
+/// A piece has the triangles that its rank owns and all nodes that it knows.
+pub struct FieldWriter {
+    folder: PathBuf,
+    /// `<Points>` and `<Cells>`, the same in every frame.
+    mesh: String,
+    /// Time, s, and file of every frame.
+    frames: Vec<(f64, String)>,
+}
 
 impl FieldWriter {
     /// A writer for the body of `problem` into `folder`.
@@ -45,121 +40,153 @@ impl FieldWriter {
     /// # Errors
     /// The mesh cannot be encoded.
     pub fn new(folder: &Path, problem: &DiscreteProblem) -> Result<Self, OutputError> {
-        let body = &problem.body;
-        let piece = Piece::of(body);
-        let mesh = mesh(&piece, &body.mesh.nodes).map_err(|e| OutputError::new(folder, e))?;
-        let comm = body.partition.comm();
-        Ok(Self { folder: folder.to_owned(), comm, piece, mesh, frames: Vec::new() })
+        let mesh = mesh_text(&problem.body).map_err(|e| OutputError::new(folder, e))?;
+        Ok(Self { folder: folder.to_owned(), mesh, frames: Vec::new() })
     }
 
-    /// Time of the last frame written.
+    /// Time of the last frame, s.
     pub fn last_time(&self) -> Option<f64> {
         self.frames.last().map(|(time, _)| *time)
     }
 
-    /// Writes a frame and the collection that names it. Collective.
+    /// Writes a frame and the lists that name it. Collective.
     ///
     /// # Errors
     /// A file cannot be written.
     pub fn add(&mut self, problem: &DiscreteProblem, state: &State) -> Result<(), OutputError> {
+        let comm = problem.body.partition.comm();
         let stem = format!("fields_{:04}", self.frames.len());
-        let (piece, frame) = match self.comm.is_serial() {
+        let piece_file = |rank| format!("{stem}_{rank}.vtu");
+        let (own, frame) = match comm.is_serial() {
             true => (format!("{stem}.vtu"), format!("{stem}.vtu")),
-            false => (piece_name(&stem, self.comm.rank()), format!("{stem}.pvtu")),
+            false => (piece_file(comm.rank()), format!("{stem}.pvtu")),
         };
         self.frames.push((state.time, frame.clone()));
-        let path = self.folder.join(&piece);
-        let contact = contact_fields(problem, state).map_err(|e| OutputError::new(&path, e))?;
-        let data = self.fields(problem, state, contact).map_err(|e| OutputError::new(&path, e))?;
-        let content = format!(
-            "{}<UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n{}{data}\
-             </Piece>\n</UnstructuredGrid>\n</VTKFile>\n",
-            head("UnstructuredGrid"),
-            self.piece.nodes.len(),
-            self.piece.corners.len(),
-            self.mesh
-        );
-        write_whole(&path, content.as_bytes())?;
-        if !self.comm.is_root() {
+
+        let path = self.folder.join(own);
+        let points = point_data(problem, state).map_err(|e| OutputError::new(&path, e))?;
+        let cells = cell_data(problem, state);
+        let text = self.piece(&problem.body, &points, &cells);
+        let text = text.map_err(|e| OutputError::new(&path, e))?;
+        write_whole(&path, text.as_bytes())?;
+        if !comm.is_root() {
             return Ok(());
         }
-        if !self.comm.is_serial() {
-            let points = [&AT_POINTS[..], &[NUMBER]].concat();
-            let text = list(&stem, self.comm.size(), &points, &IN_CELLS);
+        if !comm.is_serial() {
+            let text = list_of_pieces((0..comm.size()).map(piece_file), &points, &cells);
             write_whole(&self.folder.join(frame), text.as_bytes())?;
         }
         write_whole(&self.folder.join("fields.pvd"), self.collection().as_bytes())
+    }
+
+    fn piece(&self, body: &Body, points: &[DataArray], cells: &[DataArray]) -> io::Result<String> {
+        let points = points.iter().map(DataArray::element).collect::<io::Result<String>>()?;
+        let cells = cells.iter().map(DataArray::element).collect::<io::Result<String>>()?;
+        Ok(vtk_file(
+            "UnstructuredGrid",
+            format_args!(
+                "<UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n{}\
+                 <PointData>\n{points}</PointData>\n<CellData>\n{cells}</CellData>\n\
+                 </Piece>\n</UnstructuredGrid>\n",
+                body.mesh.nodes.len(),
+                body.own_triangles,
+                self.mesh,
+            ),
+        ))
     }
 
     fn collection(&self) -> String {
         let frames: String = (self.frames.iter())
             .map(|(time, file)| format!("<DataSet timestep=\"{time}\" file=\"{file}\"/>\n"))
             .collect();
-        format!("{}<Collection>\n{frames}</Collection>\n</VTKFile>\n", head("Collection"))
-    }
-
-    /// `<PointData>` and `<CellData>`.
-    fn fields(
-        &self,
-        problem: &DiscreteProblem,
-        state: &State,
-        (pressure, gap): (Vec<f64>, Vec<f64>),
-    ) -> std::io::Result<String> {
-        let (elasticity, piece) = (&problem.elasticity, &self.piece);
-        let stress: Vec<_> = (state.zeta_mean.iter().enumerate().take(piece.corners.len()))
-            .map(|(t, zeta)| elasticity.stress(&problem.body, t, *zeta, &state.u))
-            .collect();
-        let u = &state.u;
-        let displacement = piece.nodes.iter().flat_map(|&i| [u[2 * i], u[2 * i + 1], 0.0]);
-        let von_mises = stress.iter().map(|s| elasticity.material.von_mises(s));
-        let components = stress.iter().flat_map(|s| [s[0], s[1], s[2]]);
-        let number = |&node: &usize| problem.body.partition.global(node, 1, 0);
-        let [(u, _, width), (zeta, ..), (p, ..), (g, ..)] = AT_POINTS;
-        let [(mises, ..), (sigma, _, parts)] = IN_CELLS;
-        Ok([
-            "<PointData>\n".to_owned(),
-            data_array(u, width, displacement)?,
-            data_array(zeta, 1, piece.values(&state.zeta))?,
-            data_array(p, 1, piece.values(&pressure))?,
-            data_array(g, 1, piece.values(&gap))?,
-            match self.comm.is_serial() {
-                true => String::new(),
-                false => data_array(NUMBER.0, 1, piece.nodes.iter().map(number))?,
-            },
-            "</PointData>\n<CellData>\n".to_owned(),
-            data_array(mises, 1, von_mises)?,
-            data_array(sigma, parts, components)?,
-            "</CellData>\n".to_owned(),
-        ]
-        .concat())
+        vtk_file("Collection", format_args!("<Collection>\n{frames}</Collection>\n"))
     }
 }
 
 /// `<Points>` and `<Cells>`.
-fn mesh(piece: &Piece, nodes: &[[f64; 2]]) -> std::io::Result<String> {
-    let cells = piece.corners.len();
-    let points = data_array("Points", 3, piece.values(nodes).flat_map(|[x, y]| [x, y, 0.0]))?;
-    let corners = piece.corners.iter().flatten().map(|&node| node as i32);
-    let connectivity = data_array("connectivity", 1, corners)?;
-    let offsets = data_array("offsets", 1, (1..=cells).map(|t| 3 * t as i32))?;
-    let types = data_array("types", 1, (0..cells).map(|_| TRIANGLE))?;
-    Ok(format!("<Points>\n{points}</Points>\n<Cells>\n{connectivity}{offsets}{types}</Cells>\n"))
+fn mesh_text(body: &Body) -> io::Result<String> {
+    let points = body.mesh.nodes.iter().flat_map(|&[x, y]| [x, y, 0.0]);
+    let triangles = &body.mesh.triangles[..body.own_triangles];
+    let corners = triangles.iter().flatten().map(|&node| node as i32);
+    let offsets = (1..=triangles.len()).map(|t| 3 * t as i32);
+    let types = triangles.iter().map(|_| TRIANGLE);
+    Ok(format!(
+        "<Points>\n{}</Points>\n<Cells>\n{}{}{}</Cells>\n",
+        DataArray::new("Points", REAL, 3, points).element()?,
+        DataArray::new("connectivity", INTEGER, 1, corners).element()?,
+        DataArray::new("offsets", INTEGER, 1, offsets).element()?,
+        DataArray::new("types", BYTE, 1, types).element()?,
+    ))
 }
 
-/// Contact pressure (0 off Γ_C) and remaining gap (NaN off Γ_C) at the nodes; where two
-/// conditions meet at a corner, the larger pressure and the smaller gap.
-fn contact_fields(
-    problem: &DiscreteProblem,
-    state: &State,
-) -> Result<(Vec<f64>, Vec<f64>), PetscError> {
+/// The nodal fields. Contact pressure is 0 and the remaining gap NaN off Γ_C; where two gap conditions
+/// meet at a corner, the larger pressure and the smaller gap are shown. Collective.
+fn point_data(problem: &DiscreteProblem, state: &State) -> Result<Vec<DataArray>, PetscError> {
+    let partition = &problem.body.partition;
     let mut pressure = vec![0.0_f64; state.zeta.len()];
     let mut gap = vec![f64::NAN; state.zeta.len()];
     for point in &state.contact {
         pressure[point.node] = pressure[point.node].max(point.pressure);
         gap[point.node] = gap[point.node].min(point.gap);
     }
-    let partition = &problem.body.partition;
     partition.update(&mut pressure, 1)?;
     partition.update(&mut gap, 1)?;
-    Ok((pressure, gap))
+    let displacement = state.u.chunks_exact(2).flat_map(|u| [u[0], u[1], 0.0]);
+    let mut arrays = vec![
+        DataArray::new("displacement", REAL, 3, displacement),
+        DataArray::new("zeta", REAL, 1, state.zeta.iter().copied()),
+        DataArray::new("normal_pressure", REAL, 1, pressure.into_iter()),
+        DataArray::new("gap", REAL, 1, gap.into_iter()),
+    ];
+    if !partition.comm().is_serial() {
+        // The node's number in the whole body, by which the pieces can be joined.
+        let numbers = (0..partition.local()).map(|node| partition.global(node, 1, 0));
+        arrays.push(DataArray::new("global_node", INTEGER, 1, numbers));
+    }
+    Ok(arrays)
+}
+
+/// The fields that are constant on each triangle; the stress has the components xx, yy, xy.
+fn cell_data(problem: &DiscreteProblem, state: &State) -> Vec<DataArray> {
+    let (elasticity, body) = (&problem.elasticity, &problem.body);
+    let zeta = state.zeta_mean[..body.own_triangles].iter().enumerate();
+    let stress: Vec<_> =
+        zeta.map(|(t, zeta)| elasticity.stress(body, t, *zeta, &state.u)).collect();
+    let von_mises = stress.iter().map(|s| elasticity.material.von_mises(s));
+    let components = stress.iter().flat_map(|s| [s[0], s[1], s[2]]);
+    vec![
+        DataArray::new("von_mises", REAL, 1, von_mises),
+        DataArray::new("stress", REAL, 3, components),
+    ]
+}
+
+/// The list of the files of a frame's pieces, with the arrays `points` and `cells` in each.
+fn list_of_pieces(
+    files: impl Iterator<Item = String>,
+    points: &[DataArray],
+    cells: &[DataArray],
+) -> String {
+    let declarations =
+        |arrays: &[DataArray]| -> String { arrays.iter().map(DataArray::declaration).collect() };
+    let coordinates = [DataArray::new::<f64>("Points", REAL, 3, iter::empty())];
+    let files: String = files.map(|file| format!("<Piece Source=\"{file}\"/>\n")).collect();
+    vtk_file(
+        "PUnstructuredGrid",
+        format_args!(
+            "<PUnstructuredGrid GhostLevel=\"0\">\n<PPointData>\n{}</PPointData>\n\
+             <PCellData>\n{}</PCellData>\n<PPoints>\n{}</PPoints>\n{files}</PUnstructuredGrid>\n",
+            declarations(points),
+            declarations(cells),
+            declarations(&coordinates),
+        ),
+    )
+}
+
+/// A VTK file of `kind` with arrays as [`DataArray`] encodes them.
+fn vtk_file(kind: &str, content: fmt::Arguments) -> String {
+    format!(
+        "<?xml version=\"1.0\"?>\n\
+         <VTKFile type=\"{kind}\" version=\"1.0\" byte_order=\"LittleEndian\" \
+         header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n{content}</VTKFile>\n"
+    )
 }

@@ -1,0 +1,77 @@
+//! A data array of a VTK XML file: binary, compressed by zlib, in base64 (VTK User's Guide, "VTK File
+//! Formats").
+
+use base64::{Engine, engine::general_purpose::STANDARD};
+use flate2::{Compress, Compression, FlushCompress};
+use num_traits::ToBytes;
+use std::io;
+
+/// Bytes that are compressed as one block.
+const BLOCK: usize = 1 << 20;
+/// zlib's fastest level: it halves the size in a tenth of the time of its best level.
+const LEVEL: u32 = 1;
+
+/// A named array with a tuple of numbers per point or cell.
+pub(super) struct DataArray {
+    name: &'static str,
+    /// VTK's name of the numbers' type.
+    number_type: &'static str,
+    components: usize,
+    /// The numbers one after the other, each with its least significant byte first.
+    bytes: Vec<u8>,
+}
+
+impl DataArray {
+    /// The array called `name` of tuples of `components` numbers, whose type VTK calls `number_type`.
+    pub(super) fn new<T: ToBytes>(
+        name: &'static str,
+        number_type: &'static str,
+        components: usize,
+        values: impl Iterator<Item = T>,
+    ) -> Self {
+        let mut bytes = Vec::with_capacity(values.size_hint().0 * size_of::<T>());
+        values.for_each(|value| bytes.extend_from_slice(value.to_le_bytes().as_ref()));
+        Self { name, number_type, components, bytes }
+    }
+
+    fn attributes(&self) -> String {
+        let Self { name, number_type, components, .. } = self;
+        format!("type=\"{number_type}\" Name=\"{name}\" NumberOfComponents=\"{components}\"")
+    }
+
+    /// The element `<PDataArray>`, which declares the array in the list of a file's pieces.
+    pub(super) fn declaration(&self) -> String {
+        format!("<PDataArray {}/>\n", self.attributes())
+    }
+
+    /// The element `<DataArray>` with the values.
+    ///
+    /// # Errors
+    /// zlib cannot compress them.
+    pub(super) fn element(&self) -> io::Result<String> {
+        let mut text = format!("<DataArray {} format=\"binary\">", self.attributes());
+        let (header, blocks) = compress(&self.bytes)?;
+        STANDARD.encode_string(header, &mut text);
+        STANDARD.encode_string(blocks, &mut text);
+        text.push_str("</DataArray>\n");
+        Ok(text)
+    }
+}
+
+/// VTK's header (the number of blocks, the bytes of a block, the bytes of a last partial block or 0,
+/// the compressed bytes of each block; all as 64-bit integers) and the compressed blocks.
+fn compress(bytes: &[u8]) -> io::Result<(Vec<u8>, Vec<u8>)> {
+    let mut compressor = Compress::new(Compression::new(LEVEL), true);
+    let mut header = vec![bytes.chunks(BLOCK).len(), BLOCK, bytes.len() % BLOCK];
+    let mut compressed = Vec::with_capacity(bytes.len() / 2 + BLOCK);
+    for block in bytes.chunks(BLOCK) {
+        compressor.reset();
+        let before = compressed.len();
+        // zlib's bound on the size of its output (zlib.h, compressBound).
+        compressed.reserve(block.len() + block.len() / 1000 + 64);
+        compressor.compress_vec(block, &mut compressed, FlushCompress::Finish)?;
+        header.push(compressed.len() - before);
+    }
+    let header = header.iter().flat_map(|&n| (n as u64).to_le_bytes()).collect();
+    Ok((header, compressed))
+}
