@@ -19,7 +19,7 @@ pub enum Mass {
 }
 
 impl Mass {
-    /// The mass of one triangle, m².
+    /// The mass matrix of one triangle, m².
     fn of(self, triangle: &Triangle) -> Matrix3<f64> {
         match self {
             Self::Consistent => triangle.mass(),
@@ -36,7 +36,8 @@ pub fn source(body: &Body, law: &DamageLaw, strain_squared: &[f64], zeta: &[f64]
     body.mesh.triangles.iter().zip(strain_squared).map(at_vertices).collect()
 }
 
-/// The load b_i = ∫ φ λ_i of a source given at the vertices and affine between them, m²/s.
+/// The load b_i = ∫ φ λ_i, m²/s, of a source φ given at the vertices of each triangle and affine
+/// between them.
 pub fn source_load(body: &Body, mass: Mass, source: &[[f64; 3]]) -> Vec<f64> {
     let mut load = vec![0.0; body.mesh.nodes.len()];
     for ((nodes, triangle), phi) in body.mesh.triangles.iter().zip(&body.triangles).zip(source) {
@@ -48,23 +49,24 @@ pub fn source_load(body: &Body, mass: Mass, source: &[[f64; 3]]) -> Vec<f64> {
     load
 }
 
-/// What a solution ζ_n of (28) is worth, from its residual r = (M + kκL)ζ_n − Mζ_{n−1} − kb.
+/// How well ζ_n solves (28), from its residual r = (M + kκL)ζ_n − Mζ_{n−1} − kb.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct DamageCertificate {
     /// ‖r‖₂ over the norm of the right-hand side (its mass lumped).
     pub residual: f64,
-    /// An upper bound of the error of ζ_n at any node.
+    /// An upper bound of the error of the solve in ζ_n at any node.
     pub error: f64,
 }
 
 impl DamageCertificate {
-    /// Judges the ζ_n = `after` that follows ζ_{n−1} = `before` by a step of `step` s with the
-    /// source load b = `load`, for the diffusion κ, m²/s. Collective.
+    /// For ζ_{n−1} = `before` and ζ_n = `after`, a step k = `step`, s, the source load b = `load`
+    /// and the diffusion κ, m²/s. Collective.
     ///
     /// The residual is summed triangle by triangle, without the matrices of the solver. On a
-    /// triangle M is |T|/12 times [2 1 1; 1 2 1; 1 1 2], of which the least eigenvalue is a quarter
-    /// of that of the lumped mass |T|/3. So M + kκL ≥ M ≥ ¼W, W the diagonal of node areas w, and
-    /// the error e satisfies √w_i |e_i| ≤ ‖e‖_W ≤ 4 ‖W^-½ r‖; with the lumped mass the 4 is 1.
+    /// triangle T the least eigenvalue of M, |T|/12 [2 1 1; 1 2 1; 1 1 2], is a quarter of that of
+    /// the lumped mass |T|/3. So M + kκL ≥ M ≥ ¼W with W the diagonal matrix of the node areas w,
+    /// and the error e satisfies √w_i |e_i| ≤ ‖e‖_W ≤ 4 ‖W^-½ r‖; for the lumped mass, where
+    /// M = W, the 4 is 1.
     pub fn of(
         body: &Body,
         mass: Mass,
@@ -99,13 +101,13 @@ impl DamageCertificate {
     }
 }
 
-/// M(ζ_n − ζ_{n−1}) + kκL ζ_n, summed over the triangles.
+/// M(ζ_n − ζ_{n−1}) + kκL ζ_n, summed over the triangles, with `spread` = kκ, m².
 fn residual(body: &Body, mass: Mass, spread: f64, [before, after]: [&[f64]; 2]) -> Vec<f64> {
     let mut residual = vec![0.0; after.len()];
     for (nodes, triangle) in body.mesh.triangles.iter().zip(&body.triangles) {
         let zeta = nodes.map(|node| after[node]);
         let change: [f64; 3] = std::array::from_fn(|i| zeta[i] - before[nodes[i]]);
-        // The consistent mass weighs the sum of the vertices and each, the lumped one each.
+        // (Mv)_i is |T|/12 (Σ_j v_j + v_i) for the consistent mass and |T|/3 v_i for the lumped.
         let (sum, own) = match mass {
             Mass::Consistent => (change[0] + change[1] + change[2], triangle.area / 12.0),
             Mass::Lumped => (0.0, triangle.area / 3.0),

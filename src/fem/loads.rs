@@ -16,8 +16,8 @@ pub fn gauss_points(p: [f64; 2], q: [f64; 2]) -> [[f64; 2]; 2] {
 /// ½ ∓ 1/√12.
 const GAUSS: [f64; 2] = [0.211_324_865_405_187_08, 0.788_675_134_594_812_9];
 
-/// Adds ∫ f_B·φ_i with f_B in N/m³ as a function of the point: the edge-midpoint rule,
-/// exact where f_B is affine.
+/// Adds the body force f_i = ∫_Ω f_B·φ_i to the nodal loads, with f_B in N/m³ as a function of the
+/// point. The rule of the side midpoints is exact where f_B is affine.
 pub fn add_body_force(body: &Body, force: impl Fn([f64; 2]) -> [f64; 2], load: &mut [f64]) {
     for (nodes, triangle) in body.mesh.triangles.iter().zip(&body.triangles) {
         for side in 0..3 {
@@ -33,8 +33,8 @@ pub fn add_body_force(body: &Body, force: impl Fn([f64; 2]) -> [f64; 2], load: &
     }
 }
 
-/// Adds ∫ f_N·φ_i over boundary `edges` with f_N in N/m² as a function of the point:
-/// two Gauss points an edge, exact where f_N is quadratic.
+/// Adds the traction f_i = ∫ f_N·φ_i over boundary `edges` to the nodal loads, with f_N in N/m² as
+/// a function of the point. Two Gauss points an edge are exact where f_N is quadratic.
 pub fn add_traction(
     body: &Body,
     edges: &[[usize; 2]],
@@ -43,7 +43,7 @@ pub fn add_traction(
 ) {
     for &[a, b] in edges {
         let (p, q) = (body.mesh.nodes[a], body.mesh.nodes[b]);
-        let length = (q[0] - p[0]).hypot(q[1] - p[1]);
+        let (_, length) = body.mesh.edge_normal([a, b]);
         for (s, point) in GAUSS.into_iter().zip(gauss_points(p, q)) {
             let f = traction(point);
             for (node, weight) in [(a, 1.0 - s), (b, s)] {

@@ -1,8 +1,7 @@
 //! Continuous piecewise affine finite elements (22), (23): from laws to matrices and vectors.
 //!
-//! Fields are plain slices over this rank's nodes, owned ones first, ghosts behind:
-//! one value per node (ζ) or two in turn (u_x, u_y). Which nodes are owned is known to
-//! [`Partition`] alone.
+//! Fields are plain slices over the nodes of this rank's subdomain, owned ones first, then ghosts:
+//! one value per node (ζ) or two in turn (u_x, u_y). [`Partition`] alone knows which are owned.
 
 mod triangle;
 mod partition;

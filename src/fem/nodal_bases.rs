@@ -10,32 +10,32 @@ use nalgebra::{Matrix2, Vector2};
 /// D⁻ᵀ: a force r does the work r·u = (D⁻ᵀr)·c.
 #[derive(Debug, Clone)]
 pub struct NodalBases {
-    directions: Vec<(usize, Matrix2<f64>, Matrix2<f64>)>,
-    index: Vec<u32>,
+    /// Node, D and D⁻¹.
+    bases: Vec<(usize, Matrix2<f64>, Matrix2<f64>)>,
+    /// The place of each node in `bases`.
+    place: Vec<u32>,
     fixed: Vec<bool>,
 }
 
+/// The place of a node with c = u.
 const IDENTITY: u32 = u32::MAX;
 
 impl NodalBases {
     /// The identity at each of `nodes` nodes, nothing fixed.
     pub fn identity(nodes: usize) -> Self {
-        Self { directions: Vec::new(), index: vec![IDENTITY; nodes], fixed: vec![false; 2 * nodes] }
+        Self { bases: Vec::new(), place: vec![IDENTITY; nodes], fixed: vec![false; 2 * nodes] }
     }
 
-    /// The frames of the nodes of a rank's share.
+    /// The bases at the nodes of a subdomain.
     pub(crate) fn restrict(&self, subdomain: &Subdomain) -> Self {
-        let mut bases = Self {
-            directions: Vec::new(),
-            index: subdomain.field(&vec![IDENTITY; self.index.len()], 1),
-            fixed: subdomain.field(&self.fixed, 2),
-        };
-        for (node, directions, inverse) in &self.directions {
-            if let Some(node) = subdomain.local(*node) {
-                bases.add(node, *directions, *inverse);
+        let fixed = subdomain.field(&self.fixed, 2);
+        let mut restricted = Self { place: vec![IDENTITY; fixed.len() / 2], bases: vec![], fixed };
+        for &(node, directions, inverse) in &self.bases {
+            if let Some(node) = subdomain.local(node) {
+                restricted.add(node, directions, inverse);
             }
         }
-        bases
+        restricted
     }
 
     /// Makes the rows of `directions` the basis at `node`; `None` if they are dependent.
@@ -46,8 +46,8 @@ impl NodalBases {
     }
 
     fn add(&mut self, node: usize, directions: Matrix2<f64>, inverse: Matrix2<f64>) {
-        self.index[node] = self.directions.len() as u32;
-        self.directions.push((node, directions, inverse));
+        self.place[node] = self.bases.len() as u32;
+        self.bases.push((node, directions, inverse));
     }
 
     /// Takes unknown `dof` (2·node + component) out of the system.
@@ -62,7 +62,7 @@ impl NodalBases {
 
     /// D⁻¹ at `node`, unless it is the identity: u = D⁻¹ c.
     pub fn inverse(&self, node: usize) -> Option<&Matrix2<f64>> {
-        self.directions.get(self.index[node] as usize).map(|(_, _, inverse)| inverse)
+        self.bases.get(self.place[node] as usize).map(|(_, _, inverse)| inverse)
     }
 
     /// c = D u, in place.
@@ -85,7 +85,7 @@ impl NodalBases {
         field: &mut [f64],
         matrix: impl Fn(&Matrix2<f64>, &Matrix2<f64>) -> Matrix2<f64>,
     ) {
-        for (node, d, inverse) in &self.directions {
+        for (node, d, inverse) in &self.bases {
             let v = matrix(d, inverse) * Vector2::new(field[2 * node], field[2 * node + 1]);
             field[2 * node] = v[0];
             field[2 * node + 1] = v[1];

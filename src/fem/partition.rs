@@ -1,32 +1,33 @@
-//! Which nodes this rank owns, and what it must ask the others. Nothing else in the program knows.
+//! Which nodes this rank owns, and the exchange of values with the ranks that own the others.
 
 use crate::petsc::{Communicator, Ghosts, PetscError};
 
-/// The nodes of this rank: owned ones first, then ghosts, with their global numbers.
+/// The nodes of this rank: owned ones first, then ghosts, with their global indices.
 ///
-/// Global numbers are contiguous by owner, so that a PETSc row belongs to its owner.
-/// A triangle is assembled by every rank that owns one of its nodes, into owned rows only: what is
-/// assembled at ghosts is incomplete.
+/// Global indices are PETSc's: contiguous on each rank, so that every rank owns the rows of its
+/// nodes. A triangle is assembled by every rank that owns one of its nodes, into owned rows only:
+/// what is assembled at ghosts is incomplete.
 #[derive(Debug)]
 pub struct Partition {
     owned: usize,
-    /// Nodes of the whole body.
+    /// Nodes of the undivided body.
     total: usize,
+    /// Global index of each local node.
     global: Vec<i32>,
     comm: Communicator,
-    /// None where one rank owns everything.
+    /// `None` where one rank owns everything.
     ghosts: Option<Ghosts>,
 }
 
 impl Partition {
     /// One rank that owns everything.
-    pub fn whole(nodes: usize) -> Self {
+    pub fn serial(nodes: usize) -> Self {
         let global = (0..nodes as i32).collect();
         Self { owned: nodes, total: nodes, global, comm: Communicator::serial(), ghosts: None }
     }
 
-    /// One of several ranks, with the global numbers of its nodes, `owned` of them its own.
-    pub(super) fn part(
+    /// One of several ranks, which owns the first `owned` of its nodes.
+    pub(super) fn distributed(
         comm: Communicator,
         owned: usize,
         total: usize,
@@ -51,12 +52,12 @@ impl Partition {
         self.global.len()
     }
 
-    /// Number of nodes of the whole body.
+    /// Number of nodes of the undivided body.
     pub fn total(&self) -> usize {
         self.total
     }
 
-    /// The global number of component `component` of a nodal field with `block` components.
+    /// The global index of component `component` of a nodal field with `block` components.
     pub fn global(&self, node: usize, block: usize, component: usize) -> i32 {
         self.global[node] * block as i32 + component as i32
     }
@@ -67,6 +68,9 @@ impl Partition {
     }
 
     /// Fetches the ghosts of a field with `block` components from their owners. Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
     pub fn update(&self, field: &mut [f64], block: usize) -> Result<(), PetscError> {
         match &self.ghosts {
             Some(ghosts) => ghosts.update(field, block),
@@ -74,37 +78,40 @@ impl Partition {
         }
     }
 
-    /// A field from its owned values. Collective.
+    /// A field with its ghosts from its `owned` values. Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
     pub fn field(&self, mut owned: Vec<f64>, block: usize) -> Result<Vec<f64>, PetscError> {
         owned.resize(self.local() * block, 0.0);
         self.update(&mut owned, block)?;
         Ok(owned)
     }
 
-    /// ‖·‖₂ of a field over the whole body, from its local values with `block` components.
+    /// ‖·‖₂ of a field with `block` components over the undivided body. Collective.
     pub fn norm(&self, field: &[f64], block: usize) -> f64 {
         let squares = field[..self.owned * block].iter().map(|v| v * v).sum::<f64>();
         self.comm.total(squares).sqrt()
     }
 
-    /// Inner product of two fields over the whole body.
+    /// Inner product of two fields with `block` components over the undivided body. Collective.
     pub fn dot(&self, a: &[f64], b: &[f64], block: usize) -> f64 {
         let owned = self.owned * block;
         self.comm.total(a[..owned].iter().zip(&b[..owned]).map(|(a, b)| a * b).sum())
     }
 
-    /// The largest |·| of a field with two components, over the whole body.
+    /// max |u_i| over the nodes i of the undivided body, u_i the vector at node i. Collective.
     pub fn largest(&self, u: &[f64]) -> f64 {
         let (owned, _) = u[..2 * self.owned].as_chunks::<2>();
         let square = owned.iter().map(|[x, y]| x * x + y * y).fold(0.0, f64::max);
         self.comm.max(square).sqrt()
     }
 
-    /// (min, max) of a field over the whole body.
+    /// (min, max) of a field with one component over the undivided body. Collective.
     pub fn extremes(&self, field: &[f64]) -> (f64, f64) {
         let owned = field[..self.owned].iter();
-        let (low, high) = owned
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &z| (low.min(z), high.max(z)));
-        (self.comm.min(low), self.comm.max(high))
+        let (min, max) = owned
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(min, max), &z| (min.min(z), max.max(z)));
+        (self.comm.min(min), self.comm.max(max))
     }
 }

@@ -11,7 +11,8 @@ pub struct RigidPart {
 }
 
 impl RigidPart {
-    /// Of the nodal displacements u, m: a = ∫u/|Ω|, θ = ∫ (x − x̄) × u / ∫|x − x̄|². Collective.
+    /// The rigid part of the nodal displacements u, m: a = ∫u/|Ω|, θ = ∫ (x − x̄) × u / ∫|x − x̄|².
+    /// Collective.
     pub fn of(body: &Body, u: &[f64]) -> Self {
         let [cx, cy] = body.centroid;
         let mut sums = [0.0; 3];
@@ -32,7 +33,7 @@ impl RigidPart {
         [ax - self.rotation * (y - cy), ay + self.rotation * (x - cx)]
     }
 
-    /// The largest |·| of the motion and of what it leaves of u, m. Collective.
+    /// The largest nodal |·| of the motion and of u less the motion, m. Collective.
     pub fn sizes(&self, body: &Body, u: &[f64]) -> [f64; 2] {
         let (mut rigid, mut rest) = (0.0_f64, 0.0_f64);
         let nodes = body.mesh.nodes.iter().zip(u.as_chunks::<2>().0);

@@ -4,16 +4,17 @@ use super::{Body, Elasticity, NodalBases};
 use crate::petsc::{Matrix, PetscError, Session, Vector};
 use nalgebra::Matrix2;
 
-/// The stiffness matrix K(ζ) in the unknowns of a [`NodalBases`]; pattern once, values refilled.
+/// The stiffness matrix K_ij = Σ_T ζ̄_T ∫_T Aε(φ_i) : ε(φ_j) with the mean damage ζ̄_T of each
+/// triangle, in the unknowns of [`NodalBases`]. The pattern is made once, values are refilled.
 ///
-/// K consists of 2×2 blocks, one for each pair of nodes with a common triangle. Every pair {a, b}
-/// keeps what its triangles contribute without damage: a refill reads these once, in order.
+/// K consists of 2×2 blocks, one for each pair of nodes with a common triangle. For every pair the
+/// undamaged contributions of its triangles are kept: a refill reads these once, in order.
 pub struct Stiffness {
     /// K, symmetric; rows and columns of fixed unknowns hold only a diagonal.
     pub matrix: Matrix,
     /// Mean diagonal entry of the undamaged K, N/m: the scale of the matrix.
     pub scale: f64,
-    /// For each pair the end of its contributions, and whether a = b.
+    /// For each pair of nodes the end of its contributions, and whether it is one node twice.
     pairs: Vec<(u32, bool)>,
     /// A triangle and its undamaged block, row by row, N/m.
     contributions: Vec<(u32, [f64; 4])>,
@@ -22,6 +23,9 @@ pub struct Stiffness {
 
 impl Stiffness {
     /// Blocks and pattern; the values are those of the undamaged body.
+    ///
+    /// # Errors
+    /// PETSc failed.
     pub fn new(
         session: &Session,
         body: &Body,
@@ -29,16 +33,14 @@ impl Stiffness {
         bases: &NodalBases,
     ) -> Result<Self, PetscError> {
         let partition = &body.partition;
-        let (places, pairs) = pairs(body);
-        let contributions: Vec<_> = places
-            .iter()
-            .map(|&(t, i, j)| (t, block(body, t as usize, [i, j], elasticity, bases)))
-            .collect();
-        drop(places);
+        let (corners, pairs) = pairs(body);
+        let contributions: Vec<_> =
+            corners.iter().map(|&at| (at.0, block(body, at, elasticity, bases))).collect();
+        drop(corners);
 
         let fixed = bases.fixed();
         let (mut rows, mut columns) = (Vec::new(), Vec::new());
-        let mut place = |a: usize, b: usize| {
+        let mut push_block = |a: usize, b: usize| {
             for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
                 let row = partition.row(a, 2, i);
                 let skip = row < 0 || fixed[2 * a + i] || fixed[2 * b + j];
@@ -48,9 +50,9 @@ impl Stiffness {
         };
         let (mut first, mut trace) = (0, 0.0);
         for &([a, b], end) in &pairs {
-            place(a, b);
+            push_block(a, b);
             if a != b {
-                place(b, a);
+                push_block(b, a);
             } else if a < partition.owned() {
                 for (_, block) in &contributions[first..end as usize] {
                     trace += if fixed[2 * a] { 0.0 } else { block[0] };
@@ -84,12 +86,15 @@ impl Stiffness {
         read as f64 + 32.0 * self.values.len() as f64 + self.matrix.values_traffic()
     }
 
-    /// K alone, as last filled; what only refills need is given up.
+    /// K as last filled, without what only refills need.
     pub fn into_matrix(self) -> Matrix {
         self.matrix
     }
 
-    /// K(ζ) from the mean ζ̄ of each triangle: exact, the strains being constant there.
+    /// K(ζ) from the mean ζ̄ of each triangle, which is exact: strains are constant there.
+    ///
+    /// # Errors
+    /// PETSc failed.
     pub fn refill(&mut self, zeta: &[f64]) -> Result<(), PetscError> {
         let mut values = self.values.chunks_exact_mut(4);
         let mut first = 0;
@@ -132,12 +137,12 @@ fn rigid_motions(
 }
 
 /// A triangle and two of its corners.
-type Place = (u32, u8, u8);
+type Corners = (u32, u8, u8);
 
 /// All pairs of nodes {a ≥ b} with a common triangle, one of them owned, each with the end of its
-/// places in the first list.
-fn pairs(body: &Body) -> (Vec<Place>, Vec<([usize; 2], u32)>) {
-    let mut found: Vec<([u32; 2], Place)> = Vec::with_capacity(6 * body.triangles.len());
+/// triangles in the first list.
+fn pairs(body: &Body) -> (Vec<Corners>, Vec<([usize; 2], u32)>) {
+    let mut found: Vec<([u32; 2], Corners)> = Vec::with_capacity(6 * body.triangles.len());
     for (t, nodes) in body.mesh.triangles.iter().enumerate() {
         for (i, j) in [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)] {
             let (i, j) = if nodes[i] >= nodes[j] { (i, j) } else { (j, i) };
@@ -147,34 +152,26 @@ fn pairs(body: &Body) -> (Vec<Place>, Vec<([usize; 2], u32)>) {
         }
     }
     found.sort_unstable();
-    let mut pairs: Vec<([usize; 2], u32)> = Vec::new();
-    for (k, (pair, _)) in found.iter().enumerate() {
-        let (pair, end) = (pair.map(|node| node as usize), k as u32 + 1);
-        match pairs.last_mut() {
-            Some(last) if last.0 == pair => last.1 = end,
-            _ => pairs.push((pair, end)),
-        }
-    }
-    (found.into_iter().map(|(_, place)| place).collect(), pairs)
+    let mut end = 0;
+    let pairs = found.chunk_by(|(a, _), (b, _)| a == b).map(|same| {
+        end += same.len() as u32;
+        (same[0].0.map(|node| node as usize), end)
+    });
+    let pairs = pairs.collect();
+    (found.into_iter().map(|(_, corners)| corners).collect(), pairs)
 }
 
-/// The block of two corners of triangle `t` in the unknowns of `bases`, row by row.
-fn block(
-    body: &Body,
-    t: usize,
-    corners: [u8; 2],
-    elasticity: &Elasticity,
-    bases: &NodalBases,
-) -> [f64; 4] {
-    let [i, j] = corners.map(usize::from);
-    let mut k = body.triangles[t].stiffness(&elasticity.d, i, j);
-    let turn = |i: usize| bases.inverse(body.mesh.triangles[t][i]);
-    if let Some(inverse) = turn(i) {
+/// The undamaged block of two corners of a triangle in the unknowns of `bases`, row by row:
+/// D_i⁻ᵀ K_ij D_j⁻¹.
+fn block(body: &Body, (t, i, j): Corners, elasticity: &Elasticity, bases: &NodalBases) -> [f64; 4] {
+    let (t, i, j) = (t as usize, usize::from(i), usize::from(j));
+    let mut k: Matrix2<f64> = body.triangles[t].stiffness(&elasticity.d, i, j);
+    let inverse = |corner: usize| bases.inverse(body.mesh.triangles[t][corner]);
+    if let Some(inverse) = inverse(i) {
         k = inverse.transpose() * k;
     }
-    if let Some(inverse) = turn(j) {
+    if let Some(inverse) = inverse(j) {
         k *= inverse;
     }
-    let k: Matrix2<f64> = k;
     [k[(0, 0)], k[(0, 1)], k[(1, 0)], k[(1, 1)]]
 }

@@ -1,4 +1,4 @@
-//! A rank's share of a body that every rank has read.
+//! The part of a body that a rank keeps, after every rank has read the undivided body.
 
 use super::{Body, Partition};
 use crate::{
@@ -7,23 +7,26 @@ use crate::{
 };
 use std::collections::HashMap;
 
-/// The nodes and triangles of a whole body that a rank keeps: the nodes it owns, the triangles
-/// around them, and the other nodes of these as ghosts.
+/// The nodes and triangles that a rank keeps: the nodes it owns, the triangles around them, and
+/// the other nodes of these as ghosts.
+///
+/// *Local* indices count these nodes and triangles; all others are indices in the undivided mesh.
+/// (PETSc numbers the nodes a third way, see [`Partition`].)
 #[derive(Debug)]
 pub struct Subdomain {
-    /// Whole numbers of the rank's nodes, owned ones first.
+    /// Index in the undivided mesh of each local node, owned ones first.
     nodes: Vec<usize>,
     owned: usize,
-    /// Whole numbers of the rank's triangles, its own first.
+    /// The same of each local triangle; first those that belong to the rank.
     triangles: Vec<usize>,
     own_triangles: usize,
-    /// From whole numbers of nodes to the rank's.
+    /// Local index of each of `nodes`.
     local: HashMap<usize, usize>,
     partition: Partition,
 }
 
 impl Subdomain {
-    /// Divides the nodes of `mesh`; `None` where one rank keeps it all. Collective.
+    /// Divides the nodes of `mesh` among the ranks; `None` if there is only one. Collective.
     ///
     /// # Errors
     /// PETSc cannot divide it.
@@ -49,20 +52,21 @@ impl Subdomain {
         ghosts.dedup();
         nodes.extend(&ghosts);
 
-        // Numbers among the nodes of the same owner, and the first number of each owner.
+        // PETSc numbers the nodes owner by owner: the index of each node among those of its owner,
+        // and the first number of each owner.
         let mut counts = vec![0; comm.size()];
-        let mut place = vec![0; total];
-        for (place, &owner) in place.iter_mut().zip(&owner) {
-            *place = counts[owner];
+        let mut index = vec![0; total];
+        for (index, &owner) in index.iter_mut().zip(&owner) {
+            *index = counts[owner];
             counts[owner] += 1;
         }
         let first: Vec<usize> = (0..comm.size()).map(|r| counts[..r].iter().sum()).collect();
-        let global = nodes.iter().map(|&i| (first[owner[i]] + place[i]) as i32).collect();
-        let roots: Vec<_> = ghosts.iter().map(|&i| (owner[i], place[i])).collect();
+        let petsc = nodes.iter().map(|&i| (first[owner[i]] + index[i]) as i32).collect();
+        let roots: Vec<_> = ghosts.iter().map(|&i| (owner[i], index[i])).collect();
         let ghosts = Ghosts::new(session, owned, &roots)?;
         Ok(Some(Self {
-            local: nodes.iter().enumerate().map(|(local, &whole)| (whole, local)).collect(),
-            partition: Partition::part(comm, owned, total, global, ghosts),
+            local: nodes.iter().enumerate().map(|(local, &node)| (node, local)).collect(),
+            partition: Partition::distributed(comm, owned, total, petsc, ghosts),
             nodes,
             owned,
             triangles,
@@ -70,33 +74,33 @@ impl Subdomain {
         }))
     }
 
-    /// The rank's number of a node of the whole body, if it knows the node.
+    /// The local index of a node, if the rank keeps it.
     pub fn local(&self, node: usize) -> Option<usize> {
         self.local.get(&node).copied()
     }
 
-    /// The rank's number of a node of the whole body, if it owns the node.
+    /// The local index of a node, if the rank owns it.
     pub fn owned(&self, node: usize) -> Option<usize> {
         self.local(node).filter(|&local| local < self.owned)
     }
 
-    /// The rank's part of a nodal field with `block` components.
-    pub fn field<T: Copy>(&self, whole: &[T], block: usize) -> Vec<T> {
-        self.nodes.iter().flat_map(|&i| &whole[block * i..block * (i + 1)]).copied().collect()
+    /// The local part of a nodal field of the undivided body with `block` components.
+    pub fn field<T: Copy>(&self, undivided: &[T], block: usize) -> Vec<T> {
+        self.nodes.iter().flat_map(|&i| &undivided[block * i..block * (i + 1)]).copied().collect()
     }
 
-    /// The edges around the nodes that the rank owns, in its numbers.
-    pub fn edges(&self, whole: &[[usize; 2]]) -> Vec<[usize; 2]> {
+    /// The edges that have a node which the rank owns, with local indices.
+    pub fn edges(&self, undivided: &[[usize; 2]]) -> Vec<[usize; 2]> {
         let local = |&[a, b]: &[usize; 2]| match (self.local(a), self.local(b)) {
             (Some(a), Some(b)) if a.min(b) < self.owned => Some([a, b]),
             _ => None,
         };
-        whole.iter().filter_map(local).collect()
+        undivided.iter().filter_map(local).collect()
     }
 
-    /// The rank's part of `whole`.
-    pub fn body(self, whole: &Body) -> Body {
-        let mesh = &whole.mesh;
+    /// The local part of the undivided body.
+    pub fn body(self, undivided: &Body) -> Body {
+        let mesh = &undivided.mesh;
         let curve = |curve: &Curve| Curve { edges: self.edges(&curve.edges), ..*curve };
         let corner = |i: usize| self.local[&i];
         Body {
@@ -105,12 +109,12 @@ impl Subdomain {
                 triangles: self.triangles.iter().map(|&t| mesh.triangles[t].map(corner)).collect(),
                 curves: mesh.curves.iter().map(|(n, c)| (n.clone(), curve(c))).collect(),
             },
-            triangles: self.triangles.iter().map(|&t| whole.triangles[t]).collect(),
+            triangles: self.triangles.iter().map(|&t| undivided.triangles[t]).collect(),
             own_triangles: self.own_triangles,
-            node_area: self.field(&whole.node_area, 1),
-            area: whole.area,
-            centroid: whole.centroid,
-            polar_inertia: whole.polar_inertia,
+            node_area: self.field(&undivided.node_area, 1),
+            area: undivided.area,
+            centroid: undivided.centroid,
+            polar_inertia: undivided.polar_inertia,
             partition: self.partition,
         }
     }

@@ -1,5 +1,6 @@
 //! The P1 triangle.
 
+use crate::mesh::twice_area;
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, SVector, Vector3};
 
 /// Area and gradients of the three barycentric functions of one triangle.
@@ -15,7 +16,7 @@ impl Triangle {
     /// From the corners in counter-clockwise order.
     pub fn new(corners: [[f64; 2]; 3]) -> Self {
         let [a, b, c] = corners;
-        let twice = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
+        let twice = twice_area(a, b, c);
         // ∇λ_a is the opposite side turned by 90° over twice the area.
         let gradient = |p: [f64; 2], q: [f64; 2]| [(p[1] - q[1]) / twice, (q[0] - p[0]) / twice];
         Self { area: 0.5 * twice, gradients: [gradient(b, c), gradient(c, a), gradient(a, b)] }
@@ -27,7 +28,8 @@ impl Triangle {
         Matrix3x2::new(dx, 0.0, 0.0, dy, dy, dx)
     }
 
-    /// ∫ Dε(φ_i):ε(φ_j) of two corners, 2×2, N/m per metre of thickness.
+    /// The 2×2 block K_ij = ∫ Aε(φ_i) : ε(φ_j) = |T| B_iᵀ D B_j of two corners, N/m per metre of
+    /// thickness, from the matrix D of A.
     pub fn stiffness(&self, d: &Matrix3<f64>, i: usize, j: usize) -> Matrix2<f64> {
         self.strain_matrix(i).transpose() * d * self.strain_matrix(j) * self.area
     }
@@ -50,7 +52,7 @@ impl Triangle {
         Matrix2::from_fn(entry)
     }
 
-    /// Nodal forces ∫ σ:ε(φ_i) of a constant stress (σ_xx, σ_yy, σ_xy).
+    /// The nodal forces F_i = ∫ σ : ε(φ_i) = |T| B_iᵀ σ of a constant stress (σ_xx, σ_yy, σ_xy).
     #[inline(always)]
     pub fn force(&self, stress: &Vector3<f64>) -> SVector<f64, 6> {
         let mut force = SVector::zeros();
@@ -61,13 +63,13 @@ impl Triangle {
         force
     }
 
-    /// ∫ λ_i λ_j, the consistent mass.
+    /// The consistent mass M_ij = ∫ λ_i λ_j = |T|/12 (1 + δ_ij), m².
     pub fn mass(&self) -> Matrix3<f64> {
         let off = self.area / 12.0;
         Matrix3::from_fn(|i, j| if i == j { 2.0 * off } else { off })
     }
 
-    /// ∫ ∇λ_i·∇λ_j.
+    /// The Laplace matrix L_ij = ∫ ∇λ_i·∇λ_j.
     pub fn laplace(&self) -> Matrix3<f64> {
         let g = &self.gradients;
         Matrix3::from_fn(|i, j| self.area * (g[i][0] * g[j][0] + g[i][1] * g[j][1]))

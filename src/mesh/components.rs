@@ -1,11 +1,13 @@
-//! Pieces of a mesh that share no node, and parts of a piece that share single nodes only.
+//! The connected components of a mesh: pieces, which share no node, and the parts of a piece, which
+//! share single nodes only.
 
 use super::Mesh;
 
 /// The connected components of a triangulation.
 ///
-/// A *part* hangs together through edges: it moves without strain only as a rigid body. A *piece*
-/// hangs together through nodes: one part, or several that meet in hinges.
+/// The triangles of a *part* are connected through edges: it moves without strain only as a rigid
+/// body. The triangles of a *piece* are connected through nodes: it is one part, or several that
+/// meet in hinges.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Components {
     /// The part of each node; of a hinge one of its parts.
@@ -50,24 +52,14 @@ impl Mesh {
     /// A union–find forest of the triangles, joined across common edges.
     fn edge_connected(&self) -> Vec<usize> {
         let mut forest: Vec<usize> = (0..self.triangles.len()).collect();
-        // The edges met so far by their smaller node: the larger one, a triangle, the next edge.
-        let mut first = vec![NONE; self.nodes.len()];
-        let mut edges: Vec<(usize, usize, usize)> = Vec::with_capacity(2 * self.triangles.len());
-        for (t, &[a, b, c]) in self.triangles.iter().enumerate() {
-            for (p, q) in [(a, b), (b, c), (c, a)] {
-                let (low, high) = (p.min(q), p.max(q));
-                let mut at = first[low];
-                while at != NONE && edges[at].0 != high {
-                    at = edges[at].2;
-                }
-                match edges.get(at) {
-                    Some(&(_, other, _)) => join(&mut forest, t, other),
-                    None => {
-                        edges.push((high, t, first[low]));
-                        first[low] = edges.len() - 1;
-                    }
-                }
-            }
+        let mut edges: Vec<([usize; 2], usize)> = (self.triangles.iter().enumerate())
+            .flat_map(|(t, &[a, b, c])| {
+                [[a, b], [b, c], [c, a]].map(|[p, q]| ([p.min(q), p.max(q)], t))
+            })
+            .collect();
+        edges.sort_unstable();
+        for same in edges.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
+            join(&mut forest, same[0].1, same[1].1);
         }
         forest
     }
@@ -87,7 +79,8 @@ fn root(forest: &mut [usize], mut i: usize) -> usize {
     i
 }
 
-/// The number of each element's set, in the order of their first elements, and how many there are.
+/// The number of each element's set, counted in the order of their first elements, and how many
+/// sets there are.
 fn numbered(mut forest: Vec<usize>) -> (Vec<usize>, usize) {
     let mut count = 0;
     for i in 0..forest.len() {

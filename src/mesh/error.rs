@@ -1,6 +1,9 @@
 //! What can be wrong with a mesh, told to the person at the terminal.
 
-use std::{fmt, io, path::PathBuf};
+use std::{
+    fmt, io,
+    path::{Path, PathBuf},
+};
 
 /// Why there is no mesh.
 #[derive(Debug, thiserror::Error)]
@@ -24,42 +27,33 @@ pub enum MeshError {
         /// What is wrong.
         problem: Box<Problem>,
     },
-    /// Neither `.geo` nor `.msh`.
-    #[error("{}: a mesh is a .msh file or a .geo file for gmsh", path.display())]
-    Extension {
-        /// The file.
-        path: PathBuf,
-    },
-    /// A mesh parameter gmsh would misread or ignore.
-    #[error("{}: mesh parameter `{name}` = {value}: {reason}", path.display())]
+    /// A mesh parameter that gmsh would misread or ignore.
+    #[error("{}: mesh parameter {reason}", path.display())]
     Parameter {
         /// The `.geo` file.
         path: PathBuf,
-        /// Name of the parameter.
-        name: String,
-        /// Its value.
-        value: f64,
-        /// What is wrong with it.
-        reason: &'static str,
+        /// The parameter, and what is wrong with it.
+        reason: String,
     },
-    /// gmsh is not installed.
-    #[error(
-        "{}: gmsh is needed to mesh this file and was not found; install it with `make deps` \
-         (Debian: apt install gmsh), or give a .msh file",
-        path.display()
-    )]
-    GmshMissing {
-        /// The `.geo` file.
+    /// No mesh was made of the file: it is not for gmsh, or gmsh is missing or has failed.
+    #[error("{}: {reason}", path.display())]
+    Meshing {
+        /// The file.
         path: PathBuf,
+        /// What is wrong, and what to do.
+        reason: String,
     },
-    /// gmsh ran and did not produce a mesh.
-    #[error("{}: gmsh could not mesh it:\n{message}", path.display())]
-    GmshFailed {
-        /// The `.geo` file.
-        path: PathBuf,
-        /// gmsh's own error lines.
-        message: String,
-    },
+}
+
+impl MeshError {
+    /// The error of a file that could not be read or written.
+    pub(super) fn io(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        |source| Self::Io { path: path.to_owned(), source }
+    }
+
+    pub(super) fn meshing(path: &Path, reason: impl Into<String>) -> Self {
+        Self::Meshing { path: path.to_owned(), reason: reason.into() }
+    }
 }
 
 /// A place in a mesh file.
@@ -101,30 +95,21 @@ pub enum Problem {
     )]
     Version(String),
     #[error(
-        "written on a machine with the other byte order; convert it there with \
-         `gmsh OLD.msh -save -format msh41 -o NEW.msh` (text, without -bin)"
+        "its binary numbers are those of another machine (byte order or size); convert it there \
+         with `gmsh OLD.msh -save -format msh41 -o NEW.msh` (text, without -bin)"
     )]
-    ByteOrder,
-    #[error(
-        "written with {0}-byte numbers where 8 are expected; convert it there with \
-         `gmsh OLD.msh -save -format msh41 -o NEW.msh` (text, without -bin)"
-    )]
-    DataSize(String),
+    ForeignNumbers,
     #[error("the file ends inside ${section}: it was cut off; mesh or copy it again")]
     Truncated { section: String },
-    #[error("expected {what}, found `{found}`")]
-    Expected { what: &'static str, found: String },
     #[error(
-        "{count} {what} are announced, more than the rest of the file can hold: \
-         it was cut off or damaged; mesh or copy it again"
+        "expected {what}, but ${section} ends here: it lists less than it announces; mesh or copy \
+         it again"
     )]
-    Count { what: &'static str, count: u64 },
-    #[error("{announced} {what} are announced but {found} are listed")]
-    Total { what: &'static str, announced: usize, found: usize },
+    SectionEnds { what: String, section: String },
+    #[error("expected {what}, found `{found}`")]
+    Expected { what: String, found: String },
     #[error("there is no ${0} section")]
     MissingSection(&'static str),
-    #[error("$Entities must come before $Elements, or the physical groups are lost")]
-    LateEntities,
     #[error(
         "the mesh is partitioned; write it whole: mesh without -part, or without \
          Mesh.NbPartitions in the .geo"
@@ -142,14 +127,10 @@ pub enum Problem {
     #[error("node {node} has z = {z}: the body must lie in the plane z = 0")]
     NotPlanar { node: u64, z: f64 },
     #[error(
-        "the mesh holds {0}; only three-node triangles are supported: mesh with `gmsh -2`, \
-         without Recombine and with Mesh.ElementOrder = 1"
+        "element {element} is of gmsh's type {element_type} ({name}); only three-node triangles \
+         are supported: mesh with `gmsh -2`, without Recombine and with Mesh.ElementOrder = 1"
     )]
-    Unusable(String),
-    #[error(
-        "unknown element type {0}; only lines (1), triangles (2) and points (15) are supported"
-    )]
-    UnknownType(i64),
+    ElementType { element: u64, element_type: i32, name: &'static str },
     #[error(
         "there are no triangles; mesh with `gmsh -2`, and give the body a Physical Surface \
          if there are physical groups at all"
@@ -160,20 +141,11 @@ pub enum Problem {
     #[error("element {element} refers to node {node}, which $Nodes does not list")]
     MissingNode { element: u64, node: u64 },
     #[error(
-        "triangles {first} and {second} are the same: two surfaces lie on each other; \
-         keep one of them (gmsh: Coherence)"
+        "triangles {} and {} lie on the same side of their common edge, nodes {} and {}: two \
+         surfaces overlap, of which one should go (gmsh: Coherence), or the mesh folds over itself",
+        triangles[0], triangles[1], nodes[0], nodes[1]
     )]
-    DuplicateTriangle { first: u64, second: u64 },
-    #[error(
-        "the edge between nodes {} and {} belongs to three triangles ({}, {}, {}): \
-         surfaces overlap; keep one of them", nodes[0], nodes[1], triangles[0], triangles[1], triangles[2]
-    )]
-    CrowdedEdge { nodes: [u64; 2], triangles: [u64; 3] },
-    #[error(
-        "triangles {} and {} lie on the same side of their common edge, nodes {} and {}: \
-         the mesh folds over itself there", triangles[0], triangles[1], nodes[0], nodes[1]
-    )]
-    Fold { nodes: [u64; 2], triangles: [u64; 2] },
+    Overlap { triangles: [u64; 2], nodes: [u64; 2] },
     #[error(
         "line {line} of the physical curve `{curve}`, nodes {} and {}, is no edge of any triangle \
          of the body; does its surface belong to a Physical Surface?", nodes[0], nodes[1]

@@ -1,16 +1,15 @@
 //! Meshes `.geo` files with the gmsh command line.
 
+use super::{Mesh, MeshError, read};
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, HashSet},
     fs, io,
     path::{Path, PathBuf},
     process::Command,
     time::SystemTime,
 };
 
-use super::{Mesh, MeshError, read};
-
-/// How many different error lines of gmsh are shown; it can repeat itself by the hundred.
+/// How many different lines of gmsh are shown; it can repeat an error by the hundred.
 const SHOWN: usize = 5;
 
 /// Reads a mesh: a `.msh` as it is, a `.geo` through [`mesh_geo`].
@@ -24,7 +23,7 @@ pub fn load(path: &Path, parameters: &BTreeMap<String, f64>) -> Result<Mesh, Mes
     match extension.as_ref().and_then(|e| e.to_str()) {
         Some("msh") => read(path),
         Some("geo") => read(&mesh_geo(path, parameters)?),
-        _ => Err(MeshError::Extension { path: path.to_owned() }),
+        _ => Err(MeshError::meshing(path, "a mesh is a .msh file or a .geo file for gmsh")),
     }
 }
 
@@ -39,15 +38,16 @@ pub fn load(path: &Path, parameters: &BTreeMap<String, f64>) -> Result<Mesh, Mes
 /// The `.geo` cannot be read or the `.msh` written, a parameter makes no sense or occurs
 /// nowhere in the `.geo`, gmsh is missing, or gmsh reports an error.
 pub fn mesh_geo(geo: &Path, parameters: &BTreeMap<String, f64>) -> Result<PathBuf, MeshError> {
-    let io_error = |path: &Path| {
-        let path = path.to_owned();
-        move |source| MeshError::Io { path, source }
-    };
-    let text = fs::read(geo).map_err(io_error(geo))?;
-    check(geo, &String::from_utf8_lossy(&text), parameters)?;
+    let text = read_text(geo).map_err(MeshError::io(geo))?;
+    for (name, &value) in parameters {
+        if let Some(reason) = refusal(&text, name, value) {
+            let reason = format!("`{name}` = {value}: {reason}");
+            return Err(MeshError::Parameter { path: geo.to_owned(), reason });
+        }
+    }
     let mesh = mesh_path(geo, parameters);
     if let Ok(meshed) = modified(&mesh)
-        && meshed >= last_change(geo).map_err(io_error(geo))?
+        && meshed >= last_change(geo).map_err(MeshError::io(geo))?
     {
         return Ok(mesh);
     }
@@ -60,19 +60,49 @@ pub fn mesh_geo(geo: &Path, parameters: &BTreeMap<String, f64>) -> Result<PathBu
     let scratch = tempfile::Builder::new()
         .prefix(".meshing-")
         .tempdir_in(folder)
-        .map_err(io_error(folder))?;
+        .map_err(MeshError::io(folder))?;
     let fresh = scratch.path().join("fresh.msh");
     run(geo, parameters, &fresh, folder)?;
-    fs::rename(&fresh, &mesh).map_err(io_error(&mesh))?;
+    fs::rename(&fresh, &mesh).map_err(MeshError::io(&mesh))?;
     Ok(mesh)
+}
+
+fn read_text(path: &Path) -> io::Result<String> {
+    fs::read(path).map(|bytes| String::from_utf8_lossy(&bytes).into_owned())
+}
+
+/// Why gmsh would misread or silently ignore a parameter of the .geo file `text`, if it would.
+fn refusal(text: &str, name: &str, value: f64) -> Option<&'static str> {
+    let word = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    // An included file may define the parameter.
+    let includes = text.contains("Include") || text.contains("Merge");
+    let defined = || includes || text.split(|c| !word(c)).any(|w| w == name);
+    if !name.chars().all(word) || !name.starts_with(|c: char| !c.is_ascii_digit()) {
+        Some("the name must consist of letters, digits and underscores")
+    } else if !value.is_finite() {
+        Some("the value must be finite")
+    } else if name == "size" {
+        (value <= 0.0).then_some("the size must be positive")
+    } else {
+        (!defined()).then_some("the .geo file has no such parameter")
+    }
+}
+
+fn mesh_path(geo: &Path, parameters: &BTreeMap<String, f64>) -> PathBuf {
+    let mut name = geo.file_stem().unwrap_or_default().to_owned();
+    for (parameter, value) in parameters {
+        name.push(format!("-{parameter}{value}"));
+    }
+    name.push(".msh");
+    geo.with_file_name(name)
 }
 
 fn modified(path: &Path) -> io::Result<SystemTime> {
     fs::metadata(path).and_then(|data| data.modified())
 }
 
-/// When the `.geo`, or a file that it takes in, directly or through others, was last changed. Files
-/// that are not there are for gmsh to tell.
+/// When the `.geo`, or a file that it takes in by `Include "name"` or `Merge "name"`, directly or
+/// through others, was last changed. Files that are not there are for gmsh to tell.
 fn last_change(geo: &Path) -> io::Result<SystemTime> {
     let mut last = modified(geo)?;
     let mut files = vec![fs::canonicalize(geo)?];
@@ -80,8 +110,11 @@ fn last_change(geo: &Path) -> io::Result<SystemTime> {
     while let Some(file) = files.get(next).cloned() {
         next += 1;
         last = last.max(modified(&file)?);
-        let text = fs::read(&file)?;
-        for name in taken_in(&String::from_utf8_lossy(&text)) {
+        let text = read_text(&file)?;
+        let commands = ["Include", "Merge"].into_iter().flat_map(|word| text.split(word).skip(1));
+        for name in
+            commands.filter_map(|rest| rest.trim_start().strip_prefix('"')?.split('"').next())
+        {
             // Names are relative to the file they stand in.
             if let Ok(path) = fs::canonicalize(file.with_file_name(name))
                 && path.is_file()
@@ -92,53 +125,6 @@ fn last_change(geo: &Path) -> io::Result<SystemTime> {
         }
     }
     Ok(last)
-}
-
-/// The names in `Include "name"` and `Merge "name"`.
-fn taken_in(text: &str) -> Vec<&str> {
-    let after = |keyword| text.split(keyword).skip(1);
-    let names = after("Include").chain(after("Merge")).filter_map(|rest| {
-        let name = rest.trim_start().strip_prefix('"')?;
-        name.split_once('"').map(|(name, _)| name)
-    });
-    names.collect()
-}
-
-/// Refuses what gmsh would misread or silently ignore.
-fn check(geo: &Path, text: &str, parameters: &BTreeMap<String, f64>) -> Result<(), MeshError> {
-    let word = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    // An included file may define the parameter.
-    let includes = text.contains("Include") || text.contains("Merge");
-    for (name, &value) in parameters {
-        let reason = if !name.chars().all(word) || !name.starts_with(|c: char| !c.is_ascii_digit())
-        {
-            "the name must consist of letters, digits and underscores"
-        } else if !value.is_finite() {
-            "the value must be finite"
-        } else if name == "size" && value <= 0.0 {
-            "the size must be positive"
-        } else if name != "size" && !includes && !text.split(|c| !word(c)).any(|w| w == name) {
-            "the .geo file has no such parameter"
-        } else {
-            continue;
-        };
-        return Err(MeshError::Parameter {
-            path: geo.to_owned(),
-            name: name.clone(),
-            value,
-            reason,
-        });
-    }
-    Ok(())
-}
-
-fn mesh_path(geo: &Path, parameters: &BTreeMap<String, f64>) -> PathBuf {
-    let mut name = geo.file_stem().unwrap_or_default().to_owned();
-    for (parameter, value) in parameters {
-        name.push(format!("-{parameter}{value}"));
-    }
-    name.push(".msh");
-    geo.with_file_name(name)
 }
 
 /// Runs gmsh, which must leave `fresh` behind without a word of error.
@@ -161,26 +147,26 @@ fn run(
     let input = folder.join(geo.file_name().unwrap_or_default());
     let output = command.arg("-o").arg(fresh).arg(input).output();
     let output = output.map_err(|source| match source.kind() {
-        io::ErrorKind::NotFound => MeshError::GmshMissing { path: geo.to_owned() },
-        _ => MeshError::Io { path: PathBuf::from("gmsh"), source },
+        io::ErrorKind::NotFound => MeshError::meshing(
+            geo,
+            "gmsh is needed to mesh this file and was not found; install it with `make deps` \
+             (Debian: apt install gmsh), or give a .msh file",
+        ),
+        _ => MeshError::io(Path::new("gmsh"))(source),
     })?;
 
-    // gmsh can report errors and still exit with success.
     let said = [output.stdout, output.stderr].concat();
     let said = String::from_utf8_lossy(&said);
-    let mut errors: Vec<&str> = Vec::new();
-    for line in said.lines().filter(|line| line.trim_start().starts_with("Error")) {
-        if !errors.contains(&line) && errors.len() < SHOWN {
-            errors.push(line);
-        }
-    }
-    if output.status.success() && errors.is_empty() && fresh.exists() {
+    // gmsh can report errors and still exit with success.
+    let is_error = |line: &str| line.trim_start().starts_with("Error");
+    if output.status.success() && fresh.exists() && !said.lines().any(is_error) {
         return Ok(());
     }
-    let message = match (errors.is_empty(), said.trim()) {
-        (false, _) => errors.join("\n"),
-        (true, "") => format!("no message, {}", output.status),
-        (true, said) => said.chars().take(2000).collect(),
+    let mut seen = HashSet::new();
+    let lines: Vec<&str> = said.lines().filter(|line| seen.insert(*line)).take(SHOWN).collect();
+    let message = match lines.is_empty() {
+        true => format!("no message, {}", output.status),
+        false => lines.join("\n"),
     };
-    Err(MeshError::GmshFailed { path: geo.to_owned(), message })
+    Err(MeshError::meshing(geo, format!("gmsh could not mesh it:\n{message}")))
 }

@@ -39,19 +39,6 @@ pub struct Curve {
 }
 
 impl Mesh {
-    /// Area of one triangle, m².
-    #[must_use]
-    pub fn triangle_area(&self, triangle: [usize; 3]) -> f64 {
-        let [a, b, c] = triangle.map(|node| self.nodes[node]);
-        0.5 * twice_area(a, b, c)
-    }
-
-    /// Area of the body, m².
-    #[must_use]
-    pub fn area(&self) -> f64 {
-        self.triangles.iter().map(|&t| self.triangle_area(t)).sum()
-    }
-
     /// Outward unit normal and length (m) of a boundary edge that has the body on its left.
     #[must_use]
     pub fn edge_normal(&self, [from, to]: [usize; 2]) -> ([f64; 2], f64) {
@@ -59,12 +46,6 @@ impl Mesh {
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
         let length = dx.hypot(dy);
         ([dy / length, -dx / length], length)
-    }
-
-    /// Total length of a set of edges, m.
-    #[must_use]
-    pub fn length(&self, edges: &[[usize; 2]]) -> f64 {
-        edges.iter().map(|&edge| self.edge_normal(edge).1).sum()
     }
 }
 
@@ -78,7 +59,8 @@ pub fn extent(points: &[[f64; 2]]) -> f64 {
     side(0).max(side(1)).max(0.0)
 }
 
-/// Twice the signed area of the triangle abc, positive when counter-clockwise.
-fn twice_area(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
+/// Twice the signed area of the triangle abc, m², positive when counter-clockwise.
+#[must_use]
+pub fn twice_area(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
 }

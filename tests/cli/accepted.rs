@@ -220,7 +220,7 @@ fn solvers_and_petsc_options_agree() {
             active,
         ]);
     }
-    for answer in &answers {
+    for answer in &answers[1..] {
         for (a, b) in answer.iter().zip(&answers[0]) {
             assert!((a / b - 1.0).abs() < 1e-7, "{answers:?}");
         }

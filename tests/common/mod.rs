@@ -1,13 +1,16 @@
-//! What the tests of the mesh share.
+//! What several test programs share.
 #![allow(dead_code, reason = "each test program uses its part")]
 
+use rand_xoshiro::{
+    SplitMix64,
+    rand_core::{Rng, SeedableRng},
+};
+use signorini::mesh::{Mesh, MeshError, read, twice_area};
 use std::{
     collections::{BTreeMap, HashMap},
     fs,
     path::{Path, PathBuf},
 };
-
-use signorini::mesh::{Mesh, MeshError, read};
 
 pub fn fixture(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/msh");
@@ -35,8 +38,8 @@ pub fn edges(mesh: &Mesh) -> HashMap<[usize; 2], usize> {
 
 /// What every mesh must satisfy.
 pub fn check_laws(mesh: &Mesh, area: f64, perimeter: f64, holes: isize) {
-    assert!(mesh.triangles.iter().all(|&t| mesh.triangle_area(t) > 0.0));
-    close(mesh.area(), area);
+    assert!(triangle_areas(mesh).all(|area| area > 0.0));
+    close(triangle_areas(mesh).sum(), area);
 
     let mut used = vec![false; mesh.nodes.len()];
     mesh.triangles.iter().flatten().for_each(|&i| used[i] = true);
@@ -45,7 +48,7 @@ pub fn check_laws(mesh: &Mesh, area: f64, perimeter: f64, holes: isize) {
     let edges = edges(mesh);
     assert!(edges.values().all(|&count| count <= 2));
     let boundary: Vec<_> = edges.iter().filter(|(_, n)| **n == 1).map(|(e, _)| *e).collect();
-    close(mesh.length(&boundary), perimeter);
+    close(length(mesh, &boundary), perimeter);
     let [v, e, f] = [mesh.nodes.len(), edges.len(), mesh.triangles.len()].map(usize::cast_signed);
     assert_eq!(v - e + f, 1 - holes, "Euler characteristic");
 
@@ -59,7 +62,18 @@ pub fn check_laws(mesh: &Mesh, area: f64, perimeter: f64, holes: isize) {
 }
 
 pub fn curve_length(mesh: &Mesh, name: &str) -> f64 {
-    mesh.length(&mesh.curves[name].edges)
+    length(mesh, &mesh.curves[name].edges)
+}
+
+/// Total length of a set of edges.
+pub fn length(mesh: &Mesh, edges: &[[usize; 2]]) -> f64 {
+    edges.iter().map(|&edge| mesh.edge_normal(edge).1).sum()
+}
+
+/// The area of each triangle.
+pub fn triangle_areas(mesh: &Mesh) -> impl Iterator<Item = f64> {
+    let corners = mesh.triangles.iter().map(|t| t.map(|node| mesh.nodes[node]));
+    corners.map(|[a, b, c]| 0.5 * twice_area(a, b, c))
 }
 
 #[track_caller]
@@ -70,4 +84,31 @@ pub fn close(a: f64, b: f64) {
 /// Mesh parameters from pairs.
 pub fn parameters<const N: usize>(pairs: [(&str, f64); N]) -> BTreeMap<String, f64> {
     pairs.map(|(name, value)| (name.to_owned(), value)).into()
+}
+
+/// Numbers between −1 and 1, the same at every run.
+pub struct Random(SplitMix64);
+
+impl Random {
+    pub fn new(seed: u64) -> Self {
+        Self(SplitMix64::seed_from_u64(seed))
+    }
+
+    pub fn next(&mut self) -> f64 {
+        (self.0.next_u64() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+
+    /// An index below `count`.
+    pub fn below(&mut self, count: usize) -> usize {
+        (self.0.next_u64() % count as u64) as usize
+    }
+
+    pub fn field(&mut self, length: usize) -> Vec<f64> {
+        (0..length).map(|_| self.next()).collect()
+    }
+}
+
+/// The unit square, n×n cells cut along the rising diagonal, with its four sides.
+pub fn square(n: usize) -> Mesh {
+    Mesh::rectangle(1.0, 1.0, n, n)
 }

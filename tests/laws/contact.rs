@@ -93,7 +93,7 @@ fn more_load_presses_more() {
         let (steps, _) = history(&problem, solver);
         let last = &steps[4];
         assert!(largest(&steps[0].state.u) == 0.0, "no load at t = 0");
-        for step in &steps[1..] {
+        for step in &steps[1..4] {
             let t = step.state.time;
             let scaled: Vec<f64> = last.state.u.iter().map(|u| t * u).collect();
             let error = difference(&step.state.u, &scaled);

@@ -184,7 +184,7 @@ fn forces_turn_with_the_body() {
     assert!(error < 1e-13, "{error}");
 }
 
-/// Frames at a third of the nodes, orthonormal and oblique, and a fixed unknown at some.
+/// Bases at a third of the nodes, orthonormal and oblique, and a fixed unknown at some.
 fn bases(nodes: usize, random: &mut Random) -> NodalBases {
     let mut bases = NodalBases::identity(nodes);
     for node in (0..nodes).step_by(3) {
@@ -202,7 +202,7 @@ fn bases(nodes: usize, random: &mut Random) -> NodalBases {
 }
 
 #[test]
-fn frames_keep_work_and_give_back_what_they_take() {
+fn nodal_bases_keep_work_and_give_back_what_they_take() {
     let mut random = Random::new(7);
     let bases = bases(30, &mut random);
     let (u, r) = (random.field(60), random.field(60));
@@ -217,7 +217,7 @@ fn frames_keep_work_and_give_back_what_they_take() {
 }
 
 #[test]
-fn the_assembled_stiffness_is_the_matrix_free_force_in_the_frames() {
+fn the_assembled_stiffness_is_the_matrix_free_force_in_the_nodal_bases() {
     let body = Body::new(unstructured(0.2));
     let session = Session::start(&[]).unwrap();
     let (nodes, elasticity) = (body.mesh.nodes.len(), elasticity(Plane::Stress));

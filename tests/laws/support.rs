@@ -1,9 +1,10 @@
 //! Meshes, scenes and runs for the laws.
 
-use rand_xoshiro::{
-    SplitMix64,
-    rand_core::{Rng, SeedableRng},
-};
+#[path = "../common/mod.rs"]
+mod common;
+
+pub use common::{Random, square};
+
 use signorini::{
     evolution::{self, DiscreteProblem, Outcome, Phases, RunError, SetupError, Step},
     mesh::{self, Mesh},
@@ -17,30 +18,8 @@ use std::{collections::BTreeMap, fs, path::Path};
 #[path = "../../validation/study/src/slope.rs"]
 mod slope;
 
-/// Numbers between −1 and 1, the same at every run.
-pub struct Random(SplitMix64);
-
-impl Random {
-    pub fn new(seed: u64) -> Self {
-        Self(SplitMix64::seed_from_u64(seed))
-    }
-
-    pub fn next(&mut self) -> f64 {
-        (self.0.next_u64() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-
-    pub fn field(&mut self, length: usize) -> Vec<f64> {
-        (0..length).map(|_| self.next()).collect()
-    }
-}
-
-/// The unit square, n×n cells cut along the rising diagonal, with its four sides.
-pub fn square(n: usize) -> Mesh {
-    Mesh::rectangle(1.0, 1.0, n, n)
-}
-
-/// The same with its inner nodes moved at random, by up to 0.3 cells in x and y, and those
-/// on the sides along them.
+/// The [`square`] with its inner nodes moved at random, by up to 0.3 cells in x and y, and those on
+/// the sides along them.
 pub fn distorted(n: usize) -> Mesh {
     let (mut mesh, mut random) = (square(n), Random::new(n as u64));
     let reach = 0.3 / n as f64;
@@ -70,8 +49,8 @@ pub fn unstructured(size: f64) -> Mesh {
     meshed(&geo, &[("size".to_owned(), size)].into())
 }
 
-/// A mesh by gmsh (not while a session is held), which cannot be started while MPI, as it starts in another test, changes the
-/// environment.
+/// A mesh by gmsh. It cannot be started while MPI, as it starts in another test, changes the
+/// environment: so this waits for its turn at a session (and must not be called with one held).
 fn meshed(file: &Path, parameters: &BTreeMap<String, f64>) -> Mesh {
     drop(Session::start(&[]).unwrap());
     mesh::load(file, parameters).unwrap()

@@ -1,6 +1,6 @@
 //! The program on several ranks, from outside: the same answers, whole results, one voice.
 
-mod pieces;
+mod vtu_pieces;
 mod repeat;
 
 #[path = "../cli/test_directory.rs"]
@@ -89,7 +89,9 @@ fn every_solver(name: &str, few: &[&str]) -> TestDirectory {
             };
             assert_eq!(said.code, Some(0), "{out}: {said:?}");
             assert!(said.err.is_empty(), "{out}: {said:?}");
-            same_history(&test_directory, &out, &format!("out/{name}-{solver}-1"));
+            if ranks > 1 {
+                same_history(&test_directory, &out, &format!("out/{name}-{solver}-1"));
+            }
         }
     }
     test_directory
@@ -199,7 +201,9 @@ fn pieces_and_a_hinge() {
             assert_eq!(said.code, Some(0), "{out}: {said:?}");
             assert!(said.out.contains("the mesh has 3 pieces"), "{}", said.out);
             assert!(said.out.contains("a hinge, as at (3.0000, 1.0000)"), "{}", said.out);
-            same_history(&test_directory, &out, "active-set-1");
+            if out != "active-set-1" {
+                same_history(&test_directory, &out, "active-set-1");
+            }
         }
     }
     test_directory.write("scene.toml", &scene("[0, 't']"));

@@ -1,20 +1,19 @@
-//! Reads gmsh's `.msh` files, versions 4.1 and 2.2, text and binary.
+//! Reads gmsh's `.msh` files, versions 4.1 and 2.2, text and binary
+//! (<https://gmsh.info/doc/texinfo/gmsh.html#File-formats>).
 
-use std::{fs, path::Path};
-
-mod assemble;
-mod edges;
-mod raw;
-mod source;
+mod body;
+mod byte_reader;
+mod contents;
 mod v2;
 mod v4;
 
 use super::{
     Mesh,
-    error::{MeshError, Problem},
+    error::{MeshError, Place, Problem},
 };
-use raw::Raw;
-use source::{Fault, Result, Source};
+use byte_reader::{ByteReader, Fault, Numbers, Result, Section, expected, fault};
+use contents::Contents;
+use std::{fs, path::Path};
 
 /// Reads a `.msh` file.
 ///
@@ -25,129 +24,109 @@ use source::{Fault, Result, Source};
 /// # Errors
 /// The file cannot be read, or it is not the mesh of a plane body; the message says where.
 pub fn read(path: &Path) -> std::result::Result<Mesh, MeshError> {
-    let bytes = fs::read(path).map_err(|source| MeshError::Io { path: path.to_owned(), source })?;
-    let mut source = Source::new(&bytes);
-    let result = if bytes.trim_ascii().is_empty() {
-        fault(Problem::Empty)
-    } else {
-        parse(&mut source).and_then(assemble::assemble)
-    };
-    result.map_err(|Fault { at, problem }| MeshError::File {
+    let bytes = fs::read(path).map_err(MeshError::io(path))?;
+    let mut sections = Vec::new();
+    let mesh = Section::split(&bytes, &mut sections)
+        .and_then(|()| contents(&sections))
+        .and_then(|contents| body::mesh(&contents));
+    mesh.map_err(|Fault { at, problem }| MeshError::File {
         path: path.to_owned(),
-        place: at.map(|at| source.place(at)),
+        place: at.map(|at| place(at, &bytes, &sections)),
         problem: Box::new(problem),
     })
 }
 
-/// A fault of the file as a whole.
-fn fault<T>(problem: Problem) -> Result<T> {
-    Err(Fault { at: None, problem })
+/// The place of a byte for a message: a line of a text file, a byte of a binary one.
+fn place(byte: usize, bytes: &[u8], sections: &[Section]) -> Place {
+    // Every binary file holds the four bytes of the integer 1.
+    if bytes.contains(&0) {
+        let section = sections.iter().rfind(|section| section.at <= byte);
+        Place::Byte { section: section.map_or("", |section| section.name).to_owned(), byte }
+    } else {
+        Place::Line(1 + bytes[..byte].iter().filter(|&&b| b == b'\n').count())
+    }
 }
 
-#[derive(Clone, Copy, PartialEq)]
-enum Version {
-    V2,
-    V4,
-}
+/// Reads a section.
+type Parse = fn(&mut ByteReader, &mut Contents) -> Result<()>;
 
-fn parse(source: &mut Source) -> Result<Raw> {
-    let mut raw = Raw::default();
-    let mut groups = v4::Groups::new();
-    let mut version = None;
-    let (mut nodes, mut elements) = (false, false);
-    let mut at = 0;
-    while let Some(section) = source.open()? {
-        match (section.as_str(), version) {
-            ("MeshFormat", _) => version = Some(format(source)?),
-            // MSH 1 had no header.
-            ("NOD" | "ELM", None) => return source.fault(at, Problem::Version("1".into())),
-            ("PhysicalNames", Some(_)) => names(source, &mut raw)?,
-            ("PartitionedEntities", _) => return source.fault(at, Problem::Partitioned),
-            ("ParametricNodes", _) => return source.fault(at, Problem::ParametricNodes),
-            ("Entities", Some(Version::V4)) => {
-                if elements {
-                    return source.fault(at, Problem::LateEntities);
-                }
-                v4::entities(source, &mut groups)?;
-            }
-            ("Nodes", Some(version)) => {
-                nodes = true;
-                match version {
-                    Version::V2 => v2::nodes(source, &mut raw)?,
-                    Version::V4 => v4::nodes(source, &mut raw)?,
-                }
-            }
-            ("Elements", Some(version)) => {
-                elements = true;
-                match version {
-                    Version::V2 => v2::elements(source, &mut raw)?,
-                    Version::V4 => v4::elements(source, &mut raw, &groups)?,
-                }
-            }
-            ("Comments", None) | (_, Some(_)) => {
-                source.skip()?;
-                at = source.at();
-                continue;
-            }
-            _ => return source.fault(at, Problem::NotMsh),
+/// The sections of MSH 2.2 (also announced as 2.1 or 2) that are read, in this order.
+const V2: &[(&str, Parse)] =
+    &[("PhysicalNames", physical_names), ("Nodes", v2::nodes), ("Elements", v2::elements)];
+/// Those of MSH 4.1.
+const V4: &[(&str, Parse)] = &[
+    ("PhysicalNames", physical_names),
+    ("Entities", v4::entities),
+    ("Nodes", v4::nodes),
+    ("Elements", v4::elements),
+];
+
+/// What the sections list, in whatever order they stand.
+fn contents(sections: &[Section]) -> Result<Contents> {
+    let all = |name| sections.iter().filter(move |section| section.name == name);
+    let Some(header) = all("MeshFormat").next() else {
+        let problem = if sections.is_empty() { Problem::Empty } else { Problem::NotMsh };
+        return fault(None, problem);
+    };
+    let (version, numbers) = format(header)?;
+    for section in sections {
+        match section.name {
+            "PartitionedEntities" => return fault(section.at, Problem::Partitioned),
+            "ParametricNodes" => return fault(section.at, Problem::ParametricNodes),
+            _ => {}
         }
-        source.close()?;
-        at = source.at();
     }
-    match (version, nodes, elements) {
-        (None, ..) => fault(Problem::NotMsh),
-        (_, false, _) => fault(Problem::MissingSection("Nodes")),
-        (.., false) => fault(Problem::MissingSection("Elements")),
-        _ => Ok(raw),
+    let mut contents = Contents::default();
+    for (name, parse) in version {
+        for section in all(name) {
+            let mut reader = ByteReader::new(section, numbers);
+            parse(&mut reader, &mut contents)?;
+            reader.finish()?;
+        }
+    }
+    match ["Nodes", "Elements"].into_iter().find(|name| all(name).next().is_none()) {
+        Some(missing) => fault(None, Problem::MissingSection(missing)),
+        None => Ok(contents),
     }
 }
 
-/// `$MeshFormat`: version, text or binary, size of a number; then 1 in the file's byte order.
-fn format(source: &mut Source) -> Result<Version> {
-    let at = source.at();
-    let line = source.line()?;
+/// `$MeshFormat`: version, text or binary, size of a number; in a binary file then the integer 1,
+/// which shows its byte order.
+fn format(section: &Section) -> Result<(&'static [(&'static str, Parse)], Numbers)> {
+    let what = "version, file type and data size";
+    let mut reader = ByteReader::new(section, Numbers::Text);
+    let at = reader.position();
+    let line = reader.line(what)?;
     let words: Vec<&str> = line.split_ascii_whitespace().collect();
-    let [version, kind, size] = words[..] else {
-        return source.expected(at, "version, file type and data size", &line);
+    let [version, file_type, size] = words[..] else { return expected(at, what, &line) };
+    let (version, binary) = match version {
+        "4.1" => (V4, Numbers::Binary4),
+        "2.2" | "2.1" | "2" => (V2, Numbers::Binary2),
+        other if other.parse::<f64>().is_ok() => return fault(at, Problem::Version(other.into())),
+        other => return expected(at, "a version such as 4.1", other),
     };
-    let version = match version {
-        "4.1" => Version::V4,
-        "2.2" | "2.1" | "2" => Version::V2,
-        other if other.parse::<f64>().is_ok() => {
-            return source.fault(at, Problem::Version(other.into()));
-        }
-        other => return source.expected(at, "a version such as 4.1", other),
-    };
-    match kind {
-        "0" => source.binary = false,
-        "1" => {
-            source.binary = true;
-            if size != "8" {
-                return source.fault(at, Problem::DataSize(size.into()));
-            }
-            let at = source.at();
-            match source.int("the number 1")? {
-                1 => {}
-                one if one.swap_bytes() == 1 => return source.fault(at, Problem::ByteOrder),
-                other => return source.expected(at, "the number 1", &other.to_string()),
-            }
-        }
-        other => return source.expected(at, "file type 0 (text) or 1 (binary)", other),
+    match file_type {
+        "0" => return Ok((version, Numbers::Text)),
+        "1" => reader.numbers = binary,
+        other => return expected(at, "file type 0 (text) or 1 (binary)", other),
     }
-    Ok(version)
+    let at = reader.position();
+    match reader.int("the number 1")? {
+        1 if size == "8" => Ok((version, binary)),
+        one if one == 1 || one.swap_bytes() == 1 => fault(at, Problem::ForeignNumbers),
+        other => expected(at, "the number 1", &other.to_string()),
+    }
 }
 
 /// `$PhysicalNames`, text in any file: dimension, tag, quoted name.
-fn names(source: &mut Source, raw: &mut Raw) -> Result<()> {
-    for _ in 0..source.count_line("physical names", 1)? {
-        let at = source.at();
-        let line = source.line()?;
+fn physical_names(reader: &mut ByteReader, contents: &mut Contents) -> Result<()> {
+    for _ in 0..reader.count_line()? {
+        let at = reader.position();
+        let line = reader.line("dimension, tag and \"name\"")?;
         match physical_name(&line) {
-            Some((1, tag, name)) => {
-                raw.curve_names.insert(tag, name.to_owned());
-            }
+            Some((1, tag, name)) => drop(contents.curve_names.insert(tag, name.to_owned())),
             Some((0..=3, ..)) => {}
-            _ => return source.expected(at, "dimension, tag and \"name\"", &line),
+            _ => return expected(at, "dimension, tag and \"name\"", &line),
         }
     }
     Ok(())

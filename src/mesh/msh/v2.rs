@@ -1,102 +1,54 @@
 //! `$Nodes` and `$Elements` of MSH 2.2. A binary file keeps the counts in text.
 
 use super::{
-    super::error::Problem,
-    raw::{Element, Kind, Raw, kind},
-    source::{Result, Source},
+    byte_reader::{ByteReader, Result, expected},
+    contents::Contents,
 };
 
-pub(super) fn nodes(source: &mut Source, raw: &mut Raw) -> Result<()> {
-    let count = source.count_line("nodes", 4)?;
-    raw.nodes.reserve(count);
-    for _ in 0..count {
-        let at = source.at();
-        let tag = positive(source, "a node tag")?;
-        raw.push_node(source, tag, at)?;
+pub fn nodes(reader: &mut ByteReader, contents: &mut Contents) -> Result<()> {
+    for _ in 0..reader.count_line()? {
+        let at = reader.position();
+        let tag = reader.size("a node tag")?;
+        contents.read_node(reader, tag, at)?;
     }
     Ok(())
 }
 
-pub(super) fn elements(source: &mut Source, raw: &mut Raw) -> Result<()> {
-    let count = source.count_line("elements", 2)?;
-    let mut left = count;
+/// A text file lists for each element tag, type, number of labels, labels and nodes. A binary one
+/// lists runs of like elements: type, number of elements, number of labels, then for each element
+/// tag, labels and nodes.
+pub fn elements(reader: &mut ByteReader, contents: &mut Contents) -> Result<()> {
+    let mut left = reader.count_line()?;
     while left > 0 {
-        // A text file gives type and number of tags with every element; a binary one heads
-        // a run of like elements with type, how many follow, number of tags.
-        let at = source.at();
-        let (tag, number, run) = if source.binary {
-            let number = source.int("an element type")?;
-            let run = positive(source, "a count")?;
-            match usize::try_from(run) {
-                Ok(run @ 1..) if run <= left => (None, number, run),
-                _ => {
-                    return source.fault(at, Problem::Count { what: "elements", count: run });
-                }
-            }
-        } else {
-            let tag = positive(source, "an element tag")?;
-            (Some(tag), source.int("an element type")?, 1)
-        };
-        let (kind, size) = kind(source, at, number)?;
-        let labels = positive(source, "a number of tags")?;
-        let labels = source.bounded(at, "element tags", labels, 1)?;
+        let at = reader.position();
+        let text_tag = if reader.is_binary() { None } else { Some(reader.size("an element tag")?) };
+        let element_type = reader.int("an element type")?;
+        let run = if reader.is_binary() { reader.size("a count")? } else { 1 };
+        let labels = reader.size("a number of tags")?;
         for _ in 0..run {
-            let at = source.at();
-            let tag = match tag {
+            let at = reader.position();
+            let tag = match text_tag {
                 Some(tag) => tag,
-                None => positive(source, "an element tag")?,
+                None => reader.size("an element tag")?,
             };
-            let (group, entity) = group_and_entity(source, labels)?;
-            match kind {
-                Kind::Line => {
-                    let nodes = tag_list(source)?;
-                    raw.lines.push(Element { tag, group, entity, nodes, at });
-                }
-                Kind::Triangle => {
-                    let nodes = tag_list(source)?;
-                    raw.triangles.push(Element { tag, group, entity, nodes, at });
-                }
-                Kind::Point | Kind::Other => {
-                    for _ in 0..size {
-                        source.int("a node tag")?;
-                    }
-                    if matches!(kind, Kind::Other) {
-                        raw.unusable.entry(number).or_insert((0, at)).0 += 1;
-                    }
+            // The physical group (0 for none) and the entity; partitions may follow.
+            let (mut group, mut entity) = (0, 0);
+            for i in 0..labels {
+                let label = reader.int("an element's tag")?;
+                match i {
+                    // A negative group only says that the curve runs backwards.
+                    0 => group = label.saturating_abs(),
+                    1 => entity = label,
+                    _ => {}
                 }
             }
+            let groups = if group == 0 { &[][..] } else { &[group] };
+            contents.read_element(reader, element_type, (tag, entity, at), groups)?;
         }
-        left -= run;
+        let Some(rest) = left.checked_sub(run) else {
+            return expected(at, "no more elements than announced", &run.to_string());
+        };
+        left = rest;
     }
     Ok(())
-}
-
-/// The first two of an element's tags; partitions follow, and nobody asks for them.
-fn group_and_entity(source: &mut Source, labels: usize) -> Result<(i32, i32)> {
-    let mut first = [0, 0];
-    for i in 0..labels {
-        let label = source.int("an element's tag")?;
-        if let Some(slot) = first.get_mut(i) {
-            *slot = label;
-        }
-    }
-    // A negative group only says that the curve runs backwards.
-    Ok((first[0].saturating_abs(), first[1]))
-}
-
-fn tag_list<const N: usize>(source: &mut Source) -> Result<[u64; N]> {
-    let mut tags = [0; N];
-    for tag in &mut tags {
-        *tag = positive(source, "a node tag")?;
-    }
-    Ok(tags)
-}
-
-fn positive(source: &mut Source, what: &'static str) -> Result<u64> {
-    let at = source.at();
-    let tag = source.int(what)?;
-    match u64::try_from(tag) {
-        Ok(tag) => Ok(tag),
-        Err(_) => source.expected(at, what, &tag.to_string()),
-    }
 }

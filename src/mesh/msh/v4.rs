@@ -1,148 +1,90 @@
-//! `$Entities`, `$Nodes` and `$Elements` of MSH 4.1: everything in blocks, one per entity.
-
-use std::collections::HashMap;
+//! `$Entities`, `$Nodes` and `$Elements` of MSH 4.1: everything in blocks, one for each entity.
 
 use super::{
-    super::error::Problem,
-    raw::{Element, Kind, Raw, kind},
-    source::{Result, Source},
+    byte_reader::{ByteReader, Result, expected},
+    contents::Contents,
 };
 
-/// Physical groups of the entities, by dimension and tag.
-pub(super) type Groups = HashMap<(usize, i32), Vec<i32>>;
-
-pub(super) fn entities(source: &mut Source, groups: &mut Groups) -> Result<()> {
-    // A point has three coordinates, the others six of their bounding box.
-    let counts = [
-        source.count("points", 5)?,
-        source.count("curves", 9)?,
-        source.count("surfaces", 9)?,
-        source.count("volumes", 9)?,
-    ];
-    for (dimension, count) in counts.into_iter().enumerate() {
+pub fn entities(reader: &mut ByteReader, contents: &mut Contents) -> Result<()> {
+    let mut counts = [0; 4];
+    for count in &mut counts {
+        *count = reader.size("a count")?;
+    }
+    for (dimension, count) in (0..).zip(counts) {
         for _ in 0..count {
-            let tag = source.int("an entity tag")?;
+            let tag = reader.int("an entity tag")?;
+            // A point has three coordinates, the others six of their bounding box.
             for _ in 0..if dimension == 0 { 3 } else { 6 } {
-                source.real()?;
+                reader.real()?;
             }
-            let mut list = Vec::new();
-            for _ in 0..source.count("physical groups", 1)? {
+            let groups = contents.groups.entry((dimension, tag)).or_default();
+            for _ in 0..reader.size("a count")? {
                 // A negative group only says that the curve runs backwards.
-                list.push(source.int("a physical tag")?.saturating_abs());
+                groups.push(reader.int("a physical tag")?.saturating_abs());
             }
-            list.sort_unstable();
-            list.dedup();
-            groups.insert((dimension, tag), list);
-            if dimension > 0 {
-                for _ in 0..source.count("bounding entities", 1)? {
-                    source.int("an entity tag")?;
-                }
+            let boundary = if dimension == 0 { 0 } else { reader.size("a count")? };
+            for _ in 0..boundary {
+                reader.int("an entity tag")?;
             }
         }
     }
     Ok(())
 }
 
-pub(super) fn nodes(source: &mut Source, raw: &mut Raw) -> Result<()> {
-    let start = source.at();
-    let blocks = source.count("blocks of nodes", 4)?;
-    let announced = source.count("nodes", 4)?;
-    raw.nodes.reserve(announced);
-    let before = raw.nodes.len();
-    span(source)?;
+pub fn nodes(reader: &mut ByteReader, contents: &mut Contents) -> Result<()> {
+    let before = contents.nodes.len();
+    let start = reader.position();
+    let (blocks, announced) = header(reader)?;
     for _ in 0..blocks {
-        let dimension = source.int("a dimension")?;
-        source.int("an entity tag")?;
-        let parametric = source.int("0 or 1 (parametric nodes)")?;
-        let count = source.count("nodes", 4)?;
-        let mut tags = Vec::with_capacity(count);
-        for _ in 0..count {
-            tags.push((source.at(), source.size("a node tag")?));
+        let dimension = reader.int("a dimension")?;
+        reader.int("an entity tag")?;
+        let parametric = reader.int("0 or 1 (parametric nodes)")? != 0;
+        let mut tags = Vec::new();
+        for _ in 0..reader.size("a count")? {
+            tags.push((reader.position(), reader.size("a node tag")?));
         }
         for (at, tag) in tags {
-            raw.push_node(source, tag, at)?;
+            contents.read_node(reader, tag, at)?;
             // A parametric node adds as many parameters as its entity has dimensions.
-            if parametric != 0 {
-                for _ in 0..dimension.clamp(0, 3) {
-                    source.real()?;
-                }
+            for _ in 0..if parametric { dimension.clamp(0, 3) } else { 0 } {
+                reader.real()?;
             }
         }
     }
-    total(source, start, "nodes", announced, raw.nodes.len() - before)
+    check_total(start, "nodes", announced, (contents.nodes.len() - before) as u64)
 }
 
-pub(super) fn elements(source: &mut Source, raw: &mut Raw, groups: &Groups) -> Result<()> {
-    let start = source.at();
-    let blocks = source.count("blocks of elements", 4)?;
-    let announced = source.count("elements", 2)?;
+pub fn elements(reader: &mut ByteReader, contents: &mut Contents) -> Result<()> {
+    let start = reader.position();
+    let (blocks, announced) = header(reader)?;
     let mut found = 0;
-    span(source)?;
     for _ in 0..blocks {
-        let at = source.at();
-        let dimension = source.int("a dimension")?;
-        let entity = source.int("an entity tag")?;
-        let number = source.int("an element type")?;
-        let (kind, size) = kind(source, at, number)?;
-        let count = source.count("elements", 1 + size as u64)?;
-        let groups = usize::try_from(dimension)
-            .ok()
-            .and_then(|dimension| groups.get(&(dimension, entity)))
-            .map_or(&[][..], Vec::as_slice);
+        let dimension = reader.int("a dimension")?;
+        let entity = reader.int("an entity tag")?;
+        let element_type = reader.int("an element type")?;
+        let count = reader.size("a count")?;
+        let groups = contents.groups.get(&(dimension, entity)).cloned().unwrap_or_default();
         for _ in 0..count {
-            let at = source.at();
-            let tag = source.size("an element tag")?;
-            match kind {
-                Kind::Line => {
-                    let nodes = tag_list(source)?;
-                    let lines =
-                        groups.iter().map(|&group| Element { tag, group, entity, nodes, at });
-                    raw.lines.extend(lines);
-                }
-                Kind::Triangle => {
-                    let group = groups.first().copied().unwrap_or(0);
-                    let nodes = tag_list(source)?;
-                    raw.triangles.push(Element { tag, group, entity, nodes, at });
-                }
-                Kind::Point | Kind::Other => {
-                    for _ in 0..size {
-                        source.size("a node tag")?;
-                    }
-                    if matches!(kind, Kind::Other) {
-                        raw.unusable.entry(number).or_insert((0, at)).0 += 1;
-                    }
-                }
-            }
+            let at = reader.position();
+            let tag = reader.size("an element tag")?;
+            contents.read_element(reader, element_type, (tag, entity, at), &groups)?;
         }
         found += count;
     }
-    total(source, start, "elements", announced, found)
+    check_total(start, "elements", announced, found)
 }
 
-/// The smallest and largest tag, of no use here.
-fn span(source: &mut Source) -> Result<()> {
-    source.size("the smallest tag")?;
-    source.size("the largest tag")?;
-    Ok(())
+/// The numbers of blocks and of items in all of them; the range of their tags is of no use here.
+fn header(reader: &mut ByteReader) -> Result<(u64, u64)> {
+    let counts = (reader.size("a count")?, reader.size("a count")?);
+    reader.size("the smallest tag")?;
+    reader.size("the largest tag")?;
+    Ok(counts)
 }
 
-fn tag_list<const N: usize>(source: &mut Source) -> Result<[u64; N]> {
-    let mut tags = [0; N];
-    for tag in &mut tags {
-        *tag = source.size("a node tag")?;
+fn check_total(at: usize, what: &str, announced: u64, found: u64) -> Result<()> {
+    match announced == found {
+        true => Ok(()),
+        false => expected(at, &format!("{announced} {what} as announced"), &found.to_string()),
     }
-    Ok(tags)
-}
-
-fn total(
-    source: &Source,
-    at: usize,
-    what: &'static str,
-    announced: usize,
-    found: usize,
-) -> Result<()> {
-    if announced == found {
-        return Ok(());
-    }
-    source.fault(at, Problem::Total { what, announced, found })
 }

@@ -1,0 +1,112 @@
+//! The nodes and elements that a `.msh` file lists, before they are known to be a mesh of a plane
+//! body.
+
+use super::{
+    super::error::Problem,
+    byte_reader::{ByteReader, Result, fault},
+};
+use std::collections::{BTreeMap, HashMap};
+
+/// A node as listed.
+pub struct Node {
+    pub tag: u64,
+    pub point: [f64; 3],
+    /// The byte where it is listed, for messages.
+    pub at: usize,
+}
+
+/// An element with N nodes in one physical group.
+pub struct Element<const N: usize> {
+    pub tag: u64,
+    /// Tag of the physical group, 0 for none.
+    pub group: i32,
+    /// Tag of the geometrical entity that it was meshed on, 0 when unknown.
+    pub entity: i32,
+    /// Tags of its nodes.
+    pub nodes: [u64; N],
+    /// The byte where it is listed, for messages.
+    pub at: usize,
+}
+
+/// What a file lists, in its order.
+#[derive(Default)]
+pub struct Contents {
+    /// Names of the physical curves by tag.
+    pub curve_names: BTreeMap<i32, String>,
+    /// Physical groups of the entities, by dimension and tag (MSH 4.1).
+    pub groups: HashMap<(i32, i32), Vec<i32>>,
+    pub nodes: Vec<Node>,
+    /// The lines in physical groups, once for each group.
+    pub lines: Vec<Element<2>>,
+    /// The triangles, in MSH 2.2 once for each of their groups.
+    pub triangles: Vec<Element<3>>,
+}
+
+impl Contents {
+    /// Reads the coordinates of the node `tag`.
+    pub fn read_node(&mut self, reader: &mut ByteReader, tag: u64, at: usize) -> Result<()> {
+        let point = [reader.real()?, reader.real()?, reader.real()?];
+        if point.iter().any(|x| !x.is_finite()) {
+            return fault(at, Problem::NotFinite(tag));
+        }
+        self.nodes.push(Node { tag, point, at });
+        Ok(())
+    }
+
+    /// Reads the nodes of an element of one of gmsh's types, which belongs to the physical
+    /// `groups`.
+    pub fn read_element(
+        &mut self,
+        reader: &mut ByteReader,
+        element_type: i32,
+        (tag, entity, at): (u64, i32, usize),
+        groups: &[i32],
+    ) -> Result<()> {
+        match element_type {
+            LINE => {
+                let nodes = node_tags(reader)?;
+                let of = |&group: &i32| Element { tag, group, entity, nodes, at };
+                self.lines.extend(groups.iter().map(of));
+            }
+            TRIANGLE => {
+                let (group, nodes) = (groups.first().copied().unwrap_or(0), node_tags(reader)?);
+                self.triangles.push(Element { tag, group, entity, nodes, at });
+            }
+            POINT => drop(node_tags::<1>(reader)?),
+            _ => {
+                let name = name(element_type);
+                return fault(at, Problem::ElementType { element: tag, element_type, name });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn node_tags<const N: usize>(reader: &mut ByteReader) -> Result<[u64; N]> {
+    let mut tags = [0; N];
+    for tag in &mut tags {
+        *tag = reader.size("a node tag")?;
+    }
+    Ok(tags)
+}
+
+/// gmsh's numbers of the element types that are read.
+const LINE: i32 = 1;
+const TRIANGLE: i32 = 2;
+const POINT: i32 = 15;
+
+/// What the other element types are called.
+fn name(element_type: i32) -> &'static str {
+    match element_type {
+        3 => "quadrangle",
+        4 => "tetrahedron",
+        5 => "hexahedron",
+        6 => "prism",
+        7 => "pyramid",
+        8 | 26..=28 => "line of higher order",
+        9 | 20..=25 => "triangle of higher order",
+        10 | 16 | 36 | 37 => "quadrangle of higher order",
+        11..=14 | 17..=19 | 29 => "solid of higher order",
+        _ => "unknown",
+    }
+}

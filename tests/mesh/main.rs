@@ -1,0 +1,10 @@
+//! Meshes: what every file must give, what is wrong with a malformed one, what gmsh makes of the
+//! geometries, and the boundary of a mesh.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod boundary;
+mod geometries;
+mod malformed;
+mod reader;
