@@ -27,15 +27,10 @@ impl Extrapolation {
         Self { history, degree: 0, comm }
     }
 
-    /// The last accepted solution.
-    pub(super) fn last(&self) -> &[f64] {
-        &self.history[0].1
-    }
-
     /// The likely solution at `time`.
     pub(super) fn at(&self, time: f64) -> Vec<f64> {
         let shares = self.shares(self.degree, time);
-        let mut values = vec![0.0; self.last().len()];
+        let mut values = vec![0.0; self.history[0].1.len()];
         for ((_, solution), share) in self.history.iter().zip(shares).take(self.degree + 1) {
             values.iter_mut().zip(solution).for_each(|(value, old)| *value += share * old);
         }

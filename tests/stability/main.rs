@@ -26,7 +26,7 @@ fn solve(
     let phases = Phases::default();
     let mut contact_step = ContactStep::new(session, &problem, solver, &phases).unwrap();
     let step = contact_step.solve(0, problem.start(), &problem.initial_damage())?;
-    Ok((step.state, *contact_step.report()))
+    Ok((step.state, step.report))
 }
 
 /// max |a − b| / max |b|.

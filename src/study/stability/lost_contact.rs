@@ -107,7 +107,8 @@ fn rows(
             Ok((step, report)) => {
                 let others = answers.iter().enumerate().filter(|(j, _)| *j != i);
                 let mut unique = others.filter_map(|(_, answer)| answer.as_ref().ok());
-                let other = unique.find(|(s, _)| s.unheld.is_none()).map(|(s, _)| &s.state.u);
+                let other =
+                    unique.find(|(s, _)| s.unconstrained.is_none()).map(|(s, _)| &s.state.u);
                 row.judge(&problem, sweep, step, report, open.as_ref().or(other));
             }
         }
@@ -140,7 +141,7 @@ impl Row {
         &mut self,
         problem: &DiscreteProblem,
         sweep: &Sweep,
-        Step { state, record, unheld }: &Step,
+        Step { state, record, unconstrained, .. }: &Step,
         report: &ContactReport,
         other: Option<&Vec<f64>>,
     ) {
@@ -151,7 +152,7 @@ impl Row {
         self.unbalanced = (sweep.side != CLAMPED).then(|| unbalanced(problem, state));
         let balanced = self.unbalanced.is_none_or(|error| error <= BALANCE);
         let many = sweep.many.is_some_and(|[from, to]| (from..=to).contains(&self.value));
-        if unheld.is_none() {
+        if unconstrained.is_none() {
             self.outcome = "certified";
             self.difference = other.map(|other| difference(&state.u, other));
         } else {
@@ -162,7 +163,7 @@ impl Row {
         let margin = sweep.many.map_or(f64::INFINITY, |[_, to]| (self.value - to).abs());
         let allowed = AGREEMENT.max(TOLERANCE / (margin * CELLS as f64));
         let agrees = self.difference.is_none_or(|difference| difference <= allowed);
-        self.verdict = match (balanced && agrees, unheld.is_some(), many) {
+        self.verdict = match (balanced && agrees, unconstrained.is_some(), many) {
             (false, _, _) | (true, false, true) => Verdict::Wrong,
             (true, true, false) => Verdict::Refused,
             (true, true, true) | (true, false, false) => Verdict::Correct,

@@ -88,7 +88,8 @@ fn fail(
     let problem = DiscreteProblem::new(scene, rectangle(1.0, 1.0, n, n))?;
     let outcome =
         evolution::run(session, &problem, SOLVERS[0], &Phases::default(), &mut |_| Ok(()))?;
-    let missed = Stop { time: f64::NAN, zeta_min: f64::NAN, floor: f64::NAN, uncertainty: 0.0 };
+    let missed =
+        Stop { time: f64::NAN, zeta_min: f64::NAN, least_admissible: f64::NAN, uncertainty: 0.0 };
     let stop = outcome.stopped.unwrap_or(missed);
     Ok(Row {
         n,
