@@ -3,44 +3,14 @@
 use super::step_controller::PlannedStep;
 use crate::fem::Mass;
 
-/// The maximum principle of a step (28) that is not discretised in space: φ ≤ 0, so max ζ never
+/// By how much ζ violated the bounds of its equation in a run.
+///
+/// A step (28) that is not discretised in space obeys the maximum principle: φ ≤ 0, so max ζ never
 /// rises, and min ζ falls by no more than k min φ,
 ///
 /// min ζ_{n−1} + k min φ_{n−1} ≤ ζ_n ≤ max ζ_{n−1}.
 ///
 /// Both bounds are carried on from the first step, so that small violations in many steps add up.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Bounds {
-    pub(super) lower: f64,
-    upper: f64,
-}
-
-/// A violation counts above this, which is far above the error of the linear solver.
-const ROUNDING: f64 = 1e-10;
-
-impl Bounds {
-    /// From min ζ and max ζ.
-    pub(super) fn new((lower, upper): (f64, f64)) -> Self {
-        Self { lower, upper }
-    }
-
-    /// After a step of `step` s with min φ = `source_min`, 1/s.
-    pub(super) fn after(self, source_min: f64, step: f64) -> Self {
-        Self { lower: self.lower + step * source_min, ..self }
-    }
-
-    /// After a correction of ζ by a field with this minimum and maximum.
-    pub(super) fn shifted(self, (min, max): (f64, f64)) -> Self {
-        Self { lower: self.lower + min.min(0.0), upper: self.upper + max.max(0.0) }
-    }
-
-    /// No wider than the minimum and maximum of the ζ that was reached.
-    pub(super) fn tightened(self, (min, max): (f64, f64)) -> Self {
-        Self { lower: self.lower.max(min), upper: self.upper.min(max) }
-    }
-}
-
-/// By how much ζ violated the bounds of its equation in a run.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct BoundViolation {
     /// The largest ζ above its upper bound.
@@ -51,10 +21,14 @@ pub struct BoundViolation {
     pub first: Option<(usize, f64)>,
 }
 
+/// A violation counts above this, which is far above the error of the linear solver.
+const ROUNDING: f64 = 1e-10;
+
 impl BoundViolation {
     /// Compares min ζ_n and max ζ_n with the bounds of the step, which ends at `time`.
     pub(super) fn observe(&mut self, planned: &PlannedStep, (min, max): (f64, f64), time: f64) {
-        let (above, below) = (max - planned.bounds.upper, planned.bounds.lower - min);
+        let (lower, upper) = planned.bounds;
+        let (above, below) = (max - upper, lower - min);
         if above.max(below) > ROUNDING {
             self.above = self.above.max(above);
             self.below = self.below.max(below);
@@ -65,20 +39,15 @@ impl BoundViolation {
     /// What the user should know about the violation, and what cures it.
     pub fn note(&self, mass: Mass) -> Option<String> {
         let (step, time) = self.first?;
-        let sides = [("above", self.above), ("below", self.below)];
-        let sides: Vec<String> = sides
-            .iter()
-            .filter(|(_, by)| *by > ROUNDING)
-            .map(|(side, by)| format!("{side} by {by:.1e}"))
-            .collect();
+        let sides = [("above", self.above), ("below", self.below)].into_iter();
+        let sides = sides.filter(|(_, by)| *by > ROUNDING);
+        let sides: Vec<String> = sides.map(|(side, by)| format!("{side} by {by:.1e}")).collect();
         let cure = match mass {
             Mass::Consistent => {
                 "κk is too small against h² for the consistent mass; set damage.mass = \
                  \"lumped\" (for meshes without obtuse angles), or refine the mesh there"
             }
-            Mass::Lumped => {
-                "the mesh has obtuse angles, for which the lumped mass has no maximum principle"
-            }
+            Mass::Lumped => "the mesh has obtuse angles, of which the lumped mass takes no care",
         };
         Some(format!(
             "ζ left the bounds of the damage equation, {}, first in step {step} (t = {time:.4e}): \

@@ -50,7 +50,7 @@ pub use state::{State, Step, StepRecord};
 use crate::petsc::{Communicator, Session};
 use damage_step::DamageStep;
 use std::time::Instant;
-use step_controller::{Verdict, step_controller};
+use step_controller::{StepController, Verdict};
 
 /// The answer of whoever is shown an accepted step: an error ends the run.
 pub type Observed = Result<(), Box<dyn std::error::Error + Send + Sync>>;
@@ -77,7 +77,8 @@ pub fn run(
     // (27): u_0 from ζ_0.
     let first = contact_step.solve(0, problem.start(), &problem.initial_damage())?;
     contact_step.accept(problem.start())?;
-    let mut controller = step_controller(problem, &first, damage_step.source(&first.state));
+    let source = damage_step.source(&first.state);
+    let mut controller = StepController::new(problem, &first.state.zeta, source);
     let mut outcome = Outcome::new(first);
     show(&outcome.last)?;
     loop {
@@ -112,7 +113,7 @@ pub fn run(
     }
     // Makes room for another factorisation.
     drop(damage_step);
-    outcome.bound_violation = controller.bound_violation();
+    outcome.bound_violation = controller.violation;
     outcome.damage_error = controller.damage_error();
     outcome.accuracy = phases.time("accuracy", || contact_step.accuracy(&outcome))?;
     Ok(outcome)

@@ -1,32 +1,47 @@
-//! Step control: how long each step is, and whether it is accepted.
+//! Step control: which steps are made, and whether they are accepted.
+//!
+//! Steps are uniform as in (25), or chosen by their error. Chosen ones are two-step backward
+//! differences with an extrapolated source (Hairer, Nørsett, Wanner, *Solving Ordinary Differential
+//! Equations I*, III.5): with the step k_n = ω k_{n−1},
+//!
+//! (M + kκL) ζ_n = M (ζ̃_{n−1} + β (ζ̃_{n−1} − ζ̃_{n−2})) + k b̂_n,
+//! k = k_n (1+ω)/(1+2ω), β = ω²/(1+2ω), b̂_n = b_{n−1} + ω (b_{n−1} − b_{n−2}),
+//!
+//! which is a step (28) of length k from another start with another source. When u_n is known, so is
+//! b_n, and the error of the extrapolation b̂_n is corrected in the next step: ζ̃_n = ζ_n + e_n with
+//! (M + kκL) e_n = k (b_n − b̂_n). Uniform steps, and the first chosen one, are the same formula
+//! with ω = 0; uniform ones have no correction.
 
-mod chosen;
+mod error_control;
 mod load_curve;
-mod uniform;
 
 use super::{
-    DiscreteProblem, RunError, Step, StepFailure, Stop,
-    bounds::{BoundViolation, Bounds},
+    BoundViolation, DiscreteProblem, RunError, Step, StepFailure, Stop,
     damage_step::{DamageSource, DamageStep, DamageUpdate},
 };
-use crate::{fem::Partition, scene::Stepping};
+use crate::{
+    fem::Body,
+    scene::{Stepping, TimeGrid},
+};
+use error_control::ErrorControl;
 
-/// A step to be made from t_{n−1} to t_n. Its ζ_n is that of a damage step (28),
+/// A step to be made from t_{n−1} to t_n, with the damage step
 /// (M + kκL) ζ_n = M · `start` + k · `load`.
 pub(super) struct PlannedStep {
     pub(super) n: usize,
     /// t_n, s.
     pub(super) time: f64,
-    /// t_n − t_{n−1}, s.
+    /// k_n = t_n − t_{n−1}, s.
     pub(super) length: f64,
     /// k, s.
     pub(super) k: f64,
     /// ζ_{n−1}, or what stands in its place.
     pub(super) start: Vec<f64>,
-    /// The source load b_{n−1}, or what stands in its place, m²/s.
+    /// b_{n−1}, or what stands in its place, m²/s.
     pub(super) load: Vec<f64>,
-    /// The bounds on ζ_n.
-    pub(super) bounds: Bounds,
+    /// The bounds on ζ_n of [`BoundViolation`].
+    pub(super) bounds: (f64, f64),
+    beta: f64,
 }
 
 impl PlannedStep {
@@ -46,69 +61,232 @@ pub(super) enum Verdict {
     Stop(Stop),
 }
 
-/// Plans the steps of a run and judges them. What it knows of the accepted steps it updates when it
+/// Plans the steps of a run and judges them. What it knows of the accepted steps changes when it
 /// answers [`Verdict::Accept`], and only then.
-pub(super) trait StepController {
-    /// The step after the accepted one `last`; `None` at the end of time.
-    fn plan(&mut self, last: &Step) -> Option<PlannedStep>;
+pub(super) struct StepController<'a> {
+    body: &'a Body,
+    /// ζ_*.
+    threshold: f64,
+    /// `None` where there is no time, and so no step.
+    grid: Option<TimeGrid>,
+    /// Where steps are chosen.
+    chosen: Option<ErrorControl<'a>>,
+    /// k_{n−1}, s; infinite before the first step, so that ω = 0.
+    length: f64,
+    /// ζ̃_{n−1}, ζ̃_{n−1} − ζ̃_{n−2}, and the rate of the formula at t_{n−1}, 1/s.
+    zeta: Vec<f64>,
+    change: Vec<f64>,
+    rate: Option<Vec<f64>>,
+    /// The damage source at t_{n−1}, and b_{n−1} − b_{n−2}, m²/s.
+    source: DamageSource,
+    load_change: Vec<f64>,
+    /// Per node, Σ error / rate of the steps: by how much it reaches a given ζ too late or too early,
+    /// s. (An error δζ shifts an autonomous evolution by δζ/ζ', once and for all.)
+    delay: Vec<f64>,
+    bounds: (f64, f64),
+    pub(super) violation: BoundViolation,
+}
 
-    /// Judges a step from `last` that reaches ζ_*: a stop, or a shorter step that lands nearer.
-    fn judge_stop(&mut self, planned: &PlannedStep, damage: &DamageUpdate, last: &Step) -> Verdict;
+/// In a smooth evolution with equal steps the increments of the formula are off by ⅓ k³ζ‴, those of
+/// the trapezoidal rule by 1/12: the first is this multiple of their difference.
+const TRUNCATION: f64 = 4.0 / 3.0;
+
+impl<'a> StepController<'a> {
+    /// After (27), from ζ₀ = `zeta` and its damage source.
+    pub(super) fn new(problem: &'a DiscreteProblem, zeta: &[f64], source: DamageSource) -> Self {
+        let zeros = vec![0.0; zeta.len()];
+        Self {
+            body: &problem.body,
+            threshold: problem.threshold(),
+            grid: problem.scene().time,
+            chosen: ErrorControl::new(problem, zeta),
+            length: f64::INFINITY,
+            zeta: zeta.to_vec(),
+            change: zeros.clone(),
+            rate: None,
+            source,
+            load_change: zeros.clone(),
+            delay: zeros,
+            bounds: problem.body.partition.extremes(zeta),
+            violation: BoundViolation::default(),
+        }
+    }
+
+    /// The step after the accepted one `last`; `None` at the end of time.
+    pub(super) fn plan(&mut self, last: &Step) -> Option<PlannedStep> {
+        let (grid, n) = (self.grid?, last.record.step + 1);
+        let (time, length, omega) = match (&mut self.chosen, grid.stepping) {
+            (Some(chosen), _) => {
+                let (time, length) = chosen.choose(last.state.time)?;
+                (time, length, length / self.length)
+            }
+            (None, Stepping::Uniform { steps }) if n <= steps => {
+                (grid.time(n, steps), grid.end / steps as f64, 0.0)
+            }
+            _ => return None,
+        };
+        let (k, beta) =
+            (length * (1.0 + omega) / (1.0 + 2.0 * omega), omega * omega / (1.0 + 2.0 * omega));
+        let shift: Vec<f64> = self.change.iter().map(|change| beta * change).collect();
+        let (min_shift, max_shift) = self.body.partition.extremes(&shift);
+        // φ ≤ 0, so b ≤ 0 and b̂_n ≥ (1 + ω) b_{n−1}.
+        let extrapolated = |(b, change): (&f64, &f64)| (b + omega * change).min(0.0);
+        Some(PlannedStep {
+            n,
+            time,
+            length,
+            k,
+            start: self.zeta.iter().zip(&shift).map(|(zeta, shift)| zeta + shift).collect(),
+            load: self.source.load.iter().zip(&self.load_change).map(extrapolated).collect(),
+            bounds: (
+                self.bounds.0 + min_shift.min(0.0) + k * ((1.0 + omega) * self.source.min),
+                self.bounds.1 + max_shift.max(0.0),
+            ),
+            beta,
+        })
+    }
 
     /// Judges a step whose ζ_n and u_n are known.
     ///
     /// # Errors
-    /// The error is too large however short the step is, or a solve failed.
-    fn judge(
+    /// The error is too large however short the step is, or the correction e_n has no answer.
+    pub(super) fn judge(
         &mut self,
         planned: &PlannedStep,
         damage: &DamageUpdate,
         step: Box<Step>,
         damage_step: &mut DamageStep,
-    ) -> Result<Verdict, RunError>;
+    ) -> Result<Verdict, RunError> {
+        let (zeta, source) = (&damage.zeta, damage_step.source(&step.state));
+        let correction = match self.chosen {
+            Some(_) => damage_step.correction(planned, &difference(&source.load, &planned.load))?,
+            None => vec![0.0; zeta.len()],
+        };
+        let change: Vec<f64> =
+            (0..zeta.len()).map(|i| zeta[i] + correction[i] - self.zeta[i]).collect();
+        let rate = self.rate(planned, &change);
+        if let Some(chosen) = &mut self.chosen {
+            // The rate before the first step is that of its source, which needs no correction.
+            let rate_before = |i: usize| match &self.rate {
+                Some(rate) => rate[i],
+                None => rate[i] - correction[i] / planned.k,
+            };
+            let error = |i: usize| 0.5 * planned.length * (rate_before(i) + rate[i]) - change[i];
+            let truncation: Vec<f64> = (0..zeta.len()).map(|i| TRUNCATION * error(i)).collect();
+            if let Err(factor) = chosen.judge(planned, zeta, &correction, &truncation, &rate) {
+                let shorter = self.retry(planned, factor);
+                return shorter.ok_or_else(|| planned.failed(StepFailure::TooShort));
+            }
+            add_delay(&mut self.delay, truncation.iter().copied().zip(rate.iter().copied()));
+        } else {
+            self.add_uniform_delay(planned, &rate);
+        }
+        self.violation.observe(planned, damage.min_max, planned.time);
+        let (min_correction, max_correction) = self.body.partition.extremes(&correction);
+        self.bounds = (
+            planned.bounds.0.max(damage.min_max.0) + min_correction.min(0.0),
+            planned.bounds.1.min(damage.min_max.1) + max_correction.max(0.0),
+        );
+        self.zeta = zeta.iter().zip(&correction).map(|(zeta, e)| zeta + e).collect();
+        self.load_change = difference(&source.load, &self.source.load);
+        (self.length, self.change, self.rate, self.source) =
+            (planned.length, change, Some(rate), source);
+        Ok(Verdict::Accept(step))
+    }
 
-    /// Judges a step whose solves failed: a shorter step may do better.
+    /// Judges a step from `last` that reaches ζ_*: a stop, or a shorter step that lands nearer.
+    pub(super) fn judge_stop(
+        &mut self,
+        planned: &PlannedStep,
+        damage: &DamageUpdate,
+        last: &Step,
+    ) -> Verdict {
+        let (zeta_min, level) = (damage.min_max.0, self.threshold);
+        let (time, delays) = if let Some(chosen) = &self.chosen {
+            let from = self.body.partition.extremes(&self.zeta).0;
+            let part = if from > level { (from - level) / (from - zeta_min) } else { 0.0 };
+            // The last ζ that is written counts as well as its correction ζ̃.
+            if from.max(last.record.zeta_min) - level > chosen.landing()
+                && let Some(shorter) = self.retry(planned, (0.9 * part).max(0.01))
+            {
+                return shorter;
+            }
+            (last.state.time + part * planned.length, 1.0)
+        } else {
+            // This step tells the error of the one before.
+            let rate = self.rate(planned, &difference(&damage.zeta, &self.zeta));
+            self.add_uniform_delay(planned, &rate);
+            (planned.time, 2.0)
+        };
+        self.violation.observe(planned, damage.min_max, time);
+        let delay = self.delay_at_weakest_node(&damage.zeta).abs();
+        let uncertainty = planned.length + delays * delay;
+        Verdict::Stop(Stop { time, zeta_min, least_admissible: planned.bounds.0, uncertainty })
+    }
+
+    /// Judges a step whose solves failed: where steps are chosen, a shorter step may do better.
     ///
     /// # Errors
-    /// `failure`, if a shorter step is not to be tried.
-    fn judge_failure(&self, _: &PlannedStep, failure: RunError) -> Result<Verdict, RunError> {
-        Err(failure)
+    /// `failure`, if no shorter step is to be tried.
+    pub(super) fn judge_failure(
+        &self,
+        planned: &PlannedStep,
+        failure: RunError,
+    ) -> Result<Verdict, RunError> {
+        let shorter = self.retry(planned, 0.5).filter(|_| failure.is_of_a_solve());
+        shorter.ok_or(failure)
     }
 
-    /// Makes the next step `length` s long.
-    fn shorten(&mut self, _length: f64) {}
-
-    /// By how much the accepted steps violate the bounds on ζ.
-    fn bound_violation(&self) -> BoundViolation;
+    /// The step is to be made again, `length` s long.
+    pub(super) fn shorten(&mut self, length: f64) {
+        self.chosen.iter_mut().for_each(|chosen| chosen.next_length = length);
+    }
 
     /// The estimated error of the last accepted ζ over the damage done, where steps are chosen.
-    fn damage_error(&self) -> Option<f64> {
-        None
+    pub(super) fn damage_error(&self) -> Option<f64> {
+        self.chosen.as_ref().map(ErrorControl::relative_error)
+    }
+
+    /// A shorter step, where steps are chosen and not hopelessly short.
+    fn retry(&self, planned: &PlannedStep, factor: f64) -> Option<Verdict> {
+        let possible = self.chosen.as_ref()?.is_possible(planned.length * factor);
+        possible.then_some(Verdict::Retry(factor))
+    }
+
+    /// The rate of the formula at t_n, (ζ̃_n − ζ̃_{n−1} − β (ζ̃_{n−1} − ζ̃_{n−2})) / k, from
+    /// `change` = ζ̃_n − ζ̃_{n−1}.
+    fn rate(&self, planned: &PlannedStep, change: &[f64]) -> Vec<f64> {
+        let rate = |(new, old): (&f64, &f64)| (new - planned.beta * old) / planned.k;
+        change.iter().zip(&self.change).map(rate).collect()
+    }
+
+    /// Adds the delay of the uniform step before the one with this `rate`: (28) takes the source at
+    /// the beginning of a step, so its error is ½ k (ζ'_n − ζ'_{n−1}).
+    fn add_uniform_delay(&mut self, planned: &PlannedStep, rate: &[f64]) {
+        let Some(before) = &self.rate else { return };
+        let terms = rate.iter().zip(before);
+        let terms = terms.map(|(new, old)| (0.5 * planned.k * (new - old), 0.5 * (new + old)));
+        add_delay(&mut self.delay, terms);
+    }
+
+    /// The delay at the node of least `zeta`. Collective.
+    fn delay_at_weakest_node(&self, zeta: &[f64]) -> f64 {
+        let nodes = 0..self.body.partition.owned();
+        let weakest = nodes.min_by(|&a, &b| zeta[a].total_cmp(&zeta[b]));
+        let comm = self.body.partition.comm();
+        let (_, rank) = comm.min_with_rank(weakest.map_or(f64::INFINITY, |i| zeta[i]));
+        comm.broadcast(rank, weakest.map_or(0.0, |i| self.delay[i]))
     }
 }
 
-/// The step controller that the scene asks for, after (27) with `first` and its damage source.
-pub(super) fn step_controller<'a>(
-    problem: &'a DiscreteProblem,
-    first: &Step,
-    source: DamageSource,
-) -> Box<dyn StepController + 'a> {
-    let zeta = &first.state.zeta;
-    match problem.scene().time.map(|grid| (grid, grid.stepping)) {
-        Some((grid, Stepping::Auto { tolerance })) => {
-            Box::new(chosen::ChosenSteps::new(problem, zeta, source, tolerance, grid.end))
-        }
-        uniform => {
-            let grid = uniform.map(|(grid, _)| grid);
-            Box::new(uniform::UniformSteps::new(&problem.body.partition, grid, zeta, source))
-        }
+/// Adds error / rate per node; nodes at rest have no delay.
+fn add_delay(delay: &mut [f64], terms: impl Iterator<Item = (f64, f64)>) {
+    for (delay, (error, rate)) in delay.iter_mut().zip(terms) {
+        *delay += if rate == 0.0 { 0.0 } else { error / rate };
     }
 }
 
-/// The value of a field at the node of least `zeta`. Collective.
-fn at_weakest_node(partition: &Partition, zeta: &[f64], field: &[f64]) -> f64 {
-    let weakest = (0..partition.owned()).min_by(|&a, &b| zeta[a].total_cmp(&zeta[b]));
-    let comm = partition.comm();
-    let (_, rank) = comm.min_with_rank(weakest.map_or(f64::INFINITY, |i| zeta[i]));
-    comm.broadcast(rank, weakest.map_or(0.0, |i| field[i]))
+/// a − b.
+fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
