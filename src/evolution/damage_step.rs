@@ -6,6 +6,7 @@ use crate::{
     model::DamageLaw,
     petsc::{PetscError, Session},
 };
+use nalgebra::DVector;
 
 /// Solves the damage systems (M + kκL) ζ_n = M ζ_{n−1} + k b_{n−1} of a run.
 pub(super) struct DamageStep<'a> {
@@ -19,7 +20,7 @@ pub(super) struct DamageStep<'a> {
 /// The damage source φ(ε(u), ζ) of a state; zero where there is no damage law.
 pub(super) struct DamageSource {
     /// b_i = ∫ φ λ_i, m²/s.
-    pub(super) load: Vec<f64>,
+    pub(super) load: DVector<f64>,
     /// min φ ≤ 0, 1/s.
     pub(super) min: f64,
 }
@@ -48,14 +49,15 @@ impl<'a> DamageStep<'a> {
     pub(super) fn source(&self, state: &State) -> DamageSource {
         let (problem, body) = (self.problem, &self.problem.body);
         let Some(law) = problem.damage() else {
-            return DamageSource { load: vec![0.0; state.zeta.len()], min: 0.0 };
+            return DamageSource { load: DVector::zeros(state.zeta.len()), min: 0.0 };
         };
         self.phases.time("damage source", || {
             let strain = problem.elasticity.strain_squared(body, &state.u);
             let phi = fem::source(body, &law, &strain, &state.zeta);
             let min = phi.iter().flatten().copied().fold(0.0, f64::min);
             let min = body.partition.comm().min(min);
-            DamageSource { load: fem::source_load(body, problem.mass(), &phi), min }
+            let load = fem::source_load(body, problem.mass(), &phi);
+            DamageSource { load: DVector::from_vec(load), min }
         })
     }
 
@@ -66,21 +68,22 @@ impl<'a> DamageStep<'a> {
     pub(super) fn solve(&mut self, planned: &PlannedStep) -> Result<DamageUpdate, RunError> {
         let (problem, phases) = (self.problem, self.phases);
         let partition = &problem.body.partition;
-        let mut zeta = planned.start.clone();
+        let (start, load) = (planned.start.as_slice(), planned.load.as_slice());
+        let mut zeta = start.to_vec();
         let min_max = partition.extremes(&zeta);
-        let stays = min_max.0 == min_max.1 && self.is_zero(&planned.load);
+        let stays = min_max.0 == min_max.1 && self.is_zero(load);
         let Some(law) = problem.damage().filter(|_| !stays) else {
             return Ok(DamageUpdate { zeta, min_max, certificate: None });
         };
         let system = self.system(&law, planned.k)?;
-        if !phases.time("damage solve", || system.advance(&planned.load, &mut zeta))? {
+        if !phases.time("damage solve", || system.advance(load, &mut zeta))? {
             return Err(planned.failed(StepFailure::Damage));
         }
         let largest_residual = system.largest_residual()?;
         partition.update(&mut zeta, 1)?;
         let certificate = phases.time("damage certificate", || {
-            let (body, mass, fields) = (&problem.body, problem.mass(), [&planned.start[..], &zeta]);
-            DamageCertificate::of(body, mass, law.diffusion, planned.k, &planned.load, fields)
+            let (body, mass, fields) = (&problem.body, problem.mass(), [start, &zeta]);
+            DamageCertificate::of(body, mass, law.diffusion, planned.k, load, fields)
         });
         match certificate.residual {
             residual if !residual.is_finite() => Err(planned.failed(StepFailure::Damage)),
@@ -102,20 +105,19 @@ impl<'a> DamageStep<'a> {
     pub(super) fn correction(
         &mut self,
         planned: &PlannedStep,
-        load: &[f64],
-    ) -> Result<Vec<f64>, RunError> {
-        let partition = &self.problem.body.partition;
-        let zero = self.is_zero(load);
+        load: DVector<f64>,
+    ) -> Result<DVector<f64>, RunError> {
+        let (partition, phases) = (&self.problem.body.partition, self.phases);
+        let zero = self.is_zero(load.as_slice());
         let Some(law) = self.problem.damage().filter(|_| !zero) else {
-            return Ok(vec![0.0; partition.local()]);
+            return Ok(DVector::zeros(load.len()));
         };
-        let phases = self.phases;
         let system = self.system(&law, planned.k)?;
-        let solved = phases.time("damage solve", || system.correction(load))?;
+        let solved = phases.time("damage solve", || system.correction(load.as_slice()))?;
         let failed = || planned.failed(StepFailure::Damage);
         let change = partition.field(solved.ok_or_else(failed)?, 1)?;
         let finite = partition.comm().all(change.iter().all(|z| z.is_finite()));
-        if finite { Ok(change) } else { Err(failed()) }
+        if finite { Ok(DVector::from_vec(change)) } else { Err(failed()) }
     }
 
     /// Whether a source load is zero on all ranks. Collective.

@@ -2,6 +2,7 @@
 
 use super::{PlannedStep, load_curve::LoadCurve};
 use crate::{evolution::DiscreteProblem, fem::Body, scene::Stepping};
+use nalgebra::DVector;
 
 /// Keeps the error of ζ, over the damage done, below a tolerance: at the worst node and in the mean.
 pub(super) struct ErrorControl<'a> {
@@ -14,9 +15,9 @@ pub(super) struct ErrorControl<'a> {
     /// The length of the next step, s.
     pub(super) next_length: f64,
     /// ζ₀.
-    initial: Vec<f64>,
+    initial: DVector<f64>,
     /// Per node, the sum of the truncation errors of the accepted steps.
-    truncation: Vec<f64>,
+    truncation: DVector<f64>,
     /// [`ErrorControl::norms`] of the last accepted ζ − ζ₀ and of its estimated error.
     damage: [f64; 2],
     error: [f64; 2],
@@ -53,8 +54,8 @@ impl<'a> ErrorControl<'a> {
             end: grid.end,
             load_curve: LoadCurve::new(problem),
             next_length: first_length.min(COARSEST * grid.end),
-            initial: initial.to_vec(),
-            truncation: vec![0.0; initial.len()],
+            initial: DVector::from_column_slice(initial),
+            truncation: DVector::zeros(initial.len()),
             damage: [0.0; 2],
             error: [0.0; 2],
         })
@@ -92,22 +93,21 @@ impl<'a> ErrorControl<'a> {
         self.tolerance * self.damage[0].max(NEGLIGIBLE)
     }
 
-    /// Compares the error of ζ_n = `zeta`, e_n and truncation, with the allowed one, and chooses the
-    /// length of the next step. `rate` is dζ/dt at t_n, 1/s. Collective.
+    /// Compares the error of ζ_n = `zeta`, that is e_n and the truncation error, with the allowed one,
+    /// and chooses the length of the next step. `rate` is dζ/dt at t_n, 1/s. Collective.
     ///
     /// # Errors
     /// The error is too large: the factor by which to shorten the step.
     pub(super) fn judge(
         &mut self,
         planned: &PlannedStep,
-        zeta: &[f64],
-        correction: &[f64],
-        truncation: &[f64],
-        rate: &[f64],
+        zeta: &DVector<f64>,
+        [correction, truncation]: [&DVector<f64>; 2],
+        rate: &DVector<f64>,
     ) -> Result<(), f64> {
-        let damage = self.norms(|i| zeta[i] - self.initial[i]);
-        let error = self.norms(|i| correction[i] + truncation[i]);
-        let rates = self.norms(|i| rate[i]);
+        let damage = self.norms(&(zeta - &self.initial));
+        let error = self.norms(&(correction + truncation));
+        let rates = self.norms(rate);
         let ahead = (HORIZON * self.end).min(STEPS * planned.length).min(self.end - planned.time);
         let ratio = |j: usize| {
             let reference = damage[j] + (ahead * rates[j]).clamp(NEGLIGIBLE, FORESEEN);
@@ -117,9 +117,9 @@ impl<'a> ErrorControl<'a> {
         if ratio > 1.0 {
             return Err(growth(ratio).clamp(0.2, 0.9));
         }
-        self.truncation.iter_mut().zip(truncation).for_each(|(sum, new)| *sum += new);
+        self.truncation += truncation;
         self.damage = damage;
-        self.error = self.norms(|i| self.truncation[i] + correction[i]);
+        self.error = self.norms(&(&self.truncation + correction));
         self.next_length = (planned.length * growth(ratio).min(2.0)).min(COARSEST * self.end);
         Ok(())
     }
@@ -131,12 +131,12 @@ impl<'a> ErrorControl<'a> {
     }
 
     /// max |·| over the nodes, and the mean of |·| over the body. Collective.
-    fn norms(&self, field: impl Fn(usize) -> f64) -> [f64; 2] {
+    fn norms(&self, field: &DVector<f64>) -> [f64; 2] {
         let (mut max, mut integral) = (0.0_f64, 0.0);
-        for i in 0..self.body.partition.owned() {
-            let value = field(i).abs();
-            max = max.max(value);
-            integral += self.body.node_area[i] * value;
+        let nodes = field.iter().zip(&self.body.node_area).take(self.body.partition.owned());
+        for (value, area) in nodes {
+            max = max.max(value.abs());
+            integral += area * value.abs();
         }
         let comm = self.body.partition.comm();
         [comm.max(max), comm.total(integral) / self.body.area]

@@ -24,6 +24,7 @@ use crate::{
     scene::{Stepping, TimeGrid},
 };
 use error_control::ErrorControl;
+use nalgebra::DVector;
 
 /// A step to be made from t_{n−1} to t_n, with the damage step
 /// (M + kκL) ζ_n = M · `start` + k · `load`.
@@ -36,9 +37,9 @@ pub(super) struct PlannedStep {
     /// k, s.
     pub(super) k: f64,
     /// ζ_{n−1}, or what stands in its place.
-    pub(super) start: Vec<f64>,
+    pub(super) start: DVector<f64>,
     /// b_{n−1}, or what stands in its place, m²/s.
-    pub(super) load: Vec<f64>,
+    pub(super) load: DVector<f64>,
     /// The bounds on ζ_n of [`BoundViolation`].
     pub(super) bounds: (f64, f64),
     beta: f64,
@@ -74,15 +75,15 @@ pub(super) struct StepController<'a> {
     /// k_{n−1}, s; infinite before the first step, so that ω = 0.
     length: f64,
     /// ζ̃_{n−1}, ζ̃_{n−1} − ζ̃_{n−2}, and the rate of the formula at t_{n−1}, 1/s.
-    zeta: Vec<f64>,
-    change: Vec<f64>,
-    rate: Option<Vec<f64>>,
+    zeta: DVector<f64>,
+    change: DVector<f64>,
+    rate: Option<DVector<f64>>,
     /// The damage source at t_{n−1}, and b_{n−1} − b_{n−2}, m²/s.
     source: DamageSource,
-    load_change: Vec<f64>,
+    load_change: DVector<f64>,
     /// Per node, Σ error / rate of the steps: by how much it reaches a given ζ too late or too early,
     /// s. (An error δζ shifts an autonomous evolution by δζ/ζ', once and for all.)
-    delay: Vec<f64>,
+    delay: DVector<f64>,
     bounds: (f64, f64),
     pub(super) violation: BoundViolation,
 }
@@ -94,14 +95,14 @@ const TRUNCATION: f64 = 4.0 / 3.0;
 impl<'a> StepController<'a> {
     /// After (27), from ζ₀ = `zeta` and its damage source.
     pub(super) fn new(problem: &'a DiscreteProblem, zeta: &[f64], source: DamageSource) -> Self {
-        let zeros = vec![0.0; zeta.len()];
+        let zeros = DVector::zeros(zeta.len());
         Self {
             body: &problem.body,
             threshold: problem.threshold(),
             grid: problem.scene().time,
             chosen: ErrorControl::new(problem, zeta),
             length: f64::INFINITY,
-            zeta: zeta.to_vec(),
+            zeta: DVector::from_column_slice(zeta),
             change: zeros.clone(),
             rate: None,
             source,
@@ -125,25 +126,15 @@ impl<'a> StepController<'a> {
             }
             _ => return None,
         };
-        let (k, beta) =
-            (length * (1.0 + omega) / (1.0 + 2.0 * omega), omega * omega / (1.0 + 2.0 * omega));
-        let shift: Vec<f64> = self.change.iter().map(|change| beta * change).collect();
-        let (min_shift, max_shift) = self.body.partition.extremes(&shift);
+        let beta = omega * omega / (1.0 + 2.0 * omega);
+        let k = length * (1.0 + omega) / (1.0 + 2.0 * omega);
+        let shift = beta * &self.change;
+        let (lower, upper) = shifted(self.bounds, self.body.partition.extremes(shift.as_slice()));
         // φ ≤ 0, so b ≤ 0 and b̂_n ≥ (1 + ω) b_{n−1}.
-        let extrapolated = |(b, change): (&f64, &f64)| (b + omega * change).min(0.0);
-        Some(PlannedStep {
-            n,
-            time,
-            length,
-            k,
-            start: self.zeta.iter().zip(&shift).map(|(zeta, shift)| zeta + shift).collect(),
-            load: self.source.load.iter().zip(&self.load_change).map(extrapolated).collect(),
-            bounds: (
-                self.bounds.0 + min_shift.min(0.0) + k * ((1.0 + omega) * self.source.min),
-                self.bounds.1 + max_shift.max(0.0),
-            ),
-            beta,
-        })
+        let lower = lower + k * ((1.0 + omega) * self.source.min);
+        let load = (&self.source.load + omega * &self.load_change).map(|b| b.min(0.0));
+        let (start, bounds) = (&self.zeta + shift, (lower, upper));
+        Some(PlannedStep { n, time, length, k, beta, start, load, bounds })
     }
 
     /// Judges a step whose ζ_n and u_n are known.
@@ -157,40 +148,41 @@ impl<'a> StepController<'a> {
         step: Box<Step>,
         damage_step: &mut DamageStep,
     ) -> Result<Verdict, RunError> {
-        let (zeta, source) = (&damage.zeta, damage_step.source(&step.state));
+        let source = damage_step.source(&step.state);
+        let zeta = DVector::from_column_slice(&damage.zeta);
         let correction = match self.chosen {
-            Some(_) => damage_step.correction(planned, &difference(&source.load, &planned.load))?,
-            None => vec![0.0; zeta.len()],
+            Some(_) => damage_step.correction(planned, &source.load - &planned.load)?,
+            None => DVector::zeros(zeta.len()),
         };
-        let change: Vec<f64> =
-            (0..zeta.len()).map(|i| zeta[i] + correction[i] - self.zeta[i]).collect();
-        let rate = self.rate(planned, &change);
-        if let Some(chosen) = &mut self.chosen {
-            // The rate before the first step is that of its source, which needs no correction.
-            let rate_before = |i: usize| match &self.rate {
-                Some(rate) => rate[i],
-                None => rate[i] - correction[i] / planned.k,
-            };
-            let error = |i: usize| 0.5 * planned.length * (rate_before(i) + rate[i]) - change[i];
-            let truncation: Vec<f64> = (0..zeta.len()).map(|i| TRUNCATION * error(i)).collect();
-            if let Err(factor) = chosen.judge(planned, zeta, &correction, &truncation, &rate) {
-                let shorter = self.retry(planned, factor);
-                return shorter.ok_or_else(|| planned.failed(StepFailure::TooShort));
+        let corrected = &zeta + &correction;
+        let rate = self.rate(planned, &corrected);
+        match &mut self.chosen {
+            None => self.add_uniform_delay(planned, &rate),
+            Some(chosen) => {
+                // The rate before the first step is that of its source, which needs no correction.
+                let first = || &rate - &correction / planned.k;
+                let sum = self.rate.clone().unwrap_or_else(first) + &rate;
+                let trapezoidal = 0.5 * planned.length * sum;
+                let truncation = TRUNCATION * (trapezoidal - (&corrected - &self.zeta));
+                let errors = [&correction, &truncation];
+                if let Err(factor) = chosen.judge(planned, &zeta, errors, &rate) {
+                    let shorter = self.retry(planned, factor);
+                    return shorter.ok_or_else(|| planned.failed(StepFailure::TooShort));
+                }
+                add_delay(&mut self.delay, &truncation, &rate);
             }
-            add_delay(&mut self.delay, truncation.iter().copied().zip(rate.iter().copied()));
-        } else {
-            self.add_uniform_delay(planned, &rate);
         }
         self.violation.observe(planned, damage.min_max, planned.time);
-        let (min_correction, max_correction) = self.body.partition.extremes(&correction);
-        self.bounds = (
-            planned.bounds.0.max(damage.min_max.0) + min_correction.min(0.0),
-            planned.bounds.1.min(damage.min_max.1) + max_correction.max(0.0),
-        );
-        self.zeta = zeta.iter().zip(&correction).map(|(zeta, e)| zeta + e).collect();
-        self.load_change = difference(&source.load, &self.source.load);
-        (self.length, self.change, self.rate, self.source) =
-            (planned.length, change, Some(rate), source);
+        let (lower, upper) = planned.bounds;
+        let tightened = (lower.max(damage.min_max.0), upper.min(damage.min_max.1));
+        let partition = &self.body.partition;
+        self.bounds = shifted(tightened, partition.extremes(correction.as_slice()));
+        self.length = planned.length;
+        self.change = &corrected - &self.zeta;
+        self.zeta = corrected;
+        self.rate = Some(rate);
+        self.load_change = &source.load - &self.source.load;
+        self.source = source;
         Ok(Verdict::Accept(step))
     }
 
@@ -203,7 +195,7 @@ impl<'a> StepController<'a> {
     ) -> Verdict {
         let (zeta_min, level) = (damage.min_max.0, self.threshold);
         let (time, delays) = if let Some(chosen) = &self.chosen {
-            let from = self.body.partition.extremes(&self.zeta).0;
+            let from = self.body.partition.extremes(self.zeta.as_slice()).0;
             let part = if from > level { (from - level) / (from - zeta_min) } else { 0.0 };
             // The last ζ that is written counts as well as its correction ζ̃.
             if from.max(last.record.zeta_min) - level > chosen.landing()
@@ -214,7 +206,7 @@ impl<'a> StepController<'a> {
             (last.state.time + part * planned.length, 1.0)
         } else {
             // This step tells the error of the one before.
-            let rate = self.rate(planned, &difference(&damage.zeta, &self.zeta));
+            let rate = self.rate(planned, &DVector::from_column_slice(&damage.zeta));
             self.add_uniform_delay(planned, &rate);
             (planned.time, 2.0)
         };
@@ -253,20 +245,18 @@ impl<'a> StepController<'a> {
         possible.then_some(Verdict::Retry(factor))
     }
 
-    /// The rate of the formula at t_n, (ζ̃_n − ζ̃_{n−1} − β (ζ̃_{n−1} − ζ̃_{n−2})) / k, from
-    /// `change` = ζ̃_n − ζ̃_{n−1}.
-    fn rate(&self, planned: &PlannedStep, change: &[f64]) -> Vec<f64> {
-        let rate = |(new, old): (&f64, &f64)| (new - planned.beta * old) / planned.k;
-        change.iter().zip(&self.change).map(rate).collect()
+    /// The rate of the formula at t_n, (ζ̃_n − ζ̃_{n−1} − β (ζ̃_{n−1} − ζ̃_{n−2})) / k.
+    fn rate(&self, planned: &PlannedStep, zeta: &DVector<f64>) -> DVector<f64> {
+        (zeta - &self.zeta - planned.beta * &self.change) / planned.k
     }
 
     /// Adds the delay of the uniform step before the one with this `rate`: (28) takes the source at
     /// the beginning of a step, so its error is ½ k (ζ'_n − ζ'_{n−1}).
-    fn add_uniform_delay(&mut self, planned: &PlannedStep, rate: &[f64]) {
-        let Some(before) = &self.rate else { return };
-        let terms = rate.iter().zip(before);
-        let terms = terms.map(|(new, old)| (0.5 * planned.k * (new - old), 0.5 * (new + old)));
-        add_delay(&mut self.delay, terms);
+    fn add_uniform_delay(&mut self, planned: &PlannedStep, rate: &DVector<f64>) {
+        if let Some(before) = &self.rate {
+            let error = 0.5 * planned.k * (rate - before);
+            add_delay(&mut self.delay, &error, &(0.5 * (rate + before)));
+        }
     }
 
     /// The delay at the node of least `zeta`. Collective.
@@ -280,13 +270,11 @@ impl<'a> StepController<'a> {
 }
 
 /// Adds error / rate per node; nodes at rest have no delay.
-fn add_delay(delay: &mut [f64], terms: impl Iterator<Item = (f64, f64)>) {
-    for (delay, (error, rate)) in delay.iter_mut().zip(terms) {
-        *delay += if rate == 0.0 { 0.0 } else { error / rate };
-    }
+fn add_delay(delay: &mut DVector<f64>, error: &DVector<f64>, rate: &DVector<f64>) {
+    *delay += error.zip_map(rate, |error, rate| if rate == 0.0 { 0.0 } else { error / rate });
 }
 
-/// a − b.
-fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
-    a.iter().zip(b).map(|(a, b)| a - b).collect()
+/// Bounds on ζ after a correction of ζ by a field with this minimum and maximum.
+fn shifted((lower, upper): (f64, f64), (min, max): (f64, f64)) -> (f64, f64) {
+    (lower + min.min(0.0), upper + max.max(0.0))
 }
