@@ -112,7 +112,7 @@ impl<'a> ContactStep<'a> {
             c: Vector::zeros(session, unknowns)?,
             next: memory.clone(),
             accepted: memory,
-            extrapolation: Extrapolation::new(comm, unknowns),
+            extrapolation: Extrapolation::new(comm),
             covered: comm.all(body.is_covered()),
             rigid: problem.motions.normal_at(body, &constraints.bounds),
         })
@@ -184,7 +184,8 @@ impl<'a> ContactStep<'a> {
             self.next.datum = Datum::default();
         }
         self.phases.time("extrapolation", || {
-            let c = self.extrapolation.at(case.time);
+            let predicted = self.extrapolation.at(case.time);
+            let c = predicted.unwrap_or_else(|| vec![0.0; self.c.owned()]);
             self.c.set(&self.next.datum.shifted(problem, c, -1.0))
         })?;
         if unloaded { Ok(()) } else { self.approach(case) }
@@ -230,7 +231,7 @@ impl<'a> ContactStep<'a> {
             let u = self.displacement(lift)?;
             let judged = self.phases.time("certificate", || self.certify(u, case));
             let certified = judged.kkt.within(problem.tolerance);
-            let far = !self.next.datum.is_zero() && judged.sizes[0] > FAR * judged.sizes[1];
+            let far = !self.next.datum.is_zero() && judged.rigid_max > FAR * judged.elastic_max;
             if (far || !certified) && attempt < ATTEMPTS && self.move_datum(&judged)? {
                 attempt += 1;
                 continue;
@@ -260,8 +261,7 @@ impl<'a> ContactStep<'a> {
 
     /// Moves the datum by the rigid part of an answer, if the answer is mostly that.
     fn move_datum(&mut self, judged: &Judged) -> Result<bool, PetscError> {
-        let [rigid, rest] = judged.sizes;
-        if rigid <= DOMINANT * rest {
+        if judged.rigid_max <= DOMINANT * judged.elastic_max {
             return Ok(false);
         }
         let c = self.c.read(<[f64]>::to_vec)?;
@@ -293,7 +293,7 @@ impl<'a> ContactStep<'a> {
         Ok(scale)
     }
 
-    /// From c to the c that answers (26), where forces of size `force` count as 1.
+    /// Replaces c by the solution of (26); forces of `force` N per metre of thickness count as 1.
     fn solve_contact(
         &mut self,
         case: &LoadCase,

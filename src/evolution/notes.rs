@@ -30,7 +30,7 @@ impl Outcome {
         if let Some((time, motion)) = &self.unconstrained {
             // Nodes that touch without force may still be in the way.
             notes.push(format!(
-                "at t = {time}, no pressing node holds the body against {motion}: the answer may \
+                "at t = {time}, no active contact node holds the body against {motion}: the answer may \
                  be one of many"
             ));
         }

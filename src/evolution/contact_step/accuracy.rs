@@ -44,8 +44,8 @@ impl Accuracy {
         let mut notes = Vec::new();
         if self.displacement.is_infinite() {
             notes.push(format!(
-                "at t = {:.4e}, the nodes that press do not hold the body by themselves: how exact \
-                 the displacements are cannot be estimated",
+                "at t = {:.4e}, the active contact nodes alone do not hold the body: how exact the \
+                 displacements are cannot be estimated",
                 self.time
             ));
         } else if self.displacement > Self::promised(tolerance) {
@@ -81,8 +81,8 @@ impl ContactStep<'_> {
         drop(solver);
         let (body, elasticity) = (&problem.body, &problem.elasticity);
         let last = &outcome.last;
-        let (size, resolved) = match &outcome.most_displaced {
-            Some((size, state)) => (*size, state),
+        let (max, resolved) = match &outcome.most_displaced {
+            Some((max, state)) => (*max, state),
             None => (last.record.displacement_max, &last.state),
         };
         let [rigid, rest] = RigidPart::of(body, &resolved.u).sizes(body, &resolved.u);
@@ -91,32 +91,33 @@ impl ContactStep<'_> {
             true => elasticity.energy_error(body, &resolved.zeta_mean, &resolved.u)?,
             false => 0.0,
         };
-        let displacement = displacement_error(session, problem, stiffness, &last.state, size)?;
-        let accuracy = Accuracy { displacement, energy, time: last.state.time };
+        let displacement = displacement_error(session, problem, stiffness, &last.state, max)?;
+        let mut accuracy = Accuracy { displacement, energy, time: last.state.time };
         let Some((residual, state)) = &outcome.least_accurate else { return Ok(accuracy) };
         let expected = displacement * (residual / last.record.kkt_stationarity).max(1.0);
         if expected <= SAFE * Accuracy::promised(problem.tolerance) {
             return Ok(accuracy);
         }
         let stiffness = Stiffness::new(session, body, elasticity, &problem.constraints.bases)?;
-        let displacement = displacement_error(session, problem, stiffness, state, size)?;
-        Ok(match displacement > accuracy.displacement {
-            true => Accuracy { displacement, time: state.time, ..accuracy },
-            false => accuracy,
-        })
+        let displacement = displacement_error(session, problem, stiffness, state, max)?;
+        if displacement > accuracy.displacement {
+            accuracy.displacement = displacement;
+            accuracy.time = state.time;
+        }
+        Ok(accuracy)
     }
 }
 
-/// max |K⁻¹(f − Ku)| / `size`, the active nodes fixed: the correction that the residual forces ask
+/// max |K⁻¹(f − Ku)| / `max`, the active nodes fixed: the correction that the residual forces ask
 /// for.
 fn displacement_error(
     session: &Session,
     problem: &DiscreteProblem,
     mut stiffness: Stiffness,
     state: &State,
-    size: f64,
+    max: f64,
 ) -> Result<f64, PetscError> {
-    if size == 0.0 || problem.body.partition.largest(&state.u) == 0.0 {
+    if max == 0.0 || problem.body.partition.largest(&state.u) == 0.0 {
         return Ok(0.0);
     }
     stiffness.refill(&state.zeta_mean)?;
@@ -148,5 +149,5 @@ fn displacement_error(
     let mut correction = body.partition.field(correction.read(<[f64]>::to_vec)?, 2)?;
     constraints.bases.displacement_to_global(&mut correction);
     problem.motions.remove_free(body, &mut correction);
-    Ok(body.partition.largest(&correction) / size)
+    Ok(body.partition.largest(&correction) / max)
 }

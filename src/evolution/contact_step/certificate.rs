@@ -22,9 +22,10 @@ pub(super) struct Judged {
     /// The cosine between u and its elastic forces: the sign of the energy.
     pub(super) energy: f64,
     pub(super) contact: Vec<ContactPoint>,
-    /// The rigid part of u, and max |·| of it and of the rest, m.
+    /// The rigid part of u, max |·| of it and of the rest, m.
     pub(super) rigid: RigidPart,
-    pub(super) sizes: [f64; 2],
+    pub(super) rigid_max: f64,
+    pub(super) elastic_max: f64,
 }
 
 impl ContactStep<'_> {
@@ -34,7 +35,7 @@ impl ContactStep<'_> {
         let problem = self.problem;
         let (body, partition) = (&problem.body, &problem.body.partition);
         let rigid = RigidPart::of(body, &u);
-        let sizes = rigid.sizes(body, &u);
+        let [rigid_max, elastic_max] = rigid.sizes(body, &u);
         let mut unbalanced = problem.elasticity.internal_force(body, &self.zeta_mean, &u);
         // |f|², |Ku|², u·Ku and |u|².
         let mut sums = [0.0; 4];
@@ -48,7 +49,7 @@ impl ContactStep<'_> {
         }
         partition.comm().sum(&mut sums);
         let force = sums[0].max(sums[1]).sqrt();
-        let scales = self.run_scales(Scales { force, displacement: sizes[1] });
+        let scales = self.run_scales(Scales { force, displacement: elastic_max });
         let energy = sums[2] / (scales.force * sums[3].sqrt()).max(f64::MIN_POSITIVE);
         let answer = Answer {
             rigid: &self.next.datum.field,
@@ -61,7 +62,7 @@ impl ContactStep<'_> {
         if !self.covered {
             kkt.stationarity = f64::NAN;
         }
-        Judged { u, kkt, scales, force, energy, contact, rigid, sizes }
+        Judged { u, kkt, scales, force, energy, contact, rigid, rigid_max, elastic_max }
     }
 
     /// Adds to an error the tolerance that double precision can reach, from the rounding of the
@@ -102,8 +103,8 @@ impl ContactStep<'_> {
         let partition = &self.problem.body.partition;
         let nodes = partition.total() as f64;
         let active = self.active_bounds(contact, nodes * self.problem.tolerance * force);
-        let left = contact::unheld(partition.comm(), &self.rigid, &active);
-        let first = left.first().filter(|_| force > 0.0)?;
+        let motions = contact::unheld(partition.comm(), &self.rigid, &active);
+        let first = motions.first().filter(|_| force > 0.0)?;
         Some(self.problem.motions.combined(first))
     }
 }
