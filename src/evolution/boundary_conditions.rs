@@ -57,8 +57,8 @@ impl BoundaryConditions {
         conditions
     }
 
-    /// Finds the rigid motions that the conditions leave, and turns the normals of axes and gaps
-    /// exactly across those of them that are only rounding away from being tangential.
+    /// Finds the rigid motions that the conditions do not prevent, and makes the normals of axes and
+    /// gaps exactly orthogonal to the free motions to which they are orthogonal up to rounding.
     pub(super) fn resolve_motions(&mut self, body: &Body) -> RigidMotions {
         let directions: Vec<_> = self.fixed.iter().map(|row| (row.node, row.direction)).collect();
         let motions = RigidMotions::new(body, &directions, &self.gaps);

@@ -67,15 +67,11 @@ const ATTEMPTS: usize = 3;
 const DOMINANT: f64 = 10.0;
 /// … and so far from a datum that was chosen before that even a certified answer is measured anew.
 const FAR: f64 = 1e3;
-/// A deformation below this part of the datum is rounding.
-const CARRIED: f64 = 1e-14;
 /// A force scale below this part of the forces that prescribed displacements cause is rounding.
 const LIFTED: f64 = 1e-2;
 /// Loads below this part of the largest of the run count as so much, or an answer to rounding
 /// (sin(pi) = 1.2e-16) would have to have as many digits as any other.
 const LEAST_LOAD: f64 = 1e-6;
-/// The cosine between u and its elastic forces is below this only if K is indefinite.
-const NEGATIVE_ENERGY: f64 = -1e-10;
 
 impl<'a> ContactStep<'a> {
     /// With the contact solver called `solver`.
@@ -243,7 +239,7 @@ impl<'a> ContactStep<'a> {
             }
             let method = self.solver.name();
             // Then a KKT point need not be a minimum, and which solver would notice is chance.
-            if judged.energy < NEGATIVE_ENERGY {
+            if judged.is_indefinite() {
                 return Err(failed(ContactError::NotDefinite { method }));
             }
             if certified {
@@ -332,19 +328,5 @@ impl<'a> ContactStep<'a> {
         problem.body.partition.update(&mut u, 2)?;
         problem.motions.remove_free(&problem.body, &mut u);
         Ok(u)
-    }
-
-    /// The scales of an answer, not below those of the run so far, nor below the rounding of the datum
-    /// (a body that is only carried along has no other scales); and with displacements not below
-    /// those that the forces cause at least.
-    fn run_scales(&self, answer: Scales) -> Scales {
-        let (datum, run) = (&self.next.datum, self.accepted.scales);
-        let rounding = match datum.is_zero() {
-            true => 0.0,
-            false => CARRIED * self.problem.body.partition.largest(&datum.field),
-        };
-        let force = answer.force.max(run.force).max(self.stiffness.scale * rounding);
-        let least = rounding.max(force / self.stiffness.scale);
-        Scales { force, displacement: answer.displacement.max(run.displacement).max(least) }
     }
 }

@@ -10,6 +10,11 @@ use crate::{
 /// Residuals are the effect of rounding if they are at most this many times its estimate.
 const ROUNDED: f64 = 10.0;
 
+/// A deformation below this part of the datum is rounding.
+const CARRIED: f64 = 1e-14;
+/// The cosine between u and its elastic forces is below this only if K is indefinite.
+const NEGATIVE_ENERGY: f64 = -1e-10;
+
 /// An answer and what the certificate found.
 pub(super) struct Judged {
     /// The displacements from the datum, m.
@@ -20,12 +25,19 @@ pub(super) struct Judged {
     /// The larger of ‖f‖₂ and ‖Ku‖₂, N per metre of thickness.
     pub(super) force: f64,
     /// The cosine between u and its elastic forces: the sign of the energy.
-    pub(super) energy: f64,
+    energy: f64,
     pub(super) contact: Vec<ContactPoint>,
     /// The rigid part of u, max |·| of it and of the rest, m.
     pub(super) rigid: RigidPart,
     pub(super) rigid_max: f64,
     pub(super) elastic_max: f64,
+}
+
+impl Judged {
+    /// Whether u shows that K is not positive definite.
+    pub(super) fn is_indefinite(&self) -> bool {
+        self.energy < NEGATIVE_ENERGY
+    }
 }
 
 impl ContactStep<'_> {
@@ -63,6 +75,20 @@ impl ContactStep<'_> {
             kkt.stationarity = f64::NAN;
         }
         Judged { u, kkt, scales, force, energy, contact, rigid, rigid_max, elastic_max }
+    }
+
+    /// The scales of an answer, not below those of the run so far, nor below the rounding of the datum
+    /// (a body that is only carried along has no other scales); and with displacements not below
+    /// those that the forces cause at least.
+    pub(super) fn run_scales(&self, answer: Scales) -> Scales {
+        let (datum, run) = (&self.next.datum, self.accepted.scales);
+        let rounding = match datum.is_zero() {
+            true => 0.0,
+            false => CARRIED * self.problem.body.partition.largest(&datum.field),
+        };
+        let force = answer.force.max(run.force).max(self.stiffness.scale * rounding);
+        let least = rounding.max(force / self.stiffness.scale);
+        Scales { force, displacement: answer.displacement.max(run.displacement).max(least) }
     }
 
     /// Adds to an error the tolerance that double precision can reach, from the rounding of the

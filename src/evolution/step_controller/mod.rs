@@ -130,9 +130,10 @@ impl<'a> StepController<'a> {
         let k = length * (1.0 + omega) / (1.0 + 2.0 * omega);
         let shift = beta * &self.change;
         let (lower, upper) = shifted(self.bounds, self.body.partition.extremes(shift.as_slice()));
-        // φ ≤ 0, so b ≤ 0 and b̂_n ≥ (1 + ω) b_{n−1}.
+        // φ ≤ 0, so b ≤ 0 and b̂_n ≥ (1 + ω) b_{n−1}. What is not a number must stay so.
         let lower = lower + k * ((1.0 + omega) * self.source.min);
-        let load = (&self.source.load + omega * &self.load_change).map(|b| b.min(0.0));
+        let load =
+            (&self.source.load + omega * &self.load_change).map(|b| if b > 0.0 { 0.0 } else { b });
         let (start, bounds) = (&self.zeta + shift, (lower, upper));
         Some(PlannedStep { n, time, length, k, beta, start, load, bounds })
     }
