@@ -1,10 +1,20 @@
-//! The contact step (26): from ζ_n and f_n to a certified u_n.
+//! The contact step (26), from ζ_n and f_n to a certified u_n:
+//!
+//! u_n minimises ½ uᵀK(ζ_n)u − f_nᵀu over u·ν ≤ g on Γ_C and u = u_D on Γ_D.
+//!
+//! The unknowns are c, the displacements in the nodal bases, where every condition concerns one
+//! unknown, measured from a rigid [`Datum`].
 
 mod accuracy;
 mod certificate;
 mod datum;
 
-use super::{DiscreteProblem, Phases, RunError, State, Step, agreed, extrapolation::Extrapolation};
+pub use accuracy::Accuracy;
+
+use super::{
+    DiscreteProblem, Phases, RunError, State, Step, StepRecord, agreed, discrete_problem::LoadCase,
+    extrapolation::Extrapolation,
+};
 use crate::{
     contact::{self, Bound, ContactError, ContactProblem, ContactReport, ContactSolver, Scales},
     fem::Stiffness,
@@ -12,7 +22,7 @@ use crate::{
 };
 use certificate::Judged;
 use datum::Datum;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use std::time::Instant;
 
 /// Solves the contact problems of a run, one after the other.
@@ -24,47 +34,44 @@ pub struct ContactStep<'a> {
     stiffness: Stiffness,
     /// The triangle means of η_*(ζ) that K was filled with.
     zeta_mean: Vec<f64>,
+    /// The load of the free unknowns, and these.
     load: Vector,
     c: Vector,
-    /// Where c is measured from, now and at the last accepted step.
-    datum: Datum,
-    accepted_datum: Datum,
-    /// The scales of the accepted steps, and with the last solve.
-    scales: Scales,
-    next_scales: Scales,
-    /// The bounds active at the last accepted step, and after the last solve.
-    active: Vec<bool>,
-    next_active: Vec<bool>,
+    /// What every solve starts from, and what the last solve will leave if its step is accepted.
+    accepted: Memory,
+    next: Memory,
+    /// c of the accepted steps.
+    extrapolation: Extrapolation,
     /// Whether this rank knows all triangles around its nodes.
     covered: bool,
+    /// u·ν at the bounds of the rigid motions that only contact constrains, a column each.
     rigid: DMatrix<f64>,
-    work: DVector<f64>,
-    /// c of the accepted steps, and the solver's warm start at the last.
-    evolution: Extrapolation,
-    warm_start: Vec<f64>,
-    /// What the last solve took.
-    report: ContactReport,
 }
 
-/// The rigid part of an answer is worth removing if it is so many times the rest.
+/// What a step leaves to the next one.
+#[derive(Debug, Clone)]
+struct Memory {
+    /// Where displacements are measured from.
+    datum: Datum,
+    /// The largest scales of residuals so far.
+    scales: Scales,
+    /// The active bounds.
+    active: Vec<bool>,
+    /// The solver's warm start.
+    warm_start: Vec<f64>,
+}
+
+/// How often a solver is asked for one answer, more precisely or from another datum.
+const ATTEMPTS: usize = 3;
+/// An answer is mostly rigid if its rigid part is so many times the rest.
 const DOMINANT: f64 = 10.0;
-/// … and from a datum that has been left behind, u is measured anew from so many times on.
+/// … and so far from a datum that was chosen before that even a certified answer is measured anew.
 const FAR: f64 = 1e3;
-/// A deformation below this part of the way that a body is carried is rounding.
-const CARRIED: f64 = 1e-14;
-/// How often displacements may be measured from another datum for one answer.
-const FOLLOWED: usize = 3;
-/// A force limit below this part of the forces that prescribed displacements cause is rounding.
+/// A force scale below this part of the forces that prescribed displacements cause is rounding.
 const LIFTED: f64 = 1e-2;
 /// Loads below this part of the largest of the run count as so much, or an answer to rounding
 /// (sin(pi) = 1.2e-16) would have to have as many digits as any other.
 const LEAST_LOAD: f64 = 1e-6;
-/// Residuals are refused by rounding if they are no more than this many times its estimate.
-const ROUNDED: f64 = 10.0;
-/// How often a solver is asked again, more precisely, when its answer misses the tolerance.
-const ATTEMPTS: usize = 3;
-/// A cosine between u and its elastic forces below this is more than rounding.
-const NEGATIVE_ENERGY: f64 = -1e-10;
 
 impl<'a> ContactStep<'a> {
     /// With the contact solver called `solver`.
@@ -78,56 +85,43 @@ impl<'a> ContactStep<'a> {
         phases: &'a Phases,
     ) -> Result<Self, RunError> {
         let (body, constraints) = (&problem.body, &problem.constraints);
-        let owned = 2 * body.partition.owned();
+        let (comm, unknowns) = (body.partition.comm(), 2 * body.partition.owned());
         let stiffness = phases.time("stiffness pattern", || {
             Stiffness::new(session, body, &problem.elasticity, &constraints.bases)
         })?;
+        let bounded = comm.any(!constraints.bounds.is_empty());
+        let penalty = problem.scene().contact.penalty_duality;
+        let memory = Memory {
+            datum: Datum::default(),
+            scales: Scales { force: LEAST_LOAD * problem.largest_load, displacement: 0.0 },
+            active: vec![false; constraints.bounds.len()],
+            warm_start: Vec::new(),
+        };
         Ok(Self {
             session,
             problem,
             phases,
-            solver: contact::solver(
-                session,
-                solver,
-                body.partition.comm().any(!constraints.bounds.is_empty()),
-                problem.scene().contact.penalty_duality,
-            )?,
+            solver: contact::solver(session, solver, bounded, penalty)?,
             stiffness,
             zeta_mean: vec![1.0; body.triangles.len()],
-            load: Vector::zeros(session, owned)?,
-            c: Vector::zeros(session, owned)?,
-            datum: Datum::default(),
-            accepted_datum: Datum::default(),
-            scales: Scales { force: LEAST_LOAD * problem.largest_load, displacement: 0.0 },
-            next_scales: Scales { force: 0.0, displacement: 0.0 },
-            active: vec![false; constraints.bounds.len()],
-            next_active: Vec::new(),
-            covered: body.partition.comm().all(body.is_covered()),
+            load: Vector::zeros(session, unknowns)?,
+            c: Vector::zeros(session, unknowns)?,
+            next: memory.clone(),
+            accepted: memory,
+            extrapolation: Extrapolation::new(comm),
+            covered: comm.all(body.is_covered()),
             rigid: problem.motions.normal_at(body, &constraints.bounds),
-            work: DVector::zeros(problem.motions.resisted()),
-            evolution: Extrapolation::new(body.partition.comm(), owned),
-            warm_start: Vec::new(),
-            report: ContactReport::default(),
         })
     }
 
-    /// The name of the method in use.
-    pub fn method(&self) -> &'static str {
-        self.solver.name()
-    }
-
     /// Gives the solver a warm start as its own `warm_start` would: for the active set a 1
-    /// for each bound that is guessed to press, else 0.
-    pub fn set_warm_start(&mut self, kept: &[f64]) {
-        self.solver.set_warm_start(kept);
+    /// for each bound that is guessed to be active, else 0.
+    pub fn set_warm_start(&mut self, warm_start: &[f64]) {
+        self.accepted.warm_start = warm_start.to_vec();
     }
 
-    /// What the last solve took that gave an answer.
-    pub fn report(&self) -> &ContactReport {
-        &self.report
-    }
-
-    /// u_n at `time` for the nodal damage `zeta`, starting from where the last steps lead.
+    /// u_n at `time` for the nodal damage `zeta`. Every solve starts from the accepted steps, whatever
+    /// was solved since the last of them.
     ///
     /// # Errors
     /// The solver failed, or no answer of its met the KKT tolerance.
@@ -135,100 +129,33 @@ impl<'a> ContactStep<'a> {
         let started = Instant::now();
         let (problem, phases) = (self.problem, self.phases);
         self.fill(&problem.triangle_means(zeta))?;
-        let external = phases.time("loads", || problem.load(time));
-        problem.check_load(time, &external)?;
-        let external = problem.motions.balanced(&problem.body, external);
-        let prescribed = problem.loads.prescribed_at(time);
-        let posed = agreed(problem.body.partition.comm(), problem.posed(time))?;
-
-        self.start(time, &external, &posed)?;
-        let failed = |source| RunError::contact(problem.scene(), step, time, source);
-        let mut total = ContactReport::default();
-        let (mut tolerance, mut attempts) = (problem.tolerance, 0);
-        loop {
-            attempts += 1;
-            let (lift, bounds) = self.datum.pose(problem, &posed);
-            let force = self.set_load(&external, &lift)?;
-            let solved = match self.solve_contact(&bounds, force, tolerance) {
-                // All ranks know that the method stopped short; other errors may be one rank's.
-                Err(e @ (ContactError::NotConverged { .. } | ContactError::TaoStopped { .. })) => {
-                    Err(e)
-                }
-                other => Ok(other.map_err(failed)?),
-            };
-            let u = self.displacement(&lift)?;
-            let judged = phases.time("certificate", || self.certify(&u, &external, &prescribed));
-            // Rounding of a long way hides a small deformation: measured from the way's end it
-            // has all its digits.
-            let certified = judged.kkt.within(problem.tolerance);
-            let far = !self.datum.field.is_empty() && judged.sizes[0] > FAR * judged.sizes[1];
-            if (far || !certified) && attempts < FOLLOWED && self.follow(&judged)? {
-                continue;
-            }
-            match solved {
-                Ok(report) => total.add(&report),
-                // What a solver thinks of its answer is not asked if the certificate holds.
-                Err(_) if certified => {}
-                Err(error) => return Err(failed(self.limited(error, &judged, &u))),
-            }
-            self.report = total;
-            // Then a KKT point need not be a minimum, and which solver would notice is chance.
-            if judged.energy < NEGATIVE_ENERGY {
-                return Err(failed(ContactError::NotDefinite { method: self.solver.name() }));
-            }
-            if certified {
-                let Judged { kkt, scales, force, contact, .. } = judged;
-                self.next_scales = scales;
-                self.next_active = self.active_bounds(&contact, 0.0);
-                let unheld = self.unheld(&contact, force);
-                let (u, zeta_mean) = (self.datum.total(u), self.zeta_mean.clone());
-                let state = State { time, u, zeta: zeta.to_vec(), zeta_mean, contact };
-                let mut record = phases.time("figures", || {
-                    certificate::figures(problem, step, &state, &external, &total, &kkt)
-                });
-                record.seconds = started.elapsed().as_secs_f64();
-                return Ok(Step { state, record, unheld });
-            }
-            if attempts == ATTEMPTS || judged.kkt.worst().is_nan() {
-                let (method, tolerance) = (self.solver.name(), problem.tolerance);
-                let residuals = judged.kkt;
-                let error = ContactError::NotCertified { method, tolerance, residuals };
-                return Err(failed(self.limited(error, &judged, &u)));
-            }
-            tolerance *= 0.3 * problem.tolerance / judged.kkt.worst();
-        }
+        let case = phases.time("loads", || problem.load_case(time));
+        let case = agreed(problem.body.partition.comm(), case)?;
+        self.start(&case)?;
+        let (Judged { u, kkt, scales, force, contact, .. }, report) =
+            self.solve_certified(step, &case)?;
+        self.next.scales = scales;
+        self.next.active = self.active_bounds(&contact, 0.0);
+        let unconstrained = self.unconstrained_motion(&contact, force);
+        let (u, zeta_mean) = (self.next.datum.total(u), self.zeta_mean.clone());
+        let state = State { time, u, zeta: zeta.to_vec(), zeta_mean, contact };
+        let mut record = phases
+            .time("figures", || StepRecord::new(problem, step, &state, &case.load, &report, &kkt));
+        record.seconds = started.elapsed().as_secs_f64();
+        Ok(Step { state, record, report, unconstrained, skipped_damage_solve: false })
     }
 
-    /// The scales of an answer, not below those of the run so far, nor below rounding: of the way of
-    /// the datum (a body that is only carried along has no other scales), and with displacements not
-    /// below those that the forces cause at least.
-    fn with_floors(&self, own: Scales) -> Scales {
-        let way = match self.datum.field[..] {
-            [] => 0.0,
-            _ => CARRIED * self.problem.body.partition.largest(&self.datum.field),
-        };
-        let force = own.force.max(self.scales.force).max(self.stiffness.scale * way);
-        let least = way.max(force / self.stiffness.scale);
-        Scales { force, displacement: own.displacement.max(self.scales.displacement).max(least) }
-    }
-
-    /// Sets the start c of a solve at `time`, and where displacements are measured from.
-    fn start(
-        &mut self,
-        time: f64,
-        external: &[f64],
-        posed: &(Vec<f64>, Vec<Bound>),
-    ) -> Result<(), PetscError> {
-        let problem = self.problem;
-        let nothing = external.iter().chain(&posed.0).all(|&value| value == 0.0);
-        let rests = problem.body.partition.comm().all(nothing);
-        if rests {
-            self.datum = Datum::default();
-        }
-        self.phases.time("extrapolation", || {
-            self.c.set(&self.datum.relative(problem, self.evolution.at(time)))
-        })?;
-        if rests { Ok(()) } else { self.approach(external, posed) }
+    /// The last solve, at `time`, belongs to an accepted step.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub fn accept(&mut self, time: f64) -> Result<(), PetscError> {
+        let c = self.c.read(<[f64]>::to_vec)?;
+        let c = self.next.datum.shifted(self.problem, c, 1.0);
+        self.phases.time("extrapolation", || self.extrapolation.accept(time, c));
+        self.next.warm_start = self.solver.warm_start();
+        self.accepted = self.next.clone();
+        Ok(())
     }
 
     /// Fills K for the triangle means of η_*(ζ).
@@ -242,63 +169,107 @@ impl<'a> ContactStep<'a> {
         Ok(())
     }
 
-    /// The last solve, at `time`, belongs to an accepted step.
-    pub fn accept(&mut self, time: f64) -> Result<(), PetscError> {
-        let c = self.datum.absolute(self.problem, self.c.read(<[f64]>::to_vec)?);
-        self.accepted_datum = self.datum.clone();
-        self.scales = self.next_scales;
-        self.active.clone_from(&self.next_active);
-        self.phases.time("extrapolation", || self.evolution.accept(time, c));
-        self.warm_start = self.solver.warm_start();
-        Ok(())
+    /// Starts from the accepted steps: sets c, the datum and the solver's warm start.
+    fn start(&mut self, case: &LoadCase) -> Result<(), PetscError> {
+        let problem = self.problem;
+        self.next = self.accepted.clone();
+        self.solver.set_warm_start(&self.next.warm_start);
+        let zero = case.load.iter().chain(&case.lift).all(|&value| value == 0.0);
+        let unloaded = problem.body.partition.comm().all(zero);
+        if unloaded {
+            self.next.datum = Datum::default();
+        }
+        self.phases.time("extrapolation", || {
+            let predicted = self.extrapolation.at(case.time);
+            let c = predicted.unwrap_or_else(|| vec![0.0; self.c.owned()]);
+            self.c.set(&self.next.datum.shifted(problem, c, -1.0))
+        })?;
+        if unloaded { Ok(()) } else { self.approach(case) }
     }
 
-    /// The solves since the last accepted step have not happened.
-    pub fn undo(&mut self) -> Result<(), PetscError> {
-        self.c.set(self.evolution.last())?;
-        self.datum = self.accepted_datum.clone();
-        self.solver.set_warm_start(&self.warm_start);
-        Ok(())
-    }
-
-    /// Where the bounds active so far do not support the body: measures displacements from where
-    /// the load drives it as a rigid one.
-    fn approach(
-        &mut self,
-        external: &[f64],
-        posed: &(Vec<f64>, Vec<Bound>),
-    ) -> Result<(), PetscError> {
+    /// Where the active bounds do not support the body, moves the datum, and c with it, to where the
+    /// load drives the body as a rigid one.
+    fn approach(&mut self, case: &LoadCase) -> Result<(), PetscError> {
         let problem = self.problem;
         let (body, comm) = (&problem.body, problem.body.partition.comm());
-        if contact::unheld(comm, &self.rigid, &self.active).is_empty() {
+        if contact::unheld(comm, &self.rigid, &self.next.active).is_empty() {
             return Ok(());
         }
-        // Prescribed displacements do no work on motions that they prevent.
-        let work = problem.motions.work(body, external);
-        let (_, bounds) = self.datum.pose(problem, posed);
-        let way = self.c.read(|c| {
-            contact::approach(comm, (&self.rigid, &work), &bounds, c, self.active.clone(), false)
+        let (_, bounds) = self.next.datum.pose(problem, case);
+        let motion = (&self.rigid, &case.work);
+        let approach = self.c.read(|c| {
+            contact::approach(comm, motion, &bounds, c, self.next.active.clone(), false)
         })?;
-        // The start c moves along.
-        self.datum.add(problem, &problem.motions.displacement(body, &way.amplitudes));
+        self.next.datum.add(problem, &problem.motions.displacement(body, &approach.amplitudes));
         Ok(())
     }
 
-    /// Measures displacements from further on if the answer is mostly a rigid motion.
-    fn follow(&mut self, judged: &Judged) -> Result<bool, PetscError> {
-        let c = self.datum.absolute(self.problem, self.c.read(<[f64]>::to_vec)?);
-        let [rigid, rest] = judged.sizes;
-        if rigid <= DOMINANT * rest {
+    /// Solves until the certificate accepts the answer: more precisely, or from another datum, where
+    /// it does not. What the solver thinks of an answer does not matter then.
+    fn solve_certified(
+        &mut self,
+        step: usize,
+        case: &LoadCase,
+    ) -> Result<(Judged, ContactReport), RunError> {
+        let problem = self.problem;
+        let failed = |source| RunError::contact(problem, step, case.time, source);
+        let mut report = ContactReport::default();
+        let mut tolerance = problem.tolerance;
+        let mut attempt = 1;
+        loop {
+            let (lift, bounds) = self.next.datum.pose(problem, case);
+            let force = self.set_load(&case.load, &lift)?;
+            let solved = match self.solve_contact(case, &bounds, force, tolerance) {
+                // All ranks know that the method stopped short; other errors may be one rank's.
+                Err(error) if !error.is_missed() => return Err(failed(error)),
+                solved => solved,
+            };
+            let u = self.displacement(lift)?;
+            let judged = self.phases.time("certificate", || self.certify(u, case));
+            let certified = judged.kkt.within(problem.tolerance);
+            let far = !self.next.datum.is_zero() && judged.rigid_max > FAR * judged.elastic_max;
+            if (far || !certified) && attempt < ATTEMPTS && self.move_datum(&judged)? {
+                attempt += 1;
+                continue;
+            }
+            match solved {
+                Ok(solved) => report.add(&solved),
+                Err(error) if !certified => return Err(failed(self.limited(error, &judged))),
+                Err(_) => {}
+            }
+            let method = self.solver.name();
+            // Then a KKT point need not be a minimum, and which solver would notice is chance.
+            if judged.is_indefinite() {
+                return Err(failed(ContactError::NotDefinite { method }));
+            }
+            if certified {
+                return Ok((judged, report));
+            }
+            if attempt == ATTEMPTS || judged.kkt.worst().is_nan() {
+                let (tolerance, residuals) = (problem.tolerance, judged.kkt);
+                let error = ContactError::NotCertified { method, tolerance, residuals };
+                return Err(failed(self.limited(error, &judged)));
+            }
+            tolerance *= 0.3 * problem.tolerance / judged.kkt.worst();
+            attempt += 1;
+        }
+    }
+
+    /// Moves the datum by the rigid part of an answer, if the answer is mostly that.
+    fn move_datum(&mut self, judged: &Judged) -> Result<bool, PetscError> {
+        if judged.rigid_max <= DOMINANT * judged.elastic_max {
             return Ok(false);
         }
+        let c = self.c.read(<[f64]>::to_vec)?;
+        let c = self.next.datum.shifted(self.problem, c, 1.0);
         let nodes = &self.problem.body.mesh.nodes;
         let motion: Vec<f64> = nodes.iter().flat_map(|&x| judged.rigid.at(x)).collect();
-        self.datum.add(self.problem, &motion);
-        self.c.set(&self.datum.relative(self.problem, c))?;
+        self.next.datum.add(self.problem, &motion);
+        self.c.set(&self.next.datum.shifted(self.problem, c, -1.0))?;
         Ok(true)
     }
 
-    /// Sets the load of the free unknowns, f − K u_D, and returns the size of forces.
+    /// Sets the load of the free unknowns, f − K u_D, and returns the scale of forces.
     fn set_load(&mut self, external: &[f64], lift: &[f64]) -> Result<f64, PetscError> {
         let problem = self.problem;
         let (body, bases) = (&problem.body, &problem.constraints.bases);
@@ -312,27 +283,24 @@ impl<'a> ContactStep<'a> {
             scale = scale.max(LIFTED * body.partition.norm(&load, 2));
         }
         bases.force_to_local(&mut load);
-        load.iter_mut()
-            .zip(bases.fixed())
-            .for_each(|(f, fixed)| *f = if *fixed { 0.0 } else { *f });
+        let fixed = load.iter_mut().zip(bases.fixed()).filter(|(_, fixed)| **fixed);
+        fixed.for_each(|(f, _)| *f = 0.0);
         self.load.set(&load[..self.load.owned()])?;
-        // Prescribed displacements do no work on motions that they hold.
-        self.work = problem.motions.work(body, external);
         Ok(scale)
     }
 
-    /// From c to the c that answers (26), where forces of size `force` count as 1.
+    /// Replaces c by the solution of (26); forces of `force` N per metre of thickness count as 1.
     fn solve_contact(
         &mut self,
+        case: &LoadCase,
         bounds: &[Bound],
         force: f64,
         tolerance: f64,
     ) -> Result<ContactReport, ContactError> {
-        let problem = self.problem;
-        let comm = problem.body.partition.comm();
-        let rests = |bound: &Bound| bound.nearest(0.0) == 0.0;
-        if comm.all(self.load.read(|f| f.iter().all(|&f| f == 0.0))? && bounds.iter().all(rests)) {
-            // Nothing pushes and no obstacle is in the way: the body rests.
+        let comm = self.problem.body.partition.comm();
+        let admits_zero = |bound: &Bound| bound.nearest(0.0) == 0.0;
+        let unloaded = self.load.read(|f| f.iter().all(|&f| f == 0.0))?;
+        if comm.all(unloaded && bounds.iter().all(admits_zero)) {
             self.c.write(|c| c.fill(0.0))?;
             return Ok(ContactReport::default());
         }
@@ -342,8 +310,8 @@ impl<'a> ContactStep<'a> {
             load: &self.load,
             bounds,
             rigid: &self.rigid,
-            work: &self.work,
-            scales: self.with_floors(Scales { force, displacement: 0.0 }),
+            work: &case.work,
+            scales: self.run_scales(Scales { force, displacement: 0.0 }),
             tolerance,
             comm,
             phases: self.phases,
@@ -352,9 +320,9 @@ impl<'a> ContactStep<'a> {
     }
 
     /// u from the unknowns c and the prescribed ones, without free rigid motions.
-    fn displacement(&self, lift: &[f64]) -> Result<Vec<f64>, PetscError> {
+    fn displacement(&self, lift: Vec<f64>) -> Result<Vec<f64>, PetscError> {
         let problem = self.problem;
-        let mut u = lift.to_vec();
+        let mut u = lift;
         self.c.read(|c| u.iter_mut().zip(c).for_each(|(u, c)| *u += c))?;
         problem.constraints.bases.displacement_to_global(&mut u);
         problem.body.partition.update(&mut u, 2)?;

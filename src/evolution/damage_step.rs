@@ -1,51 +1,39 @@
-//! The damage step (28).
+//! The damage step (28): ζ_n from ζ_{n−1} and u_{n−1}.
 
-use super::{DiscreteProblem, Phases};
+use super::{DiscreteProblem, Phases, RunError, State, StepFailure, step_controller::PlannedStep};
 use crate::{
     fem::{self, DamageCertificate, DamageSystem},
     model::DamageLaw,
     petsc::{PetscError, Session},
 };
+use nalgebra::DVector;
 
-/// ζ_n from ζ_{n−1} and u_{n−1}; does nothing for a material that is not damaged.
+/// Solves the damage systems (M + kκL) ζ_n = M ζ_{n−1} + k b_{n−1} of a run.
 pub(super) struct DamageStep<'a> {
     session: &'a Session,
     problem: &'a DiscreteProblem,
     phases: &'a Phases,
-    law: Option<DamageLaw>,
-    /// M + kκL, made when a step needs it, and its k.
+    /// k and M + kκL, factorised by the first step that needs it.
     system: Option<(f64, DamageSystem)>,
 }
 
-/// The source of a state.
-pub(super) struct Source {
-    /// b, m²/s.
-    pub(super) load: Vec<f64>,
-    /// The least φ, 1/s.
-    pub(super) least: f64,
+/// The damage source φ(ε(u), ζ) of a state; zero where there is no damage law.
+pub(super) struct DamageSource {
+    /// b_i = ∫ φ λ_i, m²/s.
+    pub(super) load: DVector<f64>,
+    /// min φ ≤ 0, 1/s.
+    pub(super) min: f64,
 }
 
-/// What became of a damage step.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum DamageUpdate {
-    /// The system was solved; what the solution is worth.
-    Solved(DamageCertificate),
-    /// No source and a uniform ζ: ζ_n = ζ_{n−1} without a solve.
-    Nothing,
-    /// The linear solver failed.
-    Failed,
-    /// The solution misses the tolerance by this residual.
-    Missed(f64),
-}
-
-impl DamageUpdate {
-    /// What ζ_n is worth; without a solve it is exact.
-    pub(super) fn certificate(self) -> DamageCertificate {
-        match self {
-            Self::Solved(certificate) => certificate,
-            Self::Nothing | Self::Failed | Self::Missed(_) => DamageCertificate::default(),
-        }
-    }
+/// The answer of a damage step.
+pub(super) struct DamageUpdate {
+    /// ζ_n at the nodes.
+    pub(super) zeta: Vec<f64>,
+    /// min ζ_n and max ζ_n.
+    pub(super) min_max: (f64, f64),
+    /// The accuracy of ζ_n. `None` where the solve was skipped: a uniform ζ_{n−1} without source
+    /// stays exactly as it is.
+    pub(super) certificate: Option<DamageCertificate>,
 }
 
 impl<'a> DamageStep<'a> {
@@ -54,93 +42,102 @@ impl<'a> DamageStep<'a> {
         problem: &'a DiscreteProblem,
         phases: &'a Phases,
     ) -> Self {
-        Self { session, problem, phases, law: problem.damage(), system: None }
+        Self { session, problem, phases, system: None }
     }
 
-    /// The source of u and ζ, where there is a damage law.
-    pub(super) fn source(&self, u: &[f64], zeta: &[f64]) -> Option<Source> {
-        let (law, body) = (self.law?, &self.problem.body);
-        Some(self.phases.time("damage source", || {
-            let strain = self.problem.elasticity.strain_squared(body, u);
-            let phi = fem::source(body, &law, &strain, zeta);
-            let least = phi.iter().flatten().copied().fold(0.0, f64::min);
-            let least = body.partition.comm().min(least);
-            Source { load: fem::source_load(body, self.problem.mass(), &phi), least }
-        }))
-    }
-
-    /// ζ_n, `step` s after ζ_{n−1} = `start`, for the source load b = `load`.
-    pub(super) fn advance(
-        &mut self,
-        load: Option<&[f64]>,
-        start: &[f64],
-        step: f64,
-    ) -> Result<(Vec<f64>, DamageUpdate), PetscError> {
-        let mut zeta = start.to_vec();
-        let (Some(law), Some(load)) = (self.law, load) else {
-            return Ok((zeta, DamageUpdate::Nothing));
+    /// The damage source of a state.
+    pub(super) fn source(&self, state: &State) -> DamageSource {
+        let (problem, body) = (self.problem, &self.problem.body);
+        let Some(law) = problem.damage() else {
+            return DamageSource { load: DVector::zeros(state.zeta.len()), min: 0.0 };
         };
-        let problem = self.problem;
+        self.phases.time("damage source", || {
+            let strain = problem.elasticity.strain_squared(body, &state.u);
+            let phi = fem::source(body, &law, &strain, &state.zeta);
+            let min = phi.iter().flatten().copied().fold(0.0, f64::min);
+            let min = body.partition.comm().min(min);
+            let load = fem::source_load(body, problem.mass(), &phi);
+            DamageSource { load: DVector::from_vec(load), min }
+        })
+    }
+
+    /// ζ_n of a planned step.
+    ///
+    /// # Errors
+    /// The system has no finite solution, or was solved too inaccurately.
+    pub(super) fn solve(&mut self, planned: &PlannedStep) -> Result<DamageUpdate, RunError> {
+        let (problem, phases) = (self.problem, self.phases);
         let partition = &problem.body.partition;
-        let (low, high) = partition.extremes(start);
-        if low == high && partition.comm().all(load.iter().all(|&b| b == 0.0)) {
-            return Ok((zeta, DamageUpdate::Nothing));
-        }
-        let phases = self.phases;
-        let system = self.system(&law, step)?;
+        let (start, load) = (planned.start.as_slice(), planned.load.as_slice());
+        let mut zeta = start.to_vec();
+        let min_max = partition.extremes(&zeta);
+        let stays = min_max.0 == min_max.1 && self.is_zero(load);
+        let Some(law) = problem.damage().filter(|_| !stays) else {
+            return Ok(DamageUpdate { zeta, min_max, certificate: None });
+        };
+        let system = self.system(&law, planned.k)?;
         if !phases.time("damage solve", || system.advance(load, &mut zeta))? {
-            return Ok((zeta, DamageUpdate::Failed));
+            return Err(planned.failed(StepFailure::Damage));
         }
-        let largest = system.largest_residual()?;
+        let largest_residual = system.largest_residual()?;
         partition.update(&mut zeta, 1)?;
         let certificate = phases.time("damage certificate", || {
-            let (body, fields) = (&problem.body, [start, &zeta]);
-            DamageCertificate::of(body, problem.mass(), law.diffusion, step, load, fields)
+            let (body, mass, fields) = (&problem.body, problem.mass(), [start, &zeta]);
+            DamageCertificate::of(body, mass, law.diffusion, planned.k, load, fields)
         });
-        let driving = match certificate.residual {
-            residual if !residual.is_finite() => DamageUpdate::Failed,
-            residual if residual > largest => DamageUpdate::Missed(residual),
-            _ => DamageUpdate::Solved(certificate),
-        };
-        Ok((zeta, driving))
+        match certificate.residual {
+            residual if !residual.is_finite() => Err(planned.failed(StepFailure::Damage)),
+            residual if residual > largest_residual => {
+                Err(planned.failed(StepFailure::DamageResidual(residual)))
+            }
+            _ => {
+                let (min_max, certificate) = (partition.extremes(&zeta), Some(certificate));
+                Ok(DamageUpdate { zeta, min_max, certificate })
+            }
+        }
     }
 
-    /// By how much ζ_n changes if the source load of a step of `step` s changes by `load`. `None` if
-    /// that has no finite answer.
+    /// (M + kκL)⁻¹ k b: what ζ_n of a planned step changes by if its source load changes by
+    /// b = `load`, m²/s.
+    ///
+    /// # Errors
+    /// The system has no finite solution.
     pub(super) fn correction(
         &mut self,
-        load: &[f64],
-        step: f64,
-    ) -> Result<Option<Vec<f64>>, PetscError> {
-        let partition = &self.problem.body.partition;
-        let nothing = partition.comm().all(load.iter().all(|&b| b == 0.0));
-        let Some(law) = self.law.filter(|_| !nothing) else {
-            return Ok(Some(vec![0.0; partition.local()]));
+        planned: &PlannedStep,
+        load: DVector<f64>,
+    ) -> Result<DVector<f64>, RunError> {
+        let (partition, phases) = (&self.problem.body.partition, self.phases);
+        let zero = self.is_zero(load.as_slice());
+        let Some(law) = self.problem.damage().filter(|_| !zero) else {
+            return Ok(DVector::zeros(load.len()));
         };
-        let phases = self.phases;
-        let system = self.system(&law, step)?;
-        let solved = phases.time("damage solve", || system.correction(load))?;
-        let Some(mut change) = solved else { return Ok(None) };
-        change.resize(partition.local(), 0.0);
-        partition.update(&mut change, 1)?;
+        let system = self.system(&law, planned.k)?;
+        let solved = phases.time("damage solve", || system.correction(load.as_slice()))?;
+        let failed = || planned.failed(StepFailure::Damage);
+        let change = partition.field(solved.ok_or_else(failed)?, 1)?;
         let finite = partition.comm().all(change.iter().all(|z| z.is_finite()));
-        Ok(finite.then_some(change))
+        if finite { Ok(DVector::from_vec(change)) } else { Err(failed()) }
     }
 
-    /// The damage system of a step of `step` s.
-    fn system(&mut self, law: &DamageLaw, step: f64) -> Result<&mut DamageSystem, PetscError> {
+    /// Whether a source load is zero on all ranks. Collective.
+    fn is_zero(&self, load: &[f64]) -> bool {
+        self.problem.body.partition.comm().all(load.iter().all(|&b| b == 0.0))
+    }
+
+    /// The damage system of a step of `k` s, factorised.
+    fn system(&mut self, law: &DamageLaw, k: f64) -> Result<&mut DamageSystem, PetscError> {
         let (session, problem, phases) = (self.session, self.problem, self.phases);
-        let made = match self.system.take() {
-            Some((k, system)) if k == step => system,
+        let system = match self.system.take() {
+            Some((factorised, system)) if factorised == k => system,
             Some((_, mut system)) => {
-                phases.time("damage factor", || system.set_step(step))?;
+                phases.time("damage factor", || system.set_step(k))?;
                 system
             }
             None => phases.time("damage factor", || {
-                let (body, mass) = (&problem.body, problem.mass());
-                DamageSystem::new(session, body, mass, law.diffusion, step)
+                DamageSystem::new(session, &problem.body, problem.mass(), law.diffusion, k)
             })?,
         };
-        Ok(&mut self.system.insert((step, made)).1)
+        Ok(&mut self.system.insert((k, system)).1)
     }
 }

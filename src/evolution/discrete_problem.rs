@@ -1,18 +1,16 @@
-//! The physical setting: a scene bound to its mesh, everything that does not change with time.
+//! The discrete problem: a scene bound to its mesh, all that does not change from step to step.
 
-use super::{Foundation, Loads, resultants};
+use super::{Foundation, Loads, boundary_conditions::BoundaryConditions, resultants};
 use crate::{
-    contact::{
-        Bound, Certificate, ConstraintError, Constraints, DrivenMotion, FixedRow, GapRow,
-        RigidMotions, join_gap,
-    },
+    contact::{Bound, Certificate, ConstraintError, Constraints, DrivenMotion, RigidMotions},
     fem::{Body, Elasticity, Mass, Subdomain},
-    mesh::{Mesh, boundary_nodes},
+    mesh::Mesh,
     model::DamageLaw,
     petsc::{PetscError, Session},
-    scene::{Condition, Scene, SceneError},
+    scene::{Scene, SceneError},
 };
-use std::{collections::BTreeMap, path::PathBuf};
+use nalgebra::DVector;
+use std::path::PathBuf;
 
 /// A scene on its mesh, ready to be stepped.
 #[derive(Debug)]
@@ -25,12 +23,12 @@ pub struct DiscreteProblem {
     pub constraints: Constraints,
     /// The same conditions as posed, to judge answers by.
     pub certificate: Certificate,
-    /// Rigid motions that Γ_D does not hold.
+    /// Rigid motions that Γ_D leaves unconstrained.
     pub motions: RigidMotions,
     /// Loads and prescribed displacements.
     pub loads: Loads,
     /// The largest ‖·‖₂ of the nodal loads at some times of the run, N per metre of thickness.
-    pub largest_load: f64,
+    pub(super) largest_load: f64,
     /// KKT tolerance.
     pub tolerance: f64,
     /// The foundation opposite Γ_C.
@@ -40,7 +38,22 @@ pub struct DiscreteProblem {
     scene: Scene,
 }
 
-/// Times at which the loads of a run are looked at for the largest.
+/// What the contact problem (26) of one time is posed with.
+#[derive(Debug)]
+pub(super) struct LoadCase {
+    /// t, s.
+    pub(super) time: f64,
+    /// Nodal loads f, N per metre of thickness, and their work on the motions that contact resists.
+    pub(super) load: Vec<f64>,
+    pub(super) work: DVector<f64>,
+    /// The values of the prescribed rows, m, and the unknowns prescribed by them, 0 elsewhere.
+    pub(super) prescribed: Vec<f64>,
+    pub(super) lift: Vec<f64>,
+    /// The bounds on the other unknowns.
+    pub(super) bounds: Vec<Bound>,
+}
+
+/// Times at which the loads of a run are sampled for the largest.
 const SAMPLES: usize = 9;
 /// A load below this part of the largest is rounding.
 const UNLOADED: f64 = 1e-14;
@@ -91,29 +104,26 @@ impl DiscreteProblem {
     pub fn new(scene: Scene, mesh: Mesh) -> Result<Self, SetupError> {
         scene.check_mesh(&mesh)?;
         let body = Body::new(mesh);
-        let (mut fixed, prescribed) = fixed_rows(&scene, &body.mesh);
-        let mut gaps = gap_rows(&scene, &body.mesh);
-        let directions: Vec<_> = fixed.iter().map(|row| (row.node, row.direction)).collect();
-        let motions = RigidMotions::new(&body, &directions, &gaps);
-        let axes = fixed.iter_mut().zip(&prescribed).filter(|(_, value)| value.is_none());
-        axes.for_each(|(row, _)| {
-            row.direction = motions.tangential(&body, row.node, row.direction);
-        });
-        gaps.iter_mut()
-            .for_each(|row| row.normal = motions.tangential(&body, row.node, row.normal));
-        let mut constraints = Constraints::new(&body.mesh.nodes, &fixed, &gaps)
+        let mut conditions = BoundaryConditions::new(&scene, &body.mesh);
+        let motions = conditions.resolve_motions(&body);
+        let (fixed, gaps) = (&conditions.fixed, &conditions.gaps);
+        let mut constraints = Constraints::new(&body.mesh.nodes, fixed, gaps)
             .map_err(|source| SetupError::Constraint { scene: scene.path.clone(), source })?;
-        let loads = Loads::new(&scene, &body, prescribed);
         motions.pin_free(&body, &mut constraints);
-
-        let sizes = scene.sample_times(SAMPLES).into_iter();
-        let sizes = sizes.map(|time| body.partition.norm(&loads.at(&body, time), 2));
-        let largest_load = sizes.filter(|size| size.is_finite()).fold(0.0, f64::max);
+        let certificate = Certificate::new(fixed, &constraints.gaps);
+        let foundation = Foundation::new(&conditions, &body.mesh, &constraints.gaps);
+        let unresolved = (conditions.tractions.iter())
+            .filter_map(|traction| resultants::unresolved(&scene, &body.mesh, traction))
+            .collect();
+        let BoundaryConditions { tractions, prescribed, .. } = conditions;
+        let loads = Loads::new(&body, &scene.body_force, tractions, prescribed);
+        let norms = (scene.sample_times(SAMPLES).into_iter())
+            .map(|time| body.partition.norm(&loads.at(&body, time), 2));
         let problem = Self {
-            largest_load,
-            foundation: Foundation::new(&scene, &body.mesh, &constraints),
-            unresolved: resultants::unresolved(&scene, &body.mesh),
-            certificate: Certificate::new(&fixed, &constraints.gaps),
+            largest_load: norms.filter(|norm| norm.is_finite()).fold(0.0, f64::max),
+            foundation,
+            unresolved,
+            certificate,
             elasticity: Elasticity::new(scene.material),
             constraints,
             motions,
@@ -126,7 +136,7 @@ impl DiscreteProblem {
         Ok(problem)
     }
 
-    /// This rank's share of a setting that every rank has made. Collective.
+    /// The part of this rank's subdomain in a problem that every rank has made. Collective.
     ///
     /// # Errors
     /// PETSc cannot divide the mesh.
@@ -150,7 +160,7 @@ impl DiscreteProblem {
         let mut times = self.scene.sample_times(most);
         times.truncate(if self.loads.depend_on_time() { usize::MAX } else { 1 });
         for time in times {
-            self.posed(time)?;
+            self.lift_and_bounds(time, &self.loads.prescribed_at(time))?;
             if !self.motions.held() {
                 self.check_load(time, &self.load(time))?;
             }
@@ -159,21 +169,34 @@ impl DiscreteProblem {
     }
 
     /// Nodal loads at `time`, N per metre of thickness; rounding of the largest load of the run
-    /// (sin(pi) = 1.2e-16) is none.
+    /// (sin(pi) = 1.2e-16) counts as zero.
     pub fn load(&self, time: f64) -> Vec<f64> {
         let load = self.loads.at(&self.body, time);
-        let size = self.body.partition.norm(&load, 2);
-        match size > 0.0 && size <= UNLOADED * self.largest_load {
+        let norm = self.body.partition.norm(&load, 2);
+        match norm > 0.0 && norm <= UNLOADED * self.largest_load {
             true => vec![0.0; load.len()],
             false => load,
         }
     }
 
-    /// Checks that the load at `time` is finite and drives no rigid motion that nothing holds.
+    /// What (26) is posed with at `time`.
     ///
     /// # Errors
-    /// It is not, or it does; the error then names the motion.
-    pub fn check_load(&self, time: f64, load: &[f64]) -> Result<(), SetupError> {
+    /// The load is not finite or drives an unconstrained rigid motion; prescribed values are not
+    /// finite, contradict each other or go through the obstacle; obstacles leave a node no room.
+    pub(super) fn load_case(&self, time: f64) -> Result<LoadCase, SetupError> {
+        let load = self.load(time);
+        self.check_load(time, &load)?;
+        let load = self.motions.balanced(&self.body, load);
+        let work = self.motions.work(&self.body, &load);
+        let prescribed = self.loads.prescribed_at(time);
+        let (lift, bounds) = self.lift_and_bounds(time, &prescribed)?;
+        Ok(LoadCase { time, load, work, prescribed, lift, bounds })
+    }
+
+    /// Checks that the load at `time` is finite and drives no rigid motion that is unconstrained.
+    /// Collective.
+    fn check_load(&self, time: f64, load: &[f64]) -> Result<(), SetupError> {
         let comm = self.body.partition.comm();
         if !comm.all(load.iter().all(|f| f.is_finite())) {
             return Err(self.not_finite(time));
@@ -196,31 +219,20 @@ impl DiscreteProblem {
         }
     }
 
-    /// The prescribed unknowns at `time`, zero elsewhere.
-    ///
-    /// # Errors
-    /// Prescribed values are not finite, contradict each other or go through the obstacle.
-    pub fn lift(&self, time: f64) -> Result<Vec<f64>, SetupError> {
-        let values = self.loads.prescribed_at(time);
+    /// The unknowns prescribed at `time` by the `values` of the prescribed rows, and the bounds on the
+    /// others.
+    fn lift_and_bounds(
+        &self,
+        time: f64,
+        values: &[f64],
+    ) -> Result<(Vec<f64>, Vec<Bound>), SetupError> {
         if !values.iter().all(|value| value.is_finite()) {
             return Err(self.not_finite(time));
         }
-        self.constraints
-            .lift(&values, &self.body.mesh.nodes)
+        let (constraints, nodes) = (&self.constraints, &self.body.mesh.nodes);
+        (constraints.lift(values, nodes))
+            .and_then(|lift| constraints.bounds_at(&lift, nodes).map(|bounds| (lift, bounds)))
             .map_err(|source| SetupError::Constraint { scene: self.scene.path.clone(), source })
-    }
-
-    /// The prescribed unknowns at `time`, and the bounds on the others.
-    ///
-    /// # Errors
-    /// Those of [`Self::lift`], and obstacles that leave a node no room.
-    pub fn posed(&self, time: f64) -> Result<(Vec<f64>, Vec<Bound>), SetupError> {
-        let lift = self.lift(time)?;
-        let bounds = self
-            .constraints
-            .bounds_at(&lift, &self.body.mesh.nodes)
-            .map_err(|source| SetupError::Constraint { scene: self.scene.path.clone(), source })?;
-        Ok((lift, bounds))
     }
 
     /// The time of the first solve, s: 0, or 1 where there is no time.
@@ -267,59 +279,4 @@ impl DiscreteProblem {
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
-}
-
-type Prescribed = Vec<Option<([f64; 2], crate::scene::Expression)>>;
-
-/// Prescribed components and symmetry axes as rows u·d = value, with their values' sources.
-fn fixed_rows(scene: &Scene, mesh: &Mesh) -> (Vec<FixedRow>, Prescribed) {
-    let (mut rows, mut sources) = (Vec::new(), Vec::new());
-    for boundary in &scene.boundaries {
-        let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
-        for point in boundary_nodes(mesh, &curve.edges) {
-            let node = point.node;
-            for condition in &boundary.conditions {
-                match condition {
-                    Condition::Displacement(components) => {
-                        for (value, direction) in components.iter().zip([[1.0, 0.0], [0.0, 1.0]]) {
-                            let Some(value) = value else { continue };
-                            rows.push(FixedRow { node, direction });
-                            sources.push(Some((mesh.nodes[node], value.clone())));
-                        }
-                    }
-                    Condition::Symmetry => {
-                        for face in &point.faces {
-                            rows.push(FixedRow { node, direction: face.normal });
-                            sources.push(None);
-                        }
-                    }
-                    Condition::Gap(_) | Condition::Traction(_) => {}
-                }
-            }
-        }
-    }
-    (rows, sources)
-}
-
-/// The gap conditions u·ν ≤ g of Γ_C, node by node, joined where boundaries meet smoothly.
-fn gap_rows(scene: &Scene, mesh: &Mesh) -> Vec<GapRow> {
-    let mut rows: BTreeMap<usize, Vec<GapRow>> = BTreeMap::new();
-    for boundary in &scene.boundaries {
-        let (Some(gap), Some(curve)) = (boundary.gap(), mesh.curves.get(&boundary.name)) else {
-            continue;
-        };
-        for point in boundary_nodes(mesh, &curve.edges) {
-            let node = point.node;
-            let distance = gap.at(mesh.nodes[node]);
-            let rows = rows.entry(node).or_default();
-            let mut row = |normal, tributary_length| {
-                join_gap(rows, &GapRow { node, normal, gap: distance, tributary_length });
-            };
-            match gap.normal {
-                Some(normal) => row(normal, point.faces.iter().map(|f| f.length).sum()),
-                None => point.faces.iter().for_each(|face| row(face.normal, face.length)),
-            }
-        }
-    }
-    rows.into_values().flatten().collect()
 }

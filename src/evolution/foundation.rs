@@ -1,53 +1,44 @@
-//! Where the foundation is, for figures.
+//! The foundation opposite Γ_C, for pictures of the results.
 
-use crate::{
-    contact::{Constraints, GapRow},
-    mesh::Mesh,
-    scene::Scene,
-};
+use super::boundary_conditions::BoundaryConditions;
+use crate::{contact::GapRow, mesh::Mesh};
 
-/// What is opposite Γ_C: of each edge of it an entry with both its ends.
+/// What is opposite Γ_C: for each edge an entry with its two ends.
 #[derive(Debug, Clone, Default)]
 pub struct Foundation {
     /// The edge, m.
     pub contact_boundary: Vec<[[f64; 2]; 2]>,
-    /// The foundation opposite, m.
+    /// The foundation opposite, m; its segments meet at the nodes.
     pub segments: Vec<[[f64; 2]; 2]>,
-    /// Unit vectors along which the body slides there; (0, 0) at a corner, which stands still.
+    /// Unit vectors along which the body slides there; (0, 0) at a corner, which does not slide.
     pub tangents: Vec<[[f64; 2]; 2]>,
 }
 
 impl Foundation {
-    /// The edges of Γ_C and what is opposite them; segments of the foundation meet at the nodes.
-    pub(super) fn new(scene: &Scene, mesh: &Mesh, constraints: &Constraints) -> Self {
-        let rows = &constraints.gaps;
+    /// Opposite the edges of Γ_C, where `gaps` are the gap conditions by node.
+    pub(super) fn new(conditions: &BoundaryConditions, mesh: &Mesh, gaps: &[GapRow]) -> Self {
         let at = |node: usize| {
-            let first = rows.partition_point(|row| row.node < node);
-            &rows[first..first + rows[first..].partition_point(|row| row.node == node)]
+            let first = gaps.partition_point(|row| row.node < node);
+            &gaps[first..first + gaps[first..].partition_point(|row| row.node == node)]
         };
         let mut foundation = Self::default();
-        for boundary in &scene.boundaries {
-            let (Some(gap), Some(curve)) = (boundary.gap(), mesh.curves.get(&boundary.name)) else {
-                continue;
-            };
-            for &edge in &curve.edges {
-                let points = edge.map(|node| mesh.nodes[node]);
-                let normal = gap.normal.unwrap_or(mesh.edge_normal(edge).0);
-                let ways = edge.map(|node| way(at(node), normal));
-                let opposite = |i: usize| [0, 1].map(|k| points[i][k] + ways[i].0[k]);
-                foundation.contact_boundary.push(points);
-                foundation.tangents.push(ways.map(|(_, tangent)| tangent));
-                foundation.segments.push([opposite(0), opposite(1)]);
-            }
+        for &(edge, normal) in &conditions.contact_edges {
+            let ends = edge.map(|node| {
+                let ([x, y], (d, tangent)) = (mesh.nodes[node], opposite(at(node), normal));
+                ([x, y], [x + d[0], y + d[1]], tangent)
+            });
+            foundation.contact_boundary.push(ends.map(|(point, ..)| point));
+            foundation.segments.push(ends.map(|(_, opposite, _)| opposite));
+            foundation.tangents.push(ends.map(|(.., tangent)| tangent));
         }
         foundation
     }
 }
 
-/// The way d from a node of Γ_C with these gap conditions to the foundation, and the direction in
+/// The vector d from a node of Γ_C with these gap conditions to the foundation, and the direction in
 /// which the node may slide: at a corner the d with d·ν = g for both conditions, and (0, 0); else
-/// d = g ν and the tangent. Of a node between two plates the condition nearer to `normal` counts.
-fn way(rows: &[GapRow], normal: [f64; 2]) -> ([f64; 2], [f64; 2]) {
+/// d = g ν and the tangent. At a node between two plates, the condition nearer to `normal` counts.
+fn opposite(rows: &[GapRow], normal: [f64; 2]) -> ([f64; 2], [f64; 2]) {
     if let [a, b, ..] = rows {
         let (p, q) = (a.normal, b.normal);
         let cross = p[0] * q[1] - p[1] * q[0];

@@ -1,8 +1,9 @@
 //! The loads and prescribed displacements of a scene as functions of time.
 
+use super::boundary_conditions::Traction;
 use crate::{
     fem::{Body, Subdomain, add_body_force, add_traction, midpoint},
-    scene::{Boundary, Expression, Scene},
+    scene::Expression,
 };
 
 /// The midpoint and the length or area, m or m², of an edge or triangle.
@@ -14,48 +15,44 @@ const TRIANGLES: usize = 500;
 /// (f(t), ·)_V and the values of the fixed rows.
 #[derive(Debug)]
 pub struct Loads {
+    /// f_B, N/m³, if it is not zero.
     body_force: Option<[Expression; 2]>,
-    tractions: Vec<(Vec<[usize; 2]>, [Expression; 2])>,
+    tractions: Vec<Traction>,
     /// Of each fixed row: the point and the component's expression, `None` for a symmetry's 0.
     prescribed: Vec<Option<([f64; 2], Expression)>>,
-    /// Where each load is sampled.
+    /// Where each load of the whole body is sampled.
     samples: Vec<(Vec<Sample>, [Expression; 2])>,
     /// The load, where it does not depend on time.
     constant: Option<Vec<f64>>,
 }
 
 impl Loads {
-    /// The loads of `scene` on `body`, whose mesh has all curves the scene names.
-    pub fn new(
-        scene: &Scene,
+    /// The loads on `body`, and the values of its fixed rows.
+    pub(super) fn new(
         body: &Body,
+        body_force: &[Expression; 2],
+        tractions: Vec<Traction>,
         prescribed: Vec<Option<([f64; 2], Expression)>>,
     ) -> Self {
-        let zero = |f: &[Expression; 2]| f.iter().all(|e| e.as_constant() == Some(0.0));
-        let edges = |b: &Boundary| {
-            body.mesh.curves.get(&b.name).map(|curve| curve.edges.clone()).unwrap_or_default()
-        };
-        let tractions: Vec<_> = (scene.boundaries.iter())
-            .filter_map(|b| b.traction().map(|f| (edges(b), f.clone())))
-            .collect();
-        let body_force = (!zero(&scene.body_force)).then(|| scene.body_force.clone());
+        let zero = body_force.iter().all(|e| e.as_constant() == Some(0.0));
+        let body_force = (!zero).then(|| body_force.clone());
         let samples = (tractions.iter())
-            .map(|(edges, f)| (edge_samples(body, edges), f.clone()))
+            .map(|traction| (edge_samples(body, &traction.edges), traction.force.clone()))
             .chain(body_force.iter().map(|f| (triangle_samples(body), f.clone())))
             .collect();
         let mut loads = Self { body_force, tractions, prescribed, samples, constant: None };
-        let all = loads.body_force.iter().chain(loads.tractions.iter().map(|(_, f)| f));
-        if !all.flatten().any(Expression::depends_on_time) {
+        if !loads.samples.iter().flat_map(|(_, f)| f).any(Expression::depends_on_time) {
             loads.constant = Some(loads.assemble(body, 0.0));
         }
         loads
     }
 
-    /// The loads on a rank's share. Values of the fixed rows are needed wherever one is known.
-    pub fn restrict(self, subdomain: &Subdomain) -> Self {
-        let edges = |(edges, f): (Vec<[usize; 2]>, _)| (subdomain.edges(&edges), f);
+    /// The loads on a rank's subdomain. Values of the fixed rows are needed wherever one is known.
+    pub(super) fn restrict(self, subdomain: &Subdomain) -> Self {
+        let local =
+            |traction: Traction| Traction { edges: subdomain.edges(&traction.edges), ..traction };
         Self {
-            tractions: self.tractions.into_iter().map(edges).collect(),
+            tractions: self.tractions.into_iter().map(local).collect(),
             constant: self.constant.map(|load| subdomain.field(&load, 2)),
             ..self
         }
@@ -77,16 +74,6 @@ impl Loads {
         self.constant.clone().unwrap_or_else(|| self.assemble(body, t))
     }
 
-    /// Forces at time t, N per metre of thickness, on each edge under traction and on a sample of the
-    /// triangles, of the whole body on every rank: much less work than the nodal loads.
-    pub fn sampled_at(&self, t: f64) -> Vec<f64> {
-        let force = |f: &Expression, [x, y]: [f64; 2], size: f64| size * f.eval(x, y, t);
-        (self.samples.iter())
-            .flat_map(|(places, f)| places.iter().map(move |place| (place, f)))
-            .flat_map(|(&(x, size), f)| [force(&f[0], x, size), force(&f[1], x, size)])
-            .collect()
-    }
-
     /// u·d of each fixed row at time t, m.
     pub fn prescribed_at(&self, t: f64) -> Vec<f64> {
         let value = |row: &Option<([f64; 2], Expression)>| match row {
@@ -96,14 +83,25 @@ impl Loads {
         self.prescribed.iter().map(value).collect()
     }
 
+    /// The forces at time t, N per metre of thickness, on each edge under traction and on a sample of
+    /// the triangles, and the prescribed displacements, m. On every rank those of the whole body:
+    /// much less work than the nodal loads.
+    pub(super) fn sampled_at(&self, t: f64) -> [Vec<f64>; 2] {
+        let forces = (self.samples.iter())
+            .flat_map(|(places, f)| places.iter().map(move |place| (place, f)))
+            .flat_map(|(([x, y], size), f)| f.each_ref().map(|f| size * f.eval(*x, *y, t)))
+            .collect();
+        [forces, self.prescribed_at(t)]
+    }
+
     fn assemble(&self, body: &Body, t: f64) -> Vec<f64> {
         let mut load = vec![0.0; 2 * body.partition.local()];
         let at = |f: &[Expression; 2], [x, y]: [f64; 2]| [f[0].eval(x, y, t), f[1].eval(x, y, t)];
         if let Some(force) = &self.body_force {
             add_body_force(body, |x| at(force, x), &mut load);
         }
-        for (edges, traction) in &self.tractions {
-            add_traction(body, edges, |x| at(traction, x), &mut load);
+        for Traction { edges, force, .. } in &self.tractions {
+            add_traction(body, edges, |x| at(force, x), &mut load);
         }
         load
     }

@@ -1,180 +1,61 @@
-//! Problem VP^hk: damage and contact in turn, step by step.
+//! Problem VP^hk of the paper: damage and contact in turn, step by step.
+//!
+//! Displacements u_n and damage ζ_n are affine on the triangles of one mesh, (22) and (23). With the
+//! nodal functions λ_i of ζ and the matrices and vectors
+//!
+//! M_ij = ∫ λ_i λ_j, L_ij = ∫ ∇λ_i·∇λ_j, b_i(u, ζ) = ∫ φ(ε(u), ζ) λ_i,
+//! vᵀK(ζ)u = ∫ η_*(ζ) 𝒜ε(u)·ε(v), fᵀv = ∫_Ω f_B·v + ∫_{Γ_N} f_N·v,
+//!
+//! and the admissible set (24), U_n = {v: v = u_D(t_n) on Γ_D, v·ν ≤ g at the nodes of Γ_C}:
+//!
+//! - (27): ζ_0 interpolates ζ₀, and u_0 minimises ½ uᵀK(ζ_0)u − f_0ᵀu over U_0.
+//!
+//! For n = 1, …, N:
+//!
+//! - (25), solved as (28): (M + kκL) ζ_n = M ζ_{n−1} + k b(u_{n−1}, ζ_{n−1});
+//! - the program stops when min ζ_n ≤ ζ_*;
+//! - (26): u_n minimises ½ uᵀK(ζ_n)u − f_nᵀu over U_n.
+//!
+//! Strains are constant in a triangle. There φ is taken at the three vertices, from their ζ and the
+//! triangle's strain, and integrated as an affine function; and η_*(ζ) by its mean over the three
+//! vertices. [`run`] is this loop; a step controller plans each step and judges it, so that steps
+//! may be chosen as well as uniform.
 
-mod bound_violation;
-mod chosen;
-mod clock;
-mod damage_step;
+mod boundary_conditions;
+mod bounds;
 mod contact_step;
-mod estimate;
+mod damage_step;
+mod discrete_problem;
+mod error;
 mod extrapolation;
 mod foundation;
-mod load_curve;
 mod loads;
 mod notes;
+mod outcome;
 mod resultants;
-mod discrete_problem;
 mod state;
-mod time_loop;
+mod step_controller;
 
 pub use crate::contact::ContactPoint;
 pub use crate::phases::Phases;
-pub use bound_violation::BoundViolation;
-pub use contact_step::ContactStep;
+pub use bounds::BoundViolation;
+pub use contact_step::{Accuracy, ContactStep};
 pub use discrete_problem::{DiscreteProblem, SetupError};
+pub use error::{RunError, StepFailure};
 pub use foundation::Foundation;
 pub use loads::Loads;
-pub use notes::Accuracy;
+pub use outcome::{Outcome, Stop};
 pub use state::{State, Step, StepRecord};
 
-use crate::{
-    contact::{ContactError, ContactReport, Kkt, RigidMotion, UnknownSolver},
-    petsc::{Communicator, PetscError, Session},
-    scene::Scene,
-};
-use damage_step::DamageUpdate;
-use time_loop::{Attempt, TimeLoop};
-
-/// How a run ended that did not fail.
-#[derive(Debug, Clone)]
-pub struct Outcome {
-    /// The last accepted step.
-    pub last: Step,
-    /// The stop at ζ_*, if it was reached.
-    pub stopped: Option<Stop>,
-    /// Worst KKT residuals of all steps.
-    pub kkt: Kkt,
-    /// Steps without a damage solve, because nothing drove the damage.
-    pub skipped_damage_solves: usize,
-    /// Steps undone and tried again, shorter.
-    pub undone: usize,
-    /// Steps in which the contact solver left its fast path.
-    pub fallbacks: usize,
-    /// Of these, steps in which TAO gave the answer in the place of the active set.
-    pub rescued: usize,
-    /// Where ζ left the bounds of its equation.
-    pub bound_violation: BoundViolation,
-    /// When first no pressing node held the body against a rigid motion, s, and which.
-    pub unheld: Option<(f64, RigidMotion)>,
-    /// Estimated errors of the answers.
-    pub accuracy: Accuracy,
-    /// Estimated error of the last ζ over the damage done, where steps are chosen.
-    pub damage_error: Option<f64>,
-    /// The accepted step before the last one whose u is likely to be the least exact, if it is less
-    /// exact than the last: its stationarity residual and its fields.
-    worst: Option<(f64, State)>,
-    /// The largest displacement before the last step, m, if larger than in that, and its state.
-    largest: Option<(f64, State)>,
-}
-
-/// The stop at ζ_*.
-#[derive(Debug, Clone, Copy)]
-pub struct Stop {
-    /// When, s: the first t_n with min ζ ≤ ζ_*; where steps are chosen, the interpolated time.
-    pub time: f64,
-    /// The min ζ found there, not accepted.
-    pub zeta_min: f64,
-    /// The least ζ that the sources so far allow: above ζ_* the stop comes too early.
-    pub floor: f64,
-    /// How far off the time may be, s: the last step and twice the estimated delay of all steps.
-    pub uncertainty: f64,
-}
-
-/// Why a run ended early.
-#[derive(Debug, thiserror::Error)]
-pub enum RunError {
-    /// A contact step failed; the steps before it are accepted.
-    #[error("{}{source}{advice}", time.map_or(String::new(), |t| format!("step {step} (t = {t}): ")))]
-    Contact {
-        /// The step.
-        step: usize,
-        /// Its time, s; none where there is no time.
-        time: Option<f64>,
-        /// What failed.
-        source: Box<ContactError>,
-        /// What to try, to follow the source; empty where that says it.
-        advice: &'static str,
-    },
-    /// The damage step has no answer.
-    #[error(
-        "step {step} (t = {time}): the damage equation has no finite answer: its source overflows \
-         or its matrix is not positive definite; look for extreme numbers in [damage] and the loads"
-    )]
-    Damage {
-        /// The step.
-        step: usize,
-        /// Its time, s.
-        time: f64,
-    },
-    /// The contact solver has no such name.
-    #[error(transparent)]
-    Solver(#[from] UnknownSolver),
-    /// The damage solve misses its tolerance.
-    #[error(
-        "step {step} (t = {time}): the damage equation was solved only to a residual of {residual:.1e} \
-         of its right-hand side; look for extreme numbers in [damage], for slivers in the mesh, and \
-         for PETSc options that loosen -damage_ksp_"
-    )]
-    DamageMissed {
-        /// The step.
-        step: usize,
-        /// Its time, s.
-        time: f64,
-        /// The relative residual.
-        residual: f64,
-    },
-    /// Chosen steps cannot keep their tolerance.
-    #[error(
-        "step {step} (t = {time}): the damage changes too fast for time.tolerance, however short the \
-         step; does a load jump there? Set time.step to a number"
-    )]
-    Steps {
-        /// The step.
-        step: usize,
-        /// Its time, s.
-        time: f64,
-    },
-    /// The scene contradicts itself at some time.
-    #[error(transparent)]
-    Setup(#[from] SetupError),
-    /// Another rank failed where this one did not.
-    #[error("another rank failed")]
-    OnAnotherRank,
-    /// PETSc failed.
-    #[error(transparent)]
-    Petsc(#[from] PetscError),
-    /// Whoever was shown an accepted step could not go on (results that cannot be written).
-    #[error(transparent)]
-    Observer(Box<dyn std::error::Error + Send + Sync>),
-}
-
-impl RunError {
-    /// The failed contact step n = `step`; its advice is of what the scene has: another solver helps
-    /// where there is contact, shorter steps help after the first solve.
-    fn contact(scene: &Scene, step: usize, time: f64, source: ContactError) -> Self {
-        let contact = scene.boundaries.iter().any(|boundary| boundary.gap().is_some());
-        let advice = match (source.is_missed(), contact, step > 0) {
-            (false, ..) => "",
-            (_, true, true) => {
-                "; try another contact.solver, shorter steps or a larger contact.tolerance"
-            }
-            (_, true, false) => "; try another contact.solver or a larger contact.tolerance",
-            (_, false, true) => "; try shorter steps or a larger contact.tolerance",
-            (_, false, false) => "; try a larger contact.tolerance",
-        };
-        let time = scene.time.map(|_| time);
-        Self::Contact { step, time, source: Box::new(source), advice }
-    }
-
-    /// Whether a shorter step may do better.
-    fn is_of_a_step(&self) -> bool {
-        matches!(self, Self::Contact { .. } | Self::Damage { .. } | Self::DamageMissed { .. })
-    }
-}
+use crate::petsc::{Communicator, Session};
+use damage_step::DamageStep;
+use std::time::Instant;
+use step_controller::{StepController, Verdict};
 
 /// The answer of whoever is shown an accepted step: an error ends the run.
 pub type Observed = Result<(), Box<dyn std::error::Error + Send + Sync>>;
 
-/// Runs `problem` with the contact solver called `solver`; `accepted` sees every accepted
+/// Solves Problem VP^hk with the contact solver called `solver`; `accepted` sees every accepted
 /// step, n = 0 included.
 ///
 /// # Errors
@@ -186,19 +67,56 @@ pub fn run(
     phases: &Phases,
     accepted: &mut dyn FnMut(&Step) -> Observed,
 ) -> Result<Outcome, RunError> {
-    let mut run = TimeLoop::start(session, problem, solver, phases)?;
     let mut show = |step: &Step| {
         let shown = accepted(step).map_err(RunError::Observer);
         agreed(problem.body.partition.comm(), shown)
     };
-    show(&run.outcome.last)?;
+    let mut damage_step = DamageStep::new(session, problem, phases);
+    let mut contact_step = ContactStep::new(session, problem, solver, phases)?;
+
+    // (27): u_0 from ζ_0.
+    let first = contact_step.solve(0, problem.start(), &problem.initial_damage())?;
+    contact_step.accept(problem.start())?;
+    let source = damage_step.source(&first.state);
+    let mut controller = StepController::new(problem, &first.state.zeta, source);
+    let mut outcome = Outcome::new(first);
+    show(&outcome.last)?;
     loop {
-        match run.next()? {
-            Some(Attempt::Accepted) => show(&run.outcome.last)?,
-            Some(Attempt::Undone) => (),
-            Some(Attempt::Stopped) | None => return run.finish(phases),
+        let started = Instant::now();
+        let Some(planned) = controller.plan(&outcome.last) else { break };
+        // (28): ζ_n from ζ_{n−1} and u_{n−1}.
+        let verdict = damage_step.solve(&planned).and_then(|damage| {
+            if damage.min_max.0 <= problem.threshold() {
+                return Ok(controller.judge_stop(&planned, &damage, &outcome.last));
+            }
+            // (26): u_n from ζ_n.
+            let mut step = contact_step.solve(planned.n, planned.time, &damage.zeta)?;
+            step.set_damage_certificate(damage.certificate);
+            controller.judge(&planned, &damage, Box::new(step), &mut damage_step)
+        });
+        match verdict.or_else(|failure| controller.judge_failure(&planned, failure))? {
+            Verdict::Accept(mut step) => {
+                contact_step.accept(planned.time)?;
+                step.record.seconds = started.elapsed().as_secs_f64();
+                outcome.accept(*step);
+                show(&outcome.last)?;
+            }
+            Verdict::Retry(factor) => {
+                controller.shorten(planned.length * factor);
+                outcome.undone += 1;
+            }
+            Verdict::Stop(stop) => {
+                outcome.stopped = Some(stop);
+                break;
+            }
         }
     }
+    // Makes room for another factorisation.
+    drop(damage_step);
+    outcome.bound_violation = controller.violation;
+    outcome.damage_error = controller.damage_error();
+    outcome.accuracy = phases.time("accuracy", || contact_step.accuracy(&outcome))?;
+    Ok(outcome)
 }
 
 /// All ranks go on, or none. Collective.
@@ -207,49 +125,5 @@ fn agreed<T, E: Into<RunError>>(comm: Communicator, result: Result<T, E>) -> Res
     match result {
         Ok(_) if failed => Err(RunError::OnAnotherRank),
         result => result.map_err(E::into),
-    }
-}
-
-impl Outcome {
-    fn new(first: Step) -> Self {
-        Self {
-            unheld: first.unheld.clone().map(|motion| (first.record.time, motion)),
-            kkt: first.record.kkt(),
-            last: first,
-            stopped: None,
-            skipped_damage_solves: 0,
-            undone: 0,
-            fallbacks: 0,
-            rescued: 0,
-            bound_violation: BoundViolation::default(),
-            accuracy: Accuracy::default(),
-            damage_error: None,
-            worst: None,
-            largest: None,
-        }
-    }
-
-    fn count(&mut self, report: &ContactReport) {
-        self.fallbacks += usize::from(report.fallbacks > 0);
-        self.rescued += usize::from(report.rescues > 0);
-    }
-
-    fn accept(&mut self, last: Step, driving: DamageUpdate) {
-        self.kkt = self.kkt.max(&last.record.kkt());
-        self.skipped_damage_solves += usize::from(driving == DamageUpdate::Nothing);
-        if self.unheld.is_none() {
-            self.unheld = last.unheld.clone().map(|motion| (last.record.time, motion));
-        }
-        let before = std::mem::replace(&mut self.last, last);
-        let size = before.record.displacement_max;
-        if size > self.last.record.displacement_max
-            && self.largest.as_ref().is_none_or(|(largest, _)| size > *largest)
-        {
-            self.largest = Some((size, before.state.clone()));
-        }
-        let residual = before.record.kkt_stationarity;
-        if self.worst.as_ref().is_none_or(|(worst, _)| residual > *worst) {
-            self.worst = Some((residual, before.state));
-        }
     }
 }

@@ -1,97 +1,42 @@
-//! What the user should know about an answer that its residuals do not tell.
+//! What the user should know about a problem or an answer that its residuals do not tell.
 
-use super::{DiscreteProblem, Outcome};
-use crate::{contact::RigidMotion, model::Plane, scene::Stepping};
+use super::{Accuracy, DiscreteProblem, Outcome};
+use crate::{model::Plane, scene::Stepping};
 
 /// In plane strain with ν above this, P1 triangles lock: measured in the stability study.
 const LOCKING: f64 = 0.45;
-/// Triangles with a smaller angle are told, degrees.
+/// Triangles with a smaller angle are noted, degrees.
 const SLIVER: f64 = 1.0;
-/// So many free motions are told one by one.
-const TOLD: usize = 6;
-/// Displacements are promised to this, relative, or to `TOLERANCES` times the KKT tolerance.
-const DISPLACEMENT: f64 = 1e-6;
-const TOLERANCES: f64 = 100.0;
-/// A mesh is too coarse if the energy norm is estimated to be off by more than this: the
-/// displacement under the load is then too small by about the square of it.
-const COARSE: f64 = 0.5;
+/// So many free motions are noted one by one.
+const FREE_MOTIONS: usize = 6;
 /// Infinitesimal strain theory supposes |∇u| ≪ 1. At `LARGE` the term ½ ∇uᵀ∇u of the strain, which
 /// it leaves out, is up to a twentieth of ∇u. A smaller part of the body than `NOTICEABLE` may be
 /// a corner where the strain is singular, in every load.
 const LARGE: f64 = 0.1;
 const NOTICEABLE: f64 = 0.01;
 
-/// Estimated errors of an answer, relative.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Accuracy {
-    /// Of the largest displacement, against the exact answer of the discrete problem with the
-    /// same pressing nodes. The KKT residuals bound forces; where K is ill-conditioned small
-    /// forces move u far. Infinite where the pressing nodes alone do not hold the body.
-    ///
-    /// The larger of two: of the last step, and of the step with the largest stationarity residual.
-    pub displacement: f64,
-    /// The time of the step of which `displacement` is, s.
-    pub time: f64,
-    /// Of the last step's discretisation, in the energy norm: [`crate::fem::Elasticity::energy_error`].
-    pub energy: f64,
-}
-
-impl Accuracy {
-    /// How exact displacements should be, relative, at a KKT tolerance.
-    pub fn promised(tolerance: f64) -> f64 {
-        DISPLACEMENT.max(TOLERANCES * tolerance)
-    }
-
-    /// What to tell of these errors at a KKT tolerance; nothing if they are small.
-    pub fn notes(&self, tolerance: f64) -> Vec<String> {
-        let mut notes = Vec::new();
-        if self.displacement.is_infinite() {
-            notes.push(format!(
-                "at t = {:.4e}, the nodes that press do not hold the body by themselves: how exact \
-                 the displacements are cannot be estimated",
-                self.time
-            ));
-        } else if self.displacement > Self::promised(tolerance) {
-            notes.push(format!(
-                "the stiffness is ill-conditioned (a slender or very soft part?): the residuals \
-                 are within the tolerance, but displacements are exact only to about {:.0e} of \
-                 the largest at t = {:.4e}",
-                self.displacement, self.time
-            ));
-        }
-        if self.energy > COARSE {
-            notes.push(format!(
-                "the mesh is too coarse for this answer: strains jump from triangle to triangle \
-                 by about {:.0} % (energy norm), and displacements may be far too small; use \
-                 smaller or less stretched triangles, several across a part that bends",
-                100.0 * self.energy
-            ));
-        }
-        notes
-    }
-}
-
 impl Outcome {
     /// What the user should know about the run of `problem`.
     pub fn notes(&self, problem: &DiscreteProblem) -> Vec<String> {
         let mut notes = Vec::new();
-        if let Some(stop) = self.stopped.filter(|stop| stop.floor > problem.threshold()) {
+        let early = |level: &f64| *level > problem.threshold();
+        if let Some(least) = self.stopped.map(|stop| stop.least_admissible).filter(early) {
             notes.push(format!(
                 "ζ_* was reached too early, or should not be reached at all: the sources up to \
-                 there allow no ζ below {:.4}",
-                stop.floor
+                 there allow no ζ below {least:.4}"
             ));
         }
         notes.extend(self.bound_violation.note(problem.mass()));
-        if let Some((time, motion)) = &self.unheld {
+        if let Some((time, motion)) = &self.unconstrained {
             // Nodes that touch without force may still be in the way.
             notes.push(format!(
-                "at t = {time}, no pressing node holds the body against {motion}: the answer may \
+                "at t = {time}, no active contact node holds the body against {motion}: the answer may \
                  be one of many"
             ));
         }
-        // That a body which is not held has no one answer is said already.
-        let displacement = if self.unheld.is_none() { self.accuracy.displacement } else { 0.0 };
+        // That an unconstrained body has no one answer is said already.
+        let unique = self.unconstrained.is_none();
+        let displacement = if unique { self.accuracy.displacement } else { 0.0 };
         let accuracy = Accuracy { displacement, ..self.accuracy };
         notes.extend(accuracy.notes(problem.tolerance));
         notes.extend(problem.large_gradients(&self.last.state.u));
@@ -109,24 +54,6 @@ impl Outcome {
         notes
     }
 
-    /// How many steps were chosen, and how exact the damage is for it.
-    fn chosen_steps(&self, problem: &DiscreteProblem) -> Option<String> {
-        let error = self.damage_error.filter(|_| problem.damage().is_some())?;
-        let Stepping::Auto { tolerance } = problem.scene().time?.stepping else { return None };
-        let steps = self.last.record.step;
-        let verdict = match error > tolerance {
-            true => format!(", more than time.tolerance = {tolerance}: lower it"),
-            false => String::new(),
-        };
-        Some(format!(
-            "{steps} steps chosen: the damage is exact in time to about {} of the damage \
-             done (two or three times that where the load swings or jumps){verdict}",
-            percent(error)
-        ))
-    }
-}
-
-impl Outcome {
     /// That answers came another way than the one the solver's name stands for.
     fn slow_path(&self) -> Option<String> {
         let steps = |n: usize| if n == 1 { "1 step".to_owned() } else { format!("{n} steps") };
@@ -141,23 +68,66 @@ impl Outcome {
             )
         })
     }
+
+    /// How many steps were chosen, and how exact the damage is for it.
+    fn chosen_steps(&self, problem: &DiscreteProblem) -> Option<String> {
+        let error = self.damage_error.filter(|_| problem.damage().is_some())?;
+        let Stepping::Auto { tolerance } = problem.scene().time?.stepping else { return None };
+        let verdict = match error > tolerance {
+            true => format!(", more than time.tolerance = {tolerance}: lower it"),
+            false => String::new(),
+        };
+        // Two decimals, or three digits where these would say too little.
+        let percent = match 100.0 * error {
+            percent if percent > 0.0 && percent < 0.1 => format!("{percent:.2e} %"),
+            percent => format!("{percent:.2} %"),
+        };
+        Some(format!(
+            "{} steps chosen: the damage is exact in time to about {percent} of the damage \
+             done (two or three times that where the load swings or jumps){verdict}",
+            self.last.record.step
+        ))
+    }
 }
 
 impl DiscreteProblem {
-    /// What the user should know before any solve: what was not taken as it is written, rigid
-    /// motions that nothing holds, tractions, a material or triangles that make the discretisation
-    /// poor.
+    /// What the user should know before any solve: what was not taken as it is written, unconstrained
+    /// rigid motions, and tractions, a material or triangles that make the discretisation poor.
     pub fn notes(&self) -> Vec<String> {
-        let mut notes = self.scene().notes.clone();
-        notes.extend(self.pieces().into_iter().chain(self.hinge()));
-        let free = &self.motions.free;
-        notes.extend(free.iter().take(TOLD).map(free_motion));
-        if free.len() > TOLD {
-            notes.push(format!("nothing holds or drives {} more such motions", free.len() - TOLD));
+        let (scene, motions) = (self.scene(), &self.motions);
+        let mut notes = scene.notes.clone();
+        if motions.pieces > 1 {
+            let pieces = motions.pieces;
+            notes.push(format!(
+                "the mesh has {pieces} pieces (gmsh: Coherence joins those that touch)"
+            ));
+        }
+        if let Some([x, y]) = motions.hinge {
+            notes.push(format!(
+                "parts of the mesh meet in a single node, a hinge, as at ({x:.4}, {y:.4})"
+            ));
+        }
+        notes.extend(motions.free.iter().take(FREE_MOTIONS).map(|motion| {
+            format!(
+                "nothing holds or drives {motion}: of all answers the one of least ∫|u|² is given"
+            )
+        }));
+        if motions.free.len() > FREE_MOTIONS {
+            let more = motions.free.len() - FREE_MOTIONS;
+            notes.push(format!("nothing holds or drives {more} more such motions"));
         }
         notes.extend(self.unresolved.iter().cloned());
-        notes.extend(self.static_damage());
-        notes.extend(self.locking());
+        if scene.damage.is_some() && scene.time.is_none() {
+            let note = "[damage] without [time]: in this static solve ζ stays damage.initial";
+            notes.push(note.to_owned());
+        }
+        let poisson = scene.material.poisson;
+        if scene.material.plane == Plane::Strain && poisson > LOCKING {
+            notes.push(format!(
+                "nearly incompressible (plane strain, ν = {poisson} > {LOCKING}): linear triangles \
+                 lock, displacements may be far too small; compare with a mesh half as fine"
+            ));
+        }
         notes.extend(self.sliver());
         notes
     }
@@ -175,38 +145,6 @@ impl DiscreteProblem {
                 "|∇u| exceeds {LARGE} in {:.0} % of the body: strains or rotations are not small, \
                  and linear elasticity, which supposes they are, is a poor model of this load",
                 100.0 * part
-            )
-        })
-    }
-
-    fn pieces(&self) -> Option<String> {
-        let pieces = self.motions.pieces;
-        (pieces > 1).then(|| {
-            format!("the mesh has {pieces} pieces (gmsh: Coherence joins those that touch)")
-        })
-    }
-
-    fn hinge(&self) -> Option<String> {
-        self.motions.hinge.map(|[x, y]| {
-            format!("parts of the mesh meet in a single node, a hinge, as at ({x:.4}, {y:.4})")
-        })
-    }
-
-    fn static_damage(&self) -> Option<String> {
-        let scene = self.scene();
-        (scene.damage.is_some() && scene.time.is_none()).then(|| {
-            "[damage] without [time]: in this static solve ζ stays damage.initial".to_owned()
-        })
-    }
-
-    fn locking(&self) -> Option<String> {
-        let material = self.scene().material;
-        let locks = material.plane == Plane::Strain && material.poisson > LOCKING;
-        locks.then(|| {
-            format!(
-                "nearly incompressible (plane strain, ν = {} > {LOCKING}): linear triangles lock, \
-                 displacements may be far too small; compare with a mesh half as fine",
-                material.poisson
             )
         })
     }
@@ -230,19 +168,7 @@ impl DiscreteProblem {
     }
 }
 
-/// A part of 1 in percent: with two decimals, or three figures where these would say too little.
-fn percent(part: f64) -> String {
-    match 100.0 * part {
-        percent if percent > 0.0 && percent < 0.1 => format!("{percent:.2e} %"),
-        percent => format!("{percent:.2} %"),
-    }
-}
-
-fn free_motion(motion: &RigidMotion) -> String {
-    format!("nothing holds or drives {motion}: of all answers the one of least ∫|u|² is given")
-}
-
-/// Degrees.
+/// The smallest angle of a triangle, degrees.
 fn smallest_angle(corners: [[f64; 2]; 3]) -> f64 {
     let at = |i: usize| {
         let [a, b, c] = [0, 1, 2].map(|k| corners[(i + k) % 3]);

@@ -1,20 +1,28 @@
-//! An accepted step: its fields and its figures.
+//! A step: its fields and its quantities of interest.
 
-use crate::contact::{ContactPoint, Kkt, RigidMotion};
+use super::DiscreteProblem;
+use crate::{
+    contact::{ContactPoint, ContactReport, Kkt, RigidMotion},
+    fem::DamageCertificate,
+};
 use serde::Serialize;
 
-/// An accepted step.
+/// A step with its certified answer.
 #[derive(Debug, Clone)]
 pub struct Step {
     /// The fields.
     pub state: State,
     /// A row of `history.csv`.
     pub record: StepRecord,
-    /// A motion that no pressing node holds, if there is one.
-    pub unheld: Option<RigidMotion>,
+    /// What the contact solve took.
+    pub report: ContactReport,
+    /// A rigid motion that the active nodes leave unconstrained, if there is one.
+    pub unconstrained: Option<RigidMotion>,
+    /// Whether no damage solve was needed.
+    pub skipped_damage_solve: bool,
 }
 
-/// The fields of an accepted step.
+/// The fields of a step.
 #[derive(Debug, Clone)]
 pub struct State {
     /// t, s.
@@ -29,7 +37,7 @@ pub struct State {
     pub contact: Vec<ContactPoint>,
 }
 
-/// The figures of a step: a row of `history.csv`.
+/// The quantities of interest of a step: a row of `history.csv`.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct StepRecord {
     /// n.
@@ -46,7 +54,7 @@ pub struct StepRecord {
     pub work: f64,
     /// Σ normal reactions, N per metre of thickness.
     pub contact_force: f64,
-    /// Contact nodes that press.
+    /// Contact nodes in the active set.
     pub active_nodes: usize,
     /// Iterations of the contact solver.
     pub iterations: usize,
@@ -54,7 +62,7 @@ pub struct StepRecord {
     pub linear_iterations: usize,
     /// Factorisations (not those of a preconditioner chosen by PETSc options).
     pub factorisations: usize,
-    /// Times it left its fast path.
+    /// Times the contact solver left its fast path.
     pub fallbacks: usize,
     /// Contraction per iteration of a fixed-point method; empty for others.
     pub contraction: Option<f64>,
@@ -74,7 +82,57 @@ pub struct StepRecord {
     pub seconds: f64,
 }
 
+impl Step {
+    /// Enters the accuracy of ζ_n; `None` means that it is exact, the damage solve being skipped.
+    pub(super) fn set_damage_certificate(&mut self, certificate: Option<DamageCertificate>) {
+        self.skipped_damage_solve = certificate.is_none();
+        let DamageCertificate { residual, error } = certificate.unwrap_or_default();
+        self.record.zeta_residual = residual;
+        self.record.zeta_error = error;
+    }
+}
+
 impl StepRecord {
+    /// Of the step n = `step` with the nodal loads `load`. What the damage step and the clock tell is
+    /// still zero.
+    pub(super) fn new(
+        problem: &DiscreteProblem,
+        step: usize,
+        state: &State,
+        load: &[f64],
+        report: &ContactReport,
+        kkt: &Kkt,
+    ) -> Self {
+        let mut active: Vec<usize> =
+            state.contact.iter().filter(|point| point.active).map(|point| point.node).collect();
+        active.dedup();
+        let partition = &problem.body.partition;
+        let comm = partition.comm();
+        Self {
+            step,
+            time: state.time,
+            zeta_min: partition.extremes(&state.zeta).0,
+            zeta_mean: problem.body.mean(&state.zeta),
+            displacement_max: partition.largest(&state.u),
+            work: partition.dot(load, &state.u, 2),
+            // An empty sum is -0.0, and so is one of reactions of nothing.
+            contact_force: comm.total(state.contact.iter().map(|point| point.force).sum()) + 0.0,
+            active_nodes: comm.count(active.len()),
+            iterations: report.iterations,
+            linear_iterations: report.linear_iterations,
+            factorisations: report.factorisations,
+            fallbacks: report.fallbacks,
+            contraction: report.contraction,
+            kkt_stationarity: kkt.stationarity,
+            kkt_primal: kkt.primal,
+            kkt_dual: kkt.dual,
+            kkt_complementarity: kkt.complementarity,
+            zeta_residual: 0.0,
+            zeta_error: 0.0,
+            seconds: 0.0,
+        }
+    }
+
     /// The step's KKT residuals.
     pub fn kkt(&self) -> Kkt {
         Kkt {

@@ -164,9 +164,7 @@ fn contact(c: &mut Criterion) {
         group.bench_function(BenchmarkId::from_parameter(solver), |b| {
             b.iter(|| {
                 turn += 1;
-                let step = contact_step.solve(1, 0.51, &next[turn % 2]).unwrap();
-                contact_step.undo().unwrap();
-                step.record.zeta_min
+                contact_step.solve(1, 0.51, &next[turn % 2]).unwrap().record.zeta_min
             });
         });
     }

@@ -156,7 +156,7 @@ fn a_stop_that_the_sources_do_not_allow_is_named() {
     // No source: ζ cannot fall below 0.02, and ζ_* = 0.01.
     let (consistent, notes) = outcome(0.02, 0.1, "");
     let stop = consistent.stopped.unwrap();
-    close(stop.floor, 0.02, 1e-14);
+    close(stop.least_admissible, 0.02, 1e-14);
     assert!(notes[0].contains("too early") && notes[0].contains("0.0200"), "{notes:?}");
     let (lumped, notes) = outcome(0.02, 0.1, ", mass = 'lumped'");
     assert!(lumped.stopped.is_none() && notes.is_empty());
@@ -175,6 +175,6 @@ fn a_stop_that_they_allow_is_not() {
         ]";
     let problem = problem(square(8), text).unwrap();
     let outcome = run(&problem, "active-set");
-    assert!(outcome.stopped.unwrap().floor <= 0.01);
+    assert!(outcome.stopped.unwrap().least_admissible <= 0.01);
     assert_eq!(outcome.notes(&problem), [""; 0]);
 }

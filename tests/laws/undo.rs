@@ -28,8 +28,8 @@ fn zeta(problem: &DiscreteProblem, mean: f64) -> Vec<f64> {
     field.iter().map(|v| mean + 0.1 * v).collect()
 }
 
-/// Two accepted steps by one solver, with `tries` (time, ζ, whether it succeeds) made and undone
-/// between them; the second step.
+/// Two accepted steps by one solver, with `tries` (time, ζ, whether it succeeds) made between them
+/// and not accepted; the second step.
 fn second_step(problem: &DiscreteProblem, solver: &str, tries: &[(f64, Vec<f64>, bool)]) -> Step {
     let (session, phases) = (Session::start(&[]).unwrap(), Phases::default());
     let mut contact_step = ContactStep::new(&session, problem, solver, &phases).unwrap();
@@ -42,7 +42,6 @@ fn second_step(problem: &DiscreteProblem, solver: &str, tries: &[(f64, Vec<f64>,
             Err(RunError::Contact { .. }) => assert!(!succeeds, "{solver}, ζ = {} …", zeta[0]),
             Err(other) => panic!("{solver}: {other}"),
         }
-        contact_step.undo().unwrap();
     }
     contact_step.solve(2, 1.0, &zeta(problem, 0.88)).unwrap_or_else(|e| panic!("{solver}: {e}"))
 }

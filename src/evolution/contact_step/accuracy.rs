@@ -1,68 +1,123 @@
-//! How far an answer may be off although its KKT residuals are small.
+//! How large the errors of an answer may be although its KKT residuals are small.
 
 use super::ContactStep;
 use crate::{
-    evolution::{Accuracy, DiscreteProblem, State, Step},
+    evolution::{DiscreteProblem, Outcome, State},
     fem::{RigidPart, Stiffness},
     petsc::{LinearSolver, PetscError, Session, Vector},
 };
 
+/// Displacements are promised to this, relative, or to `TOLERANCES` times the KKT tolerance.
+const DISPLACEMENT: f64 = 1e-6;
+const TOLERANCES: f64 = 100.0;
+/// A mesh is too coarse if the energy norm is estimated to be off by more than this: the
+/// displacement under the load is then too small by about the square of it.
+const COARSE: f64 = 0.5;
 /// A deformation below this part of a rigid motion is taken for rounding.
 const CARRIED: f64 = 1e-11;
-/// A part of the promised error that an estimate may reach before another is made.
+/// An estimate up to this part of the promised error is not repeated for another step.
 const SAFE: f64 = 0.1;
 
+/// Estimated errors of an answer, relative.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Accuracy {
+    /// Of the largest displacement, against the exact answer of the discrete problem with the
+    /// same active nodes. The KKT residuals bound forces; where K is ill-conditioned small
+    /// forces move u far. Infinite where the active nodes alone do not support the body.
+    ///
+    /// The larger of two: of the last step, and of the step with the largest stationarity residual.
+    pub displacement: f64,
+    /// The time of the step of which `displacement` is, s.
+    pub time: f64,
+    /// Of the last step's discretisation, in the energy norm: [`crate::fem::Elasticity::energy_error`].
+    pub energy: f64,
+}
+
+impl Accuracy {
+    /// How exact displacements should be, relative, at a KKT tolerance.
+    pub fn promised(tolerance: f64) -> f64 {
+        DISPLACEMENT.max(TOLERANCES * tolerance)
+    }
+
+    /// What the user should know about these errors at a KKT tolerance; nothing if they are small.
+    pub fn notes(&self, tolerance: f64) -> Vec<String> {
+        let mut notes = Vec::new();
+        if self.displacement.is_infinite() {
+            notes.push(format!(
+                "at t = {:.4e}, the active contact nodes alone do not hold the body: how exact the \
+                 displacements are cannot be estimated",
+                self.time
+            ));
+        } else if self.displacement > Self::promised(tolerance) {
+            notes.push(format!(
+                "the stiffness is ill-conditioned (a slender or very soft part?): the residuals \
+                 are within the tolerance, but displacements are exact only to about {:.0e} of \
+                 the largest at t = {:.4e}",
+                self.displacement, self.time
+            ));
+        }
+        if self.energy > COARSE {
+            notes.push(format!(
+                "the mesh is too coarse for this answer: strains jump from triangle to triangle \
+                 by about {:.0} % (energy norm), and displacements may be far too small; use \
+                 smaller or less stretched triangles, several across a part that bends",
+                100.0 * self.energy
+            ));
+        }
+        notes
+    }
+}
+
 impl ContactStep<'_> {
-    /// Estimates the errors of the `last` answer of a run, and of the `worst` one before it, whose
-    /// stationarity is given, relative to the displacements of the `largest` one. Costs a
-    /// factorisation, in the place of the solver's own; a second one if the first error, enlarged as
-    /// the residual of the worst answer is, comes near to what is promised.
+    /// Estimates the errors of the last answer of a run, and of the one with the largest stationarity
+    /// residual before it, relative to the largest displacement. Costs a factorisation, in the place
+    /// of the solver's own; a second one if the first error, enlarged by the ratio of the two
+    /// residuals, comes near to what is promised.
     ///
     /// # Errors
     /// PETSc failed.
-    pub fn accuracy(
-        self,
-        last: &Step,
-        worst: Option<&(f64, State)>,
-        largest: Option<&(f64, State)>,
-    ) -> Result<Accuracy, PetscError> {
-        let (session, problem, stiffness) = (self.session, self.problem, self.stiffness);
-        let (body, elasticity, state) = (&problem.body, &problem.elasticity, &last.state);
-        drop(self.solver);
-        let last_size = (last.record.displacement_max, state);
-        let (size, resolved) = largest.map_or(last_size, |(size, state)| (*size, state));
+    pub(in crate::evolution) fn accuracy(self, outcome: &Outcome) -> Result<Accuracy, PetscError> {
+        let Self { session, problem, stiffness, solver, .. } = self;
+        drop(solver);
+        let (body, elasticity) = (&problem.body, &problem.elasticity);
+        let last = &outcome.last;
+        let (max, resolved) = match &outcome.most_displaced {
+            Some((max, state)) => (*max, state),
+            None => (last.record.displacement_max, &last.state),
+        };
         let [rigid, rest] = RigidPart::of(body, &resolved.u).sizes(body, &resolved.u);
         // What is only carried along has no strains but rounding.
         let energy = match rest > CARRIED * rigid {
             true => elasticity.energy_error(body, &resolved.zeta_mean, &resolved.u)?,
             false => 0.0,
         };
-        let displacement = displacement_error(session, problem, stiffness, state, size)?;
-        let accuracy = Accuracy { displacement, energy, time: state.time };
-        let Some((residual, state)) = worst else { return Ok(accuracy) };
+        let displacement = displacement_error(session, problem, stiffness, &last.state, max)?;
+        let mut accuracy = Accuracy { displacement, energy, time: last.state.time };
+        let Some((residual, state)) = &outcome.least_accurate else { return Ok(accuracy) };
         let expected = displacement * (residual / last.record.kkt_stationarity).max(1.0);
         if expected <= SAFE * Accuracy::promised(problem.tolerance) {
             return Ok(accuracy);
         }
         let stiffness = Stiffness::new(session, body, elasticity, &problem.constraints.bases)?;
-        let displacement = displacement_error(session, problem, stiffness, state, size)?;
-        Ok(match displacement > accuracy.displacement {
-            true => Accuracy { displacement, time: state.time, ..accuracy },
-            false => accuracy,
-        })
+        let displacement = displacement_error(session, problem, stiffness, state, max)?;
+        if displacement > accuracy.displacement {
+            accuracy.displacement = displacement;
+            accuracy.time = state.time;
+        }
+        Ok(accuracy)
     }
 }
 
-/// max |K⁻¹(f − Ku)| / `size`, the active nodes fixed: the correction that the residual forces ask
+/// max |K⁻¹(f − Ku)| / `max`, the active nodes fixed: the correction that the residual forces ask
 /// for.
 fn displacement_error(
     session: &Session,
     problem: &DiscreteProblem,
     mut stiffness: Stiffness,
     state: &State,
-    size: f64,
+    max: f64,
 ) -> Result<f64, PetscError> {
-    if size == 0.0 || problem.body.partition.largest(&state.u) == 0.0 {
+    if max == 0.0 || problem.body.partition.largest(&state.u) == 0.0 {
         return Ok(0.0);
     }
     stiffness.refill(&state.zeta_mean)?;
@@ -71,11 +126,11 @@ fn displacement_error(
     let external = problem.load(state.time);
     let mut residual: Vec<f64> = external.iter().zip(&internal).map(|(f, r)| f - r).collect();
     constraints.bases.force_to_local(&mut residual);
-    let active = state.contact.iter().filter(|point| point.active);
-    let bounds = active.filter_map(|p| constraints.bound_along(p.node, p.normal));
-    let mut pressing: Vec<usize> = bounds.map(|i| constraints.bounds[i].dof).collect();
-    pressing.dedup();
-    pressing.iter().for_each(|&dof| residual[dof] = 0.0);
+    let points = state.contact.iter().filter(|point| point.active);
+    let bounds = points.filter_map(|p| constraints.bound_along(p.node, p.normal));
+    let mut active: Vec<usize> = bounds.map(|i| constraints.bounds[i].dof).collect();
+    active.dedup();
+    active.iter().for_each(|&dof| residual[dof] = 0.0);
     let fixed = constraints.bases.fixed();
     residual.iter_mut().zip(fixed).filter(|(_, on)| **on).for_each(|(r, _)| *r = 0.0);
 
@@ -84,7 +139,7 @@ fn displacement_error(
     rhs.set(&residual[..rhs.owned()])?;
     let scale = stiffness.scale;
     let mut matrix = stiffness.into_matrix();
-    matrix.hold(&pressing, scale)?;
+    matrix.hold(&active, scale)?;
     let mut solver = LinearSolver::cholesky(session, "elastic_", 2 * body.partition.total())?;
     solver.factorise(&matrix)?;
     // One digit of an error is enough.
@@ -94,5 +149,5 @@ fn displacement_error(
     let mut correction = body.partition.field(correction.read(<[f64]>::to_vec)?, 2)?;
     constraints.bases.displacement_to_global(&mut correction);
     problem.motions.remove_free(body, &mut correction);
-    Ok(body.partition.largest(&correction) / size)
+    Ok(body.partition.largest(&correction) / max)
 }

@@ -1,39 +1,58 @@
-//! What an answer is worth, from the displacement alone: residuals, contact, figures.
+//! Judges an answer by its displacements alone: residuals, contact forces, unconstrained motions.
 
-use super::{ContactStep, ROUNDED};
+use super::ContactStep;
 use crate::{
-    contact::{self, Answer, ContactError, ContactPoint, ContactReport, Kkt, RigidMotion, Scales},
-    evolution::{DiscreteProblem, State, StepRecord},
+    contact::{self, Answer, ContactError, ContactPoint, Kkt, RigidMotion, Scales},
+    evolution::discrete_problem::LoadCase,
     fem::RigidPart,
 };
 
-/// What the certificate found.
+/// Residuals are the effect of rounding if they are at most this many times its estimate.
+const ROUNDED: f64 = 10.0;
+
+/// A deformation below this part of the datum is rounding.
+const CARRIED: f64 = 1e-14;
+/// The cosine between u and its elastic forces is below this only if K is indefinite.
+const NEGATIVE_ENERGY: f64 = -1e-10;
+
+/// An answer and what the certificate found.
 pub(super) struct Judged {
+    /// The displacements from the datum, m.
+    pub(super) u: Vec<f64>,
     pub(super) kkt: Kkt,
     /// The scales of the residuals: of the run so far, this answer included.
     pub(super) scales: Scales,
-    /// The size of the forces of this answer, N per metre of thickness.
+    /// The larger of ‖f‖₂ and ‖Ku‖₂, N per metre of thickness.
     pub(super) force: f64,
     /// The cosine between u and its elastic forces: the sign of the energy.
-    pub(super) energy: f64,
+    energy: f64,
     pub(super) contact: Vec<ContactPoint>,
-    /// The rigid part of u, and the sizes of it and of the rest, m.
+    /// The rigid part of u, max |·| of it and of the rest, m.
     pub(super) rigid: RigidPart,
-    pub(super) sizes: [f64; 2],
+    pub(super) rigid_max: f64,
+    pub(super) elastic_max: f64,
+}
+
+impl Judged {
+    /// Whether u shows that K is not positive definite.
+    pub(super) fn is_indefinite(&self) -> bool {
+        self.energy < NEGATIVE_ENERGY
+    }
 }
 
 impl ContactStep<'_> {
-    /// Judges u, measured from the datum, by element-wise forces.
-    pub(super) fn certify(&self, u: &[f64], external: &[f64], prescribed: &[f64]) -> Judged {
+    /// Judges u, measured from the datum, by forces summed triangle by triangle, without the assembled
+    /// K of the solvers.
+    pub(super) fn certify(&self, u: Vec<f64>, case: &LoadCase) -> Judged {
         let problem = self.problem;
         let (body, partition) = (&problem.body, &problem.body.partition);
-        let internal = problem.elasticity.internal_force(body, &self.zeta_mean, u);
-        let rigid = RigidPart::of(body, u);
-        let sizes = rigid.sizes(body, u);
+        let rigid = RigidPart::of(body, &u);
+        let [rigid_max, elastic_max] = rigid.sizes(body, &u);
+        let mut unbalanced = problem.elasticity.internal_force(body, &self.zeta_mean, &u);
         // |f|², |Ku|², u·Ku and |u|².
         let mut sums = [0.0; 4];
-        let mut unbalanced = internal;
-        for ((r, f), u) in unbalanced.iter_mut().zip(external).zip(u).take(2 * partition.owned()) {
+        let nodal = unbalanced.iter_mut().zip(&case.load).zip(&u);
+        for ((r, f), u) in nodal.take(2 * partition.owned()) {
             sums[0] += f * f;
             sums[1] += *r * *r;
             sums[2] += u * *r;
@@ -42,23 +61,41 @@ impl ContactStep<'_> {
         }
         partition.comm().sum(&mut sums);
         let force = sums[0].max(sums[1]).sqrt();
-        let scales = self.with_floors(Scales { force, displacement: sizes[1] });
+        let scales = self.run_scales(Scales { force, displacement: elastic_max });
         let energy = sums[2] / (scales.force * sums[3].sqrt()).max(f64::MIN_POSITIVE);
-        let answer =
-            Answer { rigid: &self.datum.field, elastic: u, unbalanced: &unbalanced, prescribed };
+        let answer = Answer {
+            rigid: &self.next.datum.field,
+            elastic: &u,
+            unbalanced: &unbalanced,
+            prescribed: &case.prescribed,
+        };
         let comm = partition.comm();
         let (mut kkt, contact) = problem.certificate.judge(answer, partition.owned(), scales, comm);
         if !self.covered {
             kkt.stationarity = f64::NAN;
         }
-        Judged { kkt, scales, force, energy, contact, rigid, sizes }
+        Judged { u, kkt, scales, force, energy, contact, rigid, rigid_max, elastic_max }
     }
 
-    /// Adds to an error what double precision can reach, where that is less than was asked for and
-    /// what was reached: the rounding of the internal forces of u alone.
-    pub(super) fn limited(&self, error: ContactError, judged: &Judged, u: &[f64]) -> ContactError {
+    /// The scales of an answer, not below those of the run so far, nor below the rounding of the datum
+    /// (a body that is only carried along has no other scales); and with displacements not below
+    /// those that the forces cause at least.
+    pub(super) fn run_scales(&self, answer: Scales) -> Scales {
+        let (datum, run) = (&self.next.datum, self.accepted.scales);
+        let rounding = match datum.is_zero() {
+            true => 0.0,
+            false => CARRIED * self.problem.body.partition.largest(&datum.field),
+        };
+        let force = answer.force.max(run.force).max(self.stiffness.scale * rounding);
+        let least = rounding.max(force / self.stiffness.scale);
+        Scales { force, displacement: answer.displacement.max(run.displacement).max(least) }
+    }
+
+    /// Adds to an error the tolerance that double precision can reach, from the rounding of the
+    /// internal forces of u, if that explains the error.
+    pub(super) fn limited(&self, error: ContactError, judged: &Judged) -> ContactError {
         let problem = self.problem;
-        let rounding = problem.elasticity.force_rounding(&problem.body, &self.zeta_mean, u);
+        let rounding = problem.elasticity.force_rounding(&problem.body, &self.zeta_mean, &judged.u);
         let rounding = problem.body.partition.norm(&rounding, 2) / judged.scales.force;
         let attainable = ROUNDED * rounding;
         match attainable > problem.tolerance && judged.kkt.within(attainable) && attainable < 1.0 {
@@ -79,57 +116,21 @@ impl ContactStep<'_> {
         active
     }
 
-    /// A rigid motion that the pressing nodes leave. A body without load rests where it is,
-    /// which needs no holding.
-    pub(super) fn unheld(&self, contact: &[ContactPoint], force_scale: f64) -> Option<RigidMotion> {
+    /// A rigid motion that the active nodes leave unconstrained. Without load (`force` = 0) the body
+    /// rests where it is.
+    pub(super) fn unconstrained_motion(
+        &self,
+        contact: &[ContactPoint],
+        force: f64,
+    ) -> Option<RigidMotion> {
         // A residual at the tolerance does work of up to √N times that on a motion (Cauchy and
         // Schwarz), which at the lever of one mesh width, 1/√N of the body, is a force √N times
-        // as large: a smaller one holds nothing for certain.
+        // as large: a smaller force is no certain constraint.
         let partition = &self.problem.body.partition;
         let nodes = partition.total() as f64;
-        let least = nodes * self.problem.tolerance * force_scale;
-        let pressing = self.active_bounds(contact, least);
-        let unheld = contact::unheld(partition.comm(), &self.rigid, &pressing);
-        let first = unheld.first().filter(|_| force_scale > 0.0)?;
+        let active = self.active_bounds(contact, nodes * self.problem.tolerance * force);
+        let motions = contact::unheld(partition.comm(), &self.rigid, &active);
+        let first = motions.first().filter(|_| force > 0.0)?;
         Some(self.problem.motions.combined(first))
-    }
-}
-
-/// The row of an answer in the history.
-pub(super) fn figures(
-    problem: &DiscreteProblem,
-    step: usize,
-    state: &State,
-    external: &[f64],
-    report: &ContactReport,
-    kkt: &Kkt,
-) -> StepRecord {
-    let mut active: Vec<usize> =
-        state.contact.iter().filter(|point| point.active).map(|point| point.node).collect();
-    active.dedup();
-    let partition = &problem.body.partition;
-    let comm = partition.comm();
-    StepRecord {
-        step,
-        time: state.time,
-        zeta_min: partition.extremes(&state.zeta).0,
-        zeta_mean: problem.body.mean(&state.zeta),
-        displacement_max: partition.largest(&state.u),
-        work: partition.dot(external, &state.u, 2),
-        // An empty sum is -0.0, and so is one of reactions of nothing.
-        contact_force: comm.total(state.contact.iter().map(|point| point.force).sum()) + 0.0,
-        active_nodes: comm.count(active.len()),
-        iterations: report.iterations,
-        linear_iterations: report.linear_iterations,
-        factorisations: report.factorisations,
-        fallbacks: report.fallbacks,
-        contraction: report.contraction,
-        kkt_stationarity: kkt.stationarity,
-        kkt_primal: kkt.primal,
-        kkt_dual: kkt.dual,
-        kkt_complementarity: kkt.complementarity,
-        zeta_residual: 0.0,
-        zeta_error: 0.0,
-        seconds: 0.0,
     }
 }

@@ -95,7 +95,8 @@ fn add(
             Ok(answer) => {
                 let others = answers.iter().enumerate().filter(|(j, _)| *j != i);
                 let mut unique = others.filter_map(|(_, answer)| answer.as_ref().ok());
-                let other = unique.find(|(s, _)| s.unheld.is_none()).map(|(s, _)| &s.state.u);
+                let other =
+                    unique.find(|(s, _)| s.unconstrained.is_none()).map(|(s, _)| &s.state.u);
                 let other = open.as_ref().or(other);
                 let (row, verdict) = judged(row(solver), &problem, (sweep, value), answer, other);
                 table.push(row, verdict);
@@ -112,14 +113,14 @@ fn judged(
     row: Row,
     problem: &DiscreteProblem,
     (sweep, value): (&Sweep, f64),
-    (Step { state, record, unheld }, report): &(Step, ContactReport),
+    (Step { state, record, unconstrained, .. }, report): &(Step, ContactReport),
     other: Option<&Vec<f64>>,
 ) -> (Row, Verdict) {
     // Empty where Γ_D takes its share.
     let unbalanced = (sweep.side != CLAMPED).then(|| unbalanced(problem, state));
     let balanced = unbalanced.is_none_or(|error| error <= BALANCE);
     let many = sweep.many.is_some_and(|[from, to]| (from..=to).contains(&value));
-    let noted = unheld.is_some();
+    let noted = unconstrained.is_some();
     let apart = other.filter(|_| !noted).map(|other| difference(&state.u, other));
     // The last node that holds the body presses with a share of about margin/h; p (g − u·ν)
     // within the tolerance then leaves its gap uncertain by the tolerance over that.

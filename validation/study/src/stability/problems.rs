@@ -71,7 +71,10 @@ pub fn solve(
         contact_step.set_warm_start(guess);
     }
     match contact_step.solve(0, problem.start(), &problem.initial_damage()) {
-        Ok(step) => Ok(Ok((step, *contact_step.report()))),
+        Ok(step) => {
+            let report = step.report;
+            Ok(Ok((step, report)))
+        }
         Err(failure @ RunError::Contact { .. }) => Ok(Err(failure)),
         Err(other) => Err(other.into()),
     }

@@ -1,0 +1,106 @@
+//! What a scene asks for on the named parts of the boundary, in terms of the mesh.
+
+use crate::{
+    contact::{FixedRow, GapRow, RigidMotions, join_gap},
+    fem::Body,
+    mesh::{BoundaryNode, Mesh, boundary_nodes},
+    scene::{Boundary, Condition, Expression, Scene},
+};
+use std::collections::BTreeMap;
+
+/// The conditions of all boundaries.
+#[derive(Debug, Default)]
+pub(super) struct BoundaryConditions {
+    /// Prescribed components and symmetry axes as rows u·d = value.
+    pub(super) fixed: Vec<FixedRow>,
+    /// The values of these rows: a point and an expression, `None` for the 0 of a symmetry axis.
+    pub(super) prescribed: Vec<Option<([f64; 2], Expression)>>,
+    /// The gap conditions u·ν ≤ g of Γ_C, by node, joined where boundaries meet smoothly.
+    pub(super) gaps: Vec<GapRow>,
+    /// The edges of Γ_C with their directions ν.
+    pub(super) contact_edges: Vec<([usize; 2], [f64; 2])>,
+    /// The tractions of Γ_N.
+    pub(super) tractions: Vec<Traction>,
+}
+
+/// A traction on a part of the boundary.
+#[derive(Debug, Clone)]
+pub(super) struct Traction {
+    /// The boundary's name.
+    pub(super) boundary: String,
+    pub(super) edges: Vec<[usize; 2]>,
+    /// f_N, N/m².
+    pub(super) force: [Expression; 2],
+}
+
+impl BoundaryConditions {
+    /// The conditions of `scene` on `mesh`, which has all curves that the scene names.
+    pub(super) fn new(scene: &Scene, mesh: &Mesh) -> Self {
+        let mut conditions = Self::default();
+        let mut gaps: BTreeMap<usize, Vec<GapRow>> = BTreeMap::new();
+        for boundary in &scene.boundaries {
+            let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
+            for node in boundary_nodes(mesh, &curve.edges) {
+                conditions.add_fixed_rows(boundary, mesh, &node);
+                add_gap_rows(boundary, mesh, &node, gaps.entry(node.node).or_default());
+            }
+            if let Some(gap) = boundary.gap() {
+                let normal = |edge| gap.normal.unwrap_or(mesh.edge_normal(edge).0);
+                conditions.contact_edges.extend(curve.edges.iter().map(|&e| (e, normal(e))));
+            }
+            if let Some(force) = boundary.traction() {
+                let (boundary, edges) = (boundary.name.clone(), curve.edges.clone());
+                conditions.tractions.push(Traction { boundary, edges, force: force.clone() });
+            }
+        }
+        conditions.gaps = gaps.into_values().flatten().collect();
+        conditions
+    }
+
+    /// Finds the rigid motions that the conditions do not prevent, and makes the normals of axes and
+    /// gaps exactly orthogonal to the free motions to which they are orthogonal up to rounding.
+    pub(super) fn resolve_motions(&mut self, body: &Body) -> RigidMotions {
+        let directions: Vec<_> = self.fixed.iter().map(|row| (row.node, row.direction)).collect();
+        let motions = RigidMotions::new(body, &directions, &self.gaps);
+        let axes = self.fixed.iter_mut().zip(&self.prescribed);
+        for (row, _) in axes.filter(|(_, value)| value.is_none()) {
+            row.direction = motions.tangential(body, row.node, row.direction);
+        }
+        for row in &mut self.gaps {
+            row.normal = motions.tangential(body, row.node, row.normal);
+        }
+        motions
+    }
+
+    fn add_fixed_rows(&mut self, boundary: &Boundary, mesh: &Mesh, at: &BoundaryNode) {
+        let node = at.node;
+        for condition in &boundary.conditions {
+            if let Condition::Displacement(components) = condition {
+                for (component, direction) in components.iter().zip([[1.0, 0.0], [0.0, 1.0]]) {
+                    let Some(value) = component else { continue };
+                    self.fixed.push(FixedRow { node, direction });
+                    self.prescribed.push(Some((mesh.nodes[node], value.clone())));
+                }
+            }
+            if let Condition::Symmetry = condition {
+                for face in &at.faces {
+                    self.fixed.push(FixedRow { node, direction: face.normal });
+                    self.prescribed.push(None);
+                }
+            }
+        }
+    }
+}
+
+/// Adds the gap conditions of a boundary at a node to `rows`, those of its other boundaries.
+fn add_gap_rows(boundary: &Boundary, mesh: &Mesh, at: &BoundaryNode, rows: &mut Vec<GapRow>) {
+    let Some(gap) = boundary.gap() else { return };
+    let (node, distance) = (at.node, gap.at(mesh.nodes[at.node]));
+    let mut add = |normal, tributary_length| {
+        join_gap(rows, &GapRow { node, normal, gap: distance, tributary_length });
+    };
+    match gap.normal {
+        Some(normal) => add(normal, at.faces.iter().map(|face| face.length).sum()),
+        None => at.faces.iter().for_each(|face| add(face.normal, face.length)),
+    }
+}

@@ -1,0 +1,106 @@
+//! Why a run ends early.
+
+use super::{DiscreteProblem, SetupError};
+use crate::{
+    contact::{ContactError, UnknownSolver},
+    petsc::PetscError,
+};
+
+/// Why a run ended early.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// A contact step failed; the steps before it are accepted.
+    #[error("{}{source}{advice}", time.map_or(String::new(), |t| format!("step {step} (t = {t}): ")))]
+    Contact {
+        /// The step.
+        step: usize,
+        /// Its time, s; none where there is no time.
+        time: Option<f64>,
+        /// What failed.
+        source: Box<ContactError>,
+        /// What to try, to follow the source; empty where the source says it.
+        advice: &'static str,
+    },
+    /// Another part of a step failed; the steps before it are accepted.
+    #[error("step {step} (t = {time}): {source}")]
+    Step {
+        /// The step.
+        step: usize,
+        /// Its time, s.
+        time: f64,
+        /// What failed.
+        source: StepFailure,
+    },
+    /// The contact solver has no such name.
+    #[error(transparent)]
+    Solver(#[from] UnknownSolver),
+    /// The scene contradicts itself at some time.
+    #[error(transparent)]
+    Setup(#[from] SetupError),
+    /// Another rank failed where this one did not.
+    #[error("another rank failed")]
+    OnAnotherRank,
+    /// PETSc failed.
+    #[error(transparent)]
+    Petsc(#[from] PetscError),
+    /// Whoever was shown an accepted step could not go on (results that cannot be written).
+    #[error(transparent)]
+    Observer(Box<dyn std::error::Error + Send + Sync>),
+}
+
+/// What failed in a step, if not contact.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum StepFailure {
+    /// The damage system has no finite solution.
+    #[error(
+        "the damage equation has no finite answer: its source overflows or its matrix is not \
+         positive definite; look for extreme numbers in [damage] and the loads"
+    )]
+    Damage,
+    /// The relative residual of the damage system is above its tolerance.
+    #[error(
+        "the damage equation was solved only to a residual of {0:.1e} of its right-hand side; look \
+         for extreme numbers in [damage], for slivers in the mesh, and for PETSc options that \
+         loosen -damage_ksp_"
+    )]
+    DamageResidual(f64),
+    /// However short a chosen step is, its error is above the tolerance.
+    #[error(
+        "the damage changes too fast for time.tolerance, however short the step; does a load jump \
+         there? Set time.step to a number"
+    )]
+    TooShort,
+}
+
+impl RunError {
+    /// The contact solve of a step failed. What to try depends on the scene: another solver helps
+    /// where there is contact, shorter steps help after the first solve.
+    pub(super) fn contact(
+        problem: &DiscreteProblem,
+        step: usize,
+        time: f64,
+        source: ContactError,
+    ) -> Self {
+        let contact = !problem.foundation.contact_boundary.is_empty();
+        let advice = match (source.is_missed(), contact, step > 0) {
+            (false, ..) => "",
+            (_, true, true) => {
+                "; try another contact.solver, shorter steps or a larger contact.tolerance"
+            }
+            (_, true, false) => "; try another contact.solver or a larger contact.tolerance",
+            (_, false, true) => "; try shorter steps or a larger contact.tolerance",
+            (_, false, false) => "; try a larger contact.tolerance",
+        };
+        let time = problem.scene().time.map(|_| time);
+        Self::Contact { step, time, source: Box::new(source), advice }
+    }
+
+    /// Whether a solve of a step failed, which may succeed for a shorter step.
+    pub(super) fn is_of_a_solve(&self) -> bool {
+        match self {
+            Self::Contact { .. } => true,
+            Self::Step { source, .. } => *source != StepFailure::TooShort,
+            _ => false,
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! How a run ended that did not fail.
+
+use super::{Accuracy, BoundViolation, State, Step};
+use crate::contact::{Kkt, RigidMotion};
+
+/// How a run ended that did not fail.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// The last accepted step.
+    pub last: Step,
+    /// The stop at ζ_*, if it was reached.
+    pub stopped: Option<Stop>,
+    /// Worst KKT residuals of all steps.
+    pub kkt: Kkt,
+    /// Accepted steps whose damage solve was skipped, because a uniform ζ had no source.
+    pub skipped_damage_solves: usize,
+    /// Steps that were made again, shorter.
+    pub undone: usize,
+    /// Steps in which the contact solver left its fast path.
+    pub fallbacks: usize,
+    /// Of these, steps in which TAO gave the answer in the place of the active set.
+    pub rescued: usize,
+    /// By how much ζ violated the bounds of its equation.
+    pub bound_violation: BoundViolation,
+    /// When first the active nodes left a rigid motion unconstrained, s, and which.
+    pub unconstrained: Option<(f64, RigidMotion)>,
+    /// Estimated errors of the answers.
+    pub accuracy: Accuracy,
+    /// Estimated error of the last ζ over the damage done, where steps are chosen.
+    pub damage_error: Option<f64>,
+    /// The largest stationarity residual of the steps before the last, and the state that has it.
+    pub(super) least_accurate: Option<(f64, State)>,
+    /// The largest displacement of the steps before the last, m, if larger than in the last, and the
+    /// state that has it.
+    pub(super) most_displaced: Option<(f64, State)>,
+}
+
+/// The stop at ζ_*.
+#[derive(Debug, Clone, Copy)]
+pub struct Stop {
+    /// When, s: the first t_n with min ζ ≤ ζ_*; where steps are chosen, the interpolated time.
+    pub time: f64,
+    /// The min ζ found there, which is not accepted.
+    pub zeta_min: f64,
+    /// The least ζ that the sources so far allow: above ζ_* the stop comes too early.
+    pub least_admissible: f64,
+    /// How far off the time may be, s: the last step and twice the estimated delay of all steps.
+    pub uncertainty: f64,
+}
+
+impl Outcome {
+    /// Of a run whose first solve, (27), is `first`.
+    pub(super) fn new(first: Step) -> Self {
+        let mut outcome = Self {
+            last: first,
+            stopped: None,
+            kkt: Kkt::default(),
+            skipped_damage_solves: 0,
+            undone: 0,
+            fallbacks: 0,
+            rescued: 0,
+            bound_violation: BoundViolation::default(),
+            unconstrained: None,
+            accuracy: Accuracy::default(),
+            damage_error: None,
+            least_accurate: None,
+            most_displaced: None,
+        };
+        outcome.count_last();
+        outcome
+    }
+
+    /// A further step is accepted.
+    pub(super) fn accept(&mut self, step: Step) {
+        let Step { state, record, .. } = std::mem::replace(&mut self.last, step);
+        self.count_last();
+        let displacement = record.displacement_max;
+        if displacement > self.last.record.displacement_max
+            && self.most_displaced.as_ref().is_none_or(|(largest, _)| displacement > *largest)
+        {
+            self.most_displaced = Some((displacement, state.clone()));
+        }
+        let residual = record.kkt_stationarity;
+        if self.least_accurate.as_ref().is_none_or(|(largest, _)| residual > *largest) {
+            self.least_accurate = Some((residual, state));
+        }
+    }
+
+    fn count_last(&mut self) {
+        let Step { record, report, unconstrained, .. } = &self.last;
+        self.kkt = self.kkt.max(&record.kkt());
+        self.skipped_damage_solves += usize::from(self.last.skipped_damage_solve);
+        self.fallbacks += usize::from(report.fallbacks > 0);
+        self.rescued += usize::from(report.rescues > 0);
+        if self.unconstrained.is_none() {
+            self.unconstrained = unconstrained.clone().map(|motion| (record.time, motion));
+        }
+    }
+}

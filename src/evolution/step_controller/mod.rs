@@ -1,0 +1,281 @@
+//! Step control: which steps are made, and whether they are accepted.
+//!
+//! Steps are uniform as in (25), or chosen by their error. Chosen ones are two-step backward
+//! differences with an extrapolated source (Hairer, Nørsett, Wanner, *Solving Ordinary Differential
+//! Equations I*, III.5): with the step k_n = ω k_{n−1},
+//!
+//! (M + kκL) ζ_n = M (ζ̃_{n−1} + β (ζ̃_{n−1} − ζ̃_{n−2})) + k b̂_n,
+//! k = k_n (1+ω)/(1+2ω), β = ω²/(1+2ω), b̂_n = b_{n−1} + ω (b_{n−1} − b_{n−2}),
+//!
+//! which is a step (28) of length k from another start with another source. When u_n is known, so is
+//! b_n, and the error of the extrapolation b̂_n is corrected in the next step: ζ̃_n = ζ_n + e_n with
+//! (M + kκL) e_n = k (b_n − b̂_n). Uniform steps, and the first chosen one, are the same formula
+//! with ω = 0; uniform ones have no correction.
+
+mod error_control;
+mod load_curve;
+
+use super::{
+    BoundViolation, DiscreteProblem, RunError, Step, StepFailure, Stop,
+    damage_step::{DamageSource, DamageStep, DamageUpdate},
+};
+use crate::{
+    fem::Body,
+    scene::{Stepping, TimeGrid},
+};
+use error_control::ErrorControl;
+use nalgebra::DVector;
+
+/// A step to be made from t_{n−1} to t_n, with the damage step
+/// (M + kκL) ζ_n = M · `start` + k · `load`.
+pub(super) struct PlannedStep {
+    pub(super) n: usize,
+    /// t_n, s.
+    pub(super) time: f64,
+    /// k_n = t_n − t_{n−1}, s.
+    pub(super) length: f64,
+    /// k, s.
+    pub(super) k: f64,
+    /// ζ_{n−1}, or what stands in its place.
+    pub(super) start: DVector<f64>,
+    /// b_{n−1}, or what stands in its place, m²/s.
+    pub(super) load: DVector<f64>,
+    /// The bounds on ζ_n of [`BoundViolation`].
+    pub(super) bounds: (f64, f64),
+    beta: f64,
+}
+
+impl PlannedStep {
+    /// The error of a step that has no answer.
+    pub(super) fn failed(&self, source: StepFailure) -> RunError {
+        RunError::Step { step: self.n, time: self.time, source }
+    }
+}
+
+/// What becomes of a step.
+pub(super) enum Verdict {
+    /// It is accepted.
+    Accept(Box<Step>),
+    /// It is to be made again, shorter by this factor.
+    Retry(f64),
+    /// ζ_* is reached: the run ends before this step.
+    Stop(Stop),
+}
+
+/// Plans the steps of a run and judges them. What it knows of the accepted steps changes when it
+/// answers [`Verdict::Accept`], and only then.
+pub(super) struct StepController<'a> {
+    body: &'a Body,
+    /// ζ_*.
+    threshold: f64,
+    /// `None` where there is no time, and so no step.
+    grid: Option<TimeGrid>,
+    /// Where steps are chosen.
+    chosen: Option<ErrorControl<'a>>,
+    /// k_{n−1}, s; infinite before the first step, so that ω = 0.
+    length: f64,
+    /// ζ̃_{n−1}, ζ̃_{n−1} − ζ̃_{n−2}, and the rate of the formula at t_{n−1}, 1/s.
+    zeta: DVector<f64>,
+    change: DVector<f64>,
+    rate: Option<DVector<f64>>,
+    /// The damage source at t_{n−1}, and b_{n−1} − b_{n−2}, m²/s.
+    source: DamageSource,
+    load_change: DVector<f64>,
+    /// Per node, Σ error / rate of the steps: by how much it reaches a given ζ too late or too early,
+    /// s. (An error δζ shifts an autonomous evolution by δζ/ζ', once and for all.)
+    delay: DVector<f64>,
+    bounds: (f64, f64),
+    pub(super) violation: BoundViolation,
+}
+
+/// In a smooth evolution with equal steps the increments of the formula are off by ⅓ k³ζ‴, those of
+/// the trapezoidal rule by 1/12: the first is this multiple of their difference.
+const TRUNCATION: f64 = 4.0 / 3.0;
+
+impl<'a> StepController<'a> {
+    /// After (27), from ζ₀ = `zeta` and its damage source.
+    pub(super) fn new(problem: &'a DiscreteProblem, zeta: &[f64], source: DamageSource) -> Self {
+        let zeros = DVector::zeros(zeta.len());
+        Self {
+            body: &problem.body,
+            threshold: problem.threshold(),
+            grid: problem.scene().time,
+            chosen: ErrorControl::new(problem, zeta),
+            length: f64::INFINITY,
+            zeta: DVector::from_column_slice(zeta),
+            change: zeros.clone(),
+            rate: None,
+            source,
+            load_change: zeros.clone(),
+            delay: zeros,
+            bounds: problem.body.partition.extremes(zeta),
+            violation: BoundViolation::default(),
+        }
+    }
+
+    /// The step after the accepted one `last`; `None` at the end of time.
+    pub(super) fn plan(&mut self, last: &Step) -> Option<PlannedStep> {
+        let (grid, n) = (self.grid?, last.record.step + 1);
+        let (time, length, omega) = match (&mut self.chosen, grid.stepping) {
+            (Some(chosen), _) => {
+                let (time, length) = chosen.choose(last.state.time)?;
+                (time, length, length / self.length)
+            }
+            (None, Stepping::Uniform { steps }) if n <= steps => {
+                (grid.time(n, steps), grid.end / steps as f64, 0.0)
+            }
+            _ => return None,
+        };
+        let beta = omega * omega / (1.0 + 2.0 * omega);
+        let k = length * (1.0 + omega) / (1.0 + 2.0 * omega);
+        let shift = beta * &self.change;
+        let (lower, upper) = shifted(self.bounds, self.body.partition.extremes(shift.as_slice()));
+        // φ ≤ 0, so b ≤ 0 and b̂_n ≥ (1 + ω) b_{n−1}. What is not a number must stay so.
+        let lower = lower + k * ((1.0 + omega) * self.source.min);
+        let load =
+            (&self.source.load + omega * &self.load_change).map(|b| if b > 0.0 { 0.0 } else { b });
+        let (start, bounds) = (&self.zeta + shift, (lower, upper));
+        Some(PlannedStep { n, time, length, k, beta, start, load, bounds })
+    }
+
+    /// Judges a step whose ζ_n and u_n are known.
+    ///
+    /// # Errors
+    /// The error is too large however short the step is, or the correction e_n has no answer.
+    pub(super) fn judge(
+        &mut self,
+        planned: &PlannedStep,
+        damage: &DamageUpdate,
+        step: Box<Step>,
+        damage_step: &mut DamageStep,
+    ) -> Result<Verdict, RunError> {
+        let source = damage_step.source(&step.state);
+        let zeta = DVector::from_column_slice(&damage.zeta);
+        let correction = match self.chosen {
+            Some(_) => damage_step.correction(planned, &source.load - &planned.load)?,
+            None => DVector::zeros(zeta.len()),
+        };
+        let corrected = &zeta + &correction;
+        let rate = self.rate(planned, &corrected);
+        match &mut self.chosen {
+            None => self.add_uniform_delay(planned, &rate),
+            Some(chosen) => {
+                // The rate before the first step is that of its source, which needs no correction.
+                let first = || &rate - &correction / planned.k;
+                let sum = self.rate.clone().unwrap_or_else(first) + &rate;
+                let trapezoidal = 0.5 * planned.length * sum;
+                let truncation = TRUNCATION * (trapezoidal - (&corrected - &self.zeta));
+                let errors = [&correction, &truncation];
+                if let Err(factor) = chosen.judge(planned, &zeta, errors, &rate) {
+                    let shorter = self.retry(planned, factor);
+                    return shorter.ok_or_else(|| planned.failed(StepFailure::TooShort));
+                }
+                add_delay(&mut self.delay, &truncation, &rate);
+            }
+        }
+        self.violation.observe(planned, damage.min_max, planned.time);
+        let (lower, upper) = planned.bounds;
+        let tightened = (lower.max(damage.min_max.0), upper.min(damage.min_max.1));
+        let partition = &self.body.partition;
+        self.bounds = shifted(tightened, partition.extremes(correction.as_slice()));
+        self.length = planned.length;
+        self.change = &corrected - &self.zeta;
+        self.zeta = corrected;
+        self.rate = Some(rate);
+        self.load_change = &source.load - &self.source.load;
+        self.source = source;
+        Ok(Verdict::Accept(step))
+    }
+
+    /// Judges a step from `last` that reaches ζ_*: a stop, or a shorter step that lands nearer.
+    pub(super) fn judge_stop(
+        &mut self,
+        planned: &PlannedStep,
+        damage: &DamageUpdate,
+        last: &Step,
+    ) -> Verdict {
+        let (zeta_min, level) = (damage.min_max.0, self.threshold);
+        let (time, delays) = if let Some(chosen) = &self.chosen {
+            let from = self.body.partition.extremes(self.zeta.as_slice()).0;
+            let part = if from > level { (from - level) / (from - zeta_min) } else { 0.0 };
+            // The last ζ that is written counts as well as its correction ζ̃.
+            if from.max(last.record.zeta_min) - level > chosen.landing()
+                && let Some(shorter) = self.retry(planned, (0.9 * part).max(0.01))
+            {
+                return shorter;
+            }
+            (last.state.time + part * planned.length, 1.0)
+        } else {
+            // This step tells the error of the one before.
+            let rate = self.rate(planned, &DVector::from_column_slice(&damage.zeta));
+            self.add_uniform_delay(planned, &rate);
+            (planned.time, 2.0)
+        };
+        self.violation.observe(planned, damage.min_max, time);
+        let delay = self.delay_at_weakest_node(&damage.zeta).abs();
+        let uncertainty = planned.length + delays * delay;
+        Verdict::Stop(Stop { time, zeta_min, least_admissible: planned.bounds.0, uncertainty })
+    }
+
+    /// Judges a step whose solves failed: where steps are chosen, a shorter step may do better.
+    ///
+    /// # Errors
+    /// `failure`, if no shorter step is to be tried.
+    pub(super) fn judge_failure(
+        &self,
+        planned: &PlannedStep,
+        failure: RunError,
+    ) -> Result<Verdict, RunError> {
+        let shorter = self.retry(planned, 0.5).filter(|_| failure.is_of_a_solve());
+        shorter.ok_or(failure)
+    }
+
+    /// The step is to be made again, `length` s long.
+    pub(super) fn shorten(&mut self, length: f64) {
+        self.chosen.iter_mut().for_each(|chosen| chosen.next_length = length);
+    }
+
+    /// The estimated error of the last accepted ζ over the damage done, where steps are chosen.
+    pub(super) fn damage_error(&self) -> Option<f64> {
+        self.chosen.as_ref().map(ErrorControl::relative_error)
+    }
+
+    /// A shorter step, where steps are chosen and not hopelessly short.
+    fn retry(&self, planned: &PlannedStep, factor: f64) -> Option<Verdict> {
+        let possible = self.chosen.as_ref()?.is_possible(planned.length * factor);
+        possible.then_some(Verdict::Retry(factor))
+    }
+
+    /// The rate of the formula at t_n, (ζ̃_n − ζ̃_{n−1} − β (ζ̃_{n−1} − ζ̃_{n−2})) / k.
+    fn rate(&self, planned: &PlannedStep, zeta: &DVector<f64>) -> DVector<f64> {
+        (zeta - &self.zeta - planned.beta * &self.change) / planned.k
+    }
+
+    /// Adds the delay of the uniform step before the one with this `rate`: (28) takes the source at
+    /// the beginning of a step, so its error is ½ k (ζ'_n − ζ'_{n−1}).
+    fn add_uniform_delay(&mut self, planned: &PlannedStep, rate: &DVector<f64>) {
+        if let Some(before) = &self.rate {
+            let error = 0.5 * planned.k * (rate - before);
+            add_delay(&mut self.delay, &error, &(0.5 * (rate + before)));
+        }
+    }
+
+    /// The delay at the node of least `zeta`. Collective.
+    fn delay_at_weakest_node(&self, zeta: &[f64]) -> f64 {
+        let nodes = 0..self.body.partition.owned();
+        let weakest = nodes.min_by(|&a, &b| zeta[a].total_cmp(&zeta[b]));
+        let comm = self.body.partition.comm();
+        let (_, rank) = comm.min_with_rank(weakest.map_or(f64::INFINITY, |i| zeta[i]));
+        comm.broadcast(rank, weakest.map_or(0.0, |i| self.delay[i]))
+    }
+}
+
+/// Adds error / rate per node; nodes at rest have no delay.
+fn add_delay(delay: &mut DVector<f64>, error: &DVector<f64>, rate: &DVector<f64>) {
+    *delay += error.zip_map(rate, |error, rate| if rate == 0.0 { 0.0 } else { error / rate });
+}
+
+/// Bounds on ζ after a correction of ζ by a field with this minimum and maximum.
+fn shifted((lower, upper): (f64, f64), (min, max): (f64, f64)) -> (f64, f64) {
+    (lower + min.min(0.0), upper + max.max(0.0))
+}
