@@ -112,7 +112,7 @@ pub enum RunError {
     #[error(
         "step {step} (t = {time}): the damage equation was solved only to a residual of {residual:.1e} \
          of its right-hand side; look for extreme numbers in [damage], for slivers in the mesh, and \
-         for PETSc options that loosen -damage_ksp_"
+         for PETSc options that begin with -damage_pc_"
     )]
     DamageMissed {
         /// The step.

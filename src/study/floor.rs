@@ -1,9 +1,10 @@
 //! What a time step costs at least: the work that no step can avoid, timed in isolation.
 
 use crate::{
+    cholesky::{Factor, Precision},
     evolution::DiscreteProblem,
     fem::{DamageSystem, Stiffness},
-    petsc::{Factor, PetscError, Precision, Session, Vector},
+    petsc::{PetscError, Session, Vector},
     scene::Stepping,
 };
 use serde::Serialize;
@@ -50,9 +51,8 @@ pub fn floor(
     let mut stiffness = Stiffness::new(session, body, &problem.elasticity, &constraints.bases)?;
     let mut held = stiffness.matrix.duplicate()?;
     let bounded: Vec<usize> = constraints.bounds.iter().map(|bound| bound.dof).collect();
-    held.hold(&bounded, stiffness.scale)?;
-    let unknowns = 2 * problem.body.partition.total();
-    let mut factor = Factor::new(session, "elastic_", unknowns, Precision::Preconditioner)?;
+    held.zero_rows_columns(&bounded, stiffness.scale)?;
+    let mut factor = Factor::new(session, "elastic_", Precision::Preconditioner);
     factor.factorise(&held)?;
 
     let zeros = || Vector::zeros(session, stiffness.matrix.owned());
@@ -70,8 +70,8 @@ pub fn floor(
 
     let traffic = [
         ("stiffness refill", stiffness.refill_traffic()),
-        ("product", stiffness.matrix.traffic()),
-        ("triangular solves", factor.traffic()),
+        ("product", stiffness.matrix.bytes_per_product()),
+        ("triangular solves", factor.bytes_per_application()),
         ("damage solve", 0.0),
     ];
     let mut seconds = [const { Vec::new() }; 5];

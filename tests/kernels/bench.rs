@@ -3,10 +3,11 @@
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use signorini::{
+    cholesky::{Factor, Precision},
     contact::SOLVERS,
     evolution::{ContactStep, DiscreteProblem},
     fem::{DamageSystem, Stiffness, source, source_load},
-    petsc::{Factor, Precision, Session, Vector},
+    petsc::{Session, Vector},
     phases::Phases,
     scene::Scene,
     study,
@@ -36,15 +37,14 @@ fn stiffness(c: &mut Criterion) {
     let (session, problem) = (Session::start(&[]).unwrap(), problem());
     let bases = &problem.constraints.bases;
     let mut k = Stiffness::new(&session, &problem.body, &problem.elasticity, bases).unwrap();
-    let mut held = k.matrix.duplicate().unwrap();
+    let mut matrix = k.matrix.duplicate().unwrap();
     let bounded: Vec<usize> = problem.constraints.bounds.iter().map(|bound| bound.dof).collect();
-    let mut factor =
-        Factor::new(&session, "elastic_", k.matrix.owned(), Precision::Preconditioner).unwrap();
+    let mut factor = Factor::new(&session, "elastic_", Precision::Preconditioner);
     // The values count as new only when they are written.
     let mut renew = |k: &Stiffness, factor: &mut Factor| {
-        held.copy(&k.matrix).unwrap();
-        held.hold(&bounded, k.scale).unwrap();
-        factor.factorise(&held).unwrap()
+        matrix.copy(&k.matrix).unwrap();
+        matrix.zero_rows_columns(&bounded, k.scale).unwrap();
+        factor.factorise(&matrix).unwrap()
     };
     renew(&k, &mut factor);
 
