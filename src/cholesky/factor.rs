@@ -11,14 +11,21 @@ use crate::petsc::{
 /// a cycle of algebraic multigrid (PCGAMG) where the matrix is very large. PETSc options can ask for
 /// any other preconditioner.
 ///
-/// Fill-reducing ordering and symbolic factorisation are done once for each number of rows.
+/// Fill-reducing ordering and symbolic factorisation are done once for each number of rows. A factor
+/// may be kept as the preconditioner of later matrices until [`RefactorisationPolicy`] finds a new one
+/// due.
 pub struct Factor {
     comm: Communicator,
     prefix: String,
     precision: Precision,
     /// Made with the first matrix of so many rows.
     method: Option<(usize, Method)>,
-    cost: f64,
+    /// `None` before the first factorisation, and after one that failed.
+    policy: Option<RefactorisationPolicy>,
+    /// Applications in the present solve.
+    applications: usize,
+    /// Factorisations that did not fail.
+    factorisations: usize,
 }
 
 enum Method {
@@ -26,7 +33,7 @@ enum Method {
     Petsc(Preconditioner),
 }
 
-/// The cost of a factor whose work is not known, in iterations. Measured on square.toml with n = 64
+/// What a factorisation costs whose work is not known, in iterations. Measured on square.toml with n = 64
 /// and 256, on one and two ranks: MUMPS 4 to 10, gamg 13 to 33, CHOLMOD through PETSc 10 to 19.
 const UNKNOWN_COST: f64 = 10.0;
 
@@ -38,11 +45,19 @@ const VERY_LARGE: usize = 2_500_000;
 impl Factor {
     /// A factor whose PETSc options begin with `prefix` (`-elastic_pc_type …`).
     pub fn new(session: &Session, prefix: &str, precision: Precision) -> Self {
-        let (comm, prefix) = (session.comm(), prefix.to_owned());
-        Self { comm, prefix, precision, method: None, cost: UNKNOWN_COST }
+        Self {
+            comm: session.comm(),
+            prefix: prefix.to_owned(),
+            precision,
+            method: None,
+            policy: None,
+            applications: 0,
+            factorisations: 0,
+        }
     }
 
-    /// Factorises the present values of `matrix`; false if it is not positive definite. Collective.
+    /// Factorises the present values of `matrix`; false if it is not positive definite: then there is
+    /// no factor. Collective.
     ///
     /// # Errors
     /// There is no memory for it, or PETSc options ask for what PETSc has not.
@@ -52,17 +67,18 @@ impl Factor {
             Some((size, method)) if size == rows => method,
             _ => self.choose(matrix, rows)?,
         };
-        let definite = match &mut method {
-            Method::Petsc(preconditioner) => preconditioner.set_up(matrix)?,
+        let (definite, cost) = match &mut method {
+            Method::Petsc(preconditioner) => (preconditioner.set_up(matrix)?, UNKNOWN_COST),
             Method::Substructure(factor) => {
                 let definite = factor.factorise(matrix)?;
                 let work = self.comm.max(factor.work());
                 let iteration = self.comm.max(factor.bytes() + matrix.entry_bytes());
-                self.cost = work / iteration.max(1.0);
-                definite
+                (definite, work / iteration.max(1.0))
             }
         };
         self.method = Some((rows, method));
+        self.policy = definite.then(|| RefactorisationPolicy::new(cost));
+        self.factorisations += usize::from(definite);
         Ok(definite)
     }
 
@@ -94,18 +110,6 @@ impl Factor {
         Ok(Method::Petsc(Preconditioner::new(prefix, kind, package)?))
     }
 
-    /// Whether the matrix last factorised had as many rows as this one.
-    fn fits(&self, matrix: &Matrix) -> Result<bool, PetscError> {
-        let rows = matrix.size()?;
-        Ok(self.method.as_ref().is_some_and(|(size, _)| *size == rows))
-    }
-
-    /// Iterations of conjugate gradients that take about as long as a factorisation, by counted
-    /// work; the same on all ranks.
-    pub fn cost(&self) -> f64 {
-        self.cost
-    }
-
     /// Bytes that an application reads on this rank; 0 where unknown.
     pub fn bytes_per_application(&self) -> f64 {
         match &self.method {
@@ -119,6 +123,7 @@ impl Factor {
     /// # Errors
     /// Sizes differ, or nothing was factorised.
     pub fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
+        self.applications += 1;
         match &mut self.method {
             Some((_, Method::Petsc(preconditioner))) => preconditioner.apply(r, z),
             Some((_, Method::Substructure(factor))) if r.owned() == z.owned() => {
@@ -127,26 +132,8 @@ impl Factor {
             _ => Err(PetscError::ours("a factor is applied that was not made for such vectors")),
         }
     }
-}
 
-/// A factor that preconditions further matrices until [`RefactorisationPolicy`] finds a new one due.
-pub struct KeptFactor {
-    factor: Factor,
-    /// `None` before the first factorisation, and after one that failed.
-    policy: Option<RefactorisationPolicy>,
-    /// Applications in the present solve.
-    applications: usize,
-    factorisations: usize,
-}
-
-impl KeptFactor {
-    /// A [`Factor::new`] that is to be kept.
-    pub fn new(session: &Session, prefix: &str, precision: Precision) -> Self {
-        let factor = Factor::new(session, prefix, precision);
-        Self { factor, policy: None, applications: 0, factorisations: 0 }
-    }
-
-    /// Whether there is a factor, of whatever matrix.
+    /// Whether the last factorisation went well.
     pub(super) fn exists(&self) -> bool {
         self.policy.is_some()
     }
@@ -165,35 +152,19 @@ impl KeptFactor {
             policy.solved(iterations);
         }
     }
-
-    /// Factorises `matrix`; false if it is not positive definite: then there is no factor.
-    pub(super) fn factorise(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
-        self.policy = None;
-        let definite = self.factor.factorise(matrix)?;
-        if definite {
-            self.policy = Some(RefactorisationPolicy::new(self.factor.cost()));
-            self.factorisations += 1;
-        }
-        Ok(definite)
-    }
-
-    /// See [`Factor::bytes_per_application`].
-    pub(super) fn bytes_per_application(&self) -> f64 {
-        self.factor.bytes_per_application()
-    }
 }
 
 /// Inside one of TAO's methods: every new operator begins a solve.
-impl ShellPreconditioner for KeptFactor {
+impl ShellPreconditioner for Factor {
     fn set_up(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
         self.end_solve();
-        let fits = self.iteration_limit().is_some() && self.factor.fits(matrix)?;
-        if fits { Ok(true) } else { self.factorise(matrix) }
+        let rows = matrix.size()?;
+        let fits = self.method.as_ref().is_some_and(|(size, _)| *size == rows);
+        if fits && self.iteration_limit().is_some() { Ok(true) } else { self.factorise(matrix) }
     }
 
     fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
-        self.applications += 1;
-        self.factor.apply(r, z)
+        Factor::apply(self, r, z)
     }
 
     fn factorisations(&self) -> usize {

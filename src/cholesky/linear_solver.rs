@@ -1,8 +1,8 @@
 //! Linear systems by conjugate gradients on a Cholesky factor that is kept.
 
-use super::{KeptFactor, Precision};
+use super::{Factor, Precision};
 use crate::{
-    petsc::{Matrix, PetscError, Session, ShellPreconditioner, Vector},
+    petsc::{Matrix, PetscError, Session, Vector},
     phases::Phases,
 };
 
@@ -11,7 +11,7 @@ use crate::{
 pub struct LinearSystem<'a> {
     /// A.
     pub matrix: &'a Matrix,
-    /// The nonzero entries of the diagonal D; `None` where it has none on any rank.
+    /// The nonzero entries of the diagonal D; `None` where no rank has any.
     pub added: Option<&'a [(usize, f64)]>,
     /// The unknowns that keep their values in x (Dirichlet conditions); `None` where no rank has any.
     pub prescribed: Option<&'a [usize]>,
@@ -74,7 +74,7 @@ impl<'a> LinearSystem<'a> {
 /// A hand-written loop rather than KSPCG, which would need a matrix of its own for each set of
 /// prescribed unknowns and would not tell the residual on them, the forces of contact.
 pub struct LinearSolver {
-    factor: KeptFactor,
+    factor: Factor,
     /// A + D with identity rows, while it is factorised.
     modified: Option<Matrix>,
     residual: Vector,
@@ -102,7 +102,7 @@ const MOST_ITERATIONS: usize = 200;
 
 impl LinearSolver {
     /// For systems of `owned` unknowns on this rank, with the PETSc options of
-    /// [`Factor`](super::Factor) under `prefix`.
+    /// [`Factor`] under `prefix`.
     ///
     /// # Errors
     /// There is no memory for it.
@@ -113,7 +113,7 @@ impl LinearSolver {
         precision: Precision,
     ) -> Result<Self, PetscError> {
         Ok(Self {
-            factor: KeptFactor::new(session, prefix, precision),
+            factor: Factor::new(session, prefix, precision),
             modified: None,
             residual: Vector::zeros(session, owned)?,
             free_residual: Vector::zeros(session, owned)?,

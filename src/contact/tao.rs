@@ -2,7 +2,7 @@
 
 use super::{ContactError, ContactProblem, ContactReport, ContactSolver, Kkt};
 use crate::{
-    cholesky::{KeptFactor, Precision},
+    cholesky::{Factor, Precision},
     petsc::{BoundedQuadratic, Session, Vector},
 };
 
@@ -14,7 +14,7 @@ use crate::{
 pub(super) struct Tao<'s> {
     session: &'s Session,
     method: String,
-    tao: Option<BoundedQuadratic<KeptFactor>>,
+    tao: Option<BoundedQuadratic<Factor>>,
     /// U of the last solve, m.
     size: f64,
 }
@@ -55,7 +55,7 @@ impl ContactSolver for Tao<'_> {
         let tao = match self.tao.take() {
             Some(tao) => tao,
             None => BoundedQuadratic::new(self.session, &self.method, c.owned(), || {
-                KeptFactor::new(self.session, "elastic_", Precision::Preconditioner)
+                Factor::new(self.session, "elastic_", Precision::Preconditioner)
             })?,
         };
         let tao = self.tao.insert(tao);

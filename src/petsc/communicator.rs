@@ -78,13 +78,10 @@ impl Communicator {
 
     /// The largest of the ranks' values; NaN counts as −∞.
     pub fn max(self, value: f64) -> f64 {
-        match self.is_serial() {
-            true => value,
-            false => {
-                let value = if value.is_nan() { f64::NEG_INFINITY } else { value };
-                self.reduced(value, Operation::Max)
-            }
+        if self.is_serial() {
+            return value;
         }
+        self.reduced(if value.is_nan() { f64::NEG_INFINITY } else { value }, Operation::Max)
     }
 
     /// The least of the ranks' values; NaN counts as ∞.
@@ -104,14 +101,14 @@ impl Communicator {
         self.total(if self.rank == from { value } else { 0.0 })
     }
 
-    /// Whether it holds on some rank.
-    pub fn any(self, on_this: bool) -> bool {
-        if self.is_serial() { on_this } else { self.max(f64::from(u8::from(on_this))) > 0.0 }
+    /// Whether the condition is true on some rank.
+    pub fn any(self, condition: bool) -> bool {
+        if self.is_serial() { condition } else { self.max(f64::from(u8::from(condition))) > 0.0 }
     }
 
-    /// Whether it holds on every rank.
-    pub fn all(self, on_this: bool) -> bool {
-        !self.any(!on_this)
+    /// Whether the condition is true on every rank.
+    pub fn all(self, condition: bool) -> bool {
+        !self.any(!condition)
     }
 
     /// The values of all ranks, one after the other (as MPI_Allgather); each rank passes as many.

@@ -8,7 +8,7 @@ use super::{
 use std::{ffi::c_void, fmt, ptr};
 
 /// Fetches ghost values from their owners (PetscSF, a star forest: one owner, many ghosts).
-pub struct Ghosts {
+pub(crate) struct Ghosts {
     handle: Handle<raw::_p_PetscSF>,
     /// Values of a field: owned ones, then ghosts.
     length: usize,
@@ -17,10 +17,7 @@ pub struct Ghosts {
 impl Ghosts {
     /// For fields of `owned` values followed by ghosts, each given by its owner and its index
     /// among the owner's values (PetscSFSetGraph). Collective.
-    ///
-    /// # Errors
-    /// PETSc failed.
-    pub fn new(
+    pub(crate) fn new(
         _session: &Session,
         owned: usize,
         ghosts: &[(usize, usize)],
@@ -52,10 +49,7 @@ impl Ghosts {
 
     /// Replaces the ghosts of `field`, which has `block` numbers for each value (PetscSFBcastBegin).
     /// Collective.
-    ///
-    /// # Errors
-    /// The field has another length, or PETSc fails.
-    pub fn update(&self, field: &mut [f64], block: usize) -> Result<(), PetscError> {
+    pub(crate) fn update(&self, field: &mut [f64], block: usize) -> Result<(), PetscError> {
         same_size(block * self.length, field.len())?;
         let mut unit = ptr::null_mut();
         let data = field.as_mut_ptr().cast::<c_void>();

@@ -6,10 +6,7 @@ use std::{ptr, slice};
 /// The rank of each of `nodes` nodes so that all have about as many and few of the pairs of
 /// neighbours that `cells` (their nodes) make are cut (PTScotch, a parallel multilevel method).
 /// Every rank knows the graph and learns the answer. Collective.
-///
-/// # Errors
-/// This PETSc has no PTScotch, or fails.
-pub fn divide(
+pub(crate) fn divide(
     session: &Session,
     nodes: usize,
     cells: &[[usize; 3]],

@@ -115,10 +115,7 @@ impl Matrix {
     }
 
     /// A copy scaled by `factor`, then with `shift` added to its diagonal (MatScale, MatShift).
-    ///
-    /// # Errors
-    /// There is no memory for it.
-    pub fn scaled(&self, factor: f64, shift: f64) -> Result<Self, PetscError> {
+    pub(crate) fn scaled(&self, factor: f64, shift: f64) -> Result<Self, PetscError> {
         let copy = self.duplicate()?;
         // SAFETY: a live handle of our own.
         unsafe {
@@ -140,10 +137,7 @@ impl Matrix {
     }
 
     /// this ← this + `factor` · `other`, which has the same pattern (MatAXPY).
-    ///
-    /// # Errors
-    /// Sizes differ.
-    pub fn add(&mut self, factor: f64, other: &Self) -> Result<(), PetscError> {
+    pub(crate) fn add(&mut self, factor: f64, other: &Self) -> Result<(), PetscError> {
         same_size(self.owned, other.owned)?;
         let pattern = raw::MatStructure::SAME_NONZERO_PATTERN;
         // SAFETY: live handles, distinct by borrowing; PETSc compares the patterns' sizes.
@@ -151,10 +145,7 @@ impl Matrix {
     }
 
     /// Adds `diagonal` (owned entries) to the diagonal (MatDiagonalSet).
-    ///
-    /// # Errors
-    /// Sizes differ.
-    pub fn add_diagonal(&mut self, diagonal: &Vector) -> Result<(), PetscError> {
+    pub(crate) fn add_diagonal(&mut self, diagonal: &Vector) -> Result<(), PetscError> {
         same_size(self.owned, diagonal.owned())?;
         let add = raw::InsertMode::ADD_VALUES;
         // SAFETY: live handles of matching layout.
@@ -182,10 +173,7 @@ impl Matrix {
 
     /// Tells multigrid the fields that the matrix without boundary conditions maps to zero
     /// (MatSetNearNullSpace). PETSc wants them orthonormal; dependent ones are left out.
-    ///
-    /// # Errors
-    /// Sizes differ.
-    pub fn set_near_null_space(&mut self, fields: Vec<Vector>) -> Result<(), PetscError> {
+    pub(crate) fn set_near_null_space(&mut self, fields: Vec<Vector>) -> Result<(), PetscError> {
         let mut basis: Vec<Vector> = Vec::new();
         for mut field in fields {
             same_size(self.owned, field.owned())?;

@@ -37,15 +37,15 @@ mod raw {
 
 pub use communicator::Communicator;
 pub use error::PetscError;
-pub use ghosts::Ghosts;
-pub use graph::divide;
 pub use matrix::Matrix;
 pub use session::Session;
-pub use shell::ShellPreconditioner;
-pub use tao::{BoundedQuadratic, TaoReport};
 pub use vector::Vector;
 
+pub(crate) use ghosts::Ghosts;
+pub(crate) use graph::divide;
 pub(crate) use options::{has_option, set_default_option};
 pub(crate) use preconditioner::Preconditioner;
+pub(crate) use shell::ShellPreconditioner;
+pub(crate) use tao::BoundedQuadratic;
 
 use error::check;

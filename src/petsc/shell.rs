@@ -5,17 +5,11 @@ use super::{Matrix, PetscError, Vector, check, preconditioner::NOT_DEFINITE, raw
 use std::{ffi::c_void, ptr};
 
 /// What PETSc's solvers call where they would call a preconditioner of their own.
-pub trait ShellPreconditioner {
+pub(crate) trait ShellPreconditioner {
     /// The operator is now `matrix`, or has other values; false if it is not positive definite.
-    ///
-    /// # Errors
-    /// The preconditioner cannot be made.
     fn set_up(&mut self, matrix: &Matrix) -> Result<bool, PetscError>;
 
     /// `z` ← P⁻¹ `r`.
-    ///
-    /// # Errors
-    /// The preconditioner cannot be applied.
     fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError>;
 
     /// Factorisations made so far.

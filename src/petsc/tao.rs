@@ -14,7 +14,7 @@ use std::{ffi::c_void, ptr};
 /// Minimises ½ xᵀKx − fᵀx over lower ≤ x ≤ upper with one of TAO's methods.
 ///
 /// PETSc options without a prefix reach it: `-tao_type bnls`, `-tao_monitor`, `-ksp_type …`.
-pub struct BoundedQuadratic<P> {
+pub(crate) struct BoundedQuadratic<P> {
     // Destroyed in this order: the Tao uses the preconditioner.
     tao: Handle<raw::_p_Tao>,
     preconditioner: Option<Box<P>>,
@@ -23,15 +23,15 @@ pub struct BoundedQuadratic<P> {
 
 /// What TAO says of a solve; whether it is true is for the KKT residuals to tell.
 #[derive(Debug, Clone, Copy)]
-pub struct TaoReport {
+pub(crate) struct TaoReport {
     /// Outer iterations.
-    pub iterations: usize,
+    pub(crate) iterations: usize,
     /// Iterations of the linear solver inside.
-    pub linear_iterations: usize,
+    pub(crate) linear_iterations: usize,
     /// Factorisations inside; methods with another preconditioner do none.
-    pub factorisations: usize,
+    pub(crate) factorisations: usize,
     /// TaoConvergedReason: positive when TAO believes it has converged.
-    pub reason: i32,
+    pub(crate) reason: i32,
 }
 
 /// What the callbacks need: ½ xᵀKx − fᵀx.
@@ -45,10 +45,7 @@ impl<P: ShellPreconditioner> BoundedQuadratic<P> {
     ///
     /// Its Newton systems are solved by Steihaug's conjugate gradients (KSPSTCG), which take the
     /// whole step unless the trust region cuts it, with the preconditioner that `precondition` makes.
-    ///
-    /// # Errors
-    /// PETSc knows no such method, or fails.
-    pub fn new(
+    pub(crate) fn new(
         session: &Session,
         method: &str,
         size: usize,
@@ -88,11 +85,9 @@ impl<P: ShellPreconditioner> BoundedQuadratic<P> {
     }
 
     /// Minimises from the start `x` until the gradient is about `limit` in ‖·‖₂, and leaves the
-    /// minimiser there; bounds may be ±infinite.
-    ///
-    /// # Errors
-    /// Sizes differ, or PETSc fails. That TAO did not converge is no error but a negative `reason`.
-    pub fn minimise(
+    /// minimiser there; bounds may be ±infinite. That TAO did not converge is no error but a negative
+    /// `reason`.
+    pub(crate) fn minimise(
         &mut self,
         k: &Matrix,
         f: &Vector,

@@ -81,10 +81,7 @@ impl Vector {
     }
 
     /// ‖·‖₂ over all ranks (VecNorm).
-    ///
-    /// # Errors
-    /// PETSc failed.
-    pub fn norm(&self) -> Result<f64, PetscError> {
+    pub(crate) fn norm(&self) -> Result<f64, PetscError> {
         let mut norm = 0.0;
         // SAFETY: a live handle.
         check(unsafe { raw::VecNorm(self.raw(), raw::NormType::NORM_2, &mut norm) })?;
@@ -92,10 +89,7 @@ impl Vector {
     }
 
     /// Inner product over all ranks (VecDot).
-    ///
-    /// # Errors
-    /// Sizes differ.
-    pub fn dot(&self, other: &Self) -> Result<f64, PetscError> {
+    pub(crate) fn dot(&self, other: &Self) -> Result<f64, PetscError> {
         same_size(self.owned, other.owned)?;
         let mut product = 0.0;
         // SAFETY: live handles of matching layout.
@@ -104,30 +98,21 @@ impl Vector {
     }
 
     /// this ← this + `factor` · `other` (VecAXPY).
-    ///
-    /// # Errors
-    /// Sizes differ.
-    pub fn add(&mut self, factor: f64, other: &Self) -> Result<(), PetscError> {
+    pub(crate) fn add(&mut self, factor: f64, other: &Self) -> Result<(), PetscError> {
         same_size(self.owned, other.owned)?;
         // SAFETY: live handles of matching layout, distinct by borrowing.
         check(unsafe { raw::VecAXPY(self.raw(), factor, other.raw()) })
     }
 
     /// this ← `factor` · this + `other` (VecAYPX).
-    ///
-    /// # Errors
-    /// Sizes differ.
-    pub fn scale_add(&mut self, factor: f64, other: &Self) -> Result<(), PetscError> {
+    pub(crate) fn scale_add(&mut self, factor: f64, other: &Self) -> Result<(), PetscError> {
         same_size(self.owned, other.owned)?;
         // SAFETY: live handles of matching layout, distinct by borrowing.
         check(unsafe { raw::VecAYPX(self.raw(), factor, other.raw()) })
     }
 
     /// this ← `other` (VecCopy).
-    ///
-    /// # Errors
-    /// Sizes differ.
-    pub fn copy(&mut self, other: &Self) -> Result<(), PetscError> {
+    pub(crate) fn copy(&mut self, other: &Self) -> Result<(), PetscError> {
         same_size(self.owned, other.owned)?;
         // SAFETY: live handles of matching layout, distinct by borrowing.
         check(unsafe { raw::VecCopy(other.raw(), self.raw()) })
