@@ -27,7 +27,7 @@ const PETSC: &str = "\
     PCShellSetApply|PCShellSetSetUp|\
     TaoCreate|TaoDestroy|TaoSetType|TaoSetSolution|TaoSetVariableBounds|\
     TaoSetObjectiveAndGradient|TaoSetHessian|TaoSetFromOptions|TaoSetTolerances|\
-    TaoSetMaximumIterations|TaoSolve|TaoGetSolutionStatus|TaoGetLinearSolveIterations|TaoGetKSP";
+    TaoSetMaximumIterations|TaoSolve|TaoGetIterationNumber|TaoGetConvergedReason|TaoGetLinearSolveIterations|TaoGetKSP";
 
 /// Everything the `cholesky` module calls.
 const CHOLMOD: &str = "\

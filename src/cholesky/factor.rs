@@ -1,4 +1,4 @@
-//! What preconditions a matrix, and when it is made anew.
+//! The factor that preconditions a matrix, whatever makes it.
 
 use super::{Precision, RefactorisationPolicy, substructure::Substructure};
 use crate::petsc::{
@@ -33,8 +33,8 @@ enum Method {
     Petsc(Preconditioner),
 }
 
-/// What a factorisation costs whose work is not known, in iterations. Measured on square.toml with n = 64
-/// and 256, on one and two ranks: MUMPS 4 to 10, gamg 13 to 33, CHOLMOD through PETSc 10 to 19.
+/// The cost, in iterations, of a factorisation whose work is not known. Measured on square.toml with
+/// n = 64 and 256, on one and two ranks: MUMPS 4 to 10, gamg 13 to 33, CHOLMOD through PETSc 10 to 19.
 const UNKNOWN_COST: f64 = 10.0;
 
 /// Rows above which several ranks use multigrid: the memory of factors grows faster than the rows.
@@ -72,7 +72,8 @@ impl Factor {
             Method::Substructure(factor) => {
                 let definite = factor.factorise(matrix)?;
                 let work = self.comm.max(factor.work());
-                let iteration = self.comm.max(factor.bytes() + matrix.entry_bytes());
+                // An iteration reads the factor and the entries of the matrix with their columns.
+                let iteration = self.comm.max(factor.bytes() + 12.0 * matrix.entries());
                 (definite, work / iteration.max(1.0))
             }
         };

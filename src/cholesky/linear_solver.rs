@@ -15,7 +15,7 @@ pub struct LinearSystem<'a> {
     pub added: Option<&'a [(usize, f64)]>,
     /// The unknowns that keep their values in x (Dirichlet conditions); `None` where no rank has any.
     pub prescribed: Option<&'a [usize]>,
-    /// What the factor has on the diagonal for a prescribed unknown: the size of A's entries.
+    /// The size of A's diagonal entries: what prescribed unknowns have there in the factored matrix.
     pub scale: f64,
     /// Where the time of a solve's parts is booked.
     pub booking: Option<Booking<'a>>,
@@ -71,17 +71,22 @@ impl<'a> LinearSystem<'a> {
 /// a Cholesky factor: that of the matrix itself, which they polish, or that of an earlier system with
 /// other values, other prescribed unknowns, another diagonal.
 ///
-/// A hand-written loop rather than KSPCG, which would need a matrix of its own for each set of
-/// prescribed unknowns and would not tell the residual on them, the forces of contact.
+/// PETSc's KSPCG makes the same operations in the same order, but would need a matrix without the
+/// prescribed unknowns for each set of them, and another product for the residual on them, which is the
+/// contact forces.
 pub struct LinearSolver {
     factor: Factor,
-    /// A + D with identity rows, while it is factorised.
+    /// A + D with rows and columns of prescribed unknowns zeroed: what is factorised.
     modified: Option<Matrix>,
+    /// b − (A + D) x.
     residual: Vector,
-    /// The residual with 0 on prescribed unknowns.
+    /// r: the residual with 0 on prescribed unknowns.
     free_residual: Vector,
+    /// z.
     preconditioned: Vector,
+    /// p.
     direction: Vector,
+    /// (A + D) p.
     image: Vector,
 }
 
@@ -157,7 +162,7 @@ impl LinearSolver {
     /// that there is; without one `x` is left alone.
     ///
     /// # Errors
-    /// PETSc failed. That the limit was not reached is no error but said in the report.
+    /// PETSc failed. Whether the limit was reached stands in the report.
     pub fn solve(
         &mut self,
         system: LinearSystem,
@@ -228,10 +233,16 @@ impl LinearSolver {
         self.free_residual.norm()
     }
 
-    /// Conjugate gradients from the residual r of x, P the factor:
+    /// Conjugate gradients from x and its residual r, with P the factored matrix and K = A + D. Until
+    /// ‖r‖₂ ≤ `limit` on the free unknowns, and at most so many times:
     ///
-    /// z = P⁻¹ r,  β = rᵀz / (rᵀz of before),  p ← z + β p,  α = rᵀz / pᵀAp,  x ← x + α p,
-    /// r ← r − α A p.
+    /// ```text
+    /// z = P⁻¹ r,   β = rᵀz / (rᵀz)_previous, at first 0,   p ← z + β p,
+    /// α = rᵀz / pᵀKp,   x ← x + α p,   r ← r − α K p.
+    /// ```
+    ///
+    /// r, z and p are 0 on prescribed unknowns in all of this; K is not positive definite if rᵀz or pᵀKp
+    /// is not positive.
     fn iterate(
         &mut self,
         system: LinearSystem,

@@ -236,7 +236,7 @@ impl Matrix {
     }
 
     /// Entries that this rank stores (MatGetInfo).
-    fn entries(&self) -> f64 {
+    pub fn entries(&self) -> f64 {
         let mut info = MaybeUninit::<raw::MatInfo>::zeroed();
         // SAFETY: a live handle; zeros are numbers, and PETSc fills them.
         unsafe {
@@ -251,17 +251,7 @@ impl Matrix {
     /// Bytes that this rank reads and writes in a product: value and column of each entry, 12 bytes;
     /// the beginning of each row, x and y, 20 bytes.
     pub fn bytes_per_product(&self) -> f64 {
-        self.entry_bytes() + 20.0 * self.owned as f64
-    }
-
-    /// Bytes of the values and columns of this rank's entries.
-    pub(crate) fn entry_bytes(&self) -> f64 {
-        12.0 * self.entries()
-    }
-
-    /// Bytes of the values of this rank's entries.
-    pub fn value_bytes(&self) -> f64 {
-        8.0 * self.entries()
+        12.0 * self.entries() + 20.0 * self.owned as f64
     }
 
     /// Number of rows this rank owns.

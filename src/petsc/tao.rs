@@ -121,15 +121,8 @@ impl<P: ShellPreconditioner> BoundedQuadratic<P> {
                 check(raw::KSPSetTolerances(ksp, 1e-12, 0.5 * limit, f64::MAX, 200))?;
             }
             check(raw::TaoSolve(tao))?;
-            check(raw::TaoGetSolutionStatus(
-                tao,
-                &mut iterations,
-                ptr::null_mut(),
-                ptr::null_mut(),
-                ptr::null_mut(),
-                ptr::null_mut(),
-                &mut reason,
-            ))?;
+            check(raw::TaoGetIterationNumber(tao, &mut iterations))?;
+            check(raw::TaoGetConvergedReason(tao, &mut reason))?;
             check(raw::TaoGetLinearSolveIterations(tao, &mut linear))?;
         }
         Ok(TaoReport {
