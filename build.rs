@@ -3,15 +3,13 @@
 use std::{env, path::PathBuf, process::Command};
 
 /// Everything the `petsc` module calls. A name that is not here does not exist for us.
-const FUNCTIONS: &str = "\
-    PetscInitialize|PetscInitialized|PetscFinalize|PetscPushErrorHandler|\
+const PETSC: &str = "\
+    PetscInitialize|PetscInitialized|PetscFinalize|PetscPushErrorHandler|PetscObjectReference|\
     PetscOptionsInsertString|PetscOptionsSetValue|PetscOptionsHasName|\
     PetscOptionsLeftGet|PetscOptionsLeftRestore|\
     MPI_Comm_size|MPI_Comm_rank|MPI_Allreduce|MPI_Type_contiguous|MPI_Type_commit|MPI_Type_free|\
     MPI_Ibarrier|MPI_Test|MPI_Abort|mallopt|omp_set_max_active_levels|\
     PetscSFCreate|PetscSFDestroy|PetscSFSetGraph|PetscSFBcastBegin|PetscSFBcastEnd|\
-    cholmod_l_start|cholmod_l_finish|cholmod_l_analyze|cholmod_l_analyze_p|cholmod_l_factorize|\
-    cholmod_l_change_factor|cholmod_l_free_factor|\
     MatPartitioningCreate|MatPartitioningDestroy|MatPartitioningSetType|\
     MatPartitioningSetAdjacency|MatPartitioningSetFromOptions|MatPartitioningApply|\
     ISAllGather|ISGetIndices|ISRestoreIndices|ISDestroy|\
@@ -22,16 +20,19 @@ const FUNCTIONS: &str = "\
     MatDiagonalSet|MatZeroRowsColumns|MatGetOwnershipRange|MatGetSize|MatGetInfo|MatMumpsGetInfog|\
     MatGetRow|MatRestoreRow|\
     MatNullSpaceCreate|MatNullSpaceDestroy|MatSetNearNullSpace|MatGetNearNullSpace|\
-    KSPCreate|KSPDestroy|KSPSetOperators|KSPSetType|KSPGetPC|KSPSetUp|KSPSolve|\
-    KSPSetTolerances|KSPGetConvergedReason|KSPGetIterationNumber|KSPSetFromOptions|\
-    KSPSetOptionsPrefix|KSPSetNormType|KSPSetInitialGuessNonzero|\
+    KSPGetPC|KSPSetTolerances|\
     PCCreate|PCDestroy|PCSetType|PCSetOptionsPrefix|PCSetFromOptions|PCSetOperators|PCSetUp|PCApply|\
-    PCFactorSetMatSolverType|PCFactorGetMatrix|PCFactorGetMatSolverType|PCGetFailedReason|PCGetType|\
-    PCReset|PCSetReusePreconditioner|PCGetOperators|PCShellSetContext|PCShellGetContext|\
+    PCFactorSetMatSolverType|PCFactorGetMatrix|PCFactorGetMatSolverType|PCGetFailedReason|\
+    PCSetReusePreconditioner|PCGetOperators|PCShellSetContext|PCShellGetContext|\
     PCShellSetApply|PCShellSetSetUp|\
     TaoCreate|TaoDestroy|TaoSetType|TaoSetSolution|TaoSetVariableBounds|\
     TaoSetObjectiveAndGradient|TaoSetHessian|TaoSetFromOptions|TaoSetTolerances|\
-    TaoSetMaximumIterations|TaoSolve|TaoGetSolutionStatus|TaoGetLinearSolveIterations|TaoGetKSP";
+    TaoSetMaximumIterations|TaoSolve|TaoGetIterationNumber|TaoGetConvergedReason|TaoGetLinearSolveIterations|TaoGetKSP";
+
+/// Everything the `cholesky` module calls.
+const CHOLMOD: &str = "\
+    cholmod_l_start|cholmod_l_finish|cholmod_l_analyze|cholmod_l_analyze_p|cholmod_l_factorize|\
+    cholmod_l_change_factor|cholmod_l_free_factor";
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
@@ -48,24 +49,34 @@ fn main() {
         .expect("mpicc did not run; `make deps` installs it (Debian: libopenmpi-dev)");
     let mpi_flags = String::from_utf8_lossy(&mpi_flags.stdout).into_owned();
 
+    let mut flags: Vec<String> =
+        petsc.include_paths.iter().map(|path| format!("-I{}", path.display())).collect();
+    flags.extend(mpi_flags.split_whitespace().map(str::to_owned));
+    // Debian's MPI is Open MPI, whose constants are the addresses of variables.
+    let variables = "PETSC_COMM_WORLD|M_MMAP_MAX|M_MMAP_THRESHOLD|M_TRIM_THRESHOLD|\
+                     ompi_mpi_double|ompi_mpi_op_(sum|max|replace)";
+    let headers = "#include <petsctao.h>\n#include <petscsf.h>\n#include <malloc.h>\n\
+                   void omp_set_max_active_levels(int);\n";
+    declare("petsc", headers, &flags, PETSC, variables);
+    let variables = "CHOLMOD_(LONG|REAL|DOUBLE|SUPERNODAL|GIVEN|PATTERN|OUT_OF_MEMORY)";
+    declare("cholmod", "#include <suitesparse/cholmod.h>\n", &[], CHOLMOD, variables);
+}
+
+/// Writes the Rust declarations of some C functions and variables to `OUT_DIR/name.rs`.
+fn declare(name: &str, headers: &str, flags: &[String], functions: &str, variables: &str) {
+    let file = PathBuf::from(env::var("OUT_DIR").unwrap_or_default()).join(format!("{name}.rs"));
     bindgen::Builder::default()
-        .header_contents(
-            "signorini.h",
-            "#include <petsctao.h>\n#include <petscsf.h>\n#include <suitesparse/cholmod.h>\n\
-             #include <malloc.h>\nvoid omp_set_max_active_levels(int);\n",
-        )
-        .clang_args(petsc.include_paths.iter().map(|p| format!("-I{}", p.display())))
-        .clang_args(mpi_flags.split_whitespace())
-        .allowlist_function(FUNCTIONS)
-        .allowlist_var("PETSC_COMM_WORLD|M_MMAP_MAX|M_MMAP_THRESHOLD|M_TRIM_THRESHOLD")
-        // Debian's MPI is Open MPI, whose constants are the addresses of these.
-        .allowlist_var("CHOLMOD_(LONG|REAL|DOUBLE|SUPERNODAL|GIVEN|PATTERN)")
-        .allowlist_var("ompi_mpi_double|ompi_mpi_op_(sum|max|replace)")
+        .header_contents(&format!("{name}_headers.h"), headers)
+        .clang_args(flags)
+        .allowlist_function(functions)
+        .allowlist_var(variables)
         .default_enum_style(bindgen::EnumVariation::ModuleConsts)
         .layout_tests(false)
         .generate_comments(false)
         .generate()
-        .expect("bindgen could not read petsctao.h (Debian: petsc-dev, libclang-dev)")
-        .write_to_file(PathBuf::from(env::var("OUT_DIR").unwrap_or_default()).join("petsc.rs"))
+        .unwrap_or_else(|e| {
+            panic!("bindgen could not read the headers of {name}; run `make deps`\n{e}")
+        })
+        .write_to_file(file)
         .expect("the build directory is writable");
 }

@@ -8,6 +8,7 @@
 
 pub mod phases;
 pub mod petsc;
+pub mod cholesky;
 pub mod mesh;
 pub mod model;
 pub mod fem;

@@ -1,11 +1,10 @@
 //! The primal-dual active set method.
 
 use super::{
-    Bound, ContactError, ContactProblem, ContactReport, ContactSolver,
-    approach::approach,
-    elastic::{ElasticSolver, System},
-    tao::Tao,
+    Bound, ContactError, ContactProblem, ContactReport, ContactSolver, approach::approach,
+    elastic::ElasticSolver, tao::Tao,
 };
+use crate::cholesky::LinearSystem;
 use crate::petsc::{Communicator, PetscError, Session, Vector};
 
 /// Guess which bounds are active, solve with u_ν at these bounds, and pivot on the indices that
@@ -101,10 +100,10 @@ impl<'s> ActiveSet<'s> {
         let value = |(bound, side): (&Bound, &Side)| Some((bound.dof, side.value(bound)?));
         let active: Vec<(usize, f64)> =
             problem.bounds.iter().zip(&self.active).filter_map(value).collect();
-        let held: Vec<usize> = active.iter().map(|(dof, _)| *dof).collect();
+        let prescribed: Vec<usize> = active.iter().map(|(dof, _)| *dof).collect();
         c.write(|c| active.iter().for_each(|&(dof, value)| c[dof] = value))?;
-        let system = System { held: &held, added: None };
-        self.elastic.solve(problem, system, problem.load, c, problem.linear_residual(), report)
+        let system = LinearSystem { prescribed: Some(&prescribed), ..problem.system() };
+        self.elastic.solve(system, problem.load, c, problem.linear_residual(), report)
     }
 
     /// Where the guess violates the conditions, beyond what the KKT tolerance allows, and the side

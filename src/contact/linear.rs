@@ -1,9 +1,6 @@
-//! No obstacle: one linear solve.
+//! Without an obstacle a contact problem is one linear system.
 
-use super::{
-    ContactError, ContactProblem, ContactReport, ContactSolver,
-    elastic::{ElasticSolver, System},
-};
+use super::{ContactError, ContactProblem, ContactReport, ContactSolver, elastic::ElasticSolver};
 use crate::petsc::{Session, Vector};
 
 /// K c = f.
@@ -28,9 +25,8 @@ impl ContactSolver for Linear<'_> {
         c: &mut Vector,
     ) -> Result<ContactReport, ContactError> {
         let mut report = ContactReport { iterations: 1, ..Default::default() };
-        let system = System { held: &[], added: None };
-        let (f, limit) = (problem.load, problem.linear_residual());
-        match self.elastic.solve(problem, system, f, c, limit, &mut report)? {
+        let (system, limit) = (problem.system(), problem.linear_residual());
+        match self.elastic.solve(system, problem.load, c, limit, &mut report)? {
             true => Ok(report),
             false => Err(ContactError::NotConverged {
                 method: self.name(),

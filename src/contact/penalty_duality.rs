@@ -2,10 +2,10 @@
 //! the paper's reference [4].
 
 use super::{
-    Bound, ContactError, ContactProblem, ContactReport, ContactSolver, Kkt,
-    anderson::Anderson,
-    elastic::{ElasticSolver, System},
+    Bound, ContactError, ContactProblem, ContactReport, ContactSolver, Kkt, anderson::Anderson,
+    elastic::ElasticSolver,
 };
+use crate::cholesky::LinearSystem;
 use crate::petsc::{PetscError, Session, Vector};
 use nalgebra::DMatrix;
 
@@ -82,8 +82,8 @@ impl<'s> PenaltyDuality<'s> {
         };
         let added: Vec<_> =
             problem.bounds.iter().map(|b| (b.dof, omega * b.tributary_length)).collect();
-        let system = System { held: &[], added: Some(&added) };
-        match self.elastic.solve(problem, system, &rhs, u, limit, report)? {
+        let system = LinearSystem { added: Some(&added), ..problem.system() };
+        match self.elastic.solve(system, &rhs, u, limit, report)? {
             true => Ok(()),
             false => Err(ContactError::NotConverged {
                 method: "penalty-duality",

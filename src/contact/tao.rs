@@ -1,7 +1,10 @@
 //! PETSc's TAO on the contact problem.
 
 use super::{ContactError, ContactProblem, ContactReport, ContactSolver, Kkt};
-use crate::petsc::{BoundedQuadratic, Session, Vector};
+use crate::{
+    cholesky::{Factor, Precision},
+    petsc::{BoundedQuadratic, Session, Vector},
+};
 
 /// TAO's trust-region Newton method `tron` on a kept Cholesky factor; `-tao_type` chooses another.
 ///
@@ -11,7 +14,7 @@ use crate::petsc::{BoundedQuadratic, Session, Vector};
 pub(super) struct Tao<'s> {
     session: &'s Session,
     method: String,
-    tao: Option<BoundedQuadratic>,
+    tao: Option<BoundedQuadratic<Factor>>,
     /// U of the last solve, m.
     size: f64,
 }
@@ -51,7 +54,9 @@ impl ContactSolver for Tao<'_> {
     ) -> Result<ContactReport, ContactError> {
         let tao = match self.tao.take() {
             Some(tao) => tao,
-            None => BoundedQuadratic::new(self.session, &self.method, c.owned())?,
+            None => BoundedQuadratic::new(self.session, &self.method, c.owned(), || {
+                Factor::new(self.session, "elastic_", Precision::Preconditioner)
+            })?,
         };
         let tao = self.tao.insert(tao);
         let mut report = ContactReport::default();

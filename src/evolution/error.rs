@@ -61,7 +61,7 @@ pub enum StepFailure {
     #[error(
         "the damage equation was solved only to a residual of {0:.1e} of its right-hand side; look \
          for extreme numbers in [damage], for slivers in the mesh, and for PETSc options that \
-         loosen -damage_ksp_"
+         begin with -damage_pc_"
     )]
     DamageResidual(f64),
     /// However short a chosen step is, its error is above the tolerance.

@@ -2,8 +2,9 @@
 
 use super::{Body, Triangle};
 use crate::{
+    cholesky::{LinearSolver, LinearSystem, Precision},
     model::DamageLaw,
-    petsc::{LinearSolver, Matrix, PetscError, Session, Vector},
+    petsc::{Matrix, PetscError, Session, Vector},
 };
 use nalgebra::{Matrix3, Vector3};
 
@@ -123,7 +124,7 @@ fn residual(body: &Body, mass: Mass, spread: f64, [before, after]: [&[f64]; 2]) 
     residual
 }
 
-/// M + kκL, factored once for each step length, M and L.
+/// The matrix M + kκL of (28) with its factor, made anew for each step length k.
 pub struct DamageSystem {
     mass: Matrix,
     laplace: Matrix,
@@ -139,6 +140,9 @@ pub struct DamageSystem {
 
 impl DamageSystem {
     /// Assembles and factorises for diffusion κ (m²/s) and step k (s).
+    ///
+    /// # Errors
+    /// PETSc failed.
     pub fn new(
         session: &Session,
         body: &Body,
@@ -149,9 +153,11 @@ impl DamageSystem {
         let owned = body.partition.owned();
         let (mut rows, mut columns) = (Vec::new(), Vec::new());
         let (mut mass_values, mut laplace_values) = (Vec::new(), Vec::new());
+        let mut diagonal = vec![0.0; body.mesh.nodes.len()];
         for (nodes, triangle) in body.mesh.triangles.iter().zip(&body.triangles) {
             let (mass, laplace) = (mass.of(triangle), triangle.laplace());
             for i in 0..3 {
+                diagonal[nodes[i]] += laplace[(i, i)];
                 for j in 0..3 {
                     rows.push(body.partition.row(nodes[i], 1, 0));
                     columns.push(body.partition.global(nodes[j], 1, 0));
@@ -160,16 +166,10 @@ impl DamageSystem {
                 }
             }
         }
-        let mut diagonal = vec![0.0; body.mesh.nodes.len()];
-        for (nodes, triangle) in body.mesh.triangles.iter().zip(&body.triangles) {
-            for (node, [dx, dy]) in nodes.iter().zip(triangle.gradients) {
-                diagonal[*node] += triangle.area * (dx * dx + dy * dy);
-            }
-        }
         let mut filled = Matrix::with_pattern(session, owned, 1, rows, columns)?;
         let mut with = |values: Vec<f64>| {
             filled.set_values(&values)?;
-            // A copy does without the pattern's bookkeeping, which is larger than the matrix.
+            // A copy does without the COO pattern, which is larger than the matrix.
             filled.duplicate()
         };
         let (mass, laplace) = (with(mass_values)?, with(laplace_values)?);
@@ -177,7 +177,8 @@ impl DamageSystem {
             matrix: mass.duplicate()?,
             mass,
             laplace,
-            solver: LinearSolver::cholesky(session, "damage_", body.partition.total())?,
+            // One iteration with all digits costs less than two with half of them.
+            solver: LinearSolver::new(session, "damage_", owned, Precision::Full)?,
             rhs: Vector::zeros(session, owned)?,
             unknown: Vector::zeros(session, owned)?,
             diffusion,
@@ -188,29 +189,45 @@ impl DamageSystem {
         Ok(system)
     }
 
-    /// Refills and factorises the matrix for another step length k, s.
+    /// Refills and factorises the matrix for another step length k, s. A matrix that is not positive
+    /// definite is no error here: the solves do not converge.
+    ///
+    /// # Errors
+    /// PETSc or CHOLMOD failed.
     pub fn set_step(&mut self, step: f64) -> Result<(), PetscError> {
         self.matrix.copy(&self.mass)?;
         self.matrix.add(step * self.diffusion, &self.laplace)?;
         self.step = step;
-        self.solver.factorise(&self.matrix)
+        self.solver.factorise(LinearSystem::of(&self.matrix)).map(drop)
     }
 
-    /// Replaces ζ_{n−1} by ζ_n for the source load b; false if the linear solver failed.
+    /// (28): replaces ζ_{n−1} by the solution ζ_n of (M + kκL) ζ_n = M ζ_{n−1} + k b for the source
+    /// load b = `load`; false if the linear solver failed.
+    ///
+    /// # Errors
+    /// PETSc failed.
     pub fn advance(&mut self, load: &[f64], zeta: &mut [f64]) -> Result<bool, PetscError> {
         let owned = self.rhs.owned();
         self.unknown.set(&zeta[..owned])?;
         self.mass.multiply(&self.unknown, &mut self.rhs)?;
         let step = self.step;
         self.rhs.write(|rhs| rhs.iter_mut().zip(load).for_each(|(r, b)| *r += step * b))?;
-        let residual = 1e-13 * self.rhs.norm()?;
-        let krylov = self.solver.solve(&self.rhs, &mut self.unknown, residual)?;
-        self.unknown.get(&mut zeta[..owned])?;
-        Ok(krylov.converged)
+        let solved = self.solve(1e-13 * self.rhs.norm()?)?;
+        self.unknown.read(|unknown| zeta[..owned].copy_from_slice(unknown))?;
+        Ok(solved)
+    }
+
+    /// Solves for `rhs` from `unknown` until ‖residual‖₂ ≤ `limit`; whether that was reached.
+    fn solve(&mut self, limit: f64) -> Result<bool, PetscError> {
+        let system = LinearSystem::of(&self.matrix);
+        Ok(self.solver.solve(system, &self.rhs, &mut self.unknown, limit)?.converged)
     }
 
     /// The largest [`DamageCertificate::residual`] of a solution as good as round-off allows:
     /// 1e-10, and where diffusion prevails what is lost in kκLζ, of which the terms are up to 1.
+    ///
+    /// # Errors
+    /// PETSc failed.
     pub fn largest_residual(&self) -> Result<f64, PetscError> {
         let round_off = 8.0 * f64::EPSILON * self.step * self.diffusion * self.laplace_size;
         Ok(1e-10 + round_off / self.rhs.norm()?.max(f64::MIN_POSITIVE))
@@ -218,14 +235,20 @@ impl DamageSystem {
 
     /// (M + kκL)⁻¹ k b of a source load b = `load`, at the nodes owned: what ζ_n changes by with the
     /// load. `None` if the linear solver failed.
+    ///
+    /// # Errors
+    /// PETSc failed.
     pub fn correction(&mut self, load: &[f64]) -> Result<Option<Vec<f64>>, PetscError> {
+        /// ‖k b‖₂ below which the change is less than any digit of ζ, and its energy bᵀ(M + kκL)⁻¹b
+        /// less than the least double.
+        const NEGLIGIBLE: f64 = 1e-150;
         let step = self.step;
         self.rhs.write(|rhs| rhs.iter_mut().zip(load).for_each(|(r, b)| *r = step * b))?;
         self.unknown.write(|x| x.fill(0.0))?;
+        let size = self.rhs.norm()?;
         // Some digits of a correction are enough.
-        let residual = 1e-6 * self.rhs.norm()?;
-        let krylov = self.solver.solve(&self.rhs, &mut self.unknown, residual)?;
+        let solved = size < NEGLIGIBLE || self.solve(1e-6 * size)?;
         let correction = self.unknown.read(<[f64]>::to_vec)?;
-        Ok(krylov.converged.then_some(correction))
+        Ok(solved.then_some(correction))
     }
 }

@@ -83,7 +83,7 @@ impl Stiffness {
     /// with their places (PETSc keeps two numbers of 8 bytes each), and K's own values.
     pub fn refill_traffic(&self) -> f64 {
         let read = 40 * self.contributions.len() + 8 * self.pairs.len();
-        read as f64 + 32.0 * self.values.len() as f64 + self.matrix.values_traffic()
+        read as f64 + 32.0 * self.values.len() as f64 + 8.0 * self.matrix.entries()
     }
 
     /// K as last filled, without what only refills need.

@@ -1,4 +1,4 @@
-//! The ranks that share a run, and what they must know of each other.
+//! The ranks that share a run, and what they must know of each other (MPI).
 
 use super::{raw, session::world};
 use std::{
@@ -9,8 +9,8 @@ use std::{
 
 /// This rank among all: sums and decisions over the whole body go through it.
 ///
-/// Every reduction is collective: all ranks call it, at the same point of the run, and all get the
-/// same answer to the last bit. Alone, a rank does nothing for it.
+/// Every reduction is collective (MPI_Allreduce): all ranks call it, at the same point of the run, and
+/// all get the same answer to the last bit. A single rank gets its own value back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Communicator {
     rank: usize,
@@ -18,7 +18,7 @@ pub struct Communicator {
 }
 
 impl Communicator {
-    /// One rank that holds everything.
+    /// The only rank, which owns everything.
     pub fn serial() -> Self {
         Self { rank: 0, size: 1 }
     }
@@ -34,29 +34,29 @@ impl Communicator {
         Self { rank: rank as usize, size: size as usize }
     }
 
-    /// How many `mpiexec` has started, as it tells its processes; known before MPI runs.
+    /// The number of ranks that `mpiexec` has started, from the environment: known before MPI runs.
     pub fn launched() -> usize {
         // Open MPI, and the process managers of MPICH.
-        let told = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"].map(|name| std::env::var(name).ok());
-        told.into_iter().flatten().find_map(|size| size.parse().ok()).unwrap_or(1)
+        let sizes = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"].map(|name| std::env::var(name).ok());
+        sizes.into_iter().flatten().find_map(|size| size.parse().ok()).unwrap_or(1)
     }
 
-    /// The number of this rank, from 0.
+    /// The index of this rank, from 0.
     pub fn rank(self) -> usize {
         self.rank
     }
 
-    /// How many there are.
+    /// The number of ranks.
     pub fn size(self) -> usize {
         self.size
     }
 
-    /// Whether this is the only one.
+    /// Whether this is the only rank.
     pub fn is_serial(self) -> bool {
         self.size == 1
     }
 
-    /// Whether this is the rank that speaks and writes for all.
+    /// Whether this is rank 0, which prints and writes for all.
     pub fn is_root(self) -> bool {
         self.rank == 0
     }
@@ -78,13 +78,10 @@ impl Communicator {
 
     /// The largest of the ranks' values; NaN counts as −∞.
     pub fn max(self, value: f64) -> f64 {
-        match self.is_serial() {
-            true => value,
-            false => {
-                let value = if value.is_nan() { f64::NEG_INFINITY } else { value };
-                self.reduced(value, Operation::Max)
-            }
+        if self.is_serial() {
+            return value;
         }
+        self.reduced(if value.is_nan() { f64::NEG_INFINITY } else { value }, Operation::Max)
     }
 
     /// The least of the ranks' values; NaN counts as ∞.
@@ -92,29 +89,29 @@ impl Communicator {
         if self.is_serial() { value } else { -self.max(-value) }
     }
 
-    /// The least of the ranks' values and the first rank that has it.
+    /// The least of the ranks' values and the first rank that has it (as MPI_MINLOC).
     pub fn min_with_rank(self, value: f64) -> (f64, usize) {
         let least = self.min(value);
         let first = self.min(if value == least { self.rank as f64 } else { f64::INFINITY });
         (least, first as usize)
     }
 
-    /// The value of the rank numbered `from`.
+    /// The value of rank `from` (as MPI_Bcast).
     pub fn broadcast(self, from: usize, value: f64) -> f64 {
         self.total(if self.rank == from { value } else { 0.0 })
     }
 
-    /// Whether it holds on some rank.
-    pub fn any(self, on_this: bool) -> bool {
-        if self.is_serial() { on_this } else { self.max(f64::from(u8::from(on_this))) > 0.0 }
+    /// Whether the condition is true on some rank.
+    pub fn any(self, condition: bool) -> bool {
+        if self.is_serial() { condition } else { self.max(f64::from(u8::from(condition))) > 0.0 }
     }
 
-    /// Whether it holds on every rank.
-    pub fn all(self, on_this: bool) -> bool {
-        !self.any(!on_this)
+    /// Whether the condition is true on every rank.
+    pub fn all(self, condition: bool) -> bool {
+        !self.any(!condition)
     }
 
-    /// The values of all ranks, one after the other; each gives as many.
+    /// The values of all ranks, one after the other (as MPI_Allgather); each rank passes as many.
     pub fn gather(self, values: &[f64]) -> Vec<f64> {
         let mut all = vec![0.0; self.size * values.len()];
         all[self.rank * values.len()..][..values.len()].copy_from_slice(values);
@@ -122,29 +119,29 @@ impl Communicator {
         all
     }
 
-    /// Waits until all ranks have come here, for at most `patience` if one is given. Collective, or
-    /// false: then some rank waits elsewhere for what this one will not do.
+    /// Waits until all ranks have come here, for at most `patience` if one is given (MPI_Ibarrier).
+    /// False if a rank has not come by then: it waits elsewhere for what this one will not do.
     pub fn barrier(self, patience: Option<Duration>) -> bool {
         if self.is_serial() {
             return true;
         }
         let started = Instant::now();
         let mut request = ptr::null_mut();
-        let mut met = 0;
-        // SAFETY: MPI runs on several ranks; the request lives until all have met or the run ends.
+        let mut complete = 0;
+        // SAFETY: MPI runs on several ranks; the request lives until all ranks have come or the run ends.
         unsafe {
             raw::MPI_Ibarrier(world(), &mut request);
             loop {
-                raw::MPI_Test(&mut request, &mut met, ptr::null_mut());
-                if met != 0 || patience.is_some_and(|patience| started.elapsed() > patience) {
-                    return met != 0;
+                raw::MPI_Test(&mut request, &mut complete, ptr::null_mut());
+                if complete != 0 || patience.is_some_and(|patience| started.elapsed() > patience) {
+                    return complete != 0;
                 }
                 std::thread::sleep(Duration::from_millis(1));
             }
         }
     }
 
-    /// Ends all ranks at once with an exit code, wherever they are.
+    /// Ends all ranks at once with an exit code, wherever they are (MPI_Abort).
     pub fn abort(self, code: u8) -> ! {
         if !self.is_serial() {
             // SAFETY: MPI runs on several ranks.
@@ -191,18 +188,4 @@ enum Operation {
 /// MPI_DOUBLE.
 pub(super) fn double() -> raw::MPI_Datatype {
     (&raw const raw::ompi_mpi_double).cast_mut().cast()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn alone_every_reduction_is_the_value_itself() {
-        let alone = Communicator::serial();
-        assert_eq!((alone.total(0.1), alone.max(0.2), alone.min(0.3)), (0.1, 0.2, 0.3));
-        assert_eq!((alone.min_with_rank(-1.0), alone.broadcast(0, 5.0)), ((-1.0, 0), 5.0));
-        assert_eq!((alone.any(true), alone.all(false), alone.count(7)), (true, false, 7));
-        assert_eq!(alone.gather(&[1.0, 2.0]), [1.0, 2.0]);
-    }
 }

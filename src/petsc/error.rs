@@ -6,25 +6,26 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
-/// A PETSc call failed.
+/// A call of PETSc or CHOLMOD failed, or was given what does not fit.
 #[derive(Debug, Clone, thiserror::Error)]
-#[error("PETSc error {code}: {message}")]
+#[error("{}{message}", match code { 0 => String::new(), code => format!("PETSc error {code}: ") })]
 pub struct PetscError {
-    /// PETSc's error code (petscerror.h).
+    /// PETSc's error code (petscerror.h); 0 where PETSc was not asked.
     pub code: i32,
     /// What PETSc said where the error arose.
     pub message: String,
 }
 
 impl PetscError {
-    /// An error found by our own checks before PETSc was called.
-    pub(super) fn ours(message: impl Into<String>) -> Self {
+    /// An error that our own checks or CHOLMOD found, not PETSc.
+    pub(crate) fn ours(message: impl Into<String>) -> Self {
         Self { code: 0, message: message.into() }
     }
 
-    /// The code for PETSc to pass on from a callback; the message waits for the caller's `check`.
-    pub(super) fn pass_on(self) -> raw::PetscErrorCode {
-        /// PETSC_ERR_LIB, for errors PETSc has no code for.
+    /// The code that a callback returns to PETSc, which passes it on to the caller of the solver; the
+    /// message waits there for `check`.
+    pub(super) fn into_code(self) -> raw::PetscErrorCode {
+        /// PETSC_ERR_LIB, "error in an external library".
         const LIBRARY: raw::PetscErrorCode = 76;
         *MESSAGE.lock().unwrap_or_else(PoisonError::into_inner) = self.message;
         if self.code == 0 { LIBRARY } else { self.code }

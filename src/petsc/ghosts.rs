@@ -1,43 +1,41 @@
-//! Values that a rank needs of unknowns which others own.
+//! Values that a rank needs of unknowns which others own
+//! (<https://petsc.org/release/manualpages/PetscSF/>).
 
 use super::{
-    PetscError, Session, check,
-    communicator::double,
-    raw,
-    session::{Live, world},
-    vec::same_size,
+    PetscError, Session, check, communicator::double, handle::Handle, raw, session::world,
+    vector::same_size,
 };
 use std::{ffi::c_void, fmt, ptr};
 
 /// Fetches ghost values from their owners (PetscSF, a star forest: one owner, many ghosts).
-pub struct Ghosts {
-    raw: raw::PetscSF,
+pub(crate) struct Ghosts {
+    handle: Handle<raw::_p_PetscSF>,
     /// Values of a field: owned ones, then ghosts.
     length: usize,
-    _live: Live,
 }
 
 impl Ghosts {
-    /// For fields of `owned` values followed by ghosts, each given by its owner and its place
-    /// among the owner's values. Collective.
-    pub fn new(
+    /// For fields of `owned` values followed by ghosts, each given by its owner and its index
+    /// among the owner's values (PetscSFSetGraph). Collective.
+    pub(crate) fn new(
         _session: &Session,
         owned: usize,
         ghosts: &[(usize, usize)],
     ) -> Result<Self, PetscError> {
-        let mut this =
-            Self { raw: ptr::null_mut(), length: owned + ghosts.len(), _live: Live::new() };
-        let mut leaves: Vec<i32> = (owned..this.length).map(|i| i as i32).collect();
-        let mut roots: Vec<raw::PetscSFNode> = ghosts
-            .iter()
-            .map(|&(rank, index)| raw::PetscSFNode { rank: rank as i32, index: index as i32 })
-            .collect();
+        let length = owned + ghosts.len();
+        let mut leaves: Vec<i32> = (owned..length).map(|i| i as i32).collect();
+        let root = |&(rank, index): &(usize, usize)| raw::PetscSFNode {
+            rank: rank as i32,
+            index: index as i32,
+        };
+        let mut roots: Vec<raw::PetscSFNode> = ghosts.iter().map(root).collect();
         let copy = raw::PetscCopyMode::PETSC_COPY_VALUES;
         // SAFETY: a fresh handle; both arrays have as many values as there are ghosts and are copied.
         unsafe {
-            check(raw::PetscSFCreate(world(), &mut this.raw))?;
+            let create = |handle| raw::PetscSFCreate(world(), handle);
+            let handle = Handle::new(raw::PetscSFDestroy, create)?;
             check(raw::PetscSFSetGraph(
-                this.raw,
+                handle.raw(),
                 owned as i32,
                 ghosts.len() as i32,
                 leaves.as_mut_ptr(),
@@ -45,12 +43,13 @@ impl Ghosts {
                 roots.as_mut_ptr(),
                 copy,
             ))?;
+            Ok(Self { handle, length })
         }
-        Ok(this)
     }
 
-    /// Replaces the ghosts of `field`, which has `block` numbers for each value. Collective.
-    pub fn update(&self, field: &mut [f64], block: usize) -> Result<(), PetscError> {
+    /// Replaces the ghosts of `field`, which has `block` numbers for each value (PetscSFBcastBegin).
+    /// Collective.
+    pub(crate) fn update(&self, field: &mut [f64], block: usize) -> Result<(), PetscError> {
         same_size(block * self.length, field.len())?;
         let mut unit = ptr::null_mut();
         let data = field.as_mut_ptr().cast::<c_void>();
@@ -60,9 +59,9 @@ impl Ghosts {
             raw::MPI_Type_contiguous(block as i32, double(), &mut unit);
             raw::MPI_Type_commit(&mut unit);
             let replace = (&raw const raw::ompi_mpi_op_replace).cast_mut().cast();
-            let mut code = raw::PetscSFBcastBegin(self.raw, unit, data, data, replace);
+            let mut code = raw::PetscSFBcastBegin(self.handle.raw(), unit, data, data, replace);
             if code == 0 {
-                code = raw::PetscSFBcastEnd(self.raw, unit, data, data, replace);
+                code = raw::PetscSFBcastEnd(self.handle.raw(), unit, data, data, replace);
             }
             raw::MPI_Type_free(&mut unit);
             check(code)
@@ -73,12 +72,5 @@ impl Ghosts {
 impl fmt::Debug for Ghosts {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.debug_struct("Ghosts").field("length", &self.length).finish_non_exhaustive()
-    }
-}
-
-impl Drop for Ghosts {
-    fn drop(&mut self) {
-        // SAFETY: the handle is ours and not used afterwards.
-        unsafe { raw::PetscSFDestroy(&mut self.raw) };
     }
 }

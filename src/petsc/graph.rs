@@ -1,21 +1,18 @@
-//! Dividing a graph among the ranks.
+//! Dividing a mesh among the ranks (<https://petsc.org/release/manualpages/MatOrderings/>).
 
-use super::{Matrix, PetscError, Session, check, raw, session::world};
+use super::{Matrix, PetscError, Session, check, handle::Handle, raw, session::world};
 use std::{ptr, slice};
 
 /// The rank of each of `nodes` nodes so that all have about as many and few of the pairs of
 /// neighbours that `cells` (their nodes) make are cut (PTScotch, a parallel multilevel method).
 /// Every rank knows the graph and learns the answer. Collective.
-///
-/// # Errors
-/// This PETSc has no PTScotch, or fails.
-pub fn divide(
+pub(crate) fn divide(
     session: &Session,
     nodes: usize,
     cells: &[[usize; 3]],
 ) -> Result<Vec<usize>, PetscError> {
     let comm = session.comm();
-    // Each rank gives the rows of an even share.
+    // Each rank passes an equal part of the rows of the adjacency matrix.
     let (start, end) = (nodes * comm.rank() / comm.size(), nodes * (comm.rank() + 1) / comm.size());
     let (mut rows, mut columns) = (Vec::new(), Vec::new());
     for cell in cells {
@@ -28,23 +25,21 @@ pub fn divide(
     let mut graph = Matrix::with_pattern(session, end - start, 1, rows, columns)?;
     graph.set_values(&links)?;
 
-    let mut partitioning = ptr::null_mut();
-    let (mut share, mut whole, mut indices) = (ptr::null_mut(), ptr::null_mut(), ptr::null());
+    let mut indices = ptr::null();
     // SAFETY: fresh handles and a live matrix; the gathered set has `nodes` indices, lent until
     // they are given back.
     unsafe {
-        check(raw::MatPartitioningCreate(world(), &mut partitioning))?;
-        check(raw::MatPartitioningSetAdjacency(partitioning, graph.raw))?;
-        check(raw::MatPartitioningSetType(partitioning, c"ptscotch".as_ptr()))?;
-        check(raw::MatPartitioningSetFromOptions(partitioning))?;
-        check(raw::MatPartitioningApply(partitioning, &mut share))?;
-        check(raw::ISAllGather(share, &mut whole))?;
-        check(raw::ISGetIndices(whole, &mut indices))?;
+        let create = |handle| raw::MatPartitioningCreate(world(), handle);
+        let partitioning = Handle::new(raw::MatPartitioningDestroy, create)?;
+        check(raw::MatPartitioningSetAdjacency(partitioning.raw(), graph.raw()))?;
+        check(raw::MatPartitioningSetType(partitioning.raw(), c"ptscotch".as_ptr()))?;
+        check(raw::MatPartitioningSetFromOptions(partitioning.raw()))?;
+        let apply = |handle| raw::MatPartitioningApply(partitioning.raw(), handle);
+        let own = Handle::new(raw::ISDestroy, apply)?;
+        let all = Handle::new(raw::ISDestroy, |handle| raw::ISAllGather(own.raw(), handle))?;
+        check(raw::ISGetIndices(all.raw(), &mut indices))?;
         let owner = slice::from_raw_parts(indices, nodes).iter().map(|&r| r as usize).collect();
-        check(raw::ISRestoreIndices(whole, &mut indices))?;
-        check(raw::ISDestroy(&mut whole))?;
-        check(raw::ISDestroy(&mut share))?;
-        check(raw::MatPartitioningDestroy(&mut partitioning))?;
+        check(raw::ISRestoreIndices(all.raw(), &mut indices))?;
         Ok(owner)
     }
 }

@@ -1,28 +1,26 @@
-//! PETSc: the only unsafe code of the crate.
+//! PETSc and MPI, safely.
 //!
-//! `raw` holds the C names one to one (bindgen, an explicit list in `build.rs`);
-//! the other files are small owners above them: every call's error code becomes a
-//! [`PetscError`] with PETSc's own message, every handle is destroyed on drop, and
-//! sizes are checked here because PETSc does not.
-//!
-//! Beside PETSc it calls MPI, for sums over ranks, and CHOLMOD, for factors whose solves are ours.
+//! `raw` holds the C names one to one (bindgen, an explicit list in `build.rs`). The other files
+//! are small owners above them: every call's error code becomes a [`PetscError`] with PETSc's own
+//! message, every object is destroyed when its owner is dropped, and sizes are checked here because
+//! PETSc does not. A C name in parentheses has its page under
+//! <https://petsc.org/release/manualpages/>.
 //!
 //! All objects live on `PETSC_COMM_WORLD`; sizes and slices are those owned by this rank.
 #![allow(unsafe_code)]
 
-mod direct;
+mod communicator;
 mod error;
-mod factor;
 mod ghosts;
 mod graph;
-mod ksp;
-mod mat;
-mod communicator;
-mod refactorisation;
+mod handle;
+mod matrix;
+mod options;
+mod preconditioner;
 mod session;
 mod shell;
 mod tao;
-mod vec;
+mod vector;
 
 #[allow(
     non_camel_case_types,
@@ -38,16 +36,16 @@ mod raw {
 }
 
 pub use communicator::Communicator;
-pub use direct::Precision;
 pub use error::PetscError;
-pub use factor::Factor;
-pub use ghosts::Ghosts;
-pub use graph::divide;
-pub use ksp::{Krylov, LinearSolver};
-pub use mat::Matrix;
-pub use refactorisation::Refactorisation;
+pub use matrix::Matrix;
 pub use session::Session;
-pub use tao::{BoundedQuadratic, TaoReport};
-pub use vec::Vector;
+pub use vector::Vector;
+
+pub(crate) use ghosts::Ghosts;
+pub(crate) use graph::divide;
+pub(crate) use options::{has_option, set_default_option};
+pub(crate) use preconditioner::Preconditioner;
+pub(crate) use shell::ShellPreconditioner;
+pub(crate) use tao::BoundedQuadratic;
 
 use error::check;

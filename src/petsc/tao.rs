@@ -1,34 +1,37 @@
-//! TAO on a quadratic function with bounds.
+//! TAO on a quadratic function with bounds (<https://petsc.org/release/manualpages/Tao/>).
 
 use super::{
-    Factor, Matrix, PetscError, Precision, Refactorisation, Session, Vector, check, raw,
-    session::{Live, c_string, world},
-    shell::KeptFactor,
-    vec::same_size,
+    Matrix, PetscError, Session, ShellPreconditioner, Vector, check,
+    handle::Handle,
+    options::{c_string, set_default_option},
+    raw,
+    session::world,
+    shell,
+    vector::same_size,
 };
 use std::{ffi::c_void, ptr};
 
 /// Minimises ½ xᵀKx − fᵀx over lower ≤ x ≤ upper with one of TAO's methods.
 ///
 /// PETSc options without a prefix reach it: `-tao_type bnls`, `-tao_monitor`, `-ksp_type …`.
-pub struct BoundedQuadratic {
-    // Destroyed in this order: the Tao uses the factor.
-    tao: Handle,
-    factor: Option<Box<KeptFactor>>,
+pub(crate) struct BoundedQuadratic<P> {
+    // Destroyed in this order: the Tao uses the preconditioner.
+    tao: Handle<raw::_p_Tao>,
+    preconditioner: Option<Box<P>>,
     gradient: Vector,
 }
 
 /// What TAO says of a solve; whether it is true is for the KKT residuals to tell.
 #[derive(Debug, Clone, Copy)]
-pub struct TaoReport {
+pub(crate) struct TaoReport {
     /// Outer iterations.
-    pub iterations: usize,
+    pub(crate) iterations: usize,
     /// Iterations of the linear solver inside.
-    pub linear_iterations: usize,
+    pub(crate) linear_iterations: usize,
     /// Factorisations inside; methods with another preconditioner do none.
-    pub factorisations: usize,
+    pub(crate) factorisations: usize,
     /// TaoConvergedReason: positive when TAO believes it has converged.
-    pub reason: i32,
+    pub(crate) reason: i32,
 }
 
 /// What the callbacks need: ½ xᵀKx − fᵀx.
@@ -37,65 +40,54 @@ struct Quadratic {
     f: raw::Vec,
 }
 
-/// Destroys the Tao.
-struct Handle(raw::Tao, #[allow(dead_code)] Live);
-
-impl Drop for Handle {
-    fn drop(&mut self) {
-        // SAFETY: the handle is ours and not used afterwards.
-        unsafe { raw::TaoDestroy(&mut self.0) };
-    }
-}
-
-impl BoundedQuadratic {
+impl<P: ShellPreconditioner> BoundedQuadratic<P> {
     /// TAO's `method` (`tron`, `bnls`, …) for `size` unknowns on this rank.
     ///
-    /// Its Newton systems are solved by Steihaug's conjugate gradients, which take the whole step
-    /// unless the trust region cuts it, on a Cholesky factor that is kept while that pays.
-    pub fn new(session: &Session, method: &str, size: usize) -> Result<Self, PetscError> {
+    /// Its Newton systems are solved by Steihaug's conjugate gradients (KSPSTCG), which take the
+    /// whole step unless the trust region cuts it, with the preconditioner that `precondition` makes.
+    pub(crate) fn new(
+        session: &Session,
+        method: &str,
+        size: usize,
+        precondition: impl FnOnce() -> P,
+    ) -> Result<Self, PetscError> {
         // tron reads the first prefix, the bounded Newton family (bnls, …) the second.
         for prefix in ["-ksp_", "-tao_bnk_ksp_"] {
-            session.default_option(&format!("{prefix}type"), "stcg")?;
-            session.default_option(&format!("{prefix}norm_type"), "unpreconditioned")?;
+            set_default_option(&format!("{prefix}type"), "stcg")?;
+            set_default_option(&format!("{prefix}norm_type"), "unpreconditioned")?;
         }
         // Systems of the full size whatever is active, so that a factor fits the next one.
-        session.default_option("-tao_subset_type", "mask")?;
+        set_default_option("-tao_subset_type", "mask")?;
+        let c_method = c_string(method)?;
+        // SAFETY: a fresh handle.
+        let create = |handle| unsafe { raw::TaoCreate(world(), handle) };
+        let tao = Handle::new(raw::TaoDestroy, create)?;
         // The quasi-Newton Krylov methods' Hessian is an approximation without entries, which
         // nothing can factorise; they bring their own preconditioner.
         let quasi_newton = method.starts_with("bqnk");
-        let factor = (!quasi_newton)
-            .then(|| {
-                let (all, enough) = (session.comm().count(size), Precision::Preconditioner);
-                let factor = Factor::new(session, "elastic_", all, enough)?;
-                Ok(KeptFactor::new(factor, Some(Refactorisation::default())))
-            })
-            .transpose()?;
+        let preconditioner = (!quasi_newton).then(|| Box::new(precondition()));
         let gradient = Vector::zeros(session, size)?;
-        let tao = Handle(ptr::null_mut(), Live::new());
-        let mut this = Self { tao, factor, gradient };
-        let method = c_string(method)?;
+        let mut this = Self { tao, preconditioner, gradient };
+        let tao = this.tao.raw();
         let (mut ksp, mut pc) = (ptr::null_mut(), ptr::null_mut());
-        // SAFETY: a fresh handle; its solver, if the method has one, lives as long.
+        // SAFETY: live handles; the preconditioner lives as long as the Tao.
         unsafe {
-            check(raw::TaoCreate(world(), &mut this.tao.0))?;
-            check(raw::TaoSetType(this.tao.0, method.as_ptr()))?;
-            check(raw::TaoGetKSP(this.tao.0, &mut ksp))?;
-            if let (Some(factor), false) = (&mut this.factor, ksp.is_null()) {
+            check(raw::TaoSetType(tao, c_method.as_ptr()))?;
+            check(raw::TaoGetKSP(tao, &mut ksp))?;
+            if let (Some(preconditioner), false) = (&mut this.preconditioner, ksp.is_null()) {
                 check(raw::KSPGetPC(ksp, &mut pc))?;
-                factor.attach(pc)?;
+                shell::attach(preconditioner, pc)?;
             }
-            check(raw::TaoSetMaximumIterations(this.tao.0, 200))?;
-            check(raw::TaoSetFromOptions(this.tao.0))?;
+            check(raw::TaoSetMaximumIterations(tao, 200))?;
+            check(raw::TaoSetFromOptions(tao))?;
         }
         Ok(this)
     }
 
     /// Minimises from the start `x` until the gradient is about `limit` in ‖·‖₂, and leaves the
-    /// minimiser there; bounds may be ±infinite.
-    ///
-    /// # Errors
-    /// Sizes differ, or PETSc fails. That TAO did not converge is no error but a negative `reason`.
-    pub fn minimise(
+    /// minimiser there; bounds may be ±infinite. That TAO did not converge is no error but a negative
+    /// `reason`.
+    pub(crate) fn minimise(
         &mut self,
         k: &Matrix,
         f: &Vector,
@@ -107,37 +99,30 @@ impl BoundedQuadratic {
         for size in [k.owned(), f.owned(), lower.owned(), upper.owned(), x.owned()] {
             same_size(own, size)?;
         }
-        let tao = self.tao.0;
-        let mut quadratic = Quadratic { k: k.raw, f: f.raw };
+        let tao = self.tao.raw();
+        let mut quadratic = Quadratic { k: k.raw(), f: f.raw() };
         let context = ptr::from_mut(&mut quadratic).cast::<c_void>();
         let (mut iterations, mut linear, mut reason) = (0, 0, 0);
         let mut ksp = ptr::null_mut();
-        let factorisations = || self.factor.as_ref().map_or(0, |factor| factor.factorisations);
+        let factorisations = || self.preconditioner.as_ref().map_or(0, |p| p.factorisations());
         let before = factorisations();
         let unused = ptr::null_mut();
         // SAFETY: live handles of matching layout; the context outlives the solve, in which
         // alone the callbacks run.
         unsafe {
-            check(raw::TaoSetSolution(tao, x.raw))?;
-            check(raw::TaoSetVariableBounds(tao, lower.raw, upper.raw))?;
-            let gradient = self.gradient.raw;
+            check(raw::TaoSetSolution(tao, x.raw()))?;
+            check(raw::TaoSetVariableBounds(tao, lower.raw(), upper.raw()))?;
+            let gradient = self.gradient.raw();
             check(raw::TaoSetObjectiveAndGradient(tao, gradient, Some(evaluate), context))?;
-            check(raw::TaoSetHessian(tao, k.raw, k.raw, Some(keep_hessian), unused))?;
+            check(raw::TaoSetHessian(tao, k.raw(), k.raw(), Some(keep_hessian), unused))?;
             check(raw::TaoSetTolerances(tao, limit, 1e-13, 0.0))?;
             check(raw::TaoGetKSP(tao, &mut ksp))?;
             if !ksp.is_null() {
                 check(raw::KSPSetTolerances(ksp, 1e-12, 0.5 * limit, f64::MAX, 200))?;
             }
             check(raw::TaoSolve(tao))?;
-            check(raw::TaoGetSolutionStatus(
-                tao,
-                &mut iterations,
-                ptr::null_mut(),
-                ptr::null_mut(),
-                ptr::null_mut(),
-                ptr::null_mut(),
-                &mut reason,
-            ))?;
+            check(raw::TaoGetIterationNumber(tao, &mut iterations))?;
+            check(raw::TaoGetConvergedReason(tao, &mut reason))?;
             check(raw::TaoGetLinearSolveIterations(tao, &mut linear))?;
         }
         Ok(TaoReport {

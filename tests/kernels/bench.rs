@@ -3,11 +3,12 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use signorini::{
+    cholesky::{Factor, Precision},
     contact::SOLVERS,
     evolution::{ContactStep, DiscreteProblem},
     fem::{DamageSystem, Stiffness, source, source_load},
     mesh::Mesh,
-    petsc::{Factor, Matrix, Precision, Session, Vector},
+    petsc::{Matrix, Session, Vector},
     phases::Phases,
     scene::Scene,
 };
@@ -66,8 +67,7 @@ impl Elastic {
         let k = k.unwrap();
         let prescribed = k.matrix.duplicate().unwrap();
         let bounded = constraints.bounds.iter().map(|bound| bound.dof).collect();
-        let unknowns = k.matrix.owned();
-        let factor = Factor::new(session, "elastic_", unknowns, Precision::Preconditioner).unwrap();
+        let factor = Factor::new(session, "elastic_", Precision::Preconditioner);
         let mut elastic = Self { k, prescribed, bounded, factor };
         elastic.factorise();
         elastic
@@ -76,7 +76,7 @@ impl Elastic {
     /// The values count as new only when they are written.
     fn factorise(&mut self) {
         self.prescribed.copy(&self.k.matrix).unwrap();
-        self.prescribed.hold(&self.bounded, self.k.scale).unwrap();
+        self.prescribed.zero_rows_columns(&self.bounded, self.k.scale).unwrap();
         self.factor.factorise(&self.prescribed).unwrap();
     }
 }
@@ -113,11 +113,11 @@ fn unavoidable(c: &mut Criterion) {
         group.bench_function(BenchmarkId::new("stiffness refill", n), |b| {
             b.iter(|| k.refill(black_box(&means)).unwrap());
         });
-        group.throughput(Throughput::Bytes(k.matrix.traffic() as u64));
+        group.throughput(Throughput::Bytes(k.matrix.bytes_per_product() as u64));
         group.bench_function(BenchmarkId::new("product", n), |b| {
             b.iter(|| k.matrix.multiply(&x, &mut y).unwrap());
         });
-        group.throughput(Throughput::Bytes(factor.traffic() as u64));
+        group.throughput(Throughput::Bytes(factor.bytes_per_application() as u64));
         group.bench_function(BenchmarkId::new("triangular solves", n), |b| {
             b.iter(|| factor.apply(&y, &mut z).unwrap());
         });

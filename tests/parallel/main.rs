@@ -7,6 +7,7 @@ mod repeat;
 #[allow(dead_code, reason = "the command line's tests use the rest of it")]
 mod test_directory;
 
+use signorini::petsc::Communicator;
 use std::{fs, path::Path, process::Command};
 use test_directory::{ProgramOutput, TestDirectory};
 
@@ -300,4 +301,13 @@ fn other_commands_refuse_ranks() {
     let test_directory = TestDirectory::new();
     let said = ProgramOutput::of(&mut on_ranks(&test_directory, 2, &["compare", "scene.toml"]));
     one_message(&said, 2, "without mpiexec");
+}
+
+#[test]
+fn on_one_rank_every_reduction_is_the_value_itself() {
+    let comm = Communicator::serial();
+    assert_eq!((comm.total(0.1), comm.max(0.2), comm.min(0.3)), (0.1, 0.2, 0.3));
+    assert_eq!((comm.min_with_rank(-1.0), comm.broadcast(0, 5.0)), ((-1.0, 0), 5.0));
+    assert_eq!((comm.any(true), comm.all(false), comm.count(7)), (true, false, 7));
+    assert_eq!(comm.gather(&[1.0, 2.0]), [1.0, 2.0]);
 }

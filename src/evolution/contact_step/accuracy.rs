@@ -2,9 +2,10 @@
 
 use super::ContactStep;
 use crate::{
+    cholesky::{LinearSolver, LinearSystem, Precision},
     evolution::{DiscreteProblem, Outcome, State},
     fem::{RigidPart, Stiffness},
-    petsc::{LinearSolver, PetscError, Session, Vector},
+    petsc::{PetscError, Session, Vector},
 };
 
 /// Displacements are promised to this, relative, or to `TOLERANCES` times the KKT tolerance.
@@ -137,13 +138,14 @@ fn displacement_error(
     let mut rhs = Vector::zeros(session, 2 * body.partition.owned())?;
     let mut correction = Vector::zeros(session, 2 * body.partition.owned())?;
     rhs.set(&residual[..rhs.owned()])?;
+    let mut solver = LinearSolver::new(session, "elastic_", rhs.owned(), Precision::Full)?;
     let scale = stiffness.scale;
     let mut matrix = stiffness.into_matrix();
-    matrix.hold(&active, scale)?;
-    let mut solver = LinearSolver::cholesky(session, "elastic_", 2 * body.partition.total())?;
-    solver.factorise(&matrix)?;
+    matrix.zero_rows_columns(&active, scale)?;
+    let system = LinearSystem::of(&matrix);
+    solver.factorise(system)?;
     // One digit of an error is enough.
-    if !solver.solve(&rhs, &mut correction, 0.1 * rhs.norm()?)?.converged {
+    if !solver.solve(system, &rhs, &mut correction, 0.1 * rhs.norm()?)?.converged {
         return Ok(f64::INFINITY);
     }
     let mut correction = body.partition.field(correction.read(<[f64]>::to_vec)?, 2)?;

@@ -4,18 +4,18 @@ use nalgebra::{RealField, convert};
 use std::ops::{Add, Mul, Sub};
 use wide::{f32x8, f64x8};
 
-/// Columns that are worked on together, so that what they work on is read once for all.
-pub(super) const WIDE: usize = 4;
+/// Columns of a panel: they are worked on together, so that the vector is read once for all.
+pub(super) const PANEL_WIDTH: usize = 4;
 /// Rows of a tile.
-pub(super) const TALL: usize = 8;
+pub(super) const TILE_HEIGHT: usize = 8;
 
-/// A number that comes in lanes of [`TALL`], worked on side by side.
+/// A number that comes in lanes of [`TILE_HEIGHT`], worked on side by side (SIMD).
 pub(super) trait Number: RealField + Copy {
     /// From an array, or from one number for all lanes.
     type Lanes: Copy
-        + From<[Self; TALL]>
+        + From<[Self; TILE_HEIGHT]>
         + From<Self>
-        + Into<[Self; TALL]>
+        + Into<[Self; TILE_HEIGHT]>
         + Add<Output = Self::Lanes>
         + Sub<Output = Self::Lanes>
         + Mul<Output = Self::Lanes>;
@@ -29,19 +29,19 @@ impl Number for f64 {
     type Lanes = f64x8;
 }
 
-/// Entries of a panel in consecutive rows, by columns.
-pub(super) type Tile<T> = [[T; TALL]; WIDE];
+/// Entries of a panel in consecutive rows below its triangle, by columns.
+pub(super) type Tile<T> = [[T; TILE_HEIGHT]; PANEL_WIDTH];
 
-/// Consecutive columns of a triangular matrix where they meet the diagonal: a triangle by columns,
-/// with inverses in place of the diagonal.
+/// The triangle of a panel at the diagonal: D, lower triangular, by columns, with inverses in place
+/// of the diagonal entries.
 #[derive(Clone, Copy)]
-pub(super) struct Panel<T>([[T; WIDE]; WIDE]);
+pub(super) struct DiagonalBlock<T>([[T; PANEL_WIDTH]; PANEL_WIDTH]);
 
-impl<T: Number> Panel<T> {
+impl<T: Number> DiagonalBlock<T> {
     pub(super) fn identity() -> Self {
-        let mut triangle = [[T::zero(); WIDE]; WIDE];
-        (0..WIDE).for_each(|i| triangle[i][i] = T::one());
-        Self(triangle)
+        let mut columns = [[T::zero(); PANEL_WIDTH]; PANEL_WIDTH];
+        (0..PANEL_WIDTH).for_each(|i| columns[i][i] = T::one());
+        Self(columns)
     }
 
     /// Takes over the entries of a column from the diagonal down; those missing stay.
@@ -51,8 +51,8 @@ impl<T: Number> Panel<T> {
         }
     }
 
-    /// The solution of the triangular system for `b`.
-    pub(super) fn forward(&self, b: &[T]) -> [T; WIDE] {
+    /// D⁻¹ `b`.
+    pub(super) fn forward(&self, b: &[T]) -> [T; PANEL_WIDTH] {
         let Self([k, l, m, n]) = self;
         let p = b[0] * k[0];
         let q = (b[1] - k[1] * p) * l[1];
@@ -61,8 +61,8 @@ impl<T: Number> Panel<T> {
         [p, q, r, s]
     }
 
-    /// The solution of the transposed system for `b` less `sums`.
-    pub(super) fn backward(&self, b: &[T], sums: [T; WIDE]) -> [T; WIDE] {
+    /// D⁻ᵀ (`b` − `sums`).
+    pub(super) fn backward(&self, b: &[T], sums: [T; PANEL_WIDTH]) -> [T; PANEL_WIDTH] {
         let Self([k, l, m, n]) = self;
         let s = (b[3] - sums[3]) * n[3];
         let r = (b[2] - sums[2] - m[3] * s) * m[2];
@@ -72,8 +72,12 @@ impl<T: Number> Panel<T> {
     }
 }
 
-/// `front` less the products of the tiles with `x`.
-pub(super) fn subtract<T: Number>(front: &mut [[T; TALL]], tiles: &[Tile<T>], x: [T; WIDE]) {
+/// `front` ← `front` − B `x`, B the rows of a panel that are stored in `tiles`.
+pub(super) fn subtract<T: Number>(
+    front: &mut [[T; TILE_HEIGHT]],
+    tiles: &[Tile<T>],
+    x: [T; PANEL_WIDTH],
+) {
     let [p, q, r, s] = x.map(T::Lanes::from);
     for (front, tile) in front.iter_mut().zip(tiles) {
         let [a, b, c, d] = tile.map(T::Lanes::from);
@@ -81,11 +85,14 @@ pub(super) fn subtract<T: Number>(front: &mut [[T; TALL]], tiles: &[Tile<T>], x:
     }
 }
 
-/// The products of the columns of the tiles with `x`. From the end: sweeps through a whole factor
-/// go one way in memory, which the processor sees and fetches ahead.
-pub(super) fn products<T: Number>(tiles: &[Tile<T>], x: &[[T; TALL]]) -> [T; WIDE] {
+/// Bᵀ `x`, B the rows of a panel that are stored in `tiles`. From the last tile to the first: a sweep
+/// through a whole factor then goes one way in memory, which the processor sees and fetches ahead.
+pub(super) fn transposed_product<T: Number>(
+    tiles: &[Tile<T>],
+    x: &[[T; TILE_HEIGHT]],
+) -> [T; PANEL_WIDTH] {
     let zero = T::Lanes::from(T::zero());
-    let [mut p, mut q, mut r, mut s] = [zero; WIDE];
+    let [mut p, mut q, mut r, mut s] = [zero; PANEL_WIDTH];
     for (tile, x) in tiles.iter().zip(x).rev() {
         let [a, b, c, d] = tile.map(T::Lanes::from);
         let x = T::Lanes::from(*x);

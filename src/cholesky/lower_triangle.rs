@@ -1,36 +1,41 @@
 //! Symmetric matrices as CHOLMOD reads them.
 
-use crate::petsc::raw;
+use super::raw;
 use std::{ffi::c_void, ptr};
 
-/// The lower triangle by columns: rows `rows[starts[j]..starts[j + 1]]`, all at least j.
-#[derive(Default)]
-pub(super) struct Lower {
+/// The lower triangle of a symmetric matrix in compressed sparse columns (CSC): column j has the
+/// rows `rows[starts[j]..starts[j + 1]]`, all at least j.
+pub struct LowerTriangle {
     starts: Vec<i64>,
     rows: Vec<i64>,
     values: Vec<f64>,
 }
 
-impl Lower {
-    /// Of `size` rows, to be filled column by column.
-    pub(super) fn new() -> Self {
-        Self { starts: vec![0], ..Self::default() }
+impl Default for LowerTriangle {
+    /// Without columns; they are added one after the other.
+    fn default() -> Self {
+        Self { starts: vec![0], rows: Vec::new(), values: Vec::new() }
     }
+}
 
-    pub(super) fn push(&mut self, row: usize, value: f64) {
+impl LowerTriangle {
+    /// Adds an entry to the present column.
+    pub fn push(&mut self, row: usize, value: f64) {
         self.rows.push(row as i64);
         self.values.push(value);
     }
 
-    pub(super) fn end_column(&mut self) {
+    /// Ends the present column.
+    pub fn end_column(&mut self) {
         self.starts.push(self.rows.len() as i64);
     }
 
-    pub(super) fn size(&self) -> usize {
+    /// The number of rows and columns.
+    pub fn size(&self) -> usize {
         self.starts.len() - 1
     }
 
-    /// The symmetric matrix' product with `x`.
+    /// The product of the whole symmetric matrix with `x`.
     pub(super) fn multiply(&self, x: &[f64]) -> Vec<f64> {
         let mut y = vec![0.0; x.len()];
         for (j, span) in self.starts.windows(2).enumerate() {
@@ -45,7 +50,7 @@ impl Lower {
         y
     }
 
-    /// What CHOLMOD reads; valid while this is not changed.
+    /// What CHOLMOD reads (`cholmod_sparse` in its user guide); valid while this is not changed.
     pub(super) fn view(&mut self) -> raw::cholmod_sparse {
         raw::cholmod_sparse {
             nrow: self.size(),
@@ -56,6 +61,7 @@ impl Lower {
             nz: ptr::null_mut(),
             x: self.values.as_mut_ptr().cast::<c_void>(),
             z: ptr::null_mut(),
+            // Symmetric, the lower triangle is given.
             stype: -1,
             itype: raw::CHOLMOD_LONG as i32,
             xtype: raw::CHOLMOD_REAL as i32,

@@ -1,0 +1,174 @@
+//! The factor that preconditions a matrix, whatever makes it.
+
+use super::{Precision, RefactorisationPolicy, substructure::Substructure};
+use crate::petsc::{
+    Communicator, Matrix, PetscError, Preconditioner, Session, ShellPreconditioner, Vector,
+    has_option, set_default_option,
+};
+
+/// A Cholesky factor: CHOLMOD's with solves of our own, by substructuring where there are several
+/// ranks. There MUMPS takes its place (PCCHOLESKY) where the interface between the ranks is too large,
+/// a cycle of algebraic multigrid (PCGAMG) where the matrix is very large. PETSc options can ask for
+/// any other preconditioner.
+///
+/// Fill-reducing ordering and symbolic factorisation are done once for each number of rows. A factor
+/// may be kept as the preconditioner of later matrices until [`RefactorisationPolicy`] finds a new one
+/// due.
+pub struct Factor {
+    comm: Communicator,
+    prefix: String,
+    precision: Precision,
+    /// Made with the first matrix of so many rows.
+    method: Option<(usize, Method)>,
+    /// `None` before the first factorisation, and after one that failed.
+    policy: Option<RefactorisationPolicy>,
+    /// Applications in the present solve.
+    applications: usize,
+    /// Factorisations that did not fail.
+    factorisations: usize,
+}
+
+enum Method {
+    Substructure(Substructure),
+    Petsc(Preconditioner),
+}
+
+/// The cost, in iterations, of a factorisation whose work is not known. Measured on square.toml with
+/// n = 64 and 256, on one and two ranks: MUMPS 4 to 10, gamg 13 to 33, CHOLMOD through PETSc 10 to 19.
+const UNKNOWN_COST: f64 = 10.0;
+
+/// Rows above which several ranks use multigrid: the memory of factors grows faster than the rows.
+/// With 2.1 million on two ranks a step with factors was six times as fast, their set-up four times
+/// as slow, memory 10 % more; what is beyond was not measured.
+const VERY_LARGE: usize = 2_500_000;
+
+impl Factor {
+    /// A factor whose PETSc options begin with `prefix` (`-elastic_pc_type …`).
+    pub fn new(session: &Session, prefix: &str, precision: Precision) -> Self {
+        Self {
+            comm: session.comm(),
+            prefix: prefix.to_owned(),
+            precision,
+            method: None,
+            policy: None,
+            applications: 0,
+            factorisations: 0,
+        }
+    }
+
+    /// Factorises the present values of `matrix`; false if it is not positive definite: then there is
+    /// no factor. Collective.
+    ///
+    /// # Errors
+    /// There is no memory for it, or PETSc options ask for what PETSc has not.
+    pub fn factorise(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
+        let rows = matrix.size()?;
+        let mut method = match self.method.take() {
+            Some((size, method)) if size == rows => method,
+            _ => self.choose(matrix, rows)?,
+        };
+        let (definite, cost) = match &mut method {
+            Method::Petsc(preconditioner) => (preconditioner.set_up(matrix)?, UNKNOWN_COST),
+            Method::Substructure(factor) => {
+                let definite = factor.factorise(matrix)?;
+                let work = self.comm.max(factor.work());
+                // An iteration reads the factor and the entries of the matrix with their columns.
+                let iteration = self.comm.max(factor.bytes() + 12.0 * matrix.entries());
+                (definite, work / iteration.max(1.0))
+            }
+        };
+        self.method = Some((rows, method));
+        self.policy = definite.then(|| RefactorisationPolicy::new(cost));
+        self.factorisations += usize::from(definite);
+        Ok(definite)
+    }
+
+    /// What factorises matrices of the pattern of this one.
+    fn choose(&self, matrix: &Matrix, rows: usize) -> Result<Method, PetscError> {
+        let (prefix, serial) = (&self.prefix, self.comm.is_serial());
+        let asked = has_option(&format!("-{prefix}pc_type"))?
+            || has_option(&format!("-{prefix}pc_factor_mat_solver_type"))?;
+        let factorised = serial || rows < VERY_LARGE;
+        if factorised
+            && !asked
+            && let Some(factor) = Substructure::new(self.comm, matrix, self.precision)?
+        {
+            return Ok(Method::Substructure(factor));
+        }
+        // Left to itself CHOLMOD makes LDLᵀ of a small matrix, accepts negative pivots, and prints its
+        // warnings into the results. MUMPS' guess of the memory it needs is now and then too small.
+        let options = match serial {
+            true => {
+                &[("cholmod_final_asis", "0"), ("cholmod_final_ll", "1"), ("cholmod_print", "0")][..]
+            }
+            false => &[("mumps_icntl_14", "100")],
+        };
+        for (option, value) in options {
+            set_default_option(&format!("-{prefix}mat_{option}"), value)?;
+        }
+        let kind = if factorised { c"cholesky" } else { c"gamg" };
+        let package = if serial { c"cholmod" } else { c"mumps" };
+        Ok(Method::Petsc(Preconditioner::new(prefix, kind, package)?))
+    }
+
+    /// Bytes that an application reads on this rank; 0 where unknown.
+    pub fn bytes_per_application(&self) -> f64 {
+        match &self.method {
+            Some((_, Method::Substructure(factor))) => factor.bytes(),
+            _ => 0.0,
+        }
+    }
+
+    /// `z` ← A⁻¹ `r`, A the matrix last factorised: a pair of triangular solves.
+    ///
+    /// # Errors
+    /// Sizes differ, or nothing was factorised.
+    pub fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
+        self.applications += 1;
+        match &mut self.method {
+            Some((_, Method::Petsc(preconditioner))) => preconditioner.apply(r, z),
+            Some((_, Method::Substructure(factor))) if r.owned() == z.owned() => {
+                r.read(|r| z.write(|z| factor.apply(r, z)))?
+            }
+            _ => Err(PetscError::ours("a factor is applied that was not made for such vectors")),
+        }
+    }
+
+    /// Whether the last factorisation went well.
+    pub(super) fn exists(&self) -> bool {
+        self.policy.is_some()
+    }
+
+    /// Iterations that a solve with the factor of an earlier matrix is worth; `None` if a new factor is
+    /// due.
+    pub(super) fn iteration_limit(&self) -> Option<usize> {
+        let policy = self.policy.as_ref().filter(|policy| !policy.is_due());
+        policy.map(RefactorisationPolicy::iteration_limit)
+    }
+
+    /// Ends a solve: its applications tell how good the factor still is.
+    pub(super) fn end_solve(&mut self) {
+        let iterations = std::mem::take(&mut self.applications);
+        if let Some(policy) = &mut self.policy {
+            policy.solved(iterations);
+        }
+    }
+}
+
+/// Inside one of TAO's methods: every new operator begins a solve.
+impl ShellPreconditioner for Factor {
+    fn set_up(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
+        self.end_solve();
+        let rows = matrix.size()?;
+        let fits = self.method.as_ref().is_some_and(|(size, _)| *size == rows);
+        if fits && self.iteration_limit().is_some() { Ok(true) } else { self.factorise(matrix) }
+    }
+
+    fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
+        Factor::apply(self, r, z)
+    }
+
+    fn factorisations(&self) -> usize {
+        self.factorisations
+    }
+}

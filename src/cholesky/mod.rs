@@ -1,0 +1,48 @@
+//! The Cholesky factor that is kept across matrices, and what solves with it.
+//!
+//! Every linear system of a run is symmetric positive definite: (M + kκL) ζ = b of the damage step
+//! and K(ζ) u = f of the contact step, with prescribed or penalised unknowns. The factor of one
+//! matrix preconditions conjugate gradients for the next ones, until it costs more iterations than
+//! a new one ([`RefactorisationPolicy`]).
+//!
+//! - On one rank CHOLMOD computes L Lᵀ = P A Pᵀ; the triangular solves L y = P b and Lᵀ (P x) = y
+//!   are our own ([`Cholesky`], [`TriangularSolver`]).
+//! - On several ranks each eliminates its interior unknowns I, and all share the dense Schur
+//!   complement S = A_ΓΓ − Σ A_ΓI A_II⁻¹ A_IΓ of the unknowns Γ between them (`substructure`).
+//! - Where Γ is too large, or PETSc options ask for it, a preconditioner of PETSc takes its place
+//!   ([`Factor`]).
+//!
+//! Unsafe code is where CHOLMOD is called, in `cholmod.rs`.
+
+#[expect(clippy::module_inception, reason = "the factor gives the room its name")]
+mod cholesky;
+#[allow(unsafe_code)]
+mod cholmod;
+mod factor;
+mod linear_solver;
+mod lower_triangle;
+mod refactorisation;
+mod substructure;
+mod supernodal;
+mod tiles;
+
+#[allow(
+    non_camel_case_types,
+    non_snake_case,
+    non_upper_case_globals,
+    dead_code,
+    missing_docs,
+    unsafe_code,
+    unsafe_op_in_unsafe_fn,
+    clippy::all
+)]
+mod raw {
+    include!(concat!(env!("OUT_DIR"), "/cholmod.rs"));
+}
+
+pub use cholesky::{Cholesky, Precision};
+pub use factor::Factor;
+pub use linear_solver::{Booking, LinearSolver, LinearSystem, SolveReport};
+pub use lower_triangle::LowerTriangle;
+pub use refactorisation::RefactorisationPolicy;
+pub use supernodal::TriangularSolver;

@@ -1,0 +1,240 @@
+//! Triangular solves with a supernodal Cholesky factor.
+//!
+//! L is a sequence of supernodes, consecutive columns with the same rows below their diagonal block
+//! (Ng and Peyton, SIAM J. Sci. Comput. 14, 1993). Of a supernode with the diagonal block D and the
+//! rows B below it, the forward solve makes y_s ← D⁻¹ y_s and then y_rows ← y_rows − B y_s; the
+//! backward solve, from the last supernode to the first, y_s ← D⁻ᵀ (y_s − Bᵀ y_rows).
+//!
+//! Both are limited by the reading of L, so L is stored in the order in which it is read: a supernode
+//! is cut into panels of [`PANEL_WIDTH`] columns, a panel into its triangle at the diagonal and tiles
+//! of [`TILE_HEIGHT`] rows below. The entries of y that a supernode works on are gathered first in a
+//! front: its own, padded to whole panels, then those of the rows below.
+
+use super::tiles::{
+    DiagonalBlock, Number, PANEL_WIDTH, TILE_HEIGHT, Tile, subtract, transposed_product,
+};
+use nalgebra::{convert, convert_unchecked};
+use std::mem::take;
+
+/// Solves with the leading part of a factor P A Pᵀ = L Lᵀ: L₁₁ of
+///
+/// ```text
+/// L = ⎡ L₁₁     ⎤        L₁₁ y₁ = (P b)₁,        y₂ = (P b)₂ − L₂₁ y₁,
+///     ⎣ L₂₁ L₂₂ ⎦        L₁₁ᵀ (P x)₁ = y₁ − L₂₁ᵀ (P x)₂.
+/// ```
+///
+/// The part 2, an interface or nothing, is for the caller to solve between the two solves.
+pub trait TriangularSolver {
+    /// Copies the values of L₁₁ and L₂₁: of each supernode its columns from the diagonal block down,
+    /// whatever stands above the diagonal.
+    fn set_values(&mut self, values: &[f64]);
+
+    /// The forward solve, for y₁ and y₂.
+    fn forward(&mut self, b: &[f64]);
+
+    /// y₂, of so many entries.
+    fn interface(&self, count: usize) -> Vec<f64>;
+
+    /// Sets (P x)₂.
+    fn set_interface(&mut self, values: &[f64]);
+
+    /// The backward solve, for x; destroys y.
+    fn backward(&mut self, x: &mut [f64]);
+
+    /// Bytes that a forward and a backward solve read.
+    fn bytes(&self) -> f64;
+}
+
+/// Where the entries of L₁₁ and L₂₁ are.
+pub(super) struct Structure {
+    /// P: the row of A of each row of L.
+    pub(super) order: Vec<u32>,
+    pub(super) supernodes: Vec<Supernode>,
+    /// Of each supernode the rows below its diagonal block.
+    pub(super) rows: Vec<u32>,
+}
+
+/// Consecutive columns of L with the same rows below their diagonal block.
+pub(super) struct Supernode {
+    pub(super) first: usize,
+    pub(super) columns: usize,
+    /// The number of rows below the diagonal block.
+    pub(super) below: usize,
+}
+
+impl Supernode {
+    fn panels(&self) -> usize {
+        self.columns.div_ceil(PANEL_WIDTH)
+    }
+
+    /// Tiles from the top of the front to its end.
+    fn front_height(&self) -> usize {
+        (PANEL_WIDTH * self.panels() + self.below).div_ceil(TILE_HEIGHT)
+    }
+
+    /// The first tile of the front below a panel's triangle; it may contain rows of the triangle, for
+    /// which it has zeros.
+    fn first_tile(panel: usize) -> usize {
+        PANEL_WIDTH * (panel + 1) / TILE_HEIGHT
+    }
+
+    /// Tiles of all panels.
+    fn tiles(&self) -> usize {
+        (0..self.panels()).map(|panel| self.front_height() - Self::first_tile(panel)).sum()
+    }
+
+    /// The place in the front of a row of the supernode.
+    fn place(&self, row: usize) -> usize {
+        if row < self.columns { row } else { row - self.columns + PANEL_WIDTH * self.panels() }
+    }
+}
+
+/// L₁₁ and L₂₁ with entries `T`, in the order in which they are read.
+pub(super) struct Supernodal<T> {
+    structure: Structure,
+    /// Of each panel the triangle at the diagonal.
+    diagonal: Vec<DiagonalBlock<T>>,
+    /// Of each panel what stands below its triangle.
+    tiles: Vec<Tile<T>>,
+    /// P b, y or P x, divided by `scale`: the exponents of `f32` end at 10^±38.
+    y: Vec<T>,
+    scale: f64,
+    front: Vec<[T; TILE_HEIGHT]>,
+}
+
+impl<T: Number> Supernodal<T> {
+    /// With L₁₁ = 1, L₂₁ = 0.
+    pub(super) fn new(structure: Structure) -> Self {
+        let Structure { order, supernodes, .. } = &structure;
+        let panels = supernodes.iter().map(Supernode::panels).sum();
+        let tiles = supernodes.iter().map(Supernode::tiles).sum();
+        let front = supernodes.iter().map(Supernode::front_height).max().unwrap_or(0);
+        Self {
+            diagonal: vec![DiagonalBlock::identity(); panels],
+            tiles: vec![[[T::zero(); TILE_HEIGHT]; PANEL_WIDTH]; tiles],
+            y: vec![T::zero(); order.len()],
+            scale: 0.0,
+            front: vec![[T::zero(); TILE_HEIGHT]; front],
+            structure,
+        }
+    }
+
+    /// y₁ ← L₁₁⁻¹ y₁, y₂ ← y₂ − L₂₁ y₁.
+    fn solve_forward(&mut self) {
+        let Structure { supernodes, rows, .. } = &self.structure;
+        let (mut diagonal, mut tiles, mut rows) = (&self.diagonal[..], &self.tiles[..], &rows[..]);
+        for s in supernodes {
+            let front = &mut self.front[..s.front_height()];
+            let own = s.first..s.first + s.columns;
+            front.fill([T::zero(); TILE_HEIGHT]);
+            front.as_flattened_mut()[..s.columns].copy_from_slice(&self.y[own.clone()]);
+            let (panels, others) = diagonal.split_at(s.panels());
+            diagonal = others;
+            for (k, panel) in panels.iter().enumerate() {
+                let first_tile = Supernode::first_tile(k);
+                let (below, others) = tiles.split_at(s.front_height() - first_tile);
+                tiles = others;
+                let head = &mut front.as_flattened_mut()[PANEL_WIDTH * k..PANEL_WIDTH * (k + 1)];
+                let solved = panel.forward(head);
+                head.copy_from_slice(&solved);
+                subtract(&mut front[first_tile..], below, solved);
+            }
+            let front = front.as_flattened();
+            self.y[own].copy_from_slice(&front[..s.columns]);
+            let (below, others) = rows.split_at(s.below);
+            rows = others;
+            for (&row, &change) in below.iter().zip(&front[PANEL_WIDTH * s.panels()..]) {
+                self.y[row as usize] += change;
+            }
+        }
+    }
+
+    /// y₁ ← L₁₁⁻ᵀ (y₁ − L₂₁ᵀ y₂).
+    fn solve_backward(&mut self) {
+        let Structure { supernodes, rows, .. } = &self.structure;
+        let (mut diagonal, mut tiles, mut rows) = (&self.diagonal[..], &self.tiles[..], &rows[..]);
+        for s in supernodes.iter().rev() {
+            let front = &mut self.front[..s.front_height()];
+            let own = s.first..s.first + s.columns;
+            front.fill([T::zero(); TILE_HEIGHT]);
+            let entries = front.as_flattened_mut();
+            entries[..s.columns].copy_from_slice(&self.y[own.clone()]);
+            let (others, below) = rows.split_at(rows.len() - s.below);
+            rows = others;
+            for (&row, value) in below.iter().zip(&mut entries[PANEL_WIDTH * s.panels()..]) {
+                *value = self.y[row as usize];
+            }
+            let (others, panels) = diagonal.split_at(diagonal.len() - s.panels());
+            diagonal = others;
+            for (k, panel) in panels.iter().enumerate().rev() {
+                let first_tile = Supernode::first_tile(k);
+                let (others, below) = tiles.split_at(tiles.len() - (s.front_height() - first_tile));
+                tiles = others;
+                let sums = transposed_product(below, &front[first_tile..]);
+                let head = &mut front.as_flattened_mut()[PANEL_WIDTH * k..PANEL_WIDTH * (k + 1)];
+                let solved = panel.backward(head, sums);
+                head.copy_from_slice(&solved);
+            }
+            self.y[own].copy_from_slice(&front.as_flattened()[..s.columns]);
+        }
+    }
+}
+
+impl<T: Number> TriangularSolver for Supernodal<T> {
+    fn set_values(&mut self, mut values: &[f64]) {
+        let (mut diagonal, mut tiles) = (&mut self.diagonal[..], &mut self.tiles[..]);
+        for s in &self.structure.supernodes {
+            let height = s.columns + s.below;
+            let (panels, others) = take(&mut diagonal).split_at_mut(s.panels());
+            diagonal = others;
+            for (k, panel) in panels.iter_mut().enumerate() {
+                let first_tile = Supernode::first_tile(k);
+                let (below, others) = take(&mut tiles).split_at_mut(s.front_height() - first_tile);
+                tiles = others;
+                let end = s.columns.min(PANEL_WIDTH * (k + 1));
+                for j in PANEL_WIDTH * k..end {
+                    let column = &values[j * height..(j + 1) * height];
+                    panel.set_column(j % PANEL_WIDTH, &column[j..end]);
+                    for (i, &value) in column.iter().enumerate().skip(end) {
+                        let (tile, row) = (s.place(i) / TILE_HEIGHT, s.place(i) % TILE_HEIGHT);
+                        below[tile - first_tile][j % PANEL_WIDTH][row] = convert(value);
+                    }
+                }
+            }
+            values = &values[s.columns * height..];
+        }
+    }
+
+    fn forward(&mut self, b: &[f64]) {
+        self.scale = b.iter().fold(f64::MIN_POSITIVE, |scale, b| scale.max(b.abs()));
+        for (y, &row) in self.y.iter_mut().zip(&self.structure.order) {
+            *y = convert(b[row as usize] / self.scale);
+        }
+        self.solve_forward();
+    }
+
+    fn interface(&self, count: usize) -> Vec<f64> {
+        let y = &self.y[self.y.len() - count..];
+        y.iter().map(|&y| self.scale * convert_unchecked::<T, f64>(y)).collect()
+    }
+
+    fn set_interface(&mut self, values: &[f64]) {
+        let (interior, interface) = self.y.split_at_mut(self.structure.order.len() - values.len());
+        let scale = values.iter().fold(self.scale, |scale, value| scale.max(value.abs()));
+        let smaller = convert(self.scale / scale);
+        interior.iter_mut().for_each(|y| *y *= smaller);
+        interface.iter_mut().zip(values).for_each(|(y, value)| *y = convert(value / scale));
+        self.scale = scale;
+    }
+
+    fn backward(&mut self, x: &mut [f64]) {
+        self.solve_backward();
+        for (&y, &row) in self.y.iter().zip(&self.structure.order) {
+            x[row as usize] = self.scale * convert_unchecked::<T, f64>(y);
+        }
+    }
+
+    fn bytes(&self) -> f64 {
+        2.0 * (size_of_val(&self.tiles[..]) + size_of_val(&self.diagonal[..])) as f64
+    }
+}

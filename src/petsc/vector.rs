@@ -1,0 +1,133 @@
+//! Vectors distributed by owned entries (<https://petsc.org/release/manualpages/Vec/>).
+
+use super::{PetscError, Session, check, handle::Handle, raw, session::world};
+use std::slice;
+
+/// A PETSc vector; this rank owns a contiguous part of it.
+pub struct Vector {
+    handle: Handle<raw::_p_Vec>,
+    owned: usize,
+}
+
+impl Vector {
+    /// A zero vector with `owned` entries on this rank (VecCreateMPI).
+    ///
+    /// # Errors
+    /// There are too many entries for 32-bit indices, or no memory for them.
+    pub fn zeros(_session: &Session, owned: usize) -> Result<Self, PetscError> {
+        let local = i32::try_from(owned)
+            .map_err(|_| PetscError::ours(format!("{owned} entries exceed 32-bit indices")))?;
+        let handle = Handle::new(raw::VecDestroy, |handle| {
+            // SAFETY: a fresh handle; -1 (PETSC_DETERMINE) sums the sizes of the ranks.
+            unsafe { raw::VecCreateMPI(world(), local, -1, handle) }
+        })?;
+        Ok(Self { handle, owned })
+    }
+
+    /// A vector that PETSc passes to a callback.
+    ///
+    /// # Safety
+    /// `raw` is a live vector.
+    pub(super) unsafe fn shared(raw: raw::Vec) -> Result<Self, PetscError> {
+        let mut owned = 0;
+        // SAFETY: the caller's promise.
+        unsafe {
+            check(raw::VecGetLocalSize(raw, &mut owned))?;
+            Ok(Self { handle: Handle::shared(raw, raw::VecDestroy)?, owned: owned as usize })
+        }
+    }
+
+    pub(super) fn raw(&self) -> raw::Vec {
+        self.handle.raw()
+    }
+
+    /// Lends the owned entries (VecGetArrayRead).
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub fn read<R>(&self, reader: impl FnOnce(&[f64]) -> R) -> Result<R, PetscError> {
+        let mut data = std::ptr::null();
+        // SAFETY: PETSc lends `owned` values until they are given back below.
+        unsafe {
+            check(raw::VecGetArrayRead(self.raw(), &mut data))?;
+            let result = reader(slice::from_raw_parts(data, self.owned));
+            check(raw::VecRestoreArrayRead(self.raw(), &mut data))?;
+            Ok(result)
+        }
+    }
+
+    /// Lends the owned entries, to be changed (VecGetArray).
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub fn write<R>(&mut self, writer: impl FnOnce(&mut [f64]) -> R) -> Result<R, PetscError> {
+        let mut data = std::ptr::null_mut();
+        // SAFETY: as in `read`, and `&mut self` keeps other readers away.
+        unsafe {
+            check(raw::VecGetArray(self.raw(), &mut data))?;
+            let result = writer(slice::from_raw_parts_mut(data, self.owned));
+            check(raw::VecRestoreArray(self.raw(), &mut data))?;
+            Ok(result)
+        }
+    }
+
+    /// Copies `values` (the owned entries) into the vector.
+    ///
+    /// # Errors
+    /// Their number is another.
+    pub fn set(&mut self, values: &[f64]) -> Result<(), PetscError> {
+        same_size(self.owned, values.len())?;
+        self.write(|data| data.copy_from_slice(values))
+    }
+
+    /// ‖·‖₂ over all ranks (VecNorm).
+    pub(crate) fn norm(&self) -> Result<f64, PetscError> {
+        let mut norm = 0.0;
+        // SAFETY: a live handle.
+        check(unsafe { raw::VecNorm(self.raw(), raw::NormType::NORM_2, &mut norm) })?;
+        Ok(norm)
+    }
+
+    /// Inner product over all ranks (VecDot).
+    pub(crate) fn dot(&self, other: &Self) -> Result<f64, PetscError> {
+        same_size(self.owned, other.owned)?;
+        let mut product = 0.0;
+        // SAFETY: live handles of matching layout.
+        check(unsafe { raw::VecDot(self.raw(), other.raw(), &mut product) })?;
+        Ok(product)
+    }
+
+    /// this ← this + `factor` · `other` (VecAXPY).
+    pub(crate) fn add(&mut self, factor: f64, other: &Self) -> Result<(), PetscError> {
+        same_size(self.owned, other.owned)?;
+        // SAFETY: live handles of matching layout, distinct by borrowing.
+        check(unsafe { raw::VecAXPY(self.raw(), factor, other.raw()) })
+    }
+
+    /// this ← `factor` · this + `other` (VecAYPX).
+    pub(crate) fn scale_add(&mut self, factor: f64, other: &Self) -> Result<(), PetscError> {
+        same_size(self.owned, other.owned)?;
+        // SAFETY: live handles of matching layout, distinct by borrowing.
+        check(unsafe { raw::VecAYPX(self.raw(), factor, other.raw()) })
+    }
+
+    /// this ← `other` (VecCopy).
+    pub(crate) fn copy(&mut self, other: &Self) -> Result<(), PetscError> {
+        same_size(self.owned, other.owned)?;
+        // SAFETY: live handles of matching layout, distinct by borrowing.
+        check(unsafe { raw::VecCopy(other.raw(), self.raw()) })
+    }
+
+    /// Number of entries this rank owns.
+    pub fn owned(&self) -> usize {
+        self.owned
+    }
+}
+
+/// PETSc would read or write beyond the end where sizes differ.
+pub(super) fn same_size(expected: usize, found: usize) -> Result<(), PetscError> {
+    match expected == found {
+        true => Ok(()),
+        false => Err(PetscError::ours(format!("{found} values where {expected} are owned"))),
+    }
+}

@@ -1,0 +1,265 @@
+//! Factors, triangular solves and the solver above them, against dense algebra.
+
+use nalgebra::{DMatrix, DVector};
+use signorini::{
+    cholesky::{
+        Cholesky, Factor, LinearSolver, LinearSystem, LowerTriangle, Precision,
+        RefactorisationPolicy,
+    },
+    petsc::{Matrix, Session, Vector},
+};
+
+const BOTH: [Precision; 2] = [Precision::Preconditioner, Precision::Full];
+
+/// The part of a dense matrix that is not zero, from the diagonal down.
+fn lower(a: &DMatrix<f64>) -> LowerTriangle {
+    let mut lower = LowerTriangle::default();
+    for j in 0..a.ncols() {
+        (j..a.nrows()).filter(|&i| a[(i, j)] != 0.0).for_each(|i| lower.push(i, a[(i, j)]));
+        lower.end_column();
+    }
+    lower
+}
+
+/// A definite matrix of rows coupled at random, `sparsity` of 8 entries missing.
+fn coupled(size: usize, sparsity: usize) -> DMatrix<f64> {
+    let number = |i: usize, j: usize| (i * 31 + j * 17 + i * j) % 101;
+    let entry = |i: usize, j: usize| match number(i.max(j), i.min(j)) {
+        n if n % 8 < sparsity => 0.0,
+        n => n as f64 / 101.0 - 0.4,
+    };
+    let mut a = DMatrix::from_fn(size, size, entry);
+    (0..size).for_each(|i| a[(i, i)] = 1.0 + a.row(i).abs().sum());
+    a
+}
+
+fn cholesky(a: &DMatrix<f64>, precision: Precision) -> Cholesky {
+    let mut cholesky = Cholesky::analyse(&mut lower(a), None, 0, precision).unwrap();
+    // Twice: values are replaced, not added.
+    assert!(cholesky.factorise(&mut lower(&(a * 2.0))).unwrap().is_some());
+    assert!(cholesky.factorise(&mut lower(a)).unwrap().is_some());
+    cholesky
+}
+
+/// max |b − A x| / max |b|.
+fn residual(a: &DMatrix<f64>, cholesky: &mut Cholesky, b: &DVector<f64>) -> f64 {
+    let mut x = DVector::zeros(b.len());
+    cholesky.solver().forward(b.as_slice());
+    cholesky.solver().backward(x.as_mut_slice());
+    (b - a * x).amax() / b.amax()
+}
+
+#[test]
+fn solves_solve_whatever_the_shape_of_the_supernodes() {
+    for size in (1..30).chain([100, 211]) {
+        for sparsity in [0, 3, 6, 7, 8] {
+            let a = coupled(size, sparsity);
+            // Loads of any size: exponents of single precision end at 1e±38.
+            for scale in [1.0, 1e-200, 1e200] {
+                let b = DVector::from_fn(size, |i, _| scale * (i as f64 + 1.0).sin());
+                for (precision, rounding) in BOTH.into_iter().zip([3e-6, 1e-14]) {
+                    let left = residual(&a, &mut cholesky(&a, precision), &b);
+                    assert!(left < rounding, "{size} {sparsity} {precision:?}: {left:e}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_forward_solve_makes_the_energy_of_the_solution() {
+    // |L⁻¹Pb|² = bᵀA⁻¹b.
+    let a = coupled(50, 5);
+    let b = DVector::from_element(50, 1.0);
+    let energy = b.dot(&a.clone().cholesky().unwrap().solve(&b));
+    for (precision, rounding) in BOTH.into_iter().zip([1e-6, 1e-14]) {
+        let mut cholesky = cholesky(&a, precision);
+        cholesky.solver().forward(b.as_slice());
+        let y = DVector::from_vec(cholesky.solver().interface(50));
+        assert!((y.norm_squared() / energy - 1.0).abs() < rounding);
+    }
+}
+
+#[test]
+fn the_schur_complement_of_the_interface_is_left_to_the_caller() {
+    const INTERFACE: usize = 7;
+    let mut a = coupled(61, 5);
+    a.view_mut((61 - INTERFACE, 61 - INTERFACE), (INTERFACE, INTERFACE)).add_scalar_mut(1e-3);
+    let b = DVector::from_fn(61, |i, _| (i as f64).cos());
+    let x = a.clone().cholesky().unwrap().solve(&b);
+    let (inside, coupling) = (a.view((0, 0), (54, 54)), a.view((54, 0), (INTERFACE, 54)));
+    let y = inside.clone_owned().cholesky().unwrap().solve(&b.rows(0, 54).clone_owned());
+    let reduced = b.rows(54, INTERFACE) - coupling * y;
+    for (precision, rounding) in BOTH.into_iter().zip([1e-6, 1e-14]) {
+        let order = Some((0..61).collect());
+        let mut cholesky = Cholesky::analyse(&mut lower(&a), order, INTERFACE, precision).unwrap();
+        let block = cholesky.factorise(&mut lower(&a)).unwrap().unwrap();
+        // L₂₂ L₂₂ᵀ = A₂₂ − A₂₁ A₁₁⁻¹ A₁₂.
+        let schur = &block * block.transpose();
+        assert!((schur * x.rows(54, INTERFACE) - &reduced).amax() < 1e-14);
+        let solver = cholesky.solver();
+        solver.forward(b.as_slice());
+        assert!((DVector::from_vec(solver.interface(INTERFACE)) - &reduced).amax() < rounding);
+        // Far larger than what is there: the scale follows.
+        for scale in [1.0, 1e60] {
+            let mut found = DVector::zeros(61);
+            solver.forward(b.as_slice());
+            solver.set_interface((x.rows(54, INTERFACE) * scale).as_slice());
+            solver.backward(found.as_mut_slice());
+            let interface = found.rows(54, INTERFACE) / scale;
+            assert!((interface - x.rows(54, INTERFACE)).amax() < rounding);
+            assert!(scale > 1.0 || (found - &x).amax() < rounding);
+        }
+    }
+}
+
+#[test]
+fn a_matrix_that_needs_all_digits_gets_them() {
+    // Springs in a row, the last supported by almost nothing: condition 1e12.
+    let mut a = DMatrix::from_fn(40, 40, |i, j| match i.abs_diff(j) {
+        0 => 2.0,
+        1 => -1.0,
+        _ => 0.0,
+    });
+    (a[(0, 0)], a[(39, 39)]) = (1.0, 1.0 + 1e-9);
+    let mut kept = cholesky(&a, Precision::Preconditioner);
+    assert_eq!(kept.bytes(), cholesky(&a, Precision::Full).bytes());
+    assert!(residual(&a, &mut kept, &DVector::from_element(40, 1.0)) < 1e-5);
+    let (easy, [half, full]) = (coupled(40, 5), BOTH);
+    assert_eq!(2.0 * cholesky(&easy, half).bytes(), cholesky(&easy, full).bytes());
+}
+
+#[test]
+fn a_matrix_that_is_not_definite_is_told_and_forgotten() {
+    let good = coupled(20, 4);
+    let mut bad = good.clone();
+    bad[(7, 7)] = -1.0;
+    for precision in BOTH {
+        let mut cholesky = cholesky(&good, precision);
+        assert!(cholesky.factorise(&mut lower(&bad)).unwrap().is_none());
+        assert!(cholesky.factorise(&mut lower(&good)).unwrap().is_some());
+        assert!(residual(&good, &mut cholesky, &DVector::from_element(20, 1.0)) < 1e-5);
+    }
+}
+
+/// The matrix of a dense one, all entries in its pattern.
+fn matrix(session: &Session, a: &DMatrix<f64>) -> Matrix {
+    let indices = || 0..a.nrows() as i32;
+    let rows = indices().flat_map(|i| indices().map(move |_| i)).collect();
+    let columns = indices().flat_map(|_| indices()).collect();
+    let mut matrix = Matrix::with_pattern(session, a.nrows(), 1, rows, columns).unwrap();
+    matrix.set_values(a.as_slice()).unwrap();
+    matrix
+}
+
+fn vector(session: &Session, values: &DVector<f64>) -> Vector {
+    let mut vector = Vector::zeros(session, values.len()).unwrap();
+    vector.set(values.as_slice()).unwrap();
+    vector
+}
+
+/// Three blocks [[2, 1], [1, 2]] on the diagonal, the middle one [[a, b], [b, a]] with the
+/// eigenvalues a ± b.
+fn blocks([a, b]: [f64; 2]) -> DMatrix<f64> {
+    DMatrix::from_fn(6, 6, |i, j| match (i / 2 == j / 2, i == j, i / 2) {
+        (false, ..) => 0.0,
+        (true, true, 1) => a,
+        (true, false, 1) => b,
+        (true, true, _) => 2.0,
+        (true, false, _) => 1.0,
+    })
+}
+
+#[test]
+fn what_is_not_positive_definite_does_not_converge_and_does_no_harm() {
+    let session = Session::start(&[]).unwrap();
+    let b = vector(&session, &DVector::from_element(6, 1.0));
+    let mut solver = LinearSolver::new(&session, "test_", 6, Precision::Full).unwrap();
+    // Whether the solve converges, and the first unknown.
+    let mut solve = |a: DMatrix<f64>| {
+        let (matrix, mut x) = (matrix(&session, &a), Vector::zeros(&session, 6).unwrap());
+        let system = LinearSystem::of(&matrix);
+        let definite = solver.factorise(system).unwrap();
+        let report = solver.solve(system, &b, &mut x, 1e-12).unwrap();
+        assert!(definite || !report.converged);
+        (report.converged, x.read(|x| x[0]).unwrap())
+    };
+    for bad in [[1.0, 2.0], [-2.0, 1.0], [1.0, 1.0], [0.0, 0.0], [f64::NAN, 0.0]] {
+        // First of all, and after a factorisation that went well.
+        for _ in 0..2 {
+            assert_eq!(solve(blocks(bad)), (false, 0.0), "{bad:?}");
+            let (converged, x) = solve(blocks([2.0, 1.0]));
+            assert!(converged && (x - 1.0 / 3.0).abs() < 1e-15, "after {bad:?}: {x}");
+        }
+    }
+    // All pivots negative: conjugate gradients alone would not notice, r·z and p·Ap keep their sign.
+    assert!(!solve(-blocks([2.0, 1.0])).0);
+}
+
+#[test]
+fn an_old_factor_solves_other_values_other_prescribed_unknowns_and_another_diagonal() {
+    const SIZE: usize = 61;
+    let session = Session::start(&[]).unwrap();
+    let mut solver = LinearSolver::new(&session, "test_", SIZE, Precision::Preconditioner).unwrap();
+    let b = DVector::from_fn(SIZE, |i, _| (i as f64).cos());
+    let right = vector(&session, &b);
+    let (mut factorisations, mut worst) = (0, 0.0_f64);
+    for turn in 0..8 {
+        let a = coupled(SIZE, 5) * (1.0 + 0.01 * turn as f64);
+        let (matrix, added) = (matrix(&session, &a), [(3, 0.5), (turn, 1.0)]);
+        let prescribed: Vec<usize> = (20..22 + turn).collect();
+        let system = LinearSystem {
+            added: Some(&added),
+            prescribed: Some(&prescribed),
+            ..LinearSystem::of(&matrix)
+        };
+        let mut x = vector(&session, &DVector::from_element(SIZE, 0.25));
+        let report = solver.solve_renewing(system, &right, &mut x, 1e-11).unwrap();
+        assert!(report.converged);
+        factorisations += report.factorisations;
+        let x = DVector::from_vec(x.read(<[f64]>::to_vec).unwrap());
+        let mut residual = &b - &a * &x;
+        added.iter().for_each(|&(i, d)| residual[i] -= d * x[i]);
+        let told = solver.residual().read(<[f64]>::to_vec).unwrap();
+        worst = worst.max((DVector::from_vec(told) - &residual).amax());
+        prescribed.iter().for_each(|&i| assert_eq!(x[i], 0.25));
+        prescribed.iter().for_each(|&i| residual[i] = 0.0);
+        assert!(residual.norm() < 2e-11, "{:e}", residual.norm());
+    }
+    assert!(worst < 1e-11, "the residual on all unknowns is told: {worst:e}");
+    assert!(factorisations < 8, "the factor is kept: {factorisations}");
+}
+
+#[test]
+fn a_factor_takes_over_matrices_of_another_size() {
+    let session = Session::start(&[]).unwrap();
+    let mut factor = Factor::new(&session, "test_", Precision::Full);
+    for size in [30, 50, 20] {
+        let (a, b) = (coupled(size, 5), DVector::from_element(size, 1.0));
+        assert!(factor.factorise(&matrix(&session, &a)).unwrap());
+        let (b, mut x) = (vector(&session, &b), Vector::zeros(&session, size).unwrap());
+        factor.apply(&b, &mut x).unwrap();
+        let x = DVector::from_vec(x.read(<[f64]>::to_vec).unwrap());
+        assert!((a * x).add_scalar(-1.0).amax() < 1e-13);
+    }
+    let (short, mut x) =
+        (Vector::zeros(&session, 3).unwrap(), Vector::zeros(&session, 20).unwrap());
+    assert!(factor.apply(&short, &mut x).is_err());
+}
+
+#[test]
+fn a_factor_is_replaced_when_its_age_has_cost_as_much_as_a_new_one() {
+    let mut policy = RefactorisationPolicy::new(8.0);
+    policy.solved(4);
+    assert!(!policy.is_due(), "the first solve tells what a new factor needs");
+    policy.solved(1);
+    policy.solved(0);
+    policy.solved(4);
+    assert!(!policy.is_due(), "3 iterations lost of 8");
+    assert_eq!(policy.iteration_limit(), 1 + 5);
+    policy.solved(6);
+    assert!(policy.is_due());
+    let mut policy = RefactorisationPolicy::new(8.0);
+    policy.solved(13);
+    assert!(policy.is_due(), "a factor that helps so little is due at once");
+}
