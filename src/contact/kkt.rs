@@ -55,7 +55,7 @@ pub struct Kkt {
 
 impl Kkt {
     /// Of an answer that cannot be judged.
-    pub(super) const UNKNOWN: Self = Self {
+    pub const UNKNOWN: Self = Self {
         stationarity: f64::NAN,
         primal: f64::NAN,
         dual: f64::NAN,

@@ -6,7 +6,10 @@ mod datum;
 
 use super::{DiscreteProblem, Phases, RunError, State, Step, agreed, extrapolation::Extrapolation};
 use crate::{
-    contact::{self, Bound, ContactError, ContactProblem, ContactReport, ContactSolver, Scales},
+    contact::{
+        self, Bound, ContactError, ContactProblem, ContactReport, ContactSolver, ProblemClass,
+        Scales,
+    },
     fem::Stiffness,
     petsc::{PetscError, Session, Vector},
 };
@@ -82,16 +85,17 @@ impl<'a> ContactStep<'a> {
         let stiffness = phases.time("stiffness pattern", || {
             Stiffness::new(session, body, &problem.elasticity, &constraints.bases)
         })?;
+        let bounded = body.partition.comm().any(!constraints.bounds.is_empty());
+        let class = match (bounded, problem.motions.resisted()) {
+            (false, _) => ProblemClass::Linear,
+            (true, 0) => ProblemClass::Definite,
+            (true, _) => ProblemClass::Semidefinite,
+        };
         Ok(Self {
             session,
             problem,
             phases,
-            solver: contact::solver(
-                session,
-                solver,
-                body.partition.comm().any(!constraints.bounds.is_empty()),
-                problem.scene().contact.penalty_duality,
-            )?,
+            solver: contact::solver(session, solver, class, &problem.scene().contact)?,
             stiffness,
             zeta_mean: vec![1.0; body.triangles.len()],
             load: Vector::zeros(session, owned)?,
@@ -151,9 +155,7 @@ impl<'a> ContactStep<'a> {
             let force = self.set_load(&external, &lift)?;
             let solved = match self.solve_contact(&bounds, force, tolerance) {
                 // All ranks know that the method stopped short; other errors may be one rank's.
-                Err(e @ (ContactError::NotConverged { .. } | ContactError::TaoStopped { .. })) => {
-                    Err(e)
-                }
+                Err(error) if error.stopped_short() => Err(error),
                 other => Ok(other.map_err(failed)?),
             };
             let u = self.displacement(&lift)?;
@@ -270,17 +272,19 @@ impl<'a> ContactStep<'a> {
     ) -> Result<(), PetscError> {
         let problem = self.problem;
         let (body, comm) = (&problem.body, problem.body.partition.comm());
-        if contact::unheld(comm, &self.rigid, &self.active).is_empty() {
+        if contact::unconstrained_motions(comm, &self.rigid, &self.active).is_empty() {
             return Ok(());
         }
         // Prescribed displacements do no work on motions that they prevent.
         let work = problem.motions.work(body, external);
         let (_, bounds) = self.datum.pose(problem, posed);
-        let way = self.c.read(|c| {
-            contact::approach(comm, (&self.rigid, &work), &bounds, c, self.active.clone(), false)
+        let motions = (&self.rigid, &work);
+        let moved = self.c.read(|c| {
+            let active = self.active.clone();
+            contact::rigid_motion_until_contact(comm, motions, &bounds, c, active, false)
         })?;
         // The start c moves along.
-        self.datum.add(problem, &problem.motions.displacement(body, &way.amplitudes));
+        self.datum.add(problem, &problem.motions.displacement(body, &moved.amplitudes));
         Ok(())
     }
 

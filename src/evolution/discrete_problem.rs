@@ -4,7 +4,7 @@ use super::{Foundation, Loads, resultants};
 use crate::{
     contact::{
         Bound, Certificate, ConstraintError, Constraints, DrivenMotion, FixedRow, GapRow,
-        RigidMotions, join_gap,
+        RigidMotions,
     },
     fem::{Body, Elasticity, Mass, Subdomain},
     mesh::{Mesh, boundary_nodes},
@@ -12,7 +12,7 @@ use crate::{
     petsc::{PetscError, Session},
     scene::{Scene, SceneError},
 };
-use std::{collections::BTreeMap, path::PathBuf};
+use std::path::PathBuf;
 
 /// A scene on its mesh, ready to be stepped.
 #[derive(Debug)]
@@ -93,8 +93,7 @@ impl DiscreteProblem {
         let body = Body::new(mesh);
         let (mut fixed, prescribed) = fixed_rows(&scene, &body.mesh);
         let mut gaps = gap_rows(&scene, &body.mesh);
-        let directions: Vec<_> = fixed.iter().map(|row| (row.node, row.direction)).collect();
-        let motions = RigidMotions::new(&body, &directions, &gaps);
+        let motions = RigidMotions::new(&body, &fixed, &gaps);
         let axes = fixed.iter_mut().zip(&prescribed).filter(|(_, value)| value.is_none());
         axes.for_each(|(row, _)| {
             row.direction = motions.tangential(&body, row.node, row.direction);
@@ -151,7 +150,7 @@ impl DiscreteProblem {
         times.truncate(if self.loads.depend_on_time() { usize::MAX } else { 1 });
         for time in times {
             self.posed(time)?;
-            if !self.motions.held() {
+            if !self.motions.all_prevented() {
                 self.check_load(time, &self.load(time))?;
             }
         }
@@ -178,7 +177,7 @@ impl DiscreteProblem {
         if !comm.all(load.iter().all(|f| f.is_finite())) {
             return Err(self.not_finite(time));
         }
-        if self.motions.held() {
+        if self.motions.all_prevented() {
             return Ok(());
         }
         self.motions.check(&self.body, load).map_err(|source| SetupError::Driven {
@@ -298,7 +297,7 @@ fn fixed_rows(scene: &Scene, mesh: &Mesh) -> (Vec<FixedRow>, Prescribed) {
 
 /// The gap conditions u·ν ≤ g of Γ_C, node by node, joined where boundaries meet smoothly.
 fn gap_rows(scene: &Scene, mesh: &Mesh) -> Vec<GapRow> {
-    let mut rows: BTreeMap<usize, Vec<GapRow>> = BTreeMap::new();
+    let mut rows = Vec::new();
     for boundary in &scene.boundaries {
         let (Some(gap), Some(curve)) = (&boundary.gap, mesh.curves.get(&boundary.name)) else {
             continue;
@@ -306,15 +305,13 @@ fn gap_rows(scene: &Scene, mesh: &Mesh) -> Vec<GapRow> {
         for point in boundary_nodes(mesh, &curve.edges) {
             let node = point.node;
             let distance = gap.at(mesh.nodes[node]);
-            let rows = rows.entry(node).or_default();
-            let mut row = |normal, tributary_length| {
-                join_gap(rows, &GapRow { node, normal, gap: distance, tributary_length });
-            };
+            let row =
+                |normal, tributary_length| GapRow { node, normal, gap: distance, tributary_length };
             match gap.normal {
-                Some(normal) => row(normal, point.faces.iter().map(|f| f.length).sum()),
-                None => point.faces.iter().for_each(|face| row(face.normal, face.length)),
+                Some(normal) => rows.push(row(normal, point.faces.iter().map(|f| f.length).sum())),
+                None => rows.extend(point.faces.iter().map(|face| row(face.normal, face.length))),
             }
         }
     }
-    rows.into_values().flatten().collect()
+    GapRow::joined(rows)
 }

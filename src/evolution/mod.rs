@@ -27,7 +27,7 @@ pub use notes::Accuracy;
 pub use state::{State, Step, StepRecord};
 
 use crate::{
-    contact::{ContactError, ContactReport, Kkt, RigidMotion, UnknownSolver},
+    contact::{ContactError, ContactReport, Kkt, RigidMotion, SolverError},
     petsc::{Communicator, PetscError, Session},
     scene::Scene,
 };
@@ -49,8 +49,8 @@ pub struct Outcome {
     pub undone: usize,
     /// Steps in which the contact solver left its fast path.
     pub fallbacks: usize,
-    /// Of these, steps in which TAO gave the answer in the place of the active set.
-    pub rescued: usize,
+    /// Steps in which another solver gave the answer, and which.
+    pub rescued: Option<(usize, &'static str)>,
     /// Where ζ left the bounds of its equation.
     pub bound_violation: BoundViolation,
     /// When first no pressing node held the body against a rigid motion, s, and which.
@@ -105,9 +105,9 @@ pub enum RunError {
         /// Its time, s.
         time: f64,
     },
-    /// The contact solver has no such name.
+    /// There is no contact solver of that name, or it cannot solve such problems.
     #[error(transparent)]
-    Solver(#[from] UnknownSolver),
+    Solver(#[from] SolverError),
     /// The damage solve misses its tolerance.
     #[error(
         "step {step} (t = {time}): the damage equation was solved only to a residual of {residual:.1e} \
@@ -220,7 +220,7 @@ impl Outcome {
             skipped_damage_solves: 0,
             undone: 0,
             fallbacks: 0,
-            rescued: 0,
+            rescued: None,
             bound_violation: BoundViolation::default(),
             accuracy: Accuracy::default(),
             damage_error: None,
@@ -231,7 +231,10 @@ impl Outcome {
 
     fn count(&mut self, report: &ContactReport) {
         self.fallbacks += usize::from(report.fallbacks > 0);
-        self.rescued += usize::from(report.rescues > 0);
+        if let Some(solver) = report.rescued_by {
+            let before = self.rescued.map_or(0, |(steps, _)| steps);
+            self.rescued = Some((before + 1, solver));
+        }
     }
 
     fn accept(&mut self, last: Step, driving: DamageUpdate) {

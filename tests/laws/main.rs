@@ -6,6 +6,7 @@
 
 mod support;
 
+mod anderson;
 mod certificate;
 mod chosen_steps;
 mod conditioning;

@@ -89,7 +89,7 @@ impl ContactStep<'_> {
         let nodes = partition.total() as f64;
         let least = nodes * self.problem.tolerance * force_scale;
         let pressing = self.active_bounds(contact, least);
-        let unheld = contact::unheld(partition.comm(), &self.rigid, &pressing);
+        let unheld = contact::unconstrained_motions(partition.comm(), &self.rigid, &pressing);
         let first = unheld.first().filter(|_| force_scale > 0.0)?;
         Some(self.problem.motions.combined(first))
     }
