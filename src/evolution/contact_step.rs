@@ -192,7 +192,8 @@ impl<'a> ContactStep<'a> {
                 return Ok(Step { state, record, unheld });
             }
             if attempts == ATTEMPTS || judged.kkt.worst().is_nan() {
-                let (method, tolerance) = (self.solver.name(), problem.tolerance);
+                let method = total.rescued_by.unwrap_or(self.solver.name());
+                let tolerance = problem.tolerance;
                 let residuals = judged.kkt;
                 let error = ContactError::NotCertified { method, tolerance, residuals };
                 return Err(failed(self.limited(error, &judged, &u)));

@@ -25,6 +25,7 @@ mod patch;
 mod pieces;
 mod pivoting;
 mod regression;
+mod rescue;
 mod rigid;
 mod scales;
 mod undo;

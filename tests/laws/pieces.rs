@@ -221,7 +221,7 @@ fn what_is_free_does_not_depend_on_units_or_on_the_size_of_other_pieces() {
         let scaled = |mesh: Mesh| moved(mesh, |x| x.map(|v| length * v));
         let decided = |mesh: Mesh, boundaries: &str| match bounded(scaled(mesh), boundaries) {
             Ok(problem) => Ok((problem.motions.free.len(), problem.motions.resisted())),
-            Err(SetupError::Driven { source, .. }) => Err(source.motion.mover),
+            Err(SetupError::Driven { source, .. }) => Err(source.motion.extent),
             Err(other) => panic!("{other}"),
         };
         let three = || together(&both, false);
