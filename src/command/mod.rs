@@ -22,7 +22,7 @@ pub use run::{RunArguments, run};
 pub use stability::{StabilityArguments, stability};
 
 use signorini::{
-    contact::{self, TAO_TYPES},
+    contact::{self, REGISTRY, TAO_TYPES},
     mesh,
     scene::Scene,
 };
@@ -88,6 +88,12 @@ fn check_petsc(options: &[String]) -> Result<(), Failure> {
         ))),
         _ => Ok(()),
     }
+}
+
+/// `signorini solvers`.
+pub fn solvers() -> Result<(), Failure> {
+    REGISTRY.iter().for_each(|entry| screen::say(&format!("{}\t{}", entry.name, entry.summary)));
+    Ok(())
 }
 
 /// `signorini mesh SCENE…`.

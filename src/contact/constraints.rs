@@ -59,9 +59,9 @@ impl Constraints {
         fixed: &[FixedRow],
         gaps: &[GapRow],
     ) -> Result<Self, ConstraintError> {
-        let mut nodes: BTreeMap<usize, (Vec<(FixedRow, usize)>, Vec<GapRow>)> = BTreeMap::new();
+        let mut nodes: BTreeMap<usize, (Vec<usize>, Vec<GapRow>)> = BTreeMap::new();
         for (number, row) in fixed.iter().enumerate() {
-            nodes.entry(row.node).or_default().0.push((*row, number));
+            nodes.entry(row.node).or_default().0.push(number);
         }
         gaps.iter().for_each(|gap| nodes.entry(gap.node).or_default().1.push(*gap));
         let mut constraints = Self {
@@ -73,11 +73,11 @@ impl Constraints {
             further: Vec::new(),
             prescribed_gaps: Vec::new(),
         };
-        for (node, (fixed, gaps)) in nodes {
+        for (node, (numbers, gaps)) in nodes {
             let at = coordinates[node];
             // The basis of a node: its prescribed directions, then the normals of its gaps as far
             // as they are independent of these and of each other.
-            let mut basis = constraints.prescribe(node, &fixed);
+            let mut basis = constraints.prescribe(node, &numbers, fixed);
             let prescribed = basis.len();
             for gap in gaps {
                 constraints.add_gap(gap, &mut basis, prescribed, at)?;
@@ -93,16 +93,16 @@ impl Constraints {
     }
 
     /// Prescribes unknowns of a node in the first independent directions, and returns these.
-    fn prescribe(&mut self, node: usize, fixed: &[(FixedRow, usize)]) -> Vec<[f64; 2]> {
+    fn prescribe(&mut self, node: usize, numbers: &[usize], fixed: &[FixedRow]) -> Vec<[f64; 2]> {
         let mut basis: Vec<[f64; 2]> = Vec::new();
-        for &(row, number) in fixed {
-            let (d, dof) = (row.direction, 2 * node + basis.len());
+        for &number in numbers {
+            let (d, dof) = (fixed[number].direction, 2 * node + basis.len());
             if basis.len() < 2 && basis.iter().all(|b| cross(*b, d).abs() > PARALLEL) {
                 self.prescribed.push((dof, number));
                 self.bases.fix(dof);
                 basis.push(d);
             } else {
-                self.implied.push((row, number));
+                self.implied.push((fixed[number], number));
             }
         }
         basis

@@ -9,7 +9,7 @@ pub enum ConstraintError {
     /// A prescribed displacement goes through the obstacle.
     #[error(
         "the displacement prescribed at node ({}, {}) goes {depth:.3e} m through the obstacle \
-         there: a node that is both held and in contact keeps its prescribed value, which must \
+         there: a node that is both prescribed and in contact keeps its prescribed value, which must \
          respect the gap", at[0], at[1]
     )]
     Penetrates {
@@ -125,7 +125,7 @@ pub enum ContactError {
     #[error("{method} gave an answer, but {}", residuals.missed(*tolerance))]
     NotCertified {
         /// The solver's name.
-        method: &'static str,
+        method: String,
         /// The tolerance missed.
         tolerance: f64,
         /// The residuals found.

@@ -125,7 +125,7 @@ pub struct SolverEntry {
 }
 
 /// All solvers of problems with obstacles, the default first.
-pub const REGISTRY: [SolverEntry; 3] = [active_set::ENTRY, penalty_duality::ENTRY, tao::ENTRY];
+pub static REGISTRY: [SolverEntry; 3] = [active_set::ENTRY, penalty_duality::ENTRY, tao::ENTRY];
 
 /// Their names.
 pub const SOLVERS: [&str; REGISTRY.len()] = {
@@ -163,8 +163,10 @@ impl Default for ContactOptions {
 
 fn known_solver<'de, D: Deserializer<'de>>(value: D) -> Result<Option<String>, D::Error> {
     let name = String::deserialize(value)?;
-    let expected = format!("a contact solver{}; there are {}", alike(&name), listing());
-    find(&name).map_err(|_| D::Error::invalid_value(Unexpected::Str(&name), &&*expected))?;
+    if find(&name).is_err() {
+        let found = format!("\"{name}\"{}; there are {}", alike(&name), listing());
+        return Err(D::Error::invalid_value(Unexpected::Other(&found), &"a contact solver"));
+    }
     Ok(Some(name))
 }
 
@@ -180,14 +182,18 @@ fn between_0_and_1<'de, D: Deserializer<'de>>(value: D) -> Result<f64, D::Error>
 /// # Errors
 /// There is none of that name.
 pub fn find(name: &str) -> Result<(&'static SolverEntry, &str), SolverError> {
-    static ENTRIES: [SolverEntry; REGISTRY.len()] = REGISTRY;
-    let (solver, variant) = name.split_once(':').map_or((name, None), |(s, v)| (s, Some(v)));
+    let (solver, variant) = name.split_once(':').unwrap_or((name, ""));
     let known = |entry: &&SolverEntry| {
-        entry.name == solver && variant.is_none_or(|variant| entry.variants.contains(&variant))
+        entry.name == solver && (name == solver || entry.variants.contains(&variant))
     };
-    let entry =
-        ENTRIES.iter().find(known).ok_or_else(|| SolverError::Unknown { name: name.to_owned() })?;
-    Ok((entry, variant.unwrap_or_default()))
+    let unknown = || SolverError::Unknown { name: name.to_owned() };
+    REGISTRY.iter().find(known).map(|entry| (entry, variant)).ok_or_else(unknown)
+}
+
+/// All solvers and what they do, a line each, for `--help`.
+pub fn summaries() -> String {
+    let line = |entry: &SolverEntry| format!("{:<16} {}", entry.name, entry.summary);
+    REGISTRY.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
 /// The names that [`find`] knows, in words.
@@ -201,15 +207,14 @@ pub fn listing() -> String {
 
 /// The tail of a message: which name was perhaps meant by `name`.
 pub(super) fn alike(name: &str) -> String {
-    let variants =
-        |entry: SolverEntry| entry.variants.iter().map(move |v| format!("{}:{v}", entry.name));
-    let names =
-        SOLVERS.map(str::to_owned).into_iter().chain(REGISTRY.into_iter().flat_map(variants));
+    let names = REGISTRY.iter().flat_map(|entry| {
+        let variants = entry.variants.iter().map(|variant| format!("{}:{variant}", entry.name));
+        variants.chain([entry.name.to_owned()])
+    });
     let likeness = |known: &String| strsim::normalized_damerau_levenshtein(name, known);
     let nearest = names.max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
-    nearest
-        .filter(|known| likeness(known) >= 0.5)
-        .map_or_else(String::new, |known| format!("; did you mean `{known}`?"))
+    let meant = nearest.filter(|known| likeness(known) >= 0.5);
+    meant.map_or_else(String::new, |known| format!("; did you mean `{known}`?"))
 }
 
 /// The solver called `name` for problems of the class `class`, with another one behind it where

@@ -192,8 +192,11 @@ impl<'a> ContactStep<'a> {
                 return Ok(Step { state, record, unheld });
             }
             if attempts == ATTEMPTS || judged.kkt.worst().is_nan() {
-                let method = total.rescued_by.unwrap_or(self.solver.name());
-                let tolerance = problem.tolerance;
+                let (asked, tolerance) = (self.solver.name(), problem.tolerance);
+                let method = match total.rescued_by {
+                    Some(other) => format!("{other}, in the place of {asked},"),
+                    None => asked.to_owned(),
+                };
                 let residuals = judged.kkt;
                 let error = ContactError::NotCertified { method, tolerance, residuals };
                 return Err(failed(self.limited(error, &judged, &u)));

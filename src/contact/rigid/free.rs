@@ -12,11 +12,11 @@ impl RigidMotions {
     pub fn tangential(&self, body: &Body, node: usize, normal: [f64; 2]) -> [f64; 2] {
         self.free.iter().fold(normal, |[nx, ny], motion| {
             let [x, y] = self.at(motion, &body.mesh.nodes, node);
-            let (along, size) = (x * nx + y * ny, x.hypot(y));
-            if along.abs() <= 1e-14 || along.abs() > TURN * size {
+            let (along, speed) = (x * nx + y * ny, x.hypot(y));
+            if along.abs() <= 1e-14 || along.abs() > TURN * speed {
                 return [nx, ny];
             }
-            let [nx, ny] = [nx - along / size * (x / size), ny - along / size * (y / size)];
+            let [nx, ny] = [nx - along / speed * (x / speed), ny - along / speed * (y / speed)];
             let length = nx.hypot(ny);
             [nx / length, ny / length]
         })

@@ -58,18 +58,18 @@ impl RigidMotions {
         let sums = self.resultants(body, |i| [load[2 * i], load[2 * i + 1]]);
         let total: f64 = sums.iter().map(|sum| sum[3]).sum();
         for piece in &self.movable {
-            let size: f64 = piece.parts.iter().map(|&part| sums[part][3]).sum();
-            if size <= UNLOADED * total {
+            let sum: f64 = piece.parts.iter().map(|&part| sums[part][3]).sum();
+            if sum <= UNLOADED * total {
                 continue;
             }
             let mut free = self.free[piece.free.clone()].iter();
-            if let Some(motion) = free.find(|m| m.work(&sums).abs() > BALANCED * size) {
+            if let Some(motion) = free.find(|m| m.work(&sums).abs() > BALANCED * sum) {
                 return Err(self.driven(piece, motion.clone(), &sums));
             }
             let resisted = &self.resisted[piece.resisted.clone()];
             let work = DVector::from_fn(resisted.len(), |i, _| resisted[i].work(&sums));
             let remainder = &work - piece.normal.transpose() * nonnegative(&piece.normal, &work);
-            if remainder.norm() > REMAINDER * size {
+            if remainder.norm() > REMAINDER * sum {
                 let motion = RigidMotion::combination(resisted, remainder.normalize().as_slice());
                 return Err(self.driven(piece, motion, &sums));
             }
@@ -111,13 +111,13 @@ impl RigidMotions {
         sums: &[Resultant],
     ) -> DrivenMotion {
         let [x, y] = motion.largest().map_or([0.0; 2], |largest| largest.centre);
-        let [mut fx, mut fy, mut moment, mut size] = [0.0; 4];
+        let [mut fx, mut fy, mut moment, mut total] = [0.0; 4];
         for &part in &piece.parts {
             let ([cx, cy], [px, py, turn, all]) = (self.parts[part].centre, sums[part]);
-            (fx, fy, size) = (fx + px, fy + py, size + all);
+            (fx, fy, total) = (fx + px, fy + py, total + all);
             moment += turn + (cx - x) * py - (cy - y) * px;
         }
-        let force = [fx, fy].map(|f| if f.abs() > ROUNDING * size { f } else { 0.0 });
+        let force = [fx, fy].map(|f| if f.abs() > ROUNDING * total { f } else { 0.0 });
         DrivenMotion { motion, force, moment, pieces: self.pieces }
     }
 

@@ -149,8 +149,8 @@ impl<'s> PenaltyDuality<'s> {
         // Rigid motions that contact alone constrains have s = ∞ and do not count.
         let finite = || eigenvalues.iter().filter(|theta| 1.0 - trial * **theta > 1e-6);
         let least = compliance(finite().copied().fold(f64::INFINITY, f64::min));
-        let largest = compliance(finite().copied().fold(0.0, f64::max));
-        let omega = OMEGA_COMPLIANCE / (least * largest).sqrt();
+        let most = compliance(finite().copied().fold(0.0, f64::max));
+        let omega = OMEGA_COMPLIANCE / (least * most).sqrt();
         Ok(if omega.is_finite() && omega > 0.0 { omega } else { trial })
     }
 
@@ -188,8 +188,8 @@ impl<'s> PenaltyDuality<'s> {
             let mut w: Vec<f64> = u.read(|u| bounds.iter().map(|b| -u[b.dof]).collect())?;
             alpha.push(dot(&w, &v));
             for earlier in basis.iter().rev().chain(basis.iter().rev()) {
-                let share = dot(&w, earlier);
-                w.iter_mut().zip(earlier).for_each(|(w, e)| *w -= share * e);
+                let component = dot(&w, earlier);
+                w.iter_mut().zip(earlier).for_each(|(w, e)| *w -= component * e);
             }
             v = w;
         }

@@ -3,7 +3,7 @@
 use super::{ContactReport, ContactSolver, ProblemClass, SolverEntry};
 use crate::{
     contact::{ContactError, ContactProblem, Kkt},
-    petsc::{BoundedQuadratic, Matrix, PetscError, Session, Vector},
+    petsc::{BoundedQuadratic, Matrix, PetscError, Session, TaoReport, Vector},
 };
 
 pub(super) const ENTRY: SolverEntry = SolverEntry {
@@ -82,27 +82,25 @@ impl ContactSolver for Tao<'_> {
         let method = || format!("tao:{}", self.kind);
         let infinite = if self.kind == "bqpip" { BOX } else { INFINITE };
         let mut scaled = Scaled::new(self.session, problem, infinite)?;
-        let estimate = problem.max_norm(problem.load)? / scaled.stiffness_scale;
-        let mut size = if self.displacement > 0.0 { self.displacement } else { estimate };
+        let estimate = problem.max_norm(problem.load)? / problem.stiffness_scale;
+        let mut unit = if self.displacement > 0.0 { self.displacement } else { estimate };
 
         let mut report = ContactReport::default();
         let (mut reason, mut residuals) = (0, Kkt::default());
         let (mut best, mut stalled) = (f64::INFINITY, 0);
         for _ in 0..if problem.definite() { CALLS } else { PROXIMAL_CALLS } {
-            scaled.set(problem, c, size)?;
-            let limit = problem.linear_residual() / (scaled.stiffness_scale * size);
-            let Scaled { stiffness, load, lower, upper, x, .. } = &mut scaled;
-            let answer = tao
-                .minimise(stiffness, load, [lower, upper], x, limit)
+            scaled.set(problem, c, unit)?;
+            let answer = scaled
+                .minimise(tao, problem.linear_residual() / (problem.stiffness_scale * unit))
                 .map_err(|source| ContactError::Failed { method: method(), source })?;
             report.iterations += answer.iterations;
             report.linear_iterations += answer.linear_iterations;
             report.factorisations += answer.factorisations;
             reason = answer.reason;
-            c.write(|c| x.read(|x| c.iter_mut().zip(x).for_each(|(c, x)| *c = x * size)))??;
-            let found = problem.max_norm(x)? * size;
+            c.write(|c| scaled.x.read(|x| c.iter_mut().zip(x).for_each(|(c, x)| *c = x * unit)))??;
+            let found = problem.max_norm(&scaled.x)? * unit;
             if found > 0.0 {
-                (size, self.displacement) = (found, found);
+                (unit, self.displacement) = (found, found);
             }
             residuals = problem.residuals(self.session, c)?;
             if residuals.within(0.1 * problem.tolerance) {
@@ -140,11 +138,9 @@ impl ContactSolver for Tao<'_> {
 struct Scaled {
     stiffness: Matrix,
     load: Vector,
-    lower: Vector,
-    upper: Vector,
+    /// Lower and upper.
+    bounds: [Vector; 2],
     x: Vector,
-    /// s, N/m.
-    stiffness_scale: f64,
     /// ρ.
     proximal: f64,
     infinite: f64,
@@ -152,41 +148,48 @@ struct Scaled {
 
 impl Scaled {
     fn new(session: &Session, problem: &ContactProblem, infinite: f64) -> Result<Self, PetscError> {
-        let stiffness_scale = problem.stiffness_scale;
         let proximal = if problem.definite() { 0.0 } else { PROXIMAL };
         let zeros = || Vector::zeros(session, problem.load.owned());
         Ok(Self {
-            stiffness: problem.stiffness.scaled(1.0 / stiffness_scale, proximal)?,
+            stiffness: problem.stiffness.scaled(1.0 / problem.stiffness_scale, proximal)?,
             load: zeros()?,
-            lower: zeros()?,
-            upper: zeros()?,
+            bounds: [zeros()?, zeros()?],
             x: zeros()?,
-            stiffness_scale,
             proximal,
             infinite,
         })
     }
 
-    /// Sets load, bounds and start for the start `c` and U = `size`.
-    fn set(&mut self, problem: &ContactProblem, c: &Vector, size: f64) -> Result<(), PetscError> {
+    /// Sets load, bounds and start for the start `c` and U = `unit`.
+    fn set(&mut self, problem: &ContactProblem, c: &Vector, unit: f64) -> Result<(), PetscError> {
         let start = c.read(<[f64]>::to_vec)?;
-        let (s, proximal, infinite) = (self.stiffness_scale, self.proximal, self.infinite);
+        let (s, proximal, infinite) = (problem.stiffness_scale, self.proximal, self.infinite);
         self.load.write(|v| {
             problem.load.read(|f| {
                 for i in 0..v.len() {
-                    v[i] = f[i] / (s * size) + proximal * start[i] / size;
+                    v[i] = f[i] / (s * unit) + proximal * start[i] / unit;
                 }
             })
         })??;
-        let limit = |value: f64| (value / size).clamp(-infinite, infinite);
-        self.lower.write(|v| {
+        let limit = |value: f64| (value / unit).clamp(-infinite, infinite);
+        let [lower, upper] = &mut self.bounds;
+        lower.write(|v| {
             v.fill(-infinite);
             problem.bounds.iter().for_each(|b| v[b.dof] = limit(b.lower));
         })?;
-        self.upper.write(|v| {
+        upper.write(|v| {
             v.fill(infinite);
             problem.bounds.iter().for_each(|b| v[b.dof] = limit(b.upper));
         })?;
-        self.x.write(|v| v.iter_mut().zip(&start).for_each(|(v, c)| *v = c / size))
+        self.x.write(|v| v.iter_mut().zip(&start).for_each(|(v, c)| *v = c / unit))
+    }
+
+    /// Minimises with TAO until the gradient is about `limit` in ‖·‖₂.
+    fn minimise(
+        &mut self,
+        tao: &mut BoundedQuadratic,
+        limit: f64,
+    ) -> Result<TaoReport, PetscError> {
+        tao.minimise(&self.stiffness, &self.load, self.bounds.each_ref(), &mut self.x, limit)
     }
 }
