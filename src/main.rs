@@ -36,6 +36,8 @@ enum Command {
     Chart(command::ChartArguments),
     /// Time the work of a scene's step that no method can avoid, in isolation (JSON).
     Floor(command::FloorArguments),
+    /// List the contact solvers, a line each: its name, a tab, what it does.
+    Solvers,
     /// Mesh the .geo files of scenes with gmsh, where their .msh is missing or older.
     Mesh {
         /// Scene files.
@@ -47,7 +49,7 @@ enum Command {
 fn main() -> ExitCode {
     let command = Arguments::parse().command;
     let alone = match &command {
-        Command::Run(_) => Ok(()),
+        Command::Run(_) | Command::Solvers => Ok(()),
         Command::Compare(_) => command::refuse_ranks("compare"),
         Command::Stability(_) => command::refuse_ranks("stability"),
         Command::Mesh { .. } => command::refuse_ranks("mesh"),
@@ -67,6 +69,7 @@ fn main() -> ExitCode {
         Command::Converge(arguments) => command::convergence(&arguments),
         Command::Chart(arguments) => command::speed_chart(&arguments),
         Command::Floor(arguments) => command::floor(&arguments),
+        Command::Solvers => command::solvers(),
         Command::Mesh { scenes } => command::mesh(&scenes),
     };
     match result {

@@ -19,7 +19,7 @@ pub struct CompareArguments {
     /// Scene files.
     #[arg(required = true, value_name = "SCENE")]
     scenes: Vec<PathBuf>,
-    /// Solvers to compare [default: active-set, penalty-duality, tao].
+    /// Solvers to compare, each by itself (contact.rescue = false) [default: all].
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     solvers: Vec<String>,
     /// Override a key of the scenes, e.g. --set time.step=0.005; may be repeated.
@@ -46,7 +46,8 @@ pub fn compare_scenes(arguments: &CompareArguments) -> Result<(), Failure> {
     }
     let mut settings = Vec::new();
     for path in &arguments.scenes {
-        let scene = Scene::read(path, &arguments.set).map_err(Failure::input)?;
+        let mut scene = Scene::read(path, &arguments.set).map_err(Failure::input)?;
+        scene.contact.rescue = false;
         let mesh = mesh::load(&scene.mesh.file, &scene.mesh.parameters).map_err(Failure::input)?;
         settings.push(DiscreteProblem::new(scene, mesh).map_err(Failure::input)?);
     }

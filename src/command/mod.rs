@@ -22,7 +22,7 @@ pub use run::{RunArguments, run};
 pub use stability::{StabilityArguments, stability};
 
 use signorini::{
-    contact::{TAO_TYPES, UnknownSolver, is_solver},
+    contact::{self, REGISTRY, TAO_TYPES},
     mesh,
     scene::Scene,
 };
@@ -71,10 +71,8 @@ impl fmt::Display for Failure {
 
 /// Refuses a solver that `option` names and nobody knows.
 fn check_solver(option: &str, name: &str) -> Result<(), Failure> {
-    match is_solver(name) {
-        true => Ok(()),
-        false => Err(Failure::Input(format!("{option}: {}", UnknownSolver(name.to_owned())))),
-    }
+    let found = contact::find(name).map(|_| ());
+    found.map_err(|unknown| Failure::Input(format!("{option}: {unknown}")))
 }
 
 /// Refuses PETSc options that would end a run after its first results are written.
@@ -90,6 +88,12 @@ fn check_petsc(options: &[String]) -> Result<(), Failure> {
         ))),
         _ => Ok(()),
     }
+}
+
+/// `signorini solvers`.
+pub fn solvers() -> Result<(), Failure> {
+    REGISTRY.iter().for_each(|entry| screen::say(&format!("{}\t{}", entry.name, entry.summary)));
+    Ok(())
 }
 
 /// `signorini mesh SCENE…`.

@@ -7,7 +7,7 @@ use super::{
 };
 use clap::Args;
 use signorini::{
-    contact::SOLVERS,
+    contact::{self, SOLVERS},
     evolution::{self, DiscreteProblem, Phases, RunError},
     mesh, output,
     petsc::{Communicator, Session},
@@ -29,9 +29,7 @@ pub struct RunArguments {
     /// Folder for the results [default: out/<scene>].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Contact solver: active-set, penalty-duality, tao, tao:TYPE [default: the scene's, else
-    /// active-set].
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help = format!("Contact solver [default: the scene's, else {}]:\n{}", SOLVERS[0], contact::summaries()))]
     solver: Option<String>,
     /// Override a key of the scene, e.g. --set time.step=0.005; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]

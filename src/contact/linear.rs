@@ -1,7 +1,7 @@
 //! No obstacle: one linear solve.
 
 use super::{
-    ContactError, ContactProblem, ContactReport, ContactSolver,
+    ContactError, ContactProblem, ContactReport, ContactSolver, Kkt,
     elastic::{ElasticSolver, System},
 };
 use crate::petsc::{Session, Vector};
@@ -33,8 +33,9 @@ impl ContactSolver for Linear<'_> {
         match self.elastic.solve(problem, system, f, c, limit, &mut report)? {
             true => Ok(report),
             false => Err(ContactError::NotConverged {
-                method: self.name(),
-                iterations: report.linear_iterations,
+                method: self.name().to_owned(),
+                residuals: Kkt::UNKNOWN,
+                report: Box::new(ContactReport { iterations: report.linear_iterations, ..report }),
                 detail: "conjugate gradients on the factored stiffness did not converge: the \
                          matrix is not positive definite"
                     .into(),

@@ -22,8 +22,29 @@ pub struct BoundaryNode {
 pub struct Face {
     /// Outward unit normal.
     pub normal: [f64; 2],
-    /// Lumped length, m: half of each edge that the face stands for.
+    /// Tributary length, m: half of each edge that the face stands for.
     pub length: f64,
+}
+
+impl Face {
+    /// Whether the other face continues this one smoothly, at an angle of no more than
+    /// [`CORNER_ANGLE`] between their normals.
+    #[must_use]
+    pub fn continues(&self, other: &Self) -> bool {
+        let ([a, b], [c, d]) = (self.normal, other.normal);
+        // The cosine alone would lose small angles to rounding.
+        let angle = (a * d - b * c).abs().atan2(a * c + b * d);
+        // Round-off must not decide on a boundary whose edges turn by exactly 30°.
+        angle <= CORNER_ANGLE + 1e-9
+    }
+
+    /// Both faces as one: the length-weighted mean of the normals, the sum of the lengths.
+    #[must_use]
+    pub fn joined(&self, other: &Self) -> Self {
+        let sum = [0, 1].map(|i| self.length * self.normal[i] + other.length * other.normal[i]);
+        let norm = sum[0].hypot(sum[1]);
+        Self { normal: sum.map(|x| x / norm), length: self.length + other.length }
+    }
 }
 
 /// The nodes of a set of boundary edges, in increasing order.

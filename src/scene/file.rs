@@ -10,7 +10,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::error::{Names, SceneError};
 use super::source::Source;
-use crate::{fem::Mass, model::Plane};
+use crate::{contact::ContactOptions, fem::Mass, model::Plane};
 
 /// The tables that stand alone.
 const TABLES: [&str; 7] = ["mesh", "material", "damage", "time", "body", "contact", "output"];
@@ -30,7 +30,7 @@ pub(super) struct File {
     #[serde(default)]
     pub(super) body: BodyTable,
     #[serde(default)]
-    pub(super) contact: ContactTable,
+    pub(super) contact: ContactOptions,
     #[serde(default)]
     pub(super) output: OutputTable,
     pub(super) boundary: Spanned<Vec<Spanned<BoundaryTable>>>,
@@ -79,24 +79,6 @@ pub(super) struct TimeTable {
 #[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct BodyTable {
     pub(super) force: Option<Vector>,
-}
-
-#[derive(Deserialize, Default)]
-#[serde(deny_unknown_fields, expecting = "a table")]
-pub(super) struct ContactTable {
-    pub(super) solver: Option<Spanned<String>>,
-    pub(super) tolerance: Option<Number>,
-    #[serde(default)]
-    pub(super) penalty_duality: PenaltyTable,
-}
-
-#[derive(Deserialize, Default)]
-#[serde(deny_unknown_fields, expecting = "a table")]
-pub(super) struct PenaltyTable {
-    pub(super) omega: Option<Number>,
-    pub(super) lambda_omega: Option<Number>,
-    pub(super) accelerate: Option<bool>,
-    pub(super) iterations: Option<Spanned<usize>>,
 }
 
 #[derive(Deserialize, Default)]

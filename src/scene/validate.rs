@@ -8,17 +8,10 @@ use toml::Spanned;
 
 use super::error::SceneError;
 use super::expression::Expression;
-use super::file::{
-    ContactTable, DamageTable, File, Formula, MaterialTable, MeshTable, TimeTable, Vector,
-};
+use super::file::{DamageTable, File, Formula, MaterialTable, MeshTable, TimeTable, Vector};
 use super::source::Source;
-use super::{
-    ContactOptions, Damage, MeshSource, OutputOptions, Scene, Stepping, TimeGrid, may_start_at,
-};
-use crate::{
-    contact::{PenaltyOptions, is_solver, solver_names},
-    model::{DamageLaw, Material},
-};
+use super::{Damage, MeshSource, OutputOptions, Scene, Stepping, TimeGrid, may_start_at};
+use crate::model::{DamageLaw, Material};
 
 /// More steps than this are a slip of the pen.
 const MOST_STEPS: f64 = 1e9;
@@ -46,7 +39,7 @@ pub(super) fn scene(file: File, path: &Path, source: Source) -> Result<Scene, Sc
         damage: file.damage.map(|d| check.damage(&d)).transpose()?,
         time,
         body_force,
-        contact: check.contact(file.contact)?,
+        contact: file.contact,
         output: OutputOptions { every: file.output.every.map(Spanned::into_inner) },
         boundaries: check.boundaries(&file.boundary)?,
         notes,
@@ -232,28 +225,5 @@ impl Check<'_> {
             return Err(self.invalid(&table.step.span(), problem));
         }
         Ok(TimeGrid::uniform(end, step))
-    }
-
-    fn contact(&self, table: ContactTable) -> Result<ContactOptions, SceneError> {
-        let in_range = |n| self.number(n, "between 0 and 1, both excluded", |v| 0.0 < v && v < 1.0);
-        let (given, default) = (table.penalty_duality, PenaltyOptions::default());
-        let lambda_omega = given.lambda_omega.as_ref().map(in_range).transpose()?;
-        let penalty_duality = PenaltyOptions {
-            omega: given.omega.as_ref().map(|n| self.positive(n, "Pa/m")).transpose()?,
-            lambda_omega: lambda_omega.unwrap_or(default.lambda_omega),
-            accelerate: given.accelerate.unwrap_or(default.accelerate),
-            iterations: given.iterations.map_or(default.iterations, Spanned::into_inner),
-        };
-        if let Some(solver) = table.solver.as_ref().filter(|name| !is_solver(name.get_ref())) {
-            let (found, known) = (solver.get_ref(), solver_names());
-            let problem =
-                format!("must be a contact solver, but is \"{found}\"; there are {known}");
-            return Err(self.invalid(&solver.span(), problem));
-        }
-        Ok(ContactOptions {
-            solver: table.solver.map(Spanned::into_inner),
-            tolerance: table.tolerance.as_ref().map_or(Ok(1e-10), in_range)?,
-            penalty_duality,
-        })
     }
 }

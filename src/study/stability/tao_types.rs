@@ -121,17 +121,11 @@ impl Cell {
         self.message = Some(failure.to_string());
         let RunError::Contact { source, .. } = failure else { return };
         match &**source {
-            ContactError::TaoStopped {
-                iterations,
-                linear_iterations,
-                false_claims,
-                residuals,
-                ..
-            } => {
-                self.outcome = if *false_claims > 0 { "claimed" } else { "stalled" };
-                self.claimed = *false_claims;
-                self.iterations = Some(*iterations);
-                self.linear_iterations = Some(*linear_iterations);
+            ContactError::NotConverged { report, residuals, .. } => {
+                self.outcome = if report.false_claims > 0 { "claimed" } else { "stalled" };
+                self.claimed = report.false_claims;
+                self.iterations = Some(report.iterations);
+                self.linear_iterations = Some(report.linear_iterations);
                 self.kkt = Some(residuals.worst());
             }
             ContactError::NotCertified { residuals, .. } => {
