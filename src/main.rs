@@ -25,6 +25,8 @@ enum Command {
     Run(command::RunArguments),
     /// Run scenes with every contact solver and compare cost and answers.
     Compare(command::CompareArguments),
+    /// List the contact solvers, a line each: its name, a tab, what it does.
+    Solvers,
     /// Mesh the .geo files of scenes with gmsh, where their .msh is missing or older.
     Mesh {
         /// Scene files.
@@ -37,6 +39,7 @@ fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Run(arguments) => command::run(&arguments),
         Command::Compare(arguments) => command::compare(&arguments),
+        Command::Solvers => command::solvers(),
         Command::Mesh { scenes } => command::mesh(&scenes),
     };
     match result {

@@ -36,6 +36,7 @@ try:
 except ImportError as error:
     sys.exit(f"{error}: the comparison needs FEniCSx; run `make deps-validate`")
 from scene import SceneError, read_scene, write_scene
+from solvers import solvers
 from triangulation import mesh_geometry, read_triangulation
 
 TOLERANCE = {"elastic": 1e-10, "contact": 1e-8, "damage": 1e-8}
@@ -105,7 +106,8 @@ def program(binary, scene, directory, solver=None):
     shutil.rmtree(out, ignore_errors=True)  # never read the answer to an earlier case
     write_scene({**scene, "output": {"every": 1}}, path)
     command = [str(binary), "run", str(path), "--out", str(out)]
-    command += ["--solver", solver] if solver else []
+    # Each solver by itself: a rescue would hide that it failed.
+    command += ["--solver", solver, "--set", "contact.rescue=false"] if solver else []
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=1800)
     except (OSError, subprocess.TimeoutExpired) as error:
@@ -216,13 +218,13 @@ def main():
     parser = argparse.ArgumentParser(description="Compare signorini with FEniCSx.")
     parser.add_argument("scenes", nargs="+", type=Path, metavar="SCENE")
     parser.add_argument("--binary", type=Path, default=Path("target/release/signorini"))
-    parser.add_argument("--solvers", nargs="+", default=["active-set", "penalty-duality", "tao"],
-                        help="contact solvers")
+    parser.add_argument("--solvers", nargs="+", help="contact solvers [default: all]")
     parser.add_argument("--steps", type=int, default=20, help="time steps of the damage case")
     arguments = parser.parse_args()
     arguments.binary = arguments.binary.resolve()
     if not arguments.binary.is_file():
         sys.exit(f"{arguments.binary} does not exist: build it first, or name it with --binary")
+    arguments.solvers = arguments.solvers or solvers(arguments.binary)
     line = "{:<14} {:<8} {:<16} {:>6} {:>6} {:>7}  {:>9} {:>9} {:>9}  {:>9}  {}"
     print(line.format(*COLUMNS))
     failed = False

@@ -128,9 +128,10 @@ class Bench:
     def kernels(self, n):
         """What no step can do without, in isolation: `cargo bench --bench kernels` times it."""
         home = self.out / "kernels"
+        environment = {"CRITERION_HOME": str(home), "PATH": os.pathsep.join(
+            [os.environ["PATH"], str(Path.home() / ".cargo" / "bin")])}
         self.start(["cargo", "bench", "--locked", "--manifest-path", ROOT / "Cargo.toml",
-                    "--bench", "kernels", "--", f"^unavoidable/(.*/{n}|copy)$"],
-                   {"CRITERION_HOME": str(home)})
+                    "--bench", "kernels", "--", f"^unavoidable/(.*/{n}|copy)$"], environment)
         group = home / "unavoidable"
         everything = timed(group / "all" / str(n))
         self.keep({"program": "unavoidable", "method": "", "n": n, "ranks": 1,

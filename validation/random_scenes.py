@@ -30,6 +30,7 @@ from judge import Verdict, judge  # noqa: E402
 from random_bodies import write_msh  # noqa: E402
 from random_draw import draw  # noqa: E402
 from scene import read_scene, write_scene  # noqa: E402
+from solvers import solvers  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent.parent
 LIMIT = 120  # seconds a run may take, on a busy machine
@@ -97,7 +98,7 @@ def follow(folder, binary, solver, ranks, tolerance):
 
 def one(binary, out, seed, number, solver):
     """Draws, runs and judges scene `number`; keeps its files if it failed."""
-    case = draw(seed, number)
+    case = draw(seed, number, solvers(binary))
     case.solver = solver or case.solver
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)

@@ -2,7 +2,6 @@
 
 use super::{
     Failure, SOLVERS, check_petsc, check_solver, ranks::require_one_process, read, screen::say,
-    solver_names,
 };
 use clap::Args;
 use comfy_table::{CellAlignment, Table, presets};
@@ -21,8 +20,8 @@ pub struct CompareArguments {
     /// Scene files.
     #[arg(required = true, value_name = "SCENE")]
     scenes: Vec<PathBuf>,
-    #[arg(long, value_name = "NAME", value_delimiter = ',', default_values = SOLVERS,
-        help = format!("Solvers to compare, of {}", solver_names()))]
+    /// Solvers to compare, each by itself (contact.rescue = false).
+    #[arg(long, value_name = "NAME", value_delimiter = ',', default_values = SOLVERS)]
     solvers: Vec<String>,
     /// Override a key of the scenes, e.g. --set time.step=0.005; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -43,7 +42,8 @@ pub fn compare(arguments: &CompareArguments) -> Result<(), Failure> {
     check_petsc(&arguments.petsc)?;
     let mut problems = Vec::new();
     for path in &arguments.scenes {
-        let (scene, mesh) = read(path, None, &arguments.set)?;
+        let (mut scene, mesh) = read(path, None, &arguments.set)?;
+        scene.contact.rescue = false;
         problems.push(DiscreteProblem::new(scene, mesh).map_err(Failure::input)?);
     }
     output::create(&arguments.out).map_err(Failure::input)?;

@@ -12,7 +12,7 @@ pub use run::{RunArguments, run};
 
 use ranks::require_one_process;
 use signorini::{
-    contact::{SOLVERS, TAO_TYPES, UnknownSolver, is_solver, solver_names},
+    contact::{self, REGISTRY, SOLVERS, TAO_TYPES, summaries},
     mesh::{self, Mesh},
     scene::{MeshSource, Scene},
 };
@@ -47,10 +47,8 @@ impl Failure {
 
 /// Refuses an unknown solver, which `option` names.
 fn check_solver(option: &str, name: &str) -> Result<(), Failure> {
-    match is_solver(name) {
-        true => Ok(()),
-        false => Err(Failure::input(format!("{option}: {}", UnknownSolver(name.to_owned())))),
-    }
+    let found = contact::find(name).map(|_| ());
+    found.map_err(|unknown| Failure::input(format!("{option}: {unknown}")))
 }
 
 /// Refuses PETSc options that would end a run only after the results of an earlier run are removed.
@@ -77,6 +75,12 @@ fn read(path: &Path, file: Option<&Path>, set: &[String]) -> Result<(Scene, Mesh
     }
     let mesh = mesh::load(&scene.mesh.file, &scene.mesh.parameters).map_err(Failure::input)?;
     Ok((scene, mesh))
+}
+
+/// `signorini solvers`.
+pub fn solvers() -> Result<(), Failure> {
+    REGISTRY.iter().for_each(|entry| screen::say(&format!("{}\t{}", entry.name, entry.summary)));
+    Ok(())
 }
 
 /// `signorini mesh SCENE…`.

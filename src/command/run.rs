@@ -5,7 +5,7 @@ use super::{
     ranks::{agree, barrier_or_abort},
     read,
     recorder::Recorder,
-    solver_names,
+    summaries,
 };
 use clap::Args;
 use signorini::{
@@ -30,7 +30,7 @@ pub struct RunArguments {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[arg(long, value_name = "NAME", help = format!(
-        "Contact solver [default: the scene's, else {}]: {}", SOLVERS[0], solver_names()
+        "Contact solver [default: the scene's, else {}]:\n{}", SOLVERS[0], summaries()
     ))]
     solver: Option<String>,
     /// Override a key of the scene, e.g. --set time.step=0.005; may be repeated.

@@ -3,9 +3,10 @@
 //! Nothing here comes from a solver: no nodal basis, no bound on an unknown, no mask of prescribed
 //! ones. A fault in any of these makes u wrong, and cannot hide here.
 
-use super::{FixedRow, GapRow, Kkt, Scales};
+use super::{FixedRow, GapRow, Kkt, Scales, kkt::worse};
 use crate::{fem::Subdomain, petsc::Communicator};
 use nalgebra::Vector2;
+use std::collections::BTreeMap;
 
 /// The conditions of a body, node by node, for the nodes that this rank owns.
 #[derive(Debug, Clone)]
@@ -62,13 +63,11 @@ const ROUNDING: f64 = 1e-12;
 impl Certificate {
     /// From the rows of the whole body.
     pub fn new(fixed: &[FixedRow], gaps: &[GapRow]) -> Self {
-        let mut nodes = std::collections::BTreeMap::<usize, Conditions>::new();
+        let mut nodes = BTreeMap::<usize, Conditions>::new();
         for (number, row) in fixed.iter().enumerate() {
             nodes.entry(row.node).or_default().fixed.push((row.direction.into(), number));
         }
-        for gap in gaps {
-            nodes.entry(gap.node).or_default().gaps.push(gap.clone());
-        }
+        gaps.iter().for_each(|gap| nodes.entry(gap.node).or_default().gaps.push(*gap));
         let nodes = nodes.into_iter().map(|(node, at)| Conditions { node, ..at }).collect();
         Self { nodes, posed: fixed.len() + gaps.len() }
     }
@@ -77,7 +76,7 @@ impl Certificate {
     pub fn restrict(&self, subdomain: &Subdomain) -> Self {
         let local = |at: &Conditions| {
             let node = subdomain.owned(at.node)?;
-            let gaps = at.gaps.iter().map(|gap| GapRow { node, ..gap.clone() }).collect();
+            let gaps = at.gaps.iter().map(|gap| GapRow { node, ..*gap }).collect();
             Some(Conditions { node, gaps, fixed: at.fixed.clone() })
         };
         let mut nodes: Vec<_> = self.nodes.iter().filter_map(local).collect();
@@ -100,25 +99,25 @@ impl Certificate {
         comm: Communicator,
     ) -> (Kkt, Vec<ContactPoint>) {
         let mut points = Vec::new();
-        let (mut dual, mut supported) = (0.0, 0.0);
+        let (mut stationarity, mut across, mut dual) = (0.0, 0.0, 0.0);
         let (mut primal, mut complementarity) = (0.0_f64, 0.0_f64);
-        let mut next = 0;
-        let mut stationarity = 0.0;
-        let free = |nodes: std::ops::Range<usize>| {
-            answer.unbalanced[2 * nodes.start..2 * nodes.end].iter().map(|f| f * f).sum::<f64>()
+        // Σ |f − Ku|² over nodes without conditions.
+        let free = |from: usize, to: usize| {
+            answer.unbalanced[2 * from..2 * to].iter().map(|f| f * f).sum::<f64>()
         };
+        let mut next = 0;
         for at in &self.nodes {
-            stationarity += free(next..at.node);
+            stationarity += free(next, at.node);
             next = at.node + 1;
             primal = worse(primal, at.prescribed_error(answer, scales));
             let left = at.gaps_left(answer);
             let carried = at.carry(vector(answer.unbalanced, at.node), &left);
             dual += carried.pull;
-            supported += carried.across;
+            across += carried.across;
             for ((gap, left), force) in at.gaps.iter().zip(&left).zip(carried.forces) {
-                let depth = if force.is_some() || -left > ROUNDING * gap.gap { -left } else { 0.0 };
-                primal =
-                    worse(primal, scales.of_displacement(if depth <= 0.0 { 0.0 } else { depth }));
+                let counts = force.is_some() || -left > ROUNDING * gap.gap;
+                let depth = if !counts || *left >= 0.0 { 0.0 } else { -left };
+                primal = worse(primal, scales.of_displacement(depth));
                 let Some(force) = force else { continue };
                 complementarity = worse(complementarity, scales.natural(force, *left));
                 points.push(ContactPoint {
@@ -131,7 +130,7 @@ impl Certificate {
                 });
             }
         }
-        stationarity += free(next..owned) + supported;
+        stationarity += free(next, owned) + across;
         let judged: usize = self.nodes.iter().map(|at| at.fixed.len() + at.gaps.len()).sum();
         let mut sums = [stationarity, dual, judged as f64];
         comm.sum(&mut sums);
@@ -203,8 +202,8 @@ impl Conditions {
         let normals: Vec<_> = self.gaps.iter().map(|gap| project(gap.normal.into())).collect();
         let bears = |i: &usize| normals[*i].norm() > ALONG;
         let bearing: Vec<usize> = (0..normals.len()).filter(bears).collect();
-        let (shares, rest) = cone(force, &normals, &bearing, left);
-        let forces = (0..normals.len()).map(|i| bears(&i).then_some(shares[i])).collect();
+        let (multipliers, rest) = cone(force, &normals, &bearing, left);
+        let forces = (0..normals.len()).map(|i| bears(&i).then_some(multipliers[i])).collect();
         let along = match bearing[..] {
             [] => Vector2::zeros(),
             [first, ..] => {
@@ -219,7 +218,7 @@ impl Conditions {
     }
 }
 
-/// Shares p ≥ 0 of the `bearing` normals whose Σ p ν is nearest to `force`, and what is left of it.
+/// Multipliers p ≥ 0 of the `bearing` normals whose Σ p ν is nearest to `force`, and what is left of it.
 /// A vector in the plane lies in the cone of at most two of them; of several such pairs, the one
 /// whose gaps have the least `left`.
 fn cone(
@@ -230,14 +229,14 @@ fn cone(
 ) -> (Vec<f64>, Vector2<f64>) {
     let mut best = (vec![0.0; normals.len()], force, 0.0);
     let rounding = 1e-12 * force.norm();
-    let mut offer = |shares: &[(usize, f64)]| {
-        let carried: Vector2<f64> = shares.iter().map(|&(i, p)| normals[i] * p).sum();
+    let mut offer = |multipliers: &[(usize, f64)]| {
+        let carried: Vector2<f64> = multipliers.iter().map(|&(i, p)| normals[i] * p).sum();
         let rest = force - carried;
-        let work: f64 = shares.iter().map(|&(i, p)| p * left[i].abs()).sum();
+        let work: f64 = multipliers.iter().map(|&(i, p)| p * left[i].abs()).sum();
         let gain = best.1.norm() - rest.norm();
         if gain > rounding || (gain > -rounding && work < best.2) {
             let mut all = vec![0.0; normals.len()];
-            shares.iter().for_each(|&(i, p)| all[i] = p);
+            multipliers.iter().for_each(|&(i, p)| all[i] = p);
             best = (all, rest, work);
         }
     };
@@ -256,9 +255,4 @@ fn cone(
 
 fn vector(field: &[f64], node: usize) -> Vector2<f64> {
     Vector2::new(field[2 * node], field[2 * node + 1])
-}
-
-/// The larger; NaN if either is, which f64::max would forget.
-fn worse(a: f64, b: f64) -> f64 {
-    if b > a || b.is_nan() { b } else { a }
 }

@@ -55,7 +55,7 @@ pub struct Kkt {
 
 impl Kkt {
     /// Of an answer that cannot be judged.
-    pub(super) const UNKNOWN: Self = Self {
+    pub const UNKNOWN: Self = Self {
         stationarity: f64::NAN,
         primal: f64::NAN,
         dual: f64::NAN,
@@ -64,14 +64,12 @@ impl Kkt {
 
     /// The largest of the four; NaN if any is.
     pub fn worst(&self) -> f64 {
-        // f64::max would forget a NaN.
-        let values = self.named().map(|(_, value)| value);
-        values.into_iter().fold(0.0, |worst, v| if v > worst || v.is_nan() { v } else { worst })
+        self.named().into_iter().fold(0.0, |worst, (_, value)| worse(worst, value))
     }
 
     /// Whether all are at most `tolerance` (NaN is not).
     pub fn within(&self, tolerance: f64) -> bool {
-        self.named().iter().all(|(_, value)| *value <= tolerance)
+        self.worst() <= tolerance
     }
 
     /// Which residuals miss `tolerance`, and by what factor.
@@ -114,4 +112,9 @@ impl fmt::Display for Kkt {
 /// A residual over its scale; nothing over nothing is nothing.
 fn relative(residual: f64, scale: f64) -> f64 {
     if residual == 0.0 { 0.0 } else { residual / scale }
+}
+
+/// The larger; NaN if either is, which f64::max would forget.
+pub(super) fn worse(a: f64, b: f64) -> f64 {
+    if b > a || b.is_nan() { b } else { a }
 }

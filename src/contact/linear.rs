@@ -1,6 +1,8 @@
 //! Without an obstacle a contact problem is one linear system.
 
-use super::{ContactError, ContactProblem, ContactReport, ContactSolver, elastic::ElasticSolver};
+use super::{
+    ContactError, ContactProblem, ContactReport, ContactSolver, Kkt, elastic::ElasticSolver,
+};
 use crate::petsc::{Session, Vector};
 
 /// K c = f.
@@ -29,8 +31,9 @@ impl ContactSolver for Linear<'_> {
         match self.elastic.solve(system, problem.load, c, limit, &mut report)? {
             true => Ok(report),
             false => Err(ContactError::NotConverged {
-                method: self.name(),
-                iterations: report.linear_iterations,
+                method: self.name().to_owned(),
+                residuals: Kkt::UNKNOWN,
+                report: Box::new(ContactReport { iterations: report.linear_iterations, ..report }),
                 detail: "conjugate gradients on the factored stiffness did not converge: the \
                          matrix is not positive definite"
                     .into(),

@@ -1,7 +1,10 @@
 //! Displacement conditions at nodes, as posed and as bounds on unknowns.
 
+use crate::mesh::Face;
+use std::collections::BTreeMap;
+
 /// u·d is prescribed at a node (a displacement component, or 0 across a symmetry axis).
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 pub struct FixedRow {
     /// The node.
     pub node: usize,
@@ -10,7 +13,7 @@ pub struct FixedRow {
 }
 
 /// u·ν ≤ g at a node of Γ_C.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 pub struct GapRow {
     /// The node.
     pub node: usize,
@@ -18,12 +21,36 @@ pub struct GapRow {
     pub normal: [f64; 2],
     /// g ≥ 0, m.
     pub gap: f64,
-    /// The node's share of Γ_C, m.
+    /// The node's tributary length of Γ_C, m.
     pub tributary_length: f64,
 }
 
+impl GapRow {
+    /// The rows by node: those of one smooth boundary become one, of the mean normal, the sum of
+    /// the lengths and the smallest gap; across a corner both stay.
+    pub fn joined(rows: impl IntoIterator<Item = Self>) -> Vec<Self> {
+        let mut nodes: BTreeMap<usize, Vec<Self>> = BTreeMap::new();
+        for new in rows {
+            let rows = nodes.entry(new.node).or_default();
+            match rows.iter_mut().find(|row| row.face().continues(&new.face())) {
+                None => rows.push(new),
+                Some(row) => {
+                    let Face { normal, length } = row.face().joined(&new.face());
+                    let gap = row.gap.min(new.gap);
+                    *row = Self { normal, gap, tributary_length: length, ..*row };
+                }
+            }
+        }
+        nodes.into_values().flatten().collect()
+    }
+
+    fn face(&self) -> Face {
+        Face { normal: self.normal, length: self.tributary_length }
+    }
+}
+
 /// Gap conditions of a node as bounds on one unknown: lower ≤ c_dof ≤ upper.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bound {
     /// The unknown, 2·node + component in the node's basis.
     pub dof: usize,

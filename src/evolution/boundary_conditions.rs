@@ -1,12 +1,11 @@
 //! What a scene asks for on the named parts of the boundary, in terms of the mesh.
 
 use crate::{
-    contact::{FixedRow, GapRow, RigidMotions, join_gap},
+    contact::{FixedRow, GapRow, RigidMotions},
     fem::Body,
     mesh::{BoundaryNode, Mesh, boundary_nodes},
     scene::{Boundary, Condition, Expression, Scene},
 };
-use std::collections::BTreeMap;
 
 /// The conditions of all boundaries.
 #[derive(Debug, Default)]
@@ -37,12 +36,11 @@ impl BoundaryConditions {
     /// The conditions of `scene` on `mesh`, which has all curves that the scene names.
     pub(super) fn new(scene: &Scene, mesh: &Mesh) -> Self {
         let mut conditions = Self::default();
-        let mut gaps: BTreeMap<usize, Vec<GapRow>> = BTreeMap::new();
         for boundary in &scene.boundaries {
             let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
             for node in boundary_nodes(mesh, &curve.edges) {
                 conditions.add_fixed_rows(boundary, mesh, &node);
-                add_gap_rows(boundary, mesh, &node, gaps.entry(node.node).or_default());
+                conditions.add_gap_rows(boundary, mesh, &node);
             }
             if let Some(gap) = boundary.gap() {
                 let normal = |edge| gap.normal.unwrap_or(mesh.edge_normal(edge).0);
@@ -53,15 +51,14 @@ impl BoundaryConditions {
                 conditions.tractions.push(Traction { boundary, edges, force: force.clone() });
             }
         }
-        conditions.gaps = gaps.into_values().flatten().collect();
+        conditions.gaps = GapRow::joined(conditions.gaps);
         conditions
     }
 
     /// Finds the rigid motions that the conditions do not prevent, and makes the normals of axes and
     /// gaps exactly orthogonal to the free motions to which they are orthogonal up to rounding.
     pub(super) fn resolve_motions(&mut self, body: &Body) -> RigidMotions {
-        let directions: Vec<_> = self.fixed.iter().map(|row| (row.node, row.direction)).collect();
-        let motions = RigidMotions::new(body, &directions, &self.gaps);
+        let motions = RigidMotions::new(body, &self.fixed, &self.gaps);
         let axes = self.fixed.iter_mut().zip(&self.prescribed);
         for (row, _) in axes.filter(|(_, value)| value.is_none()) {
             row.direction = motions.tangential(body, row.node, row.direction);
@@ -90,17 +87,17 @@ impl BoundaryConditions {
             }
         }
     }
-}
 
-/// Adds the gap conditions of a boundary at a node to `rows`, those of its other boundaries.
-fn add_gap_rows(boundary: &Boundary, mesh: &Mesh, at: &BoundaryNode, rows: &mut Vec<GapRow>) {
-    let Some(gap) = boundary.gap() else { return };
-    let (node, distance) = (at.node, gap.at(mesh.nodes[at.node]));
-    let mut add = |normal, tributary_length| {
-        join_gap(rows, &GapRow { node, normal, gap: distance, tributary_length });
-    };
-    match gap.normal {
-        Some(normal) => add(normal, at.faces.iter().map(|face| face.length).sum()),
-        None => at.faces.iter().for_each(|face| add(face.normal, face.length)),
+    fn add_gap_rows(&mut self, boundary: &Boundary, mesh: &Mesh, at: &BoundaryNode) {
+        let Some(gap) = boundary.gap() else { return };
+        let (node, distance) = (at.node, gap.at(mesh.nodes[at.node]));
+        let row =
+            |normal, tributary_length| GapRow { node, normal, gap: distance, tributary_length };
+        match gap.normal {
+            Some(normal) => {
+                self.gaps.push(row(normal, at.faces.iter().map(|face| face.length).sum()));
+            }
+            None => self.gaps.extend(at.faces.iter().map(|face| row(face.normal, face.length))),
+        }
     }
 }

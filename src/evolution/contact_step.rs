@@ -16,7 +16,10 @@ use super::{
     extrapolation::Extrapolation,
 };
 use crate::{
-    contact::{self, Bound, ContactError, ContactProblem, ContactReport, ContactSolver, Scales},
+    contact::{
+        self, Bound, ContactError, ContactProblem, ContactReport, ContactSolver, ProblemClass,
+        Scales,
+    },
     fem::Stiffness,
     petsc::{PetscError, Session, Vector},
 };
@@ -90,7 +93,11 @@ impl<'a> ContactStep<'a> {
             Stiffness::new(session, body, &problem.elasticity, &constraints.bases)
         })?;
         let bounded = comm.any(!constraints.bounds.is_empty());
-        let penalty = problem.scene().contact.penalty_duality;
+        let class = match (bounded, problem.motions.resisted()) {
+            (false, _) => ProblemClass::Linear,
+            (true, 0) => ProblemClass::Definite,
+            (true, _) => ProblemClass::Semidefinite,
+        };
         let memory = Memory {
             datum: Datum::default(),
             scales: Scales { force: LEAST_LOAD * problem.largest_load, displacement: 0.0 },
@@ -101,7 +108,7 @@ impl<'a> ContactStep<'a> {
             session,
             problem,
             phases,
-            solver: contact::solver(session, solver, bounded, penalty)?,
+            solver: contact::solver(session, solver, class, &problem.scene().contact)?,
             stiffness,
             zeta_mean: vec![1.0; body.triangles.len()],
             load: Vector::zeros(session, unknowns)?,
@@ -192,15 +199,16 @@ impl<'a> ContactStep<'a> {
     fn approach(&mut self, case: &LoadCase) -> Result<(), PetscError> {
         let problem = self.problem;
         let (body, comm) = (&problem.body, problem.body.partition.comm());
-        if contact::unheld(comm, &self.rigid, &self.next.active).is_empty() {
+        if contact::unconstrained_motions(comm, &self.rigid, &self.next.active).is_empty() {
             return Ok(());
         }
         let (_, bounds) = self.next.datum.pose(problem, case);
-        let motion = (&self.rigid, &case.work);
-        let approach = self.c.read(|c| {
-            contact::approach(comm, motion, &bounds, c, self.next.active.clone(), false)
+        let motions = (&self.rigid, &case.work);
+        let moved = self.c.read(|c| {
+            let active = self.next.active.clone();
+            contact::rigid_motion_until_contact(comm, motions, &bounds, c, active, false)
         })?;
-        self.next.datum.add(problem, &problem.motions.displacement(body, &approach.amplitudes));
+        self.next.datum.add(problem, &problem.motions.displacement(body, &moved.amplitudes));
         Ok(())
     }
 
@@ -221,7 +229,7 @@ impl<'a> ContactStep<'a> {
             let force = self.set_load(&case.load, &lift)?;
             let solved = match self.solve_contact(case, &bounds, force, tolerance) {
                 // All ranks know that the method stopped short; other errors may be one rank's.
-                Err(error) if !error.is_missed() => return Err(failed(error)),
+                Err(error) if !error.stopped_short() => return Err(failed(error)),
                 solved => solved,
             };
             let u = self.displacement(lift)?;
@@ -246,6 +254,10 @@ impl<'a> ContactStep<'a> {
                 return Ok((judged, report));
             }
             if attempt == ATTEMPTS || judged.kkt.worst().is_nan() {
+                let method = match report.rescued_by {
+                    Some(other) => format!("{other}, in the place of {method},"),
+                    None => method.to_owned(),
+                };
                 let (tolerance, residuals) = (problem.tolerance, judged.kkt);
                 let error = ContactError::NotCertified { method, tolerance, residuals };
                 return Err(failed(self.limited(error, &judged)));

@@ -161,7 +161,7 @@ impl DiscreteProblem {
         times.truncate(if self.loads.depend_on_time() { usize::MAX } else { 1 });
         for time in times {
             self.lift_and_bounds(time, &self.loads.prescribed_at(time))?;
-            if !self.motions.held() {
+            if !self.motions.all_prevented() {
                 self.check_load(time, &self.load(time))?;
             }
         }
@@ -201,7 +201,7 @@ impl DiscreteProblem {
         if !comm.all(load.iter().all(|f| f.is_finite())) {
             return Err(self.not_finite(time));
         }
-        if self.motions.held() {
+        if self.motions.all_prevented() {
             return Ok(());
         }
         self.motions.check(&self.body, load).map_err(|source| SetupError::Driven {

@@ -2,7 +2,7 @@
 
 use super::{DiscreteProblem, SetupError};
 use crate::{
-    contact::{ContactError, UnknownSolver},
+    contact::{ContactError, SolverError},
     petsc::PetscError,
 };
 
@@ -31,9 +31,9 @@ pub enum RunError {
         /// What failed.
         source: StepFailure,
     },
-    /// The contact solver has no such name.
+    /// There is no contact solver of that name, or it cannot solve such problems.
     #[error(transparent)]
-    Solver(#[from] UnknownSolver),
+    Solver(#[from] SolverError),
     /// The scene contradicts itself at some time.
     #[error(transparent)]
     Setup(#[from] SetupError),

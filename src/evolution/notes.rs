@@ -46,7 +46,8 @@ impl Outcome {
                 self.skipped_damage_solves, self.last.record.step
             ));
         }
-        notes.extend(self.slow_path());
+        notes.extend(self.fallbacks());
+        notes.extend(self.rescues());
         if self.undone > 0 {
             notes.push(format!("{} steps were undone and tried again, shorter", self.undone));
         }
@@ -54,19 +55,21 @@ impl Outcome {
         notes
     }
 
-    /// That answers came another way than the one the solver's name stands for.
-    fn slow_path(&self) -> Option<String> {
-        let steps = |n: usize| if n == 1 { "1 step".to_owned() } else { format!("{n} steps") };
-        let rescued = match self.rescued {
-            0 => String::new(),
-            n => format!("; in {} TAO gave the answer in its place", steps(n)),
-        };
-        (self.fallbacks > 0).then(|| {
-            format!(
-                "in {} the contact solver left its fast path (single pivoting){rescued}",
-                steps(self.fallbacks)
-            )
-        })
+    /// That answers came by single pivoting.
+    fn fallbacks(&self) -> Option<String> {
+        let steps = counted(self.fallbacks);
+        (self.fallbacks > 0)
+            .then(|| format!("in {steps} the contact solver left its fast path (single pivoting)"))
+    }
+
+    /// That answers came from another solver than the one the run is named after.
+    fn rescues(&self) -> Option<String> {
+        let (steps, solver) = self.rescued?;
+        Some(format!(
+            "in {} the contact solver stopped short of the tolerance, and {solver} gave the answer \
+             in its place",
+            counted(steps)
+        ))
     }
 
     /// How many steps were chosen, and how exact the damage is for it.
@@ -166,6 +169,10 @@ impl DiscreteProblem {
             )
         })
     }
+}
+
+fn counted(steps: usize) -> String {
+    if steps == 1 { "1 step".to_owned() } else { format!("{steps} steps") }
 }
 
 /// The smallest angle of a triangle, degrees.

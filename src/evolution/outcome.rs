@@ -18,8 +18,8 @@ pub struct Outcome {
     pub undone: usize,
     /// Steps in which the contact solver left its fast path.
     pub fallbacks: usize,
-    /// Of these, steps in which TAO gave the answer in the place of the active set.
-    pub rescued: usize,
+    /// Steps in which another solver gave the answer, and which.
+    pub rescued: Option<(usize, &'static str)>,
     /// By how much ζ violated the bounds of its equation.
     pub bound_violation: BoundViolation,
     /// When first the active nodes left a rigid motion unconstrained, s, and which.
@@ -58,7 +58,7 @@ impl Outcome {
             skipped_damage_solves: 0,
             undone: 0,
             fallbacks: 0,
-            rescued: 0,
+            rescued: None,
             bound_violation: BoundViolation::default(),
             unconstrained: None,
             accuracy: Accuracy::default(),
@@ -91,7 +91,10 @@ impl Outcome {
         self.kkt = self.kkt.max(&record.kkt());
         self.skipped_damage_solves += usize::from(self.last.skipped_damage_solve);
         self.fallbacks += usize::from(report.fallbacks > 0);
-        self.rescued += usize::from(report.rescues > 0);
+        if let Some(solver) = report.rescued_by {
+            let before = self.rescued.map_or(0, |(steps, _)| steps);
+            self.rescued = Some((before + 1, solver));
+        }
         if self.unconstrained.is_none() {
             self.unconstrained = unconstrained.clone().map(|motion| (record.time, motion));
         }

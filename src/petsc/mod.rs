@@ -46,6 +46,6 @@ pub(crate) use graph::divide;
 pub(crate) use options::{has_option, set_default_option};
 pub(crate) use preconditioner::Preconditioner;
 pub(crate) use shell::ShellPreconditioner;
-pub(crate) use tao::BoundedQuadratic;
+pub(crate) use tao::{BoundedQuadratic, TaoReport};
 
 use error::check;

@@ -115,6 +115,22 @@ impl Node {
         Self { origin: origin(start..value.span().end), content }
     }
 
+    /// The value as serde reads it.
+    pub(super) fn to_toml(&self) -> toml::Value {
+        match &self.content {
+            Content::Text(text) => toml::Value::String(text.clone()),
+            Content::Number(number) if number.fract() == 0.0 => (*number as i64).into(),
+            Content::Number(number) => (*number).into(),
+            Content::Flag(flag) => (*flag).into(),
+            Content::Date => "a date or time".into(),
+            Content::Array(nodes) => nodes.iter().map(Self::to_toml).collect::<Vec<_>>().into(),
+            Content::Table(entries) => {
+                let entries = entries.iter().map(|(key, node)| (key.clone(), node.to_toml()));
+                toml::Value::Table(entries.collect())
+            }
+        }
+    }
+
     /// Puts what is `given` in the place of what is there under `key`. Tables are merged; one that
     /// is given for an array of tables reaches into them by their names.
     fn put(&mut self, given: Self, key: &str) -> Result<(), String> {

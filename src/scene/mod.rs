@@ -19,7 +19,7 @@ pub use error::SceneError;
 pub use expression::{Expression, ExpressionError};
 
 use crate::{
-    contact::PenaltyOptions,
+    contact::ContactOptions,
     fem::Mass,
     model::{DamageLaw, Material},
 };
@@ -134,23 +134,6 @@ impl TimeGrid {
         };
         let parts = steps.min(most);
         (0..=parts).map(|i| self.time(i * steps / parts, steps)).collect()
-    }
-}
-
-/// How the contact problem is solved.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ContactOptions {
-    /// The solver's name, if the scene asks for one: see [`is_solver`](crate::contact::is_solver).
-    pub solver: Option<String>,
-    /// Relative tolerance of the KKT residuals, in (0, 1).
-    pub tolerance: f64,
-    /// Parameters of the penalty-duality method.
-    pub penalty_duality: PenaltyOptions,
-}
-
-impl Default for ContactOptions {
-    fn default() -> Self {
-        Self { solver: None, tolerance: 1e-10, penalty_duality: PenaltyOptions::default() }
     }
 }
 

@@ -5,6 +5,8 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fmt::Display;
 
+use serde::de::DeserializeOwned;
+
 use super::document::{Content, Entries, Node, Problem, SceneText};
 use super::error::{SceneError, suggestion};
 use super::expression::Expression;
@@ -177,6 +179,57 @@ impl<'d> Value<'d> {
         let entries = self.entries()?.iter();
         let entries = entries.map(|(key, node)| Ok((key.clone(), read(&value(key, node))?)));
         entries.collect::<Vec<_>>().into_iter().collect()
+    }
+
+    /// A table of options that a room below reads by serde and that has a default for each. Each
+    /// value is also read alone, so that all that are wrong are told.
+    pub(super) fn options<T: DeserializeOwned>(&self) -> Reading<T> {
+        self.each_option::<T>(&|option| option)?;
+        T::deserialize(self.node.to_toml()).map_err(|error| self.refuse_option(error.message()))
+    }
+
+    /// Reads each value below this one alone, in the tables in which it `stands`.
+    fn each_option<T: DeserializeOwned>(
+        &self,
+        stands: &dyn Fn(toml::Value) -> toml::Value,
+    ) -> Reading<()> {
+        let mut all = Ok(());
+        for (key, node) in self.entries()? {
+            let value = Self::new(format!("{}.{key}", self.key), node, self.findings);
+            let stands = |option| stands(toml::Table::from_iter([(key.clone(), option)]).into());
+            let one = match node.content {
+                Content::Table(_) => value.each_option::<T>(&stands),
+                _ => match T::deserialize(stands(node.to_toml())) {
+                    Ok(_) => Ok(()),
+                    Err(error) => Err(value.refuse_option(error.message())),
+                },
+            };
+            all = all.and(one);
+        }
+        all
+    }
+
+    /// Notes what serde found, which quotes an unknown name and then the known ones in backquotes.
+    fn refuse_option(&self, found: &str) -> Refused {
+        let mut quoted = found.split('`').skip(1).step_by(2);
+        if found.starts_with("unknown field") {
+            let (unknown, known) = (quoted.next().unwrap_or_default(), quoted.collect::<Vec<_>>());
+            return self.note(format!("unknown key {}{}", self.key, suggestion(unknown, &known)));
+        }
+        let Some((found, wanted)) = found.split_once(", expected ") else {
+            return self.refuse(found);
+        };
+        let wanted = match wanted {
+            "f64" => "a number",
+            "usize" => "a whole number, not negative",
+            "a boolean" => "true or false",
+            other => other,
+        };
+        // A value says what it is: `invalid type: string "fast"`.
+        let found = found.split_once(": ").map_or(found, |(_, found)| found);
+        let kinds = ["string ", "integer ", "floating point ", "boolean "];
+        let found = kinds.iter().find_map(|kind| found.strip_prefix(kind)).unwrap_or(found);
+        self.refuse(format!("must be {wanted}, but is {}", found.trim_matches('`')))
     }
 
     /// A table whose keys are those that `read` asks for; the `separator` stands between its own

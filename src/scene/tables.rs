@@ -9,11 +9,8 @@ use super::boundary::boundaries;
 use super::document::Content;
 use super::expression::Expression;
 use super::reader::{Reading, Table, Value};
-use super::{
-    ContactOptions, Damage, MeshSource, OutputOptions, Scene, Stepping, TimeGrid, may_start_at,
-};
+use super::{Damage, MeshSource, OutputOptions, Scene, Stepping, TimeGrid, may_start_at};
 use crate::{
-    contact::{PenaltyOptions, is_solver, solver_names},
     fem::Mass,
     model::{DamageLaw, Material, Plane},
 };
@@ -30,7 +27,7 @@ pub(super) fn scene(root: &mut Table, path: &Path) -> Reading<Scene> {
     let damage = root.optional("damage", |value| value.table(".", damage));
     let time = root.optional("time", |value| value.table(".", time));
     let body_force = root.optional("body", |value| value.table(".", body_force));
-    let contact = root.optional("contact", |value| value.table(".", contact));
+    let contact = root.optional("contact", Value::options);
     let output = root.optional("output", |value| value.table(".", output));
     let boundaries = root.required("boundary", boundaries);
 
@@ -168,42 +165,6 @@ fn other_step(grid: TimeGrid, asked: f64) -> Option<String> {
 
 fn body_force(table: &mut Table) -> Reading<Option<[Expression; 2]>> {
     table.optional("force", |value| value.pair(Value::expression))
-}
-
-fn contact(table: &mut Table) -> Reading<ContactOptions> {
-    let solver = table.optional("solver", |value| {
-        let name = value.text()?;
-        match is_solver(&name) {
-            true => Ok(name),
-            false => Err(value.refuse(format!(
-                "must be a contact solver, but is \"{name}\"; there are {}",
-                solver_names()
-            ))),
-        }
-    });
-    let tolerance = table.optional("tolerance", Value::fraction);
-    let penalty_duality =
-        table.optional("penalty_duality", |value| value.table(".", penalty_duality));
-    let default = ContactOptions::default();
-    Ok(ContactOptions {
-        solver: solver?,
-        tolerance: tolerance?.unwrap_or(default.tolerance),
-        penalty_duality: penalty_duality?.unwrap_or(default.penalty_duality),
-    })
-}
-
-fn penalty_duality(table: &mut Table) -> Reading<PenaltyOptions> {
-    let omega = table.optional("omega", |value| value.positive("Pa/m"));
-    let lambda_omega = table.optional("lambda_omega", Value::fraction);
-    let accelerate = table.optional("accelerate", Value::flag);
-    let iterations = table.optional("iterations", |value| value.whole(0));
-    let default = PenaltyOptions::default();
-    Ok(PenaltyOptions {
-        omega: omega?,
-        lambda_omega: lambda_omega?.unwrap_or(default.lambda_omega),
-        accelerate: accelerate?.unwrap_or(default.accelerate),
-        iterations: iterations?.unwrap_or(default.iterations),
-    })
 }
 
 fn output(table: &mut Table) -> Reading<OutputOptions> {

@@ -2,6 +2,7 @@
 
 use crate::test_directory::{ProgramOutput, SCENE, TestDirectory, square};
 use serde_json::Value;
+use signorini::contact::{REGISTRY, SOLVERS};
 use std::process::Stdio;
 
 const KEYS: [&str; 25] = [
@@ -303,4 +304,14 @@ fn a_process_alone_needs_no_directory_of_temporary_files() {
     let mut command = test_directory.command(&["run", "scene.toml"]);
     let said = ProgramOutput::of(command.env("TMPDIR", "/proc/none"));
     assert_eq!((said.code, said.err.as_str()), (Some(0), ""), "{said:?}");
+}
+
+#[test]
+fn the_solvers_are_listed_with_what_they_do() {
+    let said = TestDirectory::new().say(&["solvers"]);
+    assert_eq!(said.code, Some(0));
+    let names: Vec<_> = said.out.lines().map(|line| line.split_once('\t').unwrap().0).collect();
+    assert_eq!(names, SOLVERS);
+    let help = TestDirectory::new().say(&["run", "--help"]);
+    assert!(REGISTRY.iter().all(|entry| help.out.contains(entry.summary)), "{}", help.out);
 }

@@ -6,6 +6,7 @@
 
 mod support;
 
+mod anderson;
 mod certificate;
 mod chosen_steps;
 mod conditioning;
@@ -24,6 +25,7 @@ mod patch;
 mod pieces;
 mod pivoting;
 mod regression;
+mod rescue;
 mod rigid;
 mod scales;
 mod shipped_scenes;

@@ -3,7 +3,7 @@
 
 use crate::support::{close, difference, distorted, moved, problem, run, square, turn};
 use signorini::{
-    contact::{Mover, SOLVERS},
+    contact::{Extent, SOLVERS},
     evolution::{DiscreteProblem, SetupError},
     mesh::{Curve, Mesh},
 };
@@ -175,7 +175,7 @@ fn a_part_turns_about_the_node_it_hangs_on() {
     let along = "{ name = 'top2', traction = [0, 1] }, { name = 'right2', traction = [1, 0] }";
     let problem = stands(hinged(), &format!("{CLAMPED}, {along}"));
     let [motion] = &problem.motions.free[..] else { panic!("one motion") };
-    assert_eq!(motion.mover, Mover::Part);
+    assert_eq!(motion.extent, Extent::Parts);
     assert!(problem.notes()[0].contains("meet in a single node, a hinge, as at (1.0000, 1.0000)"));
     for solver in SOLVERS {
         assert!(run(&problem, solver).kkt.within(1e-10));
@@ -205,10 +205,10 @@ fn parts_hold_each_other_where_their_hinges_leave_no_motion() {
     let feet = "{ name = 'bottom1', displacement = [0, 0] },
         { name = 'bottom3', displacement = [0, 0] }, { name = 'top2', traction = [1, -1] }";
     let arch = stands(together(&parts[..3], true), feet);
-    assert!(arch.motions.held());
+    assert!(arch.motions.all_prevented());
     assert!(run(&arch, SOLVERS[0]).kkt.within(1e-10));
     let ring = together(&parts, true);
-    assert!(stands(ring.clone(), feet).motions.held());
+    assert!(stands(ring.clone(), feet).motions.all_prevented());
     let one = "{ name = 'bottom1', displacement = [0, 0] }";
     assert_eq!(stands(ring, one).motions.free.len(), 1);
 }
@@ -221,7 +221,7 @@ fn what_is_free_does_not_depend_on_units_or_on_the_size_of_other_pieces() {
         let scaled = |mesh: Mesh| moved(mesh, |x| x.map(|v| length * v));
         let decided = |mesh: Mesh, boundaries: &str| match bounded(scaled(mesh), boundaries) {
             Ok(problem) => Ok((problem.motions.free.len(), problem.motions.resisted())),
-            Err(SetupError::Driven { source, .. }) => Err(source.motion.mover),
+            Err(SetupError::Driven { source, .. }) => Err(source.motion.extent),
             Err(other) => panic!("{other}"),
         };
         let three = || together(&both, false);
@@ -230,11 +230,11 @@ fn what_is_free_does_not_depend_on_units_or_on_the_size_of_other_pieces() {
         let pressed = format!("{CLAMPED}, {standing}, {{ name = 'top3', traction = [0, -1] }}");
         assert_eq!(decided(three(), &pressed), Ok((2, 4)));
         let driven = format!("{CLAMPED}, {standing}, {{ name = 'top3', traction = [1e-6, -1] }}");
-        assert_eq!(decided(three(), &driven), Err(Mover::Piece));
+        assert_eq!(decided(three(), &driven), Err(Extent::Piece));
         let hinge = format!("{CLAMPED}, {{ name = 'bottom2', gap = 0 }}");
         assert_eq!(decided(hinged(), &hinge), Ok((0, 1)));
         let turned = format!("{CLAMPED}, {{ name = 'top2', traction = [1, 0] }}");
-        assert_eq!(decided(hinged(), &turned), Err(Mover::Part));
+        assert_eq!(decided(hinged(), &turned), Err(Extent::Parts));
     }
 }
 

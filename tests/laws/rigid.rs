@@ -46,14 +46,14 @@ fn footed(foot: [f64; 2], load: [f64; 2]) -> Mesh {
 #[test]
 fn a_clamped_side_holds_the_body() {
     let motions = motions(square(3), "{ name = 'left', displacement = [0, 0] }");
-    assert!(motions.held() && motions.free.is_empty() && motions.resisted() == 0);
+    assert!(motions.all_prevented() && motions.free.is_empty() && motions.resisted() == 0);
 }
 
 #[test]
 fn a_body_on_a_foundation_may_slide_but_not_sink_or_turn() {
     let down = "{ name = 'bottom', gap = 0 }, { name = 'top', traction = [0, -1] }";
     let problem = bounded(distorted(4), down).unwrap();
-    assert!(!problem.motions.held() && problem.motions.resisted() == 2);
+    assert!(!problem.motions.all_prevented() && problem.motions.resisted() == 2);
     let names: Vec<_> = problem.motions.free.iter().map(RigidMotion::to_string).collect();
     assert_eq!(names, ["the horizontal translation"]);
     assert_eq!(problem.notes().len(), 1);
@@ -194,7 +194,7 @@ fn an_axis_leaves_the_translation_along_it() {
     let turned = moved(square(3), |x| turn(0.25 * std::f64::consts::PI, x));
     let [name] = &free(turned, left)[..] else { panic!("one motion") };
     assert!(name.contains("0.707"), "{name}");
-    assert!(motions(square(3), &format!("{left}, {bottom}")).held());
+    assert!(motions(square(3), &format!("{left}, {bottom}")).all_prevented());
     // u_y = 0 along x = 0 leaves the translation in x and turning about a point of that side.
     let component = motions(square(3), "{ name = 'left', displacement = ['free', 0] }");
     assert_eq!(component.free.len(), 2);

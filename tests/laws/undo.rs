@@ -84,6 +84,7 @@ fn released(stepping: &str, iterations: usize) -> DiscreteProblem {
          damage = {{ diffusion = 0.2, lambda_d = 0, lambda_u = 1, lambda_w = 0,
                      strain_cap = 1000, threshold = 0.01, initial = 1 }}
          time = {{ end = 1, {stepping} }}
+         contact.rescue = false
          contact.penalty_duality = {{ accelerate = false, iterations = {iterations} }}
          boundary = [
             {{ name = 'left', displacement = [0, 0] }},

@@ -32,7 +32,9 @@ const CASES: &[(&str, &str, &[&str])] = &[
     (
         "solver",
         "qqq",
-        &["bad.toml:24: unknown key contact.qqq (known: solver, tolerance, penalty_duality)"],
+        &[
+            "bad.toml:24: unknown key contact.qqq (known: solver, tolerance, rescue, penalty_duality)",
+        ],
     ),
     (
         "traction = [\"0\", \"-80*t\"]",

@@ -1,6 +1,6 @@
-//! What becomes of the motions that nothing holds and nothing drives.
+//! What becomes of the motions that nothing prevents and nothing drives.
 
-use super::{Part, PartMotion, RigidMotions, load::Resultant};
+use super::{PartMotion, RigidMotions, load::Resultant};
 use crate::{contact::Constraints, fem::Body};
 
 /// Normals turn by at most this (rad) to be tangential to free motions.
@@ -11,12 +11,12 @@ impl RigidMotions {
     /// they leave contact and symmetry axes exactly as they are.
     pub fn tangential(&self, body: &Body, node: usize, normal: [f64; 2]) -> [f64; 2] {
         self.free.iter().fold(normal, |[nx, ny], motion| {
-            let [x, y] = self.at(motion, body, node);
-            let (along, size) = (x * nx + y * ny, x.hypot(y));
-            if along.abs() <= 1e-14 || along.abs() > TURN * size {
+            let [x, y] = self.at(motion, &body.mesh.nodes, node);
+            let (along, speed) = (x * nx + y * ny, x.hypot(y));
+            if along.abs() <= 1e-14 || along.abs() > TURN * speed {
                 return [nx, ny];
             }
-            let [nx, ny] = [nx - along / size * (x / size), ny - along / size * (y / size)];
+            let [nx, ny] = [nx - along / speed * (x / speed), ny - along / speed * (y / speed)];
             let length = nx.hypot(ny);
             [nx / length, ny / length]
         })
@@ -25,7 +25,7 @@ impl RigidMotions {
     /// Pins one unknown for each free motion. The load being balanced, the pins carry no
     /// force: any solution so found is exact up to the motion, which [`Self::remove_free`] takes out.
     pub fn pin_free(&self, body: &Body, constraints: &mut Constraints) {
-        for piece in &self.unheld {
+        for piece in &self.movable {
             let motions = self.free[piece.free.clone()].iter();
             let mut fields: Vec<Vec<f64>> = motions.map(|m| self.field(m, body)).collect();
             fields.iter_mut().for_each(|f| constraints.bases.displacement_to_local(f));
@@ -58,7 +58,7 @@ impl RigidMotions {
         }
     }
 
-    /// `load` (nodal forces) less the body force that does the same work on free motions. That
+    /// `load` (nodal forces, N) less the body force that does the same work on free motions. That
     /// work is rounding where [`Self::check`] accepts the load, and no pin then carries it.
     pub fn balanced(&self, body: &Body, mut load: Vec<f64>) -> Vec<f64> {
         if self.free.is_empty() {
@@ -73,21 +73,15 @@ impl RigidMotions {
         load
     }
 
-    /// Part by part the combination m of free motions with ∫m·v = f·v for all free motions v, from the
-    /// resultants of f: they are orthogonal, so each has its own share.
+    /// Part by part the combination m of free motions with ∫m·v = f·v for all free motions v, from
+    /// the resultants of f: they are orthogonal, so m = Σ (f·v/∫v·v) v.
     fn projection(&self, sums: &[Resultant]) -> Vec<PartMotion> {
-        let zero = |(part, Part { centre, radius, .. }): (usize, &Part)| PartMotion {
-            part,
-            translation: [0.0; 2],
-            rotation: 0.0,
-            centre: *centre,
-            radius: *radius,
-        };
-        let mut parts: Vec<_> = self.parts.iter().enumerate().map(zero).collect();
+        let still = self.parts.iter().enumerate().map(|(i, part)| part.motion(i, [0.0; 2], 0.0));
+        let mut parts: Vec<_> = still.collect();
         for motion in &self.free {
             let square = |part: &PartMotion| self.parts[part.part].area * part.mean_square();
-            let share = motion.work(sums) / motion.parts.iter().map(square).sum::<f64>();
-            motion.parts.iter().for_each(|part| parts[part.part].add(share, part));
+            let amplitude = motion.work(sums) / motion.parts.iter().map(square).sum::<f64>();
+            motion.parts.iter().for_each(|part| parts[part.part].add(amplitude, part));
         }
         parts
     }

@@ -1,7 +1,7 @@
-//! Whether a load drives the motions that prescribed displacements do not hold.
+//! Whether a load drives the motions that prescribed displacements leave.
 
-use super::{DrivenMotion, Mover, PartMotion, RigidMotion, RigidMotions, Unheld};
-use crate::{contact::nonnegative::nonnegative, fem::Body};
+use super::{Extent, MovablePiece, RigidMotion, RigidMotions, nonnegative::nonnegative};
+use crate::fem::Body;
 use nalgebra::DVector;
 
 /// Of nodal forces on a part: f_x, f_y, the moment about the part's centre, Σ|f|.
@@ -16,37 +16,68 @@ const UNLOADED: f64 = 1e-14;
 /// A component of the resultant below this, relative to Σ|f|, is not told.
 const ROUNDING: f64 = 1e-12;
 
+/// The load does work on a rigid motion that nothing prevents.
+#[derive(Debug, Clone, thiserror::Error)]
+#[error(
+    "{}nothing holds {} against {}, and the load drives it (resultant ({:.4e}, {:.4e}) N/m, \
+     moment about its centre {moment:.4e} N): hold it by a `displacement`, a `symmetry` axis or a `gap`, \
+     or balance the load",
+    disjoint(*pieces, motion.extent), motion.what_moves(), motion.how_it_moves(), force[0], force[1]
+)]
+pub struct DrivenMotion {
+    /// The motion.
+    pub motion: RigidMotion,
+    /// The load's resultant on what moves and hangs on it, N per metre of thickness.
+    pub force: [f64; 2],
+    /// The load's moment about the centre of what moves, N m per metre of thickness.
+    pub moment: f64,
+    /// Number of pieces of the mesh.
+    pub pieces: usize,
+}
+
+fn disjoint(pieces: usize, extent: Extent) -> String {
+    match (pieces, extent) {
+        (_, Extent::Parts) => "parts of the mesh meet in single nodes only; ".to_owned(),
+        (1, _) => String::new(),
+        _ => format!("the mesh has {pieces} pieces (gmsh: Coherence joins those that touch); "),
+    }
+}
+
 impl RigidMotions {
-    /// Checks that `load` (nodal forces) does no work on free motions and can be balanced by
-    /// contact forces p ≥ 0 on the resisted ones: the nearest such forces leave no remainder
-    /// (Farkas; the remainder itself is the motion that the load drives).
+    /// Checks that `load` (nodal forces, N) does no work on free motions and can be balanced by
+    /// contact forces on the resisted ones: with N the u·ν of these and w the work on them, that
+    /// min ‖Nᵀp − w‖ over p ≥ 0 is 0 (Farkas; the remainder itself is a motion that the load
+    /// drives and contact allows).
+    ///
+    /// # Errors
+    /// The load drives a motion, which the error names.
     pub fn check(&self, body: &Body, load: &[f64]) -> Result<(), DrivenMotion> {
-        if self.held() {
+        if self.all_prevented() {
             return Ok(());
         }
         let sums = self.resultants(body, |i| [load[2 * i], load[2 * i + 1]]);
-        let all: f64 = sums.iter().map(|sum| sum[3]).sum();
-        for piece in &self.unheld {
-            let size: f64 = piece.parts.iter().map(|&part| sums[part][3]).sum();
-            if size <= UNLOADED * all {
+        let total: f64 = sums.iter().map(|sum| sum[3]).sum();
+        for piece in &self.movable {
+            let sum: f64 = piece.parts.iter().map(|&part| sums[part][3]).sum();
+            if sum <= UNLOADED * total {
                 continue;
             }
             let mut free = self.free[piece.free.clone()].iter();
-            if let Some(motion) = free.find(|m| m.work(&sums).abs() > BALANCED * size) {
+            if let Some(motion) = free.find(|m| m.work(&sums).abs() > BALANCED * sum) {
                 return Err(self.driven(piece, motion.clone(), &sums));
             }
             let resisted = &self.resisted[piece.resisted.clone()];
             let work = DVector::from_fn(resisted.len(), |i, _| resisted[i].work(&sums));
             let remainder = &work - piece.normal.transpose() * nonnegative(&piece.normal, &work);
-            if remainder.norm() > REMAINDER * size {
-                let motion = sum(resisted, remainder.normalize().as_slice());
+            if remainder.norm() > REMAINDER * sum {
+                let motion = RigidMotion::combination(resisted, remainder.normalize().as_slice());
                 return Err(self.driven(piece, motion, &sums));
             }
         }
         Ok(())
     }
 
-    /// The work of `load` (nodal forces) on the motions that only contact holds.
+    /// The work of `load` (nodal forces, N) on the motions that contact alone constrains.
     pub fn work(&self, body: &Body, load: &[f64]) -> DVector<f64> {
         if self.resisted.is_empty() {
             return DVector::zeros(0);
@@ -55,7 +86,7 @@ impl RigidMotions {
         DVector::from_fn(self.resisted.len(), |i, _| self.resisted[i].work(&sums))
     }
 
-    /// The resultants of nodal forces on all parts.
+    /// The resultants of nodal forces on all parts. Collective.
     pub(super) fn resultants(
         &self,
         body: &Body,
@@ -73,52 +104,43 @@ impl RigidMotions {
         sums
     }
 
-    fn driven(&self, piece: &Unheld, motion: RigidMotion, sums: &[Resultant]) -> DrivenMotion {
+    fn driven(
+        &self,
+        piece: &MovablePiece,
+        motion: RigidMotion,
+        sums: &[Resultant],
+    ) -> DrivenMotion {
         let [x, y] = motion.largest().map_or([0.0; 2], |largest| largest.centre);
-        let [mut fx, mut fy, mut moment, mut size] = [0.0; 4];
+        let [mut fx, mut fy, mut moment, mut total] = [0.0; 4];
         for &part in &piece.parts {
             let ([cx, cy], [px, py, turn, all]) = (self.parts[part].centre, sums[part]);
-            (fx, fy, size) = (fx + px, fy + py, size + all);
+            (fx, fy, total) = (fx + px, fy + py, total + all);
             moment += turn + (cx - x) * py - (cy - y) * px;
         }
-        let force = [fx, fy].map(|f| if f.abs() > ROUNDING * size { f } else { 0.0 });
+        let force = [fx, fy].map(|f| if f.abs() > ROUNDING * total { f } else { 0.0 });
         DrivenMotion { motion, force, moment, pieces: self.pieces }
     }
 
-    /// The motion with these shares (a unit vector) of those that only contact holds. Where it
-    /// moves several pieces, what it does to the one that moves most, which is as little held.
-    pub fn combined(&self, shares: &DVector<f64>) -> RigidMotion {
-        let subdomain = |piece: &Unheld| &shares.as_slice()[piece.resisted.clone()];
-        let square = |piece: &Unheld| subdomain(piece).iter().map(|c| c * c).sum::<f64>();
-        match self.unheld.iter().max_by(|a, b| square(a).total_cmp(&square(b))) {
-            Some(piece) => sum(&self.resisted[piece.resisted.clone()], subdomain(piece)),
-            None => RigidMotion { parts: Vec::new(), mover: Mover::Body },
-        }
+    /// The motion with these amplitudes (a unit vector) of those that contact alone constrains.
+    /// Where it moves several pieces, what it does to the one that moves most.
+    pub fn combined(&self, amplitudes: &DVector<f64>) -> RigidMotion {
+        let own = |piece: &MovablePiece| &amplitudes.as_slice()[piece.resisted.clone()];
+        let square = |piece: &MovablePiece| own(piece).iter().map(|c| c * c).sum::<f64>();
+        let most = self.movable.iter().max_by(|a, b| square(a).total_cmp(&square(b)));
+        most.map_or_else(RigidMotion::default, |piece| {
+            RigidMotion::combination(&self.resisted[piece.resisted.clone()], own(piece))
+        })
     }
 }
 
 impl RigidMotion {
-    /// The work of forces with these resultants on all parts.
+    /// The work of forces with these resultants on all parts, a·F + θM.
     pub(super) fn work(&self, sums: &[Resultant]) -> f64 {
-        let part = |motion: &PartMotion| {
+        let part = |motion: &super::PartMotion| {
             let [fx, fy, moment, _] = sums[motion.part];
             let [ax, ay] = motion.translation;
             ax * fx + ay * fy + motion.rotation * moment
         };
         self.parts.iter().map(part).sum()
     }
-}
-
-/// Σ share·motion of motions of one piece.
-fn sum(motions: &[RigidMotion], shares: &[f64]) -> RigidMotion {
-    let mut pairs = motions.iter().zip(shares);
-    let Some((first, subdomain)) = pairs.next() else {
-        return RigidMotion { parts: Vec::new(), mover: Mover::Body };
-    };
-    let mut sum = first.clone();
-    sum.parts.iter_mut().for_each(|part| part.scale(*subdomain));
-    for (motion, subdomain) in pairs {
-        sum.parts.iter_mut().zip(&motion.parts).for_each(|(part, more)| part.add(*subdomain, more));
-    }
-    sum
 }

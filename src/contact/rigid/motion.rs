@@ -32,11 +32,6 @@ impl PartMotion {
         ax * ax + ay * ay + (self.radius * self.rotation).powi(2)
     }
 
-    pub(super) fn scale(&mut self, factor: f64) {
-        let [ax, ay] = self.translation;
-        (self.translation, self.rotation) = ([factor * ax, factor * ay], factor * self.rotation);
-    }
-
     /// Adds `factor` times another motion of the same part.
     pub(super) fn add(&mut self, factor: f64, other: &Self) {
         let ([ax, ay], [bx, by]) = (self.translation, other.translation);
@@ -45,49 +40,60 @@ impl PartMotion {
     }
 }
 
-/// A rotation that moves the part less than this, relative to its translation, is not told.
-const TRANSLATION: f64 = 1e-6;
+/// A component of a motion that moves the part less than this, relative, is not told.
+const NEGLIGIBLE: f64 = 1e-6;
 
 impl fmt::Display for PartMotion {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let [ax, ay] = self.translation;
-        let size = ax.hypot(ay);
-        if self.rotation.abs() * self.radius <= TRANSLATION * size {
-            match (ax.abs() > 1e-6 * size, ay.abs() > 1e-6 * size) {
-                (true, false) => write!(f, "the horizontal translation"),
-                (false, _) => write!(f, "the vertical translation"),
-                _ => write!(f, "the translation along ({:.3}, {:.3})", ax / size, ay / size),
-            }
-        } else {
+        let length = ax.hypot(ay);
+        if self.rotation.abs() * self.radius > NEGLIGIBLE * length {
             // Where the motion is at rest: a + θ e_z × (x − centre) = 0.
-            let (dx, dy) = (-ay / self.rotation, ax / self.rotation);
-            write!(f, "the rotation about {}", place([self.centre[0] + dx, self.centre[1] + dy]))
+            let [x, y] = self.centre;
+            let at_rest = [x - ay / self.rotation, y + ax / self.rotation];
+            return write!(f, "the rotation about {}", place(at_rest));
+        }
+        match [ax, ay].map(|a| a.abs() > NEGLIGIBLE * length) {
+            [true, false] => write!(f, "the horizontal translation"),
+            [false, _] => write!(f, "the vertical translation"),
+            _ => write!(f, "the translation along ({:.3}, {:.3})", ax / length, ay / length),
         }
     }
 }
 
-/// What a motion moves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mover {
+/// How much of the mesh a motion moves.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Extent {
     /// The whole mesh, in one part.
+    #[default]
     Body,
     /// One of several pieces of the mesh.
     Piece,
     /// Parts of a piece, which turn about the nodes where they meet.
-    Part,
+    Parts,
 }
 
 /// A motion without strain: rigid on each of some parts of the mesh, continuous where parts meet,
 /// 0 elsewhere.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct RigidMotion {
     /// The parts that move.
     pub parts: Vec<PartMotion>,
     /// What it moves.
-    pub mover: Mover,
+    pub extent: Extent,
 }
 
 impl RigidMotion {
+    /// Σ factor·motion of motions of the same parts.
+    pub(super) fn combination(motions: &[Self], factors: &[f64]) -> Self {
+        let mut sum = motions.first().cloned().unwrap_or_default();
+        sum.parts.iter_mut().for_each(|part| (part.translation, part.rotation) = ([0.0; 2], 0.0));
+        for (motion, factor) in motions.iter().zip(factors) {
+            sum.parts.iter_mut().zip(&motion.parts).for_each(|(s, part)| s.add(*factor, part));
+        }
+        sum
+    }
+
     /// The displacement at a point of the part `part`.
     pub fn at(&self, part: usize, x: [f64; 2]) -> [f64; 2] {
         self.parts.iter().find(|motion| motion.part == part).map_or([0.0; 2], |m| m.at(x))
@@ -101,10 +107,10 @@ impl RigidMotion {
     /// What moves, in words.
     pub fn what_moves(&self) -> String {
         let centre = place(self.largest().map_or([0.0; 2], |motion| motion.centre));
-        match self.mover {
-            Mover::Body => "the body".to_owned(),
-            Mover::Piece => format!("the piece around {centre}"),
-            Mover::Part => format!("the part around {centre}"),
+        match self.extent {
+            Extent::Body => "the body".to_owned(),
+            Extent::Piece => format!("the piece around {centre}"),
+            Extent::Parts => format!("the part around {centre}"),
         }
     }
 
@@ -116,8 +122,8 @@ impl RigidMotion {
 
 impl fmt::Display for RigidMotion {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        match self.mover {
-            Mover::Body => f.write_str(&self.how_it_moves()),
+        match self.extent {
+            Extent::Body => f.write_str(&self.how_it_moves()),
             _ => write!(f, "{} of {}", self.how_it_moves(), self.what_moves()),
         }
     }
@@ -127,31 +133,4 @@ impl fmt::Display for RigidMotion {
 fn place(x: [f64; 2]) -> String {
     let [x, y] = x.map(|v| (1e4 * v).round() / 1e4 + 0.0);
     format!("({x:.4}, {y:.4})")
-}
-
-/// The load does work on a rigid motion that nothing holds.
-#[derive(Debug, Clone, thiserror::Error)]
-#[error(
-    "{}nothing holds {} against {}, and the load drives it (resultant ({:.4e}, {:.4e}) N/m, \
-     moment about its centre {moment:.4e} N): hold it by a `displacement`, a `symmetry` axis or a `gap`, \
-     or balance the load",
-    disjoint(*pieces, motion.mover), motion.what_moves(), motion.how_it_moves(), force[0], force[1]
-)]
-pub struct DrivenMotion {
-    /// The motion.
-    pub motion: RigidMotion,
-    /// The load's resultant on what moves and hangs on it, N per metre of thickness.
-    pub force: [f64; 2],
-    /// The load's moment about the centre of what moves, N m per metre of thickness.
-    pub moment: f64,
-    /// Number of pieces of the mesh.
-    pub pieces: usize,
-}
-
-fn disjoint(pieces: usize, mover: Mover) -> String {
-    match (pieces, mover) {
-        (_, Mover::Part) => "parts of the mesh meet in single nodes only; ".to_owned(),
-        (1, _) => String::new(),
-        _ => format!("the mesh has {pieces} pieces (gmsh: Coherence joins those that touch); "),
-    }
 }

@@ -129,7 +129,7 @@ impl ContactStep<'_> {
         let partition = &self.problem.body.partition;
         let nodes = partition.total() as f64;
         let active = self.active_bounds(contact, nodes * self.problem.tolerance * force);
-        let motions = contact::unheld(partition.comm(), &self.rigid, &active);
+        let motions = contact::unconstrained_motions(partition.comm(), &self.rigid, &active);
         let first = motions.first().filter(|_| force > 0.0)?;
         Some(self.problem.motions.combined(first))
     }

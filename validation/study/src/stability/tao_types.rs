@@ -95,13 +95,11 @@ fn refused(row: Row, failure: &RunError) -> Row {
     let row = row.with("message", failure.to_string());
     let RunError::Contact { source, .. } = failure else { return row.with("claimed", 0) };
     match &**source {
-        ContactError::TaoStopped {
-            iterations, linear_iterations, false_claims, residuals, ..
-        } => row
-            .with("outcome", if *false_claims > 0 { "claimed" } else { "stalled" })
-            .with("claimed", false_claims)
-            .with("iterations", iterations)
-            .with("linear_iterations", linear_iterations)
+        ContactError::NotConverged { report, residuals, .. } => row
+            .with("outcome", if report.false_claims > 0 { "claimed" } else { "stalled" })
+            .with("claimed", report.false_claims)
+            .with("iterations", report.iterations)
+            .with("linear_iterations", report.linear_iterations)
             .with("kkt", residuals.worst()),
         ContactError::NotCertified { residuals, .. } => {
             row.with("outcome", "uncertified").with("claimed", 0).with("kkt", residuals.worst())

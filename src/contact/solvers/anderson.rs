@@ -6,11 +6,11 @@ use nalgebra::{DMatrix, DVector};
 /// Anderson's mixing of the last few iterates (J. ACM 12, 1965; Walker and Ni, SIAM J. Numer.
 /// Anal. 49, 2011, type II), in a weighted norm.
 ///
-/// The map of a contact law is only piecewise affine, so mixing can overshoot when the set of
-/// pressing nodes changes: when the residual exceeds ten times the best one seen, the history
+/// The map of a contact law is only piecewise affine, so mixing can overshoot when the active set
+/// changes: when the residual exceeds ten times the best one seen, the history
 /// is dropped and the iteration goes on from the mean of q and T(q), which cannot move away
 /// from a fixed point of a nonexpansive map.
-pub(super) struct Anderson {
+pub struct Anderson {
     /// Square roots of the norm's weights.
     weights: Vec<f64>,
     /// (T(q), T(q) − q) of the last iterates, oldest first.
@@ -30,21 +30,22 @@ const RANK: f64 = 1e-10;
 const FARTHEST: f64 = 1e6;
 
 impl Anderson {
-    pub(super) fn new(comm: Communicator, weights: impl Iterator<Item = f64>) -> Self {
+    /// The norm is (Σ w_i q_i²)^½ over all ranks.
+    pub fn new(comm: Communicator, weights: impl Iterator<Item = f64>) -> Self {
         let weights = weights.map(f64::sqrt).collect();
         Self { weights, history: Vec::new(), best: f64::INFINITY, comm }
     }
 
     /// The next iterate from `q` and its image T(q).
-    pub(super) fn next(&mut self, q: &[f64], image: Vec<f64>) -> Vec<f64> {
+    pub fn next(&mut self, q: &[f64], image: Vec<f64>) -> Vec<f64> {
         let residual: Vec<f64> = image.iter().zip(q).map(|(t, q)| t - q).collect();
-        let size = self.norm(&residual);
-        if size.is_nan() || size > OVERSHOOT * self.best {
+        let norm = self.norm(&residual);
+        if norm.is_nan() || norm > OVERSHOOT * self.best {
             self.history.clear();
-            self.best = size;
+            self.best = norm;
             return image.iter().zip(q).map(|(t, q)| 0.5 * (t + q)).collect();
         }
-        self.best = self.best.min(size);
+        self.best = self.best.min(norm);
         self.history.push((image, residual));
         if self.history.len() > DEPTH + 1 {
             self.history.remove(0);
@@ -69,13 +70,13 @@ impl Anderson {
         let (differences, target) = self.condensed(differences, target);
         let svd = differences.svd(true, true);
         let cut = RANK * svd.singular_values.max();
-        let Ok(share) = svd.solve(&target, cut) else { return next };
-        if share.amax() > FARTHEST {
+        let Ok(coefficients) = svd.solve(&target, cut) else { return next };
+        if coefficients.amax() > FARTHEST {
             return next;
         }
-        for (j, share) in share.iter().enumerate() {
+        for (j, factor) in coefficients.iter().enumerate() {
             let (new, old) = (&self.history[j + 1].0, &self.history[j].0);
-            next.iter_mut().zip(new.iter().zip(old)).for_each(|(v, (n, o))| *v -= share * (n - o));
+            next.iter_mut().zip(new.iter().zip(old)).for_each(|(v, (n, o))| *v -= factor * (n - o));
         }
         next
     }
@@ -105,33 +106,5 @@ impl Anderson {
     fn norm(&self, v: &[f64]) -> f64 {
         let squares = v.iter().zip(&self.weights).map(|(v, w)| (v * w).powi(2)).sum::<f64>();
         self.comm.total(squares).sqrt()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn solves_an_affine_map_in_as_many_steps_as_unknowns() {
-        // T(q) = Mq + b with a spectral radius of 0.99: plain iteration needs over 2000 steps.
-        let m = DMatrix::from_row_slice(3, 3, &[0.9, 0.3, 0.0, -0.3, 0.9, 0.1, 0.0, 0.1, -0.8]);
-        let b = DVector::from_row_slice(&[1.0, 2.0, 3.0]);
-        let mut anderson = Anderson::new(Communicator::serial(), [1.0, 2.0, 0.5].into_iter());
-        let mut q = vec![0.0; 3];
-        for _ in 0..5 {
-            let image = &m * DVector::from_row_slice(&q) + &b;
-            q = anderson.next(&q, image.as_slice().to_vec());
-        }
-        let image = &m * DVector::from_row_slice(&q) + &b;
-        let error = (image - DVector::from_row_slice(&q)).norm();
-        assert!(error < 1e-12, "residual {error}");
-    }
-
-    #[test]
-    fn an_overshoot_restarts_from_the_mean() {
-        let mut anderson = Anderson::new(Communicator::serial(), [1.0].into_iter());
-        assert_eq!(anderson.next(&[0.0], vec![1e-3]), vec![1e-3]);
-        assert_eq!(anderson.next(&[1.0], vec![3.0]), vec![2.0]);
     }
 }

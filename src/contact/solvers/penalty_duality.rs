@@ -1,23 +1,39 @@
 //! The penalty-duality algorithm of Bermúdez and Moreno (Comput. Math. Appl. 7, 1981),
 //! the paper's reference [4].
 
-use super::{
-    Bound, ContactError, ContactProblem, ContactReport, ContactSolver, Kkt, anderson::Anderson,
-    elastic::ElasticSolver,
+use super::{Anderson, ContactReport, ContactSolver, ProblemClass, SolverEntry, between_0_and_1};
+use crate::{
+    cholesky::LinearSystem,
+    contact::{Bound, ContactError, ContactProblem, Kkt, elastic::ElasticSolver},
+    petsc::{PetscError, Session, Vector},
 };
-use crate::cholesky::LinearSystem;
-use crate::petsc::{PetscError, Session, Vector};
 use nalgebra::DMatrix;
+use serde::{
+    Deserialize, Deserializer,
+    de::{Error, Unexpected},
+};
 
-/// With G = ∂I₍ₗ,ᵤ₎ of the bounds l ≤ Bu ≤ u (mostly l = −∞, u = g) and its Yosida approximation the contact law becomes a fixed point in q:
+pub(super) const ENTRY: SolverEntry = SolverEntry {
+    name: "penalty-duality",
+    summary: "fixed-point iteration of Bermúdez and Moreno on the contact pressure, accelerated",
+    variants: &[],
+    solves: ProblemClass::Semidefinite,
+    rescuer: Some("active-set"),
+    construct: |session, _, options| {
+        Box::new(PenaltyDuality::new(session, options.penalty_duality))
+    },
+};
+
+/// With G = ∂I₍ₗ,ᵤ₎ of the bounds l ≤ Bu ≤ u (mostly l = −∞, u = g) and its Yosida approximation
+/// the contact law becomes a fixed point in q:
 ///
 /// 1. solve (K + ω BᵀWB) u = f − BᵀW q,
 /// 2. r = Bu + λq,  y = r/(1 − λω) or the bound nearest to it,  q ← (r − y)/λ.
 ///
-/// B picks the bounded unknowns, W their shares of Γ_C; p = q + ω Bu is the contact pressure
-/// at the fixed point, which gives the first q from the start u. The iteration is mixed by Anderson: measured on this project's
-/// scenes, 11 to 30 iterations instead of 200 to 600.
-pub(super) struct PenaltyDuality<'s> {
+/// B picks the bounded unknowns, W their tributary lengths; p = q + ω Bu is the contact pressure
+/// at the fixed point, which gives the first q from the start u. [`Anderson`] mixes the iterates:
+/// measured on this project's scenes, 11 to 30 iterations instead of 200 to 600.
+struct PenaltyDuality<'s> {
     session: &'s Session,
     options: PenaltyOptions,
     /// ω, Pa/m, once estimated.
@@ -34,13 +50,16 @@ const DIVERGED: f64 = 1e12;
 const LANCZOS: usize = 25;
 
 /// The method's parameters, `[contact.penalty_duality]` of a scene.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields, expecting = "a table")]
 pub struct PenaltyOptions {
     /// ω > 0, Pa/m; estimated from the boundary compliance when absent.
+    #[serde(deserialize_with = "positive")]
     pub omega: Option<f64>,
     /// λω in (0, 1). On a compliance eigenvalue s the error of q is multiplied by
-    /// 1 − s/(λ(1 + ωs)) where all nodes press and by −λω/(1 − λω) · (1 − s/(λ(1 + ωs))) where
-    /// none do: at most 1 in size for every s only if λω is ½, the default.
+    /// 1 − s/(λ(1 + ωs)) where all nodes are active and by −λω/(1 − λω) · (1 − s/(λ(1 + ωs)))
+    /// where none are: at most 1 in size for every s only if λω is ½, the default.
+    #[serde(deserialize_with = "between_0_and_1")]
     pub lambda_omega: f64,
     /// Whether Anderson mixes the iterates.
     pub accelerate: bool,
@@ -54,8 +73,14 @@ impl Default for PenaltyOptions {
     }
 }
 
+fn positive<'de, D: Deserializer<'de>>(value: D) -> Result<Option<f64>, D::Error> {
+    let value = f64::deserialize(value)?;
+    let wrong = || D::Error::invalid_value(Unexpected::Float(value), &"positive (Pa/m)");
+    (value > 0.0 && value.is_finite()).then_some(Some(value)).ok_or_else(wrong)
+}
+
 impl<'s> PenaltyDuality<'s> {
-    pub(super) fn new(session: &'s Session, options: PenaltyOptions) -> Self {
+    fn new(session: &'s Session, options: PenaltyOptions) -> Self {
         Self { session, options, omega: options.omega, elastic: ElasticSolver::new(session) }
     }
 
@@ -86,8 +111,9 @@ impl<'s> PenaltyDuality<'s> {
         match self.elastic.solve(system, &rhs, u, limit, report)? {
             true => Ok(()),
             false => Err(ContactError::NotConverged {
-                method: "penalty-duality",
-                iterations: report.iterations,
+                method: ENTRY.name.to_owned(),
+                report: Box::new(*report),
+                residuals: Kkt::UNKNOWN,
                 detail: "the penalised stiffness is not positive definite".into(),
             }),
         }
@@ -108,70 +134,86 @@ impl<'s> PenaltyDuality<'s> {
         u.read(|u| residual.read(|r| q(u, r)))?
     }
 
-    /// ω from the extreme eigenvalues of the compliance S = B K⁻¹BᵀW (normal displacement per
-    /// pressure). K may be singular, so the Lanczos process runs on
-    /// S_ω = B (K + ω BᵀWB)⁻¹ BᵀW = S (1 + ωS)⁻¹ with a trial ω, self-adjoint in W.
+    /// ω = 3/√(s_min s_max) from the extreme eigenvalues of the compliance S = B K⁻¹BᵀW (normal
+    /// displacement per pressure), by the eigenvalues θ = s/(1 + ωs) of [`Self::lanczos`].
     fn estimate_omega(
         &mut self,
         problem: &ContactProblem,
         report: &mut ContactReport,
     ) -> Result<f64, ContactError> {
+        let trial = problem.stiffness_scale / contact_length(problem);
+        let eigenvalues = self.lanczos(problem, trial, report)?.symmetric_eigenvalues();
+        let compliance = |theta: f64| theta / (1.0 - trial * theta);
+        // Rigid motions that contact alone constrains have s = ∞ and do not count.
+        let finite = || eigenvalues.iter().filter(|theta| 1.0 - trial * **theta > 1e-6);
+        let least = compliance(finite().copied().fold(f64::INFINITY, f64::min));
+        let most = compliance(finite().copied().fold(0.0, f64::max));
+        let omega = OMEGA_COMPLIANCE / (least * most).sqrt();
+        Ok(if omega.is_finite() && omega > 0.0 { omega } else { trial })
+    }
+
+    /// The tridiagonal matrix of the Lanczos process, reorthogonalised twice (Golub and Van Loan,
+    /// Matrix Computations, ch. 10), on S_ω = B (K + ω BᵀWB)⁻¹ BᵀW = S (1 + ωS)⁻¹, self-adjoint
+    /// in W: K itself may be singular.
+    fn lanczos(
+        &mut self,
+        problem: &ContactProblem,
+        omega: f64,
+        report: &mut ContactReport,
+    ) -> Result<DMatrix<f64>, ContactError> {
         let bounds = problem.bounds;
-        let length = contact_length(problem);
-        let trial = problem.stiffness_scale / length;
         let dot = |a: &[f64], b: &[f64]| -> f64 {
             let products =
                 bounds.iter().enumerate().map(|(i, bound)| bound.tributary_length * a[i] * b[i]);
             problem.comm.total(products.sum())
         };
         let mut u = Vector::zeros(self.session, problem.load.owned())?;
-
         // A start with all frequencies in it: smooth plus alternating.
         let mut v: Vec<f64> = (0..bounds.len())
             .map(|i| 1.0 + 0.3 * (i as f64).sin() + if i % 2 == 0 { 1.0 } else { -1.0 })
             .collect();
         let mut basis: Vec<Vec<f64>> = Vec::new();
         let (mut alpha, mut beta) = (Vec::new(), Vec::<f64>::new());
-        for _ in 0..LANCZOS.min(problem.all_bounds()) {
+        for _ in 0..LANCZOS.min(problem.bound_count()) {
             let norm = dot(&v, &v).sqrt();
-            if basis.len() == beta.len() + 1 {
-                beta.push(norm);
-            }
             if norm <= 1e-10 * alpha.iter().fold(0.0, |m: f64, a: &f64| m.max(a.abs())) {
-                beta.pop();
                 break;
             }
+            beta.push(norm);
             v.iter_mut().for_each(|v| *v /= norm);
             basis.push(v.clone());
-            self.response(problem, trial, None, &v, &mut u, report)?;
+            self.response(problem, omega, None, &v, &mut u, report)?;
             let mut w: Vec<f64> = u.read(|u| bounds.iter().map(|b| -u[b.dof]).collect())?;
             alpha.push(dot(&w, &v));
             for earlier in basis.iter().rev().chain(basis.iter().rev()) {
-                let share = dot(&w, earlier);
-                w.iter_mut().zip(earlier).for_each(|(w, e)| *w -= share * e);
+                let component = dot(&w, earlier);
+                w.iter_mut().zip(earlier).for_each(|(w, e)| *w -= component * e);
             }
             v = w;
         }
-        let steps = alpha.len();
-        let tridiagonal = DMatrix::from_fn(steps, steps, |i, j| match i.abs_diff(j) {
+        // β_i couples vector i to the one before; β_0 is the norm of the start.
+        Ok(DMatrix::from_fn(alpha.len(), alpha.len(), |i, j| match i.abs_diff(j) {
             0 => alpha[i],
-            1 => beta[i.min(j)],
+            1 => beta[i.max(j)],
             _ => 0.0,
-        });
-        // θ = s/(1 + ωs); rigid motions that only contact holds have s = ∞ and do not count.
-        let compliance = |theta: f64| theta / (1.0 - trial * theta);
-        let eigenvalues = tridiagonal.symmetric_eigenvalues();
-        let finite = || eigenvalues.iter().filter(|theta| 1.0 - trial * **theta > 1e-6);
-        let least = compliance(finite().copied().fold(f64::INFINITY, f64::min));
-        let largest = compliance(finite().copied().fold(0.0, f64::max));
-        let omega = OMEGA_COMPLIANCE / (least * largest).sqrt();
-        Ok(if omega.is_finite() && omega > 0.0 { omega } else { trial })
+        }))
+    }
+
+    /// The images (r − y)/λ of q, where Bu is `normal`.
+    fn image(&self, problem: &ContactProblem, omega: f64, q: &[f64], normal: &[f64]) -> Vec<f64> {
+        let lambda = self.options.lambda_omega / omega;
+        let image = |((q, u), bound): ((&f64, &f64), &Bound)| {
+            let r = u + lambda * q;
+            let y = bound.nearest(r / (1.0 - self.options.lambda_omega));
+            (r - y) / lambda
+        };
+        q.iter().zip(normal).zip(problem.bounds).map(image).collect()
     }
 }
 
 impl ContactSolver for PenaltyDuality<'_> {
     fn name(&self) -> &'static str {
-        "penalty-duality"
+        ENTRY.name
     }
 
     fn solve(
@@ -186,7 +228,6 @@ impl ContactSolver for PenaltyDuality<'_> {
         };
         self.omega = Some(omega);
         report.omega = Some(omega);
-        let lambda = self.options.lambda_omega / omega;
         let mut q = self.first(problem, omega, c)?;
 
         let (mut residuals, mut first_change) = (Kkt::default(), 0.0_f64);
@@ -199,41 +240,34 @@ impl ContactSolver for PenaltyDuality<'_> {
             let normal: Vec<f64> = c.read(|c| problem.bounds.iter().map(|b| c[b.dof]).collect())?;
             // The equation is solved: only the contact conditions are left to judge, with the
             // contact forces W (q + ω Bu).
-            let at = |((q, u), bound): ((&f64, &f64), &Bound)| {
+            let at_bound = |((q, u), bound): ((&f64, &f64), &Bound)| {
                 (bound.tributary_length * (q + omega * u), *u)
             };
-            let bounded = q.iter().zip(&normal).zip(problem.bounds).map(at);
-            residuals = problem.kkt(0.0, bounded, problem.scales(c)?);
+            let bounded = q.iter().zip(&normal).zip(problem.bounds).map(at_bound);
+            residuals = problem.kkt(0.0, bounded, problem.scales_at(c)?);
             if residuals.within(0.1 * problem.tolerance) {
                 return Ok(report);
             }
-            let image = |(q, (u, bound)): (&f64, (&f64, &Bound))| {
-                let r = u + lambda * q;
-                let y = bound.nearest(r / (1.0 - self.options.lambda_omega));
-                (r - y) / lambda
-            };
-            let images = q.iter().zip(normal.iter().zip(problem.bounds)).map(image).collect();
-            let images: Vec<f64> = images;
-            let change = (images.iter().zip(&q)).fold(0.0_f64, |m, (t, q)| m.max((t - q).abs()));
+            let image = self.image(problem, omega, &q, &normal);
+            let change = image.iter().zip(&q).fold(0.0_f64, |m, (t, q)| m.max((t - q).abs()));
             let change = problem.comm.max(change);
-            if !(change.is_finite() && change <= DIVERGED * first_change.max(pressure))
-                && report.iterations > 1
-            {
+            if report.iterations == 1 {
+                first_change = change;
+            } else if !change.is_finite() || change > DIVERGED * first_change.max(pressure) {
                 break;
-            }
-            first_change = if report.iterations == 1 { change } else { first_change };
-            if report.iterations > 1 && change > 0.0 {
+            } else if change > 0.0 {
                 let steps = (report.iterations - 1) as f64;
                 report.contraction = Some((change / first_change).powf(1.0 / steps));
             }
-            q = if self.options.accelerate { anderson.next(&q, images) } else { images };
+            q = if self.options.accelerate { anderson.next(&q, image) } else { image };
         }
         if residuals.within(problem.tolerance) {
             return Ok(report);
         }
         Err(ContactError::NotConverged {
-            method: self.name(),
-            iterations: report.iterations,
+            method: ENTRY.name.to_owned(),
+            report: Box::new(report),
+            residuals,
             detail: format!("{} (ω = {omega:.3e} Pa/m)", residuals.missed(problem.tolerance)),
         })
     }

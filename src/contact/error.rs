@@ -1,0 +1,169 @@
+//! What can be wrong with contact conditions, with the choice of a solver, and with its answer.
+
+use super::{ContactReport, Kkt, ProblemClass, constraints::DEPENDENT, listing, solvers::alike};
+use crate::petsc::PetscError;
+
+/// Displacement conditions at a node that contradict each other.
+#[derive(Debug, Clone, thiserror::Error)]
+pub enum ConstraintError {
+    /// A prescribed displacement goes through the obstacle.
+    #[error(
+        "the displacement prescribed at node ({}, {}) goes {depth:.3e} m through the obstacle \
+         there: a node that is both prescribed and in contact keeps its prescribed value, which must \
+         respect the gap", at[0], at[1]
+    )]
+    Penetrates {
+        /// Coordinates of the node, m.
+        at: [f64; 2],
+        /// How far beyond the gap, m.
+        depth: f64,
+    },
+    /// Two prescribed values contradict each other.
+    #[error(
+        "two boundaries prescribe different displacements at their common node ({}, {}): \
+         {} and {} m along ({:.3}, {:.3})",
+        at[0], at[1], values[0], values[1], direction[0], direction[1]
+    )]
+    Contradicts {
+        /// Coordinates of the node, m.
+        at: [f64; 2],
+        /// The value that the other conditions imply and the one prescribed, m.
+        values: [f64; 2],
+        /// The common direction.
+        direction: [f64; 2],
+    },
+    /// Two obstacles leave a node no place.
+    #[error(
+        "the obstacles on both sides of node ({}, {}) leave it no room: it would have to be \
+         {depth:.3e} m inside one of them; widen a gap or change the displacement prescribed there",
+        at[0], at[1]
+    )]
+    NoRoom {
+        /// Coordinates of the node, m.
+        at: [f64; 2],
+        /// How much the gaps lack, m.
+        depth: f64,
+    },
+    /// Directions too near to each other to be unknowns of their own, too far apart to be one.
+    #[error(
+        "two conditions at node ({}, {}) (prescribed directions or contact normals) differ from \
+         one line by an angle of only {angle:.1e}: double precision cannot tell their effects apart; \
+         open the wedge there beyond {DEPENDENT:e} rad, or let one boundary end before the node",
+        at[0], at[1]
+    )]
+    Dependent {
+        /// Coordinates of the node, m.
+        at: [f64; 2],
+        /// The angle between the directions' lines, rad.
+        angle: f64,
+    },
+    /// More independent conditions than the two unknowns of a node.
+    #[error(
+        "more than two independent conditions (prescribed directions and contact normals) meet at \
+         node ({}, {}): a node of the plane has two unknowns; free one of them or separate the \
+         boundaries", at[0], at[1]
+    )]
+    TooMany {
+        /// Coordinates of the node, m.
+        at: [f64; 2],
+    },
+}
+
+/// A solver that cannot be had.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum SolverError {
+    /// There is none of that name.
+    #[error("there is no contact solver `{name}`{}; there are {}", alike(name), listing())]
+    Unknown {
+        /// The name.
+        name: String,
+    },
+    /// It is not made for problems like this one.
+    #[error("the contact solver `{name}` cannot solve this: {needed}")]
+    Unable {
+        /// The solver.
+        name: &'static str,
+        /// What the problem is.
+        needed: ProblemClass,
+    },
+}
+
+/// A contact solve that did not end well.
+///
+/// [`RunError`](crate::evolution::RunError) adds what to try, which depends on the scene.
+#[derive(Debug, thiserror::Error)]
+pub enum ContactError {
+    /// The method ended above the tolerance; it has left in c the best that it could do.
+    #[error("{method} stopped after {} iterations: {detail}", report.iterations)]
+    NotConverged {
+        /// The solver's name, with its variant.
+        method: String,
+        /// What it took.
+        report: Box<ContactReport>,
+        /// The residuals where it stood, if it knows them.
+        residuals: Kkt,
+        /// Why it stopped and where it stood.
+        detail: String,
+    },
+    /// PETSc failed inside the method.
+    #[error("{method} cannot solve this: {source}")]
+    Failed {
+        /// The solver's name, with its variant.
+        method: String,
+        /// What PETSc said.
+        source: PetscError,
+    },
+    /// The solver stopped short of the tolerance, and so did the one that was asked in its place.
+    #[error("{first}; in its place {second}")]
+    NotRescued {
+        /// How the solver ended.
+        first: Box<Self>,
+        /// How the other one ended.
+        second: Box<Self>,
+    },
+    /// The answer does not satisfy the KKT conditions.
+    #[error("{method} gave an answer, but {}", residuals.missed(*tolerance))]
+    NotCertified {
+        /// The solver's name.
+        method: String,
+        /// The tolerance missed.
+        tolerance: f64,
+        /// The residuals found.
+        residuals: Kkt,
+    },
+    /// Rounding keeps the answer from the tolerance.
+    #[error(
+        "{source}; double precision reaches only about {attainable:.0e} here (triangles or parts much \
+         longer than wide, nearly incompressible or almost broken material): set contact.tolerance \
+         to that or more, or mend the mesh"
+    )]
+    Limited {
+        /// How the solve ended.
+        source: Box<Self>,
+        /// The tolerance that rounding allows, about.
+        attainable: f64,
+    },
+    /// The answer satisfies the KKT conditions of a stiffness that is not positive definite.
+    #[error(
+        "{method} gave an answer that stores negative energy: the stiffness is not positive definite"
+    )]
+    NotDefinite {
+        /// The solver's name.
+        method: &'static str,
+    },
+    /// PETSc failed.
+    #[error(transparent)]
+    Petsc(#[from] PetscError),
+}
+
+impl ContactError {
+    /// Whether the method stopped short of its tolerance, which all ranks then know.
+    pub fn stopped_short(&self) -> bool {
+        matches!(self, Self::NotConverged { .. } | Self::NotRescued { .. })
+    }
+
+    /// Whether the method has missed a tolerance that may not be out of reach.
+    pub fn is_missed(&self) -> bool {
+        self.stopped_short() || matches!(self, Self::NotCertified { .. })
+    }
+}

@@ -1,0 +1,89 @@
+//! The rigid motion of a body that contact alone constrains, until contact stops it.
+
+use super::null_space;
+use crate::{contact::Bound, petsc::Communicator};
+use nalgebra::{DMatrix, DVector};
+
+/// A rigid motion of a body that contact alone constrains, and the bounds it ends at.
+pub(crate) struct UntilContact {
+    /// How far along each of the motions, m.
+    pub(crate) amplitudes: DVector<f64>,
+    /// The bounds reached on this rank, and whether it is their upper side.
+    pub(crate) reached: Vec<(usize, bool)>,
+    /// Whether the active and the reached bounds constrain all rigid motions.
+    pub(crate) constrained: bool,
+}
+
+/// Work on a motion below this part of the load's work on all is rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// The combinations (orthonormal) of the motions `rigid`, u·ν at the bounds, a column each, that
+/// are left when u·ν is prescribed on the `active` bounds: the null space of the rows of `rigid`
+/// there. Collective.
+pub(crate) fn unconstrained_motions(
+    comm: Communicator,
+    rigid: &DMatrix<f64>,
+    active: &[bool],
+) -> Vec<DVector<f64>> {
+    let motions = rigid.ncols();
+    if motions == 0 {
+        return Vec::new();
+    }
+    let rows = rigid.row_iter().zip(active).filter(|(_, on)| **on);
+    let mut gram =
+        rows.fold(DMatrix::zeros(motions, motions), |sum, (row, _)| sum + row.transpose() * row);
+    comm.sum(gram.as_mut_slice());
+    null_space(gram, 1e-10 * comm.total(rigid.norm_squared()))
+}
+
+/// Lets the body move from c, with u·ν kept at the `active` bounds, as the load drives it until it
+/// reaches a further bound, and again until no rigid motion is left. `rigid` are the u·ν of its
+/// motions at the bounds, a column each, `work` that of the load on them. Collective.
+///
+/// Where the load drives none of the motions left, the body stays, or with `undriven`, any motion
+/// does.
+pub(crate) fn rigid_motion_until_contact(
+    comm: Communicator,
+    (rigid, work): (&DMatrix<f64>, &DVector<f64>),
+    bounds: &[Bound],
+    c: &[f64],
+    mut active: Vec<bool>,
+    undriven: bool,
+) -> UntilContact {
+    let mut amplitudes = DVector::zeros(rigid.ncols());
+    let mut reached = Vec::new();
+    loop {
+        let left = unconstrained_motions(comm, rigid, &active);
+        let Some(any) = left.first() else {
+            return UntilContact { amplitudes, reached, constrained: true };
+        };
+        let driven = left.iter().map(|m| m * m.dot(work)).sum::<DVector<f64>>();
+        let motion = match driven.amax() > ROUNDING * work.amax() {
+            true => driven.normalize(),
+            false if undriven => any.normalize(),
+            false => return UntilContact { amplitudes, reached, constrained: false },
+        };
+        let (speed, gone) = (rigid * &motion, rigid * &amplitudes);
+        let fastest = comm.max(speed.iter().fold(0.0, |m: f64, v| m.max(v.abs())));
+        let distance = |i: usize| {
+            let bound = &bounds[i];
+            let value = if speed[i] > 0.0 { bound.upper } else { bound.lower };
+            (i, (value - c[bound.dof] - gone[i]) / speed[i])
+        };
+        let moving = |i: &usize| !active[*i] && speed[*i].abs() > 1e-6 * fastest;
+        let nearest = (0..bounds.len())
+            .filter(moving)
+            .map(distance)
+            .filter(|(_, distance)| distance.is_finite())
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        let (distance, rank) = comm.min_with_rank(nearest.map_or(f64::INFINITY, |(_, d)| d));
+        if distance == f64::INFINITY {
+            return UntilContact { amplitudes, reached, constrained: false };
+        }
+        amplitudes += distance * motion;
+        if let Some((i, _)) = nearest.filter(|_| rank == comm.rank()) {
+            active[i] = true;
+            reached.push((i, speed[i] > 0.0));
+        }
+    }
+}

@@ -1,0 +1,248 @@
+//! The contact solvers and the one table of them.
+//!
+//! A solver is a file that implements [`ContactSolver`] and defines its [`SolverEntry`] (and the
+//! struct of its own options, if it has any); it becomes one of the program's by its `mod` line,
+//! its place in [`REGISTRY`] and, for options, its field of [`ContactOptions`], all in this file.
+
+mod active_set;
+mod anderson;
+mod penalty_duality;
+mod rescue;
+mod tao;
+
+pub use anderson::Anderson;
+pub use penalty_duality::PenaltyOptions;
+pub use tao::TAO_TYPES;
+
+use super::{ContactError, ContactProblem, SolverError, linear};
+use crate::petsc::{Session, Vector};
+use serde::{
+    Deserialize, Deserializer,
+    de::{Error, Unexpected},
+};
+use std::fmt;
+
+/// A method for the contact problem.
+pub trait ContactSolver {
+    /// The name a scene or `--solver` calls it by.
+    fn name(&self) -> &'static str;
+
+    /// What the method keeps for the next solve besides `c` (a set, a multiplier), as numbers.
+    fn warm_start(&self) -> Vec<f64> {
+        Vec::new()
+    }
+
+    /// Goes back to an earlier [`Self::warm_start`], as if the solves since then had not been;
+    /// with nothing, to that of a new solver.
+    fn set_warm_start(&mut self, _kept: &[f64]) {}
+
+    /// Solves from the start `c` and leaves the solution there.
+    ///
+    /// # Errors
+    /// The method stopped short of the tolerance, or PETSc failed.
+    fn solve(
+        &mut self,
+        problem: &ContactProblem,
+        c: &mut Vector,
+    ) -> Result<ContactReport, ContactError>;
+}
+
+/// What a contact solve took.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct ContactReport {
+    /// Iterations of the method itself.
+    pub iterations: usize,
+    /// Iterations of linear solvers inside, each a pair of triangular solves.
+    pub linear_iterations: usize,
+    /// Factorisations (not those of a preconditioner chosen by PETSc options).
+    pub factorisations: usize,
+    /// Times the method had to leave its fast path for a slower one that always ends, or another
+    /// solver was asked in its place.
+    pub fallbacks: usize,
+    /// The solver that gave the answer in the place of the one that was asked.
+    pub rescued_by: Option<&'static str>,
+    /// Mean factor by which an iteration shrank the change of the multiplier, where the method
+    /// is a fixed-point iteration.
+    pub contraction: Option<f64>,
+    /// ω of penalty-duality, Pa/m.
+    pub omega: Option<f64>,
+    /// Calls of TAO that claimed convergence to an answer which the KKT residuals rejected.
+    pub false_claims: usize,
+}
+
+impl ContactReport {
+    /// Adds what a further solve of the same problem took.
+    pub fn add(&mut self, further: &Self) {
+        self.iterations += further.iterations;
+        self.linear_iterations += further.linear_iterations;
+        self.factorisations += further.factorisations;
+        self.fallbacks += further.fallbacks;
+        self.rescued_by = further.rescued_by.or(self.rescued_by);
+        self.contraction = further.contraction;
+        self.omega = further.omega;
+        self.false_claims += further.false_claims;
+    }
+}
+
+/// The problems that a method can solve; each class contains those before it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ProblemClass {
+    /// No bounds: Kc = f.
+    Linear,
+    /// Bounds, and K positive definite.
+    Definite,
+    /// Bounds, and K only semidefinite: contact alone constrains some rigid motion.
+    Semidefinite,
+}
+
+impl fmt::Display for ProblemClass {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            Self::Linear => "a problem without obstacles",
+            Self::Definite => "a problem with obstacles, which need inequalities",
+            Self::Semidefinite => {
+                "contact alone constrains a rigid motion, so the stiffness is singular"
+            }
+        })
+    }
+}
+
+/// A solver as the program knows it.
+pub struct SolverEntry {
+    /// What a scene or `--solver` calls it.
+    pub name: &'static str,
+    /// What it does, in a line of `--help`.
+    pub summary: &'static str,
+    /// Its variants, reached as `name:VARIANT`.
+    pub variants: &'static [&'static str],
+    /// What it can solve.
+    pub solves: ProblemClass,
+    /// The solver that is asked in its place where it stops short; never of a variant, so that
+    /// one sees what that does by itself.
+    pub rescuer: Option<&'static str>,
+    /// A new one; the text is the variant, or empty.
+    pub construct: for<'s> fn(&'s Session, &str, &ContactOptions) -> Box<dyn ContactSolver + 's>,
+}
+
+/// All solvers of problems with obstacles, the default first.
+pub static REGISTRY: [SolverEntry; 3] = [active_set::ENTRY, penalty_duality::ENTRY, tao::ENTRY];
+
+/// Their names.
+pub const SOLVERS: [&str; REGISTRY.len()] = {
+    let mut names = [""; REGISTRY.len()];
+    let mut i = 0;
+    while i < REGISTRY.len() {
+        names[i] = REGISTRY[i].name;
+        i += 1;
+    }
+    names
+};
+
+/// `[contact]` of a scene: how the contact problem is solved.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields, expecting = "a table")]
+pub struct ContactOptions {
+    /// The solver's name, if the scene asks for one.
+    #[serde(deserialize_with = "known_solver")]
+    pub solver: Option<String>,
+    /// Relative tolerance of the KKT residuals, in (0, 1).
+    #[serde(deserialize_with = "between_0_and_1")]
+    pub tolerance: f64,
+    /// Whether another solver may answer where the one asked for stops short.
+    pub rescue: bool,
+    /// Parameters of the penalty-duality method.
+    pub penalty_duality: PenaltyOptions,
+}
+
+impl Default for ContactOptions {
+    fn default() -> Self {
+        let penalty_duality = PenaltyOptions::default();
+        Self { solver: None, tolerance: 1e-10, rescue: true, penalty_duality }
+    }
+}
+
+fn known_solver<'de, D: Deserializer<'de>>(value: D) -> Result<Option<String>, D::Error> {
+    let name = String::deserialize(value)?;
+    if find(&name).is_err() {
+        let found = format!("\"{name}\"{}; there are {}", alike(&name), listing());
+        return Err(D::Error::invalid_value(Unexpected::Other(&found), &"a contact solver"));
+    }
+    Ok(Some(name))
+}
+
+fn between_0_and_1<'de, D: Deserializer<'de>>(value: D) -> Result<f64, D::Error> {
+    let value = f64::deserialize(value)?;
+    let rule = "between 0 and 1, both excluded";
+    let wrong = || D::Error::invalid_value(Unexpected::Float(value), &rule);
+    (0.0 < value && value < 1.0).then_some(value).ok_or_else(wrong)
+}
+
+/// The solver called `name`, and its variant: empty, or what stands behind a colon.
+///
+/// # Errors
+/// There is none of that name.
+pub fn find(name: &str) -> Result<(&'static SolverEntry, &str), SolverError> {
+    let (solver, variant) = name.split_once(':').unwrap_or((name, ""));
+    let known = |entry: &&SolverEntry| {
+        entry.name == solver && (name == solver || entry.variants.contains(&variant))
+    };
+    let unknown = || SolverError::Unknown { name: name.to_owned() };
+    REGISTRY.iter().find(known).map(|entry| (entry, variant)).ok_or_else(unknown)
+}
+
+/// All solvers and what they do, a line each, for `--help`.
+pub fn summaries() -> String {
+    let line = |entry: &SolverEntry| format!("{:<16} {}", entry.name, entry.summary);
+    REGISTRY.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+/// The names that [`find`] knows, in words.
+pub fn listing() -> String {
+    let variants = REGISTRY.iter().filter(|entry| !entry.variants.is_empty());
+    let variants = variants.map(|entry| {
+        format!(", and {}:TYPE with TYPE one of {}", entry.name, entry.variants.join(", "))
+    });
+    SOLVERS.join(", ") + &variants.collect::<String>()
+}
+
+/// The tail of a message: which name was perhaps meant by `name`.
+pub(super) fn alike(name: &str) -> String {
+    let names = REGISTRY.iter().flat_map(|entry| {
+        let variants = entry.variants.iter().map(|variant| format!("{}:{variant}", entry.name));
+        variants.chain([entry.name.to_owned()])
+    });
+    let likeness = |known: &String| strsim::normalized_damerau_levenshtein(name, known);
+    let nearest = names.max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
+    let meant = nearest.filter(|known| likeness(known) >= 0.5);
+    meant.map_or_else(String::new, |known| format!("; did you mean `{known}`?"))
+}
+
+/// The solver called `name` for problems of the class `class`, with another one behind it where
+/// the options allow that. Without bounds every name means one linear solve.
+///
+/// # Errors
+/// There is none of that name, or it cannot solve such problems.
+pub fn solver<'s>(
+    session: &'s Session,
+    name: &str,
+    class: ProblemClass,
+    options: &ContactOptions,
+) -> Result<Box<dyn ContactSolver + 's>, SolverError> {
+    let (entry, variant) = find(name)?;
+    if class == ProblemClass::Linear {
+        return Ok(Box::new(linear::Linear::new(session)));
+    }
+    if entry.solves < class {
+        return Err(SolverError::Unable { name: entry.name, needed: class });
+    }
+    let asked = (entry.construct)(session, variant, options);
+    let rescuer = entry.rescuer.filter(|_| options.rescue && variant.is_empty());
+    let rescuer = rescuer.map(find).transpose()?.filter(|(other, _)| other.solves >= class);
+    Ok(match rescuer {
+        Some((other, _)) => {
+            let other = (other.construct)(session, "", options);
+            Box::new(rescue::Rescued::new(session, asked, other))
+        }
+        None => asked,
+    })
+}

@@ -1,0 +1,243 @@
+//! The primal-dual active set method.
+
+use super::{ContactReport, ContactSolver, ProblemClass, SolverEntry};
+use crate::{
+    cholesky::LinearSystem,
+    contact::{
+        Bound, ContactError, ContactProblem, Kkt, elastic::ElasticSolver,
+        rigid_motion_until_contact,
+    },
+    petsc::{Communicator, PetscError, Session, Vector},
+};
+
+pub(super) const ENTRY: SolverEntry = SolverEntry {
+    name: "active-set",
+    summary: "primal-dual active set method, one linear solve per guess of the active nodes",
+    variants: &[],
+    solves: ProblemClass::Semidefinite,
+    rescuer: Some("tao"),
+    construct: |session, _, _| Box::new(ActiveSet::new(session)),
+};
+
+/// With p = f − Kc, the contact force, the conditions of an unknown with an upper bound are
+///
+/// ```text
+/// c ≤ g,  p ≥ 0,  p (c − g) = 0
+/// ```
+///
+/// Guess the active set A, solve Kc = f with c = g on A, and pivot on the indices that violate the
+/// conditions: those of A with p < 0 leave it, those outside with c > g join it (Hintermüller, Ito,
+/// Kunisch, SIAM J. Optim. 13, 2003: a semismooth Newton method). The active set of the last step
+/// is the first of this one.
+///
+/// Pivoting on all violating indices may return to an earlier set. [`Pivoting`] sees that their
+/// number falls, and else takes one at a time, which ends for every positive definite K. Where K
+/// is singular and A leaves a rigid motion unconstrained, the body moves as the load drives it
+/// until further bounds are reached.
+struct ActiveSet<'s> {
+    /// Of each bound the sign of its contact force: 1 at the upper bound, −1 at the lower one, 0
+    /// where neither is active.
+    active: Vec<f64>,
+    elastic: ElasticSolver<'s>,
+}
+
+impl<'s> ActiveSet<'s> {
+    fn new(session: &'s Session) -> Self {
+        Self { active: Vec::new(), elastic: ElasticSolver::new(session) }
+    }
+
+    /// The set to begin with: the last one, or the bounds that the start reaches.
+    fn first_guess(&mut self, problem: &ContactProblem, c: &Vector) -> Result<(), PetscError> {
+        if self.active.len() != problem.bounds.len() {
+            let reached = |bound: &Bound, c: f64| {
+                if c >= bound.upper { 1.0 } else { -f64::from(c <= bound.lower) }
+            };
+            self.active =
+                c.read(|c| problem.bounds.iter().map(|b| reached(b, c[b.dof])).collect())?;
+        }
+        // A lower bound may have been one for the last problem only.
+        for (side, bound) in self.active.iter_mut().zip(problem.bounds) {
+            if *side < 0.0 && bound.lower.is_infinite() {
+                *side = 0.0;
+            }
+        }
+        if !self.constrain_rigid_motions(problem, c)? {
+            self.active.fill(1.0);
+        }
+        Ok(())
+    }
+
+    /// Where the active set leaves a rigid motion unconstrained: lets the body move as the load
+    /// drives it until it reaches a further bound. False if there is none; the load being balanced,
+    /// it is then rounding that drives the motion.
+    fn constrain_rigid_motions(
+        &mut self,
+        problem: &ContactProblem,
+        c: &Vector,
+    ) -> Result<bool, PetscError> {
+        let active = self.active.iter().map(|side| *side != 0.0).collect();
+        let motions = (problem.rigid, problem.work);
+        let moved = c.read(|c| {
+            rigid_motion_until_contact(problem.comm, motions, problem.bounds, c, active, true)
+        })?;
+        for (i, upper) in moved.reached {
+            self.active[i] = if upper { 1.0 } else { -1.0 };
+        }
+        Ok(moved.constrained)
+    }
+
+    /// Minimises with the active unknowns at their bounds and no other bound; false if that failed.
+    fn solve_equality(
+        &mut self,
+        problem: &ContactProblem,
+        c: &mut Vector,
+        report: &mut ContactReport,
+    ) -> Result<bool, PetscError> {
+        let active = problem.bounds.iter().zip(&self.active).filter(|(_, side)| **side != 0.0);
+        let value = |(bound, side): (&Bound, &f64)| {
+            (bound.dof, if *side > 0.0 { bound.upper } else { bound.lower })
+        };
+        let active: Vec<(usize, f64)> = active.map(value).collect();
+        let prescribed: Vec<usize> = active.iter().map(|(dof, _)| *dof).collect();
+        c.write(|c| active.iter().for_each(|&(dof, value)| c[dof] = value))?;
+        let system = LinearSystem { prescribed: Some(&prescribed), ..problem.system() };
+        self.elastic.solve(system, problem.load, c, problem.linear_residual(), report)
+    }
+
+    /// The indices that violate the conditions beyond what the KKT tolerance allows, and the sign
+    /// that each should have: p = f − Kc is at least 0 at an upper bound and at most 0 at a lower
+    /// one, and lower ≤ c ≤ upper elsewhere.
+    fn violating(
+        &self,
+        problem: &ContactProblem,
+        c: &Vector,
+    ) -> Result<Vec<(usize, f64)>, PetscError> {
+        let slack = 0.1 * problem.tolerance;
+        let depth = slack * problem.scales_at(c)?.displacement;
+        let pull = slack * problem.scales.force / (problem.bound_count() as f64).sqrt();
+        c.read(|c| {
+            self.elastic.forces(|p| {
+                let violation = |(i, bound): (usize, &Bound)| {
+                    let (c, p, side) = (c[bound.dof], p[bound.dof], self.active[i]);
+                    let other = if side != 0.0 {
+                        // An equality carries a force of either sign.
+                        (side * p < -pull && !bound.is_equality()).then_some(0.0)
+                    } else if c - bound.upper > depth {
+                        Some(1.0)
+                    } else {
+                        (bound.lower - c > depth).then_some(-1.0)
+                    };
+                    other.map(|other| (i, other))
+                };
+                problem.bounds.iter().enumerate().filter_map(violation).collect()
+            })
+        })?
+    }
+
+    /// Pivots on the chosen indices; false if that changes nothing.
+    fn pivot(
+        &mut self,
+        problem: &ContactProblem,
+        c: &Vector,
+        chosen: &[(usize, f64)],
+    ) -> Result<bool, PetscError> {
+        let old = self.active.clone();
+        chosen.iter().for_each(|&(i, side)| self.active[i] = side);
+        if !self.constrain_rigid_motions(problem, c)? {
+            // No index leaves the active set: only open ones join it.
+            for (new, old) in self.active.iter_mut().zip(&old) {
+                *new = if *new == 0.0 { *old } else { *new };
+            }
+        }
+        Ok(problem.comm.any(self.active != old))
+    }
+}
+
+impl ContactSolver for ActiveSet<'_> {
+    fn name(&self) -> &'static str {
+        ENTRY.name
+    }
+
+    fn warm_start(&self) -> Vec<f64> {
+        self.active.clone()
+    }
+
+    fn set_warm_start(&mut self, kept: &[f64]) {
+        self.active = kept.to_vec();
+    }
+
+    fn solve(
+        &mut self,
+        problem: &ContactProblem,
+        c: &mut Vector,
+    ) -> Result<ContactReport, ContactError> {
+        let mut report = ContactReport::default();
+        let mut rule = Pivoting::new();
+        let stopped = |report, detail: &str| ContactError::NotConverged {
+            method: ENTRY.name.to_owned(),
+            report: Box::new(report),
+            residuals: Kkt::UNKNOWN,
+            detail: detail.to_owned(),
+        };
+        self.first_guess(problem, c)?;
+        for _ in 0..30 + 5 * problem.bound_count() {
+            report.iterations += 1;
+            if !self.solve_equality(problem, c, &mut report)? {
+                return Err(stopped(
+                    report,
+                    "the stiffness with its active unknowns fixed is not positive definite, or too \
+                     ill-conditioned for the tolerance",
+                ));
+            }
+            let violating = self.violating(problem, c)?;
+            let count = problem.comm.count(violating.len());
+            if count == 0 {
+                return Ok(report);
+            }
+            let single = rule.single(count);
+            report.fallbacks += usize::from(single && count > 1);
+            let chosen = if single { last(problem.comm, &violating) } else { &violating };
+            if !self.pivot(problem, c, chosen)? {
+                // The forces of bounds that support a balanced body are rounding; the certificate
+                // judges them.
+                return Ok(report);
+            }
+        }
+        Err(stopped(report, "the active set still changes"))
+    }
+}
+
+/// Block principal pivoting (Júdice and Pires, Comput. Oper. Res. 21, 1994): on all violating
+/// indices while their number falls, or for a few times more; then only on the last of them
+/// (Murty's rule, finite for positive definite matrices) until it has fallen.
+struct Pivoting {
+    fewest: usize,
+    patience: usize,
+}
+
+const PATIENCE: usize = 5;
+
+impl Pivoting {
+    fn new() -> Self {
+        Self { fewest: usize::MAX, patience: PATIENCE }
+    }
+
+    /// Whether to pivot on only one of so many violating indices.
+    fn single(&mut self, violating: usize) -> bool {
+        if violating < self.fewest {
+            (self.fewest, self.patience) = (violating, PATIENCE);
+            return false;
+        }
+        let single = self.patience == 0;
+        self.patience = self.patience.saturating_sub(1);
+        single
+    }
+}
+
+/// The last of all ranks' `violating` indices, which are numbered rank by rank; nothing on the
+/// others.
+fn last<T>(comm: Communicator, violating: &[T]) -> &[T] {
+    let owner = if violating.is_empty() { -1.0 } else { comm.rank() as f64 };
+    let is_owner = comm.max(owner) == comm.rank() as f64;
+    if is_owner { &violating[violating.len().saturating_sub(1)..] } else { &[] }
+}
