@@ -79,7 +79,7 @@ pub enum SolverError {
         name: String,
     },
     /// It is not made for problems like this one.
-    #[error("the contact solver `{name}` cannot solve this: {needed}")]
+    #[error("the contact solver `{name}` cannot solve {needed:?} problems")]
     Unable {
         /// The solver.
         name: &'static str,

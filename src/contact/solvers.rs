@@ -20,7 +20,6 @@ use serde::{
     Deserialize, Deserializer,
     de::{Error, Unexpected},
 };
-use std::fmt;
 
 /// A method for the contact problem.
 pub trait ContactSolver {
@@ -93,18 +92,6 @@ pub enum ProblemClass {
     Definite,
     /// Bounds, and K only semidefinite: contact alone constrains some rigid motion.
     Semidefinite,
-}
-
-impl fmt::Display for ProblemClass {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(match self {
-            Self::Linear => "a problem without obstacles",
-            Self::Definite => "a problem with obstacles, which need inequalities",
-            Self::Semidefinite => {
-                "contact alone constrains a rigid motion, so the stiffness is singular"
-            }
-        })
-    }
 }
 
 /// A solver as the program knows it.
@@ -205,7 +192,7 @@ pub fn listing() -> String {
     SOLVERS.join(", ") + &variants.collect::<String>()
 }
 
-/// The tail of a message: which name was perhaps meant by `name`.
+/// An aside of a message: which name was perhaps meant by `name`.
 pub(super) fn alike(name: &str) -> String {
     let names = REGISTRY.iter().flat_map(|entry| {
         let variants = entry.variants.iter().map(|variant| format!("{}:{variant}", entry.name));
@@ -214,7 +201,7 @@ pub(super) fn alike(name: &str) -> String {
     let likeness = |known: &String| strsim::normalized_damerau_levenshtein(name, known);
     let nearest = names.max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
     let meant = nearest.filter(|known| likeness(known) >= 0.5);
-    meant.map_or_else(String::new, |known| format!("; did you mean `{known}`?"))
+    meant.map_or_else(String::new, |known| format!(" (did you mean `{known}`?)"))
 }
 
 /// The solver called `name` for problems of the class `class`, with another one behind it where

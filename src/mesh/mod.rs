@@ -68,6 +68,16 @@ impl Mesh {
     }
 }
 
+/// The longer side of the box around `points`, m.
+#[must_use]
+pub fn extent(points: &[[f64; 2]]) -> f64 {
+    let side = |axis: usize| {
+        let low = points.iter().fold(f64::INFINITY, |low, point| low.min(point[axis]));
+        points.iter().fold(f64::NEG_INFINITY, |high, point| high.max(point[axis])) - low
+    };
+    side(0).max(side(1)).max(0.0)
+}
+
 /// Twice the signed area of the triangle abc, positive when counter-clockwise.
 fn twice_area(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])

@@ -23,34 +23,22 @@ impl<'s> Rescued<'s> {
     }
 
     /// The second solver's answer where the first ended with `failure`. It starts from nothing, so
-    /// that it does not depend on how the first one lost its way. Where it does no better, all is
-    /// as if it had not been asked.
+    /// that it does not depend on how the first one lost its way. If it stops short too, the answer
+    /// with the smaller KKT residuals is left in c: the certificate may yet accept that.
     fn rescue(
         &mut self,
         problem: &ContactProblem,
         c: &mut Vector,
         failure: ContactError,
     ) -> Result<ContactReport, ContactError> {
-        let worst = |c: &Vector| problem.residuals(self.session, c).map(|kkt| kkt.worst());
         let mut left = Vector::zeros(self.session, c.owned())?;
         left.copy(c)?;
         c.write(|c| c.fill(0.0))?;
-        self.second.set_warm_start(&[]);
-        let ended = self.second.solve(problem, c);
-        if ended.as_ref().is_err_and(|error| !error.stopped_short()) {
-            return ended;
-        }
-        if worst(&left)? <= worst(c)? {
-            c.copy(&left)?;
-            return Err(failure);
-        }
         self.first.set_warm_start(&[]);
-        match (failure, ended) {
-            (first, Err(second)) => {
-                Err(ContactError::NotRescued { first: Box::new(first), second: Box::new(second) })
-            }
-            (first, Ok(rescue)) => {
-                let mut report = match first {
+        self.second.set_warm_start(&[]);
+        match self.second.solve(problem, c) {
+            Ok(rescue) => {
+                let mut report = match failure {
                     ContactError::NotConverged { report, .. } => *report,
                     _ => ContactReport::default(),
                 };
@@ -59,6 +47,14 @@ impl<'s> Rescued<'s> {
                 report.rescued_by = Some(self.second.name());
                 Ok(report)
             }
+            Err(second) if second.stopped_short() => {
+                let worst = |c: &Vector| problem.residuals(self.session, c).map(|kkt| kkt.worst());
+                if worst(&left)? <= worst(c)? {
+                    c.copy(&left)?;
+                }
+                Err(ContactError::NotRescued { first: Box::new(failure), second: Box::new(second) })
+            }
+            Err(other) => Err(other),
         }
     }
 }
