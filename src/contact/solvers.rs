@@ -158,10 +158,18 @@ fn known_solver<'de, D: Deserializer<'de>>(value: D) -> Result<Option<String>, D
 }
 
 fn between_0_and_1<'de, D: Deserializer<'de>>(value: D) -> Result<f64, D::Error> {
+    number(value, "between 0 and 1, both excluded", |value| 0.0 < value && value < 1.0)
+}
+
+/// A number for which `holds`; `rule` says so in words.
+fn number<'de, D: Deserializer<'de>>(
+    value: D,
+    rule: &str,
+    holds: fn(f64) -> bool,
+) -> Result<f64, D::Error> {
     let value = f64::deserialize(value)?;
-    let rule = "between 0 and 1, both excluded";
     let wrong = || D::Error::invalid_value(Unexpected::Float(value), &rule);
-    (0.0 < value && value < 1.0).then_some(value).ok_or_else(wrong)
+    holds(value).then_some(value).ok_or_else(wrong)
 }
 
 /// The solver called `name`, and its variant: empty, or what stands behind a colon.
