@@ -7,7 +7,6 @@
 mod active_set;
 mod anderson;
 mod penalty_duality;
-mod rescue;
 mod tao;
 
 pub use anderson::Anderson;
@@ -104,8 +103,7 @@ pub struct SolverEntry {
     pub variants: &'static [&'static str],
     /// What it can solve.
     pub solves: ProblemClass,
-    /// The solver that is asked in its place where it stops short; never of a variant, so that
-    /// one sees what that does by itself.
+    /// The solver that is asked in its place where it stops short.
     pub rescuer: Option<&'static str>,
     /// A new one; the text is the variant, or empty.
     pub construct: for<'s> fn(&'s Session, &str, &ContactOptions) -> Box<dyn ContactSolver + 's>,
@@ -212,8 +210,8 @@ pub(super) fn alike(name: &str) -> String {
     meant.map_or_else(String::new, |known| format!(" (did you mean `{known}`?)"))
 }
 
-/// The solver called `name` for problems of the class `class`, with another one behind it where
-/// the options allow that. Without bounds every name means one linear solve.
+/// The solver called `name` for problems of the class `class`. Without bounds every name means one
+/// linear solve.
 ///
 /// # Errors
 /// There is none of that name, or it cannot solve such problems.
@@ -224,20 +222,28 @@ pub fn solver<'s>(
     options: &ContactOptions,
 ) -> Result<Box<dyn ContactSolver + 's>, SolverError> {
     let (entry, variant) = find(name)?;
-    if class == ProblemClass::Linear {
-        return Ok(Box::new(linear::Linear::new(session)));
-    }
-    if entry.solves < class {
-        return Err(SolverError::Unable { name: entry.name, needed: class });
-    }
-    let asked = (entry.construct)(session, variant, options);
-    let rescuer = entry.rescuer.filter(|_| options.rescue && variant.is_empty());
-    let rescuer = rescuer.map(find).transpose()?.filter(|(other, _)| other.solves >= class);
-    Ok(match rescuer {
-        Some((other, _)) => {
-            let other = (other.construct)(session, "", options);
-            Box::new(rescue::Rescued::new(session, asked, other))
+    match class {
+        ProblemClass::Linear => Ok(Box::new(linear::Linear::new(session))),
+        class if entry.solves < class => {
+            Err(SolverError::Unable { name: entry.name, needed: class })
         }
-        None => asked,
-    })
+        _ => Ok((entry.construct)(session, variant, options)),
+    }
+}
+
+/// The solver to ask in the place of the one called `name` where that stops short; none of a
+/// variant, so that one sees what that does by itself, nor where the options forbid it.
+///
+/// # Errors
+/// See [`solver`].
+pub fn rescuer<'s>(
+    session: &'s Session,
+    name: &str,
+    class: ProblemClass,
+    options: &ContactOptions,
+) -> Result<Option<Box<dyn ContactSolver + 's>>, SolverError> {
+    let (entry, variant) = find(name)?;
+    let asked = options.rescue && variant.is_empty() && class > ProblemClass::Linear;
+    let rescuer = entry.rescuer.filter(|_| asked);
+    rescuer.map(|name| solver(session, name, class, options)).transpose()
 }

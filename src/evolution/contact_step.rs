@@ -24,6 +24,8 @@ pub struct ContactStep<'a> {
     problem: &'a DiscreteProblem,
     phases: &'a Phases,
     solver: Box<dyn ContactSolver + 'a>,
+    /// Who is asked where that one stops short.
+    rescuer: Option<Box<dyn ContactSolver + 'a>>,
     stiffness: Stiffness,
     /// The triangle means of η_*(ζ) that K was filled with.
     zeta_mean: Vec<f64>,
@@ -85,6 +87,7 @@ impl<'a> ContactStep<'a> {
         let stiffness = phases.time("stiffness pattern", || {
             Stiffness::new(session, body, &problem.elasticity, &constraints.bases)
         })?;
+        let options = &problem.scene().contact;
         let bounded = body.partition.comm().any(!constraints.bounds.is_empty());
         let class = match (bounded, problem.motions.resisted()) {
             (false, _) => ProblemClass::Linear,
@@ -95,7 +98,8 @@ impl<'a> ContactStep<'a> {
             session,
             problem,
             phases,
-            solver: contact::solver(session, solver, class, &problem.scene().contact)?,
+            solver: contact::solver(session, solver, class, options)?,
+            rescuer: contact::rescuer(session, solver, class, options)?,
             stiffness,
             zeta_mean: vec![1.0; body.triangles.len()],
             load: Vector::zeros(session, owned)?,
@@ -131,11 +135,42 @@ impl<'a> ContactStep<'a> {
         &self.report
     }
 
-    /// u_n at `time` for the nodal damage `zeta`, starting from where the last steps lead.
+    /// u_n at `time` for the nodal damage `zeta`, starting from where the last steps lead. Where
+    /// the solver stops short, its rescuer is asked instead, as if the solver had not been.
     ///
     /// # Errors
-    /// The solver failed, or no answer of its met the KKT tolerance.
+    /// The solver failed, or no answer of its met the KKT tolerance, nor one of its rescuer.
     pub fn solve(&mut self, step: usize, time: f64, zeta: &[f64]) -> Result<Step, RunError> {
+        let comm = self.problem.body.partition.comm();
+        let solved = self.solve_by_one(step, time, zeta);
+        let missed = |error: &RunError| match error {
+            RunError::Contact { source, .. } => source.may_be_rescued(comm),
+            _ => false,
+        };
+        let Some(rescuer) = self.rescuer.take_if(|_| solved.as_ref().is_err_and(missed)) else {
+            return solved;
+        };
+        self.undo()?;
+        let asked = std::mem::replace(&mut self.solver, rescuer);
+        self.solver.set_warm_start(&[]);
+        let rescued = self.solve_by_one(step, time, zeta);
+        let rescuer = self.rescuer.insert(std::mem::replace(&mut self.solver, asked));
+        // What it believed has misled it.
+        self.solver.set_warm_start(&[]);
+        match rescued {
+            Err(RunError::Contact { .. }) => solved,
+            Err(other) => Err(other),
+            Ok(mut step) => {
+                self.report.rescued_by = Some(rescuer.name());
+                self.report.fallbacks += 1;
+                step.record.fallbacks += 1;
+                Ok(step)
+            }
+        }
+    }
+
+    /// u_n by the present solver.
+    fn solve_by_one(&mut self, step: usize, time: f64, zeta: &[f64]) -> Result<Step, RunError> {
         let started = Instant::now();
         let (problem, phases) = (self.problem, self.phases);
         self.fill(&problem.triangle_means(zeta))?;
@@ -192,11 +227,7 @@ impl<'a> ContactStep<'a> {
                 return Ok(Step { state, record, unheld });
             }
             if attempts == ATTEMPTS || judged.kkt.worst().is_nan() {
-                let (asked, tolerance) = (self.solver.name(), problem.tolerance);
-                let method = match total.rescued_by {
-                    Some(other) => format!("{other}, in the place of {asked},"),
-                    None => asked.to_owned(),
-                };
+                let (method, tolerance) = (self.solver.name(), problem.tolerance);
                 let residuals = judged.kkt;
                 let error = ContactError::NotCertified { method, tolerance, residuals };
                 return Err(failed(self.limited(error, &judged, &u)));

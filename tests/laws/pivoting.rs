@@ -4,7 +4,8 @@ use crate::support::close;
 use nalgebra::{DMatrix, DVector};
 use signorini::{
     contact::{
-        Bound, ContactOptions, ContactProblem, ContactReport, ProblemClass, SOLVERS, Scales, solver,
+        Bound, ContactError, ContactOptions, ContactProblem, ContactReport, ProblemClass, SOLVERS,
+        Scales, find, solver,
     },
     petsc::{Communicator, Matrix, Session, Vector},
     phases::Phases,
@@ -23,6 +24,14 @@ struct Small {
 
 impl Small {
     fn solve(&self, name: &str, guess: &[f64]) -> (Vec<f64>, ContactReport) {
+        self.try_solve(name, guess).unwrap_or_else(|e| panic!("{name}: {e}"))
+    }
+
+    fn try_solve(
+        &self,
+        name: &str,
+        guess: &[f64],
+    ) -> Result<(Vec<f64>, ContactReport), ContactError> {
         let session = Session::start(&[]).unwrap();
         let size = self.load.len();
         let indices = || 0..size as i32;
@@ -62,8 +71,8 @@ impl Small {
         if name == "active-set" {
             solver.set_warm_start(guess);
         }
-        let report = solver.solve(&problem, &mut c).unwrap_or_else(|e| panic!("{name}: {e}"));
-        (c.read(<[f64]>::to_vec).unwrap(), report)
+        let report = solver.solve(&problem, &mut c)?;
+        Ok((c.read(<[f64]>::to_vec).unwrap(), report))
     }
 
     /// Minimises with c = g on the active unknowns and no other bound; Kc − f there.
@@ -129,7 +138,6 @@ fn single_pivots_end_where_block_pivots_cycle() {
         left_the_fast_path += usize::from(report.fallbacks > 0);
         // A first block pivot, and five that have not made the violating indices fewer.
         assert!(report.fallbacks == 0 || report.iterations >= 8, "{report:?}");
-        assert_eq!(report.rescued_by, None, "ended by itself: {report:?}");
     }
     assert!(left_the_fast_path > 0);
 }
@@ -162,10 +170,12 @@ fn a_body_that_its_active_nodes_do_not_support_moves_to_the_next() {
 }
 
 #[test]
-fn a_stiffness_that_no_factor_fits_is_rescued() {
+fn a_stiffness_that_no_factor_fits_is_left_to_the_rescuer() {
     // Nobody says that contact alone supports the beam: without node 0 its stiffness is singular.
     let untold = Small { rigid: DMatrix::zeros(3, 0), work: DVector::zeros(0), ..beam() };
-    let (c, report) = untold.solve("active-set", &[1.0, 1.0, 0.0]);
+    let failure = untold.try_solve("active-set", &[1.0, 1.0, 0.0]).unwrap_err();
+    assert!(failure.stopped_short(), "{failure}");
+    let (entry, _) = find("active-set").unwrap();
+    let (c, _) = untold.solve(entry.rescuer.unwrap(), &[]);
     c.iter().zip([-1.0, 0.0, 1.0]).for_each(|(c, exact)| close(*c, exact, 1e-9));
-    assert_eq!((report.fallbacks, report.rescued_by), (1, Some("tao")), "{report:?}");
 }
