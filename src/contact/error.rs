@@ -159,6 +159,11 @@ impl ContactError {
         matches!(self, Self::NotConverged { .. } | Self::NotCertified { .. })
     }
 
+    /// Whether rounding keeps the answer from the tolerance.
+    pub fn is_limited(&self) -> bool {
+        matches!(self, Self::Limited { .. })
+    }
+
     /// Whether another method may do better, as all ranks know. (Of an error inside PETSc others
     /// than this rank may know nothing.)
     pub fn may_be_rescued(&self, comm: Communicator) -> bool {

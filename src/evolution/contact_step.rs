@@ -158,7 +158,8 @@ impl<'a> ContactStep<'a> {
         // What it believed has misled it.
         self.solver.set_warm_start(&[]);
         match rescued {
-            Err(RunError::Contact { .. }) => solved,
+            // What rounding allows is worth telling, whoever found it.
+            Err(RunError::Contact { source, .. }) if !source.is_limited() => solved,
             Err(other) => Err(other),
             Ok(mut step) => {
                 self.report.rescued_by = Some(rescuer.name());
