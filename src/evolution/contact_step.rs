@@ -150,6 +150,8 @@ impl<'a> ContactStep<'a> {
         let Some(rescuer) = self.rescuer.take_if(|_| solved.as_ref().is_err_and(missed)) else {
             return solved;
         };
+        let limited =
+            matches!(&solved, Err(RunError::Contact { source, .. }) if source.is_limited());
         self.undo()?;
         let asked = std::mem::replace(&mut self.solver, rescuer);
         self.solver.set_warm_start(&[]);
@@ -158,8 +160,8 @@ impl<'a> ContactStep<'a> {
         // What it believed has misled it.
         self.solver.set_warm_start(&[]);
         match rescued {
-            // What rounding allows is worth telling, whoever found it.
-            Err(RunError::Contact { source, .. }) if !source.is_limited() => solved,
+            // What rounding allows is worth telling, if only the rescuer has found it.
+            Err(RunError::Contact { source, .. }) if limited || !source.is_limited() => solved,
             Err(other) => Err(other),
             Ok(mut step) => {
                 self.report.rescued_by = Some(rescuer.name());
