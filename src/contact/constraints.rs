@@ -1,7 +1,10 @@
 //! From directions and values at nodes to nodal bases, prescribed unknowns and bounds.
 
 use super::{Bound, ConstraintError, FixedRow, GapRow};
-use crate::fem::{NodalBases, Subdomain};
+use crate::{
+    fem::{NodalBases, Subdomain},
+    mesh::extent,
+};
 use nalgebra::Matrix2;
 use std::collections::BTreeMap;
 
@@ -315,17 +318,6 @@ fn along(line: [f64; 2], normal: [f64; 2]) -> [f64; 2] {
         true => line,
         false => line.map(|v| -v),
     }
-}
-
-/// The longer side of the box around `points`, m.
-fn extent(points: &[[f64; 2]]) -> f64 {
-    let side = |axis: usize| {
-        let range = points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| {
-            (p[axis].min(low), p[axis].max(high))
-        });
-        range.1 - range.0
-    };
-    side(0).max(side(1)).max(0.0)
 }
 
 fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {

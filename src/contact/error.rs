@@ -1,7 +1,7 @@
 //! What can be wrong with contact conditions, with the choice of a solver, and with its answer.
 
 use super::{ContactReport, Kkt, ProblemClass, constraints::DEPENDENT, listing, solvers::alike};
-use crate::petsc::PetscError;
+use crate::petsc::{Communicator, PetscError};
 
 /// Displacement conditions at a node that contradict each other.
 #[derive(Debug, Clone, thiserror::Error)]
@@ -79,7 +79,7 @@ pub enum SolverError {
         name: String,
     },
     /// It is not made for problems like this one.
-    #[error("the contact solver `{name}` cannot solve this: {needed}")]
+    #[error("the contact solver `{name}` cannot solve {needed:?} problems")]
     Unable {
         /// The solver.
         name: &'static str,
@@ -113,19 +113,11 @@ pub enum ContactError {
         /// What PETSc said.
         source: PetscError,
     },
-    /// The solver stopped short of the tolerance, and so did the one that was asked in its place.
-    #[error("{first}; in its place {second}")]
-    NotRescued {
-        /// How the solver ended.
-        first: Box<Self>,
-        /// How the other one ended.
-        second: Box<Self>,
-    },
     /// The answer does not satisfy the KKT conditions.
     #[error("{method} gave an answer, but {}", residuals.missed(*tolerance))]
     NotCertified {
         /// The solver's name.
-        method: String,
+        method: &'static str,
         /// The tolerance missed.
         tolerance: f64,
         /// The residuals found.
@@ -159,11 +151,26 @@ pub enum ContactError {
 impl ContactError {
     /// Whether the method stopped short of its tolerance, which all ranks then know.
     pub fn stopped_short(&self) -> bool {
-        matches!(self, Self::NotConverged { .. } | Self::NotRescued { .. })
+        matches!(self, Self::NotConverged { .. })
     }
 
     /// Whether the method has missed a tolerance that may not be out of reach.
     pub fn is_missed(&self) -> bool {
-        self.stopped_short() || matches!(self, Self::NotCertified { .. })
+        matches!(self, Self::NotConverged { .. } | Self::NotCertified { .. })
+    }
+
+    /// Whether rounding keeps the answer from the tolerance.
+    pub fn is_limited(&self) -> bool {
+        matches!(self, Self::Limited { .. })
+    }
+
+    /// Whether another method may do better, as all ranks know. (Of an error inside PETSc others
+    /// than this rank may know nothing.)
+    pub fn may_be_rescued(&self, comm: Communicator) -> bool {
+        match self {
+            Self::Failed { .. } => comm.is_serial(),
+            Self::Limited { source, .. } => source.may_be_rescued(comm),
+            error => error.is_missed(),
+        }
     }
 }

@@ -29,5 +29,5 @@ pub(crate) use rigid::{rigid_motion_until_contact, unconstrained_motions};
 pub use rows::{Bound, FixedRow, GapRow};
 pub use solvers::{
     Anderson, ContactOptions, ContactReport, ContactSolver, PenaltyOptions, ProblemClass, REGISTRY,
-    SOLVERS, SolverEntry, TAO_TYPES, find, listing, solver, summaries,
+    SOLVERS, SolverEntry, TAO_TYPES, find, listing, rescuer, solver, summaries,
 };

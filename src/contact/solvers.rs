@@ -7,7 +7,6 @@
 mod active_set;
 mod anderson;
 mod penalty_duality;
-mod rescue;
 mod tao;
 
 pub use anderson::Anderson;
@@ -20,7 +19,6 @@ use serde::{
     Deserialize, Deserializer,
     de::{Error, Unexpected},
 };
-use std::fmt;
 
 /// A method for the contact problem.
 pub trait ContactSolver {
@@ -95,18 +93,6 @@ pub enum ProblemClass {
     Semidefinite,
 }
 
-impl fmt::Display for ProblemClass {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(match self {
-            Self::Linear => "a problem without obstacles",
-            Self::Definite => "a problem with obstacles, which need inequalities",
-            Self::Semidefinite => {
-                "contact alone constrains a rigid motion, so the stiffness is singular"
-            }
-        })
-    }
-}
-
 /// A solver as the program knows it.
 pub struct SolverEntry {
     /// What a scene or `--solver` calls it.
@@ -117,8 +103,7 @@ pub struct SolverEntry {
     pub variants: &'static [&'static str],
     /// What it can solve.
     pub solves: ProblemClass,
-    /// The solver that is asked in its place where it stops short; never of a variant, so that
-    /// one sees what that does by itself.
+    /// The solver that is asked in its place where it stops short.
     pub rescuer: Option<&'static str>,
     /// A new one; the text is the variant, or empty.
     pub construct: for<'s> fn(&'s Session, &str, &ContactOptions) -> Box<dyn ContactSolver + 's>,
@@ -171,10 +156,18 @@ fn known_solver<'de, D: Deserializer<'de>>(value: D) -> Result<Option<String>, D
 }
 
 fn between_0_and_1<'de, D: Deserializer<'de>>(value: D) -> Result<f64, D::Error> {
+    number(value, "between 0 and 1, both excluded", |value| 0.0 < value && value < 1.0)
+}
+
+/// A number for which `holds`; `rule` says so in words.
+fn number<'de, D: Deserializer<'de>>(
+    value: D,
+    rule: &str,
+    holds: fn(f64) -> bool,
+) -> Result<f64, D::Error> {
     let value = f64::deserialize(value)?;
-    let rule = "between 0 and 1, both excluded";
     let wrong = || D::Error::invalid_value(Unexpected::Float(value), &rule);
-    (0.0 < value && value < 1.0).then_some(value).ok_or_else(wrong)
+    holds(value).then_some(value).ok_or_else(wrong)
 }
 
 /// The solver called `name`, and its variant: empty, or what stands behind a colon.
@@ -205,7 +198,7 @@ pub fn listing() -> String {
     SOLVERS.join(", ") + &variants.collect::<String>()
 }
 
-/// The tail of a message: which name was perhaps meant by `name`.
+/// An aside of a message: which name was perhaps meant by `name`.
 pub(super) fn alike(name: &str) -> String {
     let names = REGISTRY.iter().flat_map(|entry| {
         let variants = entry.variants.iter().map(|variant| format!("{}:{variant}", entry.name));
@@ -214,11 +207,11 @@ pub(super) fn alike(name: &str) -> String {
     let likeness = |known: &String| strsim::normalized_damerau_levenshtein(name, known);
     let nearest = names.max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
     let meant = nearest.filter(|known| likeness(known) >= 0.5);
-    meant.map_or_else(String::new, |known| format!("; did you mean `{known}`?"))
+    meant.map_or_else(String::new, |known| format!(" (did you mean `{known}`?)"))
 }
 
-/// The solver called `name` for problems of the class `class`, with another one behind it where
-/// the options allow that. Without bounds every name means one linear solve.
+/// The solver called `name` for problems of the class `class`. Without bounds every name means one
+/// linear solve.
 ///
 /// # Errors
 /// There is none of that name, or it cannot solve such problems.
@@ -229,20 +222,28 @@ pub fn solver<'s>(
     options: &ContactOptions,
 ) -> Result<Box<dyn ContactSolver + 's>, SolverError> {
     let (entry, variant) = find(name)?;
-    if class == ProblemClass::Linear {
-        return Ok(Box::new(linear::Linear::new(session)));
-    }
-    if entry.solves < class {
-        return Err(SolverError::Unable { name: entry.name, needed: class });
-    }
-    let asked = (entry.construct)(session, variant, options);
-    let rescuer = entry.rescuer.filter(|_| options.rescue && variant.is_empty());
-    let rescuer = rescuer.map(find).transpose()?.filter(|(other, _)| other.solves >= class);
-    Ok(match rescuer {
-        Some((other, _)) => {
-            let other = (other.construct)(session, "", options);
-            Box::new(rescue::Rescued::new(session, asked, other))
+    match class {
+        ProblemClass::Linear => Ok(Box::new(linear::Linear::new(session))),
+        class if entry.solves < class => {
+            Err(SolverError::Unable { name: entry.name, needed: class })
         }
-        None => asked,
-    })
+        _ => Ok((entry.construct)(session, variant, options)),
+    }
+}
+
+/// The solver to ask in the place of the one called `name` where that stops short; none of a
+/// variant, so that one sees what that does by itself, nor where the options forbid it.
+///
+/// # Errors
+/// See [`solver`].
+pub fn rescuer<'s>(
+    session: &'s Session,
+    name: &str,
+    class: ProblemClass,
+    options: &ContactOptions,
+) -> Result<Option<Box<dyn ContactSolver + 's>>, SolverError> {
+    let (entry, variant) = find(name)?;
+    let asked = options.rescue && variant.is_empty() && class > ProblemClass::Linear;
+    let rescuer = entry.rescuer.filter(|_| asked);
+    rescuer.map(|name| solver(session, name, class, options)).transpose()
 }

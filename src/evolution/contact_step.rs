@@ -34,6 +34,8 @@ pub struct ContactStep<'a> {
     problem: &'a DiscreteProblem,
     phases: &'a Phases,
     solver: Box<dyn ContactSolver + 'a>,
+    /// Who is asked where the solver stops short.
+    rescuer: Option<Box<dyn ContactSolver + 'a>>,
     stiffness: Stiffness,
     /// The triangle means of η_*(ζ) that K was filled with.
     zeta_mean: Vec<f64>,
@@ -92,6 +94,7 @@ impl<'a> ContactStep<'a> {
         let stiffness = phases.time("stiffness pattern", || {
             Stiffness::new(session, body, &problem.elasticity, &constraints.bases)
         })?;
+        let options = &problem.scene().contact;
         let bounded = comm.any(!constraints.bounds.is_empty());
         let class = match (bounded, problem.motions.resisted()) {
             (false, _) => ProblemClass::Linear,
@@ -108,7 +111,8 @@ impl<'a> ContactStep<'a> {
             session,
             problem,
             phases,
-            solver: contact::solver(session, solver, class, &problem.scene().contact)?,
+            solver: contact::solver(session, solver, class, options)?,
+            rescuer: contact::rescuer(session, solver, class, options)?,
             stiffness,
             zeta_mean: vec![1.0; body.triangles.len()],
             load: Vector::zeros(session, unknowns)?,
@@ -128,11 +132,43 @@ impl<'a> ContactStep<'a> {
     }
 
     /// u_n at `time` for the nodal damage `zeta`. Every solve starts from the accepted steps, whatever
-    /// was solved since the last of them.
+    /// was solved since the last of them. Where the solver stops short, its rescuer is asked.
     ///
     /// # Errors
-    /// The solver failed, or no answer of its met the KKT tolerance.
+    /// The solver failed, or no answer of its met the KKT tolerance, nor one of its rescuer.
     pub fn solve(&mut self, step: usize, time: f64, zeta: &[f64]) -> Result<Step, RunError> {
+        let comm = self.problem.body.partition.comm();
+        let solved = self.solve_by_one(step, time, zeta);
+        let limited = match &solved {
+            Err(RunError::Contact { source, .. }) if source.may_be_rescued(comm) => {
+                source.is_limited()
+            }
+            _ => return solved,
+        };
+        let Some(rescuer) = self.rescuer.take() else { return solved };
+        let asked = std::mem::replace(&mut self.solver, rescuer);
+        // One solver's warm start is none for another, and what the solver believed has misled it.
+        self.accepted.warm_start.clear();
+        let rescued = self.solve_by_one(step, time, zeta);
+        let rescuer = std::mem::replace(&mut self.solver, asked);
+        self.solver.set_warm_start(&[]);
+        let name = rescuer.name();
+        self.rescuer = Some(rescuer);
+        match rescued {
+            // What rounding allows is worth telling, if only the rescuer has found it.
+            Err(RunError::Contact { source, .. }) if limited || !source.is_limited() => solved,
+            Err(other) => Err(other),
+            Ok(mut step) => {
+                step.report.rescued_by = Some(name);
+                step.report.fallbacks += 1;
+                step.record.fallbacks += 1;
+                Ok(step)
+            }
+        }
+    }
+
+    /// u_n by the present solver.
+    fn solve_by_one(&mut self, step: usize, time: f64, zeta: &[f64]) -> Result<Step, RunError> {
         let started = Instant::now();
         let (problem, phases) = (self.problem, self.phases);
         self.fill(&problem.triangle_means(zeta))?;
@@ -254,10 +290,6 @@ impl<'a> ContactStep<'a> {
                 return Ok((judged, report));
             }
             if attempt == ATTEMPTS || judged.kkt.worst().is_nan() {
-                let method = match report.rescued_by {
-                    Some(other) => format!("{other}, in the place of {method},"),
-                    None => method.to_owned(),
-                };
                 let (tolerance, residuals) = (problem.tolerance, judged.kkt);
                 let error = ContactError::NotCertified { method, tolerance, residuals };
                 return Err(failed(self.limited(error, &judged)));

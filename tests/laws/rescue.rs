@@ -1,7 +1,11 @@
 //! A solver that stops short is rescued by another one, and the run says so.
 
 use crate::support::{difference, problem, run, try_run};
-use signorini::{contact::SOLVERS, evolution::DiscreteProblem, mesh::Mesh};
+use signorini::{
+    contact::{REGISTRY, SOLVERS, find},
+    evolution::DiscreteProblem,
+    mesh::Mesh,
+};
 
 /// A thin strip that contact alone keeps from sinking and tilting: its bending is so soft against
 /// its other stiffness that the proximal point iteration around TAO stalls.
@@ -24,7 +28,6 @@ fn the_active_set_answers_where_others_stop_short() {
     let exact = run(&loose_strip(false, 20), SOLVERS[0]);
     for solver in ["tao", "penalty-duality"] {
         let refused = try_run(&loose_strip(false, 20), solver).unwrap_err().to_string();
-        println!("{refused}");
         assert!(refused.starts_with(solver), "{refused}");
         let problem = loose_strip(true, 20);
         let outcome = run(&problem, solver);
@@ -40,4 +43,13 @@ fn the_active_set_answers_where_others_stop_short() {
 fn a_type_of_tao_that_is_asked_for_is_not_rescued() {
     let refused = try_run(&loose_strip(true, 20), "tao:tron").unwrap_err().to_string();
     assert!(refused.starts_with("tao:tron stopped after"), "{refused}");
+}
+
+#[test]
+fn a_rescuer_is_another_solver_that_can_solve_as_much() {
+    for entry in &REGISTRY {
+        let Some(name) = entry.rescuer else { continue };
+        let (rescuer, _) = find(name).unwrap();
+        assert!(rescuer.name != entry.name && rescuer.solves >= entry.solves, "{}", entry.name);
+    }
 }

@@ -1,17 +1,16 @@
 //! The penalty-duality algorithm of Bermúdez and Moreno (Comput. Math. Appl. 7, 1981),
 //! the paper's reference [4].
 
-use super::{Anderson, ContactReport, ContactSolver, ProblemClass, SolverEntry, between_0_and_1};
+use super::{
+    Anderson, ContactReport, ContactSolver, ProblemClass, SolverEntry, between_0_and_1, number,
+};
 use crate::{
     cholesky::LinearSystem,
     contact::{Bound, ContactError, ContactProblem, Kkt, elastic::ElasticSolver},
     petsc::{PetscError, Session, Vector},
 };
 use nalgebra::DMatrix;
-use serde::{
-    Deserialize, Deserializer,
-    de::{Error, Unexpected},
-};
+use serde::{Deserialize, Deserializer};
 
 pub(super) const ENTRY: SolverEntry = SolverEntry {
     name: "penalty-duality",
@@ -74,9 +73,7 @@ impl Default for PenaltyOptions {
 }
 
 fn positive<'de, D: Deserializer<'de>>(value: D) -> Result<Option<f64>, D::Error> {
-    let value = f64::deserialize(value)?;
-    let wrong = || D::Error::invalid_value(Unexpected::Float(value), &"positive (Pa/m)");
-    (value > 0.0 && value.is_finite()).then_some(Some(value)).ok_or_else(wrong)
+    number(value, "positive (Pa/m)", |value| value > 0.0 && value.is_finite()).map(Some)
 }
 
 impl<'s> PenaltyDuality<'s> {
