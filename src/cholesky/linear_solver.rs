@@ -222,15 +222,17 @@ impl LinearSolver {
     ) -> Result<bool, PetscError> {
         system.multiply(x, &mut self.residual)?;
         self.residual.scale_add(-1.0, b)?;
-        report.converged = self.free_norm(system)? <= limit;
+        report.converged = self.is_reached(system, limit)?;
         Ok(report.converged)
     }
 
-    /// ‖r‖₂ on the free unknowns.
-    fn free_norm(&mut self, system: LinearSystem) -> Result<f64, PetscError> {
+    /// Whether ‖r‖₂ ≤ `limit` on the free unknowns; never where the norm overflows, as the limit of a
+    /// huge b does too.
+    fn is_reached(&mut self, system: LinearSystem, limit: f64) -> Result<bool, PetscError> {
         self.free_residual.copy(&self.residual)?;
         system.clear_prescribed(&mut self.free_residual)?;
-        self.free_residual.norm()
+        let norm = self.free_residual.norm()?;
+        Ok(norm.is_finite() && norm <= limit)
     }
 
     /// Conjugate gradients from x and its residual r, with P the factored matrix and K = A + D. Until
@@ -274,7 +276,7 @@ impl LinearSolver {
             }
             x.add(energy / stiffness, &self.direction)?;
             self.residual.add(-energy / stiffness, &self.image)?;
-            report.converged = self.free_norm(system)? <= limit;
+            report.converged = self.is_reached(system, limit)?;
             if report.converged {
                 break;
             }
