@@ -183,7 +183,7 @@ impl<'a> ContactStep<'a> {
         let (u, zeta_mean) = (self.next.datum.total(u), self.zeta_mean.clone());
         let state = State { time, u, zeta: zeta.to_vec(), zeta_mean, contact };
         let mut record = phases
-            .time("figures", || StepRecord::new(problem, step, &state, &case.load, &report, &kkt));
+            .time("step record", || StepRecord::new(problem, step, &state, &case.load, &report, &kkt));
         record.seconds = started.elapsed().as_secs_f64();
         Ok(Step { state, record, report, unconstrained, skipped_damage_solve: false })
     }

@@ -70,7 +70,7 @@ impl<'a> DamageStep<'a> {
         let partition = &problem.body.partition;
         let (start, load) = (planned.start.as_slice(), planned.load.as_slice());
         let mut zeta = start.to_vec();
-        let min_max = partition.extremes(&zeta);
+        let min_max = partition.min_max(&zeta);
         let stays = min_max.0 == min_max.1 && self.is_zero(load);
         let Some(law) = problem.damage().filter(|_| !stays) else {
             return Ok(DamageUpdate { zeta, min_max, certificate: None });
@@ -91,7 +91,7 @@ impl<'a> DamageStep<'a> {
                 Err(planned.failed(StepFailure::DamageResidual(residual)))
             }
             _ => {
-                let (min_max, certificate) = (partition.extremes(&zeta), Some(certificate));
+                let (min_max, certificate) = (partition.min_max(&zeta), Some(certificate));
                 Ok(DamageUpdate { zeta, min_max, certificate })
             }
         }

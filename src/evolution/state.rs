@@ -111,9 +111,9 @@ impl StepRecord {
         Self {
             step,
             time: state.time,
-            zeta_min: partition.extremes(&state.zeta).0,
+            zeta_min: partition.min_max(&state.zeta).0,
             zeta_mean: problem.body.mean(&state.zeta),
-            displacement_max: partition.largest(&state.u),
+            displacement_max: partition.max_norm(&state.u),
             work: partition.dot(load, &state.u, 2),
             // An empty sum is -0.0, and so is one of reactions of nothing.
             contact_force: comm.total(state.contact.iter().map(|point| point.force).sum()) + 0.0,

@@ -101,14 +101,14 @@ impl Partition {
     }
 
     /// max |u_i| over the nodes i of the undivided body, u_i the vector at node i. Collective.
-    pub fn largest(&self, u: &[f64]) -> f64 {
+    pub fn max_norm(&self, u: &[f64]) -> f64 {
         let (owned, _) = u[..2 * self.owned].as_chunks::<2>();
         let square = owned.iter().map(|[x, y]| x * x + y * y).fold(0.0, f64::max);
         self.comm.max(square).sqrt()
     }
 
     /// (min, max) of a field with one component over the undivided body. Collective.
-    pub fn extremes(&self, field: &[f64]) -> (f64, f64) {
+    pub fn min_max(&self, field: &[f64]) -> (f64, f64) {
         let owned = field[..self.owned].iter();
         let (min, max) = owned
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(min, max), &z| (min.min(z), max.max(z)));

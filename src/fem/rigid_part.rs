@@ -34,7 +34,7 @@ impl RigidPart {
     }
 
     /// The largest nodal |·| of the motion and of u less the motion, m. Collective.
-    pub fn sizes(&self, body: &Body, u: &[f64]) -> [f64; 2] {
+    pub fn max_norms(&self, body: &Body, u: &[f64]) -> [f64; 2] {
         let (mut rigid, mut rest) = (0.0_f64, 0.0_f64);
         let nodes = body.mesh.nodes.iter().zip(u.as_chunks::<2>().0);
         for (&point, &[ux, uy]) in nodes.take(body.partition.owned()) {

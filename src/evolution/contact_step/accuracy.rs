@@ -86,7 +86,7 @@ impl ContactStep<'_> {
             Some((max, state)) => (*max, state),
             None => (last.record.displacement_max, &last.state),
         };
-        let [rigid, rest] = RigidPart::of(body, &resolved.u).sizes(body, &resolved.u);
+        let [rigid, rest] = RigidPart::of(body, &resolved.u).max_norms(body, &resolved.u);
         // What is only carried along has no strains but rounding.
         let energy = match rest > CARRIED * rigid {
             true => elasticity.energy_error(body, &resolved.zeta_mean, &resolved.u)?,
@@ -118,7 +118,7 @@ fn displacement_error(
     state: &State,
     max: f64,
 ) -> Result<f64, PetscError> {
-    if max == 0.0 || problem.body.partition.largest(&state.u) == 0.0 {
+    if max == 0.0 || problem.body.partition.max_norm(&state.u) == 0.0 {
         return Ok(0.0);
     }
     stiffness.refill(&state.zeta_mean)?;
@@ -151,5 +151,5 @@ fn displacement_error(
     let mut correction = body.partition.field(correction.read(<[f64]>::to_vec)?, 2)?;
     constraints.bases.displacement_to_global(&mut correction);
     problem.motions.remove_free(body, &mut correction);
-    Ok(body.partition.largest(&correction) / max)
+    Ok(body.partition.max_norm(&correction) / max)
 }

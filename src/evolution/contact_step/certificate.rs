@@ -47,7 +47,7 @@ impl ContactStep<'_> {
         let problem = self.problem;
         let (body, partition) = (&problem.body, &problem.body.partition);
         let rigid = RigidPart::of(body, &u);
-        let [rigid_max, elastic_max] = rigid.sizes(body, &u);
+        let [rigid_max, elastic_max] = rigid.max_norms(body, &u);
         let mut unbalanced = problem.elasticity.internal_force(body, &self.zeta_mean, &u);
         // |f|², |Ku|², u·Ku and |u|².
         let mut sums = [0.0; 4];
@@ -84,7 +84,7 @@ impl ContactStep<'_> {
         let (datum, run) = (&self.next.datum, self.accepted.scales);
         let rounding = match datum.is_zero() {
             true => 0.0,
-            false => CARRIED * self.problem.body.partition.largest(&datum.field),
+            false => CARRIED * self.problem.body.partition.max_norm(&datum.field),
         };
         let force = answer.force.max(run.force).max(self.stiffness.scale * rounding);
         let least = rounding.max(force / self.stiffness.scale);

@@ -108,7 +108,7 @@ impl<'a> StepController<'a> {
             source,
             load_change: zeros.clone(),
             delay: zeros,
-            bounds: problem.body.partition.extremes(zeta),
+            bounds: problem.body.partition.min_max(zeta),
             violation: BoundViolation::default(),
         }
     }
@@ -129,7 +129,7 @@ impl<'a> StepController<'a> {
         let beta = omega * omega / (1.0 + 2.0 * omega);
         let k = length * (1.0 + omega) / (1.0 + 2.0 * omega);
         let shift = beta * &self.change;
-        let (lower, upper) = shifted(self.bounds, self.body.partition.extremes(shift.as_slice()));
+        let (lower, upper) = shifted(self.bounds, self.body.partition.min_max(shift.as_slice()));
         // φ ≤ 0, so b ≤ 0 and b̂_n ≥ (1 + ω) b_{n−1}. What is not a number must stay so.
         let lower = lower + k * ((1.0 + omega) * self.source.min);
         let load =
@@ -177,7 +177,7 @@ impl<'a> StepController<'a> {
         let (lower, upper) = planned.bounds;
         let tightened = (lower.max(damage.min_max.0), upper.min(damage.min_max.1));
         let partition = &self.body.partition;
-        self.bounds = shifted(tightened, partition.extremes(correction.as_slice()));
+        self.bounds = shifted(tightened, partition.min_max(correction.as_slice()));
         self.length = planned.length;
         self.change = &corrected - &self.zeta;
         self.zeta = corrected;
@@ -196,7 +196,7 @@ impl<'a> StepController<'a> {
     ) -> Verdict {
         let (zeta_min, level) = (damage.min_max.0, self.threshold);
         let (time, delays) = if let Some(chosen) = &self.chosen {
-            let from = self.body.partition.extremes(self.zeta.as_slice()).0;
+            let from = self.body.partition.min_max(self.zeta.as_slice()).0;
             let part = if from > level { (from - level) / (from - zeta_min) } else { 0.0 };
             // The last ζ that is written counts as well as its correction ζ̃.
             if from.max(last.record.zeta_min) - level > chosen.landing()
