@@ -8,6 +8,7 @@
 mod accuracy;
 mod certificate;
 mod datum;
+mod rescue;
 
 pub use accuracy::Accuracy;
 
@@ -131,43 +132,8 @@ impl<'a> ContactStep<'a> {
         self.accepted.warm_start = warm_start.to_vec();
     }
 
-    /// u_n at `time` for the nodal damage `zeta`. Every solve starts from the accepted steps, whatever
-    /// was solved since the last of them. Where the solver stops short, its rescuer is asked.
-    ///
-    /// # Errors
-    /// The solver failed, or no answer of its met the KKT tolerance, nor one of its rescuer.
-    pub fn solve(&mut self, step: usize, time: f64, zeta: &[f64]) -> Result<Step, RunError> {
-        let comm = self.problem.body.partition.comm();
-        let solved = self.solve_by_one(step, time, zeta);
-        let limited = match &solved {
-            Err(RunError::Contact { source, .. }) if source.may_be_rescued(comm) => {
-                source.is_limited()
-            }
-            _ => return solved,
-        };
-        let Some(rescuer) = self.rescuer.take() else { return solved };
-        let asked = std::mem::replace(&mut self.solver, rescuer);
-        // One solver's warm start is none for another, and what the solver believed has misled it.
-        self.accepted.warm_start.clear();
-        let rescued = self.solve_by_one(step, time, zeta);
-        let rescuer = std::mem::replace(&mut self.solver, asked);
-        self.solver.set_warm_start(&[]);
-        let name = rescuer.name();
-        self.rescuer = Some(rescuer);
-        match rescued {
-            // What rounding allows is worth telling, if only the rescuer has found it.
-            Err(RunError::Contact { source, .. }) if limited || !source.is_limited() => solved,
-            Err(other) => Err(other),
-            Ok(mut step) => {
-                step.report.rescued_by = Some(name);
-                step.report.fallbacks += 1;
-                step.record.fallbacks += 1;
-                Ok(step)
-            }
-        }
-    }
-
-    /// u_n by the present solver.
+    /// u_n at `time` for the nodal damage `zeta`, by the present solver. Every solve starts from the
+    /// accepted steps, whatever was solved since the last of them.
     fn solve_by_one(&mut self, step: usize, time: f64, zeta: &[f64]) -> Result<Step, RunError> {
         let started = Instant::now();
         let (problem, phases) = (self.problem, self.phases);
@@ -182,8 +148,9 @@ impl<'a> ContactStep<'a> {
         let unconstrained = self.unconstrained_motion(&contact, force);
         let (u, zeta_mean) = (self.next.datum.total(u), self.zeta_mean.clone());
         let state = State { time, u, zeta: zeta.to_vec(), zeta_mean, contact };
-        let mut record = phases
-            .time("step record", || StepRecord::new(problem, step, &state, &case.load, &report, &kkt));
+        let mut record = phases.time("step record", || {
+            StepRecord::new(problem, step, &state, &case.load, &report, &kkt)
+        });
         record.seconds = started.elapsed().as_secs_f64();
         Ok(Step { state, record, report, unconstrained, skipped_damage_solve: false })
     }
