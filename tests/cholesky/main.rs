@@ -21,6 +21,11 @@ fn lower(a: &DMatrix<f64>) -> LowerTriangle {
     lower
 }
 
+/// Tests of CHOLMOD alone take turns too: the BLAS it calls has no locks.
+fn turn() -> Session {
+    Session::start(&[]).unwrap()
+}
+
 /// A definite matrix of rows coupled at random, `sparsity` of 8 entries missing.
 fn coupled(size: usize, sparsity: usize) -> DMatrix<f64> {
     let number = |i: usize, j: usize| (i * 31 + j * 17 + i * j) % 101;
@@ -51,6 +56,7 @@ fn residual(a: &DMatrix<f64>, cholesky: &mut Cholesky, b: &DVector<f64>) -> f64 
 
 #[test]
 fn solves_solve_whatever_the_shape_of_the_supernodes() {
+    let _turn = turn();
     for size in (1..30).chain([100, 211]) {
         for sparsity in [0, 3, 6, 7, 8] {
             let a = coupled(size, sparsity);
@@ -68,6 +74,7 @@ fn solves_solve_whatever_the_shape_of_the_supernodes() {
 
 #[test]
 fn the_forward_solve_makes_the_energy_of_the_solution() {
+    let _turn = turn();
     // |L⁻¹Pb|² = bᵀA⁻¹b.
     let a = coupled(50, 5);
     let b = DVector::from_element(50, 1.0);
@@ -82,6 +89,7 @@ fn the_forward_solve_makes_the_energy_of_the_solution() {
 
 #[test]
 fn the_schur_complement_of_the_interface_is_left_to_the_caller() {
+    let _turn = turn();
     const INTERFACE: usize = 7;
     let mut a = coupled(61, 5);
     a.view_mut((61 - INTERFACE, 61 - INTERFACE), (INTERFACE, INTERFACE)).add_scalar_mut(1e-3);
@@ -115,6 +123,7 @@ fn the_schur_complement_of_the_interface_is_left_to_the_caller() {
 
 #[test]
 fn a_matrix_that_needs_all_digits_gets_them() {
+    let _turn = turn();
     // Springs in a row, the last supported by almost nothing: condition 1e12.
     let mut a = DMatrix::from_fn(40, 40, |i, j| match i.abs_diff(j) {
         0 => 2.0,
@@ -131,6 +140,7 @@ fn a_matrix_that_needs_all_digits_gets_them() {
 
 #[test]
 fn a_matrix_that_is_not_definite_is_told_and_forgotten() {
+    let _turn = turn();
     let good = coupled(20, 4);
     let mut bad = good.clone();
     bad[(7, 7)] = -1.0;
