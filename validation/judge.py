@@ -28,6 +28,7 @@ ENERGY = 1e-4  # strains in the energy norm, relative
 PAST = 0.1  # a load may cross zero: scales fall no lower than this share of the largest so far
 TOLERANCE = 1e-10  # KKT tolerance of a run; relative limits are for this and grow with it
 DAMAGE = 1e-8
+EPSILON = np.finfo(float).eps
 
 
 @dataclass
@@ -252,7 +253,10 @@ def residuals(step, u, scale=(0.0, 0.0)):
     alone = np.abs(step.k @ step.lift).max()
     carried = 10 * TOLERANCE * easing * alone
     travelled = step.discrete.element_sizes(step.zeta, np.full_like(u, PAST * scale[1]))[1]
-    noise = 1e-14 * (rounding + travelled).reshape(-1, 2).sum(1)
+    # u = a rigid motion and a rest: near the motion's centre of rotation, too, u is exact to the
+    # last digits of the largest displacement only.
+    largest = step.discrete.element_sizes(step.zeta, np.full_like(u, np.abs(u).max()))[1]
+    noise = (1e-14 * (rounding + travelled) + EPSILON * largest).reshape(-1, 2).sum(1)
     off = np.maximum(off - noise - carried, 0.0)
     return off.max() / force / easing, places / length / easing, (max(force, 0.1 * alone), length)
 
