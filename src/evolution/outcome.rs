@@ -16,7 +16,7 @@ pub struct Outcome {
     pub skipped_damage_solves: usize,
     /// Steps that were made again, shorter.
     pub undone: usize,
-    /// Steps in which the contact solver left its fast path.
+    /// Steps in which the solver that gave the answer left its fast path.
     pub fallbacks: usize,
     /// Steps in which another solver gave the answer, and which.
     pub rescued: Option<(usize, &'static str)>,
@@ -90,7 +90,9 @@ impl Outcome {
         let Step { record, report, unconstrained, .. } = &self.last;
         self.kkt = self.kkt.max(&record.kkt());
         self.skipped_damage_solves += usize::from(self.last.skipped_damage_solve);
-        self.fallbacks += usize::from(report.fallbacks > 0);
+        // A rescue counts as one fallback of the step.
+        let rescues = usize::from(report.rescued_by.is_some());
+        self.fallbacks += usize::from(report.fallbacks > rescues);
         if let Some(solver) = report.rescued_by {
             let before = self.rescued.map_or(0, |(steps, _)| steps);
             self.rescued = Some((before + 1, solver));
