@@ -88,11 +88,11 @@ struct Entry {
     kkt_primal: f64,
     kkt_dual: f64,
     kkt_complementarity: f64,
-    /// max |u − u_ref| / max |u_ref| at the end.
+    /// max |u − u_ref| at the end, over max |u_ref| of all steps.
     difference_u: f64,
     /// max |ζ − ζ_ref| at the end.
     difference_zeta: f64,
-    /// max |p − p_ref| / max |p_ref| at the end, p the contact pressure.
+    /// max |p − p_ref| at the end, over max |p_ref| of all steps, p the contact pressure.
     difference_pressure: f64,
     /// Why the run ended early, if it failed.
     error: Option<String>,
@@ -122,30 +122,33 @@ fn compare_solvers(
     let mut runs = runs.collect::<Result<Vec<_>, _>>()?;
     let reference = runs
         .iter()
-        .filter(|(entry, _)| entry.error.is_none())
-        .min_by(|(a, _), (b, _)| a.worst_residual().total_cmp(&b.worst_residual()))
-        .and_then(|(_, state)| state.clone());
-    for (entry, state) in &mut runs {
-        if let (Some(state), Some(reference)) = (state, &reference) {
-            entry.difference_u = relative(&state.u, &reference.u);
+        .filter(|(entry, ..)| entry.error.is_none())
+        .min_by(|(a, ..), (b, ..)| a.worst_residual().total_cmp(&b.worst_residual()))
+        .and_then(|(_, state, scales)| Some((state.clone()?, *scales)));
+    for (entry, state, _) in &mut runs {
+        if let (Some(state), Some((reference, [max_u, max_p]))) = (state, &reference) {
+            entry.difference_u = difference(&state.u, &reference.u) / max_u;
             entry.difference_zeta = difference(&state.zeta, &reference.zeta);
-            entry.difference_pressure = relative(&pressure(state), &pressure(reference));
+            entry.difference_pressure = difference(&pressure(state), &pressure(reference)) / max_p;
         }
     }
-    Ok(runs.into_iter().map(|(entry, _)| entry).collect())
+    Ok(runs.into_iter().map(|(entry, ..)| entry).collect())
 }
 
-/// The run of one solver, and its last accepted state.
+/// The run of one solver, its last accepted state, and what counts as 1 in u and in p: their max norms
+/// over all steps.
 fn run(
     session: &Session,
     problem: &DiscreteProblem,
     solver: &str,
-) -> Result<(Entry, Option<State>), RunError> {
+) -> Result<(Entry, Option<State>, [f64; 2]), RunError> {
     let phases = Phases::default();
     let mut records: Vec<StepRecord> = Vec::new();
-    let mut state = None;
+    let (mut state, mut scales) = (None, [0.0_f64; 2]);
     let result = evolution::run(session, problem, solver, &phases, &mut |step| {
         records.push(step.record);
+        scales[0] = scales[0].max(step.record.displacement_max);
+        scales[1] = pressure(&step.state).iter().fold(scales[1], |max, p| max.max(p.abs()));
         state = Some(step.state.clone());
         Ok(())
     });
@@ -177,7 +180,7 @@ fn run(
         difference_pressure: f64::NAN,
         error,
     };
-    Ok((entry, state))
+    Ok((entry, state, scales.map(|scale| if scale == 0.0 { 1.0 } else { scale })))
 }
 
 fn pressure(state: &State) -> Vec<f64> {
@@ -187,12 +190,6 @@ fn pressure(state: &State) -> Vec<f64> {
 /// ‖a − b‖ in the max norm.
 fn difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
-}
-
-/// ‖a − b‖ / ‖b‖ in the max norm, ‖a − b‖ where b vanishes.
-fn relative(a: &[f64], b: &[f64]) -> f64 {
-    let norm = b.iter().fold(0.0_f64, |norm, value| norm.max(value.abs()));
-    if norm == 0.0 { difference(a, b) } else { difference(a, b) / norm }
 }
 
 /// A table in Markdown.

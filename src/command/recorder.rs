@@ -40,17 +40,22 @@ impl<'a> Recorder<'a> {
         Ok(Self { task, fields, history, last: None, stepping: 0.0 })
     }
 
-    /// Whether a frame is written of step `n`. Unless the scene says how often, runs that do not come
+    /// Whether a frame is written of a step. Unless the scene says how often, runs that do not come
     /// far get additional frames after 1, 2, 4, … steps.
-    fn is_frame(&self, n: usize) -> bool {
+    fn is_frame(&self, StepRecord { step: n, time, .. }: &StepRecord) -> bool {
         let scene = self.task.problem.scene();
-        match (scene.output.every, scene.time.map(|grid| grid.stepping)) {
+        let Some(grid) = scene.time else { return true };
+        match (scene.output.every, grid.stepping) {
             (Some(every), _) => n.is_multiple_of(every),
-            (None, Some(Stepping::Uniform { steps })) => {
+            (None, Stepping::Uniform { steps }) => {
                 let every = steps.div_ceil(FRAMES);
-                n.is_multiple_of(every) || (n < every && n.is_power_of_two())
+                n.is_multiple_of(every) || (*n < every && n.is_power_of_two())
             }
-            (None, _) => true,
+            (None, Stepping::Auto { .. }) => {
+                let part = |time: f64| (FRAMES as f64 * time / grid.end) as usize;
+                let before = self.last.as_ref().map_or(0, |step| part(step.record.time));
+                *n == 0 || part(*time) > before || (part(*time) == 0 && n.is_power_of_two())
+            }
         }
     }
 
@@ -66,7 +71,7 @@ impl<'a> Recorder<'a> {
                 history.add(&step.record)
             });
             // All ranks write the frame together, also where the row could not be written.
-            match self.is_frame(step.record.step) {
+            match self.is_frame(&step.record) {
                 true => row.and(self.fields.add(&self.task.problem, &step.state)),
                 false => row,
             }

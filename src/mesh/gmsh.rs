@@ -77,15 +77,37 @@ fn refusal(text: &str, name: &str, value: f64) -> Option<&'static str> {
     // An included file may define the parameter.
     let includes = text.contains("Include") || text.contains("Merge");
     let defined = || includes || text.split(|c| !word(c)).any(|w| w == name);
+    let assigned =
+        "the .geo file assigns it, which overrules this value; write DefineConstant[ … ] there";
     if !name.chars().all(word) || !name.starts_with(|c: char| !c.is_ascii_digit()) {
         Some("the name must consist of letters, digits and underscores")
     } else if !value.is_finite() {
         Some("the value must be finite")
+    } else if is_assigned(text, name) {
+        Some(assigned)
     } else if name == "size" {
         (value <= 0.0).then_some("the size must be positive")
     } else {
         (!defined()).then_some("the .geo file has no such parameter")
     }
+}
+
+/// Whether a statement of the .geo file `text` is `name = …`. In `DefineConstant[ … ]` and behind
+/// `If (!Exists(…))` a constant gives way to the parameter.
+fn is_assigned(text: &str, name: &str) -> bool {
+    let blocks = text.split("/*").enumerate();
+    let code = blocks.map(|(i, part)| match i {
+        0 => part,
+        _ => part.split_once("*/").map_or("", |(_, rest)| rest),
+    });
+    let code: String = code.collect();
+    let lines = code.lines().map(|line| line.split("//").next().unwrap_or_default());
+    let code = lines.collect::<Vec<_>>().join(" ");
+    code.match_indices(name).any(|(at, _)| {
+        let after = code[at + name.len()..].trim_start();
+        let starts = matches!(code[..at].trim_end().chars().next_back(), None | Some(';' | '}'));
+        starts && after.starts_with('=') && !after.starts_with("==")
+    })
 }
 
 fn mesh_path(geo: &Path, parameters: &BTreeMap<String, f64>) -> PathBuf {

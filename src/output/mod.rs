@@ -39,7 +39,28 @@ pub fn create(folder: &Path) -> Result<(), OutputError> {
     Ok(())
 }
 
-/// Creates `folder` and removes the results of an earlier run, so that none are mistaken for new.
+/// What a run and its figures leave in a folder besides the frames.
+const FILES: [&str; 7] = [
+    "fields.pvd",
+    "history.csv",
+    "summary.json",
+    "deformed.png",
+    "stress-damage.png",
+    "pressure.png",
+    "damage-history.png",
+];
+
+/// Whether `name` is that of a frame, of a piece or of a list of pieces: `fields_NNNN[_R].[p]vtu`.
+fn is_frame(name: &str) -> bool {
+    let stem = name.strip_suffix(".vtu").or(name.strip_suffix(".pvtu"));
+    stem.and_then(|stem| stem.strip_prefix("fields_")).is_some_and(|numbers| {
+        let is_number = |n: &str| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit());
+        numbers.split('_').all(is_number)
+    })
+}
+
+/// Creates `folder` and removes the results of an earlier run and their figures, so that none are
+/// mistaken for new.
 ///
 /// # Errors
 /// The folder cannot be created or written to.
@@ -49,9 +70,7 @@ pub fn prepare(folder: &Path) -> Result<(), OutputError> {
     for entry in entries.flatten() {
         let name = entry.file_name();
         let name = name.to_string_lossy();
-        let is_frame =
-            name.starts_with("fields_") && (name.ends_with(".vtu") || name.ends_with(".pvtu"));
-        if is_frame || ["fields.pvd", "history.csv", "summary.json"].contains(&&*name) {
+        if is_frame(&name) || FILES.contains(&&*name) {
             fs::remove_file(entry.path()).map_err(|e| OutputError::new(&entry.path(), e))?;
         }
     }

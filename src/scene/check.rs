@@ -46,7 +46,7 @@ impl Scene {
                 (Ok(curve), Some(gap)) => {
                     let key = boundary_key(&boundary.name, "gap");
                     let nodes = curve.edges.iter().flatten().map(|&node| mesh.nodes[node]);
-                    let rule = "; it must not be negative";
+                    let rule = "; it must be finite and not negative";
                     let holds = |distance| distance >= least;
                     problems.extend(self.check(&key, &gap.distance, nodes, &[0.0], rule, holds));
                     problems.extend(self.check_normal(&boundary.name, gap, curve, mesh));

@@ -128,7 +128,11 @@ fn time(table: &mut Table) -> Reading<(TimeGrid, Option<String>)> {
         Content::Text(_) => Err(value.refuse("must be a number (s) or \"auto\"")),
         _ => value.positive("s").map(Some),
     });
-    let tolerance = table.optional("tolerance", Value::fraction);
+    let tolerance = table.optional("tolerance", |value| {
+        value.number("at least 1e-5 (rounding hides smaller errors of ζ) and below 1", |number| {
+            (1e-5..1.0).contains(&number)
+        })
+    });
 
     let (end, step, tolerance) = (end?, step?, tolerance?);
     let Some(step) = step else {

@@ -126,11 +126,25 @@ fn a_run_that_does_not_come_far_has_frames_of_its_beginning() {
 }
 
 #[test]
-fn what_others_put_into_the_folder_stays() {
+fn chosen_steps_have_about_twenty_frames() {
     let test_directory = TestDirectory::new();
-    test_directory.write("out/scene/notes.txt", "mine");
-    test_directory.write("out/scene/deformed.png", "mine");
+    test_directory.run(&["--set", "time.step=auto", "--set", "time.tolerance=1e-4"]);
+    let frames = test_directory.frames("out/scene").len() as i64;
+    let steps = test_directory.summary("out/scene")["steps"].as_i64().expect("a number");
+    assert!(steps > 40 && (20..=30).contains(&frames), "{frames} frames of {steps} steps");
+}
+
+#[test]
+fn what_others_put_into_the_folder_stays_but_figures_of_an_earlier_run() {
+    let test_directory = TestDirectory::new();
+    let others = ["notes.txt", "fields_mine.vtu", "fields_.vtu", "fields_0001_old.vtu"];
+    for name in others.into_iter().chain(["deformed.png", "fields_0099_1.vtu"]) {
+        test_directory.write(&format!("out/scene/{name}"), "mine");
+    }
     test_directory.run(&["--set", "time.end=0.1"]);
-    assert_eq!(test_directory.read("out/scene/notes.txt"), "mine");
-    assert_eq!(test_directory.read("out/scene/deformed.png"), "mine");
+    for name in others {
+        assert_eq!(test_directory.read(&format!("out/scene/{name}")), "mine");
+    }
+    assert!(!test_directory.path("out/scene/deformed.png").exists());
+    assert!(!test_directory.path("out/scene/fields_0099_1.vtu").exists());
 }

@@ -258,6 +258,25 @@ fn what_gmsh_rejects_is_told() {
 }
 
 #[test]
+fn a_constant_that_the_file_assigns_itself_is_no_parameter() {
+    let (_folder, geo) = copy("square");
+    // It would overrule the parameter without a word.
+    for (text, overruled) in [
+        ("w = 1;\n", true),
+        ("a = 2; /* w */ w=1; // c\n", true),
+        ("// w = 1;\nDefineConstant[ w = 1 ];\n", false),
+        ("/* w = 1; */ DefineConstant[ v = 1,\n w = 1 ];\n", false),
+        ("If (!Exists(w))\n w = 1;\nEndIf\n", false),
+        ("If (w == 1)\nEndIf\n", false),
+    ] {
+        fs::write(&geo, text).unwrap();
+        let read = load(&geo, &BTreeMap::from([("w".to_owned(), 3.0)]));
+        let told = read.is_err_and(|e| e.to_string().contains("assigns it, which overrules"));
+        assert_eq!(told, overruled, "{text}");
+    }
+}
+
+#[test]
 fn missing_gmsh_says_what_to_install() {
     // The search path is this process's own: look again from a child without one.
     if env::var_os("PATH").is_some_and(|path| path.is_empty()) {

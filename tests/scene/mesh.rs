@@ -77,17 +77,17 @@ fn values_are_checked_where_they_are_used() {
         (
             "x^2",
             "1-x",
-            "bad.toml:36: boundary \"foundation\": gap is -1 at (2, 0); it must not be negative",
+            "bad.toml:36: boundary \"foundation\": gap is -1 at (2, 0); it must be finite and not negative",
         ),
         (
             "x^2",
             "sqrt(x-1)",
-            "bad.toml:36: boundary \"foundation\": gap is NaN at (0, 0); it must not be negative",
+            "bad.toml:36: boundary \"foundation\": gap is NaN at (0, 0); it must be finite and not negative",
         ),
         (
             "\"x^2\"",
             "-0.1",
-            "bad.toml:36: boundary \"foundation\": gap is -0.1 at (0, 0); it must not be negative",
+            "bad.toml:36: boundary \"foundation\": gap is -0.1 at (0, 0); it must be finite and not negative",
         ),
         (
             "[\"3\", \"-4\"]",
