@@ -40,10 +40,17 @@ pub fn compare(arguments: &CompareArguments) -> Result<(), Failure> {
     require_one_process()?;
     arguments.solvers.iter().try_for_each(|name| check_solver("--solvers", name))?;
     check_petsc(&arguments.petsc)?;
-    let mut problems = Vec::new();
+    let mut problems: Vec<DiscreteProblem> = Vec::new();
     for path in &arguments.scenes {
         let (mut scene, mesh) = read(path, None, &arguments.set)?;
         scene.contact.rescue = false;
+        if let Some(other) = problems.iter().find(|other| other.scene().name == scene.name) {
+            return Err(Failure::input(format!(
+                "{} and {} have the same name, which the table goes by; rename one",
+                other.scene().path.display(),
+                path.display()
+            )));
+        }
         problems.push(DiscreteProblem::new(scene, mesh).map_err(Failure::input)?);
     }
     output::create(&arguments.out).map_err(Failure::input)?;

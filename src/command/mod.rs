@@ -71,7 +71,14 @@ fn check_petsc(options: &[String]) -> Result<(), Failure> {
 fn read(path: &Path, file: Option<&Path>, set: &[String]) -> Result<(Scene, Mesh), Failure> {
     let mut scene = Scene::read(path, set).map_err(Failure::input)?;
     if let Some(file) = file {
-        scene.mesh = MeshSource::from_path(file);
+        let replaced = std::mem::replace(&mut scene.mesh, MeshSource::from_path(file));
+        if !replaced.parameters.is_empty() {
+            let unused: Vec<_> = replaced.parameters.into_keys().collect();
+            scene.notes.push(format!(
+                "of the scene's [mesh] nothing was used, because of --mesh: not {}",
+                unused.join(", ")
+            ));
+        }
     }
     let mesh = mesh::load(&scene.mesh.file, &scene.mesh.parameters).map_err(Failure::input)?;
     Ok((scene, mesh))
