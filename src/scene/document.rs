@@ -41,8 +41,15 @@ impl SceneText {
     /// All is well if there are no problems; else they are told in the order of the file.
     pub(super) fn verdict(&self, mut problems: Vec<Problem>) -> Result<(), SceneError> {
         problems.sort_by_key(|(origin, _)| *origin);
-        let reports = problems.iter().map(|(origin, message)| self.report(*origin, message));
-        if problems.is_empty() { Ok(()) } else { Err(SceneError::Refused(reports.collect())) }
+        let mut reports: Vec<String> =
+            problems.iter().map(|(origin, message)| self.report(*origin, message)).collect();
+        let Some(last) = reports.last_mut() else { return Ok(()) };
+        // What contradicts a line of the file may stand on the command line.
+        let of_the_file = |(origin, _): &Problem| !matches!(origin, Origin::Set(_));
+        if !self.sets.is_empty() && problems.iter().all(of_the_file) {
+            *last += &format!("\n(the file was read with --set {})", self.sets.join(" --set "));
+        }
+        Err(SceneError::Refused(reports))
     }
 
     /// The message with its place before it and the lines of the file after it, underlined.
