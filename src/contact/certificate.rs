@@ -32,13 +32,13 @@ pub struct ContactPoint {
     pub node: usize,
     /// ν, towards the obstacle.
     pub normal: [f64; 2],
-    /// Normal reaction p, N per metre of thickness; positive presses.
+    /// Normal reaction p, N per metre of thickness; positive in compression.
     pub force: f64,
     /// The reaction over the node's tributary length, Pa.
     pub pressure: f64,
     /// g − u·ν: the gap that is left, m.
     pub gap: f64,
-    /// Whether the node presses rather than gapes, p/F > (g − u·ν)/U.
+    /// Whether the node is active, p/F > (g − u·ν)/U.
     pub active: bool,
 }
 

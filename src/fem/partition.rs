@@ -1,4 +1,4 @@
-//! Which nodes this rank owns, and the exchange of values with the ranks that own the others.
+//! Which nodes this rank owns, and the communication of values with the ranks that own the others.
 
 use crate::petsc::{Communicator, Ghosts, PetscError};
 

@@ -10,7 +10,7 @@ use nalgebra::Matrix2;
 /// K consists of 2×2 blocks, one for each pair of nodes with a common triangle. For every pair the
 /// undamaged contributions of its triangles are kept: a refill reads these once, in order.
 pub struct Stiffness {
-    /// K, symmetric; rows and columns of fixed unknowns hold only a diagonal.
+    /// K, symmetric; rows and columns of fixed unknowns have only a diagonal.
     pub matrix: Matrix,
     /// Mean diagonal entry of the undamaged K, N/m: the scale of the matrix.
     pub scale: f64,

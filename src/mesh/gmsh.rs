@@ -103,11 +103,15 @@ fn is_assigned(text: &str, name: &str) -> bool {
     let code: String = code.collect();
     let lines = code.lines().map(|line| line.split("//").next().unwrap_or_default());
     let code = lines.collect::<Vec<_>>().join(" ");
-    code.match_indices(name).any(|(at, _)| {
-        let after = code[at + name.len()..].trim_start();
-        let starts = matches!(code[..at].trim_end().chars().next_back(), None | Some(';' | '}'));
-        starts && after.starts_with('=') && !after.starts_with("==")
-    })
+    let gives_way = code.replace(' ', "").contains(&format!("Exists({name})"));
+    !gives_way
+        && code.match_indices(name).any(|(at, _)| {
+            let after = code[at + name.len()..].trim_start();
+            let before = code[..at].trim_end();
+            let starts = matches!(before.chars().next_back(), None | Some(';' | '}'))
+                || before.len() < at && (before.ends_with("EndIf") || before.ends_with("EndFor"));
+            starts && after.starts_with('=') && !after.starts_with("==")
+        })
 }
 
 fn mesh_path(geo: &Path, parameters: &BTreeMap<String, f64>) -> PathBuf {

@@ -1,4 +1,4 @@
-//! What may hold on the parts of the boundary, and what may not hold together.
+//! The conditions on the parts of the boundary, and which of them exclude each other.
 
 use std::collections::BTreeMap;
 

@@ -44,9 +44,9 @@ fn a_held_node_on_the_contact_boundary_keeps_its_value() {
             }
         }
         // It is no contact node: it counts in no reaction.
-        let held = node(&problem.body.mesh, [0.0, 0.0]);
+        let prescribed = node(&problem.body.mesh, [0.0, 0.0]);
         assert_eq!(last.state.contact.len(), 4);
-        assert!(last.state.contact.iter().all(|point| point.node != held));
+        assert!(last.state.contact.iter().all(|point| point.node != prescribed));
         assert!(last.record.active_nodes > 0);
     }
 }
@@ -224,19 +224,19 @@ fn gaps_of_one_smooth_boundary_become_one_bound_and_those_of_a_corner_two() {
 #[test]
 fn a_third_gap_or_a_gap_along_a_held_direction_takes_no_unknown() {
     let gap = |normal, gap| GapRow { node: 0, normal, gap, tributary_length: 1.0 };
-    let held = |direction| FixedRow { node: 0, direction };
+    let prescribed = |direction| FixedRow { node: 0, direction };
     let origin = [[0.0, 0.0]];
     let three = [gap([0.0, -1.0], 0.0), gap([1.0, 0.0], 0.0), gap([-0.6, 0.8], 0.0)];
     assert!(matches!(Constraints::new(&origin, &[], &three), Err(ConstraintError::TooMany { .. })));
     // Held along the normal: no bound, but the value is checked against the gap.
     let constraints =
-        Constraints::new(&origin, &[held([0.0, -1.0])], &[gap([0.0, -1.0], 0.1)]).unwrap();
+        Constraints::new(&origin, &[prescribed([0.0, -1.0])], &[gap([0.0, -1.0], 0.1)]).unwrap();
     assert!(constraints.bounds.is_empty());
     assert!(constraints.lift(&[0.1], &origin).is_ok());
     assert!(constraints.lift(&[0.11], &origin).is_err());
     // Held the other way round, the same gap is on the other side.
     let constraints =
-        Constraints::new(&origin, &[held([0.0, 1.0])], &[gap([0.0, -1.0], 0.1)]).unwrap();
+        Constraints::new(&origin, &[prescribed([0.0, 1.0])], &[gap([0.0, -1.0], 0.1)]).unwrap();
     assert!(constraints.lift(&[-0.11], &origin).is_err());
     assert!(constraints.lift(&[0.11], &origin).is_ok());
 }

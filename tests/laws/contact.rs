@@ -150,13 +150,13 @@ fn an_inclined_foundation_is_met_along_its_normal() {
         let (_, residual) = energy(&problem, &state, &state.u);
         assert!(state.contact.iter().filter(|p| p.active).count() > 2);
         for point in &state.contact {
-            let (i, held) = (2 * point.node, [0.6, -0.8]);
+            let (i, prescribed) = (2 * point.node, [0.6, -0.8]);
             if problem.body.mesh.nodes[point.node][1] > 0.0 {
                 continue;
             }
             // f − Ku = p ν
             for k in 0..2 {
-                close(-residual[i + k], point.force * held[k], 1e-8);
+                close(-residual[i + k], point.force * prescribed[k], 1e-8);
             }
             let along = 0.6 * state.u[i] - 0.8 * state.u[i + 1];
             close(point.gap, 0.001 - along, 1e-12);

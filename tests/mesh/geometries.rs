@@ -267,7 +267,9 @@ fn a_constant_that_the_file_assigns_itself_is_no_parameter() {
         ("// w = 1;\nDefineConstant[ w = 1 ];\n", false),
         ("/* w = 1; */ DefineConstant[ v = 1,\n w = 1 ];\n", false),
         ("If (!Exists(w))\n w = 1;\nEndIf\n", false),
+        ("If (!Exists(w))\n v = 2;\n w = 1;\nEndIf\n", false),
         ("If (w == 1)\nEndIf\n", false),
+        ("If (1)\nEndIf\nw = 1;\n", true),
     ] {
         fs::write(&geo, text).unwrap();
         let read = load(&geo, &BTreeMap::from([("w".to_owned(), 3.0)]));

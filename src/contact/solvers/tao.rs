@@ -141,7 +141,7 @@ impl ContactSolver for Tao<'_> {
 struct Scaled {
     stiffness: Matrix,
     load: Vector,
-    /// Lower and upper.
+    /// The lower bounds, and the upper ones.
     bounds: [Vector; 2],
     x: Vector,
     /// ρ.

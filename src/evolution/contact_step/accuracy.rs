@@ -45,7 +45,7 @@ impl Accuracy {
         let mut notes = Vec::new();
         if self.displacement.is_infinite() {
             notes.push(format!(
-                "at t = {:.4e}, the active contact nodes alone do not hold the body: how exact the \
+                "at t = {:.4e}, the active contact nodes alone do not support the body: how exact the \
                  displacements are cannot be estimated",
                 self.time
             ));
