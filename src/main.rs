@@ -45,7 +45,7 @@ fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            failure.message.iter().for_each(|message| eprintln!("error: {message}"));
+            failure.message.iter().for_each(|message| command::tell(message));
             ExitCode::from(failure.code)
         }
     }

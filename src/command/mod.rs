@@ -18,6 +18,7 @@ use signorini::{
 };
 use std::{
     fmt,
+    io::{self, Write},
     path::{Path, PathBuf},
 };
 
@@ -43,6 +44,13 @@ impl Failure {
     fn solver(error: impl fmt::Display) -> Self {
         Self { code: 1, message: Some(error.to_string()) }
     }
+}
+
+/// Tells the person at the terminal an error. One write holds all of it: what `mpiexec` and other ranks
+/// say meanwhile comes before or after it, never between its words.
+pub fn tell(error: &str) {
+    // Where nobody can be told any more, the exit code still says it.
+    let _ = io::stderr().write_all(format!("error: {error}\n").as_bytes());
 }
 
 /// Refuses an unknown solver, which `option` names.

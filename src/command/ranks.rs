@@ -1,7 +1,7 @@
 //! Several ranks fail as one program: they agree that one of them has failed, and all end with one
 //! message and one exit code.
 
-use super::Failure;
+use super::{Failure, tell};
 use signorini::{
     evolution::RunError,
     petsc::{Communicator, Session},
@@ -27,7 +27,7 @@ pub fn agree<T>(comm: Communicator, result: Result<T, Failure>) -> Result<T, Fai
     };
     let (_, reporter) = comm.min_with_rank(if failure.message.is_some() { 0.0 } else { 1.0 });
     if comm.rank() == reporter {
-        eprintln!("error: {}", failure.message.as_deref().unwrap_or("another rank failed"));
+        tell(failure.message.as_deref().unwrap_or("another rank failed"));
     }
     // This comes after the report, because mpiexec ends all ranks as soon as one ends with an error.
     let code = comm.broadcast(reporter, f64::from(failure.code)) as u8;
@@ -40,7 +40,7 @@ pub fn barrier_or_abort(comm: Communicator, failure: Option<&RunError>) {
     if !comm.barrier(failure.map(|_| PATIENCE))
         && let Some(error) = failure
     {
-        eprintln!("error: rank {} of {}: {error}", comm.rank(), comm.size());
+        tell(&format!("rank {} of {}: {error}", comm.rank(), comm.size()));
         comm.abort(Failure::solver(error).code);
     }
 }
