@@ -1,7 +1,7 @@
 //! The connected components of a mesh: pieces, which share no node, and the parts of a piece, which
 //! share single nodes only.
 
-use super::Mesh;
+use super::{Mesh, sides};
 
 /// The connected components of a triangulation.
 ///
@@ -18,80 +18,58 @@ pub struct Components {
     pub hinges: Vec<(usize, [usize; 2])>,
 }
 
-const NONE: usize = usize::MAX;
-
 impl Mesh {
     /// The components of this mesh, numbered as its triangles first meet them.
     #[must_use]
     pub fn components(&self) -> Components {
-        let (part_of_triangle, parts) = numbered(self.edge_connected());
-        let mut part_of_node = vec![NONE; self.nodes.len()];
+        let sides = sides(&self.triangles);
+        let inner = sides.windows(2).filter(|pair| pair[0].edge == pair[1].edge);
+        let neighbours = inner.map(|pair| [pair[0].triangle, pair[1].triangle]);
+        let (part_of_triangle, parts) = connected(self.triangles.len(), neighbours);
+
+        let mut part_of_node = vec![None; self.nodes.len()];
         let mut hinges = Vec::new();
-        for (&part, &node) in part_of_triangle
-            .iter()
-            .zip(&self.triangles)
-            .flat_map(|(part, nodes)| nodes.iter().map(move |node| (part, node)))
-        {
-            match part_of_node[node] {
-                NONE => part_of_node[node] = part,
-                own if own != part => hinges.push((node, [own, part])),
-                _ => {}
+        for (&part, triangle) in part_of_triangle.iter().zip(&self.triangles) {
+            for &node in triangle {
+                let own = *part_of_node[node].get_or_insert(part);
+                if own != part {
+                    hinges.push((node, [own, part]));
+                }
             }
         }
         hinges.sort_unstable();
         hinges.dedup();
 
-        let mut joined: Vec<usize> = (0..parts).collect();
-        hinges.iter().for_each(|&(_, [a, b])| join(&mut joined, a, b));
-        let (piece_of_part, count) = numbered(joined);
+        let (piece_of_part, count) = connected(parts, hinges.iter().map(|hinge| hinge.1));
         let mut pieces = vec![Vec::new(); count];
         piece_of_part.iter().enumerate().for_each(|(part, &piece)| pieces[piece].push(part));
-        Components { part_of_node, pieces, hinges }
-    }
-
-    /// A union–find forest of the triangles, joined across common edges.
-    fn edge_connected(&self) -> Vec<usize> {
-        let mut forest: Vec<usize> = (0..self.triangles.len()).collect();
-        let mut edges: Vec<([usize; 2], usize)> = (self.triangles.iter().enumerate())
-            .flat_map(|(t, &[a, b, c])| {
-                [[a, b], [b, c], [c, a]].map(|[p, q]| ([p.min(q), p.max(q)], t))
-            })
-            .collect();
-        edges.sort_unstable();
-        for same in edges.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
-            join(&mut forest, same[0].1, same[1].1);
-        }
-        forest
+        Components { part_of_node: part_of_node.into_iter().flatten().collect(), pieces, hinges }
     }
 }
 
-/// Joins the sets of `a` and `b`; the smaller root stays one.
-fn join(forest: &mut [usize], a: usize, b: usize) {
-    let (a, b) = (root(forest, a), root(forest, b));
-    forest[a.max(b)] = a.min(b);
-}
-
-fn root(forest: &mut [usize], mut i: usize) -> usize {
-    while forest[i] != i {
-        forest[i] = forest[forest[i]];
-        i = forest[i];
+/// The sets into which `links` join the numbers below `count`, by union–find: the set of each
+/// number, counted in the order of their first members, and how many sets there are.
+fn connected(count: usize, links: impl IntoIterator<Item = [usize; 2]>) -> (Vec<usize>, usize) {
+    let mut parent: Vec<usize> = (0..count).collect();
+    for link in links {
+        let [a, b] = link.map(|mut i| {
+            while parent[i] != i {
+                parent[i] = parent[parent[i]];
+                i = parent[i];
+            }
+            i
+        });
+        parent[a.max(b)] = a.min(b);
     }
-    i
-}
-
-/// The number of each element's set, counted in the order of their first elements, and how many
-/// sets there are.
-fn numbered(mut forest: Vec<usize>) -> (Vec<usize>, usize) {
-    let mut count = 0;
-    for i in 0..forest.len() {
-        // The root comes first: it is the smallest of its set, and numbered already.
-        let parent = forest[i];
-        if parent == i {
-            forest[i] = count;
-            count += 1;
+    let mut sets = 0;
+    for i in 0..count {
+        // Parents come before their children: they have the number of their set already.
+        if parent[i] == i {
+            parent[i] = sets;
+            sets += 1;
         } else {
-            forest[i] = forest[parent];
+            parent[i] = parent[parent[i]];
         }
     }
-    (forest, count)
+    (parent, sets)
 }

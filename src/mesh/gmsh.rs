@@ -23,7 +23,7 @@ pub fn load(path: &Path, parameters: &BTreeMap<String, f64>) -> Result<Mesh, Mes
     match extension.as_ref().and_then(|e| e.to_str()) {
         Some("msh") => read(path),
         Some("geo") => read(&mesh_geo(path, parameters)?),
-        _ => Err(MeshError::meshing(path, "a mesh is a .msh file or a .geo file for gmsh")),
+        _ => Err(MeshError::file(path, "a mesh is a .msh file or a .geo file for gmsh")),
     }
 }
 
@@ -39,30 +39,26 @@ pub fn load(path: &Path, parameters: &BTreeMap<String, f64>) -> Result<Mesh, Mes
 /// nowhere in the `.geo`, gmsh is missing, or gmsh reports an error.
 pub fn mesh_geo(geo: &Path, parameters: &BTreeMap<String, f64>) -> Result<PathBuf, MeshError> {
     let text = read_text(geo).map_err(MeshError::io(geo))?;
-    for (name, &value) in parameters {
-        if let Some(reason) = refusal(&text, name, value) {
-            let reason = format!("`{name}` = {value}: {reason}");
+    let mut name = geo.file_stem().unwrap_or_default().to_owned();
+    for (parameter, &value) in parameters {
+        if let Some(reason) = refusal(&text, parameter, value) {
+            let reason = format!("`{parameter}` = {value}: {reason}");
             return Err(MeshError::Parameter { path: geo.to_owned(), reason });
         }
+        name.push(format!("-{parameter}{value}"));
     }
-    let mesh = mesh_path(geo, parameters);
-    if let Ok(meshed) = modified(&mesh)
-        && meshed >= last_change(geo).map_err(MeshError::io(geo))?
-    {
+    name.push(".msh");
+    let mesh = geo.with_file_name(name);
+    let last_change = last_change(geo).map_err(MeshError::io(geo))?;
+    if modified(&mesh).is_ok_and(|meshed| meshed >= last_change) {
         return Ok(mesh);
     }
 
-    let folder = match geo.parent() {
-        Some(parent) if parent != Path::new("") => parent,
-        _ => Path::new("."),
-    };
     // A directory rather than a file: gmsh creates the file with the usual permissions.
-    let scratch = tempfile::Builder::new()
-        .prefix(".meshing-")
-        .tempdir_in(folder)
-        .map_err(MeshError::io(folder))?;
+    let scratch = tempfile::Builder::new().prefix(".meshing-").tempdir_in(geo.with_file_name("."));
+    let scratch = scratch.map_err(MeshError::io(&mesh))?;
     let fresh = scratch.path().join("fresh.msh");
-    run(geo, parameters, &fresh, folder)?;
+    run(geo, parameters, &fresh)?;
     fs::rename(&fresh, &mesh).map_err(MeshError::io(&mesh))?;
     Ok(mesh)
 }
@@ -77,14 +73,14 @@ fn refusal(text: &str, name: &str, value: f64) -> Option<&'static str> {
     // An included file may define the parameter.
     let includes = text.contains("Include") || text.contains("Merge");
     let defined = || includes || text.split(|c| !word(c)).any(|w| w == name);
-    let assigned =
-        "the .geo file assigns it, which overrules this value; write DefineConstant[ … ] there";
     if !name.chars().all(word) || !name.starts_with(|c: char| !c.is_ascii_digit()) {
         Some("the name must consist of letters, digits and underscores")
     } else if !value.is_finite() {
         Some("the value must be finite")
     } else if is_assigned(text, name) {
-        Some(assigned)
+        Some(
+            "the .geo file assigns it, which overrules this value; write DefineConstant[ … ] there",
+        )
     } else if name == "size" {
         (value <= 0.0).then_some("the size must be positive")
     } else {
@@ -95,71 +91,49 @@ fn refusal(text: &str, name: &str, value: f64) -> Option<&'static str> {
 /// Whether a statement of the .geo file `text` is `name = …`. In `DefineConstant[ … ]` and behind
 /// `If (!Exists(…))` a constant gives way to the parameter.
 fn is_assigned(text: &str, name: &str) -> bool {
-    let blocks = text.split("/*").enumerate();
-    let code = blocks.map(|(i, part)| match i {
-        0 => part,
-        _ => part.split_once("*/").map_or("", |(_, rest)| rest),
-    });
-    let code: String = code.collect();
-    let lines = code.lines().map(|line| line.split("//").next().unwrap_or_default());
+    let mut parts = text.split("/*");
+    let first = parts.next();
+    let uncommented = parts.filter_map(|part| part.split_once("*/")).map(|(_, rest)| rest);
+    let code: String = first.into_iter().chain(uncommented).collect();
+    let lines = code.lines().filter_map(|line| line.split("//").next());
     let code = lines.collect::<Vec<_>>().join(" ");
     let gives_way = code.replace(' ', "").contains(&format!("Exists({name})"));
-    !gives_way
-        && code.match_indices(name).any(|(at, _)| {
-            let after = code[at + name.len()..].trim_start();
-            let before = code[..at].trim_end();
-            let starts = matches!(before.chars().next_back(), None | Some(';' | '}'))
-                || before.len() < at && (before.ends_with("EndIf") || before.ends_with("EndFor"));
-            starts && after.starts_with('=') && !after.starts_with("==")
-        })
-}
-
-fn mesh_path(geo: &Path, parameters: &BTreeMap<String, f64>) -> PathBuf {
-    let mut name = geo.file_stem().unwrap_or_default().to_owned();
-    for (parameter, value) in parameters {
-        name.push(format!("-{parameter}{value}"));
-    }
-    name.push(".msh");
-    geo.with_file_name(name)
-}
-
-fn modified(path: &Path) -> io::Result<SystemTime> {
-    fs::metadata(path).and_then(|data| data.modified())
+    let assigns = |statement: &str| {
+        let rest = statement.trim_start().strip_prefix(name).unwrap_or_default().trim_start();
+        rest.starts_with('=') && !rest.starts_with("==")
+    };
+    let code = code.replace("EndIf", ";").replace("EndFor", ";");
+    !gives_way && code.split([';', '}']).any(assigns)
 }
 
 /// When the `.geo`, or a file that it takes in by `Include "name"` or `Merge "name"`, directly or
 /// through others, was last changed. Files that are not there are for gmsh to tell.
 fn last_change(geo: &Path) -> io::Result<SystemTime> {
-    let mut last = modified(geo)?;
     let mut files = vec![fs::canonicalize(geo)?];
+    let mut last = SystemTime::UNIX_EPOCH;
     let mut next = 0;
     while let Some(file) = files.get(next).cloned() {
         next += 1;
         last = last.max(modified(&file)?);
         let text = read_text(&file)?;
         let commands = ["Include", "Merge"].into_iter().flat_map(|word| text.split(word).skip(1));
-        for name in
-            commands.filter_map(|rest| rest.trim_start().strip_prefix('"')?.split('"').next())
-        {
+        let quoted = commands.filter_map(|rest| rest.trim_start().strip_prefix('"'));
+        for name in quoted.filter_map(|rest| rest.split('"').next()) {
             // Names are relative to the file they stand in.
-            if let Ok(path) = fs::canonicalize(file.with_file_name(name))
-                && path.is_file()
-                && !files.contains(&path)
-            {
-                files.push(path);
-            }
+            let path = fs::canonicalize(file.with_file_name(name)).ok();
+            let new = path.filter(|path| path.is_file() && !files.contains(path));
+            files.extend(new);
         }
     }
     Ok(last)
 }
 
+fn modified(path: &Path) -> io::Result<SystemTime> {
+    fs::metadata(path).and_then(|data| data.modified())
+}
+
 /// Runs gmsh, which must leave `fresh` behind without a word of error.
-fn run(
-    geo: &Path,
-    parameters: &BTreeMap<String, f64>,
-    fresh: &Path,
-    folder: &Path,
-) -> Result<(), MeshError> {
+fn run(geo: &Path, parameters: &BTreeMap<String, f64>, fresh: &Path) -> Result<(), MeshError> {
     let mut command = Command::new("gmsh");
     // One thread: the same input then gives the same mesh, node by node.
     command.args(["-2", "-format", "msh41", "-v", "1", "-nt", "1"]);
@@ -169,11 +143,10 @@ fn run(
             command.args(["-clmax", &value.to_string()]);
         }
     }
-    // The folder keeps a file name that begins with a dash from being taken for an option.
-    let input = folder.join(geo.file_name().unwrap_or_default());
-    let output = command.arg("-o").arg(fresh).arg(input).output();
+    // "./" keeps a path that begins with a dash from being taken for an option.
+    let output = command.arg("-o").arg(fresh).arg(Path::new(".").join(geo)).output();
     let output = output.map_err(|source| match source.kind() {
-        io::ErrorKind::NotFound => MeshError::meshing(
+        io::ErrorKind::NotFound => MeshError::file(
             geo,
             "gmsh is needed to mesh this file and was not found; install it with `make deps` \
              (Debian: apt install gmsh), or give a .msh file",
@@ -194,5 +167,5 @@ fn run(
         true => format!("no message, {}", output.status),
         false => lines.join("\n"),
     };
-    Err(MeshError::meshing(geo, format!("gmsh could not mesh it:\n{message}")))
+    Err(MeshError::file(geo, format!("gmsh could not mesh it:\n{message}")))
 }

@@ -11,7 +11,7 @@ mod rectangle;
 
 pub use boundary::{BoundaryNode, CORNER_ANGLE, Face, boundary_nodes};
 pub use components::Components;
-pub use error::{MeshError, Place, Problem};
+pub use error::MeshError;
 pub use gmsh::{load, mesh_geo};
 pub use msh::read;
 
@@ -47,6 +47,31 @@ impl Mesh {
         let length = dx.hypot(dy);
         ([dy / length, -dx / length], length)
     }
+}
+
+/// One triangle's side of an edge.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+struct Side {
+    /// The ends in increasing order.
+    edge: [usize; 2],
+    /// Whether the triangle lies on the left of the way from the first end to the second.
+    on_left: bool,
+    triangle: usize,
+}
+
+/// The sides of all edges, sorted: a boundary edge has one, an inner edge one on the right and one
+/// on the left, in this order.
+fn sides(triangles: &[[usize; 3]]) -> Vec<Side> {
+    let of_triangle = |(triangle, &[a, b, c]): (usize, &[usize; 3])| {
+        [[a, b], [b, c], [c, a]].map(|[p, q]| Side {
+            edge: [p.min(q), p.max(q)],
+            on_left: p < q,
+            triangle,
+        })
+    };
+    let mut sides: Vec<Side> = triangles.iter().enumerate().flat_map(of_triangle).collect();
+    sides.sort_unstable();
+    sides
 }
 
 /// The longer side of the box around `points`, m.

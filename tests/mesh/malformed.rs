@@ -3,7 +3,7 @@
 use std::fs;
 
 use crate::common::{Random, fixture, read_bytes};
-use signorini::mesh::{MeshError, Place, read};
+use signorini::mesh::{MeshError, read};
 
 const HEAD: &str = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n";
 
@@ -152,10 +152,10 @@ fn counts() {
 }
 
 #[test]
-fn places_are_typed() {
+fn places_stand_apart_from_problems() {
     let error = read_bytes(text(&NODES, &["1 99 0 1 2 3"])).unwrap_err();
     let MeshError::File { place, .. } = error else { panic!("{error}") };
-    assert_eq!(place, Some(Place::Line(14)));
+    assert_eq!(place, ":14");
 }
 
 const VALID: [&str; 8] = [

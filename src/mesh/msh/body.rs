@@ -1,7 +1,7 @@
 //! Turns what a file lists into the mesh of a plane body, or says why it is none.
 
 use super::{
-    super::{Curve, Mesh, error::Problem, extent, twice_area},
+    super::{Curve, Mesh, Side, extent, sides, twice_area},
     byte_reader::{Result, fault},
     contents::{Contents, Element, Node},
 };
@@ -16,19 +16,36 @@ const PLANAR: f64 = 1e-10;
 pub fn mesh(contents: &Contents) -> Result<Mesh> {
     let elements = triangles(contents);
     if elements.is_empty() {
-        return fault(None, Problem::NoTriangles);
+        let none = "there are no triangles; mesh with `gmsh -2`, and give the body a Physical \
+                    Surface if there are physical groups at all";
+        return fault(None, none);
     }
-    let (index, nodes) = number_nodes(contents, &elements)?;
-    let points: Vec<[f64; 2]> = nodes.iter().map(|node| [node.point[0], node.point[1]]).collect();
-    let limit = PLANAR * extent(&points);
-    if let Some(node) = nodes.iter().find(|node| node.point[2].abs() > limit) {
-        return fault(node.at, Problem::NotPlanar { node: node.tag, z: node.point[2] });
+    let (index, listed) = number_nodes(contents, &elements)?;
+    let nodes: Vec<[f64; 2]> = listed.iter().map(|node| [node.point[0], node.point[1]]).collect();
+    let limit = PLANAR * extent(&nodes);
+    if let Some(&&Node { tag, point: [.., z], at }) =
+        listed.iter().find(|n| n.point[2].abs() > limit)
+    {
+        return fault(at, format!("node {tag} has z = {z}: the body must lie in the plane z = 0"));
     }
-    let counter_clockwise = |element: &&Element<3>| counter_clockwise(element, &index, &points);
+    let counter_clockwise = |element: &&Element<3>| counter_clockwise(element, &index, &nodes);
     let triangles = elements.iter().map(counter_clockwise).collect::<Result<Vec<_>>>()?;
-    let half_edges = half_edges(&elements, &triangles, &nodes)?;
-    let curves = curves(contents, &index, &half_edges)?;
-    Ok(Mesh { nodes: points, triangles, curves })
+    let sides = sides(&triangles);
+    let same_side =
+        |pair: &&[Side]| (pair[0].edge, pair[0].on_left) == (pair[1].edge, pair[1].on_left);
+    if let Some(pair) = sides.windows(2).find(same_side) {
+        let [first, second] = [0, 1].map(|i| elements[pair[i].triangle]);
+        let [a, b] = pair[0].edge.map(|node| listed[node].tag);
+        let problem = format!(
+            "triangles {} and {} lie on the same side of their common edge, nodes {a} and {b}: two \
+             surfaces overlap, of which one should go (gmsh: Coherence), or the mesh folds over \
+             itself",
+            first.tag, second.tag
+        );
+        return fault(second.at, problem);
+    }
+    let curves = curves(contents, &index, &sides)?;
+    Ok(Mesh { nodes, triangles, curves })
 }
 
 /// The triangles of the body: those of its physical surfaces, if there are any.
@@ -56,8 +73,8 @@ fn number_nodes<'a>(
     contents: &'a Contents,
     elements: &[&Element<3>],
 ) -> Result<(Index, Vec<&'a Node>)> {
-    let mut index = Index::with_capacity(contents.nodes.len());
-    index.extend(elements.iter().flat_map(|element| element.nodes).map(|tag| (tag, UNLISTED)));
+    let tags = elements.iter().flat_map(|element| element.nodes);
+    let mut index: Index = tags.map(|tag| (tag, UNLISTED)).collect();
     let mut nodes = Vec::with_capacity(index.len());
     for node in &contents.nodes {
         match index.get_mut(&node.tag) {
@@ -65,7 +82,7 @@ fn number_nodes<'a>(
                 *number = nodes.len();
                 nodes.push(node);
             }
-            Some(_) => return fault(node.at, Problem::DuplicateNode(node.tag)),
+            Some(_) => return fault(node.at, format!("node {} is listed twice", node.tag)),
             None => {}
         }
     }
@@ -74,22 +91,25 @@ fn number_nodes<'a>(
 
 /// The nodes of a triangle in counter-clockwise order.
 fn counter_clockwise(
-    element: &Element<3>,
+    &Element { tag, nodes: tags, at, .. }: &Element<3>,
     index: &Index,
-    points: &[[f64; 2]],
+    nodes: &[[f64; 2]],
 ) -> Result<[usize; 3]> {
-    let mut triangle = element.nodes.map(|tag| index[&tag]);
+    let mut triangle = tags.map(|tag| index[&tag]);
     if let Some(missing) = triangle.iter().position(|&node| node == UNLISTED) {
-        let (element_tag, node) = (element.tag, element.nodes[missing]);
-        return fault(element.at, Problem::MissingNode { element: element_tag, node });
+        let node = tags[missing];
+        let problem = format!("element {tag} refers to node {node}, which $Nodes does not list");
+        return fault(at, problem);
     }
-    let [a, b, c] = triangle.map(|node| points[node]);
+    let [a, b, c] = triangle.map(|node| nodes[node]);
     let twice = twice_area(a, b, c);
     let length = |p: [f64; 2], q: [f64; 2]| (q[0] - p[0]).hypot(q[1] - p[1]);
     let longest = length(a, b).max(length(b, c)).max(length(c, a));
     // Huge coordinates overflow the area.
     if twice.abs() <= FLAT * longest * longest || !twice.is_finite() {
-        return fault(element.at, Problem::ZeroArea(element.tag));
+        let problem =
+            format!("triangle {tag} has no area: its nodes lie on a line; mend the mesh there");
+        return fault(at, problem);
     }
     if twice < 0.0 {
         triangle.swap(1, 2);
@@ -97,56 +117,33 @@ fn counter_clockwise(
     Ok(triangle)
 }
 
-/// A side of a triangle, which lies on its left, and the triangle.
-type HalfEdge = ([usize; 2], usize);
-
-/// The sides of all triangles, sorted: an inner edge is there twice, once in each direction, a
-/// boundary edge once.
-///
-/// Of a side that is there twice in one direction both triangles are on the left: they overlap.
-fn half_edges(
-    elements: &[&Element<3>],
-    triangles: &[[usize; 3]],
-    nodes: &[&Node],
-) -> Result<Vec<HalfEdge>> {
-    let sides = |(t, &[a, b, c]): (usize, &[usize; 3])| [([a, b], t), ([b, c], t), ([c, a], t)];
-    let mut half_edges: Vec<HalfEdge> = triangles.iter().enumerate().flat_map(sides).collect();
-    half_edges.sort_unstable();
-    match half_edges.windows(2).find(|pair| pair[0].0 == pair[1].0) {
-        Some(pair) => {
-            let [first, second] = [0, 1].map(|i| elements[pair[i].1]);
-            let nodes = pair[0].0.map(|node| nodes[node].tag);
-            fault(second.at, Problem::Overlap { triangles: [first.tag, second.tag], nodes })
-        }
-        None => Ok(half_edges),
-    }
-}
-
 /// The physical curves, each edge once.
-fn curves(
-    contents: &Contents,
-    index: &Index,
-    half_edges: &[HalfEdge],
-) -> Result<BTreeMap<String, Curve>> {
-    let is_side = |edge: [usize; 2]| half_edges.binary_search_by_key(&edge, |side| side.0).is_ok();
+fn curves(contents: &Contents, index: &Index, sides: &[Side]) -> Result<BTreeMap<String, Curve>> {
     let mut curves = BTreeMap::<String, Curve>::new();
     let mut seen = HashSet::new();
     for line in &contents.lines {
-        let [a, b] = line.nodes.map(|tag| index.get(&tag).copied().unwrap_or(UNLISTED));
         let name = contents.curve_names.get(&line.group);
         let name = name.cloned().unwrap_or_else(|| line.group.to_string());
-        let sides = (is_side([a, b]), is_side([b, a]));
-        if sides == (false, false) {
-            let stray = Problem::StrayLine { line: line.tag, curve: name, nodes: line.nodes };
-            return fault(line.at, stray);
-        }
-        let first = seen.insert((name.clone(), [a.min(b), a.max(b)]));
-        let curve = curves.entry(name).or_default();
-        match sides {
-            _ if !first => {}
-            (true, true) => curve.interior_edges += 1,
-            (true, false) => curve.edges.push([a, b]),
-            _ => curve.edges.push([b, a]),
+        let mut edge = line.nodes.map(|tag| index.get(&tag).copied().unwrap_or(UNLISTED));
+        edge.sort_unstable();
+        let sides = &sides[sides.partition_point(|side| side.edge < edge)..];
+        let Some(side) = sides.first().filter(|side| side.edge == edge) else {
+            let [a, b] = line.nodes;
+            let problem = format!(
+                "line {} of the physical curve `{name}`, nodes {a} and {b}, is no edge of any \
+                 triangle of the body; does its surface belong to a Physical Surface?",
+                line.tag
+            );
+            return fault(line.at, problem);
+        };
+        let is_inner = sides.get(1).is_some_and(|other| other.edge == edge);
+        if seen.insert((name.clone(), edge)) {
+            let curve = curves.entry(name).or_default();
+            match side.on_left {
+                _ if is_inner => curve.interior_edges += 1,
+                true => curve.edges.push(edge),
+                false => curve.edges.push([edge[1], edge[0]]),
+            }
         }
     }
     Ok(curves)

@@ -1,40 +1,37 @@
 //! The sections of a `.msh` file and the numbers in them, whether text or binary.
 
-use super::super::error::Problem;
-use std::{borrow::Cow, str::FromStr};
+use std::{borrow::Cow, fmt::Display, str::FromStr};
 
-/// What is wrong and at which byte (`None`: in the file as a whole), before the file has a name.
-#[derive(Debug)]
-pub struct Fault {
-    pub at: Option<usize>,
-    pub problem: Problem,
-}
-
-pub type Result<T> = std::result::Result<T, Fault>;
+/// The error is what is wrong, and at which byte (`None`: in the file as a whole), before the file
+/// has a name.
+pub type Result<T> = std::result::Result<T, (Option<usize>, String)>;
 
 /// The error of `problem` at a byte of the file, or without one in the file as a whole.
-pub fn fault<T>(at: impl Into<Option<usize>>, problem: Problem) -> Result<T> {
-    Err(Fault { at: at.into(), problem })
+pub fn fault<T>(at: impl Into<Option<usize>>, problem: impl Into<String>) -> Result<T> {
+    Err((at.into(), problem.into()))
 }
 
 /// The error of finding something else, shortened to what fits a terminal.
-pub fn expected<T>(at: usize, what: &str, found: &str) -> Result<T> {
-    let mut found: String = found.escape_debug().collect();
+pub fn expected<T>(at: usize, what: &str, found: impl Display) -> Result<T> {
+    let mut found: String = found.to_string().trim().escape_debug().collect();
     if found.chars().count() > 40 {
         found = found.chars().take(40).chain(['…']).collect();
     }
-    fault(at, Problem::Expected { what: what.to_owned(), found })
+    fault(at, format!("expected {what}, found `{found}`"))
 }
 
-/// How a file writes its numbers.
-#[derive(Clone, Copy, PartialEq)]
-pub enum Numbers {
-    /// As words between blanks.
-    Text,
-    /// Binary; tags and counts are `int`s of four bytes (MSH 2.2).
-    Binary2,
-    /// Binary; tags and counts are `size_t`s of eight bytes (MSH 4.1).
-    Binary4,
+/// The error of a file that is no mesh file.
+pub fn not_a_mesh<T>(at: impl Into<Option<usize>>) -> Result<T> {
+    fault(at, "not a gmsh mesh: it does not begin with $MeshFormat")
+}
+
+/// The error of a version that is not read.
+pub fn unsupported_version<T>(at: usize, version: f64) -> Result<T> {
+    let problem = format!(
+        "MSH version {version} is not supported, 4.1 and 2.2 are; convert the file with \
+         `gmsh OLD.msh -save -format msh41 -o NEW.msh` (or -format msh22)"
+    );
+    fault(at, problem)
 }
 
 /// What stands between the lines `$Name` and `$EndName`.
@@ -53,41 +50,58 @@ impl<'a> Section<'a> {
     pub fn split(bytes: &'a [u8], sections: &mut Vec<Self>) -> Result<()> {
         let mut at = 0;
         loop {
-            at += bytes[at..].iter().take_while(|b| b.is_ascii_whitespace()).count();
+            at += blanks(&bytes[at..]);
             let line = first_line(&bytes[at..]);
             if line.is_empty() {
                 return Ok(());
             }
-            let Some(Ok(name)) = line.trim_ascii_end().strip_prefix(b"$").map(str::from_utf8)
-            else {
-                let found = String::from_utf8_lossy(line);
-                return match sections.is_empty() {
-                    true => fault(at, Problem::NotMsh),
-                    false => expected(at, "a section line such as $Nodes", found.trim_end()),
-                };
-            };
-            match name {
-                "MeshFormat" | "Comments" => {}
+            let name = line.trim_ascii_end().strip_prefix(b"$");
+            let name = match name.and_then(|name| str::from_utf8(name).ok()) {
+                Some(name @ ("MeshFormat" | "Comments")) => name,
                 // MSH 1 had no header.
-                "NOD" | "ELM" => return fault(at, Problem::Version("1".to_owned())),
-                _ if sections.is_empty() => return fault(at, Problem::NotMsh),
-                _ => {}
-            }
+                Some("NOD" | "ELM") => return unsupported_version(at, 1.0),
+                _ if sections.is_empty() => return not_a_mesh(at),
+                Some(name) => name,
+                None => {
+                    let found = String::from_utf8_lossy(line);
+                    return expected(at, "a section line such as $Nodes", found);
+                }
+            };
             let start = at + line.len();
             let last = format!("$End{name}");
             let mut dollars = (start..bytes.len()).filter(|&i| bytes[i] == b'$');
             let end = dollars.find(|&i| bytes[i..].starts_with(last.as_bytes()));
             sections.push(Self { name, at, bytes: &bytes[..end.unwrap_or(bytes.len())], start });
             let Some(end) = end else {
-                return fault(bytes.len(), Problem::Truncated { section: name.to_owned() });
+                let cut = format!("the file ends inside ${name}: it was cut off; {AGAIN}");
+                return fault(bytes.len(), cut);
             };
             at = end + last.len();
         }
     }
 }
 
+/// What to do about a file that is not complete.
+const AGAIN: &str = "mesh or copy it again";
+
 fn first_line(bytes: &[u8]) -> &[u8] {
     bytes.split_inclusive(|&b| b == b'\n').next().unwrap_or_default()
+}
+
+/// How many blanks `bytes` begin with.
+fn blanks(bytes: &[u8]) -> usize {
+    bytes.iter().take_while(|b| b.is_ascii_whitespace()).count()
+}
+
+/// How a file writes its numbers.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Numbers {
+    /// As words between blanks.
+    Text,
+    /// Binary; tags and counts are `int`s of four bytes (MSH 2.2).
+    Binary2,
+    /// Binary; tags and counts are `size_t`s of eight bytes (MSH 4.1).
+    Binary4,
 }
 
 /// Reads a section from front to back. No read goes beyond its end: counts need no check.
@@ -111,13 +125,9 @@ impl<'a> ByteReader<'a> {
     /// The byte of the next item, past the blanks of a text file.
     pub fn position(&mut self) -> usize {
         if !self.is_binary() {
-            self.skip_blanks();
+            self.position += blanks(self.rest());
         }
         self.position
-    }
-
-    fn skip_blanks(&mut self) {
-        self.position += self.rest().iter().take_while(|b| b.is_ascii_whitespace()).count();
     }
 
     fn rest(&self) -> &'a [u8] {
@@ -125,24 +135,18 @@ impl<'a> ByteReader<'a> {
     }
 
     /// Makes sure that the section holds nothing more.
-    pub fn finish(mut self) -> Result<()> {
-        self.skip_blanks();
-        match self.rest() {
-            [] => Ok(()),
-            rest => {
-                let found = String::from_utf8_lossy(first_line(rest).trim_ascii());
-                expected(self.position, "the end of the section ($End…)", &found)
-            }
+    pub fn finish(self) -> Result<()> {
+        let rest = self.rest().trim_ascii_start();
+        if rest.is_empty() {
+            return Ok(());
         }
+        let at = self.section.bytes.len() - rest.len();
+        expected(at, "the end of the section ($End…)", String::from_utf8_lossy(first_line(rest)))
     }
 
     /// The rest of the line, without surrounding blanks.
     pub fn line(&mut self, what: &str) -> Result<Cow<'a, str>> {
-        let line = first_line(self.rest());
-        if line.is_empty() {
-            return self.section_ends(what);
-        }
-        self.position += line.len();
+        let line = self.take(what, first_line(self.rest()).len().max(1))?;
         Ok(String::from_utf8_lossy(line.trim_ascii()))
     }
 
@@ -150,56 +154,54 @@ impl<'a> ByteReader<'a> {
     pub fn count_line(&mut self) -> Result<u64> {
         let at = self.position();
         let line = self.line("a count")?;
-        line.parse().or_else(|_| expected(at, "a count", &line))
+        line.parse().or_else(|_| expected(at, "a count", line))
     }
 
     /// An `int`.
     pub fn int(&mut self, what: &str) -> Result<i32> {
-        if self.is_binary() { Ok(i32::from_ne_bytes(self.take(what)?)) } else { self.word(what) }
+        self.number(what, i32::from_ne_bytes)
     }
 
     /// A tag or a count: a whole number that is not negative.
     pub fn size(&mut self, what: &str) -> Result<u64> {
-        match self.numbers {
-            Numbers::Text => self.word(what),
-            Numbers::Binary4 => Ok(u64::from_ne_bytes(self.take(what)?)),
-            Numbers::Binary2 => {
-                let (at, value) = (self.position, self.int(what)?);
-                u64::try_from(value).or_else(|_| expected(at, what, &value.to_string()))
-            }
+        if self.numbers != Numbers::Binary2 {
+            return self.number(what, u64::from_ne_bytes);
         }
+        let (at, value) = (self.position, self.int(what)?);
+        u64::try_from(value).or_else(|_| expected(at, what, value))
     }
 
     /// A `double`, which may be infinite or not a number.
-    pub fn real(&mut self) -> Result<f64> {
-        let what = "a number";
-        if self.is_binary() { Ok(f64::from_ne_bytes(self.take(what)?)) } else { self.word(what) }
+    pub fn real(&mut self, what: &str) -> Result<f64> {
+        self.number(what, f64::from_ne_bytes)
     }
 
-    /// The next bytes of a binary file.
-    fn take<const N: usize>(&mut self, what: &str) -> Result<[u8; N]> {
-        let Some(bytes) = self.rest().first_chunk() else { return self.section_ends(what) };
-        self.position += N;
-        Ok(*bytes)
-    }
-
-    /// The next word of a text file as a number.
-    fn word<T: FromStr>(&mut self, what: &str) -> Result<T> {
-        self.skip_blanks();
-        let (at, rest) = (self.position, self.rest());
-        let length = rest.iter().take_while(|b| !b.is_ascii_whitespace()).count();
-        if length == 0 {
-            return self.section_ends(what);
+    /// The next `N` bytes of a binary file or the next word of a text file as a number.
+    fn number<T: FromStr, const N: usize>(
+        &mut self,
+        what: &str,
+        from_bytes: fn([u8; N]) -> T,
+    ) -> Result<T> {
+        let at = self.position();
+        if self.is_binary() {
+            let bytes = self.take(what, N)?;
+            return Ok(from_bytes(std::array::from_fn(|i| bytes[i])));
         }
-        self.position += length;
-        match str::from_utf8(&rest[..length]).ok().and_then(|word| word.parse().ok()) {
-            Some(value) => Ok(value),
-            None => expected(at, what, &String::from_utf8_lossy(&rest[..length])),
-        }
+        let length = self.rest().iter().take_while(|b| !b.is_ascii_whitespace()).count();
+        let word = String::from_utf8_lossy(self.take(what, length.max(1))?);
+        word.parse().or_else(|_| expected(at, what, word))
     }
 
-    fn section_ends<T>(&self, what: &str) -> Result<T> {
-        let (what, section) = (what.to_owned(), self.section.name.to_owned());
-        fault(self.position, Problem::SectionEnds { what, section })
+    /// The next `count` bytes.
+    fn take(&mut self, what: &str, count: usize) -> Result<&'a [u8]> {
+        let Some(bytes) = self.rest().get(..count) else {
+            let section = self.section.name;
+            let problem = format!(
+                "expected {what}, but ${section} ends here: it lists less than it announces; {AGAIN}"
+            );
+            return fault(self.position, problem);
+        };
+        self.position += count;
+        Ok(bytes)
     }
 }

@@ -1,10 +1,7 @@
 //! The nodes and elements that a `.msh` file lists, before they are known to be a mesh of a plane
 //! body.
 
-use super::{
-    super::error::Problem,
-    byte_reader::{ByteReader, Result, fault},
-};
+use super::byte_reader::{ByteReader, Result, fault};
 use std::collections::{BTreeMap, HashMap};
 
 /// A node as listed.
@@ -45,9 +42,12 @@ pub struct Contents {
 impl Contents {
     /// Reads the coordinates of the node `tag`.
     pub fn read_node(&mut self, reader: &mut ByteReader, tag: u64, at: usize) -> Result<()> {
-        let point = [reader.real()?, reader.real()?, reader.real()?];
+        let mut point = [0.0; 3];
+        for coordinate in &mut point {
+            *coordinate = reader.real("a number")?;
+        }
         if point.iter().any(|x| !x.is_finite()) {
-            return fault(at, Problem::NotFinite(tag));
+            return fault(at, format!("a coordinate of node {tag} is not a finite number"));
         }
         self.nodes.push(Node { tag, point, at });
         Ok(())
@@ -62,23 +62,33 @@ impl Contents {
         (tag, entity, at): (u64, i32, usize),
         groups: &[i32],
     ) -> Result<()> {
-        match element_type {
-            LINE => {
+        let name = match element_type {
+            1 => {
                 let nodes = node_tags(reader)?;
                 let of = |&group: &i32| Element { tag, group, entity, nodes, at };
                 self.lines.extend(groups.iter().map(of));
+                return Ok(());
             }
-            TRIANGLE => {
+            2 => {
                 let (group, nodes) = (groups.first().copied().unwrap_or(0), node_tags(reader)?);
                 self.triangles.push(Element { tag, group, entity, nodes, at });
+                return Ok(());
             }
-            POINT => drop(node_tags::<1>(reader)?),
-            _ => {
-                let name = name(element_type);
-                return fault(at, Problem::ElementType { element: tag, element_type, name });
-            }
-        }
-        Ok(())
+            // A point.
+            15 => return node_tags::<1>(reader).map(drop),
+            3 => "quadrangle",
+            4 => "tetrahedron",
+            8 | 26..=28 => "line of higher order",
+            9 | 20..=25 => "triangle of higher order",
+            10 | 16 | 36 | 37 => "quadrangle of higher order",
+            5..=7 | 11..=14 | 17..=19 | 29 => "solid",
+            _ => "unknown",
+        };
+        let problem = format!(
+            "element {tag} is of gmsh's type {element_type} ({name}); only three-node triangles \
+             are supported: mesh with `gmsh -2`, without Recombine and with Mesh.ElementOrder = 1"
+        );
+        fault(at, problem)
     }
 }
 
@@ -88,25 +98,4 @@ fn node_tags<const N: usize>(reader: &mut ByteReader) -> Result<[u64; N]> {
         *tag = reader.size("a node tag")?;
     }
     Ok(tags)
-}
-
-/// gmsh's numbers of the element types that are read.
-const LINE: i32 = 1;
-const TRIANGLE: i32 = 2;
-const POINT: i32 = 15;
-
-/// What the other element types are called.
-fn name(element_type: i32) -> &'static str {
-    match element_type {
-        3 => "quadrangle",
-        4 => "tetrahedron",
-        5 => "hexahedron",
-        6 => "prism",
-        7 => "pyramid",
-        8 | 26..=28 => "line of higher order",
-        9 | 20..=25 => "triangle of higher order",
-        10 | 16 | 36 | 37 => "quadrangle of higher order",
-        11..=14 | 17..=19 | 29 => "solid of higher order",
-        _ => "unknown",
-    }
 }

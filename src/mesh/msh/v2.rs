@@ -46,7 +46,7 @@ pub fn elements(reader: &mut ByteReader, contents: &mut Contents) -> Result<()> 
             contents.read_element(reader, element_type, (tag, entity, at), groups)?;
         }
         let Some(rest) = left.checked_sub(run) else {
-            return expected(at, "no more elements than announced", &run.to_string());
+            return expected(at, "no more elements than announced", run);
         };
         left = rest;
     }

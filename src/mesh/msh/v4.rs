@@ -15,7 +15,7 @@ pub fn entities(reader: &mut ByteReader, contents: &mut Contents) -> Result<()> 
             let tag = reader.int("an entity tag")?;
             // A point has three coordinates, the others six of their bounding box.
             for _ in 0..if dimension == 0 { 3 } else { 6 } {
-                reader.real()?;
+                reader.real("a number")?;
             }
             let groups = contents.groups.entry((dimension, tag)).or_default();
             for _ in 0..reader.size("a count")? {
@@ -47,7 +47,7 @@ pub fn nodes(reader: &mut ByteReader, contents: &mut Contents) -> Result<()> {
             contents.read_node(reader, tag, at)?;
             // A parametric node adds as many parameters as its entity has dimensions.
             for _ in 0..if parametric { dimension.clamp(0, 3) } else { 0 } {
-                reader.real()?;
+                reader.real("a number")?;
             }
         }
     }
@@ -85,6 +85,6 @@ fn header(reader: &mut ByteReader) -> Result<(u64, u64)> {
 fn check_total(at: usize, what: &str, announced: u64, found: u64) -> Result<()> {
     match announced == found {
         true => Ok(()),
-        false => expected(at, &format!("{announced} {what} as announced"), &found.to_string()),
+        false => expected(at, &format!("{announced} {what} as announced"), found),
     }
 }
