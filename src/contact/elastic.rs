@@ -1,6 +1,6 @@
 //! The linear systems inside contact solvers.
 
-use super::{ContactProblem, ContactReport};
+use super::{ContactError, ContactProblem, ContactReport, Kkt};
 use crate::{
     cholesky::{Booking, LinearSolver, LinearSystem, Precision},
     petsc::{PetscError, Session, Vector},
@@ -25,21 +25,23 @@ impl ContactProblem<'_> {
 
 /// A [`LinearSolver`] for the successive systems of a contact solver, which have the same pattern.
 pub(super) struct ElasticSolver<'s> {
+    /// Whose systems they are, for messages.
+    pub(super) method: &'static str,
     session: &'s Session,
     solver: Option<LinearSolver>,
 }
 
 impl<'s> ElasticSolver<'s> {
-    pub(super) fn new(session: &'s Session) -> Self {
-        Self { session, solver: None }
+    pub(super) fn new(session: &'s Session, method: &'static str) -> Self {
+        Self { method, session, solver: None }
     }
 
     /// Solves from the start `c` for the load `f` until the forces left on the free unknowns are
-    /// at most `limit` in ‖·‖₂, N. False if they do not get there: the system is not positive
-    /// definite, or too ill-conditioned for this limit.
+    /// at most `limit` in ‖·‖₂, N.
     ///
     /// # Errors
-    /// PETSc failed.
+    /// They do not get there: the system is not positive definite, or too ill-conditioned for this
+    /// limit. Or PETSc failed.
     pub(super) fn solve(
         &mut self,
         system: LinearSystem,
@@ -47,7 +49,7 @@ impl<'s> ElasticSolver<'s> {
         c: &mut Vector,
         limit: f64,
         report: &mut ContactReport,
-    ) -> Result<bool, PetscError> {
+    ) -> Result<(), ContactError> {
         let solver = match self.solver.take() {
             Some(solver) => solver,
             // Half the digits are enough for a preconditioner, and half the bytes to read.
@@ -59,7 +61,17 @@ impl<'s> ElasticSolver<'s> {
         let solved = self.solver.insert(solver).solve_renewing(system, f, c, limit)?;
         report.linear_iterations += solved.iterations;
         report.factorisations += solved.factorisations;
-        Ok(solved.converged)
+        match solved.converged {
+            true => Ok(()),
+            false => Err(ContactError::NotConverged {
+                method: self.method.to_owned(),
+                report: Box::new(*report),
+                residuals: Kkt::UNKNOWN,
+                detail: "the stiffness of its linear system is not positive definite, or too \
+                         ill-conditioned for the tolerance"
+                    .into(),
+            }),
+        }
     }
 
     /// f − (K + D) c of the last solve, N, on all unknowns: on prescribed ones the contact forces.

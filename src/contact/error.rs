@@ -1,6 +1,6 @@
-//! What can be wrong with contact conditions, with the choice of a solver, and with its answer.
+//! What can be wrong with contact conditions, and with the answer of a solver.
 
-use super::{ContactReport, Kkt, ProblemClass, constraints::DEPENDENT, listing, solvers::alike};
+use super::{ContactReport, Kkt, constraints::DEPENDENT};
 use crate::petsc::{Communicator, PetscError};
 
 /// Displacement conditions at a node that contradict each other.
@@ -66,25 +66,6 @@ pub enum ConstraintError {
     TooMany {
         /// Coordinates of the node, m.
         at: [f64; 2],
-    },
-}
-
-/// A solver that cannot be had.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum SolverError {
-    /// There is none of that name.
-    #[error("there is no contact solver `{name}`{}; there are {}", alike(name), listing())]
-    Unknown {
-        /// The name.
-        name: String,
-    },
-    /// It is not made for problems like this one.
-    #[error("the contact solver `{name}` cannot solve {needed:?} problems")]
-    Unable {
-        /// The solver.
-        name: &'static str,
-        /// What the problem is.
-        needed: ProblemClass,
     },
 }
 

@@ -13,7 +13,6 @@ mod constraints;
 mod elastic;
 mod error;
 mod kkt;
-mod linear;
 mod problem;
 mod rigid;
 mod rows;
@@ -21,13 +20,13 @@ mod solvers;
 
 pub use certificate::{Answer, Certificate, ContactPoint};
 pub use constraints::Constraints;
-pub use error::{ConstraintError, ContactError, SolverError};
+pub use error::{ConstraintError, ContactError};
 pub use kkt::{Kkt, Scales};
 pub use problem::ContactProblem;
-pub use rigid::{DrivenMotion, Extent, PartMotion, RigidMotion, RigidMotions};
+pub use rigid::{DrivenMotion, PartMotion, RigidMotion, RigidMotions};
 pub(crate) use rigid::{rigid_motion_until_contact, unconstrained_motions};
 pub use rows::{Bound, FixedRow, GapRow};
 pub use solvers::{
-    Anderson, ContactOptions, ContactReport, ContactSolver, PenaltyOptions, ProblemClass, REGISTRY,
-    SOLVERS, SolverEntry, TAO_TYPES, find, listing, rescuer, solver, summaries,
+    Anderson, ContactOptions, ContactReport, ContactSolver, PenaltyOptions, REGISTRY, SOLVERS,
+    SolverEntry, SolverError, TAO_TYPES, find, rescuer, solver, summaries,
 };

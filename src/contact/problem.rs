@@ -38,42 +38,33 @@ pub struct ContactProblem<'a> {
 
 impl ContactProblem<'_> {
     /// ‖residual‖₂ that linear systems are solved to, N: well below what the KKT residuals may be.
-    pub fn linear_residual(&self) -> f64 {
+    pub(super) fn linear_residual(&self) -> f64 {
         0.1 * self.tolerance * self.scales.force
     }
 
     /// Whether K is positive definite.
-    pub fn definite(&self) -> bool {
+    pub(super) fn definite(&self) -> bool {
         self.rigid.ncols() == 0
     }
 
     /// Number of bounds, of all ranks.
-    pub fn bound_count(&self) -> usize {
+    pub(super) fn bound_count(&self) -> usize {
         self.comm.count(self.bounds.len())
     }
 
     /// ‖v‖_∞ over all ranks.
-    ///
-    /// # Errors
-    /// PETSc failed.
-    pub fn max_norm(&self, v: &Vector) -> Result<f64, PetscError> {
+    pub(super) fn max_norm(&self, v: &Vector) -> Result<f64, PetscError> {
         Ok(self.comm.max(v.read(|v| v.iter().fold(0.0_f64, |m, v| m.max(v.abs())))?))
     }
 
     /// The scales for an iterate c: a displacement larger than that of the scales raises it.
-    ///
-    /// # Errors
-    /// PETSc failed.
-    pub fn scales_at(&self, c: &Vector) -> Result<Scales, PetscError> {
+    pub(super) fn scales_at(&self, c: &Vector) -> Result<Scales, PetscError> {
         let displacement = self.scales.displacement.max(self.max_norm(c)?);
         Ok(Scales { displacement, ..self.scales })
     }
 
     /// Kc − f, N.
-    ///
-    /// # Errors
-    /// PETSc failed.
-    pub fn residual(&self, session: &Session, c: &Vector) -> Result<Vector, PetscError> {
+    pub(super) fn residual(&self, session: &Session, c: &Vector) -> Result<Vector, PetscError> {
         let mut residual = Vector::zeros(session, c.owned())?;
         self.stiffness.multiply(c, &mut residual)?;
         residual.add(-1.0, self.load)?;
@@ -82,10 +73,7 @@ impl ContactProblem<'_> {
 
     /// The KKT residuals of `c` by the assembled K (the final word has the
     /// [`Certificate`](super::Certificate)).
-    ///
-    /// # Errors
-    /// PETSc failed.
-    pub fn residuals(&self, session: &Session, c: &Vector) -> Result<Kkt, PetscError> {
+    pub(super) fn residuals(&self, session: &Session, c: &Vector) -> Result<Kkt, PetscError> {
         let residual = self.residual(session, c)?;
         let scales = self.scales_at(c)?;
         residual.read(|r| {
@@ -102,7 +90,12 @@ impl ContactProblem<'_> {
     /// The KKT residuals when Σ r² over the unbounded unknowns of this rank is `free`, N², and the
     /// contact force p and the unknown c of each bound are `bounded`, in the order of the bounds.
     /// Collective.
-    pub fn kkt(&self, free: f64, bounded: impl Iterator<Item = (f64, f64)>, scales: Scales) -> Kkt {
+    pub(super) fn kkt(
+        &self,
+        free: f64,
+        bounded: impl Iterator<Item = (f64, f64)>,
+        scales: Scales,
+    ) -> Kkt {
         let (mut primal, mut pull, mut complementarity) = (0.0_f64, 0.0, 0.0_f64);
         for (bound, (p, c)) in self.bounds.iter().zip(bounded) {
             let (above, below) = (bound.upper - c, c - bound.lower);

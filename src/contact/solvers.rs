@@ -13,8 +13,9 @@ pub use anderson::Anderson;
 pub use penalty_duality::PenaltyOptions;
 pub use tao::TAO_TYPES;
 
-use super::{ContactError, ContactProblem, SolverError, linear};
+use super::{ContactError, ContactProblem};
 use crate::petsc::{Session, Vector};
+use active_set::ActiveSet;
 use serde::{
     Deserialize, Deserializer,
     de::{Error, Unexpected},
@@ -82,17 +83,6 @@ impl ContactReport {
     }
 }
 
-/// The problems that a method can solve; each class contains those before it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum ProblemClass {
-    /// No bounds: Kc = f.
-    Linear,
-    /// Bounds, and K positive definite.
-    Definite,
-    /// Bounds, and K only semidefinite: contact alone constrains some rigid motion.
-    Semidefinite,
-}
-
 /// A solver as the program knows it.
 pub struct SolverEntry {
     /// What a scene or `--solver` calls it.
@@ -101,8 +91,6 @@ pub struct SolverEntry {
     pub summary: &'static str,
     /// Its variants, reached as `name:VARIANT`.
     pub variants: &'static [&'static str],
-    /// What it can solve.
-    pub solves: ProblemClass,
     /// The solver that is asked in its place where it stops short.
     pub rescuer: Option<&'static str>,
     /// A new one; the text is the variant, or empty.
@@ -113,15 +101,15 @@ pub struct SolverEntry {
 pub static REGISTRY: [SolverEntry; 3] = [active_set::ENTRY, penalty_duality::ENTRY, tao::ENTRY];
 
 /// Their names.
-pub const SOLVERS: [&str; REGISTRY.len()] = {
-    let mut names = [""; REGISTRY.len()];
-    let mut i = 0;
-    while i < REGISTRY.len() {
-        names[i] = REGISTRY[i].name;
-        i += 1;
-    }
-    names
-};
+pub const SOLVERS: [&str; REGISTRY.len()] = [REGISTRY[0].name, REGISTRY[1].name, REGISTRY[2].name];
+
+/// There is no contact solver of that name.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("there is no contact solver `{name}`{}; there are {}", alike(name), listing())]
+pub struct SolverError {
+    /// The name.
+    pub name: String,
+}
 
 /// `[contact]` of a scene: how the contact problem is solved.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -179,8 +167,8 @@ pub fn find(name: &str) -> Result<(&'static SolverEntry, &str), SolverError> {
     let known = |entry: &&SolverEntry| {
         entry.name == solver && (name == solver || entry.variants.contains(&variant))
     };
-    let unknown = || SolverError::Unknown { name: name.to_owned() };
-    REGISTRY.iter().find(known).map(|entry| (entry, variant)).ok_or_else(unknown)
+    let found = REGISTRY.iter().find(known).map(|entry| (entry, variant));
+    found.ok_or_else(|| SolverError { name: name.to_owned() })
 }
 
 /// All solvers and what they do, a line each, for `--help`.
@@ -190,7 +178,7 @@ pub fn summaries() -> String {
 }
 
 /// The names that [`find`] knows, in words.
-pub fn listing() -> String {
+fn listing() -> String {
     let variants = REGISTRY.iter().filter(|entry| !entry.variants.is_empty());
     let variants = variants.map(|entry| {
         format!(", and {}:TYPE with TYPE one of {}", entry.name, entry.variants.join(", "))
@@ -199,7 +187,7 @@ pub fn listing() -> String {
 }
 
 /// An aside of a message: which name was perhaps meant by `name`.
-pub(super) fn alike(name: &str) -> String {
+fn alike(name: &str) -> String {
     let names = REGISTRY.iter().flat_map(|entry| {
         let variants = entry.variants.iter().map(|variant| format!("{}:{variant}", entry.name));
         variants.chain([entry.name.to_owned()])
@@ -210,40 +198,35 @@ pub(super) fn alike(name: &str) -> String {
     meant.map_or_else(String::new, |known| format!(" (did you mean `{known}`?)"))
 }
 
-/// The solver called `name` for problems of the class `class`. Without bounds every name means one
-/// linear solve.
+/// The solver called `name`; where there are no bounds every name means one linear solve, which is
+/// what the active set makes of them.
 ///
 /// # Errors
-/// There is none of that name, or it cannot solve such problems.
+/// There is none of that name.
 pub fn solver<'s>(
     session: &'s Session,
     name: &str,
-    class: ProblemClass,
+    bounded: bool,
     options: &ContactOptions,
 ) -> Result<Box<dyn ContactSolver + 's>, SolverError> {
     let (entry, variant) = find(name)?;
-    match class {
-        ProblemClass::Linear => Ok(Box::new(linear::Linear::new(session))),
-        class if entry.solves < class => {
-            Err(SolverError::Unable { name: entry.name, needed: class })
-        }
-        _ => Ok((entry.construct)(session, variant, options)),
-    }
+    Ok(match bounded {
+        true => (entry.construct)(session, variant, options),
+        false => Box::new(ActiveSet::new(session, "linear")),
+    })
 }
 
 /// The solver to ask in the place of the one called `name` where that stops short; none of a
 /// variant, so that one sees what that does by itself, nor where the options forbid it.
 ///
 /// # Errors
-/// See [`solver`].
+/// There is none of that name.
 pub fn rescuer<'s>(
     session: &'s Session,
     name: &str,
-    class: ProblemClass,
     options: &ContactOptions,
 ) -> Result<Option<Box<dyn ContactSolver + 's>>, SolverError> {
     let (entry, variant) = find(name)?;
-    let asked = options.rescue && variant.is_empty() && class > ProblemClass::Linear;
-    let rescuer = entry.rescuer.filter(|_| asked);
-    rescuer.map(|name| solver(session, name, class, options)).transpose()
+    let rescuer = entry.rescuer.filter(|_| options.rescue && variant.is_empty());
+    rescuer.map(|name| solver(session, name, true, options)).transpose()
 }

@@ -17,10 +17,7 @@ use super::{
     extrapolation::Extrapolation,
 };
 use crate::{
-    contact::{
-        self, Bound, ContactError, ContactProblem, ContactReport, ContactSolver, ProblemClass,
-        Scales,
-    },
+    contact::{self, Bound, ContactError, ContactProblem, ContactReport, ContactSolver, Scales},
     fem::Stiffness,
     petsc::{PetscError, Session, Vector},
 };
@@ -61,8 +58,8 @@ struct Memory {
     datum: Datum,
     /// The largest scales of residuals so far.
     scales: Scales,
-    /// The active bounds.
-    active: Vec<bool>,
+    /// Of each bound 1 if it is active, else 0.
+    active: Vec<f64>,
     /// The solver's warm start.
     warm_start: Vec<f64>,
 }
@@ -97,23 +94,18 @@ impl<'a> ContactStep<'a> {
         })?;
         let options = &problem.scene().contact;
         let bounded = comm.any(!constraints.bounds.is_empty());
-        let class = match (bounded, problem.motions.resisted()) {
-            (false, _) => ProblemClass::Linear,
-            (true, 0) => ProblemClass::Definite,
-            (true, _) => ProblemClass::Semidefinite,
-        };
         let memory = Memory {
             datum: Datum::default(),
             scales: Scales { force: LEAST_LOAD * problem.largest_load, displacement: 0.0 },
-            active: vec![false; constraints.bounds.len()],
+            active: vec![0.0; constraints.bounds.len()],
             warm_start: Vec::new(),
         };
         Ok(Self {
             session,
             problem,
             phases,
-            solver: contact::solver(session, solver, class, options)?,
-            rescuer: contact::rescuer(session, solver, class, options)?,
+            solver: contact::solver(session, solver, bounded, options)?,
+            rescuer: contact::rescuer(session, solver, options)?.filter(|_| bounded),
             stiffness,
             zeta_mean: vec![1.0; body.triangles.len()],
             load: Vector::zeros(session, unknowns)?,
@@ -207,11 +199,11 @@ impl<'a> ContactStep<'a> {
         }
         let (_, bounds) = self.next.datum.pose(problem, case);
         let motions = (&self.rigid, &case.work);
-        let moved = self.c.read(|c| {
-            let active = self.next.active.clone();
-            contact::rigid_motion_until_contact(comm, motions, &bounds, c, active, false)
+        let mut active = self.next.active.clone();
+        let (amplitudes, _) = self.c.read(|c| {
+            contact::rigid_motion_until_contact(comm, motions, &bounds, c, &mut active, false)
         })?;
-        self.next.datum.add(problem, &problem.motions.displacement(body, &moved.amplitudes));
+        self.next.datum.add(problem, &problem.motions.displacement(body, &amplitudes));
         Ok(())
     }
 

@@ -4,8 +4,8 @@ use crate::support::close;
 use nalgebra::{DMatrix, DVector};
 use signorini::{
     contact::{
-        Bound, ContactError, ContactOptions, ContactProblem, ContactReport, ProblemClass, SOLVERS,
-        Scales, find, solver,
+        Bound, ContactError, ContactOptions, ContactProblem, ContactReport, SOLVERS, Scales, find,
+        solver,
     },
     petsc::{Communicator, Matrix, Session, Vector},
     phases::Phases,
@@ -66,8 +66,7 @@ impl Small {
             comm: Communicator::serial(),
             phases: &Phases::default(),
         };
-        let mut solver =
-            solver(&session, name, ProblemClass::Semidefinite, &ContactOptions::default()).unwrap();
+        let mut solver = solver(&session, name, true, &ContactOptions::default()).unwrap();
         if name == "active-set" {
             solver.set_warm_start(guess);
         }

@@ -1,6 +1,6 @@
 //! What becomes of the motions that nothing prevents and nothing drives.
 
-use super::{PartMotion, RigidMotions, load::Resultant};
+use super::{PartMotion, RigidMotions};
 use crate::{contact::Constraints, fem::Body};
 
 /// Normals turn by at most this (rad) to be tangential to free motions.
@@ -25,64 +25,55 @@ impl RigidMotions {
     /// Pins one unknown for each free motion. The load being balanced, the pins carry no
     /// force: any solution so found is exact up to the motion, which [`Self::remove_free`] takes out.
     pub fn pin_free(&self, body: &Body, constraints: &mut Constraints) {
-        for piece in &self.movable {
-            let motions = self.free[piece.free.clone()].iter();
-            let mut fields: Vec<Vec<f64>> = motions.map(|m| self.field(m, body)).collect();
-            fields.iter_mut().for_each(|f| constraints.bases.displacement_to_local(f));
-            // Gaussian elimination on the motions, the largest remaining entry as pivot.
-            while let Some(pivot_field) = fields.pop() {
-                let fixed = constraints.bases.fixed();
-                let largest = (0..pivot_field.len())
-                    .filter(|&dof| !fixed[dof])
-                    .max_by(|&a, &b| pivot_field[a].abs().total_cmp(&pivot_field[b].abs()));
-                let Some(dof) = largest else { return };
-                for field in &mut fields {
-                    let factor = field[dof] / pivot_field[dof];
-                    field.iter_mut().zip(&pivot_field).for_each(|(v, p)| *v -= factor * p);
-                }
-                constraints.bases.fix(dof);
+        let mut fields: Vec<Vec<f64>> = self.free.iter().map(|m| self.field(m, body)).collect();
+        fields.iter_mut().for_each(|f| constraints.bases.displacement_to_local(f));
+        // Gaussian elimination on the motions, the largest remaining entry as pivot.
+        while let Some(pivot_field) = fields.pop() {
+            let fixed = constraints.bases.fixed();
+            let largest = (0..pivot_field.len())
+                .filter(|&dof| !fixed[dof])
+                .max_by(|&a, &b| pivot_field[a].abs().total_cmp(&pivot_field[b].abs()));
+            let Some(dof) = largest else { return };
+            for field in &mut fields {
+                let factor = field[dof] / pivot_field[dof];
+                field.iter_mut().zip(&pivot_field).for_each(|(v, p)| *v -= factor * p);
             }
+            constraints.bases.fix(dof);
         }
     }
 
     /// Removes the free motions from u: the answer of least ∫|u|².
     pub fn remove_free(&self, body: &Body, u: &mut [f64]) {
-        if self.free.is_empty() {
-            return;
-        }
-        let momentum = |i: usize| [u[2 * i], u[2 * i + 1]].map(|u| body.node_area[i] * u);
-        let removed = self.projection(&self.resultants(body, momentum));
-        for (node, u) in u.as_chunks_mut::<2>().0.iter_mut().enumerate() {
-            let [x, y] = removed[self.part_of_node[node]].at(body.mesh.nodes[node]);
-            *u = [u[0] - x, u[1] - y];
+        if !self.free.is_empty() {
+            let momentum = |i: usize| [u[2 * i], u[2 * i + 1]].map(|u| body.node_area[i] * u);
+            let removed = self.projection(body, momentum);
+            u.iter_mut().zip(removed).for_each(|(u, m)| *u -= m);
         }
     }
 
     /// `load` (nodal forces, N) less the body force that does the same work on free motions. That
     /// work is rounding where [`Self::check`] accepts the load, and no pin then carries it.
     pub fn balanced(&self, body: &Body, mut load: Vec<f64>) -> Vec<f64> {
-        if self.free.is_empty() {
-            return load;
-        }
-        let balance = self.projection(&self.resultants(body, |i| [load[2 * i], load[2 * i + 1]]));
-        for (node, f) in load.as_chunks_mut::<2>().0.iter_mut().enumerate() {
-            let [x, y] = balance[self.part_of_node[node]].at(body.mesh.nodes[node]);
-            let area = body.node_area[node];
-            *f = [f[0] - area * x, f[1] - area * y];
+        if !self.free.is_empty() {
+            let balance = self.projection(body, |i| [load[2 * i], load[2 * i + 1]]);
+            let areas = body.node_area.iter().flat_map(|area| [area; 2]);
+            load.iter_mut().zip(balance).zip(areas).for_each(|((f, m), area)| *f -= area * m);
         }
         load
     }
 
-    /// Part by part the combination m of free motions with ∫m·v = f·v for all free motions v, from
-    /// the resultants of f: they are orthogonal, so m = Σ (f·v/∫v·v) v.
-    fn projection(&self, sums: &[Resultant]) -> Vec<PartMotion> {
-        let still = self.parts.iter().enumerate().map(|(i, part)| part.motion(i, [0.0; 2], 0.0));
+    /// The nodal displacements of the combination m of free motions with ∫m·v = f·v for all free
+    /// motions v: they are orthogonal, so m = Σ (f·v/∫v·v) v. Collective.
+    fn projection(&self, body: &Body, force: impl Fn(usize) -> [f64; 2]) -> Vec<f64> {
+        let sums = self.resultants(body, force);
+        let still = self.parts.iter().enumerate().map(|(i, part)| part.motion(i, &[0.0; 3]));
         let mut parts: Vec<_> = still.collect();
         for motion in &self.free {
             let square = |part: &PartMotion| self.parts[part.part].area * part.mean_square();
-            let amplitude = motion.work(sums) / motion.parts.iter().map(square).sum::<f64>();
+            let amplitude = motion.work(&sums) / motion.parts.iter().map(square).sum::<f64>();
             motion.parts.iter().for_each(|part| parts[part.part].add(amplitude, part));
         }
-        parts
+        let nodes = self.part_of_node.iter().zip(&body.mesh.nodes);
+        nodes.flat_map(|(&part, &x)| parts[part].at(x)).collect()
     }
 }

@@ -1,8 +1,9 @@
 //! Whether a load drives the motions that prescribed displacements leave.
 
-use super::{Extent, MovablePiece, RigidMotion, RigidMotions, nonnegative::nonnegative};
+use super::{PartMotion, RigidMotion, RigidMotions, nonnegative::nonnegative};
 use crate::fem::Body;
 use nalgebra::DVector;
+use std::ops::Range;
 
 /// Of nodal forces on a part: f_x, f_y, the moment about the part's centre, Σ|f|.
 pub(super) type Resultant = [f64; 4];
@@ -22,7 +23,7 @@ const ROUNDING: f64 = 1e-12;
     "{}nothing holds {} against {}, and the load drives it (resultant ({:.4e}, {:.4e}) N/m, \
      moment about its centre {moment:.4e} N): hold it by a `displacement`, a `symmetry` axis or a `gap`, \
      or balance the load",
-    disjoint(*pieces, motion.extent), motion.what_moves(), motion.how_it_moves(), force[0], force[1]
+    disjoint(motion), motion.what_moves(), motion.largest(), force[0], force[1]
 )]
 pub struct DrivenMotion {
     /// The motion.
@@ -31,15 +32,13 @@ pub struct DrivenMotion {
     pub force: [f64; 2],
     /// The load's moment about the centre of what moves, N m per metre of thickness.
     pub moment: f64,
-    /// Number of pieces of the mesh.
-    pub pieces: usize,
 }
 
-fn disjoint(pieces: usize, extent: Extent) -> String {
-    match (pieces, extent) {
-        (_, Extent::Parts) => "parts of the mesh meet in single nodes only; ".to_owned(),
-        (1, _) => String::new(),
-        _ => format!("the mesh has {pieces} pieces (gmsh: Coherence joins those that touch); "),
+fn disjoint(motion: &RigidMotion) -> String {
+    match (motion.parts.len(), motion.pieces) {
+        (1, 1) => String::new(),
+        (1, n) => format!("the mesh has {n} pieces (gmsh: Coherence joins those that touch); "),
+        _ => "parts of the mesh meet in single nodes only; ".to_owned(),
     }
 }
 
@@ -57,21 +56,24 @@ impl RigidMotions {
         }
         let sums = self.resultants(body, |i| [load[2 * i], load[2 * i + 1]]);
         let total: f64 = sums.iter().map(|sum| sum[3]).sum();
-        for piece in &self.movable {
-            let sum: f64 = piece.parts.iter().map(|&part| sums[part][3]).sum();
-            if sum <= UNLOADED * total {
-                continue;
+        // Σ|f| on the piece of a motion, if it is not rounding.
+        let loaded = |motion: &RigidMotion| {
+            let sum: f64 = motion.parts.iter().map(|part| sums[part.part][3]).sum();
+            (sum > UNLOADED * total).then_some(sum)
+        };
+        for motion in &self.free {
+            if loaded(motion).is_some_and(|sum| motion.work(&sums).abs() > BALANCED * sum) {
+                return Err(self.driven(motion.clone(), &sums));
             }
-            let mut free = self.free[piece.free.clone()].iter();
-            if let Some(motion) = free.find(|m| m.work(&sums).abs() > BALANCED * sum) {
-                return Err(self.driven(piece, motion.clone(), &sums));
-            }
-            let resisted = &self.resisted[piece.resisted.clone()];
-            let work = DVector::from_fn(resisted.len(), |i, _| resisted[i].work(&sums));
-            let remainder = &work - piece.normal.transpose() * nonnegative(&piece.normal, &work);
+        }
+        for (places, motions) in self.resisted_by_piece() {
+            let Some(sum) = loaded(&motions[0]) else { continue };
+            let normal = self.normal.columns_range(places).into_owned();
+            let work = DVector::from_fn(motions.len(), |i, _| motions[i].work(&sums));
+            let remainder = &work - normal.transpose() * nonnegative(&normal, &work);
             if remainder.norm() > REMAINDER * sum {
-                let motion = RigidMotion::combination(resisted, remainder.normalize().as_slice());
-                return Err(self.driven(piece, motion, &sums));
+                let motion = RigidMotion::combination(motions, remainder.normalize().as_slice());
+                return Err(self.driven(motion, &sums));
             }
         }
         Ok(())
@@ -104,39 +106,35 @@ impl RigidMotions {
         sums
     }
 
-    fn driven(
-        &self,
-        piece: &MovablePiece,
-        motion: RigidMotion,
-        sums: &[Resultant],
-    ) -> DrivenMotion {
-        let [x, y] = motion.largest().map_or([0.0; 2], |largest| largest.centre);
+    fn driven(&self, motion: RigidMotion, sums: &[Resultant]) -> DrivenMotion {
+        let [x, y] = motion.largest().centre;
         let [mut fx, mut fy, mut moment, mut total] = [0.0; 4];
-        for &part in &piece.parts {
-            let ([cx, cy], [px, py, turn, all]) = (self.parts[part].centre, sums[part]);
+        for &PartMotion { part, centre: [cx, cy], .. } in &motion.parts {
+            let [px, py, turn, all] = sums[part];
             (fx, fy, total) = (fx + px, fy + py, total + all);
             moment += turn + (cx - x) * py - (cy - y) * px;
         }
         let force = [fx, fy].map(|f| if f.abs() > ROUNDING * total { f } else { 0.0 });
-        DrivenMotion { motion, force, moment, pieces: self.pieces }
+        DrivenMotion { motion, force, moment }
     }
 
     /// The motion with these amplitudes (a unit vector) of those that contact alone constrains.
     /// Where it moves several pieces, what it does to the one that moves most.
-    pub fn combined(&self, amplitudes: &DVector<f64>) -> RigidMotion {
-        let own = |piece: &MovablePiece| &amplitudes.as_slice()[piece.resisted.clone()];
-        let square = |piece: &MovablePiece| own(piece).iter().map(|c| c * c).sum::<f64>();
-        let most = self.movable.iter().max_by(|a, b| square(a).total_cmp(&square(b)));
-        most.map_or_else(RigidMotion::default, |piece| {
-            RigidMotion::combination(&self.resisted[piece.resisted.clone()], own(piece))
-        })
+    pub fn combined(&self, amplitudes: &DVector<f64>) -> Option<RigidMotion> {
+        let of_piece = |(places, motions): (Range<usize>, _)| {
+            let own = &amplitudes.as_slice()[places];
+            (own.iter().map(|c| c * c).sum::<f64>(), own, motions)
+        };
+        let pieces = self.resisted_by_piece().map(of_piece);
+        let most = pieces.max_by(|a, b| a.0.total_cmp(&b.0));
+        most.map(|(_, own, motions)| RigidMotion::combination(motions, own))
     }
 }
 
 impl RigidMotion {
     /// The work of forces with these resultants on all parts, a·F + θM.
     pub(super) fn work(&self, sums: &[Resultant]) -> f64 {
-        let part = |motion: &super::PartMotion| {
+        let part = |motion: &PartMotion| {
             let [fx, fy, moment, _] = sums[motion.part];
             let [ax, ay] = motion.translation;
             ax * fx + ay * fy + motion.rotation * moment

@@ -8,7 +8,7 @@ mod nonnegative;
 mod until_contact;
 
 pub use load::DrivenMotion;
-pub use motion::{Extent, PartMotion, RigidMotion};
+pub use motion::{PartMotion, RigidMotion};
 pub(crate) use until_contact::{rigid_motion_until_contact, unconstrained_motions};
 
 use super::{Bound, FixedRow, GapRow};
@@ -26,27 +26,16 @@ use std::ops::Range;
 pub struct RigidMotions {
     /// Unconstrained, even by contact in either sense.
     pub free: Vec<RigidMotion>,
-    /// Those that contact resists in one sense.
+    /// Those that contact resists in one sense, piece by piece.
     resisted: Vec<RigidMotion>,
-    /// The pieces that have any of these motions.
-    movable: Vec<MovablePiece>,
+    /// u·ν of the resisted motions, one row per gap condition of the undivided body.
+    normal: DMatrix<f64>,
     parts: Vec<Part>,
     part_of_node: Vec<usize>,
     /// Number of pieces of the mesh.
     pub pieces: usize,
     /// Where parts of a piece meet in a node, the first such place, m.
     pub hinge: Option<[f64; 2]>,
-}
-
-/// A piece of the mesh that has rigid motions left.
-#[derive(Debug, Clone)]
-struct MovablePiece {
-    parts: Vec<usize>,
-    /// Its motions among the free and among the resisted ones.
-    free: Range<usize>,
-    resisted: Range<usize>,
-    /// u·ν of its resisted motions, one row per gap condition.
-    normal: DMatrix<f64>,
 }
 
 /// A part of the mesh that hangs together through edges.
@@ -56,6 +45,8 @@ struct Part {
     centre: [f64; 2],
     /// Radius of gyration, m: a rotation by 1/radius moves the part as far as a unit translation.
     radius: f64,
+    /// √w with w its part of the piece's area.
+    weight: f64,
 }
 
 /// Squares of motions are zero below this, relative, that is motions below 3e-5. gmsh cuts a
@@ -72,73 +63,85 @@ impl RigidMotions {
     /// From the fixed rows and the gap conditions, joined node by node as in the bounds.
     pub fn new(body: &Body, fixed: &[FixedRow], gaps: &[GapRow]) -> Self {
         let Components { part_of_node, pieces, hinges } = body.mesh.components();
+        let nodes = &body.mesh.nodes;
         let mut motions = Self {
             free: Vec::new(),
             resisted: Vec::new(),
-            movable: Vec::new(),
-            parts: Part::all(body, &part_of_node),
+            normal: DMatrix::zeros(0, 0),
+            parts: Part::all(body, &part_of_node, &pieces),
             part_of_node,
             pieces: pieces.len(),
-            hinge: hinges.first().map(|&(node, _)| body.mesh.nodes[node]),
+            hinge: hinges.first().map(|&(node, _)| nodes[node]),
         };
-        let mut piece_of_part = vec![0; motions.parts.len()];
-        for (piece, parts) in pieces.iter().enumerate() {
-            parts.iter().for_each(|&part| piece_of_part[part] = piece);
+        let normals: Vec<_> = gaps.iter().map(|gap| (gap.node, gap.normal)).collect();
+        for parts in &pieces {
+            let here = |node: usize| parts.binary_search(&motions.part_of_node[node]).is_ok();
+            let fixed: Vec<_> = fixed.iter().filter(|row| here(row.node)).copied().collect();
+            let hinges: Vec<_> = hinges.iter().filter(|hinge| here(hinge.0)).copied().collect();
+            let normals: Vec<_> = normals.iter().filter(|row| here(row.0)).copied().collect();
+            let (free, resisted) = motions.of_piece(nodes, parts, &fixed, &hinges, &normals);
+            motions.free.extend(free);
+            motions.resisted.extend(resisted);
         }
-        let mut rows = vec![Rows::default(); pieces.len()];
-        let piece = |node: usize| piece_of_part[motions.part_of_node[node]];
-        fixed.iter().for_each(|row| rows[piece(row.node)].fixed.push(*row));
-        gaps.iter().for_each(|row| rows[piece(row.node)].normals.push((row.node, row.normal)));
-        hinges.iter().for_each(|hinge| rows[piece(hinge.0)].hinges.push(*hinge));
-        for (parts, rows) in pieces.into_iter().zip(&rows) {
-            motions.add_piece(&body.mesh.nodes, parts, rows);
-        }
+        motions.normal = motions.normal_displacements(nodes, &motions.resisted, &normals);
         motions
     }
 
-    /// Finds the motions of the piece of these `parts`: the null space of Σ r rᵀ over the rows
-    /// r·v = 0 of prescribed displacements and hinges. Of these, the free ones are in the null
-    /// space of u·ν at its gap conditions too.
-    fn add_piece(&mut self, nodes: &[[f64; 2]], parts: Vec<usize>, rows: &Rows) {
-        let piece = Piece::new(&self.parts, &parts, self.pieces == 1);
+    /// The motions of the piece of these `parts`, the free ones and the resisted ones: the null space
+    /// of Σ r rᵀ over the rows r·v = 0 of prescribed displacements and hinges. Of these, the free ones
+    /// are in the null space of u·ν at its gap conditions too.
+    ///
+    /// The coordinates v are of part k √w_k (a_x, a_y, r_k θ) with w_k its part of the piece's area, so
+    /// that |v|² is the mean of |u|² over the piece.
+    fn of_piece(
+        &self,
+        nodes: &[[f64; 2]],
+        parts: &[usize],
+        fixed: &[FixedRow],
+        hinges: &[(usize, [usize; 2])],
+        normals: &[(usize, [f64; 2])],
+    ) -> (Vec<RigidMotion>, Vec<RigidMotion>) {
+        let (mut free, mut resisted) = (Vec::new(), Vec::new());
+        let row = |part: usize, node: usize, d: [f64; 2]| {
+            let mut row = DVector::zeros(3 * parts.len());
+            let of_part = self.parts[part].row(nodes[node], d);
+            let k = parts.partition_point(|&other| other < part);
+            row.as_mut_slice()[3 * k..3 * k + 3].copy_from_slice(&of_part);
+            row
+        };
         let mut gram = DMatrix::zeros(3 * parts.len(), 3 * parts.len());
         let mut add = |row: DVector<f64>| gram.ger(1.0, &row, &row, 1.0);
-        for &FixedRow { node, direction: d } in &rows.fixed {
+        for &FixedRow { node, direction: d } in fixed {
             let part = self.part_of_node[node];
             // An axis is exact, the normal of a polygon is not.
             let weight = if d.contains(&0.0) { 1.0 } else { (PREVENTED / ROUNDING).sqrt() };
-            add(piece.row(part, nodes[node], d) * piece.weight(part) * weight);
+            add(row(part, node, d) * self.parts[part].weight * weight);
         }
-        for &(node, [a, b]) in &rows.hinges {
+        for &(node, [a, b]) in hinges {
             for d in [[1.0, 0.0], [0.0, 1.0]] {
-                add((piece.row(a, nodes[node], d) - piece.row(b, nodes[node], d)).normalize());
+                add((row(a, node, d) - row(b, node, d)).normalize());
             }
         }
-        let cut = PREVENTED * (rows.fixed.len() + 2 * rows.hinges.len()) as f64;
-        let basis = null_space(gram, cut);
+        let basis = null_space(gram, PREVENTED * (fixed.len() + 2 * hinges.len()) as f64);
         if basis.is_empty() {
-            return;
+            return (free, resisted);
         }
-        let all: Vec<_> = basis.iter().map(|v| piece.motion(v)).collect();
-        let contact = self.normal_displacements(nodes, &all, &rows.normals);
+        let motion = |v: &DVector<f64>| {
+            let of_part = |(v, &part): (&[f64], &usize)| self.parts[part].motion(part, v);
+            let parts = v.as_slice().chunks(3).zip(parts).map(of_part).collect();
+            RigidMotion { parts, pieces: self.pieces }
+        };
+        let all: Vec<_> = basis.iter().map(motion).collect();
+        let contact = self.normal_displacements(nodes, &all, normals);
         let eigen = (contact.transpose() * &contact).symmetric_eigen();
-        let (mut free, mut resisted) = (Vec::new(), Vec::new());
         for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
             let v: DVector<f64> = basis.iter().zip(vector.iter()).map(|(m, c)| m * *c).sum();
-            match *value > ROUNDING * rows.normals.len() as f64 {
-                true => resisted.push(piece.motion(&v)),
-                false => free.push(piece.motion(&v)),
+            match *value > ROUNDING * normals.len() as f64 {
+                true => resisted.push(motion(&v)),
+                false => free.push(motion(&v)),
             }
         }
-        let normal = self.normal_displacements(nodes, &resisted, &rows.normals);
-        self.movable.push(MovablePiece {
-            parts,
-            free: self.free.len()..self.free.len() + free.len(),
-            resisted: self.resisted.len()..self.resisted.len() + resisted.len(),
-            normal,
-        });
-        self.free.extend(free);
-        self.resisted.extend(resisted);
+        (free, resisted)
     }
 
     /// Those of a rank's subdomain.
@@ -148,13 +151,23 @@ impl RigidMotions {
 
     /// Whether prescribed displacements prevent all rigid motions (K is then positive definite).
     pub fn all_prevented(&self) -> bool {
-        self.movable.is_empty()
+        self.free.is_empty() && self.resisted.is_empty()
     }
 
     /// Number of motions that contact alone constrains: the dimension of K's null space once the
     /// free ones are pinned.
     pub fn resisted(&self) -> usize {
         self.resisted.len()
+    }
+
+    /// The resisted motions of each piece that has any, and their places among all.
+    fn resisted_by_piece(&self) -> impl Iterator<Item = (Range<usize>, &[RigidMotion])> {
+        let of_one_piece = |a: &RigidMotion, b: &RigidMotion| a.parts[0].part == b.parts[0].part;
+        self.resisted.chunk_by(of_one_piece).scan(0, |end, motions| {
+            let first = *end;
+            *end += motions.len();
+            Some((first..*end, motions))
+        })
     }
 
     /// A motion at all nodes, m (two entries per node).
@@ -197,20 +210,11 @@ impl RigidMotions {
     }
 }
 
-/// What concerns one piece: prescribed directions, nodes with normals, hinges between two parts.
-#[derive(Clone, Default)]
-struct Rows {
-    fixed: Vec<FixedRow>,
-    normals: Vec<(usize, [f64; 2])>,
-    hinges: Vec<(usize, [usize; 2])>,
-}
-
 impl Part {
     /// Area, centre and radius of all parts by the areas of their nodes: orthogonality is then
     /// exact in the sums over nodes that take the place of integrals.
-    fn all(body: &Body, part_of_node: &[usize]) -> Vec<Self> {
-        let count = part_of_node.iter().max().map_or(0, |last| last + 1);
-        let mut parts = vec![Self::default(); count];
+    fn all(body: &Body, part_of_node: &[usize], pieces: &[Vec<usize>]) -> Vec<Self> {
+        let mut parts = vec![Self::default(); pieces.iter().map(Vec::len).sum()];
         let nodes = || part_of_node.iter().zip(&body.mesh.nodes).zip(&body.node_area);
         for ((&part, [x, y]), area) in nodes() {
             let Self { area: sum, centre: [cx, cy], .. } = &mut parts[part];
@@ -222,60 +226,25 @@ impl Part {
             part.radius += area * ((x - part.centre[0]).powi(2) + (y - part.centre[1]).powi(2));
         }
         parts.iter_mut().for_each(|part| part.radius = (part.radius / part.area).sqrt());
+        for piece in pieces {
+            let area: f64 = piece.iter().map(|&part| parts[part].area).sum();
+            piece.iter().for_each(|&part| parts[part].weight = (parts[part].area / area).sqrt());
+        }
         parts
     }
 
-    /// Its motion as the part numbered `part`.
-    fn motion(&self, part: usize, translation: [f64; 2], rotation: f64) -> PartMotion {
-        PartMotion { part, translation, rotation, centre: self.centre, radius: self.radius }
-    }
-}
-
-/// Coordinates v for the motions of one piece: of part k √w_k (a_x, a_y, r_k θ) with w_k its part
-/// of the piece's area, so that |v|² is the mean of |u|² over the piece.
-struct Piece<'a> {
-    all: &'a [Part],
-    parts: &'a [usize],
-    area: f64,
-    extent: Extent,
-}
-
-impl<'a> Piece<'a> {
-    fn new(all: &'a [Part], parts: &'a [usize], only: bool) -> Self {
-        let extent = match (parts.len(), only) {
-            (1, true) => Extent::Body,
-            (1, false) => Extent::Piece,
-            _ => Extent::Parts,
-        };
-        Self { all, parts, area: parts.iter().map(|&part| all[part].area).sum(), extent }
+    /// The r for which r·v is u·d at a point, with v the part's coordinates
+    /// ([`RigidMotions::of_piece`]).
+    fn row(&self, [x, y]: [f64; 2], d: [f64; 2]) -> [f64; 3] {
+        let turn = ((x - self.centre[0]) * d[1] - (y - self.centre[1]) * d[0]) / self.radius;
+        [d[0], d[1], turn].map(|v| v / self.weight)
     }
 
-    /// √w_k of a part.
-    fn weight(&self, part: usize) -> f64 {
-        (self.all[part].area / self.area).sqrt()
-    }
-
-    /// The vector r for which r·v is u·d at a point of a part.
-    fn row(&self, part: usize, [x, y]: [f64; 2], d: [f64; 2]) -> DVector<f64> {
-        let (Part { centre, radius, .. }, weight) = (self.all[part], self.weight(part));
-        let turn = ((x - centre[0]) * d[1] - (y - centre[1]) * d[0]) / radius;
-        let mut row = DVector::zeros(3 * self.parts.len());
-        if let Ok(k) = self.parts.binary_search(&part) {
-            row.as_mut_slice()[3 * k..3 * k + 3]
-                .copy_from_slice(&[d[0], d[1], turn].map(|v| v / weight));
-        }
-        row
-    }
-
-    /// The motion with the coordinates v.
-    fn motion(&self, v: &DVector<f64>) -> RigidMotion {
-        let part = |(v, &part): (&[f64], &usize)| {
-            let weight = self.weight(part);
-            let [ax, ay, turn] = [v[0], v[1], v[2]].map(|v| v / weight);
-            self.all[part].motion(part, [ax, ay], turn / self.all[part].radius)
-        };
-        let parts = v.as_slice().chunks(3).zip(self.parts).map(part).collect();
-        RigidMotion { parts, extent: self.extent }
+    /// Its motion with the coordinates v as the part numbered `part`.
+    fn motion(&self, part: usize, v: &[f64]) -> PartMotion {
+        let [ax, ay, turn] = [v[0], v[1], v[2]].map(|v| v / self.weight);
+        let Self { centre, radius, .. } = *self;
+        PartMotion { part, translation: [ax, ay], rotation: turn / radius, centre, radius }
     }
 }
 

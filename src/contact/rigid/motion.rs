@@ -3,7 +3,7 @@
 use std::fmt;
 
 /// An infinitesimal rigid motion of one part of the mesh, u(x) = a + θ e_z × (x − centre).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PartMotion {
     /// The part, see [`Components`](crate::mesh::Components).
     pub part: usize,
@@ -61,32 +61,20 @@ impl fmt::Display for PartMotion {
     }
 }
 
-/// How much of the mesh a motion moves.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Extent {
-    /// The whole mesh, in one part.
-    #[default]
-    Body,
-    /// One of several pieces of the mesh.
-    Piece,
-    /// Parts of a piece, which turn about the nodes where they meet.
-    Parts,
-}
-
 /// A motion without strain: rigid on each of some parts of the mesh, continuous where parts meet,
 /// 0 elsewhere.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct RigidMotion {
-    /// The parts that move.
+    /// The motions of the parts of a piece.
     pub parts: Vec<PartMotion>,
-    /// What it moves.
-    pub extent: Extent,
+    /// Number of pieces of the mesh.
+    pub pieces: usize,
 }
 
 impl RigidMotion {
-    /// Σ factor·motion of motions of the same parts.
+    /// Σ factor·motion of motions of one piece.
     pub(super) fn combination(motions: &[Self], factors: &[f64]) -> Self {
-        let mut sum = motions.first().cloned().unwrap_or_default();
+        let mut sum = motions[0].clone();
         sum.parts.iter_mut().for_each(|part| (part.translation, part.rotation) = ([0.0; 2], 0.0));
         for (motion, factor) in motions.iter().zip(factors) {
             sum.parts.iter_mut().zip(&motion.parts).for_each(|(s, part)| s.add(*factor, part));
@@ -100,31 +88,26 @@ impl RigidMotion {
     }
 
     /// The motion of the part that moves most, which stands for all in messages.
-    pub fn largest(&self) -> Option<&PartMotion> {
-        self.parts.iter().max_by(|a, b| a.mean_square().total_cmp(&b.mean_square()))
+    pub(super) fn largest(&self) -> PartMotion {
+        let largest = self.parts.iter().max_by(|a, b| a.mean_square().total_cmp(&b.mean_square()));
+        largest.copied().unwrap_or_default()
     }
 
     /// What moves, in words.
-    pub fn what_moves(&self) -> String {
-        let centre = place(self.largest().map_or([0.0; 2], |motion| motion.centre));
-        match self.extent {
-            Extent::Body => "the body".to_owned(),
-            Extent::Piece => format!("the piece around {centre}"),
-            Extent::Parts => format!("the part around {centre}"),
+    pub(super) fn what_moves(&self) -> String {
+        match (self.parts.len(), self.pieces) {
+            (1, 1) => "the body".to_owned(),
+            (1, _) => format!("the piece around {}", place(self.largest().centre)),
+            _ => format!("the part around {}", place(self.largest().centre)),
         }
-    }
-
-    /// How it moves, in words.
-    pub fn how_it_moves(&self) -> String {
-        self.largest().map(PartMotion::to_string).unwrap_or_default()
     }
 }
 
 impl fmt::Display for RigidMotion {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        match self.extent {
-            Extent::Body => f.write_str(&self.how_it_moves()),
-            _ => write!(f, "{} of {}", self.how_it_moves(), self.what_moves()),
+        match (self.parts.len(), self.pieces) {
+            (1, 1) => write!(f, "{}", self.largest()),
+            _ => write!(f, "{} of {}", self.largest(), self.what_moves()),
         }
     }
 }

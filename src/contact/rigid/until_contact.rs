@@ -4,32 +4,22 @@ use super::null_space;
 use crate::{contact::Bound, petsc::Communicator};
 use nalgebra::{DMatrix, DVector};
 
-/// A rigid motion of a body that contact alone constrains, and the bounds it ends at.
-pub(crate) struct UntilContact {
-    /// How far along each of the motions, m.
-    pub(crate) amplitudes: DVector<f64>,
-    /// The bounds reached on this rank, and whether it is their upper side.
-    pub(crate) reached: Vec<(usize, bool)>,
-    /// Whether the active and the reached bounds constrain all rigid motions.
-    pub(crate) constrained: bool,
-}
-
 /// Work on a motion below this part of the load's work on all is rounding.
 const ROUNDING: f64 = 1e-12;
 
 /// The combinations (orthonormal) of the motions `rigid`, u·ν at the bounds, a column each, that
 /// are left when u·ν is prescribed on the `active` bounds: the null space of the rows of `rigid`
-/// there. Collective.
+/// there. An active bound has a side, 1 the upper and −1 the lower one, another 0. Collective.
 pub(crate) fn unconstrained_motions(
     comm: Communicator,
     rigid: &DMatrix<f64>,
-    active: &[bool],
+    active: &[f64],
 ) -> Vec<DVector<f64>> {
     let motions = rigid.ncols();
     if motions == 0 {
         return Vec::new();
     }
-    let rows = rigid.row_iter().zip(active).filter(|(_, on)| **on);
+    let rows = rigid.row_iter().zip(active).filter(|(_, side)| **side != 0.0);
     let mut gram =
         rows.fold(DMatrix::zeros(motions, motions), |sum, (row, _)| sum + row.transpose() * row);
     comm.sum(gram.as_mut_slice());
@@ -37,8 +27,9 @@ pub(crate) fn unconstrained_motions(
 }
 
 /// Lets the body move from c, with u·ν kept at the `active` bounds, as the load drives it until it
-/// reaches a further bound, and again until no rigid motion is left. `rigid` are the u·ν of its
-/// motions at the bounds, a column each, `work` that of the load on them. Collective.
+/// reaches a further bound, which becomes active, and again until no rigid motion is left. `rigid` are
+/// the u·ν of its motions at the bounds, a column each, `work` that of the load on them. Returns how far
+/// it moves along each motion, m, and whether the active bounds then constrain all. Collective.
 ///
 /// Where the load drives none of the motions left, the body stays, or with `undriven`, any motion
 /// does.
@@ -47,21 +38,18 @@ pub(crate) fn rigid_motion_until_contact(
     (rigid, work): (&DMatrix<f64>, &DVector<f64>),
     bounds: &[Bound],
     c: &[f64],
-    mut active: Vec<bool>,
+    active: &mut [f64],
     undriven: bool,
-) -> UntilContact {
+) -> (DVector<f64>, bool) {
     let mut amplitudes = DVector::zeros(rigid.ncols());
-    let mut reached = Vec::new();
     loop {
-        let left = unconstrained_motions(comm, rigid, &active);
-        let Some(any) = left.first() else {
-            return UntilContact { amplitudes, reached, constrained: true };
-        };
+        let left = unconstrained_motions(comm, rigid, active);
+        let Some(any) = left.first() else { return (amplitudes, true) };
         let driven = left.iter().map(|m| m * m.dot(work)).sum::<DVector<f64>>();
         let motion = match driven.amax() > ROUNDING * work.amax() {
             true => driven.normalize(),
             false if undriven => any.normalize(),
-            false => return UntilContact { amplitudes, reached, constrained: false },
+            false => return (amplitudes, false),
         };
         let (speed, gone) = (rigid * &motion, rigid * &amplitudes);
         let fastest = comm.max(speed.iter().fold(0.0, |m: f64, v| m.max(v.abs())));
@@ -70,7 +58,7 @@ pub(crate) fn rigid_motion_until_contact(
             let value = if speed[i] > 0.0 { bound.upper } else { bound.lower };
             (i, (value - c[bound.dof] - gone[i]) / speed[i])
         };
-        let moving = |i: &usize| !active[*i] && speed[*i].abs() > 1e-6 * fastest;
+        let moving = |i: &usize| active[*i] == 0.0 && speed[*i].abs() > 1e-6 * fastest;
         let nearest = (0..bounds.len())
             .filter(moving)
             .map(distance)
@@ -78,12 +66,11 @@ pub(crate) fn rigid_motion_until_contact(
             .min_by(|a, b| a.1.total_cmp(&b.1));
         let (distance, rank) = comm.min_with_rank(nearest.map_or(f64::INFINITY, |(_, d)| d));
         if distance == f64::INFINITY {
-            return UntilContact { amplitudes, reached, constrained: false };
+            return (amplitudes, false);
         }
         amplitudes += distance * motion;
         if let Some((i, _)) = nearest.filter(|_| rank == comm.rank()) {
-            active[i] = true;
-            reached.push((i, speed[i] > 0.0));
+            active[i] = speed[i].signum();
         }
     }
 }

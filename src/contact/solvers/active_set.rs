@@ -1,6 +1,6 @@
 //! The primal-dual active set method.
 
-use super::{ContactReport, ContactSolver, ProblemClass, SolverEntry};
+use super::{ContactReport, ContactSolver, SolverEntry};
 use crate::{
     cholesky::LinearSystem,
     contact::{
@@ -14,9 +14,8 @@ pub(super) const ENTRY: SolverEntry = SolverEntry {
     name: "active-set",
     summary: "primal-dual active set method, one linear solve per guess of the active nodes",
     variants: &[],
-    solves: ProblemClass::Semidefinite,
     rescuer: Some("tao"),
-    construct: |session, _, _| Box::new(ActiveSet::new(session)),
+    construct: |session, _, _| Box::new(ActiveSet::new(session, "active-set")),
 };
 
 /// With p = f − Kc, the contact force, the conditions of an unknown with an upper bound are
@@ -34,7 +33,7 @@ pub(super) const ENTRY: SolverEntry = SolverEntry {
 /// number falls, and else takes one at a time, which ends for every positive definite K. Where K
 /// is singular and A leaves a rigid motion unconstrained, the body moves as the load drives it
 /// until further bounds are reached.
-struct ActiveSet<'s> {
+pub(super) struct ActiveSet<'s> {
     /// Of each bound the sign of its contact force: 1 at the upper bound, −1 at the lower one, 0
     /// where neither is active.
     active: Vec<f64>,
@@ -42,8 +41,9 @@ struct ActiveSet<'s> {
 }
 
 impl<'s> ActiveSet<'s> {
-    fn new(session: &'s Session) -> Self {
-        Self { active: Vec::new(), elastic: ElasticSolver::new(session) }
+    /// Called `name`: the set of a problem without bounds is empty, and its first solve the last.
+    pub(super) fn new(session: &'s Session, name: &'static str) -> Self {
+        Self { active: Vec::new(), elastic: ElasticSolver::new(session, name) }
     }
 
     /// The set to begin with: the last one, or the bounds that the start reaches.
@@ -75,24 +75,21 @@ impl<'s> ActiveSet<'s> {
         problem: &ContactProblem,
         c: &Vector,
     ) -> Result<bool, PetscError> {
-        let active = self.active.iter().map(|side| *side != 0.0).collect();
         let motions = (problem.rigid, problem.work);
-        let moved = c.read(|c| {
+        let (_, constrained) = c.read(|c| {
+            let active = &mut self.active;
             rigid_motion_until_contact(problem.comm, motions, problem.bounds, c, active, true)
         })?;
-        for (i, upper) in moved.reached {
-            self.active[i] = if upper { 1.0 } else { -1.0 };
-        }
-        Ok(moved.constrained)
+        Ok(constrained)
     }
 
-    /// Minimises with the active unknowns at their bounds and no other bound; false if that failed.
+    /// Minimises with the active unknowns at their bounds and no other bound.
     fn solve_equality(
         &mut self,
         problem: &ContactProblem,
         c: &mut Vector,
         report: &mut ContactReport,
-    ) -> Result<bool, PetscError> {
+    ) -> Result<(), ContactError> {
         let active = problem.bounds.iter().zip(&self.active).filter(|(_, side)| **side != 0.0);
         let value = |(bound, side): (&Bound, &f64)| {
             (bound.dof, if *side > 0.0 { bound.upper } else { bound.lower })
@@ -100,7 +97,8 @@ impl<'s> ActiveSet<'s> {
         let active: Vec<(usize, f64)> = active.map(value).collect();
         let prescribed: Vec<usize> = active.iter().map(|(dof, _)| *dof).collect();
         c.write(|c| active.iter().for_each(|&(dof, value)| c[dof] = value))?;
-        let system = LinearSystem { prescribed: Some(&prescribed), ..problem.system() };
+        let prescribed = (problem.bound_count() > 0).then_some(&prescribed[..]);
+        let system = LinearSystem { prescribed, ..problem.system() };
         self.elastic.solve(system, problem.load, c, problem.linear_residual(), report)
     }
 
@@ -155,7 +153,7 @@ impl<'s> ActiveSet<'s> {
 
 impl ContactSolver for ActiveSet<'_> {
     fn name(&self) -> &'static str {
-        ENTRY.name
+        self.elastic.method
     }
 
     fn warm_start(&self) -> Vec<f64> {
@@ -173,22 +171,10 @@ impl ContactSolver for ActiveSet<'_> {
     ) -> Result<ContactReport, ContactError> {
         let mut report = ContactReport::default();
         let mut rule = Pivoting::new();
-        let stopped = |report, detail: &str| ContactError::NotConverged {
-            method: ENTRY.name.to_owned(),
-            report: Box::new(report),
-            residuals: Kkt::UNKNOWN,
-            detail: detail.to_owned(),
-        };
         self.first_guess(problem, c)?;
         for _ in 0..30 + 5 * problem.bound_count() {
             report.iterations += 1;
-            if !self.solve_equality(problem, c, &mut report)? {
-                return Err(stopped(
-                    report,
-                    "the stiffness with its active unknowns fixed is not positive definite, or too \
-                     ill-conditioned for the tolerance",
-                ));
-            }
+            self.solve_equality(problem, c, &mut report)?;
             let violating = self.violating(problem, c)?;
             let count = problem.comm.count(violating.len());
             if count == 0 {
@@ -203,7 +189,12 @@ impl ContactSolver for ActiveSet<'_> {
                 return Ok(report);
             }
         }
-        Err(stopped(report, "the active set still changes"))
+        Err(ContactError::NotConverged {
+            method: self.name().to_owned(),
+            report: Box::new(report),
+            residuals: Kkt::UNKNOWN,
+            detail: "the active set still changes".to_owned(),
+        })
     }
 }
 

@@ -1,9 +1,7 @@
 //! The penalty-duality algorithm of Bermúdez and Moreno (Comput. Math. Appl. 7, 1981),
 //! the paper's reference [4].
 
-use super::{
-    Anderson, ContactReport, ContactSolver, ProblemClass, SolverEntry, between_0_and_1, number,
-};
+use super::{Anderson, ContactReport, ContactSolver, SolverEntry, between_0_and_1, number};
 use crate::{
     cholesky::LinearSystem,
     contact::{Bound, ContactError, ContactProblem, Kkt, elastic::ElasticSolver},
@@ -16,7 +14,6 @@ pub(super) const ENTRY: SolverEntry = SolverEntry {
     name: "penalty-duality",
     summary: "fixed-point iteration of Bermúdez and Moreno on the contact pressure, accelerated",
     variants: &[],
-    solves: ProblemClass::Semidefinite,
     rescuer: Some("active-set"),
     construct: |session, _, options| {
         Box::new(PenaltyDuality::new(session, options.penalty_duality))
@@ -78,7 +75,12 @@ fn positive<'de, D: Deserializer<'de>>(value: D) -> Result<Option<f64>, D::Error
 
 impl<'s> PenaltyDuality<'s> {
     fn new(session: &'s Session, options: PenaltyOptions) -> Self {
-        Self { session, options, omega: options.omega, elastic: ElasticSolver::new(session) }
+        Self {
+            session,
+            options,
+            omega: options.omega,
+            elastic: ElasticSolver::new(session, ENTRY.name),
+        }
     }
 
     /// Solves (K + ω BᵀWB) u = f − BᵀW q from the start u.
@@ -105,15 +107,7 @@ impl<'s> PenaltyDuality<'s> {
         let added: Vec<_> =
             problem.bounds.iter().map(|b| (b.dof, omega * b.tributary_length)).collect();
         let system = LinearSystem { added: Some(&added), ..problem.system() };
-        match self.elastic.solve(system, &rhs, u, limit, report)? {
-            true => Ok(()),
-            false => Err(ContactError::NotConverged {
-                method: ENTRY.name.to_owned(),
-                report: Box::new(*report),
-                residuals: Kkt::UNKNOWN,
-                detail: "the penalised stiffness is not positive definite".into(),
-            }),
-        }
+        self.elastic.solve(system, &rhs, u, limit, report)
     }
 
     /// q = p − ω Bu with the contact pressure p = W⁻¹B (f − Ku) of the start u.

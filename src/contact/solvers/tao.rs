@@ -1,6 +1,6 @@
 //! PETSc's TAO on the contact problem.
 
-use super::{ContactReport, ContactSolver, ProblemClass, SolverEntry};
+use super::{ContactReport, ContactSolver, SolverEntry};
 use crate::{
     cholesky::{Factor, Precision},
     contact::{ContactError, ContactProblem, Kkt},
@@ -11,7 +11,6 @@ pub(super) const ENTRY: SolverEntry = SolverEntry {
     name: "tao",
     summary: "PETSc's TAO, trust-region Newton method tron; tao:TYPE for its other types",
     variants: &TAO_TYPES,
-    solves: ProblemClass::Semidefinite,
     rescuer: Some("active-set"),
     construct: |session, kind, _| Box::new(Tao::new(session, kind)),
 };

@@ -104,13 +104,13 @@ impl ContactStep<'_> {
         }
     }
 
-    /// Which bounds a contact force above `least`, N/m, acts on.
-    pub(super) fn active_bounds(&self, contact: &[ContactPoint], least: f64) -> Vec<bool> {
+    /// 1 for each bound that a contact force above `least`, N/m, acts on, else 0.
+    pub(super) fn active_bounds(&self, contact: &[ContactPoint], least: f64) -> Vec<f64> {
         let constraints = &self.problem.constraints;
-        let mut active = vec![false; constraints.bounds.len()];
+        let mut active = vec![0.0; constraints.bounds.len()];
         for point in contact.iter().filter(|point| point.active && point.force > least) {
             if let Some(bound) = constraints.bound_along(point.node, point.normal) {
-                active[bound] = true;
+                active[bound] = 1.0;
             }
         }
         active
@@ -131,6 +131,6 @@ impl ContactStep<'_> {
         let active = self.active_bounds(contact, nodes * self.problem.tolerance * force);
         let motions = contact::unconstrained_motions(partition.comm(), &self.rigid, &active);
         let first = motions.first().filter(|_| force > 0.0)?;
-        Some(self.problem.motions.combined(first))
+        self.problem.motions.combined(first)
     }
 }
