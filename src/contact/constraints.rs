@@ -5,7 +5,7 @@ use crate::{
     fem::{NodalBases, Subdomain},
     mesh::extent,
 };
-use nalgebra::Matrix2;
+use nalgebra::{Matrix2, Vector2};
 use std::collections::BTreeMap;
 
 /// All displacement conditions of a body.
@@ -13,32 +13,22 @@ use std::collections::BTreeMap;
 pub struct Constraints {
     /// The nodal bases; prescribed unknowns are fixed there (and later the pins of free motions).
     pub bases: NodalBases,
-    /// The bounded unknowns, rising; [`Self::bounds_at`] adds what prescribed displacements change.
+    /// The bounded unknowns, rising, each with its first gap condition; [`Self::pose`] adds the others.
     pub bounds: Vec<Bound>,
-    /// The gap conditions as posed: one per node and smooth boundary, by node.
-    pub gaps: Vec<GapRow>,
     /// Unknowns that take the value of a fixed row: (dof, row).
     prescribed: Vec<(usize, usize)>,
     /// Fixed rows whose direction other rows determine already, with their numbers.
     implied: Vec<(FixedRow, usize)>,
-    /// Gap conditions that bound an unknown which another one bounds already.
     further: Vec<FurtherGap>,
-    /// Gap conditions at nodes whose normal displacement is prescribed.
-    prescribed_gaps: Vec<GapRow>,
 }
 
-/// u·ν ≤ g as a u·d + b c ≤ g, with d a prescribed direction and c a bounded unknown.
+/// A gap condition for which there is no further unknown, u·ν = u_D·ν + b c ≤ g: u_D is what the
+/// prescribed unknowns of the node make of u.
 #[derive(Debug, Clone, Copy)]
 struct FurtherGap {
-    /// The bounded unknown c.
-    dof: usize,
-    /// The prescribed unknown u·d, if a is not 0.
-    fixed: Option<usize>,
-    /// ν = a d + b n, where n is the direction of c.
-    a: f64,
-    b: f64,
-    /// g, m.
-    gap: f64,
+    row: GapRow,
+    /// The unknown c, bounded by another gap condition already, and b; `None` where u·ν is prescribed.
+    bounded: Option<(usize, f64)>,
 }
 
 /// Directions whose lines are closer than this angle, rad, are one direction.
@@ -53,28 +43,27 @@ const ROUNDING: f64 = 1e-12;
 
 impl Constraints {
     /// Combines all rows node by node, gap rows being joined ([`GapRow::joined`]); `coordinates`, m,
-    /// serve the error messages.
+    /// serve the error messages. Gaps along one line get exactly this line as their normal, so that
+    /// they cannot contradict each other by rounding.
     ///
     /// # Errors
-    /// Conditions of a node contradict each other, or are too many for its two unknowns.
+    /// Directions at a node are nearly dependent, or too many for its two unknowns.
     pub fn new(
         coordinates: &[[f64; 2]],
         fixed: &[FixedRow],
-        gaps: &[GapRow],
+        gaps: &mut [GapRow],
     ) -> Result<Self, ConstraintError> {
-        let mut nodes: BTreeMap<usize, (Vec<usize>, Vec<GapRow>)> = BTreeMap::new();
+        let mut nodes: BTreeMap<usize, (Vec<usize>, Vec<&mut GapRow>)> = BTreeMap::new();
         for (number, row) in fixed.iter().enumerate() {
             nodes.entry(row.node).or_default().0.push(number);
         }
-        gaps.iter().for_each(|gap| nodes.entry(gap.node).or_default().1.push(*gap));
+        gaps.iter_mut().for_each(|gap| nodes.entry(gap.node).or_default().1.push(gap));
         let mut constraints = Self {
             bases: NodalBases::identity(coordinates.len()),
             bounds: Vec::new(),
-            gaps: Vec::new(),
             prescribed: Vec::new(),
             implied: Vec::new(),
             further: Vec::new(),
-            prescribed_gaps: Vec::new(),
         };
         for (node, (numbers, gaps)) in nodes {
             let at = coordinates[node];
@@ -87,11 +76,6 @@ impl Constraints {
             }
             constraints.set_basis(node, &basis, at)?;
         }
-        // Only what prescribed displacements change is left for later.
-        let (moving, still) = constraints.further.into_iter().partition(|gap| gap.fixed.is_some());
-        constraints.further = still;
-        constraints.bounds = constraints.bounds_at(&[], coordinates)?;
-        constraints.further = moving;
         Ok(constraints)
     }
 
@@ -116,48 +100,38 @@ impl Constraints {
     /// same unknown.
     fn add_gap(
         &mut self,
-        mut gap: GapRow,
+        gap: &mut GapRow,
         basis: &mut Vec<[f64; 2]>,
         prescribed: usize,
         at: [f64; 2],
     ) -> Result<(), ConstraintError> {
-        let node = gap.node;
         // Where nothing is left to move, no unknown is needed.
         let line = if prescribed == 2 { None } else { parallel(basis, gap.normal, at)? };
         if let Some(line) = line {
-            // Exactly this line, so that its rows cannot contradict each other by rounding.
             gap.normal = along(basis[line], gap.normal);
         }
-        self.gaps.push(gap);
-        match line {
-            _ if prescribed == 2 => self.prescribed_gaps.push(gap),
-            Some(line) if line < prescribed => self.prescribed_gaps.push(gap),
-            Some(line) => {
-                let b = if basis[line] == gap.normal { 1.0 } else { -1.0 };
-                let dof = 2 * node + line;
-                self.further.push(FurtherGap { dof, fixed: None, a: 0.0, b, gap: gap.gap });
-            }
+        let dof = |line: usize| 2 * gap.node + line;
+        let bounded = match line {
+            _ if prescribed == 2 => None,
+            Some(line) if line < prescribed => None,
+            Some(line) => Some((dof(line), if basis[line] == gap.normal { 1.0 } else { -1.0 })),
             None if basis.len() < 2 => {
                 self.bounds.push(Bound {
-                    dof: 2 * node + basis.len(),
-                    node,
+                    dof: dof(basis.len()),
+                    node: gap.node,
                     normal: gap.normal,
                     lower: f64::NEG_INFINITY,
                     upper: gap.gap,
                     tributary_length: gap.tributary_length,
                 });
                 basis.push(gap.normal);
+                return Ok(());
             }
             None if prescribed == 0 => return Err(ConstraintError::TooMany { at }),
-            None => {
-                // ν = a d + b n, by Cramer's rule.
-                let (d, n) = (basis[0], basis[1]);
-                let area = cross(d, n);
-                let (a, b) = (cross(gap.normal, n) / area, cross(d, gap.normal) / area);
-                let (dof, fixed) = (2 * node + 1, Some(2 * node));
-                self.further.push(FurtherGap { dof, fixed, a, b, gap: gap.gap });
-            }
-        }
+            // ν = a d + b n with the prescribed direction d, by Cramer's rule.
+            None => Some((dof(1), cross(basis[0], gap.normal) / cross(basis[0], basis[1]))),
+        };
+        self.further.push(FurtherGap { row: *gap, bounded });
         Ok(())
     }
 
@@ -181,38 +155,6 @@ impl Constraints {
         self.bases.set(node, directions).ok_or(dependent)
     }
 
-    /// The bounded unknowns with their bounds where the prescribed ones have the values `lift`, m
-    /// (two entries per node).
-    ///
-    /// # Errors
-    /// Obstacles on both sides of a node leave it no room.
-    pub fn bounds_at(
-        &self,
-        lift: &[f64],
-        coordinates: &[[f64; 2]],
-    ) -> Result<Vec<Bound>, ConstraintError> {
-        let mut bounds = self.bounds.clone();
-        for &FurtherGap { dof, fixed, a, b, gap } in &self.further {
-            let Ok(place) = bounds.binary_search_by_key(&dof, |bound| bound.dof) else {
-                continue;
-            };
-            let bound = &mut bounds[place];
-            let value = (gap - fixed.map_or(0.0, |dof| a * lift[dof])) / b;
-            match b > 0.0 {
-                true => bound.upper = bound.upper.min(value),
-                false => bound.lower = bound.lower.max(value),
-            }
-            let depth = bound.lower - bound.upper;
-            if depth > 0.0 {
-                if depth > ROUNDING * extent(coordinates) {
-                    return Err(ConstraintError::NoRoom { at: coordinates[bound.node], depth });
-                }
-                bound.lower = bound.upper;
-            }
-        }
-        Ok(bounds)
-    }
-
     /// The prescribed unknowns (pins are none).
     pub fn prescribed(&self) -> impl Iterator<Item = usize> {
         self.prescribed.iter().map(|&(dof, _)| dof)
@@ -226,46 +168,61 @@ impl Constraints {
         at_node.min_by(|i, j| off(i).total_cmp(&off(j)))
     }
 
-    /// The prescribed unknowns c_D, m (0 elsewhere) when `values[row]` is u·d of each fixed row.
+    /// The prescribed unknowns c_D, m (0 elsewhere; two entries per node), where `values[row]` is u·d of
+    /// each fixed row, and the bounds on the others.
     ///
     /// # Errors
-    /// Values contradict each other or go through the obstacle.
-    pub fn lift(
+    /// Values contradict each other or go through the obstacle, or obstacles on both sides of a node
+    /// leave it no room.
+    pub fn pose(
         &self,
         values: &[f64],
         coordinates: &[[f64; 2]],
-    ) -> Result<Vec<f64>, ConstraintError> {
-        let mut c = vec![0.0; 2 * coordinates.len()];
-        for &(dof, row) in &self.prescribed {
-            c[dof] = values[row];
-        }
-        if self.implied.is_empty() && self.prescribed_gaps.is_empty() {
-            return Ok(c);
-        }
-        let mut u = c.clone();
-        self.bases.displacement_to_global(&mut u);
-        let along = |node: usize, d: [f64; 2]| u[2 * node] * d[0] + u[2 * node + 1] * d[1];
-        let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    ) -> Result<(Vec<f64>, Vec<Bound>), ConstraintError> {
+        let mut lift = vec![0.0; 2 * coordinates.len()];
+        self.prescribed.iter().for_each(|&(dof, row)| lift[dof] = values[row]);
+        let along = |node: usize, [x, y]: [f64; 2]| {
+            let c = Vector2::new(lift[2 * node], lift[2 * node + 1]);
+            let u = self.bases.inverse(node).map_or(c, |inverse| inverse * c);
+            u.x * x + u.y * y
+        };
+        let largest = || values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         for &(FixedRow { node, direction }, number) in &self.implied {
             let values = [along(node, direction), values[number]];
-            if (values[0] - values[1]).abs() > ROUNDING * largest {
+            if (values[0] - values[1]).abs() > ROUNDING * largest() {
                 let at = coordinates[node];
                 return Err(ConstraintError::Contradicts { at, values, direction });
             }
         }
-        for gap in &self.prescribed_gaps {
-            let depth = along(gap.node, gap.normal) - gap.gap;
-            if depth > ROUNDING * largest.max(extent(coordinates)) {
-                return Err(ConstraintError::Penetrates { at: coordinates[gap.node], depth });
+        let mut bounds = self.bounds.clone();
+        for &FurtherGap { row, bounded } in &self.further {
+            let at = coordinates[row.node];
+            let room = row.gap - along(row.node, row.normal);
+            let Some((dof, b)) = bounded else {
+                let depth = -room;
+                if depth > 0.0 && depth > ROUNDING * largest().max(extent(coordinates)) {
+                    return Err(ConstraintError::Penetrates { at, depth });
+                }
+                continue;
+            };
+            let Ok(place) = bounds.binary_search_by_key(&dof, |bound| bound.dof) else { continue };
+            let Bound { lower, upper, .. } = &mut bounds[place];
+            match b > 0.0 {
+                true => *upper = upper.min(room / b),
+                false => *lower = lower.max(room / b),
             }
+            let depth = *lower - *upper;
+            if depth > 0.0 && depth > ROUNDING * extent(coordinates) {
+                return Err(ConstraintError::NoRoom { at, depth });
+            }
+            *lower = lower.min(*upper);
         }
-        Ok(c)
+        Ok((lift, bounds))
     }
 
-    /// The conditions at the nodes of a rank's subdomain; bounds are their owners'. The fixed rows
-    /// keep their numbers.
+    /// The conditions that concern a rank: prescribed unknowns of its subdomain, all others of the nodes
+    /// that it owns. The fixed rows keep their numbers.
     pub fn restrict(&self, subdomain: &Subdomain) -> Self {
-        let local = |node: usize| subdomain.local(node);
         let owned = |node: usize| subdomain.owned(node);
         let renumbered = |dof: usize, node: usize| 2 * node + dof % 2;
         let bound = |b: &Bound| {
@@ -274,27 +231,22 @@ impl Constraints {
         };
         let mut bounds: Vec<Bound> = self.bounds.iter().filter_map(bound).collect();
         bounds.sort_by_key(|bound| bound.dof);
-        let gap = |gap: &GapRow| Some(GapRow { node: owned(gap.node)?, ..*gap });
-        let mut gaps: Vec<GapRow> = self.gaps.iter().filter_map(gap).collect();
-        gaps.sort_by_key(|gap| gap.node);
-        let local_dof = |dof: usize| Some(renumbered(dof, local(dof / 2)?));
-        let prescribed = |&(dof, row): &(usize, usize)| Some((local_dof(dof)?, row));
+        let prescribed =
+            |&(dof, row): &(usize, usize)| Some((renumbered(dof, subdomain.local(dof / 2)?), row));
         let implied = |&(row, number): &(FixedRow, usize)| {
-            Some((FixedRow { node: local(row.node)?, ..row }, number))
+            Some((FixedRow { node: owned(row.node)?, ..row }, number))
         };
-        let further = |gap: &FurtherGap| {
-            let dof = renumbered(gap.dof, owned(gap.dof / 2)?);
-            Some(FurtherGap { dof, fixed: gap.fixed.and_then(local_dof), ..*gap })
+        let further = |&FurtherGap { row, bounded }: &FurtherGap| {
+            let row = GapRow { node: owned(row.node)?, ..row };
+            let bounded = bounded.map(|(dof, b)| (renumbered(dof, row.node), b));
+            Some(FurtherGap { row, bounded })
         };
-        let known = |gap: &GapRow| Some(GapRow { node: local(gap.node)?, ..*gap });
         Self {
             bases: self.bases.restrict(subdomain),
             bounds,
-            gaps,
             prescribed: self.prescribed.iter().filter_map(prescribed).collect(),
             implied: self.implied.iter().filter_map(implied).collect(),
             further: self.further.iter().filter_map(further).collect(),
-            prescribed_gaps: self.prescribed_gaps.iter().filter_map(known).collect(),
         }
     }
 }

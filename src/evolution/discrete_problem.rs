@@ -106,12 +106,12 @@ impl DiscreteProblem {
         let body = Body::new(mesh);
         let mut conditions = BoundaryConditions::new(&scene, &body.mesh);
         let motions = conditions.resolve_motions(&body);
-        let (fixed, gaps) = (&conditions.fixed, &conditions.gaps);
+        let (fixed, gaps) = (&conditions.fixed, &mut conditions.gaps);
         let mut constraints = Constraints::new(&body.mesh.nodes, fixed, gaps)
             .map_err(|source| SetupError::Constraint { scene: scene.path.clone(), source })?;
         motions.pin_free(&body, &mut constraints);
-        let certificate = Certificate::new(fixed, &constraints.gaps);
-        let foundation = Foundation::new(&conditions, &body.mesh, &constraints.gaps);
+        let certificate = Certificate::new(fixed, gaps);
+        let foundation = Foundation::new(&conditions, &body.mesh);
         let unresolved = (conditions.tractions.iter())
             .filter_map(|traction| resultants::unresolved(&scene, &body.mesh, traction))
             .collect();
@@ -230,8 +230,7 @@ impl DiscreteProblem {
             return Err(self.not_finite(time));
         }
         let (constraints, nodes) = (&self.constraints, &self.body.mesh.nodes);
-        (constraints.lift(values, nodes))
-            .and_then(|lift| constraints.bounds_at(&lift, nodes).map(|bounds| (lift, bounds)))
+        (constraints.pose(values, nodes))
             .map_err(|source| SetupError::Constraint { scene: self.scene.path.clone(), source })
     }
 

@@ -15,8 +15,9 @@ pub struct Foundation {
 }
 
 impl Foundation {
-    /// Opposite the edges of Γ_C, where `gaps` are the gap conditions by node.
-    pub(super) fn new(conditions: &BoundaryConditions, mesh: &Mesh, gaps: &[GapRow]) -> Self {
+    /// Opposite the edges of Γ_C.
+    pub(super) fn new(conditions: &BoundaryConditions, mesh: &Mesh) -> Self {
+        let gaps = &conditions.gaps;
         let at = |node: usize| {
             let first = gaps.partition_point(|row| row.node < node);
             &gaps[first..first + gaps[first..].partition_point(|row| row.node == node)]

@@ -131,9 +131,10 @@ fn a_node_between_two_plates_has_one_unknown_with_two_bounds() {
     let gap = |normal, gap| GapRow { node: 0, normal, gap, tributary_length: 1.0 };
     let limits = |angle: f64, lower: f64, upper: f64| {
         let n = [angle.sin(), -angle.cos()];
-        let rows = [gap(n, upper), gap(n.map(|v| -v), lower)];
-        let constraints = Constraints::new(&[[0.0, 0.0]], &[], &rows).unwrap();
-        let [bound] = &constraints.bounds[..] else { panic!("{constraints:?}") };
+        let (origin, mut rows) = ([[0.0, 0.0]], [gap(n, upper), gap(n.map(|v| -v), lower)]);
+        let constraints = Constraints::new(&origin, &[], &mut rows).unwrap();
+        let (_, bounds) = constraints.pose(&[], &origin).unwrap();
+        let [bound] = &bounds[..] else { panic!("{constraints:?}") };
         assert_eq!((bound.normal, bound.lower, bound.upper), (n, -lower, upper));
         bound.is_equality()
     };
@@ -144,8 +145,8 @@ fn a_node_between_two_plates_has_one_unknown_with_two_bounds() {
     // Tilted by less than coordinates can tell they are parallel, by a little more nobody can say,
     // beyond that they are two conditions.
     let tilted = |tilt: f64| {
-        let rows = [gap([0.0, -1.0], 0.1), gap([tilt.sin(), tilt.cos()], 0.1)];
-        Constraints::new(&[[3.0, 4.0]], &[], &rows)
+        let mut rows = [gap([0.0, -1.0], 0.1), gap([tilt.sin(), tilt.cos()], 0.1)];
+        Constraints::new(&[[3.0, 4.0]], &[], &mut rows)
     };
     assert_eq!(tilted(1e-12).unwrap().bounds.len(), 1);
     match tilted(1e-6).unwrap_err() {
@@ -163,17 +164,16 @@ fn two_normals_at_a_node_with_a_prescribed_direction_bound_its_other_unknown() {
     // u_x = v is prescribed; u_y is kept by (0.6, −0.8)·u ≤ 0.2 from below and by
     // (0.8, 0.6)·u ≤ 0.1 from above.
     let origin = [[0.0, 0.0]];
-    let rows = [([0.6, -0.8], 0.2), ([0.8, 0.6], 0.1)].map(|(normal, gap)| GapRow {
+    let mut rows = [([0.6, -0.8], 0.2), ([0.8, 0.6], 0.1)].map(|(normal, gap)| GapRow {
         node: 0,
         normal,
         gap,
         tributary_length: 1.0,
     });
     let fixed = [FixedRow { node: 0, direction: [1.0, 0.0] }];
-    let constraints = Constraints::new(&origin, &fixed, &rows).unwrap();
+    let constraints = Constraints::new(&origin, &fixed, &mut rows).unwrap();
     for v in [-0.3, 0.0, 0.15] {
-        let lift = constraints.lift(&[v], &origin).unwrap();
-        let bounds = constraints.bounds_at(&lift, &origin).unwrap();
+        let (_, bounds) = constraints.pose(&[v], &origin).unwrap();
         let [bound] = &bounds[..] else { panic!("{bounds:?}") };
         // The unknown is the first row's normal displacement.
         let u_y = |c: f64| (0.6 * v - c) / 0.8;
@@ -181,9 +181,8 @@ fn two_normals_at_a_node_with_a_prescribed_direction_bound_its_other_unknown() {
         assert!((u_y(bound.upper) - low).abs() < 1e-14 && (u_y(bound.lower) - high).abs() < 1e-14);
     }
     // Carried further there is no room between them.
-    let lift = constraints.lift(&[0.5], &origin).unwrap();
     assert!(matches!(
-        constraints.bounds_at(&lift, &origin),
+        constraints.pose(&[0.5], &origin),
         Err(ConstraintError::NoRoom { at: [0.0, 0.0], .. })
     ));
 }
@@ -198,8 +197,8 @@ fn gaps_of_one_smooth_boundary_become_one_bound_and_those_of_a_corner_two() {
             GapRow { node: 0, normal: normal(-1.0), gap: 0.1, tributary_length: 2.0 },
             GapRow { node: 0, normal: normal(1.0), gap: 0.2, tributary_length: 2.0 },
         ];
-        let rows = GapRow::joined(rows);
-        let constraints = Constraints::new(&[[0.0, 0.0]], &[], &rows).unwrap();
+        let mut rows = GapRow::joined(rows);
+        let constraints = Constraints::new(&[[0.0, 0.0]], &[], &mut rows).unwrap();
         assert_eq!(constraints.bounds.len(), bounds);
         let gaps: Vec<f64> = constraints.bounds.iter().map(|b| b.upper).collect();
         let tributary_length: f64 = constraints.bounds.iter().map(|b| b.tributary_length).sum();
@@ -226,19 +225,23 @@ fn a_third_gap_or_a_gap_along_a_held_direction_takes_no_unknown() {
     let gap = |normal, gap| GapRow { node: 0, normal, gap, tributary_length: 1.0 };
     let prescribed = |direction| FixedRow { node: 0, direction };
     let origin = [[0.0, 0.0]];
-    let three = [gap([0.0, -1.0], 0.0), gap([1.0, 0.0], 0.0), gap([-0.6, 0.8], 0.0)];
-    assert!(matches!(Constraints::new(&origin, &[], &three), Err(ConstraintError::TooMany { .. })));
+    let mut three = [gap([0.0, -1.0], 0.0), gap([1.0, 0.0], 0.0), gap([-0.6, 0.8], 0.0)];
+    assert!(matches!(
+        Constraints::new(&origin, &[], &mut three),
+        Err(ConstraintError::TooMany { .. })
+    ));
     // Held along the normal: no bound, but the value is checked against the gap.
     let constraints =
-        Constraints::new(&origin, &[prescribed([0.0, -1.0])], &[gap([0.0, -1.0], 0.1)]).unwrap();
+        Constraints::new(&origin, &[prescribed([0.0, -1.0])], &mut [gap([0.0, -1.0], 0.1)])
+            .unwrap();
     assert!(constraints.bounds.is_empty());
-    assert!(constraints.lift(&[0.1], &origin).is_ok());
-    assert!(constraints.lift(&[0.11], &origin).is_err());
+    assert!(constraints.pose(&[0.1], &origin).is_ok());
+    assert!(constraints.pose(&[0.11], &origin).is_err());
     // Held the other way round, the same gap is on the other side.
     let constraints =
-        Constraints::new(&origin, &[prescribed([0.0, 1.0])], &[gap([0.0, -1.0], 0.1)]).unwrap();
-    assert!(constraints.lift(&[-0.11], &origin).is_err());
-    assert!(constraints.lift(&[0.11], &origin).is_ok());
+        Constraints::new(&origin, &[prescribed([0.0, 1.0])], &mut [gap([0.0, -1.0], 0.1)]).unwrap();
+    assert!(constraints.pose(&[-0.11], &origin).is_err());
+    assert!(constraints.pose(&[0.11], &origin).is_ok());
 }
 
 #[test]
