@@ -1,15 +1,15 @@
 //! `signorini compare`: all contact solvers on the same scenes.
 
-use super::{
-    Failure, SOLVERS, check_petsc, check_solver, ranks::require_one_process, read, screen::say,
-};
+use super::{Failure, SOLVERS, check_petsc, check_solver, ranks::require_one_process, read};
 use clap::Args;
-use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
 use signorini::{
     contact::Kkt,
     evolution::{self, DiscreteProblem, Phases, RunError, State, StepRecord},
-    output,
+    output::{
+        self,
+        terminal::{self, MARKDOWN, say},
+    },
     petsc::Session,
 };
 use std::path::PathBuf;
@@ -55,24 +55,23 @@ pub fn compare(arguments: &CompareArguments) -> Result<(), Failure> {
     }
     output::create(&arguments.out).map_err(Failure::input)?;
 
-    let session = Session::start(&arguments.petsc).map_err(Failure::solver)?;
+    let session = Session::start(&arguments.petsc)?;
     let mut entries = Vec::new();
     for problem in &problems {
-        let compared = compare_solvers(&session, problem, &arguments.solvers);
-        entries.extend(compared.map_err(Failure::solver)?);
+        entries.extend(compare_solvers(&session, problem, &arguments.solvers)?);
     }
-    session.finalize().map_err(Failure::solver)?;
-    say(&table(&entries).to_string());
+    session.finalize()?;
+    say(&table(&entries));
     let path = arguments.out.join("comparison.csv");
-    output::write_table(&path, &entries).map_err(Failure::solver)?;
+    output::write_table(&path, &entries)?;
     say(&format!("written to {}", path.display()));
     let failed: Vec<_> = entries.iter().filter_map(|entry| entry.error.as_deref()).collect();
-    if failed.is_empty() { Ok(()) } else { Err(Failure::solver(failed.join("\n       "))) }
+    if failed.is_empty() { Ok(()) } else { Err(failed.join("\n       ").into()) }
 }
 
 /// A row of `comparison.csv`: what a solver took for a whole run, and how its answer differs from the
 /// most accurate one.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 struct Entry {
     scene: String,
     solver: String,
@@ -90,7 +89,7 @@ struct Entry {
     fallbacks: usize,
     /// Seconds in the solver.
     seconds: f64,
-    /// The worst relative KKT residuals of all steps: see [`Kkt`].
+    /// The largest relative KKT residuals of all steps: see [`Kkt`].
     kkt_stationarity: f64,
     kkt_primal: f64,
     kkt_dual: f64,
@@ -103,18 +102,19 @@ struct Entry {
     difference_pressure: f64,
     /// Why the run ended early, if it failed.
     error: Option<String>,
+    /// The last accepted state.
+    #[serde(skip)]
+    last: Option<State>,
+    /// What counts as 1 in u and in p: their max norms over all steps.
+    #[serde(skip)]
+    scales: [f64; 2],
 }
 
 impl Entry {
     /// The largest of the four residuals.
     fn worst_residual(&self) -> f64 {
-        Kkt {
-            stationarity: self.kkt_stationarity,
-            primal: self.kkt_primal,
-            dual: self.kkt_dual,
-            complementarity: self.kkt_complementarity,
-        }
-        .worst()
+        let equations = self.kkt_stationarity.max(self.kkt_complementarity);
+        equations.max(self.kkt_primal).max(self.kkt_dual)
     }
 }
 
@@ -126,37 +126,30 @@ fn compare_solvers(
     solvers: &[String],
 ) -> Result<Vec<Entry>, RunError> {
     let runs = solvers.iter().map(|solver| run(session, problem, solver));
-    let mut runs = runs.collect::<Result<Vec<_>, _>>()?;
-    let reference = runs
-        .iter()
-        .filter(|(entry, ..)| entry.error.is_none())
-        .min_by(|(a, ..), (b, ..)| a.worst_residual().total_cmp(&b.worst_residual()))
-        .and_then(|(_, state, scales)| Some((state.clone()?, *scales)));
-    for (entry, state, _) in &mut runs {
-        if let (Some(state), Some((reference, [max_u, max_p]))) = (state, &reference) {
-            entry.difference_u = difference(&state.u, &reference.u) / max_u;
-            entry.difference_zeta = difference(&state.zeta, &reference.zeta);
-            entry.difference_pressure = difference(&pressure(state), &pressure(reference)) / max_p;
+    let mut entries = runs.collect::<Result<Vec<_>, _>>()?;
+    let complete = entries.iter().filter(|entry| entry.error.is_none());
+    let best = complete.min_by(|a, b| a.worst_residual().total_cmp(&b.worst_residual()));
+    if let Some(Entry { last: Some(best), scales: [max_u, max_p], .. }) = best.cloned() {
+        for entry in &mut entries {
+            let Some(state) = &entry.last else { continue };
+            entry.difference_u = difference(&state.u, &best.u) / max_u;
+            entry.difference_zeta = difference(&state.zeta, &best.zeta);
+            entry.difference_pressure = difference(&pressure(state), &pressure(&best)) / max_p;
         }
     }
-    Ok(runs.into_iter().map(|(entry, ..)| entry).collect())
+    Ok(entries)
 }
 
-/// The run of one solver, its last accepted state, and what counts as 1 in u and in p: their max norms
-/// over all steps.
-fn run(
-    session: &Session,
-    problem: &DiscreteProblem,
-    solver: &str,
-) -> Result<(Entry, Option<State>, [f64; 2]), RunError> {
+/// The run of one solver.
+fn run(session: &Session, problem: &DiscreteProblem, solver: &str) -> Result<Entry, RunError> {
     let phases = Phases::default();
     let mut records: Vec<StepRecord> = Vec::new();
-    let (mut state, mut scales) = (None, [0.0_f64; 2]);
+    let (mut last, mut scales) = (None, [0.0_f64; 2]);
     let result = evolution::run(session, problem, solver, &phases, &mut |step| {
         records.push(step.record);
         scales[0] = scales[0].max(step.record.displacement_max);
         scales[1] = pressure(&step.state).iter().fold(scales[1], |max, p| max.max(p.abs()));
-        state = Some(step.state.clone());
+        last = Some(step.state.clone());
         Ok(())
     });
     let error = match result {
@@ -166,13 +159,12 @@ fn run(
     };
     let sum = |count: fn(&StepRecord) -> usize| records.iter().map(count).sum();
     let kkt = records.iter().fold(Kkt::default(), |worst, r| worst.max(&r.kkt()));
-    let changes =
-        records.windows(2).filter(|pair| pair[0].active_nodes != pair[1].active_nodes).count();
-    let entry = Entry {
+    let moves = records.windows(2).filter(|pair| pair[0].active_nodes != pair[1].active_nodes);
+    Ok(Entry {
         scene: problem.scene().name.clone(),
         solver: solver.to_owned(),
         steps: records.last().map_or(0, |record| record.step),
-        contact_changes: changes,
+        contact_changes: moves.count(),
         iterations: sum(|record| record.iterations),
         factorisations: sum(|record| record.factorisations),
         triangular_solves: sum(|record| record.linear_iterations),
@@ -186,8 +178,9 @@ fn run(
         difference_zeta: f64::NAN,
         difference_pressure: f64::NAN,
         error,
-    };
-    Ok((entry, state, scales.map(|scale| if scale == 0.0 { 1.0 } else { scale })))
+        last,
+        scales: scales.map(|scale| if scale == 0.0 { 1.0 } else { scale }),
+    })
 }
 
 fn pressure(state: &State) -> Vec<f64> {
@@ -200,14 +193,12 @@ fn difference(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// A table in Markdown.
-fn table(entries: &[Entry]) -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::ASCII_MARKDOWN);
-    for entry in entries {
-        let small = |value: f64| format!("{value:.1e}");
+fn table(entries: &[Entry]) -> String {
+    let small = |value: f64| format!("{value:.1e}");
+    let rows = entries.iter().map(|entry| {
         let failed = entry.error.is_some();
         let first = entries.iter().find(|other| other.scene == entry.scene).unwrap_or(entry);
-        let row = [
+        [
             ("scene", entry.scene.clone()),
             ("solver", entry.solver.clone()),
             ("steps", entry.steps.to_string()),
@@ -222,12 +213,7 @@ fn table(entries: &[Entry]) -> Table {
             ("Δu", small(entry.difference_u)),
             ("Δζ", small(entry.difference_zeta)),
             ("Δp", small(entry.difference_pressure)),
-        ];
-        table.set_header(row.iter().map(|(title, _)| *title));
-        table.add_row(row.map(|(_, cell)| cell));
-    }
-    for column in table.column_iter_mut().skip(2) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    table
+        ]
+    });
+    terminal::table(MARKDOWN, rows, 2)
 }

@@ -14,6 +14,7 @@ use ranks::require_one_process;
 use signorini::{
     contact::{self, REGISTRY, SOLVERS, TAO_TYPES, summaries},
     mesh::{self, Mesh},
+    output::terminal::say,
     scene::{MeshSource, Scene},
 };
 use std::{
@@ -39,9 +40,11 @@ impl Failure {
     fn input(error: impl fmt::Display) -> Self {
         Self { code: 2, message: Some(error.to_string()) }
     }
+}
 
-    /// A solver missed its tolerance, or the results could not be written.
-    fn solver(error: impl fmt::Display) -> Self {
+/// What is no matter of the input: a solver missed its tolerance, or results could not be written.
+impl<E: fmt::Display> From<E> for Failure {
+    fn from(error: E) -> Self {
         Self { code: 1, message: Some(error.to_string()) }
     }
 }
@@ -94,7 +97,7 @@ fn read(path: &Path, file: Option<&Path>, set: &[String]) -> Result<(Scene, Mesh
 
 /// `signorini solvers`.
 pub fn solvers() -> Result<(), Failure> {
-    REGISTRY.iter().for_each(|entry| screen::say(&format!("{}\t{}", entry.name, entry.summary)));
+    REGISTRY.iter().for_each(|entry| say(&format!("{}\t{}", entry.name, entry.summary)));
     Ok(())
 }
 
@@ -104,7 +107,7 @@ pub fn mesh(scenes: &[PathBuf]) -> Result<(), Failure> {
     for path in scenes {
         let (scene, mesh) = read(path, None, &[])?;
         let (nodes, triangles) = (mesh.nodes.len(), mesh.triangles.len());
-        screen::say(&format!("{}: {nodes} nodes, {triangles} triangles", scene.name));
+        say(&format!("{}: {nodes} nodes, {triangles} triangles", scene.name));
     }
     Ok(())
 }

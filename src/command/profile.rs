@@ -1,7 +1,10 @@
 //! Where the time of a run went: the closing table, short or with all that was measured.
 
-use comfy_table::{CellAlignment, LineStyle, Table, presets};
-use signorini::phases::{Phase, Phases};
+use comfy_table::{LineStyle, presets};
+use signorini::{
+    output::terminal,
+    phases::{Phase, Phases},
+};
 use std::fs;
 
 /// What no time step can do without: the values of K, a product with K, a pair of triangular solves,
@@ -9,33 +12,26 @@ use std::fs;
 const UNAVOIDABLE: [&str; 4] =
     ["stiffness refill", "contact/products", "contact/triangular solves", "damage solve"];
 
-/// The columns of the table; the short one has the first [`SHORT`] of them.
-const COLUMNS: [&str; 7] =
-    ["phase", "calls", "seconds", "share", "ms per call", "MB per call", "GB/s"];
+/// The columns of the short table, the first ones of the full table.
 const SHORT: usize = 4;
 
 /// The table of phases, longest first, for a run of `wall` seconds; in full it has the parts of
 /// phases too, milliseconds per call and bytes moved.
 pub fn table(phases: &Phases, wall: f64, full: bool) -> Vec<String> {
-    let columns = if full { COLUMNS.len() } else { SHORT };
-    let mut table = Table::new();
-    let rule = LineStyle::none().fill('─').junction('─');
-    table.load_style(presets::NOTHING.header_separator(rule));
-    table.set_header(&COLUMNS[..columns]);
-    let mut add = |name: &str, phase: Phase| {
-        table.add_row(cells(name, phase, wall).into_iter().take(columns));
-    };
+    let mut lines = Vec::new();
     for (name, phase) in rows(phases, "", wall) {
-        add(name, phase);
+        lines.push((name.to_owned(), phase));
         let parts = if full { rows(phases, name, phase.seconds) } else { Vec::new() };
-        parts.into_iter().for_each(|(part, phase)| add(&format!("  {part}"), phase));
+        lines.extend(parts.into_iter().map(|(part, phase)| (format!("  {part}"), phase)));
     }
-    add("all", Phase { seconds: wall, ..Phase::default() });
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
+    lines.push(("all".to_owned(), Phase { seconds: wall, ..Phase::default() }));
+    let columns = if full { usize::MAX } else { SHORT };
+    let cells =
+        lines.into_iter().map(|(name, phase)| cells(name, phase, wall).into_iter().take(columns));
+    let rule = LineStyle::none().fill('─').junction('─');
+    let table = terminal::table(presets::NOTHING.header_separator(rule), cells, 1);
     // The table pads its last column too.
-    table.to_string().lines().map(|line| format!(" {}", line.trim_end())).collect()
+    table.lines().map(|line| format!(" {}", line.trim_end())).collect()
 }
 
 /// The parts of the phase called `whole`, longest first, and what they leave of its `seconds`.
@@ -49,19 +45,19 @@ fn rows(phases: &Phases, whole: &str, seconds: f64) -> Vec<(&'static str, Phase)
     rows
 }
 
-/// A row of the table; cells of what was not measured are empty.
-fn cells(name: &str, phase: Phase, wall: f64) -> [String; COLUMNS.len()] {
+/// A row of the table with its titles; cells of what was not measured are empty.
+fn cells(name: String, phase: Phase, wall: f64) -> [(&'static str, String); 7] {
     let Phase { calls, seconds, bytes } = phase;
     let if_called = |text: String| if calls > 0 { text } else { String::new() };
     let if_moved = |text: String| if bytes > 0.0 { text } else { String::new() };
     [
-        name.to_owned(),
-        if_called(calls.to_string()),
-        format!("{seconds:.3}"),
-        format!("{:.1} %", 100.0 * seconds / wall),
-        if_called(format!("{:.3}", 1e3 * seconds / calls as f64)),
-        if_moved(format!("{:.1}", 1e-6 * bytes / calls as f64)),
-        if_moved(format!("{:.1}", 1e-9 * bytes / seconds)),
+        ("phase", name),
+        ("calls", if_called(calls.to_string())),
+        ("seconds", format!("{seconds:.3}")),
+        ("share", format!("{:.1} %", 100.0 * seconds / wall)),
+        ("ms per call", if_called(format!("{:.3}", 1e3 * seconds / calls as f64))),
+        ("MB per call", if_moved(format!("{:.1}", 1e-6 * bytes / calls as f64))),
+        ("GB/s", if_moved(format!("{:.1}", 1e-9 * bytes / seconds))),
     ]
 }
 

@@ -41,7 +41,7 @@ pub fn barrier_or_abort(comm: Communicator, failure: Option<&RunError>) {
         && let Some(error) = failure
     {
         tell(&format!("rank {} of {}: {error}", comm.rank(), comm.size()));
-        comm.abort(Failure::solver(error).code);
+        comm.abort(Failure::from(error).code);
     }
 }
 
@@ -50,10 +50,10 @@ pub fn require_one_process() -> Result<(), Failure> {
     if Communicator::launched() == 1 {
         return Ok(());
     }
-    let session = Session::start(&[]).map_err(Failure::solver)?;
+    let session = Session::start(&[])?;
     let problem =
         "only `signorini run` uses several processes; start other commands without mpiexec";
     let refused = agree(session.comm(), Err(Failure::input(problem)));
-    session.finalize().map_err(Failure::solver)?;
+    session.finalize()?;
     refused
 }

@@ -1,15 +1,11 @@
 //! What a run writes and shows.
 
-use super::{
-    profile,
-    run::Task,
-    screen::{self, say},
-};
+use super::{profile, run::Task, screen};
 use indicatif::ProgressBar;
 use serde_json::{Value, json};
 use signorini::{
     evolution::{Outcome, RunError, Step, StepRecord},
-    output::{FieldWriter, History, OutputError, write_whole},
+    output::{FieldWriter, History, OutputError, terminal::say, write_whole},
     scene::Stepping,
 };
 use std::collections::BTreeMap;

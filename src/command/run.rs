@@ -65,14 +65,13 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let (started, phases) = (Instant::now(), Phases::default());
     let checked = arguments.check();
     let options = if checked.is_ok() { &arguments.petsc[..] } else { &[] };
-    let session =
-        phases.time("petsc start", || Session::start(options)).map_err(Failure::solver)?;
+    let session = phases.time("petsc start", || Session::start(options))?;
     let task = agree(session.comm(), checked)
         .and_then(|()| Task::read(arguments, &session, &phases, started));
     let warns = task.is_ok() && session.comm().is_root();
     let result = task.and_then(|task| task.solve(&session));
     let unused = session.unused_options();
-    let finalized = session.finalize().map_err(Failure::solver);
+    let finalized = session.finalize().map_err(Failure::from);
     if warns && !unused.is_empty() {
         eprintln!("warning: PETSc options that nothing read: {}", unused.join(" "));
     }
@@ -116,7 +115,7 @@ impl<'a> Task<'a> {
         let problem = phases.time("discrete problem", || DiscreteProblem::new(scene, mesh));
         let problem = agree(comm, problem.map_err(Failure::input))?;
         let problem = phases.time("partition", || problem.restrict(session));
-        let problem = agree(comm, problem.map_err(Failure::solver))?;
+        let problem = agree(comm, problem.map_err(Failure::from))?;
         let prepared = if comm.is_root() { output::prepare(&folder) } else { Ok(()) };
         agree(comm, prepared.map_err(Failure::input))?;
 
@@ -146,9 +145,9 @@ impl<'a> Task<'a> {
         barrier_or_abort(comm, result.as_ref().err());
         let written = recorder.finish(&result);
         let ended = match result {
-            Ok(_) => written.map_err(Failure::solver),
+            Ok(_) => written.map_err(Failure::from),
             Err(RunError::OnAnotherRank) => Err(Failure::ON_ANOTHER_RANK),
-            Err(error) => Err(Failure::solver(error)),
+            Err(error) => Err(error.into()),
         };
         agree(comm, ended)
     }

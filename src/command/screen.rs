@@ -1,22 +1,17 @@
 //! What a run shows: what is to be solved, a progress bar, and the result in a few lines.
 
 use super::run::Task;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use signorini::{
     evolution::{Outcome, StepRecord},
+    output::terminal::{progress_bar, say},
     scene::{Stepping, TimeGrid},
 };
-use std::io::{self, Write};
-
-/// Prints to standard output; a reader that has gone (`… | head`) is no reason to panic.
-pub fn say(text: &str) {
-    let _ = writeln!(io::stdout(), "{text}");
-}
 
 /// The progress bar counts thousandths of [0, T].
 const LENGTH: u64 = 1000;
 
-/// Shows what is to be solved, and a progress bar, which is silent when standard error is no terminal.
+/// Shows what is to be solved, and a progress bar.
 pub fn open(task: &Task) -> ProgressBar {
     let (scene, partition) = (task.problem.scene(), &task.problem.body.partition);
     let mut mesh = format!("{} nodes, {} triangles", partition.total(), task.triangles);
@@ -31,11 +26,7 @@ pub fn open(task: &Task) -> ProgressBar {
     lines.extend(scene.time.map(|grid| row("time", steps(grid))));
     say(&lines.join("\n"));
 
-    let bar = ProgressBar::new(LENGTH);
-    let template = "{bar:20} {wide_msg} {elapsed}, {eta} left";
-    if let Ok(style) = ProgressStyle::with_template(template) {
-        bar.set_style(style);
-    }
+    let bar = progress_bar("{bar:20} {wide_msg} {elapsed}, {eta} left", LENGTH);
     bar.with_message("the first solve")
 }
 

@@ -13,10 +13,8 @@ const LEVEL: u32 = 1;
 
 /// A named array with a tuple of numbers per point or cell.
 pub(super) struct DataArray {
-    name: &'static str,
-    /// VTK's name of the numbers' type.
-    number_type: &'static str,
-    components: usize,
+    /// Type, name and components, as XML attributes.
+    attributes: String,
     /// The numbers one after the other, each with its least significant byte first.
     bytes: Vec<u8>,
 }
@@ -24,24 +22,21 @@ pub(super) struct DataArray {
 impl DataArray {
     /// The array called `name` of tuples of `components` numbers, whose type VTK calls `number_type`.
     pub(super) fn new<T: ToBytes>(
-        name: &'static str,
-        number_type: &'static str,
+        name: &str,
+        number_type: &str,
         components: usize,
         values: impl Iterator<Item = T>,
     ) -> Self {
         let mut bytes = Vec::with_capacity(values.size_hint().0 * size_of::<T>());
         values.for_each(|value| bytes.extend_from_slice(value.to_le_bytes().as_ref()));
-        Self { name, number_type, components, bytes }
-    }
-
-    fn attributes(&self) -> String {
-        let Self { name, number_type, components, .. } = self;
-        format!("type=\"{number_type}\" Name=\"{name}\" NumberOfComponents=\"{components}\"")
+        let attributes =
+            format!("type=\"{number_type}\" Name=\"{name}\" NumberOfComponents=\"{components}\"");
+        Self { attributes, bytes }
     }
 
     /// The element `<PDataArray>`, which declares the array in the list of a file's pieces.
     pub(super) fn declaration(&self) -> String {
-        format!("<PDataArray {}/>\n", self.attributes())
+        format!("<PDataArray {}/>\n", self.attributes)
     }
 
     /// The element `<DataArray>` with the values.
@@ -49,7 +44,7 @@ impl DataArray {
     /// # Errors
     /// zlib cannot compress them.
     pub(super) fn element(&self) -> io::Result<String> {
-        let mut text = format!("<DataArray {} format=\"binary\">", self.attributes());
+        let mut text = format!("<DataArray {} format=\"binary\">", self.attributes);
         let (header, blocks) = compress(&self.bytes)?;
         STANDARD.encode_string(header, &mut text);
         STANDARD.encode_string(blocks, &mut text);

@@ -1,6 +1,8 @@
-//! What a run leaves behind: `fields.pvd` with its frames, `history.csv`, `summary.json`.
+//! What a run leaves behind: `fields.pvd` with its frames, `history.csv`, `summary.json`; and what
+//! the commands share at the terminal.
 
 mod data_array;
+pub mod terminal;
 mod vtu;
 
 pub use vtu::FieldWriter;
@@ -99,8 +101,8 @@ impl History {
     /// # Errors
     /// The file cannot be written.
     pub fn add(&mut self, record: &StepRecord) -> Result<(), OutputError> {
-        self.writer.serialize(record).map_err(|e| OutputError::new(&self.path, e))?;
-        self.writer.flush().map_err(|e| OutputError::new(&self.path, e))
+        let added = self.writer.serialize(record).and_then(|()| Ok(self.writer.flush()?));
+        added.map_err(|e| OutputError::new(&self.path, e))
     }
 }
 

@@ -1,7 +1,7 @@
 //! Speed against accuracy: what a run costs and how far its answer is from the reference.
 
 use super::{
-    Reference, ReferenceSpec, StudyError,
+    Norms, Reference, ReferenceSpec, StudyError,
     front::Front,
     study_run::{History, StudyRun},
 };
@@ -131,7 +131,8 @@ pub struct ChartRow {
 /// Runs the chart and marks its fronts; `done` is told how many of how many runs are finished.
 ///
 /// # Errors
-/// A run failed for which no contact solver is to blame.
+/// No mesh is coarser than that of the reference, or a run failed for which no contact solver is to
+/// blame.
 pub fn chart(
     session: &Session,
     reference: &Reference,
@@ -139,10 +140,12 @@ pub fn chart(
 ) -> Result<Vec<ChartRow>, StudyError> {
     let spec = &reference.spec;
     let choices = choices(spec)?;
+    let Some(first) = choices.first() else {
+        let problem = "no mesh of the chart is coarser than this reference";
+        return Err(StudyError::Unsuitable(problem.to_owned()));
+    };
     // The first run of a process pays for what the others find ready.
-    if let Some(choice) = choices.first() {
-        attempt(session, choice, reference)?.ok();
-    }
+    attempt(session, first, reference)?.ok();
     let mut rows = Vec::new();
     for choice in &choices {
         done(rows.len(), PASSES * choices.len());
@@ -244,49 +247,36 @@ fn run(session: &Session, reference: &Reference, choice: &Choice) -> Result<Char
         Stepping::Uniform { steps } => (Some(reference.spec.end / steps as f64), None),
         Stepping::Auto { tolerance } => (None, Some(tolerance)),
     };
-    let mut row = ChartRow {
+    let ran = attempt(session, choice, reference)?;
+    let history = ran.as_ref().ok();
+    let measured = |value: fn(&History) -> f64| history.map_or(f64::NAN, value);
+    let errors = history.map(|history| reference.errors(&history.body, &history.states));
+    let error = |value: fn(&Norms) -> f64| errors.map_or(f64::NAN, |(norms, ..)| value(&norms));
+    Ok(ChartRow {
         solver: choice.solver.to_owned(),
         size: choice.size,
         grading: choice.grading,
-        nodes: 0,
+        nodes: history.map_or(0, |history| history.body.mesh.nodes.len()),
         step,
         step_tolerance,
         tolerance: choice.tolerance,
-        kkt: f64::NAN,
-        steps: 0,
-        seconds: f64::NAN,
-        sum: f64::NAN,
-        strain: f64::NAN,
-        gradient: f64::NAN,
-        zeta: f64::NAN,
-        zeta_gradient: f64::NAN,
-        zeta_min: f64::NAN,
-        displacement_max: f64::NAN,
+        kkt: measured(|history| history.kkt.worst()),
+        steps: history.map_or(0, |history| history.last.step),
+        seconds: measured(|history| history.seconds),
+        sum: errors.map_or(f64::NAN, |(_, sum, _)| sum),
+        strain: error(|norms| norms.strain),
+        gradient: error(|norms| norms.gradient),
+        zeta: error(|norms| norms.zeta),
+        zeta_gradient: error(|norms| norms.zeta_gradient),
+        zeta_min: measured(|history| history.last.zeta_min),
+        displacement_max: measured(|history| history.last.displacement_max),
         default: *choice == Choice::of(&reference.spec)?,
         front: false,
         knee: false,
         front_zeta: false,
         knee_zeta: false,
-        error: None,
-    };
-    match attempt(session, choice, reference)? {
-        Err(error) => row.error = Some(error),
-        Ok(history) => {
-            let (error, sum, _) = reference.errors(&history.body, &history.states);
-            row.nodes = history.body.mesh.nodes.len();
-            row.kkt = history.kkt.worst();
-            row.steps = history.last.step;
-            row.seconds = history.seconds;
-            row.sum = sum;
-            row.strain = error.strain;
-            row.gradient = error.gradient;
-            row.zeta = error.zeta;
-            row.zeta_gradient = error.zeta_gradient;
-            row.zeta_min = history.last.zeta_min;
-            row.displacement_max = history.last.displacement_max;
-        }
-    }
-    Ok(row)
+        error: ran.as_ref().err().cloned(),
+    })
 }
 
 /// Marks the Pareto fronts and their knees.

@@ -88,7 +88,7 @@ pub struct Convergence {
 /// own; `done` is told how many of how many runs are finished.
 ///
 /// # Errors
-/// A run failed, or stopped at ζ_*.
+/// There are no such meshes and steps; a run failed, or stopped at ζ_*.
 pub fn converge(
     session: &Session,
     reference: &Reference,
@@ -98,6 +98,10 @@ pub fn converge(
     let steps = STEPS.map(|count| spec.end / count);
     let pairs = (0..spec.refinements.min(MESHES)).flat_map(|j| steps.map(|k| (j, k)));
     let pairs: Vec<_> = pairs.filter(|(_, k)| *k > 1.001 * spec.step).collect();
+    if pairs.is_empty() {
+        let problem = "no mesh and step of the study is coarser than this reference";
+        return Err(StudyError::Unsuitable(problem.to_owned()));
+    }
     let mut rows = Vec::new();
     for &(refinements, k) in &pairs {
         done(rows.len(), pairs.len());

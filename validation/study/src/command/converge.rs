@@ -1,36 +1,28 @@
 //! `signorini-study converge`: errors on nested meshes; on Example I the paper's Table 1 and Figure 3.
 
-use super::{StudyArguments, run_progress, say, with_petsc};
-use comfy_table::Table;
-use signorini::output;
-use signorini_study::{Convergence, ErrorRow, MEASURES, Measure, Norms, StudyError, converge};
+use super::StudyArguments;
+use signorini::output::terminal::{self, MARKDOWN, say};
+use signorini_study::{
+    Convergence, ErrorRow, MEASURES, Measure, Norms, Reference, StudyError, converge,
+};
 
 /// Runs the study, prints and writes its tables.
 ///
 /// # Errors
 /// There is no reference, or a run failed.
 pub fn convergence(arguments: &StudyArguments) -> Result<(), StudyError> {
-    let (reference, folder) = arguments.prepare("converge")?;
-    let (bar, mut tell) = run_progress();
-    let study = with_petsc(&[], |session| converge(session, &reference, &mut tell));
-    bar.finish_and_clear();
-    let study = study?;
-    if study.rows.is_empty() {
-        let problem = "no mesh and step of the study is coarser than this reference";
-        return Err(StudyError::Unsuitable(problem.to_owned()));
-    }
+    arguments.study("converge", converge, |study| &study.rows, show)
+}
+
+fn show(reference: &Reference, study: &Convergence) {
     for measure in &MEASURES {
-        say(&errors(&study, &reference.size, measure));
+        say(&errors(study, &reference.size, measure));
     }
     if study.rows.iter().any(|row| row.printed.is_some()) {
         for measure in &MEASURES[..2] {
-            say(&comparison(&study, measure));
+            say(&comparison(study, measure));
         }
     }
-    let path = folder.join("converge.csv");
-    output::write_table(&path, &study.rows)?;
-    say(&format!("written to {}", path.display()));
-    Ok(())
 }
 
 /// An error in the layout of Table 1, with its orders.
@@ -73,19 +65,19 @@ fn comparison(study: &Convergence, (name, measure, _): &Measure) -> String {
     )
 }
 
-/// A row per mesh, a column per step.
+/// A row per mesh, which `mesh` tells under the title `name`, and a column per step.
 fn table(
     study: &Convergence,
     name: &str,
     mesh: impl Fn(f64) -> String,
     cell: impl Fn(&ErrorRow) -> String,
-) -> Table {
-    let head = study.steps().into_iter().map(|k| format!("k = {k}"));
+) -> String {
     let rows = study.meshes().into_iter().map(|h| {
-        let cells = study.rows.iter().filter(|row| row.h == h).map(&cell);
-        std::iter::once(mesh(h)).chain(cells).collect()
+        let of_mesh = study.rows.iter().filter(move |row| row.h == h);
+        let cells = of_mesh.map(|row| (format!("k = {}", row.k), cell(row)));
+        std::iter::once((name.to_owned(), mesh(h))).chain(cells)
     });
-    super::table::<String>(std::iter::once(name.to_owned()).chain(head), rows, 0)
+    terminal::table(MARKDOWN, rows, 0)
 }
 
 /// As in the paper: four significant digits, without an exponent.

@@ -1,8 +1,15 @@
 //! `signorini-study reference`: the reference solution of `converge` and `chart`.
 
-use super::{progress, say, with_petsc};
+use super::with_petsc;
 use clap::Args;
-use signorini::output;
+use serde::Serialize;
+use signorini::{
+    output::{
+        self,
+        terminal::{progress_bar, say},
+    },
+    petsc::Session,
+};
 use signorini_study::{Reference, ReferenceError, ReferenceOptions, ReferenceSpec, StudyError};
 use std::{path::PathBuf, time::Instant};
 
@@ -39,15 +46,33 @@ impl ReferenceArguments {
 }
 
 impl StudyArguments {
-    /// The reference, which must have been computed, and the folder of this `study`, made if it is
-    /// not there.
-    pub fn prepare(&self, study: &str) -> Result<(Reference, PathBuf), StudyError> {
+    /// Makes the study called `name` against the reference, which must have been computed, shows what
+    /// it found, and writes its `rows` to `<name>.csv`.
+    pub fn study<T, R: Serialize>(
+        &self,
+        name: &str,
+        make: impl FnOnce(&Session, &Reference, &mut dyn FnMut(usize, usize)) -> Result<T, StudyError>,
+        rows: fn(&T) -> &[R],
+        show: fn(&Reference, &T),
+    ) -> Result<(), StudyError> {
         let reference = self.reference.spec()?.load(&self.reference.kept)?;
-        let name = self.reference.scene.file_stem().unwrap_or_default();
-        let usual = || PathBuf::from("out").join(study).join(name);
+        let scene = self.reference.scene.file_stem().unwrap_or_default();
+        let usual = || PathBuf::from("out").join(name).join(scene);
         let folder = self.out.clone().unwrap_or_else(usual);
         output::create(&folder)?;
-        Ok((reference, folder))
+        let bar = progress_bar("{bar:20} {pos} of {len} runs {elapsed}, {eta} left", 1);
+        let mut progress = |done: usize, all: usize| {
+            bar.set_length(all as u64);
+            bar.set_position(done as u64);
+        };
+        let made = with_petsc(&[], |session| make(session, &reference, &mut progress));
+        bar.finish_and_clear();
+        let made = made?;
+        show(&reference, &made);
+        let path = folder.join(name).with_extension("csv");
+        output::write_table(&path, rows(&made))?;
+        say(&format!("written to {}", path.display()));
+        Ok(())
     }
 }
 
@@ -73,8 +98,7 @@ pub fn reference(arguments: &ReferenceArguments) -> Result<(), StudyError> {
     output::create(kept)?;
     let started = Instant::now();
     // The bar counts thousandths of the time to be run.
-    let bar = progress("{bar:20} {wide_msg} {elapsed}, {eta} left");
-    bar.set_length(1000);
+    let bar = progress_bar("{bar:20} {wide_msg} {elapsed}, {eta} left", 1000);
     let computed = with_petsc(&[], |session| {
         spec.compute(session, kept, &mut |record| {
             bar.set_position((1e3 * record.time / spec.end) as u64);

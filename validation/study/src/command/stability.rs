@@ -1,8 +1,8 @@
 //! `signorini-study stability`: the maps of where methods fail.
 
-use super::{say, with_petsc};
+use super::with_petsc;
 use clap::Args;
-use signorini::output;
+use signorini::output::{self, terminal::say};
 use signorini_study::{
     StudyError,
     stability::{MAPS, make},

@@ -91,9 +91,7 @@ fn add(case: &Case, attempt: &Attempt, attempts: &[Attempt], table: &mut Table) 
     let outcome = match &attempt.outcome {
         Ok(outcome) => outcome,
         Err(message) => {
-            let row = row.with("agreement", agreement).with("message", message);
-            table.push(row, Verdict::Refused);
-            return;
+            return table.push_refused(row.with("agreement", agreement), message);
         }
     };
     let reference = most_exact_other(attempt, outcome, attempts);

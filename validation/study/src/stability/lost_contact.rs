@@ -74,8 +74,7 @@ fn add(
     let problem = match sweep.problem(&load, true) {
         Ok(problem) => problem,
         Err(refusal @ SetupError::Driven { .. }) => {
-            let row = row("all").with("outcome", "setup").with("message", refusal.to_string());
-            table.push(row, Verdict::Refused);
+            table.push_refused(row("all").with("outcome", "setup"), refusal);
             return Ok(());
         }
         Err(other) => return Err(other.into()),
@@ -88,10 +87,7 @@ fn add(
     let open = open.map(|l| l.u.iter().map(|u| u * (1.0 - value)).collect::<Vec<_>>());
     for (i, solver) in SOLVERS.into_iter().enumerate() {
         match &answers[i] {
-            Err(failure) => {
-                let row = row(solver).with("outcome", "failed");
-                table.push(row.with("message", failure.to_string()), Verdict::Refused);
-            }
+            Err(failure) => table.push_refused(row(solver).with("outcome", "failed"), failure),
             Ok(answer) => {
                 let others = answers.iter().enumerate().filter(|(j, _)| *j != i);
                 let mut unique = others.filter_map(|(_, answer)| answer.as_ref().ok());

@@ -1,6 +1,10 @@
 //! Map 2. The maximum principle of the damage step: kκ against h², with both masses.
 
-use super::{Table, Verdict, problems, table::Row};
+use super::{
+    Table, Verdict,
+    problems::{self, EXAMPLE_I},
+    table::Row,
+};
 use crate::StudyError;
 use signorini::{
     contact::SOLVERS,
@@ -14,18 +18,13 @@ use signorini::{
 const SOFT: &str = r#"
 damage = { diffusion = 1, lambda_d = 0, lambda_u = 1, lambda_w = 0, strain_cap = 1, threshold = 0.01, initial = "LOW + (1 - LOW)*min(1, max(0, 1e6*(max(abs(x - SHEAR*y - 0.5), abs(y - 0.5)) - 0.26)))" }
 time = { end = 1, step = 1 }
-boundary = [{ name = "left", displacement = [0, 0] }]
 "#;
+const UNLOADED: &str = r#"boundary = [{ name = "left", displacement = [0, 0] }]"#;
 
 /// Example I with λ_U = 2: the source is singular in the corner (1, 0).
 const CORNER: &str = r#"
 damage = { diffusion = 1, lambda_d = 0.1, lambda_u = 2, lambda_w = 0, strain_cap = 1000, threshold = 0.01, initial = 1 }
 time = { end = 1, step = 1 }
-boundary = [
-    { name = "left", displacement = [0, 0] },
-    { name = "right", traction = [-10, -10] },
-    { name = "bottom", gap = 0 },
-]
 "#;
 
 const DIFFUSIONS: [f64; 7] = [1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
@@ -44,7 +43,8 @@ const ROUNDING: f64 = 1e-10;
 #[derive(Debug, Clone, Copy)]
 struct Case {
     name: &'static str,
-    text: &'static str,
+    damage: &'static str,
+    boundary: &'static str,
     /// ζ₀ of the soft square.
     low: f64,
     /// The body is sheared by this: x + shear y. At 1 the right angles become 135°.
@@ -53,11 +53,11 @@ struct Case {
 }
 
 const fn soft(name: &'static str, low: f64, shear: f64, cells: usize) -> Case {
-    Case { name, text: SOFT, low, shear, cells }
+    Case { name, damage: SOFT, boundary: UNLOADED, low, shear, cells }
 }
 
 const fn corner(cells: usize) -> Case {
-    Case { name: "corner", text: CORNER, low: 1.0, shear: 0.0, cells }
+    Case { name: "corner", damage: CORNER, boundary: EXAMPLE_I, low: 1.0, shear: 0.0, cells }
 }
 
 const CASES: [Case; 8] = [
@@ -146,8 +146,9 @@ fn problem(
         format!("time.step={step:e}"),
         format!("time.end={:e}", END.min(LENGTH * step)),
     ];
-    let text = case.text.replace("LOW", &case.low.to_string());
-    let text = text.replace("SHEAR", &case.shear.to_string());
+    let damage = case.damage.replace("LOW", &case.low.to_string());
+    let damage = damage.replace("SHEAR", &case.shear.to_string());
+    let text = format!("{damage}{}", case.boundary);
     let mut mesh = Mesh::rectangle(1.0, 1.0, case.cells, case.cells);
     mesh.nodes.iter_mut().for_each(|[x, y]| *x += case.shear * *y);
     Ok(problems::problem(mesh, &text, &set)?)

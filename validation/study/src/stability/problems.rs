@@ -25,6 +25,15 @@ boundary = [
 ]
 "#;
 
+/// The boundaries of Example I: clamped left, sheared on the right, on the foundation.
+pub const EXAMPLE_I: &str = r#"
+boundary = [
+    { name = "left", displacement = [0, 0] },
+    { name = "right", traction = [-10, -10] },
+    { name = "bottom", gap = 0 },
+]
+"#;
+
 /// The scene `text`, without its mesh and material, on `mesh`; `set` overrides keys.
 ///
 /// # Errors

@@ -84,8 +84,7 @@ fn add(session: &Session, id: u64, table: &mut Table) -> Result<(), StudyError> 
     let (answer, report) = match solve(session, &discrete, "active-set", guess.as_deref())? {
         Ok(answer) => answer,
         Err(failure) => {
-            let row = row.with("reference", "none").with("message", failure.to_string());
-            table.push(row, Verdict::Refused);
+            table.push_refused(row.with("reference", "none"), failure);
             return Ok(());
         }
     };

@@ -85,7 +85,7 @@ fn add(
                         table.push(row, Verdict::of_answer(apart <= allowed));
                     }
                     Err(StudyError::Run(error @ RunError::Contact { .. })) => {
-                        table.push(row.with("message", error.to_string()), Verdict::Refused);
+                        table.push_refused(row, error);
                     }
                     Err(other) => return Err(other),
                 }

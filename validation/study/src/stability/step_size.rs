@@ -2,22 +2,21 @@
 
 use super::{
     Table, Verdict,
-    problems::{run, square},
+    problems::{EXAMPLE_I, run, square},
     table::Row,
 };
 use crate::StudyError;
-use signorini::{contact::SOLVERS, petsc::Session};
+use signorini::{
+    contact::SOLVERS,
+    evolution::{DiscreteProblem, SetupError},
+    petsc::Session,
+};
 use std::time::Instant;
 
-/// Example I of the paper as printed.
-const SCENE: &str = r#"
+/// The damage of Example I as printed.
+const DAMAGE: &str = r#"
 damage = { diffusion = 0.01, lambda_d = 0.1, lambda_u = 100, lambda_w = 0, strain_cap = 1000, threshold = 0.01, initial = 1 }
 time = { end = 1, step = 0.1 }
-boundary = [
-    { name = "left", displacement = [0, 0] },
-    { name = "right", traction = [-10, -10] },
-    { name = "bottom", gap = 0 },
-]
 "#;
 const CELLS: [usize; 4] = [8, 16, 32, 64];
 const STEPS: [f64; 10] = [0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4];
@@ -42,6 +41,11 @@ pub(super) fn fill(session: &Session, table: &mut Table) -> Result<(), StudyErro
     Ok(())
 }
 
+/// Example I on n × n cells.
+fn example_i(n: usize, set: &[String]) -> Result<DiscreteProblem, SetupError> {
+    square(n, &format!("{DAMAGE}{EXAMPLE_I}"), set)
+}
+
 /// Runs to ζ_* on n × n cells with steps as `set` says; `limit` is the failure time as k → 0, s.
 fn add(
     session: &Session,
@@ -51,7 +55,7 @@ fn add(
     (n, limit): (usize, f64),
 ) -> Result<(), StudyError> {
     let started = Instant::now();
-    let problem = square(n, SCENE, set)?;
+    let problem = example_i(n, set)?;
     let outcome = run(session, &problem, SOLVERS[0])?;
     let last = &outcome.last.record;
     let (time, zeta_min, uncertainty) =
@@ -75,7 +79,7 @@ fn add(
 /// error, of first order in k, extrapolated away.
 fn limit(session: &Session, n: usize) -> Result<f64, StudyError> {
     let crossing = |k: f64| -> Result<f64, StudyError> {
-        let problem = square(n, SCENE, &[format!("time.step={k:e}")])?;
+        let problem = example_i(n, &[format!("time.step={k:e}")])?;
         let outcome = run(session, &problem, SOLVERS[0])?;
         let (record, level) = (outcome.last.record, problem.threshold());
         let below = outcome.stopped.map_or(f64::NAN, |stop| stop.zeta_min);

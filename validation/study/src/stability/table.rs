@@ -2,7 +2,7 @@
 
 use crate::StudyError;
 use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Map, Value};
 use signorini::output;
 use std::path::PathBuf;
 
@@ -38,12 +38,12 @@ pub struct Counts {
 
 /// What was tried and what came of it: cells by their columns.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Row(Vec<(&'static str, Value)>);
+pub(super) struct Row(Map<String, Value>);
 
 impl Row {
     /// With one more cell; `None` and NaN leave it empty.
     pub(super) fn with(mut self, column: &'static str, value: impl Serialize) -> Self {
-        self.0.push((column, serde_json::to_value(value).unwrap_or_default()));
+        self.0.insert(column.to_owned(), serde_json::to_value(value).unwrap_or_default());
         self
     }
 }
@@ -53,7 +53,7 @@ impl Row {
 pub struct Table {
     path: PathBuf,
     /// In the order of their first cells.
-    columns: Vec<&'static str>,
+    columns: Vec<String>,
     rows: Vec<(Row, Verdict)>,
 }
 
@@ -65,12 +65,17 @@ impl Table {
 
     /// Adds a row.
     pub(super) fn push(&mut self, row: Row, verdict: Verdict) {
-        for (column, _) in &row.0 {
+        for column in row.0.keys() {
             if !self.columns.contains(column) {
-                self.columns.push(column);
+                self.columns.push(column.clone());
             }
         }
         self.rows.push((row, verdict));
+    }
+
+    /// Adds the row of a problem to which the program gave no answer, and why.
+    pub(super) fn push_refused(&mut self, row: Row, why: impl ToString) {
+        self.push(row.with("message", why.to_string()), Verdict::Refused);
     }
 
     /// Its verdicts.
@@ -87,14 +92,11 @@ impl Table {
         if self.rows.is_empty() {
             return Ok(());
         }
-        let cell = |row: &Row, column: &str| {
-            let found = row.0.iter().find(|(name, _)| *name == column);
-            found.map_or(Value::Null, |(_, value)| value.clone())
-        };
-        let mut lines: Vec<Vec<Value>> =
-            vec![self.columns.iter().chain(&["verdict"]).map(|&column| column.into()).collect()];
+        let titles = self.columns.iter().map(String::as_str).chain(["verdict"]);
+        let mut lines: Vec<Vec<Value>> = vec![titles.map(Value::from).collect()];
         for (row, verdict) in &self.rows {
-            let cells = self.columns.iter().map(|column| cell(row, column));
+            let cells = self.columns.iter().map(|column| row.0.get(column).cloned());
+            let cells = cells.map(Option::unwrap_or_default);
             lines.push(cells.chain(serde_json::to_value(verdict)).collect());
         }
         Ok(output::write_table(&self.path, &lines)?)

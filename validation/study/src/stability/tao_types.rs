@@ -2,7 +2,7 @@
 
 use super::{
     Table, Verdict,
-    problems::{PRESSED_AND_LIFTED, difference, problem, solve},
+    problems::{EXAMPLE_I, PRESSED_AND_LIFTED, difference, problem, solve},
     table::Row,
 };
 use crate::StudyError;
@@ -22,14 +22,6 @@ boundary = [
     { name = "top", traction = [0, "-max(0, 1 - abs(x - 1.5)) + 0.3*max(0, x - 3)"] },
 ]
 "#;
-/// Example I's square without its damage.
-const SQUARE: &str = r#"
-boundary = [
-    { name = "left", displacement = [0, 0] },
-    { name = "bottom", gap = 0 },
-    { name = "right", traction = [-10, -10] },
-]
-"#;
 /// Half of a block that only contact holds up.
 const BLOCK: &str = r#"
 boundary = [
@@ -44,7 +36,7 @@ type Case = (&'static str, &'static str, (f64, f64, usize, usize));
 const SCENES: [Case; 4] = [
     ("d40", PRESSED_AND_LIFTED, (1.0, 1.0, 32, 32)),
     ("beam", BEAM, (4.0, 1.0, 64, 16)),
-    ("square", SQUARE, (1.0, 1.0, 32, 32)),
+    ("square", EXAMPLE_I, (1.0, 1.0, 32, 32)),
     ("block", BLOCK, (1.0, 1.0, 32, 32)),
 ];
 const TOLERANCES: [f64; 3] = [1e-6, 1e-8, 1e-10];
