@@ -5,14 +5,12 @@ faster signorini is, where contact stays and where it moves; how far a step is f
 none can avoid; growth of time and memory.
 """
 
-import sys
-from pathlib import Path
 from statistics import median
 
 import matplotlib.pyplot as plt
 import numpy as np
 
-from drawing import FAINT, INK, RED
+from drawing import FAINT, INK, RED, draw_table
 from results import read_table
 
 STYLES = {
@@ -147,7 +145,8 @@ def ticks(axes, rows, part):
     axes.minorticks_off()
 
 
-def draw(rows, path):
+def draw(table):
+    rows = read_table(table)
     figure, all_axes = plt.subplots(3, 2, figsize=(11, 12))
     (a, b), (c, d), (e, f) = all_axes
     time(a, rows, "steps", "contact stays: a step of square-mild")
@@ -159,20 +158,8 @@ def draw(rows, path):
     for axes in all_axes.flat:
         axes.grid(color=FAINT, alpha=0.35, linewidth=0.6)
         axes.set_axisbelow(True)
-    figure.savefig(path)
-    plt.close(figure)
-
-
-def main(folder):
-    table = Path(folder) / "bench.csv"
-    if not table.exists():
-        sys.exit(f"no {table}: run `make bench` first")
-    picture = table.with_suffix(".png")
-    draw(read_table(table), picture)
-    print(picture)
+    return figure
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 2:
-        sys.exit(__doc__)
-    main(sys.argv[1])
+    draw_table(__doc__, "bench", "make bench", draw)

@@ -8,12 +8,11 @@ k, provided both end with the same min ζ and largest |u|, which is checked here
 """
 
 import sys
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 from matplotlib.ticker import LogFormatterSciNotation
 
-from drawing import BLUE, FAINT, INK, RED
+from drawing import BLUE, FAINT, INK, RED, draw_table
 from results import read_table
 
 # The least two answers of the same discrete problem agree to, at KKT residuals of 1e-10.
@@ -70,7 +69,7 @@ def name(row):
     return f"size {size}, {mesh}, {steps(row)}{loose}"
 
 
-def draw(axes, rows, fenicsx, error, suffix, label):
+def draw_errors(axes, rows, fenicsx, error, suffix, label):
     for kind, of_kind, style in kinds(rows):
         axes.scatter([row["seconds"] for row in of_kind], [row[error] for row in of_kind],
                      s=16, alpha=0.75, label=kind, **style)
@@ -97,28 +96,28 @@ def draw(axes, rows, fenicsx, error, suffix, label):
     axes.set_axisbelow(True)
 
 
-def main(folder):
-    table, others = Path(folder) / "chart.csv", Path(folder) / "fenicsx.csv"
-    if not table.exists():
-        sys.exit(f"no {table}: run `signorini-study chart` first")
+def draw(table, fenicsx):
+    """The figure of the chart at this path; fills the list of FEniCSx's runs."""
     rows = [row for row in read_table(table) if not row["error"]]
-    fenicsx = list(matched(read_table(others), rows)) if others.exists() else []
+    others = table.parent / "fenicsx.csv"
+    fenicsx += matched(read_table(others), rows) if others.exists() else []
     figure, (left, right) = plt.subplots(1, 2, figsize=(13, 6))
-    draw(left, rows, fenicsx, "sum", "", "largest ‖ε(Δu)‖ + ‖Δζ‖ over time (that of Table 1)")
-    draw(right, rows, fenicsx, "zeta", "_zeta", "largest ‖Δζ‖ over time")
+    draw_errors(left, rows, fenicsx, "sum", "", "largest ‖ε(Δu)‖ + ‖Δζ‖ over time (that of Table 1)")
+    draw_errors(right, rows, fenicsx, "zeta", "_zeta", "largest ‖Δζ‖ over time")
     left.set_title(f"{table.parent.name}: error of displacement and damage", loc="left")
     right.set_title("error of the damage alone", loc="left")
     figure.legend(*left.get_legend_handles_labels(), loc="upper center", ncols=4,
                   bbox_to_anchor=(0.5, 0.0))
-    picture = table.with_suffix(".png")
-    figure.savefig(picture)
-    print(picture)
+    return figure
+
+
+def main():
+    fenicsx = []
+    draw_table(__doc__, "chart", "signorini-study chart", lambda table: draw(table, fenicsx))
     for row in fenicsx:
         print(f"FEniCSx n = {row['n']:g}, k = {row['step']:g}: {row['times']:.1f} times the "
               f"seconds of active-set, answers {row['apart']:.0e} apart")
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 2:
-        sys.exit(__doc__)
-    main(sys.argv[1])
+    main()

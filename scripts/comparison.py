@@ -5,13 +5,11 @@ scene, how well it did, and one against the other.
 """
 
 import csv
-import sys
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 
-from drawing import FAINT, INK, RED
+from drawing import FAINT, INK, RED, draw_table
 
 COLOURS = ["#2f6db3", "#d08a1d", "#3d8f5a", "#8e5aa8", "#4fa3a5", "#a3554f"]
 MARKERS = ["o", "s", "^", "D", "v", "P", "X", "<", ">", "*"]
@@ -62,8 +60,9 @@ def colour(solver):
     return COLOURS[solver % len(COLOURS)]
 
 
-def draw(rows, path):
-    """Draws the rows of the table into the PNG file at path."""
+def draw(table):
+    """The figure of the table at this path."""
+    rows = read(table)
     figure, ((seconds, kkt), (work, trade)) = plt.subplots(2, 2, figsize=(12, 7.6))
     scenes, solvers = names(rows, "scene"), names(rows, "solver")
     bars(seconds, rows, "seconds", "time in the contact solver, all steps (s)")
@@ -84,20 +83,8 @@ def draw(rows, path):
     keys += [plt.Line2D([], [], marker=MARKERS[i % len(MARKERS)], ls="", color=FAINT, label=scene)
              for i, scene in enumerate(scenes)]
     trade.legend(handles=keys, loc="center left", bbox_to_anchor=(1, 0.5))
-    figure.savefig(path)
-    plt.close(figure)
-
-
-def main(folder):
-    table = Path(folder) / "comparison.csv"
-    if not table.exists():
-        sys.exit(f"no {table}: run `signorini compare` first")
-    picture = table.with_suffix(".png")
-    draw(read(table), picture)
-    print(picture)
+    return figure
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 2:
-        sys.exit(__doc__)
-    main(sys.argv[1])
+    draw_table(__doc__, "comparison", "signorini compare", draw)

@@ -5,12 +5,11 @@ the printed one where there is one, and all errors against h at the least k.
 """
 
 import sys
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 
-from drawing import FAINT, INK
+from drawing import FAINT, INK, draw_table
 from results import read_table
 
 COLOURS = ["#2f6db3", "#d08a1d", "#3d8f5a", "#8e5aa8", "#c0392b"]
@@ -83,22 +82,15 @@ def draw_orders(axes, rows):
     grid(axes)
 
 
-def main(folder):
-    table = Path(folder) / "converge.csv"
-    if not table.exists():
-        sys.exit(f"no {table}: run `signorini-study converge` first")
+def draw(table):
     rows = read_table(table)
     if len({row["h"] for row in rows}) < 2:
         sys.exit(f"{table}: an order needs two meshes; refine the reference more often")
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.8))
     draw_figure_3(left, rows)
     draw_orders(right, rows)
-    picture = table.with_suffix(".png")
-    figure.savefig(picture)
-    print(picture)
+    return figure
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 2:
-        sys.exit(__doc__)
-    main(sys.argv[1])
+    draw_table(__doc__, "converge", "signorini-study converge", draw)

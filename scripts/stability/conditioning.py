@@ -2,6 +2,8 @@
 
 import matplotlib.pyplot as plt
 
+from . import verdicts
+
 SOLVERS = {"active-set": "o", "penalty-duality": "s", "tao": "^"}
 VERDICTS = {"correct": "#1b9e77", "refused": "#e08214", "wrong": "#d7301f"}
 
@@ -90,8 +92,7 @@ def draw(table, path):
     handles += [plt.Line2D([], [], ls="", marker="o", color=c, label=v) for v, c in VERDICTS.items()]
     handles += [plt.Line2D([], [], ls="", marker="o", mec="grey", mfc="none", label="hollow: noted")]
     figure.legend(handles=handles, loc="lower center", ncol=7, frameon=False)
-    counts = {v: sum(r["verdict"] == v for r in table) for v in VERDICTS}
-    figure.suptitle(", ".join(f"{n} {v}" for v, n in counts.items()))
+    figure.suptitle(verdicts(table))
     figure.tight_layout(rect=(0, 0.04, 1, 0.98))
     figure.savefig(path, dpi=130)
     plt.close(figure)

@@ -2,7 +2,8 @@
 
 import matplotlib.pyplot as plt
 
-COLOURS = {"correct": "#7fbf7b", "refused": "#fdd49e", "wrong": "#d7301f"}
+from . import CELL_COLOURS
+
 SOLVERS = ["active-set", "penalty-duality", "tao"]
 AXES = {
     "clamped, lifted": "1 − load / load at which the last node leaves",
@@ -39,7 +40,7 @@ def draw(table, path):
         rows = [r for r in table if r["sweep"] == sweep]
         values = list(dict.fromkeys(r["value"] for r in rows))
         for r in rows:
-            x, colour = values.index(r["value"]), COLOURS[r["verdict"]]
+            x, colour = values.index(r["value"]), CELL_COLOURS[r["verdict"]]
             first, height = (0, 3) if r["solver"] == "all" else (SOLVERS.index(r["solver"]), 1)
             cell = plt.Rectangle((x, first), 1, height, facecolor=colour, edgecolor="white")
             axis.add_patch(cell)

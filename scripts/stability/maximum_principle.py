@@ -2,6 +2,8 @@
 
 import matplotlib.pyplot as plt
 
+from . import verdicts
+
 COLOURS = {8: "#1b9e77", 16: "#d95f02", 32: "#7570b3"}
 MASSES = {"consistent": ("o", "full"), "lumped": ("s", "none")}
 ROUNDING = 1e-10
@@ -44,8 +46,6 @@ def draw(table, path):
     for axis in axes[:, 0]:
         axis.set_ylabel("excess (1e-10: none)")
     axes[0, 0].legend(frameon=False, fontsize=8, loc="upper left")
-    counts = {v: sum(r["verdict"] == v for r in table) for v in ("correct", "refused", "wrong")}
-    named = ", ".join(f"{n} {v}" for v, n in counts.items())
-    figure.suptitle(f"{named}; dotted: kκ/h² = 1/6 and 0.55; ×: ζ* reached too early")
+    figure.suptitle(f"{verdicts(table)}; dotted: kκ/h² = 1/6 and 0.55; ×: ζ* reached too early")
     figure.savefig(path, dpi=130)
     plt.close(figure)

@@ -2,6 +2,8 @@
 
 import matplotlib.pyplot as plt
 
+from . import verdicts
+
 
 def draw(table, path):
     """Draws the rows of active-set.csv (dictionaries) into the PNG file at path."""
@@ -24,7 +26,6 @@ def draw(table, path):
     axes[1, 0].axhline(1e-10, color="black", lw=0.8)
     axes[1, 0].set(xlabel="contrast of the stiffness", ylabel="worst KKT residual")
     axes[1, 1].set(xlabel="contrast of the stiffness", ylabel="iterations")
-    counts = {v: sum(r["verdict"] == v for r in table) for v in ("correct", "refused", "wrong")}
-    figure.suptitle(", ".join(f"{n} {v}" for v, n in counts.items()))
+    figure.suptitle(verdicts(table))
     figure.savefig(path, dpi=130)
     plt.close(figure)

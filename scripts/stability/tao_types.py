@@ -2,7 +2,7 @@
 
 import matplotlib.pyplot as plt
 
-COLOURS = {"correct": "#7fbf7b", "refused": "#fdd49e", "wrong": "#d7301f"}
+from . import CELL_COLOURS
 
 
 def draw(table, path):
@@ -14,7 +14,7 @@ def draw(table, path):
     for axis, tolerance in zip(axes, tolerances):
         for r in (r for r in table if r["tolerance"] == tolerance):
             x, y = scenes.index(r["scene"]), types.index(r["type"])
-            axis.add_patch(plt.Rectangle((x, y), 1, 1, facecolor=COLOURS[r["verdict"]], edgecolor="white"))
+            axis.add_patch(plt.Rectangle((x, y), 1, 1, facecolor=CELL_COLOURS[r["verdict"]], edgecolor="white"))
             text = r["iterations"] or r["outcome"]
             if int(r["claimed"]):
                 text += " *"
