@@ -112,7 +112,7 @@ impl<'a> ContactStep<'a> {
             c: Vector::zeros(session, unknowns)?,
             next: memory.clone(),
             accepted: memory,
-            extrapolation: Extrapolation::new(comm),
+            extrapolation: Extrapolation::default(),
             covered: comm.all(body.is_covered()),
             rigid: problem.motions.normal_at(body, &constraints.bounds),
         })
@@ -154,7 +154,8 @@ impl<'a> ContactStep<'a> {
     pub fn accept(&mut self, time: f64) -> Result<(), PetscError> {
         let c = self.c.read(<[f64]>::to_vec)?;
         let c = self.next.datum.shifted(self.problem, c, 1.0);
-        self.phases.time("extrapolation", || self.extrapolation.accept(time, c));
+        let comm = self.problem.body.partition.comm();
+        self.phases.time("extrapolation", || self.extrapolation.accept(comm, time, c));
         self.next.warm_start = self.solver.warm_start();
         self.accepted = self.next.clone();
         Ok(())

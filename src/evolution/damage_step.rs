@@ -28,7 +28,7 @@ pub(super) struct DamageSource {
 /// The answer of a damage step.
 pub(super) struct DamageUpdate {
     /// ζ_n at the nodes.
-    pub(super) zeta: Vec<f64>,
+    pub(super) zeta: DVector<f64>,
     /// min ζ_n and max ζ_n.
     pub(super) min_max: (f64, f64),
     /// The accuracy of ζ_n. `None` where the solve was skipped: a uniform ζ_{n−1} without source
@@ -69,32 +69,30 @@ impl<'a> DamageStep<'a> {
         let (problem, phases) = (self.problem, self.phases);
         let partition = &problem.body.partition;
         let (start, load) = (planned.start.as_slice(), planned.load.as_slice());
-        let mut zeta = start.to_vec();
-        let min_max = partition.min_max(&zeta);
+        let (mut zeta, min_max) = (planned.start.clone(), partition.min_max(start));
         let stays = min_max.0 == min_max.1 && self.is_zero(load);
         let Some(law) = problem.damage().filter(|_| !stays) else {
             return Ok(DamageUpdate { zeta, min_max, certificate: None });
         };
         let system = self.system(&law, planned.k)?;
-        if !phases.time("damage solve", || system.advance(load, &mut zeta))? {
+        if !phases.time("damage solve", || system.advance(load, zeta.as_mut_slice()))? {
             return Err(planned.failed(StepFailure::Damage));
         }
         let largest_residual = system.largest_residual()?;
-        partition.update(&mut zeta, 1)?;
+        partition.update(zeta.as_mut_slice(), 1)?;
         let certificate = phases.time("damage certificate", || {
-            let (body, mass, fields) = (&problem.body, problem.mass(), [start, &zeta]);
+            let (body, mass, fields) = (&problem.body, problem.mass(), [start, zeta.as_slice()]);
             DamageCertificate::of(body, mass, law.diffusion, planned.k, load, fields)
         });
-        match certificate.residual {
-            residual if !residual.is_finite() => Err(planned.failed(StepFailure::Damage)),
-            residual if residual > largest_residual => {
-                Err(planned.failed(StepFailure::DamageResidual(residual)))
-            }
-            _ => {
-                let (min_max, certificate) = (partition.min_max(&zeta), Some(certificate));
-                Ok(DamageUpdate { zeta, min_max, certificate })
-            }
+        let residual = certificate.residual;
+        if !residual.is_finite() {
+            return Err(planned.failed(StepFailure::Damage));
         }
+        if residual > largest_residual {
+            return Err(planned.failed(StepFailure::DamageResidual(residual)));
+        }
+        let min_max = partition.min_max(zeta.as_slice());
+        Ok(DamageUpdate { zeta, min_max, certificate: Some(certificate) })
     }
 
     /// (M + kκL)⁻¹ k b: what ζ_n of a planned step changes by if its source load changes by

@@ -94,13 +94,4 @@ impl RunError {
         let time = problem.scene().time.map(|_| time);
         Self::Contact { step, time, source: Box::new(source), advice }
     }
-
-    /// Whether a solve of a step failed, which may succeed for a shorter step.
-    pub(super) fn is_of_a_solve(&self) -> bool {
-        match self {
-            Self::Contact { .. } => true,
-            Self::Step { source, .. } => *source != StepFailure::TooShort,
-            _ => false,
-        }
-    }
 }

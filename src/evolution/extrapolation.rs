@@ -7,12 +7,11 @@ use std::collections::VecDeque;
 ///
 /// Which degree predicts best depends on how smooth the evolution is and on how precisely
 /// the solutions are known: the degree that predicted the last solution best is used.
-pub(super) struct Extrapolation {
+#[derive(Debug, Default)]
+pub struct Extrapolation {
     /// (time, solution), the latest first.
     history: VecDeque<(f64, Vec<f64>)>,
     degree: usize,
-    /// The ranks among which solutions are divided.
-    comm: Communicator,
 }
 
 /// Above this degree the tolerance of the solutions, magnified by 2^(degree + 1), prevails.
@@ -21,12 +20,8 @@ const HIGHEST: usize = 4;
 const SAMPLE: usize = 4096;
 
 impl Extrapolation {
-    pub(super) fn new(comm: Communicator) -> Self {
-        Self { history: VecDeque::new(), degree: 0, comm }
-    }
-
     /// The predicted solution at `time`; `None` before any solution.
-    pub(super) fn at(&self, time: f64) -> Option<Vec<f64>> {
+    pub fn at(&self, time: f64) -> Option<Vec<f64>> {
         let mut values = vec![0.0; self.history.front()?.1.len()];
         for ((_, solution), weight) in self.history.iter().zip(self.weights(self.degree, time)) {
             values.iter_mut().zip(solution).for_each(|(value, old)| *value += weight * old);
@@ -34,9 +29,9 @@ impl Extrapolation {
         Some(values)
     }
 
-    /// A solution is accepted.
-    pub(super) fn accept(&mut self, time: f64, solution: Vec<f64>) {
-        let errors = self.errors(time, &solution);
+    /// Adds the part that this rank owns of an accepted solution. Collective.
+    pub fn accept(&mut self, comm: Communicator, time: f64, solution: Vec<f64>) {
+        let errors = self.errors(comm, time, &solution);
         let best = (0..errors.len()).min_by(|&a, &b| errors[a].total_cmp(&errors[b]));
         // One degree more than was possible so far is tried as soon as the highest was best.
         self.degree = match best {
@@ -50,7 +45,7 @@ impl Extrapolation {
 
     /// For every possible degree, the squared error of its prediction of the `solution` at `time`, in
     /// a sample of the entries. Collective.
-    fn errors(&self, time: f64, solution: &[f64]) -> Vec<f64> {
+    fn errors(&self, comm: Communicator, time: f64, solution: &[f64]) -> Vec<f64> {
         let weights: Vec<_> = (0..self.history.len()).map(|d| self.weights(d, time)).collect();
         let mut errors = vec![0.0; weights.len()];
         let stride = solution.len().div_ceil(SAMPLE).max(1);
@@ -60,7 +55,7 @@ impl Extrapolation {
                 *error += (terms.sum::<f64>() - exact).powi(2);
             }
         }
-        self.comm.sum(&mut errors);
+        comm.sum(&mut errors);
         errors
     }
 
@@ -73,31 +68,5 @@ impl Extrapolation {
             others.map(|(_, other)| (time - other) / (own - other)).product()
         };
         times().map(weight).collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_quadratic_evolution_is_predicted_exactly_from_uneven_times() {
-        let solution = |t: f64| vec![1.0 + t * t, 3.0 * t];
-        let mut extrapolation = Extrapolation::new(Communicator::serial());
-        assert_eq!(extrapolation.at(0.0), None);
-        for t in [0.0, 0.1, 0.3, 0.35, 0.5, 0.6] {
-            extrapolation.accept(t, solution(t));
-        }
-        let (found, expected) = (extrapolation.at(0.8).unwrap(), solution(0.8));
-        assert!((0..2).all(|i| (found[i] - expected[i]).abs() < 1e-13), "{found:?}");
-    }
-
-    #[test]
-    fn a_jump_lowers_the_degree() {
-        let mut extrapolation = Extrapolation::new(Communicator::serial());
-        for (t, s) in [(0.0, 0.0), (1.0, 1.0), (2.0, 2.0), (3.0, 2.0), (4.0, 2.0)] {
-            extrapolation.accept(t, vec![s]);
-        }
-        assert_eq!(extrapolation.at(5.0), Some(vec![2.0]));
     }
 }

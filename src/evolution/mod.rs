@@ -42,6 +42,7 @@ pub use bounds::BoundViolation;
 pub use contact_step::{Accuracy, ContactStep};
 pub use discrete_problem::{DiscreteProblem, SetupError};
 pub use error::{RunError, StepFailure};
+pub use extrapolation::Extrapolation;
 pub use foundation::Foundation;
 pub use loads::Loads;
 pub use outcome::{Outcome, Stop};
@@ -90,7 +91,7 @@ pub fn run(
                 return Ok(controller.judge_stop(&planned, &damage, &outcome.last));
             }
             // (26): u_n from ζ_n.
-            let mut step = contact_step.solve(planned.n, planned.time, &damage.zeta)?;
+            let mut step = contact_step.solve(planned.n, planned.time, damage.zeta.as_slice())?;
             step.set_damage_certificate(damage.certificate);
             controller.judge(&planned, &damage, Box::new(step), &mut damage_step)
         });
@@ -101,10 +102,7 @@ pub fn run(
                 outcome.accept(*step);
                 show(&outcome.last)?;
             }
-            Verdict::Retry(factor) => {
-                controller.shorten(planned.length * factor);
-                outcome.undone += 1;
-            }
+            Verdict::Retry => outcome.undone += 1,
             Verdict::Stop(stop) => {
                 outcome.stopped = Some(stop);
                 break;

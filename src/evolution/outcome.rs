@@ -1,10 +1,11 @@
 //! How a run ended that did not fail.
 
-use super::{Accuracy, BoundViolation, State, Step};
+use super::{Accuracy, BoundViolation, Step, StepRecord};
 use crate::contact::{Kkt, RigidMotion};
+use std::{mem, rc::Rc};
 
 /// How a run ended that did not fail.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Outcome {
     /// The last accepted step.
     pub last: Step,
@@ -28,11 +29,9 @@ pub struct Outcome {
     pub accuracy: Accuracy,
     /// Estimated error of the last ζ over the damage done, where steps are chosen.
     pub damage_error: Option<f64>,
-    /// The largest stationarity residual of the steps before the last, and the state that has it.
-    pub(super) least_accurate: Option<(f64, State)>,
-    /// The largest displacement of the steps before the last, m, if larger than in the last, and the
-    /// state that has it.
-    pub(super) most_displaced: Option<(f64, State)>,
+    /// The steps of the largest stationarity residual and displacement before the last.
+    pub(super) least_accurate: Option<Rc<Step>>,
+    pub(super) most_displaced: Option<Rc<Step>>,
 }
 
 /// The stop at ζ_*.
@@ -51,39 +50,22 @@ pub struct Stop {
 impl Outcome {
     /// Of a run whose first solve, (27), is `first`.
     pub(super) fn new(first: Step) -> Self {
-        let mut outcome = Self {
-            last: first,
-            stopped: None,
-            kkt: Kkt::default(),
-            skipped_damage_solves: 0,
-            undone: 0,
-            fallbacks: 0,
-            rescued: None,
-            bound_violation: BoundViolation::default(),
-            unconstrained: None,
-            accuracy: Accuracy::default(),
-            damage_error: None,
-            least_accurate: None,
-            most_displaced: None,
-        };
+        let mut outcome = Self { last: first, ..Self::default() };
         outcome.count_last();
         outcome
     }
 
     /// A further step is accepted.
     pub(super) fn accept(&mut self, step: Step) {
-        let Step { state, record, .. } = std::mem::replace(&mut self.last, step);
+        let before = Rc::new(mem::replace(&mut self.last, step));
+        let keep_larger = |kept: &mut Option<Rc<Step>>, of: fn(&StepRecord) -> f64| {
+            if kept.as_ref().is_none_or(|kept| of(&before.record) > of(&kept.record)) {
+                *kept = Some(before.clone());
+            }
+        };
+        keep_larger(&mut self.least_accurate, |record| record.kkt_stationarity);
+        keep_larger(&mut self.most_displaced, |record| record.displacement_max);
         self.count_last();
-        let displacement = record.displacement_max;
-        if displacement > self.last.record.displacement_max
-            && self.most_displaced.as_ref().is_none_or(|(largest, _)| displacement > *largest)
-        {
-            self.most_displaced = Some((displacement, state.clone()));
-        }
-        let residual = record.kkt_stationarity;
-        if self.least_accurate.as_ref().is_none_or(|(largest, _)| residual > *largest) {
-            self.least_accurate = Some((residual, state));
-        }
     }
 
     fn count_last(&mut self) {
@@ -94,8 +76,7 @@ impl Outcome {
         let rescues = usize::from(report.rescued_by.is_some());
         self.fallbacks += usize::from(report.fallbacks > rescues);
         if let Some(solver) = report.rescued_by {
-            let before = self.rescued.map_or(0, |(steps, _)| steps);
-            self.rescued = Some((before + 1, solver));
+            self.rescued = Some((self.rescued.map_or(1, |(steps, _)| steps + 1), solver));
         }
         if self.unconstrained.is_none() {
             self.unconstrained = unconstrained.clone().map(|motion| (record.time, motion));

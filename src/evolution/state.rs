@@ -8,7 +8,7 @@ use crate::{
 use serde::Serialize;
 
 /// A step with its certified answer.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Step {
     /// The fields.
     pub state: State,
@@ -23,7 +23,7 @@ pub struct Step {
 }
 
 /// The fields of a step.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct State {
     /// t, s.
     pub time: f64,
@@ -38,7 +38,7 @@ pub struct State {
 }
 
 /// The quantities of interest of a step: a row of `history.csv`.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct StepRecord {
     /// n.
     pub step: usize,
@@ -127,9 +127,7 @@ impl StepRecord {
             kkt_primal: kkt.primal,
             kkt_dual: kkt.dual,
             kkt_complementarity: kkt.complementarity,
-            zeta_residual: 0.0,
-            zeta_error: 0.0,
-            seconds: 0.0,
+            ..Self::default()
         }
     }
 

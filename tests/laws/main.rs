@@ -14,6 +14,7 @@ mod constraints;
 mod contact;
 mod damage;
 mod elements;
+mod extrapolation;
 mod hertz;
 mod loads;
 mod lost_contact;

@@ -3,10 +3,11 @@
 use super::ContactStep;
 use crate::{
     cholesky::{LinearSolver, LinearSystem, Precision},
-    evolution::{DiscreteProblem, Outcome, State},
+    evolution::{DiscreteProblem, Outcome, State, Step},
     fem::{RigidPart, Stiffness},
     petsc::{PetscError, Session, Vector},
 };
+use std::rc::Rc;
 
 /// Displacements are promised to this, relative, or to `TOLERANCES` times the KKT tolerance.
 const DISPLACEMENT: f64 = 1e-6;
@@ -82,28 +83,28 @@ impl ContactStep<'_> {
         drop(solver);
         let (body, elasticity) = (&problem.body, &problem.elasticity);
         let last = &outcome.last;
-        let (max, resolved) = match &outcome.most_displaced {
-            Some((max, state)) => (*max, state),
-            None => (last.record.displacement_max, &last.state),
-        };
-        let [rigid, rest] = RigidPart::of(body, &resolved.u).max_norms(body, &resolved.u);
+        let larger =
+            |before: &&Rc<Step>| before.record.displacement_max > last.record.displacement_max;
+        let most = outcome.most_displaced.as_ref().filter(larger).map_or(last, Rc::as_ref);
+        let (max, State { u, zeta_mean, .. }) = (most.record.displacement_max, &most.state);
+        let [rigid, rest] = RigidPart::of(body, u).max_norms(body, u);
         // What is only carried along has no strains but rounding.
         let energy = match rest > CARRIED * rigid {
-            true => elasticity.energy_error(body, &resolved.zeta_mean, &resolved.u)?,
+            true => elasticity.energy_error(body, zeta_mean, u)?,
             false => 0.0,
         };
         let displacement = displacement_error(session, problem, stiffness, &last.state, max)?;
         let mut accuracy = Accuracy { displacement, energy, time: last.state.time };
-        let Some((residual, state)) = &outcome.least_accurate else { return Ok(accuracy) };
-        let expected = displacement * (residual / last.record.kkt_stationarity).max(1.0);
+        let Some(worst) = &outcome.least_accurate else { return Ok(accuracy) };
+        let ratio = worst.record.kkt_stationarity / last.record.kkt_stationarity;
+        let expected = displacement * ratio.max(1.0);
         if expected <= SAFE * Accuracy::promised(problem.tolerance) {
             return Ok(accuracy);
         }
         let stiffness = Stiffness::new(session, body, elasticity, &problem.constraints.bases)?;
-        let displacement = displacement_error(session, problem, stiffness, state, max)?;
+        let displacement = displacement_error(session, problem, stiffness, &worst.state, max)?;
         if displacement > accuracy.displacement {
-            accuracy.displacement = displacement;
-            accuracy.time = state.time;
+            accuracy = Accuracy { displacement, time: worst.state.time, ..accuracy };
         }
         Ok(accuracy)
     }

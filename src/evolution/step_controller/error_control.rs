@@ -13,14 +13,15 @@ pub(super) struct ErrorControl<'a> {
     /// What steps must follow, where it depends on time.
     load_curve: Option<LoadCurve<'a>>,
     /// The length of the next step, s.
-    pub(super) next_length: f64,
+    next_length: f64,
     /// ζ₀.
     initial: DVector<f64>,
     /// Per node, the sum of the truncation errors of the accepted steps.
     truncation: DVector<f64>,
-    /// [`ErrorControl::norms`] of the last accepted ζ − ζ₀ and of its estimated error.
-    damage: [f64; 2],
-    error: [f64; 2],
+    /// max |ζ − ζ₀| of the last accepted ζ.
+    damage: f64,
+    /// The estimated error of the last accepted ζ over the damage done.
+    pub(super) relative_error: f64,
 }
 
 /// A step is at most this part of the run.
@@ -56,8 +57,8 @@ impl<'a> ErrorControl<'a> {
             next_length: first_length.min(COARSEST * grid.end),
             initial: DVector::from_column_slice(initial),
             truncation: DVector::zeros(initial.len()),
-            damage: [0.0; 2],
-            error: [0.0; 2],
+            damage: 0.0,
+            relative_error: 0.0,
         })
     }
 
@@ -83,14 +84,15 @@ impl<'a> ErrorControl<'a> {
         }
     }
 
-    /// Whether a step may be so short, s.
-    pub(super) fn is_possible(&self, length: f64) -> bool {
+    /// Makes the next step `length` s long; false where so short a step means that the run has failed.
+    pub(super) fn shorten(&mut self, length: f64) -> bool {
+        self.next_length = length;
         length > FINEST * self.end
     }
 
     /// How near ζ_* a run must land.
     pub(super) fn landing(&self) -> f64 {
-        self.tolerance * self.damage[0].max(NEGLIGIBLE)
+        self.tolerance * self.damage.max(NEGLIGIBLE)
     }
 
     /// Compares the error of ζ_n = `zeta`, that is e_n and the truncation error, with the allowed one,
@@ -118,16 +120,12 @@ impl<'a> ErrorControl<'a> {
             return Err(growth(ratio).clamp(0.2, 0.9));
         }
         self.truncation += truncation;
-        self.damage = damage;
-        self.error = self.norms(&(&self.truncation + correction));
+        let total = self.norms(&(&self.truncation + correction));
+        let relative = |j: usize| total[j] / damage[j].max(NEGLIGIBLE);
+        self.relative_error = relative(0).max(relative(1));
+        self.damage = damage[0];
         self.next_length = (planned.length * growth(ratio).min(2.0)).min(COARSEST * self.end);
         Ok(())
-    }
-
-    /// The estimated error of the last accepted ζ over the damage done.
-    pub(super) fn relative_error(&self) -> f64 {
-        let relative = |j: usize| self.error[j] / self.damage[j].max(NEGLIGIBLE);
-        relative(0).max(relative(1))
     }
 
     /// max |·| over the nodes, and the mean of |·| over the body. Collective.

@@ -42,10 +42,14 @@ pub(super) struct PlannedStep {
     pub(super) load: DVector<f64>,
     /// The bounds on ζ_n of [`BoundViolation`].
     pub(super) bounds: (f64, f64),
-    beta: f64,
 }
 
 impl PlannedStep {
+    /// The rate of the formula at t_n, (ζ̃_n − `start`) / k, for ζ̃_n = `zeta`.
+    fn rate(&self, zeta: &DVector<f64>) -> DVector<f64> {
+        (zeta - &self.start) / self.k
+    }
+
     /// The error of a step that has no answer.
     pub(super) fn failed(&self, source: StepFailure) -> RunError {
         RunError::Step { step: self.n, time: self.time, source }
@@ -56,8 +60,8 @@ impl PlannedStep {
 pub(super) enum Verdict {
     /// It is accepted.
     Accept(Box<Step>),
-    /// It is to be made again, shorter by this factor.
-    Retry(f64),
+    /// It is to be made again, shorter.
+    Retry,
     /// ζ_* is reached: the run ends before this step.
     Stop(Stop),
 }
@@ -135,7 +139,7 @@ impl<'a> StepController<'a> {
         let load =
             (&self.source.load + omega * &self.load_change).map(|b| if b > 0.0 { 0.0 } else { b });
         let (start, bounds) = (&self.zeta + shift, (lower, upper));
-        Some(PlannedStep { n, time, length, k, beta, start, load, bounds })
+        Some(PlannedStep { n, time, length, k, start, load, bounds })
     }
 
     /// Judges a step whose ζ_n and u_n are known.
@@ -150,13 +154,12 @@ impl<'a> StepController<'a> {
         damage_step: &mut DamageStep,
     ) -> Result<Verdict, RunError> {
         let source = damage_step.source(&step.state);
-        let zeta = DVector::from_column_slice(&damage.zeta);
         let correction = match self.chosen {
             Some(_) => damage_step.correction(planned, &source.load - &planned.load)?,
-            None => DVector::zeros(zeta.len()),
+            None => DVector::zeros(damage.zeta.len()),
         };
-        let corrected = &zeta + &correction;
-        let rate = self.rate(planned, &corrected);
+        let corrected = &damage.zeta + &correction;
+        let rate = planned.rate(&corrected);
         match &mut self.chosen {
             None => self.add_uniform_delay(planned, &rate),
             Some(chosen) => {
@@ -166,7 +169,7 @@ impl<'a> StepController<'a> {
                 let trapezoidal = 0.5 * planned.length * sum;
                 let truncation = TRUNCATION * (trapezoidal - (&corrected - &self.zeta));
                 let errors = [&correction, &truncation];
-                if let Err(factor) = chosen.judge(planned, &zeta, errors, &rate) {
+                if let Err(factor) = chosen.judge(planned, &damage.zeta, errors, &rate) {
                     let shorter = self.retry(planned, factor);
                     return shorter.ok_or_else(|| planned.failed(StepFailure::TooShort));
                 }
@@ -207,12 +210,11 @@ impl<'a> StepController<'a> {
             (last.state.time + part * planned.length, 1.0)
         } else {
             // This step tells the error of the one before.
-            let rate = self.rate(planned, &DVector::from_column_slice(&damage.zeta));
-            self.add_uniform_delay(planned, &rate);
+            self.add_uniform_delay(planned, &planned.rate(&damage.zeta));
             (planned.time, 2.0)
         };
         self.violation.observe(planned, damage.min_max, time);
-        let delay = self.delay_at_weakest_node(&damage.zeta).abs();
+        let delay = self.delay_at_weakest_node(damage.zeta.as_slice()).abs();
         let uncertainty = planned.length + delays * delay;
         Verdict::Stop(Stop { time, zeta_min, least_admissible: planned.bounds.0, uncertainty })
     }
@@ -222,33 +224,27 @@ impl<'a> StepController<'a> {
     /// # Errors
     /// `failure`, if no shorter step is to be tried.
     pub(super) fn judge_failure(
-        &self,
+        &mut self,
         planned: &PlannedStep,
         failure: RunError,
     ) -> Result<Verdict, RunError> {
-        let shorter = self.retry(planned, 0.5).filter(|_| failure.is_of_a_solve());
+        let shorter = match failure {
+            RunError::Step { source: StepFailure::TooShort, .. } => None,
+            RunError::Contact { .. } | RunError::Step { .. } => self.retry(planned, 0.5),
+            _ => None,
+        };
         shorter.ok_or(failure)
-    }
-
-    /// The step is to be made again, `length` s long.
-    pub(super) fn shorten(&mut self, length: f64) {
-        self.chosen.iter_mut().for_each(|chosen| chosen.next_length = length);
     }
 
     /// The estimated error of the last accepted ζ over the damage done, where steps are chosen.
     pub(super) fn damage_error(&self) -> Option<f64> {
-        self.chosen.as_ref().map(ErrorControl::relative_error)
+        self.chosen.as_ref().map(|chosen| chosen.relative_error)
     }
 
-    /// A shorter step, where steps are chosen and not hopelessly short.
-    fn retry(&self, planned: &PlannedStep, factor: f64) -> Option<Verdict> {
-        let possible = self.chosen.as_ref()?.is_possible(planned.length * factor);
-        possible.then_some(Verdict::Retry(factor))
-    }
-
-    /// The rate of the formula at t_n, (ζ̃_n − ζ̃_{n−1} − β (ζ̃_{n−1} − ζ̃_{n−2})) / k.
-    fn rate(&self, planned: &PlannedStep, zeta: &DVector<f64>) -> DVector<f64> {
-        (zeta - &self.zeta - planned.beta * &self.change) / planned.k
+    /// Makes the step again, shorter by this factor, where steps are chosen and not hopelessly short.
+    fn retry(&mut self, planned: &PlannedStep, factor: f64) -> Option<Verdict> {
+        let possible = self.chosen.as_mut()?.shorten(planned.length * factor);
+        possible.then_some(Verdict::Retry)
     }
 
     /// Adds the delay of the uniform step before the one with this `rate`: (28) takes the source at
