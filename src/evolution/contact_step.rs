@@ -129,9 +129,13 @@ impl<'a> ContactStep<'a> {
     fn solve_by_one(&mut self, step: usize, time: f64, zeta: &[f64]) -> Result<Step, RunError> {
         let started = Instant::now();
         let (problem, phases) = (self.problem, self.phases);
-        self.fill(&problem.triangle_means(zeta))?;
-        let case = phases.time("loads", || problem.load_case(time));
-        let case = agreed(problem.body.partition.comm(), case)?;
+        let (comm, zeta_mean) = (problem.body.partition.comm(), problem.triangle_means(zeta));
+        if comm.any(zeta_mean != self.zeta_mean) {
+            let bytes = self.stiffness.refill_traffic();
+            phases.time_moving("stiffness refill", bytes, || self.stiffness.refill(&zeta_mean))?;
+            self.zeta_mean = zeta_mean;
+        }
+        let case = agreed(comm, phases.time("loads", || problem.load_case(time)))?;
         self.start(&case)?;
         let (Judged { u, kkt, scales, force, contact, .. }, report) =
             self.solve_certified(step, &case)?;
@@ -158,17 +162,6 @@ impl<'a> ContactStep<'a> {
         self.phases.time("extrapolation", || self.extrapolation.accept(comm, time, c));
         self.next.warm_start = self.solver.warm_start();
         self.accepted = self.next.clone();
-        Ok(())
-    }
-
-    /// Fills K for the triangle means of η_*(ζ).
-    fn fill(&mut self, zeta_mean: &[f64]) -> Result<(), PetscError> {
-        if self.problem.body.partition.comm().any(zeta_mean != self.zeta_mean) {
-            let bytes = self.stiffness.refill_traffic();
-            self.phases
-                .time_moving("stiffness refill", bytes, || self.stiffness.refill(zeta_mean))?;
-            self.zeta_mean = zeta_mean.to_vec();
-        }
         Ok(())
     }
 
@@ -228,7 +221,7 @@ impl<'a> ContactStep<'a> {
                 Err(error) if !error.stopped_short() => return Err(failed(error)),
                 solved => solved,
             };
-            let u = self.displacement(lift)?;
+            let u = displacement(problem, lift, &self.c)?;
             let judged = self.phases.time("certificate", || self.certify(u, case));
             let certified = judged.kkt.within(problem.tolerance);
             let far = !self.next.datum.is_zero() && judged.rigid_max > FAR * judged.elastic_max;
@@ -287,8 +280,7 @@ impl<'a> ContactStep<'a> {
             scale = scale.max(LIFTED * body.partition.norm(&load, 2));
         }
         bases.force_to_local(&mut load);
-        let fixed = load.iter_mut().zip(bases.fixed()).filter(|(_, fixed)| **fixed);
-        fixed.for_each(|(f, _)| *f = 0.0);
+        bases.zero_fixed(&mut load);
         self.load.set(&load[..self.load.owned()])?;
         Ok(scale)
     }
@@ -322,15 +314,18 @@ impl<'a> ContactStep<'a> {
         };
         self.phases.time("contact", || self.solver.solve(&contact, &mut self.c))
     }
+}
 
-    /// u from the unknowns c and the prescribed ones, without free rigid motions.
-    fn displacement(&self, lift: Vec<f64>) -> Result<Vec<f64>, PetscError> {
-        let problem = self.problem;
-        let mut u = lift;
-        self.c.read(|c| u.iter_mut().zip(c).for_each(|(u, c)| *u += c))?;
-        problem.constraints.bases.displacement_to_global(&mut u);
-        problem.body.partition.update(&mut u, 2)?;
-        problem.motions.remove_free(&problem.body, &mut u);
-        Ok(u)
-    }
+/// u from the unknowns c and the prescribed ones, `lift`, without free rigid motions. Collective.
+fn displacement(
+    problem: &DiscreteProblem,
+    lift: Vec<f64>,
+    c: &Vector,
+) -> Result<Vec<f64>, PetscError> {
+    let mut u = lift;
+    c.read(|c| u.iter_mut().zip(c).for_each(|(u, c)| *u += c))?;
+    problem.constraints.bases.displacement_to_global(&mut u);
+    problem.body.partition.update(&mut u, 2)?;
+    problem.motions.remove_free(&problem.body, &mut u);
+    Ok(u)
 }

@@ -171,12 +171,11 @@ impl DiscreteProblem {
     /// Nodal loads at `time`, N per metre of thickness; rounding of the largest load of the run
     /// (sin(pi) = 1.2e-16) counts as zero.
     pub fn load(&self, time: f64) -> Vec<f64> {
-        let load = self.loads.at(&self.body, time);
-        let norm = self.body.partition.norm(&load, 2);
-        match norm > 0.0 && norm <= UNLOADED * self.largest_load {
-            true => vec![0.0; load.len()],
-            false => load,
+        let mut load = self.loads.at(&self.body, time);
+        if self.body.partition.norm(&load, 2) <= UNLOADED * self.largest_load {
+            load.fill(0.0);
         }
+        load
     }
 
     /// What (26) is posed with at `time`.
@@ -201,14 +200,8 @@ impl DiscreteProblem {
         if !comm.all(load.iter().all(|f| f.is_finite())) {
             return Err(self.not_finite(time));
         }
-        if self.motions.all_prevented() {
-            return Ok(());
-        }
-        self.motions.check(&self.body, load).map_err(|source| SetupError::Driven {
-            scene: self.scene.path.clone(),
-            time,
-            source,
-        })
+        let driven = |source| SetupError::Driven { scene: self.scene.path.clone(), time, source };
+        self.motions.check(&self.body, load).map_err(driven)
     }
 
     /// Which value is not finite at `time`, as far as this rank knows.

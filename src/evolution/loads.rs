@@ -76,11 +76,8 @@ impl Loads {
 
     /// u·d of each fixed row at time t, m.
     pub fn prescribed_at(&self, t: f64) -> Vec<f64> {
-        let value = |row: &Option<([f64; 2], Expression)>| match row {
-            Some(([x, y], expression)) => expression.eval(*x, *y, t),
-            None => 0.0,
-        };
-        self.prescribed.iter().map(value).collect()
+        let value = |([x, y], u): &([f64; 2], Expression)| u.eval(*x, *y, t);
+        self.prescribed.iter().map(|row| row.as_ref().map_or(0.0, value)).collect()
     }
 
     /// The forces at time t, N per metre of thickness, on each edge under traction and on a sample of
@@ -96,7 +93,7 @@ impl Loads {
 
     fn assemble(&self, body: &Body, t: f64) -> Vec<f64> {
         let mut load = vec![0.0; 2 * body.partition.local()];
-        let at = |f: &[Expression; 2], [x, y]: [f64; 2]| [f[0].eval(x, y, t), f[1].eval(x, y, t)];
+        let at = |f: &[Expression; 2], [x, y]: [f64; 2]| f.each_ref().map(|f| f.eval(x, y, t));
         if let Some(force) = &self.body_force {
             add_body_force(body, |x| at(force, x), &mut load);
         }
@@ -108,8 +105,10 @@ impl Loads {
 }
 
 fn edge_samples(body: &Body, edges: &[[usize; 2]]) -> Vec<Sample> {
-    let ends = edges.iter().map(|edge| edge.map(|node| body.mesh.nodes[node]));
-    ends.map(|[p, q]| (midpoint(p, q), (q[0] - p[0]).hypot(q[1] - p[1]))).collect()
+    let nodes = &body.mesh.nodes;
+    let sample =
+        |&[a, b]: &[usize; 2]| (midpoint(nodes[a], nodes[b]), body.mesh.edge_normal([a, b]).1);
+    edges.iter().map(sample).collect()
 }
 
 /// Every so many triangles, which stand for those between them.

@@ -46,30 +46,25 @@ impl Outcome {
                 self.skipped_damage_solves, self.last.record.step
             ));
         }
-        notes.extend(self.fallbacks());
-        notes.extend(self.rescues());
+        let counted = |n: usize| format!("{n} step{}", if n == 1 { "" } else { "s" });
+        if self.fallbacks > 0 {
+            let steps = counted(self.fallbacks);
+            notes.push(format!(
+                "in {steps} the contact solver left its fast path (single pivoting)"
+            ));
+        }
+        if let Some((steps, solver)) = self.rescued {
+            notes.push(format!(
+                "in {} the contact solver stopped short of the tolerance, and {solver} gave the \
+                 answer in its place",
+                counted(steps)
+            ));
+        }
         if self.undone > 0 {
             notes.push(format!("{} steps were undone and tried again, shorter", self.undone));
         }
         notes.extend(self.chosen_steps(problem));
         notes
-    }
-
-    /// That answers came by single pivoting.
-    fn fallbacks(&self) -> Option<String> {
-        let steps = counted(self.fallbacks);
-        (self.fallbacks > 0)
-            .then(|| format!("in {steps} the contact solver left its fast path (single pivoting)"))
-    }
-
-    /// That answers came from another solver than the one the run is named after.
-    fn rescues(&self) -> Option<String> {
-        let (steps, solver) = self.rescued?;
-        Some(format!(
-            "in {} the contact solver stopped short of the tolerance, and {solver} gave the answer \
-             in its place",
-            counted(steps)
-        ))
     }
 
     /// How many steps were chosen, and how exact the damage is for it.
@@ -169,10 +164,6 @@ impl DiscreteProblem {
             )
         })
     }
-}
-
-fn counted(steps: usize) -> String {
-    if steps == 1 { "1 step".to_owned() } else { format!("{steps} steps") }
 }
 
 /// The smallest angle of a triangle, degrees.

@@ -24,10 +24,13 @@ pub(super) fn unresolved(scene: &Scene, mesh: &Mesh, traction: &Traction) -> Opt
     }
     let mut times = scene.sample_times(TIMES);
     times.truncate(if f.iter().any(Expression::depends_on_time) { usize::MAX } else { 1 });
+    // Points of an edge from p to q as parts of the way.
+    let gauss = gauss_points([0.0; 2], [1.0, 0.0]).map(|[s, _]| s);
+    let midpoints: [f64; FINE] = std::array::from_fn(|i| (i as f64 + 0.5) / FINE as f64);
     let (mut largest, mut worst) = (0.0_f64, (0.0, [0.0; 4], 0.0));
     for t in times {
-        let [gx, gy, coarse] = integral(mesh, traction, gauss_points, t);
-        let [x, y, fine] = integral(mesh, traction, midpoints, t);
+        let [gx, gy, coarse] = integral(mesh, traction, &gauss, t);
+        let [x, y, fine] = integral(mesh, traction, &midpoints, t);
         largest = largest.max(coarse).max(fine);
         let difference = (gx - x).hypot(gy - y);
         if difference > worst.0 {
@@ -49,29 +52,18 @@ pub(super) fn unresolved(scene: &Scene, mesh: &Mesh, traction: &Traction) -> Opt
     })
 }
 
-/// ∫f_x, ∫f_y and ∫|f| of a traction at time t, by equal weights at `points` of each edge.
-fn integral<const N: usize>(
-    mesh: &Mesh,
-    traction: &Traction,
-    points: impl Fn([f64; 2], [f64; 2]) -> [[f64; 2]; N],
-    t: f64,
-) -> [f64; 3] {
+/// ∫f_x, ∫f_y and ∫|f| of a traction at time t, by equal weights at these parts of each edge.
+fn integral(mesh: &Mesh, traction: &Traction, parts: &[f64], t: f64) -> [f64; 3] {
     let mut sums = [0.0; 3];
     for &[a, b] in &traction.edges {
-        let weight = mesh.edge_normal([a, b]).1 / N as f64;
-        for [x, y] in points(mesh.nodes[a], mesh.nodes[b]) {
+        let (p, q) = (mesh.nodes[a], mesh.nodes[b]);
+        let weight = mesh.edge_normal([a, b]).1 / parts.len() as f64;
+        for s in parts {
+            let [x, y] = [0, 1].map(|k| p[k] + s * (q[k] - p[k]));
             let [fx, fy] = traction.force.each_ref().map(|f| f.eval(x, y, t));
             let values = [fx, fy, fx.hypot(fy)];
             sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight * value);
         }
     }
     sums
-}
-
-/// The midpoints of `FINE` equal parts of the edge from `p` to `q`.
-fn midpoints(p: [f64; 2], q: [f64; 2]) -> [[f64; 2]; FINE] {
-    std::array::from_fn(|i| {
-        let s = (i as f64 + 0.5) / FINE as f64;
-        [p[0] + s * (q[0] - p[0]), p[1] + s * (q[1] - p[1])]
-    })
 }

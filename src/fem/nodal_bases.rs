@@ -60,6 +60,11 @@ impl NodalBases {
         &self.fixed
     }
 
+    /// Sets the entries of the fixed unknowns to 0, in place.
+    pub fn zero_fixed(&self, field: &mut [f64]) {
+        field.iter_mut().zip(&self.fixed).filter(|(_, on)| **on).for_each(|(v, _)| *v = 0.0);
+    }
+
     /// D⁻¹ at `node`, unless it is the identity: u = D⁻¹ c.
     pub fn inverse(&self, node: usize) -> Option<&Matrix2<f64>> {
         self.bases.get(self.place[node] as usize).map(|(_, _, inverse)| inverse)

@@ -128,7 +128,7 @@ fn rigid_motions(
     let vector = |motion: fn([f64; 2]) -> [f64; 2]| {
         let mut field: Vec<f64> = body.mesh.nodes.iter().flat_map(|&x| motion(x)).collect();
         bases.displacement_to_local(&mut field);
-        field.iter_mut().zip(bases.fixed()).filter(|(_, on)| **on).for_each(|(v, _)| *v = 0.0);
+        bases.zero_fixed(&mut field);
         let mut vector = Vector::zeros(session, 2 * body.partition.owned())?;
         vector.set(&field[..2 * body.partition.owned()])?;
         Ok(vector)

@@ -1,6 +1,6 @@
 //! How large the errors of an answer may be although its KKT residuals are small.
 
-use super::ContactStep;
+use super::{ContactStep, displacement};
 use crate::{
     cholesky::{LinearSolver, LinearSystem, Precision},
     evolution::{DiscreteProblem, Outcome, State, Step},
@@ -125,16 +125,15 @@ fn displacement_error(
     stiffness.refill(&state.zeta_mean)?;
     let (body, constraints) = (&problem.body, &problem.constraints);
     let internal = problem.elasticity.internal_force(body, &state.zeta_mean, &state.u);
-    let external = problem.load(state.time);
-    let mut residual: Vec<f64> = external.iter().zip(&internal).map(|(f, r)| f - r).collect();
+    let mut residual = problem.load(state.time);
+    residual.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
     constraints.bases.force_to_local(&mut residual);
+    constraints.bases.zero_fixed(&mut residual);
     let points = state.contact.iter().filter(|point| point.active);
     let bounds = points.filter_map(|p| constraints.bound_along(p.node, p.normal));
     let mut active: Vec<usize> = bounds.map(|i| constraints.bounds[i].dof).collect();
     active.dedup();
     active.iter().for_each(|&dof| residual[dof] = 0.0);
-    let fixed = constraints.bases.fixed();
-    residual.iter_mut().zip(fixed).filter(|(_, on)| **on).for_each(|(r, _)| *r = 0.0);
 
     let mut rhs = Vector::zeros(session, 2 * body.partition.owned())?;
     let mut correction = Vector::zeros(session, 2 * body.partition.owned())?;
@@ -149,8 +148,6 @@ fn displacement_error(
     if !solver.solve(system, &rhs, &mut correction, 0.1 * rhs.norm()?)?.converged {
         return Ok(f64::INFINITY);
     }
-    let mut correction = body.partition.field(correction.read(<[f64]>::to_vec)?, 2)?;
-    constraints.bases.displacement_to_global(&mut correction);
-    problem.motions.remove_free(body, &mut correction);
+    let correction = displacement(problem, vec![0.0; residual.len()], &correction)?;
     Ok(body.partition.max_norm(&correction) / max)
 }

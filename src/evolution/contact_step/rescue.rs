@@ -2,6 +2,7 @@
 
 use super::ContactStep;
 use crate::evolution::{RunError, Step};
+use std::mem;
 
 impl ContactStep<'_> {
     /// u_n at `time` for the nodal damage `zeta`, from the solver or, where that stops short, from its
@@ -12,24 +13,24 @@ impl ContactStep<'_> {
     pub fn solve(&mut self, step: usize, time: f64, zeta: &[f64]) -> Result<Step, RunError> {
         let comm = self.problem.body.partition.comm();
         let solved = self.solve_by_one(step, time, zeta);
-        let limited = match &solved {
-            Err(RunError::Contact { source, .. }) if source.may_be_rescued(comm) => {
-                source.is_limited()
-            }
-            _ => return solved,
+        let Err(RunError::Contact { source, .. }) = &solved else { return solved };
+        let Some(rescuer) = self.rescuer.as_mut().filter(|_| source.may_be_rescued(comm)) else {
+            return solved;
         };
-        let Some(rescuer) = self.rescuer.take() else { return solved };
-        let asked = std::mem::replace(&mut self.solver, rescuer);
+        mem::swap(&mut self.solver, rescuer);
         // One solver's warm start is none for another, and what the solver believed has misled it.
         self.accepted.warm_start.clear();
         let rescued = self.solve_by_one(step, time, zeta);
-        let rescuer = std::mem::replace(&mut self.solver, asked);
+        let name = self.solver.name();
+        self.rescuer.iter_mut().for_each(|asked| mem::swap(&mut self.solver, asked));
         self.solver.set_warm_start(&[]);
-        let name = rescuer.name();
-        self.rescuer = Some(rescuer);
         match rescued {
             // What rounding allows is worth telling, if only the rescuer has found it.
-            Err(RunError::Contact { source, .. }) if limited || !source.is_limited() => solved,
+            Err(RunError::Contact { source: further, .. })
+                if source.is_limited() || !further.is_limited() =>
+            {
+                solved
+            }
             Err(other) => Err(other),
             Ok(mut step) => {
                 step.report.rescued_by = Some(name);
