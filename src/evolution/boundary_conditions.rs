@@ -1,4 +1,5 @@
-//! What a scene asks for on the named parts of the boundary, in terms of the mesh.
+//! What a scene asks for on the named parts of the boundary, in terms of the mesh, and the foundation
+//! opposite Γ_C for pictures.
 
 use crate::{
     contact::{FixedRow, GapRow, RigidMotions},
@@ -69,6 +70,44 @@ impl BoundaryConditions {
         motions
     }
 
+    /// The foundation opposite the edges of Γ_C.
+    pub(super) fn foundation(&self, mesh: &Mesh) -> Foundation {
+        let mut foundation = Foundation::default();
+        for &(edge, normal) in &self.contact_edges {
+            let ends = edge.map(|node| {
+                let ([x, y], (d, tangent)) = (mesh.nodes[node], self.opposite(node, normal));
+                ([x, y], [x + d[0], y + d[1]], tangent)
+            });
+            foundation.contact_boundary.push(ends.map(|(point, ..)| point));
+            foundation.segments.push(ends.map(|(_, opposite, _)| opposite));
+            foundation.tangents.push(ends.map(|(.., tangent)| tangent));
+        }
+        foundation
+    }
+
+    /// The vector d from a node of Γ_C to the foundation, and the direction in which the node may
+    /// slide: at a corner the d with d·ν = g for both conditions, and (0, 0); else d = g ν and the
+    /// tangent. At a node between two plates, the condition nearer to `normal` counts.
+    fn opposite(&self, node: usize, normal: [f64; 2]) -> ([f64; 2], [f64; 2]) {
+        let first = self.gaps.partition_point(|row| row.node < node);
+        let end = self.gaps.partition_point(|row| row.node <= node);
+        let rows = &self.gaps[first..end];
+        if let [a, b, ..] = rows {
+            let (p, q) = (a.normal, b.normal);
+            let cross = p[0] * q[1] - p[1] * q[0];
+            if cross.abs() > 1e-4 {
+                let (x, y) = (a.gap * q[1] - b.gap * p[1], b.gap * p[0] - a.gap * q[0]);
+                return ([x / cross, y / cross], [0.0; 2]);
+            }
+        }
+        let along = |row: &&GapRow| row.normal[0] * normal[0] + row.normal[1] * normal[1];
+        let nearer = rows.iter().max_by(|a, b| along(a).total_cmp(&along(b)));
+        nearer.map_or_else(Default::default, |row| {
+            let [x, y] = row.normal;
+            ([row.gap * x, row.gap * y], [-y, x])
+        })
+    }
+
     fn add_fixed_rows(&mut self, boundary: &Boundary, mesh: &Mesh, at: &BoundaryNode) {
         let node = at.node;
         for condition in &boundary.conditions {
@@ -100,4 +139,15 @@ impl BoundaryConditions {
             None => self.gaps.extend(at.faces.iter().map(|face| row(face.normal, face.length))),
         }
     }
+}
+
+/// What is opposite Γ_C: for each edge an entry with its two ends.
+#[derive(Debug, Clone, Default)]
+pub struct Foundation {
+    /// The edge, m.
+    pub contact_boundary: Vec<[[f64; 2]; 2]>,
+    /// The foundation opposite, m; its segments meet at the nodes.
+    pub segments: Vec<[[f64; 2]; 2]>,
+    /// Unit vectors along which the body slides there; (0, 0) at a corner, which does not slide.
+    pub tangents: Vec<[[f64; 2]; 2]>,
 }

@@ -142,8 +142,8 @@ impl<'a> ContactStep<'a> {
         self.next.scales = scales;
         self.next.active = self.active_bounds(&contact, 0.0);
         let unconstrained = self.unconstrained_motion(&contact, force);
-        let (u, zeta_mean) = (self.next.datum.total(u), self.zeta_mean.clone());
-        let state = State { time, u, zeta: zeta.to_vec(), zeta_mean, contact };
+        let u = self.next.datum.total(u);
+        let state = State { time, u, zeta: zeta.to_vec(), contact };
         let mut record = phases.time("step record", || {
             StepRecord::new(problem, step, &state, &case.load, &report, &kkt)
         });

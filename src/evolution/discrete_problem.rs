@@ -1,6 +1,6 @@
 //! The discrete problem: a scene bound to its mesh, all that does not change from step to step.
 
-use super::{Foundation, Loads, boundary_conditions::BoundaryConditions, resultants};
+use super::{Foundation, Loads, boundary_conditions::BoundaryConditions, notes};
 use crate::{
     contact::{Bound, Certificate, ConstraintError, Constraints, DrivenMotion, RigidMotions},
     fem::{Body, Elasticity, Mass, Subdomain},
@@ -33,8 +33,6 @@ pub struct DiscreteProblem {
     pub tolerance: f64,
     /// The foundation opposite Γ_C.
     pub foundation: Foundation,
-    /// Notes on tractions that the mesh does not resolve.
-    pub(super) unresolved: Vec<String>,
     scene: Scene,
 }
 
@@ -101,7 +99,7 @@ impl DiscreteProblem {
     ///
     /// # Errors
     /// The scene does not fit the mesh, contradicts itself, or its load drives a rigid motion.
-    pub fn new(scene: Scene, mesh: Mesh) -> Result<Self, SetupError> {
+    pub fn new(mut scene: Scene, mesh: Mesh) -> Result<Self, SetupError> {
         scene.check_mesh(&mesh)?;
         let body = Body::new(mesh);
         let mut conditions = BoundaryConditions::new(&scene, &body.mesh);
@@ -111,10 +109,10 @@ impl DiscreteProblem {
             .map_err(|source| SetupError::Constraint { scene: scene.path.clone(), source })?;
         motions.pin_free(&body, &mut constraints);
         let certificate = Certificate::new(fixed, gaps);
-        let foundation = Foundation::new(&conditions, &body.mesh);
-        let unresolved = (conditions.tractions.iter())
-            .filter_map(|traction| resultants::unresolved(&scene, &body.mesh, traction))
-            .collect();
+        let foundation = conditions.foundation(&body.mesh);
+        let unresolved = |traction| notes::unresolved(&scene, &body.mesh, traction);
+        let unresolved: Vec<_> = conditions.tractions.iter().filter_map(unresolved).collect();
+        scene.notes.extend(unresolved);
         let BoundaryConditions { tractions, prescribed, .. } = conditions;
         let loads = Loads::new(&body, &scene.body_force, tractions, prescribed);
         let norms = (scene.sample_times(SAMPLES).into_iter())
@@ -122,7 +120,6 @@ impl DiscreteProblem {
         let problem = Self {
             largest_load: norms.filter(|norm| norm.is_finite()).fold(0.0, f64::max),
             foundation,
-            unresolved,
             certificate,
             elasticity: Elasticity::new(scene.material),
             constraints,

@@ -22,30 +22,26 @@
 //! may be chosen as well as uniform.
 
 mod boundary_conditions;
-mod bounds;
 mod contact_step;
 mod damage_step;
 mod discrete_problem;
 mod error;
 mod extrapolation;
-mod foundation;
 mod loads;
 mod notes;
 mod outcome;
-mod resultants;
 mod state;
 mod step_controller;
 
 pub use crate::contact::ContactPoint;
 pub use crate::phases::Phases;
-pub use bounds::BoundViolation;
+pub use boundary_conditions::Foundation;
 pub use contact_step::{Accuracy, ContactStep};
 pub use discrete_problem::{DiscreteProblem, SetupError};
 pub use error::{RunError, StepFailure};
 pub use extrapolation::Extrapolation;
-pub use foundation::Foundation;
 pub use loads::Loads;
-pub use outcome::{Outcome, Stop};
+pub use outcome::{BoundViolation, Outcome, Stop};
 pub use state::{State, Step, StepRecord};
 
 use crate::petsc::{Communicator, Session};

@@ -31,8 +31,6 @@ pub struct State {
     pub u: Vec<f64>,
     /// ζ at the nodes.
     pub zeta: Vec<f64>,
-    /// Mean of η_*(ζ) on each triangle: what multiplies the stiffness there.
-    pub zeta_mean: Vec<f64>,
     /// The nodes of Γ_C that carry a gap condition; two entries at a corner.
     pub contact: Vec<ContactPoint>,
 }

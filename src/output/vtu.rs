@@ -149,9 +149,9 @@ fn point_data(problem: &DiscreteProblem, state: &State) -> Result<Vec<DataArray>
 /// The fields that are constant on each triangle; the stress has the components xx, yy, xy.
 fn cell_data(problem: &DiscreteProblem, state: &State) -> Vec<DataArray> {
     let (elasticity, body) = (&problem.elasticity, &problem.body);
-    let zeta = state.zeta_mean[..body.own_triangles].iter().enumerate();
-    let stress: Vec<_> =
-        zeta.map(|(t, zeta)| elasticity.stress(body, t, *zeta, &state.u)).collect();
+    let zeta = problem.triangle_means(&state.zeta);
+    let stress = |t: usize| elasticity.stress(body, t, zeta[t], &state.u);
+    let stress: Vec<_> = (0..body.own_triangles).map(stress).collect();
     let von_mises = stress.iter().map(|s| elasticity.material.von_mises(s));
     let components = stress.iter().flat_map(|s| [s[0], s[1], s[2]]);
     vec![

@@ -138,7 +138,11 @@ fn contact_and_clamp_together_carry_the_load() {
     for solver in SOLVERS {
         let problem = quick("lshape");
         let state = run(&problem, solver).last.state;
-        let internal = problem.elasticity.internal_force(&problem.body, &state.zeta_mean, &state.u);
+        let internal = problem.elasticity.internal_force(
+            &problem.body,
+            &problem.triangle_means(&state.zeta),
+            &state.u,
+        );
         let load = problem.loads.at(&problem.body, state.time);
         let clamp: Vec<usize> =
             problem.body.mesh.curves["clamp"].edges.iter().flatten().copied().collect();

@@ -86,11 +86,11 @@ impl ContactStep<'_> {
         let larger =
             |before: &&Rc<Step>| before.record.displacement_max > last.record.displacement_max;
         let most = outcome.most_displaced.as_ref().filter(larger).map_or(last, Rc::as_ref);
-        let (max, State { u, zeta_mean, .. }) = (most.record.displacement_max, &most.state);
+        let (max, State { u, zeta, .. }) = (most.record.displacement_max, &most.state);
         let [rigid, rest] = RigidPart::of(body, u).max_norms(body, u);
         // What is only carried along has no strains but rounding.
         let energy = match rest > CARRIED * rigid {
-            true => elasticity.energy_error(body, zeta_mean, u)?,
+            true => elasticity.energy_error(body, &problem.triangle_means(zeta), u)?,
             false => 0.0,
         };
         let displacement = displacement_error(session, problem, stiffness, &last.state, max)?;
@@ -122,9 +122,10 @@ fn displacement_error(
     if max == 0.0 || problem.body.partition.max_norm(&state.u) == 0.0 {
         return Ok(0.0);
     }
-    stiffness.refill(&state.zeta_mean)?;
+    let zeta_mean = problem.triangle_means(&state.zeta);
+    stiffness.refill(&zeta_mean)?;
     let (body, constraints) = (&problem.body, &problem.constraints);
-    let internal = problem.elasticity.internal_force(body, &state.zeta_mean, &state.u);
+    let internal = problem.elasticity.internal_force(body, &zeta_mean, &state.u);
     let mut residual = problem.load(state.time);
     residual.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
     constraints.bases.force_to_local(&mut residual);

@@ -1,7 +1,11 @@
 //! The lengths of chosen steps, from the estimated error of each.
 
-use super::{PlannedStep, load_curve::LoadCurve};
-use crate::{evolution::DiscreteProblem, fem::Body, scene::Stepping};
+use super::PlannedStep;
+use crate::{
+    evolution::{DiscreteProblem, loads::LoadCurve},
+    fem::Body,
+    scene::Stepping,
+};
 use nalgebra::DVector;
 
 /// Keeps the error of ζ, over the damage done, below a tolerance: at the worst node and in the mean.

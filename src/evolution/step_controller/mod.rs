@@ -13,16 +13,12 @@
 //! with ω = 0; uniform ones have no correction.
 
 mod error_control;
-mod load_curve;
 
 use super::{
     BoundViolation, DiscreteProblem, RunError, Step, StepFailure, Stop,
     damage_step::{DamageSource, DamageStep, DamageUpdate},
 };
-use crate::{
-    fem::Body,
-    scene::{Stepping, TimeGrid},
-};
+use crate::scene::Stepping;
 use error_control::ErrorControl;
 use nalgebra::DVector;
 
@@ -69,11 +65,7 @@ pub(super) enum Verdict {
 /// Plans the steps of a run and judges them. What it knows of the accepted steps changes when it
 /// answers [`Verdict::Accept`], and only then.
 pub(super) struct StepController<'a> {
-    body: &'a Body,
-    /// ζ_*.
-    threshold: f64,
-    /// `None` where there is no time, and so no step.
-    grid: Option<TimeGrid>,
+    problem: &'a DiscreteProblem,
     /// Where steps are chosen.
     chosen: Option<ErrorControl<'a>>,
     /// k_{n−1}, s; infinite before the first step, so that ω = 0.
@@ -101,9 +93,7 @@ impl<'a> StepController<'a> {
     pub(super) fn new(problem: &'a DiscreteProblem, zeta: &[f64], source: DamageSource) -> Self {
         let zeros = DVector::zeros(zeta.len());
         Self {
-            body: &problem.body,
-            threshold: problem.threshold(),
-            grid: problem.scene().time,
+            problem,
             chosen: ErrorControl::new(problem, zeta),
             length: f64::INFINITY,
             zeta: DVector::from_column_slice(zeta),
@@ -119,7 +109,7 @@ impl<'a> StepController<'a> {
 
     /// The step after the accepted one `last`; `None` at the end of time.
     pub(super) fn plan(&mut self, last: &Step) -> Option<PlannedStep> {
-        let (grid, n) = (self.grid?, last.record.step + 1);
+        let (grid, n) = (self.problem.scene().time?, last.record.step + 1);
         let (time, length, omega) = match (&mut self.chosen, grid.stepping) {
             (Some(chosen), _) => {
                 let (time, length) = chosen.choose(last.state.time)?;
@@ -133,7 +123,8 @@ impl<'a> StepController<'a> {
         let beta = omega * omega / (1.0 + 2.0 * omega);
         let k = length * (1.0 + omega) / (1.0 + 2.0 * omega);
         let shift = beta * &self.change;
-        let (lower, upper) = shifted(self.bounds, self.body.partition.min_max(shift.as_slice()));
+        let (lower, upper) =
+            shifted(self.bounds, self.problem.body.partition.min_max(shift.as_slice()));
         // φ ≤ 0, so b ≤ 0 and b̂_n ≥ (1 + ω) b_{n−1}. What is not a number must stay so.
         let lower = lower + k * ((1.0 + omega) * self.source.min);
         let load =
@@ -179,7 +170,7 @@ impl<'a> StepController<'a> {
         self.violation.observe(planned, damage.min_max, planned.time);
         let (lower, upper) = planned.bounds;
         let tightened = (lower.max(damage.min_max.0), upper.min(damage.min_max.1));
-        let partition = &self.body.partition;
+        let partition = &self.problem.body.partition;
         self.bounds = shifted(tightened, partition.min_max(correction.as_slice()));
         self.length = planned.length;
         self.change = &corrected - &self.zeta;
@@ -197,9 +188,9 @@ impl<'a> StepController<'a> {
         damage: &DamageUpdate,
         last: &Step,
     ) -> Verdict {
-        let (zeta_min, level) = (damage.min_max.0, self.threshold);
+        let (zeta_min, level) = (damage.min_max.0, self.problem.threshold());
         let (time, delays) = if let Some(chosen) = &self.chosen {
-            let from = self.body.partition.min_max(self.zeta.as_slice()).0;
+            let from = self.problem.body.partition.min_max(self.zeta.as_slice()).0;
             let part = if from > level { (from - level) / (from - zeta_min) } else { 0.0 };
             // The last ζ that is written counts as well as its correction ζ̃.
             if from.max(last.record.zeta_min) - level > chosen.landing()
@@ -258,9 +249,9 @@ impl<'a> StepController<'a> {
 
     /// The delay at the node of least `zeta`. Collective.
     fn delay_at_weakest_node(&self, zeta: &[f64]) -> f64 {
-        let nodes = 0..self.body.partition.owned();
+        let nodes = 0..self.problem.body.partition.owned();
         let weakest = nodes.min_by(|&a, &b| zeta[a].total_cmp(&zeta[b]));
-        let comm = self.body.partition.comm();
+        let comm = self.problem.body.partition.comm();
         let (_, rank) = comm.min_with_rank(weakest.map_or(f64::INFINITY, |i| zeta[i]));
         comm.broadcast(rank, weakest.map_or(0.0, |i| self.delay[i]))
     }

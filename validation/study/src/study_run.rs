@@ -130,7 +130,6 @@ mod tests {
                 time,
                 u: vec![time, time * time],
                 zeta: vec![1.0 - time],
-                zeta_mean: Vec::new(),
                 contact: Vec::new(),
             });
         }
