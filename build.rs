@@ -4,7 +4,7 @@ use std::{env, path::PathBuf, process::Command};
 
 /// Everything the `petsc` module calls. A name that is not here does not exist for us.
 const PETSC: &str = "\
-    PetscInitialize|PetscInitialized|PetscFinalize|PetscPushErrorHandler|PetscObjectReference|\
+    PetscInitialize|PetscInitialized|PetscFinalize|PetscPushErrorHandler|\
     PetscOptionsInsertString|PetscOptionsSetValue|PetscOptionsHasName|\
     PetscOptionsLeftGet|PetscOptionsLeftRestore|\
     MPI_Comm_size|MPI_Comm_rank|MPI_Allreduce|MPI_Type_contiguous|MPI_Type_commit|MPI_Type_free|\
@@ -14,7 +14,7 @@ const PETSC: &str = "\
     MatPartitioningSetAdjacency|MatPartitioningSetFromOptions|MatPartitioningApply|\
     ISAllGather|ISGetIndices|ISRestoreIndices|ISDestroy|\
     VecCreateMPI|VecGetLocalSize|VecDestroy|VecGetArray|VecRestoreArray|VecGetArrayRead|\
-    VecRestoreArrayRead|VecAXPY|VecAYPX|VecCopy|VecDot|VecNorm|\
+    VecRestoreArrayRead|VecAXPBY|VecDot|VecNorm|\
     MatCreate|MatDestroy|MatSetSizes|MatSetType|MatSetBlockSize|MatSetOption|\
     MatSetPreallocationCOO|MatSetValuesCOO|MatMult|MatDuplicate|MatCopy|MatAXPY|MatScale|MatShift|\
     MatDiagonalSet|MatZeroRowsColumns|MatGetOwnershipRange|MatGetSize|MatGetInfo|MatMumpsGetInfog|\
@@ -73,6 +73,7 @@ fn declare(name: &str, headers: &str, flags: &[String], functions: &str, variabl
         .default_enum_style(bindgen::EnumVariation::ModuleConsts)
         .layout_tests(false)
         .generate_comments(false)
+        .derive_default(true)
         .generate()
         .unwrap_or_else(|e| {
             panic!("bindgen could not read the headers of {name}; run `make deps`\n{e}")

@@ -134,6 +134,11 @@ impl Factor {
         }
     }
 
+    /// Factorisations made so far that did not fail.
+    pub fn factorisations(&self) -> usize {
+        self.factorisations
+    }
+
     /// Whether the last factorisation went well.
     pub(super) fn exists(&self) -> bool {
         self.policy.is_some()
@@ -166,9 +171,5 @@ impl ShellPreconditioner for Factor {
 
     fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
         Factor::apply(self, r, z)
-    }
-
-    fn factorisations(&self) -> usize {
-        self.factorisations
     }
 }

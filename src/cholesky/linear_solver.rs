@@ -221,7 +221,7 @@ impl LinearSolver {
         report: &mut SolveReport,
     ) -> Result<bool, PetscError> {
         system.multiply(x, &mut self.residual)?;
-        self.residual.scale_add(-1.0, b)?;
+        self.residual.axpby(1.0, b, -1.0)?;
         report.converged = self.is_reached(system, limit)?;
         Ok(report.converged)
     }
@@ -229,7 +229,7 @@ impl LinearSolver {
     /// Whether ‖r‖₂ ≤ `limit` on the free unknowns; never where the norm overflows, as the limit of a
     /// huge b does too.
     fn is_reached(&mut self, system: LinearSystem, limit: f64) -> Result<bool, PetscError> {
-        self.free_residual.copy(&self.residual)?;
+        self.free_residual.axpby(1.0, &self.residual, 0.0)?;
         system.clear_prescribed(&mut self.free_residual)?;
         let norm = self.free_residual.norm()?;
         Ok(norm.is_finite() && norm <= limit)
@@ -265,17 +265,15 @@ impl LinearSolver {
             system.clear_prescribed(&mut self.preconditioned)?;
             let previous = energy;
             energy = self.free_residual.dot(&self.preconditioned)?;
-            match iteration {
-                1 => self.direction.copy(&self.preconditioned)?,
-                _ => self.direction.scale_add(energy / previous, &self.preconditioned)?,
-            }
+            let beta = if iteration == 1 { 0.0 } else { energy / previous };
+            self.direction.axpby(1.0, &self.preconditioned, beta)?;
             system.multiply(&self.direction, &mut self.image)?;
             let stiffness = self.direction.dot(&self.image)?;
             if !(stiffness > 0.0 && energy > 0.0) {
                 break;
             }
-            x.add(energy / stiffness, &self.direction)?;
-            self.residual.add(-energy / stiffness, &self.image)?;
+            x.axpby(energy / stiffness, &self.direction, 1.0)?;
+            self.residual.axpby(-energy / stiffness, &self.image, 1.0)?;
             report.converged = self.is_reached(system, limit)?;
             if report.converged {
                 break;

@@ -175,7 +175,7 @@ impl Division {
     /// Divides the unknowns of a matrix: of two neighbours on different ranks, the one on the higher
     /// rank belongs to the interface. `None` if that is too large. Collective.
     fn of(comm: Communicator, matrix: &Matrix) -> Result<Option<Self>, PetscError> {
-        let rows = matrix.rows()?;
+        let rows = matrix.rows();
         let (mut kinds, mut own) = (Vec::new(), Vec::new());
         for row in rows.clone() {
             let on_interface =
@@ -222,7 +222,7 @@ impl Division {
     fn interface_rows(&self, matrix: &Matrix) -> Result<(DMatrix<f64>, f64), PetscError> {
         let mut block = DMatrix::zeros(self.interface.len(), self.interface.len());
         let mut largest = 0.0_f64;
-        for (row, kind) in matrix.rows()?.zip(&self.kinds) {
+        for (row, kind) in matrix.rows().zip(&self.kinds) {
             let Unknown::Interface(i) = *kind else { continue };
             matrix.read_row(row, |columns, values| {
                 let mut sum = 0.0;
@@ -242,7 +242,7 @@ impl Division {
     /// [A_II A_IΓ; A_ΓI c 1]. The pattern of the last block is full, as that of S.
     fn local_matrix(&self, matrix: &Matrix, c: f64) -> Result<LowerTriangle, PetscError> {
         let mut lower = LowerTriangle::default();
-        let rows = matrix.rows()?;
+        let rows = matrix.rows();
         for (row, kind) in rows.clone().zip(&self.kinds) {
             let Unknown::Interior(i) = *kind else { continue };
             matrix.read_row(row, |columns, values| {

@@ -67,7 +67,7 @@ impl ContactProblem<'_> {
     pub(super) fn residual(&self, session: &Session, c: &Vector) -> Result<Vector, PetscError> {
         let mut residual = Vector::zeros(session, c.owned())?;
         self.stiffness.multiply(c, &mut residual)?;
-        residual.add(-1.0, self.load)?;
+        residual.axpby(-1.0, self.load, 1.0)?;
         Ok(residual)
     }
 

@@ -9,7 +9,7 @@ use std::{
 
 /// This rank among all: sums and decisions over the whole body go through it.
 ///
-/// Every reduction is collective (MPI_Allreduce): all ranks call it, at the same point of the run, and
+/// Every reduction is collective: all ranks call it, at the same point of the run, and
 /// all get the same answer to the last bit. A single rank gets its own value back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Communicator {
@@ -63,12 +63,14 @@ impl Communicator {
 
     /// Replaces each value by its sum over the ranks.
     pub fn sum(self, values: &mut [f64]) {
-        self.reduce(values, Operation::Sum);
+        self.reduce(values, predefined(&raw const raw::ompi_mpi_op_sum));
     }
 
     /// The sum of the ranks' values.
     pub fn total(self, value: f64) -> f64 {
-        self.reduced(value, Operation::Sum)
+        let mut sum = [value];
+        self.sum(&mut sum);
+        sum[0]
     }
 
     /// The sum of the ranks' counts.
@@ -81,12 +83,14 @@ impl Communicator {
         if self.is_serial() {
             return value;
         }
-        self.reduced(if value.is_nan() { f64::NEG_INFINITY } else { value }, Operation::Max)
+        let mut max = [if value.is_nan() { f64::NEG_INFINITY } else { value }];
+        self.reduce(&mut max, predefined(&raw const raw::ompi_mpi_op_max));
+        max[0]
     }
 
     /// The least of the ranks' values; NaN counts as ∞.
     pub fn min(self, value: f64) -> f64 {
-        if self.is_serial() { value } else { -self.max(-value) }
+        -self.max(-value)
     }
 
     /// The least of the ranks' values and the first rank that has it (as MPI_MINLOC).
@@ -103,7 +107,7 @@ impl Communicator {
 
     /// Whether the condition is true on some rank.
     pub fn any(self, condition: bool) -> bool {
-        if self.is_serial() { condition } else { self.max(f64::from(u8::from(condition))) > 0.0 }
+        self.max(f64::from(condition)) > 0.0
     }
 
     /// Whether the condition is true on every rank.
@@ -111,10 +115,14 @@ impl Communicator {
         !self.any(!condition)
     }
 
-    /// The values of all ranks, one after the other (as MPI_Allgather); each rank passes as many.
+    /// The values of all ranks, one after the other (as MPI_Allgatherv).
     pub fn gather(self, values: &[f64]) -> Vec<f64> {
-        let mut all = vec![0.0; self.size * values.len()];
-        all[self.rank * values.len()..][..values.len()].copy_from_slice(values);
+        let mut counts = vec![0.0; self.size];
+        counts[self.rank] = values.len() as f64;
+        self.sum(&mut counts);
+        let before = counts[..self.rank].iter().sum::<f64>() as usize;
+        let mut all = vec![0.0; counts.iter().sum::<f64>() as usize];
+        all[before..][..values.len()].copy_from_slice(values);
         self.sum(&mut all);
         all
     }
@@ -150,42 +158,27 @@ impl Communicator {
         std::process::exit(i32::from(code))
     }
 
-    fn reduced(self, value: f64, operation: Operation) -> f64 {
-        let mut values = [value];
-        self.reduce(&mut values, operation);
-        values[0]
-    }
-
-    fn reduce(self, values: &mut [f64], operation: Operation) {
+    /// Replaces `values` by their reduction over the ranks (MPI_Allreduce).
+    fn reduce(self, values: &mut [f64], operation: raw::MPI_Op) {
         if self.is_serial() {
             return;
         }
+        let sent = values.to_vec();
+        let (from, to) = (sent.as_ptr().cast::<c_void>(), values.as_mut_ptr().cast::<c_void>());
         // SAFETY: more ranks than one come from `of_world`; MPI reads its own `count` values and
         // writes as many. Its error handler ends the run.
         unsafe {
-            let operation = match operation {
-                Operation::Sum => &raw const raw::ompi_mpi_op_sum,
-                Operation::Max => &raw const raw::ompi_mpi_op_max,
-            };
-            let sent = values.to_vec();
-            raw::MPI_Allreduce(
-                sent.as_ptr().cast::<c_void>(),
-                values.as_mut_ptr().cast::<c_void>(),
-                values.len() as c_int,
-                double(),
-                operation.cast_mut().cast(),
-                world(),
-            );
+            raw::MPI_Allreduce(from, to, values.len() as c_int, double(), operation, world());
         }
     }
-}
-
-enum Operation {
-    Sum,
-    Max,
 }
 
 /// MPI_DOUBLE.
 pub(super) fn double() -> raw::MPI_Datatype {
-    (&raw const raw::ompi_mpi_double).cast_mut().cast()
+    predefined(&raw const raw::ompi_mpi_double)
+}
+
+/// One of Open MPI's constants, which are the addresses of variables.
+pub(super) fn predefined<T, U>(variable: *const T) -> *mut U {
+    variable.cast_mut().cast()
 }

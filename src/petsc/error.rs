@@ -2,8 +2,9 @@
 
 use super::raw;
 use std::{
+    borrow::Cow,
+    cell::RefCell,
     ffi::{CStr, c_char, c_int, c_void},
-    sync::{Mutex, PoisonError},
 };
 
 /// A call of PETSc or CHOLMOD failed, or was given what does not fit.
@@ -21,19 +22,12 @@ impl PetscError {
     pub(crate) fn ours(message: impl Into<String>) -> Self {
         Self { code: 0, message: message.into() }
     }
-
-    /// The code that a callback returns to PETSc, which passes it on to the caller of the solver; the
-    /// message waits there for `check`.
-    pub(super) fn into_code(self) -> raw::PetscErrorCode {
-        /// PETSC_ERR_LIB, "error in an external library".
-        const LIBRARY: raw::PetscErrorCode = 76;
-        *MESSAGE.lock().unwrap_or_else(PoisonError::into_inner) = self.message;
-        if self.code == 0 { LIBRARY } else { self.code }
-    }
 }
 
-/// The message of the last error; PETSc reports it through the handler, not the code.
-static MESSAGE: Mutex<String> = Mutex::new(String::new());
+thread_local! {
+    /// The message of the last error; PETSc reports it through the handler, not the code.
+    static MESSAGE: RefCell<String> = const { RefCell::new(String::new()) };
+}
 
 /// Keeps the first message of an error trace instead of printing the trace (PetscPushErrorHandler).
 pub(super) unsafe extern "C" fn keep_message(
@@ -48,21 +42,29 @@ pub(super) unsafe extern "C" fn keep_message(
 ) -> raw::PetscErrorCode {
     if kind == raw::PetscErrorType::PETSC_ERROR_INITIAL {
         let text = |p: *const c_char| match p.is_null() {
-            true => String::new(),
+            true => Cow::default(),
             // SAFETY: PETSc passes NUL-terminated strings that live during this call.
-            false => unsafe { CStr::from_ptr(p) }.to_string_lossy().into_owned(),
+            false => unsafe { CStr::from_ptr(p) }.to_string_lossy(),
         };
-        let mut kept = MESSAGE.lock().unwrap_or_else(PoisonError::into_inner);
-        *kept = format!("{} (in {})", text(message).trim_end(), text(function));
+        MESSAGE.set(format!("{} (in {})", text(message).trim_end(), text(function)));
     }
     code
 }
 
 /// Turns PETSc's return code into a result.
 pub(super) fn check(code: raw::PetscErrorCode) -> Result<(), PetscError> {
-    if code == 0 {
-        return Ok(());
+    match code {
+        0 => Ok(()),
+        code => Err(PetscError { code, message: MESSAGE.take() }),
     }
-    let message = std::mem::take(&mut *MESSAGE.lock().unwrap_or_else(PoisonError::into_inner));
-    Err(PetscError { code, message })
+}
+
+/// The return code of a function that PETSc calls. PETSc passes it on to the caller of the solver; the
+/// message waits there for [`check`].
+pub(super) fn return_code(result: Result<(), PetscError>) -> raw::PetscErrorCode {
+    /// PETSC_ERR_LIB, "error in an external library".
+    const LIBRARY: raw::PetscErrorCode = 76;
+    let Err(error) = result else { return 0 };
+    MESSAGE.set(error.message);
+    if error.code == 0 { LIBRARY } else { error.code }
 }

@@ -2,12 +2,17 @@
 //! (<https://petsc.org/release/manualpages/PetscSF/>).
 
 use super::{
-    PetscError, Session, check, communicator::double, handle::Handle, raw, session::world,
+    PetscError, Session, check,
+    communicator::{double, predefined},
+    handle::Handle,
+    raw,
+    session::world,
     vector::same_size,
 };
-use std::{ffi::c_void, fmt, ptr};
+use std::{ffi::c_void, ptr};
 
 /// Fetches ghost values from their owners (PetscSF, a star forest: one owner, many ghosts).
+#[derive(Debug)]
 pub(crate) struct Ghosts {
     handle: Handle<raw::_p_PetscSF>,
     /// Values of a field: owned ones, then ghosts.
@@ -29,20 +34,15 @@ impl Ghosts {
             index: index as i32,
         };
         let mut roots: Vec<raw::PetscSFNode> = ghosts.iter().map(root).collect();
+        let (owned, count) = (owned as i32, ghosts.len() as i32);
+        let (leaves, roots) = (leaves.as_mut_ptr(), roots.as_mut_ptr());
         let copy = raw::PetscCopyMode::PETSC_COPY_VALUES;
         // SAFETY: a fresh handle; both arrays have as many values as there are ghosts and are copied.
         unsafe {
             let create = |handle| raw::PetscSFCreate(world(), handle);
             let handle = Handle::new(raw::PetscSFDestroy, create)?;
-            check(raw::PetscSFSetGraph(
-                handle.raw(),
-                owned as i32,
-                ghosts.len() as i32,
-                leaves.as_mut_ptr(),
-                copy,
-                roots.as_mut_ptr(),
-                copy,
-            ))?;
+            let sf = handle.raw();
+            check(raw::PetscSFSetGraph(sf, owned, count, leaves, copy, roots, copy))?;
             Ok(Self { handle, length })
         }
     }
@@ -52,25 +52,17 @@ impl Ghosts {
     pub(crate) fn update(&self, field: &mut [f64], block: usize) -> Result<(), PetscError> {
         same_size(block * self.length, field.len())?;
         let mut unit = ptr::null_mut();
-        let data = field.as_mut_ptr().cast::<c_void>();
+        let (sf, data) = (self.handle.raw(), field.as_mut_ptr().cast::<c_void>());
+        let replace = predefined(&raw const raw::ompi_mpi_op_replace);
         // SAFETY: the field has `block` numbers for each of the graph's values; owned ones are
         // read and ghosts written, which are apart. PETSc copies the data type if it keeps it.
         unsafe {
             raw::MPI_Type_contiguous(block as i32, double(), &mut unit);
             raw::MPI_Type_commit(&mut unit);
-            let replace = (&raw const raw::ompi_mpi_op_replace).cast_mut().cast();
-            let mut code = raw::PetscSFBcastBegin(self.handle.raw(), unit, data, data, replace);
-            if code == 0 {
-                code = raw::PetscSFBcastEnd(self.handle.raw(), unit, data, data, replace);
-            }
+            let updated = check(raw::PetscSFBcastBegin(sf, unit, data, data, replace))
+                .and_then(|()| check(raw::PetscSFBcastEnd(sf, unit, data, data, replace)));
             raw::MPI_Type_free(&mut unit);
-            check(code)
+            updated
         }
-    }
-}
-
-impl fmt::Debug for Ghosts {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.debug_struct("Ghosts").field("length", &self.length).finish_non_exhaustive()
     }
 }

@@ -6,21 +6,18 @@ use std::{
     sync::atomic::{AtomicUsize, Ordering},
 };
 
-/// The number of handles that are not yet dropped.
-static OPEN_HANDLES: AtomicUsize = AtomicUsize::new(0);
-
 /// The number of PETSc's objects that still have an owner.
-pub(super) fn open_handles() -> usize {
-    OPEN_HANDLES.load(Ordering::Relaxed)
-}
+pub(super) static OPEN_HANDLES: AtomicUsize = AtomicUsize::new(0);
 
 /// PETSc's function that gives up one reference to an object and sets the pointer to null.
-pub(super) type Destroy<T> = unsafe extern "C" fn(*mut *mut T) -> raw::PetscErrorCode;
+type Destroy<T> = unsafe extern "C" fn(*mut *mut T) -> raw::PetscErrorCode;
 
-/// One reference to a PETSc object, given up when this is dropped.
+/// A reference to a PETSc object, given up when this is dropped.
+#[derive(Debug)]
 pub(super) struct Handle<T> {
     raw: *mut T,
-    destroy: Destroy<T>,
+    /// `None` where the reference is somebody else's.
+    destroy: Option<Destroy<T>>,
 }
 
 impl<T> Handle<T> {
@@ -32,21 +29,12 @@ impl<T> Handle<T> {
         let mut raw = ptr::null_mut();
         check(create(&mut raw))?;
         OPEN_HANDLES.fetch_add(1, Ordering::Relaxed);
-        Ok(Self { raw, destroy })
+        Ok(Self { raw, destroy: Some(destroy) })
     }
 
-    /// A further reference to an object that PETSc passes to a callback (PetscObjectReference).
-    ///
-    /// # Safety
-    /// `raw` is a live object of the kind that `destroy` destroys.
-    pub(super) unsafe fn shared(raw: *mut T, destroy: Destroy<T>) -> Result<Self, PetscError> {
-        Self::new(destroy, |handle| {
-            // SAFETY: the caller's promise; every PETSc object begins with a PetscObject.
-            unsafe {
-                *handle = raw;
-                raw::PetscObjectReference(raw.cast())
-            }
-        })
+    /// An object that PETSc lends to a callback.
+    pub(super) fn borrowed(raw: *mut T) -> Self {
+        Self { raw, destroy: None }
     }
 
     /// The pointer that PETSc's functions take.
@@ -57,8 +45,10 @@ impl<T> Handle<T> {
 
 impl<T> Drop for Handle<T> {
     fn drop(&mut self) {
-        // SAFETY: the reference is ours and not used afterwards; an error cannot be acted on here.
-        unsafe { (self.destroy)(&mut self.raw) };
-        OPEN_HANDLES.fetch_sub(1, Ordering::Relaxed);
+        if let Some(destroy) = self.destroy {
+            // SAFETY: the reference is ours and not used afterwards; an error cannot be acted on here.
+            unsafe { destroy(&mut self.raw) };
+            OPEN_HANDLES.fetch_sub(1, Ordering::Relaxed);
+        }
     }
 }

@@ -2,14 +2,19 @@
 //! (<https://petsc.org/release/manualpages/Mat/>).
 
 use super::{
-    PetscError, Session, Vector, check, handle::Handle, raw, session::world, vector::same_size,
+    PetscError, Session, Vector, check,
+    handle::Handle,
+    raw,
+    session::world,
+    vector::{index, same_size},
 };
-use std::{mem::MaybeUninit, ops::Range, ptr, slice};
+use std::{ops::Range, ptr, slice};
 
 /// A square sparse matrix, rows distributed by ownership, filled through a COO pattern.
 pub struct Matrix {
     handle: Handle<raw::_p_Mat>,
-    owned: usize,
+    /// The global indices of the owned rows.
+    rows: Range<i32>,
     /// Positions in the COO pattern; 0 for a copy, which has none.
     positions: usize,
 }
@@ -29,41 +34,38 @@ impl Matrix {
         mut columns: Vec<i32>,
     ) -> Result<Self, PetscError> {
         same_size(rows.len(), columns.len())?;
-        let local = i32::try_from(owned)
-            .map_err(|_| PetscError::ours(format!("{owned} rows exceed 32-bit indices")))?;
-        let positions = rows.len();
-        // SAFETY: a fresh handle.
-        let create = |handle| unsafe { raw::MatCreate(world(), handle) };
-        let matrix = Self { handle: Handle::new(raw::MatDestroy, create)?, owned, positions };
-        // SAFETY: the index arrays have `positions` values each (PETSc may reorder them, they are
-        // ours) and PETSc checks them against the sizes here.
+        let (local, block, positions) = (index(owned)?, block as i32, rows.len());
+        let (rows, columns) = (rows.as_mut_ptr(), columns.as_mut_ptr());
+        // SAFETY: a fresh handle; the index arrays have `positions` values each (PETSc may reorder
+        // them, they are ours) and PETSc checks them against the sizes here.
         unsafe {
-            check(raw::MatSetSizes(matrix.raw(), local, local, -1, -1))?;
-            check(raw::MatSetBlockSize(matrix.raw(), block as i32))?;
-            check(raw::MatSetType(matrix.raw(), c"aij".as_ptr()))?;
-            check(raw::MatSetPreallocationCOO(
-                matrix.raw(),
-                positions as isize,
-                rows.as_mut_ptr(),
-                columns.as_mut_ptr(),
-            ))?;
+            let handle = Handle::new(raw::MatDestroy, |handle| raw::MatCreate(world(), handle))?;
+            let matrix = handle.raw();
+            check(raw::MatSetSizes(matrix, local, local, -1, -1))?;
+            check(raw::MatSetBlockSize(matrix, block))?;
+            check(raw::MatSetType(matrix, c"aij".as_ptr()))?;
+            check(raw::MatSetPreallocationCOO(matrix, positions as isize, rows, columns))?;
             for option in [raw::MatOption::MAT_SYMMETRIC, raw::MatOption::MAT_SYMMETRY_ETERNAL] {
-                check(raw::MatSetOption(matrix.raw(), option, raw::PetscBool::PETSC_TRUE))?;
+                check(raw::MatSetOption(matrix, option, raw::PetscBool::PETSC_TRUE))?;
             }
+            Self::new(handle, positions)
         }
-        Ok(matrix)
+    }
+
+    /// The rows that this rank owns are told by PETSc (MatGetOwnershipRange).
+    fn new(handle: Handle<raw::_p_Mat>, positions: usize) -> Result<Self, PetscError> {
+        let mut rows = 0..0;
+        // SAFETY: a live handle.
+        check(unsafe { raw::MatGetOwnershipRange(handle.raw(), &mut rows.start, &mut rows.end) })?;
+        Ok(Self { handle, rows, positions })
     }
 
     /// A matrix that PETSc passes to a callback; its values cannot be set.
     ///
     /// # Safety
-    /// `raw` is a live matrix.
-    pub(super) unsafe fn shared(raw: raw::Mat) -> Result<Self, PetscError> {
-        // SAFETY: the caller's promise.
-        let handle = unsafe { Handle::shared(raw, raw::MatDestroy)? };
-        let mut matrix = Self { handle, owned: 0, positions: 0 };
-        matrix.owned = matrix.rows()?.len();
-        Ok(matrix)
+    /// `raw` is a live matrix for as long as it is used.
+    pub(super) unsafe fn borrowed(raw: raw::Mat) -> Result<Self, PetscError> {
+        Self::new(Handle::borrowed(raw), 0)
     }
 
     pub(super) fn raw(&self) -> raw::Mat {
@@ -87,9 +89,7 @@ impl Matrix {
     /// # Errors
     /// Sizes differ.
     pub fn multiply(&self, x: &Vector, y: &mut Vector) -> Result<(), PetscError> {
-        same_size(self.owned, x.owned())?;
-        same_size(self.owned, y.owned())?;
-        // SAFETY: three live handles of matching layout, `x` and `y` distinct by borrowing.
+        // SAFETY: live handles, `x` and `y` distinct by borrowing; PETSc compares their sizes.
         check(unsafe { raw::MatMult(self.raw(), x.raw(), y.raw()) })
     }
 
@@ -111,7 +111,7 @@ impl Matrix {
                 check(raw::MatSetNearNullSpace(handle.raw(), space))?;
             }
         }
-        Ok(Self { handle, owned: self.owned, positions: 0 })
+        Self::new(handle, 0)
     }
 
     /// A copy scaled by `factor`, then with `shift` added to its diagonal (MatScale, MatShift).
@@ -130,25 +130,22 @@ impl Matrix {
     /// # Errors
     /// Sizes differ.
     pub fn copy(&mut self, other: &Self) -> Result<(), PetscError> {
-        same_size(self.owned, other.owned)?;
         let pattern = raw::MatStructure::SAME_NONZERO_PATTERN;
-        // SAFETY: live handles, distinct by borrowing; PETSc compares the patterns' sizes.
+        // SAFETY: live handles, distinct by borrowing; PETSc compares their sizes and patterns.
         check(unsafe { raw::MatCopy(other.raw(), self.raw(), pattern) })
     }
 
     /// this ← this + `factor` · `other`, which has the same pattern (MatAXPY).
     pub(crate) fn add(&mut self, factor: f64, other: &Self) -> Result<(), PetscError> {
-        same_size(self.owned, other.owned)?;
         let pattern = raw::MatStructure::SAME_NONZERO_PATTERN;
-        // SAFETY: live handles, distinct by borrowing; PETSc compares the patterns' sizes.
+        // SAFETY: live handles, distinct by borrowing; PETSc compares their sizes and patterns.
         check(unsafe { raw::MatAXPY(self.raw(), factor, other.raw(), pattern) })
     }
 
     /// Adds `diagonal` (owned entries) to the diagonal (MatDiagonalSet).
     pub(crate) fn add_diagonal(&mut self, diagonal: &Vector) -> Result<(), PetscError> {
-        same_size(self.owned, diagonal.owned())?;
         let add = raw::InsertMode::ADD_VALUES;
-        // SAFETY: live handles of matching layout.
+        // SAFETY: live handles; PETSc compares their sizes.
         check(unsafe { raw::MatDiagonalSet(self.raw(), diagonal.raw(), add) })
     }
 
@@ -162,8 +159,8 @@ impl Matrix {
         unknowns: &[usize],
         diagonal: f64,
     ) -> Result<(), PetscError> {
-        let first = self.rows()?.start;
-        let rows: Vec<i32> = unknowns.iter().map(|&unknown| first + unknown as i32).collect();
+        let row = |&unknown| self.rows.start + unknown as i32;
+        let rows: Vec<i32> = unknowns.iter().map(row).collect();
         let (count, unused) = (rows.len() as i32, ptr::null_mut());
         // SAFETY: a live handle and `count` global indices; no right-hand side is to be adapted.
         check(unsafe {
@@ -176,10 +173,9 @@ impl Matrix {
     pub(crate) fn set_near_null_space(&mut self, fields: Vec<Vector>) -> Result<(), PetscError> {
         let mut basis: Vec<Vector> = Vec::new();
         for mut field in fields {
-            same_size(self.owned, field.owned())?;
             let size = field.norm()?;
             for earlier in &basis {
-                field.add(-field.dot(earlier)?, earlier)?;
+                field.axpby(-field.dot(earlier)?, earlier, 1.0)?;
             }
             let norm = field.norm()?;
             if norm > 1e-8 * size {
@@ -197,12 +193,9 @@ impl Matrix {
         check(unsafe { raw::MatSetNearNullSpace(self.raw(), space.raw()) })
     }
 
-    /// The global indices of the owned rows (MatGetOwnershipRange).
-    pub(crate) fn rows(&self) -> Result<Range<i32>, PetscError> {
-        let mut rows = 0..0;
-        // SAFETY: a live handle.
-        check(unsafe { raw::MatGetOwnershipRange(self.raw(), &mut rows.start, &mut rows.end) })?;
-        Ok(rows)
+    /// The global indices of the owned rows.
+    pub(crate) fn rows(&self) -> Range<i32> {
+        self.rows.clone()
     }
 
     /// The number of rows of all ranks together (MatGetSize).
@@ -237,25 +230,20 @@ impl Matrix {
 
     /// Entries that this rank stores (MatGetInfo).
     pub fn entries(&self) -> f64 {
-        let mut info = MaybeUninit::<raw::MatInfo>::zeroed();
-        // SAFETY: a live handle; zeros are numbers, and PETSc fills them.
-        unsafe {
-            let kind = raw::MatInfoType::MAT_LOCAL;
-            match check(raw::MatGetInfo(self.raw(), kind, info.as_mut_ptr())) {
-                Ok(()) => info.assume_init().nz_used,
-                Err(_) => 0.0,
-            }
-        }
+        let (local, mut info) = (raw::MatInfoType::MAT_LOCAL, raw::MatInfo::default());
+        // SAFETY: a live handle; were there no answer, the numbers would stay 0.
+        unsafe { raw::MatGetInfo(self.raw(), local, &mut info) };
+        info.nz_used
     }
 
     /// Bytes that this rank reads and writes in a product: value and column of each entry, 12 bytes;
     /// the beginning of each row, x and y, 20 bytes.
     pub fn bytes_per_product(&self) -> f64 {
-        12.0 * self.entries() + 20.0 * self.owned as f64
+        12.0 * self.entries() + 20.0 * self.owned() as f64
     }
 
     /// Number of rows this rank owns.
     pub fn owned(&self) -> usize {
-        self.owned
+        self.rows.len()
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! `raw` holds the C names one to one (bindgen, an explicit list in `build.rs`). The other files
 //! are small owners above them: every call's error code becomes a [`PetscError`] with PETSc's own
-//! message, every object is destroyed when its owner is dropped, and sizes are checked here because
-//! PETSc does not. A C name in parentheses has its page under
+//! message, every object is destroyed when its owner is dropped, and sizes of arrays are checked here;
+//! those of its own objects PETSc checks. A C name in parentheses has its page under
 //! <https://petsc.org/release/manualpages/>.
 //!
 //! All objects live on `PETSC_COMM_WORLD`; sizes and slices are those owned by this rank.
@@ -18,7 +18,6 @@ mod matrix;
 mod options;
 mod preconditioner;
 mod session;
-mod shell;
 mod tao;
 mod vector;
 
@@ -45,7 +44,6 @@ pub(crate) use ghosts::Ghosts;
 pub(crate) use graph::divide;
 pub(crate) use options::{has_option, set_default_option};
 pub(crate) use preconditioner::Preconditioner;
-pub(crate) use shell::ShellPreconditioner;
-pub(crate) use tao::{BoundedQuadratic, TaoReport};
+pub(crate) use tao::{BoundedQuadratic, ShellPreconditioner, TaoReport};
 
 use error::check;

@@ -1,67 +1,52 @@
-//! PETSc's options database, of which a null pointer means the global one.
+//! PETSc's options database, of which a null pointer means the global one. A session exists.
 
 use super::{PetscError, check, raw};
 use std::{
     ffi::{CStr, CString},
     ptr,
-    sync::{Mutex, PoisonError},
 };
-
-/// Options that we have set ourselves: it is not the user's fault if nothing reads them.
-static DEFAULTS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
 /// Adds options as on a command line (PetscOptionsInsertString).
 pub(super) fn insert(options: &[String]) -> Result<(), PetscError> {
     let line = c_string(&options.join(" "))?;
-    // SAFETY: a session exists, the string lives during the call.
+    // SAFETY: the string lives during the call.
     check(unsafe { raw::PetscOptionsInsertString(ptr::null_mut(), line.as_ptr()) })
 }
 
-/// Whether an option is set (PetscOptionsHasName).
+/// Whether an option is set, which counts as reading it (PetscOptionsHasName).
 pub(crate) fn has_option(name: &str) -> Result<bool, PetscError> {
-    let name = c_string(name)?;
+    let (name, all) = (c_string(name)?, ptr::null_mut());
     let mut given = raw::PetscBool::PETSC_FALSE;
-    // SAFETY: a session exists, the string lives during the call.
-    check(unsafe {
-        raw::PetscOptionsHasName(ptr::null_mut(), ptr::null(), name.as_ptr(), &mut given)
-    })?;
+    // SAFETY: the string lives during the call.
+    check(unsafe { raw::PetscOptionsHasName(all, ptr::null(), name.as_ptr(), &mut given) })?;
     Ok(given == raw::PetscBool::PETSC_TRUE)
 }
 
-/// Sets an option unless the user has given it; our own earlier default is replaced
-/// (PetscOptionsSetValue).
+/// Sets an option unless it is set (PetscOptionsSetValue).
 pub(crate) fn set_default_option(name: &str, value: &str) -> Result<(), PetscError> {
-    let mut defaults = DEFAULTS.lock().unwrap_or_else(PoisonError::into_inner);
-    let ours = defaults.iter().any(|known| known == name);
-    if !ours && has_option(name)? {
+    if has_option(name)? {
         return Ok(());
     }
     let (c_name, value) = (c_string(name)?, c_string(value)?);
-    // SAFETY: a session exists, the strings live during the call.
+    // SAFETY: the strings live during the call.
     check(unsafe { raw::PetscOptionsSetValue(ptr::null_mut(), c_name.as_ptr(), value.as_ptr()) })?;
-    if !ours {
-        defaults.push(name.to_owned());
-    }
-    Ok(())
+    // Now it counts as read: it is not the user's fault if nothing else reads our default.
+    has_option(name).map(drop)
 }
 
-/// Options that nothing has read, our own defaults left out (PetscOptionsLeftGet).
+/// Options that nothing has read (PetscOptionsLeftGet).
 pub(super) fn unused() -> Vec<String> {
     let (mut count, mut names, mut values) = (0, ptr::null_mut(), ptr::null_mut());
-    let mut unused = Vec::new();
+    let (mut unused, all) = (Vec::new(), ptr::null_mut());
     // SAFETY: PETSc fills `count` names that stay valid until they are given back.
     unsafe {
-        let database = ptr::null_mut();
-        if raw::PetscOptionsLeftGet(database, &mut count, &mut names, &mut values) == 0 {
+        if raw::PetscOptionsLeftGet(all, &mut count, &mut names, &mut values) == 0 {
             for i in 0..count as usize {
-                let name = CStr::from_ptr(*names.add(i)).to_string_lossy();
-                unused.push(format!("-{name}"));
+                unused.push(format!("-{}", CStr::from_ptr(*names.add(i)).to_string_lossy()));
             }
-            raw::PetscOptionsLeftRestore(database, &mut count, &mut names, &mut values);
+            raw::PetscOptionsLeftRestore(all, &mut count, &mut names, &mut values);
         }
     }
-    let defaults = DEFAULTS.lock().unwrap_or_else(PoisonError::into_inner);
-    unused.retain(|name| name != "-no_signal_handler" && !defaults.contains(name));
     unused
 }
 

@@ -2,7 +2,6 @@
 
 use super::{
     Matrix, PetscError, Vector, check, handle::Handle, options::c_string, raw, session::world,
-    vector::same_size,
 };
 use std::{
     ffi::{CStr, c_int},
@@ -77,8 +76,7 @@ impl Preconditioner {
 
     /// `z` ← P⁻¹ `r` (PCApply).
     pub(crate) fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
-        same_size(r.owned(), z.owned())?;
-        // SAFETY: live handles of matching layout, distinct by borrowing.
+        // SAFETY: live handles, distinct by borrowing; PETSc compares their sizes.
         check(unsafe { raw::PCApply(self.handle.raw(), r.raw(), z.raw()) })
     }
 }

@@ -1,11 +1,14 @@
 //! Starting and ending PETSc (PetscInitialize, PetscFinalize).
 
-use super::{Communicator, PetscError, check, error, handle, options, options::c_string, raw};
+use super::{
+    Communicator, PetscError, check, error::keep_message, handle::OPEN_HANDLES, options,
+    options::c_string, raw,
+};
 use std::{
     env,
     ffi::{CString, c_char, c_int},
     ptr,
-    sync::{Mutex, MutexGuard, PoisonError},
+    sync::{Mutex, MutexGuard, PoisonError, atomic::Ordering},
 };
 
 /// PETSc is not thread-safe: whoever holds this lock may call it.
@@ -57,7 +60,7 @@ impl Session {
     /// # Errors
     /// Objects made from this session still have an owner, or PETSc fails to finalize.
     pub fn finalize(self) -> Result<(), PetscError> {
-        match handle::open_handles() {
+        match OPEN_HANDLES.load(Ordering::Relaxed) {
             // SAFETY: nothing of PETSc is in use any more.
             0 => check(unsafe { raw::PetscFinalize() }),
             n => Err(PetscError::ours(format!("{n} PETSc objects outlive their session"))),
@@ -132,7 +135,7 @@ fn initialize(options: &[String]) -> Result<(), PetscError> {
     temporary.into_iter().for_each(|name| unsafe { env::remove_var(name) });
     started?;
     // SAFETY: PETSc runs; the handler needs no context.
-    check(unsafe { raw::PetscPushErrorHandler(Some(error::keep_message), ptr::null_mut()) })
+    check(unsafe { raw::PetscPushErrorHandler(Some(keep_message), ptr::null_mut()) })
 }
 
 /// `PETSC_COMM_WORLD`.

@@ -1,12 +1,13 @@
 //! TAO on a quadratic function with bounds (<https://petsc.org/release/manualpages/Tao/>).
 
 use super::{
-    Matrix, PetscError, Session, ShellPreconditioner, Vector, check,
+    Matrix, PetscError, Session, Vector, check,
+    error::return_code,
     handle::Handle,
     options::{c_string, set_default_option},
+    preconditioner::NOT_DEFINITE,
     raw,
     session::world,
-    shell,
     vector::same_size,
 };
 use std::{ffi::c_void, ptr};
@@ -14,10 +15,8 @@ use std::{ffi::c_void, ptr};
 /// Minimises ½ xᵀKx − fᵀx over lower ≤ x ≤ upper with one of TAO's methods.
 ///
 /// PETSc options without a prefix reach it: `-tao_type bnls`, `-tao_monitor`, `-ksp_type …`.
-pub(crate) struct BoundedQuadratic<P> {
-    // Destroyed in this order: the Tao uses the preconditioner.
+pub(crate) struct BoundedQuadratic {
     tao: Handle<raw::_p_Tao>,
-    preconditioner: Option<Box<P>>,
     gradient: Vector,
 }
 
@@ -28,28 +27,35 @@ pub(crate) struct TaoReport {
     pub(crate) iterations: usize,
     /// Iterations of the linear solver inside.
     pub(crate) linear_iterations: usize,
-    /// Factorisations inside; methods with another preconditioner do none.
-    pub(crate) factorisations: usize,
     /// TaoConvergedReason: positive when TAO believes it has converged.
     pub(crate) reason: i32,
 }
 
-/// What the callbacks need: ½ xᵀKx − fᵀx.
-struct Quadratic {
-    k: raw::Mat,
-    f: raw::Vec,
+/// What TAO's Newton methods call where they would call a preconditioner of PETSc (PCSHELL).
+pub(crate) trait ShellPreconditioner {
+    /// The operator is now `matrix`, or has other values; false if it is not positive definite.
+    fn set_up(&mut self, matrix: &Matrix) -> Result<bool, PetscError>;
+
+    /// `z` ← P⁻¹ `r`.
+    fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError>;
 }
 
-impl<P: ShellPreconditioner> BoundedQuadratic<P> {
-    /// TAO's `method` (`tron`, `bnls`, …) for `size` unknowns on this rank.
+/// What the callbacks need, during a call of TAO.
+struct Problem<'a, P> {
+    k: &'a Matrix,
+    f: &'a Vector,
+    preconditioner: &'a mut P,
+}
+
+impl BoundedQuadratic {
+    /// TAO's `method` (`tron`, `bnls`, …) for `size` unknowns on this rank, with preconditioners P.
     ///
     /// Its Newton systems are solved by Steihaug's conjugate gradients (KSPSTCG), which take the
-    /// whole step unless the trust region cuts it, with the preconditioner that `precondition` makes.
-    pub(crate) fn new(
+    /// whole step unless the trust region cuts it.
+    pub(crate) fn new<P: ShellPreconditioner>(
         session: &Session,
         method: &str,
         size: usize,
-        precondition: impl FnOnce() -> P,
     ) -> Result<Self, PetscError> {
         // tron reads the first prefix, the bounded Newton family (bnls, …) the second.
         for prefix in ["-ksp_", "-tao_bnk_ksp_"] {
@@ -59,106 +65,92 @@ impl<P: ShellPreconditioner> BoundedQuadratic<P> {
         // Systems of the full size whatever is active, so that a factor fits the next one.
         set_default_option("-tao_subset_type", "mask")?;
         let c_method = c_string(method)?;
-        // SAFETY: a fresh handle.
-        let create = |handle| unsafe { raw::TaoCreate(world(), handle) };
-        let tao = Handle::new(raw::TaoDestroy, create)?;
         // The quasi-Newton Krylov methods' Hessian is an approximation without entries, which
         // nothing can factorise; they bring their own preconditioner.
         let quasi_newton = method.starts_with("bqnk");
-        let preconditioner = (!quasi_newton).then(|| Box::new(precondition()));
-        let gradient = Vector::zeros(session, size)?;
-        let mut this = Self { tao, preconditioner, gradient };
-        let tao = this.tao.raw();
         let (mut ksp, mut pc) = (ptr::null_mut(), ptr::null_mut());
-        // SAFETY: live handles; the preconditioner lives as long as the Tao.
+        // SAFETY: a fresh handle, then live ones; the string lives during the calls.
         unsafe {
+            let handle = Handle::new(raw::TaoDestroy, |handle| raw::TaoCreate(world(), handle))?;
+            let tao = handle.raw();
             check(raw::TaoSetType(tao, c_method.as_ptr()))?;
             check(raw::TaoGetKSP(tao, &mut ksp))?;
-            if let (Some(preconditioner), false) = (&mut this.preconditioner, ksp.is_null()) {
+            if !quasi_newton && !ksp.is_null() {
                 check(raw::KSPGetPC(ksp, &mut pc))?;
-                shell::attach(preconditioner, pc)?;
+                check(raw::PCSetType(pc, c"shell".as_ptr()))?;
+                check(raw::PCShellSetSetUp(pc, Some(set_up::<P>)))?;
+                check(raw::PCShellSetApply(pc, Some(apply::<P>)))?;
             }
             check(raw::TaoSetMaximumIterations(tao, 200))?;
             check(raw::TaoSetFromOptions(tao))?;
+            Ok(Self { tao: handle, gradient: Vector::zeros(session, size)? })
         }
-        Ok(this)
     }
 
     /// Minimises from the start `x` until the gradient is about `limit` in ‖·‖₂, and leaves the
     /// minimiser there; bounds may be ±infinite. That TAO did not converge is no error but a negative
     /// `reason`.
-    pub(crate) fn minimise(
+    pub(crate) fn minimise<P: ShellPreconditioner>(
         &mut self,
         k: &Matrix,
         f: &Vector,
         [lower, upper]: [&Vector; 2],
         x: &mut Vector,
         limit: f64,
+        preconditioner: &mut P,
     ) -> Result<TaoReport, PetscError> {
-        let own = self.gradient.owned();
         for size in [k.owned(), f.owned(), lower.owned(), upper.owned(), x.owned()] {
-            same_size(own, size)?;
+            same_size(self.gradient.owned(), size)?;
         }
-        let tao = self.tao.raw();
-        let mut quadratic = Quadratic { k: k.raw(), f: f.raw() };
-        let context = ptr::from_mut(&mut quadratic).cast::<c_void>();
+        let (tao, gradient) = (self.tao.raw(), self.gradient.raw());
+        let mut problem = Problem { k, f, preconditioner };
+        let context = ptr::from_mut(&mut problem).cast::<c_void>();
         let (mut iterations, mut linear, mut reason) = (0, 0, 0);
-        let mut ksp = ptr::null_mut();
-        let factorisations = || self.preconditioner.as_ref().map_or(0, |p| p.factorisations());
-        let before = factorisations();
-        let unused = ptr::null_mut();
+        let (mut ksp, mut pc, unused) = (ptr::null_mut(), ptr::null_mut(), ptr::null_mut());
         // SAFETY: live handles of matching layout; the context outlives the solve, in which
         // alone the callbacks run.
         unsafe {
             check(raw::TaoSetSolution(tao, x.raw()))?;
             check(raw::TaoSetVariableBounds(tao, lower.raw(), upper.raw()))?;
-            let gradient = self.gradient.raw();
-            check(raw::TaoSetObjectiveAndGradient(tao, gradient, Some(evaluate), context))?;
+            check(raw::TaoSetObjectiveAndGradient(tao, gradient, Some(evaluate::<P>), context))?;
             check(raw::TaoSetHessian(tao, k.raw(), k.raw(), Some(keep_hessian), unused))?;
             check(raw::TaoSetTolerances(tao, limit, 1e-13, 0.0))?;
             check(raw::TaoGetKSP(tao, &mut ksp))?;
             if !ksp.is_null() {
                 check(raw::KSPSetTolerances(ksp, 1e-12, 0.5 * limit, f64::MAX, 200))?;
+                check(raw::KSPGetPC(ksp, &mut pc))?;
+                // Options may have asked for another preconditioner, which ignores this.
+                check(raw::PCShellSetContext(pc, context))?;
             }
             check(raw::TaoSolve(tao))?;
             check(raw::TaoGetIterationNumber(tao, &mut iterations))?;
             check(raw::TaoGetConvergedReason(tao, &mut reason))?;
             check(raw::TaoGetLinearSolveIterations(tao, &mut linear))?;
         }
-        Ok(TaoReport {
-            iterations: iterations as usize,
-            linear_iterations: linear as usize,
-            factorisations: factorisations() - before,
-            reason,
-        })
+        let (iterations, linear_iterations) = (iterations as usize, linear as usize);
+        Ok(TaoReport { iterations, linear_iterations, reason })
     }
 }
 
 /// Value ½ xᵀKx − fᵀx and gradient Kx − f; with g the gradient, the value is ½ (g − f)ᵀx.
-unsafe extern "C" fn evaluate(
+unsafe extern "C" fn evaluate<P>(
     _tao: raw::Tao,
     x: raw::Vec,
     value: *mut f64,
     gradient: raw::Vec,
     context: *mut c_void,
 ) -> raw::PetscErrorCode {
-    // SAFETY: `minimise` passed a Quadratic that lives during the solve; PETSc passes live vectors.
-    unsafe {
-        let quadratic = &*context.cast::<Quadratic>();
-        let (mut gx, mut fx) = (0.0, 0.0);
-        let mut code = raw::MatMult(quadratic.k, x, gradient);
-        if code == 0 {
-            code = raw::VecAXPY(gradient, -1.0, quadratic.f);
-        }
-        if code == 0 {
-            code = raw::VecDot(gradient, x, &mut gx);
-        }
-        if code == 0 {
-            code = raw::VecDot(quadratic.f, x, &mut fx);
-        }
-        *value = 0.5 * (gx - fx);
-        code
-    }
+    let evaluate = || {
+        // SAFETY: `minimise` passed a problem that lives during the solve; PETSc passes live vectors.
+        let (Problem { k, f, .. }, x, mut gradient) = unsafe {
+            (&*context.cast::<Problem<P>>(), Vector::borrowed(x)?, Vector::borrowed(gradient)?)
+        };
+        k.multiply(&x, &mut gradient)?;
+        gradient.axpby(-1.0, f, 1.0)?;
+        Ok(0.5 * (gradient.dot(&x)? - f.dot(&x)?))
+    };
+    // SAFETY: PETSc passes where it wants the value.
+    return_code(evaluate().map(|found| unsafe { *value = found }))
 }
 
 /// The Hessian is K itself, already in place.
@@ -170,4 +162,43 @@ unsafe extern "C" fn keep_hessian(
     _context: *mut c_void,
 ) -> raw::PetscErrorCode {
     0
+}
+
+/// The preconditioner of the problem that `minimise` made the context of `pc`.
+unsafe fn preconditioner<'a, P>(pc: raw::PC) -> Result<&'a mut P, PetscError> {
+    let mut context: *mut c_void = ptr::null_mut();
+    // SAFETY: the caller's promise: `pc` is in a solve of `minimise`, which outlives this.
+    unsafe {
+        check(raw::PCShellGetContext(pc, (&raw mut context).cast()))?;
+        Ok(&mut *(*context.cast::<Problem<P>>()).preconditioner)
+    }
+}
+
+unsafe extern "C" fn set_up<P: ShellPreconditioner>(pc: raw::PC) -> raw::PetscErrorCode {
+    let set_up = || {
+        let mut matrix = ptr::null_mut();
+        // SAFETY: PETSc passes a preconditioner with operators, in a solve.
+        let (shell, matrix) = unsafe {
+            check(raw::PCGetOperators(pc, ptr::null_mut(), &mut matrix))?;
+            (preconditioner::<P>(pc)?, Matrix::borrowed(matrix)?)
+        };
+        let message = || "the matrix is not positive definite".to_owned();
+        let indefinite = || PetscError { code: NOT_DEFINITE, message: message() };
+        shell.set_up(&matrix)?.then_some(()).ok_or_else(indefinite)
+    };
+    return_code(set_up())
+}
+
+unsafe extern "C" fn apply<P: ShellPreconditioner>(
+    pc: raw::PC,
+    r: raw::Vec,
+    z: raw::Vec,
+) -> raw::PetscErrorCode {
+    let apply = || {
+        // SAFETY: PETSc passes two live vectors, in a solve.
+        let (shell, r, mut z) =
+            unsafe { (preconditioner::<P>(pc)?, Vector::borrowed(r)?, Vector::borrowed(z)?) };
+        shell.apply(&r, &mut z)
+    };
+    return_code(apply())
 }

@@ -1,7 +1,7 @@
 //! Vectors distributed by owned entries (<https://petsc.org/release/manualpages/Vec/>).
 
 use super::{PetscError, Session, check, handle::Handle, raw, session::world};
-use std::slice;
+use std::{ptr, slice};
 
 /// A PETSc vector; this rank owns a contiguous part of it.
 pub struct Vector {
@@ -15,8 +15,7 @@ impl Vector {
     /// # Errors
     /// There are too many entries for 32-bit indices, or no memory for them.
     pub fn zeros(_session: &Session, owned: usize) -> Result<Self, PetscError> {
-        let local = i32::try_from(owned)
-            .map_err(|_| PetscError::ours(format!("{owned} entries exceed 32-bit indices")))?;
+        let local = index(owned)?;
         let handle = Handle::new(raw::VecDestroy, |handle| {
             // SAFETY: a fresh handle; -1 (PETSC_DETERMINE) sums the sizes of the ranks.
             unsafe { raw::VecCreateMPI(world(), local, -1, handle) }
@@ -27,14 +26,12 @@ impl Vector {
     /// A vector that PETSc passes to a callback.
     ///
     /// # Safety
-    /// `raw` is a live vector.
-    pub(super) unsafe fn shared(raw: raw::Vec) -> Result<Self, PetscError> {
+    /// `raw` is a live vector for as long as it is used.
+    pub(super) unsafe fn borrowed(raw: raw::Vec) -> Result<Self, PetscError> {
         let mut owned = 0;
         // SAFETY: the caller's promise.
-        unsafe {
-            check(raw::VecGetLocalSize(raw, &mut owned))?;
-            Ok(Self { handle: Handle::shared(raw, raw::VecDestroy)?, owned: owned as usize })
-        }
+        check(unsafe { raw::VecGetLocalSize(raw, &mut owned) })?;
+        Ok(Self { handle: Handle::borrowed(raw), owned: owned as usize })
     }
 
     pub(super) fn raw(&self) -> raw::Vec {
@@ -46,7 +43,7 @@ impl Vector {
     /// # Errors
     /// PETSc failed.
     pub fn read<R>(&self, reader: impl FnOnce(&[f64]) -> R) -> Result<R, PetscError> {
-        let mut data = std::ptr::null();
+        let mut data = ptr::null();
         // SAFETY: PETSc lends `owned` values until they are given back below.
         unsafe {
             check(raw::VecGetArrayRead(self.raw(), &mut data))?;
@@ -61,7 +58,7 @@ impl Vector {
     /// # Errors
     /// PETSc failed.
     pub fn write<R>(&mut self, writer: impl FnOnce(&mut [f64]) -> R) -> Result<R, PetscError> {
-        let mut data = std::ptr::null_mut();
+        let mut data = ptr::null_mut();
         // SAFETY: as in `read`, and `&mut self` keeps other readers away.
         unsafe {
             check(raw::VecGetArray(self.raw(), &mut data))?;
@@ -90,32 +87,16 @@ impl Vector {
 
     /// Inner product over all ranks (VecDot).
     pub(crate) fn dot(&self, other: &Self) -> Result<f64, PetscError> {
-        same_size(self.owned, other.owned)?;
         let mut product = 0.0;
-        // SAFETY: live handles of matching layout.
+        // SAFETY: live handles; PETSc compares their sizes.
         check(unsafe { raw::VecDot(self.raw(), other.raw(), &mut product) })?;
         Ok(product)
     }
 
-    /// this ← this + `factor` · `other` (VecAXPY).
-    pub(crate) fn add(&mut self, factor: f64, other: &Self) -> Result<(), PetscError> {
-        same_size(self.owned, other.owned)?;
-        // SAFETY: live handles of matching layout, distinct by borrowing.
-        check(unsafe { raw::VecAXPY(self.raw(), factor, other.raw()) })
-    }
-
-    /// this ← `factor` · this + `other` (VecAYPX).
-    pub(crate) fn scale_add(&mut self, factor: f64, other: &Self) -> Result<(), PetscError> {
-        same_size(self.owned, other.owned)?;
-        // SAFETY: live handles of matching layout, distinct by borrowing.
-        check(unsafe { raw::VecAYPX(self.raw(), factor, other.raw()) })
-    }
-
-    /// this ← `other` (VecCopy).
-    pub(crate) fn copy(&mut self, other: &Self) -> Result<(), PetscError> {
-        same_size(self.owned, other.owned)?;
-        // SAFETY: live handles of matching layout, distinct by borrowing.
-        check(unsafe { raw::VecCopy(other.raw(), self.raw()) })
+    /// this ← `a` `x` + `b` this; with `b` = 0 whatever this was (VecAXPBY).
+    pub(crate) fn axpby(&mut self, a: f64, x: &Self, b: f64) -> Result<(), PetscError> {
+        // SAFETY: live handles, distinct by borrowing; PETSc compares their sizes.
+        check(unsafe { raw::VecAXPBY(self.raw(), a, b, x.raw()) })
     }
 
     /// Number of entries this rank owns.
@@ -124,7 +105,13 @@ impl Vector {
     }
 }
 
-/// PETSc would read or write beyond the end where sizes differ.
+/// A number of entries as PETSc's integer.
+pub(super) fn index(owned: usize) -> Result<i32, PetscError> {
+    i32::try_from(owned)
+        .map_err(|_| PetscError::ours(format!("{owned} entries exceed 32-bit indices")))
+}
+
+/// Refuses arrays with which PETSc would read or write beyond the end.
 pub(super) fn same_size(expected: usize, found: usize) -> Result<(), PetscError> {
     match expected == found {
         true => Ok(()),

@@ -95,7 +95,7 @@ impl<'s> PenaltyDuality<'s> {
     ) -> Result<(), ContactError> {
         let mut rhs = Vector::zeros(self.session, u.owned())?;
         if let Some(f) = f {
-            rhs.copy(f)?;
+            rhs.axpby(1.0, f, 0.0)?;
         }
         rhs.write(|rhs| {
             problem.bounds.iter().zip(q).for_each(|(b, q)| rhs[b.dof] -= b.tributary_length * q);

@@ -29,7 +29,8 @@ pub const TAO_TYPES: [&str; 12] = [
 struct Tao<'s> {
     session: &'s Session,
     kind: String,
-    tao: Option<BoundedQuadratic<Factor>>,
+    tao: Option<BoundedQuadratic>,
+    factor: Factor,
     /// U of the last solve, m; 0 before the first.
     displacement: f64,
 }
@@ -52,7 +53,8 @@ impl<'s> Tao<'s> {
     /// With TAO's type `kind`, or `tron`.
     fn new(session: &'s Session, kind: &str) -> Self {
         let kind = if kind.is_empty() { "tron" } else { kind }.to_owned();
-        Self { session, kind, tao: None, displacement: 0.0 }
+        let factor = Factor::new(session, "elastic_", Precision::Preconditioner);
+        Self { session, kind, tao: None, factor, displacement: 0.0 }
     }
 }
 
@@ -76,9 +78,7 @@ impl ContactSolver for Tao<'_> {
     ) -> Result<ContactReport, ContactError> {
         let tao = match self.tao.take() {
             Some(tao) => tao,
-            None => BoundedQuadratic::new(self.session, &self.kind, c.owned(), || {
-                Factor::new(self.session, "elastic_", Precision::Preconditioner)
-            })?,
+            None => BoundedQuadratic::new::<Factor>(self.session, &self.kind, c.owned())?,
         };
         let tao = self.tao.insert(tao);
         let method = || format!("tao:{}", self.kind);
@@ -92,12 +92,14 @@ impl ContactSolver for Tao<'_> {
         let (mut best, mut stalled) = (f64::INFINITY, 0);
         for _ in 0..if problem.definite() { CALLS } else { PROXIMAL_CALLS } {
             scaled.set(problem, c, unit)?;
+            let limit = problem.linear_residual() / (problem.stiffness_scale * unit);
+            let factorisations = self.factor.factorisations();
             let answer = scaled
-                .minimise(tao, problem.linear_residual() / (problem.stiffness_scale * unit))
+                .minimise(tao, &mut self.factor, limit)
                 .map_err(|source| ContactError::Failed { method: method(), source })?;
             report.iterations += answer.iterations;
             report.linear_iterations += answer.linear_iterations;
-            report.factorisations += answer.factorisations;
+            report.factorisations += self.factor.factorisations() - factorisations;
             reason = answer.reason;
             c.write(|c| scaled.x.read(|x| c.iter_mut().zip(x).for_each(|(c, x)| *c = x * unit)))??;
             let found = problem.max_norm(&scaled.x)? * unit;
@@ -189,9 +191,11 @@ impl Scaled {
     /// Minimises with TAO until the gradient is about `limit` in ‖·‖₂.
     fn minimise(
         &mut self,
-        tao: &mut BoundedQuadratic<Factor>,
+        tao: &mut BoundedQuadratic,
+        factor: &mut Factor,
         limit: f64,
     ) -> Result<TaoReport, PetscError> {
-        tao.minimise(&self.stiffness, &self.load, self.bounds.each_ref(), &mut self.x, limit)
+        let bounds = self.bounds.each_ref();
+        tao.minimise(&self.stiffness, &self.load, bounds, &mut self.x, limit, factor)
     }
 }
