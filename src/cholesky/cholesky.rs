@@ -1,9 +1,9 @@
 //! Cholesky factors of matrices that one rank has.
 
 use super::{
-    LowerTriangle, TriangularSolver,
+    LowerTriangle,
     cholmod::Cholmod,
-    supernodal::{Structure, Supernodal, Supernode},
+    supernodal::{Supernodal, TriangularSolver},
 };
 use crate::petsc::PetscError;
 use nalgebra::DMatrix;
@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 /// The factor P A Pᵀ = L Lᵀ of a sparse symmetric positive definite matrix, supernodal.
 ///
 /// CHOLMOD orders and factorises. The triangular solves are our own: they read L twice as fast, in
-/// half the bytes where single precision is enough, and the forward and the backward solve are apart,
+/// half the bytes where single precision is enough, and stop between the forward and the backward solve,
 /// which the Schur complement of an interface needs.
 pub struct Cholesky {
     factor: Cholmod,
@@ -54,9 +54,11 @@ impl Cholesky {
         interface: usize,
         precision: Precision,
     ) -> Result<Self, PetscError> {
-        let interior = a.size() - interface;
-        let factor = Cholmod::analyse(a, order)?;
-        let solver = triangular_solver(&factor, interior, precision);
+        let (factor, interior) = (Cholmod::analyse(a, order)?, a.size() - interface);
+        let solver: Box<dyn TriangularSolver> = match precision {
+            Precision::Preconditioner => Box::new(Supernodal::<f32>::new(&factor, interior)),
+            Precision::Full => Box::new(Supernodal::<f64>::new(&factor, interior)),
+        };
         Ok(Self { factor, precision, interior, solver })
     }
 
@@ -72,7 +74,7 @@ impl Cholesky {
         self.solver.set_values(self.factor.values());
         if self.precision == Precision::Preconditioner && !self.is_accurate_enough(a) {
             self.precision = Precision::Full;
-            self.solver = triangular_solver(&self.factor, self.interior, self.precision);
+            self.solver = Box::new(Supernodal::<f64>::new(&self.factor, self.interior));
             self.solver.set_values(self.factor.values());
         }
         let block = self.interface_block();
@@ -85,9 +87,7 @@ impl Cholesky {
     fn is_accurate_enough(&mut self, a: &LowerTriangle) -> bool {
         let load: Vec<f64> = (0..a.size()).map(|i| 1.0 + (i as f64).sin()).collect();
         let mut x = vec![0.0; load.len()];
-        self.solver.forward(&load);
-        self.solver.set_interface(&vec![0.0; load.len() - self.interior]);
-        self.solver.backward(&mut x);
+        self.solve(&load, &mut x, |interface| interface.fill(0.0));
         let load = &load[..self.interior];
         let left: f64 = a.multiply(&x).iter().zip(load).map(|(ax, b)| (b - ax).powi(2)).sum();
         left <= LARGEST_RESIDUAL * LARGEST_RESIDUAL * load.iter().map(|b| b * b).sum::<f64>()
@@ -95,16 +95,13 @@ impl Cholesky {
 
     /// L₂₂ of a factor that has values.
     fn interface_block(&self) -> DMatrix<f64> {
-        let (arrays, values, first) = (self.factor.arrays(), self.factor.values(), self.interior);
-        let size = arrays.order.len() - first;
+        let (values, first) = (self.factor.values(), self.interior);
+        let size = self.order().len() - first;
         let mut block = DMatrix::zeros(size, size);
-        for (s, columns) in arrays.starts.windows(2).enumerate() {
-            let (start, end) = (columns[0] as usize, columns[1] as usize);
-            let rows =
-                &arrays.rows[arrays.row_starts[s] as usize..arrays.row_starts[s + 1] as usize];
-            for column in start.max(first)..end {
-                let above = column - start;
-                let values = &values[arrays.value_starts[s] as usize + above * rows.len()..];
+        for (columns, rows, start) in self.factor.supernodes() {
+            for column in columns.start.max(first)..columns.end {
+                let above = column - columns.start;
+                let values = &values[start + above * rows.len()..];
                 for (&row, value) in rows.iter().zip(values).skip(above) {
                     block[(row as usize - first, column - first)] = *value;
                 }
@@ -115,12 +112,19 @@ impl Cholesky {
 
     /// P: the row of A of each row of L.
     pub fn order(&self) -> &[i64] {
-        self.factor.arrays().order
+        self.factor.order()
     }
 
-    /// The triangular solves with L₁₁ and L₂₁.
-    pub fn solver(&mut self) -> &mut dyn TriangularSolver {
-        &mut *self.solver
+    /// The forward and the backward solve with L₁₁ and L₂₁,
+    ///
+    /// ```text
+    /// L = ⎡ L₁₁     ⎤        L₁₁ y₁ = (P b)₁,        y₂ = (P b)₂ − L₂₁ y₁,
+    ///     ⎣ L₂₁ L₂₂ ⎦        L₁₁ᵀ (P x)₁ = y₁ − L₂₁ᵀ (P x)₂;
+    /// ```
+    ///
+    /// in between `interface` replaces y₂ by (P x)₂, also where these have no rows.
+    pub fn solve(&mut self, b: &[f64], x: &mut [f64], mut interface: impl FnMut(&mut [f64])) {
+        self.solver.solve(b, x, &mut interface);
     }
 
     /// The work of a factorisation, in bytes that a solve reads in the same time.
@@ -129,32 +133,8 @@ impl Cholesky {
         BYTES_PER_OPERATION * operations + BYTES_PER_ENTRY * entries
     }
 
-    /// Bytes that a forward and a backward solve read.
+    /// Bytes that a solve reads.
     pub fn bytes(&self) -> f64 {
         self.solver.bytes()
-    }
-}
-
-/// The triangular solves with the first `interior` columns of L, which still lack their values.
-fn triangular_solver(
-    factor: &Cholmod,
-    interior: usize,
-    precision: Precision,
-) -> Box<dyn TriangularSolver> {
-    let arrays = factor.arrays();
-    let (mut supernodes, mut below) = (Vec::new(), Vec::new());
-    for (columns, span) in arrays.starts.windows(2).zip(arrays.row_starts.windows(2)) {
-        let (first, end) = (columns[0] as usize, interior.min(columns[1] as usize));
-        if first < end {
-            let rows = &arrays.rows[span[0] as usize + end - first..span[1] as usize];
-            supernodes.push(Supernode { first, columns: end - first, below: rows.len() });
-            below.extend(rows.iter().map(|&row| row as u32));
-        }
-    }
-    let order = arrays.order.iter().map(|&row| row as u32).collect();
-    let structure = Structure { order, supernodes, rows: below };
-    match precision {
-        Precision::Preconditioner => Box::new(Supernodal::<f32>::new(structure)),
-        Precision::Full => Box::new(Supernodal::<f64>::new(structure)),
     }
 }

@@ -3,24 +3,12 @@
 
 use super::{LowerTriangle, raw};
 use crate::petsc::PetscError;
-use std::{ffi::c_void, ptr, slice};
+use std::{ffi::c_void, ops::Range, ptr, slice};
 
 /// A `cholmod_factor` P A Pᵀ = L Lᵀ with the `cholmod_common` it was made with.
 pub(super) struct Cholmod {
     common: Box<raw::cholmod_common>,
     factor: *mut raw::cholmod_factor,
-}
-
-/// Where the entries of L are; the supernode s has the columns `starts[s]..starts[s + 1]`.
-pub(super) struct FactorArrays<'a> {
-    /// P: the row of A of each row of L.
-    pub(super) order: &'a [i64],
-    pub(super) starts: &'a [i64],
-    /// Where the rows of each supernode begin in `rows`.
-    pub(super) row_starts: &'a [i64],
-    /// Where the values of each supernode begin.
-    pub(super) value_starts: &'a [i64],
-    pub(super) rows: &'a [i64],
 }
 
 impl Cholmod {
@@ -30,27 +18,26 @@ impl Cholmod {
         a: &mut LowerTriangle,
         order: Option<Vec<i64>>,
     ) -> Result<Self, PetscError> {
-        // SAFETY: plain data that cholmod_l_start fills.
-        let common = unsafe { Box::new(std::mem::zeroed::<raw::cholmod_common>()) };
-        let mut this = Self { common, factor: ptr::null_mut() };
-        let mut view = a.view();
+        let mut this = Self { common: Box::default(), factor: ptr::null_mut() };
+        let (common, mut view) = (&mut *this.common, a.view());
         // SAFETY: `common` stays where it is; the view describes arrays that live during the call,
         // and `order` has as many entries as there are rows.
         unsafe {
-            raw::cholmod_l_start(&mut *this.common);
-            this.common.print = 0;
-            this.common.supernodal = raw::CHOLMOD_SUPERNODAL as i32;
+            raw::cholmod_l_start(common);
+            common.print = 0;
+            common.supernodal = raw::CHOLMOD_SUPERNODAL as i32;
             this.factor = match order {
-                None => raw::cholmod_l_analyze(&mut view, &mut *this.common),
+                None => raw::cholmod_l_analyze(&mut view, common),
                 Some(mut order) => {
-                    this.common.nmethods = 1;
-                    this.common.method[0].ordering = raw::CHOLMOD_GIVEN as i32;
+                    common.nmethods = 1;
+                    common.method[0].ordering = raw::CHOLMOD_GIVEN as i32;
                     let (order, none) = (order.as_mut_ptr(), ptr::null_mut());
-                    raw::cholmod_l_analyze_p(&mut view, order, none, 0, &mut *this.common)
+                    raw::cholmod_l_analyze_p(&mut view, order, none, 0, common)
                 }
             };
         }
-        if this.factor.is_null() { Err(this.failure()) } else { Ok(this) }
+        this.check(!this.factor.is_null())?;
+        Ok(this)
     }
 
     /// Factorises `a`, which has the pattern that was analysed; false if it is not positive definite
@@ -58,37 +45,43 @@ impl Cholmod {
     pub(super) fn factorise(&mut self, a: &mut LowerTriangle) -> Result<bool, PetscError> {
         let mut view = a.view();
         // SAFETY: live handles; the view describes arrays that live during the call.
-        unsafe {
-            match raw::cholmod_l_factorize(&mut view, self.factor, &mut *self.common) {
-                0 => Err(self.failure()),
-                _ => Ok((*self.factor).minor == (*self.factor).n),
-            }
-        }
+        let done =
+            unsafe { raw::cholmod_l_factorize(&mut view, self.factor, &mut *self.common) != 0 };
+        self.check(done)?;
+        // SAFETY: a live factor.
+        Ok(unsafe { (*self.factor).minor == (*self.factor).n })
     }
 
     /// Frees the values of L and keeps the analysis (cholmod_l_change_factor).
     pub(super) fn free_values(&mut self) -> Result<(), PetscError> {
         let (pattern, common) = (raw::CHOLMOD_PATTERN as i32, &mut *self.common);
         // SAFETY: live handles.
-        match unsafe { raw::cholmod_l_change_factor(pattern, 1, 1, 1, 1, self.factor, common) } {
-            0 => Err(self.failure()),
-            _ => Ok(()),
-        }
+        let done =
+            unsafe { raw::cholmod_l_change_factor(pattern, 1, 1, 1, 1, self.factor, common) != 0 };
+        self.check(done)
     }
 
-    pub(super) fn arrays(&self) -> FactorArrays<'_> {
+    /// P: the row of A of each row of L.
+    pub(super) fn order(&self) -> &[i64] {
+        // SAFETY: the permutation of an analysed factor.
+        unsafe { indices((*self.factor).Perm, (*self.factor).n) }
+    }
+
+    /// Of each supernode its columns, its rows (first those of the diagonal block), and where its
+    /// [`Self::values`] begin.
+    pub(super) fn supernodes(&self) -> impl Iterator<Item = (Range<usize>, &[i64], usize)> {
         // SAFETY: an analysed supernodal factor has these arrays of 64-bit indices.
-        unsafe {
-            let l = &*self.factor;
-            let array = |array: *mut c_void, size| slice::from_raw_parts(array.cast::<i64>(), size);
-            FactorArrays {
-                order: array(l.Perm, l.n),
-                starts: array(l.super_, l.nsuper + 1),
-                row_starts: array(l.pi, l.nsuper + 1),
-                value_starts: array(l.px, l.nsuper + 1),
-                rows: array(l.s, l.ssize),
-            }
-        }
+        let [columns, rows, values, s] = unsafe {
+            let (l, ends) = (&*self.factor, (*self.factor).nsuper + 1);
+            let array = |start| indices(start, ends);
+            [array(l.super_), array(l.pi), array(l.px), indices(l.s, l.ssize)]
+        };
+        let range = |ends: &[i64]| ends[0] as usize..ends[1] as usize;
+        columns
+            .windows(2)
+            .zip(rows.windows(2))
+            .zip(values)
+            .map(move |((columns, rows), value)| (range(columns), &s[range(rows)], *value as usize))
     }
 
     /// The values of L: of each supernode its columns from the diagonal block down; none before a
@@ -107,12 +100,23 @@ impl Cholmod {
         [self.common.fl, unsafe { (*self.factor).xsize } as f64]
     }
 
-    fn failure(&self) -> PetscError {
-        PetscError::ours(match self.common.status {
+    /// The error of a call that was not `done`.
+    fn check(&self, done: bool) -> Result<(), PetscError> {
+        let message = || match self.common.status {
             raw::CHOLMOD_OUT_OF_MEMORY => "not enough memory for a Cholesky factor".to_owned(),
             status => format!("CHOLMOD failed with status {status}"),
-        })
+        };
+        done.then_some(()).ok_or_else(|| PetscError::ours(message()))
     }
+}
+
+/// An array of CHOLMOD.
+///
+/// # Safety
+/// It has `size` 64-bit indices, and lives for 'a.
+unsafe fn indices<'a>(array: *mut c_void, size: usize) -> &'a [i64] {
+    // SAFETY: the caller's promise.
+    unsafe { slice::from_raw_parts(array.cast::<i64>(), size) }
 }
 
 impl Drop for Cholmod {

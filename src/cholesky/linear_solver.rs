@@ -117,14 +117,15 @@ impl LinearSolver {
         owned: usize,
         precision: Precision,
     ) -> Result<Self, PetscError> {
+        let zeros = || Vector::zeros(session, owned);
         Ok(Self {
             factor: Factor::new(session, prefix, precision),
             modified: None,
-            residual: Vector::zeros(session, owned)?,
-            free_residual: Vector::zeros(session, owned)?,
-            preconditioned: Vector::zeros(session, owned)?,
-            direction: Vector::zeros(session, owned)?,
-            image: Vector::zeros(session, owned)?,
+            residual: zeros()?,
+            free_residual: zeros()?,
+            preconditioned: zeros()?,
+            direction: zeros()?,
+            image: zeros()?,
         })
     }
 
@@ -136,13 +137,11 @@ impl LinearSolver {
         if system.added.is_none() && system.prescribed.is_none() {
             return self.factor.factorise(system.matrix);
         }
-        let mut matrix = match self.modified.take() {
-            None => system.matrix.duplicate()?,
-            Some(mut matrix) => {
-                matrix.copy(system.matrix)?;
-                matrix
-            }
+        let matrix = match &mut self.modified {
+            Some(matrix) => matrix,
+            none => none.insert(system.matrix.duplicate()?),
         };
+        matrix.copy(system.matrix)?;
         if let Some(added) = system.added {
             self.image.write(|d| {
                 d.fill(0.0);
@@ -153,9 +152,7 @@ impl LinearSolver {
         if let Some(prescribed) = system.prescribed {
             matrix.zero_rows_columns(prescribed, system.scale)?;
         }
-        let definite = self.factor.factorise(&matrix)?;
-        self.modified = Some(matrix);
-        Ok(definite)
+        self.factor.factorise(matrix)
     }
 
     /// Solves from the start `x` until ‖b − (A + D) x‖₂ ≤ `limit` on the free unknowns, with the factor
@@ -170,10 +167,11 @@ impl LinearSolver {
         x: &mut Vector,
         limit: f64,
     ) -> Result<SolveReport, PetscError> {
-        let mut report = SolveReport::default();
-        if self.factor.exists() && !self.start(system, b, x, limit, &mut report)? {
-            self.iterate(system, x, limit, MOST_ITERATIONS, &mut report)?;
+        if !self.factor.exists() {
+            return Ok(SolveReport::default());
         }
+        let mut report = self.start(system, b, x, limit)?;
+        self.iterate(system, x, limit, MOST_ITERATIONS, &mut report)?;
         Ok(report)
     }
 
@@ -189,10 +187,7 @@ impl LinearSolver {
         x: &mut Vector,
         limit: f64,
     ) -> Result<SolveReport, PetscError> {
-        let mut report = SolveReport::default();
-        if self.start(system, b, x, limit, &mut report)? {
-            return Ok(report);
-        }
+        let mut report = self.start(system, b, x, limit)?;
         if let Some(most) = self.factor.iteration_limit() {
             self.iterate(system, x, limit, most, &mut report)?;
         }
@@ -211,19 +206,18 @@ impl LinearSolver {
         &self.residual
     }
 
-    /// r ← b − (A + D) x; whether that is small enough already.
+    /// r ← b − (A + D) x, and whether that is small enough already.
     fn start(
         &mut self,
         system: LinearSystem,
         b: &Vector,
         x: &Vector,
         limit: f64,
-        report: &mut SolveReport,
-    ) -> Result<bool, PetscError> {
+    ) -> Result<SolveReport, PetscError> {
         system.multiply(x, &mut self.residual)?;
         self.residual.axpby(1.0, b, -1.0)?;
-        report.converged = self.is_reached(system, limit)?;
-        Ok(report.converged)
+        let converged = self.is_reached(system, limit)?;
+        Ok(SolveReport { converged, ..SolveReport::default() })
     }
 
     /// Whether ‖r‖₂ ≤ `limit` on the free unknowns; never where the norm overflows, as the limit of a
@@ -239,7 +233,7 @@ impl LinearSolver {
     /// ‖r‖₂ ≤ `limit` on the free unknowns, and at most so many times:
     ///
     /// ```text
-    /// z = P⁻¹ r,   β = rᵀz / (rᵀz)_previous, at first 0,   p ← z + β p,
+    /// z = P⁻¹ r,   β = rᵀz / (rᵀz)_previous, at first rᵀz / ∞,   p ← z + β p,
     /// α = rᵀz / pᵀKp,   x ← x + α p,   r ← r − α K p.
     /// ```
     ///
@@ -253,8 +247,11 @@ impl LinearSolver {
         most: usize,
         report: &mut SolveReport,
     ) -> Result<(), PetscError> {
-        let mut energy = 0.0;
-        for iteration in 1..=most {
+        let mut energy = f64::INFINITY;
+        for _ in 0..most {
+            if report.converged {
+                break;
+            }
             report.iterations += 1;
             let bytes = self.factor.bytes_per_application();
             system.book(
@@ -265,8 +262,7 @@ impl LinearSolver {
             system.clear_prescribed(&mut self.preconditioned)?;
             let previous = energy;
             energy = self.free_residual.dot(&self.preconditioned)?;
-            let beta = if iteration == 1 { 0.0 } else { energy / previous };
-            self.direction.axpby(1.0, &self.preconditioned, beta)?;
+            self.direction.axpby(1.0, &self.preconditioned, energy / previous)?;
             system.multiply(&self.direction, &mut self.image)?;
             let stiffness = self.direction.dot(&self.image)?;
             if !(stiffness > 0.0 && energy > 0.0) {
@@ -275,9 +271,6 @@ impl LinearSolver {
             x.axpby(energy / stiffness, &self.direction, 1.0)?;
             self.residual.axpby(-energy / stiffness, &self.image, 1.0)?;
             report.converged = self.is_reached(system, limit)?;
-            if report.converged {
-                break;
-            }
         }
         self.factor.end_solve();
         Ok(())

@@ -6,7 +6,7 @@
 //! a new one ([`RefactorisationPolicy`]).
 //!
 //! - On one rank CHOLMOD computes L Lᵀ = P A Pᵀ; the triangular solves L y = P b and Lᵀ (P x) = y
-//!   are our own ([`Cholesky`], [`TriangularSolver`]).
+//!   are our own ([`Cholesky`]).
 //! - On several ranks each eliminates its interior unknowns I, and all share the dense Schur
 //!   complement S = A_ΓΓ − Σ A_ΓI A_II⁻¹ A_IΓ of the unknowns Γ between them (`substructure`).
 //! - Where Γ is too large, or PETSc options ask for it, a preconditioner of PETSc takes its place
@@ -45,4 +45,3 @@ pub use factor::Factor;
 pub use linear_solver::{Booking, LinearSolver, LinearSystem, SolveReport};
 pub use lower_triangle::LowerTriangle;
 pub use refactorisation::RefactorisationPolicy;
-pub use supernodal::TriangularSolver;

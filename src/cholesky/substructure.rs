@@ -29,10 +29,11 @@ pub(super) struct Substructure {
     schur: Option<Cholesky>,
 }
 
-/// The unknowns of a rank.
+/// The unknowns of a rank. Their *places* are those of a vector of three parts: the interior of the
+/// rank, the interface next to it, the interface of all ranks.
 struct Division {
-    /// Of each owned unknown what it is.
-    kinds: Vec<Unknown>,
+    /// Of each owned unknown its place, in the first or the third part.
+    places: Vec<usize>,
     /// Global indices of all ranks' interface unknowns, increasing.
     interface: Vec<i32>,
     /// Indices in `interface` of those next to this rank's interior, increasing.
@@ -41,12 +42,14 @@ struct Division {
     interior: usize,
 }
 
-#[derive(Clone, Copy)]
-enum Unknown {
-    /// With its index among the interior unknowns of the rank.
-    Interior(usize),
-    /// With its index in the interface of all ranks.
-    Interface(usize),
+/// The part of a matrix that a rank has.
+struct Blocks {
+    /// The interior and the interface next to it, [A_II A_IΓ; A_ΓI c 1]: of its columns the first.
+    local: LowerTriangle,
+    /// A_ΓΓ in the rows that this rank owns.
+    interface: DMatrix<f64>,
+    /// Its largest row sum of absolute values.
+    largest_row_sum: f64,
 }
 
 /// Interface unknowns up to which a dense Schur complement on every rank is tried: then it takes
@@ -62,17 +65,18 @@ impl Substructure {
         precision: Precision,
     ) -> Result<Option<Self>, PetscError> {
         let Some(division) = Division::of(comm, matrix)? else { return Ok(None) };
-        let mut a = division.local_matrix(matrix, 1.0)?;
+        let (interior, near) = (division.interior, division.near.len());
+        let Blocks { local: mut a, .. } = division.blocks(matrix)?;
+        add_interface(&mut a, near, 1.0);
         let mut local = Cholesky::analyse(&mut a, None, 0, precision)?;
         // The same order with the interface moved to the end.
-        let (interior, near) = (division.interior as i64, division.near.len());
-        let last = interior..interior + near as i64;
+        let last = interior as i64..(interior + near) as i64;
         if near > 0 {
-            let order = local.order().iter().copied().filter(|&i| i < interior);
+            let order = local.order().iter().copied().filter(|i| !last.contains(i));
             let order = order.chain(last.clone()).collect();
             local = Cholesky::analyse(&mut a, Some(order), near, precision)?;
         }
-        let in_place = local.order()[division.interior..].iter().copied().eq(last);
+        let in_place = local.order()[interior..].iter().copied().eq(last);
         let this = Self { comm, precision, division, local, schur: None };
         Ok(comm.all(in_place).then_some(this))
     }
@@ -90,23 +94,25 @@ impl Substructure {
     /// Factorises the present values of a matrix of the same pattern; false if it is not positive
     /// definite. Collective.
     pub(super) fn factorise(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
-        let division = &self.division;
-        let (mut schur, largest_row_sum) = division.interface_rows(matrix)?;
+        let near = &self.division.near;
+        let Blocks { mut local, interface: mut schur, largest_row_sum } =
+            self.division.blocks(matrix)?;
         // A_ΓI A_II⁻¹ A_IΓ ≤ A_ΓΓ for a definite A, so with this c the rank's matrix is definite.
         let c = 2.0 * self.comm.max(largest_row_sum);
-        let block = self.local.factorise(&mut division.local_matrix(matrix, c)?)?;
+        add_interface(&mut local, near.len(), c);
+        let block = self.local.factorise(&mut local)?;
         if !self.comm.all(block.is_some()) {
             return Ok(false);
         }
         let block = block.unwrap_or_default();
         let part = &block * block.transpose();
-        for (j, &column) in division.near.iter().enumerate() {
-            for (i, &row) in division.near.iter().enumerate() {
+        for (j, &column) in near.iter().enumerate() {
+            for (i, &row) in near.iter().enumerate() {
                 schur[(row, column)] += part[(i, j)];
             }
             schur[(column, column)] -= c;
         }
-        if division.interface.is_empty() {
+        if schur.is_empty() {
             return Ok(true);
         }
         self.comm.sum(schur.as_mut_slice());
@@ -122,52 +128,37 @@ impl Substructure {
             (j..size).for_each(|i| lower.push(i, schur[(i, j)]));
             lower.end_column();
         }
-        let mut factor = match self.schur.take() {
+        let factor = match &mut self.schur {
             Some(factor) => factor,
-            None => {
+            none => {
                 let order = Some((0..size as i64).collect());
-                Cholesky::analyse(&mut lower, order, 0, self.precision)?
+                none.insert(Cholesky::analyse(&mut lower, order, 0, self.precision)?)
             }
         };
-        let definite = factor.factorise(&mut lower)?.is_some();
-        self.schur = Some(factor);
-        Ok(definite)
+        Ok(factor.factorise(&mut lower)?.is_some())
     }
 
     /// `z` ← A⁻¹ `r` on the owned unknowns. Collective.
     pub(super) fn apply(&mut self, r: &[f64], z: &mut [f64]) {
-        let local = self.local.solver();
-        let Division { kinds, interface, near, interior } = &self.division;
+        let Division { places, interface, near, interior } = &self.division;
         if interface.is_empty() {
-            local.forward(r);
-            return local.backward(z);
+            return self.local.solve(r, z, |_| {});
         }
-        let mut shared = vec![0.0; interface.len()];
-        let mut own = vec![0.0; interior + near.len()];
-        for (r, kind) in r.iter().zip(kinds) {
-            match *kind {
-                Unknown::Interior(i) => own[i] = *r,
-                Unknown::Interface(i) => shared[i] = *r,
+        let mut b = vec![0.0; interior + near.len() + interface.len()];
+        places.iter().zip(r).for_each(|(&place, r)| b[place] = *r);
+        let mut x = vec![0.0; b.len()];
+        let (b, b_shared) = b.split_at_mut(interior + near.len());
+        let (x_local, x_shared) = x.split_at_mut(interior + near.len());
+        self.local.solve(b, x_local, |values| {
+            // The values are − A_ΓI A_II⁻¹ r_I.
+            near.iter().zip(values.iter()).for_each(|(&i, value)| b_shared[i] += value);
+            self.comm.sum(b_shared);
+            if let Some(schur) = &mut self.schur {
+                schur.solve(b_shared, x_shared, |_| {});
             }
-        }
-        local.forward(&own);
-        // − A_ΓI A_II⁻¹ r_I.
-        let eliminated = local.interface(near.len());
-        near.iter().zip(&eliminated).for_each(|(&i, eliminated)| shared[i] += eliminated);
-        self.comm.sum(&mut shared);
-        if let Some(schur) = &mut self.schur {
-            schur.solver().forward(&shared);
-            schur.solver().backward(&mut shared);
-        }
-        let solved: Vec<f64> = near.iter().map(|&i| shared[i]).collect();
-        local.set_interface(&solved);
-        local.backward(&mut own);
-        for (z, kind) in z.iter_mut().zip(kinds) {
-            *z = match *kind {
-                Unknown::Interior(i) => own[i],
-                Unknown::Interface(i) => shared[i],
-            };
-        }
+            values.iter_mut().zip(near).for_each(|(value, &i)| *value = x_shared[i]);
+        });
+        places.iter().zip(z).for_each(|(&place, z)| *z = x[place]);
     }
 }
 
@@ -176,96 +167,85 @@ impl Division {
     /// rank belongs to the interface. `None` if that is too large. Collective.
     fn of(comm: Communicator, matrix: &Matrix) -> Result<Option<Self>, PetscError> {
         let rows = matrix.rows();
-        let (mut kinds, mut own) = (Vec::new(), Vec::new());
+        let before = |columns: &[i32], _: &[f64]| columns.iter().any(|&j| j < rows.start);
+        let (mut inner, mut own) = (Vec::new(), Vec::new());
         for row in rows.clone() {
-            let on_interface =
-                matrix.read_row(row, |columns, _| columns.iter().any(|&j| j < rows.start))?;
-            kinds.push(match on_interface {
-                true => Unknown::Interface(own.len()),
-                false => Unknown::Interior(kinds.len() - own.len()),
-            });
-            if on_interface {
-                own.push(row);
-            }
+            if matrix.read_row(row, before)? { &mut own } else { &mut inner }.push(row);
         }
-        let counts = comm.gather(&[own.len() as f64]);
-        let size = counts.iter().sum::<f64>() as usize;
-        if size > LARGEST_INTERFACE {
+        let own: Vec<f64> = own.into_iter().map(f64::from).collect();
+        let interface: Vec<i32> = comm.gather(&own).into_iter().map(|row| row as i32).collect();
+        if interface.len() > LARGEST_INTERFACE {
             return Ok(None);
         }
-        let before = counts[..comm.rank()].iter().sum::<f64>() as usize;
-        let mut interface = vec![0.0; size];
-        own.iter().enumerate().for_each(|(i, &row)| interface[before + i] = f64::from(row));
-        comm.sum(&mut interface);
-        let interface: Vec<i32> = interface.into_iter().map(|row| row as i32).collect();
-        for kind in &mut kinds {
-            if let Unknown::Interface(i) = kind {
-                *i += before;
-            }
-        }
-
         let mut near = Vec::new();
-        for (row, kind) in rows.zip(&kinds) {
-            if let Unknown::Interior(_) = kind {
-                matrix.read_row(row, |columns, _| {
-                    near.extend(columns.iter().filter_map(|j| interface.binary_search(j).ok()));
-                })?;
-            }
+        for &row in &inner {
+            matrix.read_row(row, |columns, _| {
+                near.extend(columns.iter().filter_map(|j| interface.binary_search(j).ok()));
+            })?;
         }
         near.sort_unstable();
         near.dedup();
-        let interior = kinds.len() - own.len();
-        Ok(Some(Self { kinds, interface, near, interior }))
-    }
-
-    /// A_ΓΓ in the rows that this rank owns, and its largest row sum of absolute values.
-    fn interface_rows(&self, matrix: &Matrix) -> Result<(DMatrix<f64>, f64), PetscError> {
-        let mut block = DMatrix::zeros(self.interface.len(), self.interface.len());
-        let mut largest = 0.0_f64;
-        for (row, kind) in matrix.rows().zip(&self.kinds) {
-            let Unknown::Interface(i) = *kind else { continue };
-            matrix.read_row(row, |columns, values| {
-                let mut sum = 0.0;
-                for (column, value) in columns.iter().zip(values) {
-                    if let Ok(j) = self.interface.binary_search(column) {
-                        block[(i, j)] = *value;
-                        sum += value.abs();
-                    }
-                }
-                largest = largest.max(sum);
-            })?;
+        let interior = inner.len();
+        let mut places = vec![0; rows.len()];
+        let owned = |row: i32| (row - rows.start) as usize;
+        inner.into_iter().enumerate().for_each(|(place, row)| places[owned(row)] = place);
+        for (i, &row) in interface.iter().enumerate().filter(|(_, row)| rows.contains(row)) {
+            places[owned(row)] = interior + near.len() + i;
         }
-        Ok((block, largest))
+        Ok(Some(Self { places, interface, near, interior }))
     }
 
-    /// The rank's interior, behind it the interface next to it with c on the diagonal:
-    /// [A_II A_IΓ; A_ΓI c 1]. The pattern of the last block is full, as that of S.
-    fn local_matrix(&self, matrix: &Matrix, c: f64) -> Result<LowerTriangle, PetscError> {
-        let mut lower = LowerTriangle::default();
+    /// Reads the rows that this rank owns.
+    fn blocks(&self, matrix: &Matrix) -> Result<Blocks, PetscError> {
+        let (interior, shared) = (self.interior, self.interior + self.near.len());
+        let (mut local, mut largest_row_sum) = (LowerTriangle::default(), 0.0_f64);
+        let mut interface = DMatrix::zeros(self.interface.len(), self.interface.len());
         let rows = matrix.rows();
-        for (row, kind) in rows.clone().zip(&self.kinds) {
-            let Unknown::Interior(i) = *kind else { continue };
+        for (row, &place) in rows.clone().zip(&self.places) {
             matrix.read_row(row, |columns, values| {
+                let mut row_sum = 0.0;
                 for (&column, &value) in columns.iter().zip(values) {
-                    let own = usize::try_from(column - rows.start).ok();
-                    match own.and_then(|j| self.kinds.get(j)) {
-                        Some(Unknown::Interior(j)) if *j >= i => lower.push(*j, value),
-                        Some(Unknown::Interior(_)) => {}
-                        _ => {
-                            let found = self.interface.binary_search(&column).ok();
-                            let near = found.and_then(|i| self.near.binary_search(&i).ok());
-                            near.iter().for_each(|near| lower.push(self.interior + near, value));
+                    match self.place(rows.start, column) {
+                        // The transpose of an entry of `local`.
+                        Some(other) if other < interior && other < place => {}
+                        Some(other) if other < interior => local.push(other, value),
+                        Some(other) if place < interior => {
+                            let near = self.near.binary_search(&(other - shared));
+                            near.iter().for_each(|near| local.push(interior + near, value));
                         }
+                        Some(other) => {
+                            interface[(place - shared, other - shared)] = value;
+                            row_sum += value.abs();
+                        }
+                        None => {}
                     }
                 }
+                largest_row_sum = largest_row_sum.max(row_sum);
             })?;
-            lower.end_column();
+            if place < interior {
+                local.end_column();
+            }
         }
-        for j in 0..self.near.len() {
-            lower.push(self.interior + j, c);
-            (j + 1..self.near.len()).for_each(|i| lower.push(self.interior + i, 0.0));
-            lower.end_column();
-        }
-        Ok(lower)
+        Ok(Blocks { local, interface, largest_row_sum })
+    }
+
+    /// The place of an unknown, given by its global index and the first one that this rank owns; `None`
+    /// in the interior of another rank.
+    fn place(&self, first: i32, unknown: i32) -> Option<usize> {
+        let owned = usize::try_from(unknown - first).ok().and_then(|i| self.places.get(i));
+        let shared = self.interior + self.near.len();
+        let on_interface = || Some(shared + self.interface.binary_search(&unknown).ok()?);
+        owned.copied().or_else(on_interface)
+    }
+}
+
+/// [A_II A_IΓ; A_ΓI c 1] from its first columns and the number of its last. The pattern of the last block
+/// is full, as that of S.
+fn add_interface(local: &mut LowerTriangle, near: usize, c: f64) {
+    let interior = local.size();
+    for j in interior..interior + near {
+        local.push(j, c);
+        (j + 1..interior + near).for_each(|i| local.push(i, 0.0));
+        local.end_column();
     }
 }

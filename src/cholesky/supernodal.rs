@@ -10,56 +10,34 @@
 //! of [`TILE_HEIGHT`] rows below. The entries of y that a supernode works on are gathered first in a
 //! front: its own, padded to whole panels, then those of the rows below.
 
-use super::tiles::{
-    DiagonalBlock, Number, PANEL_WIDTH, TILE_HEIGHT, Tile, subtract, transposed_product,
+use super::{
+    cholmod::Cholmod,
+    tiles::{DiagonalBlock, Number, PANEL_WIDTH, TILE_HEIGHT, Tile, subtract, transposed_product},
 };
 use nalgebra::{convert, convert_unchecked};
 use std::mem::take;
 
-/// Solves with the leading part of a factor P A Pᵀ = L Lᵀ: L₁₁ of
-///
-/// ```text
-/// L = ⎡ L₁₁     ⎤        L₁₁ y₁ = (P b)₁,        y₂ = (P b)₂ − L₂₁ y₁,
-///     ⎣ L₂₁ L₂₂ ⎦        L₁₁ᵀ (P x)₁ = y₁ − L₂₁ᵀ (P x)₂.
-/// ```
-///
-/// The part 2, an interface or nothing, is for the caller to solve between the two solves.
-pub trait TriangularSolver {
+/// Solves with the first rows and columns of a factor, and forms what they leave of the others: see
+/// [`Cholesky::solve`](super::Cholesky::solve).
+pub(super) trait TriangularSolver {
     /// Copies the values of L₁₁ and L₂₁: of each supernode its columns from the diagonal block down,
     /// whatever stands above the diagonal.
     fn set_values(&mut self, values: &[f64]);
 
-    /// The forward solve, for y₁ and y₂.
-    fn forward(&mut self, b: &[f64]);
+    /// L₁₁ y₁ = (P b)₁, y₂ = (P b)₂ − L₂₁ y₁; `interface` replaces y₂ by (P x)₂;
+    /// L₁₁ᵀ (P x)₁ = y₁ − L₂₁ᵀ (P x)₂.
+    fn solve(&mut self, b: &[f64], x: &mut [f64], interface: &mut dyn FnMut(&mut [f64]));
 
-    /// y₂, of so many entries.
-    fn interface(&self, count: usize) -> Vec<f64>;
-
-    /// Sets (P x)₂.
-    fn set_interface(&mut self, values: &[f64]);
-
-    /// The backward solve, for x; destroys y.
-    fn backward(&mut self, x: &mut [f64]);
-
-    /// Bytes that a forward and a backward solve read.
+    /// Bytes that a solve reads.
     fn bytes(&self) -> f64;
 }
 
-/// Where the entries of L₁₁ and L₂₁ are.
-pub(super) struct Structure {
-    /// P: the row of A of each row of L.
-    pub(super) order: Vec<u32>,
-    pub(super) supernodes: Vec<Supernode>,
-    /// Of each supernode the rows below its diagonal block.
-    pub(super) rows: Vec<u32>,
-}
-
 /// Consecutive columns of L with the same rows below their diagonal block.
-pub(super) struct Supernode {
-    pub(super) first: usize,
-    pub(super) columns: usize,
+struct Supernode {
+    first: usize,
+    columns: usize,
     /// The number of rows below the diagonal block.
-    pub(super) below: usize,
+    below: usize,
 }
 
 impl Supernode {
@@ -91,7 +69,11 @@ impl Supernode {
 
 /// L₁₁ and L₂₁ with entries `T`, in the order in which they are read.
 pub(super) struct Supernodal<T> {
-    structure: Structure,
+    /// P: the row of A of each row of L.
+    order: Vec<u32>,
+    supernodes: Vec<Supernode>,
+    /// Of each supernode the rows below its diagonal block.
+    rows: Vec<u32>,
     /// Of each panel the triangle at the diagonal.
     diagonal: Vec<DiagonalBlock<T>>,
     /// Of each panel what stands below its triangle.
@@ -103,27 +85,37 @@ pub(super) struct Supernodal<T> {
 }
 
 impl<T: Number> Supernodal<T> {
-    /// With L₁₁ = 1, L₂₁ = 0.
-    pub(super) fn new(structure: Structure) -> Self {
-        let Structure { order, supernodes, .. } = &structure;
+    /// The first `interior` columns of an analysed factor, still with L₁₁ = 1, L₂₁ = 0.
+    pub(super) fn new(factor: &Cholmod, interior: usize) -> Self {
+        let (mut supernodes, mut below) = (Vec::new(), Vec::new());
+        for (columns, rows, _) in factor.supernodes() {
+            let (first, end) = (columns.start, interior.min(columns.end));
+            if first < end {
+                let rows = &rows[end - first..];
+                supernodes.push(Supernode { first, columns: end - first, below: rows.len() });
+                below.extend(rows.iter().map(|&row| row as u32));
+            }
+        }
         let panels = supernodes.iter().map(Supernode::panels).sum();
         let tiles = supernodes.iter().map(Supernode::tiles).sum();
         let front = supernodes.iter().map(Supernode::front_height).max().unwrap_or(0);
         Self {
+            order: factor.order().iter().map(|&row| row as u32).collect(),
             diagonal: vec![DiagonalBlock::identity(); panels],
             tiles: vec![[[T::zero(); TILE_HEIGHT]; PANEL_WIDTH]; tiles],
-            y: vec![T::zero(); order.len()],
+            y: vec![T::zero(); factor.order().len()],
             scale: 0.0,
             front: vec![[T::zero(); TILE_HEIGHT]; front],
-            structure,
+            supernodes,
+            rows: below,
         }
     }
 
     /// y₁ ← L₁₁⁻¹ y₁, y₂ ← y₂ − L₂₁ y₁.
     fn solve_forward(&mut self) {
-        let Structure { supernodes, rows, .. } = &self.structure;
-        let (mut diagonal, mut tiles, mut rows) = (&self.diagonal[..], &self.tiles[..], &rows[..]);
-        for s in supernodes {
+        let (mut diagonal, mut tiles) = (&self.diagonal[..], &self.tiles[..]);
+        let mut rows = &self.rows[..];
+        for s in &self.supernodes {
             let front = &mut self.front[..s.front_height()];
             let own = s.first..s.first + s.columns;
             front.fill([T::zero(); TILE_HEIGHT]);
@@ -151,9 +143,9 @@ impl<T: Number> Supernodal<T> {
 
     /// y₁ ← L₁₁⁻ᵀ (y₁ − L₂₁ᵀ y₂).
     fn solve_backward(&mut self) {
-        let Structure { supernodes, rows, .. } = &self.structure;
-        let (mut diagonal, mut tiles, mut rows) = (&self.diagonal[..], &self.tiles[..], &rows[..]);
-        for s in supernodes.iter().rev() {
+        let (mut diagonal, mut tiles) = (&self.diagonal[..], &self.tiles[..]);
+        let mut rows = &self.rows[..];
+        for s in self.supernodes.iter().rev() {
             let front = &mut self.front[..s.front_height()];
             let own = s.first..s.first + s.columns;
             front.fill([T::zero(); TILE_HEIGHT]);
@@ -178,12 +170,29 @@ impl<T: Number> Supernodal<T> {
             self.y[own].copy_from_slice(&front.as_flattened()[..s.columns]);
         }
     }
+
+    /// Lets `interface` replace y₂ by (P x)₂, and scales y₁ as that.
+    fn solve_interface(&mut self, interface: &mut dyn FnMut(&mut [f64])) {
+        let interior = self.supernodes.last().map_or(0, |s| s.first + s.columns);
+        let (inner, outer) = self.y.split_at_mut(interior);
+        let number = |&y: &T| self.scale * convert_unchecked::<T, f64>(y);
+        let mut values: Vec<f64> = outer.iter().map(number).collect();
+        interface(&mut values);
+        if values.is_empty() {
+            return;
+        }
+        let scale = values.iter().fold(self.scale, |scale, value| scale.max(value.abs()));
+        let smaller = convert(self.scale / scale);
+        inner.iter_mut().for_each(|y| *y *= smaller);
+        outer.iter_mut().zip(values).for_each(|(y, value)| *y = convert(value / scale));
+        self.scale = scale;
+    }
 }
 
 impl<T: Number> TriangularSolver for Supernodal<T> {
     fn set_values(&mut self, mut values: &[f64]) {
         let (mut diagonal, mut tiles) = (&mut self.diagonal[..], &mut self.tiles[..]);
-        for s in &self.structure.supernodes {
+        for s in &self.supernodes {
             let height = s.columns + s.below;
             let (panels, others) = take(&mut diagonal).split_at_mut(s.panels());
             diagonal = others;
@@ -205,31 +214,15 @@ impl<T: Number> TriangularSolver for Supernodal<T> {
         }
     }
 
-    fn forward(&mut self, b: &[f64]) {
+    fn solve(&mut self, b: &[f64], x: &mut [f64], interface: &mut dyn FnMut(&mut [f64])) {
         self.scale = b.iter().fold(f64::MIN_POSITIVE, |scale, b| scale.max(b.abs()));
-        for (y, &row) in self.y.iter_mut().zip(&self.structure.order) {
+        for (y, &row) in self.y.iter_mut().zip(&self.order) {
             *y = convert(b[row as usize] / self.scale);
         }
         self.solve_forward();
-    }
-
-    fn interface(&self, count: usize) -> Vec<f64> {
-        let y = &self.y[self.y.len() - count..];
-        y.iter().map(|&y| self.scale * convert_unchecked::<T, f64>(y)).collect()
-    }
-
-    fn set_interface(&mut self, values: &[f64]) {
-        let (interior, interface) = self.y.split_at_mut(self.structure.order.len() - values.len());
-        let scale = values.iter().fold(self.scale, |scale, value| scale.max(value.abs()));
-        let smaller = convert(self.scale / scale);
-        interior.iter_mut().for_each(|y| *y *= smaller);
-        interface.iter_mut().zip(values).for_each(|(y, value)| *y = convert(value / scale));
-        self.scale = scale;
-    }
-
-    fn backward(&mut self, x: &mut [f64]) {
+        self.solve_interface(interface);
         self.solve_backward();
-        for (&y, &row) in self.y.iter().zip(&self.structure.order) {
+        for (&y, &row) in self.y.iter().zip(&self.order) {
             x[row as usize] = self.scale * convert_unchecked::<T, f64>(y);
         }
     }

@@ -97,32 +97,25 @@ const SINGLETON: [(&str, &str); 3] = [
     ("OMPI_MCA_orte_create_session_dirs", "0"),
 ];
 
-/// Scotch 7 starts a thread for each core of the machine in every rank: too many by the number of
-/// ranks, and slow because they wait for each other. Read whenever it divides a graph.
-const SCOTCH: [(&str, &str); 1] = [("SCOTCH_PTHREAD_NUMBER", "1")];
-
 /// Sets those variables of the environment that the user has not set, and tells which.
 fn set_missing(variables: &[(&'static str, &str)]) -> Vec<&'static str> {
     let missing = variables.iter().filter(|(name, _)| env::var_os(name).is_none());
-    let set = missing.map(|&(name, value)| {
-        // SAFETY: PETSc has no threads yet; those of tests read the environment through std.
-        unsafe { env::set_var(name, value) };
-        name
-    });
-    set.collect()
+    // SAFETY: PETSc has no threads yet; those of tests read the environment through std.
+    missing.inspect(|(name, value)| unsafe { env::set_var(name, value) }).map(|v| v.0).collect()
 }
 
 /// Starts PETSc; its errors keep their message for [`check`] instead of printing a trace.
 fn initialize(options: &[String]) -> Result<(), PetscError> {
     give_memory_back();
-    set_missing(&SCOTCH);
+    // Scotch 7 starts a thread for each core of the machine in every rank: too many by the number of
+    // ranks, and slow because they wait for each other. It reads this whenever it divides a graph.
+    set_missing(&[("SCOTCH_PTHREAD_NUMBER", "1")]);
     let singleton = LAUNCHERS.iter().all(|name| env::var_os(name).is_none());
     let temporary = if singleton { set_missing(&SINGLETON) } else { Vec::new() };
-    let mut arguments = vec![c_string("signorini")?, c_string("-no_signal_handler")?];
-    for option in options {
-        arguments.push(c_string(option)?);
-    }
-    let mut pointers: Vec<*mut c_char> = arguments.into_iter().map(CString::into_raw).collect();
+    let own = ["signorini", "-no_signal_handler"].into_iter();
+    let arguments = own.chain(options.iter().map(String::as_str));
+    let pointers = arguments.map(|argument| c_string(argument).map(CString::into_raw));
+    let mut pointers: Vec<*mut c_char> = pointers.collect::<Result<_, _>>()?;
     pointers.push(ptr::null_mut());
     let mut count = (pointers.len() - 1) as c_int;
     // PETSc keeps the argument vector for the life of the process, so it is given away.

@@ -49,8 +49,7 @@ fn cholesky(a: &DMatrix<f64>, precision: Precision) -> Cholesky {
 /// max |b − A x| / max |b|.
 fn residual(a: &DMatrix<f64>, cholesky: &mut Cholesky, b: &DVector<f64>) -> f64 {
     let mut x = DVector::zeros(b.len());
-    cholesky.solver().forward(b.as_slice());
-    cholesky.solver().backward(x.as_mut_slice());
+    cholesky.solve(b.as_slice(), x.as_mut_slice(), |interface| assert!(interface.is_empty()));
     (b - a * x).amax() / b.amax()
 }
 
@@ -73,21 +72,6 @@ fn solves_solve_whatever_the_shape_of_the_supernodes() {
 }
 
 #[test]
-fn the_forward_solve_makes_the_energy_of_the_solution() {
-    let _turn = turn();
-    // |L⁻¹Pb|² = bᵀA⁻¹b.
-    let a = coupled(50, 5);
-    let b = DVector::from_element(50, 1.0);
-    let energy = b.dot(&a.clone().cholesky().unwrap().solve(&b));
-    for (precision, rounding) in BOTH.into_iter().zip([1e-6, 1e-14]) {
-        let mut cholesky = cholesky(&a, precision);
-        cholesky.solver().forward(b.as_slice());
-        let y = DVector::from_vec(cholesky.solver().interface(50));
-        assert!((y.norm_squared() / energy - 1.0).abs() < rounding);
-    }
-}
-
-#[test]
 fn the_schur_complement_of_the_interface_is_left_to_the_caller() {
     let _turn = turn();
     const INTERFACE: usize = 7;
@@ -105,15 +89,14 @@ fn the_schur_complement_of_the_interface_is_left_to_the_caller() {
         // L₂₂ L₂₂ᵀ = A₂₂ − A₂₁ A₁₁⁻¹ A₁₂.
         let schur = &block * block.transpose();
         assert!((schur * x.rows(54, INTERFACE) - &reduced).amax() < 1e-14);
-        let solver = cholesky.solver();
-        solver.forward(b.as_slice());
-        assert!((DVector::from_vec(solver.interface(INTERFACE)) - &reduced).amax() < rounding);
         // Far larger than what is there: the scale follows.
         for scale in [1.0, 1e60] {
             let mut found = DVector::zeros(61);
-            solver.forward(b.as_slice());
-            solver.set_interface((x.rows(54, INTERFACE) * scale).as_slice());
-            solver.backward(found.as_mut_slice());
+            let solution = x.rows(54, INTERFACE) * scale;
+            cholesky.solve(b.as_slice(), found.as_mut_slice(), |interface| {
+                assert!((DVector::from_column_slice(interface) - &reduced).amax() < rounding);
+                interface.copy_from_slice(solution.as_slice());
+            });
             let interface = found.rows(54, INTERFACE) / scale;
             assert!((interface - x.rows(54, INTERFACE)).amax() < rounding);
             assert!(scale > 1.0 || (found - &x).amax() < rounding);
