@@ -1,8 +1,8 @@
-//! Where the time goes.
+//! Wall time and memory traffic of a run, by named phases.
 
 use std::{cell::RefCell, collections::BTreeMap, time::Instant};
 
-/// What was booked under one name.
+/// The measurements of one phase.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Phase {
     /// Times the phase was entered.
@@ -19,7 +19,7 @@ pub struct Phase {
 pub struct Phases(RefCell<BTreeMap<&'static str, Phase>>);
 
 impl Phases {
-    /// Runs `work` and books its wall time under `name`.
+    /// Runs `work` and adds its wall time to the phase `name`.
     pub fn time<R>(&self, name: &'static str, work: impl FnOnce() -> R) -> R {
         self.time_moving(name, 0.0, work)
     }
@@ -38,7 +38,7 @@ impl Phases {
         result
     }
 
-    /// What was booked under `name`, if anything.
+    /// The phase `name`, if it was entered.
     pub fn get(&self, name: &str) -> Option<Phase> {
         self.0.borrow().get(name).copied()
     }

@@ -84,7 +84,7 @@ impl Cholmod {
             .map(move |((columns, rows), value)| (range(columns), &s[range(rows)], *value as usize))
     }
 
-    /// The values of L: of each supernode its columns from the diagonal block down; none before a
+    /// The values of L: of each supernode its dense columns from the diagonal block down; none before a
     /// factorisation.
     pub(super) fn values(&self) -> &[f64] {
         // SAFETY: the array x of a factor is null or has `xsize` values.

@@ -89,6 +89,7 @@ impl<'a> Recorder<'a> {
         let outcome = result.as_ref().ok();
         let mut notes = task.problem.notes();
         notes.extend(outcome.iter().flat_map(|outcome| outcome.notes(&task.problem)));
+        // The rest is for the first rank alone.
         let Some((_, bar)) = &self.history else { return written };
 
         let record = last.map(|step| step.record);

@@ -158,7 +158,9 @@ struct Carried {
 }
 
 impl Conditions {
-    /// By how much the prescribed rows are missed, relative.
+    /// The largest |ū − u·d|/U of the node's prescribed rows u·d = ū. With the rigid part r and the
+    /// elastic part e of u the difference is (ū − r·d) − e·d: ū and r·d may be much larger than U, and a
+    /// difference within the rounding of these counts as none.
     fn prescribed_error(&self, answer: Answer, scales: Scales) -> f64 {
         let error = |(direction, row): &(Vector2<f64>, usize)| {
             let value = answer.prescribed[*row];

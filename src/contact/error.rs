@@ -135,7 +135,8 @@ impl ContactError {
         matches!(self, Self::NotConverged { .. })
     }
 
-    /// Whether the method has missed a tolerance that may not be out of reach.
+    /// Whether the method missed its tolerance although rounding need not keep an answer from it: other
+    /// settings may help.
     pub fn is_missed(&self) -> bool {
         matches!(self, Self::NotConverged { .. } | Self::NotCertified { .. })
     }

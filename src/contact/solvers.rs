@@ -186,7 +186,8 @@ fn listing() -> String {
     SOLVERS.join(", ") + &variants.collect::<String>()
 }
 
-/// An aside of a message: which name was perhaps meant by `name`.
+/// An aside of a message: the known name that is most like `name`, or nothing where none is at least
+/// half alike.
 fn alike(name: &str) -> String {
     let names = REGISTRY.iter().flat_map(|entry| {
         let variants = entry.variants.iter().map(|variant| format!("{}:{variant}", entry.name));

@@ -73,7 +73,7 @@ impl Communicator {
         sum[0]
     }
 
-    /// The sum of the ranks' counts.
+    /// The sum of the ranks' counts; exact below 2⁵³, as MPI adds them as doubles.
     pub fn count(self, value: usize) -> usize {
         self.total(value as f64) as usize
     }

@@ -50,7 +50,7 @@ pub(super) fn unused() -> Vec<String> {
     unused
 }
 
-/// A C string; a NUL inside is the user's typing error.
+/// A C string of what the user has typed: a NUL in it is an error.
 pub(super) fn c_string(text: &str) -> Result<CString, PetscError> {
     CString::new(text).map_err(|_| PetscError::ours(format!("`{text}` contains a NUL character")))
 }

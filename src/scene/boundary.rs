@@ -136,6 +136,7 @@ fn boundary(table: &mut Table) -> Reading<Boundary> {
     Ok(Boundary { name: name?, conditions })
 }
 
+/// `displacement = [u_x, u_y]`: the expression of each component, `None` for one that is "free".
 fn displacement(value: &Value) -> Reading<[Option<Expression>; 2]> {
     let components = value.pair(|component| match &component.node.content {
         Content::Text(text) if text.trim() == "free" => Ok(None),

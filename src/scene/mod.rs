@@ -145,8 +145,9 @@ pub struct OutputOptions {
 }
 
 impl Scene {
-    /// The times at which values are judged before the run, s: all t_n, or some `most` (at least 1)
-    /// evenly chosen ones; a hundred times where steps are chosen; t = 1 where there is no time.
+    /// The times at which expressions are evaluated and checked before the run, s: all t_n, or some
+    /// `most` (at least 1) evenly chosen ones; a hundred times where steps are chosen; t = 1 where there
+    /// is no time.
     pub fn sample_times(&self, most: usize) -> Vec<f64> {
         self.time.map_or(vec![1.0], |grid| grid.sample(most.max(1)))
     }

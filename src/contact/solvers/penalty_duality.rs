@@ -144,8 +144,8 @@ impl<'s> PenaltyDuality<'s> {
     }
 
     /// The tridiagonal matrix of the Lanczos process, reorthogonalised twice (Golub and Van Loan,
-    /// Matrix Computations, ch. 10), on S_ω = B (K + ω BᵀWB)⁻¹ BᵀW = S (1 + ωS)⁻¹, self-adjoint
-    /// in W: K itself may be singular.
+    /// Matrix Computations, ch. 10), on S_ω = B (K + ω BᵀWB)⁻¹ BᵀW, which is self-adjoint in the inner
+    /// product of W. With the compliance S = B K⁻¹ BᵀW it is S (1 + ωS)⁻¹, but K may be singular.
     fn lanczos(
         &mut self,
         problem: &ContactProblem,

@@ -66,7 +66,7 @@ pub(super) enum Verdict {
 /// answers [`Verdict::Accept`], and only then.
 pub(super) struct StepController<'a> {
     problem: &'a DiscreteProblem,
-    /// Where steps are chosen.
+    /// Error control of the damage; `None` where steps are uniform.
     chosen: Option<ErrorControl<'a>>,
     /// k_{n−1}, s; infinite before the first step, so that ω = 0.
     length: f64,

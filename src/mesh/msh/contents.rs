@@ -53,8 +53,9 @@ impl Contents {
         Ok(())
     }
 
-    /// Reads the nodes of an element of one of gmsh's types, which belongs to the physical
-    /// `groups`.
+    /// Reads the nodes of the element `tag` of gmsh's `element_type`, which is on the geometrical
+    /// `entity` and listed at byte `at`. A line is kept once for each of its physical `groups`, a
+    /// triangle once, in the first of them, or 0: that it has one is what counts.
     pub fn read_element(
         &mut self,
         reader: &mut ByteReader,

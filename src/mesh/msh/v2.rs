@@ -14,9 +14,9 @@ pub fn nodes(reader: &mut ByteReader, contents: &mut Contents) -> Result<()> {
     Ok(())
 }
 
-/// A text file lists for each element tag, type, number of labels, labels and nodes. A binary one
-/// lists runs of like elements: type, number of elements, number of labels, then for each element
-/// tag, labels and nodes.
+/// A text file lists for each element its number, type, number of labels, labels (gmsh's manual calls
+/// them tags) and nodes. A binary one lists runs of like elements: type, number of elements, number of
+/// labels, then for each element its number, labels and nodes.
 pub fn elements(reader: &mut ByteReader, contents: &mut Contents) -> Result<()> {
     let mut left = reader.count_line()?;
     while left > 0 {
