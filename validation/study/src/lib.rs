@@ -26,3 +26,4 @@ pub use norms::{Embedding, Fields, Norms};
 pub use reference::{Reference, ReferenceOptions, ReferenceSpec};
 pub use refine::{longest_edge, refined};
 pub use store::ReferenceError;
+pub use study_run::Sampler;

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::StudyError;
 use signorini::{
-    contact::{ContactReport, SOLVERS},
+    contact::SOLVERS,
     evolution::{ContactPoint, DiscreteProblem, SetupError, State, Step},
     petsc::Session,
 };
@@ -49,7 +49,7 @@ struct Lifted {
 impl Lifted {
     fn new(session: &Session, sweep: &Sweep) -> Result<Self, StudyError> {
         let problem = sweep.problem("-1", false)?;
-        let (Step { state, .. }, _) = solve(session, &problem, SOLVERS[0], None)??;
+        let Step { state, .. } = solve(session, &problem, SOLVERS[0], None)??;
         let mesh = &problem.body.mesh;
         let bottom = mesh.curves["bottom"].edges.iter().flatten();
         let deepest = bottom.map(|&node| -state.u[2 * node + 1]).fold(0.0, f64::max);
@@ -91,8 +91,7 @@ fn add(
             Ok(answer) => {
                 let others = answers.iter().enumerate().filter(|(j, _)| *j != i);
                 let mut unique = others.filter_map(|(_, answer)| answer.as_ref().ok());
-                let other =
-                    unique.find(|(s, _)| s.unconstrained.is_none()).map(|(s, _)| &s.state.u);
+                let other = unique.find(|s| s.unconstrained.is_none()).map(|s| &s.state.u);
                 let other = open.as_ref().or(other);
                 let (row, verdict) = judged(row(solver), &problem, (sweep, value), answer, other);
                 table.push(row, verdict);
@@ -109,7 +108,7 @@ fn judged(
     row: Row,
     problem: &DiscreteProblem,
     (sweep, value): (&Sweep, f64),
-    (Step { state, record, unconstrained, .. }, report): &(Step, ContactReport),
+    Step { state, record, report, unconstrained, .. }: &Step,
     other: Option<&Vec<f64>>,
 ) -> (Row, Verdict) {
     // Empty where Γ_D takes its share.

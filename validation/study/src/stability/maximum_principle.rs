@@ -22,7 +22,7 @@ time = { end = 1, step = 1 }
 const UNLOADED: &str = r#"boundary = [{ name = "left", displacement = [0, 0] }]"#;
 
 /// Example I with λ_U = 2: the source is singular in the corner (1, 0).
-const CORNER: &str = r#"
+const MILD: &str = r#"
 damage = { diffusion = 1, lambda_d = 0.1, lambda_u = 2, lambda_w = 0, strain_cap = 1000, threshold = 0.01, initial = 1 }
 time = { end = 1, step = 1 }
 "#;
@@ -40,7 +40,7 @@ const END: f64 = 1.0;
 const ROUNDING: f64 = 1e-10;
 
 /// What a run is made of.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 struct Case {
     name: &'static str,
     damage: &'static str,
@@ -52,23 +52,18 @@ struct Case {
     cells: usize,
 }
 
-const fn soft(name: &'static str, low: f64, shear: f64, cells: usize) -> Case {
-    Case { name, damage: SOFT, boundary: UNLOADED, low, shear, cells }
-}
-
-const fn corner(cells: usize) -> Case {
-    Case { name: "corner", damage: CORNER, boundary: EXAMPLE_I, low: 1.0, shear: 0.0, cells }
-}
-
+const SQUARE: Case =
+    Case { name: "soft square", damage: SOFT, boundary: UNLOADED, low: 0.1, shear: 0.0, cells: 16 };
+const CORNER: Case = Case { name: "corner", damage: MILD, boundary: EXAMPLE_I, low: 1.0, ..SQUARE };
 const CASES: [Case; 8] = [
-    soft("soft square", 0.1, 0.0, 8),
-    soft("soft square", 0.1, 0.0, 16),
-    soft("soft square", 0.1, 0.0, 32),
-    soft("nearly broken square", 0.02, 0.0, 16),
-    corner(8),
-    corner(16),
-    corner(32),
-    soft("soft square, obtuse mesh", 0.1, 1.0, 16),
+    Case { cells: 8, ..SQUARE },
+    SQUARE,
+    Case { cells: 32, ..SQUARE },
+    Case { name: "nearly broken square", low: 0.02, ..SQUARE },
+    Case { cells: 8, ..CORNER },
+    CORNER,
+    Case { cells: 32, ..CORNER },
+    Case { name: "soft square, obtuse mesh", shear: 1.0, ..SQUARE },
 ];
 
 /// A row is correct if ζ keeps its bounds, refused if it does not and the notes say so.

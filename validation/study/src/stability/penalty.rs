@@ -32,25 +32,16 @@ const FEW: [f64; 5] = [-2.0, -1.0, 0.0, 1.0, 2.0];
 const LAMBDAS: [f64; 7] = [0.1, 0.3, 0.45, 0.5, 0.55, 0.7, 0.9];
 const SIDES: [f64; 3] = [0.3, 0.5, 0.7];
 
-const fn sweep(
-    cells: usize,
-    contrast: f64,
-    cap: usize,
-    decades: &'static [f64],
-    lambdas: &'static [f64],
-) -> Sweep {
-    Sweep { cells, contrast, cap, decades, lambdas }
-}
-
+const SWEEP: Sweep = Sweep { cells: 32, contrast: 1.0, cap: 300, decades: &FEW, lambdas: &[0.5] };
 const SWEEPS: [Sweep; 8] = [
-    sweep(16, 1.0, 1000, &WIDE, &LAMBDAS),
-    sweep(32, 1.0, 500, &WIDE, &SIDES),
-    sweep(64, 1.0, 300, &FEW, &[0.5]),
-    sweep(128, 1.0, 100, &[-1.0, 0.0, 1.0], &[0.5]),
-    sweep(32, 1e1, 300, &FEW, &[0.5]),
-    sweep(32, 1e2, 300, &FEW, &[0.5]),
-    sweep(32, 1e3, 300, &FEW, &[0.5]),
-    sweep(32, 1e4, 300, &FEW, &[0.5]),
+    Sweep { cells: 16, cap: 1000, decades: &WIDE, lambdas: &LAMBDAS, ..SWEEP },
+    Sweep { cap: 500, decades: &WIDE, lambdas: &SIDES, ..SWEEP },
+    Sweep { cells: 64, ..SWEEP },
+    Sweep { cells: 128, cap: 100, decades: &[-1.0, 0.0, 1.0], ..SWEEP },
+    Sweep { contrast: 1e1, ..SWEEP },
+    Sweep { contrast: 1e2, ..SWEEP },
+    Sweep { contrast: 1e3, ..SWEEP },
+    Sweep { contrast: 1e4, ..SWEEP },
 ];
 
 /// A row is correct if the iteration ends at the answer of the active set.
@@ -72,9 +63,8 @@ fn add(session: &Session, sweep: &Sweep, table: &mut Table) -> Result<(), StudyE
         let set: Vec<_> = keys.iter().map(|key| format!("contact.penalty_duality.{key}")).collect();
         problems::solve(session, &square(sweep.cells, &text, &set)?, solver, None)
     };
-    let (reference, _) = solve("active-set", &[])??;
-    let (_, found) = solve("penalty-duality", &[])??;
-    let automatic = found.omega.unwrap_or(f64::NAN);
+    let reference = solve("active-set", &[])??;
+    let automatic = solve("penalty-duality", &[])??.report.omega.unwrap_or(f64::NAN);
     for accelerate in [false, true] {
         for &lambda_omega in sweep.lambdas {
             for &decade in sweep.decades {
@@ -95,14 +85,14 @@ fn add(session: &Session, sweep: &Sweep, table: &mut Table) -> Result<(), StudyE
                     .with("lambda_omega", lambda_omega)
                     .with("accelerate", accelerate)
                     .with("converged", answer.is_ok());
-                let Ok((step, report)) = answer else {
+                let Ok(step) = answer else {
                     table.push(row.with("iterations", sweep.cap), Verdict::Refused);
                     continue;
                 };
                 let apart = difference(&step.state.u, &reference.state.u);
                 let row = row
-                    .with("iterations", report.iterations)
-                    .with("contraction", report.contraction)
+                    .with("iterations", step.report.iterations)
+                    .with("contraction", step.report.contraction)
                     .with("difference", apart);
                 table.push(row, Verdict::of_answer(apart <= AGREEMENT));
             }

@@ -2,7 +2,6 @@
 
 use crate::StudyError;
 use signorini::{
-    contact::ContactReport,
     evolution::{self, ContactStep, DiscreteProblem, Outcome, Phases, RunError, SetupError, Step},
     mesh::Mesh,
     petsc::Session,
@@ -75,17 +74,14 @@ pub fn solve(
     problem: &DiscreteProblem,
     solver: &str,
     guess: Option<&[f64]>,
-) -> Result<Result<(Step, ContactReport), RunError>, StudyError> {
+) -> Result<Result<Step, RunError>, StudyError> {
     let phases = Phases::default();
     let mut contact_step = ContactStep::new(session, problem, solver, &phases)?;
     if let Some(guess) = guess {
         contact_step.set_warm_start(guess);
     }
     match contact_step.solve(0, problem.start(), &problem.initial_damage()) {
-        Ok(step) => {
-            let report = step.report;
-            Ok(Ok((step, report)))
-        }
+        Ok(step) => Ok(Ok(step)),
         Err(failure @ RunError::Contact { .. }) => Ok(Err(failure)),
         Err(other) => Err(other.into()),
     }

@@ -81,18 +81,18 @@ fn add(session: &Session, id: u64, table: &mut Table) -> Result<(), StudyError> 
         .with("contrast", contrast)
         .with("random_start", guess.is_some())
         .with("allowed", allowed);
-    let (answer, report) = match solve(session, &discrete, "active-set", guess.as_deref())? {
+    let answer = match solve(session, &discrete, "active-set", guess.as_deref())? {
         Ok(answer) => answer,
         Err(failure) => {
             table.push_refused(row.with("reference", "none"), failure);
             return Ok(());
         }
     };
-    let kkt = answer.record.kkt().worst();
+    let (report, kkt) = (answer.report, answer.record.kkt().worst());
     // The first of two methods that share nothing with the active set and can do it.
     let mut other = None;
     for method in ["penalty-duality", "tao"] {
-        if let Ok((step, _)) = solve(session, &discrete, method, None)? {
+        if let Ok(step) = solve(session, &discrete, method, None)? {
             other = Some((method, difference(&answer.state.u, &step.state.u)));
             break;
         }

@@ -128,7 +128,7 @@ fn last(
     solver: &str,
 ) -> Result<(State, f64), StudyError> {
     if problem.scene().time.is_none() {
-        let (step, _) = solve(session, problem, solver, None)??;
+        let step = solve(session, problem, solver, None)??;
         return Ok((step.state, step.record.kkt().worst()));
     }
     let outcome = run(session, problem, solver)?;

@@ -9,10 +9,9 @@ fn what_changes_the_cost_alone_does_not_change_the_error() {
     let study = Study::of("square-mild", "square.geo");
     // The scene as it stands has n = 8, so that n = 2 and 4 go with it.
     let spec = study.try_spec(&["mesh.size=0.125"], options(0.25, 2, 0.001)).unwrap();
+    study.compute(&spec);
     let session = Session::start(&[]).unwrap();
-    spec.compute(&session, study.folder.path(), &mut |_| ()).unwrap();
-    let reference = spec.load(study.folder.path()).unwrap();
-    let rows = chart(&session, &reference, &mut |_, _| ()).unwrap();
+    let rows = chart(&session, &study.load(&spec), &mut |_, _| ()).unwrap();
     assert!(rows.iter().all(|row| row.error.is_none() && row.kkt <= row.tolerance));
     assert!(rows.iter().all(|row| row.size >= 0.125), "coarser than the reference");
     let finest = |row: &&ChartRow| row.size / row.grading < 0.999 * 0.0625 / 4.0;

@@ -5,10 +5,9 @@ use signorini::petsc::Session;
 use signorini_study::{Convergence, MEASURES, ReferenceOptions, ReferenceSpec, converge};
 
 fn run(study: &Study, spec: &ReferenceSpec) -> Convergence {
+    study.compute(spec);
     let session = Session::start(&[]).unwrap();
-    spec.compute(&session, study.folder.path(), &mut |_| ()).unwrap();
-    let reference = spec.load(study.folder.path()).unwrap();
-    converge(&session, &reference, &mut |_, _| ()).unwrap()
+    converge(&session, &study.load(spec), &mut |_, _| ()).unwrap()
 }
 
 #[test]

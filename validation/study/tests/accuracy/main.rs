@@ -6,9 +6,11 @@ mod converge;
 mod front;
 mod nested;
 mod norms;
+mod sampler;
 mod store;
 
-use signorini_study::{ReferenceOptions, ReferenceSpec, StudyError};
+use signorini::{evolution::StepRecord, petsc::Session};
+use signorini_study::{Reference, ReferenceOptions, ReferenceSpec, StudyError};
 use std::{fs, path::Path};
 use tempfile::TempDir;
 
@@ -40,6 +42,18 @@ impl Study {
 
     fn spec(&self, options: ReferenceOptions) -> ReferenceSpec {
         self.try_spec(&[], options).unwrap()
+    }
+
+    /// Computes the states of the reference; its steps.
+    fn compute(&self, spec: &ReferenceSpec) -> Vec<StepRecord> {
+        let session = Session::start(&[]).unwrap();
+        let mut steps = Vec::new();
+        spec.compute(&session, self.folder.path(), &mut |step| steps.push(*step)).unwrap();
+        steps
+    }
+
+    fn load(&self, spec: &ReferenceSpec) -> Reference {
+        spec.load(self.folder.path()).unwrap()
     }
 }
 

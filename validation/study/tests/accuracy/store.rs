@@ -1,7 +1,6 @@
 //! A reference that is kept is the one computed, or is refused with a reason.
 
 use super::{Study, options};
-use signorini::petsc::Session;
 use signorini_study::{ReferenceError, ReferenceOptions, ReferenceSpec, StudyError};
 use std::fs;
 
@@ -9,19 +8,11 @@ fn study() -> Study {
     Study::of("square-mild", "square.geo")
 }
 
-fn compute(spec: &ReferenceSpec, study: &Study) {
-    let session = Session::start(&[]).unwrap();
-    spec.compute(&session, study.folder.path(), &mut |_| ()).unwrap();
-}
-
 #[test]
 fn states_come_back_bit_by_bit_and_start_from_a_sound_body() {
     let study = study();
     let spec = study.spec(options(0.25, 0, 0.02));
-    let mut seen = Vec::new();
-    let session = Session::start(&[]).unwrap();
-    spec.compute(&session, study.folder.path(), &mut |record| seen.push(*record)).unwrap();
-    let reference = spec.load(study.folder.path()).unwrap();
+    let (seen, reference) = (study.compute(&spec), study.load(&spec));
     assert_eq!((reference.states.len(), reference.times.len(), seen.len()), (51, 51, 51));
     assert!(reference.states[0].zeta.iter().all(|&zeta| zeta == 1.0));
     for (state, record) in reference.states.iter().zip(&seen) {
@@ -36,10 +27,7 @@ fn states_come_back_bit_by_bit_and_start_from_a_sound_body() {
 fn a_reference_of_finer_steps_keeps_the_same_times() {
     let study = study();
     let fine = study.spec(options(0.25, 0, 0.005));
-    let mut records = Vec::new();
-    let session = Session::start(&[]).unwrap();
-    fine.compute(&session, study.folder.path(), &mut |record| records.push(*record)).unwrap();
-    let reference = fine.load(study.folder.path()).unwrap();
+    let (records, reference) = (study.compute(&fine), study.load(&fine));
     for (j, state) in reference.states.iter().enumerate() {
         let least = state.zeta.iter().copied().fold(f64::INFINITY, f64::min);
         assert_eq!(least, records[4 * j].zeta_min, "state {j}");
@@ -61,12 +49,12 @@ fn a_file_that_is_missing_foreign_or_damaged_is_refused() {
 
     // Another mesh under this name.
     let other = study.spec(ReferenceOptions { grading: Some(2.0), ..options(0.25, 0, 0.02) });
-    compute(&other, &study);
+    study.compute(&other);
     fs::rename(other.path(folder), &path).unwrap();
     assert!(matches!(load(&spec), ReferenceError::Useless(..)), "{}", load(&spec));
     assert!(load(&spec).to_string().contains("another scene or mesh"));
 
-    compute(&spec, &study);
+    study.compute(&spec);
     let whole = fs::read(&path).unwrap();
     spec.load(folder).unwrap();
     for length in [0, 10, 150, whole.len() / 2, whole.len() - 5, whole.len() - 1] {
@@ -83,7 +71,7 @@ fn a_file_that_is_missing_foreign_or_damaged_is_refused() {
 fn what_the_states_depend_on_makes_a_reference_foreign_and_nothing_else_does() {
     let study = study();
     let choice = options(0.25, 0, 0.02);
-    compute(&study.spec(choice), &study);
+    study.compute(&study.spec(choice));
     let load = |set: &[&str]| study.try_spec(set, choice).unwrap().load(study.folder.path());
     for same in ["title=Another", "output.every=7", "time.step=0.1"] {
         load(&[same]).unwrap();

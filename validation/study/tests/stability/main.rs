@@ -6,22 +6,15 @@ mod step_size;
 mod tao_types;
 
 use signorini::{
-    contact::ContactReport,
-    evolution::{RunError, State},
+    evolution::{RunError, Step},
     petsc::Session,
 };
 use signorini_study::stability::problems::{self, PRESSED_AND_LIFTED};
 
 /// The square of map 3 on n × n cells, pressed on the left and lifted on the right.
-fn solve(
-    session: &Session,
-    n: usize,
-    solver: &str,
-    set: &[String],
-) -> Result<(State, ContactReport), RunError> {
+fn solve(session: &Session, n: usize, solver: &str, set: &[String]) -> Result<Step, RunError> {
     // What a solver does by itself.
     let set = [set, &["contact.rescue=false".to_owned()]].concat();
     let problem = problems::square(n, PRESSED_AND_LIFTED, &set)?;
-    let answer = problems::solve(session, &problem, solver, None).unwrap_or_else(|e| panic!("{e}"));
-    answer.map(|(step, report)| (step.state, report))
+    problems::solve(session, &problem, solver, None).unwrap_or_else(|e| panic!("{e}"))
 }

@@ -18,13 +18,13 @@ fn keys(omega: f64, lambda_omega: f64, accelerate: bool) -> Vec<String> {
 #[test]
 fn the_automatic_omega_is_near_the_best_and_anderson_is_faster() {
     let session = Session::start(&[]).unwrap();
-    let (_, found) = solve(&session, 16, "penalty-duality", &[]).unwrap();
-    let automatic = found.omega.unwrap();
+    let found = solve(&session, 16, "penalty-duality", &[]).unwrap();
+    let automatic = found.report.omega.unwrap();
     let mut at_automatic = Vec::new();
     for accelerate in [false, true] {
         let count = |power: i32| {
             let keys = keys(automatic * 10f64.powf(0.5 * f64::from(power)), 0.5, accelerate);
-            solve(&session, 16, "penalty-duality", &keys).map_or(600, |(_, r)| r.iterations)
+            solve(&session, 16, "penalty-duality", &keys).map_or(600, |step| step.report.iterations)
         };
         let best = (-4..=4).map(count).min().unwrap();
         at_automatic.push(count(0));
@@ -36,12 +36,15 @@ fn the_automatic_omega_is_near_the_best_and_anderson_is_faster() {
 #[test]
 fn no_lambda_gives_a_wrong_answer() {
     let session = Session::start(&[]).unwrap();
-    let (exact, _) = solve(&session, 8, "active-set", &[]).unwrap();
+    let exact = solve(&session, 8, "active-set", &[]).unwrap();
     for lambda_omega in [0.1, 0.3, 0.5, 0.7, 0.9] {
         for omega in [1.0, 1e3, 1e6] {
             let keys = keys(omega, lambda_omega, false);
-            if let Ok((state, _)) = solve(&session, 8, "penalty-duality", &keys) {
-                assert!(difference(&state.u, &exact.u) < 1e-8, "ω {omega}, λω {lambda_omega}");
+            if let Ok(step) = solve(&session, 8, "penalty-duality", &keys) {
+                assert!(
+                    difference(&step.state.u, &exact.state.u) < 1e-8,
+                    "ω {omega}, λω {lambda_omega}"
+                );
             }
         }
     }
