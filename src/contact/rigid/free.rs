@@ -7,8 +7,8 @@ use crate::{contact::Constraints, fem::Body};
 const TURN: f64 = 1e-3;
 
 impl RigidMotions {
-    /// The direction ν at a node without what is rounding of u·ν for the free motions u, so that
-    /// they leave contact and symmetry axes exactly as they are.
+    /// ν at a node without its component along a free motion u where u·ν is so small that it is rounding:
+    /// the motion then leaves contact and symmetry axes exactly as they are.
     pub fn tangential(&self, body: &Body, node: usize, normal: [f64; 2]) -> [f64; 2] {
         self.free.iter().fold(normal, |[nx, ny], motion| {
             let [x, y] = self.at(motion, &body.mesh.nodes, node);

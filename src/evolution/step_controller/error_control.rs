@@ -145,8 +145,9 @@ impl<'a> ErrorControl<'a> {
     }
 }
 
-/// By this factor a step becomes one with the allowed error, of third order in its length, less a
-/// margin. In 32nds: rounding, which differs with ranks and units, then hardly ever changes steps.
+/// 0.9 (error over the allowed one)^(−1/3): by this factor a step becomes one with the allowed error,
+/// which is of third order in its length, less a margin. It is cut to 32nds: rounding, which differs
+/// with ranks and units, then hardly ever changes steps.
 fn growth(error_ratio: f64) -> f64 {
     (32.0 * 0.9 / error_ratio.max(1e-300).cbrt()).floor() / 32.0
 }
