@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::document::{Content, Node};
+use toml::de::DeValue;
+
+use super::document::name_of;
 use super::expression::Expression;
 use super::reader::{Reading, Table, Value};
 
@@ -86,15 +88,15 @@ pub(super) fn boundary_key(name: &str, key: &str) -> String {
 }
 
 pub(super) fn boundaries(list: &Value) -> Reading<Vec<Boundary>> {
-    let key = |i: usize, table: &Node| match table.name() {
+    let key = |i: usize, table: &DeValue| match name_of(table) {
         Some(name) => format!("boundary \"{name}\""),
         None => format!("boundary number {}", i + 1),
     };
-    let mut first: BTreeMap<&str, String> = BTreeMap::new();
+    let mut first = BTreeMap::new();
     let mut boundaries = Vec::new();
     for value in list.array(key)? {
         boundaries.push(value.table(": ", boundary));
-        let Some(name) = value.node.name() else { continue };
+        let Some(name) = name_of(value.required()?) else { continue };
         if let Some(earlier) = first.insert(name, value.place()) {
             value.refuse(format!("is given twice, first at {earlier}; merge the two"));
         }
@@ -106,16 +108,17 @@ pub(super) fn boundaries(list: &Value) -> Reading<Vec<Boundary>> {
 }
 
 fn boundary(table: &mut Table) -> Reading<Boundary> {
-    let name = table.required("name", Value::text);
-    let displacement = table.optional("displacement", displacement);
-    let symmetry = table.optional("symmetry", Value::flag);
-    let gap = table.optional("gap", Value::expression_in_space);
-    let normal = table.optional("normal", normal);
-    let traction = table.optional("traction", |value| value.pair(Value::expression));
+    let name = table.get("name").read();
+    let displacement = table.get("displacement").optional(displacement);
+    let symmetry = table.get("symmetry").optional(Value::read);
+    let gap = table.get("gap").optional(Value::expression_in_space);
+    let direction = table.get("normal");
+    let normal = direction.optional(normal);
+    let traction = table.get("traction").optional(|value| value.pair(Value::expression));
 
     let (gap, normal) = (gap?, normal?);
     if normal.is_some() && gap.is_none() {
-        return Err(table.refuse("normal", "needs a gap beside it"));
+        return Err(direction.refuse("needs a gap beside it"));
     }
     let conditions = [
         displacement?.map(Condition::Displacement),
@@ -138,8 +141,8 @@ fn boundary(table: &mut Table) -> Reading<Boundary> {
 
 /// `displacement = [u_x, u_y]`: the expression of each component, `None` for one that is "free".
 fn displacement(value: &Value) -> Reading<[Option<Expression>; 2]> {
-    let components = value.pair(|component| match &component.node.content {
-        Content::Text(text) if text.trim() == "free" => Ok(None),
+    let components = value.pair(|component| match component.required()?.as_str() {
+        Some(text) if text.trim() == "free" => Ok(None),
         _ => component.expression().map(Some),
     })?;
     match components {

@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use super::error::suggestion;
+use Instruction::{Binary, Number, Unary, Variable};
 
 /// A real function of x, y (m) and t (s), read from a scene.
 ///
@@ -21,9 +22,9 @@ use super::error::suggestion;
 /// ```
 #[derive(Debug, Clone)]
 pub struct Expression {
-    term: Term,
-    /// Which of `VARIABLES` it names.
-    names: [bool; 3],
+    /// In postfix order: a number or variable is put on a stack, a function or operator takes its
+    /// arguments from there and puts its value in their place.
+    program: Vec<Instruction>,
 }
 
 /// Why a text is no expression: what is wrong and what to write instead, as its predicate.
@@ -31,53 +32,45 @@ pub struct Expression {
 #[error("{0}")]
 pub struct ExpressionError(String);
 
-/// A part of an expression.
-#[derive(Debug, Clone)]
-enum Term {
+#[derive(Debug, Clone, Copy)]
+enum Instruction {
     Number(f64),
-    /// One of `VARIABLES`.
+    /// x, y or t, by its index.
     Variable(usize),
-    /// A term to whose value steps are applied in turn. (A long sum is no deep tree.)
-    Chain(Box<Term>, Vec<Step>),
+    Unary(fn(f64) -> f64),
+    Binary(fn(f64, f64) -> f64),
 }
 
-#[derive(Debug, Clone)]
-enum Step {
-    Unary(Unary),
-    Binary(Binary, Term),
-}
-
-type Unary = fn(f64) -> f64;
-type Binary = fn(f64, f64) -> f64;
-
-const VARIABLES: [&str; 3] = ["x", "y", "t"];
-const UNARY: [(&str, Unary); 7] = [
-    ("sin", f64::sin),
-    ("cos", f64::cos),
-    ("tan", f64::tan),
-    ("sqrt", f64::sqrt),
-    ("exp", f64::exp),
-    ("log", f64::ln),
-    ("abs", f64::abs),
-];
-const BINARY: [(&str, Binary); 3] = [
-    ("min", |a, b| if a < b || a.is_nan() { a } else { b }),
-    ("max", |a, b| if a > b || a.is_nan() { a } else { b }),
-    ("atan2", f64::atan2),
+/// All names, and what they stand for.
+const NAMES: [(&str, Instruction); 14] = [
+    ("x", Variable(0)),
+    ("y", Variable(1)),
+    ("t", Variable(2)),
+    ("pi", Number(PI)),
+    ("sin", Unary(f64::sin)),
+    ("cos", Unary(f64::cos)),
+    ("tan", Unary(f64::tan)),
+    ("sqrt", Unary(f64::sqrt)),
+    ("exp", Unary(f64::exp)),
+    ("log", Unary(f64::ln)),
+    ("abs", Unary(f64::abs)),
+    ("min", Binary(|a, b| if a < b || a.is_nan() { a } else { b })),
+    ("max", Binary(|a, b| if a > b || a.is_nan() { a } else { b })),
+    ("atan2", Binary(f64::atan2)),
 ];
 /// What operators do, how strongly they bind, and how strongly an operator in their right operand
 /// must bind at least: `a - b` is taken from the left, `a^b` from the right.
-const OPERATORS: [(char, Binary, u8, u8); 5] = [
-    ('+', |a, b| a + b, 1, 2),
-    ('-', |a, b| a - b, 1, 2),
-    ('*', |a, b| a * b, 2, 3),
-    ('/', |a, b| a / b, 2, 3),
-    ('^', f64::powf, 3, 3),
+const OPERATORS: [(char, Instruction, u8, u8); 5] = [
+    ('+', Binary(|a, b| a + b), 1, 2),
+    ('-', Binary(|a, b| a - b), 1, 2),
+    ('*', Binary(|a, b| a * b), 2, 3),
+    ('/', Binary(|a, b| a / b), 2, 3),
+    ('^', Binary(f64::powf), 3, 3),
 ];
 /// Of the operators only `^` binds stronger than a sign: `-x^2` is −(x²), and `2^-1` is ½.
 const SIGN: u8 = 3;
 
-/// Deeper nesting is refused: it would exhaust the stack long before it means anything.
+/// Deeper nesting is refused: parsing would exhaust the stack long before it means anything.
 const DEEPEST: usize = 128;
 
 impl Expression {
@@ -86,71 +79,67 @@ impl Expression {
     /// # Errors
     /// A syntax error with its column, or a name or function that is not known.
     pub fn parse(text: &str) -> Result<Self, ExpressionError> {
-        let mut parser = Parser { text, at: 0, depth: 0, names: [false; 3] };
-        let term = parser.whole().map_err(ExpressionError)?;
-        match parser.names {
-            [false, false, false] => Ok(Self::constant(term.eval(&[0.0; 3]))),
-            names => Ok(Self { term, names }),
+        let mut parser = Parser { text, at: 0, depth: 0, program: Vec::new() };
+        parser.whole().map_err(ExpressionError)?;
+        let parsed = Self { program: parser.program };
+        match parsed.depends_on_space() || parsed.depends_on_time() {
+            true => Ok(parsed),
+            false => Ok(Self::constant(parsed.eval(0.0, 0.0, 0.0))),
         }
     }
 
     /// The expression that is `value` everywhere.
     pub fn constant(value: f64) -> Self {
-        Self { term: Term::Number(value), names: [false; 3] }
+        Self { program: vec![Number(value)] }
     }
 
     /// The value at the point (x, y), m, and time t, s; NaN or infinite where the
     /// expression is not defined.
     pub fn eval(&self, x: f64, y: f64, t: f64) -> f64 {
-        self.term.eval(&[x, y, t])
+        // A program of n instructions has at most (n + 1)/2 values on its stack; and one of any
+        // length at most one waiting in each level of nesting: the left operand of an operator, or
+        // the first argument of a function.
+        match self.program.len() {
+            ..32 => self.run::<16>([x, y, t]),
+            _ => self.run::<DEEPEST>([x, y, t]),
+        }
+    }
+
+    /// Runs the program with a stack of `N` values.
+    fn run<const N: usize>(&self, variables: [f64; 3]) -> f64 {
+        let mut stack = [0.0; N];
+        let mut height = 0;
+        for instruction in &self.program {
+            let (taken, value) = match *instruction {
+                Number(value) => (0, value),
+                Variable(i) => (0, variables[i]),
+                Unary(apply) => (1, apply(stack[height - 1])),
+                Binary(apply) => (2, apply(stack[height - 2], stack[height - 1])),
+            };
+            height -= taken;
+            stack[height] = value;
+            height += 1;
+        }
+        stack[0]
     }
 
     /// The value if the expression names no variable.
     pub fn as_constant(&self) -> Option<f64> {
-        match self.term {
-            Term::Number(value) => Some(value),
+        match self.program[..] {
+            [Number(value)] => Some(value),
             _ => None,
         }
     }
 
     /// Whether the expression names t.
     pub fn depends_on_time(&self) -> bool {
-        self.names[2]
+        self.program.iter().any(|instruction| matches!(instruction, Variable(2)))
     }
 
     /// Whether the expression names x or y.
     pub fn depends_on_space(&self) -> bool {
-        self.names[0] || self.names[1]
+        self.program.iter().any(|instruction| matches!(instruction, Variable(0 | 1)))
     }
-}
-
-impl Term {
-    fn then(self, step: Step) -> Self {
-        match self {
-            Self::Chain(first, mut steps) => {
-                steps.push(step);
-                Self::Chain(first, steps)
-            }
-            first => Self::Chain(first.into(), vec![step]),
-        }
-    }
-
-    /// Inlined, so that numbers and variables cost no call.
-    #[inline(always)]
-    fn eval(&self, variables: &[f64; 3]) -> f64 {
-        match self {
-            Self::Number(value) => *value,
-            Self::Variable(i) => variables[*i],
-            Self::Chain(first, steps) => run(first, steps, variables),
-        }
-    }
-}
-
-fn run(first: &Term, steps: &[Step], variables: &[f64; 3]) -> f64 {
-    steps.iter().fold(first.eval(variables), |value, step| match step {
-        Step::Unary(apply) => apply(value),
-        Step::Binary(apply, term) => apply(value, term.eval(variables)),
-    })
 }
 
 /// Reads a text by precedence climbing.
@@ -159,21 +148,23 @@ struct Parser<'a> {
     /// Byte offset of what is read next.
     at: usize,
     depth: usize,
-    names: [bool; 3],
+    program: Vec<Instruction>,
 }
 
-/// A term, or why there is none.
-type Parsed = Result<Term, String>;
+/// What was read is in the program; or what is wrong with it.
+type Parsed = Result<(), String>;
 
-impl<'a> Parser<'a> {
+impl Parser<'_> {
     fn whole(&mut self) -> Parsed {
         if self.peek().is_none() {
             return Err("is empty; write a number or an expression in x, y, t".into());
         }
-        let term = self.expression(1)?;
+        self.expression(1)?;
         match self.peek() {
-            Some(_) => Err(self.unexpected("an operator or the end")),
-            None => Ok(term),
+            Some(_) => {
+                Err(self.unexpected("an operator (a product is written with `*`) or the end"))
+            }
+            None => Ok(()),
         }
     }
 
@@ -183,19 +174,21 @@ impl<'a> Parser<'a> {
         if self.depth > DEEPEST {
             return Err(format!("is nested more than {DEEPEST} deep; simplify it"));
         }
-        let mut term = if self.take('-') {
-            self.expression(SIGN)?.then(Step::Unary(|a| -a))
+        if self.take('-') {
+            self.expression(SIGN)?;
+            self.program.push(Unary(|a| -a));
         } else if self.take('+') {
-            self.expression(SIGN)?
+            self.expression(SIGN)?;
         } else {
-            self.atom()?
-        };
+            self.atom()?;
+        }
         let operators = OPERATORS.iter().filter(|(_, _, strength, _)| *strength >= least);
         while let Some((_, apply, _, right)) = operators.clone().find(|(o, ..)| self.take(*o)) {
-            term = term.then(Step::Binary(*apply, self.expression(*right)?));
+            self.expression(*right)?;
+            self.program.push(*apply);
         }
         self.depth -= 1;
-        Ok(term)
+        Ok(())
     }
 
     /// A number, a name or a bracket.
@@ -204,13 +197,13 @@ impl<'a> Parser<'a> {
         let rest = &self.text[self.at..];
         let number = &rest[..number_length(rest)];
         if self.take('(') {
-            let inside = self.expression(1)?;
-            self.expect_closing_bracket()?;
-            Ok(inside)
+            self.expression(1)?;
+            self.closing_bracket()
         } else if let Ok(value) = number.parse::<f64>() {
             self.at += number.len();
+            self.program.push(Number(value));
             match value.is_finite() {
-                true => Ok(Term::Number(value)),
+                true => Ok(()),
                 false => Err(format!("has the number {number}, which is too large")),
             }
         } else if first.is_some_and(|first| first.is_alphabetic() || first == '_') {
@@ -222,45 +215,32 @@ impl<'a> Parser<'a> {
     }
 
     /// A variable, π, or a function with its arguments.
-    fn name(&mut self, name: &'a str) -> Parsed {
+    fn name(&mut self, name: &str) -> Parsed {
         self.at += name.len();
-        if let Some((_, apply)) = UNARY.iter().find(|(known, _)| *known == name) {
-            let [argument] = self.arguments(name)?;
-            return Ok(argument.then(Step::Unary(*apply)));
-        }
-        if let Some((_, apply)) = BINARY.iter().find(|(known, _)| *known == name) {
-            let [a, b] = self.arguments(name)?;
-            return Ok(a.then(Step::Binary(*apply, b)));
-        }
-        let called = self.peek() == Some('(');
-        let term = match VARIABLES.iter().position(|known| *known == name) {
-            Some(i) => {
-                self.names[i] = true;
-                Term::Variable(i)
-            }
-            None if name == "pi" => Term::Number(PI),
-            None => return Err(unknown_name(name, called)),
+        let Some((_, instruction)) = NAMES.iter().find(|(known, _)| *known == name) else {
+            let kind = if self.peek() == Some('(') { "function" } else { "variable" };
+            let suggestion = suggestion(name, &NAMES.map(|(name, _)| name));
+            return Err(format!("has the unknown {kind} `{name}`{suggestion}"));
         };
-        match called {
-            true => Err(self.unexpected("an operator (a product is written with `*`)")),
-            false => Ok(term),
-        }
-    }
-
-    /// The `N` arguments of a function.
-    fn arguments<const N: usize>(&mut self, name: &str) -> Result<[Term; N], String> {
-        let mut arguments = Vec::new();
-        if self.take('(') {
-            arguments.push(self.expression(1)?);
-            while self.take(',') {
-                arguments.push(self.expression(1)?);
+        let takes = match instruction {
+            Number(_) | Variable(_) => 0,
+            Unary(_) => 1,
+            Binary(_) => 2,
+        };
+        let mut given = 0;
+        if takes > 0 && self.take('(') {
+            while given == 0 || self.take(',') {
+                self.expression(1)?;
+                given += 1;
             }
-            self.expect_closing_bracket()?;
+            self.closing_bracket()?;
         }
-        arguments.try_into().map_err(|given: Vec<_>| {
-            let given = given.len();
-            format!("calls `{name}` with {given} arguments; it takes {N}, in brackets")
-        })
+        if given != takes {
+            let given = format!("calls `{name}` with {given} arguments");
+            return Err(format!("{given}; it takes {takes}, in brackets"));
+        }
+        self.program.push(*instruction);
+        Ok(())
     }
 
     /// The next character that is not a blank; `at` is moved to it.
@@ -278,8 +258,12 @@ impl<'a> Parser<'a> {
         found
     }
 
-    fn expect_closing_bracket(&mut self) -> Result<(), String> {
-        if self.take(')') { Ok(()) } else { Err(self.unexpected("`)`")) }
+    fn closing_bracket(&mut self) -> Parsed {
+        if self.take(')') {
+            Ok(())
+        } else {
+            Err(self.unexpected("an operator (a product is written with `*`) or `)`"))
+        }
     }
 
     fn unexpected(&mut self, expected: &str) -> String {
@@ -303,11 +287,4 @@ fn number_length(text: &str) -> usize {
         length += if exponent > 0 { 1 + sign + exponent } else { 0 };
     }
     length
-}
-
-fn unknown_name(name: &str, called: bool) -> String {
-    let functions = UNARY.map(|(name, _)| name).into_iter().chain(BINARY.map(|(name, _)| name));
-    let known: Vec<&str> = VARIABLES.into_iter().chain(["pi"]).chain(functions).collect();
-    let kind = if called { "function" } else { "variable" };
-    format!("has the unknown {kind} `{name}`{}", suggestion(name, &known))
 }

@@ -124,17 +124,6 @@ impl TimeGrid {
     pub fn time(&self, n: usize, steps: usize) -> f64 {
         if n == steps { self.end } else { n as f64 * (self.end / steps as f64) }
     }
-
-    /// Times that stand for the whole run, s, 0 and the end among them: the t_n of a uniform
-    /// partition, at most `most` + 1; a hundred parts of [0, T] where steps are chosen.
-    fn sample(&self, most: usize) -> Vec<f64> {
-        let steps = match self.stepping {
-            Stepping::Uniform { steps } => steps,
-            Stepping::Auto { .. } => 100,
-        };
-        let parts = steps.min(most);
-        (0..=parts).map(|i| self.time(i * steps / parts, steps)).collect()
-    }
 }
 
 /// What is written while the scene runs.
@@ -149,7 +138,13 @@ impl Scene {
     /// `most` (at least 1) evenly chosen ones; a hundred times where steps are chosen; t = 1 where there
     /// is no time.
     pub fn sample_times(&self, most: usize) -> Vec<f64> {
-        self.time.map_or(vec![1.0], |grid| grid.sample(most.max(1)))
+        let Some(grid) = self.time else { return vec![1.0] };
+        let steps = match grid.stepping {
+            Stepping::Uniform { steps } => steps,
+            Stepping::Auto { .. } => 100,
+        };
+        let parts = steps.min(most.max(1));
+        (0..=parts).map(|i| grid.time(i * steps / parts, steps)).collect()
     }
 
     /// Reads and checks the scene at `path`.
@@ -174,13 +169,11 @@ impl Scene {
     /// # Errors
     /// As [`Scene::read`], but for the reading itself.
     pub fn parse(text: &str, path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
-        let text = SceneText {
-            path: path.to_owned(),
-            text: text.to_owned(),
-            sets: overrides.to_vec(),
-            origins: BTreeMap::new(),
-        };
-        let root = document::parse(&text)?;
-        reader::read(text, &root, |table| tables::scene(table, path))
+        let text = SceneText::new(path, text, overrides);
+        let root = text.parse()?;
+        let (mut scene, places) =
+            reader::read(&text, root, |table| tables::scene(table, path, &text))?;
+        scene.text.places = places;
+        Ok(scene)
     }
 }

@@ -4,10 +4,13 @@
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fmt::Display;
+use std::ops::Range;
 
-use serde::de::DeserializeOwned;
+use serde::de::{DeserializeOwned, IntoDeserializer};
+use toml::Spanned;
+use toml::de::{DeString, DeTable, DeValue};
 
-use super::document::{Content, Entries, Node, Problem, SceneText};
+use super::document::{NOWHERE, Problem, SceneText};
 use super::error::{SceneError, suggestion};
 use super::expression::Expression;
 
@@ -18,53 +21,57 @@ pub(super) struct Refused;
 /// What a value was read as.
 pub(super) type Reading<T> = Result<T, Refused>;
 
-/// The text that is read, and what was found wrong with it so far.
-struct Findings {
-    text: RefCell<SceneText>,
+/// What was found so far in the text that is read.
+struct Findings<'d> {
+    text: &'d SceneText,
+    places: RefCell<BTreeMap<String, Range<usize>>>,
     problems: RefCell<Vec<Problem>>,
 }
 
-/// Reads the document `root` of `text`: `read` gets its table.
+/// Reads the document `root` of `text`: `read` gets its table. Also tells where the values that
+/// have been read are written.
 ///
 /// # Errors
 /// All problems that were found, in the order of the file.
 pub(super) fn read<T>(
-    text: SceneText,
-    root: &Node,
+    text: &SceneText,
+    root: DeTable<'_>,
     read: impl FnOnce(&mut Table) -> Reading<T>,
-) -> Result<T, SceneError> {
-    let findings = Findings { text: text.into(), problems: RefCell::default() };
-    let result = Value::new(String::new(), root, &findings).table("", read);
-    findings.text.into_inner().verdict(findings.problems.into_inner())?;
+) -> Result<(T, BTreeMap<String, Range<usize>>), SceneError> {
+    let (places, problems) = Default::default();
+    let findings = Findings { text, places, problems };
+    let root = DeValue::Table(root);
+    let (key, place, value) = (String::new(), NOWHERE, Some(&root));
+    let result = Value { key, place, value, findings: &findings }.table("", read);
+    text.verdict(findings.problems.take())?;
     // Nothing was refused, or there would be a problem.
-    result.map_err(|Refused| SceneError::Refused(vec![]))
+    let result = result.map_err(|Refused| SceneError::Refused(vec![]))?;
+    Ok((result, findings.places.take()))
 }
 
-/// A value and its key in full.
+/// A value, or the lack of one, and its key in full.
 pub(super) struct Value<'d> {
     key: String,
-    pub(super) node: &'d Node,
-    findings: &'d Findings,
+    /// Where it is written; of one that is missing, where it should be.
+    place: Range<usize>,
+    value: Option<&'d DeValue<'d>>,
+    findings: &'d Findings<'d>,
 }
 
 impl<'d> Value<'d> {
-    fn new(key: String, node: &'d Node, findings: &'d Findings) -> Self {
-        findings.text.borrow_mut().origins.insert(key.clone(), node.origin);
-        Self { key, node, findings }
-    }
-
-    /// The text of the scene, with the places of all values that have been read.
-    pub(super) fn scene_text(&self) -> SceneText {
-        self.findings.text.borrow().clone()
+    /// A value below this one, or the lack of one.
+    fn below(&self, key: String, place: Range<usize>, value: Option<&'d DeValue<'d>>) -> Self {
+        self.findings.places.borrow_mut().insert(key.clone(), place.clone());
+        Self { key, place, value, findings: self.findings }
     }
 
     /// Where the value is written, in words.
     pub(super) fn place(&self) -> String {
-        self.findings.text.borrow().place(self.node.origin)
+        self.findings.text.in_words(&self.place)
     }
 
     fn note(&self, message: String) -> Refused {
-        self.findings.problems.borrow_mut().push((self.node.origin, message));
+        self.findings.problems.borrow_mut().push((self.place.clone(), message));
         Refused
     }
 
@@ -73,59 +80,80 @@ impl<'d> Value<'d> {
         self.note(format!("{} {problem}", self.key))
     }
 
-    pub(super) fn text(&self) -> Reading<String> {
-        match &self.node.content {
-            Content::Text(text) => Ok(text.clone()),
-            _ => Err(self.refuse("must be a string")),
-        }
+    /// The value, which must be there.
+    pub(super) fn required(&self) -> Reading<&'d DeValue<'d>> {
+        self.value.ok_or_else(|| self.refuse("is required but missing"))
     }
 
-    pub(super) fn flag(&self) -> Reading<bool> {
-        match self.node.content {
-            Content::Flag(flag) => Ok(flag),
-            _ => Err(self.refuse("must be true or false")),
+    /// What is read from the value if there is one.
+    pub(super) fn optional<T>(&self, read: impl FnOnce(&Self) -> Reading<T>) -> Reading<Option<T>> {
+        self.value.map(|_| read(self)).transpose()
+    }
+
+    /// A value as serde reads it: text, a flag.
+    pub(super) fn read<T: DeserializeOwned>(&self) -> Reading<T> {
+        self.deserialize(self.required()?.clone())
+    }
+
+    fn deserialize<T: DeserializeOwned>(&self, value: DeValue<'d>) -> Reading<T> {
+        let value = Spanned::new(self.place.clone(), value).into_deserializer();
+        T::deserialize(value).map_err(|error| self.refuse_as_found(error.message()))
+    }
+
+    /// Notes what serde found, which quotes an unknown name and then the known ones in backquotes.
+    fn refuse_as_found(&self, found: &str) -> Refused {
+        let mut quoted = found.split('`').skip(1).step_by(2);
+        if found.starts_with("unknown field") {
+            let (unknown, known) = (quoted.next().unwrap_or_default(), quoted.collect::<Vec<_>>());
+            return self.note(format!("unknown key {}{}", self.key, suggestion(unknown, &known)));
+        }
+        let Some((found, wanted)) = found.split_once(", expected ") else {
+            return self.refuse(format!("is wrong: {found}"));
+        };
+        let wanted = match wanted {
+            "f64" => "a number",
+            "usize" => "a whole number, not negative",
+            "a boolean" => "true or false",
+            other => other,
+        };
+        // A value says what it is: `invalid type: string "fast"`.
+        let found = found.split_once(": ").map_or(found, |(_, found)| found);
+        let kinds = ["string ", "integer ", "floating point ", "boolean "];
+        let value = kinds.iter().find_map(|kind| found.strip_prefix(kind)).unwrap_or(found);
+        let value = value.trim_end_matches(" as i128").trim_matches('`');
+        match found {
+            "map" | "sequence" => self.refuse(format!("must be {wanted}")),
+            _ => self.refuse(format!("must be {wanted}, but is {value}")),
         }
     }
 
     /// What one of the `choices` stands for.
     pub(super) fn choice<T: Copy>(&self, choices: [(&str, T); 2]) -> Reading<T> {
-        let chosen = match &self.node.content {
-            Content::Text(text) => choices.iter().find(|(name, _)| name == text),
-            _ => None,
-        };
-        let [(first, _), (second, _)] = choices;
+        let name = self.required()?.as_str();
+        let [first, second] = choices.map(|(known, _)| known);
+        let chosen = choices.into_iter().find(|(known, _)| Some(*known) == name);
         let wanted = || self.refuse(format!("must be \"{first}\" or \"{second}\""));
-        chosen.map(|(_, meaning)| *meaning).ok_or_else(wanted)
+        chosen.map(|(_, meaning)| meaning).ok_or_else(wanted)
     }
 
     /// A finite number for which `holds`; `rule` says so in words.
     pub(super) fn number(&self, rule: &str, holds: impl Fn(f64) -> bool) -> Reading<f64> {
-        match self.node.content {
-            Content::Number(number) if number.is_finite() && holds(number) => Ok(number),
-            Content::Number(number) => Err(self.refuse(format!("must be {rule}, but is {number}"))),
-            _ => Err(self.refuse("must be a number")),
+        let number: f64 = self.read()?;
+        match number.is_finite() && holds(number) {
+            true => Ok(number),
+            false => Err(self.refuse(format!("must be {rule}, but is {number}"))),
         }
-    }
-
-    pub(super) fn whole(&self, least: usize) -> Reading<usize> {
-        let rule = format!("a whole number, at least {least}");
-        Ok(self.number(&rule, |number| number.fract() == 0.0 && number >= least as f64)? as usize)
     }
 
     pub(super) fn positive(&self, unit: &str) -> Reading<f64> {
         self.number(&format!("positive ({unit})"), |number| number > 0.0)
     }
 
-    /// A number in (0, 1).
-    pub(super) fn fraction(&self) -> Reading<f64> {
-        self.number("between 0 and 1, both excluded", |number| 0.0 < number && number < 1.0)
-    }
-
     /// An expression that is finite if it is constant.
     pub(super) fn expression(&self) -> Reading<Expression> {
-        let expression = match &self.node.content {
-            Content::Number(number) => Expression::constant(*number),
-            Content::Text(text) => Expression::parse(text).map_err(|e| self.refuse(e))?,
+        let expression = match self.required()? {
+            DeValue::String(text) => Expression::parse(text).map_err(|e| self.refuse(e))?,
+            DeValue::Integer(_) | DeValue::Float(_) => Expression::constant(self.read()?),
             _ => return Err(self.refuse("must be a number or an expression in quotes")),
         };
         match expression.as_constant().filter(|value| !value.is_finite()) {
@@ -144,12 +172,14 @@ impl<'d> Value<'d> {
     }
 
     /// The elements of an array, each under the key that it gets by its index.
-    pub(super) fn array(&self, key: impl Fn(usize, &Node) -> String) -> Reading<Vec<Self>> {
-        let Content::Array(nodes) = &self.node.content else {
+    pub(super) fn array(&self, key: impl Fn(usize, &DeValue) -> String) -> Reading<Vec<Self>> {
+        let Some(values) = self.required()?.as_array() else {
             return Err(self.refuse("must be an array"));
         };
-        let element = |(i, node)| Self::new(key(i, node), node, self.findings);
-        Ok(nodes.iter().enumerate().map(element).collect())
+        let element = |(i, value): (usize, &'d Spanned<DeValue<'d>>)| {
+            self.below(key(i, value.get_ref()), value.span(), Some(value.get_ref()))
+        };
+        Ok(values.iter().enumerate().map(element).collect())
     }
 
     /// An array of two components.
@@ -163,11 +193,20 @@ impl<'d> Value<'d> {
         }
     }
 
-    fn entries(&self) -> Reading<&'d Entries> {
-        match &self.node.content {
-            Content::Table(entries) => Ok(entries),
-            _ => Err(self.refuse("must be a table")),
-        }
+    /// The values of a table by their names; the `separator` stands between its key and theirs.
+    fn entries(&self, separator: &str) -> Reading<BTreeMap<&'d str, Self>> {
+        let Some(table) = self.required()?.as_table() else {
+            return Err(self.refuse("must be a table"));
+        };
+        let entry = |(name, value): (&'d Spanned<DeString<'d>>, &'d Spanned<DeValue<'d>>)| {
+            let span = value.span();
+            // A table is where its header is.
+            let start = if value.get_ref().is_table() { span.start } else { name.span().start };
+            let key = format!("{}{separator}{}", self.key, name.get_ref());
+            let place = start..span.end;
+            (&**name.get_ref(), self.below(key, place, Some(value.get_ref())))
+        };
+        Ok(table.iter().map(entry).collect())
     }
 
     /// A table of values by names of the user's.
@@ -175,9 +214,8 @@ impl<'d> Value<'d> {
         &self,
         read: impl Fn(&Self) -> Reading<T>,
     ) -> Reading<BTreeMap<String, T>> {
-        let value = |key, node| Self::new(format!("{}.{key}", self.key), node, self.findings);
-        let entries = self.entries()?.iter();
-        let entries = entries.map(|(key, node)| Ok((key.clone(), read(&value(key, node))?)));
+        let entries = self.entries(".")?.into_iter();
+        let entries = entries.map(|(name, value)| Ok((name.to_owned(), read(&value)?)));
         entries.collect::<Vec<_>>().into_iter().collect()
     }
 
@@ -185,66 +223,42 @@ impl<'d> Value<'d> {
     /// value is also read alone, so that all that are wrong are told.
     pub(super) fn options<T: DeserializeOwned>(&self) -> Reading<T> {
         self.each_option::<T>(&|option| option)?;
-        T::deserialize(self.node.to_toml()).map_err(|error| self.refuse_option(error.message()))
+        self.read()
     }
 
     /// Reads each value below this one alone, in the tables in which it `stands`.
     fn each_option<T: DeserializeOwned>(
         &self,
-        stands: &dyn Fn(toml::Value) -> toml::Value,
+        stands: &dyn Fn(DeValue<'d>) -> DeValue<'d>,
     ) -> Reading<()> {
         let mut all = Ok(());
-        for (key, node) in self.entries()? {
-            let value = Self::new(format!("{}.{key}", self.key), node, self.findings);
-            let stands = |option| stands(toml::Table::from_iter([(key.clone(), option)]).into());
-            let one = match node.content {
-                Content::Table(_) => value.each_option::<T>(&stands),
-                _ => match T::deserialize(stands(node.to_toml())) {
-                    Ok(_) => Ok(()),
-                    Err(error) => Err(value.refuse_option(error.message())),
-                },
+        for (name, entry) in self.entries(".")? {
+            let spanned_name = Spanned::new(0..0, name.into());
+            let stands = |option| {
+                let option = Spanned::new(entry.place.clone(), option);
+                stands(DeValue::Table([(spanned_name.clone(), option)].into_iter().collect()))
+            };
+            let one = match entry.required()? {
+                DeValue::Table(_) => entry.each_option::<T>(&stands),
+                option => entry.deserialize::<T>(stands(option.clone())).map(drop),
             };
             all = all.and(one);
         }
         all
     }
 
-    /// Notes what serde found, which quotes an unknown name and then the known ones in backquotes.
-    fn refuse_option(&self, found: &str) -> Refused {
-        let mut quoted = found.split('`').skip(1).step_by(2);
-        if found.starts_with("unknown field") {
-            let (unknown, known) = (quoted.next().unwrap_or_default(), quoted.collect::<Vec<_>>());
-            return self.note(format!("unknown key {}{}", self.key, suggestion(unknown, &known)));
-        }
-        let Some((found, wanted)) = found.split_once(", expected ") else {
-            return self.refuse(found);
-        };
-        let wanted = match wanted {
-            "f64" => "a number",
-            "usize" => "a whole number, not negative",
-            "a boolean" => "true or false",
-            other => other,
-        };
-        // A value says what it is: `invalid type: string "fast"`.
-        let found = found.split_once(": ").map_or(found, |(_, found)| found);
-        let kinds = ["string ", "integer ", "floating point ", "boolean "];
-        let found = kinds.iter().find_map(|kind| found.strip_prefix(kind)).unwrap_or(found);
-        self.refuse(format!("must be {wanted}, but is {}", found.trim_matches('`')))
-    }
-
     /// A table whose keys are those that `read` asks for; the `separator` stands between its own
     /// key and theirs.
     pub(super) fn table<T>(
         &self,
-        separator: &str,
+        separator: &'static str,
         read: impl FnOnce(&mut Table) -> Reading<T>,
     ) -> Reading<T> {
-        let prefix = format!("{}{separator}", self.key);
-        let mut table = Table { value: self, prefix, entries: self.entries()?, known: vec![] };
+        let entries = self.entries(separator)?;
+        let mut table = Table { value: self, separator, entries, known: vec![] };
         let result = read(&mut table);
-        for key in table.entries.keys().filter(|key| !table.known.contains(&key.as_str())) {
-            let Some(value) = table.entry(key) else { continue };
-            value.note(format!("unknown key {}{}", value.key, suggestion(key, &table.known)));
+        for (name, value) in &table.entries {
+            value.note(format!("unknown key {}{}", value.key, suggestion(name, &table.known)));
         }
         result
     }
@@ -254,40 +268,21 @@ impl<'d> Value<'d> {
 /// are unknown.
 pub(super) struct Table<'d> {
     pub(super) value: &'d Value<'d>,
-    /// What stands before the keys of entries.
-    prefix: String,
-    entries: &'d Entries,
+    /// What stands between its key and those of its entries.
+    separator: &'static str,
+    /// The entries that were not yet asked for.
+    entries: BTreeMap<&'d str, Value<'d>>,
     /// The keys that were asked for.
     known: Vec<&'static str>,
 }
 
 impl<'d> Table<'d> {
-    fn entry(&self, key: &str) -> Option<Value<'d>> {
-        let node = self.entries.get(key)?;
-        Some(Value::new(format!("{}{key}", self.prefix), node, self.value.findings))
-    }
-
-    pub(super) fn optional<T>(
-        &mut self,
-        key: &'static str,
-        read: impl FnOnce(&Value<'d>) -> Reading<T>,
-    ) -> Reading<Option<T>> {
+    /// The value of `key`, or the lack of one, once.
+    pub(super) fn get(&mut self, key: &'static str) -> Value<'d> {
         self.known.push(key);
-        self.entry(key).as_ref().map(read).transpose()
-    }
-
-    pub(super) fn required<T>(
-        &mut self,
-        key: &'static str,
-        read: impl FnOnce(&Value<'d>) -> Reading<T>,
-    ) -> Reading<T> {
-        let value = self.optional(key, read)?;
-        let missing = || self.value.note(format!("{}{key} is required but missing", self.prefix));
-        value.ok_or_else(missing)
-    }
-
-    /// Notes a problem of the value of `key`.
-    pub(super) fn refuse(&self, key: &str, problem: impl Display) -> Refused {
-        self.entry(key).as_ref().unwrap_or(self.value).refuse(problem)
+        self.entries.remove(key).unwrap_or_else(|| {
+            let key = format!("{}{}{key}", self.value.key, self.separator);
+            self.value.below(key, self.value.place.clone(), None)
+        })
     }
 }

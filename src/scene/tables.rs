@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use super::boundary::boundaries;
-use super::document::Content;
+use super::document::SceneText;
 use super::expression::Expression;
 use super::reader::{Reading, Table, Value};
 use super::{Damage, MeshSource, OutputOptions, Scene, Stepping, TimeGrid, may_start_at};
@@ -20,16 +20,18 @@ const MOST_STEPS: f64 = 1e9;
 /// The error of ζ over the damage done that `step = "auto"` allows unless told otherwise.
 const STEP_TOLERANCE: f64 = 0.01;
 
-pub(super) fn scene(root: &mut Table, path: &Path) -> Reading<Scene> {
-    let title = root.optional("title", Value::text);
-    let mesh = root.required("mesh", |value| value.table(".", |table| mesh(table, path)));
-    let material = root.required("material", |value| value.table(".", material));
-    let damage = root.optional("damage", |value| value.table(".", damage));
-    let time = root.optional("time", |value| value.table(".", time));
-    let body_force = root.optional("body", |value| value.table(".", body_force));
-    let contact = root.optional("contact", Value::options);
-    let output = root.optional("output", |value| value.table(".", output));
-    let boundaries = root.required("boundary", boundaries);
+pub(super) fn scene(root: &mut Table, path: &Path, text: &SceneText) -> Reading<Scene> {
+    let title = root.get("title").optional(Value::read);
+    let mesh = root.get("mesh").table(".", |table| mesh(table, path));
+    let material = root.get("material").table(".", material);
+    let damage = root.get("damage").optional(|value| value.table(".", damage));
+    let time = root.get("time").optional(|value| value.table(".", time));
+    let body_force = root.get("body").optional(|value| {
+        value.table(".", |body| body.get("force").optional(|value| value.pair(Value::expression)))
+    });
+    let contact = root.get("contact").optional(Value::options);
+    let output = root.get("output").optional(|value| value.table(".", output));
+    let boundaries = boundaries(&root.get("boundary"));
 
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let (time, note) = time?.unzip();
@@ -46,58 +48,54 @@ pub(super) fn scene(root: &mut Table, path: &Path) -> Reading<Scene> {
         output: output?.unwrap_or_default(),
         boundaries: boundaries?,
         notes: note.flatten().into_iter().collect(),
-        text: root.value.scene_text(),
+        text: text.clone(),
     })
 }
 
 fn mesh(table: &mut Table, scene: &Path) -> Reading<MeshSource> {
-    let file = table.required("file", |value| {
-        let file = value.text()?;
-        match Path::new(&file).extension().and_then(|extension| extension.to_str()) {
-            Some("geo" | "msh") => Ok(file),
-            _ => Err(value.refuse("must be a .geo or .msh file")),
-        }
+    let (file, size, parameters) = (table.get("file"), table.get("size"), table.get("parameters"));
+    let name = file.read::<String>().and_then(|name| match Path::new(&name).extension() {
+        Some(extension) if extension == "geo" || extension == "msh" => Ok(name),
+        _ => Err(file.refuse("must be a .geo or .msh file")),
     });
-    let size = table.optional("size", |value| value.positive("m"));
-    let parameters =
-        table.optional("parameters", |value| value.map(|value| value.number("finite", |_| true)));
+    let mesh_size = size.optional(|size| size.positive("m"));
+    let constants =
+        parameters.optional(|table| table.map(|value| value.number("finite", |_| true)));
 
-    let (file, size, parameters) = (file?, size?, parameters?);
-    if file.ends_with(".msh") && (size.is_some() || parameters.is_some()) {
-        let key = if size.is_some() { "size" } else { "parameters" };
-        let problem = format!("has no effect: \"{file}\" is used as it is; name its .geo");
-        return Err(table.refuse(key, problem));
+    let (name, mesh_size, constants) = (name?, mesh_size?, constants?);
+    if name.ends_with(".msh") && (mesh_size.is_some() || constants.is_some()) {
+        let useless = if mesh_size.is_some() { size } else { parameters };
+        let problem = format!("has no effect: \"{name}\" is used as it is; name its .geo");
+        return Err(useless.refuse(problem));
     }
-    let mut parameters = parameters.unwrap_or_default();
-    if let Some(size) = size
-        && parameters.insert("size".into(), size).is_some()
+    let mut parameters = constants.unwrap_or_default();
+    if let Some(mesh_size) = mesh_size
+        && parameters.insert("size".into(), mesh_size).is_some()
     {
-        return Err(table.refuse("size", "is given a second time in mesh.parameters; keep one"));
+        return Err(size.refuse("is given a second time in mesh.parameters; keep one"));
     }
-    Ok(MeshSource { file: scene.parent().unwrap_or(Path::new("")).join(file), parameters })
+    Ok(MeshSource { file: scene.parent().unwrap_or(Path::new("")).join(name), parameters })
 }
 
 fn material(table: &mut Table) -> Reading<Material> {
-    let young = table.required("young", |value| value.positive("Pa"));
-    let poisson = table.required("poisson", |value| {
-        value.number("between -1 and 0.5, both excluded", |nu| -1.0 < nu && nu < 0.5)
-    });
-    let plane = table.required("plane", |value| {
-        value.choice([("stress", Plane::Stress), ("strain", Plane::Strain)])
-    });
+    let young = table.get("young").positive("Pa");
+    let poisson = table.get("poisson");
+    let poisson = poisson.number("between -1 and 0.5, both excluded", |nu| -1.0 < nu && nu < 0.5);
+    let plane = table.get("plane").choice([("stress", Plane::Stress), ("strain", Plane::Strain)]);
     Ok(Material { young: young?, poisson: poisson?, plane: plane? })
 }
 
 fn damage(table: &mut Table) -> Reading<Damage> {
-    let rate = |value: &Value| value.number("at least 0 (1/s)", |rate| rate >= 0.0);
-    let diffusion = table.required("diffusion", |value| value.positive("m²/s"));
-    let lambda_d = table.required("lambda_d", rate);
-    let lambda_u = table.required("lambda_u", rate);
-    let lambda_w = table.required("lambda_w", rate);
-    let strain_cap = table.required("strain_cap", |value| value.number("positive", |q| q > 0.0));
-    let threshold = table.required("threshold", Value::fraction);
-    let initial = table.required("initial", Value::expression_in_space);
-    let mass = table.optional("mass", |value| {
+    let diffusion = table.get("diffusion").positive("m²/s");
+    let mut rate = |key| table.get(key).number("at least 0 (1/s)", |rate| rate >= 0.0);
+    let (lambda_d, lambda_u, lambda_w) = (rate("lambda_d"), rate("lambda_u"), rate("lambda_w"));
+    let strain_cap = table.get("strain_cap").number("positive", |q| q > 0.0);
+    let threshold = table.get("threshold");
+    let threshold =
+        threshold.number("between 0 and 1, both excluded", |zeta| 0.0 < zeta && zeta < 1.0);
+    let initial = table.get("initial");
+    let zeta_0 = initial.expression_in_space();
+    let mass = table.get("mass").optional(|value| {
         value.choice([("consistent", Mass::Consistent), ("lumped", Mass::Lumped)])
     });
 
@@ -109,49 +107,49 @@ fn damage(table: &mut Table) -> Reading<Damage> {
         strain_cap: strain_cap?,
         threshold: threshold?,
     };
-    let initial = initial?;
-    match initial.as_constant() {
+    let zeta_0 = zeta_0?;
+    match zeta_0.as_constant() {
         Some(value) if !may_start_at(&law, value) => {
-            let problem = format!("must be in ({}, 1], but is {value}", law.threshold);
-            Err(table.refuse("initial", problem))
+            Err(initial.refuse(format!("must be in ({}, 1], but is {value}", law.threshold)))
         }
-        _ => Ok(Damage { law, initial, mass: mass?.unwrap_or_default() }),
+        _ => Ok(Damage { law, initial: zeta_0, mass: mass?.unwrap_or_default() }),
     }
 }
 
 /// The time grid, and what to tell where the step that is written does not divide the end.
 fn time(table: &mut Table) -> Reading<(TimeGrid, Option<String>)> {
-    let end = table.required("end", |value| value.positive("s"));
+    let end = table.get("end").positive("s");
+    let (step, tolerance) = (table.get("step"), table.get("tolerance"));
     // None: chosen by an estimate of the error.
-    let step = table.required("step", |value| match &value.node.content {
-        Content::Text(text) if text == "auto" => Ok(None),
-        Content::Text(_) => Err(value.refuse("must be a number (s) or \"auto\"")),
-        _ => value.positive("s").map(Some),
+    let length = step.required().and_then(|value| match value.as_str() {
+        Some("auto") => Ok(None),
+        Some(_) => Err(step.refuse("must be a number (s) or \"auto\"")),
+        None => step.positive("s").map(Some),
     });
-    let tolerance = table.optional("tolerance", |value| {
+    let allowed = tolerance.optional(|value| {
         value.number("at least 1e-5 (rounding hides smaller errors of ζ) and below 1", |number| {
             (1e-5..1.0).contains(&number)
         })
     });
 
-    let (end, step, tolerance) = (end?, step?, tolerance?);
-    let Some(step) = step else {
-        let tolerance = tolerance.unwrap_or(STEP_TOLERANCE);
+    let (end, length, allowed) = (end?, length?, allowed?);
+    let Some(length) = length else {
+        let tolerance = allowed.unwrap_or(STEP_TOLERANCE);
         return Ok((TimeGrid { end, stepping: Stepping::Auto { tolerance } }, None));
     };
-    if tolerance.is_some() {
-        return Err(table.refuse("tolerance", "has no effect unless step = \"auto\""));
+    if allowed.is_some() {
+        return Err(tolerance.refuse("has no effect unless step = \"auto\""));
     }
-    if step > end {
-        let problem = format!("must be positive and at most the end, {end} s, but is {step}");
-        return Err(table.refuse("step", problem));
+    if length > end {
+        let problem = format!("must be positive and at most the end, {end} s, but is {length}");
+        return Err(step.refuse(problem));
     }
-    if end / step > MOST_STEPS {
-        let problem = format!("is {step}: more than {MOST_STEPS:e} steps to {end} s");
-        return Err(table.refuse("step", problem));
+    if end / length > MOST_STEPS {
+        let problem = format!("is {length}: more than {MOST_STEPS:e} steps to {end} s");
+        return Err(step.refuse(problem));
     }
-    let grid = TimeGrid::uniform(end, step);
-    Ok((grid, other_step(grid, step)))
+    let grid = TimeGrid::uniform(end, length);
+    Ok((grid, other_step(grid, length)))
 }
 
 fn other_step(grid: TimeGrid, asked: f64) -> Option<String> {
@@ -167,10 +165,9 @@ fn other_step(grid: TimeGrid, asked: f64) -> Option<String> {
     })
 }
 
-fn body_force(table: &mut Table) -> Reading<Option<[Expression; 2]>> {
-    table.optional("force", |value| value.pair(Value::expression))
-}
-
 fn output(table: &mut Table) -> Reading<OutputOptions> {
-    Ok(OutputOptions { every: table.optional("every", |value| value.whole(1))? })
+    let every = table.get("every").optional(|value| {
+        value.number("a whole number, at least 1", |every| every.fract() == 0.0 && every >= 1.0)
+    });
+    Ok(OutputOptions { every: every?.map(|every| every as usize) })
 }

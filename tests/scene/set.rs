@@ -50,6 +50,8 @@ fn a_bad_set_is_named() {
         ("time.step=-1", ["base.toml, --set time.step=-1: time.step must be positive", "is -1"]),
         ("time.step=fast", ["--set time.step=fast: time.step must be a number", "\"auto\""]),
         ("time.step", ["--set time.step: has no `=`", "--set KEY=VALUE"]),
+        ("", ["--set : has no `=`", "--set KEY=VALUE"]),
+        ("[time]", ["--set [time]: has no `=`", "--set KEY=VALUE"]),
         ("=3", ["--set =3: the key is no dotted TOML key", "--set KEY=VALUE"]),
         ("a b=3", ["--set a b=3: the key is no dotted TOML key", "quote odd names"]),
         ("time=3", ["--set time=3: time must be a table", "--set time=3"]),

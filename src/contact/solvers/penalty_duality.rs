@@ -60,6 +60,7 @@ pub struct PenaltyOptions {
     /// Whether Anderson mixes the iterates.
     pub accelerate: bool,
     /// Iterations allowed for one contact problem.
+    #[serde(deserialize_with = "whole")]
     pub iterations: usize,
 }
 
@@ -71,6 +72,12 @@ impl Default for PenaltyOptions {
 
 fn positive<'de, D: Deserializer<'de>>(value: D) -> Result<Option<f64>, D::Error> {
     number(value, "positive (Pa/m)", |value| value > 0.0 && value.is_finite()).map(Some)
+}
+
+/// Also written as 2e4.
+fn whole<'de, D: Deserializer<'de>>(value: D) -> Result<usize, D::Error> {
+    let holds = |value: f64| value.fract() == 0.0 && value >= 0.0;
+    Ok(number(value, "a whole number, not negative", holds)? as usize)
 }
 
 impl<'s> PenaltyDuality<'s> {
