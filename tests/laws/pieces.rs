@@ -199,6 +199,24 @@ fn contact_holds_a_part_at_its_hinge_like_a_lever() {
 }
 
 #[test]
+fn a_triangle_between_three_parts_carries_though_no_node_is_its_own() {
+    // Two squares are clamped; the triangle between them keeps a corner of the third in its place.
+    let places = [[0.0, 0.0], [2.0, 0.0], [1.0, 2.0]];
+    let mut mesh = together(&places.map(|x| at(square(2), x)), true);
+    let corners = [[1.0, 1.0], [2.0, 1.0], [1.0, 2.0]];
+    mesh.triangles.push(corners.map(|x| mesh.nodes.iter().position(|y| *y == x).unwrap()));
+    let problem = stands(
+        mesh,
+        "{ name = 'bottom1', displacement = [0, 0] }, { name = 'bottom2', displacement = [0, 0] },
+         { name = 'bottom3', gap = '2 - x' }, { name = 'top3', traction = [0, -1] }",
+    );
+    assert_eq!((problem.motions.free.len(), problem.motions.resisted()), (0, 1));
+    for solver in SOLVERS {
+        close(run(&problem, solver).last.record.contact_force, 0.5, 1e-9);
+    }
+}
+
+#[test]
 fn parts_hold_each_other_where_their_hinges_leave_no_motion() {
     // An arch of three: both feet clamped. A ring of four with one clamped is a linkage.
     let parts = [[0.0, 0.0], [1.0, 1.0], [2.0, 0.0], [1.0, -1.0]].map(|x| at(square(2), x));

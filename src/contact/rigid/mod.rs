@@ -17,7 +17,7 @@ use crate::{
     mesh::Components,
 };
 use nalgebra::{DMatrix, DVector};
-use std::ops::Range;
+use std::{collections::BTreeSet, ops::Range};
 
 /// The rigid motions that prescribed displacements leave free.
 ///
@@ -68,7 +68,7 @@ impl RigidMotions {
             free: Vec::new(),
             resisted: Vec::new(),
             normal: DMatrix::zeros(0, 0),
-            parts: Part::all(body, &part_of_node, &pieces),
+            parts: Part::all(body, &part_of_node, &pieces, &hinges),
             part_of_node,
             pieces: pieces.len(),
             hinge: hinges.first().map(|&(node, _)| nodes[node]),
@@ -213,15 +213,27 @@ impl RigidMotions {
 impl Part {
     /// Area, centre and radius of all parts by the areas of their nodes: orthogonality is then
     /// exact in the sums over nodes that take the place of integrals.
-    fn all(body: &Body, part_of_node: &[usize], pieces: &[Vec<usize>]) -> Vec<Self> {
+    ///
+    /// A hinge counts for its own part, and for another one that has no node of its own.
+    fn all(
+        body: &Body,
+        part_of_node: &[usize],
+        pieces: &[Vec<usize>],
+        hinges: &[(usize, [usize; 2])],
+    ) -> Vec<Self> {
         let mut parts = vec![Self::default(); pieces.iter().map(Vec::len).sum()];
-        let nodes = || part_of_node.iter().zip(&body.mesh.nodes).zip(&body.node_area);
-        for ((&part, [x, y]), area) in nodes() {
+        let mut nodes: Vec<(usize, usize)> = part_of_node.iter().copied().zip(0..).collect();
+        let own: BTreeSet<usize> = part_of_node.iter().copied().collect();
+        let further = hinges.iter().map(|&(node, [_, part])| (part, node));
+        nodes.extend(further.filter(|(part, _)| !own.contains(part)));
+        for &(part, node) in &nodes {
+            let ([x, y], area) = (body.mesh.nodes[node], body.node_area[node]);
             let Self { area: sum, centre: [cx, cy], .. } = &mut parts[part];
             (*sum, *cx, *cy) = (*sum + area, *cx + area * x, *cy + area * y);
         }
         parts.iter_mut().for_each(|part| part.centre = part.centre.map(|v| v / part.area));
-        for ((&part, [x, y]), area) in nodes() {
+        for &(part, node) in &nodes {
+            let ([x, y], area) = (body.mesh.nodes[node], body.node_area[node]);
             let part = &mut parts[part];
             part.radius += area * ((x - part.centre[0]).powi(2) + (y - part.centre[1]).powi(2));
         }

@@ -29,8 +29,9 @@ pub(super) const ENTRY: SolverEntry = SolverEntry {
 /// Kunisch, SIAM J. Optim. 13, 2003: a semismooth Newton method). The active set of the last step
 /// is the first of this one.
 ///
-/// Pivoting on all violating indices may return to an earlier set. [`Pivoting`] sees that their
-/// number falls, and else takes one at a time, which ends for every positive definite K. Where K
+/// Pivoting on all violating indices may return to an earlier set. Where their number has not fallen
+/// for a few times, only the last of them is pivoted on until it has (block principal pivoting, Júdice
+/// and Pires, Comput. Oper. Res. 21, 1994, with Murty's rule, finite for positive definite K). Where K
 /// is singular and A leaves a rigid motion unconstrained, the body moves as the load drives it
 /// until further bounds are reached.
 pub(super) struct ActiveSet<'s> {
@@ -39,6 +40,9 @@ pub(super) struct ActiveSet<'s> {
     active: Vec<f64>,
     elastic: ElasticSolver<'s>,
 }
+
+/// Times that the number of violating indices may fail to fall before only one is pivoted on.
+const PATIENCE: usize = 5;
 
 impl<'s> ActiveSet<'s> {
     /// Called `name`: the set of a problem without bounds is empty, and its first solve the last.
@@ -170,7 +174,7 @@ impl ContactSolver for ActiveSet<'_> {
         c: &mut Vector,
     ) -> Result<ContactReport, ContactError> {
         let mut report = ContactReport::default();
-        let mut rule = Pivoting::new();
+        let (mut fewest, mut patience) = (usize::MAX, PATIENCE);
         self.first_guess(problem, c)?;
         for _ in 0..30 + 5 * problem.bound_count() {
             report.iterations += 1;
@@ -180,7 +184,11 @@ impl ContactSolver for ActiveSet<'_> {
             if count == 0 {
                 return Ok(report);
             }
-            let single = rule.single(count);
+            let single = count >= fewest && patience == 0;
+            (fewest, patience) = match count < fewest {
+                true => (count, PATIENCE),
+                false => (fewest, patience.saturating_sub(1)),
+            };
             report.fallbacks += usize::from(single && count > 1);
             let chosen = if single { last(problem.comm, &violating) } else { &violating };
             if !self.pivot(problem, c, chosen)? {
@@ -195,33 +203,6 @@ impl ContactSolver for ActiveSet<'_> {
             residuals: Kkt::UNKNOWN,
             detail: "the active set still changes".to_owned(),
         })
-    }
-}
-
-/// Block principal pivoting (Júdice and Pires, Comput. Oper. Res. 21, 1994): on all violating
-/// indices while their number falls, or for a few times more; then only on the last of them
-/// (Murty's rule, finite for positive definite matrices) until it has fallen.
-struct Pivoting {
-    fewest: usize,
-    patience: usize,
-}
-
-const PATIENCE: usize = 5;
-
-impl Pivoting {
-    fn new() -> Self {
-        Self { fewest: usize::MAX, patience: PATIENCE }
-    }
-
-    /// Whether to pivot on only one of so many violating indices.
-    fn single(&mut self, violating: usize) -> bool {
-        if violating < self.fewest {
-            (self.fewest, self.patience) = (violating, PATIENCE);
-            return false;
-        }
-        let single = self.patience == 0;
-        self.patience = self.patience.saturating_sub(1);
-        single
     }
 }
 

@@ -3,7 +3,7 @@
 use super::{ContactReport, ContactSolver, SolverEntry};
 use crate::{
     cholesky::{Factor, Precision},
-    contact::{ContactError, ContactProblem, Kkt},
+    contact::{Bound, ContactError, ContactProblem, Kkt},
     petsc::{BoundedQuadratic, Matrix, PetscError, Session, TaoReport, Vector},
 };
 
@@ -24,8 +24,16 @@ pub const TAO_TYPES: [&str; 12] = [
 
 /// One of TAO's types on a kept Cholesky factor (`-tao_type` chooses another).
 ///
-/// TAO is called again with the U it found ([`Scaled`]) until the KKT residuals are met, each time
-/// from the last answer.
+/// The problem is put in the units that TAO's absolute tolerances suppose: with s the size of K and U
+/// that of the answer,
+///
+/// ```text
+/// x = c/U minimises ½ xᵀ(K/s)x − (f/(sU))ᵀx within the bounds over U.
+/// ```
+///
+/// Where K is singular, ½ρ|x − c/U|² with the last answer c is added (proximal point method,
+/// Rockafellar, SIAM J. Control Optim. 14, 1976). TAO is called again with the U it found until the
+/// KKT residuals are met, each time from the last answer.
 struct Tao<'s> {
     session: &'s Session,
     kind: String,
@@ -40,8 +48,7 @@ struct Tao<'s> {
 const CALLS: usize = 8;
 const PROXIMAL_CALLS: usize = 40;
 const STALLED: usize = 7;
-/// Relative size of the proximal term that makes K definite where contact alone constrains a
-/// rigid motion.
+/// ρ where contact alone constrains a rigid motion.
 const PROXIMAL: f64 = 1e-7;
 /// Stands for infinity, in units of U, where the interior-point method cannot bear it; an answer
 /// that touches this box is not stationary, so the residuals reject it.
@@ -55,6 +62,53 @@ impl<'s> Tao<'s> {
         let kind = if kind.is_empty() { "tron" } else { kind }.to_owned();
         let factor = Factor::new(session, "elastic_", Precision::Preconditioner);
         Self { session, kind, tao: None, factor, displacement: 0.0 }
+    }
+
+    /// The solver's name, with its variant.
+    fn method(&self) -> String {
+        format!("{}:{}", ENTRY.name, self.kind)
+    }
+
+    /// Calls TAO from c for K/s + ρI = `stiffness` and U = `unit`, and leaves its answer in c.
+    fn minimise(
+        &mut self,
+        problem: &ContactProblem,
+        stiffness: &Matrix,
+        proximal: f64,
+        unit: f64,
+        c: &mut Vector,
+    ) -> Result<TaoReport, ContactError> {
+        let tao = match self.tao.take() {
+            Some(tao) => tao,
+            None => BoundedQuadratic::new::<Factor>(self.session, &self.kind, c.owned())?,
+        };
+        let tao = self.tao.insert(tao);
+        let vector = |values: Vec<f64>| -> Result<Vector, PetscError> {
+            let mut vector = Vector::zeros(self.session, values.len())?;
+            vector.set(&values)?;
+            Ok(vector)
+        };
+        let (start, force) = (c.read(<[f64]>::to_vec)?, problem.stiffness_scale * unit);
+        let load = |(f, c): (&f64, &f64)| f / force + proximal * c / unit;
+        let load = problem.load.read(|f| vector(f.iter().zip(&start).map(load).collect()))??;
+        let infinite = if self.kind == "bqpip" { BOX } else { INFINITE };
+        let limits = |unbounded: f64, side: fn(&Bound) -> f64| {
+            let mut limits = vec![unbounded; start.len()];
+            for bound in problem.bounds {
+                limits[bound.dof] = (side(bound) / unit).clamp(-infinite, infinite);
+            }
+            vector(limits)
+        };
+        let lower = limits(-infinite, |bound| bound.lower)?;
+        let upper = limits(infinite, |bound| bound.upper)?;
+        let mut x = vector(start.iter().map(|c| c / unit).collect())?;
+        let gradient = problem.linear_residual() / force;
+        let bounds = [&lower, &upper];
+        let answer = tao.minimise(stiffness, &load, bounds, &mut x, gradient, &mut self.factor);
+        let method = self.method();
+        let answer = answer.map_err(|source| ContactError::Failed { method, source })?;
+        c.write(|c| x.read(|x| c.iter_mut().zip(x).for_each(|(c, x)| *c = x * unit)))??;
+        Ok(answer)
     }
 }
 
@@ -76,33 +130,23 @@ impl ContactSolver for Tao<'_> {
         problem: &ContactProblem,
         c: &mut Vector,
     ) -> Result<ContactReport, ContactError> {
-        let tao = match self.tao.take() {
-            Some(tao) => tao,
-            None => BoundedQuadratic::new::<Factor>(self.session, &self.kind, c.owned())?,
-        };
-        let tao = self.tao.insert(tao);
-        let method = || format!("tao:{}", self.kind);
-        let infinite = if self.kind == "bqpip" { BOX } else { INFINITE };
-        let mut scaled = Scaled::new(self.session, problem, infinite)?;
+        let (proximal, calls) =
+            if problem.definite() { (0.0, CALLS) } else { (PROXIMAL, PROXIMAL_CALLS) };
+        let stiffness = problem.stiffness.scaled(1.0 / problem.stiffness_scale, proximal)?;
         let estimate = problem.max_norm(problem.load)? / problem.stiffness_scale;
         let mut unit = if self.displacement > 0.0 { self.displacement } else { estimate };
 
         let mut report = ContactReport::default();
         let (mut reason, mut residuals) = (0, Kkt::default());
         let (mut best, mut stalled) = (f64::INFINITY, 0);
-        for _ in 0..if problem.definite() { CALLS } else { PROXIMAL_CALLS } {
-            scaled.set(problem, c, unit)?;
-            let limit = problem.linear_residual() / (problem.stiffness_scale * unit);
+        for _ in 0..calls {
             let factorisations = self.factor.factorisations();
-            let answer = scaled
-                .minimise(tao, &mut self.factor, limit)
-                .map_err(|source| ContactError::Failed { method: method(), source })?;
+            let answer = self.minimise(problem, &stiffness, proximal, unit, c)?;
             report.iterations += answer.iterations;
             report.linear_iterations += answer.linear_iterations;
             report.factorisations += self.factor.factorisations() - factorisations;
             reason = answer.reason;
-            c.write(|c| scaled.x.read(|x| c.iter_mut().zip(x).for_each(|(c, x)| *c = x * unit)))??;
-            let found = problem.max_norm(&scaled.x)? * unit;
+            let found = problem.max_norm(c)?;
             if found > 0.0 {
                 (unit, self.displacement) = (found, found);
             }
@@ -122,7 +166,7 @@ impl ContactSolver for Tao<'_> {
             return Ok(report);
         }
         Err(ContactError::NotConverged {
-            method: method(),
+            method: self.method(),
             report: Box::new(report),
             residuals,
             detail: format!(
@@ -131,71 +175,5 @@ impl ContactSolver for Tao<'_> {
                 report.false_claims
             ),
         })
-    }
-}
-
-/// The contact problem in the units that TAO's absolute tolerances suppose: with s the size of K
-/// and U that of the answer, x = c/U minimises ½ xᵀ(K/s)x − (f/(sU))ᵀx within the bounds over U.
-///
-/// Where K is singular, ½ρ|x − c/U|² with the last answer c is added (proximal point method,
-/// Rockafellar, SIAM J. Control Optim. 14, 1976).
-struct Scaled {
-    stiffness: Matrix,
-    load: Vector,
-    /// The lower bounds, and the upper ones.
-    bounds: [Vector; 2],
-    x: Vector,
-    /// ρ.
-    proximal: f64,
-    infinite: f64,
-}
-
-impl Scaled {
-    fn new(session: &Session, problem: &ContactProblem, infinite: f64) -> Result<Self, PetscError> {
-        let proximal = if problem.definite() { 0.0 } else { PROXIMAL };
-        let zeros = || Vector::zeros(session, problem.load.owned());
-        Ok(Self {
-            stiffness: problem.stiffness.scaled(1.0 / problem.stiffness_scale, proximal)?,
-            load: zeros()?,
-            bounds: [zeros()?, zeros()?],
-            x: zeros()?,
-            proximal,
-            infinite,
-        })
-    }
-
-    /// Sets load, bounds and start for the start `c` and U = `unit`.
-    fn set(&mut self, problem: &ContactProblem, c: &Vector, unit: f64) -> Result<(), PetscError> {
-        let start = c.read(<[f64]>::to_vec)?;
-        let (s, proximal, infinite) = (problem.stiffness_scale, self.proximal, self.infinite);
-        self.load.write(|v| {
-            problem.load.read(|f| {
-                for i in 0..v.len() {
-                    v[i] = f[i] / (s * unit) + proximal * start[i] / unit;
-                }
-            })
-        })??;
-        let limit = |value: f64| (value / unit).clamp(-infinite, infinite);
-        let [lower, upper] = &mut self.bounds;
-        lower.write(|v| {
-            v.fill(-infinite);
-            problem.bounds.iter().for_each(|b| v[b.dof] = limit(b.lower));
-        })?;
-        upper.write(|v| {
-            v.fill(infinite);
-            problem.bounds.iter().for_each(|b| v[b.dof] = limit(b.upper));
-        })?;
-        self.x.write(|v| v.iter_mut().zip(&start).for_each(|(v, c)| *v = c / unit))
-    }
-
-    /// Minimises with TAO until the gradient is about `limit` in ‖·‖₂.
-    fn minimise(
-        &mut self,
-        tao: &mut BoundedQuadratic,
-        factor: &mut Factor,
-        limit: f64,
-    ) -> Result<TaoReport, PetscError> {
-        let bounds = self.bounds.each_ref();
-        tao.minimise(&self.stiffness, &self.load, bounds, &mut self.x, limit, factor)
     }
 }
