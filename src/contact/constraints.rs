@@ -1,6 +1,6 @@
 //! From directions and values at nodes to nodal bases, prescribed unknowns and bounds.
 
-use super::{Bound, ConstraintError, FixedRow, GapRow};
+use super::{Bound, Conflict, ConstraintError, FixedRow, GapRow};
 use crate::{
     fem::{NodalBases, Subdomain},
     mesh::extent,
@@ -66,15 +66,15 @@ impl Constraints {
             further: Vec::new(),
         };
         for (node, (numbers, gaps)) in nodes {
-            let at = coordinates[node];
+            let error = |conflict| ConstraintError { at: coordinates[node], conflict };
             // The basis of a node: its prescribed directions, then the normals of its gaps as far
             // as they are independent of these and of each other.
             let mut basis = constraints.prescribe(node, &numbers, fixed);
             let prescribed = basis.len();
             for gap in gaps {
-                constraints.add_gap(gap, &mut basis, prescribed, at)?;
+                constraints.add_gap(gap, &mut basis, prescribed).map_err(error)?;
             }
-            constraints.set_basis(node, &basis, at)?;
+            constraints.set_basis(node, &basis).map_err(error)?;
         }
         Ok(constraints)
     }
@@ -103,10 +103,9 @@ impl Constraints {
         gap: &mut GapRow,
         basis: &mut Vec<[f64; 2]>,
         prescribed: usize,
-        at: [f64; 2],
-    ) -> Result<(), ConstraintError> {
+    ) -> Result<(), Conflict> {
         // Where nothing is left to move, no unknown is needed.
-        let line = if prescribed == 2 { None } else { parallel(basis, gap.normal, at)? };
+        let line = if prescribed == 2 { None } else { parallel(basis, gap.normal)? };
         if let Some(line) = line {
             gap.normal = along(basis[line], gap.normal);
         }
@@ -127,7 +126,7 @@ impl Constraints {
                 basis.push(gap.normal);
                 return Ok(());
             }
-            None if prescribed == 0 => return Err(ConstraintError::TooMany { at }),
+            None if prescribed == 0 => return Err(Conflict::TooMany),
             // ν = a d + b n with the prescribed direction d, by Cramer's rule.
             None => Some((dof(1), cross(basis[0], gap.normal) / cross(basis[0], basis[1]))),
         };
@@ -136,12 +135,7 @@ impl Constraints {
     }
 
     /// Makes `basis`, completed by a perpendicular, the basis of a node, unless it is the identity.
-    fn set_basis(
-        &mut self,
-        node: usize,
-        basis: &[[f64; 2]],
-        at: [f64; 2],
-    ) -> Result<(), ConstraintError> {
+    fn set_basis(&mut self, node: usize, basis: &[[f64; 2]]) -> Result<(), Conflict> {
         let (a, b) = match *basis {
             [d] => (d, [-d[1], d[0]]),
             [a, b] => (a, b),
@@ -151,8 +145,7 @@ impl Constraints {
         if directions == Matrix2::identity() {
             return Ok(());
         }
-        let dependent = ConstraintError::Dependent { at, angle: cross(a, b).abs() };
-        self.bases.set(node, directions).ok_or(dependent)
+        self.bases.set(node, directions).ok_or(Conflict::Dependent(cross(a, b).abs()))
     }
 
     /// The prescribed unknowns (pins are none).
@@ -186,22 +179,21 @@ impl Constraints {
             let u = self.bases.inverse(node).map_or(c, |inverse| inverse * c);
             u.x * x + u.y * y
         };
+        let error = |node: usize, conflict| ConstraintError { at: coordinates[node], conflict };
         let largest = || values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         for &(FixedRow { node, direction }, number) in &self.implied {
             let values = [along(node, direction), values[number]];
             if (values[0] - values[1]).abs() > ROUNDING * largest() {
-                let at = coordinates[node];
-                return Err(ConstraintError::Contradicts { at, values, direction });
+                return Err(error(node, Conflict::Contradicts { values, direction }));
             }
         }
         let mut bounds = self.bounds.clone();
         for &FurtherGap { row, bounded } in &self.further {
-            let at = coordinates[row.node];
             let room = row.gap - along(row.node, row.normal);
             let Some((dof, b)) = bounded else {
                 let depth = -room;
                 if depth > 0.0 && depth > ROUNDING * largest().max(extent(coordinates)) {
-                    return Err(ConstraintError::Penetrates { at, depth });
+                    return Err(error(row.node, Conflict::Penetrates(depth)));
                 }
                 continue;
             };
@@ -213,7 +205,7 @@ impl Constraints {
             }
             let depth = *lower - *upper;
             if depth > 0.0 && depth > ROUNDING * extent(coordinates) {
-                return Err(ConstraintError::NoRoom { at, depth });
+                return Err(error(row.node, Conflict::NoRoom(depth)));
             }
             *lower = lower.min(*upper);
         }
@@ -252,14 +244,10 @@ impl Constraints {
 }
 
 /// The direction of `basis` on whose line `normal` lies.
-fn parallel(
-    basis: &[[f64; 2]],
-    normal: [f64; 2],
-    at: [f64; 2],
-) -> Result<Option<usize>, ConstraintError> {
+fn parallel(basis: &[[f64; 2]], normal: [f64; 2]) -> Result<Option<usize>, Conflict> {
     let angles = || basis.iter().map(|b| cross(*b, normal).abs());
     if let Some(angle) = angles().find(|angle| (PARALLEL..DEPENDENT).contains(angle)) {
-        return Err(ConstraintError::Dependent { at, angle });
+        return Err(Conflict::Dependent(angle));
     }
     Ok(angles().position(|angle| angle < PARALLEL))
 }

@@ -63,14 +63,11 @@ impl<'s> ElasticSolver<'s> {
         report.factorisations += solved.factorisations;
         match solved.converged {
             true => Ok(()),
-            false => Err(ContactError::NotConverged {
-                method: self.method.to_owned(),
-                report: Box::new(*report),
-                residuals: Kkt::UNKNOWN,
-                detail: "the stiffness of its linear system is not positive definite, or too \
-                         ill-conditioned for the tolerance"
-                    .into(),
-            }),
+            false => {
+                let detail = "the stiffness of its linear system is not positive definite, or too \
+                              ill-conditioned for the tolerance";
+                Err(ContactError::stopped(self.method, *report, Kkt::UNKNOWN, detail))
+            }
         }
     }
 

@@ -5,68 +5,54 @@ use crate::petsc::{Communicator, PetscError};
 
 /// Displacement conditions at a node that contradict each other.
 #[derive(Debug, Clone, thiserror::Error)]
-pub enum ConstraintError {
-    /// A prescribed displacement goes through the obstacle.
+#[error("at node ({}, {}), {conflict}", at[0], at[1])]
+pub struct ConstraintError {
+    /// Coordinates of the node, m.
+    pub at: [f64; 2],
+    /// What is wrong there.
+    pub conflict: Conflict,
+}
+
+/// How displacement conditions contradict each other.
+#[derive(Debug, Clone, thiserror::Error)]
+pub enum Conflict {
+    /// A prescribed displacement goes so far, m, through the obstacle.
     #[error(
-        "the displacement prescribed at node ({}, {}) goes {depth:.3e} m through the obstacle \
-         there: a node that is both prescribed and in contact keeps its prescribed value, which must \
-         respect the gap", at[0], at[1]
+        "the prescribed displacement goes {0:.3e} m through the obstacle: a node that is both \
+         prescribed and in contact keeps its prescribed value, which must respect the gap"
     )]
-    Penetrates {
-        /// Coordinates of the node, m.
-        at: [f64; 2],
-        /// How far beyond the gap, m.
-        depth: f64,
-    },
+    Penetrates(f64),
     /// Two prescribed values contradict each other.
     #[error(
-        "two boundaries prescribe different displacements at their common node ({}, {}): \
-         {} and {} m along ({:.3}, {:.3})",
-        at[0], at[1], values[0], values[1], direction[0], direction[1]
+        "two boundaries prescribe different displacements: {} and {} m along ({:.3}, {:.3})",
+        values[0], values[1], direction[0], direction[1]
     )]
     Contradicts {
-        /// Coordinates of the node, m.
-        at: [f64; 2],
         /// The value that the other conditions imply and the one prescribed, m.
         values: [f64; 2],
         /// The common direction.
         direction: [f64; 2],
     },
-    /// Two obstacles leave a node no place.
+    /// Two obstacles leave a node no place; the gaps lack so much, m.
     #[error(
-        "the obstacles on both sides of node ({}, {}) leave it no room: it would have to be \
-         {depth:.3e} m inside one of them; widen a gap or change the displacement prescribed there",
-        at[0], at[1]
+        "the obstacles on both sides leave no room: the node would have to be {0:.3e} m inside one \
+         of them; widen a gap or change the displacement prescribed there"
     )]
-    NoRoom {
-        /// Coordinates of the node, m.
-        at: [f64; 2],
-        /// How much the gaps lack, m.
-        depth: f64,
-    },
-    /// Directions too near to each other to be unknowns of their own, too far apart to be one.
+    NoRoom(f64),
+    /// Directions too near to each other to be unknowns of their own, too far apart to be one: the
+    /// angle between their lines, rad.
     #[error(
-        "two conditions at node ({}, {}) (prescribed directions or contact normals) differ from \
-         one line by an angle of only {angle:.1e}: double precision cannot tell their effects apart; \
-         open the wedge there beyond {DEPENDENT:e} rad, or let one boundary end before the node",
-        at[0], at[1]
+        "two conditions (prescribed directions or contact normals) differ from one line by an angle \
+         of only {0:.1e}: double precision cannot tell their effects apart; open the wedge there \
+         beyond {DEPENDENT:e} rad, or let one boundary end before the node"
     )]
-    Dependent {
-        /// Coordinates of the node, m.
-        at: [f64; 2],
-        /// The angle between the directions' lines, rad.
-        angle: f64,
-    },
+    Dependent(f64),
     /// More independent conditions than the two unknowns of a node.
     #[error(
-        "more than two independent conditions (prescribed directions and contact normals) meet at \
-         node ({}, {}): a node of the plane has two unknowns; free one of them or separate the \
-         boundaries", at[0], at[1]
+        "more than two independent conditions (prescribed directions and contact normals) meet: a \
+         node of the plane has two unknowns; free one of them or separate the boundaries"
     )]
-    TooMany {
-        /// Coordinates of the node, m.
-        at: [f64; 2],
-    },
+    TooMany,
 }
 
 /// A contact solve that did not end well.
@@ -130,6 +116,17 @@ pub enum ContactError {
 }
 
 impl ContactError {
+    /// A method ended above the tolerance.
+    pub(super) fn stopped(
+        method: &str,
+        report: ContactReport,
+        residuals: Kkt,
+        detail: impl Into<String>,
+    ) -> Self {
+        let (method, report) = (method.to_owned(), Box::new(report));
+        Self::NotConverged { method, report, residuals, detail: detail.into() }
+    }
+
     /// Whether the method stopped short of its tolerance, which all ranks then know.
     pub fn stopped_short(&self) -> bool {
         matches!(self, Self::NotConverged { .. })

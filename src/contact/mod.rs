@@ -5,7 +5,7 @@
 //! ```
 //!
 //! [`Constraints`] chooses unknowns c so that each contact condition bounds one of them,
-//! [`RigidMotions`] finds the null space of K, [`solver`] makes a solver of [`REGISTRY`] by its
+//! [`RigidMotions`] finds the null space of K, [`solvers()`] makes a solver of [`REGISTRY`] by its
 //! name, and the [`Certificate`] judges u, whoever computed it.
 
 mod certificate;
@@ -20,13 +20,13 @@ mod solvers;
 
 pub use certificate::{Answer, Certificate, ContactPoint};
 pub use constraints::Constraints;
-pub use error::{ConstraintError, ContactError};
+pub use error::{Conflict, ConstraintError, ContactError};
 pub use kkt::{Kkt, Scales};
 pub use problem::ContactProblem;
 pub use rigid::{DrivenMotion, PartMotion, RigidMotion, RigidMotions};
 pub(crate) use rigid::{rigid_motion_until_contact, unconstrained_motions};
 pub use rows::{Bound, FixedRow, GapRow};
 pub use solvers::{
-    Anderson, ContactOptions, ContactReport, ContactSolver, PenaltyOptions, REGISTRY, SOLVERS,
-    SolverEntry, SolverError, TAO_TYPES, find, rescuer, solver, summaries,
+    Anderson, BoxedSolver, ContactOptions, ContactReport, ContactSolver, PenaltyOptions, REGISTRY,
+    SOLVERS, SolverEntry, SolverError, TAO_TYPES, find, solvers, summaries,
 };

@@ -57,6 +57,11 @@ impl ContactProblem<'_> {
         Ok(self.comm.max(v.read(|v| v.iter().fold(0.0_f64, |m, v| m.max(v.abs())))?))
     }
 
+    /// v at the bounded unknowns.
+    pub(super) fn at_bounds(&self, v: &Vector) -> Result<Vec<f64>, PetscError> {
+        v.read(|v| self.bounds.iter().map(|bound| v[bound.dof]).collect())
+    }
+
     /// The scales for an iterate c: a displacement larger than that of the scales raises it.
     pub(super) fn scales_at(&self, c: &Vector) -> Result<Scales, PetscError> {
         let displacement = self.scales.displacement.max(self.max_norm(c)?);

@@ -46,6 +46,9 @@ pub trait ContactSolver {
     ) -> Result<ContactReport, ContactError>;
 }
 
+/// A solver of one kind or another.
+pub type BoxedSolver<'s> = Box<dyn ContactSolver + 's>;
+
 /// What a contact solve took.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ContactReport {
@@ -94,7 +97,7 @@ pub struct SolverEntry {
     /// The solver that is asked in its place where it stops short.
     pub rescuer: Option<&'static str>,
     /// A new one; the text is the variant, or empty.
-    pub construct: for<'s> fn(&'s Session, &str, &ContactOptions) -> Box<dyn ContactSolver + 's>,
+    pub construct: for<'s> fn(&'s Session, &str, &ContactOptions) -> BoxedSolver<'s>,
 }
 
 /// All solvers of problems with obstacles, the default first.
@@ -199,35 +202,24 @@ fn alike(name: &str) -> String {
     meant.map_or_else(String::new, |known| format!(" (did you mean `{known}`?)"))
 }
 
-/// The solver called `name`; where there are no bounds every name means one linear solve, which is
-/// what the active set makes of them.
+/// The solver called `name`, and the one to ask in its place where it stops short: none of a variant,
+/// so that one sees what that does by itself, nor where the options forbid it. Without bounds every
+/// name means one linear solve, which is what the active set makes of them.
 ///
 /// # Errors
 /// There is none of that name.
-pub fn solver<'s>(
+pub fn solvers<'s>(
     session: &'s Session,
     name: &str,
     bounded: bool,
     options: &ContactOptions,
-) -> Result<Box<dyn ContactSolver + 's>, SolverError> {
+) -> Result<(BoxedSolver<'s>, Option<BoxedSolver<'s>>), SolverError> {
     let (entry, variant) = find(name)?;
-    Ok(match bounded {
-        true => (entry.construct)(session, variant, options),
-        false => Box::new(ActiveSet::new(session, "linear")),
-    })
-}
-
-/// The solver to ask in the place of the one called `name` where that stops short; none of a
-/// variant, so that one sees what that does by itself, nor where the options forbid it.
-///
-/// # Errors
-/// There is none of that name.
-pub fn rescuer<'s>(
-    session: &'s Session,
-    name: &str,
-    options: &ContactOptions,
-) -> Result<Option<Box<dyn ContactSolver + 's>>, SolverError> {
-    let (entry, variant) = find(name)?;
+    if !bounded {
+        return Ok((Box::new(ActiveSet::new(session, "linear")), None));
+    }
     let rescuer = entry.rescuer.filter(|_| options.rescue && variant.is_empty());
-    rescuer.map(|name| solver(session, name, true, options)).transpose()
+    let rescuer = rescuer.map(find).transpose()?;
+    let construct = |entry: &SolverEntry, variant| (entry.construct)(session, variant, options);
+    Ok((construct(entry, variant), rescuer.map(|(entry, variant)| construct(entry, variant))))
 }

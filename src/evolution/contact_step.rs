@@ -94,6 +94,7 @@ impl<'a> ContactStep<'a> {
         })?;
         let options = &problem.scene().contact;
         let bounded = comm.any(!constraints.bounds.is_empty());
+        let (solver, rescuer) = contact::solvers(session, solver, bounded, options)?;
         let memory = Memory {
             datum: Datum::default(),
             scales: Scales { force: LEAST_LOAD * problem.largest_load, displacement: 0.0 },
@@ -104,8 +105,8 @@ impl<'a> ContactStep<'a> {
             session,
             problem,
             phases,
-            solver: contact::solver(session, solver, bounded, options)?,
-            rescuer: contact::rescuer(session, solver, options)?.filter(|_| bounded),
+            solver,
+            rescuer,
             stiffness,
             zeta_mean: vec![1.0; body.triangles.len()],
             load: Vector::zeros(session, unknowns)?,

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use signorini::{
     contact::{
         Bound, ContactError, ContactOptions, ContactProblem, ContactReport, SOLVERS, Scales, find,
-        solver,
+        solvers,
     },
     petsc::{Communicator, Matrix, Session, Vector},
     phases::Phases,
@@ -66,7 +66,8 @@ impl Small {
             comm: Communicator::serial(),
             phases: &Phases::default(),
         };
-        let mut solver = solver(&session, name, true, &ContactOptions::default()).unwrap();
+        let options = ContactOptions::default();
+        let (mut solver, _) = solvers(&session, name, true, &options).unwrap();
         if name == "active-set" {
             solver.set_warm_start(guess);
         }

@@ -56,8 +56,8 @@ impl<'s> ActiveSet<'s> {
             let reached = |bound: &Bound, c: f64| {
                 if c >= bound.upper { 1.0 } else { -f64::from(c <= bound.lower) }
             };
-            self.active =
-                c.read(|c| problem.bounds.iter().map(|b| reached(b, c[b.dof])).collect())?;
+            let c = problem.at_bounds(c)?;
+            self.active = problem.bounds.iter().zip(c).map(|(b, c)| reached(b, c)).collect();
         }
         // A lower bound may have been one for the last problem only.
         for (side, bound) in self.active.iter_mut().zip(problem.bounds) {
@@ -197,12 +197,8 @@ impl ContactSolver for ActiveSet<'_> {
                 return Ok(report);
             }
         }
-        Err(ContactError::NotConverged {
-            method: self.name().to_owned(),
-            report: Box::new(report),
-            residuals: Kkt::UNKNOWN,
-            detail: "the active set still changes".to_owned(),
-        })
+        let detail = "the active set still changes";
+        Err(ContactError::stopped(self.name(), report, Kkt::UNKNOWN, detail))
     }
 }
 

@@ -5,7 +5,7 @@ use super::{Anderson, ContactReport, ContactSolver, SolverEntry, between_0_and_1
 use crate::{
     cholesky::LinearSystem,
     contact::{Bound, ContactError, ContactProblem, Kkt, elastic::ElasticSolver},
-    petsc::{PetscError, Session, Vector},
+    petsc::{Session, Vector},
 };
 use nalgebra::DMatrix;
 use serde::{Deserialize, Deserializer};
@@ -117,21 +117,6 @@ impl<'s> PenaltyDuality<'s> {
         self.elastic.solve(system, &rhs, u, limit, report)
     }
 
-    /// q = p − ω Bu with the contact pressure p = W⁻¹B (f − Ku) of the start u.
-    fn first(
-        &self,
-        problem: &ContactProblem,
-        omega: f64,
-        u: &Vector,
-    ) -> Result<Vec<f64>, PetscError> {
-        let residual = problem.residual(self.session, u)?;
-        let q = |u: &[f64], r: &[f64]| {
-            let at = |b: &Bound| -r[b.dof] / b.tributary_length - omega * u[b.dof];
-            problem.bounds.iter().map(at).collect()
-        };
-        u.read(|u| residual.read(|r| q(u, r)))?
-    }
-
     /// ω = 3/√(s_min s_max) from the extreme eigenvalues of the compliance S = B K⁻¹BᵀW (normal
     /// displacement per pressure), by the eigenvalues θ = s/(1 + ωs) of [`Self::lanczos`].
     fn estimate_omega(
@@ -181,7 +166,7 @@ impl<'s> PenaltyDuality<'s> {
             v.iter_mut().for_each(|v| *v /= norm);
             basis.push(v.clone());
             self.response(problem, omega, None, &v, &mut u, report)?;
-            let mut w: Vec<f64> = u.read(|u| bounds.iter().map(|b| -u[b.dof]).collect())?;
+            let mut w: Vec<f64> = problem.at_bounds(&u)?.iter().map(|u| -u).collect();
             alpha.push(dot(&w, &v));
             for earlier in basis.iter().rev().chain(basis.iter().rev()) {
                 let component = dot(&w, earlier);
@@ -226,7 +211,11 @@ impl ContactSolver for PenaltyDuality<'_> {
         };
         self.omega = Some(omega);
         report.omega = Some(omega);
-        let mut q = self.first(problem, omega, c)?;
+        // q = p − ω Bu with the contact pressure p = W⁻¹B (f − Ku) of the start u.
+        let residual = problem.at_bounds(&problem.residual(self.session, c)?)?;
+        let start = residual.iter().zip(problem.at_bounds(c)?).zip(problem.bounds);
+        let mut q: Vec<f64> =
+            start.map(|((r, u), bound)| -r / bound.tributary_length - omega * u).collect();
 
         let (mut residuals, mut first_change) = (Kkt::default(), 0.0_f64);
         let pressure = problem.scales.force / contact_length(problem);
@@ -235,7 +224,7 @@ impl ContactSolver for PenaltyDuality<'_> {
         while report.iterations < self.options.iterations {
             self.response(problem, omega, Some(problem.load), &q, c, &mut report)?;
             report.iterations += 1;
-            let normal: Vec<f64> = c.read(|c| problem.bounds.iter().map(|b| c[b.dof]).collect())?;
+            let normal = problem.at_bounds(c)?;
             // The equation is solved: only the contact conditions are left to judge, with the
             // contact forces W (q + ω Bu).
             let at_bound = |((q, u), bound): ((&f64, &f64), &Bound)| {
@@ -262,12 +251,8 @@ impl ContactSolver for PenaltyDuality<'_> {
         if residuals.within(problem.tolerance) {
             return Ok(report);
         }
-        Err(ContactError::NotConverged {
-            method: ENTRY.name.to_owned(),
-            report: Box::new(report),
-            residuals,
-            detail: format!("{} (ω = {omega:.3e} Pa/m)", residuals.missed(problem.tolerance)),
-        })
+        let detail = format!("{} (ω = {omega:.3e} Pa/m)", residuals.missed(problem.tolerance));
+        Err(ContactError::stopped(ENTRY.name, report, residuals, detail))
     }
 }
 

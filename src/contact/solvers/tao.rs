@@ -165,15 +165,11 @@ impl ContactSolver for Tao<'_> {
         if residuals.within(problem.tolerance) {
             return Ok(report);
         }
-        Err(ContactError::NotConverged {
-            method: self.method(),
-            report: Box::new(report),
-            residuals,
-            detail: format!(
-                "{} (TaoConvergedReason {reason}, {} false claims of convergence)",
-                residuals.missed(problem.tolerance),
-                report.false_claims
-            ),
-        })
+        let detail = format!(
+            "{} (TaoConvergedReason {reason}, {} false claims of convergence)",
+            residuals.missed(problem.tolerance),
+            report.false_claims
+        );
+        Err(ContactError::stopped(&self.method(), report, residuals, detail))
     }
 }
