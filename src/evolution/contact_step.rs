@@ -157,48 +157,42 @@ impl<'a> ContactStep<'a> {
     /// # Errors
     /// PETSc failed.
     pub fn accept(&mut self, time: f64) -> Result<(), PetscError> {
-        let c = self.c.read(<[f64]>::to_vec)?;
-        let c = self.next.datum.shifted(self.problem, c, 1.0);
-        let comm = self.problem.body.partition.comm();
+        let (problem, comm) = (self.problem, self.problem.body.partition.comm());
+        let mut c = self.c.read(<[f64]>::to_vec)?;
+        self.next.datum.shift(&problem.constraints, &mut c, 1.0);
         self.phases.time("extrapolation", || self.extrapolation.accept(comm, time, c));
         self.next.warm_start = self.solver.warm_start();
         self.accepted = self.next.clone();
         Ok(())
     }
 
-    /// Starts from the accepted steps: sets c, the datum and the solver's warm start.
+    /// Starts from the accepted steps: sets c, the datum and the solver's warm start. Where the active
+    /// bounds do not support the body, the datum, and c with it, moves to where the load drives the
+    /// body as a rigid one.
     fn start(&mut self, case: &LoadCase) -> Result<(), PetscError> {
-        let problem = self.problem;
+        let (problem, comm) = (self.problem, self.problem.body.partition.comm());
+        let constraints = &problem.constraints;
         self.next = self.accepted.clone();
         self.solver.set_warm_start(&self.next.warm_start);
-        let zero = case.load.iter().chain(&case.lift).all(|&value| value == 0.0);
-        let unloaded = problem.body.partition.comm().all(zero);
+        let Memory { datum, active, .. } = &mut self.next;
+        let unloaded = comm.all(case.load.iter().chain(&case.lift).all(|&value| value == 0.0));
         if unloaded {
-            self.next.datum = Datum::default();
+            *datum = Datum::default();
         }
         self.phases.time("extrapolation", || {
             let predicted = self.extrapolation.at(case.time);
-            let c = predicted.unwrap_or_else(|| vec![0.0; self.c.owned()]);
-            self.c.set(&self.next.datum.shifted(problem, c, -1.0))
+            let mut c = predicted.unwrap_or_else(|| vec![0.0; self.c.owned()]);
+            datum.shift(constraints, &mut c, -1.0);
+            self.c.set(&c)
         })?;
-        if unloaded { Ok(()) } else { self.approach(case) }
-    }
-
-    /// Where the active bounds do not support the body, moves the datum, and c with it, to where the
-    /// load drives the body as a rigid one.
-    fn approach(&mut self, case: &LoadCase) -> Result<(), PetscError> {
-        let problem = self.problem;
-        let (body, comm) = (&problem.body, problem.body.partition.comm());
-        if contact::unconstrained_motions(comm, &self.rigid, &self.next.active).is_empty() {
-            return Ok(());
+        if !unloaded && !contact::unconstrained_motions(comm, &self.rigid, active).is_empty() {
+            let (_, bounds) = datum.pose(constraints, case);
+            let (motions, mut active) = ((&self.rigid, &case.work), active.clone());
+            let (amplitudes, _) = self.c.read(|c| {
+                contact::rigid_motion_until_contact(comm, motions, &bounds, c, &mut active, false)
+            })?;
+            datum.add(constraints, &problem.motions.displacement(&problem.body, &amplitudes));
         }
-        let (_, bounds) = self.next.datum.pose(problem, case);
-        let motions = (&self.rigid, &case.work);
-        let mut active = self.next.active.clone();
-        let (amplitudes, _) = self.c.read(|c| {
-            contact::rigid_motion_until_contact(comm, motions, &bounds, c, &mut active, false)
-        })?;
-        self.next.datum.add(problem, &problem.motions.displacement(body, &amplitudes));
         Ok(())
     }
 
@@ -212,12 +206,11 @@ impl<'a> ContactStep<'a> {
         let problem = self.problem;
         let failed = |source| RunError::contact(problem, step, case.time, source);
         let mut report = ContactReport::default();
-        let mut tolerance = problem.tolerance;
-        let mut attempt = 1;
+        let (mut tolerance, mut attempt) = (problem.tolerance, 0);
         loop {
-            let (lift, bounds) = self.next.datum.pose(problem, case);
-            let force = self.set_load(&case.load, &lift)?;
-            let solved = match self.solve_contact(case, &bounds, force, tolerance) {
+            attempt += 1;
+            let (lift, bounds) = self.next.datum.pose(&problem.constraints, case);
+            let solved = match self.solve_contact(case, &lift, &bounds, tolerance) {
                 // All ranks know that the method stopped short; other errors may be one rank's.
                 Err(error) if !error.stopped_short() => return Err(failed(error)),
                 solved => solved,
@@ -227,7 +220,6 @@ impl<'a> ContactStep<'a> {
             let certified = judged.kkt.within(problem.tolerance);
             let far = !self.next.datum.is_zero() && judged.rigid_max > FAR * judged.elastic_max;
             if (far || !certified) && attempt < ATTEMPTS && self.move_datum(&judged)? {
-                attempt += 1;
                 continue;
             }
             match solved {
@@ -249,7 +241,6 @@ impl<'a> ContactStep<'a> {
                 return Err(failed(self.limited(error, &judged)));
             }
             tolerance *= 0.3 * problem.tolerance / judged.kkt.worst();
-            attempt += 1;
         }
     }
 
@@ -258,46 +249,43 @@ impl<'a> ContactStep<'a> {
         if judged.rigid_max <= DOMINANT * judged.elastic_max {
             return Ok(false);
         }
-        let c = self.c.read(<[f64]>::to_vec)?;
-        let c = self.next.datum.shifted(self.problem, c, 1.0);
+        let (datum, constraints) = (&mut self.next.datum, &self.problem.constraints);
         let nodes = &self.problem.body.mesh.nodes;
         let motion: Vec<f64> = nodes.iter().flat_map(|&x| judged.rigid.at(x)).collect();
-        self.next.datum.add(self.problem, &motion);
-        self.c.set(&self.next.datum.shifted(self.problem, c, -1.0))?;
+        self.c.write(|c| {
+            datum.shift(constraints, c, 1.0);
+            datum.add(constraints, &motion);
+            datum.shift(constraints, c, -1.0);
+        })?;
         Ok(true)
     }
 
-    /// Sets the load of the free unknowns, f − K u_D, and returns the scale of forces.
-    fn set_load(&mut self, external: &[f64], lift: &[f64]) -> Result<f64, PetscError> {
-        let problem = self.problem;
-        let (body, bases) = (&problem.body, &problem.constraints.bases);
-        let mut load = external.to_vec();
-        let mut scale = body.partition.norm(&load, 2);
-        if body.partition.comm().any(lift.iter().any(|&v| v != 0.0)) {
-            let mut u = lift.to_vec();
-            bases.displacement_to_global(&mut u);
-            let internal = problem.elasticity.internal_force(body, &self.zeta_mean, &u);
-            load.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
-            scale = scale.max(LIFTED * body.partition.norm(&load, 2));
-        }
-        bases.force_to_local(&mut load);
-        bases.zero_fixed(&mut load);
-        self.load.set(&load[..self.load.owned()])?;
-        Ok(scale)
-    }
-
-    /// Replaces c by the solution of (26); forces of `force` N per metre of thickness count as 1.
+    /// Replaces c by the solution of (26) for the load of the free unknowns, f − K u_D with u_D the
+    /// displacements of the prescribed ones, `lift`.
     fn solve_contact(
         &mut self,
         case: &LoadCase,
+        lift: &[f64],
         bounds: &[Bound],
-        force: f64,
         tolerance: f64,
     ) -> Result<ContactReport, ContactError> {
-        let comm = self.problem.body.partition.comm();
+        let (body, bases) = (&self.problem.body, &self.problem.constraints.bases);
+        let comm = body.partition.comm();
+        let mut load = case.load.clone();
+        let mut force = body.partition.norm(&load, 2);
+        if comm.any(lift.iter().any(|&v| v != 0.0)) {
+            let mut u = lift.to_vec();
+            bases.displacement_to_global(&mut u);
+            let internal = self.problem.elasticity.internal_force(body, &self.zeta_mean, &u);
+            load.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
+            force = force.max(LIFTED * body.partition.norm(&load, 2));
+        }
+        bases.force_to_local(&mut load);
+        bases.zero_fixed(&mut load);
+        let load = &load[..self.load.owned()];
+        self.load.set(load)?;
         let admits_zero = |bound: &Bound| bound.nearest(0.0) == 0.0;
-        let unloaded = self.load.read(|f| f.iter().all(|&f| f == 0.0))?;
-        if comm.all(unloaded && bounds.iter().all(admits_zero)) {
+        if comm.all(load.iter().all(|&f| f == 0.0) && bounds.iter().all(admits_zero)) {
             self.c.write(|c| c.fill(0.0))?;
             return Ok(ContactReport::default());
         }

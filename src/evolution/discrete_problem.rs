@@ -157,9 +157,9 @@ impl DiscreteProblem {
         let mut times = self.scene.sample_times(most);
         times.truncate(if self.loads.depend_on_time() { usize::MAX } else { 1 });
         for time in times {
-            self.lift_and_bounds(time, &self.loads.prescribed_at(time))?;
+            self.prescribed(time)?;
             if !self.motions.all_prevented() {
-                self.check_load(time, &self.load(time))?;
+                self.checked_load(time)?;
             }
         }
         Ok(())
@@ -181,24 +181,22 @@ impl DiscreteProblem {
     /// The load is not finite or drives an unconstrained rigid motion; prescribed values are not
     /// finite, contradict each other or go through the obstacle; obstacles leave a node no room.
     pub(super) fn load_case(&self, time: f64) -> Result<LoadCase, SetupError> {
-        let load = self.load(time);
-        self.check_load(time, &load)?;
-        let load = self.motions.balanced(&self.body, load);
+        let load = self.motions.balanced(&self.body, self.checked_load(time)?);
         let work = self.motions.work(&self.body, &load);
-        let prescribed = self.loads.prescribed_at(time);
-        let (lift, bounds) = self.lift_and_bounds(time, &prescribed)?;
+        let (prescribed, lift, bounds) = self.prescribed(time)?;
         Ok(LoadCase { time, load, work, prescribed, lift, bounds })
     }
 
-    /// Checks that the load at `time` is finite and drives no rigid motion that is unconstrained.
+    /// The nodal loads at `time`, if they are finite and drive no unconstrained rigid motion.
     /// Collective.
-    fn check_load(&self, time: f64, load: &[f64]) -> Result<(), SetupError> {
-        let comm = self.body.partition.comm();
-        if !comm.all(load.iter().all(|f| f.is_finite())) {
+    fn checked_load(&self, time: f64) -> Result<Vec<f64>, SetupError> {
+        let load = self.load(time);
+        if !self.body.partition.comm().all(load.iter().all(|f| f.is_finite())) {
             return Err(self.not_finite(time));
         }
         let driven = |source| SetupError::Driven { scene: self.scene.path.clone(), time, source };
-        self.motions.check(&self.body, load).map_err(driven)
+        self.motions.check(&self.body, &load).map_err(driven)?;
+        Ok(load)
     }
 
     /// Which value is not finite at `time`, as far as this rank knows.
@@ -209,19 +207,16 @@ impl DiscreteProblem {
         }
     }
 
-    /// The unknowns prescribed at `time` by the `values` of the prescribed rows, and the bounds on the
-    /// others.
-    fn lift_and_bounds(
-        &self,
-        time: f64,
-        values: &[f64],
-    ) -> Result<(Vec<f64>, Vec<Bound>), SetupError> {
+    /// The values of the prescribed rows at `time`, the unknowns prescribed by them and the bounds on
+    /// the others.
+    fn prescribed(&self, time: f64) -> Result<(Vec<f64>, Vec<f64>, Vec<Bound>), SetupError> {
+        let values = self.loads.prescribed_at(time);
         if !values.iter().all(|value| value.is_finite()) {
             return Err(self.not_finite(time));
         }
-        let (constraints, nodes) = (&self.constraints, &self.body.mesh.nodes);
-        (constraints.pose(values, nodes))
-            .map_err(|source| SetupError::Constraint { scene: self.scene.path.clone(), source })
+        let posed = self.constraints.pose(&values, &self.body.mesh.nodes);
+        let constraint = |source| SetupError::Constraint { scene: self.scene.path.clone(), source };
+        posed.map(|(lift, bounds)| (values, lift, bounds)).map_err(constraint)
     }
 
     /// The time of the first solve, s: 0, or 1 where there is no time.

@@ -1,8 +1,8 @@
 //! Where displacements are measured from.
 
 use crate::{
-    contact::Bound,
-    evolution::{DiscreteProblem, discrete_problem::LoadCase},
+    contact::{Bound, Constraints},
+    evolution::discrete_problem::LoadCase,
 };
 
 /// A rigid motion of each piece of the body, from which displacements are measured.
@@ -25,14 +25,10 @@ impl Datum {
     }
 
     /// The prescribed unknowns and the bounds, measured from here.
-    pub(super) fn pose(
-        &self,
-        problem: &DiscreteProblem,
-        case: &LoadCase,
-    ) -> (Vec<f64>, Vec<Bound>) {
+    pub(super) fn pose(&self, of: &Constraints, case: &LoadCase) -> (Vec<f64>, Vec<Bound>) {
         let (mut lift, mut bounds) = (case.lift.clone(), case.bounds.clone());
         if !self.is_zero() {
-            problem.constraints.prescribed().for_each(|dof| lift[dof] -= self.unknowns[dof]);
+            of.prescribed().for_each(|dof| lift[dof] -= self.unknowns[dof]);
             for bound in &mut bounds {
                 bound.lower -= self.unknowns[bound.dof];
                 bound.upper -= self.unknowns[bound.dof];
@@ -43,17 +39,9 @@ impl Datum {
 
     /// Adds `sign` times the datum to the free unknowns c: with −1 they are measured from here
     /// instead of from zero, with 1 from zero again.
-    pub(super) fn shifted(
-        &self,
-        problem: &DiscreteProblem,
-        mut c: Vec<f64>,
-        sign: f64,
-    ) -> Vec<f64> {
-        let fixed = problem.constraints.bases.fixed();
-        for ((c, own), _) in c.iter_mut().zip(&self.unknowns).zip(fixed).filter(|(_, on)| !**on) {
-            *c += sign * own;
-        }
-        c
+    pub(super) fn shift(&self, of: &Constraints, c: &mut [f64], sign: f64) {
+        let unknowns = c.iter_mut().zip(&self.unknowns).zip(of.bases.fixed());
+        unknowns.filter(|(_, fixed)| !**fixed).for_each(|((c, own), _)| *c += sign * own);
     }
 
     /// u from zero, of displacements measured from here.
@@ -63,10 +51,10 @@ impl Datum {
     }
 
     /// Moves on by a rigid motion, in nodal displacements.
-    pub(super) fn add(&mut self, problem: &DiscreteProblem, motion: &[f64]) {
+    pub(super) fn add(&mut self, of: &Constraints, motion: &[f64]) {
         self.field.resize(motion.len(), 0.0);
         self.field.iter_mut().zip(motion).for_each(|(own, more)| *own += more);
         self.unknowns = self.field.clone();
-        problem.constraints.bases.displacement_to_local(&mut self.unknowns);
+        of.bases.displacement_to_local(&mut self.unknowns);
     }
 }
