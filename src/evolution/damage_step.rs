@@ -10,11 +10,11 @@ use nalgebra::DVector;
 
 /// Solves the damage systems (M + kκL) ζ_n = M ζ_{n−1} + k b_{n−1} of a run.
 pub(super) struct DamageStep<'a> {
-    session: &'a Session,
-    problem: &'a DiscreteProblem,
-    phases: &'a Phases,
+    pub(super) session: &'a Session,
+    pub(super) problem: &'a DiscreteProblem,
+    pub(super) phases: &'a Phases,
     /// k and M + kκL, factorised by the first step that needs it.
-    system: Option<(f64, DamageSystem)>,
+    pub(super) system: Option<(f64, DamageSystem)>,
 }
 
 /// The damage source φ(ε(u), ζ) of a state; zero where there is no damage law.
@@ -36,15 +36,7 @@ pub(super) struct DamageUpdate {
     pub(super) certificate: Option<DamageCertificate>,
 }
 
-impl<'a> DamageStep<'a> {
-    pub(super) fn new(
-        session: &'a Session,
-        problem: &'a DiscreteProblem,
-        phases: &'a Phases,
-    ) -> Self {
-        Self { session, problem, phases, system: None }
-    }
-
+impl DamageStep<'_> {
     /// The damage source of a state.
     pub(super) fn source(&self, state: &State) -> DamageSource {
         let (problem, body) = (self.problem, &self.problem.body);

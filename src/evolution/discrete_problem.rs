@@ -113,8 +113,7 @@ impl DiscreteProblem {
         let unresolved = |traction| notes::unresolved(&scene, &body.mesh, traction);
         let unresolved: Vec<_> = conditions.tractions.iter().filter_map(unresolved).collect();
         scene.notes.extend(unresolved);
-        let BoundaryConditions { tractions, prescribed, .. } = conditions;
-        let loads = Loads::new(&body, &scene.body_force, tractions, prescribed);
+        let loads = Loads::new(&body, &scene, conditions);
         let norms = (scene.sample_times(SAMPLES).into_iter())
             .map(|time| body.partition.norm(&loads.at(&body, time), 2));
         let problem = Self {

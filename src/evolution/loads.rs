@@ -1,9 +1,12 @@
 //! The loads and prescribed displacements of a scene as functions of time.
 
-use super::{DiscreteProblem, boundary_conditions::Traction};
+use super::{
+    DiscreteProblem,
+    boundary_conditions::{BoundaryConditions, Traction},
+};
 use crate::{
     fem::{Body, Subdomain, add_body_force, add_traction, midpoint},
-    scene::Expression,
+    scene::{Expression, Scene},
 };
 
 /// The midpoint and the length or area, m or m², of an edge or triangle.
@@ -32,14 +35,10 @@ pub struct Loads {
 
 impl Loads {
     /// The loads on `body`, and the values of its fixed rows.
-    pub(super) fn new(
-        body: &Body,
-        body_force: &[Expression; 2],
-        tractions: Vec<Traction>,
-        prescribed: Vec<Option<([f64; 2], Expression)>>,
-    ) -> Self {
-        let zero = body_force.iter().all(|e| e.as_constant() == Some(0.0));
-        let body_force = (!zero).then(|| body_force.clone());
+    pub(super) fn new(body: &Body, scene: &Scene, conditions: BoundaryConditions) -> Self {
+        let BoundaryConditions { tractions, prescribed, .. } = conditions;
+        let zero = scene.body_force.iter().all(|f| f.as_constant() == Some(0.0));
+        let body_force = (!zero).then(|| scene.body_force.clone());
         let samples = (tractions.iter())
             .map(|traction| (edge_samples(body, &traction.edges), traction.force.clone()))
             .chain(body_force.iter().map(|f| (triangle_samples(body), f.clone())))
@@ -150,8 +149,7 @@ impl<'a> LoadCurve<'a> {
 
     /// Whether loads and prescribed displacements are nearly linear in time from `start` to `end`.
     pub(super) fn is_nearly_linear(&mut self, start: f64, end: f64) -> bool {
-        let (first, last) =
-            (self.problem.loads.sampled_at(start), self.problem.loads.sampled_at(end));
+        let [first, last] = [start, end].map(|time| self.problem.loads.sampled_at(time));
         (1..=POINTS).all(|point| {
             let part = point as f64 / (POINTS + 1) as f64;
             let values = self.sample(start + part * (end - start));

@@ -68,7 +68,7 @@ pub fn run(
         let shown = accepted(step).map_err(RunError::Observer);
         agreed(problem.body.partition.comm(), shown)
     };
-    let mut damage_step = DamageStep::new(session, problem, phases);
+    let mut damage_step = DamageStep { session, problem, phases, system: None };
     let mut contact_step = ContactStep::new(session, problem, solver, phases)?;
 
     // (27): u_0 from ζ_0.
