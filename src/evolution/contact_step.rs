@@ -21,7 +21,7 @@ use crate::{
     fem::Stiffness,
     petsc::{PetscError, Session, Vector},
 };
-use certificate::Judged;
+use certificate::{Judged, active_bounds};
 use datum::Datum;
 use nalgebra::DMatrix;
 use std::time::Instant;
@@ -141,7 +141,7 @@ impl<'a> ContactStep<'a> {
         let (Judged { u, kkt, scales, force, contact, .. }, report) =
             self.solve_certified(step, &case)?;
         self.next.scales = scales;
-        self.next.active = self.active_bounds(&contact, 0.0);
+        self.next.active = active_bounds(&problem.constraints, &contact, 0.0);
         let unconstrained = self.unconstrained_motion(&contact, force);
         let u = self.next.datum.total(u);
         let state = State { time, u, zeta: zeta.to_vec(), contact };

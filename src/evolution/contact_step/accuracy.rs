@@ -1,6 +1,6 @@
 //! How large the errors of an answer may be although its KKT residuals are small.
 
-use super::{ContactStep, displacement};
+use super::{ContactStep, active_bounds, displacement};
 use crate::{
     cholesky::{LinearSolver, LinearSystem, Precision},
     evolution::{DiscreteProblem, Outcome, State, Step},
@@ -31,7 +31,7 @@ pub struct Accuracy {
     pub displacement: f64,
     /// The time of the step of which `displacement` is, s.
     pub time: f64,
-    /// Of the last step's discretisation, in the energy norm: [`crate::fem::Elasticity::energy_error`].
+    /// Of the mesh, in the energy norm, where u is largest: [`crate::fem::Elasticity::energy_error`].
     pub energy: f64,
 }
 
@@ -130,10 +130,9 @@ fn displacement_error(
     residual.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
     constraints.bases.force_to_local(&mut residual);
     constraints.bases.zero_fixed(&mut residual);
-    let points = state.contact.iter().filter(|point| point.active);
-    let bounds = points.filter_map(|p| constraints.bound_along(p.node, p.normal));
-    let mut active: Vec<usize> = bounds.map(|i| constraints.bounds[i].dof).collect();
-    active.dedup();
+    let flags = active_bounds(constraints, &state.contact, 0.0);
+    let active = constraints.bounds.iter().zip(flags).filter(|(_, active)| *active > 0.0);
+    let active: Vec<usize> = active.map(|(bound, _)| bound.dof).collect();
     active.iter().for_each(|&dof| residual[dof] = 0.0);
 
     let mut rhs = Vector::zeros(session, 2 * body.partition.owned())?;

@@ -2,7 +2,7 @@
 
 use super::ContactStep;
 use crate::{
-    contact::{self, Answer, ContactError, ContactPoint, Kkt, RigidMotion, Scales},
+    contact::{self, Answer, Constraints, ContactError, ContactPoint, Kkt, RigidMotion, Scales},
     evolution::discrete_problem::LoadCase,
     fem::RigidPart,
 };
@@ -104,18 +104,6 @@ impl ContactStep<'_> {
         }
     }
 
-    /// 1 for each bound that a contact force above `least`, N/m, acts on, else 0.
-    pub(super) fn active_bounds(&self, contact: &[ContactPoint], least: f64) -> Vec<f64> {
-        let constraints = &self.problem.constraints;
-        let mut active = vec![0.0; constraints.bounds.len()];
-        for point in contact.iter().filter(|point| point.active && point.force > least) {
-            if let Some(bound) = constraints.bound_along(point.node, point.normal) {
-                active[bound] = 1.0;
-            }
-        }
-        active
-    }
-
     /// A rigid motion that the active nodes leave unconstrained. Without load (`force` = 0) the body
     /// rests where it is.
     pub(super) fn unconstrained_motion(
@@ -128,9 +116,21 @@ impl ContactStep<'_> {
         // as large: a smaller force is no certain constraint.
         let partition = &self.problem.body.partition;
         let nodes = partition.total() as f64;
-        let active = self.active_bounds(contact, nodes * self.problem.tolerance * force);
+        let least = nodes * self.problem.tolerance * force;
+        let active = active_bounds(&self.problem.constraints, contact, least);
         let motions = contact::unconstrained_motions(partition.comm(), &self.rigid, &active);
         let first = motions.first().filter(|_| force > 0.0)?;
         self.problem.motions.combined(first)
     }
+}
+
+/// 1 for each bound that a contact force above `least`, N/m, acts on, else 0.
+pub(super) fn active_bounds(of: &Constraints, contact: &[ContactPoint], least: f64) -> Vec<f64> {
+    let mut active = vec![0.0; of.bounds.len()];
+    for point in contact.iter().filter(|point| point.active && point.force > least) {
+        if let Some(bound) = of.bound_along(point.node, point.normal) {
+            active[bound] = 1.0;
+        }
+    }
+    active
 }
