@@ -31,7 +31,8 @@ pub struct Accuracy {
     pub displacement: f64,
     /// The time of the step of which `displacement` is, s.
     pub time: f64,
-    /// Of the mesh, in the energy norm, where u is largest: [`crate::fem::Elasticity::energy_error`].
+    /// Of the discretisation in the step of the largest displacement, in the energy norm:
+    /// [`crate::fem::Elasticity::energy_error`].
     pub energy: f64,
 }
 
