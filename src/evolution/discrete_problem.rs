@@ -156,7 +156,7 @@ impl DiscreteProblem {
         let mut times = self.scene.sample_times(most);
         times.truncate(if self.loads.depend_on_time() { usize::MAX } else { 1 });
         for time in times {
-            self.prescribed(time)?;
+            self.posed(time, &self.loads.prescribed_at(time))?;
             if !self.motions.all_prevented() {
                 self.checked_load(time)?;
             }
@@ -182,7 +182,8 @@ impl DiscreteProblem {
     pub(super) fn load_case(&self, time: f64) -> Result<LoadCase, SetupError> {
         let load = self.motions.balanced(&self.body, self.checked_load(time)?);
         let work = self.motions.work(&self.body, &load);
-        let (prescribed, lift, bounds) = self.prescribed(time)?;
+        let prescribed = self.loads.prescribed_at(time);
+        let (lift, bounds) = self.posed(time, &prescribed)?;
         Ok(LoadCase { time, load, work, prescribed, lift, bounds })
     }
 
@@ -206,16 +207,14 @@ impl DiscreteProblem {
         }
     }
 
-    /// The values of the prescribed rows at `time`, the unknowns prescribed by them and the bounds on
-    /// the others.
-    fn prescribed(&self, time: f64) -> Result<(Vec<f64>, Vec<f64>, Vec<Bound>), SetupError> {
-        let values = self.loads.prescribed_at(time);
+    /// The unknowns prescribed at `time` by the `values` of the prescribed rows, and the bounds on the
+    /// others.
+    fn posed(&self, time: f64, values: &[f64]) -> Result<(Vec<f64>, Vec<Bound>), SetupError> {
         if !values.iter().all(|value| value.is_finite()) {
             return Err(self.not_finite(time));
         }
-        let posed = self.constraints.pose(&values, &self.body.mesh.nodes);
         let constraint = |source| SetupError::Constraint { scene: self.scene.path.clone(), source };
-        posed.map(|(lift, bounds)| (values, lift, bounds)).map_err(constraint)
+        self.constraints.pose(values, &self.body.mesh.nodes).map_err(constraint)
     }
 
     /// The time of the first solve, s: 0, or 1 where there is no time.
