@@ -10,7 +10,7 @@ use crate::{
     petsc::PetscError,
 };
 use std::{
-    fmt, io, iter,
+    io, iter,
     path::{Path, PathBuf},
 };
 
@@ -82,24 +82,19 @@ impl FieldWriter {
     fn piece(&self, body: &Body, points: &[DataArray], cells: &[DataArray]) -> io::Result<String> {
         let points = points.iter().map(DataArray::element).collect::<io::Result<String>>()?;
         let cells = cells.iter().map(DataArray::element).collect::<io::Result<String>>()?;
-        Ok(vtk_file(
-            "UnstructuredGrid",
-            format_args!(
-                "<UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n{}\
-                 <PointData>\n{points}</PointData>\n<CellData>\n{cells}</CellData>\n\
-                 </Piece>\n</UnstructuredGrid>\n",
-                body.mesh.nodes.len(),
-                body.own_triangles,
-                self.mesh,
-            ),
-        ))
+        let (mesh, nodes, triangles) = (&self.mesh, body.mesh.nodes.len(), body.own_triangles);
+        let piece = format!(
+            "<Piece NumberOfPoints=\"{nodes}\" NumberOfCells=\"{triangles}\">\n{mesh}\
+             <PointData>\n{points}</PointData>\n<CellData>\n{cells}</CellData>\n</Piece>\n"
+        );
+        Ok(vtk_file("UnstructuredGrid", "", &piece))
     }
 
     fn collection(&self) -> String {
-        let frames: String = (self.frames.iter())
-            .map(|(time, file)| format!("<DataSet timestep=\"{time}\" file=\"{file}\"/>\n"))
-            .collect();
-        vtk_file("Collection", format_args!("<Collection>\n{frames}</Collection>\n"))
+        let frame = |(time, file): &(f64, String)| -> String {
+            format!("<DataSet timestep=\"{time}\" file=\"{file}\"/>\n")
+        };
+        vtk_file("Collection", "", &self.frames.iter().map(frame).collect::<String>())
     }
 }
 
@@ -166,27 +161,24 @@ fn list_of_pieces(
     points: &[DataArray],
     cells: &[DataArray],
 ) -> String {
-    let declarations =
-        |arrays: &[DataArray]| -> String { arrays.iter().map(DataArray::declaration).collect() };
-    let coordinates = [DataArray::new::<f64>("Points", REAL, 3, iter::empty())];
+    let points: String = points.iter().map(DataArray::declaration).collect();
+    let cells: String = cells.iter().map(DataArray::declaration).collect();
+    let coordinates = DataArray::new::<f64>("Points", REAL, 3, iter::empty()).declaration();
     let files: String = files.map(|file| format!("<Piece Source=\"{file}\"/>\n")).collect();
-    vtk_file(
-        "PUnstructuredGrid",
-        format_args!(
-            "<PUnstructuredGrid GhostLevel=\"0\">\n<PPointData>\n{}</PPointData>\n\
-             <PCellData>\n{}</PCellData>\n<PPoints>\n{}</PPoints>\n{files}</PUnstructuredGrid>\n",
-            declarations(points),
-            declarations(cells),
-            declarations(&coordinates),
-        ),
-    )
+    let pieces = format!(
+        "<PPointData>\n{points}</PPointData>\n<PCellData>\n{cells}</PCellData>\n\
+         <PPoints>\n{coordinates}</PPoints>\n{files}"
+    );
+    vtk_file("PUnstructuredGrid", " GhostLevel=\"0\"", &pieces)
 }
 
-/// A VTK file of `kind` with arrays as [`DataArray`] encodes them.
-fn vtk_file(kind: &str, content: fmt::Arguments) -> String {
+/// A VTK file whose element `kind` has these `attributes` and a `content` with arrays as [`DataArray`]
+/// encodes them.
+fn vtk_file(kind: &str, attributes: &str, content: &str) -> String {
     format!(
         "<?xml version=\"1.0\"?>\n\
          <VTKFile type=\"{kind}\" version=\"1.0\" byte_order=\"LittleEndian\" \
-         header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n{content}</VTKFile>\n"
+         header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n\
+         <{kind}{attributes}>\n{content}</{kind}>\n</VTKFile>\n"
     )
 }

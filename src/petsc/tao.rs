@@ -33,7 +33,8 @@ pub(crate) struct TaoReport {
 
 /// What TAO's Newton methods call where they would call a preconditioner of PETSc (PCSHELL).
 pub(crate) trait ShellPreconditioner {
-    /// The operator is now `matrix`, or has other values; false if it is not positive definite.
+    /// Sets P up for the operator `matrix`, which is new or has new values; false if it is not positive
+    /// definite.
     fn set_up(&mut self, matrix: &Matrix) -> Result<bool, PetscError>;
 
     /// `z` ← P⁻¹ `r`.

@@ -118,8 +118,8 @@ impl RigidMotions {
         DrivenMotion { motion, force, moment }
     }
 
-    /// The motion with these amplitudes (a unit vector) of those that contact alone constrains.
-    /// Where it moves several pieces, what it does to the one that moves most.
+    /// Σ a_i m_i of the motions m_i that contact alone resists, with these amplitudes a (a unit vector),
+    /// on the one piece of the body whose motions have the largest.
     pub fn combined(&self, amplitudes: &DVector<f64>) -> Option<RigidMotion> {
         let of_piece = |(places, motions): (Range<usize>, _)| {
             let own = &amplitudes.as_slice()[places];

@@ -144,7 +144,7 @@ impl RigidMotions {
         (free, resisted)
     }
 
-    /// Those of a rank's subdomain.
+    /// The same motions with the nodes that a rank knows.
     pub fn restrict(self, subdomain: &Subdomain) -> Self {
         Self { part_of_node: subdomain.field(&self.part_of_node, 1), ..self }
     }
