@@ -119,12 +119,11 @@ impl<'a> Task<'a> {
         let prepared = if comm.is_root() { output::prepare(&folder) } else { Ok(()) };
         agree(comm, prepared.map_err(Failure::input))?;
 
-        let mut contact_nodes: Vec<usize> =
-            problem.constraints.bounds.iter().map(|bound| bound.node).collect();
-        contact_nodes.dedup();
+        // The bounds of a node follow each other.
+        let contact_nodes = problem.constraints.bounds.chunk_by(|a, b| a.node == b.node);
         Ok(Self {
             triangles: comm.count(problem.body.own_triangles),
-            contact_nodes: comm.count(contact_nodes.len()),
+            contact_nodes: comm.count(contact_nodes.count()),
             problem,
             solver,
             folder,
