@@ -75,7 +75,7 @@ impl<'d> Value<'d> {
         Refused
     }
 
-    /// Notes a problem, as the predicate of the key.
+    /// Notes a problem: the message begins with the key, `problem` goes on from there.
     pub(super) fn refuse(&self, problem: impl Display) -> Refused {
         self.note(format!("{} {problem}", self.key))
     }
