@@ -8,7 +8,10 @@ Both programs read the same mesh file and a scene derived from the given one:
 
 elastic   contact removed, no damage: one static solve at t = 1;
 contact   the gap as given, no damage: one static solve at t = 1, with each contact solver;
-damage    the whole scheme (25)–(28) in a few steps, compared at each, with each contact solver.
+damage    the whole scheme (25)–(28) in a few steps, compared at each, with each contact solver;
+
+each with displacements of the orders asked for. Where the program sets the middles of edges itself,
+because the mesh file does not have them, FEniCSx is given the same.
 
 Every time must agree, also in the number of active nodes; differences are relative to the largest
 value of all times, and the largest is shown.
@@ -24,7 +27,7 @@ import subprocess
 import sys
 import tempfile
 import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import meshio
@@ -35,22 +38,25 @@ try:
     from damage import evolve
 except ImportError as error:
     sys.exit(f"{error}: the comparison needs FEniCSx; run `make deps-validate`")
-from scene import SceneError, read_scene, write_scene
+from lagrange import Lagrange
+from scene import SceneError, displacement_order, of_order, read_scene, write_scene
 from solvers import solvers
 from triangulation import mesh_geometry, read_triangulation
 
 TOLERANCE = {"elastic": 1e-10, "contact": 1e-8, "damage": 1e-8}
 COLUMNS = (
-    "scene", "case", "solver", "nodes", "steps", "active", "|Δu|/|u|", "|Δζ|", "ΔR/R",
+    "scene", "case", "order", "solver", "nodes", "steps", "active", "|Δu|/|u|", "|Δζ|", "ΔR/R",
     "tolerance", "verdict",
 )
 
 
 @dataclass
 class Answer:
-    """What is compared at an accepted time: nodal fields, contact force, active nodes."""
+    """What is compared at an accepted time: fields at the nodes of u, contact force, active nodes;
+    and the elements, nodes as VTK numbers them."""
 
     time: float
+    elements: np.ndarray
     nodes: np.ndarray
     displacement: np.ndarray
     zeta: np.ndarray
@@ -93,11 +99,19 @@ def in_few_steps(scene, steps):
 
 def reference(scene, mesh):
     """FEniCSx's answers, one for each accepted time."""
-    answers = []
+    answers, space = [], Lagrange(mesh, displacement_order(scene))
     evolve(scene, mesh, lambda state: answers.append(Answer(
-        state.time, mesh.nodes, state.displacement, state.zeta, state.contact_force, state.active
+        state.time, space.elements, space.points, state.displacement, space.spread(state.zeta),
+        state.contact_force, state.active
     )))
     return answers
+
+
+def with_middles(mesh, answer):
+    """The triangulation with the middles of sides as in an answer of order 2."""
+    if not np.array_equal(answer.nodes[answer.elements[:, :3]], mesh.nodes[mesh.triangles]):
+        raise RunError("the triangles written are not those of the mesh")
+    return replace(mesh, middles=answer.nodes[answer.elements[:, 3:]])
 
 
 def program(binary, scene, directory, solver=None):
@@ -125,6 +139,7 @@ def program(binary, scene, directory, solver=None):
         return [
             Answer(
                 float(frame.get("timestep")),
+                np.vstack([block.data for block in field.cells]),
                 field.points[:, :2],
                 field.point_data["displacement"][:, :2],
                 np.ravel(field.point_data["zeta"]),
@@ -177,11 +192,13 @@ def differences(exact, answers):
 
 
 def cases(scene, mesh, arguments):
-    """(case, derived scene, contact solvers) for one scene."""
-    yield "elastic", without_contact(scene, mesh), [None]
-    yield "contact", static(scene), arguments.solvers
-    if "damage" in scene and "time" in scene:
-        yield "damage", in_few_steps(scene, arguments.steps), arguments.solvers
+    """(case, derived scene, contact solvers) for one scene, first of order 1."""
+    for order in sorted(arguments.orders):
+        scene = of_order(scene, order)
+        yield "elastic", without_contact(scene, mesh), [None]
+        yield "contact", static(scene), arguments.solvers
+        if "damage" in scene and "time" in scene:
+            yield "damage", in_few_steps(scene, arguments.steps), arguments.solvers
 
 
 def compare(path, arguments):
@@ -196,11 +213,14 @@ def compare(path, arguments):
         scene["mesh"] = {"file": str(source.resolve())}
         mesh = read_triangulation(source)
         for case, derived, solvers in cases(scene, mesh, arguments):
-            tolerance = TOLERANCE[case]
+            tolerance, order = TOLERANCE[case], displacement_order(derived)
+            if order == 2 and mesh.middles is None:
+                mesh = with_middles(mesh, program(arguments.binary, derived, directory)[0])
             exact = reference(derived, mesh)
             for solver in solvers:
                 active = sorted({answer.active for answer in exact})
-                row = (path.stem, case, solver or "–", str(len(mesh.nodes)), str(len(exact) - 1),
+                row = (path.stem, case, str(order), solver or "–", str(len(exact[0].nodes)),
+                       str(len(exact) - 1),
                        "–".join(str(a) for a in dict.fromkeys((active[0], active[-1]))))
                 try:
                     errors = differences(
@@ -219,13 +239,15 @@ def main():
     parser.add_argument("scenes", nargs="+", type=Path, metavar="SCENE")
     parser.add_argument("--binary", type=Path, default=Path("target/release/signorini"))
     parser.add_argument("--solvers", nargs="+", help="contact solvers [default: all]")
+    parser.add_argument("--orders", nargs="+", type=int, choices=[1, 2], default=[1],
+                        help="of the displacements")
     parser.add_argument("--steps", type=int, default=20, help="time steps of the damage case")
     arguments = parser.parse_args()
     arguments.binary = arguments.binary.resolve()
     if not arguments.binary.is_file():
         sys.exit(f"{arguments.binary} does not exist: build it first, or name it with --binary")
     arguments.solvers = arguments.solvers or solvers(arguments.binary)
-    line = "{:<14} {:<8} {:<16} {:>6} {:>6} {:>7}  {:>9} {:>9} {:>9}  {:>9}  {}"
+    line = "{:<14} {:<8} {:>5} {:<16} {:>6} {:>6} {:>7}  {:>9} {:>9} {:>9}  {:>9}  {}"
     print(line.format(*COLUMNS))
     failed = False
     for path in arguments.scenes:

@@ -1,8 +1,9 @@
 """Problem VP^hk written independently in FEniCSx: forms in UFL, algebra in PETSc.
 
 Equation numbers are those of Campo, Fernández and Silva, "Damageable contact between
-an elastic body and a rigid foundation". All fields go in and come out in the node order
-of the triangulation. Written for dolfinx 0.5 (Debian 12).
+an elastic body and a rigid foundation". Displacements are P1 or P2 (isoparametric where edges are
+curved), ζ is P1. u comes out in the order of the nodes of `Lagrange`, ζ goes in and comes out in
+that of the vertices of the triangulation. Written for dolfinx 0.5 (Debian 12).
 """
 
 import logging
@@ -16,7 +17,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from contact import Bounds, solve_contact
-from scene import Expression, SceneError
+from lagrange import Lagrange
+from scene import Expression, SceneError, displacement_order
 from triangulation import edge_keys
 
 logging.disable(logging.INFO)  # the form compiler reports each of its builds
@@ -27,24 +29,27 @@ UFL_FUNCTIONS = {
     "min": ufl.min_value, "max": ufl.max_value, "atan2": ufl.atan_2,
 }
 
-# The quadrature that defines the discrete loads: edge midpoints in a triangle, two Gauss
-# points on an edge.
+# The quadrature that defines the discrete loads: in a triangle the midpoints of the sides for P1,
+# the three interior points of `INTERIOR_POINTS` for P2; two Gauss points on an edge.
 MIDPOINTS = {
     "quadrature_rule": "custom",
     "quadrature_degree": 2,
     "quadrature_points": [[0.5, 0.0], [0.5, 0.5], [0.0, 0.5]],
     "quadrature_weights": [1 / 6, 1 / 6, 1 / 6],
 }
+INTERIOR_POINTS = {"quadrature_degree": 2}
 TWO_GAUSS_POINTS = {"quadrature_degree": 3}
+# dolfinx numbers the middles of a triangle's sides as the vertices opposite.
+DOLFINX_ORDER = [0, 1, 2, 4, 5, 3]
 
 
 @dataclass
 class State:
-    """The fields at one time, in the node order of the triangulation."""
+    """The fields at one time, at the nodes of u; ζ at the vertices."""
 
     time: float
     displacement: np.ndarray  # (n, 2)
-    zeta: np.ndarray  # (n,)
+    zeta: np.ndarray  # (vertices,)
     residual: np.ndarray  # (n, 2): K u − f
     contact_force: float
     active: int
@@ -54,21 +59,25 @@ class Body:
     """Spaces, forms and node maps of one scene on one triangulation."""
 
     def __init__(self, scene, mesh):
-        self.scene, self.mesh = scene, mesh
-        domain = self.domain = _dolfinx_mesh(mesh)
+        self.scene, self.mesh, self.order = scene, mesh, displacement_order(scene)
+        self.nodes, vertices = Lagrange(mesh, self.order), Lagrange(mesh, 1)
+        # Of a curved body ζ lives on the straight triangles of the vertices.
+        curved = self.nodes.curved()
+        domain = self.domain = dolfinx_mesh(self.nodes if curved else vertices)
+        self.straight = dolfinx_mesh(vertices) if curved else domain
         self.time = fem.Constant(domain, PETSc.ScalarType(0.0))
-        self.V = fem.VectorFunctionSpace(domain, ("Lagrange", 1))
+        self.V = fem.VectorFunctionSpace(domain, ("Lagrange", self.order))
         self.E = fem.FunctionSpace(domain, ("Lagrange", 1))
-        self.dof_of_node = _dof_of_node(domain, self.V)
-        self.zeta_dof_of_node = _dof_of_node(domain, self.E)
+        self.dof_of_node = dof_of_node(self.V, self.nodes)
+        self.zeta_dof_of_node = dof_of_node(self.E, vertices)
         self.u, self.zeta = fem.Function(self.V), fem.Function(self.E)
         self.boundaries = scene.get("boundary", [])
 
         v, w = ufl.TrialFunction(self.V), ufl.TestFunction(self.V)
-        # For P1 strains, one point per triangle integrates ζ exactly: its mean.
+        # One point per triangle for P1, where it integrates ζ exactly, three for P2.
         self.stiffness_form = fem.form(
             self.zeta * ufl.inner(self.elasticity(ufl.sym(ufl.grad(v))), ufl.sym(ufl.grad(w)))
-            * ufl.dx
+            * ufl.dx(metadata={"quadrature_degree": self.order})
         )
         self.load_forms = [fem.form(form) for form in self._loads(w)]
         self._must_be_held()
@@ -94,11 +103,12 @@ class Body:
 
         force = vector(self.scene.get("body", {}).get("force", ["0", "0"]))
         if force is not None:
-            yield ufl.dot(force, w) * ufl.dx(metadata=MIDPOINTS)
+            rule = MIDPOINTS if self.order == 1 else INTERIOR_POINTS
+            yield ufl.dot(force, w) * ufl.dx(metadata=rule)
         for boundary in self.boundaries:
             traction = vector(boundary.get("traction", ["0", "0"]))
             if traction is not None:
-                edges = _facet_tags(self.domain, self.mesh.edges(boundary["name"]))
+                edges = _facet_tags(self.domain, self.mesh, boundary["name"])
                 ds = ufl.Measure("ds", self.domain, subdomain_data=edges)
                 yield ufl.dot(traction, w) * ds(1, metadata=TWO_GAUSS_POINTS)
 
@@ -107,12 +117,12 @@ class Body:
 
     def bounds(self, t):
         """Γ_D, symmetry and the gap as prescribed values and bounds on single unknowns."""
-        size = 2 * len(self.mesh.nodes)
+        size = 2 * len(self.nodes.points)
         value, lower, upper = np.full(size, np.nan), np.full(size, -np.inf), np.full(size, np.inf)
         for boundary in self.boundaries:
             name = boundary["name"]
-            nodes = np.unique(self.mesh.edges(name))
-            points = self.mesh.nodes[nodes]
+            nodes = np.unique(self.nodes.on(self.mesh.edges(name)))
+            points = self.nodes.points[nodes]
             if "displacement" in boundary:
                 for component, text in enumerate(boundary["displacement"]):
                     if text != "free":
@@ -123,7 +133,7 @@ class Body:
             if "gap" in boundary:
                 for members, component, sign in self.sides(boundary):
                     # ν = ± e: u·ν ≤ g bounds one component from above or below.
-                    gap = Expression(boundary["gap"]).at(self.mesh.nodes[members], t)
+                    gap = Expression(boundary["gap"]).at(self.nodes.points[members], t)
                     k = self._unknowns(members, component)
                     if sign > 0:
                         upper[k] = np.minimum(upper[k], gap)
@@ -140,7 +150,8 @@ class Body:
         held = np.isfinite(bounds.lower) | np.isfinite(bounds.upper)
         held[bounds.fixed] = True
         held = held.reshape(-1, 2)[self.dof_of_node]
-        x, y = ((self.mesh.nodes - self.mesh.nodes.mean(axis=0)) / np.ptp(self.mesh.nodes)).T
+        points = self.nodes.points
+        x, y = ((points - points.mean(axis=0)) / np.ptp(points)).T
         motions = np.array([[1 + 0 * x, 0 * x], [0 * x, 1 + 0 * x], [-y, x]])
         if np.linalg.matrix_rank(motions.transpose(0, 2, 1)[:, held]) < 3:
             raise SceneError("the body may move rigidly, its displacement is not unique")
@@ -150,16 +161,18 @@ class Body:
         name = boundary["name"]
         edges = self.mesh.edges(name)
         normals, _ = self.mesh.outward_normals(name)
+        curved = self.nodes.curved(edges)
         if "normal" in boundary:
-            normals = np.broadcast_to(boundary_direction(boundary), normals.shape)
-        if (np.abs(normals).max(axis=1) < 1 - 1e-9).any():
+            normals, curved = np.broadcast_to(boundary_direction(boundary), normals.shape), False
+        if curved or (np.abs(normals).max(axis=1) < 1 - 1e-9).any():
             raise SceneError(
                 f"boundary '{name}': this check knows only contact and symmetry along x or y"
             )
         component = np.abs(normals).argmax(axis=1)
         sign = np.sign(normals[np.arange(len(normals)), component])
         for c, s in sorted(set(zip(component, sign))):
-            yield np.unique(edges[(component == c) & (sign == s)]), int(c), int(s)
+            members = edges[(component == c) & (sign == s)]
+            yield np.unique(self.nodes.on(members)), int(c), int(s)
 
     def equilibrium(self, t, zeta):
         """Problem (26), or (27) at t = 0: the displacement for a given damage field."""
@@ -188,33 +201,36 @@ def boundary_direction(boundary):
     return direction / np.linalg.norm(direction)
 
 
-def _dolfinx_mesh(mesh):
-    element = ufl.VectorElement("Lagrange", ufl.triangle, 1)
-    return dolfinx.mesh.create_mesh(
-        MPI.COMM_SELF, mesh.triangles, mesh.nodes, ufl.Mesh(element)
-    )
+def dolfinx_mesh(nodes):
+    """The mesh whose coordinates are interpolated between the nodes: straight triangles from the
+    vertices, parabolic sides from the nodes of P2."""
+    element = ufl.VectorElement("Lagrange", ufl.triangle, nodes.order)
+    cells = nodes.elements[:, DOLFINX_ORDER[:nodes.elements.shape[1]]]
+    return dolfinx.mesh.create_mesh(MPI.COMM_SELF, cells, nodes.points, ufl.Mesh(element))
 
 
-def _dof_of_node(domain, space):
-    """For each node of the triangulation its (blocked) degree of freedom.
+def dof_of_node(space, nodes):
+    """For each of the nodes its (blocked) degree of freedom.
 
-    dolfinx reorders twice: nodes when it builds the mesh, unknowns when it builds a space.
+    dolfinx reorders twice: nodes and cells when it builds the mesh, unknowns when it builds a
+    space. It keeps the order of a cell's vertices.
     """
-    node_of_point = np.asarray(domain.geometry.input_global_indices)
-    dof = np.empty(len(node_of_point), np.int64)
-    dof[node_of_point[domain.geometry.dofmap.array]] = space.dofmap.list.array
+    elements = nodes.elements[space.mesh.topology.original_cell_index]
+    dof = np.empty(len(nodes.points), np.int64)
+    dof[elements[:, DOLFINX_ORDER[:elements.shape[1]]]] = (
+        space.dofmap.list.array.reshape(elements.shape))
     return dof
 
 
-def _facet_tags(domain, edges):
-    """Tag 1 on the facets that are the given node pairs."""
-    topology, geometry = domain.topology, domain.geometry
+def _facet_tags(domain, mesh, name):
+    """Tag 1 on the facets of a curve of the triangulation."""
+    topology = domain.topology
     topology.create_connectivity(1, 2)  # meshtags and ds need it
-    node_of_point = np.asarray(geometry.input_global_indices)
-    node_of_vertex = np.empty(topology.index_map(0).size_local, np.int64)
-    node_of_vertex[topology.connectivity(2, 0).array] = node_of_point[geometry.dofmap.array]
+    node_of_vertex = np.empty(len(mesh.nodes), np.int64)
+    triangles = mesh.triangles[topology.original_cell_index]
+    node_of_vertex[topology.connectivity(2, 0).array] = triangles.ravel()
     facets = node_of_vertex[topology.connectivity(1, 0).array.reshape(-1, 2)]
     size = len(node_of_vertex)
-    wanted = np.isin(edge_keys(facets, size), edge_keys(edges, size))
+    wanted = np.isin(edge_keys(facets, size), edge_keys(mesh.edges(name), size))
     found = np.flatnonzero(wanted).astype(np.int32)
     return dolfinx.mesh.meshtags(domain, 1, found, np.ones(len(found), np.int32))

@@ -19,7 +19,7 @@ from petsc4py import PETSc
 
 from damage import DEFAULTS, Damage
 from fenicsx import Body
-from scene import Expression, read_scene
+from scene import Expression, of_order, read_scene
 from triangulation import read_triangulation
 
 
@@ -119,27 +119,30 @@ class Loop:
 
     def damage_step(self):
         """ζ of the next step, by the factor kept."""
-        damage, body = self.damage, self.body
-        damage.source.interpolate(damage.source_at_corners)
-        right = fem.petsc.assemble_vector(damage.right_side)
+        right = self.damage.load()
         zeta = right.duplicate()
         self.factor.solve(right, zeta)
-        return zeta.array[body.zeta_dof_of_node]
+        return zeta.array[self.damage.dof_of_node]
 
 
 class Fields:
-    """The results as a FEniCSx user writes them."""
+    """The results as a FEniCSx user writes them: in XDMF, which takes fields of the degree of the
+    mesh's coordinates."""
 
     def __init__(self, path, body):
-        self.body = body
-        body.u.name, body.zeta.name = "displacement", "zeta"
+        domain, element = body.domain, ("Lagrange", body.domain.geometry.cmap.degree)
+        spaces = (fem.VectorFunctionSpace(domain, element), fem.FunctionSpace(domain, element))
+        names = ("displacement", "zeta")
+        self.fields = [(field, fem.Function(space, name=name))
+                       for field, space, name in zip((body.u, body.zeta), spaces, names)]
         path.parent.mkdir(parents=True, exist_ok=True)
-        self.file = XDMFFile(body.domain.comm, str(path), "w")
-        self.file.write_mesh(body.domain)
+        self.file = XDMFFile(domain.comm, str(path), "w")
+        self.file.write_mesh(domain)
 
     def write(self, t):
-        for field in (self.body.u, self.body.zeta):
-            self.file.write_function(field, t)
+        for field, written in self.fields:
+            written.interpolate(field)
+            self.file.write_function(written, t)
 
 
 def main():
@@ -148,10 +151,13 @@ def main():
     parser.add_argument("mesh", type=Path)
     parser.add_argument("--steps", type=int, default=10)
     parser.add_argument("--factor", choices=["lu", "cholesky"], default="lu")
+    parser.add_argument("--order", type=int, choices=[1, 2],
+                        help="polynomial degree of the displacements instead of the scene's")
     parser.add_argument("--out", type=Path, help="write u and ζ at about 20 times, as XDMF")
     arguments = parser.parse_args()
     began = time.perf_counter()
     scene, mesh = read_scene(arguments.scene), read_triangulation(arguments.mesh)
+    scene = of_order(scene, arguments.order) if arguments.order else scene
     loop = Loop(scene, mesh, arguments.factor)
     zeta = Expression({**DEFAULTS, **scene["damage"]}["initial"]).at(mesh.nodes)
     loop.contact(0.0, zeta)
@@ -168,7 +174,7 @@ def main():
         if fields and n % every == 0:
             fields.write(n * step)
     print(json.dumps({
-        "nodes": len(mesh.nodes),
+        "nodes": len(loop.body.nodes.points),
         "steps": arguments.steps,
         "seconds": seconds,
         "iterations": iterations,

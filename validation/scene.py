@@ -74,6 +74,18 @@ def read_scene(path):
     return scene
 
 
+def displacement_order(scene):
+    """The polynomial degree of the displacements; that of ζ is 1."""
+    return scene.get("discretisation", {}).get("displacement", 1)
+
+
+def of_order(scene, order):
+    """The scene with displacements of that degree."""
+    if order == displacement_order(scene):
+        return scene
+    return {**scene, "discretisation": {**scene.get("discretisation", {}), "displacement": order}}
+
+
 def write_scene(scene, path):
     """Writes scalars, lists of scalars, tables and arrays of tables: all that scenes use."""
     lines = []

@@ -1,13 +1,17 @@
-"""Checks the FEniCSx side on its own, without the program: exact solutions and signs.
+"""Checks the FEniCSx side on its own, without the program: exact solutions and signs, for
+displacements of order 1 and 2.
 
 Run: /usr/bin/python3 validation/selfcheck.py
 """
 
+import itertools
 import sys
 
 import numpy as np
 
 from damage import evolve
+from lagrange import SIDES, Lagrange
+from scene import of_order
 from triangulation import Triangulation
 
 
@@ -40,33 +44,70 @@ def pressed(gap="0", **extra):
     }
 
 
-def patch_test(mesh):
+def solved(scene, mesh, order):
+    """The state at the end and the coordinates of the nodes of u."""
+    state, _ = evolve(of_order(scene, order), mesh)
+    return state, *Lagrange(mesh, order).points.T
+
+
+def patch_test(mesh, order):
     """σ_yy = −p: u_y = −p y/E − g, u_x = ν p x/E in plane stress."""
-    state, _ = evolve(pressed("0.01"), mesh)
-    x, y = mesh.nodes.T
+    state, x, y = solved(pressed("0.01"), mesh, order)
     exact = np.stack((0.3 * 3 / 80 * x, -3 / 80 * y - 0.01), 1)
     yield "patch test: displacement", np.abs(state.displacement - exact).max(), 1e-13
     yield "patch test: contact force", abs(state.contact_force - 3.0), 1e-12
 
 
-def plane_strain_patch_test(mesh):
+def plane_strain_patch_test(mesh, order):
     """As above with E/(1−ν²) and ν/(1−ν)."""
     scene = pressed()
     scene["material"]["plane"] = "strain"
-    state, _ = evolve(scene, mesh)
-    x, y = mesh.nodes.T
+    state, x, y = solved(scene, mesh, order)
     exact = 3 / 80 * np.stack((0.3 * 1.3 * x, -(1 - 0.3**2) * y), 1)
     yield "plane strain patch test", np.abs(state.displacement - exact).max(), 1e-13
 
 
-def body_force(mesh):
-    """A force that varies in x: total reaction = its integral by the midpoint rule."""
+def prescribed(*field, **extra):
+    """A body whose whole boundary is moved as a field."""
+    sides = ("bottom", "right", "top", "left")
+    boundary = [{"name": name, "displacement": list(field)} for name in sides]
+    return {"mesh": {"file": ""}, "material": {"young": 80.0, "poisson": 0.25},
+            "boundary": boundary, **extra}
+
+
+def curved_patch_test(mesh, order):
+    """Isoparametric elements of order 2 have all affine fields, wherever the middles of sides lie,
+    and so does the weak form: the Jacobian's cofactors times ∇φ are of degree 2."""
+    middles = mesh.nodes[mesh.triangles[:, SIDES]].mean(axis=2)
+    x, y = middles.transpose(2, 0, 1)
+    middles = middles + 0.01 * np.stack((np.sin(7 * x + 3 * y), np.cos(5 * x - 6 * y)), -1)
+    bent = Triangulation(mesh.nodes, mesh.triangles, mesh.curves, middles)
+    state, x, y = solved(prescribed("1 + 2*x - 3*y", "x + 0.5*y"), bent, order)
+    exact = np.stack((1 + 2 * x - 3 * y, x + 0.5 * y), 1)
+    yield "curved sides: affine field", np.abs(state.displacement - exact).max(), 1e-13
+
+
+def quadratic_patch_test(mesh, order):
+    """u = (x² − xy, y²/2), which order 2 has. With ν = ¼ and E = 80 in plane stress
+    σ_xx = E'(2x − y + y/4), σ_yy = E'(y + (2x − y)/4), σ_xy = −E'·3/8·x, E' = 80·16/15, and
+    −div σ = −E'(2, 1 − 1/4 − 3/8)."""
+    scale = 80 * 16 / 15
+    force = [repr(-2 * scale), repr(-0.375 * scale)]
+    scene = prescribed("x^2 - x*y", "0.5*y^2", body={"force": force})
+    state, x, y = solved(scene, mesh, order)
+    error = np.abs(state.displacement - np.stack((x**2 - x * y, 0.5 * y**2), 1)).max()
+    # P1 is exact only at the nodes, and only because the triangles are as regular as these.
+    yield "quadratic field, at the nodes", error, 1e-13
+
+
+def body_force(mesh, order):
+    """A force that varies in x: total reaction = its integral by the quadrature."""
     scene = pressed(body={"force": ["0", "-(1 + x^2 + 0*sin(y))"]})
-    state, _ = evolve(scene, mesh)
+    state, *_ = solved(scene, mesh, order)
     yield "body force: contact force", abs(state.contact_force - 3 - 4 / 3), 1e-12
 
 
-def partial_contact(mesh):
+def partial_contact(mesh, order):
     """Clamped on the left, one half pressed, the other pulled: KKT signs node by node."""
     scene = {
         "mesh": {"file": ""},
@@ -77,8 +118,7 @@ def partial_contact(mesh):
             {"name": "bottom", "gap": "1e-3*x"},
         ],
     }
-    state, _ = evolve(scene, mesh)
-    x, y = mesh.nodes.T
+    state, x, y = solved(scene, mesh, order)
     contact = (y == 0) & (x > 0)
     reaction = state.residual[contact, 1]
     distance = 1e-3 * x[contact] + state.displacement[contact, 1]
@@ -89,10 +129,10 @@ def partial_contact(mesh):
     yield "KKT: contact partly open", 0.0 if some else np.inf, 0.0
 
 
-def uniform_damage(mesh):
+def uniform_damage(mesh, order):
     """Uniform uniaxial stress: ζ stays uniform and follows the scalar Euler recursion."""
     law = {"diffusion": 0.5, "lambda_d": 0.1, "lambda_u": 20.0}
-    state, _ = evolve(pressed(damage=law, time={"end": 1.0, "step": 0.1}), mesh)
+    state, *_ = solved(pressed(damage=law, time={"end": 1.0, "step": 0.1}), mesh, order)
     zeta = 1.0
     for _ in range(10):
         strain_squared = (3 / (80 * zeta)) ** 2 * (1 + 0.3**2)
@@ -103,12 +143,14 @@ def uniform_damage(mesh):
 def main():
     mesh = square(12)
     failed = 0
-    checks = (patch_test, plane_strain_patch_test, body_force, partial_contact, uniform_damage)
-    for check in checks:
-        for name, error, tolerance in check(mesh):
+    checks = (patch_test, plane_strain_patch_test, curved_patch_test, quadratic_patch_test,
+              body_force, partial_contact, uniform_damage)
+    for check, order in itertools.product(checks, (1, 2)):
+        for name, error, tolerance in check(mesh, order):
             good = error <= tolerance
             failed += not good
-            print(f"{name:<32} {error:9.1e} ≤ {tolerance:.0e}  {'ok' if good else 'FAILED'}")
+            word = "ok" if good else "FAILED"
+            print(f"{name:<31} P{order} {error:9.1e} ≤ {tolerance:.0e}  {word}")
     return 1 if failed else 0
 
 

@@ -13,11 +13,13 @@ from scene import SceneError
 
 @dataclass
 class Triangulation:
-    """Nodes (n, 2), triangles (m, 3) counter-clockwise, and the edges of each named curve."""
+    """Nodes (n, 2), triangles (m, 3) counter-clockwise, and the edges of each named curve; of a
+    file of second order the points in the middle of the sides 01, 12, 20 (m, 3, 2)."""
 
     nodes: np.ndarray
     triangles: np.ndarray
     curves: dict
+    middles: np.ndarray = None
 
     def outward_normals(self, name):
         """Unit outward normals and lengths of a curve's edges; all must be boundary edges."""
@@ -47,7 +49,7 @@ def edge_keys(edges, nodes):
 
 
 def read_triangulation(path):
-    """Nodes in the file's order, without those no triangle uses; all groups of each line.
+    """Vertices in the file's order, without those no triangle uses; all groups of each line.
 
     A line may belong to several groups. The 4.1 format states this per entity, which
     meshio gives as cell sets; the 2.2 format repeats the line with another tag.
@@ -58,10 +60,12 @@ def read_triangulation(path):
     except (OSError, meshio.ReadError) as error:
         raise SceneError(f"{path}: {error}") from None
     blocks = [(k, b.data) for k, b in enumerate(mesh.cells)]
-    triangles = [data for k, data in blocks if mesh.cells[k].type == "triangle"]
+    triangles = [data for k, data in blocks if mesh.cells[k].type in ("triangle", "triangle6")]
     if not triangles:
         raise SceneError(f"{path}: no triangles")
     triangles = np.vstack(triangles).astype(np.int64)
+    middles = mesh.points[triangles[:, 3:], :2] if triangles.shape[1] == 6 else None
+    triangles = triangles[:, :3]
 
     used = np.unique(triangles)
     renumber = np.full(len(mesh.points), -1, np.int64)
@@ -72,6 +76,8 @@ def read_triangulation(path):
     ab, ac = (nodes[triangles[:, k]] - nodes[triangles[:, 0]] for k in (1, 2))
     clockwise = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0] < 0
     triangles[clockwise] = triangles[clockwise][:, [0, 2, 1]]
+    if middles is not None:
+        middles[clockwise] = middles[clockwise][:, [2, 1, 0]]
 
     tags = mesh.cell_data.get("gmsh:physical", [[]] * len(mesh.cells))
     curves = {}
@@ -80,19 +86,21 @@ def read_triangulation(path):
             continue
         edges = []
         for k, data in blocks:
-            if mesh.cells[k].type == "line":
+            if mesh.cells[k].type in ("line", "line3"):
                 inside = mesh.cell_sets[name][k] if name in mesh.cell_sets else tags[k] == tag
-                edges.append(renumber[data[inside]])
+                edges.append(renumber[data[inside][:, :2]])
         curves[name] = np.unique(np.sort(np.vstack(edges), axis=1), axis=0)
-    return Triangulation(nodes, triangles, curves)
+    return Triangulation(nodes, triangles, curves, middles)
 
 
-def mesh_geometry(geometry, table, target):
-    """Meshes a .geo file into `target` with gmsh; `table` is the scene's [mesh]."""
+def mesh_geometry(geometry, table, target, order=1):
+    """Meshes a .geo file into `target` with gmsh; `table` is the scene's [mesh]. Of order 2 the
+    middles of edges lie on the geometry."""
     numbers = dict(table.get("parameters", {}))
     if "size" in table:
         numbers["size"] = table["size"]
-    command = ["gmsh", "-2", str(geometry), "-o", str(target), "-v", "2"]
+    command = ["gmsh", "-2", str(geometry), "-o", str(target), "-v", "2",
+               "-order", str(order)]
     for name, value in numbers.items():
         command += ["-setnumber", name, str(value)]
     try:
