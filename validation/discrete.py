@@ -1,8 +1,9 @@
 """The discrete problem of a scene, assembled for the judge of `random_scenes.py`.
 
-P1 stiffness, loads, prescribed rows, contact rows and the damage step (28), written from the
-method's description alone (README.md, the paper's sections 2 to 4): nothing here was taken from
-the program, so that a fault of its assembly, bases or constraints shows as a difference.
+Stiffness of P1 or P2 on straight triangles, loads, prescribed rows, contact rows and the damage
+step (28), written from the method's description alone (README.md, the paper's sections 2 to 4):
+nothing here was taken from the program, so that a fault of its assembly, bases or constraints shows
+as a difference.
 """
 
 from dataclasses import dataclass
@@ -12,11 +13,16 @@ from scipy.sparse import coo_matrix, diags
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
-from scene import Expression
+from lagrange import Lagrange, derivatives, functions
+from scene import Expression, displacement_order
 
 CORNER = np.pi / 6  # edges further apart meet in a corner
 DAMAGE = {"lambda_w": 0.0, "strain_cap": 1000.0, "threshold": 0.01, "initial": 1.0,
           "mass": "consistent"}
+# Barycentric coordinates of the points, of equal weights, that integrate the stiffness.
+POINTS = {1: np.full((1, 3), 1 / 3), 2: np.full((3, 3), 1 / 6) + 0.5 * np.eye(3)}
+# Of the nodes of an edge (ends, middle) the share of its length: the integrals of their functions.
+SHARES = {1: (1 / 2, 1 / 2), 2: (1 / 6, 1 / 6, 4 / 6)}
 
 
 @dataclass
@@ -31,81 +37,93 @@ class Rows:
 
 
 class Discrete:
-    """A scene on its triangulation."""
+    """A scene on its triangulation: u at the `points`, which the `elements` number; ζ at the
+    vertices."""
 
     def __init__(self, scene, mesh):
-        self.scene, self.mesh = scene, mesh
+        self.scene, self.mesh, self.order = scene, mesh, displacement_order(scene)
+        self.space = Lagrange(mesh, self.order)
+        self.points, self.elements = self.space.points, self.space.elements
         x, t = mesh.nodes, mesh.triangles
         # ∇λ_i of a triangle is its opposite side turned by 90° over twice the area.
         side = x[np.roll(t, -2, 1)] - x[np.roll(t, -1, 1)]
         a, b = x[t[:, 1]] - x[t[:, 0]], x[t[:, 2]] - x[t[:, 0]]
         self.area = 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
         self.gradient = np.stack([-side[..., 1], side[..., 0]], -1) / (2 * self.area)[:, None, None]
-        # (ε_xx, ε_yy, 2ε_xy) = B u_e
-        self.b = np.zeros((len(t), 3, 6))
-        self.b[:, 0, 0::2] = self.b[:, 2, 1::2] = self.gradient[..., 0]
-        self.b[:, 1, 1::2] = self.b[:, 2, 0::2] = self.gradient[..., 1]
-        self.dof = np.stack([2 * t, 2 * t + 1], -1).reshape(-1, 6)
+        # (ε_xx, ε_yy, 2ε_xy) = B u_e at each quadrature point.
+        local = derivatives(POINTS[self.order], self.order)
+        gradient = np.einsum("qnk,ekd->eqnd", local, self.gradient)
+        self.b = np.zeros((*gradient.shape[:2], 3, 2 * gradient.shape[2]))
+        self.b[..., 0, 0::2] = self.b[..., 2, 1::2] = gradient[..., 0]
+        self.b[..., 1, 1::2] = self.b[..., 2, 0::2] = gradient[..., 1]
+        n = self.elements
+        self.dof = np.stack([2 * n, 2 * n + 1], -1).reshape(len(n), -1)
         self.law = {**DAMAGE, **scene.get("damage", {})}
         self.d = elasticity(scene["material"])
-        self.element = np.einsum("eki,kl,elj,e->eij", self.b, self.d, self.b, self.area)
+        weight = self.area / gradient.shape[1]
+        self.element = np.einsum("eqki,kl,eqlj,e->eqij", self.b, self.d, self.b, weight)
         self.boundaries = scene.get("boundary", [])
         self.contact = self._contact_rows()
         self.prescribed = self._prescribed()
 
-    def zeta_mean(self, zeta):
-        """η_*(ζ) is exact at the triangle's mean of the nodal values: ε is constant."""
+    def element_stiffness(self, zeta):
+        """Σ_q w_q η_*(ζ)(x_q) Bᵀ D B of each triangle, η_*(ζ) affine between the vertices: of P1
+        that is exact, as ε is constant."""
         if "damage" in self.scene:
             zeta = np.clip(zeta, self.law["threshold"], 1.0)
-        return zeta[self.mesh.triangles].mean(1)
+        at_points = zeta[self.mesh.triangles] @ POINTS[self.order].T
+        return np.einsum("eqij,eq->eij", self.element, at_points)
 
     def stiffness(self, zeta):
-        """K(ζ) = Σ ζ̄ |T| Bᵀ D B."""
-        k = self.element * self.zeta_mean(zeta)[:, None, None]
+        """K(ζ), the sum over the triangles."""
+        k = self.element_stiffness(zeta)
         rows, columns = (np.broadcast_to(v, k.shape) for v in
                          (self.dof[:, :, None], self.dof[:, None, :]))
-        n = 2 * len(self.mesh.nodes)
+        n = 2 * len(self.points)
         return coo_matrix((k.ravel(), (rows.ravel(), columns.ravel())), (n, n)).tocsc()
 
     def element_sizes(self, zeta, u):
         """Per unknown Σ_T |f_T| and Σ_T |K_T||u_T|: the scales of forces and of their rounding."""
-        k, v = self.element * self.zeta_mean(zeta)[:, None, None], u[self.dof]
+        k, v = self.element_stiffness(zeta), u[self.dof]
         force, rounding = np.zeros_like(u), np.zeros_like(u)
         np.add.at(force, self.dof, np.abs(np.einsum("eij,ej->ei", k, v)))
         np.add.at(rounding, self.dof, np.einsum("eij,ej->ei", np.abs(k), np.abs(v)))
         return force, rounding
 
     def load(self, t):
-        """∫ f_B·v by the edge-midpoint rule and ∫ f_N·v by two Gauss points an edge."""
-        x, tri = self.mesh.nodes, self.mesh.triangles
-        load = np.zeros((len(x), 2))
+        """∫ f_B·v by the midpoints of the sides (P1) or the points of the stiffness (P2), and
+        ∫ f_N·v by two Gauss points an edge."""
+        x, load = self.mesh.nodes, np.zeros((len(self.points), 2))
         if "body" in self.scene:
-            for k in range(3):
-                p, q = tri[:, k], tri[:, (k + 1) % 3]
-                force = pair(self.scene["body"]["force"], 0.5 * (x[p] + x[q]), t)
-                for node in (p, q):
-                    np.add.at(load, node, force * (self.area / 6)[:, None])
+            inner = POINTS[2] if self.order == 2 else 0.5 - 0.5 * np.eye(3)
+            for barycentric in inner:
+                points = barycentric @ x[self.mesh.triangles]
+                force = pair(self.scene["body"]["force"], points, t) * (self.area / 3)[:, None]
+                for node, value in zip(self.elements.T, functions(barycentric, self.order)):
+                    np.add.at(load, node, value * force)
         for boundary in self.boundaries:
             if "traction" not in boundary:
                 continue
-            p, q = self.mesh.edges(boundary["name"]).T
+            edges = self.mesh.edges(boundary["name"])
+            p, q = edges.T
             length = np.linalg.norm(x[q] - x[p], axis=1)[:, None]
             for s in 0.5 + 0.5 / np.sqrt(3) * np.array([-1, 1]):
-                force = pair(boundary["traction"], x[p] + s * (x[q] - x[p]), t)
-                np.add.at(load, p, 0.5 * length * (1 - s) * force)
-                np.add.at(load, q, 0.5 * length * s * force)
+                force = 0.5 * length * pair(boundary["traction"], x[p] + s * (x[q] - x[p]), t)
+                values = functions(np.array([1 - s, s]), self.order)
+                for node, value in zip(self.space.on(edges).T, values):
+                    np.add.at(load, node, value * force)
         return load.ravel()
 
     def faces(self, name):
         """Per node of a curve the (normal, length) it sees: the length-weighted mean of the
         adjacent edges' outward normals, or one for each side of a corner."""
-        edges = self.mesh.edges(name)
+        edges = self.space.on(self.mesh.edges(name))
         normals, lengths = self.mesh.outward_normals(name)
-        halves = {}
+        parts = {}
         for edge, normal, length in zip(edges, normals, lengths):
-            for node in edge:
-                halves.setdefault(int(node), []).append((normal, 0.5 * length))
-        return {node: merged(parts) for node, parts in halves.items()}
+            for node, share in zip(edge, SHARES[self.order]):
+                parts.setdefault(int(node), []).append((normal, share * length))
+        return {node: merged(found) for node, found in parts.items()}
 
     def _contact_rows(self):
         """u·ν ≤ g: a fixed normal or those of the faces; where curves meet smoothly one row of
@@ -119,7 +137,7 @@ class Discrete:
                 fixed = np.array([float(Expression(c)(0.0, 0.0, 0.0)) for c in fixed])
                 fixed = fixed / np.linalg.norm(fixed)
             for node, faces in self.faces(boundary["name"]).items():
-                g = float(gap.at(self.mesh.nodes[[node]])[0])
+                g = float(gap.at(self.points[[node]])[0])
                 if fixed is not None:
                     faces = [(fixed, sum(length for _, length in faces))]
                 rows.setdefault(node, []).extend((n, w, g) for n, w in faces)
@@ -138,12 +156,13 @@ class Discrete:
                 if str(text).strip() != "free":
                     value, d = Expression(text), np.eye(2)[axis]
                     rows += [(int(node), d, value)
-                             for node in np.unique(self.mesh.edges(boundary["name"]))]
+                             for node in np.unique(
+                                 self.space.on(self.mesh.edges(boundary["name"])))]
         return rows
 
     def prescribed_rows(self, t):
         """The prescribed rows with their values at time t."""
-        value = lambda node, e: 0.0 if e is None else float(e.at(self.mesh.nodes[[node]], t)[0])
+        value = lambda node, e: 0.0 if e is None else float(e.at(self.points[[node]], t)[0])
         return as_rows([(node, d, value(node, e)) for node, d, e in self.prescribed])
 
     def bad_input(self):
@@ -154,7 +173,7 @@ class Discrete:
             if "gap" not in boundary:
                 continue
             gap = Expression(boundary["gap"]).at(
-                self.mesh.nodes[np.unique(self.mesh.edges(boundary["name"]))])
+                self.points[np.unique(self.space.on(self.mesh.edges(boundary["name"])))])
             size = np.ptp(self.mesh.nodes, axis=0).max()
             if not np.isfinite(gap).all() or (gap < -1e-9 * size).any():
                 return "gap negative", False
@@ -180,14 +199,15 @@ class Discrete:
         return connected_components(graph, directed=False)
 
     def damage_step(self, u, zeta, step):
-        """ζ_n of (28): (M + kκL) ζ_n = M ζ_{n−1} + k b(φ(ε(u_{n−1}), ζ_{n−1})), φ at the three
-        vertices of a triangle and then integrated with the same M; and how much of it may be
-        rounding, where triangles are very thin."""
+        """ζ_n of (28): (M + kκL) ζ_n = M ζ_{n−1} + k b(φ(ε(u_{n−1}), ζ_{n−1})); of P1 with φ at the
+        three vertices of a triangle and then integrated with the same M, of P2 at the points of the
+        stiffness; and how much of it may be rounding, where triangles are very thin."""
         t, law = self.mesh.triangles, self.law
-        strain = np.einsum("eki,ei->ek", self.b, u[self.dof])
-        squared = strain[:, 0] ** 2 + strain[:, 1] ** 2 + 0.5 * strain[:, 2] ** 2
-        psi = np.minimum(squared, law["strain_cap"])[:, None]
-        eta = np.clip(zeta[t], law["threshold"], 1.0)
+        strain = np.einsum("eqki,ei->keq", self.b, u[self.dof])
+        squared = strain[0] ** 2 + strain[1] ** 2 + 0.5 * strain[2] ** 2
+        psi = np.minimum(squared, law["strain_cap"])
+        at = np.eye(3) if self.order == 1 else POINTS[2]
+        eta = np.clip(zeta[t] @ at.T, law["threshold"], 1.0)
         rate = law["lambda_d"] * (1 - eta) / eta + 0.5 * law["lambda_u"] * psi - law["lambda_w"]
         phi = -np.maximum(rate, 0.0)
         local = (np.ones((3, 3)) + np.eye(3)) / 12
@@ -201,7 +221,10 @@ class Discrete:
         assemble = lambda v: coo_matrix((v.ravel(), (rows, columns)), (n, n)).tocsc()
         m, l = assemble(mass), assemble(laplace)
         right = m @ zeta
-        np.add.at(right, t, step * np.einsum("eij,ej->ei", mass, phi))
+        if self.order == 1:
+            np.add.at(right, t, step * np.einsum("eij,ej->ei", mass, phi))
+        else:
+            np.add.at(right, t, step * (self.area / 3)[:, None] * (phi @ POINTS[2]))
         matrix = m + step * law["diffusion"] * l
         # Jacobi scaling keeps pieces of very different size apart from rounding.
         scale = diags(1 / np.sqrt(matrix.diagonal()))

@@ -9,8 +9,9 @@ import numpy as np
 
 @dataclass
 class Frame:
-    """Time, displacement, ζ, remaining gap and pressure, and by how much pieces of several ranks
-    differ at their common nodes."""
+    """Time, displacement, ζ at the vertices, remaining gap and pressure; and by how much pieces of
+    several ranks differ at their common nodes, or ζ in the middle of an edge from the mean of its
+    ends."""
 
     time: float
     u: np.ndarray
@@ -20,10 +21,10 @@ class Frame:
     apart: float
 
 
-def read_frames(mesh, out):
-    """Every frame written, nodes as in `mesh`; pieces are matched triangle by triangle, as slits
-    have two nodes at one point."""
-    place = {key(mesh.nodes[t]): t for t in mesh.triangles}
+def read_frames(space, out):
+    """Every frame written, nodes as in the finite element `space` of u; pieces are matched triangle
+    by triangle, as slits have two nodes at one point."""
+    place = {key(space.points[t]): t for t in space.elements}
     collection = out / "fields.pvd"
     if not collection.exists():
         return []
@@ -32,29 +33,31 @@ def read_frames(mesh, out):
         pieces = [out / entry.get("file")]
         if pieces[0].suffix == ".pvtu":
             pieces = [out / p.get("Source") for p in ElementTree.parse(pieces[0]).iter("Piece")]
-        values, apart, seen = np.full((len(mesh.nodes), 5), np.nan), 0.0, 0
+        values, apart, seen = np.full((len(space.points), 5), np.nan), 0.0, 0
         for data in map(meshio.read, pieces):
             names = ("displacement", "zeta", "gap", "normal_pressure")
             field = np.column_stack([data.point_data[name] for name in names])[:, [0, 1, 3, 4, 5]]
             for cell in np.vstack([block.data for block in data.cells]):
                 nodes = place[key(data.points[cell, :2])]
                 # Both lists in the order of their points.
-                a, b = (order(points) for points in (mesh.nodes[nodes], data.points[cell, :2]))
+                a, b = (order(points) for points in (space.points[nodes], data.points[cell, :2]))
                 old, new = values[nodes[a]], field[cell[b]]
                 apart = max(apart, np.nanmax(np.abs(old - new), initial=0.0))
                 values[nodes[a]] = new
                 seen += 1
-        values[:] = values if seen == len(mesh.triangles) else np.nan
+        values[:] = values if seen == len(space.elements) else np.nan
         u, (zeta, gap, pressure) = values[:, :2].ravel(), values[:, 2:].T
+        vertices = zeta[:len(space.mesh.nodes)]
+        apart, zeta = max(apart, np.abs(space.spread(vertices) - zeta).max()), vertices
         frames.append(Frame(float(entry.get("timestep")), u, zeta, gap, pressure, apart))
     return frames
 
 
 def key(points):
-    """A triangle by the coordinates of its corners."""
+    """A triangle by the coordinates of its nodes."""
     return tuple(map(tuple, (points[order(points)] + 0.0).tolist()))
 
 
 def order(points):
-    """Corners sorted by their coordinates."""
+    """Nodes sorted by their coordinates."""
     return np.lexsort((points[:, 1], points[:, 0]))

@@ -65,7 +65,7 @@ def verdict_on(discrete, out, code, output):
     if refusal and not either:
         word = "gave up" if code == 1 else "wrong"
         return Verdict(word, f"should be refused ({refusal}), exit code {code}")
-    frames = read_frames(discrete.mesh, out)
+    frames = read_frames(discrete.space, out)
     if not frames and code == 0:
         return Verdict("wrong", "no frames")
     found = judge_frames(discrete, frames, output)

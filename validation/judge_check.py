@@ -1,8 +1,10 @@
-"""Checks the judge itself, without the program: exact answers pass, planted faults do not.
+"""Checks the judge itself, without the program: exact answers pass, planted faults do not, for
+displacements of order 1 and 2.
 
 Run: /usr/bin/python3 validation/judge_check.py
 """
 
+import itertools
 import sys
 
 import numpy as np
@@ -10,6 +12,7 @@ import numpy as np
 import random_bodies as bodies
 from discrete import Discrete
 from judge import expectation, judge_step, residuals
+from scene import of_order
 from variational import Step, along
 
 SCENE = {"material": {"young": 80.0, "poisson": 0.3}}
@@ -22,56 +25,70 @@ def square(turn=0.0):
     return bodies.finish(rng, (points, triangles, bodies.sides(node)), 1.0, turn)
 
 
-def step_of(mesh, boundary, t=1.0, **more):
-    """A contact step of a scene on a mesh, undamaged."""
-    discrete = Discrete({**SCENE, "boundary": boundary, **more}, mesh)
-    return Step(discrete, np.ones(len(mesh.nodes)), t)
+def step_of(mesh, boundary, order=1, **more):
+    """A contact step of a scene on a mesh, undamaged, at t = 1."""
+    discrete = Discrete(of_order({**SCENE, "boundary": boundary, **more}, order), mesh)
+    return Step(discrete, np.ones(len(mesh.nodes)), 1.0)
 
 
-def pressed(gap="0.01"):
+def pressed(order, gap="0.01"):
     """A square under pressure 3, held by a symmetry axis and contact, and its exact answer
     u_y = −p y/E − g, u_x = νp x/E."""
     mesh = square()
     step = step_of(mesh, [{"name": "west", "symmetry": True}, {"name": "south", "gap": gap},
-                          {"name": "north", "traction": ["0", "-3"]}])
-    x, y = mesh.nodes.T
+                          {"name": "north", "traction": ["0", "-3"]}], order)
+    x, y = step.discrete.points.T
     return step, np.stack((0.3 * 3 / 80 * x, -3 / 80 * y - float(gap)), 1).ravel()
 
 
-def patch_test():
+def patch_test(order):
     """The exact field keeps every condition and is the judge's own answer, also turned."""
-    step, exact = pressed()
+    step, exact = pressed(order)
     yield "patch test: residuals of the exact field", max(residuals(step, exact)[:2]), 1e-14
     yield "patch test: own answer", np.abs(step.solve() - exact).max(), 1e-14
     mesh = square(0.7)
     direction = [repr(float(3 * c)) for c in -mesh.outward_normals("north")[0].mean(0)]
     step = step_of(mesh, [{"name": "west", "symmetry": True}, {"name": "south", "gap": "0"},
-                          {"name": "north", "traction": direction}])
+                          {"name": "north", "traction": direction}], order)
     own = step.solve()
     yield "patch test, turned: residuals", max(residuals(step, own)[:2]), 1e-13
 
 
-def planted():
+def planted(order):
     """What is not the answer is called wrong: scaled, lifted, through the obstacle, glued, one node
     off by 1e-5 of the answer, the answer of another gap."""
-    step, exact = pressed()
-    x = step.discrete.mesh.nodes
+    step, exact = pressed(order)
+    x = step.discrete.points
     one = np.zeros_like(exact)
     one[2 * int(np.argmin(np.hypot(*(x - 0.5).T)))] = 1e-5 * np.abs(exact).max()
     up = np.tile([0.0, 1.0], len(x))
     faults = {"scaled": 1.001 * exact, "lifted": exact + 1e-5 * up, "through": exact - 1e-5 * up,
-              "one node": exact + one, "other gap": pressed("0.02")[1], "zero": 0 * exact}
+              "one node": exact + one, "other gap": pressed(order, "0.02")[1], "zero": 0 * exact}
     for name, u in faults.items():
         yield f"planted: {name}", float(judge_step(step, u, (0, 0))[0].word == "right"), 0.5
     yield "exact is right", float(judge_step(step, exact, (0, 0))[0].word != "right"), 0.5
     # Pulled off its foundation: an answer that sticks to it has tensile contact forces.
     pull = [{"name": "north", "displacement": ["0", "0.1"]}, {"name": "south", "gap": "0"}]
-    free = step_of(square(), pull)
-    glued = step_of(square(), [pull[0], {"name": "south", "displacement": ["free", "0"]}])
+    free = step_of(square(), pull, order)
+    glued = step_of(square(), [pull[0], {"name": "south", "displacement": ["free", "0"]}], order)
     yield "glued is wrong", float(judge_step(free, glued.solve(), (0, 0))[0].word != "wrong"), 0.5
 
 
-def opposite():
+def quadratic(order):
+    """u = (x² − xy, y²/2), which P2 has, with its body force (see selfcheck.py)."""
+    if order == 1:
+        return
+    boundary = [{"name": name, "displacement": ["x^2 - x*y", "0.5*y^2"]}
+                for name in ("south", "east", "north", "west")]
+    scale = 80 * 16 / 15
+    step = step_of(square(), boundary, order, material={"young": 80.0, "poisson": 0.25},
+                   body={"force": [repr(-2 * scale), repr(-0.375 * scale)]})
+    x, y = step.discrete.points.T
+    exact = np.stack((x**2 - x * y, 0.5 * y**2), 1).ravel()
+    yield "quadratic field", np.abs(step.solve() - exact).max(), 1e-14
+
+
+def opposite(order):
     """A tip between two plates with gaps of 0.001: the triangle (0,0), (2,∓0.4) clamped at its
     end. Both rows hold, and the force of the touching plate is a pressure."""
     rng = np.random.default_rng(3)
@@ -86,7 +103,7 @@ def opposite():
               {"name": "lower", "gap": "0.001", "normal": ["0", "-1"]},
               {"name": "upper", "gap": "0.001", "normal": ["0", "1"]}]
     material = {"young": 1.0, "poisson": 0.3}
-    step = step_of(mesh, plates, material=material, body={"force": ["0.01", "0.003"]})
+    step = step_of(mesh, plates, order, material=material, body={"force": ["0.01", "0.003"]})
     own = step.solve()
     yield "wedge between plates: residuals", max(residuals(step, own)[:2]), 1e-12
     yield "wedge: the upper plate holds", abs((along(step.rows, own) - 0.001).max()), 1e-15
@@ -94,35 +111,35 @@ def opposite():
     yield "wedge: largest displacement near 9.9e-3", abs(large - 9.9e-3), 1e-3
 
 
-def ranks():
+def ranks(order):
     """Rigid motions by pieces and hinges; loads that contact can and cannot balance."""
     corner = {"name": "south", "gap": "0"}
     mesh = square()
-    yield "a free square has 3 motions", abs(step_of(mesh, [corner]).n.shape[1] - 3.0), 0.0
+    yield "a free square has 3 motions", abs(step_of(mesh, [corner], order).n.shape[1] - 3.0), 0.0
     # Two triangles with a common node: 3 + 3 motions, two of them tied.
     two = bodies.Triangulation(
         np.array([[0, 0], [1, -1], [1, 1], [-1, 1], [-1, -1]], float),
         np.array([[0, 1, 2], [0, 3, 4]]), {"south": np.array([[1, 2]])})
-    yield "a hinge leaves 4 motions", abs(step_of(two, [corner]).n.shape[1] - 4.0), 0.0
+    yield "a hinge leaves 4 motions", abs(step_of(two, [corner], order).n.shape[1] - 4.0), 0.0
     for name, force, driven in (("down", "-1", 0.0), ("up", "1", 1.0)):
-        step = step_of(mesh, [corner], body={"force": ["0", force]})
+        step = step_of(mesh, [corner], order, body={"force": ["0", force]})
         yield f"pushed {name}: driven or not", abs((step.driven > 1e-7) - driven), 0.0
     scene = {**SCENE, "boundary": [corner], "body": {"force": ["0", "1-2*t"]}}
-    refused = expectation(Discrete(scene, mesh))[0] is not None
+    refused = expectation(Discrete(of_order(scene, order), mesh))[0] is not None
     yield "only the time of the solve counts", float(refused), 0.0
-    yield "one motion is left loose", abs(loose(mesh, corner) - 1.0), 0.0
+    yield "one motion is left loose", abs(loose(mesh, corner, order) - 1.0), 0.0
 
 
-def loose(mesh, corner):
+def loose(mesh, corner, order):
     """How many motions an answer leaves open: sliding, on a flat foundation."""
-    step = step_of(mesh, [corner], body={"force": ["0", "-1"]})
+    step = step_of(mesh, [corner], order, body={"force": ["0", "-1"]})
     step.solve()
     return step.loose.shape[1]
 
 
-def damage():
+def damage(order):
     """Uniform strain: ζ obeys the scalar Euler recursion; without a source ∫ζ is conserved."""
-    step, exact = pressed()
+    step, exact = pressed(order)
     law = {"diffusion": 0.5, "lambda_d": 0.1, "lambda_u": 20.0}
     discrete = Discrete({**step.discrete.scene, "damage": law}, step.discrete.mesh)
     zeta = np.full(len(discrete.mesh.nodes), 0.8)
@@ -141,11 +158,13 @@ def damage():
 
 def main():
     failed = 0
-    for check in (patch_test, planted, opposite, ranks, damage):
-        for name, error, tolerance in check():
+    checks = (patch_test, planted, quadratic, opposite, ranks, damage)
+    for check, order in itertools.product(checks, (1, 2)):
+        for name, error, tolerance in check(order):
             good = error <= tolerance
             failed += not good
-            print(f"{name:<42} {error:9.1e} ≤ {tolerance:.0e}  {'ok' if good else 'FAILED'}")
+            word = "ok" if good else "FAILED"
+            print(f"{name:<42} P{order} {error:9.1e} ≤ {tolerance:.0e}  {word}")
     return 1 if failed else 0
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Judges the program on random scenes: random_scenes.py [--count N] [--seed S] [--binary FILE]
+"""Judges the program on random scenes: random_scenes.py [--count N] [--seed S] [--order 2] [--binary FILE]
 
 Each scene (`random_draw`) is run with a drawn solver on one to three ranks, and its answer judged
 by code that shares nothing with the program (`judge`). Writes out/random/scenes.csv; scenes judged
@@ -29,7 +29,7 @@ os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", SCOTCH_PTHREAD_
 from judge import Verdict, judge  # noqa: E402
 from random_bodies import write_msh  # noqa: E402
 from random_draw import draw  # noqa: E402
-from scene import read_scene, write_scene  # noqa: E402
+from scene import of_order, read_scene, write_scene  # noqa: E402
 from solvers import solvers  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -96,10 +96,10 @@ def follow(folder, binary, solver, ranks, tolerance):
     return verdict
 
 
-def one(binary, out, seed, number, solver):
+def one(binary, out, seed, number, solver, order):
     """Draws, runs and judges scene `number`; keeps its files if it failed."""
     case = draw(seed, number, solvers(binary))
-    case.solver = solver or case.solver
+    case.solver, case.scene = solver or case.solver, of_order(case.scene, order)
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         write_msh(case.mesh, folder / "mesh.msh")
@@ -140,6 +140,7 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--first", type=int, default=0, help="number of the first scene")
     parser.add_argument("--solver", help="this one instead of the one drawn")
+    parser.add_argument("--order", type=int, choices=[1, 2], default=1, help="of the displacements")
     parser.add_argument("--binary", type=Path, default=ROOT / "target" / "release" / "signorini")
     parser.add_argument("--out", type=Path, default=ROOT / "out" / "random")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
@@ -156,7 +157,8 @@ def main():
     numbers = range(arguments.first, arguments.first + arguments.count)
     rows = []
     with ProcessPoolExecutor(arguments.jobs) as pool:
-        runs = [pool.submit(one, binary, out, arguments.seed, n, arguments.solver) for n in numbers]
+        runs = [pool.submit(one, binary, out, arguments.seed, n, arguments.solver, arguments.order)
+                for n in numbers]
         for done in as_completed(runs):
             rows.append(done.result())
     rows.sort(key=lambda row: int(row["id"].split("-")[1]))

@@ -57,7 +57,7 @@ class Step:
     def _motions(self):
         """N: rigid motions of the pieces that agree at common nodes (hinges) and that no
         prescribed row resists; those that no contact row resists either are `free`."""
-        x, t = self.discrete.mesh.nodes, self.discrete.mesh.triangles
+        x, t = self.discrete.points, self.discrete.elements
         count, piece = self.discrete.clusters()
         fields, first, ties = np.zeros((len(x), 2, 3 * count)), np.full(len(x), -1), []
         for c in range(count):
