@@ -13,8 +13,6 @@ from matplotlib.collections import LineCollection
 from matplotlib.patheffects import withTickedStroke
 from matplotlib.ticker import MaxNLocator
 
-from results import paths
-
 INK, FAINT, BLUE, RED = "#22262b", "#9aa3ad", "#2f6db3", "#c0392b"
 
 plt.rcParams.update({
@@ -69,9 +67,9 @@ def map_size(extent, across):
 
 
 def draw_outline(axes, points, results, **style):
-    """The body's boundary curves, unbroken so that dashes run on from edge to edge."""
-    curves = [points[path] for path in paths([tuple(edge) for edge in results.boundary().tolist()])]
-    axes.add_collection(LineCollection(curves, capstyle="round", **style))
+    """The body's boundary curves, unbroken so that dashes run on from edge to edge; `points` are
+    the places of its nodes."""
+    axes.add_collection(LineCollection(results.outline(points), capstyle="round", **style))
 
 
 def draw_foundation(axes, results, factor=None):

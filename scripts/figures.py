@@ -37,17 +37,20 @@ def draw_deformed(results, factor=None):
     # The obstacle moves away by as much: it must keep its shape, and stay in sight.
     widest = np.linalg.norm(results.obstacle - results.contact, axis=2).max(initial=0.0)
     factor = factor or amplification(results.size, max(largest, widest))
-    moved = results.nodes + factor * results.displacement
-    both = np.vstack((results.nodes, moved))
+    moved, pieces = results.nodes + factor * results.displacement, results.pieces
+    both = np.vstack((results.nodes, pieces.at_points(moved)))
     extent = np.ptp(both, axis=0)
     width, height = map_size(extent, 7.2)
     figure, axes = plt.subplots(figsize=(width, height + 0.4))
 
     # Lines must not fill a fine mesh: their width follows the mean edge, in points.
-    edge = np.sqrt(extent.prod() / len(results.triangles)) * 72 * width / extent[0]
-    mesh = Triangulation(*moved.T, results.triangles)
-    axes.tripcolor(mesh, np.zeros(len(moved)), cmap=ListedColormap(["#dfe9f3"]), zorder=1)
-    axes.triplot(mesh, color=BLUE, linewidth=min(0.6, 0.06 * edge), zorder=2)
+    edge = np.sqrt(extent.prod() / len(pieces.elements)) * 72 * width / extent[0]
+    mesh = Triangulation(*pieces.at_points(moved).T, pieces.triangles)
+    axes.tripcolor(mesh, np.zeros(len(mesh.x)), cmap=ListedColormap(["#dfe9f3"]), zorder=1)
+    # One line for all sides, with a break after each.
+    sides = np.pad(pieces.along(pieces.sides(), moved), ((0, 0), (0, 1), (0, 0)),
+                   constant_values=np.nan)
+    axes.plot(*sides.reshape(-1, 2).T, color=BLUE, linewidth=min(0.6, 0.06 * edge), zorder=2)
     draw_outline(axes, moved, results, color=BLUE, linewidth=1.0, zorder=2.5)
     draw_outline(
         axes, results.nodes, results, color=INK, linewidth=0.9, linestyle=(0, (4, 2)), zorder=3
@@ -76,14 +79,15 @@ def draw_stress_and_damage(results):
     else:
         width, height = map_size(extent, 8.0)
         figure, (left, right) = plt.subplots(2, 1, figsize=(width, 2 * height + 0.5))
-    mesh = Triangulation(*results.nodes.T, results.triangles)
+    pieces = results.pieces
+    mesh = Triangulation(*pieces.at_points(results.nodes).T, pieces.triangles)
 
     # Stress is singular at corners: a few triangles must not darken all the others.
     largest, top = results.von_mises.max(), np.quantile(results.von_mises, 0.995)
     cut = largest > 1.25 * top > 0.0
     factor, prefix = unit_prefix(top)
     stress = left.tripcolor(
-        mesh, facecolors=results.von_mises / factor, cmap="viridis", vmin=0.0,
+        mesh, facecolors=pieces.of_cells(results.von_mises / factor), cmap="viridis", vmin=0.0,
         vmax=(top if cut else largest) / factor or 1.0,
     )
     draw_colourbar(left, stress, f"von Mises stress ({prefix}Pa)", "max" if cut else "neither")
@@ -91,6 +95,7 @@ def draw_stress_and_damage(results):
 
     if damaged:
         values, label, colours, limits = damage_scale(results.zeta)
+        values = pieces.at_points(values)
         damage = right.tripcolor(mesh, values, shading="gouraud", cmap=colours, **limits)
         draw_colourbar(right, damage, label)
         right.set_title(rf"damage, least $\zeta$ = {least_zeta(results.zeta.min())}")

@@ -10,6 +10,8 @@ from pathlib import Path
 import meshio
 import numpy as np
 
+from elements import Pieces, counter_clockwise
+
 
 def read_table(path):
     """The rows of a CSV file as dictionaries, with numbers where there are any."""
@@ -36,7 +38,7 @@ class Results:
     history: dict  # column → array
     time: float
     nodes: np.ndarray  # (n, 2), m
-    triangles: np.ndarray  # (m, 3)
+    pieces: Pieces  # the elements, 3 or 6 nodes each
     displacement: np.ndarray  # (n, 2), m
     zeta: np.ndarray  # (n,)
     von_mises: np.ndarray  # (m,), Pa
@@ -68,20 +70,24 @@ class Results:
         """The longer side of the body's bounding box."""
         return float(np.ptp(self.nodes, axis=0).max())
 
-    def boundary(self):
-        """Boundary edges, each with the body on its left."""
-        t = self.triangles
-        edges = np.vstack((t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]))
-        _, first, count = np.unique(
-            np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
-        )
-        return edges[first[count == 1]]
+    def outline(self, points):
+        """The boundary as polylines as long as possible, from the coordinates of the nodes."""
+        edges = self.pieces.boundary()
+        lines = self.pieces.along(edges, points)
+        at, joined = {}, []
+        for (start, end, *_), line in zip(edges.tolist(), lines):
+            ends = [start, *((start, end, k) for k in range(1, len(line) - 1)), end]
+            at.update(zip(ends, line))
+            joined += zip(ends, ends[1:])
+        return [np.array([at[end] for end in path]) for path in paths(joined)]
 
     def contact_pieces(self):
         """Γ_C as node paths: its connected pieces, the body on the left."""
-        edges = self.boundary()
-        on = np.isfinite(self.gap)
-        return paths([tuple(edge) for edge in edges[on[edges].all(axis=1)].tolist()])
+        edges = self.pieces.boundary()
+        edges = edges[np.isfinite(self.gap)[edges].all(axis=1)]
+        # From one end by way of the middle, if there is one, to the other.
+        edges = np.column_stack([edges[:, 0], edges[:, 2:], edges[:, 1]])
+        return paths([pair for edge in edges.tolist() for pair in zip(edge, edge[1:])])
 
     def foundation(self, factor=None):
         """The obstacle as polylines; with a factor, as the body deformed so many times meets it.
@@ -140,15 +146,15 @@ def read_results(folder):
         frames = ElementTree.parse(folder / "fields.pvd").findall(".//DataSet")
         last = max(frames, key=lambda frame: float(frame.get("timestep")))
         fields = read_frame(folder / last.get("file"))
-        blocks = [k for k, block in enumerate(fields.cells) if block.type == "triangle"]
-        triangles = np.vstack([fields.cells[k].data for k in blocks])
+        blocks = [k for k, b in enumerate(fields.cells) if b.type in ("triangle", "triangle6")]
+        elements = np.vstack([fields.cells[k].data for k in blocks])
         results = Results(
             folder=folder,
             summary=summary,
             history={c: np.array([_number(r[c]) for r in rows]) for c in (rows or [{}])[0]},
             time=float(last.get("timestep")),
             nodes=fields.points[:, :2],
-            triangles=_counter_clockwise(fields.points, triangles),
+            pieces=Pieces(counter_clockwise(fields.points, elements)),
             displacement=fields.point_data["displacement"][:, :2],
             zeta=np.ravel(fields.point_data["zeta"]),
             von_mises=np.concatenate([np.ravel(fields.cell_data["von_mises"][k]) for k in blocks]),
@@ -207,7 +213,7 @@ def read_frame(path):
     ]
     return meshio.Mesh(
         joined([piece.points for piece in pieces]),
-        [("triangle", np.concatenate(cells))],
+        [(pieces[0].cells[0].type, np.concatenate(cells))],
         point_data={
             name: joined([piece.point_data[name] for piece in pieces])
             for name in pieces[0].point_data
@@ -225,9 +231,3 @@ def _segments(lists):
 
 def _number(text):
     return float(text) if text else np.nan
-
-
-def _counter_clockwise(points, triangles):
-    a, b, c = (points[triangles[:, k], :2] for k in range(3))
-    turn = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
-    return np.where(turn[:, None], triangles[:, [0, 2, 1]], triangles)
