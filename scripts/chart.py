@@ -18,7 +18,7 @@ from results import read_table
 # The least two answers of the same discrete problem agree to, at KKT residuals of 1e-10.
 SAME = 1e-6
 SOLVERS = {"active-set": BLUE, "penalty-duality": "#d08a1d", "tao": "#3d8f5a"}
-FENICSX = "#8e5aa8"
+FENICSX = {1: "#8e5aa8", 2: "#c58ad9"}
 
 
 def is_plain(row):
@@ -26,17 +26,23 @@ def is_plain(row):
     return row["grading"] == 1 and row["step"] != "" and row["tolerance"] == 1e-10
 
 
+def order(row):
+    """The polynomial degree of the displacements."""
+    return int(row.get("order", 1))
+
+
 def matched(fenicsx, rows):
     """FEniCSx's rows with the errors of our runs of the same problem, on squares of n = 1/size."""
-    ours = {(round(1 / row["size"]), row["step"]): row for row in rows
+    ours = {(round(1 / row["size"]), row["step"], order(row)): row for row in rows
             if row["solver"] == "active-set" and is_plain(row)}
     for row in fenicsx:
-        twin = ours.get((row["n"], row["step"]))
+        twin = ours.get((row["n"], row["step"], order(row)))
         if twin is None:
             continue
         apart = max(abs(row[key] / twin[key] - 1) for key in ("zeta_min", "displacement_max"))
         if apart > SAME:
-            sys.exit(f"FEniCSx differs by {apart:.1e} at n = {row['n']:g}, k = {row['step']:g}")
+            sys.exit(f"FEniCSx P{order(row)} differs by {apart:.1e} at n = {row['n']:g}, "
+                     f"k = {row['step']:g}")
         times = row["seconds"] / twin["seconds"]
         yield {**row, "sum": twin["sum"], "zeta": twin["zeta"], "times": times, "apart": apart}
 
@@ -73,9 +79,12 @@ def draw_errors(axes, rows, fenicsx, error, suffix, label):
     for kind, of_kind, style in kinds(rows):
         axes.scatter([row["seconds"] for row in of_kind], [row[error] for row in of_kind],
                      s=16, alpha=0.75, label=kind, **style)
-    if fenicsx:
-        axes.scatter([row["seconds"] for row in fenicsx], [row[error] for row in fenicsx], s=18,
-                     marker="s", color=FENICSX, label="FEniCSx loop, uniform mesh")
+    for degree, colour in FENICSX.items():
+        of_order = [row for row in fenicsx if order(row) == degree]
+        if of_order:
+            axes.scatter([row["seconds"] for row in of_order], [row[error] for row in of_order],
+                         s=18, marker="s", color=colour,
+                         label=f"FEniCSx loop, P{degree}, uniform mesh")
     front = sorted((row for row in rows if row["front" + suffix] == "true"),
                    key=lambda row: row["seconds"])
     axes.step([row["seconds"] for row in front], [row[error] for row in front], where="post",
@@ -115,8 +124,8 @@ def main():
     fenicsx = []
     draw_table(__doc__, "chart", "signorini-study chart", lambda table: draw(table, fenicsx))
     for row in fenicsx:
-        print(f"FEniCSx n = {row['n']:g}, k = {row['step']:g}: {row['times']:.1f} times the "
-              f"seconds of active-set, answers {row['apart']:.0e} apart")
+        print(f"FEniCSx P{order(row)}, n = {row['n']:g}, k = {row['step']:g}: "
+              f"{row['times']:.1f} times the seconds of active-set, answers {row['apart']:.0e} apart")
 
 
 if __name__ == "__main__":

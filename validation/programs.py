@@ -44,8 +44,9 @@ MOVING = Case("lshape-rolling", "lshape", "size", lambda n: 2 / n)
 class Bench:
     """Runs the programs in turn and keeps what they took, a row each."""
 
-    def __init__(self, binary, out, sizes):
+    def __init__(self, binary, out, sizes, order=1):
         self.binary, self.out, self.sizes = str(binary), out, sizes
+        self.order = order  # of the displacements
         self.rows, self.text, self.part = [], [], None
         self.environment = {**os.environ, "OMP_NUM_THREADS": "1"}
         out.mkdir(parents=True, exist_ok=True)
@@ -85,6 +86,8 @@ class Bench:
         folder = self.out / "run"
         command = [self.binary, "run", case.file(), "--mesh", self.mesh(case, n),
                    "--solver", solver, "--set", f"time.end={steps / 100}", "--out", folder, "--profile"]
+        if self.order != 1:
+            command += ["--set", f"discretisation.displacement={self.order}"]
         if not frames:
             command += ["--set", "output.every=100000"]
         if ranks is not None:
@@ -111,7 +114,7 @@ class Bench:
     def loop(self, n, factor, steps, frames=False, case=FROZEN):
         """The FEniCSx loop."""
         command = ["/usr/bin/python3", LOOP, case.file(), self.mesh(case, n), "--factor", factor,
-                   "--steps", steps]
+                   "--steps", steps, "--order", self.order]
         if frames:
             command += ["--out", self.out / "run" / "loop.xdmf"]
         said, whole = self.start(command)
@@ -143,7 +146,7 @@ class Bench:
         """Notes a run, whose answer must satisfy the KKT conditions."""
         if row.get("kkt", 0.0) > TOLERANCE:
             raise Failure(f"{row['program']} {row['method']}: KKT {row['kkt']:.1e} at n = {row['n']}")
-        self.rows.append({"part": self.part, **row})
+        self.rows.append({"part": self.part, "order": self.order, **row})
         name = f"{self.part}, n = {row['n']}: {row['program']} {row['method']}"
         print(f"{name} {1e3 * row['seconds_per_step']:.3g} ms per step", file=sys.stderr)
         return row
