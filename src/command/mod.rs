@@ -13,7 +13,7 @@ pub use run::{RunArguments, run};
 use ranks::require_one_process;
 use signorini::{
     contact::{self, REGISTRY, SOLVERS, TAO_TYPES, summaries},
-    mesh::{self, Mesh},
+    mesh::{self, Mesh, Order},
     output::terminal::say,
     scene::{MeshSource, Scene},
 };
@@ -91,7 +91,8 @@ fn read(path: &Path, file: Option<&Path>, set: &[String]) -> Result<(Scene, Mesh
             ));
         }
     }
-    let mesh = mesh::load(&scene.mesh.file, &scene.mesh.parameters).map_err(Failure::input)?;
+    let mesh = mesh::load(&scene.mesh.file, &scene.mesh.parameters, Order::Linear)
+        .map_err(Failure::input)?;
     Ok((scene, mesh))
 }
 

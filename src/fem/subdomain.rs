@@ -103,11 +103,16 @@ impl Subdomain {
         let mesh = &undivided.mesh;
         let curve = |curve: &Curve| Curve { edges: self.edges(&curve.edges), ..*curve };
         let corner = |i: usize| self.local[&i];
+        let curved = mesh.curved.iter().filter_map(|([a, b], &midpoint)| {
+            let (a, b) = (self.local(*a)?, self.local(*b)?);
+            Some(([a.min(b), a.max(b)], midpoint))
+        });
         Body {
             mesh: Mesh {
                 nodes: self.field(&mesh.nodes, 1),
                 triangles: self.triangles.iter().map(|&t| mesh.triangles[t].map(corner)).collect(),
                 curves: mesh.curves.iter().map(|(n, c)| (n.clone(), curve(c))).collect(),
+                curved: curved.collect(),
             },
             triangles: self.triangles.iter().map(|&t| undivided.triangles[t]).collect(),
             own_triangles: self.own_triangles,

@@ -12,17 +12,34 @@ use std::{
 /// How many different lines of gmsh are shown; it can repeat an error by the hundred.
 const SHOWN: usize = 5;
 
+/// The order of the elements that gmsh makes of a `.geo`.
+///
+/// Vertices and triangles are the same; of order 2 gmsh also places midpoints of curved edges, for
+/// six times its time and three times the file.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Order {
+    /// Order 1, every edge straight.
+    #[default]
+    Linear,
+    /// Order 2.
+    Quadratic,
+}
+
 /// Reads a mesh: a `.msh` as it is, a `.geo` through [`mesh_geo`].
 ///
-/// `parameters` are for a `.geo` and have no meaning for a `.msh`.
+/// `parameters` and `order` are for a `.geo` and have no meaning for a `.msh`.
 ///
 /// # Errors
 /// Those of [`read`] and [`mesh_geo`], and any other extension.
-pub fn load(path: &Path, parameters: &BTreeMap<String, f64>) -> Result<Mesh, MeshError> {
+pub fn load(
+    path: &Path,
+    parameters: &BTreeMap<String, f64>,
+    order: Order,
+) -> Result<Mesh, MeshError> {
     let extension = path.extension().map(|e| e.to_ascii_lowercase());
     match extension.as_ref().and_then(|e| e.to_str()) {
         Some("msh") => read(path),
-        Some("geo") => read(&mesh_geo(path, parameters)?),
+        Some("geo") => read(&mesh_geo(path, parameters, order)?),
         _ => Err(MeshError::file(path, "a mesh is a .msh file or a .geo file for gmsh")),
     }
 }
@@ -30,14 +47,18 @@ pub fn load(path: &Path, parameters: &BTreeMap<String, f64>) -> Result<Mesh, Mes
 /// Meshes a `.geo` file and returns the path of the `.msh` beside it.
 ///
 /// Each parameter is set over the `DefineConstant` of its name and appears in the name of
-/// the mesh, as in `bridge-grading3-size0.25.msh`. `size`, in m, also bounds the length of
+/// the mesh, as in `bridge-grading3-size0.25.msh`, and so does order 2, as in `hertz.order2.msh`. `size`, in m, also bounds the length of
 /// the edges. A mesh that is not older than its `.geo` and the files this takes in by `Include` and
 /// `Merge` is kept as it is; a new one appears complete or not at all.
 ///
 /// # Errors
 /// The `.geo` cannot be read or the `.msh` written, a parameter makes no sense or occurs
 /// nowhere in the `.geo`, gmsh is missing, or gmsh reports an error.
-pub fn mesh_geo(geo: &Path, parameters: &BTreeMap<String, f64>) -> Result<PathBuf, MeshError> {
+pub fn mesh_geo(
+    geo: &Path,
+    parameters: &BTreeMap<String, f64>,
+    order: Order,
+) -> Result<PathBuf, MeshError> {
     let text = read_text(geo).map_err(MeshError::io(geo))?;
     let mut name = geo.file_stem().unwrap_or_default().to_owned();
     for (parameter, &value) in parameters {
@@ -47,7 +68,8 @@ pub fn mesh_geo(geo: &Path, parameters: &BTreeMap<String, f64>) -> Result<PathBu
         }
         name.push(format!("-{parameter}{value}"));
     }
-    name.push(".msh");
+    // No parameter makes such a name: theirs have no point.
+    name.push(if order == Order::Quadratic { ".order2.msh" } else { ".msh" });
     let mesh = geo.with_file_name(name);
     let last_change = last_change(geo).map_err(MeshError::io(geo))?;
     if modified(&mesh).is_ok_and(|meshed| meshed >= last_change) {
@@ -58,7 +80,7 @@ pub fn mesh_geo(geo: &Path, parameters: &BTreeMap<String, f64>) -> Result<PathBu
     let scratch = tempfile::Builder::new().prefix(".meshing-").tempdir_in(geo.with_file_name("."));
     let scratch = scratch.map_err(MeshError::io(&mesh))?;
     let fresh = scratch.path().join("fresh.msh");
-    run(geo, parameters, &fresh)?;
+    run(geo, parameters, order, &fresh)?;
     fs::rename(&fresh, &mesh).map_err(MeshError::io(&mesh))?;
     Ok(mesh)
 }
@@ -133,10 +155,18 @@ fn modified(path: &Path) -> io::Result<SystemTime> {
 }
 
 /// Runs gmsh, which must leave `fresh` behind without a word of error.
-fn run(geo: &Path, parameters: &BTreeMap<String, f64>, fresh: &Path) -> Result<(), MeshError> {
+fn run(
+    geo: &Path,
+    parameters: &BTreeMap<String, f64>,
+    order: Order,
+    fresh: &Path,
+) -> Result<(), MeshError> {
     let mut command = Command::new("gmsh");
     // One thread: the same input then gives the same mesh, node by node.
     command.args(["-2", "-format", "msh41", "-v", "1", "-nt", "1"]);
+    if order == Order::Quadratic {
+        command.args(["-order", "2"]);
+    }
     for (name, value) in parameters {
         command.args(["-setnumber", name, &value.to_string()]);
         if name == "size" {

@@ -7,26 +7,32 @@ mod components;
 mod error;
 mod gmsh;
 mod msh;
+mod quadratic;
 mod rectangle;
+mod refine;
 
 pub use boundary::{BoundaryNode, CORNER_ANGLE, Face, boundary_nodes};
 pub use components::Components;
 pub use error::MeshError;
-pub use gmsh::{load, mesh_geo};
+pub use gmsh::{Order, load, mesh_geo};
 pub use msh::read;
+pub use refine::Refinement;
 
 /// A conforming triangulation of the body, with the named parts of its boundary.
 ///
 /// Every node belongs to at least one triangle, every triangle is
 /// counter-clockwise with positive area.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Mesh {
-    /// Coordinates of the nodes, m.
+    /// Coordinates of the nodes, which are the vertices of the triangles, m.
     pub nodes: Vec<[f64; 2]>,
     /// Three node indices per triangle, counter-clockwise.
     pub triangles: Vec<[usize; 3]>,
     /// The physical curves by name; a group without a name goes by its tag.
     pub curves: BTreeMap<String, Curve>,
+    /// The midpoints of curved edges, m, by their ends in increasing order; the others are straight.
+    /// Quadratic elements follow them, linear ones do not know them.
+    pub curved: BTreeMap<[usize; 2], [f64; 2]>,
 }
 
 /// One physical curve: the edges of the triangulation that lie on it.

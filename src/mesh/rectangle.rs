@@ -27,6 +27,6 @@ impl Mesh {
             ("left", curve((0..ny).map(|j| [node(0, j + 1), node(0, j)]).collect())),
         ];
         let curves = sides.map(|(name, curve)| (name.to_owned(), curve)).into();
-        Self { nodes, triangles, curves }
+        Self { nodes, triangles, curves, ..Self::default() }
     }
 }

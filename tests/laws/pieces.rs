@@ -7,14 +7,13 @@ use signorini::{
     evolution::{DiscreteProblem, SetupError},
     mesh::{Curve, Mesh},
 };
-use std::collections::BTreeMap;
 
 const MATERIAL: &str = "material = { young = 100, poisson = 0.3, plane = 'stress' }";
 
 /// One mesh of several; the curves of the k-th, from 1, end in k. Nodes at the same place become
 /// one if `joined`.
 fn together(meshes: &[Mesh], joined: bool) -> Mesh {
-    let mut all = Mesh { nodes: vec![], triangles: vec![], curves: BTreeMap::new() };
+    let mut all = Mesh::default();
     for (k, mesh) in meshes.iter().enumerate() {
         let before = all.nodes.len();
         let mut place = |x: &[f64; 2]| {
@@ -287,6 +286,7 @@ fn disc(n: usize, uneven: f64, curves: usize) -> Mesh {
             .collect(),
         triangles,
         curves: (0..curves).map(arc).collect(),
+        ..Mesh::default()
     }
 }
 

@@ -217,6 +217,7 @@ fn a_disc_in_a_ring_can_only_turn() {
         nodes: std::iter::once([3.0, 2.0]).chain((0..corners).map(point)).collect(),
         triangles: edges.iter().map(|&[a, b]| [0, a, b]).collect(),
         curves: BTreeMap::from([("rim".to_owned(), Curve { edges, interior_edges: 0 })]),
+        ..Mesh::default()
     };
     for held in ["symmetry = true", "gap = 0"] {
         let motions = motions(mesh.clone(), &format!("{{ name = 'rim', {held} }}"));

@@ -91,7 +91,8 @@ fn wedge(angle: f64, slope: f64, gap: f64) -> DiscreteProblem {
     let upper = (0..n).map(|i| [first(i + 1) + i + 1, first(i) + i]).collect();
     let end = (0..n).map(|j| [first(n) + j, first(n) + j + 1]).collect();
     let curves = [("lower", curve(lower)), ("upper", curve(upper)), ("end", curve(end))];
-    let mesh = Mesh { nodes, triangles, curves: curves.map(|(n, c)| (n.to_owned(), c)).into() };
+    let curves = curves.map(|(n, c)| (n.to_owned(), c)).into();
+    let mesh = Mesh { nodes, triangles, curves, ..Mesh::default() };
     let [fx, fy] = turn(angle, [0.01, 0.003]);
     let [nx, ny] = turn(angle, [0.0, 1.0]);
     let text = format!(

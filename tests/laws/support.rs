@@ -7,7 +7,7 @@ pub use common::{Random, square};
 
 use signorini::{
     evolution::{self, DiscreteProblem, Outcome, Phases, RunError, SetupError, Step},
-    mesh::{self, Mesh},
+    mesh::{self, Mesh, Order},
     petsc::Session,
     scene::Scene,
 };
@@ -53,7 +53,7 @@ pub fn unstructured(size: f64) -> Mesh {
 /// environment: so this waits for its turn at a session (and must not be called with one held).
 fn meshed(file: &Path, parameters: &BTreeMap<String, f64>) -> Mesh {
     drop(Session::start(&[]).unwrap());
-    mesh::load(file, parameters).unwrap()
+    mesh::load(file, parameters, Order::Linear).unwrap()
 }
 
 /// `mesh` with its nodes moved; the map must keep the orientation.

@@ -2,7 +2,6 @@
 
 use crate::common::length;
 use signorini::mesh::{BoundaryNode, Mesh, boundary_nodes};
-use std::collections::BTreeMap;
 
 /// A polygon around its first node, the centre; boundary edges counter-clockwise.
 fn fan(points: &[[f64; 2]], centre: [f64; 2]) -> (Mesh, Vec<[usize; 2]>) {
@@ -11,7 +10,7 @@ fn fan(points: &[[f64; 2]], centre: [f64; 2]) -> (Mesh, Vec<[usize; 2]>) {
     let mesh = Mesh {
         nodes: std::iter::once(centre).chain(points.iter().copied()).collect(),
         triangles: edges.iter().map(|&[a, b]| [0, a, b]).collect(),
-        curves: BTreeMap::new(),
+        ..Mesh::default()
     };
     (mesh, edges)
 }

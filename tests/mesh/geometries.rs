@@ -11,7 +11,7 @@ use std::{
 };
 
 use crate::common::{check_laws, close, curve_length, edges, parameters};
-use signorini::mesh::{Mesh, MeshError, boundary_nodes, load, mesh_geo};
+use signorini::mesh::{Mesh, MeshError, Order, boundary_nodes, load, mesh_geo};
 use tempfile::TempDir;
 
 /// A copy of one of the geometries in a folder of its own: meshes appear beside them.
@@ -25,7 +25,7 @@ fn copy(name: &str) -> (TempDir, PathBuf) {
 
 fn mesh<const N: usize>(name: &str, pairs: [(&str, f64); N]) -> Mesh {
     let (_folder, geo) = copy(name);
-    load(&geo, &parameters(pairs)).unwrap()
+    load(&geo, &parameters(pairs), Order::Linear).unwrap()
 }
 
 fn node_count(mesh: &Mesh, curve: &str) -> usize {
@@ -210,21 +210,47 @@ fn hertz() {
 }
 
 #[test]
+fn second_order_adds_midpoints_and_changes_nothing_else() {
+    let (folder, geo) = copy("hertz");
+    let linear = load(&geo, &BTreeMap::new(), Order::Linear).unwrap();
+    let quadratic = load(&geo, &BTreeMap::new(), Order::Quadratic).unwrap();
+    assert!(folder.path().join("hertz.msh").exists());
+    assert!(folder.path().join("hertz.order2.msh").exists());
+    assert!(linear.curved.is_empty());
+    let arcs = ["foundation", "side"].into_iter().flat_map(|name| &linear.curves[name].edges);
+    assert_eq!(quadratic.curved.len(), arcs.clone().count());
+    for edge in arcs {
+        let [x, y] = quadratic.midpoint(*edge);
+        assert!((x.hypot(y - 0.05) - 0.05).abs() < 1e-12);
+    }
+    assert!(Mesh { curved: BTreeMap::new(), ..quadratic } == linear);
+
+    let (_folder, geo) = copy("square");
+    let graded = parameters([("n", 16.0), ("grading", 8.0)]);
+    let [linear, quadratic] =
+        [Order::Linear, Order::Quadratic].map(|order| load(&geo, &graded, order).unwrap());
+    assert!(linear == quadratic);
+}
+
+#[test]
 fn meshes_are_named_kept_and_renewed() {
     let (folder, geo) = copy("square");
     let name = |path: PathBuf| path.file_name().unwrap().to_str().unwrap().to_owned();
-    assert_eq!(name(mesh_geo(&geo, &BTreeMap::new()).unwrap()), "square.msh");
+    assert_eq!(name(mesh_geo(&geo, &BTreeMap::new(), Order::Linear).unwrap()), "square.msh");
     let sized = parameters([("size", 0.25), ("grading", 3.0)]);
-    let path = mesh_geo(&geo, &sized).unwrap();
+    let path = mesh_geo(&geo, &sized, Order::Linear).unwrap();
     assert_eq!(name(path.clone()), "square-grading3-size0.25.msh");
-    assert_eq!(load(&path, &BTreeMap::new()).unwrap(), load(&geo, &sized).unwrap());
+    assert_eq!(
+        load(&path, &BTreeMap::new(), Order::Linear).unwrap(),
+        load(&geo, &sized, Order::Linear).unwrap()
+    );
 
     fs::write(&path, "kept").unwrap();
-    mesh_geo(&geo, &sized).unwrap();
+    mesh_geo(&geo, &sized, Order::Linear).unwrap();
     assert_eq!(fs::read_to_string(&path).unwrap(), "kept");
     let later = SystemTime::now() + Duration::from_secs(10);
     fs::File::options().append(true).open(&geo).unwrap().set_modified(later).unwrap();
-    assert_eq!(load(&geo, &sized).unwrap().nodes.len(), 25);
+    assert_eq!(load(&geo, &sized, Order::Linear).unwrap().nodes.len(), 25);
     assert_eq!(fs::read_dir(&folder).unwrap().count(), 3, "something was left behind");
 }
 
@@ -233,7 +259,7 @@ fn what_gmsh_rejects_is_told() {
     let (folder, geo) = copy("square");
     let fails = |pairs: &[(&str, f64)]| {
         let parameters = pairs.iter().map(|&(name, value)| (name.to_owned(), value)).collect();
-        load(&geo, &parameters).unwrap_err().to_string()
+        load(&geo, &parameters, Order::Linear).unwrap_err().to_string()
     };
     assert!(fails(&[("n", 0.0)]).contains("n must be at least 1"));
     assert!(
@@ -251,9 +277,9 @@ fn what_gmsh_rejects_is_told() {
     fs::remove_file(geo.with_extension("msh")).unwrap();
     assert_eq!(fs::read_dir(&folder).unwrap().count(), 1, "something was left behind");
 
-    let none = load(&folder.path().join("none.geo"), &BTreeMap::new()).unwrap_err();
+    let none = load(&folder.path().join("none.geo"), &BTreeMap::new(), Order::Linear).unwrap_err();
     assert!(matches!(none, MeshError::Io { .. }));
-    let other = load(Path::new("body.stl"), &BTreeMap::new()).unwrap_err();
+    let other = load(Path::new("body.stl"), &BTreeMap::new(), Order::Linear).unwrap_err();
     assert_eq!(other.to_string(), "body.stl: a mesh is a .msh file or a .geo file for gmsh");
 }
 
@@ -272,7 +298,7 @@ fn a_constant_that_the_file_assigns_itself_is_no_parameter() {
         ("If (1)\nEndIf\nw = 1;\n", true),
     ] {
         fs::write(&geo, text).unwrap();
-        let read = load(&geo, &BTreeMap::from([("w".to_owned(), 3.0)]));
+        let read = load(&geo, &parameters([("w", 3.0)]), Order::Linear);
         let told = read.is_err_and(|e| e.to_string().contains("assigns it, which overrules"));
         assert_eq!(told, overruled, "{text}");
     }
@@ -283,7 +309,7 @@ fn missing_gmsh_says_what_to_install() {
     // The search path is this process's own: look again from a child without one.
     if env::var_os("PATH").is_some_and(|path| path.is_empty()) {
         let (_folder, geo) = copy("square");
-        let message = load(&geo, &BTreeMap::new()).unwrap_err().to_string();
+        let message = load(&geo, &BTreeMap::new(), Order::Linear).unwrap_err().to_string();
         assert!(message.contains("make deps") && message.contains("apt install gmsh"));
         return;
     }

@@ -1,5 +1,5 @@
 //! Meshes: what every file must give, what is wrong with a malformed one, what gmsh makes of the
-//! geometries, and the boundary of a mesh.
+//! geometries, the boundary of a mesh and its refinement.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -8,3 +8,4 @@ mod boundary;
 mod geometries;
 mod malformed;
 mod reader;
+mod refine;

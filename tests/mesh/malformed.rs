@@ -70,17 +70,46 @@ fn versions_and_byte_orders() {
 fn elements_nobody_can_use() {
     for (name, fragments) in [
         ("quadrangles", &["is of gmsh's type 3 (quadrangle)", "Recombine"][..]),
-        ("second-order", &[":208: element 2 is of gmsh's type 8 (line of higher order)"]),
-        (
-            "second-order-22-binary",
-            &["type 8 (line of higher order)", "ElementOrder", "in $Elements"],
-        ),
         ("tetrahedra", &["(tetrahedron)", "gmsh -2"]),
     ] {
         complains(fs::read(fixture(name)).unwrap(), fragments);
     }
     let unknown = text(&NODES, &["7 99 2 1 1 1 2 3"]);
     complains(unknown, &["x.msh:14: element 7 is of gmsh's type 99 (unknown)"]);
+    let cubic = text(&NODES, &["7 21 2 1 1 1 2 3"]);
+    complains(cubic, &["type 21 (triangle of higher order)", "Mesh.ElementOrder = 1 or 2"]);
+}
+
+#[test]
+fn elements_of_second_order() {
+    const SECOND: &str = "1 9 2 1 1 1 2 3 4 5 6";
+    let with = |midpoint: &str, elements: &[&str]| {
+        let vertices = ["1 0 0 0", "2 1 0 0", "3 0 1 0", "10 1 1 0"];
+        let midpoints = [midpoint, "5 0.5 0.5 0", "6 0 0.5 0", "7 1 0.5 0", "8 0.5 1 0"];
+        text(&[&vertices[..], &midpoints].concat(), elements)
+    };
+    assert!(read_bytes(with("4 0.5 0 0", &[SECOND])).unwrap().curved.is_empty());
+    let curved = read_bytes(with("4 0.5 -0.1 0", &[SECOND])).unwrap().curved;
+    assert_eq!(curved, [([0, 1], [0.5, -0.1])].into());
+    // det ∂x/∂λ = 1 − 4·0.3 at the second vertex.
+    complains(with("4 0.5 0.3 0", &[SECOND]), &["x.msh:18: curved triangle 1 is folded"]);
+    complains(with("4 0.5 0.25 0", &[SECOND]), &["x.msh:18: curved triangle 1 is folded"]);
+    assert!(read_bytes(with("4 0.5 0.24 0", &[SECOND])).is_ok());
+    complains(with("4 1e300 1e300 0", &[SECOND]), &["curved triangle 1 is folded"]);
+    complains(with("4 1e308 1e308 0", &[SECOND]), &["curved triangle 1 is folded"]);
+    complains(with("5 0.5 0.5 0", &[SECOND]), &["x.msh:11: node 5 is listed twice"]);
+    complains(with("4 0.5 nan 0", &[SECOND]), &["node 4 is not a finite number"]);
+    complains(with("4 0.5 0 0.1", &[SECOND]), &["x.msh:10: node 4 has z = 0.1"]);
+    complains(with("40 0.5 0 0", &[SECOND]), &["x.msh:18: element 1 refers to node 4, which"]);
+    complains(with("4 0.5 0 0", &["1 9 2 1 1 1 2 3 4 5"]), &["expected a node tag, but $Elements"]);
+
+    let with = |elements: &[&str]| with("4 0.5 0 0", elements);
+    assert!(read_bytes(with(&[SECOND, "2 9 2 1 1 10 3 2 8 5 7"])).is_ok());
+    let gap = with(&[SECOND, "2 9 2 1 1 10 3 2 8 4 7"]);
+    complains(gap, &["x.msh:19: element 2 has node 4 between nodes 3 and 2", "node 5"]);
+    complains(with(&["9 8 2 1 1 1 2 7", SECOND]), &["element 1 has node 4", "has node 7"]);
+    let mixed = with(&[SECOND, "2 2 2 1 1 10 3 2"]);
+    complains(mixed, &["x.msh:19: triangle 2 is of order 1, others are of order 2"]);
 }
 
 #[test]
@@ -158,7 +187,7 @@ fn places_stand_apart_from_problems() {
     assert_eq!(place, ":14");
 }
 
-const VALID: [&str; 8] = [
+const VALID: [&str; 10] = [
     "plate-41",
     "plate-41-binary",
     "plate-22",
@@ -167,6 +196,8 @@ const VALID: [&str; 8] = [
     "newer-22-binary",
     "parametric-41",
     "parametric-41-binary",
+    "disc-41",
+    "disc-22-binary",
 ];
 
 #[test]

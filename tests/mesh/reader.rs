@@ -66,6 +66,32 @@ fn parametric_nodes_and_saved_extras_change_nothing() {
     check_laws(&read(&fixture("save-all-22")).unwrap(), 1.75, 8.0, 1);
 }
 
+#[test]
+fn second_order_keeps_the_midpoints_of_curved_edges_only() {
+    assert!(read(&fixture("second-order")).unwrap() == read(&fixture("plate-41")).unwrap());
+    let binary = read(&fixture("second-order-22-binary")).unwrap();
+    assert!(binary == read(&fixture("plate-22-binary")).unwrap());
+
+    let disc = read(&fixture("disc-41")).unwrap();
+    let rim = &disc.curves["rim"].edges;
+    let curved: Vec<_> = disc.curved.keys().copied().collect();
+    let mut expected: Vec<_> = rim.iter().map(|&[a, b]| [a.min(b), a.max(b)]).collect();
+    expected.sort_unstable();
+    assert_eq!(curved, expected);
+    for edge in rim {
+        let [x, y] = disc.midpoint(*edge);
+        close(x.hypot(y), 1.0);
+    }
+    for form in OTHER_FORMS {
+        let other = read(&fixture(&format!("disc-{form}"))).unwrap();
+        for (p, q) in disc.curved.values().flatten().zip(other.curved.values().flatten()) {
+            assert!((p - q).abs() < 1e-15, "{form}: {p} is not {q}");
+        }
+        assert_eq!(disc.curved.len(), other.curved.len());
+        assert_eq!(disc.triangles, other.triangles);
+    }
+}
+
 /// Two triangles on a square, one of them clockwise; stray tags and an unused node.
 const SQUARE: &str = "\
 $Comments

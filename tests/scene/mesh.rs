@@ -20,6 +20,7 @@ fn square() -> Mesh {
             ("load".into(), side(2, 3)),
             ("axis".into(), side(3, 0)),
         ]),
+        ..Mesh::default()
     }
 }
 

@@ -23,11 +23,7 @@ pub fn mesh(contents: &Contents) -> Result<Mesh> {
     let (index, listed) = number_nodes(contents, &elements)?;
     let nodes: Vec<[f64; 2]> = listed.iter().map(|node| [node.point[0], node.point[1]]).collect();
     let limit = PLANAR * extent(&nodes);
-    if let Some(&&Node { tag, point: [.., z], at }) =
-        listed.iter().find(|n| n.point[2].abs() > limit)
-    {
-        return fault(at, format!("node {tag} has z = {z}: the body must lie in the plane z = 0"));
-    }
+    listed.iter().try_for_each(|node| check_planar(node, limit))?;
     let counter_clockwise = |element: &&Element<3>| counter_clockwise(element, &index, &nodes);
     let triangles = elements.iter().map(counter_clockwise).collect::<Result<Vec<_>>>()?;
     let sides = sides(&triangles);
@@ -45,7 +41,18 @@ pub fn mesh(contents: &Contents) -> Result<Mesh> {
         return fault(second.at, problem);
     }
     let curves = curves(contents, &index, &sides)?;
-    Ok(Mesh { nodes, triangles, curves })
+    let mut mesh = Mesh { nodes, triangles, curves, ..Mesh::default() };
+    if !contents.midpoints.is_empty() {
+        set_midpoints(&mut mesh, contents, &elements, &index, limit)?;
+    }
+    Ok(mesh)
+}
+
+fn check_planar(&Node { tag, point: [.., z], at }: &Node, limit: f64) -> Result<()> {
+    match z.abs() > limit {
+        true => fault(at, format!("node {tag} has z = {z}: the body must lie in the plane z = 0")),
+        false => Ok(()),
+    }
 }
 
 /// The triangles of the body: those of its physical surfaces, if there are any.
@@ -82,7 +89,7 @@ fn number_nodes<'a>(
                 *number = nodes.len();
                 nodes.push(node);
             }
-            Some(_) => return fault(node.at, format!("node {} is listed twice", node.tag)),
+            Some(_) => return listed_twice(node),
             None => {}
         }
     }
@@ -97,16 +104,12 @@ fn counter_clockwise(
 ) -> Result<[usize; 3]> {
     let mut triangle = tags.map(|tag| index[&tag]);
     if let Some(missing) = triangle.iter().position(|&node| node == UNLISTED) {
-        let node = tags[missing];
-        let problem = format!("element {tag} refers to node {node}, which $Nodes does not list");
-        return fault(at, problem);
+        return missing_node(tag, tags[missing], at);
     }
     let [a, b, c] = triangle.map(|node| nodes[node]);
     let twice = twice_area(a, b, c);
-    let length = |p: [f64; 2], q: [f64; 2]| (q[0] - p[0]).hypot(q[1] - p[1]);
-    let longest = length(a, b).max(length(b, c)).max(length(c, a));
     // Huge coordinates overflow the area.
-    if twice.abs() <= FLAT * longest * longest || !twice.is_finite() {
+    if twice.abs() <= flat([a, b, c]) || !twice.is_finite() {
         let problem =
             format!("triangle {tag} has no area: its nodes lie on a line; mend the mesh there");
         return fault(at, problem);
@@ -115,6 +118,60 @@ fn counter_clockwise(
         triangle.swap(1, 2);
     }
     Ok(triangle)
+}
+
+/// Twice the area (m²) of a triangle that is a line.
+fn flat([a, b, c]: [[f64; 2]; 3]) -> f64 {
+    let length = |p: [f64; 2], q: [f64; 2]| (q[0] - p[0]).hypot(q[1] - p[1]);
+    let longest = length(a, b).max(length(b, c)).max(length(c, a));
+    FLAT * longest * longest
+}
+
+fn listed_twice<T>(node: &Node) -> Result<T> {
+    fault(node.at, format!("node {} is listed twice", node.tag))
+}
+
+fn missing_node<T>(element: u64, node: u64, at: usize) -> Result<T> {
+    fault(at, format!("element {element} refers to node {node}, which $Nodes does not list"))
+}
+
+/// Sets the midpoints of the edges of `elements`, the triangles of `mesh`, which are of second
+/// order, and checks that none of them is folded.
+fn set_midpoints(
+    mesh: &mut Mesh,
+    contents: &Contents,
+    elements: &[&Element<3>],
+    index: &Index,
+    limit: f64,
+) -> Result<()> {
+    let mut listed = HashMap::with_capacity(contents.nodes.len());
+    for node in &contents.nodes {
+        if listed.insert(node.tag, node).is_some() {
+            return listed_twice(node);
+        }
+    }
+    for &&Element { tag, nodes: [a, b, c], at, .. } in elements {
+        for [a, b] in [[a, b], [b, c], [c, a]] {
+            let Some(midpoint) = contents.midpoints.get(&[a.min(b), a.max(b)]) else {
+                return fault(at, format!("triangle {tag} is of order 1, others are of order 2"));
+            };
+            let Some(node) = listed.get(midpoint) else { return missing_node(tag, *midpoint, at) };
+            check_planar(node, limit)?;
+            mesh.set_midpoint([index[&a], index[&b]], [node.point[0], node.point[1]]);
+        }
+    }
+    for (element, &triangle) in elements.iter().zip(&mesh.triangles) {
+        let bound = flat(triangle.map(|node| mesh.nodes[node]));
+        if mesh.is_curved(triangle) && !mesh.jacobian_exceeds(bound, triangle) {
+            let tag = element.tag;
+            let problem = format!(
+                "curved triangle {tag} is folded: a midpoint of its edges lies too far off; mesh \
+                 finer there, or mend it"
+            );
+            return fault(element.at, problem);
+        }
+    }
+    Ok(())
 }
 
 /// The physical curves, each edge once.

@@ -12,14 +12,14 @@ pub struct Node {
     pub at: usize,
 }
 
-/// An element with N nodes in one physical group.
+/// An element with N vertices in one physical group.
 pub struct Element<const N: usize> {
     pub tag: u64,
     /// Tag of the physical group, 0 for none.
     pub group: i32,
     /// Tag of the geometrical entity that it was meshed on, 0 when unknown.
     pub entity: i32,
-    /// Tags of its nodes.
+    /// Tags of its vertices.
     pub nodes: [u64; N],
     /// The byte where it is listed, for messages.
     pub at: usize,
@@ -37,6 +37,9 @@ pub struct Contents {
     pub lines: Vec<Element<2>>,
     /// The triangles, in MSH 2.2 once for each of their groups.
     pub triangles: Vec<Element<3>>,
+    /// Tags of the nodes between the vertices of second-order elements, by these in increasing
+    /// order.
+    pub midpoints: HashMap<[u64; 2], u64>,
 }
 
 impl Contents {
@@ -64,14 +67,21 @@ impl Contents {
         groups: &[i32],
     ) -> Result<()> {
         let name = match element_type {
-            1 => {
+            1 | 8 => {
                 let nodes = node_tags(reader)?;
+                if element_type == 8 {
+                    self.read_midpoints(reader, &[nodes], tag, at)?;
+                }
                 let of = |&group: &i32| Element { tag, group, entity, nodes, at };
                 self.lines.extend(groups.iter().map(of));
                 return Ok(());
             }
-            2 => {
-                let (group, nodes) = (groups.first().copied().unwrap_or(0), node_tags(reader)?);
+            2 | 9 => {
+                let nodes @ [a, b, c] = node_tags(reader)?;
+                if element_type == 9 {
+                    self.read_midpoints(reader, &[[a, b], [b, c], [c, a]], tag, at)?;
+                }
+                let group = groups.first().copied().unwrap_or(0);
                 self.triangles.push(Element { tag, group, entity, nodes, at });
                 return Ok(());
             }
@@ -79,17 +89,40 @@ impl Contents {
             15 => return node_tags::<1>(reader).map(drop),
             3 => "quadrangle",
             4 => "tetrahedron",
-            8 | 26..=28 => "line of higher order",
-            9 | 20..=25 => "triangle of higher order",
+            26..=28 => "line of higher order",
+            20..=25 => "triangle of higher order",
             10 | 16 | 36 | 37 => "quadrangle of higher order",
             5..=7 | 11..=14 | 17..=19 | 29 => "solid",
             _ => "unknown",
         };
         let problem = format!(
-            "element {tag} is of gmsh's type {element_type} ({name}); only three-node triangles \
-             are supported: mesh with `gmsh -2`, without Recombine and with Mesh.ElementOrder = 1"
+            "element {tag} is of gmsh's type {element_type} ({name}); only triangles of \
+             order 1 and 2 are supported: mesh with `gmsh -2`, without Recombine and with \
+             Mesh.ElementOrder = 1 or 2"
         );
         fault(at, problem)
+    }
+
+    /// Reads the nodes between the vertices of the element `tag` of second order, along its `edges`.
+    fn read_midpoints(
+        &mut self,
+        reader: &mut ByteReader,
+        edges: &[[u64; 2]],
+        tag: u64,
+        at: usize,
+    ) -> Result<()> {
+        for &[a, b] in edges {
+            let node = reader.size("a node tag")?;
+            let first = *self.midpoints.entry([a.min(b), a.max(b)]).or_insert(node);
+            if node != first {
+                let problem = format!(
+                    "element {tag} has node {node} between nodes {a} and {b}, where another \
+                     element has node {first}: the mesh has a gap there, mend it"
+                );
+                return fault(at, problem);
+            }
+        }
+        Ok(())
     }
 }
 

@@ -1,21 +1,20 @@
 //! Uniform refinement: nested triangulations of the same polygon.
 
 use signorini::mesh::{Curve, Mesh};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 /// Red refinement: the midpoints of its edges cut every triangle of `mesh` into four similar ones.
 ///
-/// Every P1 function on the mesh is one on the refined mesh. The nodes keep their numbers,
-/// midpoints follow. A polygon stays that polygon: midpoints of edges on a curved boundary do
-/// not move onto the curve.
+/// Every P1 function on the mesh is one on the refined mesh, and every isoparametric P2 function.
+/// The nodes keep their numbers, midpoints follow. The body stays the same polygon, or if edges are
+/// quadratic, bounded by the same parabolas.
 #[must_use]
 pub fn refined(mesh: &Mesh) -> Mesh {
     let mut nodes = mesh.nodes.clone();
     let mut midpoints = HashMap::new();
     let mut midpoint = |a: usize, b: usize| {
         *midpoints.entry([a.min(b), a.max(b)]).or_insert_with(|| {
-            let ([ax, ay], [bx, by]) = (nodes[a], nodes[b]);
-            nodes.push([0.5 * (ax + bx), 0.5 * (ay + by)]);
+            nodes.push(mesh.midpoint([a, b]));
             nodes.len() - 1
         })
     };
@@ -31,7 +30,22 @@ pub fn refined(mesh: &Mesh) -> Mesh {
     };
     let curves = mesh.curves.iter().map(|(name, curve)| (name.clone(), halves(curve)));
     let curves = curves.collect();
-    Mesh { nodes, triangles, curves }
+    let curved = BTreeMap::new();
+    let mut fine = Mesh { nodes, triangles, curves, curved };
+    for triangle in mesh.triangles.iter().filter(|&&triangle| mesh.is_curved(triangle)) {
+        // x(t) = (1−t)a + tb + 4t(1−t)d has a quarter of the offset on each half, and so has the
+        // line of the map that runs beside it through the middles of the other sides.
+        let middle = |[a, b]: [usize; 2]| midpoints[&[a.min(b), a.max(b)]];
+        let &[a, b, c] = triangle;
+        let sides = [[a, b, c], [b, c, a], [c, a, b]];
+        for ([a, b, c], offset) in sides.into_iter().zip(mesh.offsets(*triangle)) {
+            let [ab, bc, ca] = [middle([a, b]), middle([b, c]), middle([c, a])];
+            for edge in [[a, ab], [ab, b], [bc, ca]] {
+                fine.set_offset(edge, offset.map(|d| 0.25 * d));
+            }
+        }
+    }
+    fine
 }
 
 /// h: the length of the longest edge, m.

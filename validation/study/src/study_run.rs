@@ -5,7 +5,7 @@ use signorini::{
     contact::Kkt,
     evolution::{self, DiscreteProblem, Phases, State, StepRecord},
     fem::Body,
-    mesh::{self, Mesh, MeshError},
+    mesh::{self, Mesh, MeshError, Order},
     petsc::Session,
     scene::Scene,
 };
@@ -41,7 +41,7 @@ impl StudyRun {
     /// # Errors
     /// The scene's mesh cannot be made or read.
     pub(super) fn mesh(&self) -> Result<Mesh, MeshError> {
-        let mesh = mesh::load(&self.scene.mesh.file, &self.scene.mesh.parameters)?;
+        let mesh = mesh::load(&self.scene.mesh.file, &self.scene.mesh.parameters, Order::Linear)?;
         Ok((0..self.refinements).fold(mesh, |mesh, _| refined(&mesh)))
     }
 

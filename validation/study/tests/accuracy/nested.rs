@@ -4,7 +4,7 @@
 mod common;
 
 use super::Study;
-use signorini::mesh::{self, Mesh};
+use signorini::mesh::{self, Mesh, Order};
 use signorini_study::{longest_edge, refined};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -24,10 +24,10 @@ fn triangles(mesh: &Mesh) -> BTreeSet<[[i64; 2]; 3]> {
 fn refinements_of_the_square_are_its_meshes_of_twice_as_many_cells() {
     let study = Study::of("square-table1", "square.geo");
     let geo = study.folder.path().join("square.geo");
-    let mut nested = mesh::load(&geo, &[("n".to_owned(), 4.0)].into()).unwrap();
+    let mut nested = mesh::load(&geo, &[("n".to_owned(), 4.0)].into(), Order::Linear).unwrap();
     for n in [8, 16, 32] {
         nested = refined(&nested);
-        let direct = mesh::load(&geo, &[("n".to_owned(), n as f64)].into()).unwrap();
+        let direct = mesh::load(&geo, &[("n".to_owned(), n as f64)].into(), Order::Linear).unwrap();
         assert_eq!(triangles(&nested), triangles(&direct), "n = {n}: gmsh");
         assert_eq!(
             triangles(&nested),
@@ -51,7 +51,7 @@ fn refinement_keeps_the_body_the_curves_and_the_laws_of_a_triangulation() {
     let study = Study::of("lshape", "lshape.geo");
     let geo = study.folder.path().join("lshape.geo");
     let parameters = BTreeMap::from([("size".to_owned(), 1.0), ("grading".to_owned(), 3.0)]);
-    let coarse = mesh::load(&geo, &parameters).unwrap();
+    let coarse = mesh::load(&geo, &parameters, Order::Linear).unwrap();
     let fine = refined(&coarse);
     common::check_laws(&fine, common::triangle_areas(&coarse).sum(), 28.0, 0);
     assert_eq!(fine.triangles.len(), 4 * coarse.triangles.len());

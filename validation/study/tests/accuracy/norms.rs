@@ -3,7 +3,7 @@
 use super::Study;
 use signorini::{
     fem::Body,
-    mesh::{self, Mesh},
+    mesh::{self, Mesh, Order},
 };
 use signorini_study::{Embedding, Fields, Norms, refined};
 
@@ -15,7 +15,7 @@ fn square(n: usize) -> Body {
 fn l_shape(size: f64) -> Mesh {
     let study = Study::of("lshape", "lshape.geo");
     let geo = study.folder.path().join("lshape.geo");
-    mesh::load(&geo, &[("size".to_owned(), size)].into()).unwrap()
+    mesh::load(&geo, &[("size".to_owned(), size)].into(), Order::Linear).unwrap()
 }
 
 /// The interpolant of (u_x, u_y, ζ)(x, y).

@@ -1,0 +1,98 @@
+//! Quadratic (isoparametric) edges and triangles.
+//!
+//! An edge with ends a, b and midpoint m is the parabola x(t) = (1−t) a + t b + 4t(1−t) d, where the
+//! offset d = m − (a+b)/2 vanishes if it is straight. A triangle with vertices p_i is the image
+//! x(λ) = Σ_i λ_i p_i + Σ_{i<j} 4λ_iλ_j d_ij of the barycentric coordinates λ.
+
+use super::Mesh;
+
+/// |d| over the length of an edge: below this it is straight.
+const STRAIGHT: f64 = 1e-9;
+
+impl Mesh {
+    /// The midpoint of an edge, m; of a curved one that of its parabola.
+    #[must_use]
+    pub fn midpoint(&self, [a, b]: [usize; 2]) -> [f64; 2] {
+        let curved = self.curved.get(&sorted([a, b]));
+        curved.copied().unwrap_or_else(|| mean(self.nodes[a], self.nodes[b]))
+    }
+
+    /// Sets the offset d (m) of an edge's midpoint; the edge is straight if that is only rounding.
+    pub fn set_offset(&mut self, edge: [usize; 2], [dx, dy]: [f64; 2]) {
+        let [x, y] = mean(self.nodes[edge[0]], self.nodes[edge[1]]);
+        self.set_midpoint(edge, [x + dx, y + dy]);
+    }
+
+    /// Sets the offsets of the sides ab, bc and ca of a triangle abc that have none yet, m.
+    pub(super) fn add_offsets(&mut self, [a, b, c]: [usize; 3], offsets: [[f64; 2]; 3]) {
+        for (edge, offset) in [[a, b], [b, c], [c, a]].into_iter().zip(offsets) {
+            if !self.curved.contains_key(&sorted(edge)) {
+                self.set_offset(edge, offset);
+            }
+        }
+    }
+
+    /// Sets the midpoint of an edge, which is straight if that is its middle up to rounding.
+    pub(super) fn set_midpoint(&mut self, [a, b]: [usize; 2], midpoint: [f64; 2]) {
+        let [dx, dy] = offset(self.nodes[a], self.nodes[b], midpoint);
+        let (_, length) = self.edge_normal([a, b]);
+        if dx.hypot(dy) > STRAIGHT * length {
+            self.curved.insert(sorted([a, b]), midpoint);
+        } else {
+            self.curved.remove(&sorted([a, b]));
+        }
+    }
+
+    /// Whether any side of a triangle is curved.
+    #[must_use]
+    pub fn is_curved(&self, [a, b, c]: [usize; 3]) -> bool {
+        let sides = [[a, b], [b, c], [c, a]];
+        !self.curved.is_empty()
+            && sides.iter().any(|&[p, q]| self.curved.contains_key(&sorted([p, q])))
+    }
+
+    /// The offsets d of the sides ab, bc and ca of a triangle abc, m.
+    #[must_use]
+    pub fn offsets(&self, [a, b, c]: [usize; 3]) -> [[f64; 2]; 3] {
+        let nodes = &self.nodes;
+        [[a, b], [b, c], [c, a]].map(|[p, q]| offset(nodes[p], nodes[q], self.midpoint([p, q])))
+    }
+
+    /// Whether det ∂x/∂(λ₂, λ₃) of a triangle is above `bound` (m²) at its vertices, the midpoints of
+    /// its sides and the points of the three-point quadrature rule within.
+    pub(super) fn jacobian_exceeds(&self, bound: f64, triangle: [usize; 3]) -> bool {
+        // ∂λ_i/∂λ₂ and ∂λ_i/∂λ₃.
+        const GRADIENTS: [[f64; 2]; 3] = [[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]];
+        let (nodes, offsets) = (triangle.map(|node| self.nodes[node]), self.offsets(triangle));
+        let determinant = |lambda: [f64; 3]| {
+            let derivative = |axis: usize, by: usize| -> f64 {
+                let term = |i: usize| {
+                    let j = (i + 1) % 3;
+                    let product = GRADIENTS[i][by] * lambda[j] + lambda[i] * GRADIENTS[j][by];
+                    GRADIENTS[i][by] * nodes[i][axis] + 4.0 * product * offsets[i][axis]
+                };
+                (0..3).map(term).sum()
+            };
+            derivative(0, 0) * derivative(1, 1) - derivative(0, 1) * derivative(1, 0)
+        };
+        let points = [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0]];
+        let mut rotated =
+            points.into_iter().flat_map(|[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]]);
+        // False of what is not a number, too.
+        rotated.all(|lambda| determinant(lambda) > bound)
+    }
+}
+
+fn sorted([a, b]: [usize; 2]) -> [usize; 2] {
+    [a.min(b), a.max(b)]
+}
+
+fn mean(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])]
+}
+
+/// d = m − (a+b)/2.
+fn offset(a: [f64; 2], b: [f64; 2], midpoint: [f64; 2]) -> [f64; 2] {
+    let [x, y] = mean(a, b);
+    [midpoint[0] - x, midpoint[1] - y]
+}

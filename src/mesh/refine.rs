@@ -1,0 +1,165 @@
+//! Newest-vertex bisection of marked triangles (W. F. Mitchell, J. Comput. Appl. Math. 36, 1991).
+//!
+//! A triangle [a, b, c] is bisected across its reference edge ab: with m between a and b its children
+//! are [c, a, m] and [b, c, m], their reference edges lie opposite the new vertex. The first reference
+//! edge of each triangle is its longest. All descendants of a straight triangle then have one of four
+//! shapes, whose angles are at least half its smallest one (I. G. Rosenberg, F. Stenger, SIAM J.
+//! Numer. Anal. 12, 1975), and those of a right isosceles triangle are right isosceles.
+
+use super::{Mesh, Side, sides};
+
+/// A mesh that is refined round after round.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Refinement {
+    /// The mesh; the first two nodes of each triangle are the ends of its reference edge.
+    pub mesh: Mesh,
+    /// For each triangle the one in the mesh before that it is, or lies in.
+    pub parent_of_triangle: Vec<usize>,
+    /// For each new node the ends of the edge that it halves. Nodes keep their numbers, the new
+    /// ones follow.
+    pub halved_edges: Vec<[usize; 2]>,
+}
+
+impl Refinement {
+    /// A mesh before its first round. Its nodes and triangles keep their numbers; the nodes of a
+    /// triangle only take turns.
+    #[must_use]
+    pub fn start(mut mesh: Mesh) -> Self {
+        let mut triangles = std::mem::take(&mut mesh.triangles);
+        for triangle in &mut triangles {
+            let length = |i: &usize| mesh.edge_normal([triangle[*i], triangle[(i + 1) % 3]]).1;
+            let longest = (0..3).max_by(|i, j| length(i).total_cmp(&length(j)));
+            triangle.rotate_left(longest.unwrap_or(0));
+        }
+        let parent_of_triangle = (0..triangles.len()).collect();
+        mesh.triangles = triangles;
+        Self { mesh, parent_of_triangle, halved_edges: Vec::new() }
+    }
+
+    /// Bisects the triangles that are `marked`, and others as far as the mesh needs it to stay
+    /// conforming; each into four at most.
+    ///
+    /// The edges of curves are halved with their triangles. Quadratic edges and triangles are
+    /// divided as the images that they are: new nodes lie on them, and parts keep their curvature.
+    /// (The interior edges of a curve are not listed: their number stays.)
+    #[must_use]
+    pub fn refine(&self, marked: &[bool]) -> Self {
+        let edges = Edges::of(&self.mesh.triangles);
+        let halved = edges.halved_with(marked);
+        let mut new_node = vec![None; edges.ends.len()];
+        for (edge, node) in halved.iter().zip(self.mesh.nodes.len()..) {
+            new_node[*edge] = Some(node);
+        }
+        let halved_edges: Vec<[usize; 2]> = halved.iter().map(|&edge| edges.ends[edge]).collect();
+
+        let mut mesh = Mesh { triangles: Vec::new(), ..self.mesh.clone() };
+        mesh.nodes.extend(halved_edges.iter().map(|&ends| self.mesh.midpoint(ends)));
+        for curve in mesh.curves.values_mut() {
+            let halves = |&[a, b]: &[usize; 2]| {
+                let middle = edges.find([a, b]).and_then(|edge| new_node[edge]);
+                middle.map_or(vec![[a, b]], |m| vec![[a, m], [m, b]])
+            };
+            curve.edges = curve.edges.iter().flat_map(halves).collect();
+        }
+        for ends in &halved_edges {
+            mesh.curved.remove(ends);
+        }
+        let mut parent_of_triangle = Vec::new();
+        for (parent, &nodes) in self.mesh.triangles.iter().enumerate() {
+            let is_curved = self.mesh.is_curved(nodes);
+            let offsets = if is_curved { self.mesh.offsets(nodes) } else { [[0.0; 2]; 3] };
+            let [ab, bc, ca] = edges.of_triangle[parent].map(|edge| new_node[edge]);
+            for (child, middle) in bisected(Triangle { nodes, offsets }, ab).zip([ca, bc]) {
+                for Triangle { nodes, offsets } in bisected(child, middle) {
+                    mesh.triangles.push(nodes);
+                    parent_of_triangle.push(parent);
+                    if is_curved {
+                        mesh.add_offsets(nodes, offsets);
+                    }
+                }
+            }
+        }
+        Self { mesh, parent_of_triangle, halved_edges }
+    }
+
+    /// The nodal values of a P1 function with `block` components, carried over from the mesh before.
+    #[must_use]
+    pub fn carry(&self, values: &[f64], block: usize) -> Vec<f64> {
+        let mean = |&[a, b]: &[usize; 2]| {
+            (0..block).map(move |i| 0.5 * (values[block * a + i] + values[block * b + i]))
+        };
+        values.iter().copied().chain(self.halved_edges.iter().flat_map(mean)).collect()
+    }
+}
+
+/// The nodes of a triangle and the offsets of its sides ab, bc, ca from straight ones.
+struct Triangle {
+    nodes: [usize; 3],
+    offsets: [[f64; 2]; 3],
+}
+
+/// The children of a triangle that is bisected at the node `middle`, or the triangle itself.
+///
+/// Halves of ab have the offset d_ab/4. The new side mc is x(λ) between m, λ = (½, ½, 0), and c; its
+/// offset from the straight one is x(¼, ¼, ½) − (m + c)/2 = (d_bc + d_ca)/2 − d_ab/4.
+fn bisected(triangle: Triangle, middle: Option<usize>) -> impl Iterator<Item = Triangle> {
+    let Some(m) = middle else { return [Some(triangle), None].into_iter().flatten() };
+    let Triangle { nodes: [a, b, c], offsets: [ab, bc, ca] } = triangle;
+    let half = ab.map(|d| 0.25 * d);
+    let cut = [0, 1].map(|i| 0.5 * (bc[i] + ca[i]) - half[i]);
+    let first = Triangle { nodes: [c, a, m], offsets: [ca, half, cut] };
+    let second = Triangle { nodes: [b, c, m], offsets: [bc, cut, half] };
+    [Some(first), Some(second)].into_iter().flatten()
+}
+
+/// The edges of a triangulation, in increasing order of their ends.
+struct Edges {
+    /// Their ends, these too in increasing order.
+    ends: Vec<[usize; 2]>,
+    /// The triangles on both sides; of a boundary edge one triangle twice.
+    triangles: Vec<[usize; 2]>,
+    /// The edges ab, bc, ca of each triangle abc.
+    of_triangle: Vec<[usize; 3]>,
+}
+
+impl Edges {
+    fn of(triangles: &[[usize; 3]]) -> Self {
+        let of_triangle = vec![[0; 3]; triangles.len()];
+        let mut edges = Self { ends: Vec::new(), triangles: Vec::new(), of_triangle };
+        for Side { edge: [low, high], on_left, triangle } in sides(triangles) {
+            if edges.ends.last() != Some(&[low, high]) {
+                edges.ends.push([low, high]);
+                edges.triangles.push([triangle; 2]);
+            }
+            let last = edges.ends.len() - 1;
+            edges.triangles[last][1] = triangle;
+            let from = if on_left { low } else { high };
+            for (node, edge) in triangles[triangle].iter().zip(&mut edges.of_triangle[triangle]) {
+                if *node == from {
+                    *edge = last;
+                }
+            }
+        }
+        edges
+    }
+
+    fn find(&self, [a, b]: [usize; 2]) -> Option<usize> {
+        self.ends.binary_search(&[a.min(b), a.max(b)]).ok()
+    }
+
+    /// The edges to halve, in increasing order: the reference edges of the `marked` triangles, and
+    /// of every triangle that has an edge to halve.
+    fn halved_with(&self, marked: &[bool]) -> Vec<usize> {
+        let mut is_halved = vec![false; self.ends.len()];
+        let marked = self.of_triangle.iter().zip(marked).filter(|(_, marked)| **marked);
+        let mut references: Vec<usize> = marked.map(|(edges, _)| edges[0]).collect();
+        while let Some(edge) = references.pop() {
+            if !is_halved[edge] {
+                is_halved[edge] = true;
+                references
+                    .extend(self.triangles[edge].map(|triangle| self.of_triangle[triangle][0]));
+            }
+        }
+        (0..self.ends.len()).filter(|&edge| is_halved[edge]).collect()
+    }
+}

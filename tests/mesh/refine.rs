@@ -1,0 +1,210 @@
+//! Refinement: what bisection must keep, whatever is marked.
+
+use crate::common::{Random, check_laws, close, curve_length, fixture, length, triangle_areas};
+use signorini::mesh::{Mesh, Order, Refinement, load, read, twice_area};
+use std::{collections::BTreeMap, fs};
+
+/// The area of the triangle abc, whose sides are parabolas: ½ (b−a)×(c−a) + ⅔ Σ d×(q−p).
+fn area(mesh: &Mesh, triangle: [usize; 3]) -> f64 {
+    let [a, b, c] = triangle.map(|node| mesh.nodes[node]);
+    let sides = [[a, b], [b, c], [c, a]].into_iter().zip(mesh.offsets(triangle));
+    let segments = sides.map(|([p, q], [dx, dy])| dx * (q[1] - p[1]) - dy * (q[0] - p[0]));
+    0.5 * twice_area(a, b, c) + 2.0 / 3.0 * segments.sum::<f64>()
+}
+
+fn total_area(mesh: &Mesh) -> f64 {
+    mesh.triangles.iter().map(|&triangle| area(mesh, triangle)).sum()
+}
+
+/// The smallest angle, in radians.
+fn smallest_angle(mesh: &Mesh) -> f64 {
+    let angle = |[a, b, c]: [[f64; 2]; 3]| {
+        let (u, v) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
+        (u[0] * v[1] - u[1] * v[0]).atan2(u[0] * v[0] + u[1] * v[1])
+    };
+    let corners = mesh.triangles.iter().map(|t| t.map(|node| mesh.nodes[node]));
+    let angles = corners.flat_map(|[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]].map(angle));
+    angles.fold(f64::INFINITY, f64::min)
+}
+
+/// The triangles with a node at a point.
+fn at(mesh: &Mesh, point: [f64; 2]) -> Vec<bool> {
+    mesh.triangles.iter().map(|t| t.iter().any(|&node| mesh.nodes[node] == point)).collect()
+}
+
+/// Rounds of refinement of about every `one_in`-th triangle.
+fn random_rounds(mesh: Mesh, rounds: usize, one_in: usize) -> Vec<(Vec<bool>, Refinement)> {
+    let mut random = Random::new(7);
+    let mut refined = Refinement::start(mesh);
+    let mut history = Vec::new();
+    for _ in 0..rounds {
+        let count = refined.mesh.triangles.len();
+        let marked: Vec<bool> = (0..count).map(|_| random.below(one_in) == 0).collect();
+        refined = refined.refine(&marked);
+        history.push((marked, refined.clone()));
+    }
+    history
+}
+
+#[test]
+fn a_refined_mesh_is_conforming_and_covers_the_same_body() {
+    let coarse = read(&fixture("plate-41")).unwrap();
+    let mut before = Refinement::start(coarse.clone()).mesh;
+    for (marked, refined) in random_rounds(coarse.clone(), 8, 3) {
+        let mesh = &refined.mesh;
+        check_laws(mesh, 1.75, 8.0, 1);
+        for (name, curve) in &coarse.curves {
+            close(curve_length(mesh, name), length(&coarse, &curve.edges));
+            assert_eq!(mesh.curves[name].interior_edges, curve.interior_edges);
+        }
+        let mut parts = vec![0; before.triangles.len()];
+        let mut areas = vec![0.0; before.triangles.len()];
+        for (area, &parent) in triangle_areas(mesh).zip(&refined.parent_of_triangle) {
+            parts[parent] += 1;
+            areas[parent] += area;
+        }
+        for (parent, area) in triangle_areas(&before).enumerate() {
+            close(areas[parent], area);
+            assert!((1..=4).contains(&parts[parent]));
+            assert!(!marked[parent] || parts[parent] > 1, "a marked triangle is left whole");
+        }
+        before = mesh.clone();
+    }
+    assert!(before.triangles.len() > 500);
+    let [again, first] = [0, 1].map(|_| random_rounds(coarse.clone(), 4, 4));
+    assert!(again == first, "not the same again");
+}
+
+#[test]
+fn nothing_marked_changes_nothing() {
+    let start = Refinement::start(read(&fixture("disc-41")).unwrap());
+    let refined = start.refine(&vec![false; start.mesh.triangles.len()]);
+    assert!(refined == start);
+}
+
+#[test]
+fn new_nodes_halve_edges_and_linear_functions_stay_linear() {
+    let linear = |mesh: &Mesh| -> Vec<f64> {
+        mesh.nodes.iter().flat_map(|[x, y]| [1.0 + x + 2.0 * y, x - 3.0 * y]).collect()
+    };
+    let mut values = linear(&Mesh::rectangle(1.0, 1.0, 4, 4));
+    for (_, refined) in random_rounds(Mesh::rectangle(1.0, 1.0, 4, 4), 5, 4) {
+        values = refined.carry(&values, 2);
+        assert_eq!(values, linear(&refined.mesh));
+    }
+}
+
+#[test]
+fn right_isosceles_triangles_stay_so_and_the_area_is_exact() {
+    for (_, refined) in random_rounds(Mesh::rectangle(1.0, 1.0, 8, 8), 8, 4) {
+        let mesh = refined.mesh;
+        assert_eq!(triangle_areas(&mesh).sum::<f64>(), 1.0);
+        for triangle in &mesh.triangles {
+            let [a, b, c] = triangle.map(|node| mesh.nodes[node]);
+            let squared = |p: [f64; 2], q: [f64; 2]| (q[0] - p[0]).powi(2) + (q[1] - p[1]).powi(2);
+            assert_eq!(squared(a, b), 2.0 * squared(b, c));
+            assert_eq!(squared(b, c), squared(c, a));
+        }
+    }
+}
+
+#[test]
+fn towards_a_corner_angles_stay_and_triangles_are_few() {
+    let plate = read(&fixture("plate-41")).unwrap();
+    for (mesh, point) in [(plate, [0.25, 0.25]), (Mesh::rectangle(1.0, 1.0, 4, 4), [1.0, 0.0])] {
+        let mut refined = Refinement::start(mesh);
+        let (angle, count) = (smallest_angle(&refined.mesh), refined.mesh.triangles.len());
+        for round in 1..=20 {
+            refined = refined.refine(&at(&refined.mesh, point));
+            assert!(smallest_angle(&refined.mesh) >= 0.5 * angle - 1e-12);
+            assert!(refined.mesh.triangles.len() < count + 30 * round, "round {round}");
+        }
+        let finest = triangle_areas(&refined.mesh).fold(1.0, f64::min);
+        assert!(finest < 1e-6, "{finest}");
+    }
+}
+
+#[test]
+fn the_parts_of_a_curved_triangle_are_parts_of_its_image() {
+    let mut mesh = Mesh {
+        nodes: vec![[0.0, 0.0], [2.0, 0.0], [0.5, 1.5]],
+        triangles: vec![[0, 1, 2]],
+        ..Mesh::default()
+    };
+    let d = [[0.1, -0.2], [0.15, 0.1], [0.1, -0.05]];
+    for (i, offset) in d.into_iter().enumerate() {
+        mesh.set_offset([i, (i + 1) % 3], offset);
+    }
+    let coarse = mesh.clone();
+    // x(λ) = Σ λ_i p_i + Σ 4 λ_i λ_j d_ij
+    let image = |lambda: [f64; 3]| {
+        [0, 1].map(|axis| {
+            let term = |i: usize| {
+                let product = 4.0 * lambda[i] * lambda[(i + 1) % 3];
+                lambda[i] * coarse.nodes[i][axis] + product * d[i][axis]
+            };
+            (0..3).map(term).sum::<f64>()
+        })
+    };
+    let mut barycentric = vec![1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+    for (_, refined) in random_rounds(mesh, 9, 2) {
+        barycentric = refined.carry(&barycentric, 3);
+        let mesh = &refined.mesh;
+        let lambda = |node: usize| std::array::from_fn(|i| barycentric[3 * node + i]);
+        let same = |p: [f64; 2], q: [f64; 2]| {
+            assert!((p[0] - q[0]).hypot(p[1] - q[1]) < 1e-9, "{p:?} is not {q:?}");
+        };
+        for (node, &point) in mesh.nodes.iter().enumerate() {
+            same(point, image(lambda(node)));
+        }
+        for &[a, b, c] in &mesh.triangles {
+            for [p, q] in [[a, b], [b, c], [c, a]] {
+                let (at_p, at_q): ([f64; 3], [f64; 3]) = (lambda(p), lambda(q));
+                let middle = std::array::from_fn(|i| 0.5 * (at_p[i] + at_q[i]));
+                same(mesh.midpoint([p, q]), image(middle));
+            }
+        }
+        close(total_area(mesh), total_area(&coarse));
+    }
+}
+
+#[test]
+fn a_disc_keeps_its_parabolas_and_their_area_is_of_fourth_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let geo = folder.path().join("disc.geo");
+    fs::copy(fixture("disc").with_extension("geo"), &geo).unwrap();
+    let mut errors = Vec::new();
+    for size in [0.5, 0.25, 0.125] {
+        let parameters = BTreeMap::from([("size".to_owned(), size)]);
+        let disc = load(&geo, &parameters, Order::Quadratic).unwrap();
+        let disc_area = total_area(&disc);
+        errors.push((disc_area - std::f64::consts::PI).abs());
+
+        let refined = Refinement::start(disc.clone()).refine(&vec![true; disc.triangles.len()]);
+        for &[a, b] in &disc.curves["rim"].edges {
+            let ends = [a.min(b), a.max(b)];
+            let new = refined.halved_edges.iter().position(|&edge| edge == ends);
+            let Some(new) = new else { continue };
+            let m = disc.nodes.len() + new;
+            let (p, q, d) = (disc.nodes[a], disc.nodes[b], disc.midpoint(ends));
+            let on_parabola = |t: f64| {
+                let [at_p, at_q] = [(1.0 - t) * (1.0 - 2.0 * t), t * (2.0 * t - 1.0)];
+                [0, 1].map(|i| at_p * p[i] + at_q * q[i] + 4.0 * t * (1.0 - t) * d[i])
+            };
+            let mesh = &refined.mesh;
+            let found = [mesh.midpoint([a, m]), mesh.nodes[m], mesh.midpoint([m, b])];
+            for (found, t) in found.into_iter().zip([0.25, 0.5, 0.75]) {
+                let expected = on_parabola(t);
+                assert!((found[0] - expected[0]).hypot(found[1] - expected[1]) < 1e-15);
+            }
+        }
+        for (_, refined) in random_rounds(disc, 3, 3) {
+            close(total_area(&refined.mesh), disc_area);
+            assert!(triangle_areas(&refined.mesh).all(|area| area > 0.0));
+        }
+    }
+    for pair in errors.windows(2) {
+        let order = (pair[0] / pair[1]).log2();
+        assert!((3.5..4.5).contains(&order), "{errors:?}");
+    }
+}
