@@ -76,6 +76,29 @@ pub fn triangle_areas(mesh: &Mesh) -> impl Iterator<Item = f64> {
     corners.map(|[a, b, c]| 0.5 * twice_area(a, b, c))
 }
 
+/// The area within quadratic edges: of each triangle ½ (b−a)×(c−a) + ⅔ Σ d×(q−p), over its sides pq
+/// with offsets d.
+pub fn curved_area(mesh: &Mesh) -> f64 {
+    let segments = |triangle: &[usize; 3]| {
+        let [a, b, c] = triangle.map(|node| mesh.nodes[node]);
+        let sides = [[a, b], [b, c], [c, a]].into_iter().zip(mesh.offsets(*triangle));
+        sides.map(|([p, q], [dx, dy])| dx * (q[1] - p[1]) - dy * (q[0] - p[0])).sum::<f64>()
+    };
+    let straight: f64 = triangle_areas(mesh).sum();
+    straight + 2.0 / 3.0 * mesh.triangles.iter().map(segments).sum::<f64>()
+}
+
+/// The smallest angle of the triangulation, in degrees.
+pub fn smallest_angle(mesh: &Mesh) -> f64 {
+    let angle = |[a, b, c]: [usize; 3]| {
+        let [a, b, c] = [a, b, c].map(|i| mesh.nodes[i]);
+        let (u, v) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
+        (u[0] * v[1] - u[1] * v[0]).atan2(u[0] * v[0] + u[1] * v[1])
+    };
+    let corners = mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]]);
+    corners.map(angle).fold(f64::INFINITY, f64::min).to_degrees()
+}
+
 #[track_caller]
 pub fn close(a: f64, b: f64) {
     assert!((a - b).abs() <= 1e-12 * (1.0 + b.abs()), "{a} is not {b}");

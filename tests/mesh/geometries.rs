@@ -10,7 +10,7 @@ use std::{
     time::{Duration, SystemTime},
 };
 
-use crate::common::{check_laws, close, curve_length, edges, parameters};
+use crate::common::{check_laws, close, curve_length, edges, parameters, smallest_angle};
 use signorini::mesh::{Mesh, MeshError, Order, boundary_nodes, load, mesh_geo};
 use tempfile::TempDir;
 
@@ -30,17 +30,6 @@ fn mesh<const N: usize>(name: &str, pairs: [(&str, f64); N]) -> Mesh {
 
 fn node_count(mesh: &Mesh, curve: &str) -> usize {
     boundary_nodes(mesh, &mesh.curves[curve].edges).len()
-}
-
-/// The smallest angle of the triangulation, in degrees.
-fn smallest_angle(mesh: &Mesh) -> f64 {
-    let angle = |[a, b, c]: [usize; 3]| {
-        let [a, b, c] = [a, b, c].map(|i| mesh.nodes[i]);
-        let (u, v) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
-        (u[0] * v[1] - u[1] * v[0]).atan2(u[0] * v[0] + u[1] * v[1])
-    };
-    let corners = mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]]);
-    corners.map(angle).fold(PI, f64::min).to_degrees()
 }
 
 /// Length of the longest edge at the node nearest to a point.

@@ -67,3 +67,15 @@ fn refinement_keeps_the_body_the_curves_and_the_laws_of_a_triangulation() {
         assert_eq!(halves.interior_edges, 2 * curve.interior_edges);
     }
 }
+
+#[test]
+fn refinement_keeps_quadratic_edges() {
+    let study = Study::of("hertz", "hertz.geo");
+    let geo = study.folder.path().join("hertz.geo");
+    let coarse = mesh::load(&geo, &BTreeMap::new(), Order::Quadratic).unwrap();
+    assert!(!coarse.curved.is_empty());
+    let finer = refined(&refined(&coarse));
+    common::close(common::curved_area(&finer), common::curved_area(&coarse));
+    let is_curved = |&[a, b]: &[usize; 2]| finer.curved.contains_key(&[a.min(b), a.max(b)]);
+    assert!(finer.curves["foundation"].edges.iter().all(is_curved));
+}
