@@ -109,9 +109,12 @@ def reference(scene, mesh):
 
 def with_middles(mesh, answer):
     """The triangulation with the middles of sides as in an answer of order 2."""
-    if not np.array_equal(answer.nodes[answer.elements[:, :3]], mesh.nodes[mesh.triangles]):
+    vertices, middles = np.split(answer.nodes[answer.elements], [3], axis=1)
+    if middles.shape != vertices.shape:
+        raise RunError("the triangles written are not of order 2")
+    if not np.array_equal(vertices, mesh.nodes[mesh.triangles]):
         raise RunError("the triangles written are not those of the mesh")
-    return replace(mesh, middles=answer.nodes[answer.elements[:, 3:]])
+    return replace(mesh, middles=middles)
 
 
 def program(binary, scene, directory, solver=None):
@@ -255,7 +258,7 @@ def main():
             for good, row in compare(path, arguments):
                 failed |= not good
                 print(line.format(*row), flush=True)
-        except (SceneError, ContactError) as error:
+        except (SceneError, ContactError, RunError) as error:
             failed = True
             print(f"{path.stem}: {error}")
     return 1 if failed else 0
