@@ -130,8 +130,8 @@ def program(binary, scene, directory, solver=None):
     except (OSError, subprocess.TimeoutExpired) as error:
         raise RunError(f"{binary}: {error}") from None
     if done.returncode != 0:
-        said = done.stderr.strip() or done.stdout.strip() or "no message"
-        raise RunError(said.splitlines()[-1])
+        said = (done.stderr.strip() or done.stdout.strip() or "no message").splitlines()
+        raise RunError(next((line for line in said if line.startswith("error:")), said[-1]))
     try:
         frames = ElementTree.parse(out / "fields.pvd").findall(".//DataSet")
         with open(out / "history.csv", newline="") as file:
