@@ -145,10 +145,9 @@ impl Factor {
     }
 
     /// Iterations that a solve with the factor of an earlier matrix is worth; `None` if a new factor is
-    /// due.
+    /// due, or there is none.
     pub(super) fn iteration_limit(&self) -> Option<usize> {
-        let policy = self.policy.as_ref().filter(|policy| !policy.is_due());
-        policy.map(RefactorisationPolicy::iteration_limit)
+        self.policy.as_ref().and_then(RefactorisationPolicy::iteration_limit)
     }
 
     /// Ends a solve: its applications tell how good the factor still is.

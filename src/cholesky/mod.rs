@@ -26,16 +26,7 @@ mod substructure;
 mod supernodal;
 mod tiles;
 
-#[allow(
-    non_camel_case_types,
-    non_snake_case,
-    non_upper_case_globals,
-    dead_code,
-    missing_docs,
-    unsafe_code,
-    unsafe_op_in_unsafe_fn,
-    clippy::all
-)]
+#[allow(warnings, unsafe_code, clippy::all)]
 mod raw {
     include!(concat!(env!("OUT_DIR"), "/cholmod.rs"));
 }

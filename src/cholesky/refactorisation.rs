@@ -36,15 +36,10 @@ impl RefactorisationPolicy {
         }
     }
 
-    /// Whether a new factor is due.
-    pub fn is_due(&self) -> bool {
-        self.lost as f64 >= self.cost
-    }
-
-    /// Iterations after which a solve has lost what a new factor costs.
-    pub fn iteration_limit(&self) -> usize {
-        let left = (self.cost - self.lost as f64) as usize;
+    /// Iterations after which a solve has lost what a new factor costs; `None` if one is due.
+    pub fn iteration_limit(&self) -> Option<usize> {
+        let left = self.cost - self.lost as f64;
         let [least, most] = EXTRA_ITERATIONS;
-        self.best.saturating_add(left.clamp(least, most))
+        (left > 0.0).then(|| self.best.saturating_add((left as usize).clamp(least, most)))
     }
 }

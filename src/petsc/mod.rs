@@ -21,15 +21,7 @@ mod session;
 mod tao;
 mod vector;
 
-#[allow(
-    non_camel_case_types,
-    non_snake_case,
-    non_upper_case_globals,
-    dead_code,
-    missing_docs,
-    unsafe_op_in_unsafe_fn,
-    clippy::all
-)]
+#[allow(warnings, clippy::all)]
 mod raw {
     include!(concat!(env!("OUT_DIR"), "/petsc.rs"));
 }

@@ -42,9 +42,8 @@ impl Preconditioner {
             check(raw::PCSetReusePreconditioner(pc, raw::PetscBool::PETSC_FALSE))?;
             check(raw::PCSetOperators(pc, matrix.raw(), matrix.raw()))?;
             match check(raw::PCSetUp(pc)) {
-                Ok(()) => {}
                 Err(error) if error.code == NOT_DEFINITE => return Ok(false),
-                Err(other) => return Err(other),
+                set_up => set_up?,
             }
             check(raw::PCSetReusePreconditioner(pc, raw::PetscBool::PETSC_TRUE))?;
         }

@@ -17,7 +17,6 @@ use std::{ffi::c_void, ptr};
 /// PETSc options without a prefix reach it: `-tao_type bnls`, `-tao_monitor`, `-ksp_type …`.
 pub(crate) struct BoundedQuadratic {
     tao: Handle<raw::_p_Tao>,
-    gradient: Vector,
 }
 
 /// What TAO says of a solve; whether it is true is for the KKT residuals to tell.
@@ -49,14 +48,13 @@ struct Problem<'a, P> {
 }
 
 impl BoundedQuadratic {
-    /// TAO's `method` (`tron`, `bnls`, …) for `size` unknowns on this rank, with preconditioners P.
+    /// TAO's `method` (`tron`, `bnls`, …) for problems of one size, with preconditioners P.
     ///
     /// Its Newton systems are solved by Steihaug's conjugate gradients (KSPSTCG), which take the
     /// whole step unless the trust region cuts it.
     pub(crate) fn new<P: ShellPreconditioner>(
-        session: &Session,
+        _session: &Session,
         method: &str,
-        size: usize,
     ) -> Result<Self, PetscError> {
         // tron reads the first prefix, the bounded Newton family (bnls, …) the second.
         for prefix in ["-ksp_", "-tao_bnk_ksp_"] {
@@ -72,8 +70,10 @@ impl BoundedQuadratic {
         let (mut ksp, mut pc) = (ptr::null_mut(), ptr::null_mut());
         // SAFETY: a fresh handle, then live ones; the string lives during the calls.
         unsafe {
-            let handle = Handle::new(raw::TaoDestroy, |handle| raw::TaoCreate(world(), handle))?;
-            let tao = handle.raw();
+            let this = Self {
+                tao: Handle::new(raw::TaoDestroy, |handle| raw::TaoCreate(world(), handle))?,
+            };
+            let tao = this.tao.raw();
             check(raw::TaoSetType(tao, c_method.as_ptr()))?;
             check(raw::TaoGetKSP(tao, &mut ksp))?;
             if !quasi_newton && !ksp.is_null() {
@@ -84,7 +84,7 @@ impl BoundedQuadratic {
             }
             check(raw::TaoSetMaximumIterations(tao, 200))?;
             check(raw::TaoSetFromOptions(tao))?;
-            Ok(Self { tao: handle, gradient: Vector::zeros(session, size)? })
+            Ok(this)
         }
     }
 
@@ -100,21 +100,22 @@ impl BoundedQuadratic {
         limit: f64,
         preconditioner: &mut P,
     ) -> Result<TaoReport, PetscError> {
-        for size in [k.owned(), f.owned(), lower.owned(), upper.owned(), x.owned()] {
-            same_size(self.gradient.owned(), size)?;
+        for size in [k.owned(), f.owned(), lower.owned(), upper.owned()] {
+            same_size(x.owned(), size)?;
         }
-        let (tao, gradient) = (self.tao.raw(), self.gradient.raw());
+        // TAO has a vector of its own for the gradient.
+        let (tao, own) = (self.tao.raw(), ptr::null_mut());
         let mut problem = Problem { k, f, preconditioner };
         let context = ptr::from_mut(&mut problem).cast::<c_void>();
         let (mut iterations, mut linear, mut reason) = (0, 0, 0);
-        let (mut ksp, mut pc, unused) = (ptr::null_mut(), ptr::null_mut(), ptr::null_mut());
+        let (mut ksp, mut pc) = (ptr::null_mut(), ptr::null_mut());
         // SAFETY: live handles of matching layout; the context outlives the solve, in which
         // alone the callbacks run.
         unsafe {
             check(raw::TaoSetSolution(tao, x.raw()))?;
             check(raw::TaoSetVariableBounds(tao, lower.raw(), upper.raw()))?;
-            check(raw::TaoSetObjectiveAndGradient(tao, gradient, Some(evaluate::<P>), context))?;
-            check(raw::TaoSetHessian(tao, k.raw(), k.raw(), Some(keep_hessian), unused))?;
+            check(raw::TaoSetObjectiveAndGradient(tao, own, Some(evaluate::<P>), context))?;
+            check(raw::TaoSetHessian(tao, k.raw(), k.raw(), Some(keep_hessian), context))?;
             check(raw::TaoSetTolerances(tao, limit, 1e-13, 0.0))?;
             check(raw::TaoGetKSP(tao, &mut ksp))?;
             if !ksp.is_null() {
@@ -166,9 +167,12 @@ unsafe extern "C" fn keep_hessian(
 }
 
 /// The preconditioner of the problem that `minimise` made the context of `pc`.
+///
+/// # Safety
+/// `pc` is in a solve of `minimise`, and of its preconditioner there is no other reference.
 unsafe fn preconditioner<'a, P>(pc: raw::PC) -> Result<&'a mut P, PetscError> {
     let mut context: *mut c_void = ptr::null_mut();
-    // SAFETY: the caller's promise: `pc` is in a solve of `minimise`, which outlives this.
+    // SAFETY: the caller's promise.
     unsafe {
         check(raw::PCShellGetContext(pc, (&raw mut context).cast()))?;
         Ok(&mut *(*context.cast::<Problem<P>>()).preconditioner)

@@ -244,15 +244,15 @@ fn a_factor_takes_over_matrices_of_another_size() {
 fn a_factor_is_replaced_when_its_age_has_cost_as_much_as_a_new_one() {
     let mut policy = RefactorisationPolicy::new(8.0);
     policy.solved(4);
-    assert!(!policy.is_due(), "the first solve tells what a new factor needs");
+    assert!(policy.iteration_limit().is_some(), "the first solve tells what a new factor needs");
     policy.solved(1);
     policy.solved(0);
     policy.solved(4);
-    assert!(!policy.is_due(), "3 iterations lost of 8");
-    assert_eq!(policy.iteration_limit(), 1 + 5);
+    assert!(policy.iteration_limit().is_some(), "3 iterations lost of 8");
+    assert_eq!(policy.iteration_limit(), Some(1 + 5));
     policy.solved(6);
-    assert!(policy.is_due());
+    assert!(policy.iteration_limit().is_none());
     let mut policy = RefactorisationPolicy::new(8.0);
     policy.solved(13);
-    assert!(policy.is_due(), "a factor that helps so little is due at once");
+    assert!(policy.iteration_limit().is_none(), "a factor that helps so little is due at once");
 }

@@ -78,11 +78,10 @@ impl<'s> Tao<'s> {
         unit: f64,
         c: &mut Vector,
     ) -> Result<TaoReport, ContactError> {
-        let tao = match self.tao.take() {
+        let tao = match &mut self.tao {
             Some(tao) => tao,
-            None => BoundedQuadratic::new::<Factor>(self.session, &self.kind, c.owned())?,
+            none => none.insert(BoundedQuadratic::new::<Factor>(self.session, &self.kind)?),
         };
-        let tao = self.tao.insert(tao);
         let vector = |values: Vec<f64>| -> Result<Vector, PetscError> {
             let mut vector = Vector::zeros(self.session, values.len())?;
             vector.set(&values)?;
