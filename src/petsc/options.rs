@@ -1,6 +1,6 @@
 //! PETSc's options database, of which a null pointer means the global one. A session exists.
 
-use super::{PetscError, check, raw};
+use super::{PetscError, Session, check, raw};
 use std::{
     ffi::{CStr, CString},
     ptr,
@@ -34,20 +34,22 @@ pub(crate) fn set_default_option(name: &str, value: &str) -> Result<(), PetscErr
     has_option(name).map(drop)
 }
 
-/// Options that nothing has read (PetscOptionsLeftGet).
-pub(super) fn unused() -> Vec<String> {
-    let (mut count, mut names, mut values) = (0, ptr::null_mut(), ptr::null_mut());
-    let (mut unused, all) = (Vec::new(), ptr::null_mut());
-    // SAFETY: PETSc fills `count` names that stay valid until they are given back.
-    unsafe {
-        if raw::PetscOptionsLeftGet(all, &mut count, &mut names, &mut values) == 0 {
-            for i in 0..count as usize {
-                unused.push(format!("-{}", CStr::from_ptr(*names.add(i)).to_string_lossy()));
+impl Session {
+    /// Options of the database that nothing has read: most likely misspelt (PetscOptionsLeftGet).
+    pub fn unused_options(&self) -> Vec<String> {
+        let (mut count, mut names, mut values) = (0, ptr::null_mut(), ptr::null_mut());
+        let (mut unused, all) = (Vec::new(), ptr::null_mut());
+        // SAFETY: PETSc fills `count` names that stay valid until they are given back.
+        unsafe {
+            if raw::PetscOptionsLeftGet(all, &mut count, &mut names, &mut values) == 0 {
+                for i in 0..count as usize {
+                    unused.push(format!("-{}", CStr::from_ptr(*names.add(i)).to_string_lossy()));
+                }
+                raw::PetscOptionsLeftRestore(all, &mut count, &mut names, &mut values);
             }
-            raw::PetscOptionsLeftRestore(all, &mut count, &mut names, &mut values);
         }
+        unused
     }
-    unused
 }
 
 /// A C string of what the user has typed: a NUL in it is an error.

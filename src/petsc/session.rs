@@ -50,11 +50,6 @@ impl Session {
         Communicator::of_world()
     }
 
-    /// Options of the database that nothing has read: most likely misspelt.
-    pub fn unused_options(&self) -> Vec<String> {
-        options::unused()
-    }
-
     /// Ends PETSc and MPI. Call it last; without it MPI complains at exit.
     ///
     /// # Errors
