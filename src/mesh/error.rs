@@ -35,6 +35,16 @@ pub enum MeshError {
         /// The parameter, and what is wrong with it.
         reason: String,
     },
+    /// The sides of a triangle are so curved that its parts would fold over each other.
+    #[error(
+        "the triangle at ({x}, {y}) is too curved to be refined; start from a finer mesh there"
+    )]
+    TooCurved {
+        /// A vertex of the triangle, m.
+        x: f64,
+        /// Its other coordinate, m.
+        y: f64,
+    },
 }
 
 impl MeshError {

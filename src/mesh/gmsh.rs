@@ -164,9 +164,6 @@ fn run(
     let mut command = Command::new("gmsh");
     // One thread: the same input then gives the same mesh, node by node.
     command.args(["-2", "-format", "msh41", "-v", "1", "-nt", "1"]);
-    if order == Order::Quadratic {
-        command.args(["-order", "2"]);
-    }
     for (name, value) in parameters {
         command.args(["-setnumber", name, &value.to_string()]);
         if name == "size" {
@@ -174,7 +171,14 @@ fn run(
         }
     }
     // "./" keeps a path that begins with a dash from being taken for an option.
-    let output = command.arg("-o").arg(fresh).arg(Path::new(".").join(geo)).output();
+    command.arg("-o").arg(fresh).arg(Path::new(".").join(geo));
+    if order == Order::Quadratic {
+        // The option -order would give way to a Mesh.ElementOrder in the .geo, a later file does not.
+        let second = fresh.with_file_name("order.geo");
+        fs::write(&second, "Mesh.ElementOrder = 2;\n").map_err(MeshError::io(&second))?;
+        command.arg(second);
+    }
+    let output = command.output();
     let output = output.map_err(|source| match source.kind() {
         io::ErrorKind::NotFound => MeshError::file(
             geo,

@@ -6,7 +6,7 @@
 //! shapes, whose angles are at least half its smallest one (I. G. Rosenberg, F. Stenger, SIAM J.
 //! Numer. Anal. 12, 1975), and those of a right isosceles triangle are right isosceles.
 
-use super::{Mesh, Side, sides};
+use super::{Mesh, MeshError, Side, sides, twice_area};
 
 /// A mesh that is refined round after round.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,8 +42,11 @@ impl Refinement {
     /// The edges of curves are halved with their triangles. Quadratic edges and triangles are
     /// divided as the images that they are: new nodes lie on them, and parts keep their curvature.
     /// (The interior edges of a curve are not listed: their number stays.)
-    #[must_use]
-    pub fn refine(&self, marked: &[bool]) -> Self {
+    ///
+    /// # Errors
+    /// The vertices of a part of a quadratic triangle are not counter-clockwise: its sides curve by a
+    /// good part of its height.
+    pub fn refine(&self, marked: &[bool]) -> Result<Self, MeshError> {
         let edges = Edges::of(&self.mesh.triangles);
         let halved = edges.halved_with(marked);
         let mut new_node = vec![None; edges.ends.len()];
@@ -75,11 +78,15 @@ impl Refinement {
                     parent_of_triangle.push(parent);
                     if is_curved {
                         mesh.add_offsets(nodes, offsets);
+                        let [a, b, c] = nodes.map(|node| mesh.nodes[node]);
+                        if twice_area(a, b, c) <= 0.0 {
+                            return Err(MeshError::TooCurved { x: a[0], y: a[1] });
+                        }
                     }
                 }
             }
         }
-        Self { mesh, parent_of_triangle, halved_edges }
+        Ok(Self { mesh, parent_of_triangle, halved_edges })
     }
 
     /// The nodal values of a P1 function with `block` components, carried over from the mesh before.

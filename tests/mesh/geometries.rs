@@ -219,6 +219,11 @@ fn second_order_adds_midpoints_and_changes_nothing_else() {
     let [linear, quadratic] =
         [Order::Linear, Order::Quadratic].map(|order| load(&geo, &graded, order).unwrap());
     assert!(linear == quadratic);
+
+    let (_folder, geo) = copy("hertz");
+    let text = fs::read_to_string(&geo).unwrap();
+    fs::write(&geo, format!("{text}Mesh.ElementOrder = 1;\n")).unwrap();
+    assert!(!load(&geo, &BTreeMap::new(), Order::Quadratic).unwrap().curved.is_empty());
 }
 
 #[test]

@@ -20,7 +20,7 @@ fn random_rounds(mesh: Mesh, rounds: usize, one_in: usize) -> Vec<(Vec<bool>, Re
     for _ in 0..rounds {
         let count = refined.mesh.triangles.len();
         let marked: Vec<bool> = (0..count).map(|_| random.below(one_in) == 0).collect();
-        refined = refined.refine(&marked);
+        refined = refined.refine(&marked).unwrap();
         history.push((marked, refined.clone()));
     }
     history
@@ -58,7 +58,7 @@ fn a_refined_mesh_is_conforming_and_covers_the_same_body() {
 #[test]
 fn nothing_marked_changes_nothing() {
     let start = Refinement::start(read(&fixture("disc-41")).unwrap());
-    let refined = start.refine(&vec![false; start.mesh.triangles.len()]);
+    let refined = start.refine(&vec![false; start.mesh.triangles.len()]).unwrap();
     assert!(refined == start);
 }
 
@@ -95,7 +95,7 @@ fn towards_a_corner_angles_stay_and_triangles_are_few() {
         let mut refined = Refinement::start(mesh);
         let (angle, count) = (smallest_angle(&refined.mesh), refined.mesh.triangles.len());
         for round in 1..=20 {
-            refined = refined.refine(&at(&refined.mesh, point));
+            refined = refined.refine(&at(&refined.mesh, point)).unwrap();
             assert!(smallest_angle(&refined.mesh) >= 0.5 * angle - 1e-10);
             assert!(refined.mesh.triangles.len() < count + 30 * round, "round {round}");
         }
@@ -149,6 +149,20 @@ fn the_parts_of_a_curved_triangle_are_parts_of_its_image() {
 }
 
 #[test]
+fn a_triangle_too_curved_to_be_refined_is_an_error() {
+    let mut mesh = Mesh {
+        nodes: vec![[0.0, 0.0], [2.0, 0.0], [1.0, 1.0]],
+        triangles: vec![[0, 1, 2]],
+        ..Mesh::default()
+    };
+    // The middle of the right side lies on the left of the line through apex and foot.
+    mesh.set_offset([1, 2], [-0.6, -0.3]);
+    let halves = Refinement::start(mesh).refine(&[true]).unwrap();
+    let message = halves.refine(&[true, true]).unwrap_err().to_string();
+    assert!(message.contains("too curved to be refined"), "{message}");
+}
+
+#[test]
 fn a_disc_keeps_its_parabolas_and_their_area_is_of_fourth_order() {
     let folder = tempfile::tempdir().unwrap();
     let geo = folder.path().join("disc.geo");
@@ -160,7 +174,8 @@ fn a_disc_keeps_its_parabolas_and_their_area_is_of_fourth_order() {
         let disc_area = curved_area(&disc);
         errors.push((disc_area - std::f64::consts::PI).abs());
 
-        let refined = Refinement::start(disc.clone()).refine(&vec![true; disc.triangles.len()]);
+        let refined =
+            Refinement::start(disc.clone()).refine(&vec![true; disc.triangles.len()]).unwrap();
         for &[a, b] in &disc.curves["rim"].edges {
             let ends = [a.min(b), a.max(b)];
             let new = refined.halved_edges.iter().position(|&edge| edge == ends);
