@@ -13,7 +13,7 @@ pub use run::{RunArguments, run};
 use ranks::require_one_process;
 use signorini::{
     contact::{self, REGISTRY, SOLVERS, TAO_TYPES, summaries},
-    mesh::{self, Mesh, Order},
+    mesh::{self, Mesh},
     output::terminal::say,
     scene::{MeshSource, Scene},
 };
@@ -91,7 +91,7 @@ fn read(path: &Path, file: Option<&Path>, set: &[String]) -> Result<(Scene, Mesh
             ));
         }
     }
-    let mesh = mesh::load(&scene.mesh.file, &scene.mesh.parameters, Order::Linear)
+    let mesh = mesh::load(&scene.mesh.file, &scene.mesh.parameters, scene.order)
         .map_err(Failure::input)?;
     Ok((scene, mesh))
 }

@@ -29,7 +29,7 @@ impl<'a> Recorder<'a> {
     /// Shows what is to be solved, and starts the files.
     pub(super) fn new(task: &'a Task) -> Result<Self, OutputError> {
         let fields = FieldWriter::new(&task.folder, &task.problem)?;
-        let history = match task.problem.body.partition.comm().is_root() {
+        let history = match task.problem.body.nodes.partition.comm().is_root() {
             true => Some((History::create(&task.folder)?, screen::open(task))),
             false => None,
         };
@@ -121,7 +121,7 @@ fn summary(
     wall: f64,
 ) -> Value {
     let Task { problem, triangles, contact_nodes, solver, .. } = task;
-    let (scene, partition) = (problem.scene(), &problem.body.partition);
+    let (scene, partition) = (problem.scene(), &problem.body.nodes.partition);
     let outcome = result.as_ref().ok();
     let stopped = outcome.and_then(|outcome| outcome.stopped);
     let steps = last.map_or(0, |record| record.step);
@@ -150,6 +150,8 @@ fn summary(
         "active_nodes": last.map(|record| record.active_nodes),
         // The worst of all steps.
         "kkt": outcome.map(|outcome| outcome.kkt).or(last.map(|record| record.kkt())),
+        // Estimated relative errors of the last state; null where there is none.
+        "errors": outcome.map(|outcome| outcome.errors),
         "wall_seconds": wall,
         "seconds_per_step": wall / steps.max(1) as f64,
         "phases": seconds.collect::<BTreeMap<_, _>>(),

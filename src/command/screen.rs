@@ -13,7 +13,7 @@ const LENGTH: u64 = 1000;
 
 /// Shows what is to be solved, and a progress bar.
 pub fn open(task: &Task) -> ProgressBar {
-    let (scene, partition) = (task.problem.scene(), &task.problem.body.partition);
+    let (scene, partition) = (task.problem.scene(), &task.problem.body.nodes.partition);
     let mut mesh = format!("{} nodes, {} triangles", partition.total(), task.triangles);
     if !partition.comm().is_serial() {
         mesh += &format!(", on {} ranks", partition.comm().size());
@@ -61,6 +61,11 @@ pub fn conclusion(
             let force = last.contact_force;
             let contact = format!("{active} of {nodes} nodes active, force {force:.6e} N/m");
             lines.push(row("contact", contact));
+        }
+        if let Some(outcome) = outcome {
+            let [first, rest @ ..] = outcome.errors.lines();
+            lines.push(row("errors", first));
+            lines.extend(rest.map(|line| row("", line)));
         }
         let kkt = outcome.map_or(last.kkt(), |outcome| outcome.kkt);
         lines.push(row("residuals", kkt.to_string()));

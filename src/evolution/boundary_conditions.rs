@@ -3,7 +3,7 @@
 
 use crate::{
     contact::{FixedRow, GapRow, RigidMotions},
-    fem::Body,
+    fem::{Body, Edge},
     mesh::{BoundaryNode, Mesh, boundary_nodes},
     scene::{Boundary, Condition, Expression, Scene},
 };
@@ -28,27 +28,29 @@ pub(super) struct BoundaryConditions {
 pub(super) struct Traction {
     /// The boundary's name.
     pub(super) boundary: String,
-    pub(super) edges: Vec<[usize; 2]>,
+    pub(super) edges: Vec<Edge>,
     /// f_N, N/m².
     pub(super) force: [Expression; 2],
 }
 
 impl BoundaryConditions {
-    /// The conditions of `scene` on `mesh`, which has all curves that the scene names.
-    pub(super) fn new(scene: &Scene, mesh: &Mesh) -> Self {
+    /// The conditions of `scene` on `body`, whose mesh has all curves that the scene names.
+    pub(super) fn new(scene: &Scene, body: &Body) -> Self {
+        let (mesh, points) = (&body.mesh, &body.nodes.points);
         let mut conditions = Self::default();
         for boundary in &scene.boundaries {
             let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
-            for node in boundary_nodes(mesh, &curve.edges) {
-                conditions.add_fixed_rows(boundary, mesh, &node);
-                conditions.add_gap_rows(boundary, mesh, &node);
+            let edges = body.edges(&curve.edges);
+            for node in boundary_nodes(edges.iter().flat_map(|edge| edge.faces(points))) {
+                conditions.add_fixed_rows(boundary, points, &node);
+                conditions.add_gap_rows(boundary, points, &node);
             }
             if let Some(gap) = boundary.gap() {
                 let normal = |edge| gap.normal.unwrap_or(mesh.edge_normal(edge).0);
                 conditions.contact_edges.extend(curve.edges.iter().map(|&e| (e, normal(e))));
             }
             if let Some(force) = boundary.traction() {
-                let (boundary, edges) = (boundary.name.clone(), curve.edges.clone());
+                let boundary = boundary.name.clone();
                 conditions.tractions.push(Traction { boundary, edges, force: force.clone() });
             }
         }
@@ -108,14 +110,14 @@ impl BoundaryConditions {
         })
     }
 
-    fn add_fixed_rows(&mut self, boundary: &Boundary, mesh: &Mesh, at: &BoundaryNode) {
+    fn add_fixed_rows(&mut self, boundary: &Boundary, points: &[[f64; 2]], at: &BoundaryNode) {
         let node = at.node;
         for condition in &boundary.conditions {
             if let Condition::Displacement(components) = condition {
                 for (component, direction) in components.iter().zip([[1.0, 0.0], [0.0, 1.0]]) {
                     let Some(value) = component else { continue };
                     self.fixed.push(FixedRow { node, direction });
-                    self.prescribed.push(Some((mesh.nodes[node], value.clone())));
+                    self.prescribed.push(Some((points[node], value.clone())));
                 }
             }
             if let Condition::Symmetry = condition {
@@ -127,9 +129,9 @@ impl BoundaryConditions {
         }
     }
 
-    fn add_gap_rows(&mut self, boundary: &Boundary, mesh: &Mesh, at: &BoundaryNode) {
+    fn add_gap_rows(&mut self, boundary: &Boundary, points: &[[f64; 2]], at: &BoundaryNode) {
         let Some(gap) = boundary.gap() else { return };
-        let (node, distance) = (at.node, gap.at(mesh.nodes[at.node]));
+        let (node, distance) = (at.node, gap.at(points[at.node]));
         let row =
             |normal, tributary_length| GapRow { node, normal, gap: distance, tributary_length };
         match gap.normal {

@@ -36,7 +36,7 @@ pub struct ContactStep<'a> {
     rescuer: Option<Box<dyn ContactSolver + 'a>>,
     stiffness: Stiffness,
     /// The triangle means of η_*(ζ) that K was filled with.
-    zeta_mean: Vec<f64>,
+    zeta_at_points: Vec<f64>,
     /// The load of the free unknowns, and these.
     load: Vector,
     c: Vector,
@@ -88,7 +88,7 @@ impl<'a> ContactStep<'a> {
         phases: &'a Phases,
     ) -> Result<Self, RunError> {
         let (body, constraints) = (&problem.body, &problem.constraints);
-        let (comm, unknowns) = (body.partition.comm(), 2 * body.partition.owned());
+        let (comm, unknowns) = (body.nodes.partition.comm(), 2 * body.nodes.partition.owned());
         let stiffness = phases.time("stiffness pattern", || {
             Stiffness::new(session, body, &problem.elasticity, &constraints.bases)
         })?;
@@ -108,7 +108,7 @@ impl<'a> ContactStep<'a> {
             solver,
             rescuer,
             stiffness,
-            zeta_mean: vec![1.0; body.triangles.len()],
+            zeta_at_points: body.at_points(&vec![1.0; body.mesh.nodes.len()]),
             load: Vector::zeros(session, unknowns)?,
             c: Vector::zeros(session, unknowns)?,
             next: memory.clone(),
@@ -130,11 +130,14 @@ impl<'a> ContactStep<'a> {
     fn solve_by_one(&mut self, step: usize, time: f64, zeta: &[f64]) -> Result<Step, RunError> {
         let started = Instant::now();
         let (problem, phases) = (self.problem, self.phases);
-        let (comm, zeta_mean) = (problem.body.partition.comm(), problem.triangle_means(zeta));
-        if comm.any(zeta_mean != self.zeta_mean) {
+        let (comm, zeta_at_points) =
+            (problem.body.nodes.partition.comm(), problem.zeta_at_points(zeta));
+        if comm.any(zeta_at_points != self.zeta_at_points) {
             let bytes = self.stiffness.refill_traffic();
-            phases.time_moving("stiffness refill", bytes, || self.stiffness.refill(&zeta_mean))?;
-            self.zeta_mean = zeta_mean;
+            phases.time_moving("stiffness refill", bytes, || {
+                self.stiffness.refill(&zeta_at_points)
+            })?;
+            self.zeta_at_points = zeta_at_points;
         }
         let case = agreed(comm, phases.time("loads", || problem.load_case(time)))?;
         self.start(&case)?;
@@ -157,7 +160,7 @@ impl<'a> ContactStep<'a> {
     /// # Errors
     /// PETSc failed.
     pub fn accept(&mut self, time: f64) -> Result<(), PetscError> {
-        let (problem, comm) = (self.problem, self.problem.body.partition.comm());
+        let (problem, comm) = (self.problem, self.problem.body.nodes.partition.comm());
         let mut c = self.c.read(<[f64]>::to_vec)?;
         self.next.datum.shift(&problem.constraints, &mut c, 1.0);
         self.phases.time("extrapolation", || self.extrapolation.accept(comm, time, c));
@@ -170,7 +173,7 @@ impl<'a> ContactStep<'a> {
     /// bounds do not support the body, the datum, and c with it, moves to where the load drives the
     /// body as a rigid one.
     fn start(&mut self, case: &LoadCase) -> Result<(), PetscError> {
-        let (problem, comm) = (self.problem, self.problem.body.partition.comm());
+        let (problem, comm) = (self.problem, self.problem.body.nodes.partition.comm());
         let constraints = &problem.constraints;
         self.next = self.accepted.clone();
         self.solver.set_warm_start(&self.next.warm_start);
@@ -250,7 +253,7 @@ impl<'a> ContactStep<'a> {
             return Ok(false);
         }
         let (datum, constraints) = (&mut self.next.datum, &self.problem.constraints);
-        let nodes = &self.problem.body.mesh.nodes;
+        let nodes = &self.problem.body.nodes.points;
         let motion: Vec<f64> = nodes.iter().flat_map(|&x| judged.rigid.at(x)).collect();
         self.c.write(|c| {
             datum.shift(constraints, c, 1.0);
@@ -270,15 +273,15 @@ impl<'a> ContactStep<'a> {
         tolerance: f64,
     ) -> Result<ContactReport, ContactError> {
         let (body, bases) = (&self.problem.body, &self.problem.constraints.bases);
-        let comm = body.partition.comm();
+        let comm = body.nodes.partition.comm();
         let mut load = case.load.clone();
-        let mut force = body.partition.norm(&load, 2);
+        let mut force = body.nodes.partition.norm(&load, 2);
         if comm.any(lift.iter().any(|&v| v != 0.0)) {
             let mut u = lift.to_vec();
             bases.displacement_to_global(&mut u);
-            let internal = self.problem.elasticity.internal_force(body, &self.zeta_mean, &u);
+            let internal = self.problem.elasticity.internal_force(body, &self.zeta_at_points, &u);
             load.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
-            force = force.max(LIFTED * body.partition.norm(&load, 2));
+            force = force.max(LIFTED * body.nodes.partition.norm(&load, 2));
         }
         bases.force_to_local(&mut load);
         bases.zero_fixed(&mut load);
@@ -314,7 +317,7 @@ fn displacement(
     let mut u = lift;
     c.read(|c| u.iter_mut().zip(c).for_each(|(u, c)| *u += c))?;
     problem.constraints.bases.displacement_to_global(&mut u);
-    problem.body.partition.update(&mut u, 2)?;
+    problem.body.nodes.partition.update(&mut u, 2)?;
     problem.motions.remove_free(&problem.body, &mut u);
     Ok(u)
 }

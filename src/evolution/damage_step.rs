@@ -47,7 +47,7 @@ impl DamageStep<'_> {
             let strain = problem.elasticity.strain_squared(body, &state.u);
             let phi = fem::source(body, &law, &strain, &state.zeta);
             let min = phi.iter().flatten().copied().fold(0.0, f64::min);
-            let min = body.partition.comm().min(min);
+            let min = body.vertices.partition.comm().min(min);
             let load = fem::source_load(body, problem.mass(), &phi);
             DamageSource { load: DVector::from_vec(load), min }
         })
@@ -59,7 +59,7 @@ impl DamageStep<'_> {
     /// The system has no finite solution, or was solved too inaccurately.
     pub(super) fn solve(&mut self, planned: &PlannedStep) -> Result<DamageUpdate, RunError> {
         let (problem, phases) = (self.problem, self.phases);
-        let partition = &problem.body.partition;
+        let partition = &problem.body.vertices.partition;
         let (start, load) = (planned.start.as_slice(), planned.load.as_slice());
         let (mut zeta, min_max) = (planned.start.clone(), partition.min_max(start));
         let stays = min_max.0 == min_max.1 && self.is_zero(load);
@@ -97,7 +97,7 @@ impl DamageStep<'_> {
         planned: &PlannedStep,
         load: DVector<f64>,
     ) -> Result<DVector<f64>, RunError> {
-        let (partition, phases) = (&self.problem.body.partition, self.phases);
+        let (partition, phases) = (&self.problem.body.vertices.partition, self.phases);
         let zero = self.is_zero(load.as_slice());
         let Some(law) = self.problem.damage().filter(|_| !zero) else {
             return Ok(DVector::zeros(load.len()));
@@ -112,7 +112,7 @@ impl DamageStep<'_> {
 
     /// Whether a source load is zero on all ranks. Collective.
     fn is_zero(&self, load: &[f64]) -> bool {
-        self.problem.body.partition.comm().all(load.iter().all(|&b| b == 0.0))
+        self.problem.body.vertices.partition.comm().all(load.iter().all(|&b| b == 0.0))
     }
 
     /// The damage system of a step of `k` s, factorised.

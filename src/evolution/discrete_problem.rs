@@ -101,11 +101,11 @@ impl DiscreteProblem {
     /// The scene does not fit the mesh, contradicts itself, or its load drives a rigid motion.
     pub fn new(mut scene: Scene, mesh: Mesh) -> Result<Self, SetupError> {
         scene.check_mesh(&mesh)?;
-        let body = Body::new(mesh);
-        let mut conditions = BoundaryConditions::new(&scene, &body.mesh);
+        let body = Body::new(mesh, scene.order);
+        let mut conditions = BoundaryConditions::new(&scene, &body);
         let motions = conditions.resolve_motions(&body);
         let (fixed, gaps) = (&conditions.fixed, &mut conditions.gaps);
-        let mut constraints = Constraints::new(&body.mesh.nodes, fixed, gaps)
+        let mut constraints = Constraints::new(&body.nodes.points, fixed, gaps)
             .map_err(|source| SetupError::Constraint { scene: scene.path.clone(), source })?;
         motions.pin_free(&body, &mut constraints);
         let certificate = Certificate::new(fixed, gaps);
@@ -115,7 +115,7 @@ impl DiscreteProblem {
         scene.notes.extend(unresolved);
         let loads = Loads::new(&body, &scene, conditions);
         let norms = (scene.sample_times(SAMPLES).into_iter())
-            .map(|time| body.partition.norm(&loads.at(&body, time), 2));
+            .map(|time| body.nodes.partition.norm(&loads.at(&body, time), 2));
         let problem = Self {
             largest_load: norms.filter(|norm| norm.is_finite()).fold(0.0, f64::max),
             foundation,
@@ -137,7 +137,7 @@ impl DiscreteProblem {
     /// # Errors
     /// PETSc cannot divide the mesh.
     pub fn restrict(self, session: &Session) -> Result<Self, PetscError> {
-        let Some(subdomain) = Subdomain::of(session, &self.body.mesh)? else { return Ok(self) };
+        let Some(subdomain) = Subdomain::of(session, &self.body)? else { return Ok(self) };
         Ok(Self {
             constraints: self.constraints.restrict(&subdomain),
             certificate: self.certificate.restrict(&subdomain),
@@ -168,7 +168,7 @@ impl DiscreteProblem {
     /// (sin(pi) = 1.2e-16) counts as zero.
     pub fn load(&self, time: f64) -> Vec<f64> {
         let mut load = self.loads.at(&self.body, time);
-        if self.body.partition.norm(&load, 2) <= UNLOADED * self.largest_load {
+        if self.body.nodes.partition.norm(&load, 2) <= UNLOADED * self.largest_load {
             load.fill(0.0);
         }
         load
@@ -191,7 +191,7 @@ impl DiscreteProblem {
     /// Collective.
     fn checked_load(&self, time: f64) -> Result<Vec<f64>, SetupError> {
         let load = self.load(time);
-        if !self.body.partition.comm().all(load.iter().all(|f| f.is_finite())) {
+        if !self.body.nodes.partition.comm().all(load.iter().all(|f| f.is_finite())) {
             return Err(self.not_finite(time));
         }
         let driven = |source| SetupError::Driven { scene: self.scene.path.clone(), time, source };
@@ -214,7 +214,7 @@ impl DiscreteProblem {
             return Err(self.not_finite(time));
         }
         let constraint = |source| SetupError::Constraint { scene: self.scene.path.clone(), source };
-        self.constraints.pose(values, &self.body.mesh.nodes).map_err(constraint)
+        self.constraints.pose(values, &self.body.nodes.points).map_err(constraint)
     }
 
     /// The time of the first solve, s: 0, or 1 where there is no time.
@@ -247,14 +247,13 @@ impl DiscreteProblem {
         self.scene.damage.as_ref().map_or(0.0, |damage| damage.law.threshold)
     }
 
-    /// The mean of η_*(ζ) over each triangle.
-    pub fn triangle_means(&self, zeta: &[f64]) -> Vec<f64> {
+    /// η_*(ζ) at the quadrature points of the elements of u, interpolated between the vertices.
+    pub fn zeta_at_points(&self, zeta: &[f64]) -> Vec<f64> {
         let truncate = |z: f64| match &self.scene.damage {
             Some(damage) => damage.law.truncate(z),
             None => z,
         };
-        let mean = |t: &[usize; 3]| t.iter().map(|&node| truncate(zeta[node])).sum::<f64>() / 3.0;
-        self.body.mesh.triangles.iter().map(mean).collect()
+        self.body.at_points(&zeta.iter().map(|&z| truncate(z)).collect::<Vec<_>>())
     }
 
     /// The scene.

@@ -5,7 +5,7 @@ use super::{
     boundary_conditions::{BoundaryConditions, Traction},
 };
 use crate::{
-    fem::{Body, Subdomain, add_body_force, add_traction, midpoint},
+    fem::{Body, Edge, Subdomain, add_body_force, add_traction, midpoint},
     scene::{Expression, Scene},
 };
 
@@ -95,7 +95,7 @@ impl Loads {
     }
 
     fn assemble(&self, body: &Body, t: f64) -> Vec<f64> {
-        let mut load = vec![0.0; 2 * body.partition.local()];
+        let mut load = vec![0.0; 2 * body.nodes.partition.local()];
         let at = |f: &[Expression; 2], [x, y]: [f64; 2]| f.each_ref().map(|f| f.eval(x, y, t));
         if let Some(force) = &self.body_force {
             add_body_force(body, |x| at(force, x), &mut load);
@@ -107,10 +107,11 @@ impl Loads {
     }
 }
 
-fn edge_samples(body: &Body, edges: &[[usize; 2]]) -> Vec<Sample> {
-    let nodes = &body.mesh.nodes;
-    let sample =
-        |&[a, b]: &[usize; 2]| (midpoint(nodes[a], nodes[b]), body.mesh.edge_normal([a, b]).1);
+fn edge_samples(body: &Body, edges: &[Edge]) -> Vec<Sample> {
+    let nodes = &body.nodes.points;
+    let sample = |&Edge { ends: [a, b], .. }: &Edge| {
+        (midpoint(nodes[a], nodes[b]), body.mesh.edge_normal([a, b]).1)
+    };
     edges.iter().map(sample).collect()
 }
 
@@ -122,7 +123,7 @@ fn triangle_samples(body: &Body) -> Vec<Sample> {
         .map(|(nodes, triangle)| {
             let [a, b, c] = nodes.map(|node| body.mesh.nodes[node]);
             let centroid = [0, 1].map(|k| (a[k] + b[k] + c[k]) / 3.0);
-            (centroid, stride as f64 * triangle.area)
+            (centroid, stride as f64 * triangle.area())
         })
         .collect()
 }

@@ -1,7 +1,7 @@
 //! Problem VP^hk of the paper: damage and contact in turn, step by step.
 //!
-//! Displacements u_n and damage ζ_n are affine on the triangles of one mesh, (22) and (23). With the
-//! nodal functions λ_i of ζ and the matrices and vectors
+//! Displacements u_n and damage ζ_n are affine on the triangles of one mesh, (22) and (23); or u_n is
+//! quadratic there. With the nodal functions λ_i of ζ and the matrices and vectors
 //!
 //! M_ij = ∫ λ_i λ_j, L_ij = ∫ ∇λ_i·∇λ_j, b_i(u, ζ) = ∫ φ(ε(u), ζ) λ_i,
 //! vᵀK(ζ)u = ∫ η_*(ζ) 𝒜ε(u)·ε(v), fᵀv = ∫_Ω f_B·v + ∫_{Γ_N} f_N·v,
@@ -16,9 +16,9 @@
 //! - the program stops when min ζ_n ≤ ζ_*;
 //! - (26): u_n minimises ½ uᵀK(ζ_n)u − f_nᵀu over U_n.
 //!
-//! Strains are constant in a triangle. There φ is taken at the three vertices, from their ζ and the
-//! triangle's strain, and integrated as an affine function; and η_*(ζ) by its mean over the three
-//! vertices. [`run`] is this loop; a step controller plans each step and judges it, so that steps
+//! Affine displacements have one strain in a triangle. There φ is taken at the three vertices, from
+//! their ζ and that strain, and integrated as an affine function; and η_*(ζ) by its mean over the three
+//! vertices. For quadratic ones, φ and η_*(ζ)𝒜ε(u) are taken at three quadrature points. [`run`] is this loop; a step controller plans each step and judges it, so that steps
 //! may be chosen as well as uniform.
 
 mod boundary_conditions;
@@ -26,6 +26,7 @@ mod contact_step;
 mod damage_step;
 mod discrete_problem;
 mod error;
+mod error_budget;
 mod extrapolation;
 mod loads;
 mod notes;
@@ -39,6 +40,7 @@ pub use boundary_conditions::Foundation;
 pub use contact_step::{Accuracy, ContactStep};
 pub use discrete_problem::{DiscreteProblem, SetupError};
 pub use error::{RunError, StepFailure};
+pub use error_budget::ErrorBudget;
 pub use extrapolation::Extrapolation;
 pub use loads::Loads;
 pub use outcome::{BoundViolation, Outcome, Stop};
@@ -66,7 +68,7 @@ pub fn run(
 ) -> Result<Outcome, RunError> {
     let mut show = |step: &Step| {
         let shown = accepted(step).map_err(RunError::Observer);
-        agreed(problem.body.partition.comm(), shown)
+        agreed(problem.body.nodes.partition.comm(), shown)
     };
     let mut damage_step = DamageStep { session, problem, phases, system: None };
     let mut contact_step = ContactStep::new(session, problem, solver, phases)?;
@@ -110,6 +112,16 @@ pub fn run(
     outcome.bound_violation = controller.violation;
     outcome.damage_error = controller.damage_error();
     outcome.accuracy = phases.time("accuracy", || contact_step.accuracy(&outcome))?;
+    let state = &outcome.last.state;
+    let steps = controller.step_error().filter(|_| problem.damage().is_some());
+    outcome.errors = ErrorBudget {
+        displacement_mesh: outcome.accuracy.energy,
+        displacement_steps: steps
+            .as_ref()
+            .map(|e| problem.displacement_error_of(e.as_slice(), state)),
+        damage_steps: steps.and_then(|e| problem.relative_to_damage(e.as_slice(), state)),
+        solver: outcome.accuracy.displacement,
+    };
     Ok(outcome)
 }
 

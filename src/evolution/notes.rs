@@ -2,7 +2,7 @@
 
 use super::{Accuracy, DiscreteProblem, Outcome, boundary_conditions::Traction};
 use crate::{
-    fem::gauss_points,
+    fem::{Edge, for_elements, gauss_points},
     mesh::Mesh,
     model::Plane,
     scene::{Expression, Scene, Stepping},
@@ -145,10 +145,11 @@ impl DiscreteProblem {
     /// `LARGE` in a noticeable part of the body. A translation, however far, is not.
     fn large_gradients(&self, u: &[f64]) -> Option<String> {
         let body = &self.body;
-        let gradient = |t: usize| body.triangles[t].gradient(&body.gather(t, u)).norm();
-        let own = 0..body.own_triangles;
-        let large = own.filter(|&t| gradient(t) > LARGE).map(|t| body.triangles[t].area).sum();
-        let part = body.partition.comm().total(large) / body.area;
+        let gradients = for_elements!(body, cells => cells.gradients(u));
+        let own = gradients.iter().zip(&body.triangles).take(body.own_triangles);
+        let large =
+            own.filter(|(gradient, _)| gradient.norm() > LARGE).map(|(_, t)| t.area()).sum();
+        let part = body.nodes.partition.comm().total(large) / body.area;
         (part > NOTICEABLE).then(|| {
             format!(
                 "|∇u| exceeds {LARGE} in {:.0} % of the body: strains or rotations are not small, \
@@ -164,7 +165,7 @@ impl DiscreteProblem {
         let angles =
             self.body.mesh.triangles.iter().map(|t| (smallest_angle(t.map(|i| nodes[i])), t));
         let least = angles.min_by(|(a, _), (b, _)| a.total_cmp(b));
-        let comm = self.body.partition.comm();
+        let comm = self.body.nodes.partition.comm();
         let (angle, rank) = comm.min_with_rank(least.map_or(f64::INFINITY, |(angle, _)| angle));
         let at = least.map_or([0.0; 2], |(_, triangle)| nodes[triangle[0]]);
         let [x, y] = at.map(|coordinate| comm.broadcast(rank, coordinate));
@@ -229,7 +230,7 @@ pub(super) fn unresolved(scene: &Scene, mesh: &Mesh, traction: &Traction) -> Opt
 /// ∫f_x, ∫f_y and ∫|f| of a traction at time t, by equal weights at these parts of each edge.
 fn integral(mesh: &Mesh, traction: &Traction, parts: &[f64], t: f64) -> [f64; 3] {
     let mut sums = [0.0; 3];
-    for &[a, b] in &traction.edges {
+    for &Edge { ends: [a, b], .. } in &traction.edges {
         let (p, q) = (mesh.nodes[a], mesh.nodes[b]);
         let weight = mesh.edge_normal([a, b]).1 / parts.len() as f64;
         for s in parts {

@@ -1,6 +1,6 @@
 //! How a run ended that did not fail.
 
-use super::{Accuracy, Step, StepRecord, step_controller::PlannedStep};
+use super::{Accuracy, ErrorBudget, Step, StepRecord, step_controller::PlannedStep};
 use crate::{
     contact::{Kkt, RigidMotion},
     fem::Mass,
@@ -30,6 +30,8 @@ pub struct Outcome {
     pub unconstrained: Option<(f64, RigidMotion)>,
     /// Estimated errors of the answers.
     pub accuracy: Accuracy,
+    /// Where the errors of the last accepted state come from.
+    pub errors: ErrorBudget,
     /// Estimated error of the last ζ over the damage done, where steps are chosen.
     pub damage_error: Option<f64>,
     /// The steps of the largest stationarity residual and displacement before the last.

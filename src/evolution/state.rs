@@ -104,12 +104,12 @@ impl StepRecord {
         let mut active: Vec<usize> =
             state.contact.iter().filter(|point| point.active).map(|point| point.node).collect();
         active.dedup();
-        let partition = &problem.body.partition;
+        let partition = &problem.body.nodes.partition;
         let comm = partition.comm();
         Self {
             step,
             time: state.time,
-            zeta_min: partition.min_max(&state.zeta).0,
+            zeta_min: problem.body.vertices.partition.min_max(&state.zeta).0,
             zeta_mean: problem.body.mean(&state.zeta),
             displacement_max: partition.max_norm(&state.u),
             work: partition.dot(load, &state.u, 2),

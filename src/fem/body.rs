@@ -1,22 +1,28 @@
-//! The body: its mesh, the geometry of its triangles, and which nodes this rank owns.
+//! The body: its triangulation, the nodes and elements of u and ζ on it, and which this rank owns.
 
-use super::{Partition, Triangle};
-use crate::mesh::Mesh;
-use nalgebra::Vector3;
+use super::{
+    Edge, Partition, Triangle,
+    element::{Element, POINTS, Quadratic, quadratic_values},
+};
+use crate::mesh::{Mesh, Order};
+use nalgebra::{Matrix2, Vector3};
+use std::{collections::HashMap, rc::Rc};
 
 /// A triangulated body, or the subdomain of it that this rank keeps.
 #[derive(Debug)]
 pub struct Body {
-    /// The triangulation.
+    /// The triangulation; its nodes are the vertices.
     pub mesh: Mesh,
-    /// Area and gradients, one per triangle of the mesh.
+    /// The P1 triangles of ζ, one per triangle of the mesh, with straight sides.
     pub triangles: Vec<Triangle>,
     /// The first so many triangles belong to this rank; every triangle belongs to one rank.
     pub own_triangles: usize,
-    /// Ownership of the nodes.
-    pub partition: Partition,
-    /// ∫ λ_i, m²: the weight of each node in an integral.
-    pub node_area: Vec<f64>,
+    /// The nodes of ζ: the vertices.
+    pub vertices: Rc<Nodes>,
+    /// The nodes of u: the vertices, and for P2 the midpoints of the edges.
+    pub nodes: Rc<Nodes>,
+    /// The elements of u, unless they are the P1 triangles.
+    pub(super) quadratic: Option<QuadraticElements>,
     /// |Ω| of the undivided body, m².
     pub area: f64,
     /// Its centroid x̄, m.
@@ -25,57 +31,255 @@ pub struct Body {
     pub polar_inertia: f64,
 }
 
+/// The nodes of a continuous finite element space: those that this rank owns, then ghosts.
+#[derive(Debug)]
+pub struct Nodes {
+    /// Coordinates, m.
+    pub points: Vec<[f64; 2]>,
+    /// ∫ φ_i, m²: the weight of each node in an integral. For P2 it is 0 at the vertices of straight
+    /// triangles.
+    pub weights: Vec<f64>,
+    /// Σ ∫ φ_i over the undivided body, m²: its area, with straight edges for P1.
+    pub area: f64,
+    /// Ownership.
+    pub partition: Partition,
+}
+
+/// The elements of P2.
+#[derive(Debug)]
+pub(super) struct QuadraticElements {
+    /// Six nodes per triangle: vertices, then the midpoints of the sides 01, 12, 20.
+    pub(super) nodes: Vec<[usize; 6]>,
+    pub(super) elements: Vec<Quadratic>,
+    /// The node in the middle of each edge, by the nodes of its ends in increasing order.
+    pub(super) middle: HashMap<[usize; 2], usize>,
+}
+
+/// Elements with N nodes and Q quadrature points, one per triangle of the mesh.
+#[derive(Debug, Clone, Copy)]
+pub struct Cells<'a, const N: usize, const Q: usize> {
+    /// The nodes of each element.
+    pub nodes: &'a [[usize; N]],
+    /// The elements.
+    pub elements: &'a [Element<N, Q>],
+}
+
+/// The elements of u.
+#[derive(Debug, Clone, Copy)]
+pub enum Elements<'a> {
+    /// P1.
+    Linear(Cells<'a, 3, 1>),
+    /// P2.
+    Quadratic(Cells<'a, 6, 3>),
+}
+
+/// Evaluates an expression of `cells` for the elements of a body, whatever their order.
+macro_rules! for_elements {
+    ($body:expr, $cells:ident => $value:expr) => {
+        match $body.elements() {
+            $crate::fem::Elements::Linear($cells) => $value,
+            $crate::fem::Elements::Quadratic($cells) => $value,
+        }
+    };
+}
+pub(crate) use for_elements;
+
+impl<const N: usize, const Q: usize> Cells<'_, N, Q> {
+    /// The displacements of the nodes of element `t`.
+    #[inline(always)]
+    pub fn gather(&self, t: usize, u: &[f64]) -> [[f64; 2]; N] {
+        self.nodes[t].map(|node| [u[2 * node], u[2 * node + 1]])
+    }
+
+    /// ∇u at the first quadrature point of each triangle.
+    pub fn gradients(&self, u: &[f64]) -> Vec<Matrix2<f64>> {
+        let elements = self.elements.iter().enumerate();
+        elements.map(|(t, element)| element.points[0].gradient(&self.gather(t, u))).collect()
+    }
+
+    /// The strains (ε_xx, ε_yy, 2ε_xy) of nodal u at all quadrature points, triangle by triangle.
+    #[inline(always)]
+    pub fn strains(&self, u: &[f64]) -> impl Iterator<Item = Vector3<f64>> {
+        self.elements.iter().enumerate().flat_map(|(t, element)| {
+            let local = self.gather(t, u);
+            element.points.each_ref().map(|point| point.strain(&local))
+        })
+    }
+}
+
+impl Nodes {
+    /// All nodes on one rank.
+    fn serial(points: Vec<[f64; 2]>, weights: Vec<f64>) -> Rc<Self> {
+        let (area, partition) = (weights.iter().sum(), Partition::serial(points.len()));
+        Rc::new(Self { points, weights, area, partition })
+    }
+}
+
 impl Body {
     /// The undivided body, on one rank.
-    pub fn new(mesh: Mesh) -> Self {
+    pub fn new(mesh: Mesh, order: Order) -> Self {
         let corners = |t: &[usize; 3]| t.map(|node| mesh.nodes[node]);
         let triangles: Vec<Triangle> =
             mesh.triangles.iter().map(|t| Triangle::new(corners(t))).collect();
-        let partition = Partition::serial(mesh.nodes.len());
-        let node_area = node_area(&mesh, &triangles);
-        let (own_triangles, area) = (triangles.len(), node_area.iter().sum::<f64>());
+        let weights = linear_weights(&mesh, &triangles);
+        let vertices = Nodes::serial(mesh.nodes.clone(), weights);
+        let (nodes, quadratic) = match order {
+            Order::Linear => (Rc::clone(&vertices), None),
+            Order::Quadratic => {
+                let (points, quadratic) = QuadraticElements::new(&mesh);
+                let weights = quadratic.weights(points.len());
+                (Nodes::serial(points, weights), Some(quadratic))
+            }
+        };
+        let area = nodes.area;
         let mean = |of: &dyn Fn([f64; 2]) -> f64| {
-            let weighted = mesh.nodes.iter().zip(&node_area).map(|(&x, a)| a * of(x));
+            let weighted = nodes.points.iter().zip(&nodes.weights).map(|(&x, a)| a * of(x));
             weighted.sum::<f64>() / area
         };
         let centroid = [mean(&|x| x[0]), mean(&|x| x[1])];
         let polar = |[x, y]: [f64; 2]| (x - centroid[0]).powi(2) + (y - centroid[1]).powi(2);
         let polar_inertia = area * mean(&polar);
-        Self { mesh, triangles, own_triangles, partition, node_area, area, centroid, polar_inertia }
+        let own_triangles = triangles.len();
+        Self {
+            mesh,
+            triangles,
+            own_triangles,
+            vertices,
+            nodes,
+            quadratic,
+            area,
+            centroid,
+            polar_inertia,
+        }
+    }
+
+    /// The elements of u.
+    pub fn elements(&self) -> Elements<'_> {
+        match &self.quadratic {
+            None => {
+                Elements::Linear(Cells { nodes: &self.mesh.triangles, elements: &self.triangles })
+            }
+            Some(q) => Elements::Quadratic(Cells { nodes: &q.nodes, elements: &q.elements }),
+        }
+    }
+
+    /// The order of the displacements.
+    pub fn order(&self) -> Order {
+        if self.quadratic.is_some() { Order::Quadratic } else { Order::Linear }
     }
 
     /// Whether this rank knows all triangles around the nodes that it owns: their parts of
-    /// ∫ λ_i add up to the value in the undivided body.
+    /// ∫ φ_i add up to the value in the undivided body.
     pub fn is_covered(&self) -> bool {
-        let known = node_area(&self.mesh, &self.triangles);
-        let mut areas = known.iter().zip(&self.node_area).take(self.partition.owned());
-        areas.all(|(known, area)| (known - area).abs() <= 1e-9 * area)
+        let known = match &self.quadratic {
+            None => linear_weights(&self.mesh, &self.triangles),
+            Some(quadratic) => quadratic.weights(self.nodes.points.len()),
+        };
+        let mut weights = known.iter().zip(&self.nodes.weights).take(self.nodes.partition.owned());
+        let least = 1e-9 * self.area / self.nodes.partition.total() as f64;
+        weights.all(|(known, weight)| (known - weight).abs() <= (1e-9 * weight).max(1e-3 * least))
     }
 
-    /// The six displacements (u_1x, u_1y, …, u_3y) of a triangle from a nodal field.
-    #[inline(always)]
-    pub fn gather(&self, triangle: usize, u: &[f64]) -> [f64; 6] {
-        let [a, b, c] = self.mesh.triangles[triangle];
-        [u[2 * a], u[2 * a + 1], u[2 * b], u[2 * b + 1], u[2 * c], u[2 * c + 1]]
+    /// A nodal field of ζ at the quadrature points of the elements of u, Q in turn for each triangle.
+    pub fn at_points(&self, zeta: &[f64]) -> Vec<f64> {
+        let values = self.mesh.triangles.iter().map(|t| t.map(|node| zeta[node]));
+        match self.elements() {
+            Elements::Linear(_) => values.map(|z| z.iter().sum::<f64>() / 3.0).collect(),
+            Elements::Quadratic(_) => values.flat_map(at_quadratic_points).collect(),
+        }
     }
 
-    /// The strain (ε_xx, ε_yy, 2ε_xy) of a triangle from nodal displacements.
-    #[inline(always)]
-    pub fn strain(&self, triangle: usize, u: &[f64]) -> Vector3<f64> {
-        self.triangles[triangle].strain(&self.gather(triangle, u))
+    /// A nodal field of ζ at the nodes of u: at the midpoint of an edge the mean of its ends.
+    pub fn at_nodes(&self, zeta: &[f64]) -> Vec<f64> {
+        let Some(quadratic) = &self.quadratic else { return zeta.to_vec() };
+        let mut values = vec![0.0; self.nodes.points.len()];
+        for (vertices, &[a, b, c, ab, bc, ca]) in self.mesh.triangles.iter().zip(&quadratic.nodes) {
+            let [p, q, r] = vertices.map(|vertex| zeta[vertex]);
+            let mean = |p: f64, q: f64| 0.5 * (p + q);
+            let own =
+                [(a, p), (b, q), (c, r), (ab, mean(p, q)), (bc, mean(q, r)), (ca, mean(r, p))];
+            own.into_iter().for_each(|(node, value)| values[node] = value);
+        }
+        values
     }
 
-    /// ∫ζ/|Ω| of a nodal field. Collective.
-    pub fn mean(&self, field: &[f64]) -> f64 {
-        self.partition.dot(&self.node_area, field, 1) / self.area
+    /// Values at the nodes of u: those at the vertices, and at the midpoint of an edge the value of its
+    /// triangles, which must have the same.
+    pub fn with_midpoints<T: Copy>(&self, mut vertices: Vec<T>, triangles: &[T]) -> Vec<T> {
+        if let Some(quadratic) = &self.quadratic {
+            vertices.resize(self.nodes.points.len(), triangles[0]);
+            for (nodes, value) in quadratic.nodes.iter().zip(triangles) {
+                nodes[3..].iter().for_each(|&node| vertices[node] = *value);
+            }
+        }
+        vertices
+    }
+
+    /// ∫ζ/|Ω| of a nodal field of ζ. Collective.
+    pub fn mean(&self, zeta: &[f64]) -> f64 {
+        let Nodes { weights, partition, area, .. } = &*self.vertices;
+        partition.dot(weights, zeta, 1) / area
+    }
+
+    /// The nodes of u on edges of the undivided mesh, given by their vertices.
+    pub fn edges(&self, edges: &[[usize; 2]]) -> Vec<Edge> {
+        let middle = |ends| self.quadratic.as_ref().map(|q| q.middle[&sorted(ends)]);
+        edges.iter().map(|&ends| Edge { ends, middle: middle(ends) }).collect()
     }
 }
 
-/// ∫ λ_i over `triangles`, m²: a third of each triangle around a node.
-fn node_area(mesh: &Mesh, triangles: &[Triangle]) -> Vec<f64> {
-    let mut area = vec![0.0; mesh.nodes.len()];
-    for (nodes, triangle) in mesh.triangles.iter().zip(triangles) {
-        nodes.iter().for_each(|&node| area[node] += triangle.area / 3.0);
+impl QuadraticElements {
+    /// The coordinates of the nodes (vertices, then midpoints, numbered as the triangles first meet
+    /// their edges) and the elements.
+    fn new(mesh: &Mesh) -> (Vec<[f64; 2]>, Self) {
+        let mut points = mesh.nodes.clone();
+        let mut middle = HashMap::with_capacity(3 * mesh.triangles.len() / 2);
+        let nodes: Vec<[usize; 6]> = (mesh.triangles.iter())
+            .map(|&[a, b, c]| {
+                let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|edge| {
+                    *middle.entry(sorted(edge)).or_insert_with(|| {
+                        points.push(mesh.midpoint(edge));
+                        points.len() - 1
+                    })
+                });
+                [a, b, c, ab, bc, ca]
+            })
+            .collect();
+        let elements = nodes.iter().map(|n| Quadratic::new(n.map(|i| points[i]))).collect();
+        (points, Self { nodes, elements, middle })
     }
-    area
+
+    /// ∫ φ_i of each of `count` nodes, m².
+    fn weights(&self, count: usize) -> Vec<f64> {
+        let values = POINTS.map(quadratic_values);
+        let mut weights = vec![0.0; count];
+        for (nodes, element) in self.nodes.iter().zip(&self.elements) {
+            for (point, values) in element.points.iter().zip(&values) {
+                for (node, value) in nodes.iter().zip(values) {
+                    weights[*node] += point.weight * value;
+                }
+            }
+        }
+        weights
+    }
+}
+
+/// The values of an affine function at the quadrature points [`POINTS`], from those at the vertices.
+pub(super) fn at_quadratic_points(vertices: [f64; 3]) -> [f64; 3] {
+    let sum = vertices.iter().sum::<f64>();
+    vertices.map(|value| sum / 6.0 + 0.5 * value)
+}
+
+/// An edge by its nodes in increasing order.
+pub(super) fn sorted([a, b]: [usize; 2]) -> [usize; 2] {
+    [a.min(b), a.max(b)]
+}
+
+/// ∫ λ_i over `triangles`, m²: a third of each triangle around a vertex.
+fn linear_weights(mesh: &Mesh, triangles: &[Triangle]) -> Vec<f64> {
+    let mut weights = vec![0.0; mesh.nodes.len()];
+    for (nodes, triangle) in mesh.triangles.iter().zip(triangles) {
+        nodes.iter().for_each(|&node| weights[node] += triangle.area() / 3.0);
+    }
+    weights
 }

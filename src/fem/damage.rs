@@ -1,8 +1,9 @@
 //! The damage system (28): (M + kκL) ζ_n = M ζ_{n−1} + k b(φ).
 
-use super::{Body, Triangle};
+use super::{Body, Triangle, body::at_quadratic_points, element::POINTS};
 use crate::{
     cholesky::{LinearSolver, LinearSystem, Precision},
+    mesh::Order,
     model::DamageLaw,
     petsc::{Matrix, PetscError, Session, Vector},
 };
@@ -24,25 +25,51 @@ impl Mass {
     fn of(self, triangle: &Triangle) -> Matrix3<f64> {
         match self {
             Self::Consistent => triangle.mass(),
-            Self::Lumped => Matrix3::from_diagonal_element(triangle.area / 3.0),
+            Self::Lumped => Matrix3::from_diagonal_element(triangle.area() / 3.0),
         }
     }
 }
 
-/// The damage source φ of (25) at the vertices of each triangle, from nodal ζ and the
-/// triangle's |ε|², 1/s.
+/// The damage source φ of (25) at three points of each triangle, 1/s: for P1 displacements at the
+/// vertices, from nodal ζ and the triangle's |ε|²; for P2 at the quadrature points, from ζ and |ε|²
+/// there. `strain_squared` is that of [`Elasticity::strain_squared`](super::Elasticity).
 pub fn source(body: &Body, law: &DamageLaw, strain_squared: &[f64], zeta: &[f64]) -> Vec<[f64; 3]> {
-    let at_vertices =
-        |(nodes, e2): (&[usize; 3], &f64)| nodes.map(|node| law.source(*e2, zeta[node]));
-    body.mesh.triangles.iter().zip(strain_squared).map(at_vertices).collect()
+    match body.order() {
+        Order::Linear => source_at(body, law, strain_squared.iter().map(|&e2| [e2; 3]), zeta),
+        Order::Quadratic => {
+            source_at(body, law, strain_squared.as_chunks().0.iter().copied(), zeta)
+        }
+    }
 }
 
-/// The load b_i = ∫ φ λ_i, m²/s, of a source φ given at the vertices of each triangle and affine
-/// between them.
+/// [`source`] from |ε|² at its three points of each triangle.
+pub fn source_at(
+    body: &Body,
+    law: &DamageLaw,
+    strain_squared: impl Iterator<Item = [f64; 3]>,
+    zeta: &[f64],
+) -> Vec<[f64; 3]> {
+    let quadratic = body.order() == Order::Quadratic;
+    let triangles = body.mesh.triangles.iter().zip(strain_squared);
+    let source = |(nodes, e2): (&[usize; 3], [f64; 3])| {
+        let vertices = nodes.map(|node| zeta[node]);
+        let zeta = if quadratic { at_quadratic_points(vertices) } else { vertices };
+        [0, 1, 2].map(|q| law.source(e2[q], zeta[q]))
+    };
+    triangles.map(source).collect()
+}
+
+/// The load b_i = ∫ φ λ_i, m²/s, of a source φ as [`source`] gives it: for P1 affine between the
+/// vertices, for P2 by the quadrature points.
 pub fn source_load(body: &Body, mass: Mass, source: &[[f64; 3]]) -> Vec<f64> {
     let mut load = vec![0.0; body.mesh.nodes.len()];
+    let values = Matrix3::from(POINTS) / 3.0;
     for ((nodes, triangle), phi) in body.mesh.triangles.iter().zip(&body.triangles).zip(source) {
-        let b = mass.of(triangle) * Vector3::from(*phi);
+        let weights = match body.order() {
+            Order::Linear => mass.of(triangle),
+            Order::Quadratic => values * triangle.area(),
+        };
+        let b = weights * Vector3::from(*phi);
         for (node, b) in nodes.iter().zip(b.iter()) {
             load[*node] += b;
         }
@@ -79,15 +106,15 @@ impl DamageCertificate {
         let residual = residual(body, mass, step * diffusion, [before, after]);
         let (mut squares, mut weighted, mut rhs) = (0.0, 0.0, 0.0);
         let mut least = f64::INFINITY;
-        for i in 0..body.partition.owned() {
-            let (area, b) = (body.node_area[i], step * load[i]);
+        for i in 0..body.vertices.partition.owned() {
+            let (area, b) = (body.vertices.weights[i], step * load[i]);
             let r = residual[i] - b;
             squares += r * r;
             weighted += r * r / area;
             rhs += (area * before[i] + b).powi(2);
             least = area.min(least);
         }
-        let comm = body.partition.comm();
+        let comm = body.vertices.partition.comm();
         let mut sums = [squares, weighted, rhs];
         comm.sum(&mut sums);
         let [squares, weighted, rhs] = sums;
@@ -110,14 +137,14 @@ fn residual(body: &Body, mass: Mass, spread: f64, [before, after]: [&[f64]; 2]) 
         let change: [f64; 3] = std::array::from_fn(|i| zeta[i] - before[nodes[i]]);
         // (Mv)_i is |T|/12 (Σ_j v_j + v_i) for the consistent mass and |T|/3 v_i for the lumped.
         let (sum, own) = match mass {
-            Mass::Consistent => (change[0] + change[1] + change[2], triangle.area / 12.0),
-            Mass::Lumped => (0.0, triangle.area / 3.0),
+            Mass::Consistent => (change[0] + change[1] + change[2], triangle.area() / 12.0),
+            Mass::Lumped => (0.0, triangle.area() / 3.0),
         };
         let flux = [0, 1].map(|axis| {
-            let slope = |i: usize| zeta[i] * triangle.gradients[i][axis];
-            spread * triangle.area * (slope(0) + slope(1) + slope(2))
+            let slope = |i: usize| zeta[i] * triangle.gradients()[i][axis];
+            spread * triangle.area() * (slope(0) + slope(1) + slope(2))
         });
-        for ((node, change), [dx, dy]) in nodes.iter().zip(change).zip(triangle.gradients) {
+        for ((node, change), [dx, dy]) in nodes.iter().zip(change).zip(triangle.gradients()) {
             residual[*node] += own * (sum + change) + dx * flux[0] + dy * flux[1];
         }
     }
@@ -150,7 +177,7 @@ impl DamageSystem {
         diffusion: f64,
         step: f64,
     ) -> Result<Self, PetscError> {
-        let owned = body.partition.owned();
+        let owned = body.vertices.partition.owned();
         let (mut rows, mut columns) = (Vec::new(), Vec::new());
         let (mut mass_values, mut laplace_values) = (Vec::new(), Vec::new());
         let mut diagonal = vec![0.0; body.mesh.nodes.len()];
@@ -159,8 +186,8 @@ impl DamageSystem {
             for i in 0..3 {
                 diagonal[nodes[i]] += laplace[(i, i)];
                 for j in 0..3 {
-                    rows.push(body.partition.row(nodes[i], 1, 0));
-                    columns.push(body.partition.global(nodes[j], 1, 0));
+                    rows.push(body.vertices.partition.row(nodes[i], 1, 0));
+                    columns.push(body.vertices.partition.global(nodes[j], 1, 0));
                     mass_values.push(mass[(i, j)]);
                     laplace_values.push(laplace[(i, j)]);
                 }
@@ -183,7 +210,7 @@ impl DamageSystem {
             unknown: Vector::zeros(session, owned)?,
             diffusion,
             step,
-            laplace_size: body.partition.norm(&diagonal, 1),
+            laplace_size: body.vertices.partition.norm(&diagonal, 1),
         };
         system.set_step(step)?;
         Ok(system)

@@ -1,7 +1,7 @@
 //! The damaged elastic operator (ζ Aε(u), ε(v)) of (26), matrix-free, for the residuals that
 //! judge solvers.
 
-use super::Body;
+use super::{Body, for_elements};
 use crate::model::Material;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
@@ -20,50 +20,74 @@ impl Elasticity {
         Self { d: material.stiffness(), material }
     }
 
-    /// |ε|² = Σ ε_ij² on each triangle (the shear counts twice) from nodal u.
+    /// |ε|² = Σ ε_ij² (the shear counts twice) of nodal u at the quadrature points of the elements.
     pub fn strain_squared(&self, body: &Body, u: &[f64]) -> Vec<f64> {
         let squared = |e: Vector3<f64>| e[0] * e[0] + e[1] * e[1] + 0.5 * e[2] * e[2];
-        (0..body.triangles.len()).map(|t| squared(body.strain(t, u))).collect()
+        for_elements!(body, cells => cells.strains(u).map(squared).collect())
     }
 
-    /// σ = ζ̄ Aε(u), Pa, on triangle `t` with its mean damage `zeta` = ζ̄.
-    pub fn stress(&self, body: &Body, t: usize, zeta: f64, u: &[f64]) -> Vector3<f64> {
-        self.d * body.strain(t, u) * zeta
+    /// σ = ζ Aε(u), Pa, the mean over the quadrature points of each triangle, with `zeta` the values of
+    /// ζ at these points.
+    pub fn stresses(&self, body: &Body, zeta: &[f64], u: &[f64]) -> Vec<Vector3<f64>> {
+        for_elements!(body, cells => {
+            let points = cells.elements[0].points.len();
+            let stresses: Vec<_> =
+                cells.strains(u).zip(zeta).map(|(strain, zeta)| self.d * strain * *zeta).collect();
+            let mean = |of: &[Vector3<f64>]| of.iter().sum::<Vector3<f64>>() / points as f64;
+            stresses.chunks(points).map(mean).collect()
+        })
     }
 
-    /// The internal forces F_i = ∫ ζ̄ Aε(u) : ε(φ_i) of nodal u, N per metre of thickness, with the
-    /// mean damage ζ̄ of each triangle.
+    /// The strain energies (twice) w ζ Aε(u) : ε(u) at the quadrature points, N m per metre of thickness.
+    pub fn energies(&self, body: &Body, zeta: &[f64], u: &[f64]) -> Vec<f64> {
+        for_elements!(body, cells => {
+            let points = cells.elements.iter().flat_map(|element| &element.points);
+            let strains = cells.strains(u).zip(points).zip(zeta);
+            strains.map(|((e, point), zeta)| point.weight * zeta * e.dot(&(self.d * e))).collect()
+        })
+    }
+
+    /// The internal forces F_i = ∫ ζ Aε(u) : ε(φ_i) of nodal u, N per metre of thickness, with
+    /// `zeta` the values of ζ at the quadrature points ([`Body::at_points`]).
     pub fn internal_force(&self, body: &Body, zeta: &[f64], u: &[f64]) -> Vec<f64> {
-        let mut force = vec![0.0; u.len()];
-        let triangles = body.mesh.triangles.iter().zip(&body.triangles).zip(zeta);
-        for (t, ((nodes, triangle), zeta)) in triangles.enumerate() {
-            let strain = triangle.strain(&body.gather(t, u));
-            let f = triangle.force(&(self.d * strain * *zeta));
-            for (i, node) in nodes.iter().enumerate() {
-                force[2 * node] += f[2 * i];
-                force[2 * node + 1] += f[2 * i + 1];
+        for_elements!(body, cells => {
+            let mut force = vec![0.0; u.len()];
+            let mut zeta = zeta.iter();
+            for (t, (nodes, element)) in cells.nodes.iter().zip(cells.elements).enumerate() {
+                let local = cells.gather(t, u);
+                for (point, zeta) in element.points.iter().zip(&mut zeta) {
+                    let stress = self.d * point.strain(&local) * *zeta;
+                    for (node, [fx, fy]) in nodes.iter().zip(point.force(&stress)) {
+                        force[2 * node] += fx;
+                        force[2 * node + 1] += fy;
+                    }
+                }
             }
-        }
-        force
+            force
+        })
     }
 
     /// The rounding error that double precision leaves in the internal forces of u: at each node
-    /// ε_machine Σ ζ̄ |K_T||u| over its triangles T, N per metre of thickness (Oettli and Prager,
-    /// Numer. Math. 6, 1964).
+    /// ε_machine Σ ζ |K_T||u| over the quadrature points of its triangles T, N per metre of thickness
+    /// (Oettli and Prager, Numer. Math. 6, 1964).
     pub fn force_rounding(&self, body: &Body, zeta: &[f64], u: &[f64]) -> Vec<f64> {
-        let mut rounding = vec![0.0; u.len()];
-        for (t, nodes) in body.mesh.triangles.iter().enumerate() {
-            let local = body.gather(t, u);
-            let unit = f64::EPSILON * zeta[t].abs();
-            for i in 0..3 {
-                for j in 0..3 {
-                    let k = body.triangles[t].stiffness(&self.d, i, j).abs();
-                    let force = k * Vector2::new(local[2 * j].abs(), local[2 * j + 1].abs());
-                    rounding[2 * nodes[i]] += unit * force[0];
-                    rounding[2 * nodes[i] + 1] += unit * force[1];
+        for_elements!(body, cells => {
+            let mut rounding = vec![0.0; u.len()];
+            let mut zeta = zeta.iter();
+            for (t, (nodes, element)) in cells.nodes.iter().zip(cells.elements).enumerate() {
+                let local = cells.gather(t, u).map(|[x, y]| Vector2::new(x.abs(), y.abs()));
+                for (point, zeta) in element.points.iter().zip(&mut zeta) {
+                    let unit = f64::EPSILON * zeta.abs();
+                    for (i, &node) in nodes.iter().enumerate() {
+                        for (j, u) in local.iter().enumerate() {
+                            let force = point.stiffness(&self.d, i, j).abs() * u;
+                            rounding[2 * node] += unit * force[0];
+                            rounding[2 * node + 1] += unit * force[1];
+                        }
+                    }
                 }
             }
-        }
-        rounding
+            rounding
+        })
     }
 }

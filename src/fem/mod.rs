@@ -1,9 +1,13 @@
-//! Continuous piecewise affine finite elements (22), (23): from laws to matrices and vectors.
+//! Continuous finite elements (22), (23), P1 for ζ and P1 or P2 for u: from laws to matrices and
+//! vectors.
 //!
 //! Fields are plain slices over the nodes of this rank's subdomain, owned ones first, then ghosts:
-//! one value per node (ζ) or two in turn (u_x, u_y). [`Partition`] alone knows which are owned.
+//! one value per vertex (ζ) or two in turn per node (u_x, u_y). [`Partition`] alone knows which are
+//! owned.
 
+mod element;
 mod triangle;
+mod edge;
 mod partition;
 mod body;
 mod subdomain;
@@ -15,12 +19,16 @@ mod rigid_part;
 mod damage;
 mod loads;
 
-pub use body::Body;
-pub use damage::{DamageCertificate, DamageSystem, Mass, source, source_load};
+pub(crate) use body::for_elements;
+pub use body::{Body, Cells, Elements, Nodes};
+pub use damage::{DamageCertificate, DamageSystem, Mass, source, source_at, source_load};
+pub use edge::{Edge, gauss_points};
 pub use elasticity::Elasticity;
-pub use loads::{add_body_force, add_traction, gauss_points, midpoint};
+pub use element::{Element, QuadraturePoint};
+pub use loads::{add_body_force, add_traction, midpoint};
 pub use nodal_bases::NodalBases;
 pub use partition::Partition;
+pub use recovery::{EnergyError, RecoveredStrains};
 pub use rigid_part::RigidPart;
 pub use stiffness::Stiffness;
 pub use subdomain::Subdomain;

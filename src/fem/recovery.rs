@@ -1,52 +1,262 @@
-//! How well a mesh resolves an answer.
+//! Recovered strains: how well a mesh resolves displacements.
 
-use super::{Body, Elasticity};
+use super::{
+    Body, Cells, Elasticity, Triangle,
+    body::for_elements,
+    element::{POINTS, quadratic_values},
+};
 use crate::petsc::PetscError;
-use nalgebra::Vector3;
+use nalgebra::{Matrix6, Matrix6x3, Vector3, Vector6};
 
-impl Elasticity {
-    /// An estimate of the error of u in the energy norm, relative to the energy norm of u:
-    /// (∫ ζ̄ A(ε* − ε(u)) : (ε* − ε(u)) / ∫ ζ̄ Aε(u) : ε(u))^½, with ε* the recovered strain.
-    ///
-    /// ε* is affine on each triangle; at a node it is the mean of ε(u) on the triangles around it,
-    /// weighted by ζ̄ |T| (Zienkiewicz and Zhu, Int. J. Numer. Meth. Eng. 24, 1987, who recover
-    /// stresses; these jump with ζ̄).
+/// An estimate of the error of u in the energy norm, ‖v‖² = ∫ ζ Aε(v) : ε(v).
+#[derive(Debug, Clone)]
+pub struct EnergyError {
+    /// ‖ε* − ε(u)‖² on each triangle that belongs to this rank, N m per metre of thickness.
+    pub squares: Vec<f64>,
+    /// Its sum and ‖u‖², over the undivided body.
+    pub error: f64,
+    /// See `error`.
+    pub energy: f64,
+}
+
+/// A vertex's fit is from its own triangles if there are so many; else from its neighbours' fits.
+const ENOUGH: usize = 4;
+/// Multiples of the trace of the normal matrix on its diagonal: they decide where a fit is not unique.
+const REGULARISATION: f64 = 1e-13;
+
+/// A strain (ε_xx, ε_yy, 2ε_xy) as a polynomial in (x, y) − x_v about a vertex: the coefficients of
+/// 1, x, y, x², xy, y² (rows).
+type Fit = Matrix6x3<f64>;
+
+impl EnergyError {
+    /// Relative to the energy norm of u.
+    pub fn relative(&self) -> f64 {
+        if self.error == 0.0 { 0.0 } else { (self.error / self.energy).sqrt() }
+    }
+}
+
+/// Strains recovered from nodal u (Zienkiewicz and Zhu, Int. J. Numer. Meth. Eng. 33, 1992:
+/// superconvergent patch recovery).
+///
+/// Around each vertex, ε(u) at the quadrature points of its triangles is fitted by a polynomial of
+/// the degree of u; ε* is the interpolant of the order of u of these fits, at the midpoint of an
+/// edge their mean. A vertex of few triangles, at a boundary, has the mean of its neighbours' fits.
+pub struct RecoveredStrains<'a> {
+    body: &'a Body,
+    /// ε(u) at the quadrature points, so many in a triangle.
+    strains: Vec<Vector3<f64>>,
+    per_triangle: usize,
+    fits: Vec<Fit>,
+}
+
+impl<'a> RecoveredStrains<'a> {
+    /// From nodal u. Collective.
     ///
     /// # Errors
     /// PETSc failed.
-    pub fn energy_error(&self, body: &Body, zeta: &[f64], u: &[f64]) -> Result<f64, PetscError> {
-        let strains: Vec<_> = (0..body.triangles.len()).map(|t| body.strain(t, u)).collect();
-        let weight = |t: usize| zeta[t] * body.triangles[t].area;
-        // Per node: Σ weight·strain (3 entries), then Σ weight.
-        let mut sums = vec![[0.0; 4]; body.mesh.nodes.len()];
-        for (t, nodes) in body.mesh.triangles.iter().enumerate() {
-            for &node in nodes {
-                let [x, y, xy, total] = &mut sums[node];
-                *x += weight(t) * strains[t][0];
-                *y += weight(t) * strains[t][1];
-                *xy += weight(t) * strains[t][2];
-                *total += weight(t);
+    pub fn new(body: &'a Body, u: &[f64]) -> Result<Self, PetscError> {
+        let (strains, samples) = for_elements!(body, cells => {
+            (cells.strains(u).collect::<Vec<_>>(), sample_points(body, &cells))
+        });
+        let per_triangle = strains.len() / body.triangles.len();
+        let fits = fits(body, &strains, &samples, per_triangle)?;
+        Ok(Self { body, strains, per_triangle, fits })
+    }
+
+    /// An estimate of the error of u in the energy norm, with `zeta` the values of ζ at the quadrature
+    /// points. Collective.
+    pub fn energy_error(&self, elasticity: &Elasticity, zeta: &[f64], u: &[f64]) -> EnergyError {
+        let Self { body, per_triangle, .. } = *self;
+        let product = |v: &Vector3<f64>, w: &Vector3<f64>| v.dot(&(elasticity.d * w));
+        let square = |(t, triangle): (usize, &Triangle)| {
+            let own = per_triangle * t..per_triangle * (t + 1);
+            let mean = zeta[own].iter().sum::<f64>() / per_triangle as f64;
+            mean * triangle.area() * mean_square(&self.difference(t), product)
+        };
+        let own = body.triangles.iter().enumerate().take(body.own_triangles);
+        let squares: Vec<f64> = own.map(square).collect();
+        let points = per_triangle * body.own_triangles;
+        let energy: f64 = elasticity.energies(body, zeta, u).iter().take(points).sum();
+        let mut sums = [squares.iter().sum(), energy];
+        body.nodes.partition.comm().sum(&mut sums);
+        EnergyError { squares, error: sums[0], energy: sums[1] }
+    }
+
+    /// |ε*|² at the three points of each triangle where the damage source is taken
+    /// ([`source`](super::source)).
+    pub fn squared(&self) -> Vec<[f64; 3]> {
+        let squared = |e: Vector3<f64>| e[0] * e[0] + e[1] * e[1] + 0.5 * e[2] * e[2];
+        let values = POINTS.map(quadratic_values);
+        let at_points = |t: usize| {
+            let difference = self.difference(t);
+            let strains = &self.strains[self.per_triangle * t..self.per_triangle * (t + 1)];
+            [0, 1, 2].map(|q| match strains {
+                [strain] => squared(strain + difference[q]),
+                _ => {
+                    let terms = difference.iter().zip(&values[q]).map(|(d, value)| d * *value);
+                    squared(strains[q] + terms.sum::<Vector3<f64>>())
+                }
+            })
+        };
+        (0..self.body.triangles.len()).map(at_points).collect()
+    }
+
+    /// ε* − ε(u) on triangle `t`, at the vertices and the midpoints of the sides 01, 12, 20. (Between
+    /// the quadrature points ε(u) is affine, but for curved triangles.)
+    fn difference(&self, t: usize) -> [Vector3<f64>; 6] {
+        let (body, triangle) = (self.body, self.body.mesh.triangles[t]);
+        let strains = &self.strains[self.per_triangle * t..self.per_triangle * (t + 1)];
+        let sum = strains.iter().sum::<Vector3<f64>>();
+        // An affine f with the values f(x_q) = Σf/6 + f_q/2 at the points has f_q = 2 f(x_q) − Σf/3.
+        let computed = |i: usize| match strains {
+            [strain] => *strain,
+            _ => 2.0 * strains[i] - sum / 3.0,
+        };
+        let at = |i: usize| body.mesh.nodes[triangle[i]];
+        let recovered = |i: usize, [x, y]: [f64; 2]| {
+            let [vx, vy] = at(i);
+            self.fits[triangle[i]].transpose() * monomials([x - vx, y - vy])
+        };
+        let vertex = |i: usize| recovered(i, at(i)) - computed(i);
+        let middle = |i: usize, j: usize| {
+            if let [_] = strains {
+                return 0.5 * (vertex(i) + vertex(j));
+            }
+            let x = [0, 1].map(|k| 0.5 * (at(i)[k] + at(j)[k]));
+            0.5 * (recovered(i, x) + recovered(j, x) - computed(i) - computed(j))
+        };
+        [vertex(0), vertex(1), vertex(2), middle(0, 1), middle(1, 2), middle(2, 0)]
+    }
+}
+
+/// The quadrature points, m, triangle by triangle.
+fn sample_points<const N: usize, const Q: usize>(
+    body: &Body,
+    cells: &Cells<N, Q>,
+) -> Vec<[f64; 2]> {
+    let points = &body.nodes.points;
+    let values: Vec<Vec<f64>> = match Q {
+        1 => vec![vec![1.0 / 3.0; 3]],
+        _ => POINTS.map(|point| quadratic_values(point).to_vec()).to_vec(),
+    };
+    let place = |nodes: &[usize; N], values: &Vec<f64>| {
+        [0, 1].map(|k| nodes.iter().zip(values).map(|(&i, value)| value * points[i][k]).sum())
+    };
+    cells.nodes.iter().flat_map(|nodes| values.iter().map(move |v| place(nodes, v))).collect()
+}
+
+/// The fit of each vertex.
+fn fits(
+    body: &Body,
+    strains: &[Vector3<f64>],
+    samples: &[[f64; 2]],
+    per_triangle: usize,
+) -> Result<Vec<Fit>, PetscError> {
+    let (vertices, nodes) = (&body.mesh.nodes, body.mesh.nodes.len());
+    let mut around = vec![Vec::new(); nodes];
+    for (t, triangle) in body.mesh.triangles.iter().enumerate() {
+        triangle.iter().for_each(|&vertex| around[vertex].push(t));
+    }
+    let partition = &body.vertices.partition;
+    let own_fit = |vertex: usize| {
+        let own = around[vertex].iter().flat_map(|t| per_triangle * t..per_triangle * (t + 1));
+        fit(vertices[vertex], own.map(|q| (samples[q], strains[q])), per_triangle > 1)
+    };
+    // Each vertex's fit (18 entries), and 1 where it has one.
+    let mut fields = vec![[0.0; 19]; nodes];
+    let known = |fit: Fit| std::array::from_fn(|i| fit.as_slice().get(i).copied().unwrap_or(1.0));
+    for vertex in (0..partition.owned()).filter(|&vertex| around[vertex].len() >= ENOUGH) {
+        fields[vertex] = known(own_fit(vertex));
+    }
+    partition.update(fields.as_flattened_mut(), 19)?;
+    // The others have the mean of their neighbours' fits, layer by layer.
+    loop {
+        let before = fields.clone();
+        let mut added = false;
+        for vertex in (0..partition.owned()).filter(|&vertex| before[vertex][18] == 0.0) {
+            let neighbours = around[vertex].iter().flat_map(|&t| body.mesh.triangles[t]);
+            let fits = neighbours.filter(|&other| before[other][18] > 0.0).map(|other| {
+                let fit = Fit::from_column_slice(&before[other][..18]);
+                moved(&fit, vertices[other], vertices[vertex])
+            });
+            let (count, sum) = fits.fold((0.0, Fit::zeros()), |(n, sum), fit| (n + 1.0, sum + fit));
+            if count > 0.0 {
+                fields[vertex] = known(sum / count);
+                added = true;
             }
         }
-        body.partition.update(sums.as_flattened_mut(), 4)?;
-        let recovered = |node: usize| {
-            let [x, y, xy, total] = sums[node];
-            Vector3::new(x, y, xy) / total
-        };
-        let (mut error, mut energy) = (0.0, 0.0);
-        for (t, nodes) in body.mesh.triangles[..body.own_triangles].iter().enumerate() {
-            let differences = nodes.map(|node| recovered(node) - strains[t]);
-            let sum = differences.iter().sum::<Vector3<f64>>();
-            // ∫ Av : v of an affine v with the values v_i at the vertices is
-            // (Σ Av_i : v_i + A(Σ v_i) : (Σ v_i)) |T| / 12.
-            let squared = |v: &Vector3<f64>| v.dot(&(self.d * v));
-            let squares = differences.iter().map(squared).sum::<f64>();
-            error += weight(t) / 12.0 * (squares + squared(&sum));
-            energy += weight(t) * squared(&strains[t]);
+        if !partition.comm().any(added) {
+            break;
         }
-        let mut sums = [error, energy];
-        body.partition.comm().sum(&mut sums);
-        let [error, energy] = sums;
-        Ok(if error == 0.0 { 0.0 } else { (error / energy).sqrt() })
+        partition.update(fields.as_flattened_mut(), 19)?;
     }
+    // Pieces that have no vertex of enough triangles, strips for instance, are left.
+    for (vertex, field) in fields.iter_mut().enumerate().take(partition.owned()) {
+        if field[18] == 0.0 {
+            *field = known(own_fit(vertex));
+        }
+    }
+    partition.update(fields.as_flattened_mut(), 19)?;
+    Ok(fields.iter().map(|field| Fit::from_column_slice(&field[..18])).collect())
+}
+
+/// The polynomial about `centre` nearest to the strains at some points, in least squares.
+fn fit(
+    centre: [f64; 2],
+    samples: impl Iterator<Item = ([f64; 2], Vector3<f64>)> + Clone,
+    quadratic: bool,
+) -> Fit {
+    let offset = |x: [f64; 2]| [x[0] - centre[0], x[1] - centre[1]];
+    let size = samples.clone().map(|(x, _)| offset(x)).map(|[x, y]| x.hypot(y)).fold(0.0, f64::max);
+    let (mut normal, mut rhs) = (Matrix6::zeros(), Fit::zeros());
+    for (x, strain) in samples {
+        let mut row = monomials(offset(x).map(|x| x / size));
+        if !quadratic {
+            row.fixed_rows_mut::<3>(3).fill(0.0);
+        }
+        normal.ger(1.0, &row, &row, 1.0);
+        rhs.ger(1.0, &row, &strain, 1.0);
+    }
+    let trace = normal.trace();
+    (0..6).for_each(|i| normal[(i, i)] += REGULARISATION * trace);
+    let Some(factor) = normal.cholesky() else { return Fit::zeros() };
+    let mut fit = factor.solve(&rhs);
+    for (row, degree) in [0, 1, 1, 2, 2, 2].into_iter().enumerate() {
+        fit.row_mut(row).scale_mut(size.powi(-degree));
+    }
+    fit
+}
+
+/// 1, x, y, x², xy, y².
+fn monomials([x, y]: [f64; 2]) -> Vector6<f64> {
+    Vector6::new(1.0, x, y, x * x, x * y, y * y)
+}
+
+/// A fit about `from` as a polynomial about `to`.
+fn moved(fit: &Fit, from: [f64; 2], to: [f64; 2]) -> Fit {
+    let [x, y] = [to[0] - from[0], to[1] - from[1]];
+    let mut moved = *fit;
+    moved.set_row(0, &(monomials([x, y]).transpose() * fit));
+    moved.set_row(1, &(fit.row(1) + 2.0 * x * fit.row(3) + y * fit.row(4)));
+    moved.set_row(2, &(fit.row(2) + x * fit.row(4) + 2.0 * y * fit.row(5)));
+    moved
+}
+
+/// ∫ v : v / |T| of a quadratic v on a triangle, from its values at vertices and midpoints.
+fn mean_square(
+    v: &[Vector3<f64>; 6],
+    product: impl Fn(&Vector3<f64>, &Vector3<f64>) -> f64,
+) -> f64 {
+    /// ∫ φ_i φ_j / |T| of P2, times 180.
+    const MASS: [[f64; 6]; 6] = [
+        [6.0, -1.0, -1.0, 0.0, -4.0, 0.0],
+        [-1.0, 6.0, -1.0, 0.0, 0.0, -4.0],
+        [-1.0, -1.0, 6.0, -4.0, 0.0, 0.0],
+        [0.0, 0.0, -4.0, 32.0, 16.0, 16.0],
+        [-4.0, 0.0, 0.0, 16.0, 32.0, 16.0],
+        [0.0, -4.0, 0.0, 16.0, 16.0, 32.0],
+    ];
+    let rows = MASS.iter().zip(v).flat_map(|(row, v)| row.iter().zip([v; 6]));
+    let pairs = rows.zip(v.iter().cycle());
+    pairs.map(|((mass, v), w)| mass / 180.0 * product(v, w)).sum()
 }

@@ -16,13 +16,13 @@ impl RigidPart {
     pub fn of(body: &Body, u: &[f64]) -> Self {
         let [cx, cy] = body.centroid;
         let mut sums = [0.0; 3];
-        let nodes = body.mesh.nodes.iter().zip(&body.node_area).zip(u.as_chunks::<2>().0);
-        for ((&[x, y], area), &[ux, uy]) in nodes.take(body.partition.owned()) {
+        let nodes = body.nodes.points.iter().zip(&body.nodes.weights).zip(u.as_chunks::<2>().0);
+        for ((&[x, y], area), &[ux, uy]) in nodes.take(body.nodes.partition.owned()) {
             sums[0] += area * ux;
             sums[1] += area * uy;
             sums[2] += area * ((x - cx) * uy - (y - cy) * ux);
         }
-        body.partition.comm().sum(&mut sums);
+        body.nodes.partition.comm().sum(&mut sums);
         let translation = [sums[0] / body.area, sums[1] / body.area];
         Self { translation, rotation: sums[2] / body.polar_inertia, centre: body.centroid }
     }
@@ -36,12 +36,12 @@ impl RigidPart {
     /// The largest nodal |·| of the motion and of u less the motion, m. Collective.
     pub fn max_norms(&self, body: &Body, u: &[f64]) -> [f64; 2] {
         let (mut rigid, mut rest) = (0.0_f64, 0.0_f64);
-        let nodes = body.mesh.nodes.iter().zip(u.as_chunks::<2>().0);
-        for (&point, &[ux, uy]) in nodes.take(body.partition.owned()) {
+        let nodes = body.nodes.points.iter().zip(u.as_chunks::<2>().0);
+        for (&point, &[ux, uy]) in nodes.take(body.nodes.partition.owned()) {
             let [x, y] = self.at(point);
             rigid = rigid.max(x * x + y * y);
             rest = rest.max((ux - x) * (ux - x) + (uy - y) * (uy - y));
         }
-        [rigid, rest].map(|square| body.partition.comm().max(square).sqrt())
+        [rigid, rest].map(|square| body.nodes.partition.comm().max(square).sqrt())
     }
 }

@@ -1,14 +1,14 @@
 //! The damaged elastic operator (ζ Aε(u), ε(v)) of (26) as a matrix for solvers.
 
-use super::{Body, Elasticity, NodalBases};
+use super::{Body, Cells, Elasticity, NodalBases, for_elements};
 use crate::petsc::{Matrix, PetscError, Session, Vector};
 use nalgebra::Matrix2;
 
-/// The stiffness matrix K_ij = Σ_T ζ̄_T ∫_T Aε(φ_i) : ε(φ_j) with the mean damage ζ̄_T of each
-/// triangle, in the unknowns of [`NodalBases`]. The pattern is made once, values are refilled.
+/// The stiffness matrix K_ij = Σ_q w_q ζ_q Aε(φ_i) : ε(φ_j) over the quadrature points q of the
+/// elements, in the unknowns of [`NodalBases`]. The pattern is made once, values are refilled.
 ///
 /// K consists of 2×2 blocks, one for each pair of nodes with a common triangle. For every pair the
-/// undamaged contributions of its triangles are kept: a refill reads these once, in order.
+/// undamaged contributions of its points are kept: a refill reads these once, in order.
 pub struct Stiffness {
     /// K, symmetric; rows and columns of fixed unknowns have only a diagonal.
     pub matrix: Matrix,
@@ -16,7 +16,7 @@ pub struct Stiffness {
     pub scale: f64,
     /// For each pair of nodes the end of its contributions, and whether it is one node twice.
     pairs: Vec<(u32, bool)>,
-    /// A triangle and its undamaged block, row by row, N/m.
+    /// A quadrature point and its undamaged block, row by row, N/m.
     contributions: Vec<(u32, [f64; 4])>,
     values: Vec<f64>,
 }
@@ -32,11 +32,11 @@ impl Stiffness {
         elasticity: &Elasticity,
         bases: &NodalBases,
     ) -> Result<Self, PetscError> {
-        let partition = &body.partition;
-        let (corners, pairs) = pairs(body);
-        let contributions: Vec<_> =
-            corners.iter().map(|&at| (at.0, block(body, at, elasticity, bases))).collect();
-        drop(corners);
+        let partition = &body.nodes.partition;
+        let (contributions, pairs) = for_elements!(body, cells => {
+            let (places, pairs) = pairs(&cells, partition.owned());
+            (contributions(&cells, &places, elasticity, bases), pairs)
+        });
 
         let fixed = bases.fixed();
         let (mut rows, mut columns) = (Vec::new(), Vec::new());
@@ -75,11 +75,11 @@ impl Stiffness {
         matrix.set_near_null_space(rigid_motions(session, body, bases)?)?;
         let pairs = pairs.iter().map(|&([a, b], end)| (end, a == b)).collect();
         let mut stiffness = Self { matrix, scale, pairs, contributions, values };
-        stiffness.refill(&vec![1.0; body.triangles.len()])?;
+        stiffness.refill(&body.at_points(&vec![1.0; body.mesh.nodes.len()]))?;
         Ok(stiffness)
     }
 
-    /// Bytes that a refill moves: contributions and pairs, ζ̄ once, the values written, read again
+    /// Bytes that a refill moves: contributions and pairs, ζ once, the values written, read again
     /// with their places (PETSc keeps two numbers of 8 bytes each), and K's own values.
     pub fn refill_traffic(&self) -> f64 {
         let read = 40 * self.contributions.len() + 8 * self.pairs.len();
@@ -91,7 +91,8 @@ impl Stiffness {
         self.matrix
     }
 
-    /// K(ζ) from the mean ζ̄ of each triangle, which is exact: strains are constant there.
+    /// K(ζ) from the values of ζ at the quadrature points, [`Body::at_points`]. (For P1, where strains
+    /// are constant, this is exact.)
     ///
     /// # Errors
     /// PETSc failed.
@@ -126,27 +127,30 @@ fn rigid_motions(
 ) -> Result<Vec<Vector>, PetscError> {
     let motions: [fn([f64; 2]) -> [f64; 2]; 3] = [|_| [1.0, 0.0], |_| [0.0, 1.0], |[x, y]| [-y, x]];
     let vector = |motion: fn([f64; 2]) -> [f64; 2]| {
-        let mut field: Vec<f64> = body.mesh.nodes.iter().flat_map(|&x| motion(x)).collect();
+        let mut field: Vec<f64> = body.nodes.points.iter().flat_map(|&x| motion(x)).collect();
         bases.displacement_to_local(&mut field);
         bases.zero_fixed(&mut field);
-        let mut vector = Vector::zeros(session, 2 * body.partition.owned())?;
-        vector.set(&field[..2 * body.partition.owned()])?;
+        let mut vector = Vector::zeros(session, 2 * body.nodes.partition.owned())?;
+        vector.set(&field[..2 * body.nodes.partition.owned()])?;
         Ok(vector)
     };
     motions.into_iter().map(vector).collect()
 }
 
-/// A triangle and two of its corners.
-type Corners = (u32, u8, u8);
+/// A triangle and two of its nodes.
+type Place = (u32, u8, u8);
 
-/// All pairs of nodes {a ≥ b} with a common triangle, one of them owned, each with the end of its
-/// triangles in the first list.
-fn pairs(body: &Body) -> (Vec<Corners>, Vec<([usize; 2], u32)>) {
-    let mut found: Vec<([u32; 2], Corners)> = Vec::with_capacity(6 * body.triangles.len());
-    for (t, nodes) in body.mesh.triangles.iter().enumerate() {
-        for (i, j) in [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)] {
+/// All pairs of nodes {a ≥ b} with a common triangle, one of them among the first `owned`, each with
+/// the end of its triangles in the first list.
+fn pairs<const N: usize, const Q: usize>(
+    cells: &Cells<N, Q>,
+    owned: usize,
+) -> (Vec<Place>, Vec<([usize; 2], u32)>) {
+    let mut found: Vec<([u32; 2], Place)> = Vec::with_capacity(N * (N + 1) / 2 * cells.nodes.len());
+    for (t, nodes) in cells.nodes.iter().enumerate() {
+        for (i, j) in (0..N).flat_map(|i| (0..=i).map(move |j| (i, j))) {
             let (i, j) = if nodes[i] >= nodes[j] { (i, j) } else { (j, i) };
-            if nodes[j] < body.partition.owned() {
+            if nodes[j] < owned {
                 found.push(([nodes[i] as u32, nodes[j] as u32], (t as u32, i as u8, j as u8)));
             }
         }
@@ -154,24 +158,36 @@ fn pairs(body: &Body) -> (Vec<Corners>, Vec<([usize; 2], u32)>) {
     found.sort_unstable();
     let mut end = 0;
     let pairs = found.chunk_by(|(a, _), (b, _)| a == b).map(|same| {
-        end += same.len() as u32;
+        end += (Q * same.len()) as u32;
         (same[0].0.map(|node| node as usize), end)
     });
     let pairs = pairs.collect();
-    (found.into_iter().map(|(_, corners)| corners).collect(), pairs)
+    (found.into_iter().map(|(_, place)| place).collect(), pairs)
 }
 
-/// The undamaged block of two corners of a triangle in the unknowns of `bases`, row by row:
-/// D_i⁻ᵀ K_ij D_j⁻¹.
-fn block(body: &Body, (t, i, j): Corners, elasticity: &Elasticity, bases: &NodalBases) -> [f64; 4] {
-    let (t, i, j) = (t as usize, usize::from(i), usize::from(j));
-    let mut k: Matrix2<f64> = body.triangles[t].stiffness(&elasticity.d, i, j);
-    let inverse = |corner: usize| bases.inverse(body.mesh.triangles[t][corner]);
-    if let Some(inverse) = inverse(i) {
-        k = inverse.transpose() * k;
+/// The quadrature points of each place with their undamaged blocks, row by row, in the unknowns of
+/// `bases`: D_i⁻ᵀ K_ij D_j⁻¹.
+fn contributions<const N: usize, const Q: usize>(
+    cells: &Cells<N, Q>,
+    places: &[Place],
+    elasticity: &Elasticity,
+    bases: &NodalBases,
+) -> Vec<(u32, [f64; 4])> {
+    let mut contributions = Vec::with_capacity(Q * places.len());
+    for &(t, i, j) in places {
+        let (i, j, nodes) = (usize::from(i), usize::from(j), &cells.nodes[t as usize]);
+        let (left, right) = (bases.inverse(nodes[i]), bases.inverse(nodes[j]));
+        for (q, point) in cells.elements[t as usize].points.iter().enumerate() {
+            let mut k: Matrix2<f64> = point.stiffness(&elasticity.d, i, j);
+            if let Some(inverse) = left {
+                k = inverse.transpose() * k;
+            }
+            if let Some(inverse) = right {
+                k *= inverse;
+            }
+            let block = [k[(0, 0)], k[(0, 1)], k[(1, 0)], k[(1, 1)]];
+            contributions.push((t * Q as u32 + q as u32, block));
+        }
     }
-    if let Some(inverse) = inverse(j) {
-        k *= inverse;
-    }
-    [k[(0, 0)], k[(0, 1)], k[(1, 0)], k[(1, 1)]]
+    contributions
 }

@@ -1,44 +1,114 @@
 //! The part of a body that a rank keeps, after every rank has read the undivided body.
 
-use super::{Body, Partition};
+use super::{Body, Edge, Nodes, Partition, body::QuadraticElements};
 use crate::{
     mesh::{Curve, Mesh},
     petsc::{Ghosts, PetscError, Session, divide},
 };
-use std::collections::HashMap;
+use std::{
+    collections::{BTreeMap, BTreeSet, HashMap},
+    rc::Rc,
+};
 
 /// The nodes and triangles that a rank keeps: the nodes it owns, the triangles around them, and
 /// the other nodes of these as ghosts.
 ///
-/// *Local* indices count these nodes and triangles; all others are indices in the undivided mesh.
+/// *Local* indices count these nodes and triangles; all others are indices in the undivided body.
 /// (PETSc numbers the nodes a third way, see [`Partition`].)
 #[derive(Debug)]
 pub struct Subdomain {
-    /// Index in the undivided mesh of each local node, owned ones first.
-    nodes: Vec<usize>,
-    owned: usize,
-    /// The same of each local triangle; first those that belong to the rank.
+    /// The vertices, nodes of ζ.
+    vertices: LocalNodes,
+    /// The nodes of u, unless they are the vertices.
+    quadratic: Option<LocalNodes>,
+    /// Index in the undivided mesh of each local triangle; first those that belong to the rank.
     triangles: Vec<usize>,
     own_triangles: usize,
+}
+
+/// The nodes of a space that a rank keeps.
+#[derive(Debug)]
+struct LocalNodes {
+    /// Index in the undivided body of each local node, owned ones first.
+    nodes: Vec<usize>,
     /// Local index of each of `nodes`.
     local: HashMap<usize, usize>,
     partition: Partition,
 }
 
+impl LocalNodes {
+    /// Of a space whose nodes belong to the ranks `owner`, the nodes that this rank owns and, as
+    /// ghosts, the others of `kept`. Collective.
+    fn new(session: &Session, owner: &[usize], kept: BTreeSet<usize>) -> Result<Self, PetscError> {
+        let (comm, total) = (session.comm(), owner.len());
+        let mut nodes: Vec<usize> = (0..total).filter(|&i| owner[i] == comm.rank()).collect();
+        let owned = nodes.len();
+        let ghosts = kept.into_iter().filter(|&i| owner[i] != comm.rank());
+        nodes.extend(ghosts);
+        // PETSc numbers the nodes owner by owner: the index of each node among those of its owner,
+        // and the first number of each owner.
+        let mut counts = vec![0; comm.size()];
+        let mut index = vec![0; total];
+        for (index, &owner) in index.iter_mut().zip(owner) {
+            *index = counts[owner];
+            counts[owner] += 1;
+        }
+        let first: Vec<usize> = (0..comm.size()).map(|r| counts[..r].iter().sum()).collect();
+        let petsc = nodes.iter().map(|&i| (first[owner[i]] + index[i]) as i32).collect();
+        let roots: Vec<_> = nodes[owned..].iter().map(|&i| (owner[i], index[i])).collect();
+        let ghosts = Ghosts::new(session, owned, &roots)?;
+        Ok(Self {
+            local: nodes.iter().enumerate().map(|(local, &node)| (node, local)).collect(),
+            partition: Partition::distributed(comm, owned, total, petsc, ghosts),
+            nodes,
+        })
+    }
+
+    fn field<T: Copy>(&self, undivided: &[T], block: usize) -> Vec<T> {
+        self.nodes.iter().flat_map(|&i| &undivided[block * i..block * (i + 1)]).copied().collect()
+    }
+
+    /// The nodes of these triangles in local indices.
+    fn cells<const N: usize>(
+        &self,
+        undivided: &[[usize; N]],
+        triangles: &[usize],
+    ) -> Vec<[usize; N]> {
+        triangles.iter().map(|&t| undivided[t].map(|node| self.local[&node])).collect()
+    }
+
+    /// The edges of a curve that have an end which the rank owns.
+    fn curve(&self, undivided: &Curve) -> Curve {
+        let local = |edge: &[usize; 2]| {
+            let [a, b] = edge.map(|node| self.local.get(&node).copied());
+            Some([a?, b?]).filter(|[a, b]| a.min(b) < &self.partition.owned())
+        };
+        let edges = undivided.edges.iter().filter_map(local).collect();
+        Curve { edges, interior_edges: undivided.interior_edges }
+    }
+
+    /// The nodes as such of the subdomain.
+    fn restrict(self, undivided: &Nodes) -> Rc<Nodes> {
+        Rc::new(Nodes {
+            points: self.field(&undivided.points, 1),
+            weights: self.field(&undivided.weights, 1),
+            area: undivided.area,
+            partition: self.partition,
+        })
+    }
+}
+
 impl Subdomain {
-    /// Divides the nodes of `mesh` among the ranks; `None` if there is only one. Collective.
+    /// Divides the nodes of `body` among the ranks; `None` if there is only one. Collective.
     ///
     /// # Errors
     /// PETSc cannot divide it.
-    pub fn of(session: &Session, mesh: &Mesh) -> Result<Option<Self>, PetscError> {
-        let comm = session.comm();
+    pub fn of(session: &Session, body: &Body) -> Result<Option<Self>, PetscError> {
+        let (comm, mesh) = (session.comm(), &body.mesh);
         if comm.is_serial() {
             return Ok(None);
         }
-        let total = mesh.nodes.len();
-        let owner = divide(session, total, &mesh.triangles)?;
-        let mut nodes: Vec<usize> = (0..total).filter(|&i| owner[i] == comm.rank()).collect();
-        let owned = nodes.len();
+        let mut owner = divide(session, mesh.nodes.len(), &mesh.triangles)?;
         // A triangle belongs to the owner of its first node.
         let around = |t: &usize| mesh.triangles[*t].iter().any(|&i| owner[i] == comm.rank());
         let own = |t: &usize| owner[mesh.triangles[*t][0]] == comm.rank();
@@ -46,81 +116,78 @@ impl Subdomain {
         let own_triangles = triangles.len();
         triangles.extend((0..mesh.triangles.len()).filter(|t| around(t) && !own(t)));
 
-        let corners = triangles.iter().flat_map(|&t| mesh.triangles[t]);
-        let mut ghosts: Vec<usize> = corners.filter(|&i| owner[i] != comm.rank()).collect();
-        ghosts.sort_unstable();
-        ghosts.dedup();
-        nodes.extend(&ghosts);
-
-        // PETSc numbers the nodes owner by owner: the index of each node among those of its owner,
-        // and the first number of each owner.
-        let mut counts = vec![0; comm.size()];
-        let mut index = vec![0; total];
-        for (index, &owner) in index.iter_mut().zip(&owner) {
-            *index = counts[owner];
-            counts[owner] += 1;
-        }
-        let first: Vec<usize> = (0..comm.size()).map(|r| counts[..r].iter().sum()).collect();
-        let petsc = nodes.iter().map(|&i| (first[owner[i]] + index[i]) as i32).collect();
-        let roots: Vec<_> = ghosts.iter().map(|&i| (owner[i], index[i])).collect();
-        let ghosts = Ghosts::new(session, owned, &roots)?;
-        Ok(Some(Self {
-            local: nodes.iter().enumerate().map(|(local, &node)| (node, local)).collect(),
-            partition: Partition::distributed(comm, owned, total, petsc, ghosts),
-            nodes,
-            owned,
-            triangles,
-            own_triangles,
-        }))
+        let kept = triangles.iter().flat_map(|&t| mesh.triangles[t]).collect();
+        let vertices = LocalNodes::new(session, &owner, kept)?;
+        let quadratic = body.quadratic.as_ref().map(|quadratic| {
+            // The middle of an edge belongs to the owner of its first end.
+            owner.resize(body.nodes.points.len(), 0);
+            quadratic.middle.iter().for_each(|(ends, &node)| owner[node] = owner[ends[0]]);
+            let kept = triangles.iter().flat_map(|&t| quadratic.nodes[t]).collect();
+            LocalNodes::new(session, &owner, kept)
+        });
+        Ok(Some(Self { vertices, quadratic: quadratic.transpose()?, triangles, own_triangles }))
     }
 
-    /// The local index of a node, if the rank keeps it.
+    /// The nodes of u.
+    fn nodes(&self) -> &LocalNodes {
+        self.quadratic.as_ref().unwrap_or(&self.vertices)
+    }
+
+    /// The local index of a node of u, if the rank keeps it.
     pub fn local(&self, node: usize) -> Option<usize> {
-        self.local.get(&node).copied()
+        self.nodes().local.get(&node).copied()
     }
 
-    /// The local index of a node, if the rank owns it.
+    /// The local index of a node of u, if the rank owns it.
     pub fn owned(&self, node: usize) -> Option<usize> {
-        self.local(node).filter(|&local| local < self.owned)
+        self.local(node).filter(|&local| local < self.nodes().partition.owned())
     }
 
-    /// The local part of a nodal field of the undivided body with `block` components.
+    /// The local part of a nodal field like u of the undivided body with `block` components.
     pub fn field<T: Copy>(&self, undivided: &[T], block: usize) -> Vec<T> {
-        self.nodes.iter().flat_map(|&i| &undivided[block * i..block * (i + 1)]).copied().collect()
+        self.nodes().field(undivided, block)
     }
 
-    /// The edges that have a node which the rank owns, with local indices.
-    pub fn edges(&self, undivided: &[[usize; 2]]) -> Vec<[usize; 2]> {
-        let local = |&[a, b]: &[usize; 2]| match (self.local(a), self.local(b)) {
-            (Some(a), Some(b)) if a.min(b) < self.owned => Some([a, b]),
-            _ => None,
+    /// The edges that have an end which the rank owns, with local indices.
+    pub fn edges(&self, undivided: &[Edge]) -> Vec<Edge> {
+        let local = |edge: &Edge| {
+            let [a, b] = edge.ends.map(|node| self.local(node));
+            let (ends, owned) = ([a?, b?], self.nodes().partition.owned());
+            let middle = edge.middle.and_then(|node| self.local(node));
+            (ends[0].min(ends[1]) < owned).then_some(Edge { ends, middle })
         };
         undivided.iter().filter_map(local).collect()
     }
 
     /// The local part of the undivided body.
     pub fn body(self, undivided: &Body) -> Body {
-        let mesh = &undivided.mesh;
-        let curve = |curve: &Curve| Curve { edges: self.edges(&curve.edges), ..*curve };
-        let corner = |i: usize| self.local[&i];
-        let curved = mesh.curved.iter().filter_map(|([a, b], &midpoint)| {
-            let (a, b) = (self.local(*a)?, self.local(*b)?);
-            Some(([a.min(b), a.max(b)], midpoint))
+        let Self { vertices, quadratic, triangles, own_triangles } = self;
+        let part = &undivided.mesh;
+        let mesh = Mesh {
+            nodes: vertices.field(&part.nodes, 1),
+            triangles: vertices.cells(&part.triangles, &triangles),
+            curves: part.curves.iter().map(|(n, c)| (n.clone(), vertices.curve(c))).collect(),
+            // The elements know their curvature.
+            curved: BTreeMap::new(),
+        };
+        let elements = undivided.quadratic.as_ref().zip(quadratic.as_ref());
+        let elements = elements.map(|(undivided, nodes)| QuadraticElements {
+            nodes: nodes.cells(&undivided.nodes, &triangles),
+            elements: triangles.iter().map(|&t| undivided.elements[t]).collect(),
+            middle: HashMap::new(),
         });
+        let vertices = vertices.restrict(&undivided.vertices);
         Body {
-            mesh: Mesh {
-                nodes: self.field(&mesh.nodes, 1),
-                triangles: self.triangles.iter().map(|&t| mesh.triangles[t].map(corner)).collect(),
-                curves: mesh.curves.iter().map(|(n, c)| (n.clone(), curve(c))).collect(),
-                curved: curved.collect(),
+            mesh,
+            triangles: triangles.iter().map(|&t| undivided.triangles[t]).collect(),
+            own_triangles,
+            nodes: match quadratic {
+                None => Rc::clone(&vertices),
+                Some(nodes) => nodes.restrict(&undivided.nodes),
             },
-            triangles: self.triangles.iter().map(|&t| undivided.triangles[t]).collect(),
-            own_triangles: self.own_triangles,
-            node_area: self.field(&undivided.node_area, 1),
-            area: undivided.area,
-            centroid: undivided.centroid,
-            polar_inertia: undivided.polar_inertia,
-            partition: self.partition,
+            vertices,
+            quadratic: elements,
+            ..*undivided
         }
     }
 }

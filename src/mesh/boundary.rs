@@ -2,8 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use super::Mesh;
-
 /// Edges whose normals differ by more than this angle (radians) meet in a corner.
 pub const CORNER_ANGLE: f64 = std::f64::consts::PI / 6.0;
 
@@ -47,27 +45,21 @@ impl Face {
     }
 }
 
-/// The nodes of a set of boundary edges, in increasing order.
+/// The nodes of a set of boundary edges, in increasing order, from the `faces` of the single edges at
+/// their nodes.
 ///
 /// A node's normal is the length-weighted mean of its edges' normals; at a corner, where
 /// they differ by more than [`CORNER_ANGLE`], it keeps both. The lengths of all faces add
 /// up to the length of the edges.
-///
-/// `edges` are node pairs with the body on their left, as in
-/// [`Curve::edges`](super::Curve::edges); their indices must be nodes of `mesh`.
 #[must_use]
-pub fn boundary_nodes(mesh: &Mesh, edges: &[[usize; 2]]) -> Vec<BoundaryNode> {
-    let mut faces: BTreeMap<usize, Vec<Face>> = BTreeMap::new();
-    for &edge in edges {
-        let (normal, length) = mesh.edge_normal(edge);
-        let half = Face { normal, length: 0.5 * length };
-        for node in edge {
-            let faces = faces.entry(node).or_default();
-            match faces.iter_mut().find(|face| face.continues(&half)) {
-                Some(face) => *face = face.joined(&half),
-                None => faces.push(half),
-            }
+pub fn boundary_nodes(faces: impl IntoIterator<Item = (usize, Face)>) -> Vec<BoundaryNode> {
+    let mut nodes: BTreeMap<usize, Vec<Face>> = BTreeMap::new();
+    for (node, own) in faces {
+        let faces = nodes.entry(node).or_default();
+        match faces.iter_mut().find(|face| face.continues(&own)) {
+            Some(face) => *face = face.joined(&own),
+            None => faces.push(own),
         }
     }
-    faces.into_iter().map(|(node, faces)| BoundaryNode { node, faces }).collect()
+    nodes.into_iter().map(|(node, faces)| BoundaryNode { node, faces }).collect()
 }

@@ -10,6 +10,8 @@ use super::{Mesh, sides};
 /// meet in hinges.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Components {
+    /// The part of each triangle.
+    pub part_of_triangle: Vec<usize>,
     /// The part of each node; of a hinge one of its parts.
     pub part_of_node: Vec<usize>,
     /// The parts of each piece, in increasing order.
@@ -43,7 +45,12 @@ impl Mesh {
         let (piece_of_part, count) = connected(parts, hinges.iter().map(|hinge| hinge.1));
         let mut pieces = vec![Vec::new(); count];
         piece_of_part.iter().enumerate().for_each(|(part, &piece)| pieces[piece].push(part));
-        Components { part_of_node: part_of_node.into_iter().flatten().collect(), pieces, hinges }
+        Components {
+            part_of_triangle,
+            part_of_node: part_of_node.into_iter().flatten().collect(),
+            pieces,
+            hinges,
+        }
     }
 }
 

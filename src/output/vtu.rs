@@ -6,7 +6,7 @@
 use super::{OutputError, data_array::DataArray, write_whole};
 use crate::{
     evolution::{DiscreteProblem, State},
-    fem::Body,
+    fem::{Body, Elements},
     petsc::PetscError,
 };
 use std::{
@@ -14,8 +14,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// VTK_TRIANGLE.
+/// VTK_TRIANGLE and VTK_QUADRATIC_TRIANGLE (the midpoints of the sides 01, 12, 20 follow the vertices).
 const TRIANGLE: u8 = 5;
+const QUADRATIC_TRIANGLE: u8 = 22;
 /// VTK's names of the types of numbers.
 const REAL: &str = "Float64";
 const INTEGER: &str = "Int32";
@@ -54,7 +55,7 @@ impl FieldWriter {
     /// # Errors
     /// A file cannot be written.
     pub fn add(&mut self, problem: &DiscreteProblem, state: &State) -> Result<(), OutputError> {
-        let comm = problem.body.partition.comm();
+        let comm = problem.body.nodes.partition.comm();
         let stem = format!("fields_{:04}", self.frames.len());
         let piece_file = |rank| format!("{stem}_{rank}.vtu");
         let (own, frame) = match comm.is_serial() {
@@ -82,7 +83,7 @@ impl FieldWriter {
     fn piece(&self, body: &Body, points: &[DataArray], cells: &[DataArray]) -> io::Result<String> {
         let points = points.iter().map(DataArray::element).collect::<io::Result<String>>()?;
         let cells = cells.iter().map(DataArray::element).collect::<io::Result<String>>()?;
-        let (mesh, nodes, triangles) = (&self.mesh, body.mesh.nodes.len(), body.own_triangles);
+        let (mesh, nodes, triangles) = (&self.mesh, body.nodes.points.len(), body.own_triangles);
         let piece = format!(
             "<Piece NumberOfPoints=\"{nodes}\" NumberOfCells=\"{triangles}\">\n{mesh}\
              <PointData>\n{points}</PointData>\n<CellData>\n{cells}</CellData>\n</Piece>\n"
@@ -100,15 +101,19 @@ impl FieldWriter {
 
 /// `<Points>` and `<Cells>`.
 fn mesh_text(body: &Body) -> io::Result<String> {
-    let points = body.mesh.nodes.iter().flat_map(|&[x, y]| [x, y, 0.0]);
-    let triangles = &body.mesh.triangles[..body.own_triangles];
-    let corners = triangles.iter().flatten().map(|&node| node as i32);
-    let offsets = (1..=triangles.len()).map(|t| 3 * t as i32);
-    let types = triangles.iter().map(|_| TRIANGLE);
+    let points = body.nodes.points.iter().flat_map(|&[x, y]| [x, y, 0.0]);
+    let own = body.own_triangles;
+    let (nodes, kind, per_cell) = match body.elements() {
+        Elements::Linear(cells) => (cells.nodes[..own].as_flattened(), TRIANGLE, 3),
+        Elements::Quadratic(cells) => (cells.nodes[..own].as_flattened(), QUADRATIC_TRIANGLE, 6),
+    };
+    let nodes = nodes.iter().map(|&node| node as i32);
+    let offsets = (1..=own).map(|t| (per_cell * t) as i32);
+    let types = iter::repeat_n(kind, own);
     Ok(format!(
         "<Points>\n{}</Points>\n<Cells>\n{}{}{}</Cells>\n",
         DataArray::new("Points", REAL, 3, points).element()?,
-        DataArray::new("connectivity", INTEGER, 1, corners).element()?,
+        DataArray::new("connectivity", INTEGER, 1, nodes).element()?,
         DataArray::new("offsets", INTEGER, 1, offsets).element()?,
         DataArray::new("types", BYTE, 1, types).element()?,
     ))
@@ -117,9 +122,9 @@ fn mesh_text(body: &Body) -> io::Result<String> {
 /// The nodal fields. Contact pressure is 0 and the remaining gap NaN off Γ_C; where two gap conditions
 /// meet at a corner, the larger pressure and the smaller gap are shown. Collective.
 fn point_data(problem: &DiscreteProblem, state: &State) -> Result<Vec<DataArray>, PetscError> {
-    let partition = &problem.body.partition;
-    let mut pressure = vec![0.0_f64; state.zeta.len()];
-    let mut gap = vec![f64::NAN; state.zeta.len()];
+    let partition = &problem.body.nodes.partition;
+    let mut pressure = vec![0.0_f64; partition.local()];
+    let mut gap = vec![f64::NAN; partition.local()];
     for point in &state.contact {
         pressure[point.node] = pressure[point.node].max(point.pressure);
         gap[point.node] = gap[point.node].min(point.gap);
@@ -129,7 +134,7 @@ fn point_data(problem: &DiscreteProblem, state: &State) -> Result<Vec<DataArray>
     let displacement = state.u.chunks_exact(2).flat_map(|u| [u[0], u[1], 0.0]);
     let mut arrays = vec![
         DataArray::new("displacement", REAL, 3, displacement),
-        DataArray::new("zeta", REAL, 1, state.zeta.iter().copied()),
+        DataArray::new("zeta", REAL, 1, problem.body.at_nodes(&state.zeta).into_iter()),
         DataArray::new("normal_pressure", REAL, 1, pressure.into_iter()),
         DataArray::new("gap", REAL, 1, gap.into_iter()),
     ];
@@ -144,9 +149,9 @@ fn point_data(problem: &DiscreteProblem, state: &State) -> Result<Vec<DataArray>
 /// The fields that are constant on each triangle; the stress has the components xx, yy, xy.
 fn cell_data(problem: &DiscreteProblem, state: &State) -> Vec<DataArray> {
     let (elasticity, body) = (&problem.elasticity, &problem.body);
-    let zeta = problem.triangle_means(&state.zeta);
-    let stress = |t: usize| elasticity.stress(body, t, zeta[t], &state.u);
-    let stress: Vec<_> = (0..body.own_triangles).map(stress).collect();
+    let zeta = problem.zeta_at_points(&state.zeta);
+    let mut stress = elasticity.stresses(body, &zeta, &state.u);
+    stress.truncate(body.own_triangles);
     let von_mises = stress.iter().map(|s| elasticity.material.von_mises(s));
     let components = stress.iter().flat_map(|s| [s[0], s[1], s[2]]);
     vec![

@@ -21,6 +21,7 @@ pub use expression::{Expression, ExpressionError};
 use crate::{
     contact::ContactOptions,
     fem::Mass,
+    mesh::Order,
     model::{DamageLaw, Material},
 };
 use document::SceneText;
@@ -40,6 +41,8 @@ pub struct Scene {
     pub material: Material,
     /// The damage law and ζ₀; without it nothing is damaged.
     pub damage: Option<Damage>,
+    /// The order of the displacements.
+    pub order: Order,
     /// The time grid; without it there is one static solve at t = 1.
     pub time: Option<TimeGrid>,
     /// Body force f_B, N/m³.

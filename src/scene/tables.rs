@@ -12,6 +12,7 @@ use super::reader::{Reading, Table, Value};
 use super::{Damage, MeshSource, OutputOptions, Scene, Stepping, TimeGrid, may_start_at};
 use crate::{
     fem::Mass,
+    mesh::Order,
     model::{DamageLaw, Material, Plane},
 };
 
@@ -25,6 +26,7 @@ pub(super) fn scene(root: &mut Table, path: &Path, text: &SceneText) -> Reading<
     let mesh = root.get("mesh").table(".", |table| mesh(table, path));
     let material = root.get("material").table(".", material);
     let damage = root.get("damage").optional(|value| value.table(".", damage));
+    let order = root.get("discretisation").optional(|value| value.table(".", discretisation));
     let time = root.get("time").optional(|value| value.table(".", time));
     let body_force = root.get("body").optional(|value| {
         value.table(".", |body| body.get("force").optional(|value| value.pair(Value::expression)))
@@ -42,6 +44,7 @@ pub(super) fn scene(root: &mut Table, path: &Path, text: &SceneText) -> Reading<
         mesh: mesh?,
         material: material?,
         damage: damage?,
+        order: order?.unwrap_or_default(),
         time,
         body_force: body_force?.flatten().unwrap_or([0.0; 2].map(Expression::constant)),
         contact: contact?.unwrap_or_default(),
@@ -83,6 +86,13 @@ fn material(table: &mut Table) -> Reading<Material> {
     let poisson = poisson.number("between -1 and 0.5, both excluded", |nu| -1.0 < nu && nu < 0.5);
     let plane = table.get("plane").choice([("stress", Plane::Stress), ("strain", Plane::Strain)]);
     Ok(Material { young: young?, poisson: poisson?, plane: plane? })
+}
+
+fn discretisation(table: &mut Table) -> Reading<Order> {
+    let degree = table
+        .get("displacement")
+        .optional(|value| value.number("1 or 2", |degree| degree == 1.0 || degree == 2.0));
+    Ok(if degree? == Some(2.0) { Order::Quadratic } else { Order::Linear })
 }
 
 fn damage(table: &mut Table) -> Reading<Damage> {

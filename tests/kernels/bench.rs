@@ -91,7 +91,7 @@ fn unavoidable(c: &mut Criterion) {
         let Elastic { k, factor, .. } = &mut Elastic::new(&session, &problem);
         let mut damage = damage_system(&session, &problem);
         let (u, zeta) = (displaced(&problem), damaged(&problem, 0.5));
-        let (means, load) = (problem.triangle_means(&zeta), damage_load(&problem, &u, &zeta));
+        let (means, load) = (problem.zeta_at_points(&zeta), damage_load(&problem, &u, &zeta));
         let vector = || Vector::zeros(&session, k.matrix.owned()).unwrap();
         let (mut x, mut y, mut z) = (vector(), vector(), vector());
         x.set(&u).unwrap();
@@ -142,7 +142,7 @@ fn damage_source(c: &mut Criterion) {
 
 fn certificate(c: &mut Criterion) {
     let problem = problem(CELLS);
-    let (means, u) = (problem.triangle_means(&damaged(&problem, 0.5)), displaced(&problem));
+    let (means, u) = (problem.zeta_at_points(&damaged(&problem, 0.5)), displaced(&problem));
     c.bench_function("internal force", |b| {
         b.iter(|| problem.elasticity.internal_force(&problem.body, &means, black_box(&u)));
     });

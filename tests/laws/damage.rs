@@ -7,7 +7,7 @@ use signorini::{
     contact::SOLVERS,
     evolution::{DiscreteProblem, Step, Stop},
     fem::{self, Body, DamageCertificate, DamageSystem, Mass, source_load},
-    mesh::Mesh,
+    mesh::{Mesh, Order},
     petsc::Session,
 };
 use std::f64::consts::PI;
@@ -257,13 +257,17 @@ fn nothing_that_drives_damage_leaves_it_bit_for_bit() {
 
 #[test]
 fn the_certificate_of_a_damage_step_bounds_its_error_and_catches_a_planted_one() {
-    let (session, body) = (Session::start(&[]).unwrap(), Body::new(distorted(8)));
+    let (session, body) = (Session::start(&[]).unwrap(), Body::new(distorted(8), Order::Linear));
     let (diffusion, step) = (0.3, 0.05);
     let mut random = Random::new(3);
     let nodes = body.mesh.nodes.len();
     let before: Vec<f64> = random.field(nodes).iter().map(|v| 0.6 + 0.3 * v).collect();
-    let load: Vec<f64> =
-        random.field(nodes).iter().zip(&body.node_area).map(|(v, area)| -v.abs() * area).collect();
+    let load: Vec<f64> = random
+        .field(nodes)
+        .iter()
+        .zip(&body.nodes.weights)
+        .map(|(v, area)| -v.abs() * area)
+        .collect();
     for mass in [Mass::Consistent, Mass::Lumped] {
         let mut system = DamageSystem::new(&session, &body, mass, diffusion, step).unwrap();
         let mut zeta = before.clone();

@@ -6,7 +6,7 @@ use signorini::{
     fem::{
         Body, DamageSystem, Elasticity, Mass, NodalBases, Stiffness, Triangle, source, source_load,
     },
-    mesh::Mesh,
+    mesh::{Mesh, Order},
     model::{DamageLaw, Material, Plane},
     petsc::{Session, Vector},
 };
@@ -23,12 +23,12 @@ fn triangles() -> Vec<Triangle> {
     let mut random = Random::new(1);
     let mut point = || [random.next(), random.next()];
     let triangles = (0..200).map(|_| Triangle::new([point(), point(), point()]));
-    triangles.filter(|t| t.area > 0.02).collect()
+    triangles.filter(|t| t.area() > 0.02).collect()
 }
 
 /// The 6×6 stiffness of a triangle from its 2×2 blocks.
 fn stiffness(triangle: &Triangle, d: &Matrix3<f64>) -> SMatrix<f64, 6, 6> {
-    SMatrix::from_fn(|i, j| triangle.stiffness(d, i / 2, j / 2)[(i % 2, j % 2)])
+    SMatrix::from_fn(|i, j| triangle.points[0].stiffness(d, i / 2, j / 2)[(i % 2, j % 2)])
 }
 
 /// (E, ν) for which plane stress is `plane` with (YOUNG, POISSON).
@@ -80,8 +80,9 @@ fn element_forces_are_the_stiffness_times_the_displacements() {
     let mut random = Random::new(2);
     for triangle in triangles() {
         let u = SVector::<f64, 6>::from_fn(|_, _| random.next());
-        let strain = triangle.strain(u.as_ref());
-        let force = triangle.force(&(d * strain));
+        let strain = triangle.points[0].strain(&[[u[0], u[1]], [u[2], u[3]], [u[4], u[5]]]);
+        let force = triangle.points[0].force(&(d * strain));
+        let force = SVector::<f64, 6>::from_iterator(force.into_iter().flatten());
         let error = (stiffness(&triangle, &d) * u - force).amax();
         assert!(error <= 1e-13 * force.amax(), "{error}");
     }
@@ -91,7 +92,7 @@ fn element_forces_are_the_stiffness_times_the_displacements() {
 fn mass_is_a_partition_of_unity_and_laplace_sees_gradients_only() {
     let mut random = Random::new(3);
     for triangle in triangles() {
-        let area = triangle.area;
+        let area = triangle.area();
         let (mass, laplace) = (triangle.mass(), triangle.laplace());
         for i in 0..3 {
             // Σ_j ∫λ_i λ_j = ∫λ_i = area/3, and ∇Σλ_j = 0.
@@ -112,7 +113,7 @@ fn mass_is_a_partition_of_unity_and_laplace_sees_gradients_only() {
 
 /// A triangle of the same gradients with its first corner at the origin.
 fn corners(triangle: &Triangle) -> [[f64; 2]; 3] {
-    let [_, b, c] = triangle.gradients;
+    let [_, b, c] = triangle.gradients();
     // ∇λ_b·(x_b − x_a) = 1 and ∇λ_c·(x_b − x_a) = 0, and so on.
     let sides = Matrix2::new(b[0], b[1], c[0], c[1]).try_inverse().unwrap();
     [[0.0; 2], sides.column(0).into_owned().into(), sides.column(1).into_owned().into()]
@@ -120,7 +121,7 @@ fn corners(triangle: &Triangle) -> [[f64; 2]; 3] {
 
 #[test]
 fn rigid_motions_have_neither_strain_nor_force() {
-    let body = Body::new(unstructured(0.2));
+    let body = Body::new(unstructured(0.2), Order::Linear);
     let zeta: Vec<f64> =
         Random::new(4).field(body.triangles.len()).iter().map(|z| 1.5 + z).collect();
     let elasticity = elasticity(Plane::Strain);
@@ -138,7 +139,7 @@ fn rigid_motions_have_neither_strain_nor_force() {
 #[test]
 fn shear_counts_twice_in_the_size_of_strain() {
     // u = (γ y, 0): ε_xy = ε_yx = γ/2, |ε|² = 2 (γ/2)².
-    let body = Body::new(distorted(3));
+    let body = Body::new(distorted(3), Order::Linear);
     let u: Vec<f64> = body.mesh.nodes.iter().flat_map(|[_, y]| [0.4 * y, 0.0]).collect();
     for e2 in elasticity(Plane::Stress).strain_squared(&body, &u) {
         close(e2, 2.0 * 0.2_f64.powi(2), 1e-13);
@@ -147,7 +148,7 @@ fn shear_counts_twice_in_the_size_of_strain() {
 
 #[test]
 fn internal_forces_are_the_gradient_of_the_energy() {
-    let body = Body::new(unstructured(0.2));
+    let body = Body::new(unstructured(0.2), Order::Linear);
     let mut random = Random::new(5);
     for plane in [Plane::Stress, Plane::Strain] {
         let zeta: Vec<f64> = body.triangles.iter().map(|_| 1.5 + random.next()).collect();
@@ -178,8 +179,8 @@ fn forces_turn_with_the_body() {
     let turned =
         |v: &[f64]| -> Vec<f64> { v.chunks(2).flat_map(|v| turn(angle, [v[0], v[1]])).collect() };
     let elasticity = elasticity(Plane::Stress);
-    let force = elasticity.internal_force(&Body::new(mesh.clone()), &zeta, &u);
-    let body = Body::new(moved(mesh, |x| turn(angle, x)));
+    let force = elasticity.internal_force(&Body::new(mesh.clone(), Order::Linear), &zeta, &u);
+    let body = Body::new(moved(mesh, |x| turn(angle, x)), Order::Linear);
     let error = difference(&elasticity.internal_force(&body, &zeta, &turned(&u)), &turned(&force));
     assert!(error < 1e-13, "{error}");
 }
@@ -218,7 +219,7 @@ fn nodal_bases_keep_work_and_give_back_what_they_take() {
 
 #[test]
 fn the_assembled_stiffness_is_the_matrix_free_force_in_the_nodal_bases() {
-    let body = Body::new(unstructured(0.2));
+    let body = Body::new(unstructured(0.2), Order::Linear);
     let session = Session::start(&[]).unwrap();
     let (nodes, elasticity) = (body.mesh.nodes.len(), elasticity(Plane::Stress));
     let mut random = Random::new(8);
@@ -263,7 +264,7 @@ fn a_damage_step_solves_the_assembled_system() {
     // (M + kκL) ζ_n = M ζ_{n−1} + k b with M and L summed from the elements in a dense
     // matrix, and b = ∫ φ λ_i of the affine φ through its values at the vertices.
     let session = Session::start(&[]).unwrap();
-    let body = Body::new(distorted(3));
+    let body = Body::new(distorted(3), Order::Linear);
     let law = DamageLaw {
         diffusion: 0.7,
         lambda_d: 0.3,

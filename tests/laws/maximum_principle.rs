@@ -5,7 +5,7 @@ use crate::support::{Random, close, distorted, largest, moved, problem, run, squ
 use signorini::{
     evolution::{DiscreteProblem, Outcome},
     fem::{Body, DamageSystem, Mass, source, source_load},
-    mesh::Mesh,
+    mesh::{Mesh, Order},
     model::DamageLaw,
     petsc::Session,
 };
@@ -58,7 +58,7 @@ const ABOVE: [f64; 3] = [0.6, 1.0, 100.0];
 
 #[test]
 fn the_lumped_mass_keeps_the_bounds_for_every_step_without_obtuse_angles() {
-    let body = Body::new(square(10));
+    let body = Body::new(square(10), Order::Linear);
     for ratio in BELOW.into_iter().chain(ABOVE) {
         let violation = violation(&body, Mass::Lumped, ratio);
         assert!(violation < 1e-12, "kκ/h² = {ratio}: {violation}");
@@ -67,7 +67,7 @@ fn the_lumped_mass_keeps_the_bounds_for_every_step_without_obtuse_angles() {
 
 #[test]
 fn the_consistent_mass_leaves_the_bounds_where_diffusion_is_small() {
-    let body = Body::new(square(10));
+    let body = Body::new(square(10), Order::Linear);
     for ratio in BELOW {
         // Diffusion alone leaves them by some kκ/h² where that is small.
         let violation = violation(&body, Mass::Consistent, ratio);
@@ -81,14 +81,14 @@ fn the_consistent_mass_leaves_the_bounds_where_diffusion_is_small() {
 
 #[test]
 fn obtuse_angles_break_the_lumped_mass_too() {
-    let body = Body::new(moved(square(10), |[x, y]| [x + y, y]));
+    let body = Body::new(moved(square(10), |[x, y]| [x + y, y]), Order::Linear);
     let violation = violation(&body, Mass::Lumped, 0.1);
     assert!(violation > 1e-3, "{violation}");
 }
 
 #[test]
 fn both_masses_integrate_constants_alike() {
-    let body = Body::new(distorted(6));
+    let body = Body::new(distorted(6), Order::Linear);
     let mut random = Random::new(3);
     let strain: Vec<f64> = random.field(body.triangles.len()).iter().map(|v| v * v).collect();
     let zeta: Vec<f64> =

@@ -99,8 +99,8 @@ fn stress_is_the_pressure_along_the_load_and_nothing_else() {
     for (_, mesh) in meshes() {
         let problem = pressed(mesh, 0.0, Plane::Stress, 3.0, "");
         let u = run(&problem, SOLVERS[0]).last.state.u;
-        for t in 0..problem.body.triangles.len() {
-            let s = problem.elasticity.stress(&problem.body, t, 1.0, &u);
+        let undamaged = vec![1.0; u.len() * problem.body.triangles.len()];
+        for s in problem.elasticity.stresses(&problem.body, &undamaged, &u) {
             assert!((s[1] + 3.0).abs().max(s[0].abs()).max(s[2].abs()) < 1e-10, "{s}");
         }
     }
@@ -166,6 +166,41 @@ fn all_round_pressure_into_a_corner_of_the_foundation() {
                 let faces = state.contact.iter().filter(|point| point.node == corner);
                 assert_eq!(faces.count(), 2);
             }
+        }
+    }
+}
+
+/// Bending by c on top of the pressure p, in plane stress: σ_xx = cy, σ_yy = −p, σ_xy = 0 and
+/// u = ((cxy + νpx)/E, −(cx² + cνy²)/2E − py/E), a foundation of the same curvature under the bottom.
+#[test]
+fn a_quadratic_field_is_solved_exactly_with_quadratic_elements() {
+    let (p, c) = (7.0, 3.0);
+    let text = format!(
+        "discretisation.displacement = 2
+         {}
+         boundary = [
+            {{ name = 'left', displacement = ['0', '-({c}*{POISSON}*y^2/2 + {p}*y)/{YOUNG}'] }},
+            {{ name = 'right', traction = ['{c}*y', '0'] }},
+            {{ name = 'bottom', gap = '{c}*x^2/2/{YOUNG}' }},
+            {{ name = 'top', traction = ['0', '-{p}'] }},
+         ]",
+        material(Plane::Stress)
+    );
+    let exact = |&[x, y]: &[f64; 2]| {
+        let bent = -0.5 * c * (x * x + POISSON * y * y);
+        [(c * x * y + POISSON * p * x) / YOUNG, (bent - p * y) / YOUNG]
+    };
+    for (name, mesh) in meshes() {
+        for solver in SOLVERS {
+            let problem = problem(mesh.clone(), &text).unwrap_or_else(|e| panic!("{e}"));
+            let state = run(&problem, solver).last.state;
+            let exact: Vec<f64> = problem.body.nodes.points.iter().flat_map(exact).collect();
+            let error = difference(&state.u, &exact);
+            assert!(error < TOLERANCE, "{solver}, {name}: {error:.1e}");
+            // At (0, 0) the displacement is prescribed.
+            let vertices_and_midpoints = 2 * problem.body.mesh.curves["bottom"].edges.len();
+            assert_eq!(state.contact.len(), vertices_and_midpoints);
+            check_pressures(&state, p);
         }
     }
 }

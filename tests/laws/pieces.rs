@@ -157,7 +157,7 @@ fn curves_of_one_name_on_several_pieces_hold_each() {
         // Σ area u·m = 0 for each free motion m.
         for motion in &problem.motions.free {
             let field = problem.motions.field(motion, &problem.body);
-            let dot = |i: usize| problem.body.node_area[i / 2] * field[i] * last.state.u[i];
+            let dot = |i: usize| problem.body.nodes.weights[i / 2] * field[i] * last.state.u[i];
             assert!((0..field.len()).map(dot).sum::<f64>().abs() < 1e-14);
         }
     }

@@ -121,9 +121,9 @@ fn the_whole_bridge_is_symmetric_and_twice_its_half() {
             close(part.state.zeta[i], full.state.zeta[j], 1e-10);
         }
         // Nothing holds the bridge sideways: the answer given has ∫u_x = 0.
-        let area: f64 = whole.body.node_area.iter().sum();
+        let area: f64 = whole.body.nodes.weights.iter().sum();
         let drift: f64 =
-            (0..nodes.len()).map(|i| whole.body.node_area[i] * full.state.u[2 * i]).sum();
+            (0..nodes.len()).map(|i| whole.body.nodes.weights[i] * full.state.u[2 * i]).sum();
         assert!(drift.abs() < 1e-14 * area * size, "{drift}");
         // 80 N/m² over 4 m, at t = 1.
         close_to(full.record.contact_force, 320.0, 1e-10);
@@ -140,7 +140,7 @@ fn contact_and_clamp_together_carry_the_load() {
         let state = run(&problem, solver).last.state;
         let internal = problem.elasticity.internal_force(
             &problem.body,
-            &problem.triangle_means(&state.zeta),
+            &problem.zeta_at_points(&state.zeta),
             &state.u,
         );
         let load = problem.loads.at(&problem.body, state.time);

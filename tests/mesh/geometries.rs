@@ -10,8 +10,9 @@ use std::{
     time::{Duration, SystemTime},
 };
 
+use crate::boundary_nodes;
 use crate::common::{check_laws, close, curve_length, edges, parameters, smallest_angle};
-use signorini::mesh::{Mesh, MeshError, Order, boundary_nodes, load, mesh_geo};
+use signorini::mesh::{Mesh, MeshError, Order, load, mesh_geo};
 use tempfile::TempDir;
 
 /// A copy of one of the geometries in a folder of its own: meshes appear beside them.

@@ -4,6 +4,19 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+use signorini::{
+    fem::Edge,
+    mesh::{BoundaryNode, Mesh},
+};
+
+/// The nodes of straight boundary edges.
+fn boundary_nodes(mesh: &Mesh, edges: &[[usize; 2]]) -> Vec<BoundaryNode> {
+    let edges = edges.iter().map(|&ends| Edge { ends, middle: None });
+    let faces: Vec<_> =
+        edges.flat_map(|edge| edge.faces(&mesh.nodes).collect::<Vec<_>>()).collect();
+    signorini::mesh::boundary_nodes(faces)
+}
+
 mod boundary;
 mod geometries;
 mod malformed;

@@ -11,7 +11,7 @@ impl RigidMotions {
     /// the motion then leaves contact and symmetry axes exactly as they are.
     pub fn tangential(&self, body: &Body, node: usize, normal: [f64; 2]) -> [f64; 2] {
         self.free.iter().fold(normal, |[nx, ny], motion| {
-            let [x, y] = self.at(motion, &body.mesh.nodes, node);
+            let [x, y] = self.at(motion, &body.nodes.points, node);
             let (along, speed) = (x * nx + y * ny, x.hypot(y));
             if along.abs() <= 1e-14 || along.abs() > TURN * speed {
                 return [nx, ny];
@@ -45,7 +45,7 @@ impl RigidMotions {
     /// Removes the free motions from u: the answer of least ∫|u|².
     pub fn remove_free(&self, body: &Body, u: &mut [f64]) {
         if !self.free.is_empty() {
-            let momentum = |i: usize| [u[2 * i], u[2 * i + 1]].map(|u| body.node_area[i] * u);
+            let momentum = |i: usize| [u[2 * i], u[2 * i + 1]].map(|u| body.nodes.weights[i] * u);
             let removed = self.projection(body, momentum);
             u.iter_mut().zip(removed).for_each(|(u, m)| *u -= m);
         }
@@ -56,7 +56,7 @@ impl RigidMotions {
     pub fn balanced(&self, body: &Body, mut load: Vec<f64>) -> Vec<f64> {
         if !self.free.is_empty() {
             let balance = self.projection(body, |i| [load[2 * i], load[2 * i + 1]]);
-            let areas = body.node_area.iter().flat_map(|area| [area; 2]);
+            let areas = body.nodes.weights.iter().flat_map(|area| [area; 2]);
             load.iter_mut().zip(balance).zip(areas).for_each(|((f, m), area)| *f -= area * m);
         }
         load
@@ -73,7 +73,7 @@ impl RigidMotions {
             let amplitude = motion.work(&sums) / motion.parts.iter().map(square).sum::<f64>();
             motion.parts.iter().for_each(|part| parts[part.part].add(amplitude, part));
         }
-        let nodes = self.part_of_node.iter().zip(&body.mesh.nodes);
+        let nodes = self.part_of_node.iter().zip(&body.nodes.points);
         nodes.flat_map(|(&part, &x)| parts[part].at(x)).collect()
     }
 }

@@ -95,14 +95,14 @@ impl RigidMotions {
         force: impl Fn(usize) -> [f64; 2],
     ) -> Vec<Resultant> {
         let mut sums = vec![[0.0; 4]; self.parts.len()];
-        for node in 0..body.partition.owned() {
+        for node in 0..body.nodes.partition.owned() {
             let part = self.part_of_node[node];
-            let ([x, y], [cx, cy]) = (body.mesh.nodes[node], self.parts[part].centre);
+            let ([x, y], [cx, cy]) = (body.nodes.points[node], self.parts[part].centre);
             let [fx, fy] = force(node);
             let more = [fx, fy, (x - cx) * fy - (y - cy) * fx, fx.hypot(fy)];
             sums[part].iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
         }
-        body.partition.comm().sum(sums.as_flattened_mut());
+        body.nodes.partition.comm().sum(sums.as_flattened_mut());
         sums
     }
 

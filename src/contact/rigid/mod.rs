@@ -62,8 +62,9 @@ const PREVENTED: f64 = 1e-14;
 impl RigidMotions {
     /// From the fixed rows and the gap conditions, joined node by node as in the bounds.
     pub fn new(body: &Body, fixed: &[FixedRow], gaps: &[GapRow]) -> Self {
-        let Components { part_of_node, pieces, hinges } = body.mesh.components();
-        let nodes = &body.mesh.nodes;
+        let Components { part_of_triangle, part_of_node, pieces, hinges } = body.mesh.components();
+        let part_of_node = body.with_midpoints(part_of_node, &part_of_triangle);
+        let nodes = &body.nodes.points;
         let mut motions = Self {
             free: Vec::new(),
             resisted: Vec::new(),
@@ -172,13 +173,13 @@ impl RigidMotions {
 
     /// A motion at all nodes, m (two entries per node).
     pub fn field(&self, motion: &RigidMotion, body: &Body) -> Vec<f64> {
-        let nodes = &body.mesh.nodes;
+        let nodes = &body.nodes.points;
         (0..nodes.len()).flat_map(|node| self.at(motion, nodes, node)).collect()
     }
 
     /// The nodal displacements of the motions that contact alone constrains, with these amplitudes.
     pub fn displacement(&self, body: &Body, amplitudes: &DVector<f64>) -> Vec<f64> {
-        let mut u = vec![0.0; 2 * body.mesh.nodes.len()];
+        let mut u = vec![0.0; 2 * body.nodes.points.len()];
         for (motion, amplitude) in self.resisted.iter().zip(amplitudes.iter()) {
             u.iter_mut().zip(self.field(motion, body)).for_each(|(u, m)| *u += amplitude * m);
         }
@@ -188,7 +189,7 @@ impl RigidMotions {
     /// u·ν at `bounds` (rows) of the motions that contact alone constrains (columns).
     pub fn normal_at(&self, body: &Body, bounds: &[Bound]) -> DMatrix<f64> {
         let normals: Vec<_> = bounds.iter().map(|bound| (bound.node, bound.normal)).collect();
-        self.normal_displacements(&body.mesh.nodes, &self.resisted, &normals)
+        self.normal_displacements(&body.nodes.points, &self.resisted, &normals)
     }
 
     /// u·ν at nodes with these normals (rows) of `motions` (columns).
@@ -227,13 +228,13 @@ impl Part {
         let further = hinges.iter().map(|&(node, [_, part])| (part, node));
         nodes.extend(further.filter(|(part, _)| !own.contains(part)));
         for &(part, node) in &nodes {
-            let ([x, y], area) = (body.mesh.nodes[node], body.node_area[node]);
+            let ([x, y], area) = (body.nodes.points[node], body.nodes.weights[node]);
             let Self { area: sum, centre: [cx, cy], .. } = &mut parts[part];
             (*sum, *cx, *cy) = (*sum + area, *cx + area * x, *cy + area * y);
         }
         parts.iter_mut().for_each(|part| part.centre = part.centre.map(|v| v / part.area));
         for &(part, node) in &nodes {
-            let ([x, y], area) = (body.mesh.nodes[node], body.node_area[node]);
+            let ([x, y], area) = (body.nodes.points[node], body.nodes.weights[node]);
             let part = &mut parts[part];
             part.radius += area * ((x - part.centre[0]).powi(2) + (y - part.centre[1]).powi(2));
         }

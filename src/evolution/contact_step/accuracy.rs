@@ -15,6 +15,9 @@ const TOLERANCES: f64 = 100.0;
 /// A mesh is too coarse if the energy norm is estimated to be off by more than this: the
 /// displacement under the load is then too small by about the square of it.
 const COARSE: f64 = 0.5;
+/// The discretisation is judged at the last step, unless its displacements are less than this part of
+/// the largest.
+const UNLOADED: f64 = 0.01;
 /// A deformation below this part of a rigid motion is taken for rounding.
 const CARRIED: f64 = 1e-11;
 /// An estimate up to this part of the promised error is not repeated for another step.
@@ -31,8 +34,9 @@ pub struct Accuracy {
     pub displacement: f64,
     /// The time of the step of which `displacement` is, s.
     pub time: f64,
-    /// Of the discretisation in the step of the largest displacement, in the energy norm:
-    /// [`crate::fem::Elasticity::energy_error`].
+    /// Of the discretisation in the last step, in the energy norm
+    /// ([`RecoveredStrains`](crate::fem::RecoveredStrains)); where that is unloaded, in the step of the
+    /// largest displacement.
     pub energy: f64,
 }
 
@@ -87,11 +91,14 @@ impl ContactStep<'_> {
         let larger =
             |before: &&Rc<Step>| before.record.displacement_max > last.record.displacement_max;
         let most = outcome.most_displaced.as_ref().filter(larger).map_or(last, Rc::as_ref);
-        let (max, State { u, zeta, .. }) = (most.record.displacement_max, &most.state);
+        let max = most.record.displacement_max;
+        // What is left of u after unloading is judged less well than what there was.
+        let judged = if last.record.displacement_max < UNLOADED * max { most } else { last };
+        let State { u, zeta, .. } = &judged.state;
         let [rigid, rest] = RigidPart::of(body, u).max_norms(body, u);
         // What is only carried along has no strains but rounding.
         let energy = match rest > CARRIED * rigid {
-            true => elasticity.energy_error(body, &problem.triangle_means(zeta), u)?,
+            true => problem.energy_error(zeta, u)?,
             false => 0.0,
         };
         let displacement = displacement_error(session, problem, stiffness, &last.state, max)?;
@@ -120,13 +127,13 @@ fn displacement_error(
     state: &State,
     max: f64,
 ) -> Result<f64, PetscError> {
-    if max == 0.0 || problem.body.partition.max_norm(&state.u) == 0.0 {
+    if max == 0.0 || problem.body.nodes.partition.max_norm(&state.u) == 0.0 {
         return Ok(0.0);
     }
-    let zeta_mean = problem.triangle_means(&state.zeta);
-    stiffness.refill(&zeta_mean)?;
+    let zeta_at_points = problem.zeta_at_points(&state.zeta);
+    stiffness.refill(&zeta_at_points)?;
     let (body, constraints) = (&problem.body, &problem.constraints);
-    let internal = problem.elasticity.internal_force(body, &zeta_mean, &state.u);
+    let internal = problem.elasticity.internal_force(body, &zeta_at_points, &state.u);
     let mut residual = problem.load(state.time);
     residual.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
     constraints.bases.force_to_local(&mut residual);
@@ -136,8 +143,8 @@ fn displacement_error(
     let active: Vec<usize> = active.map(|(bound, _)| bound.dof).collect();
     active.iter().for_each(|&dof| residual[dof] = 0.0);
 
-    let mut rhs = Vector::zeros(session, 2 * body.partition.owned())?;
-    let mut correction = Vector::zeros(session, 2 * body.partition.owned())?;
+    let mut rhs = Vector::zeros(session, 2 * body.nodes.partition.owned())?;
+    let mut correction = Vector::zeros(session, 2 * body.nodes.partition.owned())?;
     rhs.set(&residual[..rhs.owned()])?;
     let mut solver = LinearSolver::new(session, "elastic_", rhs.owned(), Precision::Full)?;
     let scale = stiffness.scale;
@@ -150,5 +157,5 @@ fn displacement_error(
         return Ok(f64::INFINITY);
     }
     let correction = displacement(problem, vec![0.0; residual.len()], &correction)?;
-    Ok(body.partition.max_norm(&correction) / max)
+    Ok(body.nodes.partition.max_norm(&correction) / max)
 }

@@ -45,10 +45,10 @@ impl ContactStep<'_> {
     /// K of the solvers.
     pub(super) fn certify(&self, u: Vec<f64>, case: &LoadCase) -> Judged {
         let problem = self.problem;
-        let (body, partition) = (&problem.body, &problem.body.partition);
+        let (body, partition) = (&problem.body, &problem.body.nodes.partition);
         let rigid = RigidPart::of(body, &u);
         let [rigid_max, elastic_max] = rigid.max_norms(body, &u);
-        let mut unbalanced = problem.elasticity.internal_force(body, &self.zeta_mean, &u);
+        let mut unbalanced = problem.elasticity.internal_force(body, &self.zeta_at_points, &u);
         // |f|², |Ku|², u·Ku and |u|².
         let mut sums = [0.0; 4];
         let nodal = unbalanced.iter_mut().zip(&case.load).zip(&u);
@@ -84,7 +84,7 @@ impl ContactStep<'_> {
         let (datum, run) = (&self.next.datum, self.accepted.scales);
         let rounding = match datum.is_zero() {
             true => 0.0,
-            false => CARRIED * self.problem.body.partition.max_norm(&datum.field),
+            false => CARRIED * self.problem.body.nodes.partition.max_norm(&datum.field),
         };
         let force = answer.force.max(run.force).max(self.stiffness.scale * rounding);
         let least = rounding.max(force / self.stiffness.scale);
@@ -95,8 +95,9 @@ impl ContactStep<'_> {
     /// internal forces of u, if that explains the error.
     pub(super) fn limited(&self, error: ContactError, judged: &Judged) -> ContactError {
         let problem = self.problem;
-        let rounding = problem.elasticity.force_rounding(&problem.body, &self.zeta_mean, &judged.u);
-        let rounding = problem.body.partition.norm(&rounding, 2) / judged.scales.force;
+        let rounding =
+            problem.elasticity.force_rounding(&problem.body, &self.zeta_at_points, &judged.u);
+        let rounding = problem.body.nodes.partition.norm(&rounding, 2) / judged.scales.force;
         let attainable = ROUNDED * rounding;
         match attainable > problem.tolerance && judged.kkt.within(attainable) && attainable < 1.0 {
             true => ContactError::Limited { source: Box::new(error), attainable },
@@ -114,7 +115,7 @@ impl ContactStep<'_> {
         // A residual at the tolerance does work of up to √N times that on a motion (Cauchy and
         // Schwarz), which at the lever of one mesh width, 1/√N of the body, is a force √N times
         // as large: a smaller force is no certain constraint.
-        let partition = &self.problem.body.partition;
+        let partition = &self.problem.body.nodes.partition;
         let nodes = partition.total() as f64;
         let least = nodes * self.problem.tolerance * force;
         let active = active_bounds(&self.problem.constraints, contact, least);

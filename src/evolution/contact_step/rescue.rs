@@ -11,7 +11,7 @@ impl ContactStep<'_> {
     /// # Errors
     /// The solver failed, or no answer of its met the KKT tolerance, nor one of its rescuer.
     pub fn solve(&mut self, step: usize, time: f64, zeta: &[f64]) -> Result<Step, RunError> {
-        let comm = self.problem.body.partition.comm();
+        let comm = self.problem.body.nodes.partition.comm();
         let solved = self.solve_by_one(step, time, zeta);
         let Err(RunError::Contact { source, .. }) = &solved else { return solved };
         let Some(rescuer) = self.rescuer.as_mut().filter(|_| source.may_be_rescued(comm)) else {

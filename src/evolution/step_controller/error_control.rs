@@ -135,12 +135,15 @@ impl<'a> ErrorControl<'a> {
     /// max |·| over the nodes, and the mean of |·| over the body. Collective.
     fn norms(&self, field: &DVector<f64>) -> [f64; 2] {
         let (mut max, mut integral) = (0.0_f64, 0.0);
-        let nodes = field.iter().zip(&self.body.node_area).take(self.body.partition.owned());
+        let nodes = field
+            .iter()
+            .zip(&self.body.vertices.weights)
+            .take(self.body.vertices.partition.owned());
         for (value, area) in nodes {
             max = max.max(value.abs());
             integral += area * value.abs();
         }
-        let comm = self.body.partition.comm();
+        let comm = self.body.vertices.partition.comm();
         [comm.max(max), comm.total(integral) / self.body.area]
     }
 }

@@ -80,6 +80,10 @@ pub(super) struct StepController<'a> {
     /// Per node, Σ error / rate of the steps: by how much it reaches a given ζ too late or too early,
     /// s. (An error δζ shifts an autonomous evolution by δζ/ζ', once and for all.)
     delay: DVector<f64>,
+    /// The error of ζ̃ from the steps: what they add to it and how it has grown since; and what the
+    /// last step adds to that of ζ.
+    error: DVector<f64>,
+    last_error: DVector<f64>,
     bounds: (f64, f64),
     pub(super) violation: BoundViolation,
 }
@@ -101,8 +105,10 @@ impl<'a> StepController<'a> {
             rate: None,
             source,
             load_change: zeros.clone(),
-            delay: zeros,
-            bounds: problem.body.partition.min_max(zeta),
+            delay: zeros.clone(),
+            error: zeros.clone(),
+            last_error: zeros,
+            bounds: problem.body.vertices.partition.min_max(zeta),
             violation: BoundViolation::default(),
         }
     }
@@ -124,7 +130,7 @@ impl<'a> StepController<'a> {
         let k = length * (1.0 + omega) / (1.0 + 2.0 * omega);
         let shift = beta * &self.change;
         let (lower, upper) =
-            shifted(self.bounds, self.problem.body.partition.min_max(shift.as_slice()));
+            shifted(self.bounds, self.problem.body.vertices.partition.min_max(shift.as_slice()));
         // φ ≤ 0, so b ≤ 0 and b̂_n ≥ (1 + ω) b_{n−1}. What is not a number must stay so.
         let lower = lower + k * ((1.0 + omega) * self.source.min);
         let load =
@@ -165,14 +171,18 @@ impl<'a> StepController<'a> {
                     return shorter.ok_or_else(|| planned.failed(StepFailure::TooShort));
                 }
                 add_delay(&mut self.delay, &truncation, &rate);
+                self.grow_error(planned.length, &truncation);
             }
         }
         self.violation.observe(planned, damage.min_max, planned.time);
         let (lower, upper) = planned.bounds;
         let tightened = (lower.max(damage.min_max.0), upper.min(damage.min_max.1));
-        let partition = &self.problem.body.partition;
+        let partition = &self.problem.body.vertices.partition;
         self.bounds = shifted(tightened, partition.min_max(correction.as_slice()));
         self.length = planned.length;
+        if self.chosen.is_some() {
+            self.last_error = correction;
+        }
         self.change = &corrected - &self.zeta;
         self.zeta = corrected;
         self.rate = Some(rate);
@@ -190,7 +200,7 @@ impl<'a> StepController<'a> {
     ) -> Verdict {
         let (zeta_min, level) = (damage.min_max.0, self.problem.threshold());
         let (time, delays) = if let Some(chosen) = &self.chosen {
-            let from = self.problem.body.partition.min_max(self.zeta.as_slice()).0;
+            let from = self.problem.body.vertices.partition.min_max(self.zeta.as_slice()).0;
             let part = if from > level { (from - level) / (from - zeta_min) } else { 0.0 };
             // The last ζ that is written counts as well as its correction ζ̃.
             if from.max(last.record.zeta_min) - level > chosen.landing()
@@ -227,6 +237,13 @@ impl<'a> StepController<'a> {
         shorter.ok_or(failure)
     }
 
+    /// The estimated error of the last accepted ζ from the time steps, at the nodes; `None` before the
+    /// second step.
+    pub(super) fn step_error(&self) -> Option<DVector<f64>> {
+        self.rate.as_ref()?;
+        Some(&self.error + &self.last_error)
+    }
+
     /// The estimated error of the last accepted ζ over the damage done, where steps are chosen.
     pub(super) fn damage_error(&self) -> Option<f64> {
         self.chosen.as_ref().map(|chosen| chosen.relative_error)
@@ -244,14 +261,34 @@ impl<'a> StepController<'a> {
         if let Some(before) = &self.rate {
             let error = 0.5 * planned.k * (rate - before);
             add_delay(&mut self.delay, &error, &(0.5 * (rate + before)));
+            self.grow_error(planned.length, &error);
+            self.last_error = error;
+        }
+    }
+
+    /// Adds the error of a step of `length` s to those before, which have grown meanwhile: with
+    /// r = −ζ', an error δζ changes the source φ = −(λ_D (1−ζ)/ζ + ½ λ_U |ε|² − λ_W) by
+    /// λ_D/ζ² δζ, and under a given load, where |ε| ~ 1/ζ, by 2 (r − λ_D (1−ζ)/ζ + λ_W)/ζ δζ more.
+    fn grow_error(&mut self, length: f64, error: &DVector<f64>) {
+        let Some((law, rate)) = self.problem.damage().zip(self.rate.as_ref()) else { return };
+        for (i, own) in self.error.iter_mut().enumerate() {
+            let zeta = law.truncate(self.zeta[i]);
+            let internal = law.lambda_d * (1.0 - zeta) / zeta;
+            let external = (law.lambda_w - rate[i] - internal).max(0.0);
+            let growth = if rate[i] < 0.0 {
+                law.lambda_d / (zeta * zeta) + 2.0 * external / zeta
+            } else {
+                0.0
+            };
+            *own = *own * (1.0 + length * growth) + error[i];
         }
     }
 
     /// The delay at the node of least `zeta`. Collective.
     fn delay_at_weakest_node(&self, zeta: &[f64]) -> f64 {
-        let nodes = 0..self.problem.body.partition.owned();
+        let nodes = 0..self.problem.body.vertices.partition.owned();
         let weakest = nodes.min_by(|&a, &b| zeta[a].total_cmp(&zeta[b]));
-        let comm = self.problem.body.partition.comm();
+        let comm = self.problem.body.vertices.partition.comm();
         let (_, rank) = comm.min_with_rank(weakest.map_or(f64::INFINITY, |i| zeta[i]));
         comm.broadcast(rank, weakest.map_or(0.0, |i| self.delay[i]))
     }

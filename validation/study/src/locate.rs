@@ -40,7 +40,7 @@ impl<'a> Locator<'a> {
         let corners = self.body.mesh.triangles[t].map(|node| self.body.mesh.nodes[node]);
         let centroid =
             [0, 1].map(|axis| corners.iter().map(|corner| corner[axis]).sum::<f64>() / 3.0);
-        let gradients = &self.body.triangles[t].gradients;
+        let gradients = &self.body.triangles[t].gradients();
         gradients.map(|[dx, dy]| 1.0 / 3.0 + dx * (x - centroid[0]) + dy * (y - centroid[1])).into()
     }
 }

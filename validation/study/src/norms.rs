@@ -104,7 +104,7 @@ impl<'a> Embedding<'a> {
                     gradients.row(2).norm_squared(),
                 );
             }
-            squares += self.fine.triangles[t].area / 3.0 * of_triangle;
+            squares += self.fine.triangles[t].area() / 3.0 * of_triangle;
         }
         let [strain, gradient, zeta, zeta_gradient] = squares.map(f64::sqrt).into();
         Norms { strain, gradient, zeta, zeta_gradient }
@@ -113,9 +113,9 @@ impl<'a> Embedding<'a> {
 
 /// The rows ∇u_x, ∇u_y and ∇ζ on triangle `t`: Σ (u_x, u_y, ζ)_i ∇λ_iᵀ.
 fn gradients(body: &Body, t: usize, fields: &Fields) -> Matrix3x2<f64> {
-    let nodes = body.mesh.triangles[t].iter().zip(body.triangles[t].gradients);
+    let nodes = body.mesh.triangles[t].iter().zip(body.triangles[t].gradients());
     let values = |i: usize| Vector3::new(fields.u[2 * i], fields.u[2 * i + 1], fields.zeta[i]);
-    nodes.map(|(&node, slope)| values(node) * RowVector2::from(slope)).sum()
+    nodes.map(|(&node, slope)| values(node) * RowVector2::from(*slope)).sum()
 }
 
 /// ζ at the corners of triangle `t`.

@@ -11,6 +11,7 @@ use signorini::{
     contact::SOLVERS,
     evolution::StepRecord,
     fem::Body,
+    mesh::Order,
     petsc::Session,
     scene::{Scene, TimeGrid},
 };
@@ -146,7 +147,7 @@ impl ReferenceSpec {
     /// There are none, they belong to another scene or mesh, or the file is damaged; or the mesh
     /// cannot be made.
     pub fn load(&self, folder: &Path) -> Result<Reference, StudyError> {
-        let body = Body::new(self.run(self.refinements, self.step).mesh()?);
+        let body = Body::new(self.run(self.refinements, self.step).mesh()?, Order::Linear);
         let (times, nodes) = (self.times(), body.mesh.nodes.len());
         let states = store::read(&self.path(folder), &self.hash(&body), times.len(), nodes)?;
         let (own, zero) = (Embedding::new(&body, &body), Fields::zero(nodes));

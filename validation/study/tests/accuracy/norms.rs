@@ -8,7 +8,7 @@ use signorini::{
 use signorini_study::{Embedding, Fields, Norms, refined};
 
 fn square(n: usize) -> Body {
-    Body::new(Mesh::rectangle(1.0, 1.0, n, n))
+    Body::new(Mesh::rectangle(1.0, 1.0, n, n), Order::Linear)
 }
 
 /// The L, whose re-entrant corner no box of triangles may cut across: area 28 m².
@@ -42,8 +42,8 @@ fn a_linear_field_has_no_error_on_any_mesh() {
     for (fine, coarse) in [
         (square(16), square(4)),
         (square(16), square(7)),
-        (Body::new(refined(&l)), Body::new(l)),
-        (Body::new(l_shape(0.4)), Body::new(l_shape(0.7))),
+        (Body::new(refined(&l), Order::Linear), Body::new(l, Order::Linear)),
+        (Body::new(l_shape(0.4), Order::Linear), Body::new(l_shape(0.7), Order::Linear)),
     ] {
         let embedding = Embedding::new(&fine, &coarse);
         let norms = embedding.difference(&fields(&fine, linear), &fields(&coarse, linear));
@@ -59,7 +59,8 @@ fn functions_of_the_coarse_mesh_are_exact_on_its_refinement() {
         [(17.0 * x + 5.0 * y).sin(), (9.0 * x * y).cos(), (31.0 * x - 23.0 * y).sin()]
     };
     for mesh in [Mesh::rectangle(1.0, 1.0, 4, 4), l_shape(1.0)] {
-        let (coarse, fine) = (Body::new(mesh.clone()), Body::new(refined(&mesh)));
+        let (coarse, fine) =
+            (Body::new(mesh.clone(), Order::Linear), Body::new(refined(&mesh), Order::Linear));
         let below = fields(&coarse, wild);
         let mut above = Fields::zero(fine.mesh.nodes.len());
         above.u[..below.u.len()].copy_from_slice(&below.u);

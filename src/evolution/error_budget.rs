@@ -1,0 +1,105 @@
+//! The error budget of a run: how large the errors of mesh, time steps and solver are.
+
+use super::{DiscreteProblem, State};
+use crate::{fem::RecoveredStrains, petsc::PetscError};
+use serde::Serialize;
+
+/// Estimated relative errors of the last accepted state: of u in the energy norm, of the damage
+/// ζ₀ − ζ in L². `None` without damage, or before the second step.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct ErrorBudget {
+    /// Of u, from the mesh.
+    pub displacement_mesh: f64,
+    /// Of u, from the time steps.
+    pub displacement_steps: Option<f64>,
+    /// Of the damage, from the time steps.
+    pub damage_steps: Option<f64>,
+    /// Of the largest displacement, from the solver.
+    pub solver: f64,
+}
+
+/// Above this the mesh is called the limit.
+const LARGE: f64 = 0.05;
+
+impl ErrorBudget {
+    /// The errors by their causes, and which cause to spend on.
+    pub fn lines(&self) -> [String; 3] {
+        let of_damage = |error: Option<f64>| match error {
+            Some(error) => format!("damage {}", percent(error)),
+            None => "no damage".to_owned(),
+        };
+        let steps = match self.displacement_steps {
+            Some(error) => format!("u {}, {}", percent(error), of_damage(self.damage_steps)),
+            None => "none".to_owned(),
+        };
+        let mesh = self.displacement_mesh;
+        let steps_most =
+            self.displacement_steps.unwrap_or(0.0).max(self.damage_steps.unwrap_or(0.0));
+        let advice = match () {
+            () if self.solver > mesh.max(steps_most) => "the solver's tolerance",
+            () if steps_most > mesh => "shorter time steps",
+            () if mesh > LARGE => "the mesh, which is the limit of this answer",
+            () => "the mesh",
+        };
+        [
+            format!("from the mesh: u {} (energy norm)", percent(self.displacement_mesh)),
+            format!("from the time steps: {steps}"),
+            format!("from the solver: u {:.0e}; spend on {advice}", self.solver),
+        ]
+    }
+}
+
+/// An error in percent, with two digits.
+fn percent(error: f64) -> String {
+    match 100.0 * error {
+        error if error == 0.0 || !error.is_finite() => format!("{error} %"),
+        error if error < 0.01 => format!("{error:.0e} %"),
+        error => {
+            let decimals = (1.0 - error.log10().floor()).max(0.0) as usize;
+            format!("{error:.decimals$} %")
+        }
+    }
+}
+
+impl DiscreteProblem {
+    /// The estimated error of u in the energy norm, relative, from the mesh. Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub(super) fn energy_error(&self, zeta: &[f64], u: &[f64]) -> Result<f64, PetscError> {
+        let recovered = RecoveredStrains::new(&self.body, u)?;
+        let zeta = self.zeta_at_points(zeta);
+        Ok(recovered.energy_error(&self.elasticity, &zeta, u).relative())
+    }
+
+    /// ‖field‖ / ‖ζ₀ − ζ‖ in L², by the weights of the vertices; `None` without damage. Collective.
+    pub(super) fn relative_to_damage(&self, field: &[f64], state: &State) -> Option<f64> {
+        let vertices = &self.body.vertices;
+        let initial = self.initial_damage();
+        let values = field.iter().zip(initial.iter().zip(&state.zeta));
+        let mut sums = [0.0; 2];
+        let owned = vertices.weights.iter().zip(values).take(vertices.partition.owned());
+        for (weight, (value, (from, zeta))) in owned {
+            sums[0] += weight * value * value;
+            sums[1] += weight * (from - zeta) * (from - zeta);
+        }
+        vertices.partition.comm().sum(&mut sums);
+        (sums[1] > 0.0).then(|| (sums[0] / sums[1]).sqrt())
+    }
+
+    /// The relative error of u in the energy norm that errors δζ = `error` of ζ cause, at most:
+    /// ‖δζ/ζ ε(u)‖ over ‖ε(u)‖, since K δu = −δK u. Collective.
+    pub(super) fn displacement_error_of(&self, error: &[f64], state: &State) -> f64 {
+        let body = &self.body;
+        let (zeta, error) = (self.zeta_at_points(&state.zeta), body.at_points(error));
+        let energies = self.elasticity.energies(body, &zeta, &state.u);
+        let own = energies.len() / body.triangles.len() * body.own_triangles;
+        let mut sums = [0.0; 2];
+        for ((energy, zeta), error) in energies.iter().zip(&zeta).zip(&error).take(own) {
+            sums[0] += energy * (error / zeta).powi(2);
+            sums[1] += energy;
+        }
+        body.nodes.partition.comm().sum(&mut sums);
+        if sums[1] > 0.0 { (sums[0] / sums[1]).sqrt() } else { 0.0 }
+    }
+}

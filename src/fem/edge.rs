@@ -1,0 +1,78 @@
+//! Boundary edges of the elements of u: a straight line or a parabola.
+
+use crate::mesh::Face;
+
+/// The nodes of u on an edge x(s), 0 ≤ s ≤ 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Edge {
+    /// Its ends x(0) and x(1), with the body on the left of a boundary edge.
+    pub ends: [usize; 2],
+    /// For P2 its middle x(½).
+    pub middle: Option<usize>,
+}
+
+/// The abscissae ½ ∓ 1/√12 of the two Gauss points of an edge, of weights ½.
+pub(super) const GAUSS: [f64; 2] = [0.211_324_865_405_187_08, 0.788_675_134_594_812_9];
+
+/// The Gauss points of the straight edge from `p` to `q`.
+pub fn gauss_points(p: [f64; 2], q: [f64; 2]) -> [[f64; 2]; 2] {
+    GAUSS.map(|s| [p[0] + s * (q[0] - p[0]), p[1] + s * (q[1] - p[1])])
+}
+
+impl Edge {
+    /// x(s), m, from the coordinates of all nodes.
+    pub fn at(&self, points: &[[f64; 2]], s: f64) -> [f64; 2] {
+        let [p, q] = self.ends.map(|node| points[node]);
+        let bulge = 4.0 * s * (1.0 - s);
+        let offset = self.offset(points);
+        [0, 1].map(|k| p[k] + s * (q[k] - p[k]) + bulge * offset[k])
+    }
+
+    /// x'(s), m.
+    pub fn tangent(&self, points: &[[f64; 2]], s: f64) -> [f64; 2] {
+        let [p, q] = self.ends.map(|node| points[node]);
+        let offset = self.offset(points);
+        [0, 1].map(|k| q[k] - p[k] + 4.0 * (1.0 - 2.0 * s) * offset[k])
+    }
+
+    /// How far the middle lies from that of the chord, m.
+    fn offset(&self, points: &[[f64; 2]]) -> [f64; 2] {
+        let [p, q] = self.ends.map(|node| points[node]);
+        self.middle.map_or([0.0; 2], |node| [0, 1].map(|k| points[node][k] - 0.5 * (p[k] + q[k])))
+    }
+
+    /// The nodes with the values of their functions φ_i at s.
+    pub fn values(&self, s: f64) -> impl Iterator<Item = (usize, f64)> {
+        let [a, b] = self.ends;
+        let r = 1.0 - s;
+        match self.middle {
+            None => [Some((a, r)), Some((b, s)), None],
+            Some(middle) => {
+                [Some((a, r * (r - s))), Some((b, s * (s - r))), Some((middle, 4.0 * r * s))]
+            }
+        }
+        .into_iter()
+        .flatten()
+    }
+
+    /// The nodes of a boundary edge, each with its outward normal and its tributary length ∫ φ_i: half
+    /// of the edge for P1; for P2 1/6 of it at the ends and 4/6 in the middle (Simpson's rule).
+    pub fn faces(&self, points: &[[f64; 2]]) -> impl Iterator<Item = (usize, Face)> {
+        let [a, b] = self.ends;
+        let face = |s: f64, part: f64| {
+            let [x, y] = self.tangent(points, s);
+            let length = x.hypot(y);
+            Face { normal: [y / length, -x / length], length: part * length }
+        };
+        match self.middle {
+            None => [Some((a, face(0.0, 0.5))), Some((b, face(1.0, 0.5))), None],
+            Some(middle) => [
+                Some((a, face(0.0, 1.0 / 6.0))),
+                Some((b, face(1.0, 1.0 / 6.0))),
+                Some((middle, face(0.5, 4.0 / 6.0))),
+            ],
+        }
+        .into_iter()
+        .flatten()
+    }
+}
