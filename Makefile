@@ -36,7 +36,7 @@ help:
 	@echo 'make figures    the figures of every run in out/, again'
 	@echo 'make test       format, lints, documentation, tests'
 	@echo 'make validate   the comparison with FEniCSx (installs it: make deps-validate)'
-	@echo 'make random     a thousand random scenes, judged by code of their own; or ARGS="--count 50 --seed 3"'
+	@echo 'make random     a thousand random scenes, judged by code of their own; or ARGS="--count 50 --order 2"'
 	@echo 'make compare    all contact solvers on all scenes, side by side'
 	@echo 'make bench      speed against FEniCSx and the unavoidable work, growth; or ARGS=--quick'
 	@echo 'make stability  the maps of where methods fail; or MAPS="step-size …"'

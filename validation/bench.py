@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Measures speed, everything side by side in one run, and says it as ratios.
 
-    /usr/bin/python3 validation/bench.py --binary target/release/signorini [--quick] [--order 2] [PART…]
+    /usr/bin/python3 validation/bench.py --binary FILE [--quick] [--order 2] [PART…]
 
 steps    seconds per step of square-mild (k = 0.01) at n = 64, 128, 256, whose contact set never
          changes: each contact solver and the FEniCSx loop (loop.py, MUMPS by LU and by Cholesky);

@@ -204,8 +204,8 @@ def cases(scene, mesh, arguments):
 
 
 def compare(path, order, arguments):
-    """Rows of the table for one scene with displacements of an order, which that of a mesh made here
-    has, too. "active" are the least and the most active nodes."""
+    """Rows of the table for one scene with displacements of an order; a mesh made here is of the
+    same. "active" are the least and the most active nodes."""
     scene = of_order(read_scene(path), order)
     with tempfile.TemporaryDirectory() as directory:
         directory = Path(directory)

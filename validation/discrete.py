@@ -1,6 +1,6 @@
 """The discrete problem of a scene, assembled for the judge of `random_scenes.py`.
 
-Stiffness of P1 or P2 on straight triangles, loads, prescribed rows, contact rows and the damage
+Stiffness of P1 or isoparametric P2, loads, prescribed rows, contact rows and the damage
 step (28), written from the method's description alone (README.md, the paper's sections 2 to 4):
 nothing here was taken from the program, so that a fault of its assembly, bases or constraints shows
 as a difference.
@@ -13,7 +13,7 @@ from scipy.sparse import coo_matrix, diags
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
-from lagrange import Lagrange, derivatives, functions
+from lagrange import SIDES, Lagrange, derivatives, functions
 from scene import Expression, displacement_order
 
 CORNER = np.pi / 6  # edges further apart meet in a corner
@@ -50,9 +50,16 @@ class Discrete:
         a, b = x[t[:, 1]] - x[t[:, 0]], x[t[:, 2]] - x[t[:, 0]]
         self.area = 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
         self.gradient = np.stack([-side[..., 1], side[..., 0]], -1) / (2 * self.area)[:, None, None]
-        # (ε_xx, ε_yy, 2ε_xy) = B u_e at each quadrature point.
+        # ∇φ of each triangle at the quadrature points: on the straight one, then on its image under
+        # the map that moves the middles of sides, X ↦ X + Σ φ_m(X) offset_m, of Jacobian F.
         local = derivatives(POINTS[self.order], self.order)
-        gradient = np.einsum("qnk,ekd->eqnd", local, self.gradient)
+        straight = np.einsum("qnk,ekd->eqnd", local, self.gradient)
+        offsets = self.space.offsets(t[:, SIDES].reshape(-1, 2)).reshape(-1, 3, 2)
+        jacobian = np.eye(2) + np.einsum(
+            "emi,eqmj->eqij", offsets[:, :straight.shape[2] - 3], straight[:, :, 3:])
+        gradient = np.einsum("eqnj,eqjd->eqnd", straight, np.linalg.inv(jacobian))
+        self.weight = (self.area / len(local))[:, None] * np.linalg.det(jacobian)
+        # (ε_xx, ε_yy, 2ε_xy) = B u_e there.
         self.b = np.zeros((*gradient.shape[:2], 3, 2 * gradient.shape[2]))
         self.b[..., 0, 0::2] = self.b[..., 2, 1::2] = gradient[..., 0]
         self.b[..., 1, 1::2] = self.b[..., 2, 0::2] = gradient[..., 1]
@@ -60,8 +67,7 @@ class Discrete:
         self.dof = np.stack([2 * n, 2 * n + 1], -1).reshape(len(n), -1)
         self.law = {**DAMAGE, **scene.get("damage", {})}
         self.d = elasticity(scene["material"])
-        weight = self.area / gradient.shape[1]
-        self.element = np.einsum("eqki,kl,eqlj,e->eqij", self.b, self.d, self.b, weight)
+        self.element = np.einsum("eqki,kl,eqlj,eq->eqij", self.b, self.d, self.b, self.weight)
         self.boundaries = scene.get("boundary", [])
         self.contact = self._contact_rows()
         self.prescribed = self._prescribed()
@@ -93,36 +99,50 @@ class Discrete:
     def load(self, t):
         """∫ f_B·v by the midpoints of the sides (P1) or the points of the stiffness (P2), and
         ∫ f_N·v by two Gauss points an edge."""
-        x, load = self.mesh.nodes, np.zeros((len(self.points), 2))
+        x, load = self.points, np.zeros((len(self.points), 2))
         if "body" in self.scene:
-            inner = POINTS[2] if self.order == 2 else 0.5 - 0.5 * np.eye(3)
-            for barycentric in inner:
-                points = barycentric @ x[self.mesh.triangles]
-                force = pair(self.scene["body"]["force"], points, t) * (self.area / 3)[:, None]
-                for node, value in zip(self.elements.T, functions(barycentric, self.order)):
+            rule = (POINTS[2], self.weight.T)
+            if self.order == 1:
+                rule = (0.5 - 0.5 * np.eye(3), [self.area / 3] * 3)
+            for barycentric, weight in zip(*rule):
+                values = functions(barycentric, self.order)
+                points = np.einsum("n,end->ed", values, x[self.elements])
+                force = pair(self.scene["body"]["force"], points, t) * weight[:, None]
+                for node, value in zip(self.elements.T, values):
                     np.add.at(load, node, value * force)
         for boundary in self.boundaries:
             if "traction" not in boundary:
                 continue
             edges = self.mesh.edges(boundary["name"])
-            p, q = edges.T
-            length = np.linalg.norm(x[q] - x[p], axis=1)[:, None]
             for s in 0.5 + 0.5 / np.sqrt(3) * np.array([-1, 1]):
-                force = 0.5 * length * pair(boundary["traction"], x[p] + s * (x[q] - x[p]), t)
+                length = np.linalg.norm(self._tangents(edges, s), axis=1)[:, None]
                 values = functions(np.array([1 - s, s]), self.order)
+                points = np.einsum("n,end->ed", values, x[self.space.on(edges)])
+                force = 0.5 * length * pair(boundary["traction"], points, t)
                 for node, value in zip(self.space.on(edges).T, values):
                     np.add.at(load, node, value * force)
         return load.ravel()
 
+    def _tangents(self, edges, s):
+        """x'(s) of the edges x(s) = (1 − s) p + s q + 4s(1 − s) offset."""
+        p, q = self.mesh.nodes[edges].transpose(1, 0, 2)
+        return q - p + 4 * (1 - 2 * s) * self.space.offsets(edges)
+
     def faces(self, name):
         """Per node of a curve the (normal, length) it sees: the length-weighted mean of the
         adjacent edges' outward normals, or one for each side of a corner."""
-        edges = self.space.on(self.mesh.edges(name))
-        normals, lengths = self.mesh.outward_normals(name)
-        parts = {}
-        for edge, normal, length in zip(edges, normals, lengths):
-            for node, share in zip(edge, SHARES[self.order]):
-                parts.setdefault(int(node), []).append((normal, share * length))
+        edges, parts = self.mesh.edges(name), {}
+        outward, _ = self.mesh.outward_normals(name)
+        for nodes, s, share in zip(self.space.on(edges).T, (0, 1, 0.5), SHARES[self.order]):
+            dx, dy = self._tangents(edges, s).T
+            length = np.hypot(dx, dy)
+            normals = np.column_stack([dy, -dx]) / length[:, None]
+            # The side of the chord's normal is outside.
+            p, q = self.mesh.nodes[edges].transpose(1, 0, 2)
+            chord = q - p
+            turn = np.sign(chord[:, 1] * outward[:, 0] - chord[:, 0] * outward[:, 1])
+            for node, normal, part in zip(nodes, turn[:, None] * normals, share * length):
+                parts.setdefault(int(node), []).append((normal, part))
         return {node: merged(found) for node, found in parts.items()}
 
     def _contact_rows(self):

@@ -6,12 +6,14 @@ Run: /usr/bin/python3 validation/judge_check.py
 
 import itertools
 import sys
+from dataclasses import replace
 
 import numpy as np
 
 import random_bodies as bodies
 from discrete import Discrete
 from judge import expectation, judge_step, residuals
+from lagrange import SIDES
 from scene import of_order
 from variational import Step, along
 
@@ -86,6 +88,16 @@ def quadratic(order):
     x, y = step.discrete.points.T
     exact = np.stack((x**2 - x * y, 0.5 * y**2), 1).ravel()
     yield "quadratic field", np.abs(step.solve() - exact).max(), 1e-14
+    # Isoparametric elements have all affine fields.
+    mesh = square()
+    x, y = mesh.nodes[mesh.triangles[:, SIDES]].mean(axis=2).transpose(2, 0, 1)
+    moved = np.stack((x + 0.01 * np.sin(7 * x + 3 * y), y + 0.01 * np.cos(5 * x - 6 * y)), -1)
+    for condition in boundary:
+        condition["displacement"] = ["1 + 2*x - 3*y", "x + 0.5*y"]
+    step = step_of(replace(mesh, middles=moved), boundary, order)
+    x, y = step.discrete.points.T
+    exact = np.stack((1 + 2 * x - 3 * y, x + 0.5 * y), 1).ravel()
+    yield "curved sides: affine field", np.abs(step.solve() - exact).max(), 1e-14
 
 
 def opposite(order):

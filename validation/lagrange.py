@@ -58,8 +58,8 @@ class Lagrange:
 
 
 def functions(barycentric, order):
-    """The functions of an element (a triangle or an edge) at a point: its barycentric coordinates λ,
-    or for order 2 λ_i (2λ_i − 1) of the corners and 4λ_i λ_j of the middles."""
+    """The functions of an element (triangle or edge) at a point: its barycentric coordinates λ, or
+    for order 2 λ_i (2λ_i − 1) of the corners and 4λ_i λ_j of the middles."""
     if order == 1:
         return barycentric
     corners = len(barycentric)

@@ -7,6 +7,7 @@ so that nothing may rest on their order.
 
 import numpy as np
 
+from lagrange import SIDES, Lagrange
 from triangulation import Triangulation, edge_keys
 
 
@@ -181,16 +182,39 @@ def finish(rng, body, length, turn):
     return Triangulation(nodes, triangles, {name: number[edges] for name, edges in lines.items()})
 
 
+def bent(rng, mesh):
+    """The body of second order: the middles of its sides are left or moved across them, by up to a
+    twentieth of the least height of their triangles: more may fold these."""
+    t, x = mesh.triangles, mesh.nodes
+    ends = x[t[:, SIDES]]
+    chord = ends[:, :, 1] - ends[:, :, 0]
+    twice_area = chord[:, 0, 0] * -chord[:, 2, 1] + chord[:, 0, 1] * chord[:, 2, 0]
+    length = np.linalg.norm(chord, axis=2)
+    keys = edge_keys(t[:, SIDES].reshape(-1, 2), len(x))
+    _, edge = np.unique(keys, return_inverse=True)
+    height = np.full(edge.max() + 1, np.inf)
+    np.minimum.at(height, edge.ravel(), np.repeat(twice_area / length.max(axis=1), 3))
+    height *= rng.choice([0.0, 0.01, 0.05]) * rng.uniform(-1, 1, len(height))
+    # Of the two triangles at an edge both must move it to the same place.
+    forward = np.where(t[:, SIDES][:, :, 0] < t[:, SIDES][:, :, 1], 1.0, -1.0)
+    across = np.stack([chord[..., 1], -chord[..., 0]], -1) / length[..., None]
+    move = (forward * height[edge.reshape(-1, 3)])[..., None] * across
+    return Triangulation(x, t, mesh.curves, ends.mean(axis=2) + move)
+
+
 def write_msh(mesh, path):
     """MSH 2.2, text: numbers as Python prints them, which reads back exactly."""
+    space = Lagrange(mesh, 1 if mesh.middles is None else 2)
+    line, triangle = (1, 2) if mesh.middles is None else (8, 9)
     lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat"]
     lines += ["$PhysicalNames", str(len(mesh.curves) + 1)]
     lines += [f'1 {k} "{name}"' for k, name in enumerate(mesh.curves, 2)] + ['2 1 "body"']
-    lines += ["$EndPhysicalNames", "$Nodes", str(len(mesh.nodes))]
-    lines += [f"{i} {x!r} {y!r} 0" for i, (x, y) in enumerate(mesh.nodes.tolist(), 1)]
-    elements = [f"1 2 {k} {k} {a + 1} {b + 1}" for k, edges in enumerate(mesh.curves.values(), 2)
-                for a, b in edges]
-    elements += [f"2 2 1 1 {a + 1} {b + 1} {c + 1}" for a, b, c in mesh.triangles]
+    lines += ["$EndPhysicalNames", "$Nodes", str(len(space.points))]
+    lines += [f"{i} {x!r} {y!r} 0" for i, (x, y) in enumerate(space.points.tolist(), 1)]
+    tags = lambda nodes: " ".join(str(node + 1) for node in nodes)
+    elements = [f"{line} 2 {k} {k} {tags(nodes)}" for k, edges in enumerate(mesh.curves.values(), 2)
+                for nodes in space.on(edges)]
+    elements += [f"{triangle} 2 1 1 {tags(nodes)}" for nodes in space.elements]
     lines += ["$EndNodes", "$Elements", str(len(elements))]
     lines += [f"{i} {element}" for i, element in enumerate(elements, 1)]
     path.write_text("\n".join([*lines, "$EndElements", ""]), encoding="utf-8")

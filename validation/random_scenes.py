@@ -1,10 +1,11 @@
 #!/usr/bin/python3
-"""Judges the program on random scenes: random_scenes.py [--count N] [--seed S] [--order 2] [--binary FILE]
+"""Judges the program on random scenes: random_scenes.py [--count N] [--seed S] [--order 2] …
 
 Each scene (`random_draw`) is run with a drawn solver on one to three ranks, and its answer judged
-by code that shares nothing with the program (`judge`). Writes out/random/scenes.csv; scenes judged
-wrong or wrongly refused are kept in out/random/failures/ID with what was run, and make the exit
-code 1. `--again ID` runs a kept one once more; `--check` tries the judge itself (`judge_check`).
+by code that shares nothing with the program (`judge`). With displacements of order 2 bodies have
+curved sides. Writes out/random/scenes.csv; scenes judged wrong or wrongly refused are kept in
+out/random/failures/ID with what was run, and make the exit code 1. `--again ID` runs a kept one once
+more. (`judge_check` tries the judge itself.)
 """
 
 import argparse
@@ -26,8 +27,10 @@ from pathlib import Path
 # The judge's matrices are small: threads would only wait for each other.
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", SCOTCH_PTHREAD_NUMBER="1")
 
+import numpy as np  # noqa: E402
+
 from judge import Verdict, judge  # noqa: E402
-from random_bodies import write_msh  # noqa: E402
+from random_bodies import bent, write_msh  # noqa: E402
 from random_draw import draw  # noqa: E402
 from scene import of_order, read_scene, write_scene  # noqa: E402
 from solvers import solvers  # noqa: E402
@@ -100,6 +103,8 @@ def one(binary, out, seed, number, solver, order):
     """Draws, runs and judges scene `number`; keeps its files if it failed."""
     case = draw(seed, number, solvers(binary))
     case.solver, case.scene = solver or case.solver, of_order(case.scene, order)
+    if order == 2:
+        case.mesh = bent(np.random.default_rng([seed, number, order]), case.mesh)
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         write_msh(case.mesh, folder / "mesh.msh")
