@@ -7,12 +7,13 @@
 //   (0,0) _foundation-
 //
 // size     edge length far from the contact, in m
-// grading  edges are size/grading long within 8 mm of the lowest point (default
-//          0.16 mm), then grow by a fifth of the distance until they reach `size`.
+// grading  edges are size/grading long within 8 mm of the lowest point (default 25:
+//          0.16 mm; for sizes from 10 mm on 1, where an adapted mesh begins), then grow
+//          by a fifth of the distance until they reach `size`.
 
 DefineConstant[
   size = {0.004, Name "Parameters/size"},
-  grading = {25, Name "Parameters/grading"}
+  grading = {size < 0.01 ? 25 : 1, Name "Parameters/grading"}
 ];
 radius = 0.05;
 zone = 0.008;

@@ -42,7 +42,7 @@ pub fn compare(arguments: &CompareArguments) -> Result<(), Failure> {
     check_petsc(&arguments.petsc)?;
     let mut problems: Vec<DiscreteProblem> = Vec::new();
     for path in &arguments.scenes {
-        let (mut scene, mesh) = read(path, None, &arguments.set)?;
+        let (mut scene, mesh) = read(path, None, &arguments.set, false)?;
         scene.contact.rescue = false;
         if let Some(other) = problems.iter().find(|other| other.scene().name == scene.name) {
             return Err(Failure::input(format!(

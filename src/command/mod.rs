@@ -13,7 +13,7 @@ pub use run::{RunArguments, run};
 use ranks::require_one_process;
 use signorini::{
     contact::{self, REGISTRY, SOLVERS, TAO_TYPES, summaries},
-    mesh::{self, Mesh},
+    mesh::{self, Mesh, Order},
     output::terminal::say,
     scene::{MeshSource, Scene},
 };
@@ -77,9 +77,18 @@ fn check_petsc(options: &[String]) -> Result<(), Failure> {
     }
 }
 
+/// Where an accuracy is asked for, the first mesh of a `.geo` has about so many triangles along the body.
+const CELLS: f64 = 4.0;
+
 /// The scene at `path` with keys overridden by `set`, and its mesh, or another one in `file`; it is made
-/// where it is not there.
-fn read(path: &Path, file: Option<&Path>, set: &[String]) -> Result<(Scene, Mesh), Failure> {
+/// where it is not there. Where the scene asks for an accuracy and the mesh is to be adapted to it,
+/// that of a `.geo` is coarse.
+fn read(
+    path: &Path,
+    file: Option<&Path>,
+    set: &[String],
+    adapts: bool,
+) -> Result<(Scene, Mesh), Failure> {
     let mut scene = Scene::read(path, set).map_err(Failure::input)?;
     if let Some(file) = file {
         let replaced = std::mem::replace(&mut scene.mesh, MeshSource::from_path(file));
@@ -91,8 +100,13 @@ fn read(path: &Path, file: Option<&Path>, set: &[String]) -> Result<(Scene, Mesh
             ));
         }
     }
-    let mesh = mesh::load(&scene.mesh.file, &scene.mesh.parameters, scene.order)
-        .map_err(Failure::input)?;
+    let MeshSource { file, parameters } = &scene.mesh;
+    let mut parameters = parameters.clone();
+    if adapts && scene.accuracy.is_some() && file.extension().is_none_or(|kind| kind != "msh") {
+        let usual = mesh::load(file, &parameters, Order::Linear).map_err(Failure::input)?;
+        parameters.insert("size".to_owned(), mesh::extent(&usual.nodes) / CELLS);
+    }
+    let mesh = mesh::load(file, &parameters, scene.order).map_err(Failure::input)?;
     Ok((scene, mesh))
 }
 
@@ -106,7 +120,7 @@ pub fn solvers() -> Result<(), Failure> {
 pub fn mesh(scenes: &[PathBuf]) -> Result<(), Failure> {
     require_one_process()?;
     for path in scenes {
-        let (scene, mesh) = read(path, None, &[])?;
+        let (scene, mesh) = read(path, None, &[], false)?;
         let (nodes, triangles) = (mesh.nodes.len(), mesh.triangles.len());
         say(&format!("{}: {nodes} nodes, {triangles} triangles", scene.name));
     }

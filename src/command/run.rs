@@ -9,9 +9,11 @@ use super::{
 };
 use clap::Args;
 use signorini::{
-    evolution::{self, DiscreteProblem, Phases, RunError},
-    output,
+    evolution::{self, AdaptError, DiscreteProblem, Phases, RunError, SHARE_OF_STEPS},
+    mesh::{Mesh, Order},
+    output::{self, write_whole},
     petsc::Session,
+    scene::{Scene, Stepping},
 };
 use std::{
     path::{Path, PathBuf},
@@ -33,6 +35,10 @@ pub struct RunArguments {
         "Contact solver [default: the scene's, else {}]:\n{}", SOLVERS[0], summaries()
     ))]
     solver: Option<String>,
+    /// Choose order, mesh and time steps so that the estimated error of u (energy norm) and of the
+    /// damage is at most this, e.g. 0.01.
+    #[arg(long, value_name = "ERROR")]
+    accuracy: Option<f64>,
     /// Override a key of the scene, e.g. --set time.step=0.005; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -58,6 +64,39 @@ impl RunArguments {
         self.solver.iter().try_for_each(|name| check_solver("--solver", name))?;
         check_petsc(&self.petsc)
     }
+}
+
+/// Where the scene asks for an accuracy, a mesh that has it, and steps for it in the scene; else `mesh`.
+/// Whether it was adapted comes second. Collective.
+fn adapt(
+    session: &Session,
+    scene: &mut Scene,
+    mesh: Mesh,
+    solver: &str,
+) -> Result<(Mesh, bool), Failure> {
+    let Some(accuracy) = scene.accuracy else { return Ok((mesh, false)) };
+    let adapted = evolution::adapted(session, scene, mesh, solver, accuracy);
+    let adapted = adapted.map_err(|error| match error {
+        AdaptError::Setup(_) => Failure::input(error),
+        _ => error.into(),
+    })?;
+    if let Some(grid) = &mut scene.time {
+        grid.stepping = Stepping::Auto { tolerance: SHARE_OF_STEPS * accuracy };
+    }
+    let (order, triangles) = (scene.order, adapted.mesh.triangles.len());
+    let degree = if order == Order::Quadratic { 2 } else { 1 };
+    let reached = if adapted.exhausted { "NOT reached" } else { "reached" };
+    scene.notes.push(format!(
+        "accuracy {accuracy} {reached}: P{degree} on {triangles} triangles, mesh {} of those tried \
+         (kept as mesh.msh)",
+        adapted.rounds,
+    ));
+    if let Some(change) = adapted.stop_change {
+        scene.notes.push(format!(
+            "from the mesh before to this one, the time at which ζ_* is reached moved by {change:.1e} s"
+        ));
+    }
+    Ok((adapted.mesh, true))
 }
 
 /// `signorini run SCENE`, on as many ranks as `mpiexec` has started.
@@ -106,18 +145,28 @@ impl<'a> Task<'a> {
     ) -> Result<Self, Failure> {
         let comm = session.comm();
         let mesh = arguments.mesh.as_deref();
-        let load = || phases.time("mesh", || read(&arguments.scene, mesh, &arguments.set));
+        let set: Vec<String> = (arguments.set.iter().cloned())
+            .chain(arguments.accuracy.map(|error| format!("accuracy={error}")))
+            .collect();
+        let load = || phases.time("mesh", || read(&arguments.scene, mesh, &set, true));
         let of_root = agree(comm, comm.is_root().then(load).transpose())?;
-        let (scene, mesh) = agree(comm, of_root.map_or_else(load, Ok))?;
+        let (mut scene, mesh) = agree(comm, of_root.map_or_else(load, Ok))?;
         let solver = arguments.solver.as_ref().or(scene.contact.solver.as_ref());
         let solver = solver.map_or(SOLVERS[0], String::as_str).to_owned();
         let folder = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
+        let adapted = phases.time("adaptation", || adapt(session, &mut scene, mesh, &solver));
+        let (mesh, adapted) = agree(comm, adapted)?;
+        let kept = adapted.then(|| mesh.to_msh());
         let problem = phases.time("discrete problem", || DiscreteProblem::new(scene, mesh));
         let problem = agree(comm, problem.map_err(Failure::input))?;
         let problem = phases.time("partition", || problem.restrict(session));
         let problem = agree(comm, problem.map_err(Failure::from))?;
         let prepared = if comm.is_root() { output::prepare(&folder) } else { Ok(()) };
         agree(comm, prepared.map_err(Failure::input))?;
+        let kept = kept.filter(|_| comm.is_root());
+        let kept =
+            kept.map_or(Ok(()), |text| write_whole(&folder.join("mesh.msh"), text.as_bytes()));
+        agree(comm, kept.map_err(Failure::from))?;
 
         // The bounds of a node follow each other.
         let contact_nodes = problem.constraints.bounds.chunk_by(|a, b| a.node == b.node);

@@ -21,6 +21,7 @@
 //! vertices. For quadratic ones, φ and η_*(ζ)𝒜ε(u) are taken at three quadrature points. [`run`] is this loop; a step controller plans each step and judges it, so that steps
 //! may be chosen as well as uniform.
 
+mod adaptive;
 mod boundary_conditions;
 mod contact_step;
 mod damage_step;
@@ -36,6 +37,7 @@ mod step_controller;
 
 pub use crate::contact::ContactPoint;
 pub use crate::phases::Phases;
+pub use adaptive::{AdaptError, Adapted, SHARE_OF_STEPS, adapted};
 pub use boundary_conditions::Foundation;
 pub use contact_step::{Accuracy, ContactStep};
 pub use discrete_problem::{DiscreteProblem, SetupError};

@@ -17,6 +17,8 @@ pub struct Body {
     pub triangles: Vec<Triangle>,
     /// The first so many triangles belong to this rank; every triangle belongs to one rank.
     pub own_triangles: usize,
+    /// Index of each triangle in the undivided mesh.
+    pub global_triangles: Vec<usize>,
     /// The nodes of ζ: the vertices.
     pub vertices: Rc<Nodes>,
     /// The nodes of u: the vertices, and for P2 the midpoints of the edges.
@@ -144,6 +146,7 @@ impl Body {
             mesh,
             triangles,
             own_triangles,
+            global_triangles: (0..own_triangles).collect(),
             vertices,
             nodes,
             quadratic,

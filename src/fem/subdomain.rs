@@ -181,6 +181,7 @@ impl Subdomain {
             mesh,
             triangles: triangles.iter().map(|&t| undivided.triangles[t]).collect(),
             own_triangles,
+            global_triangles: triangles,
             nodes: match quadratic {
                 None => Rc::clone(&vertices),
                 Some(nodes) => nodes.restrict(&undivided.nodes),

@@ -43,6 +43,8 @@ pub struct Scene {
     pub damage: Option<Damage>,
     /// The order of the displacements.
     pub order: Order,
+    /// The largest relative error of u (energy norm) and of the damage: mesh and steps are then chosen.
+    pub accuracy: Option<f64>,
     /// The time grid; without it there is one static solve at t = 1.
     pub time: Option<TimeGrid>,
     /// Body force f_B, N/m³.

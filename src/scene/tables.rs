@@ -26,6 +26,9 @@ pub(super) fn scene(root: &mut Table, path: &Path, text: &SceneText) -> Reading<
     let mesh = root.get("mesh").table(".", |table| mesh(table, path));
     let material = root.get("material").table(".", material);
     let damage = root.get("damage").optional(|value| value.table(".", damage));
+    let accuracy = root.get("accuracy").optional(|value| {
+        value.number("between 1e-5 and 0.5", |error| (1e-5..=0.5).contains(&error))
+    });
     let order = root.get("discretisation").optional(|value| value.table(".", discretisation));
     let time = root.get("time").optional(|value| value.table(".", time));
     let body_force = root.get("body").optional(|value| {
@@ -44,7 +47,8 @@ pub(super) fn scene(root: &mut Table, path: &Path, text: &SceneText) -> Reading<
         mesh: mesh?,
         material: material?,
         damage: damage?,
-        order: order?.unwrap_or_default(),
+        order: order?.unwrap_or(if accuracy?.is_some() { Order::Quadratic } else { Order::Linear }),
+        accuracy: accuracy?,
         time,
         body_force: body_force?.flatten().unwrap_or([0.0; 2].map(Expression::constant)),
         contact: contact?.unwrap_or_default(),

@@ -5,7 +5,7 @@ use serde_json::Value;
 use signorini::contact::{REGISTRY, SOLVERS};
 use std::process::Stdio;
 
-const KEYS: [&str; 25] = [
+const KEYS: [&str; 26] = [
     "scene",
     "title",
     "solver",
@@ -25,6 +25,7 @@ const KEYS: [&str; 25] = [
     "contact_boundary",
     "contact_nodes",
     "contact_tangents",
+    "errors",
     "kkt",
     "wall_seconds",
     "seconds_per_step",

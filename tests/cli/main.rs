@@ -1,6 +1,7 @@
 //! The program from outside: exit codes, messages, and the files it leaves.
 
 mod accepted;
+mod accuracy;
 mod test_directory;
 mod failing;
 mod fields;

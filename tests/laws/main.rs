@@ -6,6 +6,7 @@
 
 mod support;
 
+mod adaptive;
 mod anderson;
 mod certificate;
 mod chosen_steps;

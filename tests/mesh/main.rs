@@ -22,3 +22,4 @@ mod geometries;
 mod malformed;
 mod reader;
 mod refine;
+mod writer;

@@ -6,6 +6,7 @@ mod byte_reader;
 mod contents;
 mod v2;
 mod v4;
+mod write;
 
 use super::{Mesh, MeshError};
 use byte_reader::{

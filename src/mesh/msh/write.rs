@@ -1,0 +1,63 @@
+//! Writes a mesh as text in MSH 2.2, of which gmsh and the reader make the same mesh again.
+
+use crate::mesh::Mesh;
+use std::fmt::Write;
+
+/// gmsh's element types: lines and triangles with straight and with curved sides.
+const LINES: [u8; 2] = [1, 8];
+const TRIANGLES: [u8; 2] = [2, 9];
+
+impl Mesh {
+    /// The text of an MSH file. Where an edge is curved, all elements are of second order.
+    #[must_use]
+    pub fn to_msh(&self) -> String {
+        let order = usize::from(!self.curved.is_empty());
+        let mut midpoints: Vec<([usize; 2], [f64; 2])> = Vec::new();
+        if order == 1 {
+            let sides = |&[a, b, c]: &[usize; 3]| [[a, b], [b, c], [c, a]];
+            let mut edges: Vec<[usize; 2]> = (self.triangles.iter().flat_map(sides))
+                .map(|[a, b]| [a.min(b), a.max(b)])
+                .collect();
+            edges.sort_unstable();
+            edges.dedup();
+            midpoints.extend(edges.into_iter().map(|edge| (edge, self.midpoint(edge))));
+        }
+        let middle = |[a, b]: [usize; 2]| {
+            let found = midpoints.binary_search_by_key(&[a.min(b), a.max(b)], |(edge, _)| *edge);
+            found.ok().map(|i| self.nodes.len() + i)
+        };
+
+        let mut elements = Vec::new();
+        let mut names = String::new();
+        for (group, (name, curve)) in (2..).zip(&self.curves) {
+            names += &format!("1 {group} \"{name}\"\n");
+            for &[a, b] in &curve.edges {
+                let nodes = [Some(a), Some(b), middle([a, b])];
+                elements.push((LINES[order], group, nodes.into_iter().flatten().collect()));
+            }
+        }
+        for &[a, b, c] in &self.triangles {
+            let sides = [[a, b], [b, c], [c, a]].into_iter().filter_map(middle);
+            let nodes: Vec<usize> = [a, b, c].into_iter().chain(sides).collect();
+            elements.push((TRIANGLES[order], 1, nodes));
+        }
+
+        let points = self.nodes.iter().chain(midpoints.iter().map(|(_, point)| point));
+        let mut text = format!(
+            "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n{}\n2 1 \"body\"\n{names}\
+             $EndPhysicalNames\n$Nodes\n{}\n",
+            self.curves.len() + 1,
+            self.nodes.len() + midpoints.len()
+        );
+        for (number, [x, y]) in (1..).zip(points) {
+            // Writing to a string does not fail.
+            let _ = writeln!(text, "{number} {x} {y} 0");
+        }
+        let _ = write!(text, "$EndNodes\n$Elements\n{}\n", elements.len());
+        for (number, (kind, group, nodes)) in (1..).zip(&elements) {
+            let nodes: Vec<String> = nodes.iter().map(|node| (node + 1).to_string()).collect();
+            let _ = writeln!(text, "{number} {kind} 2 {group} {group} {}", nodes.join(" "));
+        }
+        text + "$EndElements\n"
+    }
+}

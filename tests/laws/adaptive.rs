@@ -1,0 +1,69 @@
+//! Adapted meshes: the accuracy asked for is the accuracy got, with few triangles.
+
+use crate::support::{run, square};
+use signorini::{
+    contact::SOLVERS,
+    evolution::{self, Adapted, DiscreteProblem},
+    mesh::Mesh,
+    petsc::Session,
+    scene::Scene,
+};
+use std::{collections::BTreeMap, path::Path};
+
+/// A block on a foundation that ends under it: u ~ r^½ at the end, a jump of the traction besides.
+fn scene(accuracy: f64) -> Scene {
+    let text = format!(
+        "accuracy = {accuracy}
+         mesh.file = 'given.msh'
+         material = {{ young = 1000, poisson = 0.3, plane = 'stress' }}
+         boundary = [
+            {{ name = 'left', symmetry = true }},
+            {{ name = 'half', gap = 0 }},
+            {{ name = 'top', traction = ['0', '-1'] }},
+         ]"
+    );
+    Scene::parse(&text, Path::new("law.toml"), &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The unit square, of whose bottom the first half is a curve of its own.
+fn mesh(n: usize) -> Mesh {
+    let mut mesh = square(n);
+    let mut half = mesh.curves["bottom"].clone();
+    half.edges.retain(|edge| edge.iter().all(|&node| mesh.nodes[node][0] <= 0.5));
+    mesh.curves = BTreeMap::from([
+        ("half".to_owned(), half),
+        ("left".to_owned(), mesh.curves["left"].clone()),
+        ("top".to_owned(), mesh.curves["top"].clone()),
+    ]);
+    mesh
+}
+
+fn adapted(accuracy: f64) -> Adapted {
+    let session = Session::start(&[]).unwrap();
+    let found = evolution::adapted(&session, &scene(accuracy), mesh(2), SOLVERS[0], accuracy);
+    found.unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// fᵀu on a mesh: with a gap of zero fᵀu = ‖u‖², and ‖u − u_h‖² ≤ ‖u‖² − ‖u_h‖², the difference of
+/// twice the energies.
+fn work(mesh: Mesh) -> f64 {
+    let problem = DiscreteProblem::new(scene(0.1), mesh).unwrap_or_else(|error| panic!("{error}"));
+    run(&problem, SOLVERS[0]).last.record.work
+}
+
+#[test]
+fn the_error_is_at_most_the_one_asked_for_and_not_much_less() {
+    let exact = work(adapted(1e-3).mesh);
+    let mut triangles = Vec::new();
+    for accuracy in [0.1, 0.03, 0.01] {
+        let Adapted { mesh, error, exhausted, .. } = adapted(accuracy);
+        triangles.push(mesh.triangles.len() as f64);
+        let truth = (1.0 - work(mesh) / exact).sqrt();
+        println!("{accuracy}: estimated {error:.5}, true {truth:.5}, {triangles:?}");
+        assert!(!exhausted && error <= accuracy);
+        assert!(truth < accuracy && truth > 0.3 * accuracy, "{truth} for {accuracy}");
+        assert!(0.7 * truth < error && error < 1.4 * truth, "{error} for {truth}");
+    }
+    // P2 on adapted meshes: the error falls like 1/N, on uniform ones like N^-1/4 here.
+    assert!(triangles[2] < 1.5 * 10.0 * triangles[0], "{triangles:?}");
+}
