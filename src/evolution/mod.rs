@@ -18,8 +18,10 @@
 //!
 //! Affine displacements have one strain in a triangle. There φ is taken at the three vertices, from
 //! their ζ and that strain, and integrated as an affine function; and η_*(ζ) by its mean over the three
-//! vertices. For quadratic ones, φ and η_*(ζ)𝒜ε(u) are taken at three quadrature points. [`run`] is this loop; a step controller plans each step and judges it, so that steps
-//! may be chosen as well as uniform.
+//! vertices. For quadratic ones, φ and η_*(ζ)𝒜ε(u) are taken at three quadrature points.
+//!
+//! [`run`] is this loop; a step controller plans each step and judges it, so that steps may be chosen as
+//! well as uniform.
 
 mod adaptive;
 mod boundary_conditions;

@@ -6,8 +6,9 @@ use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector3};
 ///
 /// P1 is `Element<3, 1>`: gradients are constant and the point stands for the triangle. P2 is
 /// `Element<6, 3>`: the three vertices, then the midpoints of the sides 01, 12, 20, integrated at the
-/// points [`POINTS`] (exact for polynomials of degree 2 on straight triangles, which keeps the order
-/// of P2: Ciarlet, The Finite Element Method for Elliptic Problems, 1978, section 4.1).
+/// points (2/3, 1/6, 1/6) and its permutations (exact for polynomials of degree 2 on straight
+/// triangles, which keeps the order of P2: Ciarlet, The Finite Element Method for Elliptic Problems,
+/// 1978, section 4.1).
 #[derive(Debug, Clone, Copy)]
 pub struct Element<const N: usize, const Q: usize> {
     /// The quadrature points.

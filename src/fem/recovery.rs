@@ -5,8 +5,8 @@ use super::{
     body::for_elements,
     element::{POINTS, quadratic_values},
 };
-use crate::petsc::PetscError;
-use nalgebra::{Matrix6, Matrix6x3, Vector3, Vector6};
+use crate::{mesh::Mesh, petsc::PetscError};
+use nalgebra::{Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
 
 /// An estimate of the error of u in the energy norm, ‖v‖² = ∫ ζ Aε(v) : ε(v).
 #[derive(Debug, Clone)]
@@ -67,11 +67,10 @@ impl<'a> RecoveredStrains<'a> {
     /// points. Collective.
     pub fn energy_error(&self, elasticity: &Elasticity, zeta: &[f64], u: &[f64]) -> EnergyError {
         let Self { body, per_triangle, .. } = *self;
-        let product = |v: &Vector3<f64>, w: &Vector3<f64>| v.dot(&(elasticity.d * w));
         let square = |(t, triangle): (usize, &Triangle)| {
             let own = per_triangle * t..per_triangle * (t + 1);
             let mean = zeta[own].iter().sum::<f64>() / per_triangle as f64;
-            mean * triangle.area() * mean_square(&self.difference(t), product)
+            mean * triangle.area() * mean_square(&self.difference(t), &elasticity.d)
         };
         let own = body.triangles.iter().enumerate().take(body.own_triangles);
         let squares: Vec<f64> = own.map(square).collect();
@@ -145,6 +144,35 @@ fn sample_points<const N: usize, const Q: usize>(
     cells.nodes.iter().flat_map(|nodes| values.iter().map(move |v| place(nodes, v))).collect()
 }
 
+/// The triangles around each vertex, rising, in one list.
+struct TrianglesAround {
+    triangles: Vec<usize>,
+    /// Where those of each vertex end.
+    ends: Vec<usize>,
+}
+
+impl TrianglesAround {
+    fn new(mesh: &Mesh) -> Self {
+        // Where those of each vertex begin, then, as they are put there, end.
+        let mut ends = vec![0; mesh.nodes.len() + 1];
+        mesh.triangles.iter().flatten().for_each(|&vertex| ends[vertex + 1] += 1);
+        (1..ends.len()).for_each(|i| ends[i] += ends[i - 1]);
+        let mut triangles = vec![0; 3 * mesh.triangles.len()];
+        for (t, triangle) in mesh.triangles.iter().enumerate() {
+            for &vertex in triangle {
+                triangles[ends[vertex]] = t;
+                ends[vertex] += 1;
+            }
+        }
+        Self { triangles, ends }
+    }
+
+    fn of(&self, vertex: usize) -> &[usize] {
+        let first = vertex.checked_sub(1).map_or(0, |before| self.ends[before]);
+        &self.triangles[first..self.ends[vertex]]
+    }
+}
+
 /// The fit of each vertex.
 fn fits(
     body: &Body,
@@ -153,20 +181,18 @@ fn fits(
     per_triangle: usize,
 ) -> Result<Vec<Fit>, PetscError> {
     let (vertices, nodes) = (&body.mesh.nodes, body.mesh.nodes.len());
-    let mut around = vec![Vec::new(); nodes];
-    for (t, triangle) in body.mesh.triangles.iter().enumerate() {
-        triangle.iter().for_each(|&vertex| around[vertex].push(t));
-    }
+    let around = TrianglesAround::new(&body.mesh);
     let partition = &body.vertices.partition;
-    let own_fit = |vertex: usize| {
-        let own = around[vertex].iter().flat_map(|t| per_triangle * t..per_triangle * (t + 1));
-        fit(vertices[vertex], own.map(|q| (samples[q], strains[q])), per_triangle > 1)
+    let degree = if per_triangle > 1 { 2 } else { 1 };
+    let own_fit = |vertex: usize, degree: usize| {
+        let own = around.of(vertex).iter().flat_map(|t| per_triangle * t..per_triangle * (t + 1));
+        fit(vertices[vertex], own.map(|q| (samples[q], strains[q])), degree)
     };
     // Each vertex's fit (18 entries), and 1 where it has one.
     let mut fields = vec![[0.0; 19]; nodes];
     let known = |fit: Fit| std::array::from_fn(|i| fit.as_slice().get(i).copied().unwrap_or(1.0));
-    for vertex in (0..partition.owned()).filter(|&vertex| around[vertex].len() >= ENOUGH) {
-        fields[vertex] = known(own_fit(vertex));
+    for vertex in (0..partition.owned()).filter(|&vertex| around.of(vertex).len() >= ENOUGH) {
+        fields[vertex] = known(own_fit(vertex, degree));
     }
     partition.update(fields.as_flattened_mut(), 19)?;
     // The others have the mean of their neighbours' fits, layer by layer.
@@ -174,7 +200,7 @@ fn fits(
         let before = fields.clone();
         let mut added = false;
         for vertex in (0..partition.owned()).filter(|&vertex| before[vertex][18] == 0.0) {
-            let neighbours = around[vertex].iter().flat_map(|&t| body.mesh.triangles[t]);
+            let neighbours = around.of(vertex).iter().flat_map(|&t| body.mesh.triangles[t]);
             let fits = neighbours.filter(|&other| before[other][18] > 0.0).map(|other| {
                 let fit = Fit::from_column_slice(&before[other][..18]);
                 moved(&fit, vertices[other], vertices[vertex])
@@ -190,30 +216,31 @@ fn fits(
         }
         partition.update(fields.as_flattened_mut(), 19)?;
     }
-    // Pieces that have no vertex of enough triangles, strips for instance, are left.
+    // Pieces that have no vertex of enough triangles, strips for instance, are left. Of the degree of
+    // the strains themselves a fit is unique with a single triangle.
     for (vertex, field) in fields.iter_mut().enumerate().take(partition.owned()) {
         if field[18] == 0.0 {
-            *field = known(own_fit(vertex));
+            *field = known(own_fit(vertex, degree - 1));
         }
     }
     partition.update(fields.as_flattened_mut(), 19)?;
     Ok(fields.iter().map(|field| Fit::from_column_slice(&field[..18])).collect())
 }
 
-/// The polynomial about `centre` nearest to the strains at some points, in least squares.
+/// The polynomial of this degree about `centre` nearest to the strains at some points, in least squares.
 fn fit(
     centre: [f64; 2],
     samples: impl Iterator<Item = ([f64; 2], Vector3<f64>)> + Clone,
-    quadratic: bool,
+    degree: usize,
 ) -> Fit {
+    /// How many monomials there are up to each degree.
+    const COUNT: [usize; 3] = [1, 3, 6];
     let offset = |x: [f64; 2]| [x[0] - centre[0], x[1] - centre[1]];
     let size = samples.clone().map(|(x, _)| offset(x)).map(|[x, y]| x.hypot(y)).fold(0.0, f64::max);
     let (mut normal, mut rhs) = (Matrix6::zeros(), Fit::zeros());
     for (x, strain) in samples {
         let mut row = monomials(offset(x).map(|x| x / size));
-        if !quadratic {
-            row.fixed_rows_mut::<3>(3).fill(0.0);
-        }
+        row.rows_range_mut(COUNT[degree]..).fill(0.0);
         normal.ger(1.0, &row, &row, 1.0);
         rhs.ger(1.0, &row, &strain, 1.0);
     }
@@ -242,11 +269,8 @@ fn moved(fit: &Fit, from: [f64; 2], to: [f64; 2]) -> Fit {
     moved
 }
 
-/// ∫ v : v / |T| of a quadratic v on a triangle, from its values at vertices and midpoints.
-fn mean_square(
-    v: &[Vector3<f64>; 6],
-    product: impl Fn(&Vector3<f64>, &Vector3<f64>) -> f64,
-) -> f64 {
+/// ∫ Dv·v / |T| of a quadratic v on a triangle, from its values at vertices and midpoints.
+fn mean_square(v: &[Vector3<f64>; 6], d: &Matrix3<f64>) -> f64 {
     /// ∫ φ_i φ_j / |T| of P2, times 180.
     const MASS: [[f64; 6]; 6] = [
         [6.0, -1.0, -1.0, 0.0, -4.0, 0.0],
@@ -256,7 +280,8 @@ fn mean_square(
         [-4.0, 0.0, 0.0, 16.0, 32.0, 16.0],
         [0.0, -4.0, 0.0, 16.0, 16.0, 32.0],
     ];
+    let stresses = v.map(|v| d * v);
     let rows = MASS.iter().zip(v).flat_map(|(row, v)| row.iter().zip([v; 6]));
-    let pairs = rows.zip(v.iter().cycle());
-    pairs.map(|((mass, v), w)| mass / 180.0 * product(v, w)).sum()
+    let pairs = rows.zip(stresses.iter().cycle());
+    pairs.map(|((mass, v), stress)| mass / 180.0 * v.dot(stress)).sum()
 }

@@ -1,6 +1,8 @@
 //! One triangle, and the operators assembled from many.
 
-use crate::support::{Random, close, difference, distorted, largest, moved, turn, unstructured};
+use crate::support::{
+    ORDERS, Random, close, difference, distorted, largest, moved, turn, unstructured,
+};
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector};
 use signorini::{
     fem::{
@@ -121,28 +123,33 @@ fn corners(triangle: &Triangle) -> [[f64; 2]; 3] {
 
 #[test]
 fn rigid_motions_have_neither_strain_nor_force() {
-    let body = Body::new(unstructured(0.2), Order::Linear);
-    let zeta: Vec<f64> =
-        Random::new(4).field(body.triangles.len()).iter().map(|z| 1.5 + z).collect();
-    let elasticity = elasticity(Plane::Strain);
-    // u = a + θ e_z × x
-    let u: Vec<f64> =
-        body.mesh.nodes.iter().flat_map(|[x, y]| [0.3 - 0.7 * y, -1.1 + 0.7 * x]).collect();
-    assert!(largest(&elasticity.strain_squared(&body, &u)) < 1e-26);
-    assert!(largest(&elasticity.internal_force(&body, &zeta, &u)) < 1e-12 * YOUNG);
-    let stretched: Vec<f64> = body.mesh.nodes.iter().flat_map(|[x, _]| [1e-3 * x, 0.0]).collect();
-    for e2 in elasticity.strain_squared(&body, &stretched) {
-        close(e2 * 1e6, 1.0, 1e-12);
+    for order in ORDERS {
+        let body = Body::new(unstructured(0.2), order);
+        let zeta: Vec<f64> =
+            Random::new(4).field(3 * body.triangles.len()).iter().map(|z| 1.5 + z).collect();
+        let elasticity = elasticity(Plane::Strain);
+        // u = a + θ e_z × x
+        let u: Vec<f64> =
+            body.nodes.points.iter().flat_map(|[x, y]| [0.3 - 0.7 * y, -1.1 + 0.7 * x]).collect();
+        assert!(largest(&elasticity.strain_squared(&body, &u)) < 1e-26);
+        assert!(largest(&elasticity.internal_force(&body, &zeta, &u)) < 1e-12 * YOUNG);
+        let stretched: Vec<f64> =
+            body.nodes.points.iter().flat_map(|[x, _]| [1e-3 * x, 0.0]).collect();
+        for e2 in elasticity.strain_squared(&body, &stretched) {
+            close(e2 * 1e6, 1.0, 1e-12);
+        }
     }
 }
 
 #[test]
 fn shear_counts_twice_in_the_size_of_strain() {
-    // u = (γ y, 0): ε_xy = ε_yx = γ/2, |ε|² = 2 (γ/2)².
-    let body = Body::new(distorted(3), Order::Linear);
-    let u: Vec<f64> = body.mesh.nodes.iter().flat_map(|[_, y]| [0.4 * y, 0.0]).collect();
-    for e2 in elasticity(Plane::Stress).strain_squared(&body, &u) {
-        close(e2, 2.0 * 0.2_f64.powi(2), 1e-13);
+    for order in ORDERS {
+        // u = (γ y, 0): ε_xy = ε_yx = γ/2, |ε|² = 2 (γ/2)².
+        let body = Body::new(distorted(3), order);
+        let u: Vec<f64> = body.nodes.points.iter().flat_map(|[_, y]| [0.4 * y, 0.0]).collect();
+        for e2 in elasticity(Plane::Stress).strain_squared(&body, &u) {
+            close(e2, 2.0 * 0.2_f64.powi(2), 1e-13);
+        }
     }
 }
 
@@ -174,15 +181,19 @@ fn forces_turn_with_the_body() {
     // F(Ru) on the body turned by R is R F(u).
     let (mesh, angle) = (distorted(4), 1.234);
     let mut random = Random::new(6);
-    let zeta: Vec<f64> = mesh.triangles.iter().map(|_| 1.5 + random.next()).collect();
-    let u = random.field(2 * mesh.nodes.len());
     let turned =
         |v: &[f64]| -> Vec<f64> { v.chunks(2).flat_map(|v| turn(angle, [v[0], v[1]])).collect() };
     let elasticity = elasticity(Plane::Stress);
-    let force = elasticity.internal_force(&Body::new(mesh.clone(), Order::Linear), &zeta, &u);
-    let body = Body::new(moved(mesh, |x| turn(angle, x)), Order::Linear);
-    let error = difference(&elasticity.internal_force(&body, &zeta, &turned(&u)), &turned(&force));
-    assert!(error < 1e-13, "{error}");
+    for order in ORDERS {
+        let body = Body::new(mesh.clone(), order);
+        let zeta: Vec<f64> = (0..3 * body.triangles.len()).map(|_| 1.5 + random.next()).collect();
+        let u = random.field(2 * body.nodes.points.len());
+        let force = elasticity.internal_force(&body, &zeta, &u);
+        let body = Body::new(moved(mesh.clone(), |x| turn(angle, x)), order);
+        let error =
+            difference(&elasticity.internal_force(&body, &zeta, &turned(&u)), &turned(&force));
+        assert!(error < 1e-13, "{error}");
+    }
 }
 
 /// Bases at a third of the nodes, orthonormal and oblique, and a fixed unknown at some.
@@ -219,37 +230,41 @@ fn nodal_bases_keep_work_and_give_back_what_they_take() {
 
 #[test]
 fn the_assembled_stiffness_is_the_matrix_free_force_in_the_nodal_bases() {
-    let body = Body::new(unstructured(0.2), Order::Linear);
-    let session = Session::start(&[]).unwrap();
-    let (nodes, elasticity) = (body.mesh.nodes.len(), elasticity(Plane::Stress));
-    let mut random = Random::new(8);
-    let bases = bases(nodes, &mut random);
-    let mut stiffness = Stiffness::new(&session, &body, &elasticity, &bases).unwrap();
-    for _ in 0..3 {
-        let zeta: Vec<f64> = body.triangles.iter().map(|_| 1.5 + random.next()).collect();
-        stiffness.refill(&zeta).unwrap();
-        let fixed = bases.fixed();
-        let c: Vec<f64> =
-            (0..2 * nodes).map(|i| if fixed[i] { 0.0 } else { random.next() }).collect();
-        let (mut x, mut y) = (vector(&session, &c), vector(&session, &c));
-        stiffness.matrix.multiply(&x, &mut y).unwrap();
-        let product = y.read(<[f64]>::to_vec).unwrap();
+    let (mesh, session) = (unstructured(0.2), Session::start(&[]).unwrap());
+    let elasticity = elasticity(Plane::Stress);
+    for order in ORDERS {
+        let body = Body::new(mesh.clone(), order);
+        let nodes = body.nodes.points.len();
+        let mut random = Random::new(8);
+        let bases = bases(nodes, &mut random);
+        let mut stiffness = Stiffness::new(&session, &body, &elasticity, &bases).unwrap();
+        for _ in 0..3 {
+            let zeta: Vec<f64> = body.mesh.nodes.iter().map(|_| 1.5 + random.next()).collect();
+            let zeta = body.at_points(&zeta);
+            stiffness.refill(&zeta).unwrap();
+            let fixed = bases.fixed();
+            let c: Vec<f64> =
+                (0..2 * nodes).map(|i| if fixed[i] { 0.0 } else { random.next() }).collect();
+            let (mut x, mut y) = (vector(&session, &c), vector(&session, &c));
+            stiffness.matrix.multiply(&x, &mut y).unwrap();
+            let product = y.read(<[f64]>::to_vec).unwrap();
 
-        // K c = D⁻ᵀ F(D⁻¹ c) on the free unknowns, and the fixed are decoupled from them.
-        let mut u = c.clone();
-        bases.displacement_to_global(&mut u);
-        let mut force = elasticity.internal_force(&body, &zeta, &u);
-        bases.force_to_local(&mut force);
-        force.iter_mut().zip(fixed).for_each(|(f, fixed)| *f = if *fixed { 0.0 } else { *f });
-        let error = difference(&product, &force);
-        assert!(error < 1e-13, "{error}");
+            // K c = D⁻ᵀ F(D⁻¹ c) on the free unknowns, and the fixed are decoupled from them.
+            let mut u = c.clone();
+            bases.displacement_to_global(&mut u);
+            let mut force = elasticity.internal_force(&body, &zeta, &u);
+            bases.force_to_local(&mut force);
+            force.iter_mut().zip(fixed).for_each(|(f, fixed)| *f = if *fixed { 0.0 } else { *f });
+            let error = difference(&product, &force);
+            assert!(error < 1e-13, "{error}");
 
-        let only_fixed: Vec<f64> = fixed.iter().map(|f| if *f { 1.0 } else { 0.0 }).collect();
-        x.set(&only_fixed).unwrap();
-        stiffness.matrix.multiply(&x, &mut y).unwrap();
-        let product = y.read(<[f64]>::to_vec).unwrap();
-        let expected: Vec<f64> = only_fixed.iter().map(|f| f * stiffness.scale).collect();
-        assert_eq!(product, expected);
+            let only_fixed: Vec<f64> = fixed.iter().map(|f| if *f { 1.0 } else { 0.0 }).collect();
+            x.set(&only_fixed).unwrap();
+            stiffness.matrix.multiply(&x, &mut y).unwrap();
+            let product = y.read(<[f64]>::to_vec).unwrap();
+            let expected: Vec<f64> = only_fixed.iter().map(|f| f * stiffness.scale).collect();
+            assert_eq!(product, expected);
+        }
     }
 }
 

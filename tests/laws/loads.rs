@@ -1,9 +1,10 @@
 //! Nodal loads against the integrals they stand for.
 
-use crate::support::{close, distorted, moved, turn};
+use crate::support::{ORDERS, bent, close, curved_area, difference, distorted, moved, turn};
 use signorini::{
-    fem::{Body, add_body_force, add_traction},
-    mesh::Order,
+    fem::{Body, Edge, Elasticity, add_body_force, add_traction},
+    mesh::{Mesh, Order},
+    model::{Material, Plane},
 };
 
 /// Σ load_i and Σ x_i load_i, y_i load_i, component by component: as 1, x and y are in the
@@ -12,7 +13,7 @@ use signorini::{
 fn moments(body: &Body, load: &[f64]) -> [[f64; 3]; 2] {
     [0, 1].map(|k| {
         let mut sums = [0.0; 3];
-        for (i, [x, y]) in body.mesh.nodes.iter().enumerate() {
+        for (i, [x, y]) in body.nodes.points.iter().enumerate() {
             for (sum, weight) in sums.iter_mut().zip([1.0, *x, *y]) {
                 *sum += weight * load[2 * i + k];
             }
@@ -24,59 +25,162 @@ fn moments(body: &Body, load: &[f64]) -> [[f64; 3]; 2] {
 #[test]
 fn quadratic_tractions_are_integrated_exactly() {
     // On the top, y = 1: f = (1 − 2x + 6x², 3x²).
-    let body = Body::new(distorted(5), Order::Linear);
-    let mut load = vec![0.0; 2 * body.mesh.nodes.len()];
-    let f = |[x, _]: [f64; 2]| [1.0 - 2.0 * x + 6.0 * x * x, 3.0 * x * x];
-    add_traction(&body, &body.edges(&body.mesh.curves["top"].edges), f, &mut load);
-    let [horizontal, vertical] = moments(&body, &load);
-    // ∫f_x = 1 − 1 + 2, ∫x f_x = 1/2 − 2/3 + 6/4; ∫f_y = 1, ∫x f_y = 3/4.
-    for (value, expected) in horizontal.into_iter().zip([2.0, 4.0 / 3.0, 2.0]) {
-        close(value, expected, 1e-14);
-    }
-    for (value, expected) in vertical.into_iter().zip([1.0, 0.75, 1.0]) {
-        close(value, expected, 1e-14);
+    for order in ORDERS {
+        let body = Body::new(distorted(5), order);
+        let mut load = vec![0.0; 2 * body.nodes.points.len()];
+        let f = |[x, _]: [f64; 2]| [1.0 - 2.0 * x + 6.0 * x * x, 3.0 * x * x];
+        add_traction(&body, &body.edges(&body.mesh.curves["top"].edges), f, &mut load);
+        let [horizontal, vertical] = moments(&body, &load);
+        // ∫f_x = 1 − 1 + 2, ∫x f_x = 1/2 − 2/3 + 6/4; ∫f_y = 1, ∫x f_y = 3/4.
+        for (value, expected) in horizontal.into_iter().zip([2.0, 4.0 / 3.0, 2.0]) {
+            close(value, expected, 1e-14);
+        }
+        for (value, expected) in vertical.into_iter().zip([1.0, 0.75, 1.0]) {
+            close(value, expected, 1e-14);
+        }
     }
 }
 
 #[test]
 fn affine_body_forces_are_integrated_exactly() {
     // f = (2 − x + 3y, 6y) on the square.
-    let body = Body::new(distorted(5), Order::Linear);
-    let mut load = vec![0.0; 2 * body.mesh.nodes.len()];
-    add_body_force(&body, |[x, y]| [2.0 - x + 3.0 * y, 6.0 * y], &mut load);
-    let [horizontal, vertical] = moments(&body, &load);
-    // ∫xy = 1/4, ∫x² = 1/3.
-    for (value, expected) in horizontal.into_iter().zip([3.0, 17.0 / 12.0, 1.75]) {
-        close(value, expected, 1e-14);
-    }
-    for (value, expected) in vertical.into_iter().zip([3.0, 1.5, 2.0]) {
-        close(value, expected, 1e-14);
+    for order in ORDERS {
+        let body = Body::new(distorted(5), order);
+        let mut load = vec![0.0; 2 * body.nodes.points.len()];
+        add_body_force(&body, |[x, y]| [2.0 - x + 3.0 * y, 6.0 * y], &mut load);
+        let [horizontal, vertical] = moments(&body, &load);
+        // ∫xy = 1/4, ∫x² = 1/3.
+        for (value, expected) in horizontal.into_iter().zip([3.0, 17.0 / 12.0, 1.75]) {
+            close(value, expected, 1e-14);
+        }
+        for (value, expected) in vertical.into_iter().zip([3.0, 1.5, 2.0]) {
+            close(value, expected, 1e-14);
+        }
     }
 }
 
 #[test]
 fn a_pressure_all_around_has_no_resultant() {
     // ∮ν = 0 and ∮x × ν = 0 for any closed outline.
-    let body = Body::new(
-        moved(distorted(4), |[x, y]| turn(0.5, [x + 0.3 * y, y - 0.2 * x * y])),
-        Order::Linear,
-    );
-    let mut load = vec![0.0; 2 * body.mesh.nodes.len()];
+    for order in ORDERS {
+        let body = Body::new(
+            moved(distorted(4), |[x, y]| turn(0.5, [x + 0.3 * y, y - 0.2 * x * y])),
+            order,
+        );
+        let mut load = vec![0.0; 2 * body.nodes.points.len()];
+        for curve in body.mesh.curves.values() {
+            for edge in &curve.edges {
+                let [edge] = body.edges(&[*edge])[..] else { panic!("one edge") };
+                add_traction(&body, &[edge], |x| normal(&body, edge, x), &mut load);
+            }
+        }
+        let [[x, _, moment_x], [y, moment_y, _]] = moments(&body, &load);
+        assert!(load.iter().any(|f| f.abs() > 0.1));
+        assert!(x.abs() < 1e-15 && y.abs() < 1e-15 && (moment_y - moment_x).abs() < 1e-15);
+    }
+}
+
+/// The outward normal of a boundary edge at one of its Gauss points.
+fn normal(body: &Body, edge: Edge, x: [f64; 2]) -> [f64; 2] {
+    let distance = |s: f64| {
+        let [px, py] = edge.at(&body.nodes.points, s);
+        (x[0] - px).hypot(x[1] - py)
+    };
+    let [near, far] = [-1.0, 1.0].map(|sign| 0.5 + sign / 12.0_f64.sqrt());
+    let s = if distance(near) < distance(far) { near } else { far };
+    assert!(distance(s) < 1e-15);
+    let [dx, dy] = edge.tangent(&body.nodes.points, s);
+    [dy / dx.hypot(dy), -dx / dx.hypot(dy)]
+}
+
+/// A square of which all edges are parabolas.
+fn curved() -> Mesh {
+    bent(&distorted(4), |[x, y]| {
+        [x + 0.3 * y + 0.1 * (2.0 * y).sin(), y - 0.2 * x * y + 0.1 * x * x]
+    })
+}
+
+#[test]
+fn a_pressure_on_a_curved_boundary_has_the_resultant_and_moment_of_its_ends() {
+    // ∫ν ds is the way from end to end turned by −90°, ∫x × ν ds = −½ [|x|²]; on parabolas both
+    // are integrals of polynomials of degree three at most.
+    let body = Body::new(curved(), Order::Quadratic);
     for curve in body.mesh.curves.values() {
-        for edge in &curve.edges {
-            let normal = body.mesh.edge_normal(*edge).0;
-            add_traction(&body, &body.edges(&[*edge]), |_| normal, &mut load);
+        let mut load = vec![0.0; 2 * body.nodes.points.len()];
+        for edge in body.edges(&curve.edges) {
+            add_traction(&body, &[edge], |x| normal(&body, edge, x), &mut load);
+        }
+        let ends = curve.edges.iter().map(|edge| edge.map(|node| body.mesh.nodes[node]));
+        let square = |[x, y]: [f64; 2]| x * x + y * y;
+        let mut expected = [0.0; 3];
+        for [p, q] in ends {
+            let of_edge = [q[1] - p[1], p[0] - q[0], -0.5 * (square(q) - square(p))];
+            expected.iter_mut().zip(of_edge).for_each(|(sum, v)| *sum += v);
+        }
+        let [[x, _, moment_x], [y, moment_y, _]] = moments(&body, &load);
+        for (value, expected) in [x, y, moment_y - moment_x].into_iter().zip(expected) {
+            close(value, expected, 1e-14);
         }
     }
-    let [[x, _, moment_x], [y, moment_y, _]] = moments(&body, &load);
-    assert!(load.iter().any(|f| f.abs() > 0.1));
-    assert!(x.abs() < 1e-15 && y.abs() < 1e-15 && (moment_y - moment_x).abs() < 1e-15);
+}
+
+#[test]
+fn a_uniform_stress_is_in_equilibrium_with_its_traction_on_curved_elements() {
+    // u = (ax + by, cx + dy): ∫σ : ε(φ_i) = ∫_∂Ω σν·φ_i, to round-off by both quadratures.
+    let body = Body::new(curved(), Order::Quadratic);
+    let elasticity = Elasticity::new(Material { young: 3.0, poisson: 0.3, plane: Plane::Strain });
+    let u: Vec<f64> = (body.nodes.points.iter())
+        .flat_map(|[x, y]| [0.2 * x + 0.7 * y, 0.1 * x - 0.4 * y])
+        .collect();
+    let ones = vec![1.0; 3 * body.triangles.len()];
+    let force = elasticity.internal_force(&body, &ones, &u);
+    let stress = elasticity.stresses(&body, &ones, &u)[0];
+    let mut load = vec![0.0; u.len()];
+    for edge in body.mesh.curves.values().flat_map(|curve| body.edges(&curve.edges)) {
+        let traction = |x| {
+            let [nx, ny] = normal(&body, edge, x);
+            [stress[0] * nx + stress[2] * ny, stress[2] * nx + stress[1] * ny]
+        };
+        add_traction(&body, &[edge], traction, &mut load);
+    }
+    let error = difference(&load, &force);
+    assert!(error < 1e-13, "{error}");
+}
+
+#[test]
+fn body_forces_on_curved_elements_have_their_resultant() {
+    // x and the Jacobian are quadratic: a uniform f is integrated exactly.
+    let body = Body::new(curved(), Order::Quadratic);
+    let mut load = vec![0.0; 2 * body.nodes.points.len()];
+    add_body_force(&body, |_| [2.0, -3.0], &mut load);
+    let [[x, ..], [y, ..]] = moments(&body, &load);
+    let area = curved_area(&body.mesh);
+    close(x, 2.0 * area, 1e-14);
+    close(y, -3.0 * area, 1e-14);
+    close(body.area, area, 1e-14);
 }
 
 #[test]
 fn the_weights_of_the_nodes_add_up_to_the_area() {
-    let body = Body::new(distorted(6), Order::Linear);
-    close(body.nodes.weights.iter().sum(), 1.0, 1e-14);
-    let affine: Vec<f64> = body.mesh.nodes.iter().map(|[x, y]| 1.0 + 2.0 * x - y).collect();
-    close(body.mean(&affine), 1.5, 1e-14);
+    for order in ORDERS {
+        let body = Body::new(distorted(6), order);
+        close(body.nodes.weights.iter().sum(), 1.0, 1e-14);
+        let affine: Vec<f64> = body.mesh.nodes.iter().map(|[x, y]| 1.0 + 2.0 * x - y).collect();
+        close(body.mean(&affine), 1.5, 1e-14);
+        let affine = body.at_nodes(&affine);
+        close(affine.iter().zip(&body.nodes.weights).map(|(v, w)| v * w).sum(), 1.5, 1e-14);
+    }
+}
+
+#[test]
+fn the_weights_of_quadratic_nodes_are_those_of_the_midpoints() {
+    // ∫φ_i on straight triangles: 0 at the vertices, a third of each triangle at the middle of a side.
+    let body = Body::new(distorted(6), Order::Quadratic);
+    let (vertices, midpoints) = body.nodes.weights.split_at(body.mesh.nodes.len());
+    assert!(vertices.iter().all(|weight| weight.abs() < 1e-16));
+    assert!(midpoints.iter().all(|weight| *weight > 0.0));
+    // ∫x² + y² = 2/3, ∫|x − x̄|² = 1/6.
+    let square = |([x, y], weight): (&[f64; 2], &f64)| weight * (x * x + y * y);
+    close(body.nodes.points.iter().zip(&body.nodes.weights).map(square).sum(), 2.0 / 3.0, 1e-14);
+    close(body.polar_inertia, 1.0 / 6.0, 1e-14);
 }

@@ -26,6 +26,8 @@ mod orders;
 mod patch;
 mod pieces;
 mod pivoting;
+mod quadratic_elements;
+mod recovery;
 mod regression;
 mod rescue;
 mod rigid;

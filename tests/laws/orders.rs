@@ -1,10 +1,11 @@
 //! Orders of convergence to smooth manufactured solutions.
 
 use crate::support::{distorted, order, problem, run, unstructured};
+use nalgebra::Vector3;
 use signorini::{
     contact::SOLVERS,
     evolution::DiscreteProblem,
-    fem::Elements,
+    fem::{Elements, RecoveredStrains},
     mesh::{Mesh, twice_area},
 };
 use std::fmt::Write;
@@ -92,9 +93,11 @@ fn quadrature() -> Vec<([f64; 3], f64)> {
     line().flat_map(|a| line().map(move |b| point(a, b))).collect()
 }
 
-/// ‖u − u_h‖ in L² and |u − u_h| in H¹, on straight triangles.
-fn errors(problem: &DiscreteProblem, u: &[f64]) -> [f64; 2] {
-    let (body, mut squares) = (&problem.body, [0.0; 2]);
+/// ‖u − u_h‖ in L², |u − u_h| in H¹ and ‖u − u_h‖ in the energy norm with ζ = 1 − dx, on straight
+/// triangles.
+fn errors(problem: &DiscreteProblem, u: &[f64], d: f64) -> [f64; 3] {
+    let (body, mut squares) = (&problem.body, [0.0; 3]);
+    let stiffness = problem.elasticity.material.stiffness();
     for (t, corners) in body.mesh.triangles.iter().enumerate() {
         let nodes: Vec<usize> = match body.elements() {
             Elements::Linear(cells) => cells.nodes[t].to_vec(),
@@ -109,6 +112,7 @@ fn errors(problem: &DiscreteProblem, u: &[f64]) -> [f64; 2] {
             let place = [0, 1].map(|k| l[0] * a[k] + l[1] * b[k] + l[2] * c[k]);
             let (value, gradient) = (exact(place), gradient(place));
             let functions = nodal_functions(nodes.len(), l);
+            let mut off = [[0.0; 2]; 2];
             for k in 0..2 {
                 let sum = |of: &dyn Fn(&Function) -> f64| -> f64 {
                     nodes.iter().zip(&functions).map(|(&i, f)| u[2 * i + k] * of(f)).sum()
@@ -116,21 +120,34 @@ fn errors(problem: &DiscreteProblem, u: &[f64]) -> [f64; 2] {
                 squares[0] += 0.5 * twice * weight * (value[k] - sum(&|f| f.0)).powi(2);
                 for axis in 0..2 {
                     let slope = sum(&|f| (0..3).map(|i| f.1[i] * lambda[i][axis]).sum());
-                    squares[1] += 0.5 * twice * weight * (gradient[k][axis] - slope).powi(2);
+                    off[k][axis] = gradient[k][axis] - slope;
+                    squares[1] += 0.5 * twice * weight * off[k][axis].powi(2);
                 }
             }
+            let strain = Vector3::new(off[0][0], off[1][1], off[0][1] + off[1][0]);
+            let energy = (1.0 - d * place[0]) * strain.dot(&(stiffness * strain));
+            squares[2] += 0.5 * twice * weight * energy;
         }
     }
     squares.map(f64::sqrt)
 }
 
-/// Slopes over three meshes: `degree` in H¹ and one more in L².
+/// Slopes over three meshes: `degree` in H¹ and one more in L². The recovered strains know the error in
+/// the energy norm.
 fn check(meshes: [Mesh; 3], plane: &str, d: f64, degree: u8) {
     let size = |mesh: &Mesh| (mesh.triangles.len() as f64).powf(-0.5);
     let sizes = [size(&meshes[0]), size(&meshes[1]), size(&meshes[2])];
     let errors = meshes.map(|mesh| {
         let problem = manufactured(mesh, plane, d, degree);
-        errors(&problem, &run(&problem, SOLVERS[0]).last.state.u)
+        let state = run(&problem, SOLVERS[0]).last.state;
+        let errors = errors(&problem, &state.u, d);
+        let recovered = RecoveredStrains::new(&problem.body, &state.u).unwrap();
+        let zeta = problem.zeta_at_points(&state.zeta);
+        let estimate = recovered.energy_error(&problem.elasticity, &zeta, &state.u);
+        let ratio = estimate.error.sqrt() / errors[2];
+        println!("estimated over true: {ratio:.3}");
+        assert!((0.7..1.4).contains(&ratio), "{ratio} of {}", errors[2]);
+        errors
     });
     for (k, expected) in [f64::from(degree) + 1.0, f64::from(degree)].into_iter().enumerate() {
         let errors = [errors[0][k], errors[1][k], errors[2][k]];

@@ -204,3 +204,54 @@ fn a_quadratic_field_is_solved_exactly_with_quadratic_elements() {
         }
     }
 }
+
+/// σ_yy = −(p + cx) alone, in plane stress: u = (ν(px + cx²/2) + cy²/2, −(p + cx)y)/E. Simpson's weights
+/// of the nodes of an edge are exact for ∫pφ_i of an affine p.
+#[test]
+fn an_affine_pressure_is_exact_at_the_vertices_and_midpoints_of_any_foundation() {
+    let (p, c) = (7.0, 3.0);
+    for (name, mesh) in meshes() {
+        for angle in [0.0_f64, 0.7, -2.5] {
+            // (x, y) of the patch from the coordinates of the turned one.
+            let (s, k) = angle.sin_cos();
+            let (x, y) = (format!("({k}*x + {s}*y)"), format!("({k}*y - {s}*x)"));
+            let pressure = format!("({p} + {c}*{x})");
+            let load = turn(angle, [0.0, -1.0]).map(|f| format!("{f}*{pressure}"));
+            // The left side is carried to u_x = cy²/2E, with its tangential displacement free, by
+            // prescribing both components there: u_y = −py/E.
+            let left = [format!("{c}*{y}^2/2/{YOUNG}"), format!("(0 - {p}*{y}/{YOUNG})")];
+            let left = [
+                format!("{k}*{} - {s}*{}", left[0], left[1]),
+                format!("{s}*{} + {k}*{}", left[0], left[1]),
+            ];
+            let text = format!(
+                "discretisation.displacement = 2
+                 {}
+                 boundary = [
+                    {{ name = 'left', displacement = {left:?} }},
+                    {{ name = 'bottom', gap = 0 }},
+                    {{ name = 'top', traction = {load:?} }},
+                 ]",
+                material(Plane::Stress)
+            );
+            let mesh = moved(mesh.clone(), |x| turn(angle, x));
+            let exact = |point: &[f64; 2]| {
+                let [x, y] = turn(-angle, *point);
+                let across = POISSON * (p * x + 0.5 * c * x * x) + 0.5 * c * y * y;
+                turn(angle, [across / YOUNG, -(p + c * x) * y / YOUNG])
+            };
+            for solver in SOLVERS {
+                let problem = problem(mesh.clone(), &text).unwrap_or_else(|e| panic!("{e}"));
+                let state = run(&problem, solver).last.state;
+                let points = &problem.body.nodes.points;
+                let expected: Vec<f64> = points.iter().flat_map(exact).collect();
+                let error = difference(&state.u, &expected);
+                assert!(error < TOLERANCE, "{solver}, {name}, {angle}: {error:.1e}");
+                for point in &state.contact {
+                    let [x, _] = turn(-angle, points[point.node]);
+                    close_to(point.pressure, p + c * x, 1e-9);
+                }
+            }
+        }
+    }
+}

@@ -43,7 +43,14 @@ fn bounded(mesh: Mesh, boundaries: &str) -> Result<DiscreteProblem, SetupError> 
 }
 
 fn stands(mesh: Mesh, boundaries: &str) -> DiscreteProblem {
-    bounded(mesh, boundaries).unwrap_or_else(|e| panic!("{e}"))
+    of_order(1, mesh, boundaries)
+}
+
+/// With displacements of this order.
+fn of_order(order: u8, mesh: Mesh, boundaries: &str) -> DiscreteProblem {
+    let text = format!("discretisation.displacement = {order}\n{MATERIAL}");
+    let problem = problem(mesh, &format!("{text}\nboundary = [{boundaries}]"));
+    problem.unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn refusal(mesh: Mesh, boundaries: &str) -> String {
@@ -100,23 +107,33 @@ fn each_piece_moves_as_if_it_were_alone() {
         let placed: Vec<_> = pieces.iter().zip(places).map(|(m, x)| at(m.clone(), x)).collect();
         together(&placed, false)
     };
-    let whole = stands(mesh(), &[CLAMPED, PRESSED, PULLED].join(","));
-    let notes = whole.notes();
-    assert_eq!(notes.len(), 4, "{notes:?}");
-    assert!(notes[0].contains("the mesh has 3 pieces"), "{notes:?}");
-    assert!(notes[1..].iter().all(|note| note.contains("of the piece around (4.")), "{notes:?}");
-    assert_eq!((whole.motions.free.len(), whole.motions.resisted()), (3, 1));
-    for solver in SOLVERS {
-        let u = run(&whole, solver).last.state.u;
-        let mut first = 0;
-        for (k, boundaries) in [CLAMPED, PRESSED, PULLED].iter().enumerate() {
-            let mut mesh = at(pieces[k].clone(), places[k]);
-            let named = |(name, curve)| (format!("{name}{}", k + 1), curve);
-            mesh.curves = mesh.curves.into_iter().map(named).collect();
-            let alone = run(&stands(mesh, boundaries), solver).last.state.u;
-            let error = difference(&u[first..first + alone.len()], &alone);
-            assert!(error < 1e-8, "{solver}: piece {k} is off by {error:.1e}");
-            first += alone.len();
+    for order in [1, 2] {
+        let whole = of_order(order, mesh(), &[CLAMPED, PRESSED, PULLED].join(","));
+        let notes = whole.notes();
+        assert_eq!(notes.len(), 4, "{notes:?}");
+        assert!(notes[0].contains("the mesh has 3 pieces"), "{notes:?}");
+        assert!(
+            notes[1..].iter().all(|note| note.contains("of the piece around (4.")),
+            "{notes:?}"
+        );
+        assert_eq!((whole.motions.free.len(), whole.motions.resisted()), (3, 1));
+        for solver in SOLVERS {
+            let u = run(&whole, solver).last.state.u;
+            // All vertices come first, then all midpoints.
+            let (mut first, mut middle) = (0, 2 * whole.body.mesh.nodes.len());
+            for (k, boundaries) in [CLAMPED, PRESSED, PULLED].iter().enumerate() {
+                let vertices = 2 * pieces[k].nodes.len();
+                let mut mesh = at(pieces[k].clone(), places[k]);
+                let named = |(name, curve)| (format!("{name}{}", k + 1), curve);
+                mesh.curves = mesh.curves.into_iter().map(named).collect();
+                let alone = run(&of_order(order, mesh, boundaries), solver).last.state.u;
+                let (of_vertices, of_midpoints) =
+                    (first + vertices, middle + alone.len() - vertices);
+                let found = [&u[first..of_vertices], &u[middle..of_midpoints]].concat();
+                let error = difference(&found, &alone);
+                assert!(error < 1e-8, "{solver}: piece {k} is off by {error:.1e}");
+                (first, middle) = (of_vertices, of_midpoints);
+            }
         }
     }
 }
@@ -148,17 +165,22 @@ fn curves_of_one_name_on_several_pieces_hold_each() {
         let curve = Curve { edges: edges.collect(), interior_edges: 0 };
         mesh.curves.insert(name.into(), curve);
     }
-    let problem =
-        stands(mesh, "{ name = 'bottom', gap = 0 }, { name = 'top', traction = [0, -1] }");
-    assert_eq!((problem.motions.free.len(), problem.motions.resisted()), (2, 4));
-    for solver in SOLVERS {
-        let last = run(&problem, solver).last;
-        close(last.record.contact_force, 2.0, 1e-9);
-        // Σ area u·m = 0 for each free motion m.
-        for motion in &problem.motions.free {
-            let field = problem.motions.field(motion, &problem.body);
-            let dot = |i: usize| problem.body.nodes.weights[i / 2] * field[i] * last.state.u[i];
-            assert!((0..field.len()).map(dot).sum::<f64>().abs() < 1e-14);
+    for order in [1, 2] {
+        let problem = of_order(
+            order,
+            mesh.clone(),
+            "{ name = 'bottom', gap = 0 }, { name = 'top', traction = [0, -1] }",
+        );
+        assert_eq!((problem.motions.free.len(), problem.motions.resisted()), (2, 4));
+        for solver in SOLVERS {
+            let last = run(&problem, solver).last;
+            close(last.record.contact_force, 2.0, 1e-9);
+            // Σ area u·m = 0 for each free motion m.
+            for motion in &problem.motions.free {
+                let field = problem.motions.field(motion, &problem.body);
+                let dot = |i: usize| problem.body.nodes.weights[i / 2] * field[i] * last.state.u[i];
+                assert!((0..field.len()).map(dot).sum::<f64>().abs() < 1e-14);
+            }
         }
     }
 }
@@ -172,28 +194,34 @@ fn a_part_turns_about_the_node_it_hangs_on() {
 
     // A load through the hinge: the part rests but for what is free.
     let along = "{ name = 'top2', traction = [0, 1] }, { name = 'right2', traction = [1, 0] }";
-    let problem = stands(hinged(), &format!("{CLAMPED}, {along}"));
-    let [motion] = &problem.motions.free[..] else { panic!("one motion") };
-    assert_eq!(motion.parts.len(), 2);
-    assert!(problem.notes()[0].contains("meet in a single node, a hinge, as at (1.0000, 1.0000)"));
-    for solver in SOLVERS {
-        assert!(run(&problem, solver).kkt.within(1e-10));
+    for order in [1, 2] {
+        let problem = of_order(order, hinged(), &format!("{CLAMPED}, {along}"));
+        let [motion] = &problem.motions.free[..] else { panic!("one motion") };
+        assert_eq!(motion.parts.len(), 2);
+        assert!(
+            problem.notes()[0].contains("meet in a single node, a hinge, as at (1.0000, 1.0000)")
+        );
+        for solver in SOLVERS {
+            assert!(run(&problem, solver).kkt.within(1e-10));
+        }
+        // The motion has no strain: no forces.
+        let field = problem.motions.field(motion, &problem.body);
+        let zeta = vec![1.0; 3 * problem.body.triangles.len()];
+        let force = problem.elasticity.internal_force(&problem.body, &zeta, &field);
+        assert!(force.iter().all(|f| f.abs() < 1e-12), "{force:?}");
     }
-    // The motion has no strain: no forces.
-    let field = problem.motions.field(motion, &problem.body);
-    let zeta = vec![1.0; problem.body.triangles.len()];
-    let force = problem.elasticity.internal_force(&problem.body, &zeta, &field);
-    assert!(force.iter().all(|f| f.abs() < 1e-12), "{force:?}");
 }
 
 #[test]
 fn contact_holds_a_part_at_its_hinge_like_a_lever() {
-    // The gap is closed at (2, 1) only; the load 1 has its resultant half way to the hinge.
-    let lever = "{ name = 'bottom2', gap = '2 - x' }, { name = 'top2', traction = [0, -1] }";
-    let problem = stands(hinged(), &format!("{CLAMPED}, {lever}"));
-    assert_eq!((problem.motions.free.len(), problem.motions.resisted()), (0, 1));
-    for solver in SOLVERS {
-        close(run(&problem, solver).last.record.contact_force, 0.5, 1e-9);
+    for order in [1, 2] {
+        // The gap is closed at (2, 1) only; the load 1 has its resultant half way to the hinge.
+        let lever = "{ name = 'bottom2', gap = '2 - x' }, { name = 'top2', traction = [0, -1] }";
+        let problem = of_order(order, hinged(), &format!("{CLAMPED}, {lever}"));
+        assert_eq!((problem.motions.free.len(), problem.motions.resisted()), (0, 1));
+        for solver in SOLVERS {
+            close(run(&problem, solver).last.record.contact_force, 0.5, 1e-9);
+        }
     }
 }
 

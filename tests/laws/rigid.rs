@@ -12,7 +12,13 @@ use std::collections::BTreeMap;
 const MATERIAL: &str = "material = { young = 100, poisson = 0.3, plane = 'stress' }";
 
 fn bounded(mesh: Mesh, boundaries: &str) -> Result<DiscreteProblem, SetupError> {
-    problem(mesh, &format!("{MATERIAL}\nboundary = [{boundaries}]"))
+    of_order(1, mesh, boundaries)
+}
+
+/// The same with displacements of this order.
+fn of_order(order: u8, mesh: Mesh, boundaries: &str) -> Result<DiscreteProblem, SetupError> {
+    let text = format!("discretisation.displacement = {order}\n{MATERIAL}");
+    problem(mesh, &format!("{text}\nboundary = [{boundaries}]"))
 }
 
 /// The motions of a scene that stands.
@@ -22,8 +28,8 @@ fn motions(mesh: Mesh, boundaries: &str) -> RigidMotions {
 
 /// The motion that the load drives, in words.
 #[track_caller]
-fn driven(mesh: Mesh, boundaries: &str) -> String {
-    match bounded(mesh, boundaries) {
+fn driven(order: u8, mesh: Mesh, boundaries: &str) -> String {
+    match of_order(order, mesh, boundaries) {
         Err(SetupError::Driven { source, .. }) => source.motion.to_string(),
         Err(other) => panic!("{other}"),
         Ok(_) => panic!("the load was accepted"),
@@ -51,18 +57,20 @@ fn a_clamped_side_holds_the_body() {
 
 #[test]
 fn a_body_on_a_foundation_may_slide_but_not_sink_or_turn() {
-    let down = "{ name = 'bottom', gap = 0 }, { name = 'top', traction = [0, -1] }";
-    let problem = bounded(distorted(4), down).unwrap();
-    assert!(!problem.motions.all_prevented() && problem.motions.resisted() == 2);
-    let names: Vec<_> = problem.motions.free.iter().map(RigidMotion::to_string).collect();
-    assert_eq!(names, ["the horizontal translation"]);
-    assert_eq!(problem.notes().len(), 1);
-    for solver in SOLVERS {
-        // Of all answers the one that does not slide on average.
-        let u = run(&problem, solver).last.state.u;
-        let mean: f64 =
-            (problem.body.nodes.weights.iter().enumerate()).map(|(i, a)| a * u[2 * i]).sum();
-        assert!(mean.abs() < 1e-15 && largest(&u) > 1e-3);
+    for order in [1, 2] {
+        let down = "{ name = 'bottom', gap = 0 }, { name = 'top', traction = [0, -1] }";
+        let problem = of_order(order, distorted(4), down).unwrap();
+        assert!(!problem.motions.all_prevented() && problem.motions.resisted() == 2);
+        let names: Vec<_> = problem.motions.free.iter().map(RigidMotion::to_string).collect();
+        assert_eq!(names, ["the horizontal translation"]);
+        assert_eq!(problem.notes().len(), 1);
+        for solver in SOLVERS {
+            // Of all answers the one that does not slide on average.
+            let u = run(&problem, solver).last.state.u;
+            let mean: f64 =
+                (problem.body.nodes.weights.iter().enumerate()).map(|(i, a)| a * u[2 * i]).sum();
+            assert!(mean.abs() < 1e-15 && largest(&u) > 1e-3);
+        }
     }
 }
 
@@ -70,114 +78,129 @@ fn a_body_on_a_foundation_may_slide_but_not_sink_or_turn() {
 fn loads_that_nothing_balances_are_named_by_the_motion_they_drive() {
     let on_ground = |load: &str| {
         let ground = "{ name = 'bottom', gap = 0 }, { name = 'top', traction = ";
-        driven(square(4), &format!("{ground}{load} }}"))
+        driven(1, square(4), &format!("{ground}{load} }}"))
     };
     assert_eq!(on_ground("[1, -1]"), "the horizontal translation");
     assert_eq!(on_ground("[1e-6, -1]"), "the horizontal translation");
     assert_eq!(on_ground("[0, 1]"), "the vertical translation");
     let couple = "{ name = 'left', traction = [0, -1] }, { name = 'right', traction = [0, 1] }";
-    assert!(driven(square(4), couple).starts_with("the rotation about (0.5000, 0.5000)"));
+    assert!(driven(1, square(4), couple).starts_with("the rotation about (0.5000, 0.5000)"));
     // Held against sliding by an axis, a body is still lifted.
     let lifted = "{ name = 'left', symmetry = true }, { name = 'bottom', gap = 0 },
                   { name = 'top', traction = [0, 1] }";
-    assert_eq!(driven(square(4), lifted), "the vertical translation");
+    assert_eq!(driven(1, square(4), lifted), "the vertical translation");
 }
 
 #[test]
 fn a_load_tips_the_body_as_soon_as_its_resultant_leaves_the_support() {
-    // The foot is 0.3 ≤ x ≤ 0.7, the load 0.2 wide around its centre.
-    let scene = "{ name = 'foot', gap = 0 }, { name = 'load', traction = [0, -1] }";
-    for centre in [0.3, 0.4, 0.5, 0.7] {
-        let mesh = footed([0.3, 0.7], [centre - 0.1, centre + 0.1]);
-        assert!(bounded(mesh, scene).is_ok(), "{centre}");
-    }
-    for centre in [0.1, 0.2, 0.8, 0.9] {
-        let name = driven(footed([0.3, 0.7], [centre - 0.1, centre + 0.1]), scene);
-        assert!(name.starts_with("the rotation about"), "{name}");
+    for order in [1, 2] {
+        // The foot is 0.3 ≤ x ≤ 0.7, the load 0.2 wide around its centre.
+        let scene = "{ name = 'foot', gap = 0 }, { name = 'load', traction = [0, -1] }";
+        for centre in [0.3, 0.4, 0.5, 0.7] {
+            let mesh = footed([0.3, 0.7], [centre - 0.1, centre + 0.1]);
+            assert!(of_order(order, mesh, scene).is_ok(), "{centre}");
+        }
+        for centre in [0.1, 0.2, 0.8, 0.9] {
+            let name = driven(order, footed([0.3, 0.7], [centre - 0.1, centre + 0.1]), scene);
+            assert!(name.starts_with("the rotation about"), "{name}");
+        }
     }
 }
 
 #[test]
 fn a_body_about_to_tip_stands_on_one_edge() {
-    // The load 0.6 ≤ x ≤ 0.8 has its resultant above the end of the foot: all of the
-    // reaction, 0.2, is in that one node.
-    let scene = "{ name = 'foot', gap = 0 }, { name = 'load', traction = [0, -1] }";
-    for solver in SOLVERS {
-        let problem = bounded(footed([0.3, 0.7], [0.6, 0.8]), scene).unwrap();
-        let last = run(&problem, solver).last;
-        close(last.record.contact_force, 0.2, 1e-9);
-        for point in &last.state.contact {
-            let [x, _] = problem.body.mesh.nodes[point.node];
-            let force = if (x - 0.7).abs() < 1e-9 { 0.2 } else { 0.0 };
-            close(point.force, force, 1e-9);
+    for order in [1, 2] {
+        // The load 0.6 ≤ x ≤ 0.8 has its resultant above the end of the foot: all of the
+        // reaction, 0.2, is in that one node.
+        let scene = "{ name = 'foot', gap = 0 }, { name = 'load', traction = [0, -1] }";
+        for solver in SOLVERS {
+            let problem = of_order(order, footed([0.3, 0.7], [0.6, 0.8]), scene).unwrap();
+            let last = run(&problem, solver).last;
+            close(last.record.contact_force, 0.2, 1e-9);
+            for point in &last.state.contact {
+                let [x, _] = problem.body.nodes.points[point.node];
+                let force = if (x - 0.7).abs() < 1e-9 { 0.2 } else { 0.0 };
+                close(point.force, force, 1e-9);
+            }
         }
     }
 }
 
 #[test]
 fn a_body_that_nothing_holds_takes_balanced_loads() {
-    // Pulled by ±σ on opposite sides of a square turned by any angle: u = (σ/E)(x − x̄) along
-    // the pull and −ν as much across, less what of it is a rigid motion.
-    for angle in [0.0, 0.6, 2.0] {
-        let mesh = moved(distorted(5), |x| turn(angle, x));
-        let text = format!(
-            "{{ name = 'left', traction = {:?} }}, {{ name = 'right', traction = {:?} }}",
-            turn(angle, [-2.0, 0.0]),
-            turn(angle, [2.0, 0.0])
-        );
-        let problem = bounded(mesh, &text).unwrap();
-        assert_eq!(problem.motions.free.len(), 3);
-        let mut expected: Vec<f64> = (problem.body.mesh.nodes.iter())
-            .flat_map(|x| {
-                let [x, y] = turn(-angle, *x);
-                turn(angle, [0.02 * (x - 0.5), -0.006 * (y - 0.5)])
-            })
-            .collect();
-        problem.motions.remove_free(&problem.body, &mut expected);
-        let u = run(&problem, SOLVERS[0]).last.state.u;
-        let error = difference(&u, &expected);
-        assert!(error < 1e-12, "{error}");
-        // Σ area_i u_i·m(x_i) = 0 for each free motion m.
-        for motion in &problem.motions.free {
-            let nodes =
-                problem.body.mesh.nodes.iter().zip(&problem.body.nodes.weights).zip(u.chunks(2));
-            let share: f64 = nodes
-                .map(|((x, area), u)| {
-                    let m = motion.at(0, *x);
-                    area * (m[0] * u[0] + m[1] * u[1])
+    for order in [1, 2] {
+        // Pulled by ±σ on opposite sides of a square turned by any angle: u = (σ/E)(x − x̄) along
+        // the pull and −ν as much across, less what of it is a rigid motion.
+        for angle in [0.0, 0.6, 2.0] {
+            let mesh = moved(distorted(5), |x| turn(angle, x));
+            let text = format!(
+                "{{ name = 'left', traction = {:?} }}, {{ name = 'right', traction = {:?} }}",
+                turn(angle, [-2.0, 0.0]),
+                turn(angle, [2.0, 0.0])
+            );
+            let problem = of_order(order, mesh, &text).unwrap();
+            assert_eq!(problem.motions.free.len(), 3);
+            let mut expected: Vec<f64> = (problem.body.nodes.points.iter())
+                .flat_map(|x| {
+                    let [x, y] = turn(-angle, *x);
+                    turn(angle, [0.02 * (x - 0.5), -0.006 * (y - 0.5)])
                 })
-                .sum();
-            assert!(share.abs() < 1e-15, "{share}");
+                .collect();
+            problem.motions.remove_free(&problem.body, &mut expected);
+            let u = run(&problem, SOLVERS[0]).last.state.u;
+            let error = difference(&u, &expected);
+            assert!(error < 1e-12, "{error}");
+            // Σ area_i u_i·m(x_i) = 0 for each free motion m.
+            for motion in &problem.motions.free {
+                let nodes = problem
+                    .body
+                    .nodes
+                    .points
+                    .iter()
+                    .zip(&problem.body.nodes.weights)
+                    .zip(u.chunks(2));
+                let share: f64 = nodes
+                    .map(|((x, area), u)| {
+                        let m = motion.at(0, *x);
+                        area * (m[0] * u[0] + m[1] * u[1])
+                    })
+                    .sum();
+                assert!(share.abs() < 1e-15, "{share}");
+            }
         }
     }
 }
 
 #[test]
 fn a_body_without_load_rests() {
-    let problem = bounded(square(4), "{ name = 'top', traction = [0, 0] }").unwrap();
-    assert_eq!(problem.motions.free.len(), 3);
-    assert_eq!(problem.notes().len(), 3);
-    for solver in SOLVERS {
-        let outcome = run(&problem, solver);
-        assert!(outcome.last.state.u.iter().all(|u| *u == 0.0));
-        assert_eq!(outcome.kkt.worst(), 0.0);
+    for order in [1, 2] {
+        let problem = of_order(order, square(4), "{ name = 'top', traction = [0, 0] }").unwrap();
+        assert_eq!(problem.motions.free.len(), 3);
+        assert_eq!(problem.notes().len(), 3);
+        for solver in SOLVERS {
+            let outcome = run(&problem, solver);
+            assert!(outcome.last.state.u.iter().all(|u| *u == 0.0));
+            assert_eq!(outcome.kkt.worst(), 0.0);
+        }
     }
 }
 
 #[test]
 fn free_motions_are_orthonormal_over_the_body() {
-    let problem = bounded(distorted(4), "{ name = 'top', traction = [0, 0] }").unwrap();
-    let (body, free) = (&problem.body, &problem.motions.free);
-    for (i, a) in free.iter().enumerate() {
-        for (j, b) in free.iter().enumerate() {
-            let product: f64 = (body.mesh.nodes.iter().zip(&body.nodes.weights))
-                .map(|(x, area)| {
-                    let (a, b) = (a.at(0, *x), b.at(0, *x));
-                    area * (a[0] * b[0] + a[1] * b[1])
-                })
-                .sum();
-            // The square's area is 1, so a unit translation has length 1.
-            close(product, if i == j { 1.0 } else { 0.0 }, 1e-12);
+    for order in [1, 2] {
+        let problem = of_order(order, distorted(4), "{ name = 'top', traction = [0, 0] }").unwrap();
+        let (body, free) = (&problem.body, &problem.motions.free);
+        for (i, a) in free.iter().enumerate() {
+            for (j, b) in free.iter().enumerate() {
+                let product: f64 = (body.nodes.points.iter().zip(&body.nodes.weights))
+                    .map(|(x, area)| {
+                        let (a, b) = (a.at(0, *x), b.at(0, *x));
+                        area * (a[0] * b[0] + a[1] * b[1])
+                    })
+                    .sum();
+                // The square's area is 1, so a unit translation has length 1.
+                close(product, if i == j { 1.0 } else { 0.0 }, 1e-12);
+            }
         }
     }
 }

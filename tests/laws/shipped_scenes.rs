@@ -22,10 +22,25 @@ fn quick(name: &str) -> DiscreteProblem {
     shipped(name, sets)
 }
 
+/// The same with quadratic displacements.
+fn quick_quadratic(name: &str) -> DiscreteProblem {
+    let sets: &[&str] = match name {
+        "square" => &["mesh.size=0.125", "time.end=0.05", "time.step=0.005"],
+        "hertz" => &["mesh.size=0.016"],
+        "square-mild" | "square-table1" => &["mesh.size=0.125", "time.step=0.1"],
+        "lshape-rolling" => &["mesh.size=0.5", "time.step=0.05"],
+        "beam" => &["mesh.size=0.25", "time.step=0.1"],
+        _ => &["mesh.size=1", "time.step=0.2"],
+    };
+    shipped(name, &[sets, &["discretisation.displacement=2"]].concat())
+}
+
 #[test]
 fn all_solvers_agree_on_every_shipped_scene() {
-    for name in shipped_names() {
-        let problem = quick(&name);
+    let names = shipped_names();
+    let problems =
+        names.iter().flat_map(|name| [(name, quick(name)), (name, quick_quadratic(name))]);
+    for (name, problem) in problems {
         let all = SOLVERS.map(|solver| (solver, history(&problem, solver)));
         for (solver, (_, outcome)) in &all {
             assert!(outcome.kkt.within(1e-10), "{name}, {solver}: {}", outcome.kkt);
@@ -54,7 +69,8 @@ fn all_solvers_agree_on_every_shipped_scene() {
                 assert_eq!(step.record.active_nodes, other.record.active_nodes, "{name}, {solver}");
             }
             println!("{name}, {solver}: u {worst_u:.1e}, ζ {worst_zeta:.1e}, {}", outcome.kkt);
-            assert!(worst_zeta < 1e-10, "{name}, {solver}: ζ differs by {worst_zeta:.1e}");
+            // Contact is solved to 1e-10 in each step, which a slender beam enlarges.
+            assert!(worst_zeta < 1e-9, "{name}, {solver}: ζ differs by {worst_zeta:.1e}");
         }
     }
 }
@@ -92,50 +108,56 @@ fn contact_comes_in_several_pieces_under_a_wave() {
 /// The node of `problem` at a point.
 fn node_at(problem: &DiscreteProblem, [x, y]: [f64; 2]) -> usize {
     let near = |p: &[f64; 2]| (p[0] - x).hypot(p[1] - y) < 1e-8;
-    problem.body.mesh.nodes.iter().position(near).unwrap_or_else(|| panic!("no node at {x}, {y}"))
+    problem.body.nodes.points.iter().position(near).unwrap_or_else(|| panic!("no node at {x}, {y}"))
 }
 
 #[test]
 fn the_whole_bridge_is_symmetric_and_twice_its_half() {
-    let (whole, half) = (quick("bridge"), quick("bridge-half"));
-    assert_eq!(whole.motions.free.len(), 1);
-    assert!(half.motions.free.is_empty());
-    for solver in SOLVERS {
-        let full = run(&whole, solver).last;
-        let part = run(&half, solver).last;
-        let size = largest(&full.state.u);
-        let nodes = &whole.body.mesh.nodes;
-        for (i, [x, y]) in nodes.iter().enumerate() {
-            let m = node_at(&whole, [12.0 - x, *y]);
-            let (u, v) = (&full.state.u[2 * i..2 * i + 2], &full.state.u[2 * m..2 * m + 2]);
-            let error = (u[0] + v[0]).abs().max((u[1] - v[1]).abs());
-            assert!(error < 1e-8 * size, "{solver}: asymmetric by {error:.1e} at ({x}, {y})");
-            close(full.state.zeta[i], full.state.zeta[m], 1e-10);
-        }
-        for (i, x) in half.body.mesh.nodes.iter().enumerate() {
-            let j = node_at(&whole, *x);
-            for k in 0..2 {
-                let error = (part.state.u[2 * i + k] - full.state.u[2 * j + k]).abs();
-                assert!(error < 1e-8 * size, "{solver}: the half differs by {error:.1e}");
+    for quick in [quick, quick_quadratic] {
+        let (whole, half) = (quick("bridge"), quick("bridge-half"));
+        assert_eq!(whole.motions.free.len(), 1);
+        assert!(half.motions.free.is_empty());
+        for solver in SOLVERS {
+            let full = run(&whole, solver).last;
+            let part = run(&half, solver).last;
+            let full_zeta = whole.body.at_nodes(&full.state.zeta);
+            let part_zeta = half.body.at_nodes(&part.state.zeta);
+            let size = largest(&full.state.u);
+            let nodes = &whole.body.nodes.points;
+            for (i, [x, y]) in nodes.iter().enumerate() {
+                let m = node_at(&whole, [12.0 - x, *y]);
+                let (u, v) = (&full.state.u[2 * i..2 * i + 2], &full.state.u[2 * m..2 * m + 2]);
+                let error = (u[0] + v[0]).abs().max((u[1] - v[1]).abs());
+                assert!(error < 1e-8 * size, "{solver}: asymmetric by {error:.1e} at ({x}, {y})");
+                close(full_zeta[i], full_zeta[m], 1e-10);
             }
-            close(part.state.zeta[i], full.state.zeta[j], 1e-10);
+            for (i, x) in half.body.nodes.points.iter().enumerate() {
+                let j = node_at(&whole, *x);
+                for k in 0..2 {
+                    let error = (part.state.u[2 * i + k] - full.state.u[2 * j + k]).abs();
+                    assert!(error < 1e-8 * size, "{solver}: the half differs by {error:.1e}");
+                }
+                close(part_zeta[i], full_zeta[j], 1e-10);
+            }
+            // Nothing holds the bridge sideways: the answer given has ∫u_x = 0.
+            let area: f64 = whole.body.nodes.weights.iter().sum();
+            let drift: f64 =
+                (0..nodes.len()).map(|i| whole.body.nodes.weights[i] * full.state.u[2 * i]).sum();
+            assert!(drift.abs() < 1e-14 * area * size, "{drift}");
+            // 80 N/m² over 4 m, at t = 1.
+            close_to(full.record.contact_force, 320.0, 1e-10);
+            close_to(part.record.contact_force, 160.0, 1e-10);
+            close_to(full.record.work, 2.0 * part.record.work, 1e-8);
         }
-        // Nothing holds the bridge sideways: the answer given has ∫u_x = 0.
-        let area: f64 = whole.body.nodes.weights.iter().sum();
-        let drift: f64 =
-            (0..nodes.len()).map(|i| whole.body.nodes.weights[i] * full.state.u[2 * i]).sum();
-        assert!(drift.abs() < 1e-14 * area * size, "{drift}");
-        // 80 N/m² over 4 m, at t = 1.
-        close_to(full.record.contact_force, 320.0, 1e-10);
-        close_to(part.record.contact_force, 160.0, 1e-10);
-        close_to(full.record.work, 2.0 * part.record.work, 1e-8);
     }
 }
 
 #[test]
 fn contact_and_clamp_together_carry_the_load() {
     // Σ of all nodal residuals is minus the load: ∫f_N = (0, −80 t · 8) on the L.
-    for solver in SOLVERS {
+    for (solver, quick) in
+        SOLVERS.into_iter().flat_map(|s| [(s, quick as fn(&str) -> _), (s, quick_quadratic)])
+    {
         let problem = quick("lshape");
         let state = run(&problem, solver).last.state;
         let internal = problem.elasticity.internal_force(
@@ -144,8 +166,9 @@ fn contact_and_clamp_together_carry_the_load() {
             &state.u,
         );
         let load = problem.loads.at(&problem.body, state.time);
+        let edges = problem.body.edges(&problem.body.mesh.curves["clamp"].edges);
         let clamp: Vec<usize> =
-            problem.body.mesh.curves["clamp"].edges.iter().flatten().copied().collect();
+            edges.iter().flat_map(|edge| edge.ends.into_iter().chain(edge.middle)).collect();
         let reaction = |k: usize| -> f64 {
             let mut nodes = clamp.clone();
             nodes.sort_unstable();

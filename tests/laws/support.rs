@@ -3,7 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
-pub use common::{Random, square};
+pub use common::{Random, curved_area, square};
 
 use signorini::{
     evolution::{self, DiscreteProblem, Outcome, Phases, RunError, SetupError, Step},
@@ -46,20 +46,37 @@ pub fn unstructured(size: f64) -> Mesh {
         .collect();
     let body = "Curve Loop(1) = {1:4}; Plane Surface(1) = {1}; Physical Surface(\"body\") = {1};";
     fs::write(&geo, [corners, sides, body, &named].join("\n")).unwrap();
-    meshed(&geo, &[("size".to_owned(), size)].into())
+    meshed(&geo, &[("size".to_owned(), size)].into(), Order::Linear)
 }
+
+/// Both orders of the displacements.
+pub const ORDERS: [Order; 2] = [Order::Linear, Order::Quadratic];
 
 /// A mesh by gmsh. It cannot be started while MPI, as it starts in another test, changes the
 /// environment: so this waits for its turn at a session (and must not be called with one held).
-fn meshed(file: &Path, parameters: &BTreeMap<String, f64>) -> Mesh {
+fn meshed(file: &Path, parameters: &BTreeMap<String, f64>, order: Order) -> Mesh {
     drop(Session::start(&[]).unwrap());
-    mesh::load(file, parameters, Order::Linear).unwrap()
+    mesh::load(file, parameters, order).unwrap()
 }
 
 /// `mesh` with its nodes moved; the map must keep the orientation.
 pub fn moved(mut mesh: Mesh, place: impl Fn([f64; 2]) -> [f64; 2]) -> Mesh {
     mesh.nodes.iter_mut().for_each(|x| *x = place(*x));
     mesh
+}
+
+/// `mesh` with its vertices and the midpoints of its edges moved: all edges are curved.
+pub fn bent(mesh: &Mesh, place: impl Fn([f64; 2]) -> [f64; 2]) -> Mesh {
+    let mut bent = moved(mesh.clone(), &place);
+    let mean = |p: [f64; 2], q: [f64; 2]| [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])];
+    for [a, b, c] in &mesh.triangles {
+        for [p, q] in [[*a, *b], [*b, *c], [*c, *a]] {
+            let [x, y] = place(mean(mesh.nodes[p], mesh.nodes[q]));
+            let straight = mean(bent.nodes[p], bent.nodes[q]);
+            bent.set_offset([p, q], [x - straight[0], y - straight[1]]);
+        }
+    }
+    bent
 }
 
 /// x turned by `angle` about the origin.
@@ -77,6 +94,11 @@ pub fn problem(mesh: Mesh, text: &str) -> Result<DiscreteProblem, SetupError> {
 
 /// A shipped scene with `--set` arguments.
 pub fn shipped(name: &str, sets: &[&str]) -> DiscreteProblem {
+    shipped_with(name, sets, ["", ""])
+}
+
+/// The same with one text of its geometry replaced by another.
+pub fn shipped_with(name: &str, sets: &[&str], [old, new]: [&str; 2]) -> DiscreteProblem {
     let geo = Path::new(env!("CARGO_MANIFEST_DIR")).join("geo");
     // Meshes appear beside the geometry, so it is copied.
     let folder = tempfile::tempdir().unwrap();
@@ -89,7 +111,12 @@ pub fn shipped(name: &str, sets: &[&str]) -> DiscreteProblem {
     let sets: Vec<String> = sets.iter().map(|s| (*s).to_owned()).collect();
     let scene = folder.path().join(name).with_extension("toml");
     let scene = Scene::read(&scene, &sets).unwrap_or_else(|e| panic!("{e}"));
-    let mesh = meshed(&scene.mesh.file, &scene.mesh.parameters);
+    if !old.is_empty() {
+        let geometry = fs::read_to_string(&scene.mesh.file).unwrap();
+        assert!(geometry.contains(old));
+        fs::write(&scene.mesh.file, geometry.replace(old, new)).unwrap();
+    }
+    let mesh = meshed(&scene.mesh.file, &scene.mesh.parameters, scene.order);
     DiscreteProblem::new(scene, mesh).unwrap_or_else(|e| panic!("{e}"))
 }
 

@@ -7,9 +7,10 @@ use signorini::{contact::SOLVERS, evolution::Step};
 
 /// All steps of a small square that is bent down and damaged on a foundation that falls away from
 /// it, with lengths in units of 1/`length` m and stresses in units of 1/`stress` Pa.
-fn scene(length: f64, stress: f64, stepping: &str, solver: &str) -> Vec<Step> {
+fn scene(length: f64, stress: f64, stepping: &str, solver: &str, order: u8) -> Vec<Step> {
     let text = format!(
-        "material = {{ young = {:e}, poisson = 0.3, plane = 'stress' }}
+        "discretisation.displacement = {order}
+         material = {{ young = {:e}, poisson = 0.3, plane = 'stress' }}
          damage = {{ diffusion = {:e}, lambda_d = 0.25, lambda_u = 40, lambda_w = 0,
                      strain_cap = 1000, threshold = 0.01, initial = 1 }}
          time = {{ end = 1, {stepping} }}
@@ -32,14 +33,19 @@ fn scene(length: f64, stress: f64, stepping: &str, solver: &str) -> Vec<Step> {
 fn units_do_not_matter() {
     let units = [(1e3, 1e-9), (1.0, 1e9), (1e-3, 1.0), (1.0, 1e-6)];
     for solver in SOLVERS {
-        for stepping in ["step = 0.1", "step = 'auto', tolerance = 0.002"] {
-            let si = scene(1.0, 1.0, stepping, solver);
+        let stepping = ["step = 0.1", "step = 'auto', tolerance = 0.002"];
+        for (stepping, order) in stepping.into_iter().flat_map(|s| [(s, 1), (s, 2)]) {
+            let si = scene(1.0, 1.0, stepping, solver, order);
             let active = si.iter().map(|step| step.record.active_nodes);
-            assert!(active.clone().max().unwrap() < 9 && active.min().unwrap() > 0);
+            assert!(
+                active.clone().max().unwrap() < 8 * usize::from(order) + 1
+                    && active.min().unwrap() > 0
+            );
             assert!(si.last().unwrap().record.zeta_min < 0.9, "the damage law is at work");
             for (length, stress) in units {
-                let name = format!("{solver}, {stepping}, m * {length:e}, Pa * {stress:e}");
-                let other = scene(length, stress, stepping, solver);
+                let name =
+                    format!("P{order}, {solver}, {stepping}, m * {length:e}, Pa * {stress:e}");
+                let other = scene(length, stress, stepping, solver, order);
                 assert_eq!(si.len(), other.len(), "{name}");
                 let all = |steps: &[Step]| steps.iter().map(|s| s.record.iterations).sum();
                 same_iterations(solver, all(&si), all(&other));

@@ -85,6 +85,22 @@ const CASES: &[(&str, &str, &[&str])] = &[
     ("[0, \"-t\"]", "[0, 1, 2]", &["bad.toml:22: body.force must have two components, but has 3"]),
     ("[0, \"-t\"]", "[0, [1]]", &["bad.toml:22: body.force[1] must be a number or an expression"]),
     ("end = 1.0\nstep = 0.01", "", &["bad.toml:18: time.end is required but missing"]),
+    (
+        "[material]",
+        "[discretisation]\ndisplacement = \"2\"\n[material]",
+        &["bad.toml:7: discretisation.displacement must be a number"],
+    ),
+    (
+        "[material]",
+        "[discretisation]\ndisplacment = 2\n[material]",
+        &["bad.toml:7: unknown key discretisation.displacment", "did you mean `displacement`?"],
+    ),
+    (
+        "[material]",
+        "[discretization]\ndisplacement = 2\n[material]",
+        &["bad.toml:6: unknown key discretization", "did you mean `discretisation`?"],
+    ),
+    ("[mesh]", "discretisation = 2\n[mesh]", &["bad.toml:2: discretisation must be a table"]),
     ("title = \"Base\"", "title = 3", &["bad.toml:1: title must be a string"]),
 ];
 

@@ -10,6 +10,7 @@ mod set;
 use std::path::{Path, PathBuf};
 
 use signorini::fem::Mass;
+use signorini::mesh::Order;
 use signorini::model::Plane;
 use signorini::scene::{Condition, MeshSource, Scene, Stepping, TimeGrid};
 
@@ -155,5 +156,16 @@ fn the_time_grid_is_uniform_and_not_coarser_than_asked() {
         assert_eq!(grid.stepping, Stepping::Uniform { steps }, "{end} by {step}");
         assert!(end / steps as f64 <= step * (1.0 + 1e-8));
         assert_eq!(grid.end, end);
+    }
+}
+
+#[test]
+fn displacements_are_of_order_one_unless_the_scene_says_two() {
+    let order = |sets: &[String]| {
+        Scene::parse(BASE, Path::new("base.toml"), sets).unwrap_or_else(|e| panic!("{e}")).order
+    };
+    assert_eq!(order(&[]), Order::Linear);
+    for (value, expected) in [("1", Order::Linear), ("2", Order::Quadratic)] {
+        assert_eq!(order(&[format!("discretisation.displacement={value}")]), expected);
     }
 }

@@ -26,6 +26,17 @@ fn every_rule_names_file_line_and_key() {
             &["bad.toml:8: material.poisson must be between -1 and"],
         ),
         ("poisson = 0.3", "poisson = -1", &["bad.toml:8: material.poisson must be between -1 and"]),
+        // Discretisation.
+        (
+            "[material]",
+            "[discretisation]\ndisplacement = 3\n[material]",
+            &["bad.toml:7: discretisation.displacement must be 1 or 2, but is 3"],
+        ),
+        (
+            "[material]",
+            "[discretisation]\ndisplacement = 1.5\n[material]",
+            &["bad.toml:7: discretisation.displacement must be 1 or 2, but is 1.5"],
+        ),
         // Damage.
         ("diffusion = 1.0", "diffusion = 0", &["bad.toml:11: damage.diffusion must be positive"]),
         ("lambda_d = 0.25", "lambda_d = -1", &["bad.toml:12: damage.lambda_d must be at least 0"]),

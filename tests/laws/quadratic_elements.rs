@@ -1,0 +1,220 @@
+//! The P2 elements, straight and curved, against formulas of their own: fields are interpolated as
+//! Σ λ_i v_i + Σ 4λ_iλ_j (v_ij − (v_i + v_j)/2), and derived by central differences, which are exact.
+
+use crate::support::{Random, bent, close, curved_area, difference, distorted};
+use nalgebra::{Matrix2, Matrix3, SMatrix, SVector};
+use signorini::{
+    fem::{Body, Elasticity, Element, Elements, Mass, source, source_load},
+    mesh::{Mesh, Order},
+    model::{DamageLaw, Material, Plane},
+};
+
+type Quadratic = Element<6, 3>;
+
+const MATERIAL: Material = Material { young: 2.1e5, poisson: 0.3, plane: Plane::Stress };
+
+/// Barycentric coordinates of the three quadrature points.
+const POINTS: [[f64; 3]; 3] = {
+    let (near, far) = (2.0 / 3.0, 1.0 / 6.0);
+    [[near, far, far], [far, near, far], [far, far, near]]
+};
+
+/// The value at λ of a field with these values at vertices and midpoints.
+fn interpolate(values: &[[f64; 2]; 6], l: [f64; 3]) -> [f64; 2] {
+    [0, 1].map(|k| {
+        let side = |i: usize| {
+            let j = (i + 1) % 3;
+            4.0 * l[i] * l[j] * (values[3 + i][k] - 0.5 * (values[i][k] + values[j][k]))
+        };
+        (0..3).map(|i| l[i] * values[i][k] + side(i)).sum()
+    })
+}
+
+/// The derivatives by λ_1 and λ_2 there (columns).
+fn derivatives(values: &[[f64; 2]; 6], [a, b, c]: [f64; 3]) -> Matrix2<f64> {
+    let h = 0.125;
+    let slope = |forth: [f64; 3], back: [f64; 3]| {
+        let [p, q] = [forth, back].map(|l| interpolate(values, l));
+        [0, 1].map(|k| (p[k] - q[k]) / (2.0 * h))
+    };
+    let first = slope([a - h, b + h, c], [a + h, b - h, c]);
+    let second = slope([a - h, b, c + h], [a + h, b, c - h]);
+    Matrix2::new(first[0], second[0], first[1], second[1])
+}
+
+/// The weight det J/6 and ∇u at a point of the element with these nodes.
+fn gradient(nodes: &[[f64; 2]; 6], u: &[[f64; 2]; 6], l: [f64; 3]) -> (f64, Matrix2<f64>) {
+    let jacobian = derivatives(nodes, l);
+    (jacobian.determinant() / 6.0, derivatives(u, l) * jacobian.try_inverse().unwrap())
+}
+
+/// Nodes of elements of all shapes that are neither too thin nor folded: straight ones, and some
+/// with parabolas for sides.
+fn shapes() -> Vec<[[f64; 2]; 6]> {
+    let mut random = Random::new(11);
+    let shapes = (0..200).map(|n| {
+        let vertices: [[f64; 2]; 3] = std::array::from_fn(|_| [random.next(), random.next()]);
+        let bulge = if n % 2 == 0 { 0.0 } else { 0.1 };
+        std::array::from_fn(|i| match i {
+            0..3 => vertices[i],
+            _ => [0, 1].map(|k| {
+                let mean = 0.5 * (vertices[i - 3][k] + vertices[(i - 2) % 3][k]);
+                mean + bulge * random.next()
+            }),
+        })
+    });
+    let thick =
+        |nodes: &[[f64; 2]; 6]| POINTS.iter().all(|&l| derivatives(nodes, l).determinant() > 0.1);
+    shapes.filter(thick).collect()
+}
+
+fn stiffness(element: &Quadratic, d: &Matrix3<f64>) -> SMatrix<f64, 12, 12> {
+    SMatrix::from_fn(|i, j| {
+        let of_point = element.points.iter().map(|point| point.stiffness(d, i / 2, j / 2));
+        of_point.map(|block| block[(i % 2, j % 2)]).sum()
+    })
+}
+
+#[test]
+fn the_stiffness_is_symmetric_and_vanishes_on_three_rigid_motions_only() {
+    assert!(shapes().len() > 40);
+    for plane in [Plane::Stress, Plane::Strain] {
+        let d = Material { plane, ..MATERIAL }.stiffness();
+        for nodes in shapes() {
+            let k = stiffness(&Quadratic::new(nodes), &d);
+            assert!((k - k.transpose()).amax() <= 1e-14 * k.amax());
+            let mut values: Vec<f64> = k.symmetric_eigenvalues().iter().copied().collect();
+            values.sort_by(f64::total_cmp);
+            let most = values[11];
+            assert!(values[..3].iter().all(|v| v.abs() < 1e-12 * most), "{values:?}");
+            assert!(values[3] > 1e-7 * most, "{values:?}");
+        }
+    }
+}
+
+#[test]
+fn forces_are_the_stiffness_times_the_displacements() {
+    let d = MATERIAL.stiffness();
+    let mut random = Random::new(12);
+    for nodes in shapes() {
+        let element = Quadratic::new(nodes);
+        let u: [[f64; 2]; 6] = std::array::from_fn(|_| [random.next(), random.next()]);
+        let mut force = SVector::<f64, 12>::zeros();
+        for point in &element.points {
+            let of_point = point.force(&(d * point.strain(&u)));
+            force += SVector::<f64, 12>::from_iterator(of_point.into_iter().flatten());
+        }
+        let u = SVector::<f64, 12>::from_iterator(u.into_iter().flatten());
+        let error = (stiffness(&element, &d) * u - force).amax();
+        assert!(error <= 1e-12 * force.amax(), "{error}");
+    }
+}
+
+#[test]
+fn weights_and_gradients_are_those_of_the_parabolic_map() {
+    let mut random = Random::new(13);
+    for nodes in shapes() {
+        let element = Quadratic::new(nodes);
+        let u: [[f64; 2]; 6] = std::array::from_fn(|_| [random.next(), random.next()]);
+        for (point, l) in element.points.iter().zip(POINTS) {
+            let (weight, expected) = gradient(&nodes, &u, l);
+            close(point.weight / weight, 1.0, 1e-13);
+            assert!((point.gradient(&u) - expected).amax() <= 1e-12 * expected.amax());
+        }
+    }
+}
+
+/// A square of which all edges are parabolas.
+fn curved() -> Mesh {
+    bent(&distorted(4), |[x, y]| {
+        [x + 0.3 * y + 0.1 * (2.0 * y).sin(), y - 0.2 * x * y + 0.1 * x * x]
+    })
+}
+
+/// ½ ∫ ζ Aε(u):ε(u) with A as printed in the paper, (Aτ):τ = Er/(1−r²) tr²τ + E/(1+r) |τ|² in plane
+/// stress, by the quadrature points of the elements.
+fn energy(body: &Body, zeta: &[f64], u: &[f64]) -> f64 {
+    let Elements::Quadratic(cells) = body.elements() else { panic!("of order 1") };
+    let Material { young: e, poisson: r, .. } = MATERIAL;
+    let of_element = |(nodes, zeta): (&[usize; 6], &[f64])| -> f64 {
+        let at = nodes.map(|node| body.nodes.points[node]);
+        let v = nodes.map(|node| [u[2 * node], u[2 * node + 1]]);
+        let of_point = POINTS.iter().zip(zeta).map(|(&l, zeta)| {
+            let (weight, gradient) = gradient(&at, &v, l);
+            let strain = 0.5 * (gradient + gradient.transpose());
+            let (trace, square) = (strain.trace(), strain.norm_squared());
+            weight * zeta * (e * r / (1.0 - r * r) * trace * trace + e / (1.0 + r) * square)
+        });
+        of_point.sum()
+    };
+    0.5 * cells.nodes.iter().zip(zeta.chunks(3)).map(of_element).sum::<f64>()
+}
+
+#[test]
+fn internal_forces_are_the_gradient_of_the_energy() {
+    let elasticity = Elasticity::new(MATERIAL);
+    let mut random = Random::new(14);
+    for mesh in [distorted(4), curved()] {
+        let body = Body::new(mesh, Order::Quadratic);
+        let zeta: Vec<f64> = (0..3 * body.triangles.len()).map(|_| 1.5 + random.next()).collect();
+        let u = random.field(2 * body.nodes.points.len());
+        let force = elasticity.internal_force(&body, &zeta, &u);
+        let work: f64 = force.iter().zip(&u).map(|(f, u)| f * u).sum();
+        close(work / (2.0 * energy(&body, &zeta, &u)), 1.0, 1e-12);
+        let energies: f64 = elasticity.energies(&body, &zeta, &u).iter().sum();
+        close(energies / work, 1.0, 1e-12);
+        for _ in 0..5 {
+            let v = random.field(u.len());
+            let at = |s: f64| {
+                let moved: Vec<f64> = u.iter().zip(&v).map(|(u, v)| u + s * v).collect();
+                energy(&body, &zeta, &moved)
+            };
+            let slope: f64 = force.iter().zip(&v).map(|(f, v)| f * v).sum();
+            close((at(1.0) - at(-1.0)) / 2.0 / work, slope / work, 1e-12);
+        }
+    }
+}
+
+#[test]
+fn the_body_has_the_area_within_its_parabolas() {
+    let body = Body::new(curved(), Order::Quadratic);
+    close(body.area, curved_area(&body.mesh), 1e-14);
+    // ζ lives on the straight triangles.
+    let straight: f64 = body.triangles.iter().map(|triangle| triangle.area()).sum();
+    close(body.vertices.area, straight, 1e-14);
+    assert!((body.area - straight).abs() > 1e-4);
+}
+
+#[test]
+fn the_damage_source_is_taken_at_the_quadrature_points() {
+    // b_i = Σ |T|/3 φ(|ε|²(x_q), ζ(x_q)) λ_i(x_q).
+    let body = Body::new(curved(), Order::Quadratic);
+    let law = DamageLaw {
+        diffusion: 0.7,
+        lambda_d: 0.3,
+        lambda_u: 2.0,
+        lambda_w: 0.1,
+        strain_cap: 0.8,
+        threshold: 0.01,
+    };
+    let mut random = Random::new(15);
+    let zeta: Vec<f64> = body.mesh.nodes.iter().map(|_| 0.6 + 0.3 * random.next()).collect();
+    let strain: Vec<f64> = (0..3 * body.triangles.len()).map(|_| random.next().abs()).collect();
+    let mut expected = vec![0.0; zeta.len()];
+    for (t, nodes) in body.mesh.triangles.iter().enumerate() {
+        for (q, l) in POINTS.iter().enumerate() {
+            let z: f64 = nodes.iter().zip(l).map(|(&node, l)| l * zeta[node]).sum();
+            let rate =
+                law.lambda_d * (1.0 - z) / z + 0.5 * law.lambda_u * strain[3 * t + q].min(0.8);
+            let phi = -(rate - 0.1).max(0.0);
+            for (&node, l) in nodes.iter().zip(l) {
+                expected[node] += body.triangles[t].area() / 3.0 * phi * l;
+            }
+        }
+    }
+    for mass in [Mass::Consistent, Mass::Lumped] {
+        let load = source_load(&body, mass, &source(&body, &law, &strain, &zeta));
+        let error = difference(&load, &expected);
+        assert!(error < 1e-14, "{error}");
+    }
+}

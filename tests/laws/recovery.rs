@@ -1,0 +1,96 @@
+//! Strains recovered from displacements, and the error that they tell.
+
+use crate::support::{ORDERS, distorted, problem, run, square, unstructured};
+use signorini::{
+    contact::SOLVERS,
+    fem::{Body, Elasticity, RecoveredStrains},
+    mesh::Order,
+    model::{Material, Plane},
+};
+
+/// u of which the strains are constant for P1, affine for P2.
+fn displacement(order: Order, [x, y]: [f64; 2]) -> [f64; 2] {
+    let linear = [0.3 * x - 0.7 * y, 0.2 * x + 0.4 * y];
+    match order {
+        Order::Linear => linear,
+        Order::Quadratic => {
+            [linear[0] + 0.5 * x * x - 0.3 * x * y, linear[1] - 0.6 * x * y + 0.2 * y * y]
+        }
+    }
+}
+
+/// |ε|² of that.
+fn strain_squared(order: Order, [x, y]: [f64; 2]) -> f64 {
+    let (xx, yy, xy) = match order {
+        Order::Linear => (0.3, 0.4, -0.25),
+        Order::Quadratic => {
+            (0.3 + x - 0.3 * y, 0.4 - 0.6 * x + 0.4 * y, -0.25 - 0.5 * (0.3 * x + 0.6 * y))
+        }
+    };
+    xx * xx + yy * yy + 2.0 * xy * xy
+}
+
+/// Where the source is taken: the vertices for P1, the quadrature points for P2.
+fn places(body: &Body, t: usize) -> [[f64; 2]; 3] {
+    let corners = body.mesh.triangles[t].map(|node| body.mesh.nodes[node]);
+    match body.order() {
+        Order::Linear => corners,
+        Order::Quadratic => [0, 1, 2].map(|q| {
+            [0, 1].map(|k| corners.iter().map(|x| x[k]).sum::<f64>() / 6.0 + 0.5 * corners[q][k])
+        }),
+    }
+}
+
+#[test]
+fn strains_of_the_degree_of_the_element_are_recovered_exactly_up_to_the_boundary() {
+    let elasticity = Elasticity::new(Material { young: 1.0, poisson: 0.3, plane: Plane::Stress });
+    // One cell has two triangles: no vertex has enough of them.
+    for mesh in [square(1), square(2), distorted(2), distorted(6), unstructured(0.2)] {
+        for order in ORDERS {
+            let body = Body::new(mesh.clone(), order);
+            let u: Vec<f64> =
+                body.nodes.points.iter().flat_map(|&x| displacement(order, x)).collect();
+            let recovered = RecoveredStrains::new(&body, &u).unwrap();
+            let zeta = vec![1.0; 3 * body.triangles.len()];
+            let error = recovered.energy_error(&elasticity, &zeta, &u);
+            let relative = error.relative();
+            assert!(relative < 1e-9, "{} triangles: {relative:.1e}", body.triangles.len());
+            for (t, squared) in recovered.squared().iter().enumerate() {
+                for (found, x) in squared.iter().zip(places(&body, t)) {
+                    let off = (found - strain_squared(order, x)).abs();
+                    assert!(off < 1e-9, "{} triangles: {off:.1e} at {x:?}", body.triangles.len());
+                }
+            }
+        }
+    }
+}
+
+/// A square clamped at the left and pressed on its foundation: with gaps and values of 0, and the
+/// foundation touched in every node, ‖u − u_h‖² is the work that u_h lacks.
+fn pressed(cells: usize, degree: usize) -> (f64, f64) {
+    let text = format!(
+        "discretisation.displacement = {degree}
+         material = {{ young = 100, poisson = 0.3, plane = 'stress' }}
+         boundary = [
+            {{ name = 'left', displacement = [0, 0] }},
+            {{ name = 'bottom', gap = 0 }},
+            {{ name = 'top', traction = [0, '-1 - x'] }},
+         ]"
+    );
+    let problem = problem(square(cells), &text).unwrap_or_else(|e| panic!("{e}"));
+    let outcome = run(&problem, SOLVERS[0]);
+    assert_eq!(outcome.last.record.active_nodes, degree * cells);
+    (outcome.last.record.work, outcome.errors.displacement_mesh)
+}
+
+#[test]
+fn with_contact_the_estimate_is_near_the_error_against_a_fine_quadratic_answer() {
+    let (exact, _) = pressed(96, 2);
+    for (degree, cells) in [(1, 8), (1, 16), (1, 32), (2, 4), (2, 8), (2, 16)] {
+        let (work, estimate) = pressed(cells, degree);
+        let error = ((exact - work) / exact).sqrt();
+        println!("P{degree}, {cells}: {estimate:.4} estimated, {error:.4} true");
+        let ratio = estimate / error;
+        assert!((0.7..1.4).contains(&ratio), "P{degree}, {cells}: {ratio:.3} of {error:.4}");
+    }
+}
