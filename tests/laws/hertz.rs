@@ -65,7 +65,8 @@ fn a_disc_on_a_plane_has_the_pressure_of_hertz() {
 fn energy(size: f64, degree: u8) -> [f64; 2] {
     let sets = [format!("mesh.size={size}"), format!("discretisation.displacement={degree}")];
     let growth = format!("{} * (sqrt", 25.0 * size);
-    let problem = shipped_with("hertz", &[&sets[0], &sets[1]], ["0.2 * (sqrt", &growth]);
+    let sets = [&sets[0], &sets[1], "mesh.parameters.grading=25"];
+    let problem = shipped_with("hertz", &sets, ["0.2 * (sqrt", &growth]);
     let outcome = run(&problem, SOLVERS[0]);
     let (body, u) = (&problem.body, &outcome.last.state.u);
     let zeta = problem.zeta_at_points(&outcome.last.state.zeta);

@@ -26,7 +26,7 @@ fn quick(name: &str) -> DiscreteProblem {
 fn quick_quadratic(name: &str) -> DiscreteProblem {
     let sets: &[&str] = match name {
         "square" => &["mesh.size=0.125", "time.end=0.05", "time.step=0.005"],
-        "hertz" => &["mesh.size=0.016"],
+        "hertz" => &["mesh.size=0.016", "mesh.parameters.grading=25"],
         "square-mild" | "square-table1" => &["mesh.size=0.125", "time.step=0.1"],
         "lshape-rolling" => &["mesh.size=0.5", "time.step=0.05"],
         "beam" => &["mesh.size=0.25", "time.step=0.1"],
