@@ -99,13 +99,18 @@ impl<const N: usize, const Q: usize> Cells<'_, N, Q> {
         elements.map(|(t, element)| element.points[0].gradient(&self.gather(t, u))).collect()
     }
 
-    /// The strains (ε_xx, ε_yy, 2ε_xy) of nodal u at all quadrature points, triangle by triangle.
+    /// A function of the strains (ε_xx, ε_yy, 2ε_xy) of nodal u at all quadrature points, triangle by
+    /// triangle.
     #[inline(always)]
-    pub fn strains(&self, u: &[f64]) -> impl Iterator<Item = Vector3<f64>> {
-        self.elements.iter().enumerate().flat_map(|(t, element)| {
+    pub fn strains<T>(&self, u: &[f64], of: impl Fn(Vector3<f64>) -> T) -> Vec<T> {
+        let mut values = Vec::with_capacity(Q * self.elements.len());
+        for (t, element) in self.elements.iter().enumerate() {
             let local = self.gather(t, u);
-            element.points.each_ref().map(|point| point.strain(&local))
-        })
+            for point in &element.points {
+                values.push(of(point.strain(&local)));
+            }
+        }
+        values
     }
 }
 

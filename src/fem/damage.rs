@@ -35,7 +35,11 @@ impl Mass {
 /// there. `strain_squared` is that of [`Elasticity::strain_squared`](super::Elasticity).
 pub fn source(body: &Body, law: &DamageLaw, strain_squared: &[f64], zeta: &[f64]) -> Vec<[f64; 3]> {
     match body.order() {
-        Order::Linear => source_at(body, law, strain_squared.iter().map(|&e2| [e2; 3]), zeta),
+        Order::Linear => {
+            let at_vertices =
+                |(nodes, e2): (&[usize; 3], &f64)| nodes.map(|node| law.source(*e2, zeta[node]));
+            body.mesh.triangles.iter().zip(strain_squared).map(at_vertices).collect()
+        }
         Order::Quadratic => {
             source_at(body, law, strain_squared.as_chunks().0.iter().copied(), zeta)
         }

@@ -23,7 +23,7 @@ impl Elasticity {
     /// |ε|² = Σ ε_ij² (the shear counts twice) of nodal u at the quadrature points of the elements.
     pub fn strain_squared(&self, body: &Body, u: &[f64]) -> Vec<f64> {
         let squared = |e: Vector3<f64>| e[0] * e[0] + e[1] * e[1] + 0.5 * e[2] * e[2];
-        for_elements!(body, cells => cells.strains(u).map(squared).collect())
+        for_elements!(body, cells => cells.strains(u, squared))
     }
 
     /// σ = ζ Aε(u), Pa, the mean over the quadrature points of each triangle, with `zeta` the values of
@@ -31,8 +31,8 @@ impl Elasticity {
     pub fn stresses(&self, body: &Body, zeta: &[f64], u: &[f64]) -> Vec<Vector3<f64>> {
         for_elements!(body, cells => {
             let points = cells.elements[0].points.len();
-            let stresses: Vec<_> =
-                cells.strains(u).zip(zeta).map(|(strain, zeta)| self.d * strain * *zeta).collect();
+            let stresses = cells.strains(u, |strain| self.d * strain);
+            let stresses: Vec<_> = stresses.iter().zip(zeta).map(|(s, zeta)| s * *zeta).collect();
             let mean = |of: &[Vector3<f64>]| of.iter().sum::<Vector3<f64>>() / points as f64;
             stresses.chunks(points).map(mean).collect()
         })
@@ -42,8 +42,9 @@ impl Elasticity {
     pub fn energies(&self, body: &Body, zeta: &[f64], u: &[f64]) -> Vec<f64> {
         for_elements!(body, cells => {
             let points = cells.elements.iter().flat_map(|element| &element.points);
-            let strains = cells.strains(u).zip(points).zip(zeta);
-            strains.map(|((e, point), zeta)| point.weight * zeta * e.dot(&(self.d * e))).collect()
+            let densities = cells.strains(u, |e| e.dot(&(self.d * e)));
+            let points = densities.iter().zip(points).zip(zeta);
+            points.map(|((density, point), zeta)| point.weight * zeta * density).collect()
         })
     }
 

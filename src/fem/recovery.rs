@@ -56,7 +56,7 @@ impl<'a> RecoveredStrains<'a> {
     /// PETSc failed.
     pub fn new(body: &'a Body, u: &[f64]) -> Result<Self, PetscError> {
         let (strains, samples) = for_elements!(body, cells => {
-            (cells.strains(u).collect::<Vec<_>>(), sample_points(body, &cells))
+            (cells.strains(u, |strain| strain), sample_points(body, &cells))
         });
         let per_triangle = strains.len() / body.triangles.len();
         let fits = fits(body, &strains, &samples, per_triangle)?;

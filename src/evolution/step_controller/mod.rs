@@ -84,10 +84,14 @@ pub(super) struct StepController<'a> {
     /// last step adds to that of ζ.
     error: DVector<f64>,
     last_error: DVector<f64>,
+    /// The time since errors have last grown, s.
+    not_grown: f64,
     bounds: (f64, f64),
     pub(super) violation: BoundViolation,
 }
 
+/// The errors of steps grow this part of a run at a time.
+const GROWTH_STEP: f64 = 1.0 / 32.0;
 /// In a smooth evolution with equal steps the increments of the formula are off by ⅓ k³ζ‴, those of
 /// the trapezoidal rule by 1/12: the first is this multiple of their difference.
 const TRUNCATION: f64 = 4.0 / 3.0;
@@ -108,6 +112,7 @@ impl<'a> StepController<'a> {
             delay: zeros.clone(),
             error: zeros.clone(),
             last_error: zeros,
+            not_grown: 0.0,
             bounds: problem.body.vertices.partition.min_max(zeta),
             violation: BoundViolation::default(),
         }
@@ -266,11 +271,20 @@ impl<'a> StepController<'a> {
         }
     }
 
-    /// Adds the error of a step of `length` s to those before, which have grown meanwhile: with
+    /// Adds the error of a step of `length` s to those before, which grow, every few steps: with
     /// r = −ζ', an error δζ changes the source φ = −(λ_D (1−ζ)/ζ + ½ λ_U |ε|² − λ_W) by
     /// λ_D/ζ² δζ, and under a given load, where |ε| ~ 1/ζ, by 2 (r − λ_D (1−ζ)/ζ + λ_W)/ζ δζ more.
     fn grow_error(&mut self, length: f64, error: &DVector<f64>) {
-        let Some((law, rate)) = self.problem.damage().zip(self.rate.as_ref()) else { return };
+        self.not_grown += length;
+        let end = self.problem.scene().time.map_or(0.0, |grid| grid.end);
+        let (law, rate) = match (self.problem.damage(), &self.rate) {
+            (Some(law), Some(rate)) if self.not_grown > GROWTH_STEP * end => (law, rate),
+            _ => {
+                self.error += error;
+                return;
+            }
+        };
+        let length = std::mem::take(&mut self.not_grown);
         for (i, own) in self.error.iter_mut().enumerate() {
             let zeta = law.truncate(self.zeta[i]);
             let internal = law.lambda_d * (1.0 - zeta) / zeta;
