@@ -1,10 +1,10 @@
 //! The discrete problem: a scene bound to its mesh, all that does not change from step to step.
 
-use super::{Foundation, Loads, boundary_conditions::BoundaryConditions, notes};
+use super::{Foundation, Loads, RunError, agreed, boundary_conditions::BoundaryConditions, notes};
 use crate::{
     contact::{Bound, Certificate, ConstraintError, Constraints, DrivenMotion, RigidMotions},
     fem::{Body, Elasticity, Mass, Subdomain},
-    mesh::Mesh,
+    mesh::{Mesh, Order},
     model::DamageLaw,
     petsc::{PetscError, Session},
     scene::{Scene, SceneError},
@@ -34,6 +34,8 @@ pub struct DiscreteProblem {
     /// The foundation opposite Γ_C.
     pub foundation: Foundation,
     scene: Scene,
+    /// Where `body` is a part: the undivided mesh and the ranks that own its vertices.
+    undivided: Option<(Mesh, Vec<usize>)>,
 }
 
 /// What the contact problem (26) of one time is posed with.
@@ -127,6 +129,7 @@ impl DiscreteProblem {
             tolerance: scene.contact.tolerance,
             body,
             scene,
+            undivided: None,
         };
         problem.check_times()?;
         Ok(problem)
@@ -137,15 +140,47 @@ impl DiscreteProblem {
     /// # Errors
     /// PETSc cannot divide the mesh.
     pub fn restrict(self, session: &Session) -> Result<Self, PetscError> {
-        let Some(subdomain) = Subdomain::of(session, &self.body)? else { return Ok(self) };
+        match Subdomain::owners(session, &self.body.mesh)? {
+            Some(owners) => self.divide(session, owners),
+            None => Ok(self),
+        }
+    }
+
+    /// The part of this rank, from the owners of all vertices.
+    fn divide(self, session: &Session, owners: Vec<usize>) -> Result<Self, PetscError> {
+        let subdomain = Subdomain::new(session, &self.body, &owners)?;
         Ok(Self {
             constraints: self.constraints.restrict(&subdomain),
             certificate: self.certificate.restrict(&subdomain),
             motions: self.motions.restrict(&subdomain),
             loads: self.loads.restrict(&subdomain),
             body: subdomain.body(&self.body),
+            undivided: Some((self.body.mesh, owners)),
             ..self
         })
+    }
+
+    /// The same scene on the same mesh, and this rank's same triangles of it, with displacements of the
+    /// other order, with a KKT tolerance of its own. Collective.
+    ///
+    /// # Errors
+    /// At its nodes the scene contradicts itself, or PETSc failed.
+    pub(super) fn of_other_order(
+        &self,
+        session: &Session,
+        tolerance: f64,
+    ) -> Result<Self, RunError> {
+        let mut scene = self.scene.clone();
+        scene.order = match scene.order {
+            Order::Linear => Order::Quadratic,
+            Order::Quadratic => Order::Linear,
+        };
+        scene.contact.tolerance = tolerance;
+        let Some((mesh, owners)) = self.undivided.clone() else {
+            return Ok(Self::new(scene, self.body.mesh.clone())?);
+        };
+        let other = agreed(self.body.nodes.partition.comm(), Self::new(scene, mesh))?;
+        Ok(other.divide(session, owners)?)
     }
 
     /// Checks what depends on time, where times are known beforehand
@@ -235,10 +270,14 @@ impl DiscreteProblem {
 
     /// ζ₀ at the nodes: π^h ζ₀, or 1 for a material that is not damaged.
     pub fn initial_damage(&self) -> Vec<f64> {
-        let nodes = &self.body.mesh.nodes;
+        self.initial_damage_at(&self.body.mesh.nodes)
+    }
+
+    /// ζ₀ at some points.
+    pub(super) fn initial_damage_at(&self, points: &[[f64; 2]]) -> Vec<f64> {
         match &self.scene.damage {
-            Some(damage) => nodes.iter().map(|&[x, y]| damage.initial.eval(x, y, 0.0)).collect(),
-            None => vec![1.0; nodes.len()],
+            Some(damage) => points.iter().map(|&[x, y]| damage.initial.eval(x, y, 0.0)).collect(),
+            None => vec![1.0; points.len()],
         }
     }
 

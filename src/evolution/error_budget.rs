@@ -1,6 +1,6 @@
 //! The error budget of a run: how large the errors of mesh, time steps and solver are.
 
-use super::{DiscreteProblem, State};
+use super::{DiscreteProblem, Outcome, State, mesh_error::DamageError};
 use crate::{fem::RecoveredStrains, petsc::PetscError};
 use serde::Serialize;
 
@@ -10,6 +10,8 @@ use serde::Serialize;
 pub struct ErrorBudget {
     /// Of u, from the mesh.
     pub displacement_mesh: f64,
+    /// Of the damage, from the mesh.
+    pub damage_mesh: Option<f64>,
     /// Of u, from the time steps.
     pub displacement_steps: Option<f64>,
     /// Of the damage, from the time steps.
@@ -22,17 +24,37 @@ pub struct ErrorBudget {
 const LARGE: f64 = 0.05;
 
 impl ErrorBudget {
+    /// Of the last accepted state, from the estimated errors `mesh` and `steps` of its ζ. Collective.
+    pub(super) fn new(
+        problem: &DiscreteProblem,
+        outcome: &Outcome,
+        mesh: Option<DamageError>,
+        steps: Option<&[f64]>,
+    ) -> Self {
+        let (accuracy, state) = (&outcome.accuracy, &outcome.last.state);
+        let caused = |error: &[f64]| problem.displacement_error_of(error, state);
+        let by_damage = mesh.as_ref().map_or(0.0, |error| caused(&error.change));
+        Self {
+            displacement_mesh: accuracy.energy.hypot(by_damage),
+            damage_mesh: mesh.map(|error| error.relative),
+            displacement_steps: steps.map(caused),
+            damage_steps: steps.and_then(|error| problem.relative_to_damage(error, state)),
+            solver: accuracy.displacement,
+        }
+    }
+
     /// The errors by their causes, and which cause to spend on.
-    pub fn lines(&self) -> [String; 3] {
+    pub fn lines(&self) -> [String; 4] {
         let of_damage = |error: Option<f64>| match error {
             Some(error) => format!("damage {}", percent(error)),
+            None if self.damage_steps.is_some() => "damage not estimated".to_owned(),
             None => "no damage".to_owned(),
         };
         let steps = match self.displacement_steps {
             Some(error) => format!("u {}, {}", percent(error), of_damage(self.damage_steps)),
             None => "none".to_owned(),
         };
-        let mesh = self.displacement_mesh;
+        let mesh = self.displacement_mesh.max(self.damage_mesh.unwrap_or(0.0));
         let steps_most =
             self.displacement_steps.unwrap_or(0.0).max(self.damage_steps.unwrap_or(0.0));
         let advice = match () {
@@ -43,6 +65,7 @@ impl ErrorBudget {
         };
         [
             format!("from the mesh: u {} (energy norm)", percent(self.displacement_mesh)),
+            format!("from the mesh: {}", of_damage(self.damage_mesh)),
             format!("from the time steps: {steps}"),
             format!("from the solver: u {:.0e}; spend on {advice}", self.solver),
         ]

@@ -32,6 +32,7 @@ mod error;
 mod error_budget;
 mod extrapolation;
 mod loads;
+mod mesh_error;
 mod notes;
 mod outcome;
 mod state;
@@ -52,6 +53,8 @@ pub use state::{State, Step, StepRecord};
 
 use crate::petsc::{Communicator, Session};
 use damage_step::DamageStep;
+use mesh_error::{Instants, mesh_error};
+use nalgebra::DVector;
 use std::time::Instant;
 use step_controller::{StepController, Verdict};
 
@@ -84,6 +87,8 @@ pub fn run(
     let mut controller = StepController::new(problem, &first.state.zeta, source);
     let mut outcome = Outcome::new(first);
     show(&outcome.last)?;
+    let mut instants = Instants::new(problem.body.order());
+    instants.observe(&outcome.last);
     loop {
         let started = Instant::now();
         let Some(planned) = controller.plan(&outcome.last) else { break };
@@ -103,6 +108,7 @@ pub fn run(
                 step.record.seconds = started.elapsed().as_secs_f64();
                 outcome.accept(*step);
                 show(&outcome.last)?;
+                instants.observe(&outcome.last);
             }
             Verdict::Retry => outcome.undone += 1,
             Verdict::Stop(stop) => {
@@ -117,15 +123,11 @@ pub fn run(
     outcome.damage_error = controller.damage_error();
     outcome.accuracy = phases.time("accuracy", || contact_step.accuracy(&outcome))?;
     let state = &outcome.last.state;
+    let mesh = phases.time("mesh error", || mesh_error(session, problem, instants, state));
+    outcome.damage_indicators = mesh.as_ref().map_or_else(Vec::new, |mesh| mesh.indicators.clone());
     let steps = controller.step_error().filter(|_| problem.damage().is_some());
-    outcome.errors = ErrorBudget {
-        displacement_mesh: outcome.accuracy.energy,
-        displacement_steps: steps
-            .as_ref()
-            .map(|e| problem.displacement_error_of(e.as_slice(), state)),
-        damage_steps: steps.and_then(|e| problem.relative_to_damage(e.as_slice(), state)),
-        solver: outcome.accuracy.displacement,
-    };
+    outcome.errors =
+        ErrorBudget::new(problem, &outcome, mesh, steps.as_ref().map(DVector::as_slice));
     Ok(outcome)
 }
 

@@ -32,6 +32,9 @@ pub struct Outcome {
     pub accuracy: Accuracy,
     /// Where the errors of the last accepted state come from.
     pub errors: ErrorBudget,
+    /// Of each triangle of this rank ‖z − Iz‖²_T / ‖ζ₀ − z‖², with z the last ζ in P2 and I its
+    /// interpolation in P1. Empty where the error of the damage is not estimated.
+    pub damage_indicators: Vec<f64>,
     /// Estimated error of the last ζ over the damage done, where steps are chosen.
     pub damage_error: Option<f64>,
     /// The steps of the largest stationarity residual and displacement before the last.

@@ -1,13 +1,13 @@
 //! The damage system (28): (M + kκL) ζ_n = M ζ_{n−1} + k b(φ).
 
-use super::{Body, Triangle, body::at_quadratic_points, element::POINTS};
+use super::{Body, Cells, Nodes, Triangle, body::at_quadratic_points, element::POINTS, quadratic};
 use crate::{
     cholesky::{LinearSolver, LinearSystem, Precision},
     mesh::Order,
     model::DamageLaw,
     petsc::{Matrix, PetscError, Session, Vector},
 };
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 
 /// How (28) integrates products with a test function λ_i: the mass M and the source load b.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -47,7 +47,7 @@ pub fn source(body: &Body, law: &DamageLaw, strain_squared: &[f64], zeta: &[f64]
 }
 
 /// [`source`] from |ε|² at its three points of each triangle.
-pub fn source_at(
+fn source_at(
     body: &Body,
     law: &DamageLaw,
     strain_squared: impl Iterator<Item = [f64; 3]>,
@@ -181,17 +181,47 @@ impl DamageSystem {
         diffusion: f64,
         step: f64,
     ) -> Result<Self, PetscError> {
-        let owned = body.vertices.partition.owned();
+        let triangles = body.mesh.triangles.iter().zip(&body.triangles);
+        let elements = triangles.map(|(n, triangle)| (*n, mass.of(triangle), triangle.laplace()));
+        Self::assemble(session, &body.vertices, elements, diffusion, step)
+    }
+
+    /// The same with ζ in P2, on the straight triangles of a body whose elements of u are `cells`.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub fn quadratic(
+        session: &Session,
+        body: &Body,
+        cells: Cells<6, 3>,
+        diffusion: f64,
+        step: f64,
+    ) -> Result<Self, PetscError> {
+        let elements = cells.nodes.iter().zip(&body.triangles).map(|(nodes, triangle)| {
+            let laplace = quadratic::laplace([0, 1, 2].map(|i| body.nodes.points[nodes[i]]));
+            (*nodes, quadratic::mass(triangle), laplace)
+        });
+        Self::assemble(session, &body.nodes, elements, diffusion, step)
+    }
+
+    /// From the nodes of ζ and, of each triangle, its nodes and its parts of M and L.
+    fn assemble<const N: usize>(
+        session: &Session,
+        Nodes { partition, points, .. }: &Nodes,
+        elements: impl Iterator<Item = ([usize; N], SMatrix<f64, N, N>, SMatrix<f64, N, N>)>,
+        diffusion: f64,
+        step: f64,
+    ) -> Result<Self, PetscError> {
+        let owned = partition.owned();
         let (mut rows, mut columns) = (Vec::new(), Vec::new());
         let (mut mass_values, mut laplace_values) = (Vec::new(), Vec::new());
-        let mut diagonal = vec![0.0; body.mesh.nodes.len()];
-        for (nodes, triangle) in body.mesh.triangles.iter().zip(&body.triangles) {
-            let (mass, laplace) = (mass.of(triangle), triangle.laplace());
-            for i in 0..3 {
+        let mut diagonal = vec![0.0; points.len()];
+        for (nodes, mass, laplace) in elements {
+            for i in 0..N {
                 diagonal[nodes[i]] += laplace[(i, i)];
-                for j in 0..3 {
-                    rows.push(body.vertices.partition.row(nodes[i], 1, 0));
-                    columns.push(body.vertices.partition.global(nodes[j], 1, 0));
+                for j in 0..N {
+                    rows.push(partition.row(nodes[i], 1, 0));
+                    columns.push(partition.global(nodes[j], 1, 0));
                     mass_values.push(mass[(i, j)]);
                     laplace_values.push(laplace[(i, j)]);
                 }
@@ -214,7 +244,7 @@ impl DamageSystem {
             unknown: Vector::zeros(session, owned)?,
             diffusion,
             step,
-            laplace_size: body.vertices.partition.norm(&diagonal, 1),
+            laplace_size: partition.norm(&diagonal, 1),
         };
         system.set_step(step)?;
         Ok(system)

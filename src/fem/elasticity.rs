@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 #[derive(Debug, Clone, Copy)]
 pub struct Elasticity {
     /// A, as the matrix D of [`Material::stiffness`], Pa.
-    pub(super) d: Matrix3<f64>,
+    pub(crate) d: Matrix3<f64>,
     /// The material.
     pub material: Material,
 }

@@ -7,6 +7,7 @@
 
 mod element;
 mod triangle;
+mod quadratic;
 mod edge;
 mod partition;
 mod body;
@@ -21,14 +22,15 @@ mod loads;
 
 pub(crate) use body::for_elements;
 pub use body::{Body, Cells, Elements, Nodes};
-pub use damage::{DamageCertificate, DamageSystem, Mass, source, source_at, source_load};
+pub use damage::{DamageCertificate, DamageSystem, Mass, source, source_load};
 pub use edge::{Edge, gauss_points};
 pub use elasticity::Elasticity;
 pub use element::{Element, QuadraturePoint};
 pub use loads::{add_body_force, add_traction, midpoint};
 pub use nodal_bases::NodalBases;
 pub use partition::Partition;
-pub use recovery::{EnergyError, RecoveredStrains};
+pub use quadratic::{mean_product, quadratic_load};
+pub use recovery::{EnergyError, RecoveredStrains, strains_at_nodes};
 pub use rigid_part::RigidPart;
 pub use stiffness::Stiffness;
 pub use subdomain::Subdomain;

@@ -4,9 +4,10 @@ use super::{
     Body, Cells, Elasticity, Triangle,
     body::for_elements,
     element::{POINTS, quadratic_values},
+    quadratic::mean_product,
 };
 use crate::{mesh::Mesh, petsc::PetscError};
-use nalgebra::{Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
+use nalgebra::{Matrix6, Matrix6x3, Vector3, Vector6};
 
 /// An estimate of the error of u in the energy norm, ‖v‖² = ∫ ζ Aε(v) : ε(v).
 #[derive(Debug, Clone)]
@@ -70,7 +71,9 @@ impl<'a> RecoveredStrains<'a> {
         let square = |(t, triangle): (usize, &Triangle)| {
             let own = per_triangle * t..per_triangle * (t + 1);
             let mean = zeta[own].iter().sum::<f64>() / per_triangle as f64;
-            mean * triangle.area() * mean_square(&self.difference(t), &elasticity.d)
+            let difference = self.difference(t);
+            let stress = difference.map(|strain| elasticity.d * strain);
+            mean * triangle.area() * mean_product(&difference, &stress, Vector3::dot)
         };
         let own = body.triangles.iter().enumerate().take(body.own_triangles);
         let squares: Vec<f64> = own.map(square).collect();
@@ -81,50 +84,48 @@ impl<'a> RecoveredStrains<'a> {
         EnergyError { squares, error: sums[0], energy: sums[1] }
     }
 
-    /// |ε*|² at the three points of each triangle where the damage source is taken
-    /// ([`source`](super::source)).
-    pub fn squared(&self) -> Vec<[f64; 3]> {
-        let squared = |e: Vector3<f64>| e[0] * e[0] + e[1] * e[1] + 0.5 * e[2] * e[2];
-        let values = POINTS.map(quadratic_values);
-        let at_points = |t: usize| {
-            let difference = self.difference(t);
-            let strains = &self.strains[self.per_triangle * t..self.per_triangle * (t + 1)];
-            [0, 1, 2].map(|q| match strains {
-                [strain] => squared(strain + difference[q]),
-                _ => {
-                    let terms = difference.iter().zip(&values[q]).map(|(d, value)| d * *value);
-                    squared(strains[q] + terms.sum::<Vector3<f64>>())
-                }
-            })
-        };
-        (0..self.body.triangles.len()).map(at_points).collect()
-    }
-
     /// ε* − ε(u) on triangle `t`, at the vertices and the midpoints of the sides 01, 12, 20. (Between
     /// the quadrature points ε(u) is affine, but for curved triangles.)
     fn difference(&self, t: usize) -> [Vector3<f64>; 6] {
         let (body, triangle) = (self.body, self.body.mesh.triangles[t]);
         let strains = &self.strains[self.per_triangle * t..self.per_triangle * (t + 1)];
-        let sum = strains.iter().sum::<Vector3<f64>>();
-        // An affine f with the values f(x_q) = Σf/6 + f_q/2 at the points has f_q = 2 f(x_q) − Σf/3.
-        let computed = |i: usize| match strains {
-            [strain] => *strain,
-            _ => 2.0 * strains[i] - sum / 3.0,
-        };
+        let computed = at_vertices(strains);
         let at = |i: usize| body.mesh.nodes[triangle[i]];
         let recovered = |i: usize, [x, y]: [f64; 2]| {
             let [vx, vy] = at(i);
             self.fits[triangle[i]].transpose() * monomials([x - vx, y - vy])
         };
-        let vertex = |i: usize| recovered(i, at(i)) - computed(i);
+        let vertex = |i: usize| recovered(i, at(i)) - computed[i];
         let middle = |i: usize, j: usize| {
             if let [_] = strains {
                 return 0.5 * (vertex(i) + vertex(j));
             }
             let x = [0, 1].map(|k| 0.5 * (at(i)[k] + at(j)[k]));
-            0.5 * (recovered(i, x) + recovered(j, x) - computed(i) - computed(j))
+            0.5 * (recovered(i, x) + recovered(j, x) - computed[i] - computed[j])
         };
         [vertex(0), vertex(1), vertex(2), middle(0, 1), middle(1, 2), middle(2, 0)]
+    }
+}
+
+/// The strains of nodal u at the vertices and the midpoints of the sides 01, 12, 20 of each triangle.
+pub fn strains_at_nodes(body: &Body, u: &[f64]) -> Vec<[Vector3<f64>; 6]> {
+    let strains: Vec<_> = for_elements!(body, cells => cells.strains(u).collect());
+    let with_midpoints = |of: &[Vector3<f64>]| {
+        let [a, b, c] = at_vertices(of);
+        [a, b, c, 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)]
+    };
+    strains.chunks(strains.len() / body.triangles.len()).map(with_midpoints).collect()
+}
+
+/// A function at the vertices from its values at the quadrature points of a triangle, constant or
+/// affine between them: an affine f has the values f(x_q) = Σf/6 + f_q/2, so f_q = 2 f(x_q) − Σf/3.
+fn at_vertices(points: &[Vector3<f64>]) -> [Vector3<f64>; 3] {
+    match points {
+        [value] => [*value; 3],
+        _ => {
+            let sum = points.iter().sum::<Vector3<f64>>();
+            [0, 1, 2].map(|i| 2.0 * points[i] - sum / 3.0)
+        }
     }
 }
 
@@ -267,21 +268,4 @@ fn moved(fit: &Fit, from: [f64; 2], to: [f64; 2]) -> Fit {
     moved.set_row(1, &(fit.row(1) + 2.0 * x * fit.row(3) + y * fit.row(4)));
     moved.set_row(2, &(fit.row(2) + x * fit.row(4) + 2.0 * y * fit.row(5)));
     moved
-}
-
-/// ∫ Dv·v / |T| of a quadratic v on a triangle, from its values at vertices and midpoints.
-fn mean_square(v: &[Vector3<f64>; 6], d: &Matrix3<f64>) -> f64 {
-    /// ∫ φ_i φ_j / |T| of P2, times 180.
-    const MASS: [[f64; 6]; 6] = [
-        [6.0, -1.0, -1.0, 0.0, -4.0, 0.0],
-        [-1.0, 6.0, -1.0, 0.0, 0.0, -4.0],
-        [-1.0, -1.0, 6.0, -4.0, 0.0, 0.0],
-        [0.0, 0.0, -4.0, 32.0, 16.0, 16.0],
-        [-4.0, 0.0, 0.0, 16.0, 32.0, 16.0],
-        [0.0, -4.0, 0.0, 16.0, 16.0, 32.0],
-    ];
-    let stresses = v.map(|v| d * v);
-    let rows = MASS.iter().zip(v).flat_map(|(row, v)| row.iter().zip([v; 6]));
-    let pairs = rows.zip(stresses.iter().cycle());
-    pairs.map(|((mass, v), stress)| mass / 180.0 * v.dot(stress)).sum()
 }

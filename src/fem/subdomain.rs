@@ -99,16 +99,21 @@ impl LocalNodes {
 }
 
 impl Subdomain {
-    /// Divides the nodes of `body` among the ranks; `None` if there is only one. Collective.
+    /// The ranks that own the vertices of `mesh`; `None` if there is only one. Collective.
     ///
     /// # Errors
     /// PETSc cannot divide it.
-    pub fn of(session: &Session, body: &Body) -> Result<Option<Self>, PetscError> {
+    pub fn owners(session: &Session, mesh: &Mesh) -> Result<Option<Vec<usize>>, PetscError> {
+        let divided = || divide(session, mesh.nodes.len(), &mesh.triangles);
+        (!session.comm().is_serial()).then(divided).transpose()
+    }
+
+    /// The subdomain of this rank, from the owners of all vertices. Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub fn new(session: &Session, body: &Body, owner: &[usize]) -> Result<Self, PetscError> {
         let (comm, mesh) = (session.comm(), &body.mesh);
-        if comm.is_serial() {
-            return Ok(None);
-        }
-        let mut owner = divide(session, mesh.nodes.len(), &mesh.triangles)?;
         // A triangle belongs to the owner of its first node.
         let around = |t: &usize| mesh.triangles[*t].iter().any(|&i| owner[i] == comm.rank());
         let own = |t: &usize| owner[mesh.triangles[*t][0]] == comm.rank();
@@ -117,15 +122,16 @@ impl Subdomain {
         triangles.extend((0..mesh.triangles.len()).filter(|t| around(t) && !own(t)));
 
         let kept = triangles.iter().flat_map(|&t| mesh.triangles[t]).collect();
-        let vertices = LocalNodes::new(session, &owner, kept)?;
+        let vertices = LocalNodes::new(session, owner, kept)?;
         let quadratic = body.quadratic.as_ref().map(|quadratic| {
             // The middle of an edge belongs to the owner of its first end.
+            let mut owner = owner.to_vec();
             owner.resize(body.nodes.points.len(), 0);
             quadratic.middle.iter().for_each(|(ends, &node)| owner[node] = owner[ends[0]]);
             let kept = triangles.iter().flat_map(|&t| quadratic.nodes[t]).collect();
             LocalNodes::new(session, &owner, kept)
         });
-        Ok(Some(Self { vertices, quadratic: quadratic.transpose()?, triangles, own_triangles }))
+        Ok(Self { vertices, quadratic: quadratic.transpose()?, triangles, own_triangles })
     }
 
     /// The nodes of u.

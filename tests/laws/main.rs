@@ -20,6 +20,7 @@ mod hertz;
 mod loads;
 mod lost_contact;
 mod material;
+mod mesh_error;
 mod maximum_principle;
 mod notes;
 mod orders;

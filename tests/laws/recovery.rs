@@ -3,7 +3,7 @@
 use crate::support::{ORDERS, distorted, problem, run, square, unstructured};
 use signorini::{
     contact::SOLVERS,
-    fem::{Body, Elasticity, RecoveredStrains},
+    fem::{Body, Elasticity, RecoveredStrains, strains_at_nodes},
     mesh::Order,
     model::{Material, Plane},
 };
@@ -30,15 +30,11 @@ fn strain_squared(order: Order, [x, y]: [f64; 2]) -> f64 {
     xx * xx + yy * yy + 2.0 * xy * xy
 }
 
-/// Where the source is taken: the vertices for P1, the quadrature points for P2.
-fn places(body: &Body, t: usize) -> [[f64; 2]; 3] {
-    let corners = body.mesh.triangles[t].map(|node| body.mesh.nodes[node]);
-    match body.order() {
-        Order::Linear => corners,
-        Order::Quadratic => [0, 1, 2].map(|q| {
-            [0, 1].map(|k| corners.iter().map(|x| x[k]).sum::<f64>() / 6.0 + 0.5 * corners[q][k])
-        }),
-    }
+/// The vertices and the midpoints of the sides of a triangle.
+fn places(body: &Body, t: usize) -> [[f64; 2]; 6] {
+    let [a, b, c] = body.mesh.triangles[t].map(|node| body.mesh.nodes[node]);
+    let middle = |p: [f64; 2], q: [f64; 2]| [0, 1].map(|k| 0.5 * (p[k] + q[k]));
+    [a, b, c, middle(a, b), middle(b, c), middle(c, a)]
 }
 
 #[test]
@@ -55,8 +51,9 @@ fn strains_of_the_degree_of_the_element_are_recovered_exactly_up_to_the_boundary
             let error = recovered.energy_error(&elasticity, &zeta, &u);
             let relative = error.relative();
             assert!(relative < 1e-9, "{} triangles: {relative:.1e}", body.triangles.len());
-            for (t, squared) in recovered.squared().iter().enumerate() {
-                for (found, x) in squared.iter().zip(places(&body, t)) {
+            for (t, strains) in strains_at_nodes(&body, &u).iter().enumerate() {
+                for (e, x) in strains.iter().zip(places(&body, t)) {
+                    let found = e[0] * e[0] + e[1] * e[1] + 0.5 * e[2] * e[2];
                     let off = (found - strain_squared(order, x)).abs();
                     assert!(off < 1e-9, "{} triangles: {off:.1e} at {x:?}", body.triangles.len());
                 }

@@ -1,0 +1,71 @@
+//! The estimated error of the damage against the true one.
+
+use crate::support::{problem, run, square};
+use signorini::{contact::SOLVERS, evolution::Outcome};
+
+/// A sheared square of n × n cells on a foundation.
+fn sheared(n: usize, order: u8) -> Outcome {
+    let text = format!(
+        "discretisation.displacement = {order}
+         material = {{ young = 80, poisson = 0.3, plane = 'stress' }}
+         damage = {{ diffusion = 0.01, lambda_d = 0.1, lambda_u = 2, lambda_w = 0,
+                     strain_cap = 1000, threshold = 0.01, initial = 1 }}
+         time = {{ end = 1, step = 0.05 }}
+         boundary = [
+            {{ name = 'left', displacement = ['0', '0'] }},
+            {{ name = 'bottom', gap = '0' }},
+            {{ name = 'right', traction = ['-10*t', '-10*t'] }},
+         ]"
+    );
+    run(&problem(square(n), &text).unwrap_or_else(|e| panic!("{e}")), SOLVERS[0])
+}
+
+/// ‖ζ − ζ_fine‖ / ‖1 − ζ_fine‖ by the vertices of 4n × 4n cells, ζ being affine on the triangles of
+/// n × n cells.
+fn true_error(n: usize, coarse: &Outcome, fine: &Outcome) -> f64 {
+    let (zeta, fine) = (&coarse.last.state.zeta, &fine.last.state.zeta);
+    let interpolated = |i: usize, j: usize| {
+        let [column, row] = [i, j].map(|k| (k / 4).min(n - 1));
+        let [x, y] = [(i, column), (j, row)].map(|(k, cell)| k as f64 / 4.0 - cell as f64);
+        let corner = |dx: usize, dy: usize| zeta[(row + dy) * (n + 1) + column + dx];
+        let middle = if x > y { corner(1, 0) } else { corner(0, 1) };
+        let (far, near) = (x.min(y), 1.0 - x.max(y));
+        near * corner(0, 0) + (1.0 - far - near) * middle + far * corner(1, 1)
+    };
+    let mut sums = [0.0; 2];
+    for (node, fine) in fine.iter().enumerate() {
+        let (i, j) = (node % (4 * n + 1), node / (4 * n + 1));
+        let inside = |k: usize| if k == 0 || k == 4 * n { 0.5 } else { 1.0 };
+        let weight = inside(i) * inside(j);
+        sums[0] += weight * (interpolated(i, j) - fine).powi(2);
+        sums[1] += weight * (1.0 - fine).powi(2);
+    }
+    (sums[0] / sums[1]).sqrt()
+}
+
+#[test]
+fn the_error_of_the_damage_is_estimated_within_0_7_and_1_4_of_it() {
+    for n in [6, 12] {
+        let fine = sheared(4 * n, 2);
+        for order in [1, 2] {
+            let coarse = sheared(n, order);
+            let (error, truth) =
+                (coarse.errors.damage_mesh.unwrap(), true_error(n, &coarse, &fine));
+            println!("n = {n}, order {order}: {error:.3e} for {truth:.3e}, {:.2}", error / truth);
+            assert!((0.7..1.4).contains(&(error / truth)), "n = {n}: {error} is not {truth}");
+            assert_eq!(coarse.damage_indicators.len(), 2 * n * n);
+            let whole = coarse.damage_indicators.iter().sum::<f64>().sqrt();
+            assert!(whole > 0.0 && whole < 1.2 * error.max(truth), "{whole}");
+        }
+    }
+}
+
+#[test]
+fn there_is_no_error_of_the_damage_without_damage() {
+    let text = "material = { young = 80, poisson = 0.3, plane = 'stress' }
+                boundary = [{ name = 'left', displacement = ['0', '0'] },
+                            { name = 'right', traction = ['-10', '-10'] }]";
+    let outcome = run(&problem(square(4), text).unwrap_or_else(|e| panic!("{e}")), SOLVERS[0]);
+    assert_eq!(outcome.errors.damage_mesh, None);
+    assert!(outcome.damage_indicators.is_empty());
+}
