@@ -87,7 +87,7 @@ pub fn run(
     let mut controller = StepController::new(problem, &first.state.zeta, source);
     let mut outcome = Outcome::new(first);
     show(&outcome.last)?;
-    let mut instants = Instants::new(problem.body.order());
+    let mut instants = Instants::new();
     instants.observe(&outcome.last);
     loop {
         let started = Instant::now();
