@@ -316,3 +316,24 @@ fn the_solvers_are_listed_with_what_they_do() {
     let help = TestDirectory::new().say(&["run", "--help"]);
     assert!(REGISTRY.iter().all(|entry| help.out.contains(entry.summary)), "{}", help.out);
 }
+
+#[test]
+fn solvers_are_compared_with_quadratic_displacements() {
+    let test_directory = TestDirectory::new();
+    let quadratic = ["--set", "discretisation.displacement=2"];
+    let said = test_directory.say(&[&["compare", "scene.toml"], &quadratic[..]].concat());
+    assert_eq!((said.code, said.err.as_str()), (Some(0), ""), "{said:?}");
+    let table = test_directory.read("out/compare/comparison.csv");
+    let mut reader = csv::Reader::from_reader(table.as_bytes());
+    let names = reader.headers().expect("a header").clone();
+    let rows: Vec<csv::StringRecord> = reader.records().map(|row| row.expect("a row")).collect();
+    assert_eq!(rows.len(), SOLVERS.len());
+    for row in &rows {
+        let value = |name: &str| &row[names.iter().position(|n| n == name).expect(name)];
+        for difference in ["difference_u", "difference_zeta", "difference_pressure"] {
+            let value: f64 = value(difference).parse().expect("a number");
+            assert!(value < 1e-8, "{difference}: {value}");
+        }
+        assert_eq!(value("error"), "");
+    }
+}

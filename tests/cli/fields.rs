@@ -2,12 +2,13 @@
 
 use crate::test_directory::TestDirectory;
 use std::path::Path;
-use vtkio::model::{Attribute, DataSet, Piece, Vtk};
+use vtkio::model::{Attribute, CellType, DataSet, Piece, Vtk};
 
-/// Names, values and components of point and cell data; the points; the number of cells.
+/// Names, values and components of point and cell data; the points; the types and nodes of the cells.
 struct Frame {
     points: Vec<f64>,
-    cells: usize,
+    types: Vec<CellType>,
+    nodes: Vec<Vec<usize>>,
     point_data: Vec<(String, Vec<f64>)>,
     cell_data: Vec<(String, Vec<f64>)>,
 }
@@ -26,8 +27,14 @@ fn frame(path: &Path) -> Frame {
     let vtk = Vtk::import(path).unwrap_or_else(|e| panic!("{}: {e:?}", path.display()));
     let DataSet::UnstructuredGrid { mut pieces, .. } = vtk.data else { panic!("another data set") };
     let Some(Piece::Inline(piece)) = pieces.pop() else { panic!("no piece") };
+    let (connectivity, offsets) = piece.cells.cell_verts.into_xml();
+    let firsts = std::iter::once(0).chain(offsets.iter().copied());
+    let cell = |(first, end): (u64, &u64)| {
+        connectivity[first as usize..*end as usize].iter().map(|&node| node as usize).collect()
+    };
     Frame {
-        cells: piece.cells.types.len(),
+        nodes: firsts.zip(&offsets).map(cell).collect(),
+        types: piece.cells.types,
         points: piece.points.cast_into().expect("real numbers"),
         point_data: arrays(piece.data.point),
         cell_data: arrays(piece.data.cell),
@@ -49,7 +56,8 @@ fn the_last_frame_is_the_state_of_the_summary() {
     let (time, file) = test_directory.frames("out/scene").pop().expect("frames");
     assert_eq!(time, 1.0);
     let frame = frame(&test_directory.path(&format!("out/scene/{file}")));
-    assert_eq!((frame.points.len(), frame.cells), (3 * 25, 32));
+    assert_eq!((frame.points.len(), frame.nodes.len()), (3 * 25, 32));
+    assert!(frame.types.iter().all(|kind| *kind == CellType::Triangle));
     let sizes = |data: &[(String, Vec<f64>)], count: usize| -> Vec<(String, usize)> {
         data.iter().map(|(name, values)| (name.clone(), values.len() / count)).collect()
     };
@@ -84,6 +92,45 @@ fn the_last_frame_is_the_state_of_the_summary() {
             }
             false => assert!(pressure[i] == 0.0 && gap[i].is_nan()),
         }
+    }
+}
+
+#[test]
+fn frames_of_quadratic_displacements_have_quadratic_triangles() {
+    let test_directory = TestDirectory::new();
+    test_directory.run(&["--set", "discretisation.displacement=2"]);
+    let (_, file) = test_directory.frames("out/scene").pop().expect("frames");
+    let frame = frame(&test_directory.path(&format!("out/scene/{file}")));
+    // 25 vertices and 56 edges.
+    assert_eq!((frame.points.len(), frame.nodes.len()), (3 * 81, 32));
+    assert!(frame.types.iter().all(|kind| *kind == CellType::QuadraticTriangle));
+    let summary = test_directory.summary("out/scene");
+    assert_eq!((&summary["nodes"], &summary["triangles"]), (&81.into(), &32.into()));
+    assert_eq!((&summary["contact_nodes"], &summary["active_nodes"]), (&9.into(), &9.into()));
+
+    // The midpoints of the sides 01, 12, 20 follow the vertices.
+    let (zeta, u) = (field(&frame.point_data, "zeta"), field(&frame.point_data, "displacement"));
+    for nodes in &frame.nodes {
+        assert_eq!(nodes.len(), 6);
+        for side in 0..3 {
+            let ends = [nodes[side], nodes[(side + 1) % 3]];
+            let mean = |of: &dyn Fn(usize) -> f64| 0.5 * (of(ends[0]) + of(ends[1]));
+            (0..3).for_each(|k| {
+                let x = |node: usize| frame.points[3 * node + k];
+                close(x(nodes[3 + side]), mean(&x));
+                // Uniform stress: u is affine.
+                let u = |node: usize| u[3 * node + k];
+                close(u(nodes[3 + side]), mean(&u));
+            });
+            close(zeta[nodes[3 + side]], mean(&|node| zeta[node]));
+        }
+    }
+    for stress in field(&frame.cell_data, "stress").chunks(3) {
+        stress.iter().zip([0.0, -3.0, 0.0]).for_each(|(a, b)| close(*a, b));
+    }
+    let pressure = field(&frame.point_data, "normal_pressure");
+    for (x, pressure) in frame.points.chunks(3).zip(pressure) {
+        close(*pressure, if x[1] == 0.0 { 3.0 } else { 0.0 });
     }
 }
 

@@ -242,11 +242,21 @@ fn a_disc_in_a_ring_can_only_turn() {
         curves: BTreeMap::from([("rim".to_owned(), Curve { edges, interior_edges: 0 })]),
         ..Mesh::default()
     };
+    let mut round = mesh.clone();
+    for &[a, b] in &mesh.curves["rim"].edges {
+        // The sagitta 1 − cos(π/n), outwards.
+        let sagitta = 1.0 - (std::f64::consts::PI / corners as f64).cos();
+        round.set_offset([a, b], mesh.edge_normal([a, b]).0.map(|normal| sagitta * normal));
+    }
     for held in ["symmetry = true", "gap = 0"] {
-        let motions = motions(mesh.clone(), &format!("{{ name = 'rim', {held} }}"));
-        let names: Vec<_> = motions.free.iter().map(RigidMotion::to_string).collect();
-        assert_eq!(names, ["the rotation about (3.0000, 2.0000)"], "{held}");
-        assert_eq!(motions.resisted() > 0, held == "gap = 0");
+        for (order, mesh) in [(1, &mesh), (2, &mesh), (2, &round)] {
+            let rim = format!("{{ name = 'rim', {held} }}");
+            let problem = of_order(order, mesh.clone(), &rim).unwrap_or_else(|e| panic!("{e}"));
+            let motions = &problem.motions;
+            let names: Vec<_> = motions.free.iter().map(RigidMotion::to_string).collect();
+            assert_eq!(names, ["the rotation about (3.0000, 2.0000)"], "P{order}, {held}");
+            assert_eq!(motions.resisted() > 0, held == "gap = 0");
+        }
     }
 }
 

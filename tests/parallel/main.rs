@@ -152,6 +152,34 @@ fn the_disc() {
     every_solver("hertz", &[]);
 }
 
+#[test]
+fn quadratic_displacements_under_a_rolling_load() {
+    let test_directory = example("lshape-rolling");
+    let quadratic = ["--set", "discretisation.displacement=2"];
+    let few = ["--set", "mesh.size=0.5", "--set", "time.step=0.1"];
+    let mut errors = Vec::new();
+    for (ranks, solver) in
+        [(1, "active-set"), (2, "active-set"), (3, "tao"), (3, "penalty-duality")]
+    {
+        let out = format!("{solver}-{ranks}");
+        let run = ["run", "scene.toml", "--solver", solver, "--out", &out];
+        let arguments = [&run[..], &quadratic, &few].concat();
+        let said = ProgramOutput::of(&mut on_ranks(&test_directory, ranks, &arguments));
+        assert_eq!((said.code, said.err.as_str()), (Some(0), ""), "{out}: {said:?}");
+        same_history(&test_directory, &out, "active-set-1");
+        let summary = test_directory.summary(&out);
+        let error = |name: &str| summary["errors"][name].as_f64().expect("a number");
+        errors.push([error("displacement_mesh"), error("damage_steps")]);
+    }
+    contact_travels(&test_directory, "active-set-1");
+    // The estimated errors know the undivided body, too.
+    for of_ranks in &errors {
+        for (error, expected) in of_ranks.iter().zip(errors[0]) {
+            assert!((error / expected - 1.0).abs() < 1e-6, "{errors:?}");
+        }
+    }
+}
+
 /// Four squares: one pressed on its foundation, one clamped with another that hangs on its corner,
 /// one pulled on both sides; the last two share a point and are a piece.
 const PIECES: &str = r#"

@@ -50,9 +50,10 @@ fn add(path: &Path, frame: &mut Frame) {
     }
     let (_, corners) = piece.cells.cell_verts.into_legacy();
     let corners: Vec<usize> = corners.into_iter().map(|i| i as usize).collect();
-    let triangles: Vec<&[usize]> = corners.chunks(4).map(|t| &t[1..]).collect();
+    // Each cell is its number of nodes and these, the vertices first.
+    let triangles: Vec<&[usize]> = corners.chunks(1 + corners[0]).map(|t| &t[1..]).collect();
     for (t, new) in triangles.iter().zip(values(&piece.data.cell, triangles.len())) {
-        let middle = [0, 1].map(|k| t.iter().map(|&i| at(i)[k]).sum::<f64>() / 3.0);
+        let middle = [0, 1].map(|k| t[..3].iter().map(|&i| at(i)[k]).sum::<f64>() / 3.0);
         assert!(frame.cells.insert(place(&middle), new).is_none(), "a triangle in two pieces");
     }
 }
@@ -69,12 +70,24 @@ fn close(a: &Values, b: &Values) {
 
 #[test]
 fn pieces_together_are_the_frame_of_one_rank() {
+    same_frames("1");
+}
+
+#[test]
+fn pieces_of_quadratic_triangles_together_are_the_frame_of_one_rank() {
+    same_frames("2");
+}
+
+/// With displacements of this order.
+fn same_frames(order: &str) {
     let test_directory = TestDirectory::new();
     // A frame of an earlier run on more ranks must not stay.
     test_directory.write("many/fields_0001_7.vtu", "old");
     test_directory.write("many/fields_0099.pvtu", "old");
     // Not uniform, and pressed on a part of the bottom.
+    let order = format!("discretisation.displacement={order}");
     let load = ["--set", "boundary.top.traction=['t', '-2*t*x']", "--set", "time.step=0.5"];
+    let load = [&load[..], &["--set", &order]].concat();
     test_directory.run(&[&load[..], &["--out", "one"]].concat());
     let arguments = [&["run", "scene.toml", "--out", "many"], &load[..]].concat();
     let said = ProgramOutput::of(&mut on_ranks(&test_directory, 3, &arguments));
