@@ -1,6 +1,6 @@
 //! Where the conditioning or the discretisation is poor: answers stay right, or notes say not.
 
-use crate::support::{close, difference, distorted, history, moved, problem, run, square};
+use crate::support::{close, difference, distorted, history, moved, order, problem, run, square};
 use signorini::{contact::SOLVERS, evolution::DiscreteProblem, mesh::Mesh};
 use std::f64::consts::PI;
 
@@ -66,7 +66,7 @@ fn slivers_are_told_with_their_place() {
 
 /// The curl of ψ = sin²(πx) sin(πy)/100 prescribed on the boundary of the square, with the body
 /// force that makes it the exact answer: the relative error of u at the nodes.
-fn curl_error(n: usize, poisson: f64) -> f64 {
+fn curl_error(order: u8, n: usize, poisson: f64) -> f64 {
     let u = "['pi*sin(pi*x)^2*cos(pi*y)/100', '-pi*sin(2*pi*x)*sin(pi*y)/100']";
     // div u = 0: f = −μΔu.
     let f = 0.01 * PI.powi(3) * 80.0 / (2.0 * (1.0 + poisson));
@@ -77,23 +77,41 @@ fn curl_error(n: usize, poisson: f64) -> f64 {
     let sides = ["left", "right", "bottom", "top"];
     let sides = sides.map(|name| format!("{{ name = '{name}', displacement = {u} }}")).join(",");
     let law = format!("poisson = {poisson}, plane = 'strain'");
-    let problem = body(square(n), &law, &force, &sides);
+    let more = format!("discretisation.displacement = {order}\n{force}");
+    let problem = body(square(n), &law, &more, &sides);
     let exact = |&[x, y]: &[f64; 2]| {
         let (a, b) = ((PI * x).sin().powi(2), (2.0 * PI * x).sin());
         [a * (PI * y).cos(), -b * (PI * y).sin()].map(|v| 0.01 * PI * v)
     };
-    let exact: Vec<f64> = problem.body.mesh.nodes.iter().flat_map(exact).collect();
+    let exact: Vec<f64> = problem.body.nodes.points.iter().flat_map(exact).collect();
     difference(&run(&problem, SOLVERS[0]).last.state.u, &exact)
 }
 
 #[test]
 fn linear_triangles_lock_as_poissons_ratio_goes_to_a_half() {
     for n in [8, 16] {
-        let errors = [0.3, 0.45, 0.49, 0.499, 0.4999].map(|nu| curl_error(n, nu));
+        let errors = [0.3, 0.45, 0.49, 0.499, 0.4999].map(|nu| curl_error(1, n, nu));
         assert!(errors.is_sorted() && errors[4] > 0.4, "{errors:?}");
         // Up to where no note is given the error stays that of a coarse mesh.
         assert!(errors[1] < 3.0 * errors[0] && errors[0] < 8.0 / (n * n) as f64, "{errors:?}");
     }
+}
+
+#[test]
+fn quadratic_triangles_lose_an_order_instead_of_locking() {
+    // Of order 3 where ν is small, of order 2 at least in the limit.
+    for (poisson, least) in [(0.3, 2.9), (0.49, 2.5), (0.4999, 1.9)] {
+        let cells = [8, 16, 32];
+        let errors = cells.map(|n| curl_error(2, n, poisson));
+        let order = order(&cells.map(|n| 1.0 / n as f64), &errors);
+        println!("ν = {poisson}: {errors:?}, order {order:.2}");
+        assert!(order > least, "ν = {poisson}: {order}, {errors:?}");
+        // With the nodes of twice as many cells, linear triangles are far from that.
+        assert!(errors[0] < 0.1 * curl_error(1, 16, poisson), "ν = {poisson}");
+    }
+    let told = "poisson = 0.4999, plane = 'strain'";
+    let notes = body(distorted(8), told, "discretisation.displacement = 2", PRESSED).notes();
+    assert_eq!(notes, [""; 0]);
 }
 
 #[test]
