@@ -9,7 +9,7 @@ use crate::{
 };
 
 /// In plane strain with ν above this, P1 triangles lock: measured in the stability study. P2 triangles
-/// lose one order of convergence as ν goes to ½, but do not lock (measured up to 0.4999).
+/// converge more slowly as ν goes to ½, but do not lock (measured up to 0.4999).
 const LOCKING: f64 = 0.45;
 /// Triangles with a smaller angle are noted, degrees.
 const SLIVER: f64 = 1.0;

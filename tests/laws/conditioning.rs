@@ -98,16 +98,17 @@ fn linear_triangles_lock_as_poissons_ratio_goes_to_a_half() {
 }
 
 #[test]
-fn quadratic_triangles_lose_an_order_instead_of_locking() {
-    // Of order 3 where ν is small, of order 2 at least in the limit.
-    for (poisson, least) in [(0.3, 2.9), (0.49, 2.5), (0.4999, 1.9)] {
+fn quadratic_triangles_converge_more_slowly_instead_of_locking() {
+    // At the nodes of these regular meshes with order 4 where ν is small, with order 2 in the limit.
+    for (poisson, least) in [(0.3, 3.7), (0.49, 3.2), (0.4999, 1.9)] {
         let cells = [8, 16, 32];
         let errors = cells.map(|n| curl_error(2, n, poisson));
         let order = order(&cells.map(|n| 1.0 / n as f64), &errors);
         println!("ν = {poisson}: {errors:?}, order {order:.2}");
         assert!(order > least, "ν = {poisson}: {order}, {errors:?}");
-        // With the nodes of twice as many cells, linear triangles are far from that.
-        assert!(errors[0] < 0.1 * curl_error(1, 16, poisson), "ν = {poisson}");
+        // Linear triangles with as many nodes are worse, and far worse where they lock.
+        let part = if poisson < 0.4 { 0.3 } else { 0.1 };
+        assert!(errors[0] < part * curl_error(1, 16, poisson), "ν = {poisson}");
     }
     let told = "poisson = 0.4999, plane = 'strain'";
     let notes = body(distorted(8), told, "discretisation.displacement = 2", PRESSED).notes();
