@@ -3,8 +3,9 @@
 //! From a coarse mesh, runs with few time steps tell how the error of u is spread over the triangles,
 //! m_T = max_t ‖ε* − ε(u(t))‖²_T / max_t ‖u(t)‖², at the end relative to the ‖u‖² there. On a triangle whose size is multiplied by r the
 //! error falls like r^p, p the order of u, and 1/r² triangles take its place: the least number of
-//! triangles for a given error Σ r_T^2p m_T has r_T ~ m_T^(−1/(2p+2)). Triangles are bisected down to
-//! that size, round after round, until the estimate is small enough.
+//! triangles for a given error Σ r_T^2p m_T has r_T ~ m_T^(−1/(2p+2)). The same holds for the part of
+//! the damage's error that its P1 interpolation makes; the other part comes from u. Triangles are
+//! bisected down to the smaller size, round after round, until both estimates are small enough.
 
 use super::{DiscreteProblem, Outcome, Phases, RunError, SetupError, State, run};
 use crate::{
@@ -23,6 +24,8 @@ pub struct Adapted {
     pub rounds: usize,
     /// The estimated relative error of u on it, in the energy norm, at the worst time.
     pub error: f64,
+    /// That of the damage at the end.
+    pub damage_error: Option<f64>,
     /// By how much the time at which ζ_* is reached changed from the mesh before to this one, s.
     pub stop_change: Option<f64>,
     /// The target was not reached: the mesh has become as large as is allowed.
@@ -49,6 +52,8 @@ pub enum AdaptError {
 /// Parts of the accuracy asked for: what a mesh is made for, and what its estimate may be.
 const AIM: f64 = 0.7;
 const ENOUGH: f64 = 0.85;
+/// The part of the damage's error that its interpolation may take.
+const INTERPOLATION: f64 = 0.7;
 /// The error of ζ over the damage done that the few steps of a run on a coarse mesh may make.
 const PILOT_TOLERANCE: f64 = 0.05;
 /// The part of the accuracy that the time steps of the last run may take.
@@ -65,9 +70,9 @@ const UNLOADED: f64 = 1e-4;
 const ROUNDS: usize = 25;
 const MOST_TRIANGLES: usize = 4_000_000;
 
-/// Refines `mesh` until the estimated relative error of u in a run of `scene`, and where the run ends at
-/// ζ_* that of the time, is at most `accuracy`; what the time steps add is for the caller. Collective:
-/// all ranks have the same mesh.
+/// Refines `mesh` until the estimated relative errors of u and the damage in a run of `scene` are at most
+/// `accuracy`; where the run ends at ζ_*, those of u and of that time. What the time steps add is for the
+/// caller. Collective: all ranks have the same mesh.
 ///
 /// # Errors
 /// See [`AdaptError`].
@@ -101,17 +106,35 @@ pub fn adapted(
         }
         indicators.observe(&outcome.last.state, true)?;
         let (error, shares) = indicators.relative();
+        let damage_error = outcome.errors.damage_mesh.filter(|_| outcome.stopped.is_none());
         let settled = is_settled(&outcome, stopped_before, accuracy);
         let exhausted = rounds == ROUNDS || refinement.mesh.triangles.len() > MOST_TRIANGLES;
-        if exhausted || (error <= ENOUGH * accuracy && settled) {
+        let largest = error.max(damage_error.unwrap_or(0.0));
+        if exhausted || (largest <= ENOUGH * accuracy && settled) {
             let times = outcome.stopped.map(|stop| stop.time).zip(stopped_before);
             let stop_change = times.map(|(now, before): (f64, f64)| (now - before).abs());
-            return Ok(Adapted { mesh: refinement.mesh, rounds, error, stop_change, exhausted });
+            let mesh = refinement.mesh;
+            return Ok(Adapted { mesh, rounds, error, damage_error, stop_change, exhausted });
         }
-        // A time that has not settled asks for a mesh better than this one.
-        let aim = AIM * if settled { accuracy } else { accuracy.min(0.5 * error) };
+        // A damage, or a time, that is not exact enough asks for a u better than this one.
+        let mut ratios = size_ratios(
+            &shares,
+            order,
+            AIM * match damage_error {
+                _ if !settled => accuracy.min(0.5 * error),
+                Some(of_damage) if of_damage > accuracy => {
+                    accuracy.min(error * accuracy / of_damage)
+                }
+                _ => accuracy,
+            },
+        );
+        if damage_error.is_some() {
+            let shares = indicators.gathered(&outcome.damage_indicators);
+            let of_damage = size_ratios(&shares, 2.0, INTERPOLATION * AIM * accuracy);
+            ratios.iter_mut().zip(of_damage).for_each(|(ratio, other)| *ratio = ratio.min(other));
+        }
         stopped_before = outcome.stopped.map(|stop| stop.time);
-        refinement = divided(refinement, &size_ratios(&shares, order, aim))?;
+        refinement = divided(refinement, &ratios)?;
     }
     unreachable!("the last round returns")
 }
@@ -211,16 +234,23 @@ impl<'a> Indicators<'a> {
         let zeta = problem.zeta_at_points(&state.zeta);
         let recovered = RecoveredStrains::new(body, &state.u)?;
         let error = recovered.energy_error(&problem.elasticity, &zeta, &state.u);
-        let mut squares = vec![0.0; self.squares.len()];
-        for (&triangle, square) in body.global_triangles.iter().zip(&error.squares) {
-            squares[triangle] = *square;
-        }
-        body.nodes.partition.comm().sum(&mut squares);
+        let squares = self.gathered(&error.squares);
         self.squares.iter_mut().zip(&squares).for_each(|(max, square)| *max = max.max(*square));
         self.end = (squares, error.error, error.energy);
         self.worst = self.worst.max(error.error);
         self.energy = self.energy.max(error.energy);
         Ok(())
+    }
+
+    /// Values of this rank's triangles for all triangles of the undivided mesh. Collective.
+    fn gathered(&self, own: &[f64]) -> Vec<f64> {
+        let body = &self.problem.body;
+        let mut values = vec![0.0; self.squares.len()];
+        for (&triangle, value) in body.global_triangles.iter().zip(own) {
+            values[triangle] = *value;
+        }
+        body.nodes.partition.comm().sum(&mut values);
+        values
     }
 
     /// The relative error at the worst time, and the shares m_T of its square.

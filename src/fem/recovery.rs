@@ -109,7 +109,7 @@ impl<'a> RecoveredStrains<'a> {
 
 /// The strains of nodal u at the vertices and the midpoints of the sides 01, 12, 20 of each triangle.
 pub fn strains_at_nodes(body: &Body, u: &[f64]) -> Vec<[Vector3<f64>; 6]> {
-    let strains: Vec<_> = for_elements!(body, cells => cells.strains(u, |strain| strain));
+    let strains = for_elements!(body, cells => cells.strains(u, |strain| strain));
     let with_midpoints = |of: &[Vector3<f64>]| {
         let [a, b, c] = at_vertices(of);
         [a, b, c, 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)]
