@@ -36,7 +36,8 @@ pub struct RunArguments {
     ))]
     solver: Option<String>,
     /// Choose order, mesh and time steps so that the estimated error of u (energy norm) and of the
-    /// damage is at most this, e.g. 0.01.
+    /// damage is at most this, from 1e-5 to 0.5, e.g. 0.01; time.step, time.tolerance and the mesh.size of
+    /// a .geo then have no effect.
     #[arg(long, value_name = "ERROR")]
     accuracy: Option<f64>,
     /// Override a key of the scene, e.g. --set time.step=0.005; may be repeated.

@@ -90,6 +90,7 @@ pub fn adapted(
     let order = if scene.order == Order::Quadratic { 2.0 } else { 1.0 };
     let mut refinement = Refinement::start(mesh);
     let mut stopped_before = None;
+    let mut settled_rounds = 0;
     for rounds in 1.. {
         let problem = DiscreteProblem::new(scene.clone(), refinement.mesh.clone())?;
         let problem = problem.restrict(session)?;
@@ -107,7 +108,12 @@ pub fn adapted(
         indicators.observe(&outcome.last.state, true)?;
         let (error, shares) = indicators.relative();
         let damage_error = outcome.errors.damage_mesh.filter(|_| outcome.stopped.is_none());
-        let settled = is_settled(&outcome, stopped_before, accuracy);
+        // Two meshes may agree by chance.
+        settled_rounds = match is_settled(&outcome, stopped_before, accuracy) {
+            true => settled_rounds + 1,
+            false => 0,
+        };
+        let settled = settled_rounds >= if outcome.stopped.is_some() { 2 } else { 1 };
         let exhausted = rounds == ROUNDS || refinement.mesh.triangles.len() > MOST_TRIANGLES;
         let largest = error.max(damage_error.unwrap_or(0.0));
         if exhausted || (largest <= ENOUGH * accuracy && settled) {

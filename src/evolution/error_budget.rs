@@ -111,7 +111,8 @@ impl DiscreteProblem {
     }
 
     /// The relative error of u in the energy norm that errors δζ = `error` of ζ cause, at most:
-    /// ‖δζ/ζ ε(u)‖ over ‖ε(u)‖, since K δu = −δK u; for large δζ with the larger of both ζ. Collective.
+    /// ‖δζ/ζ ε(u)‖ over ‖ε(u)‖, since K δu = −δK u; for large δζ with the larger of both ζ, and at no
+    /// place more than ε(u) itself. Collective.
     pub(super) fn displacement_error_of(&self, error: &[f64], state: &State) -> f64 {
         let body = &self.body;
         let (zeta, error) = (self.zeta_at_points(&state.zeta), body.at_points(error));
@@ -119,7 +120,7 @@ impl DiscreteProblem {
         let own = energies.len() / body.triangles.len() * body.own_triangles;
         let mut sums = [0.0; 2];
         for ((energy, zeta), error) in energies.iter().zip(&zeta).zip(&error).take(own) {
-            sums[0] += energy * (error / zeta.max(zeta + error)).powi(2);
+            sums[0] += energy * (error / zeta.max(zeta + error)).powi(2).min(1.0);
             sums[1] += energy;
         }
         body.nodes.partition.comm().sum(&mut sums);

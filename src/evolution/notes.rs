@@ -84,7 +84,8 @@ impl Outcome {
     fn chosen_steps(&self, problem: &DiscreteProblem) -> Option<String> {
         let error = self.damage_error.filter(|_| problem.damage().is_some())?;
         let Stepping::Auto { tolerance } = problem.scene().time?.stepping else { return None };
-        let verdict = match error > tolerance {
+        // Where an accuracy is asked for, the tolerance is not the user's.
+        let verdict = match error > tolerance && problem.scene().accuracy.is_none() {
             true => format!(", more than time.tolerance = {tolerance}: lower it"),
             false => String::new(),
         };
