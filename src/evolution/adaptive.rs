@@ -7,7 +7,9 @@
 //! the damage's error that its P1 interpolation makes; the other part comes from u. Triangles are
 //! bisected down to the smaller size, round after round, until both estimates are small enough.
 
-use super::{DiscreteProblem, Outcome, Phases, RunError, SetupError, State, run};
+use super::{
+    DiscreteProblem, Outcome, Phases, RunError, SetupError, State, run, unresolved::unresolved,
+};
 use crate::{
     fem::RecoveredStrains,
     mesh::{Mesh, MeshError, Order, Refinement, twice_area},
@@ -62,6 +64,8 @@ pub const SHARE_OF_STEPS: f64 = 0.5;
 const INSTANTS: usize = 12;
 /// A triangle's size is multiplied by no less than this in a round.
 const LEAST_RATIO: f64 = 0.125;
+/// A triangle at an edge on which a traction or a gap is not resolved becomes smaller by this.
+const QUARTER: f64 = 0.25;
 /// Triangles are bisected while they are larger than this part of their wanted area.
 const EXCESS: f64 = 1.5;
 /// At the end of a run, errors are relative to no less than this part of the largest ‖u‖².
@@ -116,7 +120,9 @@ pub fn adapted(
         let settled = settled_rounds >= if outcome.stopped.is_some() { 2 } else { 1 };
         let exhausted = rounds == ROUNDS || refinement.mesh.triangles.len() > MOST_TRIANGLES;
         let largest = error.max(damage_error.unwrap_or(0.0));
-        if exhausted || (largest <= ENOUGH * accuracy && settled) {
+        let displacement = outcome.last.record.displacement_max.max(indicators.displacement);
+        let coarse = unresolved(&scene, &refinement.mesh, accuracy, displacement);
+        if exhausted || (largest <= ENOUGH * accuracy && settled && coarse.is_empty()) {
             let times = outcome.stopped.map(|stop| stop.time).zip(stopped_before);
             let stop_change = times.map(|(now, before): (f64, f64)| (now - before).abs());
             let mesh = refinement.mesh;
@@ -138,6 +144,12 @@ pub fn adapted(
             let shares = indicators.gathered(&outcome.damage_indicators);
             let of_damage = size_ratios(&shares, 2.0, INTERPOLATION * AIM * accuracy);
             ratios.iter_mut().zip(of_damage).for_each(|(ratio, other)| *ratio = ratio.min(other));
+        }
+        for (ratio, &[a, b, c]) in ratios.iter_mut().zip(&refinement.mesh.triangles) {
+            let sides = [[a, b], [b, c], [c, a]].map(|[p, q]| [p.min(q), p.max(q)]);
+            if sides.iter().any(|side| coarse.contains(side)) {
+                *ratio = ratio.min(QUARTER);
+            }
         }
         stopped_before = outcome.stopped.map(|stop| stop.time);
         refinement = divided(refinement, &ratios)?;
@@ -205,8 +217,9 @@ struct Indicators<'a> {
     /// max_t ‖ε* − ε(u)‖²_T, and the largest sum over T at any time.
     squares: Vec<f64>,
     worst: f64,
-    /// max_t ‖u‖².
+    /// max_t ‖u‖², and the largest |u| at any time, m.
     energy: f64,
+    displacement: f64,
     /// ‖ε* − ε(u)‖²_T, their sum and ‖u‖² at the last time.
     end: (Vec<f64>, f64, f64),
 }
@@ -219,6 +232,7 @@ impl<'a> Indicators<'a> {
             squares: vec![0.0; triangles],
             worst: 0.0,
             energy: 0.0,
+            displacement: 0.0,
             end: Default::default(),
         }
     }
@@ -245,6 +259,7 @@ impl<'a> Indicators<'a> {
         self.end = (squares, error.error, error.energy);
         self.worst = self.worst.max(error.error);
         self.energy = self.energy.max(error.energy);
+        self.displacement = self.displacement.max(body.nodes.partition.max_norm(&state.u));
         Ok(())
     }
 

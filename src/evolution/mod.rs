@@ -37,6 +37,7 @@ mod notes;
 mod outcome;
 mod state;
 mod step_controller;
+mod unresolved;
 
 pub use crate::contact::ContactPoint;
 pub use crate::phases::Phases;

@@ -12,6 +12,11 @@ use std::{collections::BTreeMap, path::Path};
 
 /// A block on a foundation that ends under it: u ~ r^½ at the end, a jump of the traction besides.
 fn scene(accuracy: f64) -> Scene {
+    loaded(accuracy, "-1")
+}
+
+/// The same under another load per area.
+fn loaded(accuracy: f64, load: &str) -> Scene {
     let text = format!(
         "accuracy = {accuracy}
          mesh.file = 'given.msh'
@@ -19,7 +24,7 @@ fn scene(accuracy: f64) -> Scene {
          boundary = [
             {{ name = 'left', symmetry = true }},
             {{ name = 'half', gap = 0 }},
-            {{ name = 'top', traction = ['0', '-1'] }},
+            {{ name = 'top', traction = ['0', '{load}'] }},
          ]"
     );
     Scene::parse(&text, Path::new("law.toml"), &[]).unwrap_or_else(|error| panic!("{error}"))
@@ -66,4 +71,19 @@ fn the_error_is_at_most_the_one_asked_for_and_not_much_less() {
     }
     // P2 on adapted meshes: the error falls like 1/N, on uniform ones like N^-1/4 here.
     assert!(triangles[2] < 1.5 * 10.0 * triangles[0], "{triangles:?}");
+}
+
+#[test]
+fn a_load_narrower_than_the_first_triangles_is_found() {
+    // ∫ exp(−((x − c)/w)²) dx = w √π.
+    let (width, accuracy) = (0.004, 0.1);
+    let scene = loaded(accuracy, &format!("-exp(-((x - 0.31)/{width})^2)"));
+    let session = Session::start(&[]).unwrap();
+    let found = evolution::adapted(&session, &scene, mesh(2), SOLVERS[0], accuracy);
+    let mesh = found.unwrap_or_else(|error| panic!("{error}")).mesh;
+    drop(session);
+    let problem = DiscreteProblem::new(scene, mesh).unwrap_or_else(|error| panic!("{error}"));
+    let force = run(&problem, SOLVERS[0]).last.record.contact_force;
+    let exact = width * std::f64::consts::PI.sqrt();
+    assert!((force - exact).abs() < accuracy * exact, "{force} is not {exact}");
 }

@@ -1,0 +1,93 @@
+//! Edges on which a traction or a gap varies by more than the mesh shows.
+
+use crate::{mesh::Mesh, scene::Scene};
+use std::collections::HashSet;
+
+/// Points at which the functions are sampled in an edge.
+const SAMPLES: usize = 64;
+/// Times at which a traction is sampled, about.
+const TIMES: usize = 8;
+/// What a single edge may lose of the accuracy asked for.
+const SHARE: f64 = 0.1;
+/// Gaps count where they are less than this many times the largest displacement.
+const NEAR: f64 = 2.0;
+
+/// The edges, by their ends in increasing order, that must be halved for a relative `accuracy`, with
+/// `displacement` the largest |u|, m:
+///
+/// - those on which the two Gauss points of a traction f miss more than a tenth of `accuracy` ∫|f|;
+/// - those near the foundation on which g is further than `accuracy` · `displacement` from its
+///   interpolation at ends and middle.
+pub(super) fn unresolved(
+    scene: &Scene,
+    mesh: &Mesh,
+    accuracy: f64,
+    displacement: f64,
+) -> HashSet<[usize; 2]> {
+    let mut found = HashSet::new();
+    for boundary in &scene.boundaries {
+        let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
+        if let Some(gap) = boundary.gap() {
+            let near = |&edge: &[usize; 2]| {
+                let [a, m, b] = [0.0, 0.5, 1.0].map(|s| gap.at(place(mesh, edge, s)));
+                let mut least = f64::INFINITY;
+                let mut deviation = 0.0_f64;
+                for s in samples() {
+                    let r = 1.0 - s;
+                    let shown = a * r * (r - s) + 4.0 * m * r * s + b * s * (s - r);
+                    let g = gap.at(place(mesh, edge, s));
+                    least = least.min(g).min(shown);
+                    deviation = deviation.max((g - shown).abs());
+                }
+                least < NEAR * displacement && deviation > accuracy * displacement
+            };
+            found.extend(curve.edges.iter().filter(|edge| near(edge)).map(sorted));
+        }
+        let Some(f) = boundary.traction() else { continue };
+        if !f.iter().any(|component| component.depends_on_space()) {
+            continue;
+        }
+        for t in scene.sample_times(TIMES) {
+            let mean = |edge: [usize; 2], at: &[f64]| {
+                let mut sums = [0.0; 3];
+                for &s in at {
+                    let [x, y] = place(mesh, edge, s);
+                    let [fx, fy] = f.each_ref().map(|component| component.eval(x, y, t));
+                    let values = [fx, fy, fx.hypot(fy)];
+                    sums.iter_mut().zip(values).for_each(|(sum, v)| *sum += v / at.len() as f64);
+                }
+                sums
+            };
+            let fine: Vec<f64> = samples().collect();
+            let parts = curve.edges.iter().map(|&edge| {
+                let (length, fine) = (mesh.edge_normal(edge).1, mean(edge, &fine));
+                let coarse = mean(edge, &GAUSS);
+                let lost = (fine[0] - coarse[0]).hypot(fine[1] - coarse[1]);
+                (edge, lost * length, fine[2] * length)
+            });
+            let parts: Vec<_> = parts.collect();
+            let total: f64 = parts.iter().map(|part| part.2).sum();
+            let lost = parts.iter().filter(|part| part.1 > SHARE * accuracy * total);
+            found.extend(lost.map(|part| sorted(&part.0)));
+        }
+    }
+    found
+}
+
+/// The abscissae of the Gauss points of [`crate::fem::add_traction`].
+const GAUSS: [f64; 2] = [0.211_324_865_405_187_08, 0.788_675_134_594_812_9];
+
+fn samples() -> impl Iterator<Item = f64> {
+    (0..SAMPLES).map(|i| (i as f64 + 0.5) / SAMPLES as f64)
+}
+
+/// The point x(s) of an edge, 0 ≤ s ≤ 1, m.
+fn place(mesh: &Mesh, [a, b]: [usize; 2], s: f64) -> [f64; 2] {
+    let (p, m, q) = (mesh.nodes[a], mesh.midpoint([a, b]), mesh.nodes[b]);
+    let r = 1.0 - s;
+    [0, 1].map(|k| p[k] * r * (r - s) + 4.0 * m[k] * r * s + q[k] * s * (s - r))
+}
+
+fn sorted([a, b]: &[usize; 2]) -> [usize; 2] {
+    [*a.min(b), *a.max(b)]
+}
