@@ -1,11 +1,12 @@
 //! Meshes for an accuracy that is asked for, instead of a size.
 //!
 //! From a coarse mesh, runs with few time steps tell how the error of u is spread over the triangles,
-//! m_T = max_t ‖ε* − ε(u(t))‖²_T / max_t ‖u(t)‖², at the end relative to the ‖u‖² there. On a triangle whose size is multiplied by r the
-//! error falls like r^p, p the order of u, and 1/r² triangles take its place: the least number of
-//! triangles for a given error Σ r_T^2p m_T has r_T ~ m_T^(−1/(2p+2)). The same holds for the part of
-//! the damage's error that its P1 interpolation makes; the other part comes from u. Triangles are
-//! bisected down to the smaller size, round after round, until both estimates are small enough.
+//! m_T = max_t ‖ε* − ε(u(t))‖²_T / max_t ‖u(t)‖², at the end relative to the ‖u‖² there. On a triangle
+//! whose size is multiplied by r the error falls like r^p, p the order of u, and 1/r² triangles take
+//! its place: the least number of triangles for a given error Σ r_T^2p m_T has r_T ~ m_T^(−1/(2p+2)).
+//! The same holds for the part of the damage's error that its P1 interpolation makes; the other part
+//! comes from u. Triangles are bisected down to the smaller size, round after round, until both
+//! estimates are small enough.
 
 use super::{
     DiscreteProblem, Outcome, Phases, RunError, SetupError, State, run, unresolved::unresolved,
@@ -118,7 +119,7 @@ pub fn adapted(
             false => 0,
         };
         let settled = settled_rounds >= if outcome.stopped.is_some() { 2 } else { 1 };
-        let exhausted = rounds == ROUNDS || refinement.mesh.triangles.len() > MOST_TRIANGLES;
+        let exhausted = rounds >= ROUNDS || refinement.mesh.triangles.len() > MOST_TRIANGLES;
         let largest = error.max(damage_error.unwrap_or(0.0));
         let displacement = outcome.last.record.displacement_max.max(indicators.displacement);
         let coarse = unresolved(&scene, &refinement.mesh, accuracy, displacement);
@@ -129,17 +130,12 @@ pub fn adapted(
             return Ok(Adapted { mesh, rounds, error, damage_error, stop_change, exhausted });
         }
         // A damage, or a time, that is not exact enough asks for a u better than this one.
-        let mut ratios = size_ratios(
-            &shares,
-            order,
-            AIM * match damage_error {
-                _ if !settled => accuracy.min(0.5 * error),
-                Some(of_damage) if of_damage > accuracy => {
-                    accuracy.min(error * accuracy / of_damage)
-                }
-                _ => accuracy,
-            },
-        );
+        let of_u = match damage_error {
+            _ if !settled => accuracy.min(0.5 * error),
+            Some(of_damage) if of_damage > accuracy => accuracy.min(error * accuracy / of_damage),
+            _ => accuracy,
+        };
+        let mut ratios = size_ratios(&shares, order, AIM * of_u);
         if damage_error.is_some() {
             let shares = indicators.gathered(&outcome.damage_indicators);
             let of_damage = size_ratios(&shares, 2.0, INTERPOLATION * AIM * accuracy);

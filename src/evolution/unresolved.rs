@@ -1,6 +1,6 @@
 //! Edges on which a traction or a gap varies by more than the mesh shows.
 
-use crate::{mesh::Mesh, scene::Scene};
+use crate::{fem::gauss_points, mesh::Mesh, scene::Scene};
 use std::collections::HashSet;
 
 /// Points at which the functions are sampled in an edge.
@@ -25,6 +25,8 @@ pub(super) fn unresolved(
     displacement: f64,
 ) -> HashSet<[usize; 2]> {
     let mut found = HashSet::new();
+    // As parts of the way along an edge.
+    let gauss = gauss_points([0.0; 2], [1.0, 0.0]).map(|[s, _]| s);
     for boundary in &scene.boundaries {
         let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
         if let Some(gap) = boundary.gap() {
@@ -61,7 +63,7 @@ pub(super) fn unresolved(
             let fine: Vec<f64> = samples().collect();
             let parts = curve.edges.iter().map(|&edge| {
                 let (length, fine) = (mesh.edge_normal(edge).1, mean(edge, &fine));
-                let coarse = mean(edge, &GAUSS);
+                let coarse = mean(edge, &gauss);
                 let lost = (fine[0] - coarse[0]).hypot(fine[1] - coarse[1]);
                 (edge, lost * length, fine[2] * length)
             });
@@ -73,9 +75,6 @@ pub(super) fn unresolved(
     }
     found
 }
-
-/// The abscissae of the Gauss points of [`crate::fem::add_traction`].
-const GAUSS: [f64; 2] = [0.211_324_865_405_187_08, 0.788_675_134_594_812_9];
 
 fn samples() -> impl Iterator<Item = f64> {
     (0..SAMPLES).map(|i| (i as f64 + 0.5) / SAMPLES as f64)
