@@ -1,9 +1,41 @@
 //! **signorini**: an elastic body pressed against a rigid foundation while its
 //! material is damaged.
 //!
-//! The scheme is Problem VP^hk of Campo, Fernández and Silva, "Damageable contact
-//! between an elastic body and a rigid foundation". The modules stand in the order
-//! of their dependence: each uses only those above it.
+//! # The problem
+//!
+//! A body Ω in the plane, per metre of thickness, is held on Γ_D, loaded on Γ_N and by a force f_B, and
+//! may touch a rigid foundation at the distance g along the outward normal ν of Γ_C, without friction.
+//! Sought are the displacement u and the damage ζ, 1 where the material is sound and 0 where it is
+//! broken, with σ = ζ𝒜ε(u), −Div σ = f_B, σν = f_N on Γ_N and
+//!
+//! ```text
+//! u·ν ≤ g,   σ_ν ≤ 0,   σ_ν (u·ν − g) = 0,   σ_τ = 0   on Γ_C           (7), (8)
+//! ζ′ − κ Δζ = φ(ε(u), ζ)  in Ω,   ∂ζ/∂ν = 0  on ∂Ω,   ζ(0) = ζ₀         (3), (4), (9)
+//! φ = −(λ_D (1 − ζ)/ζ + ½ λ_U min(|ε|², q*) − λ_W)₊
+//! ```
+//!
+//! On the right and in σ, ζ is cut to [ζ_*, 1]. In weak form, with U the displacements that
+//! take their values on Γ_D and have u·ν ≤ g on Γ_C: u(t) ∈ U and ζ(t) ∈ H¹(Ω) such that
+//!
+//! ```text
+//! ∫ ζ𝒜ε(u)·ε(v − u) ≥ ∫ f_B·(v − u) + ∫_Γ_N f_N·(v − u)   for all v ∈ U         (20)
+//! ∫ ζ′ξ + κ∇ζ·∇ξ = ∫ φ(ε(u), ζ) ξ                          for all ξ ∈ H¹(Ω)     (21)
+//! ```
+//!
+//! # The scheme
+//!
+//! Problem VP^hk of Campo, Fernández and Silva, "Damageable contact between an elastic body and a
+//! rigid foundation" (the numbers are theirs), with finite elements of degree 1 (u also 2) on
+//! triangles and Euler steps of length k:
+//!
+//! ```text
+//! ∫ (ζₙ − ζₙ₋₁)/k ξ + κ∇ζₙ·∇ξ = ∫ φ(ε(uₙ₋₁), ζₙ₋₁) ξ                             (25)
+//! ∫ ζₙ𝒜ε(uₙ)·ε(v − uₙ) ≥ the work of the loads at tₙ on v − uₙ                    (26)
+//! ```
+//!
+//! (27) is (26) at t = 0. A run stops where min ζ reaches ζ_*. Start reading at [`evolution::run`].
+//!
+//! The modules stand in the order of their dependence: each uses only those above it.
 #![deny(unsafe_code)]
 
 pub mod phases;

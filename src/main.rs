@@ -3,7 +3,7 @@
 
 mod command;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::{path::PathBuf, process::ExitCode};
 
 /// Contact of a damageable elastic body with a rigid foundation (plane, quasistatic, frictionless).
@@ -11,8 +11,10 @@ use std::{path::PathBuf, process::ExitCode};
 #[command(
     version,
     about,
-    after_help = "Exit codes: 0 finished or stopped at ζ_*, \
-    1 the run ended early, e.g. a solver missed its tolerance (state saved), 2 bad input."
+    after_help = "Scenes are TOML files beside a gmsh geometry: see the README's \"A scene\" and \
+    the scenes of geo/.\n\
+    Exit codes: 0 finished or stopped at ζ_*, 1 the run ended early, e.g. a solver missed its tolerance \
+    (state saved), 2 bad input."
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -27,6 +29,12 @@ enum Command {
     Compare(command::CompareArguments),
     /// List the contact solvers, a line each: its name, a tab, what it does.
     Solvers,
+    /// Print a shell's completions, e.g. for bash into
+    /// ~/.local/share/bash-completion/completions/signorini.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
     /// Mesh the .geo files of scenes with gmsh, where their .msh is missing or older.
     Mesh {
         /// Scene files.
@@ -40,6 +48,7 @@ fn main() -> ExitCode {
         Command::Run(arguments) => command::run(&arguments),
         Command::Compare(arguments) => command::compare(&arguments),
         Command::Solvers => command::solvers(),
+        Command::Completions { shell } => command::completions(shell, Arguments::command()),
         Command::Mesh { scenes } => command::mesh(&scenes),
     };
     match result {

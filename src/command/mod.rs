@@ -2,6 +2,7 @@
 
 mod compare;
 mod profile;
+mod provenance;
 mod ranks;
 mod recorder;
 mod run;
@@ -113,6 +114,14 @@ fn read(
 /// `signorini solvers`.
 pub fn solvers() -> Result<(), Failure> {
     REGISTRY.iter().for_each(|entry| say(&format!("{}\t{}", entry.name, entry.summary)));
+    Ok(())
+}
+
+/// `signorini completions SHELL`.
+pub fn completions(shell: clap_complete::Shell, mut program: clap::Command) -> Result<(), Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut program, "signorini", &mut script);
+    say(String::from_utf8_lossy(&script).trim_end());
     Ok(())
 }
 

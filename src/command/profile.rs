@@ -1,4 +1,4 @@
-//! Where the time of a run went: the closing table, short or with all that was measured.
+//! Where the time of a run went: the closing table of `--profile`.
 
 use comfy_table::{LineStyle, presets};
 use signorini::{
@@ -12,22 +12,16 @@ use std::fs;
 const UNAVOIDABLE: [&str; 4] =
     ["stiffness refill", "contact/products", "contact/triangular solves", "damage solve"];
 
-/// The columns of the short table, the first ones of the full table.
-const SHORT: usize = 4;
-
-/// The table of phases, longest first, for a run of `wall` seconds; in full it has the parts of
-/// phases too, milliseconds per call and bytes moved.
-pub fn table(phases: &Phases, wall: f64, full: bool) -> Vec<String> {
+/// The table of phases and their parts, longest first, for a run of `wall` seconds.
+pub fn table(phases: &Phases, wall: f64) -> Vec<String> {
     let mut lines = Vec::new();
     for (name, phase) in rows(phases, "", wall) {
         lines.push((name.to_owned(), phase));
-        let parts = if full { rows(phases, name, phase.seconds) } else { Vec::new() };
+        let parts = rows(phases, name, phase.seconds);
         lines.extend(parts.into_iter().map(|(part, phase)| (format!("  {part}"), phase)));
     }
     lines.push(("all".to_owned(), Phase { seconds: wall, ..Phase::default() }));
-    let columns = if full { usize::MAX } else { SHORT };
-    let cells =
-        lines.into_iter().map(|(name, phase)| cells(name, phase, wall).into_iter().take(columns));
+    let cells = lines.into_iter().map(|(name, phase)| cells(name, phase, wall));
     let rule = LineStyle::none().fill('─').junction('─');
     let table = terminal::table(presets::NOTHING.header_separator(rule), cells, 1);
     // The table pads its last column too.

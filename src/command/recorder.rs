@@ -1,11 +1,14 @@
 //! What a run writes and shows.
 
-use super::{profile, run::Task, screen};
-use indicatif::ProgressBar;
+use super::{profile, provenance::provenance, run::Task, screen};
 use serde_json::{Value, json};
 use signorini::{
     evolution::{Outcome, RunError, Step, StepRecord},
-    output::{FieldWriter, History, OutputError, terminal::say, write_whole},
+    output::{
+        FieldWriter, History, OutputError,
+        terminal::{Progress, say},
+        write_whole,
+    },
     scene::Stepping,
 };
 use std::collections::BTreeMap;
@@ -19,7 +22,7 @@ pub(super) struct Recorder<'a> {
     task: &'a Task<'a>,
     fields: FieldWriter,
     /// On the first rank only.
-    history: Option<(History, ProgressBar)>,
+    history: Option<(History, Progress)>,
     last: Option<Step>,
     /// Seconds of all accepted steps after n = 0.
     stepping: f64,
@@ -89,6 +92,8 @@ impl<'a> Recorder<'a> {
         let outcome = result.as_ref().ok();
         let mut notes = task.problem.notes();
         notes.extend(outcome.iter().flat_map(|outcome| outcome.notes(&task.problem)));
+        let mut shown = notes.clone();
+        notes.extend(outcome.iter().flat_map(|outcome| outcome.remarks(&task.problem)));
         // The rest is for the first rank alone.
         let Some((_, bar)) = &self.history else { return written };
 
@@ -97,15 +102,18 @@ impl<'a> Recorder<'a> {
         let summary = summary(task, record, result, &notes, wall);
         let path = task.folder.join("summary.json");
         write_whole(&path, format!("{summary:#}\n").as_bytes())?;
-        let mut lines = screen::conclusion(task, record, outcome, &notes);
-        lines.push(String::new());
-        lines.extend(profile::table(task.phases, wall, task.profile));
+        if task.profile {
+            shown.clone_from(&notes);
+        }
+        let mut lines = screen::conclusion(task, record, outcome, &shown);
         if task.profile {
             let steps = record.map_or(0, |record| record.step);
             lines.push(String::new());
+            lines.extend(profile::table(task.phases, wall));
+            lines.push(String::new());
             lines.extend(profile::remarks(task.phases, steps, self.stepping));
         }
-        bar.finish_and_clear();
+        bar.finish();
         say(&lines.join("\n"));
         written
     }
@@ -127,6 +135,7 @@ fn summary(
     let steps = last.map_or(0, |record| record.step);
     let seconds = task.phases.parts("").into_iter().map(|(name, phase)| (name, phase.seconds));
     let mut summary = json!({
+        "provenance": provenance(),
         "scene": scene.name,
         "title": scene.title,
         "solver": solver,

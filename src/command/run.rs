@@ -11,7 +11,7 @@ use clap::Args;
 use signorini::{
     evolution::{self, AdaptError, DiscreteProblem, Phases, RunError, SHARE_OF_STEPS},
     mesh::{Mesh, Order},
-    output::{self, write_whole},
+    output::{self, OutputError, write_whole},
     petsc::Session,
     scene::{Scene, Stepping},
 };
@@ -43,7 +43,8 @@ pub struct RunArguments {
     /// Override a key of the scene, e.g. --set time.step=0.005; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Close with all that was timed: counts, times per call, bytes moved, unavoidable work.
+    /// Close with all that was timed (phases, times per call, bytes moved, unavoidable work) and all
+    /// notes, also those that do not bear on the answer.
     #[arg(long)]
     profile: bool,
     /// PETSc options, e.g. -- -tao_monitor -log_view.
@@ -100,6 +101,12 @@ fn adapt(
     Ok((adapted.mesh, true))
 }
 
+/// Writes the scene as it is run and, if it was adapted, the mesh.
+fn keep(folder: &Path, scene: &str, mesh: Option<String>) -> Result<(), OutputError> {
+    write_whole(&folder.join(output::SCENE), scene.as_bytes())?;
+    mesh.map_or(Ok(()), |text| write_whole(&folder.join("mesh.msh"), text.as_bytes()))
+}
+
 /// `signorini run SCENE`, on as many ranks as `mpiexec` has started.
 pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let (started, phases) = (Instant::now(), Phases::default());
@@ -148,13 +155,14 @@ impl<'a> Task<'a> {
         let mesh = arguments.mesh.as_deref();
         let set: Vec<String> = (arguments.set.iter().cloned())
             .chain(arguments.accuracy.map(|error| format!("accuracy={error}")))
+            .chain(arguments.solver.iter().map(|name| format!("contact.solver='{name}'")))
             .collect();
         let load = || phases.time("mesh", || read(&arguments.scene, mesh, &set, true));
         let of_root = agree(comm, comm.is_root().then(load).transpose())?;
         let (mut scene, mesh) = agree(comm, of_root.map_or_else(load, Ok))?;
-        let solver = arguments.solver.as_ref().or(scene.contact.solver.as_ref());
-        let solver = solver.map_or(SOLVERS[0], String::as_str).to_owned();
+        let solver = scene.contact.solver.clone().unwrap_or(SOLVERS[0].to_owned());
         let folder = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
+        let as_run = scene.as_run().map_err(Failure::input)?;
         let adapted = phases.time("adaptation", || adapt(session, &mut scene, mesh, &solver));
         let (mesh, adapted) = agree(comm, adapted)?;
         let kept = adapted.then(|| mesh.to_msh());
@@ -164,9 +172,7 @@ impl<'a> Task<'a> {
         let problem = agree(comm, problem.map_err(Failure::from))?;
         let prepared = if comm.is_root() { output::prepare(&folder) } else { Ok(()) };
         agree(comm, prepared.map_err(Failure::input))?;
-        let kept = kept.filter(|_| comm.is_root());
-        let kept =
-            kept.map_or(Ok(()), |text| write_whole(&folder.join("mesh.msh"), text.as_bytes()));
+        let kept = if comm.is_root() { keep(&folder, &as_run, kept) } else { Ok(()) };
         agree(comm, kept.map_err(Failure::from))?;
 
         // The bounds of a node follow each other.

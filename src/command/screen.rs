@@ -1,10 +1,9 @@
 //! What a run shows: what is to be solved, a progress bar, and the result in a few lines.
 
 use super::run::Task;
-use indicatif::ProgressBar;
 use signorini::{
     evolution::{Outcome, StepRecord},
-    output::terminal::{progress_bar, say},
+    output::terminal::{Progress, say},
     scene::{Stepping, TimeGrid},
 };
 
@@ -12,7 +11,7 @@ use signorini::{
 const LENGTH: u64 = 1000;
 
 /// Shows what is to be solved, and a progress bar.
-pub fn open(task: &Task) -> ProgressBar {
+pub fn open(task: &Task) -> Progress {
     let (scene, partition) = (task.problem.scene(), &task.problem.body.nodes.partition);
     let mut mesh = format!("{} nodes, {} triangles", partition.total(), task.triangles);
     if !partition.comm().is_serial() {
@@ -26,17 +25,18 @@ pub fn open(task: &Task) -> ProgressBar {
     lines.extend(scene.time.map(|grid| row("time", steps(grid))));
     say(&lines.join("\n"));
 
-    let bar = progress_bar("{bar:20} {wide_msg} {elapsed}, {eta} left", LENGTH);
-    bar.with_message("the first solve")
+    let mut progress = Progress::new("{bar:20} {wide_msg} {elapsed}, {eta} left", LENGTH);
+    progress.show(0, "the first solve".to_owned());
+    progress
 }
 
 /// Shows an accepted step of a run to t = `end`.
-pub fn progress(bar: &ProgressBar, record: &StepRecord, end: f64) {
-    bar.set_position((LENGTH as f64 * record.time / end) as u64);
-    bar.set_message(format!(
+pub fn progress(bar: &mut Progress, record: &StepRecord, end: f64) {
+    let message = format!(
         "step {}  t = {:.4}  min ζ = {:.6}  active {}  iterations {}",
         record.step, record.time, record.zeta_min, record.active_nodes, record.iterations
-    ));
+    );
+    bar.show((LENGTH as f64 * record.time / end) as u64, message);
 }
 
 /// How a run ended and what its last accepted state tells, a line each; `outcome` is none if the run

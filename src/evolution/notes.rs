@@ -53,19 +53,6 @@ impl Outcome {
         let accuracy = Accuracy { displacement, ..self.accuracy };
         notes.extend(accuracy.notes(problem.tolerance));
         notes.extend(problem.large_gradients(&self.last.state.u));
-        if self.skipped_damage_solves > 0 && problem.damage().is_some() {
-            notes.push(format!(
-                "the damage solve was skipped in {} of {} steps: no source, uniform ζ",
-                self.skipped_damage_solves, self.last.record.step
-            ));
-        }
-        let counted = |n: usize| format!("{n} step{}", if n == 1 { "" } else { "s" });
-        if self.fallbacks > 0 {
-            let steps = counted(self.fallbacks);
-            notes.push(format!(
-                "in {steps} the contact solver left its fast path (single pivoting)"
-            ));
-        }
         if let Some((steps, solver)) = self.rescued {
             notes.push(format!(
                 "in {} the contact solver stopped short of the tolerance, and {solver} gave the \
@@ -73,19 +60,40 @@ impl Outcome {
                 counted(steps)
             ));
         }
-        if self.undone > 0 {
-            notes.push(format!("{} steps were undone and tried again, shorter", self.undone));
-        }
-        notes.extend(self.chosen_steps(problem));
+        notes.extend(self.chosen_steps(problem, true));
         notes
     }
 
-    /// How many steps were chosen, and how exact the damage is for it.
-    fn chosen_steps(&self, problem: &DiscreteProblem) -> Option<String> {
+    /// What the run of `problem` did on its way; its answer is none the worse for it.
+    pub fn remarks(&self, problem: &DiscreteProblem) -> Vec<String> {
+        let mut notes = Vec::new();
+        if self.skipped_damage_solves > 0 && problem.damage().is_some() {
+            notes.push(format!(
+                "the damage solve was skipped in {} of {} steps: no source, uniform ζ",
+                self.skipped_damage_solves, self.last.record.step
+            ));
+        }
+        if self.fallbacks > 0 {
+            let steps = counted(self.fallbacks);
+            notes.push(format!(
+                "in {steps} the contact solver left its fast path (single pivoting)"
+            ));
+        }
+        if self.undone > 0 {
+            notes.push(format!("{} steps were undone and tried again, shorter", self.undone));
+        }
+        notes.extend(self.chosen_steps(problem, false));
+        notes
+    }
+
+    /// How many steps were chosen, and how exact the damage is for it, if that `misses` the tolerance,
+    /// or if it does not.
+    fn chosen_steps(&self, problem: &DiscreteProblem, misses: bool) -> Option<String> {
         let error = self.damage_error.filter(|_| problem.damage().is_some())?;
         let Stepping::Auto { tolerance } = problem.scene().time?.stepping else { return None };
         // Where an accuracy is asked for, the tolerance is not the user's.
-        let verdict = match error > tolerance && problem.scene().accuracy.is_none() {
+        let missed = error > tolerance && problem.scene().accuracy.is_none();
+        let verdict = match missed {
             true => format!(", more than time.tolerance = {tolerance}: lower it"),
             false => String::new(),
         };
@@ -94,11 +102,13 @@ impl Outcome {
             percent if percent > 0.0 && percent < 0.1 => format!("{percent:.2e} %"),
             percent => format!("{percent:.2} %"),
         };
-        Some(format!(
-            "{} steps chosen: the damage is exact in time to about {percent} of the damage \
-             done (two or three times that where the load swings or jumps){verdict}",
-            self.last.record.step
-        ))
+        (missed == misses).then(|| {
+            format!(
+                "{} steps chosen: the damage is exact in time to about {percent} of the damage \
+                 done (two or three times that where the load swings or jumps){verdict}",
+                self.last.record.step
+            )
+        })
     }
 }
 
@@ -180,6 +190,11 @@ impl DiscreteProblem {
             )
         })
     }
+}
+
+/// So many steps, in words.
+fn counted(steps: usize) -> String {
+    format!("{steps} step{}", if steps == 1 { "" } else { "s" })
 }
 
 /// The smallest angle of a triangle, degrees.

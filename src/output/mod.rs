@@ -7,7 +7,7 @@ mod vtu;
 
 pub use vtu::FieldWriter;
 
-use crate::evolution::StepRecord;
+use crate::{evolution::StepRecord, scene::AS_RUN};
 use serde::Serialize;
 use std::{
     fs::{self, File, Permissions},
@@ -41,6 +41,9 @@ pub fn create(folder: &Path) -> Result<(), OutputError> {
     Ok(())
 }
 
+/// The scene as it was run. It takes the place of the earlier one, which may be the one that is run.
+pub const SCENE: &str = "scene.toml";
+
 /// What a run and its figures leave in a folder besides the frames.
 const FILES: [&str; 7] = [
     "fields.pvd",
@@ -65,9 +68,14 @@ fn is_frame(name: &str) -> bool {
 /// mistaken for new.
 ///
 /// # Errors
-/// The folder cannot be created or written to.
+/// The folder holds a scene of the user's where that of the run would be written; it cannot be created or written to.
 pub fn prepare(folder: &Path) -> Result<(), OutputError> {
     create(folder)?;
+    let scene = folder.join(SCENE);
+    if fs::read_to_string(&scene).is_ok_and(|text| !text.starts_with(AS_RUN)) {
+        let reason = "it is no scene that a run left there; choose another folder with --out";
+        return Err(OutputError::new(&scene, reason));
+    }
     let entries = fs::read_dir(folder).map_err(|e| OutputError::new(folder, e))?;
     for entry in entries.flatten() {
         let name = entry.file_name();

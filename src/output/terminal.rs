@@ -4,7 +4,10 @@ pub use comfy_table::presets::ASCII_MARKDOWN as MARKDOWN;
 
 use comfy_table::{CellAlignment, Table, TableStyle};
 use indicatif::{ProgressBar, ProgressStyle};
-use std::io::{self, Write};
+use std::{
+    io::{self, Write},
+    time::{Duration, Instant},
+};
 
 /// Prints to standard output; a reader that has gone (`… | head`) is no reason to panic.
 pub fn say(text: &str) {
@@ -19,6 +22,42 @@ pub fn progress_bar(template: &str, length: u64) -> ProgressBar {
         bar.set_style(style);
     }
     bar
+}
+
+/// Without a terminal progress is told this often.
+const BETWEEN_LINES: Duration = Duration::from_secs(5);
+
+/// Progress on standard error: a bar on a terminal, elsewhere a line every few seconds.
+pub struct Progress {
+    bar: ProgressBar,
+    started: Instant,
+    last_line: Instant,
+}
+
+impl Progress {
+    /// As [`progress_bar`].
+    pub fn new(template: &str, length: u64) -> Self {
+        let now = Instant::now();
+        Self { bar: progress_bar(template, length), started: now, last_line: now }
+    }
+
+    /// Shows how far the work has come, out of the length, and what is to be said of it.
+    pub fn show(&mut self, position: u64, message: String) {
+        if !self.bar.is_hidden() {
+            self.bar.set_position(position);
+            self.bar.set_message(message);
+        } else if self.last_line.elapsed() > BETWEEN_LINES {
+            self.last_line = Instant::now();
+            let part = 100 * position / self.bar.length().unwrap_or(position).max(1);
+            let seconds = self.started.elapsed().as_secs();
+            let _ = writeln!(io::stderr(), "  {part:>3} % after {seconds} s  {message}");
+        }
+    }
+
+    /// Takes the bar away.
+    pub fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
 }
 
 /// A table of `rows`, whose cells bring the titles of their columns, with numbers to the right in all

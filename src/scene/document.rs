@@ -6,6 +6,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
+use serde::{Deserialize, de::IntoDeserializer};
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue};
 
@@ -96,6 +97,13 @@ impl SceneText {
     /// Where the value of a key is written.
     pub(super) fn place(&self, key: &str) -> Range<usize> {
         self.places.get(key).cloned().unwrap_or(NOWHERE)
+    }
+
+    /// The scene with the `--set` arguments put in, as TOML; comments are lost.
+    pub(super) fn merged(&self) -> Result<toml::Table, SceneError> {
+        let root = Spanned::new(NOWHERE, DeValue::Table(self.parse()?));
+        toml::Table::deserialize(root.into_deserializer())
+            .map_err(|error| SceneError::Refused(vec![error.message().to_owned()]))
     }
 
     /// Parses the file and puts the `--set` arguments in, in their order.

@@ -131,6 +131,9 @@ impl TimeGrid {
     }
 }
 
+/// The first line of a scene as it was run.
+pub const AS_RUN: &str = "# As run by signorini; the results stand beside it.";
+
 /// What is written while the scene runs.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct OutputOptions {
@@ -150,6 +153,26 @@ impl Scene {
         };
         let parts = steps.min(most.max(1));
         (0..=parts).map(|i| grid.time(i * steps / parts, steps)).collect()
+    }
+
+    /// The scene as it is run, as the text of a file that runs from anywhere: the `--set` arguments are
+    /// put in, the mesh is the one in use, with its path in full.
+    ///
+    /// # Errors
+    /// None, if the scene has been read.
+    pub fn as_run(&self) -> Result<String, SceneError> {
+        let mut scene = self.text.merged()?;
+        scene.insert("title".into(), self.title.clone().into());
+        let file = std::path::absolute(&self.mesh.file).unwrap_or(self.mesh.file.clone());
+        let mut mesh = toml::Table::new();
+        mesh.insert("file".into(), file.to_string_lossy().into_owned().into());
+        let mut parameters = self.mesh.parameters.clone();
+        mesh.extend(parameters.remove("size").map(|size| ("size".into(), size.into())));
+        if !parameters.is_empty() {
+            mesh.insert("parameters".into(), parameters.into());
+        }
+        scene.insert("mesh".into(), mesh.into());
+        Ok(format!("{AS_RUN}\n{scene}"))
     }
 
     /// Reads and checks the scene at `path`.

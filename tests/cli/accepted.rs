@@ -5,7 +5,8 @@ use serde_json::Value;
 use signorini::contact::{REGISTRY, SOLVERS};
 use std::process::Stdio;
 
-const KEYS: [&str; 26] = [
+const KEYS: [&str; 27] = [
+    "provenance",
     "scene",
     "title",
     "solver",
@@ -79,7 +80,7 @@ fn summary() {
     for fragment in ["Pressed square", "finished at t = 1 after 10 steps", "5 of 5 nodes active"] {
         assert!(said.out.contains(fragment), "{}", said.out);
     }
-    assert!(said.out.contains("phase") && said.out.contains("results       out/scene"));
+    assert!(!said.out.contains("phase") && said.out.contains("results       out/scene"));
     assert!(said.out.lines().all(|line| line.trim_end() == line), "blanks at line ends");
 
     let summary = test_directory.summary("out/scene");
@@ -276,6 +277,16 @@ fn a_step_that_does_not_divide_the_end_is_noted() {
     for step in ["0.1", "0.333333333333"] {
         let said = test_directory.run(&["--set", &format!("time.step={step}")]);
         assert!(!said.out.contains("does not divide"), "{said:?}");
+    }
+}
+
+#[test]
+fn shells_complete_commands_and_options() {
+    let test_directory = TestDirectory::new();
+    for shell in ["bash", "zsh", "fish"] {
+        let said = test_directory.say(&["completions", shell]);
+        assert_eq!((said.code, said.err.as_str()), (Some(0), ""), "{shell}");
+        assert!(["compare", "accuracy"].iter().all(|word| said.out.contains(word)), "{shell}");
     }
 }
 

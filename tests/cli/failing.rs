@@ -76,7 +76,7 @@ fn the_first_solve_fails() {
     for of_a_state in ["end_time", "zeta_min", "displacement_max", "active_nodes", "kkt"] {
         assert!(summary[of_a_state].is_null(), "{of_a_state}");
     }
-    assert_eq!(test_directory.names("out/scene"), ["history.csv", "summary.json"]);
+    assert_eq!(test_directory.names("out/scene"), ["history.csv", "scene.toml", "summary.json"]);
 }
 
 #[test]

@@ -151,7 +151,8 @@ fn frames_are_as_many_as_asked_for() {
         assert_eq!(tenths, times);
         // An earlier run's frames are gone, and there is nothing else.
         let mut files: Vec<String> = frames.into_iter().map(|(_, file)| file).collect();
-        files.extend(["fields.pvd", "history.csv", "summary.json"].map(str::to_owned));
+        files
+            .extend(["fields.pvd", "history.csv", "scene.toml", "summary.json"].map(str::to_owned));
         files.sort();
         assert_eq!(test_directory.names("out/scene"), files);
     }

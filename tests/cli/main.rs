@@ -6,4 +6,5 @@ mod test_directory;
 mod failing;
 mod fields;
 mod meshes;
+mod provenance;
 mod refused;

@@ -130,7 +130,7 @@ fn the_note_of_a_run_tells_its_steps_and_their_error() {
     let (steps, outcome) = history(&scene, SOLVERS[0]);
     let error = outcome.damage_error.unwrap();
     assert!(0.0 < error && error < 0.01, "{error}");
-    let notes = outcome.notes(&scene);
+    let notes = outcome.remarks(&scene);
     let told = format!("{} steps chosen", steps.len() - 1);
     assert!(notes.iter().any(|note| note.contains(&told)), "{notes:?}");
     // A tolerance that its steps miss is told.

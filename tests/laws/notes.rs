@@ -84,10 +84,10 @@ fn steps_off_the_fast_path_are_noted() {
     let mut outcome = run(&problem, SOLVERS[0]);
     assert_eq!((outcome.fallbacks, outcome.rescued), (0, None));
     outcome.fallbacks = 3;
-    let [note] = &outcome.notes(&problem)[..] else { panic!("one note") };
+    let [note] = &outcome.remarks(&problem)[..] else { panic!("one remark") };
     assert!(note.starts_with("in 3 steps the contact solver left its fast path"), "{note}");
     outcome.rescued = Some((1, "tao"));
-    let [_, note] = &outcome.notes(&problem)[..] else { panic!("two notes") };
+    let [note] = &outcome.notes(&problem)[..] else { panic!("one note") };
     assert_eq!(
         note,
         "in 1 step the contact solver stopped short of the tolerance, and tao gave the answer in \

@@ -7,7 +7,7 @@ use super::{
 use std::collections::BTreeMap;
 
 /// Entries of `summary.json` that tell how long a run took.
-const TIMES: [&str; 3] = ["wall_seconds", "seconds_per_step", "phases"];
+const TIMES: [&str; 4] = ["provenance", "wall_seconds", "seconds_per_step", "phases"];
 
 /// The files of a run's folder by name, without what tells seconds.
 fn results(test_directory: &TestDirectory, folder: &str) -> BTreeMap<String, Vec<u8>> {

@@ -95,7 +95,8 @@ fn same_frames(order: &str) {
 
     let (frames, lists) = (test_directory.frames("one"), test_directory.frames("many"));
     assert_eq!(frames.len(), lists.len());
-    let mut expected_names = vec!["fields.pvd".into(), "history.csv".into(), "summary.json".into()];
+    let mut expected_names =
+        ["fields.pvd", "history.csv", "scene.toml", "summary.json"].map(String::from).to_vec();
     for ((time, file), (listed, list)) in frames.iter().zip(&lists) {
         assert_eq!(time, listed);
         let mut whole = Frame::default();

@@ -1,0 +1,59 @@
+//! Results tell what made them, and can be made again from what they hold.
+
+use crate::test_directory::{TestDirectory, square};
+
+#[test]
+fn the_scene_in_the_results_runs_again_to_the_same_answer() {
+    let test_directory = TestDirectory::new();
+    test_directory.write("meshes/fine.msh", &square(8));
+    for (options, overridden) in [
+        (vec!["--set", "time.step=0.25", "--set", "boundary.top.traction=[0, '-2*t']"], "-2*t"),
+        (vec!["--mesh", "meshes/fine.msh", "--solver", "tao"], "fine.msh"),
+    ] {
+        test_directory.run(&[&options[..], &["--out", "first"]].concat());
+        let scene = test_directory.read("first/scene.toml");
+        assert!(scene.contains(overridden), "{scene}");
+        // It stands in another folder than the mesh and the scene, and is told another name there.
+        let again = test_directory.say(&["run", "first/scene.toml", "--out", "again"]);
+        assert_eq!(again.code, Some(0), "{again:?}");
+        let without_seconds = |folder| {
+            let (_, rows) = test_directory.history(folder);
+            rows.into_iter().map(|row| row[..row.len() - 1].to_vec()).collect::<Vec<_>>()
+        };
+        assert_eq!(
+            format!("{:?}", without_seconds("first")),
+            format!("{:?}", without_seconds("again"))
+        );
+        let title = |folder| test_directory.summary(folder)["title"].clone();
+        assert_eq!(title("first"), title("again"));
+        assert_eq!(test_directory.read("again/scene.toml"), scene);
+    }
+}
+
+#[test]
+fn a_scene_of_the_user_is_not_overwritten() {
+    let test_directory = TestDirectory::new();
+    let before = test_directory.everything();
+    let refused = test_directory.say(&["run", "scene.toml", "--out", "."]);
+    refused.fails(2, &["scene.toml", "no scene that a run left there", "--out"]);
+    assert_eq!(test_directory.everything(), before);
+    // That of an earlier run is replaced, also by itself.
+    test_directory.run(&["--out", "out"]);
+    let again = test_directory.say(&["run", "out/scene.toml", "--out", "out"]);
+    assert_eq!(again.code, Some(0), "{again:?}");
+}
+
+#[test]
+fn the_summary_tells_the_program_the_time_the_place_and_the_command() {
+    let test_directory = TestDirectory::new();
+    test_directory.run(&["--set", "time.step=0.5"]);
+    let provenance = &test_directory.summary("out/scene")["provenance"];
+    assert_eq!(provenance["version"], env!("CARGO_PKG_VERSION"));
+    let date = provenance["date"].as_str().expect("a date");
+    assert!(date.len() == 20 && date.starts_with("20") && date.ends_with('Z'), "{date}");
+    let command = provenance["command"].as_array().expect("words");
+    assert_eq!(command[1..], ["run", "scene.toml", "--set", "time.step=0.5"]);
+    let directory = provenance["directory"].as_str().expect("a path");
+    assert!(std::path::Path::new(directory).join("scene.toml").exists(), "{directory}");
+    assert!(provenance["machine"]["cores"].as_u64() > Some(0));
+}
