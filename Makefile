@@ -69,7 +69,9 @@ run: build
 	done
 
 figures: deps
-	$(PYTHON) scripts/figures.py $(patsubst %/summary.json,%,$(wildcard out/*/summary.json))
+	@set -e; for run in $(patsubst %/summary.json,%,$(wildcard out/*/summary.json)); do \
+	    $(PYTHON) scripts/figures.py $$run; \
+	done
 
 test: deps
 	cargo fmt --all --check

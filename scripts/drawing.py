@@ -1,6 +1,7 @@
 """What the figures share: style, maps with equal aspect, scales that can be read."""
 
 import sys
+import textwrap
 from pathlib import Path
 
 import matplotlib
@@ -13,7 +14,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.patheffects import withTickedStroke
 from matplotlib.ticker import MaxNLocator
 
-INK, FAINT, BLUE, RED = "#22262b", "#9aa3ad", "#2f6db3", "#c0392b"
+INK, FAINT, BLUE, RED, GREEN = "#22262b", "#9aa3ad", "#2f6db3", "#c0392b", "#3d8f5a"
 
 plt.rcParams.update({
     "figure.dpi": 160,
@@ -47,6 +48,14 @@ def draw_table(usage, name, command, draw):
     print(picture)
 
 
+def canvas(size, figure=None):
+    """An empty figure of `size`, inches: a new one, or `figure` cleared, which keeps its size."""
+    if figure is None:
+        return plt.figure(figsize=size)
+    figure.clear()
+    return figure
+
+
 def amplification(size, largest):
     """1, 2 or 5 times a power of ten that shows `largest` as some 4–10 % of `size`."""
     if largest <= 0.0:
@@ -57,8 +66,11 @@ def amplification(size, largest):
 
 
 def headline(results, text):
-    """The title, what the figure shows, and that the run ended early if it did."""
-    return "\n".join(filter(None, (results.title, results.ending, text)))
+    """The title, what the command line changed in the scene, that the run ended early if it did, and
+    what the figure shows."""
+    overrides = textwrap.shorten(f"with {results.overrides}", 100, placeholder=" …")
+    overrides = overrides.replace("$", r"\$") if results.overrides else ""
+    return "\n".join(filter(None, (results.title, overrides, results.ending, text)))
 
 
 def map_size(extent, across):
@@ -85,10 +97,10 @@ def draw_foundation(axes, results, factor=None):
         axes.plot(*line.T, color=INK, linewidth=1.8, zorder=1.6, solid_capstyle="butt")
 
 
-def frame(axes, points, size):
-    """Equal aspect, a little air, few ticks."""
+def frame(axes, points):
+    """Equal aspect around `points`, a little air, few ticks."""
     low, high = points.min(axis=0), points.max(axis=0)
-    air = 0.05 * size
+    air = 0.05 * max(high - low)
     axes.set_xlim(low[0] - air, high[0] + air)
     axes.set_ylim(low[1] - air, high[1] + air)
     axes.set_aspect("equal")
@@ -114,21 +126,22 @@ def unit_prefix(value):
     return 1.0, ""
 
 
-def damage_scale(zeta):
-    """What to show of ζ: values, label, colour map, limits. Darker always means more damaged.
+def damage_scale(least, largest):
+    """How to show ζ between two values: what turns it into what is shown, its label, colour map and
+    limits. Darker always means more damaged.
 
     Where ζ hardly leaves 1 the loss 1 − ζ, in a power of ten, can be read; ζ cannot. Where ζ is
-    uniform the colours would show the round-off between nodes, unless they have limits.
+    uniform the colours would show the round-off between nodes, unless the limits are apart.
     """
-    loss = 1.0 - zeta
-    uniform = np.ptp(loss) <= 1e-9 * loss.max()
-    if 0.0 < loss.max() < 0.1:
-        power = int(np.floor(np.log10(loss.max())))
-        label = rf"damage  $1 - \zeta$  ($\times 10^{{{power}}}$)"
-        limits = {"vmin": 0.0, "vmax": 10.0} if uniform else {}
-        return loss / 10.0**power, label, "magma_r", limits
-    limits = {"vmin": 0.0, "vmax": 1.0} if uniform else {}
-    return zeta, r"damage field  $\zeta$", "magma", limits
+    low, high = 1.0 - largest, 1.0 - least
+    uniform = high - low <= 1e-9 * high
+    if 0.0 < high < 0.1:
+        unit = 10.0 ** np.floor(np.log10(high))
+        label = rf"damage  $1 - \zeta$  ($\times 10^{{{np.log10(unit):.0f}}}$)"
+        limits = (0.0, 10.0) if uniform else (low / unit, high / unit)
+        return lambda zeta: (1.0 - zeta) / unit, label, "magma_r", limits
+    limits = (0.0, 1.0) if uniform else (least, largest)
+    return lambda zeta: zeta, r"damage field  $\zeta$", "magma", limits
 
 
 def least_zeta(low):

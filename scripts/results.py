@@ -1,16 +1,19 @@
-"""Reads a result folder: fields.pvd with its frames, history.csv, summary.json."""
+"""A state of a run and its geometry, as pictures need them."""
 
+import argparse
 import csv
-import json
-import xml.etree.ElementTree as ElementTree
 from collections import defaultdict
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import meshio
 import numpy as np
 
-from elements import Pieces, counter_clockwise
+from elements import Pieces
+
+# Parts of the largest value of a run that only round-off and the solver's tolerance (1e-10) leave.
+ROUNDING = 1e-9
+# ζ closer to 1 than this is undamaged.
+UNDAMAGED = 1e-12
 
 
 def read_table(path):
@@ -31,22 +34,24 @@ class ResultError(Exception):
 
 @dataclass
 class Results:
-    """The last accepted state, and what happened on the way to it."""
+    """A state of the body, by default the last accepted one, and what happened on the way to it."""
 
     folder: Path
     summary: dict
+    scene: dict  # the scene as run; empty where the folder does not hold it
     history: dict  # column → array
+    frames: list  # (time, file) of every frame, in the order of time
     time: float
     nodes: np.ndarray  # (n, 2), m
     pieces: Pieces  # the elements, 3 or 6 nodes each
-    displacement: np.ndarray  # (n, 2), m
-    zeta: np.ndarray  # (n,)
-    von_mises: np.ndarray  # (m,), Pa
-    pressure: np.ndarray  # (n,), Pa, −σ_ν
-    gap: np.ndarray  # (n,), m, NaN off Γ_C
     contact: np.ndarray  # (k, 2, 2): both ends of the edges of Γ_C, m
     tangents: np.ndarray  # (k, 2, 2): along which the body slides there, 0 where it cannot
     obstacle: np.ndarray  # (k, 2, 2): what is opposite them, m
+    displacement: np.ndarray = None  # (n, 2), m
+    zeta: np.ndarray = None  # (n,)
+    von_mises: np.ndarray = None  # (m,), Pa
+    pressure: np.ndarray = None  # (n,), Pa, −σ_ν
+    gap: np.ndarray = None  # (n,), m, NaN off Γ_C
 
     @property
     def title(self):
@@ -57,8 +62,38 @@ class Results:
         """That the run did not reach its end, and when it ended; nothing if it did."""
         stopped = self.summary.get("stopped_at")
         if self.summary.get("error"):
-            return f"the run FAILED after t = {self.time:g} s"
+            return f"the run FAILED after t = {self.frames[-1][0]:g} s"
         return "" if stopped is None else f"stopped: ζ$_*$ reached at t = {stopped:.4g} s"
+
+    @property
+    def overrides(self):
+        """What the command line put in the place of the scene's keys; nothing if it did not."""
+        words = self.summary.get("provenance", {}).get("command", [])
+        words = words[:words.index("--")] if "--" in words else words
+        parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+        parser.add_argument("--set", action="append", default=[])
+        names = ("mesh", "solver", "accuracy")
+        for name in names:
+            parser.add_argument(f"--{name}")
+        given = vars(parser.parse_known_args(words)[0])
+        return ", ".join(given["set"] + [f"{name} {given[name]}" for name in names if given[name]])
+
+    @property
+    def is_last(self):
+        """Whether this is the last state of the run."""
+        return self.time == self.frames[-1][0]
+
+    @property
+    def active(self):
+        """The number of active nodes, as the history has it; none where it does not."""
+        times = self.history.get("time", [])
+        found = np.flatnonzero(np.isclose(times, self.time, rtol=1e-12, atol=0.0))
+        return int(self.history["active_nodes"][found[-1]]) if len(found) else None
+
+    @property
+    def damaged(self):
+        """Whether there is damage to see."""
+        return bool((self.zeta != 1.0).any())
 
     @property
     def unloaded(self):
@@ -136,98 +171,27 @@ def paths(edges):
     return found
 
 
-def read_results(folder):
-    """Everything a figure needs from one result folder."""
-    folder, summary = Path(folder), {}
-    try:
-        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-        with open(folder / "history.csv", newline="", encoding="utf-8") as file:
-            rows = list(csv.DictReader(file))
-        frames = ElementTree.parse(folder / "fields.pvd").findall(".//DataSet")
-        last = max(frames, key=lambda frame: float(frame.get("timestep")))
-        fields = read_frame(folder / last.get("file"))
-        blocks = [k for k, b in enumerate(fields.cells) if b.type in ("triangle", "triangle6")]
-        elements = np.vstack([fields.cells[k].data for k in blocks])
-        results = Results(
-            folder=folder,
-            summary=summary,
-            history={c: np.array([_number(r[c]) for r in rows]) for c in (rows or [{}])[0]},
-            time=float(last.get("timestep")),
-            nodes=fields.points[:, :2],
-            pieces=Pieces(counter_clockwise(fields.points, elements)),
-            displacement=fields.point_data["displacement"][:, :2],
-            zeta=np.ravel(fields.point_data["zeta"]),
-            von_mises=np.concatenate([np.ravel(fields.cell_data["von_mises"][k]) for k in blocks]),
-            pressure=np.ravel(fields.point_data["normal_pressure"]),
-            gap=np.ravel(fields.point_data["gap"]),
-            contact=_segments(summary["contact_boundary"]),
-            tangents=_segments(summary["contact_tangents"]),
-            obstacle=_segments(summary["foundation"]),
-        )
-        return without_roundoff(results)
-    except OSError as error:
-        if failed := summary.get("error"):
-            raise ResultError(f"{folder}: nothing to draw, the run failed: {failed}") from None
-        raise ResultError(f"{error.filename}: {error.strerror}") from None
-    except KeyError as error:
-        raise ResultError(f"{folder}: the field {error} is missing") from None
-    except (ValueError, ElementTree.ParseError, meshio.ReadError) as error:
-        raise ResultError(f"{folder}: {error}") from None
-
-
 def without_roundoff(results):
-    """The results, with zeros in the place of what round-off leaves of an unloaded state.
+    """The results, with zeros in the place of what is only round-off.
 
-    That is a state whose displacements are below the rounding of coordinates, or a billion times
-    smaller than earlier in the run (solvers are exact to about 1e-10).
+    Unloaded is a state whose displacements are below the rounding of coordinates, or a billion times
+    smaller than earlier in the run (solvers are exact to about 1e-10). In a loaded one pressures
+    are compared with stresses, stresses with Young's modulus times the displacement over the size
+    of the body, gaps with displacements.
     """
     largest = np.linalg.norm(results.displacement, axis=1).max()
     earlier = np.nanmax(results.history.get("displacement_max", [0.0]), initial=0.0)
-    if largest > max(1e-14 * results.size, 1e-9 * earlier):
-        return results
-    names = ("displacement", "von_mises", "pressure")
-    return replace(results, **{name: 0.0 * getattr(results, name) for name in names})
-
-
-def read_frame(path):
-    """A frame: a .vtu file, or the .pvtu list of the pieces that several ranks have written.
-
-    meshio does not read lists; nodes that pieces share are joined by their numbers.
-    """
-    if path.suffix != ".pvtu":
-        return meshio.read(path)
-    sources = [piece.get("Source") for piece in ElementTree.parse(path).findall(".//Piece")]
-    # A rank that has no triangles leaves an empty piece.
-    pieces = [piece for piece in (meshio.read(path.parent / s) for s in sources) if piece.cells]
-    numbers = [np.ravel(piece.point_data["global_node"]) for piece in pieces]
-    _, first, place = np.unique(np.concatenate(numbers), return_index=True, return_inverse=True)
-    starts = np.cumsum([0, *map(len, numbers)])
-
-    def joined(arrays):
-        return np.concatenate(arrays)[first]
-
-    cells = [
-        place[start + block.data]
-        for piece, start in zip(pieces, starts)
-        for block in piece.cells
-    ]
-    return meshio.Mesh(
-        joined([piece.points for piece in pieces]),
-        [(pieces[0].cells[0].type, np.concatenate(cells))],
-        point_data={
-            name: joined([piece.point_data[name] for piece in pieces])
-            for name in pieces[0].point_data
-        },
-        cell_data={
-            name: [np.concatenate([block for piece in pieces for block in piece.cell_data[name]])]
-            for name in pieces[0].cell_data
-        },
-    )
-
-
-def _segments(lists):
-    return np.array(lists, dtype=float).reshape(-1, 2, 2)
-
-
-def _number(text):
-    return float(text) if text else np.nan
+    deformation = max(1e-14 * results.size, ROUNDING * max(largest, earlier))
+    zeta = np.where(np.abs(1.0 - results.zeta) <= UNDAMAGED, 1.0, results.zeta)
+    gap = np.where(np.abs(results.gap) <= deformation, 0.0, results.gap)
+    results = replace(results, zeta=zeta, gap=gap)
+    if largest <= deformation:
+        names = ("displacement", "von_mises", "pressure")
+        return replace(results, **{name: 0.0 * getattr(results, name) for name in names})
+    young = results.scene.get("material", {}).get("young")
+    young = young if isinstance(young, (int, float)) else 0.0
+    rigid = results.von_mises.max() <= ROUNDING * young * largest / results.size
+    stress = results.von_mises * (not rigid)
+    pressures = np.maximum(results.pressure.max(), stress.max())
+    noise = np.abs(results.pressure) <= ROUNDING * pressures
+    return replace(results, von_mises=stress, pressure=np.where(noise, 0.0, results.pressure))

@@ -164,6 +164,8 @@ fn summary(
         "wall_seconds": wall,
         "seconds_per_step": wall / steps.max(1) as f64,
         "phases": seconds.collect::<BTreeMap<_, _>>(),
+        // The named curves of the mesh as segments [[x, y], [x, y]], m, the body on their left.
+        "boundaries": problem.boundaries(),
         // The edges of Γ_C as segments [[x, y], [x, y]], m; unit vectors along which the body slides
         // at their ends, [0, 0] at corners; opposite each edge the foundation, m.
         "contact_boundary": problem.foundation.contact_boundary,

@@ -10,7 +10,7 @@ use crate::{
     scene::{Scene, SceneError},
 };
 use nalgebra::DVector;
-use std::path::PathBuf;
+use std::{collections::BTreeMap, path::PathBuf};
 
 /// A scene on its mesh, ready to be stepped.
 #[derive(Debug)]
@@ -293,6 +293,14 @@ impl DiscreteProblem {
             None => z,
         };
         self.body.at_points(&zeta.iter().map(|&z| truncate(z)).collect::<Vec<_>>())
+    }
+
+    /// The named curves of the whole mesh: the ends of their edges, m, the body on the left.
+    pub fn boundaries(&self) -> BTreeMap<&str, Vec<[[f64; 2]; 2]>> {
+        let mesh = self.undivided.as_ref().map_or(&self.body.mesh, |(mesh, _)| mesh);
+        let ends = |edge: &[usize; 2]| edge.map(|node| mesh.nodes[node]);
+        let curves = mesh.curves.iter();
+        curves.map(|(name, curve)| (&**name, curve.edges.iter().map(ends).collect())).collect()
     }
 
     /// The scene.

@@ -44,16 +44,27 @@ pub fn create(folder: &Path) -> Result<(), OutputError> {
 /// The scene as it was run. It takes the place of the earlier one, which may be the one that is run.
 pub const SCENE: &str = "scene.toml";
 
-/// What a run and its figures leave in a folder besides the frames.
-const FILES: [&str; 7] = [
-    "fields.pvd",
-    "history.csv",
-    "summary.json",
-    "deformed.png",
-    "stress-damage.png",
-    "pressure.png",
-    "damage-history.png",
+/// What a run and its figures leave in a folder besides the frames and the pictures.
+const FILES: [&str; 5] =
+    ["fields.pvd", "history.csv", "summary.json", "report.html", "open_in_paraview.py"];
+/// The pictures of a run.
+const PICTURES: [&str; 7] = [
+    "setting",
+    "deformed",
+    "stress-damage",
+    "pressure",
+    "damage-history",
+    "contact-evolution",
+    "damage",
 ];
+
+/// Whether `name` is that of a picture or an animation, of the end or another time: `NAME[_tTIME].png`.
+fn is_picture(name: &str) -> bool {
+    name.rsplit_once('.').is_some_and(|(stem, ending)| {
+        let name = stem.split_once("_t").map_or(stem, |(name, _)| name);
+        PICTURES.contains(&name) && ["png", "svg", "pdf", "gif", "mp4"].contains(&ending)
+    })
+}
 
 /// Whether `name` is that of a frame, of a piece or of a list of pieces: `fields_NNNN[_R].[p]vtu`.
 fn is_frame(name: &str) -> bool {
@@ -80,7 +91,7 @@ pub fn prepare(folder: &Path) -> Result<(), OutputError> {
     for entry in entries.flatten() {
         let name = entry.file_name();
         let name = name.to_string_lossy();
-        if is_frame(&name) || FILES.contains(&&*name) {
+        if is_frame(&name) || is_picture(&name) || FILES.contains(&&*name) {
             fs::remove_file(entry.path()).map_err(|e| OutputError::new(&entry.path(), e))?;
         }
     }

@@ -5,7 +5,7 @@ use serde_json::Value;
 use signorini::contact::{REGISTRY, SOLVERS};
 use std::process::Stdio;
 
-const KEYS: [&str; 27] = [
+const KEYS: [&str; 28] = [
     "provenance",
     "scene",
     "title",
@@ -23,6 +23,7 @@ const KEYS: [&str; 27] = [
     "work",
     "contact_force",
     "active_nodes",
+    "boundaries",
     "contact_boundary",
     "contact_nodes",
     "contact_tangents",

@@ -185,14 +185,18 @@ fn chosen_steps_have_about_twenty_frames() {
 #[test]
 fn what_others_put_into_the_folder_stays_but_figures_of_an_earlier_run() {
     let test_directory = TestDirectory::new();
-    let others = ["notes.txt", "fields_mine.vtu", "fields_.vtu", "fields_0001_old.vtu"];
-    for name in others.into_iter().chain(["deformed.png", "fields_0099_1.vtu"]) {
+    let others =
+        ["notes.txt", "damage_mine.png", "fields_mine.vtu", "fields_.vtu", "fields_0001_old.vtu"];
+    let ours =
+        ["deformed.png", "pressure_t0.5.svg", "damage.gif", "report.html", "fields_0099_1.vtu"];
+    for name in others.into_iter().chain(ours) {
         test_directory.write(&format!("out/scene/{name}"), "mine");
     }
     test_directory.run(&["--set", "time.end=0.1"]);
     for name in others {
         assert_eq!(test_directory.read(&format!("out/scene/{name}")), "mine");
     }
-    assert!(!test_directory.path("out/scene/deformed.png").exists());
-    assert!(!test_directory.path("out/scene/fields_0099_1.vtu").exists());
+    for name in ours {
+        assert!(!test_directory.path(&format!("out/scene/{name}")).exists(), "{name}");
+    }
 }

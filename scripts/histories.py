@@ -1,0 +1,75 @@
+"""Pictures of what happens in time, from history.csv."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.ticker import ScalarFormatter
+
+from drawing import BLUE, FAINT, RED, headline
+from results import ROUNDING, UNDAMAGED
+
+
+def draw_damage_history(results, _limits=None):
+    """min ζ and mean ζ in time, and the moment ζ_* was reached."""
+    time, least = results.history.get("time"), results.history.get("zeta_min")
+    if time is None or least is None or len(time) < 3 or np.nanmin(least) >= 1.0 - UNDAMAGED:
+        return None
+    figure, axes = plt.subplots(figsize=(6.4, 3.8))
+    axes.plot(time, results.history["zeta_mean"], color=FAINT, linewidth=1.4, label="mean ζ")
+    axes.plot(time, least, color=BLUE, linewidth=1.8, label="min ζ")
+    stopped = results.summary.get("stopped_at")
+    if stopped is not None:
+        axes.axvline(stopped, color=RED, linewidth=1.0, linestyle=(0, (4, 2)),
+                     label=f"ζ$_*$ reached at t = {stopped:.4g} s")
+        axes.set_ylim(bottom=0.0)
+    axes.set_xlim(left=0.0)
+    axes.yaxis.set_major_formatter(ScalarFormatter(useOffset=False))
+    axes.set_xlabel("time t (s)")
+    axes.set_ylabel("damage field ζ")
+    axes.set_title(headline(results, ""))
+    axes.legend(loc="lower left")
+    return figure
+
+
+# Panels of the figure of all histories: title, columns with their names, whether logarithmic.
+PANELS = (
+    ("largest displacement (m)", {"displacement_max": ""}, False),
+    ("work of the loads (J/m)", {"work": ""}, False),
+    ("sum of the contact reactions (N/m)", {"contact_force": ""}, False),
+    ("active nodes", {"active_nodes": ""}, False),
+    ("KKT residuals", {f"kkt_{kind}": kind for kind in (
+        "stationarity", "primal", "dual", "complementarity")}, True),
+    ("iterations", {"iterations": "of contact", "linear_iterations": "linear"}, False),
+    ("error bound of ζ from its linear system", {"zeta_error": ""}, True),
+    ("seconds per step", {"seconds": ""}, True),
+)
+
+
+def draw_histories(results):
+    """What history.csv has of every step, a panel each; none where there are no steps."""
+    history = results.history
+    if len(history.get("time", [])) < 3:
+        return None
+    panels = [(title, {k: v for k, v in columns.items() if k in history}, is_log)
+              for title, columns, is_log in PANELS]
+    panels = [panel for panel in panels if any(np.nanmax(history[k]) > 0.0 for k in panel[1])]
+    rows = (len(panels) + 1) // 2
+    figure, grid = plt.subplots(rows, 2, figsize=(9.6, 2.1 * rows), sharex=True, squeeze=False)
+    for axes, (title, columns, is_log) in zip(grid.flat, panels):
+        for column, name in columns.items():
+            values = history[column]
+            largest = np.nanmax(np.abs(values))
+            if is_log:
+                values = np.where(values > 0.0, values, np.nan)
+            else:
+                values = np.where(np.abs(values) <= ROUNDING * largest, 0.0, values)
+            if np.isfinite(values).any():
+                axes.plot(history["time"], values, linewidth=1.2, label=name)
+        axes.set_title(title, fontsize=9.5)
+        axes.set_yscale("log" if is_log else "linear")
+        if any(columns.values()):
+            axes.legend(fontsize=8, ncols=2, loc="best")
+    for axes in grid.flat[len(panels):]:
+        axes.set_visible(False)
+    for axes in grid[-1]:
+        axes.set_xlabel("time t (s)")
+    return figure

@@ -1,0 +1,58 @@
+"""Scales that pictures share, so that runs, or the frames of one, can be compared by eye."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drawing import amplification
+
+
+@dataclass
+class Limits:
+    """The scales of one or more states."""
+
+    factor: float  # amplification of displacements
+    box: np.ndarray  # (2, 2): corners of what the bodies take up before and after deformation, m
+    stress: float  # the top of the colours, Pa
+    is_cut: bool  # whether some stresses are above it
+    zeta: tuple  # the least and the largest
+    pressure: float  # the largest of Γ_C, Pa
+    gap: float  # the largest of Γ_C, m
+
+    @property
+    def damaged(self):
+        """Whether there is damage to see."""
+        return self.zeta[0] < 1.0
+
+
+def limits_of(states, factor=None):
+    """The scales that suit all `states`, with an amplification of displacements if it is given."""
+    # Stress is singular at corners: a few triangles must not darken all the others.
+    largest = max(state.von_mises.max() for state in states)
+    top = max(np.quantile(state.von_mises, 0.995) for state in states)
+    is_cut = largest > 1.25 * top > 0.0
+    factor = factor or _amplification(states)
+    on_contact = [np.isfinite(state.gap) for state in states]
+    return Limits(
+        factor=factor,
+        box=box_of(states, factor),
+        stress=float(top if is_cut else largest),
+        is_cut=bool(is_cut),
+        zeta=(min(s.zeta.min() for s in states), max(s.zeta.max() for s in states)),
+        pressure=max(s.pressure[on].max(initial=0.0) for s, on in zip(states, on_contact)),
+        gap=max(s.gap[on].max(initial=0.0) for s, on in zip(states, on_contact)),
+    )
+
+
+def box_of(states, factor):
+    """Lower left and upper right corner of bodies, as they were and deformed `factor` times."""
+    points = np.vstack([points for state in states for points in (
+        state.nodes, state.pieces.at_points(state.nodes + factor * state.displacement))])
+    return np.array([points.min(axis=0), points.max(axis=0)])
+
+
+def _amplification(states):
+    """What shows the displacements, and leaves the obstacle, which moves away by as much, in sight."""
+    largest = max(np.linalg.norm(state.displacement, axis=1).max() for state in states)
+    widest = max(np.linalg.norm(s.obstacle - s.contact, axis=2).max(initial=0.0) for s in states)
+    return amplification(min(state.size for state in states), max(largest, widest))

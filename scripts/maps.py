@@ -1,0 +1,119 @@
+"""Pictures of the whole body: its deformed mesh, stress and damage."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.colors import ListedColormap
+from matplotlib.tri import Triangulation
+
+from drawing import (
+    BLUE, INK, canvas, damage_scale, draw_colourbar, draw_foundation, draw_outline, frame, headline,
+    least_zeta, map_size, unit_prefix,
+)
+
+
+def draw_deformed(results, limits):
+    """The deformed mesh over the initial outline and the foundation (paper, Figures 5 and 8).
+
+    The obstacle is drawn opposite the nodes of Γ_C, which slide: it seems to slide with them.
+    """
+    pieces = results.pieces
+    moved = results.nodes + limits.factor * results.displacement
+    extent = np.ptp(limits.box, axis=0)
+    width, height = map_size(extent, 7.2)
+    figure, axes = plt.subplots(figsize=(width, height + 0.4))
+
+    # Lines must not fill a fine mesh: their width follows the mean edge, in points.
+    edge = np.sqrt(extent.prod() / len(pieces.elements)) * 72 * width / extent[0]
+    mesh = Triangulation(*pieces.at_points(moved).T, pieces.triangles)
+    axes.tripcolor(mesh, np.zeros(len(mesh.x)), cmap=ListedColormap(["#dfe9f3"]), zorder=1,
+                   rasterized=True)
+    # One line for all sides, with a break after each.
+    sides = np.pad(pieces.along(pieces.sides(), moved), ((0, 0), (0, 1), (0, 0)),
+                   constant_values=np.nan)
+    axes.plot(*sides.reshape(-1, 2).T, color=BLUE, linewidth=min(0.6, 0.06 * edge), zorder=2)
+    draw_outline(axes, moved, results, color=BLUE, linewidth=1.0, zorder=2.5)
+    draw_outline(
+        axes, results.nodes, results, color=INK, linewidth=0.9, linestyle=(0, (4, 2)), zorder=3
+    )
+    draw_foundation(axes, results, limits.factor)
+    frame(axes, limits.box)
+    text = f"deformed mesh at t = {results.time:g} s, {_amplified(results, limits)}"
+    axes.set_title(headline(results, text + ("" if results.unloaded else "; dashed: initial outline")))
+    return figure
+
+
+def draw_stress_and_damage(results, limits):
+    """Von Mises stress beside the damage field, on the initial configuration (Figures 6 and 9).
+
+    An undamaged body has only its stress to show.
+    """
+    extent = np.ptp(results.nodes, axis=0)
+    if not limits.damaged:
+        width, height = map_size(extent, 6.0)
+        figure, left = plt.subplots(figsize=(width + 0.9, height + 0.5))
+    elif extent[0] < 2.5 * extent[1]:
+        width, height = map_size(extent, 5.0)
+        figure, (left, right) = plt.subplots(1, 2, figsize=(2 * (width + 0.9), height + 0.5))
+    else:
+        width, height = map_size(extent, 8.0)
+        figure, (left, right) = plt.subplots(2, 1, figsize=(width, 2 * height + 0.5))
+    mesh = Triangulation(*results.pieces.at_points(results.nodes).T, results.pieces.triangles)
+    left.set_title(_paint_stress(left, mesh, results, limits))
+    if limits.damaged:
+        right.set_title(_paint_damage(right, mesh, results, limits))
+    for axes in figure.axes:
+        draw_outline(axes, results.nodes, results, color=INK, linewidth=0.7)
+        draw_foundation(axes, results)
+        frame(axes, results.nodes)
+    figure.suptitle(headline(results, f"t = {results.time:g} s"), fontsize=11.5)
+    return figure
+
+
+def draw_state(results, limits, figure=None):
+    """The deformed body coloured by its damage, or by its stress where there is no damage."""
+    width, height = map_size(np.ptp(limits.box, axis=0), 7.2)
+    figure = canvas((width, height + 0.4), figure)
+    axes = figure.add_subplot()
+    moved = results.nodes + limits.factor * results.displacement
+    mesh = Triangulation(*results.pieces.at_points(moved).T, results.pieces.triangles)
+    paint = _paint_damage if limits.damaged else _paint_stress
+    shown = paint(axes, mesh, results, limits)
+    draw_outline(axes, moved, results, color=INK, linewidth=0.7)
+    draw_outline(
+        axes, results.nodes, results, color=INK, linewidth=0.6, linestyle=(0, (4, 2)), zorder=0
+    )
+    draw_foundation(axes, results, limits.factor)
+    frame(axes, limits.box)
+    text = f"t = {results.time:g} s: {shown}; {_amplified(results, limits)}"
+    axes.set_title(headline(results, text))
+    return figure
+
+
+def _amplified(results, limits):
+    """How the deformation is shown."""
+    largest = np.linalg.norm(results.displacement, axis=1).max()
+    moves = f"displacements × {limits.factor:g} (largest {largest:.3g} m)"
+    return "unloaded" if results.unloaded else moves
+
+
+def _paint_stress(axes, mesh, results, limits):
+    """Colours for the von Mises stress, with their bar; returns what to say of it."""
+    factor, prefix = unit_prefix(limits.stress)
+    image = axes.tripcolor(
+        mesh, facecolors=results.pieces.of_cells(results.von_mises / factor), cmap="viridis",
+        vmin=0.0, vmax=limits.stress / factor or 1.0, rasterized=True,
+    )
+    extend = "max" if limits.is_cut else "neither"
+    draw_colourbar(axes, image, f"von Mises stress ({prefix}Pa)", extend)
+    return f"von Mises stress, largest {results.von_mises.max() / factor:.3g} {prefix}Pa"
+
+
+def _paint_damage(axes, mesh, results, limits):
+    """Colours for ζ, with their bar; returns what to say of it."""
+    shown, label, colours, (low, high) = damage_scale(*limits.zeta)
+    image = axes.tripcolor(
+        mesh, results.pieces.at_points(shown(results.zeta)), shading="gouraud", cmap=colours,
+        vmin=low, vmax=high, rasterized=True,
+    )
+    draw_colourbar(axes, image, label)
+    return rf"damage, least $\zeta$ = {least_zeta(results.zeta.min())}"

@@ -1,0 +1,138 @@
+"""Reads a result folder: fields.pvd with its frames, history.csv, summary.json, and scene.toml if it
+is there."""
+
+import csv
+import json
+import tomllib
+import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
+from pathlib import Path
+
+import meshio
+import numpy as np
+
+from elements import Pieces, counter_clockwise
+from results import ResultError, Results, without_roundoff
+
+
+def read_results(folder, time=None):
+    """Everything a figure needs from one result folder: the frame nearest to `time`, or the last."""
+    folder, summary = Path(folder), {}
+    try:
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        with open(folder / "history.csv", newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        scene = folder / "scene.toml"
+        frames = ElementTree.parse(folder / "fields.pvd").findall(".//DataSet")
+        frames = [(float(frame.get("timestep")), folder / frame.get("file")) for frame in frames]
+        frames.sort(key=lambda frame: frame[0])
+        chosen = frames[-1 if time is None else nearest(frames, time)]
+        fields = read_frame(chosen[1])
+        elements = np.vstack([fields.cells[k].data for k in triangles(fields)])
+        results = Results(
+            folder=folder,
+            summary=summary,
+            scene=tomllib.loads(scene.read_text(encoding="utf-8")) if scene.exists() else {},
+            history={c: np.array([_number(r[c]) for r in rows]) for c in (rows or [{}])[0]},
+            frames=frames,
+            time=chosen[0],
+            nodes=fields.points[:, :2],
+            pieces=Pieces(counter_clockwise(fields.points, elements)),
+            contact=_segments(summary["contact_boundary"]),
+            tangents=_segments(summary["contact_tangents"]),
+            obstacle=_segments(summary["foundation"]),
+        )
+        return with_fields(results, chosen[0], fields)
+    except OSError as error:
+        if failed := summary.get("error"):
+            raise ResultError(f"{folder}: nothing to draw, the run failed: {failed}") from None
+        raise ResultError(f"{error.filename}: {error.strerror}") from None
+    except KeyError as error:
+        raise ResultError(f"{folder}: the field {error} is missing") from None
+    except IndexError:
+        raise ResultError(f"{folder}: fields.pvd lists no frame") from None
+    except (ValueError, ElementTree.ParseError, meshio.ReadError) as error:
+        raise ResultError(f"{folder}: {error}") from None
+
+
+def nearest(frames, time):
+    """The index of the frame nearest to a time."""
+    return min(range(len(frames)), key=lambda k: abs(frames[k][0] - time))
+
+
+def evenly(frames, most):
+    """Of all frames some `most` at even distances in time: no nearer than the farthest neighbours."""
+    times = [time for time, _ in frames]
+    if len(times) < 2:
+        return frames
+    count = 1 + round((times[-1] - times[0]) / max(np.diff(times)))
+    wanted = np.linspace(times[0], times[-1], min(count, most))
+    return [frames[k] for k in sorted({nearest(frames, time) for time in wanted})]
+
+
+def states(results, frames):
+    """The results at some of their frames."""
+    return [with_fields(results, time, read_frame(path)) for time, path in frames]
+
+
+def triangles(fields):
+    """Which blocks of cells are triangles."""
+    return [k for k, block in enumerate(fields.cells) if block.type in ("triangle", "triangle6")]
+
+
+def with_fields(results, time, fields):
+    """The results with the state of another frame of the same run."""
+    points, cells = fields.point_data, fields.cell_data
+    return without_roundoff(replace(
+        results,
+        time=time,
+        displacement=points["displacement"][:, :2],
+        zeta=np.ravel(points["zeta"]),
+        von_mises=np.concatenate([np.ravel(cells["von_mises"][k]) for k in triangles(fields)]),
+        pressure=np.ravel(points["normal_pressure"]),
+        gap=np.ravel(points["gap"]),
+    ))
+
+
+def read_frame(path):
+    """A frame: a .vtu file, or the .pvtu list of the pieces that several ranks have written.
+
+    meshio does not read lists; nodes that pieces share are joined by their numbers.
+    """
+    if path.suffix != ".pvtu":
+        return meshio.read(path)
+    sources = [piece.get("Source") for piece in ElementTree.parse(path).findall(".//Piece")]
+    # A rank that has no triangles leaves an empty piece.
+    pieces = [piece for piece in (meshio.read(path.parent / s) for s in sources) if piece.cells]
+    numbers = [np.ravel(piece.point_data["global_node"]) for piece in pieces]
+    _, first, place = np.unique(np.concatenate(numbers), return_index=True, return_inverse=True)
+    starts = np.cumsum([0, *map(len, numbers)])
+
+    def joined(arrays):
+        return np.concatenate(arrays)[first]
+
+    cells = [
+        place[start + block.data]
+        for piece, start in zip(pieces, starts)
+        for block in piece.cells
+    ]
+    return meshio.Mesh(
+        joined([piece.points for piece in pieces]),
+        [(pieces[0].cells[0].type, np.concatenate(cells))],
+        point_data={
+            name: joined([piece.point_data[name] for piece in pieces])
+            for name in pieces[0].point_data
+        },
+        cell_data={
+            name: [np.concatenate([block for piece in pieces for block in piece.cell_data[name]])]
+            for name in pieces[0].cell_data
+        },
+    )
+
+
+def _segments(lists):
+    return np.array(lists, dtype=float).reshape(-1, 2, 2)
+
+
+def _number(text):
+    return float(text) if text else np.nan

@@ -1,0 +1,194 @@
+"""The picture of the physical setting: boundaries by name, loads and supports (paper, Figures 1, 2,
+4 and 7)."""
+
+import textwrap
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.patheffects import withTickedStroke
+
+from drawing import (
+    BLUE, FAINT, GREEN, INK, RED, draw_foundation, draw_outline, frame, headline, map_size,
+)
+from expressions import evaluate
+from results import paths
+
+# In parts of the body's size: the longest arrow, and the distances from arrow to arrow and from roller
+# to roller.
+ARROW, SPACING, ROLLERS = 0.12, 0.05, 0.03
+# How far names are from what they name, inches.
+AWAY = 0.13
+
+
+def draw_setting(results, _limits):
+    """The body with its boundaries named, tractions as arrows, supports, and the foundation.
+
+    Clamps are hatched; rollers stand where only one component is prescribed, or u·ν on an axis of
+    symmetry. The legend has the conditions in the scene's words. None where the folder does not hold
+    the scene.
+    """
+    conditions = {b["name"]: b for b in results.scene.get("boundary", [])}
+    boundaries = results.summary.get("boundaries")
+    if not conditions or not boundaries:
+        return None
+    curves = [(name, np.array(path)) for name, edges in boundaries.items()
+              for path in paths([tuple(map(tuple, edge)) for edge in edges])]
+    width, height = map_size(np.ptp(results.nodes, axis=0), 6.4)
+    figure, axes = plt.subplots(figsize=(width, height + 0.7 + 0.2 * len(conditions)))
+    for outline in results.outline(results.nodes):
+        axes.fill(*outline.T, color="#edf1f5", zorder=0.5)
+    draw_outline(axes, results.nodes, results, color=INK, linewidth=0.9, zorder=2)
+    draw_foundation(axes, results)
+
+    size = results.size
+    time, forces = _loads(results, conditions, curves)
+    largest = max([np.linalg.norm(force, axis=-1).max() for force in forces], default=0.0)
+    places = [results.nodes]
+    for (name, line), force in zip(curves, forces):
+        condition = conditions.get(name, {})
+        outer = _draw_support(axes, line, condition, size)
+        tails = _draw_traction(axes, line, force * ARROW * size / (largest or 1.0), size)
+        beyond = np.vstack([outer, tails, *_opposite(results, line)])
+        places += [tails, _write_name(axes, line, name, condition, beyond, size / (width - 1.0))]
+    body_force = _draw_body_force(axes, results, time)
+    frame(axes, np.vstack(places))
+    for name, condition in conditions.items():
+        axes.plot([], [], color=_colour(condition), linewidth=4, label=_words(name, condition))
+    if body_force:
+        axes.plot([], [], color=GREEN, linewidth=4, label=f"body force: {body_force} N/m³")
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.55 / height), fontsize=8.5, handlelength=1)
+    loads = f"; loads at t = {time:g} s" if largest or body_force else ""
+    axes.set_title(headline(results, f"setting{loads}"))
+    return figure
+
+
+def _loads(results, conditions, curves):
+    """A time with loads, the shown one if it has any, and the tractions then: (n, 2) at the samples of
+    each curve, N/m²."""
+    def at(time):
+        forces = []
+        for name, line in curves:
+            points, _ = _samples(line, SPACING * results.size)
+            traction = conditions.get(name, {}).get("traction", [0, 0])
+            forces.append(_vectors(traction, points, time))
+        return forces
+
+    def largest(forces):
+        return max(np.abs(force).max() for force in forces)
+
+    forces = at(results.time)
+    if largest(forces) > 0.0:
+        return results.time, forces
+    times = [time for time, _ in results.frames]
+    time = max(times, key=lambda time: largest(at(time)))
+    return time, at(time)
+
+
+def _vectors(expressions, points, time):
+    """The values of two expressions at points, (n, 2); 0 where they are not known."""
+    values = [evaluate(expression, *points.T, time) for expression in expressions]
+    return np.column_stack([np.zeros(len(points)) if v is None else v for v in values])
+
+
+def _samples(line, spacing):
+    """Points along a line, about `spacing` apart and both ends among them, and the outward normals."""
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    s = np.concatenate(([0.0], np.cumsum(steps)))
+    at = np.linspace(0.0, s[-1], max(3, 1 + round(s[-1] / spacing)))
+    points = np.column_stack([np.interp(at, s, line[:, k]) for k in (0, 1)])
+    edge = np.clip(np.searchsorted(s, at) - 1, 0, len(steps) - 1)
+    dx, dy = (np.diff(line, axis=0)[edge] / steps[edge, None]).T
+    return points, np.column_stack((dy, -dx))
+
+
+def _draw_support(axes, line, condition, size):
+    """Hatching of a clamp, or rollers; returns their outer line, or the boundary's."""
+    prescribed = condition.get("displacement", ["free", "free"])
+    free = [component == "free" for component in prescribed]
+    if not any(free):
+        strokes = withTickedStroke(spacing=6, angle=-135, length=1.0, linewidth=0.9, foreground=BLUE)
+        axes.plot(*line.T, color=BLUE, linewidth=0.9, path_effects=[strokes], zorder=1.5)
+        axes.plot(*line.T, color=BLUE, linewidth=2.0, zorder=2.5, solid_capstyle="butt")
+    elif condition.get("symmetry") or not all(free):
+        points, normals = _samples(line, ROLLERS * size)
+        radius = 0.35 * ROLLERS * size
+        for point in points + radius * normals:
+            axes.add_patch(plt.Circle(point, radius, facecolor="white", edgecolor=BLUE, linewidth=0.9,
+                                      zorder=1.8))
+        outer = points + 2.2 * radius * normals
+        axes.plot(*outer.T, color=BLUE, linewidth=1.2, zorder=1.8)
+        return outer
+    return line
+
+
+def _draw_traction(axes, line, arrows, size):
+    """Arrows, m, onto the boundary where they press, from it where they pull; returns where they
+    start or end off it."""
+    points, normals = _samples(line, SPACING * size)
+    presses = (arrows * normals).sum(axis=1) <= 0.0
+    off = points + np.where(presses[:, None], -arrows, arrows)
+    length = np.linalg.norm(arrows, axis=1)
+    if not length.any():
+        return points
+    for chosen, pivot in ((presses, "tip"), (~presses, "tail")):
+        shown = chosen & (length > 0.05 * ARROW * size)
+        axes.quiver(*points[shown].T, *arrows[shown].T, color=RED, angles="xy", scale_units="xy",
+                    scale=1.0, pivot=pivot, width=0.0035, zorder=4)
+    axes.plot(*off.T, color=RED, linewidth=0.8, zorder=3.9)
+    return off
+
+
+def _draw_body_force(axes, results, time):
+    """An arrow in the middle of the body; returns the force in the scene's words, if there is one."""
+    force = results.scene.get("body", {}).get("force")
+    middle = results.nodes.mean(axis=0, keepdims=True)
+    arrow = _vectors(force, middle, time) if force else np.zeros((1, 2))
+    if arrow.any():
+        arrow *= ARROW * results.size / np.linalg.norm(arrow)
+        axes.quiver(*middle.T, *arrow.T, color=GREEN, angles="xy", scale_units="xy", scale=1.0,
+                    pivot="middle", width=0.006, zorder=4)
+    return _pair(force) if force else None
+
+
+def _opposite(results, line):
+    """The points of the obstacle opposite a part of the boundary."""
+    ends = set(map(tuple, line.tolist()))
+    pairs = zip(results.contact.reshape(-1, 2).tolist(), results.obstacle.reshape(-1, 2))
+    return [opposite for end, opposite in pairs if tuple(end) in ends]
+
+
+def _write_name(axes, line, name, condition, others, inch):
+    """The name of a boundary beside its middle, beyond its arrows and the obstacle; returns the corners
+    of a box around it. An inch of the picture is `inch` metres."""
+    points, normals = _samples(line, spacing=np.inf)
+    x, y = normal = normals[1]
+    beyond = max(0.0, ((others - points[1]) @ normal).max())
+    place = points[1] + (beyond + AWAY * inch) * normal
+    across = "center" if abs(x) < 0.4 else "left" if x > 0.0 else "right"
+    upright = "center" if abs(y) < 0.4 else "bottom" if y > 0.0 else "top"
+    axes.text(*place, name, color=_colour(condition), ha=across, va=upright, zorder=5)
+    # A letter is about 0.09 inches wide.
+    return np.array([place, place + (0.09 * len(name) * inch * np.sign(x) * (abs(x) >= 0.4), 0.0)])
+
+
+def _colour(condition):
+    """Supports blue, the foundation dark, loads red, what is free grey."""
+    kinds = (("displacement", BLUE), ("symmetry", BLUE), ("gap", INK), ("traction", RED))
+    return next((colour for kind, colour in kinds if kind in condition), FAINT)
+
+
+def _words(name, condition):
+    """What holds on a boundary."""
+    words = {
+        "displacement": lambda u: f"u = {_pair(u)} m",
+        "symmetry": lambda _: "u·ν = 0",
+        "gap": lambda gap: f"gap g = {gap} m",
+        "normal": lambda normal: f"along ν = {_pair(normal)}",
+        "traction": lambda force: f"traction {_pair(force)} N/m²",
+    }
+    parts = [say(condition[key]) for key, say in words.items() if condition.get(key)]
+    return textwrap.fill(f"{name}: {', '.join(parts)}".replace("$", r"\$"), 90)
+
+
+def _pair(components):
+    return f"({', '.join(map(str, components))})"
