@@ -58,12 +58,19 @@ class Results:
         return self.summary.get("title") or self.summary.get("scene") or self.folder.name
 
     @property
+    def units(self):
+        """The names of the units of length, force, time and stress."""
+        return {"length": "m", "force": "N", "time": "s", "stress": "Pa",
+                **self.summary.get("units", {})}
+
+    @property
     def ending(self):
         """That the run did not reach its end, and when it ended; nothing if it did."""
         stopped = self.summary.get("stopped_at")
         if self.summary.get("error"):
-            return f"the run FAILED after t = {self.frames[-1][0]:g} s"
-        return "" if stopped is None else f"stopped: ζ$_*$ reached at t = {stopped:.4g} s"
+            return f"the run FAILED after t = {self.frames[-1][0]:g} {self.units['time']}"
+        at = "" if stopped is None else f"{stopped:.4g} {self.units['time']}"
+        return at and f"stopped: ζ$_*$ reached at t = {at}"
 
     @property
     def overrides(self):

@@ -134,6 +134,7 @@ fn summary(
     let stopped = outcome.and_then(|outcome| outcome.stopped);
     let steps = last.map_or(0, |record| record.step);
     let seconds = task.phases.parts("").into_iter().map(|(name, phase)| (name, phase.seconds));
+    let foundation = problem.foundation(last.map_or(problem.start(), |record| record.time));
     let mut summary = json!({
         "provenance": provenance(),
         "scene": scene.name,
@@ -167,10 +168,11 @@ fn summary(
         // The named curves of the mesh as segments [[x, y], [x, y]], m, the body on their left.
         "boundaries": problem.boundaries(),
         // The edges of Γ_C as segments [[x, y], [x, y]], m; unit vectors along which the body slides
-        // at their ends, [0, 0] at corners; opposite each edge the foundation, m.
-        "contact_boundary": problem.foundation.contact_boundary,
-        "contact_tangents": problem.foundation.tangents,
-        "foundation": problem.foundation.segments,
+        // at their ends, [0, 0] at corners; opposite each edge the foundation at the end, m.
+        "contact_boundary": foundation.contact_boundary,
+        "contact_tangents": foundation.tangents,
+        "foundation": foundation.segments,
+        "units": scene.units,
         "notes": notes,
     });
     if let Err(error) = result {

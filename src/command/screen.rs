@@ -22,7 +22,7 @@ pub fn open(task: &Task) -> Progress {
         _ => task.solver.clone(),
     };
     let mut lines = vec![scene.title.clone(), row("mesh", mesh), row("solver", solver)];
-    lines.extend(scene.time.map(|grid| row("time", steps(grid))));
+    lines.extend(scene.time.map(|grid| row("time", steps(grid, &scene.units.time))));
     say(&lines.join("\n"));
 
     let mut progress = Progress::new("{bar:20} {wide_msg} {elapsed}, {eta} left", LENGTH);
@@ -54,12 +54,15 @@ pub fn conclusion(
             least => format!("min ζ {least:.6}, mean ζ {:.6}", last.zeta_mean),
         };
         lines.push(row("damage", damage));
-        lines.push(row("displacement", format!("largest {:.6e} m", last.displacement_max)));
-        lines.push(row("work", format!("{:.6e} J/m", last.work)));
+        let units = &task.problem.scene().units;
+        let (length, force) = (&units.length, &units.force);
+        lines.push(row("displacement", format!("largest {:.6e} {length}", last.displacement_max)));
+        lines.push(row("work", format!("{:.6e} {}", last.work, units.work())));
         if task.contact_nodes > 0 {
             let (active, nodes) = (last.active_nodes, task.contact_nodes);
-            let force = last.contact_force;
-            let contact = format!("{active} of {nodes} nodes active, force {force:.6e} N/m");
+            let sum = last.contact_force;
+            let contact =
+                format!("{active} of {nodes} nodes active, force {sum:.6e} {force}/{length}");
             lines.push(row("contact", contact));
         }
         if let Some(outcome) = outcome {
@@ -79,11 +82,11 @@ fn row(name: &str, value: String) -> String {
     format!("  {name:<13} {value}")
 }
 
-fn steps(grid: TimeGrid) -> String {
+fn steps(grid: TimeGrid, unit: &str) -> String {
     let end = grid.end;
     match grid.stepping {
         Stepping::Uniform { steps } => {
-            format!("{steps} steps of {} s to t = {end}", rounded(end / steps as f64))
+            format!("{steps} steps of {} {unit} to t = {end}", rounded(end / steps as f64))
         }
         Stepping::Auto { tolerance } => {
             format!("to t = {end} in steps as the error of ζ, {tolerance:e} each, allows")

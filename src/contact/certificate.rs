@@ -22,7 +22,8 @@ struct Conditions {
     node: usize,
     /// Directions d in which u·d is prescribed, and the numbers of these rows.
     fixed: Vec<(Vector2<f64>, usize)>,
-    gaps: Vec<GapRow>,
+    /// The gap conditions and the numbers of these rows.
+    gaps: Vec<(GapRow, usize)>,
 }
 
 /// A gap condition at a node and how it is met.
@@ -53,6 +54,8 @@ pub struct Answer<'a> {
     pub unbalanced: &'a [f64],
     /// The values of the prescribed rows, m.
     pub prescribed: &'a [f64],
+    /// The gaps of all gap rows at the time, m; none where no gap depends on time.
+    pub gaps: &'a [f64],
 }
 
 /// A normal that has less than this outside the prescribed directions acts along them.
@@ -67,7 +70,9 @@ impl Certificate {
         for (number, row) in fixed.iter().enumerate() {
             nodes.entry(row.node).or_default().fixed.push((row.direction.into(), number));
         }
-        gaps.iter().for_each(|gap| nodes.entry(gap.node).or_default().gaps.push(*gap));
+        for (number, gap) in gaps.iter().enumerate() {
+            nodes.entry(gap.node).or_default().gaps.push((*gap, number));
+        }
         let nodes = nodes.into_iter().map(|(node, at)| Conditions { node, ..at }).collect();
         Self { nodes, posed: fixed.len() + gaps.len() }
     }
@@ -76,7 +81,8 @@ impl Certificate {
     pub fn restrict(&self, subdomain: &Subdomain) -> Self {
         let local = |at: &Conditions| {
             let node = subdomain.owned(at.node)?;
-            let gaps = at.gaps.iter().map(|gap| GapRow { node, ..*gap }).collect();
+            let gaps = at.gaps.iter().map(|&(gap, number)| (GapRow { node, ..gap }, number));
+            let gaps = gaps.collect();
             Some(Conditions { node, gaps, fixed: at.fixed.clone() })
         };
         let mut nodes: Vec<_> = self.nodes.iter().filter_map(local).collect();
@@ -114,8 +120,9 @@ impl Certificate {
             let carried = at.carry(vector(answer.unbalanced, at.node), &left);
             dual += carried.pull;
             across += carried.across;
-            for ((gap, left), force) in at.gaps.iter().zip(&left).zip(carried.forces) {
-                let counts = force.is_some() || -left > ROUNDING * gap.gap;
+            for (((gap, number), left), force) in at.gaps.iter().zip(&left).zip(carried.forces) {
+                let width = gap.gap_of(*number, answer.gaps).abs();
+                let counts = force.is_some() || -left > ROUNDING * width;
                 let depth = if !counts || *left >= 0.0 { 0.0 } else { -left };
                 primal = worse(primal, scales.of_displacement(depth));
                 let Some(force) = force else { continue };
@@ -182,9 +189,9 @@ impl Conditions {
     /// g − u·ν of each gap condition, the rigid part first: both are large where the gap is.
     fn gaps_left(&self, answer: Answer) -> Vec<f64> {
         let (rigid, elastic) = (self.rigid(answer), vector(answer.elastic, self.node));
-        let left = |gap: &GapRow| {
+        let left = |(gap, number): &(GapRow, usize)| {
             let normal = Vector2::from(gap.normal);
-            (gap.gap - normal.dot(&rigid)) - normal.dot(&elastic)
+            (gap.gap_of(*number, answer.gaps) - normal.dot(&rigid)) - normal.dot(&elastic)
         };
         self.gaps.iter().map(left).collect()
     }
@@ -201,7 +208,7 @@ impl Conditions {
         };
         let project = |v: Vector2<f64>| free.iter().map(|t| t * t.dot(&v)).sum::<Vector2<f64>>();
         let force = project(force);
-        let normals: Vec<_> = self.gaps.iter().map(|gap| project(gap.normal.into())).collect();
+        let normals: Vec<_> = self.gaps.iter().map(|(gap, _)| project(gap.normal.into())).collect();
         let bears = |i: &usize| normals[*i].norm() > ALONG;
         let bearing: Vec<usize> = (0..normals.len()).filter(bears).collect();
         let (multipliers, rest) = cone(force, &normals, &bearing, left);

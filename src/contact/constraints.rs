@@ -15,6 +15,8 @@ pub struct Constraints {
     pub bases: NodalBases,
     /// The bounded unknowns, rising, each with its first gap condition; [`Self::pose`] adds the others.
     pub bounds: Vec<Bound>,
+    /// The numbers of these conditions among all gap rows.
+    first: Vec<usize>,
     /// Unknowns that take the value of a fixed row: (dof, row).
     prescribed: Vec<(usize, usize)>,
     /// Fixed rows whose direction other rows determine already, with their numbers.
@@ -27,9 +29,14 @@ pub struct Constraints {
 #[derive(Debug, Clone, Copy)]
 struct FurtherGap {
     row: GapRow,
+    /// Its number among all gap rows.
+    number: usize,
     /// The unknown c, bounded by another gap condition already, and b; `None` where u·ν is prescribed.
     bounded: Option<(usize, f64)>,
 }
+
+/// The numbers of the fixed rows of a node, and its gap rows with theirs.
+type AtNode<'a> = (Vec<usize>, Vec<(usize, &'a mut GapRow)>);
 
 /// Directions whose lines are closer than this angle, rad, are one direction.
 const PARALLEL: f64 = 1e-8;
@@ -53,14 +60,17 @@ impl Constraints {
         fixed: &[FixedRow],
         gaps: &mut [GapRow],
     ) -> Result<Self, ConstraintError> {
-        let mut nodes: BTreeMap<usize, (Vec<usize>, Vec<&mut GapRow>)> = BTreeMap::new();
+        let mut nodes: BTreeMap<usize, AtNode> = BTreeMap::new();
         for (number, row) in fixed.iter().enumerate() {
             nodes.entry(row.node).or_default().0.push(number);
         }
-        gaps.iter_mut().for_each(|gap| nodes.entry(gap.node).or_default().1.push(gap));
+        for (number, gap) in gaps.iter_mut().enumerate() {
+            nodes.entry(gap.node).or_default().1.push((number, gap));
+        }
         let mut constraints = Self {
             bases: NodalBases::identity(coordinates.len()),
             bounds: Vec::new(),
+            first: Vec::new(),
             prescribed: Vec::new(),
             implied: Vec::new(),
             further: Vec::new(),
@@ -100,7 +110,7 @@ impl Constraints {
     /// same unknown.
     fn add_gap(
         &mut self,
-        gap: &mut GapRow,
+        (number, gap): (usize, &mut GapRow),
         basis: &mut Vec<[f64; 2]>,
         prescribed: usize,
     ) -> Result<(), Conflict> {
@@ -123,6 +133,7 @@ impl Constraints {
                     upper: gap.gap,
                     tributary_length: gap.tributary_length,
                 });
+                self.first.push(number);
                 basis.push(gap.normal);
                 return Ok(());
             }
@@ -130,7 +141,7 @@ impl Constraints {
             // ν = a d + b n with the prescribed direction d, by Cramer's rule.
             None => Some((dof(1), cross(basis[0], gap.normal) / cross(basis[0], basis[1]))),
         };
-        self.further.push(FurtherGap { row: *gap, bounded });
+        self.further.push(FurtherGap { row: *gap, number, bounded });
         Ok(())
     }
 
@@ -162,7 +173,8 @@ impl Constraints {
     }
 
     /// The prescribed unknowns c_D, m (0 elsewhere; two entries per node), where `values[row]` is u·d of
-    /// each fixed row, and the bounds on the others.
+    /// each fixed row, and the bounds on the others. `gaps` are those of all gap rows at the time; none
+    /// where no gap depends on time.
     ///
     /// # Errors
     /// Values contradict each other or go through the obstacle, or obstacles on both sides of a node
@@ -170,6 +182,7 @@ impl Constraints {
     pub fn pose(
         &self,
         values: &[f64],
+        gaps: &[f64],
         coordinates: &[[f64; 2]],
     ) -> Result<(Vec<f64>, Vec<Bound>), ConstraintError> {
         let mut lift = vec![0.0; 2 * coordinates.len()];
@@ -188,8 +201,11 @@ impl Constraints {
             }
         }
         let mut bounds = self.bounds.clone();
-        for &FurtherGap { row, bounded } in &self.further {
-            let room = row.gap - along(row.node, row.normal);
+        for (bound, number) in bounds.iter_mut().zip(&self.first) {
+            bound.upper = gaps.get(*number).copied().unwrap_or(bound.upper);
+        }
+        for &FurtherGap { row, number, bounded } in &self.further {
+            let room = row.gap_of(number, gaps) - along(row.node, row.normal);
             let Some((dof, b)) = bounded else {
                 let depth = -room;
                 if depth > 0.0 && depth > ROUNDING * largest().max(extent(coordinates)) {
@@ -213,29 +229,32 @@ impl Constraints {
     }
 
     /// The conditions that concern a rank: prescribed unknowns of its subdomain, all others of the nodes
-    /// that it owns. The fixed rows keep their numbers.
+    /// that it owns. All rows keep their numbers.
     pub fn restrict(&self, subdomain: &Subdomain) -> Self {
         let owned = |node: usize| subdomain.owned(node);
         let renumbered = |dof: usize, node: usize| 2 * node + dof % 2;
-        let bound = |b: &Bound| {
+        let bound = |(b, number): (&Bound, &usize)| {
             let node = owned(b.node)?;
-            Some(Bound { node, dof: renumbered(b.dof, node), ..*b })
+            Some((Bound { node, dof: renumbered(b.dof, node), ..*b }, *number))
         };
-        let mut bounds: Vec<Bound> = self.bounds.iter().filter_map(bound).collect();
-        bounds.sort_by_key(|bound| bound.dof);
+        let bounds = self.bounds.iter().zip(&self.first);
+        let mut bounds: Vec<(Bound, usize)> = bounds.filter_map(bound).collect();
+        bounds.sort_by_key(|(bound, _)| bound.dof);
+        let (bounds, first) = bounds.into_iter().unzip();
         let prescribed =
             |&(dof, row): &(usize, usize)| Some((renumbered(dof, subdomain.local(dof / 2)?), row));
         let implied = |&(row, number): &(FixedRow, usize)| {
             Some((FixedRow { node: owned(row.node)?, ..row }, number))
         };
-        let further = |&FurtherGap { row, bounded }: &FurtherGap| {
+        let further = |&FurtherGap { row, number, bounded }: &FurtherGap| {
             let row = GapRow { node: owned(row.node)?, ..row };
             let bounded = bounded.map(|(dof, b)| (renumbered(dof, row.node), b));
-            Some(FurtherGap { row, bounded })
+            Some(FurtherGap { row, number, bounded })
         };
         Self {
             bases: self.bases.restrict(subdomain),
             bounds,
+            first,
             prescribed: self.prescribed.iter().filter_map(prescribed).collect(),
             implied: self.implied.iter().filter_map(implied).collect(),
             further: self.further.iter().filter_map(further).collect(),

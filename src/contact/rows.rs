@@ -19,7 +19,8 @@ pub struct GapRow {
     pub node: usize,
     /// ν, a unit vector.
     pub normal: [f64; 2],
-    /// g ≥ 0, m.
+    /// g, m, negative where body and obstacle overlap; of a gap that depends on time, that of the first
+    /// solve.
     pub gap: f64,
     /// The node's tributary length of Γ_C, m.
     pub tributary_length: f64,
@@ -27,21 +28,29 @@ pub struct GapRow {
 
 impl GapRow {
     /// The rows by node: those of one smooth boundary become one, of the mean normal, the sum of
-    /// the lengths and the smallest gap; across a corner both stay.
-    pub fn joined(rows: impl IntoIterator<Item = Self>) -> Vec<Self> {
-        let mut nodes: BTreeMap<usize, Vec<Self>> = BTreeMap::new();
-        for new in rows {
+    /// the lengths and the smallest gap; across a corner both stay. Also the `T` of the rows that each
+    /// is made of.
+    pub fn joined<T>(rows: impl IntoIterator<Item = (Self, T)>) -> (Vec<Self>, Vec<Vec<T>>) {
+        let mut nodes: BTreeMap<usize, Vec<(Self, Vec<T>)>> = BTreeMap::new();
+        for (new, of_new) in rows {
             let rows = nodes.entry(new.node).or_default();
-            match rows.iter_mut().find(|row| row.face().continues(&new.face())) {
-                None => rows.push(new),
-                Some(row) => {
+            match rows.iter_mut().find(|(row, _)| row.face().continues(&new.face())) {
+                None => rows.push((new, vec![of_new])),
+                Some((row, of_row)) => {
                     let Face { normal, length } = row.face().joined(&new.face());
                     let gap = row.gap.min(new.gap);
                     *row = Self { normal, gap, tributary_length: length, ..*row };
+                    of_row.push(of_new);
                 }
             }
         }
-        nodes.into_values().flatten().collect()
+        nodes.into_values().flatten().unzip()
+    }
+
+    /// Its gap, m: its own, or where gaps depend on time, that of its `number` among all of them at
+    /// the time.
+    pub(super) fn gap_of(&self, number: usize, gaps: &[f64]) -> f64 {
+        gaps.get(number).copied().unwrap_or(self.gap)
     }
 
     fn face(&self) -> Face {

@@ -70,7 +70,8 @@ const ATTEMPTS: usize = 3;
 const DOMINANT: f64 = 10.0;
 /// … and so far from a datum that was chosen before that even a certified answer is measured anew.
 const FAR: f64 = 1e3;
-/// A force scale below this part of the forces that prescribed displacements cause is rounding.
+/// A force scale below this part of the forces that prescribed displacements or obstacles cause, as they
+/// move the nodes there alone, is rounding.
 const LIFTED: f64 = 1e-2;
 /// Loads below this part of the largest of the run count as so much, or an answer to rounding
 /// (sin(pi) = 1.2e-16) would have to have as many digits as any other.
@@ -283,12 +284,20 @@ impl<'a> ContactStep<'a> {
             load.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
             force = force.max(LIFTED * body.nodes.partition.norm(&load, 2));
         }
+        let admits_zero = |bound: &Bound| bound.nearest(0.0) == 0.0;
+        let overlaps = comm.any(!bounds.iter().all(admits_zero));
+        if overlaps {
+            let mut u = vec![0.0; lift.len()];
+            bounds.iter().for_each(|bound| u[bound.dof] = bound.nearest(0.0));
+            bases.displacement_to_global(&mut u);
+            let pushed = self.problem.elasticity.internal_force(body, &self.zeta_at_points, &u);
+            force = force.max(LIFTED * body.nodes.partition.norm(&pushed, 2));
+        }
         bases.force_to_local(&mut load);
         bases.zero_fixed(&mut load);
         let load = &load[..self.load.owned()];
         self.load.set(load)?;
-        let admits_zero = |bound: &Bound| bound.nearest(0.0) == 0.0;
-        if comm.all(load.iter().all(|&f| f == 0.0) && bounds.iter().all(admits_zero)) {
+        if !overlaps && comm.all(load.iter().all(|&f| f == 0.0)) {
             self.c.write(|c| c.fill(0.0))?;
             return Ok(ContactReport::default());
         }

@@ -1,6 +1,10 @@
 //! The discrete problem: a scene bound to its mesh, all that does not change from step to step.
 
-use super::{Foundation, Loads, RunError, agreed, boundary_conditions::BoundaryConditions, notes};
+use super::{
+    Foundation, Loads, RunError, agreed,
+    boundary_conditions::{BoundaryConditions, ContactBoundary},
+    notes,
+};
 use crate::{
     contact::{Bound, Certificate, ConstraintError, Constraints, DrivenMotion, RigidMotions},
     fem::{Body, Elasticity, Mass, Subdomain},
@@ -31,8 +35,8 @@ pub struct DiscreteProblem {
     pub(super) largest_load: f64,
     /// KKT tolerance.
     pub tolerance: f64,
-    /// The foundation opposite Γ_C.
-    pub foundation: Foundation,
+    /// Γ_C of the undivided body.
+    contact_boundary: ContactBoundary,
     scene: Scene,
     /// Where `body` is a part: the undivided mesh and the ranks that own its vertices.
     undivided: Option<(Mesh, Vec<usize>)>,
@@ -51,6 +55,8 @@ pub(super) struct LoadCase {
     pub(super) lift: Vec<f64>,
     /// The bounds on the other unknowns.
     pub(super) bounds: Vec<Bound>,
+    /// The gaps of all gap rows, m, where any depends on time.
+    pub(super) gaps: Vec<f64>,
 }
 
 /// Times at which the loads of a run are sampled for the largest.
@@ -72,9 +78,9 @@ pub enum SetupError {
         /// What contradicts what.
         source: ConstraintError,
     },
-    /// A load or a prescribed displacement is not finite, and this rank cannot tell where.
+    /// A load, a prescribed displacement or a gap is not finite, and this rank cannot tell where.
     #[error(
-        "{scene}: a traction, the body force or a prescribed displacement is not finite or too \
+        "{scene}: a traction, the body force, a prescribed displacement or a gap is not finite or too \
          large at t = {time}; check its expression for divisions by zero, roots and logarithms \
          of negative numbers"
     )]
@@ -111,7 +117,7 @@ impl DiscreteProblem {
             .map_err(|source| SetupError::Constraint { scene: scene.path.clone(), source })?;
         motions.pin_free(&body, &mut constraints);
         let certificate = Certificate::new(fixed, gaps);
-        let foundation = conditions.foundation(&body.mesh);
+        let contact_boundary = conditions.contact_boundary(&body.mesh);
         let unresolved = |traction| notes::unresolved(&scene, &body.mesh, traction);
         let unresolved: Vec<_> = conditions.tractions.iter().filter_map(unresolved).collect();
         scene.notes.extend(unresolved);
@@ -120,7 +126,7 @@ impl DiscreteProblem {
             .map(|time| body.nodes.partition.norm(&loads.at(&body, time), 2));
         let problem = Self {
             largest_load: norms.filter(|norm| norm.is_finite()).fold(0.0, f64::max),
-            foundation,
+            contact_boundary,
             certificate,
             elasticity: Elasticity::new(scene.material),
             constraints,
@@ -191,7 +197,7 @@ impl DiscreteProblem {
         let mut times = self.scene.sample_times(most);
         times.truncate(if self.loads.depend_on_time() { usize::MAX } else { 1 });
         for time in times {
-            self.posed(time, &self.loads.prescribed_at(time))?;
+            self.posed(time, &self.loads.prescribed_at(time), &self.loads.gaps_at(time))?;
             if !self.motions.all_prevented() {
                 self.checked_load(time)?;
             }
@@ -218,8 +224,9 @@ impl DiscreteProblem {
         let load = self.motions.balanced(&self.body, self.checked_load(time)?);
         let work = self.motions.work(&self.body, &load);
         let prescribed = self.loads.prescribed_at(time);
-        let (lift, bounds) = self.posed(time, &prescribed)?;
-        Ok(LoadCase { time, load, work, prescribed, lift, bounds })
+        let gaps = self.loads.gaps_at(time);
+        let (lift, bounds) = self.posed(time, &prescribed, &gaps)?;
+        Ok(LoadCase { time, load, work, prescribed, lift, bounds, gaps })
     }
 
     /// The nodal loads at `time`, if they are finite and drive no unconstrained rigid motion.
@@ -243,13 +250,28 @@ impl DiscreteProblem {
     }
 
     /// The unknowns prescribed at `time` by the `values` of the prescribed rows, and the bounds on the
-    /// others.
-    fn posed(&self, time: f64, values: &[f64]) -> Result<(Vec<f64>, Vec<Bound>), SetupError> {
-        if !values.iter().all(|value| value.is_finite()) {
+    /// others, with the `gaps` of all gap rows where any depends on time.
+    fn posed(
+        &self,
+        time: f64,
+        values: &[f64],
+        gaps: &[f64],
+    ) -> Result<(Vec<f64>, Vec<Bound>), SetupError> {
+        if !values.iter().chain(gaps).all(|value| value.is_finite()) {
             return Err(self.not_finite(time));
         }
         let constraint = |source| SetupError::Constraint { scene: self.scene.path.clone(), source };
-        self.constraints.pose(values, &self.body.nodes.points).map_err(constraint)
+        self.constraints.pose(values, gaps, &self.body.nodes.points).map_err(constraint)
+    }
+
+    /// Whether there is a Γ_C.
+    pub fn has_contact(&self) -> bool {
+        !self.contact_boundary.edges.is_empty()
+    }
+
+    /// The foundation opposite Γ_C at `time`.
+    pub fn foundation(&self, time: f64) -> Foundation {
+        self.contact_boundary.foundation(&self.loads.all_gaps_at(time))
     }
 
     /// The time of the first solve, s: 0, or 1 where there is no time.

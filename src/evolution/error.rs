@@ -81,7 +81,7 @@ impl RunError {
         time: f64,
         source: ContactError,
     ) -> Self {
-        let contact = !problem.foundation.contact_boundary.is_empty();
+        let contact = problem.has_contact();
         let advice = match (source.is_missed(), contact, step > 0) {
             (false, ..) => "",
             (_, true, true) => {

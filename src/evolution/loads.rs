@@ -1,8 +1,8 @@
-//! The loads and prescribed displacements of a scene as functions of time.
+//! The loads, prescribed displacements and gaps of a scene as functions of time.
 
 use super::{
     DiscreteProblem,
-    boundary_conditions::{BoundaryConditions, Traction},
+    boundary_conditions::{BoundaryConditions, MovingGap, Traction},
 };
 use crate::{
     fem::{Body, Edge, Subdomain, add_body_force, add_traction, midpoint},
@@ -16,10 +16,12 @@ type Sample = ([f64; 2], f64);
 const TRIANGLES: usize = 500;
 /// The loads of a step may deviate from a straight line in time by this part of the largest ones.
 const DEVIATION: f64 = 0.05;
+/// Times that differ by less than this part of the run are one.
+const APART: f64 = 1e-9;
 /// Times sampled within a step.
 const POINTS: usize = 16;
 
-/// (f(t), ·)_V and the values of the fixed rows.
+/// (f(t), ·)_V and the values of the fixed rows and of the gap rows.
 #[derive(Debug)]
 pub struct Loads {
     /// f_B, N/m³, if it is not zero.
@@ -27,8 +29,11 @@ pub struct Loads {
     tractions: Vec<Traction>,
     /// Of each fixed row: the point and the component's expression, `None` for a symmetry's 0.
     prescribed: Vec<Option<([f64; 2], Expression)>>,
+    /// The gaps of all gap rows at the first solve, m, and those that depend on time.
+    gaps: Vec<f64>,
+    moving: Vec<MovingGap>,
     /// Where each load of the whole body is sampled.
-    samples: Vec<(Vec<Sample>, [Expression; 2])>,
+    samples: Vec<(Vec<Sample>, Vec<Expression>)>,
     /// The load, where it does not depend on time.
     constant: Option<Vec<f64>>,
 }
@@ -36,14 +41,16 @@ pub struct Loads {
 impl Loads {
     /// The loads on `body`, and the values of its fixed rows.
     pub(super) fn new(body: &Body, scene: &Scene, conditions: BoundaryConditions) -> Self {
-        let BoundaryConditions { tractions, prescribed, .. } = conditions;
+        let BoundaryConditions { tractions, prescribed, gaps, moving, .. } = conditions;
+        let gaps = gaps.iter().map(|row| row.gap).collect();
         let zero = scene.body_force.iter().all(|f| f.as_constant() == Some(0.0));
         let body_force = (!zero).then(|| scene.body_force.clone());
         let samples = (tractions.iter())
-            .map(|traction| (edge_samples(body, &traction.edges), traction.force.clone()))
-            .chain(body_force.iter().map(|f| (triangle_samples(body), f.clone())))
+            .map(|load| (edge_samples(body, &load.edges), load.force.expressions().to_vec()))
+            .chain(body_force.iter().map(|f| (triangle_samples(body), f.to_vec())))
             .collect();
-        let mut loads = Self { body_force, tractions, prescribed, samples, constant: None };
+        let constant = None;
+        let mut loads = Self { body_force, tractions, prescribed, gaps, moving, samples, constant };
         if !loads.samples.iter().flat_map(|(_, f)| f).any(Expression::depends_on_time) {
             loads.constant = Some(loads.assemble(body, 0.0));
         }
@@ -61,10 +68,12 @@ impl Loads {
         }
     }
 
-    /// Whether a load or a prescribed displacement depends on time.
+    /// Whether a load, a prescribed displacement or a gap depends on time.
     pub fn depend_on_time(&self) -> bool {
         let mut prescribed = self.prescribed.iter().flatten().map(|(_, expression)| expression);
-        self.constant.is_none() || prescribed.any(Expression::depends_on_time)
+        self.constant.is_none()
+            || !self.moving.is_empty()
+            || prescribed.any(Expression::depends_on_time)
     }
 
     /// Whether the body force depends on time.
@@ -83,25 +92,55 @@ impl Loads {
         self.prescribed.iter().map(|row| row.as_ref().map_or(0.0, value)).collect()
     }
 
+    /// The gaps of all gap rows at time t, m; none where no gap depends on time.
+    pub fn gaps_at(&self, t: f64) -> Vec<f64> {
+        if self.moving.is_empty() { Vec::new() } else { self.all_gaps_at(t) }
+    }
+
+    /// The gaps of all gap rows at time t, m.
+    pub(super) fn all_gaps_at(&self, t: f64) -> Vec<f64> {
+        let mut gaps = self.gaps.clone();
+        self.moving.iter().for_each(|gap| gaps[gap.number] = gap.at(t));
+        gaps
+    }
+
+    /// Times within a run at which what depends on time is known not to be smooth, and one between
+    /// each two of them, s: rising, further apart than rounding of the `end`.
+    fn breaks(&self, end: f64) -> Vec<f64> {
+        let loads = self.samples.iter().flat_map(|(_, f)| f);
+        let prescribed = self.prescribed.iter().flatten().map(|(_, expression)| expression);
+        let gaps = self.moving.iter().flat_map(|gap| &gap.distances);
+        let all = loads.chain(prescribed).chain(gaps).flat_map(Expression::breaks);
+        let mut breaks: Vec<f64> = all.filter(|t| 0.0 < *t && *t < end).collect();
+        breaks.sort_by(f64::total_cmp);
+        breaks.dedup_by(|next, t| *next - *t < APART * end);
+        let between: Vec<f64> = breaks.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
+        breaks.extend(between);
+        breaks.sort_by(f64::total_cmp);
+        breaks
+    }
+
     /// The forces at time t, N per metre of thickness, on each edge under traction and on a sample of
-    /// the triangles, and the prescribed displacements, m. On every rank those of the whole body:
-    /// much less work than the nodal loads.
+    /// the triangles, and the prescribed displacements and the changes of gaps, m. On every rank those
+    /// of the whole body: much less work than the nodal loads.
     fn sampled_at(&self, t: f64) -> [Vec<f64>; 2] {
         let forces = (self.samples.iter())
             .flat_map(|(places, f)| places.iter().map(move |place| (place, f)))
-            .flat_map(|(([x, y], size), f)| f.each_ref().map(|f| size * f.eval(*x, *y, t)))
+            .flat_map(|(([x, y], size), f)| f.iter().map(move |f| size * f.eval(*x, *y, t)))
             .collect();
-        [forces, self.prescribed_at(t)]
+        let mut displacements = self.prescribed_at(t);
+        displacements.extend(self.moving.iter().map(|gap| gap.at(t) - self.gaps[gap.number]));
+        [forces, displacements]
     }
 
     fn assemble(&self, body: &Body, t: f64) -> Vec<f64> {
         let mut load = vec![0.0; 2 * body.nodes.partition.local()];
-        let at = |f: &[Expression; 2], [x, y]: [f64; 2]| f.each_ref().map(|f| f.eval(x, y, t));
         if let Some(force) = &self.body_force {
-            add_body_force(body, |x| at(force, x), &mut load);
+            let at = |[x, y]: [f64; 2]| force.each_ref().map(|f| f.eval(x, y, t));
+            add_body_force(body, at, &mut load);
         }
         for Traction { edges, force, .. } in &self.tractions {
-            add_traction(body, edges, |x| at(force, x), &mut load);
+            add_traction(body, edges, |x, normal| force.at(x, normal, t), &mut load);
         }
         load
     }
@@ -128,31 +167,48 @@ fn triangle_samples(body: &Body) -> Vec<Sample> {
         .collect()
 }
 
-/// The forces and prescribed displacements of a run, sampled between the ends of its steps.
+/// The forces, prescribed displacements and changes of gaps of a run, sampled between the ends of its
+/// steps.
 ///
 /// Every rank samples those of the whole body, so that all ranks choose the same steps.
 pub(super) struct LoadCurve<'a> {
     problem: &'a DiscreteProblem,
-    /// The largest Σ|·| of the forces and of the prescribed displacements at any time sampled.
+    /// The largest Σ|·| of the forces and of the displacements at any time sampled.
     largest: [f64; 2],
+    /// Times that must be looked at, rising, s.
+    breaks: Vec<f64>,
+    /// The end of the run, s.
+    end: f64,
 }
 
 impl<'a> LoadCurve<'a> {
     /// Samples the whole run; `None` where nothing depends on time.
     pub(super) fn new(problem: &'a DiscreteProblem) -> Option<Self> {
-        let mut curve = Self { problem, largest: [0.0; 2] };
-        let times = problem.scene().sample_times(100);
+        let end = problem.scene().time?.end;
         problem.loads.depend_on_time().then(|| {
-            times.into_iter().for_each(|time| _ = curve.sample(time));
+            let breaks = problem.loads.breaks(end);
+            let mut curve = Self { problem, largest: [0.0; 2], breaks: breaks.clone(), end };
+            let times = problem.scene().sample_times(100).into_iter().chain(breaks);
+            times.for_each(|time| _ = curve.sample(time));
             curve
         })
     }
 
-    /// Whether loads and prescribed displacements are nearly linear in time from `start` to `end`.
+    /// The breaks between two times.
+    pub(super) fn breaks(&self, start: f64, end: f64) -> &[f64] {
+        let apart = APART * self.end;
+        let place = |time: f64| self.breaks.partition_point(|other| *other <= time);
+        let (first, last) = (place(start + apart), place(end - apart));
+        &self.breaks[first..last.max(first)]
+    }
+
+    /// Whether loads, prescribed displacements and gaps are nearly linear in time from `start` to `end`.
     pub(super) fn is_nearly_linear(&mut self, start: f64, end: f64) -> bool {
         let [first, last] = [start, end].map(|time| self.problem.loads.sampled_at(time));
-        (1..=POINTS).all(|point| {
-            let part = point as f64 / (POINTS + 1) as f64;
+        let parts = (1..=POINTS).map(|point| point as f64 / (POINTS + 1) as f64);
+        let breaks = self.breaks(start, end).iter().map(|time| (time - start) / (end - start));
+        let parts: Vec<f64> = parts.chain(breaks).collect();
+        parts.into_iter().all(|part| {
             let values = self.sample(start + part * (end - start));
             !(0..2).any(|kind| {
                 let line = first[kind].iter().zip(&last[kind]);
@@ -163,7 +219,7 @@ impl<'a> LoadCurve<'a> {
         })
     }
 
-    /// Forces and prescribed displacements at `time`; the largest ones are kept.
+    /// Forces and displacements at `time`; the largest ones are kept.
     fn sample(&mut self, time: f64) -> [Vec<f64>; 2] {
         let values = self.problem.loads.sampled_at(time);
         for (largest, values) in self.largest.iter_mut().zip(&values) {

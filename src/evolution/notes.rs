@@ -212,7 +212,7 @@ fn smallest_angle(corners: [[f64; 2]; 3]) -> f64 {
 /// [`add_traction`](crate::fem::add_traction) is far from ∫f by `FINE` midpoints per edge, relative
 /// to the largest ∫|f| of all sampled times: then f varies within the edges, is lost or counts twice.
 pub(super) fn unresolved(scene: &Scene, mesh: &Mesh, traction: &Traction) -> Option<String> {
-    let f = &traction.force;
+    let f = traction.force.expressions();
     if !f.iter().any(Expression::depends_on_space) {
         return None;
     }
@@ -251,10 +251,11 @@ fn integral(mesh: &Mesh, traction: &Traction, parts: &[f64], t: f64) -> [f64; 3]
     let mut sums = [0.0; 3];
     for &Edge { ends: [a, b], .. } in &traction.edges {
         let (p, q) = (mesh.nodes[a], mesh.nodes[b]);
-        let weight = mesh.edge_normal([a, b]).1 / parts.len() as f64;
+        let (normal, length) = mesh.edge_normal([a, b]);
+        let weight = length / parts.len() as f64;
         for s in parts {
             let [x, y] = [0, 1].map(|k| p[k] + s * (q[k] - p[k]));
-            let [fx, fy] = traction.force.each_ref().map(|f| f.eval(x, y, t));
+            let [fx, fy] = traction.force.at([x, y], normal, t);
             let values = [fx, fy, fx.hypot(fy)];
             sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight * value);
         }

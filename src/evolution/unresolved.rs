@@ -1,11 +1,15 @@
 //! Edges on which a traction or a gap varies by more than the mesh shows.
 
-use crate::{fem::gauss_points, mesh::Mesh, scene::Scene};
+use crate::{
+    fem::gauss_points,
+    mesh::{Curve, Mesh},
+    scene::{Expression, Scene, SurfaceLoad},
+};
 use std::collections::HashSet;
 
 /// Points at which the functions are sampled in an edge.
 const SAMPLES: usize = 64;
-/// Times at which a traction is sampled, about.
+/// Times at which a traction or a gap is sampled, about.
 const TIMES: usize = 8;
 /// What a single edge may lose of the accuracy asked for.
 const SHARE: f64 = 0.1;
@@ -25,53 +29,73 @@ pub(super) fn unresolved(
     displacement: f64,
 ) -> HashSet<[usize; 2]> {
     let mut found = HashSet::new();
-    // As parts of the way along an edge.
-    let gauss = gauss_points([0.0; 2], [1.0, 0.0]).map(|[s, _]| s);
     for boundary in &scene.boundaries {
         let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
         if let Some(gap) = boundary.gap() {
-            let near = |&edge: &[usize; 2]| {
-                let [a, m, b] = [0.0, 0.5, 1.0].map(|s| gap.at(place(mesh, edge, s)));
+            let near = |edge: [usize; 2], t: f64| {
+                let at = |s: f64| {
+                    let [x, y] = place(mesh, edge, s);
+                    gap.distance.eval(x, y, t)
+                };
+                let [a, m, b] = [0.0, 0.5, 1.0].map(at);
                 let mut least = f64::INFINITY;
                 let mut deviation = 0.0_f64;
                 for s in samples() {
                     let r = 1.0 - s;
                     let shown = a * r * (r - s) + 4.0 * m * r * s + b * s * (s - r);
-                    let g = gap.at(place(mesh, edge, s));
+                    let g = at(s);
                     least = least.min(g).min(shown);
                     deviation = deviation.max((g - shown).abs());
                 }
                 least < NEAR * displacement && deviation > accuracy * displacement
             };
-            found.extend(curve.edges.iter().filter(|edge| near(edge)).map(sorted));
+            let mut times = scene.sample_times(TIMES);
+            times.truncate(if gap.distance.depends_on_time() { usize::MAX } else { 1 });
+            let near = |edge: &&[usize; 2]| times.iter().any(|&t| near(**edge, t));
+            found.extend(curve.edges.iter().filter(near).map(sorted));
         }
-        let Some(f) = boundary.traction() else { continue };
-        if !f.iter().any(|component| component.depends_on_space()) {
-            continue;
+        for load in boundary.loads() {
+            found.extend(unresolved_load(scene, mesh, curve, load, accuracy));
         }
-        for t in scene.sample_times(TIMES) {
-            let mean = |edge: [usize; 2], at: &[f64]| {
-                let mut sums = [0.0; 3];
-                for &s in at {
-                    let [x, y] = place(mesh, edge, s);
-                    let [fx, fy] = f.each_ref().map(|component| component.eval(x, y, t));
-                    let values = [fx, fy, fx.hypot(fy)];
-                    sums.iter_mut().zip(values).for_each(|(sum, v)| *sum += v / at.len() as f64);
-                }
-                sums
-            };
-            let fine: Vec<f64> = samples().collect();
-            let parts = curve.edges.iter().map(|&edge| {
-                let (length, fine) = (mesh.edge_normal(edge).1, mean(edge, &fine));
-                let coarse = mean(edge, &gauss);
-                let lost = (fine[0] - coarse[0]).hypot(fine[1] - coarse[1]);
-                (edge, lost * length, fine[2] * length)
-            });
-            let parts: Vec<_> = parts.collect();
-            let total: f64 = parts.iter().map(|part| part.2).sum();
-            let lost = parts.iter().filter(|part| part.1 > SHARE * accuracy * total);
-            found.extend(lost.map(|part| sorted(&part.0)));
-        }
+    }
+    found
+}
+
+/// The edges of a curve on which the two Gauss points of a `load` miss too much of it.
+fn unresolved_load(
+    scene: &Scene,
+    mesh: &Mesh,
+    curve: &Curve,
+    load: &SurfaceLoad,
+    accuracy: f64,
+) -> HashSet<[usize; 2]> {
+    let mut found = HashSet::new();
+    if !load.expressions().iter().any(Expression::depends_on_space) {
+        return found;
+    }
+    // As parts of the way along an edge.
+    let gauss = gauss_points([0.0; 2], [1.0, 0.0]).map(|[s, _]| s);
+    for t in scene.sample_times(TIMES) {
+        let mean = |edge: [usize; 2], at: &[f64]| {
+            let mut sums = [0.0; 3];
+            for &s in at {
+                let [fx, fy] = load.at(place(mesh, edge, s), mesh.edge_normal(edge).0, t);
+                let values = [fx, fy, fx.hypot(fy)];
+                sums.iter_mut().zip(values).for_each(|(sum, v)| *sum += v / at.len() as f64);
+            }
+            sums
+        };
+        let fine: Vec<f64> = samples().collect();
+        let parts = curve.edges.iter().map(|&edge| {
+            let (length, fine) = (mesh.edge_normal(edge).1, mean(edge, &fine));
+            let coarse = mean(edge, &gauss);
+            let lost = (fine[0] - coarse[0]).hypot(fine[1] - coarse[1]);
+            (edge, lost * length, fine[2] * length)
+        });
+        let parts: Vec<_> = parts.collect();
+        let total: f64 = parts.iter().map(|part| part.2).sum();
+        let lost = parts.iter().filter(|part| part.1 > SHARE * accuracy * total);
+        found.extend(lost.map(|part| sorted(&part.0)));
     }
     found
 }

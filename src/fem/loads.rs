@@ -49,22 +49,24 @@ pub fn add_body_force(body: &Body, force: impl Fn([f64; 2]) -> [f64; 2], load: &
     }
 }
 
-/// Adds the traction f_i = ∫ f_N·φ_i over boundary `edges` to the nodal loads, with f_N in N/m² as
-/// a function of the point. Two Gauss points an edge are exact, on straight edges, where f_N is
+/// Adds the surface load f_i = ∫ f_N·φ_i over boundary `edges` to the nodal loads, with f_N in N/m² as
+/// a function of the point and the outward normal there. Two Gauss points an edge are exact, on straight edges, where f_N is
 /// quadratic for P1 and affine for P2.
 pub fn add_traction(
     body: &Body,
     edges: &[Edge],
-    traction: impl Fn([f64; 2]) -> [f64; 2],
+    traction: impl Fn([f64; 2], [f64; 2]) -> [f64; 2],
     load: &mut [f64],
 ) {
     let points = &body.nodes.points;
     for edge in edges {
         for s in GAUSS {
-            let (f, [dx, dy]) = (traction(edge.at(points, s)), edge.tangent(points, s));
+            let [dx, dy] = edge.tangent(points, s);
+            let length = dx.hypot(dy);
+            let f = traction(edge.at(points, s), [dy / length, -dx / length]);
             for (node, value) in edge.values(s) {
-                load[2 * node] += 0.5 * dx.hypot(dy) * value * f[0];
-                load[2 * node + 1] += 0.5 * dx.hypot(dy) * value * f[1];
+                load[2 * node] += 0.5 * length * value * f[0];
+                load[2 * node + 1] += 0.5 * length * value * f[1];
             }
         }
     }

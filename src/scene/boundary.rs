@@ -1,6 +1,6 @@
 //! The conditions on the parts of the boundary, and which of them exclude each other.
 
-use std::collections::BTreeMap;
+use std::{array, collections::BTreeMap};
 
 use toml::de::DeValue;
 
@@ -27,25 +27,47 @@ pub enum Condition {
     Symmetry,
     /// Γ_C: u·ν ≤ g.
     Gap(Gap),
-    /// Γ_N: the surface traction f_N, N/m².
+    /// Γ_N: a surface load.
+    Load(SurfaceLoad),
+}
+
+/// A surface load f_N, N/m².
+#[derive(Debug, Clone)]
+pub enum SurfaceLoad {
+    /// By component.
     Traction([Expression; 2]),
+    /// The p of −p n, with n the body's outward normal: positive p presses on the body.
+    Pressure(Expression),
+}
+
+impl SurfaceLoad {
+    /// f_N at a point, m, with the outward normal there, and a time, s.
+    pub fn at(&self, [x, y]: [f64; 2], normal: [f64; 2], t: f64) -> [f64; 2] {
+        match self {
+            Self::Traction(f) => f.each_ref().map(|f| f.eval(x, y, t)),
+            Self::Pressure(p) => {
+                let p = p.eval(x, y, t);
+                normal.map(|n| -p * n)
+            }
+        }
+    }
+
+    /// The expressions that it is made of.
+    pub fn expressions(&self) -> &[Expression] {
+        match self {
+            Self::Traction(f) => f,
+            Self::Pressure(p) => array::from_ref(p),
+        }
+    }
 }
 
 /// A rigid obstacle.
 #[derive(Debug, Clone)]
 pub struct Gap {
-    /// g(x, y) ≥ 0 along the normal, m.
+    /// g(x, y, t) along the normal, m; negative where the body at rest would be in the obstacle.
     pub distance: Expression,
     /// Unit vector towards the obstacle; the body's outward normal when absent.
     pub normal: Option<[f64; 2]>,
-}
-
-impl Gap {
-    /// g at a point, m. What [`Scene::check_mesh`](super::Scene::check_mesh) accepts below 0 is
-    /// rounding.
-    pub fn at(&self, [x, y]: [f64; 2]) -> f64 {
-        self.distance.eval(x, y, 0.0).max(0.0)
-    }
 }
 
 impl Boundary {
@@ -57,10 +79,10 @@ impl Boundary {
         })
     }
 
-    /// The surface traction, on Γ_N.
-    pub fn traction(&self) -> Option<&[Expression; 2]> {
-        self.conditions.iter().find_map(|condition| match condition {
-            Condition::Traction(traction) => Some(traction),
+    /// The surface loads, on Γ_N: at most a traction and a pressure.
+    pub fn loads(&self) -> impl Iterator<Item = &SurfaceLoad> {
+        self.conditions.iter().filter_map(|condition| match condition {
+            Condition::Load(load) => Some(load),
             _ => None,
         })
     }
@@ -68,12 +90,16 @@ impl Boundary {
 
 /// What of the conditions of `a` and `b`, which hold on the same edge, cannot both hold there.
 pub(super) fn contradiction(a: &[Condition], b: &[Condition]) -> Option<[&'static str; 2]> {
-    use Condition::{Displacement, Gap, Symmetry, Traction};
+    use Condition::{Displacement, Gap, Load, Symmetry};
     let one_way = |a: &Condition, b: &Condition| match (a, b) {
         (Displacement(_), Gap(_)) => Some(["a displacement", "a gap"]),
         (Displacement(_), Symmetry) => Some(["a displacement", "a symmetry"]),
-        (Displacement([Some(_), Some(_)]), Traction(_)) => {
-            Some(["both displacements prescribed (no component is \"free\")", "a traction"])
+        (Displacement([Some(_), Some(_)]), Load(load)) => {
+            let load = match load {
+                SurfaceLoad::Traction(_) => "a traction",
+                SurfaceLoad::Pressure(_) => "a pressure",
+            };
+            Some(["both displacements prescribed (no component is \"free\")", load])
         }
         (Symmetry, Gap(_)) => Some(["a symmetry", "a gap"]),
         _ => None,
@@ -111,10 +137,11 @@ fn boundary(table: &mut Table) -> Reading<Boundary> {
     let name = table.get("name").read();
     let displacement = table.get("displacement").optional(displacement);
     let symmetry = table.get("symmetry").optional(Value::read);
-    let gap = table.get("gap").optional(Value::expression_in_space);
+    let gap = table.get("gap").optional(Value::expression);
     let direction = table.get("normal");
     let normal = direction.optional(normal);
     let traction = table.get("traction").optional(|value| value.pair(Value::expression));
+    let pressure = table.get("pressure").optional(Value::expression);
 
     let (gap, normal) = (gap?, normal?);
     if normal.is_some() && gap.is_none() {
@@ -124,7 +151,8 @@ fn boundary(table: &mut Table) -> Reading<Boundary> {
         displacement?.map(Condition::Displacement),
         symmetry?.unwrap_or(false).then_some(Condition::Symmetry),
         gap.map(|distance| Condition::Gap(Gap { distance, normal })),
-        traction?.map(Condition::Traction),
+        traction?.map(|f| Condition::Load(SurfaceLoad::Traction(f))),
+        pressure?.map(|p| Condition::Load(SurfaceLoad::Pressure(p))),
     ];
     let conditions: Vec<_> = conditions.into_iter().flatten().collect();
     if let Some([one, other]) = contradiction(&conditions, &conditions) {
@@ -132,8 +160,8 @@ fn boundary(table: &mut Table) -> Reading<Boundary> {
         return Err(table.value.refuse(problem));
     }
     if conditions.is_empty() {
-        let problem = "has nothing in it: give it a displacement, symmetry = true, a traction or \
-                       a gap, or remove it";
+        let problem = "has nothing in it: give it a displacement, symmetry = true, a traction, a \
+                       pressure or a gap, or remove it";
         return Err(table.value.refuse(problem));
     }
     Ok(Boundary { name: name?, conditions })

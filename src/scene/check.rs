@@ -2,19 +2,16 @@
 
 use std::collections::BTreeSet;
 
-use super::boundary::{Boundary, Condition, boundary_key, contradiction};
+use super::boundary::{Boundary, Condition, SurfaceLoad, boundary_key, contradiction};
 use super::document::Problem;
 use super::error::{SceneError, suggestion};
 use super::expression::Expression;
 use super::{Damage, Scene, may_start_at};
 use crate::{
     fem::{gauss_points, midpoint},
-    mesh::{Curve, Mesh, extent},
+    mesh::{Curve, Mesh},
 };
 
-/// A gap may be this much below zero, relative to the size of the body: nodes on
-/// curved boundaries carry the mesh generator's rounding, differences like `0.3-0.1*3` their own.
-const ROUNDING: f64 = 1e-12;
 /// A fixed normal whose cosine with an edge's outward normal is at most this does not point out of
 /// the body: gmsh places nodes to about 1e-8 of an edge.
 const ALONG: f64 = 1e-6;
@@ -28,8 +25,7 @@ type Rule<'a> = (&'a str, &'a dyn Fn(f64) -> bool);
 impl Scene {
     /// Checks the scene against its mesh: every boundary names a physical curve on the
     /// boundary of the body, boundaries that share edges do not contradict each other, ζ₀ is in
-    /// (ζ_*, 1] and the gap not negative at their nodes, fixed normals point out of the body, and
-    /// all expressions are finite where and when they are used, as far as times are known
+    /// (ζ_*, 1] at the nodes, fixed normals point out of the body, and all expressions are finite where and when they are used, as far as times are known
     /// beforehand (a thousand of them at most).
     ///
     /// # Errors
@@ -74,8 +70,6 @@ impl Scene {
         for (i, force) in self.body_force.iter().enumerate() {
             check(format!("body.force[{i}]"), force, &midpoints, finite);
         }
-        let least = -ROUNDING * extent(&mesh.nodes);
-        let not_negative: Rule = ("; it must be finite and not negative", &|gap| gap >= least);
         for boundary in &self.boundaries {
             let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
             let key = |what: &str, i| boundary_key(&boundary.name, &format!("{what}[{i}]"));
@@ -89,14 +83,18 @@ impl Scene {
                             check(key("displacement", i), u, &nodes, finite);
                         }
                     }
-                    Condition::Traction(f) => {
+                    Condition::Load(SurfaceLoad::Traction(f)) => {
                         for (i, f) in (0..2).zip(f) {
                             check(key("traction", i), f, &gauss_points, finite);
                         }
                     }
+                    Condition::Load(SurfaceLoad::Pressure(p)) => {
+                        let key = boundary_key(&boundary.name, "pressure");
+                        check(key, p, &gauss_points, finite);
+                    }
                     Condition::Gap(gap) => {
                         let key = boundary_key(&boundary.name, "gap");
-                        check(key, &gap.distance, &nodes, not_negative);
+                        check(key, &gap.distance, &nodes, finite);
                     }
                     Condition::Symmetry => {}
                 }

@@ -55,6 +55,11 @@ impl SceneText {
         }
     }
 
+    /// Where relative paths begin.
+    pub(super) fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(Path::new(""))
+    }
+
     /// All is well if there are no problems; else they are told in the order of the file.
     pub(super) fn verdict(&self, mut problems: Vec<Problem>) -> Result<(), SceneError> {
         problems.sort_by_key(|(place, _)| (place.start, place.end));

@@ -14,7 +14,7 @@ mod tables;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-pub use boundary::{Boundary, Condition, Gap};
+pub use boundary::{Boundary, Condition, Gap, SurfaceLoad};
 pub use error::SceneError;
 pub use expression::{Expression, ExpressionError};
 
@@ -53,6 +53,8 @@ pub struct Scene {
     pub contact: ContactOptions,
     /// What is written.
     pub output: OutputOptions,
+    /// The names of its units.
+    pub units: Units,
     /// What holds on the named parts of the boundary; each name once.
     pub boundaries: Vec<Boundary>,
     /// What was not taken as it is written.
@@ -139,6 +141,36 @@ pub const AS_RUN: &str = "# As run by signorini; the results stand beside it.";
 pub struct OutputOptions {
     /// Fields are written every so many steps, at least 1.
     pub every: Option<usize>,
+}
+
+/// Names of the units that a scene is written in. They label results; nothing is converted.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Units {
+    /// Of lengths and displacements, m unless told otherwise.
+    pub length: String,
+    /// Of forces, N unless told otherwise.
+    pub force: String,
+    /// Of time, s unless told otherwise.
+    pub time: String,
+    /// Of stresses and pressures: Pa, or force/length² where one of these is told.
+    pub stress: String,
+}
+
+impl Default for Units {
+    fn default() -> Self {
+        let [length, force, time, stress] = ["m", "N", "s", "Pa"].map(str::to_owned);
+        Self { length, force, time, stress }
+    }
+}
+
+impl Units {
+    /// Of work per thickness.
+    pub fn work(&self) -> String {
+        match *self == Self::default() {
+            true => "J/m".to_owned(),
+            false => format!("{0}·{1}/{1}", self.force, self.length),
+        }
+    }
 }
 
 impl Scene {

@@ -152,7 +152,8 @@ impl<'d> Value<'d> {
     /// An expression that is finite if it is constant.
     pub(super) fn expression(&self) -> Reading<Expression> {
         let expression = match self.required()? {
-            DeValue::String(text) => Expression::parse(text).map_err(|e| self.refuse(e))?,
+            DeValue::String(text) => Expression::parse_in(text, self.findings.text.folder())
+                .map_err(|e| self.refuse(e))?,
             DeValue::Integer(_) | DeValue::Float(_) => Expression::constant(self.read()?),
             _ => return Err(self.refuse("must be a number or an expression in quotes")),
         };

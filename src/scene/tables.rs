@@ -9,7 +9,7 @@ use super::boundary::boundaries;
 use super::document::SceneText;
 use super::expression::Expression;
 use super::reader::{Reading, Table, Value};
-use super::{Damage, MeshSource, OutputOptions, Scene, Stepping, TimeGrid, may_start_at};
+use super::{Damage, MeshSource, OutputOptions, Scene, Stepping, TimeGrid, Units, may_start_at};
 use crate::{
     fem::Mass,
     mesh::Order,
@@ -20,6 +20,9 @@ use crate::{
 const MOST_STEPS: f64 = 1e9;
 /// The error of ζ over the damage done that `step = "auto"` allows unless told otherwise.
 const STEP_TOLERANCE: f64 = 0.01;
+/// q* and ζ_* unless told otherwise: those of the paper's examples.
+const STRAIN_CAP: f64 = 1000.0;
+const THRESHOLD: f64 = 0.01;
 
 pub(super) fn scene(root: &mut Table, path: &Path, text: &SceneText) -> Reading<Scene> {
     let title = root.get("title").optional(Value::read);
@@ -36,6 +39,7 @@ pub(super) fn scene(root: &mut Table, path: &Path, text: &SceneText) -> Reading<
     });
     let contact = root.get("contact").optional(Value::options);
     let output = root.get("output").optional(|value| value.table(".", output));
+    let units = root.get("units").optional(|value| value.table(".", units));
     let boundaries = boundaries(&root.get("boundary"));
 
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -53,6 +57,7 @@ pub(super) fn scene(root: &mut Table, path: &Path, text: &SceneText) -> Reading<
         body_force: body_force?.flatten().unwrap_or([0.0; 2].map(Expression::constant)),
         contact: contact?.unwrap_or_default(),
         output: output?.unwrap_or_default(),
+        units: units?.unwrap_or_default(),
         boundaries: boundaries?,
         notes: note.flatten().into_iter().collect(),
         text: text.clone(),
@@ -101,14 +106,16 @@ fn discretisation(table: &mut Table) -> Reading<Order> {
 
 fn damage(table: &mut Table) -> Reading<Damage> {
     let diffusion = table.get("diffusion").positive("m²/s");
-    let mut rate = |key| table.get(key).number("at least 0 (1/s)", |rate| rate >= 0.0);
-    let (lambda_d, lambda_u, lambda_w) = (rate("lambda_d"), rate("lambda_u"), rate("lambda_w"));
-    let strain_cap = table.get("strain_cap").number("positive", |q| q > 0.0);
-    let threshold = table.get("threshold");
-    let threshold =
-        threshold.number("between 0 and 1, both excluded", |zeta| 0.0 < zeta && zeta < 1.0);
+    let rate = |value: &Value| value.number("at least 0 (1/s)", |rate| rate >= 0.0);
+    let (lambda_d, lambda_u) = (rate(&table.get("lambda_d")), rate(&table.get("lambda_u")));
+    let lambda_w = table.get("lambda_w").optional(rate);
+    let strain_cap =
+        table.get("strain_cap").optional(|value| value.number("positive", |q| q > 0.0));
+    let threshold = table.get("threshold").optional(|value| {
+        value.number("between 0 and 1, both excluded", |zeta| 0.0 < zeta && zeta < 1.0)
+    });
     let initial = table.get("initial");
-    let zeta_0 = initial.expression_in_space();
+    let zeta_0 = initial.optional(Value::expression_in_space);
     let mass = table.get("mass").optional(|value| {
         value.choice([("consistent", Mass::Consistent), ("lumped", Mass::Lumped)])
     });
@@ -117,11 +124,11 @@ fn damage(table: &mut Table) -> Reading<Damage> {
         diffusion: diffusion?,
         lambda_d: lambda_d?,
         lambda_u: lambda_u?,
-        lambda_w: lambda_w?,
-        strain_cap: strain_cap?,
-        threshold: threshold?,
+        lambda_w: lambda_w?.unwrap_or(0.0),
+        strain_cap: strain_cap?.unwrap_or(STRAIN_CAP),
+        threshold: threshold?.unwrap_or(THRESHOLD),
     };
-    let zeta_0 = zeta_0?;
+    let zeta_0 = zeta_0?.unwrap_or(Expression::constant(1.0));
     match zeta_0.as_constant() {
         Some(value) if !may_start_at(&law, value) => {
             Err(initial.refuse(format!("must be in ({}, 1], but is {value}", law.threshold)))
@@ -184,4 +191,17 @@ fn output(table: &mut Table) -> Reading<OutputOptions> {
         value.number("a whole number, at least 1", |every| every.fract() == 0.0 && every >= 1.0)
     });
     Ok(OutputOptions { every: every?.map(|every| every as usize) })
+}
+
+fn units(table: &mut Table) -> Reading<Units> {
+    let mut label = |key| table.get(key).optional(Value::read::<String>);
+    let (length, force) = (label("length"), label("force"));
+    let (time, stress) = (label("time"), label("stress"));
+    let (length, force, stress) = (length?, force?, stress?);
+    let si = Units::default();
+    let is_si = length.is_none() && force.is_none();
+    let (length, force) = (length.unwrap_or(si.length), force.unwrap_or(si.force));
+    let derived = if is_si { si.stress } else { format!("{force}/{length}²") };
+    let stress = stress.unwrap_or(derived);
+    Ok(Units { length, force, time: time?.unwrap_or(si.time), stress })
 }

@@ -5,7 +5,7 @@ use serde_json::Value;
 use signorini::contact::{REGISTRY, SOLVERS};
 use std::process::Stdio;
 
-const KEYS: [&str; 28] = [
+const KEYS: [&str; 29] = [
     "provenance",
     "scene",
     "title",
@@ -33,6 +33,7 @@ const KEYS: [&str; 28] = [
     "seconds_per_step",
     "phases",
     "foundation",
+    "units",
     "notes",
 ];
 const COLUMNS: [&str; 20] = [

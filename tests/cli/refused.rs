@@ -43,8 +43,9 @@ const SCENES: &[(&str, &str, &[&str])] = &[
     ("step = 0.1", "step = 0", &["scene.toml:18: time.step must be positive"]),
     ("step = 0.1", "step = -0.1", &["scene.toml:18: time.step must be positive"]),
     ("step = 0.1", "step = 2", &["scene.toml:18: time.step must be positive and at most the end"]),
-    ("gap = \"0\"", "gap = \"-0.1\"", &["scene.toml:26: boundary \"bottom\": gap is -0.1 at"]),
-    ("gap = \"0\"", "gap = \"x-1\"", &["scene.toml:26: ", "gap is -1 at (0, 0)"]),
+    ("gap = \"0\"", "gap = \"1/(t-0.5)\"", &["scene.toml:26: ", "gap is inf at (", "t = 0.5"]),
+    ("gap = \"0\"", "pressure = \"log(x - 2)\"", &["scene.toml:26: ", "pressure is NaN"]),
+    ("\"-3*t\"", "\"table('load.csv')\"", &["scene.toml:29: ", "load.csv: No such file"]),
     (
         "\"-3*t\"",
         "\"-3*\"",

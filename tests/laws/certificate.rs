@@ -22,7 +22,8 @@ fn judge(change: impl Fn(&mut [f64], &mut [f64])) -> (Kkt, Vec<ContactPoint>) {
     change(&mut unbalanced, &mut u);
     let fixed = [FixedRow { node: 0, direction: [1.0, 0.0] }];
     let gaps = [gap(0, [0.0, 1.0], 0.25), gap(1, [0.0, 1.0], 1.0)];
-    let answer = Answer { rigid: &[], elastic: &u, unbalanced: &unbalanced, prescribed: &[2.0] };
+    let answer =
+        Answer { rigid: &[], elastic: &u, unbalanced: &unbalanced, prescribed: &[2.0], gaps: &[] };
     Certificate::new(&fixed, &gaps).judge(answer, 2, SCALES, Communicator::serial())
 }
 
@@ -86,8 +87,13 @@ fn a_force_in_the_cone_of_a_corners_normals_is_carried_and_no_other() {
     };
     let judged = |force: [f64; 2]| {
         let gaps = normals.map(|normal| gap(0, normal, 0.0));
-        let answer =
-            Answer { rigid: &[], elastic: &[0.0, 0.0], unbalanced: &force, prescribed: &[] };
+        let answer = Answer {
+            rigid: &[],
+            elastic: &[0.0, 0.0],
+            unbalanced: &force,
+            prescribed: &[],
+            gaps: &[],
+        };
         Certificate::new(&[], &gaps).judge(answer, 1, SCALES, Communicator::serial())
     };
     for shares in [[3.0, 2.0, 0.0], [0.0, 2.0, 1.0], [0.0, 0.0, 5.0], [4.0, 0.0, 0.0]] {

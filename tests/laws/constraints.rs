@@ -133,7 +133,7 @@ fn a_node_between_two_plates_has_one_unknown_with_two_bounds() {
         let n = [angle.sin(), -angle.cos()];
         let (origin, mut rows) = ([[0.0, 0.0]], [gap(n, upper), gap(n.map(|v| -v), lower)]);
         let constraints = Constraints::new(&origin, &[], &mut rows).unwrap();
-        let (_, bounds) = constraints.pose(&[], &origin).unwrap();
+        let (_, bounds) = constraints.pose(&[], &[], &origin).unwrap();
         let [bound] = &bounds[..] else { panic!("{constraints:?}") };
         assert_eq!((bound.normal, bound.lower, bound.upper), (n, -lower, upper));
         bound.is_equality()
@@ -173,7 +173,7 @@ fn two_normals_at_a_node_with_a_prescribed_direction_bound_its_other_unknown() {
     let fixed = [FixedRow { node: 0, direction: [1.0, 0.0] }];
     let constraints = Constraints::new(&origin, &fixed, &mut rows).unwrap();
     for v in [-0.3, 0.0, 0.15] {
-        let (_, bounds) = constraints.pose(&[v], &origin).unwrap();
+        let (_, bounds) = constraints.pose(&[v], &[], &origin).unwrap();
         let [bound] = &bounds[..] else { panic!("{bounds:?}") };
         // The unknown is the first row's normal displacement.
         let u_y = |c: f64| (0.6 * v - c) / 0.8;
@@ -182,7 +182,7 @@ fn two_normals_at_a_node_with_a_prescribed_direction_bound_its_other_unknown() {
     }
     // Carried further there is no room between them.
     assert!(matches!(
-        constraints.pose(&[0.5], &origin),
+        constraints.pose(&[0.5], &[], &origin),
         Err(ConstraintError { at: [0.0, 0.0], conflict: Conflict::NoRoom(_) })
     ));
 }
@@ -197,7 +197,7 @@ fn gaps_of_one_smooth_boundary_become_one_bound_and_those_of_a_corner_two() {
             GapRow { node: 0, normal: normal(-1.0), gap: 0.1, tributary_length: 2.0 },
             GapRow { node: 0, normal: normal(1.0), gap: 0.2, tributary_length: 2.0 },
         ];
-        let mut rows = GapRow::joined(rows);
+        let (mut rows, _) = GapRow::joined(rows.map(|row| (row, ())));
         let constraints = Constraints::new(&[[0.0, 0.0]], &[], &mut rows).unwrap();
         assert_eq!(constraints.bounds.len(), bounds);
         let gaps: Vec<f64> = constraints.bounds.iter().map(|b| b.upper).collect();
@@ -233,13 +233,13 @@ fn a_third_gap_or_a_gap_along_a_held_direction_takes_no_unknown() {
         Constraints::new(&origin, &[prescribed([0.0, -1.0])], &mut [gap([0.0, -1.0], 0.1)])
             .unwrap();
     assert!(constraints.bounds.is_empty());
-    assert!(constraints.pose(&[0.1], &origin).is_ok());
-    assert!(constraints.pose(&[0.11], &origin).is_err());
+    assert!(constraints.pose(&[0.1], &[], &origin).is_ok());
+    assert!(constraints.pose(&[0.11], &[], &origin).is_err());
     // Held the other way round, the same gap is on the other side.
     let constraints =
         Constraints::new(&origin, &[prescribed([0.0, 1.0])], &mut [gap([0.0, -1.0], 0.1)]).unwrap();
-    assert!(constraints.pose(&[-0.11], &origin).is_err());
-    assert!(constraints.pose(&[0.11], &origin).is_ok());
+    assert!(constraints.pose(&[-0.11], &[], &origin).is_err());
+    assert!(constraints.pose(&[0.11], &[], &origin).is_ok());
 }
 
 #[test]
@@ -275,13 +275,14 @@ fn the_segments_of_the_foundation_meet_where_the_conditions_of_a_node_put_them()
          ]",
     )
     .unwrap();
+    let foundation = problem.foundation(1.0);
     let opposite = |[x, y]: [f64; 2]| -> Vec<[f64; 2]> {
-        let ends = (problem.foundation.contact_boundary.iter().flatten())
-            .zip(problem.foundation.segments.iter().flatten());
+        let ends = (foundation.contact_boundary.iter().flatten())
+            .zip(foundation.segments.iter().flatten());
         let here = ends.filter(|(body, _)| **body == [x, y]);
         here.map(|(_, there)| [there[0] - x, there[1] - y]).collect()
     };
-    assert_eq!(problem.foundation.segments.len(), 12);
+    assert_eq!(foundation.segments.len(), 12);
     for (place, d, edges) in [
         ([0.5, 0.0], [0.36, -0.48], 2),
         ([0.0, 0.0], [0.06, -0.08], 1),
@@ -297,8 +298,8 @@ fn the_segments_of_the_foundation_meet_where_the_conditions_of_a_node_put_them()
         }
     }
     // Different gaps on one line: the smaller counts at their common node, for both edges.
-    let steps = footed_steps();
-    for (body, there) in steps.foundation.contact_boundary.iter().zip(&steps.foundation.segments) {
+    let steps = footed_steps().foundation(1.0);
+    for (body, there) in steps.contact_boundary.iter().zip(&steps.segments) {
         for (body, there) in body.iter().zip(there) {
             let gap = if body[0] <= 0.5 { 0.0 } else { 0.01 };
             assert_eq!([there[0], there[1]], [body[0], body[1] - gap]);

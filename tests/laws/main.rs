@@ -27,6 +27,7 @@ mod orders;
 mod patch;
 mod pieces;
 mod pivoting;
+mod posed;
 mod quadratic_elements;
 mod recovery;
 mod regression;

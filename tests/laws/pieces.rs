@@ -388,5 +388,6 @@ fn a_gap_below_zero_by_rounding_is_none() {
         let [a, b] = [&none, &rounding].map(|problem| run(problem, solver).last.state.u);
         assert!(difference(&a, &b) < 1e-10);
     }
-    assert!(matches!(gap("-1e-9"), Err(SetupError::Scene(_))));
+    // The right end of the bottom is prescribed.
+    assert!(matches!(gap("-1e-9"), Err(SetupError::Constraint { .. })));
 }

@@ -16,8 +16,9 @@ fn scene(length: f64, stress: f64, stepping: &str, solver: &str, order: u8) -> V
          time = {{ end = 1, {stepping} }}
          boundary = [
             {{ name = 'left', displacement = [0, 0] }},
-            {{ name = 'bottom', gap = '{:e}*(x/{length:e})^2' }},
+            {{ name = 'bottom', gap = '{:e}*(x/{length:e})^2*(1 - 0.5*t)' }},
             {{ name = 'top', traction = ['{:e}*t', '-{:e}*(0.2 + t)'] }},
+            {{ name = 'right', pressure = '{stress:e}*if(t < 0.5, t, 1 - t)' }},
          ]",
         80.0 * stress,
         0.1 * length * length,

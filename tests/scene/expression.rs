@@ -172,6 +172,16 @@ fn malformed_texts_are_refused_where_they_go_wrong() {
         ("min(1,2,3)", "calls `min` with 3 arguments"),
         ("1 min 2", "`m` at column 3"),
         ("1e999", "1e999, which is too large"),
+        ("0 < t < 1", "compares a second time by `<` at column 7; write `a < b and b < c`"),
+        ("t = 1", "`=` at column 3"),
+        ("t < ", "the end at column 5"),
+        ("t && x", "`&` at column 3"),
+        ("x and or y", "unknown variable `or`"),
+        ("if(t < 1, 2)", "calls `if` with 2 arguments; it takes 3"),
+        ("table", "a table without a file"),
+        ("table(x)", "a table without a file"),
+        ("table('load.csv)", "a table without a file"),
+        ("table('no such.csv')", "the table no such.csv: No such file"),
         ("free", "unknown variable `free`"),
     ] {
         let refusal = refusal(text);
@@ -189,4 +199,85 @@ fn length_and_depth_do_not_exhaust_the_stack() {
     assert!(refusal(&deep(100_000)).contains("nested more than"));
     assert!(refusal(&("-".repeat(100_000) + "1")).contains("nested"));
     assert!(refusal(&("2^".repeat(100_000) + "1")).contains("nested"));
+}
+
+#[test]
+fn conditions_are_one_or_zero_and_choose() {
+    for (text, expected) in [
+        ("1 < 2", 1.0),
+        ("2 <= 1", 0.0),
+        ("2 >= 2", 1.0),
+        ("1 + 1 > 3 - 2", 1.0),
+        ("1 == 1 and 2 != 2", 0.0),
+        ("0 and 0 or 1", 1.0),
+        ("1 or 0 and 0", 1.0),
+        ("(1 or 0) and 0", 0.0),
+        ("5 * (1 < 2)", 5.0),
+        ("-1 < 0", 1.0),
+        ("if(1 < 2, 3, 4)", 3.0),
+        ("if(1 > 2, 3, if(0, 5, 6)) + 1", 7.0),
+        ("if(0, sqrt(-1), 2)", 2.0),
+    ] {
+        assert_eq!(value(text), expected, "{text}");
+        assert_eq!(Expression::parse(text).expect(text).as_constant(), Some(expected), "{text}");
+    }
+    let pulse = "if(t >= 0.2 and t < 0.4, x, -y)";
+    for (t, expected) in [(0.1, -3.0), (0.2, 2.0), (0.3, 2.0), (0.4, -3.0)] {
+        assert_eq!(at(pulse, 2.0, 3.0, t), expected, "{t}");
+    }
+    for text in ["sqrt(x) < 1", "if(sqrt(x) < 1, 2, 3)", "1 or sqrt(x)", "if(1, sqrt(x), 3)"] {
+        assert!(at(text, -1.0, 0.0, 0.0).is_nan(), "{text}");
+    }
+    // Three deep in `if`, each with two values that wait.
+    let deep = "if(x < 1, 2, 1 + ".repeat(40) + "x" + &")".repeat(40);
+    assert_eq!(at(&deep, 3.0, 0.0, 0.0), 43.0);
+}
+
+#[test]
+fn the_times_of_jumps_are_known() {
+    let breaks = |text: &str| Expression::parse(text).expect(text).breaks();
+    assert_eq!(breaks("if(t > 0.1*2 and 0.4 >= t, x < 3, sin(t))"), [0.2, 0.4]);
+    assert_eq!(breaks("if(2*t < 1, 0, 1) + min(t, 2)"), []);
+}
+
+/// The function of the table with the `content`.
+fn table(content: &str, expression: &str) -> Result<Expression, String> {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("load.csv"), content).expect("written");
+    Expression::parse_in(expression, folder.path()).map_err(|e| e.to_string())
+}
+
+#[test]
+fn a_table_is_piecewise_linear_and_constant_beyond_its_ends() {
+    let text = "t, f\n# a comment\n0, 1\n 1, 3\n1, 5\n\n2.5e0, 2\n";
+    let of_t = table(text, "2*table(\"load.csv\")").expect("a table");
+    for (t, expected) in
+        [(-1.0, 2.0), (0.0, 2.0), (0.25, 3.0), (1.0, 10.0), (1.75, 7.0), (2.5, 4.0), (9.0, 4.0)]
+    {
+        assert_eq!(of_t.eval(0.0, 0.0, t), expected, "{t}");
+    }
+    assert!(of_t.depends_on_time() && !of_t.depends_on_space());
+    assert_eq!(of_t.breaks(), [0.0, 1.0, 1.0, 2.5]);
+    let of_x = table(text, "table('load.csv', abs(x))").expect("a table");
+    assert_eq!(of_x.eval(-0.25, 7.0, 9.0), 1.5);
+    assert!(of_x.depends_on_space() && !of_x.depends_on_time() && of_x.breaks().is_empty());
+    assert!(of_x.eval(f64::NAN, 0.0, 0.0).is_nan());
+}
+
+#[test]
+fn malformed_tables_are_refused_with_their_line() {
+    for (content, fragment) in [
+        ("", "load.csv: has no rows of numbers"),
+        ("t,f\n", "load.csv: has no rows of numbers"),
+        ("0,1\n1\n", "load.csv:2: must be two numbers"),
+        ("t,f\n0,1\nx,2\n", "load.csv:3: must be two numbers"),
+        ("0,1,2\n", "load.csv:1: must be two numbers"),
+        ("0;1\n1;2\n", "load.csv:2: must be two numbers"),
+        ("0,1\n1,nan\n", "load.csv:2: has a number that is not finite"),
+        ("0,1\n2,1\n1,1\n", "load.csv:3: the numbers of the first column must not fall"),
+        ("0,1\n0,2\n0,3\n", "load.csv:3: is a third row"),
+    ] {
+        let refusal = table(content, "table('load.csv')").expect_err(content);
+        assert!(refusal.contains(fragment), "{content:?} {refusal}");
+    }
 }

@@ -12,7 +12,9 @@ use std::path::{Path, PathBuf};
 use signorini::fem::Mass;
 use signorini::mesh::Order;
 use signorini::model::Plane;
-use signorini::scene::{Condition, MeshSource, Scene, Stepping, TimeGrid};
+use signorini::scene::{
+    Boundary, Condition, Expression, MeshSource, Scene, Stepping, SurfaceLoad, TimeGrid, Units,
+};
 
 /// A complete scene; a test changes a line of it.
 const BASE: &str = include_str!("base.toml");
@@ -23,6 +25,14 @@ fn geo(file: &str) -> PathBuf {
 
 fn shipped(name: &str) -> Scene {
     Scene::read(&geo(&format!("{name}.toml")), &[]).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// The traction on a boundary.
+fn traction(boundary: &Boundary) -> &[Expression; 2] {
+    match boundary.loads().next() {
+        Some(SurfaceLoad::Traction(f)) => f,
+        other => panic!("{other:?} is no traction"),
+    }
 }
 
 #[test]
@@ -68,9 +78,8 @@ fn the_examples_carry_the_printed_data() {
         assert_eq!(scene.time, Some(TimeGrid { end: 1.0, stepping }), "{name}");
         let names: Vec<&str> = scene.boundaries.iter().map(|b| b.name.as_str()).collect();
         assert_eq!(names, curves, "{name}");
-        let load = scene.boundaries.iter().find_map(|b| b.traction());
-        let [x, y] = load.expect("a load");
-        let load = [x.eval(1.0, 1.0, 0.5), y.eval(1.0, 1.0, 0.5)];
+        let load = scene.boundaries.iter().find_map(|b| b.loads().next());
+        let load = load.expect("a load").at([1.0, 1.0], [f64::NAN; 2], 0.5);
         let expected = match name {
             // Not the printed one: see the scene.
             "square-table1" => [-5.0, 0.0],
@@ -94,7 +103,7 @@ fn hertz_is_elastic_static_and_carries_half_the_load() {
     let gap = boundary("foundation").gap().expect("a gap");
     assert_eq!(gap.normal, Some([0.0, -1.0]));
     assert_eq!(gap.distance.eval(0.01, 0.002, 1.0), 0.002);
-    let [_, y] = boundary("top").traction().expect("a load");
+    let [_, y] = traction(boundary("top"));
     let force = y.as_constant().expect("uniform") * 0.05;
     assert!((force + 17.5e6).abs() < 1e-6, "{force}");
 }
@@ -113,12 +122,48 @@ fn what_is_left_out_has_a_default() {
     assert!(scene.body_force.iter().all(|f| f.as_constant() == Some(0.0)));
     assert_eq!((scene.contact.solver, scene.contact.tolerance), (None, 1e-10));
     assert_eq!(scene.output.every, None);
-    let [Condition::Displacement([None, Some(y)]), Condition::Traction(_)] =
+    assert_eq!(scene.units, Units::default());
+    let [Condition::Displacement([None, Some(y)]), Condition::Load(_)] =
         &scene.boundaries[0].conditions[..]
     else {
         panic!("a displacement, free in x, and a traction")
     };
     assert_eq!(y.as_constant(), Some(2.0));
+}
+
+#[test]
+fn the_damage_law_has_the_constants_of_the_paper_unless_told_otherwise() {
+    let text = "
+        mesh.file = 'm.msh'
+        material = { young = 1, poisson = 0, plane = 'strain' }
+        damage = { diffusion = 1, lambda_d = 0.5, lambda_u = 2 }
+        boundary = [{ name = 'b', displacement = [0, 0] }]
+    ";
+    let damage = Scene::parse(text, Path::new("tiny.toml"), &[]).expect("complete").damage;
+    let damage = damage.expect("given");
+    let law = damage.law;
+    assert_eq!((law.lambda_w, law.strain_cap, law.threshold), (0.0, 1000.0, 0.01));
+    assert_eq!(damage.initial.as_constant(), Some(1.0));
+}
+
+#[test]
+fn units_are_names() {
+    for (units, expected) in [
+        ("", ["m", "N", "s", "Pa", "J/m"]),
+        ("units = { time = 'h' }", ["m", "N", "h", "Pa", "N·m/m"]),
+        ("units = { length = 'mm' }", ["mm", "N", "s", "N/mm²", "N·mm/mm"]),
+        ("units = { length = 'mm', stress = 'MPa' }", ["mm", "N", "s", "MPa", "N·mm/mm"]),
+        ("units = { length = 'mm', force = 'kN' }", ["mm", "kN", "s", "kN/mm²", "kN·mm/mm"]),
+    ] {
+        let text = format!("{units}\n{BASE}");
+        let scene =
+            Scene::parse(&text, Path::new("base.toml"), &[]).unwrap_or_else(|e| panic!("{e}"));
+        let Units { length, force, time, stress } = &scene.units;
+        assert_eq!([length, force, time, stress, &scene.units.work()], expected.each_ref());
+        assert_eq!(scene.material.young, 1e6, "nothing is converted");
+    }
+    let refused = Scene::parse(BASE, Path::new("base.toml"), &["units.lenght=mm".into()]);
+    assert!(refused.expect_err("refused").to_string().contains("did you mean `length`?"));
 }
 
 #[test]
@@ -138,7 +183,7 @@ fn everything_written_is_read() {
     assert_eq!(damage.mass, Mass::Consistent, "as in the paper unless told otherwise");
     let gap = scene.boundaries[2].gap().expect("given");
     assert_eq!(gap.normal, Some([0.6, -0.8]), "scaled to length 1");
-    assert!(scene.boundaries[2].traction().is_some(), "beside the gap");
+    assert!(scene.boundaries[2].loads().next().is_some(), "beside the gap");
 }
 
 #[test]

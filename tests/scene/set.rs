@@ -6,7 +6,7 @@ use signorini::fem::Mass;
 use signorini::model::Plane;
 use signorini::scene::{Condition, Scene, TimeGrid};
 
-use crate::BASE;
+use crate::{BASE, traction};
 
 fn with(sets: &[&str]) -> Result<Scene, String> {
     let sets: Vec<String> = sets.iter().map(|s| (*s).to_owned()).collect();
@@ -33,7 +33,7 @@ fn set_replaces_adds_and_reaches_boundaries_by_name() {
     assert_eq!(scene.mesh.parameters["radius"], 2.0);
     assert_eq!(scene.damage.expect("given").initial.eval(0.0, 1.0, 0.0), 0.8);
     assert_eq!(scene.title, "Another, with blanks");
-    let [_, y] = scene.boundaries[1].traction().expect("given");
+    let [_, y] = traction(&scene.boundaries[1]);
     assert_eq!(y.eval(0.0, 0.0, 1.0), -40.0);
     let clamp = &scene.boundaries[0].conditions[..];
     assert!(matches!(clamp, [Condition::Displacement([None, Some(_)])]), "{clamp:?}");

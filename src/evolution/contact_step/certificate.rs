@@ -68,6 +68,7 @@ impl ContactStep<'_> {
             elastic: &u,
             unbalanced: &unbalanced,
             prescribed: &case.prescribed,
+            gaps: &case.gaps,
         };
         let comm = partition.comm();
         let (mut kkt, contact) = problem.certificate.judge(answer, partition.owned(), scales, comm);

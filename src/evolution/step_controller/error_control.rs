@@ -78,11 +78,14 @@ impl<'a> ErrorControl<'a> {
                 steps if steps < 2.0 => (start + 0.5 * rest, 0.5 * rest),
                 _ => (start + self.next_length, self.next_length),
             };
-            let mut curve = self.load_curve.iter_mut();
-            if curve.all(|curve| curve.is_nearly_linear(start, time))
-                || length <= FOLLOWING * self.end
-            {
+            let Some(curve) = &mut self.load_curve else { return Some((time, length)) };
+            if curve.is_nearly_linear(start, time) {
                 return Some((time, length));
+            }
+            if length <= FOLLOWING * self.end {
+                // Where it is known when a load jumps, no pulse is left out.
+                let known = curve.breaks(start, time).first();
+                return Some(known.map_or((time, length), |&time| (time, time - start)));
             }
             self.next_length = 0.5 * length;
         }

@@ -1,0 +1,264 @@
+//! From the text of an expression to its program.
+
+use super::{
+    super::error::suggestion,
+    Expression,
+    Instruction::{self, Binary, Choose, Compare, Number, Unary, Variable},
+    Table, truth,
+};
+use std::{f64::consts::PI, path::Path, sync::Arc};
+
+/// All names, and what they stand for.
+const NAMES: [(&str, Instruction); 15] = [
+    ("x", Variable(0)),
+    ("y", Variable(1)),
+    ("t", Variable(2)),
+    ("pi", Number(PI)),
+    ("sin", Unary(f64::sin)),
+    ("cos", Unary(f64::cos)),
+    ("tan", Unary(f64::tan)),
+    ("sqrt", Unary(f64::sqrt)),
+    ("exp", Unary(f64::exp)),
+    ("log", Unary(f64::ln)),
+    ("abs", Unary(f64::abs)),
+    ("min", Binary(|a, b| if a < b || a.is_nan() { a } else { b })),
+    ("max", Binary(|a, b| if a > b || a.is_nan() { a } else { b })),
+    ("atan2", Binary(f64::atan2)),
+    ("if", Choose),
+];
+/// What operators do, how strongly they bind, and how strongly an operator in their right operand
+/// must bind at least: `a - b` is taken from the left, `a^b` from the right. (One that begins with
+/// another comes first.)
+const OPERATORS: [(&str, Instruction, u8, u8); 13] = [
+    ("or", Binary(|a, b| truth(a, b, |a, b| a != 0.0 || b != 0.0)), 1, 2),
+    ("and", Binary(|a, b| truth(a, b, |a, b| a != 0.0 && b != 0.0)), 2, 3),
+    ("<=", Compare(f64::le), 3, 4),
+    (">=", Compare(f64::ge), 3, 4),
+    ("==", Compare(f64::eq), 3, 4),
+    ("!=", Compare(f64::ne), 3, 4),
+    ("<", Compare(f64::lt), 3, 4),
+    (">", Compare(f64::gt), 3, 4),
+    ("+", Binary(|a, b| a + b), 4, 5),
+    ("-", Binary(|a, b| a - b), 4, 5),
+    ("*", Binary(|a, b| a * b), 5, 6),
+    ("/", Binary(|a, b| a / b), 5, 6),
+    ("^", Binary(f64::powf), 6, 6),
+];
+/// Of the operators only `^` binds stronger than a sign: `-x^2` is −(x²), and `2^-1` is ½.
+const SIGN: u8 = 6;
+
+/// Deeper nesting is refused: parsing would exhaust the stack long before it means anything.
+const DEEPEST: usize = 128;
+/// No program has more values on its stack: in each level of nesting at most two wait, the first two
+/// arguments of `if`.
+pub(super) const HIGHEST: usize = 2 * DEEPEST;
+
+/// Reads a text by precedence climbing.
+pub(super) struct Parser<'a> {
+    text: &'a str,
+    /// Where relative paths of tables begin.
+    folder: &'a Path,
+    /// Byte offset of what is read next.
+    at: usize,
+    depth: usize,
+    program: Vec<Instruction>,
+}
+
+/// What was read is in the program; or what is wrong with it.
+type Parsed = Result<(), String>;
+
+impl<'a> Parser<'a> {
+    /// The program of `text`.
+    pub(super) fn parse(text: &'a str, folder: &'a Path) -> Result<Vec<Instruction>, String> {
+        let mut parser = Self { text, folder, at: 0, depth: 0, program: Vec::new() };
+        parser.whole()?;
+        Ok(parser.program)
+    }
+
+    fn whole(&mut self) -> Parsed {
+        if self.peek().is_none() {
+            return Err("is empty; write a number or an expression in x, y, t".into());
+        }
+        self.expression(1)?;
+        match self.peek() {
+            Some(_) => {
+                Err(self.unexpected("an operator (a product is written with `*`) or the end"))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Signs, atoms, and operators between them that bind as strongly as `least`.
+    fn expression(&mut self, least: u8) -> Parsed {
+        self.depth += 1;
+        if self.depth > DEEPEST {
+            return Err(format!("is nested more than {DEEPEST} deep; simplify it"));
+        }
+        if self.take("-") {
+            self.expression(SIGN)?;
+            self.push(Unary(|a| -a));
+        } else if self.take("+") {
+            self.expression(SIGN)?;
+        } else {
+            self.atom()?;
+        }
+        let mut compared = false;
+        while let Some((symbol, apply, strength, right)) = self.operator()
+            && *strength >= least
+        {
+            let compares = matches!(apply, Compare(_));
+            if compared && compares {
+                let column = self.column();
+                return Err(format!(
+                    "compares a second time by `{symbol}` at column {column}; write `a < b and b < c`"
+                ));
+            }
+            compared = compares;
+            self.at += symbol.len();
+            self.expression(*right)?;
+            self.push(apply.clone());
+        }
+        self.depth -= 1;
+        Ok(())
+    }
+
+    /// A number, a name or a bracket.
+    fn atom(&mut self) -> Parsed {
+        let first = self.peek();
+        let rest = &self.text[self.at..];
+        let number = &rest[..number_length(rest)];
+        if self.take("(") {
+            self.expression(1)?;
+            self.closing_bracket()
+        } else if let Ok(value) = number.parse::<f64>() {
+            self.at += number.len();
+            self.program.push(Number(value));
+            match value.is_finite() {
+                true => Ok(()),
+                false => Err(format!("has the number {number}, which is too large")),
+            }
+        } else if first.is_some_and(|first| first.is_alphabetic() || first == '_') {
+            let name = rest.split(|c: char| !c.is_alphanumeric() && c != '_').next();
+            self.name(name.unwrap_or(rest))
+        } else {
+            Err(self.unexpected("a number, a name or `(`"))
+        }
+    }
+
+    /// A variable, π, or a function with its arguments.
+    fn name(&mut self, name: &str) -> Parsed {
+        self.at += name.len();
+        if name == "table" {
+            return self.table();
+        }
+        let Some((_, instruction)) = NAMES.iter().find(|(known, _)| *known == name) else {
+            let kind = if self.peek() == Some('(') { "function" } else { "variable" };
+            let known = NAMES.iter().map(|(name, _)| *name).chain(["table"]);
+            let suggestion = suggestion(name, &known.collect::<Vec<_>>());
+            return Err(format!("has the unknown {kind} `{name}`{suggestion}"));
+        };
+        let (takes, mut given) = (instruction.takes(), 0);
+        if takes > 0 && self.take("(") {
+            while given == 0 || self.take(",") {
+                self.expression(1)?;
+                given += 1;
+            }
+            self.closing_bracket()?;
+        }
+        if given != takes {
+            let given = format!("calls `{name}` with {given} arguments");
+            return Err(format!("{given}; it takes {takes}, in brackets"));
+        }
+        self.push(instruction.clone());
+        Ok(())
+    }
+
+    /// A table: `("file")` or `("file", argument)`.
+    fn table(&mut self) -> Parsed {
+        let usage = "has a table without a file; write table(\"file.csv\"), of t, or \
+                     table(\"file.csv\", x)";
+        let quote = if self.take("(") { self.peek() } else { None };
+        let rest = self.text[self.at..].strip_prefix(['"', '\'']);
+        let file = quote.zip(rest).and_then(|(quote, rest)| rest.split_once(quote));
+        let Some((file, _)) = file else { return Err(usage.into()) };
+        self.at += file.len() + 2;
+        let table = Table::read(&self.folder.join(file)).map_err(|error| format!("has {error}"))?;
+        match self.take(",") {
+            true => self.expression(1)?,
+            false => self.program.push(Variable(2)),
+        }
+        self.push(Instruction::Table(Arc::new(table)));
+        self.closing_bracket()
+    }
+
+    /// Adds an instruction, or its value where its arguments are numbers.
+    fn push(&mut self, instruction: Instruction) {
+        let takes = instruction.takes();
+        let first = self.program.len() - takes;
+        self.program.push(instruction);
+        if takes > 0
+            && self.program[first..first + takes]
+                .iter()
+                .all(|argument| matches!(argument, Number(_)))
+        {
+            let program = self.program.split_off(first);
+            self.program.push(Number(Expression { program, height: takes }.eval(0.0, 0.0, 0.0)));
+        }
+    }
+
+    /// The operator that comes next.
+    fn operator(&mut self) -> Option<&'static (&'static str, Instruction, u8, u8)> {
+        self.peek();
+        let rest = &self.text[self.at..];
+        OPERATORS.iter().find(|(symbol, ..)| rest.starts_with(symbol))
+    }
+
+    /// The next character that is not a blank; `at` is moved to it.
+    fn peek(&mut self) -> Option<char> {
+        let rest = self.text[self.at..].trim_start();
+        self.at = self.text.len() - rest.len();
+        rest.chars().next()
+    }
+
+    fn take(&mut self, symbol: &str) -> bool {
+        self.peek();
+        let found = self.text[self.at..].starts_with(symbol);
+        self.at += if found { symbol.len() } else { 0 };
+        found
+    }
+
+    fn closing_bracket(&mut self) -> Parsed {
+        if self.take(")") {
+            Ok(())
+        } else {
+            Err(self.unexpected("an operator (a product is written with `*`) or `)`"))
+        }
+    }
+
+    /// Where the next character stands, counted from 1.
+    fn column(&self) -> usize {
+        self.text[..self.at].chars().count() + 1
+    }
+
+    fn unexpected(&mut self, expected: &str) -> String {
+        let found = self.peek().map_or("the end".into(), |c| format!("`{c}`"));
+        let column = self.column();
+        format!("has {found} at column {column} of the expression, where {expected} is expected")
+    }
+}
+
+/// How many bytes at the start of `text` may be a number: digits with an optional point and
+/// exponent.
+fn number_length(text: &str) -> usize {
+    let digits = |from: usize| text.bytes().skip(from).take_while(u8::is_ascii_digit).count();
+    let mut length = digits(0);
+    if text[length..].starts_with('.') {
+        length += 1 + digits(length + 1);
+    }
+    if text[length..].starts_with(['e', 'E']) {
+        let sign = usize::from(text[length + 1..].starts_with(['+', '-']));
+        let exponent = digits(length + 1 + sign);
+        length += if exponent > 0 { 1 + sign + exponent } else { 0 };
+    }
+    length
+}

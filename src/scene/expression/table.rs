@@ -1,0 +1,73 @@
+//! Functions given by the points of a file.
+
+use std::path::Path;
+
+/// A piecewise linear function through points (a, f), constant beyond the first and the last one.
+#[derive(Debug)]
+pub(super) struct Table {
+    /// The points, by a not falling; at a jump two have the same.
+    points: Vec<[f64; 2]>,
+}
+
+impl Table {
+    /// Reads the points from the CSV file at `path`: a and f in each row. The first row may be a header,
+    /// lines that begin with `#` are comments.
+    ///
+    /// # Errors
+    /// The file cannot be read, or a row does not hold two finite numbers, or is not in order.
+    pub(super) fn read(path: &Path) -> Result<Self, String> {
+        let failed =
+            |error: &dyn std::fmt::Display| format!("the table {}: {error}", path.display());
+        let file = std::fs::File::open(path).map_err(|error| failed(&error))?;
+        let mut reader = csv::ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .comment(Some(b'#'))
+            .trim(csv::Trim::All)
+            .from_reader(file);
+        let mut points: Vec<[f64; 2]> = Vec::new();
+        for (row, record) in reader.records().enumerate() {
+            let record = record.map_err(|error| failed(&error))?;
+            let line = record.position().map_or(0, csv::Position::line);
+            let problem = |what: &str| Err(format!("the table {}:{line}: {what}", path.display()));
+            let number = |i: usize| record.get(i).and_then(|text| text.parse().ok());
+            let point = match (number(0), number(1)) {
+                (Some(a), Some(f)) if record.len() == 2 => [a, f],
+                (None, None) if row == 0 => continue,
+                _ => return problem("must be two numbers with a comma between them"),
+            };
+            if !point.iter().all(|number: &f64| number.is_finite()) {
+                return problem("has a number that is not finite");
+            }
+            match points[..] {
+                [.., [last, _]] if point[0] < last => {
+                    return problem("the numbers of the first column must not fall");
+                }
+                [.., [before, _], [last, _]] if before == last && last == point[0] => {
+                    return problem("is a third row with the same first number");
+                }
+                _ => points.push(point),
+            }
+        }
+        match points.is_empty() {
+            true => Err(failed(&"has no rows of numbers")),
+            false => Ok(Self { points }),
+        }
+    }
+
+    /// f(a), at a jump the value after it.
+    pub(super) fn at(&self, a: f64) -> f64 {
+        let next = self.points.partition_point(|[other, _]| *other <= a);
+        match (&self.points[..next], &self.points[next..]) {
+            _ if a.is_nan() => a,
+            ([], [[_, f], ..]) | ([.., [_, f]], []) => *f,
+            ([.., [p, f]], [[q, g], ..]) => f + (a - p) / (q - p) * (g - f),
+            ([], []) => f64::NAN,
+        }
+    }
+
+    /// The a of all points.
+    pub(super) fn arguments(&self) -> impl Iterator<Item = f64> {
+        self.points.iter().map(|[a, _]| *a)
+    }
+}
