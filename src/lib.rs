@@ -38,6 +38,7 @@
 //! The modules stand in the order of their dependence: each uses only those above it.
 #![deny(unsafe_code)]
 
+pub mod interrupt;
 pub mod phases;
 pub mod petsc;
 pub mod cholesky;

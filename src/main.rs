@@ -4,6 +4,7 @@
 mod command;
 
 use clap::{CommandFactory, Parser, Subcommand};
+use signorini::interrupt;
 use std::{path::PathBuf, process::ExitCode};
 
 /// Contact of a damageable elastic body with a rigid foundation (plane, quasistatic, frictionless).
@@ -44,6 +45,9 @@ enum Command {
 }
 
 fn main() -> ExitCode {
+    if let Err(error) = interrupt::install() {
+        command::tell("warning", &format!("no handlers for signals: {error}"));
+    }
     let result = match Arguments::parse().command {
         Command::Run(arguments) => command::run(&arguments),
         Command::Compare(arguments) => command::compare(&arguments),
@@ -54,7 +58,7 @@ fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            failure.message.iter().for_each(|message| command::tell(message));
+            failure.message.iter().for_each(|message| command::tell("error", message));
             ExitCode::from(failure.code)
         }
     }

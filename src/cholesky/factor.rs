@@ -56,6 +56,24 @@ impl Factor {
         }
     }
 
+    /// Whether PETSc options ask for a preconditioner.
+    fn is_asked_for(&self) -> Result<bool, PetscError> {
+        let prefix = &self.prefix;
+        Ok(has_option(&format!("-{prefix}pc_type"))?
+            || has_option(&format!("-{prefix}pc_factor_mat_solver_type"))?)
+    }
+
+    /// Refuses options that PETSc does not know before anything is factorised.
+    ///
+    /// # Errors
+    /// They ask for what PETSc has not.
+    pub fn check_options(&self) -> Result<(), PetscError> {
+        if self.is_asked_for()? {
+            Preconditioner::new(&self.prefix, c"cholesky", c"petsc")?;
+        }
+        Ok(())
+    }
+
     /// Factorises the present values of `matrix`; false if it is not positive definite: then there is
     /// no factor. Collective.
     ///
@@ -86,8 +104,7 @@ impl Factor {
     /// What factorises matrices of the pattern of this one.
     fn choose(&self, matrix: &Matrix, rows: usize) -> Result<Method, PetscError> {
         let (prefix, serial) = (&self.prefix, self.comm.is_serial());
-        let asked = has_option(&format!("-{prefix}pc_type"))?
-            || has_option(&format!("-{prefix}pc_factor_mat_solver_type"))?;
+        let asked = self.is_asked_for()?;
         let factorised = serial || rows < VERY_LARGE;
         if factorised
             && !asked

@@ -14,7 +14,7 @@ pub use run::{RunArguments, run};
 use ranks::require_one_process;
 use signorini::{
     contact::{self, REGISTRY, SOLVERS, TAO_TYPES, summaries},
-    mesh::{self, Mesh, Order},
+    mesh::{self, Mesh, MeshError, Order},
     output::terminal::say,
     scene::{MeshSource, Scene},
 };
@@ -41,6 +41,16 @@ impl Failure {
     fn input(error: impl fmt::Display) -> Self {
         Self { code: 2, message: Some(error.to_string()) }
     }
+
+    /// There is no mesh.
+    fn mesh(error: MeshError) -> Self {
+        match error {
+            MeshError::Interrupted(signal) => {
+                Self { code: signal.exit_code(), message: Some(error.to_string()) }
+            }
+            _ => Self::input(error),
+        }
+    }
 }
 
 /// What is no matter of the input: a solver missed its tolerance, or results could not be written.
@@ -50,11 +60,11 @@ impl<E: fmt::Display> From<E> for Failure {
     }
 }
 
-/// Tells the person at the terminal an error. One write holds all of it: what `mpiexec` and other ranks
+/// Tells the person at the terminal an error, or what else `kind` names. One write holds all of it: what `mpiexec` and other ranks
 /// say meanwhile comes before or after it, never between its words.
-pub fn tell(error: &str) {
+pub fn tell(kind: &str, text: &str) {
     // Where nobody can be told any more, the exit code still says it.
-    let _ = io::stderr().write_all(format!("error: {error}\n").as_bytes());
+    let _ = io::stderr().write_all(format!("{kind}: {text}\n").as_bytes());
 }
 
 /// Refuses an unknown solver, which `option` names.
@@ -104,10 +114,10 @@ fn read(
     let MeshSource { file, parameters } = &scene.mesh;
     let mut parameters = parameters.clone();
     if adapts && scene.accuracy.is_some() && file.extension().is_none_or(|kind| kind != "msh") {
-        let usual = mesh::load(file, &parameters, Order::Linear).map_err(Failure::input)?;
+        let usual = mesh::load(file, &parameters, Order::Linear).map_err(Failure::mesh)?;
         parameters.insert("size".to_owned(), mesh::extent(&usual.nodes) / CELLS);
     }
-    let mesh = mesh::load(file, &parameters, scene.order).map_err(Failure::input)?;
+    let mesh = mesh::load(file, &parameters, scene.order).map_err(Failure::mesh)?;
     Ok((scene, mesh))
 }
 

@@ -27,7 +27,7 @@ pub fn agree<T>(comm: Communicator, result: Result<T, Failure>) -> Result<T, Fai
     };
     let (_, reporter) = comm.min_with_rank(if failure.message.is_some() { 0.0 } else { 1.0 });
     if comm.rank() == reporter {
-        tell(failure.message.as_deref().unwrap_or("another rank failed"));
+        tell("error", failure.message.as_deref().unwrap_or("another rank failed"));
     }
     // This comes after the report, because mpiexec ends all ranks as soon as one ends with an error.
     let code = comm.broadcast(reporter, f64::from(failure.code)) as u8;
@@ -40,7 +40,7 @@ pub fn barrier_or_abort(comm: Communicator, failure: Option<&RunError>) {
     if !comm.barrier(failure.map(|_| PATIENCE))
         && let Some(error) = failure
     {
-        tell(&format!("rank {} of {}: {error}", comm.rank(), comm.size()));
+        tell("error", &format!("rank {} of {}: {error}", comm.rank(), comm.size()));
         comm.abort(Failure::from(error).code);
     }
 }

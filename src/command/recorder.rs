@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use signorini::{
     evolution::{Outcome, RunError, Step, StepRecord},
     output::{
-        FieldWriter, History, OutputError,
+        self, FieldWriter, History, OutputError,
         terminal::{Progress, say},
         write_whole,
     },
@@ -21,22 +21,33 @@ const FRAMES: usize = 20;
 pub(super) struct Recorder<'a> {
     task: &'a Task<'a>,
     fields: FieldWriter,
-    /// On the first rank only.
-    history: Option<(History, Progress)>,
+    /// On the first rank, which shows the run.
+    bar: Option<Progress>,
+    /// On the first rank, from the first accepted step on.
+    history: Option<History>,
     last: Option<Step>,
     /// Seconds of all accepted steps after n = 0.
     stepping: f64,
 }
 
 impl<'a> Recorder<'a> {
-    /// Shows what is to be solved, and starts the files.
+    /// Shows what is to be solved.
     pub(super) fn new(task: &'a Task) -> Result<Self, OutputError> {
         let fields = FieldWriter::new(&task.folder, &task.problem)?;
-        let history = match task.problem.body.nodes.partition.comm().is_root() {
-            true => Some((History::create(&task.folder)?, screen::open(task))),
-            false => None,
-        };
-        Ok(Self { task, fields, history, last: None, stepping: 0.0 })
+        let bar = task.problem.body.nodes.partition.comm().is_root().then(|| screen::open(task));
+        Ok(Self { task, fields, bar, history: None, last: None, stepping: 0.0 })
+    }
+
+    /// Puts the beginning of this run in the place of an earlier run's results.
+    fn start(&mut self) -> Result<(), OutputError> {
+        let Task { folder, as_run, adapted, .. } = self.task;
+        output::prepare(folder)?;
+        write_whole(&folder.join(output::SCENE), as_run.as_bytes())?;
+        if let Some(mesh) = adapted {
+            write_whole(&folder.join("mesh.msh"), mesh.as_bytes())?;
+        }
+        self.history = Some(History::create(folder)?);
+        Ok(())
     }
 
     /// Whether a frame is written of a step. Unless the scene says how often, runs that do not come
@@ -60,15 +71,21 @@ impl<'a> Recorder<'a> {
 
     /// Writes and shows an accepted step. Collective.
     pub(super) fn accept(&mut self, step: &Step) -> Result<(), OutputError> {
+        let comm = self.task.problem.body.nodes.partition.comm();
+        if self.last.is_none() {
+            let started = if comm.is_root() { self.start() } else { Ok(()) };
+            // No rank writes before the first one has removed what there was.
+            if !comm.all(started.is_ok()) {
+                return started;
+            }
+        }
         if step.record.step > 0 {
             self.stepping += step.record.seconds;
         }
         let written = self.task.phases.time("output", || {
             let end = self.task.problem.scene().time.map_or(1.0, |grid| grid.end);
-            let row = self.history.as_mut().map_or(Ok(()), |(history, bar)| {
-                screen::progress(bar, &step.record, end);
-                history.add(&step.record)
-            });
+            self.bar.iter_mut().for_each(|bar| screen::progress(bar, &step.record, end));
+            let row = self.history.as_mut().map_or(Ok(()), |history| history.add(&step.record));
             // All ranks write the frame together, also where the row could not be written.
             match self.is_frame(&step.record) {
                 true => row.and(self.fields.add(&self.task.problem, &step.state)),
@@ -79,8 +96,8 @@ impl<'a> Recorder<'a> {
         written
     }
 
-    /// Writes the last accepted state, if there is one, and the summary, also of a run that failed;
-    /// shows the result. Collective.
+    /// Writes the last accepted state and the summary, also of a run that failed, but for one without
+    /// any accepted state: then the results of an earlier run stay. Shows the result. Collective.
     pub(super) fn finish(mut self, result: &Result<Outcome, RunError>) -> Result<(), OutputError> {
         let (task, last) = (self.task, self.last.take());
         let written = match &last {
@@ -95,13 +112,15 @@ impl<'a> Recorder<'a> {
         let mut shown = notes.clone();
         notes.extend(outcome.iter().flat_map(|outcome| outcome.remarks(&task.problem)));
         // The rest is for the first rank alone.
-        let Some((_, bar)) = &self.history else { return written };
+        let Some(bar) = &self.bar else { return written };
 
         let record = last.map(|step| step.record);
         let wall = task.started.elapsed().as_secs_f64();
         let summary = summary(task, record, result, &notes, wall);
-        let path = task.folder.join("summary.json");
-        write_whole(&path, format!("{summary:#}\n").as_bytes())?;
+        if record.is_some() {
+            let path = task.folder.join("summary.json");
+            write_whole(&path, format!("{summary:#}\n").as_bytes())?;
+        }
         if task.profile {
             shown.clone_from(&notes);
         }

@@ -5,17 +5,19 @@ use super::{
     ranks::{agree, barrier_or_abort},
     read,
     recorder::Recorder,
-    summaries,
+    summaries, tell,
 };
 use clap::Args;
 use signorini::{
+    cholesky::{Factor, Precision},
     evolution::{self, AdaptError, DiscreteProblem, Phases, RunError, SHARE_OF_STEPS},
     mesh::{Mesh, Order},
-    output::{self, OutputError, write_whole},
-    petsc::Session,
+    output,
+    petsc::{PetscError, Session},
     scene::{Scene, Stepping},
 };
 use std::{
+    fs::File,
     path::{Path, PathBuf},
     time::Instant,
 };
@@ -101,10 +103,11 @@ fn adapt(
     Ok((adapted.mesh, true))
 }
 
-/// Writes the scene as it is run and, if it was adapted, the mesh.
-fn keep(folder: &Path, scene: &str, mesh: Option<String>) -> Result<(), OutputError> {
-    write_whole(&folder.join(output::SCENE), scene.as_bytes())?;
-    mesh.map_or(Ok(()), |text| write_whole(&folder.join("mesh.msh"), text.as_bytes()))
+/// Refuses PETSc options that would end the run at its first factorisations.
+fn check_factors(session: &Session, problem: &DiscreteProblem) -> Result<(), PetscError> {
+    let prefixes = ["elastic_"].into_iter().chain(problem.damage().map(|_| "damage_"));
+    let mut factors = prefixes.map(|prefix| Factor::new(session, prefix, Precision::Full));
+    factors.try_for_each(|factor| factor.check_options())
 }
 
 /// `signorini run SCENE`, on as many ranks as `mpiexec` has started.
@@ -120,7 +123,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let unused = session.unused_options();
     let finalized = session.finalize().map_err(Failure::from);
     if warns && !unused.is_empty() {
-        eprintln!("warning: PETSc options that nothing read: {}", unused.join(" "));
+        tell("warning", &format!("PETSc options that nothing read: {}", unused.join(" ")));
     }
     result.and(finalized)
 }
@@ -136,6 +139,12 @@ pub(super) struct Task<'a> {
     pub(super) solver: String,
     /// Where the results go.
     pub(super) folder: PathBuf,
+    /// The scene as it is run, as a file.
+    pub(super) as_run: String,
+    /// The mesh, as a file, where it was adapted.
+    pub(super) adapted: Option<String>,
+    /// Keeps other runs out of the folder.
+    _lock: Option<File>,
     /// Whether the closing table has all that was timed.
     pub(super) profile: bool,
     pub(super) phases: &'a Phases,
@@ -143,8 +152,8 @@ pub(super) struct Task<'a> {
 }
 
 impl<'a> Task<'a> {
-    /// Reads scene and mesh and removes the results of an earlier run. Every rank reads both files;
-    /// where the mesh is yet to be made, the first rank makes it. Collective.
+    /// Reads scene and mesh. Every rank reads both files; where the mesh is yet to be made, the first
+    /// rank makes it. Collective.
     fn read(
         arguments: &RunArguments,
         session: &Session,
@@ -165,15 +174,14 @@ impl<'a> Task<'a> {
         let as_run = scene.as_run().map_err(Failure::input)?;
         let adapted = phases.time("adaptation", || adapt(session, &mut scene, mesh, &solver));
         let (mesh, adapted) = agree(comm, adapted)?;
-        let kept = adapted.then(|| mesh.to_msh());
+        let adapted = adapted.then(|| mesh.to_msh());
         let problem = phases.time("discrete problem", || DiscreteProblem::new(scene, mesh));
         let problem = agree(comm, problem.map_err(Failure::input))?;
         let problem = phases.time("partition", || problem.restrict(session));
         let problem = agree(comm, problem.map_err(Failure::from))?;
-        let prepared = if comm.is_root() { output::prepare(&folder) } else { Ok(()) };
-        agree(comm, prepared.map_err(Failure::input))?;
-        let kept = if comm.is_root() { keep(&folder, &as_run, kept) } else { Ok(()) };
-        agree(comm, kept.map_err(Failure::from))?;
+        agree(comm, check_factors(session, &problem).map_err(Failure::input))?;
+        let lock = if comm.is_root() { output::lock(&folder) } else { Ok(None) };
+        let lock = agree(comm, lock.map_err(Failure::input))?;
 
         // The bounds of a node follow each other.
         let contact_nodes = problem.constraints.bounds.chunk_by(|a, b| a.node == b.node);
@@ -183,6 +191,9 @@ impl<'a> Task<'a> {
             problem,
             solver,
             folder,
+            as_run,
+            adapted,
+            _lock: lock,
             profile: arguments.profile,
             phases,
             started,

@@ -74,7 +74,9 @@ pub fn conclusion(
         lines.push(row("residuals", kkt.to_string()));
     }
     lines.extend(notes.iter().map(|note| row("note", note.clone())));
-    lines.push(row("results", task.folder.display().to_string()));
+    if last.is_some() {
+        lines.push(row("results", task.folder.display().to_string()));
+    }
     lines
 }
 

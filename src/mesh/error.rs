@@ -1,5 +1,6 @@
 //! What can be wrong with a mesh, told to the person at the terminal.
 
+use crate::interrupt::Signal;
 use std::{
     io,
     path::{Path, PathBuf},
@@ -35,6 +36,9 @@ pub enum MeshError {
         /// The parameter, and what is wrong with it.
         reason: String,
     },
+    /// A signal came while gmsh worked.
+    #[error("{0} while gmsh worked")]
+    Interrupted(Signal),
     /// The sides of a triangle are so curved that its parts would fold over each other.
     #[error(
         "the triangle at ({x}, {y}) is too curved to be refined; start from a finer mesh there"

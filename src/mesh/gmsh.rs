@@ -1,16 +1,29 @@
 //! Meshes `.geo` files with the gmsh command line.
 
 use super::{Mesh, MeshError, read};
+use crate::interrupt::Interrupts;
 use std::{
     collections::{BTreeMap, HashSet},
-    fs, io,
+    env,
+    fs::{self, File},
+    io,
     path::{Path, PathBuf},
-    process::Command,
-    time::SystemTime,
+    process::{Child, Command, ExitStatus, Stdio},
+    thread::sleep,
+    time::{Duration, Instant, SystemTime},
 };
 
 /// How many different lines of gmsh are shown; it can repeat an error by the hundred.
 const SHOWN: usize = 5;
+/// Seconds that gmsh may take, and the variable of the environment that sets another number.
+const SECONDS: f64 = 600.0;
+const SECONDS_VARIABLE: &str = "SIGNORINI_GMSH_SECONDS";
+/// How often it is looked whether gmsh has ended.
+const POLL: Duration = Duration::from_millis(5);
+/// The folders in which gmsh works begin with this.
+const SCRATCH: &str = ".meshing-";
+/// Such a folder is old after so long.
+const ABANDONED: Duration = Duration::from_secs(10);
 
 /// The order of the elements that gmsh makes of a `.geo`.
 ///
@@ -77,12 +90,33 @@ pub fn mesh_geo(
     }
 
     // A directory rather than a file: gmsh creates the file with the usual permissions.
-    let scratch = tempfile::Builder::new().prefix(".meshing-").tempdir_in(geo.with_file_name("."));
+    let folder = geo.with_file_name(".");
+    remove_abandoned(&folder);
+    let scratch = tempfile::Builder::new().prefix(SCRATCH).tempdir_in(folder);
     let scratch = scratch.map_err(MeshError::io(&mesh))?;
+    // Held until the mesh is made.
+    let lock = File::open(scratch.path()).map_err(MeshError::io(&mesh))?;
+    let _ = lock.try_lock();
     let fresh = scratch.path().join("fresh.msh");
     run(geo, parameters, order, &fresh)?;
     fs::rename(&fresh, &mesh).map_err(MeshError::io(&mesh))?;
     Ok(mesh)
+}
+
+/// Removes the folders of runs of gmsh that were killed: nobody holds their locks.
+fn remove_abandoned(folder: &Path) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path();
+        // A new one may not be locked yet.
+        let old = || modified(&path).is_ok_and(|at| at.elapsed().is_ok_and(|age| age > ABANDONED));
+        let abandoned = entry.file_name().to_string_lossy().starts_with(SCRATCH)
+            && old()
+            && File::open(&path).is_ok_and(|folder| folder.try_lock().is_ok());
+        if abandoned {
+            // What cannot be removed harms nobody.
+            let _ = fs::remove_dir_all(path);
+        }
+    }
 }
 
 fn read_text(path: &Path) -> io::Result<String> {
@@ -178,8 +212,12 @@ fn run(
         fs::write(&second, "Mesh.ElementOrder = 2;\n").map_err(MeshError::io(&second))?;
         command.arg(second);
     }
-    let output = command.output();
-    let output = output.map_err(|source| match source.kind() {
+    // A file takes what it says, however much: a pipe would have to be read meanwhile.
+    let log = fresh.with_file_name("log");
+    let said = File::create(&log).and_then(|file| Ok([file.try_clone()?, file]));
+    let [out, err] = said.map_err(MeshError::io(&log))?;
+    let child = command.stdin(Stdio::null()).stdout(out).stderr(err).spawn();
+    let child = child.map_err(|source| match source.kind() {
         io::ErrorKind::NotFound => MeshError::file(
             geo,
             "gmsh is needed to mesh this file and was not found; install it with `make deps` \
@@ -187,19 +225,49 @@ fn run(
         ),
         _ => MeshError::io(Path::new("gmsh"))(source),
     })?;
+    let status = wait(child, geo)?;
 
-    let said = [output.stdout, output.stderr].concat();
-    let said = String::from_utf8_lossy(&said);
+    let said = read_text(&log).map_err(MeshError::io(&log))?;
     // gmsh can report errors and still exit with success.
     let is_error = |line: &str| line.trim_start().starts_with("Error");
-    if output.status.success() && fresh.exists() && !said.lines().any(is_error) {
+    if status.success() && fresh.exists() && !said.lines().any(is_error) {
         return Ok(());
     }
     let mut seen = HashSet::new();
     let lines: Vec<&str> = said.lines().filter(|line| seen.insert(*line)).take(SHOWN).collect();
     let message = match lines.is_empty() {
-        true => format!("no message, {}", output.status),
+        true => format!("no message, {status}"),
         false => lines.join("\n"),
     };
     Err(MeshError::file(geo, format!("gmsh could not mesh it:\n{message}")))
+}
+
+/// Waits for gmsh, which is ended with its time or by a signal to this process.
+fn wait(mut gmsh: Child, geo: &Path) -> Result<ExitStatus, MeshError> {
+    let (started, interrupts) = (Instant::now(), Interrupts::hold());
+    let limit = env::var(SECONDS_VARIABLE).ok().and_then(|text| text.parse().ok());
+    let limit = limit.unwrap_or(SECONDS);
+    loop {
+        if let Some(status) = gmsh.try_wait().map_err(MeshError::io(Path::new("gmsh")))? {
+            return Ok(status);
+        }
+        let late = started.elapsed().as_secs_f64() > limit;
+        let signal = interrupts.received();
+        if late || signal.is_some() {
+            // It may have ended by itself just now.
+            let _ = gmsh.kill();
+            let _ = gmsh.wait();
+        }
+        if let Some(signal) = signal {
+            return Err(MeshError::Interrupted(signal));
+        }
+        if late {
+            let problem = format!(
+                "gmsh has not meshed it in {limit} s and was ended; give a larger size, or more time \
+                 in the environment variable {SECONDS_VARIABLE}"
+            );
+            return Err(MeshError::file(geo, problem));
+        }
+        sleep(POLL);
+    }
 }

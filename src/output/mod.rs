@@ -2,15 +2,17 @@
 //! the commands share at the terminal.
 
 mod data_array;
+mod growing_file;
 pub mod terminal;
 mod vtu;
 
 pub use vtu::FieldWriter;
 
 use crate::{evolution::StepRecord, scene::AS_RUN};
+use growing_file::GrowingFile;
 use serde::Serialize;
 use std::{
-    fs::{self, File, Permissions},
+    fs::{self, File, Permissions, TryLockError},
     io::Write,
     os::unix::fs::PermissionsExt,
     path::{Path, PathBuf},
@@ -44,6 +46,30 @@ pub fn create(folder: &Path) -> Result<(), OutputError> {
 /// The scene as it was run. It takes the place of the earlier one, which may be the one that is run.
 pub const SCENE: &str = "scene.toml";
 
+/// Creates `folder` and keeps other runs out of it while the answer lives (flock(2); where the file
+/// system has no locks it keeps nobody out).
+///
+/// # Errors
+/// The folder cannot be created or written to, another run has it, or it holds a scene of the user's
+/// where that of the run would be written.
+pub fn lock(folder: &Path) -> Result<Option<File>, OutputError> {
+    create(folder)?;
+    let scene = folder.join(SCENE);
+    if fs::read_to_string(&scene).is_ok_and(|text| !text.starts_with(AS_RUN)) {
+        let reason = "it is no scene that a run left there; choose another folder with --out";
+        return Err(OutputError::new(&scene, reason));
+    }
+    let file = File::open(folder).map_err(|e| OutputError::new(folder, e))?;
+    match file.try_lock() {
+        Ok(()) => Ok(Some(file)),
+        Err(TryLockError::Error(_)) => Ok(None),
+        Err(TryLockError::WouldBlock) => {
+            let problem = "another run writes there; wait for its end, or choose another --out";
+            Err(OutputError::new(folder, problem))
+        }
+    }
+}
+
 /// What a run and its figures leave in a folder besides the frames and the pictures.
 const FILES: [&str; 5] =
     ["fields.pvd", "history.csv", "summary.json", "report.html", "open_in_paraview.py"];
@@ -57,6 +83,8 @@ const PICTURES: [&str; 7] = [
     "contact-evolution",
     "damage",
 ];
+/// Files that are not complete yet begin with this.
+const PARTIAL: &str = ".partial-";
 
 /// Whether `name` is that of a picture or an animation, of the end or another time: `NAME[_tTIME].png`.
 fn is_picture(name: &str) -> bool {
@@ -75,23 +103,18 @@ fn is_frame(name: &str) -> bool {
     })
 }
 
-/// Creates `folder` and removes the results of an earlier run and their figures, so that none are
-/// mistaken for new.
+/// Removes from `folder` the results of an earlier run, its figures and its files that were never
+/// completed, so that none are mistaken for new.
 ///
 /// # Errors
-/// The folder holds a scene of the user's where that of the run would be written; it cannot be created or written to.
+/// A file cannot be removed.
 pub fn prepare(folder: &Path) -> Result<(), OutputError> {
-    create(folder)?;
-    let scene = folder.join(SCENE);
-    if fs::read_to_string(&scene).is_ok_and(|text| !text.starts_with(AS_RUN)) {
-        let reason = "it is no scene that a run left there; choose another folder with --out";
-        return Err(OutputError::new(&scene, reason));
-    }
     let entries = fs::read_dir(folder).map_err(|e| OutputError::new(folder, e))?;
     for entry in entries.flatten() {
         let name = entry.file_name();
         let name = name.to_string_lossy();
-        if is_frame(&name) || is_picture(&name) || FILES.contains(&&*name) {
+        let of_results = is_frame(&name) || is_picture(&name) || FILES.contains(&&*name);
+        if of_results || name.starts_with(PARTIAL) {
             fs::remove_file(entry.path()).map_err(|e| OutputError::new(&entry.path(), e))?;
         }
     }
@@ -99,10 +122,8 @@ pub fn prepare(folder: &Path) -> Result<(), OutputError> {
 }
 
 /// Writes `history.csv`: a row per accepted step, at once, so that a run can be followed.
-pub struct History {
-    path: PathBuf,
-    writer: csv::Writer<File>,
-}
+#[derive(Debug)]
+pub struct History(GrowingFile);
 
 impl History {
     /// Starts `history.csv` in `folder`.
@@ -110,18 +131,20 @@ impl History {
     /// # Errors
     /// The file cannot be created.
     pub fn create(folder: &Path) -> Result<Self, OutputError> {
-        let path = folder.join("history.csv");
-        let writer = csv::Writer::from_path(&path).map_err(|e| OutputError::new(&path, e))?;
-        Ok(Self { path, writer })
+        GrowingFile::create(folder.join("history.csv"), "", "").map(Self)
     }
 
-    /// Appends the row of a step.
+    /// Appends the row of a step, the first one below the names of the columns.
     ///
     /// # Errors
     /// The file cannot be written.
     pub fn add(&mut self, record: &StepRecord) -> Result<(), OutputError> {
-        let added = self.writer.serialize(record).and_then(|()| Ok(self.writer.flush()?));
-        added.map_err(|e| OutputError::new(&self.path, e))
+        let failed = |e: &dyn ToString| OutputError::new(self.0.path(), e.to_string());
+        let has_headers = self.0.is_empty();
+        let mut writer = csv::WriterBuilder::new().has_headers(has_headers).from_writer(Vec::new());
+        writer.serialize(record).map_err(|e| failed(&e))?;
+        let row = writer.into_inner().map_err(|e| failed(&e))?;
+        self.0.add(&row)
     }
 }
 
@@ -145,6 +168,7 @@ pub fn write_table<T: Serialize>(path: &Path, rows: &[T]) -> Result<(), OutputEr
 pub fn write_whole(path: &Path, content: &[u8]) -> Result<(), OutputError> {
     let folder = path.parent().unwrap_or(Path::new("."));
     let written = tempfile::Builder::new()
+        .prefix(PARTIAL)
         .permissions(Permissions::from_mode(0o644))
         .tempfile_in(folder)
         .and_then(|mut file| {

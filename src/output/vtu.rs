@@ -3,11 +3,12 @@
 //! The files are written here and not by the VTK crate, which reads them back in the tests: it
 //! compresses value by value and took 0.9 s for a frame of 66,049 nodes.
 
-use super::{OutputError, data_array::DataArray, write_whole};
+use super::{OutputError, data_array::DataArray, growing_file::GrowingFile, write_whole};
 use crate::{
     evolution::{DiscreteProblem, State},
     fem::{Body, Elements},
     petsc::PetscError,
+    scene::{Scene, Stepping},
 };
 use std::{
     io, iter,
@@ -22,6 +23,13 @@ const REAL: &str = "Float64";
 const INTEGER: &str = "Int32";
 const BYTE: &str = "UInt8";
 
+/// How `fields.pvd` ends.
+const LIST_END: &str = "</Collection>\n</VTKFile>\n";
+/// Digits of the number of a frame, unless there are many.
+const DIGITS: usize = 4;
+/// Frames may be so many where steps are chosen and the scene says how many of them are written.
+const MANY: usize = 999_999;
+
 /// Writes frames `fields_NNNN.vtu` and their list over time, `fields.pvd`. Of several ranks each
 /// writes its piece of a frame, `fields_NNNN_R.vtu`, and the first one the lists:
 /// `fields_NNNN.pvtu` names the pieces, `fields.pvd` the frames.
@@ -31,8 +39,11 @@ pub struct FieldWriter {
     folder: PathBuf,
     /// `<Points>` and `<Cells>`, the same in every frame.
     mesh: String,
-    /// Time, s, and file of every frame.
-    frames: Vec<(f64, String)>,
+    /// `fields.pvd`, from the first frame on, on the first rank.
+    list: Option<GrowingFile>,
+    frames: usize,
+    last_time: Option<f64>,
+    digits: usize,
 }
 
 impl FieldWriter {
@@ -42,12 +53,14 @@ impl FieldWriter {
     /// The mesh cannot be encoded.
     pub fn new(folder: &Path, problem: &DiscreteProblem) -> Result<Self, OutputError> {
         let mesh = mesh_text(&problem.body).map_err(|e| OutputError::new(folder, e))?;
-        Ok(Self { folder: folder.to_owned(), mesh, frames: Vec::new() })
+        let digits = digits(problem.scene());
+        let folder = folder.to_owned();
+        Ok(Self { folder, mesh, list: None, frames: 0, last_time: None, digits })
     }
 
     /// Time of the last frame, s.
     pub fn last_time(&self) -> Option<f64> {
-        self.frames.last().map(|(time, _)| *time)
+        self.last_time
     }
 
     /// Writes a frame and the lists that name it. Collective.
@@ -56,13 +69,13 @@ impl FieldWriter {
     /// A file cannot be written.
     pub fn add(&mut self, problem: &DiscreteProblem, state: &State) -> Result<(), OutputError> {
         let comm = problem.body.nodes.partition.comm();
-        let stem = format!("fields_{:04}", self.frames.len());
+        let stem = format!("fields_{:0width$}", self.frames, width = self.digits);
         let piece_file = |rank| format!("{stem}_{rank}.vtu");
         let (own, frame) = match comm.is_serial() {
             true => (format!("{stem}.vtu"), format!("{stem}.vtu")),
             false => (piece_file(comm.rank()), format!("{stem}.pvtu")),
         };
-        self.frames.push((state.time, frame.clone()));
+        (self.frames, self.last_time) = (self.frames + 1, Some(state.time));
 
         let path = self.folder.join(own);
         let points = point_data(problem, state).map_err(|e| OutputError::new(&path, e))?;
@@ -75,9 +88,19 @@ impl FieldWriter {
         }
         if !comm.is_serial() {
             let text = list_of_pieces((0..comm.size()).map(piece_file), &points, &cells);
-            write_whole(&self.folder.join(frame), text.as_bytes())?;
+            write_whole(&self.folder.join(&frame), text.as_bytes())?;
         }
-        write_whole(&self.folder.join("fields.pvd"), self.collection().as_bytes())
+        let line = format!("<DataSet timestep=\"{}\" file=\"{frame}\"/>\n", state.time);
+        match &mut self.list {
+            Some(list) => list.add(line.as_bytes()),
+            none => {
+                let (path, list) =
+                    (self.folder.join("fields.pvd"), vtk_file("Collection", "", &line));
+                let list = list.trim_end_matches(LIST_END);
+                *none = Some(GrowingFile::create(path, list, LIST_END)?);
+                Ok(())
+            }
+        }
     }
 
     fn piece(&self, body: &Body, points: &[DataArray], cells: &[DataArray]) -> io::Result<String> {
@@ -90,13 +113,17 @@ impl FieldWriter {
         );
         Ok(vtk_file("UnstructuredGrid", "", &piece))
     }
+}
 
-    fn collection(&self) -> String {
-        let frame = |(time, file): &(f64, String)| -> String {
-            format!("<DataSet timestep=\"{time}\" file=\"{file}\"/>\n")
-        };
-        vtk_file("Collection", "", &self.frames.iter().map(frame).collect::<String>())
-    }
+/// Digits that the numbers of all frames have, so that their names sort.
+fn digits(scene: &Scene) -> usize {
+    let stepping = scene.time.map(|grid| grid.stepping);
+    let frames = match (scene.output.every, stepping) {
+        (Some(every), Some(Stepping::Uniform { steps })) => steps / every + 2,
+        (Some(_), Some(Stepping::Auto { .. })) => MANY,
+        _ => 1,
+    };
+    DIGITS.max(frames.ilog10() as usize + 1)
 }
 
 /// `<Points>` and `<Cells>`.

@@ -3,7 +3,7 @@
 use crate::test_directory::{SCENE, TestDirectory};
 
 /// At rest until t = 0.2, so that steps 0 to 2 need no solver; the third does.
-const LATE: &str = "boundary.top.traction=[0, '-max(0, t - 0.2)']";
+pub const LATE: &str = "boundary.top.traction=[0, '-max(0, t - 0.2)']";
 
 #[track_caller]
 fn fails_at_the_third_step(arguments: &[&str], fragments: &[&str]) {
@@ -69,14 +69,24 @@ fn the_first_solve_fails() {
     ]);
     said.fails(1, &["step 0 (t = 0): active-set", "the tolerance 1.0e-30 is missed by"]);
     assert!(said.out.contains("FAILED at the first solve; there is no state to save"));
+    assert!(test_directory.names("out/scene").is_empty(), "there is nothing to write");
+}
 
-    let summary = test_directory.summary("out/scene");
-    assert_eq!(said.err, format!("error: {}\n", summary["error"].as_str().expect("the error")));
-    assert_eq!(summary["steps"], 0);
-    for of_a_state in ["end_time", "zeta_min", "displacement_max", "active_nodes", "kkt"] {
-        assert!(summary[of_a_state].is_null(), "{of_a_state}");
+#[test]
+fn results_stay_until_there_are_others() {
+    let test_directory = TestDirectory::new();
+    test_directory.run(&["--set", "time.end=0.1"]);
+    let before = test_directory.everything();
+    let failing = [
+        (1, &["--set", "boundary.top.traction=[0, -3]", "--set", "contact.tolerance=1e-30"][..]),
+        (2, &["--", "-elastic_pc_type", "none_such"]),
+        (2, &["--", "-damage_pc_type", "none_such"]),
+    ];
+    for (code, arguments) in failing {
+        let said = test_directory.say(&[&["run", "scene.toml"], arguments].concat());
+        said.fails(code, &[]);
+        assert!(test_directory.everything() == before, "{said:?}");
     }
-    assert_eq!(test_directory.names("out/scene"), ["history.csv", "scene.toml", "summary.json"]);
 }
 
 #[test]

@@ -5,6 +5,7 @@ mod accuracy;
 mod test_directory;
 mod failing;
 mod fields;
+mod losses;
 mod meshes;
 mod provenance;
 mod refused;

@@ -306,6 +306,9 @@ fn what_fails_on_one_rank_ends_all_with_its_message() {
     let said = unlike(&test_directory, &[], &["--out", "/proc/nowhere"]);
     one_message(&said, 1, "cannot write /proc/nowhere/fields_0000_1.vtu");
     let said = unlike(&test_directory, &[], &["--", "-elastic_pc_type", "none_such"]);
+    one_message(&said, 2, "none_such");
+    let package = ["-elastic_pc_factor_mat_solver_type", "none_such"];
+    let said = unlike(&test_directory, &[], &[&["--"], &package[..]].concat());
     one_message(&said, 1, "rank 1 of 2: ");
     assert!(said.err.contains("none_such"), "{said:?}");
 }

@@ -1,0 +1,78 @@
+//! What the signals SIGINT (Ctrl-C), SIGTERM and SIGXFSZ do.
+
+use signal_hook::{
+    consts::{SIGINT, SIGTERM, SIGXFSZ},
+    flag,
+};
+use std::{
+    io,
+    sync::{
+        Arc, LazyLock,
+        atomic::{AtomicBool, AtomicUsize, Ordering},
+    },
+};
+
+/// Whether the next signal ends the process at once.
+static AT_ONCE: LazyLock<Arc<AtomicBool>> = LazyLock::new(|| Arc::new(true.into()));
+/// The signal that came while it was held; 0 for none.
+static HELD: LazyLock<Arc<AtomicUsize>> = LazyLock::new(Arc::default);
+
+/// Lets SIGINT and SIGTERM end the process with the exit codes 130 and 143: at once, or while an
+/// [`Interrupts`] holds them only the second one. A file-size limit (SIGXFSZ) becomes an error of the
+/// write that exceeds it.
+///
+/// # Errors
+/// The system refuses handlers.
+pub fn install() -> io::Result<()> {
+    flag::register(SIGXFSZ, Arc::default())?;
+    for signal in [SIGINT, SIGTERM] {
+        // They act in this order.
+        flag::register_conditional_shutdown(signal, 128 + signal, AT_ONCE.clone())?;
+        flag::register_usize(signal, HELD.clone(), signal as usize)?;
+        flag::register(signal, AT_ONCE.clone())?;
+    }
+    Ok(())
+}
+
+/// While this lives, a first signal only tells that work should end soon.
+#[derive(Debug)]
+pub struct Interrupts(());
+
+impl Interrupts {
+    /// Holds signals from now on.
+    pub fn hold() -> Self {
+        AT_ONCE.store(HELD.load(Ordering::Relaxed) != 0, Ordering::Relaxed);
+        Self(())
+    }
+
+    /// The signal that has come, if one has.
+    pub fn received(&self) -> Option<Signal> {
+        match HELD.load(Ordering::Relaxed) as i32 {
+            0 => None,
+            number => Some(Signal(number)),
+        }
+    }
+}
+
+impl Drop for Interrupts {
+    fn drop(&mut self) {
+        AT_ONCE.store(true, Ordering::Relaxed);
+    }
+}
+
+/// SIGINT or SIGTERM.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Signal(pub i32);
+
+impl Signal {
+    /// The exit code of a process that it has ended, as shells give it.
+    pub fn exit_code(self) -> u8 {
+        (128 + self.0) as u8
+    }
+}
+
+impl std::fmt::Display for Signal {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(if self.0 == SIGINT { "SIGINT" } else { "SIGTERM" })
+    }
+}
