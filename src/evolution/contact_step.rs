@@ -226,6 +226,9 @@ impl<'a> ContactStep<'a> {
             if (far || !certified) && attempt < ATTEMPTS && self.move_datum(&judged)? {
                 continue;
             }
+            // Once a further attempt has not helped, or cannot, what rounding leaves is accepted.
+            let certified =
+                certified || (attempt > 1 || solved.is_err()) && self.is_exact_to_rounding(&judged);
             match solved {
                 Ok(solved) => report.add(&solved),
                 Err(error) if !certified => return Err(failed(self.limited(error, &judged))),

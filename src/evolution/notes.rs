@@ -51,6 +51,14 @@ impl Outcome {
         let unique = self.unconstrained.is_none();
         let displacement = if unique { self.accuracy.displacement } else { 0.0 };
         let accuracy = Accuracy { displacement, ..self.accuracy };
+        if self.kkt.worst() > problem.tolerance {
+            notes.push(format!(
+                "KKT residuals up to {:.1e}, above contact.tolerance, are all that double precision allows \
+                 here (a body much longer than wide, stretched triangles, nearly incompressible or almost \
+                 broken material)",
+                self.kkt.worst()
+            ));
+        }
         notes.extend(accuracy.notes(problem.tolerance));
         notes.extend(problem.large_gradients(&self.last.state.u));
         if let Some((steps, solver)) = self.rescued {

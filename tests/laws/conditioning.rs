@@ -1,6 +1,8 @@
 //! Where the conditioning or the discretisation is poor: answers stay right, or notes say not.
 
-use crate::support::{close, difference, distorted, history, moved, order, problem, run, square};
+use crate::support::{
+    close, difference, distorted, history, moved, order, problem, run, square, try_run,
+};
 use signorini::{contact::SOLVERS, evolution::DiscreteProblem, mesh::Mesh};
 use std::f64::consts::PI;
 
@@ -135,6 +137,27 @@ fn soft_holes_and_slivers_do_not_spoil_certified_answers() {
             assert!(off < 1e-8, "{off}");
         }
     }
+}
+
+#[test]
+fn a_slender_body_is_solved_as_exactly_as_rounding_allows_and_told_so() {
+    // Deflected by FL³/3EI, I = 1/12; a last digit of that bends the body by forces above 1e-10 F.
+    let clamped =
+        "{ name = 'left', displacement = [0, 0] }, { name = 'right', traction = [0, -1e-6] },
+        { name = 'bottom', gap = 10 }";
+    let slender = |more: &str| {
+        let more = format!("discretisation.displacement = 2\n{more}");
+        body(Mesh::rectangle(200.0, 1.0, 200, 2), STRESS, &more, clamped)
+    };
+    let outcome = run(&slender(""), SOLVERS[0]);
+    assert!(outcome.kkt.worst() > 1e-10, "the case is to be hard: {:?}", outcome.kkt);
+    close(outcome.last.record.displacement_max, 4e-6 * 200.0_f64.powi(3) / 80.0, 1e-3);
+    let notes = outcome.notes(&slender(""));
+    assert!(notes[0].contains("all that double precision"), "{notes:?}");
+    // A tolerance that was asked for is not eased.
+    let exact = slender("contact = { tolerance = 9e-11, rescue = false }");
+    let refused = try_run(&exact, SOLVERS[0]).unwrap_err().to_string();
+    assert!(refused.contains("double precision reaches only"), "{refused}");
 }
 
 #[test]

@@ -57,9 +57,8 @@ impl Accuracy {
             ));
         } else if self.displacement > Self::promised(tolerance) {
             notes.push(format!(
-                "the stiffness is ill-conditioned (a slender or very soft part?): the residuals \
-                 are within the tolerance, but displacements are exact only to about {:.0e} of \
-                 the largest at t = {:.4e}",
+                "the stiffness is ill-conditioned (a slender or very soft part?): small as the residuals \
+                 are, displacements are exact only to about {:.0e} of the largest at t = {:.4e}",
                 self.displacement, self.time
             ));
         }

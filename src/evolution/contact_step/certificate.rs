@@ -2,14 +2,18 @@
 
 use super::ContactStep;
 use crate::{
-    contact::{self, Answer, Constraints, ContactError, ContactPoint, Kkt, RigidMotion, Scales},
+    contact::{
+        self, Answer, Constraints, ContactError, ContactOptions, ContactPoint, Kkt, RigidMotion,
+        Scales,
+    },
     evolution::discrete_problem::LoadCase,
     fem::RigidPart,
 };
 
 /// Residuals are the effect of rounding if they are at most this many times its estimate.
 const ROUNDED: f64 = 10.0;
-
+/// Residuals above this are accepted only by a tolerance that is as large.
+const MOST_ROUNDING: f64 = 1e-6;
 /// A deformation below this part of the datum is rounding.
 const CARRIED: f64 = 1e-14;
 /// The cosine between u and its elastic forces is below this only if K is indefinite.
@@ -95,15 +99,30 @@ impl ContactStep<'_> {
     /// Adds to an error the tolerance that double precision can reach, from the rounding of the
     /// internal forces of u, if that explains the error.
     pub(super) fn limited(&self, error: ContactError, judged: &Judged) -> ContactError {
-        let problem = self.problem;
-        let rounding =
-            problem.elasticity.force_rounding(&problem.body, &self.zeta_at_points, &judged.u);
-        let rounding = problem.body.nodes.partition.norm(&rounding, 2) / judged.scales.force;
-        let attainable = ROUNDED * rounding;
-        match attainable > problem.tolerance && judged.kkt.within(attainable) && attainable < 1.0 {
+        let attainable = ROUNDED * self.rounding(judged);
+        match attainable > self.problem.tolerance
+            && judged.kkt.within(attainable)
+            && attainable < 1.0
+        {
             true => ContactError::Limited { source: Box::new(error), attainable },
             false => error,
         }
+    }
+
+    /// Whether the residuals of u are no larger than the rounding of its internal forces: u is then the
+    /// exact answer for a stiffness whose entries are off by ε_machine. A tolerance below the usual one
+    /// is taken at its word.
+    pub(super) fn is_exact_to_rounding(&self, judged: &Judged) -> bool {
+        self.problem.tolerance >= ContactOptions::default().tolerance
+            && judged.kkt.within(self.rounding(judged).min(MOST_ROUNDING))
+    }
+
+    /// The rounding of the internal forces of u, ε_machine ‖|K||u|‖₂ / F.
+    fn rounding(&self, judged: &Judged) -> f64 {
+        let body = &self.problem.body;
+        let elasticity = &self.problem.elasticity;
+        let rounding = elasticity.force_rounding(body, &self.zeta_at_points, &judged.u);
+        body.nodes.partition.norm(&rounding, 2) / judged.scales.force
     }
 
     /// A rigid motion that the active nodes leave unconstrained. Without load (`force` = 0) the body
