@@ -33,7 +33,7 @@ help:
 	@echo 'make build      $(BINARY) and $(notdir $(STUDIES))'
 	@echo 'make mesh       the .msh of every scene'
 	@echo 'make run        every scene; or SCENE="geo/a.toml …" SOLVER=name ARGS="--set time.step=0.005"'
-	@echo 'make figures    the figures of every run in out/, again'
+	@echo 'make figures    the figures of every run in out/, again; or ARGS="--animate --format svg"'
 	@echo 'make test       format, lints, documentation, tests'
 	@echo 'make validate   the comparison with FEniCSx (installs it: make deps-validate)'
 	@echo 'make random     a thousand random scenes, judged by code of their own; or ARGS="--count 50 --order 2"'
@@ -70,7 +70,7 @@ run: build
 
 figures: deps
 	@set -e; for run in $(patsubst %/summary.json,%,$(wildcard out/*/summary.json)); do \
-	    $(PYTHON) scripts/figures.py $$run; \
+	    $(PYTHON) scripts/figures.py $$run $(ARGS); \
 	done
 
 test: deps

@@ -3,7 +3,7 @@
 import matplotlib.pyplot as plt
 import numpy as np
 
-from drawing import BLUE, FAINT, along, canvas, draw_colourbar, headline, unit_prefix
+from drawing import BLUE, FAINT, along, canvas, draw_colourbar, headline, stress_unit
 
 
 def draw_pressure(results, limits, figure=None):
@@ -17,9 +17,9 @@ def draw_pressure(results, limits, figure=None):
         gridspec_kw={"height_ratios": (2.2, 1)},
     )
     figure.set_constrained_layout_pads(wspace=0.08)
-    factor, prefix = unit_prefix(limits.pressure)
+    factor, unit = stress_unit(limits.pressure, results.units)
     for piece, (above, below) in zip(pieces, rows.T):
-        s, label = along(results.nodes[piece])
+        s, label = along(results.nodes[piece], results.units)
         pressure, gap = results.pressure[piece] / factor, results.gap[piece]
         active = pressure > 0.0
         # Markers shrink where nodes crowd.
@@ -35,15 +35,15 @@ def draw_pressure(results, limits, figure=None):
         below.set_xlabel(label)
     _scale(rows[0, 0], limits.pressure / factor)
     _scale(rows[1, 0], limits.gap)
-    rows[0, 0].set_ylabel(f"contact pressure ({prefix}Pa)")
-    rows[1, 0].set_ylabel("gap (m)")
+    rows[0, 0].set_ylabel(f"contact pressure ({unit})")
+    rows[1, 0].set_ylabel(f"gap ({results.units['length']})")
     rows[1, 0].ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
     for face, name in ((BLUE, "in contact"), ("white", "open")):
         rows[0, -1].scatter([], [], s=25, facecolor=face, edgecolor=BLUE, linewidth=0.8, label=name)
     rows[0, -1].legend(loc="best")
     text = f"{results.active} of {results.summary.get('contact_nodes', '?')} nodes active"
     text = "unloaded" if results.unloaded else "" if results.active is None else text
-    text = ", ".join(filter(None, (f"contact at t = {results.time:g} s", text)))
+    text = ", ".join(filter(None, (f"contact at {results.moment}", text)))
     figure.suptitle(headline(results, text), fontsize=11)
     return figure
 
@@ -66,20 +66,20 @@ def draw_evolution(states, limits):
     figure, rows = plt.subplots(
         len(pieces), 1, figsize=(7.2, 1.2 + min(2.8 * len(pieces), 8.0)), squeeze=False, sharex=True
     )
-    factor, prefix = unit_prefix(limits.pressure)
+    factor, unit = stress_unit(limits.pressure, first.units)
     times = np.array([state.time for state in states])
     for piece, axes in zip(pieces, rows[:, 0]):
-        s, label = along(first.nodes[piece])
+        s, label = along(first.nodes[piece], first.units)
         pressure = np.array([state.pressure[piece] for state in states]).T / factor
         image = axes.pcolormesh(
             _between(times), _between(s), np.ma.masked_where(pressure <= 0.0, pressure),
             cmap="viridis_r", vmin=0.0, vmax=limits.pressure / factor or 1.0, rasterized=True,
         )
-        draw_colourbar(axes, image, f"contact pressure ({prefix}Pa)")
+        draw_colourbar(axes, image, f"contact pressure ({unit})")
         axes.set_ylabel(label)
         for side in ("top", "right"):
             axes.spines[side].set_visible(True)
-    rows[-1, 0].set_xlabel("time t (s)")
+    rows[-1, 0].set_xlabel(f"time t ({first.units['time']})")
     text = f"contact pressure on $\\Gamma_C$ in {len(states)} frames; white: open"
     figure.suptitle(headline(last, text), fontsize=11)
     return figure

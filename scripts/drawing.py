@@ -97,7 +97,7 @@ def draw_foundation(axes, results, factor=None):
         axes.plot(*line.T, color=INK, linewidth=1.8, zorder=1.6, solid_capstyle="butt")
 
 
-def frame(axes, points):
+def frame(axes, points, units):
     """Equal aspect around `points`, a little air, few ticks."""
     low, high = points.min(axis=0), points.max(axis=0)
     air = 0.05 * max(high - low)
@@ -106,8 +106,8 @@ def frame(axes, points):
     axes.set_aspect("equal")
     axes.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
     axes.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
-    axes.set_xlabel("x (m)")
-    axes.set_ylabel("y (m)")
+    axes.set_xlabel(f"x ({units['length']})")
+    axes.set_ylabel(f"y ({units['length']})")
 
 
 def draw_colourbar(axes, image, label, extend="neither"):
@@ -118,12 +118,14 @@ def draw_colourbar(axes, image, label, extend="neither"):
     bar.set_label(label)
 
 
-def unit_prefix(value):
-    """The factor and the prefix that bring a stress to a number below a thousand."""
-    for factor, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
-        if value >= 2 * factor:
-            return factor, prefix
-    return 1.0, ""
+def stress_unit(largest, units):
+    """The factor and the unit that bring stresses in pascals up to `largest` below a thousand or so;
+    others are shown as they are."""
+    if units["stress"] == "Pa":
+        for factor, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
+            if largest >= 2 * factor:
+                return factor, f"{prefix}Pa"
+    return 1.0, units["stress"]
 
 
 def damage_scale(least, largest):
@@ -151,10 +153,11 @@ def least_zeta(low):
     return f"{low:.{max(3, 1 - int(np.floor(np.log10(1.0 - low))))}f}"
 
 
-def along(points):
+def along(points, units):
     """A coordinate along a path: x or y if the path follows that axis, else arclength."""
+    unit = units["length"]
     for k, (name, other) in enumerate(("xy", "yx")):
         if np.ptp(points[:, 1 - k]) <= 1e-9 * np.ptp(points[:, k]):
-            return points[:, k], f"{name} (m) along {other} = {points[0, 1 - k]:g}"
+            return points[:, k], f"{name} ({unit}) along {other} = {points[0, 1 - k]:g}"
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    return np.concatenate(([0.0], np.cumsum(steps))), "arclength along $\\Gamma_C$ (m)"
+    return np.concatenate(([0.0], np.cumsum(steps))), f"arclength along $\\Gamma_C$ ({unit})"

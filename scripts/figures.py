@@ -23,8 +23,9 @@ from contact_pressure import draw_evolution, draw_pressure
 from histories import draw_damage_history
 from limits import box_of, limits_of
 from maps import draw_deformed, draw_stress_and_damage
+from paraview_script import write_script
 from reading import read_results, states
-from results import ResultError
+from results import telling
 from setting import draw_setting
 
 FIGURES = {
@@ -55,6 +56,8 @@ def arguments_of(prog):
     parser.add_argument("--evolution", action="store_true", help="also contact-evolution")
     parser.add_argument("--animate", nargs="?", const="gif", choices=MOVIES, help=(
         "also animations of damage and pressure: gif, or mp4 by ffmpeg (default: gif)"))
+    parser.add_argument("--paraview", action="store_true", help=(
+        "only write open_in_paraview.py, for `paraview --script=OUT/open_in_paraview.py`"))
     arguments = parser.parse_args()
     if unknown := set(arguments.format) - set(FORMATS):
         parser.error(f"--format: {', '.join(unknown)} is none of {', '.join(FORMATS)}")
@@ -79,6 +82,9 @@ def save(figure, results, name, formats):
 
 def draw(results, limits, arguments):
     """Everything that is asked for of one run."""
+    if arguments.paraview:
+        print(write_script(results, limits))
+        return
     last = replace(results, time=results.frames[-1][0])
     for name, figure in FIGURES.items():
         of = last if name == "damage-history" else results
@@ -93,19 +99,18 @@ def draw(results, limits, arguments):
 
 
 def main(prog=None):
-    """Returns the exit code: 2 if a folder does not hold what figures need."""
+    """Returns the exit code: 2 if something could not be drawn, which is told."""
     arguments = arguments_of(prog)
     runs, failed = [], False
     for folder in arguments.folders:
-        try:
+        with telling() as problems:
             runs.append(read_results(folder, arguments.time))
-        except ResultError as error:
-            failed = True
-            print(f"error: {error}", file=sys.stderr)
-    if runs:
-        shared = limits_of(runs, arguments.factor)
-        for results in runs:
+        failed |= bool(problems)
+    shared = runs and limits_of(runs, arguments.factor)
+    for results in runs:
+        with telling() as problems:
             draw(results, replace(shared, box=box_of([results], shared.factor)), arguments)
+        failed |= bool(problems)
     return 2 if failed else 0
 
 

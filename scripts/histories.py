@@ -19,11 +19,11 @@ def draw_damage_history(results, _limits=None):
     stopped = results.summary.get("stopped_at")
     if stopped is not None:
         axes.axvline(stopped, color=RED, linewidth=1.0, linestyle=(0, (4, 2)),
-                     label=f"ζ$_*$ reached at t = {stopped:.4g} s")
+                     label=f"ζ$_*$ reached at t = {stopped:.4g} {results.units['time']}")
         axes.set_ylim(bottom=0.0)
     axes.set_xlim(left=0.0)
     axes.yaxis.set_major_formatter(ScalarFormatter(useOffset=False))
-    axes.set_xlabel("time t (s)")
+    axes.set_xlabel(f"time t ({results.units['time']})")
     axes.set_ylabel("damage field ζ")
     axes.set_title(headline(results, ""))
     axes.legend(loc="lower left")
@@ -32,9 +32,9 @@ def draw_damage_history(results, _limits=None):
 
 # Panels of the figure of all histories: title, columns with their names, whether logarithmic.
 PANELS = (
-    ("largest displacement (m)", {"displacement_max": ""}, False),
-    ("work of the loads (J/m)", {"work": ""}, False),
-    ("sum of the contact reactions (N/m)", {"contact_force": ""}, False),
+    ("largest displacement ({length})", {"displacement_max": ""}, False),
+    ("work of the loads ({work})", {"work": ""}, False),
+    ("sum of the contact reactions ({line})", {"contact_force": ""}, False),
     ("active nodes", {"active_nodes": ""}, False),
     ("KKT residuals", {f"kkt_{kind}": kind for kind in (
         "stationarity", "primal", "dual", "complementarity")}, True),
@@ -64,12 +64,12 @@ def draw_histories(results):
                 values = np.where(np.abs(values) <= ROUNDING * largest, 0.0, values)
             if np.isfinite(values).any():
                 axes.plot(history["time"], values, linewidth=1.2, label=name)
-        axes.set_title(title, fontsize=9.5)
+        axes.set_title(title.format(**results.units), fontsize=9.5)
         axes.set_yscale("log" if is_log else "linear")
         if any(columns.values()):
             axes.legend(fontsize=8, ncols=2, loc="best")
     for axes in grid.flat[len(panels):]:
         axes.set_visible(False)
     for axes in grid[-1]:
-        axes.set_xlabel("time t (s)")
+        axes.set_xlabel(f"time t ({results.units['time']})")
     return figure

@@ -7,7 +7,7 @@ from matplotlib.tri import Triangulation
 
 from drawing import (
     BLUE, INK, canvas, damage_scale, draw_colourbar, draw_foundation, draw_outline, frame, headline,
-    least_zeta, map_size, unit_prefix,
+    least_zeta, map_size, stress_unit,
 )
 
 
@@ -36,8 +36,8 @@ def draw_deformed(results, limits):
         axes, results.nodes, results, color=INK, linewidth=0.9, linestyle=(0, (4, 2)), zorder=3
     )
     draw_foundation(axes, results, limits.factor)
-    frame(axes, limits.box)
-    text = f"deformed mesh at t = {results.time:g} s, {_amplified(results, limits)}"
+    frame(axes, limits.box, results.units)
+    text = f"deformed mesh at {results.moment}, {_amplified(results, limits)}"
     axes.set_title(headline(results, text + ("" if results.unloaded else "; dashed: initial outline")))
     return figure
 
@@ -64,8 +64,8 @@ def draw_stress_and_damage(results, limits):
     for axes in figure.axes:
         draw_outline(axes, results.nodes, results, color=INK, linewidth=0.7)
         draw_foundation(axes, results)
-        frame(axes, results.nodes)
-    figure.suptitle(headline(results, f"t = {results.time:g} s"), fontsize=11.5)
+        frame(axes, results.nodes, results.units)
+    figure.suptitle(headline(results, f"{results.moment}"), fontsize=11.5)
     return figure
 
 
@@ -83,8 +83,8 @@ def draw_state(results, limits, figure=None):
         axes, results.nodes, results, color=INK, linewidth=0.6, linestyle=(0, (4, 2)), zorder=0
     )
     draw_foundation(axes, results, limits.factor)
-    frame(axes, limits.box)
-    text = f"t = {results.time:g} s: {shown}; {_amplified(results, limits)}"
+    frame(axes, limits.box, results.units)
+    text = f"{results.moment}: {shown}; {_amplified(results, limits)}"
     axes.set_title(headline(results, text))
     return figure
 
@@ -92,20 +92,20 @@ def draw_state(results, limits, figure=None):
 def _amplified(results, limits):
     """How the deformation is shown."""
     largest = np.linalg.norm(results.displacement, axis=1).max()
-    moves = f"displacements × {limits.factor:g} (largest {largest:.3g} m)"
+    moves = f"displacements × {limits.factor:g} (largest {largest:.3g} {results.units['length']})"
     return "unloaded" if results.unloaded else moves
 
 
 def _paint_stress(axes, mesh, results, limits):
     """Colours for the von Mises stress, with their bar; returns what to say of it."""
-    factor, prefix = unit_prefix(limits.stress)
+    factor, unit = stress_unit(limits.stress, results.units)
     image = axes.tripcolor(
         mesh, facecolors=results.pieces.of_cells(results.von_mises / factor), cmap="viridis",
         vmin=0.0, vmax=limits.stress / factor or 1.0, rasterized=True,
     )
     extend = "max" if limits.is_cut else "neither"
-    draw_colourbar(axes, image, f"von Mises stress ({prefix}Pa)", extend)
-    return f"von Mises stress, largest {results.von_mises.max() / factor:.3g} {prefix}Pa"
+    draw_colourbar(axes, image, f"von Mises stress ({unit})", extend)
+    return f"von Mises stress, largest {results.von_mises.max() / factor:.3g} {unit}"
 
 
 def _paint_damage(axes, mesh, results, limits):

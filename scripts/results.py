@@ -2,7 +2,9 @@
 
 import argparse
 import csv
+import sys
 from collections import defaultdict
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -32,6 +34,21 @@ class ResultError(Exception):
     """The folder does not hold what a figure needs: said in one line."""
 
 
+@contextmanager
+def telling():
+    """Tells problems with results or with writing beside them in a line; the list has those that were
+    met."""
+    problems = []
+    try:
+        yield problems
+    except ResultError as error:
+        problems.append(str(error))
+    except OSError as error:
+        problems.append(f"{error.filename}: {error.strerror}")
+    for problem in problems:
+        print(f"error: {problem}", file=sys.stderr)
+
+
 @dataclass
 class Results:
     """A state of the body, by default the last accepted one, and what happened on the way to it."""
@@ -59,9 +76,18 @@ class Results:
 
     @property
     def units(self):
-        """The names of the units of length, force, time and stress."""
-        return {"length": "m", "force": "N", "time": "s", "stress": "Pa",
-                **self.summary.get("units", {})}
+        """The names of the units of length, force, time and stress, and of some made of them."""
+        units = {"length": "m", "force": "N", "time": "s", "stress": "Pa",
+                 **self.summary.get("units", {})}
+        force, length = units["force"], units["length"]
+        work = "J/m" if (force, length) == ("N", "m") else f"{force}·{length}/{length}"
+        return {**units, "work": work, "line": f"{force}/{length}", "area": f"{force}/{length}²",
+                "volume": f"{force}/{length}³"}
+
+    @property
+    def moment(self):
+        """The time of the state, for titles."""
+        return f"t = {self.time:g} {self.units['time']}"
 
     @property
     def ending(self):

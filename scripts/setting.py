@@ -2,6 +2,7 @@
 4 and 7)."""
 
 import textwrap
+from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -40,7 +41,7 @@ def draw_setting(results, _limits):
     draw_outline(axes, results.nodes, results, color=INK, linewidth=0.9, zorder=2)
     draw_foundation(axes, results)
 
-    size = results.size
+    size, units = results.size, results.units
     time, forces = _loads(results, conditions, curves)
     largest = max([np.linalg.norm(force, axis=-1).max() for force in forces], default=0.0)
     places = [results.nodes]
@@ -51,13 +52,13 @@ def draw_setting(results, _limits):
         beyond = np.vstack([outer, tails, *_opposite(results, line)])
         places += [tails, _write_name(axes, line, name, condition, beyond, size / (width - 1.0))]
     body_force = _draw_body_force(axes, results, time)
-    frame(axes, np.vstack(places))
+    frame(axes, np.vstack(places), units)
     for name, condition in conditions.items():
-        axes.plot([], [], color=_colour(condition), linewidth=4, label=_words(name, condition))
+        axes.plot([], [], color=_colour(condition), linewidth=4, label=_words(name, condition, units))
     if body_force:
-        axes.plot([], [], color=GREEN, linewidth=4, label=f"body force: {body_force} N/m³")
+        axes.plot([], [], color=GREEN, linewidth=4, label=f"body force: {body_force} {units['volume']}")
     axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.55 / height), fontsize=8.5, handlelength=1)
-    loads = f"; loads at t = {time:g} s" if largest or body_force else ""
+    loads = f"; loads at t = {time:g} {units['time']}" if largest or body_force else ""
     axes.set_title(headline(results, f"setting{loads}"))
     return figure
 
@@ -65,12 +66,17 @@ def draw_setting(results, _limits):
 def _loads(results, conditions, curves):
     """A time with loads, the shown one if it has any, and the tractions then: (n, 2) at the samples of
     each curve, N/m²."""
+    folder = _folder(results)
+
     def at(time):
         forces = []
         for name, line in curves:
-            points, _ = _samples(line, SPACING * results.size)
-            traction = conditions.get(name, {}).get("traction", [0, 0])
-            forces.append(_vectors(traction, points, time))
+            points, normals = _samples(line, SPACING * results.size)
+            condition = conditions.get(name, {})
+            force = _vectors(condition.get("traction", [0, 0]), points, time, folder)
+            # A pressure p is the traction −p ν.
+            pressure = evaluate(condition.get("pressure", 0), points, time, folder)
+            forces.append(force - pressure[:, None] * normals)
         return forces
 
     def largest(forces):
@@ -84,10 +90,14 @@ def _loads(results, conditions, curves):
     return time, at(time)
 
 
-def _vectors(expressions, points, time):
-    """The values of two expressions at points, (n, 2); 0 where they are not known."""
-    values = [evaluate(expression, *points.T, time) for expression in expressions]
-    return np.column_stack([np.zeros(len(points)) if v is None else v for v in values])
+def _folder(results):
+    """Where the scene's tables are: beside its mesh."""
+    return Path(results.scene.get("mesh", {}).get("file", "")).parent
+
+
+def _vectors(expressions, points, time, folder):
+    """The values of two expressions at points, (n, 2)."""
+    return np.column_stack([evaluate(text, points, time, folder) for text in expressions])
 
 
 def _samples(line, spacing):
@@ -142,7 +152,7 @@ def _draw_body_force(axes, results, time):
     """An arrow in the middle of the body; returns the force in the scene's words, if there is one."""
     force = results.scene.get("body", {}).get("force")
     middle = results.nodes.mean(axis=0, keepdims=True)
-    arrow = _vectors(force, middle, time) if force else np.zeros((1, 2))
+    arrow = _vectors(force, middle, time, _folder(results)) if force else np.zeros((1, 2))
     if arrow.any():
         arrow *= ARROW * results.size / np.linalg.norm(arrow)
         axes.quiver(*middle.T, *arrow.T, color=GREEN, angles="xy", scale_units="xy", scale=1.0,
@@ -173,18 +183,21 @@ def _write_name(axes, line, name, condition, others, inch):
 
 def _colour(condition):
     """Supports blue, the foundation dark, loads red, what is free grey."""
-    kinds = (("displacement", BLUE), ("symmetry", BLUE), ("gap", INK), ("traction", RED))
+    kinds = (("displacement", BLUE), ("symmetry", BLUE), ("gap", INK), ("traction", RED),
+             ("pressure", RED))
     return next((colour for kind, colour in kinds if kind in condition), FAINT)
 
 
-def _words(name, condition):
+def _words(name, condition, units):
     """What holds on a boundary."""
+    length, area = units["length"], units["area"]
     words = {
-        "displacement": lambda u: f"u = {_pair(u)} m",
+        "displacement": lambda u: f"u = {_pair(u)} {length}",
         "symmetry": lambda _: "u·ν = 0",
-        "gap": lambda gap: f"gap g = {gap} m",
+        "gap": lambda gap: f"gap g = {gap} {length}",
         "normal": lambda normal: f"along ν = {_pair(normal)}",
-        "traction": lambda force: f"traction {_pair(force)} N/m²",
+        "traction": lambda force: f"traction {_pair(force)} {area}",
+        "pressure": lambda pressure: f"pressure {pressure} {area}",
     }
     parts = [say(condition[key]) for key, say in words.items() if condition.get(key)]
     return textwrap.fill(f"{name}: {', '.join(parts)}".replace("$", r"\$"), 90)

@@ -28,6 +28,10 @@ enum Command {
     Run(command::RunArguments),
     /// Run scenes with every contact solver and compare cost and answers.
     Compare(command::CompareArguments),
+    /// Draw the figures of runs into their folders; also at other times, as vectors, moving (--help).
+    Figures(command::ScriptArguments),
+    /// Write report.html, one page with all about a run, into its folder.
+    Report(command::ScriptArguments),
     /// List the contact solvers, a line each: its name, a tab, what it does.
     Solvers,
     /// Print a shell's completions, e.g. for bash into
@@ -51,6 +55,8 @@ fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Run(arguments) => command::run(&arguments),
         Command::Compare(arguments) => command::compare(&arguments),
+        Command::Figures(arguments) => command::script("figures", &arguments),
+        Command::Report(arguments) => command::script("report", &arguments),
         Command::Solvers => command::solvers(),
         Command::Completions { shell } => command::completions(shell, Arguments::command()),
         Command::Mesh { scenes } => command::mesh(&scenes),

@@ -1,6 +1,7 @@
 //! What the subcommands do.
 
 mod compare;
+mod figures;
 mod profile;
 mod provenance;
 mod ranks;
@@ -9,6 +10,7 @@ mod run;
 mod screen;
 
 pub use compare::{CompareArguments, compare};
+pub use figures::{ScriptArguments, script};
 pub use run::{RunArguments, run};
 
 use ranks::require_one_process;

@@ -6,6 +6,7 @@ mod test_directory;
 mod failing;
 mod fields;
 mod losses;
+mod figures;
 mod meshes;
 mod provenance;
 mod refused;

@@ -1,0 +1,185 @@
+#!/usr/bin/python3
+"""Writes a run's report.html: one page with its pictures, a slider over its frames, histories, error
+budget, scene and timings, which needs no other file and no network.
+
+    signorini report out/lshape
+"""
+
+import argparse
+import base64
+import html
+import io
+import json
+import multiprocessing
+import sys
+from functools import partial
+from string import Template
+
+import matplotlib.pyplot as plt
+
+from contact_pressure import draw_evolution, draw_pressure
+from histories import draw_damage_history, draw_histories
+from limits import limits_of
+from maps import draw_deformed, draw_state, draw_stress_and_damage
+from reading import evenly, read_results, states
+from report_page import PAGE, SLIDER
+from results import telling
+from setting import draw_setting
+
+# Frames of the slider, at most.
+FRAMES = 30
+# What summary.json says of the last state: its key, what it is, the kind of its unit.
+FACTS = (
+    ("solver", "contact solver", ""), ("ranks", "ranks", ""), ("nodes", "nodes", ""),
+    ("triangles", "triangles", ""), ("steps", "time steps", ""), ("end_time", "last time", "time"),
+    ("stopped_at", "ζ<sub>*</sub> reached at", "time"), ("zeta_min", "least ζ", ""),
+    ("zeta_mean", "mean ζ", ""), ("displacement_max", "largest displacement", "length"),
+    ("work", "work of the loads", "work"), ("contact_force", "sum of contact reactions", "line"),
+    ("active_nodes", "active nodes", ""), ("contact_nodes", "contact nodes", ""),
+)
+ERRORS = {
+    "displacement_mesh": "u, from the mesh (energy norm)",
+    "damage_mesh": "damage, from the mesh (L²)",
+    "displacement_steps": "u, from the time steps (energy norm)",
+    "damage_steps": "damage, from the time steps (L²)",
+    "solver": "u, from the solver",
+}
+
+
+def encoded(figure, dpi=110):
+    """The figure as a PNG in base64; empty without a figure."""
+    if figure is None:
+        return ""
+    with io.BytesIO() as file:
+        figure.savefig(file, format="png", dpi=dpi)
+        plt.close(figure)
+        return base64.b64encode(file.getvalue()).decode()
+
+
+def picture(figure, name):
+    """An element of the page with the figure; empty without a figure."""
+    data = encoded(figure)
+    return data and f'<img alt="{name}" src="data:image/png;base64,{data}">'
+
+
+def table(rows):
+    """Rows of cells; what is a number stands right."""
+    def cell(value):
+        if isinstance(value, (int, float)) and not isinstance(value, bool):
+            return f'<td class="number">{value:.6g}</td>'
+        return f"<td>{value}</td>"
+
+    rows = (f"<tr>{''.join(map(cell, row))}</tr>" for row in rows)
+    return f"<table>{''.join(rows)}</table>"
+
+
+def frame(state, limits):
+    """The pictures of one time, which have the same size at all times."""
+    with plt.rc_context({"savefig.bbox": None}):
+        return {
+            "moment": state.moment,
+            "state": encoded(draw_state(state, limits), dpi=90),
+            "pressure": encoded(draw_pressure(state, limits), dpi=90),
+        }
+
+
+def slider(results):
+    """Pictures of the body and of Γ_C at up to FRAMES times, and what chooses among them."""
+    chosen = states(results, evenly(results.frames, FRAMES))
+    if len(chosen) < 2:
+        return ""
+    # Forked, because scripts that the program carries cannot be imported anew.
+    with multiprocessing.get_context("fork").Pool() as pool:
+        frames = pool.map(partial(frame, limits=limits_of(chosen)), chosen)
+    return Template(SLIDER).substitute(last=len(frames) - 1, frames=json.dumps(frames))
+
+
+def facts(results):
+    """What summary.json says of the last state, and the quantities that are asked for by name."""
+    summary, units = results.summary, results.units
+    rows = [(name, summary[key], html.escape(units.get(kind, "")))
+            for key, name, kind in FACTS if summary.get(key) is not None]
+    rows += [(html.escape(name), value, "") for name, value in summary.get("quantities", {}).items()]
+    return table(rows)
+
+
+def timings(summary):
+    """The phases of the run, the longest first, with bars."""
+    wall = summary.get("wall_seconds") or 1.0
+    phases = sorted(summary.get("phases", {}).items(), key=lambda phase: -phase[1])
+    rows = [("all", wall, "s", "")]
+    for name, seconds in phases:
+        if seconds >= 1e-3 * wall:
+            bar = f'<td class="bar"><div style="width: {100 * seconds / wall:.1f}%"></div></td>'
+            rows.append((html.escape(name), float(f"{seconds:.3g}"), "s", bar))
+    return table(rows).replace("<td><td", "<td").replace("</td></td>", "</td>")
+
+
+def provenance(summary):
+    """Version, date, machine and command line."""
+    made = summary.get("provenance", {})
+    machine = made.get("machine", {})
+    rows = [(key, html.escape(str(made[key]))) for key in ("version", "date", "directory")
+            if made.get(key)]
+    rows += [(key, html.escape(str(machine[key]))) for key in ("host", "processor", "cores")
+             if machine.get(key)]
+    rows += [("command", f"<code>{html.escape(' '.join(made.get('command', [])))}</code>")]
+    return table(rows)
+
+
+def page(results):
+    """The text of the page."""
+    summary, limits = results.summary, limits_of([results])
+    scene = results.folder / "scene.toml"
+    everything = states(results, evenly(results.frames, 400))
+    errors = summary.get("errors") or {}
+    percent = {key: "none" if value is None else f"{100 * value:.2g} %"
+               for key, value in errors.items()}
+    notes = [f"<li>{html.escape(note)}</li>" for note in summary.get("notes", [])]
+    error = summary.get("error")
+    ending = error and f"failed: {error}" or results.ending.replace("$_*$", "_*")
+    with_overrides = results.overrides and f"with {results.overrides}"
+    return Template(PAGE).substitute(
+        title=html.escape(results.title),
+        subtitle=html.escape(with_overrides),
+        ending=html.escape(ending),
+        facts=facts(results),
+        setting=picture(draw_setting(results, limits), "the setting"),
+        slider=slider(results),
+        pictures="".join([
+            picture(draw_deformed(results, limits), "deformed mesh"),
+            picture(draw_stress_and_damage(results, limits), "stress and damage"),
+            picture(draw_pressure(results, limits), "contact pressure and gap"),
+        ]),
+        histories="".join([
+            picture(draw_damage_history(results), "least and mean ζ"),
+            picture(draw_evolution(everything, limits_of(everything)), "evolution of contact"),
+            picture(draw_histories(results), "histories"),
+        ]) or "One static solve.",
+        errors=table((ERRORS.get(key, key), value) for key, value in percent.items()),
+        residuals=table((key, f"{value:.1e}") for key, value in (summary.get("kkt") or {}).items()),
+        notes=f"<p>Notes:</p><ul>{''.join(notes)}</ul>" if notes else "",
+        scene=html.escape(scene.read_text(encoding="utf-8") if scene.exists() else "not kept"),
+        timings=timings(summary),
+        provenance=provenance(summary),
+    )
+
+
+def main(prog=None):
+    """Returns the exit code: 2 if a folder does not hold what the report needs."""
+    parser = argparse.ArgumentParser(
+        prog=prog, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folders", nargs="+", metavar="OUT", help="result folder")
+    failed = False
+    for folder in parser.parse_args().folders:
+        with telling() as problems:
+            results = read_results(folder)
+            path = results.folder / "report.html"
+            path.write_text(page(results), encoding="utf-8")
+            print(path)
+        failed |= bool(problems)
+    return 2 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,81 @@
+//! `signorini figures` and `signorini report`: the pictures of a run, drawn by Python scripts that the
+//! program carries.
+
+use super::{Failure, ranks::require_one_process};
+use clap::Args;
+use std::{
+    collections::BTreeMap,
+    env,
+    ffi::OsString,
+    io::Write,
+    process::{Command, Stdio},
+};
+
+/// Names and sources of files in scripts/.
+macro_rules! scripts {
+    ($($name:literal)*) => {
+        [$(($name, include_str!(concat!("../../scripts/", $name, ".py")))),*]
+    };
+}
+
+/// What the scripts import from each other.
+const SCRIPTS: [(&str, &str); 16] = scripts! {
+    "animation" "contact_pressure" "drawing" "elements" "expressions" "figures" "histories" "limits"
+    "maps" "paraview_script" "paraview_view" "reading" "report" "report_page" "results" "setting"
+};
+/// Runs one of them.
+const EMBEDDED: &str = include_str!("../../scripts/embedded.py");
+/// Tells what Python lacks.
+const PROBE: &str = "import sys, importlib.util as util\n\
+    lacks = [m for m in ('matplotlib', 'meshio', 'tomllib') if not util.find_spec(m)]\n\
+    sys.exit(', '.join(lacks) or None)";
+
+/// Arguments of a script.
+#[derive(Args)]
+#[command(disable_help_flag = true)]
+pub struct ScriptArguments {
+    /// Result folders, and options that `--help` lists.
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "OUT")]
+    arguments: Vec<OsString>,
+}
+
+/// Runs the script `name`, which tells itself what is wrong with its input.
+pub fn script(name: &str, ScriptArguments { arguments }: &ScriptArguments) -> Result<(), Failure> {
+    require_one_process()?;
+    let python = python()?;
+    let mut running = Command::new(&python)
+        .args(["-c", EMBEDDED, name])
+        .args(arguments)
+        .stdin(Stdio::piped())
+        .spawn()
+        .map_err(|error| format!("{}: {error}", python.display()))?;
+    if let Some(mut input) = running.stdin.take() {
+        let sources = serde_json::to_vec(&BTreeMap::from(SCRIPTS)).map_err(Failure::from)?;
+        // A script that has ended early says itself why.
+        let _ = input.write_all(&sources);
+    }
+    match running.wait().map_err(Failure::from)?.code() {
+        Some(0) => Ok(()),
+        code => Err(Failure { code: code.map_or(1, |code| code as u8), message: None }),
+    }
+}
+
+/// The Python of `PYTHON` or, without it, the first of the usual ones that has what the scripts import.
+fn python() -> Result<OsString, Failure> {
+    let usual = || vec!["/usr/bin/python3".into(), "python3".into()];
+    let candidates = env::var_os("PYTHON").map_or_else(usual, |python| vec![python]);
+    let mut problems = Vec::new();
+    for python in candidates {
+        let problem = match Command::new(&python).args(["-c", PROBE]).output() {
+            Ok(probe) if probe.status.success() => return Ok(python),
+            Ok(probe) => format!("lacks {}", String::from_utf8_lossy(&probe.stderr).trim()),
+            Err(error) => error.to_string(),
+        };
+        problems.push(format!("{} {problem}", python.display()));
+    }
+    Err(Failure::input(format!(
+        "pictures are drawn by Python 3.11 or newer with matplotlib and meshio (Debian: apt install \
+         python3-matplotlib python3-meshio; or PYTHON=… for another one), but {}",
+        problems.join("; ")
+    )))
+}
