@@ -66,8 +66,8 @@ def amplification(size, largest):
 
 
 def headline(results, text):
-    """The title, what the command line changed in the scene, that the run ended early if it did, and
-    what the figure shows."""
+    """The title, what the command line changed in the scene, that the run ended early if it did,
+    and what the figure shows."""
     overrides = textwrap.shorten(f"with {results.overrides}", 100, placeholder=" …")
     overrides = overrides.replace("$", r"\$") if results.overrides else ""
     return "\n".join(filter(None, (results.title, overrides, results.ending, text)))
@@ -119,8 +119,8 @@ def draw_colourbar(axes, image, label, extend="neither"):
 
 
 def stress_unit(largest, units):
-    """The factor and the unit that bring stresses in pascals up to `largest` below a thousand or so;
-    others are shown as they are."""
+    """The factor and the unit that bring stresses in pascals up to `largest` below a thousand or
+    so; others are shown as they are."""
     if units["stress"] == "Pa":
         for factor, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
             if largest >= 2 * factor:

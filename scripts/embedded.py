@@ -1,5 +1,5 @@
-"""Runs a script that `signorini` carries: python -c EMBEDDED NAME ARGUMENT…, with the sources of all
-its scripts as JSON on standard input. Nothing is written to disk."""
+"""Runs a script that `signorini` carries: python -c EMBEDDED NAME ARGUMENT…, with the sources of
+all its scripts as JSON on standard input. Nothing is written to disk."""
 
 import importlib
 import json

@@ -15,8 +15,8 @@ TOKEN = re.compile(r'(?P<number>(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)|(?P<name>[A-Za
 
 
 def evaluate(expression, points, t, folder):
-    """The values of an expression, or of a number, at points (n, 2), m, and a time t, s; 0 where it is
-    not defined, or is none that pictures know. Tables are in `folder`."""
+    """The values of an expression, or of a number, at points (n, 2), m, and a time t, s; 0 where it
+    is not defined, or is none that pictures know. Tables are in `folder`."""
     try:
         program = compile(_as_python(str(expression)), "expression", "eval")
     except (SyntaxError, RecursionError, MemoryError):

@@ -52,7 +52,7 @@ def box_of(states, factor):
 
 
 def _amplification(states):
-    """What shows the displacements, and leaves the obstacle, which moves away by as much, in sight."""
+    """What shows the displacements and leaves the obstacle, which moves as far, in sight."""
     largest = max(np.linalg.norm(state.displacement, axis=1).max() for state in states)
     widest = max(np.linalg.norm(s.obstacle - s.contact, axis=2).max(initial=0.0) for s in states)
     return amplification(min(state.size for state in states), max(largest, widest))

@@ -38,7 +38,8 @@ def draw_deformed(results, limits):
     draw_foundation(axes, results, limits.factor)
     frame(axes, limits.box, results.units)
     text = f"deformed mesh at {results.moment}, {_amplified(results, limits)}"
-    axes.set_title(headline(results, text + ("" if results.unloaded else "; dashed: initial outline")))
+    text += "" if results.unloaded else "; dashed: initial outline"
+    axes.set_title(headline(results, text))
     return figure
 
 

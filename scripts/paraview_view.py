@@ -49,7 +49,8 @@ def view_of_deformation(fields, view):
     coloured(shown, view, ("POINTS", "damage"), "1 - zeta", "Magma (matplotlib)", 0.0,
              RUN["damage"] or 1.0, is_inverted=True)
     outline = simple.Show(fields, view)
-    setup(outline, Representation="Feature Edges", ColorArrayName=["POINTS", ""], AmbientColor=[0, 0, 0], DiffuseColor=[0, 0, 0], LineWidth=1.5)
+    setup(outline, Representation="Feature Edges", LineWidth=1.5, ColorArrayName=["POINTS", ""],
+          AmbientColor=[0, 0, 0], DiffuseColor=[0, 0, 0])
     most = simple.Threshold(registrationName="damaged most", Input=body)
     setup(most, Scalars=["POINTS", "damage"], ThresholdMethod="Above Upper Threshold",
              UpperThreshold=0.5 * RUN["damage"])
@@ -60,8 +61,8 @@ def view_of_deformation(fields, view):
 def view_of_stress(fields, contact, view):
     """The von Mises stress on the initial configuration, and arrows for the contact pressure."""
     shown = simple.Show(fields, view)
-    coloured(shown, view, ("CELLS", "von_mises"), f"von Mises stress ({RUN['stress_unit']})", "Viridis (matplotlib)",
-             0.0, RUN["stress"] or 1.0)
+    coloured(shown, view, ("CELLS", "von_mises"), f"von Mises stress ({RUN['stress_unit']})",
+             "Viridis (matplotlib)", 0.0, RUN["stress"] or 1.0)
     if contact is None or not RUN["pressure"]:
         return "von Mises stress"
     arrows = simple.Glyph(registrationName="contact pressure", Input=contact, GlyphType="Arrow")
@@ -69,7 +70,8 @@ def view_of_stress(fields, contact, view):
                ScaleArray=["POINTS", "normal_pressure"], GlyphMode="All Points",
                ScaleFactor=0.15 * RUN["size"] / RUN["pressure"])
     arrows = simple.Show(arrows, view)
-    setup(arrows, ColorArrayName=["POINTS", ""], AmbientColor=[0.75, 0.2, 0.15], DiffuseColor=[0.75, 0.2, 0.15])
+    setup(arrows, ColorArrayName=["POINTS", ""],
+          AmbientColor=[0.75, 0.2, 0.15], DiffuseColor=[0.75, 0.2, 0.15])
     return "von Mises stress, contact pressure"
 
 

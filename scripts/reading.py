@@ -1,5 +1,5 @@
-"""Reads a result folder: fields.pvd with its frames, history.csv, summary.json, and scene.toml if it
-is there."""
+"""Reads a result folder: fields.pvd with its frames, history.csv, summary.json, and scene.toml if
+it is there."""
 
 import csv
 import json
@@ -16,7 +16,7 @@ from results import ResultError, Results, without_roundoff
 
 
 def read_results(folder, time=None):
-    """Everything a figure needs from one result folder: the frame nearest to `time`, or the last."""
+    """Everything a figure needs from a result folder: the frame nearest to `time`, or the last."""
     folder, summary = Path(folder), {}
     try:
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
@@ -61,7 +61,7 @@ def nearest(frames, time):
 
 
 def evenly(frames, most):
-    """Of all frames some `most` at even distances in time: no nearer than the farthest neighbours."""
+    """At most so many frames at even times, no nearer to each other than the farthest of all."""
     times = [time for time, _ in frames]
     if len(times) < 2:
         return frames

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Writes a run's report.html: one page with its pictures, a slider over its frames, histories, error
-budget, scene and timings, which needs no other file and no network.
+"""Writes a run's report.html: one page with its pictures, a slider over its frames, histories,
+error budget, scene and timings, which needs no other file and no network.
 
     signorini report out/lshape
 """
@@ -99,7 +99,8 @@ def facts(results):
     summary, units = results.summary, results.units
     rows = [(name, summary[key], html.escape(units.get(kind, "")))
             for key, name, kind in FACTS if summary.get(key) is not None]
-    rows += [(html.escape(name), value, "") for name, value in summary.get("quantities", {}).items()]
+    named = summary.get("quantities", {})
+    rows += [(html.escape(name), value, "") for name, value in named.items()]
     return table(rows)
 
 

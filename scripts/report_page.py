@@ -17,7 +17,8 @@ PAGE = """<!DOCTYPE html>
   .pair { display: grid; grid-template-columns: repeat(auto-fit, minmax(420px, 1fr)); gap: 1.2rem; }
   img { max-width: 100%; height: auto; display: block; margin: auto; }
   table { border-collapse: collapse; }
-  td, th { padding: .15rem .9rem .15rem 0; text-align: left; vertical-align: top; font-weight: normal; }
+  td, th { padding: .15rem .9rem .15rem 0; text-align: left; vertical-align: top;
+           font-weight: normal; }
   td.number { text-align: right; font-variant-numeric: tabular-nums; }
   td.bar { width: 16rem; }
   td.bar div { background: #2f6db3; height: .7rem; margin-top: .4rem; }
@@ -59,7 +60,9 @@ SLIDER = """<h2>Frames</h2>
   <input id="frame" type="range" min="0" max="$last" value="$last" aria-label="frame">
   <output id="time"></output>
 </div>
-<div class="pair"><img id="state" alt="the body"><img id="pressure" alt="contact pressure and gap"></div>
+<div class="pair">
+  <img id="state" alt="the body"><img id="pressure" alt="contact pressure and gap">
+</div>
 <script>
 const frames = $frames;
 const [slider, play] = ["frame", "play"].map(id => document.getElementById(id));

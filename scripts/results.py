@@ -36,8 +36,8 @@ class ResultError(Exception):
 
 @contextmanager
 def telling():
-    """Tells problems with results or with writing beside them in a line; the list has those that were
-    met."""
+    """Tells problems with results or with writing beside them in a line; the list has those that
+    were met."""
     problems = []
     try:
         yield problems
@@ -207,8 +207,8 @@ def paths(edges):
 def without_roundoff(results):
     """The results, with zeros in the place of what is only round-off.
 
-    Unloaded is a state whose displacements are below the rounding of coordinates, or a billion times
-    smaller than earlier in the run (solvers are exact to about 1e-10). In a loaded one pressures
+    Unloaded is a state whose displacements are below the rounding of coordinates, or a billion
+    times smaller than earlier in the run (solvers are exact to about 1e-10). In a loaded one pressures
     are compared with stresses, stresses with Young's modulus times the displacement over the size
     of the body, gaps with displacements.
     """

@@ -14,8 +14,8 @@ from drawing import (
 from expressions import evaluate
 from results import paths
 
-# In parts of the body's size: the longest arrow, and the distances from arrow to arrow and from roller
-# to roller.
+# In parts of the body's size: the longest arrow, and the distances from arrow to arrow and from
+# roller to roller.
 ARROW, SPACING, ROLLERS = 0.12, 0.05, 0.03
 # How far names are from what they name, inches.
 AWAY = 0.13
@@ -25,8 +25,8 @@ def draw_setting(results, _limits):
     """The body with its boundaries named, tractions as arrows, supports, and the foundation.
 
     Clamps are hatched; rollers stand where only one component is prescribed, or u·ν on an axis of
-    symmetry. The legend has the conditions in the scene's words. None where the folder does not hold
-    the scene.
+    symmetry. The legend has the conditions in the scene's words. None where the folder does not
+    hold the scene.
     """
     conditions = {b["name"]: b for b in results.scene.get("boundary", [])}
     boundaries = results.summary.get("boundaries")
@@ -54,18 +54,22 @@ def draw_setting(results, _limits):
     body_force = _draw_body_force(axes, results, time)
     frame(axes, np.vstack(places), units)
     for name, condition in conditions.items():
-        axes.plot([], [], color=_colour(condition), linewidth=4, label=_words(name, condition, units))
+        words = _words(name, condition, units)
+        axes.plot([], [], color=_colour(condition), linewidth=4, label=words)
     if body_force:
-        axes.plot([], [], color=GREEN, linewidth=4, label=f"body force: {body_force} {units['volume']}")
-    axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.55 / height), fontsize=8.5, handlelength=1)
+        words = f"body force: {body_force} {units['volume']}"
+        axes.plot([], [], color=GREEN, linewidth=4, label=words)
+    axes.legend(
+        loc="upper left", bbox_to_anchor=(0.0, -0.55 / height), fontsize=8.5, handlelength=1
+    )
     loads = f"; loads at t = {time:g} {units['time']}" if largest or body_force else ""
     axes.set_title(headline(results, f"setting{loads}"))
     return figure
 
 
 def _loads(results, conditions, curves):
-    """A time with loads, the shown one if it has any, and the tractions then: (n, 2) at the samples of
-    each curve, N/m²."""
+    """A time with loads, the shown one if it has any, and the tractions then: (n, 2) at the samples
+    of each curve, N/m²."""
     folder = _folder(results)
 
     def at(time):
@@ -101,7 +105,7 @@ def _vectors(expressions, points, time, folder):
 
 
 def _samples(line, spacing):
-    """Points along a line, about `spacing` apart and both ends among them, and the outward normals."""
+    """Points along a line, about `spacing` apart, its ends among them, and the outward normals."""
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
     s = np.concatenate(([0.0], np.cumsum(steps)))
     at = np.linspace(0.0, s[-1], max(3, 1 + round(s[-1] / spacing)))
@@ -116,15 +120,15 @@ def _draw_support(axes, line, condition, size):
     prescribed = condition.get("displacement", ["free", "free"])
     free = [component == "free" for component in prescribed]
     if not any(free):
-        strokes = withTickedStroke(spacing=6, angle=-135, length=1.0, linewidth=0.9, foreground=BLUE)
+        strokes = withTickedStroke(spacing=6, angle=-135, linewidth=0.9, foreground=BLUE)
         axes.plot(*line.T, color=BLUE, linewidth=0.9, path_effects=[strokes], zorder=1.5)
         axes.plot(*line.T, color=BLUE, linewidth=2.0, zorder=2.5, solid_capstyle="butt")
     elif condition.get("symmetry") or not all(free):
         points, normals = _samples(line, ROLLERS * size)
         radius = 0.35 * ROLLERS * size
         for point in points + radius * normals:
-            axes.add_patch(plt.Circle(point, radius, facecolor="white", edgecolor=BLUE, linewidth=0.9,
-                                      zorder=1.8))
+            axes.add_patch(plt.Circle(
+                point, radius, facecolor="white", edgecolor=BLUE, linewidth=0.9, zorder=1.8))
         outer = points + 2.2 * radius * normals
         axes.plot(*outer.T, color=BLUE, linewidth=1.2, zorder=1.8)
         return outer
@@ -149,7 +153,7 @@ def _draw_traction(axes, line, arrows, size):
 
 
 def _draw_body_force(axes, results, time):
-    """An arrow in the middle of the body; returns the force in the scene's words, if there is one."""
+    """An arrow in the middle of the body; returns the force in the scene's words, if any."""
     force = results.scene.get("body", {}).get("force")
     middle = results.nodes.mean(axis=0, keepdims=True)
     arrow = _vectors(force, middle, time, _folder(results)) if force else np.zeros((1, 2))
@@ -168,8 +172,8 @@ def _opposite(results, line):
 
 
 def _write_name(axes, line, name, condition, others, inch):
-    """The name of a boundary beside its middle, beyond its arrows and the obstacle; returns the corners
-    of a box around it. An inch of the picture is `inch` metres."""
+    """The name of a boundary beside its middle, beyond its arrows and the obstacle; returns the
+    corners of a box around it. An inch of the picture is `inch` metres."""
     points, normals = _samples(line, spacing=np.inf)
     x, y = normal = normals[1]
     beyond = max(0.0, ((others - points[1]) @ normal).max())
