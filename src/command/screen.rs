@@ -4,7 +4,7 @@ use super::run::Task;
 use signorini::{
     evolution::{Outcome, StepRecord},
     output::terminal::{Progress, say},
-    scene::{Stepping, TimeGrid},
+    scene::{Scheme, Stepping, TimeGrid},
 };
 
 /// The progress bar counts thousandths of [0, T].
@@ -88,7 +88,8 @@ fn steps(grid: TimeGrid, unit: &str) -> String {
     let end = grid.end;
     match grid.stepping {
         Stepping::Uniform { steps } => {
-            format!("{steps} steps of {} {unit} to t = {end}", rounded(end / steps as f64))
+            let scheme = if grid.scheme == Scheme::Bdf2 { " (bdf2)" } else { "" };
+            format!("{steps} steps of {} {unit} to t = {end}{scheme}", rounded(end / steps as f64))
         }
         Stepping::Auto { tolerance } => {
             format!("to t = {end} in steps as the error of ζ, {tolerance:e} each, allows")

@@ -110,6 +110,28 @@ impl DamageStep<'_> {
         if finite { Ok(DVector::from_vec(change)) } else { Err(failed()) }
     }
 
+    /// Replaces an error δ = `error` of ζ_{n−1} by what diffusion leaves of it after a planned step of
+    /// length k_n, δ + (k_n/k) ((M + kκL)⁻¹ M δ − δ); where that has no answer it stays. Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub(super) fn diffuse(
+        &mut self,
+        planned: &PlannedStep,
+        error: &mut DVector<f64>,
+    ) -> Result<(), RunError> {
+        let (partition, phases) = (&self.problem.body.vertices.partition, self.phases);
+        let zero = self.is_zero(error.as_slice());
+        let Some(law) = self.problem.damage().filter(|_| !zero) else { return Ok(()) };
+        let (mut left, no_source) = (error.clone(), vec![0.0; error.len()]);
+        let system = self.system(&law, planned.k)?;
+        if phases.time("damage solve", || system.advance(&no_source, left.as_mut_slice()))? {
+            partition.update(left.as_mut_slice(), 1)?;
+            *error += planned.length / planned.k * (left - &*error);
+        }
+        Ok(())
+    }
+
     /// Whether a source load is zero on all ranks. Collective.
     fn is_zero(&self, load: &[f64]) -> bool {
         self.problem.body.vertices.partition.comm().all(load.iter().all(|&b| b == 0.0))

@@ -45,7 +45,7 @@ pub struct Outcome {
 /// The stop at ζ_*.
 #[derive(Debug, Clone, Copy)]
 pub struct Stop {
-    /// When, s: the first t_n with min ζ ≤ ζ_*; where steps are chosen, the interpolated time.
+    /// When, s: the first t_n with min ζ ≤ ζ_*; of two-step differences, the interpolated time.
     pub time: f64,
     /// The min ζ found there, which is not accepted.
     pub zeta_min: f64,

@@ -101,12 +101,24 @@ pub struct TimeGrid {
     pub end: f64,
     /// How [0, T] is divided.
     pub stepping: Stepping,
+    /// The scheme of uniform steps; chosen ones are always two-step.
+    pub scheme: Scheme,
+}
+
+/// How a time step is made.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Scheme {
+    /// Euler's backward differences with the source at the old time, as in (25): of first order.
+    #[default]
+    Euler,
+    /// Two-step backward differences with an extrapolated source: of second order.
+    Bdf2,
 }
 
 /// How a time interval is divided.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Stepping {
-    /// Uniformly, as in (25).
+    /// Uniformly.
     Uniform {
         /// N, at least 1.
         steps: usize,
@@ -121,10 +133,10 @@ pub enum Stepping {
 
 impl TimeGrid {
     /// The uniform partition (25) of [0, `end`] closest to `step` (both positive, s)
-    /// and not coarser. A step that divides the end up to rounding is kept.
+    /// and not coarser, for Euler's scheme. A step that divides the end up to rounding is kept.
     pub fn uniform(end: f64, step: f64) -> Self {
         let steps = (end / step - 1e-9).ceil().max(1.0) as usize;
-        Self { end, stepping: Stepping::Uniform { steps } }
+        Self { end, stepping: Stepping::Uniform { steps }, scheme: Scheme::Euler }
     }
 
     /// t_n of `steps` equal steps, s; the last is the end without rounding.

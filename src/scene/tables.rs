@@ -9,7 +9,9 @@ use super::boundary::boundaries;
 use super::document::SceneText;
 use super::expression::Expression;
 use super::reader::{Reading, Table, Value};
-use super::{Damage, MeshSource, OutputOptions, Scene, Stepping, TimeGrid, Units, may_start_at};
+use super::{
+    Damage, MeshSource, OutputOptions, Scene, Scheme, Stepping, TimeGrid, Units, may_start_at,
+};
 use crate::{
     fem::Mass,
     mesh::Order,
@@ -153,10 +155,17 @@ fn time(table: &mut Table) -> Reading<(TimeGrid, Option<String>)> {
         })
     });
 
-    let (end, length, allowed) = (end?, length?, allowed?);
+    let written = table.get("scheme");
+    let scheme =
+        written.optional(|value| value.choice([("euler", Scheme::Euler), ("bdf2", Scheme::Bdf2)]));
+
+    let (end, length, allowed, scheme) = (end?, length?, allowed?, scheme?);
     let Some(length) = length else {
-        let tolerance = allowed.unwrap_or(STEP_TOLERANCE);
-        return Ok((TimeGrid { end, stepping: Stepping::Auto { tolerance } }, None));
+        if scheme == Some(Scheme::Euler) {
+            return Err(written.refuse("must be \"bdf2\" where step = \"auto\""));
+        }
+        let stepping = Stepping::Auto { tolerance: allowed.unwrap_or(STEP_TOLERANCE) };
+        return Ok((TimeGrid { end, stepping, scheme: Scheme::Bdf2 }, None));
     };
     if allowed.is_some() {
         return Err(tolerance.refuse("has no effect unless step = \"auto\""));
@@ -169,7 +178,8 @@ fn time(table: &mut Table) -> Reading<(TimeGrid, Option<String>)> {
         let problem = format!("is {length}: more than {MOST_STEPS:e} steps to {end} s");
         return Err(step.refuse(problem));
     }
-    let grid = TimeGrid::uniform(end, length);
+    let scheme = scheme.unwrap_or_default();
+    let grid = TimeGrid { scheme, ..TimeGrid::uniform(end, length) };
     Ok((grid, other_step(grid, length)))
 }
 

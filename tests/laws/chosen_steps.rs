@@ -125,6 +125,27 @@ fn a_sound_body_takes_few_steps() {
 }
 
 #[test]
+fn the_error_of_chosen_steps_is_estimated_within_0_7_and_1_4_of_it() {
+    // At the corners of the square early errors are large, and diffusion spreads them.
+    let run = |sets: &[&str]| {
+        let scene = shipped("square-mild", &[&["mesh.size=0.125"], sets].concat());
+        let outcome = history(&scene, SOLVERS[0]).1;
+        (scene, outcome)
+    };
+    let fine = run(&["time.scheme=bdf2", "time.step=2e-3"]).1.last.state.zeta;
+    let (scene, outcome) = run(&["time.step=auto"]);
+    let body = &scene.body;
+    let norm = |of: &dyn Fn(usize) -> f64| {
+        let squares: Vec<f64> = (0..fine.len()).map(|i| of(i).powi(2)).collect();
+        body.mean(&squares).sqrt()
+    };
+    let error = norm(&|i| outcome.last.state.zeta[i] - fine[i]) / norm(&|i| 1.0 - fine[i]);
+    let ratio = outcome.errors.damage_steps.unwrap() / error;
+    println!("error {error:.2e}, estimated over true: {ratio:.2}");
+    assert!((0.7..=1.4).contains(&ratio), "{ratio}");
+}
+
+#[test]
 fn the_note_of_a_run_tells_its_steps_and_their_error() {
     let scene = bent(10.0, "step = 'auto', tolerance = 0.01");
     let (steps, outcome) = history(&scene, SOLVERS[0]);

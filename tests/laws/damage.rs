@@ -5,7 +5,7 @@ use crate::support::{
 };
 use signorini::{
     contact::SOLVERS,
-    evolution::{DiscreteProblem, Step, Stop},
+    evolution::{DiscreteProblem, Outcome, Step, Stop},
     fem::{self, Body, DamageCertificate, DamageSystem, Mass, source_load},
     mesh::{Mesh, Order},
     petsc::Session,
@@ -166,14 +166,14 @@ const LAMBDA_D: f64 = 0.4;
 const LAMBDA_U: f64 = 90.0;
 const PRESSURE: f64 = 6.0;
 
-/// Pressed on the foundation by p = t PRESSURE, ζ₀ = 0.95.
-fn uniaxial(order: u8, mesh: Mesh, step: f64) -> DiscreteProblem {
+/// Pressed on the foundation by p = t PRESSURE, ζ₀ = 0.95, in these steps to ζ_* = `threshold`.
+fn uniaxial(order: u8, mesh: Mesh, steps: &str, threshold: f64) -> DiscreteProblem {
     let text = format!(
         "discretisation.displacement = {order}
          {MATERIAL}
          damage = {{ diffusion = 0.2, lambda_d = {LAMBDA_D}, lambda_u = {LAMBDA_U}, lambda_w = 0,
-                     strain_cap = 1000, threshold = 0.01, initial = 0.95 }}
-         time = {{ end = 1, step = {step:?} }}
+                     strain_cap = 1000, threshold = {threshold}, initial = 0.95 }}
+         time = {{ end = 1, {steps} }}
          boundary = [
             {{ name = 'left', symmetry = true }},
             {{ name = 'bottom', gap = 0 }},
@@ -194,7 +194,7 @@ fn rate(t: f64, zeta: f64) -> f64 {
 fn uniform_stress_keeps_damage_uniform_and_follows_the_scalar_recursion() {
     // ζ_n = ζ_{n−1} + k φ(t_{n−1}, ζ_{n−1}), for every solver of the contact.
     for (solver, order) in SOLVERS.into_iter().flat_map(|solver| [(solver, 1), (solver, 2)]) {
-        let (steps, _) = history(&uniaxial(order, distorted(4), 0.05), solver);
+        let (steps, _) = history(&uniaxial(order, distorted(4), "step = 0.05", 0.01), solver);
         let mut zeta = 0.95;
         for pair in steps.windows(2) {
             zeta += 0.05 * rate(pair[0].state.time, zeta);
@@ -207,24 +207,54 @@ fn uniform_stress_keeps_damage_uniform_and_follows_the_scalar_recursion() {
     }
 }
 
-#[test]
-fn uniform_damage_converges_to_its_differential_equation_with_order_one() {
-    // Runge and Kutta's fourth order with 1000 steps is exact here.
-    let h = 1e-3;
-    let exact = (0..1000).fold(0.95, |z, n| {
+/// ζ' = φ from ζ₀ = 0.95 to the time `end`, by so many steps of Runge and Kutta's fourth order that it
+/// is exact here.
+fn exact(end: f64) -> f64 {
+    let h = 1e-3 * end;
+    (0..1000).fold(0.95, |z, n| {
         let t = f64::from(n) * h;
         let a = rate(t, z);
         let b = rate(t + 0.5 * h, z + 0.5 * h * a);
         let c = rate(t + 0.5 * h, z + 0.5 * h * b);
         z + h / 6.0 * (a + 2.0 * b + 2.0 * c + rate(t + h, z + h * c))
-    });
-    let steps = [0.05, 0.025, 0.0125];
-    let errors = steps.map(|step| {
-        (run(&uniaxial(1, square(2), step), SOLVERS[0]).last.record.zeta_mean - exact).abs()
-    });
-    let order = order(&steps, &errors);
-    println!("ζ(1) = {exact}, errors {errors:?}: order {order:.3}");
-    assert!((order - 1.0).abs() < 0.1, "{order}: {errors:?}");
+    })
+}
+
+#[test]
+fn uniform_damage_converges_to_its_differential_equation_with_the_order_of_the_scheme() {
+    let expected = exact(1.0);
+    let outcome = |steps: &str| run(&uniaxial(1, square(2), steps, 0.01), SOLVERS[0]);
+    let error = |outcome: &Outcome| (outcome.last.record.zeta_mean - expected).abs();
+    for (scheme, expected) in [("euler", 1.0), ("bdf2", 2.0)] {
+        let steps = [0.01, 0.005, 0.0025];
+        let errors = steps.map(|k| error(&outcome(&format!("step = {k}, scheme = '{scheme}'"))));
+        let order = order(&steps, &errors);
+        println!("{scheme}: errors {errors:?}: order {order:.3}");
+        assert!((order - expected).abs() < 0.1, "{scheme}: {order}: {errors:?}");
+    }
+    let chosen = [1e-3, 1e-4, 1e-5].map(|e| outcome(&format!("step = 'auto', tolerance = {e:?}")));
+    let lengths = chosen.each_ref().map(|outcome| 1.0 / outcome.last.record.step as f64);
+    let errors = chosen.each_ref().map(error);
+    let order = order(&lengths, &errors);
+    println!("chosen: 1 / {lengths:?} steps, errors {errors:?}: order {order:.3}");
+    assert!((order - 2.0).abs() < 0.3, "{order}: {errors:?}");
+}
+
+#[test]
+fn the_time_at_which_damage_reaches_its_threshold_is_of_second_order_too() {
+    let time = 0.8;
+    let error = |steps: &str| {
+        let stop = run(&uniaxial(1, square(2), steps, exact(time)), SOLVERS[0]).stopped.unwrap();
+        let error = (stop.time - time).abs();
+        assert!(error <= stop.uncertainty, "{steps}: {stop:?}");
+        error
+    };
+    // None of these steps ends at 0.8.
+    let counts = [17.0, 34.0, 67.0];
+    let errors = counts.map(|n: f64| error(&format!("step = {:?}, scheme = 'bdf2'", 1.0 / n)));
+    let order = order(&counts.map(|n| 1.0 / n), &errors);
+    println!("errors {errors:?}: order {order:.3}");
+    assert!(order > 1.7, "{order}: {errors:?}");
 }
 
 #[test]

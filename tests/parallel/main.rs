@@ -241,13 +241,16 @@ fn pieces_and_a_hinge() {
 }
 
 #[test]
-fn chosen_steps_are_the_same_on_all_ranks() {
+fn two_step_differences_are_the_same_on_all_ranks() {
     let test_directory = TestDirectory::new();
     let chosen = ["--set", "time.step=\"auto\"", "--set", "time.tolerance=1e-3"];
-    test_directory.run(&[&chosen[..], &["--out", "one"]].concat());
-    let arguments = [&["run", "scene.toml", "--out", "three"], &chosen[..]].concat();
-    assert_eq!(ProgramOutput::of(&mut on_ranks(&test_directory, 3, &arguments)).code, Some(0));
-    same_history(&test_directory, "three", "one");
+    let uniform = ["--set", "time.scheme=\"bdf2\""];
+    for steps in [&chosen[..], &uniform] {
+        test_directory.run(&[steps, &["--out", "one"]].concat());
+        let arguments = [&["run", "scene.toml", "--out", "three"], steps].concat();
+        assert_eq!(ProgramOutput::of(&mut on_ranks(&test_directory, 3, &arguments)).code, Some(0));
+        same_history(&test_directory, "three", "one");
+    }
 }
 
 #[test]

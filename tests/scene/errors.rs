@@ -81,6 +81,16 @@ const CASES: &[(&str, &str, &[&str])] = &[
         "gap = true",
         &["bad.toml:36: boundary \"foundation\": gap must be a number or an expression"],
     ),
+    (
+        "step = 0.01",
+        "step = 0.01\nscheme = \"bdf3\"",
+        &["bad.toml:21: time.scheme must be \"euler\" or \"bdf2\""],
+    ),
+    (
+        "step = 0.01",
+        "step = \"auto\"\nscheme = \"euler\"",
+        &["bad.toml:21: time.scheme must be \"bdf2\" where step = \"auto\""],
+    ),
     ("[0, \"-t\"]", "\"-t\"", &["bad.toml:22: body.force must be an array"]),
     ("[0, \"-t\"]", "[0, 1, 2]", &["bad.toml:22: body.force must have two components, but has 3"]),
     ("[0, \"-t\"]", "[0, [1]]", &["bad.toml:22: body.force[1] must be a number or an expression"]),

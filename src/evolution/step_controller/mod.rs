@@ -1,16 +1,16 @@
 //! Step control: which steps are made, and whether they are accepted.
 //!
-//! Steps are uniform as in (25), or chosen by their error. Chosen ones are two-step backward
-//! differences with an extrapolated source (Hairer, Nørsett, Wanner, *Solving Ordinary Differential
-//! Equations I*, III.5): with the step k_n = ω k_{n−1},
+//! Steps are uniform, Euler's (25) or by the scheme "bdf2", or chosen by their error. The last two are
+//! two-step backward differences with an extrapolated source (Hairer, Nørsett, Wanner, *Solving
+//! Ordinary Differential Equations I*, III.5): with the step k_n = ω k_{n−1},
 //!
 //! (M + kκL) ζ_n = M (ζ̃_{n−1} + β (ζ̃_{n−1} − ζ̃_{n−2})) + k b̂_n,
 //! k = k_n (1+ω)/(1+2ω), β = ω²/(1+2ω), b̂_n = b_{n−1} + ω (b_{n−1} − b_{n−2}),
 //!
 //! which is a step (28) of length k from another start with another source. When u_n is known, so is
 //! b_n, and the error of the extrapolation b̂_n is corrected in the next step: ζ̃_n = ζ_n + e_n with
-//! (M + kκL) e_n = k (b_n − b̂_n). Uniform steps, and the first chosen one, are the same formula
-//! with ω = 0; uniform ones have no correction.
+//! (M + kκL) e_n = k (b_n − b̂_n). Euler's steps (28), and the first one of all, are the same formula
+//! with ω = 0; Euler's have no correction.
 
 mod error_control;
 
@@ -18,7 +18,7 @@ use super::{
     BoundViolation, DiscreteProblem, RunError, Step, StepFailure, Stop,
     damage_step::{DamageSource, DamageStep, DamageUpdate},
 };
-use crate::scene::Stepping;
+use crate::scene::{Scheme, Stepping};
 use error_control::ErrorControl;
 use nalgebra::DVector;
 
@@ -68,6 +68,8 @@ pub(super) struct StepController<'a> {
     problem: &'a DiscreteProblem,
     /// Error control of the damage; `None` where steps are uniform.
     chosen: Option<ErrorControl<'a>>,
+    /// Whether steps are two-step backward differences; else Euler's.
+    two_step: bool,
     /// k_{n−1}, s; infinite before the first step, so that ω = 0.
     length: f64,
     /// ζ̃_{n−1}, ζ̃_{n−1} − ζ̃_{n−2}, and the rate of the formula at t_{n−1}, 1/s.
@@ -80,8 +82,8 @@ pub(super) struct StepController<'a> {
     /// Per node, Σ error / rate of the steps: by how much it reaches a given ζ too late or too early,
     /// s. (An error δζ shifts an autonomous evolution by δζ/ζ', once and for all.)
     delay: DVector<f64>,
-    /// The error of ζ̃ from the steps: what they add to it and how it has grown since; and what the
-    /// last step adds to that of ζ.
+    /// The error of ζ̃ from the steps: what they add to it, how it has grown and, of two-step differences,
+    /// how it has diffused since; and what the last step adds to that of ζ.
     error: DVector<f64>,
     last_error: DVector<f64>,
     /// The time since errors have last grown, s.
@@ -100,9 +102,12 @@ impl<'a> StepController<'a> {
     /// After (27), from ζ₀ = `zeta` and its damage source.
     pub(super) fn new(problem: &'a DiscreteProblem, zeta: &[f64], source: DamageSource) -> Self {
         let zeros = DVector::zeros(zeta.len());
+        let chosen = ErrorControl::new(problem, zeta);
+        let bdf2 = problem.scene().time.is_some_and(|grid| grid.scheme == Scheme::Bdf2);
         Self {
             problem,
-            chosen: ErrorControl::new(problem, zeta),
+            two_step: bdf2 || chosen.is_some(),
+            chosen,
             length: f64::INFINITY,
             zeta: DVector::from_column_slice(zeta),
             change: zeros.clone(),
@@ -121,16 +126,14 @@ impl<'a> StepController<'a> {
     /// The step after the accepted one `last`; `None` at the end of time.
     pub(super) fn plan(&mut self, last: &Step) -> Option<PlannedStep> {
         let (grid, n) = (self.problem.scene().time?, last.record.step + 1);
-        let (time, length, omega) = match (&mut self.chosen, grid.stepping) {
-            (Some(chosen), _) => {
-                let (time, length) = chosen.choose(last.state.time)?;
-                (time, length, length / self.length)
-            }
+        let (time, length) = match (&mut self.chosen, grid.stepping) {
+            (Some(chosen), _) => chosen.choose(last.state.time)?,
             (None, Stepping::Uniform { steps }) if n <= steps => {
-                (grid.time(n, steps), grid.end / steps as f64, 0.0)
+                (grid.time(n, steps), grid.end / steps as f64)
             }
             _ => return None,
         };
+        let omega = if self.two_step { length / self.length } else { 0.0 };
         let beta = omega * omega / (1.0 + 2.0 * omega);
         let k = length * (1.0 + omega) / (1.0 + 2.0 * omega);
         let shift = beta * &self.change;
@@ -156,28 +159,30 @@ impl<'a> StepController<'a> {
         damage_step: &mut DamageStep,
     ) -> Result<Verdict, RunError> {
         let source = damage_step.source(&step.state);
-        let correction = match self.chosen {
-            Some(_) => damage_step.correction(planned, &source.load - &planned.load)?,
-            None => DVector::zeros(damage.zeta.len()),
+        let correction = match self.two_step {
+            true => damage_step.correction(planned, &source.load - &planned.load)?,
+            false => DVector::zeros(damage.zeta.len()),
         };
         let corrected = &damage.zeta + &correction;
         let rate = planned.rate(&corrected);
-        match &mut self.chosen {
-            None => self.add_uniform_delay(planned, &rate),
-            Some(chosen) => {
-                // The rate before the first step is that of its source, which needs no correction.
-                let first = || &rate - &correction / planned.k;
-                let sum = self.rate.clone().unwrap_or_else(first) + &rate;
-                let trapezoidal = 0.5 * planned.length * sum;
-                let truncation = TRUNCATION * (trapezoidal - (&corrected - &self.zeta));
-                let errors = [&correction, &truncation];
-                if let Err(factor) = chosen.judge(planned, &damage.zeta, errors, &rate) {
-                    let shorter = self.retry(planned, factor);
-                    return shorter.ok_or_else(|| planned.failed(StepFailure::TooShort));
-                }
-                add_delay(&mut self.delay, &truncation, &rate);
-                self.grow_error(planned.length, &truncation);
+        if self.two_step {
+            // The rate before the first step is that of its source, which needs no correction.
+            let first = || &rate - &correction / planned.k;
+            let sum = self.rate.clone().unwrap_or_else(first) + &rate;
+            let trapezoidal = 0.5 * planned.length * sum;
+            let truncation = TRUNCATION * (trapezoidal - (&corrected - &self.zeta));
+            let errors = [&correction, &truncation];
+            if let Some(chosen) = &mut self.chosen
+                && let Err(factor) = chosen.judge(planned, &damage.zeta, errors, &rate)
+            {
+                let shorter = self.retry(planned, factor);
+                return shorter.ok_or_else(|| planned.failed(StepFailure::TooShort));
             }
+            add_delay(&mut self.delay, &truncation, &rate);
+            self.grow_error(planned.length, &truncation);
+            damage_step.diffuse(planned, &mut self.error)?;
+        } else {
+            self.add_euler_delay(planned, &rate);
         }
         self.violation.observe(planned, damage.min_max, planned.time);
         let (lower, upper) = planned.bounds;
@@ -185,7 +190,7 @@ impl<'a> StepController<'a> {
         let partition = &self.problem.body.vertices.partition;
         self.bounds = shifted(tightened, partition.min_max(correction.as_slice()));
         self.length = planned.length;
-        if self.chosen.is_some() {
+        if self.two_step {
             self.last_error = correction;
         }
         self.change = &corrected - &self.zeta;
@@ -204,11 +209,12 @@ impl<'a> StepController<'a> {
         last: &Step,
     ) -> Verdict {
         let (zeta_min, level) = (damage.min_max.0, self.problem.threshold());
-        let (time, delays) = if let Some(chosen) = &self.chosen {
+        let (time, delays) = if self.two_step {
             let from = self.problem.body.vertices.partition.min_max(self.zeta.as_slice()).0;
             let part = if from > level { (from - level) / (from - zeta_min) } else { 0.0 };
             // The last ζ that is written counts as well as its correction ζ̃.
-            if from.max(last.record.zeta_min) - level > chosen.landing()
+            if let Some(chosen) = &self.chosen
+                && from.max(last.record.zeta_min) - level > chosen.landing()
                 && let Some(shorter) = self.retry(planned, (0.9 * part).max(0.01))
             {
                 return shorter;
@@ -216,7 +222,7 @@ impl<'a> StepController<'a> {
             (last.state.time + part * planned.length, 1.0)
         } else {
             // This step tells the error of the one before.
-            self.add_uniform_delay(planned, &planned.rate(&damage.zeta));
+            self.add_euler_delay(planned, &planned.rate(&damage.zeta));
             (planned.time, 2.0)
         };
         self.violation.observe(planned, damage.min_max, time);
@@ -260,9 +266,9 @@ impl<'a> StepController<'a> {
         possible.then_some(Verdict::Retry)
     }
 
-    /// Adds the delay of the uniform step before the one with this `rate`: (28) takes the source at
-    /// the beginning of a step, so its error is ½ k (ζ'_n − ζ'_{n−1}).
-    fn add_uniform_delay(&mut self, planned: &PlannedStep, rate: &DVector<f64>) {
+    /// Adds the delay of the Euler step before the one with this `rate`: (28) takes the source at the
+    /// beginning of a step, so its error is ½ k (ζ'_n − ζ'_{n−1}).
+    fn add_euler_delay(&mut self, planned: &PlannedStep, rate: &DVector<f64>) {
         if let Some(before) = &self.rate {
             let error = 0.5 * planned.k * (rate - before);
             add_delay(&mut self.delay, &error, &(0.5 * (rate + before)));

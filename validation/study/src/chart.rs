@@ -60,7 +60,8 @@ impl Choice {
             parameters.insert("grading".to_owned(), self.grading);
         }
         scene.contact.tolerance = self.tolerance;
-        scene.time = Some(TimeGrid { end: spec.end, stepping: self.stepping });
+        let euler = TimeGrid::uniform(spec.end, spec.end);
+        scene.time = Some(TimeGrid { stepping: self.stepping, ..euler });
         StudyRun { scene, refinements: 0, solver: self.solver.to_owned() }
     }
 }
