@@ -18,13 +18,13 @@ from dataclasses import replace
 
 import matplotlib.pyplot as plt
 
-from animation import MOVIES, animate
+from animation import FRAMES, MOVIES, animate
 from contact_pressure import draw_evolution, draw_pressure
 from histories import draw_damage_history
 from limits import box_of, limits_of
 from maps import draw_deformed, draw_stress_and_damage
 from paraview_script import write_script
-from reading import read_results, states
+from reading import evenly, read_results, states
 from results import telling
 from setting import draw_setting
 
@@ -83,7 +83,9 @@ def save(figure, results, name, formats):
 def draw(results, limits, arguments):
     """Everything that is asked for of one run."""
     if arguments.paraview:
-        print(write_script(results, limits))
+        # Its scales are for all frames.
+        chosen = states(results, evenly(results.frames, FRAMES))
+        print(write_script(results, limits_of(chosen, arguments.factor)))
         return
     last = replace(results, time=results.frames[-1][0])
     for name, figure in FIGURES.items():

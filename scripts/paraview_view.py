@@ -53,7 +53,7 @@ def view_of_deformation(fields, view):
           AmbientColor=[0, 0, 0], DiffuseColor=[0, 0, 0])
     most = simple.Threshold(registrationName="damaged most", Input=body)
     setup(most, Scalars=["POINTS", "damage"], ThresholdMethod="Above Upper Threshold",
-             UpperThreshold=0.5 * RUN["damage"])
+          UpperThreshold=0.5 * RUN["damage"])
     simple.Hide(most, view)
     return f"deformed body, displacements x {RUN['factor']:g}"
 
@@ -67,8 +67,11 @@ def view_of_stress(fields, contact, view):
         return "von Mises stress"
     arrows = simple.Glyph(registrationName="contact pressure", Input=contact, GlyphType="Arrow")
     setup(arrows, OrientationArray=["POINTS", "pressure_on_body"],
-               ScaleArray=["POINTS", "normal_pressure"], GlyphMode="All Points",
-               ScaleFactor=0.15 * RUN["size"] / RUN["pressure"])
+          ScaleArray=["POINTS", "normal_pressure"], GlyphMode="All Points",
+          ScaleFactor=0.12 * RUN["size"] / RUN["pressure"])
+    # Thin ones, with their tips on the body.
+    setup(arrows.GlyphType, TipRadius=0.03, TipLength=0.15, ShaftRadius=0.008)
+    setup(arrows.GlyphTransform, Translate=[-1, 0, 0])
     arrows = simple.Show(arrows, view)
     setup(arrows, ColorArrayName=["POINTS", ""],
           AmbientColor=[0.75, 0.2, 0.15], DiffuseColor=[0.75, 0.2, 0.15])

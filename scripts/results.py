@@ -44,7 +44,7 @@ def telling():
     except ResultError as error:
         problems.append(str(error))
     except OSError as error:
-        problems.append(f"{error.filename}: {error.strerror}")
+        problems.append(f"{error.filename or 'output'}: {error.strerror}")
     for problem in problems:
         print(f"error: {problem}", file=sys.stderr)
 
