@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use signorini::{
     evolution::{Outcome, RunError, Step, StepRecord},
     output::{
-        self, FieldWriter, History, OutputError,
+        self, FieldWriter, OutputError, Table,
         terminal::{Progress, say},
         write_whole,
     },
@@ -24,7 +24,7 @@ pub(super) struct Recorder<'a> {
     /// On the first rank, which shows the run.
     bar: Option<Progress>,
     /// On the first rank, from the first accepted step on.
-    history: Option<History>,
+    history: Option<Table>,
     last: Option<Step>,
     /// Seconds of all accepted steps after n = 0.
     stepping: f64,
@@ -46,7 +46,8 @@ impl<'a> Recorder<'a> {
         if let Some(mesh) = adapted {
             write_whole(&folder.join("mesh.msh"), mesh.as_bytes())?;
         }
-        self.history = Some(History::create(folder)?);
+        let (path, columns) = (folder.join("history.csv"), self.task.problem.quantities());
+        self.history = Some(Table::create(path, &StepRecord::default(), &columns)?);
         Ok(())
     }
 
@@ -85,7 +86,10 @@ impl<'a> Recorder<'a> {
         let written = self.task.phases.time("output", || {
             let end = self.task.problem.scene().time.map_or(1.0, |grid| grid.end);
             self.bar.iter_mut().for_each(|bar| screen::progress(bar, &step.record, end));
-            let row = self.history.as_mut().map_or(Ok(()), |history| history.add(&step.record));
+            let row = self
+                .history
+                .as_mut()
+                .map_or(Ok(()), |history| history.add(&[(&step.record, &step.quantities)]));
             // All ranks write the frame together, also where the row could not be written.
             match self.is_frame(&step.record) {
                 true => row.and(self.fields.add(&self.task.problem, &step.state)),
@@ -114,9 +118,14 @@ impl<'a> Recorder<'a> {
         // The rest is for the first rank alone.
         let Some(bar) = &self.bar else { return written };
 
+        let quantities = task.problem.quantities();
+        let quantities: Vec<(String, f64)> = last
+            .iter()
+            .flat_map(|step| quantities.iter().cloned().zip(step.quantities.clone()))
+            .collect();
         let record = last.map(|step| step.record);
         let wall = task.started.elapsed().as_secs_f64();
-        let summary = summary(task, record, result, &notes, wall);
+        let summary = summary(task, record, &quantities, result, &notes, wall);
         if record.is_some() {
             let path = task.folder.join("summary.json");
             write_whole(&path, format!("{summary:#}\n").as_bytes())?;
@@ -124,7 +133,7 @@ impl<'a> Recorder<'a> {
         if task.profile {
             shown.clone_from(&notes);
         }
-        let mut lines = screen::conclusion(task, record, outcome, &shown);
+        let mut lines = screen::conclusion(task, record, &quantities, outcome, &shown);
         if task.profile {
             let steps = record.map_or(0, |record| record.step);
             lines.push(String::new());
@@ -143,6 +152,7 @@ impl<'a> Recorder<'a> {
 fn summary(
     task: &Task,
     last: Option<StepRecord>,
+    quantities: &[(String, f64)],
     result: &Result<Outcome, RunError>,
     notes: &[String],
     wall: f64,
@@ -177,6 +187,7 @@ fn summary(
         "work": last.map(|record| record.work),
         "contact_force": last.map(|record| record.contact_force),
         "active_nodes": last.map(|record| record.active_nodes),
+        "quantities": quantities.iter().cloned().collect::<BTreeMap<_, _>>(),
         // The worst of all steps.
         "kkt": outcome.map(|outcome| outcome.kkt).or(last.map(|record| record.kkt())),
         // Estimated relative errors of the last state; null where there is none.

@@ -7,6 +7,9 @@ use signorini::{
     scene::{Scheme, Stepping, TimeGrid},
 };
 
+/// A component below this part of its force is shown as zero.
+const ROUNDING: f64 = 1e-9;
+
 /// The progress bar counts thousandths of [0, T].
 const LENGTH: u64 = 1000;
 
@@ -44,6 +47,7 @@ pub fn progress(bar: &mut Progress, record: &StepRecord, end: f64) {
 pub fn conclusion(
     task: &Task,
     last: Option<StepRecord>,
+    quantities: &[(String, f64)],
     outcome: Option<&Outcome>,
     notes: &[String],
 ) -> Vec<String> {
@@ -64,6 +68,15 @@ pub fn conclusion(
             let contact =
                 format!("{active} of {nodes} nodes active, force {sum:.6e} {force}/{length}");
             lines.push(row("contact", contact));
+        }
+        // Resultants come first, three for each support.
+        let supports = &task.problem.supports.names;
+        for (name, resultant) in supports.iter().zip(quantities.chunks_exact(3)) {
+            let [x, y, moment] = [0, 1, 2].map(|i| resultant[i].1);
+            let size = x.hypot(y);
+            let [x, y] = [x, y].map(|f| if f.abs() < ROUNDING * size { 0.0 } else { f });
+            let resultant = format!("force ({x:.4e}, {y:.4e}) {force}/{length}");
+            lines.push(row("support", format!("{name}: {resultant}, moment {moment:.4e} {force}")));
         }
         if let Some(outcome) = outcome {
             let [first, rest @ ..] = outcome.errors.lines();

@@ -142,18 +142,19 @@ impl<'a> ContactStep<'a> {
         }
         let case = agreed(comm, phases.time("loads", || problem.load_case(time)))?;
         self.start(&case)?;
-        let (Judged { u, kkt, scales, force, contact, .. }, report) =
+        let (Judged { u, kkt, scales, force, unbalanced, contact, .. }, report) =
             self.solve_certified(step, &case)?;
         self.next.scales = scales;
         self.next.active = active_bounds(&problem.constraints, &contact, 0.0);
         let unconstrained = self.unconstrained_motion(&contact, force);
         let u = self.next.datum.total(u);
         let state = State { time, u, zeta: zeta.to_vec(), contact };
-        let mut record = phases.time("step record", || {
-            StepRecord::new(problem, step, &state, &case.load, &report, &kkt)
+        let (mut record, quantities) = phases.time("step record", || {
+            let record = StepRecord::new(problem, step, &state, &case.load, &report, &kkt);
+            (record, problem.quantities_in(&state, &unbalanced))
         });
         record.seconds = started.elapsed().as_secs_f64();
-        Ok(Step { state, record, report, unconstrained, skipped_damage_solve: false })
+        Ok(Step { state, record, quantities, report, unconstrained, skipped_damage_solve: false })
     }
 
     /// The last solve, at `time`, belongs to an accepted step.

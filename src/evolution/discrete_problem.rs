@@ -1,9 +1,10 @@
 //! The discrete problem: a scene bound to its mesh, all that does not change from step to step.
 
 use super::{
-    Foundation, Loads, RunError, agreed,
+    Foundation, Loads, RunError, State, Supports, agreed,
     boundary_conditions::{BoundaryConditions, ContactBoundary},
     notes,
+    probe::{OBSERVED, Probes},
 };
 use crate::{
     contact::{Bound, Certificate, ConstraintError, Constraints, DrivenMotion, RigidMotions},
@@ -31,6 +32,9 @@ pub struct DiscreteProblem {
     pub motions: RigidMotions,
     /// Loads and prescribed displacements.
     pub loads: Loads,
+    /// The boundaries that support the body.
+    pub supports: Supports,
+    probes: Probes,
     /// The largest ‖·‖₂ of the nodal loads at some times of the run, N per metre of thickness.
     pub(super) largest_load: f64,
     /// KKT tolerance.
@@ -132,6 +136,8 @@ impl DiscreteProblem {
             constraints,
             motions,
             loads,
+            supports: Supports::new(&scene, &body),
+            probes: Probes::new(&scene, &body)?,
             tolerance: scene.contact.tolerance,
             body,
             scene,
@@ -160,6 +166,8 @@ impl DiscreteProblem {
             certificate: self.certificate.restrict(&subdomain),
             motions: self.motions.restrict(&subdomain),
             loads: self.loads.restrict(&subdomain),
+            supports: self.supports.restrict(&subdomain),
+            probes: self.probes.restrict(&subdomain),
             body: subdomain.body(&self.body),
             undivided: Some((self.body.mesh, owners)),
             ..self
@@ -308,13 +316,35 @@ impl DiscreteProblem {
         self.scene.damage.as_ref().map_or(0.0, |damage| damage.law.threshold)
     }
 
+    /// What is observed in every step beside its record: of each supporting boundary the resultant of
+    /// its forces on the body, N per metre of thickness, and their moment about the origin, N; at
+    /// each probe displacement, m, damage and stress, Pa.
+    pub fn quantities(&self) -> Vec<String> {
+        let resultants = ["force_x", "force_y", "moment"];
+        let probes: Vec<_> = self.scene.probes.iter().map(|probe| probe.name.clone()).collect();
+        let columns = |names: &[String], of: &[&str]| -> Vec<String> {
+            names.iter().flat_map(|name| of.iter().map(move |of| format!("{name}.{of}"))).collect()
+        };
+        [columns(&self.supports.names, &resultants), columns(&probes, &OBSERVED)].concat()
+    }
+
+    /// Their values in a state that leaves the nodal forces `unbalanced`, f − Ku. Collective.
+    pub(super) fn quantities_in(&self, state: &State, unbalanced: &[f64]) -> Vec<f64> {
+        let mut values = self.supports.resultants(&self.body, unbalanced, &state.contact);
+        values.extend(self.probes.values(self, state));
+        self.body.nodes.partition.comm().sum(&mut values);
+        // No -0.
+        values.iter().map(|value| value + 0.0).collect()
+    }
+
+    /// η_*(ζ).
+    pub(super) fn truncated(&self, zeta: f64) -> f64 {
+        self.scene.damage.as_ref().map_or(zeta, |damage| damage.law.truncate(zeta))
+    }
+
     /// η_*(ζ) at the quadrature points of the elements of u, interpolated between the vertices.
     pub fn zeta_at_points(&self, zeta: &[f64]) -> Vec<f64> {
-        let truncate = |z: f64| match &self.scene.damage {
-            Some(damage) => damage.law.truncate(z),
-            None => z,
-        };
-        self.body.at_points(&zeta.iter().map(|&z| truncate(z)).collect::<Vec<_>>())
+        self.body.at_points(&zeta.iter().map(|&z| self.truncated(z)).collect::<Vec<_>>())
     }
 
     /// The named curves of the whole mesh: the ends of their edges, m, the body on the left.

@@ -35,8 +35,10 @@ mod loads;
 mod mesh_error;
 mod notes;
 mod outcome;
+mod probe;
 mod state;
 mod step_controller;
+mod supports;
 mod unresolved;
 
 pub use crate::contact::ContactPoint;
@@ -51,6 +53,7 @@ pub use extrapolation::Extrapolation;
 pub use loads::Loads;
 pub use outcome::{BoundViolation, Outcome, Stop};
 pub use state::{State, Step, StepRecord};
+pub use supports::{ContactRow, Supports};
 
 use crate::petsc::{Communicator, Session};
 use damage_step::DamageStep;

@@ -14,6 +14,8 @@ pub struct Step {
     pub state: State,
     /// A row of `history.csv`.
     pub record: StepRecord,
+    /// The rest of the row: [`DiscreteProblem::quantities`].
+    pub quantities: Vec<f64>,
     /// What the contact solve took.
     pub report: ContactReport,
     /// A rigid motion that the active nodes leave unconstrained, if there is one.

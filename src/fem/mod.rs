@@ -19,6 +19,7 @@ mod recovery;
 mod rigid_part;
 mod damage;
 mod loads;
+mod location;
 
 pub(crate) use body::for_elements;
 pub use body::{Body, Cells, Elements, Nodes};
@@ -27,6 +28,7 @@ pub use edge::{Edge, gauss_points};
 pub use elasticity::Elasticity;
 pub use element::{Element, QuadraturePoint};
 pub use loads::{add_body_force, add_traction, midpoint};
+pub use location::{Location, PointValues};
 pub use nodal_bases::NodalBases;
 pub use partition::Partition;
 pub use quadratic::{mean_product, quadratic_load};

@@ -149,6 +149,11 @@ impl Subdomain {
         self.local(node).filter(|&local| local < self.nodes().partition.owned())
     }
 
+    /// The local index of a triangle, if it belongs to the rank.
+    pub fn own_triangle(&self, triangle: usize) -> Option<usize> {
+        self.triangles[..self.own_triangles].iter().position(|&own| own == triangle)
+    }
+
     /// The local part of a nodal field like u of the undivided body with `block` components.
     pub fn field<T: Copy>(&self, undivided: &[T], block: usize) -> Vec<T> {
         self.nodes().field(undivided, block)

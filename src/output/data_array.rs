@@ -34,6 +34,14 @@ impl DataArray {
         Self { attributes, bytes }
     }
 
+    /// The array with names for its components, which ParaView shows.
+    pub(super) fn with_names(mut self, names: &[&str]) -> Self {
+        for (component, name) in names.iter().enumerate() {
+            self.attributes += &format!(" ComponentName{component}=\"{name}\"");
+        }
+        self
+    }
+
     /// The element `<PDataArray>`, which declares the array in the list of a file's pieces.
     pub(super) fn declaration(&self) -> String {
         format!("<PDataArray {}/>\n", self.attributes)

@@ -37,11 +37,6 @@ impl GrowingFile {
         &self.path
     }
 
-    /// Whether it has no piece yet.
-    pub(super) fn is_empty(&self) -> bool {
-        self.length == 0
-    }
-
     /// Adds a piece.
     pub(super) fn add(&mut self, piece: &[u8]) -> Result<(), OutputError> {
         let text = [piece, self.ending.as_bytes()].concat();

@@ -1,6 +1,7 @@
 //! What a run leaves behind: `fields.pvd` with its frames, `history.csv`, `summary.json`; and what
 //! the commands share at the terminal.
 
+mod contact;
 mod data_array;
 mod growing_file;
 pub mod terminal;
@@ -8,7 +9,7 @@ mod vtu;
 
 pub use vtu::FieldWriter;
 
-use crate::{evolution::StepRecord, scene::AS_RUN};
+use crate::scene::AS_RUN;
 use growing_file::GrowingFile;
 use serde::Serialize;
 use std::{
@@ -71,8 +72,15 @@ pub fn lock(folder: &Path) -> Result<Option<File>, OutputError> {
 }
 
 /// What a run and its figures leave in a folder besides the frames and the pictures.
-const FILES: [&str; 5] =
-    ["fields.pvd", "history.csv", "summary.json", "report.html", "open_in_paraview.py"];
+const FILES: [&str; 7] = [
+    "contact.csv",
+    "contact.pvd",
+    "fields.pvd",
+    "history.csv",
+    "summary.json",
+    "report.html",
+    "open_in_paraview.py",
+];
 /// The pictures of a run.
 const PICTURES: [&str; 7] = [
     "setting",
@@ -94,13 +102,15 @@ fn is_picture(name: &str) -> bool {
     })
 }
 
-/// Whether `name` is that of a frame, of a piece or of a list of pieces: `fields_NNNN[_R].[p]vtu`.
+/// Whether `name` is that of a frame, of a piece or of a list of pieces: `fields_NNNN[_R].[p]vtu`, or
+/// `contact_NNNN.vtu`.
 fn is_frame(name: &str) -> bool {
     let stem = name.strip_suffix(".vtu").or(name.strip_suffix(".pvtu"));
-    stem.and_then(|stem| stem.strip_prefix("fields_")).is_some_and(|numbers| {
-        let is_number = |n: &str| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit());
-        numbers.split('_').all(is_number)
-    })
+    stem.and_then(|stem| stem.strip_prefix("fields_").or(stem.strip_prefix("contact_")))
+        .is_some_and(|numbers| {
+            let is_number = |n: &str| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit());
+            numbers.split('_').all(is_number)
+        })
 }
 
 /// Removes from `folder` the results of an earlier run, its figures and its files that were never
@@ -121,31 +131,48 @@ pub fn prepare(folder: &Path) -> Result<(), OutputError> {
     Ok(())
 }
 
-/// Writes `history.csv`: a row per accepted step, at once, so that a run can be followed.
+/// A CSV file that grows by rows, each written at once, so that a run can be followed.
 #[derive(Debug)]
-pub struct History(GrowingFile);
+pub struct Table(GrowingFile);
 
-impl History {
-    /// Starts `history.csv` in `folder`.
+impl Table {
+    /// Starts the file at `path`: its first columns are the fields of a row like `example`, the others
+    /// are `more`.
     ///
     /// # Errors
     /// The file cannot be created.
-    pub fn create(folder: &Path) -> Result<Self, OutputError> {
-        GrowingFile::create(folder.join("history.csv"), "", "").map(Self)
+    pub fn create(
+        path: PathBuf,
+        example: &impl Serialize,
+        more: &[String],
+    ) -> Result<Self, OutputError> {
+        let header = csv_text(true, [example]).and_then(|example| {
+            let mut example = csv::Reader::from_reader(&example[..]);
+            let columns = example.headers()?.iter().chain(more.iter().map(String::as_str));
+            csv_text(false, [columns.collect::<Vec<_>>()])
+        });
+        let header = header.map_err(|e| OutputError::new(&path, e))?;
+        GrowingFile::create(path, &String::from_utf8_lossy(&header), "").map(Self)
     }
 
-    /// Appends the row of a step, the first one below the names of the columns.
+    /// Appends rows.
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn add(&mut self, record: &StepRecord) -> Result<(), OutputError> {
-        let failed = |e: &dyn ToString| OutputError::new(self.0.path(), e.to_string());
-        let has_headers = self.0.is_empty();
-        let mut writer = csv::WriterBuilder::new().has_headers(has_headers).from_writer(Vec::new());
-        writer.serialize(record).map_err(|e| failed(&e))?;
-        let row = writer.into_inner().map_err(|e| failed(&e))?;
-        self.0.add(&row)
+    pub fn add<T: Serialize>(&mut self, rows: &[T]) -> Result<(), OutputError> {
+        let text = csv_text(false, rows).map_err(|e| OutputError::new(self.0.path(), e))?;
+        self.0.add(&text)
     }
+}
+
+/// Rows as text, below the names of their fields if asked for.
+fn csv_text<T: Serialize>(
+    headers: bool,
+    rows: impl IntoIterator<Item = T>,
+) -> Result<Vec<u8>, csv::Error> {
+    let mut writer = csv::WriterBuilder::new().has_headers(headers).from_writer(Vec::new());
+    rows.into_iter().try_for_each(|row| writer.serialize(row))?;
+    writer.into_inner().map_err(|error| error.into_error().into())
 }
 
 /// Writes a CSV file with a row per element, whole or not at all.
@@ -153,12 +180,7 @@ impl History {
 /// # Errors
 /// The file cannot be written.
 pub fn write_table<T: Serialize>(path: &Path, rows: &[T]) -> Result<(), OutputError> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    for row in rows {
-        writer.serialize(row).map_err(|e| OutputError::new(path, e))?;
-    }
-    let content = writer.into_inner().map_err(|e| OutputError::new(path, e))?;
-    write_whole(path, &content)
+    write_whole(path, &csv_text(true, rows).map_err(|e| OutputError::new(path, e))?)
 }
 
 /// Writes a file whole or not at all: a temporary file beside it is renamed when complete.

@@ -3,7 +3,10 @@
 //! The files are written here and not by the VTK crate, which reads them back in the tests: it
 //! compresses value by value and took 0.9 s for a frame of 66,049 nodes.
 
-use super::{OutputError, data_array::DataArray, growing_file::GrowingFile, write_whole};
+use super::{
+    OutputError, contact::ContactWriter, data_array::DataArray, growing_file::GrowingFile,
+    write_whole,
+};
 use crate::{
     evolution::{DiscreteProblem, State},
     fem::{Body, Elements},
@@ -19,11 +22,11 @@ use std::{
 const TRIANGLE: u8 = 5;
 const QUADRATIC_TRIANGLE: u8 = 22;
 /// VTK's names of the types of numbers.
-const REAL: &str = "Float64";
-const INTEGER: &str = "Int32";
-const BYTE: &str = "UInt8";
+pub(super) const REAL: &str = "Float64";
+pub(super) const INTEGER: &str = "Int32";
+pub(super) const BYTE: &str = "UInt8";
 
-/// How `fields.pvd` ends.
+/// How a list of frames ends.
 const LIST_END: &str = "</Collection>\n</VTKFile>\n";
 /// Digits of the number of a frame, unless there are many.
 const DIGITS: usize = 4;
@@ -39,8 +42,10 @@ pub struct FieldWriter {
     folder: PathBuf,
     /// `<Points>` and `<Cells>`, the same in every frame.
     mesh: String,
-    /// `fields.pvd`, from the first frame on, on the first rank.
-    list: Option<GrowingFile>,
+    /// `fields.pvd`, on the first rank.
+    list: FrameList,
+    /// Γ_C, on the first rank.
+    contact: ContactWriter,
     frames: usize,
     last_time: Option<f64>,
     digits: usize,
@@ -55,7 +60,9 @@ impl FieldWriter {
         let mesh = mesh_text(&problem.body).map_err(|e| OutputError::new(folder, e))?;
         let digits = digits(problem.scene());
         let folder = folder.to_owned();
-        Ok(Self { folder, mesh, list: None, frames: 0, last_time: None, digits })
+        let list = FrameList::new(folder.join("fields.pvd"));
+        let contact = ContactWriter::new(&folder);
+        Ok(Self { folder, mesh, list, contact, frames: 0, last_time: None, digits })
     }
 
     /// Time of the last frame, s.
@@ -69,7 +76,8 @@ impl FieldWriter {
     /// A file cannot be written.
     pub fn add(&mut self, problem: &DiscreteProblem, state: &State) -> Result<(), OutputError> {
         let comm = problem.body.nodes.partition.comm();
-        let stem = format!("fields_{:0width$}", self.frames, width = self.digits);
+        let number = format!("{:0width$}", self.frames, width = self.digits);
+        let stem = format!("fields_{number}");
         let piece_file = |rank| format!("{stem}_{rank}.vtu");
         let (own, frame) = match comm.is_serial() {
             true => (format!("{stem}.vtu"), format!("{stem}.vtu")),
@@ -83,6 +91,7 @@ impl FieldWriter {
         let text = self.piece(&problem.body, &points, &cells);
         let text = text.map_err(|e| OutputError::new(&path, e))?;
         write_whole(&path, text.as_bytes())?;
+        self.contact.add(&format!("contact_{number}.vtu"), problem, state)?;
         if !comm.is_root() {
             return Ok(());
         }
@@ -90,17 +99,7 @@ impl FieldWriter {
             let text = list_of_pieces((0..comm.size()).map(piece_file), &points, &cells);
             write_whole(&self.folder.join(&frame), text.as_bytes())?;
         }
-        let line = format!("<DataSet timestep=\"{}\" file=\"{frame}\"/>\n", state.time);
-        match &mut self.list {
-            Some(list) => list.add(line.as_bytes()),
-            none => {
-                let (path, list) =
-                    (self.folder.join("fields.pvd"), vtk_file("Collection", "", &line));
-                let list = list.trim_end_matches(LIST_END);
-                *none = Some(GrowingFile::create(path, list, LIST_END)?);
-                Ok(())
-            }
-        }
+        self.list.add(state.time, &frame)
     }
 
     fn piece(&self, body: &Body, points: &[DataArray], cells: &[DataArray]) -> io::Result<String> {
@@ -112,6 +111,33 @@ impl FieldWriter {
              <PointData>\n{points}</PointData>\n<CellData>\n{cells}</CellData>\n</Piece>\n"
         );
         Ok(vtk_file("UnstructuredGrid", "", &piece))
+    }
+}
+
+/// A list of frames over time for ParaView, a file from the first frame on.
+pub(super) struct FrameList {
+    path: PathBuf,
+    file: Option<GrowingFile>,
+}
+
+impl FrameList {
+    /// The list that will be at `path`.
+    pub(super) fn new(path: PathBuf) -> Self {
+        Self { path, file: None }
+    }
+
+    /// Adds the frame in `file` of a time, s.
+    pub(super) fn add(&mut self, time: f64, file: &str) -> Result<(), OutputError> {
+        let line = format!("<DataSet timestep=\"{time}\" file=\"{file}\"/>\n");
+        match &mut self.file {
+            Some(list) => list.add(line.as_bytes()),
+            none => {
+                let list = vtk_file("Collection", "", &line);
+                let list = list.trim_end_matches(LIST_END);
+                *none = Some(GrowingFile::create(self.path.clone(), list, LIST_END)?);
+                Ok(())
+            }
+        }
     }
 }
 
@@ -183,7 +209,7 @@ fn cell_data(problem: &DiscreteProblem, state: &State) -> Vec<DataArray> {
     let components = stress.iter().flat_map(|s| [s[0], s[1], s[2]]);
     vec![
         DataArray::new("von_mises", REAL, 1, von_mises),
-        DataArray::new("stress", REAL, 3, components),
+        DataArray::new("stress", REAL, 3, components).with_names(&["xx", "yy", "xy"]),
     ]
 }
 
@@ -206,7 +232,7 @@ fn list_of_pieces(
 
 /// A VTK file whose element `kind` has these `attributes` and a `content` with arrays as [`DataArray`]
 /// encodes them.
-fn vtk_file(kind: &str, attributes: &str, content: &str) -> String {
+pub(super) fn vtk_file(kind: &str, attributes: &str, content: &str) -> String {
     format!(
         "<?xml version=\"1.0\"?>\n\
          <VTKFile type=\"{kind}\" version=\"1.0\" byte_order=\"LittleEndian\" \

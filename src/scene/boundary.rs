@@ -1,10 +1,7 @@
 //! The conditions on the parts of the boundary, and which of them exclude each other.
 
-use std::{array, collections::BTreeMap};
+use std::array;
 
-use toml::de::DeValue;
-
-use super::document::name_of;
 use super::expression::Expression;
 use super::reader::{Reading, Table, Value};
 
@@ -114,23 +111,11 @@ pub(super) fn boundary_key(name: &str, key: &str) -> String {
 }
 
 pub(super) fn boundaries(list: &Value) -> Reading<Vec<Boundary>> {
-    let key = |i: usize, table: &DeValue| match name_of(table) {
-        Some(name) => format!("boundary \"{name}\""),
-        None => format!("boundary number {}", i + 1),
-    };
-    let mut first = BTreeMap::new();
-    let mut boundaries = Vec::new();
-    for value in list.array(key)? {
-        boundaries.push(value.table(": ", boundary));
-        let Some(name) = name_of(value.required()?) else { continue };
-        if let Some(earlier) = first.insert(name, value.place()) {
-            value.refuse(format!("is given twice, first at {earlier}; merge the two"));
-        }
+    let boundaries = list.named_tables("boundary", boundary)?;
+    match boundaries.is_empty() {
+        true => Err(list.refuse("must hold at least one boundary")),
+        false => Ok(boundaries),
     }
-    if boundaries.is_empty() {
-        return Err(list.refuse("must hold at least one boundary"));
-    }
-    boundaries.into_iter().collect()
 }
 
 fn boundary(table: &mut Table) -> Reading<Boundary> {

@@ -6,7 +6,7 @@ use super::boundary::{Boundary, Condition, SurfaceLoad, boundary_key, contradict
 use super::document::Problem;
 use super::error::{SceneError, suggestion};
 use super::expression::Expression;
-use super::{Damage, Scene, may_start_at};
+use super::{Damage, Probe, Scene, may_start_at};
 use crate::{
     fem::{gauss_points, midpoint},
     mesh::{Curve, Mesh},
@@ -51,6 +51,18 @@ impl Scene {
     /// Those that are not, each with its line, key, point and time.
     pub fn check_values(&self, mesh: &Mesh, times: &[f64]) -> Result<(), SceneError> {
         self.text.verdict(self.bad_values(mesh, times))
+    }
+
+    /// Checks that the body has all probes, those in `outside` lying outside of it.
+    ///
+    /// # Errors
+    /// These, with their lines.
+    pub fn check_probes(&self, outside: &[&Probe]) -> Result<(), SceneError> {
+        let problem = |probe: &&Probe| {
+            let (key, [x, y]) = (format!("probe \"{}\": point", probe.name), probe.point);
+            self.at_key(&key, &format!("({x}, {y}) lies outside the body; move it into the body"))
+        };
+        self.text.verdict(outside.iter().map(problem).collect())
     }
 
     fn bad_values(&self, mesh: &Mesh, times: &[f64]) -> Vec<Problem> {

@@ -55,6 +55,8 @@ pub struct Scene {
     pub output: OutputOptions,
     /// The names of its units.
     pub units: Units,
+    /// Points at which every step is observed; each name once.
+    pub probes: Vec<Probe>,
     /// What holds on the named parts of the boundary; each name once.
     pub boundaries: Vec<Boundary>,
     /// What was not taken as it is written.
@@ -147,6 +149,15 @@ impl TimeGrid {
 
 /// The first line of a scene as it was run.
 pub const AS_RUN: &str = "# As run by signorini; the results stand beside it.";
+
+/// A point of the body at which every step is observed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Probe {
+    /// The first part of its columns' names.
+    pub name: String,
+    /// m.
+    pub point: [f64; 2],
+}
 
 /// What is written while the scene runs.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

@@ -10,7 +10,7 @@ use serde::de::{DeserializeOwned, IntoDeserializer};
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
-use super::document::{NOWHERE, Problem, SceneText};
+use super::document::{NOWHERE, Problem, SceneText, name_of};
 use super::error::{SceneError, suggestion};
 use super::expression::Expression;
 
@@ -181,6 +181,29 @@ impl<'d> Value<'d> {
             self.below(key(i, value.get_ref()), value.span(), Some(value.get_ref()))
         };
         Ok(values.iter().enumerate().map(element).collect())
+    }
+
+    /// An array of tables that `read` reads, each with a `name` that no other one has; `kind` says what
+    /// they are.
+    pub(super) fn named_tables<T>(
+        &self,
+        kind: &str,
+        read: impl Fn(&mut Table) -> Reading<T>,
+    ) -> Reading<Vec<T>> {
+        let key = |i: usize, table: &DeValue| match name_of(table) {
+            Some(name) => format!("{kind} \"{name}\""),
+            None => format!("{kind} number {}", i + 1),
+        };
+        let mut first = BTreeMap::new();
+        let mut tables = Vec::new();
+        for value in self.array(key)? {
+            tables.push(value.table(": ", &read));
+            let Some(name) = name_of(value.required()?) else { continue };
+            if let Some(earlier) = first.insert(name, value.place()) {
+                value.refuse(format!("is given twice, first at {earlier}; merge the two"));
+            }
+        }
+        tables.into_iter().collect()
     }
 
     /// An array of two components.

@@ -10,7 +10,8 @@ use super::document::SceneText;
 use super::expression::Expression;
 use super::reader::{Reading, Table, Value};
 use super::{
-    Damage, MeshSource, OutputOptions, Scene, Scheme, Stepping, TimeGrid, Units, may_start_at,
+    Damage, MeshSource, OutputOptions, Probe, Scene, Scheme, Stepping, TimeGrid, Units,
+    may_start_at,
 };
 use crate::{
     fem::Mass,
@@ -43,6 +44,7 @@ pub(super) fn scene(root: &mut Table, path: &Path, text: &SceneText) -> Reading<
     let output = root.get("output").optional(|value| value.table(".", output));
     let units = root.get("units").optional(|value| value.table(".", units));
     let boundaries = boundaries(&root.get("boundary"));
+    let probes = root.get("probe").optional(|list| list.named_tables("probe", probe));
 
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let (time, note) = time?.unzip();
@@ -61,6 +63,7 @@ pub(super) fn scene(root: &mut Table, path: &Path, text: &SceneText) -> Reading<
         output: output?.unwrap_or_default(),
         units: units?.unwrap_or_default(),
         boundaries: boundaries?,
+        probes: probes?.unwrap_or_default(),
         notes: note.flatten().into_iter().collect(),
         text: text.clone(),
     })
@@ -214,4 +217,10 @@ fn units(table: &mut Table) -> Reading<Units> {
     let derived = if is_si { si.stress } else { format!("{force}/{length}²") };
     let stress = stress.unwrap_or(derived);
     Ok(Units { length, force, time: time?.unwrap_or(si.time), stress })
+}
+
+fn probe(table: &mut Table) -> Reading<Probe> {
+    let (name, point) = (table.get("name").read(), table.get("point"));
+    let point = point.pair(|value| value.number("finite (m)", |_| true));
+    Ok(Probe { name: name?, point: point? })
 }

@@ -5,7 +5,8 @@ use serde_json::Value;
 use signorini::contact::{REGISTRY, SOLVERS};
 use std::process::Stdio;
 
-const KEYS: [&str; 29] = [
+const KEYS: [&str; 30] = [
+    "quantities",
     "provenance",
     "scene",
     "title",
@@ -36,7 +37,7 @@ const KEYS: [&str; 29] = [
     "units",
     "notes",
 ];
-const COLUMNS: [&str; 20] = [
+const COLUMNS: [&str; 26] = [
     "step",
     "time",
     "zeta_min",
@@ -57,6 +58,12 @@ const COLUMNS: [&str; 20] = [
     "zeta_residual",
     "zeta_error",
     "seconds",
+    "left.force_x",
+    "left.force_y",
+    "left.moment",
+    "bottom.force_x",
+    "bottom.force_y",
+    "bottom.moment",
 ];
 
 fn keys(value: &Value) -> Vec<&str> {
@@ -135,6 +142,7 @@ fn history() {
         let (a, b) = (number(&summary[name]), last[column(name)]);
         assert!((a - b).abs() <= 1e-15 * b.abs(), "{name}: {a} is not {b}");
     }
+    assert!((number(&summary["quantities"]["bottom.force_y"]) - 3.0).abs() < 1e-8);
 }
 
 #[test]

@@ -135,6 +135,28 @@ fn frames_of_quadratic_displacements_have_quadratic_triangles() {
 }
 
 #[test]
+fn the_contact_boundary_has_frames_of_its_own() {
+    // Uniform pressure 3 on the bottom, whose normal points down.
+    let test_directory = TestDirectory::new();
+    test_directory.run(&[]);
+    let (_, file) = test_directory.frames("out/scene").pop().expect("frames");
+    let file = file.replace("fields_", "contact_");
+    assert!(test_directory.read("out/scene/contact.pvd").contains(&file));
+    let frame = frame(&test_directory.path(&format!("out/scene/{file}")));
+    assert_eq!(frame.nodes, (0..4).map(|i| vec![i, i + 1]).collect::<Vec<_>>());
+    assert!(frame.types.iter().all(|kind| *kind == CellType::Line));
+    let rows = test_directory.read("out/scene/contact.csv");
+    assert_eq!(rows.lines().count(), 1 + 11 * 5);
+    assert!(
+        rows.starts_with("time,boundary,part,arc_length,x,y,normal_x,normal_y,gap,pressure,active")
+    );
+    for pressure in field(&frame.point_data, "pressure_on_body").chunks(3) {
+        pressure.iter().zip([0.0, 3.0, 0.0]).for_each(|(a, b)| close(*a, b));
+    }
+    assert_eq!(field(&frame.point_data, "arc_length"), [0.0, 0.25, 0.5, 0.75, 1.0]);
+}
+
+#[test]
 fn frames_are_as_many_as_asked_for() {
     let test_directory = TestDirectory::new();
     // Steps 0 … 10: all of them, every third and the last, the ends.
@@ -151,8 +173,10 @@ fn frames_are_as_many_as_asked_for() {
         assert_eq!(tenths, times);
         // An earlier run's frames are gone, and there is nothing else.
         let mut files: Vec<String> = frames.into_iter().map(|(_, file)| file).collect();
-        files
-            .extend(["fields.pvd", "history.csv", "scene.toml", "summary.json"].map(str::to_owned));
+        let contact: Vec<_> = files.iter().map(|f| f.replace("fields_", "contact_")).collect();
+        let others = ["contact.csv", "contact.pvd", "fields.pvd", "history.csv", "scene.toml"];
+        files.extend(contact.into_iter().chain(others.map(str::to_owned)));
+        files.push("summary.json".to_owned());
         files.sort();
         assert_eq!(test_directory.names("out/scene"), files);
     }

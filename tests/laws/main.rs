@@ -23,6 +23,7 @@ mod material;
 mod mesh_error;
 mod maximum_principle;
 mod notes;
+mod observed;
 mod orders;
 mod patch;
 mod pieces;

@@ -66,9 +66,18 @@ fn same_history(test_directory: &TestDirectory, folder: &str, reference: &str) {
     let (names, rows) = test_directory.history(folder);
     let (_, expected) = test_directory.history(reference);
     assert_eq!(rows.len(), expected.len(), "{folder}");
-    for name in ANSWER {
+    // Besides, resultants and probes: `name.quantity`.
+    let observed = names.iter().map(String::as_str).filter(|name| name.contains('.'));
+    for name in ANSWER.into_iter().chain(observed) {
         let column = names.iter().position(|n| n == name).expect("the column");
-        let size = expected.iter().fold(f64::MIN_POSITIVE, |m, row| m.max(row[column].abs()));
+        // One force may be zero where the other component is not.
+        let group = |other: &String| match name.split_once('.') {
+            Some((support, _)) => other.starts_with(&format!("{support}.")),
+            None => other == name,
+        };
+        let columns: Vec<usize> = (0..names.len()).filter(|&i| group(&names[i])).collect();
+        let values = expected.iter().flat_map(|row| columns.iter().map(|&i| row[i].abs()));
+        let size = values.fold(f64::MIN_POSITIVE, f64::max);
         for (row, expected) in rows.iter().zip(&expected) {
             let off = (row[column] - expected[column]).abs() / size;
             assert!(off <= SAME, "{folder}: {name} at t = {} is off by {off:.1e}", row[1]);

@@ -30,6 +30,8 @@ pub(super) struct Judged {
     pub(super) force: f64,
     /// The cosine between u and its elastic forces: the sign of the energy.
     energy: f64,
+    /// f − Ku, N per metre of thickness.
+    pub(super) unbalanced: Vec<f64>,
     pub(super) contact: Vec<ContactPoint>,
     /// The rigid part of u, max |·| of it and of the rest, m.
     pub(super) rigid: RigidPart,
@@ -79,7 +81,7 @@ impl ContactStep<'_> {
         if !self.covered {
             kkt.stationarity = f64::NAN;
         }
-        Judged { u, kkt, scales, force, energy, contact, rigid, rigid_max, elastic_max }
+        Judged { u, kkt, scales, force, energy, unbalanced, contact, rigid, rigid_max, elastic_max }
     }
 
     /// The scales of an answer, not below those of the run so far, nor below the rounding of the datum

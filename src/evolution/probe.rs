@@ -1,0 +1,66 @@
+//! Points of the body at which every step is observed.
+
+use super::{DiscreteProblem, SetupError, State};
+use crate::{
+    fem::{Body, Location, Subdomain},
+    scene::Scene,
+};
+
+/// The probes of a scene.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Probes {
+    places: Vec<Place>,
+}
+
+#[derive(Debug, Clone)]
+struct Place {
+    location: Location,
+    /// This rank's triangle, if it is one of its own.
+    triangle: Option<usize>,
+}
+
+/// What is observed at each probe: displacement, m; damage; stress, Pa.
+pub(super) const OBSERVED: [&str; 7] =
+    ["u_x", "u_y", "zeta", "stress_xx", "stress_yy", "stress_xy", "von_mises"];
+
+impl Probes {
+    /// Finds the probes of `scene` in the undivided `body`.
+    ///
+    /// # Errors
+    /// A probe lies outside of it.
+    pub(super) fn new(scene: &Scene, body: &Body) -> Result<Self, SetupError> {
+        let (mut places, mut outside) = (Vec::new(), Vec::new());
+        for probe in &scene.probes {
+            match Location::of(probe.point, body) {
+                Some(location) => {
+                    places.push(Place { location, triangle: Some(location.triangle) });
+                }
+                None => outside.push(probe),
+            }
+        }
+        scene.check_probes(&outside)?;
+        Ok(Self { places })
+    }
+
+    /// The probes in the triangles that a rank owns.
+    pub(super) fn restrict(&self, subdomain: &Subdomain) -> Self {
+        let local = |place: &Place| Place {
+            triangle: subdomain.own_triangle(place.location.triangle),
+            ..*place
+        };
+        Self { places: self.places.iter().map(local).collect() }
+    }
+
+    /// What is observed at all probes, as far as this rank owns them; 0 elsewhere. The stress is
+    /// σ = η_*(ζ) 𝒜ε(u) at the point.
+    pub(super) fn values(&self, problem: &DiscreteProblem, state: &State) -> Vec<f64> {
+        let values = |Place { location, triangle }: &Place| {
+            let Some(t) = *triangle else { return [0.0; OBSERVED.len()] };
+            let at = location.values(&problem.body, t, &state.u, &state.zeta);
+            let stress = problem.elasticity.d * at.strain * problem.truncated(at.zeta);
+            let von_mises = problem.elasticity.material.von_mises(&stress);
+            [at.u[0], at.u[1], at.zeta, stress[0], stress[1], stress[2], von_mises]
+        };
+        self.places.iter().flat_map(values).collect()
+    }
+}

@@ -1,0 +1,224 @@
+//! The boundaries that support the body: the forces they exert, and Γ_C as a line.
+
+use super::State;
+use crate::{
+    contact::ContactPoint,
+    fem::{Body, Edge, Subdomain},
+    scene::{Condition, Scene},
+};
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The boundaries with prescribed displacements or a gap, and the nodes of this rank on them.
+#[derive(Debug, Clone, Default)]
+pub struct Supports {
+    /// Their names, in the order of the scene.
+    pub names: Vec<String>,
+    /// Of each node with a prescribed displacement the first boundary that prescribes it.
+    prescribed: BTreeMap<usize, usize>,
+    /// Where each node of Γ_C lies, once for each edge of Γ_C that it belongs to.
+    contact: BTreeMap<usize, Vec<Place>>,
+}
+
+/// Where a node of Γ_C lies.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    boundary: usize,
+    /// Which connected part of the boundary, from 0.
+    part: usize,
+    /// The length of the part up to the node, m, with the body on the left.
+    arc_length: f64,
+    /// The body's outward normal.
+    normal: [f64; 2],
+}
+
+/// A row of `contact.csv`: a gap condition at a node of Γ_C and how it is met.
+#[derive(Debug, Clone, Serialize)]
+pub struct ContactRow {
+    /// t, s.
+    pub time: f64,
+    /// The boundary.
+    pub boundary: String,
+    /// Which connected part of it, from 0.
+    pub part: usize,
+    /// The length of the part up to the node, m, with the body on the left.
+    pub arc_length: f64,
+    /// The node, m.
+    pub x: f64,
+    /// See `x`.
+    pub y: f64,
+    /// ν, towards the obstacle.
+    pub normal_x: f64,
+    /// See `normal_x`.
+    pub normal_y: f64,
+    /// g − u·ν: the gap that is left, m.
+    pub gap: f64,
+    /// Pa, positive in compression.
+    pub pressure: f64,
+    /// 1 where the node is active, else 0.
+    pub active: u8,
+}
+
+impl Supports {
+    /// The supports of `scene` on the undivided `body`.
+    pub(super) fn new(scene: &Scene, body: &Body) -> Self {
+        let mut supports = Self::default();
+        for boundary in &scene.boundaries {
+            let Some(curve) = body.mesh.curves.get(&boundary.name) else { continue };
+            let edges = body.edges(&curve.edges);
+            let number = supports.names.len();
+            let is_prescribed =
+                |of: &Condition| matches!(of, Condition::Displacement(_) | Condition::Symmetry);
+            let prescribed = boundary.conditions.iter().any(is_prescribed);
+            if prescribed {
+                for node in edges.iter().flat_map(|edge| edge.ends.into_iter().chain(edge.middle)) {
+                    supports.prescribed.entry(node).or_insert(number);
+                }
+            }
+            if boundary.gap().is_some() {
+                supports.add_contact(number, body, &edges);
+            }
+            if prescribed || boundary.gap().is_some() {
+                supports.names.push(boundary.name.clone());
+            }
+        }
+        supports
+    }
+
+    fn add_contact(&mut self, boundary: usize, body: &Body, edges: &[Edge]) {
+        let points = &body.nodes.points;
+        let distance =
+            |a: usize, b: usize| (points[a][0] - points[b][0]).hypot(points[a][1] - points[b][1]);
+        for (part, edges) in connected(edges).iter().enumerate() {
+            let mut start = 0.0;
+            for edge in edges {
+                let [a, b] = edge.ends;
+                let half = edge.middle.map_or(0.0, |middle| distance(a, middle));
+                let end =
+                    start + edge.middle.map_or_else(|| distance(a, b), |m| half + distance(m, b));
+                for (node, face) in edge.faces(points) {
+                    let arc_length = match node {
+                        _ if node == a => start,
+                        _ if node == b => end,
+                        _ => start + half,
+                    };
+                    let place = Place { boundary, part, arc_length, normal: face.normal };
+                    self.contact.entry(node).or_default().push(place);
+                }
+                start = end;
+            }
+        }
+    }
+
+    /// The supports at the nodes that a rank owns.
+    pub(super) fn restrict(&self, subdomain: &Subdomain) -> Self {
+        fn local<T: Clone>(of: &BTreeMap<usize, T>, subdomain: &Subdomain) -> BTreeMap<usize, T> {
+            let own =
+                of.iter().filter_map(|(node, of)| Some((subdomain.owned(*node)?, of.clone())));
+            own.collect()
+        }
+        Self {
+            names: self.names.clone(),
+            prescribed: local(&self.prescribed, subdomain),
+            contact: local(&self.contact, subdomain),
+        }
+    }
+
+    /// The boundary that exerts the force of a contact point: of several at its node the one whose
+    /// normal is nearest.
+    fn place(&self, point: &ContactPoint) -> Option<Place> {
+        let along =
+            |place: &&Place| point.normal[0] * place.normal[0] + point.normal[1] * place.normal[1];
+        let places = self.contact.get(&point.node)?.iter();
+        places.rev().max_by(|a, b| along(a).total_cmp(&along(b))).copied()
+    }
+
+    /// Of each boundary F = Σ R_i, N per metre of thickness, and M = Σ x_i × R_i about the origin,
+    /// positive anticlockwise, N; (F_x, F_y, M) in turn, this rank's part. R_i = (Ku − f)_i is the force
+    /// on the body at node i, with f − Ku `unbalanced`; of a node where displacements are prescribed
+    /// and a gap is closed the obstacle has its normal reactions, and the other boundary the rest.
+    pub(super) fn resultants(
+        &self,
+        body: &Body,
+        unbalanced: &[f64],
+        contact: &[ContactPoint],
+    ) -> Vec<f64> {
+        let mut sums = vec![0.0; 3 * self.names.len()];
+        let mut add = |boundary: usize, node: usize, [fx, fy]: [f64; 2]| {
+            let [x, y] = body.nodes.points[node];
+            for (sum, part) in sums[3 * boundary..].iter_mut().zip([fx, fy, x * fy - y * fx]) {
+                *sum += part;
+            }
+        };
+        let mut rest: BTreeMap<usize, [f64; 2]> = (self.prescribed.keys())
+            .map(|&node| (node, [-unbalanced[2 * node], -unbalanced[2 * node + 1]]))
+            .collect();
+        for point in contact {
+            let force = point.normal.map(|n| -point.force * n);
+            self.place(point).into_iter().for_each(|place| add(place.boundary, point.node, force));
+            if let Some([x, y]) = rest.get_mut(&point.node) {
+                (*x, *y) = (*x - force[0], *y - force[1]);
+            }
+        }
+        rest.iter().for_each(|(node, force)| add(self.prescribed[node], *node, *force));
+        sums
+    }
+
+    /// Γ_C in a state, boundary by boundary and along them, on every rank that of the whole body.
+    /// Collective.
+    pub fn contact_rows(&self, body: &Body, state: &State) -> Vec<ContactRow> {
+        let row = |point: &ContactPoint| {
+            let (place, [x, y], [nx, ny]) =
+                (self.place(point)?, body.nodes.points[point.node], point.normal);
+            let active = f64::from(u8::from(point.active));
+            let at = [place.boundary as f64, place.part as f64, place.arc_length];
+            Some([at[0], at[1], at[2], x, y, nx, ny, point.gap, point.pressure, active])
+        };
+        let own: Vec<[f64; 10]> = state.contact.iter().filter_map(row).collect();
+        let all = body.nodes.partition.comm().gather(own.as_flattened());
+        let mut rows: Vec<[f64; 10]> = all.as_chunks().0.to_vec();
+        rows.sort_by(|a, b| a[..3].partial_cmp(&b[..3]).expect("places are finite"));
+        rows.into_iter()
+            .map(|[boundary, part, arc_length, x, y, normal_x, normal_y, gap, pressure, active]| {
+                let boundary = self.names[boundary as usize].clone();
+                let (part, active) = (part as usize, active as u8);
+                let time = state.time;
+                ContactRow {
+                    time,
+                    boundary,
+                    part,
+                    arc_length,
+                    x,
+                    y,
+                    normal_x,
+                    normal_y,
+                    gap,
+                    pressure,
+                    active,
+                }
+            })
+            .collect()
+    }
+}
+
+/// The connected parts of edges that have the body on their left, each in the order in which they follow
+/// each other.
+fn connected(edges: &[Edge]) -> Vec<Vec<Edge>> {
+    let mut after: BTreeMap<usize, Edge> = edges.iter().map(|edge| (edge.ends[0], *edge)).collect();
+    let ends: BTreeSet<usize> = edges.iter().map(|edge| edge.ends[1]).collect();
+    let open = edges.iter().filter(|edge| !ends.contains(&edge.ends[0]));
+    // Closed parts begin at their first edge.
+    let mut parts = Vec::new();
+    for first in open.chain(edges) {
+        let mut part = Vec::new();
+        let mut node = first.ends[0];
+        while let Some(edge) = after.remove(&node) {
+            node = edge.ends[1];
+            part.push(edge);
+        }
+        if !part.is_empty() {
+            parts.push(part);
+        }
+    }
+    parts
+}

@@ -1,0 +1,118 @@
+//! What is observed beside the fields: resultants of the supports, values at probes, Γ_C as a line.
+
+use crate::support::{bent, close, distorted, moved, problem, run, turn};
+use std::collections::BTreeMap;
+
+/// The observed quantities of the last step by their names.
+fn observed(mesh: signorini::mesh::Mesh, text: &str) -> (BTreeMap<String, f64>, [f64; 3]) {
+    let problem = problem(mesh, text).unwrap_or_else(|e| panic!("{e}"));
+    let step = run(&problem, "active-set").last;
+    let load = problem.load(1.0);
+    let mut resultant = [0.0; 3];
+    for ([x, y], f) in problem.body.nodes.points.iter().zip(load.chunks(2)) {
+        let parts = [f[0], f[1], x * f[1] - y * f[0]];
+        resultant.iter_mut().zip(parts).for_each(|(sum, part)| *sum += part);
+    }
+    (problem.quantities().into_iter().zip(step.quantities).collect(), resultant)
+}
+
+#[test]
+fn of_uniform_stress_everything_observed_is_exact() {
+    // σ_yy = −p alone: u = p/E (ν x, −y); the bottom carries p on the length 1, at ½ in the mean. The
+    // whole is turned about the origin.
+    let (p, young, poisson) = (7.0, 200.0, 0.3);
+    for (order, angle) in [(1, 0.0), (2, 0.7)] {
+        let [x, y] = turn(angle, [0.31, 0.83]);
+        let text = format!(
+            "discretisation.displacement = {order}
+             contact.tolerance = 1e-13
+             material = {{ young = {young}, poisson = {poisson}, plane = 'stress' }}
+             probe = [{{ name = 'inside', point = [{x}, {y}] }}]
+             boundary = [
+                {{ name = 'left', symmetry = true }},
+                {{ name = 'bottom', gap = 0 }},
+                {{ name = 'top', traction = {:?} }},
+             ]",
+            turn(angle, [0.0, -p]),
+        );
+        let (observed, _) = observed(moved(distorted(6), |x| turn(angle, x)), &text);
+        let [fx, fy] = turn(angle, [0.0, p]);
+        let [ux, uy] = turn(angle, [p * poisson / young * 0.31, -p / young * 0.83]);
+        // σ = −p n⊗n with n the turned normal.
+        let [nx, ny] = turn(angle, [0.0, 1.0]);
+        let expected = [
+            ("left.force_x", 0.0),
+            ("left.force_y", 0.0),
+            ("left.moment", 0.0),
+            ("bottom.force_x", fx),
+            ("bottom.force_y", fy),
+            ("bottom.moment", p / 2.0),
+            ("inside.u_x", ux),
+            ("inside.u_y", uy),
+            ("inside.zeta", 1.0),
+            ("inside.stress_xx", -p * nx * nx),
+            ("inside.stress_yy", -p * ny * ny),
+            ("inside.stress_xy", -p * nx * ny),
+            ("inside.von_mises", p),
+        ];
+        assert_eq!(observed.len(), expected.len());
+        expected.iter().for_each(|(name, value)| close(observed[*name], *value, 1e-10));
+    }
+}
+
+#[test]
+fn supports_balance_the_loads() {
+    // A clamp and an obstacle that meet at a corner, curved sides, a body force.
+    for order in [1, 2] {
+        let text = format!(
+            "discretisation.displacement = {order}
+             contact.tolerance = 1e-12
+             material = {{ young = 200, poisson = 0.3, plane = 'strain' }}
+             body.force = ['3', '-5*x']
+             boundary = [
+                {{ name = 'left', displacement = [0, 0] }},
+                {{ name = 'bottom', gap = '0.001*x' }},
+                {{ name = 'top', traction = ['1', '-2'] }},
+             ]"
+        );
+        let mesh = bent(&distorted(6), |[x, y]| [x, y + 0.1 * x * (1.0 - x)]);
+        let (observed, load) = observed(mesh, &text);
+        for (part, load) in ["force_x", "force_y", "moment"].iter().zip(load) {
+            let [clamp, bottom] =
+                ["left", "bottom"].map(|name| observed[&format!("{name}.{part}")]);
+            assert!(clamp.abs() > 0.01 && (*part == "force_x" || bottom.abs() > 0.01));
+            close(clamp + bottom, -load, 1e-9);
+        }
+    }
+}
+
+#[test]
+fn a_probe_outside_the_body_is_refused() {
+    let text = "material = { young = 200, poisson = 0.3, plane = 'stress' }
+                probe = [{ name = 'far', point = [0.5, 1.2] }]
+                boundary = [{ name = 'left', displacement = [0, 0] }]";
+    let error = problem(distorted(6), text).expect_err("outside").to_string();
+    assert!(error.contains("probe \"far\": point (0.5, 1.2) lies outside the body"), "{error}");
+}
+
+#[test]
+fn the_contact_boundary_is_a_line() {
+    // Around a corner of Γ_C the arc length goes on; its rows know their forces' boundary.
+    let text = "contact.tolerance = 1e-12
+                material = { young = 200, poisson = 0.3, plane = 'stress' }
+                boundary = [{ name = 'left', gap = 0.0 }, { name = 'bottom', gap = 0.0 },
+                            { name = 'top', traction = [0, -3] },
+                            { name = 'right', traction = [-2, 0] }]";
+    let problem = problem(distorted(6), text).unwrap_or_else(|e| panic!("{e}"));
+    let state = run(&problem, "active-set").last.state;
+    let rows = problem.supports.contact_rows(&problem.body, &state);
+    for (name, pressure) in [("left", 2.0), ("bottom", 3.0)] {
+        let rows: Vec<_> = rows.iter().filter(|row| row.boundary == name).collect();
+        assert_eq!(rows.len(), 7);
+        for row in &rows {
+            let along = if name == "left" { 1.0 - row.y } else { row.x };
+            close(row.arc_length, along, 1e-12);
+            close(row.pressure, pressure, 1e-9);
+        }
+    }
+}
