@@ -95,8 +95,10 @@ fn same_frames(order: &str) {
 
     let (frames, lists) = (test_directory.frames("one"), test_directory.frames("many"));
     assert_eq!(frames.len(), lists.len());
-    let mut expected_names =
-        ["fields.pvd", "history.csv", "scene.toml", "summary.json"].map(String::from).to_vec();
+    let mut expected_names: Vec<String> =
+        ["contact.csv", "contact.pvd", "fields.pvd", "history.csv", "scene.toml", "summary.json"]
+            .map(String::from)
+            .to_vec();
     for ((time, file), (listed, list)) in frames.iter().zip(&lists) {
         assert_eq!(time, listed);
         let mut whole = Frame::default();
@@ -118,6 +120,7 @@ fn same_frames(order: &str) {
         }
         expected_names.extend(sources.iter().map(|&name| name.to_owned()));
         expected_names.push(list.clone());
+        expected_names.push(file.replace("fields_", "contact_"));
     }
     expected_names.sort();
     assert_eq!(test_directory.names("many"), expected_names);
