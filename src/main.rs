@@ -12,8 +12,7 @@ use std::{path::PathBuf, process::ExitCode};
 #[command(
     version,
     about,
-    after_help = "Scenes are TOML files beside a gmsh geometry: see the README's \"A scene\" and \
-    the scenes of geo/.\n\
+    after_help = "Scenes are TOML files beside a gmsh geometry: `signorini keys` describes every key.\n\
     Exit codes: 0 finished or stopped at ζ_*, 1 the run ended early, e.g. a solver missed its tolerance \
     (state saved), 2 bad input."
 )]
@@ -26,6 +25,15 @@ struct Arguments {
 enum Command {
     /// Solve a scene; results go to out/<scene>/.
     Run(command::RunArguments),
+    /// Describe a scene without solving it: mesh, boundaries, loads, support, unknowns, cost. Like
+    /// `mesh`, it meshes a .geo whose .msh is missing or older.
+    Check(command::CheckArguments),
+    /// Tell what a folder of results holds: scene, program, outcome, errors, frames.
+    Info {
+        /// A folder that `run` has written, e.g. out/lshape.
+        #[arg(value_name = "OUT")]
+        folder: PathBuf,
+    },
     /// Run scenes with every contact solver and compare cost and answers.
     Compare(command::CompareArguments),
     /// Draw the figures of runs into their folders; also at other times, as vectors, moving (--help).
@@ -34,6 +42,12 @@ enum Command {
     Report(command::ScriptArguments),
     /// List the contact solvers, a line each: its name, a tab, what it does.
     Solvers,
+    /// Print the reference of all keys of a scene, in Markdown.
+    Keys {
+        /// As a JSON schema, for editors.
+        #[arg(long)]
+        schema: bool,
+    },
     /// Print a shell's completions, e.g. for bash into
     /// ~/.local/share/bash-completion/completions/signorini.
     Completions {
@@ -54,10 +68,13 @@ fn main() -> ExitCode {
     }
     let result = match Arguments::parse().command {
         Command::Run(arguments) => command::run(&arguments),
+        Command::Check(arguments) => command::check(&arguments),
+        Command::Info { folder } => command::info(&folder),
         Command::Compare(arguments) => command::compare(&arguments),
         Command::Figures(arguments) => command::script("figures", &arguments),
         Command::Report(arguments) => command::script("report", &arguments),
         Command::Solvers => command::solvers(),
+        Command::Keys { schema } => command::keys(schema),
         Command::Completions { shell } => command::completions(shell, Arguments::command()),
         Command::Mesh { scenes } => command::mesh(&scenes),
     };

@@ -1,7 +1,10 @@
 //! What the subcommands do.
 
+mod check;
 mod compare;
 mod figures;
+mod info;
+mod keys;
 mod profile;
 mod provenance;
 mod ranks;
@@ -9,8 +12,11 @@ mod recorder;
 mod run;
 mod screen;
 
+pub use check::{CheckArguments, check};
 pub use compare::{CompareArguments, compare};
 pub use figures::{ScriptArguments, script};
+pub use info::info;
+pub use keys::keys;
 pub use run::{RunArguments, run};
 
 use ranks::require_one_process;

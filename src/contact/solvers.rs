@@ -16,6 +16,7 @@ pub use tao::TAO_TYPES;
 use super::{ContactError, ContactProblem};
 use crate::petsc::{Session, Vector};
 use active_set::ActiveSet;
+use schemars::JsonSchema;
 use serde::{
     Deserialize, Deserializer,
     de::{Error, Unexpected},
@@ -115,7 +116,7 @@ pub struct SolverError {
 }
 
 /// `[contact]` of a scene: how the contact problem is solved.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields, expecting = "a table")]
 pub struct ContactOptions {
     /// The solver's name, if the scene asks for one.

@@ -183,13 +183,9 @@ impl DiscreteProblem {
 
     /// The triangle with the smallest angle, if that is small.
     fn sliver(&self) -> Option<String> {
-        let nodes = &self.body.mesh.nodes;
-        let angles =
-            self.body.mesh.triangles.iter().map(|t| (smallest_angle(t.map(|i| nodes[i])), t));
-        let least = angles.min_by(|(a, _), (b, _)| a.total_cmp(b));
+        let (least, at) = self.body.mesh.smallest_angle();
         let comm = self.body.nodes.partition.comm();
-        let (angle, rank) = comm.min_with_rank(least.map_or(f64::INFINITY, |(angle, _)| angle));
-        let at = least.map_or([0.0; 2], |(_, triangle)| nodes[triangle[0]]);
+        let (angle, rank) = comm.min_with_rank(least);
         let [x, y] = at.map(|coordinate| comm.broadcast(rank, coordinate));
         (angle < SLIVER).then(|| {
             format!(
@@ -203,17 +199,6 @@ impl DiscreteProblem {
 /// So many steps, in words.
 fn counted(steps: usize) -> String {
     format!("{steps} step{}", if steps == 1 { "" } else { "s" })
-}
-
-/// The smallest angle of a triangle, degrees.
-fn smallest_angle(corners: [[f64; 2]; 3]) -> f64 {
-    let at = |i: usize| {
-        let [a, b, c] = [0, 1, 2].map(|k| corners[(i + k) % 3]);
-        let (p, q) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
-        // The cosine alone would lose small angles to rounding.
-        (p[0] * q[1] - p[1] * q[0]).atan2(p[0] * q[0] + p[1] * q[1]).to_degrees()
-    };
-    at(0).min(at(1)).min(at(2))
 }
 
 /// A note if the resultant ∫f by the two Gauss points per edge of

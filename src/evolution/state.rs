@@ -5,6 +5,7 @@ use crate::{
     contact::{ContactPoint, ContactReport, Kkt, RigidMotion},
     fem::DamageCertificate,
 };
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// A step with its certified answer.
@@ -38,23 +39,23 @@ pub struct State {
 }
 
 /// The quantities of interest of a step: a row of `history.csv`.
-#[derive(Debug, Clone, Copy, Default, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize, JsonSchema)]
 pub struct StepRecord {
-    /// n.
+    /// n, 0 for the state at t = 0.
     pub step: usize,
     /// t_n, s.
     pub time: f64,
-    /// min ζ.
+    /// min ζ over the nodes: 1 sound, 0 broken.
     pub zeta_min: f64,
-    /// ∫ζ/|Ω|.
+    /// Mean of ζ, ∫ζ/|Ω|.
     pub zeta_mean: f64,
     /// Largest nodal |u|, m.
     pub displacement_max: f64,
-    /// fᵀu, J per metre of thickness.
+    /// fᵀu, of the loads alone, J per metre of thickness.
     pub work: f64,
-    /// Σ normal reactions, N per metre of thickness.
+    /// Σ normal reactions of Γ_C, not the length of their resultant, N per metre of thickness.
     pub contact_force: f64,
-    /// Contact nodes in the active set.
+    /// Nodes in contact: those of Γ_C in the active set.
     pub active_nodes: usize,
     /// Iterations of the contact solver.
     pub iterations: usize,
@@ -66,13 +67,13 @@ pub struct StepRecord {
     pub fallbacks: usize,
     /// Contraction per iteration of a fixed-point method; empty for others.
     pub contraction: Option<f64>,
-    /// Relative KKT residuals.
+    /// KKT residual, relative: nodal forces that nothing carries.
     pub kkt_stationarity: f64,
-    /// See [`Kkt`].
+    /// KKT residual, relative: how far nodes are in the foundation.
     pub kkt_primal: f64,
-    /// See [`Kkt`].
+    /// KKT residual, relative: contact forces that pull.
     pub kkt_dual: f64,
-    /// See [`Kkt`].
+    /// KKT residual, relative: contact forces across an open gap.
     pub kkt_complementarity: f64,
     /// Residual of the damage system over its right-hand side.
     pub zeta_residual: f64,

@@ -53,6 +53,38 @@ impl Mesh {
         let length = dx.hypot(dy);
         ([dy / length, -dx / length], length)
     }
+
+    /// The edges of one triangle alone, the body on their left.
+    #[must_use]
+    pub fn boundary_edges(&self) -> Vec<[usize; 2]> {
+        let sides = sides(&self.triangles);
+        let single = sides.chunk_by(|a, b| a.edge == b.edge).filter(|sides| sides.len() == 1);
+        let directed = |sides: &[Side]| {
+            let [p, q] = sides[0].edge;
+            if sides[0].on_left { [p, q] } else { [q, p] }
+        };
+        single.map(directed).collect()
+    }
+
+    /// The smallest angle of all triangles, degrees, and a corner of its triangle, m.
+    #[must_use]
+    pub fn smallest_angle(&self) -> (f64, [f64; 2]) {
+        let corners = self.triangles.iter().map(|triangle| triangle.map(|node| self.nodes[node]));
+        let angles = corners.map(|corners| (smallest_angle(corners), corners[0]));
+        let least = angles.min_by(|(a, _), (b, _)| a.total_cmp(b));
+        least.unwrap_or((f64::INFINITY, [0.0; 2]))
+    }
+}
+
+/// The smallest angle of a triangle, degrees.
+fn smallest_angle(corners: [[f64; 2]; 3]) -> f64 {
+    let at = |i: usize| {
+        let [a, b, c] = [0, 1, 2].map(|k| corners[(i + k) % 3]);
+        let (p, q) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
+        // The cosine alone would lose small angles to rounding.
+        (p[0] * q[1] - p[1] * q[0]).atan2(p[0] * q[0] + p[1] * q[1]).to_degrees()
+    };
+    at(0).min(at(1)).min(at(2))
 }
 
 /// One triangle's side of an edge.

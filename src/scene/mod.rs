@@ -9,6 +9,7 @@ mod document;
 mod error;
 mod expression;
 mod reader;
+mod schema;
 mod tables;
 
 use std::collections::BTreeMap;
@@ -17,6 +18,7 @@ use std::path::{Path, PathBuf};
 pub use boundary::{Boundary, Condition, Gap, SurfaceLoad};
 pub use error::SceneError;
 pub use expression::{Expression, ExpressionError};
+pub use schema::{schema, schema_of};
 
 use crate::{
     contact::ContactOptions,

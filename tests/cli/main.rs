@@ -3,10 +3,12 @@
 mod accepted;
 mod accuracy;
 mod test_directory;
+mod check;
 mod failing;
 mod fields;
 mod figures;
 mod losses;
+mod keys;
 mod meshes;
 mod provenance;
 mod refused;

@@ -3,6 +3,7 @@
 mod boundaries;
 mod errors;
 mod expression;
+mod keys;
 mod mesh;
 mod numbers;
 mod set;

@@ -27,7 +27,7 @@ pub struct RigidMotions {
     /// Unconstrained, even by contact in either sense.
     pub free: Vec<RigidMotion>,
     /// Those that contact resists in one sense, piece by piece.
-    resisted: Vec<RigidMotion>,
+    pub resisted: Vec<RigidMotion>,
     /// u·ν of the resisted motions, one row per gap condition of the undivided body.
     normal: DMatrix<f64>,
     parts: Vec<Part>,

@@ -1,0 +1,55 @@
+//! `check` and `info`: what there is to solve, and what was solved.
+
+use crate::test_directory::TestDirectory;
+
+#[test]
+fn a_scene_is_described_and_nothing_is_written() {
+    let test_directory = TestDirectory::new();
+    let before = test_directory.everything();
+    let said = test_directory.say(&["check", "scene.toml"]);
+    assert_eq!((said.code, said.err.as_str()), (Some(0), ""), "{said:?}");
+    for fragment in [
+        "25 vertices, 32 triangles in 1 piece, up to 1 m wide, angles from 45°",
+        "50 displacements, 25 of the damage; 5 nodes of Γ_C",
+        "gap from 0 to 0 m",
+        // -3 t on the unit top.
+        "t = 0: (0, 0) N/m, moment about (0, 0) 0 N",
+        "t = 1: (0, -3) N/m, moment about (0, 0) -1.5 N",
+        "only contact holds the body against the vertical translation",
+        "in 10 steps",
+    ] {
+        assert!(said.out.contains(fragment), "no `{fragment}` in: {}", said.out);
+    }
+    // The right side, which the scene does not list.
+    let free = said.out.lines().find(|line| line.contains("(all other)")).expect("a row");
+    let words: Vec<_> = free.split_whitespace().skip(2).collect();
+    assert_eq!(words, ["free", "4", "1.0000", "(1.000,", "0.000)"]);
+    assert_eq!(test_directory.everything(), before);
+}
+
+#[test]
+fn a_scene_that_cannot_be_solved_is_refused_after_its_mesh_is_described() {
+    let test_directory = TestDirectory::new();
+    let said =
+        test_directory.say(&["check", "scene.toml", "--set", "boundary.top.traction=[0, 1]"]);
+    said.fails(2, &["the vertical translation", "the load drives it"]);
+    assert!(said.out.contains("32 triangles"), "{said:?}");
+}
+
+#[test]
+fn results_are_described() {
+    let test_directory = TestDirectory::new();
+    test_directory.run(&[]);
+    let said = test_directory.say(&["info", "out/scene"]);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let lines: Vec<String> = (said.out.lines())
+        .map(|line| line.split_whitespace().collect::<Vec<_>>().join(" "))
+        .collect();
+    for line in ["title Pressed square", "steps 10", "frames 11, from t = 0 to 1"] {
+        assert!(lines.iter().any(|other| other == line), "no `{line}` in: {}", said.out);
+    }
+    assert!(said.out.contains("run scene.toml") && !said.out.contains("foundation"));
+    test_directory
+        .say(&["info", "out"])
+        .fails(2, &["out/summary.json", "name a folder of results"]);
+}

@@ -1,0 +1,101 @@
+//! The reference of keys says what the reader does.
+
+use crate::BASE;
+use serde_json::Value;
+use signorini::scene::{Scene, schema};
+use std::path::Path;
+
+/// Paths of all keys that are no tables, with what is told of them and whether they are required.
+fn keys() -> Vec<(String, Value, bool)> {
+    fn walk(path: &str, table: &Value, keys: &mut Vec<(String, Value, bool)>) {
+        for (name, key) in table["properties"].as_object().expect("keys") {
+            let required =
+                table["required"].as_array().is_some_and(|r| r.contains(&name.as_str().into()));
+            assert!(key["description"].is_string(), "{path}{name} has no meaning in keys.toml");
+            let told = !key["default"].is_null() || !key["absent"].is_null();
+            assert!(required != told, "{path}{name}: either required, or its default is told");
+            match [key, &key["items"]].into_iter().find(|table| table["properties"].is_object()) {
+                Some(table) => walk(&format!("{path}{name}."), table, keys),
+                None => keys.push((format!("{path}{name}"), key.clone(), required)),
+            }
+        }
+    }
+    let mut all = Vec::new();
+    walk("", &schema(), &mut all);
+    all
+}
+
+/// The complete scene with a key of it set to a value, or without it; of a boundary's key on the one
+/// where it can stand.
+fn with(path: &str, value: Option<&str>) -> Result<Scene, String> {
+    let paths: Vec<Vec<&str>> = match path.strip_prefix("boundary.") {
+        None => vec![path.split('.').collect()],
+        Some(key) => {
+            ["clamp", "load", "foundation", "axis"].map(|at| vec!["boundary", at, key]).to_vec()
+        }
+    };
+    let read = |path: &Vec<&str>| {
+        let mut scene: toml::Table = BASE.parse().expect("TOML");
+        let mut sets = Vec::new();
+        if path[..] == ["time", "tolerance"] {
+            sets.push("time.step='auto'".to_owned());
+        }
+        match value {
+            Some(value) => sets.push(format!("{}={value}", path.join("."))),
+            None => remove(&mut scene, path),
+        }
+        Scene::parse(&scene.to_string(), Path::new("base.toml"), &sets)
+    };
+    let scenes = paths.iter().map(|path| read(path).map_err(|error| error.to_string()));
+    scenes.reduce(Result::or).expect("a path")
+}
+
+fn remove(scene: &mut toml::Table, path: &[&str]) {
+    match path {
+        [key] => _ = scene.remove(*key),
+        ["boundary", name, key] => {
+            let all = scene["boundary"].as_array_mut().expect("boundaries").iter_mut();
+            let mut all = all.map(|boundary| boundary.as_table_mut().expect("a table"));
+            all.find(|boundary| boundary["name"].as_str() == Some(name))
+                .expect("named")
+                .remove(*key);
+        }
+        [table, below @ ..] => {
+            if let Some(toml::Value::Table(table)) = scene.get_mut(*table) {
+                remove(table, below);
+            }
+        }
+        [] => {}
+    }
+}
+
+/// All that a scene says, without the text it was read from.
+fn content(scene: &Scene) -> String {
+    format!("{scene:?}").split("text: SceneText").next().expect("a part").to_owned()
+}
+
+#[test]
+fn every_key_has_a_meaning_and_an_example_that_is_read() {
+    for (path, key, _) in keys() {
+        let example = key["example"].as_str().unwrap_or_else(|| panic!("{path}: no example"));
+        with(&path, Some(example)).unwrap_or_else(|error| panic!("{path} = {example}: {error}"));
+    }
+}
+
+#[test]
+fn defaults_are_what_is_read_where_a_key_is_left_out() {
+    let checked = keys().into_iter().filter(|(path, key, required)| {
+        let (absent, default) = (with(path, None), &key["default"]);
+        if *required {
+            // A boundary without its name is none of the four.
+            assert!(absent.is_err() || path == "boundary.name", "{path} is not required");
+        } else if !default.is_null() && !path.starts_with("boundary.") {
+            let absent = absent.unwrap_or_else(|error| panic!("{path} left out: {error}"));
+            let default = with(path, Some(&default.to_string())).expect("the default is read");
+            assert_eq!(content(&absent), content(&default), "{path}");
+            return true;
+        }
+        false
+    });
+    assert!(checked.count() >= 7);
+}
