@@ -12,7 +12,8 @@ use std::{path::PathBuf, process::ExitCode};
 #[command(
     version,
     about,
-    after_help = "Scenes are TOML files beside a gmsh geometry: `signorini keys` describes every key.\n\
+    after_help = "Scenes are TOML files beside a gmsh geometry: `signorini keys` describes every key, \
+    `signorini new NAME` writes a first scene, geo/TUTORIAL.md goes on from there.\n\
     Exit codes: 0 finished or stopped at ζ_*, 1 the run ended early, e.g. a solver missed its tolerance \
     (state saved), 2 bad input."
 )]
@@ -25,6 +26,11 @@ struct Arguments {
 enum Command {
     /// Solve a scene; results go to out/<scene>/.
     Run(command::RunArguments),
+    /// Write NAME.geo and NAME.toml, a small geometry and scene that run as they are, to start from.
+    New {
+        /// The name, perhaps with a folder.
+        name: PathBuf,
+    },
     /// Describe a scene without solving it: mesh, boundaries, loads, support, unknowns, cost. Like
     /// `mesh`, it meshes a .geo whose .msh is missing or older.
     Check(command::CheckArguments),
@@ -68,6 +74,7 @@ fn main() -> ExitCode {
     }
     let result = match Arguments::parse().command {
         Command::Run(arguments) => command::run(&arguments),
+        Command::New { name } => command::new(&name),
         Command::Check(arguments) => command::check(&arguments),
         Command::Info { folder } => command::info(&folder),
         Command::Compare(arguments) => command::compare(&arguments),

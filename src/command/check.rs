@@ -7,7 +7,7 @@ use signorini::{
     evolution::DiscreteProblem,
     mesh::{Mesh, extent},
     output::terminal::{self, say},
-    scene::{Boundary, Condition, Scene, Stepping},
+    scene::{Boundary, Condition, Scene, Stepping, SurfaceLoad},
 };
 use std::path::PathBuf;
 
@@ -23,6 +23,9 @@ pub struct CheckArguments {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
 }
+
+/// Times at which gaps are looked at, about.
+const TIMES: usize = 20;
 
 /// `signorini check SCENE`: describes mesh, boundaries, loads, support and cost.
 pub fn check(arguments: &CheckArguments) -> Result<(), Failure> {
@@ -59,12 +62,17 @@ fn describe_mesh(mesh: &Mesh) -> String {
 
 /// A table of the parts of the boundary: of those that the scene names, and of what is left free.
 fn boundaries(scene: &Scene, mesh: &Mesh) -> String {
+    let times = scene.sample_times(TIMES);
     let mut free = mesh.boundary_edges();
     let mut rows: Vec<(String, Vec<[usize; 2]>, String)> = Vec::new();
     for boundary in &scene.boundaries {
         let edges = mesh.curves.get(&boundary.name).map_or(&[][..], |curve| &curve.edges);
         free.retain(|edge| !edges.contains(edge));
-        rows.push((boundary.name.clone(), edges.to_vec(), conditions(boundary, edges, mesh)));
+        rows.push((
+            boundary.name.clone(),
+            edges.to_vec(),
+            conditions(boundary, edges, mesh, &times),
+        ));
     }
     rows.push(("(all other)".to_owned(), free, "free".to_owned()));
     let rows = rows.into_iter().map(|(name, edges, conditions)| {
@@ -95,17 +103,21 @@ fn boundaries(scene: &Scene, mesh: &Mesh) -> String {
     table.lines().map(str::trim_end).collect::<Vec<_>>().join("\n")
 }
 
-/// What holds on a boundary, in words.
-fn conditions(boundary: &Boundary, edges: &[[usize; 2]], mesh: &Mesh) -> String {
+/// What holds on a boundary, in words; gaps are looked at at these times.
+fn conditions(boundary: &Boundary, edges: &[[usize; 2]], mesh: &Mesh, times: &[f64]) -> String {
     let in_words = |condition: &Condition| match condition {
         Condition::Displacement([Some(_), Some(_)]) => "displacement".to_owned(),
         Condition::Displacement([Some(_), None]) => "displacement in x".to_owned(),
         Condition::Displacement(_) => "displacement in y".to_owned(),
         Condition::Symmetry => "symmetry".to_owned(),
-        Condition::Traction(_) => "traction".to_owned(),
+        Condition::Load(SurfaceLoad::Traction(_)) => "traction".to_owned(),
+        Condition::Load(SurfaceLoad::Pressure(_)) => "pressure".to_owned(),
         Condition::Gap(gap) => {
-            let nodes = edges.iter().flatten().map(|&node| mesh.nodes[node]);
-            let gaps = nodes.map(|[x, y]| gap.distance.eval(x, y, 0.0));
+            let at = |node: &usize| {
+                let [x, y] = mesh.nodes[*node];
+                times.iter().map(move |&t| gap.distance.eval(x, y, t))
+            };
+            let gaps = edges.iter().flatten().flat_map(at);
             let (least, most) = gaps
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), gap| {
                     (low.min(gap), high.max(gap))

@@ -5,9 +5,6 @@ use serde_json::Value;
 use signorini::output::terminal::say;
 use std::{fs, path::Path};
 
-/// Entries of `summary.json` that are for figures and `--profile`.
-const LONG: [&str; 4] = ["contact_boundary", "contact_tangents", "foundation", "phases"];
-
 /// `signorini info OUT`: the summary on the screen, a line for each entry, then frames and files.
 pub fn info(folder: &Path) -> Result<(), Failure> {
     let path = folder.join("summary.json");
@@ -21,7 +18,7 @@ pub fn info(folder: &Path) -> Result<(), Failure> {
     let summary: Value = serde_json::from_str(&text).map_err(|error| refuse(error.to_string()))?;
     let mut lines = Vec::new();
     for (name, value) in summary.as_object().into_iter().flatten() {
-        if !LONG.contains(&name.as_str()) {
+        if name != "phases" {
             lines.extend(entry(name, value));
         }
     }
@@ -51,7 +48,10 @@ fn entry(name: &str, value: &Value) -> Vec<String> {
             let words: Vec<_> = words.iter().filter_map(Value::as_str).collect();
             vec![row(name, &words.join(" "))]
         }
-        Value::Array(values) => values.iter().flat_map(|value| entry(name, value)).collect(),
+        // Others than notes are for figures.
+        Value::Array(values) => {
+            values.iter().filter_map(Value::as_str).map(|text| row(name, text)).collect()
+        }
         Value::String(text) => vec![row(name, text)],
         Value::Null => Vec::new(),
         other => vec![row(name, &other.to_string())],

@@ -11,6 +11,9 @@ use signorini::{
 /// What the tables of keys cannot say.
 const CONVENTIONS: &str = include_str!("keys.md");
 
+/// In the place of a default.
+const REQUIRED: &str = "**required**";
+
 /// `signorini keys [--schema]`.
 pub fn keys(as_schema: bool) -> Result<(), Failure> {
     let page = match as_schema {
@@ -43,7 +46,10 @@ fn section(title: &str, path: &str, meaning: &str, table: &Value) -> String {
     }
     for (name, key) in keys().filter(|(_, key)| is_table(key)) {
         let meaning = text(&key["description"]);
-        let meaning = format!("{meaning} Left out: {}.\n\n", default(table, name));
+        let meaning = match default(table, name) {
+            default if default == REQUIRED => format!("{meaning} Required.\n\n"),
+            default => format!("{meaning} Left out: {default}.\n\n"),
+        };
         let (title, below, content) = match &key["items"] {
             Value::Null => (format!("`[{path}{name}]`"), format!("{path}{name}."), key),
             items => (format!("`[[{path}{name}]]`"), format!("{path}{name}.NAME."), items),
@@ -73,7 +79,7 @@ fn default(table: &Value, name: &str) -> String {
     let required = table["required"].as_array().is_some_and(|names| names.contains(&name.into()));
     let key = &table["properties"][name];
     match &key["absent"] {
-        _ if required => "**required**".to_owned(),
+        _ if required => REQUIRED.to_owned(),
         Value::Null => format!("`{}`", key["default"]),
         words => text(words),
     }

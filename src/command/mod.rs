@@ -5,6 +5,7 @@ mod compare;
 mod figures;
 mod info;
 mod keys;
+mod new;
 mod profile;
 mod provenance;
 mod ranks;
@@ -17,6 +18,7 @@ pub use compare::{CompareArguments, compare};
 pub use figures::{ScriptArguments, script};
 pub use info::info;
 pub use keys::keys;
+pub use new::new;
 pub use run::{RunArguments, run};
 
 use ranks::require_one_process;

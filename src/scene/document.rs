@@ -132,6 +132,26 @@ impl SceneText {
     }
 }
 
+/// Writes the paths of `table("file")` in full; relative ones begin at `folder`.
+pub(super) fn complete_paths(value: &mut toml::Value, folder: &Path) {
+    match value {
+        toml::Value::String(text) if text.contains("table") => {
+            // An expression quotes nothing but files.
+            let full = |part: &str| match folder.join(part) {
+                file if file.is_file() => std::path::absolute(&file).unwrap_or(file),
+                _ => part.into(),
+            };
+            for quote in ["\"", "'"] {
+                let parts = text.split(quote).map(|part| full(part).to_string_lossy().into_owned());
+                *text = parts.collect::<Vec<_>>().join(quote);
+            }
+        }
+        toml::Value::Array(values) => values.iter_mut().for_each(|v| complete_paths(v, folder)),
+        toml::Value::Table(table) => table.iter_mut().for_each(|(_, v)| complete_paths(v, folder)),
+        _ => {}
+    }
+}
+
 /// What is wrong with a `--set` argument that is no TOML.
 fn misshapen(argument: &str) -> String {
     let problem = match argument.contains('=') {

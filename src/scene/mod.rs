@@ -213,7 +213,7 @@ impl Scene {
     }
 
     /// The scene as it is run, as the text of a file that runs from anywhere: the `--set` arguments are
-    /// put in, the mesh is the one in use, with its path in full.
+    /// put in, the mesh is the one in use, paths of files are full.
     ///
     /// # Errors
     /// None, if the scene has been read.
@@ -229,6 +229,7 @@ impl Scene {
             mesh.insert("parameters".into(), parameters.into());
         }
         scene.insert("mesh".into(), mesh.into());
+        scene.iter_mut().for_each(|(_, value)| document::complete_paths(value, self.text.folder()));
         Ok(format!("{AS_RUN}\n{scene}"))
     }
 

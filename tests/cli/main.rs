@@ -3,6 +3,7 @@
 mod accepted;
 mod accuracy;
 mod test_directory;
+mod tutorial;
 mod check;
 mod failing;
 mod fields;

@@ -6,8 +6,10 @@ use crate::test_directory::{TestDirectory, square};
 fn the_scene_in_the_results_runs_again_to_the_same_answer() {
     let test_directory = TestDirectory::new();
     test_directory.write("meshes/fine.msh", &square(8));
+    test_directory.write("loads/top.csv", "0, 0\n1, -2\n");
     for (options, overridden) in [
         (vec!["--set", "time.step=0.25", "--set", "boundary.top.traction=[0, '-2*t']"], "-2*t"),
+        (vec!["--set", "boundary.top.traction=[0, 'table(\"loads/top.csv\")']"], "/loads/top.csv"),
         (vec!["--mesh", "meshes/fine.msh", "--solver", "tao"], "fine.msh"),
     ] {
         test_directory.run(&[&options[..], &["--out", "first"]].concat());

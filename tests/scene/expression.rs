@@ -237,7 +237,7 @@ fn conditions_are_one_or_zero_and_choose() {
 fn the_times_of_jumps_are_known() {
     let breaks = |text: &str| Expression::parse(text).expect(text).breaks();
     assert_eq!(breaks("if(t > 0.1*2 and 0.4 >= t, x < 3, sin(t))"), [0.2, 0.4]);
-    assert_eq!(breaks("if(2*t < 1, 0, 1) + min(t, 2)"), []);
+    assert_eq!(breaks("if(2*t < 1, 0, 1) + min(t, 2)"), Vec::<f64>::new());
 }
 
 /// The function of the table with the `content`.

@@ -1,0 +1,34 @@
+//! `signorini new`: a geometry and a scene to start from.
+
+use super::Failure;
+use signorini::output::terminal::say;
+use std::{fs, path::Path};
+
+const GEOMETRY: &str = include_str!("new.geo");
+const SCENE: &str = include_str!("new.toml");
+
+/// `signorini new NAME`: writes `NAME.geo` and `NAME.toml`, which run as they are.
+pub fn new(name: &Path) -> Result<(), Failure> {
+    let [geometry, scene] = [".geo", ".toml"].map(|extension| {
+        let mut path = name.as_os_str().to_owned();
+        path.push(extension);
+        path
+    });
+    if let Some(there) = [&geometry, &scene].into_iter().find(|path| Path::new(path).exists()) {
+        let there = there.display();
+        return Err(Failure::input(format!("{there} is there already; give another name")));
+    }
+    let file = Path::new(&geometry).file_name().unwrap_or_default().to_string_lossy();
+    let text = SCENE.replace("\"new.geo\"", &toml::Value::from(&*file).to_string());
+    for (path, text) in [(&geometry, GEOMETRY), (&scene, &text)] {
+        let written = fs::write(path, text);
+        written
+            .map_err(|error| Failure::input(format!("cannot write {}: {error}", path.display())))?;
+    }
+    let (geometry, scene, name) = (geometry.display(), scene.display(), name.display());
+    say(&format!(
+        "{geometry} and {scene} are written; next:\n  signorini check {scene}\n  signorini run {scene}\n  \
+         signorini figures out/{name}"
+    ));
+    Ok(())
+}

@@ -1,0 +1,68 @@
+//! `signorini new`, and the tutorial as it is typed.
+
+use crate::test_directory::{ProgramOutput, TestDirectory};
+use std::{fs, path::Path};
+
+/// Blocks of the tutorial between fences: what stands behind the opening one, and the content.
+fn blocks(page: &str) -> Vec<(&str, &str)> {
+    let fenced = page.split("\n```").skip(1).step_by(2);
+    fenced.map(|block| block.split_once('\n').expect("a fenced block")).collect()
+}
+
+/// The words of a text with a blank between them.
+fn spaced(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn every_command_of_the_tutorial_does_what_it_says() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("geo/TUTORIAL.md");
+    let page = fs::read_to_string(page).expect("the tutorial");
+    let test_directory = TestDirectory::new();
+    let (mut said, mut commands) = (String::new(), 0);
+    for (kind, content) in blocks(&page) {
+        match kind {
+            "geo" => test_directory.write("dam.geo", content),
+            "toml" => test_directory.write("dam.toml", content),
+            "sh" => {
+                for line in content.lines().filter(|line| line.starts_with("signorini ")) {
+                    // Figures have tests of their own.
+                    if line.starts_with("signorini figures") {
+                        continue;
+                    }
+                    let (typed, comment) = line.split_once('#').unwrap_or((line, ""));
+                    let words: Vec<&str> = typed.split_whitespace().skip(1).collect();
+                    let output = test_directory.say(&words);
+                    let code = if comment.contains("refused") { 2 } else { 0 };
+                    assert_eq!(output.code, Some(code), "{line}: {output:?}");
+                    said += &(output.out + &output.err);
+                    commands += 1;
+                }
+            }
+            // What the program is said to print, up to an ellipsis.
+            _ => {
+                for line in content.lines() {
+                    let line = spaced(line.split(" …").next().expect("a part"));
+                    assert!(spaced(&said).contains(&line), "not printed: {line}\nbut: {said}");
+                }
+            }
+        }
+    }
+    assert!(commands >= 9 && said.contains("14 of 16 nodes active"), "{commands}: {said}");
+}
+
+#[test]
+fn a_new_scene_overwrites_nothing() {
+    let test_directory = TestDirectory::new();
+    test_directory.write("wall.toml", "mine");
+    test_directory.say(&["new", "wall"]).fails(2, &["wall.toml is there already"]);
+    assert!(!test_directory.path("wall.geo").exists());
+    // A name with a folder, a blank and a quote.
+    fs::create_dir(test_directory.path("my walls")).expect("a folder");
+    let name = "my walls/the \"old\" one";
+    assert_eq!(test_directory.say(&["new", name]).code, Some(0));
+    let checked = test_directory.say(&["check", &format!("{name}.toml")]);
+    assert_eq!((checked.code, checked.err.as_str()), (Some(0), ""), "{checked:?}");
+    let unwritable = ProgramOutput::of(&mut test_directory.command(&["new", "nowhere/wall"]));
+    unwritable.fails(2, &["cannot write nowhere/wall.geo"]);
+}
