@@ -34,6 +34,14 @@ fn with(path: &str, value: Option<&str>) -> Result<Scene, String> {
             ["clamp", "load", "foundation", "axis"].map(|at| vec!["boundary", at, key]).to_vec()
         }
     };
+    if let Some(key) = path.strip_prefix("probe.") {
+        let all = [("name", "'p'"), ("point", "[0, 0]")].into_iter().chain(value.map(|v| (key, v)));
+        let given = all.enumerate().filter(|(i, (name, _))| *i == 2 || *name != key);
+        let given = given.map(|(_, (name, value))| format!("{name} = {value}"));
+        let set = format!("probe = [{{ {} }}]", given.collect::<Vec<_>>().join(", "));
+        let scene = Scene::parse(BASE, Path::new("base.toml"), &[set]);
+        return scene.map_err(|error| error.to_string());
+    }
     let read = |path: &Vec<&str>| {
         let mut scene: toml::Table = BASE.parse().expect("TOML");
         let mut sets = Vec::new();
