@@ -9,7 +9,8 @@ ARGS ?=
 # The scene of `make reference` and `make converge`; the scenes of `make chart`.
 STUDY ?= geo/square-table1.toml
 STUDY_NAME = $(basename $(notdir $(firstword $(STUDY))))
-CHART ?= geo/square-mild.toml geo/square-table1.toml geo/lshape-rolling.toml
+CHART ?= $(addprefix geo/, square-mild.toml square-table1.toml lshape.toml bridge-half.toml \
+    lshape-rolling.toml)
 
 # petsc-dev brings MPI and a C compiler, libclang-dev the headers that bindgen reads.
 PACKAGES := petsc-dev libsuitesparse-dev libopenblas0-serial libclang-dev pkg-config gcc gmsh \
@@ -42,7 +43,7 @@ help:
 	@echo 'make stability  the maps of where methods fail; or MAPS="step-size …"'
 	@echo 'make reference  the reference solution of a scene, unless it is there (minutes); or STUDY=geo/a.toml'
 	@echo 'make converge   errors against it on nested meshes: Table 1, Figure 3; or STUDY=geo/a.toml'
-	@echo 'make chart      error against seconds: solvers, meshes, steps, FEniCSx; or CHART="geo/a.toml …"'
+	@echo 'make chart      error against seconds: meshes, orders, --accuracy, solvers, FEniCSx; or CHART="geo/a.toml …"'
 	@echo 'make clean      remove the build, the results and the meshes'
 
 deps:
@@ -112,21 +113,10 @@ converge: reference
 	$(STUDIES) converge $(STUDY)
 	$(PYTHON) scripts/converge.py out/converge/$(STUDY_NAME)
 
-# The chart compares uniform meshes with graded ones: a graded reference is nearer to both. The one
-# of the rolling load is coarser, because its steps are dear. The FEniCSx loop is timed on
-# square.geo alone, with n cells a side.
+# Whole processes against references of their own, which are kept (minutes); out/chart/chart.png.
 chart: build deps-validate
-	@set -e; for scene in $(CHART); do \
-	    out=out/chart/$$(basename $$scene .toml); \
-	    case $$scene in \
-	        *-rolling.toml) reference='--refinements 5 --step 1e-3';; \
-	        *) reference='--grading 4 --step 5e-4';; \
-	    esac; \
-	    $(STUDIES) reference $$scene $$reference; \
-	    $(STUDIES) chart $$scene $$reference; \
-	    ! grep -q '"square.geo"' $$scene || $(PYTHON) validation/timing.py $$scene $$out; \
-	    $(PYTHON) scripts/chart.py $$out; \
-	done
+	$(PYTHON) validation/chart.py --binary $(BINARY) $(CHART)
+	$(PYTHON) scripts/chart.py out/chart
 
 clean:
 	rm -rf target out geo/*.msh scripts/__pycache__ scripts/*/__pycache__ validation/__pycache__

@@ -89,7 +89,9 @@ class Loop:
         if not hasattr(self, "snes"):
             self.start_solver()
         self.force = max(self.force, self.load.norm())
-        self.snes.setTolerances(rtol=0.0, atol=5e-11 * self.force, stol=0.0, max_it=200)
+        # Without any load so far the residual is zero, which SNES wants to be below the tolerance.
+        atol = 5e-11 * self.force or 1e-300
+        self.snes.setTolerances(rtol=0.0, atol=atol, stol=0.0, max_it=200)
         self.snes.solve(None, self.u)
         if self.snes.getConvergedReason() <= 0:
             raise SystemExit(f"SNES stopped with reason {self.snes.getConvergedReason()}")

@@ -86,13 +86,19 @@ def of_order(scene, order):
     return {**scene, "discretisation": {**scene.get("discretisation", {}), "displacement": order}}
 
 
+def toml(value):
+    """A value in TOML: JSON's strings, numbers, booleans and flat lists, and tables in a line."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {toml(entry)}" for key, entry in value.items()) + " }"
+    return json.dumps(value)
+
+
 def write_scene(scene, path):
     """Writes scalars, lists of scalars, tables and arrays of tables: all that scenes use."""
     lines = []
 
     def entries(table):
-        # JSON's strings, numbers, booleans and flat lists are TOML's.
-        lines.extend(f"{key} = {json.dumps(value)}" for key, value in table.items())
+        lines.extend(f"{key} = {toml(value)}" for key, value in table.items())
 
     entries({k: v for k, v in scene.items() if not _is_table(v)})
     for name, value in scene.items():

@@ -16,7 +16,8 @@ fn done(steps: &[Step]) -> [f64; 2] {
 fn lshape(stepping: &str, load: &str) -> (Vec<Step>, Outcome) {
     let load = format!("boundary.load.traction=['0', '{load}']");
     let gap = "boundary.foundation.gap=1e-3";
-    let scene = shipped("lshape", &["mesh.size=1", stepping, &load, gap]);
+    let uniform = ["discretisation.displacement=1", "mesh.parameters.grading=1", "mesh.size=1"];
+    let scene = shipped("lshape", &[&uniform[..], &[stepping, &load, gap]].concat());
     history(&scene, SOLVERS[0])
 }
 

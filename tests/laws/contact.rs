@@ -10,7 +10,8 @@ use signorini::{
 
 /// A bending L over an obstacle from which its arm partly lifts off, elastic and static.
 fn lshape(sets: &[&str]) -> DiscreteProblem {
-    let sets = [&["mesh.size=0.5", "time.step=1"], sets].concat();
+    let uniform = ["discretisation.displacement=1", "mesh.parameters.grading=1", "mesh.size=0.5"];
+    let sets = [&uniform[..], &["time.step=1"], sets].concat();
     shipped("lshape", &sets)
 }
 

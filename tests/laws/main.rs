@@ -31,6 +31,7 @@ mod pivoting;
 mod posed;
 mod quadratic_elements;
 mod recovery;
+mod punch;
 mod regression;
 mod rescue;
 mod rigid;

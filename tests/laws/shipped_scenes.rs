@@ -17,9 +17,9 @@ fn quick(name: &str) -> DiscreteProblem {
         "square-mild" | "square-table1" => &["mesh.size=0.0625", "time.step=0.1"],
         "lshape-rolling" => &["mesh.size=0.25", "time.step=0.05"],
         "beam" => &["mesh.size=0.125", "time.step=0.05"],
-        _ => &["mesh.size=0.5", "time.step=0.1"],
+        _ => &["mesh.size=0.5", "mesh.parameters.grading=1", "time.step=0.1"],
     };
-    shipped(name, sets)
+    shipped(name, &[sets, &["discretisation.displacement=1"]].concat())
 }
 
 /// The same with quadratic displacements.

@@ -1,14 +1,12 @@
 //! Studies of [`signorini`]: many runs, and what they say together.
 //!
 //! - [`stability`]: where methods fail (`validation/STABILITY.md`);
-//! - [`converge`](fn@converge) and [`chart`](fn@chart): errors against a [`Reference`] solution,
-//!   over mesh size and time step, and over seconds (`validation/ACCURACY.md`).
+//! - [`converge`](fn@converge): errors against a [`Reference`] solution over mesh size and time step
+//!   (`validation/ACCURACY.md`).
 #![forbid(unsafe_code)]
 
-mod chart;
 mod converge;
 mod error;
-mod front;
 mod locate;
 mod norms;
 mod reference;
@@ -18,10 +16,8 @@ pub mod stability;
 mod store;
 mod study_run;
 
-pub use chart::{ChartRow, chart};
 pub use converge::{Convergence, ErrorRow, MEASURES, Measure, converge};
 pub use error::StudyError;
-pub use front::Front;
 pub use norms::{Embedding, Fields, Norms};
 pub use reference::{Reference, ReferenceOptions, ReferenceSpec};
 pub use refine::{longest_edge, refined};

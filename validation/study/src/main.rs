@@ -7,7 +7,7 @@ use clap::{Parser, Subcommand};
 use signorini::petsc::Communicator;
 use std::{env, process::ExitCode};
 
-/// Studies of signorini: where methods fail, orders of convergence, error against seconds.
+/// Studies of signorini: where methods fail, orders of convergence.
 #[derive(Parser)]
 #[command(
     version,
@@ -24,12 +24,10 @@ struct Arguments {
 enum Command {
     /// Make the maps of where methods fail.
     Stability(command::StabilityArguments),
-    /// Compute the reference solution of `converge` and `chart`, unless it is there.
+    /// Compute the reference solution of `converge`, unless it is there.
     Reference(command::ReferenceArguments),
     /// Errors on nested meshes against the reference; by default the paper's Table 1 and Figure 3.
     Converge(command::StudyArguments),
-    /// Error against seconds: solvers, meshes, steps and tolerances, with the Pareto front.
-    Chart(command::StudyArguments),
 }
 
 fn main() -> ExitCode {
@@ -47,7 +45,6 @@ fn main() -> ExitCode {
         Command::Stability(arguments) => command::stability(&arguments),
         Command::Reference(arguments) => command::reference(&arguments),
         Command::Converge(arguments) => command::convergence(&arguments),
-        Command::Chart(arguments) => command::speed_chart(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

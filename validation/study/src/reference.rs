@@ -89,7 +89,9 @@ impl ReferenceSpec {
         set: &[String],
         options: &ReferenceOptions,
     ) -> Result<Self, StudyError> {
-        let scene = Scene::read(path, set)?;
+        // The meshes and norms of the studies are those of affine displacements, as in the paper.
+        let mut scene = Scene::read(path, set)?;
+        scene.order = Order::Linear;
         let unsuitable =
             |problem: &str| Err(StudyError::Unsuitable(format!("{}: {problem}", path.display())));
         let Some(TimeGrid { end, .. }) = scene.time else {
@@ -154,17 +156,6 @@ impl ReferenceSpec {
         let norms = states.iter().map(|state| own.difference(state, &zero));
         let size = norms.fold(Norms::default(), |a, b| a.max(&b));
         Ok(Reference { spec: self.clone(), times, states, body, size })
-    }
-
-    /// The mesh size of the finest mesh, where gmsh makes the coarsest by a size, m.
-    pub(super) fn finest_size(&self) -> Option<f64> {
-        let size = self.coarsest.mesh.parameters.get("size")?;
-        Some(size / 2.0_f64.powi(self.refinements as i32))
-    }
-
-    /// The grading of the meshes; 1 where the scene names none.
-    pub(super) fn grading(&self) -> f64 {
-        self.coarsest.mesh.parameters.get("grading").copied().unwrap_or(1.0)
     }
 
     /// A run on the coarsest mesh refined so often, with uniform steps k.

@@ -2,7 +2,6 @@
 
 use super::{Fields, StudyError, refined};
 use signorini::{
-    contact::Kkt,
     evolution::{self, DiscreteProblem, Phases, State, StepRecord},
     fem::Body,
     mesh::{self, Mesh, MeshError, Order},
@@ -31,8 +30,6 @@ pub(super) struct History {
     pub(super) seconds: f64,
     /// The last step.
     pub(super) last: StepRecord,
-    /// Worst residuals of all steps.
-    pub(super) kkt: Kkt,
 }
 
 impl StudyRun {
@@ -80,7 +77,6 @@ impl StudyRun {
             states: sampler.states,
             seconds,
             last: outcome.last.record,
-            kkt: outcome.kkt,
         })
     }
 }

@@ -1,11 +1,9 @@
 //! What the subcommands do.
 
-mod chart;
 mod converge;
 mod reference;
 mod stability;
 
-pub use chart::speed_chart;
 pub use converge::convergence;
 pub use reference::{ReferenceArguments, StudyArguments, reference};
 pub use stability::{StabilityArguments, stability};

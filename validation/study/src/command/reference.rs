@@ -1,4 +1,4 @@
-//! `signorini-study reference`: the reference solution of `converge` and `chart`.
+//! `signorini-study reference`: the reference solution of `converge`.
 
 use super::with_petsc;
 use clap::Args;

@@ -1,9 +1,7 @@
 //! Errors against a reference solution: nested meshes, norms on them, the file the reference is
 //! kept in, and the orders they show.
 
-mod chart;
 mod converge;
-mod front;
 mod nested;
 mod norms;
 mod sampler;
