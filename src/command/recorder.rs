@@ -179,7 +179,7 @@ fn summary(
         "end_time": last.map(|record| record.time),
         // When ζ_* was reached, s, and how far off that time may be; null if it was not reached.
         "stopped_at": stopped.map(|stop| stop.time),
-        "stopped_uncertainty": stopped.map(|stop| stop.uncertainty),
+        "stopped_uncertainty": stopped.map(|stop| stop.bar()),
         // As in history.csv.
         "zeta_min": last.map(|record| record.zeta_min),
         "zeta_mean": last.map(|record| record.zeta_mean),

@@ -10,7 +10,7 @@ use super::{
 use clap::Args;
 use signorini::{
     cholesky::{Factor, Precision},
-    evolution::{self, AdaptError, DiscreteProblem, Phases, RunError, SHARE_OF_STEPS},
+    evolution::{self, AdaptError, DiscreteProblem, Outcome, Phases, RunError, SHARE_OF_STEPS},
     mesh::{Mesh, Order},
     output,
     petsc::{PetscError, Session},
@@ -71,14 +71,15 @@ impl RunArguments {
 }
 
 /// Where the scene asks for an accuracy, a mesh that has it, and steps for it in the scene; else `mesh`.
-/// Whether it was adapted comes second. Collective.
+/// Whether it was adapted comes second, then by how much the time at which ζ_* is reached moved from the
+/// mesh before to it, s. Collective.
 fn adapt(
     session: &Session,
     scene: &mut Scene,
     mesh: Mesh,
     solver: &str,
-) -> Result<(Mesh, bool), Failure> {
-    let Some(accuracy) = scene.accuracy else { return Ok((mesh, false)) };
+) -> Result<(Mesh, bool, Option<f64>), Failure> {
+    let Some(accuracy) = scene.accuracy else { return Ok((mesh, false, None)) };
     let adapted = evolution::adapted(session, scene, mesh, solver, accuracy);
     let adapted = adapted.map_err(|error| match error {
         AdaptError::Setup(_) => Failure::input(error),
@@ -95,12 +96,7 @@ fn adapt(
          (kept as mesh.msh)",
         adapted.rounds,
     ));
-    if let Some(change) = adapted.stop_change {
-        scene.notes.push(format!(
-            "from the mesh before to this one, the time at which ζ_* is reached moved by {change:.1e} s"
-        ));
-    }
-    Ok((adapted.mesh, true))
+    Ok((adapted.mesh, true, adapted.stop_change))
 }
 
 /// Refuses PETSc options that would end the run at its first factorisations.
@@ -135,6 +131,8 @@ pub(super) struct Task<'a> {
     /// Triangles of the whole body, and its nodes with a gap condition.
     pub(super) triangles: usize,
     pub(super) contact_nodes: usize,
+    /// By how much the time at which ζ_* is reached moved from one adapted mesh to the last, s.
+    stop_change: Option<f64>,
     /// The name of the contact solver.
     pub(super) solver: String,
     /// Where the results go.
@@ -173,7 +171,7 @@ impl<'a> Task<'a> {
         let folder = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
         let as_run = scene.as_run().map_err(Failure::input)?;
         let adapted = phases.time("adaptation", || adapt(session, &mut scene, mesh, &solver));
-        let (mesh, adapted) = agree(comm, adapted)?;
+        let (mesh, adapted, stop_change) = agree(comm, adapted)?;
         let adapted = adapted.then(|| mesh.to_msh());
         let problem = phases.time("discrete problem", || DiscreteProblem::new(scene, mesh));
         let problem = agree(comm, problem.map_err(Failure::input))?;
@@ -189,6 +187,7 @@ impl<'a> Task<'a> {
             triangles: comm.count(problem.body.own_triangles),
             contact_nodes: comm.count(contact_nodes.count()),
             problem,
+            stop_change,
             solver,
             folder,
             as_run,
@@ -205,9 +204,13 @@ impl<'a> Task<'a> {
         let comm = session.comm();
         let mut recorder = agree(comm, Recorder::new(&self).map_err(Failure::input))?;
         let (problem, phases) = (&self.problem, self.phases);
-        let result = evolution::run(session, problem, &self.solver, phases, &mut |step| {
+        let mut result = evolution::run(session, problem, &self.solver, phases, &mut |step| {
             Ok(recorder.accept(step)?)
         });
+        if let Ok(Outcome { stopped: Some(stop), .. }) = &mut result {
+            let parts = [stop.from_mesh, self.stop_change].into_iter().flatten();
+            stop.from_mesh = parts.reduce(f64::max);
+        }
         barrier_or_abort(comm, result.as_ref().err());
         let written = recorder.finish(&result);
         let ended = match result {

@@ -79,7 +79,7 @@ pub fn conclusion(
             lines.push(row("support", format!("{name}: {resultant}, moment {moment:.4e} {force}")));
         }
         if let Some(outcome) = outcome {
-            let [first, rest @ ..] = outcome.errors.lines();
+            let [first, rest @ ..] = outcome.errors.lines(outcome.stopped.as_ref());
             lines.push(row("errors", first));
             lines.extend(rest.map(|line| row("", line)));
         }
@@ -118,10 +118,11 @@ fn ending(last: Option<StepRecord>, outcome: Option<&Outcome>) -> String {
     match outcome.map(|outcome| outcome.stopped) {
         None => format!("FAILED after t = {end}; the state there is saved"),
         Some(Some(stop)) => format!(
-            "STOPPED at t = {} ± {:.1e}: min ζ = {:.4} there reaches ζ_*; \
+            "STOPPED at t = {} ± {:.1e}{}: min ζ = {:.4} there reaches ζ_*; \
              saved is the state before, t = {end} (step {step})",
             rounded(stop.time),
-            stop.uncertainty,
+            stop.bar(),
+            if stop.from_mesh.is_some() { "" } else { " (the time steps alone)" },
             stop.zeta_min,
         ),
         Some(None) if step == 0 => format!("solved at t = {end}"),

@@ -13,10 +13,11 @@ use super::{
 };
 use crate::{
     fem::RecoveredStrains,
-    mesh::{Mesh, MeshError, Order, Refinement, twice_area},
+    mesh::{Mesh, MeshError, Order, Refinement, sorted, twice_area},
     petsc::{PetscError, Session},
     scene::{Scene, Stepping},
 };
+use std::collections::HashSet;
 
 /// A mesh that was adapted to a scene.
 #[derive(Debug, Clone)]
@@ -55,6 +56,9 @@ pub enum AdaptError {
 /// Parts of the accuracy asked for: what a mesh is made for, and what its estimate may be.
 const AIM: f64 = 0.7;
 const ENOUGH: f64 = 0.85;
+/// The damage's error of interpolation counts so many times: on a mesh too coarse for its layers
+/// recovered gradients show down to a third of it.
+const CAUTION: f64 = 2.5;
 /// The part of the damage's error that its interpolation may take.
 const INTERPOLATION: f64 = 0.7;
 /// The error of ζ over the damage done that the few steps of a run on a coarse mesh may make.
@@ -112,12 +116,14 @@ pub fn adapted(
         }
         indicators.observe(&outcome.last.state, true)?;
         let (error, shares) = indicators.relative();
-        let damage_error = outcome.errors.damage_mesh.filter(|_| outcome.stopped.is_none());
+        let mut of_damage = indicators.gathered(&outcome.damage_indicators);
+        of_damage.iter_mut().for_each(|share| *share *= CAUTION * CAUTION);
+        let interpolation = of_damage.iter().sum::<f64>().sqrt();
+        let more = (1.0 - 1.0 / CAUTION) * interpolation;
+        let damage_error = outcome.errors.damage_mesh.map(|error| error + more);
         // Two meshes may agree by chance.
-        settled_rounds = match is_settled(&outcome, stopped_before, accuracy) {
-            true => settled_rounds + 1,
-            false => 0,
-        };
+        let is_settled = is_settled(&outcome, stopped_before, accuracy);
+        settled_rounds = if is_settled { settled_rounds + 1 } else { 0 };
         let settled = settled_rounds >= if outcome.stopped.is_some() { 2 } else { 1 };
         let exhausted = rounds >= ROUNDS || refinement.mesh.triangles.len() > MOST_TRIANGLES;
         let largest = error.max(damage_error.unwrap_or(0.0));
@@ -129,28 +135,35 @@ pub fn adapted(
             let mesh = refinement.mesh;
             return Ok(Adapted { mesh, rounds, error, damage_error, stop_change, exhausted });
         }
-        // A damage, or a time, that is not exact enough asks for a u better than this one.
-        let of_u = match damage_error {
-            _ if !settled => accuracy.min(0.5 * error),
-            Some(of_damage) if of_damage > accuracy => accuracy.min(error * accuracy / of_damage),
-            _ => accuracy,
-        };
+        let of_u = accuracy_of_u(accuracy, error, damage_error, settled);
         let mut ratios = size_ratios(&shares, order, AIM * of_u);
         if damage_error.is_some() {
-            let shares = indicators.gathered(&outcome.damage_indicators);
-            let of_damage = size_ratios(&shares, 2.0, INTERPOLATION * AIM * accuracy);
+            let of_damage = size_ratios(&of_damage, 2.0, INTERPOLATION * AIM * accuracy);
             ratios.iter_mut().zip(of_damage).for_each(|(ratio, other)| *ratio = ratio.min(other));
         }
-        for (ratio, &[a, b, c]) in ratios.iter_mut().zip(&refinement.mesh.triangles) {
-            let sides = [[a, b], [b, c], [c, a]].map(|[p, q]| [p.min(q), p.max(q)]);
-            if sides.iter().any(|side| coarse.contains(side)) {
-                *ratio = ratio.min(QUARTER);
-            }
-        }
+        quarter(&refinement.mesh, &coarse, &mut ratios);
         stopped_before = outcome.stopped.map(|stop| stop.time);
         refinement = divided(refinement, &ratios)?;
     }
     unreachable!("the last round returns")
+}
+
+/// A damage, or a time, that is not exact enough asks for a u better than this one.
+fn accuracy_of_u(accuracy: f64, error: f64, damage_error: Option<f64>, settled: bool) -> f64 {
+    match damage_error {
+        _ if !settled => accuracy.min(0.5 * error),
+        Some(of_damage) if of_damage > accuracy => accuracy.min(error * accuracy / of_damage),
+        _ => accuracy,
+    }
+}
+
+/// Makes the triangles at some edges smaller.
+fn quarter(mesh: &Mesh, edges: &HashSet<[usize; 2]>, ratios: &mut [f64]) {
+    for (ratio, &[a, b, c]) in ratios.iter_mut().zip(&mesh.triangles) {
+        if [[a, b], [b, c], [c, a]].iter().any(|&side| edges.contains(&sorted(side))) {
+            *ratio = ratio.min(QUARTER);
+        }
+    }
 }
 
 /// Whether the time at which ζ_* was reached has changed by little since the mesh before.

@@ -11,6 +11,8 @@ mod datum;
 mod rescue;
 
 pub use accuracy::Accuracy;
+pub(super) use accuracy::Compliance;
+pub(super) use certificate::active_bounds;
 
 use super::{
     DiscreteProblem, Phases, RunError, State, Step, StepRecord, agreed, discrete_problem::LoadCase,
@@ -21,7 +23,7 @@ use crate::{
     fem::Stiffness,
     petsc::{PetscError, Session, Vector},
 };
-use certificate::{Judged, active_bounds};
+use certificate::Judged;
 use datum::Datum;
 use nalgebra::DMatrix;
 use std::time::Instant;

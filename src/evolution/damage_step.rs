@@ -138,7 +138,11 @@ impl DamageStep<'_> {
     }
 
     /// The damage system of a step of `k` s, factorised.
-    fn system(&mut self, law: &DamageLaw, k: f64) -> Result<&mut DamageSystem, PetscError> {
+    pub(super) fn system(
+        &mut self,
+        law: &DamageLaw,
+        k: f64,
+    ) -> Result<&mut DamageSystem, PetscError> {
         let (session, problem, phases) = (self.session, self.problem, self.phases);
         let system = match self.system.take() {
             Some((factorised, system)) if factorised == k => system,

@@ -175,21 +175,16 @@ impl DiscreteProblem {
     }
 
     /// The same scene on the same mesh, and this rank's same triangles of it, with displacements of the
-    /// other order, with a KKT tolerance of its own. Collective.
+    /// other order. Collective.
     ///
     /// # Errors
     /// At its nodes the scene contradicts itself, or PETSc failed.
-    pub(super) fn of_other_order(
-        &self,
-        session: &Session,
-        tolerance: f64,
-    ) -> Result<Self, RunError> {
+    pub(super) fn of_other_order(&self, session: &Session) -> Result<Self, RunError> {
         let mut scene = self.scene.clone();
         scene.order = match scene.order {
             Order::Linear => Order::Quadratic,
             Order::Quadratic => Order::Linear,
         };
-        scene.contact.tolerance = tolerance;
         let Some((mesh, owners)) = self.undivided.clone() else {
             return Ok(Self::new(scene, self.body.mesh.clone())?);
         };
@@ -300,11 +295,7 @@ impl DiscreteProblem {
 
     /// ζ₀ at the nodes: π^h ζ₀, or 1 for a material that is not damaged.
     pub fn initial_damage(&self) -> Vec<f64> {
-        self.initial_damage_at(&self.body.mesh.nodes)
-    }
-
-    /// ζ₀ at some points.
-    pub(super) fn initial_damage_at(&self, points: &[[f64; 2]]) -> Vec<f64> {
+        let points = &self.body.mesh.nodes;
         match &self.scene.damage {
             Some(damage) => points.iter().map(|&[x, y]| damage.initial.eval(x, y, 0.0)).collect(),
             None => vec![1.0; points.len()],

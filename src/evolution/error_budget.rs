@@ -1,6 +1,6 @@
 //! The error budget of a run: how large the errors of mesh, time steps and solver are.
 
-use super::{DiscreteProblem, Outcome, State, mesh_error::DamageError};
+use super::{DiscreteProblem, Outcome, State, Stop, mesh_error::DamageError};
 use crate::{fem::RecoveredStrains, petsc::PetscError};
 use serde::Serialize;
 
@@ -10,7 +10,8 @@ use serde::Serialize;
 pub struct ErrorBudget {
     /// Of u, from the mesh.
     pub displacement_mesh: f64,
-    /// Of the damage, from the mesh.
+    /// Of the damage, from the mesh; `None` also where the run stopped at ζ_*: near it the error grows
+    /// without bound.
     pub damage_mesh: Option<f64>,
     /// Of u, from the time steps.
     pub displacement_steps: Option<f64>,
@@ -32,6 +33,7 @@ impl ErrorBudget {
         steps: Option<&[f64]>,
     ) -> Self {
         let (accuracy, state) = (&outcome.accuracy, &outcome.last.state);
+        let mesh = mesh.filter(|_| outcome.stopped.is_none());
         let caused = |error: &[f64]| problem.displacement_error_of(error, state);
         let by_damage = mesh.as_ref().map_or(0.0, |error| caused(&error.change));
         Self {
@@ -43,20 +45,34 @@ impl ErrorBudget {
         }
     }
 
-    /// The errors by their causes, and which cause to spend on.
-    pub fn lines(&self) -> [String; 4] {
+    /// The errors by their causes, and which cause to spend on; of a run that stopped at ζ_* those of the
+    /// time instead of the damage.
+    pub fn lines(&self, stopped: Option<&Stop>) -> [String; 4] {
         let of_damage = |error: Option<f64>| match error {
             Some(error) => format!("damage {}", percent(error)),
             None if self.damage_steps.is_some() => "damage not estimated".to_owned(),
             None => "no damage".to_owned(),
         };
-        let steps = match self.displacement_steps {
-            Some(error) => format!("u {}, {}", percent(error), of_damage(self.damage_steps)),
-            None => "none".to_owned(),
+        let of_stop = |off: Option<f64>| match off {
+            Some(off) => format!("the time of ζ_* off by up to {off:.1e} s"),
+            None => "the time of ζ_*: not estimated".to_owned(),
         };
-        let mesh = self.displacement_mesh.max(self.damage_mesh.unwrap_or(0.0));
-        let steps_most =
-            self.displacement_steps.unwrap_or(0.0).max(self.damage_steps.unwrap_or(0.0));
+        let of_u = self.displacement_steps;
+        let (of_mesh, of_steps, mesh, steps) = match (stopped, of_u) {
+            (Some(stop), _) => {
+                let [mesh, steps] = [stop.from_mesh, Some(stop.uncertainty)];
+                let part = |off: Option<f64>| off.map(|off| off / stop.time);
+                (of_stop(mesh), of_stop(steps), part(mesh), part(steps))
+            }
+            (None, Some(u)) => {
+                let steps = format!("u {}, {}", percent(u), of_damage(self.damage_steps));
+                let largest = self.damage_steps.map_or(u, |damage| damage.max(u));
+                (of_damage(self.damage_mesh), steps, self.damage_mesh, Some(largest))
+            }
+            (None, None) => (of_damage(self.damage_mesh), "none".to_owned(), None, None),
+        };
+        let of_u = if stopped.is_some() { 0.0 } else { self.displacement_mesh };
+        let (mesh, steps_most) = (of_u.max(mesh.unwrap_or(0.0)), steps.unwrap_or(0.0));
         let advice = match () {
             () if self.solver > mesh.max(steps_most) => "the solver's tolerance",
             () if steps_most > mesh => "shorter time steps",
@@ -65,8 +81,8 @@ impl ErrorBudget {
         };
         [
             format!("from the mesh: u {} (energy norm)", percent(self.displacement_mesh)),
-            format!("from the mesh: {}", of_damage(self.damage_mesh)),
-            format!("from the time steps: {steps}"),
+            format!("from the mesh: {of_mesh}"),
+            format!("from the time steps: {of_steps}"),
             format!("from the solver: u {:.0e}; spend on {advice}", self.solver),
         ]
     }

@@ -1,14 +1,30 @@
-//! What the mesh does to the damage: damage steps once more, in P1 and in P2.
+//! What the mesh does to the damage.
+//!
+//! The damage z of a much finer mesh is ζ + δ + β, with ζ that of the run, δ affine and β = z − Iz, 0 at
+//! the vertices. With b* the load of z's source φ*, (28) for both leaves
+//!
+//! (M + kκL) δ_n = M δ_{n−1} + k (b* − b)_i − ∫ (β_n − β_{n−1}) λ_i − kκ ∫ ∇β_n·∇λ_i,
+//!
+//! solved with a few long steps. β comes from recovered gradients of z ([`interpolation_error`]), and φ*
+//! from the displacements u₁ and u₂ of both orders for the same ζ ([`BothOrders`]): with the estimated
+//! error η of u₂ in the energy norm, where errors are orthogonal to what is resolved and squares add up,
+//!
+//! |ε*|² = |ε(u₂)|² + c (|ε(u₂)|² − |ε(u₁)|²), c = η²/‖u₂ − u₁‖²,
+//!
+//! or c = 1 where ζ_* was reached: it is at singular points, where both orders converge alike;
+//! and as strains at the same stress go like 1/ζ, φ* = φ((ζ/z)² |ε*|², z).
 
-use super::{ContactStep, DiscreteProblem, Phases, RunError, State, Step, damage_step::DamageStep};
+use super::{
+    DiscreteProblem, Outcome, Phases, RunError, State, Step, both_orders::BothOrders,
+    contact_step::Compliance, damage_step::DamageStep,
+};
 use crate::{
-    contact::SOLVERS,
     fem::{
-        DamageSystem, Elements, RecoveredStrains, mean_product, quadratic_load, strains_at_nodes,
+        RecoveredStrains, bulged, diffusion_load, interpolation_error, mean_product, missing_mass,
+        quadratic_load, strains_at_nodes,
     },
-    mesh::Order,
     model::DamageLaw,
-    petsc::{PetscError, Session},
+    petsc::PetscError,
 };
 use nalgebra::Vector3;
 use std::array;
@@ -16,28 +32,24 @@ use std::array;
 /// So many intervals of time at least and about twice as many at most, if there are so many steps; with
 /// three the error of a load that swings once was estimated at 0.6 of it.
 const INTERVALS: usize = 5;
-/// Vertices up to which displacements of order 1 are solved for again in order 2, which takes far more
-/// than a step of theirs.
-const MOST: usize = 4000;
-/// Times that z₂ of an instant is computed, each with the source of the one before.
-const PASSES: usize = 2;
-/// The KKT tolerance of the other order: a few digits of an error are enough.
-const TOLERANCE: f64 = 1e-4;
 
 /// States of a run at a few times, evenly spread over its steps.
 pub(super) struct Instants {
     /// Every so many steps.
     stride: usize,
     states: Vec<State>,
+    /// t_n and min ζ_n of all steps.
+    falling: Vec<(f64, f64)>,
 }
 
 impl Instants {
     pub(super) fn new() -> Self {
-        Self { stride: 1, states: Vec::new() }
+        Self { stride: 1, states: Vec::new(), falling: Vec::new() }
     }
 
     /// Sees an accepted step.
     pub(super) fn observe(&mut self, step: &Step) {
+        self.falling.push((step.state.time, step.record.zeta_min));
         if !step.record.step.is_multiple_of(self.stride) {
             return;
         }
@@ -49,223 +61,248 @@ impl Instants {
         }
     }
 
-    /// The states, `last` being the last one.
-    fn until(mut self, last: &State) -> Vec<State> {
+    /// The last state becomes the last of these.
+    fn end(&mut self, last: &State) {
         if let [.., before, end] = &self.states[..]
             && last.time - end.time < 0.5 * (end.time - before.time)
         {
             self.states.pop();
         }
         self.states.push(last.clone());
-        self.states
+    }
+
+    /// How long after `time` min ζ of the run falls to `level`, s; `None` where it does not.
+    fn delay(&self, time: f64, level: f64) -> Option<f64> {
+        let after = self.falling.iter().position(|(_, zeta)| *zeta <= level)?;
+        let (t, zeta) = self.falling[after];
+        let (t0, zeta0) = self.falling[after.saturating_sub(1)];
+        let part = if zeta0 > zeta { (zeta0 - level) / (zeta0 - zeta) } else { 1.0 };
+        Some(t0 + part * (t - t0) - time)
     }
 }
 
 /// The estimated error that the mesh makes in the damage.
 pub(super) struct DamageError {
-    /// ‖z₂ − z₁‖ / ‖ζ₀ − z₂‖ in L².
+    /// ‖z − ζ‖ / ‖ζ₀ − z‖ in L².
     pub(super) relative: f64,
-    /// z₂ − z₁ at the vertices.
+    /// z − ζ at the vertices.
     pub(super) change: Vec<f64>,
     /// See [`Outcome::damage_indicators`](super::Outcome).
     pub(super) indicators: Vec<f64>,
+    /// How long after z the run's ζ has fallen to the same least value, s: at the last instant when both
+    /// still fall, if there is one.
+    pub(super) delay: Option<f64>,
 }
 
-/// The error that the mesh makes in the damage `last`; `None` without damage, where the same contact
-/// problem with displacements of the other order has no answer, or where that has too many. Collective.
+/// The error that the mesh makes in the last damage; `None` without damage, or where the active nodes
+/// of a state alone do not support the body. Collective.
 pub(super) fn mesh_error(
-    session: &Session,
     problem: &DiscreteProblem,
-    instants: Instants,
-    last: &State,
+    damage_step: &mut DamageStep,
+    compliance: Compliance,
+    mut instants: Instants,
+    outcome: &Outcome,
 ) -> Option<DamageError> {
     let comm = problem.body.nodes.partition.comm();
+    let last = &outcome.last.state;
     let undamaged = comm.all(last.zeta == problem.initial_damage());
     let law = problem.damage().filter(|_| !undamaged)?;
-    let vertices = problem.body.vertices.partition.total();
-    if problem.body.order() == Order::Linear && vertices > MOST {
-        return None;
-    }
-    let estimate = damage_error(session, problem, &law, &instants.until(last));
+    instants.end(last);
+    let stopped = outcome.stopped.is_some();
+    instants.falling.extend(outcome.stopped.map(|stop| (stop.time, problem.threshold())));
+    let estimate = damage_error(problem, damage_step, compliance, &law, &instants, stopped);
     let told = comm.all(estimate.is_ok());
     estimate.ok().flatten().filter(|_| told)
 }
 
-/// Damage steps from each of `states` to the next: z₁ in P1 with the run's own source φ(ε(u), ζ), z₂ in
-/// P2 with what the source would be on a finer mesh. Both have the same error of time.
-///
-/// With d = z₂ − z₁ and z = ζ + d, the strain at the same stress is ζ/z ε(u), and the source of z₂
-///
-/// φ(ζ/z ε(u), z) + (ζ/z)² c (φ(ε(u₂), ζ) − φ(ε(u₁), ζ)).
-///
-/// The second term is what u lacks: u₁ and u₂ are the displacements of either order for the same ζ,
-/// u is one of them, and c = η²/‖u₂ − u₁‖² from the estimated error η of u, at order 1 at least 1.
+/// From the first instant to the last, where the run may have `stopped` at ζ_*.
 fn damage_error(
-    session: &Session,
     problem: &DiscreteProblem,
+    damage_step: &mut DamageStep,
+    compliance: Compliance,
     law: &DamageLaw,
-    states: &[State],
+    instants: &Instants,
+    stopped: bool,
 ) -> Result<Option<DamageError>, RunError> {
-    let (phases, other) = (Phases::default(), problem.of_other_order(session, TOLERANCE)?);
-    let mut contact = ContactStep::new(session, &other, SOLVERS[0], &phases)?;
-    let damage_step = DamageStep { session, problem, phases: &phases, system: None };
-    let (body, cells) = match (problem.body.elements(), other.body.elements()) {
-        (Elements::Quadratic(cells), _) => (&problem.body, cells),
-        (_, Elements::Quadratic(cells)) => (&other.body, cells),
-        _ => return Ok(None),
+    let session = damage_step.session;
+    let other = problem.of_other_order(session)?;
+    let phases = Phases::default();
+    let orders = BothOrders::new(session, problem, &other, compliance, &phases)?;
+    let Some(mut orders) = orders else {
+        return Ok(None);
     };
-    let (vertices, nodes) = (&body.vertices.partition, &body.nodes.partition);
-    let [first, second, ..] = states else { return Ok(None) };
-    let (mut k, mass) = (second.time - first.time, problem.mass());
-    let mut linear = DamageSystem::new(session, body, mass, law.diffusion, k)?;
-    let mut quadratic = DamageSystem::quadratic(session, body, cells, law.diffusion, k)?;
-    let initial = problem.initial_damage_at(&body.nodes.points);
-    let (mut z1, mut z2) = (problem.initial_damage(), initial.clone());
-    let difference = |z1: &[f64], z2: &[f64]| subtract(z2, &body.at_nodes(z1));
-    let (mut time, mut before): (f64, Option<[Vec<f64>; 2]>) = (first.time, None);
-    for state in states {
-        if let Order::Linear = problem.body.order() {
-            // Active are the same nodes, and the midpoints between two of them.
-            let mut active = vec![0.0; z1.len()];
-            let points = state.contact.iter().filter(|point| point.active);
-            points.for_each(|point| active[point.node] = 1.0);
-            vertices.update(&mut active, 1)?;
-            let active = body.at_nodes(&active);
-            let bounds = other.constraints.bounds.iter();
-            let guess: Vec<f64> = bounds.map(|bound| active[bound.node].floor()).collect();
-            contact.set_warm_start(&guess);
-        }
-        let solved = contact.solve(0, state.time, &state.zeta)?;
-        contact.accept(state.time)?;
-        let source = Source::new(law, [problem, &other], state, &solved.state.u)?;
-        let load = |d: &[f64]| {
-            let values = source.values(law, cells.nodes, &body.at_nodes(&state.zeta), d);
-            quadratic_load(body, cells, &values)
+    let [first, .., last] = &instants.states[..] else { return Ok(None) };
+    let mut error = ZetaError {
+        problem,
+        law,
+        change: vec![0.0; first.zeta.len()],
+        middles: interpolation_error(&problem.body, &first.zeta)?,
+        load: Vec::new(),
+        step: 0.0,
+        delay: None,
+    };
+    let initial = error.middles.clone();
+    let mut before: Option<&State> = None;
+    for state in &instants.states {
+        let Some(strain_squared) = strain_squared(problem, &mut orders, state, stopped)? else {
+            return Ok(None);
         };
-        let load1 = damage_step.source(state).load.as_slice().to_vec();
-        let mut load2 = load(&difference(&z1, &z2));
-        if let Some([before1, before2]) = before {
-            // Steps of equal length differ by rounding.
-            if (state.time - time - k).abs() > 1e-6 * k {
-                k = state.time - time;
-                linear.set_step(k)?;
-                quadratic.set_step(k)?;
-            }
-            linear.advance(&mean(&before1, &load1), &mut z1)?;
-            vertices.update(&mut z1, 1)?;
-            let from = z2.clone();
-            for _ in 0..PASSES {
-                z2.clone_from(&from);
-                quadratic.advance(&mean(&before2, &load2), &mut z2)?;
-                nodes.update(&mut z2, 1)?;
-                load2 = load(&difference(&z1, &z2));
-            }
+        let own = damage_step.source(state).load;
+        let load = |error: &ZetaError| error.load(state, &strain_squared, own.as_slice());
+        if let Some(before) = before {
+            error.advance(damage_step, before, state, load)?;
         }
-        (time, before) = (state.time, Some([load1, load2]));
-    }
-    let error = difference(&z1, &z2);
-    let done = subtract(&initial, &z2);
-    let mut change = vec![0.0; z1.len()];
-    let mut indicators = Vec::new();
-    let mut sums = [0.0; 2];
-    let local = body.mesh.triangles.iter().zip(cells.nodes).zip(&body.triangles).enumerate();
-    for (t, ((vertices, nodes), triangle)) in local {
-        vertices.iter().zip(nodes).for_each(|(&vertex, &node)| change[vertex] = error[node]);
-        if t < body.own_triangles {
-            let square = |v: [f64; 6]| triangle.area() * mean_product(&v, &v, |a, b| a * b);
-            sums[0] += square(nodes.map(|node| error[node]));
-            sums[1] += square(nodes.map(|node| done[node]));
-            let [a, b, c, ab, bc, ca] = nodes.map(|node| z2[node]);
-            let inner = [ab - 0.5 * (a + b), bc - 0.5 * (b + c), ca - 0.5 * (c + a)];
-            indicators.push(square([0.0, 0.0, 0.0, inner[0], inner[1], inner[2]]));
+        error.load = load(&error);
+        let least = error.least(state);
+        if least > law.threshold {
+            error.delay = instants.delay(state.time, least).or(error.delay);
         }
+        before = Some(state);
     }
-    nodes.comm().sum(&mut sums);
-    indicators.iter_mut().for_each(|square| *square /= sums[1]);
-    let relative = (sums[0] / sums[1]).sqrt();
-    Ok(relative.is_finite().then_some(DamageError { relative, change, indicators }))
+    Ok(error.judged(&initial, last))
 }
 
-/// What φ of z₂ is made of, at the P2 nodes of each triangle.
-struct Source {
-    /// |ε(u)|².
-    strain_squared: Vec<[f64; 6]>,
-    /// c (φ(ε(u₂), ζ) − φ(ε(u₁), ζ)), 1/s.
-    missing: Vec<[f64; 6]>,
+/// z − ζ of an instant.
+struct ZetaError<'a> {
+    problem: &'a DiscreteProblem,
+    law: &'a DamageLaw,
+    /// δ.
+    change: Vec<f64>,
+    /// β at the midpoints of the sides of each triangle.
+    middles: Vec<[f64; 3]>,
+    /// b* − b, m²/s.
+    load: Vec<f64>,
+    /// k, s.
+    step: f64,
+    /// See [`DamageError`].
+    delay: Option<f64>,
 }
 
-impl Source {
-    /// For the state of the run and the displacements `u` of the `other` order. Collective.
-    fn new(
-        law: &DamageLaw,
-        [problem, other]: [&DiscreteProblem; 2],
+impl ZetaError<'_> {
+    /// From one state to the next one, whose `load` is found from an error.
+    fn advance(
+        &mut self,
+        damage_step: &mut DamageStep,
+        before: &State,
         state: &State,
-        u: &[f64],
-    ) -> Result<Self, PetscError> {
-        let body = &problem.body;
-        let strains = [(body, &state.u[..]), (&other.body, u)];
-        let [own, other] = strains.map(|(body, u)| strains_at_nodes(body, u));
-        let zeta: Vec<[f64; 6]> =
-            body.mesh.triangles.iter().map(|t| at_six(t.map(|i| state.zeta[i]))).collect();
-        let distance = (0..body.own_triangles).map(|t| {
-            let difference: [Vector3<f64>; 6] = array::from_fn(|i| own[t][i] - other[t][i]);
-            let stress = difference.map(|strain| problem.elasticity.d * strain);
-            let mean = zeta[t][..3].iter().map(|&z| law.truncate(z)).sum::<f64>() / 3.0;
-            mean * body.triangles[t].area() * mean_product(&difference, &stress, Vector3::dot)
-        });
-        let distance = body.nodes.partition.comm().total(distance.sum());
-        let at_points = problem.zeta_at_points(&state.zeta);
-        let recovered = RecoveredStrains::new(body, &state.u)?;
-        let square = recovered.energy_error(&problem.elasticity, &at_points, &state.u).error;
-        let factor = match body.order() {
-            Order::Linear => -(square / distance).max(1.0),
-            Order::Quadratic => square / distance,
-        };
-        let factor = if distance > 0.0 { factor } else { 0.0 };
-        let strain_squared = own.iter().map(|e| e.map(squared)).collect();
-        let missing = (own.iter().zip(&other).zip(&zeta)).map(|((own, other), zeta)| {
-            array::from_fn(|i| {
-                let [own, other] = [own[i], other[i]].map(|e| law.source(squared(e), zeta[i]));
-                factor * (own - other)
-            })
-        });
-        Ok(Self { missing: missing.collect(), strain_squared })
+        load: impl Fn(&Self) -> Vec<f64>,
+    ) -> Result<(), RunError> {
+        let body = &self.problem.body;
+        // Steps of equal length differ by rounding, which is no reason for another factor.
+        let length = state.time - before.time;
+        if (length - self.step).abs() > 1e-6 * length {
+            self.step = length;
+        }
+        let k = self.step;
+        let initial = self.load.clone();
+        let start = self.middles.clone();
+        let pairs = state.zeta.iter().zip(&before.zeta);
+        let rates: Vec<f64> = pairs.map(|(now, before)| (now - before) / k).collect();
+        self.middles = self.deviation(state)?;
+        self.load = load(self);
+        let mut rhs: Vec<f64> =
+            initial.iter().zip(&self.load).map(|(a, b)| 0.5 * (a + b)).collect();
+        for (t, (nodes, triangle)) in body.mesh.triangles.iter().zip(&body.triangles).enumerate() {
+            let middles = self.middles[t];
+            let growth = array::from_fn(|i| (middles[i] - start[t][i]) / k);
+            let rate = nodes.map(|node| rates[node]);
+            let mass = missing_mass(self.problem.mass(), triangle, rate, growth);
+            let diffusion = diffusion_load(triangle, middles);
+            for (i, &node) in nodes.iter().enumerate() {
+                rhs[node] -= mass[i] + self.law.diffusion * diffusion[i];
+            }
+        }
+        damage_step.system(self.law, k)?.advance(&rhs, &mut self.change)?;
+        body.vertices.partition.update(&mut self.change, 1)?;
+        self.middles = self.deviation(state)?;
+        Ok(())
     }
 
-    /// φ of z₂ for ζ and d at the P2 nodes.
-    fn values(
-        &self,
-        law: &DamageLaw,
-        cells: &[[usize; 6]],
-        zeta: &[f64],
-        d: &[f64],
-    ) -> Vec<[f64; 6]> {
-        let value = |(t, nodes): (usize, &[usize; 6])| {
-            array::from_fn(|i| {
-                let (zeta, d) = (law.truncate(zeta[nodes[i]]), d[nodes[i]]);
-                let z = law.truncate(zeta + d);
-                let more = (zeta / z).powi(2);
-                law.source(more * self.strain_squared[t][i], z) + more * self.missing[t][i]
-            })
-        };
-        cells.iter().enumerate().map(value).collect()
+    /// ζ + δ, with ζ of `state`.
+    fn at_vertices(&self, state: &State) -> Vec<f64> {
+        state.zeta.iter().zip(&self.change).map(|(zeta, d)| zeta + d).collect()
+    }
+
+    /// β for ζ of `state` and δ.
+    fn deviation(&self, state: &State) -> Result<Vec<[f64; 3]>, PetscError> {
+        interpolation_error(&self.problem.body, &self.at_vertices(state))
+    }
+
+    /// min z at the vertices. Collective.
+    fn least(&self, state: &State) -> f64 {
+        self.problem.body.vertices.partition.min_max(&self.at_vertices(state)).0
+    }
+
+    /// z − ζ at the vertices and midpoints of triangle `t`.
+    fn at(&self, t: usize) -> [f64; 6] {
+        bulged(self.problem.body.mesh.triangles[t].map(|node| self.change[node]), self.middles[t])
+    }
+
+    /// b* − b of `state`, with |ε*|² = `strain_squared` and b = `own`.
+    fn load(&self, state: &State, strain_squared: &[[f64; 6]], own: &[f64]) -> Vec<f64> {
+        let (body, law) = (&self.problem.body, self.law);
+        let mut load: Vec<f64> = own.iter().map(|b| -b).collect();
+        for (t, (nodes, triangle)) in body.mesh.triangles.iter().zip(&body.triangles).enumerate() {
+            let (zeta, error) = (bulged(nodes.map(|node| state.zeta[node]), [0.0; 3]), self.at(t));
+            let source = array::from_fn(|i| {
+                let (zeta, z) = (law.truncate(zeta[i]), law.truncate(zeta[i] + error[i]));
+                law.source((zeta / z).powi(2) * strain_squared[t][i], z)
+            });
+            let loads = nodes.iter().zip(quadratic_load(triangle, source));
+            loads.for_each(|(&node, b)| load[node] += b);
+        }
+        load
+    }
+
+    /// The error of the last state, from β at the first one. Collective.
+    fn judged(self, initial: &[[f64; 3]], last: &State) -> Option<DamageError> {
+        let body = &self.problem.body;
+        let start = self.problem.initial_damage();
+        let (mut sums, mut indicators) = ([0.0; 2], Vec::with_capacity(body.own_triangles));
+        for (t, nodes) in body.mesh.triangles.iter().enumerate().take(body.own_triangles) {
+            let square =
+                |v: [f64; 6]| body.triangles[t].area() * mean_product(&v, &v, |a, b| a * b);
+            let error = self.at(t);
+            let fallen = bulged(nodes.map(|node| start[node] - last.zeta[node]), initial[t]);
+            sums[0] += square(error);
+            sums[1] += square(array::from_fn(|i| fallen[i] - error[i]));
+            indicators.push(square(bulged([0.0; 3], self.middles[t])));
+        }
+        body.vertices.partition.comm().sum(&mut sums);
+        indicators.iter_mut().for_each(|square| *square /= sums[1]);
+        let relative = (sums[0] / sums[1]).sqrt();
+        let (change, delay) = (self.change, self.delay);
+        relative.is_finite().then_some(DamageError { relative, change, indicators, delay })
     }
 }
 
-/// |ε|² of (ε_xx, ε_yy, 2ε_xy).
-fn squared(e: Vector3<f64>) -> f64 {
-    e[0] * e[0] + e[1] * e[1] + 0.5 * e[2] * e[2]
-}
-
-/// An affine function at the vertices and the midpoints of the sides 01, 12, 20.
-fn at_six([a, b, c]: [f64; 3]) -> [f64; 6] {
-    [a, b, c, 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)]
-}
-
-fn subtract(a: &[f64], b: &[f64]) -> Vec<f64> {
-    a.iter().zip(b).map(|(a, b)| a - b).collect()
-}
-
-fn mean(a: &[f64], b: &[f64]) -> Vec<f64> {
-    a.iter().zip(b).map(|(a, b)| 0.5 * (a + b)).collect()
+/// |ε*|² at the vertices and midpoints of each triangle; `None` where the active nodes do not support
+/// the body. Collective.
+fn strain_squared(
+    problem: &DiscreteProblem,
+    orders: &mut BothOrders,
+    state: &State,
+    stopped: bool,
+) -> Result<Option<Vec<[f64; 6]>>, RunError> {
+    let Some([u1, u2]) = orders.displacements(state)? else { return Ok(None) };
+    let [coarse, fine] = orders.problems();
+    let strains = [strains_at_nodes(&coarse.body, &u1), strains_at_nodes(&fine.body, &u2)];
+    let distance = (0..problem.body.own_triangles).map(|t| {
+        let difference: [Vector3<f64>; 6] = array::from_fn(|i| strains[1][t][i] - strains[0][t][i]);
+        let stress = difference.map(|strain| problem.elasticity.d * strain);
+        let zeta = problem.body.mesh.triangles[t].map(|node| state.zeta[node]);
+        let mean = zeta.iter().sum::<f64>() / 3.0;
+        mean * problem.body.triangles[t].area() * mean_product(&difference, &stress, Vector3::dot)
+    });
+    let distance = problem.body.nodes.partition.comm().total(distance.sum());
+    let recovered = RecoveredStrains::new(&fine.body, &u2)?;
+    let zeta = fine.zeta_at_points(&state.zeta);
+    let error = recovered.energy_error(&fine.elasticity, &zeta, &u2).error;
+    let c = if stopped || error > distance { 1.0 } else { error / distance.max(f64::MIN_POSITIVE) };
+    let squares = |[e1, e2]: [Vector3<f64>; 2]| {
+        let [s1, s2] = [e1, e2].map(|e| e[0] * e[0] + e[1] * e[1] + 0.5 * e[2] * e[2]);
+        (s2 + c * (s2 - s1)).max(0.0)
+    };
+    let pairs = strains[0].iter().zip(&strains[1]);
+    Ok(Some(pairs.map(|(e1, e2)| array::from_fn(|i| squares([e1[i], e2[i]]))).collect()))
 }

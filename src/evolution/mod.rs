@@ -24,6 +24,7 @@
 //! well as uniform.
 
 mod adaptive;
+mod both_orders;
 mod boundary_conditions;
 mod contact_step;
 mod damage_step;
@@ -56,6 +57,7 @@ pub use state::{State, Step, StepRecord};
 pub use supports::{ContactRow, Supports};
 
 use crate::petsc::{Communicator, Session};
+use contact_step::Compliance;
 use damage_step::DamageStep;
 use mesh_error::{Instants, mesh_error};
 use nalgebra::DVector;
@@ -121,18 +123,34 @@ pub fn run(
             }
         }
     }
-    // Makes room for another factorisation.
-    drop(damage_step);
+    let compliance = contact_step.into_compliance()?;
+    judge(&mut outcome, &controller, damage_step, compliance, instants)?;
+    Ok(outcome)
+}
+
+/// Estimates the errors of a run that has ended. Collective.
+fn judge(
+    outcome: &mut Outcome,
+    controller: &StepController,
+    mut damage_step: DamageStep,
+    mut compliance: Compliance,
+    instants: Instants,
+) -> Result<(), RunError> {
+    let (problem, phases) = (damage_step.problem, damage_step.phases);
     outcome.bound_violation = controller.violation;
     outcome.damage_error = controller.damage_error();
-    outcome.accuracy = phases.time("accuracy", || contact_step.accuracy(&outcome))?;
-    let state = &outcome.last.state;
-    let mesh = phases.time("mesh error", || mesh_error(session, problem, instants, state));
+    outcome.accuracy = phases.time("accuracy", || compliance.accuracy(outcome))?;
+    let mesh = phases.time("mesh error", || {
+        mesh_error(problem, &mut damage_step, compliance, instants, outcome)
+    });
+    if let (Some(stop), Some(error)) = (&mut outcome.stopped, &mesh) {
+        stop.from_mesh = error.delay.map(|delay| 2.0 * delay.abs());
+    }
     outcome.damage_indicators = mesh.as_ref().map_or_else(Vec::new, |mesh| mesh.indicators.clone());
     let steps = controller.step_error().filter(|_| problem.damage().is_some());
     outcome.errors =
-        ErrorBudget::new(problem, &outcome, mesh, steps.as_ref().map(DVector::as_slice));
-    Ok(outcome)
+        ErrorBudget::new(problem, outcome, mesh, steps.as_ref().map(DVector::as_slice));
+    Ok(())
 }
 
 /// All ranks go on, or none. Collective.

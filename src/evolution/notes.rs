@@ -1,8 +1,12 @@
 //! What the user should know about a problem or an answer that its residuals do not tell.
 
-use super::{Accuracy, DiscreteProblem, Outcome, boundary_conditions::Traction};
+use super::{
+    Accuracy, DiscreteProblem, Outcome,
+    boundary_conditions::Traction,
+    unresolved::{gauss_parts, mean_load},
+};
 use crate::{
-    fem::{Edge, for_elements, gauss_points},
+    fem::{Edge, for_elements},
     mesh::{Mesh, Order},
     model::Plane,
     scene::{Expression, Scene, Stepping},
@@ -211,8 +215,7 @@ pub(super) fn unresolved(scene: &Scene, mesh: &Mesh, traction: &Traction) -> Opt
     }
     let mut times = scene.sample_times(TIMES);
     times.truncate(if f.iter().any(Expression::depends_on_time) { usize::MAX } else { 1 });
-    // Points of an edge from p to q as parts of the way.
-    let gauss = gauss_points([0.0; 2], [1.0, 0.0]).map(|[s, _]| s);
+    let gauss = gauss_parts();
     let midpoints: [f64; FINE] = std::array::from_fn(|i| (i as f64 + 0.5) / FINE as f64);
     let (mut largest, mut worst) = (0.0_f64, (0.0, [0.0; 4], 0.0));
     for t in times {
@@ -242,16 +245,10 @@ pub(super) fn unresolved(scene: &Scene, mesh: &Mesh, traction: &Traction) -> Opt
 /// ∫f_x, ∫f_y and ∫|f| of a traction at time t, by equal weights at these parts of each edge.
 fn integral(mesh: &Mesh, traction: &Traction, parts: &[f64], t: f64) -> [f64; 3] {
     let mut sums = [0.0; 3];
-    for &Edge { ends: [a, b], .. } in &traction.edges {
-        let (p, q) = (mesh.nodes[a], mesh.nodes[b]);
-        let (normal, length) = mesh.edge_normal([a, b]);
-        let weight = length / parts.len() as f64;
-        for s in parts {
-            let [x, y] = [0, 1].map(|k| p[k] + s * (q[k] - p[k]));
-            let [fx, fy] = traction.force.at([x, y], normal, t);
-            let values = [fx, fy, fx.hypot(fy)];
-            sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight * value);
-        }
+    for &Edge { ends, .. } in &traction.edges {
+        let length = mesh.edge_normal(ends).1;
+        let means = mean_load(mesh, &traction.force, ends, parts, t);
+        sums.iter_mut().zip(means).for_each(|(sum, mean)| *sum += length * mean);
     }
     sums
 }

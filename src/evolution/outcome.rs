@@ -51,8 +51,18 @@ pub struct Stop {
     pub zeta_min: f64,
     /// The least ζ that the sources so far allow: above ζ_* the stop comes too early.
     pub least_admissible: f64,
-    /// How far off the time may be, s: the last step and twice the estimated delay of all steps.
+    /// How far off the steps may put the time, s: the last one and twice the estimated delay of all.
     pub uncertainty: f64,
+    /// How far off the mesh may put it, s: twice the estimated delay, and if the mesh was adapted no less
+    /// than the time moved from the mesh before. `None` where it is not estimated.
+    pub from_mesh: Option<f64>,
+}
+
+impl Stop {
+    /// How far off the time may be, s.
+    pub fn bar(&self) -> f64 {
+        self.uncertainty + self.from_mesh.unwrap_or(0.0)
+    }
 }
 
 impl Outcome {

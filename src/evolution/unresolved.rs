@@ -1,8 +1,8 @@
 //! Edges on which a traction or a gap varies by more than the mesh shows.
 
 use crate::{
-    fem::gauss_points,
-    mesh::{Curve, Mesh},
+    fem::{gauss_points, parabola},
+    mesh::{Curve, Mesh, sorted},
     scene::{Expression, Scene, SurfaceLoad},
 };
 use std::collections::HashSet;
@@ -41,8 +41,7 @@ pub(super) fn unresolved(
                 let mut least = f64::INFINITY;
                 let mut deviation = 0.0_f64;
                 for s in samples() {
-                    let r = 1.0 - s;
-                    let shown = a * r * (r - s) + 4.0 * m * r * s + b * s * (s - r);
+                    let [shown] = parabola([[a], [m], [b]], s);
                     let g = at(s);
                     least = least.min(g).min(shown);
                     deviation = deviation.max((g - shown).abs());
@@ -52,7 +51,7 @@ pub(super) fn unresolved(
             let mut times = scene.sample_times(TIMES);
             times.truncate(if gap.distance.depends_on_time() { usize::MAX } else { 1 });
             let near = |edge: &&[usize; 2]| times.iter().any(|&t| near(**edge, t));
-            found.extend(curve.edges.iter().filter(near).map(sorted));
+            found.extend(curve.edges.iter().filter(near).copied().map(sorted));
         }
         for load in boundary.loads() {
             found.extend(unresolved_load(scene, mesh, curve, load, accuracy));
@@ -73,18 +72,9 @@ fn unresolved_load(
     if !load.expressions().iter().any(Expression::depends_on_space) {
         return found;
     }
-    // As parts of the way along an edge.
-    let gauss = gauss_points([0.0; 2], [1.0, 0.0]).map(|[s, _]| s);
+    let gauss = gauss_parts();
     for t in scene.sample_times(TIMES) {
-        let mean = |edge: [usize; 2], at: &[f64]| {
-            let mut sums = [0.0; 3];
-            for &s in at {
-                let [fx, fy] = load.at(place(mesh, edge, s), mesh.edge_normal(edge).0, t);
-                let values = [fx, fy, fx.hypot(fy)];
-                sums.iter_mut().zip(values).for_each(|(sum, v)| *sum += v / at.len() as f64);
-            }
-            sums
-        };
+        let mean = |edge: [usize; 2], parts: &[f64]| mean_load(mesh, load, edge, parts, t);
         let fine: Vec<f64> = samples().collect();
         let parts = curve.edges.iter().map(|&edge| {
             let (length, fine) = (mesh.edge_normal(edge).1, mean(edge, &fine));
@@ -95,7 +85,7 @@ fn unresolved_load(
         let parts: Vec<_> = parts.collect();
         let total: f64 = parts.iter().map(|part| part.2).sum();
         let lost = parts.iter().filter(|part| part.1 > SHARE * accuracy * total);
-        found.extend(lost.map(|part| sorted(&part.0)));
+        found.extend(lost.map(|part| sorted(part.0)));
     }
     found
 }
@@ -104,13 +94,29 @@ fn samples() -> impl Iterator<Item = f64> {
     (0..SAMPLES).map(|i| (i as f64 + 0.5) / SAMPLES as f64)
 }
 
-/// The point x(s) of an edge, 0 ≤ s ≤ 1, m.
-fn place(mesh: &Mesh, [a, b]: [usize; 2], s: f64) -> [f64; 2] {
-    let (p, m, q) = (mesh.nodes[a], mesh.midpoint([a, b]), mesh.nodes[b]);
-    let r = 1.0 - s;
-    [0, 1].map(|k| p[k] * r * (r - s) + 4.0 * m[k] * r * s + q[k] * s * (s - r))
+/// The Gauss points of an edge, as parts of the way along it.
+pub(super) fn gauss_parts() -> [f64; 2] {
+    gauss_points([0.0; 2], [1.0, 0.0]).map(|[s, _]| s)
 }
 
-fn sorted([a, b]: &[usize; 2]) -> [usize; 2] {
-    [*a.min(b), *a.max(b)]
+/// The means of f_x, f_y and |f| of a load at time t over these parts of the way along an edge.
+pub(super) fn mean_load(
+    mesh: &Mesh,
+    load: &SurfaceLoad,
+    edge: [usize; 2],
+    parts: &[f64],
+    t: f64,
+) -> [f64; 3] {
+    let mut sums = [0.0; 3];
+    for &s in parts {
+        let [fx, fy] = load.at(place(mesh, edge, s), mesh.edge_normal(edge).0, t);
+        let values = [fx, fy, fx.hypot(fy)];
+        sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value / parts.len() as f64);
+    }
+    sums
+}
+
+/// The point x(s) of an edge, 0 ≤ s ≤ 1, m.
+fn place(mesh: &Mesh, [a, b]: [usize; 2], s: f64) -> [f64; 2] {
+    parabola([mesh.nodes[a], mesh.midpoint([a, b]), mesh.nodes[b]], s)
 }

@@ -4,7 +4,7 @@ use super::{
     Edge, Partition, Triangle,
     element::{Element, POINTS, Quadratic, quadratic_values},
 };
-use crate::mesh::{Mesh, Order};
+use crate::mesh::{Mesh, Order, sorted};
 use nalgebra::{Matrix2, Vector3};
 use std::{collections::HashMap, rc::Rc};
 
@@ -276,11 +276,6 @@ impl QuadraticElements {
 pub(super) fn at_quadratic_points(vertices: [f64; 3]) -> [f64; 3] {
     let sum = vertices.iter().sum::<f64>();
     vertices.map(|value| sum / 6.0 + 0.5 * value)
-}
-
-/// An edge by its nodes in increasing order.
-pub(super) fn sorted([a, b]: [usize; 2]) -> [usize; 2] {
-    [a.min(b), a.max(b)]
 }
 
 /// ∫ λ_i over `triangles`, m²: a third of each triangle around a vertex.

@@ -1,13 +1,13 @@
 //! The damage system (28): (M + kκL) ζ_n = M ζ_{n−1} + k b(φ).
 
-use super::{Body, Cells, Nodes, Triangle, body::at_quadratic_points, element::POINTS, quadratic};
+use super::{Body, Triangle, body::at_quadratic_points, element::POINTS};
 use crate::{
     cholesky::{LinearSolver, LinearSystem, Precision},
     mesh::Order,
     model::DamageLaw,
     petsc::{Matrix, PetscError, Session, Vector},
 };
-use nalgebra::{Matrix3, SMatrix, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
 /// How (28) integrates products with a test function λ_i: the mass M and the source load b.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -22,7 +22,7 @@ pub enum Mass {
 
 impl Mass {
     /// The mass matrix of one triangle, m².
-    fn of(self, triangle: &Triangle) -> Matrix3<f64> {
+    pub(super) fn of(self, triangle: &Triangle) -> Matrix3<f64> {
         match self {
             Self::Consistent => triangle.mass(),
             Self::Lumped => Matrix3::from_diagonal_element(triangle.area() / 3.0),
@@ -181,45 +181,16 @@ impl DamageSystem {
         diffusion: f64,
         step: f64,
     ) -> Result<Self, PetscError> {
-        let triangles = body.mesh.triangles.iter().zip(&body.triangles);
-        let elements = triangles.map(|(n, triangle)| (*n, mass.of(triangle), triangle.laplace()));
-        Self::assemble(session, &body.vertices, elements, diffusion, step)
-    }
-
-    /// The same with ζ in P2, on the straight triangles of a body whose elements of u are `cells`.
-    ///
-    /// # Errors
-    /// PETSc failed.
-    pub fn quadratic(
-        session: &Session,
-        body: &Body,
-        cells: Cells<6, 3>,
-        diffusion: f64,
-        step: f64,
-    ) -> Result<Self, PetscError> {
-        let elements = cells.nodes.iter().zip(&body.triangles).map(|(nodes, triangle)| {
-            let laplace = quadratic::laplace([0, 1, 2].map(|i| body.nodes.points[nodes[i]]));
-            (*nodes, quadratic::mass(triangle), laplace)
-        });
-        Self::assemble(session, &body.nodes, elements, diffusion, step)
-    }
-
-    /// From the nodes of ζ and, of each triangle, its nodes and its parts of M and L.
-    fn assemble<const N: usize>(
-        session: &Session,
-        Nodes { partition, points, .. }: &Nodes,
-        elements: impl Iterator<Item = ([usize; N], SMatrix<f64, N, N>, SMatrix<f64, N, N>)>,
-        diffusion: f64,
-        step: f64,
-    ) -> Result<Self, PetscError> {
+        let partition = &body.vertices.partition;
         let owned = partition.owned();
         let (mut rows, mut columns) = (Vec::new(), Vec::new());
         let (mut mass_values, mut laplace_values) = (Vec::new(), Vec::new());
-        let mut diagonal = vec![0.0; points.len()];
-        for (nodes, mass, laplace) in elements {
-            for i in 0..N {
+        let mut diagonal = vec![0.0; body.mesh.nodes.len()];
+        for (nodes, triangle) in body.mesh.triangles.iter().zip(&body.triangles) {
+            let (mass, laplace) = (mass.of(triangle), triangle.laplace());
+            for i in 0..3 {
                 diagonal[nodes[i]] += laplace[(i, i)];
-                for j in 0..N {
+                for j in 0..3 {
                     rows.push(partition.row(nodes[i], 1, 0));
                     columns.push(partition.global(nodes[j], 1, 0));
                     mass_values.push(mass[(i, j)]);

@@ -1,6 +1,7 @@
 //! Boundary edges of the elements of u: a straight line or a parabola.
 
 use crate::mesh::Face;
+use std::array;
 
 /// The nodes of u on an edge x(s), 0 ≤ s ≤ 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,13 +20,18 @@ pub fn gauss_points(p: [f64; 2], q: [f64; 2]) -> [[f64; 2]; 2] {
     GAUSS.map(|s| [p[0] + s * (q[0] - p[0]), p[1] + s * (q[1] - p[1])])
 }
 
+/// x(s) on the parabola through `p` at s = 0, `m` at ½ and `q` at 1.
+pub fn parabola<const D: usize>([p, m, q]: [[f64; D]; 3], s: f64) -> [f64; D] {
+    let bulge = 4.0 * s * (1.0 - s);
+    array::from_fn(|k| p[k] + s * (q[k] - p[k]) + bulge * (m[k] - 0.5 * (p[k] + q[k])))
+}
+
 impl Edge {
     /// x(s), m, from the coordinates of all nodes.
     pub fn at(&self, points: &[[f64; 2]], s: f64) -> [f64; 2] {
         let [p, q] = self.ends.map(|node| points[node]);
-        let bulge = 4.0 * s * (1.0 - s);
-        let offset = self.offset(points);
-        [0, 1].map(|k| p[k] + s * (q[k] - p[k]) + bulge * offset[k])
+        let middle = || [0, 1].map(|k| 0.5 * (p[k] + q[k]));
+        parabola([p, self.middle.map_or_else(middle, |node| points[node]), q], s)
     }
 
     /// x'(s), m.

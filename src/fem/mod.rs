@@ -24,14 +24,16 @@ mod location;
 pub(crate) use body::for_elements;
 pub use body::{Body, Cells, Elements, Nodes};
 pub use damage::{DamageCertificate, DamageSystem, Mass, source, source_load};
-pub use edge::{Edge, gauss_points};
+pub use edge::{Edge, gauss_points, parabola};
 pub use elasticity::Elasticity;
 pub use element::{Element, QuadraturePoint};
 pub use loads::{add_body_force, add_traction, midpoint};
 pub use location::{Location, PointValues};
 pub use nodal_bases::NodalBases;
 pub use partition::Partition;
-pub use quadratic::{mean_product, quadratic_load};
+pub use quadratic::{
+    bulged, diffusion_load, interpolation_error, mean_product, missing_mass, quadratic_load,
+};
 pub use recovery::{EnergyError, RecoveredStrains, strains_at_nodes};
 pub use rigid_part::RigidPart;
 pub use stiffness::Stiffness;

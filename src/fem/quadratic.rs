@@ -1,8 +1,10 @@
 //! Quadratic functions on straight triangles, by their values at the vertices and the midpoints of the
 //! sides 01, 12, 20.
 
-use super::{Body, Cells, Triangle, element::Quadratic};
-use nalgebra::SMatrix;
+use super::{Body, Mass, Triangle};
+use crate::petsc::PetscError;
+use nalgebra::Vector3;
+use std::array;
 
 /// ∫ φ_i φ_j / |T| of the six P2 functions, times 180.
 const MASS: [[f64; 6]; 6] = [
@@ -14,6 +16,9 @@ const MASS: [[f64; 6]; 6] = [
     [0.0, -4.0, 0.0, 16.0, 16.0, 32.0],
 ];
 
+/// The vertices of each side.
+const SIDES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
+
 /// ∫ v·w / |T| of quadratic v and w.
 pub fn mean_product<V>(v: &[V; 6], w: &[V; 6], product: impl Fn(&V, &V) -> f64) -> f64 {
     let rows = MASS.iter().zip(v).flat_map(|(row, v)| row.iter().map(move |mass| (mass, v)));
@@ -21,30 +26,80 @@ pub fn mean_product<V>(v: &[V; 6], w: &[V; 6], product: impl Fn(&V, &V) -> f64) 
     pairs.map(|((mass, v), w)| mass / 180.0 * product(v, w)).sum()
 }
 
-/// The P2 mass matrix ∫ φ_i φ_j, m², of a straight triangle.
-pub(super) fn mass(triangle: &Triangle) -> SMatrix<f64, 6, 6> {
-    SMatrix::from_fn(|i, j| triangle.area() / 180.0 * MASS[i][j])
+/// The loads ∫ f λ_i of a quadratic f: |T|/60 times 2 f at the vertex less f at the others, 8 f at the
+/// midpoints of its sides, 4 f at that of the opposite side.
+pub fn quadratic_load(triangle: &Triangle, [a, b, c, ab, bc, ca]: [f64; 6]) -> [f64; 3] {
+    let unit = triangle.area() / 60.0;
+    let load = |own: f64, others: f64, sides: f64, opposite: f64| {
+        unit * (2.0 * own - others + 8.0 * sides + 4.0 * opposite)
+    };
+    [load(a, b + c, ab + ca, bc), load(b, c + a, bc + ab, ca), load(c, a + b, ca + bc, ab)]
 }
 
-/// The P2 Laplace matrix ∫ ∇φ_i·∇φ_j of the straight triangle between three vertices.
-pub(super) fn laplace(vertices: [[f64; 2]; 3]) -> SMatrix<f64, 6, 6> {
-    let [a, b, c] = vertices;
-    let middle = |p: [f64; 2], q: [f64; 2]| [0, 1].map(|k| 0.5 * (p[k] + q[k]));
-    let element = Quadratic::new([a, b, c, middle(a, b), middle(b, c), middle(c, a)]);
-    SMatrix::from_fn(|i, j| {
-        let product = |g: &[[f64; 2]; 6]| g[i][0] * g[j][0] + g[i][1] * g[j][1];
-        element.points.iter().map(|point| point.weight * product(&point.gradients)).sum()
-    })
-}
-
-/// The load b_i = ∫ f φ_i at the nodes of P2, of a function f that is quadratic in each triangle.
-pub fn quadratic_load(body: &Body, cells: Cells<6, 3>, values: &[[f64; 6]]) -> Vec<f64> {
-    let mut load = vec![0.0; body.nodes.points.len()];
-    for ((nodes, triangle), values) in cells.nodes.iter().zip(&body.triangles).zip(values) {
-        for (node, row) in nodes.iter().zip(&MASS) {
-            let sum: f64 = row.iter().zip(values).map(|(mass, value)| mass * value).sum();
-            load[*node] += triangle.area() / 180.0 * sum;
+/// z − Iz at the midpoints of the sides of each triangle, from the nodal values Iz of a smooth function
+/// z with ∂z/∂n = 0 on the boundary: ⅛ (∇z(a) − ∇z(b))·(b − a) on the side ab. Collective.
+///
+/// ∇z at a vertex is the mean of ∇Iz over its triangles, at the boundary without its normal part.
+///
+/// # Errors
+/// PETSc failed.
+pub fn interpolation_error(body: &Body, values: &[f64]) -> Result<Vec<[f64; 3]>, PetscError> {
+    // Σ |T|, Σ |T| ∇z and Σ |T| ∇λ_i around each vertex i; the last is the normal of the boundary
+    // times its length there, and rounding inside.
+    let mut sums = vec![[0.0; 5]; values.len()];
+    for (nodes, triangle) in body.mesh.triangles.iter().zip(&body.triangles) {
+        let (area, slopes) = (triangle.area(), triangle.gradients());
+        let [x, y] = [0, 1].map(|k| (0..3).map(|i| values[nodes[i]] * slopes[i][k]).sum::<f64>());
+        for (&node, [dx, dy]) in nodes.iter().zip(slopes) {
+            let parts = [1.0, x, y, *dx, *dy];
+            sums[node].iter_mut().zip(parts).for_each(|(sum, part)| *sum += area * part);
         }
     }
-    load
+    let gradient = |[area, x, y, nx, ny]: [f64; 5]| {
+        let square = nx * nx + ny * ny;
+        let normal = if square > 1e-12 * area { (x * nx + y * ny) / square } else { 0.0 };
+        [(x - normal * nx) / area, (y - normal * ny) / area]
+    };
+    let mut gradients: Vec<[f64; 2]> = sums.into_iter().map(gradient).collect();
+    body.vertices.partition.update(gradients.as_flattened_mut(), 2)?;
+    let points = &body.mesh.nodes;
+    let at_middle = |a: usize, b: usize| {
+        let part = |k: usize| (gradients[a][k] - gradients[b][k]) * (points[b][k] - points[a][k]);
+        (part(0) + part(1)) / 8.0
+    };
+    let of = |t: &[usize; 3]| SIDES.map(|[i, j]| at_middle(t[i], t[j]));
+    Ok(body.mesh.triangles.iter().map(of).collect())
+}
+
+/// A function at the vertices and the midpoints of the sides, affine but for `middles`.
+pub fn bulged(vertices: [f64; 3], middles: [f64; 3]) -> [f64; 6] {
+    let middle = |side: usize| {
+        let [a, b] = SIDES[side].map(|i| vertices[i]);
+        0.5 * (a + b) + middles[side]
+    };
+    let [a, b, c] = vertices;
+    [a, b, c, middle(0), middle(1), middle(2)]
+}
+
+/// ∫ ζ′ λ_i, m²/s, of a ζ′ with these values at the vertices, affine but for `middles`, less what the mass
+/// matrix of the run makes of it.
+pub fn missing_mass(
+    mass: Mass,
+    triangle: &Triangle,
+    rate: [f64; 3],
+    middles: [f64; 3],
+) -> [f64; 3] {
+    let whole = quadratic_load(triangle, bulged(rate, middles));
+    let own = mass.of(triangle) * Vector3::from(rate);
+    array::from_fn(|i| whole[i] - own[i])
+}
+
+/// ∫ ∇β·∇λ_i, where ∫ ∇(4 λ_a λ_b) = 4/3 |T| (∇λ_a + ∇λ_b).
+pub fn diffusion_load(triangle: &Triangle, middles: [f64; 3]) -> [f64; 3] {
+    let slopes = triangle.gradients();
+    let flux = |k: usize| -> f64 {
+        SIDES.iter().zip(middles).map(|([a, b], c)| c * (slopes[*a][k] + slopes[*b][k])).sum()
+    };
+    let (x, y) = (flux(0), flux(1));
+    slopes.map(|[dx, dy]| 4.0 / 3.0 * triangle.area() * (x * dx + y * dy))
 }

@@ -102,7 +102,7 @@ struct Side {
 fn sides(triangles: &[[usize; 3]]) -> Vec<Side> {
     let of_triangle = |(triangle, &[a, b, c]): (usize, &[usize; 3])| {
         [[a, b], [b, c], [c, a]].map(|[p, q]| Side {
-            edge: [p.min(q), p.max(q)],
+            edge: sorted([p, q]),
             on_left: p < q,
             triangle,
         })
@@ -110,6 +110,12 @@ fn sides(triangles: &[[usize; 3]]) -> Vec<Side> {
     let mut sides: Vec<Side> = triangles.iter().enumerate().flat_map(of_triangle).collect();
     sides.sort_unstable();
     sides
+}
+
+/// An edge by its ends in increasing order.
+#[must_use]
+pub fn sorted([a, b]: [usize; 2]) -> [usize; 2] {
+    [a.min(b), a.max(b)]
 }
 
 /// The longer side of the box around `points`, m.

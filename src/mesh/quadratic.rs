@@ -4,7 +4,7 @@
 //! offset d = m − (a+b)/2 vanishes if it is straight. A triangle with vertices p_i is the image
 //! x(λ) = Σ_i λ_i p_i + Σ_{i<j} 4λ_iλ_j d_ij of the barycentric coordinates λ.
 
-use super::Mesh;
+use super::{Mesh, sorted};
 
 /// |d| over the length of an edge: below this it is straight.
 const STRAIGHT: f64 = 1e-9;
@@ -81,10 +81,6 @@ impl Mesh {
         // False of what is not a number, too.
         rotated.all(|lambda| determinant(lambda) > bound)
     }
-}
-
-fn sorted([a, b]: [usize; 2]) -> [usize; 2] {
-    [a.min(b), a.max(b)]
 }
 
 fn mean(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {

@@ -1,7 +1,7 @@
 //! One triangle, and the operators assembled from many.
 
 use crate::support::{
-    ORDERS, Random, close, difference, distorted, largest, moved, turn, unstructured,
+    DAMAGE_LAW, ORDERS, Random, close, difference, distorted, largest, moved, turn, unstructured,
 };
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector};
 use signorini::{
@@ -9,7 +9,7 @@ use signorini::{
         Body, DamageSystem, Elasticity, Mass, NodalBases, Stiffness, Triangle, source, source_load,
     },
     mesh::{Mesh, Order},
-    model::{DamageLaw, Material, Plane},
+    model::{Material, Plane},
     petsc::{Session, Vector},
 };
 
@@ -280,14 +280,7 @@ fn a_damage_step_solves_the_assembled_system() {
     // matrix, and b = ∫ φ λ_i of the affine φ through its values at the vertices.
     let session = Session::start(&[]).unwrap();
     let body = Body::new(distorted(3), Order::Linear);
-    let law = DamageLaw {
-        diffusion: 0.7,
-        lambda_d: 0.3,
-        lambda_u: 2.0,
-        lambda_w: 0.1,
-        strain_cap: 0.8,
-        threshold: 0.01,
-    };
+    let law = DAMAGE_LAW;
     let (n, step, mut random) = (body.mesh.nodes.len(), 0.05, Random::new(9));
     let zeta: Vec<f64> = (0..n).map(|_| 0.6 + 0.3 * random.next()).collect();
     let strain: Vec<f64> = body.triangles.iter().map(|_| random.next().abs()).collect();

@@ -1,12 +1,12 @@
 //! The P2 elements, straight and curved, against formulas of their own: fields are interpolated as
 //! Σ λ_i v_i + Σ 4λ_iλ_j (v_ij − (v_i + v_j)/2), and derived by central differences, which are exact.
 
-use crate::support::{Random, bent, close, curved_area, difference, distorted};
+use crate::support::{DAMAGE_LAW, Random, bent, close, curved_area, difference, distorted};
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector};
 use signorini::{
     fem::{Body, Elasticity, Element, Elements, Mass, source, source_load},
     mesh::{Mesh, Order},
-    model::{DamageLaw, Material, Plane},
+    model::{Material, Plane},
 };
 
 type Quadratic = Element<6, 3>;
@@ -189,14 +189,7 @@ fn the_body_has_the_area_within_its_parabolas() {
 fn the_damage_source_is_taken_at_the_quadrature_points() {
     // b_i = Σ |T|/3 φ(|ε|²(x_q), ζ(x_q)) λ_i(x_q).
     let body = Body::new(curved(), Order::Quadratic);
-    let law = DamageLaw {
-        diffusion: 0.7,
-        lambda_d: 0.3,
-        lambda_u: 2.0,
-        lambda_w: 0.1,
-        strain_cap: 0.8,
-        threshold: 0.01,
-    };
+    let law = DAMAGE_LAW;
     let mut random = Random::new(15);
     let zeta: Vec<f64> = body.mesh.nodes.iter().map(|_| 0.6 + 0.3 * random.next()).collect();
     let strain: Vec<f64> = (0..3 * body.triangles.len()).map(|_| random.next().abs()).collect();

@@ -8,6 +8,7 @@ pub use common::{Random, curved_area, square};
 use signorini::{
     evolution::{self, DiscreteProblem, Outcome, Phases, RunError, SetupError, Step},
     mesh::{self, Mesh, Order},
+    model::DamageLaw,
     petsc::Session,
     scene::Scene,
 };
@@ -17,6 +18,16 @@ use std::{collections::BTreeMap, fs, path::Path};
 // The studies fit orders too.
 #[path = "../../validation/study/src/slope.rs"]
 mod slope;
+
+/// A damage law of which every constant counts.
+pub const DAMAGE_LAW: DamageLaw = DamageLaw {
+    diffusion: 0.7,
+    lambda_d: 0.3,
+    lambda_u: 2.0,
+    lambda_w: 0.1,
+    strain_cap: 0.8,
+    threshold: 0.01,
+};
 
 /// The [`square`] with its inner nodes moved at random, by up to 0.3 cells in x and y, and those on
 /// the sides along them.

@@ -3,9 +3,10 @@
 use super::{ContactStep, active_bounds, displacement};
 use crate::{
     cholesky::{LinearSolver, LinearSystem, Precision},
+    contact::ContactPoint,
     evolution::{DiscreteProblem, Outcome, State, Step},
     fem::{RigidPart, Stiffness},
-    petsc::{PetscError, Session, Vector},
+    petsc::{PetscError, Vector},
 };
 use std::rc::Rc;
 
@@ -74,18 +75,43 @@ impl Accuracy {
     }
 }
 
-impl ContactStep<'_> {
+/// The displacements that small forces cause at states of a run, their active nodes fixed.
+pub(in crate::evolution) struct Compliance<'a> {
+    pub(in crate::evolution) problem: &'a DiscreteProblem,
+    stiffness: Stiffness,
+    /// The unknowns that are fixed.
+    active: Vec<usize>,
+    solver: LinearSolver,
+    rhs: Vector,
+    answer: Vector,
+}
+
+impl<'a> ContactStep<'a> {
+    /// With a factor of its own in the place of the solver's.
+    ///
+    /// # Errors
+    /// There is no memory for it.
+    pub(in crate::evolution) fn into_compliance(self) -> Result<Compliance<'a>, PetscError> {
+        let Self { session, problem, stiffness, load, c, .. } = self;
+        let owned = load.owned();
+        let solver = LinearSolver::new(session, "elastic_", owned, Precision::Full)?;
+        Ok(Compliance { problem, stiffness, active: Vec::new(), solver, rhs: load, answer: c })
+    }
+}
+
+impl Compliance<'_> {
     /// Estimates the errors of the last answer of a run, and of the one with the largest stationarity
-    /// residual before it, relative to the largest displacement. Costs a factorisation, in the place
-    /// of the solver's own; a second one if the first error, enlarged by the ratio of the two
-    /// residuals, comes near to what is promised.
+    /// residual before it, relative to the largest displacement. Costs a factorisation; a second one if
+    /// the first error, enlarged by the ratio of the two residuals, comes near to what is promised.
     ///
     /// # Errors
     /// PETSc failed.
-    pub(in crate::evolution) fn accuracy(self, outcome: &Outcome) -> Result<Accuracy, PetscError> {
-        let Self { session, problem, stiffness, solver, .. } = self;
-        drop(solver);
-        let (body, elasticity) = (&problem.body, &problem.elasticity);
+    pub(in crate::evolution) fn accuracy(
+        &mut self,
+        outcome: &Outcome,
+    ) -> Result<Accuracy, PetscError> {
+        let problem = self.problem;
+        let body = &problem.body;
         let last = &outcome.last;
         let larger =
             |before: &&Rc<Step>| before.record.displacement_max > last.record.displacement_max;
@@ -100,7 +126,7 @@ impl ContactStep<'_> {
             true => problem.energy_error(zeta, u)?,
             false => 0.0,
         };
-        let displacement = displacement_error(session, problem, stiffness, &last.state, max)?;
+        let displacement = self.displacement_error(&last.state, max)?;
         let mut accuracy = Accuracy { displacement, energy, time: last.state.time };
         let Some(worst) = &outcome.least_accurate else { return Ok(accuracy) };
         let ratio = worst.record.kkt_stationarity / last.record.kkt_stationarity;
@@ -108,53 +134,72 @@ impl ContactStep<'_> {
         if expected <= SAFE * Accuracy::promised(problem.tolerance) {
             return Ok(accuracy);
         }
-        let stiffness = Stiffness::new(session, body, elasticity, &problem.constraints.bases)?;
-        let displacement = displacement_error(session, problem, stiffness, &worst.state, max)?;
+        let displacement = self.displacement_error(&worst.state, max)?;
         if displacement > accuracy.displacement {
             accuracy = Accuracy { displacement, time: worst.state.time, ..accuracy };
         }
         Ok(accuracy)
     }
-}
 
-/// max |K⁻¹(f − Ku)| / `max`, the active nodes fixed: the correction that the residual forces ask
-/// for.
-fn displacement_error(
-    session: &Session,
-    problem: &DiscreteProblem,
-    mut stiffness: Stiffness,
-    state: &State,
-    max: f64,
-) -> Result<f64, PetscError> {
-    if max == 0.0 || problem.body.nodes.partition.max_norm(&state.u) == 0.0 {
-        return Ok(0.0);
+    /// max |K⁻¹(f − Ku)| / `max`, the active nodes fixed: the correction that the residual forces ask
+    /// for.
+    fn displacement_error(&mut self, state: &State, max: f64) -> Result<f64, PetscError> {
+        let problem = self.problem;
+        if max == 0.0 || problem.body.nodes.partition.max_norm(&state.u) == 0.0 {
+            return Ok(0.0);
+        }
+        let zeta = problem.zeta_at_points(&state.zeta);
+        let internal = problem.elasticity.internal_force(&problem.body, &zeta, &state.u);
+        let mut residual = problem.load(state.time);
+        residual.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
+        self.set(&state.zeta, &state.contact)?;
+        let correction = self.displacement(residual)?;
+        let max_norm = |u: Vec<f64>| problem.body.nodes.partition.max_norm(&u) / max;
+        Ok(correction.map_or(f64::INFINITY, max_norm))
     }
-    let zeta_at_points = problem.zeta_at_points(&state.zeta);
-    stiffness.refill(&zeta_at_points)?;
-    let (body, constraints) = (&problem.body, &problem.constraints);
-    let internal = problem.elasticity.internal_force(body, &zeta_at_points, &state.u);
-    let mut residual = problem.load(state.time);
-    residual.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
-    constraints.bases.force_to_local(&mut residual);
-    constraints.bases.zero_fixed(&mut residual);
-    let flags = active_bounds(constraints, &state.contact, 0.0);
-    let active = constraints.bounds.iter().zip(flags).filter(|(_, active)| *active > 0.0);
-    let active: Vec<usize> = active.map(|(bound, _)| bound.dof).collect();
-    active.iter().for_each(|&dof| residual[dof] = 0.0);
 
-    let mut rhs = Vector::zeros(session, 2 * body.nodes.partition.owned())?;
-    let mut correction = Vector::zeros(session, 2 * body.nodes.partition.owned())?;
-    rhs.set(&residual[..rhs.owned()])?;
-    let mut solver = LinearSolver::new(session, "elastic_", rhs.owned(), Precision::Full)?;
-    let scale = stiffness.scale;
-    let mut matrix = stiffness.into_matrix();
-    matrix.zero_rows_columns(&active, scale)?;
-    let system = LinearSystem::of(&matrix);
-    solver.factorise(system)?;
-    // One digit of an error is enough.
-    if !solver.solve(system, &rhs, &mut correction, 0.1 * rhs.norm()?)?.converged {
-        return Ok(f64::INFINITY);
+    /// Takes the nodal damage and the active nodes of a state.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub(in crate::evolution) fn set(
+        &mut self,
+        zeta: &[f64],
+        contact: &[ContactPoint],
+    ) -> Result<(), PetscError> {
+        let constraints = &self.problem.constraints;
+        let flags = active_bounds(constraints, contact, 0.0);
+        let active = constraints.bounds.iter().zip(flags).filter(|(_, active)| *active > 0.0);
+        self.active = active.map(|(bound, _)| bound.dof).collect();
+        self.stiffness.refill(&self.problem.zeta_at_points(zeta))
     }
-    let correction = displacement(problem, vec![0.0; residual.len()], &correction)?;
-    Ok(body.nodes.partition.max_norm(&correction) / max)
+
+    /// K(ζ)⁻¹ of nodal `forces`, N per metre of thickness, to a digit, the active nodes fixed; `None`
+    /// if these do not support the body. Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub(in crate::evolution) fn displacement(
+        &mut self,
+        mut forces: Vec<f64>,
+    ) -> Result<Option<Vec<f64>>, PetscError> {
+        let Self { problem, stiffness, active, solver, rhs, answer } = self;
+        let bases = &problem.constraints.bases;
+        bases.force_to_local(&mut forces);
+        bases.zero_fixed(&mut forces);
+        active.iter().for_each(|&dof| forces[dof] = 0.0);
+        rhs.set(&forces[..rhs.owned()])?;
+        answer.write(|u| u.fill(0.0))?;
+        let comm = problem.body.nodes.partition.comm();
+        let system = LinearSystem {
+            prescribed: comm.any(!active.is_empty()).then_some(&active[..]),
+            scale: stiffness.scale,
+            ..LinearSystem::of(&stiffness.matrix)
+        };
+        // One digit of an error is enough.
+        if !solver.solve_renewing(system, rhs, answer, 0.1 * rhs.norm()?)?.converged {
+            return Ok(None);
+        }
+        displacement(problem, vec![0.0; forces.len()], answer).map(Some)
+    }
 }

@@ -228,7 +228,8 @@ impl<'a> StepController<'a> {
         self.violation.observe(planned, damage.min_max, time);
         let delay = self.delay_at_weakest_node(damage.zeta.as_slice()).abs();
         let uncertainty = planned.length + delays * delay;
-        Verdict::Stop(Stop { time, zeta_min, least_admissible: planned.bounds.0, uncertainty })
+        let least_admissible = planned.bounds.0;
+        Verdict::Stop(Stop { time, zeta_min, least_admissible, uncertainty, from_mesh: None })
     }
 
     /// Judges a step whose solves failed: where steps are chosen, a shorter step may do better.

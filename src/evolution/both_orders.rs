@@ -1,0 +1,303 @@
+//! Displacements of both orders for the damage and the active nodes of a state.
+
+use super::{
+    DiscreteProblem, Phases, RunError, State,
+    contact_step::{Compliance, ContactStep, active_bounds},
+    discrete_problem::LoadCase,
+};
+use crate::{
+    contact::{ContactPoint, SOLVERS},
+    fem::{Cells, Elements},
+    mesh::Order,
+    petsc::{PetscError, Session},
+};
+
+/// A scene in P1 and in P2 on one mesh, one of them that of a run.
+pub(super) struct BothOrders<'a> {
+    /// The order of the run.
+    order: Order,
+    /// K⁻¹ in P1.
+    coarse: Compliance<'a>,
+    fine: &'a DiscreteProblem,
+    /// The node of P2 at each vertex.
+    node_of_vertex: Vec<usize>,
+    /// The node of P2 in the middle of each edge, and the vertices at its ends.
+    middles: Vec<(usize, [usize; 2])>,
+    /// u₂ − u₁ of the last state, in the unknowns of P2.
+    correction: Option<Vec<f64>>,
+}
+
+/// A state in P2: what the iterations for u₂ keep.
+struct Fine<'a> {
+    problem: &'a DiscreteProblem,
+    zeta_at_points: Vec<f64>,
+    /// Of each bound whether it is active.
+    active: Vec<bool>,
+    /// The mean diagonal entry of K at each midpoint, N/m; 0 at vertices.
+    diagonal: Vec<f64>,
+}
+
+/// The square that the energy norm of u₂ − u₁ may still lack, as a part of it; iterations at most.
+const REST: f64 = 0.003;
+const ITERATIONS: usize = 30;
+
+impl<'a> BothOrders<'a> {
+    /// From the problem of a run with its K⁻¹ and the same of the other order; `None` where the triangle
+    /// has no other order.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub(super) fn new(
+        session: &'a Session,
+        run: &'a DiscreteProblem,
+        other: &'a DiscreteProblem,
+        compliance: Compliance<'a>,
+        phases: &'a Phases,
+    ) -> Result<Option<Self>, RunError> {
+        let order = run.body.order();
+        let (coarse, fine) = match order {
+            Order::Linear => (compliance, other),
+            Order::Quadratic => {
+                // Makes room for another factor.
+                drop(compliance);
+                let step = ContactStep::new(session, other, SOLVERS[0], phases)?;
+                (step.into_compliance()?, run)
+            }
+        };
+        let Elements::Quadratic(Cells { nodes, .. }) = fine.body.elements() else {
+            return Ok(None);
+        };
+        let mut node_of_vertex = vec![0; fine.body.mesh.nodes.len()];
+        let mut ends = vec![None; fine.body.nodes.points.len()];
+        for (&[a, b, c], nodes) in fine.body.mesh.triangles.iter().zip(nodes) {
+            [a, b, c].iter().zip(nodes).for_each(|(&vertex, &node)| node_of_vertex[vertex] = node);
+            let sides = [[a, b], [b, c], [c, a]].into_iter().zip(&nodes[3..]);
+            sides.for_each(|(side, &middle)| ends[middle] = Some(side));
+        }
+        let middles = ends.into_iter().enumerate();
+        let middles = middles.filter_map(|(middle, ends)| Some((middle, ends?))).collect();
+        Ok(Some(Self { order, coarse, fine, node_of_vertex, middles, correction: None }))
+    }
+
+    /// The problems in P1 and P2.
+    pub(super) fn problems(&self) -> [&'a DiscreteProblem; 2] {
+        [self.coarse.problem, self.fine]
+    }
+
+    /// u₁ and u₂ of a state of the run; `None` where the active nodes do not support the body.
+    /// Collective.
+    ///
+    /// # Errors
+    /// PETSc failed, or the scene contradicts itself at the other nodes.
+    pub(super) fn displacements(
+        &mut self,
+        state: &State,
+    ) -> Result<Option<[Vec<f64>; 2]>, RunError> {
+        Ok(match self.order {
+            Order::Linear => self.finer(state)?.map(|u2| [state.u.clone(), u2]),
+            Order::Quadratic => self.coarser(state)?.map(|u1| [u1, state.u.clone()]),
+        })
+    }
+
+    /// u₁ = Iu₂ + K₁⁻¹ (f₁ − K₁ Iu₂).
+    fn coarser(&mut self, state: &State) -> Result<Option<Vec<f64>>, RunError> {
+        let mut u = self.at_vertices(&state.u);
+        let mut vertex_of_node = vec![None; self.fine.body.nodes.points.len()];
+        let vertices = self.node_of_vertex.iter().enumerate();
+        vertices.for_each(|(vertex, &node)| vertex_of_node[node] = Some(vertex));
+        let vertex = |point: &ContactPoint| {
+            Some(ContactPoint { node: vertex_of_node[point.node]?, ..*point })
+        };
+        let active = state.contact.iter().filter(|point| point.active);
+        self.coarse.set(&state.zeta, &active.filter_map(vertex).collect::<Vec<_>>())?;
+        let problem = self.coarse.problem;
+        let zeta = problem.zeta_at_points(&state.zeta);
+        let internal = problem.elasticity.internal_force(&problem.body, &zeta, &u);
+        let mut forces = problem.load(state.time);
+        add(&mut forces, -1.0, &internal);
+        let Some(correction) = self.coarse.displacement(forces)? else { return Ok(None) };
+        add(&mut u, 1.0, &correction);
+        Ok(Some(u))
+    }
+
+    /// u₂ by conjugate gradients from u₁. The preconditioner is that of two levels, K₁⁻¹ of the forces
+    /// as P1 sees them and the diagonal of K at the midpoints, in the basis of P1 and what P2 adds to it
+    /// (Bank, Dupont, Yserentant, Numer. Math. 52, 1988); K₁⁻¹ being one digit's, the directions are
+    /// made orthogonal in the flexible way (Notay, SIAM J. Sci. Comput. 22, 2000). The first one is
+    /// u₂ − u₁ of the last state.
+    fn finer(&mut self, state: &State) -> Result<Option<Vec<f64>>, RunError> {
+        self.coarse.set(&state.zeta, &state.contact)?;
+        let fine = Fine::new(self, state)?;
+        let (bases, partition) = (&self.fine.constraints.bases, &self.fine.body.nodes.partition);
+        let case = self.fine.load_case(state.time)?;
+        let start = fine.start(&case, self.prolonged(&state.u));
+        let (mut c, mut residual) = (start.clone(), case.load);
+        bases.force_to_local(&mut residual);
+        add(&mut residual, -1.0, &fine.product(&c)?);
+        fine.clear_fixed(&mut residual);
+        let mut direction = vec![0.0; c.len()];
+        let (mut image, mut stiffness, mut gained) = (direction.clone(), f64::INFINITY, 0.0);
+        for _ in 0..ITERATIONS {
+            let z = match self.correction.take() {
+                Some(mut correction) => {
+                    fine.clear_fixed(&mut correction);
+                    correction
+                }
+                None => match self.preconditioned(&fine, &residual)? {
+                    None => return Ok(None),
+                    Some(z) if partition.dot(&residual, &z, 2) <= REST * gained => break,
+                    Some(z) => z,
+                },
+            };
+            let beta = -partition.dot(&z, &image, 2) / stiffness;
+            direction.iter_mut().zip(&z).for_each(|(p, z)| *p = z + beta * *p);
+            image = fine.product(&direction)?;
+            fine.clear_fixed(&mut image);
+            stiffness = partition.dot(&direction, &image, 2);
+            if stiffness <= 0.0 {
+                return Ok(None);
+            }
+            let work = partition.dot(&direction, &residual, 2);
+            add(&mut c, work / stiffness, &direction);
+            add(&mut residual, -work / stiffness, &image);
+            gained += work * work / stiffness;
+        }
+        let correction: Vec<f64> = c.iter().zip(&start).map(|(c, start)| c - start).collect();
+        self.correction = (gained > 0.0).then_some(correction);
+        bases.displacement_to_global(&mut c);
+        partition.update(&mut c, 2)?;
+        Ok(Some(c))
+    }
+
+    /// The preconditioner's answer to a residual, both in the unknowns of P2; `None` where the active
+    /// nodes do not support the body.
+    fn preconditioned(
+        &mut self,
+        fine: &Fine,
+        residual: &[f64],
+    ) -> Result<Option<Vec<f64>>, PetscError> {
+        let (bases, partition) = (&self.fine.constraints.bases, &self.fine.body.nodes.partition);
+        let mut forces = residual.to_vec();
+        bases.force_to_global(&mut forces);
+        partition.update(&mut forces, 2)?;
+        let Some(coarse) = self.coarse.displacement(self.restricted(&forces))? else {
+            return Ok(None);
+        };
+        let mut z = self.prolonged(&coarse);
+        bases.displacement_to_local(&mut z);
+        for &(middle, _) in &self.middles {
+            for dof in [2 * middle, 2 * middle + 1] {
+                z[dof] += residual[dof] / fine.diagonal[middle];
+            }
+        }
+        fine.clear_fixed(&mut z);
+        Ok(Some(z))
+    }
+
+    /// A field at the vertices in P2.
+    fn prolonged(&self, coarse: &[f64]) -> Vec<f64> {
+        let mut fine = vec![0.0; 2 * self.fine.body.nodes.points.len()];
+        for (vertex, &node) in self.node_of_vertex.iter().enumerate() {
+            (0..2).for_each(|k| fine[2 * node + k] = coarse[2 * vertex + k]);
+        }
+        for &(middle, [a, b]) in &self.middles {
+            let mean = |k: usize| 0.5 * (coarse[2 * a + k] + coarse[2 * b + k]);
+            (0..2).for_each(|k| fine[2 * middle + k] = mean(k));
+        }
+        fine
+    }
+
+    /// Forces at the nodes of P2 as P1 sees them: the transpose of [`Self::prolonged`].
+    fn restricted(&self, fine: &[f64]) -> Vec<f64> {
+        let mut coarse = self.at_vertices(fine);
+        for &(middle, ends) in &self.middles {
+            for (vertex, k) in ends.into_iter().flat_map(|vertex| [(vertex, 0), (vertex, 1)]) {
+                coarse[2 * vertex + k] += 0.5 * fine[2 * middle + k];
+            }
+        }
+        coarse
+    }
+
+    /// The values of a field in P2 at the vertices.
+    fn at_vertices(&self, fine: &[f64]) -> Vec<f64> {
+        let values = |&node: &usize| [fine[2 * node], fine[2 * node + 1]];
+        self.node_of_vertex.iter().flat_map(values).collect()
+    }
+}
+
+impl<'a> Fine<'a> {
+    /// Active are the same vertices as in `state`, and the midpoints between two of them. Collective.
+    fn new(orders: &BothOrders<'a>, state: &State) -> Result<Self, PetscError> {
+        let problem = orders.fine;
+        let (body, constraints) = (&problem.body, &problem.constraints);
+        let node_of = |point: &ContactPoint| orders.node_of_vertex[point.node];
+        let points = state.contact.iter().filter(|point| point.active);
+        let points: Vec<_> = points.map(|p| ContactPoint { node: node_of(p), ..*p }).collect();
+        let mut active = vec![0.0; body.nodes.points.len()];
+        points.iter().for_each(|point| active[point.node] = 1.0);
+        body.nodes.partition.update(&mut active, 1)?;
+        let mut between = vec![false; active.len()];
+        for &(middle, ends) in &orders.middles {
+            between[middle] = ends.iter().all(|&end| active[orders.node_of_vertex[end]] > 0.0);
+        }
+        let flags = active_bounds(constraints, &points, 0.0);
+        let bounds = constraints.bounds.iter().zip(flags);
+        let active = bounds.map(|(bound, flag)| flag > 0.0 || between[bound.node]).collect();
+        let zeta_at_points = problem.zeta_at_points(&state.zeta);
+        let diagonal = middle_diagonal(problem, &zeta_at_points);
+        Ok(Self { problem, zeta_at_points, active, diagonal })
+    }
+
+    /// The places of the active bounds.
+    fn active(&self) -> impl Iterator<Item = usize> {
+        (0..self.active.len()).filter(|&place| self.active[place])
+    }
+
+    /// Sets the entries of the unknowns that are prescribed or at an active bound to 0.
+    fn clear_fixed(&self, field: &mut [f64]) {
+        let constraints = &self.problem.constraints;
+        constraints.bases.zero_fixed(field);
+        self.active().for_each(|place| field[constraints.bounds[place].dof] = 0.0);
+    }
+
+    /// The unknowns of a field u, but for those that are prescribed or at an active bound.
+    fn start(&self, case: &LoadCase, mut u: Vec<f64>) -> Vec<f64> {
+        let constraints = &self.problem.constraints;
+        constraints.bases.displacement_to_local(&mut u);
+        constraints.prescribed().for_each(|dof| u[dof] = case.lift[dof]);
+        self.active().for_each(|place| u[case.bounds[place].dof] = case.bounds[place].upper);
+        u
+    }
+
+    /// K c, element by element.
+    fn product(&self, c: &[f64]) -> Result<Vec<f64>, PetscError> {
+        let DiscreteProblem { body, constraints, elasticity, .. } = self.problem;
+        let mut u = c.to_vec();
+        constraints.bases.displacement_to_global(&mut u);
+        body.nodes.partition.update(&mut u, 2)?;
+        let mut forces = elasticity.internal_force(body, &self.zeta_at_points, &u);
+        constraints.bases.force_to_local(&mut forces);
+        Ok(forces)
+    }
+}
+
+/// See [`Fine`].
+fn middle_diagonal(problem: &DiscreteProblem, zeta_at_points: &[f64]) -> Vec<f64> {
+    let (body, d) = (&problem.body, &problem.elasticity.d);
+    let mut diagonal = vec![0.0; body.nodes.points.len()];
+    let Elements::Quadratic(cells) = body.elements() else { return diagonal };
+    let elements = cells.nodes.iter().zip(cells.elements).zip(zeta_at_points.chunks(3));
+    for ((nodes, element), zeta) in elements {
+        for (point, zeta) in element.points.iter().zip(zeta) {
+            for i in 3..6 {
+                diagonal[nodes[i]] += 0.5 * zeta * point.stiffness(d, i, i).trace();
+            }
+        }
+    }
+    diagonal
+}
+
+/// a ← a + factor · b.
+fn add(a: &mut [f64], factor: f64, b: &[f64]) {
+    a.iter_mut().zip(b).for_each(|(a, b)| *a += factor * b);
+}
