@@ -25,7 +25,7 @@ STUDIES := target/release/signorini-study
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
 .PHONY: help deps deps-validate deps-random build mesh run figures test validate random compare \
-    bench stability reference converge chart clean
+    bench stability reference converge chart kills fuzz wrong clean
 
 help:
 	@echo 'make mesh && make run   mesh and solve the scenes of geo/, draw their figures into out/'
@@ -44,6 +44,9 @@ help:
 	@echo 'make reference  the reference solution of a scene, unless it is there (minutes); or STUDY=geo/a.toml'
 	@echo 'make converge   errors against it on nested meshes: Table 1, Figure 3; or STUDY=geo/a.toml'
 	@echo 'make chart      error against seconds: meshes, orders, --accuracy, solvers, FEniCSx; or CHART="geo/a.toml …"'
+	@echo 'make kills      runs killed 50 times and restarted: the same checksums; or ARGS="--count 10"'
+	@echo 'make fuzz       10 million inputs for what reads meshes, scenes, expressions (nightly Rust, cargo-fuzz)'
+	@echo 'make wrong      43 wrong inputs and what the program says of them'
 	@echo 'make clean      remove the build, the results and the meshes'
 
 deps:
@@ -117,6 +120,27 @@ converge: reference
 chart: build deps-validate
 	$(PYTHON) validation/chart.py --binary $(BINARY) $(CHART)
 	$(PYTHON) scripts/chart.py out/chart
+
+kills: build deps
+	$(PYTHON) validation/kills.py --binary $(BINARY) $(ARGS)
+
+# What is found stays in target/fuzz; the seeds are those of the tests. FUZZ_RUNS is per target.
+FUZZ_RUNS ?= 3400000
+fuzz: deps
+	@set -e; for target in mesh scene expression; do \
+	    case $$target in \
+	        mesh) seeds=tests/fixtures/msh;; \
+	        scene) seeds=geo;; \
+	        expression) seeds=validation/fuzz/seeds/expression;; \
+	    esac; \
+	    mkdir -p target/fuzz/corpus/$$target; \
+	    cargo +nightly fuzz run --fuzz-dir validation/fuzz --target-dir target/fuzz -s none -O $$target \
+	        target/fuzz/corpus/$$target $$seeds -- -runs=$(FUZZ_RUNS) -dict=validation/fuzz/words.dict \
+	        -max_len=16384 -timeout=10 -rss_limit_mb=1024 -print_final_stats=1; \
+	done
+
+wrong: build
+	$(PYTHON) validation/wrong_inputs.py --binary $(BINARY)
 
 clean:
 	rm -rf target out geo/*.msh scripts/__pycache__ scripts/*/__pycache__ validation/__pycache__

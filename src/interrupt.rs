@@ -60,7 +60,7 @@ impl Drop for Interrupts {
     }
 }
 
-/// SIGINT or SIGTERM.
+/// SIGINT or SIGTERM, by its number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Signal(pub i32);
 

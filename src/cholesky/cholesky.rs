@@ -7,6 +7,7 @@ use super::{
 };
 use crate::petsc::PetscError;
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 
 /// The factor P A Pᵀ = L Lᵀ of a sparse symmetric positive definite matrix, supernodal.
 ///
@@ -22,7 +23,7 @@ pub struct Cholesky {
 }
 
 /// Digits of the entries of L.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Precision {
     /// Seven (`f32`) if that makes a good preconditioner, else sixteen.
     Preconditioner,
@@ -108,6 +109,11 @@ impl Cholesky {
             }
         }
         block
+    }
+
+    /// The digits of L: full ones from the first factorisation on that needed them.
+    pub fn precision(&self) -> Precision {
+        self.precision
     }
 
     /// P: the row of A of each row of L.

@@ -1,9 +1,12 @@
 //! The factor that preconditions a matrix, whatever makes it.
 
 use super::{Precision, RefactorisationPolicy, substructure::Substructure};
-use crate::petsc::{
-    Communicator, Matrix, PetscError, Preconditioner, Session, ShellPreconditioner, Vector,
-    has_option, set_default_option,
+use crate::{
+    archive::{Archive, ArchiveError},
+    petsc::{
+        Communicator, Matrix, PetscError, Preconditioner, Session, ShellPreconditioner, Vector,
+        has_option, set_default_option,
+    },
 };
 
 /// A Cholesky factor: CHOLMOD's with solves of our own, by substructuring where there are several
@@ -17,7 +20,8 @@ use crate::petsc::{
 pub struct Factor {
     comm: Communicator,
     prefix: String,
-    precision: Precision,
+    /// Of the factors of a substructure.
+    precisions: [Precision; 2],
     /// Made with the first matrix of so many rows.
     method: Option<(usize, Method)>,
     /// `None` before the first factorisation, and after one that failed.
@@ -26,6 +30,10 @@ pub struct Factor {
     applications: usize,
     /// Factorisations that did not fail.
     factorisations: usize,
+    /// The values of the matrix last factorised, from which a checkpoint makes the same factor.
+    values: Vec<f64>,
+    /// Whether the factor was loaded and is yet to be made.
+    loaded: bool,
 }
 
 enum Method {
@@ -48,12 +56,45 @@ impl Factor {
         Self {
             comm: session.comm(),
             prefix: prefix.to_owned(),
-            precision,
+            precisions: [precision; 2],
             method: None,
             policy: None,
             applications: 0,
             factorisations: 0,
+            values: Vec::new(),
+            loaded: false,
         }
+    }
+
+    /// Saves or loads the factor as the values of the matrix that it was made of.
+    ///
+    /// # Errors
+    /// The archive has no factor there.
+    pub fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
+        archive.value(&mut self.values)?;
+        archive.value(&mut self.precisions)?;
+        archive.value(&mut self.policy)?;
+        archive.value(&mut self.applications)?;
+        archive.value(&mut self.factorisations)?;
+        self.loaded |= archive.is_loading() && self.policy.is_some();
+        Ok(())
+    }
+
+    /// Makes the factor that was loaded again, of a matrix with the pattern of this one. Collective.
+    ///
+    /// # Errors
+    /// The pattern is another, or as in [`Self::factorise`].
+    pub(super) fn remake(&mut self, matrix: &Matrix) -> Result<(), PetscError> {
+        if !std::mem::take(&mut self.loaded) {
+            return Ok(());
+        }
+        let mut copy = matrix.duplicate()?;
+        copy.set_entries(&self.values)?;
+        let (policy, factorisations) = (self.policy.take(), self.factorisations);
+        if self.factorise(&copy)? {
+            (self.policy, self.factorisations) = (policy, factorisations);
+        }
+        Ok(())
     }
 
     /// Whether PETSc options ask for a preconditioner.
@@ -89,6 +130,7 @@ impl Factor {
             Method::Petsc(preconditioner) => (preconditioner.set_up(matrix)?, UNKNOWN_COST),
             Method::Substructure(factor) => {
                 let definite = factor.factorise(matrix)?;
+                self.precisions = factor.precisions();
                 let work = self.comm.max(factor.work());
                 // An iteration reads the factor and the entries of the matrix with their columns.
                 let iteration = self.comm.max(factor.bytes() + 12.0 * matrix.entries());
@@ -96,6 +138,7 @@ impl Factor {
             }
         };
         self.method = Some((rows, method));
+        matrix.read_entries(&mut self.values)?;
         self.policy = definite.then(|| RefactorisationPolicy::new(cost));
         self.factorisations += usize::from(definite);
         Ok(definite)
@@ -108,7 +151,7 @@ impl Factor {
         let factorised = serial || rows < VERY_LARGE;
         if factorised
             && !asked
-            && let Some(factor) = Substructure::new(self.comm, matrix, self.precision)?
+            && let Some(factor) = Substructure::new(self.comm, matrix, self.precisions)?
         {
             return Ok(Method::Substructure(factor));
         }
@@ -179,6 +222,7 @@ impl Factor {
 /// Inside one of TAO's methods: every new operator begins a solve.
 impl ShellPreconditioner for Factor {
     fn set_up(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
+        self.remake(matrix)?;
         self.end_solve();
         let rows = matrix.size()?;
         let fits = self.method.as_ref().is_some_and(|(size, _)| *size == rows);

@@ -117,9 +117,17 @@ impl LinearSolver {
         owned: usize,
         precision: Precision,
     ) -> Result<Self, PetscError> {
+        Self::with(session, Factor::new(session, prefix, precision), owned)
+    }
+
+    /// The same with a factor of its own.
+    ///
+    /// # Errors
+    /// There is no memory for it.
+    pub fn with(session: &Session, factor: Factor, owned: usize) -> Result<Self, PetscError> {
         let zeros = || Vector::zeros(session, owned);
         Ok(Self {
-            factor: Factor::new(session, prefix, precision),
+            factor,
             modified: None,
             residual: zeros()?,
             free_residual: zeros()?,
@@ -127,6 +135,11 @@ impl LinearSolver {
             direction: zeros()?,
             image: zeros()?,
         })
+    }
+
+    /// The factor.
+    pub fn factor(&mut self) -> &mut Factor {
+        &mut self.factor
     }
 
     /// Factorises the system; false if it is not positive definite.
@@ -187,6 +200,7 @@ impl LinearSolver {
         x: &mut Vector,
         limit: f64,
     ) -> Result<SolveReport, PetscError> {
+        self.factor.remake(system.matrix)?;
         let mut report = self.start(system, b, x, limit)?;
         if let Some(most) = self.factor.iteration_limit() {
             self.iterate(system, x, limit, most, &mut report)?;

@@ -1,12 +1,14 @@
 //! When the factor of an earlier matrix is replaced.
 
+use serde::{Deserialize, Serialize};
+
 /// Compares what the age of a factor has cost with what a new one costs, both in iterations.
 ///
 /// Let a solve with the factor of an earlier matrix take mᵢ iterations, the best one since the last
 /// factorisation m. A new factor is due as soon as Σ (mᵢ − m) ≥ C, the cost of a factorisation. Where
 /// the loss per solve grows evenly that is the cheapest moment, otherwise it costs at most twice the
 /// cheapest. All is counted, nothing measured: equal runs decide alike, and so do all ranks.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct RefactorisationPolicy {
     /// C: iterations that take as long as a factorisation.
     cost: f64,

@@ -21,6 +21,7 @@ use nalgebra::DMatrix;
 /// The factor of a matrix whose unknowns are divided among the ranks.
 pub(super) struct Substructure {
     comm: Communicator,
+    /// Of the factor of S, before there is one.
     precision: Precision,
     division: Division,
     /// Of the interior and the interface next to it.
@@ -57,12 +58,13 @@ struct Blocks {
 const LARGEST_INTERFACE: usize = 6000;
 
 impl Substructure {
-    /// Divides, orders and analyses the unknowns of a matrix; `None` if the interface is too large.
+    /// Divides, orders and analyses the unknowns of a matrix, for factors of these precisions, that of
+    /// S the second; `None` if the interface is too large.
     /// Collective.
     pub(super) fn new(
         comm: Communicator,
         matrix: &Matrix,
-        precision: Precision,
+        [precision, of_schur]: [Precision; 2],
     ) -> Result<Option<Self>, PetscError> {
         let Some(division) = Division::of(comm, matrix)? else { return Ok(None) };
         let (interior, near) = (division.interior, division.near.len());
@@ -77,13 +79,18 @@ impl Substructure {
             local = Cholesky::analyse(&mut a, Some(order), near, precision)?;
         }
         let in_place = local.order()[interior..].iter().copied().eq(last);
-        let this = Self { comm, precision, division, local, schur: None };
+        let this = Self { comm, precision: of_schur, division, local, schur: None };
         Ok(comm.all(in_place).then_some(this))
     }
 
     /// The work of a factorisation on this rank, in bytes that a solve reads in the same time.
     pub(super) fn work(&self) -> f64 {
         self.local.work() + self.schur.as_ref().map_or(0.0, Cholesky::work)
+    }
+
+    /// The precisions of both factors.
+    pub(super) fn precisions(&self) -> [Precision; 2] {
+        [self.local.precision(), self.schur.as_ref().map_or(self.precision, Cholesky::precision)]
     }
 
     /// Bytes that a solve reads on this rank.

@@ -1,6 +1,7 @@
 //! What the subcommands do.
 
 mod check;
+mod checkpoint;
 mod compare;
 mod figures;
 mod info;

@@ -1,9 +1,17 @@
 //! What a run writes and shows.
 
-use super::{profile, provenance::provenance, run::Task, screen};
+use super::{
+    checkpoint::{self, Checkpoint},
+    profile,
+    provenance::provenance,
+    run::Task,
+    screen,
+};
 use serde_json::{Value, json};
 use signorini::{
-    evolution::{Outcome, RunError, Step, StepRecord},
+    archive::Archive,
+    evolution::{Next, Observed, Observer, Outcome, RunError, Step, StepRecord},
+    interrupt::Interrupts,
     output::{
         self, FieldWriter, OutputError, Table,
         terminal::{Progress, say},
@@ -11,7 +19,7 @@ use signorini::{
     },
     scene::Stepping,
 };
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, time::Instant};
 
 /// Frames that are written, about, when the scene does not say how often.
 const FRAMES: usize = 20;
@@ -28,6 +36,9 @@ pub(super) struct Recorder<'a> {
     last: Option<Step>,
     /// Seconds of all accepted steps after n = 0.
     stepping: f64,
+    interrupts: Interrupts,
+    /// When the last checkpoint was written.
+    saved: Instant,
 }
 
 impl<'a> Recorder<'a> {
@@ -35,7 +46,16 @@ impl<'a> Recorder<'a> {
     pub(super) fn new(task: &'a Task) -> Result<Self, OutputError> {
         let fields = FieldWriter::new(&task.folder, &task.problem)?;
         let bar = task.problem.body.nodes.partition.comm().is_root().then(|| screen::open(task));
-        Ok(Self { task, fields, bar, history: None, last: None, stepping: 0.0 })
+        let (interrupts, saved) = (Interrupts::hold(), Instant::now());
+        let (history, last, stepping) = Default::default();
+        Ok(Self { task, fields, bar, history, last, stepping, interrupts, saved })
+    }
+
+    /// Shows where the run goes on from.
+    pub(super) fn show_restart(&self, restart: Option<&Checkpoint>) {
+        if let (Some(Checkpoint { header, .. }), Some(_)) = (restart, &self.bar) {
+            say(&screen::row("restart", format!("from step {}, t = {}", header.step, header.time)));
+        }
     }
 
     /// Puts the beginning of this run in the place of an earlier run's results.
@@ -44,7 +64,7 @@ impl<'a> Recorder<'a> {
         output::prepare(folder)?;
         write_whole(&folder.join(output::SCENE), as_run.as_bytes())?;
         if let Some(mesh) = adapted {
-            write_whole(&folder.join("mesh.msh"), mesh.as_bytes())?;
+            write_whole(&folder.join("mesh.msh"), mesh.mesh.to_msh().as_bytes())?;
         }
         let (path, columns) = (folder.join("history.csv"), self.task.problem.quantities());
         self.history = Some(Table::create(path, &StepRecord::default(), &columns)?);
@@ -71,7 +91,7 @@ impl<'a> Recorder<'a> {
     }
 
     /// Writes and shows an accepted step. Collective.
-    pub(super) fn accept(&mut self, step: &Step) -> Result<(), OutputError> {
+    fn write(&mut self, step: &Step) -> Result<(), OutputError> {
         let comm = self.task.problem.body.nodes.partition.comm();
         if self.last.is_none() {
             let started = if comm.is_root() { self.start() } else { Ok(()) };
@@ -115,6 +135,9 @@ impl<'a> Recorder<'a> {
         notes.extend(outcome.iter().flat_map(|outcome| outcome.notes(&task.problem)));
         let mut shown = notes.clone();
         notes.extend(outcome.iter().flat_map(|outcome| outcome.remarks(&task.problem)));
+        if result.is_ok() {
+            checkpoint::remove(&task.folder, task.problem.body.nodes.partition.comm().rank());
+        }
         // The rest is for the first rank alone.
         let Some(bar) = &self.bar else { return written };
 
@@ -144,6 +167,37 @@ impl<'a> Recorder<'a> {
         bar.finish();
         say(&lines.join("\n"));
         written
+    }
+}
+
+impl Observer for Recorder<'_> {
+    fn accept(&mut self, step: &Step) -> Observed<Next> {
+        self.write(step)?;
+        let seconds = self.task.problem.scene().output.checkpoint;
+        // The clock of the first rank counts.
+        let due = self.bar.is_some() && self.saved.elapsed().as_secs_f64() > seconds;
+        Ok(match self.interrupts.received() {
+            Some(signal) => Next::End(signal),
+            None if due && seconds > 0.0 => Next::Checkpoint,
+            None => Next::Step,
+        })
+    }
+
+    fn archive(&mut self, last: &Step, archive: &mut Archive) -> Observed {
+        archive.value(&mut self.stepping)?;
+        self.fields.archive(archive)?;
+        Table::archive(&mut self.history, self.task.folder.join("history.csv"), archive)?;
+        if archive.is_loading() && self.bar.is_some() {
+            output::remove_partial(&self.task.folder)?;
+        }
+        self.last = Some(last.clone());
+        Ok(())
+    }
+
+    fn keep(&mut self, last: &Step, archive: Archive) -> Observed {
+        checkpoint::write(self.task, &last.record, &archive.into_bytes())?;
+        self.saved = Instant::now();
+        Ok(())
     }
 }
 

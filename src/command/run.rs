@@ -2,6 +2,7 @@
 
 use super::{
     Failure, SOLVERS, check_petsc, check_solver,
+    checkpoint::Checkpoint,
     ranks::{agree, barrier_or_abort},
     read,
     recorder::Recorder,
@@ -10,7 +11,9 @@ use super::{
 use clap::Args;
 use signorini::{
     cholesky::{Factor, Precision},
-    evolution::{self, AdaptError, DiscreteProblem, Outcome, Phases, RunError, SHARE_OF_STEPS},
+    evolution::{
+        self, AdaptError, Adapted, DiscreteProblem, Outcome, Phases, RunError, SHARE_OF_STEPS,
+    },
     mesh::{Mesh, Order},
     output,
     petsc::{PetscError, Session},
@@ -49,6 +52,10 @@ pub struct RunArguments {
     /// notes, also those that do not bear on the answer.
     #[arg(long)]
     profile: bool,
+    /// Go on from the last checkpoint of the same run, to the same results bit by bit; from the
+    /// beginning if there is none.
+    #[arg(long)]
+    restart: bool,
     /// PETSc options, e.g. -- -tao_monitor -log_view.
     #[arg(last = true, value_name = "PETSC OPTIONS")]
     petsc: Vec<String>,
@@ -70,17 +77,18 @@ impl RunArguments {
     }
 }
 
-/// Where the scene asks for an accuracy, a mesh that has it, and steps for it in the scene; else `mesh`.
-/// Whether it was adapted comes second, then by how much the time at which ζ_* is reached moved from the
-/// mesh before to it, s. Collective.
+/// Where the scene asks for an accuracy, a mesh that has it, or the one `made` in the run that goes on,
+/// and steps for it in the scene. Collective.
 fn adapt(
     session: &Session,
     scene: &mut Scene,
-    mesh: Mesh,
+    mesh: &Mesh,
     solver: &str,
-) -> Result<(Mesh, bool, Option<f64>), Failure> {
-    let Some(accuracy) = scene.accuracy else { return Ok((mesh, false, None)) };
-    let adapted = evolution::adapted(session, scene, mesh, solver, accuracy);
+    made: Option<Adapted>,
+) -> Result<Option<Adapted>, Failure> {
+    let Some(accuracy) = scene.accuracy else { return Ok(None) };
+    let adapt = || evolution::adapted(session, scene, mesh.clone(), solver, accuracy);
+    let adapted = made.map_or_else(adapt, Ok);
     let adapted = adapted.map_err(|error| match error {
         AdaptError::Setup(_) => Failure::input(error),
         _ => error.into(),
@@ -96,7 +104,7 @@ fn adapt(
          (kept as mesh.msh)",
         adapted.rounds,
     ));
-    Ok((adapted.mesh, true, adapted.stop_change))
+    Ok(Some(adapted))
 }
 
 /// Refuses PETSc options that would end the run at its first factorisations.
@@ -139,10 +147,13 @@ pub(super) struct Task<'a> {
     pub(super) folder: PathBuf,
     /// The scene as it is run, as a file.
     pub(super) as_run: String,
-    /// The mesh, as a file, where it was adapted.
-    pub(super) adapted: Option<String>,
+    /// The mesh, where it was adapted.
+    pub(super) adapted: Option<Adapted>,
     /// Keeps other runs out of the folder.
     _lock: Option<File>,
+    /// Where the run goes on from.
+    restart: Option<Checkpoint>,
+    pub(super) petsc: &'a [String],
     /// Whether the closing table has all that was timed.
     pub(super) profile: bool,
     pub(super) phases: &'a Phases,
@@ -153,7 +164,7 @@ impl<'a> Task<'a> {
     /// Reads scene and mesh. Every rank reads both files; where the mesh is yet to be made, the first
     /// rank makes it. Collective.
     fn read(
-        arguments: &RunArguments,
+        arguments: &'a RunArguments,
         session: &Session,
         phases: &'a Phases,
         started: Instant,
@@ -170,14 +181,20 @@ impl<'a> Task<'a> {
         let solver = scene.contact.solver.clone().unwrap_or(SOLVERS[0].to_owned());
         let folder = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
         let as_run = scene.as_run().map_err(Failure::input)?;
-        let adapted = phases.time("adaptation", || adapt(session, &mut scene, mesh, &solver));
-        let (mesh, adapted, stop_change) = agree(comm, adapted)?;
-        let adapted = adapted.then(|| mesh.to_msh());
+        let restart = arguments.restart.then(|| Checkpoint::read(comm, &folder));
+        let restart = restart.transpose()?.flatten();
+        let made = restart.as_ref().and_then(|checkpoint| checkpoint.header.adapted.clone());
+        let adapt = || adapt(session, &mut scene, &mesh, &solver, made);
+        let adapted = agree(comm, phases.time("adaptation", adapt))?;
+        let mesh = adapted.as_ref().map_or(mesh, |adapted| adapted.mesh.clone());
+        let stop_change = adapted.as_ref().and_then(|adapted| adapted.stop_change);
         let problem = phases.time("discrete problem", || DiscreteProblem::new(scene, mesh));
         let problem = agree(comm, problem.map_err(Failure::input))?;
         let problem = phases.time("partition", || problem.restrict(session));
         let problem = agree(comm, problem.map_err(Failure::from))?;
-        agree(comm, check_factors(session, &problem).map_err(Failure::input))?;
+        let asked =
+            |error| Failure::input(format!("PETSc options -elastic_pc_… or -damage_pc_…: {error}"));
+        agree(comm, check_factors(session, &problem).map_err(asked))?;
         let lock = if comm.is_root() { output::lock(&folder) } else { Ok(None) };
         let lock = agree(comm, lock.map_err(Failure::input))?;
 
@@ -193,6 +210,8 @@ impl<'a> Task<'a> {
             as_run,
             adapted,
             _lock: lock,
+            restart,
+            petsc: &arguments.petsc,
             profile: arguments.profile,
             phases,
             started,
@@ -200,13 +219,17 @@ impl<'a> Task<'a> {
     }
 
     /// Solves and writes the results. Collective.
-    fn solve(self, session: &Session) -> Result<(), Failure> {
+    fn solve(mut self, session: &Session) -> Result<(), Failure> {
         let comm = session.comm();
+        let restart = self.restart.take();
+        let checked = restart.as_ref().map_or(Ok(()), |checkpoint| checkpoint.check(&self));
+        agree(comm, checked)?;
         let mut recorder = agree(comm, Recorder::new(&self).map_err(Failure::input))?;
         let (problem, phases) = (&self.problem, self.phases);
-        let mut result = evolution::run(session, problem, &self.solver, phases, &mut |step| {
-            Ok(recorder.accept(step)?)
-        });
+        recorder.show_restart(restart.as_ref());
+        let saved = restart.map(|checkpoint| checkpoint.state);
+        let mut result =
+            evolution::run_from(session, problem, &self.solver, phases, &mut recorder, saved);
         if let Ok(Outcome { stopped: Some(stop), .. }) = &mut result {
             let parts = [stop.from_mesh, self.stop_change].into_iter().flatten();
             stop.from_mesh = parts.reduce(f64::max);
@@ -216,6 +239,10 @@ impl<'a> Task<'a> {
         let ended = match result {
             Ok(_) => written.map_err(Failure::from),
             Err(RunError::OnAnotherRank) => Err(Failure::ON_ANOTHER_RANK),
+            Err(RunError::Interrupted(signal)) => {
+                let message = format!("ended by {signal}; --restart goes on from here");
+                Err(Failure { code: signal.exit_code(), message: Some(message) })
+            }
             Err(error) => Err(error.into()),
         };
         agree(comm, ended)

@@ -93,7 +93,7 @@ pub fn conclusion(
     lines
 }
 
-fn row(name: &str, value: String) -> String {
+pub fn row(name: &str, value: String) -> String {
     format!("  {name:<13} {value}")
 }
 

@@ -6,6 +6,7 @@
 use super::{FixedRow, GapRow, Kkt, Scales, kkt::worse};
 use crate::{fem::Subdomain, petsc::Communicator};
 use nalgebra::Vector2;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// The conditions of a body, node by node, for the nodes that this rank owns.
@@ -27,7 +28,7 @@ struct Conditions {
 }
 
 /// A gap condition at a node and how it is met.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct ContactPoint {
     /// The node.
     pub node: usize,

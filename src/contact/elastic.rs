@@ -2,7 +2,8 @@
 
 use super::{ContactError, ContactProblem, ContactReport, Kkt};
 use crate::{
-    cholesky::{Booking, LinearSolver, LinearSystem, Precision},
+    archive::{Archive, ArchiveError},
+    cholesky::{Booking, Factor, LinearSolver, LinearSystem, Precision},
     petsc::{PetscError, Session, Vector},
 };
 
@@ -29,11 +30,29 @@ pub(super) struct ElasticSolver<'s> {
     pub(super) method: &'static str,
     session: &'s Session,
     solver: Option<LinearSolver>,
+    /// The factor of a checkpoint, before the first solve.
+    loaded: Option<Factor>,
 }
 
 impl<'s> ElasticSolver<'s> {
     pub(super) fn new(session: &'s Session, method: &'static str) -> Self {
-        Self { method, session, solver: None }
+        Self { method, session, solver: None, loaded: None }
+    }
+
+    /// Saves or loads the factor.
+    pub(super) fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
+        if let Some(solver) = &mut self.solver {
+            return solver.factor().archive(archive);
+        }
+        let mut factor = self.loaded.take().unwrap_or_else(|| self.new_factor());
+        factor.archive(archive)?;
+        self.loaded = Some(factor);
+        Ok(())
+    }
+
+    fn new_factor(&self) -> Factor {
+        // Half the digits are enough for a preconditioner, and half the bytes to read.
+        Factor::new(self.session, "elastic_", Precision::Preconditioner)
     }
 
     /// Solves from the start `c` for the load `f` until the forces left on the free unknowns are
@@ -52,10 +71,9 @@ impl<'s> ElasticSolver<'s> {
     ) -> Result<(), ContactError> {
         let solver = match self.solver.take() {
             Some(solver) => solver,
-            // Half the digits are enough for a preconditioner, and half the bytes to read.
             None => {
-                let owned = system.matrix.owned();
-                LinearSolver::new(self.session, "elastic_", owned, Precision::Preconditioner)?
+                let factor = self.loaded.take().unwrap_or_else(|| self.new_factor());
+                LinearSolver::with(self.session, factor, system.matrix.owned())?
             }
         };
         let solved = self.solver.insert(solver).solve_renewing(system, f, c, limit)?;

@@ -1,10 +1,11 @@
 //! The Karush–Kuhn–Tucker residuals of an answer, whoever computed it.
 
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// What counts as 1 in relative residuals: the sizes of forces and of displacements in a run so
 /// far, so that a load that passes zero, or a gap much wider than a displacement, changes nothing.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Scales {
     /// F: the largest ‖·‖₂ of the nodal loads and of the internal forces, N per metre of thickness.
     pub force: f64,
@@ -41,7 +42,7 @@ impl Scales {
 
 /// Relative KKT residuals of u. The multiplier p of a gap condition is the contact force that u
 /// itself implies.
-#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Kkt {
     /// ‖the part of f − Ku that no support can carry‖₂ / F.
     pub stationarity: f64,

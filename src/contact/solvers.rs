@@ -14,7 +14,10 @@ pub use penalty_duality::PenaltyOptions;
 pub use tao::TAO_TYPES;
 
 use super::{ContactError, ContactProblem};
-use crate::petsc::{Session, Vector};
+use crate::{
+    archive::{Archive, ArchiveError},
+    petsc::{Session, Vector},
+};
 use active_set::ActiveSet;
 use schemars::JsonSchema;
 use serde::{
@@ -35,6 +38,14 @@ pub trait ContactSolver {
     /// Goes back to an earlier [`Self::warm_start`], as if the solves since then had not been;
     /// with nothing, to that of a new solver.
     fn set_warm_start(&mut self, _kept: &[f64]) {}
+
+    /// Saves or loads what else it keeps from solve to solve: factors, estimates.
+    ///
+    /// # Errors
+    /// The archive is of another solver.
+    fn archive(&mut self, _archive: &mut Archive) -> Result<(), ArchiveError> {
+        Ok(())
+    }
 
     /// Solves from the start `c` and leaves the solution there.
     ///

@@ -17,10 +17,11 @@ use crate::{
     petsc::{PetscError, Session},
     scene::{Scene, Stepping},
 };
+use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 
 /// A mesh that was adapted to a scene.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Adapted {
     /// The mesh.
     pub mesh: Mesh,

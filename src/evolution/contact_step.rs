@@ -19,6 +19,7 @@ use super::{
     extrapolation::Extrapolation,
 };
 use crate::{
+    archive::{Archive, ArchiveError},
     contact::{self, Bound, ContactError, ContactProblem, ContactReport, ContactSolver, Scales},
     fem::Stiffness,
     petsc::{PetscError, Session, Vector},
@@ -26,6 +27,7 @@ use crate::{
 use certificate::Judged;
 use datum::Datum;
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
 /// Solves the contact problems of a run, one after the other.
@@ -54,7 +56,7 @@ pub struct ContactStep<'a> {
 }
 
 /// What a step leaves to the next one.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 struct Memory {
     /// Where displacements are measured from.
     datum: Datum,
@@ -171,6 +173,14 @@ impl<'a> ContactStep<'a> {
         self.next.warm_start = self.solver.warm_start();
         self.accepted = self.next.clone();
         Ok(())
+    }
+
+    /// Saves or loads what the accepted steps have left to the next one.
+    pub(super) fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
+        archive.value(&mut self.accepted)?;
+        self.extrapolation.archive(archive)?;
+        self.solver.archive(archive)?;
+        self.rescuer.iter_mut().try_for_each(|rescuer| rescuer.archive(archive))
     }
 
     /// Starts from the accepted steps: sets c, the datum and the solver's warm start. Where the active

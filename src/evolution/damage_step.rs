@@ -7,6 +7,7 @@ use crate::{
     petsc::{PetscError, Session},
 };
 use nalgebra::DVector;
+use serde::{Deserialize, Serialize};
 
 /// Solves the damage systems (M + kκL) ζ_n = M ζ_{n−1} + k b_{n−1} of a run.
 pub(super) struct DamageStep<'a> {
@@ -18,6 +19,7 @@ pub(super) struct DamageStep<'a> {
 }
 
 /// The damage source φ(ε(u), ζ) of a state; zero where there is no damage law.
+#[derive(Default, Serialize, Deserialize)]
 pub(super) struct DamageSource {
     /// b_i = ∫ φ λ_i, m²/s.
     pub(super) load: DVector<f64>,

@@ -338,9 +338,14 @@ impl DiscreteProblem {
         self.body.at_points(&zeta.iter().map(|&z| self.truncated(z)).collect::<Vec<_>>())
     }
 
+    /// The undivided mesh.
+    pub fn mesh(&self) -> &Mesh {
+        self.undivided.as_ref().map_or(&self.body.mesh, |(mesh, _)| mesh)
+    }
+
     /// The named curves of the whole mesh: the ends of their edges, m, the body on the left.
     pub fn boundaries(&self) -> BTreeMap<&str, Vec<[[f64; 2]; 2]>> {
-        let mesh = self.undivided.as_ref().map_or(&self.body.mesh, |(mesh, _)| mesh);
+        let mesh = self.mesh();
         let ends = |edge: &[usize; 2]| edge.map(|node| mesh.nodes[node]);
         let curves = mesh.curves.iter();
         curves.map(|(name, curve)| (&**name, curve.edges.iter().map(ends).collect())).collect()

@@ -2,7 +2,9 @@
 
 use super::{DiscreteProblem, SetupError};
 use crate::{
+    archive::ArchiveError,
     contact::{ContactError, SolverError},
+    interrupt::Signal,
     petsc::PetscError,
 };
 
@@ -43,6 +45,12 @@ pub enum RunError {
     /// PETSc failed.
     #[error(transparent)]
     Petsc(#[from] PetscError),
+    /// A signal has ended the run behind an accepted step.
+    #[error("ended by {0}")]
+    Interrupted(Signal),
+    /// The state in a checkpoint is none of this run.
+    #[error(transparent)]
+    Archive(#[from] ArchiveError),
     /// Whoever was shown an accepted step could not go on (results that cannot be written).
     #[error(transparent)]
     Observer(Box<dyn std::error::Error + Send + Sync>),

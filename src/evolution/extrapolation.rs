@@ -1,6 +1,9 @@
 //! Predicts the next solution from the last ones.
 
-use crate::petsc::Communicator;
+use crate::{
+    archive::{Archive, ArchiveError},
+    petsc::Communicator,
+};
 use std::collections::VecDeque;
 
 /// Polynomials in time through the last accepted solutions, as starts for iterative solvers.
@@ -20,6 +23,12 @@ const HIGHEST: usize = 4;
 const SAMPLE: usize = 4096;
 
 impl Extrapolation {
+    /// Saves or loads the solutions.
+    pub(super) fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
+        archive.value(&mut self.history)?;
+        archive.value(&mut self.degree)
+    }
+
     /// The predicted solution at `time`; `None` before any solution.
     pub fn at(&self, time: f64) -> Option<Vec<f64>> {
         let mut values = vec![0.0; self.history.front()?.1.len()];

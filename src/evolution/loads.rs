@@ -5,6 +5,7 @@ use super::{
     boundary_conditions::{BoundaryConditions, MovingGap, Traction},
 };
 use crate::{
+    archive::{Archive, ArchiveError},
     fem::{Body, Edge, Subdomain, add_body_force, add_traction, midpoint},
     scene::{Expression, Scene},
 };
@@ -192,6 +193,11 @@ impl<'a> LoadCurve<'a> {
             times.for_each(|time| _ = curve.sample(time));
             curve
         })
+    }
+
+    /// Saves or loads the largest values so far.
+    pub(super) fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
+        archive.value(&mut self.largest)
     }
 
     /// The breaks between two times.

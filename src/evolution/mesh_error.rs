@@ -27,6 +27,7 @@ use crate::{
     petsc::PetscError,
 };
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 use std::array;
 
 /// So many intervals of time at least and about twice as many at most, if there are so many steps; with
@@ -34,6 +35,7 @@ use std::array;
 const INTERVALS: usize = 5;
 
 /// States of a run at a few times, evenly spread over its steps.
+#[derive(Serialize, Deserialize)]
 pub(super) struct Instants {
     /// Every so many steps.
     stride: usize,

@@ -35,6 +35,7 @@ mod extrapolation;
 mod loads;
 mod mesh_error;
 mod notes;
+mod observer;
 mod outcome;
 mod probe;
 mod state;
@@ -52,20 +53,22 @@ pub use error::{RunError, StepFailure};
 pub use error_budget::ErrorBudget;
 pub use extrapolation::Extrapolation;
 pub use loads::Loads;
+pub use observer::{Next, Observed, Observer};
 pub use outcome::{BoundViolation, Outcome, Stop};
 pub use state::{State, Step, StepRecord};
 pub use supports::{ContactRow, Supports};
 
-use crate::petsc::{Communicator, Session};
+use crate::{
+    archive::{Archive, ArchiveError},
+    petsc::{Communicator, Session},
+};
 use contact_step::Compliance;
 use damage_step::DamageStep;
 use mesh_error::{Instants, mesh_error};
 use nalgebra::DVector;
+use observer::Shown;
 use std::time::Instant;
 use step_controller::{StepController, Verdict};
-
-/// The answer of whoever is shown an accepted step: an error ends the run.
-pub type Observed = Result<(), Box<dyn std::error::Error + Send + Sync>>;
 
 /// Solves Problem VP^hk with the contact solver called `solver`; `accepted` sees every accepted
 /// step, n = 0 included.
@@ -79,53 +82,123 @@ pub fn run(
     phases: &Phases,
     accepted: &mut dyn FnMut(&Step) -> Observed,
 ) -> Result<Outcome, RunError> {
-    let mut show = |step: &Step| {
-        let shown = accepted(step).map_err(RunError::Observer);
-        agreed(problem.body.nodes.partition.comm(), shown)
-    };
-    let mut damage_step = DamageStep { session, problem, phases, system: None };
-    let mut contact_step = ContactStep::new(session, problem, solver, phases)?;
+    run_from(session, problem, solver, phases, &mut Shown(accepted), None)
+}
 
-    // (27): u_0 from ζ_0.
-    let first = contact_step.solve(0, problem.start(), &problem.initial_damage())?;
-    contact_step.accept(problem.start())?;
-    let source = damage_step.source(&first.state);
-    let mut controller = StepController::new(problem, &first.state.zeta, source);
-    let mut outcome = Outcome::new(first);
-    show(&outcome.last)?;
-    let mut instants = Instants::new();
-    instants.observe(&outcome.last);
-    loop {
+/// As [`run`], for an `observer` that may keep checkpoints and end the run; from the state `saved` in
+/// one of them, if it is given.
+///
+/// # Errors
+/// See [`RunError`]; every accepted step has been seen by then.
+pub fn run_from(
+    session: &Session,
+    problem: &DiscreteProblem,
+    solver: &str,
+    phases: &Phases,
+    observer: &mut dyn Observer,
+    saved: Option<Vec<u8>>,
+) -> Result<Outcome, RunError> {
+    let damage_step = DamageStep { session, problem, phases, system: None };
+    let mut contact_step = ContactStep::new(session, problem, solver, phases)?;
+    let (zeta, start) = (problem.initial_damage(), problem.start());
+    let (mut first, mut source) = Default::default();
+    if saved.is_none() {
+        // (27): u_0 from ζ_0.
+        first = contact_step.solve(0, start, &zeta)?;
+        contact_step.accept(start)?;
+        source = damage_step.source(&first.state);
+    }
+    let controller = StepController::new(problem, &zeta, source);
+    let (outcome, instants) = (Outcome::new(first), Instants::new());
+    let mut run = Run { damage_step, contact_step, controller, outcome, instants };
+    match saved {
+        None => run.show(observer)?,
+        Some(bytes) => {
+            let mut archive = Archive::loading(bytes);
+            run.archive(&mut archive)?;
+            observer.archive(&run.outcome.last, &mut archive).map_err(RunError::Observer)?;
+        }
+    }
+    while run.step(observer)? {}
+    let Run { damage_step, contact_step, controller, mut outcome, instants } = run;
+    let compliance = contact_step.into_compliance()?;
+    judge(&mut outcome, &controller, damage_step, compliance, instants)?;
+    Ok(outcome)
+}
+
+/// A run between two steps.
+struct Run<'a> {
+    damage_step: DamageStep<'a>,
+    contact_step: ContactStep<'a>,
+    controller: StepController<'a>,
+    outcome: Outcome,
+    instants: Instants,
+}
+
+impl Run<'_> {
+    /// Makes a step, or finds that it has to be shorter; false at the end of the run.
+    fn step(&mut self, observer: &mut dyn Observer) -> Result<bool, RunError> {
         let started = Instant::now();
-        let Some(planned) = controller.plan(&outcome.last) else { break };
+        let Self { damage_step, contact_step, controller, outcome, .. } = self;
+        let Some(planned) = controller.plan(&outcome.last) else { return Ok(false) };
         // (28): ζ_n from ζ_{n−1} and u_{n−1}.
         let verdict = damage_step.solve(&planned).and_then(|damage| {
-            if damage.min_max.0 <= problem.threshold() {
+            if damage.min_max.0 <= damage_step.problem.threshold() {
                 return Ok(controller.judge_stop(&planned, &damage, &outcome.last));
             }
             // (26): u_n from ζ_n.
             let mut step = contact_step.solve(planned.n, planned.time, damage.zeta.as_slice())?;
             step.set_damage_certificate(damage.certificate);
-            controller.judge(&planned, &damage, Box::new(step), &mut damage_step)
+            controller.judge(&planned, &damage, Box::new(step), damage_step)
         });
         match verdict.or_else(|failure| controller.judge_failure(&planned, failure))? {
             Verdict::Accept(mut step) => {
                 contact_step.accept(planned.time)?;
                 step.record.seconds = started.elapsed().as_secs_f64();
                 outcome.accept(*step);
-                show(&outcome.last)?;
-                instants.observe(&outcome.last);
+                self.show(observer)?;
             }
             Verdict::Retry => outcome.undone += 1,
             Verdict::Stop(stop) => {
                 outcome.stopped = Some(stop);
-                break;
+                return Ok(false);
             }
         }
+        Ok(true)
     }
-    let compliance = contact_step.into_compliance()?;
-    judge(&mut outcome, &controller, damage_step, compliance, instants)?;
-    Ok(outcome)
+
+    /// Shows the last accepted step, and does what the observers of all ranks then want. Collective.
+    fn show(&mut self, observer: &mut dyn Observer) -> Result<(), RunError> {
+        self.instants.observe(&self.outcome.last);
+        let comm = self.damage_step.problem.body.nodes.partition.comm();
+        let wanted = observer.accept(&self.outcome.last);
+        // One reduction for failures and wishes alike.
+        let most = comm.max(wanted.as_ref().map_or(f64::INFINITY, |next| next.urgency()));
+        wanted.map_err(RunError::Observer)?;
+        if most.is_infinite() {
+            return Err(RunError::OnAnotherRank);
+        }
+        let next = Next::of_urgency(most);
+        if next != Next::Step {
+            let kept = self.damage_step.phases.time("checkpoint", || {
+                let mut archive = Archive::saving();
+                self.archive(&mut archive)?;
+                let last = &self.outcome.last;
+                let added = observer.archive(last, &mut archive);
+                added.and_then(|()| observer.keep(last, archive)).map_err(RunError::Observer)
+            });
+            agreed(comm, kept)?;
+        }
+        if let Next::End(signal) = next { Err(RunError::Interrupted(signal)) } else { Ok(()) }
+    }
+
+    /// Saves or loads all that the next steps depend on. The damage system is made again.
+    fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
+        self.contact_step.archive(archive)?;
+        self.controller.archive(archive)?;
+        self.outcome.archive(archive)?;
+        archive.value(&mut self.instants)
+    }
 }
 
 /// Estimates the errors of a run that has ended. Collective.

@@ -2,9 +2,11 @@
 
 use super::{Accuracy, ErrorBudget, Step, StepRecord, step_controller::PlannedStep};
 use crate::{
-    contact::{Kkt, RigidMotion},
+    archive::{Archive, ArchiveError},
+    contact::{Kkt, RigidMotion, find},
     fem::Mass,
 };
+use serde::{Deserialize, Serialize};
 use std::{mem, rc::Rc};
 
 /// How a run ended that did not fail.
@@ -73,6 +75,22 @@ impl Outcome {
         outcome
     }
 
+    /// What a checkpoint keeps of a run that has not ended.
+    pub(super) fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
+        archive.value(&mut self.last)?;
+        archive.value(&mut self.kkt)?;
+        archive.value(&mut self.skipped_damage_solves)?;
+        archive.value(&mut self.undone)?;
+        archive.value(&mut self.fallbacks)?;
+        let mut rescued = self.rescued.map(|(steps, solver)| (steps, solver.to_owned()));
+        archive.value(&mut rescued)?;
+        self.rescued =
+            rescued.and_then(|(steps, solver)| Some((steps, find(&solver).ok()?.0.name)));
+        archive.value(&mut self.unconstrained)?;
+        archive.value(&mut self.least_accurate)?;
+        archive.value(&mut self.most_displaced)
+    }
+
     /// A further step is accepted.
     pub(super) fn accept(&mut self, step: Step) {
         let before = Rc::new(mem::replace(&mut self.last, step));
@@ -110,7 +128,7 @@ impl Outcome {
 /// min ζ_{n−1} + k min φ_{n−1} ≤ ζ_n ≤ max ζ_{n−1}.
 ///
 /// Both bounds are carried on from the first step, so that small violations in many steps add up.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct BoundViolation {
     /// The largest ζ above its upper bound.
     pub above: f64,

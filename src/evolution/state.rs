@@ -6,10 +6,10 @@ use crate::{
     fem::DamageCertificate,
 };
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A step with its certified answer.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Step {
     /// The fields.
     pub state: State,
@@ -17,7 +17,8 @@ pub struct Step {
     pub record: StepRecord,
     /// The rest of the row: [`DiscreteProblem::quantities`].
     pub quantities: Vec<f64>,
-    /// What the contact solve took.
+    /// What the contact solve took; not in archives.
+    #[serde(skip)]
     pub report: ContactReport,
     /// A rigid motion that the active nodes leave unconstrained, if there is one.
     pub unconstrained: Option<RigidMotion>,
@@ -26,7 +27,7 @@ pub struct Step {
 }
 
 /// The fields of a step.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct State {
     /// t, s.
     pub time: f64,
@@ -39,7 +40,7 @@ pub struct State {
 }
 
 /// The quantities of interest of a step: a row of `history.csv`.
-#[derive(Debug, Clone, Copy, Default, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, JsonSchema)]
 pub struct StepRecord {
     /// n, 0 for the state at t = 0.
     pub step: usize,

@@ -1,5 +1,6 @@
 //! Triangulations of a plane body, and where they come from.
 
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 mod boundary;
@@ -15,14 +16,14 @@ pub use boundary::{BoundaryNode, CORNER_ANGLE, Face, boundary_nodes};
 pub use components::Components;
 pub use error::MeshError;
 pub use gmsh::{Order, load, mesh_geo};
-pub use msh::read;
+pub use msh::{parse, read};
 pub use refine::Refinement;
 
 /// A conforming triangulation of the body, with the named parts of its boundary.
 ///
 /// Every node belongs to at least one triangle, every triangle is
 /// counter-clockwise with positive area.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Mesh {
     /// Coordinates of the nodes, which are the vertices of the triangles, m.
     pub nodes: Vec<[f64; 2]>,
@@ -36,7 +37,7 @@ pub struct Mesh {
 }
 
 /// One physical curve: the edges of the triangulation that lie on it.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Curve {
     /// Boundary edges as node pairs, the body on their left: (dy, −dx) points outwards.
     pub edges: Vec<[usize; 2]>,

@@ -6,12 +6,16 @@ use super::{
     vtu::{BYTE, FrameList, INTEGER, REAL, vtk_file},
     write_whole,
 };
-use crate::evolution::{ContactRow, DiscreteProblem, State};
+use crate::{
+    archive::Archive,
+    evolution::{ContactRow, DiscreteProblem, Observed, State},
+};
 use std::{
     io, iter,
     path::{Path, PathBuf},
 };
 
+const TABLE: &str = "contact.csv";
 /// VTK_LINE.
 const LINE: u8 = 3;
 
@@ -30,6 +34,12 @@ impl ContactWriter {
         Self { folder: folder.to_owned(), list, table: None }
     }
 
+    /// Saves how long list and table are, or goes back to that.
+    pub(super) fn archive(&mut self, archive: &mut Archive) -> Observed {
+        self.list.archive(archive)?;
+        Table::archive(&mut self.table, self.folder.join(TABLE), archive)
+    }
+
     /// Writes Γ_C of a frame, if there is one, its lines as `file`. Collective.
     ///
     /// # Errors
@@ -46,7 +56,7 @@ impl ContactWriter {
         }
         let table = match self.table.take() {
             Some(table) => table,
-            None => Table::create(self.folder.join("contact.csv"), &rows[0], &[])?,
+            None => Table::create(self.folder.join(TABLE), &rows[0], &[])?,
         };
         self.table.insert(table).add(&rows)?;
         let path = self.folder.join(file);

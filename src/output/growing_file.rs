@@ -1,6 +1,7 @@
 //! A file that grows and is whole whenever the program is killed.
 
 use super::{OutputError, write_whole};
+use crate::{archive::Archive, evolution::Observed};
 use std::{
     fs::File,
     io,
@@ -31,6 +32,35 @@ impl GrowingFile {
         let file = File::options().write(true).open(&path);
         let file = file.map_err(|e| OutputError::new(&path, e))?;
         Ok(Self { path, file, length: piece.len() as u64, ending })
+    }
+
+    /// Saves where the file ends, or goes back to that end of the file at `path`; `None` where there was
+    /// no file.
+    pub(super) fn archive(
+        this: &mut Option<Self>,
+        path: PathBuf,
+        ending: &'static str,
+        archive: &mut Archive,
+    ) -> Observed {
+        let mut length = this.as_ref().map(|file| file.length);
+        archive.value(&mut length)?;
+        if archive.is_loading() {
+            *this = length.map(|length| Self::reopen(path, length, ending)).transpose()?;
+        }
+        Ok(())
+    }
+
+    fn reopen(path: PathBuf, length: u64, ending: &'static str) -> Result<Self, OutputError> {
+        let reopened = File::options().write(true).open(&path).and_then(|file| {
+            let there = file.metadata()?.len();
+            let mut this = Self { path: path.clone(), file, length, ending };
+            if there < length {
+                return Err(io::Error::other("it is shorter than when the checkpoint was written"));
+            }
+            this.end_at(length)?;
+            Ok(this)
+        });
+        reopened.map_err(|e| OutputError::new(&path, e))
     }
 
     pub(super) fn path(&self) -> &Path {

@@ -9,12 +9,12 @@ mod vtu;
 
 pub use vtu::FieldWriter;
 
-use crate::scene::AS_RUN;
+use crate::{archive::Archive, evolution::Observed, scene::AS_RUN};
 use growing_file::GrowingFile;
 use serde::Serialize;
 use std::{
     fs::{self, File, Permissions, TryLockError},
-    io::Write,
+    io::{self, Write},
     os::unix::fs::PermissionsExt,
     path::{Path, PathBuf},
 };
@@ -28,7 +28,8 @@ pub struct OutputError {
 }
 
 impl OutputError {
-    pub(crate) fn new(path: &Path, reason: impl ToString) -> Self {
+    /// The file at `path` cannot be written for this reason.
+    pub fn new(path: &Path, reason: impl ToString) -> Self {
         Self { path: path.to_owned(), reason: reason.to_string() }
     }
 }
@@ -113,18 +114,48 @@ fn is_frame(name: &str) -> bool {
         })
 }
 
+/// The checkpoints of a rank in `folder`, `checkpoint_STEP_RANK`, with their steps.
+pub fn checkpoints(folder: &Path, rank: usize) -> Vec<(usize, PathBuf)> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let checkpoint = |entry: fs::DirEntry| {
+        let (step, of_rank) = checkpoint(&entry.file_name().to_string_lossy())?;
+        (of_rank == rank).then(|| (step, entry.path()))
+    };
+    entries.filter_map(checkpoint).collect()
+}
+
+/// The step and the rank of a file, if its `name` is that of a checkpoint.
+fn checkpoint(name: &str) -> Option<(usize, usize)> {
+    let (step, rank) = name.strip_prefix("checkpoint_")?.split_once('_')?;
+    Some((step.parse().ok()?, rank.parse().ok()?))
+}
+
 /// Removes from `folder` the results of an earlier run, its figures and its files that were never
 /// completed, so that none are mistaken for new.
 ///
 /// # Errors
 /// A file cannot be removed.
 pub fn prepare(folder: &Path) -> Result<(), OutputError> {
+    let of_results = |name: &str| is_frame(name) || is_picture(name) || FILES.contains(&name);
+    remove(folder, |name| of_results(name) || is_partial(name) || checkpoint(name).is_some())
+}
+
+/// Removes from `folder` the files that a run which was killed has not completed.
+///
+/// # Errors
+/// A file cannot be removed.
+pub fn remove_partial(folder: &Path) -> Result<(), OutputError> {
+    remove(folder, is_partial)
+}
+
+fn is_partial(name: &str) -> bool {
+    name.starts_with(PARTIAL)
+}
+
+fn remove(folder: &Path, is_old: impl Fn(&str) -> bool) -> Result<(), OutputError> {
     let entries = fs::read_dir(folder).map_err(|e| OutputError::new(folder, e))?;
     for entry in entries.flatten() {
-        let name = entry.file_name();
-        let name = name.to_string_lossy();
-        let of_results = is_frame(&name) || is_picture(&name) || FILES.contains(&&*name);
-        if of_results || name.starts_with(PARTIAL) {
+        if is_old(&entry.file_name().to_string_lossy()) {
             fs::remove_file(entry.path()).map_err(|e| OutputError::new(&entry.path(), e))?;
         }
     }
@@ -153,6 +184,17 @@ impl Table {
         });
         let header = header.map_err(|e| OutputError::new(&path, e))?;
         GrowingFile::create(path, &String::from_utf8_lossy(&header), "").map(Self)
+    }
+
+    /// Saves how long the file is, or goes back to that length of the one at `path`.
+    ///
+    /// # Errors
+    /// The file is gone or shorter.
+    pub fn archive(this: &mut Option<Self>, path: PathBuf, archive: &mut Archive) -> Observed {
+        let mut file = this.take().map(|table| table.0);
+        GrowingFile::archive(&mut file, path, "", archive)?;
+        *this = file.map(Self);
+        Ok(())
     }
 
     /// Appends rows.
@@ -188,6 +230,22 @@ pub fn write_table<T: Serialize>(path: &Path, rows: &[T]) -> Result<(), OutputEr
 /// # Errors
 /// The file cannot be written.
 pub fn write_whole(path: &Path, content: &[u8]) -> Result<(), OutputError> {
+    write(path, content, |_| Ok(()))
+}
+
+/// As [`write_whole`], and the disk has the file before it takes the place of another.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_synced(path: &Path, content: &[u8]) -> Result<(), OutputError> {
+    write(path, content, File::sync_all)
+}
+
+fn write(
+    path: &Path,
+    content: &[u8],
+    complete: impl FnOnce(&File) -> io::Result<()>,
+) -> Result<(), OutputError> {
     let folder = path.parent().unwrap_or(Path::new("."));
     let written = tempfile::Builder::new()
         .prefix(PARTIAL)
@@ -195,6 +253,7 @@ pub fn write_whole(path: &Path, content: &[u8]) -> Result<(), OutputError> {
         .tempfile_in(folder)
         .and_then(|mut file| {
             file.write_all(content)?;
+            complete(file.as_file())?;
             Ok(file.persist(path)?)
         });
     written.map(|_| ()).map_err(|e| OutputError::new(path, e))

@@ -8,7 +8,8 @@ use super::{
     write_whole,
 };
 use crate::{
-    evolution::{DiscreteProblem, State},
+    archive::Archive,
+    evolution::{DiscreteProblem, Observed, State},
     fem::{Body, Elements},
     petsc::PetscError,
     scene::{Scene, Stepping},
@@ -63,6 +64,17 @@ impl FieldWriter {
         let list = FrameList::new(folder.join("fields.pvd"));
         let contact = ContactWriter::new(&folder);
         Ok(Self { folder, mesh, list, contact, frames: 0, last_time: None, digits })
+    }
+
+    /// Saves how many frames there are, or goes back to so many.
+    ///
+    /// # Errors
+    /// A list of theirs is gone.
+    pub fn archive(&mut self, archive: &mut Archive) -> Observed {
+        archive.value(&mut self.frames)?;
+        archive.value(&mut self.last_time)?;
+        self.list.archive(archive)?;
+        self.contact.archive(archive)
     }
 
     /// Time of the last frame, s.
@@ -124,6 +136,11 @@ impl FrameList {
     /// The list that will be at `path`.
     pub(super) fn new(path: PathBuf) -> Self {
         Self { path, file: None }
+    }
+
+    /// Saves how long the list is, or goes back to that length.
+    pub(super) fn archive(&mut self, archive: &mut Archive) -> Observed {
+        GrowingFile::archive(&mut self.file, self.path.clone(), LIST_END, archive)
     }
 
     /// Adds the frame in `file` of a time, s.

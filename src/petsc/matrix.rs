@@ -228,6 +228,62 @@ impl Matrix {
         }
     }
 
+    /// Copies the entries that this rank stores into `values` (MatSeqAIJGetArrayRead).
+    pub(crate) fn read_entries(&self, values: &mut Vec<f64>) -> Result<(), PetscError> {
+        values.clear();
+        for (block, count) in self.blocks()? {
+            let mut data = ptr::null();
+            // SAFETY: a live block, which lends `count` values until they are given back.
+            unsafe {
+                check(raw::MatSeqAIJGetArrayRead(block, &mut data))?;
+                (count > 0).then(|| values.extend(slice::from_raw_parts(data, count)));
+                check(raw::MatSeqAIJRestoreArrayRead(block, &mut data))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Replaces the entries that this rank stores by those that [`Self::read_entries`] has copied from a
+    /// matrix of the same pattern (MatSeqAIJGetArray).
+    pub(crate) fn set_entries(&mut self, mut values: &[f64]) -> Result<(), PetscError> {
+        let blocks = self.blocks()?;
+        same_size(blocks.iter().map(|(_, count)| count).sum(), values.len())?;
+        for (block, count) in blocks {
+            let (mut data, (own, others)) = (ptr::null_mut(), values.split_at(count));
+            // SAFETY: as in `read_entries`, and `&mut self` keeps other readers away.
+            unsafe {
+                check(raw::MatSeqAIJGetArray(block, &mut data))?;
+                ptr::copy_nonoverlapping(own.as_ptr(), data, count);
+                check(raw::MatSeqAIJRestoreArray(block, &mut data))?;
+            }
+            values = others;
+        }
+        Ok(())
+    }
+
+    /// The blocks of this rank's rows, of the columns that it owns and of the others, each with the
+    /// number of its stored entries (MatMPIAIJGetSeqAIJ).
+    fn blocks(&self) -> Result<Vec<(raw::Mat, usize)>, PetscError> {
+        let (mut own, mut others) = (self.raw(), ptr::null_mut());
+        let (mut parallel, columns) = (raw::PetscBool::PETSC_FALSE, ptr::null_mut());
+        let (object, kind) = (self.raw().cast(), c"mpiaij".as_ptr());
+        // SAFETY: a live handle, which keeps its blocks.
+        unsafe {
+            check(raw::PetscObjectTypeCompare(object, kind, &mut parallel))?;
+            if parallel == raw::PetscBool::PETSC_TRUE {
+                check(raw::MatMPIAIJGetSeqAIJ(self.raw(), &mut own, &mut others, columns))?;
+            }
+        }
+        let mut blocks = Vec::new();
+        for block in [own, others].into_iter().filter(|block| !block.is_null()) {
+            let (local, mut info) = (raw::MatInfoType::MAT_LOCAL, raw::MatInfo::default());
+            // SAFETY: a live block.
+            check(unsafe { raw::MatGetInfo(block, local, &mut info) })?;
+            blocks.push((block, info.nz_used as usize));
+        }
+        Ok(blocks)
+    }
+
     /// Entries that this rank stores (MatGetInfo).
     pub fn entries(&self) -> f64 {
         let (local, mut info) = (raw::MatInfoType::MAT_LOCAL, raw::MatInfo::default());

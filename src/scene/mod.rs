@@ -162,10 +162,18 @@ pub struct Probe {
 }
 
 /// What is written while the scene runs.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OutputOptions {
     /// Fields are written every so many steps, at least 1.
     pub every: Option<usize>,
+    /// A checkpoint is written every so many seconds; none if 0.
+    pub checkpoint: f64,
+}
+
+impl Default for OutputOptions {
+    fn default() -> Self {
+        Self { every: None, checkpoint: 60.0 }
+    }
 }
 
 /// Names of the units that a scene is written in. They label results; nothing is converted.

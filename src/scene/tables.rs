@@ -203,7 +203,12 @@ fn output(table: &mut Table) -> Reading<OutputOptions> {
     let every = table.get("every").optional(|value| {
         value.number("a whole number, at least 1", |every| every.fract() == 0.0 && every >= 1.0)
     });
-    Ok(OutputOptions { every: every?.map(|every| every as usize) })
+    let checkpoint = table.get("checkpoint");
+    let checkpoint =
+        checkpoint.optional(|value| value.number("at least 0 (s)", |seconds| seconds >= 0.0));
+    let every = every?.map(|every| every as usize);
+    let usual = OutputOptions::default();
+    Ok(OutputOptions { every, checkpoint: checkpoint?.unwrap_or(usual.checkpoint) })
 }
 
 fn units(table: &mut Table) -> Reading<Units> {

@@ -13,3 +13,4 @@ mod keys;
 mod meshes;
 mod provenance;
 mod refused;
+mod restart;

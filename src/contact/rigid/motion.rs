@@ -1,9 +1,10 @@
 //! Motions without strain, and how they are told.
 
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// An infinitesimal rigid motion of one part of the mesh, u(x) = a + θ e_z × (x − centre).
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct PartMotion {
     /// The part, see [`Components`](crate::mesh::Components).
     pub part: usize,
@@ -63,7 +64,7 @@ impl fmt::Display for PartMotion {
 
 /// A motion without strain: rigid on each of some parts of the mesh, continuous where parts meet,
 /// 0 elsewhere.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RigidMotion {
     /// The motions of the parts of a piece.
     pub parts: Vec<PartMotion>,

@@ -2,6 +2,7 @@
 
 use super::{ContactReport, ContactSolver, SolverEntry};
 use crate::{
+    archive::{Archive, ArchiveError},
     cholesky::LinearSystem,
     contact::{
         Bound, ContactError, ContactProblem, Kkt, elastic::ElasticSolver,
@@ -166,6 +167,10 @@ impl ContactSolver for ActiveSet<'_> {
 
     fn set_warm_start(&mut self, kept: &[f64]) {
         self.active = kept.to_vec();
+    }
+
+    fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
+        self.elastic.archive(archive)
     }
 
     fn solve(

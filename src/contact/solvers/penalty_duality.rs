@@ -3,6 +3,7 @@
 
 use super::{Anderson, ContactReport, ContactSolver, SolverEntry, between_0_and_1, number};
 use crate::{
+    archive::{Archive, ArchiveError},
     cholesky::LinearSystem,
     contact::{Bound, ContactError, ContactProblem, Kkt, elastic::ElasticSolver},
     petsc::{Session, Vector},
@@ -198,6 +199,11 @@ impl<'s> PenaltyDuality<'s> {
 impl ContactSolver for PenaltyDuality<'_> {
     fn name(&self) -> &'static str {
         ENTRY.name
+    }
+
+    fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
+        archive.value(&mut self.omega)?;
+        self.elastic.archive(archive)
     }
 
     fn solve(

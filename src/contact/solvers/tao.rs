@@ -2,6 +2,7 @@
 
 use super::{ContactReport, ContactSolver, SolverEntry};
 use crate::{
+    archive::{Archive, ArchiveError},
     cholesky::{Factor, Precision},
     contact::{Bound, ContactError, ContactProblem, Kkt},
     petsc::{BoundedQuadratic, Matrix, PetscError, Session, TaoReport, Vector},
@@ -122,6 +123,10 @@ impl ContactSolver for Tao<'_> {
 
     fn set_warm_start(&mut self, kept: &[f64]) {
         self.displacement = kept.first().copied().unwrap_or(0.0);
+    }
+
+    fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
+        self.factor.archive(archive)
     }
 
     fn solve(

@@ -4,6 +4,7 @@ use crate::{
     contact::{Bound, Constraints},
     evolution::discrete_problem::LoadCase,
 };
+use serde::{Deserialize, Serialize};
 
 /// A rigid motion of each piece of the body, from which displacements are measured.
 ///
@@ -11,7 +12,7 @@ use crate::{
 /// a small part of the way that it goes, and u in double precision has no digits left for that part.
 /// Measured from the end of the way it has all of them. A rigid motion causes no forces, so (26)
 /// holds for the rest of u as it stands, with gaps and prescribed values less the motion.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Datum {
     /// Its nodal displacements, m; empty while they are zero.
     pub(super) field: Vec<f64>,

@@ -2,6 +2,7 @@
 
 use super::PlannedStep;
 use crate::{
+    archive::{Archive, ArchiveError},
     evolution::{DiscreteProblem, loads::LoadCurve},
     fem::Body,
     scene::Stepping,
@@ -64,6 +65,15 @@ impl<'a> ErrorControl<'a> {
             damage: 0.0,
             relative_error: 0.0,
         })
+    }
+
+    /// Saves or loads what the accepted steps have left.
+    pub(super) fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
+        self.load_curve.iter_mut().try_for_each(|curve| curve.archive(archive))?;
+        archive.value(&mut self.next_length)?;
+        archive.value(&mut self.truncation)?;
+        archive.value(&mut self.damage)?;
+        archive.value(&mut self.relative_error)
     }
 
     /// The end and the length, s, of the step from `start`, which follows the loads if one can;

@@ -18,7 +18,10 @@ use super::{
     BoundViolation, DiscreteProblem, RunError, Step, StepFailure, Stop,
     damage_step::{DamageSource, DamageStep, DamageUpdate},
 };
-use crate::scene::{Scheme, Stepping};
+use crate::{
+    archive::{Archive, ArchiveError},
+    scene::{Scheme, Stepping},
+};
 use error_control::ErrorControl;
 use nalgebra::DVector;
 
@@ -121,6 +124,23 @@ impl<'a> StepController<'a> {
             bounds: problem.body.vertices.partition.min_max(zeta),
             violation: BoundViolation::default(),
         }
+    }
+
+    /// Saves or loads what it knows of the accepted steps.
+    pub(super) fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
+        self.chosen.iter_mut().try_for_each(|chosen| chosen.archive(archive))?;
+        archive.value(&mut self.length)?;
+        for field in [&mut self.zeta, &mut self.change, &mut self.load_change] {
+            archive.value(field)?;
+        }
+        archive.value(&mut self.rate)?;
+        archive.value(&mut self.source)?;
+        for field in [&mut self.delay, &mut self.error, &mut self.last_error] {
+            archive.value(field)?;
+        }
+        archive.value(&mut self.not_grown)?;
+        archive.value(&mut self.bounds)?;
+        archive.value(&mut self.violation)
     }
 
     /// The step after the accepted one `last`; `None` at the end of time.

@@ -24,13 +24,20 @@ use std::{fs, path::Path};
 /// # Errors
 /// The file cannot be read, or it is not the mesh of a plane body; the message says where.
 pub fn read(path: &Path) -> std::result::Result<Mesh, MeshError> {
-    let bytes = fs::read(path).map_err(MeshError::io(path))?;
+    parse(&fs::read(path).map_err(MeshError::io(path))?, path)
+}
+
+/// As [`read`], from the bytes of a file that would stand at `path`.
+///
+/// # Errors
+/// As [`read`], but for the reading itself.
+pub fn parse(bytes: &[u8], path: &Path) -> std::result::Result<Mesh, MeshError> {
     let mut sections = Vec::new();
-    let mesh = Section::split(&bytes, &mut sections)
+    let mesh = Section::split(bytes, &mut sections)
         .and_then(|()| contents(&sections))
         .and_then(|contents| body::mesh(&contents));
     mesh.map_err(|(at, problem)| {
-        let place = at.map_or_else(String::new, |at| place(at, &bytes, &sections));
+        let place = at.map_or_else(String::new, |at| place(at, bytes, &sections));
         MeshError::File { path: path.to_owned(), place, problem }
     })
 }

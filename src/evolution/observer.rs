@@ -1,0 +1,76 @@
+//! Whoever is shown the accepted steps of a run, and how the run goes on.
+
+use super::Step;
+use crate::{archive::Archive, interrupt::Signal};
+
+/// The answer of an observer: an error ends the run.
+pub type Observed<T = ()> = Result<T, Box<dyn std::error::Error + Send + Sync>>;
+
+/// How a run goes on behind an accepted step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Next {
+    /// With the next step.
+    Step,
+    /// With a checkpoint, then the next step.
+    Checkpoint,
+    /// It ends with a checkpoint, because this signal has come.
+    End(Signal),
+}
+
+impl Next {
+    /// Of what several ranks want the most urgent is done. Signals have numbers above 1.
+    pub(super) fn urgency(self) -> f64 {
+        match self {
+            Self::Step => 0.0,
+            Self::Checkpoint => 1.0,
+            Self::End(Signal(number)) => f64::from(number),
+        }
+    }
+
+    pub(super) fn of_urgency(urgency: f64) -> Self {
+        match urgency as i32 {
+            0 => Self::Step,
+            1 => Self::Checkpoint,
+            number => Self::End(Signal(number)),
+        }
+    }
+}
+
+/// Is shown the accepted steps of a run on its rank. Every function is called on all ranks.
+pub trait Observer {
+    /// Sees an accepted step and says how to go on.
+    ///
+    /// # Errors
+    /// The run is to end.
+    fn accept(&mut self, step: &Step) -> Observed<Next>;
+
+    /// Saves what a checkpoint needs of the observer, or goes back to it; `last` is the last accepted
+    /// step.
+    ///
+    /// # Errors
+    /// The archive is of another observer, or what it tells of is gone.
+    fn archive(&mut self, last: &Step, archive: &mut Archive) -> Observed;
+
+    /// Keeps a checkpoint.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    fn keep(&mut self, last: &Step, archive: Archive) -> Observed;
+}
+
+/// Who only looks.
+pub(super) struct Shown<'a>(pub(super) &'a mut dyn FnMut(&Step) -> Observed);
+
+impl Observer for Shown<'_> {
+    fn accept(&mut self, step: &Step) -> Observed<Next> {
+        (self.0)(step).map(|()| Next::Step)
+    }
+
+    fn archive(&mut self, _last: &Step, _archive: &mut Archive) -> Observed {
+        Ok(())
+    }
+
+    fn keep(&mut self, _last: &Step, _archive: Archive) -> Observed {
+        Ok(())
+    }
+}

@@ -1,0 +1,147 @@
+//! Checkpoints and restarts: the same results bit by bit, whenever a run ends and however.
+
+use crate::{
+    losses::{ENDLESS, signal, wait_for},
+    test_directory::{ProgramOutput, TestDirectory},
+};
+use std::{
+    collections::BTreeMap,
+    fs,
+    process::{Child, Stdio},
+    thread::sleep,
+    time::{Duration, Instant},
+};
+
+/// A run of some seconds with a checkpoint after every step, or nearly so.
+const LONG: [&str; 6] =
+    ["--set", "time.step=2e-3", "--set", "output.checkpoint=1e-9", "--set", "output.every=50"];
+
+fn start(directory: &TestDirectory, out: &str, arguments: &[&str]) -> Child {
+    let arguments = [&["run", "scene.toml", "--out", out], arguments].concat();
+    let mut command = directory.command(&arguments);
+    command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program starts")
+}
+
+/// The content of all files, without what tells how long the run took and when it was.
+fn results(directory: &TestDirectory, folder: &str) -> BTreeMap<String, String> {
+    let content = |name: &String| match name.as_str() {
+        "summary.json" => {
+            let mut summary = directory.summary(folder);
+            let entries = summary.as_object_mut().expect("a table");
+            for name in ["wall_seconds", "seconds_per_step", "phases", "provenance"] {
+                entries.remove(name);
+            }
+            summary.to_string()
+        }
+        "history.csv" => {
+            let (names, mut rows) = directory.history(folder);
+            let seconds = names.iter().position(|name| name == "seconds").expect("the column");
+            rows.iter_mut().for_each(|row| row[seconds] = 0.0);
+            format!("{rows:?}")
+        }
+        file => directory.read(&format!("{folder}/{file}")),
+    };
+    directory.names(folder).into_iter().map(|name| (name.clone(), content(&name))).collect()
+}
+
+/// Waits until a run that lives has a checkpoint behind the `step`.
+#[track_caller]
+fn wait_for_step(directory: &TestDirectory, folder: &str, step: usize) {
+    wait_for(directory, folder);
+    let started = Instant::now();
+    let steps = |name: &String| name.strip_prefix("checkpoint_")?.split('_').next()?.parse().ok();
+    while directory.names(folder).iter().filter_map(steps).max() < Some(step) {
+        assert!(started.elapsed() < Duration::from_secs(60), "step {step} is not reached");
+        sleep(Duration::from_millis(2));
+    }
+}
+
+#[test]
+fn a_killed_run_goes_on_as_if_it_had_not_been() {
+    for solver in ["active-set", "penalty-duality", "tao"] {
+        let directory = TestDirectory::new();
+        let arguments = [&LONG[..], &["--solver", solver]].concat();
+        directory.run(&[&arguments[..], &["--out", "whole"]].concat());
+        let expected = results(&directory, "whole");
+        assert!(expected.keys().all(|name| !name.starts_with("checkpoint")), "it is of no use now");
+
+        let mut run = start(&directory, "killed", &arguments);
+        for step in [120, 330] {
+            wait_for_step(&directory, "killed", step);
+            run.kill().expect("it lives");
+            run.wait().expect("it ends");
+            directory.frames("killed").iter().for_each(|(_, file)| {
+                assert!(directory.path(&format!("killed/{file}")).exists(), "{file}");
+            });
+            run = start(&directory, "killed", &[&arguments[..], &["--restart"]].concat());
+        }
+        assert_eq!(run.wait().expect("it ends").code(), Some(0));
+        assert!(results(&directory, "killed") == expected, "{solver}");
+    }
+}
+
+#[test]
+fn a_signal_ends_a_run_behind_a_step() {
+    for (name, code) in [("INT", 130), ("TERM", 143)] {
+        let directory = TestDirectory::new();
+        let out = fs::File::create(directory.path("said")).expect("mine");
+        let errors = out.try_clone().expect("mine");
+        let mut command = directory.command(&ENDLESS);
+        let mut run = command.stdout(out).stderr(errors).spawn().expect("the program starts");
+        wait_for(&directory, "out/scene/fields.pvd");
+        signal(&run, name);
+        assert_eq!(run.wait().expect("it ends").code(), Some(code));
+        let said = directory.read("said");
+        assert!(said.contains(&format!("error: ended by SIG{name}; --restart goes on")), "{said}");
+        let (steps, rows) =
+            (directory.summary("out/scene")["steps"].clone(), directory.history("out/scene").1);
+        assert_eq!(steps, rows.len() - 1, "the summary tells the last row");
+        let (last, _) = directory.frames("out/scene").pop().expect("frames");
+        let end = directory.summary("out/scene")["end_time"].as_f64().expect("a time");
+        assert!((end - last).abs() < 1e-12, "the last state is saved");
+        assert!(directory.path(&format!("out/scene/checkpoint_{steps}_0")).exists());
+    }
+}
+
+#[test]
+fn what_is_no_checkpoint_of_this_run_is_refused() {
+    let directory = TestDirectory::new();
+    // There is none: the run begins.
+    directory.run(&["--set", "time.end=0.1", "--restart"]);
+    let mut run = start(&directory, "out", &LONG);
+    wait_for_step(&directory, "out", 10);
+    signal(&run, "TERM");
+    run.wait().expect("it ends");
+    let file = directory.names("out").into_iter().find(|name| name.starts_with("checkpoint"));
+    let path = directory.path(&format!("out/{}", file.expect("a checkpoint")));
+    let restart = |more: &[&str], fragment: &str| {
+        let arguments = ["run", "scene.toml", "--out", "out", "--restart"];
+        let before = directory.everything();
+        let said = directory.say(&[&arguments, &LONG[..], more].concat());
+        said.fails(2, &["cannot restart from out/checkpoint_", fragment, "without --restart"]);
+        assert!(directory.everything() == before, "nothing is touched");
+    };
+    restart(&["--set", "material.young=81"], "the scene, --set or PETSc's options are others");
+    let mesh = directory.read("square.msh");
+    directory.write("square.msh", &mesh.replace("0.25 0.25 0\n", "0.26 0.25 0\n"));
+    restart(&[], "the mesh is another");
+    directory.write("square.msh", &mesh);
+    let content = fs::read(&path).expect("the checkpoint");
+    let mut damaged = content.clone();
+    damaged[content.len() / 2] ^= 4;
+    for (wrong, reason) in [
+        (&damaged[..], "it is damaged"),
+        (&content[..content.len() - 1], "it is damaged"),
+        (&content[..25], "it is cut off"),
+        (b"another file", "it is no checkpoint of this version"),
+    ] {
+        fs::write(&path, wrong).expect("mine");
+        restart(&[], reason);
+    }
+    // Nor one of results that are gone.
+    fs::write(&path, content).expect("mine");
+    directory.write("out/history.csv", "step\n");
+    let arguments = [&["run", "scene.toml", "--out", "out", "--restart"], &LONG[..]].concat();
+    ProgramOutput::of(&mut directory.command(&arguments))
+        .fails(1, &["out/history.csv", "shorter than when the checkpoint was written"]);
+}
