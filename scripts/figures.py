@@ -8,6 +8,7 @@ deformed       the deformed mesh over the initial outline (Figures 5 and 8)
 stress-damage  von Mises stress and damage (Figures 6 and 9)
 pressure       contact pressure and gap along Γ_C
 damage-history the least and the mean ζ in time, where there is damage to see
+force-displacement  the forces on the supports over the largest displacement
 
 and on request: contact-evolution, the pressure on Γ_C in time; damage and pressure as animations.
 """
@@ -20,7 +21,7 @@ import matplotlib.pyplot as plt
 
 from animation import FRAMES, MOVIES, animate
 from contact_pressure import draw_evolution, draw_pressure
-from histories import draw_damage_history
+from histories import draw_damage_history, draw_force_displacement
 from limits import box_of, limits_of
 from maps import draw_deformed, draw_stress_and_damage
 from paraview_script import write_script
@@ -34,7 +35,10 @@ FIGURES = {
     "stress-damage": draw_stress_and_damage,
     "pressure": draw_pressure,
     "damage-history": draw_damage_history,
+    "force-displacement": draw_force_displacement,
 }
+# Figures of the whole run, whatever time is asked for.
+OF_ALL_TIMES = ("damage-history", "force-displacement")
 # What pictures are saved as.
 FORMATS = ("png", "svg", "pdf")
 # Frames of the contact evolution, at most.
@@ -89,7 +93,7 @@ def draw(results, limits, arguments):
         return
     last = replace(results, time=results.frames[-1][0])
     for name, figure in FIGURES.items():
-        of = last if name == "damage-history" else results
+        of = last if name in OF_ALL_TIMES else results
         save(figure(results, limits), of, name, arguments.format)
     if arguments.evolution:
         stride = 1 + len(results.frames) // EVOLUTION

@@ -30,6 +30,28 @@ def draw_damage_history(results, _limits=None):
     return figure
 
 
+def draw_force_displacement(results, _limits=None):
+    """The length of the resultant of each supporting boundary over the largest displacement."""
+    history = results.history
+    supports = [name.removesuffix(".force_x") for name in history if name.endswith(".force_x")]
+    forces = {name: np.hypot(history[f"{name}.force_x"], history[f"{name}.force_y"])
+              for name in supports}
+    largest = max((np.nanmax(force, initial=0.0) for force in forces.values()), default=0.0)
+    if largest <= 0.0 or len(history["time"]) < 3:
+        return None
+    figure, axes = plt.subplots(figsize=(6.4, 3.8))
+    for name, force in forces.items():
+        if np.nanmax(force) > ROUNDING * largest:
+            axes.plot(history["displacement_max"], force, linewidth=1.6, label=name)
+    axes.set_xlim(left=0.0)
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlabel("largest displacement ({length})".format(**results.units))
+    axes.set_ylabel("force on the support ({line})".format(**results.units))
+    axes.set_title(headline(results, ""))
+    axes.legend(loc="best")
+    return figure
+
+
 # Panels of the figure of all histories: title, columns with their names, whether logarithmic.
 PANELS = (
     ("largest displacement ({length})", {"displacement_max": ""}, False),

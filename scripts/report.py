@@ -18,7 +18,7 @@ from string import Template
 import matplotlib.pyplot as plt
 
 from contact_pressure import draw_evolution, draw_pressure
-from histories import draw_damage_history, draw_histories
+from histories import draw_damage_history, draw_force_displacement, draw_histories
 from limits import limits_of
 from maps import draw_deformed, draw_state, draw_stress_and_damage
 from reading import evenly, read_results, states
@@ -154,6 +154,7 @@ def page(results):
         ]),
         histories="".join([
             picture(draw_damage_history(results), "least and mean ζ"),
+            picture(draw_force_displacement(results), "forces on the supports"),
             picture(draw_evolution(everything, limits_of(everything)), "evolution of contact"),
             picture(draw_histories(results), "histories"),
         ]) or "One static solve.",

@@ -83,7 +83,8 @@ const FILES: [&str; 7] = [
     "open_in_paraview.py",
 ];
 /// The pictures of a run.
-const PICTURES: [&str; 7] = [
+const PICTURES: [&str; 8] = [
+    "force-displacement",
     "setting",
     "deformed",
     "stress-damage",
