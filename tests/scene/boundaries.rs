@@ -61,7 +61,6 @@ fn every_rule_names_file_line_and_boundary() {
             "symmetry = true\ngap = 0",
             &["bad.toml:39: boundary \"axis\" has a symmetry and a gap"],
         ),
-        ("x^2", "x^2 + t", &["bad.toml:36: boundary \"foundation\": gap depends on t"]),
         ("gap = \"x^2\"\n", "", &["bad.toml:36: boundary \"foundation\": normal needs a gap"]),
         (
             "[\"3\", \"-4\"]",

@@ -63,7 +63,7 @@ fn a_bad_set_is_named() {
             "boundary.load.gaap=0",
             ["--set boundary.load.gaap=0: unknown key boundary \"load\": gaap", "mean `gap`"],
         ),
-        ("boundary.load.gap=t", ["--set boundary.load.gap=t: boundary \"load\": gap", "on t"]),
+        ("damage.initial=t", ["--set damage.initial=t: damage.initial depends", "on t"]),
         ("boundary.load=3", ["boundary.load needs a key", "boundary.NAME.KEY=VALUE"]),
         ("boundary=3", ["--set boundary=3: boundary must be an array", "--set boundary=3"]),
         (
