@@ -1,6 +1,8 @@
 //! `signorini compare`: all contact solvers on the same scenes.
 
-use super::{Failure, SOLVERS, check_petsc, check_solver, ranks::require_one_process, read};
+use super::{
+    Failure, SOLVERS, check_petsc, check_solver, ranks::require_one_process, read, run::adapt,
+};
 use clap::Args;
 use serde::Serialize;
 use signorini::{
@@ -40,9 +42,13 @@ pub fn compare(arguments: &CompareArguments) -> Result<(), Failure> {
     require_one_process()?;
     arguments.solvers.iter().try_for_each(|name| check_solver("--solvers", name))?;
     check_petsc(&arguments.petsc)?;
+    let session = Session::start(&arguments.petsc)?;
     let mut problems: Vec<DiscreteProblem> = Vec::new();
     for path in &arguments.scenes {
-        let (mut scene, mesh) = read(path, None, &arguments.set, false)?;
+        let (mut scene, mesh) = read(path, None, &arguments.set, true)?;
+        // All solvers run on the mesh that the first one adapts.
+        let adapted = adapt(&session, &mut scene, &mesh, &arguments.solvers[0], None)?;
+        let mesh = adapted.map_or(mesh, |adapted| adapted.mesh);
         scene.contact.rescue = false;
         if let Some(other) = problems.iter().find(|other| other.scene().name == scene.name) {
             return Err(Failure::input(format!(
@@ -55,7 +61,6 @@ pub fn compare(arguments: &CompareArguments) -> Result<(), Failure> {
     }
     output::create(&arguments.out).map_err(Failure::input)?;
 
-    let session = Session::start(&arguments.petsc)?;
     let mut entries = Vec::new();
     for problem in &problems {
         entries.extend(compare_solvers(&session, problem, &arguments.solvers)?);

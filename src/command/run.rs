@@ -6,7 +6,7 @@ use super::{
     ranks::{agree, barrier_or_abort},
     read,
     recorder::Recorder,
-    summaries, tell,
+    screen, summaries, tell,
 };
 use clap::Args;
 use signorini::{
@@ -79,7 +79,7 @@ impl RunArguments {
 
 /// Where the scene asks for an accuracy, a mesh that has it, or the one `made` in the run that goes on,
 /// and steps for it in the scene. Collective.
-fn adapt(
+pub(super) fn adapt(
     session: &Session,
     scene: &mut Scene,
     mesh: &Mesh,
@@ -87,7 +87,13 @@ fn adapt(
     made: Option<Adapted>,
 ) -> Result<Option<Adapted>, Failure> {
     let Some(accuracy) = scene.accuracy else { return Ok(None) };
-    let adapt = || evolution::adapted(session, scene, mesh.clone(), solver, accuracy);
+    let is_root = session.comm().is_root();
+    let mut show = |mesh: &Adapted| {
+        if is_root {
+            screen::adapting(mesh, accuracy);
+        }
+    };
+    let adapt = || evolution::adapted(session, scene, mesh.clone(), solver, accuracy, &mut show);
     let adapted = made.map_or_else(adapt, Ok);
     let adapted = adapted.map_err(|error| match error {
         AdaptError::Setup(_) => Failure::input(error),
@@ -98,7 +104,10 @@ fn adapt(
     }
     let (order, triangles) = (scene.order, adapted.mesh.triangles.len());
     let degree = if order == Order::Quadratic { 2 } else { 1 };
-    let reached = if adapted.exhausted { "NOT reached" } else { "reached" };
+    let reached = match &adapted.short {
+        Some(reason) => format!("NOT reached ({reason})"),
+        None => "reached".to_owned(),
+    };
     scene.notes.push(format!(
         "accuracy {accuracy} {reached}: P{degree} on {triangles} triangles, mesh {} of those tried \
          (kept as mesh.msh)",

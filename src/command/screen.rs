@@ -2,10 +2,11 @@
 
 use super::run::Task;
 use signorini::{
-    evolution::{Outcome, StepRecord},
+    evolution::{Adapted, Outcome, StepRecord},
     output::terminal::{Progress, say},
     scene::{Scheme, Stepping, TimeGrid},
 };
+use std::io::{self, IsTerminal, Write};
 
 /// A component below this part of its force is shown as zero.
 const ROUNDING: f64 = 1e-9;
@@ -31,6 +32,23 @@ pub fn open(task: &Task) -> Progress {
     let mut progress = Progress::new("{bar:20} {wide_msg} {elapsed}, {eta} left", LENGTH);
     progress.show(0, "the first solve".to_owned());
     progress
+}
+
+/// Shows on a terminal a mesh that was tried for an accuracy, with its errors.
+pub fn adapting(mesh: &Adapted, accuracy: f64) {
+    if !io::stderr().is_terminal() {
+        return;
+    }
+    let percent = |error: f64| format!("{:.2} %", 100.0 * error);
+    let of_damage = mesh.damage_error.map_or(String::new(), |e| format!(", damage {}", percent(e)));
+    let (rounds, triangles, unknowns) = (mesh.rounds, mesh.mesh.triangles.len(), mesh.unknowns);
+    let _ = writeln!(
+        io::stderr(),
+        "  adapting      mesh {rounds}: {triangles} triangles, {unknowns} unknowns, error of u {}{of_damage} \
+         (accuracy {})",
+        percent(mesh.error),
+        percent(accuracy)
+    );
 }
 
 /// Shows an accepted step of a run to t = `end`.

@@ -25,6 +25,8 @@ use std::collections::HashSet;
 pub struct Adapted {
     /// The mesh.
     pub mesh: Mesh,
+    /// Displacement components at its nodes.
+    pub unknowns: usize,
     /// Runs that were made on meshes before it.
     pub rounds: usize,
     /// The estimated relative error of u on it, in the energy norm, at the worst time.
@@ -33,8 +35,8 @@ pub struct Adapted {
     pub damage_error: Option<f64>,
     /// By how much the time at which ζ_* is reached changed from the mesh before to this one, s.
     pub stop_change: Option<f64>,
-    /// The target was not reached: the mesh has become as large as is allowed.
-    pub exhausted: bool,
+    /// Why the accuracy was not reached, if it was not.
+    pub short: Option<String>,
 }
 
 /// Why no mesh was found.
@@ -46,9 +48,19 @@ pub enum AdaptError {
     /// A triangle cannot be divided.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// A run on a coarse mesh failed.
-    #[error("on an adapted mesh: {0}")]
-    Run(#[from] RunError),
+    /// A run on a mesh that was tried failed.
+    #[error(
+        "mesh {rounds} of those tried for the accuracy, of {triangles} triangles: {source} (a run of the \
+         same scene without `accuracy` keeps its results up to there)"
+    )]
+    Run {
+        /// The number of the mesh.
+        rounds: usize,
+        /// Its triangles.
+        triangles: usize,
+        /// What failed.
+        source: RunError,
+    },
     /// PETSc failed.
     #[error(transparent)]
     Petsc(#[from] PetscError),
@@ -82,7 +94,8 @@ const MOST_TRIANGLES: usize = 4_000_000;
 
 /// Refines `mesh` until the estimated relative errors of u and the damage in a run of `scene` are at most
 /// `accuracy`; where the run ends at ζ_*, those of u and of that time. What the time steps add is for the
-/// caller. Collective: all ranks have the same mesh.
+/// caller. `seen` is shown each mesh with its errors. Where a run on a refined mesh fails, the mesh before
+/// it is the answer. Collective: all ranks have the same mesh.
 ///
 /// # Errors
 /// See [`AdaptError`].
@@ -92,6 +105,27 @@ pub fn adapted(
     mesh: Mesh,
     solver: &str,
     accuracy: f64,
+    seen: &mut dyn FnMut(&Adapted),
+) -> Result<Adapted, AdaptError> {
+    let mut reached = None;
+    let refined = refined(session, scene, mesh, solver, accuracy, &mut |mesh| {
+        seen(mesh);
+        reached = Some(mesh.clone());
+    });
+    match (refined, reached) {
+        (Err(error), Some(before)) => Ok(Adapted { short: Some(error.to_string()), ..before }),
+        (refined, _) => refined,
+    }
+}
+
+/// The same, without an answer where a run fails.
+fn refined(
+    session: &Session,
+    scene: &Scene,
+    mesh: Mesh,
+    solver: &str,
+    accuracy: f64,
+    seen: &mut dyn FnMut(&Adapted),
 ) -> Result<Adapted, AdaptError> {
     let mut scene = scene.clone();
     if let Some(grid) = &mut scene.time {
@@ -104,10 +138,12 @@ pub fn adapted(
     for rounds in 1.. {
         let problem = DiscreteProblem::new(scene.clone(), refinement.mesh.clone())?;
         let problem = problem.restrict(session)?;
-        let mut indicators = Indicators::new(&problem, refinement.mesh.triangles.len());
+        let triangles = refinement.mesh.triangles.len();
+        let mut indicators = Indicators::new(&problem, triangles);
         let outcome = run(session, &problem, solver, &Phases::default(), &mut |step| {
             Ok(indicators.observe(&step.state, false)?)
-        })?;
+        });
+        let outcome = outcome.map_err(|source| AdaptError::Run { rounds, triangles, source })?;
         if let (Some(grid), Some(_)) = (&mut scene.time, outcome.stopped)
             && matches!(grid.stepping, Stepping::Uniform { .. })
         {
@@ -126,15 +162,23 @@ pub fn adapted(
         let is_settled = is_settled(&outcome, stopped_before, accuracy);
         settled_rounds = if is_settled { settled_rounds + 1 } else { 0 };
         let settled = settled_rounds >= if outcome.stopped.is_some() { 2 } else { 1 };
-        let exhausted = rounds >= ROUNDS || refinement.mesh.triangles.len() > MOST_TRIANGLES;
+        let exhausted = rounds >= ROUNDS || triangles > MOST_TRIANGLES;
+        let times = outcome.stopped.map(|stop| stop.time).zip(stopped_before);
+        let adapted = Adapted {
+            mesh: refinement.mesh.clone(),
+            unknowns: 2 * problem.body.nodes.partition.total(),
+            rounds,
+            error,
+            damage_error,
+            stop_change: times.map(|(now, before): (f64, f64)| (now - before).abs()),
+            short: exhausted.then(|| "no larger mesh and no further one is tried".to_owned()),
+        };
+        seen(&adapted);
         let largest = error.max(damage_error.unwrap_or(0.0));
         let displacement = outcome.last.record.displacement_max.max(indicators.displacement);
         let coarse = unresolved(&scene, &refinement.mesh, accuracy, displacement);
         if exhausted || (largest <= ENOUGH * accuracy && settled && coarse.is_empty()) {
-            let times = outcome.stopped.map(|stop| stop.time).zip(stopped_before);
-            let stop_change = times.map(|(now, before): (f64, f64)| (now - before).abs());
-            let mesh = refinement.mesh;
-            return Ok(Adapted { mesh, rounds, error, damage_error, stop_change, exhausted });
+            return Ok(adapted);
         }
         let of_u = accuracy_of_u(accuracy, error, damage_error, settled);
         let mut ratios = size_ratios(&shares, order, AIM * of_u);

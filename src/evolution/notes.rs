@@ -163,6 +163,11 @@ impl DiscreteProblem {
                  take discretisation.displacement = 2"
             ));
         }
+        if linear && self.body.nodes.partition.comm().any(!self.body.mesh.curved.is_empty()) {
+            let note = "the mesh's curved sides count as straight: discretisation.displacement = 2 would \
+                        follow them";
+            notes.push(note.to_owned());
+        }
         notes.extend(self.sliver());
         notes
     }

@@ -122,7 +122,9 @@ impl SceneText {
         let mut problems = Vec::new();
         for argument in &self.arguments {
             let put = match DeTable::parse(argument) {
-                Ok(given) if argument.contains('=') => put_all(&mut root, given.into_inner(), ""),
+                Ok(given) if argument.contains('=') => {
+                    put_all(&mut root, given.into_inner(), "", argument)
+                }
                 _ => Err(misshapen(argument)),
             };
             let start = argument.len() - argument.trim_start_matches(' ').len();
@@ -161,15 +163,26 @@ fn misshapen(argument: &str) -> String {
     format!("{problem}; write --set KEY=VALUE, for example --set time.step=0.005")
 }
 
-/// Puts the values that are `given` in the place of those in the table whose key is `prefix`.
-/// Tables are merged.
-fn put_all<'t>(old: &mut DeTable<'t>, given: DeTable<'t>, prefix: &str) -> Result<(), String> {
+/// Puts the values that are `given` by an `argument` in the place of those in the table whose key is
+/// `prefix`. Dotted keys reach into tables; a table in braces takes the place of the old one.
+fn put_all<'t>(
+    old: &mut DeTable<'t>,
+    given: DeTable<'t>,
+    prefix: &str,
+    argument: &str,
+) -> Result<(), String> {
     for (name, value) in given {
         let prefix = format!("{prefix}{}.", name.get_ref());
         let span = value.span();
-        match (old.get_mut(&name).map(Spanned::get_mut), value.into_inner()) {
-            (Some(DeValue::Table(old)), DeValue::Table(given)) => put_all(old, given, &prefix)?,
-            (Some(DeValue::Array(old)), DeValue::Table(given)) => put_named(old, given, &prefix)?,
+        let old_value = old.get_mut(&name).map(Spanned::get_mut);
+        let braced = argument[span.start..].starts_with('{');
+        match (old_value.filter(|_| !braced), value.into_inner()) {
+            (Some(DeValue::Table(old)), DeValue::Table(given)) => {
+                put_all(old, given, &prefix, argument)?;
+            }
+            (Some(DeValue::Array(old)), DeValue::Table(given)) => {
+                put_named(old, given, &prefix, argument)?;
+            }
             (_, value) => {
                 // The old key would tell where the old value was written.
                 old.remove(&name);
@@ -181,14 +194,19 @@ fn put_all<'t>(old: &mut DeTable<'t>, given: DeTable<'t>, prefix: &str) -> Resul
 }
 
 /// Reaches into an array of tables by their names.
-fn put_named<'t>(old: &mut DeArray<'t>, given: DeTable<'t>, prefix: &str) -> Result<(), String> {
+fn put_named<'t>(
+    old: &mut DeArray<'t>,
+    given: DeTable<'t>,
+    prefix: &str,
+    argument: &str,
+) -> Result<(), String> {
     for (name, value) in given {
         let name = name.get_ref();
         let table = old.iter_mut().map(Spanned::get_mut).find(|old| name_of(old) == Some(name));
         let key = format!("{prefix}{name}");
         match (table, value.into_inner()) {
             (Some(DeValue::Table(old)), DeValue::Table(given)) => {
-                put_all(old, given, &format!("{key}."))?;
+                put_all(old, given, &format!("{key}."), argument)?;
             }
             (Some(_), _) => {
                 return Err(format!("{key} needs a key; write --set boundary.NAME.KEY=VALUE"));

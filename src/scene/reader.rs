@@ -326,9 +326,18 @@ impl<'d> Value<'d> {
     ) -> Reading<T> {
         let entries = self.entries(separator)?;
         let mut table = Table { value: self, separator, entries, known: vec![] };
+        let problems = &self.findings.problems;
+        let earlier = problems.borrow().len();
         let result = read(&mut table);
+        let suggest = |name: &&str| suggestion(name, &table.known);
+        if table.entries.keys().any(|name| suggest(name).contains("did you mean")) {
+            // What the table lacks is what was misspelt.
+            let own = problems.borrow_mut().split_off(earlier);
+            let others = own.into_iter().filter(|(place, _)| *place != self.place);
+            problems.borrow_mut().extend(others);
+        }
         for (name, value) in &table.entries {
-            value.note(format!("unknown key {}{}", value.key, suggestion(name, &table.known)));
+            value.note(format!("unknown key {}{}", value.key, suggest(name)));
         }
         result
     }

@@ -339,10 +339,15 @@ fn the_solvers_are_listed_with_what_they_do() {
 }
 
 #[test]
-fn solvers_are_compared_with_quadratic_displacements() {
+fn solvers_are_compared_at_order_2_and_on_the_mesh_of_an_accuracy() {
+    compared("discretisation.displacement=2");
+    compared("accuracy=0.2");
+}
+
+/// All solvers agree on the scene with a key overridden.
+fn compared(key: &str) {
     let test_directory = TestDirectory::new();
-    let quadratic = ["--set", "discretisation.displacement=2"];
-    let said = test_directory.say(&[&["compare", "scene.toml"], &quadratic[..]].concat());
+    let said = test_directory.say(&["compare", "scene.toml", "--set", key]);
     assert_eq!((said.code, said.err.as_str()), (Some(0), ""), "{said:?}");
     let table = test_directory.read("out/compare/comparison.csv");
     let mut reader = csv::Reader::from_reader(table.as_bytes());
@@ -356,5 +361,7 @@ fn solvers_are_compared_with_quadratic_displacements() {
             assert!(value < 1e-8, "{difference}: {value}");
         }
         assert_eq!(value("error"), "");
+        // The scene has 10 steps; an accuracy chooses others.
+        assert_eq!(value("steps") == "10", key != "accuracy=0.2", "{key}: {row:?}");
     }
 }

@@ -1,6 +1,6 @@
 //! What is told of an answer, or refused, besides its residuals.
 
-use crate::support::{problem, run, square};
+use crate::support::{bent, problem, run, square};
 use signorini::{
     contact::{SOLVERS, SolverError},
     evolution::{self, DiscreteProblem, Phases, RunError, SetupError},
@@ -64,6 +64,20 @@ fn a_traction_narrower_than_the_edges_is_noted() {
     );
     let notes = problem(square(4), &text).unwrap().notes();
     assert!(notes.len() == 1 && notes[0].contains(" N/m at t = "), "{notes:?}");
+}
+
+#[test]
+fn curved_sides_that_order_1_does_not_follow_are_noted() {
+    for (order, told) in [(1, true), (2, false)] {
+        let text = format!(
+            "discretisation.displacement = {order}\n{MATERIAL}\n\
+             boundary = [{{ name = 'left', displacement = [0, 0] }}]"
+        );
+        let mesh = bent(&square(2), |[x, y]| [x, y + 0.1 * x * x]);
+        let notes = problem(mesh, &text).unwrap_or_else(|e| panic!("{e}")).notes();
+        let noted = notes.iter().any(|note| note.contains("curved sides count as straight"));
+        assert_eq!(noted, told, "{notes:?}");
+    }
 }
 
 #[test]

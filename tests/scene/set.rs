@@ -18,19 +18,21 @@ fn set_replaces_adds_and_reaches_boundaries_by_name() {
     let scene = with(&[
         "time.step=0.005",
         "material.plane=strain",
-        "mesh.parameters.grading=4",
-        "mesh.parameters.radius = 2",
         "damage.initial=1-0.2*y",
         "boundary.load.traction=[\"0\", \"-40*t\"]",
         "boundary.\"clamp\".displacement=['free', 0.5]",
         "title=Another, with blanks",
         "time.step=0.05",
+        "mesh={file='other.geo'}",
+        "mesh.parameters.grading=4",
+        "mesh.parameters.radius = 2",
     ])
     .unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(scene.time, Some(TimeGrid::uniform(1.0, 0.05)), "the last one holds");
     assert_eq!(scene.material.plane, Plane::Strain);
-    assert_eq!(scene.mesh.parameters["grading"], 4.0);
-    assert_eq!(scene.mesh.parameters["radius"], 2.0);
+    // A table in braces takes the place of the old one, dotted keys add to it.
+    let parameters = [("grading", 4.0), ("radius", 2.0)].map(|(name, v)| (name.to_owned(), v));
+    assert_eq!(scene.mesh.parameters, parameters.into());
     assert_eq!(scene.damage.expect("given").initial.eval(0.0, 1.0, 0.0), 0.8);
     assert_eq!(scene.title, "Another, with blanks");
     let [_, y] = traction(&scene.boundaries[1]);
