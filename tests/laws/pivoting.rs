@@ -126,7 +126,7 @@ fn cycling() -> Small {
 }
 
 #[test]
-fn single_pivots_end_where_block_pivots_cycle() {
+fn the_set_that_begins_again_ends_where_block_pivots_cycle() {
     let small = cycling();
     let exact = small.enumerate();
     let mut left_the_fast_path = 0;
@@ -136,8 +136,8 @@ fn single_pivots_end_where_block_pivots_cycle() {
         c.iter().zip(&exact).for_each(|(c, e)| close(*c, *e, 1e-9));
         assert_eq!(report.fallbacks > 0, small.cycles(guess.map(|on| on == 1.0)), "{guess:?}");
         left_the_fast_path += usize::from(report.fallbacks > 0);
-        // A first block pivot, and five that have not made the violating indices fewer.
-        assert!(report.fallbacks == 0 || report.iterations >= 8, "{report:?}");
+        // A first block pivot, five that have not made the violating indices fewer, the empty set.
+        assert!(report.fallbacks == 0 || report.iterations >= 7, "{report:?}");
     }
     assert!(left_the_fast_path > 0);
 }

@@ -106,7 +106,8 @@ fn the_pressure_under_a_punch_comes_at_the_rate_of_smooth_solutions() {
     let (mut unknowns, mut strains, mut pressures) = (Vec::new(), Vec::new(), Vec::new());
     for accuracy in [0.03, 0.01, 3e-3, 1e-3] {
         let session = Session::start(&[]).unwrap();
-        let found = evolution::adapted(&session, &exact.scene(), mesh(), SOLVERS[0], accuracy);
+        let found =
+            evolution::adapted(&session, &exact.scene(), mesh(), SOLVERS[0], accuracy, &mut |_| {});
         let mesh = found.unwrap_or_else(|error| panic!("{error}")).mesh;
         drop(session);
         let problem = DiscreteProblem::new(exact.scene(), mesh).unwrap();

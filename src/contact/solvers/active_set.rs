@@ -30,9 +30,11 @@ pub(super) const ENTRY: SolverEntry = SolverEntry {
 /// Kunisch, SIAM J. Optim. 13, 2003: a semismooth Newton method). The active set of the last step
 /// is the first of this one.
 ///
-/// Pivoting on all violating indices may return to an earlier set. Where their number has not fallen
-/// for a few times, only the last of them is pivoted on until it has (block principal pivoting, Júdice
-/// and Pires, Comput. Oper. Res. 21, 1994, with Murty's rule, finite for positive definite K). Where K
+/// Pivoting on all violating indices may return to an earlier set, and where a slender body bends to its
+/// obstacle it does. Where their number has not fallen for a few times, the set begins again empty, and all
+/// indices that pull leave it or, if none does, the deepest one joins it. Where that takes too long only
+/// the last violating index is pivoted on (block principal pivoting, Júdice and Pires, Comput. Oper.
+/// Res. 21, 1994, with Murty's rule, finite for positive definite K). Where K
 /// is singular and A leaves a rigid motion unconstrained, the body moves as the load drives it
 /// until further bounds are reached.
 pub(super) struct ActiveSet<'s> {
@@ -42,8 +44,20 @@ pub(super) struct ActiveSet<'s> {
     elastic: ElasticSolver<'s>,
 }
 
-/// Times that the number of violating indices may fail to fall before only one is pivoted on.
+/// Times that the number of violating indices may fail to fall before the set begins again.
 const PATIENCE: usize = 5;
+/// Iterations that it then grows by one index at a time.
+const GROWTH: usize = 100;
+
+/// An index that violates the conditions.
+#[derive(Debug, Clone, Copy)]
+struct Violation {
+    index: usize,
+    /// The sign that its contact force should have.
+    side: f64,
+    /// How far c is beyond a bound that is not active, m; 0 for an active one, which pulls.
+    depth: f64,
+}
 
 impl<'s> ActiveSet<'s> {
     /// Called `name`: the set of a problem without bounds is empty, and its first solve the last.
@@ -107,30 +121,30 @@ impl<'s> ActiveSet<'s> {
         self.elastic.solve(system, problem.load, c, problem.linear_residual(), report)
     }
 
-    /// The indices that violate the conditions beyond what the KKT tolerance allows, and the sign
-    /// that each should have: p = f − Kc is at least 0 at an upper bound and at most 0 at a lower
-    /// one, and lower ≤ c ≤ upper elsewhere.
+    /// The indices that violate the conditions beyond what the KKT tolerance allows: p = f − Kc is at
+    /// least 0 at an upper bound and at most 0 at a lower one, and lower ≤ c ≤ upper elsewhere.
     fn violating(
         &self,
         problem: &ContactProblem,
         c: &Vector,
-    ) -> Result<Vec<(usize, f64)>, PetscError> {
+    ) -> Result<Vec<Violation>, PetscError> {
         let slack = 0.1 * problem.tolerance;
         let depth = slack * problem.scales_at(c)?.displacement;
         let pull = slack * problem.scales.force / (problem.bound_count() as f64).sqrt();
         c.read(|c| {
             self.elastic.forces(|p| {
-                let violation = |(i, bound): (usize, &Bound)| {
-                    let (c, p, side) = (c[bound.dof], p[bound.dof], self.active[i]);
-                    let other = if side != 0.0 {
+                let violation = |(index, bound): (usize, &Bound)| {
+                    let (c, p, side) = (c[bound.dof], p[bound.dof], self.active[index]);
+                    let (above, below) = (c - bound.upper, bound.lower - c);
+                    let (side, depth) = match side != 0.0 {
                         // An equality carries a force of either sign.
-                        (side * p < -pull && !bound.is_equality()).then_some(0.0)
-                    } else if c - bound.upper > depth {
-                        Some(1.0)
-                    } else {
-                        (bound.lower - c > depth).then_some(-1.0)
+                        true if bound.is_equality() || side * p >= -pull => return None,
+                        true => (0.0, 0.0),
+                        false if above > depth => (1.0, above),
+                        false if below > depth => (-1.0, below),
+                        false => return None,
                     };
-                    other.map(|other| (i, other))
+                    Some(Violation { index, side, depth })
                 };
                 problem.bounds.iter().enumerate().filter_map(violation).collect()
             })
@@ -142,10 +156,10 @@ impl<'s> ActiveSet<'s> {
         &mut self,
         problem: &ContactProblem,
         c: &Vector,
-        chosen: &[(usize, f64)],
+        chosen: &[Violation],
     ) -> Result<bool, PetscError> {
         let old = self.active.clone();
-        chosen.iter().for_each(|&(i, side)| self.active[i] = side);
+        chosen.iter().for_each(|one| self.active[one.index] = one.side);
         if !self.constrain_rigid_motions(problem, c)? {
             // No index leaves the active set: only open ones join it.
             for (new, old) in self.active.iter_mut().zip(&old) {
@@ -180,8 +194,10 @@ impl ContactSolver for ActiveSet<'_> {
     ) -> Result<ContactReport, ContactError> {
         let mut report = ContactReport::default();
         let (mut fewest, mut patience) = (usize::MAX, PATIENCE);
+        // Iterations that the set may still grow by one index at a time, once it has begun again.
+        let mut growth = None;
         self.first_guess(problem, c)?;
-        for _ in 0..30 + 5 * problem.bound_count() {
+        for _ in 0..30 + GROWTH + 5 * problem.bound_count() {
             report.iterations += 1;
             self.solve_equality(problem, c, &mut report)?;
             let violating = self.violating(problem, c)?;
@@ -189,13 +205,26 @@ impl ContactSolver for ActiveSet<'_> {
             if count == 0 {
                 return Ok(report);
             }
-            let single = count >= fewest && patience == 0;
+            let stuck = count >= fewest && patience == 0;
             (fewest, patience) = match count < fewest {
                 true => (count, PATIENCE),
                 false => (fewest, patience.saturating_sub(1)),
             };
-            report.fallbacks += usize::from(single && count > 1);
-            let chosen = if single { last(problem.comm, &violating) } else { &violating };
+            if stuck && growth.is_none() {
+                growth = Some(GROWTH);
+                report.fallbacks += 1;
+                self.active.fill(0.0);
+                self.constrain_rigid_motions(problem, c)?;
+                continue;
+            }
+            let chosen = match &mut growth {
+                Some(0) if stuck => last(problem.comm, &violating),
+                None | Some(0) => &violating,
+                Some(left) => {
+                    *left -= 1;
+                    &careful(problem.comm, &violating)
+                }
+            };
             if !self.pivot(problem, c, chosen)? {
                 // The forces of bounds that support a balanced body are rounding; the certificate
                 // judges them.
@@ -205,6 +234,16 @@ impl ContactSolver for ActiveSet<'_> {
         let detail = "the active set still changes";
         Err(ContactError::stopped(self.name(), report, Kkt::UNKNOWN, detail))
     }
+}
+
+/// Of all ranks' `violating` indices those that pull, or if none does the deepest one.
+fn careful(comm: Communicator, violating: &[Violation]) -> Vec<Violation> {
+    if comm.any(violating.iter().any(|one| one.side == 0.0)) {
+        return violating.iter().filter(|one| one.side == 0.0).copied().collect();
+    }
+    let deepest = violating.iter().copied().max_by(|a, b| a.depth.total_cmp(&b.depth));
+    let (_, owner) = comm.min_with_rank(deepest.map_or(f64::INFINITY, |one| -one.depth));
+    deepest.filter(|_| owner == comm.rank()).into_iter().collect()
 }
 
 /// The last of all ranks' `violating` indices, which are numbered rank by rank; nothing on the
