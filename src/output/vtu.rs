@@ -102,8 +102,10 @@ impl FieldWriter {
         let cells = cell_data(problem, state);
         let text = self.piece(&problem.body, &points, &cells);
         let text = text.map_err(|e| OutputError::new(&path, e))?;
-        write_whole(&path, text.as_bytes())?;
+        let written = write_whole(&path, text.as_bytes());
+        // All ranks collect Γ_C, also where one could not write its piece.
         self.contact.add(&format!("contact_{number}.vtu"), problem, state)?;
+        written?;
         if !comm.is_root() {
             return Ok(());
         }
