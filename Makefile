@@ -86,7 +86,7 @@ test: deps
 
 validate: build deps-validate
 	$(PYTHON) validation/selfcheck.py
-	$(PYTHON) validation/compare.py --binary $(BINARY) $(addprefix geo/, \
+	$(PYTHON) validation/compare.py --binary $(BINARY) validation/layers.toml $(addprefix geo/, \
 	    square-mild.toml lshape.toml lshape-rolling.toml beam.toml bridge-half.toml hertz.toml)
 
 # The judge proves itself first; exit code 1 if a scene is judged wrong or wrongly refused.

@@ -7,9 +7,9 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from contact import solve_linear
-from fenicsx import INTERIOR_POINTS, Body, dof_of_node
+from fenicsx import INTERIOR_POINTS, Body, dof_of_node, per_triangle
 from lagrange import Lagrange
-from scene import Expression
+from scene import Expression, of_material
 
 DEFAULTS = {"lambda_w": 0.0, "strain_cap": 1000.0, "threshold": 0.01, "initial": 1.0}
 
@@ -22,7 +22,13 @@ class Damage:
         self.law = {**DEFAULTS, **body.scene["damage"]}
         domain = body.straight
         k = fem.Constant(domain, PETSc.ScalarType(step))
-        kappa = fem.Constant(domain, PETSc.ScalarType(self.law["diffusion"]))
+        def constant(key, domain):
+            values = of_material(body.scene, body.mesh, "damage", key, DEFAULTS.get(key))
+            return per_triangle(domain, values)
+
+        kappa = constant("diffusion", domain)
+        for key in ("lambda_d", "lambda_u", "lambda_w", "strain_cap"):
+            self.law[key] = constant(key, body.domain)
         space = fem.FunctionSpace(domain, ("Lagrange", 1))
         self.dof_of_node = dof_of_node(space, Lagrange(body.mesh, 1))
         self.zeta = fem.Function(space)

@@ -18,7 +18,7 @@ from petsc4py import PETSc
 
 from contact import Bounds, solve_contact
 from lagrange import Lagrange
-from scene import Expression, SceneError, displacement_order
+from scene import Expression, SceneError, displacement_order, of_material
 from triangulation import edge_keys
 
 logging.disable(logging.INFO)  # the form compiler reports each of its builds
@@ -27,6 +27,7 @@ UFL_FUNCTIONS = {
     "pi": np.pi, "sin": ufl.sin, "cos": ufl.cos, "tan": ufl.tan, "sqrt": ufl.sqrt,
     "exp": ufl.exp, "log": ufl.ln, "abs": abs,
     "min": ufl.min_value, "max": ufl.max_value, "atan2": ufl.atan_2,
+    "if_": ufl.conditional, "And": ufl.And, "Or": ufl.Or,
 }
 
 # The quadrature that defines the discrete loads: in a triangle the midpoints of the sides for P1,
@@ -53,6 +54,15 @@ class State:
     residual: np.ndarray  # (n, 2): K u − f
     contact_force: float
     active: int
+
+
+def per_triangle(domain, values):
+    """A function that is constant on each triangle, from the values in the order they were given."""
+    if (values == values[0]).all():
+        return fem.Constant(domain, PETSc.ScalarType(values[0]))
+    function = fem.Function(fem.FunctionSpace(domain, ("Discontinuous Lagrange", 0)))
+    function.x.array[:] = values[domain.topology.original_cell_index]
+    return function
 
 
 class Body:
@@ -84,11 +94,11 @@ class Body:
 
     def elasticity(self, strain):
         """A ε: the paper's plane-stress tensor (section 4), or plane strain."""
-        material = self.scene["material"]
-        young, poisson = float(material["young"]), float(material["poisson"])
-        if material.get("plane", "stress") == "strain":
+        young, poisson = (of_material(self.scene, self.mesh, "material", key)
+                          for key in ("young", "poisson"))
+        if self.scene["material"].get("plane", "stress") == "strain":
             young, poisson = young / (1 - poisson**2), poisson / (1 - poisson)
-        young, poisson = (fem.Constant(self.domain, PETSc.ScalarType(c)) for c in (young, poisson))
+        young, poisson = (per_triangle(self.domain, values) for values in (young, poisson))
         return young / (1 + poisson) * (
             poisson / (1 - poisson) * ufl.tr(strain) * ufl.Identity(2) + strain
         )
@@ -107,6 +117,10 @@ class Body:
             yield ufl.dot(force, w) * ufl.dx(metadata=rule)
         for boundary in self.boundaries:
             traction = vector(boundary.get("traction", ["0", "0"]))
+            if "pressure" in boundary:
+                pressure = Expression(boundary["pressure"])(x[0], x[1], self.time, UFL_FUNCTIONS)
+                pressure = -pressure * ufl.FacetNormal(self.domain)
+                traction = pressure if traction is None else traction + pressure
             if traction is not None:
                 edges = _facet_tags(self.domain, self.mesh, boundary["name"])
                 ds = ufl.Measure("ds", self.domain, subdomain_data=edges)

@@ -6,6 +6,7 @@ is well formed.
 
 import ast
 import json
+import re
 import tomllib
 from pathlib import Path
 
@@ -20,12 +21,26 @@ NUMPY_FUNCTIONS = {
     "pi": np.pi, "sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt,
     "exp": np.exp, "log": np.log, "abs": np.abs,
     "min": np.minimum, "max": np.maximum, "atan2": np.arctan2,
+    "if_": np.where, "And": np.logical_and, "Or": np.logical_or,
 }
 
 _ALLOWED = (
     ast.Expression, ast.BinOp, ast.UnaryOp, ast.Call, ast.Name, ast.Load, ast.Constant,
     ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.USub, ast.UAdd,
+    ast.Compare, ast.Lt, ast.LtE, ast.Gt, ast.GtE,
 )
+
+
+class _Functions(ast.NodeTransformer):
+    """Writes `and` and `or` as functions, which fields have."""
+
+    def visit_BoolOp(self, node):
+        self.generic_visit(node)
+        name = ast.Name(type(node.op).__name__, ast.Load())
+        first, *others = node.values
+        for other in others:
+            first = ast.Call(name, [first, other], [])
+        return ast.fix_missing_locations(ast.copy_location(first, node))
 
 
 class Expression:
@@ -37,8 +52,9 @@ class Expression:
     def __init__(self, text):
         self.text = str(text)
         try:
-            # Python writes ^ as **; its ^ would bind more loosely than +.
-            tree = ast.parse(self.text.strip().replace("^", "**"), mode="eval")
+            # Python writes ^ as **; its ^ would bind more loosely than +. Its `if` is no function.
+            text = re.sub(r"\bif\s*\(", "if_(", self.text.strip().replace("^", "**"))
+            tree = _Functions().visit(ast.parse(text, mode="eval"))
         except SyntaxError as error:
             raise SceneError(f"expression '{self.text}': {error.msg}") from None
         names = set(NUMPY_FUNCTIONS) | {"x", "y", "t"}
@@ -72,6 +88,15 @@ def read_scene(path):
         if table not in scene:
             raise SceneError(f"{path}: the table [{table}] is missing")
     return scene
+
+
+def of_material(scene, mesh, table, key, default=None):
+    """A value of [material] or [damage] for each triangle, from the tables of its surfaces."""
+    values = np.full(len(mesh.triangles), float(scene[table].get(key, default)))
+    for name, surface in scene[table].items():
+        if isinstance(surface, dict) and key in surface:
+            values[mesh.surfaces[name]] = float(surface[key])
+    return values
 
 
 def displacement_order(scene):

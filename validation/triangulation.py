@@ -3,7 +3,7 @@
 import contextlib
 import io
 import subprocess
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import meshio
 import numpy as np
@@ -13,13 +13,15 @@ from scene import SceneError
 
 @dataclass
 class Triangulation:
-    """Nodes (n, 2), triangles (m, 3) counter-clockwise, and the edges of each named curve; of a
-    file of second order the points in the middle of the sides 01, 12, 20 (m, 3, 2)."""
+    """Nodes (n, 2), triangles (m, 3) counter-clockwise, the edges of each named curve and, for each
+    named surface, whether a triangle is in it; of a file of second order the points in the middle of
+    the sides 01, 12, 20 (m, 3, 2)."""
 
     nodes: np.ndarray
     triangles: np.ndarray
     curves: dict
     middles: np.ndarray = None
+    surfaces: dict = field(default_factory=dict)
 
     def outward_normals(self, name):
         """Unit outward normals and lengths of a curve's edges; all must be boundary edges."""
@@ -80,17 +82,21 @@ def read_triangulation(path):
         middles[clockwise] = middles[clockwise][:, [2, 1, 0]]
 
     tags = mesh.cell_data.get("gmsh:physical", [[]] * len(mesh.cells))
-    curves = {}
+    curves, surfaces = {}, {}
     for name, (tag, dimension) in mesh.field_data.items():
-        if dimension != 1:
-            continue
-        edges = []
+        edges, inside = [], []
         for k, data in blocks:
+            found = np.zeros(len(data), bool)
+            found[mesh.cell_sets[name][k] if name in mesh.cell_sets else tags[k] == tag] = True
             if mesh.cells[k].type in ("line", "line3"):
-                inside = mesh.cell_sets[name][k] if name in mesh.cell_sets else tags[k] == tag
-                edges.append(renumber[data[inside][:, :2]])
-        curves[name] = np.unique(np.sort(np.vstack(edges), axis=1), axis=0)
-    return Triangulation(nodes, triangles, curves, middles)
+                edges.append(renumber[data[found][:, :2]])
+            elif mesh.cells[k].type in ("triangle", "triangle6"):
+                inside.append(found)
+        if dimension == 1:
+            curves[name] = np.unique(np.sort(np.vstack(edges), axis=1), axis=0)
+        elif dimension == 2:
+            surfaces[name] = np.concatenate(inside)
+    return Triangulation(nodes, triangles, curves, middles, surfaces)
 
 
 def mesh_geometry(geometry, table, target, order=1):

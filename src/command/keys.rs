@@ -56,6 +56,12 @@ fn section(title: &str, path: &str, meaning: &str, table: &Value) -> String {
         };
         page += &format!("\n{}", section(&title, &below, &meaning, content));
     }
+    let any = &table["additionalProperties"];
+    if any["properties"].is_object() {
+        let meaning = format!("{}\n\n", text(&any["description"]));
+        let (title, below) = (format!("`[{path}NAME]`"), format!("{path}NAME."));
+        page += &format!("\n{}", section(&title, &below, &meaning, any));
+    }
     page
 }
 

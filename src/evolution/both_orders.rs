@@ -283,11 +283,12 @@ impl<'a> Fine<'a> {
 
 /// See [`Fine`].
 fn middle_diagonal(problem: &DiscreteProblem, zeta_at_points: &[f64]) -> Vec<f64> {
-    let (body, d) = (&problem.body, &problem.elasticity.d);
+    let (body, elasticity) = (&problem.body, &problem.elasticity);
     let mut diagonal = vec![0.0; body.nodes.points.len()];
     let Elements::Quadratic(cells) = body.elements() else { return diagonal };
     let elements = cells.nodes.iter().zip(cells.elements).zip(zeta_at_points.chunks(3));
-    for ((nodes, element), zeta) in elements {
+    for (t, ((nodes, element), zeta)) in elements.enumerate() {
+        let d = elasticity.d(body, t);
         for (point, zeta) in element.points.iter().zip(zeta) {
             for i in 3..6 {
                 diagonal[nodes[i]] += 0.5 * zeta * point.stiffness(d, i, i).trace();

@@ -3,7 +3,6 @@
 use super::{DiscreteProblem, Phases, RunError, State, StepFailure, step_controller::PlannedStep};
 use crate::{
     fem::{self, DamageCertificate, DamageSystem},
-    model::DamageLaw,
     petsc::{PetscError, Session},
 };
 use nalgebra::DVector;
@@ -42,12 +41,12 @@ impl DamageStep<'_> {
     /// The damage source of a state.
     pub(super) fn source(&self, state: &State) -> DamageSource {
         let (problem, body) = (self.problem, &self.problem.body);
-        let Some(law) = problem.damage() else {
+        let Some(laws) = problem.damage() else {
             return DamageSource { load: DVector::zeros(state.zeta.len()), min: 0.0 };
         };
         self.phases.time("damage source", || {
             let strain = problem.elasticity.strain_squared(body, &state.u);
-            let phi = fem::source(body, &law, &strain, &state.zeta);
+            let phi = fem::source(body, laws, &strain, &state.zeta);
             let min = phi.iter().flatten().copied().fold(0.0, f64::min);
             let min = body.vertices.partition.comm().min(min);
             let load = fem::source_load(body, problem.mass(), &phi);
@@ -65,10 +64,10 @@ impl DamageStep<'_> {
         let (start, load) = (planned.start.as_slice(), planned.load.as_slice());
         let (mut zeta, min_max) = (planned.start.clone(), partition.min_max(start));
         let stays = min_max.0 == min_max.1 && self.is_zero(load);
-        let Some(law) = problem.damage().filter(|_| !stays) else {
+        if stays || problem.damage().is_none() {
             return Ok(DamageUpdate { zeta, min_max, certificate: None });
-        };
-        let system = self.system(&law, planned.k)?;
+        }
+        let system = self.system(planned.k)?;
         if !phases.time("damage solve", || system.advance(load, zeta.as_mut_slice()))? {
             return Err(planned.failed(StepFailure::Damage));
         }
@@ -76,7 +75,7 @@ impl DamageStep<'_> {
         partition.update(zeta.as_mut_slice(), 1)?;
         let certificate = phases.time("damage certificate", || {
             let (body, mass, fields) = (&problem.body, problem.mass(), [start, zeta.as_slice()]);
-            DamageCertificate::of(body, mass, law.diffusion, planned.k, load, fields)
+            DamageCertificate::of(body, mass, &problem.diffusions(), planned.k, load, fields)
         });
         let residual = certificate.residual;
         if !residual.is_finite() {
@@ -101,10 +100,10 @@ impl DamageStep<'_> {
     ) -> Result<DVector<f64>, RunError> {
         let (partition, phases) = (&self.problem.body.vertices.partition, self.phases);
         let zero = self.is_zero(load.as_slice());
-        let Some(law) = self.problem.damage().filter(|_| !zero) else {
+        if zero || self.problem.damage().is_none() {
             return Ok(DVector::zeros(load.len()));
-        };
-        let system = self.system(&law, planned.k)?;
+        }
+        let system = self.system(planned.k)?;
         let solved = phases.time("damage solve", || system.correction(load.as_slice()))?;
         let failed = || planned.failed(StepFailure::Damage);
         let change = partition.field(solved.ok_or_else(failed)?, 1)?;
@@ -124,9 +123,11 @@ impl DamageStep<'_> {
     ) -> Result<(), RunError> {
         let (partition, phases) = (&self.problem.body.vertices.partition, self.phases);
         let zero = self.is_zero(error.as_slice());
-        let Some(law) = self.problem.damage().filter(|_| !zero) else { return Ok(()) };
+        if zero || self.problem.damage().is_none() {
+            return Ok(());
+        }
         let (mut left, no_source) = (error.clone(), vec![0.0; error.len()]);
-        let system = self.system(&law, planned.k)?;
+        let system = self.system(planned.k)?;
         if phases.time("damage solve", || system.advance(&no_source, left.as_mut_slice()))? {
             partition.update(left.as_mut_slice(), 1)?;
             *error += planned.length / planned.k * (left - &*error);
@@ -140,11 +141,7 @@ impl DamageStep<'_> {
     }
 
     /// The damage system of a step of `k` s, factorised.
-    pub(super) fn system(
-        &mut self,
-        law: &DamageLaw,
-        k: f64,
-    ) -> Result<&mut DamageSystem, PetscError> {
+    pub(super) fn system(&mut self, k: f64) -> Result<&mut DamageSystem, PetscError> {
         let (session, problem, phases) = (self.session, self.problem, self.phases);
         let system = match self.system.take() {
             Some((factorised, system)) if factorised == k => system,
@@ -153,7 +150,7 @@ impl DamageStep<'_> {
                 system
             }
             None => phases.time("damage factor", || {
-                DamageSystem::new(session, &problem.body, problem.mass(), law.diffusion, k)
+                DamageSystem::new(session, &problem.body, problem.mass(), &problem.diffusions(), k)
             })?,
         };
         Ok(&mut self.system.insert((k, system)).1)

@@ -24,6 +24,8 @@ pub struct DiscreteProblem {
     pub body: Body,
     /// The undamaged elastic operator.
     pub elasticity: Elasticity,
+    /// The damage laws of the materials by their numbers; none where the body is not damaged in time.
+    laws: Vec<DamageLaw>,
     /// Displacement conditions as unknowns and bounds, for the solvers.
     pub constraints: Constraints,
     /// The same conditions as posed, to judge answers by.
@@ -113,7 +115,8 @@ impl DiscreteProblem {
     /// The scene does not fit the mesh, contradicts itself, or its load drives a rigid motion.
     pub fn new(mut scene: Scene, mesh: Mesh) -> Result<Self, SetupError> {
         scene.check_mesh(&mesh)?;
-        let body = Body::new(mesh, scene.order);
+        let mut body = Body::new(mesh, scene.order);
+        body.materials = scene.materials_of(&body.mesh);
         let mut conditions = BoundaryConditions::new(&scene, &body);
         let motions = conditions.resolve_motions(&body);
         let (fixed, gaps) = (&conditions.fixed, &mut conditions.gaps);
@@ -132,7 +135,8 @@ impl DiscreteProblem {
             largest_load: norms.filter(|norm| norm.is_finite()).fold(0.0, f64::max),
             contact_boundary,
             certificate,
-            elasticity: Elasticity::new(scene.material),
+            elasticity: Elasticity::new(scene.materials()),
+            laws: if scene.time.is_some() { scene.damage_laws() } else { Vec::new() },
             constraints,
             motions,
             loads,
@@ -282,10 +286,14 @@ impl DiscreteProblem {
         if self.scene.time.is_some() { 0.0 } else { 1.0 }
     }
 
-    /// The damage law, where the material can be damaged in time.
-    pub fn damage(&self) -> Option<DamageLaw> {
-        self.scene.time?;
-        self.scene.damage.as_ref().map(|damage| damage.law)
+    /// The damage laws of the materials by their numbers, where these can be damaged in time.
+    pub fn damage(&self) -> Option<&[DamageLaw]> {
+        Some(&self.laws[..]).filter(|laws| !laws.is_empty())
+    }
+
+    /// The κ of the materials by their numbers, m²/s.
+    pub fn diffusions(&self) -> Vec<f64> {
+        self.laws.iter().map(|law| law.diffusion).collect()
     }
 
     /// How the damage steps are integrated.

@@ -108,11 +108,11 @@ pub(super) fn mesh_error(
     let comm = problem.body.nodes.partition.comm();
     let last = &outcome.last.state;
     let undamaged = comm.all(last.zeta == problem.initial_damage());
-    let law = problem.damage().filter(|_| !undamaged)?;
+    let laws = problem.damage().filter(|_| !undamaged)?;
     instants.end(last);
     let stopped = outcome.stopped.is_some();
     instants.falling.extend(outcome.stopped.map(|stop| (stop.time, problem.threshold())));
-    let estimate = damage_error(problem, damage_step, compliance, &law, &instants, stopped);
+    let estimate = damage_error(problem, damage_step, compliance, laws, &instants, stopped);
     let told = comm.all(estimate.is_ok());
     estimate.ok().flatten().filter(|_| told)
 }
@@ -122,7 +122,7 @@ fn damage_error(
     problem: &DiscreteProblem,
     damage_step: &mut DamageStep,
     compliance: Compliance,
-    law: &DamageLaw,
+    laws: &[DamageLaw],
     instants: &Instants,
     stopped: bool,
 ) -> Result<Option<DamageError>, RunError> {
@@ -136,7 +136,8 @@ fn damage_error(
     let [first, .., last] = &instants.states[..] else { return Ok(None) };
     let mut error = ZetaError {
         problem,
-        law,
+        laws,
+        diffusions: problem.diffusions(),
         change: vec![0.0; first.zeta.len()],
         middles: interpolation_error(&problem.body, &first.zeta)?,
         load: Vec::new(),
@@ -156,7 +157,7 @@ fn damage_error(
         }
         error.load = load(&error);
         let least = error.least(state);
-        if least > law.threshold {
+        if least > problem.threshold() {
             error.delay = instants.delay(state.time, least).or(error.delay);
         }
         before = Some(state);
@@ -167,7 +168,10 @@ fn damage_error(
 /// z − ζ of an instant.
 struct ZetaError<'a> {
     problem: &'a DiscreteProblem,
-    law: &'a DamageLaw,
+    /// Of the materials by their numbers.
+    laws: &'a [DamageLaw],
+    /// κ of each, m²/s.
+    diffusions: Vec<f64>,
     /// δ.
     change: Vec<f64>,
     /// β at the midpoints of the sides of each triangle.
@@ -210,11 +214,12 @@ impl ZetaError<'_> {
             let rate = nodes.map(|node| rates[node]);
             let mass = missing_mass(self.problem.mass(), triangle, rate, growth);
             let diffusion = diffusion_load(triangle, middles);
+            let kappa = self.diffusions[body.material(t)];
             for (i, &node) in nodes.iter().enumerate() {
-                rhs[node] -= mass[i] + self.law.diffusion * diffusion[i];
+                rhs[node] -= mass[i] + kappa * diffusion[i];
             }
         }
-        damage_step.system(self.law, k)?.advance(&rhs, &mut self.change)?;
+        damage_step.system(k)?.advance(&rhs, &mut self.change)?;
         body.vertices.partition.update(&mut self.change, 1)?;
         self.middles = self.deviation(state)?;
         Ok(())
@@ -242,9 +247,10 @@ impl ZetaError<'_> {
 
     /// b* − b of `state`, with |ε*|² = `strain_squared` and b = `own`.
     fn load(&self, state: &State, strain_squared: &[[f64; 6]], own: &[f64]) -> Vec<f64> {
-        let (body, law) = (&self.problem.body, self.law);
+        let body = &self.problem.body;
         let mut load: Vec<f64> = own.iter().map(|b| -b).collect();
         for (t, (nodes, triangle)) in body.mesh.triangles.iter().zip(&body.triangles).enumerate() {
+            let law = &self.laws[body.material(t)];
             let (zeta, error) = (bulged(nodes.map(|node| state.zeta[node]), [0.0; 3]), self.at(t));
             let source = array::from_fn(|i| {
                 let (zeta, z) = (law.truncate(zeta[i]), law.truncate(zeta[i] + error[i]));
@@ -291,7 +297,7 @@ fn strain_squared(
     let strains = [strains_at_nodes(&coarse.body, &u1), strains_at_nodes(&fine.body, &u2)];
     let distance = (0..problem.body.own_triangles).map(|t| {
         let difference: [Vector3<f64>; 6] = array::from_fn(|i| strains[1][t][i] - strains[0][t][i]);
-        let stress = difference.map(|strain| problem.elasticity.d * strain);
+        let stress = difference.map(|strain| problem.elasticity.d(&problem.body, t) * strain);
         let zeta = problem.body.mesh.triangles[t].map(|node| state.zeta[node]);
         let mean = zeta.iter().sum::<f64>() / 3.0;
         mean * problem.body.triangles[t].area() * mean_product(&difference, &stress, Vector3::dot)

@@ -153,7 +153,7 @@ impl DiscreteProblem {
             let note = "[damage] without [time]: in this static solve ζ stays damage.initial";
             notes.push(note.to_owned());
         }
-        let poisson = scene.material.poisson;
+        let poisson = scene.materials().map(|material| material.poisson).fold(-1.0, f64::max);
         let linear = scene.order == Order::Linear;
         if linear && scene.material.plane == Plane::Strain && poisson > LOCKING {
             notes.push(format!(

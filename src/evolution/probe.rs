@@ -57,8 +57,9 @@ impl Probes {
         let values = |Place { location, triangle }: &Place| {
             let Some(t) = *triangle else { return [0.0; OBSERVED.len()] };
             let at = location.values(&problem.body, t, &state.u, &state.zeta);
-            let stress = problem.elasticity.d * at.strain * problem.truncated(at.zeta);
-            let von_mises = problem.elasticity.material.von_mises(&stress);
+            let (elasticity, body) = (&problem.elasticity, &problem.body);
+            let stress = elasticity.d(body, t) * at.strain * problem.truncated(at.zeta);
+            let von_mises = elasticity.material(body, t).von_mises(&stress);
             [at.u[0], at.u[1], at.zeta, stress[0], stress[1], stress[2], von_mises]
         };
         self.places.iter().flat_map(values).collect()

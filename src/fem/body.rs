@@ -19,6 +19,8 @@ pub struct Body {
     pub own_triangles: usize,
     /// Index of each triangle in the undivided mesh.
     pub global_triangles: Vec<usize>,
+    /// The number of the material of each triangle; empty where there is only one.
+    pub materials: Vec<u32>,
     /// The nodes of ζ: the vertices.
     pub vertices: Rc<Nodes>,
     /// The nodes of u: the vertices, and for P2 the midpoints of the edges.
@@ -99,15 +101,15 @@ impl<const N: usize, const Q: usize> Cells<'_, N, Q> {
         elements.map(|(t, element)| element.points[0].gradient(&self.gather(t, u))).collect()
     }
 
-    /// A function of the strains (ε_xx, ε_yy, 2ε_xy) of nodal u at all quadrature points, triangle by
-    /// triangle.
+    /// A function of the triangles and the strains (ε_xx, ε_yy, 2ε_xy) of nodal u at all quadrature
+    /// points, triangle by triangle.
     #[inline(always)]
-    pub fn strains<T>(&self, u: &[f64], of: impl Fn(Vector3<f64>) -> T) -> Vec<T> {
+    pub fn strains<T>(&self, u: &[f64], of: impl Fn(usize, Vector3<f64>) -> T) -> Vec<T> {
         let mut values = Vec::with_capacity(Q * self.elements.len());
         for (t, element) in self.elements.iter().enumerate() {
             let local = self.gather(t, u);
             for point in &element.points {
-                values.push(of(point.strain(&local)));
+                values.push(of(t, point.strain(&local)));
             }
         }
         values
@@ -152,6 +154,7 @@ impl Body {
             triangles,
             own_triangles,
             global_triangles: (0..own_triangles).collect(),
+            materials: Vec::new(),
             vertices,
             nodes,
             quadratic,
@@ -169,6 +172,12 @@ impl Body {
             }
             Some(q) => Elements::Quadratic(Cells { nodes: &q.nodes, elements: &q.elements }),
         }
+    }
+
+    /// The number of the material of triangle `t`.
+    #[inline(always)]
+    pub fn material(&self, t: usize) -> usize {
+        self.materials.get(t).map_or(0, |&number| number as usize)
     }
 
     /// The order of the displacements.

@@ -32,16 +32,25 @@ impl Mass {
 
 /// The damage source φ of (25) at three points of each triangle, 1/s: for P1 displacements at the
 /// vertices, from nodal ζ and the triangle's |ε|²; for P2 at the quadrature points, from ζ and |ε|²
-/// there. `strain_squared` is that of [`Elasticity::strain_squared`](super::Elasticity).
-pub fn source(body: &Body, law: &DamageLaw, strain_squared: &[f64], zeta: &[f64]) -> Vec<[f64; 3]> {
+/// there. `strain_squared` is that of [`Elasticity::strain_squared`](super::Elasticity), `laws` are those
+/// of the materials by their numbers.
+pub fn source(
+    body: &Body,
+    laws: &[DamageLaw],
+    strain_squared: &[f64],
+    zeta: &[f64],
+) -> Vec<[f64; 3]> {
     match body.order() {
         Order::Linear => {
-            let at_vertices =
-                |(nodes, e2): (&[usize; 3], &f64)| nodes.map(|node| law.source(*e2, zeta[node]));
-            body.mesh.triangles.iter().zip(strain_squared).map(at_vertices).collect()
+            let at_vertices = |(t, (nodes, e2)): (usize, (&[usize; 3], &f64))| {
+                let law = &laws[body.material(t)];
+                nodes.map(|node| law.source(*e2, zeta[node]))
+            };
+            let triangles = body.mesh.triangles.iter().zip(strain_squared);
+            triangles.enumerate().map(at_vertices).collect()
         }
         Order::Quadratic => {
-            source_at(body, law, strain_squared.as_chunks().0.iter().copied(), zeta)
+            source_at(body, laws, strain_squared.as_chunks().0.iter().copied(), zeta)
         }
     }
 }
@@ -49,13 +58,14 @@ pub fn source(body: &Body, law: &DamageLaw, strain_squared: &[f64], zeta: &[f64]
 /// [`source`] from |ε|² at its three points of each triangle.
 fn source_at(
     body: &Body,
-    law: &DamageLaw,
+    laws: &[DamageLaw],
     strain_squared: impl Iterator<Item = [f64; 3]>,
     zeta: &[f64],
 ) -> Vec<[f64; 3]> {
     let quadratic = body.order() == Order::Quadratic;
-    let triangles = body.mesh.triangles.iter().zip(strain_squared);
-    let source = |(nodes, e2): (&[usize; 3], [f64; 3])| {
+    let triangles = body.mesh.triangles.iter().zip(strain_squared).enumerate();
+    let source = |(t, (nodes, e2)): (usize, (&[usize; 3], [f64; 3]))| {
+        let law = &laws[body.material(t)];
         let vertices = nodes.map(|node| zeta[node]);
         let zeta = if quadratic { at_quadratic_points(vertices) } else { vertices };
         [0, 1, 2].map(|q| law.source(e2[q], zeta[q]))
@@ -92,7 +102,7 @@ pub struct DamageCertificate {
 
 impl DamageCertificate {
     /// For ζ_{n−1} = `before` and ζ_n = `after`, a step k = `step`, s, the source load b = `load`
-    /// and the diffusion κ, m²/s. Collective.
+    /// and the diffusions κ of the materials, m²/s. Collective.
     ///
     /// The residual is summed triangle by triangle, without the matrices of the solver. On a
     /// triangle T the least eigenvalue of M, |T|/12 [2 1 1; 1 2 1; 1 1 2], is a quarter of that of
@@ -102,12 +112,12 @@ impl DamageCertificate {
     pub fn of(
         body: &Body,
         mass: Mass,
-        diffusion: f64,
+        diffusions: &[f64],
         step: f64,
         load: &[f64],
         [before, after]: [&[f64]; 2],
     ) -> Self {
-        let residual = residual(body, mass, step * diffusion, [before, after]);
+        let residual = residual(body, mass, (step, diffusions), [before, after]);
         let (mut squares, mut weighted, mut rhs) = (0.0, 0.0, 0.0);
         let mut least = f64::INFINITY;
         for i in 0..body.vertices.partition.owned() {
@@ -133,10 +143,17 @@ impl DamageCertificate {
     }
 }
 
-/// M(ζ_n − ζ_{n−1}) + kκL ζ_n, summed over the triangles, with `spread` = kκ, m².
-fn residual(body: &Body, mass: Mass, spread: f64, [before, after]: [&[f64]; 2]) -> Vec<f64> {
+/// M(ζ_n − ζ_{n−1}) + kκL ζ_n, summed over the triangles, with k, s, and the κ of the materials, m²/s.
+fn residual(
+    body: &Body,
+    mass: Mass,
+    (step, diffusions): (f64, &[f64]),
+    [before, after]: [&[f64]; 2],
+) -> Vec<f64> {
     let mut residual = vec![0.0; after.len()];
-    for (nodes, triangle) in body.mesh.triangles.iter().zip(&body.triangles) {
+    let triangles = body.mesh.triangles.iter().zip(&body.triangles);
+    for (t, (nodes, triangle)) in triangles.enumerate() {
+        let spread = step * diffusions[body.material(t)];
         let zeta = nodes.map(|node| after[node]);
         let change: [f64; 3] = std::array::from_fn(|i| zeta[i] - before[nodes[i]]);
         // (Mv)_i is |T|/12 (Σ_j v_j + v_i) for the consistent mass and |T|/3 v_i for the lumped.
@@ -155,7 +172,8 @@ fn residual(body: &Body, mass: Mass, spread: f64, [before, after]: [&[f64]; 2]) 
     residual
 }
 
-/// The matrix M + kκL of (28) with its factor, made anew for each step length k.
+/// The matrix M + kκL of (28) with its factor, made anew for each step length k. Where κ differs from
+/// material to material, L is Σ_T κ_T/κ L_T with κ that of the first.
 pub struct DamageSystem {
     mass: Matrix,
     laplace: Matrix,
@@ -163,6 +181,7 @@ pub struct DamageSystem {
     solver: LinearSolver,
     rhs: Vector,
     unknown: Vector,
+    /// κ of the first material, m²/s.
     diffusion: f64,
     step: f64,
     /// ‖diag L‖₂.
@@ -170,7 +189,7 @@ pub struct DamageSystem {
 }
 
 impl DamageSystem {
-    /// Assembles and factorises for diffusion κ (m²/s) and step k (s).
+    /// Assembles and factorises for the diffusions κ of the materials (m²/s) and step k (s).
     ///
     /// # Errors
     /// PETSc failed.
@@ -178,7 +197,7 @@ impl DamageSystem {
         session: &Session,
         body: &Body,
         mass: Mass,
-        diffusion: f64,
+        diffusions: &[f64],
         step: f64,
     ) -> Result<Self, PetscError> {
         let partition = &body.vertices.partition;
@@ -186,8 +205,10 @@ impl DamageSystem {
         let (mut rows, mut columns) = (Vec::new(), Vec::new());
         let (mut mass_values, mut laplace_values) = (Vec::new(), Vec::new());
         let mut diagonal = vec![0.0; body.mesh.nodes.len()];
-        for (nodes, triangle) in body.mesh.triangles.iter().zip(&body.triangles) {
-            let (mass, laplace) = (mass.of(triangle), triangle.laplace());
+        let triangles = body.mesh.triangles.iter().zip(&body.triangles);
+        for (t, (nodes, triangle)) in triangles.enumerate() {
+            let ratio = diffusions[body.material(t)] / diffusions[0];
+            let (mass, laplace) = (mass.of(triangle), ratio * triangle.laplace());
             for i in 0..3 {
                 diagonal[nodes[i]] += laplace[(i, i)];
                 for j in 0..3 {
@@ -213,7 +234,7 @@ impl DamageSystem {
             solver: LinearSolver::new(session, "damage_", owned, Precision::Full)?,
             rhs: Vector::zeros(session, owned)?,
             unknown: Vector::zeros(session, owned)?,
-            diffusion,
+            diffusion: diffusions[0],
             step,
             laplace_size: partition.norm(&diagonal, 1),
         };

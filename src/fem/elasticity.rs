@@ -6,23 +6,38 @@ use crate::model::Material;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 /// Strains, stresses and internal forces of a displacement field, triangle by triangle.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Elasticity {
-    /// A, as the matrix D of [`Material::stiffness`], Pa.
-    pub(crate) d: Matrix3<f64>,
-    /// The material.
-    pub material: Material,
+    /// The materials by their numbers, and A of each as the matrix D of [`Material::stiffness`], Pa.
+    materials: Vec<(Material, Matrix3<f64>)>,
 }
 
 impl Elasticity {
-    /// The operator of an undamaged `material`.
-    pub fn new(material: Material) -> Self {
-        Self { d: material.stiffness(), material }
+    /// The operator of undamaged `materials`, at least one, as they are numbered in
+    /// [`Body::materials`].
+    pub fn new(materials: impl IntoIterator<Item = Material>) -> Self {
+        Self { materials: materials.into_iter().map(|m| (m, m.stiffness())).collect() }
+    }
+
+    /// The materials by their numbers.
+    pub fn materials(&self) -> impl Iterator<Item = &Material> {
+        self.materials.iter().map(|(material, _)| material)
+    }
+
+    /// The material of triangle `t`.
+    pub fn material(&self, body: &Body, t: usize) -> &Material {
+        &self.materials[body.material(t)].0
+    }
+
+    /// D of triangle `t`, Pa.
+    #[inline(always)]
+    pub(crate) fn d(&self, body: &Body, t: usize) -> &Matrix3<f64> {
+        &self.materials[body.material(t)].1
     }
 
     /// |ε|² = Σ ε_ij² (the shear counts twice) of nodal u at the quadrature points of the elements.
     pub fn strain_squared(&self, body: &Body, u: &[f64]) -> Vec<f64> {
-        let squared = |e: Vector3<f64>| e[0] * e[0] + e[1] * e[1] + 0.5 * e[2] * e[2];
+        let squared = |_, e: Vector3<f64>| e[0] * e[0] + e[1] * e[1] + 0.5 * e[2] * e[2];
         for_elements!(body, cells => cells.strains(u, squared))
     }
 
@@ -31,7 +46,7 @@ impl Elasticity {
     pub fn stresses(&self, body: &Body, zeta: &[f64], u: &[f64]) -> Vec<Vector3<f64>> {
         for_elements!(body, cells => {
             let points = cells.elements[0].points.len();
-            let stresses = cells.strains(u, |strain| self.d * strain);
+            let stresses = cells.strains(u, |t, strain| self.d(body, t) * strain);
             let stresses: Vec<_> = stresses.iter().zip(zeta).map(|(s, zeta)| s * *zeta).collect();
             let mean = |of: &[Vector3<f64>]| of.iter().sum::<Vector3<f64>>() / points as f64;
             stresses.chunks(points).map(mean).collect()
@@ -42,7 +57,7 @@ impl Elasticity {
     pub fn energies(&self, body: &Body, zeta: &[f64], u: &[f64]) -> Vec<f64> {
         for_elements!(body, cells => {
             let points = cells.elements.iter().flat_map(|element| &element.points);
-            let densities = cells.strains(u, |e| e.dot(&(self.d * e)));
+            let densities = cells.strains(u, |t, e| e.dot(&(self.d(body, t) * e)));
             let points = densities.iter().zip(points).zip(zeta);
             points.map(|((density, point), zeta)| point.weight * zeta * density).collect()
         })
@@ -55,9 +70,9 @@ impl Elasticity {
             let mut force = vec![0.0; u.len()];
             let mut zeta = zeta.iter();
             for (t, (nodes, element)) in cells.nodes.iter().zip(cells.elements).enumerate() {
-                let local = cells.gather(t, u);
+                let (local, d) = (cells.gather(t, u), self.d(body, t));
                 for (point, zeta) in element.points.iter().zip(&mut zeta) {
-                    let stress = self.d * point.strain(&local) * *zeta;
+                    let stress = d * point.strain(&local) * *zeta;
                     for (node, [fx, fy]) in nodes.iter().zip(point.force(&stress)) {
                         force[2 * node] += fx;
                         force[2 * node + 1] += fy;
@@ -81,7 +96,7 @@ impl Elasticity {
                     let unit = f64::EPSILON * zeta.abs();
                     for (i, &node) in nodes.iter().enumerate() {
                         for (j, u) in local.iter().enumerate() {
-                            let force = point.stiffness(&self.d, i, j).abs() * u;
+                            let force = point.stiffness(self.d(body, t), i, j).abs() * u;
                             rounding[2 * node] += unit * force[0];
                             rounding[2 * node + 1] += unit * force[1];
                         }

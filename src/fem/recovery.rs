@@ -6,7 +6,7 @@ use super::{
     element::{POINTS, quadratic_values},
     quadratic::mean_product,
 };
-use crate::{mesh::Mesh, petsc::PetscError};
+use crate::petsc::PetscError;
 use nalgebra::{Matrix6, Matrix6x3, Vector3, Vector6};
 
 /// An estimate of the error of u in the energy norm, ‖v‖² = ∫ ζ Aε(v) : ε(v).
@@ -41,13 +41,15 @@ impl EnergyError {
 ///
 /// Around each vertex, ε(u) at the quadrature points of its triangles is fitted by a polynomial of
 /// the degree of u; ε* is the interpolant of the order of u of these fits, at the midpoint of an
-/// edge their mean. A vertex of few triangles, at a boundary, has the mean of its neighbours' fits.
+/// edge their mean. A vertex of few triangles, at a boundary, has the mean of its neighbours' fits. Where
+/// two materials meet strains jump: each has fits of its own.
 pub struct RecoveredStrains<'a> {
     body: &'a Body,
     /// ε(u) at the quadrature points, so many in a triangle.
     strains: Vec<Vector3<f64>>,
     per_triangle: usize,
-    fits: Vec<Fit>,
+    /// Of each material the fits of the vertices.
+    fits: Vec<Vec<Fit>>,
 }
 
 impl<'a> RecoveredStrains<'a> {
@@ -57,10 +59,13 @@ impl<'a> RecoveredStrains<'a> {
     /// PETSc failed.
     pub fn new(body: &'a Body, u: &[f64]) -> Result<Self, PetscError> {
         let (strains, samples) = for_elements!(body, cells => {
-            (cells.strains(u, |strain| strain), sample_points(body, &cells))
+            (cells.strains(u, |_, strain| strain), sample_points(body, &cells))
         });
         let per_triangle = strains.len() / body.triangles.len();
-        let fits = fits(body, &strains, &samples, per_triangle)?;
+        let last = body.materials.iter().copied().max().unwrap_or(0);
+        let last = body.vertices.partition.comm().max(f64::from(last)) as usize;
+        let of_material = |material| fits(body, material, &strains, &samples, per_triangle);
+        let fits = (0..=last).map(of_material).collect::<Result<_, _>>()?;
         Ok(Self { body, strains, per_triangle, fits })
     }
 
@@ -72,7 +77,7 @@ impl<'a> RecoveredStrains<'a> {
             let own = per_triangle * t..per_triangle * (t + 1);
             let mean = zeta[own].iter().sum::<f64>() / per_triangle as f64;
             let difference = self.difference(t);
-            let stress = difference.map(|strain| elasticity.d * strain);
+            let stress = difference.map(|strain| elasticity.d(body, t) * strain);
             mean * triangle.area() * mean_product(&difference, &stress, Vector3::dot)
         };
         let own = body.triangles.iter().enumerate().take(body.own_triangles);
@@ -88,12 +93,13 @@ impl<'a> RecoveredStrains<'a> {
     /// the quadrature points ε(u) is affine, but for curved triangles.)
     fn difference(&self, t: usize) -> [Vector3<f64>; 6] {
         let (body, triangle) = (self.body, self.body.mesh.triangles[t]);
+        let fits = &self.fits[body.material(t)];
         let strains = &self.strains[self.per_triangle * t..self.per_triangle * (t + 1)];
         let computed = at_vertices(strains);
         let at = |i: usize| body.mesh.nodes[triangle[i]];
         let recovered = |i: usize, [x, y]: [f64; 2]| {
             let [vx, vy] = at(i);
-            self.fits[triangle[i]].transpose() * monomials([x - vx, y - vy])
+            fits[triangle[i]].transpose() * monomials([x - vx, y - vy])
         };
         let vertex = |i: usize| recovered(i, at(i)) - computed[i];
         let middle = |i: usize, j: usize| {
@@ -109,7 +115,7 @@ impl<'a> RecoveredStrains<'a> {
 
 /// The strains of nodal u at the vertices and the midpoints of the sides 01, 12, 20 of each triangle.
 pub fn strains_at_nodes(body: &Body, u: &[f64]) -> Vec<[Vector3<f64>; 6]> {
-    let strains = for_elements!(body, cells => cells.strains(u, |strain| strain));
+    let strains = for_elements!(body, cells => cells.strains(u, |_, strain| strain));
     let with_midpoints = |of: &[Vector3<f64>]| {
         let [a, b, c] = at_vertices(of);
         [a, b, c, 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)]
@@ -145,7 +151,7 @@ fn sample_points<const N: usize, const Q: usize>(
     cells.nodes.iter().flat_map(|nodes| values.iter().map(move |v| place(nodes, v))).collect()
 }
 
-/// The triangles around each vertex, rising, in one list.
+/// The triangles of one material around each vertex, rising, in one list.
 struct TrianglesAround {
     triangles: Vec<usize>,
     /// Where those of each vertex end.
@@ -153,13 +159,15 @@ struct TrianglesAround {
 }
 
 impl TrianglesAround {
-    fn new(mesh: &Mesh) -> Self {
+    fn new(body: &Body, material: usize) -> Self {
+        let triangles = body.mesh.triangles.iter().enumerate();
+        let own = triangles.filter(|(t, _)| body.material(*t) == material);
         // Where those of each vertex begin, then, as they are put there, end.
-        let mut ends = vec![0; mesh.nodes.len() + 1];
-        mesh.triangles.iter().flatten().for_each(|&vertex| ends[vertex + 1] += 1);
+        let mut ends = vec![0; body.mesh.nodes.len() + 1];
+        own.clone().flat_map(|(_, triangle)| triangle).for_each(|&vertex| ends[vertex + 1] += 1);
         (1..ends.len()).for_each(|i| ends[i] += ends[i - 1]);
-        let mut triangles = vec![0; 3 * mesh.triangles.len()];
-        for (t, triangle) in mesh.triangles.iter().enumerate() {
+        let mut triangles = vec![0; ends[ends.len() - 1]];
+        for (t, triangle) in own {
             for &vertex in triangle {
                 triangles[ends[vertex]] = t;
                 ends[vertex] += 1;
@@ -174,15 +182,16 @@ impl TrianglesAround {
     }
 }
 
-/// The fit of each vertex.
+/// The fit of each vertex to the strains of one material; what vertices outside it have is nothing.
 fn fits(
     body: &Body,
+    material: usize,
     strains: &[Vector3<f64>],
     samples: &[[f64; 2]],
     per_triangle: usize,
 ) -> Result<Vec<Fit>, PetscError> {
     let (vertices, nodes) = (&body.mesh.nodes, body.mesh.nodes.len());
-    let around = TrianglesAround::new(&body.mesh);
+    let around = TrianglesAround::new(body, material);
     let partition = &body.vertices.partition;
     let degree = if per_triangle > 1 { 2 } else { 1 };
     let own_fit = |vertex: usize, degree: usize| {

@@ -35,7 +35,7 @@ impl Stiffness {
         let partition = &body.nodes.partition;
         let (contributions, pairs) = for_elements!(body, cells => {
             let (places, pairs) = pairs(&cells, partition.owned());
-            (contributions(&cells, &places, elasticity, bases), pairs)
+            (contributions(body, &cells, &places, elasticity, bases), pairs)
         });
 
         let fixed = bases.fixed();
@@ -68,7 +68,8 @@ impl Stiffness {
         }
         let trace = partition.comm().total(trace);
         let free = partition.comm().count(2 * partition.owned() - diagonal.len());
-        let scale = if trace > 0.0 { trace / free as f64 } else { elasticity.material.young };
+        let young = || elasticity.materials().map(|material| material.young).fold(0.0, f64::max);
+        let scale = if trace > 0.0 { trace / free as f64 } else { young() };
 
         let values = vec![scale; rows.len()];
         let mut matrix = Matrix::with_pattern(session, 2 * partition.owned(), 2, rows, columns)?;
@@ -168,6 +169,7 @@ fn pairs<const N: usize, const Q: usize>(
 /// The quadrature points of each place with their undamaged blocks, row by row, in the unknowns of
 /// `bases`: D_i⁻ᵀ K_ij D_j⁻¹.
 fn contributions<const N: usize, const Q: usize>(
+    body: &Body,
     cells: &Cells<N, Q>,
     places: &[Place],
     elasticity: &Elasticity,
@@ -176,9 +178,10 @@ fn contributions<const N: usize, const Q: usize>(
     let mut contributions = Vec::with_capacity(Q * places.len());
     for &(t, i, j) in places {
         let (i, j, nodes) = (usize::from(i), usize::from(j), &cells.nodes[t as usize]);
+        let d = elasticity.d(body, t as usize);
         let (left, right) = (bases.inverse(nodes[i]), bases.inverse(nodes[j]));
         for (q, point) in cells.elements[t as usize].points.iter().enumerate() {
-            let mut k: Matrix2<f64> = point.stiffness(&elasticity.d, i, j);
+            let mut k: Matrix2<f64> = point.stiffness(d, i, j);
             if let Some(inverse) = left {
                 k = inverse.transpose() * k;
             }

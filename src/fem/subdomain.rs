@@ -178,8 +178,9 @@ impl Subdomain {
             nodes: vertices.field(&part.nodes, 1),
             triangles: vertices.cells(&part.triangles, &triangles),
             curves: part.curves.iter().map(|(n, c)| (n.clone(), vertices.curve(c))).collect(),
-            // The elements know their curvature.
+            // The elements know their curvature, the body its materials.
             curved: BTreeMap::new(),
+            surfaces: BTreeMap::new(),
         };
         let elements = undivided.quadratic.as_ref().zip(quadratic.as_ref());
         let elements = elements.map(|(undivided, nodes)| QuadraticElements {
@@ -192,6 +193,10 @@ impl Subdomain {
             mesh,
             triangles: triangles.iter().map(|&t| undivided.triangles[t]).collect(),
             own_triangles,
+            materials: triangles
+                .iter()
+                .filter_map(|&t| undivided.materials.get(t).copied())
+                .collect(),
             global_triangles: triangles,
             nodes: match quadratic {
                 None => Rc::clone(&vertices),

@@ -31,6 +31,9 @@ pub struct Mesh {
     pub triangles: Vec<[usize; 3]>,
     /// The physical curves by name; a group without a name goes by its tag.
     pub curves: BTreeMap<String, Curve>,
+    /// The triangles of the physical surfaces by name, rising; a group without a name goes by its tag. A
+    /// triangle may be in several.
+    pub surfaces: BTreeMap<String, Vec<usize>>,
     /// The midpoints of curved edges, m, by their ends in increasing order; the others are straight.
     /// Quadratic elements follow them, linear ones do not know them.
     pub curved: BTreeMap<[usize; 2], [f64; 2]>,

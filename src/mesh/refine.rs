@@ -86,6 +86,10 @@ impl Refinement {
                 }
             }
         }
+        for triangles in mesh.surfaces.values_mut() {
+            let inside = |t: &usize| triangles.binary_search(&parent_of_triangle[*t]).is_ok();
+            *triangles = (0..parent_of_triangle.len()).filter(inside).collect();
+        }
         Ok(Self { mesh, parent_of_triangle, halved_edges })
     }
 

@@ -218,18 +218,25 @@ fn point_data(problem: &DiscreteProblem, state: &State) -> Result<Vec<DataArray>
     Ok(arrays)
 }
 
-/// The fields that are constant on each triangle; the stress has the components xx, yy, xy.
+/// The fields that are constant on each triangle; the stress has the components xx, yy, xy. Of several
+/// materials each triangle has the number: 0, and for the surfaces of the scene 1, 2, … by name.
 fn cell_data(problem: &DiscreteProblem, state: &State) -> Vec<DataArray> {
     let (elasticity, body) = (&problem.elasticity, &problem.body);
     let zeta = problem.zeta_at_points(&state.zeta);
     let mut stress = elasticity.stresses(body, &zeta, &state.u);
     stress.truncate(body.own_triangles);
-    let von_mises = stress.iter().map(|s| elasticity.material.von_mises(s));
+    let von_mises =
+        stress.iter().enumerate().map(|(t, s)| elasticity.material(body, t).von_mises(s));
     let components = stress.iter().flat_map(|s| [s[0], s[1], s[2]]);
-    vec![
+    let mut arrays = vec![
         DataArray::new("von_mises", REAL, 1, von_mises),
         DataArray::new("stress", REAL, 3, components).with_names(&["xx", "yy", "xy"]),
-    ]
+    ];
+    if !problem.scene().surfaces.is_empty() {
+        let materials = body.materials[..body.own_triangles].iter().map(|&number| number as i32);
+        arrays.push(DataArray::new("material", INTEGER, 1, materials));
+    }
+    arrays
 }
 
 /// The list of the files of a frame's pieces, with the arrays `points` and `cells` in each.

@@ -1,9 +1,9 @@
 //! What only the mesh can tell: names, and values at the nodes.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::boundary::{Boundary, Condition, SurfaceLoad, boundary_key, contradiction};
-use super::document::Problem;
+use super::document::{NOWHERE, Problem};
 use super::error::{SceneError, suggestion};
 use super::expression::Expression;
 use super::{Damage, Probe, Scene, may_start_at};
@@ -23,10 +23,11 @@ const EVALUATIONS: usize = 4_000_000;
 type Rule<'a> = (&'a str, &'a dyn Fn(f64) -> bool);
 
 impl Scene {
-    /// Checks the scene against its mesh: every boundary names a physical curve on the
-    /// boundary of the body, boundaries that share edges do not contradict each other, ζ₀ is in
-    /// (ζ_*, 1] at the nodes, fixed normals point out of the body, and all expressions are finite where and when they are used, as far as times are known
-    /// beforehand (a thousand of them at most).
+    /// Checks the scene against its mesh: every material of a surface names a physical surface, every
+    /// boundary a physical curve on the boundary of the body, boundaries that share edges do not contradict
+    /// each other, ζ₀ is in (ζ_*, 1] at the nodes, fixed normals point out of the body, and all expressions
+    /// are finite where and when they are used, as far as times are known beforehand (a thousand of them at
+    /// most).
     ///
     /// # Errors
     /// All that is wrong, each with its line, key, point and time.
@@ -39,6 +40,7 @@ impl Scene {
             }
         }
         problems.extend(self.check_shared_edges(mesh));
+        problems.extend(self.check_surfaces(mesh));
         problems.extend(self.bad_values(mesh, &self.sample_times(1000)));
         self.text.verdict(problems)
     }
@@ -132,6 +134,33 @@ impl Scene {
             }
         };
         Err(self.at_name(boundary, &problem))
+    }
+
+    /// The surfaces with a material of their own that the mesh does not have, or that share a triangle.
+    fn check_surfaces(&self, mesh: &Mesh) -> Vec<Problem> {
+        let mut problems = Vec::new();
+        let mut taken = BTreeMap::new();
+        for name in self.surfaces.keys() {
+            let keys = ["material", "damage"].map(|table| format!("{table}.{name}"));
+            let key = keys.iter().find(|key| self.text.place(key) != NOWHERE).unwrap_or(&keys[0]);
+            let Some(triangles) = mesh.surfaces.get(name) else {
+                let known: Vec<&str> = mesh.surfaces.keys().map(String::as_str).collect();
+                let suggestion = suggestion(name, &known);
+                let problem = format!("is no physical surface of the mesh{suggestion}");
+                problems.push(self.at_key(key, &problem));
+                continue;
+            };
+            let shared = triangles.iter().find_map(|t| Some((taken.insert(*t, name)?, *t)));
+            if let Some((other, t)) = shared {
+                let [x, y] = mesh.nodes[mesh.triangles[t][0]];
+                let problem = format!(
+                    "and \"{other}\" have a triangle at ({x}, {y}) in common: it cannot be of both \
+                     materials; take it out of one of the two physical surfaces"
+                );
+                problems.push(self.at_key(key, &problem));
+            }
+        }
+        problems
     }
 
     /// The boundaries that share an edge and cannot both hold there. Shared nodes, where curves

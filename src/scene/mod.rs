@@ -13,6 +13,7 @@ mod schema;
 mod tables;
 
 use std::collections::BTreeMap;
+use std::iter;
 use std::path::{Path, PathBuf};
 
 pub use boundary::{Boundary, Condition, Gap, SurfaceLoad};
@@ -23,7 +24,7 @@ pub use schema::{schema, schema_of};
 use crate::{
     contact::ContactOptions,
     fem::Mass,
-    mesh::Order,
+    mesh::{Mesh, Order},
     model::{DamageLaw, Material},
 };
 use document::SceneText;
@@ -39,10 +40,12 @@ pub struct Scene {
     pub title: String,
     /// Where the mesh comes from.
     pub mesh: MeshSource,
-    /// The undamaged material.
+    /// The undamaged material, but for the `surfaces`.
     pub material: Material,
     /// The damage law and ζ₀; without it nothing is damaged.
     pub damage: Option<Damage>,
+    /// The physical surfaces that are of another material or have another damage law, by name.
+    pub surfaces: BTreeMap<String, Surface>,
     /// The order of the displacements.
     pub order: Order,
     /// The largest relative error of u (energy norm) and of the damage: mesh and steps are then chosen.
@@ -91,6 +94,15 @@ pub struct Damage {
     pub initial: Expression,
     /// How (28) is integrated.
     pub mass: Mass,
+}
+
+/// What a physical surface is made of.
+#[derive(Debug, Clone, Copy)]
+pub struct Surface {
+    /// Its material.
+    pub material: Material,
+    /// Its damage law, where there is damage: its ζ_* is that of all.
+    pub law: Option<DamageLaw>,
 }
 
 /// Whether ζ is in (ζ_*, 1], as ζ₀ must be.
@@ -207,6 +219,28 @@ impl Units {
 }
 
 impl Scene {
+    /// All materials by their numbers, that of the scene and those of the surfaces.
+    pub fn materials(&self) -> impl Iterator<Item = Material> {
+        iter::once(self.material).chain(self.surfaces.values().map(|surface| surface.material))
+    }
+
+    /// The damage laws of these materials; none without damage.
+    pub fn damage_laws(&self) -> Vec<DamageLaw> {
+        let own = self.damage.iter().map(|damage| damage.law);
+        own.chain(self.surfaces.values().filter_map(|surface| surface.law)).collect()
+    }
+
+    /// The number of the material of each triangle of `mesh`; none where there is only one material.
+    pub fn materials_of(&self, mesh: &Mesh) -> Vec<u32> {
+        let count = if self.surfaces.is_empty() { 0 } else { mesh.triangles.len() };
+        let mut materials = vec![0; count];
+        for (number, name) in (1..).zip(self.surfaces.keys()) {
+            let triangles = mesh.surfaces.get(name).into_iter().flatten();
+            triangles.for_each(|&t| materials[t] = number);
+        }
+        materials
+    }
+
     /// The times at which expressions are evaluated and checked before the run, s: all t_n, or some
     /// `most` (at least 1) evenly chosen ones; a hundred times where steps are chosen; t = 1 where there
     /// is no time.

@@ -356,6 +356,23 @@ pub(super) struct Table<'d> {
 }
 
 impl<'d> Table<'d> {
+    /// What is read from all tables among the entries that were not yet asked for, by their names.
+    pub(super) fn tables<T>(
+        &mut self,
+        read: impl Fn(&mut Table) -> Reading<T>,
+    ) -> Reading<Vec<(String, T)>> {
+        if self.value.findings.asked.is_some() {
+            let any = self.value.below(format!("{}.*", self.value.key), NOWHERE, None);
+            return any.table(".", read).map(|_| Vec::new());
+        }
+        let is_table = |value: &Value| value.value.is_some_and(DeValue::is_table);
+        let entries = std::mem::take(&mut self.entries).into_iter();
+        let (tables, others): (Vec<_>, _) = entries.partition(|(_, value)| is_table(value));
+        self.entries = others.into_iter().collect();
+        let read = |(name, value): (&str, Value)| Ok((name.to_owned(), value.table(".", &read)?));
+        tables.into_iter().map(read).collect::<Vec<_>>().into_iter().collect()
+    }
+
     /// The value of `key`, or the lack of one, once.
     pub(super) fn get(&mut self, key: &'static str) -> Value<'d> {
         self.known.push(key);

@@ -59,7 +59,13 @@ impl Description {
 fn node<'a>(root: &'a mut Json, path: &str) -> &'a mut Json {
     let names = path.split('.').filter(|name| !name.is_empty());
     names.fold(root, |node, name| match name.trim_end_matches("[]") {
-        "*" => &mut node["additionalProperties"],
+        "*" => {
+            let any = &mut node["additionalProperties"];
+            if any.is_boolean() {
+                *any = json!({});
+            }
+            any
+        }
         array if array != name => &mut node["properties"][array]["items"],
         name => &mut node["properties"][name],
     })

@@ -3,6 +3,8 @@
 //! Each reader first asks for all keys of its table and only then looks whether a value was refused
 //! (`?`): so every value is judged, and no key that it knows passes for unknown.
 
+use std::array;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::boundary::boundaries;
@@ -10,7 +12,7 @@ use super::document::SceneText;
 use super::expression::Expression;
 use super::reader::{Reading, Table, Value};
 use super::{
-    Damage, MeshSource, OutputOptions, Probe, Scene, Scheme, Stepping, TimeGrid, Units,
+    Damage, MeshSource, OutputOptions, Probe, Scene, Scheme, Stepping, Surface, TimeGrid, Units,
     may_start_at,
 };
 use crate::{
@@ -48,13 +50,24 @@ pub(super) fn scene(root: &mut Table, path: &Path, text: &SceneText) -> Reading<
 
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let (time, note) = time?.unzip();
+    let (material, materials) = material?;
+    let (damage, laws) = damage?.unzip();
+    let law = damage.as_ref().map(|damage: &Damage| damage.law);
+    let mut surfaces = BTreeMap::new();
+    for (name, material) in materials {
+        surfaces.insert(name, Surface { material, law });
+    }
+    for (name, law) in laws.into_iter().flatten() {
+        surfaces.entry(name).or_insert(Surface { material, law: None }).law = Some(law);
+    }
     Ok(Scene {
         path: path.to_owned(),
         title: title?.unwrap_or_else(|| name.clone()),
         name,
         mesh: mesh?,
-        material: material?,
-        damage: damage?,
+        material,
+        damage,
+        surfaces,
         order: order?.unwrap_or(if accuracy?.is_some() { Order::Quadratic } else { Order::Linear }),
         accuracy: accuracy?,
         time,
@@ -94,12 +107,25 @@ fn mesh(table: &mut Table, scene: &Path) -> Reading<MeshSource> {
     Ok(MeshSource { file: scene.parent().unwrap_or(Path::new("")).join(name), parameters })
 }
 
-fn material(table: &mut Table) -> Reading<Material> {
-    let young = table.get("young").positive("Pa");
-    let poisson = table.get("poisson");
-    let poisson = poisson.number("between -1 and 0.5, both excluded", |nu| -1.0 < nu && nu < 0.5);
+/// The material, and those of the physical surfaces that have a table of their own.
+fn material(table: &mut Table) -> Reading<(Material, Vec<(String, Material)>)> {
+    let young = |value: &Value| value.positive("Pa");
+    let poisson = |value: &Value| {
+        value.number("between -1 and 0.5, both excluded", |nu| -1.0 < nu && nu < 0.5)
+    };
+    let [e, nu] = [young(&table.get("young")), poisson(&table.get("poisson"))];
     let plane = table.get("plane").choice([("stress", Plane::Stress), ("strain", Plane::Strain)]);
-    Ok(Material { young: young?, poisson: poisson?, plane: plane? })
+    let surfaces = table.tables(|table| {
+        let e = table.get("young").optional(young);
+        let nu = table.get("poisson").optional(poisson);
+        Ok((e?, nu?))
+    });
+    let own = Material { young: e?, poisson: nu?, plane: plane? };
+    let other = |(name, (e, nu)): (String, (Option<f64>, Option<f64>))| {
+        let (young, poisson) = (e.unwrap_or(own.young), nu.unwrap_or(own.poisson));
+        (name, Material { young, poisson, plane: own.plane })
+    };
+    Ok((own, surfaces?.into_iter().map(other).collect()))
 }
 
 fn discretisation(table: &mut Table) -> Reading<Order> {
@@ -109,13 +135,29 @@ fn discretisation(table: &mut Table) -> Reading<Order> {
     Ok(if degree? == Some(2.0) { Order::Quadratic } else { Order::Linear })
 }
 
-fn damage(table: &mut Table) -> Reading<Damage> {
-    let diffusion = table.get("diffusion").positive("m²/s");
-    let rate = |value: &Value| value.number("at least 0 (1/s)", |rate| rate >= 0.0);
-    let (lambda_d, lambda_u) = (rate(&table.get("lambda_d")), rate(&table.get("lambda_u")));
-    let lambda_w = table.get("lambda_w").optional(rate);
-    let strain_cap =
-        table.get("strain_cap").optional(|value| value.number("positive", |q| q > 0.0));
+/// The rule of a number.
+type Rule = (&'static str, fn(f64) -> bool);
+
+/// The constants that may differ between physical surfaces: κ, λ_D, λ_U, λ_W and q*.
+const OF_MATERIAL: [(&str, Rule); 5] = [
+    ("diffusion", ("positive (m²/s)", |kappa| kappa > 0.0)),
+    ("lambda_d", ("at least 0 (1/s)", |rate| rate >= 0.0)),
+    ("lambda_u", ("at least 0 (1/s)", |rate| rate >= 0.0)),
+    ("lambda_w", ("at least 0 (1/s)", |rate| rate >= 0.0)),
+    ("strain_cap", ("positive", |q| q > 0.0)),
+];
+
+/// The damage, and the laws of the physical surfaces that have a table of their own.
+fn damage(table: &mut Table) -> Reading<(Damage, Vec<(String, DamageLaw)>)> {
+    let number = |value: &Value, (rule, holds): Rule| value.number(rule, holds);
+    let own = OF_MATERIAL.map(|(key, rule)| {
+        let value = table.get(key);
+        match key {
+            "lambda_w" => Ok(value.optional(|value| number(value, rule))?.unwrap_or(0.0)),
+            "strain_cap" => Ok(value.optional(|value| number(value, rule))?.unwrap_or(STRAIN_CAP)),
+            _ => number(&value, rule),
+        }
+    });
     let threshold = table.get("threshold").optional(|value| {
         value.number("between 0 and 1, both excluded", |zeta| 0.0 < zeta && zeta < 1.0)
     });
@@ -125,20 +167,35 @@ fn damage(table: &mut Table) -> Reading<Damage> {
         value.choice([("consistent", Mass::Consistent), ("lumped", Mass::Lumped)])
     });
 
-    let law = DamageLaw {
-        diffusion: diffusion?,
-        lambda_d: lambda_d?,
-        lambda_u: lambda_u?,
-        lambda_w: lambda_w?.unwrap_or(0.0),
-        strain_cap: strain_cap?.unwrap_or(STRAIN_CAP),
-        threshold: threshold?.unwrap_or(THRESHOLD),
+    let surfaces = table.tables(|table| {
+        let given =
+            OF_MATERIAL.map(|(key, rule)| table.get(key).optional(|value| number(value, rule)));
+        let [diffusion, lambda_d, lambda_u, lambda_w, strain_cap] = given;
+        Ok([diffusion?, lambda_d?, lambda_u?, lambda_w?, strain_cap?])
+    });
+
+    let threshold = threshold?.unwrap_or(THRESHOLD);
+    let of = |[diffusion, lambda_d, lambda_u, lambda_w, strain_cap]: [f64; 5]| DamageLaw {
+        diffusion,
+        lambda_d,
+        lambda_u,
+        lambda_w,
+        strain_cap,
+        threshold,
     };
+    let [diffusion, lambda_d, lambda_u, lambda_w, strain_cap] = own;
+    let own = [diffusion?, lambda_d?, lambda_u?, lambda_w?, strain_cap?];
+    let law = of(own);
+    let other = |(name, given): (String, [Option<f64>; 5])| {
+        (name, of(array::from_fn(|i| given[i].unwrap_or(own[i]))))
+    };
+    let surfaces: Vec<_> = surfaces?.into_iter().map(other).collect();
     let zeta_0 = zeta_0?.unwrap_or(Expression::constant(1.0));
     match zeta_0.as_constant() {
         Some(value) if !may_start_at(&law, value) => {
             Err(initial.refuse(format!("must be in ({}, 1], but is {value}", law.threshold)))
         }
-        _ => Ok(Damage { law, initial: zeta_0, mass: mass?.unwrap_or_default() }),
+        _ => Ok((Damage { law, initial: zeta_0, mass: mass?.unwrap_or_default() }, surfaces)),
     }
 }
 

@@ -44,12 +44,12 @@ fn displaced(problem: &DiscreteProblem) -> Vec<f64> {
 fn damage_load(problem: &DiscreteProblem, u: &[f64], zeta: &[f64]) -> Vec<f64> {
     let (body, law) = (&problem.body, problem.damage().unwrap());
     let strain = problem.elasticity.strain_squared(body, u);
-    source_load(body, problem.mass(), &source(body, &law, &strain, zeta))
+    source_load(body, problem.mass(), &source(body, law, &strain, zeta))
 }
 
 fn damage_system(session: &Session, problem: &DiscreteProblem) -> DamageSystem {
-    let diffusion = problem.damage().unwrap().diffusion;
-    DamageSystem::new(session, &problem.body, problem.mass(), diffusion, STEP).unwrap()
+    let diffusions = problem.diffusions();
+    DamageSystem::new(session, &problem.body, problem.mass(), &diffusions, STEP).unwrap()
 }
 
 /// K, its copy with the contact unknowns prescribed, and the factor of that.

@@ -269,7 +269,7 @@ fn the_loss_of_damage_is_the_integral_of_the_source() {
         for pair in steps.windows(2) {
             let (before, after) = (&pair[0], &pair[1]);
             let strain = problem.elasticity.strain_squared(&problem.body, &before.state.u);
-            let phi = fem::source(&problem.body, &law, &strain, &before.state.zeta);
+            let phi = fem::source(&problem.body, law, &strain, &before.state.zeta);
             let source: f64 = source_load(&problem.body, problem.mass(), &phi).iter().sum();
             assert!(source < -1e-3);
             // The square's area is 1.
@@ -315,11 +315,11 @@ fn the_certificate_of_a_damage_step_bounds_its_error_and_catches_a_planted_one()
         .map(|(v, area)| -v.abs() * area)
         .collect();
     for mass in [Mass::Consistent, Mass::Lumped] {
-        let mut system = DamageSystem::new(&session, &body, mass, diffusion, step).unwrap();
+        let mut system = DamageSystem::new(&session, &body, mass, &[diffusion], step).unwrap();
         let mut zeta = before.clone();
         assert!(system.advance(&load, &mut zeta).unwrap());
         let judge = |zeta: &[f64]| {
-            DamageCertificate::of(&body, mass, diffusion, step, &load, [&before, zeta])
+            DamageCertificate::of(&body, mass, &[diffusion], step, &load, [&before, zeta])
         };
         let good = judge(&zeta);
         let largest = system.largest_residual().unwrap();
@@ -336,7 +336,7 @@ fn the_certificate_of_a_damage_step_bounds_its_error_and_catches_a_planted_one()
         }
         // The solution of another step, diffusion, or source.
         let other =
-            DamageCertificate::of(&body, mass, diffusion, 1.01 * step, &load, [&before, &zeta]);
+            DamageCertificate::of(&body, mass, &[diffusion], 1.01 * step, &load, [&before, &zeta]);
         assert!(other.residual > 1e-4, "{other:?}");
     }
 }

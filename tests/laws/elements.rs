@@ -17,7 +17,7 @@ const YOUNG: f64 = 2.1e5;
 const POISSON: f64 = 0.3;
 
 fn elasticity(plane: Plane) -> Elasticity {
-    Elasticity::new(Material { young: YOUNG, poisson: POISSON, plane })
+    Elasticity::new([Material { young: YOUNG, poisson: POISSON, plane }])
 }
 
 /// Counter-clockwise triangles of all shapes that are not too thin.
@@ -62,7 +62,7 @@ fn energy(mesh: &Mesh, plane: Plane, zeta: &[f64], u: &[f64]) -> f64 {
 #[test]
 fn the_element_stiffness_is_symmetric_and_vanishes_on_three_rigid_motions_only() {
     for plane in [Plane::Stress, Plane::Strain] {
-        let d = elasticity(plane).material.stiffness();
+        let d = elasticity(plane).materials().next().unwrap().stiffness();
         for triangle in triangles() {
             let k = stiffness(&triangle, &d);
             assert!((k - k.transpose()).amax() <= 1e-15 * k.amax());
@@ -78,7 +78,7 @@ fn the_element_stiffness_is_symmetric_and_vanishes_on_three_rigid_motions_only()
 
 #[test]
 fn element_forces_are_the_stiffness_times_the_displacements() {
-    let d = elasticity(Plane::Stress).material.stiffness();
+    let d = elasticity(Plane::Stress).materials().next().unwrap().stiffness();
     let mut random = Random::new(2);
     for triangle in triangles() {
         let u = SVector::<f64, 6>::from_fn(|_, _| random.next());
@@ -299,9 +299,9 @@ fn a_damage_step_solves_the_assembled_system() {
     }
     let expected = left.lu().solve(&right).unwrap();
     let mut next = zeta.clone();
-    let load = source_load(&body, Mass::Consistent, &source(&body, &law, &strain, &zeta));
+    let load = source_load(&body, Mass::Consistent, &source(&body, &[law], &strain, &zeta));
     let mut system =
-        DamageSystem::new(&session, &body, Mass::Consistent, law.diffusion, step).unwrap();
+        DamageSystem::new(&session, &body, Mass::Consistent, &[law.diffusion], step).unwrap();
     assert!(system.advance(&load, &mut next).unwrap());
     let error = difference(&next, expected.as_slice());
     assert!(error < 1e-13, "{error}");

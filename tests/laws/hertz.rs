@@ -18,7 +18,7 @@ fn a_disc_on_a_plane_has_the_pressure_of_hertz() {
     ];
     for sets in scenes {
         let problem = shipped("hertz", sets);
-        let material = problem.elasticity.material;
+        let material = problem.scene().material;
         let (force, radius) = (35e6, 0.05);
         let e = material.young / (1.0 - material.poisson * material.poisson);
         let half_width = (4.0 * force * radius / (PI * e)).sqrt();

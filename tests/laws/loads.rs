@@ -115,7 +115,7 @@ fn a_pressure_on_a_curved_boundary_has_the_resultant_and_moment_of_its_ends() {
 fn a_uniform_stress_is_in_equilibrium_with_its_traction_on_curved_elements() {
     // u = (ax + by, cx + dy): ∫σ : ε(φ_i) = ∫_∂Ω σν·φ_i, to round-off by both quadratures.
     let body = Body::new(curved(), Order::Quadratic);
-    let elasticity = Elasticity::new(Material { young: 3.0, poisson: 0.3, plane: Plane::Strain });
+    let elasticity = Elasticity::new([Material { young: 3.0, poisson: 0.3, plane: Plane::Strain }]);
     let u: Vec<f64> = (body.nodes.points.iter())
         .flat_map(|[x, y]| [0.2 * x + 0.7 * y, 0.1 * x - 0.4 * y])
         .collect();

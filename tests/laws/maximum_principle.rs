@@ -28,13 +28,13 @@ fn violation(body: &Body, mass: Mass, ratio: f64) -> f64 {
     let session = Session::start(&[]).unwrap();
     let n = body.mesh.nodes.len();
     let step = ratio * H * H / LAW.diffusion;
-    let mut system = DamageSystem::new(&session, body, mass, LAW.diffusion, step).unwrap();
+    let mut system = DamageSystem::new(&session, body, mass, &[LAW.diffusion], step).unwrap();
     let mut random = Random::new(7);
     let mut worst = f64::NEG_INFINITY;
     for _ in 0..20 {
         let zeta: Vec<f64> = random.field(n).iter().map(|v| 0.55 + 0.45 * v.signum()).collect();
         let strain: Vec<f64> = random.field(body.triangles.len()).iter().map(|v| v * v).collect();
-        let phi = source(body, &LAW, &strain, &zeta);
+        let phi = source(body, &[LAW], &strain, &zeta);
         let mut next = zeta.clone();
         assert!(system.advance(&source_load(body, mass, &phi), &mut next).unwrap());
         // The sharpest bounds: of ζ + kφ, triangle by triangle.
@@ -93,7 +93,7 @@ fn both_masses_integrate_constants_alike() {
     let strain: Vec<f64> = random.field(body.triangles.len()).iter().map(|v| v * v).collect();
     let zeta: Vec<f64> =
         random.field(body.mesh.nodes.len()).iter().map(|v| 0.6 + 0.3 * v).collect();
-    let phi = source(&body, &LAW, &strain, &zeta);
+    let phi = source(&body, &[LAW], &strain, &zeta);
     let [consistent, lumped] =
         [Mass::Consistent, Mass::Lumped].map(|m| source_load(&body, m, &phi));
     close(lumped.iter().sum(), consistent.iter().sum(), 1e-14);

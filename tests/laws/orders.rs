@@ -97,7 +97,7 @@ fn quadrature() -> Vec<([f64; 3], f64)> {
 /// triangles.
 fn errors(problem: &DiscreteProblem, u: &[f64], d: f64) -> [f64; 3] {
     let (body, mut squares) = (&problem.body, [0.0; 3]);
-    let stiffness = problem.elasticity.material.stiffness();
+    let stiffness = problem.scene().material.stiffness();
     for (t, corners) in body.mesh.triangles.iter().enumerate() {
         let nodes: Vec<usize> = match body.elements() {
             Elements::Linear(cells) => cells.nodes[t].to_vec(),

@@ -4,7 +4,7 @@
 use crate::support::{
     close_to, difference, distorted, history, largest, moved, problem, run, square, turn,
 };
-use signorini::{contact::SOLVERS, evolution::Step};
+use signorini::{contact::SOLVERS, evolution::Step, mesh::Mesh};
 
 const YOUNG: f64 = 200.0;
 const POISSON: f64 = 0.3;
@@ -146,4 +146,114 @@ fn chosen_steps_do_not_pass_over_a_pulse_whose_times_are_known() {
             assert!((low..high).contains(&damage), "{top} {pulse}: {damage}");
         }
     }
+}
+
+/// A square of cells, its triangles above y = ½ the physical surface `upper`.
+fn layered(n: usize) -> Mesh {
+    let mut mesh = square(n);
+    let height = |t: &usize| mesh.triangles[*t].iter().map(|&i| mesh.nodes[i][1]).sum::<f64>();
+    let upper = (0..mesh.triangles.len()).filter(|t| height(t) > 1.5).collect();
+    mesh.surfaces = [("upper".to_owned(), upper)].into();
+    mesh
+}
+
+#[test]
+fn two_layers_are_compressed_each_as_its_material_is() {
+    // ν/E of both is the same, and with it ε_xx; strains are recovered exactly on both sides.
+    let (p, young, poisson) = (1.0, [200.0, 300.0], [0.2, 0.3]);
+    for order in [1, 2] {
+        let text = format!(
+            "discretisation.displacement = {order}
+             material = {{ young = 200, poisson = 0.2, plane = 'stress',
+                           upper = {{ young = 300, poisson = 0.3 }} }}
+             contact.tolerance = 1e-13
+             boundary = [{{ name = 'left', symmetry = true }}, {{ name = 'bottom', gap = 0 }},
+                         {{ name = 'top', pressure = {p} }}]"
+        );
+        let problem = problem(layered(8), &text).unwrap_or_else(|e| panic!("{e}"));
+        let outcome = run(&problem, SOLVERS[0]);
+        let exact = |&[x, y]: &[f64; 2]| {
+            let below = y.min(0.5) / young[0] + (y - 0.5).max(0.0) / young[1];
+            [p * poisson[0] / young[0] * x, -p * below]
+        };
+        let exact: Vec<f64> = problem.body.nodes.points.iter().flat_map(exact).collect();
+        assert!(difference(&outcome.last.state.u, &exact) < 1e-11);
+        assert!(outcome.errors.displacement_mesh < 1e-9, "{:?}", outcome.errors);
+    }
+}
+
+#[test]
+fn surfaces_that_cover_the_body_are_the_body() {
+    let scene = |base: &str, surfaces: bool| {
+        let text = format!(
+            "{base}
+             time = {{ end = 1, step = 0.1 }}
+             boundary = [{{ name = 'left', displacement = [0, 0] }}, {{ name = 'bottom', gap = 0 }},
+                         {{ name = 'top', pressure = '3*t' }}]"
+        );
+        let mut mesh = layered(6);
+        let lower = |t: &usize| !mesh.surfaces["upper"].contains(t);
+        let lower = (0..mesh.triangles.len()).filter(lower).collect();
+        mesh.surfaces.insert("lower".to_owned(), lower);
+        let problem = problem(mesh, &text).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(problem.body.materials.is_empty(), !surfaces);
+        run(&problem, SOLVERS[0]).last
+    };
+    let [material, damage] = [
+        "young = 80, poisson = 0.3",
+        "diffusion = 0.1, lambda_d = 0.2, lambda_u = 400, lambda_w = 0.01, strain_cap = 0.01",
+    ];
+    let one = scene(
+        &format!("material = {{ plane = 'stress', {material} }}\n damage = {{ {damage} }}"),
+        false,
+    );
+    let two = scene(
+        &format!(
+            "material = {{ plane = 'stress', young = 1, poisson = 0,
+                           upper = {{ {material} }}, lower = {{ {material} }} }}
+             damage = {{ diffusion = 7, lambda_d = 1, lambda_u = 1,
+                         upper = {{ {damage} }}, lower = {{ {damage} }} }}"
+        ),
+        true,
+    );
+    assert!(one.record.zeta_min < 0.95, "the law is at work");
+    assert!(difference(&two.state.u, &one.state.u) < 1e-8);
+    assert!(difference(&two.state.zeta, &one.state.zeta) < 1e-9);
+}
+
+#[test]
+fn each_layer_is_damaged_by_its_own_law() {
+    // With one strain everywhere, in one step ∫(ζ₀ − ζ) = k ½ |ε|² Σ λ_U of the halves.
+    let text = "material = { young = 100, poisson = 0, plane = 'stress' }
+         damage = { diffusion = 0.1, lambda_d = 0, lambda_u = 100,
+                    upper = { diffusion = 3, lambda_u = 300 } }
+         time = { end = 0.1, step = 0.1 }
+         boundary = [{ name = 'left', symmetry = true }, { name = 'bottom', gap = 0 },
+                     { name = 'top', gap = -0.02 }]";
+    let problem = problem(layered(6), text).unwrap_or_else(|e| panic!("{e}"));
+    let last = run(&problem, SOLVERS[0]).last;
+    close_to(1.0 - last.record.zeta_mean, 0.1 * 0.5 * 4e-4 * 200.0, 1e-9);
+    let at = |y: f64| {
+        let node = problem.body.mesh.nodes.iter().position(|x| *x == [0.5, y]).unwrap();
+        last.state.zeta[node]
+    };
+    assert!(at(1.0) < at(0.0));
+}
+
+#[test]
+fn surfaces_that_the_mesh_does_not_have_or_that_overlap_are_refused() {
+    let refusal = |surfaces: &str| {
+        let text = format!(
+            "material = {{ young = 1, poisson = 0, plane = 'stress', {surfaces} }}
+             boundary = [{{ name = 'left', displacement = [0, 0] }}]"
+        );
+        let mut mesh = layered(2);
+        mesh.surfaces.insert("all".to_owned(), (0..8).collect());
+        problem(mesh, &text).expect_err("refused").to_string()
+    };
+    let unknown = refusal("uper = { young = 2 }");
+    let said = "material.uper is no physical surface of the mesh; did you mean `upper`? (known: all, upper)";
+    assert!(unknown.contains(said), "{unknown}");
+    let common = refusal("upper = { young = 2 }, all = { young = 3 }");
+    assert!(common.contains("material.upper and \"all\" have a triangle at ("), "{common}");
 }

@@ -152,7 +152,7 @@ fn energy(body: &Body, zeta: &[f64], u: &[f64]) -> f64 {
 
 #[test]
 fn internal_forces_are_the_gradient_of_the_energy() {
-    let elasticity = Elasticity::new(MATERIAL);
+    let elasticity = Elasticity::new([MATERIAL]);
     let mut random = Random::new(14);
     for mesh in [distorted(4), curved()] {
         let body = Body::new(mesh, Order::Quadratic);
@@ -206,7 +206,7 @@ fn the_damage_source_is_taken_at_the_quadrature_points() {
         }
     }
     for mass in [Mass::Consistent, Mass::Lumped] {
-        let load = source_load(&body, mass, &source(&body, &law, &strain, &zeta));
+        let load = source_load(&body, mass, &source(&body, &[law], &strain, &zeta));
         let error = difference(&load, &expected);
         assert!(error < 1e-14, "{error}");
     }

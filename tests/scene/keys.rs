@@ -18,6 +18,11 @@ fn keys() -> Vec<(String, Value, bool)> {
                 Some(table) => walk(&format!("{path}{name}."), table, keys),
                 None => keys.push((format!("{path}{name}"), key.clone(), required)),
             }
+            let named = &key["additionalProperties"];
+            if named["properties"].is_object() {
+                assert!(named["description"].is_string(), "{path}{name}.* has no meaning");
+                walk(&format!("{path}{name}.core."), named, keys);
+            }
         }
     }
     let mut all = Vec::new();

@@ -20,6 +20,7 @@ use super::{
 };
 use crate::{
     archive::{Archive, ArchiveError},
+    model::DamageLaw,
     scene::{Scheme, Stepping},
 };
 use error_control::ErrorControl;
@@ -304,8 +305,8 @@ impl<'a> StepController<'a> {
     fn grow_error(&mut self, length: f64, error: &DVector<f64>) {
         self.not_grown += length;
         let end = self.problem.scene().time.map_or(0.0, |grid| grid.end);
-        let (law, rate) = match (self.problem.damage(), &self.rate) {
-            (Some(law), Some(rate)) if self.not_grown > GROWTH_STEP * end => (law, rate),
+        let (laws, rate) = match (self.problem.damage(), &self.rate) {
+            (Some(laws), Some(rate)) if self.not_grown > GROWTH_STEP * end => (laws, rate),
             _ => {
                 self.error += error;
                 return;
@@ -313,13 +314,16 @@ impl<'a> StepController<'a> {
         };
         let length = std::mem::take(&mut self.not_grown);
         for (i, own) in self.error.iter_mut().enumerate() {
-            let zeta = law.truncate(self.zeta[i]);
-            let internal = law.lambda_d * (1.0 - zeta) / zeta;
-            let external = (law.lambda_w - rate[i] - internal).max(0.0);
-            let growth = if rate[i] < 0.0 {
+            let growth = |law: &DamageLaw| {
+                let zeta = law.truncate(self.zeta[i]);
+                let internal = law.lambda_d * (1.0 - zeta) / zeta;
+                let external = (law.lambda_w - rate[i] - internal).max(0.0);
                 law.lambda_d / (zeta * zeta) + 2.0 * external / zeta
-            } else {
-                0.0
+            };
+            // A node may be of several materials.
+            let growth = match rate[i] < 0.0 {
+                true => laws.iter().map(growth).fold(0.0, f64::max),
+                false => 0.0,
             };
             *own = *own * (1.0 + length * growth) + error[i];
         }

@@ -14,7 +14,7 @@ const PLANAR: f64 = 1e-10;
 
 /// The mesh of the body. Nodes of no triangle, such as the centres of arcs, are left out.
 pub fn mesh(contents: &Contents) -> Result<Mesh> {
-    let elements = triangles(contents);
+    let (elements, surfaces) = triangles(contents);
     if elements.is_empty() {
         let none = "there are no triangles; mesh with `gmsh -2`, and give the body a Physical \
                     Surface if there are physical groups at all";
@@ -41,7 +41,7 @@ pub fn mesh(contents: &Contents) -> Result<Mesh> {
         return fault(second.at, problem);
     }
     let curves = curves(contents, &index, &sides)?;
-    let mut mesh = Mesh { nodes, triangles, curves, ..Mesh::default() };
+    let mut mesh = Mesh { nodes, triangles, curves, surfaces, ..Mesh::default() };
     if !contents.midpoints.is_empty() {
         set_midpoints(&mut mesh, contents, &elements, &index, limit)?;
     }
@@ -55,19 +55,34 @@ fn check_planar(&Node { tag, point: [.., z], at }: &Node, limit: f64) -> Result<
     }
 }
 
-/// The triangles of the body: those of its physical surfaces, if there are any.
-fn triangles(contents: &Contents) -> Vec<&Element<3>> {
+/// The triangles of the body, those of its physical surfaces if there are any, and by name which of
+/// them are in each.
+fn triangles(contents: &Contents) -> (Vec<&Element<3>>, BTreeMap<String, Vec<usize>>) {
     let grouped = contents.triangles.iter().any(|t| t.group != 0);
-    // MSH 2.2 lists a triangle once for each of its groups; the first listing counts. (What is
-    // listed twice in one group, or on two entities, stays and is found to overlap.)
-    let mut first_group = HashMap::new();
-    let listed = contents.triangles.iter().filter(|t| !grouped || t.group != 0);
-    let first = listed.filter(|t| {
-        let mut nodes = t.nodes;
+    // A triangle is listed once for each of its groups; the first listing counts. (What is listed twice
+    // in one group, or on two entities, stays and is found to overlap.)
+    let mut first_listing = HashMap::new();
+    let (mut elements, mut groups) = (Vec::new(), BTreeMap::<i32, Vec<usize>>::new());
+    for triangle in contents.triangles.iter().filter(|t| !grouped || t.group != 0) {
+        let mut nodes = triangle.nodes;
         nodes.sort_unstable();
-        *first_group.entry((t.entity, nodes)).or_insert(t.group) == t.group
-    });
-    first.collect()
+        let listing = (triangle.group, elements.len());
+        let (group, mut index) = *first_listing.entry((triangle.entity, nodes)).or_insert(listing);
+        if group == triangle.group {
+            index = elements.len();
+            elements.push(triangle);
+        }
+        groups.entry(triangle.group).or_default().push(index);
+    }
+    let mut surfaces = BTreeMap::<String, Vec<usize>>::new();
+    for (group, triangles) in groups.into_iter().filter(|_| grouped) {
+        surfaces.entry(contents.name(2, group)).or_default().extend(triangles);
+    }
+    for triangles in surfaces.values_mut() {
+        triangles.sort_unstable();
+        triangles.dedup();
+    }
+    (elements, surfaces)
 }
 
 /// The numbers of the body's nodes by their tags.
@@ -179,8 +194,7 @@ fn curves(contents: &Contents, index: &Index, sides: &[Side]) -> Result<BTreeMap
     let mut curves = BTreeMap::<String, Curve>::new();
     let mut seen = HashSet::new();
     for line in &contents.lines {
-        let name = contents.curve_names.get(&line.group);
-        let name = name.cloned().unwrap_or_else(|| line.group.to_string());
+        let name = contents.name(1, line.group);
         let mut edge = line.nodes.map(|tag| index.get(&tag).copied().unwrap_or(UNLISTED));
         edge.sort_unstable();
         let sides = &sides[sides.partition_point(|side| side.edge < edge)..];

@@ -28,14 +28,14 @@ pub struct Element<const N: usize> {
 /// What a file lists, in its order.
 #[derive(Default)]
 pub struct Contents {
-    /// Names of the physical curves by tag.
-    pub curve_names: BTreeMap<i32, String>,
+    /// Names of the physical curves and surfaces by dimension and tag.
+    pub names: BTreeMap<(i32, i32), String>,
     /// Physical groups of the entities, by dimension and tag (MSH 4.1).
     pub groups: HashMap<(i32, i32), Vec<i32>>,
     pub nodes: Vec<Node>,
     /// The lines in physical groups, once for each group.
     pub lines: Vec<Element<2>>,
-    /// The triangles, in MSH 2.2 once for each of their groups.
+    /// The triangles, once for each of their groups.
     pub triangles: Vec<Element<3>>,
     /// Tags of the nodes between the vertices of second-order elements, by these in increasing
     /// order.
@@ -43,6 +43,11 @@ pub struct Contents {
 }
 
 impl Contents {
+    /// The name of a physical group, or its tag.
+    pub fn name(&self, dimension: i32, group: i32) -> String {
+        self.names.get(&(dimension, group)).cloned().unwrap_or_else(|| group.to_string())
+    }
+
     /// Reads the coordinates of the node `tag`.
     pub fn read_node(&mut self, reader: &mut ByteReader, tag: u64, at: usize) -> Result<()> {
         let mut point = [0.0; 3];
@@ -57,8 +62,8 @@ impl Contents {
     }
 
     /// Reads the nodes of the element `tag` of gmsh's `element_type`, which is on the geometrical
-    /// `entity` and listed at byte `at`. A line is kept once for each of its physical `groups`, a
-    /// triangle once, in the first of them, or 0: that it has one is what counts.
+    /// `entity` and listed at byte `at`. It is kept once for each of its physical `groups`, a triangle
+    /// without any in group 0.
     pub fn read_element(
         &mut self,
         reader: &mut ByteReader,
@@ -81,8 +86,9 @@ impl Contents {
                 if element_type == 9 {
                     self.read_midpoints(reader, &[[a, b], [b, c], [c, a]], tag, at)?;
                 }
-                let group = groups.first().copied().unwrap_or(0);
-                self.triangles.push(Element { tag, group, entity, nodes, at });
+                let groups = if groups.is_empty() { &[0] } else { groups };
+                let of = |&group: &i32| Element { tag, group, entity, nodes, at };
+                self.triangles.extend(groups.iter().map(of));
                 return Ok(());
             }
             // A point.

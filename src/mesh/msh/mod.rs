@@ -18,7 +18,7 @@ use std::{fs, path::Path};
 /// Reads a `.msh` file.
 ///
 /// If any triangle belongs to a physical surface, only such triangles make the body.
-/// Physical curves of the same name are one curve. Nodes and triangles keep the order of
+/// Physical curves of the same name are one curve, as are physical surfaces. Nodes and triangles keep the order of
 /// the file.
 ///
 /// # Errors
@@ -140,7 +140,9 @@ fn physical_names(reader: &mut ByteReader, contents: &mut Contents) -> Result<()
         let quoted = name.strip_prefix('"').and_then(|name| name.strip_suffix('"'));
         match dimension {
             0..=3 if name.is_empty() => return expected(at, what, format!("{dimension} {tag}")),
-            1 => drop(contents.curve_names.insert(tag, quoted.unwrap_or(&name).to_owned())),
+            1 | 2 => {
+                contents.names.insert((dimension, tag), quoted.unwrap_or(&name).to_owned());
+            }
             0..=3 => {}
             _ => return expected(at, what, dimension),
         }

@@ -29,24 +29,36 @@ impl Mesh {
 
         let mut elements = Vec::new();
         let mut names = String::new();
-        for (group, (name, curve)) in (2..).zip(&self.curves) {
+        let surfaces: Vec<(&str, Vec<usize>)> = match self.surfaces.is_empty() {
+            true => vec![("body", (0..self.triangles.len()).collect())],
+            false => self.surfaces.iter().map(|(name, t)| (&**name, t.clone())).collect(),
+        };
+        for (group, (name, curve)) in (surfaces.len() + 1..).zip(&self.curves) {
             names += &format!("1 {group} \"{name}\"\n");
             for &[a, b] in &curve.edges {
                 let nodes = [Some(a), Some(b), middle([a, b])];
-                elements.push((LINES[order], group, nodes.into_iter().flatten().collect()));
+                let nodes: Vec<usize> = nodes.into_iter().flatten().collect();
+                elements.push((LINES[order], [group, group], nodes));
             }
         }
-        for &[a, b, c] in &self.triangles {
+        // Triangle by triangle, so that they are read in their order, once for each surface.
+        let mut groups = vec![Vec::new(); self.triangles.len()];
+        for (group, (name, triangles)) in (1..).zip(&surfaces) {
+            names += &format!("2 {group} \"{name}\"\n");
+            triangles.iter().for_each(|&t| groups[t].push(group));
+        }
+        for (&[a, b, c], groups) in self.triangles.iter().zip(groups) {
             let sides = [[a, b], [b, c], [c, a]].into_iter().filter_map(middle);
             let nodes: Vec<usize> = [a, b, c].into_iter().chain(sides).collect();
-            elements.push((TRIANGLES[order], 1, nodes));
+            let of = |group| (TRIANGLES[order], [group, 1], nodes.clone());
+            elements.extend(groups.into_iter().map(of));
         }
 
         let points = self.nodes.iter().chain(midpoints.iter().map(|(_, point)| point));
         let mut text = format!(
-            "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n{}\n2 1 \"body\"\n{names}\
+            "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n{}\n{names}\
              $EndPhysicalNames\n$Nodes\n{}\n",
-            self.curves.len() + 1,
+            self.curves.len() + surfaces.len(),
             self.nodes.len() + midpoints.len()
         );
         for (number, [x, y]) in (1..).zip(points) {
@@ -54,9 +66,9 @@ impl Mesh {
             let _ = writeln!(text, "{number} {x} {y} 0");
         }
         let _ = write!(text, "$EndNodes\n$Elements\n{}\n", elements.len());
-        for (number, (kind, group, nodes)) in (1..).zip(&elements) {
+        for (number, (kind, [group, entity], nodes)) in (1..).zip(&elements) {
             let nodes: Vec<String> = nodes.iter().map(|node| (node + 1).to_string()).collect();
-            let _ = writeln!(text, "{number} {kind} 2 {group} {group} {}", nodes.join(" "));
+            let _ = writeln!(text, "{number} {kind} 2 {group} {entity} {}", nodes.join(" "));
         }
         text + "$EndElements\n"
     }

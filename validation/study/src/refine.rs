@@ -30,8 +30,11 @@ pub fn refined(mesh: &Mesh) -> Mesh {
     };
     let curves = mesh.curves.iter().map(|(name, curve)| (name.clone(), halves(curve)));
     let curves = curves.collect();
-    let curved = BTreeMap::new();
-    let mut fine = Mesh { nodes, triangles, curves, curved };
+    let quarters = |t: &usize| 4 * t..4 * t + 4;
+    let surfaces = mesh.surfaces.iter();
+    let surfaces = surfaces.map(|(name, t)| (name.clone(), t.iter().flat_map(quarters).collect()));
+    let (surfaces, curved) = (surfaces.collect(), BTreeMap::new());
+    let mut fine = Mesh { nodes, triangles, curves, surfaces, curved };
     for triangle in mesh.triangles.iter().filter(|&&triangle| mesh.is_curved(triangle)) {
         // x(t) = (1−t)a + tb + 4t(1−t)d has a quarter of the offset on each half, and so has the
         // line of the map that runs beside it through the middles of the other sides.

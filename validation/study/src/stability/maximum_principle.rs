@@ -179,8 +179,8 @@ impl Seen {
 
 /// min φ at a state, 1/s.
 fn least_source(problem: &DiscreteProblem, step: &Step) -> f64 {
-    let Some(law) = problem.damage() else { return 0.0 };
+    let Some(laws) = problem.damage() else { return 0.0 };
     let strain = problem.elasticity.strain_squared(&problem.body, &step.state.u);
-    let phi = fem::source(&problem.body, &law, &strain, &step.state.zeta);
+    let phi = fem::source(&problem.body, laws, &strain, &step.state.zeta);
     phi.iter().flatten().copied().fold(0.0, f64::min)
 }
