@@ -123,6 +123,22 @@ fn check_factors(session: &Session, problem: &DiscreteProblem) -> Result<(), Pet
     factors.try_for_each(|factor| factor.check_options())
 }
 
+/// Whether the mesh that is adapted would not take the place of the one that the scene names.
+fn check_mesh_is_kept(scene: &Scene, folder: &Path) -> Result<(), Failure> {
+    let file = |path: &Path| path.canonicalize().ok();
+    let kept = folder.join("mesh.msh");
+    match scene.accuracy.is_some()
+        && file(&kept).is_some_and(|kept| file(&scene.mesh.file) == Some(kept))
+    {
+        true => Err(Failure::input(format!(
+            "{} is the mesh of the scene, and the adapted mesh would be written over it; choose another \
+             folder with --out",
+            kept.display()
+        ))),
+        false => Ok(()),
+    }
+}
+
 /// `signorini run SCENE`, on as many ranks as `mpiexec` has started.
 pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let (started, phases) = (Instant::now(), Phases::default());
@@ -190,6 +206,7 @@ impl<'a> Task<'a> {
         let solver = scene.contact.solver.clone().unwrap_or(SOLVERS[0].to_owned());
         let folder = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
         let as_run = scene.as_run().map_err(Failure::input)?;
+        agree(comm, check_mesh_is_kept(&scene, &folder))?;
         let restart = arguments.restart.then(|| Checkpoint::read(comm, &folder));
         let restart = restart.transpose()?.flatten();
         let made = restart.as_ref().and_then(|checkpoint| checkpoint.header.adapted.clone());

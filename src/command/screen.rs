@@ -8,7 +8,7 @@ use signorini::{
 };
 use std::io::{self, IsTerminal, Write};
 
-/// A component below this part of its force is shown as zero.
+/// A component below this part of the largest force is shown as zero.
 const ROUNDING: f64 = 1e-9;
 
 /// The progress bar counts thousandths of [0, T].
@@ -89,10 +89,11 @@ pub fn conclusion(
         }
         // Resultants come first, three for each support.
         let supports = &task.problem.supports.names;
+        let size = |resultant: &[(String, f64)]| resultant[0].1.hypot(resultant[1].1);
+        let largest = quantities.chunks_exact(3).take(supports.len()).map(size).fold(0.0, f64::max);
         for (name, resultant) in supports.iter().zip(quantities.chunks_exact(3)) {
             let [x, y, moment] = [0, 1, 2].map(|i| resultant[i].1);
-            let size = x.hypot(y);
-            let [x, y] = [x, y].map(|f| if f.abs() < ROUNDING * size { 0.0 } else { f });
+            let [x, y] = [x, y].map(|f| if f.abs() < ROUNDING * largest { 0.0 } else { f });
             let resultant = format!("force ({x:.4e}, {y:.4e}) {force}/{length}");
             lines.push(row("support", format!("{name}: {resultant}, moment {moment:.4e} {force}")));
         }

@@ -7,7 +7,7 @@ use super::{
 use crate::{
     archive::{Archive, ArchiveError},
     fem::{Body, Edge, Subdomain, add_body_force, add_traction, midpoint},
-    scene::{Expression, Scene},
+    scene::{Expression, Scene, Stepping},
 };
 
 /// The midpoint and the length or area, m or m², of an edge or triangle.
@@ -19,6 +19,8 @@ const TRIANGLES: usize = 500;
 const DEVIATION: f64 = 0.05;
 /// Times that differ by less than this part of the run are one.
 const APART: f64 = 1e-9;
+/// Uniform steps that are looked at.
+const STEPS: usize = 50;
 /// Times sampled within a step.
 const POINTS: usize = 16;
 
@@ -223,6 +225,27 @@ impl<'a> LoadCurve<'a> {
                 deviation > DEVIATION * self.largest[kind]
             })
         })
+    }
+
+    /// The first uniform step within which they are not nearly linear, s, of some evenly chosen ones and
+    /// those with breaks: what happens there counts only at its ends.
+    pub(super) fn unresolved_step(problem: &'a DiscreteProblem) -> Option<[f64; 2]> {
+        let grid = problem.scene().time?;
+        let Stepping::Uniform { steps } = grid.stepping else { return None };
+        let mut curve = Self::new(problem)?;
+        let evenly = steps.min(STEPS);
+        let mut looked_at: Vec<usize> = (0..evenly).map(|i| i * steps / evenly).collect();
+        let step = |time: &f64| ((time / grid.end * steps as f64) as usize).min(steps - 1);
+        looked_at.extend(curve.breaks.iter().map(step));
+        looked_at.sort_unstable();
+        looked_at.dedup();
+        let ends = |n: usize| [grid.time(n, steps), grid.time(n + 1, steps)];
+        // A jump at the very end belongs to the next step.
+        let before = 2.0 * APART * grid.end;
+        looked_at
+            .into_iter()
+            .map(ends)
+            .find(|[start, end]| !curve.is_nearly_linear(*start, end - before))
     }
 
     /// Forces and displacements at `time`; the largest ones are kept.

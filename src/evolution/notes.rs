@@ -3,6 +3,7 @@
 use super::{
     Accuracy, DiscreteProblem, Outcome,
     boundary_conditions::Traction,
+    loads::LoadCurve,
     unresolved::{gauss_parts, mean_load},
 };
 use crate::{
@@ -148,6 +149,13 @@ impl DiscreteProblem {
         if motions.free.len() > FREE_MOTIONS {
             let more = motions.free.len() - FREE_MOTIONS;
             notes.push(format!("nothing holds or drives {more} more such motions"));
+        }
+        if let Some([start, end]) = LoadCurve::unresolved_step(self) {
+            notes.push(format!(
+                "loads, displacements or gaps change within a time step, as between t = {start:.4e} and \
+                 {end:.4e}: what happens there counts only at its ends; shorten time.step, or set it to \
+                 \"auto\""
+            ));
         }
         if scene.damage.is_some() && scene.time.is_none() {
             let note = "[damage] without [time]: in this static solve ζ stays damage.initial";

@@ -63,7 +63,10 @@ fn a_traction_narrower_than_the_edges_is_noted() {
                      {{ name = 'top', traction = [0, '{running}'] }}]"
     );
     let notes = problem(square(4), &text).unwrap().notes();
-    assert!(notes.len() == 1 && notes[0].contains(" N/m at t = "), "{notes:?}");
+    // It also runs on within the steps.
+    let told = ["change within a time step", " N/m at t = "];
+    assert_eq!(notes.len(), told.len(), "{notes:?}");
+    assert!(told.iter().all(|told| notes.iter().any(|note| note.contains(told))), "{notes:?}");
 }
 
 #[test]
@@ -129,4 +132,27 @@ fn a_static_scene_is_judged_at_its_only_time() {
         refused.contains("traction[1] is -inf at") && refused.contains(", t = 1\n"),
         "{refused}"
     );
+}
+
+#[test]
+fn what_happens_within_a_uniform_step_is_noted() {
+    let note = |load: &str| {
+        let text = format!(
+            "material = {{ young = 200, poisson = 0.3, plane = 'stress' }}
+             time = {{ end = 1, step = 0.02 }}
+             boundary = [
+                {{ name = 'bottom', displacement = [0, 0] }},
+                {{ name = 'top', traction = ['0', '{load}'] }},
+             ]"
+        );
+        let problem = problem(square(4), &text).unwrap_or_else(|e| panic!("{e}"));
+        problem.notes().iter().any(|note| note.contains("change within a time step"))
+    };
+    // A pulse between two steps, and waves of the length of a step.
+    assert!(note("if(t > 0.301 and t < 0.302, -4, 0)"));
+    assert!(note("-4*sin(50*pi*t)^2"));
+    // A ramp, a slow wave, and a jump at the end of a step.
+    assert!(!note("-4*t"));
+    assert!(!note("-4*sin(pi*t)"));
+    assert!(!note("if(t < 0.5, 0, -4)"));
 }

@@ -16,7 +16,7 @@ fn check_compressed(bottom: &str, obstacles: f64, gap: &str, time: &str, g: impl
         let text = format!(
             "discretisation.displacement = {order}
              material = {{ young = {YOUNG}, poisson = {POISSON}, plane = 'stress' }}
-             contact.tolerance = 1e-12
+             contact = {{ tolerance = 1e-12, rescue = false }}
              {time}
              boundary = [
                 {{ name = 'left', symmetry = true }},

@@ -137,7 +137,11 @@ impl ContactSolver for Tao<'_> {
         let (proximal, calls) =
             if problem.definite() { (0.0, CALLS) } else { (PROXIMAL, PROXIMAL_CALLS) };
         let stiffness = problem.stiffness.scaled(1.0 / problem.stiffness_scale, proximal)?;
+        // Without loads it is an obstacle that moves the body.
+        let pushed =
+            problem.bounds.iter().map(|bound| bound.nearest(0.0).abs()).fold(0.0, f64::max);
         let estimate = problem.max_norm(problem.load)? / problem.stiffness_scale;
+        let estimate = estimate.max(problem.comm.max(pushed));
         let mut unit = if self.displacement > 0.0 { self.displacement } else { estimate };
 
         let mut report = ContactReport::default();

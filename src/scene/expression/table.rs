@@ -33,7 +33,7 @@ impl Table {
             let number = |i: usize| record.get(i).and_then(|text| text.parse().ok());
             let point = match (number(0), number(1)) {
                 (Some(a), Some(f)) if record.len() == 2 => [a, f],
-                (None, None) if row == 0 => continue,
+                (None, None) if row == 0 && !is_like_a_number(&record) => continue,
                 _ => return problem("must be two numbers with a comma between them"),
             };
             if !point.iter().all(|number: &f64| number.is_finite()) {
@@ -70,4 +70,10 @@ impl Table {
     pub(super) fn arguments(&self) -> impl Iterator<Item = f64> {
         self.points.iter().map(|[a, _]| *a)
     }
+}
+
+/// Whether a row begins like a number: then it is a bad row and no header.
+fn is_like_a_number(row: &csv::StringRecord) -> bool {
+    row.get(0)
+        .is_some_and(|text| text.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)))
 }
