@@ -104,8 +104,8 @@ impl FieldWriter {
         let text = text.map_err(|e| OutputError::new(&path, e))?;
         let written = write_whole(&path, text.as_bytes());
         // All ranks collect Γ_C, also where one could not write its piece.
-        self.contact.add(&format!("contact_{number}.vtu"), problem, state)?;
-        written?;
+        let contact = self.contact.add(&format!("contact_{number}.vtu"), problem, state);
+        written.and(contact)?;
         if !comm.is_root() {
             return Ok(());
         }
