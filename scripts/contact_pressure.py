@@ -42,6 +42,10 @@ def draw_pressure(results, limits, figure=None):
         rows[0, -1].scatter([], [], s=25, facecolor=face, edgecolor=BLUE, linewidth=0.8, label=name)
     rows[0, -1].legend(loc="best")
     text = f"{results.active} of {results.summary.get('contact_nodes', '?')} nodes active"
+    largest = results.pressure.max()
+    if largest > limits.pressure > 0.0:
+        factor, unit = stress_unit(largest, results.units)
+        text += f"; the pressure goes up to {largest / factor:.3g} {unit}"
     text = "unloaded" if results.unloaded else "" if results.active is None else text
     text = ", ".join(filter(None, (f"contact at {results.moment}", text)))
     figure.suptitle(headline(results, text), fontsize=11)

@@ -16,7 +16,7 @@ class Limits:
     stress: float  # the top of the colours, Pa
     is_cut: bool  # whether some stresses are above it
     zeta: tuple  # the least and the largest
-    pressure: float  # the largest of Γ_C, Pa
+    pressure: float  # the top of the pressures on Γ_C, Pa
     gap: float  # the largest of Γ_C, m
 
     @property
@@ -25,11 +25,36 @@ class Limits:
         return self.zeta[0] < 1.0
 
 
+def _exceeded_in(part, values, sizes):
+    """The value that is exceeded in this part of all that has these sizes."""
+    order = np.argsort(values)
+    below = np.cumsum(sizes[order]) <= (1.0 - part) * sizes.sum()
+    return values[order[min(np.count_nonzero(below), len(order) - 1)]]
+
+
+def _stress_top(state):
+    """The von Mises stress that is exceeded in 0.5 % of the area."""
+    (ax, ay), (bx, by), (cx, cy) = (state.nodes[state.pieces.elements[:, i]].T for i in range(3))
+    areas = np.abs((bx - ax) * (cy - ay) - (cx - ax) * (by - ay))
+    return _exceeded_in(0.005, state.von_mises, areas)
+
+
+def _pressure_top(state):
+    """The largest contact pressure; where a corner presses, that which is exceeded in 1 % of Γ_C."""
+    pieces = state.contact_pieces()
+    if not pieces:
+        return 0.0
+    lengths = [np.linalg.norm(np.gradient(state.nodes[piece], axis=0), axis=1) for piece in pieces]
+    pressure = state.pressure[np.concatenate(pieces)]
+    largest, top = pressure.max(), _exceeded_in(0.01, pressure, np.concatenate(lengths))
+    return top if largest > 4.0 * top > 0.0 else largest
+
+
 def limits_of(states, factor=None):
     """The scales that suit all `states`, with an amplification of displacements if it is given."""
-    # Stress is singular at corners: a few triangles must not darken all the others.
+    # Stress is singular at corners: what has little area must not darken all the rest.
     largest = max(state.von_mises.max() for state in states)
-    top = max(np.quantile(state.von_mises, 0.995) for state in states)
+    top = max(_stress_top(state) for state in states)
     is_cut = largest > 1.25 * top > 0.0
     factor = factor or _amplification(states)
     on_contact = [np.isfinite(state.gap) for state in states]
@@ -39,7 +64,7 @@ def limits_of(states, factor=None):
         stress=float(top if is_cut else largest),
         is_cut=bool(is_cut),
         zeta=(min(s.zeta.min() for s in states), max(s.zeta.max() for s in states)),
-        pressure=max(s.pressure[on].max(initial=0.0) for s, on in zip(states, on_contact)),
+        pressure=max(_pressure_top(state) for state in states),
         gap=max(s.gap[on].max(initial=0.0) for s, on in zip(states, on_contact)),
     )
 

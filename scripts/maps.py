@@ -106,7 +106,9 @@ def _paint_stress(axes, mesh, results, limits):
     )
     extend = "max" if limits.is_cut else "neither"
     draw_colourbar(axes, image, f"von Mises stress ({unit})", extend)
-    return f"von Mises stress, largest {results.von_mises.max() / factor:.3g} {unit}"
+    largest = results.von_mises.max()
+    factor, unit = stress_unit(largest, results.units)
+    return f"von Mises stress, largest {largest / factor:.3g} {unit}"
 
 
 def _paint_damage(axes, mesh, results, limits):
