@@ -135,7 +135,9 @@ fn refined(
     let mut refinement = Refinement::start(mesh);
     let mut stopped_before = None;
     let mut settled_rounds = 0;
-    for rounds in 1.. {
+    let mut rounds = 0;
+    loop {
+        rounds += 1;
         let problem = DiscreteProblem::new(scene.clone(), refinement.mesh.clone())?;
         let problem = problem.restrict(session)?;
         let triangles = refinement.mesh.triangles.len();
@@ -153,11 +155,7 @@ fn refined(
         }
         indicators.observe(&outcome.last.state, true)?;
         let (error, shares) = indicators.relative();
-        let mut of_damage = indicators.gathered(&outcome.damage_indicators);
-        of_damage.iter_mut().for_each(|share| *share *= CAUTION * CAUTION);
-        let interpolation = of_damage.iter().sum::<f64>().sqrt();
-        let more = (1.0 - 1.0 / CAUTION) * interpolation;
-        let damage_error = outcome.errors.damage_mesh.map(|error| error + more);
+        let (damage_error, of_damage) = cautious_damage(&indicators, &outcome);
         // Two meshes may agree by chance.
         let is_settled = is_settled(&outcome, stopped_before, accuracy);
         settled_rounds = if is_settled { settled_rounds + 1 } else { 0 };
@@ -190,7 +188,15 @@ fn refined(
         stopped_before = outcome.stopped.map(|stop| stop.time);
         refinement = divided(refinement, &ratios)?;
     }
-    unreachable!("the last round returns")
+}
+
+/// The error of the damage with its interpolation counted [`CAUTION`] times, and the square of that part
+/// on each triangle of the whole mesh.
+fn cautious_damage(indicators: &Indicators, outcome: &Outcome) -> (Option<f64>, Vec<f64>) {
+    let mut shares = indicators.gathered(&outcome.damage_indicators);
+    shares.iter_mut().for_each(|share| *share *= CAUTION * CAUTION);
+    let more = (1.0 - 1.0 / CAUTION) * shares.iter().sum::<f64>().sqrt();
+    (outcome.errors.damage_mesh.map(|error| error + more), shares)
 }
 
 /// A damage, or a time, that is not exact enough asks for a u better than this one.

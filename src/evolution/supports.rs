@@ -177,7 +177,10 @@ impl Supports {
         let own: Vec<[f64; 10]> = state.contact.iter().filter_map(row).collect();
         let all = body.nodes.partition.comm().gather(own.as_flattened());
         let mut rows: Vec<[f64; 10]> = all.as_chunks().0.to_vec();
-        rows.sort_by(|a, b| a[..3].partial_cmp(&b[..3]).expect("places are finite"));
+        rows.sort_by(|a, b| {
+            let by = |i: usize| a[i].total_cmp(&b[i]);
+            by(0).then(by(1)).then(by(2))
+        });
         rows.into_iter()
             .map(|[boundary, part, arc_length, x, y, normal_x, normal_y, gap, pressure, active]| {
                 let boundary = self.names[boundary as usize].clone();

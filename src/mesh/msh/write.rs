@@ -12,16 +12,7 @@ impl Mesh {
     #[must_use]
     pub fn to_msh(&self) -> String {
         let order = usize::from(!self.curved.is_empty());
-        let mut midpoints: Vec<([usize; 2], [f64; 2])> = Vec::new();
-        if order == 1 {
-            let sides = |&[a, b, c]: &[usize; 3]| [[a, b], [b, c], [c, a]];
-            let mut edges: Vec<[usize; 2]> = (self.triangles.iter().flat_map(sides))
-                .map(|[a, b]| [a.min(b), a.max(b)])
-                .collect();
-            edges.sort_unstable();
-            edges.dedup();
-            midpoints.extend(edges.into_iter().map(|edge| (edge, self.midpoint(edge))));
-        }
+        let midpoints = if order == 1 { self.midpoints() } else { Vec::new() };
         let middle = |[a, b]: [usize; 2]| {
             let found = midpoints.binary_search_by_key(&[a.min(b), a.max(b)], |(edge, _)| *edge);
             found.ok().map(|i| self.nodes.len() + i)
@@ -71,5 +62,15 @@ impl Mesh {
             let _ = writeln!(text, "{number} {kind} 2 {group} {entity} {}", nodes.join(" "));
         }
         text + "$EndElements\n"
+    }
+
+    /// The midpoints, m, of all edges, sorted by their ends in increasing order.
+    fn midpoints(&self) -> Vec<([usize; 2], [f64; 2])> {
+        let sides = |&[a, b, c]: &[usize; 3]| [[a, b], [b, c], [c, a]];
+        let mut edges: Vec<[usize; 2]> =
+            (self.triangles.iter().flat_map(sides)).map(|[a, b]| [a.min(b), a.max(b)]).collect();
+        edges.sort_unstable();
+        edges.dedup();
+        edges.into_iter().map(|edge| (edge, self.midpoint(edge))).collect()
     }
 }
