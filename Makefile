@@ -17,6 +17,9 @@ PACKAGES := petsc-dev libsuitesparse-dev libopenblas0-serial libclang-dev pkg-co
     python3-meshio python3-matplotlib
 PACKAGES_VALIDATE := python3-dolfinx-real
 PACKAGES_RANDOM := python3-scipy
+# For NGSolve: its Python, and what compiles its forms and keeps them.
+PACKAGES_BENCH := python3-venv g++ ccache
+NGSOLVE := target/ngsolve
 
 BINARY := target/release/signorini
 # The studies: a program of their own in validation/study.
@@ -24,7 +27,7 @@ STUDIES := target/release/signorini-study
 # rustup puts cargo where a shell opened before does not look.
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
-.PHONY: help deps deps-validate deps-random build mesh run figures test validate random compare \
+.PHONY: help deps deps-validate deps-random deps-bench build mesh run figures test validate random compare \
     bench stability reference converge chart kills fuzz wrong clean
 
 help:
@@ -57,6 +60,13 @@ deps-validate: deps
 
 deps-random: deps
 	@scripts/deps.sh $(PACKAGES_RANDOM)
+
+# Without the network the bench leaves NGSolve out.
+deps-bench: deps-validate
+	@scripts/deps.sh $(PACKAGES_BENCH)
+	@test -x $(NGSOLVE)/bin/ngscxx || { \
+	    $(PYTHON) -m venv --system-site-packages $(NGSOLVE) && \
+	    $(NGSOLVE)/bin/pip install --quiet ngsolve==6.2.2608; } || rm -rf $(NGSOLVE)
 
 build: deps
 	cargo build --release --locked
@@ -101,7 +111,7 @@ compare: build
 	[ $$code -eq 2 ] || $(PYTHON) scripts/comparison.py out/compare; exit $$code
 
 # Side by side on this machine: `make bench ARGS=--quick` for small meshes, one round.
-bench: build deps-validate
+bench: build deps-bench
 	$(PYTHON) validation/bench.py --binary $(BINARY) $(ARGS)
 	$(PYTHON) scripts/bench.py out/bench
 

@@ -1,163 +1,185 @@
-"""Draws the measurements of `make bench`: bench.py FOLDER
+"""Prints and draws the measurements of `make bench`: bench.py FOLDER
 
-Reads FOLDER/bench.csv and draws FOLDER/bench.png: the time of a step of every program and how much
-faster signorini is, where contact stays and where it moves; how far a step is from the work that
-none can avoid; growth of time and memory.
+Reads FOLDER/bench.csv, prints it as the tables of the README (Markdown) and draws FOLDER/bench.png: seconds
+per step and of whole processes as multiples of ours, with the floor that no step can go below, and growth.
 """
 
-from statistics import median
+from math import isfinite
 
 import matplotlib.pyplot as plt
 import numpy as np
 
-from drawing import FAINT, INK, RED, draw_table
+from drawing import BLUE, FAINT, GREEN, INK, RED, draw_table
 from results import read_table
 
-STYLES = {
-    ("signorini", "active-set"): ("#2f6db3", "o", "-"),
-    ("signorini", "penalty-duality"): ("#d08a1d", "s", "-"),
-    ("signorini", "tao"): ("#3d8f5a", "^", "-"),
-    ("FEniCSx", "lu"): ("#8e5aa8", "D", "--"),
-    ("FEniCSx", "cholesky"): ("#a3554f", "v", "--"),
-    ("unavoidable", ""): (INK, "_", ":"),
+OURS = ("signorini", "active-set")
+# Colour of each bar; where the factor is made for every system, paler.
+RIVALS = {
+    ("FEniCSx", "kept"): ("FEniCSx, factor kept", "#8e5aa8"),
+    ("FEniCSx", "anew"): ("FEniCSx, a factor for every system", "#c9aed6"),
+    ("NGSolve", "kept"): ("NGSolve, factor kept", "#d08a1d"),
+    ("NGSolve", "anew"): ("NGSolve, a factor for every system", "#ecc98b"),
 }
-DEFAULT = ("signorini", "active-set")
-GIBIBYTES = 1024.0**3
+PASSES = ["stiffness refill", "products", "triangular solves", "damage solve", "factorisation"]
 
 
-def rounds(rows, part, key):
-    """Milliseconds per step of a program, by n, round after round."""
+def cases(rows):
+    """The rows of each case by program and method."""
     found = {}
     for row in rows:
-        if row["part"] == part and (row["program"], row["method"]) == key and not is_whole(row):
-            found.setdefault(int(row["n"]), []).append(1e3 * row["seconds_per_step"])
+        if row["part"] == "compare":
+            case = found.setdefault((row["contact"], int(row["order"]), row["mesh"]), {})
+            case[row["program"], row["method"]] = row
     return found
 
 
-def is_whole(row):
-    """Runs that wrote output; their steps are not compared."""
-    return row["frames"] == "True"
+def number(value, scale=1.0):
+    """Three digits, nothing where there is no value."""
+    return f"{scale * value:.3g}" if isinstance(value, float) and isfinite(value) else ""
 
 
-def line(axes, values, key, **style):
-    """Medians over n with the range of the rounds."""
-    colour, marker, dashes = STYLES[key]
-    n = sorted(values)
-    middle = [median(values[m]) for m in n]
-    apart = [[v - min(values[m]) for m, v in zip(n, middle)],
-             [max(values[m]) - v for m, v in zip(n, middle)]]
-    axes.errorbar(n, middle, apart, color=colour, marker=marker, ls=dashes, ms=6, capsize=2,
-                  lw=1.2, label=" ".join(key).strip(), **style)
+def markdown(header, rows):
+    rows = [[str(cell) for cell in row] for row in rows]
+    widths = [max(map(len, column)) for column in zip(header, *rows)]
+    line = lambda row: "| " + " | ".join(c.rjust(w) for c, w in zip(row, widths)) + " |"
+    print(line(header))
+    print("|" + "|".join("-" * (w + 1) + ":" for w in widths) + "|")
+    for row in rows:
+        print(line(row))
+    print()
 
 
-def time(axes, rows, part, title):
-    """Milliseconds per step of every program; the work that none can avoid is that of `steps`."""
-    for key in STYLES:
-        source = part if key[0] != "unavoidable" else "kernels" if part == "steps" else None
-        if values := rounds(rows, source, key):
-            line(axes, values, key)
-    if not axes.has_data():
-        axes.set_visible(False)
-        return
-    axes.set(xscale="log", yscale="log", xlabel="n", ylabel="ms per step")
+def times(case, rival, key, spread=False):
+    """How many times ours a competitor takes, with the range over the rounds."""
+    row = case.get(rival, {})
+    text = number(row.get(f"{key}_over_ours"))
+    low, high = (row.get(f"{key}_over_ours_{end}") for end in ("least", "most"))
+    if spread and text and low != high:
+        text += f" ({number(low)}–{number(high)})"
+    return text
+
+
+def side_by_side(found):
+    """Ours, and how many times longer the others take."""
+    table = []
+    for (contact, order, mesh), case in found.items():
+        ours = case[OURS]
+        table.append([
+            contact, order, mesh, int(ours["nodes"]), number(ours["seconds_per_step"], 1e3),
+            *(times(case, rival, "seconds_per_step") for rival in RIVALS),
+            number(ours["floor"], 1e3), number(ours["step_over_floor"]), number(ours["whole_seconds"]),
+            *(times(case, rival, "whole_seconds") for rival in RIVALS if rival[1] == "kept"),
+        ])
+    markdown(["contact", "order", "mesh", "nodes", "ms per step", "FEniCSx", "… anew", "NGSolve", "… anew",
+              "floor, ms", "step / floor", "whole, s", "FEniCSx", "NGSolve"], table)
+
+
+def work(found):
+    """What all programs do in a step."""
+    table = [[contact, order, mesh, *program, number(row["seconds_per_step"], 1e3), number(row["iterations"]),
+              number(row["solves"]), number(row["factorisations"]), number(row["peak_mb"]),
+              number(row["kkt"]), number(row.get("apart"))]
+             for (contact, order, mesh), case in found.items() for program, row in case.items()]
+    markdown(["contact", "order", "mesh", "program", "method", "ms per step", "systems", "solve pairs",
+              "factors", "peak MB", "KKT", "apart"], table)
+
+
+def passes(found):
+    """Each pass of ours over its floor."""
+    table = []
+    for (contact, order, mesh), case in found.items():
+        ours = case[OURS]
+        cells = [[number(ours.get(f"ours {name}"), 1e3), number(ours.get(f"floor {name}"), 1e3)]
+                 for name in PASSES]
+        table.append([contact, order, mesh, *(" / ".join(cell) for cell in cells)])
+    row = next(iter(found.values()))[OURS]
+    print(f"Milliseconds of a pass, ours / floor: {row['copy'] / 1e9:.1f} GB/s, {row['dgemm'] / 1e9:.1f} "
+          f"Gflop/s ({row['dgemm as installed'] / 1e9:.1f} with the BLAS as it is installed)\n")
+    markdown(["contact", "order", "mesh", *PASSES], table)
+
+
+def others(rows):
+    """Growth and ranks."""
+    for part in ("growth", "ranks"):
+        chosen = [row for row in rows if row["part"] == part]
+        if chosen:
+            print(f"{part}, n = {', '.join(dict.fromkeys(str(int(r['n'])) for r in chosen))}:\n")
+            markdown(["nodes", "ranks", "ms per step", "whole, s", "peak MB", "solve pairs", "factors"],
+                     [[int(row["nodes"]), int(row["ranks"]),
+                       *(number(row[key], scale) for key, scale in (("seconds_per_step", 1e3),
+                         ("whole_seconds", 1), ("peak_mb", 1), ("solves", 1), ("factorisations", 1)))]
+                      for row in chosen])
+    if sizes := [row for row in rows if row["part"] == "growth" and row["n"] >= 64]:
+        for name, key in (("time per step", "seconds_per_step"), ("peak memory", "peak_mb")):
+            print(f"{name} grows like N^{slope(sizes, key)[0]:.2f} from n = 64")
+
+
+def slope(rows, key):
+    return np.polyfit(np.log([row["nodes"] for row in rows]), np.log([row[key] for row in rows]), 1)
+
+
+def bars(axes, found, key, title):
+    """Multiples of ours, in groups."""
+    found = {name: case for name, case in found.items()
+             if any(times(case, rival, key) for rival in RIVALS)}
+    for k, (rival, (label, colour)) in enumerate(RIVALS.items()):
+        heights = [case.get(rival, {}).get(f"{key}_over_ours", "") for case in found.values()]
+        at = [(i + 0.2 * (k - 1), float(h)) for i, h in enumerate(heights) if isinstance(h, float)]
+        if not at:
+            continue
+        drawn = axes.bar(*zip(*at), 0.19, color=colour, label=label)
+        axes.bar_label(drawn, [f"{h:.3g}" for _, h in at], fontsize=6.5, padding=1)
+    ours = [case[OURS] for case in found.values()]
+    axes.bar(np.arange(len(ours)) - 0.4, 1.0, 0.19, color=BLUE, label="signorini")
+    if key == "seconds_per_step":
+        floor = [1 / row["step_over_floor"] if row["step_over_floor"] else np.nan for row in ours]
+        axes.hlines(floor, np.arange(len(ours)) - 0.52, np.arange(len(ours)) - 0.28, color=RED, lw=2,
+                    label="floor: bytes over copy, operations over dgemm")
+    took = [f"{number(row[key], 1e3)} ms" if key == "seconds_per_step" else f"{number(row[key])} s"
+            for row in ours]
+    axes.set_xticks(range(len(ours)), [
+        f"contact {contact}\nP{order}, {mesh}\n{int(row['nodes'])} nodes\nours: {seconds}"
+        for (contact, order, mesh), row, seconds in zip(found, ours, took)], fontsize=7.5)
+    axes.set(yscale="log", ylabel="times ours")
+    axes.axhline(1, color=BLUE, lw=0.6)
     axes.set_title(title, loc="left")
-    ticks(axes, rows, part)
-    axes.legend(fontsize=8)
+    axes.set_ylim(top=2.2 * axes.get_ylim()[1])
+    axes.legend(fontsize=8, ncols=3, loc="upper left")
 
 
-def ratios(axes, rows, part):
-    """How many times longer FEniCSx takes than the default; where contact stays, what is demanded,
-    and the default against the work that no step can avoid."""
-    ours = rounds(rows, part, DEFAULT)
-    for key in STYLES:
-        theirs = rounds(rows, part, key) if key[0] == "FEniCSx" else {}
-        same = {n: [a / b for a, b in zip(theirs[n], ours[n])] for n in theirs}
-        if same:
-            line(axes, same, key)
-    if not axes.has_data():
+def growth(axes, rows, key, scale, label):
+    chosen = [row for row in rows if row["part"] == "growth"]
+    if not chosen:
         axes.set_visible(False)
         return
-    title = "FEniCSx against active-set"
-    # What is demanded, and the unavoidable work, are those of P1.
-    if part == "steps" and rows[0].get("order", 1) == 1:
-        against_unavoidable(axes, rows)
-        title += ", and active-set against the unavoidable work"
-    axes.set(xscale="log", xlabel="n", ylabel="times")
-    axes.set_ylim(0, 1.35 * axes.get_ylim()[1])
-    axes.set_title(title, loc="left")
-    ticks(axes, rows, part)
-    axes.legend(fontsize=8, loc="upper left")
-
-
-def against_unavoidable(axes, rows):
-    """The default over the unavoidable work, and what is demanded of both ratios."""
-    below = rounds(rows, "kernels", ("unavoidable", ""))
-    steps = rounds(rows, "kernels", DEFAULT)
-    if below:
-        same = {n: [a / b for a, b in zip(steps[n], below[n])] for n in below}
-        colour = STYLES[DEFAULT][0]
-        axes.plot(list(same), [median(r) for r in same.values()], "*", color=colour, ms=10,
-                  label="active-set / unavoidable")
-    for n, least in ((128, 12), (256, 15)):
-        axes.plot([0.85 * n, 1.18 * n], [least, least], color=RED, lw=2)
-    axes.plot([0.85 * 256, 1.18 * 256], [2.5, 2.5], color=RED, lw=2, label="demanded")
-
-
-def growth(axes, rows, key, scale, title, demanded):
-    """One quantity over the number of unknowns, with the fitted exponent."""
-    runs = middle([row for row in rows if row["part"] == "growth"])
-    if not runs:
-        axes.set_visible(False)
-        return
-    n, values = (np.array([row[k] for row in runs]) for k in ("unknowns", key))
-    values = values * scale
-    axes.loglog(n, values, "o-", color=STYLES[DEFAULT][0], ms=6, lw=1.2)
-    large = [i for i, row in enumerate(runs) if row["n"] >= 64]
-    slope, start = np.polyfit(np.log(n[large]), np.log(values[large]), 1)
-    axes.loglog(n[large], np.exp(start) * n[large] ** slope, ":", color=INK, lw=1,
-                label=f"fitted from n = 64: N^{slope:.2f}")
-    demanded(axes, n, values)
-    axes.set(xlabel="unknowns of u", ylabel=title)
-    axes.set_title(f"growth: {title}", loc="left")
+    nodes, values = (np.array([row[k] for row in chosen]) for k in ("nodes", key))
+    axes.loglog(2 * nodes, scale * values, "o-", color=GREEN, ms=5, lw=1.2)
+    exponent, start = slope([row for row in chosen if row["n"] >= 64] or chosen, key)
+    axes.loglog(2 * nodes, scale * np.exp(start) * nodes**exponent, ":", color=INK, lw=1,
+                label=f"N^{exponent:.2f}")
+    axes.set(xlabel="unknowns", ylabel=label)
+    axes.set_title(f"signorini, contact stays: {label}", loc="left")
     axes.legend(fontsize=8)
-
-
-def middle(runs):
-    """For each n the median run."""
-    sizes = dict.fromkeys(row["n"] for row in runs)
-    same = [sorted((r for r in runs if r["n"] == n), key=lambda r: r["seconds_per_step"])
-            for n in sizes]
-    return [group[len(group) // 2] for group in same]
-
-
-def slope_allowed(axes, n, values):
-    """N^1.25 through the run at n = 64."""
-    at = min(1, len(n) - 1)
-    axes.loglog(n[at:], values[at] * (n[at:] / n[at]) ** 1.25, color=RED, lw=1, label="N^1.25")
-
-
-def memory_allowed(axes, _n, _values):
-    axes.axhline(8 * GIBIBYTES / 1e6, color=RED, lw=1, label="8 GiB")
-
-
-def ticks(axes, rows, part):
-    sizes = sorted({int(row["n"]) for row in rows if row["part"] == part})
-    axes.set_xticks(sizes, [str(n) for n in sizes])
-    axes.minorticks_off()
 
 
 def draw(table):
     rows = read_table(table)
-    figure, all_axes = plt.subplots(3, 2, figsize=(11, 12))
-    (a, b), (c, d), (e, f) = all_axes
-    time(a, rows, "steps", "contact stays: a step of square-mild")
-    ratios(b, rows, "steps")
-    time(c, rows, "moving", "contact moves: a step of lshape-rolling")
-    ratios(d, rows, "moving")
-    growth(e, rows, "seconds_per_step", 1e3, "ms per step", slope_allowed)
-    growth(f, rows, "peak_mb", 1.0, "peak memory, MB", memory_allowed)
-    for axes in all_axes.flat:
-        axes.grid(color=FAINT, alpha=0.35, linewidth=0.6)
+    found = cases(rows)
+    if found:
+        side_by_side(found)
+        passes(found)
+        work(found)
+    others(rows)
+    figure = plt.figure(figsize=(12, 12))
+    grid = figure.add_gridspec(3, 2, height_ratios=[1.3, 1.3, 1])
+    steps, whole = figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, :])
+    if found:
+        bars(steps, found, "seconds_per_step", "a step")
+        bars(whole, found, "whole_seconds", "the whole process, files written")
+    growth(figure.add_subplot(grid[2, 0]), rows, "seconds_per_step", 1e3, "ms per step")
+    growth(figure.add_subplot(grid[2, 1]), rows, "peak_mb", 1.0, "peak memory, MB")
+    for axes in figure.axes:
+        axes.grid(axis="y", color=FAINT, alpha=0.35, linewidth=0.6)
         axes.set_axisbelow(True)
     return figure
 

@@ -25,8 +25,8 @@ KINDS = [
     ("--accuracy 0.1 … 0.001", "accuracy", "active-set", RED, "D"),
     ("the same by tao", "accuracy", "tao", "#3d8f5a", "D"),
     ("the same by penalty-duality", "accuracy", "penalty-duality", "#d08a1d", "D"),
-    ("FEniCSx P1, uniform mesh", "FEniCSx P1", "MUMPS cholesky", "#8e5aa8", "s"),
-    ("FEniCSx P2, our adapted meshes", "FEniCSx P2", "MUMPS cholesky", "#c58ad9", "s"),
+    ("FEniCSx P1, uniform mesh", "FEniCSx P1", "factor kept", "#8e5aa8", "s"),
+    ("FEniCSx P2, our adapted meshes", "FEniCSx P2", "factor kept", "#c58ad9", "s"),
 ]
 
 

@@ -3,6 +3,8 @@
 import csv
 import json
 import os
+import re
+import shutil
 import subprocess
 import sys
 import time
@@ -12,10 +14,16 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
-LOOP = ROOT / "validation" / "loop.py"
 TOLERANCE = 1e-10
-# The kernels of a step.
-KERNELS = ["stiffness refill", "product", "triangular solves", "damage solve"]
+# A competitor may differ from our answer to the same discrete problem by this.
+SAME = 1e-6
+PYTHON = {"FEniCSx": "/usr/bin/python3", "NGSolve": str(ROOT / "target/ngsolve/bin/python")}
+# After how many iterations the loop renews a factor that it keeps: what was fastest where contact
+# moves (CHOLMOD's factor costs about twenty solves, NGSolve's five); where it stays none is renewed.
+KEEP = {"FEniCSx": 7, "NGSolve": 4}
+# Instructions of the processor that OpenBLAS has kernels for; Debian's takes the oldest ones on a
+# processor that is younger than itself.
+KERNELS = {"avx512f": "SkylakeX", "avx2": "Haswell"}
 
 
 class Failure(Exception):
@@ -24,55 +32,57 @@ class Failure(Exception):
 
 @dataclass(frozen=True)
 class Case:
-    """A scene of geo/ on meshes made for it: their parameter for a given n."""
+    """A scene of geo/ on a mesh made for it: uniform with n cells a side or edges along the contact,
+    or the one that `--accuracy` finds; and how many steps of k = 0.01."""
 
-    scene: str
-    geometry: str
-    parameter: str
-    value: callable
+    contact: str
+    order: int
+    n: int = None
+    accuracy: float = None
+    steps: int = 100
+    scene: str = None
+
+    @property
+    def name(self):
+        return self.scene or {"stays": "square-mild", "moves": "lshape-rolling"}[self.contact]
+
+    @property
+    def mesh_name(self):
+        return f"accuracy {self.accuracy:g}" if self.accuracy else f"n = {self.n}"
 
     def file(self):
-        return ROOT / "geo" / f"{self.scene}.toml"
-
-
-# n cells a side; the contact set is the same in all steps.
-FROZEN = Case("square-mild", "square", "n", lambda n: n)
-# n edges across the leg and along the contact; the contact set changes with the steps.
-MOVING = Case("lshape-rolling", "lshape", "size", lambda n: 2 / n)
+        return ROOT / "geo" / f"{self.name}.toml"
 
 
 class Bench:
-    """Runs the programs in turn and keeps what they took, a row each."""
+    """Runs the programs and keeps what they took, a row each."""
 
-    def __init__(self, binary, out, sizes, order=1):
-        self.binary, self.out, self.sizes = str(binary), out, sizes
-        self.order = order  # of the displacements
-        self.rows, self.text, self.part = [], [], None
-        self.environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    def __init__(self, binary, out):
+        self.binary, self.out, self.rows, self.part = str(binary), out, [], None
+        self.compiled = set()
+        self.environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1",
+                            "CCACHE_DIR": str(ROOT / "target" / "ccache")}
         out.mkdir(parents=True, exist_ok=True)
+        # Where the program can start ranks by itself it is told to stay alone.
+        self.has_ranks = "--ranks" in self.start([binary, "run", "--help"])[0]
+        self.rivals = [name for name, module in (("FEniCSx", "dolfinx"), ("NGSolve", "ngsolve"))
+                       if self.has(PYTHON[name], module)]
+        self.speeds = self.machine()
 
-    def say(self, line=""):
-        print(line, flush=True)
-        self.text.append(line)
+    def has(self, python, module):
+        try:
+            self.start([python, "-c", f"import {module}"])
+            return True
+        except (Failure, FileNotFoundError):
+            print(f"{module} is not installed and left out", file=sys.stderr)
+            return False
 
-    def mesh(self, case, n):
-        """The mesh of a case, made once."""
-        path = self.out / f"{case.geometry}-{n}.msh"
-        if not path.exists():
-            part = path.with_suffix(".part.msh")
-            command = ["gmsh", "-2", ROOT / "geo" / f"{case.geometry}.geo", "-setnumber",
-                       case.parameter, case.value(n), "-o", part, "-v", "1"]
-            self.start(command)
-            part.rename(path)
-        return path
-
-    def start(self, command, environment=None):
+    def start(self, command, **environment):
         """Runs a command to its end: its output and wall seconds."""
         command = [str(word) for word in command]
-        environment = {**self.environment, **(environment or {})}
         began = time.perf_counter()
-        with subprocess.Popen(command, env=environment, text=True, cwd=self.out,
-                              stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        with subprocess.Popen(command, env={**self.environment, **environment}, text=True,
+                              cwd=self.out, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
             said, complaint = process.communicate()
             seconds = time.perf_counter() - began
         if process.returncode != 0:
@@ -81,106 +91,94 @@ class Bench:
             raise Failure(f"{Path(command[0]).name} … failed: {told[0]}")
         return said, seconds
 
-    def signorini(self, n, solver="active-set", steps=100, ranks=None, frames=False, case=FROZEN):
-        """A run of so many steps of k = 0.01."""
+    def machine(self):
+        """Bytes and operations per second of this machine; dgemm with the kernels its processor
+        has, and as installed."""
+        floor = [PYTHON["FEniCSx"], ROOT / "validation" / "floor.py"]
+        flags = Path("/proc/cpuinfo").read_text(encoding="utf-8").split()
+        kernels = [core for flag, core in KERNELS.items() if flag in flags][:1]
+        installed = json.loads(self.start(floor)[0])
+        best = json.loads(self.start(floor, OPENBLAS_CORETYPE=kernels[0])[0]) if kernels else installed
+        return {"copy": max(installed["copy"], best["copy"]), "dgemm": max(installed["dgemm"], best["dgemm"]),
+                "dgemm as installed": installed["dgemm"]}
+
+    def mesh(self, case):
+        """The mesh of a case, made once."""
+        geometry = {"square-mild": "square", "lshape-rolling": "lshape", "lshape": "lshape"}[case.name]
+        if case.accuracy:
+            path = self.out / f"{case.name}-{case.accuracy:g}.msh"
+            if not path.exists():
+                self.start([self.binary, "run", case.file(), "--accuracy", case.accuracy,
+                            "--out", self.out / "adapted", *self.alone()])
+                shutil.move(self.out / "adapted" / "mesh.msh", path)
+            return path
+        path = self.out / f"{geometry}-{case.n}.msh"
+        if not path.exists():
+            size = ["n", case.n] if geometry == "square" else ["size", 2 / case.n]
+            part = path.with_suffix(".part.msh")
+            self.start(["gmsh", "-2", ROOT / "geo" / f"{geometry}.geo", "-setnumber", *size, "-o", part,
+                        "-v", "1"])
+            part.rename(path)
+        return path
+
+    def alone(self):
+        return ["--ranks", 1] if self.has_ranks else []
+
+    def signorini(self, case, solver="active-set", ranks=1, frames=True):
+        """A run, about 20 frames written unless told otherwise; its history and what `--profile`
+        says of each phase in milliseconds per call."""
         folder = self.out / "run"
-        command = [self.binary, "run", case.file(), "--mesh", self.mesh(case, n),
-                   "--solver", solver, "--set", f"time.end={steps / 100}", "--out", folder, "--profile"]
-        if self.order != 1:
-            command += ["--set", f"discretisation.displacement={self.order}"]
-        if not frames:
-            command += ["--set", "output.every=100000"]
-        if ranks is not None:
+        command = [self.binary, "run", case.file(), "--mesh", self.mesh(case), "--solver", solver,
+                   "--set", "time.step=0.01", "--set", f"time.end={case.steps / 100}", "--out", folder,
+                   "--set", f"discretisation.displacement={case.order}", "--profile"]
+        command += [] if frames else ["--set", "output.every=100000"]
+        if self.has_ranks:
+            command += ["--ranks", ranks]
+        elif ranks > 1:
             command = ["mpiexec", "--allow-run-as-root", "--oversubscribe", "-n", ranks, *command]
         said, whole = self.start(command)
         summary = json.loads((folder / "summary.json").read_text())
-        with open(folder / "history.csv", newline="") as file:
+        with open(folder / "history.csv", newline="", encoding="utf-8") as file:
             history = [{k: float(v or "nan") for k, v in row.items()} for row in csv.DictReader(file)]
         # The first step also makes what all others keep.
         after = history[2:]
-        total = lambda key: int(sum(row[key] for row in after))
-        row = {
-            "program": "signorini", "method": solver, "scene": case.scene, "n": n,
-            "ranks": ranks or 1, "nodes": summary["nodes"], "steps": len(after),
-            "unknowns": 2 * summary["nodes"],
-            "seconds_per_step": sum(row["seconds"] for row in after) / len(after),
-            "whole_seconds": whole, "iterations": total("iterations"),
-            "linear_iterations": total("linear_iterations"),
-            "factorisations": total("factorisations"), "kkt": max(summary["kkt"].values()),
-            "peak_mb": peak(said), "frames": frames,
-        }
-        return self.keep(row), history
+        total = lambda key: sum(row[key] for row in after) / len(after)
+        phases = dict(re.findall(r"^ +([a-z ]+?) +\d+ +[\d.]+ +[\d.]+ % +([\d.]+)", said, re.MULTILINE))
+        peak = re.findall(r"peak memory (\d+)", said)
+        row = {"program": "signorini", "method": solver, "ranks": ranks, "nodes": summary["nodes"],
+               "seconds_per_step": total("seconds"), "whole_seconds": whole,
+               "iterations": total("iterations"), "solves": total("linear_iterations"),
+               "factorisations": total("factorisations"), "kkt": max(summary["kkt"].values()),
+               "peak_mb": float(peak[-1]) if peak else None}
+        return row, history, {name: 1e-3 * float(ms) for name, ms in phases.items()}
 
-    def loop(self, n, factor, steps, frames=False, case=FROZEN):
-        """The FEniCSx loop."""
-        command = ["/usr/bin/python3", LOOP, case.file(), self.mesh(case, n), "--factor", factor,
-                   "--steps", steps, "--order", self.order]
-        if frames:
-            command += ["--out", self.out / "run" / "loop.xdmf"]
-        said, whole = self.start(command)
-        answer = json.loads(said.strip().splitlines()[-1])
-        row = {
-            "program": "FEniCSx", "method": factor, "scene": case.scene, "n": n, "ranks": 1,
-            "nodes": answer["nodes"], "unknowns": 2 * answer["nodes"], "steps": answer["steps"] - 1,
-            "seconds_per_step": float(np.mean(answer["seconds"][1:])),
-            "whole_seconds": whole, "iterations": sum(answer["iterations"][1:]),
-            "kkt": answer["kkt"], "frames": frames,
-        }
-        return self.keep(row), answer
+    def loop(self, case, program, method, steps):
+        """The loop of a competitor, forms compiled, and its last state."""
+        command = [PYTHON[program], ROOT / "validation" / "loop.py", program.lower(), case.file(),
+                   self.mesh(case), "--order", case.order,
+                   "--keep", KEEP[program] if method == "kept" else 0]
+        if (program, case.name, case.order) not in self.compiled:
+            self.start([*command, "--steps", 1])
+            self.compiled.add((program, case.name, case.order))
+        said, whole = self.start([*command, "--steps", steps, "--out", self.out / "run" / "loop"])
+        told = json.loads(said.strip().splitlines()[-1])
+        per_step = lambda key: told[key] / (steps - 1)
+        return {"program": program, "method": method, "ranks": 1, "nodes": told["nodes"],
+                "seconds_per_step": float(np.mean(told["seconds"][1:])),
+                "whole_seconds": whole - told["compile_seconds"],
+                "iterations": per_step("systems"), "solves": per_step("iterations"),
+                "factorisations": per_step("factorisations"), "kkt": told["kkt"],
+                "peak_mb": told["peak_mb"]}, told
 
-    def kernels(self, n):
-        """What no step can do without, in isolation: `cargo bench --bench kernels` times it."""
-        home = self.out / "kernels"
-        environment = {"CRITERION_HOME": str(home), "PATH": os.pathsep.join(
-            [os.environ["PATH"], str(Path.home() / ".cargo" / "bin")])}
-        self.start(["cargo", "bench", "--locked", "--manifest-path", ROOT / "Cargo.toml",
-                    "--bench", "kernels", "--", f"^unavoidable/(.*/{n}|copy)$"], environment)
-        group = home / "unavoidable"
-        everything = timed(group / "all" / str(n))
-        self.keep({"program": "unavoidable", "method": "", "n": n, "ranks": 1,
-                   "nodes": everything["Elements"], "seconds_per_step": everything["seconds"]})
-        parts = {name: timed(group / name / str(n)) for name in KERNELS}
-        return everything["seconds"], parts, timed(group / "copy")
-
-    def keep(self, row):
-        """Notes a run, whose answer must satisfy the KKT conditions."""
-        if row.get("kkt", 0.0) > TOLERANCE:
-            raise Failure(f"{row['program']} {row['method']}: KKT {row['kkt']:.1e} at n = {row['n']}")
-        self.rows.append({"part": self.part, "order": self.order, **row})
-        name = f"{self.part}, n = {row['n']}: {row['program']} {row['method']}"
-        print(f"{name} {1e3 * row['seconds_per_step']:.3g} ms per step", file=sys.stderr)
-        return row
-
-    def table(self, header, rows):
-        """A Markdown table."""
-        rows = [[str(cell) for cell in row] for row in rows]
-        width = [max(map(len, column)) for column in zip(header, *rows)]
-        line = lambda row: "| " + " | ".join(c.rjust(w) for c, w in zip(row, width)) + " |"
-        self.say(line(header))
-        self.say("|" + "|".join("-" * (w + 1) + ":" for w in width) + "|")
-        for row in rows:
-            self.say(line(row))
-        self.say()
+    def passes(self, case):
+        """Bytes of each pass of a step, and operations of a factorisation, that none can avoid."""
+        return json.loads(self.start([PYTHON["FEniCSx"], ROOT / "validation" / "floor.py", case.file(),
+                                      self.mesh(case), case.order])[0])
 
     def write(self):
-        """The table of all runs, and what was said."""
+        """The table."""
         columns = list(dict.fromkeys(key for row in self.rows for key in row))
         with open(self.out / "bench.csv", "w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, columns)
             writer.writeheader()
             writer.writerows(self.rows)
-        (self.out / "bench.md").write_text("\n".join(self.text), encoding="utf-8")
-
-
-def timed(benchmark):
-    """The median seconds that Criterion measured, and the elements or bytes it was told of."""
-    result = benchmark / "new"
-    estimates = json.loads((result / "estimates.json").read_text())
-    throughput = json.loads((result / "benchmark.json").read_text())["throughput"] or {}
-    return {"seconds": 1e-9 * estimates["median"]["point_estimate"], **throughput}
-
-
-def peak(said):
-    """MB, from the last line of a profile."""
-    lines = [line for line in said.splitlines() if "peak memory" in line]
-    return float(lines[-1].split()[2]) if lines else None

@@ -1,5 +1,5 @@
 //! What a time step is made of, on Example I: `cargo bench`, compared with the last time it ran.
-//! `make bench` measures whole steps, and holds them against the group `unavoidable`.
+//! `make bench` measures whole steps.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use signorini::{
@@ -16,10 +16,6 @@ use std::{hint::black_box, path::Path, time::Duration};
 
 /// Cells a side of the square.
 const CELLS: usize = 128;
-/// The same, of the work that no step can do without.
-const UNAVOIDABLE: [usize; 2] = [128, 256];
-/// Doubles that no cache holds.
-const COPIED: usize = 1 << 24;
 /// k, s.
 const STEP: f64 = 0.01;
 
@@ -81,50 +77,34 @@ impl Elastic {
     }
 }
 
-/// What no step can do without, kernel by kernel and all in turn, as a step finds the caches; and
-/// the speed of memory, as a large copy reads and writes it.
-fn unavoidable(c: &mut Criterion) {
-    let session = Session::start(&[]).unwrap();
-    let mut group = c.benchmark_group("unavoidable");
-    for n in UNAVOIDABLE {
-        let problem = problem(n);
-        let Elastic { k, factor, .. } = &mut Elastic::new(&session, &problem);
-        let mut damage = damage_system(&session, &problem);
-        let (u, zeta) = (displaced(&problem), damaged(&problem, 0.5));
-        let (means, load) = (problem.zeta_at_points(&zeta), damage_load(&problem, &u, &zeta));
-        let vector = || Vector::zeros(&session, k.matrix.owned()).unwrap();
-        let (mut x, mut y, mut z) = (vector(), vector(), vector());
-        x.set(&u).unwrap();
-        k.matrix.multiply(&x, &mut y).unwrap();
+/// What no step can do without.
+fn passes(c: &mut Criterion) {
+    let (session, problem) = (Session::start(&[]).unwrap(), problem(CELLS));
+    let mut group = c.benchmark_group("passes");
+    let Elastic { k, factor, .. } = &mut Elastic::new(&session, &problem);
+    let mut damage = damage_system(&session, &problem);
+    let (u, zeta) = (displaced(&problem), damaged(&problem, 0.5));
+    let (means, load) = (problem.zeta_at_points(&zeta), damage_load(&problem, &u, &zeta));
+    let vector = || Vector::zeros(&session, k.matrix.owned()).unwrap();
+    let (mut x, mut y, mut z) = (vector(), vector(), vector());
+    x.set(&u).unwrap();
+    k.matrix.multiply(&x, &mut y).unwrap();
 
-        group.throughput(Throughput::Elements(problem.body.mesh.nodes.len() as u64));
-        group.bench_function(BenchmarkId::new("all", n), |b| {
-            b.iter(|| {
-                k.refill(&means).unwrap();
-                k.matrix.multiply(&x, &mut y).unwrap();
-                factor.apply(&y, &mut z).unwrap();
-                damage.advance(&load, &mut zeta.clone()).unwrap()
-            });
-        });
-        group.bench_function(BenchmarkId::new("damage solve", n), |b| {
-            b.iter(|| damage.advance(&load, &mut zeta.clone()).unwrap());
-        });
-        group.throughput(Throughput::Bytes(k.refill_traffic() as u64));
-        group.bench_function(BenchmarkId::new("stiffness refill", n), |b| {
-            b.iter(|| k.refill(black_box(&means)).unwrap());
-        });
-        group.throughput(Throughput::Bytes(k.matrix.bytes_per_product() as u64));
-        group.bench_function(BenchmarkId::new("product", n), |b| {
-            b.iter(|| k.matrix.multiply(&x, &mut y).unwrap());
-        });
-        group.throughput(Throughput::Bytes(factor.bytes_per_application() as u64));
-        group.bench_function(BenchmarkId::new("triangular solves", n), |b| {
-            b.iter(|| factor.apply(&y, &mut z).unwrap());
-        });
-    }
-    let (from, mut to) = (vec![1.0_f64; COPIED], vec![0.0_f64; COPIED]);
-    group.throughput(Throughput::Bytes(16 * COPIED as u64));
-    group.bench_function("copy", |b| b.iter(|| black_box(&mut to).copy_from_slice(&from)));
+    group.bench_function("damage solve", |b| {
+        b.iter(|| damage.advance(&load, &mut zeta.clone()).unwrap());
+    });
+    group.throughput(Throughput::Bytes(k.refill_traffic() as u64));
+    group.bench_function("stiffness refill", |b| {
+        b.iter(|| k.refill(black_box(&means)).unwrap());
+    });
+    group.throughput(Throughput::Bytes(k.matrix.bytes_per_product() as u64));
+    group.bench_function("product", |b| {
+        b.iter(|| k.matrix.multiply(&x, &mut y).unwrap());
+    });
+    group.throughput(Throughput::Bytes(factor.bytes_per_application() as u64));
+    group.bench_function("triangular solves", |b| {
+        b.iter(|| factor.apply(&y, &mut z).unwrap());
+    });
     group.finish();
 }
 
@@ -176,5 +156,5 @@ fn brief() -> Criterion {
     criterion.warm_up_time(Duration::from_millis(500)).measurement_time(Duration::from_secs(2))
 }
 
-criterion_group! { name = kernels; config = brief(); targets = unavoidable, factorisation, certificate, damage_source, contact }
+criterion_group! { name = kernels; config = brief(); targets = passes, factorisation, certificate, damage_source, contact }
 criterion_main!(kernels);
