@@ -110,10 +110,12 @@ impl<'a> Recorder<'a> {
                 .history
                 .as_mut()
                 .map_or(Ok(()), |history| history.add(&[(&step.record, &step.quantities)]));
+            // A frame that waited for its turn is older than this row.
+            let row = row.or_else(|error| self.fields.finish().and(Err(error)));
             // All ranks write the frame together, also where the row could not be written.
             match self.is_frame(&step.record) {
                 true => row.and(self.fields.add(&self.task.problem, &step.state)),
-                false => row,
+                false => row.and(self.fields.check()),
             }
         });
         self.last = Some(step.clone());
@@ -130,6 +132,7 @@ impl<'a> Recorder<'a> {
             }
             _ => Ok(()),
         };
+        let written = written.and(task.phases.time("output", || self.fields.finish()));
         let outcome = result.as_ref().ok();
         let mut notes = task.problem.notes();
         notes.extend(outcome.iter().flat_map(|outcome| outcome.notes(&task.problem)));

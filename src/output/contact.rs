@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     archive::Archive,
-    evolution::{ContactRow, DiscreteProblem, Observed, State},
+    evolution::{ContactRow, Observed},
 };
 use std::{
     io, iter,
@@ -40,29 +40,28 @@ impl ContactWriter {
         Table::archive(&mut self.table, self.folder.join(TABLE), archive)
     }
 
-    /// Writes Γ_C of a frame, if there is one, its lines as `file`. Collective.
+    /// Writes Γ_C at `time`, s, if there is one, its lines as `file`.
     ///
     /// # Errors
     /// A file cannot be written.
     pub(super) fn add(
         &mut self,
         file: &str,
-        problem: &DiscreteProblem,
-        state: &State,
+        time: f64,
+        rows: &[ContactRow],
     ) -> Result<(), OutputError> {
-        let rows = problem.supports.contact_rows(&problem.body, state);
-        if rows.is_empty() || !problem.body.nodes.partition.comm().is_root() {
+        if rows.is_empty() {
             return Ok(());
         }
         let table = match self.table.take() {
             Some(table) => table,
             None => Table::create(self.folder.join(TABLE), &rows[0], &[])?,
         };
-        self.table.insert(table).add(&rows)?;
+        self.table.insert(table).add(rows)?;
         let path = self.folder.join(file);
-        let text = lines(&rows).map_err(|e| OutputError::new(&path, e))?;
+        let text = lines(rows).map_err(|e| OutputError::new(&path, e))?;
         write_whole(&path, text.as_bytes())?;
-        self.list.add(state.time, file)
+        self.list.add(time, file)
     }
 }
 

@@ -1,6 +1,7 @@
 //! What a run leaves behind: `fields.pvd` with its frames, `history.csv`, `summary.json`; and what
 //! the commands share at the terminal.
 
+mod background;
 mod contact;
 mod data_array;
 mod growing_file;

@@ -4,14 +4,14 @@
 //! compresses value by value and took 0.9 s for a frame of 66,049 nodes.
 
 use super::{
-    OutputError, contact::ContactWriter, data_array::DataArray, growing_file::GrowingFile,
-    write_whole,
+    OutputError, background::Background, contact::ContactWriter, data_array::DataArray,
+    growing_file::GrowingFile, write_whole,
 };
 use crate::{
     archive::Archive,
-    evolution::{DiscreteProblem, Observed, State},
+    evolution::{ContactRow, DiscreteProblem, Observed, State},
     fem::{Body, Elements},
-    petsc::PetscError,
+    petsc::{Communicator, PetscError},
     scene::{Scene, Stepping},
 };
 use std::{
@@ -38,18 +38,35 @@ const MANY: usize = 999_999;
 /// writes its piece of a frame, `fields_NNNN_R.vtu`, and the first one the lists:
 /// `fields_NNNN.pvtu` names the pieces, `fields.pvd` the frames.
 ///
-/// A piece has the triangles that its rank owns and all nodes that it knows.
+/// A piece has the triangles that its rank owns and all nodes that it knows. One rank alone writes its
+/// frames in the background, for which it has cores to spare.
 pub struct FieldWriter {
+    files: Background<Files>,
+    frames: usize,
+    last_time: Option<f64>,
+    digits: usize,
+}
+
+/// What the frames are written to.
+struct Files {
     folder: PathBuf,
-    /// `<Points>` and `<Cells>`, the same in every frame.
+    /// `<Points>` and `<Cells>`, the same in every frame, in the element `<Piece>`.
     mesh: String,
     /// `fields.pvd`, on the first rank.
     list: FrameList,
     /// Γ_C, on the first rank.
     contact: ContactWriter,
-    frames: usize,
-    last_time: Option<f64>,
-    digits: usize,
+}
+
+/// A frame as numbers.
+struct Frame {
+    /// Its number, with all digits.
+    number: String,
+    time: f64,
+    comm: Communicator,
+    points: Vec<DataArray>,
+    cells: Vec<DataArray>,
+    contact: Vec<ContactRow>,
 }
 
 impl FieldWriter {
@@ -63,18 +80,20 @@ impl FieldWriter {
         let folder = folder.to_owned();
         let list = FrameList::new(folder.join("fields.pvd"));
         let contact = ContactWriter::new(&folder);
-        Ok(Self { folder, mesh, list, contact, frames: 0, last_time: None, digits })
+        let files = Background::new(Files { folder, mesh, list, contact });
+        Ok(Self { files, frames: 0, last_time: None, digits })
     }
 
     /// Saves how many frames there are, or goes back to so many.
     ///
     /// # Errors
-    /// A list of theirs is gone.
+    /// A frame before could not be written, or a list of theirs is gone.
     pub fn archive(&mut self, archive: &mut Archive) -> Observed {
         archive.value(&mut self.frames)?;
         archive.value(&mut self.last_time)?;
-        self.list.archive(archive)?;
-        self.contact.archive(archive)
+        let mut files = self.files.wait()?;
+        files.list.archive(archive)?;
+        files.contact.archive(archive)
     }
 
     /// Time of the last frame, s.
@@ -82,47 +101,70 @@ impl FieldWriter {
         self.last_time
     }
 
-    /// Writes a frame and the lists that name it. Collective.
+    /// Writes a frame and the lists that name it, one rank alone in the background. Collective.
     ///
     /// # Errors
-    /// A file cannot be written.
+    /// A file cannot be written; in the background, one of a frame before.
     pub fn add(&mut self, problem: &DiscreteProblem, state: &State) -> Result<(), OutputError> {
-        let comm = problem.body.nodes.partition.comm();
         let number = format!("{:0width$}", self.frames, width = self.digits);
+        (self.frames, self.last_time) = (self.frames + 1, Some(state.time));
+        // All ranks collect Γ_C, also where one could not collect its fields.
+        let contact = problem.supports.contact_rows(&problem.body, state);
+        let (cells, comm) = (cell_data(problem, state), problem.body.nodes.partition.comm());
+        let points = point_data(problem, state);
+        let points = points.map_err(|e| OutputError::new(Path::new("a frame"), e))?;
+        let frame = Frame { number, time: state.time, comm, points, cells, contact };
+        self.files.add(move |files| files.write(&frame))?;
+        if comm.is_serial() { Ok(()) } else { self.finish() }
+    }
+
+    /// Whether all frames could be written so far.
+    ///
+    /// # Errors
+    /// Why one could not.
+    pub fn check(&mut self) -> Result<(), OutputError> {
+        self.files.check()
+    }
+
+    /// Waits until all frames are written.
+    ///
+    /// # Errors
+    /// One could not be written.
+    pub fn finish(&mut self) -> Result<(), OutputError> {
+        self.files.wait().map(|_| ())
+    }
+}
+
+impl Files {
+    /// Writes a frame and the lists that name it.
+    fn write(&mut self, frame: &Frame) -> Result<(), OutputError> {
+        let Frame { number, comm, points, cells, .. } = frame;
         let stem = format!("fields_{number}");
         let piece_file = |rank| format!("{stem}_{rank}.vtu");
-        let (own, frame) = match comm.is_serial() {
+        let (own, whole) = match comm.is_serial() {
             true => (format!("{stem}.vtu"), format!("{stem}.vtu")),
             false => (piece_file(comm.rank()), format!("{stem}.pvtu")),
         };
-        (self.frames, self.last_time) = (self.frames + 1, Some(state.time));
-
         let path = self.folder.join(own);
-        let points = point_data(problem, state).map_err(|e| OutputError::new(&path, e))?;
-        let cells = cell_data(problem, state);
-        let text = self.piece(&problem.body, &points, &cells);
-        let text = text.map_err(|e| OutputError::new(&path, e))?;
-        let written = write_whole(&path, text.as_bytes());
-        // All ranks collect Γ_C, also where one could not write its piece.
-        let contact = self.contact.add(&format!("contact_{number}.vtu"), problem, state);
-        written.and(contact)?;
+        let text = self.piece(points, cells).map_err(|e| OutputError::new(&path, e))?;
+        write_whole(&path, text.as_bytes())?;
         if !comm.is_root() {
             return Ok(());
         }
+        self.contact.add(&format!("contact_{number}.vtu"), frame.time, &frame.contact)?;
         if !comm.is_serial() {
-            let text = list_of_pieces((0..comm.size()).map(piece_file), &points, &cells);
-            write_whole(&self.folder.join(&frame), text.as_bytes())?;
+            let text = list_of_pieces((0..comm.size()).map(piece_file), points, cells);
+            write_whole(&self.folder.join(&whole), text.as_bytes())?;
         }
-        self.list.add(state.time, &frame)
+        self.list.add(frame.time, &whole)
     }
 
-    fn piece(&self, body: &Body, points: &[DataArray], cells: &[DataArray]) -> io::Result<String> {
+    fn piece(&self, points: &[DataArray], cells: &[DataArray]) -> io::Result<String> {
         let points = points.iter().map(DataArray::element).collect::<io::Result<String>>()?;
         let cells = cells.iter().map(DataArray::element).collect::<io::Result<String>>()?;
-        let (mesh, nodes, triangles) = (&self.mesh, body.nodes.points.len(), body.own_triangles);
         let piece = format!(
-            "<Piece NumberOfPoints=\"{nodes}\" NumberOfCells=\"{triangles}\">\n{mesh}\
-             <PointData>\n{points}</PointData>\n<CellData>\n{cells}</CellData>\n</Piece>\n"
+            "{}<PointData>\n{points}</PointData>\n<CellData>\n{cells}</CellData>\n</Piece>\n",
+            self.mesh
         );
         Ok(vtk_file("UnstructuredGrid", "", &piece))
     }
@@ -171,7 +213,7 @@ fn digits(scene: &Scene) -> usize {
     DIGITS.max(frames.ilog10() as usize + 1)
 }
 
-/// `<Points>` and `<Cells>`.
+/// The beginning of `<Piece>`, with `<Points>` and `<Cells>`.
 fn mesh_text(body: &Body) -> io::Result<String> {
     let points = body.nodes.points.iter().flat_map(|&[x, y]| [x, y, 0.0]);
     let own = body.own_triangles;
@@ -183,7 +225,9 @@ fn mesh_text(body: &Body) -> io::Result<String> {
     let offsets = (1..=own).map(|t| (per_cell * t) as i32);
     let types = iter::repeat_n(kind, own);
     Ok(format!(
-        "<Points>\n{}</Points>\n<Cells>\n{}{}{}</Cells>\n",
+        "<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{own}\">\n\
+         <Points>\n{}</Points>\n<Cells>\n{}{}{}</Cells>\n",
+        body.nodes.points.len(),
         DataArray::new("Points", REAL, 3, points).element()?,
         DataArray::new("connectivity", INTEGER, 1, nodes).element()?,
         DataArray::new("offsets", INTEGER, 1, offsets).element()?,
