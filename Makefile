@@ -24,6 +24,8 @@ NGSOLVE := target/ngsolve
 BINARY := target/release/signorini
 # The studies: a program of their own in validation/study.
 STUDIES := target/release/signorini-study
+# The results tell what built the program, where this is a git checkout.
+export SIGNORINI_COMMIT := $(shell git describe --always --dirty 2>/dev/null)
 # rustup puts cargo where a shell opened before does not look.
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
@@ -137,6 +139,11 @@ kills: build deps
 # What is found stays in target/fuzz; the seeds are those of the tests. FUZZ_RUNS is per target.
 FUZZ_RUNS ?= 3400000
 fuzz: deps
+	@scripts/deps.sh g++
+	@cargo +nightly fuzz --version >/dev/null 2>&1 || \
+	    { rustup toolchain install nightly --profile minimal && cargo install --locked cargo-fuzz; } || \
+	    { echo 'make fuzz needs nightly Rust and cargo-fuzz, which cannot be installed here:' \
+	        'rustup toolchain install nightly; cargo install cargo-fuzz' >&2; exit 1; }
 	@set -e; for target in mesh scene expression; do \
 	    case $$target in \
 	        mesh) seeds=tests/fixtures/msh;; \

@@ -16,6 +16,7 @@ and on request: contact-evolution, the pressure on Γ_C in time; damage and pres
 import argparse
 import sys
 from dataclasses import replace
+from math import isfinite
 
 import matplotlib.pyplot as plt
 
@@ -67,6 +68,8 @@ def arguments_of(prog):
         parser.error(f"--format: {', '.join(unknown)} is none of {', '.join(FORMATS)}")
     if arguments.factor is not None and not arguments.factor > 0.0:
         parser.error("--factor: must be positive")
+    if arguments.time is not None and not isfinite(arguments.time):
+        parser.error("--time: must be a number")
     return arguments
 
 

@@ -5,7 +5,9 @@ import csv
 import json
 import tomllib
 import xml.etree.ElementTree as ElementTree
+from collections import defaultdict
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import meshio
@@ -13,6 +15,9 @@ import numpy as np
 
 from elements import Pieces, counter_clockwise
 from results import ResultError, Results, without_roundoff
+
+# Opposite a node without any condition beside it.
+NOWHERE = np.zeros(2), np.zeros(2)
 
 
 def read_results(folder, time=None):
@@ -38,9 +43,6 @@ def read_results(folder, time=None):
             time=chosen[0],
             nodes=fields.points[:, :2],
             pieces=Pieces(counter_clockwise(fields.points, elements)),
-            contact=_segments(summary["contact_boundary"]),
-            tangents=_segments(summary["contact_tangents"]),
-            obstacle=_segments(summary["foundation"]),
         )
         return with_fields(results, chosen[0], fields)
     except OSError as error:
@@ -83,9 +85,13 @@ def triangles(fields):
 def with_fields(results, time, fields):
     """The results with the state of another frame of the same run."""
     points, cells = fields.point_data, fields.cell_data
+    contact, tangents, obstacle = _foundation(results, time, points["displacement"][:, :2])
     return without_roundoff(replace(
         results,
         time=time,
+        contact=contact,
+        tangents=tangents,
+        obstacle=obstacle,
         displacement=points["displacement"][:, :2],
         zeta=np.ravel(points["zeta"]),
         von_mises=np.concatenate([np.ravel(cells["von_mises"][k]) for k in triangles(fields)]),
@@ -130,8 +136,49 @@ def read_frame(path):
     )
 
 
-def _segments(lists):
-    return np.array(lists, dtype=float).reshape(-1, 2, 2)
+def _foundation(results, time, displacement):
+    """The ends of the edges of Γ_C, the directions in which the body slides there, and the obstacle
+    opposite them.
+
+    A node x with the gap g along ν is opposite x + g ν. A corner has two of them and is opposite the
+    x + d with d·ν = g for both; it does not slide. Where boundaries meet smoothly the node has one.
+    """
+    displacements = dict(zip(map(tuple, results.nodes.tolist()), displacement))
+    conditions = _contact_rows(results.folder / "contact.csv").get(time, {})
+
+    def opposite(node, edge_normal):
+        found = [(nu, gap + nu @ displacements[node]) for nu, gap in conditions.get(node, [])]
+        if not found:
+            return None
+        normals, gaps = map(np.array, zip(*found))
+        if len(found) == 2 and abs(np.linalg.det(normals)) > 1e-4:
+            return np.linalg.solve(normals, gaps), np.zeros(2)
+        (x, y), gap = max(found, key=lambda condition: condition[0] @ edge_normal)
+        return np.array([gap * x, gap * y]), np.array([-y, x])
+
+    names = [of["name"] for of in results.scene.get("boundary", []) if "gap" in of]
+    edges = [edge for name in names for edge in results.summary["boundaries"].get(name, [])]
+    ends = []
+    for a, b in np.array(edges).reshape(-1, 2, 2):
+        normal = np.array([b[1] - a[1], a[0] - b[0]])
+        first, second = (opposite(tuple(node), normal) for node in (a.tolist(), b.tolist()))
+        # A node that is prescribed has no gap condition: the obstacle goes on as it is beside it.
+        found = [first or second or NOWHERE, second or first or NOWHERE]
+        ends.append([[node, tangent, node + way] for node, (way, tangent) in zip((a, b), found)])
+    return np.array(ends).reshape(-1, 2, 3, 2).transpose(2, 0, 1, 3)
+
+
+@cache
+def _contact_rows(path):
+    """Of contact.csv the normals and remaining gaps by time and node."""
+    rows = defaultdict(lambda: defaultdict(list))
+    if path.exists():
+        with open(path, newline="", encoding="utf-8") as file:
+            for row in csv.DictReader(file):
+                x, y, nx, ny, gap = (
+                    float(row[c]) for c in ("x", "y", "normal_x", "normal_y", "gap"))
+                rows[float(row["time"])][x, y].append((np.array([nx, ny]), gap))
+    return rows
 
 
 def _number(text):

@@ -61,9 +61,9 @@ class Results:
     time: float
     nodes: np.ndarray  # (n, 2), m
     pieces: Pieces  # the elements, 3 or 6 nodes each
-    contact: np.ndarray  # (k, 2, 2): both ends of the edges of Γ_C, m
-    tangents: np.ndarray  # (k, 2, 2): along which the body slides there, 0 where it cannot
-    obstacle: np.ndarray  # (k, 2, 2): what is opposite them, m
+    contact: np.ndarray = None  # (k, 2, 2): both ends of the edges of Γ_C, m
+    tangents: np.ndarray = None  # (k, 2, 2): along which the body slides there, 0 where it cannot
+    obstacle: np.ndarray = None  # (k, 2, 2): what is opposite them, m
     displacement: np.ndarray = None  # (n, 2), m
     zeta: np.ndarray = None  # (n,)
     von_mises: np.ndarray = None  # (m,), Pa

@@ -33,7 +33,7 @@ enum Command {
     },
     /// Describe a scene without solving it: mesh, boundaries, loads, support, unknowns, cost. Like
     /// `mesh`, it meshes a .geo whose .msh is missing or older.
-    Check(command::CheckArguments),
+    Check(command::SceneArguments),
     /// Tell what a folder of results holds: scene, program, outcome, errors, frames.
     Info {
         /// A folder that `run` has written, e.g. out/lshape.

@@ -1,38 +1,24 @@
 //! `signorini check`: what a scene asks for, before anything is solved.
 
-use super::{Failure, ranks::require_one_process, read};
-use clap::Args;
+use super::{Failure, SceneArguments, ranks::require_one_process};
 use comfy_table::presets;
 use signorini::{
     evolution::DiscreteProblem,
     mesh::{Mesh, extent},
     output::terminal::{self, say},
-    scene::{Boundary, Condition, Scene, Stepping, SurfaceLoad},
+    scene::{Boundary, Condition, Scene, Stepping, SurfaceLoad, Units},
 };
-use std::path::PathBuf;
-
-/// Arguments of `signorini check`.
-#[derive(Args)]
-pub struct CheckArguments {
-    /// Scene file.
-    scene: PathBuf,
-    /// Use this .geo or .msh instead of the scene's.
-    #[arg(long, value_name = "FILE")]
-    mesh: Option<PathBuf>,
-    /// Override a key of the scene, e.g. --set time.step=0.005; may be repeated.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    set: Vec<String>,
-}
 
 /// Times at which gaps are looked at, about.
 const TIMES: usize = 20;
 
 /// `signorini check SCENE`: describes mesh, boundaries, loads, support and cost.
-pub fn check(arguments: &CheckArguments) -> Result<(), Failure> {
+pub fn check(arguments: &SceneArguments) -> Result<(), Failure> {
     require_one_process()?;
-    let (scene, mesh) = read(&arguments.scene, arguments.mesh.as_deref(), &arguments.set, false)?;
+    arguments.check()?;
+    let (scene, mesh) = arguments.read(false, &[])?;
     say(&scene.title);
-    say(&row("mesh", describe_mesh(&mesh)));
+    say(&row("mesh", describe_mesh(&mesh, &scene.units)));
     say(&boundaries(&scene, &mesh));
     let problem = DiscreteProblem::new(scene, mesh).map_err(Failure::input)?;
     let mut lines = vec![row("unknowns", unknowns(&problem))];
@@ -48,10 +34,10 @@ fn row(name: &str, value: String) -> String {
     format!("  {name:<13} {value}")
 }
 
-fn describe_mesh(mesh: &Mesh) -> String {
+fn describe_mesh(mesh: &Mesh, Units { length, .. }: &Units) -> String {
     let pieces = mesh.components().pieces.len();
     format!(
-        "{} vertices, {} triangles in {pieces} piece{}, up to {} m wide, angles from {:.0}°",
+        "{} vertices, {} triangles in {pieces} piece{}, up to {} {length} wide, angles from {:.0}°",
         mesh.nodes.len(),
         mesh.triangles.len(),
         if pieces == 1 { "" } else { "s" },
@@ -71,10 +57,11 @@ fn boundaries(scene: &Scene, mesh: &Mesh) -> String {
         rows.push((
             boundary.name.clone(),
             edges.to_vec(),
-            conditions(boundary, edges, mesh, &times),
+            conditions(boundary, edges, mesh, &times, &scene.units.length),
         ));
     }
     rows.push(("(all other)".to_owned(), free, "free".to_owned()));
+    let measure = format!("length, {}", scene.units.length);
     let rows = rows.into_iter().map(|(name, edges, conditions)| {
         let (mut length, mut mean) = (0.0, [0.0; 2]);
         for (normal, edge_length) in edges.iter().map(|&edge| mesh.edge_normal(edge)) {
@@ -88,7 +75,7 @@ fn boundaries(scene: &Scene, mesh: &Mesh) -> String {
             ("  boundary", format!("  {name}")),
             ("conditions", conditions),
             ("edges", edges.len().to_string()),
-            ("length, m", format!("{length:.4}")),
+            (&*measure, format!("{length:.4}")),
             (
                 "outward normal",
                 match straight {
@@ -104,7 +91,13 @@ fn boundaries(scene: &Scene, mesh: &Mesh) -> String {
 }
 
 /// What holds on a boundary, in words; gaps are looked at at these times.
-fn conditions(boundary: &Boundary, edges: &[[usize; 2]], mesh: &Mesh, times: &[f64]) -> String {
+fn conditions(
+    boundary: &Boundary,
+    edges: &[[usize; 2]],
+    mesh: &Mesh,
+    times: &[f64],
+    unit: &str,
+) -> String {
     let in_words = |condition: &Condition| match condition {
         Condition::Displacement([Some(_), Some(_)]) => "displacement".to_owned(),
         Condition::Displacement([Some(_), None]) => "displacement in x".to_owned(),
@@ -123,7 +116,7 @@ fn conditions(boundary: &Boundary, edges: &[[usize; 2]], mesh: &Mesh, times: &[f
                     (low.min(gap), high.max(gap))
                 });
             let along = if gap.normal.is_some() { " along its own normal" } else { "" };
-            format!("gap from {} to {} m{along}", short(least), short(most))
+            format!("gap from {} to {} {unit}{along}", short(least), short(most))
         }
     };
     boundary.conditions.iter().map(in_words).collect::<Vec<_>>().join(", ")
@@ -149,6 +142,7 @@ fn short(value: f64) -> String {
 /// The resultants of the loads at the start and at the end.
 fn loads(problem: &DiscreteProblem) -> Vec<String> {
     let nodes = &problem.body.nodes.points;
+    let Units { length, force, .. } = &problem.scene().units;
     let resultant = |t: f64| {
         let mut sum = [0.0; 3];
         for (f, [x, y]) in problem.load(t).chunks_exact(2).zip(nodes) {
@@ -156,7 +150,8 @@ fn loads(problem: &DiscreteProblem) -> Vec<String> {
             sum = [0, 1, 2].map(|k| sum[k] + more[k]);
         }
         let [fx, fy, moment] = sum.map(short);
-        row("loads", format!("t = {t}: ({fx}, {fy}) N/m, moment about (0, 0) {moment} N"))
+        let moment = format!("moment about (0, 0) {moment} {force}");
+        row("loads", format!("t = {t}: ({fx}, {fy}) {force}/{length}, {moment}"))
     };
     problem.scene().sample_times(1).into_iter().map(resultant).collect()
 }

@@ -27,7 +27,7 @@ struct Origin {
     ranks: usize,
     /// The version and a hash of the program's file.
     program: String,
-    /// Hashes of the scene as it is run and of PETSc's options, and of the mesh.
+    /// Hashes of the scene as it is run with its tables and of PETSc's options, and of the mesh.
     scene: u64,
     mesh: u64,
 }
@@ -56,10 +56,11 @@ impl Origin {
             LazyLock::new(|| fs::read("/proc/self/exe").map_or(0, |file| hash(&file)));
         // A mesh that cannot be encoded has no hash to differ by.
         let mesh = postcard::to_stdvec(task.problem.mesh()).unwrap_or_default();
+        let scene = format!("{}{:?}", task.as_run, task.petsc);
         Self {
             ranks: task.problem.body.nodes.partition.comm().size(),
             program: format!("{} {:016x}", env!("CARGO_PKG_VERSION"), *PROGRAM),
-            scene: hash(format!("{}{:?}", task.as_run, task.petsc).as_bytes()),
+            scene: hash(&[scene.as_bytes(), &task.tables].concat()),
             mesh: hash(&mesh),
         }
     }
@@ -68,7 +69,10 @@ impl Origin {
     fn difference(&self, made: &Self) -> Option<&'static str> {
         [
             (self.program != made.program, "another build of the program wrote it"),
-            (self.scene != made.scene, "the scene, --set or PETSc's options are others"),
+            (
+                self.scene != made.scene,
+                "the scene, its tables, --set or PETSc's options are others",
+            ),
             (self.mesh != made.mesh, "the mesh is another"),
         ]
         .into_iter()

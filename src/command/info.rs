@@ -2,7 +2,7 @@
 
 use super::Failure;
 use serde_json::Value;
-use signorini::output::terminal::say;
+use signorini::{output::terminal::say, scene::rounded};
 use std::{fs, path::Path};
 
 /// `signorini info OUT`: the summary on the screen, a line for each entry, then frames and files.
@@ -24,17 +24,21 @@ pub fn info(folder: &Path) -> Result<(), Failure> {
     }
     let list = fs::read_to_string(folder.join("fields.pvd")).unwrap_or_default();
     let times = list.split("timestep=\"").skip(1).filter_map(|rest| rest.split('"').next());
-    let times: Vec<_> = times.collect();
+    let times: Vec<f64> = times.filter_map(|time| time.parse().ok()).map(rounded).collect();
     if let [first, .., last] = times[..] {
         lines.push(row("frames", &format!("{}, from t = {first} to {last}", times.len())));
     }
     let names = fs::read_dir(folder).into_iter().flatten().flatten().map(|file| file.file_name());
     let names = names.map(|name| name.to_string_lossy().into_owned());
-    let mut names: Vec<_> = names.filter(|name| !name.starts_with("fields_")).collect();
+    let mut names: Vec<_> = names.filter(|name| !is_frame(name)).collect();
     names.sort();
     lines.push(row("files", &names.join(" ")));
     say(&lines.join("\n"));
     Ok(())
+}
+
+fn is_frame(name: &str) -> bool {
+    ["fields_", "contact_"].iter().any(|frame| name.starts_with(frame))
 }
 
 /// The lines of an entry; of a table those of its entries.

@@ -14,7 +14,7 @@ mod recorder;
 mod run;
 mod screen;
 
-pub use check::{CheckArguments, check};
+pub use check::check;
 pub use compare::{CompareArguments, compare};
 pub use figures::{ScriptArguments, script};
 pub use info::info;
@@ -22,6 +22,7 @@ pub use keys::keys;
 pub use new::new;
 pub use run::{RunArguments, run};
 
+use clap::Args;
 use ranks::require_one_process;
 use signorini::{
     contact::{self, REGISTRY, SOLVERS, TAO_TYPES, summaries},
@@ -101,6 +102,46 @@ fn check_petsc(options: &[String]) -> Result<(), Failure> {
 
 /// Where an accuracy is asked for, the first mesh of a `.geo` has about so many triangles along the body.
 const CELLS: f64 = 4.0;
+
+/// Which scene, and what of it is taken otherwise than it is written.
+#[derive(Args)]
+pub struct SceneArguments {
+    /// Scene file (TOML).
+    scene: PathBuf,
+    /// Use this .geo or .msh instead of the scene's.
+    #[arg(long, value_name = "FILE")]
+    mesh: Option<PathBuf>,
+    /// Choose order, mesh and time steps so that the estimated error of u (energy norm) and of the
+    /// damage is at most this, from 1e-5 to 0.5, e.g. 0.01; time.step, time.tolerance and the mesh.size of
+    /// a .geo then have no effect.
+    #[arg(long, value_name = "ERROR")]
+    accuracy: Option<f64>,
+    /// Override a key of the scene, e.g. --set time.step=0.005; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    set: Vec<String>,
+}
+
+impl SceneArguments {
+    /// Refuses what would silently have no effect.
+    fn check(&self) -> Result<(), Failure> {
+        let is_of_mesh = |set: &&String| set.trim_start().starts_with("mesh.");
+        if let (Some(file), Some(set)) = (&self.mesh, self.set.iter().find(is_of_mesh)) {
+            return Err(Failure::input(format!(
+                "--set {set} has no effect beside --mesh {0}, which replaces the scene's [mesh]; \
+                 write --set mesh.file={0} instead (relative to the scene)",
+                file.display()
+            )));
+        }
+        Ok(())
+    }
+
+    /// Scene and mesh, coarse as for [`read`].
+    fn read(&self, adapts: bool, more: &[String]) -> Result<(Scene, Mesh), Failure> {
+        let accuracy = self.accuracy.map(|error| format!("accuracy={error}"));
+        let set = [&self.set[..], &Vec::from_iter(accuracy), more].concat();
+        read(&self.scene, self.mesh.as_deref(), &set, adapts)
+    }
+}
 
 /// The scene at `path` with keys overridden by `set`, and its mesh, or another one in `file`; it is made
 /// where it is not there. Where the scene asks for an accuracy and the mesh is to be adapted to it,

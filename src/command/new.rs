@@ -7,8 +7,11 @@ use std::{fs, path::Path};
 const GEOMETRY: &str = include_str!("new.geo");
 const SCENE: &str = include_str!("new.toml");
 
-/// `signorini new NAME`: writes `NAME.geo` and `NAME.toml`, which run as they are.
+/// `signorini new NAME`: writes `NAME.geo` and `NAME.toml`, which run as they are. NAME may be that of
+/// one of the two files.
 pub fn new(name: &Path) -> Result<(), Failure> {
+    let file = name.extension().is_some_and(|ending| ending == "toml" || ending == "geo");
+    let name = &if file { name.with_extension("") } else { name.to_owned() };
     let [geometry, scene] = [".geo", ".toml"].map(|extension| {
         let mut path = name.as_os_str().to_owned();
         path.push(extension);

@@ -9,6 +9,8 @@ pub fn provenance() -> Value {
     let arguments = env::args_os().map(|word| word.to_string_lossy().into_owned());
     json!({
         "version": env!("CARGO_PKG_VERSION"),
+        // As `make build` tells of a git checkout (git describe); null where nobody told.
+        "commit": option_env!("SIGNORINI_COMMIT").filter(|commit| !commit.is_empty()),
         // When the run ended, UTC.
         "date": now.to_string(),
         // The command line, word by word, and where it was typed.

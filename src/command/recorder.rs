@@ -17,7 +17,7 @@ use signorini::{
         terminal::{Progress, say},
         write_whole,
     },
-    scene::Stepping,
+    scene::{Stepping, rounded},
 };
 use std::{collections::BTreeMap, time::Instant};
 
@@ -54,17 +54,19 @@ impl<'a> Recorder<'a> {
     /// Shows where the run goes on from.
     pub(super) fn show_restart(&self, restart: Option<&Checkpoint>) {
         if let (Some(Checkpoint { header, .. }), Some(_)) = (restart, &self.bar) {
-            say(&screen::row("restart", format!("from step {}, t = {}", header.step, header.time)));
+            let from = format!("from step {}, t = {}", header.step, rounded(header.time));
+            say(&screen::row("restart", from));
         }
     }
 
     /// Puts the beginning of this run in the place of an earlier run's results.
     fn start(&mut self) -> Result<(), OutputError> {
         let Task { folder, as_run, adapted, .. } = self.task;
-        output::prepare(folder)?;
+        output::prepare(folder, &self.task.problem.scene().mesh.file)?;
         write_whole(&folder.join(output::SCENE), as_run.as_bytes())?;
         if let Some(mesh) = adapted {
-            write_whole(&folder.join("mesh.msh"), mesh.mesh.to_msh().as_bytes())?;
+            let text = mesh.mesh.to_msh() + output::ADAPTED;
+            write_whole(&folder.join(output::MESH), text.as_bytes())?;
         }
         let (path, columns) = (folder.join("history.csv"), self.task.problem.quantities());
         self.history = Some(Table::create(path, &StepRecord::default(), &columns)?);
@@ -220,7 +222,6 @@ fn summary(
     let stopped = outcome.and_then(|outcome| outcome.stopped);
     let steps = last.map_or(0, |record| record.step);
     let seconds = task.phases.parts("").into_iter().map(|(name, phase)| (name, phase.seconds));
-    let foundation = problem.foundation(last.map_or(problem.start(), |record| record.time));
     let mut summary = json!({
         "provenance": provenance(),
         "scene": scene.name,
@@ -254,11 +255,6 @@ fn summary(
         "phases": seconds.collect::<BTreeMap<_, _>>(),
         // The named curves of the mesh as segments [[x, y], [x, y]], m, the body on their left.
         "boundaries": problem.boundaries(),
-        // The edges of Γ_C as segments [[x, y], [x, y]], m; unit vectors along which the body slides
-        // at their ends, [0, 0] at corners; opposite each edge the foundation at the end, m.
-        "contact_boundary": foundation.contact_boundary,
-        "contact_tangents": foundation.tangents,
-        "foundation": foundation.segments,
         "units": scene.units,
         "notes": notes,
     });

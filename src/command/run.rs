@@ -1,10 +1,9 @@
 //! `signorini run`: a scene from its file to its results.
 
 use super::{
-    Failure, SOLVERS, check_petsc, check_solver,
+    Failure, SOLVERS, SceneArguments, check_petsc, check_solver,
     checkpoint::Checkpoint,
     ranks::{agree, barrier_or_abort},
-    read,
     recorder::Recorder,
     screen, summaries, tell,
 };
@@ -28,11 +27,8 @@ use std::{
 /// Arguments of `signorini run`.
 #[derive(Args)]
 pub struct RunArguments {
-    /// Scene file (TOML).
-    scene: PathBuf,
-    /// Use this .geo or .msh instead of the scene's.
-    #[arg(long, value_name = "FILE")]
-    mesh: Option<PathBuf>,
+    #[command(flatten)]
+    scene: SceneArguments,
     /// Folder for the results [default: out/<scene>].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -40,14 +36,6 @@ pub struct RunArguments {
         "Contact solver [default: the scene's, else {}]:\n{}", SOLVERS[0], summaries()
     ))]
     solver: Option<String>,
-    /// Choose order, mesh and time steps so that the estimated error of u (energy norm) and of the
-    /// damage is at most this, from 1e-5 to 0.5, e.g. 0.01; time.step, time.tolerance and the mesh.size of
-    /// a .geo then have no effect.
-    #[arg(long, value_name = "ERROR")]
-    accuracy: Option<f64>,
-    /// Override a key of the scene, e.g. --set time.step=0.005; may be repeated.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    set: Vec<String>,
     /// Close with all that was timed (phases, times per call, bytes moved, unavoidable work) and all
     /// notes, also those that do not bear on the answer.
     #[arg(long)]
@@ -64,14 +52,7 @@ pub struct RunArguments {
 impl RunArguments {
     /// Refuses what would silently have no effect.
     fn check(&self) -> Result<(), Failure> {
-        let is_of_mesh = |set: &&String| set.trim_start().starts_with("mesh.");
-        if let (Some(file), Some(set)) = (&self.mesh, self.set.iter().find(is_of_mesh)) {
-            return Err(Failure::input(format!(
-                "--set {set} has no effect beside --mesh {0}, which replaces the scene's [mesh]; \
-                 write --set mesh.file={0} instead (relative to the scene)",
-                file.display()
-            )));
-        }
+        self.scene.check()?;
         self.solver.iter().try_for_each(|name| check_solver("--solver", name))?;
         check_petsc(&self.petsc)
     }
@@ -125,11 +106,8 @@ fn check_factors(session: &Session, problem: &DiscreteProblem) -> Result<(), Pet
 
 /// Whether the mesh that is adapted would not take the place of the one that the scene names.
 fn check_mesh_is_kept(scene: &Scene, folder: &Path) -> Result<(), Failure> {
-    let file = |path: &Path| path.canonicalize().ok();
-    let kept = folder.join("mesh.msh");
-    match scene.accuracy.is_some()
-        && file(&kept).is_some_and(|kept| file(&scene.mesh.file) == Some(kept))
-    {
+    let kept = folder.join(output::MESH);
+    match scene.accuracy.is_some() && output::is_same_file(&kept, &scene.mesh.file) {
         true => Err(Failure::input(format!(
             "{} is the mesh of the scene, and the adapted mesh would be written over it; choose another \
              folder with --out",
@@ -172,6 +150,8 @@ pub(super) struct Task<'a> {
     pub(super) folder: PathBuf,
     /// The scene as it is run, as a file.
     pub(super) as_run: String,
+    /// What the files of its tables hold.
+    pub(super) tables: Vec<u8>,
     /// The mesh, where it was adapted.
     pub(super) adapted: Option<Adapted>,
     /// Keeps other runs out of the folder.
@@ -195,18 +175,16 @@ impl<'a> Task<'a> {
         started: Instant,
     ) -> Result<Self, Failure> {
         let comm = session.comm();
-        let mesh = arguments.mesh.as_deref();
-        let set: Vec<String> = (arguments.set.iter().cloned())
-            .chain(arguments.accuracy.map(|error| format!("accuracy={error}")))
-            .chain(arguments.solver.iter().map(|name| format!("contact.solver='{name}'")))
-            .collect();
-        let load = || phases.time("mesh", || read(&arguments.scene, mesh, &set, true));
+        let solver = arguments.solver.iter().map(|name| format!("contact.solver='{name}'"));
+        let solver = Vec::from_iter(solver);
+        let load = || phases.time("mesh", || arguments.scene.read(true, &solver));
         let of_root = agree(comm, comm.is_root().then(load).transpose())?;
         let (mut scene, mesh) = agree(comm, of_root.map_or_else(load, Ok))?;
         let solver = scene.contact.solver.clone().unwrap_or(SOLVERS[0].to_owned());
         let folder = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
-        let as_run = scene.as_run().map_err(Failure::input)?;
+        let (as_run, tables) = scene.as_run().map_err(Failure::input)?;
         agree(comm, check_mesh_is_kept(&scene, &folder))?;
+        let begins = !arguments.restart && comm.is_root();
         let restart = arguments.restart.then(|| Checkpoint::read(comm, &folder));
         let restart = restart.transpose()?.flatten();
         let made = restart.as_ref().and_then(|checkpoint| checkpoint.header.adapted.clone());
@@ -223,6 +201,16 @@ impl<'a> Task<'a> {
         agree(comm, check_factors(session, &problem).map_err(asked))?;
         let lock = if comm.is_root() { output::lock(&folder) } else { Ok(None) };
         let lock = agree(comm, lock.map_err(Failure::input))?;
+        if let (true, [(step, _), ..]) = (begins, &output::checkpoints(&folder, 0)[..]) {
+            tell(
+                "warning",
+                &format!(
+                    "{} holds a checkpoint of step {step}, which goes with the other results of that \
+                     run; `--restart` would go on from it",
+                    folder.display()
+                ),
+            );
+        }
 
         // The bounds of a node follow each other.
         let contact_nodes = problem.constraints.bounds.chunk_by(|a, b| a.node == b.node);
@@ -234,6 +222,7 @@ impl<'a> Task<'a> {
             solver,
             folder,
             as_run,
+            tables,
             adapted,
             _lock: lock,
             restart,

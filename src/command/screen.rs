@@ -4,7 +4,7 @@ use super::run::Task;
 use signorini::{
     evolution::{Adapted, Outcome, StepRecord},
     output::terminal::{Progress, say},
-    scene::{Scheme, Stepping, TimeGrid},
+    scene::{Scheme, Stepping, TimeGrid, rounded},
 };
 use std::io::{self, IsTerminal, Write};
 
@@ -147,9 +147,4 @@ fn ending(last: Option<StepRecord>, outcome: Option<&Outcome>) -> String {
         Some(None) if step == 0 => format!("solved at t = {end}"),
         Some(None) => format!("finished at t = {end} after {step} steps"),
     }
-}
-
-/// A time without the rounding errors of its last digits: 0.0248, not 0.024800000000000003.
-fn rounded(t: f64) -> f64 {
-    format!("{t:.9e}").parse().unwrap_or(t)
 }

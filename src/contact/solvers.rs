@@ -19,7 +19,6 @@ use crate::{
     petsc::{Session, Vector},
 };
 use active_set::ActiveSet;
-use schemars::JsonSchema;
 use serde::{
     Deserialize, Deserializer,
     de::{Error, Unexpected},
@@ -127,7 +126,7 @@ pub struct SolverError {
 }
 
 /// `[contact]` of a scene: how the contact problem is solved.
-#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields, expecting = "a table")]
 pub struct ContactOptions {
     /// The solver's name, if the scene asks for one.

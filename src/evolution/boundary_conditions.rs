@@ -1,10 +1,9 @@
-//! What a scene asks for on the named parts of the boundary, in terms of the mesh, and the foundation
-//! opposite Γ_C for pictures.
+//! What a scene asks for on the named parts of the boundary, in terms of the mesh.
 
 use crate::{
     contact::{FixedRow, GapRow, RigidMotions},
     fem::{Body, Edge},
-    mesh::{BoundaryNode, Mesh, boundary_nodes, extent},
+    mesh::{BoundaryNode, boundary_nodes, extent},
     scene::{Boundary, Condition, Expression, Gap, Scene, SurfaceLoad},
 };
 
@@ -23,8 +22,6 @@ pub(super) struct BoundaryConditions {
     pub(super) gaps: Vec<GapRow>,
     /// Of these the ones that depend on time.
     pub(super) moving: Vec<MovingGap>,
-    /// The edges of Γ_C with their directions ν.
-    pub(super) contact_edges: Vec<([usize; 2], [f64; 2])>,
     /// The surface loads of Γ_N.
     pub(super) tractions: Vec<Traction>,
 }
@@ -81,10 +78,6 @@ impl BoundaryConditions {
                 };
                 gaps.extend(gap_rows(gap, distance, &node).map(|row| (row, &gap.distance)));
             }
-            if let Some(gap) = boundary.gap() {
-                let normal = |edge| gap.normal.unwrap_or(mesh.edge_normal(edge).0);
-                conditions.contact_edges.extend(curve.edges.iter().map(|&e| (e, normal(e))));
-            }
             conditions.tractions.extend(boundary.loads().map(|force| Traction {
                 boundary: boundary.name.clone(),
                 edges: edges.clone(),
@@ -114,30 +107,6 @@ impl BoundaryConditions {
             row.normal = motions.tangential(body, row.node, row.normal);
         }
         motions
-    }
-
-    /// The edges of Γ_C, with what is opposite their ends.
-    pub(super) fn contact_boundary(&self, mesh: &Mesh) -> ContactBoundary {
-        let ends = |&(edge, normal): &([usize; 2], [f64; 2])| {
-            edge.map(|node| End { point: mesh.nodes[node], rows: self.opposite(node, normal) })
-        };
-        ContactBoundary { edges: self.contact_edges.iter().map(ends).collect() }
-    }
-
-    /// The gap conditions at a node of Γ_C that tell where the foundation is: at a corner both. At a
-    /// node between two plates, the condition nearer to `normal`.
-    fn opposite(&self, node: usize, normal: [f64; 2]) -> Vec<(usize, GapRow)> {
-        let first = self.gaps.partition_point(|row| row.node < node);
-        let end = self.gaps.partition_point(|row| row.node <= node);
-        let rows: Vec<_> = (first..end).map(|number| (number, self.gaps[number])).collect();
-        if let [(_, a), (_, b), ..] = rows[..]
-            && cross(a.normal, b.normal).abs() > 1e-4
-        {
-            return rows[..2].to_vec();
-        }
-        let along =
-            |(_, row): &(usize, GapRow)| row.normal[0] * normal[0] + row.normal[1] * normal[1];
-        rows.into_iter().max_by(|a, b| along(a).total_cmp(&along(b))).into_iter().collect()
     }
 
     fn add_fixed_rows(&mut self, boundary: &Boundary, points: &[[f64; 2]], at: &BoundaryNode) {
@@ -173,63 +142,4 @@ fn gap_rows(gap: &Gap, distance: f64, at: &BoundaryNode) -> impl Iterator<Item =
         None => at.faces.iter().map(|face| row(face.normal, face.length)).collect(),
     };
     rows.into_iter()
-}
-
-/// Γ_C, edge by edge.
-#[derive(Debug, Clone)]
-pub(super) struct ContactBoundary {
-    pub(super) edges: Vec<[End; 2]>,
-}
-
-/// An end of an edge of Γ_C.
-#[derive(Debug, Clone)]
-pub(super) struct End {
-    point: [f64; 2],
-    /// The gap conditions that tell where the foundation is, with their numbers: two at a corner.
-    rows: Vec<(usize, GapRow)>,
-}
-
-impl ContactBoundary {
-    /// The foundation where the rows have these `gaps`, m.
-    pub(super) fn foundation(&self, gaps: &[f64]) -> Foundation {
-        let mut foundation = Foundation::default();
-        for ends in &self.edges {
-            let opposite = ends.each_ref().map(|end| end.opposite(gaps));
-            let at = |i: usize| [0, 1].map(|k| ends[i].point[k] + opposite[i].0[k]);
-            foundation.contact_boundary.push([0, 1].map(|i| ends[i].point));
-            foundation.segments.push([0, 1].map(at));
-            foundation.tangents.push(opposite.map(|(_, tangent)| tangent));
-        }
-        foundation
-    }
-}
-
-impl End {
-    /// The vector d to the foundation, and the direction in which the node may slide: at a corner the d
-    /// with d·ν = g for both conditions, and (0, 0); else d = g ν and the tangent.
-    fn opposite(&self, gaps: &[f64]) -> ([f64; 2], [f64; 2]) {
-        match self.rows[..] {
-            [(i, GapRow { normal: p, .. }), (j, GapRow { normal: q, .. })] => {
-                let (x, y) = (gaps[i] * q[1] - gaps[j] * p[1], gaps[j] * p[0] - gaps[i] * q[0]);
-                ([x / cross(p, q), y / cross(p, q)], [0.0; 2])
-            }
-            [(i, GapRow { normal: [x, y], .. }), ..] => ([gaps[i] * x, gaps[i] * y], [-y, x]),
-            [] => Default::default(),
-        }
-    }
-}
-
-fn cross(p: [f64; 2], q: [f64; 2]) -> f64 {
-    p[0] * q[1] - p[1] * q[0]
-}
-
-/// What is opposite Γ_C: for each edge an entry with its two ends.
-#[derive(Debug, Clone, Default)]
-pub struct Foundation {
-    /// The edge, m.
-    pub contact_boundary: Vec<[[f64; 2]; 2]>,
-    /// The foundation opposite, m; its segments meet at the nodes.
-    pub segments: Vec<[[f64; 2]; 2]>,
-    /// Unit vectors along which the body slides there; (0, 0) at a corner, which does not slide.
-    pub tangents: Vec<[[f64; 2]; 2]>,
 }

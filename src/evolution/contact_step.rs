@@ -15,8 +15,8 @@ pub(super) use accuracy::Compliance;
 pub(super) use certificate::active_bounds;
 
 use super::{
-    DiscreteProblem, Phases, RunError, State, Step, StepRecord, agreed, discrete_problem::LoadCase,
-    extrapolation::Extrapolation,
+    DiscreteProblem, Phases, RunError, State, Step, StepFailure, StepRecord, agreed,
+    discrete_problem::LoadCase, extrapolation::Extrapolation,
 };
 use crate::{
     archive::{Archive, ArchiveError},
@@ -80,6 +80,8 @@ const LIFTED: f64 = 1e-2;
 /// Loads below this part of the largest of the run count as so much, or an answer to rounding
 /// (sin(pi) = 1.2e-16) would have to have as many digits as any other.
 const LEAST_LOAD: f64 = 1e-6;
+/// Energies of larger displacements, m, overflow.
+const LARGEST: f64 = 1e150;
 
 impl<'a> ContactStep<'a> {
     /// With the contact solver called `solver`.
@@ -158,6 +160,10 @@ impl<'a> ContactStep<'a> {
             (record, problem.quantities_in(&state, &unbalanced))
         });
         record.seconds = started.elapsed().as_secs_f64();
+        if !(0.0..=LARGEST).contains(&record.displacement_max) {
+            let source = StepFailure::TooLarge(record.displacement_max);
+            return Err(RunError::Step { step, time, source });
+        }
         Ok(Step { state, record, quantities, report, unconstrained, skipped_damage_solve: false })
     }
 

@@ -1,8 +1,8 @@
 //! The discrete problem: a scene bound to its mesh, all that does not change from step to step.
 
 use super::{
-    Foundation, Loads, RunError, State, Supports, agreed,
-    boundary_conditions::{BoundaryConditions, ContactBoundary},
+    Loads, RunError, State, Supports, agreed,
+    boundary_conditions::BoundaryConditions,
     notes,
     probe::{OBSERVED, Probes},
 };
@@ -12,7 +12,7 @@ use crate::{
     mesh::{Mesh, Order},
     model::DamageLaw,
     petsc::{PetscError, Session},
-    scene::{Scene, SceneError},
+    scene::{Scene, SceneError, rounded},
 };
 use nalgebra::DVector;
 use std::{collections::BTreeMap, path::PathBuf};
@@ -41,8 +41,6 @@ pub struct DiscreteProblem {
     pub(super) largest_load: f64,
     /// KKT tolerance.
     pub tolerance: f64,
-    /// Γ_C of the undivided body.
-    contact_boundary: ContactBoundary,
     scene: Scene,
     /// Where `body` is a part: the undivided mesh and the ranks that own its vertices.
     undivided: Option<(Mesh, Vec<usize>)>,
@@ -87,8 +85,9 @@ pub enum SetupError {
     /// A load, a prescribed displacement or a gap is not finite, and this rank cannot tell where.
     #[error(
         "{scene}: a traction, the body force, a prescribed displacement or a gap is not finite or too \
-         large at t = {time}; check its expression for divisions by zero, roots and logarithms \
-         of negative numbers"
+         large at t = {}; check its expression for divisions by zero, roots and logarithms \
+         of negative numbers",
+        rounded(*time)
     )]
     NotFinite {
         /// The scene file.
@@ -97,7 +96,7 @@ pub enum SetupError {
         time: f64,
     },
     /// The load drives a rigid motion.
-    #[error("{scene}: at t = {time}, {source}")]
+    #[error("{scene}: at t = {}, {source}", rounded(*time))]
     Driven {
         /// The scene file.
         scene: PathBuf,
@@ -124,7 +123,6 @@ impl DiscreteProblem {
             .map_err(|source| SetupError::Constraint { scene: scene.path.clone(), source })?;
         motions.pin_free(&body, &mut constraints);
         let certificate = Certificate::new(fixed, gaps);
-        let contact_boundary = conditions.contact_boundary(&body.mesh);
         let unresolved = |traction| notes::unresolved(&scene, &body.mesh, traction);
         let unresolved: Vec<_> = conditions.tractions.iter().filter_map(unresolved).collect();
         scene.notes.extend(unresolved);
@@ -133,7 +131,6 @@ impl DiscreteProblem {
             .map(|time| body.nodes.partition.norm(&loads.at(&body, time), 2));
         let problem = Self {
             largest_load: norms.filter(|norm| norm.is_finite()).fold(0.0, f64::max),
-            contact_boundary,
             certificate,
             elasticity: Elasticity::new(scene.materials()),
             laws: if scene.time.is_some() { scene.damage_laws() } else { Vec::new() },
@@ -273,12 +270,7 @@ impl DiscreteProblem {
 
     /// Whether there is a Γ_C.
     pub fn has_contact(&self) -> bool {
-        !self.contact_boundary.edges.is_empty()
-    }
-
-    /// The foundation opposite Γ_C at `time`.
-    pub fn foundation(&self, time: f64) -> Foundation {
-        self.contact_boundary.foundation(&self.loads.all_gaps_at(time))
+        self.scene.boundaries.iter().any(|boundary| boundary.gap().is_some())
     }
 
     /// The time of the first solve, s: 0, or 1 where there is no time.

@@ -6,13 +6,14 @@ use crate::{
     contact::{ContactError, SolverError},
     interrupt::Signal,
     petsc::PetscError,
+    scene::rounded,
 };
 
 /// Why a run ended early.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// A contact step failed; the steps before it are accepted.
-    #[error("{}{source}{advice}", time.map_or(String::new(), |t| format!("step {step} (t = {t}): ")))]
+    #[error("{}{source}{advice}", time.map_or(String::new(), |t| format!("step {step} (t = {}): ", rounded(t))))]
     Contact {
         /// The step.
         step: usize,
@@ -24,7 +25,7 @@ pub enum RunError {
         advice: &'static str,
     },
     /// Another part of a step failed; the steps before it are accepted.
-    #[error("step {step} (t = {time}): {source}")]
+    #[error("step {step} (t = {}): {source}", rounded(*time))]
     Step {
         /// The step.
         step: usize,
@@ -72,6 +73,12 @@ pub enum StepFailure {
          begin with -damage_pc_"
     )]
     DamageResidual(f64),
+    /// Displacements whose energy would overflow.
+    #[error(
+        "the largest displacement is {0:.1e}, too large to go on with; look for extreme numbers in \
+         [material] and the loads, and at their units"
+    )]
+    TooLarge(f64),
     /// However short a chosen step is, its error is above the tolerance.
     #[error(
         "the damage changes too fast for time.tolerance, however short the step; does a load jump \

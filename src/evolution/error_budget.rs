@@ -5,7 +5,7 @@ use crate::{fem::RecoveredStrains, petsc::PetscError};
 use serde::Serialize;
 
 /// Estimated relative errors of the last accepted state: of u in the energy norm, of the damage
-/// ζ₀ − ζ in L². `None` without damage, or before the second step.
+/// ζ₀ − ζ in L². `None` without damage; from the time steps also where these are too few to tell.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct ErrorBudget {
     /// Of u, from the mesh.
@@ -19,10 +19,15 @@ pub struct ErrorBudget {
     pub damage_steps: Option<f64>,
     /// Of the largest displacement, from the solver.
     pub solver: f64,
+    /// Whether the material can be damaged.
+    #[serde(skip)]
+    pub can_be_damaged: bool,
 }
 
 /// Above this the mesh is called the limit.
 const LARGE: f64 = 0.05;
+/// Where all are below this there is nothing to spend on.
+const NEGLIGIBLE: f64 = 1e-9;
 
 impl ErrorBudget {
     /// Of the last accepted state, from the estimated errors `mesh` and `steps` of its ζ. Collective.
@@ -42,6 +47,7 @@ impl ErrorBudget {
             displacement_steps: steps.map(caused),
             damage_steps: steps.and_then(|error| problem.relative_to_damage(error, state)),
             solver: accuracy.displacement,
+            can_be_damaged: problem.damage().is_some(),
         }
     }
 
@@ -69,21 +75,25 @@ impl ErrorBudget {
                 let largest = self.damage_steps.map_or(u, |damage| damage.max(u));
                 (of_damage(self.damage_mesh), steps, self.damage_mesh, Some(largest))
             }
-            (None, None) => (of_damage(self.damage_mesh), "none".to_owned(), None, None),
+            (None, None) => {
+                let steps = if self.can_be_damaged { "not estimated" } else { "none" };
+                (of_damage(self.damage_mesh), steps.to_owned(), self.damage_mesh, None)
+            }
         };
         let of_u = if stopped.is_some() { 0.0 } else { self.displacement_mesh };
         let (mesh, steps_most) = (of_u.max(mesh.unwrap_or(0.0)), steps.unwrap_or(0.0));
-        let advice = match () {
-            () if self.solver > mesh.max(steps_most) => "the solver's tolerance",
-            () if steps_most > mesh => "shorter time steps",
-            () if mesh > LARGE => "the mesh, which is the limit of this answer",
-            () => "the mesh",
+        let advice = match mesh.max(steps_most) {
+            largest if largest.max(self.solver) < NEGLIGIBLE => "",
+            largest if self.solver > largest => "; spend on the solver's tolerance",
+            _ if steps_most > mesh => "; spend on shorter time steps",
+            _ if mesh > LARGE => "; spend on the mesh, which is the limit of this answer",
+            _ => "; spend on the mesh",
         };
         [
             format!("from the mesh: u {} (energy norm)", percent(self.displacement_mesh)),
             format!("from the mesh: {of_mesh}"),
             format!("from the time steps: {of_steps}"),
-            format!("from the solver: u {:.0e}; spend on {advice}", self.solver),
+            format!("from the solver: u {:.0e}{advice}", self.solver),
         ]
     }
 }

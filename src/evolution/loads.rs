@@ -97,12 +97,7 @@ impl Loads {
 
     /// The gaps of all gap rows at time t, m; none where no gap depends on time.
     pub fn gaps_at(&self, t: f64) -> Vec<f64> {
-        if self.moving.is_empty() { Vec::new() } else { self.all_gaps_at(t) }
-    }
-
-    /// The gaps of all gap rows at time t, m.
-    pub(super) fn all_gaps_at(&self, t: f64) -> Vec<f64> {
-        let mut gaps = self.gaps.clone();
+        let mut gaps = if self.moving.is_empty() { Vec::new() } else { self.gaps.clone() };
         self.moving.iter().for_each(|gap| gaps[gap.number] = gap.at(t));
         gaps
     }
@@ -113,7 +108,7 @@ impl Loads {
         let loads = self.samples.iter().flat_map(|(_, f)| f);
         let prescribed = self.prescribed.iter().flatten().map(|(_, expression)| expression);
         let gaps = self.moving.iter().flat_map(|gap| &gap.distances);
-        let all = loads.chain(prescribed).chain(gaps).flat_map(Expression::breaks);
+        let all = loads.chain(prescribed).chain(gaps).flat_map(|f| f.breaks(end));
         let mut breaks: Vec<f64> = all.filter(|t| 0.0 < *t && *t < end).collect();
         breaks.sort_by(f64::total_cmp);
         breaks.dedup_by(|next, t| *next - *t < APART * end);

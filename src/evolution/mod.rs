@@ -46,7 +46,6 @@ mod unresolved;
 pub use crate::contact::ContactPoint;
 pub use crate::phases::Phases;
 pub use adaptive::{AdaptError, Adapted, SHARE_OF_STEPS, adapted};
-pub use boundary_conditions::Foundation;
 pub use contact_step::{Accuracy, ContactStep};
 pub use discrete_problem::{DiscreteProblem, SetupError};
 pub use error::{RunError, StepFailure};

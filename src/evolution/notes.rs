@@ -10,7 +10,7 @@ use crate::{
     fem::{Edge, for_elements},
     mesh::{Mesh, Order},
     model::Plane,
-    scene::{Expression, Scene, Stepping},
+    scene::{Expression, Scene, Stepping, rounded},
 };
 
 /// In plane strain with ν above this, P1 triangles lock: measured in the stability study. P2 triangles
@@ -48,8 +48,9 @@ impl Outcome {
         if let Some((time, motion)) = &self.unconstrained {
             // Nodes that touch without force may still be in the way.
             notes.push(format!(
-                "at t = {time}, no active contact node holds the body against {motion}: the answer may \
-                 be one of many"
+                "at t = {}, no active contact node holds the body against {motion}: the answer may \
+                 be one of many",
+                rounded(*time)
             ));
         }
         // That an unconstrained body has no one answer is said already.

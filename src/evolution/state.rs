@@ -5,7 +5,6 @@ use crate::{
     contact::{ContactPoint, ContactReport, Kkt, RigidMotion},
     fem::DamageCertificate,
 };
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A step with its certified answer.
@@ -40,7 +39,7 @@ pub struct State {
 }
 
 /// The quantities of interest of a step: a row of `history.csv`.
-#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub struct StepRecord {
     /// n, 0 for the state at t = 0.
     pub step: usize,

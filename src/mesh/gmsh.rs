@@ -133,33 +133,11 @@ fn refusal(text: &str, name: &str, value: f64) -> Option<&'static str> {
         Some("the name must consist of letters, digits and underscores")
     } else if !value.is_finite() {
         Some("the value must be finite")
-    } else if is_assigned(text, name) {
-        Some(
-            "the .geo file assigns it, which overrules this value; write DefineConstant[ … ] there",
-        )
     } else if name == "size" {
         (value <= 0.0).then_some("the size must be positive")
     } else {
         (!defined()).then_some("the .geo file has no such parameter")
     }
-}
-
-/// Whether a statement of the .geo file `text` is `name = …`. In `DefineConstant[ … ]` and behind
-/// `If (!Exists(…))` a constant gives way to the parameter.
-fn is_assigned(text: &str, name: &str) -> bool {
-    let mut parts = text.split("/*");
-    let first = parts.next();
-    let uncommented = parts.filter_map(|part| part.split_once("*/")).map(|(_, rest)| rest);
-    let code: String = first.into_iter().chain(uncommented).collect();
-    let lines = code.lines().filter_map(|line| line.split("//").next());
-    let code = lines.collect::<Vec<_>>().join(" ");
-    let gives_way = code.replace(' ', "").contains(&format!("Exists({name})"));
-    let assigns = |statement: &str| {
-        let rest = statement.trim_start().strip_prefix(name).unwrap_or_default().trim_start();
-        rest.starts_with('=') && !rest.starts_with("==")
-    };
-    let code = code.replace("EndIf", ";").replace("EndFor", ";");
-    !gives_way && code.split([';', '}']).any(assigns)
 }
 
 /// When the `.geo`, or a file that it takes in by `Include "name"` or `Merge "name"`, directly or
@@ -188,6 +166,19 @@ fn modified(path: &Path) -> io::Result<SystemTime> {
     fs::metadata(path).and_then(|data| data.modified())
 }
 
+/// What gmsh reads behind the `.geo`: that a parameter has not its value there is an error, and the option
+/// -order would give way to a Mesh.ElementOrder in the `.geo`.
+fn last_words(parameters: &BTreeMap<String, f64>, order: Order) -> String {
+    let kept = parameters.iter().map(|(name, value)| {
+        format!(
+            "If ({name} != {value})\n Error(\"`{name}` = {value}: the .geo file assigns it, which \
+             overrules this value; write DefineConstant[ … ] there\");\nEndIf\n"
+        )
+    });
+    let order = if order == Order::Quadratic { "Mesh.ElementOrder = 2;\n" } else { "" };
+    kept.chain([order.to_owned()]).collect()
+}
+
 /// Runs gmsh, which must leave `fresh` behind without a word of error.
 fn run(
     geo: &Path,
@@ -204,14 +195,10 @@ fn run(
             command.args(["-clmax", &value.to_string()]);
         }
     }
+    let second = fresh.with_file_name("second.geo");
+    fs::write(&second, last_words(parameters, order)).map_err(MeshError::io(&second))?;
     // "./" keeps a path that begins with a dash from being taken for an option.
-    command.arg("-o").arg(fresh).arg(Path::new(".").join(geo));
-    if order == Order::Quadratic {
-        // The option -order would give way to a Mesh.ElementOrder in the .geo, a later file does not.
-        let second = fresh.with_file_name("order.geo");
-        fs::write(&second, "Mesh.ElementOrder = 2;\n").map_err(MeshError::io(&second))?;
-        command.arg(second);
-    }
+    command.arg("-o").arg(fresh).arg(Path::new(".").join(geo)).arg(second);
     // A file takes what it says, however much: a pipe would have to be read meanwhile.
     let log = fresh.with_file_name("log");
     let said = File::create(&log).and_then(|file| Ok([file.try_clone()?, file]));

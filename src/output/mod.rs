@@ -49,18 +49,31 @@ pub fn create(folder: &Path) -> Result<(), OutputError> {
 /// The scene as it was run. It takes the place of the earlier one, which may be the one that is run.
 pub const SCENE: &str = "scene.toml";
 
+/// The mesh, where it was adapted.
+pub const MESH: &str = "mesh.msh";
+/// The end of such a file.
+pub const ADAPTED: &str =
+    "$Comments\nAdapted by signorini for the results beside it.\n$EndComments\n";
+
 /// Creates `folder` and keeps other runs out of it while the answer lives (flock(2); where the file
 /// system has no locks it keeps nobody out).
 ///
 /// # Errors
-/// The folder cannot be created or written to, another run has it, or it holds a scene of the user's
-/// where that of the run would be written.
+/// The folder cannot be created or written to, another run has it, or it holds a file of the user's
+/// where one of the run would be written: every run leaves its scene there.
 pub fn lock(folder: &Path) -> Result<Option<File>, OutputError> {
     create(folder)?;
     let scene = folder.join(SCENE);
-    if fs::read_to_string(&scene).is_ok_and(|text| !text.starts_with(AS_RUN)) {
-        let reason = "it is no scene that a run left there; choose another folder with --out";
-        return Err(OutputError::new(&scene, reason));
+    let foreign = match fs::read_to_string(&scene) {
+        Ok(text) if text.starts_with(AS_RUN) => None,
+        Ok(_) => Some(scene),
+        Err(_) => {
+            files(folder)?.into_iter().find_map(|(name, path)| is_result(&name).then_some(path))
+        }
+    };
+    if let Some(file) = foreign {
+        let reason = "no run left it there; choose another folder with --out, or move it away";
+        return Err(OutputError::new(&file, reason));
     }
     let file = File::open(folder).map_err(|e| OutputError::new(folder, e))?;
     match file.try_lock() {
@@ -118,12 +131,19 @@ fn is_frame(name: &str) -> bool {
 
 /// The checkpoints of a rank in `folder`, `checkpoint_STEP_RANK`, with their steps.
 pub fn checkpoints(folder: &Path, rank: usize) -> Vec<(usize, PathBuf)> {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let checkpoint = |entry: fs::DirEntry| {
-        let (step, of_rank) = checkpoint(&entry.file_name().to_string_lossy())?;
-        (of_rank == rank).then(|| (step, entry.path()))
+    let checkpoint = |(name, path): (String, PathBuf)| {
+        let (step, of_rank) = checkpoint(&name)?;
+        (of_rank == rank).then_some((step, path))
     };
-    entries.filter_map(checkpoint).collect()
+    files(folder).into_iter().flatten().filter_map(checkpoint).collect()
+}
+
+/// The names and paths of what a folder holds.
+fn files(folder: &Path) -> Result<Vec<(String, PathBuf)>, OutputError> {
+    let entries = fs::read_dir(folder).map_err(|e| OutputError::new(folder, e))?.flatten();
+    let named =
+        |entry: fs::DirEntry| (entry.file_name().to_string_lossy().into_owned(), entry.path());
+    Ok(entries.map(named).collect())
 }
 
 /// The step and the rank of a file, if its `name` is that of a checkpoint.
@@ -133,13 +153,27 @@ fn checkpoint(name: &str) -> Option<(usize, usize)> {
 }
 
 /// Removes from `folder` the results of an earlier run, its figures and its files that were never
-/// completed, so that none are mistaken for new.
+/// completed, so that none are mistaken for new; also its adapted mesh, unless it is the `mesh` in use.
 ///
 /// # Errors
 /// A file cannot be removed.
-pub fn prepare(folder: &Path) -> Result<(), OutputError> {
-    let of_results = |name: &str| is_frame(name) || is_picture(name) || FILES.contains(&name);
-    remove(folder, |name| of_results(name) || is_partial(name) || checkpoint(name).is_some())
+pub fn prepare(folder: &Path, mesh: &Path) -> Result<(), OutputError> {
+    let kept = folder.join(MESH);
+    let is_old = fs::read_to_string(&kept).is_ok_and(|text| text.ends_with(ADAPTED));
+    let old_mesh = if is_old && !is_same_file(&kept, mesh) { MESH } else { "" };
+    remove(folder, |name| {
+        is_result(name) || is_partial(name) || checkpoint(name).is_some() || name == old_mesh
+    })
+}
+
+fn is_result(name: &str) -> bool {
+    is_frame(name) || is_picture(name) || FILES.contains(&name)
+}
+
+/// Whether both paths lead to one file.
+#[must_use]
+pub fn is_same_file(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
 /// Removes from `folder` the files that a run which was killed has not completed.
@@ -155,13 +189,8 @@ fn is_partial(name: &str) -> bool {
 }
 
 fn remove(folder: &Path, is_old: impl Fn(&str) -> bool) -> Result<(), OutputError> {
-    let entries = fs::read_dir(folder).map_err(|e| OutputError::new(folder, e))?;
-    for entry in entries.flatten() {
-        if is_old(&entry.file_name().to_string_lossy()) {
-            fs::remove_file(entry.path()).map_err(|e| OutputError::new(&entry.path(), e))?;
-        }
-    }
-    Ok(())
+    let mut old = files(folder)?.into_iter().filter(|(name, _)| is_old(name));
+    old.try_for_each(|(_, path)| fs::remove_file(&path).map_err(|e| OutputError::new(&path, e)))
 }
 
 /// A CSV file that grows by rows, each written at once, so that a run can be followed.

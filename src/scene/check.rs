@@ -6,7 +6,7 @@ use super::boundary::{Boundary, Condition, SurfaceLoad, boundary_key, contradict
 use super::document::{NOWHERE, Problem};
 use super::error::{SceneError, suggestion};
 use super::expression::Expression;
-use super::{Damage, Probe, Scene, may_start_at};
+use super::{Damage, Probe, Scene, may_start_at, rounded};
 use crate::{
     fem::{gauss_points, midpoint},
     mesh::{Curve, Mesh},
@@ -235,7 +235,8 @@ impl Scene {
             for &[x, y] in points.iter().skip(i % parts).step_by(parts) {
                 let value = expression.eval(x, y, t);
                 if !(value.is_finite() && holds(value)) {
-                    let when = if in_time { format!(", t = {t}") } else { String::new() };
+                    let when =
+                        if in_time { format!(", t = {}", rounded(t)) } else { String::new() };
                     let problem = format!("is {value} at ({x}, {y}){when}{rule}");
                     return Some(self.at_key(key, &problem));
                 }

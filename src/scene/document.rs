@@ -2,6 +2,7 @@
 //! where it is written.
 
 use std::collections::BTreeMap;
+use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -134,22 +135,30 @@ impl SceneText {
     }
 }
 
-/// Writes the paths of `table("file")` in full; relative ones begin at `folder`.
-pub(super) fn complete_paths(value: &mut toml::Value, folder: &Path) {
+/// Writes the paths of `table("file")` in full, relative ones begin at `folder`, and adds to `tables`
+/// what the files hold.
+pub(super) fn complete_paths(value: &mut toml::Value, folder: &Path, tables: &mut Vec<u8>) {
     match value {
         toml::Value::String(text) if text.contains("table") => {
             // An expression quotes nothing but files.
-            let full = |part: &str| match folder.join(part) {
-                file if file.is_file() => std::path::absolute(&file).unwrap_or(file),
-                _ => part.into(),
+            let mut full = |part: &str| match fs::read(folder.join(part)) {
+                Ok(table) => {
+                    tables.extend(table);
+                    let file = folder.join(part);
+                    std::path::absolute(&file).unwrap_or(file).to_string_lossy().into_owned()
+                }
+                Err(_) => part.to_owned(),
             };
             for quote in ["\"", "'"] {
-                let parts = text.split(quote).map(|part| full(part).to_string_lossy().into_owned());
-                *text = parts.collect::<Vec<_>>().join(quote);
+                *text = text.split(quote).map(&mut full).collect::<Vec<_>>().join(quote);
             }
         }
-        toml::Value::Array(values) => values.iter_mut().for_each(|v| complete_paths(v, folder)),
-        toml::Value::Table(table) => table.iter_mut().for_each(|(_, v)| complete_paths(v, folder)),
+        toml::Value::Array(values) => {
+            values.iter_mut().for_each(|value| complete_paths(value, folder, tables));
+        }
+        toml::Value::Table(table) => {
+            table.iter_mut().for_each(|(_, value)| complete_paths(value, folder, tables));
+        }
         _ => {}
     }
 }

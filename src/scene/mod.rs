@@ -9,7 +9,6 @@ mod document;
 mod error;
 mod expression;
 mod reader;
-mod schema;
 mod tables;
 
 use std::collections::BTreeMap;
@@ -19,7 +18,6 @@ use std::path::{Path, PathBuf};
 pub use boundary::{Boundary, Condition, Gap, SurfaceLoad};
 pub use error::SceneError;
 pub use expression::{Expression, ExpressionError};
-pub use schema::{schema, schema_of};
 
 use crate::{
     contact::ContactOptions,
@@ -161,6 +159,12 @@ impl TimeGrid {
     }
 }
 
+/// A time without the rounding errors of its last digits, for people: 0.0248, not 0.024800000000000003.
+#[must_use]
+pub fn rounded(t: f64) -> f64 {
+    format!("{t:.9e}").parse().unwrap_or(t)
+}
+
 /// The first line of a scene as it was run.
 pub const AS_RUN: &str = "# As run by signorini; the results stand beside it.";
 
@@ -255,11 +259,12 @@ impl Scene {
     }
 
     /// The scene as it is run, as the text of a file that runs from anywhere: the `--set` arguments are
-    /// put in, the mesh is the one in use, paths of files are full.
+    /// put in, the mesh is the one in use, paths of files are full. Also what the files of its tables
+    /// hold.
     ///
     /// # Errors
     /// None, if the scene has been read.
-    pub fn as_run(&self) -> Result<String, SceneError> {
+    pub fn as_run(&self) -> Result<(String, Vec<u8>), SceneError> {
         let mut scene = self.text.merged()?;
         scene.insert("title".into(), self.title.clone().into());
         let file = std::path::absolute(&self.mesh.file).unwrap_or(self.mesh.file.clone());
@@ -271,8 +276,11 @@ impl Scene {
             mesh.insert("parameters".into(), parameters.into());
         }
         scene.insert("mesh".into(), mesh.into());
-        scene.iter_mut().for_each(|(_, value)| document::complete_paths(value, self.text.folder()));
-        Ok(format!("{AS_RUN}\n{scene}"))
+        let mut tables = Vec::new();
+        for (_, value) in scene.iter_mut() {
+            document::complete_paths(value, self.text.folder(), &mut tables);
+        }
+        Ok((format!("{AS_RUN}\n{scene}"), tables))
     }
 
     /// Reads and checks the scene at `path`.
@@ -287,6 +295,11 @@ impl Scene {
     /// type; values are out of range or contradict others. All problems of a file are told at
     /// once, each with the line (or the `--set`), the key and what to write instead.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
+        if path.extension().is_some_and(|ending| ending == "geo" || ending == "msh") {
+            let problem = "it is a mesh, and what runs is a scene that names it in [mesh] (`signorini \
+                           new NAME` writes one)";
+            return Err(SceneError::Refused(vec![format!("{}: {problem}", path.display())]));
+        }
         let text = std::fs::read_to_string(path)
             .map_err(|source| SceneError::Read { path: path.to_owned(), source })?;
         Self::parse(&text, path, overrides)

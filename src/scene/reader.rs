@@ -6,16 +6,13 @@ use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::ops::Range;
 
-use schemars::JsonSchema;
 use serde::de::{DeserializeOwned, IntoDeserializer};
-use serde_json::json;
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
 use super::document::{NOWHERE, Problem, SceneText, name_of};
 use super::error::{SceneError, suggestion};
 use super::expression::Expression;
-use super::schema::{Description, schema_of};
 
 /// A value was refused; its problem is noted.
 #[derive(Debug, Clone, Copy)]
@@ -29,8 +26,6 @@ struct Findings<'d> {
     text: &'d SceneText,
     places: RefCell<BTreeMap<String, Range<usize>>>,
     problems: RefCell<Vec<Problem>>,
-    /// Where there is no document: what is asked for. Every value is then missing.
-    asked: Option<&'d Description>,
 }
 
 /// Reads the document `root` of `text`: `read` gets its table. Also tells where the values that
@@ -44,7 +39,7 @@ pub(super) fn read<T>(
     read: impl FnOnce(&mut Table) -> Reading<T>,
 ) -> Result<(T, BTreeMap<String, Range<usize>>), SceneError> {
     let (places, problems) = Default::default();
-    let findings = Findings { text, places, problems, asked: None };
+    let findings = Findings { text, places, problems };
     let root = DeValue::Table(root);
     let (key, place, value) = (String::new(), NOWHERE, Some(&root));
     let result = Value { key, place, value, findings: &findings }.table("", read);
@@ -52,19 +47,6 @@ pub(super) fn read<T>(
     // Nothing was refused, or there would be a problem.
     let result = result.map_err(|Refused| SceneError::Refused(vec![]))?;
     Ok((result, findings.places.take()))
-}
-
-/// Describes the keys of a document: `read` asks for them all and gets none.
-pub(super) fn describe<T>(
-    text: &SceneText,
-    asked: &Description,
-    read: impl FnOnce(&mut Table) -> Reading<T>,
-) {
-    let (places, problems) = Default::default();
-    let findings = Findings { text, places, problems, asked: Some(asked) };
-    // What is refused for want of a document is noted nowhere.
-    let _ = Value { key: String::new(), place: NOWHERE, value: None, findings: &findings }
-        .table("", read);
 }
 
 /// A value, or the lack of one, and its key in full.
@@ -81,12 +63,6 @@ impl<'d> Value<'d> {
     fn below(&self, key: String, place: Range<usize>, value: Option<&'d DeValue<'d>>) -> Self {
         self.findings.places.borrow_mut().insert(key.clone(), place.clone());
         Self { key, place, value, findings: self.findings }
-    }
-
-    /// Whether there is no document; then notes what the value may be.
-    fn describes(&self, facts: impl FnOnce() -> serde_json::Value) -> bool {
-        let asked = self.findings.asked.inspect(|asked| asked.add(&self.key, facts()));
-        asked.is_some()
     }
 
     /// Where the value is written, in words.
@@ -111,16 +87,11 @@ impl<'d> Value<'d> {
 
     /// What is read from the value if there is one.
     pub(super) fn optional<T>(&self, read: impl FnOnce(&Self) -> Reading<T>) -> Reading<Option<T>> {
-        if let Some(asked) = self.findings.asked {
-            asked.require(&self.key, false);
-            return read(self).map(Some);
-        }
         self.value.map(|_| read(self)).transpose()
     }
 
     /// A value as serde reads it: text, a flag.
     pub(super) fn read<T: DeserializeOwned>(&self) -> Reading<T> {
-        self.findings.asked.inspect(|asked| asked.add_type::<T>(&self.key));
         self.deserialize(self.required()?.clone())
     }
 
@@ -159,7 +130,6 @@ impl<'d> Value<'d> {
     /// What one of the `choices` stands for.
     pub(super) fn choice<T: Copy>(&self, choices: [(&str, T); 2]) -> Reading<T> {
         let [first, second] = choices.map(|(known, _)| known);
-        self.describes(|| json!({ "enum": [first, second] }));
         let name = self.required()?.as_str();
         let chosen = choices.into_iter().find(|(known, _)| Some(*known) == name);
         let wanted = || self.refuse(format!("must be \"{first}\" or \"{second}\""));
@@ -168,7 +138,6 @@ impl<'d> Value<'d> {
 
     /// A finite number for which `holds`; `rule` says so in words.
     pub(super) fn number(&self, rule: &str, holds: impl Fn(f64) -> bool) -> Reading<f64> {
-        self.describes(|| json!({ "type": "number", "values": rule }));
         let number: f64 = self.read()?;
         match number.is_finite() && holds(number) {
             true => Ok(number),
@@ -182,8 +151,6 @@ impl<'d> Value<'d> {
 
     /// An expression that is finite if it is constant.
     pub(super) fn expression(&self) -> Reading<Expression> {
-        let values = "number or expression in x, y, t";
-        self.describes(|| json!({ "type": ["number", "string"], "values": values }));
         let expression = match self.required()? {
             DeValue::String(text) => Expression::parse_in(text, self.findings.text.folder())
                 .map_err(|e| self.refuse(e))?,
@@ -198,7 +165,6 @@ impl<'d> Value<'d> {
 
     /// An expression in x and y.
     pub(super) fn expression_in_space(&self) -> Reading<Expression> {
-        self.describes(|| json!({ "values": "number or expression in x, y" }));
         let expression = self.expression()?;
         match expression.depends_on_time() {
             true => Err(self.refuse("depends on t; it must be a function of x and y alone")),
@@ -208,9 +174,6 @@ impl<'d> Value<'d> {
 
     /// The elements of an array, each under the key that it gets by its index.
     pub(super) fn array(&self, key: impl Fn(usize, &DeValue) -> String) -> Reading<Vec<Self>> {
-        if self.describes(|| json!({ "type": "array" })) {
-            return Ok(vec![self.below(format!("{}[]", self.key), NOWHERE, None)]);
-        }
         let Some(values) = self.required()?.as_array() else {
             return Err(self.refuse("must be an array"));
         };
@@ -245,9 +208,7 @@ impl<'d> Value<'d> {
 
     /// An array of two components.
     pub(super) fn pair<T>(&self, read: impl Fn(&Self) -> Reading<T>) -> Reading<[T; 2]> {
-        self.describes(|| json!({ "type": "array", "minItems": 2, "maxItems": 2 }));
         match self.array(|i, _| format!("{}[{i}]", self.key))?.as_slice() {
-            [any] if self.findings.asked.is_some() => read(any).and(Err(Refused)),
             [x, y] => {
                 let (x, y) = (read(x), read(y));
                 Ok([x?, y?])
@@ -258,9 +219,6 @@ impl<'d> Value<'d> {
 
     /// The values of a table by their names; the `separator` stands between its key and theirs.
     fn entries(&self, separator: &str) -> Reading<BTreeMap<&'d str, Self>> {
-        if self.describes(|| json!({ "type": "object", "additionalProperties": false })) {
-            return Ok(BTreeMap::new());
-        }
         let Some(table) = self.required()?.as_table() else {
             return Err(self.refuse("must be a table"));
         };
@@ -280,9 +238,6 @@ impl<'d> Value<'d> {
         &self,
         read: impl Fn(&Self) -> Reading<T>,
     ) -> Reading<BTreeMap<String, T>> {
-        if self.describes(|| json!({ "type": "object", "additionalProperties": {} })) {
-            let _ = read(&self.below(format!("{}.*", self.key), NOWHERE, None));
-        }
         let entries = self.entries(".")?.into_iter();
         let entries = entries.map(|(name, value)| Ok((name.to_owned(), read(&value)?)));
         entries.collect::<Vec<_>>().into_iter().collect()
@@ -290,8 +245,7 @@ impl<'d> Value<'d> {
 
     /// A table of options that a room below reads by serde and that has a default for each. Each
     /// value is also read alone, so that all that are wrong are told.
-    pub(super) fn options<T: DeserializeOwned + JsonSchema>(&self) -> Reading<T> {
-        self.describes(schema_of::<T>);
+    pub(super) fn options<T: DeserializeOwned>(&self) -> Reading<T> {
         self.each_option::<T>(&|option| option)?;
         self.read()
     }
@@ -361,10 +315,6 @@ impl<'d> Table<'d> {
         &mut self,
         read: impl Fn(&mut Table) -> Reading<T>,
     ) -> Reading<Vec<(String, T)>> {
-        if self.value.findings.asked.is_some() {
-            let any = self.value.below(format!("{}.*", self.value.key), NOWHERE, None);
-            return any.table(".", read).map(|_| Vec::new());
-        }
         let is_table = |value: &Value| value.value.is_some_and(DeValue::is_table);
         let entries = std::mem::take(&mut self.entries).into_iter();
         let (tables, others): (Vec<_>, _) = entries.partition(|(_, value)| is_table(value));
@@ -376,12 +326,6 @@ impl<'d> Table<'d> {
     /// The value of `key`, or the lack of one, once.
     pub(super) fn get(&mut self, key: &'static str) -> Value<'d> {
         self.known.push(key);
-        if let Some(asked) = self.value.findings.asked {
-            let table = &self.value.key;
-            let key = if table.is_empty() { key.to_owned() } else { format!("{table}.{key}") };
-            asked.require(&key, true);
-            return self.value.below(key, NOWHERE, None);
-        }
         self.entries.remove(key).unwrap_or_else(|| {
             let key = format!("{}{}{key}", self.value.key, self.separator);
             self.value.below(key, self.value.place.clone(), None)

@@ -46,7 +46,8 @@ pub(super) fn scene(root: &mut Table, path: &Path, text: &SceneText) -> Reading<
     let output = root.get("output").optional(|value| value.table(".", output));
     let units = root.get("units").optional(|value| value.table(".", units));
     let boundaries = boundaries(&root.get("boundary"));
-    let probes = root.get("probe").optional(|list| list.named_tables("probe", probe));
+    let list = root.get("probe");
+    let probes = list.optional(|list| list.named_tables("probe", probe));
 
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let (time, note) = time?.unzip();
@@ -59,6 +60,11 @@ pub(super) fn scene(root: &mut Table, path: &Path, text: &SceneText) -> Reading<
     }
     for (name, law) in laws.into_iter().flatten() {
         surfaces.entry(name).or_insert(Surface { material, law: None }).law = Some(law);
+    }
+    let (boundaries, probes) = (boundaries?, probes?.unwrap_or_default());
+    if let Some(probe) = probes.iter().find(|p| boundaries.iter().any(|b| b.name == p.name)) {
+        let problem = format!("\"{}\" has the name of a boundary; choose another one", probe.name);
+        return Err(list.refuse(problem));
     }
     Ok(Scene {
         path: path.to_owned(),
@@ -75,8 +81,8 @@ pub(super) fn scene(root: &mut Table, path: &Path, text: &SceneText) -> Reading<
         contact: contact?.unwrap_or_default(),
         output: output?.unwrap_or_default(),
         units: units?.unwrap_or_default(),
-        boundaries: boundaries?,
-        probes: probes?.unwrap_or_default(),
+        boundaries,
+        probes,
         notes: note.flatten().into_iter().collect(),
         text: text.clone(),
     })
@@ -282,7 +288,11 @@ fn units(table: &mut Table) -> Reading<Units> {
 }
 
 fn probe(table: &mut Table) -> Reading<Probe> {
-    let (name, point) = (table.get("name").read(), table.get("point"));
+    let (key, point) = (table.get("name"), table.get("point"));
+    let name = key.read::<String>();
     let point = point.pair(|value| value.number("finite (m)", |_| true));
-    Ok(Probe { name: name?, point: point? })
+    match name? {
+        name if name.trim().is_empty() => Err(key.refuse("is empty; its columns begin with it")),
+        name => Ok(Probe { name, point: point? }),
+    }
 }

@@ -29,6 +29,13 @@ fn an_accuracy_is_reached_and_its_mesh_is_kept() {
     for key in ["triangles", "steps", "displacement_max", "work", "zeta_min", "active_nodes"] {
         assert_eq!(first[key], again[key], "{key}");
     }
+
+    // A run on the mesh of its own folder leaves it there, one on another mesh does not.
+    let mesh = test_directory.path("out/first/mesh.msh");
+    test_directory.run(&["--mesh", "out/first/mesh.msh", "--out", "out/first"]);
+    assert!(mesh.exists());
+    test_directory.run(&["--out", "out/first"]);
+    assert!(!mesh.exists());
 }
 
 #[test]

@@ -210,7 +210,8 @@ fn chosen_steps_have_about_twenty_frames() {
 fn what_others_put_into_the_folder_stays_but_figures_of_an_earlier_run() {
     let test_directory = TestDirectory::new();
     let others =
-        ["notes.txt", "damage_mine.png", "fields_mine.vtu", "fields_.vtu", "fields_0001_old.vtu"];
+        ["notes.txt", "damage_mine.png", "fields_mine.vtu", "fields_0001_old.vtu", "mesh.msh"];
+    test_directory.run(&["--set", "time.end=0.1"]);
     let ours =
         ["deformed.png", "pressure_t0.5.svg", "damage.gif", "report.html", "fields_0099_1.vtu"];
     for name in others.into_iter().chain(ours) {

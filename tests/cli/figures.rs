@@ -22,3 +22,39 @@ fn figures_and_a_report_are_drawn_far_from_the_scripts() {
     let outside = ["src=\"http", "href=", "<link", "@import", "$title"];
     assert!(outside.iter().all(|word| !page.contains(word)), "the page is not whole");
 }
+
+#[test]
+fn the_foundation_is_drawn_where_it_is_at_the_time_of_the_picture() {
+    // A plate below that comes up by 0.01 in the run, and one at the right, which leaves the corner
+    // (1, 0) opposite (1.2, −gap).
+    let directory = TestDirectory::new();
+    let plates = "boundary.bottom.gap='0.02 - 0.01*t'";
+    let scene =
+        format!("{}\n[[boundary]]\nname = \"right\"\ngap = 0.2\n", directory.read("scene.toml"));
+    directory.write("plates.toml", &scene);
+    directory.say(&["run", "plates.toml", "--set", plates, "--set", "output.every=5"]);
+    let scripts = concat!(env!("CARGO_MANIFEST_DIR"), "/scripts");
+    let draws = format!(
+        "import sys; sys.path.insert(0, '{scripts}')\n\
+         from pathlib import Path\n\
+         from reading import read_results\n\
+         for time in (0.0, 0.5, 1.0):\n\
+         \x20   results = read_results(Path('out/plates'), time)\n\
+         \x20   points = sorted(p for line in results.foundation() for p in map(tuple, line.tolist()))\n\
+         \x20   print(len(points), points[0], points[-1], points[4])"
+    );
+    let python = std::env::var("PYTHON").unwrap_or("/usr/bin/python3".to_owned());
+    let said = std::process::Command::new(python)
+        .args(["-c", &draws])
+        .current_dir(directory.path("."))
+        .output()
+        .expect("Python");
+    let error = String::from_utf8_lossy(&said.stderr);
+    if error.contains("No module named") {
+        return;
+    }
+    let expected = "9 (0.0, -0.02) (1.2, 1.0) (1.2, -0.02)\n\
+                    9 (0.0, -0.015) (1.2, 1.0) (1.2, -0.015)\n\
+                    9 (0.0, -0.01) (1.2, 1.0) (1.2, -0.01)\n";
+    assert_eq!(String::from_utf8_lossy(&said.stdout), expected, "{error}");
+}

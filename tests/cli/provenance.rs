@@ -39,8 +39,12 @@ fn a_scene_of_the_user_is_not_overwritten() {
     let test_directory = TestDirectory::new();
     let before = test_directory.everything();
     let refused = test_directory.say(&["run", "scene.toml", "--out", "."]);
-    refused.fails(2, &["scene.toml", "no scene that a run left there", "--out"]);
+    refused.fails(2, &["scene.toml", "no run left it there", "--out"]);
     assert_eq!(test_directory.everything(), before);
+    test_directory.write("mine/history.csv", "of another program");
+    let refused = test_directory.say(&["run", "scene.toml", "--out", "mine"]);
+    refused.fails(2, &["mine/history.csv", "no run left it there"]);
+    assert_eq!(test_directory.read("mine/history.csv"), "of another program");
     // That of an earlier run is replaced, also by itself.
     test_directory.run(&["--out", "out"]);
     let again = test_directory.say(&["run", "out/scene.toml", "--out", "out"]);

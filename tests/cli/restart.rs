@@ -121,7 +121,10 @@ fn what_is_no_checkpoint_of_this_run_is_refused() {
         said.fails(2, &["cannot restart from out/checkpoint_", fragment, "without --restart"]);
         assert!(directory.everything() == before, "nothing is touched");
     };
-    restart(&["--set", "material.young=81"], "the scene, --set or PETSc's options are others");
+    restart(
+        &["--set", "material.young=81"],
+        "the scene, its tables, --set or PETSc's options are others",
+    );
     let mesh = directory.read("square.msh");
     directory.write("square.msh", &mesh.replace("0.25 0.25 0\n", "0.26 0.25 0\n"));
     restart(&[], "the mesh is another");

@@ -235,9 +235,13 @@ fn conditions_are_one_or_zero_and_choose() {
 
 #[test]
 fn the_times_of_jumps_are_known() {
-    let breaks = |text: &str| Expression::parse(text).expect(text).breaks();
-    assert_eq!(breaks("if(t > 0.1*2 and 0.4 >= t, x < 3, sin(t))"), [0.2, 0.4]);
-    assert_eq!(breaks("if(2*t < 1, 0, 1) + min(t, 2)"), Vec::<f64>::new());
+    let breaks = |text: &str| Expression::parse(text).expect(text).breaks(1.0);
+    assert_eq!(breaks("if(t >= 0.1*2 and t < 0.4, x < 3, exp(t))"), [0.2, 0.4]);
+    assert_eq!(breaks("if(2*t < 1, 0, 1)"), [0.5]);
+    assert_eq!(breaks("abs(t - 0.3141)*x"), [0.3141]);
+    let found = breaks("max(0, 0.3 - t*t)");
+    assert!(!found.is_empty() && found.iter().all(|t| (t * t - 0.3).abs() < 1e-15), "{found:?}");
+    assert_eq!(breaks("min(t, 2) + if(x < t, 1, 2)"), Vec::<f64>::new());
 }
 
 /// The function of the table with the `content`.
@@ -257,10 +261,10 @@ fn a_table_is_piecewise_linear_and_constant_beyond_its_ends() {
         assert_eq!(of_t.eval(0.0, 0.0, t), expected, "{t}");
     }
     assert!(of_t.depends_on_time() && !of_t.depends_on_space());
-    assert_eq!(of_t.breaks(), [0.0, 1.0, 1.0, 2.5]);
+    assert_eq!(of_t.breaks(2.0), [0.0, 1.0, 2.5]);
     let of_x = table(text, "table('load.csv', abs(x))").expect("a table");
     assert_eq!(of_x.eval(-0.25, 7.0, 9.0), 1.5);
-    assert!(of_x.depends_on_space() && !of_x.depends_on_time() && of_x.breaks().is_empty());
+    assert!(of_x.depends_on_space() && !of_x.depends_on_time() && of_x.breaks(2.0).is_empty());
     assert!(of_x.eval(f64::NAN, 0.0, 0.0).is_nan());
 }
 

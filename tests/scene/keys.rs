@@ -1,9 +1,13 @@
-//! The reference of keys says what the reader does.
+//! The schema of scenes says what their reader does.
 
 use crate::BASE;
 use serde_json::Value;
-use signorini::scene::{Scene, schema};
+use signorini::scene::Scene;
 use std::path::Path;
+
+fn schema() -> Value {
+    serde_json::from_str(include_str!("../../geo/scene.schema.json")).expect("JSON")
+}
 
 /// Paths of all keys that are no tables, with what is told of them and whether they are required.
 fn keys() -> Vec<(String, Value, bool)> {
@@ -11,7 +15,7 @@ fn keys() -> Vec<(String, Value, bool)> {
         for (name, key) in table["properties"].as_object().expect("keys") {
             let required =
                 table["required"].as_array().is_some_and(|r| r.contains(&name.as_str().into()));
-            assert!(key["description"].is_string(), "{path}{name} has no meaning in keys.toml");
+            assert!(key["description"].is_string(), "{path}{name} has no meaning");
             let told = !key["default"].is_null() || !key["absent"].is_null();
             assert!(required != told, "{path}{name}: either required, or its default is told");
             match [key, &key["items"]].into_iter().find(|table| table["properties"].is_object()) {
@@ -111,4 +115,44 @@ fn defaults_are_what_is_read_where_a_key_is_left_out() {
         false
     });
     assert!(checked.count() >= 7);
+}
+
+#[test]
+fn every_table_has_the_keys_that_its_reader_knows_and_no_others() {
+    fn check(path: &str, table: &Value) {
+        let error = with(&format!("{path}zzz"), Some("1")).expect_err("unknown");
+        let known = error.split_once("(known: ").and_then(|(_, rest)| rest.split_once(')'));
+        let mut known: Vec<_> = known.expect(&error).0.split(", ").collect();
+        let properties = table["properties"].as_object().expect("keys");
+        let mut told: Vec<_> = properties.keys().map(String::as_str).collect();
+        known.sort_unstable();
+        told.sort_unstable();
+        assert_eq!(known, told, "{path}: {error}");
+        for (name, key) in properties {
+            for (content, below) in [
+                (key, format!("{path}{name}.")),
+                (&key["items"], format!("{path}{name}.")),
+                (&key["additionalProperties"], format!("{path}{name}.core.")),
+            ] {
+                if content["properties"].is_object() {
+                    check(&below, content);
+                }
+            }
+        }
+    }
+    check("", &schema());
+}
+
+#[test]
+fn the_rule_of_a_number_is_the_one_that_refuses_it() {
+    let numbers = keys().into_iter().filter(|(_, key, _)| {
+        key["type"] == "number" && key["values"].is_string() && key["minItems"].is_null()
+    });
+    let checked = numbers.map(|(path, key, _)| {
+        let error = with(&path, Some("nan")).expect_err(&path);
+        let rule = key["values"].as_str().expect("words");
+        let rule = rule.split(" (").next().expect("the rule without its unit");
+        assert!(error.contains(rule), "{path}, {rule}: {error}");
+    });
+    assert!(checked.count() >= 15);
 }

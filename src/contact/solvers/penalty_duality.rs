@@ -9,7 +9,6 @@ use crate::{
     petsc::{Session, Vector},
 };
 use nalgebra::DMatrix;
-use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer};
 
 pub(super) const ENTRY: SolverEntry = SolverEntry {
@@ -48,7 +47,7 @@ const DIVERGED: f64 = 1e12;
 const LANCZOS: usize = 25;
 
 /// The method's parameters, `[contact.penalty_duality]` of a scene.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields, expecting = "a table")]
 pub struct PenaltyOptions {
     /// ω > 0, Pa/m; estimated from the boundary compliance when absent.

@@ -87,9 +87,9 @@ pub(super) struct StepController<'a> {
     /// s. (An error δζ shifts an autonomous evolution by δζ/ζ', once and for all.)
     delay: DVector<f64>,
     /// The error of ζ̃ from the steps: what they add to it, how it has grown and, of two-step differences,
-    /// how it has diffused since; and what the last step adds to that of ζ.
+    /// how it has diffused since; and what the last step adds to that of ζ, once that is known.
     error: DVector<f64>,
-    last_error: DVector<f64>,
+    last_error: Option<DVector<f64>>,
     /// The time since errors have last grown, s.
     not_grown: f64,
     bounds: (f64, f64),
@@ -119,8 +119,8 @@ impl<'a> StepController<'a> {
             source,
             load_change: zeros.clone(),
             delay: zeros.clone(),
-            error: zeros.clone(),
-            last_error: zeros,
+            error: zeros,
+            last_error: None,
             not_grown: 0.0,
             bounds: problem.body.vertices.partition.min_max(zeta),
             violation: BoundViolation::default(),
@@ -136,9 +136,9 @@ impl<'a> StepController<'a> {
         }
         archive.value(&mut self.rate)?;
         archive.value(&mut self.source)?;
-        for field in [&mut self.delay, &mut self.error, &mut self.last_error] {
-            archive.value(field)?;
-        }
+        archive.value(&mut self.delay)?;
+        archive.value(&mut self.error)?;
+        archive.value(&mut self.last_error)?;
         archive.value(&mut self.not_grown)?;
         archive.value(&mut self.bounds)?;
         archive.value(&mut self.violation)
@@ -212,7 +212,7 @@ impl<'a> StepController<'a> {
         self.bounds = shifted(tightened, partition.min_max(correction.as_slice()));
         self.length = planned.length;
         if self.two_step {
-            self.last_error = correction;
+            self.last_error = Some(correction);
         }
         self.change = &corrected - &self.zeta;
         self.zeta = corrected;
@@ -271,10 +271,9 @@ impl<'a> StepController<'a> {
     }
 
     /// The estimated error of the last accepted ζ from the time steps, at the nodes; `None` before the
-    /// second step.
+    /// first step, or of Euler's before the second, which tells the error of the first.
     pub(super) fn step_error(&self) -> Option<DVector<f64>> {
-        self.rate.as_ref()?;
-        Some(&self.error + &self.last_error)
+        Some(&self.error + self.last_error.as_ref()?)
     }
 
     /// The estimated error of the last accepted ζ over the damage done, where steps are chosen.
@@ -295,7 +294,7 @@ impl<'a> StepController<'a> {
             let error = 0.5 * planned.k * (rate - before);
             add_delay(&mut self.delay, &error, &(0.5 * (rate + before)));
             self.grow_error(planned.length, &error);
-            self.last_error = error;
+            self.last_error = Some(error);
         }
     }
 

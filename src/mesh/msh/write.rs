@@ -1,6 +1,6 @@
 //! Writes a mesh as text in MSH 2.2, of which gmsh and the reader make the same mesh again.
 
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, sides, sorted};
 use std::fmt::Write;
 
 /// gmsh's element types: lines and triangles with straight and with curved sides.
@@ -13,8 +13,8 @@ impl Mesh {
     pub fn to_msh(&self) -> String {
         let order = usize::from(!self.curved.is_empty());
         let midpoints = if order == 1 { self.midpoints() } else { Vec::new() };
-        let middle = |[a, b]: [usize; 2]| {
-            let found = midpoints.binary_search_by_key(&[a.min(b), a.max(b)], |(edge, _)| *edge);
+        let middle = |edge: [usize; 2]| {
+            let found = midpoints.binary_search_by_key(&sorted(edge), |(edge, _)| *edge);
             found.ok().map(|i| self.nodes.len() + i)
         };
 
@@ -66,10 +66,7 @@ impl Mesh {
 
     /// The midpoints, m, of all edges, sorted by their ends in increasing order.
     fn midpoints(&self) -> Vec<([usize; 2], [f64; 2])> {
-        let sides = |&[a, b, c]: &[usize; 3]| [[a, b], [b, c], [c, a]];
-        let mut edges: Vec<[usize; 2]> =
-            (self.triangles.iter().flat_map(sides)).map(|[a, b]| [a.min(b), a.max(b)]).collect();
-        edges.sort_unstable();
+        let mut edges: Vec<_> = sides(&self.triangles).into_iter().map(|side| side.edge).collect();
         edges.dedup();
         edges.into_iter().map(|edge| (edge, self.midpoint(edge))).collect()
     }

@@ -3,7 +3,7 @@
 use super::{
     super::error::suggestion,
     Expression,
-    Instruction::{self, Binary, Choose, Compare, Number, Unary, Variable},
+    Instruction::{self, Arithmetic, Binary, Choose, Compare, Number, Unary, Variable},
     Table, truth,
 };
 use std::{f64::consts::PI, path::Path, sync::Arc};
@@ -38,11 +38,11 @@ const OPERATORS: [(&str, Instruction, u8, u8); 13] = [
     ("!=", Compare(f64::ne), 3, 4),
     ("<", Compare(f64::lt), 3, 4),
     (">", Compare(f64::gt), 3, 4),
-    ("+", Binary(|a, b| a + b), 4, 5),
-    ("-", Binary(|a, b| a - b), 4, 5),
-    ("*", Binary(|a, b| a * b), 5, 6),
-    ("/", Binary(|a, b| a / b), 5, 6),
-    ("^", Binary(f64::powf), 6, 6),
+    ("+", Arithmetic(|a, b| a + b), 4, 5),
+    ("-", Arithmetic(|a, b| a - b), 4, 5),
+    ("*", Arithmetic(|a, b| a * b), 5, 6),
+    ("/", Arithmetic(|a, b| a / b), 5, 6),
+    ("^", Arithmetic(f64::powf), 6, 6),
 ];
 /// Of the operators only `^` binds stronger than a sign: `-x^2` is −(x²), and `2^-1` is ½.
 const SIGN: u8 = 6;

@@ -1,0 +1,72 @@
+#!/usr/bin/python3
+"""Prints the reference of the keys of a scene, geo/KEYS.md, from their JSON schema:
+
+    scripts/keys.py geo/scene.schema.json > geo/KEYS.md
+
+The schema has annotations of its own, in words: `values`, what a value may be, with its unit, and
+`absent`, what holds without the key where no one value is the default. What tables of keys cannot say
+stands in scripts/keys.md."""
+
+import json
+import sys
+from pathlib import Path
+
+TABLES = "(the tables of keys)\n"
+
+
+def section(title, path, meaning, table):
+    """A section with a row for each key of a table, and sections of the tables in it."""
+    keys = table.get("properties", {})
+    lines = [f"## {title}", "", *([meaning, ""] if meaning else []),
+             "| key | values | default | meaning | example |", "|---|---|---|---|---|"]
+    for name, key in keys.items():
+        if not is_table(key):
+            cells = [f"`{path}{name}`", values(key), default(table, name), text(key, "description"),
+                     f"`{text(key, 'example')}`"]
+            lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    for name, key in keys.items():
+        if is_table(key):
+            without = default(table, name)
+            what = "Required." if without == "**required**" else f"Left out: {without}."
+            brackets, below = ("[[{}]]", ".NAME.") if "items" in key else ("[{}]", ".")
+            lines += ["", *section(f"`{brackets.format(path + name)}`", path + name + below,
+                                   f"{text(key, 'description')} {what}", key.get("items", key))]
+    other = table.get("additionalProperties")
+    if other and is_table(other):
+        lines += ["", *section(f"`[{path}NAME]`", f"{path}NAME.", text(other, "description"), other)]
+    return lines
+
+
+def is_table(key):
+    return "properties" in key or "properties" in key.get("items", {})
+
+
+def values(key):
+    """What a key may be, in words."""
+    if "values" in key:
+        return key["values"]
+    if "enum" in key:
+        return " or ".join(f'`"{name}"`' for name in key["enum"])
+    kinds = {"object": "a table of numbers", "boolean": "`true` or `false`"}
+    if key["type"] == "array":
+        return f"two components, each: {values(key['items'])}"
+    return kinds.get(key["type"], key["type"])
+
+
+def default(table, name):
+    """What holds where a key of a table is left out."""
+    if name in table.get("required", []):
+        return "**required**"
+    key = table["properties"][name]
+    return text(key, "absent") or f"`{json.dumps(key['default'], separators=(',', ':'))}`"
+
+
+def text(key, name):
+    return " ".join(key.get(name, "").split())
+
+
+if __name__ == "__main__":
+    schema = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))
+    tables = "\n".join(section("At the top of the file", "", "", schema)) + "\n"
+    page = Path(__file__).with_suffix(".md").read_text(encoding="utf-8")
+    print(page.replace(TABLES, tables), end="")
