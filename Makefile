@@ -8,6 +8,8 @@ SOLVER ?=
 ARGS ?=
 # The scene of `make reference` and `make converge`; the scenes of `make chart`.
 STUDY ?= geo/square-table1.toml
+# Those of `make accuracy`: all that reach T.
+ACCURACY ?= $(filter-out geo/square.toml, $(sort $(wildcard geo/*.toml)))
 STUDY_NAME = $(basename $(notdir $(firstword $(STUDY))))
 CHART ?= $(addprefix geo/, square-mild.toml square-table1.toml lshape.toml bridge-half.toml \
     lshape-rolling.toml)
@@ -30,7 +32,7 @@ export SIGNORINI_COMMIT := $(shell git describe --always --dirty 2>/dev/null)
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
 .PHONY: help deps deps-validate deps-random deps-bench build mesh run figures test validate random compare \
-    bench stability reference converge chart kills fuzz wrong clean
+    bench stability reference converge chart accuracy kills fuzz wrong clean
 
 help:
 	@echo 'make mesh && make run   mesh and solve the scenes of geo/, draw their figures into out/'
@@ -49,6 +51,7 @@ help:
 	@echo 'make reference  the reference solution of a scene, unless it is there (minutes); or STUDY=geo/a.toml'
 	@echo 'make converge   errors against it on nested meshes: Table 1, Figure 3; or STUDY=geo/a.toml'
 	@echo 'make chart      error against seconds: meshes, orders, --accuracy, solvers, FEniCSx; or CHART="geo/a.toml …"'
+	@echo 'make accuracy   true errors over the accuracy asked for (minutes); or ACCURACY="geo/a.toml …"'
 	@echo 'make kills      runs killed 50 times and restarted: the same checksums; or ARGS="--count 10"'
 	@echo 'make fuzz       10 million inputs for what reads meshes, scenes, expressions (nightly Rust, cargo-fuzz)'
 	@echo 'make wrong      43 wrong inputs and what the program says of them'
@@ -132,6 +135,9 @@ converge: reference
 chart: build deps-validate
 	$(PYTHON) validation/chart.py --binary $(BINARY) $(CHART)
 	$(PYTHON) scripts/chart.py out/chart
+
+accuracy: build
+	$(PYTHON) validation/asked.py --binary $(BINARY) $(ACCURACY)
 
 kills: build deps
 	$(PYTHON) validation/kills.py --binary $(BINARY) $(ARGS)

@@ -138,19 +138,22 @@ class Study:
                 mesh.unlink()
 
         def per_step(_said):
-            # The first step makes what the others keep.
+            # The first step makes what the others keep; without time there is no other.
             with open(out / "history.csv", encoding="utf-8") as file:
-                return mean(float(step["seconds"]) for step in list(csv.DictReader(file))[2:])
+                steps = list(csv.DictReader(file))
+            return mean(float(step["seconds"]) for step in steps[2:] or steps)
 
         command = [self.binary, "run", path, "--out", out, "--solver", choice.solver]
         seconds, seconds_per_step = seconds_of(command, per_step, unmeshed)
         run = Run(out)
         u, damage = errors(self.reference, run, self.stiffness)
+        damage = damage or 0.0
         row = {key: getattr(choice, key) for key in
                ("series", "solver", "accuracy", "order", "size", "grading", "step")}
         row |= {key: run.summary[key] for key in
                 ("nodes", "triangles", "steps", "zeta_min", "displacement_max")}
-        self.add({**row, "seconds": seconds, "seconds_per_step": seconds_per_step, "u": u, "damage": damage, "error": max(u, damage)})
+        self.add({**row, "seconds": seconds, "seconds_per_step": seconds_per_step, "u": u,
+                  "damage": damage, "error": max(u, damage)})
         return out
 
     def add(self, row):

@@ -2,9 +2,12 @@
 
     /usr/bin/python3 validation/true_errors.py SCENE.toml REFERENCE RUN…
 
-Folders of results with straight sides (either order). The reference should be quadratic, on a mesh
-graded geometrically to every corner and end of contact, with steps of its own: it shares nothing with
-the estimates it judges. Prints, for each run, estimated and true relative errors and their ratio."""
+Folders of results of either order, with straight or curved sides: integrals are taken at quadrature
+points of the reference, and a run is evaluated there, its elements being found by Newton's method. Where
+a boundary is curved two meshes differ there by the error of their parabolas; a run's element is continued
+up to the reference's. The reference should be quadratic, on a mesh graded geometrically to every corner
+and end of contact, with steps of its own: it shares nothing with the estimates it judges. Prints, for
+each run, estimated and true relative errors and their ratio."""
 
 import json
 import sys
@@ -20,6 +23,22 @@ NEAR, FAR = 0.816847572980459, 0.108103018168070
 POINTS = np.array([[1 - 2 * b if i == j else b for j in range(3)]
                    for b in ((1 - NEAR) / 2, (1 - FAR) / 2) for i in range(3)])
 WEIGHTS = np.repeat([0.109951743655322, 0.223381589678011], 3)
+# Derivatives of the barycentric coordinates in the last two of them.
+SLOPES = np.array([[-1, -1], [1, 0], [0, 1]])
+# Newton's steps, for which sides that are nearly straight need few; elements passed on the way to a point.
+NEWTON, WALK = 8, 30
+
+
+def shapes(l, nodes):
+    """Shape functions of the element of so many nodes at barycentric coordinates (n, 3), and their
+    derivatives (n, nodes, 2)."""
+    if nodes == 3:
+        return l, np.broadcast_to(SLOPES, (len(l), 3, 2))
+    sides = [(0, 1), (1, 2), (2, 0)]
+    values = [l[:, i] * (2 * l[:, i] - 1) for i in range(3)] + [4 * l[:, i] * l[:, j] for i, j in sides]
+    vertex = [(4 * l[:, i, None] - 1) * SLOPES[i] for i in range(3)]
+    middle = [4 * (l[:, i, None] * SLOPES[j] + l[:, j, None] * SLOPES[i]) for i, j in sides]
+    return np.stack(values, axis=1), np.stack(vertex + middle, axis=1)
 
 
 class Run:
@@ -33,44 +52,52 @@ class Run:
         self.cells = next(iter(frame.cells_dict.values()))
         self.u = frame.point_data["displacement"][:, :2]
         self.zeta = frame.point_data["zeta"].ravel()
-        corners = self.points[self.cells[:, :3]]
-        side = corners[:, 1:] - corners[:, :1]
-        self.area = 0.5 * np.abs(np.linalg.det(side))
-        # Gradients of the barycentric coordinates.
-        inverse = np.linalg.inv(side)
-        last = np.swapaxes(inverse, 1, 2)
-        self.slopes = np.concatenate([-last.sum(1, keepdims=True), last], axis=1)
         vertices = Triangulation(*self.points.T, self.cells[:, :3])
         self.find = vertices.get_trifinder()
+        # Opposite each vertex.
+        self.neighbours = vertices.neighbors[:, [1, 2, 0]]
 
-    def at(self, cell, barycentric):
+    def mapped(self, cell, l):
+        """Points of elements (n) at barycentric coordinates (n, 3), and ∂x/∂(l₁, l₂)."""
+        nodes = self.points[self.cells[cell]]
+        values, slopes = shapes(l, nodes.shape[1])
+        return np.einsum("nk,nkd->nd", values, nodes), np.einsum("nkd,nke->nde", nodes, slopes)
+
+    def at(self, cell, l):
         """Strain (xx, yy, 2xy) and ζ at barycentric coordinates (n, 3) of elements (n)."""
-        nodes, slopes, l = self.cells[cell], self.slopes[cell], barycentric
-        if nodes.shape[1] == 3:
-            gradients = slopes
-        else:
-            pairs = [(0, 1), (1, 2), (2, 0)]
-            vertex = [(4 * l[:, i] - 1)[:, None] * slopes[:, i] for i in range(3)]
-            middle = [4 * (l[:, i, None] * slopes[:, j] + l[:, j, None] * slopes[:, i])
-                      for i, j in pairs]
-            gradients = np.stack(vertex + middle, axis=1)
+        nodes = self.cells[cell]
+        _, slopes = shapes(l, nodes.shape[1])
+        gradients = slopes @ np.linalg.inv(self.mapped(cell, l)[1])
         h = np.einsum("nkc,nkd->ncd", self.u[nodes], gradients)
         strain = np.stack([h[:, 0, 0], h[:, 1, 1], h[:, 0, 1] + h[:, 1, 0]], axis=1)
-        zeta = (self.zeta[nodes[:, :3]] * l).sum(1)
-        return strain, zeta
+        return strain, (self.zeta[nodes[:, :3]] * l).sum(1)
 
-    def locate(self, points, centre):
-        """The elements that contain points, and barycentric coordinates; points on an edge are first
-        moved a little towards `centre`."""
-        for step in (0.0, 1e-9, 1e-6, 1e-3):
-            moved = points + step * (centre - points)
-            cell = self.find(*moved.T)
-            if (cell >= 0).all():
+    def coordinates(self, cell, points):
+        """Barycentric coordinates of points in elements, continued beyond their sides."""
+        l = np.full((len(points), 3), 1 / 3)
+        for _ in range(NEWTON):
+            x, jacobian = self.mapped(cell, l)
+            l = l + np.linalg.solve(jacobian, (points - x)[:, :, None])[:, :, 0] @ SLOPES.T
+        return l
+
+    def locate(self, points, inner):
+        """The elements that contain points, or are nearest across the boundary, and barycentric
+        coordinates. The search begins on the way from a point to its inner one."""
+        cell = self.find(*points.T)
+        for part in (1e-9, 1e-6, 1e-3, 0.03, 0.3, 1.0):
+            lost = cell < 0
+            if not lost.any():
                 break
-            points = np.where((cell < 0)[:, None], moved, points)
-        x = points - self.points[self.cells[cell, 0]]
-        rest = np.einsum("nkd,nd->nk", self.slopes[cell][:, 1:], x)
-        return cell, np.column_stack([1 - rest.sum(1), rest])
+            cell[lost] = self.find(*(points[lost] + part * (inner - points)[lost]).T)
+        l = self.coordinates(cell, points)
+        for _ in range(WALK):
+            other = self.neighbours[cell, l.argmin(1)]
+            beyond = np.flatnonzero((l.min(1) < -1e-9) & (other >= 0))
+            if len(beyond) == 0:
+                break
+            cell[beyond] = other[beyond]
+            l[beyond] = self.coordinates(cell[beyond], points[beyond])
+        return cell, l
 
 
 def elasticity(young, poisson, plane):
@@ -85,11 +112,11 @@ def errors(reference, run, d):
     """Relative errors of u and the damage (None without damage)."""
     cells = np.repeat(np.arange(len(reference.cells)), len(POINTS))
     barycentric = np.tile(POINTS, (len(reference.cells), 1))
-    corners = reference.points[reference.cells[cells, :3]]
-    points = np.einsum("nk,nkd->nd", barycentric, corners)
-    weight = (reference.area[:, None] * WEIGHTS).ravel()
+    points, jacobian = reference.mapped(cells, barycentric)
+    weight = 0.5 * np.linalg.det(jacobian) * np.tile(WEIGHTS, len(reference.cells))
     strain, zeta = reference.at(cells, barycentric)
-    other, other_zeta = run.at(*run.locate(points, corners.mean(1)))
+    inner = points.reshape(-1, len(POINTS), 2).mean(1).repeat(len(POINTS), axis=0)
+    other, other_zeta = run.at(*run.locate(points, inner))
 
     def energy(e):
         return (weight * zeta * np.einsum("ni,ij,nj->n", e, d, e)).sum()
