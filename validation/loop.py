@@ -26,7 +26,7 @@ from triangulation import read_triangulation
 
 # Of the linear systems, over the largest load so far; of signs in the active set, over the largest
 # load and displacement.
-LINEAR, SIGN = 5e-11, 1e-10
+LINEAR, SIGN = 1e-11, 1e-10
 
 
 class Model:

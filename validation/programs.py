@@ -20,7 +20,7 @@ SAME = 1e-6
 PYTHON = {"FEniCSx": "/usr/bin/python3", "NGSolve": str(ROOT / "target/ngsolve/bin/python")}
 # After how many iterations the loop renews a factor that it keeps: what was fastest where contact
 # moves (CHOLMOD's factor costs about twenty solves, NGSolve's five); where it stays none is renewed.
-KEEP = {"FEniCSx": 7, "NGSolve": 4}
+KEEP = {"FEniCSx": 7, "NGSolve": 6}
 # Instructions of the processor that OpenBLAS has kernels for; Debian's takes the oldest ones on a
 # processor that is younger than itself.
 KERNELS = {"avx512f": "SkylakeX", "avx2": "Haswell"}
