@@ -134,7 +134,7 @@ class Bench:
         command += [] if frames else ["--set", "output.every=100000"]
         if self.has_ranks:
             command += ["--ranks", ranks]
-        elif ranks > 1:
+        elif ranks != 1:
             command = ["mpiexec", "--allow-run-as-root", "--oversubscribe", "-n", ranks, *command]
         said, whole = self.start(command)
         summary = json.loads((folder / "summary.json").read_text())
@@ -143,9 +143,9 @@ class Bench:
         # The first step also makes what all others keep.
         after = history[2:]
         total = lambda key: sum(row[key] for row in after) / len(after)
-        phases = dict(re.findall(r"^ +([a-z ]+?) +\d+ +[\d.]+ +[\d.]+ % +([\d.]+)", said, re.MULTILINE))
+        phases = dict(re.findall(r"^ +([A-Za-z ]+?) +\d+ +[\d.]+ +[\d.]+ % +([\d.]+)", said, re.MULTILINE))
         peak = re.findall(r"peak memory (\d+)", said)
-        row = {"program": "signorini", "method": solver, "ranks": ranks, "nodes": summary["nodes"],
+        row = {"program": "signorini", "method": solver, "ranks": summary["ranks"], "nodes": summary["nodes"],
                "seconds_per_step": total("seconds"), "whole_seconds": whole,
                "iterations": total("iterations"), "solves": total("linear_iterations"),
                "factorisations": total("factorisations"), "kkt": max(summary["kkt"].values()),
