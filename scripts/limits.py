@@ -70,9 +70,11 @@ def limits_of(states, factor=None):
 
 
 def box_of(states, factor):
-    """Lower left and upper right corner of bodies, as they were and deformed `factor` times."""
+    """Lower left and upper right corner of bodies, as they were and deformed `factor` times, with what
+    is opposite them."""
     points = np.vstack([points for state in states for points in (
-        state.nodes, state.pieces.at_points(state.nodes + factor * state.displacement))])
+        state.nodes, state.pieces.at_points(state.nodes + factor * state.displacement),
+        *state.foundation(factor))])
     return np.array([points.min(axis=0), points.max(axis=0)])
 
 

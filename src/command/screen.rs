@@ -8,7 +8,7 @@ use signorini::{
 };
 use std::io::{self, IsTerminal, Write};
 
-/// A component below this part of the largest force is shown as zero.
+/// A component below this part of the largest force, a moment of the largest moment, is shown as zero.
 const ROUNDING: f64 = 1e-9;
 
 /// The progress bar counts thousandths of [0, T].
@@ -89,11 +89,16 @@ pub fn conclusion(
         }
         // Resultants come first, three for each support.
         let supports = &task.problem.supports.names;
-        let size = |resultant: &[(String, f64)]| resultant[0].1.hypot(resultant[1].1);
-        let largest = quantities.chunks_exact(3).take(supports.len()).map(size).fold(0.0, f64::max);
-        for (name, resultant) in supports.iter().zip(quantities.chunks_exact(3)) {
-            let [x, y, moment] = [0, 1, 2].map(|i| resultant[i].1);
-            let [x, y] = [x, y].map(|f| if f.abs() < ROUNDING * largest { 0.0 } else { f });
+        let resultants = quantities.chunks_exact(3).take(supports.len());
+        let resultants = resultants.map(|of| [0, 1, 2].map(|i| of[i].1));
+        let largest = |size: fn([f64; 3]) -> f64| resultants.clone().map(size).fold(0.0, f64::max);
+        let [force_most, moment_most] =
+            [largest(|[x, y, _]| x.hypot(y)), largest(|of| of[2].abs())];
+        let visible =
+            |value: f64, most: f64| if value.abs() < ROUNDING * most { 0.0 } else { value };
+        for (name, [x, y, moment]) in supports.iter().zip(resultants.clone()) {
+            let [x, y] = [x, y].map(|component| visible(component, force_most));
+            let moment = visible(moment, moment_most);
             let resultant = format!("force ({x:.4e}, {y:.4e}) {force}/{length}");
             lines.push(row("support", format!("{name}: {resultant}, moment {moment:.4e} {force}")));
         }

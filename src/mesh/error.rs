@@ -18,7 +18,7 @@ pub enum MeshError {
         /// What the system said.
         source: io::Error,
     },
-    /// A file is no mesh of a plane body, or gmsh made none of it.
+    /// A file is no mesh of a plane body, or gmsh made or would make none of it.
     #[error("{}{place}: {problem}", path.display())]
     File {
         /// The file.
@@ -27,14 +27,6 @@ pub enum MeshError {
         place: String,
         /// What is wrong, and what to do; nodes and elements go by their tags in the file.
         problem: String,
-    },
-    /// A mesh parameter that gmsh would misread or ignore.
-    #[error("{}: mesh parameter {reason}", path.display())]
-    Parameter {
-        /// The `.geo` file.
-        path: PathBuf,
-        /// The parameter, and what is wrong with it.
-        reason: String,
     },
     /// A signal came while gmsh worked.
     #[error("{0} while gmsh worked")]

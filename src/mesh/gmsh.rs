@@ -76,8 +76,8 @@ pub fn mesh_geo(
     let mut name = geo.file_stem().unwrap_or_default().to_owned();
     for (parameter, &value) in parameters {
         if let Some(reason) = refusal(&text, parameter, value) {
-            let reason = format!("`{parameter}` = {value}: {reason}");
-            return Err(MeshError::Parameter { path: geo.to_owned(), reason });
+            let problem = format!("mesh parameter `{parameter}` = {value}: {reason}");
+            return Err(MeshError::file(geo, problem));
         }
         name.push(format!("-{parameter}{value}"));
     }
