@@ -68,10 +68,7 @@ pub enum AdaptError {
 
 /// Parts of the accuracy asked for: what a mesh is made for, and what its estimate may be.
 const AIM: f64 = 0.7;
-const ENOUGH: f64 = 0.85;
-/// The damage's error of interpolation counts so many times: on a mesh too coarse for its layers
-/// recovered gradients show down to a third of it.
-const CAUTION: f64 = 2.5;
+const ENOUGH: f64 = 0.8;
 /// The part of the damage's error that its interpolation may take.
 const INTERPOLATION: f64 = 0.7;
 /// The error of ζ over the damage done that the few steps of a run on a coarse mesh may make.
@@ -155,7 +152,7 @@ fn refined(
         }
         indicators.observe(&outcome.last.state, true)?;
         let (error, shares) = indicators.relative();
-        let (damage_error, of_damage) = cautious_damage(&indicators, &outcome);
+        let damage_error = outcome.errors.damage_mesh;
         // Two meshes may agree by chance.
         let is_settled = is_settled(&outcome, stopped_before, accuracy);
         settled_rounds = if is_settled { settled_rounds + 1 } else { 0 };
@@ -178,25 +175,17 @@ fn refined(
         if exhausted || (largest <= ENOUGH * accuracy && settled && coarse.is_empty()) {
             return Ok(adapted);
         }
-        let of_u = accuracy_of_u(accuracy, error, damage_error, settled);
-        let mut ratios = size_ratios(&shares, order, AIM * of_u);
+        let of_u = AIM * accuracy_of_u(accuracy, error, damage_error, settled);
+        let mut ratios = size_ratios(&shares, order, of_u);
         if damage_error.is_some() {
-            let of_damage = size_ratios(&of_damage, 2.0, INTERPOLATION * AIM * accuracy);
-            ratios.iter_mut().zip(of_damage).for_each(|(ratio, other)| *ratio = ratio.min(other));
+            let shares = indicators.gathered(&outcome.damage_indicators);
+            let others = size_ratios(&shares, 2.0, INTERPOLATION * AIM * accuracy);
+            ratios.iter_mut().zip(others).for_each(|(ratio, other)| *ratio = ratio.min(other));
         }
         quarter(&refinement.mesh, &coarse, &mut ratios);
         stopped_before = outcome.stopped.map(|stop| stop.time);
         refinement = divided(refinement, &ratios)?;
     }
-}
-
-/// The error of the damage with its interpolation counted [`CAUTION`] times, and the square of that part
-/// on each triangle of the whole mesh.
-fn cautious_damage(indicators: &Indicators, outcome: &Outcome) -> (Option<f64>, Vec<f64>) {
-    let mut shares = indicators.gathered(&outcome.damage_indicators);
-    shares.iter_mut().for_each(|share| *share *= CAUTION * CAUTION);
-    let more = (1.0 - 1.0 / CAUTION) * shares.iter().sum::<f64>().sqrt();
-    (outcome.errors.damage_mesh.map(|error| error + more), shares)
 }
 
 /// A damage, or a time, that is not exact enough asks for a u better than this one.

@@ -5,8 +5,8 @@
 //!
 //! (M + kκL) δ_n = M δ_{n−1} + k (b* − b)_i − ∫ (β_n − β_{n−1}) λ_i − kκ ∫ ∇β_n·∇λ_i,
 //!
-//! solved with a few long steps. β comes from recovered gradients of z ([`interpolation_error`]), and φ*
-//! from the displacements u₁ and u₂ of both orders for the same ζ ([`BothOrders`]): with the estimated
+//! solved with a few long steps, in turn with the equation of z tested by the bubbles of the edges, for β
+//! ([`Bubbles`]). φ* comes from the displacements u₁ and u₂ of both orders for the same ζ ([`BothOrders`]): with the estimated
 //! error η of u₂ in the energy norm, where errors are orthogonal to what is resolved and squares add up,
 //!
 //! |ε*|² = |ε(u₂)|² + c (|ε(u₂)|² − |ε(u₁)|²), c = η²/‖u₂ − u₁‖²,
@@ -16,12 +16,12 @@
 
 use super::{
     DiscreteProblem, Outcome, Phases, RunError, State, Step, both_orders::BothOrders,
-    contact_step::Compliance, damage_step::DamageStep,
+    bubbles::Bubbles, contact_step::Compliance, damage_step::DamageStep,
 };
 use crate::{
     fem::{
-        RecoveredStrains, bulged, diffusion_load, interpolation_error, mean_product, missing_mass,
-        quadratic_load, strains_at_nodes,
+        RecoveredStrains, affine_diffusion, bubble_flux, bubble_load, bulged, diffusion_load,
+        interpolation_error, mean_product, missing_mass, quadratic_load, strains_at_nodes,
     },
     model::DamageLaw,
     petsc::PetscError,
@@ -134,13 +134,16 @@ fn damage_error(
         return Ok(None);
     };
     let [first, .., last] = &instants.states[..] else { return Ok(None) };
+    let fine = orders.problems()[1];
     let mut error = ZetaError {
         problem,
         laws,
         diffusions: problem.diffusions(),
+        bubbles: Bubbles::new(fine),
         change: vec![0.0; first.zeta.len()],
         middles: interpolation_error(&problem.body, &first.zeta)?,
-        load: Vec::new(),
+        source: Vec::new(),
+        own: Vec::new(),
         step: 0.0,
         delay: None,
     };
@@ -150,12 +153,12 @@ fn damage_error(
         let Some(strain_squared) = strain_squared(problem, &mut orders, state, stopped)? else {
             return Ok(None);
         };
-        let own = damage_step.source(state).load;
-        let load = |error: &ZetaError| error.load(state, &strain_squared, own.as_slice());
+        let own = damage_step.source(state).load.as_slice().to_vec();
+        let source = |error: &ZetaError| error.source(state, &strain_squared);
         if let Some(before) = before {
-            error.advance(damage_step, before, state, load)?;
+            error.advance(damage_step, [before, state], &own, source)?;
         }
-        error.load = load(&error);
+        (error.source, error.own) = (source(&error), own);
         let least = error.least(state);
         if least > problem.threshold() {
             error.delay = instants.delay(state.time, least).or(error.delay);
@@ -172,12 +175,15 @@ struct ZetaError<'a> {
     laws: &'a [DamageLaw],
     /// κ of each, m²/s.
     diffusions: Vec<f64>,
+    bubbles: Bubbles<'a>,
     /// δ.
     change: Vec<f64>,
     /// β at the midpoints of the sides of each triangle.
     middles: Vec<[f64; 3]>,
-    /// b* − b, m²/s.
-    load: Vec<f64>,
+    /// φ* at the vertices and midpoints of each triangle, 1/s.
+    source: Vec<[f64; 6]>,
+    /// b, m²/s.
+    own: Vec<f64>,
     /// k, s.
     step: f64,
     /// See [`DamageError`].
@@ -185,13 +191,13 @@ struct ZetaError<'a> {
 }
 
 impl ZetaError<'_> {
-    /// From one state to the next one, whose `load` is found from an error.
+    /// From one state to the next one, whose b is `own` and whose φ* is found from an error.
     fn advance(
         &mut self,
         damage_step: &mut DamageStep,
-        before: &State,
-        state: &State,
-        load: impl Fn(&Self) -> Vec<f64>,
+        [before, state]: [&State; 2],
+        own: &[f64],
+        source: impl Fn(&Self) -> Vec<[f64; 6]>,
     ) -> Result<(), RunError> {
         let body = &self.problem.body;
         // Steps of equal length differ by rounding, which is no reason for another factor.
@@ -200,39 +206,86 @@ impl ZetaError<'_> {
             self.step = length;
         }
         let k = self.step;
-        let initial = self.load.clone();
-        let start = self.middles.clone();
+        let (start, change) = (self.middles.clone(), self.change.clone());
         let pairs = state.zeta.iter().zip(&before.zeta);
         let rates: Vec<f64> = pairs.map(|(now, before)| (now - before) / k).collect();
-        self.middles = self.deviation(state)?;
-        self.load = load(self);
-        let mut rhs: Vec<f64> =
-            initial.iter().zip(&self.load).map(|(a, b)| 0.5 * (a + b)).collect();
+        let next = source(self);
+        let mean = |t: usize| array::from_fn(|i| 0.5 * (self.source[t][i] + next[t][i]));
+        let mean: Vec<[f64; 6]> = (0..next.len()).map(mean).collect();
+        let mut rhs: Vec<f64> = self.own.iter().zip(own).map(|(a, b)| -0.5 * (a + b)).collect();
+        let sampled = self.sampled(&rates, &rhs, state)?;
+        self.middles = self.bulges(k, &start, &sampled, state, &change, &mean)?;
         for (t, (nodes, triangle)) in body.mesh.triangles.iter().zip(&body.triangles).enumerate() {
             let middles = self.middles[t];
             let growth = array::from_fn(|i| (middles[i] - start[t][i]) / k);
             let rate = nodes.map(|node| rates[node]);
+            let load = quadratic_load(triangle, mean[t]);
             let mass = missing_mass(self.problem.mass(), triangle, rate, growth);
             let diffusion = diffusion_load(triangle, middles);
             let kappa = self.diffusions[body.material(t)];
             for (i, &node) in nodes.iter().enumerate() {
-                rhs[node] -= mass[i] + kappa * diffusion[i];
+                rhs[node] += load[i] - mass[i] - kappa * diffusion[i];
             }
         }
         damage_step.system(k)?.advance(&rhs, &mut self.change)?;
         body.vertices.partition.update(&mut self.change, 1)?;
-        self.middles = self.deviation(state)?;
+        self.middles = self.bulges(k, &start, &sampled, state, &change, &mean)?;
         Ok(())
+    }
+
+    /// The rate that ζ would have had from the sources at two instants alone, whose −b in the mean is
+    /// `negative_load`: its own `rates` less (M ζ′ + κL ζ − b)_i over the weight of the vertex.
+    fn sampled(
+        &self,
+        rates: &[f64],
+        negative_load: &[f64],
+        state: &State,
+    ) -> Result<Vec<f64>, PetscError> {
+        let body = &self.problem.body;
+        let (mut rest, mut weights) = (negative_load.to_vec(), vec![0.0; rates.len()]);
+        for (t, (nodes, triangle)) in body.mesh.triangles.iter().zip(&body.triangles).enumerate() {
+            let kappa = self.diffusions[body.material(t)];
+            let mass = self.problem.mass().of(triangle) * Vector3::from(nodes.map(|i| rates[i]));
+            let diffusion = affine_diffusion(triangle, nodes.map(|i| state.zeta[i]));
+            for (i, &node) in nodes.iter().enumerate() {
+                rest[node] += mass[i] + kappa * diffusion[i];
+                weights[node] += triangle.area() / 3.0;
+            }
+        }
+        let less = rates.iter().zip(rest.iter().zip(&weights));
+        let mut sampled: Vec<f64> =
+            less.map(|(rate, (rest, weight))| rate - rest / weight).collect();
+        body.vertices.partition.update(&mut sampled, 1)?;
+        Ok(sampled)
+    }
+
+    /// β of `state` from that of the instant before, `start`, where δ was `change`, with φ* and the
+    /// `rates` of ζ between them. Collective.
+    fn bulges(
+        &self,
+        k: f64,
+        start: &[[f64; 3]],
+        rates: &[f64],
+        state: &State,
+        change: &[f64],
+        source: &[[f64; 6]],
+    ) -> Result<Vec<[f64; 3]>, PetscError> {
+        let body = &self.problem.body;
+        let vertices = self.at_vertices(state);
+        let rate = |i: usize| rates[i] + (self.change[i] - change[i]) / k;
+        self.bubbles.advance(k, start, |t| {
+            let (nodes, triangle) = (body.mesh.triangles[t], &body.triangles[t]);
+            let rate = bulged(nodes.map(rate), [0.0; 3]);
+            let load = bubble_load(triangle, array::from_fn(|i| source[t][i] - rate[i]));
+            let flux = bubble_flux(triangle, nodes.map(|node| vertices[node]));
+            let kappa = self.diffusions[body.material(t)];
+            array::from_fn(|i| load[i] - kappa * flux[i])
+        })
     }
 
     /// ζ + δ, with ζ of `state`.
     fn at_vertices(&self, state: &State) -> Vec<f64> {
         state.zeta.iter().zip(&self.change).map(|(zeta, d)| zeta + d).collect()
-    }
-
-    /// β for ζ of `state` and δ.
-    fn deviation(&self, state: &State) -> Result<Vec<[f64; 3]>, PetscError> {
-        interpolation_error(&self.problem.body, &self.at_vertices(state))
     }
 
     /// min z at the vertices. Collective.
@@ -245,21 +298,18 @@ impl ZetaError<'_> {
         bulged(self.problem.body.mesh.triangles[t].map(|node| self.change[node]), self.middles[t])
     }
 
-    /// b* − b of `state`, with |ε*|² = `strain_squared` and b = `own`.
-    fn load(&self, state: &State, strain_squared: &[[f64; 6]], own: &[f64]) -> Vec<f64> {
+    /// φ* of `state`, with |ε*|² = `strain_squared`.
+    fn source(&self, state: &State, strain_squared: &[[f64; 6]]) -> Vec<[f64; 6]> {
         let body = &self.problem.body;
-        let mut load: Vec<f64> = own.iter().map(|b| -b).collect();
-        for (t, (nodes, triangle)) in body.mesh.triangles.iter().zip(&body.triangles).enumerate() {
+        let of = |(t, nodes): (usize, &[usize; 3])| {
             let law = &self.laws[body.material(t)];
             let (zeta, error) = (bulged(nodes.map(|node| state.zeta[node]), [0.0; 3]), self.at(t));
-            let source = array::from_fn(|i| {
+            array::from_fn(|i| {
                 let (zeta, z) = (law.truncate(zeta[i]), law.truncate(zeta[i] + error[i]));
                 law.source((zeta / z).powi(2) * strain_squared[t][i], z)
-            });
-            let loads = nodes.iter().zip(quadratic_load(triangle, source));
-            loads.for_each(|(&node, b)| load[node] += b);
-        }
-        load
+            })
+        };
+        body.mesh.triangles.iter().enumerate().map(of).collect()
     }
 
     /// The error of the last state, from β at the first one. Collective.

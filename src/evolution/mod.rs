@@ -26,6 +26,7 @@
 mod adaptive;
 mod both_orders;
 mod boundary_conditions;
+mod bubbles;
 mod contact_step;
 mod damage_step;
 mod discrete_problem;
@@ -216,7 +217,7 @@ fn judge(
         mesh_error(problem, &mut damage_step, compliance, instants, outcome)
     });
     if let (Some(stop), Some(error)) = (&mut outcome.stopped, &mesh) {
-        stop.from_mesh = error.delay.map(|delay| 2.0 * delay.abs());
+        stop.from_mesh = error.delay.map(|delay| 3.0 * delay.abs());
     }
     outcome.damage_indicators = mesh.as_ref().map_or_else(Vec::new, |mesh| mesh.indicators.clone());
     let steps = controller.step_error().filter(|_| problem.damage().is_some());

@@ -55,8 +55,9 @@ pub struct Stop {
     pub least_admissible: f64,
     /// How far off the steps may put the time, s: the last one and twice the estimated delay of all.
     pub uncertainty: f64,
-    /// How far off the mesh may put it, s: twice the estimated delay, and if the mesh was adapted no less
-    /// than the time moved from the mesh before. `None` where it is not estimated.
+    /// How far off the mesh may put it, s: three times the estimated delay, of which a coarse mesh shows
+    /// less than half, and if the mesh was adapted no less than the time moved from the mesh before.
+    /// `None` where it is not estimated.
     pub from_mesh: Option<f64>,
 }
 

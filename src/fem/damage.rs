@@ -22,7 +22,7 @@ pub enum Mass {
 
 impl Mass {
     /// The mass matrix of one triangle, m².
-    pub(super) fn of(self, triangle: &Triangle) -> Matrix3<f64> {
+    pub fn of(self, triangle: &Triangle) -> Matrix3<f64> {
         match self {
             Self::Consistent => triangle.mass(),
             Self::Lumped => Matrix3::from_diagonal_element(triangle.area() / 3.0),

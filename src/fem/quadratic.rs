@@ -103,3 +103,37 @@ pub fn diffusion_load(triangle: &Triangle, middles: [f64; 3]) -> [f64; 3] {
     let (x, y) = (flux(0), flux(1));
     slopes.map(|[dx, dy]| 4.0 / 3.0 * triangle.area() * (x * dx + y * dy))
 }
+
+/// ∫ f w_e of a quadratic f, with the bubbles w_e = 4 λ_a λ_b of the sides.
+pub fn bubble_load(triangle: &Triangle, values: [f64; 6]) -> [f64; 3] {
+    let row =
+        |e: usize| MASS[3 + e].iter().zip(values).map(|(mass, value)| mass * value).sum::<f64>();
+    [0, 1, 2].map(|e| triangle.area() / 180.0 * row(e))
+}
+
+/// ∫ ∇p·∇λ_i of an affine p with these values at the vertices.
+pub fn affine_diffusion(triangle: &Triangle, values: [f64; 3]) -> [f64; 3] {
+    let slopes = triangle.gradients();
+    let p = [0, 1].map(|k| slopes.iter().zip(values).map(|(slope, p)| p * slope[k]).sum::<f64>());
+    slopes.map(|[dx, dy]| triangle.area() * (p[0] * dx + p[1] * dy))
+}
+
+/// ∫ ∇p·∇w_e of the same: 4/3 |T| ∇p·(∇λ_a + ∇λ_b).
+pub fn bubble_flux(triangle: &Triangle, values: [f64; 3]) -> [f64; 3] {
+    let own = affine_diffusion(triangle, values);
+    SIDES.map(|[a, b]| 4.0 / 3.0 * (own[a] + own[b]))
+}
+
+/// ∫ ∇β·∇w_e of β = Σ c_f w_f with c = `middles`, where with G_ij = ∇λ_i·∇λ_j
+/// ∫ ∇w_ab·∇w_ab = 8/3 |T| (G_aa + G_bb + G_ab) and ∫ ∇w_ab·∇w_bc = 8/3 |T| G_ac.
+pub fn bubble_diffusion(triangle: &Triangle, middles: [f64; 3]) -> [f64; 3] {
+    let slopes = triangle.gradients();
+    let g = |i: usize, j: usize| slopes[i][0] * slopes[j][0] + slopes[i][1] * slopes[j][1];
+    array::from_fn(|e| {
+        // The sides e = ab, bc and ca.
+        let [a, b, c] = [e, (e + 1) % 3, (e + 2) % 3];
+        let own = (g(a, a) + g(b, b) + g(a, b)) * middles[e];
+        let others = g(a, c) * middles[b] + g(b, c) * middles[c];
+        8.0 / 3.0 * triangle.area() * (own + others)
+    })
+}

@@ -44,7 +44,7 @@ fn true_error(n: usize, coarse: &Outcome, fine: &Outcome) -> f64 {
 }
 
 #[test]
-fn the_error_of_the_damage_is_estimated_within_0_6_and_1_4_of_it() {
+fn the_error_of_the_damage_is_estimated_within_a_quarter() {
     for n in [10, 16] {
         let fine = sheared(4 * n, 2);
         for order in [1, 2] {
@@ -52,7 +52,7 @@ fn the_error_of_the_damage_is_estimated_within_0_6_and_1_4_of_it() {
             let (error, truth) =
                 (coarse.errors.damage_mesh.unwrap(), true_error(n, &coarse, &fine));
             println!("n = {n}, order {order}: {error:.3e} for {truth:.3e}, {:.2}", error / truth);
-            assert!((0.6..1.4).contains(&(error / truth)), "n = {n}: {error} is not {truth}");
+            assert!((0.75..1.25).contains(&(error / truth)), "n = {n}: {error} is not {truth}");
             assert_eq!(coarse.damage_indicators.len(), 2 * n * n);
             let whole = coarse.damage_indicators.iter().sum::<f64>().sqrt();
             assert!(whole > 0.0 && whole < 1.2 * error.max(truth), "{whole}");
@@ -80,7 +80,7 @@ fn the_bar_of_the_time_of_failure_covers_the_mesh() {
         outcome.stopped.expect("ζ_* is reached")
     };
     let fine = failing(32, 2);
-    for (n, order) in [(16, 1), (16, 2)] {
+    for (n, order) in [(8, 1), (8, 2), (16, 1), (16, 2)] {
         let stop = failing(n, order);
         let off = (stop.time - fine.time).abs();
         println!("n = {n}, order {order}: {off:.1e} off, {stop:?}");

@@ -80,6 +80,8 @@ pub(super) struct StepController<'a> {
     zeta: DVector<f64>,
     change: DVector<f64>,
     rate: Option<DVector<f64>>,
+    /// By how much that rate of two-step differences has changed since t_{n−2}, 1/s.
+    rate_change: DVector<f64>,
     /// The damage source at t_{n−1}, and b_{n−1} − b_{n−2}, m²/s.
     source: DamageSource,
     load_change: DVector<f64>,
@@ -99,7 +101,8 @@ pub(super) struct StepController<'a> {
 /// The errors of steps grow this part of a run at a time.
 const GROWTH_STEP: f64 = 1.0 / 32.0;
 /// In a smooth evolution with equal steps the increments of the formula are off by ⅓ k³ζ‴, those of
-/// the trapezoidal rule by 1/12: the first is this multiple of their difference.
+/// the trapezoidal rule by 1/12: the first is this multiple of their difference, by which steps are
+/// chosen. What they add up to is told by a rule of third order.
 const TRUNCATION: f64 = 4.0 / 3.0;
 
 impl<'a> StepController<'a> {
@@ -116,6 +119,7 @@ impl<'a> StepController<'a> {
             zeta: DVector::from_column_slice(zeta),
             change: zeros.clone(),
             rate: None,
+            rate_change: zeros.clone(),
             source,
             load_change: zeros.clone(),
             delay: zeros.clone(),
@@ -131,7 +135,9 @@ impl<'a> StepController<'a> {
     pub(super) fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
         self.chosen.iter_mut().try_for_each(|chosen| chosen.archive(archive))?;
         archive.value(&mut self.length)?;
-        for field in [&mut self.zeta, &mut self.change, &mut self.load_change] {
+        for field in
+            [&mut self.zeta, &mut self.change, &mut self.load_change, &mut self.rate_change]
+        {
             archive.value(field)?;
         }
         archive.value(&mut self.rate)?;
@@ -189,9 +195,10 @@ impl<'a> StepController<'a> {
         if self.two_step {
             // The rate before the first step is that of its source, which needs no correction.
             let first = || &rate - &correction / planned.k;
-            let sum = self.rate.clone().unwrap_or_else(first) + &rate;
-            let trapezoidal = 0.5 * planned.length * sum;
-            let truncation = TRUNCATION * (trapezoidal - (&corrected - &self.zeta));
+            let change = &rate - self.rate.clone().unwrap_or_else(first);
+            let increment = &corrected - &self.zeta;
+            let trapezoidal = planned.length * (&rate - 0.5 * &change);
+            let truncation = TRUNCATION * (trapezoidal - &increment);
             let errors = [&correction, &truncation];
             if let Some(chosen) = &mut self.chosen
                 && let Err(factor) = chosen.judge(planned, &damage.zeta, errors, &rate)
@@ -199,9 +206,11 @@ impl<'a> StepController<'a> {
                 let shorter = self.retry(planned, factor);
                 return shorter.ok_or_else(|| planned.failed(StepFailure::TooShort));
             }
-            add_delay(&mut self.delay, &truncation, &rate);
-            self.grow_error(planned.length, &truncation);
+            let error = self.integrated(planned.length, &rate, &change) - increment;
+            add_delay(&mut self.delay, &error, &rate);
+            self.grow_error(planned.length, &error);
             damage_step.diffuse(planned, &mut self.error)?;
+            self.rate_change = change;
         } else {
             self.add_euler_delay(planned, &rate);
         }
@@ -220,6 +229,14 @@ impl<'a> StepController<'a> {
         self.load_change = &source.load - &self.source.load;
         self.source = source;
         Ok(Verdict::Accept(step))
+    }
+
+    /// ∫ ζ' over a step of k = `length`, s, from its rate f_n and f_n − f_{n−1} = `change` to third order:
+    /// k (f_n − ½ (f_n − f_{n−1}) − ω/(6 (1+ω)) ((f_n − f_{n−1}) − ω (f_{n−1} − f_{n−2}))).
+    fn integrated(&self, length: f64, rate: &DVector<f64>, change: &DVector<f64>) -> DVector<f64> {
+        let omega = length / self.length;
+        let curvature = change - omega * &self.rate_change;
+        length * (rate - 0.5 * change - omega / (6.0 * (1.0 + omega)) * curvature)
     }
 
     /// Judges a step from `last` that reaches ζ_*: a stop, or a shorter step that lands nearer.
