@@ -11,7 +11,7 @@ use serde::{Deserialize, de::IntoDeserializer};
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue};
 
-use super::error::{SceneError, suggestion};
+use super::error::{MOST_SHOWN, SceneError, suggestion};
 
 /// Where something is wrong, and what.
 pub(super) type Problem = (Range<usize>, String);
@@ -64,8 +64,12 @@ impl SceneText {
     /// All is well if there are no problems; else they are told in the order of the file.
     pub(super) fn verdict(&self, mut problems: Vec<Problem>) -> Result<(), SceneError> {
         problems.sort_by_key(|(place, _)| (place.start, place.end));
-        let mut reports: Vec<String> =
-            problems.iter().map(|(place, message)| self.report(place, message)).collect();
+        let mut reports: Vec<String> = Vec::with_capacity(problems.len());
+        for (place, message) in &problems {
+            // Those that are only counted need no picture of their lines.
+            let is_shown = reports.len() < MOST_SHOWN;
+            reports.push(if is_shown { self.report(place, message) } else { message.clone() });
+        }
         let Some(last) = reports.last_mut() else { return Ok(()) };
         // What contradicts a line of the file may stand on the command line.
         let of_the_file = |(place, _): &Problem| place.start < self.stride;

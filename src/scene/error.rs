@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 /// More problems than this are counted, not shown.
-const MOST_SHOWN: usize = 20;
+pub(super) const MOST_SHOWN: usize = 20;
 
 /// Why a scene was refused.
 #[derive(Debug, thiserror::Error)]
