@@ -206,8 +206,7 @@ def main():
     except Failure as failure:
         sys.exit(f"error: {failure}")
     finally:
-        if bench.rows:
-            bench.write()
+        bench.write()
     print(f"{bench.out / 'bench.csv'}: {time.perf_counter() - began:.0f} s", file=sys.stderr)
 
 

@@ -176,7 +176,9 @@ class Bench:
                                       self.mesh(case), case.order])[0])
 
     def write(self):
-        """The table."""
+        """The table; what the last runs wrote goes."""
+        for folder in ("run", "adapted"):
+            shutil.rmtree(self.out / folder, ignore_errors=True)
         columns = list(dict.fromkeys(key for row in self.rows for key in row))
         with open(self.out / "bench.csv", "w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, columns)
