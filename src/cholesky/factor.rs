@@ -1,6 +1,6 @@
 //! The factor that preconditions a matrix, whatever makes it.
 
-use super::{Precision, RefactorisationPolicy, substructure::Substructure};
+use super::{Choose, Precision, RefactorisationPolicy, substructure::Substructure};
 use crate::{
     archive::{Archive, ArchiveError},
     petsc::{
@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// A Cholesky factor: CHOLMOD's with solves of our own, by substructuring where there are several
-/// ranks. There MUMPS takes its place (PCCHOLESKY) where the interface between the ranks is too large,
+/// ranks or contact. On several ranks MUMPS takes its place (PCCHOLESKY) where their interface is too large,
 /// a cycle of algebraic multigrid (PCGAMG) where the matrix is very large. PETSc options can ask for
 /// any other preconditioner.
 ///
@@ -22,6 +22,8 @@ pub struct Factor {
     prefix: String,
     /// Of the factors of a substructure.
     precisions: [Precision; 2],
+    /// The owned unknowns that [`Self::restrict`] is to prescribe or to change.
+    condensed: Vec<usize>,
     /// Made with the first matrix of so many rows.
     method: Option<(usize, Method)>,
     /// `None` before the first factorisation, and after one that failed.
@@ -37,7 +39,11 @@ pub struct Factor {
 }
 
 enum Method {
-    Substructure(Substructure),
+    Substructure {
+        factor: Box<Substructure>,
+        /// Whether it can be restricted.
+        condensed: bool,
+    },
     Petsc(Preconditioner),
 }
 
@@ -57,12 +63,24 @@ impl Factor {
             comm: session.comm(),
             prefix: prefix.to_owned(),
             precisions: [precision; 2],
+            condensed: Vec::new(),
             method: None,
             policy: None,
             applications: 0,
             factorisations: 0,
             values: Vec::new(),
             loaded: false,
+        }
+    }
+
+    /// Makes factors from now on so that [`Self::restrict`] may prescribe these owned unknowns and add
+    /// to their diagonal entries, if there are not too many of them. The same ones on every call, or the
+    /// factor there is is lost. Collective.
+    pub(crate) fn condense(&mut self, unknowns: impl Iterator<Item = usize>) {
+        let unknowns: Vec<usize> = unknowns.collect();
+        if self.comm.any(unknowns != self.condensed) {
+            (self.condensed, self.method) = (unknowns, None);
+            self.policy = self.policy.take().filter(|_| self.loaded);
         }
     }
 
@@ -116,44 +134,87 @@ impl Factor {
     }
 
     /// Factorises the present values of `matrix`; false if it is not positive definite: then there is
-    /// no factor. Collective.
+    /// no factor. Where it is condensed a restriction must follow before it is applied. Collective.
     ///
     /// # Errors
     /// There is no memory for it, or PETSc options ask for what PETSc has not.
     pub fn factorise(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
-        let rows = matrix.size()?;
-        let mut method = match self.method.take() {
-            Some((size, method)) if size == rows => method,
-            _ => self.choose(matrix, rows)?,
-        };
-        let (definite, cost) = match &mut method {
+        let (comm, entries) = (self.comm, matrix.entries());
+        let (definite, cost) = match self.method(matrix)? {
             Method::Petsc(preconditioner) => (preconditioner.set_up(matrix)?, UNKNOWN_COST),
-            Method::Substructure(factor) => {
-                let definite = factor.factorise(matrix)?;
-                self.precisions = factor.precisions();
-                let work = self.comm.max(factor.work());
+            Method::Substructure { factor, condensed } => {
+                let definite =
+                    factor.factorise(matrix)? && (*condensed || factor.restrict(&[], &[])?);
+                let work = comm.max(factor.work());
                 // An iteration reads the factor and the entries of the matrix with their columns.
-                let iteration = self.comm.max(factor.bytes() + 12.0 * matrix.entries());
+                let iteration = comm.max(factor.bytes() + 12.0 * entries);
                 (definite, work / iteration.max(1.0))
             }
         };
-        self.method = Some((rows, method));
+        self.keep_precisions();
         matrix.read_entries(&mut self.values)?;
         self.policy = definite.then(|| RefactorisationPolicy::new(cost));
         self.factorisations += usize::from(definite);
         Ok(definite)
     }
 
-    /// What factorises matrices of the pattern of this one.
+    /// Whether factors of such a matrix can be restricted. Collective.
+    ///
+    /// # Errors
+    /// As in [`Self::factorise`].
+    pub(super) fn is_condensed(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
+        Ok(matches!(self.method(matrix)?, Method::Substructure { condensed: true, .. }))
+    }
+
+    /// Prescribes some of the condensed unknowns of the matrix last factorised, and adds to the diagonal
+    /// entries of some; false if what is left of it is not positive definite. Collective.
+    ///
+    /// # Errors
+    /// There is no memory for it.
+    pub(super) fn restrict(
+        &mut self,
+        prescribed: &[usize],
+        added: &[(usize, f64)],
+    ) -> Result<bool, PetscError> {
+        let Some((_, Method::Substructure { factor, .. })) = &mut self.method else {
+            return Ok(false);
+        };
+        let definite = factor.restrict(prescribed, added)?;
+        self.keep_precisions();
+        Ok(definite)
+    }
+
+    /// A factor that needs all digits will need them after a checkpoint too.
+    fn keep_precisions(&mut self) {
+        if let Some((_, Method::Substructure { factor, .. })) = &self.method {
+            self.precisions = factor.precisions();
+        }
+    }
+
+    /// What factorises matrices of the pattern of this one: chosen with the first of so many rows.
+    fn method(&mut self, matrix: &Matrix) -> Result<&mut Method, PetscError> {
+        let rows = matrix.size()?;
+        let method = match self.method.take() {
+            Some((size, method)) if size == rows => method,
+            _ => self.choose(matrix, rows)?,
+        };
+        Ok(&mut self.method.insert((rows, method)).1)
+    }
+
     fn choose(&self, matrix: &Matrix, rows: usize) -> Result<Method, PetscError> {
         let (prefix, serial) = (&self.prefix, self.comm.is_serial());
-        let asked = self.is_asked_for()?;
         let factorised = serial || rows < VERY_LARGE;
-        if factorised
-            && !asked
-            && let Some(factor) = Substructure::new(self.comm, matrix, self.precisions)?
-        {
-            return Ok(Method::Substructure(factor));
+        if factorised && !self.is_asked_for()? {
+            let condensed = self.comm.any(!self.condensed.is_empty());
+            for (last, condensed) in [(&self.condensed[..], condensed), (&[], false)] {
+                let [precision, of_schur] = self.precisions;
+                // Contact forces are told by a condensed S.
+                let of_schur = if condensed { Precision::Full } else { of_schur };
+                let precisions = [precision, of_schur];
+                if let Some(factor) = Substructure::new(self.comm, matrix, last, precisions)? {
+                    return Ok(Method::Substructure { factor: Box::new(factor), condensed });
+                }
+            }
         }
         // Left to itself CHOLMOD makes LDLᵀ of a small matrix, accepts negative pivots, and prints its
         // warnings into the results. MUMPS' guess of the memory it needs is now and then too small.
@@ -174,7 +235,7 @@ impl Factor {
     /// Bytes that an application reads on this rank; 0 where unknown.
     pub fn bytes_per_application(&self) -> f64 {
         match &self.method {
-            Some((_, Method::Substructure(factor))) => factor.bytes(),
+            Some((_, Method::Substructure { factor, .. })) => factor.bytes(),
             _ => 0.0,
         }
     }
@@ -187,11 +248,36 @@ impl Factor {
         self.applications += 1;
         match &mut self.method {
             Some((_, Method::Petsc(preconditioner))) => preconditioner.apply(r, z),
-            Some((_, Method::Substructure(factor))) if r.owned() == z.owned() => {
+            Some((_, Method::Substructure { factor, .. })) if r.owned() == z.owned() => {
                 r.read(|r| z.write(|z| factor.apply(r, z)))?
             }
             _ => Err(PetscError::ours("a factor is applied that was not made for such vectors")),
         }
+    }
+
+    /// As [`Self::apply`] where `choose` chooses what of the condensed unknowns is prescribed: these if
+    /// they are others than before. Collective.
+    ///
+    /// # Errors
+    /// As in [`Self::apply`], or the factor is not condensed.
+    pub(super) fn apply_choosing(
+        &mut self,
+        r: &Vector,
+        z: &mut Vector,
+        choose: Choose,
+    ) -> Result<Option<Vec<usize>>, PetscError> {
+        let Some((_, Method::Substructure { factor, condensed: true })) = &mut self.method else {
+            return Err(PetscError::ours("unknowns are chosen in a factor that is not condensed"));
+        };
+        self.applications += 1;
+        let chosen =
+            r.read(|r| z.write(|z| factor.apply_choosing(r, z, &self.condensed, choose)))???;
+        self.keep_precisions();
+        let prescribed = |values: Vec<Option<f64>>| {
+            let unknowns = self.condensed.iter().zip(values);
+            unknowns.filter_map(|(&i, value)| value.is_some().then_some(i)).collect()
+        };
+        Ok(chosen.map(prescribed))
     }
 
     /// Factorisations made so far that did not fail.
@@ -219,17 +305,41 @@ impl Factor {
     }
 }
 
-/// Inside one of TAO's methods: every new operator begins a solve.
+/// Inside one of TAO's methods: every new operator begins a solve. Where bounds are active it is K with
+/// the rows and columns of their unknowns set to 0 but for the diagonal.
 impl ShellPreconditioner for Factor {
-    fn set_up(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
-        self.remake(matrix)?;
+    fn set_up(&mut self, k: &Matrix, operator: &Matrix) -> Result<bool, PetscError> {
+        let condensed = self.is_condensed(k)?;
+        let factored = if condensed { k } else { operator };
+        self.remake(factored)?;
         self.end_solve();
-        let rows = matrix.size()?;
-        let fits = self.method.as_ref().is_some_and(|(size, _)| *size == rows);
-        if fits && self.iteration_limit().is_some() { Ok(true) } else { self.factorise(matrix) }
+        let prescribed = if condensed { self.masked(k, operator)? } else { Vec::new() };
+        let restrict = |this: &mut Self| match condensed {
+            true => this.restrict(&prescribed, &[]),
+            false => Ok(true),
+        };
+        let usable = self.iteration_limit().is_some() && restrict(self)?;
+        Ok(usable || (self.factorise(factored)? && restrict(self)?))
     }
 
     fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
         Factor::apply(self, r, z)
+    }
+}
+
+impl Factor {
+    /// The condensed unknowns that are coupled with others in `k` but not in `operator`.
+    fn masked(&self, k: &Matrix, operator: &Matrix) -> Result<Vec<usize>, PetscError> {
+        let mut masked = Vec::new();
+        for &unknown in &self.condensed {
+            let row = k.rows().start + unknown as i32;
+            let coupled = |columns: &[i32], values: &[f64]| {
+                columns.iter().zip(values).any(|(column, value)| *column != row && *value != 0.0)
+            };
+            if k.read_row(row, coupled)? && !operator.read_row(row, coupled)? {
+                masked.push(unknown);
+            }
+        }
+        Ok(masked)
     }
 }

@@ -1,10 +1,11 @@
 //! Linear systems by conjugate gradients on a Cholesky factor that is kept.
 
-use super::{Factor, Precision};
+use super::{Condensed, Factor, Precision};
 use crate::{
     petsc::{Matrix, PetscError, Session, Vector},
     phases::Phases,
 };
+use std::mem::take;
 
 /// (A + D) x = b on the unknowns that are not prescribed, A + D positive definite there.
 #[derive(Clone, Copy)]
@@ -28,6 +29,8 @@ pub struct Booking<'a> {
     pub phases: &'a Phases,
     /// A new factor.
     pub factorisation: &'static str,
+    /// The same for other prescribed unknowns, or another diagonal, where that takes less.
+    pub restriction: &'static str,
     /// An application of the factor.
     pub triangular_solves: &'static str,
     /// A product with A + D.
@@ -67,16 +70,24 @@ impl<'a> LinearSystem<'a> {
     }
 }
 
+/// Chooses which of the condensed unknowns are prescribed, given the system that is left for them when
+/// all others are eliminated: of each by how much it then changes, or `None` where the unknowns that are
+/// prescribed stay the same. The last solve must be that of the choice. Collective.
+pub type Choose<'a> =
+    &'a mut dyn FnMut(&mut Condensed) -> Result<Option<Vec<Option<f64>>>, PetscError>;
+
 /// Conjugate gradients (Hestenes and Stiefel, J. Res. Nat. Bur. Standards 49, 1952) preconditioned by
 /// a Cholesky factor: that of the matrix itself, which they polish, or that of an earlier system with
-/// other values, other prescribed unknowns, another diagonal.
+/// other values, and where the factor is not condensed ([`Factor::condense`]) other prescribed unknowns,
+/// another diagonal.
 ///
 /// PETSc's KSPCG makes the same operations in the same order, but would need a matrix without the
 /// prescribed unknowns for each set of them, and another product for the residual on them, which is the
 /// contact forces.
 pub struct LinearSolver {
     factor: Factor,
-    /// A + D with rows and columns of prescribed unknowns zeroed: what is factorised.
+    /// A + D with rows and columns of prescribed unknowns zeroed: what is factorised where the factor is
+    /// not condensed.
     modified: Option<Matrix>,
     /// b − (A + D) x.
     residual: Vector,
@@ -147,6 +158,9 @@ impl LinearSolver {
     /// # Errors
     /// PETSc or CHOLMOD failed.
     pub fn factorise(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
+        if self.factor.is_condensed(system.matrix)? {
+            return Ok(self.factor.factorise(system.matrix)? && self.restrict(system)?);
+        }
         if system.added.is_none() && system.prescribed.is_none() {
             return self.factor.factorise(system.matrix);
         }
@@ -168,6 +182,17 @@ impl LinearSolver {
         self.factor.factorise(matrix)
     }
 
+    /// Whether the factor that there is serves for the system: a condensed one is made that of the same
+    /// unknowns prescribed, with the same diagonal.
+    fn restrict(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
+        if !self.factor.exists() || !self.factor.is_condensed(system.matrix)? {
+            return Ok(self.factor.exists());
+        }
+        let (prescribed, added) = (system.prescribed, system.added);
+        let restrict = || self.factor.restrict(prescribed.unwrap_or(&[]), added.unwrap_or(&[]));
+        system.book(|booking| booking.restriction, 0.0, restrict)
+    }
+
     /// Solves from the start `x` until ‖b − (A + D) x‖₂ ≤ `limit` on the free unknowns, with the factor
     /// that there is; without one `x` is left alone.
     ///
@@ -180,11 +205,11 @@ impl LinearSolver {
         x: &mut Vector,
         limit: f64,
     ) -> Result<SolveReport, PetscError> {
-        if !self.factor.exists() {
+        if !self.restrict(system)? {
             return Ok(SolveReport::default());
         }
         let mut report = self.start(system, b, x, limit)?;
-        self.iterate(system, x, limit, MOST_ITERATIONS, &mut report)?;
+        self.iterate(system, x, (limit, MOST_ITERATIONS), false, &mut report)?;
         Ok(report)
     }
 
@@ -200,18 +225,89 @@ impl LinearSolver {
         x: &mut Vector,
         limit: f64,
     ) -> Result<SolveReport, PetscError> {
+        self.solve_choosing(system, b, x, limit, None)
+    }
+
+    /// As [`Self::solve_renewing`]; before the first iteration, unless the start is a solution, other
+    /// unknowns may be chosen to be prescribed, if the factor is condensed: for the matrix that it was made
+    /// of the choice and the answer are exact.
+    ///
+    /// # Errors
+    /// PETSc or CHOLMOD failed.
+    pub fn solve_choosing(
+        &mut self,
+        system: LinearSystem,
+        b: &Vector,
+        x: &mut Vector,
+        limit: f64,
+        mut choose: Option<Choose>,
+    ) -> Result<SolveReport, PetscError> {
         self.factor.remake(system.matrix)?;
         let mut report = self.start(system, b, x, limit)?;
-        if let Some(most) = self.factor.iteration_limit() {
-            self.iterate(system, x, limit, most, &mut report)?;
+        let mut chosen = None;
+        if let Some(most) = self.factor.iteration_limit()
+            && self.restrict(system)?
+        {
+            chosen = self.iterate_choosing(system, x, (limit, most), choose.take(), &mut report)?;
         }
         if !report.converged {
+            let prescribed = chosen.as_deref().or(system.prescribed);
+            let system = LinearSystem { prescribed, ..system };
             report.factorisations += 1;
             if system.book(|booking| booking.factorisation, 0.0, || self.factorise(system))? {
-                self.iterate(system, x, limit, MOST_ITERATIONS, &mut report)?;
+                let limits = (limit, MOST_ITERATIONS);
+                self.iterate_choosing(system, x, limits, choose, &mut report)?;
             }
         }
         Ok(report)
+    }
+
+    /// As [`Self::iterate`], after a choice of prescribed unknowns, which is returned where it is another.
+    fn iterate_choosing(
+        &mut self,
+        system: LinearSystem,
+        x: &mut Vector,
+        (limit, most): (f64, usize),
+        choose: Option<Choose>,
+        report: &mut SolveReport,
+    ) -> Result<Option<Vec<usize>>, PetscError> {
+        let condensed = !report.converged && self.factor.is_condensed(system.matrix)?;
+        let Some(choose) = choose.filter(|_| condensed) else {
+            self.iterate(system, x, (limit, most), false, report)?;
+            return Ok(None);
+        };
+        let chosen = self.apply_factor(system, Some(choose))?;
+        let Some(chosen) = chosen else {
+            self.iterate(system, x, (limit, most), true, report)?;
+            return Ok(None);
+        };
+        report.iterations += 1;
+        let system = LinearSystem { prescribed: Some(&chosen), ..system };
+        x.axpby(1.0, &self.preconditioned, 1.0)?;
+        system.multiply(&self.preconditioned, &mut self.image)?;
+        self.residual.axpby(-1.0, &self.image, 1.0)?;
+        report.converged = self.is_reached(system, limit)?;
+        self.iterate(system, x, (limit, most), false, report)?;
+        Ok(Some(chosen))
+    }
+
+    /// z ← P⁻¹ r with 0 on prescribed unknowns; or with those that are chosen, if they are others, and
+    /// the changes of them.
+    fn apply_factor(
+        &mut self,
+        system: LinearSystem,
+        choose: Option<Choose>,
+    ) -> Result<Option<Vec<usize>>, PetscError> {
+        let (bytes, z) = (self.factor.bytes_per_application(), &mut self.preconditioned);
+        let apply = || match choose {
+            Some(choose) => self.factor.apply_choosing(&self.residual, z, choose),
+            None => self.factor.apply(&self.free_residual, z).map(|()| None),
+        };
+        let chosen = system.book(|booking| booking.triangular_solves, bytes, apply)?;
+        if chosen.is_none() {
+            system.clear_prescribed(&mut self.preconditioned)?;
+        }
+        Ok(chosen)
     }
 
     /// b − (A + D) x of the last solve on all unknowns: on prescribed ones, the forces that keep them
@@ -252,13 +348,13 @@ impl LinearSolver {
     /// ```
     ///
     /// r, z and p are 0 on prescribed unknowns in all of this; K is not positive definite if rᵀz or pᵀKp
-    /// is not positive.
+    /// is not positive. The first z may be there already (`preconditioned`).
     fn iterate(
         &mut self,
         system: LinearSystem,
         x: &mut Vector,
-        limit: f64,
-        most: usize,
+        (limit, most): (f64, usize),
+        mut preconditioned: bool,
         report: &mut SolveReport,
     ) -> Result<(), PetscError> {
         let mut energy = f64::INFINITY;
@@ -267,13 +363,9 @@ impl LinearSolver {
                 break;
             }
             report.iterations += 1;
-            let bytes = self.factor.bytes_per_application();
-            system.book(
-                |booking| booking.triangular_solves,
-                bytes,
-                || self.factor.apply(&self.free_residual, &mut self.preconditioned),
-            )?;
-            system.clear_prescribed(&mut self.preconditioned)?;
+            if !take(&mut preconditioned) {
+                self.apply_factor(system, None)?;
+            }
             let previous = energy;
             energy = self.free_residual.dot(&self.preconditioned)?;
             self.direction.axpby(1.0, &self.preconditioned, energy / previous)?;

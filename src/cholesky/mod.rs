@@ -7,8 +7,9 @@
 //!
 //! - On one rank CHOLMOD computes L Lᵀ = P A Pᵀ; the triangular solves L y = P b and Lᵀ (P x) = y
 //!   are our own ([`Cholesky`]).
-//! - On several ranks each eliminates its interior unknowns I, and all share the dense Schur
-//!   complement S = A_ΓΓ − Σ A_ΓI A_II⁻¹ A_IΓ of the unknowns Γ between them (`substructure`).
+//! - Unknowns Γ between ranks, and those of contact, come last: each rank eliminates its interior
+//!   unknowns I, and all share the dense Schur complement S = A_ΓΓ − Σ A_ΓI A_II⁻¹ A_IΓ
+//!   (`substructure`). What is prescribed, or penalised, of contact changes S alone.
 //! - Where Γ is too large, or PETSc options ask for it, a preconditioner of PETSc takes its place
 //!   ([`Factor`]).
 //!
@@ -22,6 +23,7 @@ mod factor;
 mod linear_solver;
 mod lower_triangle;
 mod refactorisation;
+mod schur;
 mod substructure;
 mod supernodal;
 mod tiles;
@@ -33,6 +35,7 @@ mod raw {
 
 pub use cholesky::{Cholesky, Precision};
 pub use factor::Factor;
-pub use linear_solver::{Booking, LinearSolver, LinearSystem, SolveReport};
+pub use linear_solver::{Booking, Choose, LinearSolver, LinearSystem, SolveReport};
 pub use lower_triangle::LowerTriangle;
 pub use refactorisation::RefactorisationPolicy;
+pub use schur::Condensed;

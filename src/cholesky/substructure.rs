@@ -1,7 +1,9 @@
 //! A Cholesky factor over the ranks by substructuring (Przemieniecki, AIAA J. 1, 1963).
 //!
 //! The unknowns of a rank are interior (I), with neighbours on this rank and in the interface only, or
-//! belong to the interface Γ between the ranks. A x = b is solved by block elimination:
+//! belong to the interface Γ: the unknowns between the ranks, and those that may be prescribed or get
+//! another diagonal, on which the interior and its factor then do not depend. A x = b is solved by block
+//! elimination:
 //!
 //! ```text
 //! S = A_ΓΓ − Σ A_ΓI A_II⁻¹ A_IΓ              the Schur complement, dense, the same on all ranks,
@@ -11,23 +13,25 @@
 //!
 //! A rank factorises its interior together with the part of the interface next to it, with c 1 in the
 //! place of A_ΓΓ: the last block of that factor then tells its part of S,
-//! L_Γ L_Γᵀ = c 1 − A_ΓI A_II⁻¹ A_IΓ, and its triangular solves do the rest. On one rank all unknowns
-//! are interior.
+//! L_Γ L_Γᵀ = c 1 − A_ΓI A_II⁻¹ A_IΓ, and its triangular solves do the rest.
 
-use super::{Cholesky, LowerTriangle, Precision};
+use super::{
+    Cholesky, Choose, LowerTriangle, Precision,
+    schur::{Condensed, SchurComplement},
+};
 use crate::petsc::{Communicator, Matrix, PetscError};
 use nalgebra::DMatrix;
 
 /// The factor of a matrix whose unknowns are divided among the ranks.
 pub(super) struct Substructure {
     comm: Communicator,
-    /// Of the factor of S, before there is one.
-    precision: Precision,
     division: Division,
     /// Of the interior and the interface next to it.
     local: Cholesky,
-    /// Of S, where there is an interface.
-    schur: Option<Cholesky>,
+    /// S.
+    schur: SchurComplement,
+    /// b and x of a solve, by places.
+    vectors: [Vec<f64>; 2],
 }
 
 /// The unknowns of a rank. Their *places* are those of a vector of three parts: the interior of the
@@ -35,7 +39,7 @@ pub(super) struct Substructure {
 struct Division {
     /// Of each owned unknown its place, in the first or the third part.
     places: Vec<usize>,
-    /// Global indices of all ranks' interface unknowns, increasing.
+    /// Global indices of all ranks' unknowns of Γ, increasing.
     interface: Vec<i32>,
     /// Indices in `interface` of those next to this rank's interior, increasing.
     near: Vec<usize>,
@@ -58,15 +62,16 @@ struct Blocks {
 const LARGEST_INTERFACE: usize = 6000;
 
 impl Substructure {
-    /// Divides, orders and analyses the unknowns of a matrix, for factors of these precisions, that of
-    /// S the second; `None` if the interface is too large.
-    /// Collective.
+    /// Divides, orders and analyses the unknowns of a matrix, with the owned ones `condensed` in the
+    /// interface, for factors of these precisions, that of S the second; `None` if the interface is too
+    /// large. Collective.
     pub(super) fn new(
         comm: Communicator,
         matrix: &Matrix,
+        condensed: &[usize],
         [precision, of_schur]: [Precision; 2],
     ) -> Result<Option<Self>, PetscError> {
-        let Some(division) = Division::of(comm, matrix)? else { return Ok(None) };
+        let Some(division) = Division::of(comm, matrix, condensed)? else { return Ok(None) };
         let (interior, near) = (division.interior, division.near.len());
         let Blocks { local: mut a, .. } = division.blocks(matrix)?;
         add_interface(&mut a, near, 1.0);
@@ -79,33 +84,37 @@ impl Substructure {
             local = Cholesky::analyse(&mut a, Some(order), near, precision)?;
         }
         let in_place = local.order()[interior..].iter().copied().eq(last);
-        let this = Self { comm, precision: of_schur, division, local, schur: None };
+        let schur = SchurComplement::new(comm, of_schur);
+        let length = interior + near + division.interface.len();
+        let vectors = [vec![0.0; length], vec![0.0; length]];
+        let this = Self { comm, division, local, schur, vectors };
         Ok(comm.all(in_place).then_some(this))
     }
 
     /// The work of a factorisation on this rank, in bytes that a solve reads in the same time.
     pub(super) fn work(&self) -> f64 {
-        self.local.work() + self.schur.as_ref().map_or(0.0, Cholesky::work)
+        self.local.work() + self.schur.work()
     }
 
     /// The precisions of both factors.
     pub(super) fn precisions(&self) -> [Precision; 2] {
-        [self.local.precision(), self.schur.as_ref().map_or(self.precision, Cholesky::precision)]
+        [self.local.precision(), self.schur.precision()]
     }
 
     /// Bytes that a solve reads on this rank.
     pub(super) fn bytes(&self) -> f64 {
-        self.local.bytes() + self.schur.as_ref().map_or(0.0, Cholesky::bytes)
+        self.local.bytes() + self.schur.bytes()
     }
 
     /// Factorises the present values of a matrix of the same pattern; false if it is not positive
-    /// definite. Collective.
+    /// definite, whatever of the interface is prescribed. [`Self::restrict`] is to follow. Collective.
     pub(super) fn factorise(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
         let near = &self.division.near;
         let Blocks { mut local, interface: mut schur, largest_row_sum } =
             self.division.blocks(matrix)?;
-        // A_ΓI A_II⁻¹ A_IΓ ≤ A_ΓΓ for a definite A, so with this c the rank's matrix is definite.
-        let c = 2.0 * self.comm.max(largest_row_sum);
+        // A_ΓI A_II⁻¹ A_IΓ ≤ A_ΓΓ for a semidefinite A, so with this c the rank's matrix is definite.
+        let scale = self.comm.max(largest_row_sum);
+        let c = 2.0 * scale;
         add_interface(&mut local, near.len(), c);
         let block = self.local.factorise(&mut local)?;
         if !self.comm.all(block.is_some()) {
@@ -119,50 +128,68 @@ impl Substructure {
             }
             schur[(column, column)] -= c;
         }
-        if schur.is_empty() {
-            return Ok(true);
-        }
         self.comm.sum(schur.as_mut_slice());
-        let definite = self.factorise_schur(&schur)?;
-        Ok(self.comm.all(definite))
+        self.schur.set(schur, scale);
+        Ok(true)
     }
 
-    /// Factorises S, in its own order: it is dense.
-    fn factorise_schur(&mut self, schur: &DMatrix<f64>) -> Result<bool, PetscError> {
-        let size = schur.nrows();
-        let mut lower = LowerTriangle::default();
-        for j in 0..size {
-            (j..size).for_each(|i| lower.push(i, schur[(i, j)]));
-            lower.end_column();
-        }
-        let factor = match &mut self.schur {
-            Some(factor) => factor,
-            none => {
-                let order = Some((0..size as i64).collect());
-                none.insert(Cholesky::analyse(&mut lower, order, 0, self.precision)?)
-            }
-        };
-        Ok(factor.factorise(&mut lower)?.is_some())
+    /// Prescribes some of the condensed unknowns and adds to the diagonal entries of some; false if what
+    /// is left of the matrix is not positive definite. Collective.
+    pub(super) fn restrict(
+        &mut self,
+        prescribed: &[usize],
+        added: &[(usize, f64)],
+    ) -> Result<bool, PetscError> {
+        let Division { places, near, interior, .. } = &self.division;
+        let place = |&i: &usize| places[i] - interior - near.len();
+        let added = added.iter().map(|(i, d)| (place(i), *d));
+        self.schur.restrict(prescribed.iter().map(place), added)
     }
 
-    /// `z` ← A⁻¹ `r` on the owned unknowns. Collective.
+    /// `z` ← A⁻¹ `r` on the owned unknowns, 0 on prescribed ones. Collective.
     pub(super) fn apply(&mut self, r: &[f64], z: &mut [f64]) {
+        self.apply_with(r, z, |schur, b, x| schur.solve(b, x));
+    }
+
+    /// The same with unknowns prescribed by `choose`, which solves for the owned unknowns `condensed`.
+    /// Collective.
+    pub(super) fn apply_choosing(
+        &mut self,
+        r: &[f64],
+        z: &mut [f64],
+        condensed: &[usize],
+        choose: Choose,
+    ) -> Result<Option<Vec<Option<f64>>>, PetscError> {
+        let Division { places, near, interior, .. } = &self.division;
+        let place = |&i: &usize| places[i] - interior - near.len();
+        let own: Vec<usize> = condensed.iter().map(place).collect();
+        let mut chosen = Ok(None);
+        self.apply_with(r, z, |schur, b, x| {
+            chosen = choose(&mut Condensed { schur, own: &own, b, x });
+        });
+        chosen
+    }
+
+    fn apply_with(
+        &mut self,
+        r: &[f64],
+        z: &mut [f64],
+        mut solve_shared: impl FnMut(&mut SchurComplement, &mut [f64], &mut [f64]),
+    ) {
         let Division { places, interface, near, interior } = &self.division;
         if interface.is_empty() {
             return self.local.solve(r, z, |_| {});
         }
-        let mut b = vec![0.0; interior + near.len() + interface.len()];
+        let [b, x] = &mut self.vectors;
+        b[interior + near.len()..].fill(0.0);
         places.iter().zip(r).for_each(|(&place, r)| b[place] = *r);
-        let mut x = vec![0.0; b.len()];
-        let (b, b_shared) = b.split_at_mut(interior + near.len());
+        let (b_local, b_shared) = b.split_at_mut(interior + near.len());
         let (x_local, x_shared) = x.split_at_mut(interior + near.len());
-        self.local.solve(b, x_local, |values| {
+        self.local.solve(b_local, x_local, |values| {
             // The values are − A_ΓI A_II⁻¹ r_I.
             near.iter().zip(values.iter()).for_each(|(&i, value)| b_shared[i] += value);
             self.comm.sum(b_shared);
-            if let Some(schur) = &mut self.schur {
-                schur.solve(b_shared, x_shared, |_| {});
-            }
+            solve_shared(&mut self.schur, b_shared, x_shared);
             values.iter_mut().zip(near).for_each(|(value, &i)| *value = x_shared[i]);
         });
         places.iter().zip(z).for_each(|(&place, z)| *z = x[place]);
@@ -171,13 +198,20 @@ impl Substructure {
 
 impl Division {
     /// Divides the unknowns of a matrix: of two neighbours on different ranks, the one on the higher
-    /// rank belongs to the interface. `None` if that is too large. Collective.
-    fn of(comm: Communicator, matrix: &Matrix) -> Result<Option<Self>, PetscError> {
+    /// rank belongs to the interface, with those `condensed`. `None` if that is too large. Collective.
+    fn of(
+        comm: Communicator,
+        matrix: &Matrix,
+        condensed: &[usize],
+    ) -> Result<Option<Self>, PetscError> {
         let rows = matrix.rows();
+        let mut shared = vec![false; rows.len()];
+        condensed.iter().for_each(|&i| shared[i] = true);
         let before = |columns: &[i32], _: &[f64]| columns.iter().any(|&j| j < rows.start);
         let (mut inner, mut own) = (Vec::new(), Vec::new());
-        for row in rows.clone() {
-            if matrix.read_row(row, before)? { &mut own } else { &mut inner }.push(row);
+        for (row, shared) in rows.clone().zip(shared) {
+            let shared = shared || matrix.read_row(row, before)?;
+            if shared { &mut own } else { &mut inner }.push(row);
         }
         let own: Vec<f64> = own.into_iter().map(f64::from).collect();
         let interface: Vec<i32> = comm.gather(&own).into_iter().map(|row| row as i32).collect();

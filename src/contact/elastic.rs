@@ -1,9 +1,9 @@
 //! The linear systems inside contact solvers.
 
-use super::{ContactError, ContactProblem, ContactReport, Kkt};
+use super::{Bound, ContactError, ContactProblem, ContactReport, Kkt};
 use crate::{
     archive::{Archive, ArchiveError},
-    cholesky::{Booking, Factor, LinearSolver, LinearSystem, Precision},
+    cholesky::{Booking, Choose, Factor, LinearSolver, LinearSystem, Precision},
     petsc::{PetscError, Session, Vector},
 };
 
@@ -13,6 +13,7 @@ impl ContactProblem<'_> {
         let booking = Booking {
             phases: self.phases,
             factorisation: "contact/factorisation",
+            restriction: "contact/Schur complement",
             triangular_solves: "contact/triangular solves",
             product: "contact/products",
         };
@@ -55,28 +56,30 @@ impl<'s> ElasticSolver<'s> {
         Factor::new(self.session, "elastic_", Precision::Preconditioner)
     }
 
-    /// Solves from the start `c` for the load `f` until the forces left on the free unknowns are
-    /// at most `limit` in ‖·‖₂, N.
+    /// Solves, with all that is prescribed or added at the `bounds`, from the start `c` for the load `f`
+    /// until the forces left on the free unknowns are at most `limit` in ‖·‖₂, N.
     ///
     /// # Errors
     /// They do not get there: the system is not positive definite, or too ill-conditioned for this
     /// limit. Or PETSc failed.
     pub(super) fn solve(
         &mut self,
+        bounds: &[Bound],
         system: LinearSystem,
-        f: &Vector,
+        (f, limit): (&Vector, f64),
         c: &mut Vector,
-        limit: f64,
+        choose: Option<Choose>,
         report: &mut ContactReport,
     ) -> Result<(), ContactError> {
-        let solver = match self.solver.take() {
+        let mut solver = match self.solver.take() {
             Some(solver) => solver,
             None => {
                 let factor = self.loaded.take().unwrap_or_else(|| self.new_factor());
                 LinearSolver::with(self.session, factor, system.matrix.owned())?
             }
         };
-        let solved = self.solver.insert(solver).solve_renewing(system, f, c, limit)?;
+        solver.factor().condense(bounds.iter().map(|bound| bound.dof));
+        let solved = self.solver.insert(solver).solve_choosing(system, f, c, limit, choose)?;
         report.linear_iterations += solved.iterations;
         report.factorisations += solved.factorisations;
         match solved.converged {

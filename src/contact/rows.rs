@@ -81,6 +81,11 @@ impl Bound {
         self.lower == self.upper
     }
 
+    /// The value on a side: 1 the upper bound, −1 the lower one, 0 none, m.
+    pub fn at(&self, side: f64) -> Option<f64> {
+        (side != 0.0).then_some(if side > 0.0 { self.upper } else { self.lower })
+    }
+
     /// The value nearest to `c` that both sides admit, m.
     pub fn nearest(&self, c: f64) -> f64 {
         c.max(self.lower).min(self.upper)

@@ -211,9 +211,9 @@ impl<'a> ContactStep<'a> {
         if !unloaded && !contact::unconstrained_motions(comm, &self.rigid, active).is_empty() {
             let (_, bounds) = datum.pose(constraints, case);
             let (motions, mut active) = ((&self.rigid, &case.work), active.clone());
-            let (amplitudes, _) = self.c.read(|c| {
-                contact::rigid_motion_until_contact(comm, motions, &bounds, c, &mut active, false)
-            })?;
+            let c: Vec<f64> = self.c.read(|c| bounds.iter().map(|b| c[b.dof]).collect())?;
+            let (amplitudes, _) =
+                contact::rigid_motion_until_contact(comm, motions, &bounds, &c, &mut active, false);
             datum.add(constraints, &problem.motions.displacement(&problem.body, &amplitudes));
         }
         Ok(())

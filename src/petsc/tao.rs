@@ -32,9 +32,9 @@ pub(crate) struct TaoReport {
 
 /// What TAO's Newton methods call where they would call a preconditioner of PETSc (PCSHELL).
 pub(crate) trait ShellPreconditioner {
-    /// Sets P up for the operator `matrix`, which is new or has new values; false if it is not positive
-    /// definite.
-    fn set_up(&mut self, matrix: &Matrix) -> Result<bool, PetscError>;
+    /// Sets P up for an `operator` that TAO makes of K, which is new or has new values; false if it is
+    /// not positive definite.
+    fn set_up(&mut self, k: &Matrix, operator: &Matrix) -> Result<bool, PetscError>;
 
     /// `z` ← P⁻¹ `r`.
     fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError>;
@@ -166,16 +166,16 @@ unsafe extern "C" fn keep_hessian(
     0
 }
 
-/// The preconditioner of the problem that `minimise` made the context of `pc`.
+/// The problem that `minimise` made the context of `pc`.
 ///
 /// # Safety
 /// `pc` is in a solve of `minimise`, and of its preconditioner there is no other reference.
-unsafe fn preconditioner<'a, P>(pc: raw::PC) -> Result<&'a mut P, PetscError> {
+unsafe fn problem<'a, P>(pc: raw::PC) -> Result<&'a mut Problem<'a, P>, PetscError> {
     let mut context: *mut c_void = ptr::null_mut();
     // SAFETY: the caller's promise.
     unsafe {
         check(raw::PCShellGetContext(pc, (&raw mut context).cast()))?;
-        Ok(&mut *(*context.cast::<Problem<P>>()).preconditioner)
+        Ok(&mut *context.cast::<Problem<P>>())
     }
 }
 
@@ -183,13 +183,13 @@ unsafe extern "C" fn set_up<P: ShellPreconditioner>(pc: raw::PC) -> raw::PetscEr
     let set_up = || {
         let mut matrix = ptr::null_mut();
         // SAFETY: PETSc passes a preconditioner with operators, in a solve.
-        let (shell, matrix) = unsafe {
+        let (Problem { k, preconditioner, .. }, operator) = unsafe {
             check(raw::PCGetOperators(pc, ptr::null_mut(), &mut matrix))?;
-            (preconditioner::<P>(pc)?, Matrix::borrowed(matrix)?)
+            (problem::<P>(pc)?, Matrix::borrowed(matrix)?)
         };
         let message = || "the matrix is not positive definite".to_owned();
         let indefinite = || PetscError { code: NOT_DEFINITE, message: message() };
-        shell.set_up(&matrix)?.then_some(()).ok_or_else(indefinite)
+        preconditioner.set_up(k, &operator)?.then_some(()).ok_or_else(indefinite)
     };
     return_code(set_up())
 }
@@ -201,9 +201,9 @@ unsafe extern "C" fn apply<P: ShellPreconditioner>(
 ) -> raw::PetscErrorCode {
     let apply = || {
         // SAFETY: PETSc passes two live vectors, in a solve.
-        let (shell, r, mut z) =
-            unsafe { (preconditioner::<P>(pc)?, Vector::borrowed(r)?, Vector::borrowed(z)?) };
-        shell.apply(&r, &mut z)
+        let (problem, r, mut z) =
+            unsafe { (problem::<P>(pc)?, Vector::borrowed(r)?, Vector::borrowed(z)?) };
+        problem.preconditioner.apply(&r, &mut z)
     };
     return_code(apply())
 }

@@ -26,7 +26,7 @@ pub(crate) fn unconstrained_motions(
     null_space(gram, 1e-10 * comm.total(rigid.norm_squared()))
 }
 
-/// Lets the body move from c, with u·ν kept at the `active` bounds, as the load drives it until it
+/// Lets the body move from c, given at the bounds, with u·ν kept at the `active` bounds, as the load drives it until it
 /// reaches a further bound, which becomes active, and again until no rigid motion is left. `rigid` are
 /// the u·ν of its motions at the bounds, a column each, `work` that of the load on them. Returns how far
 /// it moves along each motion, m, and whether the active bounds then constrain all. Collective.
@@ -56,7 +56,7 @@ pub(crate) fn rigid_motion_until_contact(
         let distance = |i: usize| {
             let bound = &bounds[i];
             let value = if speed[i] > 0.0 { bound.upper } else { bound.lower };
-            (i, (value - c[bound.dof] - gone[i]) / speed[i])
+            (i, (value - c[i] - gone[i]) / speed[i])
         };
         let moving = |i: &usize| active[*i] == 0.0 && speed[*i].abs() > 1e-6 * fastest;
         let nearest = (0..bounds.len())

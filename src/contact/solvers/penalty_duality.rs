@@ -115,7 +115,7 @@ impl<'s> PenaltyDuality<'s> {
         let added: Vec<_> =
             problem.bounds.iter().map(|b| (b.dof, omega * b.tributary_length)).collect();
         let system = LinearSystem { added: Some(&added), ..problem.system() };
-        self.elastic.solve(system, &rhs, u, limit, report)
+        self.elastic.solve(problem.bounds, system, (&rhs, limit), u, None, report)
     }
 
     /// ω = 3/√(s_min s_max) from the extreme eigenvalues of the compliance S = B K⁻¹BᵀW (normal

@@ -144,6 +144,10 @@ impl ContactSolver for Tao<'_> {
         let estimate = estimate.max(problem.comm.max(pushed));
         let mut unit = if self.displacement > 0.0 { self.displacement } else { estimate };
 
+        // What an interior point method adds to the diagonal is in its operator alone.
+        if self.kind != "bqpip" {
+            self.factor.condense(problem.bounds.iter().map(|bound| bound.dof));
+        }
         let mut report = ContactReport::default();
         let (mut reason, mut residuals) = (0, Kkt::default());
         let (mut best, mut stalled) = (f64::INFINITY, 0);

@@ -1,0 +1,172 @@
+//! The dense Schur complement of the unknowns that are eliminated last.
+
+use super::{Cholesky, LowerTriangle, Precision};
+use crate::petsc::{Communicator, PetscError};
+use nalgebra::{DMatrix, DVectorView, DVectorViewMut};
+use std::iter;
+
+/// S of a matrix, and the factor of what prescribed unknowns F̄ and an added diagonal D make of it:
+///
+/// ```text
+/// S_D = S + D,   (S_D)_FF x_F = b_F − (S_D)_FF̄ x_F̄,   x_F̄ given.
+/// ```
+///
+/// Rows and columns of prescribed unknowns are those of a scaled identity in the factored matrix. All
+/// ranks have the same.
+pub(super) struct SchurComplement {
+    comm: Communicator,
+    /// Of the factor, before there is one.
+    precision: Precision,
+    /// S; without rows where there is no such unknown.
+    matrix: DMatrix<f64>,
+    /// The size of its entries.
+    scale: f64,
+    /// Of S_D, with its changes.
+    factor: Option<Cholesky>,
+    changes: Option<Changes>,
+}
+
+/// What makes S_D of S.
+#[derive(Clone, PartialEq)]
+struct Changes {
+    /// Of each unknown 1 if it is prescribed, else 0.
+    prescribed: Vec<f64>,
+    /// D.
+    added: Vec<f64>,
+}
+
+impl SchurComplement {
+    /// Without values.
+    pub(super) fn new(comm: Communicator, precision: Precision) -> Self {
+        let matrix = DMatrix::zeros(0, 0);
+        Self { comm, precision, matrix, scale: 1.0, factor: None, changes: None }
+    }
+
+    /// Replaces S, whose entries are about as large as `scale`; it has no factor yet.
+    pub(super) fn set(&mut self, matrix: DMatrix<f64>, scale: f64) {
+        (self.matrix, self.scale, self.changes) = (matrix, scale, None);
+    }
+
+    /// Prescribes unknowns and adds to diagonal entries of S, those that this rank owns; false if what is
+    /// left is not positive definite. Factorised anew is only what has changed. Collective.
+    pub(super) fn restrict(
+        &mut self,
+        prescribed: impl Iterator<Item = usize>,
+        added: impl Iterator<Item = (usize, f64)>,
+    ) -> Result<bool, PetscError> {
+        let size = self.matrix.nrows();
+        let mut changes = Changes { prescribed: vec![0.0; size], added: vec![0.0; size] };
+        prescribed.for_each(|i| changes.prescribed[i] = 1.0);
+        added.for_each(|(i, d)| changes.added[i] += d);
+        self.comm.sum(&mut changes.prescribed);
+        self.comm.sum(&mut changes.added);
+        if size == 0 || self.changes.as_ref() == Some(&changes) {
+            return Ok(true);
+        }
+        let definite = self.factorise(&changes)?;
+        self.changes = definite.then_some(changes);
+        Ok(definite)
+    }
+
+    /// Factorises S_D, in its own order: it is dense.
+    fn factorise(&mut self, changes: &Changes) -> Result<bool, PetscError> {
+        let (size, prescribed) = (self.matrix.nrows(), |i: usize| changes.prescribed[i] != 0.0);
+        let mut lower = LowerTriangle::default();
+        for (j, column) in self.matrix.column_iter().enumerate() {
+            let diagonal = column[j] + changes.added[j];
+            lower.push(j, if prescribed(j) { self.scale } else { diagonal });
+            for i in j + 1..size {
+                lower.push(i, if prescribed(i) || prescribed(j) { 0.0 } else { column[i] });
+            }
+            lower.end_column();
+        }
+        let factor = match &mut self.factor {
+            Some(factor) => factor,
+            none => {
+                let order = Some((0..size as i64).collect());
+                none.insert(Cholesky::analyse(&mut lower, order, 0, self.precision)?)
+            }
+        };
+        let definite = factor.factorise(&mut lower)?.is_some();
+        Ok(self.comm.all(definite))
+    }
+
+    /// As [`Self::solve`], but prescribed unknowns keep their values in `x`; `b` becomes b − S_D x.
+    fn solve_prescribed(&mut self, b: &mut [f64], x: &mut [f64]) {
+        let Some(changes) = self.changes.clone() else { return };
+        let unknowns = || x.iter().zip(&changes.prescribed);
+        let given: Vec<f64> = unknowns().map(|(x, prescribed)| x * prescribed).collect();
+        self.subtract_product(&given, b);
+        let mut free = b.to_vec();
+        self.solve(&mut free, x);
+        self.subtract_product(x, b);
+        x.iter_mut().zip(given).for_each(|(x, given)| *x += given);
+    }
+
+    /// `b` ← `b` − S_D `x`.
+    fn subtract_product(&self, x: &[f64], b: &mut [f64]) {
+        let (x, rows) = (DVectorView::from_slice(x, x.len()), b.len());
+        DVectorViewMut::from_slice(b, rows).gemv(-1.0, &self.matrix, &x, 1.0);
+        let Some(Changes { added, .. }) = &self.changes else { return };
+        b.iter_mut().zip(added).zip(x.iter()).for_each(|((b, d), x)| *b -= d * x);
+    }
+
+    /// `x` ← the solution for `b`, with 0 on prescribed unknowns; `b` is changed.
+    pub(super) fn solve(&mut self, b: &mut [f64], x: &mut [f64]) {
+        let (Some(factor), Some(changes)) = (&mut self.factor, &self.changes) else { return };
+        let prescribed = b.iter_mut().zip(&changes.prescribed).filter(|(_, p)| **p != 0.0);
+        prescribed.for_each(|(b, _)| *b = 0.0);
+        factor.solve(b, x, |_| {});
+    }
+
+    /// The precision of the factor.
+    pub(super) fn precision(&self) -> Precision {
+        self.factor.as_ref().map_or(self.precision, Cholesky::precision)
+    }
+
+    /// The work of a factorisation, in bytes that a solve reads in the same time.
+    pub(super) fn work(&self) -> f64 {
+        self.factor.as_ref().map_or(0.0, Cholesky::work)
+    }
+
+    /// Bytes that a solve reads.
+    pub(super) fn bytes(&self) -> f64 {
+        self.factor.as_ref().map_or(0.0, Cholesky::bytes)
+    }
+}
+
+/// The system that is left for the condensed unknowns when all others are eliminated: S x = b − p with
+/// the forces p of what is prescribed.
+pub struct Condensed<'a> {
+    pub(super) schur: &'a mut SchurComplement,
+    /// The places of this rank's condensed unknowns.
+    pub(super) own: &'a [usize],
+    pub(super) b: &'a [f64],
+    /// The solution last found, on all places.
+    pub(super) x: &'a mut [f64],
+}
+
+impl Condensed<'_> {
+    /// The condensed unknowns of this rank, and the forces p there, where some are `prescribed`; `None` if
+    /// what is left is not positive definite. Collective.
+    ///
+    /// # Errors
+    /// There is no memory for it.
+    pub fn solve(
+        &mut self,
+        prescribed: &[Option<f64>],
+    ) -> Result<Option<[Vec<f64>; 2]>, PetscError> {
+        let Self { schur, own, b, x } = self;
+        let given = || own.iter().zip(prescribed).filter_map(|(&i, value)| Some((i, (*value)?)));
+        if !schur.restrict(given().map(|(i, _)| i), iter::empty())? {
+            return Ok(None);
+        }
+        x.fill(0.0);
+        given().for_each(|(i, value)| x[i] = value);
+        schur.comm.sum(x);
+        let mut forces = b.to_vec();
+        schur.solve_prescribed(&mut forces, x);
+        let of = |values: &[f64]| own.iter().map(|&i| values[i]).collect();
+        Ok(Some([of(x), of(&forces)]))
+    }
+}
