@@ -1,7 +1,7 @@
 //! What the signals SIGINT (Ctrl-C), SIGTERM and SIGXFSZ do.
 
 use signal_hook::{
-    consts::{SIGINT, SIGTERM, SIGXFSZ},
+    consts::{SIGINT, SIGTERM, SIGUSR1, SIGUSR2, SIGXFSZ},
     flag,
 };
 use std::{
@@ -18,17 +18,20 @@ static AT_ONCE: LazyLock<Arc<AtomicBool>> = LazyLock::new(|| Arc::new(true.into(
 static HELD: LazyLock<Arc<AtomicUsize>> = LazyLock::new(Arc::default);
 
 /// Lets SIGINT and SIGTERM end the process with the exit codes 130 and 143: at once, or while an
-/// [`Interrupts`] holds them only the second one. A file-size limit (SIGXFSZ) becomes an error of the
+/// [`Interrupts`] holds them only the second one. On ranks, SIGUSR1 and SIGUSR2 stand for them, because
+/// mpiexec does not forward them as they are. A file-size limit (SIGXFSZ) becomes an error of the
 /// write that exceeds it.
 ///
 /// # Errors
 /// The system refuses handlers.
 pub fn install() -> io::Result<()> {
     flag::register(SIGXFSZ, Arc::default())?;
-    for signal in [SIGINT, SIGTERM] {
+    for (signal, meant) in
+        [(SIGINT, SIGINT), (SIGTERM, SIGTERM), (SIGUSR1, SIGINT), (SIGUSR2, SIGTERM)]
+    {
         // They act in this order.
-        flag::register_conditional_shutdown(signal, 128 + signal, AT_ONCE.clone())?;
-        flag::register_usize(signal, HELD.clone(), signal as usize)?;
+        flag::register_conditional_shutdown(signal, 128 + meant, AT_ONCE.clone())?;
+        flag::register_usize(signal, HELD.clone(), meant as usize)?;
         flag::register(signal, AT_ONCE.clone())?;
     }
     Ok(())

@@ -100,11 +100,27 @@ impl Checkpoint {
         }
         let path = path(folder, step as usize, comm.rank());
         let read = fs::read(&path).map_err(|error| error.to_string());
-        let read = read.and_then(|bytes| Self::parse(&bytes, comm.size()));
+        let read =
+            read.and_then(|bytes| Self::parse(&bytes)).and_then(|checkpoint| {
+                match checkpoint.header.origin.ranks {
+                    made if made == comm.size() => Ok(checkpoint),
+                    made => {
+                        let ranks = comm.size();
+                        Err(format!("it was written on {made} ranks, and this is a run on {ranks}"))
+                    }
+                }
+            });
         agree(comm, read.map(Some).map_err(|reason| refusal(&path, &reason)))
     }
 
-    fn parse(bytes: &[u8], ranks: usize) -> Result<Self, String> {
+    /// On how many ranks the latest checkpoint in `folder` was written, if there is one that can be read.
+    pub fn ranks(folder: &Path) -> Option<usize> {
+        let (_, path) = output::checkpoints(folder, 0).into_iter().max()?;
+        let checkpoint = Self::parse(&fs::read(path).ok()?).ok()?;
+        Some(checkpoint.header.origin.ranks)
+    }
+
+    fn parse(bytes: &[u8]) -> Result<Self, String> {
         let rest = bytes.strip_prefix(FORMAT).ok_or("it is no checkpoint of this version")?;
         let (expected, content) = rest.split_first_chunk().ok_or("it is cut off")?;
         if *expected != hash(content).to_le_bytes() {
@@ -112,10 +128,7 @@ impl Checkpoint {
         }
         let (header, state): (Header, _) =
             postcard::take_from_bytes(content).map_err(|error| error.to_string())?;
-        match header.origin.ranks {
-            made if made == ranks => Ok(Self { header, state: state.to_vec() }),
-            made => Err(format!("it was written on {made} ranks, and this is a run on {ranks}")),
-        }
+        Ok(Self { header, state: state.to_vec() })
     }
 
     /// Refuses a checkpoint that is none of this run.

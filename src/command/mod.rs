@@ -6,6 +6,7 @@ mod compare;
 mod figures;
 mod info;
 mod keys;
+mod launch;
 mod new;
 mod profile;
 mod provenance;

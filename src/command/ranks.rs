@@ -47,7 +47,7 @@ pub fn barrier_or_abort(comm: Communicator, failure: Option<&RunError>) {
 
 /// Refuses what is not `signorini run` where `mpiexec` has started several processes.
 pub fn require_one_process() -> Result<(), Failure> {
-    if Communicator::launched() == 1 {
+    if Communicator::launched().is_none_or(|ranks| ranks == 1) {
         return Ok(());
     }
     let session = Session::start(&[])?;

@@ -3,6 +3,7 @@
 use super::{
     Failure, SOLVERS, SceneArguments, check_petsc, check_solver,
     checkpoint::Checkpoint,
+    launch::{self, Ranks},
     ranks::{agree, barrier_or_abort},
     recorder::Recorder,
     screen, summaries, tell,
@@ -15,7 +16,7 @@ use signorini::{
     },
     mesh::{Mesh, Order},
     output,
-    petsc::{PetscError, Session},
+    petsc::{Communicator, PetscError, Session},
     scene::{Scene, Stepping},
 };
 use std::{
@@ -40,6 +41,10 @@ pub struct RunArguments {
     /// notes, also those that do not bear on the answer.
     #[arg(long)]
     profile: bool,
+    /// Processes that share the run, started by mpiexec: a number, or auto for as many as pay on the cores
+    /// there are (one for small meshes; those of the checkpoint with --restart).
+    #[arg(long, alias = "threads", value_name = "N", default_value = "auto")]
+    ranks: Ranks,
     /// Go on from the last checkpoint of the same run, to the same results bit by bit; from the
     /// beginning if there is none.
     #[arg(long)]
@@ -52,9 +57,34 @@ pub struct RunArguments {
 impl RunArguments {
     /// Refuses what would silently have no effect.
     fn check(&self) -> Result<(), Failure> {
+        if let (Some(asked), Some(launched)) = (self.ranks.0, Communicator::launched())
+            && asked != launched
+            && !launch::is_launched()
+        {
+            return Err(Failure::input(format!(
+                "--ranks {asked} has no effect where mpiexec has started {launched}; leave one of them"
+            )));
+        }
         self.scene.check()?;
         self.solver.iter().try_for_each(|name| check_solver("--solver", name))?;
         check_petsc(&self.petsc)
+    }
+
+    /// The scene as it is to be run, and its mesh, which is made where it is not there.
+    fn read(&self) -> Result<(Scene, Mesh), Failure> {
+        let solver = self.solver.iter().map(|name| format!("contact.solver='{name}'"));
+        self.scene.read(true, &Vec::from_iter(solver))
+    }
+
+    /// Where the results go.
+    fn folder(&self, scene: &Scene) -> PathBuf {
+        self.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name))
+    }
+
+    /// On how many ranks to run a scene, unless that is said.
+    fn ranks(&self, scene: &Scene, mesh: &Mesh) -> usize {
+        let checkpoint = self.restart.then(|| Checkpoint::ranks(&self.folder(scene))).flatten();
+        checkpoint.unwrap_or_else(|| launch::ranks_that_pay(scene, mesh))
     }
 }
 
@@ -117,14 +147,35 @@ fn check_mesh_is_kept(scene: &Scene, folder: &Path) -> Result<(), Failure> {
     }
 }
 
-/// `signorini run SCENE`, on as many ranks as `mpiexec` has started.
+/// `signorini run SCENE`, on as many ranks as `mpiexec` has started, or are asked for, or pay.
 pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let (started, phases) = (Instant::now(), Phases::default());
     let checked = arguments.check();
+    let mut input = None;
+    if checked.is_ok() && Communicator::launched().is_none() {
+        let ranks = arguments.ranks.0.unwrap_or_else(|| {
+            let read = phases.time("mesh", || arguments.read());
+            let ranks = read.as_ref().map_or(1, |(scene, mesh)| arguments.ranks(scene, mesh));
+            input = Some(read);
+            ranks
+        });
+        if ranks > 1 {
+            match launch::on_ranks(ranks) {
+                Err(error) if arguments.ranks.0.is_some() => {
+                    return Err(Failure::input(format!("--ranks {ranks} needs mpiexec: {error}")));
+                }
+                Err(_) => {}
+                Ok(ended) => return ended,
+            }
+        }
+    }
     let options = if checked.is_ok() { &arguments.petsc[..] } else { &[] };
     let session = phases.time("petsc start", || Session::start(options))?;
+    if session.comm().is_root() {
+        launch::begin_first_rank();
+    }
     let task = agree(session.comm(), checked)
-        .and_then(|()| Task::read(arguments, &session, &phases, started));
+        .and_then(|()| Task::read(arguments, input, &session, &phases, started));
     let warns = task.is_ok() && session.comm().is_root();
     let result = task.and_then(|task| task.solve(&session));
     let unused = session.unused_options();
@@ -166,22 +217,21 @@ pub(super) struct Task<'a> {
 }
 
 impl<'a> Task<'a> {
-    /// Reads scene and mesh. Every rank reads both files; where the mesh is yet to be made, the first
-    /// rank makes it. Collective.
+    /// Reads scene and mesh, unless a single rank has read them: the `input`. Every rank reads both files;
+    /// where the mesh is yet to be made, the first rank makes it. Collective.
     fn read(
         arguments: &'a RunArguments,
+        input: Option<Result<(Scene, Mesh), Failure>>,
         session: &Session,
         phases: &'a Phases,
         started: Instant,
     ) -> Result<Self, Failure> {
         let comm = session.comm();
-        let solver = arguments.solver.iter().map(|name| format!("contact.solver='{name}'"));
-        let solver = Vec::from_iter(solver);
-        let load = || phases.time("mesh", || arguments.scene.read(true, &solver));
-        let of_root = agree(comm, comm.is_root().then(load).transpose())?;
+        let load = || phases.time("mesh", || arguments.read());
+        let of_root = agree(comm, input.or_else(|| comm.is_root().then(load)).transpose())?;
         let (mut scene, mesh) = agree(comm, of_root.map_or_else(load, Ok))?;
         let solver = scene.contact.solver.clone().unwrap_or(SOLVERS[0].to_owned());
-        let folder = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
+        let folder = arguments.folder(&scene);
         let (as_run, tables) = scene.as_run().map_err(Failure::input)?;
         agree(comm, check_mesh_is_kept(&scene, &folder))?;
         let begins = !arguments.restart && comm.is_root();

@@ -2,10 +2,14 @@
 
 use super::{raw, session::world};
 use std::{
+    env,
     ffi::{c_int, c_void},
     ptr,
     time::{Duration, Instant},
 };
+
+/// Variables by which the launchers that Open MPI knows tell a process that it is one of several.
+const LAUNCHERS: [&str; 4] = ["OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"];
 
 /// This rank among all: sums and decisions over the whole body go through it.
 ///
@@ -34,11 +38,13 @@ impl Communicator {
         Self { rank: rank as usize, size: size as usize }
     }
 
-    /// The number of ranks that `mpiexec` has started, from the environment: known before MPI runs.
-    pub fn launched() -> usize {
+    /// The number of ranks that a launcher has started, this one among them, from the environment: known
+    /// before MPI runs. `None` for a process that no launcher started (a singleton).
+    pub fn launched() -> Option<usize> {
+        LAUNCHERS.iter().find(|name| env::var_os(name).is_some())?;
         // Open MPI, and the process managers of MPICH.
-        let sizes = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"].map(|name| std::env::var(name).ok());
-        sizes.into_iter().flatten().find_map(|size| size.parse().ok()).unwrap_or(1)
+        let sizes = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"].map(|name| env::var(name).ok());
+        Some(sizes.into_iter().flatten().find_map(|size| size.parse().ok()).unwrap_or(1))
     }
 
     /// The index of this rank, from 0.

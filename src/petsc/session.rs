@@ -79,9 +79,6 @@ fn give_memory_back() {
     }
 }
 
-/// Variables by which the launchers that Open MPI knows tell a process that it is one of several.
-const LAUNCHERS: [&str; 4] = ["OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"];
-
 /// Settings of Open MPI for a process that no launcher started (a singleton). With them it starts no
 /// daemon and opens no network, which is two thirds of the time PETSc takes to start, and makes no
 /// directory of temporary files: all singletons of a user would share one, and one that ends removes
@@ -105,7 +102,7 @@ fn initialize(options: &[String]) -> Result<(), PetscError> {
     // Scotch 7 starts a thread for each core of the machine in every rank: too many by the number of
     // ranks, and slow because they wait for each other. It reads this whenever it divides a graph.
     set_missing(&[("SCOTCH_PTHREAD_NUMBER", "1")]);
-    let singleton = LAUNCHERS.iter().all(|name| env::var_os(name).is_none());
+    let singleton = Communicator::launched().is_none();
     let temporary = if singleton { set_missing(&SINGLETON) } else { Vec::new() };
     let own = ["signorini", "-no_signal_handler"].into_iter();
     let arguments = own.chain(options.iter().map(String::as_str));

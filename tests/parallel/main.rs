@@ -1,5 +1,6 @@
 //! The program on several ranks, from outside: the same answers, whole results, one voice.
 
+mod launched;
 mod vtu_pieces;
 mod repeat;
 

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 const TIMES: [&str; 4] = ["provenance", "wall_seconds", "seconds_per_step", "phases"];
 
 /// The files of a run's folder by name, without what tells seconds.
-fn results(test_directory: &TestDirectory, folder: &str) -> BTreeMap<String, Vec<u8>> {
+pub fn results(test_directory: &TestDirectory, folder: &str) -> BTreeMap<String, Vec<u8>> {
     let content = |name: String| {
         let path = format!("{folder}/{name}");
         let bytes = match &name[..] {

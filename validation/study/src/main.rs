@@ -32,7 +32,7 @@ enum Command {
 
 fn main() -> ExitCode {
     let command = Arguments::parse().command;
-    if Communicator::launched() > 1 {
+    if Communicator::launched().is_some_and(|ranks| ranks > 1) {
         // Every rank comes here; that one speaks needs no communication.
         let rank =
             ["OMPI_COMM_WORLD_RANK", "PMI_RANK"].into_iter().find_map(|name| env::var(name).ok());

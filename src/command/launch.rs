@@ -1,0 +1,141 @@
+//! A run that starts itself on several ranks.
+//!
+//! The process that was typed waits for `mpiexec` and passes signals on to it. Open MPI's answers
+//! SIGINT and SIGTERM by ending its ranks within a second, but forwards SIGUSR1 and SIGUSR2 to them
+//! (mpiexec(1), "Signal Propagation").
+
+use super::Failure;
+use rustix::{
+    process::{Pid, Signal, kill_process},
+    stdio::dup2_stderr,
+};
+use signal_hook::{consts::SIGINT, low_level};
+use signorini::{
+    interrupt::Interrupts,
+    mesh::{Mesh, Order},
+    scene::Scene,
+};
+use std::{
+    env,
+    fs::{self, File},
+    io::{self, IsTerminal, Read},
+    num::NonZero,
+    os::unix::{fs::MetadataExt, process::CommandExt},
+    process::{self, Child, Command, Stdio},
+    str::FromStr,
+    thread,
+    time::Duration,
+};
+
+/// A rank that this program has started finds here its standard error, if that is a terminal.
+const TERMINAL: &str = "SIGNORINI_TERMINAL";
+
+/// How often the launcher looks for signals and for the end.
+const PAUSE: Duration = Duration::from_millis(5);
+
+/// How many processes share a run; `None`: as many as pay.
+#[derive(Debug, Clone, Copy)]
+pub struct Ranks(pub Option<usize>);
+
+impl FromStr for Ranks {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        match text.parse() {
+            Ok(0) => Err("there is no run on 0 ranks"),
+            Ok(number) => Ok(Self(Some(number))),
+            Err(_) if text == "auto" => Ok(Self(None)),
+            Err(_) => Err("it is neither a number nor auto"),
+        }
+    }
+}
+
+/// Numbers of ranks, and of unknowns of the displacements from which on they pay. Whole runs of the uniform
+/// `square-mild` on 4 cores, seconds on 1, 2 and 4 ranks: 33,000 unknowns and 100 steps 1.8, 1.9, 3.4;
+/// 132,000 and 50 steps 8.9, 6.6, 8.4; 526,000 and 20 steps 30.5 on 1 and 15.2 on 4.
+const PAYING: [(usize, usize); 2] = [(2, 100_000), (4, 400_000)];
+
+/// The number of ranks on which a run ends first, of the cores that it may use.
+pub fn ranks_that_pay(scene: &Scene, mesh: &Mesh) -> usize {
+    let cores = thread::available_parallelism().map_or(1, NonZero::get);
+    let (nodes, triangles) = (mesh.nodes.len(), mesh.triangles.len());
+    // As many edges as vertices and triangles (Euler), but for one and the holes.
+    let nodes = if scene.order == Order::Quadratic { 2 * nodes + triangles } else { nodes };
+    let pays = |&&(ranks, unknowns): &&(usize, usize)| ranks <= cores && 2 * nodes >= unknowns;
+    let most = PAYING.iter().filter(pays).map(|(ranks, _)| *ranks).max();
+    // An accuracy begins with many small meshes; TAO and static scenes were not measured.
+    let is_tao = scene.contact.solver.as_ref().is_some_and(|name| name.starts_with("tao"));
+    let stays = scene.accuracy.is_some() || scene.time.is_none() || is_tao;
+    most.filter(|_| !stays).unwrap_or(1)
+}
+
+/// Whether this program has started this rank.
+pub fn is_launched() -> bool {
+    env::var_os(TERMINAL).is_some()
+}
+
+/// Runs the program with the same arguments on so many ranks, or tells why it cannot.
+pub fn on_ranks(ranks: usize) -> io::Result<Result<(), Failure>> {
+    let interrupts = Interrupts::hold();
+    let mut mpiexec = spawn(ranks)?;
+    // It is closed when this process ends, in whatever way: then the ranks end, too.
+    let _input = mpiexec.stdin.take();
+    let mut signal = None;
+    let status = loop {
+        if let Some(status) = mpiexec.try_wait()? {
+            break status;
+        }
+        // A second signal ends this process at once.
+        if signal.is_none()
+            && let Some(received) = interrupts.received()
+        {
+            let forwarded = if received.0 == SIGINT { Signal::USR1 } else { Signal::USR2 };
+            let _ = kill_process(Pid::from_child(&mpiexec), forwarded);
+            signal = Some(received);
+        }
+        thread::sleep(PAUSE);
+    };
+    Ok(match (status.code(), signal) {
+        (Some(0), _) => Ok(()),
+        // The ranks have told why.
+        (Some(code @ (1 | 2 | 130 | 143)), _) => Err(Failure { code: code as u8, message: None }),
+        (_, Some(signal)) => Err(Failure { code: signal.exit_code(), message: None }),
+        (_, None) => Err(io::Error::other("a rank was killed").into()),
+    })
+}
+
+fn spawn(ranks: usize) -> io::Result<Child> {
+    let mut mpiexec = Command::new("mpiexec");
+    mpiexec
+        .args(["--quiet", "--oversubscribe", "--bind-to", "none", "-n", &ranks.to_string()])
+        .arg(env::current_exe()?)
+        .args(env::args_os().skip(1))
+        .stdin(Stdio::piped())
+        // What is typed at the terminal goes to the launcher alone.
+        .process_group(0)
+        .env(
+            TERMINAL,
+            match io::stderr().is_terminal() {
+                true => format!("/proc/{}/fd/2", process::id()),
+                false => String::new(),
+            },
+        );
+    if fs::metadata("/proc/self").is_ok_and(|of_process| of_process.uid() == 0) {
+        let allowed = ["OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM"];
+        mpiexec.envs(allowed.map(|name| (name, "1")));
+    }
+    mpiexec.spawn()
+}
+
+/// What the first rank does at once if this program has started it. Its standard error would be a pipe,
+/// which shows no progress bar; its standard input is the launcher's pipe.
+pub fn begin_first_rank() {
+    let Ok(terminal) = env::var(TERMINAL) else { return };
+    if let Ok(terminal) = File::options().read(true).write(true).open(terminal) {
+        let _ = dup2_stderr(terminal);
+    }
+    thread::spawn(|| {
+        let _ = io::stdin().read_to_end(&mut Vec::new());
+        low_level::exit(1);
+    });
+}
