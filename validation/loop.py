@@ -122,7 +122,7 @@ class Contact:
             reaction = library.product(u) - library.load
             pressure, penetration = -s * reaction, s * u - self.gap
             active = (s != 0) & np.where(
-                self.active, pressure > -SIGN * self.force, penetration > SIGN * self.size)
+                self.active, pressure >= -SIGN * self.force, penetration > SIGN * self.size)
             if (active == self.active).all():
                 break
             self.active = active
