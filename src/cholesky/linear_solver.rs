@@ -78,7 +78,7 @@ pub type Choose<'a> =
 
 /// Conjugate gradients (Hestenes and Stiefel, J. Res. Nat. Bur. Standards 49, 1952) preconditioned by
 /// a Cholesky factor: that of the matrix itself, which they polish, or that of an earlier system with
-/// other values, and where the factor is not condensed ([`Factor::condense`]) other prescribed unknowns,
+/// other values, and where the factor is not condensed (`Factor::condense`) other prescribed unknowns,
 /// another diagonal.
 ///
 /// PETSc's KSPCG makes the same operations in the same order, but would need a matrix without the
