@@ -51,6 +51,11 @@ enum Method {
 /// n = 64 and 256, on one and two ranks: MUMPS 4 to 10, gamg 13 to 33, CHOLMOD through PETSc 10 to 19.
 const UNKNOWN_COST: f64 = 10.0;
 
+/// Unknowns per root of the rows up to which they are condensed: as many as a dense factor of them takes
+/// the work of the sparse one, in a body about as high as wide. (A strip a hundred times as long as high
+/// with contact along all of it, 6.7 per root and sets that go round in circles: 39 s condensed, 22 s not.)
+const MOST_CONDENSED: f64 = 4.0;
+
 /// Rows above which several ranks use multigrid: the memory of factors grows faster than the rows.
 /// With 2.1 million on two ranks a step with factors was six times as fast, their set-up four times
 /// as slow, memory 10 % more; what is beyond was not measured.
@@ -205,8 +210,10 @@ impl Factor {
         let (prefix, serial) = (&self.prefix, self.comm.is_serial());
         let factorised = serial || rows < VERY_LARGE;
         if factorised && !self.is_asked_for()? {
-            let condensed = self.comm.any(!self.condensed.is_empty());
-            for (last, condensed) in [(&self.condensed[..], condensed), (&[], false)] {
+            let unknowns = self.comm.count(self.condensed.len());
+            let pays = unknowns > 0 && unknowns as f64 <= MOST_CONDENSED * (rows as f64).sqrt();
+            let choices = [(&self.condensed[..], true), (&[], false)];
+            for (last, condensed) in choices.into_iter().skip(usize::from(!pays)) {
                 let [precision, of_schur] = self.precisions;
                 // Contact forces are told by a condensed S.
                 let of_schur = if condensed { Precision::Full } else { of_schur };
