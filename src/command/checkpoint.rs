@@ -106,7 +106,7 @@ impl Checkpoint {
                     made if made == comm.size() => Ok(checkpoint),
                     made => {
                         let ranks = comm.size();
-                        Err(format!("it was written on {made} ranks, and this is a run on {ranks}"))
+                        Err(format!("it was written on {made} ranks, and this is a run on {ranks} (--ranks {made} goes on)"))
                     }
                 }
             });

@@ -124,6 +124,10 @@ fn spawn(ranks: usize) -> io::Result<Child> {
         let allowed = ["OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM"];
         mpiexec.envs(allowed.map(|name| (name, "1")));
     }
+    // Without a PATH mpiexec itself is found (execvp(3) looks in these), but not what it starts.
+    if env::var_os("PATH").is_none() {
+        mpiexec.env("PATH", "/bin:/usr/bin");
+    }
     mpiexec.spawn()
 }
 
