@@ -8,6 +8,7 @@ use crate::{
         has_option, set_default_option,
     },
 };
+use std::iter;
 
 /// A Cholesky factor: CHOLMOD's with solves of our own, by substructuring where there are several
 /// ranks or contact. On several ranks MUMPS takes its place (PCCHOLESKY) where their interface is too large,
@@ -316,7 +317,13 @@ impl Factor {
 /// the rows and columns of their unknowns set to 0 but for the diagonal.
 impl ShellPreconditioner for Factor {
     fn set_up(&mut self, k: &Matrix, operator: &Matrix) -> Result<bool, PetscError> {
-        let condensed = self.is_condensed(k)?;
+        // Some types leave the active unknowns out of the operator.
+        let rows = operator.size()?;
+        let whole = rows == k.size()?;
+        if !whole {
+            self.condense(iter::empty());
+        }
+        let condensed = whole && self.is_condensed(k)?;
         let factored = if condensed { k } else { operator };
         self.remake(factored)?;
         self.end_solve();
@@ -325,7 +332,8 @@ impl ShellPreconditioner for Factor {
             true => this.restrict(&prescribed, &[]),
             false => Ok(true),
         };
-        let usable = self.iteration_limit().is_some() && restrict(self)?;
+        let fits = self.method.as_ref().is_some_and(|(size, _)| *size == rows);
+        let usable = fits && self.iteration_limit().is_some() && restrict(self)?;
         Ok(usable || (self.factorise(factored)? && restrict(self)?))
     }
 
