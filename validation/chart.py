@@ -1,12 +1,13 @@
 #!/usr/bin/python3
 """Error against seconds, whole processes: chart.py --binary FILE SCENE…
 
-Of each scene of geo/: the paper's method (P1, uniform mesh, uniform steps), meshes graded by the .geo in
-P1 and P2, `--accuracy` from 0.1 to 0.001, the other contact solvers, the scene as it is shipped, and the
-FEniCSx loop. The seconds are those from start to end of the process, gmsh, adaptation and output
-included; of a run below three seconds the median of three. FEniCSx is given the mesh, its forms are
-compiled, and it writes nothing. The error is the larger of those of u (energy norm) and of the damage
-(L²) at the end, relative, against the reference of graded_reference.py in out/reference/graded.
+Of each scene of geo/: the paper's method (P1, uniform mesh, uniform steps), meshes graded by the .geo
+in P1 and P2, `--accuracy` from 0.1 to 0.001, the other contact solvers, the scene as it is shipped, and
+the FEniCSx loop. The seconds are those from start to end of the process, gmsh, adaptation and output
+included, on one core, as FEniCSx has; of a run below three seconds the median of three. FEniCSx is
+given the mesh, its forms are compiled, and it writes nothing. The error is the larger of those of u
+(energy norm) and of the damage (L²) at the end, relative, against the reference of graded_reference.py
+in out/reference/graded.
 Writes out/chart/<scene>/chart.csv; scripts/chart.py draws it.
 """
 
@@ -143,7 +144,8 @@ class Study:
                 steps = list(csv.DictReader(file))
             return mean(float(step["seconds"]) for step in steps[2:] or steps)
 
-        command = [self.binary, "run", path, "--out", out, "--solver", choice.solver]
+        command = [self.binary, "run", path, "--out", out, "--solver", choice.solver,
+                   "--ranks", "1"]
         seconds, seconds_per_step = seconds_of(command, per_step, unmeshed)
         run = Run(out)
         u, damage = errors(self.reference, run, self.stiffness)

@@ -1,14 +1,15 @@
 //! The factor that preconditions a matrix, whatever makes it.
 
+mod shell;
+
 use super::{Choose, Precision, RefactorisationPolicy, substructure::Substructure};
 use crate::{
     archive::{Archive, ArchiveError},
     petsc::{
-        Communicator, Matrix, PetscError, Preconditioner, Session, ShellPreconditioner, Vector,
-        has_option, set_default_option,
+        Communicator, Matrix, PetscError, Preconditioner, Session, Vector, has_option,
+        set_default_option,
     },
 };
-use std::iter;
 
 /// A Cholesky factor: CHOLMOD's with solves of our own, by substructuring where there are several
 /// ranks or contact. On several ranks MUMPS takes its place (PCCHOLESKY) where their interface is too large,
@@ -23,8 +24,8 @@ pub struct Factor {
     prefix: String,
     /// Of the factors of a substructure.
     precisions: [Precision; 2],
-    /// The owned unknowns that [`Self::restrict`] is to prescribe or to change.
-    condensed: Vec<usize>,
+    /// The owned unknowns that [`Self::restrict`] is to prescribe or to change, of matrices of so many rows.
+    condensed: (usize, Vec<usize>),
     /// Made with the first matrix of so many rows.
     method: Option<(usize, Method)>,
     /// `None` before the first factorisation, and after one that failed.
@@ -69,7 +70,7 @@ impl Factor {
             comm: session.comm(),
             prefix: prefix.to_owned(),
             precisions: [precision; 2],
-            condensed: Vec::new(),
+            condensed: (0, Vec::new()),
             method: None,
             policy: None,
             applications: 0,
@@ -79,15 +80,23 @@ impl Factor {
         }
     }
 
-    /// Makes factors from now on so that [`Self::restrict`] may prescribe these owned unknowns and add
-    /// to their diagonal entries, if there are not too many of them. The same ones on every call, or the
-    /// factor there is is lost. Collective.
-    pub(crate) fn condense(&mut self, unknowns: impl Iterator<Item = usize>) {
-        let unknowns: Vec<usize> = unknowns.collect();
-        if self.comm.any(unknowns != self.condensed) {
-            (self.condensed, self.method) = (unknowns, None);
+    /// Makes factors of matrices like this one so that [`Self::restrict`] may prescribe these owned unknowns
+    /// and add to their diagonal entries, if there are not too many of them. The same ones on every call, or
+    /// the factor there is is lost. Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub(crate) fn condense(
+        &mut self,
+        matrix: &Matrix,
+        unknowns: impl Iterator<Item = usize>,
+    ) -> Result<(), PetscError> {
+        let condensed = (matrix.size()?, unknowns.collect());
+        if self.comm.any(condensed != self.condensed) {
+            (self.condensed, self.method) = (condensed, None);
             self.policy = self.policy.take().filter(|_| self.loaded);
         }
+        Ok(())
     }
 
     /// Saves or loads the factor as the values of the matrix that it was made of.
@@ -211,9 +220,11 @@ impl Factor {
         let (prefix, serial) = (&self.prefix, self.comm.is_serial());
         let factorised = serial || rows < VERY_LARGE;
         if factorised && !self.is_asked_for()? {
-            let unknowns = self.comm.count(self.condensed.len());
-            let pays = unknowns > 0 && unknowns as f64 <= MOST_CONDENSED * (rows as f64).sqrt();
-            let choices = [(&self.condensed[..], true), (&[], false)];
+            let (of_rows, condensed) = &self.condensed;
+            let unknowns = self.comm.count(condensed.len());
+            let few = unknowns > 0 && unknowns as f64 <= MOST_CONDENSED * (rows as f64).sqrt();
+            let pays = few && *of_rows == rows;
+            let choices = [(&condensed[..], true), (&[], false)];
             for (last, condensed) in choices.into_iter().skip(usize::from(!pays)) {
                 let [precision, of_schur] = self.precisions;
                 // Contact forces are told by a condensed S.
@@ -279,10 +290,10 @@ impl Factor {
         };
         self.applications += 1;
         let chosen =
-            r.read(|r| z.write(|z| factor.apply_choosing(r, z, &self.condensed, choose)))???;
+            r.read(|r| z.write(|z| factor.apply_choosing(r, z, &self.condensed.1, choose)))???;
         self.keep_precisions();
         let prescribed = |values: Vec<Option<f64>>| {
-            let unknowns = self.condensed.iter().zip(values);
+            let unknowns = self.condensed.1.iter().zip(values);
             unknowns.filter_map(|(&i, value)| value.is_some().then_some(i)).collect()
         };
         Ok(chosen.map(prescribed))
@@ -310,51 +321,5 @@ impl Factor {
         if let Some(policy) = &mut self.policy {
             policy.solved(iterations);
         }
-    }
-}
-
-/// Inside one of TAO's methods: every new operator begins a solve. Where bounds are active it is K with
-/// the rows and columns of their unknowns set to 0 but for the diagonal.
-impl ShellPreconditioner for Factor {
-    fn set_up(&mut self, k: &Matrix, operator: &Matrix) -> Result<bool, PetscError> {
-        // Some types leave the active unknowns out of the operator.
-        let rows = operator.size()?;
-        let whole = rows == k.size()?;
-        if !whole {
-            self.condense(iter::empty());
-        }
-        let condensed = whole && self.is_condensed(k)?;
-        let factored = if condensed { k } else { operator };
-        self.remake(factored)?;
-        self.end_solve();
-        let prescribed = if condensed { self.masked(k, operator)? } else { Vec::new() };
-        let restrict = |this: &mut Self| match condensed {
-            true => this.restrict(&prescribed, &[]),
-            false => Ok(true),
-        };
-        let fits = self.method.as_ref().is_some_and(|(size, _)| *size == rows);
-        let usable = fits && self.iteration_limit().is_some() && restrict(self)?;
-        Ok(usable || (self.factorise(factored)? && restrict(self)?))
-    }
-
-    fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
-        Factor::apply(self, r, z)
-    }
-}
-
-impl Factor {
-    /// The condensed unknowns that are coupled with others in `k` but not in `operator`.
-    fn masked(&self, k: &Matrix, operator: &Matrix) -> Result<Vec<usize>, PetscError> {
-        let mut masked = Vec::new();
-        for &unknown in &self.condensed {
-            let row = k.rows().start + unknown as i32;
-            let coupled = |columns: &[i32], values: &[f64]| {
-                columns.iter().zip(values).any(|(column, value)| *column != row && *value != 0.0)
-            };
-            if k.read_row(row, coupled)? && !operator.read_row(row, coupled)? {
-                masked.push(unknown);
-            }
-        }
-        Ok(masked)
     }
 }

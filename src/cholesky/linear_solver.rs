@@ -1,74 +1,8 @@
 //! Linear systems by conjugate gradients on a Cholesky factor that is kept.
 
-use super::{Condensed, Factor, Precision};
-use crate::{
-    petsc::{Matrix, PetscError, Session, Vector},
-    phases::Phases,
-};
+use super::{Condensed, Factor, LinearSystem, Precision};
+use crate::petsc::{Matrix, PetscError, Session, Vector};
 use std::mem::take;
-
-/// (A + D) x = b on the unknowns that are not prescribed, A + D positive definite there.
-#[derive(Clone, Copy)]
-pub struct LinearSystem<'a> {
-    /// A.
-    pub matrix: &'a Matrix,
-    /// The nonzero entries of the diagonal D; `None` where no rank has any.
-    pub added: Option<&'a [(usize, f64)]>,
-    /// The unknowns that keep their values in x (Dirichlet conditions); `None` where no rank has any.
-    pub prescribed: Option<&'a [usize]>,
-    /// The size of A's diagonal entries: what prescribed unknowns have there in the factored matrix.
-    pub scale: f64,
-    /// Where the time of a solve's parts is booked.
-    pub booking: Option<Booking<'a>>,
-}
-
-/// Names of the phases that a solve consists of.
-#[derive(Clone, Copy)]
-pub struct Booking<'a> {
-    /// Where they are booked.
-    pub phases: &'a Phases,
-    /// A new factor.
-    pub factorisation: &'static str,
-    /// The same for other prescribed unknowns, or another diagonal, where that takes less.
-    pub restriction: &'static str,
-    /// An application of the factor.
-    pub triangular_solves: &'static str,
-    /// A product with A + D.
-    pub product: &'static str,
-}
-
-impl<'a> LinearSystem<'a> {
-    /// A x = b.
-    pub fn of(matrix: &'a Matrix) -> Self {
-        Self { matrix, added: None, prescribed: None, scale: 1.0, booking: None }
-    }
-
-    /// `y` ← (A + D) `x`.
-    fn multiply(self, x: &Vector, y: &mut Vector) -> Result<(), PetscError> {
-        let bytes = self.matrix.bytes_per_product();
-        self.book(|booking| booking.product, bytes, || self.matrix.multiply(x, y))?;
-        let Some(added) = self.added else { return Ok(()) };
-        x.read(|x| y.write(|y| added.iter().for_each(|&(i, d)| y[i] += d * x[i])))?
-    }
-
-    /// `v` ← 0 on the prescribed unknowns.
-    fn clear_prescribed(self, v: &mut Vector) -> Result<(), PetscError> {
-        let Some(prescribed) = self.prescribed else { return Ok(()) };
-        v.write(|v| prescribed.iter().for_each(|&i| v[i] = 0.0))
-    }
-
-    fn book<R>(
-        self,
-        name: impl FnOnce(&Booking) -> &'static str,
-        bytes: f64,
-        work: impl FnOnce() -> R,
-    ) -> R {
-        match self.booking {
-            Some(booking) => booking.phases.time_moving(name(&booking), bytes, work),
-            None => work(),
-        }
-    }
-}
 
 /// Chooses which of the condensed unknowns are prescribed, given the system that is left for them when
 /// all others are eliminated: of each by how much it then changes, or `None` where the unknowns that are

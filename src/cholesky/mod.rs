@@ -21,6 +21,7 @@ mod cholesky;
 mod cholmod;
 mod factor;
 mod linear_solver;
+mod linear_system;
 mod lower_triangle;
 mod refactorisation;
 mod schur;
@@ -35,7 +36,8 @@ mod raw {
 
 pub use cholesky::{Cholesky, Precision};
 pub use factor::Factor;
-pub use linear_solver::{Booking, Choose, LinearSolver, LinearSystem, SolveReport};
+pub use linear_solver::{Choose, LinearSolver, SolveReport};
+pub use linear_system::{Booking, LinearSystem};
 pub use lower_triangle::LowerTriangle;
 pub use refactorisation::RefactorisationPolicy;
 pub use schur::Condensed;

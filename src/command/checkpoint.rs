@@ -100,16 +100,14 @@ impl Checkpoint {
         }
         let path = path(folder, step as usize, comm.rank());
         let read = fs::read(&path).map_err(|error| error.to_string());
-        let read =
-            read.and_then(|bytes| Self::parse(&bytes)).and_then(|checkpoint| {
-                match checkpoint.header.origin.ranks {
-                    made if made == comm.size() => Ok(checkpoint),
-                    made => {
-                        let ranks = comm.size();
-                        Err(format!("it was written on {made} ranks, and this is a run on {ranks} (--ranks {made} goes on)"))
-                    }
-                }
-            });
+        let read = read.and_then(|bytes| Self::parse(&bytes));
+        let read = read.and_then(|checkpoint| match checkpoint.header.origin.ranks {
+            made if made == comm.size() => Ok(checkpoint),
+            made => Err(format!(
+                "it was written on {made} ranks, and this is a run on {} (--ranks {made} goes on)",
+                comm.size()
+            )),
+        });
         agree(comm, read.map(Some).map_err(|reason| refusal(&path, &reason)))
     }
 

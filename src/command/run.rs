@@ -216,6 +216,18 @@ pub(super) struct Task<'a> {
     pub(super) started: Instant,
 }
 
+/// A run that begins removes the checkpoint of the one before.
+fn warn_of_checkpoint(folder: &Path) {
+    if let [(step, _), ..] = output::checkpoints(folder, 0)[..] {
+        let warning = format!(
+            "{} holds a checkpoint of step {step}, which goes with the other results of that run; \
+             `--restart` would go on from it",
+            folder.display()
+        );
+        tell("warning", &warning);
+    }
+}
+
 impl<'a> Task<'a> {
     /// Reads scene and mesh, unless a single rank has read them: the `input`. Every rank reads both files;
     /// where the mesh is yet to be made, the first rank makes it. Collective.
@@ -234,7 +246,6 @@ impl<'a> Task<'a> {
         let folder = arguments.folder(&scene);
         let (as_run, tables) = scene.as_run().map_err(Failure::input)?;
         agree(comm, check_mesh_is_kept(&scene, &folder))?;
-        let begins = !arguments.restart && comm.is_root();
         let restart = arguments.restart.then(|| Checkpoint::read(comm, &folder));
         let restart = restart.transpose()?.flatten();
         let made = restart.as_ref().and_then(|checkpoint| checkpoint.header.adapted.clone());
@@ -251,17 +262,9 @@ impl<'a> Task<'a> {
         agree(comm, check_factors(session, &problem).map_err(asked))?;
         let lock = if comm.is_root() { output::lock(&folder) } else { Ok(None) };
         let lock = agree(comm, lock.map_err(Failure::input))?;
-        if let (true, [(step, _), ..]) = (begins, &output::checkpoints(&folder, 0)[..]) {
-            tell(
-                "warning",
-                &format!(
-                    "{} holds a checkpoint of step {step}, which goes with the other results of that \
-                     run; `--restart` would go on from it",
-                    folder.display()
-                ),
-            );
+        if !arguments.restart && comm.is_root() {
+            warn_of_checkpoint(&folder);
         }
-
         // The bounds of a node follow each other.
         let contact_nodes = problem.constraints.bounds.chunk_by(|a, b| a.node == b.node);
         Ok(Self {

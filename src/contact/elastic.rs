@@ -78,7 +78,7 @@ impl<'s> ElasticSolver<'s> {
                 LinearSolver::with(self.session, factor, system.matrix.owned())?
             }
         };
-        solver.factor().condense(bounds.iter().map(|bound| bound.dof));
+        solver.factor().condense(system.matrix, bounds.iter().map(|bound| bound.dof))?;
         let solved = self.solver.insert(solver).solve_choosing(system, f, c, limit, choose)?;
         report.linear_iterations += solved.iterations;
         report.factorisations += solved.factorisations;

@@ -124,10 +124,7 @@ fn refined(
     accuracy: f64,
     seen: &mut dyn FnMut(&Adapted),
 ) -> Result<Adapted, AdaptError> {
-    let mut scene = scene.clone();
-    if let Some(grid) = &mut scene.time {
-        grid.stepping = Stepping::Uniform { steps: INSTANTS };
-    }
+    let mut scene = of_few_steps(scene);
     let order = if scene.order == Order::Quadratic { 2.0 } else { 1.0 };
     let mut refinement = Refinement::start(mesh);
     let mut stopped_before = None;
@@ -175,17 +172,24 @@ fn refined(
         if exhausted || (largest <= ENOUGH * accuracy && settled && coarse.is_empty()) {
             return Ok(adapted);
         }
-        let of_u = AIM * accuracy_of_u(accuracy, error, damage_error, settled);
-        let mut ratios = size_ratios(&shares, order, of_u);
+        let of_u = accuracy_of_u(accuracy, error, damage_error, settled);
+        let mut ratios = size_ratios(&shares, order, AIM * of_u);
         if damage_error.is_some() {
-            let shares = indicators.gathered(&outcome.damage_indicators);
-            let others = size_ratios(&shares, 2.0, INTERPOLATION * AIM * accuracy);
-            ratios.iter_mut().zip(others).for_each(|(ratio, other)| *ratio = ratio.min(other));
+            indicators.limit_by_damage(&outcome, accuracy, &mut ratios);
         }
         quarter(&refinement.mesh, &coarse, &mut ratios);
         stopped_before = outcome.stopped.map(|stop| stop.time);
         refinement = divided(refinement, &ratios)?;
     }
+}
+
+/// The scene of a pilot run.
+fn of_few_steps(scene: &Scene) -> Scene {
+    let mut scene = scene.clone();
+    if let Some(grid) = &mut scene.time {
+        grid.stepping = Stepping::Uniform { steps: INSTANTS };
+    }
+    scene
 }
 
 /// A damage, or a time, that is not exact enough asks for a u better than this one.
@@ -310,6 +314,13 @@ impl<'a> Indicators<'a> {
         self.energy = self.energy.max(error.energy);
         self.displacement = self.displacement.max(body.nodes.partition.max_norm(&state.u));
         Ok(())
+    }
+
+    /// Makes triangles as small as the damage at the end asks for. Collective.
+    fn limit_by_damage(&self, outcome: &Outcome, accuracy: f64, ratios: &mut [f64]) {
+        let shares = self.gathered(&outcome.damage_indicators);
+        let others = size_ratios(&shares, 2.0, INTERPOLATION * AIM * accuracy);
+        ratios.iter_mut().zip(others).for_each(|(ratio, other)| *ratio = ratio.min(other));
     }
 
     /// Values of this rank's triangles for all triangles of the undivided mesh. Collective.

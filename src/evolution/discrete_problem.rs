@@ -1,21 +1,21 @@
 //! The discrete problem: a scene bound to its mesh, all that does not change from step to step.
 
 use super::{
-    Loads, RunError, State, Supports, agreed,
+    Loads, RunError, SetupError, State, Supports, agreed,
     boundary_conditions::BoundaryConditions,
     notes,
     probe::{OBSERVED, Probes},
 };
 use crate::{
-    contact::{Bound, Certificate, ConstraintError, Constraints, DrivenMotion, RigidMotions},
+    contact::{Bound, Certificate, Constraints, RigidMotions},
     fem::{Body, Elasticity, Mass, Subdomain},
     mesh::{Mesh, Order},
     model::DamageLaw,
     petsc::{PetscError, Session},
-    scene::{Scene, SceneError, rounded},
+    scene::Scene,
 };
 use nalgebra::DVector;
-use std::{collections::BTreeMap, path::PathBuf};
+use std::collections::BTreeMap;
 
 /// A scene on its mesh, ready to be stepped.
 #[derive(Debug)]
@@ -67,45 +67,6 @@ pub(super) struct LoadCase {
 const SAMPLES: usize = 9;
 /// A load below this part of the largest is rounding.
 const UNLOADED: f64 = 1e-14;
-
-/// The scene and its mesh do not make a problem: bad input.
-#[derive(Debug, thiserror::Error)]
-pub enum SetupError {
-    /// The scene does not fit the mesh.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// Displacement conditions contradict each other.
-    #[error("{scene}: {source}")]
-    Constraint {
-        /// The scene file.
-        scene: PathBuf,
-        /// What contradicts what.
-        source: ConstraintError,
-    },
-    /// A load, a prescribed displacement or a gap is not finite, and this rank cannot tell where.
-    #[error(
-        "{scene}: a traction, the body force, a prescribed displacement or a gap is not finite or too \
-         large at t = {}; check its expression for divisions by zero, roots and logarithms \
-         of negative numbers",
-        rounded(*time)
-    )]
-    NotFinite {
-        /// The scene file.
-        scene: PathBuf,
-        /// The time, s.
-        time: f64,
-    },
-    /// The load drives a rigid motion.
-    #[error("{scene}: at t = {}, {source}", rounded(*time))]
-    Driven {
-        /// The scene file.
-        scene: PathBuf,
-        /// The first such time, s.
-        time: f64,
-        /// The motion.
-        source: DrivenMotion,
-    },
-}
 
 impl DiscreteProblem {
     /// Binds `scene` to `mesh` and checks that there is a solution at all times.

@@ -15,8 +15,8 @@
 //! and as strains at the same stress go like 1/ζ, φ* = φ((ζ/z)² |ε*|², z).
 
 use super::{
-    DiscreteProblem, Outcome, Phases, RunError, State, Step, both_orders::BothOrders,
-    bubbles::Bubbles, contact_step::Compliance, damage_step::DamageStep,
+    DiscreteProblem, Outcome, Phases, RunError, State, both_orders::BothOrders, bubbles::Bubbles,
+    contact_step::Compliance, damage_step::DamageStep, instants::Instants,
 };
 use crate::{
     fem::{
@@ -27,61 +27,7 @@ use crate::{
     petsc::PetscError,
 };
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
 use std::array;
-
-/// So many intervals of time at least and about twice as many at most, if there are so many steps; with
-/// three the error of a load that swings once was estimated at 0.6 of it.
-const INTERVALS: usize = 5;
-
-/// States of a run at a few times, evenly spread over its steps.
-#[derive(Serialize, Deserialize)]
-pub(super) struct Instants {
-    /// Every so many steps.
-    stride: usize,
-    states: Vec<State>,
-    /// t_n and min ζ_n of all steps.
-    falling: Vec<(f64, f64)>,
-}
-
-impl Instants {
-    pub(super) fn new() -> Self {
-        Self { stride: 1, states: Vec::new(), falling: Vec::new() }
-    }
-
-    /// Sees an accepted step.
-    pub(super) fn observe(&mut self, step: &Step) {
-        self.falling.push((step.state.time, step.record.zeta_min));
-        if !step.record.step.is_multiple_of(self.stride) {
-            return;
-        }
-        self.states.push(step.state.clone());
-        if self.states.len() > 2 * INTERVALS {
-            self.stride *= 2;
-            let mut index = 0..;
-            self.states.retain(|_| index.next().is_some_and(|i| i % 2 == 0));
-        }
-    }
-
-    /// The last state becomes the last of these.
-    fn end(&mut self, last: &State) {
-        if let [.., before, end] = &self.states[..]
-            && last.time - end.time < 0.5 * (end.time - before.time)
-        {
-            self.states.pop();
-        }
-        self.states.push(last.clone());
-    }
-
-    /// How long after `time` min ζ of the run falls to `level`, s; `None` where it does not.
-    fn delay(&self, time: f64, level: f64) -> Option<f64> {
-        let after = self.falling.iter().position(|(_, zeta)| *zeta <= level)?;
-        let (t, zeta) = self.falling[after];
-        let (t0, zeta0) = self.falling[after.saturating_sub(1)];
-        let part = if zeta0 > zeta { (zeta0 - level) / (zeta0 - zeta) } else { 1.0 };
-        Some(t0 + part * (t - t0) - time)
-    }
-}
 
 /// The estimated error that the mesh makes in the damage.
 pub(super) struct DamageError {

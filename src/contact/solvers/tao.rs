@@ -146,7 +146,7 @@ impl ContactSolver for Tao<'_> {
 
         // What an interior point method adds to the diagonal is in its operator alone.
         if self.kind != "bqpip" {
-            self.factor.condense(problem.bounds.iter().map(|bound| bound.dof));
+            self.factor.condense(&stiffness, problem.bounds.iter().map(|bound| bound.dof))?;
         }
         let mut report = ContactReport::default();
         let (mut reason, mut residuals) = (0, Kkt::default());
