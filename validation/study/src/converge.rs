@@ -84,7 +84,7 @@ pub struct Convergence {
     pub rows: Vec<ErrorRow>,
 }
 
-/// Runs all meshes coarser than that of `reference`, five at most, with the steps longer than its
+/// Runs all meshes coarser than that of `reference`, five at most, with steps not shorter than its
 /// own; `done` is told how many of how many runs are finished.
 ///
 /// # Errors
@@ -97,7 +97,7 @@ pub fn converge(
     let spec = &reference.spec;
     let steps = STEPS.map(|count| spec.end / count);
     let pairs = (0..spec.refinements.min(MESHES)).flat_map(|j| steps.map(|k| (j, k)));
-    let pairs: Vec<_> = pairs.filter(|(_, k)| *k > 1.001 * spec.step).collect();
+    let pairs: Vec<_> = pairs.filter(|(_, k)| *k > 0.999 * spec.step).collect();
     if pairs.is_empty() {
         let problem = "no mesh and step of the study is coarser than this reference";
         return Err(StudyError::Unsuitable(problem.to_owned()));

@@ -57,7 +57,7 @@ fn comparison(study: &Convergence, (name, measure, _): &Measure) -> String {
     let least = ratios.iter().copied().fold(f64::INFINITY, f64::min);
     let largest = ratios.iter().copied().fold(0.0, f64::max);
     format!(
-        "Table 1 of the paper (reference: n = 256, k = 1e-4); in brackets {name} over it\n{}\nratios {least:.2} to {largest:.2}, \
+        "Table 1 of the paper (its reference: n = 256, k = 1e-4); in brackets {name} over it\n{}\nratios {least:.2} to {largest:.2}, \
          {mean:.2} in the mean; order in h + k: the paper's {:.2}, ours {:.2}\n",
         table(study, "n", cells, cell),
         study.order(|row| row.printed),
