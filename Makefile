@@ -142,8 +142,11 @@ accuracy: build
 kills: build deps
 	$(PYTHON) validation/kills.py --binary $(BINARY) $(ARGS)
 
-# What is found stays in target/fuzz; the seeds are those of the tests. FUZZ_RUNS is per target.
-FUZZ_RUNS ?= 3400000
+# What is found stays in target/fuzz; the seeds are those of the tests. FUZZ_RUNS meshes and as many
+# expressions.
+FUZZ_RUNS ?= 4900000
+# A scene takes twenty milliseconds.
+FUZZ_SCENES ?= $(shell expr $(FUZZ_RUNS) / 25)
 fuzz: deps
 	@scripts/deps.sh g++
 	@cargo +nightly fuzz --version >/dev/null 2>&1 || \
@@ -151,14 +154,14 @@ fuzz: deps
 	    { echo 'make fuzz needs nightly Rust and cargo-fuzz, which cannot be installed here:' \
 	        'rustup toolchain install nightly; cargo install cargo-fuzz' >&2; exit 1; }
 	@set -e; for target in mesh scene expression; do \
-	    case $$target in \
+	    runs=$(FUZZ_RUNS); case $$target in \
 	        mesh) seeds=tests/fixtures/msh;; \
-	        scene) seeds=geo;; \
+	        scene) seeds=geo; runs=$(FUZZ_SCENES);; \
 	        expression) seeds=validation/fuzz/seeds/expression;; \
 	    esac; \
 	    mkdir -p target/fuzz/corpus/$$target; \
 	    cargo +nightly fuzz run --fuzz-dir validation/fuzz --target-dir target/fuzz -s none -O $$target \
-	        target/fuzz/corpus/$$target $$seeds -- -runs=$(FUZZ_RUNS) -dict=validation/fuzz/words.dict \
+	        target/fuzz/corpus/$$target $$seeds -- -runs=$$runs -dict=validation/fuzz/words.dict \
 	        -max_len=16384 -timeout=10 -rss_limit_mb=1024 -print_final_stats=1; \
 	done
 
