@@ -87,6 +87,11 @@ impl LinearSolver {
         &mut self.factor
     }
 
+    /// The factor alone.
+    pub fn into_factor(self) -> Factor {
+        self.factor
+    }
+
     /// Factorises the system; false if it is not positive definite.
     ///
     /// # Errors

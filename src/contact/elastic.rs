@@ -51,6 +51,11 @@ impl<'s> ElasticSolver<'s> {
         Ok(())
     }
 
+    /// The factor, if there is one.
+    pub(super) fn into_factor(self) -> Option<Factor> {
+        self.solver.map(LinearSolver::into_factor).or(self.loaded)
+    }
+
     fn new_factor(&self) -> Factor {
         // Half the digits are enough for a preconditioner, and half the bytes to read.
         Factor::new(self.session, "elastic_", Precision::Preconditioner)

@@ -16,6 +16,7 @@ pub use tao::TAO_TYPES;
 use super::{ContactError, ContactProblem};
 use crate::{
     archive::{Archive, ArchiveError},
+    cholesky::Factor,
     petsc::{Session, Vector},
 };
 use active_set::ActiveSet;
@@ -44,6 +45,11 @@ pub trait ContactSolver {
     /// The archive is of another solver.
     fn archive(&mut self, _archive: &mut Archive) -> Result<(), ArchiveError> {
         Ok(())
+    }
+
+    /// The factor of K, of an earlier ζ and another active set, if the method keeps one.
+    fn into_factor(self: Box<Self>) -> Option<Factor> {
+        None
     }
 
     /// Solves from the start `c` and leaves the solution there.

@@ -5,7 +5,7 @@ mod pivoting;
 use super::{ContactReport, ContactSolver, SolverEntry};
 use crate::{
     archive::{Archive, ArchiveError},
-    cholesky::{Choose, Condensed, LinearSystem},
+    cholesky::{Choose, Condensed, Factor, LinearSystem},
     contact::{Bound, ContactError, ContactProblem, Kkt, elastic::ElasticSolver},
     petsc::{PetscError, Session, Vector},
 };
@@ -114,6 +114,10 @@ impl ContactSolver for ActiveSet<'_> {
 
     fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
         self.elastic.archive(archive)
+    }
+
+    fn into_factor(self: Box<Self>) -> Option<Factor> {
+        self.elastic.into_factor()
     }
 
     fn solve(

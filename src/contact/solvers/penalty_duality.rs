@@ -4,7 +4,7 @@
 use super::{Anderson, ContactReport, ContactSolver, SolverEntry, between_0_and_1, number};
 use crate::{
     archive::{Archive, ArchiveError},
-    cholesky::LinearSystem,
+    cholesky::{Factor, LinearSystem},
     contact::{Bound, ContactError, ContactProblem, Kkt, elastic::ElasticSolver},
     petsc::{Session, Vector},
 };
@@ -203,6 +203,10 @@ impl ContactSolver for PenaltyDuality<'_> {
     fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
         archive.value(&mut self.omega)?;
         self.elastic.archive(archive)
+    }
+
+    fn into_factor(self: Box<Self>) -> Option<Factor> {
+        self.elastic.into_factor()
     }
 
     fn solve(

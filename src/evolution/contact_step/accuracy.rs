@@ -2,7 +2,7 @@
 
 use super::{ContactStep, active_bounds, displacement};
 use crate::{
-    cholesky::{LinearSolver, LinearSystem, Precision},
+    cholesky::{Factor, LinearSolver, LinearSystem, Precision},
     contact::ContactPoint,
     evolution::{DiscreteProblem, Outcome, State, Step},
     fem::{RigidPart, Stiffness},
@@ -87,22 +87,23 @@ pub(in crate::evolution) struct Compliance<'a> {
 }
 
 impl<'a> ContactStep<'a> {
-    /// With a factor of its own in the place of the solver's.
+    /// With the solver's factor, or one of its own.
     ///
     /// # Errors
     /// There is no memory for it.
     pub(in crate::evolution) fn into_compliance(self) -> Result<Compliance<'a>, PetscError> {
-        let Self { session, problem, stiffness, load, c, .. } = self;
-        let owned = load.owned();
-        let solver = LinearSolver::new(session, "elastic_", owned, Precision::Full)?;
+        let Self { session, problem, stiffness, solver, load, c, .. } = self;
+        let own = || Factor::new(session, "elastic_", Precision::Preconditioner);
+        let factor = solver.into_factor().unwrap_or_else(own);
+        let solver = LinearSolver::with(session, factor, load.owned())?;
         Ok(Compliance { problem, stiffness, active: Vec::new(), solver, rhs: load, answer: c })
     }
 }
 
 impl Compliance<'_> {
     /// Estimates the errors of the last answer of a run, and of the one with the largest stationarity
-    /// residual before it, relative to the largest displacement. Costs a factorisation; a second one if
-    /// the first error, enlarged by the ratio of the two residuals, comes near to what is promised.
+    /// residual before it, relative to the largest displacement; that only if the first error, enlarged by
+    /// the ratio of the two residuals, comes near to what is promised. The kept factor mostly serves.
     ///
     /// # Errors
     /// PETSc failed.
@@ -191,6 +192,8 @@ impl Compliance<'_> {
         rhs.set(&forces[..rhs.owned()])?;
         answer.write(|u| u.fill(0.0))?;
         let comm = problem.body.nodes.partition.comm();
+        let bounds = problem.constraints.bounds.iter().map(|bound| bound.dof);
+        solver.factor().condense(&stiffness.matrix, bounds)?;
         let system = LinearSystem {
             prescribed: comm.any(!active.is_empty()).then_some(&active[..]),
             scale: stiffness.scale,
