@@ -33,7 +33,7 @@ const PETSC: &str = "\
 /// Everything the `cholesky` module calls.
 const CHOLMOD: &str = "\
     cholmod_l_start|cholmod_l_finish|cholmod_l_analyze|cholmod_l_analyze_p|cholmod_l_factorize|\
-    cholmod_l_change_factor|cholmod_l_free_factor";
+    cholmod_l_change_factor|cholmod_l_free_factor|cholmod_l_realloc";
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");

@@ -69,16 +69,18 @@ impl Cholesky {
     /// # Errors
     /// There is no memory for it.
     pub fn factorise(&mut self, a: &mut LowerTriangle) -> Result<Option<DMatrix<f64>>, PetscError> {
+        self.solver.clear();
         if !self.factor.factorise(a)? {
             return Ok(None);
         }
-        self.solver.set_values(self.factor.values());
+        let block = self.interface_block();
+        self.solver.take_values(&mut self.factor);
         if self.precision == Precision::Preconditioner && !self.is_accurate_enough(a) {
             self.precision = Precision::Full;
             self.solver = Box::new(Supernodal::<f64>::new(&self.factor, self.interior));
-            self.solver.set_values(self.factor.values());
+            self.factor.factorise(a)?;
+            self.solver.take_values(&mut self.factor);
         }
-        let block = self.interface_block();
         self.factor.free_values()?;
         Ok(Some(block))
     }

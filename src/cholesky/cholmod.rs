@@ -3,13 +3,18 @@
 
 use super::{LowerTriangle, raw};
 use crate::petsc::PetscError;
-use std::{ffi::c_void, ops::Range, ptr, slice};
+use std::{ffi::c_void, mem::take, ops::Range, ptr, slice};
 
 /// A `cholmod_factor` P A Pᵀ = L Lᵀ with the `cholmod_common` it was made with.
 pub(super) struct Cholmod {
     common: Box<raw::cholmod_common>,
     factor: *mut raw::cholmod_factor,
+    /// The number of values of L in memory, the first ones.
+    held: usize,
 }
+
+/// Values are freed by so many at a time, 32 MB.
+const FREED: usize = 1 << 22;
 
 impl Cholmod {
     /// Orders and analyses `a`: in the `order` given, else by CHOLMOD's choice
@@ -18,7 +23,7 @@ impl Cholmod {
         a: &mut LowerTriangle,
         order: Option<Vec<i64>>,
     ) -> Result<Self, PetscError> {
-        let mut this = Self { common: Box::default(), factor: ptr::null_mut() };
+        let mut this = Self { common: Box::default(), factor: ptr::null_mut(), held: 0 };
         let (common, mut view) = (&mut *this.common, a.view());
         // SAFETY: `common` stays where it is; the view describes arrays that live during the call,
         // and `order` has as many entries as there are rows.
@@ -49,15 +54,35 @@ impl Cholmod {
             unsafe { raw::cholmod_l_factorize(&mut view, self.factor, &mut *self.common) != 0 };
         self.check(done)?;
         // SAFETY: a live factor.
-        Ok(unsafe { (*self.factor).minor == (*self.factor).n })
+        unsafe {
+            self.held = (*self.factor).xsize;
+            Ok((*self.factor).minor == (*self.factor).n)
+        }
+    }
+
+    /// Frees the values of L but for about the first `length` (cholmod_l_realloc).
+    pub(super) fn truncate_values(&mut self, length: usize) {
+        if self.held >= length + FREED {
+            // SAFETY: a live factor with so many values in its block of memory.
+            unsafe {
+                let (l, size) = (&mut *self.factor, size_of::<f64>());
+                l.x = raw::cholmod_l_realloc(length, size, l.x, &mut self.held, &mut *self.common);
+            }
+        }
     }
 
     /// Frees the values of L and keeps the analysis (cholmod_l_change_factor).
     pub(super) fn free_values(&mut self) -> Result<(), PetscError> {
         let (pattern, common) = (raw::CHOLMOD_PATTERN as i32, &mut *self.common);
-        // SAFETY: live handles.
-        let done =
-            unsafe { raw::cholmod_l_change_factor(pattern, 1, 1, 1, 1, self.factor, common) != 0 };
+        // SAFETY: live handles; CHOLMOD is told how many values there are, then again how many
+        // there will be.
+        let done = unsafe {
+            let size = (*self.factor).xsize;
+            (*self.factor).xsize = take(&mut self.held);
+            let done = raw::cholmod_l_change_factor(pattern, 1, 1, 1, 1, self.factor, common) != 0;
+            (*self.factor).xsize = size;
+            done
+        };
         self.check(done)
     }
 
@@ -84,13 +109,13 @@ impl Cholmod {
             .map(move |((columns, rows), value)| (range(columns), &s[range(rows)], *value as usize))
     }
 
-    /// The values of L: of each supernode its dense columns from the diagonal block down; none before a
-    /// factorisation.
+    /// The values of L that are in memory: of each supernode its dense columns from the diagonal block
+    /// down.
     pub(super) fn values(&self) -> &[f64] {
-        // SAFETY: the array x of a factor is null or has `xsize` values.
+        // SAFETY: the array x of a factor is null or has `held` values.
         unsafe {
-            let l = &*self.factor;
-            if l.x.is_null() { &[] } else { slice::from_raw_parts(l.x.cast::<f64>(), l.xsize) }
+            let x = (*self.factor).x.cast::<f64>();
+            if x.is_null() { &[] } else { slice::from_raw_parts(x, self.held) }
         }
     }
 

@@ -265,9 +265,10 @@ impl Factor {
     /// Sizes differ, or nothing was factorised.
     pub fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
         self.applications += 1;
+        let fits = self.exists() && r.owned() == z.owned();
         match &mut self.method {
             Some((_, Method::Petsc(preconditioner))) => preconditioner.apply(r, z),
-            Some((_, Method::Substructure { factor, .. })) if r.owned() == z.owned() => {
+            Some((_, Method::Substructure { factor, .. })) if fits => {
                 r.read(|r| z.write(|z| factor.apply(r, z)))?
             }
             _ => Err(PetscError::ours("a factor is applied that was not made for such vectors")),

@@ -20,9 +20,13 @@ use std::mem::take;
 /// Solves with the first rows and columns of a factor, and forms what they leave of the others: see
 /// [`Cholesky::solve`](super::Cholesky::solve).
 pub(super) trait TriangularSolver {
-    /// Copies the values of L₁₁ and L₂₁: of each supernode its columns from the diagonal block down,
-    /// whatever stands above the diagonal.
-    fn set_values(&mut self, values: &[f64]);
+    /// Frees its values: there is nothing to solve with until others are taken.
+    fn clear(&mut self);
+
+    /// Takes the values of L₁₁ and L₂₁, of each supernode its columns from the diagonal block down,
+    /// whatever stands above the diagonal, and frees those of the factor meanwhile: two copies of L
+    /// would be most of the memory of a run.
+    fn take_values(&mut self, factor: &mut Cholmod);
 
     /// L₁₁ y₁ = (P b)₁, y₂ = (P b)₂ − L₂₁ y₁; `interface` replaces y₂ by (P x)₂;
     /// L₁₁ᵀ (P x)₁ = y₁ − L₂₁ᵀ (P x)₂.
@@ -85,7 +89,7 @@ pub(super) struct Supernodal<T> {
 }
 
 impl<T: Number> Supernodal<T> {
-    /// The first `interior` columns of an analysed factor, still with L₁₁ = 1, L₂₁ = 0.
+    /// The first `interior` columns of an analysed factor, still without values.
     pub(super) fn new(factor: &Cholmod, interior: usize) -> Self {
         let (mut supernodes, mut below) = (Vec::new(), Vec::new());
         for (columns, rows, _) in factor.supernodes() {
@@ -97,12 +101,11 @@ impl<T: Number> Supernodal<T> {
             }
         }
         let panels = supernodes.iter().map(Supernode::panels).sum();
-        let tiles = supernodes.iter().map(Supernode::tiles).sum();
         let front = supernodes.iter().map(Supernode::front_height).max().unwrap_or(0);
         Self {
             order: factor.order().iter().map(|&row| row as u32).collect(),
             diagonal: vec![DiagonalBlock::identity(); panels],
-            tiles: vec![[[T::zero(); TILE_HEIGHT]; PANEL_WIDTH]; tiles],
+            tiles: Vec::new(),
             y: vec![T::zero(); factor.order().len()],
             scale: 0.0,
             front: vec![[T::zero(); TILE_HEIGHT]; front],
@@ -190,16 +193,28 @@ impl<T: Number> Supernodal<T> {
 }
 
 impl<T: Number> TriangularSolver for Supernodal<T> {
-    fn set_values(&mut self, mut values: &[f64]) {
+    fn clear(&mut self) {
+        self.tiles = Vec::new();
+    }
+
+    fn take_values(&mut self, factor: &mut Cholmod) {
+        let count = self.supernodes.iter().map(Supernode::tiles).sum();
+        self.tiles = vec![[[T::zero(); TILE_HEIGHT]; PANEL_WIDTH]; count];
         let (mut diagonal, mut tiles) = (&mut self.diagonal[..], &mut self.tiles[..]);
-        for s in &self.supernodes {
-            let height = s.columns + s.below;
-            let (panels, others) = take(&mut diagonal).split_at_mut(s.panels());
+        let starts: Vec<usize> = factor.supernodes().map(|(.., start)| start).collect();
+        // From the last one, so that those taken stand at the end and can be freed.
+        for (s, start) in self.supernodes.iter().zip(starts).rev() {
+            let (others, panels) = split_back(diagonal, s.panels());
             diagonal = others;
+            let (others, mut own_tiles) = split_back(tiles, s.tiles());
+            tiles = others;
+            let height = s.columns + s.below;
+            let values = &factor.values()[start..start + s.columns * height];
             for (k, panel) in panels.iter_mut().enumerate() {
                 let first_tile = Supernode::first_tile(k);
-                let (below, others) = take(&mut tiles).split_at_mut(s.front_height() - first_tile);
-                tiles = others;
+                let (below, others) =
+                    take(&mut own_tiles).split_at_mut(s.front_height() - first_tile);
+                own_tiles = others;
                 let end = s.columns.min(PANEL_WIDTH * (k + 1));
                 for j in PANEL_WIDTH * k..end {
                     let column = &values[j * height..(j + 1) * height];
@@ -210,7 +225,7 @@ impl<T: Number> TriangularSolver for Supernodal<T> {
                     }
                 }
             }
-            values = &values[s.columns * height..];
+            factor.truncate_values(start);
         }
     }
 
@@ -230,4 +245,9 @@ impl<T: Number> TriangularSolver for Supernodal<T> {
     fn bytes(&self) -> f64 {
         2.0 * (size_of_val(&self.tiles[..]) + size_of_val(&self.diagonal[..])) as f64
     }
+}
+
+/// The last `count` entries, behind the others.
+fn split_back<U>(entries: &mut [U], count: usize) -> (&mut [U], &mut [U]) {
+    entries.split_at_mut(entries.len() - count)
 }
