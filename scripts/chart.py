@@ -2,7 +2,8 @@
 
 Reads FOLDER/<scene>/chart.csv as validation/chart.py writes them and draws FOLDER/chart.png, a panel
 per scene. Prints the Pareto front of each scene (the runs to which no other is both faster and more
-accurate, among runs without FEniCSx) and how many times the seconds of `--accuracy` the paper's method takes for some errors.
+accurate, among runs without FEniCSx) and how many times the seconds of `--accuracy` the paper's method
+takes for some errors.
 """
 
 import sys
