@@ -1,12 +1,10 @@
 //! `signorini keys`: the reference of all keys of a scene, in Markdown or as a JSON schema.
 
 use super::Failure;
-use signorini::output::terminal::say;
+use signorini::{output::terminal::say, scene::SCHEMA};
 
 /// Made of the schema by scripts/keys.py.
 const PAGE: &str = include_str!("../../geo/KEYS.md");
-/// The tests hold it against the reader of scenes.
-const SCHEMA: &str = include_str!("../../geo/scene.schema.json");
 
 /// `signorini keys [--schema]`.
 pub fn keys(as_schema: bool) -> Result<(), Failure> {

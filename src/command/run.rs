@@ -244,7 +244,8 @@ impl<'a> Task<'a> {
         let (mut scene, mesh) = agree(comm, of_root.map_or_else(load, Ok))?;
         let solver = scene.contact.solver.clone().unwrap_or(SOLVERS[0].to_owned());
         let folder = arguments.folder(&scene);
-        let (as_run, tables) = scene.as_run().map_err(Failure::input)?;
+        let (as_run, tables) = scene.as_run();
+        let tables = tables.to_vec();
         agree(comm, check_mesh_is_kept(&scene, &folder))?;
         let restart = arguments.restart.then(|| Checkpoint::read(comm, &folder));
         let restart = restart.transpose()?.flatten();

@@ -20,10 +20,7 @@ use crate::{
     petsc::{Session, Vector},
 };
 use active_set::ActiveSet;
-use serde::{
-    Deserialize, Deserializer,
-    de::{Error, Unexpected},
-};
+use serde::Deserialize;
 
 /// A method for the contact problem.
 pub trait ContactSolver {
@@ -133,13 +130,11 @@ pub struct SolverError {
 
 /// `[contact]` of a scene: how the contact problem is solved.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields, expecting = "a table")]
+#[serde(default, deny_unknown_fields)]
 pub struct ContactOptions {
     /// The solver's name, if the scene asks for one.
-    #[serde(deserialize_with = "known_solver")]
     pub solver: Option<String>,
     /// Relative tolerance of the KKT residuals, in (0, 1).
-    #[serde(deserialize_with = "between_0_and_1")]
     pub tolerance: f64,
     /// Whether another solver may answer where the one asked for stops short.
     pub rescue: bool,
@@ -152,30 +147,6 @@ impl Default for ContactOptions {
         let penalty_duality = PenaltyOptions::default();
         Self { solver: None, tolerance: 1e-10, rescue: true, penalty_duality }
     }
-}
-
-fn known_solver<'de, D: Deserializer<'de>>(value: D) -> Result<Option<String>, D::Error> {
-    let name = String::deserialize(value)?;
-    if find(&name).is_err() {
-        let found = format!("\"{name}\"{}; there are {}", alike(&name), listing());
-        return Err(D::Error::invalid_value(Unexpected::Other(&found), &"a contact solver"));
-    }
-    Ok(Some(name))
-}
-
-fn between_0_and_1<'de, D: Deserializer<'de>>(value: D) -> Result<f64, D::Error> {
-    number(value, "between 0 and 1, both excluded", |value| 0.0 < value && value < 1.0)
-}
-
-/// A number for which `holds`; `rule` says so in words.
-fn number<'de, D: Deserializer<'de>>(
-    value: D,
-    rule: &str,
-    holds: fn(f64) -> bool,
-) -> Result<f64, D::Error> {
-    let value = f64::deserialize(value)?;
-    let wrong = || D::Error::invalid_value(Unexpected::Float(value), &rule);
-    holds(value).then_some(value).ok_or_else(wrong)
 }
 
 /// The solver called `name`, and its variant: empty, or what stands behind a colon.

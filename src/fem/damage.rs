@@ -8,9 +8,11 @@ use crate::{
     petsc::{Matrix, PetscError, Session, Vector},
 };
 use nalgebra::{Matrix3, Vector3};
+use serde::Deserialize;
 
 /// How (28) integrates products with a test function λ_i: the mass M and the source load b.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Mass {
     /// Exactly, as in the paper.
     #[default]

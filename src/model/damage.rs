@@ -1,7 +1,9 @@
 //! The damage source φ of the paper's section 4 with its truncations q* and η_*.
 
+use serde::Deserialize;
+
 /// Frémond's damage law: the source φ and the constants of equation (3).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub struct DamageLaw {
     /// Damage diffusion κ > 0, m²/s.
     pub diffusion: f64,

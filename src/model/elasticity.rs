@@ -1,9 +1,11 @@
 //! Plane linear elasticity, the tensor A of the paper's section 4.
 
 use nalgebra::{Matrix3, Vector3};
+use serde::Deserialize;
 
 /// Which plane reduction of three-dimensional elasticity holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Plane {
     /// σ_zz = 0: a thin sheet (the paper's choice).
     Stress,
@@ -12,7 +14,7 @@ pub enum Plane {
 }
 
 /// An isotropic linear elastic material in the plane.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub struct Material {
     /// Young's modulus E > 0, Pa.
     pub young: f64,

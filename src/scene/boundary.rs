@@ -1,9 +1,9 @@
 //! The conditions on the parts of the boundary, and which of them exclude each other.
 
-use std::array;
-
 use super::expression::Expression;
-use super::reader::{Reading, Table, Value};
+use super::schema::Fault;
+use serde::Deserialize;
+use std::array;
 
 /// A physical curve and what holds on it.
 #[derive(Debug, Clone)]
@@ -105,74 +105,72 @@ pub(super) fn contradiction(a: &[Condition], b: &[Condition]) -> Option<[&'stati
     pairs.find_map(|(a, b)| one_way(a, b).or_else(|| one_way(b, a).map(|[b, a]| [a, b])))
 }
 
-/// The key of something on a boundary, as it is written in messages.
-pub(super) fn boundary_key(name: &str, key: &str) -> String {
-    format!("boundary \"{name}\": {key}")
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct BoundaryKeys {
+    name: String,
+    displacement: Option<[Component; 2]>,
+    symmetry: bool,
+    gap: Option<Expression>,
+    normal: Option<[Expression; 2]>,
+    traction: Option<[Expression; 2]>,
+    pressure: Option<Expression>,
 }
 
-pub(super) fn boundaries(list: &Value) -> Reading<Vec<Boundary>> {
-    let boundaries = list.named_tables("boundary", boundary)?;
-    match boundaries.is_empty() {
-        true => Err(list.refuse("must hold at least one boundary")),
-        false => Ok(boundaries),
+/// A component of a prescribed displacement.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Component {
+    Free(Free),
+    Given(Expression),
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Free {
+    Free,
+}
+
+pub(super) fn boundary(keys: BoundaryKeys) -> Result<Boundary, Fault> {
+    let BoundaryKeys { name, displacement, symmetry, gap, normal, traction, pressure } = keys;
+    let given = |component| match component {
+        Component::Free(Free::Free) => None,
+        Component::Given(expression) => Some(expression),
+    };
+    let displacement = displacement.map(|components| components.map(given));
+    if let Some([None, None]) = displacement {
+        let problem = "is \"free\" in both components; leave it out".to_owned();
+        return Err(("displacement", problem));
     }
-}
-
-fn boundary(table: &mut Table) -> Reading<Boundary> {
-    let name = table.get("name").read();
-    let displacement = table.get("displacement").optional(displacement);
-    let symmetry = table.get("symmetry").optional(Value::read);
-    let gap = table.get("gap").optional(Value::expression);
-    let direction = table.get("normal");
-    let normal = direction.optional(normal);
-    let traction = table.get("traction").optional(|value| value.pair(Value::expression));
-    let pressure = table.get("pressure").optional(Value::expression);
-
-    let (gap, normal) = (gap?, normal?);
     if normal.is_some() && gap.is_none() {
-        return Err(direction.refuse("needs a gap beside it"));
+        return Err(("normal", "needs a gap beside it".to_owned()));
     }
+    let normal = normal.map(unit_vector).transpose()?;
     let conditions = [
-        displacement?.map(Condition::Displacement),
-        symmetry?.unwrap_or(false).then_some(Condition::Symmetry),
+        displacement.map(Condition::Displacement),
+        symmetry.then_some(Condition::Symmetry),
         gap.map(|distance| Condition::Gap(Gap { distance, normal })),
-        traction?.map(|f| Condition::Load(SurfaceLoad::Traction(f))),
-        pressure?.map(|p| Condition::Load(SurfaceLoad::Pressure(p))),
+        traction.map(|f| Condition::Load(SurfaceLoad::Traction(f))),
+        pressure.map(|p| Condition::Load(SurfaceLoad::Pressure(p))),
     ];
     let conditions: Vec<_> = conditions.into_iter().flatten().collect();
     if let Some([one, other]) = contradiction(&conditions, &conditions) {
-        let problem = format!("has {one} and {other}; only one of them can hold");
-        return Err(table.value.refuse(problem));
+        return Err(("", format!("has {one} and {other}; only one of them can hold")));
     }
     if conditions.is_empty() {
         let problem = "has nothing in it: give it a displacement, symmetry = true, a traction, a \
                        pressure or a gap, or remove it";
-        return Err(table.value.refuse(problem));
+        return Err(("", problem.to_owned()));
     }
-    Ok(Boundary { name: name?, conditions })
-}
-
-/// `displacement = [u_x, u_y]`: the expression of each component, `None` for one that is "free".
-fn displacement(value: &Value) -> Reading<[Option<Expression>; 2]> {
-    let components = value.pair(|component| match component.required()?.as_str() {
-        Some(text) if text.trim() == "free" => Ok(None),
-        _ => component.expression().map(Some),
-    })?;
-    match components {
-        [None, None] => Err(value.refuse("is \"free\" in both components; leave it out")),
-        components => Ok(components),
-    }
+    Ok(Boundary { name, conditions })
 }
 
 /// A constant direction, scaled to length 1.
-fn normal(value: &Value) -> Reading<[f64; 2]> {
-    let [x, y] = value.pair(|component| {
-        let constant = component.expression()?.as_constant();
-        constant.ok_or_else(|| component.refuse("must be a constant"))
-    })?;
+fn unit_vector(direction: [Expression; 2]) -> Result<[f64; 2], Fault> {
+    let [x, y] = direction.map(|component| component.eval(0.0, 0.0, 0.0));
     let length = x.hypot(y);
     match length > 0.0 && length.is_finite() {
         true => Ok([x / length, y / length]),
-        false => Err(value.refuse("has no direction: its length is zero")),
+        false => Err(("normal", "has no direction: its length is zero".to_owned())),
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::boundary::{Boundary, Condition, SurfaceLoad, boundary_key, contradiction};
+use super::boundary::{Boundary, Condition, SurfaceLoad, contradiction};
 use super::document::{NOWHERE, Problem};
 use super::error::{SceneError, suggestion};
 use super::expression::Expression;
@@ -61,7 +61,7 @@ impl Scene {
     /// These, with their lines.
     pub fn check_probes(&self, outside: &[&Probe]) -> Result<(), SceneError> {
         let problem = |probe: &&Probe| {
-            let (key, [x, y]) = (format!("probe \"{}\": point", probe.name), probe.point);
+            let (key, [x, y]) = (format!("probe.{}.point", probe.name), probe.point);
             self.at_key(&key, &format!("({x}, {y}) lies outside the body; move it into the body"))
         };
         self.text.verdict(outside.iter().map(problem).collect())
@@ -254,4 +254,9 @@ impl Scene {
         let place = self.text.place(&boundary_key(name, "name"));
         (place, format!("boundary \"{name}\" {problem}"))
     }
+}
+
+/// A key of a boundary, in full.
+fn boundary_key(name: &str, key: &str) -> String {
+    format!("boundary.{name}.{key}")
 }

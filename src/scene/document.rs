@@ -16,6 +16,15 @@ use super::error::{MOST_SHOWN, SceneError, suggestion};
 /// Where something is wrong, and what.
 pub(super) type Problem = (Range<usize>, String);
 
+/// The key of what is called `name` in the table at `key`, "" of the table itself.
+pub(super) fn below(key: &str, name: &str) -> String {
+    match (key, name) {
+        (key, "") => key.to_owned(),
+        ("", name) => name.to_owned(),
+        _ => format!("{key}.{name}"),
+    }
+}
+
 /// The place of what concerns the file as a whole.
 pub(super) const NOWHERE: Range<usize> = Range { start: 1, end: 0 };
 
@@ -34,6 +43,9 @@ pub(super) struct SceneText {
     stride: usize,
     /// Where the values that have been read are written, by their keys in full.
     pub(super) places: BTreeMap<String, Range<usize>>,
+    /// The values, and what the files of tables hold: as [`Self::values`] gives them.
+    pub(super) document: toml::Table,
+    pub(super) tables: Vec<u8>,
 }
 
 impl SceneText {
@@ -53,7 +65,13 @@ impl SceneText {
             arguments: sets.iter().enumerate().map(indented).collect(),
             stride,
             places: BTreeMap::new(),
+            document: toml::Table::new(),
+            tables: Vec::new(),
         }
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.path
     }
 
     /// Where relative paths begin.
@@ -109,11 +127,16 @@ impl SceneText {
         self.places.get(key).cloned().unwrap_or(NOWHERE)
     }
 
-    /// The scene with the `--set` arguments put in, as TOML; comments are lost.
-    pub(super) fn merged(&self) -> Result<toml::Table, SceneError> {
-        let root = Spanned::new(NOWHERE, DeValue::Table(self.parse()?));
-        toml::Table::deserialize(root.into_deserializer())
-            .map_err(|error| SceneError::Refused(vec![error.message().to_owned()]))
+    /// The values of a document with full paths of tables, and what these files hold; nothing where one
+    /// is out of the range of its type.
+    pub(super) fn values(&self, root: &DeValue) -> (toml::Table, Vec<u8>) {
+        let root = Spanned::new(NOWHERE, root.clone()).into_deserializer();
+        let mut document = toml::Table::deserialize(root).unwrap_or_default();
+        let mut tables = Vec::new();
+        for (_, value) in document.iter_mut() {
+            complete_paths(value, self.folder(), &mut tables);
+        }
+        (document, tables)
     }
 
     /// Parses the file and puts the `--set` arguments in, in their order.

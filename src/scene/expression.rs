@@ -4,6 +4,7 @@ mod parser;
 mod table;
 
 use parser::Parser;
+use serde::Deserialize;
 use std::{ops::Range, path::Path, sync::Arc};
 use table::Table;
 
@@ -30,13 +31,33 @@ const LOOKS: usize = 1000;
 /// assert!(load.depends_on_time() && load.as_constant().is_none());
 /// # Ok::<(), signorini::scene::ExpressionError>(())
 /// ```
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Deserialize)]
+#[serde(try_from = "Written")]
 pub struct Expression {
     /// In postfix order: a number or variable is put on a stack, a function or operator takes its
     /// arguments from there and puts its value in their place.
     program: Vec<Instruction>,
     /// The most values that are on the stack at a time.
     height: usize,
+}
+
+/// An expression as it stands in a scene.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Written {
+    Number(f64),
+    Text(String),
+}
+
+impl TryFrom<Written> for Expression {
+    type Error = ExpressionError;
+
+    fn try_from(written: Written) -> Result<Self, ExpressionError> {
+        match written {
+            Written::Number(value) => Ok(Self::constant(value)),
+            Written::Text(text) => Self::parse(&text),
+        }
+    }
 }
 
 /// Why a text is no expression: what is wrong and what to write instead, as its predicate.

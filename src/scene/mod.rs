@@ -8,7 +8,7 @@ mod check;
 mod document;
 mod error;
 mod expression;
-mod reader;
+mod schema;
 mod tables;
 
 use std::collections::BTreeMap;
@@ -18,6 +18,7 @@ use std::path::{Path, PathBuf};
 pub use boundary::{Boundary, Condition, Gap, SurfaceLoad};
 pub use error::SceneError;
 pub use expression::{Expression, ExpressionError};
+pub use schema::SCHEMA;
 
 use crate::{
     contact::ContactOptions,
@@ -26,6 +27,9 @@ use crate::{
     model::{DamageLaw, Material},
 };
 use document::SceneText;
+use schema::Findings;
+use serde::Deserialize;
+use toml::de::DeValue;
 
 /// A problem to solve, as described by a scene file.
 #[derive(Debug, Clone)]
@@ -120,7 +124,8 @@ pub struct TimeGrid {
 }
 
 /// How a time step is made.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Scheme {
     /// Euler's backward differences with the source at the old time, as in (25): of first order.
     #[default]
@@ -169,7 +174,8 @@ pub fn rounded(t: f64) -> f64 {
 pub const AS_RUN: &str = "# As run by signorini; the results stand beside it.";
 
 /// A point of the body at which every step is observed.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Probe {
     /// The first part of its columns' names.
     pub name: String,
@@ -178,18 +184,13 @@ pub struct Probe {
 }
 
 /// What is written while the scene runs.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct OutputOptions {
     /// Fields are written every so many steps, at least 1.
     pub every: Option<usize>,
     /// A checkpoint is written every so many seconds; none if 0.
     pub checkpoint: f64,
-}
-
-impl Default for OutputOptions {
-    fn default() -> Self {
-        Self { every: None, checkpoint: 60.0 }
-    }
 }
 
 /// Names of the units that a scene is written in. They label results; nothing is converted.
@@ -261,11 +262,8 @@ impl Scene {
     /// The scene as it is run, as the text of a file that runs from anywhere: the `--set` arguments are
     /// put in, the mesh is the one in use, paths of files are full. Also what the files of its tables
     /// hold.
-    ///
-    /// # Errors
-    /// None, if the scene has been read.
-    pub fn as_run(&self) -> Result<(String, Vec<u8>), SceneError> {
-        let mut scene = self.text.merged()?;
+    pub fn as_run(&self) -> (String, &[u8]) {
+        let mut scene = self.text.document.clone();
         scene.insert("title".into(), self.title.clone().into());
         let file = std::path::absolute(&self.mesh.file).unwrap_or(self.mesh.file.clone());
         let mut mesh = toml::Table::new();
@@ -276,11 +274,7 @@ impl Scene {
             mesh.insert("parameters".into(), parameters.into());
         }
         scene.insert("mesh".into(), mesh.into());
-        let mut tables = Vec::new();
-        for (_, value) in scene.iter_mut() {
-            document::complete_paths(value, self.text.folder(), &mut tables);
-        }
-        Ok((format!("{AS_RUN}\n{scene}"), tables))
+        (format!("{AS_RUN}\n{scene}"), &self.text.tables)
     }
 
     /// Reads and checks the scene at `path`.
@@ -310,11 +304,16 @@ impl Scene {
     /// # Errors
     /// As [`Scene::read`], but for the reading itself.
     pub fn parse(text: &str, path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
-        let text = SceneText::new(path, text, overrides);
-        let root = text.parse()?;
-        let (mut scene, places) =
-            reader::read(&text, root, |table| tables::scene(table, path, &text))?;
-        scene.text.places = places;
-        Ok(scene)
+        let mut text = SceneText::new(path, text, overrides);
+        let root = DeValue::Table(text.parse()?);
+        let (document, tables) = text.values(&root);
+        let mut found = Findings::check(&text, &root, &document);
+        let scene = tables::scene(&mut found);
+        let Findings { problems, places, .. } = found;
+        text.verdict(problems)?;
+        (text.places, text.document, text.tables) = (places, document, tables);
+        // Nothing is missing, or there would be a problem.
+        let scene = scene.ok_or_else(|| SceneError::Refused(Vec::new()))?;
+        Ok(Self { text, ..scene })
     }
 }

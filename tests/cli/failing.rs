@@ -127,7 +127,7 @@ fn a_load_that_is_not_finite_between_the_times_checked_beforehand() {
                 .replace("traction = [\"0\", \"-3*t\"]", &format!("{key} = [\"0\", \"{value}\"]")),
         );
         let said = test_directory.say(&["run", "scene.toml", "--set", "time.step=1e-4"]);
-        let place = format!("scene.toml:29: boundary \"top\": {key}[1] is NaN at (");
+        let place = format!("scene.toml:29: boundary.top.{key}[1] is NaN at (");
         said.fails(1, &[&place, "t = 0.0014"]);
         assert!(said.out.contains("FAILED after t = 0.0013; the state there is saved"), "{said:?}");
         assert_eq!(test_directory.history("out/scene").1.len(), 14);

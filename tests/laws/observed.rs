@@ -92,7 +92,7 @@ fn a_probe_outside_the_body_is_refused() {
                 probe = [{ name = 'far', point = [0.5, 1.2] }]
                 boundary = [{ name = 'left', displacement = [0, 0] }]";
     let error = problem(distorted(6), text).expect_err("outside").to_string();
-    assert!(error.contains("probe \"far\": point (0.5, 1.2) lies outside the body"), "{error}");
+    assert!(error.contains("probe.far.point (0.5, 1.2) lies outside the body"), "{error}");
 }
 
 #[test]

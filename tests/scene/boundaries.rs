@@ -5,72 +5,64 @@ use crate::errors::check;
 #[test]
 fn every_rule_names_file_line_and_boundary() {
     check(&[
-        ("\"-80*t\"", "\"1/0\"", &["bad.toml:33: boundary \"load\": traction[1] must be finite"]),
+        ("\"-80*t\"", "\"1/0\"", &["bad.toml:33: boundary.load.traction[1] must be finite"]),
         (
             "\"-80*t\"",
             "nan",
-            &["bad.toml:33: boundary \"load\": traction[1] must be finite, but is NaN"],
+            &["bad.toml:33: boundary.load.traction[1] must be finite, but is NaN"],
         ),
-        ("\"-80*t\"", "\"free\"", &["bad.toml:33: boundary \"load\": traction[1] has the unknown"]),
+        ("\"-80*t\"", "\"free\"", &["bad.toml:33: boundary.load.traction[1] has the unknown"]),
         ("\"-80*t\"", "\"sn(t)\"", &["bad.toml:33", "unknown function `sn`; did you mean `sin`?"]),
         (
             "name = \"load\"",
             "name = \"clamp\"",
-            &["bad.toml:31: boundary \"clamp\" is given twice, first at bad.toml:28"],
+            &["bad.toml:31: boundary.clamp is given twice, first at bad.toml:28"],
         ),
         (
             "displacement = [\"0\", \"0\"]",
             "displacement = [\"free\", \"free\"]",
-            &["bad.toml:30: boundary \"clamp\": displacement is \"free\" in both components"],
+            &["bad.toml:30: boundary.clamp.displacement is \"free\" in both components"],
         ),
         (
             "displacement = [\"0\", \"0\"]",
             "displacement = [\"0\"]",
-            &["bad.toml:30: boundary \"clamp\": displacement must have two components, but has 1"],
+            &["bad.toml:30: boundary.clamp.displacement must have two components, but has 1"],
         ),
         (
             "displacement = [\"0\", \"0\"]",
             "displacement = [0, 0]\ngap = 0",
-            &["bad.toml:28: boundary \"clamp\" has a displacement and a gap"],
+            &["bad.toml:28: boundary.clamp has a displacement and a gap"],
         ),
         (
             "displacement = [\"0\", \"0\"]",
             "displacement = [0, 0]\nsymmetry = true",
-            &["bad.toml:28: boundary \"clamp\" has a displacement and a symmetry"],
+            &["bad.toml:28: boundary.clamp has a displacement and a symmetry"],
         ),
         (
             "displacement = [\"0\", \"0\"]",
             "displacement = [0, 0]\ntraction = [0, 1]",
             &[
-                "bad.toml:28: boundary \"clamp\" has both displacements prescribed",
+                "bad.toml:28: boundary.clamp has both displacements prescribed",
                 "and a traction; only",
             ],
         ),
-        (
-            "displacement = [\"0\", \"0\"]",
-            "",
-            &["bad.toml:28: boundary \"clamp\" has nothing in it"],
-        ),
-        (
-            "symmetry = true",
-            "symmetry = false",
-            &["bad.toml:39: boundary \"axis\" has nothing in it"],
-        ),
+        ("displacement = [\"0\", \"0\"]", "", &["bad.toml:28: boundary.clamp has nothing in it"]),
+        ("symmetry = true", "symmetry = false", &["bad.toml:39: boundary.axis has nothing in it"]),
         (
             "symmetry = true",
             "symmetry = true\ngap = 0",
-            &["bad.toml:39: boundary \"axis\" has a symmetry and a gap"],
+            &["bad.toml:39: boundary.axis has a symmetry and a gap"],
         ),
-        ("gap = \"x^2\"\n", "", &["bad.toml:36: boundary \"foundation\": normal needs a gap"]),
+        ("gap = \"x^2\"\n", "", &["bad.toml:36: boundary.foundation.normal needs a gap"]),
         (
             "[\"3\", \"-4\"]",
             "[0, \"1-1\"]",
-            &["bad.toml:37: boundary \"foundation\": normal has no direction"],
+            &["bad.toml:37: boundary.foundation.normal has no direction"],
         ),
         (
             "[\"3\", \"-4\"]",
             "[0, \"x\"]",
-            &["bad.toml:37: boundary \"foundation\": normal[1] must be a constant"],
+            &["bad.toml:37: boundary.foundation.normal[1] must be a constant"],
         ),
     ]);
 }

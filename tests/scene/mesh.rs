@@ -47,17 +47,17 @@ fn values_are_checked_where_they_are_used() {
         (
             "\"-80*t\"",
             "\"sqrt(x-1)\"",
-            "bad.toml:33: boundary \"load\": traction[1] is NaN at (0.42264973081037427, 2)",
+            "bad.toml:33: boundary.load.traction[1] is NaN at (0.42264973081037427, 2)",
         ),
         (
             "\"-80*t\"",
             "\"1/(1-t)\"",
-            "bad.toml:33: boundary \"load\": traction[1] is inf at (1.5773502691896257, 2), t = 1",
+            "bad.toml:33: boundary.load.traction[1] is inf at (1.5773502691896257, 2), t = 1",
         ),
         (
             "displacement = [\"0\", \"0\"]",
             "displacement = [\"free\", \"log(y)\"]",
-            "bad.toml:30: boundary \"clamp\": displacement[1] is -inf at (2, 0)",
+            "bad.toml:30: boundary.clamp.displacement[1] is -inf at (2, 0)",
         ),
         ("[0, \"-t\"]", "[0, \"1/y\"]", "bad.toml:22: body.force[1] is inf at (1, 0)"),
         (
@@ -75,12 +75,12 @@ fn values_are_checked_where_they_are_used() {
             "log(x)",
             "bad.toml:17: damage.initial is -inf at (0, 0); it must be in (0.01, 1]",
         ),
-        ("x^2", "1/(x-2)", "bad.toml:36: boundary \"foundation\": gap is inf at (2, 0)"),
-        ("x^2", "sqrt(x-1)", "bad.toml:36: boundary \"foundation\": gap is NaN at (0, 0)"),
+        ("x^2", "1/(x-2)", "bad.toml:36: boundary.foundation.gap is inf at (2, 0)"),
+        ("x^2", "sqrt(x-1)", "bad.toml:36: boundary.foundation.gap is NaN at (0, 0)"),
         (
             "[\"3\", \"-4\"]",
             "[0, 1]",
-            "bad.toml:37: boundary \"foundation\": normal points into the body at (1, 0), where the \
+            "bad.toml:37: boundary.foundation.normal points into the body at (1, 0), where the \
              outward normal is (0.0000, -1.0000); turn it round, so that it points from the body \
              towards the obstacle",
         ),
@@ -100,7 +100,7 @@ fn values_are_checked_at_all_times_known_beforehand() {
     };
     let refused = |load: &str, time: &str, at_time: &str| {
         let message = at(load, time).expect_err(time);
-        assert!(message.contains("boundary \"load\": traction[1] is "), "{message}");
+        assert!(message.contains("boundary.load.traction[1] is "), "{message}");
         assert!(message.ends_with(&format!(", t = {at_time}")), "{message}");
     };
     // Every t_n, 1/3 too, and no other.
@@ -132,7 +132,7 @@ fn a_fixed_normal_points_out_of_the_body_all_along_its_curve() {
     let normal = |normal: &str| verdict("[\"3\", \"-4\"]", normal, &mesh);
     let refused = |text: &str, how: &str| {
         let message = normal(text).expect_err("a normal that does not point out");
-        let place = format!("\"foundation\": normal points {how} at (0, 1), where the outward");
+        let place = format!("foundation.normal points {how} at (0, 1), where the outward");
         assert!(message.contains(&place), "{message}");
         assert!(
             message.contains("normal is (-1.0000, 0.0000); restrict the physical"),
@@ -207,7 +207,7 @@ fn a_value_from_the_command_line_is_named_as_such() {
     assert_eq!(
         message,
         "base.toml, --set boundary.load.traction=[0, 'log(x-1)']: \
-         boundary \"load\": traction[1] is NaN at (0.42264973081037427, 2)"
+         boundary.load.traction[1] is NaN at (0.42264973081037427, 2)"
     );
 }
 
@@ -222,6 +222,6 @@ fn all_that_is_wrong_is_told_at_once() {
     let places: Vec<_> = message.lines().filter(|line| line.contains("bad.toml:")).collect();
     assert_eq!(places.len(), 3, "{message}");
     assert!(places[0].starts_with("bad.toml:17: damage.initial is 0"), "{message}");
-    assert!(places[1].starts_with("error: bad.toml:36: boundary \"foundation\": gap is inf"));
+    assert!(places[1].starts_with("error: bad.toml:36: boundary.foundation.gap is inf"));
     assert!(places[2].starts_with("error: bad.toml:40: boundary \"axes\" is no physical"));
 }

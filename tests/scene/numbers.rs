@@ -61,7 +61,11 @@ fn every_rule_names_file_line_and_key() {
         // Time.
         ("end = 1.0", "end = 0", &["bad.toml:19: time.end must be positive (s), but is 0"]),
         ("end = 1.0", "end = inf", &["bad.toml:19: time.end must be positive"]),
-        ("step = 0.01", "step = 0", &["bad.toml:20: time.step must be positive (s), but is 0"]),
+        (
+            "step = 0.01",
+            "step = 0",
+            &["bad.toml:20: time.step must be positive (s), or \"auto\", but is 0"],
+        ),
         (
             "step = 0.01",
             "step = 1.5",

@@ -63,14 +63,14 @@ fn a_bad_set_is_named() {
         ),
         (
             "boundary.load.gaap=0",
-            ["--set boundary.load.gaap=0: unknown key boundary \"load\": gaap", "mean `gap`"],
+            ["--set boundary.load.gaap=0: unknown key boundary.load.gaap", "mean `gap`"],
         ),
         ("damage.initial=t", ["--set damage.initial=t: damage.initial depends", "on t"]),
         ("boundary.load=3", ["boundary.load needs a key", "boundary.NAME.KEY=VALUE"]),
         ("boundary=3", ["--set boundary=3: boundary must be an array", "--set boundary=3"]),
         (
             "boundary.load.traction=[0,\"q\"]",
-            ["boundary \"load\": traction[1] has the unknown variable `q`", "--set boundary.load"],
+            ["boundary.load.traction[1] has the unknown variable `q`", "--set boundary.load"],
         ),
     ] {
         match with(&["time.step=0.02", set]) {

@@ -1,7 +1,7 @@
 //! The penalty-duality algorithm of Bermúdez and Moreno (Comput. Math. Appl. 7, 1981),
 //! the paper's reference [4].
 
-use super::{Anderson, ContactReport, ContactSolver, SolverEntry, between_0_and_1, number};
+use super::{Anderson, ContactReport, ContactSolver, SolverEntry};
 use crate::{
     archive::{Archive, ArchiveError},
     cholesky::{Factor, LinearSystem},
@@ -9,7 +9,7 @@ use crate::{
     petsc::{Session, Vector},
 };
 use nalgebra::DMatrix;
-use serde::{Deserialize, Deserializer};
+use serde::Deserialize;
 
 pub(super) const ENTRY: SolverEntry = SolverEntry {
     name: "penalty-duality",
@@ -48,20 +48,17 @@ const LANCZOS: usize = 25;
 
 /// The method's parameters, `[contact.penalty_duality]` of a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields, expecting = "a table")]
+#[serde(default, deny_unknown_fields)]
 pub struct PenaltyOptions {
     /// ω > 0, Pa/m; estimated from the boundary compliance when absent.
-    #[serde(deserialize_with = "positive")]
     pub omega: Option<f64>,
     /// λω in (0, 1). On a compliance eigenvalue s the error of q is multiplied by
     /// 1 − s/(λ(1 + ωs)) where all nodes are active and by −λω/(1 − λω) · (1 − s/(λ(1 + ωs)))
     /// where none are: at most 1 in size for every s only if λω is ½, the default.
-    #[serde(deserialize_with = "between_0_and_1")]
     pub lambda_omega: f64,
     /// Whether Anderson mixes the iterates.
     pub accelerate: bool,
     /// Iterations allowed for one contact problem.
-    #[serde(deserialize_with = "whole")]
     pub iterations: usize,
 }
 
@@ -69,16 +66,6 @@ impl Default for PenaltyOptions {
     fn default() -> Self {
         Self { omega: None, lambda_omega: 0.5, accelerate: true, iterations: 20_000 }
     }
-}
-
-fn positive<'de, D: Deserializer<'de>>(value: D) -> Result<Option<f64>, D::Error> {
-    number(value, "positive (Pa/m)", |value| value > 0.0 && value.is_finite()).map(Some)
-}
-
-/// Also written as 2e4.
-fn whole<'de, D: Deserializer<'de>>(value: D) -> Result<usize, D::Error> {
-    let holds = |value: f64| value.fract() == 0.0 && value >= 0.0;
-    Ok(number(value, "a whole number, not negative", holds)? as usize)
 }
 
 impl<'s> PenaltyDuality<'s> {

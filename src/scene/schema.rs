@@ -1,0 +1,291 @@
+//! What a scene file may hold: its JSON schema, against which a document is checked key by key. What is
+//! wrong with a value is noted and reading goes on, so that all problems of a scene are told at once.
+
+use super::document::{NOWHERE, Problem, SceneText, below, name_of};
+use super::error::suggestion;
+use super::expression::Expression;
+use serde::de::{Deserialize, DeserializeOwned, IntoDeserializer};
+use serde_json::Value as Schema;
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fmt::Display,
+    ops::Range,
+    path::Path,
+    sync::LazyLock,
+};
+use toml::Spanned;
+use toml::de::{DeArray, DeTable, DeValue};
+
+/// The JSON schema of scenes. Besides the words of JSON Schema it says in `values` what a value may be and
+/// in `absent` what holds without it, gives an `example`, and by `format` the kind of an expression.
+pub const SCHEMA: &str = include_str!("../../geo/scene.schema.json");
+
+static KEYS: LazyLock<Schema> = LazyLock::new(|| serde_json::from_str(SCHEMA).unwrap_or_default());
+
+/// What contradicts the rest of its table: the key below that of the table, "" for all of it, and what is
+/// wrong with it.
+pub(super) type Fault = (&'static str, String);
+
+/// A document and what was found in it so far.
+pub(super) struct Findings<'t> {
+    pub(super) text: &'t SceneText,
+    /// The values, with the defaults of what is left out.
+    document: toml::Value,
+    pub(super) problems: Vec<Problem>,
+    /// Where the values are written, by their keys in full.
+    pub(super) places: BTreeMap<String, Range<usize>>,
+    /// The keys of all in which something is wrong.
+    unsound: BTreeSet<String>,
+}
+
+impl<'t> Findings<'t> {
+    /// Checks the document `root` of `text`, whose values are those of `document`.
+    pub(super) fn check(text: &'t SceneText, root: &DeValue, document: &toml::Table) -> Self {
+        let mut document = toml::Value::Table(document.clone());
+        complete(&mut document, &KEYS);
+        let (problems, places, unsound) = Default::default();
+        let mut findings = Self { text, document, problems, places, unsound };
+        findings.check_value(String::new(), NOWHERE, root, &KEYS);
+        findings
+    }
+
+    /// Notes a problem with the value of a key; the message begins with the key.
+    pub(super) fn note(&mut self, key: &str, problem: impl Display) {
+        let place = self.places.get(key).cloned().unwrap_or(NOWHERE);
+        self.problems.push((place, format!("{key} {problem}")));
+    }
+
+    fn check_value(&mut self, key: String, place: Range<usize>, value: &DeValue, schema: &Schema) {
+        self.places.insert(key.clone(), place);
+        let before = self.problems.len();
+        match (value, schema["type"].as_str()) {
+            (DeValue::Table(table), Some("object")) => self.check_table(&key, table, schema),
+            (DeValue::Array(array), Some("array")) => self.check_array(&key, array, schema),
+            _ => {
+                let problem = judge(value, schema, self.text.folder()).err();
+                problem.into_iter().for_each(|problem| self.note(&key, problem));
+            }
+        }
+        if self.problems.len() > before {
+            self.unsound.insert(key);
+        }
+    }
+
+    fn check_table(&mut self, key: &str, table: &DeTable, schema: &Schema) {
+        let known = schema["properties"].as_object().into_iter().flat_map(|keys| keys.keys());
+        let known: Vec<&str> = known.map(String::as_str).collect();
+        let mut is_misspelt = false;
+        for (name, value) in table {
+            // A table is where its header is.
+            let span = value.span();
+            let start = if value.get_ref().is_table() { span.start } else { name.span().start };
+            let (key, place, value) =
+                (below(key, name.get_ref()), start..span.end, value.get_ref());
+            // By names of the user's.
+            let named = &schema["additionalProperties"];
+            let is_named = named["type"] == "number" || (named.is_object() && value.is_table());
+            match schema["properties"].get(&**name.get_ref()) {
+                Some(schema) => self.check_value(key, place, value, schema),
+                None if is_named => self.check_value(key, place, value, named),
+                None => {
+                    let suggestion = suggestion(name.get_ref(), &known);
+                    is_misspelt |= suggestion.contains("did you mean");
+                    self.problems.push((place, format!("unknown key {key}{suggestion}")));
+                }
+            }
+        }
+        // What the table lacks is what was misspelt.
+        let required = schema["required"].as_array().filter(|_| !is_misspelt);
+        for name in required.into_iter().flatten().filter_map(Schema::as_str) {
+            if !table.contains_key(name) {
+                let place = self.places.get(key).cloned().unwrap_or(NOWHERE);
+                let missing = format!("{} is required but missing", below(key, name));
+                self.problems.push((place, missing));
+            }
+        }
+    }
+
+    /// Tables in an array go by their names, which no two may share.
+    fn check_array(&mut self, key: &str, array: &DeArray, schema: &Schema) {
+        let count = array.len() as u64;
+        if schema["maxItems"].as_u64().is_some_and(|all| count != all) {
+            return self.note(key, format!("must have two components, but has {count}"));
+        }
+        if schema["minItems"].as_u64().is_some_and(|least| count < least) {
+            return self.note(key, format!("must hold at least one {key}"));
+        }
+        for (i, value) in array.iter().enumerate() {
+            let element = name_of(value.get_ref()).map(|name| below(key, name));
+            let first = element.as_ref().and_then(|element| self.places.get(element)).cloned();
+            let element = element.unwrap_or_else(|| format!("{key}[{i}]"));
+            self.check_value(element.clone(), value.span(), value.get_ref(), &schema["items"]);
+            if let Some(first) = first {
+                let first = self.text.in_words(&first);
+                self.note(&element, format!("is given twice, first at {first}; merge the two"));
+            }
+        }
+    }
+
+    /// What `build` makes of the value of `key`, if there is one and all in it is as the schema says.
+    pub(super) fn build<K: DeserializeOwned, T>(
+        &mut self,
+        key: &str,
+        build: impl FnOnce(K) -> Result<T, Fault>,
+    ) -> Option<T> {
+        let value = self.document.get(key)?.clone();
+        self.build_value(key, value, build)
+    }
+
+    /// What `build` makes of the elements of the array at `key`, as [`Self::build`].
+    pub(super) fn build_all<K: DeserializeOwned, T>(
+        &mut self,
+        key: &str,
+        build: impl Fn(K) -> Result<T, Fault>,
+    ) -> Vec<T> {
+        let elements = self.document.get(key).and_then(toml::Value::as_array).cloned();
+        let mut built = Vec::new();
+        for element in elements.into_iter().flatten() {
+            let name = element.get("name").and_then(toml::Value::as_str);
+            let key = name.map(|name| below(key, name));
+            built.extend(key.and_then(|key| self.build_value(&key, element, &build)));
+        }
+        built
+    }
+
+    /// The tables in the table at `key` by their names, each with what it leaves out taken from around it.
+    pub(super) fn named<T: DeserializeOwned>(&mut self, key: &str) -> Vec<(String, T)> {
+        let table = self.document.get(key).and_then(toml::Value::as_table).cloned();
+        let entries = table.filter(|_| !self.unsound.contains(key)).into_iter().flatten();
+        let (named, own): (Vec<_>, Vec<_>) = entries.partition(|(_, value)| value.is_table());
+        let with_own = |(name, value): (String, toml::Value)| {
+            let mut all: toml::Table = own.iter().cloned().collect();
+            all.extend(value.as_table().cloned().unwrap_or_default());
+            let key = below(key, &name);
+            Some((name, self.build_value(&key, all.into(), Ok)?))
+        };
+        named.into_iter().filter_map(with_own).collect()
+    }
+
+    fn build_value<K: DeserializeOwned, T>(
+        &mut self,
+        key: &str,
+        value: toml::Value,
+        build: impl FnOnce(K) -> Result<T, Fault>,
+    ) -> Option<T> {
+        if self.unsound.contains(key) {
+            return None;
+        }
+        let keys = value.try_into().map_err(|error| ("", format!("is wrong: {}", error.message())));
+        let built = keys.and_then(build);
+        built.map_err(|(name, problem)| self.note(&below(key, name), problem)).ok()
+    }
+}
+
+/// Puts the defaults of the schema in for what is left out; whole numbers are also written as 2e4.
+fn complete(value: &mut toml::Value, schema: &Schema) {
+    match value {
+        toml::Value::Table(table) => {
+            for (name, schema) in schema["properties"].as_object().into_iter().flatten() {
+                if let (false, Ok(default)) =
+                    (table.contains_key(name), toml::Value::try_from(&schema["default"]))
+                {
+                    table.insert(name.clone(), default);
+                }
+                table.get_mut(name).into_iter().for_each(|value| complete(value, schema));
+            }
+        }
+        toml::Value::Array(values) => {
+            values.iter_mut().for_each(|value| complete(value, &schema["items"]));
+        }
+        toml::Value::Float(number) if schema["type"] == "integer" => {
+            *value = toml::Value::Integer(*number as i64);
+        }
+        _ => {}
+    }
+}
+
+/// Whether a text, number or flag is as the schema says; tables of expressions begin at `folder`.
+///
+/// # Errors
+/// What is wrong; of several alternatives the last one tells.
+fn judge(value: &DeValue, schema: &Schema, folder: &Path) -> Result<(), String> {
+    if let Some([other, last]) = schema["anyOf"].as_array().map(Vec::as_slice) {
+        return judge(value, other, folder).or_else(|_| judge(value, last, folder));
+    }
+    let number = number(value);
+    if let Some(kind) = schema["format"].as_str() {
+        return judge_expression(value, number, kind, folder);
+    }
+    let is = |choice: &Schema| match choice.as_str() {
+        Some(name) => value.as_str() == Some(name),
+        None => number.is_some() && number == choice.as_f64(),
+    };
+    let (wanted, holds) = match (schema["enum"].as_array(), schema["type"].as_str()) {
+        (Some(choices), _) => {
+            let names: Vec<String> = choices.iter().map(Schema::to_string).collect();
+            (names.join(" or "), choices.iter().any(is))
+        }
+        (_, Some("string")) => ("a string".to_owned(), value.is_str()),
+        (_, Some("boolean")) => ("true or false".to_owned(), value.is_bool()),
+        (_, Some("array")) => ("an array".to_owned(), false),
+        (_, Some("object")) => ("a table".to_owned(), false),
+        _ => {
+            let rule = schema["values"].as_str().unwrap_or("finite");
+            match number {
+                Some(number) => (rule.to_owned(), is_within(number, schema)),
+                None => (format!("a number: {rule}"), false),
+            }
+        }
+    };
+    match (holds, value) {
+        (true, _) => Ok(()),
+        (_, DeValue::Table(_) | DeValue::Array(_)) => Err(format!("must be {wanted}")),
+        (_, DeValue::String(text)) => Err(format!("must be {wanted}, but is \"{text}\"")),
+        (_, DeValue::Boolean(flag)) => Err(format!("must be {wanted}, but is {flag}")),
+        _ => Err(number.map_or_else(
+            || format!("must be {wanted}"),
+            |number| format!("must be {wanted}, but is {number}"),
+        )),
+    }
+}
+
+fn number(value: &DeValue) -> Option<f64> {
+    f64::deserialize(Spanned::new(NOWHERE, value.clone()).into_deserializer()).ok()
+}
+
+/// Whether a number is finite and within the bounds of the schema.
+fn is_within(number: f64, schema: &Schema) -> bool {
+    let obeys = |bound: &str, holds: fn(&f64, &f64) -> bool| {
+        schema[bound].as_f64().is_none_or(|bound| holds(&number, &bound))
+    };
+    number.is_finite()
+        && (schema["type"] != "integer" || number.fract() == 0.0)
+        && obeys("minimum", f64::ge)
+        && obeys("exclusiveMinimum", f64::gt)
+        && obeys("maximum", f64::le)
+        && obeys("exclusiveMaximum", f64::lt)
+}
+
+/// Whether a text or number is an expression of this kind, and finite if it is constant.
+fn judge_expression(
+    value: &DeValue,
+    number: Option<f64>,
+    kind: &str,
+    folder: &Path,
+) -> Result<(), String> {
+    let expression = match (value, number) {
+        (DeValue::String(text), _) => {
+            Expression::parse_in(text, folder).map_err(|error| error.to_string())?
+        }
+        (_, Some(number)) => Expression::constant(number),
+        _ => return Err("must be a number or an expression in quotes".to_owned()),
+    };
+    match expression.as_constant() {
+        Some(value) if !value.is_finite() => Err(format!("must be finite, but is {value}")),
+        None if kind == "constant" => Err("must be a constant".to_owned()),
+        None if kind == "expression in x, y" && expression.depends_on_time() => {
+            Err("depends on t; it must be a function of x and y alone".to_owned())
+        }
+        _ => Ok(()),
+    }
+}
