@@ -114,6 +114,10 @@ def main(prog=None):
     for folder in arguments.folders:
         with telling() as problems:
             runs.append(read_results(folder, arguments.time))
+            last = runs[-1].frames[-1][0]
+            if arguments.time is not None and arguments.time > last:
+                print(f"{folder}: the last frame is at t = {last:g}, before {arguments.time:g}: it is drawn",
+                      file=sys.stderr)
         failed |= bool(problems)
     shared = runs and limits_of(runs, arguments.factor)
     for results in runs:

@@ -41,7 +41,7 @@ enum Command {
         folder: PathBuf,
     },
     /// Run scenes with every contact solver and compare cost and answers.
-    Compare(command::CompareArguments),
+    Compare(command::ScriptArguments),
     /// Draw the figures of runs into their folders; also at other times, as vectors, moving (--help).
     Figures(command::ScriptArguments),
     /// Write report.html, one page with all about a run, into its folder.
@@ -77,7 +77,7 @@ fn main() -> ExitCode {
         Command::New { name } => command::new(&name),
         Command::Check(arguments) => command::check(&arguments),
         Command::Info { folder } => command::info(&folder),
-        Command::Compare(arguments) => command::compare(&arguments),
+        Command::Compare(arguments) => command::script("compare", &arguments),
         Command::Figures(arguments) => command::script("figures", &arguments),
         Command::Report(arguments) => command::script("report", &arguments),
         Command::Solvers => command::solvers(),

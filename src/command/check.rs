@@ -1,6 +1,6 @@
 //! `signorini check`: what a scene asks for, before anything is solved.
 
-use super::{Failure, SceneArguments, ranks::require_one_process};
+use super::{Failure, SceneArguments, ranks::require_one_process, screen::row};
 use comfy_table::presets;
 use signorini::{
     evolution::DiscreteProblem,
@@ -28,10 +28,6 @@ pub fn check(arguments: &SceneArguments) -> Result<(), Failure> {
     lines.extend(problem.notes().into_iter().map(|note| row("note", note)));
     say(&lines.join("\n"));
     Ok(())
-}
-
-fn row(name: &str, value: String) -> String {
-    format!("  {name:<13} {value}")
 }
 
 fn describe_mesh(mesh: &Mesh, Units { length, .. }: &Units) -> String {

@@ -1,5 +1,4 @@
-//! `signorini figures` and `signorini report`: the pictures of a run, drawn by Python scripts that the
-//! program carries.
+//! `signorini figures`, `report` and `compare`: Python scripts that the program carries.
 
 use super::{Failure, ranks::require_one_process};
 use clap::Args;
@@ -19,8 +18,8 @@ macro_rules! scripts {
 }
 
 /// What the scripts import from each other.
-const SCRIPTS: [(&str, &str); 16] = scripts! {
-    "animation" "contact_pressure" "drawing" "elements" "expressions" "figures" "histories" "limits"
+const SCRIPTS: [(&str, &str); 17] = scripts! {
+    "animation" "compare" "contact_pressure" "drawing" "elements" "expressions" "figures" "histories" "limits"
     "maps" "paraview_script" "paraview_view" "reading" "report" "report_page" "results" "setting"
 };
 /// Runs one of them.
@@ -34,8 +33,8 @@ const PROBE: &str = "import sys, importlib.util as util\n\
 #[derive(Args)]
 #[command(disable_help_flag = true)]
 pub struct ScriptArguments {
-    /// Result folders, and options that `--help` lists.
-    #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "OUT")]
+    /// What `--help` lists.
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARGUMENT")]
     arguments: Vec<OsString>,
 }
 
@@ -46,6 +45,8 @@ pub fn script(name: &str, ScriptArguments { arguments }: &ScriptArguments) -> Re
     let mut running = Command::new(&python)
         .args(["-c", EMBEDDED, name])
         .args(arguments)
+        // What a script runs itself.
+        .env("SIGNORINI", env::current_exe().map_err(Failure::from)?)
         .stdin(Stdio::piped())
         .spawn()
         .map_err(|error| format!("{}: {error}", python.display()))?;
@@ -74,7 +75,7 @@ fn python() -> Result<OsString, Failure> {
         problems.push(format!("{} {problem}", python.display()));
     }
     Err(Failure::input(format!(
-        "pictures are drawn by Python 3.11 or newer with matplotlib and meshio (Debian: apt install \
+        "this is done by Python 3.11 or newer with matplotlib and meshio (Debian: apt install \
          python3-matplotlib python3-meshio; or PYTHON=… for another one), but {}",
         problems.join("; ")
     )))

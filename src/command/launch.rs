@@ -51,13 +51,18 @@ impl FromStr for Ranks {
 }
 
 /// Numbers of ranks, and of unknowns of the displacements from which on they pay. Whole runs of the uniform
-/// `square-mild` on 4 cores, seconds on 1, 2 and 4 ranks: 33,000 unknowns and 100 steps 1.8, 1.9, 3.4;
-/// 132,000 and 50 steps 8.9, 6.6, 8.4; 526,000 and 20 steps 30.5 on 1 and 15.2 on 4.
+/// `square-mild` on 4 cores, seconds on 1 and 2 ranks: 33,000 unknowns and 100 steps 1.8 and 1.9; 132,000
+/// and 50 steps 8.9 and 6.6; 526,000 and 20 steps 31.7 and 28.0, and 21.6 on 4.
 const PAYING: [(usize, usize); 2] = [(2, 100_000), (4, 400_000)];
+
+/// The cores that a run may use.
+pub fn cores() -> usize {
+    thread::available_parallelism().map_or(1, NonZero::get)
+}
 
 /// The number of ranks on which a run ends first, of the cores that it may use.
 pub fn ranks_that_pay(scene: &Scene, mesh: &Mesh) -> usize {
-    let cores = thread::available_parallelism().map_or(1, NonZero::get);
+    let cores = cores();
     let (nodes, triangles) = (mesh.nodes.len(), mesh.triangles.len());
     // As many edges as vertices and triangles (Euler), but for one and the holes.
     let nodes = if scene.order == Order::Quadratic { 2 * nodes + triangles } else { nodes };

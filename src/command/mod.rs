@@ -2,7 +2,6 @@
 
 mod check;
 mod checkpoint;
-mod compare;
 mod figures;
 mod info;
 mod keys;
@@ -16,7 +15,6 @@ mod run;
 mod screen;
 
 pub use check::check;
-pub use compare::{CompareArguments, compare};
 pub use figures::{ScriptArguments, script};
 pub use info::info;
 pub use keys::keys;

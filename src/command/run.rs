@@ -90,7 +90,7 @@ impl RunArguments {
 
 /// Where the scene asks for an accuracy, a mesh that has it, or the one `made` in the run that goes on,
 /// and steps for it in the scene. Collective.
-pub(super) fn adapt(
+fn adapt(
     session: &Session,
     scene: &mut Scene,
     mesh: &Mesh,

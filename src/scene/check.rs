@@ -19,6 +19,9 @@ const ALONG: f64 = 1e-6;
 /// Evaluations of an expression in space and time before a run, about: less than a second.
 const EVALUATIONS: usize = 4_000_000;
 
+/// Larger values overflow where they are squared.
+const LARGEST: f64 = 1e100;
+
 /// What values must be beside finite: how a message says so, and whether one is.
 type Rule<'a> = (&'a str, &'a dyn Fn(f64) -> bool);
 
@@ -234,7 +237,9 @@ impl Scene {
             let parts = if i == 0 || i + 1 == times.len() { 1 } else { parts };
             for &[x, y] in points.iter().skip(i % parts).step_by(parts) {
                 let value = expression.eval(x, y, t);
-                if !(value.is_finite() && holds(value)) {
+                if !(value.abs() <= LARGEST && holds(value)) {
+                    let is_too_large = value.is_finite() && value.abs() > LARGEST;
+                    let rule = if is_too_large { "; it is too large to be squared" } else { rule };
                     let when =
                         if in_time { format!(", t = {}", rounded(t)) } else { String::new() };
                     let problem = format!("is {value} at ({x}, {y}){when}{rule}");

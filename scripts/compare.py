@@ -1,0 +1,188 @@
+#!/usr/bin/python3
+"""Runs scenes with every contact solver and compares cost and answers.
+
+    signorini compare geo/lshape.toml geo/beam.toml --solvers active-set,tao --set time.step=0.02
+
+Each solver stands by itself (contact.rescue = false). Where a scene asks for an accuracy, all start from
+the mesh that the first solver adapts. The results of a run are in OUT/SCENE-SOLVER/, the table also in
+OUT/comparison.csv. What follows `--` are PETSc options."""
+
+import argparse
+import csv
+import json
+import os
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from reading import read_frame
+from results import read_table
+
+# Titles of the printed table; the others are shown in comparison.csv alone.
+TITLES = {
+    "scene": "scene", "solver": "solver", "steps": "steps", "contact_changes": "contact moves",
+    "iterations": "its", "factorisations": "factors", "triangular_solves": "solve pairs",
+    "fallbacks": "fallbacks", "seconds": "seconds", "times_first": "times first", "kkt": "worst KKT",
+    "difference_u": "Δu", "difference_zeta": "Δζ", "difference_pressure": "Δp",
+}
+DIFFERENCES = ["difference_u", "difference_zeta", "difference_pressure"]
+KKT = ["kkt_stationarity", "kkt_primal", "kkt_dual", "kkt_complementarity"]
+
+
+class Refused(Exception):
+    """The program ended with this code."""
+
+
+def signorini(*arguments):
+    """Runs the program that runs this script and returns its error, "" if there is none."""
+    ended = subprocess.run([os.environ["SIGNORINI"], *arguments], capture_output=True, text=True)
+    lines = ended.stderr.splitlines()
+    print(*(line for line in lines if line.startswith("warning")), sep="\n", end="", file=sys.stderr)
+    first = next((i for i, line in enumerate(lines) if line.startswith("error")), len(lines))
+    error = "\n".join(lines[first:])
+    if ended.returncode > 1:
+        print(error, file=sys.stderr)
+        raise Refused(ended.returncode)
+    return error.removeprefix("error: ") if ended.returncode else ""
+
+
+def compared(scene, arguments):
+    """The rows of a scene: for each solver what its run took, and how its last state differs from that
+    of the smallest residuals."""
+    rows, states, mesh = [], [], []
+    for solver in arguments.solvers:
+        folder = arguments.out / f"{scene.stem}-{solver.replace(':', '-')}"
+        # A run that fails at once leaves an earlier one as it is.
+        (folder / "history.csv").unlink(missing_ok=True)
+        error = signorini(
+            "run", str(scene), "--solver", solver, "--ranks", "1", "--out", str(folder), *mesh,
+            *settings(arguments, "contact.rescue=false"), "--", *arguments.petsc)
+        row, state = read(folder, error)
+        rows.append({"scene": scene.stem, "solver": solver, **row, **dict.fromkeys(DIFFERENCES),
+                     "error": error})
+        states.append(state)
+        asks = tomllib.loads((folder / "scene.toml").read_text(encoding="utf-8")) if state else {}
+        if not mesh and "accuracy" in asks:
+            mesh = ["--mesh", str(folder / "mesh.msh")]
+    complete = [k for k, row in enumerate(rows) if not row["error"]]
+    best = min(complete, key=lambda k: worst(rows[k]), default=None)
+    for row, state in zip(rows, states):
+        known = state and best is not None
+        row.update(zip(DIFFERENCES, differences(state, states[best]) if known else 3 * [np.nan]))
+    return rows
+
+
+def read(folder, error):
+    """What a run took, all steps together, and its last state with the largest |u| and |p| of the run;
+    no state where not even the first solve went well."""
+    history = read_table(folder / "history.csv") if (folder / "history.csv").exists() else []
+    total = {key: int(sum(row[key] for row in history))
+             for key in ["iterations", "factorisations", "linear_iterations", "fallbacks"]}
+    active = [row["active_nodes"] for row in history]
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8")) if history else {}
+    row = {
+        "steps": int(history[-1]["step"]) if history else 0,
+        "contact_changes": sum(a != b for a, b in zip(active, active[1:])),
+        "iterations": total["iterations"],
+        "factorisations": total["factorisations"],
+        "triangular_solves": total["linear_iterations"],
+        "fallbacks": total["fallbacks"],
+        "seconds": summary.get("phases", {}).get("contact", 0.0),
+        **{key: max((row[key] for row in history), default=np.nan) for key in KKT},
+    }
+    if not history:
+        return row, None
+    frames = ElementTree.parse(folder / "fields.pvd").findall(".//DataSet")
+    frames = [read_frame(folder / frame.get("file")).point_data for frame in frames]
+    scales = [max(row["displacement_max"] for row in history), 1.0,
+              max(np.max(np.abs(frame["normal_pressure"])) for frame in frames)]
+    values = [frames[-1][name] for name in ["displacement", "zeta", "normal_pressure"]]
+    return row, (values, [scale or 1.0 for scale in scales])
+
+
+def differences(state, best):
+    """max |u − u_ref| over max |u_ref|, max |ζ − ζ_ref|, max |p − p_ref| over max |p_ref|, where the best
+    state is the reference and its scales are of all steps (of p: of all frames)."""
+    (values, _), (references, scales) = state, best
+    return [np.max(np.abs(a - b)) / scale if a.shape == b.shape else np.nan
+            for a, b, scale in zip(values, references, scales)]
+
+
+def worst(row):
+    return max(row[key] for key in KKT)
+
+
+def settings(arguments, *more):
+    return [word for key in [*arguments.set, *more] for word in ("--set", key)]
+
+
+def table(rows):
+    """The table in Markdown."""
+    first = {row["scene"]: row["seconds"] for row in reversed(rows)}
+    lines = [list(TITLES.values())]
+    for row in rows:
+        shown = dict(row, seconds=f"{row['seconds']:.3f}",
+                     times_first=f"{row['seconds'] / (first[row['scene']] or np.nan):.1f}",
+                     kkt="FAILED" if row["error"] else f"{worst(row):.1e}",
+                     **{key: f"{row[key]:.1e}" for key in DIFFERENCES})
+        lines.append([str(shown[key]) for key in TITLES])
+    widths = [max(map(len, column)) for column in zip(*lines)]
+    lines.insert(1, ["-" * width for width in widths])
+    return "\n".join(
+        "| " + " | ".join(
+            cell.ljust(width) if k < 2 else cell.rjust(width)
+            for k, (cell, width) in enumerate(zip(line, widths))) + " |"
+        for line in lines)
+
+
+def arguments_of(prog):
+    parser = argparse.ArgumentParser(
+        prog=prog, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="+", type=Path, metavar="SCENE", help="scene file")
+    parser.add_argument("--solvers", metavar="NAME,…", type=lambda names: names.split(","),
+                        help="solvers to compare (all)")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE",
+                        help="override a key of the scenes; may be repeated")
+    parser.add_argument("--out", type=Path, default=Path("out/compare"), metavar="DIR",
+                        help="folder for the results (%(default)s)")
+    words = sys.argv[1:]
+    end = words.index("--") if "--" in words else len(words)
+    arguments = parser.parse_args(words[:end])
+    arguments.petsc = words[end + 1:]
+    stems = [scene.stem for scene in arguments.scenes]
+    if twice := next((stem for stem in stems if stems.count(stem) > 1), None):
+        parser.error(f"two scenes have the name {twice}, which the table goes by; rename one")
+    return arguments
+
+
+def main(prog=None):
+    """Returns the exit code: 2 for bad input, found before anything runs, 1 if a solver failed."""
+    arguments = arguments_of(prog)
+    if not arguments.solvers:
+        names = subprocess.run([os.environ["SIGNORINI"], "solvers"], capture_output=True, text=True)
+        arguments.solvers = [line.split("\t")[0] for line in names.stdout.splitlines()]
+    try:
+        for scene in arguments.scenes:
+            for solver in arguments.solvers:
+                signorini("check", str(scene), *settings(arguments, f"contact.solver='{solver}'"))
+        rows = [row for scene in arguments.scenes for row in compared(scene, arguments)]
+    except Refused as refused:
+        return refused.args[0]
+    print(table(rows))
+    path = arguments.out / "comparison.csv"
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, rows[0].keys())
+        writer.writeheader()
+        writer.writerows(rows)
+    print(f"written to {path}")
+    errors = [row["error"] for row in rows if row["error"]]
+    print(*(f"error: {error}\n" for error in errors), sep="", end="", file=sys.stderr)
+    return 1 if errors else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
