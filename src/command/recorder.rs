@@ -31,8 +31,8 @@ pub(super) struct Recorder<'a> {
     fields: FieldWriter,
     /// On the first rank, which shows the run.
     bar: Option<Progress>,
-    /// On the first rank, from the first accepted step on.
-    history: Option<Table>,
+    /// Of the first rank.
+    history: Table,
     last: Option<Step>,
     /// Seconds of all accepted steps after n = 0.
     stepping: f64,
@@ -47,7 +47,9 @@ impl<'a> Recorder<'a> {
         let fields = FieldWriter::new(&task.folder, &task.problem)?;
         let bar = task.problem.body.nodes.partition.comm().is_root().then(|| screen::open(task));
         let (interrupts, saved) = (Interrupts::hold(), Instant::now());
-        let (history, last, stepping) = Default::default();
+        let (path, columns) = (task.folder.join("history.csv"), task.problem.quantities());
+        let history = Table::new(path, &StepRecord::default(), &columns)?;
+        let (last, stepping) = Default::default();
         Ok(Self { task, fields, bar, history, last, stepping, interrupts, saved })
     }
 
@@ -68,8 +70,6 @@ impl<'a> Recorder<'a> {
             let text = mesh.mesh.to_msh() + output::ADAPTED;
             write_whole(&folder.join(output::MESH), text.as_bytes())?;
         }
-        let (path, columns) = (folder.join("history.csv"), self.task.problem.quantities());
-        self.history = Some(Table::create(path, &StepRecord::default(), &columns)?);
         Ok(())
     }
 
@@ -108,10 +108,10 @@ impl<'a> Recorder<'a> {
         let written = self.task.phases.time("output", || {
             let end = self.task.problem.scene().time.map_or(1.0, |grid| grid.end);
             self.bar.iter_mut().for_each(|bar| screen::progress(bar, &step.record, end));
-            let row = self
-                .history
-                .as_mut()
-                .map_or(Ok(()), |history| history.add(&[(&step.record, &step.quantities)]));
+            let row = match comm.is_root() {
+                true => self.history.add(&[(&step.record, &step.quantities)]),
+                false => Ok(()),
+            };
             // A frame that waited for its turn is older than this row.
             let row = row.or_else(|error| self.fields.finish().and(Err(error)));
             // All ranks write the frame together, also where the row could not be written.
@@ -191,7 +191,7 @@ impl Observer for Recorder<'_> {
     fn archive(&mut self, last: &Step, archive: &mut Archive) -> Observed {
         archive.value(&mut self.stepping)?;
         self.fields.archive(archive)?;
-        Table::archive(&mut self.history, self.task.folder.join("history.csv"), archive)?;
+        self.history.archive(archive)?;
         if archive.is_loading() && self.bar.is_some() {
             output::remove_partial(&self.task.folder)?;
         }

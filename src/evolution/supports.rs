@@ -33,7 +33,7 @@ struct Place {
 }
 
 /// A row of `contact.csv`: a gap condition at a node of Γ_C and how it is met.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct ContactRow {
     /// t, s.
     pub time: f64,

@@ -9,58 +9,42 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// A file that grows by whole pieces in front of an ending that is always there.
+/// A file that grows by whole pieces between a beginning and an ending that is always there; it is there
+/// from the first piece on.
 ///
 /// A piece and the ending behind it are one write over the ending before.
 #[derive(Debug)]
 pub(super) struct GrowingFile {
     path: PathBuf,
-    file: File,
-    /// Bytes in front of the ending.
-    length: u64,
+    beginning: String,
     ending: &'static str,
+    /// Once it is there, with the bytes in front of the ending.
+    file: Option<(File, u64)>,
 }
 
 impl GrowingFile {
-    /// A new file with a first piece in front of its ending.
-    pub(super) fn create(
-        path: PathBuf,
-        piece: &str,
-        ending: &'static str,
-    ) -> Result<Self, OutputError> {
-        write_whole(&path, [piece, ending].concat().as_bytes())?;
-        let file = File::options().write(true).open(&path);
-        let file = file.map_err(|e| OutputError::new(&path, e))?;
-        Ok(Self { path, file, length: piece.len() as u64, ending })
+    pub(super) fn new(path: PathBuf, beginning: String, ending: &'static str) -> Self {
+        Self { path, beginning, ending, file: None }
     }
 
-    /// Saves where the file ends, or goes back to that end of the file at `path`; `None` where there was
-    /// no file.
-    pub(super) fn archive(
-        this: &mut Option<Self>,
-        path: PathBuf,
-        ending: &'static str,
-        archive: &mut Archive,
-    ) -> Observed {
-        let mut length = this.as_ref().map(|file| file.length);
+    /// Saves where the file ends, or goes back to that end of the file that is there.
+    pub(super) fn archive(&mut self, archive: &mut Archive) -> Observed {
+        let mut length = self.file.as_ref().map(|(_, length)| *length);
         archive.value(&mut length)?;
         if archive.is_loading() {
-            *this = length.map(|length| Self::reopen(path, length, ending)).transpose()?;
+            let reopened = length.map(|length| self.reopen(length)).transpose();
+            self.file = reopened.map_err(|e| OutputError::new(&self.path, e))?;
         }
         Ok(())
     }
 
-    fn reopen(path: PathBuf, length: u64, ending: &'static str) -> Result<Self, OutputError> {
-        let reopened = File::options().write(true).open(&path).and_then(|file| {
-            let there = file.metadata()?.len();
-            let mut this = Self { path: path.clone(), file, length, ending };
-            if there < length {
-                return Err(io::Error::other("it is shorter than when the checkpoint was written"));
-            }
-            this.end_at(length)?;
-            Ok(this)
-        });
-        reopened.map_err(|e| OutputError::new(&path, e))
+    fn reopen(&self, length: u64) -> io::Result<(File, u64)> {
+        let file = File::options().write(true).open(&self.path)?;
+        if file.metadata()?.len() < length {
+            return Err(io::Error::other("it is shorter than when the checkpoint was written"));
+        }
+        end_at(&file, length, self.ending)?;
+        Ok((file, length))
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -69,21 +53,25 @@ impl GrowingFile {
 
     /// Adds a piece.
     pub(super) fn add(&mut self, piece: &[u8]) -> Result<(), OutputError> {
-        let text = [piece, self.ending.as_bytes()].concat();
-        if let Err(error) = self.file.write_all_at(&text, self.length) {
-            // A full disk takes a part of it: the file ends as before.
-            let _ = self.end_at(self.length);
-            return Err(OutputError::new(&self.path, error));
+        let failed = |e: io::Error| OutputError::new(&self.path, e);
+        if self.file.is_none() {
+            write_whole(&self.path, [&self.beginning, self.ending].concat().as_bytes())?;
+            self.file = Some(self.reopen(self.beginning.len() as u64).map_err(failed)?);
         }
-        self.length += piece.len() as u64;
+        let Some((file, length)) = &mut self.file else { return Ok(()) };
+        let text = [piece, self.ending.as_bytes()].concat();
+        if let Err(error) = file.write_all_at(&text, *length) {
+            // A full disk takes a part of it: the file ends as before.
+            let _ = end_at(file, *length, self.ending);
+            return Err(failed(error));
+        }
+        *length += piece.len() as u64;
         Ok(())
     }
+}
 
-    /// Puts the ending behind the first `length` bytes.
-    fn end_at(&mut self, length: u64) -> io::Result<()> {
-        self.file.write_all_at(self.ending.as_bytes(), length)?;
-        self.file.set_len(length + self.ending.len() as u64)?;
-        self.length = length;
-        Ok(())
-    }
+/// Puts the ending behind the first `length` bytes.
+fn end_at(file: &File, length: u64, ending: &str) -> io::Result<()> {
+    file.write_all_at(ending.as_bytes(), length)?;
+    file.set_len(length + ending.len() as u64)
 }

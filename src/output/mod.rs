@@ -198,12 +198,12 @@ fn remove(folder: &Path, is_old: impl Fn(&str) -> bool) -> Result<(), OutputErro
 pub struct Table(GrowingFile);
 
 impl Table {
-    /// Starts the file at `path`: its first columns are the fields of a row like `example`, the others
-    /// are `more`.
+    /// The table at `path`, a file from the first rows on: its first columns are the fields of a row like
+    /// `example`, the others are `more`.
     ///
     /// # Errors
-    /// The file cannot be created.
-    pub fn create(
+    /// The names of the columns cannot be written.
+    pub fn new(
         path: PathBuf,
         example: &impl Serialize,
         more: &[String],
@@ -214,18 +214,15 @@ impl Table {
             csv_text(false, [columns.collect::<Vec<_>>()])
         });
         let header = header.map_err(|e| OutputError::new(&path, e))?;
-        GrowingFile::create(path, &String::from_utf8_lossy(&header), "").map(Self)
+        Ok(Self(GrowingFile::new(path, String::from_utf8_lossy(&header).into_owned(), "")))
     }
 
-    /// Saves how long the file is, or goes back to that length of the one at `path`.
+    /// Saves how long the file is, or goes back to that length.
     ///
     /// # Errors
     /// The file is gone or shorter.
-    pub fn archive(this: &mut Option<Self>, path: PathBuf, archive: &mut Archive) -> Observed {
-        let mut file = this.take().map(|table| table.0);
-        GrowingFile::archive(&mut file, path, "", archive)?;
-        *this = file.map(Self);
-        Ok(())
+    pub fn archive(&mut self, archive: &mut Archive) -> Observed {
+        self.0.archive(archive)
     }
 
     /// Appends rows.

@@ -24,8 +24,8 @@ const TRIANGLE: u8 = 5;
 const QUADRATIC_TRIANGLE: u8 = 22;
 /// VTK's names of the types of numbers.
 pub(super) const REAL: &str = "Float64";
-pub(super) const INTEGER: &str = "Int32";
-pub(super) const BYTE: &str = "UInt8";
+const INTEGER: &str = "Int32";
+const BYTE: &str = "UInt8";
 
 /// How a list of frames ends.
 const LIST_END: &str = "</Collection>\n</VTKFile>\n";
@@ -53,7 +53,7 @@ struct Files {
     /// `<Points>` and `<Cells>`, the same in every frame, in the element `<Piece>`.
     mesh: String,
     /// `fields.pvd`, on the first rank.
-    list: FrameList,
+    list: GrowingFile,
     /// Γ_C, on the first rank.
     contact: ContactWriter,
 }
@@ -78,8 +78,8 @@ impl FieldWriter {
         let mesh = mesh_text(&problem.body).map_err(|e| OutputError::new(folder, e))?;
         let digits = digits(problem.scene());
         let folder = folder.to_owned();
-        let list = FrameList::new(folder.join("fields.pvd"));
-        let contact = ContactWriter::new(&folder);
+        let list = list_of_frames(folder.join("fields.pvd"));
+        let contact = ContactWriter::new(&folder)?;
         let files = Background::new(Files { folder, mesh, list, contact });
         Ok(Self { files, frames: 0, last_time: None, digits })
     }
@@ -156,7 +156,7 @@ impl Files {
             let text = list_of_pieces((0..comm.size()).map(piece_file), points, cells);
             write_whole(&self.folder.join(&whole), text.as_bytes())?;
         }
-        self.list.add(frame.time, &whole)
+        self.list.add(entry(frame.time, &whole).as_bytes())
     }
 
     fn piece(&self, points: &[DataArray], cells: &[DataArray]) -> io::Result<String> {
@@ -171,35 +171,14 @@ impl Files {
 }
 
 /// A list of frames over time for ParaView, a file from the first frame on.
-pub(super) struct FrameList {
-    path: PathBuf,
-    file: Option<GrowingFile>,
+pub(super) fn list_of_frames(path: PathBuf) -> GrowingFile {
+    let empty = vtk_file("Collection", "", "");
+    GrowingFile::new(path, empty.trim_end_matches(LIST_END).to_owned(), LIST_END)
 }
 
-impl FrameList {
-    /// The list that will be at `path`.
-    pub(super) fn new(path: PathBuf) -> Self {
-        Self { path, file: None }
-    }
-
-    /// Saves how long the list is, or goes back to that length.
-    pub(super) fn archive(&mut self, archive: &mut Archive) -> Observed {
-        GrowingFile::archive(&mut self.file, self.path.clone(), LIST_END, archive)
-    }
-
-    /// Adds the frame in `file` of a time, s.
-    pub(super) fn add(&mut self, time: f64, file: &str) -> Result<(), OutputError> {
-        let line = format!("<DataSet timestep=\"{time}\" file=\"{file}\"/>\n");
-        match &mut self.file {
-            Some(list) => list.add(line.as_bytes()),
-            none => {
-                let list = vtk_file("Collection", "", &line);
-                let list = list.trim_end_matches(LIST_END);
-                *none = Some(GrowingFile::create(self.path.clone(), list, LIST_END)?);
-                Ok(())
-            }
-        }
-    }
+/// The entry of a list for the frame in `file` of a time, s.
+pub(super) fn entry(time: f64, file: &str) -> String {
+    format!("<DataSet timestep=\"{time}\" file=\"{file}\"/>\n")
 }
 
 /// Digits that the numbers of all frames have, so that their names sort.
@@ -213,22 +192,33 @@ fn digits(scene: &Scene) -> usize {
     DIGITS.max(frames.ilog10() as usize + 1)
 }
 
-/// The beginning of `<Piece>`, with `<Points>` and `<Cells>`.
+/// The mesh of this rank.
 fn mesh_text(body: &Body) -> io::Result<String> {
-    let points = body.nodes.points.iter().flat_map(|&[x, y]| [x, y, 0.0]);
     let own = body.own_triangles;
-    let (nodes, kind, per_cell) = match body.elements() {
-        Elements::Linear(cells) => (cells.nodes[..own].as_flattened(), TRIANGLE, 3),
-        Elements::Quadratic(cells) => (cells.nodes[..own].as_flattened(), QUADRATIC_TRIANGLE, 6),
-    };
-    let nodes = nodes.iter().map(|&node| node as i32);
-    let offsets = (1..=own).map(|t| (per_cell * t) as i32);
-    let types = iter::repeat_n(kind, own);
+    match body.elements() {
+        Elements::Linear(cells) => cells_text(&body.nodes.points, &cells.nodes[..own], TRIANGLE),
+        Elements::Quadratic(cells) => {
+            cells_text(&body.nodes.points, &cells.nodes[..own], QUADRATIC_TRIANGLE)
+        }
+    }
+}
+
+/// The beginning of `<Piece>`, with `<Points>` and `<Cells>` of one kind with N nodes each.
+pub(super) fn cells_text<const N: usize>(
+    points: &[[f64; 2]],
+    cells: &[[usize; N]],
+    kind: u8,
+) -> io::Result<String> {
+    let coordinates = points.iter().flat_map(|&[x, y]| [x, y, 0.0]);
+    let nodes = cells.as_flattened().iter().map(|&node| node as i32);
+    let offsets = (1..=cells.len()).map(|cell| (N * cell) as i32);
+    let types = iter::repeat_n(kind, cells.len());
     Ok(format!(
-        "<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{own}\">\n\
+        "<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n\
          <Points>\n{}</Points>\n<Cells>\n{}{}{}</Cells>\n",
-        body.nodes.points.len(),
-        DataArray::new("Points", REAL, 3, points).element()?,
+        points.len(),
+        cells.len(),
+        DataArray::new("Points", REAL, 3, coordinates).element()?,
         DataArray::new("connectivity", INTEGER, 1, nodes).element()?,
         DataArray::new("offsets", INTEGER, 1, offsets).element()?,
         DataArray::new("types", BYTE, 1, types).element()?,

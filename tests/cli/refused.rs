@@ -163,7 +163,10 @@ fn arguments() {
         refused(&test_directory, arguments, fragments);
     }
     let said = test_directory.say(&["compare", "scene.toml", "--solvers", "tao,simplex"]);
-    said.fails(2, &["contact.solver is unknown", "`simplex`", "active-set, penalty-duality, tao", "tao:TYPE"]);
+    said.fails(
+        2,
+        &["contact.solver is unknown", "`simplex`", "active-set, penalty-duality, tao", "tao:TYPE"],
+    );
     assert!(!test_directory.path("out/compare").exists());
     test_directory.say(&["run"]).fails(2, &["<SCENE>"]);
     test_directory.say(&["rnu", "scene.toml"]).fails(2, &["unrecognized subcommand 'rnu'"]);
