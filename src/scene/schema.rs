@@ -62,8 +62,10 @@ impl<'t> Findings<'t> {
             (DeValue::Table(table), Some("object")) => self.check_table(&key, table, schema),
             (DeValue::Array(array), Some("array")) => self.check_array(&key, array, schema),
             _ => {
-                let problem = judge(value, schema, self.text.folder()).err();
-                problem.into_iter().for_each(|problem| self.note(&key, problem));
+                let value = Spanned::new(NOWHERE, value.clone()).into_deserializer();
+                let value = toml::Value::deserialize(value).map_err(|e| e.message().to_owned());
+                let judged = value.and_then(|value| judge(&value, schema, self.text.folder()));
+                judged.err().into_iter().for_each(|problem| self.note(&key, problem));
             }
         }
         if self.problems.len() > before {
@@ -208,49 +210,36 @@ fn complete(value: &mut toml::Value, schema: &Schema) {
 ///
 /// # Errors
 /// What is wrong; of several alternatives the last one tells.
-fn judge(value: &DeValue, schema: &Schema, folder: &Path) -> Result<(), String> {
+fn judge(value: &toml::Value, schema: &Schema, folder: &Path) -> Result<(), String> {
     if let Some([other, last]) = schema["anyOf"].as_array().map(Vec::as_slice) {
         return judge(value, other, folder).or_else(|_| judge(value, last, folder));
     }
-    let number = number(value);
+    let number = value.as_float().or(value.as_integer().map(|number| number as f64));
     if let Some(kind) = schema["format"].as_str() {
-        return judge_expression(value, number, kind, folder);
+        return judge_expression(value.as_str(), number, kind, folder);
     }
     let is = |choice: &Schema| match choice.as_str() {
         Some(name) => value.as_str() == Some(name),
         None => number.is_some() && number == choice.as_f64(),
     };
-    let (wanted, holds) = match (schema["enum"].as_array(), schema["type"].as_str()) {
-        (Some(choices), _) => {
+    let rule = schema["values"].as_str().unwrap_or("finite");
+    let (wanted, holds) = match (schema["enum"].as_array(), schema["type"].as_str(), number) {
+        (Some(choices), ..) => {
             let names: Vec<String> = choices.iter().map(Schema::to_string).collect();
             (names.join(" or "), choices.iter().any(is))
         }
-        (_, Some("string")) => ("a string".to_owned(), value.is_str()),
-        (_, Some("boolean")) => ("true or false".to_owned(), value.is_bool()),
-        (_, Some("array")) => ("an array".to_owned(), false),
-        (_, Some("object")) => ("a table".to_owned(), false),
-        _ => {
-            let rule = schema["values"].as_str().unwrap_or("finite");
-            match number {
-                Some(number) => (rule.to_owned(), is_within(number, schema)),
-                None => (format!("a number: {rule}"), false),
-            }
-        }
+        (_, Some("string"), _) => ("a string".to_owned(), value.is_str()),
+        (_, Some("boolean"), _) => ("true or false".to_owned(), value.is_bool()),
+        (_, Some("array"), _) => ("an array".to_owned(), false),
+        (_, Some("object"), _) => ("a table".to_owned(), false),
+        (.., Some(number)) => (rule.to_owned(), is_within(number, schema)),
+        _ => (format!("a number: {rule}"), false),
     };
-    match (holds, value) {
-        (true, _) => Ok(()),
-        (_, DeValue::Table(_) | DeValue::Array(_)) => Err(format!("must be {wanted}")),
-        (_, DeValue::String(text)) => Err(format!("must be {wanted}, but is \"{text}\"")),
-        (_, DeValue::Boolean(flag)) => Err(format!("must be {wanted}, but is {flag}")),
-        _ => Err(number.map_or_else(
-            || format!("must be {wanted}"),
-            |number| format!("must be {wanted}, but is {number}"),
-        )),
-    }
-}
-
-fn number(value: &DeValue) -> Option<f64> {
-    f64::deserialize(Spanned::new(NOWHERE, value.clone()).into_deserializer()).ok()
+    let found = match value {
+        toml::Value::Array(_) | toml::Value::Table(_) => String::new(),
+        value => format!(", but is {value}"),
+    };
+    if holds { Ok(()) } else { Err(format!("must be {wanted}{found}")) }
 }
 
 /// Whether a number is finite and within the bounds of the schema.
@@ -268,15 +257,13 @@ fn is_within(number: f64, schema: &Schema) -> bool {
 
 /// Whether a text or number is an expression of this kind, and finite if it is constant.
 fn judge_expression(
-    value: &DeValue,
+    text: Option<&str>,
     number: Option<f64>,
     kind: &str,
     folder: &Path,
 ) -> Result<(), String> {
-    let expression = match (value, number) {
-        (DeValue::String(text), _) => {
-            Expression::parse_in(text, folder).map_err(|error| error.to_string())?
-        }
+    let expression = match (text, number) {
+        (Some(text), _) => Expression::parse_in(text, folder).map_err(|error| error.to_string())?,
         (_, Some(number)) => Expression::constant(number),
         _ => return Err("must be a number or an expression in quotes".to_owned()),
     };
