@@ -35,11 +35,7 @@ enum Command {
     /// `mesh`, it meshes a .geo whose .msh is missing or older.
     Check(command::SceneArguments),
     /// Tell what a folder of results holds: scene, program, outcome, errors, frames.
-    Info {
-        /// A folder that `run` has written, e.g. out/lshape.
-        #[arg(value_name = "OUT")]
-        folder: PathBuf,
-    },
+    Info(command::ScriptArguments),
     /// Run scenes with every contact solver and compare cost and answers.
     Compare(command::ScriptArguments),
     /// Draw the figures of runs into their folders; also at other times, as vectors, moving (--help).
@@ -76,7 +72,7 @@ fn main() -> ExitCode {
         Command::Run(arguments) => command::run(&arguments),
         Command::New { name } => command::new(&name),
         Command::Check(arguments) => command::check(&arguments),
-        Command::Info { folder } => command::info(&folder),
+        Command::Info(arguments) => command::script("info", &arguments),
         Command::Compare(arguments) => command::script("compare", &arguments),
         Command::Figures(arguments) => command::script("figures", &arguments),
         Command::Report(arguments) => command::script("report", &arguments),

@@ -1,4 +1,4 @@
-//! `signorini figures`, `report` and `compare`: Python scripts that the program carries.
+//! `signorini figures`, `report`, `info` and `compare`: Python scripts that the program carries.
 
 use super::{Failure, ranks::require_one_process};
 use clap::Args;
@@ -18,8 +18,8 @@ macro_rules! scripts {
 }
 
 /// What the scripts import from each other.
-const SCRIPTS: [(&str, &str); 17] = scripts! {
-    "animation" "compare" "contact_pressure" "drawing" "elements" "expressions" "figures" "histories" "limits"
+const SCRIPTS: [(&str, &str); 18] = scripts! {
+    "animation" "compare" "contact_pressure" "drawing" "elements" "expressions" "figures" "histories" "info" "limits"
     "maps" "paraview_script" "paraview_view" "reading" "report" "report_page" "results" "setting"
 };
 /// Runs one of them.

@@ -3,7 +3,6 @@
 mod check;
 mod checkpoint;
 mod figures;
-mod info;
 mod keys;
 mod launch;
 mod new;
@@ -16,7 +15,6 @@ mod screen;
 
 pub use check::check;
 pub use figures::{ScriptArguments, script};
-pub use info::info;
 pub use keys::keys;
 pub use new::new;
 pub use run::{RunArguments, run};

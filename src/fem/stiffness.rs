@@ -87,11 +87,6 @@ impl Stiffness {
         read as f64 + 32.0 * self.values.len() as f64 + 8.0 * self.matrix.entries()
     }
 
-    /// K as last filled, without what only refills need.
-    pub fn into_matrix(self) -> Matrix {
-        self.matrix
-    }
-
     /// K(ζ) from the values of ζ at the quadrature points, [`Body::at_points`]. (For P1, where strains
     /// are constant, this is exact.)
     ///

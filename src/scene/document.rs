@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use serde::{Deserialize, de::IntoDeserializer};
 use toml::Spanned;
-use toml::de::{DeArray, DeTable, DeValue};
+use toml::de::{DeTable, DeValue};
 
 use super::error::{MOST_SHOWN, SceneError, suggestion};
 
@@ -94,7 +94,7 @@ impl SceneText {
         if !self.sets.is_empty() && problems.iter().all(of_the_file) {
             *last += &format!("\n(the file was read with --set {})", self.sets.join(" --set "));
         }
-        Err(SceneError::Refused(reports))
+        Err(SceneError(reports))
     }
 
     /// The message with its place before it and the lines of the file after it, underlined.
@@ -140,13 +140,13 @@ impl SceneText {
     }
 
     /// Parses the file and puts the `--set` arguments in, in their order.
-    pub(super) fn parse(&self) -> Result<DeTable<'_>, SceneError> {
+    pub(super) fn parse(&self) -> Result<DeValue<'_>, SceneError> {
         let (root, errors) = DeTable::parse_recoverable(&self.file);
         let syntax = |error: &toml::de::Error| {
             (error.span().unwrap_or(NOWHERE), format!("not valid TOML: {}", error.message()))
         };
         self.verdict(errors.iter().map(syntax).collect())?;
-        let mut root = root.into_inner();
+        let mut root = DeValue::Table(root.into_inner());
         let mut problems = Vec::new();
         for argument in &self.arguments {
             let put = match DeTable::parse(argument) {
@@ -199,59 +199,45 @@ fn misshapen(argument: &str) -> String {
     format!("{problem}; write --set KEY=VALUE, for example --set time.step=0.005")
 }
 
-/// Puts the values that are `given` by an `argument` in the place of those in the table whose key is
-/// `prefix`. Dotted keys reach into tables; a table in braces takes the place of the old one.
+/// Puts the values that are `given` by an `argument` in the place of those in the table, or in the array of
+/// tables with names, at `key`. Dotted keys reach into both; a table in braces takes the place of the old
+/// one.
 fn put_all<'t>(
-    old: &mut DeTable<'t>,
+    old: &mut DeValue<'t>,
     given: DeTable<'t>,
-    prefix: &str,
+    key: &str,
     argument: &str,
 ) -> Result<(), String> {
     for (name, value) in given {
-        let prefix = format!("{prefix}{}.", name.get_ref());
-        let span = value.span();
-        let old_value = old.get_mut(&name).map(Spanned::get_mut);
-        let braced = argument[span.start..].starts_with('{');
-        match (old_value.filter(|_| !braced), value.into_inner()) {
-            (Some(DeValue::Table(old)), DeValue::Table(given)) => {
-                put_all(old, given, &prefix, argument)?;
+        let key = below(key, name.get_ref());
+        let place = value.span();
+        let there = match old {
+            DeValue::Table(table) => table.get_mut(&name),
+            DeValue::Array(tables) => {
+                tables.iter_mut().find(|table| name_of(table.get_ref()) == Some(name.get_ref()))
             }
-            (Some(DeValue::Array(old)), DeValue::Table(given)) => {
-                put_named(old, given, &prefix, argument)?;
+            _ => None,
+        };
+        let is_braced = argument[place.start..].starts_with('{');
+        match (there.map(Spanned::get_mut), value.into_inner()) {
+            (Some(there @ (DeValue::Table(_) | DeValue::Array(_))), DeValue::Table(given))
+                if !is_braced =>
+            {
+                put_all(there, given, &key, argument)?;
             }
-            (_, value) => {
-                // The old key would tell where the old value was written.
-                old.remove(&name);
-                old.insert(name, Spanned::new(span, value));
-            }
-        }
-    }
-    Ok(())
-}
-
-/// Reaches into an array of tables by their names.
-fn put_named<'t>(
-    old: &mut DeArray<'t>,
-    given: DeTable<'t>,
-    prefix: &str,
-    argument: &str,
-) -> Result<(), String> {
-    for (name, value) in given {
-        let name = name.get_ref();
-        let table = old.iter_mut().map(Spanned::get_mut).find(|old| name_of(old) == Some(name));
-        let key = format!("{prefix}{name}");
-        match (table, value.into_inner()) {
-            (Some(DeValue::Table(old)), DeValue::Table(given)) => {
-                put_all(old, given, &format!("{key}."), argument)?;
-            }
-            (Some(_), _) => {
-                return Err(format!("{key} needs a key; write --set boundary.NAME.KEY=VALUE"));
-            }
-            (None, _) => {
-                let names = old.iter().filter_map(|table| name_of(table.get_ref()));
-                let suggestion = suggestion(name, &names.collect::<Vec<_>>());
-                return Err(format!("unknown key {key}{suggestion}"));
-            }
+            (there, value) => match (there.is_some(), &mut *old) {
+                (_, DeValue::Table(table)) => {
+                    // The old key would tell where the old value was written.
+                    table.remove(&name);
+                    table.insert(name, Spanned::new(place, value));
+                }
+                (false, DeValue::Array(tables)) => {
+                    let names = tables.iter().filter_map(|table| name_of(table.get_ref()));
+                    let suggestion = suggestion(name.get_ref(), &names.collect::<Vec<_>>());
+                    return Err(format!("unknown key {key}{suggestion}"));
+                }
+                _ => return Err(format!("{key} needs a key; write --set {key}.KEY=VALUE")),
+            },
         }
     }
     Ok(())

@@ -1,27 +1,14 @@
 //! What can be wrong with a scene, said to the person who wrote it.
 
-use std::path::PathBuf;
-
 /// More problems than this are counted, not shown.
 pub(super) const MOST_SHOWN: usize = 20;
 
-/// Why a scene was refused.
+/// Why a scene was refused: its problems, at least one. Each tells the file and line (or the `--set`), the
+/// key in full, what is wrong and what to write instead, and shows the line underlined. The first is
+/// displayed as it is, the others after `error: `.
 #[derive(Debug, thiserror::Error)]
-pub enum SceneError {
-    /// The file could not be read.
-    #[error("{}: the scene cannot be read: {source}", path.display())]
-    Read {
-        /// The scene file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// The problems of the scene, at least one: each tells the file and line (or the `--set`), the
-    /// key in full, what is wrong and what to write instead, and shows the line underlined. The
-    /// first is displayed as it is, the others after `error: `.
-    #[error("{}", listed(.0))]
-    Refused(Vec<String>),
-}
+#[error("{}", listed(.0))]
+pub struct SceneError(pub Vec<String>);
 
 fn listed(problems: &[String]) -> String {
     let shown = problems[..problems.len().min(MOST_SHOWN)].join("\nerror: ");

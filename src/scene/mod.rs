@@ -29,7 +29,6 @@ use crate::{
 use document::SceneText;
 use schema::Findings;
 use serde::Deserialize;
-use toml::de::DeValue;
 
 /// A problem to solve, as described by a scene file.
 #[derive(Debug, Clone)]
@@ -292,10 +291,11 @@ impl Scene {
         if path.extension().is_some_and(|ending| ending == "geo" || ending == "msh") {
             let problem = "it is a mesh, and what runs is a scene that names it in [mesh] (`signorini \
                            new NAME` writes one)";
-            return Err(SceneError::Refused(vec![format!("{}: {problem}", path.display())]));
+            return Err(SceneError(vec![format!("{}: {problem}", path.display())]));
         }
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| SceneError::Read { path: path.to_owned(), source })?;
+        let text = std::fs::read_to_string(path).map_err(|error| {
+            SceneError(vec![format!("{}: the scene cannot be read: {error}", path.display())])
+        })?;
         Self::parse(&text, path, overrides)
     }
 
@@ -305,7 +305,7 @@ impl Scene {
     /// As [`Scene::read`], but for the reading itself.
     pub fn parse(text: &str, path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
         let mut text = SceneText::new(path, text, overrides);
-        let root = DeValue::Table(text.parse()?);
+        let root = text.parse()?;
         let (document, tables) = text.values(&root);
         let mut found = Findings::check(&text, &root, &document);
         let scene = tables::scene(&mut found);
@@ -313,7 +313,7 @@ impl Scene {
         text.verdict(problems)?;
         (text.places, text.document, text.tables) = (places, document, tables);
         // Nothing is missing, or there would be a problem.
-        let scene = scene.ok_or_else(|| SceneError::Refused(Vec::new()))?;
+        let scene = scene.ok_or_else(|| SceneError(Vec::new()))?;
         Ok(Self { text, ..scene })
     }
 }

@@ -66,7 +66,7 @@ fn a_bad_set_is_named() {
             ["--set boundary.load.gaap=0: unknown key boundary.load.gaap", "mean `gap`"],
         ),
         ("damage.initial=t", ["--set damage.initial=t: damage.initial depends", "on t"]),
-        ("boundary.load=3", ["boundary.load needs a key", "boundary.NAME.KEY=VALUE"]),
+        ("boundary.load=3", ["boundary.load needs a key", "boundary.load.KEY=VALUE"]),
         ("boundary=3", ["--set boundary=3: boundary must be an array", "--set boundary=3"]),
         (
             "boundary.load.traction=[0,\"q\"]",

@@ -1,0 +1,62 @@
+#!/usr/bin/python3
+"""Tells what a folder of results holds: scene, program, outcome, errors, frames, files.
+
+    signorini info out/lshape
+"""
+
+import argparse
+import json
+import re
+import sys
+from pathlib import Path
+
+
+def row(name, value):
+    return f"  {name:<30} {value}"
+
+
+def entry(name, value):
+    """The lines of an entry of summary.json; of a table those of its entries."""
+    if isinstance(value, dict):
+        return [line for below in value for line in entry(f"{name}.{below}", value[below])]
+    if isinstance(value, list):
+        # Others than notes are for figures.
+        words = [word for word in value if isinstance(word, str)]
+        return [row(name, " ".join(words))] if name.endswith("command") else [
+            row(name, word) for word in words]
+    text = value if isinstance(value, str) else json.dumps(value)
+    return [] if value is None else [row(name, text)]
+
+
+def description(folder):
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    lines = [line for name in summary if name != "phases" for line in entry(name, summary[name])]
+    times = []
+    if (folder / "fields.pvd").exists():
+        times = re.findall('timestep="(.*?)"', (folder / "fields.pvd").read_text(encoding="utf-8"))
+    if len(times) > 1:
+        first, last = (f"{float(time):.10g}" for time in (times[0], times[-1]))
+        lines.append(row("frames", f"{len(times)}, from t = {first} to {last}"))
+    names = sorted(path.name for path in folder.iterdir())
+    others = [name for name in names if not name.startswith(("fields_", "contact_"))]
+    return "\n".join([*lines, row("files", " ".join(others))])
+
+
+def main(prog=None):
+    """Returns the exit code: 2 if the folder holds no results."""
+    parser = argparse.ArgumentParser(
+        prog=prog, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, metavar="OUT", help="a folder that `run` has written")
+    folder = parser.parse_args().folder
+    try:
+        print(description(folder))
+    except (OSError, ValueError) as error:
+        problem = error.strerror if isinstance(error, OSError) else error
+        print(f"error: {folder / 'summary.json'}: {problem}; name a folder of results, out/SCENE",
+              file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
