@@ -154,20 +154,6 @@ impl<'t> Findings<'t> {
         built
     }
 
-    /// The tables in the table at `key` by their names, each with what it leaves out taken from around it.
-    pub(super) fn named<T: DeserializeOwned>(&mut self, key: &str) -> Vec<(String, T)> {
-        let table = self.document.get(key).and_then(toml::Value::as_table).cloned();
-        let entries = table.filter(|_| !self.unsound.contains(key)).into_iter().flatten();
-        let (named, own): (Vec<_>, Vec<_>) = entries.partition(|(_, value)| value.is_table());
-        let with_own = |(name, value): (String, toml::Value)| {
-            let mut all: toml::Table = own.iter().cloned().collect();
-            all.extend(value.as_table().cloned().unwrap_or_default());
-            let key = below(key, &name);
-            Some((name, self.build_value(&key, all.into(), Ok)?))
-        };
-        named.into_iter().filter_map(with_own).collect()
-    }
-
     fn build_value<K: DeserializeOwned, T>(
         &mut self,
         key: &str,
@@ -177,10 +163,14 @@ impl<'t> Findings<'t> {
         if self.unsound.contains(key) {
             return None;
         }
-        let keys = value.try_into().map_err(|error| ("", format!("is wrong: {}", error.message())));
-        let built = keys.and_then(build);
+        let built = value.try_into().map_err(is_wrong).and_then(build);
         built.map_err(|(name, problem)| self.note(&below(key, name), problem)).ok()
     }
+}
+
+/// What the schema does not know of.
+pub(super) fn is_wrong(error: toml::de::Error) -> Fault {
+    ("", format!("is wrong: {}", error.message()))
 }
 
 /// Puts the defaults of the schema in for what is left out; whole numbers are also written as 2e4.

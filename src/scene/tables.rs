@@ -3,7 +3,7 @@
 
 use super::boundary::boundary;
 use super::expression::Expression;
-use super::schema::{Fault, Findings};
+use super::schema::{Fault, Findings, is_wrong};
 use super::{
     Damage, MeshSource, Probe, Scene, Scheme, Stepping, Surface, TimeGrid, Units, may_start_at,
 };
@@ -13,7 +13,7 @@ use crate::{
     mesh::Order,
     model::DamageLaw,
 };
-use serde::Deserialize;
+use serde::{Deserialize, de::DeserializeOwned};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -42,8 +42,8 @@ pub(super) fn scene(found: &mut Findings) -> Option<Scene> {
     {
         found.note(&format!("probe.{name}"), "has the name of a boundary; choose another one");
     }
-    let materials = found.named("material");
-    let laws = found.named("damage");
+    let materials = found.build("material", surfaces).unwrap_or_default();
+    let laws = found.build("damage", surfaces).unwrap_or_default();
 
     let material = material?;
     let law = damage.as_ref().map(|damage| damage.law);
@@ -74,6 +74,17 @@ pub(super) fn scene(found: &mut Findings) -> Option<Scene> {
         notes: note.flatten().into_iter().collect(),
         text: found.text.clone(),
     })
+}
+
+/// The tables of surfaces in a table by their names, each with what it leaves out taken from around it.
+fn surfaces<T: DeserializeOwned>(table: toml::Table) -> Result<Vec<(String, T)>, Fault> {
+    let (named, own): (Vec<_>, Vec<_>) = table.into_iter().partition(|(_, value)| value.is_table());
+    let with_own = |(name, value): (String, toml::Value)| {
+        let mut all: toml::Table = own.iter().cloned().collect();
+        all.extend(value.as_table().cloned().unwrap_or_default());
+        Ok((name, all.try_into().map_err(is_wrong)?))
+    };
+    named.into_iter().map(with_own).collect()
 }
 
 #[derive(Deserialize)]
