@@ -2,8 +2,7 @@
 
 mod check;
 mod checkpoint;
-mod figures;
-mod keys;
+mod script;
 mod launch;
 mod new;
 mod profile;
@@ -14,10 +13,9 @@ mod run;
 mod screen;
 
 pub use check::check;
-pub use figures::{ScriptArguments, script};
-pub use keys::keys;
 pub use new::new;
 pub use run::{RunArguments, run};
+pub use script::{ScriptArguments, script};
 
 use clap::Args;
 use ranks::require_one_process;
@@ -25,7 +23,7 @@ use signorini::{
     contact::{self, REGISTRY, SOLVERS, TAO_TYPES, summaries},
     mesh::{self, Mesh, MeshError, Order},
     output::terminal::say,
-    scene::{MeshSource, Scene},
+    scene::{MeshSource, SCHEMA, Scene},
 };
 use std::{
     fmt,
@@ -168,6 +166,15 @@ fn read(
     }
     let mesh = mesh::load(file, &parameters, scene.order).map_err(Failure::mesh)?;
     Ok((scene, mesh))
+}
+
+/// The reference of all keys of a scene, made of their schema by scripts/keys.py.
+const KEYS: &str = include_str!("../../geo/KEYS.md");
+
+/// `signorini keys [--schema]`.
+pub fn keys(as_schema: bool) -> Result<(), Failure> {
+    say(if as_schema { SCHEMA } else { KEYS }.trim_end());
+    Ok(())
 }
 
 /// `signorini solvers`.

@@ -87,25 +87,19 @@ fn triangles(contents: &Contents) -> (Vec<&Element<3>>, BTreeMap<String, Vec<usi
 
 /// The numbers of the body's nodes by their tags.
 type Index = HashMap<u64, usize>;
-/// In place of the number of a node that `$Nodes` does not list.
-const UNLISTED: usize = usize::MAX;
 
 /// Numbers the nodes of the triangles `elements` in the order of the file, and finds them there.
 fn number_nodes<'a>(
     contents: &'a Contents,
     elements: &[&Element<3>],
 ) -> Result<(Index, Vec<&'a Node>)> {
-    let tags = elements.iter().flat_map(|element| element.nodes);
-    let mut index: Index = tags.map(|tag| (tag, UNLISTED)).collect();
-    let mut nodes = Vec::with_capacity(index.len());
-    for node in &contents.nodes {
-        match index.get_mut(&node.tag) {
-            Some(number) if *number == UNLISTED => {
-                *number = nodes.len();
-                nodes.push(node);
-            }
-            Some(_) => return listed_twice(node),
-            None => {}
+    let used: HashSet<u64> = elements.iter().flat_map(|element| element.nodes).collect();
+    let nodes = contents.nodes.iter().filter(|node| used.contains(&node.tag));
+    let nodes: Vec<&Node> = nodes.collect();
+    let mut index = Index::with_capacity(nodes.len());
+    for (number, node) in nodes.iter().enumerate() {
+        if index.insert(node.tag, number).is_some() {
+            return listed_twice(node);
         }
     }
     Ok((index, nodes))
@@ -117,10 +111,10 @@ fn counter_clockwise(
     index: &Index,
     nodes: &[[f64; 2]],
 ) -> Result<[usize; 3]> {
-    let mut triangle = tags.map(|tag| index[&tag]);
-    if let Some(missing) = triangle.iter().position(|&node| node == UNLISTED) {
-        return missing_node(tag, tags[missing], at);
+    if let Some(missing) = tags.into_iter().find(|node| !index.contains_key(node)) {
+        return missing_node(tag, missing, at);
     }
+    let mut triangle = tags.map(|tag| index[&tag]);
     let [a, b, c] = triangle.map(|node| nodes[node]);
     let twice = twice_area(a, b, c);
     // Huge coordinates overflow the area.
@@ -195,7 +189,7 @@ fn curves(contents: &Contents, index: &Index, sides: &[Side]) -> Result<BTreeMap
     let mut seen = HashSet::new();
     for line in &contents.lines {
         let name = contents.name(1, line.group);
-        let mut edge = line.nodes.map(|tag| index.get(&tag).copied().unwrap_or(UNLISTED));
+        let mut edge = line.nodes.map(|tag| index.get(&tag).copied().unwrap_or(usize::MAX));
         edge.sort_unstable();
         let sides = &sides[sides.partition_point(|side| side.edge < edge)..];
         let Some(side) = sides.first().filter(|side| side.edge == edge) else {

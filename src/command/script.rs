@@ -19,8 +19,9 @@ macro_rules! scripts {
 
 /// What the scripts import from each other.
 const SCRIPTS: [(&str, &str); 18] = scripts! {
-    "animation" "compare" "contact_pressure" "drawing" "elements" "expressions" "figures" "histories" "info" "limits"
-    "maps" "paraview_script" "paraview_view" "reading" "report" "report_page" "results" "setting"
+    "animation" "compare" "contact_pressure" "drawing" "elements" "expressions" "figures" "histories"
+    "info" "limits" "maps" "paraview_script" "paraview_view" "reading" "report" "report_page" "results"
+    "setting"
 };
 /// Runs one of them.
 const EMBEDDED: &str = include_str!("../../scripts/embedded.py");
