@@ -133,8 +133,9 @@ impl SceneText {
         let root = Spanned::new(NOWHERE, root.clone()).into_deserializer();
         let mut document = toml::Table::deserialize(root).unwrap_or_default();
         let mut tables = Vec::new();
-        for (_, value) in document.iter_mut() {
-            complete_paths(value, self.folder(), &mut tables);
+        for key in ["body", "boundary", "damage"] {
+            let expressions = document.get_mut(key).into_iter();
+            expressions.for_each(|value| complete_paths(value, self.folder(), &mut tables));
         }
         (document, tables)
     }
