@@ -275,6 +275,17 @@ impl Factor {
         }
     }
 
+    /// Makes the factor, where it is condensed, that of these unknowns prescribed; false if there is none
+    /// then. Collective.
+    ///
+    /// # Errors
+    /// There is no memory for it.
+    pub(crate) fn prescribe(&mut self, unknowns: &[usize]) -> Result<bool, PetscError> {
+        let condensed =
+            matches!(self.method, Some((_, Method::Substructure { condensed: true, .. })));
+        Ok(self.exists() && (!condensed || self.restrict(unknowns, &[])?))
+    }
+
     /// As [`Self::apply`] where `choose` chooses what of the condensed unknowns is prescribed: these if
     /// they are others than before. Collective.
     ///
@@ -306,7 +317,7 @@ impl Factor {
     }
 
     /// Whether the last factorisation went well.
-    pub(super) fn exists(&self) -> bool {
+    pub(crate) fn exists(&self) -> bool {
         self.policy.is_some()
     }
 

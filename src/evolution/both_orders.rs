@@ -16,34 +16,35 @@ use crate::{
 pub(super) struct BothOrders<'a> {
     /// The order of the run.
     order: Order,
-    /// K⁻¹ in P1.
-    coarse: Compliance<'a>,
+    coarse: &'a DiscreteProblem,
     fine: &'a DiscreteProblem,
+    /// K⁻¹ in P1, of about the last state of the run.
+    compliance: Compliance<'a>,
     /// The node of P2 at each vertex.
     node_of_vertex: Vec<usize>,
     /// The node of P2 in the middle of each edge, and the vertices at its ends.
     middles: Vec<(usize, [usize; 2])>,
-    /// u₂ − u₁ of the last state, in the unknowns of P2.
+    /// u₂ − u₁ of the last state, or u₁ − Iu₂, in the unknowns of the order that is solved for.
     correction: Option<Vec<f64>>,
 }
 
-/// A state in P2: what the iterations for u₂ keep.
-struct Fine<'a> {
+/// A state in the order that is solved for.
+struct Fixed<'a> {
     problem: &'a DiscreteProblem,
     zeta_at_points: Vec<f64>,
     /// Of each bound whether it is active.
     active: Vec<bool>,
-    /// The mean diagonal entry of K at each midpoint, N/m; 0 at vertices.
-    diagonal: Vec<f64>,
+    /// The midpoints of P2 and the mean diagonal entry of K at each, N/m.
+    diagonal: Vec<(usize, f64)>,
 }
 
-/// The square that the energy norm of u₂ − u₁ may still lack, as a part of it; iterations at most.
+/// The square that the energy norm of a correction may still lack, as a part of it; iterations at most.
 const REST: f64 = 0.003;
 const ITERATIONS: usize = 30;
 
 impl<'a> BothOrders<'a> {
-    /// From the problem of a run with its K⁻¹ and the same of the other order; `None` where the triangle
-    /// has no other order.
+    /// From the problem of a run with its K⁻¹ and its last state, and the same problem in the other order;
+    /// `None` where the triangle has no other order.
     ///
     /// # Errors
     /// PETSc failed.
@@ -51,18 +52,14 @@ impl<'a> BothOrders<'a> {
         session: &'a Session,
         run: &'a DiscreteProblem,
         other: &'a DiscreteProblem,
-        compliance: Compliance<'a>,
+        mut compliance: Compliance<'a>,
+        last: &State,
         phases: &'a Phases,
     ) -> Result<Option<Self>, RunError> {
         let order = run.body.order();
         let (coarse, fine) = match order {
-            Order::Linear => (compliance, other),
-            Order::Quadratic => {
-                // Makes room for another factor.
-                drop(compliance);
-                let step = ContactStep::new(session, other, SOLVERS[0], phases)?;
-                (step.into_compliance()?, run)
-            }
+            Order::Linear => (run, other),
+            Order::Quadratic => (other, run),
         };
         let Elements::Quadratic(Cells { nodes, .. }) = fine.body.elements() else {
             return Ok(None);
@@ -76,12 +73,20 @@ impl<'a> BothOrders<'a> {
         }
         let middles = ends.into_iter().enumerate();
         let middles = middles.filter_map(|(middle, ends)| Some((middle, ends?))).collect();
-        Ok(Some(Self { order, coarse, fine, node_of_vertex, middles, correction: None }))
+        if order == Order::Quadratic {
+            // Makes room for another factor.
+            drop(compliance);
+            compliance = ContactStep::new(session, other, SOLVERS[0], phases)?.into_compliance()?;
+            let contact = at_vertices(&node_of_vertex, &last.contact);
+            compliance.keep_factor(&State { contact, ..last.clone() })?;
+        }
+        let correction = None;
+        Ok(Some(Self { order, coarse, fine, compliance, node_of_vertex, middles, correction }))
     }
 
     /// The problems in P1 and P2.
     pub(super) fn problems(&self) -> [&'a DiscreteProblem; 2] {
-        [self.coarse.problem, self.fine]
+        [self.coarse, self.fine]
     }
 
     /// u₁ and u₂ of a state of the run; `None` where the active nodes do not support the body.
@@ -99,51 +104,55 @@ impl<'a> BothOrders<'a> {
         })
     }
 
-    /// u₁ = Iu₂ + K₁⁻¹ (f₁ − K₁ Iu₂).
+    /// u₁ from Iu₂, the values of u₂ at the vertices.
     fn coarser(&mut self, state: &State) -> Result<Option<Vec<f64>>, RunError> {
-        let mut u = self.at_vertices(&state.u);
-        let mut vertex_of_node = vec![None; self.fine.body.nodes.points.len()];
-        let vertices = self.node_of_vertex.iter().enumerate();
-        vertices.for_each(|(vertex, &node)| vertex_of_node[node] = Some(vertex));
-        let vertex = |point: &ContactPoint| {
-            Some(ContactPoint { node: vertex_of_node[point.node]?, ..*point })
+        let contact = at_vertices(&self.node_of_vertex, &state.contact);
+        self.compliance.set(&state.zeta, &contact)?;
+        let problem = self.coarse;
+        let flags = active_bounds(&problem.constraints, &contact, 0.0);
+        let fixed = Fixed {
+            problem,
+            zeta_at_points: problem.zeta_at_points(&state.zeta),
+            active: flags.into_iter().map(|flag| flag > 0.0).collect(),
+            diagonal: Vec::new(),
         };
-        let active = state.contact.iter().filter(|point| point.active);
-        self.coarse.set(&state.zeta, &active.filter_map(vertex).collect::<Vec<_>>())?;
-        let problem = self.coarse.problem;
-        let zeta = problem.zeta_at_points(&state.zeta);
-        let internal = problem.elasticity.internal_force(&problem.body, &zeta, &u);
-        let mut forces = problem.load(state.time);
-        add(&mut forces, -1.0, &internal);
-        let Some(correction) = self.coarse.displacement(forces)? else { return Ok(None) };
-        add(&mut u, 1.0, &correction);
-        Ok(Some(u))
+        self.solve(&fixed, state.time, self.at_vertices(&state.u))
     }
 
-    /// u₂ by conjugate gradients from u₁. The preconditioner is that of two levels, K₁⁻¹ of the forces
-    /// as P1 sees them and the diagonal of K at the midpoints, in the basis of P1 and what P2 adds to it
-    /// (Bank, Dupont, Yserentant, Numer. Math. 52, 1988); K₁⁻¹ being one digit's, the directions are
-    /// made orthogonal in the flexible way (Notay, SIAM J. Sci. Comput. 22, 2000). The first one is
-    /// u₂ − u₁ of the last state.
+    /// u₂ from u₁.
     fn finer(&mut self, state: &State) -> Result<Option<Vec<f64>>, RunError> {
-        self.coarse.set(&state.zeta, &state.contact)?;
-        let fine = Fine::new(self, state)?;
-        let (bases, partition) = (&self.fine.constraints.bases, &self.fine.body.nodes.partition);
-        let case = self.fine.load_case(state.time)?;
-        let start = fine.start(&case, self.prolonged(&state.u));
-        let (mut c, mut residual) = (start.clone(), case.load);
-        bases.force_to_local(&mut residual);
-        add(&mut residual, -1.0, &fine.product(&c)?);
-        fine.clear_fixed(&mut residual);
-        let mut direction = vec![0.0; c.len()];
-        let (mut image, mut stiffness, mut gained) = (direction.clone(), f64::INFINITY, 0.0);
+        self.compliance.set(&state.zeta, &state.contact)?;
+        let fixed = Fixed::finer(self, state)?;
+        self.solve(&fixed, state.time, self.prolonged(&state.u))
+    }
+
+    /// u at `time` by conjugate gradients from another field u. Their first direction is the correction
+    /// of the last state; the directions are made orthogonal in the flexible way (Notay, SIAM J. Sci.
+    /// Comput. 22, 2000).
+    fn solve(
+        &mut self,
+        fixed: &Fixed,
+        time: f64,
+        u: Vec<f64>,
+    ) -> Result<Option<Vec<f64>>, RunError> {
+        let DiscreteProblem { body, constraints, .. } = fixed.problem;
+        let partition = &body.nodes.partition;
+        let (start, mut residual) = {
+            let case = fixed.problem.load_case(time)?;
+            (fixed.start(&case, u), case.load)
+        };
+        constraints.bases.force_to_local(&mut residual);
+        add(&mut residual, -1.0, &fixed.product(&start)?);
+        fixed.clear_fixed(&mut residual);
+        let (mut direction, mut image) = (vec![0.0; start.len()], vec![0.0; start.len()]);
+        let (mut correction, mut stiffness, mut gained) = (image.clone(), f64::INFINITY, 0.0);
         for _ in 0..ITERATIONS {
             let z = match self.correction.take() {
                 Some(mut correction) => {
-                    fine.clear_fixed(&mut correction);
+                    fixed.clear_fixed(&mut correction);
                     correction
                 }
-                None => match self.preconditioned(&fine, &residual)? {
+                None => match self.preconditioned(fixed, &residual)? {
                     None => return Ok(None),
                     Some(z) if partition.dot(&residual, &z, 2) <= REST * gained => break,
                     Some(z) => z,
@@ -151,46 +160,53 @@ impl<'a> BothOrders<'a> {
             };
             let beta = -partition.dot(&z, &image, 2) / stiffness;
             direction.iter_mut().zip(&z).for_each(|(p, z)| *p = z + beta * *p);
-            image = fine.product(&direction)?;
-            fine.clear_fixed(&mut image);
+            image = fixed.product(&direction)?;
+            fixed.clear_fixed(&mut image);
             stiffness = partition.dot(&direction, &image, 2);
             if stiffness <= 0.0 {
                 return Ok(None);
             }
             let work = partition.dot(&direction, &residual, 2);
-            add(&mut c, work / stiffness, &direction);
+            add(&mut correction, work / stiffness, &direction);
             add(&mut residual, -work / stiffness, &image);
             gained += work * work / stiffness;
         }
-        let correction: Vec<f64> = c.iter().zip(&start).map(|(c, start)| c - start).collect();
+        let mut u = start;
+        add(&mut u, 1.0, &correction);
         self.correction = (gained > 0.0).then_some(correction);
-        bases.displacement_to_global(&mut c);
-        partition.update(&mut c, 2)?;
-        Ok(Some(c))
+        constraints.bases.displacement_to_global(&mut u);
+        partition.update(&mut u, 2)?;
+        Ok(Some(u))
     }
 
-    /// The preconditioner's answer to a residual, both in the unknowns of P2; `None` where the active
-    /// nodes do not support the body.
+    /// The preconditioner's answer to a residual, both in the unknowns of the order that is solved for;
+    /// `None` where the active nodes do not support the body. For P2 it is that of two levels, K₁⁻¹ of the
+    /// forces as P1 sees them and the diagonal of K at the midpoints, in the basis of P1 and what P2 adds
+    /// to it (Bank, Dupont, Yserentant, Numer. Math. 52, 1988).
     fn preconditioned(
         &mut self,
-        fine: &Fine,
+        fixed: &Fixed,
         residual: &[f64],
     ) -> Result<Option<Vec<f64>>, PetscError> {
-        let (bases, partition) = (&self.fine.constraints.bases, &self.fine.body.nodes.partition);
+        let DiscreteProblem { body, constraints, .. } = fixed.problem;
         let mut forces = residual.to_vec();
-        bases.force_to_global(&mut forces);
-        partition.update(&mut forces, 2)?;
-        let Some(coarse) = self.coarse.displacement(self.restricted(&forces))? else {
-            return Ok(None);
+        constraints.bases.force_to_global(&mut forces);
+        body.nodes.partition.update(&mut forces, 2)?;
+        let z = match self.order {
+            Order::Linear => {
+                let coarse = self.restricted(&forces);
+                self.compliance.displacement(coarse)?.map(|coarse| self.prolonged(&coarse))
+            }
+            Order::Quadratic => self.compliance.displacement(forces)?,
         };
-        let mut z = self.prolonged(&coarse);
-        bases.displacement_to_local(&mut z);
-        for &(middle, _) in &self.middles {
+        let Some(mut z) = z else { return Ok(None) };
+        constraints.bases.displacement_to_local(&mut z);
+        for &(middle, diagonal) in &fixed.diagonal {
             for dof in [2 * middle, 2 * middle + 1] {
-                z[dof] += residual[dof] / fine.diagonal[middle];
+                z[dof] += residual[dof] / diagonal;
             }
         }
-        fine.clear_fixed(&mut z);
+        fixed.clear_fixed(&mut z);
         Ok(Some(z))
     }
 
@@ -225,9 +241,9 @@ impl<'a> BothOrders<'a> {
     }
 }
 
-impl<'a> Fine<'a> {
-    /// Active are the same vertices as in `state`, and the midpoints between two of them. Collective.
-    fn new(orders: &BothOrders<'a>, state: &State) -> Result<Self, PetscError> {
+impl<'a> Fixed<'a> {
+    /// In P2. Active are the same vertices as in `state`, and the midpoints between two of them. Collective.
+    fn finer(orders: &BothOrders<'a>, state: &State) -> Result<Self, PetscError> {
         let problem = orders.fine;
         let (body, constraints) = (&problem.body, &problem.constraints);
         let node_of = |point: &ContactPoint| orders.node_of_vertex[point.node];
@@ -244,7 +260,9 @@ impl<'a> Fine<'a> {
         let bounds = constraints.bounds.iter().zip(flags);
         let active = bounds.map(|(bound, flag)| flag > 0.0 || between[bound.node]).collect();
         let zeta_at_points = problem.zeta_at_points(&state.zeta);
-        let diagonal = middle_diagonal(problem, &zeta_at_points);
+        let entries = middle_diagonal(problem, &zeta_at_points);
+        let diagonal = orders.middles.iter().map(|&(middle, _)| (middle, entries[middle]));
+        let diagonal = diagonal.collect();
         Ok(Self { problem, zeta_at_points, active, diagonal })
     }
 
@@ -281,7 +299,7 @@ impl<'a> Fine<'a> {
     }
 }
 
-/// See [`Fine`].
+/// See [`Fixed`]; 0 at vertices.
 fn middle_diagonal(problem: &DiscreteProblem, zeta_at_points: &[f64]) -> Vec<f64> {
     let (body, elasticity) = (&problem.body, &problem.elasticity);
     let mut diagonal = vec![0.0; body.nodes.points.len()];
@@ -301,4 +319,16 @@ fn middle_diagonal(problem: &DiscreteProblem, zeta_at_points: &[f64]) -> Vec<f64
 /// a ← a + factor · b.
 fn add(a: &mut [f64], factor: f64, b: &[f64]) {
     a.iter_mut().zip(b).for_each(|(a, b)| *a += factor * b);
+}
+
+/// The contact points at vertices, by these.
+fn at_vertices(node_of_vertex: &[usize], contact: &[ContactPoint]) -> Vec<ContactPoint> {
+    let last = node_of_vertex.iter().copied().max().unwrap_or(0);
+    let mut vertex_of_node = vec![None; last + 1];
+    let vertices = node_of_vertex.iter().enumerate();
+    vertices.for_each(|(vertex, &node)| vertex_of_node[node] = Some(vertex));
+    let vertex = |node: usize| vertex_of_node.get(node).copied().flatten();
+    let at_vertex =
+        |point: &ContactPoint| Some(ContactPoint { node: vertex(point.node)?, ..*point });
+    contact.iter().filter_map(at_vertex).collect()
 }

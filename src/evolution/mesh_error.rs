@@ -6,22 +6,18 @@
 //! (M + kκL) δ_n = M δ_{n−1} + k (b* − b)_i − ∫ (β_n − β_{n−1}) λ_i − kκ ∫ ∇β_n·∇λ_i,
 //!
 //! solved with a few long steps, in turn with the equation of z tested by the bubbles of the edges, for β
-//! ([`Bubbles`]). φ* comes from the displacements u₁ and u₂ of both orders for the same ζ ([`BothOrders`]): with the estimated
-//! error η of u₂ in the energy norm, where errors are orthogonal to what is resolved and squares add up,
-//!
-//! |ε*|² = |ε(u₂)|² + c (|ε(u₂)|² − |ε(u₁)|²), c = η²/‖u₂ − u₁‖²,
-//!
-//! or c = 1 where ζ_* was reached: it is at singular points, where both orders converge alike;
-//! and as strains at the same stress go like 1/ζ, φ* = φ((ζ/z)² |ε*|², z).
+//! ([`Bubbles`]). φ* comes from the strains ε* of a much finer mesh for the same ζ ([`BestStrains`]): as
+//! strains at the same stress go like 1/ζ, φ* = φ((ζ/z)² |ε*|², z).
 
 use super::{
-    DiscreteProblem, Outcome, Phases, RunError, State, both_orders::BothOrders, bubbles::Bubbles,
-    contact_step::Compliance, damage_step::DamageStep, instants::Instants,
+    DiscreteProblem, Outcome, Phases, RunError, State, best_strains::BestStrains,
+    both_orders::BothOrders, bubbles::Bubbles, contact_step::Compliance, damage_step::DamageStep,
+    instants::Instants,
 };
 use crate::{
     fem::{
-        RecoveredStrains, affine_diffusion, bubble_flux, bubble_load, bulged, diffusion_load,
-        interpolation_error, mean_product, missing_mass, quadratic_load, strains_at_nodes,
+        affine_diffusion, bubble_flux, bubble_load, bulged, diffusion_load, interpolation_error,
+        mean_product, missing_mass, quadratic_load,
     },
     model::DamageLaw,
     petsc::PetscError,
@@ -67,20 +63,21 @@ pub(super) fn mesh_error(
 fn damage_error(
     problem: &DiscreteProblem,
     damage_step: &mut DamageStep,
-    compliance: Compliance,
+    mut compliance: Compliance,
     laws: &[DamageLaw],
     instants: &Instants,
     stopped: bool,
 ) -> Result<Option<DamageError>, RunError> {
     let session = damage_step.session;
+    let [first, .., last] = &instants.states[..] else { return Ok(None) };
+    // K makes room for what P2 has.
+    compliance.keep_factor(last)?;
     let other = problem.of_other_order(session)?;
     let phases = Phases::default();
-    let orders = BothOrders::new(session, problem, &other, compliance, &phases)?;
-    let Some(mut orders) = orders else {
-        return Ok(None);
-    };
-    let [first, .., last] = &instants.states[..] else { return Ok(None) };
+    let orders = BothOrders::new(session, problem, &other, compliance, last, &phases)?;
+    let Some(orders) = orders else { return Ok(None) };
     let fine = orders.problems()[1];
+    let mut strains = BestStrains::new(orders, stopped);
     let mut error = ZetaError {
         problem,
         laws,
@@ -96,9 +93,7 @@ fn damage_error(
     let initial = error.middles.clone();
     let mut before: Option<&State> = None;
     for state in &instants.states {
-        let Some(strain_squared) = strain_squared(problem, &mut orders, state, stopped)? else {
-            return Ok(None);
-        };
+        let Some(strain_squared) = strains.squared(state)? else { return Ok(None) };
         let own = damage_step.source(state).load.as_slice().to_vec();
         let source = |error: &ZetaError| error.source(state, &strain_squared);
         if let Some(before) = before {
@@ -278,35 +273,4 @@ impl ZetaError<'_> {
         let (change, delay) = (self.change, self.delay);
         relative.is_finite().then_some(DamageError { relative, change, indicators, delay })
     }
-}
-
-/// |ε*|² at the vertices and midpoints of each triangle; `None` where the active nodes do not support
-/// the body. Collective.
-fn strain_squared(
-    problem: &DiscreteProblem,
-    orders: &mut BothOrders,
-    state: &State,
-    stopped: bool,
-) -> Result<Option<Vec<[f64; 6]>>, RunError> {
-    let Some([u1, u2]) = orders.displacements(state)? else { return Ok(None) };
-    let [coarse, fine] = orders.problems();
-    let strains = [strains_at_nodes(&coarse.body, &u1), strains_at_nodes(&fine.body, &u2)];
-    let distance = (0..problem.body.own_triangles).map(|t| {
-        let difference: [Vector3<f64>; 6] = array::from_fn(|i| strains[1][t][i] - strains[0][t][i]);
-        let stress = difference.map(|strain| problem.elasticity.d(&problem.body, t) * strain);
-        let zeta = problem.body.mesh.triangles[t].map(|node| state.zeta[node]);
-        let mean = zeta.iter().sum::<f64>() / 3.0;
-        mean * problem.body.triangles[t].area() * mean_product(&difference, &stress, Vector3::dot)
-    });
-    let distance = problem.body.nodes.partition.comm().total(distance.sum());
-    let recovered = RecoveredStrains::new(&fine.body, &u2)?;
-    let zeta = fine.zeta_at_points(&state.zeta);
-    let error = recovered.energy_error(&fine.elasticity, &zeta, &u2).error;
-    let c = if stopped || error > distance { 1.0 } else { error / distance.max(f64::MIN_POSITIVE) };
-    let squares = |[e1, e2]: [Vector3<f64>; 2]| {
-        let [s1, s2] = [e1, e2].map(|e| e[0] * e[0] + e[1] * e[1] + 0.5 * e[2] * e[2]);
-        (s2 + c * (s2 - s1)).max(0.0)
-    };
-    let pairs = strains[0].iter().zip(&strains[1]);
-    Ok(Some(pairs.map(|(e1, e2)| array::from_fn(|i| squares([e1[i], e2[i]]))).collect()))
 }

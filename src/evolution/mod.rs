@@ -24,6 +24,7 @@
 //! well as uniform.
 
 mod adaptive;
+mod best_strains;
 mod both_orders;
 mod boundary_conditions;
 mod bubbles;

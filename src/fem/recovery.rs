@@ -114,13 +114,14 @@ impl<'a> RecoveredStrains<'a> {
 }
 
 /// The strains of nodal u at the vertices and the midpoints of the sides 01, 12, 20 of each triangle.
-pub fn strains_at_nodes(body: &Body, u: &[f64]) -> Vec<[Vector3<f64>; 6]> {
-    let strains = for_elements!(body, cells => cells.strains(u, |_, strain| strain));
-    let with_midpoints = |of: &[Vector3<f64>]| {
-        let [a, b, c] = at_vertices(of);
+pub fn strains_at_nodes(body: &Body, u: &[f64]) -> impl Iterator<Item = [Vector3<f64>; 6]> {
+    (0..body.triangles.len()).map(move |t| {
+        let [a, b, c] = for_elements!(body, cells => {
+            let local = cells.gather(t, u);
+            at_vertices(&cells.elements[t].points.map(|point| point.strain(&local)))
+        });
         [a, b, c, 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)]
-    };
-    strains.chunks(strains.len() / body.triangles.len()).map(with_midpoints).collect()
+    })
 }
 
 /// A function at the vertices from its values at the quadrature points of a triangle, constant or

@@ -78,9 +78,11 @@ impl Accuracy {
 /// The displacements that small forces cause at states of a run, their active nodes fixed.
 pub(in crate::evolution) struct Compliance<'a> {
     pub(in crate::evolution) problem: &'a DiscreteProblem,
-    stiffness: Stiffness,
-    /// The unknowns that are fixed.
+    /// K, until only its factor is kept.
+    stiffness: Option<Stiffness>,
+    /// The unknowns that are fixed, and whether the factor is definite with them.
     active: Vec<usize>,
+    supported: bool,
     solver: LinearSolver,
     rhs: Vector,
     answer: Vector,
@@ -94,9 +96,19 @@ impl<'a> ContactStep<'a> {
     pub(in crate::evolution) fn into_compliance(self) -> Result<Compliance<'a>, PetscError> {
         let Self { session, problem, stiffness, solver, load, c, .. } = self;
         let own = || Factor::new(session, "elastic_", Precision::Preconditioner);
-        let factor = solver.into_factor().unwrap_or_else(own);
+        let mut factor = solver.into_factor().unwrap_or_else(own);
+        factor.condense(&stiffness.matrix, problem.constraints.bounds.iter().map(|b| b.dof))?;
         let solver = LinearSolver::with(session, factor, load.owned())?;
-        Ok(Compliance { problem, stiffness, active: Vec::new(), solver, rhs: load, answer: c })
+        let (stiffness, active) = (Some(stiffness), Vec::new());
+        Ok(Compliance {
+            problem,
+            stiffness,
+            active,
+            supported: false,
+            solver,
+            rhs: load,
+            answer: c,
+        })
     }
 }
 
@@ -159,7 +171,7 @@ impl Compliance<'_> {
         Ok(correction.map_or(f64::INFINITY, max_norm))
     }
 
-    /// Takes the nodal damage and the active nodes of a state.
+    /// Takes the nodal damage and the active nodes of a state. Collective.
     ///
     /// # Errors
     /// PETSc failed.
@@ -172,11 +184,31 @@ impl Compliance<'_> {
         let flags = active_bounds(constraints, contact, 0.0);
         let active = constraints.bounds.iter().zip(flags).filter(|(_, active)| *active > 0.0);
         self.active = active.map(|(bound, _)| bound.dof).collect();
-        self.stiffness.refill(&self.problem.zeta_at_points(zeta))
+        match &mut self.stiffness {
+            Some(stiffness) => stiffness.refill(&self.problem.zeta_at_points(zeta))?,
+            None => self.supported = self.solver.factor().prescribe(&self.active)?,
+        }
+        Ok(())
     }
 
-    /// K(ζ)⁻¹ of nodal `forces`, N per metre of thickness, to a digit, the active nodes fixed; `None`
-    /// if these do not support the body. Collective.
+    /// Gives back K, which is much of the memory, and keeps a factor of it, if need be that of a state.
+    /// Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub(in crate::evolution) fn keep_factor(&mut self, state: &State) -> Result<(), PetscError> {
+        if !self.solver.factor().exists() {
+            self.set(&state.zeta, &state.contact)?;
+            if let Some(stiffness) = &self.stiffness {
+                self.solver.factorise(system(self.problem, stiffness, &self.active))?;
+            }
+        }
+        self.stiffness = None;
+        Ok(())
+    }
+
+    /// K(ζ)⁻¹ of nodal `forces`, N per metre of thickness, to a digit or more, the active nodes fixed; or
+    /// about that, by the factor alone. `None` if these nodes do not support the body. Collective.
     ///
     /// # Errors
     /// PETSc failed.
@@ -184,25 +216,37 @@ impl Compliance<'_> {
         &mut self,
         mut forces: Vec<f64>,
     ) -> Result<Option<Vec<f64>>, PetscError> {
-        let Self { problem, stiffness, active, solver, rhs, answer } = self;
+        let Self { problem, stiffness, active, supported, solver, rhs, answer } = self;
         let bases = &problem.constraints.bases;
         bases.force_to_local(&mut forces);
         bases.zero_fixed(&mut forces);
         active.iter().for_each(|&dof| forces[dof] = 0.0);
         rhs.set(&forces[..rhs.owned()])?;
         answer.write(|u| u.fill(0.0))?;
-        let comm = problem.body.nodes.partition.comm();
-        let bounds = problem.constraints.bounds.iter().map(|bound| bound.dof);
-        solver.factor().condense(&stiffness.matrix, bounds)?;
-        let system = LinearSystem {
-            prescribed: comm.any(!active.is_empty()).then_some(&active[..]),
-            scale: stiffness.scale,
-            ..LinearSystem::of(&stiffness.matrix)
+        let norm = rhs.norm()?;
+        let solved = match stiffness {
+            Some(stiffness) => {
+                // A factor that is kept leaves a digit of the error less.
+                let system = system(problem, stiffness, active);
+                solver.solve_renewing(system, rhs, answer, 0.01 * norm)?.converged
+            }
+            None if norm > 0.0 && *supported => {
+                solver.factor().apply(rhs, answer)?;
+                answer.write(|u| active.iter().for_each(|&dof| u[dof] = 0.0))?;
+                true
+            }
+            None => norm == 0.0,
         };
-        // One digit of an error is enough.
-        if !solver.solve_renewing(system, rhs, answer, 0.1 * rhs.norm()?)?.converged {
-            return Ok(None);
-        }
-        displacement(problem, vec![0.0; forces.len()], answer).map(Some)
+        solved.then(|| displacement(problem, vec![0.0; forces.len()], answer)).transpose()
     }
+}
+
+/// K with the unknowns `active` fixed. Collective.
+fn system<'a>(
+    problem: &DiscreteProblem,
+    stiffness: &'a Stiffness,
+    active: &'a [usize],
+) -> LinearSystem<'a> {
+    let prescribed = problem.body.nodes.partition.comm().any(!active.is_empty()).then_some(active);
+    LinearSystem { prescribed, scale: stiffness.scale, ..LinearSystem::of(&stiffness.matrix) }
 }
