@@ -109,18 +109,24 @@ def passes(found):
 
 
 def others(rows):
-    """Growth and ranks."""
+    """Growth and ranks: of whole runs the steps, and all else with the first factors; memory of a rank."""
+    columns = (("seconds_per_step", 1e3), ("solves", 1), ("whole_seconds", 1), ("else", 1), ("peak_mb", 1))
+    for row in rows:
+        row["else"] = row["whole_seconds"] - row["steps"] * row["seconds_per_step"]
     for part in ("growth", "ranks"):
-        chosen = [row for row in rows if row["part"] == part]
+        sizes = {row["n"] for row in rows if row["part"] == part}
+        # One rank is that of growth.
+        chosen = [row for row in rows if row["part"] in ("growth", part) and row["n"] in sizes]
+        chosen.sort(key=lambda row: (row["n"], row["method"], row["ranks"]))
         if chosen:
-            print(f"{part}, n = {', '.join(dict.fromkeys(str(int(r['n'])) for r in chosen))}:\n")
-            markdown(["nodes", "ranks", "ms per step", "whole, s", "peak MB", "solve pairs", "factors"],
-                     [[int(row["nodes"]), int(row["ranks"]),
-                       *(number(row[key], scale) for key, scale in (("seconds_per_step", 1e3),
-                         ("whole_seconds", 1), ("peak_mb", 1), ("solves", 1), ("factorisations", 1)))]
+            print(f"{part}:\n")
+            markdown(["n", "steps", "factor", "ranks", "ms per step", "solves", "whole, s", "else, s", "peak MB"],
+                     [[int(row["n"]), int(row["steps"]), row["method"].replace("active-set", "ours"),
+                       int(row["ranks"]), *(number(row[key], scale) for key, scale in columns)]
                       for row in chosen])
     if sizes := [row for row in rows if row["part"] == "growth" and row["n"] >= 64]:
-        for name, key in (("time per step", "seconds_per_step"), ("peak memory", "peak_mb")):
+        for name, key in (("time per step", "seconds_per_step"), ("time of a whole run", "whole_seconds"),
+                          ("peak memory", "peak_mb")):
             print(f"{name} grows like N^{slope(sizes, key)[0]:.2f} from n = 64")
 
 

@@ -9,7 +9,8 @@ compare  seconds per step and of the whole process, files written by all: signor
          passes of a step must move over the speed of memory, the operations of the factorisations
          that were made over that of dgemm
 growth   time per step and peak memory up to two million unknowns
-ranks    whole runs on 1, 2 and 4 ranks, and on as many as the program chooses
+ranks    whole runs on 1, 2 and 4 ranks with our factors (one rank: growth), with MUMPS and with PETSc's
+         multigrid (gamg), these two on 4 ranks alone where the mesh is largest
 
 k = 0.01. A step is the mean of all but the first, which makes what the others keep. Programs take turns,
 because the machine may be shared: a row has the medians over the rounds, ratios are taken round by round.
@@ -34,6 +35,14 @@ KEPT = [("FEniCSx", "kept"), ("NGSolve", "kept")]
 ANEW = [("FEniCSx", "anew"), ("NGSolve", "anew")]
 # Phases of `--profile` that the floor has, made once in every step.
 PASSES = ["stiffness refill", "products", "triangular solves", "vectors", "damage source", "damage solve"]
+# What PETSc has in the place of our factors.
+PRECONDITIONERS = {
+    "MUMPS": [word for of in ("elastic", "damage") for word in (
+        f"-{of}_pc_type", "cholesky", f"-{of}_pc_factor_mat_solver_type", "mumps")],
+    "gamg": [word for of in ("elastic", "damage") for word in (f"-{of}_pc_type", "gamg")],
+}
+# Steps of runs that are to tell size and ranks.
+STEPS = 10
 # Steps of a loop that factorises always, where one step costs as another.
 FEW = 20
 
@@ -171,21 +180,28 @@ def keep(bench, case, program, row, rounds):
 def growth(bench, quick):
     """Time and memory over the size."""
     for n in (32, 64, 128, 256) if quick else (64, 128, 256, 512, 1024):
-        case = Case("stays", 1, n, steps=20)
+        case = Case("stays", 1, n, steps=STEPS)
         row, _, _ = bench.signorini(case, frames=False)
         keep(bench, case, OURS, row, 1)
 
 
 def ranks(bench, quick):
-    """Whole runs on several ranks, and on as many as the program finds that pay."""
-    case = Case("stays", 1, 128 if quick else 512, steps=20)
-    for count in (1, 2, 4, *(["auto"] if bench.has_ranks else [])):
-        try:
-            row, _, _ = bench.signorini(case, ranks=count)
-        except (Failure, FileNotFoundError) as failure:
-            print(f"ranks are left out: {failure}", file=sys.stderr)
-            return
-        keep(bench, case, OURS, row, 1)
+    """Whole runs on several ranks, with each way to precondition."""
+    for n, petsc in [(128, (1, 2, 4))] if quick else [(512, (1, 2, 4)), (1024, (4,))]:
+        case, answer = Case("stays", 1, n, steps=STEPS), None
+        for method in ("active-set", *PRECONDITIONERS):
+            for count in petsc if method in PRECONDITIONERS else (2, 4):
+                options = PRECONDITIONERS.get(method, ())
+                try:
+                    row, history, _ = bench.signorini(case, ranks=count, frames=False, petsc=options)
+                except (Failure, FileNotFoundError) as failure:
+                    print(f"left out: {method} on {count} ranks: {failure}", file=sys.stderr)
+                    continue
+                answer = answer or history
+                if wrong := fault([(row, {"steps": STEPS, **history[STEPS]}, None)], answer):
+                    print(f"left out: {method} on {count} ranks: {wrong}", file=sys.stderr)
+                else:
+                    keep(bench, case, ("signorini", method), row, 1)
 
 
 def main():

@@ -124,7 +124,7 @@ class Bench:
     def alone(self):
         return ["--ranks", 1] if self.has_ranks else []
 
-    def signorini(self, case, solver="active-set", ranks=1, frames=True):
+    def signorini(self, case, solver="active-set", ranks=1, frames=True, petsc=()):
         """A run, about 20 frames written unless told otherwise; its history and what `--profile`
         says of each phase in milliseconds per call."""
         folder = self.out / "run"
@@ -136,6 +136,7 @@ class Bench:
             command += ["--ranks", ranks]
         elif ranks != 1:
             command = ["mpiexec", "--allow-run-as-root", "--oversubscribe", "-n", ranks, *command]
+        command += ["--", *petsc] if petsc else []
         said, whole = self.start(command)
         summary = json.loads((folder / "summary.json").read_text())
         with open(folder / "history.csv", newline="", encoding="utf-8") as file:
