@@ -119,7 +119,7 @@ fn conditions(
 }
 
 /// Nodes with a gap condition; the bounds of a node follow each other.
-fn contact_nodes(problem: &DiscreteProblem) -> usize {
+pub(super) fn contact_nodes(problem: &DiscreteProblem) -> usize {
     problem.constraints.bounds.chunk_by(|a, b| a.node == b.node).count()
 }
 

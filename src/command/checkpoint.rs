@@ -167,17 +167,13 @@ pub fn write(task: &Task, record: &StepRecord, state: &[u8]) -> Result<(), Outpu
         written = write();
     }
     if comm.all(written.is_ok()) {
-        remove_but(folder, comm.rank(), Some(record.step));
+        remove(folder, comm.rank(), Some(record.step));
     }
     written
 }
 
-/// Removes the checkpoints of a rank.
-pub fn remove(folder: &Path, rank: usize) {
-    remove_but(folder, rank, None);
-}
-
-fn remove_but(folder: &Path, rank: usize, kept: Option<usize>) {
+/// Removes the checkpoints of a rank, but for that of the step to be `kept`.
+pub fn remove(folder: &Path, rank: usize, kept: Option<usize>) {
     for (step, path) in output::checkpoints(folder, rank) {
         if Some(step) != kept {
             // One too many is not worth the end of a run.

@@ -141,7 +141,7 @@ impl<'a> Recorder<'a> {
         let mut shown = notes.clone();
         notes.extend(outcome.iter().flat_map(|outcome| outcome.remarks(&task.problem)));
         if result.is_ok() {
-            checkpoint::remove(&task.folder, task.problem.body.nodes.partition.comm().rank());
+            checkpoint::remove(&task.folder, task.problem.body.nodes.partition.comm().rank(), None);
         }
         // The rest is for the first rank alone.
         let Some(bar) = &self.bar else { return written };

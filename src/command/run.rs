@@ -1,7 +1,9 @@
 //! `signorini run`: a scene from its file to its results.
 
 use super::{
-    Failure, SOLVERS, SceneArguments, check_petsc, check_solver,
+    Failure, SOLVERS, SceneArguments,
+    check::contact_nodes,
+    check_petsc, check_solver,
     checkpoint::Checkpoint,
     launch::{self, Ranks},
     ranks::{agree, barrier_or_abort},
@@ -266,11 +268,9 @@ impl<'a> Task<'a> {
         if !arguments.restart && comm.is_root() {
             warn_of_checkpoint(&folder);
         }
-        // The bounds of a node follow each other.
-        let contact_nodes = problem.constraints.bounds.chunk_by(|a, b| a.node == b.node);
         Ok(Self {
             triangles: comm.count(problem.body.own_triangles),
-            contact_nodes: comm.count(contact_nodes.count()),
+            contact_nodes: comm.count(contact_nodes(&problem)),
             problem,
             stop_change,
             solver,
