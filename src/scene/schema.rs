@@ -116,12 +116,11 @@ impl<'t> Findings<'t> {
         if schema["minItems"].as_u64().is_some_and(|least| count < least) {
             return self.note(key, format!("must hold at least one {key}"));
         }
+        let mut seen = BTreeMap::new();
         for (i, value) in array.iter().enumerate() {
-            let element = name_of(value.get_ref()).map(|name| below(key, name));
-            let first = element.as_ref().and_then(|element| self.places.get(element)).cloned();
-            let element = element.unwrap_or_else(|| format!("{key}[{i}]"));
+            let element = key_of_element(key, i, name_of(value.get_ref()));
             self.check_value(element.clone(), value.span(), value.get_ref(), &schema["items"]);
-            if let Some(first) = first {
+            if let Some(first) = seen.insert(element.clone(), value.span()) {
                 let first = self.text.in_words(&first);
                 self.note(&element, format!("is given twice, first at {first}; merge the two"));
             }
@@ -146,10 +145,9 @@ impl<'t> Findings<'t> {
     ) -> Vec<T> {
         let elements = self.document.get(key).and_then(toml::Value::as_array).cloned();
         let mut built = Vec::new();
-        for element in elements.into_iter().flatten() {
-            let name = element.get("name").and_then(toml::Value::as_str);
-            let key = name.map(|name| below(key, name));
-            built.extend(key.and_then(|key| self.build_value(&key, element, &build)));
+        for (i, element) in elements.into_iter().flatten().enumerate() {
+            let key = key_of_element(key, i, element.get("name").and_then(toml::Value::as_str));
+            built.extend(self.build_value(&key, element, &build));
         }
         built
     }
@@ -165,6 +163,14 @@ impl<'t> Findings<'t> {
         }
         let built = value.try_into().map_err(is_wrong).and_then(build);
         built.map_err(|(name, problem)| self.note(&below(key, name), problem)).ok()
+    }
+}
+
+/// The key of an element of an array: by its name, else by its index.
+fn key_of_element(key: &str, i: usize, name: Option<&str>) -> String {
+    match name {
+        None | Some("") => format!("{key}[{i}]"),
+        Some(name) => below(key, name),
     }
 }
 

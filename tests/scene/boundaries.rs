@@ -1,6 +1,8 @@
 //! Malformed boundaries and the expressions on them.
 
-use crate::errors::check;
+use crate::{BASE, errors::check};
+use signorini::scene::Scene;
+use std::path::Path;
 
 #[test]
 fn every_rule_names_file_line_and_boundary() {
@@ -65,4 +67,17 @@ fn every_rule_names_file_line_and_boundary() {
             &["bad.toml:37: boundary.foundation.normal[1] must be a constant"],
         ),
     ]);
+}
+
+#[test]
+fn names_may_look_like_keys_and_are_not_empty() {
+    let name = |new: &str| {
+        let text = BASE.replacen("name = \"axis\"", &format!("name = \"{new}\""), 1);
+        Scene::parse(&text, Path::new("named.toml"), &[])
+    };
+    assert_eq!(name("foundation.gap").expect("another boundary").boundaries.len(), 4);
+    let probe = ["probe=[{name='', point=[0, 0]}]".to_owned()];
+    let refused = Scene::parse(BASE, Path::new("p.toml"), &probe);
+    let message = refused.expect_err("no name").to_string();
+    assert!(message.contains("probe[0].name is empty"), "{message}");
 }
