@@ -97,18 +97,25 @@ def read(folder, error):
     if not history:
         return row, None
     frames = ElementTree.parse(folder / "fields.pvd").findall(".//DataSet")
-    frames = [read_frame(folder / frame.get("file")).point_data for frame in frames]
+    meshes = [read_frame(folder / frame.get("file")) for frame in frames]
+    frames = [mesh.point_data for mesh in meshes]
     scales = [max(row["displacement_max"] for row in history), 1.0,
               max(np.max(np.abs(frame["normal_pressure"])) for frame in frames)]
     values = [frames[-1][name] for name in ["displacement", "zeta", "normal_pressure"]]
-    return row, (values, [scale or 1.0 for scale in scales])
+    return row, (meshes[-1].points, values, [scale or 1.0 for scale in scales])
 
 
 def differences(state, best):
     """max |u − u_ref| over max |u_ref|, max |ζ − ζ_ref|, max |p − p_ref| over max |p_ref|, where the best
-    state is the reference and its scales are of all steps (of p: of all frames)."""
-    (values, _), (references, scales) = state, best
-    return [np.max(np.abs(a - b)) / scale if a.shape == b.shape else np.nan
+    state is the reference and its scales are of all steps (of p: of all frames); nothing where the
+    nodes are others. An adapted mesh that is read again has its midpoints in another order."""
+    (points, values, _), (others, references, scales) = state, best
+    order = other = np.arange(len(points))
+    if not np.array_equal(points, others):
+        order, other = np.lexsort(points.T), np.lexsort(others.T)
+    if len(order) != len(other) or not np.array_equal(points[order], others[other]):
+        return 3 * [np.nan]
+    return [np.max(np.abs(a[order] - b[other])) / scale
             for a, b, scale in zip(values, references, scales)]
 
 

@@ -335,7 +335,7 @@ fn the_solvers_are_listed_with_what_they_do() {
 #[test]
 fn solvers_are_compared_at_order_2_and_on_the_mesh_of_an_accuracy() {
     compared("discretisation.displacement=2");
-    compared("accuracy=0.2");
+    compared("accuracy=0.05");
 }
 
 /// All solvers agree on the scene with a key overridden.
@@ -359,6 +359,6 @@ fn compared(key: &str) {
         }
         assert_eq!(value("error"), "");
         // The scene has 10 steps; an accuracy chooses others.
-        assert_eq!(value("steps") == "10", key != "accuracy=0.2", "{key}: {row:?}");
+        assert_eq!(value("steps") == "10", key != "accuracy=0.05", "{key}: {row:?}");
     }
 }
