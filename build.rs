@@ -16,7 +16,8 @@ const PETSC: &str = "\
     VecCreateMPI|VecGetLocalSize|VecDestroy|VecGetArray|VecRestoreArray|VecGetArrayRead|\
     VecRestoreArrayRead|VecAXPBY|VecDot|VecNorm|\
     MatCreate|MatDestroy|MatSetSizes|MatSetType|MatSetBlockSize|MatSetOption|\
-    MatSetPreallocationCOO|MatSetValuesCOO|MatMult|MatDuplicate|MatCopy|MatAXPY|MatScale|MatShift|\
+    MatSetPreallocationCOO|MatSetValuesCOO|MatMult|MatDuplicate|MatCopy|MatGetDiagonal|MatCreateVecs|\
+    MatAXPY|MatScale|MatShift|\
     MatDiagonalSet|MatZeroRowsColumns|MatGetOwnershipRange|MatGetSize|MatGetInfo|MatMumpsGetInfog|\
     MatGetRow|MatRestoreRow|PetscObjectTypeCompare|MatMPIAIJGetSeqAIJ|MatSeqAIJGetArray|\
     MatSeqAIJRestoreArray|MatSeqAIJGetArrayRead|MatSeqAIJRestoreArrayRead|\

@@ -2,7 +2,7 @@
 
 mod shell;
 
-use super::{Choose, Precision, RefactorisationPolicy, substructure::Substructure};
+use super::{Choose, Precision, Reduction, RefactorisationPolicy, substructure::Substructure};
 use crate::{
     archive::{Archive, ArchiveError},
     petsc::{
@@ -36,6 +36,8 @@ pub struct Factor {
     factorisations: usize,
     /// The values of the matrix last factorised, from which a checkpoint makes the same factor.
     values: Vec<f64>,
+    /// The diagonal of that matrix, the part of this rank.
+    diagonal: Vec<f64>,
     /// Whether the factor was loaded and is yet to be made.
     loaded: bool,
 }
@@ -76,6 +78,7 @@ impl Factor {
             applications: 0,
             factorisations: 0,
             values: Vec::new(),
+            diagonal: Vec::new(),
             loaded: false,
         }
     }
@@ -168,6 +171,7 @@ impl Factor {
         };
         self.keep_precisions();
         matrix.read_entries(&mut self.values)?;
+        self.diagonal = matrix.diagonal()?;
         self.policy = definite.then(|| RefactorisationPolicy::new(cost));
         self.factorisations += usize::from(definite);
         Ok(definite)
@@ -311,6 +315,11 @@ impl Factor {
         Ok(chosen.map(prescribed))
     }
 
+    /// The owned diagonal entries of the matrix last factorised.
+    pub(super) fn diagonal(&self) -> &[f64] {
+        &self.diagonal
+    }
+
     /// Factorisations made so far that did not fail.
     pub fn factorisations(&self) -> usize {
         self.factorisations
@@ -321,17 +330,17 @@ impl Factor {
         self.policy.is_some()
     }
 
-    /// Iterations that a solve with the factor of an earlier matrix is worth; `None` if a new factor is
-    /// due, or there is none.
-    pub(super) fn iteration_limit(&self) -> Option<usize> {
-        self.policy.as_ref().and_then(RefactorisationPolicy::iteration_limit)
+    /// Iterations that a solve with the factor of an earlier matrix is worth, where it is asked to divide the
+    /// residual by e^`asked`; `None` if a new factor is due, or there is none.
+    pub(super) fn iteration_limit(&self, asked: f64) -> Option<usize> {
+        self.policy.as_ref().and_then(|policy| policy.iteration_limit(asked))
     }
 
     /// Ends a solve: its applications tell how good the factor still is.
-    pub(super) fn end_solve(&mut self) {
+    pub(super) fn end_solve(&mut self, reduction: Reduction) {
         let iterations = std::mem::take(&mut self.applications);
         if let Some(policy) = &mut self.policy {
-            policy.solved(iterations);
+            policy.solved(iterations, reduction);
         }
     }
 }

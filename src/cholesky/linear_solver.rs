@@ -1,6 +1,6 @@
 //! Linear systems by conjugate gradients on a Cholesky factor that is kept.
 
-use super::{Condensed, Factor, LinearSystem, Precision};
+use super::{Condensed, Factor, LinearSystem, Precision, Reduction};
 use crate::petsc::{Matrix, PetscError, Session, Vector};
 use std::mem::take;
 
@@ -15,9 +15,14 @@ pub type Choose<'a> =
 /// other values, and where the factor is not condensed (`Factor::condense`) other prescribed unknowns,
 /// another diagonal.
 ///
-/// PETSc's KSPCG makes the same operations in the same order, but would need a matrix without the
-/// prescribed unknowns for each set of them, and another product for the residual on them, which is the
-/// contact forces.
+/// Of an earlier A₀ = Σ ζ₀ Aₜ, summed over triangles, the preconditioner is A₀⁻¹E with E = diag(A₀)/diag(A):
+/// where ζ/ζ₀ varies slowly, A is nearly E⁻¹A₀ for forces as concentrated as those at contact nodes and the
+/// edges of loads, of which A₀ alone would leave (ζ − ζ₀)/ζ₀. It is not quite symmetric, so that the gradients
+/// are flexible (Notay, SIAM J. Sci. Comput. 22, 2000): each direction is made conjugate to the last one, not
+/// to what symmetry would make of it.
+///
+/// PETSc's KSPFCG would need a matrix without the prescribed unknowns for each set of them, and another
+/// product for the residual on them, which is the contact forces.
 pub struct LinearSolver {
     factor: Factor,
     /// A + D with rows and columns of prescribed unknowns zeroed: what is factorised where the factor is
@@ -25,8 +30,13 @@ pub struct LinearSolver {
     modified: Option<Matrix>,
     /// b − (A + D) x.
     residual: Vector,
-    /// r: the residual with 0 on prescribed unknowns.
+    /// r: the residual with 0 on prescribed unknowns; or E r.
     free_residual: Vector,
+    /// ‖r‖₂, and at the start of the solve.
+    norm: f64,
+    first_norm: f64,
+    /// E.
+    scaling: Vec<f64>,
     /// z.
     preconditioned: Vector,
     /// p.
@@ -76,6 +86,9 @@ impl LinearSolver {
             modified: None,
             residual: zeros()?,
             free_residual: zeros()?,
+            norm: 0.0,
+            first_norm: 0.0,
+            scaling: Vec::new(),
             preconditioned: zeros()?,
             direction: zeros()?,
             image: zeros()?,
@@ -148,7 +161,7 @@ impl LinearSolver {
             return Ok(SolveReport::default());
         }
         let mut report = self.start(system, b, x, limit)?;
-        self.iterate(system, x, (limit, MOST_ITERATIONS), false, &mut report)?;
+        self.iterate_choosing(system, x, (limit, MOST_ITERATIONS), None, &mut report)?;
         Ok(report)
     }
 
@@ -184,7 +197,7 @@ impl LinearSolver {
         self.factor.remake(system.matrix)?;
         let mut report = self.start(system, b, x, limit)?;
         let mut chosen = None;
-        if let Some(most) = self.factor.iteration_limit()
+        if let Some(most) = self.factor.iteration_limit((self.norm / limit).ln())
             && self.restrict(system)?
         {
             chosen = self.iterate_choosing(system, x, (limit, most), choose.take(), &mut report)?;
@@ -210,6 +223,9 @@ impl LinearSolver {
         choose: Option<Choose>,
         report: &mut SolveReport,
     ) -> Result<Option<Vec<usize>>, PetscError> {
+        if !report.converged {
+            self.set_scaling(system)?;
+        }
         let condensed = !report.converged && self.factor.is_condensed(system.matrix)?;
         let Some(choose) = choose.filter(|_| condensed) else {
             self.iterate(system, x, (limit, most), false, report)?;
@@ -230,7 +246,19 @@ impl LinearSolver {
         Ok(Some(chosen))
     }
 
-    /// z ← P⁻¹ r with 0 on prescribed unknowns; or with those that are chosen, if they are others, and
+    /// E, of the factored matrix and this one; 1 where there is no quotient.
+    fn set_scaling(&mut self, system: LinearSystem) -> Result<(), PetscError> {
+        let mut diagonal = system.matrix.diagonal()?;
+        if !self.factor.is_condensed(system.matrix)? {
+            system.added.iter().copied().flatten().for_each(|&(i, d)| diagonal[i] += d);
+        }
+        let quotient = |(old, new): (&f64, &f64)| if old * new > 0.0 { old / new } else { 1.0 };
+        self.scaling.clear();
+        self.scaling.extend(self.factor.diagonal().iter().zip(&diagonal).map(quotient));
+        Ok(())
+    }
+
+    /// z ← P⁻¹E r with 0 on prescribed unknowns; or with those that are chosen, if they are others, and
     /// the changes of them.
     fn apply_factor(
         &mut self,
@@ -238,9 +266,14 @@ impl LinearSolver {
         choose: Option<Choose>,
     ) -> Result<Option<Vec<usize>>, PetscError> {
         let (bytes, z) = (self.factor.bytes_per_application(), &mut self.preconditioned);
+        let r = &mut self.free_residual;
+        if choose.is_some() {
+            r.axpby(1.0, &self.residual, 0.0)?;
+        }
+        r.write(|r| r.iter_mut().zip(&self.scaling).for_each(|(r, e)| *r *= e))?;
         let apply = || match choose {
-            Some(choose) => self.factor.apply_choosing(&self.residual, z, choose),
-            None => self.factor.apply(&self.free_residual, z).map(|()| None),
+            Some(choose) => self.factor.apply_choosing(r, z, choose),
+            None => self.factor.apply(r, z).map(|()| None),
         };
         let chosen = system.book(|booking| booking.triangular_solves, bytes, apply)?;
         if chosen.is_none() {
@@ -266,6 +299,7 @@ impl LinearSolver {
         system.multiply(x, &mut self.residual)?;
         self.residual.axpby(1.0, b, -1.0)?;
         let converged = self.is_reached(system, limit)?;
+        self.first_norm = self.norm;
         Ok(SolveReport { converged, ..SolveReport::default() })
     }
 
@@ -274,19 +308,19 @@ impl LinearSolver {
     fn is_reached(&mut self, system: LinearSystem, limit: f64) -> Result<bool, PetscError> {
         self.free_residual.axpby(1.0, &self.residual, 0.0)?;
         system.clear_prescribed(&mut self.free_residual)?;
-        let norm = self.free_residual.norm()?;
-        Ok(norm.is_finite() && norm <= limit)
+        self.norm = self.free_residual.norm()?;
+        Ok(self.norm.is_finite() && self.norm <= limit)
     }
 
-    /// Conjugate gradients from x and its residual r, with P the factored matrix and K = A + D. Until
-    /// ‖r‖₂ ≤ `limit` on the free unknowns, and at most so many times:
+    /// Flexible conjugate gradients from x and its residual r, with P the factored matrix and K = A + D.
+    /// Until ‖r‖₂ ≤ `limit` on the free unknowns, and at most so many times:
     ///
     /// ```text
-    /// z = P⁻¹ r,   β = rᵀz / (rᵀz)_previous, at first rᵀz / ∞,   p ← z + β p,
-    /// α = rᵀz / pᵀKp,   x ← x + α p,   r ← r − α K p.
+    /// z = P⁻¹E r,   β = − zᵀKp / pᵀKp, at first 0,   p ← z + β p,
+    /// α = rᵀp / pᵀKp,   x ← x + α p,   r ← r − α K p.
     /// ```
     ///
-    /// r, z and p are 0 on prescribed unknowns in all of this; K is not positive definite if rᵀz or pᵀKp
+    /// r, z and p are 0 on prescribed unknowns in all of this; K is not positive definite if rᵀp or pᵀKp
     /// is not positive. The first z may be there already (`preconditioned`).
     fn iterate(
         &mut self,
@@ -296,7 +330,7 @@ impl LinearSolver {
         mut preconditioned: bool,
         report: &mut SolveReport,
     ) -> Result<(), PetscError> {
-        let mut energy = f64::INFINITY;
+        let mut stiffness = None;
         for _ in 0..most {
             if report.converged {
                 break;
@@ -305,19 +339,22 @@ impl LinearSolver {
             if !take(&mut preconditioned) {
                 self.apply_factor(system, None)?;
             }
-            let previous = energy;
-            energy = self.free_residual.dot(&self.preconditioned)?;
-            self.direction.axpby(1.0, &self.preconditioned, energy / previous)?;
+            let conjugate = |last: f64| Ok(-self.image.dot(&self.preconditioned)? / last);
+            let beta = stiffness.map_or(Ok(0.0), conjugate)?;
+            self.direction.axpby(1.0, &self.preconditioned, beta)?;
             system.multiply(&self.direction, &mut self.image)?;
-            let stiffness = self.direction.dot(&self.image)?;
-            if !(stiffness > 0.0 && energy > 0.0) {
+            let last = *stiffness.insert(self.direction.dot(&self.image)?);
+            let energy = self.residual.dot(&self.direction)?;
+            if !(last > 0.0 && energy > 0.0) {
                 break;
             }
-            x.axpby(energy / stiffness, &self.direction, 1.0)?;
-            self.residual.axpby(-energy / stiffness, &self.image, 1.0)?;
+            x.axpby(energy / last, &self.direction, 1.0)?;
+            self.residual.axpby(-energy / last, &self.image, 1.0)?;
             report.converged = self.is_reached(system, limit)?;
         }
-        self.factor.end_solve();
+        let reduction = |norm: f64| (self.first_norm / norm).ln();
+        let (asked, reached) = (reduction(limit), reduction(self.norm));
+        self.factor.end_solve(Reduction { asked, reached });
         Ok(())
     }
 }

@@ -39,5 +39,5 @@ pub use factor::Factor;
 pub use linear_solver::{Choose, LinearSolver, SolveReport};
 pub use linear_system::{Booking, LinearSystem};
 pub use lower_triangle::LowerTriangle;
-pub use refactorisation::RefactorisationPolicy;
+pub use refactorisation::{Reduction, RefactorisationPolicy};
 pub use schur::Condensed;

@@ -37,9 +37,9 @@ pub struct ContactProblem<'a> {
 }
 
 impl ContactProblem<'_> {
-    /// ‖residual‖₂ that linear systems are solved to, N: well below what the KKT residuals may be.
+    /// ‖residual‖₂ that linear systems are solved to, N: below what the KKT residuals may be.
     pub(super) fn linear_residual(&self) -> f64 {
-        0.1 * self.tolerance * self.scales.force
+        0.3 * self.tolerance * self.scales.force
     }
 
     /// Whether K is positive definite.

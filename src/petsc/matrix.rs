@@ -142,6 +142,18 @@ impl Matrix {
         check(unsafe { raw::MatAXPY(self.raw(), factor, other.raw(), pattern) })
     }
 
+    /// The owned entries of its diagonal (MatGetDiagonal).
+    pub(crate) fn diagonal(&self) -> Result<Vec<f64>, PetscError> {
+        let handle = Handle::new(raw::VecDestroy, |diagonal| {
+            // SAFETY: a live handle, a fresh one; the other vector is not asked for.
+            unsafe { raw::MatCreateVecs(self.raw(), ptr::null_mut(), diagonal) }
+        })?;
+        // SAFETY: live handles of one size.
+        check(unsafe { raw::MatGetDiagonal(self.raw(), handle.raw()) })?;
+        // SAFETY: the vector lives as long as its handle.
+        unsafe { Vector::borrowed(handle.raw()) }?.read(<[f64]>::to_vec)
+    }
+
     /// Adds `diagonal` (owned entries) to the diagonal (MatDiagonalSet).
     pub(crate) fn add_diagonal(&mut self, diagonal: &Vector) -> Result<(), PetscError> {
         let add = raw::InsertMode::ADD_VALUES;

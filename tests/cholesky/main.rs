@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use signorini::{
     cholesky::{
-        Cholesky, Factor, LinearSolver, LinearSystem, LowerTriangle, Precision,
+        Cholesky, Factor, LinearSolver, LinearSystem, LowerTriangle, Precision, Reduction,
         RefactorisationPolicy,
     },
     petsc::{Matrix, Session, Vector},
@@ -242,17 +242,22 @@ fn a_factor_takes_over_matrices_of_another_size() {
 
 #[test]
 fn a_factor_is_replaced_when_its_age_has_cost_as_much_as_a_new_one() {
+    let solved = |policy: &mut RefactorisationPolicy, iterations, asked| {
+        policy.solved(iterations, Reduction { asked, reached: asked });
+    };
     let mut policy = RefactorisationPolicy::new(8.0);
-    policy.solved(4);
-    assert!(policy.iteration_limit().is_some(), "the first solve tells what a new factor needs");
-    policy.solved(1);
-    policy.solved(0);
-    policy.solved(4);
-    assert!(policy.iteration_limit().is_some(), "3 iterations lost of 8");
-    assert_eq!(policy.iteration_limit(), Some(1 + 5));
-    policy.solved(6);
-    assert!(policy.iteration_limit().is_none());
+    solved(&mut policy, 1, 60.0);
+    solved(&mut policy, 4, 6.0);
+    solved(&mut policy, 1, 6.0);
+    assert!(policy.iteration_limit(6.0).is_some(), "its own matrix is no example for later ones");
+    solved(&mut policy, 0, 6.0);
+    solved(&mut policy, 2, 12.0);
+    solved(&mut policy, 4, 6.0);
+    assert_eq!(policy.iteration_limit(6.0), Some(1 + 5), "3 iterations lost of 8");
+    assert_eq!(policy.iteration_limit(7.0), Some(2 + 5), "an iteration divides by e^6 at most");
+    solved(&mut policy, 6, 6.0);
+    assert!(policy.iteration_limit(6.0).is_none());
     let mut policy = RefactorisationPolicy::new(8.0);
-    policy.solved(13);
-    assert!(policy.iteration_limit().is_none(), "a factor that helps so little is due at once");
+    solved(&mut policy, 13, 6.0);
+    assert!(policy.iteration_limit(6.0).is_none(), "a factor that helps so little is due at once");
 }

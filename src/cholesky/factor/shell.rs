@@ -1,6 +1,6 @@
 //! The factor inside TAO's methods.
 
-use super::Factor;
+use super::{Factor, Reduction};
 use crate::petsc::{Matrix, PetscError, ShellPreconditioner, Vector};
 
 /// Every new operator begins a solve. Where bounds are active it is K with the rows and columns of their
@@ -11,14 +11,15 @@ impl ShellPreconditioner for Factor {
         let condensed = rows == k.size()? && self.is_condensed(k)?;
         let factored = if condensed { k } else { operator };
         self.remake(factored)?;
-        self.end_solve();
+        // All its solves are asked for about as much.
+        self.end_solve(Reduction { asked: 1.0, reached: 1.0 });
         let prescribed = if condensed { self.masked(k, operator)? } else { Vec::new() };
         let restrict = |this: &mut Self| match condensed {
             true => this.restrict(&prescribed, &[]),
             false => Ok(true),
         };
         let fits = self.method.as_ref().is_some_and(|(size, _)| *size == rows);
-        let usable = fits && self.iteration_limit().is_some() && restrict(self)?;
+        let usable = fits && self.iteration_limit(1.0).is_some() && restrict(self)?;
         Ok(usable || (self.factorise(factored)? && restrict(self)?))
     }
 

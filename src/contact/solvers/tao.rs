@@ -163,7 +163,7 @@ impl ContactSolver for Tao<'_> {
                 (unit, self.displacement) = (found, found);
             }
             residuals = problem.residuals(self.session, c)?;
-            if residuals.within(0.1 * problem.tolerance) {
+            if residuals.within(0.5 * problem.tolerance) {
                 return Ok(report);
             }
             report.false_claims += usize::from(reason > 0 && !residuals.within(problem.tolerance));
