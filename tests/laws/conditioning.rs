@@ -209,7 +209,7 @@ fn a_strip_one_triangle_high_that_bends_is_told() {
 
 #[test]
 fn the_estimated_error_of_displacements_is_that_of_the_worst_step() {
-    // Solved to a residual of 1e-6 of each step's forces. At t = 0.5 the strip is only pulled, which
+    // Solved to a residual of 5e-7 of the forces of the run. At t = 0.5 the strip is only pulled, which
     // moves it little, and the residual bends it; at the end it is only bent, and moves much.
     let pulled_and_bent = |tolerance: f64, solver: &str| {
         let text = format!(
@@ -226,7 +226,7 @@ fn the_estimated_error_of_displacements_is_that_of_the_worst_step() {
         history(&problem(mesh, &text).unwrap_or_else(|e| panic!("{e}")), solver)
     };
     let (exact, _) = pulled_and_bent(1e-11, "active-set");
-    let (steps, outcome) = pulled_and_bent(1e-6, "penalty-duality");
+    let (steps, outcome) = pulled_and_bent(5e-7, "penalty-duality");
     let errors: Vec<f64> =
         steps.iter().zip(&exact).map(|(a, b)| difference(&a.state.u, &b.state.u)).collect();
     let worst = errors.iter().copied().fold(0.0, f64::max);
