@@ -8,7 +8,7 @@ const PETSC: &str = "\
     PetscOptionsInsertString|PetscOptionsSetValue|PetscOptionsHasName|\
     PetscOptionsLeftGet|PetscOptionsLeftRestore|\
     MPI_Comm_size|MPI_Comm_rank|MPI_Allreduce|MPI_Type_contiguous|MPI_Type_commit|MPI_Type_free|\
-    MPI_Ibarrier|MPI_Test|MPI_Abort|mallopt|omp_set_max_active_levels|\
+    MPI_Ibarrier|MPI_Test|MPI_Abort|mallopt|madvise|dlsym|omp_set_max_active_levels|\
     PetscSFCreate|PetscSFDestroy|PetscSFSetGraph|PetscSFBcastBegin|PetscSFBcastEnd|\
     MatPartitioningCreate|MatPartitioningDestroy|MatPartitioningSetType|\
     MatPartitioningSetAdjacency|MatPartitioningSetFromOptions|MatPartitioningApply|\
@@ -17,7 +17,7 @@ const PETSC: &str = "\
     VecRestoreArrayRead|VecAXPBY|VecDot|VecNorm|\
     MatCreate|MatDestroy|MatSetSizes|MatSetType|MatSetBlockSize|MatSetOption|\
     MatSetPreallocationCOO|MatSetValuesCOO|MatMult|MatDuplicate|MatCopy|MatGetDiagonal|MatCreateVecs|\
-    MatAXPY|MatScale|MatShift|\
+    MatAXPY|MatScale|MatShift|MatAssemblyBegin|MatAssemblyEnd|\
     MatDiagonalSet|MatZeroRowsColumns|MatGetOwnershipRange|MatGetSize|MatGetInfo|MatMumpsGetInfog|\
     MatGetRow|MatRestoreRow|PetscObjectTypeCompare|MatMPIAIJGetSeqAIJ|MatSeqAIJGetArray|\
     MatSeqAIJRestoreArray|MatSeqAIJGetArrayRead|MatSeqAIJRestoreArrayRead|\
@@ -55,9 +55,10 @@ fn main() {
         petsc.include_paths.iter().map(|path| format!("-I{}", path.display())).collect();
     flags.extend(mpi_flags.split_whitespace().map(str::to_owned));
     // Debian's MPI is Open MPI, whose constants are the addresses of variables.
-    let variables = "PETSC_COMM_WORLD|M_MMAP_MAX|M_MMAP_THRESHOLD|M_TRIM_THRESHOLD|\
+    let variables = "PETSC_COMM_WORLD|M_MMAP_MAX|M_MMAP_THRESHOLD|M_TRIM_THRESHOLD|MADV_HUGEPAGE|\
                      ompi_mpi_double|ompi_mpi_op_(sum|max|replace)";
     let headers = "#include <petsctao.h>\n#include <petscsf.h>\n#include <malloc.h>\n\
+                   #include <dlfcn.h>\n#include <sys/mman.h>\n\
                    void omp_set_max_active_levels(int);\n";
     declare("petsc", headers, &flags, PETSC, variables);
     let variables = "CHOLMOD_(LONG|REAL|DOUBLE|SUPERNODAL|GIVEN|PATTERN|OUT_OF_MEMORY)";

@@ -140,9 +140,10 @@ impl<'a> ContactStep<'a> {
         let (comm, zeta_at_points) =
             (problem.body.nodes.partition.comm(), problem.zeta_at_points(zeta));
         if comm.any(zeta_at_points != self.zeta_at_points) {
-            let bytes = self.stiffness.refill_traffic();
+            let (body, bases) = (&problem.body, &problem.constraints.bases);
+            let bytes = self.stiffness.refill_traffic(body);
             phases.time_moving("stiffness refill", bytes, || {
-                self.stiffness.refill(&zeta_at_points)
+                self.stiffness.refill(body, &problem.elasticity, bases, &zeta_at_points)
             })?;
             self.zeta_at_points = zeta_at_points;
         }

@@ -2,24 +2,29 @@
 
 use super::{Body, Cells, Elasticity, NodalBases, for_elements};
 use crate::petsc::{Matrix, PetscError, Session, Vector};
-use nalgebra::Matrix2;
+use nalgebra::{Matrix2, Matrix3};
 
 /// The stiffness matrix K_ij = Σ_q w_q ζ_q Aε(φ_i) : ε(φ_j) over the quadrature points q of the
 /// elements, in the unknowns of [`NodalBases`]. The pattern is made once, values are refilled.
 ///
-/// K consists of 2×2 blocks, one for each pair of nodes with a common triangle. For every pair the
-/// undamaged contributions of its points are kept: a refill reads these once, in order.
+/// K consists of 2×2 blocks, one for each pair of nodes with a common triangle. A refill adds those of
+/// every element in turn where they are stored.
 pub struct Stiffness {
     /// K, symmetric; rows and columns of fixed unknowns have only a diagonal.
     pub matrix: Matrix,
     /// Mean diagonal entry of the undamaged K, N/m: the scale of the matrix.
     pub scale: f64,
-    /// For each pair of nodes the end of its contributions, and whether it is one node twice.
-    pairs: Vec<(u32, bool)>,
-    /// A quadrature point and its undamaged block, row by row, N/m.
-    contributions: Vec<(u32, [f64; 4])>,
-    values: Vec<f64>,
+    /// For each element and two of its nodes (i, j) the places of both rows of K_ij among the stored
+    /// entries; `NOWHERE` where another rank has them, or i ≠ j and one of the two is fixed.
+    places: Vec<[u32; 2]>,
+    /// The places of the entries in rows or columns of fixed unknowns, and whether on the diagonal.
+    fixed: Vec<(u32, bool)>,
 }
+
+/// The place of a row that is not stored.
+const NOWHERE: [u32; 2] = [u32::MAX; 2];
+/// The entries of a block, row by row.
+const ENTRIES: [[usize; 2]; 4] = [[0, 0], [0, 1], [1, 0], [1, 1]];
 
 impl Stiffness {
     /// Blocks and pattern; the values are those of the undamaged body.
@@ -32,85 +37,135 @@ impl Stiffness {
         elasticity: &Elasticity,
         bases: &NodalBases,
     ) -> Result<Self, PetscError> {
-        let partition = &body.nodes.partition;
-        let (contributions, pairs) = for_elements!(body, cells => {
-            let (places, pairs) = pairs(&cells, partition.owned());
-            (contributions(body, &cells, &places, elasticity, bases), pairs)
-        });
-
-        let fixed = bases.fixed();
+        let (partition, fixed) = (&body.nodes.partition, bases.fixed());
+        let is_fixed = |node: usize| fixed[2 * node] && fixed[2 * node + 1];
+        let is_stored =
+            |a: usize, b: usize| a < partition.owned() && (a == b || !is_fixed(a) && !is_fixed(b));
+        let pairs = for_elements!(body, cells => pairs(&cells, is_stored));
         let (mut rows, mut columns) = (Vec::new(), Vec::new());
-        let mut push_block = |a: usize, b: usize| {
-            for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-                let row = partition.row(a, 2, i);
-                let skip = row < 0 || fixed[2 * a + i] || fixed[2 * b + j];
-                rows.push(if skip { -1 } else { row });
-                columns.push(if skip { -1 } else { partition.global(b, 2, j) });
-            }
-        };
-        let (mut first, mut trace) = (0, 0.0);
-        for &([a, b], end) in &pairs {
-            push_block(a, b);
-            if a != b {
-                push_block(b, a);
-            } else if a < partition.owned() {
-                for (_, block) in &contributions[first..end as usize] {
-                    trace += if fixed[2 * a] { 0.0 } else { block[0] };
-                    trace += if fixed[2 * a + 1] { 0.0 } else { block[3] };
+        for (&[a, b], [i, j]) in pairs.iter().flat_map(|pair| ENTRIES.map(|entry| (pair, entry))) {
+            rows.push(partition.row(a as usize, 2, i));
+            columns.push(partition.global(b as usize, 2, j));
+        }
+        let mut pattern = Matrix::with_pattern(session, 2 * partition.owned(), 2, rows, columns)?;
+        let entries = pattern.places()?;
+        // A copy does without the COO pattern, which is larger than the matrix.
+        let mut matrix = pattern.duplicate()?;
+        drop(pattern);
+        matrix.set_near_null_space(rigid_motions(session, body, bases)?)?;
+
+        let (mut of_fixed, mut free_diagonal) = (Vec::new(), Vec::new());
+        for (&[a, b], block) in pairs.iter().zip(entries.as_chunks::<4>().0) {
+            for ([i, j], &place) in ENTRIES.into_iter().zip(block) {
+                let on_diagonal = a == b && i == j;
+                if fixed[2 * a as usize + i] || fixed[2 * b as usize + j] {
+                    of_fixed.push((place, on_diagonal));
+                } else if on_diagonal {
+                    free_diagonal.push(place);
                 }
             }
-            first = end as usize;
         }
-        let diagonal: Vec<usize> = (0..2 * partition.owned()).filter(|&dof| fixed[dof]).collect();
-        for &dof in &diagonal {
-            rows.push(partition.row(dof / 2, 2, dof % 2));
-            columns.push(partition.row(dof / 2, 2, dof % 2));
-        }
-        let trace = partition.comm().total(trace);
-        let free = partition.comm().count(2 * partition.owned() - diagonal.len());
-        let young = || elasticity.materials().map(|material| material.young).fold(0.0, f64::max);
-        let scale = if trace > 0.0 { trace / free as f64 } else { young() };
+        let mut first = vec![0; partition.owned() + 1];
+        pairs.iter().for_each(|[a, _]| first[*a as usize + 1] += 1);
+        (0..partition.owned()).for_each(|a| first[a + 1] += first[a]);
+        let place = |a: usize, b: usize| {
+            let of_row = if is_stored(a, b) { first[a]..first[a + 1] } else { 0..0 };
+            let pair = of_row.into_iter().find(|&pair| pairs[pair][1] as usize == b);
+            pair.map_or(NOWHERE, |pair| [entries[4 * pair], entries[4 * pair + 2]])
+        };
+        let places: Vec<[u32; 2]> = for_elements!(body, cells => {
+            let couples = cells.nodes.iter().flat_map(|n| n.iter().flat_map(|a| n.map(|b| (*a, b))));
+            couples.map(|(a, b)| place(a, b)).collect()
+        });
 
-        let values = vec![scale; rows.len()];
-        let mut matrix = Matrix::with_pattern(session, 2 * partition.owned(), 2, rows, columns)?;
-        matrix.set_near_null_space(rigid_motions(session, body, bases)?)?;
-        let pairs = pairs.iter().map(|&([a, b], end)| (end, a == b)).collect();
-        let mut stiffness = Self { matrix, scale, pairs, contributions, values };
-        stiffness.refill(&body.at_points(&vec![1.0; body.mesh.nodes.len()]))?;
+        let mut stiffness = Self { matrix, scale: 0.0, places, fixed: of_fixed };
+        let sound = body.at_points(&vec![1.0; body.mesh.nodes.len()]);
+        stiffness.refill(body, elasticity, bases, &sound)?;
+        let mut values = Vec::new();
+        stiffness.matrix.read_entries(&mut values)?;
+        let trace: f64 = free_diagonal.iter().map(|&place| values[place as usize]).sum();
+        let (trace, free) =
+            (partition.comm().total(trace), partition.comm().count(free_diagonal.len()));
+        let young = || elasticity.materials().map(|material| material.young).fold(0.0, f64::max);
+        stiffness.scale = if trace > 0.0 { trace / free as f64 } else { young() };
+        stiffness.refill(body, elasticity, bases, &sound)?;
         Ok(stiffness)
     }
 
-    /// Bytes that a refill moves: contributions and pairs, ζ once, the values written, read again
-    /// with their places (PETSc keeps two numbers of 8 bytes each), and K's own values.
-    pub fn refill_traffic(&self) -> f64 {
-        let read = 40 * self.contributions.len() + 8 * self.pairs.len();
-        read as f64 + 32.0 * self.values.len() as f64 + 8.0 * self.matrix.entries()
+    /// Bytes that a refill moves: of each element nodes, points, places and ζ once; K is written,
+    /// read and written again.
+    pub fn refill_traffic(&self, body: &Body) -> f64 {
+        let elements = for_elements!(body, cells => {
+            let points = cells.elements.iter().map(|element| 8 * element.points.len()).sum::<usize>();
+            size_of_val(cells.nodes) + size_of_val(cells.elements) + points
+        });
+        (elements + size_of_val(&self.places[..])) as f64 + 24.0 * self.matrix.entries()
     }
 
     /// K(ζ) from the values of ζ at the quadrature points, [`Body::at_points`]. (For P1, where strains
-    /// are constant, this is exact.)
+    /// are constant, this is exact.) All else as it was made of.
     ///
     /// # Errors
     /// PETSc failed.
-    pub fn refill(&mut self, zeta: &[f64]) -> Result<(), PetscError> {
-        let mut values = self.values.chunks_exact_mut(4);
-        let mut first = 0;
-        for &(end, diagonal) in &self.pairs {
-            let mut sum = [0.0; 4];
-            for (t, block) in &self.contributions[first..end as usize] {
-                let z = zeta[*t as usize];
-                sum.iter_mut().zip(block).for_each(|(sum, unit)| *sum += z * unit);
+    pub fn refill(
+        &mut self,
+        body: &Body,
+        elasticity: &Elasticity,
+        bases: &NodalBases,
+        zeta: &[f64],
+    ) -> Result<(), PetscError> {
+        let Self { matrix, scale, places, fixed } = self;
+        matrix.fill(|entries| {
+            for_elements!(body, cells => {
+                let d = |t| elasticity.d(body, t);
+                add_blocks(&cells, d, bases, zeta.as_chunks().0, places, entries);
+            });
+            for &(place, on_diagonal) in &*fixed {
+                entries[place as usize] = if on_diagonal { *scale } else { 0.0 };
             }
-            first = end as usize;
-            if let Some(block) = values.next() {
-                block.copy_from_slice(&sum);
+        })
+    }
+}
+
+/// Adds the blocks D_i⁻ᵀ K_ij D_j⁻¹ of all elements, in the unknowns of `bases`, to the entries of K at
+/// their places; `d` is the matrix of A in an element.
+fn add_blocks<'a, const N: usize, const Q: usize>(
+    cells: &Cells<N, Q>,
+    d: impl Fn(usize) -> &'a Matrix3<f64>,
+    bases: &NodalBases,
+    zeta: &[[f64; Q]],
+    places: &[[u32; 2]],
+    entries: &mut [f64],
+) {
+    let elements = cells.nodes.iter().zip(cells.elements).zip(zeta);
+    for (t, (((nodes, element), zeta), places)) in
+        elements.zip(places.chunks_exact(N * N)).enumerate()
+    {
+        let (d, inverses) = (d(t), nodes.map(|node| bases.inverse(node)));
+        let rotated = inverses.iter().any(Option::is_some);
+        for (i, j) in (0..N).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+            let mut block = element.stiffness(d, zeta, i, j);
+            if rotated {
+                block = inverses[i].map_or(block, |inverse| inverse.transpose() * block);
+                block = inverses[j].map_or(block, |inverse| block * inverse);
             }
-            // The block (b, a) is the transpose of (a, b).
-            if !diagonal && let Some(block) = values.next() {
-                block.copy_from_slice(&[sum[0], sum[2], sum[1], sum[3]]);
+            add(entries, places[i * N + j], &block);
+            if i != j {
+                add(entries, places[j * N + i], &block.transpose());
             }
         }
-        self.matrix.set_values(&self.values)
+    }
+}
+
+/// Adds a block to the entries at the places of its rows.
+#[inline(always)]
+fn add(entries: &mut [f64], places: [u32; 2], block: &Matrix2<f64>) {
+    for (i, place) in places.into_iter().enumerate() {
+        let place = place as usize;
+        if let Some([x, y]) = entries.get_mut(place..place + 2) {
+            *x += block[(i, 0)];
+            *y += block[(i, 1)];
+        }
     }
 }
 
@@ -133,59 +188,15 @@ fn rigid_motions(
     motions.into_iter().map(vector).collect()
 }
 
-/// A triangle and two of its nodes.
-type Place = (u32, u8, u8);
-
-/// All pairs of nodes {a ≥ b} with a common triangle, one of them among the first `owned`, each with
-/// the end of its triangles in the first list.
+/// The pairs of nodes (a, b) with a common triangle, increasing, that are stored.
 fn pairs<const N: usize, const Q: usize>(
     cells: &Cells<N, Q>,
-    owned: usize,
-) -> (Vec<Place>, Vec<([usize; 2], u32)>) {
-    let mut found: Vec<([u32; 2], Place)> = Vec::with_capacity(N * (N + 1) / 2 * cells.nodes.len());
-    for (t, nodes) in cells.nodes.iter().enumerate() {
-        for (i, j) in (0..N).flat_map(|i| (0..=i).map(move |j| (i, j))) {
-            let (i, j) = if nodes[i] >= nodes[j] { (i, j) } else { (j, i) };
-            if nodes[j] < owned {
-                found.push(([nodes[i] as u32, nodes[j] as u32], (t as u32, i as u8, j as u8)));
-            }
-        }
-    }
-    found.sort_unstable();
-    let mut end = 0;
-    let pairs = found.chunk_by(|(a, _), (b, _)| a == b).map(|same| {
-        end += (Q * same.len()) as u32;
-        (same[0].0.map(|node| node as usize), end)
-    });
-    let pairs = pairs.collect();
-    (found.into_iter().map(|(_, place)| place).collect(), pairs)
-}
-
-/// The quadrature points of each place with their undamaged blocks, row by row, in the unknowns of
-/// `bases`: D_i⁻ᵀ K_ij D_j⁻¹.
-fn contributions<const N: usize, const Q: usize>(
-    body: &Body,
-    cells: &Cells<N, Q>,
-    places: &[Place],
-    elasticity: &Elasticity,
-    bases: &NodalBases,
-) -> Vec<(u32, [f64; 4])> {
-    let mut contributions = Vec::with_capacity(Q * places.len());
-    for &(t, i, j) in places {
-        let (i, j, nodes) = (usize::from(i), usize::from(j), &cells.nodes[t as usize]);
-        let d = elasticity.d(body, t as usize);
-        let (left, right) = (bases.inverse(nodes[i]), bases.inverse(nodes[j]));
-        for (q, point) in cells.elements[t as usize].points.iter().enumerate() {
-            let mut k: Matrix2<f64> = point.stiffness(d, i, j);
-            if let Some(inverse) = left {
-                k = inverse.transpose() * k;
-            }
-            if let Some(inverse) = right {
-                k *= inverse;
-            }
-            let block = [k[(0, 0)], k[(0, 1)], k[(1, 0)], k[(1, 1)]];
-            contributions.push((t * Q as u32 + q as u32, block));
-        }
-    }
-    contributions
+    is_stored: impl Fn(usize, usize) -> bool,
+) -> Vec<[u32; 2]> {
+    let couples = cells.nodes.iter().flat_map(|n| n.iter().flat_map(|a| n.map(|b| (*a, b))));
+    let stored = couples.filter(|&(a, b)| is_stored(a, b));
+    let mut pairs: Vec<[u32; 2]> = stored.map(|(a, b)| [a as u32, b as u32]).collect();
+    pairs.sort_unstable();
+    pairs.dedup();
+    pairs
 }

@@ -93,9 +93,10 @@ fn passes(c: &mut Criterion) {
     group.bench_function("damage solve", |b| {
         b.iter(|| damage.advance(&load, &mut zeta.clone()).unwrap());
     });
-    group.throughput(Throughput::Bytes(k.refill_traffic() as u64));
+    group.throughput(Throughput::Bytes(k.refill_traffic(&problem.body) as u64));
     group.bench_function("stiffness refill", |b| {
-        b.iter(|| k.refill(black_box(&means)).unwrap());
+        let DiscreteProblem { body, elasticity, constraints, .. } = &problem;
+        b.iter(|| k.refill(body, elasticity, &constraints.bases, black_box(&means)).unwrap());
     });
     group.throughput(Throughput::Bytes(k.matrix.bytes_per_product() as u64));
     group.bench_function("product", |b| {

@@ -241,7 +241,7 @@ fn the_assembled_stiffness_is_the_matrix_free_force_in_the_nodal_bases() {
         for _ in 0..3 {
             let zeta: Vec<f64> = body.mesh.nodes.iter().map(|_| 1.5 + random.next()).collect();
             let zeta = body.at_points(&zeta);
-            stiffness.refill(&zeta).unwrap();
+            stiffness.refill(&body, &elasticity, &bases, &zeta).unwrap();
             let fixed = bases.fixed();
             let c: Vec<f64> =
                 (0..2 * nodes).map(|i| if fixed[i] { 0.0 } else { random.next() }).collect();

@@ -180,12 +180,15 @@ impl Compliance<'_> {
         zeta: &[f64],
         contact: &[ContactPoint],
     ) -> Result<(), PetscError> {
-        let constraints = &self.problem.constraints;
+        let DiscreteProblem { body, elasticity, constraints, .. } = self.problem;
         let flags = active_bounds(constraints, contact, 0.0);
         let active = constraints.bounds.iter().zip(flags).filter(|(_, active)| *active > 0.0);
         self.active = active.map(|(bound, _)| bound.dof).collect();
         match &mut self.stiffness {
-            Some(stiffness) => stiffness.refill(&self.problem.zeta_at_points(zeta))?,
+            Some(stiffness) => {
+                let zeta = self.problem.zeta_at_points(zeta);
+                stiffness.refill(body, elasticity, &constraints.bases, &zeta)?;
+            }
             None => self.supported = self.solver.factor().prescribe(&self.active)?,
         }
         Ok(())
