@@ -1,7 +1,7 @@
 //! Starting and ending PETSc (PetscInitialize, PetscFinalize).
 
 use super::{
-    Communicator, PetscError, check, error::keep_message, handle::OPEN_HANDLES, options,
+    Communicator, PetscError, blas, check, error::keep_message, handle::OPEN_HANDLES, options,
     options::c_string, raw,
 };
 use std::{
@@ -99,6 +99,8 @@ fn set_missing(variables: &[(&'static str, &str)]) -> Vec<&'static str> {
 /// Starts PETSc; its errors keep their message for [`check`] instead of printing a trace.
 fn initialize(options: &[String]) -> Result<(), PetscError> {
     give_memory_back();
+    // SAFETY: only a session uses BLAS, and this is the first; as in `set_missing`.
+    unsafe { blas::choose_kernels() };
     // Scotch 7 starts a thread for each core of the machine in every rank: too many by the number of
     // ranks, and slow because they wait for each other. It reads this whenever it divides a graph.
     set_missing(&[("SCOTCH_PTHREAD_NUMBER", "1")]);
