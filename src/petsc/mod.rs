@@ -17,6 +17,7 @@ mod graph;
 mod handle;
 mod matrix;
 mod options;
+mod pages;
 mod preconditioner;
 mod session;
 mod tao;
@@ -36,6 +37,7 @@ pub use vector::Vector;
 pub(crate) use ghosts::Ghosts;
 pub(crate) use graph::divide;
 pub(crate) use options::{has_option, set_default_option};
+pub(crate) use pages::use_large_pages;
 pub(crate) use preconditioner::Preconditioner;
 pub(crate) use tao::{BoundedQuadratic, ShellPreconditioner, TaoReport};
 
