@@ -7,7 +7,7 @@ use crate::{
     archive::{Archive, ArchiveError},
     petsc::{
         Communicator, Matrix, PetscError, Preconditioner, Session, Vector, has_option,
-        set_default_option, use_large_pages,
+        set_default_option,
     },
 };
 
@@ -32,8 +32,6 @@ pub struct Factor {
     policy: Option<RefactorisationPolicy>,
     /// Applications in the present solve.
     applications: usize,
-    /// Applications in the solves before.
-    uses: usize,
     /// Factorisations that did not fail.
     factorisations: usize,
     /// The values of the matrix last factorised, from which a checkpoint makes the same factor.
@@ -67,11 +65,6 @@ const MOST_CONDENSED: f64 = 4.0;
 /// as slow, memory 10 % more; what is beyond was not measured.
 const VERY_LARGE: usize = 2_500_000;
 
-/// Bytes that an application reads from memory rather than caches, and applications after which large pages
-/// are worth their making. With 132,000 unknowns that took a quarter of a second, and steps of 2.4
-/// applications then 15 ms less.
-const PAGED: (f64, usize) = (8e6, 40);
-
 impl Factor {
     /// A factor whose PETSc options begin with `prefix` (`-elastic_pc_type …`).
     pub fn new(session: &Session, prefix: &str, precision: Precision) -> Self {
@@ -83,7 +76,6 @@ impl Factor {
             method: None,
             policy: None,
             applications: 0,
-            uses: 0,
             factorisations: 0,
             values: Vec::new(),
             diagonal: Vec::new(),
@@ -347,13 +339,6 @@ impl Factor {
     /// Ends a solve: its applications tell how good the factor still is.
     pub(super) fn end_solve(&mut self, reduction: Reduction) {
         let iterations = std::mem::take(&mut self.applications);
-        let (bytes, most) = PAGED;
-        let many = self.uses < most && self.uses + iterations >= most;
-        self.uses += iterations;
-        // What reads the factor again and again reads the matrix and vectors, too.
-        if many && self.bytes_per_application() > bytes {
-            use_large_pages();
-        }
         if let Some(policy) = &mut self.policy {
             policy.solved(iterations, reduction);
         }

@@ -87,7 +87,7 @@ impl Matrix {
         })
     }
 
-    /// The place of each of the pattern's positions among the entries of [`Self::read_entries`], where
+    /// The place of each of the pattern's positions among the entries of `read_entries`, where
     /// none is repeated or left out; the values are lost.
     ///
     /// # Errors
@@ -103,7 +103,7 @@ impl Matrix {
         Ok(places)
     }
 
-    /// Replaces the entries that this rank stores, in the order of [`Self::read_entries`], by what `writer`
+    /// Replaces the entries that this rank stores, in the order of `read_entries`, by what `writer`
     /// makes of zeros. Collective.
     ///
     /// # Errors
