@@ -179,6 +179,9 @@ def main(prog=None):
         rows = [row for scene in arguments.scenes for row in compared(scene, arguments)]
     except Refused as refused:
         return refused.args[0]
+    except OSError as error:
+        print(f"error: {error.filename}: {error.strerror}", file=sys.stderr)
+        return 2
     print(table(rows))
     path = arguments.out / "comparison.csv"
     with open(path, "w", newline="", encoding="utf-8") as file:

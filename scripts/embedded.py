@@ -3,6 +3,7 @@ all its scripts as JSON on standard input. Nothing is written to disk."""
 
 import importlib
 import json
+import os
 import sys
 from importlib.abc import InspectLoader, MetaPathFinder
 from importlib.util import spec_from_loader
@@ -26,6 +27,12 @@ sys.meta_path.insert(0, Sources(json.load(sys.stdin)))
 sys.path = [path for path in sys.path if path]
 name = sys.argv.pop(1)
 try:
-    sys.exit(importlib.import_module(name).main(f"signorini {name}"))
+    code = importlib.import_module(name).main(f"signorini {name}")
+    sys.stdout.flush()
 except KeyboardInterrupt:
-    sys.exit(130)
+    code = 130
+except BrokenPipeError:
+    # Whoever reads the output has seen enough.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    code = 0
+sys.exit(code)

@@ -30,6 +30,8 @@ def entry(name, value):
 
 def description(folder):
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    if not isinstance(summary, dict) or "steps" not in summary:
+        raise ValueError("it tells of no run")
     lines = [line for name in summary if name != "phases" for line in entry(name, summary[name])]
     times = []
     if (folder / "fields.pvd").exists():

@@ -5,11 +5,11 @@ use serde::{Deserialize, Serialize};
 /// Compares what the age of a factor has cost with what a new one costs, both in iterations.
 ///
 /// Let a solve with the factor of an earlier matrix take mᵢ iterations to divide the residual by e^aᵢ or
-/// more, and let e^ρ be the most by which an iteration has divided it in the mean of a solve since the first
-/// with the factor, which is that of its own matrix: a new factor would soon take about ⌈aᵢ/ρ⌉. One is due as soon as Σ (mᵢ − ⌈aᵢ/ρ⌉) ≥ C, the cost
-/// of a factorisation. Where the loss per solve grows evenly that is the cheapest moment, otherwise it costs
-/// at most twice the cheapest. All is counted, nothing measured by the clock: equal runs decide alike, and so
-/// do all ranks.
+/// more, and let e^ρ be the most by which an iteration has divided it in the mean of a solve since the
+/// first with the factor, which is that of its own matrix: a new factor would soon take about ⌈aᵢ/ρ⌉. One
+/// is due as soon as Σ (mᵢ − ⌈aᵢ/ρ⌉) ≥ C, the cost of a factorisation. Where the loss per solve grows
+/// evenly that is the cheapest moment, otherwise it costs at most twice the cheapest. All is counted,
+/// nothing measured by the clock: equal runs decide alike, and so do all ranks.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct RefactorisationPolicy {
     /// C: iterations that take as long as a factorisation.

@@ -37,15 +37,22 @@ const PAUSE: Duration = Duration::from_millis(5);
 #[derive(Debug, Clone, Copy)]
 pub struct Ranks(pub Option<usize>);
 
+/// Ranks that may share a core: none runs faster for it, and many more bring the machine down.
+const CROWDED: usize = 8;
+
 impl FromStr for Ranks {
-    type Err = &'static str;
+    type Err = String;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         match text.parse() {
-            Ok(0) => Err("there is no run on 0 ranks"),
+            Ok(0) => Err("there is no run on 0 ranks".to_owned()),
+            Ok(number) if number > CROWDED * cores() => Err(format!(
+                "too many for {} cores, which share the work at best one each",
+                cores()
+            )),
             Ok(number) => Ok(Self(Some(number))),
             Err(_) if text == "auto" => Ok(Self(None)),
-            Err(_) => Err("it is neither a number nor auto"),
+            Err(_) => Err("it is neither a number nor auto".to_owned()),
         }
     }
 }

@@ -48,6 +48,8 @@ pub fn script(name: &str, ScriptArguments { arguments }: &ScriptArguments) -> Re
         .args(arguments)
         // What a script runs itself.
         .env("SIGNORINI", env::current_exe().map_err(Failure::from)?)
+        // The sources are UTF-8, and so is what they say.
+        .env("PYTHONIOENCODING", "utf-8")
         .stdin(Stdio::piped())
         .spawn()
         .map_err(|error| format!("{}: {error}", python.display()))?;

@@ -80,8 +80,10 @@ impl DiscreteProblem {
         let mut conditions = BoundaryConditions::new(&scene, &body);
         let motions = conditions.resolve_motions(&body);
         let (fixed, gaps) = (&conditions.fixed, &mut conditions.gaps);
-        let mut constraints = Constraints::new(&body.nodes.points, fixed, gaps)
-            .map_err(|source| SetupError::Constraint { scene: scene.path.clone(), source })?;
+        let mut constraints =
+            Constraints::new(&body.nodes.points, fixed, gaps).map_err(|source| {
+                SetupError::Constraint { scene: scene.path.clone(), time: None, source }
+            })?;
         motions.pin_free(&body, &mut constraints);
         let certificate = Certificate::new(fixed, gaps);
         let unresolved = |traction| notes::unresolved(&scene, &body.mesh, traction);
@@ -225,7 +227,8 @@ impl DiscreteProblem {
         if !values.iter().chain(gaps).all(|value| value.is_finite()) {
             return Err(self.not_finite(time));
         }
-        let constraint = |source| SetupError::Constraint { scene: self.scene.path.clone(), source };
+        let (scene, time) = (self.scene.path.clone(), self.scene.time.map(|_| time));
+        let constraint = |source| SetupError::Constraint { scene, time, source };
         self.constraints.pose(values, gaps, &self.body.nodes.points).map_err(constraint)
     }
 

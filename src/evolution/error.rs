@@ -119,10 +119,12 @@ pub enum SetupError {
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// Displacement conditions contradict each other.
-    #[error("{scene}: {source}")]
+    #[error("{scene}: {}{source}", time.map_or(String::new(), |t| format!("at t = {}, ", rounded(t))))]
     Constraint {
         /// The scene file.
         scene: PathBuf,
+        /// The time, s; none where they do at any.
+        time: Option<f64>,
         /// What contradicts what.
         source: ConstraintError,
     },

@@ -50,8 +50,8 @@ pub fn add_body_force(body: &Body, force: impl Fn([f64; 2]) -> [f64; 2], load: &
 }
 
 /// Adds the surface load f_i = ∫ f_N·φ_i over boundary `edges` to the nodal loads, with f_N in N/m² as
-/// a function of the point and the outward normal there. Two Gauss points an edge are exact, on straight edges, where f_N is
-/// quadratic for P1 and affine for P2.
+/// a function of the point and the outward normal there. Two Gauss points an edge are exact, on
+/// straight edges, where f_N is quadratic for P1 and affine for P2.
 pub fn add_traction(
     body: &Body,
     edges: &[Edge],

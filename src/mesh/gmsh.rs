@@ -59,10 +59,10 @@ pub fn load(
 
 /// Meshes a `.geo` file and returns the path of the `.msh` beside it.
 ///
-/// Each parameter is set over the `DefineConstant` of its name and appears in the name of
-/// the mesh, as in `bridge-grading3-size0.25.msh`, and so does order 2, as in `hertz.order2.msh`.
-/// `size`, in m, also bounds the length of the edges. A mesh that is not older than its `.geo` and the files this takes in by `Include` and
-/// `Merge` is kept as it is; a new one appears complete or not at all.
+/// Each parameter is set over the `DefineConstant` of its name and appears in the name of the mesh, as
+/// in `bridge-grading3-size0.25.msh`, and so does order 2, as in `hertz.order2.msh`. `size`, in m, also
+/// bounds the length of the edges. A mesh that is not older than its `.geo` and the files this takes in
+/// by `Include` and `Merge` is kept as it is; a new one appears complete or not at all.
 ///
 /// # Errors
 /// The `.geo` cannot be read or the `.msh` written, a parameter makes no sense or occurs

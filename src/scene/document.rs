@@ -151,7 +151,7 @@ impl SceneText {
         let mut problems = Vec::new();
         for argument in &self.arguments {
             let put = match DeTable::parse(argument) {
-                Ok(given) if argument.contains('=') => {
+                Ok(given) if argument.contains('=') && !argument.contains('\n') => {
                     put_all(&mut root, given.into_inner(), "", argument)
                 }
                 _ => Err(misshapen(argument)),
@@ -169,13 +169,16 @@ pub(super) fn complete_paths(value: &mut toml::Value, folder: &Path, tables: &mu
     match value {
         toml::Value::String(text) if text.contains("table") => {
             // An expression quotes nothing but files.
-            let mut full = |part: &str| match fs::read(folder.join(part)) {
-                Ok(table) => {
-                    tables.extend(table);
-                    let file = folder.join(part);
-                    std::path::absolute(&file).unwrap_or(file).to_string_lossy().into_owned()
+            let mut full = |part: &str| {
+                let file = folder.join(part);
+                // What is no file may be endless.
+                match file.is_file().then(|| fs::read(&file)) {
+                    Some(Ok(table)) => {
+                        tables.extend(table);
+                        std::path::absolute(&file).unwrap_or(file).to_string_lossy().into_owned()
+                    }
+                    _ => part.to_owned(),
                 }
-                Err(_) => part.to_owned(),
             };
             for quote in ["\"", "'"] {
                 *text = text.split(quote).map(&mut full).collect::<Vec<_>>().join(quote);
@@ -194,6 +197,7 @@ pub(super) fn complete_paths(value: &mut toml::Value, folder: &Path, tables: &mu
 /// What is wrong with a `--set` argument that is no TOML.
 fn misshapen(argument: &str) -> String {
     let problem = match argument.contains('=') {
+        true if argument.contains('\n') => "is more than one line",
         true => "the key is no dotted TOML key (quote odd names: boundary.\"left side\".gap=0)",
         false => "has no `=`",
     };

@@ -140,6 +140,28 @@ fn the_lshape_under_a_rolling_load() {
     contact_travels(&test_directory, "out/lshape-rolling-active-set-1");
 }
 
+/// Contact unknowns are eliminated last: without damage the factor of the first step serves for every set
+/// of active nodes.
+#[test]
+fn a_rolling_load_without_damage_takes_one_factorisation() {
+    let test_directory = example("lshape-rolling");
+    let sound = ["--set", "damage.lambda_d=0", "--set", "damage.lambda_u=0"];
+    let few = ["--set", "mesh.size=0.25", "--set", "time.step=0.05"];
+    for ranks in 1..=3 {
+        let out = format!("out/{ranks}");
+        let run = ["run", "scene.toml", "--solver", "active-set", "--out", &out];
+        let arguments = [&run[..], &sound, &few].concat();
+        let said = ProgramOutput::of(&mut on_ranks(&test_directory, ranks, &arguments));
+        assert_eq!(said.code, Some(0), "{said:?}");
+        contact_travels(&test_directory, &out);
+        same_history(&test_directory, &out, "out/1");
+        let (names, rows) = test_directory.history(&out);
+        let column = names.iter().position(|n| n == "factorisations").expect("the column");
+        let factorisations: f64 = rows.iter().map(|row| row[column]).sum();
+        assert_eq!(factorisations, 1.0, "{ranks} ranks");
+    }
+}
+
 #[test]
 fn the_beam_under_a_wave() {
     let test_directory =

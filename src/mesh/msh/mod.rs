@@ -17,9 +17,9 @@ use std::{fs, path::Path};
 
 /// Reads a `.msh` file.
 ///
-/// If any triangle belongs to a physical surface, only such triangles make the body.
-/// Physical curves of the same name are one curve, as are physical surfaces. Nodes and triangles keep the order of
-/// the file.
+/// If any triangle belongs to a physical surface, only such triangles make the body. Physical curves of
+/// the same name are one curve, as are physical surfaces. Nodes and triangles keep the order of the
+/// file.
 ///
 /// # Errors
 /// The file cannot be read, or it is not the mesh of a plane body; the message says where.

@@ -19,6 +19,9 @@ impl Table {
         let failed =
             |error: &dyn std::fmt::Display| format!("the table {}: {error}", path.display());
         let file = std::fs::File::open(path).map_err(|error| failed(&error))?;
+        if !file.metadata().is_ok_and(|data| data.is_file()) {
+            return Err(failed(&"is no file"));
+        }
         let mut reader = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
