@@ -111,6 +111,7 @@ def passes(found):
 def others(rows):
     """Growth and ranks: of whole runs the steps, and all else with the first factors; memory of a rank."""
     columns = (("seconds_per_step", 1e3), ("solves", 1), ("whole_seconds", 1), ("else", 1), ("peak_mb", 1))
+    rows = [row for row in rows if row["part"] in ("growth", "ranks")]
     for row in rows:
         row["else"] = row["whole_seconds"] - row["steps"] * row["seconds_per_step"]
     for part in ("growth", "ranks"):
