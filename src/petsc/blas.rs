@@ -12,8 +12,8 @@ use std::{
 const CORE_TYPE: &str = "OPENBLAS_CORETYPE";
 
 /// Lets OpenBLAS choose by what the processor can do, where it has taken its oldest kernels because it does
-/// not know the model: Debian's does not know those after 2021, and factorises at a fifth of the speed.
-/// Another BLAS is left as it is.
+/// not know the model: on such a one Debian's multiplied matrices at a fifth of the speed, and a
+/// factorisation with 132,000 unknowns took 1.4 times as long. Another BLAS is left as it is.
 ///
 /// # Safety
 /// Nothing uses BLAS meanwhile, or reads the environment but through std.
