@@ -8,15 +8,15 @@
 //! comes from u. Triangles are bisected down to the smaller size, round after round, until both
 //! estimates are small enough.
 
-use super::{
-    DiscreteProblem, Outcome, Phases, RunError, SetupError, State, run, unresolved::unresolved,
-};
+mod indicators;
+
+use super::{DiscreteProblem, RunError, SetupError, unresolved::unresolved};
 use crate::{
-    fem::RecoveredStrains,
     mesh::{Mesh, MeshError, Order, Refinement, sorted, twice_area},
     petsc::{PetscError, Session},
     scene::{Scene, Stepping},
 };
+use indicators::{INSTANTS, Indicators};
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 
@@ -75,16 +75,12 @@ const INTERPOLATION: f64 = 0.7;
 const PILOT_TOLERANCE: f64 = 0.05;
 /// The part of the accuracy that the time steps of the last run may take.
 pub const SHARE_OF_STEPS: f64 = 0.5;
-/// Steps of a run on a coarse mesh; so many times, about, at which errors are estimated.
-const INSTANTS: usize = 12;
 /// A triangle's size is multiplied by no less than this in a round.
 const LEAST_RATIO: f64 = 0.125;
 /// A triangle at an edge on which a traction or a gap is not resolved becomes smaller by this.
 const QUARTER: f64 = 0.25;
 /// Triangles are bisected while they are larger than this part of their wanted area.
 const EXCESS: f64 = 1.5;
-/// At the end of a run, errors are relative to no less than this part of the largest ‖u‖².
-const UNLOADED: f64 = 1e-4;
 /// Rounds, and triangles of a mesh, at most.
 const ROUNDS: usize = 25;
 const MOST_TRIANGLES: usize = 4_000_000;
@@ -127,58 +123,52 @@ fn refined(
     let mut scene = of_few_steps(scene);
     let order = if scene.order == Order::Quadratic { 2.0 } else { 1.0 };
     let mut refinement = Refinement::start(mesh);
-    let mut stopped_before = None;
-    let mut settled_rounds = 0;
+    let (mut stopped_before, mut close_before) = (None::<f64>, false);
     let mut rounds = 0;
     loop {
         rounds += 1;
-        let problem = DiscreteProblem::new(scene.clone(), refinement.mesh.clone())?;
-        let problem = problem.restrict(session)?;
-        let triangles = refinement.mesh.triangles.len();
-        let mut indicators = Indicators::new(&problem, triangles);
-        let outcome = run(session, &problem, solver, &Phases::default(), &mut |step| {
-            Ok(indicators.observe(&step.state, false)?)
-        });
-        let outcome = outcome.map_err(|source| AdaptError::Run { rounds, triangles, source })?;
-        if let (Some(grid), Some(_)) = (&mut scene.time, outcome.stopped)
-            && matches!(grid.stepping, Stepping::Uniform { .. })
-        {
-            // ζ_* is reached: by the body, or by too long steps.
-            grid.stepping = Stepping::Auto { tolerance: PILOT_TOLERANCE.min(2.0 * accuracy) };
+        let mesh = &refinement.mesh;
+        let triangles = mesh.triangles.len();
+        let problem = DiscreteProblem::new(scene.clone(), mesh.clone())?.restrict(session)?;
+        let (outcome, indicators) = Indicators::of_run(session, &problem, solver, triangles)
+            .map_err(|source| AdaptError::Run { rounds, triangles, source })?;
+        let stop = outcome.stopped.as_ref().map(|stop| stop.time);
+        if stop.is_some() && choose_steps(&mut scene, accuracy) {
             continue;
         }
-        indicators.observe(&outcome.last.state, true)?;
         let (error, shares) = indicators.relative();
         let damage_error = outcome.errors.damage_mesh;
+        let stop_change = stopped_before.zip(stop).map(|(before, now)| (now - before).abs());
+        let small = |(change, stop)| change <= ENOUGH * accuracy * stop;
+        let close = stop_change.zip(stop).is_some_and(small);
         // Two meshes may agree by chance.
-        let is_settled = is_settled(&outcome, stopped_before, accuracy);
-        settled_rounds = if is_settled { settled_rounds + 1 } else { 0 };
-        let settled = settled_rounds >= if outcome.stopped.is_some() { 2 } else { 1 };
+        let settled = stop.is_none() || (close && close_before);
         let exhausted = rounds >= ROUNDS || triangles > MOST_TRIANGLES;
-        let times = outcome.stopped.map(|stop| stop.time).zip(stopped_before);
         let adapted = Adapted {
-            mesh: refinement.mesh.clone(),
+            mesh: mesh.clone(),
             unknowns: 2 * problem.body.nodes.partition.total(),
             rounds,
             error,
             damage_error,
-            stop_change: times.map(|(now, before): (f64, f64)| (now - before).abs()),
+            stop_change,
             short: exhausted.then(|| "no larger mesh and no further one is tried".to_owned()),
         };
         seen(&adapted);
         let largest = error.max(damage_error.unwrap_or(0.0));
         let displacement = outcome.last.record.displacement_max.max(indicators.displacement);
-        let coarse = unresolved(&scene, &refinement.mesh, accuracy, displacement);
+        let coarse = unresolved(&scene, mesh, accuracy, displacement);
         if exhausted || (largest <= ENOUGH * accuracy && settled && coarse.is_empty()) {
             return Ok(adapted);
         }
         let of_u = accuracy_of_u(accuracy, error, damage_error, settled);
         let mut ratios = size_ratios(&shares, order, AIM * of_u);
         if damage_error.is_some() {
-            indicators.limit_by_damage(&outcome, accuracy, &mut ratios);
+            let shares = indicators.gathered(&outcome.damage_indicators);
+            let others = size_ratios(&shares, 2.0, INTERPOLATION * AIM * accuracy);
+            ratios.iter_mut().zip(others).for_each(|(ratio, other)| *ratio = ratio.min(other));
         }
-        quarter(&refinement.mesh, &coarse, &mut ratios);
-        stopped_before = outcome.stopped.map(|stop| stop.time);
+        quarter(mesh, &coarse, &mut ratios);
+        (stopped_before, close_before) = (stop, close);
         refinement = divided(refinement, &ratios)?;
     }
 }
@@ -190,6 +180,15 @@ fn of_few_steps(scene: &Scene) -> Scene {
         grid.stepping = Stepping::Uniform { steps: INSTANTS };
     }
     scene
+}
+
+/// Where ζ_* is reached, by the body or by too long steps, the steps are chosen by their error from then on;
+/// false if they are already.
+fn choose_steps(scene: &mut Scene, accuracy: f64) -> bool {
+    let Some(grid) = &mut scene.time else { return false };
+    let uniform = matches!(grid.stepping, Stepping::Uniform { .. });
+    grid.stepping = Stepping::Auto { tolerance: PILOT_TOLERANCE.min(2.0 * accuracy) };
+    uniform
 }
 
 /// A damage, or a time, that is not exact enough asks for a u better than this one.
@@ -207,15 +206,6 @@ fn quarter(mesh: &Mesh, edges: &HashSet<[usize; 2]>, ratios: &mut [f64]) {
         if [[a, b], [b, c], [c, a]].iter().any(|&side| edges.contains(&sorted(side))) {
             *ratio = ratio.min(QUARTER);
         }
-    }
-}
-
-/// Whether the time at which ζ_* was reached has changed by little since the mesh before.
-fn is_settled(outcome: &Outcome, before: Option<f64>, accuracy: f64) -> bool {
-    match (outcome.stopped, before) {
-        (None, _) => true,
-        (Some(_), None) => false,
-        (Some(stop), Some(before)) => (stop.time - before).abs() <= ENOUGH * accuracy * stop.time,
     }
 }
 
@@ -261,89 +251,4 @@ fn divided(mut refinement: Refinement, ratios: &[f64]) -> Result<Refinement, Mes
 fn areas(mesh: &Mesh) -> Vec<f64> {
     let corners = mesh.triangles.iter().map(|t| t.map(|node| mesh.nodes[node]));
     corners.map(|[a, b, c]| 0.5 * twice_area(a, b, c)).collect()
-}
-
-/// The errors of a run, triangle by triangle of the undivided mesh.
-struct Indicators<'a> {
-    problem: &'a DiscreteProblem,
-    last: Option<f64>,
-    /// max_t ‖ε* − ε(u)‖²_T, and the largest sum over T at any time.
-    squares: Vec<f64>,
-    worst: f64,
-    /// max_t ‖u‖², and the largest |u| at any time, m.
-    energy: f64,
-    displacement: f64,
-    /// ‖ε* − ε(u)‖²_T, their sum and ‖u‖² at the last time.
-    end: (Vec<f64>, f64, f64),
-}
-
-impl<'a> Indicators<'a> {
-    fn new(problem: &'a DiscreteProblem, triangles: usize) -> Self {
-        Self {
-            problem,
-            last: None,
-            squares: vec![0.0; triangles],
-            worst: 0.0,
-            energy: 0.0,
-            displacement: 0.0,
-            end: Default::default(),
-        }
-    }
-
-    /// Sees an accepted state; `at_end` says that it is the last one. Collective.
-    fn observe(&mut self, state: &State, at_end: bool) -> Result<(), PetscError> {
-        let problem = self.problem;
-        let end = problem.scene().time.map_or(1.0, |grid| grid.end);
-        let part = |time: f64| (INSTANTS as f64 * time / end + 1e-9).floor();
-        let due = match self.last {
-            None => true,
-            Some(before) => state.time > before && (at_end || part(state.time) > part(before)),
-        };
-        if !due {
-            return Ok(());
-        }
-        self.last = Some(state.time);
-        let body = &problem.body;
-        let zeta = problem.zeta_at_points(&state.zeta);
-        let recovered = RecoveredStrains::new(body, &state.u)?;
-        let error = recovered.energy_error(&problem.elasticity, &zeta, &state.u);
-        let squares = self.gathered(&error.squares);
-        self.squares.iter_mut().zip(&squares).for_each(|(max, square)| *max = max.max(*square));
-        self.end = (squares, error.error, error.energy);
-        self.worst = self.worst.max(error.error);
-        self.energy = self.energy.max(error.energy);
-        self.displacement = self.displacement.max(body.nodes.partition.max_norm(&state.u));
-        Ok(())
-    }
-
-    /// Makes triangles as small as the damage at the end asks for. Collective.
-    fn limit_by_damage(&self, outcome: &Outcome, accuracy: f64, ratios: &mut [f64]) {
-        let shares = self.gathered(&outcome.damage_indicators);
-        let others = size_ratios(&shares, 2.0, INTERPOLATION * AIM * accuracy);
-        ratios.iter_mut().zip(others).for_each(|(ratio, other)| *ratio = ratio.min(other));
-    }
-
-    /// Values of this rank's triangles for all triangles of the undivided mesh. Collective.
-    fn gathered(&self, own: &[f64]) -> Vec<f64> {
-        let body = &self.problem.body;
-        let mut values = vec![0.0; self.squares.len()];
-        for (&triangle, value) in body.global_triangles.iter().zip(own) {
-            values[triangle] = *value;
-        }
-        body.nodes.partition.comm().sum(&mut values);
-        values
-    }
-
-    /// The relative error at the worst time, and the shares m_T of its square.
-    fn relative(&self) -> (f64, Vec<f64>) {
-        if self.worst == 0.0 {
-            return (0.0, vec![0.0; self.squares.len()]);
-        }
-        // What is left after unloading need not be exact.
-        let (squares, error, energy) = &self.end;
-        let energy = energy.max(UNLOADED * self.energy);
-        let share = |(max, end): (&f64, &f64)| (max / self.energy).max(end / energy);
-        let shares = self.squares.iter().zip(squares).map(share).collect();
-        ((self.worst / self.energy).max(error / energy).sqrt(), shares)
-    }
 }
