@@ -157,7 +157,7 @@ impl Factor {
     /// # Errors
     /// There is no memory for it, or PETSc options ask for what PETSc has not.
     pub fn factorise(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
-        let (comm, entries) = (self.comm, matrix.entries());
+        let (comm, entries) = (self.comm, matrix.entries() as f64);
         let (definite, cost) = match self.method(matrix)? {
             Method::Petsc(preconditioner) => (preconditioner.set_up(matrix)?, UNKNOWN_COST),
             Method::Substructure { factor, condensed } => {

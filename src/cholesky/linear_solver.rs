@@ -1,8 +1,9 @@
 //! Linear systems by conjugate gradients on a Cholesky factor that is kept.
 
-use super::{Condensed, Factor, LinearSystem, Precision, Reduction};
+mod conjugate_gradients;
+
+use super::{Condensed, Factor, LinearSystem, Precision};
 use crate::petsc::{Matrix, PetscError, Session, Vector};
-use std::mem::take;
 
 /// Chooses which of the condensed unknowns are prescribed, given the system that is left for them when
 /// all others are eliminated: of each by how much it then changes, or `None` where the unknowns that are
@@ -227,58 +228,19 @@ impl LinearSolver {
             self.set_scaling(system)?;
         }
         let condensed = !report.converged && self.factor.is_condensed(system.matrix)?;
-        let Some(choose) = choose.filter(|_| condensed) else {
-            self.iterate(system, x, (limit, most), false, report)?;
-            return Ok(None);
-        };
-        let chosen = self.apply_factor(system, Some(choose))?;
-        let Some(chosen) = chosen else {
-            self.iterate(system, x, (limit, most), true, report)?;
-            return Ok(None);
-        };
-        report.iterations += 1;
-        let system = LinearSystem { prescribed: Some(&chosen), ..system };
-        x.axpby(1.0, &self.preconditioned, 1.0)?;
-        system.multiply(&self.preconditioned, &mut self.image)?;
-        self.residual.axpby(-1.0, &self.image, 1.0)?;
-        report.converged = self.is_reached(system, limit)?;
-        self.iterate(system, x, (limit, most), false, report)?;
-        Ok(Some(chosen))
-    }
-
-    /// E, of the factored matrix and this one; 1 where there is no quotient.
-    fn set_scaling(&mut self, system: LinearSystem) -> Result<(), PetscError> {
-        let mut diagonal = system.matrix.diagonal()?;
-        if !self.factor.is_condensed(system.matrix)? {
-            system.added.iter().copied().flatten().for_each(|&(i, d)| diagonal[i] += d);
+        let choose = choose.filter(|_| condensed);
+        let asked = choose.is_some();
+        let chosen = choose.map_or(Ok(None), |choose| self.apply_factor(system, Some(choose)))?;
+        let prescribed = chosen.as_deref().or(system.prescribed);
+        let system = LinearSystem { prescribed, ..system };
+        if chosen.is_some() {
+            report.iterations += 1;
+            x.axpby(1.0, &self.preconditioned, 1.0)?;
+            system.multiply(&self.preconditioned, &mut self.image)?;
+            self.residual.axpby(-1.0, &self.image, 1.0)?;
+            report.converged = self.is_reached(system, limit)?;
         }
-        let quotient = |(old, new): (&f64, &f64)| if old * new > 0.0 { old / new } else { 1.0 };
-        self.scaling.clear();
-        self.scaling.extend(self.factor.diagonal().iter().zip(&diagonal).map(quotient));
-        Ok(())
-    }
-
-    /// z ← P⁻¹E r with 0 on prescribed unknowns; or with those that are chosen, if they are others, and
-    /// the changes of them.
-    fn apply_factor(
-        &mut self,
-        system: LinearSystem,
-        choose: Option<Choose>,
-    ) -> Result<Option<Vec<usize>>, PetscError> {
-        let (bytes, z) = (self.factor.bytes_per_application(), &mut self.preconditioned);
-        let r = &mut self.free_residual;
-        if choose.is_some() {
-            r.axpby(1.0, &self.residual, 0.0)?;
-        }
-        r.write(|r| r.iter_mut().zip(&self.scaling).for_each(|(r, e)| *r *= e))?;
-        let apply = || match choose {
-            Some(choose) => self.factor.apply_choosing(r, z, choose),
-            None => self.factor.apply(r, z).map(|()| None),
-        };
-        let chosen = system.book(|booking| booking.triangular_solves, bytes, apply)?;
-        if chosen.is_none() {
-            system.clear_prescribed(&mut self.preconditioned)?;
-        }
+        self.iterate(system, x, (limit, most), asked && chosen.is_none(), report)?;
         Ok(chosen)
     }
 
@@ -286,75 +248,5 @@ impl LinearSolver {
     /// there.
     pub fn residual(&self) -> &Vector {
         &self.residual
-    }
-
-    /// r ← b − (A + D) x, and whether that is small enough already.
-    fn start(
-        &mut self,
-        system: LinearSystem,
-        b: &Vector,
-        x: &Vector,
-        limit: f64,
-    ) -> Result<SolveReport, PetscError> {
-        system.multiply(x, &mut self.residual)?;
-        self.residual.axpby(1.0, b, -1.0)?;
-        let converged = self.is_reached(system, limit)?;
-        self.first_norm = self.norm;
-        Ok(SolveReport { converged, ..SolveReport::default() })
-    }
-
-    /// Whether ‖r‖₂ ≤ `limit` on the free unknowns; never where the norm overflows, as the limit of a
-    /// huge b does too.
-    fn is_reached(&mut self, system: LinearSystem, limit: f64) -> Result<bool, PetscError> {
-        self.free_residual.axpby(1.0, &self.residual, 0.0)?;
-        system.clear_prescribed(&mut self.free_residual)?;
-        self.norm = self.free_residual.norm()?;
-        Ok(self.norm.is_finite() && self.norm <= limit)
-    }
-
-    /// Flexible conjugate gradients from x and its residual r, with P the factored matrix and K = A + D.
-    /// Until ‖r‖₂ ≤ `limit` on the free unknowns, and at most so many times:
-    ///
-    /// ```text
-    /// z = P⁻¹E r,   β = − zᵀKp / pᵀKp, at first 0,   p ← z + β p,
-    /// α = rᵀp / pᵀKp,   x ← x + α p,   r ← r − α K p.
-    /// ```
-    ///
-    /// r, z and p are 0 on prescribed unknowns in all of this; K is not positive definite if rᵀp or pᵀKp
-    /// is not positive. The first z may be there already (`preconditioned`).
-    fn iterate(
-        &mut self,
-        system: LinearSystem,
-        x: &mut Vector,
-        (limit, most): (f64, usize),
-        mut preconditioned: bool,
-        report: &mut SolveReport,
-    ) -> Result<(), PetscError> {
-        let mut stiffness = None;
-        for _ in 0..most {
-            if report.converged {
-                break;
-            }
-            report.iterations += 1;
-            if !take(&mut preconditioned) {
-                self.apply_factor(system, None)?;
-            }
-            let conjugate = |last: f64| Ok(-self.image.dot(&self.preconditioned)? / last);
-            let beta = stiffness.map_or(Ok(0.0), conjugate)?;
-            self.direction.axpby(1.0, &self.preconditioned, beta)?;
-            system.multiply(&self.direction, &mut self.image)?;
-            let last = *stiffness.insert(self.direction.dot(&self.image)?);
-            let energy = self.residual.dot(&self.direction)?;
-            if !(last > 0.0 && energy > 0.0) {
-                break;
-            }
-            x.axpby(energy / last, &self.direction, 1.0)?;
-            self.residual.axpby(-energy / last, &self.image, 1.0)?;
-            report.converged = self.is_reached(system, limit)?;
-        }
-        let reduction = |norm: f64| (self.first_norm / norm).ln();
-        let (asked, reached) = (reduction(limit), reduction(self.norm));
-        self.factor.end_solve(Reduction { asked, reached });
-        Ok(())
     }
 }

@@ -8,6 +8,7 @@
 mod accuracy;
 mod certificate;
 mod datum;
+mod minimisation;
 mod rescue;
 
 pub use accuracy::Accuracy;
@@ -20,12 +21,13 @@ use super::{
 };
 use crate::{
     archive::{Archive, ArchiveError},
-    contact::{self, Bound, ContactError, ContactProblem, ContactReport, ContactSolver, Scales},
+    contact::{self, ContactError, ContactReport, ContactSolver, Scales},
     fem::Stiffness,
     petsc::{PetscError, Session, Vector},
 };
 use certificate::Judged;
 use datum::Datum;
+use minimisation::displacement;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
@@ -74,9 +76,6 @@ const ATTEMPTS: usize = 3;
 const DOMINANT: f64 = 10.0;
 /// … and so far from a datum that was chosen before that even a certified answer is measured anew.
 const FAR: f64 = 1e3;
-/// A force scale below this part of the forces that prescribed displacements or obstacles cause, as they
-/// move the nodes there alone, is rounding.
-const LIFTED: f64 = 1e-2;
 /// Loads below this part of the largest of the run count as so much, or an answer to rounding
 /// (sin(pi) = 1.2e-16) would have to have as many digits as any other.
 const LEAST_LOAD: f64 = 1e-6;
@@ -286,70 +285,4 @@ impl<'a> ContactStep<'a> {
         })?;
         Ok(true)
     }
-
-    /// Replaces c by the solution of (26) for the load of the free unknowns, f − K u_D with u_D the
-    /// displacements of the prescribed ones, `lift`.
-    fn solve_contact(
-        &mut self,
-        case: &LoadCase,
-        lift: &[f64],
-        bounds: &[Bound],
-        tolerance: f64,
-    ) -> Result<ContactReport, ContactError> {
-        let (body, bases) = (&self.problem.body, &self.problem.constraints.bases);
-        let comm = body.nodes.partition.comm();
-        let mut load = case.load.clone();
-        let mut force = body.nodes.partition.norm(&load, 2);
-        if comm.any(lift.iter().any(|&v| v != 0.0)) {
-            let mut u = lift.to_vec();
-            bases.displacement_to_global(&mut u);
-            let internal = self.problem.elasticity.internal_force(body, &self.zeta_at_points, &u);
-            load.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
-            force = force.max(LIFTED * body.nodes.partition.norm(&load, 2));
-        }
-        let admits_zero = |bound: &Bound| bound.nearest(0.0) == 0.0;
-        let overlaps = comm.any(!bounds.iter().all(admits_zero));
-        if overlaps {
-            let mut u = vec![0.0; lift.len()];
-            bounds.iter().for_each(|bound| u[bound.dof] = bound.nearest(0.0));
-            bases.displacement_to_global(&mut u);
-            let pushed = self.problem.elasticity.internal_force(body, &self.zeta_at_points, &u);
-            force = force.max(LIFTED * body.nodes.partition.norm(&pushed, 2));
-        }
-        bases.force_to_local(&mut load);
-        bases.zero_fixed(&mut load);
-        let load = &load[..self.load.owned()];
-        self.load.set(load)?;
-        if !overlaps && comm.all(load.iter().all(|&f| f == 0.0)) {
-            self.c.write(|c| c.fill(0.0))?;
-            return Ok(ContactReport::default());
-        }
-        let contact = ContactProblem {
-            stiffness: &self.stiffness.matrix,
-            stiffness_scale: self.stiffness.scale,
-            load: &self.load,
-            bounds,
-            rigid: &self.rigid,
-            work: &case.work,
-            scales: self.run_scales(Scales { force, displacement: 0.0 }),
-            tolerance,
-            comm,
-            phases: self.phases,
-        };
-        self.phases.time("contact", || self.solver.solve(&contact, &mut self.c))
-    }
-}
-
-/// u from the unknowns c and the prescribed ones, `lift`, without free rigid motions. Collective.
-fn displacement(
-    problem: &DiscreteProblem,
-    lift: Vec<f64>,
-    c: &Vector,
-) -> Result<Vec<f64>, PetscError> {
-    let mut u = lift;
-    c.read(|c| u.iter_mut().zip(c).for_each(|(u, c)| *u += c))?;
-    problem.constraints.bases.displacement_to_global(&mut u);
-    problem.body.nodes.partition.update(&mut u, 2)?;
-    problem.motions.remove_free(&problem.body, &mut u);
-    Ok(u)
 }

@@ -99,7 +99,7 @@ impl Stiffness {
             let points = cells.elements.iter().map(|element| 8 * element.points.len()).sum::<usize>();
             size_of_val(cells.nodes) + size_of_val(cells.elements) + points
         });
-        (elements + size_of_val(&self.places[..])) as f64 + 24.0 * self.matrix.entries()
+        (elements + size_of_val(&self.places[..])) as f64 + 24.0 * self.matrix.entries() as f64
     }
 
     /// K(ζ) from the values of ζ at the quadrature points, [`Body::at_points`]. (For P1, where strains

@@ -1,6 +1,8 @@
 //! Symmetric sparse matrices whose pattern is given once and whose values are refilled
 //! (<https://petsc.org/release/manualpages/Mat/>).
 
+mod entries;
+
 use super::{
     PetscError, Session, Vector, check,
     handle::Handle,
@@ -85,51 +87,6 @@ impl Matrix {
         check(unsafe {
             raw::MatSetValuesCOO(self.raw(), values.as_ptr(), raw::InsertMode::INSERT_VALUES)
         })
-    }
-
-    /// The place of each of the pattern's positions among the entries of `read_entries`, where
-    /// none is repeated or left out; the values are lost.
-    ///
-    /// # Errors
-    /// PETSc failed.
-    pub fn places(&mut self) -> Result<Vec<u32>, PetscError> {
-        let numbers: Vec<f64> = (0..self.positions).map(|position| position as f64).collect();
-        self.set_values(&numbers)?;
-        let (mut positions, mut places) = (Vec::new(), vec![0; self.positions]);
-        self.read_entries(&mut positions)?;
-        for (place, position) in positions.into_iter().enumerate() {
-            places[position as usize] = place as u32;
-        }
-        Ok(places)
-    }
-
-    /// Replaces the entries that this rank stores, in the order of `read_entries`, by what `writer`
-    /// makes of zeros. Collective.
-    ///
-    /// # Errors
-    /// PETSc failed.
-    pub fn fill(&mut self, writer: impl FnOnce(&mut [f64])) -> Result<(), PetscError> {
-        let &[(block, count)] = &self.blocks()?[..] else {
-            let mut values = vec![0.0; self.entries() as usize];
-            writer(&mut values);
-            self.set_entries(&values)?;
-            let done = raw::MatAssemblyType::MAT_FINAL_ASSEMBLY;
-            // SAFETY: a live handle. PETSc sees by this that its blocks have changed.
-            return unsafe {
-                check(raw::MatAssemblyBegin(self.raw(), done))?;
-                check(raw::MatAssemblyEnd(self.raw(), done))
-            };
-        };
-        let mut data = ptr::null_mut();
-        // SAFETY: a live block, which lends `count` values until they are given back; `&mut self` keeps
-        // other readers away.
-        unsafe {
-            check(raw::MatSeqAIJGetArray(block, &mut data))?;
-            let entries = if count > 0 { slice::from_raw_parts_mut(data, count) } else { &mut [] };
-            entries.fill(0.0);
-            writer(entries);
-            check(raw::MatSeqAIJRestoreArray(block, &mut data))
-        }
     }
 
     /// `y` ← this · `x` (MatMult).
@@ -288,74 +245,10 @@ impl Matrix {
         }
     }
 
-    /// Copies the entries that this rank stores into `values` (MatSeqAIJGetArrayRead).
-    pub(crate) fn read_entries(&self, values: &mut Vec<f64>) -> Result<(), PetscError> {
-        values.clear();
-        for (block, count) in self.blocks()? {
-            let mut data = ptr::null();
-            // SAFETY: a live block, which lends `count` values until they are given back.
-            unsafe {
-                check(raw::MatSeqAIJGetArrayRead(block, &mut data))?;
-                (count > 0).then(|| values.extend(slice::from_raw_parts(data, count)));
-                check(raw::MatSeqAIJRestoreArrayRead(block, &mut data))?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Replaces the entries that this rank stores by those that [`Self::read_entries`] has copied from a
-    /// matrix of the same pattern (MatSeqAIJGetArray).
-    pub(crate) fn set_entries(&mut self, mut values: &[f64]) -> Result<(), PetscError> {
-        let blocks = self.blocks()?;
-        same_size(blocks.iter().map(|(_, count)| count).sum(), values.len())?;
-        for (block, count) in blocks {
-            let (mut data, (own, others)) = (ptr::null_mut(), values.split_at(count));
-            // SAFETY: as in `read_entries`, and `&mut self` keeps other readers away.
-            unsafe {
-                check(raw::MatSeqAIJGetArray(block, &mut data))?;
-                ptr::copy_nonoverlapping(own.as_ptr(), data, count);
-                check(raw::MatSeqAIJRestoreArray(block, &mut data))?;
-            }
-            values = others;
-        }
-        Ok(())
-    }
-
-    /// The blocks of this rank's rows, of the columns that it owns and of the others, each with the
-    /// number of its stored entries (MatMPIAIJGetSeqAIJ).
-    fn blocks(&self) -> Result<Vec<(raw::Mat, usize)>, PetscError> {
-        let (mut own, mut others) = (self.raw(), ptr::null_mut());
-        let (mut parallel, columns) = (raw::PetscBool::PETSC_FALSE, ptr::null_mut());
-        let (object, kind) = (self.raw().cast(), c"mpiaij".as_ptr());
-        // SAFETY: a live handle, which keeps its blocks.
-        unsafe {
-            check(raw::PetscObjectTypeCompare(object, kind, &mut parallel))?;
-            if parallel == raw::PetscBool::PETSC_TRUE {
-                check(raw::MatMPIAIJGetSeqAIJ(self.raw(), &mut own, &mut others, columns))?;
-            }
-        }
-        let mut blocks = Vec::new();
-        for block in [own, others].into_iter().filter(|block| !block.is_null()) {
-            let (local, mut info) = (raw::MatInfoType::MAT_LOCAL, raw::MatInfo::default());
-            // SAFETY: a live block.
-            check(unsafe { raw::MatGetInfo(block, local, &mut info) })?;
-            blocks.push((block, info.nz_used as usize));
-        }
-        Ok(blocks)
-    }
-
-    /// Entries that this rank stores (MatGetInfo).
-    pub fn entries(&self) -> f64 {
-        let (local, mut info) = (raw::MatInfoType::MAT_LOCAL, raw::MatInfo::default());
-        // SAFETY: a live handle; were there no answer, the numbers would stay 0.
-        unsafe { raw::MatGetInfo(self.raw(), local, &mut info) };
-        info.nz_used
-    }
-
     /// Bytes that this rank reads and writes in a product: value and column of each entry, 12 bytes;
     /// the beginning of each row, x and y, 20 bytes.
     pub fn bytes_per_product(&self) -> f64 {
-        12.0 * self.entries() + 20.0 * self.owned() as f64
+        12.0 * self.entries() as f64 + 20.0 * self.owned() as f64
     }
 
     /// Number of rows this rank owns.

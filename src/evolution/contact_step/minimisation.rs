@@ -1,0 +1,80 @@
+//! (26) as its solver takes it: in the unknowns c, with all loads on the free ones.
+
+use super::ContactStep;
+use crate::{
+    contact::{Bound, ContactError, ContactProblem, ContactReport, Scales},
+    evolution::{DiscreteProblem, discrete_problem::LoadCase},
+    petsc::{PetscError, Vector},
+};
+
+/// A force scale below this part of the forces that prescribed displacements or obstacles cause, as they
+/// move the nodes there alone, is rounding.
+const LIFTED: f64 = 1e-2;
+
+impl ContactStep<'_> {
+    /// Replaces c by the solution of (26) for the load of the free unknowns, f − K u_D with u_D the
+    /// displacements of the prescribed ones, `lift`.
+    pub(super) fn solve_contact(
+        &mut self,
+        case: &LoadCase,
+        lift: &[f64],
+        bounds: &[Bound],
+        tolerance: f64,
+    ) -> Result<ContactReport, ContactError> {
+        let (body, bases) = (&self.problem.body, &self.problem.constraints.bases);
+        let comm = body.nodes.partition.comm();
+        let internal_force = |mut u: Vec<f64>| {
+            bases.displacement_to_global(&mut u);
+            self.problem.elasticity.internal_force(body, &self.zeta_at_points, &u)
+        };
+        let mut load = case.load.clone();
+        let mut force = body.nodes.partition.norm(&load, 2);
+        if comm.any(lift.iter().any(|&v| v != 0.0)) {
+            let internal = internal_force(lift.to_vec());
+            load.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
+            force = force.max(LIFTED * body.nodes.partition.norm(&load, 2));
+        }
+        let admits_zero = |bound: &Bound| bound.nearest(0.0) == 0.0;
+        let overlaps = comm.any(!bounds.iter().all(admits_zero));
+        if overlaps {
+            let mut u = vec![0.0; lift.len()];
+            bounds.iter().for_each(|bound| u[bound.dof] = bound.nearest(0.0));
+            force = force.max(LIFTED * body.nodes.partition.norm(&internal_force(u), 2));
+        }
+        bases.force_to_local(&mut load);
+        bases.zero_fixed(&mut load);
+        let load = &load[..self.load.owned()];
+        self.load.set(load)?;
+        if !overlaps && comm.all(load.iter().all(|&f| f == 0.0)) {
+            self.c.write(|c| c.fill(0.0))?;
+            return Ok(ContactReport::default());
+        }
+        let contact = ContactProblem {
+            stiffness: &self.stiffness.matrix,
+            stiffness_scale: self.stiffness.scale,
+            load: &self.load,
+            bounds,
+            rigid: &self.rigid,
+            work: &case.work,
+            scales: self.run_scales(Scales { force, displacement: 0.0 }),
+            tolerance,
+            comm,
+            phases: self.phases,
+        };
+        self.phases.time("contact", || self.solver.solve(&contact, &mut self.c))
+    }
+}
+
+/// u from the unknowns c and the prescribed ones, `lift`, without free rigid motions. Collective.
+pub(super) fn displacement(
+    problem: &DiscreteProblem,
+    lift: Vec<f64>,
+    c: &Vector,
+) -> Result<Vec<f64>, PetscError> {
+    let mut u = lift;
+    c.read(|c| u.iter_mut().zip(c).for_each(|(u, c)| *u += c))?;
+    problem.constraints.bases.displacement_to_global(&mut u);
+    problem.body.nodes.partition.update(&mut u, 2)?;
+    problem.motions.remove_free(&problem.body, &mut u);
+    Ok(u)
+}

@@ -1,0 +1,127 @@
+//! The entries that a matrix stores on this rank, read and written in place.
+
+use super::Matrix;
+use crate::petsc::{PetscError, check, raw, vector::same_size};
+use std::{ptr, slice};
+
+impl Matrix {
+    /// The place of each of the pattern's positions among the entries of `read_entries`, where
+    /// none is repeated or left out; the values are lost.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub fn places(&mut self) -> Result<Vec<u32>, PetscError> {
+        let numbers: Vec<f64> = (0..self.positions).map(|position| position as f64).collect();
+        self.set_values(&numbers)?;
+        let (mut positions, mut places) = (Vec::new(), vec![0; self.positions]);
+        self.read_entries(&mut positions)?;
+        for (place, position) in positions.into_iter().enumerate() {
+            places[position as usize] = place as u32;
+        }
+        Ok(places)
+    }
+
+    /// Replaces the entries that this rank stores, in the order of `read_entries`, by what `writer`
+    /// makes of zeros. Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub fn fill(&mut self, writer: impl FnOnce(&mut [f64])) -> Result<(), PetscError> {
+        let blocks = self.blocks()?;
+        if let [block] = blocks[..] {
+            return self.write_block(block, |entries| {
+                entries.fill(0.0);
+                writer(entries);
+            });
+        }
+        let mut values = vec![0.0; self.entries()];
+        writer(&mut values);
+        let mut others = &values[..];
+        for block in blocks {
+            let own = others.split_off(..block.1).unwrap_or_default();
+            self.write_block(block, |entries| entries.copy_from_slice(own))?;
+        }
+        let done = raw::MatAssemblyType::MAT_FINAL_ASSEMBLY;
+        // SAFETY: a live handle. PETSc sees by this that its blocks have changed.
+        unsafe {
+            check(raw::MatAssemblyBegin(self.raw(), done))?;
+            check(raw::MatAssemblyEnd(self.raw(), done))
+        }
+    }
+
+    /// Lends the entries of one of `blocks` to `writer` (MatSeqAIJGetArray).
+    fn write_block(
+        &mut self,
+        (block, count): (raw::Mat, usize),
+        writer: impl FnOnce(&mut [f64]),
+    ) -> Result<(), PetscError> {
+        let mut data = ptr::null_mut();
+        // SAFETY: a live block, which lends `count` values until they are given back; `&mut self` keeps
+        // other readers away.
+        unsafe {
+            check(raw::MatSeqAIJGetArray(block, &mut data))?;
+            writer(if count > 0 { slice::from_raw_parts_mut(data, count) } else { &mut [] });
+            check(raw::MatSeqAIJRestoreArray(block, &mut data))
+        }
+    }
+
+    /// Copies the entries that this rank stores into `values` (MatSeqAIJGetArrayRead).
+    pub(crate) fn read_entries(&self, values: &mut Vec<f64>) -> Result<(), PetscError> {
+        values.clear();
+        for (block, count) in self.blocks()? {
+            let mut data = ptr::null();
+            // SAFETY: a live block, which lends `count` values until they are given back.
+            unsafe {
+                check(raw::MatSeqAIJGetArrayRead(block, &mut data))?;
+                (count > 0).then(|| values.extend(slice::from_raw_parts(data, count)));
+                check(raw::MatSeqAIJRestoreArrayRead(block, &mut data))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Replaces the entries that this rank stores by those that [`Self::read_entries`] has copied from a
+    /// matrix of the same pattern. Collective.
+    pub(crate) fn set_entries(&mut self, values: &[f64]) -> Result<(), PetscError> {
+        same_size(self.entries(), values.len())?;
+        self.fill(|entries| entries.copy_from_slice(values))
+    }
+
+    /// The blocks of this rank's rows, of the columns that it owns and of the others, each with the
+    /// number of its stored entries (MatMPIAIJGetSeqAIJ).
+    fn blocks(&self) -> Result<Vec<(raw::Mat, usize)>, PetscError> {
+        let (mut own, mut others) = (self.raw(), ptr::null_mut());
+        let (mut parallel, columns) = (raw::PetscBool::PETSC_FALSE, ptr::null_mut());
+        let (object, kind) = (self.raw().cast(), c"mpiaij".as_ptr());
+        // SAFETY: a live handle, which keeps its blocks.
+        unsafe {
+            check(raw::PetscObjectTypeCompare(object, kind, &mut parallel))?;
+            if parallel == raw::PetscBool::PETSC_TRUE {
+                check(raw::MatMPIAIJGetSeqAIJ(self.raw(), &mut own, &mut others, columns))?;
+            }
+        }
+        let mut blocks = Vec::new();
+        for block in [own, others].into_iter().filter(|block| !block.is_null()) {
+            // SAFETY: a live block.
+            blocks.push((block, unsafe { stored(block) }?));
+        }
+        Ok(blocks)
+    }
+
+    /// The number of entries that this rank stores; 0 were PETSc not to tell.
+    pub fn entries(&self) -> usize {
+        // SAFETY: a live handle.
+        unsafe { stored(self.raw()) }.unwrap_or(0)
+    }
+}
+
+/// The number of entries that this rank stores of a matrix (MatGetInfo).
+///
+/// # Safety
+/// The matrix is live.
+unsafe fn stored(matrix: raw::Mat) -> Result<usize, PetscError> {
+    let (local, mut info) = (raw::MatInfoType::MAT_LOCAL, raw::MatInfo::default());
+    // SAFETY: as above.
+    check(unsafe { raw::MatGetInfo(matrix, local, &mut info) })?;
+    Ok(info.nz_used as usize)
+}
