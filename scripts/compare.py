@@ -3,7 +3,7 @@
 
     signorini compare geo/lshape.toml geo/beam.toml --solvers active-set,tao --set time.step=0.02
 
-Each solver stands by itself (contact.rescue = false). Where a scene asks for an accuracy, all start from
+Each solver stands by itself (contact.rescue = false, unless --set says otherwise). Where a scene asks for an accuracy, all start from
 the mesh that the first solver adapts. The results of a run are in OUT/SCENE-SOLVER/, the table also in
 OUT/comparison.csv. What follows `--` are PETSc options."""
 
@@ -60,7 +60,7 @@ def compared(scene, arguments):
         (folder / "history.csv").unlink(missing_ok=True)
         error = signorini(
             "run", str(scene), "--solver", solver, "--ranks", "1", "--out", str(folder), *mesh,
-            *settings(arguments, "contact.rescue=false"), "--", *arguments.petsc)
+            *settings(["contact.rescue=false", *arguments.set]), "--", *arguments.petsc)
         row, state = read(folder, error)
         rows.append({"scene": scene.stem, "solver": solver, **row, **dict.fromkeys(DIFFERENCES),
                      "error": error})
@@ -123,8 +123,8 @@ def worst(row):
     return max(row[key] for key in KKT)
 
 
-def settings(arguments, *more):
-    return [word for key in [*arguments.set, *more] for word in ("--set", key)]
+def settings(keys):
+    return [word for key in keys for word in ("--set", key)]
 
 
 def table(rows):
@@ -175,7 +175,8 @@ def main(prog=None):
     try:
         for scene in arguments.scenes:
             for solver in arguments.solvers:
-                signorini("check", str(scene), *settings(arguments, f"contact.solver='{solver}'"))
+                signorini("check", str(scene),
+                          *settings([*arguments.set, f"contact.solver='{solver}'"]))
         rows = [row for scene in arguments.scenes for row in compared(scene, arguments)]
     except Refused as refused:
         return refused.args[0]

@@ -33,12 +33,15 @@ def description(folder):
     if not isinstance(summary, dict) or "steps" not in summary:
         raise ValueError("it tells of no run")
     lines = [line for name in summary if name != "phases" for line in entry(name, summary[name])]
-    times = []
+    frames = []
     if (folder / "fields.pvd").exists():
-        times = re.findall('timestep="(.*?)"', (folder / "fields.pvd").read_text(encoding="utf-8"))
-    if len(times) > 1:
+        frames = re.findall('timestep="(.*?)".*?file="(.*?)"',
+                            (folder / "fields.pvd").read_text(encoding="utf-8"))
+    times = [time for time, file in frames if (folder / file).exists()]
+    if len(frames) > 1 and times:
         first, last = (f"{float(time):.10g}" for time in (times[0], times[-1]))
-        lines.append(row("frames", f"{len(times)}, from t = {first} to {last}"))
+        gone = f" ({len(frames) - len(times)} more are gone)" if len(times) < len(frames) else ""
+        lines.append(row("frames", f"{len(times)}, from t = {first} to {last}{gone}"))
     names = sorted(path.name for path in folder.iterdir())
     others = [name for name in names if not name.startswith(("fields_", "contact_"))]
     return "\n".join([*lines, row("files", " ".join(others))])

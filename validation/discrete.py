@@ -203,6 +203,14 @@ class Discrete:
                 if (cosine < -1e-6).all():
                     return "normal into the body", False
                 some |= bool((cosine < 1e-6).any())
+        rows, held = self.contact, {node for node, _, _ in self.prescribed}
+        for node in np.setdiff1d(rows.node, list(held)):
+            lines = []
+            for n in rows.direction[rows.node == node]:
+                if all(abs(n[0] * m[1] - n[1] * m[0]) > 1e-8 for m in lines):
+                    lines.append(n)
+            if len(lines) > 2:
+                return "more than two lines of contact at a node", False
         return None, some
 
     def clusters(self):

@@ -60,6 +60,9 @@ const UNKNOWN_COST: f64 = 10.0;
 /// with contact along all of it, 6.7 per root and sets that go round in circles: 39 s condensed, 22 s not.)
 const MOST_CONDENSED: f64 = 4.0;
 
+/// PETSC_ERR_MISSING_FACTOR: PETSc has no such package, or not for such a factor.
+const MISSING_FACTOR: i32 = 92;
+
 /// Rows above which several ranks use multigrid: the memory of factors grows faster than the rows.
 /// With 2.1 million on two ranks a step with factors was six times as fast, their set-up four times
 /// as slow, memory 10 % more; what is beyond was not measured.
@@ -144,11 +147,18 @@ impl Factor {
     ///
     /// # Errors
     /// They ask for what PETSc has not.
-    pub fn check_options(&self) -> Result<(), PetscError> {
-        if self.is_asked_for()? {
-            Preconditioner::new(&self.prefix, c"cholesky", c"petsc")?;
+    pub fn check_options(&self, session: &Session) -> Result<(), PetscError> {
+        if !self.is_asked_for()? {
+            return Ok(());
         }
-        Ok(())
+        // PETSc looks for the package of a factor when it factorises: here an identity.
+        let row = vec![self.comm.rank() as i32];
+        let mut identity = Matrix::with_pattern(session, 1, 1, row.clone(), row)?;
+        identity.set_values(&[1.0])?;
+        match self.preconditioner(true)?.set_up(&identity) {
+            Err(error) if error.code == MISSING_FACTOR => Err(error),
+            _ => Ok(()),
+        }
     }
 
     /// Factorises the present values of `matrix`; false if it is not positive definite: then there is
@@ -221,8 +231,7 @@ impl Factor {
     }
 
     fn choose(&self, matrix: &Matrix, rows: usize) -> Result<Method, PetscError> {
-        let (prefix, serial) = (&self.prefix, self.comm.is_serial());
-        let factorised = serial || rows < VERY_LARGE;
+        let factorised = self.comm.is_serial() || rows < VERY_LARGE;
         if factorised && !self.is_asked_for()? {
             let (of_rows, condensed) = &self.condensed;
             let unknowns = self.comm.count(condensed.len());
@@ -239,6 +248,12 @@ impl Factor {
                 }
             }
         }
+        Ok(Method::Petsc(self.preconditioner(factorised)?))
+    }
+
+    /// What PETSc's options ask for, else PETSc's factor, or multigrid.
+    fn preconditioner(&self, factorised: bool) -> Result<Preconditioner, PetscError> {
+        let (prefix, serial) = (&self.prefix, self.comm.is_serial());
         // Left to itself CHOLMOD makes LDLᵀ of a small matrix, accepts negative pivots, and prints its
         // warnings into the results. MUMPS' guess of the memory it needs is now and then too small.
         let options = match serial {
@@ -252,7 +267,7 @@ impl Factor {
         }
         let kind = if factorised { c"cholesky" } else { c"gamg" };
         let package = if serial { c"cholmod" } else { c"mumps" };
-        Ok(Method::Petsc(Preconditioner::new(prefix, kind, package)?))
+        Preconditioner::new(prefix, kind, package)
     }
 
     /// Bytes that an application reads on this rank; 0 where unknown.

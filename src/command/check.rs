@@ -17,6 +17,7 @@ pub fn check(arguments: &SceneArguments) -> Result<(), Failure> {
     require_one_process()?;
     arguments.check()?;
     let (scene, mesh) = arguments.read(false, &[])?;
+    scene.check_mesh(&mesh).map_err(Failure::input)?;
     say(&scene.title);
     say(&row("mesh", describe_mesh(&mesh, &scene.units)));
     say(&boundaries(&scene, &mesh));

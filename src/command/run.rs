@@ -133,7 +133,7 @@ fn adapt(
 fn check_factors(session: &Session, problem: &DiscreteProblem) -> Result<(), PetscError> {
     let prefixes = ["elastic_"].into_iter().chain(problem.damage().map(|_| "damage_"));
     let mut factors = prefixes.map(|prefix| Factor::new(session, prefix, Precision::Full));
-    factors.try_for_each(|factor| factor.check_options())
+    factors.try_for_each(|factor| factor.check_options(session))
 }
 
 /// Whether the mesh that is adapted would not take the place of the one that the scene names.

@@ -45,12 +45,16 @@ impl Outcome {
             ));
         }
         notes.extend(self.bound_violation.note(problem.mass()));
-        if let Some((time, motion)) = &self.unconstrained {
+        if let Some((steps, times, motion)) = &self.unconstrained {
+            let [first, last] = times.map(rounded);
+            let when = match steps {
+                1 => format!("at t = {first}"),
+                steps => format!("in {steps} steps, at t = {first} first and t = {last} last"),
+            };
             // Nodes that touch without force may still be in the way.
             notes.push(format!(
-                "at t = {}, no active contact node holds the body against {motion}: the answer may \
-                 be one of many",
-                rounded(*time)
+                "{when}, no active contact node holds the body against {motion}: the answer may \
+                 be one of many"
             ));
         }
         // That an unconstrained body has no one answer is said already.

@@ -28,8 +28,9 @@ pub struct Outcome {
     pub rescued: Option<(usize, &'static str)>,
     /// By how much ζ violated the bounds of its equation.
     pub bound_violation: BoundViolation,
-    /// When first the active nodes left a rigid motion unconstrained, s, and which.
-    pub unconstrained: Option<(f64, RigidMotion)>,
+    /// Steps in which the active nodes left a rigid motion unconstrained, the times of the first and of
+    /// the last, s, and what motion it was in the first.
+    pub unconstrained: Option<(usize, [f64; 2], RigidMotion)>,
     /// Estimated errors of the answers.
     pub accuracy: Accuracy,
     /// Where the errors of the last accepted state come from.
@@ -115,8 +116,10 @@ impl Outcome {
         if let Some(solver) = report.rescued_by {
             self.rescued = Some((self.rescued.map_or(1, |(steps, _)| steps + 1), solver));
         }
-        if self.unconstrained.is_none() {
-            self.unconstrained = unconstrained.clone().map(|motion| (record.time, motion));
+        if let Some(motion) = unconstrained {
+            let first = (0, [record.time; 2], motion.clone());
+            let (steps, [_, last], _) = self.unconstrained.get_or_insert(first);
+            (*steps, *last) = (*steps + 1, record.time);
         }
     }
 }

@@ -233,6 +233,7 @@ fn judge(value: &toml::Value, schema: &Schema, folder: &Path) -> Result<(), Stri
     };
     let found = match value {
         toml::Value::Array(_) | toml::Value::Table(_) => String::new(),
+        toml::Value::Float(number) => format!(", but is {number:?}"),
         value => format!(", but is {value}"),
     };
     if holds { Ok(()) } else { Err(format!("must be {wanted}{found}")) }

@@ -34,6 +34,9 @@ fn a_scene_that_cannot_be_solved_is_refused_after_its_mesh_is_described() {
         test_directory.say(&["check", "scene.toml", "--set", "boundary.top.traction=[0, 1]"]);
     said.fails(2, &["the vertical translation", "the load drives it"]);
     assert!(said.out.contains("32 triangles"), "{said:?}");
+    let said = test_directory.say(&["check", "scene.toml", "--set", "boundary.top.name=''"]);
+    said.fails(2, &["boundary \"\" is no physical curve"]);
+    assert_eq!(said.out, "");
 }
 
 #[test]
@@ -52,6 +55,9 @@ fn results_are_described() {
         assert!(lines.iter().any(|other| other == line), "no `{line}` in: {}", said.out);
     }
     assert!(said.out.contains("run scene.toml") && !said.out.contains("foundation"));
+    std::fs::remove_file(test_directory.path("out/scene/fields_0000.vtu")).unwrap();
+    let said = test_directory.say(&["info", "out/scene"]);
+    assert!(said.out.contains("10, from t = 0.1 to 1 (1 more are gone)"), "{}", said.out);
     test_directory
         .say(&["info", "out"])
         .fails(2, &["out/summary.json", "name a folder of results"]);

@@ -81,6 +81,7 @@ fn results_stay_until_there_are_others() {
         (1, &["--set", "boundary.top.traction=[0, -3]", "--set", "contact.tolerance=1e-30"][..]),
         (2, &["--", "-elastic_pc_type", "none_such"]),
         (2, &["--", "-damage_pc_type", "none_such"]),
+        (2, &["--", "-elastic_pc_factor_mat_solver_type", "none_such"]),
     ];
     for (code, arguments) in failing {
         let said = test_directory.say(&[&["run", "scene.toml"], arguments].concat());

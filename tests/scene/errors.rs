@@ -184,7 +184,7 @@ fn all_problems_are_told_at_once_with_their_lines_underlined() {
         .replace("symmetry = true", "symmetry = true\ngap = 0");
     assert_eq!(
         refusal(&text),
-        r#"bad.toml:7: material.young must be positive (Pa), but is -3
+        r#"bad.toml:7: material.young must be positive, at most 1e100 (Pa), but is -3
   |
 7 | young = -3
   | ^^^^^^^^^^

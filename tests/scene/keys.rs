@@ -125,6 +125,7 @@ fn the_rule_of_a_number_in_words_is_that_of_its_bounds() {
         let rule = key["values"].as_str().expect("words").split(" (").next().expect("a rule");
         let expected = match rule {
             "positive" => [None, Some(0.0), None, None],
+            "positive, at most 1e100" => [None, Some(0.0), Some(1e100), None],
             "at least 0" => [Some(0.0), None, None, None],
             "at least 1e-5" => [Some(1e-5), None, None, Some(1.0)],
             "between 1e-5 and 0.5" => [Some(1e-5), None, Some(0.5), None],

@@ -15,7 +15,12 @@ fn every_rule_names_file_line_and_key() {
         (
             "young = 1e6",
             "young = -3",
-            &["bad.toml:7: material.young must be positive (Pa), but is -3"],
+            &["bad.toml:7: material.young must be positive, at most 1e100 (Pa), but is -3"],
+        ),
+        (
+            "young = 1e6",
+            "young = 1e308",
+            &["young must be positive, at most 1e100 (Pa), but is 1e308"],
         ),
         ("young = 1e6", "young = 0", &["bad.toml:7: material.young must be positive"]),
         ("young = 1e6", "young = nan", &["bad.toml:7: material.young must be positive", "nan"]),
