@@ -1,12 +1,42 @@
 //! The damage step (28): ζ_n from ζ_{n−1} and u_{n−1}.
 
-use super::{DiscreteProblem, Phases, RunError, State, StepFailure, step_controller::PlannedStep};
+use super::{DiscreteProblem, Phases, RunError, State, StepFailure};
 use crate::{
     fem::{self, DamageCertificate, DamageSystem},
     petsc::{PetscError, Session},
 };
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
+
+/// A step to be made from t_{n−1} to t_n, with the damage step
+/// (M + kκL) ζ_n = M · `start` + k · `load`.
+pub(super) struct PlannedStep {
+    pub(super) n: usize,
+    /// t_n, s.
+    pub(super) time: f64,
+    /// k_n = t_n − t_{n−1}, s.
+    pub(super) length: f64,
+    /// k, s.
+    pub(super) k: f64,
+    /// ζ_{n−1}, or what stands in its place.
+    pub(super) start: DVector<f64>,
+    /// b_{n−1}, or what stands in its place, m²/s.
+    pub(super) load: DVector<f64>,
+    /// The bounds on ζ_n of [`BoundViolation`].
+    pub(super) bounds: (f64, f64),
+}
+
+impl PlannedStep {
+    /// The rate of the formula at t_n, (ζ̃_n − `start`) / k, for ζ̃_n = `zeta`.
+    pub(super) fn rate(&self, zeta: &DVector<f64>) -> DVector<f64> {
+        (zeta - &self.start) / self.k
+    }
+
+    /// The error of a step that has no answer.
+    pub(super) fn failed(&self, source: StepFailure) -> RunError {
+        RunError::Step { step: self.n, time: self.time, source }
+    }
+}
 
 /// Solves the damage systems (M + kκL) ζ_n = M ζ_{n−1} + k b_{n−1} of a run.
 pub(super) struct DamageStep<'a> {

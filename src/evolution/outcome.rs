@@ -1,6 +1,6 @@
 //! How a run ended that did not fail.
 
-use super::{Accuracy, ErrorBudget, Step, StepRecord, step_controller::PlannedStep};
+use super::{Accuracy, ErrorBudget, Step, StepRecord, damage_step::PlannedStep};
 use crate::{
     archive::{Archive, ArchiveError},
     contact::{Kkt, RigidMotion, find},

@@ -17,7 +17,7 @@ mod step_error;
 
 use super::{
     BoundViolation, DiscreteProblem, RunError, Step, StepFailure, Stop,
-    damage_step::{DamageSource, DamageStep, DamageUpdate},
+    damage_step::{DamageSource, DamageStep, DamageUpdate, PlannedStep},
 };
 use crate::{
     archive::{Archive, ArchiveError},
@@ -25,36 +25,6 @@ use crate::{
 };
 use error_control::ErrorControl;
 use nalgebra::DVector;
-
-/// A step to be made from t_{n−1} to t_n, with the damage step
-/// (M + kκL) ζ_n = M · `start` + k · `load`.
-pub(super) struct PlannedStep {
-    pub(super) n: usize,
-    /// t_n, s.
-    pub(super) time: f64,
-    /// k_n = t_n − t_{n−1}, s.
-    pub(super) length: f64,
-    /// k, s.
-    pub(super) k: f64,
-    /// ζ_{n−1}, or what stands in its place.
-    pub(super) start: DVector<f64>,
-    /// b_{n−1}, or what stands in its place, m²/s.
-    pub(super) load: DVector<f64>,
-    /// The bounds on ζ_n of [`BoundViolation`].
-    pub(super) bounds: (f64, f64),
-}
-
-impl PlannedStep {
-    /// The rate of the formula at t_n, (ζ̃_n − `start`) / k, for ζ̃_n = `zeta`.
-    fn rate(&self, zeta: &DVector<f64>) -> DVector<f64> {
-        (zeta - &self.start) / self.k
-    }
-
-    /// The error of a step that has no answer.
-    pub(super) fn failed(&self, source: StepFailure) -> RunError {
-        RunError::Step { step: self.n, time: self.time, source }
-    }
-}
 
 /// What becomes of a step.
 pub(super) enum Verdict {
