@@ -24,6 +24,8 @@ pub(super) struct BothOrders<'a> {
     node_of_vertex: Vec<usize>,
     /// The node of P2 in the middle of each edge, and the vertices at its ends.
     middles: Vec<(usize, [usize; 2])>,
+    /// Where P2 is solved for, the mean diagonal entry of the last K at each of its nodes, N/m.
+    diagonal: Vec<f64>,
     /// u₂ − u₁ of the last state, or u₁ − Iu₂, in the unknowns of the order that is solved for.
     correction: Option<Vec<f64>>,
 }
@@ -34,12 +36,11 @@ struct Fixed<'a> {
     zeta_at_points: Vec<f64>,
     /// Of each bound whether it is active.
     active: Vec<bool>,
-    /// The midpoints of P2 and the mean diagonal entry of K at each, N/m.
-    diagonal: Vec<(usize, f64)>,
 }
 
-/// The square that the energy norm of a correction may still lack, as a part of it; iterations at most.
-const REST: f64 = 0.003;
+/// An iteration that promises less than this part of the energy of a correction is the last one;
+/// iterations at most.
+const REST: f64 = 0.02;
 const ITERATIONS: usize = 30;
 
 impl<'a> BothOrders<'a> {
@@ -61,19 +62,20 @@ impl<'a> BothOrders<'a> {
             Order::Linear => (run, other),
             Order::Quadratic => (other, run),
         };
-        let Elements::Quadratic(Cells { nodes, .. }) = fine.body.elements() else {
-            return Ok(None);
-        };
+        let Elements::Quadratic(cells) = fine.body.elements() else { return Ok(None) };
         let mut node_of_vertex = vec![0; fine.body.mesh.nodes.len()];
         let mut ends = vec![None; fine.body.nodes.points.len()];
-        for (&[a, b, c], nodes) in fine.body.mesh.triangles.iter().zip(nodes) {
+        for (&[a, b, c], nodes) in fine.body.mesh.triangles.iter().zip(cells.nodes) {
             [a, b, c].iter().zip(nodes).for_each(|(&vertex, &node)| node_of_vertex[vertex] = node);
             let sides = [[a, b], [b, c], [c, a]].into_iter().zip(&nodes[3..]);
             sides.for_each(|(side, &middle)| ends[middle] = Some(side));
         }
         let middles = ends.into_iter().enumerate();
         let middles = middles.filter_map(|(middle, ends)| Some((middle, ends?))).collect();
-        if order == Order::Quadratic {
+        let mut diagonal = Vec::new();
+        if order == Order::Linear {
+            diagonal = stiffness_diagonal(fine, &cells, last);
+        } else {
             // Makes room for another factor.
             drop(compliance);
             compliance = ContactStep::new(session, other, SOLVERS[0], phases)?.into_compliance()?;
@@ -81,7 +83,16 @@ impl<'a> BothOrders<'a> {
             compliance.keep_factor(&State { contact, ..last.clone() })?;
         }
         let correction = None;
-        Ok(Some(Self { order, coarse, fine, compliance, node_of_vertex, middles, correction }))
+        Ok(Some(Self {
+            order,
+            coarse,
+            fine,
+            compliance,
+            node_of_vertex,
+            middles,
+            diagonal,
+            correction,
+        }))
     }
 
     /// The problems in P1 and P2.
@@ -114,7 +125,6 @@ impl<'a> BothOrders<'a> {
             problem,
             zeta_at_points: problem.zeta_at_points(&state.zeta),
             active: flags.into_iter().map(|flag| flag > 0.0).collect(),
-            diagonal: Vec::new(),
         };
         self.solve(&fixed, state.time, self.at_vertices(&state.u))
     }
@@ -147,17 +157,17 @@ impl<'a> BothOrders<'a> {
         let (mut direction, mut image) = (vec![0.0; start.len()], vec![0.0; start.len()]);
         let (mut correction, mut stiffness, mut gained) = (image.clone(), f64::INFINITY, 0.0);
         for _ in 0..ITERATIONS {
-            let z = match self.correction.take() {
-                Some(mut correction) => {
-                    fixed.clear_fixed(&mut correction);
-                    correction
-                }
-                None => match self.preconditioned(fixed, &residual)? {
-                    None => return Ok(None),
-                    Some(z) if partition.dot(&residual, &z, 2) <= REST * gained => break,
-                    Some(z) => z,
-                },
+            let (z, promised) = if let Some(mut correction) = self.correction.take() {
+                fixed.clear_fixed(&mut correction);
+                (correction, f64::INFINITY)
+            } else {
+                let Some(z) = self.preconditioned(fixed, &residual)? else { return Ok(None) };
+                let promised = partition.dot(&residual, &z, 2);
+                (z, promised)
             };
+            if promised <= 0.0 {
+                break;
+            }
             let beta = -partition.dot(&z, &image, 2) / stiffness;
             direction.iter_mut().zip(&z).for_each(|(p, z)| *p = z + beta * *p);
             image = fixed.product(&direction)?;
@@ -170,6 +180,9 @@ impl<'a> BothOrders<'a> {
             add(&mut correction, work / stiffness, &direction);
             add(&mut residual, -work / stiffness, &image);
             gained += work * work / stiffness;
+            if promised <= REST * gained {
+                break;
+            }
         }
         let mut u = start;
         add(&mut u, 1.0, &correction);
@@ -180,9 +193,8 @@ impl<'a> BothOrders<'a> {
     }
 
     /// The preconditioner's answer to a residual, both in the unknowns of the order that is solved for;
-    /// `None` where the active nodes do not support the body. For P2 it is that of two levels, K₁⁻¹ of the
-    /// forces as P1 sees them and the diagonal of K at the midpoints, in the basis of P1 and what P2 adds
-    /// to it (Bank, Dupont, Yserentant, Numer. Math. 52, 1988).
+    /// `None` where the active nodes do not support the body. For P2 it is the sum of two corrections, K₁⁻¹
+    /// of the forces as P1 sees them and the residual over the diagonal of K (Xu, SIAM Review 34, 1992).
     fn preconditioned(
         &mut self,
         fixed: &Fixed,
@@ -201,10 +213,8 @@ impl<'a> BothOrders<'a> {
         };
         let Some(mut z) = z else { return Ok(None) };
         constraints.bases.displacement_to_local(&mut z);
-        for &(middle, diagonal) in &fixed.diagonal {
-            for dof in [2 * middle, 2 * middle + 1] {
-                z[dof] += residual[dof] / diagonal;
-            }
+        for (node, diagonal) in self.diagonal.iter().enumerate() {
+            (2 * node..2 * node + 2).for_each(|dof| z[dof] += residual[dof] / diagonal);
         }
         fixed.clear_fixed(&mut z);
         Ok(Some(z))
@@ -260,10 +270,7 @@ impl<'a> Fixed<'a> {
         let bounds = constraints.bounds.iter().zip(flags);
         let active = bounds.map(|(bound, flag)| flag > 0.0 || between[bound.node]).collect();
         let zeta_at_points = problem.zeta_at_points(&state.zeta);
-        let entries = middle_diagonal(problem, &zeta_at_points);
-        let diagonal = orders.middles.iter().map(|&(middle, _)| (middle, entries[middle]));
-        let diagonal = diagonal.collect();
-        Ok(Self { problem, zeta_at_points, active, diagonal })
+        Ok(Self { problem, zeta_at_points, active })
     }
 
     /// The places of the active bounds.
@@ -299,18 +306,15 @@ impl<'a> Fixed<'a> {
     }
 }
 
-/// See [`Fixed`]; 0 at vertices.
-fn middle_diagonal(problem: &DiscreteProblem, zeta_at_points: &[f64]) -> Vec<f64> {
-    let (body, elasticity) = (&problem.body, &problem.elasticity);
-    let mut diagonal = vec![0.0; body.nodes.points.len()];
-    let Elements::Quadratic(cells) = body.elements() else { return diagonal };
-    let elements = cells.nodes.iter().zip(cells.elements).zip(zeta_at_points.chunks(3));
+/// The mean diagonal entries of K at the nodes of P2, N/m, in a state.
+fn stiffness_diagonal(problem: &DiscreteProblem, cells: &Cells<6, 3>, state: &State) -> Vec<f64> {
+    let mut diagonal = vec![0.0; problem.body.nodes.points.len()];
+    let zeta = problem.zeta_at_points(&state.zeta);
+    let elements = cells.nodes.iter().zip(cells.elements).zip(zeta.as_chunks().0);
     for (t, ((nodes, element), zeta)) in elements.enumerate() {
-        let d = elasticity.d(body, t);
-        for (point, zeta) in element.points.iter().zip(zeta) {
-            for i in 3..6 {
-                diagonal[nodes[i]] += 0.5 * zeta * point.stiffness(d, i, i).trace();
-            }
+        let d = problem.elasticity.d(&problem.body, t);
+        for (i, &node) in nodes.iter().enumerate() {
+            diagonal[node] += 0.5 * element.stiffness(d, zeta, i, i).trace();
         }
     }
     diagonal

@@ -3,7 +3,7 @@
 
 use super::DiscreteProblem;
 use crate::{
-    fem::{Body, Elements, bubble_diffusion, bubble_load, bulged},
+    fem::{Body, Elements, bubble_diffusion, bubble_mass},
     petsc::PetscError,
 };
 use std::{array, mem};
@@ -17,8 +17,16 @@ pub(super) struct Bubbles<'a> {
     diffusion: Vec<f64>,
 }
 
+/// The equations of the bubbles for a step.
+pub(super) struct BubbleSystem<'a> {
+    bubbles: &'a Bubbles<'a>,
+    /// s.
+    k: f64,
+    diagonal: Vec<f64>,
+}
+
 /// The residual that the iterations for β may leave, as a part of that of the start; their number.
-const REST: f64 = 0.01;
+const REST: f64 = 0.1;
 const ITERATIONS: usize = 30;
 
 impl<'a> Bubbles<'a> {
@@ -36,57 +44,12 @@ impl<'a> Bubbles<'a> {
         Self { body, sides, diffusion }
     }
 
-    /// β_n at the midpoints of the sides of each triangle, from β_{n−1} = `before`, with
-    ///
-    /// (β_n − β_{n−1}, w) + k (κ∇β_n, ∇w) = k r(w) for all bubbles w,
-    ///
-    /// r of the three on triangle t being `residual(t)`. The system is well conditioned on any mesh:
-    /// conjugate gradients with its diagonal take a few iterations. Collective.
-    ///
-    /// # Errors
-    /// PETSc failed.
-    pub(super) fn advance(
-        &self,
-        k: f64,
-        before: &[[f64; 3]],
-        residual: impl Fn(usize) -> [f64; 3],
-    ) -> Result<Vec<[f64; 3]>, PetscError> {
-        let partition = &self.body.nodes.partition;
-        let triangles = &self.body.triangles;
-        let mass = |t: usize, values| bubble_load(&triangles[t], bulged([0.0; 3], values));
-        let system = |t: usize, values| -> [f64; 3] {
-            let (mass, diffusion) = (mass(t, values), bubble_diffusion(&triangles[t], values));
-            array::from_fn(|i| mass[i] + k * self.diffusion[t] * diffusion[i])
-        };
+    /// The system of a step of `k` s, (β, w) + k (κ∇β, ∇w) for all bubbles w.
+    pub(super) fn system(&self, k: f64) -> BubbleSystem<'_> {
+        let mut system = BubbleSystem { bubbles: self, k, diagonal: Vec::new() };
         let unit = |i: usize| array::from_fn(|j| if i == j { 1.0 } else { 0.0 });
-        let diagonal = self.assembled(|t| array::from_fn(|i| system(t, unit(i))[i]));
-        let mut b = self.assembled(|t| {
-            let (mass, r) = (mass(t, before[t]), residual(t));
-            array::from_fn(|i| mass[i] + k * r[i])
-        });
-        let scaled = |b: &[f64]| -> Vec<f64> {
-            b.iter().zip(&diagonal).map(|(b, d)| if *d > 0.0 { b / d } else { 0.0 }).collect()
-        };
-        let mut beta = vec![0.0; b.len()];
-        let mut z = scaled(&b);
-        let mut direction = z.clone();
-        let mut rest = partition.dot(&b, &z, 1);
-        let enough = REST * REST * rest;
-        for _ in 0..ITERATIONS {
-            if rest <= enough {
-                break;
-            }
-            partition.update(&mut direction, 1)?;
-            let image = self.assembled(|t| system(t, self.on(t, &direction)));
-            let step = rest / partition.dot(&direction, &image, 1);
-            beta.iter_mut().zip(&direction).for_each(|(beta, p)| *beta += step * p);
-            b.iter_mut().zip(&image).for_each(|(b, image)| *b -= step * image);
-            z = scaled(&b);
-            let before = mem::replace(&mut rest, partition.dot(&b, &z, 1));
-            direction.iter_mut().zip(&z).for_each(|(p, z)| *p = z + rest / before * *p);
-        }
-        partition.update(&mut beta, 1)?;
-        Ok((0..self.sides.len()).map(|t| self.on(t, &beta)).collect())
+        system.diagonal = self.assembled(|t| [0, 1, 2].map(|i| system.of(t, unit(i))[i]));
+        system
     }
 
     /// The values of a field of bubbles on triangle `t`.
@@ -101,5 +64,61 @@ impl<'a> Bubbles<'a> {
             sides.iter().zip(of(t)).for_each(|(&bubble, value)| sums[bubble] += value);
         }
         sums
+    }
+}
+
+impl BubbleSystem<'_> {
+    /// Its part of triangle `t` applied to a β there.
+    fn of(&self, t: usize, values: [f64; 3]) -> [f64; 3] {
+        let Self { bubbles, k, .. } = *self;
+        let triangle = &bubbles.body.triangles[t];
+        let diffusion = bubble_diffusion(triangle, values);
+        let mass = bubble_mass(triangle, values);
+        array::from_fn(|i| mass[i] + k * bubbles.diffusion[t] * diffusion[i])
+    }
+
+    /// β_n at the midpoints of the sides of each triangle, from β_{n−1} = `before`, with
+    ///
+    /// (β_n − β_{n−1}, w) + k (κ∇β_n, ∇w) = k r(w) for all bubbles w,
+    ///
+    /// r of the three on triangle t being `residual(t)`. The system is well conditioned on any mesh:
+    /// conjugate gradients with its diagonal take a few iterations. Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub(super) fn advance(
+        &self,
+        before: &[[f64; 3]],
+        residual: impl Fn(usize) -> [f64; 3],
+    ) -> Result<Vec<[f64; 3]>, PetscError> {
+        let Self { bubbles, k, ref diagonal } = *self;
+        let (body, partition) = (bubbles.body, &bubbles.body.nodes.partition);
+        let mut b = bubbles.assembled(|t| {
+            let (mass, r) = (bubble_mass(&body.triangles[t], before[t]), residual(t));
+            array::from_fn(|i| mass[i] + k * r[i])
+        });
+        let scaled = |b: &[f64]| -> Vec<f64> {
+            b.iter().zip(diagonal).map(|(b, d)| if *d > 0.0 { b / d } else { 0.0 }).collect()
+        };
+        let mut beta = vec![0.0; b.len()];
+        let mut z = scaled(&b);
+        let mut direction = z.clone();
+        let mut rest = partition.dot(&b, &z, 1);
+        let enough = REST * REST * rest;
+        for _ in 0..ITERATIONS {
+            if rest <= enough {
+                break;
+            }
+            partition.update(&mut direction, 1)?;
+            let image = bubbles.assembled(|t| self.of(t, bubbles.on(t, &direction)));
+            let step = rest / partition.dot(&direction, &image, 1);
+            beta.iter_mut().zip(&direction).for_each(|(beta, p)| *beta += step * p);
+            b.iter_mut().zip(&image).for_each(|(b, image)| *b -= step * image);
+            z = scaled(&b);
+            let before = mem::replace(&mut rest, partition.dot(&b, &z, 1));
+            direction.iter_mut().zip(&z).for_each(|(p, z)| *p = z + rest / before * *p);
+        }
+        partition.update(&mut beta, 1)?;
+        Ok((0..bubbles.sides.len()).map(|t| bubbles.on(t, &beta)).collect())
     }
 }

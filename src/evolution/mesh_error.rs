@@ -10,8 +10,12 @@
 //! strains at the same stress go like 1/ζ, φ* = φ((ζ/z)² |ε*|², z).
 
 use super::{
-    DiscreteProblem, Outcome, Phases, RunError, State, best_strains::BestStrains,
-    both_orders::BothOrders, bubbles::Bubbles, contact_step::Compliance, damage_step::DamageStep,
+    DiscreteProblem, Outcome, Phases, RunError, State,
+    best_strains::BestStrains,
+    both_orders::BothOrders,
+    bubbles::{BubbleSystem, Bubbles},
+    contact_step::Compliance,
+    damage_step::DamageStep,
     instants::Instants,
 };
 use crate::{
@@ -109,6 +113,10 @@ fn damage_error(
     Ok(error.judged(&initial, last))
 }
 
+/// Steps whose lengths differ by less than this factor share a damage system: the change of δ in one is
+/// proportional to its length.
+const ALIKE: f64 = 1.7;
+
 /// z − ζ of an instant.
 struct ZetaError<'a> {
     problem: &'a DiscreteProblem,
@@ -125,7 +133,7 @@ struct ZetaError<'a> {
     source: Vec<[f64; 6]>,
     /// b, m²/s.
     own: Vec<f64>,
-    /// k, s.
+    /// The k that the damage system has, s.
     step: f64,
     /// See [`DamageError`].
     delay: Option<f64>,
@@ -141,12 +149,10 @@ impl ZetaError<'_> {
         source: impl Fn(&Self) -> Vec<[f64; 6]>,
     ) -> Result<(), RunError> {
         let body = &self.problem.body;
-        // Steps of equal length differ by rounding, which is no reason for another factor.
-        let length = state.time - before.time;
-        if (length - self.step).abs() > 1e-6 * length {
-            self.step = length;
+        let k = state.time - before.time;
+        if !(1.0 / ALIKE..ALIKE).contains(&(k / self.step)) {
+            self.step = k;
         }
-        let k = self.step;
         let (start, change) = (self.middles.clone(), self.change.clone());
         let pairs = state.zeta.iter().zip(&before.zeta);
         let rates: Vec<f64> = pairs.map(|(now, before)| (now - before) / k).collect();
@@ -155,7 +161,8 @@ impl ZetaError<'_> {
         let mean: Vec<[f64; 6]> = (0..next.len()).map(mean).collect();
         let mut rhs: Vec<f64> = self.own.iter().zip(own).map(|(a, b)| -0.5 * (a + b)).collect();
         let sampled = self.sampled(&rates, &rhs, state)?;
-        self.middles = self.bulges(k, &start, &sampled, state, &change, &mean)?;
+        let bubbles = self.bubbles.system(k);
+        self.middles = self.bulges((&bubbles, k), &start, &sampled, state, &change, &mean)?;
         for (t, (nodes, triangle)) in body.mesh.triangles.iter().zip(&body.triangles).enumerate() {
             let middles = self.middles[t];
             let growth = array::from_fn(|i| (middles[i] - start[t][i]) / k);
@@ -168,9 +175,12 @@ impl ZetaError<'_> {
                 rhs[node] += load[i] - mass[i] - kappa * diffusion[i];
             }
         }
-        damage_step.system(k)?.advance(&rhs, &mut self.change)?;
+        damage_step.system(self.step)?.advance(&rhs, &mut self.change)?;
+        let part = k / self.step;
+        let steps = self.change.iter_mut().zip(&change);
+        steps.for_each(|(after, before)| *after = before + part * (*after - before));
         body.vertices.partition.update(&mut self.change, 1)?;
-        self.middles = self.bulges(k, &start, &sampled, state, &change, &mean)?;
+        self.middles = self.bulges((&bubbles, k), &start, &sampled, state, &change, &mean)?;
         Ok(())
     }
 
@@ -204,7 +214,7 @@ impl ZetaError<'_> {
     /// `rates` of ζ between them. Collective.
     fn bulges(
         &self,
-        k: f64,
+        (system, k): (&BubbleSystem, f64),
         start: &[[f64; 3]],
         rates: &[f64],
         state: &State,
@@ -214,7 +224,7 @@ impl ZetaError<'_> {
         let body = &self.problem.body;
         let vertices = self.at_vertices(state);
         let rate = |i: usize| rates[i] + (self.change[i] - change[i]) / k;
-        self.bubbles.advance(k, start, |t| {
+        system.advance(start, |t| {
             let (nodes, triangle) = (body.mesh.triangles[t], &body.triangles[t]);
             let rate = bulged(nodes.map(rate), [0.0; 3]);
             let load = bubble_load(triangle, array::from_fn(|i| source[t][i] - rate[i]));

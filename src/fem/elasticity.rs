@@ -71,12 +71,15 @@ impl Elasticity {
             let mut zeta = zeta.iter();
             for (t, (nodes, element)) in cells.nodes.iter().zip(cells.elements).enumerate() {
                 let (local, d) = (cells.gather(t, u), self.d(body, t));
+                let mut sums = cells.gather(t, &force);
                 for (point, zeta) in element.points.iter().zip(&mut zeta) {
                     let stress = d * point.strain(&local) * *zeta;
-                    for (node, [fx, fy]) in nodes.iter().zip(point.force(&stress)) {
-                        force[2 * node] += fx;
-                        force[2 * node + 1] += fy;
+                    for (sum, [fx, fy]) in sums.iter_mut().zip(point.force(&stress)) {
+                        *sum = [sum[0] + fx, sum[1] + fy];
                     }
+                }
+                for (node, [fx, fy]) in nodes.iter().zip(sums) {
+                    (force[2 * node], force[2 * node + 1]) = (fx, fy);
                 }
             }
             force

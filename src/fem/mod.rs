@@ -32,8 +32,8 @@ pub use location::{Location, PointValues};
 pub use nodal_bases::NodalBases;
 pub use partition::Partition;
 pub use quadratic::{
-    affine_diffusion, bubble_diffusion, bubble_flux, bubble_load, bulged, diffusion_load,
-    interpolation_error, mean_product, missing_mass, quadratic_load,
+    affine_diffusion, bubble_diffusion, bubble_flux, bubble_load, bubble_mass, bulged,
+    diffusion_load, interpolation_error, mean_product, missing_mass, quadratic_load,
 };
 pub use recovery::{EnergyError, RecoveredStrains, strains_at_nodes};
 pub use rigid_part::RigidPart;

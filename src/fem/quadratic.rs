@@ -111,6 +111,12 @@ pub fn bubble_load(triangle: &Triangle, values: [f64; 6]) -> [f64; 3] {
     [0, 1, 2].map(|e| triangle.area() / 180.0 * row(e))
 }
 
+/// ∫ β w_e of β = Σ c_f w_f with c = `middles`: 4/45 |T| (c_e + Σ c_f).
+pub fn bubble_mass(triangle: &Triangle, middles: [f64; 3]) -> [f64; 3] {
+    let sum = middles.iter().sum::<f64>();
+    middles.map(|own| 4.0 / 45.0 * triangle.area() * (own + sum))
+}
+
 /// ∫ ∇p·∇λ_i of an affine p with these values at the vertices.
 pub fn affine_diffusion(triangle: &Triangle, values: [f64; 3]) -> [f64; 3] {
     let slopes = triangle.gradients();
