@@ -1,4 +1,4 @@
-//! Wall time and memory traffic of a run, by named phases.
+//! Wall time of a run and bytes moved in it, by named phases.
 
 use std::{cell::RefCell, collections::BTreeMap, time::Instant};
 

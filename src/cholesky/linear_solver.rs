@@ -135,7 +135,7 @@ impl LinearSolver {
         self.factor.factorise(matrix)
     }
 
-    /// Whether the factor that there is serves for the system: a condensed one is made that of the same
+    /// Whether there is a factor that preconditions the system: a condensed one is made that of the same
     /// unknowns prescribed, with the same diagonal.
     fn restrict(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
         if !self.factor.exists() || !self.factor.is_condensed(system.matrix)? {

@@ -140,7 +140,7 @@ impl<'a> ContactStep<'a> {
             (problem.body.nodes.partition.comm(), problem.zeta_at_points(zeta));
         if comm.any(zeta_at_points != self.zeta_at_points) {
             let (body, bases) = (&problem.body, &problem.constraints.bases);
-            let bytes = self.stiffness.refill_traffic(body);
+            let bytes = self.stiffness.bytes_per_refill(body);
             phases.time_moving("stiffness refill", bytes, || {
                 self.stiffness.refill(body, &problem.elasticity, bases, &zeta_at_points)
             })?;

@@ -94,8 +94,8 @@ impl Step {
 }
 
 impl StepRecord {
-    /// Of the step n = `step` with the nodal loads `load`. What the damage step and the clock tell is
-    /// still zero.
+    /// Of the step n = `step` with the nodal loads `load`. What the damage step and the step controller
+    /// tell is still zero.
     pub(super) fn new(
         problem: &DiscreteProblem,
         step: usize,

@@ -94,7 +94,7 @@ impl Stiffness {
 
     /// Bytes that a refill moves: of each element nodes, points, places and ζ once; K is written,
     /// read and written again.
-    pub fn refill_traffic(&self, body: &Body) -> f64 {
+    pub fn bytes_per_refill(&self, body: &Body) -> f64 {
         let elements = for_elements!(body, cells => {
             let points = cells.elements.iter().map(|element| 8 * element.points.len()).sum::<usize>();
             size_of_val(cells.nodes) + size_of_val(cells.elements) + points

@@ -93,7 +93,7 @@ fn passes(c: &mut Criterion) {
     group.bench_function("damage solve", |b| {
         b.iter(|| damage.advance(&load, &mut zeta.clone()).unwrap());
     });
-    group.throughput(Throughput::Bytes(k.refill_traffic(&problem.body) as u64));
+    group.throughput(Throughput::Bytes(k.bytes_per_refill(&problem.body) as u64));
     group.bench_function("stiffness refill", |b| {
         let DiscreteProblem { body, elasticity, constraints, .. } = &problem;
         b.iter(|| k.refill(body, elasticity, &constraints.bases, black_box(&means)).unwrap());

@@ -115,7 +115,7 @@ impl<'a> ContactStep<'a> {
 impl Compliance<'_> {
     /// Estimates the errors of the last answer of a run, and of the one with the largest stationarity
     /// residual before it, relative to the largest displacement; that only if the first error, enlarged by
-    /// the ratio of the two residuals, comes near to what is promised. The kept factor mostly serves.
+    /// the ratio of the two residuals, comes near to what is promised. The kept factor is mostly good enough.
     ///
     /// # Errors
     /// PETSc failed.
