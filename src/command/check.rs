@@ -47,19 +47,8 @@ fn describe_mesh(mesh: &Mesh, Units { length, .. }: &Units) -> String {
 fn boundaries(scene: &Scene, mesh: &Mesh) -> String {
     let times = scene.sample_times(TIMES);
     let mut free = mesh.boundary_edges();
-    let mut rows: Vec<(String, Vec<[usize; 2]>, String)> = Vec::new();
-    for boundary in &scene.boundaries {
-        let edges = mesh.curves.get(&boundary.name).map_or(&[][..], |curve| &curve.edges);
-        free.retain(|edge| !edges.contains(edge));
-        rows.push((
-            boundary.name.clone(),
-            edges.to_vec(),
-            conditions(boundary, edges, mesh, &times, &scene.units.length),
-        ));
-    }
-    rows.push(("(all other)".to_owned(), free, "free".to_owned()));
     let measure = format!("length, {}", scene.units.length);
-    let rows = rows.into_iter().map(|(name, edges, conditions)| {
+    let row = |name: &str, edges: &[[usize; 2]], conditions: String| {
         let (mut length, mut mean) = (0.0, [0.0; 2]);
         for (normal, edge_length) in edges.iter().map(|&edge| mesh.edge_normal(edge)) {
             length += edge_length;
@@ -68,21 +57,27 @@ fn boundaries(scene: &Scene, mesh: &Mesh) -> String {
         // Of a closed curve, or of opposite sides, nothing is left.
         let straight = mean[0].hypot(mean[1]) / length;
         let [x, y] = mean.map(|sum| sum / (length * straight) + 0.0);
+        let normal = match straight {
+            straight if straight > 0.999_999 => format!("({x:.3}, {y:.3})"),
+            straight if straight > 0.1 => format!("about ({x:.2}, {y:.2})"),
+            _ => String::new(),
+        };
         [
             ("  boundary", format!("  {name}")),
             ("conditions", conditions),
             ("edges", edges.len().to_string()),
             (&*measure, format!("{length:.4}")),
-            (
-                "outward normal",
-                match straight {
-                    straight if straight > 0.999_999 => format!("({x:.3}, {y:.3})"),
-                    straight if straight > 0.1 => format!("about ({x:.2}, {y:.2})"),
-                    _ => String::new(),
-                },
-            ),
+            ("outward normal", normal),
         ]
-    });
+    };
+    let mut rows = Vec::new();
+    for boundary in &scene.boundaries {
+        let edges = mesh.curves.get(&boundary.name).map_or(&[][..], |curve| &curve.edges);
+        free.retain(|edge| !edges.contains(edge));
+        let conditions = conditions(boundary, edges, mesh, &times, &scene.units.length);
+        rows.push(row(&boundary.name, edges, conditions));
+    }
+    rows.push(row("(all other)", &free, "free".to_owned()));
     let table = terminal::table(presets::NOTHING, rows, 2);
     table.lines().map(str::trim_end).collect::<Vec<_>>().join("\n")
 }

@@ -100,7 +100,8 @@ pub fn adapted(
     accuracy: f64,
     seen: &mut dyn FnMut(&Adapted),
 ) -> Result<Adapted, AdaptError> {
-    let mut reached = None;
+    let (mut scene, mut reached) = (scene.clone(), None);
+    scene.time.iter_mut().for_each(|grid| grid.stepping = Stepping::Uniform { steps: INSTANTS });
     let refined = refined(session, scene, mesh, solver, accuracy, &mut |mesh| {
         seen(mesh);
         reached = Some(mesh.clone());
@@ -111,16 +112,15 @@ pub fn adapted(
     }
 }
 
-/// The same, without an answer where a run fails.
+/// The same, of a scene with few steps, without an answer where a run fails.
 fn refined(
     session: &Session,
-    scene: &Scene,
+    mut scene: Scene,
     mesh: Mesh,
     solver: &str,
     accuracy: f64,
     seen: &mut dyn FnMut(&Adapted),
 ) -> Result<Adapted, AdaptError> {
-    let mut scene = of_few_steps(scene);
     let order = if scene.order == Order::Quadratic { 2.0 } else { 1.0 };
     let mut refinement = Refinement::start(mesh);
     let (mut stopped_before, mut close_before) = (None::<f64>, false);
@@ -171,15 +171,6 @@ fn refined(
         (stopped_before, close_before) = (stop, close);
         refinement = divided(refinement, &ratios)?;
     }
-}
-
-/// The scene of a pilot run.
-fn of_few_steps(scene: &Scene) -> Scene {
-    let mut scene = scene.clone();
-    if let Some(grid) = &mut scene.time {
-        grid.stepping = Stepping::Uniform { steps: INSTANTS };
-    }
-    scene
 }
 
 /// Where ζ_* is reached, by the body or by too long steps, the steps are chosen by their error from then on;

@@ -3,7 +3,7 @@
 use crate::{
     contact::{FixedRow, GapRow, RigidMotions},
     fem::{Body, Edge},
-    mesh::{BoundaryNode, boundary_nodes, extent},
+    mesh::{BoundaryNode, Face, boundary_nodes, extent},
     scene::{Boundary, Condition, Expression, Gap, Scene, SurfaceLoad},
 };
 
@@ -131,15 +131,17 @@ impl BoundaryConditions {
 
 /// The rows of a gap of the width `distance`, m, at a node.
 fn gap_rows(gap: &Gap, distance: f64, at: &BoundaryNode) -> impl Iterator<Item = GapRow> {
-    let row = |normal, tributary_length| GapRow {
-        node: at.node,
+    let faces = match gap.normal {
+        Some(normal) => {
+            vec![Face { normal, length: at.faces.iter().map(|face| face.length).sum() }]
+        }
+        None => at.faces.clone(),
+    };
+    let node = at.node;
+    faces.into_iter().map(move |Face { normal, length }| GapRow {
+        node,
         normal,
         gap: distance,
-        tributary_length,
-    };
-    let rows: Vec<GapRow> = match gap.normal {
-        Some(normal) => vec![row(normal, at.faces.iter().map(|face| face.length).sum())],
-        None => at.faces.iter().map(|face| row(face.normal, face.length)).collect(),
-    };
-    rows.into_iter()
+        tributary_length: length,
+    })
 }

@@ -4,10 +4,10 @@ use super::{
     Accuracy, DiscreteProblem, Outcome,
     boundary_conditions::Traction,
     loads::LoadCurve,
-    unresolved::{gauss_parts, mean_load},
+    unresolved::{TIMES, integrals},
 };
 use crate::{
-    fem::{Edge, for_elements},
+    fem::for_elements,
     mesh::{Mesh, Order},
     model::Plane,
     scene::{Expression, Scene, Stepping, rounded},
@@ -25,13 +25,8 @@ const FREE_MOTIONS: usize = 6;
 /// a corner where the strain is singular, in every load.
 const LARGE: f64 = 0.1;
 const NOTICEABLE: f64 = 0.01;
-
-/// Midpoints per edge of the finer quadrature.
-const FINE: usize = 16;
 /// A resultant is noted if it is further than this from the finer one, relative to ∫|f|.
 const DIFFERENCE: f64 = 0.05;
-/// Times at which a traction is sampled, about.
-const TIMES: usize = 8;
 
 impl Outcome {
     /// What the user should know about the run of `problem`.
@@ -71,11 +66,11 @@ impl Outcome {
         }
         notes.extend(accuracy.notes(problem.tolerance));
         notes.extend(problem.large_gradients(&self.last.state.u));
-        if let Some((steps, solver)) = self.rescued {
+        if let Some((steps, solver)) = &self.rescued {
             notes.push(format!(
                 "in {} the contact solver stopped short of the tolerance, and {solver} gave the \
                  answer in its place",
-                counted(steps)
+                counted(*steps)
             ));
         }
         notes.extend(self.chosen_steps(problem, true));
@@ -222,8 +217,7 @@ fn counted(steps: usize) -> String {
     format!("{steps} step{}", if steps == 1 { "" } else { "s" })
 }
 
-/// A note if the resultant ∫f by the two Gauss points per edge of
-/// [`add_traction`](crate::fem::add_traction) is far from ∫f by `FINE` midpoints per edge, relative
+/// A note if the resultant ∫f by the two Gauss points per edge is far from ∫f by many midpoints, relative
 /// to the largest ∫|f| of all sampled times: then f varies within the edges, is lost or counts twice.
 pub(super) fn unresolved(scene: &Scene, mesh: &Mesh, traction: &Traction) -> Option<String> {
     let f = traction.force.expressions();
@@ -232,12 +226,15 @@ pub(super) fn unresolved(scene: &Scene, mesh: &Mesh, traction: &Traction) -> Opt
     }
     let mut times = scene.sample_times(TIMES);
     times.truncate(if f.iter().any(Expression::depends_on_time) { usize::MAX } else { 1 });
-    let gauss = gauss_parts();
-    let midpoints: [f64; FINE] = std::array::from_fn(|i| (i as f64 + 0.5) / FINE as f64);
     let (mut largest, mut worst) = (0.0_f64, (0.0, [0.0; 4], 0.0));
     for t in times {
-        let [gx, gy, coarse] = integral(mesh, traction, &gauss, t);
-        let [x, y, fine] = integral(mesh, traction, &midpoints, t);
+        let mut sums = [[0.0; 3]; 2];
+        for edge in &traction.edges {
+            let parts = integrals(mesh, &traction.force, edge.ends, t);
+            let sums = sums.as_flattened_mut().iter_mut();
+            sums.zip(parts.as_flattened()).for_each(|(sum, part)| *sum += part);
+        }
+        let [[gx, gy, coarse], [x, y, fine]] = sums;
         largest = largest.max(coarse).max(fine);
         let difference = (gx - x).hypot(gy - y);
         if difference > worst.0 {
@@ -257,15 +254,4 @@ pub(super) fn unresolved(scene: &Scene, mesh: &Mesh, traction: &Traction) -> Opt
             traction.boundary
         )
     })
-}
-
-/// ∫f_x, ∫f_y and ∫|f| of a traction at time t, by equal weights at these parts of each edge.
-fn integral(mesh: &Mesh, traction: &Traction, parts: &[f64], t: f64) -> [f64; 3] {
-    let mut sums = [0.0; 3];
-    for &Edge { ends, .. } in &traction.edges {
-        let length = mesh.edge_normal(ends).1;
-        let means = mean_load(mesh, &traction.force, ends, parts, t);
-        sums.iter_mut().zip(means).for_each(|(sum, mean)| *sum += length * mean);
-    }
-    sums
 }

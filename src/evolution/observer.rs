@@ -36,7 +36,8 @@ impl Next {
     }
 }
 
-/// Is shown the accepted steps of a run on its rank. Every function is called on all ranks.
+/// Is shown the accepted steps of a run on its rank. Every function is called on all ranks; who only looks
+/// has nothing for checkpoints.
 pub trait Observer {
     /// Sees an accepted step and says how to go on.
     ///
@@ -49,13 +50,17 @@ pub trait Observer {
     ///
     /// # Errors
     /// The archive is of another observer, or what it tells of is gone.
-    fn archive(&mut self, last: &Step, archive: &mut Archive) -> Observed;
+    fn archive(&mut self, _last: &Step, _archive: &mut Archive) -> Observed {
+        Ok(())
+    }
 
     /// Keeps a checkpoint.
     ///
     /// # Errors
     /// It cannot be written.
-    fn keep(&mut self, last: &Step, archive: Archive) -> Observed;
+    fn keep(&mut self, _last: &Step, _archive: Archive) -> Observed {
+        Ok(())
+    }
 }
 
 /// Who only looks.
@@ -64,13 +69,5 @@ pub(super) struct Shown<'a>(pub(super) &'a mut dyn FnMut(&Step) -> Observed);
 impl Observer for Shown<'_> {
     fn accept(&mut self, step: &Step) -> Observed<Next> {
         (self.0)(step).map(|()| Next::Step)
-    }
-
-    fn archive(&mut self, _last: &Step, _archive: &mut Archive) -> Observed {
-        Ok(())
-    }
-
-    fn keep(&mut self, _last: &Step, _archive: Archive) -> Observed {
-        Ok(())
     }
 }

@@ -3,7 +3,7 @@
 use super::{Accuracy, ErrorBudget, Step, StepRecord, damage_step::PlannedStep};
 use crate::{
     archive::{Archive, ArchiveError},
-    contact::{Kkt, RigidMotion, find},
+    contact::{Kkt, RigidMotion},
     fem::Mass,
 };
 use serde::{Deserialize, Serialize};
@@ -25,7 +25,7 @@ pub struct Outcome {
     /// Steps in which the solver that gave the answer left its fast path.
     pub fallbacks: usize,
     /// Steps in which another solver gave the answer, and which.
-    pub rescued: Option<(usize, &'static str)>,
+    pub rescued: Option<(usize, String)>,
     /// By how much ζ violated the bounds of its equation.
     pub bound_violation: BoundViolation,
     /// Steps in which the active nodes left a rigid motion unconstrained, the times of the first and of
@@ -84,10 +84,7 @@ impl Outcome {
         archive.value(&mut self.skipped_damage_solves)?;
         archive.value(&mut self.undone)?;
         archive.value(&mut self.fallbacks)?;
-        let mut rescued = self.rescued.map(|(steps, solver)| (steps, solver.to_owned()));
-        archive.value(&mut rescued)?;
-        self.rescued =
-            rescued.and_then(|(steps, solver)| Some((steps, find(&solver).ok()?.0.name)));
+        archive.value(&mut self.rescued)?;
         archive.value(&mut self.unconstrained)?;
         archive.value(&mut self.least_accurate)?;
         archive.value(&mut self.most_displaced)
@@ -114,7 +111,7 @@ impl Outcome {
         let rescues = usize::from(report.rescued_by.is_some());
         self.fallbacks += usize::from(report.fallbacks > rescues);
         if let Some(solver) = report.rescued_by {
-            self.rescued = Some((self.rescued.map_or(1, |(steps, _)| steps + 1), solver));
+            self.rescued.get_or_insert((0, solver.to_owned())).0 += 1;
         }
         if let Some(motion) = unconstrained {
             let first = (0, [record.time; 2], motion.clone());

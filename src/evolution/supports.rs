@@ -112,15 +112,12 @@ impl Supports {
 
     /// The supports at the nodes that a rank owns.
     pub(super) fn restrict(&self, subdomain: &Subdomain) -> Self {
-        fn local<T: Clone>(of: &BTreeMap<usize, T>, subdomain: &Subdomain) -> BTreeMap<usize, T> {
-            let own =
-                of.iter().filter_map(|(node, of)| Some((subdomain.owned(*node)?, of.clone())));
-            own.collect()
-        }
+        let own = |node: &usize| subdomain.owned(*node);
+        let contact = self.contact.iter();
         Self {
             names: self.names.clone(),
-            prescribed: local(&self.prescribed, subdomain),
-            contact: local(&self.contact, subdomain),
+            prescribed: self.prescribed.iter().filter_map(|(n, of)| Some((own(n)?, *of))).collect(),
+            contact: contact.filter_map(|(n, of)| Some((own(n)?, of.clone()))).collect(),
         }
     }
 
@@ -183,13 +180,10 @@ impl Supports {
         });
         rows.into_iter()
             .map(|[boundary, part, arc_length, x, y, normal_x, normal_y, gap, pressure, active]| {
-                let boundary = self.names[boundary as usize].clone();
-                let (part, active) = (part as usize, active as u8);
-                let time = state.time;
                 ContactRow {
-                    time,
-                    boundary,
-                    part,
+                    time: state.time,
+                    boundary: self.names[boundary as usize].clone(),
+                    part: part as usize,
                     arc_length,
                     x,
                     y,
@@ -197,7 +191,7 @@ impl Supports {
                     normal_y,
                     gap,
                     pressure,
-                    active,
+                    active: active as u8,
                 }
             })
             .collect()

@@ -10,7 +10,7 @@ use std::collections::HashSet;
 /// Points at which the functions are sampled in an edge.
 const SAMPLES: usize = 64;
 /// Times at which a traction or a gap is sampled, about.
-const TIMES: usize = 8;
+pub(super) const TIMES: usize = 8;
 /// What a single edge may lose of the accuracy asked for.
 const SHARE: f64 = 0.1;
 /// Gaps count where they are less than this many times the largest displacement.
@@ -72,15 +72,10 @@ fn unresolved_load(
     if !load.expressions().iter().any(Expression::depends_on_space) {
         return found;
     }
-    let gauss = gauss_parts();
     for t in scene.sample_times(TIMES) {
-        let mean = |edge: [usize; 2], parts: &[f64]| mean_load(mesh, load, edge, parts, t);
-        let fine: Vec<f64> = samples().collect();
         let parts = curve.edges.iter().map(|&edge| {
-            let (length, fine) = (mesh.edge_normal(edge).1, mean(edge, &fine));
-            let coarse = mean(edge, &gauss);
-            let lost = (fine[0] - coarse[0]).hypot(fine[1] - coarse[1]);
-            (edge, lost * length, fine[2] * length)
+            let [coarse, fine] = integrals(mesh, load, edge, t);
+            (edge, (fine[0] - coarse[0]).hypot(fine[1] - coarse[1]), fine[2])
         });
         let parts: Vec<_> = parts.collect();
         let total: f64 = parts.iter().map(|part| part.2).sum();
@@ -94,26 +89,22 @@ fn samples() -> impl Iterator<Item = f64> {
     (0..SAMPLES).map(|i| (i as f64 + 0.5) / SAMPLES as f64)
 }
 
-/// The Gauss points of an edge, as parts of the way along it.
-pub(super) fn gauss_parts() -> [f64; 2] {
-    gauss_points([0.0; 2], [1.0, 0.0]).map(|[s, _]| s)
-}
-
-/// The means of f_x, f_y and |f| of a load at time t over these parts of the way along an edge.
-pub(super) fn mean_load(
+/// ∫f_x, ∫f_y and ∫|f| of a load over an edge at time t: by the two Gauss points of
+/// [`add_traction`](crate::fem::add_traction), and by many midpoints.
+pub(super) fn integrals(
     mesh: &Mesh,
     load: &SurfaceLoad,
     edge: [usize; 2],
-    parts: &[f64],
     t: f64,
-) -> [f64; 3] {
-    let mut sums = [0.0; 3];
-    for &s in parts {
-        let [fx, fy] = load.at(place(mesh, edge, s), mesh.edge_normal(edge).0, t);
-        let values = [fx, fy, fx.hypot(fy)];
-        sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value / parts.len() as f64);
-    }
-    sums
+) -> [[f64; 3]; 2] {
+    let (normal, length) = mesh.edge_normal(edge);
+    let gauss = gauss_points([0.0; 2], [1.0, 0.0]).map(|[s, _]| s);
+    [gauss.to_vec(), samples().collect()].map(|parts| {
+        let values = parts.iter().map(|&s| load.at(place(mesh, edge, s), normal, t));
+        let sum =
+            values.fold([0.0; 3], |[x, y, all], [fx, fy]| [x + fx, y + fy, all + fx.hypot(fy)]);
+        sum.map(|sum| sum * length / parts.len() as f64)
+    })
 }
 
 /// The point x(s) of an edge, 0 ≤ s ≤ 1, m.

@@ -210,12 +210,10 @@ impl Body {
     pub fn at_nodes(&self, zeta: &[f64]) -> Vec<f64> {
         let Some(quadratic) = &self.quadratic else { return zeta.to_vec() };
         let mut values = vec![0.0; self.nodes.points.len()];
-        for (vertices, &[a, b, c, ab, bc, ca]) in self.mesh.triangles.iter().zip(&quadratic.nodes) {
+        for (vertices, nodes) in self.mesh.triangles.iter().zip(&quadratic.nodes) {
             let [p, q, r] = vertices.map(|vertex| zeta[vertex]);
-            let mean = |p: f64, q: f64| 0.5 * (p + q);
-            let own =
-                [(a, p), (b, q), (c, r), (ab, mean(p, q)), (bc, mean(q, r)), (ca, mean(r, p))];
-            own.into_iter().for_each(|(node, value)| values[node] = value);
+            let own = [p, q, r, 0.5 * (p + q), 0.5 * (q + r), 0.5 * (r + p)];
+            nodes.iter().zip(own).for_each(|(&node, value)| values[node] = value);
         }
         values
     }

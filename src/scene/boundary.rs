@@ -1,7 +1,7 @@
 //! The conditions on the parts of the boundary, and which of them exclude each other.
 
 use super::expression::Expression;
-use super::schema::Fault;
+use super::schema::{Fault, is_wrong};
 use serde::Deserialize;
 use std::array;
 
@@ -109,7 +109,7 @@ pub(super) fn contradiction(a: &[Condition], b: &[Condition]) -> Option<[&'stati
 #[serde(deny_unknown_fields)]
 pub(super) struct BoundaryKeys {
     name: String,
-    displacement: Option<[Component; 2]>,
+    displacement: Option<[toml::Value; 2]>,
     symmetry: bool,
     gap: Option<Expression>,
     normal: Option<[Expression; 2]>,
@@ -117,27 +117,16 @@ pub(super) struct BoundaryKeys {
     pressure: Option<Expression>,
 }
 
-/// A component of a prescribed displacement.
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum Component {
-    Free(Free),
-    Given(Expression),
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum Free {
-    Free,
-}
-
 pub(super) fn boundary(keys: BoundaryKeys) -> Result<Boundary, Fault> {
     let BoundaryKeys { name, displacement, symmetry, gap, normal, traction, pressure } = keys;
-    let given = |component| match component {
-        Component::Free(Free::Free) => None,
-        Component::Given(expression) => Some(expression),
+    let prescribed = |value: toml::Value| match value.as_str() {
+        Some("free") => Ok(None),
+        _ => value.try_into().map(Some).map_err(is_wrong),
     };
-    let displacement = displacement.map(|components| components.map(given));
+    let displacement = match displacement {
+        Some([x, y]) => Some([prescribed(x)?, prescribed(y)?]),
+        None => None,
+    };
     if let Some([None, None]) = displacement {
         let problem = "is \"free\" in both components; leave it out".to_owned();
         return Err(("displacement", problem));

@@ -89,30 +89,28 @@ impl Scene {
         }
         for boundary in &self.boundaries {
             let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
-            let key = |what: &str, i| boundary_key(&boundary.name, &format!("{what}[{i}]"));
+            let key = |what: &str| boundary_key(&boundary.name, what);
             let edges = || curve.edges.iter().copied().map(at);
             let nodes: Vec<_> = edges().flatten().collect();
             let gauss_points: Vec<_> = edges().flat_map(|[p, q]| gauss_points(p, q)).collect();
             for condition in &boundary.conditions {
                 match condition {
                     Condition::Displacement(u) => {
-                        for (i, u) in (0..2).zip(u).filter_map(|(i, u)| Some((i, u.as_ref()?))) {
-                            check(key("displacement", i), u, &nodes, finite);
+                        for (i, u) in
+                            u.iter().enumerate().filter_map(|(i, u)| Some((i, u.as_ref()?)))
+                        {
+                            check(key(&format!("displacement[{i}]")), u, &nodes, finite);
                         }
                     }
                     Condition::Load(SurfaceLoad::Traction(f)) => {
-                        for (i, f) in (0..2).zip(f) {
-                            check(key("traction", i), f, &gauss_points, finite);
+                        for (i, f) in f.iter().enumerate() {
+                            check(key(&format!("traction[{i}]")), f, &gauss_points, finite);
                         }
                     }
                     Condition::Load(SurfaceLoad::Pressure(p)) => {
-                        let key = boundary_key(&boundary.name, "pressure");
-                        check(key, p, &gauss_points, finite);
+                        check(key("pressure"), p, &gauss_points, finite);
                     }
-                    Condition::Gap(gap) => {
-                        let key = boundary_key(&boundary.name, "gap");
-                        check(key, &gap.distance, &nodes, finite);
-                    }
+                    Condition::Gap(gap) => check(key("gap"), &gap.distance, &nodes, finite),
                     Condition::Symmetry => {}
                 }
             }

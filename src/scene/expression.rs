@@ -7,6 +7,7 @@ use parser::Parser;
 use serde::Deserialize;
 use std::{ops::Range, path::Path, sync::Arc};
 use table::Table;
+use toml::Value;
 
 /// Parts of a run in which an expression is looked at for breaks.
 const LOOKS: usize = 1000;
@@ -32,7 +33,7 @@ const LOOKS: usize = 1000;
 /// # Ok::<(), signorini::scene::ExpressionError>(())
 /// ```
 #[derive(Debug, Clone, Deserialize)]
-#[serde(try_from = "Written")]
+#[serde(try_from = "Value")]
 pub struct Expression {
     /// In postfix order: a number or variable is put on a stack, a function or operator takes its
     /// arguments from there and puts its value in their place.
@@ -41,21 +42,15 @@ pub struct Expression {
     height: usize,
 }
 
-/// An expression as it stands in a scene.
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum Written {
-    Number(f64),
-    Text(String),
-}
-
-impl TryFrom<Written> for Expression {
+impl TryFrom<Value> for Expression {
     type Error = ExpressionError;
 
-    fn try_from(written: Written) -> Result<Self, ExpressionError> {
+    fn try_from(written: Value) -> Result<Self, ExpressionError> {
         match written {
-            Written::Number(value) => Ok(Self::constant(value)),
-            Written::Text(text) => Self::parse(&text),
+            Value::String(text) => Self::parse(&text),
+            Value::Float(value) => Ok(Self::constant(value)),
+            Value::Integer(value) => Ok(Self::constant(value as f64)),
+            _ => Err(ExpressionError("must be a number or an expression in quotes".to_owned())),
         }
     }
 }

@@ -127,13 +127,13 @@ impl<'t> Findings<'t> {
         }
     }
 
-    /// What `build` makes of the value of `key`, if there is one and all in it is as the schema says.
+    /// What `build` makes of the value of a dotted `key`, if there is one and all in it is as the schema says.
     pub(super) fn build<K: DeserializeOwned, T>(
         &mut self,
         key: &str,
         build: impl FnOnce(K) -> Result<T, Fault>,
     ) -> Option<T> {
-        let value = self.document.get(key)?.clone();
+        let value = key.split('.').try_fold(&self.document, |table, name| table.get(name))?.clone();
         self.build_value(key, value, build)
     }
 

@@ -29,9 +29,9 @@ pub(super) fn scene(found: &mut Findings) -> Option<Scene> {
     let material = found.build("material", Ok);
     let damage = found.build("damage", damage);
     let accuracy: Option<f64> = found.build("accuracy", Ok);
-    let order = found.build("discretisation", discretisation);
+    let degree: Option<f64> = found.build("discretisation.displacement", Ok);
     let time = found.build("time", time);
-    let body = found.build("body", |BodyKeys { force }| Ok(force));
+    let body_force = found.build("body.force", Ok);
     let contact = found.build("contact", contact);
     let output = found.build("output", Ok);
     let units = found.build("units", units);
@@ -53,7 +53,7 @@ pub(super) fn scene(found: &mut Findings) -> Option<Scene> {
         surfaces.entry(name).or_insert(Surface { material, law: None }).law = Some(law);
     }
     let (time, note) = time.unzip();
-    let usual = if accuracy.is_some() { Order::Quadratic } else { Order::Linear };
+    let degree = degree.unwrap_or(if accuracy.is_some() { 2.0 } else { 1.0 });
     Some(Scene {
         path: path.to_owned(),
         title: title.unwrap_or_else(|| name.clone()),
@@ -62,10 +62,10 @@ pub(super) fn scene(found: &mut Findings) -> Option<Scene> {
         material,
         damage,
         surfaces,
-        order: order.flatten().unwrap_or(usual),
+        order: if degree == 2.0 { Order::Quadratic } else { Order::Linear },
         accuracy,
         time,
-        body_force: body?,
+        body_force: body_force?,
         contact: contact?,
         output: output?,
         units: units?,
@@ -114,22 +114,6 @@ fn mesh(MeshKeys { file, size, parameters }: MeshKeys, folder: &Path) -> Result<
         return Err(("size", "is given a second time in mesh.parameters; keep one".to_owned()));
     }
     Ok(MeshSource { file: folder.join(file), parameters })
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct BodyKeys {
-    force: [Expression; 2],
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct DiscretisationKeys {
-    displacement: Option<f64>,
-}
-
-fn discretisation(keys: DiscretisationKeys) -> Result<Option<Order>, Fault> {
-    Ok(keys.displacement.map(|k| if k == 2.0 { Order::Quadratic } else { Order::Linear }))
 }
 
 fn contact(options: ContactOptions) -> Result<ContactOptions, Fault> {

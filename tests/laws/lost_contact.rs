@@ -112,7 +112,7 @@ fn a_load_beside_the_only_point_turns_the_body_onto_the_next() {
 }
 
 #[test]
-fn a_note_is_given_once_and_with_the_first_time() {
+fn a_note_is_given_once_with_how_often_and_when() {
     let text = "material = { young = 1e4, poisson = 0.3, plane = 'stress' }
          time = { end = 1, step = 0.25 }
          boundary = [{ name = 'bottom', gap = '0.1*(x - 0.5)^2' },
@@ -120,5 +120,8 @@ fn a_note_is_given_once_and_with_the_first_time() {
     let problem = problem(square(10), text).unwrap();
     let notes = run(&problem, SOLVERS[0]).notes(&problem);
     // Without load, at t = 0, the body rests.
-    assert!(notes.len() == 1 && notes[0].starts_with("at t = 0.25,"), "{notes:?}");
+    assert!(
+        notes.len() == 1 && notes[0].starts_with("in 4 steps, at t = 0.25 first and t = 1 last,"),
+        "{notes:?}"
+    );
 }

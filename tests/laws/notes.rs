@@ -47,7 +47,7 @@ fn a_traction_narrower_than_the_edges_is_noted() {
     let notes = |traction: &str| pressed(0.0, traction).unwrap().notes();
     let [note] = &notes("-100*max(0, 1 - abs(x - 0.5)/0.05)")[..] else { panic!("one note") };
     let told = "the traction of boundary \"top\" varies within the mesh's edges: its resultant on \
-                this mesh is (0.0000e0, 0.0000e0) N/m, integrated finely (0.0000e0, -4.98";
+                this mesh is (0.0000e0, 0.0000e0) N/m, integrated finely (0.0000e0, -4.99";
     assert!(note.starts_with(told) && note.ends_with("; refine there"), "{note}");
     // Balanced, of no resultant in truth; smooth on the mesh; constant.
     assert_eq!(notes("-1 - cos(8*pi*(x - 0.0528))").len(), 1);
