@@ -92,15 +92,6 @@ impl Refinement {
         }
         Ok(Self { mesh, parent_of_triangle, halved_edges })
     }
-
-    /// The nodal values of a P1 function with `block` components, carried over from the mesh before.
-    #[must_use]
-    pub fn carry(&self, values: &[f64], block: usize) -> Vec<f64> {
-        let mean = |&[a, b]: &[usize; 2]| {
-            (0..block).map(move |i| 0.5 * (values[block * a + i] + values[block * b + i]))
-        };
-        values.iter().copied().chain(self.halved_edges.iter().flat_map(mean)).collect()
-    }
 }
 
 /// The nodes of a triangle and the offsets of its sides ab, bc, ca from straight ones.
