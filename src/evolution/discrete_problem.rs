@@ -1,5 +1,9 @@
 //! The discrete problem: a scene bound to its mesh, all that does not change from step to step.
 
+mod load_case;
+
+pub(super) use load_case::LoadCase;
+
 use super::{
     Loads, RunError, SetupError, State, Supports, agreed,
     boundary_conditions::BoundaryConditions,
@@ -7,14 +11,13 @@ use super::{
     probe::{OBSERVED, Probes},
 };
 use crate::{
-    contact::{Bound, Certificate, Constraints, RigidMotions},
+    contact::{Certificate, Constraints, RigidMotions},
     fem::{Body, Elasticity, Mass, Subdomain},
     mesh::{Mesh, Order},
     model::DamageLaw,
     petsc::{PetscError, Session},
     scene::Scene,
 };
-use nalgebra::DVector;
 use std::collections::BTreeMap;
 
 /// A scene on its mesh, ready to be stepped.
@@ -46,28 +49,8 @@ pub struct DiscreteProblem {
     undivided: Option<(Mesh, Vec<usize>)>,
 }
 
-/// What the contact problem (26) of one time is posed with.
-#[derive(Debug)]
-pub(super) struct LoadCase {
-    /// t, s.
-    pub(super) time: f64,
-    /// Nodal loads f, N per metre of thickness, and their work on the motions that contact resists.
-    pub(super) load: Vec<f64>,
-    pub(super) work: DVector<f64>,
-    /// The values of the prescribed rows, m, and the unknowns prescribed by them, 0 elsewhere.
-    pub(super) prescribed: Vec<f64>,
-    pub(super) lift: Vec<f64>,
-    /// The bounds on the other unknowns.
-    pub(super) bounds: Vec<Bound>,
-    /// The gaps of all gap rows, m, where any depends on time.
-    pub(super) gaps: Vec<f64>,
-}
-
 /// Times at which the loads of a run are sampled for the largest.
 const SAMPLES: usize = 9;
-/// A load below this part of the largest is rounding.
-const UNLOADED: f64 = 1e-14;
-
 impl DiscreteProblem {
     /// Binds `scene` to `mesh` and checks that there is a solution at all times.
     ///
@@ -154,82 +137,6 @@ impl DiscreteProblem {
         };
         let other = agreed(self.body.nodes.partition.comm(), Self::new(scene, mesh))?;
         Ok(other.divide(session, owners)?)
-    }
-
-    /// Checks what depends on time, where times are known beforehand
-    /// ([`Scene::sample_times`]), so that bad input is refused before anything is written.
-    fn check_times(&self) -> Result<(), SetupError> {
-        // A body force is as much work as the loads of a step.
-        let most = if self.loads.body_force_depends_on_time() { 100 } else { 1000 };
-        let mut times = self.scene.sample_times(most);
-        times.truncate(if self.loads.depend_on_time() { usize::MAX } else { 1 });
-        for time in times {
-            self.posed(time, &self.loads.prescribed_at(time), &self.loads.gaps_at(time))?;
-            if !self.motions.all_prevented() {
-                self.checked_load(time)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Nodal loads at `time`, N per metre of thickness; rounding of the largest load of the run
-    /// (sin(pi) = 1.2e-16) counts as zero.
-    pub fn load(&self, time: f64) -> Vec<f64> {
-        let mut load = self.loads.at(&self.body, time);
-        if self.body.nodes.partition.norm(&load, 2) <= UNLOADED * self.largest_load {
-            load.fill(0.0);
-        }
-        load
-    }
-
-    /// What (26) is posed with at `time`.
-    ///
-    /// # Errors
-    /// The load is not finite or drives an unconstrained rigid motion; prescribed values are not
-    /// finite, contradict each other or go through the obstacle; obstacles leave a node no room.
-    pub(super) fn load_case(&self, time: f64) -> Result<LoadCase, SetupError> {
-        let load = self.motions.balanced(&self.body, self.checked_load(time)?);
-        let work = self.motions.work(&self.body, &load);
-        let prescribed = self.loads.prescribed_at(time);
-        let gaps = self.loads.gaps_at(time);
-        let (lift, bounds) = self.posed(time, &prescribed, &gaps)?;
-        Ok(LoadCase { time, load, work, prescribed, lift, bounds, gaps })
-    }
-
-    /// The nodal loads at `time`, if they are finite and drive no unconstrained rigid motion.
-    /// Collective.
-    fn checked_load(&self, time: f64) -> Result<Vec<f64>, SetupError> {
-        let load = self.load(time);
-        if !self.body.nodes.partition.comm().all(load.iter().all(|f| f.is_finite())) {
-            return Err(self.not_finite(time));
-        }
-        let driven = |source| SetupError::Driven { scene: self.scene.path.clone(), time, source };
-        self.motions.check(&self.body, &load).map_err(driven)?;
-        Ok(load)
-    }
-
-    /// Which value is not finite at `time`, as far as this rank knows.
-    fn not_finite(&self, time: f64) -> SetupError {
-        match self.scene.check_values(&self.body.mesh, &[time]) {
-            Err(error) => error.into(),
-            Ok(()) => SetupError::NotFinite { scene: self.scene.path.clone(), time },
-        }
-    }
-
-    /// The unknowns prescribed at `time` by the `values` of the prescribed rows, and the bounds on the
-    /// others, with the `gaps` of all gap rows where any depends on time.
-    fn posed(
-        &self,
-        time: f64,
-        values: &[f64],
-        gaps: &[f64],
-    ) -> Result<(Vec<f64>, Vec<Bound>), SetupError> {
-        if !values.iter().chain(gaps).all(|value| value.is_finite()) {
-            return Err(self.not_finite(time));
-        }
-        let (scene, time) = (self.scene.path.clone(), self.scene.time.map(|_| time));
-        let constraint = |source| SetupError::Constraint { scene, time, source };
-        self.constraints.pose(values, gaps, &self.body.nodes.points).map_err(constraint)
     }
 
     /// Whether there is a Γ_C.

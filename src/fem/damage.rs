@@ -42,37 +42,15 @@ pub fn source(
     strain_squared: &[f64],
     zeta: &[f64],
 ) -> Vec<[f64; 3]> {
-    match body.order() {
-        Order::Linear => {
-            let at_vertices = |(t, (nodes, e2)): (usize, (&[usize; 3], &f64))| {
-                let law = &laws[body.material(t)];
-                nodes.map(|node| law.source(*e2, zeta[node]))
-            };
-            let triangles = body.mesh.triangles.iter().zip(strain_squared);
-            triangles.enumerate().map(at_vertices).collect()
-        }
-        Order::Quadratic => {
-            source_at(body, laws, strain_squared.as_chunks().0.iter().copied(), zeta)
-        }
-    }
-}
-
-/// [`source`] from |ε|² at its three points of each triangle.
-fn source_at(
-    body: &Body,
-    laws: &[DamageLaw],
-    strain_squared: impl Iterator<Item = [f64; 3]>,
-    zeta: &[f64],
-) -> Vec<[f64; 3]> {
-    let quadratic = body.order() == Order::Quadratic;
-    let triangles = body.mesh.triangles.iter().zip(strain_squared).enumerate();
-    let source = |(t, (nodes, e2)): (usize, (&[usize; 3], [f64; 3]))| {
-        let law = &laws[body.material(t)];
-        let vertices = nodes.map(|node| zeta[node]);
-        let zeta = if quadratic { at_quadratic_points(vertices) } else { vertices };
+    let of_triangle = |(t, nodes): (usize, &[usize; 3])| {
+        let (law, vertices) = (&laws[body.material(t)], nodes.map(|node| zeta[node]));
+        let (e2, zeta) = match body.order() {
+            Order::Linear => ([strain_squared[t]; 3], vertices),
+            Order::Quadratic => (strain_squared.as_chunks().0[t], at_quadratic_points(vertices)),
+        };
         [0, 1, 2].map(|q| law.source(e2[q], zeta[q]))
     };
-    triangles.map(source).collect()
+    body.mesh.triangles.iter().enumerate().map(of_triangle).collect()
 }
 
 /// The load b_i = ∫ φ λ_i, m²/s, of a source φ as [`source`] gives it: for P1 affine between the
