@@ -143,19 +143,23 @@ impl Factor {
             || has_option(&format!("-{prefix}pc_factor_mat_solver_type"))?)
     }
 
-    /// Refuses options that PETSc does not know before anything is factorised.
+    /// Refuses options that PETSc does not know before anything is factorised. Collective.
     ///
     /// # Errors
     /// They ask for what PETSc has not.
     pub fn check_options(&self, session: &Session) -> Result<(), PetscError> {
-        if !self.is_asked_for()? {
-            return Ok(());
+        let preconditioner = match self.comm.any(self.is_asked_for()?) {
+            true => self.preconditioner(true),
+            false => return Ok(()),
+        };
+        if self.comm.any(preconditioner.is_err()) {
+            return preconditioner.map(drop);
         }
         // PETSc looks for the package of a factor when it factorises: here an identity.
         let row = vec![self.comm.rank() as i32];
         let mut identity = Matrix::with_pattern(session, 1, 1, row.clone(), row)?;
         identity.set_values(&[1.0])?;
-        match self.preconditioner(true)?.set_up(&identity) {
+        match preconditioner?.set_up(&identity) {
             Err(error) if error.code == MISSING_FACTOR => Err(error),
             _ => Ok(()),
         }

@@ -18,7 +18,7 @@ use signorini::{
     },
     mesh::{Mesh, Order},
     output,
-    petsc::{Communicator, PetscError, Session},
+    petsc::{Communicator, Session},
     scene::{Scene, Stepping},
 };
 use std::{
@@ -129,11 +129,14 @@ fn adapt(
     Ok(Some(adapted))
 }
 
-/// Refuses PETSc options that would end the run at its first factorisations.
-fn check_factors(session: &Session, problem: &DiscreteProblem) -> Result<(), PetscError> {
-    let prefixes = ["elastic_"].into_iter().chain(problem.damage().map(|_| "damage_"));
-    let mut factors = prefixes.map(|prefix| Factor::new(session, prefix, Precision::Full));
-    factors.try_for_each(|factor| factor.check_options(session))
+/// Refuses PETSc options that would end the run at its first factorisations. Collective.
+fn check_factors(session: &Session, problem: &DiscreteProblem) -> Result<(), Failure> {
+    let mut prefixes = ["elastic_"].into_iter().chain(problem.damage().map(|_| "damage_"));
+    prefixes.try_for_each(|prefix| {
+        let checked = Factor::new(session, prefix, Precision::Full).check_options(session);
+        let refused = |error| format!("PETSc options that begin with -{prefix}pc_: {error}");
+        agree(session.comm(), checked.map_err(|error| Failure::input(refused(error))))
+    })
 }
 
 /// Whether the mesh that is adapted would not take the place of the one that the scene names.
@@ -260,9 +263,7 @@ impl<'a> Task<'a> {
         let problem = agree(comm, problem.map_err(Failure::input))?;
         let problem = phases.time("partition", || problem.restrict(session));
         let problem = agree(comm, problem.map_err(Failure::from))?;
-        let asked =
-            |error| Failure::input(format!("PETSc options -elastic_pc_… or -damage_pc_…: {error}"));
-        agree(comm, check_factors(session, &problem).map_err(asked))?;
+        check_factors(session, &problem)?;
         let lock = if comm.is_root() { output::lock(&folder) } else { Ok(None) };
         let lock = agree(comm, lock.map_err(Failure::input))?;
         if !arguments.restart && comm.is_root() {
