@@ -145,7 +145,7 @@ fn refined(
         let settled = stop.is_none() || (close && close_before);
         let exhausted = rounds >= ROUNDS || triangles > MOST_TRIANGLES;
         let adapted = Adapted {
-            mesh: mesh.clone(),
+            mesh: mesh.clone().in_morton_order(),
             unknowns: 2 * problem.body.nodes.partition.total(),
             rounds,
             error,

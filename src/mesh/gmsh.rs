@@ -38,7 +38,8 @@ pub enum Order {
     Quadratic,
 }
 
-/// Reads a mesh: a `.msh` as it is, a `.geo` through [`mesh_geo`].
+/// Reads a mesh: a `.msh` as it is, a `.geo` through [`mesh_geo`]; nodes and triangles in an order of their
+/// own ([`Mesh::in_morton_order`]).
 ///
 /// `parameters` and `order` are for a `.geo` and have no meaning for a `.msh`.
 ///
@@ -50,11 +51,12 @@ pub fn load(
     order: Order,
 ) -> Result<Mesh, MeshError> {
     let extension = path.extension().map(|e| e.to_ascii_lowercase());
-    match extension.as_ref().and_then(|e| e.to_str()) {
+    let mesh = match extension.as_ref().and_then(|e| e.to_str()) {
         Some("msh") => read(path),
         Some("geo") => read(&mesh_geo(path, parameters, order)?),
         _ => Err(MeshError::file(path, "a mesh is a .msh file or a .geo file for gmsh")),
-    }
+    };
+    mesh.map(Mesh::in_morton_order)
 }
 
 /// Meshes a `.geo` file and returns the path of the `.msh` beside it.

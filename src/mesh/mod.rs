@@ -8,6 +8,7 @@ mod components;
 mod error;
 mod gmsh;
 mod msh;
+mod order;
 mod quadratic;
 mod rectangle;
 mod refine;

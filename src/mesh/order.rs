@@ -1,0 +1,63 @@
+//! The order of nodes and triangles.
+
+use super::{Mesh, extent, sorted};
+
+impl Mesh {
+    /// Numbers the nodes along Morton's curve (G. M. Morton, *A computer oriented geodetic data base*, IBM,
+    /// 1966), and the triangles by their least node: what is near in the body is then near in memory.
+    /// (As gmsh numbers 129,000 nodes, filling K takes twice as long.)
+    #[must_use]
+    pub fn in_morton_order(self) -> Self {
+        let low = [0, 1].map(|axis| self.nodes.iter().fold(f64::INFINITY, |x, p| x.min(p[axis])));
+        let scale = f64::from(u32::MAX) / extent(&self.nodes);
+        let key = |&node: &usize| {
+            let [x, y] = [0, 1].map(|axis| ((self.nodes[node][axis] - low[axis]) * scale) as u32);
+            spread(x) | spread(y) << 1
+        };
+        let mut nodes: Vec<usize> = (0..self.nodes.len()).collect();
+        nodes.sort_by_cached_key(key);
+        let number = inverse(&nodes);
+        let renumbered = |triangle: &[usize; 3]| triangle.map(|node| number[node]);
+        let mut triangles: Vec<usize> = (0..self.triangles.len()).collect();
+        triangles.sort_by_cached_key(|&t| renumbered(&self.triangles[t]).into_iter().min());
+        let number_of_triangle = inverse(&triangles);
+        let edge = |edge: [usize; 2]| edge.map(|node| number[node]);
+        let Self { mut curves, mut surfaces, .. } = self;
+        for curve in curves.values_mut() {
+            curve.edges.iter_mut().for_each(|ends| *ends = edge(*ends));
+        }
+        for surface in surfaces.values_mut() {
+            surface.iter_mut().for_each(|t| *t = number_of_triangle[*t]);
+            surface.sort_unstable();
+        }
+        Self {
+            nodes: nodes.iter().map(|&node| self.nodes[node]).collect(),
+            triangles: triangles.iter().map(|&t| renumbered(&self.triangles[t])).collect(),
+            curves,
+            surfaces,
+            curved: self.curved.iter().map(|(&ends, &at)| (sorted(edge(ends)), at)).collect(),
+        }
+    }
+}
+
+/// The bits of a number with a zero before each.
+fn spread(number: u32) -> u64 {
+    let mut bits = u64::from(number);
+    for (shift, mask) in [
+        (16, 0x0000_ffff_0000_ffff),
+        (8, 0x00ff_00ff_00ff_00ff),
+        (4, 0x0f0f_0f0f_0f0f_0f0f),
+        (2, 0x3333_3333_3333_3333),
+        (1, 0x5555_5555_5555_5555),
+    ] {
+        bits = (bits | bits << shift) & mask;
+    }
+    bits
+}
+
+/// The place of each number in a permutation.
+fn inverse(permutation: &[usize]) -> Vec<usize> {
+    let mut places = vec![0; permutation.len()];
+    permutation.iter().enumerate().for_each(|(place, &number)| places[number] = place);
+    places
+}
