@@ -20,6 +20,7 @@ fn boundary_nodes(mesh: &Mesh, edges: &[[usize; 2]]) -> Vec<BoundaryNode> {
 mod boundary;
 mod geometries;
 mod malformed;
+mod order;
 mod reader;
 mod refine;
 mod writer;
