@@ -25,6 +25,7 @@ use crate::{
     },
     model::DamageLaw,
     petsc::PetscError,
+    scene::Stepping,
 };
 use nalgebra::Vector3;
 use std::array;
@@ -91,7 +92,10 @@ fn damage_error(
         middles: interpolation_error(&problem.body, &first.zeta)?,
         source: Vec::new(),
         own: Vec::new(),
-        step: 0.0,
+        step: problem.scene().time.map_or(0.0, |grid| match grid.stepping {
+            Stepping::Uniform { steps } => grid.end / steps as f64,
+            Stepping::Auto { .. } => 0.0,
+        }),
         delay: None,
     };
     let initial = error.middles.clone();
@@ -133,7 +137,7 @@ struct ZetaError<'a> {
     source: Vec<[f64; 6]>,
     /// b, m²/s.
     own: Vec<f64>,
-    /// The k that the damage system has, s.
+    /// The k of the damage system, s: at first that of the run's, where its steps are equal.
     step: f64,
     /// See [`DamageError`].
     delay: Option<f64>,

@@ -38,8 +38,9 @@ const MANY: usize = 999_999;
 /// writes its piece of a frame, `fields_NNNN_R.vtu`, and the first one the lists:
 /// `fields_NNNN.pvtu` names the pieces, `fields.pvd` the frames.
 ///
-/// A piece has the triangles that its rank owns and all nodes that it knows. One rank alone writes its
-/// frames in the background, for which it has cores to spare.
+/// A piece has the triangles that its rank owns and all nodes that it knows. Every rank writes its files
+/// in the background: with as many ranks as cores, too, since ranks that wait for the slowest writer of a
+/// frame lose more than writers take.
 pub struct FieldWriter {
     files: Background<Files>,
     frames: usize,
@@ -101,10 +102,10 @@ impl FieldWriter {
         self.last_time
     }
 
-    /// Writes a frame and the lists that name it, one rank alone in the background. Collective.
+    /// Writes a frame and the lists that name it, in the background. Collective.
     ///
     /// # Errors
-    /// A file cannot be written; in the background, one of a frame before.
+    /// A file of a frame before cannot be written.
     pub fn add(&mut self, problem: &DiscreteProblem, state: &State) -> Result<(), OutputError> {
         let number = format!("{:0width$}", self.frames, width = self.digits);
         (self.frames, self.last_time) = (self.frames + 1, Some(state.time));
@@ -114,8 +115,7 @@ impl FieldWriter {
         let points = point_data(problem, state);
         let points = points.map_err(|e| OutputError::new(Path::new("a frame"), e))?;
         let frame = Frame { number, time: state.time, comm, points, cells, contact };
-        self.files.add(move |files| files.write(&frame))?;
-        if comm.is_serial() { Ok(()) } else { self.finish() }
+        self.files.add(move |files| files.write(&frame))
     }
 
     /// Whether all frames could be written so far.
