@@ -24,7 +24,7 @@ pub struct Factor {
     prefix: String,
     /// Of the factors of a substructure.
     precisions: [Precision; 2],
-    /// The owned unknowns that [`Self::restrict`] is to prescribe or to change, of matrices of so many rows.
+    /// The owned unknowns that [`Self::restrict`] is to prescribe, of matrices of so many rows.
     condensed: (usize, Vec<usize>),
     /// Made with the first matrix of so many rows.
     method: Option<(usize, Method)>,
@@ -86,9 +86,9 @@ impl Factor {
         }
     }
 
-    /// Makes factors of matrices like this one so that [`Self::restrict`] may prescribe these owned unknowns
-    /// and add to their diagonal entries, if there are not too many of them. The same ones on every call, or
-    /// the factor there is is lost. Collective.
+    /// Makes factors of matrices like this one so that [`Self::restrict`] may prescribe these owned unknowns,
+    /// if there are not too many of them. The same ones on every call, or the factor there is is lost.
+    /// Collective.
     ///
     /// # Errors
     /// PETSc failed.
@@ -175,8 +175,7 @@ impl Factor {
         let (definite, cost) = match self.method(matrix)? {
             Method::Petsc(preconditioner) => (preconditioner.set_up(matrix)?, UNKNOWN_COST),
             Method::Substructure { factor, condensed } => {
-                let definite =
-                    factor.factorise(matrix)? && (*condensed || factor.restrict(&[], &[])?);
+                let definite = factor.factorise(matrix)? && (*condensed || factor.restrict(&[])?);
                 let work = comm.max(factor.work());
                 // An iteration reads the factor and the entries of the matrix with their columns.
                 let iteration = comm.max(factor.bytes() + 12.0 * entries);
@@ -195,24 +194,20 @@ impl Factor {
     ///
     /// # Errors
     /// As in [`Self::factorise`].
-    pub(super) fn is_condensed(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
+    pub(crate) fn is_condensed(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
         Ok(matches!(self.method(matrix)?, Method::Substructure { condensed: true, .. }))
     }
 
-    /// Prescribes some of the condensed unknowns of the matrix last factorised, and adds to the diagonal
-    /// entries of some; false if what is left of it is not positive definite. Collective.
+    /// Prescribes some of the condensed unknowns of the matrix last factorised; false if what is left of it
+    /// is not positive definite. Collective.
     ///
     /// # Errors
     /// There is no memory for it.
-    pub(super) fn restrict(
-        &mut self,
-        prescribed: &[usize],
-        added: &[(usize, f64)],
-    ) -> Result<bool, PetscError> {
+    pub(super) fn restrict(&mut self, prescribed: &[usize]) -> Result<bool, PetscError> {
         let Some((_, Method::Substructure { factor, .. })) = &mut self.method else {
             return Ok(false);
         };
-        let definite = factor.restrict(prescribed, added)?;
+        let definite = factor.restrict(prescribed)?;
         self.keep_precisions();
         Ok(definite)
     }
@@ -306,22 +301,23 @@ impl Factor {
     pub(crate) fn prescribe(&mut self, unknowns: &[usize]) -> Result<bool, PetscError> {
         let condensed =
             matches!(self.method, Some((_, Method::Substructure { condensed: true, .. })));
-        Ok(self.exists() && (!condensed || self.restrict(unknowns, &[])?))
+        Ok(self.exists() && (!condensed || self.restrict(unknowns)?))
     }
 
     /// As [`Self::apply`] where `choose` chooses what of the condensed unknowns is prescribed: these if
     /// they are others than before. Collective.
     ///
     /// # Errors
-    /// As in [`Self::apply`], or the factor is not condensed.
-    pub(super) fn apply_choosing(
+    /// As in [`Self::apply`], or the factor is not condensed, or the choice failed.
+    pub(super) fn apply_choosing<E: From<PetscError>>(
         &mut self,
         r: &Vector,
         z: &mut Vector,
-        choose: Choose,
-    ) -> Result<Option<Vec<usize>>, PetscError> {
+        choose: Choose<E>,
+    ) -> Result<Option<Vec<usize>>, E> {
         let Some((_, Method::Substructure { factor, condensed: true })) = &mut self.method else {
-            return Err(PetscError::ours("unknowns are chosen in a factor that is not condensed"));
+            let detail = "unknowns are chosen in a factor that is not condensed";
+            return Err(PetscError::ours(detail).into());
         };
         self.applications += 1;
         let chosen =

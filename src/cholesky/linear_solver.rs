@@ -8,13 +8,11 @@ use crate::petsc::{Matrix, PetscError, Session, Vector};
 /// Chooses which of the condensed unknowns are prescribed, given the system that is left for them when
 /// all others are eliminated: of each by how much it then changes, or `None` where the unknowns that are
 /// prescribed stay the same. The last solve must be that of the choice. Collective.
-pub type Choose<'a> =
-    &'a mut dyn FnMut(&mut Condensed) -> Result<Option<Vec<Option<f64>>>, PetscError>;
+pub type Choose<'a, E> = &'a mut dyn FnMut(&mut Condensed) -> Result<Option<Vec<Option<f64>>>, E>;
 
 /// Conjugate gradients (Hestenes and Stiefel, J. Res. Nat. Bur. Standards 49, 1952) preconditioned by
 /// a Cholesky factor: that of the matrix itself, which they polish, or that of an earlier system with
-/// other values, and where the factor is not condensed (`Factor::condense`) other prescribed unknowns,
-/// another diagonal.
+/// other values, and where the factor is not condensed (`Factor::condense`) other prescribed unknowns.
 ///
 /// Of an earlier A₀ = Σ ζ₀ Aₜ, summed over triangles, the preconditioner is A₀⁻¹E with E = diag(A₀)/diag(A):
 /// where ζ/ζ₀ varies slowly, A is nearly E⁻¹A₀ for forces as concentrated as those at contact nodes and the
@@ -26,10 +24,10 @@ pub type Choose<'a> =
 /// product for the residual on them, which is the contact forces.
 pub struct LinearSolver {
     factor: Factor,
-    /// A + D with rows and columns of prescribed unknowns zeroed: what is factorised where the factor is
-    /// not condensed.
+    /// A with rows and columns of prescribed unknowns zeroed: what is factorised where the factor is not
+    /// condensed.
     modified: Option<Matrix>,
-    /// b − (A + D) x.
+    /// b − A x.
     residual: Vector,
     /// r: the residual with 0 on prescribed unknowns; or E r.
     free_residual: Vector,
@@ -42,7 +40,7 @@ pub struct LinearSolver {
     preconditioned: Vector,
     /// p.
     direction: Vector,
-    /// (A + D) p.
+    /// A p.
     image: Vector,
 }
 
@@ -114,39 +112,29 @@ impl LinearSolver {
         if self.factor.is_condensed(system.matrix)? {
             return Ok(self.factor.factorise(system.matrix)? && self.restrict(system)?);
         }
-        if system.added.is_none() && system.prescribed.is_none() {
+        let Some(prescribed) = system.prescribed else {
             return self.factor.factorise(system.matrix);
-        }
+        };
         let matrix = match &mut self.modified {
             Some(matrix) => matrix,
             none => none.insert(system.matrix.duplicate()?),
         };
         matrix.copy(system.matrix)?;
-        if let Some(added) = system.added {
-            self.image.write(|d| {
-                d.fill(0.0);
-                added.iter().for_each(|&(i, value)| d[i] += value);
-            })?;
-            matrix.add_diagonal(&self.image)?;
-        }
-        if let Some(prescribed) = system.prescribed {
-            matrix.zero_rows_columns(prescribed, system.scale)?;
-        }
+        matrix.zero_rows_columns(prescribed, system.scale)?;
         self.factor.factorise(matrix)
     }
 
     /// Whether there is a factor that preconditions the system: a condensed one is made that of the same
-    /// unknowns prescribed, with the same diagonal.
+    /// unknowns prescribed.
     fn restrict(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
         if !self.factor.exists() || !self.factor.is_condensed(system.matrix)? {
             return Ok(self.factor.exists());
         }
-        let (prescribed, added) = (system.prescribed, system.added);
-        let restrict = || self.factor.restrict(prescribed.unwrap_or(&[]), added.unwrap_or(&[]));
+        let restrict = || self.factor.restrict(system.prescribed.unwrap_or(&[]));
         system.book(|booking| booking.restriction, 0.0, restrict)
     }
 
-    /// Solves from the start `x` until ‖b − (A + D) x‖₂ ≤ `limit` on the free unknowns, with the factor
+    /// Solves from the start `x` until ‖b − A x‖₂ ≤ `limit` on the free unknowns, with the factor
     /// that there is; without one `x` is left alone.
     ///
     /// # Errors
@@ -162,7 +150,8 @@ impl LinearSolver {
             return Ok(SolveReport::default());
         }
         let mut report = self.start(system, b, x, limit)?;
-        self.iterate_choosing(system, x, (limit, MOST_ITERATIONS), None, &mut report)?;
+        let most = (limit, MOST_ITERATIONS);
+        self.iterate_choosing::<PetscError>(system, x, most, None, &mut report)?;
         Ok(report)
     }
 
@@ -178,7 +167,7 @@ impl LinearSolver {
         x: &mut Vector,
         limit: f64,
     ) -> Result<SolveReport, PetscError> {
-        self.solve_choosing(system, b, x, limit, None)
+        self.solve_choosing::<PetscError>(system, b, x, limit, None)
     }
 
     /// As [`Self::solve_renewing`]; before the first iteration, unless the start is a solution, other
@@ -186,15 +175,15 @@ impl LinearSolver {
     /// of the choice and the answer are exact.
     ///
     /// # Errors
-    /// PETSc or CHOLMOD failed.
-    pub fn solve_choosing(
+    /// PETSc, CHOLMOD or the choice failed.
+    pub fn solve_choosing<E: From<PetscError>>(
         &mut self,
         system: LinearSystem,
         b: &Vector,
         x: &mut Vector,
         limit: f64,
-        mut choose: Option<Choose>,
-    ) -> Result<SolveReport, PetscError> {
+        mut choose: Option<Choose<E>>,
+    ) -> Result<SolveReport, E> {
         self.factor.remake(system.matrix)?;
         let mut report = self.start(system, b, x, limit)?;
         let mut chosen = None;
@@ -216,14 +205,14 @@ impl LinearSolver {
     }
 
     /// As [`Self::iterate`], after a choice of prescribed unknowns, which is returned where it is another.
-    fn iterate_choosing(
+    fn iterate_choosing<E: From<PetscError>>(
         &mut self,
         system: LinearSystem,
         x: &mut Vector,
         (limit, most): (f64, usize),
-        choose: Option<Choose>,
+        choose: Option<Choose<E>>,
         report: &mut SolveReport,
-    ) -> Result<Option<Vec<usize>>, PetscError> {
+    ) -> Result<Option<Vec<usize>>, E> {
         if !report.converged {
             self.set_scaling(system)?;
         }
@@ -244,7 +233,7 @@ impl LinearSolver {
         Ok(chosen)
     }
 
-    /// b − (A + D) x of the last solve on all unknowns: on prescribed ones, the forces that keep them
+    /// b − A x of the last solve on all unknowns: on prescribed ones, the forces that keep them
     /// there.
     pub fn residual(&self) -> &Vector {
         &self.residual

@@ -5,13 +5,11 @@ use crate::{
     phases::Phases,
 };
 
-/// (A + D) x = b on the unknowns that are not prescribed, A + D positive definite there.
+/// A x = b on the unknowns that are not prescribed, A positive definite there.
 #[derive(Clone, Copy)]
 pub struct LinearSystem<'a> {
     /// A.
     pub matrix: &'a Matrix,
-    /// The nonzero entries of the diagonal D; `None` where no rank has any.
-    pub added: Option<&'a [(usize, f64)]>,
     /// The unknowns that keep their values in x (Dirichlet conditions); `None` where no rank has any.
     pub prescribed: Option<&'a [usize]>,
     /// The size of A's diagonal entries: what prescribed unknowns have there in the factored matrix.
@@ -27,26 +25,24 @@ pub struct Booking<'a> {
     pub phases: &'a Phases,
     /// A new factor.
     pub factorisation: &'static str,
-    /// The same for other prescribed unknowns, or another diagonal, where that takes less.
+    /// The same for other prescribed unknowns, where that takes less.
     pub restriction: &'static str,
     /// An application of the factor.
     pub triangular_solves: &'static str,
-    /// A product with A + D.
+    /// A product with A.
     pub product: &'static str,
 }
 
 impl<'a> LinearSystem<'a> {
     /// A x = b.
     pub fn of(matrix: &'a Matrix) -> Self {
-        Self { matrix, added: None, prescribed: None, scale: 1.0, booking: None }
+        Self { matrix, prescribed: None, scale: 1.0, booking: None }
     }
 
-    /// `y` ← (A + D) `x`.
+    /// `y` ← A `x`.
     pub(super) fn multiply(self, x: &Vector, y: &mut Vector) -> Result<(), PetscError> {
         let bytes = self.matrix.bytes_per_product();
-        self.book(|booking| booking.product, bytes, || self.matrix.multiply(x, y))?;
-        let Some(added) = self.added else { return Ok(()) };
-        x.read(|x| y.write(|y| added.iter().for_each(|&(i, d)| y[i] += d * x[i])))?
+        self.book(|booking| booking.product, bytes, || self.matrix.multiply(x, y))
     }
 
     /// `v` ← 0 on the prescribed unknowns.

@@ -169,4 +169,31 @@ impl Condensed<'_> {
         let of = |values: &[f64]| own.iter().map(|&i| values[i]).collect();
         Ok(Some([of(x), of(&forces)]))
     }
+
+    /// The forces b that the condensed unknowns of this rank are under.
+    pub fn loads(&self) -> Vec<f64> {
+        self.own.iter().map(|&i| self.b[i]).collect()
+    }
+
+    /// The condensed unknowns of this rank, none prescribed, with a diagonal D `added` to S and forces p:
+    /// (S + D) x = b − p; `None` if S + D is not positive definite. Collective.
+    ///
+    /// # Errors
+    /// There is no memory for it.
+    pub fn solve_penalised(
+        &mut self,
+        added: impl Iterator<Item = f64>,
+        p: &[f64],
+    ) -> Result<Option<Vec<f64>>, PetscError> {
+        let Self { schur, own, b, x } = self;
+        if !schur.restrict(iter::empty(), own.iter().copied().zip(added))? {
+            return Ok(None);
+        }
+        let mut forces = vec![0.0; b.len()];
+        own.iter().zip(p).for_each(|(&i, p)| forces[i] = -p);
+        schur.comm.sum(&mut forces);
+        forces.iter_mut().zip(*b).for_each(|(force, b)| *force += b);
+        schur.solve(&mut forces, x);
+        Ok(Some(own.iter().map(|&i| x[i]).collect()))
+    }
 }

@@ -21,6 +21,7 @@ use super::{
 };
 use crate::petsc::{Communicator, Matrix, PetscError};
 use nalgebra::DMatrix;
+use std::iter;
 
 /// The factor of a matrix whose unknowns are divided among the ranks.
 pub(super) struct Substructure {
@@ -134,17 +135,12 @@ impl Substructure {
         Ok(true)
     }
 
-    /// Prescribes some of the condensed unknowns and adds to the diagonal entries of some; false if what
-    /// is left of the matrix is not positive definite. Collective.
-    pub(super) fn restrict(
-        &mut self,
-        prescribed: &[usize],
-        added: &[(usize, f64)],
-    ) -> Result<bool, PetscError> {
+    /// Prescribes some of the condensed unknowns; false if what is left of the matrix is not positive
+    /// definite. Collective.
+    pub(super) fn restrict(&mut self, prescribed: &[usize]) -> Result<bool, PetscError> {
         let Division { places, near, interior, .. } = &self.division;
         let place = |&i: &usize| places[i] - interior - near.len();
-        let added = added.iter().map(|(i, d)| (place(i), *d));
-        self.schur.restrict(prescribed.iter().map(place), added)
+        self.schur.restrict(prescribed.iter().map(place), iter::empty())
     }
 
     /// `z` ← A⁻¹ `r` on the owned unknowns, 0 on prescribed ones. Collective.
@@ -154,13 +150,13 @@ impl Substructure {
 
     /// The same with unknowns prescribed by `choose`, which solves for the owned unknowns `condensed`.
     /// Collective.
-    pub(super) fn apply_choosing(
+    pub(super) fn apply_choosing<E>(
         &mut self,
         r: &[f64],
         z: &mut [f64],
         condensed: &[usize],
-        choose: Choose,
-    ) -> Result<Option<Vec<Option<f64>>>, PetscError> {
+        choose: Choose<E>,
+    ) -> Result<Option<Vec<Option<f64>>>, E> {
         let Division { places, near, interior, .. } = &self.division;
         let place = |&i: &usize| places[i] - interior - near.len();
         let own: Vec<usize> = condensed.iter().map(place).collect();

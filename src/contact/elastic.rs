@@ -4,7 +4,7 @@ use super::{Bound, ContactError, ContactProblem, ContactReport, Kkt};
 use crate::{
     archive::{Archive, ArchiveError},
     cholesky::{Booking, Choose, Factor, LinearSolver, LinearSystem, Precision},
-    petsc::{PetscError, Session, Vector},
+    petsc::{Matrix, PetscError, Session, Vector},
 };
 
 impl ContactProblem<'_> {
@@ -29,7 +29,7 @@ impl ContactProblem<'_> {
 pub(super) struct ElasticSolver<'s> {
     /// Whose systems they are, for messages.
     pub(super) method: &'static str,
-    session: &'s Session,
+    pub(super) session: &'s Session,
     solver: Option<LinearSolver>,
     /// The factor of a checkpoint, before the first solve.
     loaded: Option<Factor>,
@@ -61,7 +61,7 @@ impl<'s> ElasticSolver<'s> {
         Factor::new(self.session, "elastic_", Precision::Preconditioner)
     }
 
-    /// Solves, with all that is prescribed or added at the `bounds`, from the start `c` for the load `f`
+    /// Solves, with all that is prescribed at the `bounds`, from the start `c` for the load `f`
     /// until the forces left on the free unknowns are at most `limit` in ‖·‖₂, N.
     ///
     /// # Errors
@@ -73,18 +73,11 @@ impl<'s> ElasticSolver<'s> {
         system: LinearSystem,
         (f, limit): (&Vector, f64),
         c: &mut Vector,
-        choose: Option<Choose>,
+        choose: Option<Choose<ContactError>>,
         report: &mut ContactReport,
     ) -> Result<(), ContactError> {
-        let mut solver = match self.solver.take() {
-            Some(solver) => solver,
-            None => {
-                let factor = self.loaded.take().unwrap_or_else(|| self.new_factor());
-                LinearSolver::with(self.session, factor, system.matrix.owned())?
-            }
-        };
-        solver.factor().condense(system.matrix, bounds.iter().map(|bound| bound.dof))?;
-        let solved = self.solver.insert(solver).solve_choosing(system, f, c, limit, choose)?;
+        let solved =
+            self.solver(bounds, system.matrix)?.solve_choosing(system, f, c, limit, choose)?;
         report.linear_iterations += solved.iterations;
         report.factorisations += solved.factorisations;
         match solved.converged {
@@ -95,6 +88,28 @@ impl<'s> ElasticSolver<'s> {
                 Err(ContactError::stopped(self.method, *report, Kkt::UNKNOWN, detail))
             }
         }
+    }
+
+    /// Whether factors of K are condensed to the `bounds`. Collective.
+    pub(super) fn is_condensed(&mut self, problem: &ContactProblem) -> Result<bool, PetscError> {
+        let solver = self.solver(problem.bounds, problem.stiffness)?;
+        solver.factor().is_condensed(problem.stiffness)
+    }
+
+    fn solver(
+        &mut self,
+        bounds: &[Bound],
+        matrix: &Matrix,
+    ) -> Result<&mut LinearSolver, PetscError> {
+        let mut solver = match self.solver.take() {
+            Some(solver) => solver,
+            None => {
+                let factor = self.loaded.take().unwrap_or_else(|| self.new_factor());
+                LinearSolver::with(self.session, factor, matrix.owned())?
+            }
+        };
+        solver.factor().condense(matrix, bounds.iter().map(|bound| bound.dof))?;
+        Ok(self.solver.insert(solver))
     }
 
     /// f − (K + D) c of the last solve, N, on all unknowns: on prescribed ones the contact forces.

@@ -86,6 +86,11 @@ impl Bound {
         (side != 0.0).then_some(if side > 0.0 { self.upper } else { self.lower })
     }
 
+    /// The side that `c` reaches: 1 the upper bound, −1 the lower one, 0 none.
+    pub fn side(&self, c: f64) -> f64 {
+        if c >= self.upper { 1.0 } else { -f64::from(c <= self.lower) }
+    }
+
     /// The value nearest to `c` that both sides admit, m.
     pub fn nearest(&self, c: f64) -> f64 {
         c.max(self.lower).min(self.upper)

@@ -209,29 +209,30 @@ fn a_strip_one_triangle_high_that_bends_is_told() {
 
 #[test]
 fn the_estimated_error_of_displacements_is_that_of_the_worst_step() {
-    // Solved to a residual of 5e-7 of the forces of the run. At t = 0.5 the strip is only pulled, which
-    // moves it little, and the residual bends it; at the end it is only bent, and moves much.
-    let pulled_and_bent = |tolerance: f64, solver: &str| {
+    // Solved to a residual of 1e-6 of the forces of the run. But for a bend at t = 0.5 the loads are straight in
+    // time, as the start of a step is, up to what the tolerance forgives: a force that bends the
+    // strip by 1e-4 of its displacements at t = 0.5, by less at the end.
+    let pulled_and_bent = |tolerance: f64| {
         let text = format!(
             "material = {{ young = 80, {STRESS} }}
              contact.tolerance = {tolerance:e}
-             time = {{ end = 1, step = 0.25 }}
+             time = {{ end = 1, step = 0.125 }}
              boundary = [
                 {{ name = 'left', displacement = [0, 0] }},
-                {{ name = 'bottom', gap = 1 }},
-                {{ name = 'right', traction = ['40*max(0, 1 - 2*abs(t - 0.5))', '-0.04*abs(t - 0.5)'] }},
+                {{ name = 'bottom', gap = 10 }},
+                {{ name = 'right', traction = ['40*max(0, 1 - 2*abs(t - 0.5))', '-0.04*abs(t - 0.5) - 5e-6*max(0, 1 - 8*abs(t - 0.5)) - 2e-7*max(0, 8*t - 7)'] }},
              ]"
         );
         let mesh = Mesh::rectangle(10.0, 0.5, 60, 3);
-        history(&problem(mesh, &text).unwrap_or_else(|e| panic!("{e}")), solver)
+        history(&problem(mesh, &text).unwrap_or_else(|e| panic!("{e}")), "active-set")
     };
-    let (exact, _) = pulled_and_bent(1e-11, "active-set");
-    let (steps, outcome) = pulled_and_bent(5e-7, "penalty-duality");
+    let (exact, _) = pulled_and_bent(1e-11);
+    let (steps, outcome) = pulled_and_bent(1e-6);
     let errors: Vec<f64> =
         steps.iter().zip(&exact).map(|(a, b)| difference(&a.state.u, &b.state.u)).collect();
     let worst = errors.iter().copied().fold(0.0, f64::max);
     let at = steps.iter().position(|s| s.state.time == outcome.accuracy.time).unwrap();
-    assert!(errors[4] < 0.1 * worst, "the last step is not the worst: {errors:?}");
+    assert!(errors[8] < 0.1 * worst, "the last step is not the worst: {errors:?}");
     assert!(errors[at] > 0.1 * worst, "t = {}: {errors:?}", outcome.accuracy.time);
     let found = outcome.accuracy.displacement;
     assert!(0.1 * worst < found && found < 10.0 * worst, "{found} for {worst}");

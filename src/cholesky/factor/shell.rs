@@ -15,7 +15,7 @@ impl ShellPreconditioner for Factor {
         self.end_solve(Reduction { asked: 1.0, reached: 1.0 });
         let prescribed = if condensed { self.masked(k, operator)? } else { Vec::new() };
         let restrict = |this: &mut Self| match condensed {
-            true => this.restrict(&prescribed, &[]),
+            true => this.restrict(&prescribed),
             false => Ok(true),
         };
         let fits = self.method.as_ref().is_some_and(|(size, _)| *size == rows);

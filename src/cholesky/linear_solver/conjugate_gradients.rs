@@ -8,7 +8,7 @@ use crate::{
 use std::mem::take;
 
 impl LinearSolver {
-    /// r ← b − (A + D) x, and whether that is small enough already.
+    /// r ← b − A x, and whether that is small enough already.
     pub(super) fn start(
         &mut self,
         system: LinearSystem,
@@ -38,10 +38,7 @@ impl LinearSolver {
 
     /// E, of the factored matrix and this one; 1 where there is no quotient.
     pub(super) fn set_scaling(&mut self, system: LinearSystem) -> Result<(), PetscError> {
-        let mut diagonal = system.matrix.diagonal()?;
-        if !self.factor.is_condensed(system.matrix)? {
-            system.added.iter().copied().flatten().for_each(|&(i, d)| diagonal[i] += d);
-        }
+        let diagonal = system.matrix.diagonal()?;
         let quotient = |(old, new): (&f64, &f64)| if old * new > 0.0 { old / new } else { 1.0 };
         self.scaling.clear();
         self.scaling.extend(self.factor.diagonal().iter().zip(&diagonal).map(quotient));
@@ -50,11 +47,11 @@ impl LinearSolver {
 
     /// z ← P⁻¹E r with 0 on prescribed unknowns; or with those that are chosen, if they are others, and
     /// the changes of them.
-    pub(super) fn apply_factor(
+    pub(super) fn apply_factor<E: From<PetscError>>(
         &mut self,
         system: LinearSystem,
-        choose: Option<Choose>,
-    ) -> Result<Option<Vec<usize>>, PetscError> {
+        choose: Option<Choose<E>>,
+    ) -> Result<Option<Vec<usize>>, E> {
         let (bytes, z) = (self.factor.bytes_per_application(), &mut self.preconditioned);
         let r = &mut self.free_residual;
         if choose.is_some() {
@@ -63,7 +60,7 @@ impl LinearSolver {
         r.write(|r| r.iter_mut().zip(&self.scaling).for_each(|(r, e)| *r *= e))?;
         let apply = || match choose {
             Some(choose) => self.factor.apply_choosing(r, z, choose),
-            None => self.factor.apply(r, z).map(|()| None),
+            None => Ok(self.factor.apply(r, z).map(|()| None)?),
         };
         let chosen = system.book(|booking| booking.triangular_solves, bytes, apply)?;
         if chosen.is_none() {
@@ -72,15 +69,15 @@ impl LinearSolver {
         Ok(chosen)
     }
 
-    /// Flexible conjugate gradients from x and its residual r, with P the factored matrix and K = A + D.
-    /// Until ‖r‖₂ ≤ `limit` on the free unknowns, and at most so many times:
+    /// Flexible conjugate gradients from x and its residual r, with P the factored matrix, until
+    /// ‖r‖₂ ≤ `limit` on the free unknowns, and at most so many times:
     ///
     /// ```text
-    /// z = P⁻¹E r,   β = − zᵀKp / pᵀKp, at first 0,   p ← z + β p,
-    /// α = rᵀp / pᵀKp,   x ← x + α p,   r ← r − α K p.
+    /// z = P⁻¹E r,   β = − zᵀAp / pᵀAp, at first 0,   p ← z + β p,
+    /// α = rᵀp / pᵀAp,   x ← x + α p,   r ← r − α A p.
     /// ```
     ///
-    /// r, z and p are 0 on prescribed unknowns in all of this; K is not positive definite if rᵀp or pᵀKp
+    /// r, z and p are 0 on prescribed unknowns in all of this; A is not positive definite if rᵀp or pᵀAp
     /// is not positive. The first z may be there already (`preconditioned`).
     pub(super) fn iterate(
         &mut self,
@@ -97,7 +94,7 @@ impl LinearSolver {
             }
             report.iterations += 1;
             if !take(&mut preconditioned) {
-                self.apply_factor(system, None)?;
+                self.apply_factor::<PetscError>(system, None)?;
             }
             let conjugate = |last: f64| Ok(-self.image.dot(&self.preconditioned)? / last);
             let beta = stiffness.map_or(Ok(0.0), conjugate)?;

@@ -9,7 +9,8 @@ use crate::{
     contact::{Bound, ContactError, ContactProblem, Kkt, elastic::ElasticSolver},
     petsc::{PetscError, Session, Vector},
 };
-use pivoting::{AtBounds, Pivoting, constrain_rigid_motions, pivot_condensed};
+pub(super) use pivoting::{AtBounds, support};
+use pivoting::{Pivoting, constrain_rigid_motions, pivot_condensed};
 
 pub(super) const ENTRY: SolverEntry = SolverEntry {
     name: "active-set",
@@ -37,8 +38,17 @@ pub(super) struct ActiveSet<'s> {
     /// Of each bound the sign of its contact force: 1 at the upper bound, −1 at the lower one, 0
     /// where neither is active.
     active: Vec<f64>,
-    elastic: ElasticSolver<'s>,
+    pub(super) elastic: ElasticSolver<'s>,
 }
+
+/// Replaces the active set by that of the condensed problem, whose last solve must be with it, given the
+/// displacements at the start of the solve. Collective.
+pub(super) type Chooser<'a> = &'a mut dyn FnMut(
+    &mut Vec<f64>,
+    &AtBounds,
+    &mut Condensed,
+    &mut ContactReport,
+) -> Result<(), ContactError>;
 
 impl<'s> ActiveSet<'s> {
     /// Called `name`: the set of a problem without bounds is empty, and its first solve the last.
@@ -49,11 +59,8 @@ impl<'s> ActiveSet<'s> {
     /// The set to begin with: the last one, or the bounds that the start reaches.
     fn first_guess(&mut self, problem: &ContactProblem, c: &Vector) -> Result<(), PetscError> {
         if self.active.len() != problem.bounds.len() {
-            let reached = |bound: &Bound, c: f64| {
-                if c >= bound.upper { 1.0 } else { -f64::from(c <= bound.lower) }
-            };
             let c = problem.at_bounds(c)?;
-            self.active = problem.bounds.iter().zip(c).map(|(b, c)| reached(b, c)).collect();
+            self.active = problem.bounds.iter().zip(c).map(|(b, c)| b.side(c)).collect();
         }
         // A lower bound may have been one for the last problem only.
         for (side, bound) in self.active.iter_mut().zip(problem.bounds) {
@@ -68,13 +75,13 @@ impl<'s> ActiveSet<'s> {
         Ok(())
     }
 
-    /// Minimises with the active unknowns at their bounds and no other bound; with `choose` the active set
-    /// is first chosen anew.
+    /// Minimises with the active unknowns at their bounds and no other bound; with a chooser the active set
+    /// is first chosen anew where the factor is condensed.
     fn solve_equality(
         &mut self,
         problem: &ContactProblem,
         c: &mut Vector,
-        choose: bool,
+        chooser: Option<Chooser>,
         report: &mut ContactReport,
     ) -> Result<AtBounds, ContactError> {
         let Self { active, elastic } = self;
@@ -86,14 +93,18 @@ impl<'s> ActiveSet<'s> {
         let prescribed = (problem.bound_count() > 0).then_some(&prescribed[..]);
         let system = LinearSystem { prescribed, ..problem.system() };
         let start = AtBounds::new(problem, c, Vec::new())?;
-        let mut fallbacks = 0;
-        let mut pivot = |condensed: &mut Condensed| {
-            pivot_condensed(problem, active, &start, condensed, &mut fallbacks)
-        };
-        let choose: Option<Choose> = if choose { Some(&mut pivot) } else { None };
+        let (first, mut chosen) = (active.clone(), *report);
+        let mut choose = chooser.map(|chooser| {
+            |condensed: &mut Condensed| {
+                chooser(active, &start, condensed, &mut chosen)?;
+                Ok(problem.comm.any(*active != first).then(|| start.changes(problem, active)))
+            }
+        });
+        let choose = choose.as_mut().map(|choose| choose as Choose<ContactError>);
         let load = (problem.load, problem.linear_residual());
         elastic.solve(problem.bounds, system, load, c, choose, report)?;
-        report.fallbacks += fallbacks;
+        let ContactReport { linear_iterations, factorisations, .. } = *report;
+        *report = ContactReport { linear_iterations, factorisations, ..chosen };
         let at_bounds = |p: &[f64]| problem.bounds.iter().map(|bound| p[bound.dof]).collect();
         Ok(AtBounds::new(problem, c, elastic.forces(at_bounds)?)?)
     }
@@ -125,12 +136,28 @@ impl ContactSolver for ActiveSet<'_> {
         problem: &ContactProblem,
         c: &mut Vector,
     ) -> Result<ContactReport, ContactError> {
+        self.solve_by(problem, c, &mut |active, start, condensed, report| {
+            Ok(pivot_condensed(problem, active, start, condensed, &mut report.fallbacks)?)
+        })
+    }
+}
+
+impl ActiveSet<'_> {
+    /// Solves with the active set that `chooser` finds in the condensed problem, pivoting on where K shows
+    /// that another is needed.
+    pub(super) fn solve_by(
+        &mut self,
+        problem: &ContactProblem,
+        c: &mut Vector,
+        chooser: Chooser,
+    ) -> Result<ContactReport, ContactError> {
         let mut report = ContactReport::default();
         let mut pivoting = Pivoting::new(problem);
         self.first_guess(problem, c)?;
         for _ in 0..pivoting.limit() {
             report.iterations += 1;
-            let answer = self.solve_equality(problem, c, pivoting.is_fast(), &mut report)?;
+            let chooser: Option<Chooser> = if pivoting.is_fast() { Some(chooser) } else { None };
+            let answer = self.solve_equality(problem, c, chooser, &mut report)?;
             if !pivoting.pivot(&mut self.active, &answer, &mut report.fallbacks)? {
                 return Ok(report);
             }

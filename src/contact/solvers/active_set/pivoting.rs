@@ -7,13 +7,13 @@ use crate::{
 };
 
 /// The answer for a guess of the active set, at the bounds of this rank.
-pub(super) struct AtBounds {
+pub(in super::super) struct AtBounds {
     /// c, m.
-    c: Vec<f64>,
+    pub(in super::super) c: Vec<f64>,
     /// p, N.
     p: Vec<f64>,
     /// The largest displacement of the body, m.
-    displacement: f64,
+    pub(in super::super) displacement: f64,
 }
 
 impl AtBounds {
@@ -25,6 +25,16 @@ impl AtBounds {
     ) -> Result<Self, PetscError> {
         let displacement = problem.max_norm(c)?;
         Ok(Self { c: problem.at_bounds(c)?, p, displacement })
+    }
+
+    /// By how much each active unknown changes to its bound; `None` for the others.
+    pub(in super::super) fn changes(
+        &self,
+        problem: &ContactProblem,
+        active: &[f64],
+    ) -> Vec<Option<f64>> {
+        let sides = problem.bounds.iter().zip(active).zip(&self.c);
+        sides.map(|((bound, side), c)| Some(bound.at(*side)? - c)).collect()
     }
 }
 
@@ -112,12 +122,7 @@ impl<'p> Pivoting<'p> {
         };
         let old = active.to_vec();
         chosen.iter().for_each(|one| active[one.index] = one.side);
-        if !constrain_rigid_motions(problem, active, &answer.c) {
-            // No index leaves the active set: only open ones join it.
-            for (new, old) in active.iter_mut().zip(&old) {
-                *new = if *new == 0.0 { *old } else { *new };
-            }
-        }
+        support(problem, active, &old, &answer.c);
         Ok(problem.comm.any(*active != old[..]))
     }
 
@@ -146,21 +151,16 @@ impl<'p> Pivoting<'p> {
 }
 
 /// Pivots in the problem of the bounded unknowns alone, from `start`, with the active set at its bounds,
-/// until that is admissible there; the changes of the active unknowns if the set is then another.
-/// Collective.
+/// until that is admissible there. Collective.
 pub(super) fn pivot_condensed(
     problem: &ContactProblem,
     active: &mut Vec<f64>,
     start: &AtBounds,
     condensed: &mut Condensed,
     fallbacks: &mut usize,
-) -> Result<Option<Vec<Option<f64>>>, PetscError> {
-    let changes = |active: &[f64]| -> Vec<Option<f64>> {
-        let sides = problem.bounds.iter().zip(active).zip(&start.c);
-        sides.map(|((bound, side), c)| Some(bound.at(*side)? - c)).collect()
-    };
-    let (first, mut pivoting) = (active.clone(), Pivoting::new(problem));
-    let mut best = first.clone();
+) -> Result<(), PetscError> {
+    let changes = |active: &[f64]| start.changes(problem, active);
+    let (mut best, mut pivoting) = (active.clone(), Pivoting::new(problem));
     for _ in 0..pivoting.limit() {
         let Some([x, p]) = condensed.solve(&changes(active))? else { break };
         best.clone_from(active);
@@ -174,7 +174,22 @@ pub(super) fn pivot_condensed(
         active.clone_from(&best);
         condensed.solve(&changes(active))?;
     }
-    Ok(problem.comm.any(*active != first).then(|| changes(active)))
+    Ok(())
+}
+
+/// As [`constrain_rigid_motions`]; where it finds no bound, no index leaves the `old` active set, which open
+/// ones only join.
+pub(in super::super) fn support(
+    problem: &ContactProblem,
+    active: &mut [f64],
+    old: &[f64],
+    c: &[f64],
+) {
+    if !constrain_rigid_motions(problem, active, c) {
+        for (new, old) in active.iter_mut().zip(old) {
+            *new = if *new == 0.0 { *old } else { *new };
+        }
+    }
 }
 
 /// Where the active set leaves a rigid motion unconstrained: lets the body move as the load drives it,
