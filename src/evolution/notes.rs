@@ -88,8 +88,7 @@ impl Outcome {
         }
         if self.fallbacks > 0 {
             let steps = counted(self.fallbacks);
-            notes
-                .push(format!("in {steps} the contact solver left its fast path (block pivoting)"));
+            notes.push(format!("in {steps} the contact solver left its fast path"));
         }
         if self.undone > 0 {
             notes.push(format!("{} steps were undone and tried again, shorter", self.undone));
