@@ -9,8 +9,9 @@ use crate::{
     archive::{Archive, ArchiveError},
     cholesky::{Condensed, Factor, LinearSystem},
     contact::{Bound, ContactError, ContactProblem, Kkt},
-    petsc::{PetscError, Vector},
+    petsc::{Matrix, Session, Vector},
 };
+use nalgebra::{DMatrix, DVector};
 use serde::Deserialize;
 
 pub(super) const ENTRY: SolverEntry = SolverEntry {
@@ -19,10 +20,22 @@ pub(super) const ENTRY: SolverEntry = SolverEntry {
     variants: &[],
     rescuer: Some("active-set"),
     construct: |session, _, options| {
+        let options = options.penalty_duality;
+        let fixed_point = FixedPoint { options, omega: options.omega };
         let contact = ActiveSet::new(session, ENTRY.name);
-        Box::new(PenaltyDuality { options: options.penalty_duality, contact })
+        Box::new(PenaltyDuality { session, fixed_point, contact })
     },
 };
+
+/// With a condensed factor, of K at an earlier ζ, the [`FixedPoint`] is found in the small problem that is
+/// left for the bounded unknowns when all others are eliminated. The bounds that it is at are prescribed,
+/// and K decides as for the active set whether that is right: where it is not, the fixed point is
+/// found anew from there. Otherwise every iteration solves with K itself, and its last u is the answer.
+struct PenaltyDuality<'s> {
+    session: &'s Session,
+    fixed_point: FixedPoint,
+    contact: ActiveSet<'s>,
+}
 
 /// With G = ∂I₍ₗ,ᵤ₎ of the bounds l ≤ Bu ≤ u (mostly l = −∞, u = g) and its Yosida approximation
 /// the contact law becomes a fixed point in q:
@@ -33,19 +46,14 @@ pub(super) const ENTRY: SolverEntry = SolverEntry {
 /// B picks the bounded unknowns, W their tributary lengths; p = q + ω Bu is the contact pressure
 /// at the fixed point, which gives the first q from the start u. [`Anderson`] mixes the iterates:
 /// measured on this project's scenes, 11 to 30 iterations instead of 200 to 600.
-///
-/// With a condensed factor, of K at an earlier ζ, the fixed point is that of the small problem that is left
-/// for the bounded unknowns when all others are eliminated. It tells the active set; the displacements are
-/// then those of K with that set at its bounds, as for [`ActiveSet`], whose pivoting goes on from there, to
-/// another fixed point, where K finds the set wrong. Otherwise step 1 is a solve with K itself, and its last
-/// u the answer.
-struct PenaltyDuality<'s> {
+struct FixedPoint {
     options: PenaltyOptions,
-    contact: ActiveSet<'s>,
+    /// ω, Pa/m, once estimated.
+    omega: Option<f64>,
 }
 
-/// Step 1: Bu for q.
-type Response<'a> = &'a mut dyn FnMut(&[f64]) -> Result<Vec<f64>, ContactError>;
+/// Step 1: Bu for ω and q.
+type Response<'a> = &'a mut dyn FnMut(f64, &[f64]) -> Result<Vec<f64>, ContactError>;
 
 /// ω√(s_min s_max), with s the extreme eigenvalues of the boundary compliance: measured best.
 const OMEGA_COMPLIANCE: f64 = 3.0;
@@ -53,6 +61,8 @@ const OMEGA_COMPLIANCE: f64 = 3.0;
 const DIVERGED: f64 = 1e12;
 /// The part of a change of pressure, −ωx for the displacements x, that a factor in single precision may err by.
 const CONDENSED: f64 = 1e-6;
+/// Steps of the Lanczos process that estimates the compliance.
+const LANCZOS: usize = 25;
 
 /// The method's parameters, `[contact.penalty_duality]` of a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -76,30 +86,30 @@ impl Default for PenaltyOptions {
     }
 }
 
-impl PenaltyOptions {
+impl FixedPoint {
     /// Iterates from the contact forces p and Bu until a part `exact` of the load, of Bu, at most is missing
     /// to the contact law; Bu and the sides of the bounds that y is at then.
     fn find(
         &self,
         problem: &ContactProblem,
+        omega: f64,
         [p, start]: [Vec<f64>; 2],
         exact: &dyn Fn(&[f64]) -> f64,
         respond: Response,
         report: &mut ContactReport,
     ) -> Result<[Vec<f64>; 2], ContactError> {
-        let omega = self.omega(problem);
         report.omega = Some(omega);
         let lengths = || problem.bounds.iter().map(|bound| bound.tributary_length);
         let start = p.iter().zip(&start).zip(lengths());
         let mut q: Vec<f64> = start.map(|((p, u), w)| p / w - omega * u).collect();
         let mut anderson = Anderson::new(problem.comm, lengths());
         let (mut first, mut missed, mut steps) = (None, f64::NAN, 0.0);
-        while report.iterations < self.iterations {
+        while report.iterations < self.options.iterations {
             report.iterations += 1;
-            let normal = respond(&q)?;
-            let (image, sides) = self.image(problem, &q, &normal);
+            let normal = respond(omega, &q)?;
+            let (image, sides) = self.image(problem, omega, &q, &normal);
             let change: Vec<f64> = image.iter().zip(&q).map(|(image, q)| image - q).collect();
-            missed = self.lambda_omega * of_load(problem, &change);
+            missed = self.options.lambda_omega * of_load(problem, &change);
             if missed <= exact(&normal) {
                 return Ok([normal, sides]);
             }
@@ -111,7 +121,7 @@ impl PenaltyOptions {
             if !missed.is_finite() || missed > DIVERGED * first.max(1.0) {
                 break;
             }
-            q = if self.accelerate { anderson.next(&q, image) } else { image };
+            q = if self.options.accelerate { anderson.next(&q, image) } else { image };
         }
         let tolerance = problem.tolerance;
         let detail = format!(
@@ -122,21 +132,27 @@ impl PenaltyOptions {
         Err(ContactError::stopped(ENTRY.name, *report, Kkt::UNKNOWN, detail))
     }
 
-    /// ω, or 3/√(s_min s_max) with about the compliances (displacement per pressure) of the length of one
-    /// node and of Γ_C, in a body about as high as wide: s_min = |Γ_C|/nk, s_max = |Γ_C|/k, k the size of K.
-    fn omega(&self, problem: &ContactProblem) -> f64 {
-        let stiffness = problem.stiffness_scale * (problem.bound_count() as f64).sqrt();
-        let length = problem.bounds.iter().map(|bound| bound.tributary_length).sum();
-        let estimated = OMEGA_COMPLIANCE * stiffness / problem.comm.total(length);
-        self.omega.unwrap_or(estimated)
+    /// ω, estimated in the first solve.
+    fn omega(&mut self, problem: &ContactProblem, respond: Response) -> Result<f64, ContactError> {
+        let omega = match self.omega {
+            Some(omega) => omega,
+            None => estimate_omega(problem, respond)?,
+        };
+        Ok(*self.omega.insert(omega))
     }
 
     /// Step 2: the next q and the sides of the bounds that y is at, where Bu is `normal`.
-    fn image(&self, problem: &ContactProblem, q: &[f64], normal: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        let lambda = self.lambda_omega / self.omega(problem);
+    fn image(
+        &self,
+        problem: &ContactProblem,
+        omega: f64,
+        q: &[f64],
+        normal: &[f64],
+    ) -> (Vec<f64>, Vec<f64>) {
+        let lambda = self.options.lambda_omega / omega;
         let image = |((q, u), bound): ((&f64, &f64), &Bound)| {
             let r = u + lambda * q;
-            let free = r / (1.0 - self.lambda_omega);
+            let free = r / (1.0 - self.options.lambda_omega);
             ((r - bound.nearest(free)) / lambda, bound.side(free))
         };
         q.iter().zip(normal).zip(problem.bounds).map(image).unzip()
@@ -144,7 +160,7 @@ impl PenaltyOptions {
 
     /// The active set at the fixed point in the condensed problem, from the answer for the present one.
     fn choose(
-        &self,
+        &mut self,
         problem: &ContactProblem,
         active: &mut Vec<f64>,
         start: &AtBounds,
@@ -153,26 +169,26 @@ impl PenaltyOptions {
     ) -> Result<(), ContactError> {
         // A solve counts by the iterations of its fixed point.
         report.iterations -= 1;
-        let omega = self.omega(problem);
         let indefinite = || ContactError::NotDefinite { method: ENTRY.name };
         let moved = |x: Vec<f64>| start.c.iter().zip(x).map(|(c, x)| c + x).collect();
         let answer = condensed.solve(&start.changes(problem, active))?;
         let [x, p] = answer.ok_or_else(indefinite)?;
         // The condensed unknowns are x = Bu − Bc: (S + ωW) x = b − W (q + ω Bc).
-        let mut respond = |q: &[f64]| {
+        let mut respond = |omega: f64, q: &[f64]| {
             let added = problem.bounds.iter().map(|bound| omega * bound.tributary_length);
             let forces = problem.bounds.iter().zip(q).zip(&start.c);
             let forces = forces.map(|((bound, q), c)| bound.tributary_length * (q + omega * c));
             let x = condensed.solve_penalised(added, &forces.collect::<Vec<_>>())?;
             Ok(moved(x.ok_or_else(indefinite)?))
         };
+        let omega = self.omega(problem, &mut respond)?;
         let exact = |normal: &[f64]| {
             let pressures = normal.iter().zip(&start.c).map(|(u, c)| omega * (u - c));
             let rounding = CONDENSED * of_load(problem, &pressures.collect::<Vec<_>>());
             rounding.max(0.1 * problem.tolerance)
         };
-        let loads = [p, moved(x)];
-        let [normal, sides] = self.find(problem, loads, &exact, &mut respond, report)?;
+        let [normal, sides] =
+            self.find(problem, omega, [p, moved(x)], &exact, &mut respond, report)?;
         let old = std::mem::replace(active, sides);
         support(problem, active, &old, &normal);
         condensed.solve(&start.changes(problem, active))?;
@@ -187,33 +203,95 @@ impl PenaltyDuality<'_> {
         problem: &ContactProblem,
         c: &mut Vector,
     ) -> Result<ContactReport, ContactError> {
-        let Self { options, contact } = self;
-        let session = contact.elastic.session;
-        let lengths = || problem.bounds.iter().map(|bound| bound.tributary_length);
-        let at_bounds = |values: Vec<f64>| -> Result<Vector, PetscError> {
-            let mut vector = Vector::zeros(session, problem.load.owned())?;
-            vector.write(|v| problem.bounds.iter().zip(values).for_each(|(b, w)| v[b.dof] = w))?;
-            Ok(vector)
-        };
-        let mut matrix = problem.stiffness.duplicate()?;
-        let omega = options.omega(problem);
-        matrix.add_diagonal(&at_bounds(lengths().map(|w| omega * w).collect())?)?;
+        let Self { session, fixed_point, contact } = self;
         let p = problem.at_bounds(&problem.residual(session, c)?)?;
         let start = [p.into_iter().map(|p| -p).collect(), problem.at_bounds(c)?];
-        let mut linear = ContactReport::default();
-        let mut respond = |q: &[f64]| {
-            let mut rhs = at_bounds(q.iter().zip(lengths()).map(|(q, w)| -w * q).collect())?;
+        let (mut report, mut linear) = <(ContactReport, ContactReport)>::default();
+        let mut penalised: Option<(f64, Matrix)> = None;
+        let mut respond = |omega: f64, q: &[f64]| {
+            let at_bounds = |value: &dyn Fn(usize, f64) -> f64| {
+                let mut vector = Vector::zeros(session, c.owned())?;
+                vector.write(|v| {
+                    for (i, bound) in problem.bounds.iter().enumerate() {
+                        v[bound.dof] = value(i, bound.tributary_length);
+                    }
+                })?;
+                Ok::<_, ContactError>(vector)
+            };
+            let matrix = match &mut penalised {
+                Some((of, matrix)) if *of == omega => matrix,
+                other => {
+                    let mut matrix = problem.stiffness.duplicate()?;
+                    matrix.add_diagonal(&at_bounds(&|_, w| omega * w)?)?;
+                    &mut other.insert((omega, matrix)).1
+                }
+            };
+            let mut rhs = at_bounds(&|i, w| -w * q[i])?;
             rhs.axpby(1.0, problem.load, 1.0)?;
-            let system = LinearSystem { matrix: &matrix, ..problem.system() };
+            let system = LinearSystem { matrix, ..problem.system() };
             let load = (&rhs, problem.linear_residual());
             contact.elastic.solve(problem.bounds, system, load, c, None, &mut linear)?;
             Ok(problem.at_bounds(c)?)
         };
-        let mut report = ContactReport::default();
-        options.find(problem, start, &|_| 0.1 * problem.tolerance, &mut respond, &mut report)?;
+        let omega = fixed_point.omega(problem, &mut respond)?;
+        let exact = |_: &[f64]| 0.1 * problem.tolerance;
+        fixed_point.find(problem, omega, start, &exact, &mut respond, &mut report)?;
         let ContactReport { linear_iterations, factorisations, .. } = linear;
         Ok(ContactReport { linear_iterations, factorisations, ..report })
     }
+}
+
+/// ω = 3/√(s_min s_max) from the extreme eigenvalues of the compliance S = B K⁻¹BᵀW (normal displacement
+/// per pressure), by the eigenvalues θ = s/(1 + ωs) of [`penalised_compliance`] for a trial ω: K may be
+/// singular.
+fn estimate_omega(problem: &ContactProblem, respond: Response) -> Result<f64, ContactError> {
+    let trial = problem.stiffness_scale / contact_length(problem);
+    let eigenvalues = penalised_compliance(problem, trial, respond)?.symmetric_eigenvalues();
+    let compliance = |theta: f64| theta / (1.0 - trial * theta);
+    // Rigid motions that contact alone constrains have s = ∞ and do not count.
+    let finite = || eigenvalues.iter().filter(|theta| 1.0 - trial * **theta > 1e-6);
+    let least = compliance(finite().copied().fold(f64::INFINITY, f64::min));
+    let most = compliance(finite().copied().fold(0.0, f64::max));
+    let omega = OMEGA_COMPLIANCE / (least * most).sqrt();
+    Ok(if omega.is_finite() && omega > 0.0 { omega } else { trial })
+}
+
+/// W^½ B (K + ω BᵀWB)⁻¹ BᵀW^½ on an orthonormal basis of a Krylov space (the Lanczos process,
+/// reorthogonalised twice: Golub and Van Loan, Matrix Computations, ch. 10).
+fn penalised_compliance(
+    problem: &ContactProblem,
+    omega: f64,
+    respond: Response,
+) -> Result<DMatrix<f64>, ContactError> {
+    let weights = problem.bounds.iter().map(|bound| bound.tributary_length.sqrt());
+    let weights = DVector::from_iterator(problem.bounds.len(), weights);
+    let unit = problem.scales.force / contact_length(problem);
+    let unpressed = DVector::from_vec(respond(omega, &vec![0.0; weights.len()])?);
+    // A start with all frequencies in it: smooth plus alternating.
+    let start =
+        |i: usize| 1.0 + 0.3 * (i as f64).sin() + if i.is_multiple_of(2) { 1.0 } else { -1.0 };
+    let mut v = DVector::from_fn(weights.len(), |i, _| start(i) * weights[i]);
+    let (mut basis, mut images) = (Vec::<DVector<f64>>::new(), Vec::<DVector<f64>>::new());
+    for _ in 0..LANCZOS.min(problem.bound_count()) {
+        let norm = |v: &DVector<f64>| problem.comm.total(v.norm_squared()).sqrt();
+        let length = norm(&v);
+        for earlier in basis.iter().chain(&basis) {
+            v.axpy(-problem.comm.total(v.dot(earlier)), earlier, 1.0);
+        }
+        let left = norm(&v);
+        if left <= 1e-10 * length {
+            break;
+        }
+        v /= left;
+        let pressed =
+            DVector::from_vec(respond(omega, (&v * unit).component_div(&weights).as_slice())?);
+        let image = (&unpressed - pressed).component_mul(&weights) / unit;
+        basis.push(std::mem::replace(&mut v, image.clone()));
+        images.push(image);
+    }
+    let mut matrix = DMatrix::from_fn(basis.len(), basis.len(), |i, j| basis[i].dot(&images[j]));
+    problem.comm.sum(matrix.as_mut_slice());
+    Ok(matrix)
 }
 
 impl ContactSolver for PenaltyDuality<'_> {
@@ -230,6 +308,7 @@ impl ContactSolver for PenaltyDuality<'_> {
     }
 
     fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
+        archive.value(&mut self.fixed_point.omega)?;
         self.contact.archive(archive)
     }
 
@@ -245,11 +324,16 @@ impl ContactSolver for PenaltyDuality<'_> {
         if !self.contact.elastic.is_condensed(problem)? {
             return self.solve_whole(problem, c);
         }
-        let Self { options, contact } = self;
+        let Self { fixed_point, contact, .. } = self;
         contact.solve_by(problem, c, &mut |active, start, condensed, report| {
-            options.choose(problem, active, start, condensed, report)
+            fixed_point.choose(problem, active, start, condensed, report)
         })
     }
+}
+
+/// |Γ_C|, m.
+fn contact_length(problem: &ContactProblem) -> f64 {
+    problem.comm.total(problem.bounds.iter().map(|b| b.tributary_length).sum())
 }
 
 /// The forces of these pressures, over F.
