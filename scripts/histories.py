@@ -42,7 +42,8 @@ def draw_force_displacement(results, _limits=None):
     figure, axes = plt.subplots(figsize=(6.4, 3.8))
     for name, force in forces.items():
         if np.nanmax(force) > ROUNDING * largest:
-            axes.plot(history["displacement_max"], force, linewidth=1.6, label=name)
+            axes.plot(history["displacement_max"], force, linewidth=1.6,
+                      label=name.replace("$", r"\$"))
     axes.set_xlim(left=0.0)
     axes.set_ylim(bottom=0.0)
     axes.set_xlabel("largest displacement ({length})".format(**results.units))

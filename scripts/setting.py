@@ -180,7 +180,8 @@ def _write_name(axes, line, name, condition, others, inch):
     place = points[1] + (beyond + AWAY * inch) * normal
     across = "center" if abs(x) < 0.4 else "left" if x > 0.0 else "right"
     upright = "center" if abs(y) < 0.4 else "bottom" if y > 0.0 else "top"
-    axes.text(*place, name, color=_colour(condition), ha=across, va=upright, zorder=5)
+    axes.text(*place, name, color=_colour(condition), ha=across, va=upright, zorder=5,
+              parse_math=False)
     # A letter is about 0.09 inches wide.
     return np.array([place, place + (0.09 * len(name) * inch * np.sign(x) * (abs(x) >= 0.4), 0.0)])
 

@@ -139,17 +139,18 @@ fn check_factors(session: &Session, problem: &DiscreteProblem) -> Result<(), Fai
     })
 }
 
-/// Whether the mesh that is adapted would not take the place of the one that the scene names.
+/// Refuses to write the adapted mesh over one that no run has left.
 fn check_mesh_is_kept(scene: &Scene, folder: &Path) -> Result<(), Failure> {
     let kept = folder.join(output::MESH);
-    match scene.accuracy.is_some() && output::is_same_file(&kept, &scene.mesh.file) {
-        true => Err(Failure::input(format!(
-            "{} is the mesh of the scene, and the adapted mesh would be written over it; choose another \
-             folder with --out",
-            kept.display()
-        ))),
-        false => Ok(()),
-    }
+    let whose = match scene.accuracy {
+        Some(_) if output::is_same_file(&kept, &scene.mesh.file) => "is the mesh of the scene",
+        Some(_) if kept.exists() && !output::is_adapted(&kept) => "was left there by no run",
+        _ => return Ok(()),
+    };
+    Err(Failure::input(format!(
+        "{} {whose}, and the adapted mesh would be written over it; choose another folder with --out",
+        kept.display()
+    )))
 }
 
 /// `signorini run SCENE`, on as many ranks as `mpiexec` has started, or are asked for, or pay.

@@ -14,10 +14,18 @@ use std::collections::{BTreeMap, BTreeSet};
 pub struct Supports {
     /// Their names, in the order of the scene.
     pub names: Vec<String>,
-    /// Of each node with a prescribed displacement the first boundary that prescribes it.
-    prescribed: BTreeMap<usize, usize>,
+    /// Of each node with a prescribed displacement the boundaries that prescribe it.
+    prescribed: BTreeMap<usize, Vec<Prescribed>>,
     /// Where each node of Γ_C lies, once for each edge of Γ_C that it belongs to.
     contact: BTreeMap<usize, Vec<Place>>,
+}
+
+/// A boundary that prescribes the displacement of a node.
+#[derive(Debug, Clone, Copy)]
+struct Prescribed {
+    boundary: usize,
+    /// The unit vector of the component that it prescribes; `None`: both.
+    direction: Option<[f64; 2]>,
 }
 
 /// Where a node of Γ_C lies.
@@ -68,17 +76,25 @@ impl Supports {
             let edges = body.edges(&curve.edges);
             let number = supports.names.len();
             let is_prescribed =
-                |of: &Condition| matches!(of, Condition::Displacement(_) | Condition::Symmetry);
-            let prescribed = boundary.conditions.iter().any(is_prescribed);
-            if prescribed {
-                for node in edges.iter().flat_map(|edge| edge.ends.into_iter().chain(edge.middle)) {
-                    supports.prescribed.entry(node).or_insert(number);
+                |of: &&Condition| matches!(of, Condition::Displacement(_) | Condition::Symmetry);
+            let prescribed = boundary.conditions.iter().find(is_prescribed);
+            for (node, face) in edges.iter().flat_map(|edge| edge.faces(&body.nodes.points)) {
+                let direction = match prescribed {
+                    Some(Condition::Symmetry) => Some(face.normal),
+                    Some(Condition::Displacement([Some(_), None])) => Some([1.0, 0.0]),
+                    Some(Condition::Displacement([None, Some(_)])) => Some([0.0, 1.0]),
+                    Some(_) => None,
+                    None => break,
+                };
+                let of_node = supports.prescribed.entry(node).or_default();
+                if of_node.last().is_none_or(|last| last.boundary != number) {
+                    of_node.push(Prescribed { boundary: number, direction });
                 }
             }
             if boundary.gap().is_some() {
                 supports.add_contact(number, body, &edges);
             }
-            if prescribed || boundary.gap().is_some() {
+            if prescribed.is_some() || boundary.gap().is_some() {
                 supports.names.push(boundary.name.clone());
             }
         }
@@ -113,10 +129,10 @@ impl Supports {
     /// The supports at the nodes that a rank owns.
     pub(super) fn restrict(&self, subdomain: &Subdomain) -> Self {
         let own = |node: &usize| subdomain.owned(*node);
-        let contact = self.contact.iter();
+        let (prescribed, contact) = (self.prescribed.iter(), self.contact.iter());
         Self {
             names: self.names.clone(),
-            prescribed: self.prescribed.iter().filter_map(|(n, of)| Some((own(n)?, *of))).collect(),
+            prescribed: prescribed.filter_map(|(n, of)| Some((own(n)?, of.clone()))).collect(),
             contact: contact.filter_map(|(n, of)| Some((own(n)?, of.clone()))).collect(),
         }
     }
@@ -133,7 +149,7 @@ impl Supports {
     /// Of each boundary F = Σ R_i, N per metre of thickness, and M = Σ x_i × R_i about the origin,
     /// positive anticlockwise, N; (F_x, F_y, M) in turn, this rank's part. R_i = (Ku − f)_i is the force
     /// on the body at node i, with f − Ku `unbalanced`; of a node where displacements are prescribed
-    /// and a gap is closed the obstacle has its normal reactions, and the other boundary the rest.
+    /// and a gap is closed the obstacle has its normal reactions, and the other boundaries the rest.
     pub(super) fn resultants(
         &self,
         body: &Body,
@@ -157,7 +173,10 @@ impl Supports {
                 (*x, *y) = (*x - force[0], *y - force[1]);
             }
         }
-        rest.iter().for_each(|(node, force)| add(self.prescribed[node], *node, *force));
+        for (node, force) in rest {
+            let parts = parts(&self.prescribed[&node], force);
+            parts.into_iter().for_each(|(boundary, part)| add(boundary, node, part));
+        }
         sums
     }
 
@@ -195,6 +214,26 @@ impl Supports {
                 }
             })
             .collect()
+    }
+}
+
+/// The parts of a force F, N/m, that boundaries exert which prescribe the displacement of a node: F = αd + βe
+/// of two that prescribe the components along d and e; else the whole, if there is one that prescribes both.
+fn parts(prescribed: &[Prescribed], force: [f64; 2]) -> Vec<(usize, [f64; 2])> {
+    /// The sine of the least angle between two directions that are not one.
+    const ONE: f64 = 1e-6;
+    let cross = |[a, b]: [f64; 2], [c, d]: [f64; 2]| a * d - b * c;
+    let first = prescribed.iter().find(|of| of.direction.is_none()).unwrap_or(&prescribed[0]);
+    let other = |d: [f64; 2]| {
+        let directions = prescribed.iter().filter_map(|of| Some((of.boundary, of.direction?)));
+        directions.map(move |(other, e)| (d, other, e)).find(|&(d, _, e)| cross(d, e).abs() > ONE)
+    };
+    match first.direction.and_then(other) {
+        None => vec![(first.boundary, force)],
+        Some((d, other, e)) => {
+            let (along_d, along_e) = (cross(force, e) / cross(d, e), cross(d, force) / cross(d, e));
+            vec![(first.boundary, d.map(|d| along_d * d)), (other, e.map(|e| along_e * e))]
+        }
     }
 }
 

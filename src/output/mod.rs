@@ -159,11 +159,16 @@ fn checkpoint(name: &str) -> Option<(usize, usize)> {
 /// A file cannot be removed.
 pub fn prepare(folder: &Path, mesh: &Path) -> Result<(), OutputError> {
     let kept = folder.join(MESH);
-    let is_old = fs::read_to_string(&kept).is_ok_and(|text| text.ends_with(ADAPTED));
-    let old_mesh = if is_old && !is_same_file(&kept, mesh) { MESH } else { "" };
+    let old_mesh = if is_adapted(&kept) && !is_same_file(&kept, mesh) { MESH } else { "" };
     remove(folder, |name| {
         is_result(name) || is_partial(name) || checkpoint(name).is_some() || name == old_mesh
     })
+}
+
+/// Whether a run has left the mesh in `file`.
+#[must_use]
+pub fn is_adapted(file: &Path) -> bool {
+    fs::read_to_string(file).is_ok_and(|text| text.ends_with(ADAPTED))
 }
 
 fn is_result(name: &str) -> bool {

@@ -61,6 +61,30 @@ fn of_uniform_stress_everything_observed_is_exact() {
 }
 
 #[test]
+fn where_supports_meet_each_exerts_what_it_prescribes() {
+    // Uniform σ_yy = −2 between an axis below and a plate above, beside another axis: in whatever order.
+    let boundaries = [
+        "{ name = 'left', symmetry = true }",
+        "{ name = 'bottom', symmetry = true }",
+        "{ name = 'top', displacement = ['free', -0.01] }",
+    ];
+    for [i, j, k] in [[0, 1, 2], [2, 1, 0], [1, 0, 2]] {
+        let text = format!(
+            "material = {{ young = 200, poisson = 0.3, plane = 'stress' }}
+             boundary = [{}, {}, {}]",
+            boundaries[i], boundaries[j], boundaries[k]
+        );
+        let (observed, _) = observed(distorted(6), &text);
+        for (name, force, moment) in [("left", 0.0, 0.0), ("bottom", 2.0, 1.0), ("top", -2.0, -1.0)]
+        {
+            close(observed[&format!("{name}.force_x")], 0.0, 1e-10);
+            close(observed[&format!("{name}.force_y")], force, 1e-10);
+            close(observed[&format!("{name}.moment")], moment, 1e-10);
+        }
+    }
+}
+
+#[test]
 fn supports_balance_the_loads() {
     // A clamp and an obstacle that meet at a corner, curved sides, a body force.
     for order in [1, 2] {
