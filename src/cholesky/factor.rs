@@ -1,15 +1,14 @@
 //! The factor that preconditions a matrix, whatever makes it.
 
+mod method;
 mod shell;
 
-use super::{Choose, Precision, Reduction, RefactorisationPolicy, substructure::Substructure};
+use super::{Choose, Precision, Reduction, RefactorisationPolicy};
 use crate::{
     archive::{Archive, ArchiveError},
-    petsc::{
-        Communicator, Matrix, PetscError, Preconditioner, Session, Vector, has_option,
-        set_default_option,
-    },
+    petsc::{Communicator, Matrix, PetscError, Session, Vector},
 };
+use method::Method;
 
 /// A Cholesky factor: CHOLMOD's with solves of our own, by substructuring where there are several
 /// ranks or contact. On several ranks MUMPS takes its place (PCCHOLESKY) where their interface is too large,
@@ -22,11 +21,11 @@ use crate::{
 pub struct Factor {
     comm: Communicator,
     prefix: String,
-    /// Of the factors of a substructure.
+    /// Of the two factors of a substructure.
     precisions: [Precision; 2],
-    /// The owned unknowns that [`Self::restrict`] is to prescribe, of matrices of so many rows.
+    /// The rows of the matrices to condense, and their owned unknowns that [`Self::restrict`] may prescribe.
     condensed: (usize, Vec<usize>),
-    /// Made with the first matrix of so many rows.
+    /// The rows of the matrices that it is for, and the method, chosen with the first of them.
     method: Option<(usize, Method)>,
     /// `None` before the first factorisation, and after one that failed.
     policy: Option<RefactorisationPolicy>,
@@ -42,31 +41,9 @@ pub struct Factor {
     loaded: bool,
 }
 
-enum Method {
-    Substructure {
-        factor: Box<Substructure>,
-        /// Whether it can be restricted.
-        condensed: bool,
-    },
-    Petsc(Preconditioner),
-}
-
 /// The cost, in iterations, of a factorisation whose work is not known. Measured on square.toml with
 /// n = 64 and 256, on one and two ranks: MUMPS 4 to 10, gamg 13 to 33, CHOLMOD through PETSc 10 to 19.
 const UNKNOWN_COST: f64 = 10.0;
-
-/// Unknowns per root of the rows up to which they are condensed: as many as a dense factor of them takes
-/// the work of the sparse one, in a body about as high as wide. (A strip a hundred times as long as high
-/// with contact along all of it, 6.7 per root and sets that go round in circles: 39 s condensed, 22 s not.)
-const MOST_CONDENSED: f64 = 4.0;
-
-/// PETSC_ERR_MISSING_FACTOR: PETSc has no such package, or not for such a factor.
-const MISSING_FACTOR: i32 = 92;
-
-/// Rows above which several ranks use multigrid: the memory of factors grows faster than the rows.
-/// With 2.1 million on two ranks a step with factors was six times as fast, their set-up four times
-/// as slow, memory 10 % more; what is beyond was not measured.
-const VERY_LARGE: usize = 2_500_000;
 
 impl Factor {
     /// A factor whose PETSc options begin with `prefix` (`-elastic_pc_type …`).
@@ -87,8 +64,8 @@ impl Factor {
     }
 
     /// Makes factors of matrices like this one so that [`Self::restrict`] may prescribe these owned unknowns,
-    /// if there are not too many of them. The same ones on every call, or the factor there is is lost.
-    /// Collective.
+    /// if there are not too many of them. Other unknowns than those of the last call discard the present
+    /// factor. Collective.
     ///
     /// # Errors
     /// PETSc failed.
@@ -136,40 +113,11 @@ impl Factor {
         Ok(())
     }
 
-    /// Whether PETSc options ask for a preconditioner.
-    fn is_asked_for(&self) -> Result<bool, PetscError> {
-        let prefix = &self.prefix;
-        Ok(has_option(&format!("-{prefix}pc_type"))?
-            || has_option(&format!("-{prefix}pc_factor_mat_solver_type"))?)
-    }
-
-    /// Refuses options that PETSc does not know before anything is factorised. Collective.
-    ///
-    /// # Errors
-    /// They ask for what PETSc has not.
-    pub fn check_options(&self, session: &Session) -> Result<(), PetscError> {
-        let preconditioner = match self.comm.any(self.is_asked_for()?) {
-            true => self.preconditioner(true),
-            false => return Ok(()),
-        };
-        if self.comm.any(preconditioner.is_err()) {
-            return preconditioner.map(drop);
-        }
-        // PETSc looks for the package of a factor when it factorises: here an identity.
-        let row = vec![self.comm.rank() as i32];
-        let mut identity = Matrix::with_pattern(session, 1, 1, row.clone(), row)?;
-        identity.set_values(&[1.0])?;
-        match preconditioner?.set_up(&identity) {
-            Err(error) if error.code == MISSING_FACTOR => Err(error),
-            _ => Ok(()),
-        }
-    }
-
     /// Factorises the present values of `matrix`; false if it is not positive definite: then there is
     /// no factor. Where it is condensed a restriction must follow before it is applied. Collective.
     ///
     /// # Errors
-    /// There is no memory for it, or PETSc options ask for what PETSc has not.
+    /// There is no memory for it, or PETSc options ask for what this PETSc does not have.
     pub fn factorise(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
         let (comm, entries) = (self.comm, matrix.entries() as f64);
         let (definite, cost) = match self.method(matrix)? {
@@ -219,56 +167,6 @@ impl Factor {
         }
     }
 
-    /// What factorises matrices of the pattern of this one: chosen with the first of so many rows.
-    fn method(&mut self, matrix: &Matrix) -> Result<&mut Method, PetscError> {
-        let rows = matrix.size()?;
-        let method = match self.method.take() {
-            Some((size, method)) if size == rows => method,
-            _ => self.choose(matrix, rows)?,
-        };
-        Ok(&mut self.method.insert((rows, method)).1)
-    }
-
-    fn choose(&self, matrix: &Matrix, rows: usize) -> Result<Method, PetscError> {
-        let factorised = self.comm.is_serial() || rows < VERY_LARGE;
-        if factorised && !self.is_asked_for()? {
-            let (of_rows, condensed) = &self.condensed;
-            let unknowns = self.comm.count(condensed.len());
-            let few = unknowns > 0 && unknowns as f64 <= MOST_CONDENSED * (rows as f64).sqrt();
-            let pays = few && *of_rows == rows;
-            let choices = [(&condensed[..], true), (&[], false)];
-            for (last, condensed) in choices.into_iter().skip(usize::from(!pays)) {
-                let [precision, of_schur] = self.precisions;
-                // Contact forces are told by a condensed S.
-                let of_schur = if condensed { Precision::Full } else { of_schur };
-                let precisions = [precision, of_schur];
-                if let Some(factor) = Substructure::new(self.comm, matrix, last, precisions)? {
-                    return Ok(Method::Substructure { factor: Box::new(factor), condensed });
-                }
-            }
-        }
-        Ok(Method::Petsc(self.preconditioner(factorised)?))
-    }
-
-    /// What PETSc's options ask for, else PETSc's factor, or multigrid.
-    fn preconditioner(&self, factorised: bool) -> Result<Preconditioner, PetscError> {
-        let (prefix, serial) = (&self.prefix, self.comm.is_serial());
-        // Left to itself CHOLMOD makes LDLᵀ of a small matrix, accepts negative pivots, and prints its
-        // warnings into the results. MUMPS' guess of the memory it needs is now and then too small.
-        let options = match serial {
-            true => {
-                &[("cholmod_final_asis", "0"), ("cholmod_final_ll", "1"), ("cholmod_print", "0")][..]
-            }
-            false => &[("mumps_icntl_14", "100")],
-        };
-        for (option, value) in options {
-            set_default_option(&format!("-{prefix}mat_{option}"), value)?;
-        }
-        let kind = if factorised { c"cholesky" } else { c"gamg" };
-        let package = if serial { c"cholmod" } else { c"mumps" };
-        Preconditioner::new(prefix, kind, package)
-    }
-
     /// Bytes that an application reads on this rank; 0 where unknown.
     pub fn bytes_per_application(&self) -> f64 {
         match &self.method {
@@ -293,8 +191,8 @@ impl Factor {
         }
     }
 
-    /// Makes the factor, where it is condensed, that of these unknowns prescribed; false if there is none
-    /// then. Collective.
+    /// Prescribes these unknowns in the factor, where it is condensed; false if there is no factor then.
+    /// Collective.
     ///
     /// # Errors
     /// There is no memory for it.
@@ -304,8 +202,8 @@ impl Factor {
         Ok(self.exists() && (!condensed || self.restrict(unknowns)?))
     }
 
-    /// As [`Self::apply`] where `choose` chooses what of the condensed unknowns is prescribed: these if
-    /// they are others than before. Collective.
+    /// As [`Self::apply`], but `choose` decides which of the condensed unknowns are prescribed; they are
+    /// returned if they are not the same as before. Collective.
     ///
     /// # Errors
     /// As in [`Self::apply`], or the factor is not condensed, or the choice failed.

@@ -4,7 +4,7 @@
 //! follows, and a [`Header`] before the state of the run. The first rank writes its file when all others
 //! have theirs, and older ones are removed after that: the latest one of the first rank is complete.
 
-use super::{Failure, ranks::agree, run::Task};
+use super::{Failure, ranks::agree, task::Task};
 use serde::{Deserialize, Serialize};
 use signorini::{
     evolution::{Adapted, StepRecord},
@@ -21,7 +21,7 @@ use std::{
 /// What a file begins with.
 const FORMAT: &[u8] = b"signorini checkpoint 1\n";
 
-/// What results hang on bit by bit.
+/// What the results depend on, to the last bit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Origin {
     ranks: usize,
@@ -129,7 +129,7 @@ impl Checkpoint {
         Ok(Self { header, state: state.to_vec() })
     }
 
-    /// Refuses a checkpoint that is none of this run.
+    /// Refuses a checkpoint of another run.
     pub fn check(&self, task: &Task) -> Result<(), Failure> {
         let rank = task.problem.body.nodes.partition.comm().rank();
         let path = path(&task.folder, self.header.step, rank);
@@ -161,7 +161,7 @@ pub fn write(task: &Task, record: &StepRecord, state: &[u8]) -> Result<(), Outpu
         let file = [FORMAT, &hash(&content).to_le_bytes(), &content].concat();
         output::write_synced(&path, &file)
     };
-    // The first rank is the last.
+    // The first rank writes last: its file says that all others are complete.
     let mut written = if comm.is_root() { Ok(()) } else { write() };
     if comm.all(written.is_ok()) && comm.is_root() {
         written = write();

@@ -2,7 +2,6 @@
 
 mod check;
 mod checkpoint;
-mod script;
 mod launch;
 mod new;
 mod profile;
@@ -11,6 +10,8 @@ mod ranks;
 mod recorder;
 mod run;
 mod screen;
+mod script;
+mod task;
 
 pub use check::check;
 pub use new::new;
@@ -60,15 +61,15 @@ impl Failure {
     }
 }
 
-/// What is no matter of the input: a solver missed its tolerance, or results could not be written.
+/// Failures for which the input is not to blame: a solver missed its tolerance, or results could not be written.
 impl<E: fmt::Display> From<E> for Failure {
     fn from(error: E) -> Self {
         Self { code: 1, message: Some(error.to_string()) }
     }
 }
 
-/// Tells the person at the terminal an error, or what else `kind` names. One write holds all of it: what `mpiexec` and other ranks
-/// say meanwhile comes before or after it, never between its words.
+/// Tells the person at the terminal an error, or what else `kind` names, in one write: what `mpiexec` and
+/// other ranks say meanwhile comes before or after it, never between its words.
 pub fn tell(kind: &str, text: &str) {
     // Where nobody can be told any more, the exit code still says it.
     let _ = io::stderr().write_all(format!("{kind}: {text}\n").as_bytes());
@@ -98,7 +99,7 @@ fn check_petsc(options: &[String]) -> Result<(), Failure> {
 /// Where an accuracy is asked for, the first mesh of a `.geo` has about so many triangles along the body.
 const CELLS: f64 = 4.0;
 
-/// Which scene, and what of it is taken otherwise than it is written.
+/// A scene and what overrides parts of it.
 #[derive(Args)]
 pub struct SceneArguments {
     /// Scene file (TOML).

@@ -8,7 +8,9 @@ use super::{
     launch::{self, Ranks},
     ranks::{agree, barrier_or_abort},
     recorder::Recorder,
-    screen, summaries, tell,
+    screen, summaries,
+    task::Task,
+    tell,
 };
 use clap::Args;
 use signorini::{
@@ -22,7 +24,6 @@ use signorini::{
     scene::{Scene, Stepping},
 };
 use std::{
-    fs::File,
     path::{Path, PathBuf},
     time::Instant,
 };
@@ -181,45 +182,15 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         launch::begin_first_rank();
     }
     let task = agree(session.comm(), checked)
-        .and_then(|()| Task::read(arguments, input, &session, &phases, started));
+        .and_then(|()| read(arguments, input, &session, &phases, started));
     let warns = task.is_ok() && session.comm().is_root();
-    let result = task.and_then(|task| task.solve(&session));
+    let result = task.and_then(|(task, restart)| solve(&task, restart, &session));
     let unused = session.unused_options();
     let finalized = session.finalize().map_err(Failure::from);
     if warns && !unused.is_empty() {
         tell("warning", &format!("PETSc options that nothing read: {}", unused.join(" ")));
     }
     result.and(finalized)
-}
-
-/// A run whose input is good.
-pub(super) struct Task<'a> {
-    /// This rank's subdomain of it.
-    pub(super) problem: DiscreteProblem,
-    /// Triangles of the whole body, and its nodes with a gap condition.
-    pub(super) triangles: usize,
-    pub(super) contact_nodes: usize,
-    /// By how much the time at which ζ_* is reached moved from one adapted mesh to the last, s.
-    stop_change: Option<f64>,
-    /// The name of the contact solver.
-    pub(super) solver: String,
-    /// Where the results go.
-    pub(super) folder: PathBuf,
-    /// The scene as it is run, as a file.
-    pub(super) as_run: String,
-    /// What the files of its tables hold.
-    pub(super) tables: Vec<u8>,
-    /// The mesh, where it was adapted.
-    pub(super) adapted: Option<Adapted>,
-    /// Keeps other runs out of the folder.
-    _lock: Option<File>,
-    /// Where the run goes on from.
-    restart: Option<Checkpoint>,
-    pub(super) petsc: &'a [String],
-    /// Whether the closing table has all that was timed.
-    pub(super) profile: bool,
-    pub(super) phases: &'a Phases,
-    pub(super) started: Instant,
 }
 
 /// A run that begins removes the checkpoint of the one before.
@@ -234,88 +205,83 @@ fn warn_of_checkpoint(folder: &Path) {
     }
 }
 
-impl<'a> Task<'a> {
-    /// Reads scene and mesh, unless a single rank has read them: the `input`. Every rank reads both files;
-    /// where the mesh is yet to be made, the first rank makes it. Collective.
-    fn read(
-        arguments: &'a RunArguments,
-        input: Option<Result<(Scene, Mesh), Failure>>,
-        session: &Session,
-        phases: &'a Phases,
-        started: Instant,
-    ) -> Result<Self, Failure> {
-        let comm = session.comm();
-        let load = || phases.time("mesh", || arguments.read());
-        let of_root = agree(comm, input.or_else(|| comm.is_root().then(load)).transpose())?;
-        let (mut scene, mesh) = agree(comm, of_root.map_or_else(load, Ok))?;
-        let solver = scene.contact.solver.clone().unwrap_or(SOLVERS[0].to_owned());
-        let folder = arguments.folder(&scene);
-        let (as_run, tables) = scene.as_run();
-        let tables = tables.to_vec();
-        agree(comm, check_mesh_is_kept(&scene, &folder))?;
-        let restart = arguments.restart.then(|| Checkpoint::read(comm, &folder));
-        let restart = restart.transpose()?.flatten();
-        let made = restart.as_ref().and_then(|checkpoint| checkpoint.header.adapted.clone());
-        let adapt = || adapt(session, &mut scene, &mesh, &solver, made);
-        let adapted = agree(comm, phases.time("adaptation", adapt))?;
-        let mesh = adapted.as_ref().map_or(mesh, |adapted| adapted.mesh.clone());
-        let stop_change = adapted.as_ref().and_then(|adapted| adapted.stop_change);
-        let problem = phases.time("discrete problem", || DiscreteProblem::new(scene, mesh));
-        let problem = agree(comm, problem.map_err(Failure::input))?;
-        let problem = phases.time("partition", || problem.restrict(session));
-        let problem = agree(comm, problem.map_err(Failure::from))?;
-        check_factors(session, &problem)?;
-        let lock = if comm.is_root() { output::lock(&folder) } else { Ok(None) };
-        let lock = agree(comm, lock.map_err(Failure::input))?;
-        if !arguments.restart && comm.is_root() {
-            warn_of_checkpoint(&folder);
-        }
-        Ok(Self {
-            triangles: comm.count(problem.body.own_triangles),
-            contact_nodes: comm.count(contact_nodes(&problem)),
-            problem,
-            stop_change,
-            solver,
-            folder,
-            as_run,
-            tables,
-            adapted,
-            _lock: lock,
-            restart,
-            petsc: &arguments.petsc,
-            profile: arguments.profile,
-            phases,
-            started,
-        })
+/// Reads scene and mesh, unless a single rank has read them: the `input`; and the checkpoint where the run
+/// goes on. Every rank reads the files; where the mesh is yet to be made, the first rank makes it. Collective.
+fn read<'a>(
+    arguments: &'a RunArguments,
+    input: Option<Result<(Scene, Mesh), Failure>>,
+    session: &Session,
+    phases: &'a Phases,
+    started: Instant,
+) -> Result<(Task<'a>, Option<Checkpoint>), Failure> {
+    let comm = session.comm();
+    let load = || phases.time("mesh", || arguments.read());
+    let of_root = agree(comm, input.or_else(|| comm.is_root().then(load)).transpose())?;
+    let (mut scene, mesh) = agree(comm, of_root.map_or_else(load, Ok))?;
+    let solver = scene.contact.solver.clone().unwrap_or(SOLVERS[0].to_owned());
+    let folder = arguments.folder(&scene);
+    let (as_run, tables) = scene.as_run();
+    let tables = tables.to_vec();
+    agree(comm, check_mesh_is_kept(&scene, &folder))?;
+    let restart = arguments.restart.then(|| Checkpoint::read(comm, &folder));
+    let restart = restart.transpose()?.flatten();
+    let made = restart.as_ref().and_then(|checkpoint| checkpoint.header.adapted.clone());
+    let adapt = || adapt(session, &mut scene, &mesh, &solver, made);
+    let adapted = agree(comm, phases.time("adaptation", adapt))?;
+    let mesh = adapted.as_ref().map_or(mesh, |adapted| adapted.mesh.clone());
+    let problem = phases.time("discrete problem", || DiscreteProblem::new(scene, mesh));
+    let problem = agree(comm, problem.map_err(Failure::input))?;
+    let problem = phases.time("partition", || problem.restrict(session));
+    let problem = agree(comm, problem.map_err(Failure::from))?;
+    check_factors(session, &problem)?;
+    let lock = if comm.is_root() { output::lock(&folder) } else { Ok(None) };
+    let lock = agree(comm, lock.map_err(Failure::input))?;
+    if !arguments.restart && comm.is_root() {
+        warn_of_checkpoint(&folder);
     }
+    let task = Task {
+        triangles: comm.count(problem.body.own_triangles),
+        contact_nodes: comm.count(contact_nodes(&problem)),
+        problem,
+        solver,
+        folder,
+        as_run,
+        tables,
+        adapted,
+        _lock: lock,
+        petsc: &arguments.petsc,
+        profile: arguments.profile,
+        phases,
+        started,
+    };
+    Ok((task, restart))
+}
 
-    /// Solves and writes the results. Collective.
-    fn solve(mut self, session: &Session) -> Result<(), Failure> {
-        let comm = session.comm();
-        let restart = self.restart.take();
-        let checked = restart.as_ref().map_or(Ok(()), |checkpoint| checkpoint.check(&self));
-        agree(comm, checked)?;
-        let mut recorder = agree(comm, Recorder::new(&self).map_err(Failure::input))?;
-        let (problem, phases) = (&self.problem, self.phases);
-        recorder.show_restart(restart.as_ref());
-        let saved = restart.map(|checkpoint| checkpoint.state);
-        let mut result =
-            evolution::run_from(session, problem, &self.solver, phases, &mut recorder, saved);
-        if let Ok(Outcome { stopped: Some(stop), .. }) = &mut result {
-            let parts = [stop.from_mesh, self.stop_change].into_iter().flatten();
-            stop.from_mesh = parts.reduce(f64::max);
-        }
-        barrier_or_abort(comm, result.as_ref().err());
-        let written = recorder.finish(&result);
-        let ended = match result {
-            Ok(_) => written.map_err(Failure::from),
-            Err(RunError::OnAnotherRank) => Err(Failure::ON_ANOTHER_RANK),
-            Err(RunError::Interrupted(signal)) => {
-                let message = format!("ended by {signal}; --restart goes on from here");
-                Err(Failure { code: signal.exit_code(), message: Some(message) })
-            }
-            Err(error) => Err(error.into()),
-        };
-        agree(comm, ended)
+/// Solves and writes the results. Collective.
+fn solve(task: &Task, restart: Option<Checkpoint>, session: &Session) -> Result<(), Failure> {
+    let comm = session.comm();
+    let checked = restart.as_ref().map_or(Ok(()), |checkpoint| checkpoint.check(task));
+    agree(comm, checked)?;
+    let mut recorder = agree(comm, Recorder::new(task).map_err(Failure::input))?;
+    let (problem, phases) = (&task.problem, task.phases);
+    recorder.show_restart(restart.as_ref());
+    let saved = restart.map(|checkpoint| checkpoint.state);
+    let mut result =
+        evolution::run_from(session, problem, &task.solver, phases, &mut recorder, saved);
+    if let Ok(Outcome { stopped: Some(stop), .. }) = &mut result {
+        let change = task.adapted.as_ref().and_then(|adapted| adapted.stop_change);
+        stop.from_mesh = [stop.from_mesh, change].into_iter().flatten().reduce(f64::max);
     }
+    barrier_or_abort(comm, result.as_ref().err());
+    let written = recorder.finish(&result);
+    let ended = match result {
+        Ok(_) => written.map_err(Failure::from),
+        Err(RunError::OnAnotherRank) => Err(Failure::ON_ANOTHER_RANK),
+        Err(RunError::Interrupted(signal)) => {
+            let message = format!("ended by {signal}; --restart goes on from here");
+            Err(Failure { code: signal.exit_code(), message: Some(message) })
+        }
+        Err(error) => Err(error.into()),
+    };
+    agree(comm, ended)
 }

@@ -1,6 +1,6 @@
 //! What a run shows: what is to be solved, a progress bar, and the result in a few lines.
 
-use super::{launch, run::Task};
+use super::{launch, task::Task};
 use signorini::{
     evolution::{Adapted, Outcome, StepRecord},
     output::terminal::{Progress, say},

@@ -2,9 +2,8 @@
 
 use super::{
     OutputError, Table,
-    data_array::DataArray,
     growing_file::GrowingFile,
-    vtu::{REAL, cells_text, entry, list_of_frames, vtk_file},
+    vtk::{DataArray, REAL, cells_text, entry, list_of_frames, vtk_file},
     write_whole,
 };
 use crate::{

@@ -9,8 +9,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// A file that grows by whole pieces between a beginning and an ending that is always there; it is there
-/// from the first piece on.
+/// A file that grows by whole pieces between a beginning and an ending, and has both at any time; it is
+/// created with its first piece.
 ///
 /// A piece and the ending behind it are one write over the ending before.
 #[derive(Debug)]

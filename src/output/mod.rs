@@ -3,9 +3,9 @@
 
 mod background;
 mod contact;
-mod data_array;
 mod growing_file;
 pub mod terminal;
+mod vtk;
 mod vtu;
 
 pub use vtu::FieldWriter;

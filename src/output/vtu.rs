@@ -4,8 +4,12 @@
 //! compresses value by value and took 0.9 s for a frame of 66,049 nodes.
 
 use super::{
-    OutputError, background::Background, contact::ContactWriter, data_array::DataArray,
-    growing_file::GrowingFile, write_whole,
+    OutputError,
+    background::Background,
+    contact::ContactWriter,
+    growing_file::GrowingFile,
+    vtk::{DataArray, INTEGER, REAL, cells_text, entry, list_of_frames, vtk_file},
+    write_whole,
 };
 use crate::{
     archive::Archive,
@@ -22,13 +26,6 @@ use std::{
 /// VTK_TRIANGLE and VTK_QUADRATIC_TRIANGLE (the midpoints of the sides 01, 12, 20 follow the vertices).
 const TRIANGLE: u8 = 5;
 const QUADRATIC_TRIANGLE: u8 = 22;
-/// VTK's names of the types of numbers.
-pub(super) const REAL: &str = "Float64";
-const INTEGER: &str = "Int32";
-const BYTE: &str = "UInt8";
-
-/// How a list of frames ends.
-const LIST_END: &str = "</Collection>\n</VTKFile>\n";
 /// Digits of the number of a frame, unless there are many.
 const DIGITS: usize = 4;
 /// Frames may be so many where steps are chosen and the scene says how many of them are written.
@@ -170,17 +167,6 @@ impl Files {
     }
 }
 
-/// A list of frames over time for ParaView, a file from the first frame on.
-pub(super) fn list_of_frames(path: PathBuf) -> GrowingFile {
-    let empty = vtk_file("Collection", "", "");
-    GrowingFile::new(path, empty.trim_end_matches(LIST_END).to_owned(), LIST_END)
-}
-
-/// The entry of a list for the frame in `file` of a time, s.
-pub(super) fn entry(time: f64, file: &str) -> String {
-    format!("<DataSet timestep=\"{time}\" file=\"{file}\"/>\n")
-}
-
 /// Digits that the numbers of all frames have, so that their names sort.
 fn digits(scene: &Scene) -> usize {
     let stepping = scene.time.map(|grid| grid.stepping);
@@ -201,28 +187,6 @@ fn mesh_text(body: &Body) -> io::Result<String> {
             cells_text(&body.nodes.points, &cells.nodes[..own], QUADRATIC_TRIANGLE)
         }
     }
-}
-
-/// The beginning of `<Piece>`, with `<Points>` and `<Cells>` of one kind with N nodes each.
-pub(super) fn cells_text<const N: usize>(
-    points: &[[f64; 2]],
-    cells: &[[usize; N]],
-    kind: u8,
-) -> io::Result<String> {
-    let coordinates = points.iter().flat_map(|&[x, y]| [x, y, 0.0]);
-    let nodes = cells.as_flattened().iter().map(|&node| node as i32);
-    let offsets = (1..=cells.len()).map(|cell| (N * cell) as i32);
-    let types = iter::repeat_n(kind, cells.len());
-    Ok(format!(
-        "<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n\
-         <Points>\n{}</Points>\n<Cells>\n{}{}{}</Cells>\n",
-        points.len(),
-        cells.len(),
-        DataArray::new("Points", REAL, 3, coordinates).element()?,
-        DataArray::new("connectivity", INTEGER, 1, nodes).element()?,
-        DataArray::new("offsets", INTEGER, 1, offsets).element()?,
-        DataArray::new("types", BYTE, 1, types).element()?,
-    ))
 }
 
 /// The nodal fields. Contact pressure is 0 and the remaining gap NaN off Γ_C; where two gap conditions
@@ -288,15 +252,4 @@ fn list_of_pieces(
          <PPoints>\n{coordinates}</PPoints>\n{files}"
     );
     vtk_file("PUnstructuredGrid", " GhostLevel=\"0\"", &pieces)
-}
-
-/// A VTK file whose element `kind` has these `attributes` and a `content` with arrays as [`DataArray`]
-/// encodes them.
-pub(super) fn vtk_file(kind: &str, attributes: &str, content: &str) -> String {
-    format!(
-        "<?xml version=\"1.0\"?>\n\
-         <VTKFile type=\"{kind}\" version=\"1.0\" byte_order=\"LittleEndian\" \
-         header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n\
-         <{kind}{attributes}>\n{content}</{kind}>\n</VTKFile>\n"
-    )
 }

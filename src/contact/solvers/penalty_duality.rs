@@ -1,6 +1,8 @@
 //! The penalty-duality algorithm of Bermúdez and Moreno (Comput. Math. Appl. 7, 1981),
 //! the paper's reference [4].
 
+mod omega;
+
 use super::{
     Anderson, ContactReport, ContactSolver, SolverEntry,
     active_set::{ActiveSet, AtBounds, support},
@@ -11,7 +13,7 @@ use crate::{
     contact::{Bound, ContactError, ContactProblem, Kkt},
     petsc::{Matrix, Session, Vector},
 };
-use nalgebra::{DMatrix, DVector};
+use omega::estimate_omega;
 use serde::Deserialize;
 
 pub(super) const ENTRY: SolverEntry = SolverEntry {
@@ -55,14 +57,12 @@ struct FixedPoint {
 /// Step 1: Bu for ω and q.
 type Response<'a> = &'a mut dyn FnMut(f64, &[f64]) -> Result<Vec<f64>, ContactError>;
 
-/// ω√(s_min s_max), with s the extreme eigenvalues of the boundary compliance: measured best.
-const OMEGA_COMPLIANCE: f64 = 3.0;
-/// A pressure missing this many times as much as at first, and the load, means that the iteration diverges.
+/// The iteration diverges if the contact law is missed by this many times as much as at first, and as the
+/// load.
 const DIVERGED: f64 = 1e12;
-/// The part of a change of pressure, −ωx for the displacements x, that a factor in single precision may err by.
+/// The relative error in a change of pressure, −ωx for the displacements x, that a factor in single
+/// precision may leave.
 const CONDENSED: f64 = 1e-6;
-/// Steps of the Lanczos process that estimates the compliance.
-const LANCZOS: usize = 25;
 
 /// The method's parameters, `[contact.penalty_duality]` of a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -87,8 +87,8 @@ impl Default for PenaltyOptions {
 }
 
 impl FixedPoint {
-    /// Iterates from the contact forces p and Bu until a part `exact` of the load, of Bu, at most is missing
-    /// to the contact law; Bu and the sides of the bounds that y is at then.
+    /// Iterates from the contact forces p and Bu until the contact law is missed by forces of at most
+    /// `exact`(Bu) times the load. Returns Bu and the sides of the bounds that y is at.
     fn find(
         &self,
         problem: &ContactProblem,
@@ -241,59 +241,6 @@ impl PenaltyDuality<'_> {
     }
 }
 
-/// ω = 3/√(s_min s_max) from the extreme eigenvalues of the compliance S = B K⁻¹BᵀW (normal displacement
-/// per pressure), by the eigenvalues θ = s/(1 + ωs) of [`penalised_compliance`] for a trial ω: K may be
-/// singular.
-fn estimate_omega(problem: &ContactProblem, respond: Response) -> Result<f64, ContactError> {
-    let trial = problem.stiffness_scale / contact_length(problem);
-    let eigenvalues = penalised_compliance(problem, trial, respond)?.symmetric_eigenvalues();
-    let compliance = |theta: f64| theta / (1.0 - trial * theta);
-    // Rigid motions that contact alone constrains have s = ∞ and do not count.
-    let finite = || eigenvalues.iter().filter(|theta| 1.0 - trial * **theta > 1e-6);
-    let least = compliance(finite().copied().fold(f64::INFINITY, f64::min));
-    let most = compliance(finite().copied().fold(0.0, f64::max));
-    let omega = OMEGA_COMPLIANCE / (least * most).sqrt();
-    Ok(if omega.is_finite() && omega > 0.0 { omega } else { trial })
-}
-
-/// W^½ B (K + ω BᵀWB)⁻¹ BᵀW^½ on an orthonormal basis of a Krylov space (the Lanczos process,
-/// reorthogonalised twice: Golub and Van Loan, Matrix Computations, ch. 10).
-fn penalised_compliance(
-    problem: &ContactProblem,
-    omega: f64,
-    respond: Response,
-) -> Result<DMatrix<f64>, ContactError> {
-    let weights = problem.bounds.iter().map(|bound| bound.tributary_length.sqrt());
-    let weights = DVector::from_iterator(problem.bounds.len(), weights);
-    let unit = problem.scales.force / contact_length(problem);
-    let unpressed = DVector::from_vec(respond(omega, &vec![0.0; weights.len()])?);
-    // A start with all frequencies in it: smooth plus alternating.
-    let start =
-        |i: usize| 1.0 + 0.3 * (i as f64).sin() + if i.is_multiple_of(2) { 1.0 } else { -1.0 };
-    let mut v = DVector::from_fn(weights.len(), |i, _| start(i) * weights[i]);
-    let (mut basis, mut images) = (Vec::<DVector<f64>>::new(), Vec::<DVector<f64>>::new());
-    for _ in 0..LANCZOS.min(problem.bound_count()) {
-        let norm = |v: &DVector<f64>| problem.comm.total(v.norm_squared()).sqrt();
-        let length = norm(&v);
-        for earlier in basis.iter().chain(&basis) {
-            v.axpy(-problem.comm.total(v.dot(earlier)), earlier, 1.0);
-        }
-        let left = norm(&v);
-        if left <= 1e-10 * length {
-            break;
-        }
-        v /= left;
-        let pressed =
-            DVector::from_vec(respond(omega, (&v * unit).component_div(&weights).as_slice())?);
-        let image = (&unpressed - pressed).component_mul(&weights) / unit;
-        basis.push(std::mem::replace(&mut v, image.clone()));
-        images.push(image);
-    }
-    let mut matrix = DMatrix::from_fn(basis.len(), basis.len(), |i, j| basis[i].dot(&images[j]));
-    problem.comm.sum(matrix.as_mut_slice());
-    Ok(matrix)
-}
-
 impl ContactSolver for PenaltyDuality<'_> {
     fn name(&self) -> &'static str {
         ENTRY.name
@@ -329,11 +276,6 @@ impl ContactSolver for PenaltyDuality<'_> {
             fixed_point.choose(problem, active, start, condensed, report)
         })
     }
-}
-
-/// |Γ_C|, m.
-fn contact_length(problem: &ContactProblem) -> f64 {
-    problem.comm.total(problem.bounds.iter().map(|b| b.tributary_length).sum())
 }
 
 /// The forces of these pressures, over F.

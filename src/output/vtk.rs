@@ -1,11 +1,18 @@
-//! A data array of a VTK XML file: binary, compressed by zlib, in base64 (VTK User's Guide, "VTK File
-//! Formats").
+//! VTK's XML files (VTK User's Guide, "VTK File Formats"), with arrays in binary, compressed by zlib, in
+//! base64.
 
+use super::growing_file::GrowingFile;
 use base64::{Engine, engine::general_purpose::STANDARD};
 use flate2::{Compress, Compression, FlushCompress, Status};
 use num_traits::ToBytes;
-use std::io;
+use std::{io, iter, path::PathBuf};
 
+/// VTK's names of the types of numbers.
+pub(super) const REAL: &str = "Float64";
+pub(super) const INTEGER: &str = "Int32";
+const BYTE: &str = "UInt8";
+/// How a list of frames ends.
+const LIST_END: &str = "</Collection>\n</VTKFile>\n";
 /// Bytes that are compressed as one block.
 const BLOCK: usize = 1 << 20;
 /// zlib's fastest level: it halves the size in a tenth of the time of its best level.
@@ -59,6 +66,50 @@ impl DataArray {
         text.push_str("</DataArray>\n");
         Ok(text)
     }
+}
+
+/// A VTK file whose element `kind` has these `attributes` and a `content` with arrays as [`DataArray`]
+/// encodes them.
+pub(super) fn vtk_file(kind: &str, attributes: &str, content: &str) -> String {
+    format!(
+        "<?xml version=\"1.0\"?>\n\
+         <VTKFile type=\"{kind}\" version=\"1.0\" byte_order=\"LittleEndian\" \
+         header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n\
+         <{kind}{attributes}>\n{content}</{kind}>\n</VTKFile>\n"
+    )
+}
+
+/// A list of frames over time for ParaView, a file from the first frame on.
+pub(super) fn list_of_frames(path: PathBuf) -> GrowingFile {
+    let empty = vtk_file("Collection", "", "");
+    GrowingFile::new(path, empty.trim_end_matches(LIST_END).to_owned(), LIST_END)
+}
+
+/// The entry of a list for the frame in `file` of a time, s.
+pub(super) fn entry(time: f64, file: &str) -> String {
+    format!("<DataSet timestep=\"{time}\" file=\"{file}\"/>\n")
+}
+
+/// The beginning of `<Piece>`, with `<Points>` and `<Cells>` of one kind with N nodes each.
+pub(super) fn cells_text<const N: usize>(
+    points: &[[f64; 2]],
+    cells: &[[usize; N]],
+    kind: u8,
+) -> io::Result<String> {
+    let coordinates = points.iter().flat_map(|&[x, y]| [x, y, 0.0]);
+    let nodes = cells.as_flattened().iter().map(|&node| node as i32);
+    let offsets = (1..=cells.len()).map(|cell| (N * cell) as i32);
+    let types = iter::repeat_n(kind, cells.len());
+    Ok(format!(
+        "<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n\
+         <Points>\n{}</Points>\n<Cells>\n{}{}{}</Cells>\n",
+        points.len(),
+        cells.len(),
+        DataArray::new("Points", REAL, 3, coordinates).element()?,
+        DataArray::new("connectivity", INTEGER, 1, nodes).element()?,
+        DataArray::new("offsets", INTEGER, 1, offsets).element()?,
+        DataArray::new("types", BYTE, 1, types).element()?,
+    ))
 }
 
 /// VTK's header (the number of blocks, the bytes of a block, the bytes of a last partial block or 0,
