@@ -1,4 +1,4 @@
-// Slender beam held at both ends, over a foundation along its whole underside.
+// Slender beam clamped at both ends, over a foundation along its whole underside.
 //
 //   (0,0.5) ----------------- load ----------------- (8,0.5)
 //   clamp                     body                     clamp     in metres

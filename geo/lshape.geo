@@ -1,4 +1,4 @@
-// L-shaped body of Example II: a leg with a long arm, held at the foot.
+// L-shaped body of Example II: a leg with a long arm, clamped at the foot.
 //
 //   (0,6) ------------- load ------------- (8,6)
 //     |                                      |

@@ -14,11 +14,11 @@ use std::{
 
 /// Whether the next signal ends the process at once.
 static AT_ONCE: LazyLock<Arc<AtomicBool>> = LazyLock::new(|| Arc::new(true.into()));
-/// The signal that came while it was held; 0 for none.
-static HELD: LazyLock<Arc<AtomicUsize>> = LazyLock::new(Arc::default);
+/// The signal that has come; 0 for none.
+static RECEIVED: LazyLock<Arc<AtomicUsize>> = LazyLock::new(Arc::default);
 
 /// Lets SIGINT and SIGTERM end the process with the exit codes 130 and 143: at once, or while an
-/// [`Interrupts`] holds them only the second one. On ranks, SIGUSR1 and SIGUSR2 stand for them, because
+/// [`Interrupts`] defers them only the second one. On ranks, SIGUSR1 and SIGUSR2 stand for them, because
 /// mpiexec does not forward them as they are. A file-size limit (SIGXFSZ) becomes an error of the
 /// write that exceeds it.
 ///
@@ -31,7 +31,7 @@ pub fn install() -> io::Result<()> {
     {
         // They act in this order.
         flag::register_conditional_shutdown(signal, 128 + meant, AT_ONCE.clone())?;
-        flag::register_usize(signal, HELD.clone(), meant as usize)?;
+        flag::register_usize(signal, RECEIVED.clone(), meant as usize)?;
         flag::register(signal, AT_ONCE.clone())?;
     }
     Ok(())
@@ -42,15 +42,15 @@ pub fn install() -> io::Result<()> {
 pub struct Interrupts(());
 
 impl Interrupts {
-    /// Holds signals from now on.
-    pub fn hold() -> Self {
-        AT_ONCE.store(HELD.load(Ordering::Relaxed) != 0, Ordering::Relaxed);
+    /// Defers signals from now on.
+    pub fn defer() -> Self {
+        AT_ONCE.store(RECEIVED.load(Ordering::Relaxed) != 0, Ordering::Relaxed);
         Self(())
     }
 
     /// The signal that has come, if one has.
     pub fn received(&self) -> Option<Signal> {
-        match HELD.load(Ordering::Relaxed) as i32 {
+        match RECEIVED.load(Ordering::Relaxed) as i32 {
             0 => None,
             number => Some(Signal(number)),
         }

@@ -3,7 +3,7 @@
 //!
 //! # The problem
 //!
-//! A body Ω in the plane, per metre of thickness, is held on Γ_D, loaded on Γ_N and by a force f_B, and
+//! A body Ω in the plane, per metre of thickness, is clamped on Γ_D, loaded on Γ_N and by a force f_B, and
 //! may touch a rigid foundation at the distance g along the outward normal ν of Γ_C, without friction.
 //! Sought are the displacement u and the damage ζ, 1 where the material is sound and 0 where it is
 //! broken, with σ = ζ𝒜ε(u), −Div σ = f_B, σν = f_N on Γ_N and

@@ -15,7 +15,7 @@ because the mesh file does not have them, FEniCSx is given the same.
 
 Every time must agree, also in the number of active nodes; differences are relative to the largest
 value of all times, and the largest is shown.
-The bodies must be held: a scene whose solution is not unique cannot be compared.
+The bodies must be supported: a scene whose solution is not unique cannot be compared.
 Exit code 1 if any case fails.
 """
 
@@ -75,16 +75,16 @@ def static(scene):
 
 
 def without_contact(scene, mesh):
-    """The elastic scene: gaps dropped, or held at zero if nothing else holds the body."""
+    """The elastic scene: gaps dropped, or prescribed as zero if nothing else supports the body."""
     scene = copy.deepcopy(static(scene))
     scene.pop("contact", None)
-    held = any("displacement" in boundary for boundary in scene["boundary"])
+    supported = any("displacement" in boundary for boundary in scene["boundary"])
     for boundary in scene["boundary"]:
         if boundary.pop("gap", None) is None:
             continue
         normal = np.abs(mesh.outward_normals(boundary["name"])[0]).mean(axis=0)
         boundary.pop("normal", None)
-        if not held:
+        if not supported:
             boundary["displacement"] = ["free", "0"] if normal[1] > normal[0] else ["0", "free"]
     # A boundary that is left with its name alone says nothing.
     scene["boundary"] = [b for b in scene["boundary"] if len(b) > 1]

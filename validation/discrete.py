@@ -203,8 +203,8 @@ class Discrete:
                 if (cosine < -1e-6).all():
                     return "normal into the body", False
                 some |= bool((cosine < 1e-6).any())
-        rows, held = self.contact, {node for node, _, _ in self.prescribed}
-        for node in np.setdiff1d(rows.node, list(held)):
+        rows, prescribed = self.contact, {node for node, _, _ in self.prescribed}
+        for node in np.setdiff1d(rows.node, list(prescribed)):
             lines = []
             for n in rows.direction[rows.node == node]:
                 if all(abs(n[0] * m[1] - n[1] * m[0]) > 1e-8 for m in lines):
@@ -297,7 +297,7 @@ def merged(parts):
 
 
 def merged_gaps(parts):
-    """Joins (normal, length, gap) of curves that meet smoothly: the smaller gap holds."""
+    """Joins (normal, length, gap) of curves that meet smoothly: the smaller gap counts."""
     rows = []
     for normal, length, gap in parts:
         for k, (n, w, g) in enumerate(rows):

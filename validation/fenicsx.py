@@ -90,7 +90,7 @@ class Body:
             * ufl.dx(metadata={"quadrature_degree": self.order})
         )
         self.load_forms = [fem.form(form) for form in self._loads(w)]
-        self._must_be_held()
+        self._must_be_constrained()
 
     def elasticity(self, strain):
         """A ε: the paper's plane-stress tensor (section 4), or plane strain."""
@@ -158,16 +158,16 @@ class Body:
         lower[fixed], upper[fixed] = -np.inf, np.inf
         return Bounds(fixed, value[fixed], lower, upper)
 
-    def _must_be_held(self):
+    def _must_be_constrained(self):
         """Refuses a body that can move rigidly even in full contact: u is not unique."""
         bounds = self.bounds(0.0)
-        held = np.isfinite(bounds.lower) | np.isfinite(bounds.upper)
-        held[bounds.fixed] = True
-        held = held.reshape(-1, 2)[self.dof_of_node]
+        constrained = np.isfinite(bounds.lower) | np.isfinite(bounds.upper)
+        constrained[bounds.fixed] = True
+        constrained = constrained.reshape(-1, 2)[self.dof_of_node]
         points = self.nodes.points
         x, y = ((points - points.mean(axis=0)) / np.ptp(points)).T
         motions = np.array([[1 + 0 * x, 0 * x], [0 * x, 1 + 0 * x], [-y, x]])
-        if np.linalg.matrix_rank(motions.transpose(0, 2, 1)[:, held]) < 3:
+        if np.linalg.matrix_rank(motions.transpose(0, 2, 1)[:, constrained]) < 3:
             raise SceneError("the body may move rigidly, its displacement is not unique")
 
     def sides(self, boundary):

@@ -115,12 +115,12 @@ def initial(discrete):
 def traits(discrete):
     """What is unusual about a scene, in words to count by."""
     rows, words = discrete.contact, []
-    held = {node for node, _, _ in discrete.prescribed}
+    prescribed = {node for node, _, _ in discrete.prescribed}
     for node in np.unique(rows.node):
         n = rows.direction[rows.node == node]
-        if len(n) > 1 and node not in held:
+        if len(n) > 1 and node not in prescribed:
             words.append("opposite" if (n @ n.T).min() < -0.99 else "corner")
-        if len(n) > 2 or len(n) > 1 and node in held:
+        if len(n) > 2 or len(n) > 1 and node in prescribed:
             words.append("many rows")
     if discrete.clusters()[0] > 1:
         words.append("pieces")
@@ -191,7 +191,7 @@ def judge_frames(discrete, frames, output):
 
 def shown(step, frame, scale):
     """What is wrong with the gap and the pressure written: g − u·ν, the least of a node's rows, and
-    the nodal reaction over the tributary length, where a node has one row and is not held."""
+    the nodal reaction over the tributary length, where a node has one row and is not prescribed."""
     rows, (force, length) = step.rows, scale
     slack = np.full(len(frame.gap), np.inf)
     np.minimum.at(slack, rows.node, rows.value - along(rows, frame.u))
@@ -199,7 +199,7 @@ def shown(step, frame, scale):
     if (np.abs(frame.gap - slack)[seen] > PLACE * length + 1e-15 * slack[seen]).any():
         return "the gap field is not what the displacement leaves"
     single = np.bincount(rows.node, minlength=len(seen)) == 1
-    single[step.held.node] = False
+    single[step.prescribed.node] = False
     if not seen[single].all():
         return "the gap field lacks a node of Γ_C"
     reaction = along(rows, step.f - step.k @ frame.u)
@@ -239,13 +239,13 @@ def residuals(step, u, scale=(0.0, 0.0)):
     length = max(np.abs(u).max(), PAST * scale[1])
     easing = ease(step.discrete)
     slack = step.rows.value - along(step.rows, u)
-    places = np.r_[-slack, np.abs(along(step.held, u) - step.held.value), 0.0].max()
+    places = np.r_[-slack, np.abs(along(step.prescribed, u) - step.prescribed.value), 0.0].max()
     force, length = force or 1.0, length or 1.0
     reaction = (step.f - step.k @ u).reshape(-1, 2)
     off = np.linalg.norm(reaction, axis=1)
     touching = slack <= TOUCH * easing * length
-    for node in np.unique(np.r_[step.rows.node[touching], step.held.node]):
-        d = step.held.direction[step.held.node == node]
+    for node in np.unique(np.r_[step.rows.node[touching], step.prescribed.node]):
+        d = step.prescribed.direction[step.prescribed.node == node]
         normals = step.rows.direction[(step.rows.node == node) & touching]
         off[node] = force * nnls(np.vstack([normals, d, -d]).T, reaction[node] / force)[1]
     # Element forces of a large rigid motion, now or before, are rounding; where a prescribed
@@ -288,12 +288,12 @@ def judge_step(step, u, scale):
     move = unsure * step.sensitivity()
     energy, whole = apart @ (step.k @ apart), own @ (step.k @ own)
     # rᵀK⁻¹r ≤ ‖r‖₂ √N max|K⁻¹r|
-    floor = 1e-14 * ((np.abs(u) + np.abs(own)) @ rounding) + unsure * np.sqrt(len(u)) * move
-    floor += (PAST * ANSWER) ** 2 * scale[0] * scale[1]
+    rounding_energy = 1e-14 * ((np.abs(u) + np.abs(own)) @ rounding) + unsure * np.sqrt(len(u)) * move
+    rounding_energy += (PAST * ANSWER) ** 2 * scale[0] * scale[1]
     strain = np.sqrt(max(energy, 0.0) / whole) if whole > 0.0 else 0.0
     figures = f"u differs by {by:.1e}, strains by {strain:.1e}"
     allowed = ANSWER * easing
-    if energy > (ENERGY * easing) ** 2 * max(whole, 0.0) + floor:
+    if energy > (ENERGY * easing) ** 2 * max(whole, 0.0) + rounding_energy:
         return Verdict("wrong", figures, by), scale
     sure = by * length > move and easing == 1.0
     word = "right" if by <= allowed else "moved" if sure else "imprecise"

@@ -34,7 +34,7 @@ def step_of(mesh, boundary, order=1, **more):
 
 
 def pressed(order, gap="0.01"):
-    """A square under pressure 3, held by a symmetry axis and contact, and its exact answer
+    """A square under pressure 3, supported by a symmetry axis and contact, and its exact answer
     u_y = −p y/E − g, u_x = νp x/E."""
     mesh = square()
     step = step_of(mesh, [{"name": "west", "symmetry": True}, {"name": "south", "gap": gap},
@@ -102,7 +102,7 @@ def quadratic(order):
 
 def opposite(order):
     """A tip between two plates with gaps of 0.001: the triangle (0,0), (2,∓0.4) clamped at its
-    end. Both rows hold, and the force of the touching plate is a pressure."""
+    end. Both rows are obeyed, and the force of the touching plate is a pressure."""
     rng = np.random.default_rng(3)
     shape = lambda s, t: (2 * s, 0.4 * s * (2 * t - 1))
     points, node, triangles = bodies.grid(rng, 10, 4, shape)
@@ -118,7 +118,7 @@ def opposite(order):
     step = step_of(mesh, plates, order, material=material, body={"force": ["0.01", "0.003"]})
     own = step.solve()
     yield "wedge between plates: residuals", max(residuals(step, own)[:2]), 1e-12
-    yield "wedge: the upper plate holds", abs((along(step.rows, own) - 0.001).max()), 1e-15
+    yield "wedge: the upper plate is obeyed", abs((along(step.rows, own) - 0.001).max()), 1e-15
     large = np.linalg.norm(own.reshape(-1, 2), axis=1).max()
     yield "wedge: largest displacement near 9.9e-3", abs(large - 9.9e-3), 1e-3
 

@@ -25,7 +25,7 @@ CENTROID = IntegrationRule([(1 / 3, 1 / 3)], [0.5])
 VERTICES = IntegrationRule([(0, 0), (1, 0), (0, 1)], 3 * [1 / 6])
 INTERIOR = IntegrationRule([(1 / 6, 1 / 6), (2 / 3, 1 / 6), (1 / 6, 2 / 3)], 3 * [1 / 6])
 GAUSS = IntegrationRule([(0.5 - 0.5 / 3**0.5,), (0.5 + 0.5 / 3**0.5,)], 2 * [0.5])
-# Over the largest entry of the diagonal: what holds an unknown that is not free.
+# Over the largest entry of the diagonal: the penalty on an unknown that is not free.
 PENALTY = 1e13
 # NGSolve numbers the middles of a triangle's sides as the vertices opposite.
 ORDER = [0, 1, 2, 4, 5, 3]

@@ -3,7 +3,7 @@
 Scales are drawn over decades: E from 1e-3 to 1e12 Pa, lengths from 1e-3 to 1e3 m, strains from 1e-9
 to 1e-2, gaps from 1e-6 to 1e9 times the displacement that such a strain means. What the program's
 own stability study keeps regular is drawn here on purpose: tips, slits, pinches, nodes with several
-normals, bodies that nothing or only contact holds, loads that cross zero.
+normals, bodies that nothing or only contact supports, loads that cross zero.
 """
 
 from dataclasses import dataclass
@@ -57,7 +57,7 @@ class Draw:
         return str(self.rng.choice(PROFILES))
 
     def put(self, name, **condition):
-        """Adds to what holds on a curve."""
+        """Adds conditions on a curve."""
         self.boundary.setdefault(name, {"name": name}).update(condition)
 
     def gap(self, name, normal=None, size=None):
@@ -71,7 +71,7 @@ class Draw:
             text += f"*(1 + {self.number(0, 0.9)!r}*sin({self.number(1, 6)!r}*x/{self.length!r}))"
         self.put(name, gap=text, **({} if normal is None else {"normal": vector(normal)}))
 
-    def hold(self, name):
+    def support(self, name):
         """Clamped, one component free, a symmetry axis, or moved in time."""
         value = f"{self.number() * self.move!r}*{self.profile()}"
         way = self.rng.integers(6 if self.timed else 5)
@@ -139,10 +139,10 @@ class Draw:
 
 
 def block(d, mesh):
-    """On its foot; a side held or not; loads on the others."""
+    """On its foot; a side supported or not; loads on the others."""
     d.gap("south")
     if d.chance(0.8):
-        d.hold(str(d.rng.choice(["west", "east"])))
+        d.support(str(d.rng.choice(["west", "east"])))
     for name in ("north", "east", "west"):
         if d.chance(0.6):
             d.traction(name, mesh)
@@ -153,7 +153,7 @@ def wedge(d, mesh):
     if d.chance(0.7):
         d.put("end", displacement=["0", "0"])
     else:
-        d.hold("end")
+        d.support("end")
     axis = d.normal(mesh, "end", 0.0)
     across = np.array([-axis[1], axis[0]])
     plates = d.chance(0.5)
@@ -166,7 +166,7 @@ def wedge(d, mesh):
 
 def slit(d, mesh):
     """A rigid sheet in the slit: both lips may touch it, and the tip has two opposite normals."""
-    d.hold(str(d.rng.choice(["east", "south", "north"])))
+    d.support(str(d.rng.choice(["east", "south", "north"])))
     for name in ("lip_low", "lip_high"):
         if d.chance(0.85):
             d.gap(name)
@@ -182,7 +182,7 @@ def cells(d, mesh):
     for name in names[1:]:
         way = d.rng.random()
         if way < 0.25:
-            d.hold(name)
+            d.support(name)
         elif way < 0.6:
             d.gap(name)
         if d.chance(0.4):
@@ -190,13 +190,13 @@ def cells(d, mesh):
 
 
 def several(d, mesh):
-    """Of each piece: held, in a box that only contact makes, on contact alone, or free; driven or
-    not."""
+    """Of each piece: supported by conditions, in a box that only contact makes, on contact alone, or
+    free; driven or not."""
     for k in sorted({name.rsplit("_", 1)[1] for name in mesh.curves}):
         names = list(d.rng.permutation([n for n in mesh.curves if n.endswith(f"_{k}")]))
         way = d.rng.random()
         if way < 0.6:
-            d.hold(names[0])
+            d.support(names[0])
         for name in names:
             if name not in d.boundary and (0.6 < way < 0.85 or way < 0.95 and d.chance(0.5)):
                 d.gap(name)
@@ -212,7 +212,7 @@ def rounded(d, mesh):
     """A disc in a bore or an arch on its feet or over a mandrel: contact on curves."""
     names = list(mesh.curves)
     if d.chance(0.5):
-        d.hold(str(d.rng.choice(names[1:])))
+        d.support(str(d.rng.choice(names[1:])))
     for name in names:
         if name not in d.boundary and d.chance(0.9 if name == names[0] else 0.5):
             d.gap(name)
@@ -238,7 +238,7 @@ def prescribed(d, mesh):
 
 
 def loose(d, mesh):
-    """Held by contact alone, on some or all sides, and mostly pressed into it."""
+    """Supported by contact alone, on some or all sides, and mostly pressed into it."""
     names = list(d.rng.permutation(list(mesh.curves)))
     touching = names[:int(d.rng.integers(1, len(names) + 1))]
     for name in touching:
@@ -255,7 +255,7 @@ def loose(d, mesh):
 def normals(d, mesh):
     """Fixed normals at an angle to the body's own, a few into the body."""
     names = list(d.rng.permutation(list(mesh.curves)))
-    d.hold(names[0])
+    d.support(names[0])
     for name in names[1:]:
         if d.chance(0.7):
             tilt = d.number(-1.2, 1.2) if d.chance(0.8) else np.pi + d.number(-0.5, 0.5)

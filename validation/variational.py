@@ -22,7 +22,7 @@ class Step:
     def __init__(self, discrete, zeta, t):
         self.discrete, self.rows = discrete, discrete.contact
         self.k, self.f = discrete.stiffness(zeta), discrete.load(t)
-        self.held = discrete.prescribed_rows(t)
+        self.prescribed = discrete.prescribed_rows(t)
         self.zeta = zeta
         self._eliminate()
         self.q = self.z.T @ (self.f - self.k @ self.lift)
@@ -37,15 +37,15 @@ class Step:
         orthonormal basis of the directions they leave."""
         n = len(self.f) // 2
         self.lift, at = np.zeros(2 * n), {}
-        for k, node in enumerate(self.held.node):
+        for k, node in enumerate(self.prescribed.node):
             at.setdefault(int(node), []).append(k)
         rows, columns, entries, count = [], [], [], 0
         for node in range(n):
             basis = np.eye(2)
             if node in at:
-                d = self.held.direction[at[node]]
+                d = self.prescribed.direction[at[node]]
                 self.lift[2 * node:2 * node + 2] = (
-                    np.linalg.pinv(d, rcond=1e-8) @ self.held.value[at[node]])
+                    np.linalg.pinv(d, rcond=1e-8) @ self.prescribed.value[at[node]])
                 basis = null_space(d, rcond=1e-8)
             for vector in basis.T:
                 rows += [2 * node, 2 * node + 1]
@@ -71,7 +71,7 @@ class Step:
             ties.append((local[common] - fields[nodes[common]]).reshape(-1, 3 * count))
             fields[nodes[~common]] = local[~common]
             first[nodes] = c
-        resisted = np.einsum("ri,rik->rk", self.held.direction, fields[self.held.node])
+        resisted = np.einsum("ri,rik->rk", self.prescribed.direction, fields[self.prescribed.node])
         motions = fields.reshape(len(self.f), -1) @ kernel(np.vstack([*ties, resisted]), 3 * count)
         motions = np.linalg.qr(motions)[0] if motions.size else motions
         self.n = unit(self.z.T @ motions)
@@ -83,14 +83,14 @@ class Step:
 
     def _contradiction(self):
         """Largest |d·u − value| of the prescribed rows at nodes that have more than two."""
-        return np.abs(along(self.held, self.lift) - self.held.value).max(initial=0.0)
+        return np.abs(along(self.prescribed, self.lift) - self.prescribed.value).max(initial=0.0)
 
     def _penetration(self):
         """How far the prescribed values push some node through its obstacles: the least
         violation of the contact rows at a node over what is free to move there."""
         worst = 0.0
         a = self.a.toarray()
-        for node in np.unique(self.held.node):
+        for node in np.unique(self.prescribed.node):
             at = np.flatnonzero(self.rows.node == node)
             rows = a[at][:, np.abs(a[at]).max(0) > 1e-8] if len(at) else np.zeros((0, 0))
             if rows.shape[1] == 0:

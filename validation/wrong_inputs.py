@@ -96,7 +96,7 @@ SCENES = [
     ("a root of negative numbers", '"-3*t"', '"sqrt(x - 2)"'),
     ("one component of two", '["0", "-3*t"]', '["-3*t"]'),
     ("a normal into the body", 'gap = "0"', 'gap = "0"\nnormal = ["0", "1"]'),
-    ("nothing holds the body", 'displacement = ["0", "free"]', 'traction = ["1", "0"]'),
+    ("nothing supports the body", 'displacement = ["0", "free"]', 'traction = ["1", "0"]'),
     ("a mesh that is not there", "square.msh", "round.msh"),
     ("a mesh of another kind", "square.msh", "square.stl"),
 ]

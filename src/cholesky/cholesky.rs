@@ -37,8 +37,8 @@ pub enum Precision {
 /// the time each.
 const LARGEST_RESIDUAL: f64 = 0.3;
 
-/// Bytes that a solve reads in the time of one floating-point operation of a factorisation, and of the
-/// work per entry of L that is none (assembly, copies). Seconds of a factorisation were
+/// Bytes that a solve reads in the time of one floating-point operation of a factorisation, and in the
+/// time of its other work per entry of L (assembly, copies). Seconds of a factorisation were
 /// 0.065 ns · operations + 16.5 ns · entries within 10 % (square and L, 4,000 to 530,000 unknowns, one
 /// core of a Xeon with AVX-512, OpenBLAS), those of an iteration 0.06 to 0.13 ns per byte.
 const BYTES_PER_OPERATION: f64 = 0.8;
@@ -93,8 +93,8 @@ impl Cholesky {
         let mut x = vec![0.0; load.len()];
         self.solve(&load, &mut x, |interface| interface.fill(0.0));
         let load = &load[..self.interior];
-        let left: f64 = a.multiply(&x).iter().zip(load).map(|(ax, b)| (b - ax).powi(2)).sum();
-        left <= LARGEST_RESIDUAL * LARGEST_RESIDUAL * load.iter().map(|b| b * b).sum::<f64>()
+        let residual: f64 = a.multiply(&x).iter().zip(load).map(|(ax, b)| (b - ax).powi(2)).sum();
+        residual <= LARGEST_RESIDUAL * LARGEST_RESIDUAL * load.iter().map(|b| b * b).sum::<f64>()
     }
 
     /// L₂₂ of a factor that has values.

@@ -10,7 +10,7 @@ pub(super) struct Cholmod {
     common: Box<raw::cholmod_common>,
     factor: *mut raw::cholmod_factor,
     /// The number of values of L in memory, the first ones.
-    held: usize,
+    allocated: usize,
 }
 
 /// Values are freed by so many at a time, 32 MB.
@@ -23,7 +23,7 @@ impl Cholmod {
         a: &mut LowerTriangle,
         order: Option<Vec<i64>>,
     ) -> Result<Self, PetscError> {
-        let mut this = Self { common: Box::default(), factor: ptr::null_mut(), held: 0 };
+        let mut this = Self { common: Box::default(), factor: ptr::null_mut(), allocated: 0 };
         let (common, mut view) = (&mut *this.common, a.view());
         // SAFETY: `common` stays where it is; the view describes arrays that live during the call,
         // and `order` has as many entries as there are rows.
@@ -55,18 +55,24 @@ impl Cholmod {
         self.check(done)?;
         // SAFETY: a live factor.
         unsafe {
-            self.held = (*self.factor).xsize;
+            self.allocated = (*self.factor).xsize;
             Ok((*self.factor).minor == (*self.factor).n)
         }
     }
 
     /// Frees the values of L but for about the first `length` (cholmod_l_realloc).
     pub(super) fn truncate_values(&mut self, length: usize) {
-        if self.held >= length + FREED {
+        if self.allocated >= length + FREED {
             // SAFETY: a live factor with so many values in its block of memory.
             unsafe {
                 let (l, size) = (&mut *self.factor, size_of::<f64>());
-                l.x = raw::cholmod_l_realloc(length, size, l.x, &mut self.held, &mut *self.common);
+                l.x = raw::cholmod_l_realloc(
+                    length,
+                    size,
+                    l.x,
+                    &mut self.allocated,
+                    &mut *self.common,
+                );
             }
         }
     }
@@ -78,7 +84,7 @@ impl Cholmod {
         // there will be.
         let done = unsafe {
             let size = (*self.factor).xsize;
-            (*self.factor).xsize = take(&mut self.held);
+            (*self.factor).xsize = take(&mut self.allocated);
             let done = raw::cholmod_l_change_factor(pattern, 1, 1, 1, 1, self.factor, common) != 0;
             (*self.factor).xsize = size;
             done
@@ -112,10 +118,10 @@ impl Cholmod {
     /// The values of L that are in memory: of each supernode its dense columns from the diagonal block
     /// down.
     pub(super) fn values(&self) -> &[f64] {
-        // SAFETY: the array x of a factor is null or has `held` values.
+        // SAFETY: the array x of a factor is null or has `allocated` values.
         unsafe {
             let x = (*self.factor).x.cast::<f64>();
-            if x.is_null() { &[] } else { slice::from_raw_parts(x, self.held) }
+            if x.is_null() { &[] } else { slice::from_raw_parts(x, self.allocated) }
         }
     }
 

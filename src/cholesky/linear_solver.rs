@@ -6,8 +6,9 @@ use super::{Condensed, Factor, LinearSystem, Precision};
 use crate::petsc::{Matrix, PetscError, Session, Vector};
 
 /// Chooses which of the condensed unknowns are prescribed, given the system that is left for them when
-/// all others are eliminated: of each by how much it then changes, or `None` where the unknowns that are
-/// prescribed stay the same. The last solve must be that of the choice. Collective.
+/// all others are eliminated. The answer is `None` where the choice stays the same, else per unknown the
+/// change of its prescribed value, or `None` where it is free. The last solve of the system must be with
+/// that choice. Collective.
 pub type Choose<'a, E> = &'a mut dyn FnMut(&mut Condensed) -> Result<Option<Vec<Option<f64>>>, E>;
 
 /// Conjugate gradients (Hestenes and Stiefel, J. Res. Nat. Bur. Standards 49, 1952) preconditioned by
@@ -99,7 +100,7 @@ impl LinearSolver {
         &mut self.factor
     }
 
-    /// The factor alone.
+    /// Keeps only the factor.
     pub fn into_factor(self) -> Factor {
         self.factor
     }
@@ -124,8 +125,8 @@ impl LinearSolver {
         self.factor.factorise(matrix)
     }
 
-    /// Whether there is a factor that preconditions the system: a condensed one is made that of the same
-    /// unknowns prescribed.
+    /// Whether there is a factor that preconditions the system. In a condensed one the unknowns that the
+    /// system prescribes are prescribed first.
     fn restrict(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
         if !self.factor.exists() || !self.factor.is_condensed(system.matrix)? {
             return Ok(self.factor.exists());

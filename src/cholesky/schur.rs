@@ -15,7 +15,7 @@ use std::iter;
 /// ranks have the same.
 pub(super) struct SchurComplement {
     comm: Communicator,
-    /// Of the factor, before there is one.
+    /// The precision of the first factor.
     precision: Precision,
     /// S; without rows where there is no such unknown.
     matrix: DMatrix<f64>,
@@ -36,7 +36,7 @@ struct Changes {
 }
 
 impl SchurComplement {
-    /// Without values.
+    /// A complement that is yet to be set.
     pub(super) fn new(comm: Communicator, precision: Precision) -> Self {
         let matrix = DMatrix::zeros(0, 0);
         Self { comm, precision, matrix, scale: 1.0, factor: None, changes: None }
@@ -48,7 +48,7 @@ impl SchurComplement {
     }
 
     /// Prescribes unknowns and adds to diagonal entries of S, those that this rank owns; false if what is
-    /// left is not positive definite. Factorised anew is only what has changed. Collective.
+    /// left is not positive definite. Without changes the factor stays. Collective.
     pub(super) fn restrict(
         &mut self,
         prescribed: impl Iterator<Item = usize>,

@@ -82,7 +82,7 @@ fn boundaries(scene: &Scene, mesh: &Mesh) -> String {
     table.lines().map(str::trim_end).collect::<Vec<_>>().join("\n")
 }
 
-/// What holds on a boundary, in words; gaps are looked at at these times.
+/// The conditions on a boundary, in words; gaps are looked at at these times.
 fn conditions(
     boundary: &Boundary,
     edges: &[[usize; 2]],
@@ -152,11 +152,14 @@ fn loads(problem: &DiscreteProblem) -> Vec<String> {
     problem.scene().sample_times(1).into_iter().map(resultant).collect()
 }
 
-/// Which rigid motions there are and what holds the body against them.
+/// Which rigid motions there are and what supports the body against them.
 fn support(problem: &DiscreteProblem) -> Vec<String> {
     let motions = &problem.motions;
     let against = motions.resisted.iter().map(|motion| {
-        row("support", format!("only contact holds the body against {motion}, and one way"))
+        row(
+            "support",
+            format!("only contact supports the body against {motion}, and in one direction"),
+        )
     });
     match motions.all_prevented() {
         true => vec![row("support", "displacements and axes prevent all rigid motions".to_owned())],

@@ -88,7 +88,7 @@ pub fn is_launched() -> bool {
 
 /// Runs the program with the same arguments on so many ranks, or tells why it cannot.
 pub fn on_ranks(ranks: usize) -> io::Result<Result<(), Failure>> {
-    let interrupts = Interrupts::hold();
+    let interrupts = Interrupts::defer();
     let mut mpiexec = spawn(ranks)?;
     // It is closed when this process ends, in whatever way: then the ranks end, too.
     let _input = mpiexec.stdin.take();

@@ -76,7 +76,7 @@ pub fn remarks(phases: &Phases, steps: usize, stepping: f64) -> Vec<String> {
     remarks
 }
 
-/// The most memory this process has held, MB, where Linux tells (proc(5), VmHWM).
+/// The most memory this process has used, MB, where Linux tells (proc(5), VmHWM).
 fn peak_memory() -> Option<f64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

@@ -4,8 +4,8 @@ use super::{
     checkpoint::{self, Checkpoint},
     profile,
     provenance::provenance,
-    run::Task,
     screen,
+    task::Task,
 };
 use serde_json::{Value, json};
 use signorini::{
@@ -31,7 +31,7 @@ pub(super) struct Recorder<'a> {
     fields: FieldWriter,
     /// On the first rank, which shows the run.
     bar: Option<Progress>,
-    /// Of the first rank.
+    /// `history.csv`, which the first rank writes.
     history: Table,
     last: Option<Step>,
     /// Seconds of all accepted steps after n = 0.
@@ -46,7 +46,7 @@ impl<'a> Recorder<'a> {
     pub(super) fn new(task: &'a Task) -> Result<Self, OutputError> {
         let fields = FieldWriter::new(&task.folder, &task.problem)?;
         let bar = task.problem.body.nodes.partition.comm().is_root().then(|| screen::open(task));
-        let (interrupts, saved) = (Interrupts::hold(), Instant::now());
+        let (interrupts, saved) = (Interrupts::defer(), Instant::now());
         let (path, columns) = (task.folder.join("history.csv"), task.problem.quantities());
         let history = Table::new(path, &StepRecord::default(), &columns)?;
         let (last, stepping) = Default::default();

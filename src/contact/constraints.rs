@@ -50,7 +50,7 @@ const ROUNDING: f64 = 1e-12;
 
 impl Constraints {
     /// Combines all rows node by node, gap rows being joined ([`GapRow::joined`]); `coordinates`, m,
-    /// serve the error messages. Gaps along one line get exactly this line as their normal, so that
+    /// are for error messages. Gaps along one line get exactly this line as their normal, so that
     /// they cannot contradict each other by rounding.
     ///
     /// # Errors

@@ -79,8 +79,8 @@ pub const SHARE_OF_STEPS: f64 = 0.5;
 const LEAST_RATIO: f64 = 0.125;
 /// A triangle at an edge on which a traction or a gap is not resolved becomes smaller by this.
 const QUARTER: f64 = 0.25;
-/// Triangles are bisected while they are larger than this part of their wanted area.
-const EXCESS: f64 = 1.5;
+/// Triangles are bisected while they are larger than this many times their wanted area.
+const OVERSIZE: f64 = 1.5;
 /// Rounds, and triangles of a mesh, at most.
 const ROUNDS: usize = 25;
 const MOST_TRIANGLES: usize = 4_000_000;
@@ -226,7 +226,8 @@ fn size_ratios(shares: &[f64], order: f64, aim: f64) -> Vec<f64> {
 /// Bisects the triangles until they are as small as `ratios` say.
 fn divided(mut refinement: Refinement, ratios: &[f64]) -> Result<Refinement, MeshError> {
     let areas = areas(&refinement.mesh);
-    let mut wanted: Vec<f64> = areas.iter().zip(ratios).map(|(a, r)| EXCESS * a * r * r).collect();
+    let mut wanted: Vec<f64> =
+        areas.iter().zip(ratios).map(|(a, r)| OVERSIZE * a * r * r).collect();
     loop {
         let areas = self::areas(&refinement.mesh);
         let marked: Vec<bool> = areas.iter().zip(&wanted).map(|(a, wanted)| a > wanted).collect();

@@ -50,7 +50,7 @@ pub enum RunError {
     /// A signal has ended the run behind an accepted step.
     #[error("ended by {0}")]
     Interrupted(Signal),
-    /// The state in a checkpoint is none of this run.
+    /// The state in a checkpoint is that of another run.
     #[error(transparent)]
     Archive(#[from] ArchiveError),
     /// Whoever was shown an accepted step could not go on (results that cannot be written).

@@ -48,7 +48,7 @@ impl Outcome {
             };
             // Nodes that touch without force may still be in the way.
             notes.push(format!(
-                "{when}, no active contact node holds the body against {motion}: the answer may \
+                "{when}, no active contact node supports the body against {motion}: the answer may \
                  be one of many"
             ));
         }
@@ -142,12 +142,12 @@ impl DiscreteProblem {
         }
         notes.extend(motions.free.iter().take(FREE_MOTIONS).map(|motion| {
             format!(
-                "nothing holds or drives {motion}: of all answers the one of least ∫|u|² is given"
+                "nothing prevents or drives {motion}: of all answers the one of least ∫|u|² is given"
             )
         }));
         if motions.free.len() > FREE_MOTIONS {
             let more = motions.free.len() - FREE_MOTIONS;
-            notes.push(format!("nothing holds or drives {more} more such motions"));
+            notes.push(format!("nothing prevents or drives {more} more such motions"));
         }
         if let Some([start, end]) = LoadCurve::unresolved_step(self) {
             notes.push(format!(

@@ -36,8 +36,8 @@ impl Next {
     }
 }
 
-/// Is shown the accepted steps of a run on its rank. Every function is called on all ranks; who only looks
-/// has nothing for checkpoints.
+/// Is shown the accepted steps of a run on its rank. Every function is called on all ranks. An
+/// observer that only looks has nothing for checkpoints.
 pub trait Observer {
     /// Sees an accepted step and says how to go on.
     ///
@@ -63,7 +63,7 @@ pub trait Observer {
     }
 }
 
-/// Who only looks.
+/// An observer that only looks.
 pub(super) struct Shown<'a>(pub(super) &'a mut dyn FnMut(&Step) -> Observed);
 
 impl Observer for Shown<'_> {

@@ -96,7 +96,7 @@ pub fn mesh_geo(
     remove_abandoned(&folder);
     let scratch = tempfile::Builder::new().prefix(SCRATCH).tempdir_in(folder);
     let scratch = scratch.map_err(MeshError::io(&mesh))?;
-    // Held until the mesh is made.
+    // Locked until the mesh is made.
     let lock = File::open(scratch.path()).map_err(MeshError::io(&mesh))?;
     let _ = lock.try_lock();
     let fresh = scratch.path().join("fresh.msh");
@@ -105,7 +105,7 @@ pub fn mesh_geo(
     Ok(mesh)
 }
 
-/// Removes the folders of runs of gmsh that were killed: nobody holds their locks.
+/// Removes the folders of runs of gmsh that were killed: nobody has their locks.
 fn remove_abandoned(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let path = entry.path();
@@ -233,7 +233,7 @@ fn run(
 
 /// Waits for gmsh, which is ended with its time or by a signal to this process.
 fn wait(mut gmsh: Child, geo: &Path) -> Result<ExitStatus, MeshError> {
-    let (started, interrupts) = (Instant::now(), Interrupts::hold());
+    let (started, interrupts) = (Instant::now(), Interrupts::defer());
     let limit = env::var(SECONDS_VARIABLE).ok().and_then(|text| text.parse().ok());
     let limit = limit.unwrap_or(SECONDS);
     loop {

@@ -263,8 +263,8 @@ fn a_body_balanced_on_one_point_is_noted() {
         .replace("gap = \"0\"", "gap = \"(x - 0.5)^2\"");
     test_directory.write("scene.toml", &scene);
     let said = test_directory.run(&[]);
-    let note = "in 10 steps, at t = 0.1 first and t = 1 last, no active contact node holds the body against \
-                the rotation about";
+    let note = "in 10 steps, at t = 0.1 first and t = 1 last, no active contact node supports the body \
+                against the rotation about";
     assert_eq!(said.out.matches(note).count(), 1, "{said:?}");
     let notes = test_directory.summary("out/scene")["notes"].to_string();
     assert_eq!(notes.matches(note).count(), 1, "{notes}");

@@ -15,7 +15,7 @@ fn a_scene_is_described_and_nothing_is_written() {
         // -3 t on the unit top.
         "t = 0: (0, 0) N/m, moment about (0, 0) 0 N",
         "t = 1: (0, -3) N/m, moment about (0, 0) -1.5 N",
-        "only contact holds the body against the vertical translation",
+        "only contact supports the body against the vertical translation",
         "in 10 steps",
     ] {
         assert!(said.out.contains(fragment), "no `{fragment}` in: {}", said.out);

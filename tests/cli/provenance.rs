@@ -44,6 +44,12 @@ fn a_scene_of_the_user_is_not_overwritten() {
     test_directory.write("mine/history.csv", "of another program");
     let refused = test_directory.say(&["run", "scene.toml", "--out", "mine"]);
     refused.fails(2, &["mine/history.csv", "no run left it there"]);
+    let mesh = test_directory.read("square.msh");
+    test_directory.write("meshes/mesh.msh", &mesh);
+    let arguments = ["run", "scene.toml", "--accuracy", "0.1", "--out", "meshes"];
+    test_directory.say(&arguments).fails(2, &["meshes/mesh.msh was left there by no run", "--out"]);
+    assert!(test_directory.names("meshes") == ["mesh.msh"]);
+    assert!(test_directory.read("meshes/mesh.msh") == mesh);
     assert_eq!(test_directory.read("mine/history.csv"), "of another program");
     // That of an earlier run is replaced, also by itself.
     test_directory.run(&["--out", "out"]);

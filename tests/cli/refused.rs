@@ -87,21 +87,21 @@ const SCENES: &[(&str, &str, &[&str])] = &[
         "[body]\nforce = [\"0\", \"log(0.65 - t)\"]\n[contact]",
         &["scene.toml:20: body.force[1] is NaN at (", "t = 0.7"],
     ),
-    // Held by nothing: the message names the motion.
+    // Nothing supports it: the message names the motion.
     (
         "[\"0\", \"-3*t\"]",
         "[\"0\", \"3*t\"]",
-        &["scene.toml: at t = 0.1, nothing holds the body against the vertical translation"],
+        &["scene.toml: at t = 0.1, nothing supports the body against the vertical translation"],
     ),
     (
         "name = \"left\"\nsymmetry = true",
         "name = \"right\"\ntraction = [\"t\", \"0\"]",
-        &["nothing holds the body against the horizontal translation", "the load drives it"],
+        &["nothing supports the body against the horizontal translation", "the load drives it"],
     ),
     (
         "gap = \"0\"",
         "traction = [\"0\", \"3*t + 1e-3\"]",
-        &["scene.toml: at t = 0, nothing holds the body against the vertical translation"],
+        &["scene.toml: at t = 0, nothing supports the body against the vertical translation"],
     ),
 ];
 
@@ -113,7 +113,7 @@ fn scenes() {
 }
 
 #[test]
-fn a_boundary_held_through_the_obstacle() {
+fn a_boundary_prescribed_through_the_obstacle() {
     // The lower left node is on both: prescribed below the foundation.
     let scene = changed("symmetry = true", "displacement = [0, \"-t\"]");
     refused(&scene, &[], &["scene.toml: ", "(0, 0)"]);

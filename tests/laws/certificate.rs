@@ -129,7 +129,7 @@ fn turned() -> DiscreteProblem {
     problem(square(6), text).unwrap()
 }
 
-/// What is done to a setting, in words and in deed.
+/// What is done to a discrete problem, in words and in deed.
 type Fault<'a> = (&'static str, &'a dyn Fn(&mut DiscreteProblem));
 
 #[test]

@@ -26,7 +26,7 @@ fn node(mesh: &Mesh, place: [f64; 2]) -> usize {
 }
 
 #[test]
-fn a_held_node_on_the_contact_boundary_keeps_its_value() {
+fn a_prescribed_node_on_the_contact_boundary_keeps_its_value() {
     // Node (0, 0) is lifted by 0.01 with the left side; the bottom next to it touches.
     for solver in SOLVERS {
         let problem = bounded(
@@ -52,7 +52,7 @@ fn a_held_node_on_the_contact_boundary_keeps_its_value() {
 }
 
 #[test]
-fn a_node_held_across_the_normal_still_meets_the_foundation() {
+fn a_node_prescribed_across_the_normal_still_meets_the_foundation() {
     // Horizontal displacement prescribed at the left only: (0, 0) may slide down to the gap.
     for solver in SOLVERS {
         let problem = bounded(
@@ -221,21 +221,21 @@ fn gaps_of_one_smooth_boundary_become_one_bound_and_those_of_a_corner_two() {
 }
 
 #[test]
-fn a_third_gap_or_a_gap_along_a_held_direction_takes_no_unknown() {
+fn a_third_gap_or_a_gap_along_a_prescribed_direction_takes_no_unknown() {
     let gap = |normal, gap| GapRow { node: 0, normal, gap, tributary_length: 1.0 };
     let prescribed = |direction| FixedRow { node: 0, direction };
     let origin = [[0.0, 0.0]];
     let mut three = [gap([0.0, -1.0], 0.0), gap([1.0, 0.0], 0.0), gap([-0.6, 0.8], 0.0)];
     let refused = Constraints::new(&origin, &[], &mut three).unwrap_err();
     assert!(matches!(refused.conflict, Conflict::TooMany));
-    // Held along the normal: no bound, but the value is checked against the gap.
+    // Prescribed along the normal: no bound, but the value is checked against the gap.
     let constraints =
         Constraints::new(&origin, &[prescribed([0.0, -1.0])], &mut [gap([0.0, -1.0], 0.1)])
             .unwrap();
     assert!(constraints.bounds.is_empty());
     assert!(constraints.pose(&[0.1], &[], &origin).is_ok());
     assert!(constraints.pose(&[0.11], &[], &origin).is_err());
-    // Held the other way round, the same gap is on the other side.
+    // Prescribed the other way round, the same gap is on the other side.
     let constraints =
         Constraints::new(&origin, &[prescribed([0.0, 1.0])], &mut [gap([0.0, -1.0], 0.1)]).unwrap();
     assert!(constraints.pose(&[-0.11], &[], &origin).is_err());

@@ -9,7 +9,7 @@ use signorini::{
 
 const MATERIAL: &str = "material = { young = 100, poisson = 0.3, plane = 'stress' }";
 
-/// The square on a foundation `gap` below it, against sliding held by an axis, pressed by
+/// The square on a foundation `gap` below it, supported sideways by an axis, pressed by
 /// `traction`; static.
 fn pressed(gap: f64, traction: &str) -> Result<DiscreteProblem, SetupError> {
     let text = format!(

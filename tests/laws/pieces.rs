@@ -1,4 +1,4 @@
-//! Meshes of several pieces, and parts that meet in one node: each piece stands, is held by contact
+//! Meshes of several pieces, and parts that meet in one node: each piece stands, is supported by contact
 //! or moves by itself.
 
 use crate::support::{close, difference, distorted, moved, problem, run, square, turn};
@@ -145,10 +145,10 @@ fn a_piece_that_the_load_drives_is_named_whatever_the_others_carry() {
         let driven = format!("{{ name = 'top2', traction = [{load}, 0] }}");
         let refusal = refusal(pair(), &format!("{CLAMPED}, {driven}"));
         assert!(refusal.contains("the mesh has 2 pieces (gmsh: Coherence"), "{refusal}");
-        let motion = "nothing holds the piece around (3.5000, 0.5000) against the horizontal";
+        let motion = "nothing supports the piece around (3.5000, 0.5000) against the horizontal";
         assert!(refusal.contains(motion), "{refusal}");
     }
-    // Contact holds it down but not up.
+    // Contact prevents one direction only.
     let lifted = "{ name = 'bottom2', gap = 0 }, { name = 'top2', traction = [0, 1] }";
     let refusal = refusal(pair(), &format!("{CLAMPED}, {lifted}"));
     assert!(refusal.contains("(3.5000, 0.5000) against the vertical translation"), "{refusal}");
@@ -323,10 +323,10 @@ fn a_disc_in_a_bore_turns_freely_although_its_edges_are_only_nearly_equal() {
     // gmsh cuts a circle into edges equal to 1e-8, in one curve or several.
     for (uneven, curves) in [(0.0, 1), (1e-8, 1), (1e-8, 4), (1e-6, 3)] {
         for length in [1.0, 1e3, 1e-3] {
-            let held = (0..curves).map(|k| format!("{{ name = 'rim{k}', gap = 0 }},"));
+            let rims = (0..curves).map(|k| format!("{{ name = 'rim{k}', gap = 0 }},"));
             let text = format!(
                 "{MATERIAL}\nbody = {{ force = [0, -1] }}\nboundary = [{}]",
-                held.collect::<String>()
+                rims.collect::<String>()
             );
             let mesh = moved(disc(24, uneven, curves), |x| x.map(|v| length * v));
             let problem = problem(mesh, &text).unwrap_or_else(|e| panic!("{e}"));

@@ -1,11 +1,11 @@
 //! The figures of every shipped scene at its shipped settings, as they were when the laws
-//! beside this file held. A change here is a change of what users get.
+//! beside this file passed. A change here is a change of what users get.
 //!
 //! To regenerate the table after a change that is meant:
 //! `cargo test --test laws regression -- --nocapture`, and paste the rows it prints.
 //!
 //! The unstructured meshes are those of gmsh 4.8.4. Another release may triangulate
-//! otherwise; then their figures are held to the discretisation error only.
+//! otherwise; then their figures are compared within the discretisation error only.
 
 use crate::support::{run, shipped, shipped_names};
 use signorini::contact::SOLVERS;

@@ -1,4 +1,4 @@
-//! Rigid motions: which are held, which only contact resists, which the load drives.
+//! Rigid motions: which are prevented, which only contact resists, which the load drives.
 
 use crate::support::{close, difference, distorted, largest, moved, problem, run, square, turn};
 use signorini::{
@@ -85,7 +85,7 @@ fn loads_that_nothing_balances_are_named_by_the_motion_they_drive() {
     assert_eq!(on_ground("[0, 1]"), "the vertical translation");
     let couple = "{ name = 'left', traction = [0, -1] }, { name = 'right', traction = [0, 1] }";
     assert!(driven(1, square(4), couple).starts_with("the rotation about (0.5000, 0.5000)"));
-    // Held against sliding by an axis, a body is still lifted.
+    // Supported sideways by an axis, a body is still lifted.
     let lifted = "{ name = 'left', symmetry = true }, { name = 'bottom', gap = 0 },
                   { name = 'top', traction = [0, 1] }";
     assert_eq!(driven(1, square(4), lifted), "the vertical translation");
@@ -248,14 +248,14 @@ fn a_disc_in_a_ring_can_only_turn() {
         let sagitta = 1.0 - (std::f64::consts::PI / corners as f64).cos();
         round.set_offset([a, b], mesh.edge_normal([a, b]).0.map(|normal| sagitta * normal));
     }
-    for held in ["symmetry = true", "gap = 0"] {
+    for condition in ["symmetry = true", "gap = 0"] {
         for (order, mesh) in [(1, &mesh), (2, &mesh), (2, &round)] {
-            let rim = format!("{{ name = 'rim', {held} }}");
+            let rim = format!("{{ name = 'rim', {condition} }}");
             let problem = of_order(order, mesh.clone(), &rim).unwrap_or_else(|e| panic!("{e}"));
             let motions = &problem.motions;
             let names: Vec<_> = motions.free.iter().map(RigidMotion::to_string).collect();
-            assert_eq!(names, ["the rotation about (3.0000, 2.0000)"], "P{order}, {held}");
-            assert_eq!(motions.resisted() > 0, held == "gap = 0");
+            assert_eq!(names, ["the rotation about (3.0000, 2.0000)"], "P{order}, {condition}");
+            assert_eq!(motions.resisted() > 0, condition == "gap = 0");
         }
     }
 }

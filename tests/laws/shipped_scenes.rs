@@ -139,7 +139,7 @@ fn the_whole_bridge_is_symmetric_and_twice_its_half() {
                 }
                 close(part_zeta[i], full_zeta[j], 1e-10);
             }
-            // Nothing holds the bridge sideways: the answer given has ∫u_x = 0.
+            // Nothing supports the bridge sideways: the answer given has ∫u_x = 0.
             let area: f64 = whole.body.nodes.weights.iter().sum();
             let drift: f64 =
                 (0..nodes.len()).map(|i| whole.body.nodes.weights[i] * full.state.u[2 * i]).sum();

@@ -64,7 +64,7 @@ pub fn unstructured(size: f64) -> Mesh {
 pub const ORDERS: [Order; 2] = [Order::Linear, Order::Quadratic];
 
 /// A mesh by gmsh. It cannot be started while MPI, as it starts in another test, changes the
-/// environment: so this waits for its turn at a session (and must not be called with one held).
+/// environment: so this waits for its turn at a session (and must not be called by who has one).
 fn meshed(file: &Path, parameters: &BTreeMap<String, f64>, order: Order) -> Mesh {
     drop(Session::start(&[]).unwrap());
     mesh::load(file, parameters, order).unwrap()

@@ -8,7 +8,7 @@ use signorini::{
 };
 
 /// Pressed on a wavy foundation until t = 1, harder on the left; then torn off it on the right.
-/// Where the left is an axis, only contact holds the body.
+/// Where the left is an axis, only contact supports the body.
 fn scene(left: &str) -> DiscreteProblem {
     let text = format!(
         "material = {{ young = 100, poisson = 0.3, plane = 'strain' }}

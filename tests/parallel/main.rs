@@ -140,7 +140,7 @@ fn the_lshape_under_a_rolling_load() {
     contact_travels(&test_directory, "out/lshape-rolling-active-set-1");
 }
 
-/// Contact unknowns are eliminated last: without damage the factor of the first step serves for every set
+/// Contact unknowns are eliminated last: without damage the factor of the first step is kept for every set
 /// of active nodes.
 #[test]
 fn a_rolling_load_without_damage_takes_one_factorisation() {

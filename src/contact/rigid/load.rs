@@ -14,15 +14,15 @@ const BALANCED: f64 = 1e-9;
 const REMAINDER: f64 = 1e-8;
 /// A piece that carries less than this of all the load carries rounding.
 const UNLOADED: f64 = 1e-14;
-/// A component of the resultant below this, relative to Σ|f|, is not told.
+/// A component of the resultant below this, relative to Σ|f|, is shown as zero.
 const ROUNDING: f64 = 1e-12;
 
 /// The load does work on a rigid motion that nothing prevents.
 #[derive(Debug, Clone, thiserror::Error)]
 #[error(
-    "{}nothing holds {} against {}, and the load drives it (resultant ({:.4e}, {:.4e}) N/m, \
-     moment about its centre {moment:.4e} N): hold it by a `displacement`, a `symmetry` axis or a `gap`, \
-     or balance the load",
+    "{}nothing supports {} against {}, and the load drives it (resultant ({:.4e}, {:.4e}) N/m, \
+     moment about its centre {moment:.4e} N): support it by a `displacement`, a `symmetry` axis or a \
+     `gap`, or balance the load",
     disjoint(motion), motion.what_moves(), motion.largest(), force[0], force[1]
 )]
 pub struct DrivenMotion {

@@ -1,4 +1,4 @@
-//! Motions without strain, and how they are told.
+//! Motions without strain, and their names in messages.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -41,7 +41,7 @@ impl PartMotion {
     }
 }
 
-/// A component of a motion that moves the part less than this, relative, is not told.
+/// A component of a motion that moves the part less than this, relative, is left out of its name.
 const NEGLIGIBLE: f64 = 1e-6;
 
 impl fmt::Display for PartMotion {

@@ -26,8 +26,8 @@ pub(crate) fn unconstrained_motions(
     null_space(gram, 1e-10 * comm.total(rigid.norm_squared()))
 }
 
-/// Lets the body move from c, given at the bounds, with u·ν kept at the `active` bounds, as the load drives it until it
-/// reaches a further bound, which becomes active, and again until no rigid motion is left. `rigid` are
+/// Lets the body move from c, given at the bounds, with u·ν kept at the `active` bounds, as the load
+/// drives it until it reaches a further bound, which becomes active, and again until no rigid motion is left. `rigid` are
 /// the u·ν of its motions at the bounds, a column each, `work` that of the load on them. Returns how far
 /// it moves along each motion, m, and whether the active bounds then constrain all. Collective.
 ///

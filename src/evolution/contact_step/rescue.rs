@@ -9,7 +9,7 @@ impl ContactStep<'_> {
     /// rescuer; the step's report tells. Every solve starts from the accepted steps.
     ///
     /// # Errors
-    /// The solver failed, or no answer of its met the KKT tolerance, nor one of its rescuer.
+    /// The solver failed, or neither its answers nor those of its rescuer met the KKT tolerance.
     pub fn solve(&mut self, step: usize, time: f64, zeta: &[f64]) -> Result<Step, RunError> {
         let comm = self.problem.body.nodes.partition.comm();
         let solved = self.solve_by_one(step, time, zeta);

@@ -1,4 +1,4 @@
-//! Writes a mesh as text in MSH 2.2, of which gmsh and the reader make the same mesh again.
+//! Writes a mesh as text in MSH 2.2, which gmsh and our reader turn into the same mesh again.
 
 use crate::mesh::{Mesh, sides, sorted};
 use std::fmt::Write;

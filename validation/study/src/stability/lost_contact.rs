@@ -117,7 +117,7 @@ fn judged(
     let many = sweep.many.is_some_and(|[from, to]| (from..=to).contains(&value));
     let noted = unconstrained.is_some();
     let apart = other.filter(|_| !noted).map(|other| difference(&state.u, other));
-    // The last node that holds the body presses with a share of about margin/h; p (g − u·ν)
+    // The last node that supports the body presses with a share of about margin/h; p (g − u·ν)
     // within the tolerance then leaves its gap uncertain by the tolerance over that.
     let margin = sweep.many.map_or(f64::INFINITY, |[_, to]| (value - to).abs());
     let allowed = AGREEMENT.max(TOLERANCE / (margin * CELLS as f64));

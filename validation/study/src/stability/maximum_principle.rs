@@ -97,9 +97,9 @@ fn add(
         })?;
     let seen = Seen::of(&problem, &history, step);
     // The sources did not allow ζ_* to be reached there.
-    let early_stop = outcome.stopped.is_some() && seen.next_floor > problem.threshold();
+    let early_stop = outcome.stopped.is_some() && seen.least_admissible > problem.threshold();
     let undershoot = match outcome.stopped {
-        Some(stop) => seen.undershoot.max(seen.next_floor - stop.zeta_min),
+        Some(stop) => seen.undershoot.max(seen.least_admissible - stop.zeta_min),
         None => seen.undershoot,
     };
     let violated = seen.rise.max(undershoot) > ROUNDING;
@@ -151,28 +151,28 @@ fn problem(
 
 /// What a history shows, found from its states alone.
 struct Seen {
-    /// Largest ζ beyond the least max ζ before it.
+    /// By how much ζ rose above its maximum at an earlier time.
     rise: f64,
     /// By how much ζ fell below what the sources allow.
     undershoot: f64,
     /// The least ζ that the sources allow in the step after the last.
-    next_floor: f64,
+    least_admissible: f64,
 }
 
 impl Seen {
     fn of(problem: &DiscreteProblem, history: &[Step], length: f64) -> Self {
-        let mut seen = Self { rise: 0.0, undershoot: 0.0, next_floor: 0.0 };
-        let (mut floor, mut ceiling) = (f64::NEG_INFINITY, f64::INFINITY);
+        let mut seen = Self { rise: 0.0, undershoot: 0.0, least_admissible: 0.0 };
+        let (mut least, mut most) = (f64::NEG_INFINITY, f64::INFINITY);
         for step in history {
             let zeta = &step.state.zeta;
             let low = zeta.iter().copied().fold(f64::INFINITY, f64::min);
             let high = zeta.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            seen.rise = seen.rise.max(high - ceiling);
-            seen.undershoot = seen.undershoot.max(floor - low);
-            ceiling = ceiling.min(high);
-            floor = floor.max(low) + length * least_source(problem, step);
+            seen.rise = seen.rise.max(high - most);
+            seen.undershoot = seen.undershoot.max(least - low);
+            most = most.min(high);
+            least = least.max(low) + length * least_source(problem, step);
         }
-        seen.next_floor = floor;
+        seen.least_admissible = least;
         seen
     }
 }

@@ -27,15 +27,15 @@ struct Sweep {
     lambdas: &'static [f64],
 }
 
-const WIDE: [f64; 9] = [-3.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 3.0];
+const MANY: [f64; 9] = [-3.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 3.0];
 const FEW: [f64; 5] = [-2.0, -1.0, 0.0, 1.0, 2.0];
 const LAMBDAS: [f64; 7] = [0.1, 0.3, 0.45, 0.5, 0.55, 0.7, 0.9];
 const SIDES: [f64; 3] = [0.3, 0.5, 0.7];
 
 const SWEEP: Sweep = Sweep { cells: 32, contrast: 1.0, cap: 300, decades: &FEW, lambdas: &[0.5] };
 const SWEEPS: [Sweep; 8] = [
-    Sweep { cells: 16, cap: 1000, decades: &WIDE, lambdas: &LAMBDAS, ..SWEEP },
-    Sweep { cap: 500, decades: &WIDE, lambdas: &SIDES, ..SWEEP },
+    Sweep { cells: 16, cap: 1000, decades: &MANY, lambdas: &LAMBDAS, ..SWEEP },
+    Sweep { cap: 500, decades: &MANY, lambdas: &SIDES, ..SWEEP },
     Sweep { cells: 64, ..SWEEP },
     Sweep { cells: 128, cap: 100, decades: &[-1.0, 0.0, 1.0], ..SWEEP },
     Sweep { contrast: 1e1, ..SWEEP },

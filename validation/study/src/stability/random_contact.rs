@@ -17,7 +17,7 @@ const PROBLEMS: u64 = 1_000;
 /// KKT tolerance of the scenes (the default of the program).
 const TOLERANCE: f64 = 1e-10;
 /// The kinds of problems, in turn.
-const KINDS: [&str; 5] = ["smooth", "rough", "grazing", "held by contact", "two sides"];
+const KINDS: [&str; 5] = ["smooth", "rough", "grazing", "supported by contact", "two sides"];
 
 /// Random numbers, the same on every machine.
 struct Random(SplitMix64);
@@ -180,8 +180,8 @@ impl Boundaries {
                 (CLAMPED, gap, top, [none(), none()])
             }
             // The waves lift by less than 9 + 5: 40 downwards keep the body on the foundation, and
-            // the symmetry axis holds everything else.
-            "held by contact" => {
+            // the symmetry axis prevents everything else.
+            "supported by contact" => {
                 (SYMMETRIC, gap, [tangential, format!("-40+{load}")], [none(), pull])
             }
             _ => (CLAMPED, gap, [none(), format!("-10+{load}")], [pull, tangential]),

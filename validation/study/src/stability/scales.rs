@@ -15,11 +15,11 @@ use signorini::{
 
 /// How a body meets a uniform gap, and what its left side does.
 const KINDS: [(&str, &str); 3] = [
-    // Held on its left, bent over the gap.
+    // Clamped on its left, bent over the gap.
     ("clamped", "displacement = [0, 0]"),
     // Falls through the gap before it deforms.
     ("falling", "symmetry = true"),
-    // Held, pressed and pulled: the load passes zero at t = 1/2, as well as rounding allows.
+    // Clamped, pressed and pulled: the load passes zero at t = 1/2, as well as rounding allows.
     ("swinging", "displacement = [0, 0]"),
 ];
 /// Factors of stresses and of lengths.

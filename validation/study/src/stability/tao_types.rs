@@ -22,7 +22,7 @@ boundary = [
     { name = "top", traction = [0, "-max(0, 1 - abs(x - 1.5)) + 0.3*max(0, x - 3)"] },
 ]
 "#;
-/// Half of a block that only contact holds up.
+/// Half of a block that only contact supports.
 const BLOCK: &str = r#"
 boundary = [
     { name = "left", symmetry = true },
