@@ -5,7 +5,9 @@ import csv
 import json
 import tomllib
 import xml.etree.ElementTree as ElementTree
+import zlib
 from collections import defaultdict
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -20,15 +22,28 @@ from results import ResultError, Results, without_roundoff
 NOWHERE = np.zeros(2), np.zeros(2)
 
 
+@contextmanager
+def whole(path):
+    """Names the file where something in it cannot be read."""
+    try:
+        yield path
+    except (TypeError, ValueError, IndexError, ElementTree.ParseError, zlib.error, meshio.ReadError):
+        raise ResultError(f"{path}: it is damaged or cut off; run the scene again") from None
+
+
 def read_results(folder, time=None):
     """Everything a figure needs from a result folder: the frame nearest to `time`, or the last."""
     folder, summary = Path(folder), {}
     try:
-        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-        with open(folder / "history.csv", newline="", encoding="utf-8") as file:
+        with whole(folder / "summary.json") as file:
+            summary = json.loads(file.read_text(encoding="utf-8"))
+        path = folder / "history.csv"
+        with whole(path), open(path, newline="", encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
-        scene = folder / "scene.toml"
-        frames = ElementTree.parse(folder / "fields.pvd").findall(".//DataSet")
+        with whole(folder / "scene.toml") as file:
+            scene = tomllib.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+        with whole(folder / "fields.pvd") as file:
+            frames = ElementTree.parse(file).findall(".//DataSet")
         frames = [(float(frame.get("timestep")), folder / frame.get("file")) for frame in frames]
         frames.sort(key=lambda frame: frame[0])
         chosen = frames[-1 if time is None else nearest(frames, time)]
@@ -37,7 +52,7 @@ def read_results(folder, time=None):
         results = Results(
             folder=folder,
             summary=summary,
-            scene=tomllib.loads(scene.read_text(encoding="utf-8")) if scene.exists() else {},
+            scene=scene,
             history={c: np.array([_number(r[c]) for r in rows]) for c in (rows or [{}])[0]},
             frames=frames,
             time=chosen[0],
@@ -48,12 +63,13 @@ def read_results(folder, time=None):
     except OSError as error:
         if failed := summary.get("error"):
             raise ResultError(f"{folder}: nothing to draw, the run failed: {failed}") from None
-        raise ResultError(f"{error.filename}: {error.strerror}") from None
+        what = "" if summary else "; name a folder of results, out/SCENE"
+        raise ResultError(f"{error.filename}: {error.strerror}{what}") from None
     except KeyError as error:
         raise ResultError(f"{folder}: the field {error} is missing") from None
     except IndexError:
         raise ResultError(f"{folder}: fields.pvd lists no frame") from None
-    except (ValueError, ElementTree.ParseError, meshio.ReadError) as error:
+    except ValueError as error:
         raise ResultError(f"{folder}: {error}") from None
 
 
@@ -105,11 +121,13 @@ def read_frame(path):
 
     meshio does not read lists; nodes that pieces share are joined by their numbers.
     """
-    if path.suffix != ".pvtu":
-        return meshio.read(path)
-    sources = [piece.get("Source") for piece in ElementTree.parse(path).findall(".//Piece")]
+    with whole(path):
+        if path.suffix != ".pvtu":
+            # meshio.read would end the program where it finds a fault.
+            return meshio.vtu.read(path)
+        sources = [piece.get("Source") for piece in ElementTree.parse(path).findall(".//Piece")]
     # A rank that has no triangles leaves an empty piece.
-    pieces = [piece for piece in (meshio.read(path.parent / s) for s in sources) if piece.cells]
+    pieces = [piece for piece in (read_frame(path.parent / s) for s in sources) if piece.cells]
     numbers = [np.ravel(piece.point_data["global_node"]) for piece in pieces]
     _, first, place = np.unique(np.concatenate(numbers), return_index=True, return_inverse=True)
     starts = np.cumsum([0, *map(len, numbers)])
@@ -173,7 +191,7 @@ def _contact_rows(path):
     """Of contact.csv the normals and remaining gaps by time and node."""
     rows = defaultdict(lambda: defaultdict(list))
     if path.exists():
-        with open(path, newline="", encoding="utf-8") as file:
+        with whole(path), open(path, newline="", encoding="utf-8") as file:
             for row in csv.DictReader(file):
                 x, y, nx, ny, gap = (
                     float(row[c]) for c in ("x", "y", "normal_x", "normal_y", "gap"))

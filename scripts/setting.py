@@ -194,7 +194,7 @@ def _colour(condition):
 
 
 def _words(name, condition, units):
-    """What holds on a boundary."""
+    """The conditions on a boundary, in words."""
     length, area = units["length"], units["area"]
     words = {
         "displacement": lambda u: f"u = {_pair(u)} {length}",
@@ -204,7 +204,8 @@ def _words(name, condition, units):
         "traction": lambda force: f"traction {_pair(force)} {area}",
         "pressure": lambda pressure: f"pressure {pressure} {area}",
     }
-    parts = [say(condition[key]) for key, say in words.items() if condition.get(key)]
+    parts = [say(condition[key]) for key, say in words.items()
+             if condition.get(key, False) is not False]
     return textwrap.fill(f"{name}: {', '.join(parts)}".replace("$", r"\$"), 90)
 
 

@@ -22,7 +22,7 @@ class Bounds:
 
 
 @dataclass
-class Equilibrium:
+class ContactSolution:
     """Displacement, residual K u − f (the reactions) and the normal reactions on Γ_C."""
 
     displacement: np.ndarray
@@ -68,7 +68,7 @@ def solve_contact(stiffness, load, bounds, tolerance=1e-9):
 
 
 def _rest_on(stiffness, load, bounds, active):
-    """The equilibrium in which exactly the `active` unknowns rest on their bound."""
+    """The solution in which exactly the `active` unknowns rest on their bound."""
     at = np.where(np.isfinite(bounds.lower), bounds.lower, bounds.upper)[active]
     return solve_linear(stiffness, load, np.r_[bounds.fixed, active], np.r_[bounds.values, at])
 
@@ -133,7 +133,7 @@ def _certify(stiffness, load, bounds, u, active, tolerance):
     if not worst <= tolerance:
         raise ContactError(f"the KKT conditions hold only to {worst:.1e} (relative)")
     constrained = lower | upper
-    return Equilibrium(u, r, float(np.abs(r[constrained]).sum()), len(active))
+    return ContactSolution(u, r, float(np.abs(r[constrained]).sum()), len(active))
 
 
 def _direct(ksp):

@@ -85,17 +85,17 @@ def evolve(scene, mesh, observe=lambda state: None):
     law = {**DEFAULTS, **scene.get("damage", {})}
     zeta = Expression(law["initial"]).at(mesh.nodes)
     if "time" not in scene:
-        state = body.equilibrium(1.0, zeta)
+        state = body.contact_step(1.0, zeta)
         observe(state)
         return state, None
     end, step = float(scene["time"]["end"]), float(scene["time"]["step"])
     damage = Damage(body, step) if "damage" in scene else None
-    state = body.equilibrium(0.0, zeta)
+    state = body.contact_step(0.0, zeta)
     observe(state)
     for n in range(1, round(end / step) + 1):
         zeta = damage.advance() if damage else state.zeta
         if zeta.min() <= law["threshold"]:
             return state, n * step
-        state = body.equilibrium(n * step, zeta)
+        state = body.contact_step(n * step, zeta)
         observe(state)
     return state, None

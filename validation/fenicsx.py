@@ -188,7 +188,7 @@ class Body:
             members = edges[(component == c) & (sign == s)]
             yield np.unique(self.nodes.on(members)), int(c), int(s)
 
-    def equilibrium(self, t, zeta):
+    def contact_step(self, t, zeta):
         """Problem (26), or (27) at t = 0: the displacement for a given damage field."""
         self.time.value = t
         self.zeta.x.array[self.zeta_dof_of_node] = zeta

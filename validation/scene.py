@@ -46,7 +46,7 @@ class _Functions(ast.NodeTransformer):
 class Expression:
     """A formula in x, y, t, evaluated in whatever arithmetic the names are bound to.
 
-    The same text serves nodal values (NumPy) and variational forms (UFL).
+    The same text gives nodal values (NumPy) and variational forms (UFL).
     """
 
     def __init__(self, text):

@@ -66,9 +66,6 @@ impl Factor {
     /// Makes factors of matrices like this one so that [`Self::restrict`] may prescribe these owned unknowns,
     /// if there are not too many of them. Other unknowns than those of the last call discard the present
     /// factor. Collective.
-    ///
-    /// # Errors
-    /// PETSc failed.
     pub(crate) fn condense(
         &mut self,
         matrix: &Matrix,
@@ -148,9 +145,6 @@ impl Factor {
 
     /// Prescribes some of the condensed unknowns of the matrix last factorised; false if what is left of it
     /// is not positive definite. Collective.
-    ///
-    /// # Errors
-    /// There is no memory for it.
     pub(super) fn restrict(&mut self, prescribed: &[usize]) -> Result<bool, PetscError> {
         let Some((_, Method::Substructure { factor, .. })) = &mut self.method else {
             return Ok(false);
@@ -193,9 +187,6 @@ impl Factor {
 
     /// Prescribes these unknowns in the factor, where it is condensed; false if there is no factor then.
     /// Collective.
-    ///
-    /// # Errors
-    /// There is no memory for it.
     pub(crate) fn prescribe(&mut self, unknowns: &[usize]) -> Result<bool, PetscError> {
         let condensed =
             matches!(self.method, Some((_, Method::Substructure { condensed: true, .. })));

@@ -11,24 +11,27 @@ const SCENE: &str = include_str!("new.toml");
 /// one of the two files.
 pub fn new(name: &Path) -> Result<(), Failure> {
     let file = name.extension().is_some_and(|ending| ending == "toml" || ending == "geo");
-    let name = &if file { name.with_extension("") } else { name.to_owned() };
+    let Some(stem) = (if file { name.file_stem() } else { name.file_name() }) else {
+        let name = name.display();
+        return Err(Failure::input(format!("{name} is no name; write, say, `signorini new dam`")));
+    };
     let [geometry, scene] = [".geo", ".toml"].map(|extension| {
-        let mut path = name.as_os_str().to_owned();
-        path.push(extension);
-        path
+        let mut file = stem.to_owned();
+        file.push(extension);
+        name.with_file_name(file)
     });
-    if let Some(there) = [&geometry, &scene].into_iter().find(|path| Path::new(path).exists()) {
+    if let Some(there) = [&geometry, &scene].into_iter().find(|path| path.exists()) {
         let there = there.display();
         return Err(Failure::input(format!("{there} is there already; give another name")));
     }
-    let file = Path::new(&geometry).file_name().unwrap_or_default().to_string_lossy();
+    let file = geometry.file_name().unwrap_or_default().to_string_lossy();
     let text = SCENE.replace("\"new.geo\"", &toml::Value::from(&*file).to_string());
     for (path, text) in [(&geometry, GEOMETRY), (&scene, &text)] {
         let written = fs::write(path, text);
         written
             .map_err(|error| Failure::input(format!("cannot write {}: {error}", path.display())))?;
     }
-    let (geometry, scene, name) = (geometry.display(), scene.display(), name.display());
+    let (geometry, scene, name) = (geometry.display(), scene.display(), stem.display());
     say(&format!(
         "{geometry} and {scene} are written; next:\n  signorini check {scene}\n  signorini run {scene}\n  \
          signorini figures out/{name}"

@@ -40,9 +40,6 @@ const ITERATIONS: usize = 30;
 impl<'a> BothOrders<'a> {
     /// From the problem of a run with its K⁻¹ and its last state, and the same problem in the other order;
     /// `None` where the triangle has no other order.
-    ///
-    /// # Errors
-    /// PETSc failed.
     pub(super) fn new(
         session: &'a Session,
         run: &'a DiscreteProblem,

@@ -83,9 +83,6 @@ impl BubbleSystem<'_> {
     ///
     /// r of the three on triangle t being `residual(t)`. The system is well conditioned on any mesh:
     /// conjugate gradients with its diagonal take a few iterations. Collective.
-    ///
-    /// # Errors
-    /// PETSc failed.
     pub(super) fn advance(
         &self,
         before: &[[f64; 3]],

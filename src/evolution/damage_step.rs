@@ -143,9 +143,6 @@ impl DamageStep<'_> {
 
     /// Replaces an error δ = `error` of ζ_{n−1} by what diffusion leaves of it after a planned step of
     /// length k_n, δ + (k_n/k) ((M + kκL)⁻¹ M δ − δ); where that has no answer it stays. Collective.
-    ///
-    /// # Errors
-    /// PETSc failed.
     pub(super) fn diffuse(
         &mut self,
         planned: &PlannedStep,

@@ -64,7 +64,7 @@ pub enum StepFailure {
     /// The damage system has no finite solution.
     #[error(
         "the damage equation has no finite answer: its source overflows or its matrix is not \
-         positive definite; look for extreme numbers in [damage] and the loads"
+         positive definite; look for extreme numbers in [damage], the loads and the mesh"
     )]
     Damage,
     /// The relative residual of the damage system is above its tolerance.

@@ -112,9 +112,6 @@ fn percent(error: f64) -> String {
 
 impl DiscreteProblem {
     /// The estimated error of u in the energy norm, relative, from the mesh. Collective.
-    ///
-    /// # Errors
-    /// PETSc failed.
     pub(super) fn energy_error(&self, zeta: &[f64], u: &[f64]) -> Result<f64, PetscError> {
         let recovered = RecoveredStrains::new(&self.body, u)?;
         let zeta = self.zeta_at_points(zeta);

@@ -27,7 +27,6 @@ pub struct Face {
 impl Face {
     /// Whether the other face continues this one smoothly, at an angle of no more than
     /// [`CORNER_ANGLE`] between their normals.
-    #[must_use]
     pub fn continues(&self, other: &Self) -> bool {
         let ([a, b], [c, d]) = (self.normal, other.normal);
         // The cosine alone would lose small angles to rounding.
@@ -37,7 +36,6 @@ impl Face {
     }
 
     /// Both faces as one: the length-weighted mean of the normals, the sum of the lengths.
-    #[must_use]
     pub fn joined(&self, other: &Self) -> Self {
         let sum = [0, 1].map(|i| self.length * self.normal[i] + other.length * other.normal[i]);
         let norm = sum[0].hypot(sum[1]);
@@ -51,7 +49,6 @@ impl Face {
 /// A node's normal is the length-weighted mean of its edges' normals; at a corner, where
 /// they differ by more than [`CORNER_ANGLE`], it keeps both. The lengths of all faces add
 /// up to the length of the edges.
-#[must_use]
 pub fn boundary_nodes(faces: impl IntoIterator<Item = (usize, Face)>) -> Vec<BoundaryNode> {
     let mut nodes: BTreeMap<usize, Vec<Face>> = BTreeMap::new();
     for (node, own) in faces {

@@ -22,7 +22,6 @@ pub struct Components {
 
 impl Mesh {
     /// The components of this mesh, numbered as its triangles first meet them.
-    #[must_use]
     pub fn components(&self) -> Components {
         let sides = sides(&self.triangles);
         let inner = sides.windows(2).filter(|pair| pair[0].edge == pair[1].edge);

@@ -51,7 +51,6 @@ pub struct Curve {
 
 impl Mesh {
     /// Outward unit normal and length (m) of a boundary edge that has the body on its left.
-    #[must_use]
     pub fn edge_normal(&self, [from, to]: [usize; 2]) -> ([f64; 2], f64) {
         let (a, b) = (self.nodes[from], self.nodes[to]);
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
@@ -60,7 +59,6 @@ impl Mesh {
     }
 
     /// The edges of one triangle alone, the body on their left.
-    #[must_use]
     pub fn boundary_edges(&self) -> Vec<[usize; 2]> {
         let sides = sides(&self.triangles);
         let single = sides.chunk_by(|a, b| a.edge == b.edge).filter(|sides| sides.len() == 1);
@@ -72,7 +70,6 @@ impl Mesh {
     }
 
     /// The smallest angle of all triangles, degrees, and a corner of its triangle, m.
-    #[must_use]
     pub fn smallest_angle(&self) -> (f64, [f64; 2]) {
         let corners = self.triangles.iter().map(|triangle| triangle.map(|node| self.nodes[node]));
         let angles = corners.map(|corners| (smallest_angle(corners), corners[0]));
@@ -118,13 +115,11 @@ fn sides(triangles: &[[usize; 3]]) -> Vec<Side> {
 }
 
 /// An edge by its ends in increasing order.
-#[must_use]
 pub fn sorted([a, b]: [usize; 2]) -> [usize; 2] {
     [a.min(b), a.max(b)]
 }
 
 /// The longer side of the box around `points`, m.
-#[must_use]
 pub fn extent(points: &[[f64; 2]]) -> f64 {
     let side = |axis: usize| {
         let low = points.iter().fold(f64::INFINITY, |low, point| low.min(point[axis]));
@@ -134,7 +129,6 @@ pub fn extent(points: &[[f64; 2]]) -> f64 {
 }
 
 /// Twice the signed area of the triangle abc, m², positive when counter-clockwise.
-#[must_use]
 pub fn twice_area(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
 }

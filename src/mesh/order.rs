@@ -6,7 +6,6 @@ impl Mesh {
     /// Numbers the nodes along Morton's curve (G. M. Morton, *A computer oriented geodetic data base*, IBM,
     /// 1966), and the triangles by their least node: what is near in the body is then near in memory.
     /// (As gmsh numbers 129,000 nodes, filling K takes twice as long.)
-    #[must_use]
     pub fn in_morton_order(self) -> Self {
         let low = [0, 1].map(|axis| self.nodes.iter().fold(f64::INFINITY, |x, p| x.min(p[axis])));
         let scale = f64::from(u32::MAX) / extent(&self.nodes);

@@ -11,7 +11,6 @@ const STRAIGHT: f64 = 1e-9;
 
 impl Mesh {
     /// The midpoint of an edge, m; of a curved one that of its parabola.
-    #[must_use]
     pub fn midpoint(&self, [a, b]: [usize; 2]) -> [f64; 2] {
         let curved = self.curved.get(&sorted([a, b]));
         curved.copied().unwrap_or_else(|| mean(self.nodes[a], self.nodes[b]))
@@ -44,7 +43,6 @@ impl Mesh {
     }
 
     /// Whether any side of a triangle is curved.
-    #[must_use]
     pub fn is_curved(&self, [a, b, c]: [usize; 3]) -> bool {
         let sides = [[a, b], [b, c], [c, a]];
         !self.curved.is_empty()
@@ -52,7 +50,6 @@ impl Mesh {
     }
 
     /// The offsets d of the sides ab, bc and ca of a triangle abc, m.
-    #[must_use]
     pub fn offsets(&self, [a, b, c]: [usize; 3]) -> [[f64; 2]; 3] {
         let nodes = &self.nodes;
         [[a, b], [b, c], [c, a]].map(|[p, q]| offset(nodes[p], nodes[q], self.midpoint([p, q])))

@@ -23,7 +23,6 @@ pub struct Refinement {
 impl Refinement {
     /// A mesh before its first round. Its nodes and triangles keep their numbers; the nodes of a
     /// triangle only take turns.
-    #[must_use]
     pub fn start(mut mesh: Mesh) -> Self {
         let mut triangles = std::mem::take(&mut mesh.triangles);
         for triangle in &mut triangles {

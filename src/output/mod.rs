@@ -166,7 +166,6 @@ pub fn prepare(folder: &Path, mesh: &Path) -> Result<(), OutputError> {
 }
 
 /// Whether a run has left the mesh in `file`.
-#[must_use]
 pub fn is_adapted(file: &Path) -> bool {
     fs::read_to_string(file).is_ok_and(|text| text.ends_with(ADAPTED))
 }
@@ -176,7 +175,6 @@ fn is_result(name: &str) -> bool {
 }
 
 /// Whether both paths lead to one file.
-#[must_use]
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }

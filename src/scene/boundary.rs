@@ -5,7 +5,7 @@ use super::schema::{Fault, is_wrong};
 use serde::Deserialize;
 use std::array;
 
-/// A physical curve and what holds on it.
+/// A physical curve and the conditions on it.
 #[derive(Debug, Clone)]
 pub struct Boundary {
     /// The physical curve.

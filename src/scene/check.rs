@@ -193,7 +193,7 @@ impl Scene {
     }
 
     /// Whether the gap's normal, if fixed, points out of the body all along the curve. Elsewhere
-    /// u·n ≤ g would hold the body back on the wrong side, or let it sink into the obstacle.
+    /// u·n ≤ g would stop the body on the wrong side, or let it sink into the obstacle.
     fn check_normal(&self, boundary: &Boundary, curve: &Curve, mesh: &Mesh) -> Option<Problem> {
         let [nx, ny] = boundary.gap()?.normal?;
         let cosine = |&[from, to]: &[usize; 2]| {

@@ -146,7 +146,11 @@ impl SceneText {
         let syntax = |error: &toml::de::Error| {
             (error.span().unwrap_or(NOWHERE), format!("not valid TOML: {}", error.message()))
         };
-        self.verdict(errors.iter().map(syntax).collect())?;
+        // Behind an unclosed table, keys seem to be duplicates.
+        let is_duplicate = |error: &toml::de::Error| error.message() == "duplicate key";
+        let all = errors.first().is_none_or(is_duplicate);
+        let told = errors.iter().filter(|error| all || !is_duplicate(error));
+        self.verdict(told.map(syntax).collect())?;
         let mut root = DeValue::Table(root.into_inner());
         let mut problems = Vec::new();
         for argument in &self.arguments {

@@ -65,7 +65,7 @@ pub struct Scene {
     pub units: Units,
     /// Points at which every step is observed; each name once.
     pub probes: Vec<Probe>,
-    /// What holds on the named parts of the boundary; each name once.
+    /// The conditions on the named parts of the boundary; each name once.
     pub boundaries: Vec<Boundary>,
     /// What was not taken as it is written.
     pub notes: Vec<String>,

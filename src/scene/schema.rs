@@ -63,7 +63,9 @@ impl<'t> Findings<'t> {
             (DeValue::Array(array), Some("array")) => self.check_array(&key, array, schema),
             _ => {
                 let value = Spanned::new(NOWHERE, value.clone()).into_deserializer();
-                let value = toml::Value::deserialize(value).map_err(|e| e.message().to_owned());
+                let value = toml::Value::deserialize(value);
+                let value =
+                    value.map_err(|_| "is a number beyond 64 bits; write a smaller one".to_owned());
                 let judged = value.and_then(|value| judge(&value, schema, self.text.folder()));
                 judged.err().into_iter().for_each(|problem| self.note(&key, problem));
             }
@@ -226,6 +228,9 @@ fn judge(value: &toml::Value, schema: &Schema, folder: &Path) -> Result<(), Stri
         }
         (_, Some("string"), _) => ("a string".to_owned(), value.is_str()),
         (_, Some("boolean"), _) => ("true or false".to_owned(), value.is_bool()),
+        (_, Some("array"), _) if schema["maxItems"] == 2 && schema["items"]["type"] != "number" => {
+            ("an array of two, expressions in quotes, like [\"2*x\", 0]".to_owned(), false)
+        }
         (_, Some("array"), _) => ("an array".to_owned(), false),
         (_, Some("object"), _) => ("a table".to_owned(), false),
         (.., Some(number)) => (rule.to_owned(), is_within(number, schema)),

@@ -55,7 +55,6 @@ impl TimeGrid {
 }
 
 /// A time without the rounding errors of its last digits, for people: 0.0248, not 0.024800000000000003.
-#[must_use]
 pub fn rounded(t: f64) -> f64 {
     format!("{t:.9e}").parse().unwrap_or(t)
 }

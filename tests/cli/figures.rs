@@ -21,6 +21,12 @@ fn figures_and_a_report_are_drawn_far_from_the_scripts() {
     assert!(page.contains("data:image/png;base64,") && page.contains("[[boundary]]"));
     let outside = ["src=\"http", "href=", "<link", "@import", "$title"];
     assert!(outside.iter().all(|word| !page.contains(word)), "the page is not whole");
+
+    let last = test_directory.frames("out/scene").pop().expect("a frame").1;
+    let frame = format!("out/scene/{last}");
+    test_directory.write(&frame, &test_directory.read(&frame)[..999]);
+    let cut = format!("{frame}: it is damaged or cut off");
+    test_directory.say(&["figures", "out/scene"]).fails(2, &[&cut]);
 }
 
 #[test]

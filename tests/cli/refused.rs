@@ -31,7 +31,7 @@ const SCENES: &[(&str, &str, &[&str])] = &[
     ("young", "yuong", &["scene.toml:5: unknown key material.yuong", "did you mean `young`?"]),
     ("young = 80", "young = \"80\"", &["scene.toml:5: material.young must be a number"]),
     ("young = 80\n", "", &["scene.toml:4: material.young is required but missing"]),
-    ("[time]", "[time", &["scene.toml:16: not valid TOML"]),
+    ("[time]", "[time", &["scene.toml:16: not valid TOML: unclosed table"]),
     ("young = 80", "young = -80", &["scene.toml:5: material.young must be positive"]),
     ("poisson = 0.3", "poisson = 0.5", &["scene.toml:6: material.poisson must be between"]),
     ("poisson = 0.3", "poisson = -1", &["scene.toml:6: material.poisson must be between"]),

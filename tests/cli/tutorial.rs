@@ -56,6 +56,7 @@ fn a_new_scene_overwrites_nothing() {
     let test_directory = TestDirectory::new();
     test_directory.write("wall.toml", "mine");
     test_directory.say(&["new", "wall"]).fails(2, &["wall.toml is there already"]);
+    test_directory.say(&["new", "."]).fails(2, &[". is no name"]);
     assert!(!test_directory.path("wall.geo").exists());
     // A name with a folder, a blank and a quote.
     fs::create_dir(test_directory.path("my walls")).expect("a folder");

@@ -67,6 +67,14 @@ fn a_bad_set_is_named() {
         ),
         ("damage.initial=t", ["--set damage.initial=t: damage.initial depends", "on t"]),
         ("boundary.load=3", ["boundary.load needs a key", "boundary.load.KEY=VALUE"]),
+        (
+            "boundary.load.traction=[2*x,0]",
+            ["load.traction must be an array of two", "[\"2*x\", 0]"],
+        ),
+        (
+            "output.every=99999999999999999999",
+            ["output.every is a number beyond 64", "--set output"],
+        ),
         ("boundary=3", ["--set boundary=3: boundary must be an array", "--set boundary=3"]),
         (
             "boundary.load.traction=[0,\"q\"]",

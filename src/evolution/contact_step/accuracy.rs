@@ -90,9 +90,6 @@ pub(in crate::evolution) struct Compliance<'a> {
 
 impl<'a> ContactStep<'a> {
     /// With the solver's factor, or one of its own.
-    ///
-    /// # Errors
-    /// There is no memory for it.
     pub(in crate::evolution) fn into_compliance(self) -> Result<Compliance<'a>, PetscError> {
         let Self { session, problem, stiffness, solver, load, c, .. } = self;
         let own = || Factor::new(session, "elastic_", Precision::Preconditioner);
@@ -116,9 +113,6 @@ impl Compliance<'_> {
     /// Estimates the errors of the last answer of a run, and of the one with the largest stationarity
     /// residual before it, relative to the largest displacement; that only if the first error, enlarged by
     /// the ratio of the two residuals, comes near to what is promised. The kept factor is mostly good enough.
-    ///
-    /// # Errors
-    /// PETSc failed.
     pub(in crate::evolution) fn accuracy(
         &mut self,
         outcome: &Outcome,
@@ -172,9 +166,6 @@ impl Compliance<'_> {
     }
 
     /// Takes the nodal damage and the active nodes of a state. Collective.
-    ///
-    /// # Errors
-    /// PETSc failed.
     pub(in crate::evolution) fn set(
         &mut self,
         zeta: &[f64],
@@ -196,9 +187,6 @@ impl Compliance<'_> {
 
     /// Gives back K, which is much of the memory, and keeps a factor of it, if need be that of a state.
     /// Collective.
-    ///
-    /// # Errors
-    /// PETSc failed.
     pub(in crate::evolution) fn keep_factor(&mut self, state: &State) -> Result<(), PetscError> {
         if !self.solver.factor().exists() {
             self.set(&state.zeta, &state.contact)?;
@@ -212,9 +200,6 @@ impl Compliance<'_> {
 
     /// K(ζ)⁻¹ of nodal `forces`, N per metre of thickness, to a digit or more, the active nodes fixed; or
     /// about that, by the factor alone. `None` if these nodes do not support the body. Collective.
-    ///
-    /// # Errors
-    /// PETSc failed.
     pub(in crate::evolution) fn displacement(
         &mut self,
         mut forces: Vec<f64>,

@@ -119,8 +119,10 @@ fn counter_clockwise(
     let twice = twice_area(a, b, c);
     // Huge coordinates overflow the area.
     if twice.abs() <= flat([a, b, c]) || !twice.is_finite() {
-        let problem =
-            format!("triangle {tag} has no area: its nodes lie on a line; mend the mesh there");
+        let problem = format!(
+            "triangle {tag} has no area: its nodes lie on a line, or squares of its coordinates are \
+             beyond double precision; mend the mesh there"
+        );
         return fault(at, problem);
     }
     if twice < 0.0 {

@@ -9,7 +9,6 @@ const TRIANGLES: [u8; 2] = [2, 9];
 
 impl Mesh {
     /// The text of an MSH file. Where an edge is curved, all elements are of second order.
-    #[must_use]
     pub fn to_msh(&self) -> String {
         let order = usize::from(!self.curved.is_empty());
         let midpoints = if order == 1 { self.midpoints() } else { Vec::new() };

@@ -141,7 +141,8 @@ impl<'a> Parser<'a> {
             let name = rest.split(|c: char| !c.is_alphanumeric() && c != '_').next();
             self.name(name.unwrap_or(rest))
         } else {
-            Err(self.unexpected("a number, a name or `(`"))
+            let hint = if first == Some('*') { " (a power is written with `^`)" } else { "" };
+            Err(self.unexpected(&format!("a number, a name or `(`{hint}")))
         }
     }
 
