@@ -163,7 +163,8 @@ fn read(
     let mut parameters = parameters.clone();
     if adapts && scene.accuracy.is_some() && file.extension().is_none_or(|kind| kind != "msh") {
         let usual = mesh::load(file, &parameters, Order::Linear).map_err(Failure::mesh)?;
-        parameters.insert("size".to_owned(), mesh::extent(&usual.nodes) / CELLS);
+        let scaling = mesh::scaling_factor(file).map_err(Failure::mesh)?;
+        parameters.insert("size".to_owned(), mesh::extent(&usual.nodes) / scaling / CELLS);
     }
     let mesh = mesh::load(file, &parameters, scene.order).map_err(Failure::mesh)?;
     Ok((scene, mesh))

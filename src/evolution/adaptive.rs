@@ -79,8 +79,10 @@ pub const SHARE_OF_STEPS: f64 = 0.5;
 const LEAST_RATIO: f64 = 0.125;
 /// A triangle at an edge on which a traction or a gap is not resolved becomes smaller by this.
 const QUARTER: f64 = 0.25;
-/// Triangles are bisected while they are larger than this many times their wanted area.
+/// Triangles are bisected while they are larger than this many times their wanted area; see [`oversize`].
 const OVERSIZE: f64 = 1.5;
+/// A little less than 1: what equals the median up to rounding is bisected with it.
+const TIES: f64 = 1.0 - 1e-9;
 /// Rounds, and triangles of a mesh, at most.
 const ROUNDS: usize = 25;
 const MOST_TRIANGLES: usize = 4_000_000;
@@ -186,7 +188,9 @@ fn choose_steps(scene: &mut Scene, accuracy: f64) -> bool {
 fn accuracy_of_u(accuracy: f64, error: f64, damage_error: Option<f64>, settled: bool) -> f64 {
     match damage_error {
         _ if !settled => accuracy.min(0.5 * error),
-        Some(of_damage) if of_damage > accuracy => accuracy.min(error * accuracy / of_damage),
+        Some(of_damage) if of_damage > ENOUGH * accuracy => {
+            accuracy.min(error * accuracy / of_damage)
+        }
         _ => accuracy,
     }
 }
@@ -225,9 +229,9 @@ fn size_ratios(shares: &[f64], order: f64, aim: f64) -> Vec<f64> {
 
 /// Bisects the triangles until they are as small as `ratios` say.
 fn divided(mut refinement: Refinement, ratios: &[f64]) -> Result<Refinement, MeshError> {
-    let areas = areas(&refinement.mesh);
+    let (areas, oversize) = (areas(&refinement.mesh), oversize(ratios));
     let mut wanted: Vec<f64> =
-        areas.iter().zip(ratios).map(|(a, r)| OVERSIZE * a * r * r).collect();
+        areas.iter().zip(ratios).map(|(a, r)| oversize * a * r * r).collect();
     loop {
         let areas = self::areas(&refinement.mesh);
         let marked: Vec<bool> = areas.iter().zip(&wanted).map(|(a, wanted)| a > wanted).collect();
@@ -236,6 +240,17 @@ fn divided(mut refinement: Refinement, ratios: &[f64]) -> Result<Refinement, Mes
         }
         refinement = refinement.refine(&marked)?;
         wanted = refinement.parent_of_triangle.iter().map(|&parent| wanted[parent]).collect();
+    }
+}
+
+/// [`OVERSIZE`]; where that asks for no bisection, so little that of the triangles that are too large at all
+/// the half with the larger errors is bisected: a mesh that is short of the accuracy must not stay.
+fn oversize(ratios: &[f64]) -> f64 {
+    let mut squares: Vec<f64> = ratios.iter().map(|r| r * r).filter(|&r| r < 1.0).collect();
+    squares.sort_by(f64::total_cmp);
+    match squares.first() {
+        Some(least) if OVERSIZE * least >= 1.0 => TIES / squares[(squares.len() - 1) / 2],
+        _ => OVERSIZE,
     }
 }
 

@@ -20,7 +20,8 @@ pub struct EnergyError {
     pub energy: f64,
 }
 
-/// A vertex's fit is from its own triangles if there are so many; else from its neighbours' fits.
+/// A vertex's fit is from its own triangles if there are so many; else from its neighbours' fits, if these
+/// are.
 const ENOUGH: usize = 4;
 /// Multiples of the trace of the normal matrix on its diagonal: they decide where a fit is not unique.
 const REGULARISATION: f64 = 1e-13;
@@ -41,8 +42,9 @@ impl EnergyError {
 ///
 /// Around each vertex, ε(u) at the quadrature points of its triangles is fitted by a polynomial of
 /// the degree of u; ε* is the interpolant of the order of u of these fits, at the midpoint of an
-/// edge their mean. A vertex of few triangles, at a boundary, has the mean of its neighbours' fits. Where
-/// two materials meet strains jump: each has fits of its own.
+/// edge their mean. A vertex of few triangles, at a boundary, has the mean of its neighbours' fits, or
+/// where they too have few, in a thin layer, a fit of lower degree. Where two materials meet strains jump:
+/// each has fits of its own.
 pub struct RecoveredStrains<'a> {
     body: &'a Body,
     /// ε(u) at the quadrature points, so many in a triangle.
@@ -206,11 +208,13 @@ fn fits(
         fields[vertex] = known(own_fit(vertex, degree));
     }
     partition.update(fields.as_flattened_mut(), 19)?;
-    // The others have the mean of their neighbours' fits, layer by layer.
-    loop {
+    // The others have the mean of their neighbours' fits, and then corners, whose neighbours are such
+    // vertices. Carried further, over several triangles, a polynomial is no fit any more.
+    for most in [usize::MAX, 1] {
         let before = fields.clone();
-        let mut added = false;
-        for vertex in (0..partition.owned()).filter(|&vertex| before[vertex][18] == 0.0) {
+        let is_left =
+            |vertex: &usize| before[*vertex][18] == 0.0 && around.of(*vertex).len() <= most;
+        for vertex in (0..partition.owned()).filter(is_left) {
             let neighbours = around.of(vertex).iter().flat_map(|&t| body.mesh.triangles[t]);
             let fits = neighbours.filter(|&other| before[other][18] > 0.0).map(|other| {
                 let fit = Fit::from_column_slice(&before[other][..18]);
@@ -219,16 +223,12 @@ fn fits(
             let (count, sum) = fits.fold((0.0, Fit::zeros()), |(n, sum), fit| (n + 1.0, sum + fit));
             if count > 0.0 {
                 fields[vertex] = known(sum / count);
-                added = true;
             }
-        }
-        if !partition.comm().any(added) {
-            break;
         }
         partition.update(fields.as_flattened_mut(), 19)?;
     }
-    // Pieces that have no vertex of enough triangles, strips for instance, are left. Of the degree of
-    // the strains themselves a fit is unique with a single triangle.
+    // What is further from vertices of enough triangles, in strips one triangle thick for instance, is left.
+    // Of the degree of the strains themselves a fit is unique with a single triangle.
     for (vertex, field) in fields.iter_mut().enumerate().take(partition.owned()) {
         if field[18] == 0.0 {
             *field = known(own_fit(vertex, degree - 1));

@@ -105,6 +105,25 @@ pub fn mesh_geo(
     Ok(mesh)
 }
 
+/// By what gmsh multiplies the lengths of a `.geo` file, `size` among them, when it writes the mesh:
+/// `Mesh.ScalingFactor`, 1 where it is not set.
+///
+/// # Errors
+/// The `.geo` cannot be read, or sets it to something else than a positive number.
+pub fn scaling_factor(geo: &Path) -> Result<f64, MeshError> {
+    const OPTION: &str = "Mesh.ScalingFactor";
+    let text = read_text(geo).map_err(MeshError::io(geo))?;
+    let code: String = text.lines().map(|line| line.split("//").next().unwrap_or("")).collect();
+    let Some((_, rest)) = code.rsplit_once(OPTION) else { return Ok(1.0) };
+    let number = rest.trim_start().strip_prefix('=').and_then(|rest| rest.split(';').next());
+    let factor = number.and_then(|number| number.trim().parse().ok()).filter(|&f: &f64| f > 0.0);
+    factor.ok_or_else(|| {
+        let problem =
+            format!("for an accuracy {OPTION} must be a number, as in `{OPTION} = 0.001;`");
+        MeshError::file(geo, problem)
+    })
+}
+
 /// Removes the folders of runs of gmsh that were killed: nobody has their locks.
 fn remove_abandoned(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {

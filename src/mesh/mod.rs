@@ -16,7 +16,7 @@ mod refine;
 pub use boundary::{BoundaryNode, CORNER_ANGLE, Face, boundary_nodes};
 pub use components::Components;
 pub use error::MeshError;
-pub use gmsh::{Order, load, mesh_geo};
+pub use gmsh::{Order, load, mesh_geo, scaling_factor};
 pub use msh::{parse, read};
 pub use refine::Refinement;
 

@@ -101,3 +101,24 @@ fn quadratic_displacements_have_a_mesh_of_their_own() {
     assert_eq!(first["triangles"], second["triangles"]);
     assert!(first["nodes"].as_u64() < second["nodes"].as_u64());
 }
+
+#[test]
+fn a_geo_that_gmsh_scales_is_adapted_as_if_it_did_not() {
+    // The same square, drawn in km.
+    let pairs = [("{1, 0,", "{1e-3, 0,"), ("{1, 1,", "{1e-3, 1e-3,"), ("{0, 1,", "{0, 1e-3,")];
+    let drawn = pairs.iter().fold(GEO.replace("0.5", "5e-4"), |geo, (m, km)| geo.replace(m, km));
+    let triangles = |geo: &str| {
+        let test_directory = test_directory();
+        test_directory.write("geo/square.geo", geo);
+        let said = test_directory.say(&["run", "geo/scene.toml", "--accuracy", "0.1"]);
+        assert_eq!(said.code, Some(0), "{said:?}");
+        test_directory.summary("out/scene")["triangles"].as_u64().expect("a number")
+    };
+    let scaled = triangles(&format!("Mesh.ScalingFactor = 1000; // m\n{drawn}"));
+    assert_eq!(scaled, triangles(GEO));
+
+    let test_directory = test_directory();
+    test_directory.write("geo/square.geo", &format!("Mesh.ScalingFactor = 10^3;\n{drawn}"));
+    let said = test_directory.say(&["run", "geo/scene.toml", "--accuracy", "0.1"]);
+    said.fails(2, &["square.geo", "Mesh.ScalingFactor must be a number"]);
+}

@@ -92,3 +92,27 @@ fn a_load_narrower_than_the_first_triangles_is_found() {
     let exact = width * std::f64::consts::PI.sqrt();
     assert!((force - exact).abs() < accuracy * exact, "{force} is not {exact}");
 }
+
+#[test]
+fn a_slender_body_reaches_every_accuracy_in_few_rounds() {
+    // Of a bent strip all triangles have much the same error: either all are too large or none is by much.
+    for accuracy in [0.1, 0.07, 0.05, 0.03, 0.02, 0.01] {
+        let text = format!(
+            "accuracy = {accuracy}
+             mesh.file = 'given.msh'
+             material = {{ young = 2e5, poisson = 0, plane = 'stress' }}
+             boundary = [
+                {{ name = 'left', displacement = [0, 0] }},
+                {{ name = 'right', traction = [0, -0.1] }},
+             ]"
+        );
+        let scene =
+            Scene::parse(&text, Path::new("law.toml"), &[]).unwrap_or_else(|e| panic!("{e}"));
+        let session = Session::start(&[]).unwrap();
+        let strip = Mesh::rectangle(50.0, 1.0, 4, 1);
+        let found = evolution::adapted(&session, &scene, strip, SOLVERS[0], accuracy, &mut |_| {});
+        let Adapted { mesh, rounds, error, short, .. } = found.unwrap_or_else(|e| panic!("{e}"));
+        println!("{accuracy}: {error:.5}, {} triangles, mesh {rounds}", mesh.triangles.len());
+        assert!(short.is_none() && error <= accuracy && rounds <= 10, "{short:?}, mesh {rounds}");
+    }
+}

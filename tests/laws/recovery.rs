@@ -4,7 +4,7 @@ use crate::support::{ORDERS, distorted, problem, run, square, unstructured};
 use signorini::{
     contact::SOLVERS,
     fem::{Body, Elasticity, RecoveredStrains, strains_at_nodes},
-    mesh::Order,
+    mesh::{Mesh, Order},
     model::{Material, Plane},
 };
 
@@ -89,5 +89,41 @@ fn with_contact_the_estimate_is_near_the_error_against_a_fine_quadratic_answer()
         println!("P{degree}, {cells}: {estimate:.4} estimated, {error:.4} true");
         let ratio = estimate / error;
         assert!((0.7..1.4).contains(&ratio), "P{degree}, {cells}: {ratio:.3} of {error:.4}");
+    }
+}
+
+#[test]
+fn in_layers_one_triangle_thick_the_estimate_is_near_the_error() {
+    // Two layers of two materials, bent: without contact ‖u − u_h‖² is the work that u_h lacks.
+    let bent = |layers: usize, degree: usize| {
+        let cells = 40 * layers;
+        let mut mesh = Mesh::rectangle(20.0, 1.0, cells, 2 * layers);
+        // Only the ends of these diagonals have as many as four triangles of a layer.
+        for cell in [cells / 2, cells / 2 + cells * layers] {
+            let [[a, b, c], [_, _, d]] = [mesh.triangles[2 * cell], mesh.triangles[2 * cell + 1]];
+            (mesh.triangles[2 * cell], mesh.triangles[2 * cell + 1]) = ([a, b, d], [b, c, d]);
+        }
+        let text = format!(
+            "discretisation.displacement = {degree}
+             material = {{ young = 2e5, poisson = 0.3, plane = 'stress', upper.young = 7e4 }}
+             boundary = [
+                {{ name = 'left', displacement = [0, 0] }},
+                {{ name = 'top', traction = [0, -0.002] }},
+             ]"
+        );
+        let upper = |t: &usize| mesh.triangles[*t].iter().all(|&node| mesh.nodes[node][1] >= 0.5);
+        let upper = (0..mesh.triangles.len()).filter(upper).collect();
+        mesh.surfaces.insert("upper".to_owned(), upper);
+        let problem = problem(mesh, &text).unwrap_or_else(|e| panic!("{e}"));
+        let outcome = run(&problem, SOLVERS[0]);
+        (outcome.last.record.work, outcome.errors.displacement_mesh)
+    };
+    let (exact, _) = bent(8, 2);
+    for degree in [1, 2] {
+        let (work, estimate) = bent(1, degree);
+        let error = ((exact - work) / exact).sqrt();
+        println!("P{degree}: {estimate:.4} estimated, {error:.4} true");
+        let ratio = estimate / error;
+        assert!((0.5..2.0).contains(&ratio), "P{degree}: {ratio:.3} of {error:.4}");
     }
 }
