@@ -43,6 +43,8 @@ pub struct LinearSolver {
     direction: Vector,
     /// A p.
     image: Vector,
+    /// d.
+    correction: Vector,
 }
 
 /// What a linear solve took.
@@ -92,6 +94,7 @@ impl LinearSolver {
             preconditioned: zeros()?,
             direction: zeros()?,
             image: zeros()?,
+            correction: zeros()?,
         })
     }
 

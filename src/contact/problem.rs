@@ -18,7 +18,7 @@ pub struct ContactProblem<'a> {
     pub stiffness_scale: f64,
     /// f, N: loads less the forces of prescribed displacements.
     pub load: &'a Vector,
-    /// The bounded unknowns of this rank.
+    /// The bounded unknowns of this rank, by rising `dof`.
     pub bounds: &'a [Bound],
     /// u·ν of the rigid motions that contact alone constrains, one row per bound; no columns
     /// where K is positive definite.

@@ -229,11 +229,11 @@ impl<'a> ContactStep<'a> {
         let problem = self.problem;
         let failed = |source| RunError::contact(problem, step, case.time, source);
         let mut report = ContactReport::default();
-        let (mut tolerance, mut attempt) = (problem.tolerance, 0);
+        let (mut tolerance, mut force, mut attempt) = (problem.tolerance, None, 0);
         loop {
             attempt += 1;
             let (lift, bounds) = self.next.datum.pose(&problem.constraints, case);
-            let solved = match self.solve_contact(case, &lift, &bounds, tolerance) {
+            let solved = match self.solve_contact(case, &lift, &bounds, tolerance, force) {
                 // All ranks know that the method stopped short; other errors may be one rank's.
                 Err(error) if !error.stopped_short() => return Err(failed(error)),
                 solved => solved,
@@ -251,6 +251,7 @@ impl<'a> ContactStep<'a> {
             match solved {
                 Ok(solved) => report.add(&solved),
                 Err(error) if !certified => return Err(failed(self.limited(error, &judged))),
+                Err(ContactError::NotConverged { report: spent, .. }) => report.add(&spent),
                 Err(_) => {}
             }
             let method = self.solver.name();
@@ -267,6 +268,7 @@ impl<'a> ContactStep<'a> {
                 return Err(failed(self.limited(error, &judged)));
             }
             tolerance *= 0.3 * problem.tolerance / judged.kkt.worst();
+            force = Some(judged.scales.force);
         }
     }
 

@@ -17,7 +17,8 @@ pub struct ErrorBudget {
     pub displacement_steps: Option<f64>,
     /// Of the damage, from the time steps.
     pub damage_steps: Option<f64>,
-    /// Of the largest displacement, from the solver.
+    /// Of the largest displacement, from the solver; infinite where the active nodes alone do not support
+    /// the body.
     pub solver: f64,
     /// Whether the material can be damaged.
     #[serde(skip)]
@@ -82,9 +83,13 @@ impl ErrorBudget {
         };
         let of_u = if stopped.is_some() { 0.0 } else { self.displacement_mesh };
         let (mesh, steps_most) = (of_u.max(mesh.unwrap_or(0.0)), steps.unwrap_or(0.0));
+        let (of_solver, solver) = match self.solver.is_finite() {
+            true => (format!("{:.0e}", self.solver), self.solver),
+            false => ("not estimated".to_owned(), 0.0),
+        };
         let advice = match mesh.max(steps_most) {
-            largest if largest.max(self.solver) < NEGLIGIBLE => "",
-            largest if self.solver > largest => "; spend on the solver's tolerance",
+            largest if largest.max(solver) < NEGLIGIBLE => "",
+            largest if solver > largest => "; spend on the solver's tolerance",
             _ if steps_most > mesh => "; spend on shorter time steps",
             _ if mesh > LARGE => "; spend on the mesh, which is the limit of this answer",
             _ => "; spend on the mesh",
@@ -93,7 +98,7 @@ impl ErrorBudget {
             format!("from the mesh: u {} (energy norm)", percent(self.displacement_mesh)),
             format!("from the mesh: {of_mesh}"),
             format!("from the time steps: {of_steps}"),
-            format!("from the solver: u {:.0e}{advice}", self.solver),
+            format!("from the solver: u {of_solver}{advice}"),
         ]
     }
 }

@@ -127,7 +127,7 @@ fn cycling() -> Small {
 }
 
 #[test]
-fn exchanges_end_where_block_pivots_cycle() {
+fn pivots_on_the_deepest_end_where_block_pivots_cycle() {
     let small = cycling();
     let exact = small.enumerate();
     let mut cycling = 0;

@@ -74,11 +74,14 @@ impl LinearSolver {
     ///
     /// ```text
     /// z = P⁻¹E r,   β = − zᵀAp / pᵀAp, at first 0,   p ← z + β p,
-    /// α = rᵀp / pᵀAp,   x ← x + α p,   r ← r − α A p.
+    /// α = rᵀp / pᵀAp,   d ← d + α p, at first α p,   r ← r − α A p,   in the end x ← x + d.
     /// ```
     ///
-    /// r, z and p are 0 on prescribed unknowns in all of this; A is not positive definite if rᵀp or pᵀAp
+    /// r, z, p and d are 0 on prescribed unknowns in all of this; A is not positive definite if rᵀp or pᵀAp
     /// is not positive. The first z may be there already (`preconditioned`).
+    ///
+    /// x is rounded once and not in each iteration, so that r stays nearer to b − A x (van der Vorst and Ye,
+    /// SIAM J. Sci. Comput. 22, 2000).
     pub(super) fn iterate(
         &mut self,
         system: LinearSystem,
@@ -87,7 +90,7 @@ impl LinearSolver {
         mut preconditioned: bool,
         report: &mut SolveReport,
     ) -> Result<(), PetscError> {
-        let mut stiffness = None;
+        let (mut stiffness, mut corrected) = (None, false);
         for _ in 0..most {
             if report.converged {
                 break;
@@ -105,9 +108,13 @@ impl LinearSolver {
             if !(last > 0.0 && energy > 0.0) {
                 break;
             }
-            x.axpby(energy / last, &self.direction, 1.0)?;
+            self.correction.axpby(energy / last, &self.direction, f64::from(corrected))?;
+            corrected = true;
             self.residual.axpby(-energy / last, &self.image, 1.0)?;
             report.converged = self.is_reached(system, limit)?;
+        }
+        if corrected {
+            x.axpby(1.0, &self.correction, 1.0)?;
         }
         let reduction = |norm: f64| (self.first_norm / norm).ln();
         let (asked, reached) = (reduction(limit), reduction(self.norm));

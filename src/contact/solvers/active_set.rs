@@ -155,9 +155,11 @@ impl ActiveSet<'_> {
         let mut pivoting = Pivoting::new(problem);
         self.first_guess(problem, c)?;
         for _ in 0..pivoting.limit() {
-            report.iterations += 1;
+            let before = report.iterations;
             let chooser: Option<Chooser> = if pivoting.is_fast() { Some(chooser) } else { None };
             let answer = self.solve_equality(problem, c, chooser, &mut report)?;
+            // A guess is an iteration, or as many as it took to choose another in its place.
+            report.iterations = report.iterations.max(before + 1);
             if !pivoting.pivot(&mut self.active, &answer, &mut report.fallbacks)? {
                 return Ok(report);
             }

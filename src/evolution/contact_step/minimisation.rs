@@ -13,13 +13,14 @@ const LIFTED: f64 = 1e-2;
 
 impl ContactStep<'_> {
     /// Replaces c by the solution of (26) for the load of the free unknowns, f − K u_D with u_D the
-    /// displacements of the prescribed ones, `lift`.
+    /// displacements of the prescribed ones, `lift`. An earlier answer may tell the force scale F of residuals.
     pub(super) fn solve_contact(
         &mut self,
         case: &LoadCase,
         lift: &[f64],
         bounds: &[Bound],
         tolerance: f64,
+        known: Option<f64>,
     ) -> Result<ContactReport, ContactError> {
         let (body, bases) = (&self.problem.body, &self.problem.constraints.bases);
         let comm = body.nodes.partition.comm();
@@ -41,6 +42,7 @@ impl ContactStep<'_> {
             bounds.iter().for_each(|bound| u[bound.dof] = bound.nearest(0.0));
             force = force.max(LIFTED * body.nodes.partition.norm(&internal_force(u), 2));
         }
+        let force = known.map_or(force, |known| force.min(known));
         bases.force_to_local(&mut load);
         bases.zero_fixed(&mut load);
         let load = &load[..self.load.owned()];

@@ -42,26 +42,28 @@ impl AtBounds {
 /// beyond their bounds the locally deepest join it, to which K couples none that is deeper.
 ///
 /// Pivoting on all violating indices would press whole stretches of a slender body to an obstacle that it
-/// touches in a point or two: there they pull, and when released go through the opposite obstacle. Extremes
-/// (as in the exchange of Remez) tell the shape, and what does lie against the obstacle is halved each time.
+/// touches in a point or two: there they pull, and when released go through the opposite obstacle. The locally
+/// deepest tell the shape (as in the algorithm of Remez), and what does lie against the obstacle is halved
+/// each time.
 ///
 /// Where that takes long it may be a cycle, and the dual problem is solved, max over p ≥ 0 of the least
 /// energy (as Lawson and Hanson do, Solving Least Squares Problems, 1974, chapter 23): from p̄ ≥ 0 towards
-/// the forces p of the set, until those of the first indices that pull are zero, which leave it; extremes join
-/// where none pulls. The energy then rises from each p̄ = p to the next, and no set returns.
+/// the forces p of the set, until those of the first indices that pull are zero, which leave it; the locally
+/// deepest join where none pulls. The energy then rises from each p̄ = p to the next, and no set returns.
 ///
 /// Where K is singular and A leaves a rigid motion unconstrained, the body moves as the load drives it
 /// until further bounds are reached.
 pub(super) struct Pivoting<'p> {
     problem: &'p ContactProblem<'p>,
-    /// Exchanges that may still be made.
-    exchanges: usize,
-    /// p̄ after them, N, positive where a bound presses.
+    /// Pivots that may still be made before the dual problem is solved.
+    primal_pivots: usize,
+    /// p̄ of the dual problem, N, positive where a bound presses.
     forces: Option<Vec<f64>>,
 }
 
-/// Exchanges of extremes: on 1800 steps of strips 40 to 200 times as long as high the median was 5.
-const EXCHANGES: usize = 20;
+/// Pivots before the dual problem is solved: on 1800 steps of strips 40 to 200 times as long as high the
+/// median was 5.
+const PRIMAL_PIVOTS: usize = 20;
 /// Up to so many the condensed problem is asked before each.
 const FAST: usize = 5;
 /// Depths that differ by less than this, relatively, are equal.
@@ -79,22 +81,23 @@ struct Violation {
 
 impl<'p> Pivoting<'p> {
     pub(super) fn new(problem: &'p ContactProblem<'p>) -> Self {
-        Self { problem, exchanges: EXCHANGES, forces: None }
+        debug_assert!(problem.bounds.is_sorted_by_key(|bound| bound.dof));
+        Self { problem, primal_pivots: PRIMAL_PIVOTS, forces: None }
     }
 
     /// Changes after which it is given up.
     pub(super) fn limit(&self) -> usize {
-        30 + EXCHANGES + 5 * self.problem.bound_count()
+        30 + PRIMAL_PIVOTS + 5 * self.problem.bound_count()
     }
 
     /// Whether few changes were made yet.
     pub(super) fn is_fast(&self) -> bool {
-        self.exchanges + FAST > EXCHANGES
+        self.primal_pivots + FAST > PRIMAL_PIVOTS
     }
 
     /// Changes the active set, whose answer is given; false if that is admissible, or nothing changes: the
     /// forces of bounds that support a balanced body are rounding, and the certificate judges them.
-    /// Counts the end of exchanges among the `fallbacks`. Collective.
+    /// Counts the change to the dual problem among the `fallbacks`. Collective.
     pub(super) fn pivot(
         &mut self,
         active: &mut [f64],
@@ -106,14 +109,14 @@ impl<'p> Pivoting<'p> {
         if count == 0 {
             return Ok(false);
         }
-        let exchanged = self.exchanged(&violating)?;
-        let chosen = match self.exchanges {
-            0 => self.ascend(active, &violating, answer).unwrap_or_else(|| exchanged.clone()),
-            _ => exchanged.clone(),
+        let deepest = self.locally_deepest(&violating)?;
+        let chosen = match self.primal_pivots {
+            0 => self.ascend(active, &violating, answer).unwrap_or_else(|| deepest.clone()),
+            _ => deepest.clone(),
         };
-        *fallbacks += usize::from(self.exchanges == 1);
-        self.exchanges = self.exchanges.saturating_sub(1);
-        let choices = [&chosen, &exchanged, last(comm, &violating)];
+        *fallbacks += usize::from(self.primal_pivots == 1);
+        self.primal_pivots = self.primal_pivots.saturating_sub(1);
+        let choices = [&chosen, &deepest, last(comm, &violating)];
         Ok(choices.into_iter().any(|chosen| self.change(active, chosen, answer)))
     }
 
@@ -154,10 +157,10 @@ impl<'p> Pivoting<'p> {
 
     /// Of the `violating` indices those that pull, and those beyond their bounds to which K couples none that
     /// is deeper.
-    fn exchanged(&self, violating: &[Violation]) -> Result<Vec<Violation>, PetscError> {
+    fn locally_deepest(&self, violating: &[Violation]) -> Result<Vec<Violation>, PetscError> {
         let ContactProblem { stiffness, bounds, .. } = self.problem;
         let row = |one: &Violation| stiffness.rows().start + bounds[one.index].dof as i32;
-        let mut exchanged = Vec::new();
+        let mut deepest = Vec::new();
         for one in violating {
             let is_deeper = |column: &i32| {
                 let other = violating.binary_search_by_key(column, row);
@@ -165,10 +168,10 @@ impl<'p> Pivoting<'p> {
             };
             let pulls = one.side == 0.0;
             if pulls || !stiffness.read_row(row(one), |columns, _| columns.iter().any(is_deeper))? {
-                exchanged.push(*one);
+                deepest.push(*one);
             }
         }
-        Ok(exchanged)
+        Ok(deepest)
     }
 
     /// The indices that violate the conditions beyond what the KKT tolerance allows: p = f − Kc is at
