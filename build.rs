@@ -7,7 +7,7 @@ const PETSC: &str = "\
     PetscInitialize|PetscInitialized|PetscFinalize|PetscPushErrorHandler|\
     PetscOptionsInsertString|PetscOptionsSetValue|PetscOptionsHasName|\
     PetscOptionsLeftGet|PetscOptionsLeftRestore|\
-    MPI_Comm_size|MPI_Comm_rank|MPI_Allreduce|MPI_Type_contiguous|MPI_Type_commit|MPI_Type_free|\
+    MPI_Comm_size|MPI_Comm_rank|MPI_Allreduce|MPI_Bcast|MPI_Type_contiguous|MPI_Type_commit|MPI_Type_free|\
     MPI_Ibarrier|MPI_Test|MPI_Abort|mallopt|madvise|dlsym|omp_set_max_active_levels|\
     PetscSFCreate|PetscSFDestroy|PetscSFSetGraph|PetscSFBcastBegin|PetscSFBcastEnd|\
     MatPartitioningCreate|MatPartitioningDestroy|MatPartitioningSetType|\
@@ -34,7 +34,7 @@ const PETSC: &str = "\
 /// Everything the `cholesky` module calls.
 const CHOLMOD: &str = "\
     cholmod_l_start|cholmod_l_finish|cholmod_l_analyze|cholmod_l_analyze_p|cholmod_l_factorize|\
-    cholmod_l_change_factor|cholmod_l_free_factor|cholmod_l_realloc";
+    cholmod_l_camd|cholmod_l_metis|cholmod_l_change_factor|cholmod_l_free_factor|cholmod_l_realloc";
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
@@ -56,12 +56,12 @@ fn main() {
     flags.extend(mpi_flags.split_whitespace().map(str::to_owned));
     // Debian's MPI is Open MPI, whose constants are the addresses of variables.
     let variables = "PETSC_COMM_WORLD|M_MMAP_MAX|M_MMAP_THRESHOLD|M_TRIM_THRESHOLD|MADV_HUGEPAGE|\
-                     ompi_mpi_double|ompi_mpi_op_(sum|max|replace)";
+                     ompi_mpi_(double|byte)|ompi_mpi_op_(sum|max|replace)";
     let headers = "#include <petsctao.h>\n#include <petscsf.h>\n#include <malloc.h>\n\
                    #include <dlfcn.h>\n#include <sys/mman.h>\n\
                    void omp_set_max_active_levels(int);\n";
     declare("petsc", headers, &flags, PETSC, variables);
-    let variables = "CHOLMOD_(LONG|REAL|DOUBLE|SUPERNODAL|GIVEN|PATTERN|OUT_OF_MEMORY)";
+    let variables = "CHOLMOD_(LONG|REAL|DOUBLE|SUPERNODAL|GIVEN|NATURAL|PATTERN|OUT_OF_MEMORY)";
     declare("cholmod", "#include <suitesparse/cholmod.h>\n", &[], CHOLMOD, variables);
 }
 

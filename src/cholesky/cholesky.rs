@@ -45,8 +45,8 @@ const BYTES_PER_OPERATION: f64 = 0.8;
 const BYTES_PER_ENTRY: f64 = 200.0;
 
 impl Cholesky {
-    /// Orders and analyses `a`: in the `order` given (the row of A of each row of L), else by CHOLMOD's
-    /// choice. The last `interface` rows, also the last in the order, are not solved for.
+    /// Orders and analyses `a`: in the `order` given (the row of A of each row of L), else by a choice that
+    /// leaves L sparse. The last `interface` rows, also the last in the order, are not solved for.
     ///
     /// # Errors
     /// There is no memory for it.
@@ -56,7 +56,11 @@ impl Cholesky {
         interface: usize,
         precision: Precision,
     ) -> Result<Self, PetscError> {
-        let (factor, interior) = (Cholmod::analyse(a, order)?, a.size() - interface);
+        let interior = a.size() - interface;
+        let factor = match order {
+            Some(order) => Cholmod::analyse(a, order)?,
+            None => Cholmod::ordered(a, interface)?,
+        };
         let solver: Box<dyn TriangularSolver> = match precision {
             Precision::Preconditioner => Box::new(Supernodal::<f32>::new(&factor, interior)),
             Precision::Full => Box::new(Supernodal::<f64>::new(&factor, interior)),

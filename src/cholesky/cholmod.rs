@@ -2,8 +2,13 @@
 //! 2008), with the names of its user guide.
 
 use super::{LowerTriangle, raw};
-use crate::petsc::PetscError;
-use std::{ffi::c_void, mem::take, ops::Range, ptr, slice};
+use crate::petsc::{PetscError, use_large_pages};
+use std::{
+    ffi::c_void,
+    mem::{MaybeUninit, take},
+    ops::Range,
+    ptr, slice,
+};
 
 /// A `cholmod_factor` P A Pᵀ = L Lᵀ with the `cholmod_common` it was made with.
 pub(super) struct Cholmod {
@@ -13,45 +18,109 @@ pub(super) struct Cholmod {
     allocated: usize,
 }
 
+/// Operations for each entry of L from which on CHOLMOD tries another order (`cholmod_analyze` in its user
+/// guide).
+const MUCH_WORK: f64 = 500.0;
+
 /// Values are freed by so many at a time, 32 MB.
 const FREED: usize = 1 << 22;
 
 impl Cholmod {
-    /// Orders and analyses `a`: in the `order` given, else by CHOLMOD's choice
-    /// (cholmod_l_analyze, cholmod_l_analyze_p).
-    pub(super) fn analyse(
-        a: &mut LowerTriangle,
-        order: Option<Vec<i64>>,
-    ) -> Result<Self, PetscError> {
-        let mut this = Self { common: Box::default(), factor: ptr::null_mut(), allocated: 0 };
-        let (common, mut view) = (&mut *this.common, a.view());
-        // SAFETY: `common` stays where it is; the view describes arrays that live during the call,
-        // and `order` has as many entries as there are rows.
-        unsafe {
-            raw::cholmod_l_start(common);
-            common.print = 0;
-            common.supernodal = raw::CHOLMOD_SUPERNODAL as i32;
-            this.factor = match order {
-                None => raw::cholmod_l_analyze(&mut view, common),
-                Some(mut order) => {
-                    common.nmethods = 1;
-                    common.method[0].ordering = raw::CHOLMOD_GIVEN as i32;
-                    let (order, none) = (order.as_mut_ptr(), ptr::null_mut());
-                    raw::cholmod_l_analyze_p(&mut view, order, none, 0, common)
-                }
-            };
+    /// Orders and analyses `a`, with the last `interface` rows at the end: by minimum degree, or by nested
+    /// dissection where that leaves less of much work, which is when CHOLMOD tries it, too.
+    pub(super) fn ordered(a: &mut LowerTriangle, interface: usize) -> Result<Self, PetscError> {
+        if interface == 0 {
+            let mut this = Self::start();
+            // SAFETY: a live handle; the view describes arrays that live during the call.
+            this.factor = unsafe { raw::cholmod_l_analyze(&mut a.view(), &mut *this.common) };
+            return this.analysed();
         }
-        this.check(!this.factor.is_null())?;
-        Ok(this)
+        let mut order = Self::start().order_of(a, interface, false)?;
+        let by_degree = Self::analyse(a, order)?;
+        if by_degree.common.fl < MUCH_WORK * by_degree.common.lnz {
+            return Ok(by_degree);
+        }
+        order = Self::start().order_of(a, interface, true)?;
+        let dissected = Self::analyse(a, order)?;
+        Ok(if dissected.common.fl < by_degree.common.fl { dissected } else { by_degree })
+    }
+
+    /// An order of the rows of `a` with the last `interface` ones at the end: by nested dissection
+    /// (cholmod_l_metis), or by minimum degree (cholmod_l_camd).
+    fn order_of(
+        mut self,
+        a: &mut LowerTriangle,
+        interface: usize,
+        dissected: bool,
+    ) -> Result<Vec<i64>, PetscError> {
+        let (mut view, size, common) = (a.view(), a.size(), &mut *self.common);
+        let (none, mut order) = (ptr::null_mut(), vec![0; size]);
+        let mut sets: Vec<i64> = (0..size).map(|i| i64::from(i + interface >= size)).collect();
+        let (place, sets) = (order.as_mut_ptr(), sets.as_mut_ptr());
+        // SAFETY: a live handle; the view describes arrays that live during the calls, and the order
+        // and the sets have as many entries as there are rows.
+        let done = unsafe {
+            match dissected {
+                true => raw::cholmod_l_metis(&mut view, none, 0, 0, place, common),
+                false => raw::cholmod_l_camd(&mut view, none, 0, sets, place, common),
+            }
+        };
+        self.check(done != 0)?;
+        order.retain(|&row| (row as usize) < size - interface);
+        order.extend((size - interface) as i64..size as i64);
+        Ok(order)
+    }
+
+    /// Analyses `a` in an order (cholmod_l_analyze_p).
+    pub(super) fn analyse(a: &mut LowerTriangle, mut order: Vec<i64>) -> Result<Self, PetscError> {
+        let mut this = Self::start();
+        let (common, mut view, none) = (&mut *this.common, a.view(), ptr::null_mut());
+        common.nmethods = 1;
+        common.method[0].ordering = raw::CHOLMOD_GIVEN as i32;
+        // SAFETY: a live handle; the view describes arrays that live during the call, and `order` has as
+        // many entries as there are rows.
+        this.factor =
+            unsafe { raw::cholmod_l_analyze_p(&mut view, order.as_mut_ptr(), none, 0, common) };
+        this.analysed()
+    }
+
+    /// Without a factor.
+    fn start() -> Self {
+        let mut this = Self { common: Box::default(), factor: ptr::null_mut(), allocated: 0 };
+        // SAFETY: `common` stays where it is.
+        unsafe { raw::cholmod_l_start(&mut *this.common) };
+        this.common.print = 0;
+        this.common.supernodal = raw::CHOLMOD_SUPERNODAL as i32;
+        this
+    }
+
+    /// Itself, if there is an analysed factor.
+    fn analysed(self) -> Result<Self, PetscError> {
+        self.check(!self.factor.is_null())?;
+        if self.order().iter().copied().eq(0..self.order().len() as i64) {
+            // Without an order CHOLMOD factorises the matrix as it is, not a copy.
+            // SAFETY: an analysed factor.
+            unsafe { (*self.factor).ordering = raw::CHOLMOD_NATURAL as i32 };
+        }
+        Ok(self)
     }
 
     /// Factorises `a`, which has the pattern that was analysed; false if it is not positive definite
     /// (cholmod_l_factorize).
     pub(super) fn factorise(&mut self, a: &mut LowerTriangle) -> Result<bool, PetscError> {
-        let mut view = a.view();
-        // SAFETY: live handles; the view describes arrays that live during the call.
-        let done =
-            unsafe { raw::cholmod_l_factorize(&mut view, self.factor, &mut *self.common) != 0 };
+        let (mut view, common) = (a.view(), &mut *self.common);
+        let real = raw::CHOLMOD_REAL as i32;
+        // SAFETY: live handles; the view describes arrays that live during the call, and x as many values
+        // as the factor tells.
+        let done = unsafe {
+            // CHOLMOD takes the memory for L if there is none.
+            let taken = raw::cholmod_l_change_factor(real, 1, 1, 1, 1, self.factor, common) != 0;
+            let raw::cholmod_factor { x, xsize, .. } = *self.factor;
+            if taken && !x.is_null() {
+                use_large_pages(slice::from_raw_parts(x.cast::<MaybeUninit<f64>>(), xsize));
+            }
+            taken && raw::cholmod_l_factorize(&mut view, self.factor, common) != 0
+        };
         self.check(done)?;
         // SAFETY: a live factor.
         unsafe {

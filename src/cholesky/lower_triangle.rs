@@ -30,6 +30,17 @@ impl LowerTriangle {
         self.starts.push(self.rows.len() as i64);
     }
 
+    /// Adds so many columns with `diagonal` on the diagonal and zeros in the first of them. When that is
+    /// eliminated all entries below it fill: the pattern of the factor is that of a full block.
+    pub fn push_coupled(&mut self, columns: usize, diagonal: f64) {
+        let first = self.size();
+        for j in first..first + columns {
+            self.push(j, diagonal);
+            (j + 1..first + columns).filter(|_| j == first).for_each(|i| self.push(i, 0.0));
+            self.end_column();
+        }
+    }
+
     /// The number of rows and columns.
     pub fn size(&self) -> usize {
         self.starts.len() - 1

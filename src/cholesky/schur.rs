@@ -83,8 +83,9 @@ impl SchurComplement {
         let factor = match &mut self.factor {
             Some(factor) => factor,
             none => {
-                let order = Some((0..size as i64).collect());
-                none.insert(Cholesky::analyse(&mut lower, order, 0, self.precision)?)
+                let (mut pattern, order) = (LowerTriangle::default(), (0..size as i64).collect());
+                pattern.push_coupled(size, 1.0);
+                none.insert(Cholesky::analyse(&mut pattern, Some(order), 0, self.precision)?)
             }
         };
         let definite = factor.factorise(&mut lower)?.is_some();

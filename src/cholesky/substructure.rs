@@ -76,15 +76,9 @@ impl Substructure {
         let Some(division) = Division::of(comm, matrix, condensed)? else { return Ok(None) };
         let (interior, near) = (division.interior, division.near.len());
         let Blocks { local: mut a, .. } = division.blocks(matrix)?;
-        add_interface(&mut a, near, 1.0);
-        let mut local = Cholesky::analyse(&mut a, None, 0, precision)?;
-        // The same order with the interface moved to the end.
+        a.push_coupled(near, 1.0);
+        let local = Cholesky::analyse(&mut a, None, near, precision)?;
         let last = interior as i64..(interior + near) as i64;
-        if near > 0 {
-            let order = local.order().iter().copied().filter(|i| !last.contains(i));
-            let order = order.chain(last.clone()).collect();
-            local = Cholesky::analyse(&mut a, Some(order), near, precision)?;
-        }
         let in_place = local.order()[interior..].iter().copied().eq(last);
         let schur = SchurComplement::new(comm, of_schur);
         let length = interior + near + division.interface.len();
@@ -117,7 +111,7 @@ impl Substructure {
         // A_ΓI A_II⁻¹ A_IΓ ≤ A_ΓΓ for a semidefinite A, so with this c the rank's matrix is definite.
         let scale = self.comm.max(largest_row_sum);
         let c = 2.0 * scale;
-        add_interface(&mut local, near.len(), c);
+        local.push_coupled(near.len(), c);
         let block = self.local.factorise(&mut local)?;
         if !self.comm.all(block.is_some()) {
             return Ok(false);
@@ -274,16 +268,5 @@ impl Division {
         let shared = self.interior + self.near.len();
         let on_interface = || Some(shared + self.interface.binary_search(&unknown).ok()?);
         owned.copied().or_else(on_interface)
-    }
-}
-
-/// [A_II A_IΓ; A_ΓI c 1] from its first columns and the number of its last. The pattern of the last block
-/// is full, as that of S.
-fn add_interface(local: &mut LowerTriangle, near: usize, c: f64) {
-    let interior = local.size();
-    for j in interior..interior + near {
-        local.push(j, c);
-        (j + 1..interior + near).for_each(|i| local.push(i, 0.0));
-        local.end_column();
     }
 }

@@ -1,6 +1,6 @@
 //! `signorini check`: what a scene asks for, before anything is solved.
 
-use super::{Failure, SceneArguments, ranks::require_one_process, screen::row};
+use super::{Failure, SceneArguments, ranks::require_one_process, read_mesh, screen::row};
 use comfy_table::presets;
 use signorini::{
     evolution::DiscreteProblem,
@@ -16,7 +16,8 @@ const TIMES: usize = 20;
 pub fn check(arguments: &SceneArguments) -> Result<(), Failure> {
     require_one_process()?;
     arguments.check()?;
-    let (scene, mesh) = arguments.read(false, &[])?;
+    let scene = arguments.read(&[])?;
+    let mesh = read_mesh(&scene, false)?;
     scene.check_mesh(&mesh).map_err(Failure::input)?;
     say(&scene.title);
     say(&row("mesh", describe_mesh(&mesh, &scene.units)));

@@ -12,8 +12,8 @@ use rustix::{
 use signal_hook::{consts::SIGINT, low_level};
 use signorini::{
     interrupt::Interrupts,
-    mesh::{Mesh, Order},
-    scene::Scene,
+    mesh::{self, MeshError, Order},
+    scene::{MeshSource, Scene},
 };
 use std::{
     env,
@@ -67,18 +67,20 @@ pub fn cores() -> usize {
     thread::available_parallelism().map_or(1, NonZero::get)
 }
 
-/// The number of ranks on which a run ends first, of the cores that it may use.
-pub fn ranks_that_pay(scene: &Scene, mesh: &Mesh) -> usize {
-    let cores = cores();
-    let (nodes, triangles) = (mesh.nodes.len(), mesh.triangles.len());
-    // As many edges as vertices and triangles (Euler), but for one and the holes.
-    let nodes = if scene.order == Order::Quadratic { 2 * nodes + triangles } else { nodes };
-    let pays = |&&(ranks, unknowns): &&(usize, usize)| ranks <= cores && 2 * nodes >= unknowns;
-    let most = PAYING.iter().filter(pays).map(|(ranks, _)| *ranks).max();
+/// The number of ranks on which a run ends first, of the cores that it may use. The mesh is made where it
+/// is not there.
+pub fn ranks_that_pay(scene: &Scene) -> Result<usize, MeshError> {
     // An accuracy begins with many small meshes; TAO and static scenes were not measured.
     let is_tao = scene.contact.solver.as_ref().is_some_and(|name| name.starts_with("tao"));
-    let stays = scene.accuracy.is_some() || scene.time.is_none() || is_tao;
-    most.filter(|_| !stays).unwrap_or(1)
+    if scene.accuracy.is_some() || scene.time.is_none() || is_tao {
+        return Ok(1);
+    }
+    let MeshSource { file, parameters } = &scene.mesh;
+    let triangles = mesh::announced_elements(&mesh::file(file, parameters, scene.order)?)?;
+    // There are about half as many vertices as triangles, and three halves as many edges (Euler).
+    let unknowns = if scene.order == Order::Quadratic { 4 * triangles } else { triangles };
+    let pays = |&&(ranks, least): &&(usize, usize)| ranks <= cores() && unknowns >= least;
+    Ok(PAYING.iter().filter(pays).map(|(ranks, _)| *ranks).max().unwrap_or(1))
 }
 
 /// Whether this program has started this rank.

@@ -29,7 +29,7 @@ use signorini::{
 use std::{
     fmt,
     io::{self, Write},
-    path::{Path, PathBuf},
+    path::PathBuf,
 };
 
 /// Why a command failed.
@@ -131,34 +131,28 @@ impl SceneArguments {
         Ok(())
     }
 
-    /// Scene and mesh, coarse as for [`read`].
-    fn read(&self, adapts: bool, more: &[String]) -> Result<(Scene, Mesh), Failure> {
+    /// The scene with its keys overridden, also by `more`.
+    fn read(&self, more: &[String]) -> Result<Scene, Failure> {
         let accuracy = self.accuracy.map(|error| format!("accuracy={error}"));
         let set = [&self.set[..], &Vec::from_iter(accuracy), more].concat();
-        read(&self.scene, self.mesh.as_deref(), &set, adapts)
+        let mut scene = Scene::read(&self.scene, &set).map_err(Failure::input)?;
+        if let Some(file) = &self.mesh {
+            let replaced = std::mem::replace(&mut scene.mesh, MeshSource::from_path(file));
+            if !replaced.parameters.is_empty() {
+                let unused: Vec<_> = replaced.parameters.into_keys().collect();
+                scene.notes.push(format!(
+                    "of the scene's [mesh] nothing was used, because of --mesh: not {}",
+                    unused.join(", ")
+                ));
+            }
+        }
+        Ok(scene)
     }
 }
 
-/// The scene at `path` with keys overridden by `set`, and its mesh, or another one in `file`; it is made
-/// where it is not there. Where the scene asks for an accuracy and the mesh is to be adapted to it,
-/// that of a `.geo` is coarse.
-fn read(
-    path: &Path,
-    file: Option<&Path>,
-    set: &[String],
-    adapts: bool,
-) -> Result<(Scene, Mesh), Failure> {
-    let mut scene = Scene::read(path, set).map_err(Failure::input)?;
-    if let Some(file) = file {
-        let replaced = std::mem::replace(&mut scene.mesh, MeshSource::from_path(file));
-        if !replaced.parameters.is_empty() {
-            let unused: Vec<_> = replaced.parameters.into_keys().collect();
-            scene.notes.push(format!(
-                "of the scene's [mesh] nothing was used, because of --mesh: not {}",
-                unused.join(", ")
-            ));
-        }
-    }
+/// The mesh of a scene, which is made where it is not there. Where the scene asks for an accuracy and the
+/// mesh is to be adapted to it, that of a `.geo` is coarse.
+fn read_mesh(scene: &Scene, adapts: bool) -> Result<Mesh, Failure> {
     let MeshSource { file, parameters } = &scene.mesh;
     let mut parameters = parameters.clone();
     if adapts && scene.accuracy.is_some() && file.extension().is_none_or(|kind| kind != "msh") {
@@ -166,8 +160,7 @@ fn read(
         let scaling = mesh::scaling_factor(file).map_err(Failure::mesh)?;
         parameters.insert("size".to_owned(), mesh::extent(&usual.nodes) / scaling / CELLS);
     }
-    let mesh = mesh::load(file, &parameters, scene.order).map_err(Failure::mesh)?;
-    Ok((scene, mesh))
+    mesh::load(file, &parameters, scene.order).map_err(Failure::mesh)
 }
 
 /// The reference of all keys of a scene, made of their schema by scripts/keys.py.
@@ -197,7 +190,8 @@ pub fn completions(shell: clap_complete::Shell, mut program: clap::Command) -> R
 pub fn mesh(scenes: &[PathBuf]) -> Result<(), Failure> {
     require_one_process()?;
     for path in scenes {
-        let (scene, mesh) = read(path, None, &[], false)?;
+        let scene = Scene::read(path, &[]).map_err(Failure::input)?;
+        let mesh = read_mesh(&scene, false)?;
         let (nodes, triangles) = (mesh.nodes.len(), mesh.triangles.len());
         say(&format!("{}: {nodes} nodes, {triangles} triangles", scene.name));
     }

@@ -7,6 +7,7 @@ use super::{
     checkpoint::Checkpoint,
     launch::{self, Ranks},
     ranks::{agree, barrier_or_abort},
+    read_mesh,
     recorder::Recorder,
     screen, summaries,
     task::Task,
@@ -14,6 +15,7 @@ use super::{
 };
 use clap::Args;
 use signorini::{
+    archive::Archive,
     cholesky::{Factor, Precision},
     evolution::{
         self, AdaptError, Adapted, DiscreteProblem, Outcome, Phases, RunError, SHARE_OF_STEPS,
@@ -73,10 +75,10 @@ impl RunArguments {
         check_petsc(&self.petsc)
     }
 
-    /// The scene as it is to be run, and its mesh, which is made where it is not there.
-    fn read(&self) -> Result<(Scene, Mesh), Failure> {
+    /// The scene as it is to be run.
+    fn read(&self) -> Result<Scene, Failure> {
         let solver = self.solver.iter().map(|name| format!("contact.solver='{name}'"));
-        self.scene.read(true, &Vec::from_iter(solver))
+        self.scene.read(&Vec::from_iter(solver))
     }
 
     /// Where the results go.
@@ -84,10 +86,11 @@ impl RunArguments {
         self.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name))
     }
 
-    /// On how many ranks to run a scene, unless that is said.
-    fn ranks(&self, scene: &Scene, mesh: &Mesh) -> usize {
-        let checkpoint = self.restart.then(|| Checkpoint::ranks(&self.folder(scene))).flatten();
-        checkpoint.unwrap_or_else(|| launch::ranks_that_pay(scene, mesh))
+    /// On how many ranks to run, unless that is said.
+    fn ranks(&self) -> Result<usize, Failure> {
+        let scene = self.read()?;
+        let checkpoint = self.restart.then(|| Checkpoint::ranks(&self.folder(&scene))).flatten();
+        checkpoint.map_or_else(|| launch::ranks_that_pay(&scene).map_err(Failure::mesh), Ok)
     }
 }
 
@@ -130,6 +133,18 @@ fn adapt(
     Ok(Some(adapted))
 }
 
+/// The mesh of a scene, as the first rank reads it. Collective.
+fn read_shared(comm: Communicator, scene: &Scene) -> Result<Mesh, Failure> {
+    let read = if comm.is_root() { read_mesh(scene, true) } else { Ok(Mesh::default()) };
+    let mut mesh = agree(comm, read)?;
+    if !comm.is_serial() {
+        let mut archive = Archive::saving();
+        archive.value(&mut mesh)?;
+        Archive::loading(comm.broadcast_bytes(archive.into_bytes())).value(&mut mesh)?;
+    }
+    Ok(mesh)
+}
+
 /// Refuses PETSc options that would end the run at its first factorisations. Collective.
 fn check_factors(session: &Session, problem: &DiscreteProblem) -> Result<(), Failure> {
     let mut prefixes = ["elastic_"].into_iter().chain(problem.damage().map(|_| "damage_"));
@@ -158,14 +173,9 @@ fn check_mesh_is_kept(scene: &Scene, folder: &Path) -> Result<(), Failure> {
 pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let (started, phases) = (Instant::now(), Phases::default());
     let checked = arguments.check();
-    let mut input = None;
     if checked.is_ok() && Communicator::launched().is_none() {
-        let ranks = arguments.ranks.0.unwrap_or_else(|| {
-            let read = phases.time("mesh", || arguments.read());
-            let ranks = read.as_ref().map_or(1, |(scene, mesh)| arguments.ranks(scene, mesh));
-            input = Some(read);
-            ranks
-        });
+        let that_pay = || phases.time("mesh", || arguments.ranks());
+        let ranks = arguments.ranks.0.map_or_else(that_pay, Ok)?;
         if ranks > 1 {
             match launch::on_ranks(ranks) {
                 Err(error) if arguments.ranks.0.is_some() => {
@@ -181,8 +191,8 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     if session.comm().is_root() {
         launch::begin_first_rank();
     }
-    let task = agree(session.comm(), checked)
-        .and_then(|()| read(arguments, input, &session, &phases, started));
+    let task =
+        agree(session.comm(), checked).and_then(|()| read(arguments, &session, &phases, started));
     let warns = task.is_ok() && session.comm().is_root();
     let result = task.and_then(|(task, restart)| solve(&task, restart, &session));
     let unused = session.unused_options();
@@ -205,19 +215,17 @@ fn warn_of_checkpoint(folder: &Path) {
     }
 }
 
-/// Reads scene and mesh, unless a single rank has read them: the `input`; and the checkpoint where the run
-/// goes on. Every rank reads the files; where the mesh is yet to be made, the first rank makes it. Collective.
+/// Reads the scene and, where the run goes on, the checkpoint on every rank, and the mesh on the first one
+/// for all. Collective.
 fn read<'a>(
     arguments: &'a RunArguments,
-    input: Option<Result<(Scene, Mesh), Failure>>,
     session: &Session,
     phases: &'a Phases,
     started: Instant,
 ) -> Result<(Task<'a>, Option<Checkpoint>), Failure> {
     let comm = session.comm();
-    let load = || phases.time("mesh", || arguments.read());
-    let of_root = agree(comm, input.or_else(|| comm.is_root().then(load)).transpose())?;
-    let (mut scene, mesh) = agree(comm, of_root.map_or_else(load, Ok))?;
+    let mut scene = agree(comm, arguments.read())?;
+    let mesh = phases.time("mesh", || read_shared(comm, &scene))?;
     let solver = scene.contact.solver.clone().unwrap_or(SOLVERS[0].to_owned());
     let folder = arguments.folder(&scene);
     let (as_run, tables) = scene.as_run();

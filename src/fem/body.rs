@@ -6,7 +6,8 @@ use super::{
 };
 use crate::mesh::{Mesh, Order, sorted};
 use nalgebra::{Matrix2, Vector3};
-use std::{collections::HashMap, rc::Rc};
+use rustc_hash::FxHashMap as HashMap;
+use std::rc::Rc;
 
 /// A triangulated body, or the subdomain of it that this rank keeps.
 #[derive(Debug)]
@@ -248,7 +249,8 @@ impl QuadraticElements {
     /// their edges) and the elements.
     fn new(mesh: &Mesh) -> (Vec<[f64; 2]>, Self) {
         let mut points = mesh.nodes.clone();
-        let mut middle = HashMap::with_capacity(3 * mesh.triangles.len() / 2);
+        let mut middle =
+            HashMap::with_capacity_and_hasher(3 * mesh.triangles.len() / 2, Default::default());
         let nodes: Vec<[usize; 6]> = (mesh.triangles.iter())
             .map(|&[a, b, c]| {
                 let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|edge| {

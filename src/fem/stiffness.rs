@@ -195,8 +195,9 @@ fn pairs<const N: usize, const Q: usize>(
 ) -> Vec<[u32; 2]> {
     let couples = cells.nodes.iter().flat_map(|n| n.iter().flat_map(|a| n.map(|b| (*a, b))));
     let stored = couples.filter(|&(a, b)| is_stored(a, b));
-    let mut pairs: Vec<[u32; 2]> = stored.map(|(a, b)| [a as u32, b as u32]).collect();
+    // As single numbers they are sorted twice as fast.
+    let mut pairs: Vec<u64> = stored.map(|(a, b)| (a as u64) << 32 | b as u64).collect();
     pairs.sort_unstable();
     pairs.dedup();
-    pairs
+    pairs.into_iter().map(|pair| [(pair >> 32) as u32, pair as u32]).collect()
 }

@@ -1,12 +1,13 @@
-//! The part of a body that a rank keeps, after every rank has read the undivided body.
+//! The part of a body that a rank keeps, of the undivided body that every rank knows at first.
 
 use super::{Body, Edge, Nodes, Partition, body::QuadraticElements};
 use crate::{
     mesh::{Curve, Mesh},
     petsc::{Ghosts, PetscError, Session, divide},
 };
+use rustc_hash::FxHashMap as HashMap;
 use std::{
-    collections::{BTreeMap, BTreeSet, HashMap},
+    collections::{BTreeMap, BTreeSet},
     rc::Rc,
 };
 
@@ -39,11 +40,15 @@ struct LocalNodes {
 impl LocalNodes {
     /// Of a space whose nodes belong to the ranks `owner`, the nodes that this rank owns and, as
     /// ghosts, the others of `kept`. Collective.
-    fn new(session: &Session, owner: &[usize], kept: BTreeSet<usize>) -> Result<Self, PetscError> {
+    fn new(
+        session: &Session,
+        owner: &[usize],
+        kept: impl Iterator<Item = usize>,
+    ) -> Result<Self, PetscError> {
         let (comm, total) = (session.comm(), owner.len());
         let mut nodes: Vec<usize> = (0..total).filter(|&i| owner[i] == comm.rank()).collect();
         let owned = nodes.len();
-        let ghosts = kept.into_iter().filter(|&i| owner[i] != comm.rank());
+        let ghosts: BTreeSet<usize> = kept.filter(|&i| owner[i] != comm.rank()).collect();
         nodes.extend(ghosts);
         // PETSc numbers the nodes owner by owner: the index of each node among those of its owner,
         // and the first number of each owner.
@@ -121,14 +126,14 @@ impl Subdomain {
         let own_triangles = triangles.len();
         triangles.extend((0..mesh.triangles.len()).filter(|t| around(t) && !own(t)));
 
-        let kept = triangles.iter().flat_map(|&t| mesh.triangles[t]).collect();
+        let kept = triangles.iter().flat_map(|&t| mesh.triangles[t]);
         let vertices = LocalNodes::new(session, owner, kept)?;
         let quadratic = body.quadratic.as_ref().map(|quadratic| {
             // The middle of an edge belongs to the owner of its first end.
             let mut owner = owner.to_vec();
             owner.resize(body.nodes.points.len(), 0);
             quadratic.middle.iter().for_each(|(ends, &node)| owner[node] = owner[ends[0]]);
-            let kept = triangles.iter().flat_map(|&t| quadratic.nodes[t]).collect();
+            let kept = triangles.iter().flat_map(|&t| quadratic.nodes[t]);
             LocalNodes::new(session, &owner, kept)
         });
         Ok(Self { vertices, quadratic: quadratic.transpose()?, triangles, own_triangles })
@@ -186,7 +191,7 @@ impl Subdomain {
         let elements = elements.map(|(undivided, nodes)| QuadraticElements {
             nodes: nodes.cells(&undivided.nodes, &triangles),
             elements: triangles.iter().map(|&t| undivided.elements[t]).collect(),
-            middle: HashMap::new(),
+            middle: HashMap::default(),
         });
         let vertices = vertices.restrict(&undivided.vertices);
         Body {

@@ -38,25 +38,35 @@ pub enum Order {
     Quadratic,
 }
 
-/// Reads a mesh: a `.msh` as it is, a `.geo` through [`mesh_geo`]; nodes and triangles in an order of their
-/// own ([`Mesh::in_morton_order`]).
-///
-/// `parameters` and `order` are for a `.geo` and have no meaning for a `.msh`.
+/// Reads the mesh in [`file`]; nodes and triangles in an order of their own ([`Mesh::in_morton_order`]).
 ///
 /// # Errors
-/// Those of [`read`] and [`mesh_geo`], and any other extension.
+/// Those of [`file`] and [`read`].
 pub fn load(
     path: &Path,
     parameters: &BTreeMap<String, f64>,
     order: Order,
 ) -> Result<Mesh, MeshError> {
+    read(&file(path, parameters, order)?).map(Mesh::in_morton_order)
+}
+
+/// The `.msh` of a mesh: itself, or that which [`mesh_geo`] makes of a `.geo`.
+///
+/// `parameters` and `order` are for a `.geo` and have no meaning for a `.msh`.
+///
+/// # Errors
+/// Those of [`mesh_geo`], and any other extension.
+pub fn file(
+    path: &Path,
+    parameters: &BTreeMap<String, f64>,
+    order: Order,
+) -> Result<PathBuf, MeshError> {
     let extension = path.extension().map(|e| e.to_ascii_lowercase());
-    let mesh = match extension.as_ref().and_then(|e| e.to_str()) {
-        Some("msh") => read(path),
-        Some("geo") => read(&mesh_geo(path, parameters, order)?),
+    match extension.as_ref().and_then(|e| e.to_str()) {
+        Some("msh") => Ok(path.to_owned()),
+        Some("geo") => mesh_geo(path, parameters, order),
         _ => Err(MeshError::file(path, "a mesh is a .msh file or a .geo file for gmsh")),
-    };
-    mesh.map(Mesh::in_morton_order)
+    }
 }
 
 /// Meshes a `.geo` file and returns the path of the `.msh` beside it.

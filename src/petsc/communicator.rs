@@ -111,6 +111,19 @@ impl Communicator {
         self.total(if self.rank == from { value } else { 0.0 })
     }
 
+    /// The bytes of rank 0 (MPI_Bcast).
+    pub fn broadcast_bytes(self, mut bytes: Vec<u8>) -> Vec<u8> {
+        bytes.resize(self.broadcast(0, bytes.len() as f64) as usize, 0);
+        // MPI counts by 32 bits.
+        for part in bytes.chunks_mut(1 << 30).filter(|_| !self.is_serial()) {
+            let (data, count) = (part.as_mut_ptr().cast::<c_void>(), part.len() as c_int);
+            let byte = predefined(&raw const raw::ompi_mpi_byte);
+            // SAFETY: MPI runs on several ranks, each of which has so many bytes there.
+            unsafe { raw::MPI_Bcast(data, count, byte, 0, world()) };
+        }
+        bytes
+    }
+
     /// Whether the condition is true on some rank.
     pub fn any(self, condition: bool) -> bool {
         self.max(f64::from(condition)) > 0.0

@@ -5,7 +5,8 @@ use super::{
     byte_reader::{Result, fault},
     contents::{Contents, Element, Node},
 };
-use std::collections::{BTreeMap, HashMap, HashSet};
+use rustc_hash::{FxHashMap as HashMap, FxHashSet as HashSet};
+use std::collections::BTreeMap;
 
 /// Twice the area over the square of the longest side: below this a triangle is a line.
 const FLAT: f64 = 1e-10;
@@ -61,7 +62,7 @@ fn triangles(contents: &Contents) -> (Vec<&Element<3>>, BTreeMap<String, Vec<usi
     let grouped = contents.triangles.iter().any(|t| t.group != 0);
     // A triangle is listed once for each of its groups; the first listing counts. (What is listed twice
     // in one group, or on two entities, stays and is found to overlap.)
-    let mut first_listing = HashMap::new();
+    let mut first_listing = HashMap::default();
     let (mut elements, mut groups) = (Vec::new(), BTreeMap::<i32, Vec<usize>>::new());
     for triangle in contents.triangles.iter().filter(|t| !grouped || t.group != 0) {
         let mut nodes = triangle.nodes;
@@ -96,7 +97,7 @@ fn number_nodes<'a>(
     let used: HashSet<u64> = elements.iter().flat_map(|element| element.nodes).collect();
     let nodes = contents.nodes.iter().filter(|node| used.contains(&node.tag));
     let nodes: Vec<&Node> = nodes.collect();
-    let mut index = Index::with_capacity(nodes.len());
+    let mut index = Index::with_capacity_and_hasher(nodes.len(), Default::default());
     for (number, node) in nodes.iter().enumerate() {
         if index.insert(node.tag, number).is_some() {
             return listed_twice(node);
@@ -155,7 +156,7 @@ fn set_midpoints(
     index: &Index,
     limit: f64,
 ) -> Result<()> {
-    let mut listed = HashMap::with_capacity(contents.nodes.len());
+    let mut listed = HashMap::with_capacity_and_hasher(contents.nodes.len(), Default::default());
     for node in &contents.nodes {
         if listed.insert(node.tag, node).is_some() {
             return listed_twice(node);
@@ -188,7 +189,7 @@ fn set_midpoints(
 /// The physical curves, each edge once.
 fn curves(contents: &Contents, index: &Index, sides: &[Side]) -> Result<BTreeMap<String, Curve>> {
     let mut curves = BTreeMap::<String, Curve>::new();
-    let mut seen = HashSet::new();
+    let mut seen = HashSet::default();
     for line in &contents.lines {
         let name = contents.name(1, line.group);
         let mut edge = line.nodes.map(|tag| index.get(&tag).copied().unwrap_or(usize::MAX));

@@ -2,7 +2,8 @@
 //! body.
 
 use super::byte_reader::{ByteReader, Result, fault};
-use std::collections::{BTreeMap, HashMap};
+use rustc_hash::FxHashMap as HashMap;
+use std::collections::BTreeMap;
 
 /// A node as listed.
 pub struct Node {

@@ -42,6 +42,29 @@ pub fn parse(bytes: &[u8], path: &Path) -> std::result::Result<Mesh, MeshError> 
     })
 }
 
+/// The number of elements that a `.msh` file announces, triangles for the most part; 0 where it is none.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn announced_elements(path: &Path) -> std::result::Result<usize, MeshError> {
+    let bytes = fs::read(path).map_err(MeshError::io(path))?;
+    let mut sections = Vec::new();
+    // What else is wrong is told by who reads all of it.
+    let _ = Section::split(&bytes, &mut sections);
+    Ok(announced(&sections).unwrap_or(0) as usize)
+}
+
+/// The number of elements that the sections announce.
+fn announced(sections: &[Section]) -> Option<u64> {
+    let named = |name| sections.iter().find(|section| section.name == name);
+    let (version, numbers) = format(named("MeshFormat")?).ok()?;
+    let mut reader = ByteReader::new(named("Elements")?, numbers);
+    match version {
+        2 => reader.count_line().ok(),
+        _ => Some(v4::header(&mut reader).ok()?.1),
+    }
+}
+
 /// The place of a byte for a message: a line of a text file, a byte of a binary one.
 fn place(byte: usize, bytes: &[u8], sections: &[Section]) -> String {
     // Every binary file holds the four bytes of the integer 1.

@@ -75,7 +75,7 @@ pub fn elements(reader: &mut ByteReader, contents: &mut Contents) -> Result<()> 
 }
 
 /// The numbers of blocks and of items in all of them; the range of their tags is of no use here.
-fn header(reader: &mut ByteReader) -> Result<(u64, u64)> {
+pub fn header(reader: &mut ByteReader) -> Result<(u64, u64)> {
     let counts = (reader.size("a count")?, reader.size("a count")?);
     reader.size("the smallest tag")?;
     reader.size("the largest tag")?;
