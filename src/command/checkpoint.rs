@@ -67,16 +67,12 @@ impl Origin {
 
     /// What differs from the run that a checkpoint was `made` in.
     fn difference(&self, made: &Self) -> Option<&'static str> {
-        [
-            (self.program != made.program, "another build of the program wrote it"),
-            (
-                self.scene != made.scene,
-                "the scene, its tables, --set or PETSc's options are others",
-            ),
-            (self.mesh != made.mesh, "the mesh is another"),
-        ]
-        .into_iter()
-        .find_map(|(differs, what)| differs.then_some(what))
+        let same = [self.program == made.program, self.scene == made.scene, self.mesh == made.mesh];
+        match same {
+            [false, ..] => Some("another build of the program wrote it"),
+            [_, false, _] => Some("the scene, its tables, --set or PETSc's options are others"),
+            [.., is_same] => (!is_same).then_some("the mesh is another"),
+        }
     }
 }
 

@@ -1,8 +1,8 @@
 //! `signorini new`: a geometry and a scene to start from.
 
 use super::Failure;
-use signorini::output::terminal::say;
-use std::{fs, path::Path};
+use signorini::output::{terminal::say, write_whole};
+use std::path::Path;
 
 const GEOMETRY: &str = include_str!("new.geo");
 const SCENE: &str = include_str!("new.toml");
@@ -27,9 +27,7 @@ pub fn new(name: &Path) -> Result<(), Failure> {
     let file = geometry.file_name().unwrap_or_default().to_string_lossy();
     let text = SCENE.replace("\"new.geo\"", &toml::Value::from(&*file).to_string());
     for (path, text) in [(&geometry, GEOMETRY), (&scene, &text)] {
-        let written = fs::write(path, text);
-        written
-            .map_err(|error| Failure::input(format!("cannot write {}: {error}", path.display())))?;
+        write_whole(path, text.as_bytes()).map_err(Failure::input)?;
     }
     let (geometry, scene, name) = (geometry.display(), scene.display(), stem.display());
     say(&format!(

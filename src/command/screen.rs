@@ -133,7 +133,7 @@ fn steps(grid: TimeGrid, unit: &str) -> String {
             format!("{steps} steps of {} {unit} to t = {end}{scheme}", rounded(end / steps as f64))
         }
         Stepping::Auto { tolerance } => {
-            format!("to t = {end} in steps as the error of ζ, {tolerance:e} each, allows")
+            format!("to t = {end} in steps chosen for an error of ζ of {tolerance:e}")
         }
     }
 }
