@@ -110,7 +110,7 @@ impl fmt::Display for Kkt {
     }
 }
 
-/// A residual over its scale; nothing over nothing is nothing.
+/// A residual over its scale, where 0/0 is 0.
 fn relative(residual: f64, scale: f64) -> f64 {
     if residual == 0.0 { 0.0 } else { residual / scale }
 }

@@ -185,7 +185,7 @@ impl TrianglesAround {
     }
 }
 
-/// The fit of each vertex to the strains of one material; what vertices outside it have is nothing.
+/// The fit of each vertex to the strains of one material; a vertex outside of it has a meaningless one.
 fn fits(
     body: &Body,
     material: usize,
@@ -227,8 +227,8 @@ fn fits(
         }
         partition.update(fields.as_flattened_mut(), 19)?;
     }
-    // What is further from vertices of enough triangles, in strips one triangle thick for instance, is left.
-    // Of the degree of the strains themselves a fit is unique with a single triangle.
+    // Vertices further from those of enough triangles, as in strips one triangle thick, have fits of the
+    // degree of the strains themselves, which a single triangle determines.
     for (vertex, field) in fields.iter_mut().enumerate().take(partition.owned()) {
         if field[18] == 0.0 {
             *field = known(own_fit(vertex, degree - 1));
