@@ -58,8 +58,8 @@ impl FromStr for Ranks {
 }
 
 /// Numbers of ranks, and of unknowns of the displacements from which on they pay. Whole runs of the uniform
-/// `square-mild` on 4 cores, seconds on 1 and 2 ranks: 33,000 unknowns and 100 steps 1.8 and 1.9; 132,000
-/// and 50 steps 8.9 and 6.6; 526,000 and 20 steps 31.7 and 28.0, and 21.6 on 4.
+/// `square-mild` on 4 cores, seconds on 1 and 2 ranks: 33,000 unknowns and 100 steps 1.4 and 1.3; 132,000
+/// and 50 steps 6.0 and 4.8; 526,000 and 10 steps 16.4 on 1 and 12.8 on 4.
 const PAYING: [(usize, usize); 2] = [(2, 100_000), (4, 400_000)];
 
 /// The cores that a run may use.

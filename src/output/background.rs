@@ -15,8 +15,9 @@ const WAITING: usize = 4;
 
 type Job<T> = Box<dyn FnOnce(&mut T) -> Result<(), OutputError> + Send>;
 
-/// Files `T` that a thread of its own writes, job after job.
+/// Files `T` that a thread of its own writes, job after job, where a core is free for it.
 pub(super) struct Background<T> {
+    free_core: bool,
     files: Arc<Mutex<T>>,
     writer: Option<Writer<T>>,
 }
@@ -28,18 +29,24 @@ struct Writer<T> {
 }
 
 impl<T: Send + 'static> Background<T> {
-    pub(super) fn new(files: T) -> Self {
-        Self { files: Arc::new(Mutex::new(files)), writer: None }
+    /// Of a run on so many ranks. (As many as cores, 4, write faster by themselves: whole runs took 0.95 to
+    /// 0.99 times as long, median of 6 pairs.)
+    pub(super) fn new(files: T, ranks: usize) -> Self {
+        let free_core = thread::available_parallelism().is_ok_and(|cores| ranks < cores.get());
+        Self { free_core, files: Arc::new(Mutex::new(files)), writer: None }
     }
 
-    /// Adds a job, once there is room for it.
+    /// Adds a job, once there is room for it, or does it.
     ///
     /// # Errors
-    /// A job before has failed: then this one is not done.
+    /// This job has failed, or one before: then this one is not done.
     pub(super) fn add(
         &mut self,
         job: impl FnOnce(&mut T) -> Result<(), OutputError> + Send + 'static,
     ) -> Result<(), OutputError> {
+        if !self.free_core {
+            return job(&mut lock(&self.files));
+        }
         let writer = self.writer.get_or_insert_with(|| {
             let (queue, jobs) = sync_channel::<Job<T>>(WAITING);
             let files = self.files.clone();

@@ -35,9 +35,7 @@ const MANY: usize = 999_999;
 /// writes its piece of a frame, `fields_NNNN_R.vtu`, and the first one the lists:
 /// `fields_NNNN.pvtu` names the pieces, `fields.pvd` the frames.
 ///
-/// A piece has the triangles that its rank owns and all nodes that it knows. Every rank writes its files
-/// in the background: with as many ranks as cores, too, since ranks that wait for the slowest writer of a
-/// frame lose more than writers take.
+/// A piece has the triangles that its rank owns and all nodes that it knows.
 pub struct FieldWriter {
     files: Background<Files>,
     frames: usize,
@@ -78,7 +76,8 @@ impl FieldWriter {
         let folder = folder.to_owned();
         let list = list_of_frames(folder.join("fields.pvd"));
         let contact = ContactWriter::new(&folder)?;
-        let files = Background::new(Files { folder, mesh, list, contact });
+        let ranks = problem.body.nodes.partition.comm().size();
+        let files = Background::new(Files { folder, mesh, list, contact }, ranks);
         Ok(Self { files, frames: 0, last_time: None, digits })
     }
 
@@ -99,10 +98,10 @@ impl FieldWriter {
         self.last_time
     }
 
-    /// Writes a frame and the lists that name it, in the background. Collective.
+    /// Writes a frame and the lists that name it, or has them written while the run goes on. Collective.
     ///
     /// # Errors
-    /// A file of a frame before cannot be written.
+    /// A file of this frame, or of one before, cannot be written.
     pub fn add(&mut self, problem: &DiscreteProblem, state: &State) -> Result<(), OutputError> {
         let number = format!("{:0width$}", self.frames, width = self.digits);
         (self.frames, self.last_time) = (self.frames + 1, Some(state.time));
