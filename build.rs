@@ -16,7 +16,7 @@ const PETSC: &str = "\
     VecCreateMPI|VecGetLocalSize|VecDestroy|VecGetArray|VecRestoreArray|VecGetArrayRead|\
     VecRestoreArrayRead|VecAXPBY|VecDot|VecNorm|\
     MatCreate|MatDestroy|MatSetSizes|MatSetType|MatSetBlockSize|MatSetOption|\
-    MatSetPreallocationCOO|MatSetValuesCOO|MatMult|MatDuplicate|MatCopy|MatGetDiagonal|MatCreateVecs|\
+    MatSeqAIJSetPreallocationCSR|MatMPIAIJSetPreallocationCSR|MatMult|MatDuplicate|MatCopy|MatGetDiagonal|MatCreateVecs|\
     MatAXPY|MatScale|MatShift|MatAssemblyBegin|MatAssemblyEnd|\
     MatDiagonalSet|MatZeroRowsColumns|MatGetOwnershipRange|MatGetSize|MatGetInfo|MatMumpsGetInfog|\
     MatGetRow|MatRestoreRow|PetscObjectTypeCompare|MatMPIAIJGetSeqAIJ|MatSeqAIJGetArray|\

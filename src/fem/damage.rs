@@ -5,7 +5,7 @@ use crate::{
     cholesky::{LinearSolver, LinearSystem, Precision},
     mesh::Order,
     model::DamageLaw,
-    petsc::{Matrix, PetscError, Session, Vector},
+    petsc::{Matrix, Pattern, PetscError, Session, Vector},
 };
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
@@ -182,30 +182,30 @@ impl DamageSystem {
     ) -> Result<Self, PetscError> {
         let partition = &body.vertices.partition;
         let owned = partition.owned();
-        let (mut rows, mut columns) = (Vec::new(), Vec::new());
-        let (mut mass_values, mut laplace_values) = (Vec::new(), Vec::new());
+        let column = |node: usize| partition.global(node, 1, 0);
+        let couples =
+            body.mesh.triangles.iter().flat_map(|n| n.iter().flat_map(|a| n.map(|b| (*a, b))));
+        let own = couples.filter(|(a, _)| *a < owned);
+        let pattern = Pattern::new(owned, own.map(|(a, b)| (a, column(b))));
+        let [mut masses, mut laplacian] =
+            [vec![0.0; pattern.entries()], vec![0.0; pattern.entries()]];
         let mut diagonal = vec![0.0; body.mesh.nodes.len()];
         let triangles = body.mesh.triangles.iter().zip(&body.triangles);
         for (t, (nodes, triangle)) in triangles.enumerate() {
             let ratio = diffusions[body.material(t)] / diffusions[0];
             let (mass, laplace) = (mass.of(triangle), ratio * triangle.laplace());
-            for i in 0..3 {
-                diagonal[nodes[i]] += laplace[(i, i)];
-                for j in 0..3 {
-                    rows.push(partition.row(nodes[i], 1, 0));
-                    columns.push(partition.global(nodes[j], 1, 0));
-                    mass_values.push(mass[(i, j)]);
-                    laplace_values.push(laplace[(i, j)]);
+            for (i, &a) in nodes.iter().enumerate().filter(|(_, a)| **a < owned) {
+                diagonal[a] += laplace[(i, i)];
+                for (j, &b) in nodes.iter().enumerate() {
+                    if let Some(position) = pattern.position(a, column(b)) {
+                        masses[position] += mass[(i, j)];
+                        laplacian[position] += laplace[(i, j)];
+                    }
                 }
             }
         }
-        let mut filled = Matrix::with_pattern(session, owned, 1, rows, columns)?;
-        let mut with = |values: Vec<f64>| {
-            filled.set_values(&values)?;
-            // A copy does without the COO pattern, which is larger than the matrix.
-            filled.duplicate()
-        };
-        let (mass, laplace) = (with(mass_values)?, with(laplace_values)?);
+        let with = |values: &[f64]| Matrix::with_pattern(session, 1, &pattern, values);
+        let (mass, laplace) = (with(&masses)?, with(&laplacian)?);
         let mut system = Self {
             matrix: mass.duplicate()?,
             mass,

@@ -1,7 +1,7 @@
 //! The damaged elastic operator (ζ Aε(u), ε(v)) of (26) as a matrix for solvers.
 
 use super::{Body, Cells, Elasticity, NodalBases, for_elements};
-use crate::petsc::{Matrix, PetscError, Session, Vector};
+use crate::petsc::{Matrix, Pattern, PetscError, Session, Vector};
 use nalgebra::{Matrix2, Matrix3};
 
 /// The stiffness matrix K_ij = Σ_q w_q ζ_q Aε(φ_i) : ε(φ_j) over the quadrature points q of the
@@ -41,51 +41,39 @@ impl Stiffness {
         let is_fixed = |node: usize| fixed[2 * node] && fixed[2 * node + 1];
         let is_stored =
             |a: usize, b: usize| a < partition.owned() && (a == b || !is_fixed(a) && !is_fixed(b));
-        let pairs = for_elements!(body, cells => pairs(&cells, is_stored));
-        let (mut rows, mut columns) = (Vec::new(), Vec::new());
-        for (&[a, b], [i, j]) in pairs.iter().flat_map(|pair| ENTRIES.map(|entry| (pair, entry))) {
-            rows.push(partition.row(a as usize, 2, i));
-            columns.push(partition.global(b as usize, 2, j));
-        }
-        let mut pattern = Matrix::with_pattern(session, 2 * partition.owned(), 2, rows, columns)?;
-        let entries = pattern.places()?;
-        // A copy does without the COO pattern, which is larger than the matrix.
-        let mut matrix = pattern.duplicate()?;
-        drop(pattern);
+        let column = |node: usize| partition.global(node, 1, 0);
+        let pattern = for_elements!(body, cells => {
+            let stored = couples(&cells).filter(|&(a, b)| is_stored(a, b));
+            Pattern::new(partition.owned(), stored.map(|(a, b)| (a, column(b))))
+        });
+        let (mut matrix, entries) = Matrix::with_places(session, 2, &pattern.of_blocks())?;
         matrix.set_near_null_space(rigid_motions(session, body, bases)?)?;
 
-        let (mut of_fixed, mut free_diagonal) = (Vec::new(), Vec::new());
-        for (&[a, b], block) in pairs.iter().zip(entries.as_chunks::<4>().0) {
-            for ([i, j], &place) in ENTRIES.into_iter().zip(block) {
-                let on_diagonal = a == b && i == j;
-                if fixed[2 * a as usize + i] || fixed[2 * b as usize + j] {
-                    of_fixed.push((place, on_diagonal));
-                } else if on_diagonal {
-                    free_diagonal.push(place);
+        let place = |(a, b): (usize, usize)| {
+            let position = is_stored(a, b).then(|| pattern.position(a, column(b))).flatten();
+            let rows = |position| pattern.rows_of_block(a, position).map(|row| entries[row]);
+            position.map_or(NOWHERE, rows)
+        };
+        let (mut places, mut of_fixed) = (Vec::new(), Vec::new());
+        for_elements!(body, cells => for (a, b) in couples(&cells) {
+            let rows = place((a, b));
+            places.push(rows);
+            for [i, j] in ENTRIES.into_iter().filter(|_| rows != NOWHERE) {
+                if fixed[2 * a + i] || fixed[2 * b + j] {
+                    of_fixed.push((rows[i] + j as u32, a == b && i == j));
                 }
             }
-        }
-        let mut first = vec![0; partition.owned() + 1];
-        pairs.iter().for_each(|[a, _]| first[*a as usize + 1] += 1);
-        (0..partition.owned()).for_each(|a| first[a + 1] += first[a]);
-        let place = |a: usize, b: usize| {
-            let of_row = if is_stored(a, b) { first[a]..first[a + 1] } else { 0..0 };
-            let pair = of_row.into_iter().find(|&pair| pairs[pair][1] as usize == b);
-            pair.map_or(NOWHERE, |pair| [entries[4 * pair], entries[4 * pair + 2]])
-        };
-        let places: Vec<[u32; 2]> = for_elements!(body, cells => {
-            let couples = cells.nodes.iter().flat_map(|n| n.iter().flat_map(|a| n.map(|b| (*a, b))));
-            couples.map(|(a, b)| place(a, b)).collect()
         });
+        of_fixed.sort_unstable();
+        of_fixed.dedup();
 
         let mut stiffness = Self { matrix, scale: 0.0, places, fixed: of_fixed };
         let sound = body.at_points(&vec![1.0; body.mesh.nodes.len()]);
         stiffness.refill(body, elasticity, bases, &sound)?;
-        let mut values = Vec::new();
-        stiffness.matrix.read_entries(&mut values)?;
-        let trace: f64 = free_diagonal.iter().map(|&place| values[place as usize]).sum();
-        let (trace, free) =
-            (partition.comm().total(trace), partition.comm().count(free_diagonal.len()));
+        let diagonal = stiffness.matrix.diagonal()?;
+        let free = || diagonal.iter().zip(fixed).filter(|(_, fixed)| !**fixed);
+        let trace = partition.comm().total(free().map(|(entry, _)| entry).sum());
+        let free = partition.comm().count(free().count());
         let young = || elasticity.materials().map(|material| material.young).fold(0.0, f64::max);
         stiffness.scale = if trace > 0.0 { trace / free as f64 } else { young() };
         stiffness.refill(body, elasticity, bases, &sound)?;
@@ -188,16 +176,9 @@ fn rigid_motions(
     motions.into_iter().map(vector).collect()
 }
 
-/// The pairs of nodes (a, b) with a common triangle, increasing, that are stored.
-fn pairs<const N: usize, const Q: usize>(
+/// The pairs of nodes (a, b) of each element.
+fn couples<const N: usize, const Q: usize>(
     cells: &Cells<N, Q>,
-    is_stored: impl Fn(usize, usize) -> bool,
-) -> Vec<[u32; 2]> {
-    let couples = cells.nodes.iter().flat_map(|n| n.iter().flat_map(|a| n.map(|b| (*a, b))));
-    let stored = couples.filter(|&(a, b)| is_stored(a, b));
-    // As single numbers they are sorted twice as fast.
-    let mut pairs: Vec<u64> = stored.map(|(a, b)| (a as u64) << 32 | b as u64).collect();
-    pairs.sort_unstable();
-    pairs.dedup();
-    pairs.into_iter().map(|pair| [(pair >> 32) as u32, pair as u32]).collect()
+) -> impl Iterator<Item = (usize, usize)> + Clone {
+    cells.nodes.iter().flat_map(|nodes| nodes.iter().flat_map(|a| nodes.map(|b| (*a, b))))
 }

@@ -1,7 +1,8 @@
 //! The connected components of a mesh: pieces, which share no node, and the parts of a piece, which
 //! share single nodes only.
 
-use super::{Mesh, sides};
+use super::{Mesh, sorted};
+use rustc_hash::FxHashMap;
 
 /// The connected components of a triangulation.
 ///
@@ -23,9 +24,11 @@ pub struct Components {
 impl Mesh {
     /// The components of this mesh, numbered as its triangles first meet them.
     pub fn components(&self) -> Components {
-        let sides = sides(&self.triangles);
-        let inner = sides.windows(2).filter(|pair| pair[0].edge == pair[1].edge);
-        let neighbours = inner.map(|pair| [pair[0].triangle, pair[1].triangle]);
+        let sides = (self.triangles.iter().enumerate())
+            .flat_map(|(t, &[a, b, c])| [[a, b], [b, c], [c, a]].map(|edge| (sorted(edge), t)));
+        let count = 3 * self.triangles.len() / 2;
+        let mut met = FxHashMap::with_capacity_and_hasher(count, Default::default());
+        let neighbours = sides.filter_map(|(edge, t)| Some([met.insert(edge, t)?, t]));
         let (part_of_triangle, parts) = connected(self.triangles.len(), neighbours);
 
         let mut part_of_node = vec![None; self.nodes.len()];

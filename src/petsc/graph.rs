@@ -1,6 +1,6 @@
 //! Dividing a mesh among the ranks (<https://petsc.org/release/manualpages/MatOrderings/>).
 
-use super::{Matrix, PetscError, Session, check, handle::Handle, raw, session::world};
+use super::{Matrix, Pattern, PetscError, Session, check, handle::Handle, raw, session::world};
 use std::{ptr, slice};
 
 /// The rank of each of `nodes` nodes so that all have about as many and few of the pairs of
@@ -14,16 +14,11 @@ pub(crate) fn divide(
     let comm = session.comm();
     // Each rank passes an equal part of the rows of the adjacency matrix.
     let (start, end) = (nodes * comm.rank() / comm.size(), nodes * (comm.rank() + 1) / comm.size());
-    let (mut rows, mut columns) = (Vec::new(), Vec::new());
-    for cell in cells {
-        for &i in cell.iter().filter(|i| (start..end).contains(i)) {
-            rows.extend([i as i32; 3]);
-            columns.extend(cell.map(|j| j as i32));
-        }
-    }
-    let links = vec![1.0; rows.len()];
-    let mut graph = Matrix::with_pattern(session, end - start, 1, rows, columns)?;
-    graph.set_values(&links)?;
+    let couples = cells.iter().flat_map(|cell| cell.iter().flat_map(|&i| cell.map(|j| (i, j))));
+    let own = couples.filter(|(i, _)| (start..end).contains(i));
+    let pattern = Pattern::new(end - start, own.map(|(i, j)| (i - start, j as i32)));
+    let links = vec![1.0; pattern.entries()];
+    let graph = Matrix::with_pattern(session, 1, &pattern, &links)?;
 
     let mut indices = ptr::null();
     // SAFETY: fresh handles and a live matrix; the gathered set has `nodes` indices, lent until

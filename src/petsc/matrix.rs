@@ -2,6 +2,9 @@
 //! (<https://petsc.org/release/manualpages/Mat/>).
 
 mod entries;
+mod pattern;
+
+pub use pattern::Pattern;
 
 use super::{
     PetscError, Session, Vector, check,
@@ -12,57 +15,54 @@ use super::{
 };
 use std::{ops::Range, ptr, slice};
 
-/// A square sparse matrix, rows distributed by ownership, filled through a COO pattern.
+/// A square sparse matrix, rows distributed by ownership.
 pub struct Matrix {
     handle: Handle<raw::_p_Mat>,
     /// The global indices of the owned rows.
     rows: Range<i32>,
-    /// Positions in the COO pattern; 0 for a copy, which has none.
-    positions: usize,
 }
 
 impl Matrix {
-    /// A symmetric matrix with `owned` rows on this rank and entries at the global positions
-    /// (`rows[k]`, `columns[k]`), repeated ones to be summed; negative ones are left out
-    /// (MatSetPreallocationCOO).
+    /// A symmetric matrix whose rows on this rank, in blocks of so many, have entries as in `pattern`, with
+    /// these values (MatSeqAIJSetPreallocationCSR, MatMPIAIJSetPreallocationCSR).
     ///
     /// # Errors
-    /// An index is outside the matrix, or PETSc fails.
+    /// There are more or fewer values than entries, a column is outside the matrix, or PETSc fails.
     pub fn with_pattern(
         _session: &Session,
-        owned: usize,
         block: usize,
-        mut rows: Vec<i32>,
-        mut columns: Vec<i32>,
+        pattern: &Pattern,
+        values: &[f64],
     ) -> Result<Self, PetscError> {
-        same_size(rows.len(), columns.len())?;
-        let (local, block, positions) = (index(owned)?, block as i32, rows.len());
-        let (rows, columns) = (rows.as_mut_ptr(), columns.as_mut_ptr());
-        // SAFETY: a fresh handle; the index arrays have `positions` values each (PETSc may reorder
-        // them, they are ours) and PETSc checks them against the sizes here.
+        same_size(index(pattern.entries())? as usize, values.len())?;
+        let (local, block) = (index(pattern.starts.len() - 1)?, block as i32);
+        let (starts, columns) = (pattern.starts.as_ptr(), pattern.columns.as_ptr());
+        // SAFETY: a fresh handle; the arrays have as many values as the pattern tells, of which PETSc checks
+        // the columns. What is for a matrix of one rank does nothing to one of several, and vice versa.
         unsafe {
             let handle = Handle::new(raw::MatDestroy, |handle| raw::MatCreate(world(), handle))?;
-            let matrix = handle.raw();
+            let (matrix, values) = (handle.raw(), values.as_ptr());
             check(raw::MatSetSizes(matrix, local, local, -1, -1))?;
             check(raw::MatSetBlockSize(matrix, block))?;
             check(raw::MatSetType(matrix, c"aij".as_ptr()))?;
-            check(raw::MatSetPreallocationCOO(matrix, positions as isize, rows, columns))?;
+            check(raw::MatSeqAIJSetPreallocationCSR(matrix, starts, columns, values))?;
+            check(raw::MatMPIAIJSetPreallocationCSR(matrix, starts, columns, values))?;
             for option in [raw::MatOption::MAT_SYMMETRIC, raw::MatOption::MAT_SYMMETRY_ETERNAL] {
                 check(raw::MatSetOption(matrix, option, raw::PetscBool::PETSC_TRUE))?;
             }
             // Products by pairs of rows with equal columns took 1.5 times as long as by rows.
             let inodes = raw::MatOption::MAT_USE_INODES;
             check(raw::MatSetOption(matrix, inodes, raw::PetscBool::PETSC_FALSE))?;
-            Self::new(handle, positions)
+            Self::new(handle)
         }
     }
 
     /// The rows that this rank owns are told by PETSc (MatGetOwnershipRange).
-    fn new(handle: Handle<raw::_p_Mat>, positions: usize) -> Result<Self, PetscError> {
+    fn new(handle: Handle<raw::_p_Mat>) -> Result<Self, PetscError> {
         let mut rows = 0..0;
         // SAFETY: a live handle.
         check(unsafe { raw::MatGetOwnershipRange(handle.raw(), &mut rows.start, &mut rows.end) })?;
-        Ok(Self { handle, rows, positions })
+        Ok(Self { handle, rows })
     }
 
     /// A matrix that PETSc passes to a callback; its values cannot be set.
@@ -70,23 +70,11 @@ impl Matrix {
     /// # Safety
     /// `raw` is a live matrix for as long as it is used.
     pub(super) unsafe fn borrowed(raw: raw::Mat) -> Result<Self, PetscError> {
-        Self::new(Handle::borrowed(raw), 0)
+        Self::new(Handle::borrowed(raw))
     }
 
     pub(super) fn raw(&self) -> raw::Mat {
         self.handle.raw()
-    }
-
-    /// Replaces all values: `values[k]` belongs to the pattern's k-th position (MatSetValuesCOO).
-    ///
-    /// # Errors
-    /// Their number is not that of the pattern.
-    pub fn set_values(&mut self, values: &[f64]) -> Result<(), PetscError> {
-        same_size(self.positions, values.len())?;
-        // SAFETY: PETSc reads as many values as the pattern has positions.
-        check(unsafe {
-            raw::MatSetValuesCOO(self.raw(), values.as_ptr(), raw::InsertMode::INSERT_VALUES)
-        })
     }
 
     /// `y` ← this · `x` (MatMult).
@@ -98,7 +86,7 @@ impl Matrix {
         check(unsafe { raw::MatMult(self.raw(), x.raw(), y.raw()) })
     }
 
-    /// A copy with its near-null space (MatDuplicate); its values cannot be set through the pattern.
+    /// A copy with its near-null space (MatDuplicate).
     ///
     /// # Errors
     /// There is no memory for it.
@@ -116,7 +104,7 @@ impl Matrix {
                 check(raw::MatSetNearNullSpace(handle.raw(), space))?;
             }
         }
-        Self::new(handle, 0)
+        Self::new(handle)
     }
 
     /// A copy scaled by `factor`, then with `shift` added to its diagonal (MatScale, MatShift).

@@ -6,7 +6,7 @@ use signorini::{
         Cholesky, Factor, LinearSolver, LinearSystem, LowerTriangle, Precision, Reduction,
         RefactorisationPolicy,
     },
-    petsc::{Matrix, Session, Vector},
+    petsc::{Matrix, Pattern, Session, Vector},
 };
 
 const BOTH: [Precision; 2] = [Precision::Preconditioner, Precision::Full];
@@ -137,12 +137,9 @@ fn a_matrix_that_is_not_definite_is_told_and_forgotten() {
 
 /// The matrix of a dense one, all entries in its pattern.
 fn matrix(session: &Session, a: &DMatrix<f64>) -> Matrix {
-    let indices = || 0..a.nrows() as i32;
-    let rows = indices().flat_map(|i| indices().map(move |_| i)).collect();
-    let columns = indices().flat_map(|_| indices()).collect();
-    let mut matrix = Matrix::with_pattern(session, a.nrows(), 1, rows, columns).unwrap();
-    matrix.set_values(a.as_slice()).unwrap();
-    matrix
+    let entries = (0..a.nrows()).flat_map(|i| (0..a.nrows() as i32).map(move |j| (i, j)));
+    let pattern = Pattern::new(a.nrows(), entries);
+    Matrix::with_pattern(session, 1, &pattern, a.as_slice()).unwrap()
 }
 
 fn vector(session: &Session, values: &DVector<f64>) -> Vector {

@@ -8,7 +8,7 @@ use signorini::{
         solvers,
     },
     mesh::Mesh,
-    petsc::{Communicator, Matrix, Session, Vector},
+    petsc::{Communicator, Matrix, Pattern, Session, Vector},
     phases::Phases,
 };
 
@@ -35,11 +35,10 @@ impl Small {
     ) -> Result<(Vec<f64>, ContactReport), ContactError> {
         let session = Session::start(&[]).unwrap();
         let size = self.load.len();
-        let indices = || 0..size as i32;
-        let rows = indices().flat_map(|i| indices().map(move |_| i)).collect();
-        let columns = indices().flat_map(|_| indices()).collect();
-        let mut matrix = Matrix::with_pattern(&session, size, 1, rows, columns).unwrap();
-        matrix.set_values(self.stiffness.as_slice()).unwrap();
+        let entries = (0..size).flat_map(|i| (0..size as i32).map(move |j| (i, j)));
+        let pattern = Pattern::new(size, entries);
+        let matrix =
+            Matrix::with_pattern(&session, 1, &pattern, self.stiffness.as_slice()).unwrap();
         let (mut load, mut c) =
             (Vector::zeros(&session, size).unwrap(), Vector::zeros(&session, size).unwrap());
         load.set(&self.load).unwrap();

@@ -3,8 +3,9 @@
 use super::Factor;
 use crate::{
     cholesky::{Precision, substructure::Substructure},
-    petsc::{Matrix, PetscError, Preconditioner, Session, has_option, set_default_option},
+    petsc::{Matrix, Pattern, PetscError, Preconditioner, Session, has_option, set_default_option},
 };
+use std::iter;
 
 /// What makes and applies the factor.
 pub(super) enum Method {
@@ -50,9 +51,8 @@ impl Factor {
             return preconditioner.map(drop);
         }
         // PETSc looks for the package of a factor when it factorises: here an identity.
-        let row = vec![self.comm.rank() as i32];
-        let mut identity = Matrix::with_pattern(session, 1, 1, row.clone(), row)?;
-        identity.set_values(&[1.0])?;
+        let own = Pattern::new(1, iter::once((0, self.comm.rank() as i32)));
+        let identity = Matrix::with_pattern(session, 1, &own, &[1.0])?;
         match preconditioner?.set_up(&identity) {
             Err(error) if error.code == MISSING_FACTOR => Err(error),
             _ => Ok(()),

@@ -1,24 +1,28 @@
 //! The entries that a matrix stores on this rank, read and written in place.
 
-use super::Matrix;
-use crate::petsc::{PetscError, check, raw, vector::same_size};
+use super::{Matrix, Pattern};
+use crate::petsc::{PetscError, Session, check, raw, vector::same_size};
 use std::{ptr, slice};
 
 impl Matrix {
-    /// The place of each of the pattern's positions among the entries of `read_entries`, where
-    /// none is repeated or left out; the values are lost.
+    /// A matrix yet to be filled, as by [`Self::with_pattern`], and the place of each entry of its pattern
+    /// among those of `read_entries`.
     ///
     /// # Errors
-    /// PETSc failed.
-    pub fn places(&mut self) -> Result<Vec<u32>, PetscError> {
-        let numbers: Vec<f64> = (0..self.positions).map(|position| position as f64).collect();
-        self.set_values(&numbers)?;
-        let (mut positions, mut places) = (Vec::new(), vec![0; self.positions]);
-        self.read_entries(&mut positions)?;
+    /// As there.
+    pub fn with_places(
+        session: &Session,
+        block: usize,
+        pattern: &Pattern,
+    ) -> Result<(Self, Vec<u32>), PetscError> {
+        let numbers: Vec<f64> = (0..pattern.entries()).map(|position| position as f64).collect();
+        let matrix = Self::with_pattern(session, block, pattern, &numbers)?;
+        let (mut positions, mut places) = (Vec::new(), vec![0; numbers.len()]);
+        matrix.read_entries(&mut positions)?;
         for (place, position) in positions.into_iter().enumerate() {
             places[position as usize] = place as u32;
         }
-        Ok(places)
+        Ok((matrix, places))
     }
 
     /// Replaces the entries that this rank stores, in the order of `read_entries`, by what `writer`

@@ -1,0 +1,63 @@
+//! Where a sparse matrix has entries.
+
+/// The positions of the entries in the rows of a rank, in compressed sparse rows (CSR): row i has the global
+/// columns `columns[starts[i]..starts[i + 1]]`, increasing.
+pub struct Pattern {
+    pub(super) starts: Vec<i32>,
+    pub(super) columns: Vec<i32>,
+}
+
+impl Pattern {
+    /// Of so many rows, from the row and the global column of each entry, in any order and as often as it
+    /// comes.
+    pub fn new(rows: usize, entries: impl Iterator<Item = (usize, i32)> + Clone) -> Self {
+        let mut first = vec![0; rows + 1];
+        entries.clone().for_each(|(row, _)| first[row + 1] += 1);
+        (0..rows).for_each(|row| first[row + 1] += first[row]);
+        let (mut next, mut all) = (first.clone(), vec![0; first[rows]]);
+        for (row, column) in entries {
+            all[next[row]] = column;
+            next[row] += 1;
+        }
+        let (mut starts, mut columns) = (vec![0], Vec::new());
+        for span in first.windows(2) {
+            let row = &mut all[span[0]..span[1]];
+            row.sort_unstable();
+            columns.extend(row.chunk_by(|a, b| a == b).map(|same| same[0]));
+            starts.push(columns.len() as i32);
+        }
+        Self { starts, columns }
+    }
+
+    /// The number of entries.
+    pub fn entries(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// The position of an entry.
+    pub fn position(&self, row: usize, column: i32) -> Option<usize> {
+        let [start, end] = [row, row + 1].map(|row| self.starts[row] as usize);
+        let place = self.columns[start..end].iter().position(|other| *other == column);
+        place.map(|place| start + place)
+    }
+
+    /// With a block of 2×2 entries in the place of each entry.
+    pub fn of_blocks(&self) -> Self {
+        let (mut starts, mut columns) = (vec![0], Vec::with_capacity(4 * self.entries()));
+        for span in self.starts.windows(2) {
+            let row = &self.columns[span[0] as usize..span[1] as usize];
+            for _ in 0..2 {
+                columns.extend(row.iter().flat_map(|column| [2 * column, 2 * column + 1]));
+                starts.push(columns.len() as i32);
+            }
+        }
+        Self { starts, columns }
+    }
+
+    /// In [`Self::of_blocks`], where both rows begin of the block of an entry in `row` at `position`.
+    pub fn rows_of_block(&self, row: usize, position: usize) -> [usize; 2] {
+        let [start, end] = [row, row + 1].map(|row| self.starts[row] as usize);
+        let first = 2 * (start + position);
+        [first, first + 2 * (end - start)]
+    }
+}
