@@ -1,5 +1,6 @@
 //! What a scene asks for on the named parts of the boundary, in terms of the mesh.
 
+use super::unresolved::parts_of_edges;
 use crate::{
     contact::{FixedRow, GapRow, RigidMotions},
     fem::{Body, Edge},
@@ -55,6 +56,8 @@ pub(super) struct Traction {
     pub(super) edges: Vec<Edge>,
     /// f_N, N/m².
     pub(super) force: SurfaceLoad,
+    /// See [`parts_of_edges`].
+    pub(super) parts: usize,
 }
 
 impl BoundaryConditions {
@@ -82,6 +85,7 @@ impl BoundaryConditions {
                 boundary: boundary.name.clone(),
                 edges: edges.clone(),
                 force: force.clone(),
+                parts: parts_of_edges(scene, mesh, curve, force),
             }));
         }
         let (gaps, distances) = GapRow::joined(gaps);

@@ -137,8 +137,8 @@ impl Loads {
             let at = |[x, y]: [f64; 2]| force.each_ref().map(|f| f.eval(x, y, t));
             add_body_force(body, at, &mut load);
         }
-        for Traction { edges, force, .. } in &self.tractions {
-            add_traction(body, edges, |x, normal| force.at(x, normal, t), &mut load);
+        for Traction { edges, force, parts, .. } in &self.tractions {
+            add_traction(body, edges, *parts, |x, normal| force.at(x, normal, t), &mut load);
         }
         load
     }

@@ -229,7 +229,7 @@ pub(super) fn unresolved(scene: &Scene, mesh: &Mesh, traction: &Traction) -> Opt
     for t in times {
         let mut sums = [[0.0; 3]; 2];
         for edge in &traction.edges {
-            let parts = integrals(mesh, &traction.force, edge.ends, t);
+            let parts = integrals(mesh, &traction.force, traction.parts, edge.ends, t);
             let sums = sums.as_flattened_mut().iter_mut();
             sums.zip(parts.as_flattened()).for_each(|(sum, part)| *sum += part);
         }

@@ -11,6 +11,11 @@ use std::collections::HashSet;
 const SAMPLES: usize = 64;
 /// Times at which a traction or a gap is sampled, about.
 pub(super) const TIMES: usize = 8;
+/// A load jumps if it changes by more than this part of its largest value from one sample of an edge to the
+/// next, at one of about so many times; edges are then integrated in so many parts.
+const JUMP: f64 = 0.25;
+const JUMP_TIMES: usize = 13;
+const PARTS: usize = 16;
 /// What a single edge may lose of the accuracy asked for.
 const SHARE: f64 = 0.1;
 /// Gaps count where they are less than this many times the largest displacement.
@@ -74,7 +79,7 @@ fn unresolved_load(
     }
     for t in scene.sample_times(TIMES) {
         let parts = curve.edges.iter().map(|&edge| {
-            let [coarse, fine] = integrals(mesh, load, edge, t);
+            let [coarse, fine] = integrals(mesh, load, 1, edge, t);
             (edge, (fine[0] - coarse[0]).hypot(fine[1] - coarse[1]), fine[2])
         });
         let parts: Vec<_> = parts.collect();
@@ -89,17 +94,47 @@ fn samples() -> impl Iterator<Item = f64> {
     (0..SAMPLES).map(|i| (i as f64 + 0.5) / SAMPLES as f64)
 }
 
-/// ∫f_x, ∫f_y and ∫|f| of a load over an edge at time t: by the two Gauss points of
+/// Into how many parts the edges of a curve are divided where a `load` is integrated: more than one if it
+/// jumps within an edge, at some time. By two Gauss points a jump that moves would cross an edge in two leaps.
+pub(super) fn parts_of_edges(
+    scene: &Scene,
+    mesh: &Mesh,
+    curve: &Curve,
+    load: &SurfaceLoad,
+) -> usize {
+    let f = load.expressions();
+    if !f.iter().any(Expression::depends_on_space) {
+        return 1;
+    }
+    let mut times = scene.sample_times(JUMP_TIMES);
+    times.truncate(if f.iter().any(Expression::depends_on_time) { usize::MAX } else { 1 });
+    let (mut largest, mut jump) = (0.0_f64, 0.0_f64);
+    for (&edge, &t) in curve.edges.iter().flat_map(|edge| times.iter().map(move |t| (edge, t))) {
+        let normal = mesh.edge_normal(edge).0;
+        let at = |s: f64| load.at(place(mesh, edge, s), normal, t);
+        let values: Vec<[f64; 2]> = samples().map(at).collect();
+        for pair in values.windows(2) {
+            let [a, b] = [pair[0], pair[1]];
+            largest = largest.max(b[0].hypot(b[1]));
+            jump = jump.max((b[0] - a[0]).hypot(b[1] - a[1]));
+        }
+    }
+    if jump > JUMP * largest { PARTS } else { 1 }
+}
+
+/// ∫f_x, ∫f_y and ∫|f| of a load over an edge at time t: by the Gauss points of
 /// [`add_traction`](crate::fem::add_traction), and by many midpoints.
 pub(super) fn integrals(
     mesh: &Mesh,
     load: &SurfaceLoad,
+    parts: usize,
     edge: [usize; 2],
     t: f64,
 ) -> [[f64; 3]; 2] {
     let (normal, length) = mesh.edge_normal(edge);
     let gauss = gauss_points([0.0; 2], [1.0, 0.0]).map(|[s, _]| s);
-    [gauss.to_vec(), samples().collect()].map(|parts| {
+    let gauss = (0..parts).flat_map(|i| gauss.map(|s| (i as f64 + s) / parts as f64));
+    [gauss.collect(), samples().collect()].map(|parts: Vec<f64>| {
         let values = parts.iter().map(|&s| load.at(place(mesh, edge, s), normal, t));
         let sum =
             values.fold([0.0; 3], |[x, y, all], [fx, fy]| [x + fx, y + fy, all + fx.hypot(fy)]);

@@ -51,22 +51,26 @@ pub fn add_body_force(body: &Body, force: impl Fn([f64; 2]) -> [f64; 2], load: &
 
 /// Adds the surface load f_i = ∫ f_N·φ_i over boundary `edges` to the nodal loads, with f_N in N/m² as
 /// a function of the point and the outward normal there. Two Gauss points an edge are exact, on
-/// straight edges, where f_N is quadratic for P1 and affine for P2.
+/// straight edges, where f_N is quadratic for P1 and affine for P2; where it jumps, `parts` of each edge
+/// have two of their own.
 pub fn add_traction(
     body: &Body,
     edges: &[Edge],
+    parts: usize,
     traction: impl Fn([f64; 2], [f64; 2]) -> [f64; 2],
     load: &mut [f64],
 ) {
     let points = &body.nodes.points;
+    let part = 1.0 / parts as f64;
+    let places = || (0..parts).flat_map(|i| GAUSS.map(|s| part * (i as f64 + s)));
     for edge in edges {
-        for s in GAUSS {
+        for s in places() {
             let [dx, dy] = edge.tangent(points, s);
             let length = dx.hypot(dy);
             let f = traction(edge.at(points, s), [dy / length, -dx / length]);
             for (node, value) in edge.values(s) {
-                load[2 * node] += 0.5 * length * value * f[0];
-                load[2 * node + 1] += 0.5 * length * value * f[1];
+                load[2 * node] += 0.5 * part * length * value * f[0];
+                load[2 * node + 1] += 0.5 * part * length * value * f[1];
             }
         }
     }

@@ -1,7 +1,10 @@
 //! Nodal loads against the integrals they stand for.
 
-use crate::support::{ORDERS, bent, close, curved_area, difference, distorted, moved, turn};
+use crate::support::{
+    ORDERS, bent, close, curved_area, difference, distorted, history, moved, problem, square, turn,
+};
 use signorini::{
+    contact::SOLVERS,
     fem::{Body, Elasticity, add_body_force, add_traction},
     mesh::{Mesh, Order},
     model::{Material, Plane},
@@ -29,7 +32,7 @@ fn quadratic_tractions_are_integrated_exactly() {
         let body = Body::new(distorted(5), order);
         let mut load = vec![0.0; 2 * body.nodes.points.len()];
         let f = |[x, _]: [f64; 2], _| [1.0 - 2.0 * x + 6.0 * x * x, 3.0 * x * x];
-        add_traction(&body, &body.edges(&body.mesh.curves["top"].edges), f, &mut load);
+        add_traction(&body, &body.edges(&body.mesh.curves["top"].edges), 1, f, &mut load);
         let [horizontal, vertical] = moments(&body, &load);
         // ∫f_x = 1 − 1 + 2, ∫x f_x = 1/2 − 2/3 + 6/4; ∫f_y = 1, ∫x f_y = 3/4.
         for (value, expected) in horizontal.into_iter().zip([2.0, 4.0 / 3.0, 2.0]) {
@@ -71,7 +74,7 @@ fn a_pressure_all_around_has_no_resultant() {
         for curve in body.mesh.curves.values() {
             for edge in &curve.edges {
                 let [edge] = body.edges(&[*edge])[..] else { panic!("one edge") };
-                add_traction(&body, &[edge], |_, normal| normal, &mut load);
+                add_traction(&body, &[edge], 1, |_, normal| normal, &mut load);
             }
         }
         let [[x, _, moment_x], [y, moment_y, _]] = moments(&body, &load);
@@ -95,7 +98,7 @@ fn a_pressure_on_a_curved_boundary_has_the_resultant_and_moment_of_its_ends() {
     for curve in body.mesh.curves.values() {
         let mut load = vec![0.0; 2 * body.nodes.points.len()];
         for edge in body.edges(&curve.edges) {
-            add_traction(&body, &[edge], |_, normal| normal, &mut load);
+            add_traction(&body, &[edge], 1, |_, normal| normal, &mut load);
         }
         let ends = curve.edges.iter().map(|edge| edge.map(|node| body.mesh.nodes[node]));
         let square = |[x, y]: [f64; 2]| x * x + y * y;
@@ -127,7 +130,7 @@ fn a_uniform_stress_is_in_equilibrium_with_its_traction_on_curved_elements() {
         let traction = |_, [nx, ny]: [f64; 2]| {
             [stress[0] * nx + stress[2] * ny, stress[2] * nx + stress[1] * ny]
         };
-        add_traction(&body, &[edge], traction, &mut load);
+        add_traction(&body, &[edge], 1, traction, &mut load);
     }
     let error = difference(&load, &force);
     assert!(error < 1e-13, "{error}");
@@ -169,4 +172,29 @@ fn the_weights_of_quadratic_nodes_are_those_of_the_midpoints() {
     let square = |([x, y], weight): (&[f64; 2], &f64)| weight * (x * x + y * y);
     close(body.nodes.points.iter().zip(&body.nodes.weights).map(square).sum(), 2.0 / 3.0, 1e-14);
     close(body.polar_inertia, 1.0 / 6.0, 1e-14);
+}
+
+#[test]
+fn the_force_of_a_pressure_that_ends_within_an_edge_is_that_of_its_length() {
+    // It spreads over the top of four edges; by the two Gauss points of each it would grow in leaps of 1/8.
+    for degree in [1, 2] {
+        let text = format!(
+            "discretisation.displacement = {degree}
+             material = {{ young = 100, poisson = 0.3, plane = 'stress' }}
+             time = {{ end = 1, step = 0.02 }}
+             boundary = [
+                {{ name = 'left', symmetry = true }},
+                {{ name = 'bottom', gap = 0 }},
+                {{ name = 'top', pressure = 'if(x < t, 1, 0)' }},
+             ]"
+        );
+        let problem = problem(square(4), &text).unwrap_or_else(|e| panic!("{e}"));
+        assert!(
+            !problem.notes().iter().any(|note| note.contains("varies within the mesh's edges"))
+        );
+        for step in history(&problem, SOLVERS[0]).0 {
+            let (force, t) = (step.record.contact_force, step.record.time);
+            assert!((force - t).abs() < 0.01, "P{degree}: {force} at t = {t}");
+        }
+    }
 }
