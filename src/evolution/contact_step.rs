@@ -25,7 +25,7 @@ use crate::{
     fem::Stiffness,
     petsc::{PetscError, Session, Vector},
 };
-use certificate::Judged;
+use certificate::{Judged, MOST_ROUNDING};
 use datum::Datum;
 use minimisation::displacement;
 use nalgebra::DMatrix;
@@ -229,11 +229,11 @@ impl<'a> ContactStep<'a> {
         let problem = self.problem;
         let failed = |source| RunError::contact(problem, step, case.time, source);
         let mut report = ContactReport::default();
-        let (mut tolerance, mut force, mut attempt) = (problem.tolerance, None, 0);
+        let (mut tolerance, mut before, mut attempt) = (problem.tolerance, (None, None), 0);
         loop {
             attempt += 1;
             let (lift, bounds) = self.next.datum.pose(&problem.constraints, case);
-            let solved = match self.solve_contact(case, &lift, &bounds, tolerance, force) {
+            let solved = match self.solve_contact(case, &lift, &bounds, tolerance, before) {
                 // All ranks know that the method stopped short; other errors may be one rank's.
                 Err(error) if !error.stopped_short() => return Err(failed(error)),
                 solved => solved,
@@ -242,6 +242,7 @@ impl<'a> ContactStep<'a> {
             let judged = self.phases.time("certificate", || self.certify(u, case));
             let certified = judged.kkt.within(problem.tolerance);
             let far = !self.next.datum.is_zero() && judged.rigid_max > FAR * judged.elastic_max;
+            before = (Some(judged.scales.force), None);
             if (far || !certified) && attempt < ATTEMPTS && self.move_datum(&judged)? {
                 continue;
             }
@@ -268,7 +269,9 @@ impl<'a> ContactStep<'a> {
                 return Err(failed(self.limited(error, &judged)));
             }
             tolerance *= 0.3 * problem.tolerance / judged.kkt.worst();
-            force = Some(judged.scales.force);
+            if judged.kkt.within(MOST_ROUNDING) {
+                before.1 = Some(judged.unbalanced);
+            }
         }
     }
 

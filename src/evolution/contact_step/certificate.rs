@@ -13,7 +13,7 @@ use crate::{
 /// Residuals are the effect of rounding if they are at most this many times its estimate.
 const ROUNDED: f64 = 10.0;
 /// Residuals above this are accepted only by a tolerance that is as large.
-const MOST_ROUNDING: f64 = 1e-6;
+pub(super) const MOST_ROUNDING: f64 = 1e-6;
 /// A deformation below this part of the datum is rounding.
 const CARRIED: f64 = 1e-14;
 /// The cosine between u and its elastic forces is below this only if K is indefinite.

@@ -13,14 +13,17 @@ const LIFTED: f64 = 1e-2;
 
 impl ContactStep<'_> {
     /// Replaces c by the solution of (26) for the load of the free unknowns, f − K u_D with u_D the
-    /// displacements of the prescribed ones, `lift`. An earlier answer may tell the force scale F of residuals.
+    /// displacements of the prescribed ones, `lift`.
+    ///
+    /// Of the answer c before, the certificate may have told the force scale F of residuals, and f − Ku, `unbalanced`:
+    /// the load is then K c plus that, so that rounding of the assembled K does not count.
     pub(super) fn solve_contact(
         &mut self,
         case: &LoadCase,
         lift: &[f64],
         bounds: &[Bound],
         tolerance: f64,
-        known: Option<f64>,
+        (known, unbalanced): (Option<f64>, Option<Vec<f64>>),
     ) -> Result<ContactReport, ContactError> {
         let (body, bases) = (&self.problem.body, &self.problem.constraints.bases);
         let comm = body.nodes.partition.comm();
@@ -43,13 +46,21 @@ impl ContactStep<'_> {
             force = force.max(LIFTED * body.nodes.partition.norm(&internal_force(u), 2));
         }
         let force = known.map_or(force, |known| force.min(known));
-        bases.force_to_local(&mut load);
-        bases.zero_fixed(&mut load);
-        let load = &load[..self.load.owned()];
-        self.load.set(load)?;
+        let in_unknowns = |mut force: Vec<f64>| {
+            bases.force_to_local(&mut force);
+            bases.zero_fixed(&mut force);
+            force.truncate(self.c.owned());
+            force
+        };
+        let load = in_unknowns(load);
+        self.load.set(&load)?;
         if !overlaps && comm.all(load.iter().all(|&f| f == 0.0)) {
             self.c.write(|c| c.fill(0.0))?;
             return Ok(ContactReport::default());
+        }
+        if let Some(unbalanced) = unbalanced.map(in_unknowns) {
+            self.stiffness.matrix.multiply(&self.c, &mut self.load)?;
+            self.load.write(|load| load.iter_mut().zip(&unbalanced).for_each(|(f, r)| *f += r))?;
         }
         let contact = ContactProblem {
             stiffness: &self.stiffness.matrix,
