@@ -83,6 +83,8 @@ impl Cholesky {
         if self.precision == Precision::Preconditioner && !self.is_accurate_enough(a) {
             self.precision = Precision::Full;
             self.solver = Box::new(Supernodal::<f64>::new(&self.factor, self.interior));
+            // What is left of the values may be too short for CHOLMOD to write to.
+            self.factor.free_values()?;
             self.factor.factorise(a)?;
             self.solver.take_values(&mut self.factor);
         }
