@@ -1,7 +1,7 @@
 """Prints and draws the measurements of `make bench`: bench.py FOLDER
 
-Reads FOLDER/bench.csv, prints it as the tables of the README (Markdown) and draws FOLDER/bench.png: seconds
-per step and of whole processes as multiples of ours, with the floor that no step can go below, and growth.
+Reads FOLDER/bench.csv, prints it as the tables of validation/SPEED.md (Markdown) and draws FOLDER/bench.png:
+seconds per step and of whole processes as multiples of ours, with the floor that no step can go below, and growth.
 """
 
 from math import isfinite
