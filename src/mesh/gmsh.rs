@@ -38,10 +38,10 @@ pub enum Order {
     Quadratic,
 }
 
-/// Reads the mesh in [`file`]; nodes and triangles in an order of their own ([`Mesh::in_morton_order`]).
+/// Reads the mesh in [`file()`]; nodes and triangles in an order of their own ([`Mesh::in_morton_order`]).
 ///
 /// # Errors
-/// Those of [`file`] and [`read`].
+/// Those of [`file()`] and [`read`].
 pub fn load(
     path: &Path,
     parameters: &BTreeMap<String, f64>,
