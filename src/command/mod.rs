@@ -154,13 +154,15 @@ impl SceneArguments {
 /// mesh is to be adapted to it, that of a `.geo` is coarse.
 fn read_mesh(scene: &Scene, adapts: bool) -> Result<Mesh, Failure> {
     let MeshSource { file, parameters } = &scene.mesh;
-    let mut parameters = parameters.clone();
+    let (mut parameters, mut order) = (parameters.clone(), scene.order);
     if adapts && scene.accuracy.is_some() && file.extension().is_none_or(|kind| kind != "msh") {
+        // Of order 1, too: bisected sides then follow curved boundaries.
+        order = Order::Quadratic;
         let usual = mesh::load(file, &parameters, Order::Linear).map_err(Failure::mesh)?;
         let scaling = mesh::scaling_factor(file).map_err(Failure::mesh)?;
         parameters.insert("size".to_owned(), mesh::extent(&usual.nodes) / scaling / CELLS);
     }
-    mesh::load(file, &parameters, scene.order).map_err(Failure::mesh)
+    mesh::load(file, &parameters, order).map_err(Failure::mesh)
 }
 
 /// The reference of all keys of a scene, made of their schema by scripts/keys.py.
