@@ -17,11 +17,11 @@ pub(super) enum Method {
     Petsc(Preconditioner),
 }
 
-/// Unknowns per root of the rows up to which they are condensed: a dense factor of them then takes about the work
-/// of the sparse one. Of squares and strips up to 32 times as long as high (1,000 to 22,000 rows, both orders,
-/// 50 steps) whole runs, condensed, took 0.35 to 0.9 of the time where contact moves and there are up to 4,
-/// 0.56 to 0.74 with 5.3 to 6.2, 0.9 to 1.1 with 7, 1.1 to 1.5 with 7.7; where it stays 1.05 to 1.25 up to 6.
-const MOST_CONDENSED: f64 = 6.0;
+/// Unknowns per root of the rows up to which they are condensed. Of squares and strips up to 32 times as long as
+/// high whole runs, condensed, took 0.35 to 0.9 of the time where contact moves and there are up to 4; with 5.3
+/// to 6.2 it were 0.56 to 0.74, but a weightless strip that hardly touches at its ends (5.8) then ended with
+/// another active set, as well certified and 24 % apart in u.
+const MOST_CONDENSED: f64 = 4.0;
 
 /// PETSC_ERR_MISSING_FACTOR: PETSc has no such package, or not for such a factor.
 const MISSING_FACTOR: i32 = 92;

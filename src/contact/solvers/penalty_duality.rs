@@ -60,9 +60,6 @@ type Response<'a> = &'a mut dyn FnMut(f64, &[f64]) -> Result<Vec<f64>, ContactEr
 /// The iteration diverges if the contact law is missed by this many times as much as at first, and as the
 /// load.
 const DIVERGED: f64 = 1e12;
-/// The iteration stops if so many iterations have not halved what misses the contact law: 20,000 at that rate
-/// would gain six digits.
-const STALLED: usize = 1000;
 /// The relative error in a change of pressure, −ωx for the displacements x, that a factor in single
 /// precision may leave.
 const CONDENSED: f64 = 1e-6;
@@ -107,7 +104,6 @@ impl FixedPoint {
         let mut q: Vec<f64> = start.map(|((p, u), w)| p / w - omega * u).collect();
         let mut anderson = Anderson::new(problem.comm, lengths());
         let (mut first, mut missed, mut steps) = (None, f64::NAN, 0.0);
-        let (mut halved, mut stalled) = (f64::INFINITY, 0);
         while report.iterations < self.options.iterations {
             report.iterations += 1;
             let normal = respond(omega, &q)?;
@@ -122,11 +118,7 @@ impl FixedPoint {
                 report.contraction = Some((missed / first).powf(1.0 / steps));
             }
             steps += 1.0;
-            if missed < 0.5 * halved {
-                (halved, stalled) = (missed, 0);
-            }
-            stalled += 1;
-            if !missed.is_finite() || missed > DIVERGED * first.max(1.0) || stalled > STALLED {
+            if !missed.is_finite() || missed > DIVERGED * first.max(1.0) {
                 break;
             }
             q = if self.options.accelerate { anderson.next(&q, image) } else { image };
