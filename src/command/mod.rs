@@ -1,5 +1,6 @@
 //! What the subcommands do.
 
+mod accuracy;
 mod check;
 mod checkpoint;
 mod launch;
@@ -107,11 +108,15 @@ pub struct SceneArguments {
     /// Use this .geo or .msh instead of the scene's.
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
-    /// Choose order, mesh and time steps so that the estimated error of u (energy norm) and of the
-    /// damage is at most this, from 1e-5 to 0.5, e.g. 0.01; time.step, time.tolerance and the mesh.size of
+    /// Choose order, mesh and time steps so that every figure is within this part of its largest value in
+    /// the run, and u (energy norm) and the damage too, from 1e-5 to 0.5, e.g. 0.01; time.step, time.tolerance and the mesh.size of
     /// a .geo then have no effect.
     #[arg(long, value_name = "ERROR")]
     accuracy: Option<f64>,
+    /// Ask for the accuracy of this figure alone (work, displacement_max, contact_force, zeta_min, zeta_mean,
+    /// NAME.force_x … as in summary.json); may be repeated.
+    #[arg(long, value_name = "NAME")]
+    accuracy_of: Vec<String>,
     /// Override a key of the scene, e.g. --set time.step=0.005; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -134,7 +139,10 @@ impl SceneArguments {
     /// The scene with its keys overridden, also by `more`.
     fn read(&self, more: &[String]) -> Result<Scene, Failure> {
         let accuracy = self.accuracy.map(|error| format!("accuracy={error}"));
-        let set = [&self.set[..], &Vec::from_iter(accuracy), more].concat();
+        let quoted: Vec<_> = self.accuracy_of.iter().map(|name| format!("'{name}'")).collect();
+        let figures = (!quoted.is_empty()).then(|| format!("accuracy_of=[{}]", quoted.join(",")));
+        let asked = Vec::from_iter(accuracy.into_iter().chain(figures));
+        let set = [&self.set[..], &asked, more].concat();
         let mut scene = Scene::read(&self.scene, &set).map_err(Failure::input)?;
         if let Some(file) = &self.mesh {
             let replaced = std::mem::replace(&mut scene.mesh, MeshSource::from_path(file));

@@ -1,6 +1,7 @@
 //! What a run writes and shows.
 
 use super::{
+    accuracy,
     checkpoint::{self, Checkpoint},
     profile,
     provenance::provenance,
@@ -136,7 +137,8 @@ impl<'a> Recorder<'a> {
         };
         let written = written.and(task.phases.time("output", || self.fields.finish()));
         let outcome = result.as_ref().ok();
-        let mut notes = task.problem.notes();
+        let mut notes = Vec::from_iter(accuracy::verdict(task, outcome));
+        notes.extend(task.problem.notes());
         notes.extend(outcome.iter().flat_map(|outcome| outcome.notes(&task.problem)));
         let mut shown = notes.clone();
         notes.extend(outcome.iter().flat_map(|outcome| outcome.remarks(&task.problem)));
@@ -249,7 +251,7 @@ fn summary(
         // The worst of all steps.
         "kkt": outcome.map(|outcome| outcome.kkt).or(last.map(|record| record.kkt())),
         // Estimated relative errors of the last state; null where there is none.
-        "errors": outcome.map(|outcome| outcome.errors),
+        "errors": outcome.map(|outcome| &outcome.errors),
         "wall_seconds": wall,
         "seconds_per_step": wall / steps.max(1) as f64,
         "phases": seconds.collect::<BTreeMap<_, _>>(),

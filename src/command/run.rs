@@ -2,6 +2,7 @@
 
 use super::{
     Failure, SOLVERS, SceneArguments,
+    accuracy::{adapt, measure_bars},
     check::contact_nodes,
     check_petsc, check_solver,
     checkpoint::Checkpoint,
@@ -9,7 +10,7 @@ use super::{
     ranks::{agree, barrier_or_abort},
     read_mesh,
     recorder::Recorder,
-    screen, summaries,
+    summaries,
     task::Task,
     tell,
 };
@@ -17,13 +18,11 @@ use clap::Args;
 use signorini::{
     archive::Archive,
     cholesky::{Factor, Precision},
-    evolution::{
-        self, AdaptError, Adapted, DiscreteProblem, Outcome, Phases, RunError, SHARE_OF_STEPS,
-    },
-    mesh::{Mesh, Order},
+    evolution::{self, DiscreteProblem, Phases, RunError},
+    mesh::Mesh,
     output,
     petsc::{Communicator, Session},
-    scene::{Scene, Stepping},
+    scene::Scene,
 };
 use std::{
     path::{Path, PathBuf},
@@ -50,6 +49,11 @@ pub struct RunArguments {
     /// there are (one for small meshes; those of the checkpoint with --restart).
     #[arg(long, alias = "threads", value_name = "N", default_value = "auto")]
     ranks: Ranks,
+    /// Measure how far off the mesh puts each figure, by two runs with few steps, on the mesh and on this
+    /// mesh bisected everywhere (`signorini check` says about how long that takes); with --accuracy that is
+    /// done in any case.
+    #[arg(long)]
+    bars: bool,
     /// Go on from the last checkpoint of the same run, to the same results bit by bit; from the
     /// beginning if there is none.
     #[arg(long)]
@@ -92,45 +96,6 @@ impl RunArguments {
         let checkpoint = self.restart.then(|| Checkpoint::ranks(&self.folder(&scene))).flatten();
         checkpoint.map_or_else(|| launch::ranks_that_pay(&scene).map_err(Failure::mesh), Ok)
     }
-}
-
-/// Where the scene asks for an accuracy, a mesh that has it, or the one `made` in the run that goes on,
-/// and steps for it in the scene. Collective.
-fn adapt(
-    session: &Session,
-    scene: &mut Scene,
-    mesh: &Mesh,
-    solver: &str,
-    made: Option<Adapted>,
-) -> Result<Option<Adapted>, Failure> {
-    let Some(accuracy) = scene.accuracy else { return Ok(None) };
-    let is_root = session.comm().is_root();
-    let mut show = |mesh: &Adapted| {
-        if is_root {
-            screen::adapting(mesh, accuracy);
-        }
-    };
-    let adapt = || evolution::adapted(session, scene, mesh.clone(), solver, accuracy, &mut show);
-    let adapted = made.map_or_else(adapt, Ok);
-    let adapted = adapted.map_err(|error| match error {
-        AdaptError::Setup(_) => Failure::input(error),
-        _ => error.into(),
-    })?;
-    if let Some(grid) = &mut scene.time {
-        grid.stepping = Stepping::Auto { tolerance: SHARE_OF_STEPS * accuracy };
-    }
-    let (order, triangles) = (scene.order, adapted.mesh.triangles.len());
-    let degree = if order == Order::Quadratic { 2 } else { 1 };
-    let reached = match &adapted.short {
-        Some(reason) => format!("NOT reached ({reason})"),
-        None => "reached".to_owned(),
-    };
-    scene.notes.push(format!(
-        "accuracy {accuracy} {reached}: P{degree} on {triangles} triangles, mesh {} of those tried \
-         (kept as mesh.msh)",
-        adapted.rounds,
-    ));
-    Ok(Some(adapted))
 }
 
 /// The mesh of a scene, as the first rank reads it. Collective.
@@ -237,6 +202,12 @@ fn read<'a>(
     let adapt = || adapt(session, &mut scene, &mesh, &solver, made);
     let adapted = agree(comm, phases.time("adaptation", adapt))?;
     let mesh = adapted.as_ref().map_or(mesh, |adapted| adapted.mesh.clone());
+    let measure = || measure_bars(session, &mut scene, &mesh, &solver);
+    let bars = match &adapted {
+        Some(adapted) => adapted.bars.clone(),
+        None if arguments.bars => agree(comm, phases.time("error bars", measure))?,
+        None => Vec::new(),
+    };
     let problem = phases.time("discrete problem", || DiscreteProblem::new(scene, mesh));
     let problem = agree(comm, problem.map_err(Failure::input))?;
     let problem = phases.time("partition", || problem.restrict(session));
@@ -256,6 +227,7 @@ fn read<'a>(
         as_run,
         tables,
         adapted,
+        bars,
         _lock: lock,
         petsc: &arguments.petsc,
         profile: arguments.profile,
@@ -276,9 +248,12 @@ fn solve(task: &Task, restart: Option<Checkpoint>, session: &Session) -> Result<
     let saved = restart.map(|checkpoint| checkpoint.state);
     let mut result =
         evolution::run_from(session, problem, &task.solver, phases, &mut recorder, saved);
-    if let Ok(Outcome { stopped: Some(stop), .. }) = &mut result {
-        let change = task.adapted.as_ref().and_then(|adapted| adapted.stop_change);
-        stop.from_mesh = [stop.from_mesh, change].into_iter().flatten().reduce(f64::max);
+    if let Ok(outcome) = &mut result {
+        outcome.set_bars(problem, &task.bars);
+        if let Some(stop) = &mut outcome.stopped {
+            let measured = task.adapted.as_ref().and_then(|adapted| adapted.stop_error);
+            stop.from_mesh = [stop.from_mesh, measured].into_iter().flatten().reduce(f64::max);
+        }
     }
     barrier_or_abort(comm, result.as_ref().err());
     let written = recorder.finish(&result);

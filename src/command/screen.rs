@@ -3,7 +3,7 @@
 use super::{launch, task::Task};
 use signorini::{
     evolution::{Adapted, Outcome, StepRecord},
-    output::terminal::{Progress, say},
+    output::terminal::{Progress, say, with_bar},
     scene::{Scheme, Stepping, TimeGrid, rounded},
 };
 use std::io::{self, IsTerminal, Write};
@@ -45,12 +45,15 @@ pub fn adapting(mesh: &Adapted, accuracy: f64) {
     }
     let percent = |error: f64| format!("{:.2} %", 100.0 * error);
     let of_damage = mesh.damage_error.map_or(String::new(), |e| format!(", damage {}", percent(e)));
+    let measured = mesh.worst.as_ref();
+    let measured = measured.map(|(name, error)| format!("; measured: {name} {}", percent(*error)));
     let (rounds, triangles, unknowns) = (mesh.rounds, mesh.mesh.triangles.len(), mesh.unknowns);
     let _ = writeln!(
         io::stderr(),
-        "  adapting      mesh {rounds}: {triangles} triangles, {unknowns} unknowns, error of u {}{of_damage} \
+        "  adapting      mesh {rounds}: {triangles} triangles, {unknowns} unknowns, error of u {}{of_damage}{} \
          (accuracy {})",
         percent(mesh.error),
+        measured.unwrap_or_default(),
         percent(accuracy)
     );
 }
@@ -75,20 +78,33 @@ pub fn conclusion(
 ) -> Vec<String> {
     let mut lines = vec![row("end", ending(last, outcome))];
     if let Some(last) = last {
+        let bar = |name: &str| outcome.and_then(|of| of.errors.figures.get(name).copied());
         let damage = match last.zeta_min {
             1.0 => "none".to_owned(),
-            least => format!("min ζ {least:.6}, mean ζ {:.6}", last.zeta_mean),
+            least => match (bar("zeta_min"), bar("zeta_mean")) {
+                (None, None) => format!("min ζ {least:.6}, mean ζ {:.6}", last.zeta_mean),
+                (of_least, of_mean) => format!(
+                    "min ζ {}, mean ζ {}",
+                    with_bar(least, of_least),
+                    with_bar(last.zeta_mean, of_mean)
+                ),
+            },
         };
         lines.push(row("damage", damage));
         let units = &task.problem.scene().units;
         let (length, force) = (&units.length, &units.force);
-        lines.push(row("displacement", format!("largest {:.6e} {length}", last.displacement_max)));
-        lines.push(row("work", format!("{:.6e} {}", last.work, units.work())));
+        lines.push(row(
+            "displacement",
+            format!(
+                "largest {} {length}",
+                with_bar(last.displacement_max, bar("displacement_max"))
+            ),
+        ));
+        lines.push(row("work", format!("{} {}", with_bar(last.work, bar("work")), units.work())));
         if task.contact_nodes > 0 {
             let (active, nodes) = (last.active_nodes, task.contact_nodes);
-            let sum = last.contact_force;
-            let contact =
-                format!("{active} of {nodes} nodes active, force {sum:.6e} {force}/{length}");
+            let sum = with_bar(last.contact_force, bar("contact_force"));
+            let contact = format!("{active} of {nodes} nodes active, force {sum} {force}/{length}");
             lines.push(row("contact", contact));
         }
         // Resultants come first, three for each support.
@@ -103,8 +119,14 @@ pub fn conclusion(
         for (name, [x, y, moment]) in supports.iter().zip(resultants.clone()) {
             let [x, y] = [x, y].map(|component| visible(component, force_most));
             let moment = visible(moment, moment_most);
-            let resultant = format!("force ({x:.4e}, {y:.4e}) {force}/{length}");
-            lines.push(row("support", format!("{name}: {resultant}, moment {moment:.4e} {force}")));
+            let figure = |value: f64, of: &str| match bar(&format!("{name}.{of}")) {
+                None => format!("{value:.4e}"),
+                bar => with_bar(value, bar),
+            };
+            let (x, y) = (figure(x, "force_x"), figure(y, "force_y"));
+            let resultant = format!("force ({x}, {y}) {force}/{length}");
+            let moment = figure(moment, "moment");
+            lines.push(row("support", format!("{name}: {resultant}, moment {moment} {force}")));
         }
         if let Some(outcome) = outcome {
             let [first, rest @ ..] = outcome.errors.lines(outcome.stopped.as_ref());

@@ -1,6 +1,6 @@
 //! What a run works on.
 
-use signorini::evolution::{Adapted, DiscreteProblem, Phases};
+use signorini::evolution::{Adapted, Bar, DiscreteProblem, Phases};
 use std::{fs::File, path::PathBuf, time::Instant};
 
 /// A run whose input is good.
@@ -20,6 +20,8 @@ pub struct Task<'a> {
     pub tables: Vec<u8>,
     /// The mesh, where it was adapted.
     pub adapted: Option<Adapted>,
+    /// The error bars of the figures that the mesh makes, where they were measured.
+    pub bars: Vec<Bar>,
     /// Keeps other runs out of the folder.
     pub _lock: Option<File>,
     pub petsc: &'a [String],

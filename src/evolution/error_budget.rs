@@ -3,10 +3,11 @@
 use super::{DiscreteProblem, Outcome, State, Stop, mesh_error::DamageError};
 use crate::{fem::RecoveredStrains, petsc::PetscError};
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Estimated relative errors of the last accepted state: of u in the energy norm, of the damage
 /// ζ₀ − ζ in L². `None` without damage; from the time steps also where these are too few to tell.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ErrorBudget {
     /// Of u, from the mesh.
     pub displacement_mesh: f64,
@@ -20,9 +21,15 @@ pub struct ErrorBudget {
     /// Of the largest displacement, from the solver; infinite where the active nodes alone do not support
     /// the body.
     pub solver: f64,
+    /// The error bars of the figures by their names, from mesh and time steps, each in the unit of its
+    /// figure; empty where they are not measured.
+    pub figures: BTreeMap<String, f64>,
     /// Whether the material can be damaged.
     #[serde(skip)]
     pub can_be_damaged: bool,
+    /// The error of ζ from the time steps, at a node and in the mean.
+    #[serde(skip)]
+    pub(super) zeta_steps: Option<[f64; 2]>,
 }
 
 /// Above this the mesh is called the limit.
@@ -48,7 +55,12 @@ impl ErrorBudget {
             displacement_steps: steps.map(caused),
             damage_steps: steps.and_then(|error| problem.relative_to_damage(error, state)),
             solver: accuracy.displacement,
+            figures: BTreeMap::new(),
             can_be_damaged: problem.damage().is_some(),
+            zeta_steps: steps.map(|error| {
+                let (low, high) = problem.body.vertices.partition.min_max(error);
+                [high.max(-low), problem.body.mean(error).abs()]
+            }),
         }
     }
 

@@ -17,6 +17,8 @@ type Sample = ([f64; 2], f64);
 const TRIANGLES: usize = 500;
 /// The loads of a step may deviate from a straight line in time by this part of the largest ones.
 const DEVIATION: f64 = 0.05;
+/// Loads pass within a step if they swing by more than this part of the largest ones.
+const PASSING: f64 = 0.2;
 /// Times that differ by less than this part of the run are one.
 const APART: f64 = 1e-9;
 /// Uniform steps that are looked at.
@@ -241,6 +243,30 @@ impl<'a> LoadCurve<'a> {
             .into_iter()
             .map(ends)
             .find(|[start, end]| !curve.is_nearly_linear(*start, end - before))
+    }
+
+    /// Whether the sum of all forces, or of all displacements and gaps, swings within a uniform step by more
+    /// than [`PASSING`] of the largest: a load that comes and goes between two steps, not one that moves.
+    pub(super) fn pass_within_steps(problem: &'a DiscreteProblem) -> bool {
+        let Some(grid) = problem.scene().time else { return false };
+        let Stepping::Uniform { steps } = grid.stepping else { return false };
+        let Some(mut curve) = Self::new(problem) else { return false };
+        let size = |values: &Vec<f64>| sum_abs(values.iter().copied());
+        let mut sizes = |time: f64| curve.sample(time).each_ref().map(size);
+        let mut swings = [0.0_f64; 2];
+        for n in 0..steps {
+            let [start, end] = [grid.time(n, steps), grid.time(n + 1, steps)];
+            let [first, last] = [sizes(start), sizes(end)];
+            for point in 1..=POINTS {
+                let part = point as f64 / (POINTS + 1) as f64;
+                let now = sizes(start + part * (end - start));
+                for kind in 0..2 {
+                    let line = (1.0 - part) * first[kind] + part * last[kind];
+                    swings[kind] = swings[kind].max((now[kind] - line).abs());
+                }
+            }
+        }
+        (0..2).any(|kind| swings[kind] > PASSING * curve.largest[kind])
     }
 
     /// Forces and displacements at `time`; the largest ones are kept.

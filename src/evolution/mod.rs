@@ -34,12 +34,14 @@ mod discrete_problem;
 mod error;
 mod error_budget;
 mod extrapolation;
+mod figures;
 mod instants;
 mod loads;
 mod mesh_error;
 mod notes;
 mod observer;
 mod outcome;
+mod penetration;
 mod probe;
 mod state;
 mod step_controller;
@@ -48,12 +50,13 @@ mod unresolved;
 
 pub use crate::contact::ContactPoint;
 pub use crate::phases::Phases;
-pub use adaptive::{AdaptError, Adapted, SHARE_OF_STEPS, adapted};
+pub use adaptive::{AdaptError, Adapted, SHARE_OF_STEPS, adapted, measured_bars};
 pub use contact_step::{Accuracy, ContactStep};
 pub use discrete_problem::DiscreteProblem;
 pub use error::{RunError, SetupError, StepFailure};
 pub use error_budget::ErrorBudget;
 pub use extrapolation::Extrapolation;
+pub use figures::Bar;
 pub use loads::Loads;
 pub use observer::{Next, Observed, Observer};
 pub use outcome::{BoundViolation, Outcome, Stop};
@@ -101,6 +104,37 @@ pub fn run_from(
     observer: &mut dyn Observer,
     saved: Option<Vec<u8>>,
 ) -> Result<Outcome, RunError> {
+    let Run { damage_step, contact_step, controller, mut outcome, instants } =
+        all_steps(session, problem, solver, phases, observer, saved)?;
+    let compliance = contact_step.into_compliance()?;
+    judge(&mut outcome, &controller, damage_step, compliance, instants)?;
+    Ok(outcome)
+}
+
+/// As [`run`], without the estimates at its end.
+///
+/// # Errors
+/// See [`run`].
+fn run_unestimated(
+    session: &Session,
+    problem: &DiscreteProblem,
+    solver: &str,
+    phases: &Phases,
+    accepted: &mut dyn FnMut(&Step) -> Observed,
+) -> Result<Outcome, RunError> {
+    let observer = &mut Shown(accepted);
+    all_steps(session, problem, solver, phases, observer, None).map(|run| run.outcome)
+}
+
+/// Makes all steps of a run.
+fn all_steps<'a>(
+    session: &'a Session,
+    problem: &'a DiscreteProblem,
+    solver: &str,
+    phases: &'a Phases,
+    observer: &mut dyn Observer,
+    saved: Option<Vec<u8>>,
+) -> Result<Run<'a>, RunError> {
     let damage_step = DamageStep { session, problem, phases, system: None };
     let mut contact_step = ContactStep::new(session, problem, solver, phases)?;
     let (zeta, start) = (problem.initial_damage(), problem.start());
@@ -123,10 +157,7 @@ pub fn run_from(
         }
     }
     while run.step(observer)? {}
-    let Run { damage_step, contact_step, controller, mut outcome, instants } = run;
-    let compliance = contact_step.into_compliance()?;
-    judge(&mut outcome, &controller, damage_step, compliance, instants)?;
-    Ok(outcome)
+    Ok(run)
 }
 
 /// A run between two steps.
@@ -216,6 +247,10 @@ fn judge(
     outcome.bound_violation = controller.violation;
     outcome.damage_error = controller.damage_error();
     outcome.accuracy = phases.time("accuracy", || compliance.accuracy(outcome))?;
+    outcome.penetration = phases.time("accuracy", || {
+        let states = instants.states.iter().chain([&outcome.last.state]);
+        problem.penetration_note(states)
+    });
     let mesh = phases.time("mesh error", || {
         mesh_error(problem, &mut damage_step, compliance, instants, outcome)
     });

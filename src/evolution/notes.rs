@@ -64,6 +64,7 @@ impl Outcome {
                 self.kkt.worst()
             ));
         }
+        notes.extend(self.penetration.clone());
         notes.extend(accuracy.notes(problem.tolerance));
         notes.extend(problem.large_gradients(&self.last.state.u));
         if let Some((steps, solver)) = &self.rescued {

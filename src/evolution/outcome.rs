@@ -1,6 +1,8 @@
 //! How a run ended that did not fail.
 
-use super::{Accuracy, ErrorBudget, Step, StepRecord, damage_step::PlannedStep};
+use super::{
+    Accuracy, Bar, DiscreteProblem, ErrorBudget, Step, StepRecord, damage_step::PlannedStep,
+};
 use crate::{
     archive::{Archive, ArchiveError},
     contact::{Kkt, RigidMotion},
@@ -35,6 +37,10 @@ pub struct Outcome {
     pub accuracy: Accuracy,
     /// Where the errors of the last accepted state come from.
     pub errors: ErrorBudget,
+    /// The error bars of the figures; none where they are not measured.
+    pub bars: Vec<Bar>,
+    /// What the user should know of contact between the nodes.
+    pub(super) penetration: Option<String>,
     /// Of each triangle of this rank ‖z − Iz‖²_T / ‖ζ₀ − z‖², with z the last ζ in P2 and I its
     /// interpolation in P1. Empty where the error of the damage is not estimated.
     pub damage_indicators: Vec<f64>,
@@ -88,6 +94,19 @@ impl Outcome {
         archive.value(&mut self.unconstrained)?;
         archive.value(&mut self.least_accurate)?;
         archive.value(&mut self.most_displaced)
+    }
+
+    /// Enters the error bars that the mesh makes, `of_mesh`, and adds what the time steps may do. Where the
+    /// run stopped at ζ_* there are none: another mesh stops at another time.
+    pub fn set_bars(&mut self, problem: &DiscreteProblem, of_mesh: &[Bar]) {
+        if self.stopped.is_some() {
+            return;
+        }
+        self.bars = of_mesh.to_vec();
+        let [most, mean] = self.errors.zeta_steps.unwrap_or_default();
+        let displacement = self.errors.displacement_steps.unwrap_or(0.0);
+        problem.add_step_errors(&mut self.bars, [most, mean, displacement]);
+        self.errors.figures = self.bars.iter().map(|bar| (bar.name.clone(), bar.bar)).collect();
     }
 
     /// A further step is accepted.

@@ -48,6 +48,20 @@ impl Refinement {
     pub fn refine(&self, marked: &[bool]) -> Result<Self, MeshError> {
         let edges = Edges::of(&self.mesh.triangles);
         let halved = edges.halved_with(marked);
+        self.halve(&edges, &halved)
+    }
+
+    /// Divides every triangle into four, of half its size, by bisecting it and its halves.
+    ///
+    /// # Errors
+    /// See [`Refinement::refine`].
+    pub fn refine_everywhere(&self) -> Result<Self, MeshError> {
+        let edges = Edges::of(&self.mesh.triangles);
+        self.halve(&edges, &Vec::from_iter(0..edges.ends.len()))
+    }
+
+    /// Halves some edges, with every one of them the reference edges of its triangles.
+    fn halve(&self, edges: &Edges, halved: &[usize]) -> Result<Self, MeshError> {
         let mut new_node = vec![None; edges.ends.len()];
         for (edge, node) in halved.iter().zip(self.mesh.nodes.len()..) {
             new_node[*edge] = Some(node);

@@ -14,6 +14,26 @@ pub fn say(text: &str) {
     let _ = writeln!(io::stdout(), "{text}");
 }
 
+/// A figure with its error bar, where it has one: `5.3570 ± 0.0004`, or `(1.8139 ± 0.0012)e-2`; the bar has
+/// one digit, or two if the first one is 1.
+pub fn with_bar(value: f64, bar: Option<f64>) -> String {
+    let exponent = |number: f64| number.abs().log10().floor() as i32;
+    let bar = bar.filter(|bar| *bar > 0.0 && bar.is_finite() && value.is_finite());
+    let Some(bar) = bar else { return format!("{value:.6e}") };
+    let of_both = exponent(value.abs().max(bar));
+    let last = exponent(bar) - i32::from(bar / 10_f64.powi(exponent(bar)) < 2.0);
+    match of_both {
+        -3..5 => {
+            let decimals = (-last).max(0) as usize;
+            format!("{value:.decimals$} ± {bar:.decimals$}")
+        }
+        _ => {
+            let (unit, decimals) = (10_f64.powi(of_both), (of_both - last).max(0) as usize);
+            format!("({:.decimals$} ± {:.decimals$})e{of_both}", value / unit, bar / unit)
+        }
+    }
+}
+
 /// A progress bar of `length` that looks as indicatif's `template` says; silent when standard error is
 /// no terminal.
 pub fn progress_bar(template: &str, length: u64) -> ProgressBar {

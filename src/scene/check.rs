@@ -70,6 +70,19 @@ impl Scene {
         self.text.verdict(outside.iter().map(problem).collect())
     }
 
+    /// Checks that the figures for which an accuracy is asked are among the `known` ones.
+    ///
+    /// # Errors
+    /// The others, with their lines.
+    pub fn check_figures(&self, known: &[&str]) -> Result<(), SceneError> {
+        let unknown = self.accuracy_of.iter().filter(|name| !known.contains(&name.as_str()));
+        let problem = |name: &String| {
+            let suggestion = suggestion(name, known);
+            self.at_key("accuracy_of", &format!("names `{name}`, which is no figure{suggestion}"))
+        };
+        self.text.verdict(unknown.map(problem).collect())
+    }
+
     fn bad_values(&self, mesh: &Mesh, times: &[f64]) -> Vec<Problem> {
         let mut problems = Vec::new();
         let mut check = |key: String, expression, points: &[[f64; 2]], rule: Rule| {

@@ -51,8 +51,11 @@ pub struct Scene {
     pub surfaces: BTreeMap<String, Surface>,
     /// The order of the displacements.
     pub order: Order,
-    /// The largest relative error of u (energy norm) and of the damage: mesh and steps are then chosen.
+    /// The largest relative error of the figures, of u (energy norm) and of the damage: mesh and steps are
+    /// then chosen.
     pub accuracy: Option<f64>,
+    /// The figures for which it is asked; none: all figures, u and the damage.
+    pub accuracy_of: Vec<String>,
     /// The time grid; without it there is one static solve at t = 1.
     pub time: Option<TimeGrid>,
     /// Body force f_B, N/m³.

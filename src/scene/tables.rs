@@ -29,6 +29,7 @@ pub(super) fn scene(found: &mut Findings) -> Option<Scene> {
     let material = found.build("material", Ok);
     let damage = found.build("damage", damage);
     let accuracy: Option<f64> = found.build("accuracy", Ok);
+    let accuracy_of: Option<Vec<String>> = found.build("accuracy_of", Ok);
     let degree: Option<f64> = found.build("discretisation.displacement", Ok);
     let time = found.build("time", time);
     let body_force = found.build("body.force", Ok);
@@ -64,6 +65,7 @@ pub(super) fn scene(found: &mut Findings) -> Option<Scene> {
         surfaces,
         order: if degree == 2.0 { Order::Quadratic } else { Order::Linear },
         accuracy,
+        accuracy_of: accuracy_of.unwrap_or_default(),
         time,
         body_force: body_force?,
         contact: contact?,

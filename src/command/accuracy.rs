@@ -1,0 +1,83 @@
+//! An accuracy that is asked for: the mesh that has it, and whether the answer does.
+
+use super::{Failure, screen, task::Task};
+use signorini::{
+    evolution::{self, AdaptError, Adapted, Bar, Outcome, SHARE_OF_STEPS},
+    mesh::{Mesh, Order},
+    petsc::Session,
+    scene::{Scene, Stepping},
+};
+
+/// Where the scene asks for an accuracy, a mesh that has it, or the one `made` in the run that goes on,
+/// and steps for it in the scene. Collective.
+pub(super) fn adapt(
+    session: &Session,
+    scene: &mut Scene,
+    mesh: &Mesh,
+    solver: &str,
+    made: Option<Adapted>,
+) -> Result<Option<Adapted>, Failure> {
+    let Some(accuracy) = scene.accuracy else { return Ok(None) };
+    let is_root = session.comm().is_root();
+    let mut show = |mesh: &Adapted| {
+        if is_root {
+            screen::adapting(mesh, accuracy);
+        }
+    };
+    let adapt = || evolution::adapted(session, scene, mesh.clone(), solver, accuracy, &mut show);
+    let adapted = made.map_or_else(adapt, Ok);
+    let adapted = adapted.map_err(|error| match error {
+        AdaptError::Setup(_) => Failure::input(error),
+        _ => error.into(),
+    })?;
+    if let Some(grid) = &mut scene.time {
+        grid.stepping = Stepping::Auto { tolerance: SHARE_OF_STEPS * accuracy };
+    }
+    Ok(Some(adapted))
+}
+
+/// The error bars that a mesh makes, measured. Where a run for them fails a note says so. Collective.
+pub(super) fn measure_bars(
+    session: &Session,
+    scene: &mut Scene,
+    mesh: &Mesh,
+    solver: &str,
+) -> Result<Vec<Bar>, Failure> {
+    match evolution::measured_bars(session, scene, mesh, solver) {
+        Ok(bars) => Ok(bars),
+        Err(AdaptError::Setup(error)) => Err(Failure::input(error)),
+        Err(error) => {
+            scene.notes.push(format!("the error bars could not be measured: {error}"));
+            Ok(Vec::new())
+        }
+    }
+}
+
+/// Whether the accuracy that was asked for is reached by the answer, and what is in its way; `None` where
+/// none was asked for.
+pub(super) fn verdict(task: &Task, outcome: Option<&Outcome>) -> Option<String> {
+    let (adapted, scene) = (task.adapted.as_ref()?, task.problem.scene());
+    let accuracy = scene.accuracy?;
+    let (triangles, rounds) = (adapted.mesh.triangles.len(), adapted.rounds);
+    let degree = if scene.order == Order::Quadratic { 2 } else { 1 };
+    let mesh = format!(
+        "P{degree} on {triangles} triangles, mesh {rounds} of those tried (kept as mesh.msh)"
+    );
+    let Some(outcome) = outcome else { return Some(format!("accuracy {accuracy}: {mesh}")) };
+    let is_asked =
+        |name: &str| scene.accuracy_of.is_empty() || scene.accuracy_of.iter().any(|n| n == name);
+    let bars = outcome.bars.iter().filter(|bar| is_asked(&bar.name));
+    let bars = bars.map(|bar| (bar.name.clone(), bar.relative()));
+    let norms = scene.accuracy_of.is_empty().then_some(&adapted.worst).into_iter().flatten();
+    let worst = bars.chain(norms.cloned()).max_by(|a, b| a.1.total_cmp(&b.1));
+    let missed = worst.filter(|(_, error)| *error > accuracy).map(|(name, error)| {
+        let unit =
+            if error.is_finite() { format!("{:.2} %", 100.0 * error) } else { "?".to_owned() };
+        format!("{name} is exact to {unit} only")
+    });
+    let reasons: Vec<String> = missed.into_iter().chain(adapted.short.clone()).collect();
+    Some(match reasons.is_empty() {
+        true => format!("accuracy {accuracy} reached: {mesh}"),
+        false => format!("accuracy {accuracy} NOT reached ({}): {mesh}", reasons.join("; ")),
+    })
+}

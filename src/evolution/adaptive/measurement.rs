@@ -1,0 +1,199 @@
+//! What a mesh does to the figures, measured: the same few steps on the mesh bisected everywhere.
+//!
+//! With the size of all triangles halved, an error of order p falls by 2^p, so that of the change
+//! F(h/2) − F(h) = (1 − 2^−p) e(h) the error e(h) is at most twice the change for every p ≥ 1. The change
+//! at one time may vanish by chance where it changes its sign: the bar of a figure is
+//!
+//! 2 max(|ΔF(T)|, (mean over t of ΔF(t)²)^½).
+
+use super::{
+    super::{
+        DiscreteProblem,
+        figures::{Bar, Dimension},
+    },
+    AdaptError,
+    pilot::{INSTANTS, Pilot},
+    sizes::areas,
+};
+use crate::{
+    mesh::{Mesh, Order, Refinement},
+    petsc::Session,
+    scene::Scene,
+};
+
+/// The error over the change, at most, of anything of first order or better.
+const ERROR_OVER_CHANGE: f64 = 2.0;
+/// The error over the change of the norm of a field, in which nothing cancels: 1.1 to 2.1 in P1 and P2
+/// (ACCURACY.md).
+const FIELD_ERROR_OVER_CHANGE: f64 = 1.5;
+
+/// Triangles whose change is above this part of the largest are refined for a figure …
+const GOOD_PART: f64 = 0.25;
+/// … and they alone where they make this part of the whole change.
+const MOST: f64 = 0.7;
+
+/// What the bisection of a mesh changed.
+#[derive(Default)]
+pub(super) struct Measurement {
+    /// The error bars of the figures; none where the run ends at ζ_*.
+    pub(super) bars: Vec<Bar>,
+    /// The error of ζ at the end over the damage, in L².
+    pub(super) damage: f64,
+    /// The relative error of u on the bisected mesh as it is estimated there, at the worst time.
+    pub(super) displacement: f64,
+    /// The error of ‖u‖² over its largest value.
+    pub(super) energy: f64,
+    /// How far off the time is at which ζ_* is reached, over that time: infinite where one of the two runs
+    /// does not reach it.
+    pub(super) stop: f64,
+    /// For each triangle of the mesh: its share of the squared relative error of u, by the estimates on its
+    /// parts, and the largest penetration at their edges, m.
+    pub(super) shares: Vec<f64>,
+    pub(super) depths: Vec<f64>,
+    /// For each triangle the change of the reactions on its edges, N per metre of thickness, and the largest
+    /// change of ζ at its nodes and midpoints.
+    reactions: Vec<f64>,
+    zeta: Vec<f64>,
+}
+
+impl Measurement {
+    /// Compares the run `coarse` of `scene` on `mesh` with the same one on this mesh bisected everywhere.
+    /// Collective.
+    ///
+    /// # Errors
+    /// A triangle cannot be bisected, or the run on the bisected mesh fails.
+    pub(super) fn new(
+        session: &Session,
+        scene: &Scene,
+        mesh: &Mesh,
+        coarse: &Pilot,
+        solver: &str,
+        rounds: usize,
+    ) -> Result<Self, AdaptError> {
+        let halved = Refinement::start(mesh.clone()).refine_everywhere()?;
+        let triangles = halved.mesh.triangles.len();
+        let problem =
+            DiscreteProblem::new(scene.clone(), halved.mesh.clone())?.restrict(session)?;
+        let fine = Pilot::run(session, &problem, solver, triangles, false);
+        let fine = fine.map_err(|source| AdaptError::Run { rounds, triangles, source })?;
+        let stop = match [coarse.stop(), fine.stop()] {
+            [None, None] => 0.0,
+            [Some(before), Some(now)] => ERROR_OVER_CHANGE * (now - before).abs() / now,
+            _ => f64::INFINITY,
+        };
+        let (displacement, of_parts) = fine.relative();
+        // An error of order p on the parts was 2^p times as large on the whole.
+        let growth = if scene.order == Order::Quadratic { 16.0 } else { 4.0 };
+        let count = mesh.triangles.len();
+        let (mut shares, mut depths) = (vec![0.0; count], vec![0.0_f64; count]);
+        let parts = halved.parent_of_triangle.iter().zip(of_parts).zip(fine.depths());
+        for ((&parent, share), depth) in parts {
+            shares[parent] += growth * share;
+            depths[parent] = depths[parent].max(*depth);
+        }
+        let [before, now] = [coarse, &fine].map(|run| run.energies());
+        let energy = match now[1] {
+            0.0 => 0.0,
+            largest => ERROR_OVER_CHANGE * (now[0] - before[0]).abs() / largest,
+        };
+        let mut measured = Self { displacement, energy, stop, shares, depths, ..Self::default() };
+        if coarse.stop().or(fine.stop()).is_none() {
+            measured.bars = bars(coarse, &fine);
+            (measured.damage, measured.zeta) = damage(mesh, &halved, coarse, &fine);
+            measured.reactions = coarse.reactions().iter().map(|force| -force).collect();
+            for (&parent, force) in halved.parent_of_triangle.iter().zip(fine.reactions()) {
+                measured.reactions[parent] += force;
+            }
+        }
+        Ok(measured)
+    }
+
+    /// The measured relative errors and what they are the errors of, the largest first: those of the figures
+    /// `asked` for, or of all figures, of u, its energy, the damage and the time of ζ_*.
+    pub(super) fn errors(&self, asked: &[String]) -> impl Iterator<Item = (String, f64)> {
+        let norms = [
+            ("damage", self.damage),
+            ("displacement", self.displacement),
+            ("energy", self.energy),
+            ("stopped_at", self.stop),
+        ];
+        let figures = self.bars.iter().map(|bar| (bar.name.as_str(), bar.relative()));
+        let is_asked = |name: &str| asked.is_empty() || asked.iter().any(|other| other == name);
+        let errors = figures.chain(norms).filter(|(name, _)| is_asked(name));
+        let mut errors: Vec<_> = errors.map(|(name, error)| (name.to_owned(), error)).collect();
+        errors.sort_by(|a, b| b.1.total_cmp(&a.1));
+        errors.into_iter()
+    }
+
+    /// The triangles that make most of the change of the figure `name`, where these are few: those in which
+    /// ζ, for its least value, or the contact reactions, for a force, changed by a good part of the largest
+    /// change. `None` where the whole mesh made the change.
+    pub(super) fn places(&self, name: &str) -> Option<Vec<bool>> {
+        let bar = self.bars.iter().find(|bar| bar.name == name)?;
+        let changes = match bar.dimension {
+            Dimension::Damage if name != "zeta_mean" => &self.zeta,
+            Dimension::Force | Dimension::Moment => &self.reactions,
+            _ => return None,
+        };
+        let largest = changes.iter().fold(0.0_f64, |most, change| most.max(change.abs()));
+        let here: Vec<bool> = changes.iter().map(|c| c.abs() > GOOD_PART * largest).collect();
+        let marked = here.iter().filter(|&&here| here).count();
+        let change: f64 = changes.iter().sum();
+        let of_marked: f64 =
+            changes.iter().zip(&here).filter(|(_, here)| **here).map(|(c, _)| c).sum();
+        let is_most = bar.dimension == Dimension::Damage || of_marked.abs() > MOST * change.abs();
+        (largest > 0.0 && is_most && marked <= here.len() / 4).then_some(here)
+    }
+}
+
+/// The error bars of the figures on the mesh of `coarse`.
+fn bars(coarse: &Pilot, fine: &Pilot) -> Vec<Bar> {
+    let end = coarse.outcome.last.state.time;
+    let times: Vec<f64> = (0..=INSTANTS).map(|i| end * i as f64 / INSTANTS as f64).collect();
+    let changes: Vec<Vec<f64>> = (times.iter())
+        .map(|&time| {
+            let pair = coarse.figures_at(time).into_iter().zip(fine.figures_at(time));
+            pair.map(|(before, now)| now - before).collect()
+        })
+        .collect();
+    let error = |i: usize| {
+        let squares: f64 = changes.iter().map(|change| change[i] * change[i]).sum();
+        let change = (squares / changes.len() as f64).sqrt().max(changes[INSTANTS][i].abs());
+        ERROR_OVER_CHANGE * change
+    };
+    let scales = fine.scales();
+    let errors: Vec<f64> = (0..scales.len()).map(error).collect();
+    coarse.problem.bars(&errors, &scales)
+}
+
+/// ‖ζ_h − ζ_{h/2}‖ over ‖1 − ζ_{h/2}‖ at the end, as an error, and the largest |ζ_h − ζ_{h/2}| of each
+/// triangle of `mesh`. Collective.
+fn damage(mesh: &Mesh, halved: &Refinement, coarse: &Pilot, fine: &Pilot) -> (f64, Vec<f64>) {
+    let mut before = at_vertices(mesh, &coarse.zeta());
+    let middles = halved.halved_edges.iter().map(|&[a, b]| 0.5 * (before[a] + before[b]));
+    before.extend(middles.collect::<Vec<f64>>());
+    let mut changes = vec![0.0_f64; mesh.triangles.len()];
+    let mesh = &halved.mesh;
+    let now = at_vertices(mesh, &fine.zeta());
+    let mut sums = [0.0; 2];
+    let parts = mesh.triangles.iter().zip(&halved.parent_of_triangle).zip(areas(mesh));
+    for ((nodes, &parent), area) in parts {
+        for &node in nodes {
+            let change = now[node] - before[node];
+            sums[0] += area * change * change;
+            sums[1] += area * (1.0 - now[node]).powi(2);
+            changes[parent] = changes[parent].max(change.abs());
+        }
+    }
+    let relative = if sums[0] > 0.0 { (sums[0] / sums[1]).sqrt() } else { 0.0 };
+    (FIELD_ERROR_OVER_CHANGE * relative, changes)
+}
+
+/// A field at the vertices of `mesh`, from its values on the triangles.
+fn at_vertices(mesh: &Mesh, of_triangles: &[Vec<f64>; 3]) -> Vec<f64> {
+    let mut values = vec![0.0; mesh.nodes.len()];
+    for (t, nodes) in mesh.triangles.iter().enumerate() {
+        nodes.iter().zip(of_triangles).for_each(|(&node, of)| values[node] = of[t]);
+    }
+    values
+}

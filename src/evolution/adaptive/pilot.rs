@@ -1,0 +1,183 @@
+//! A run with few time steps: how the error of u is spread over the triangles, where the body lies in the
+//! foundation between the nodes, and the figures at the times of its steps.
+
+use super::super::{DiscreteProblem, Outcome, Phases, RunError, State, Step, run, run_unestimated};
+use crate::{
+    fem::RecoveredStrains,
+    petsc::{PetscError, Session},
+};
+
+/// Steps of the run; times, about, at which errors are estimated.
+pub(super) const INSTANTS: usize = 12;
+/// At the end, errors are relative to no less than this part of the largest ‖u‖².
+const UNLOADED: f64 = 1e-4;
+
+/// What a run with few steps shows, triangle by triangle of the undivided mesh.
+pub(super) struct Pilot<'a> {
+    pub(super) problem: &'a DiscreteProblem,
+    pub(super) outcome: Outcome,
+    seen: Seen,
+}
+
+/// What was seen of the steps of a run.
+#[derive(Default)]
+struct Seen {
+    last: Option<f64>,
+    /// max_t ‖ε* − ε(u)‖²_T, and the largest sum over T at any time.
+    squares: Vec<f64>,
+    worst: f64,
+    /// max_t ‖u‖², and the largest |u| at any time, m.
+    energy: f64,
+    displacement: f64,
+    /// ‖ε* − ε(u)‖²_T, their sum and ‖u‖² at the last time.
+    end: (Vec<f64>, f64, f64),
+    /// The largest penetration at an edge of each triangle at any time, m.
+    depths: Vec<f64>,
+    /// The times of all steps, s, with their figures, and the largest sizes of these.
+    figures: Vec<(f64, Vec<f64>)>,
+    sizes: Vec<f64>,
+}
+
+impl<'a> Pilot<'a> {
+    /// Runs `problem` on a mesh of `triangles` triangles, and estimates the errors at its end if they are
+    /// `estimated`. Collective.
+    pub(super) fn run(
+        session: &Session,
+        problem: &'a DiscreteProblem,
+        solver: &str,
+        triangles: usize,
+        estimated: bool,
+    ) -> Result<Self, RunError> {
+        let zeros = vec![0.0; triangles];
+        let mut seen = Seen { squares: zeros.clone(), depths: zeros, ..Seen::default() };
+        let phases = Phases::default();
+        let mut observe = |step: &Step| Ok(seen.observe(problem, step, false)?);
+        let run = if estimated { run } else { run_unestimated };
+        let outcome = run(session, problem, solver, &phases, &mut observe)?;
+        seen.observe(problem, &outcome.last, true)?;
+        Ok(Self { problem, outcome, seen })
+    }
+
+    /// The time at which ζ_* was reached, s.
+    pub(super) fn stop(&self) -> Option<f64> {
+        self.outcome.stopped.as_ref().map(|stop| stop.time)
+    }
+
+    /// The largest |u| at any time, m.
+    pub(super) fn displacement(&self) -> f64 {
+        self.seen.displacement
+    }
+
+    /// The largest penetration at an edge of each triangle at any time, m.
+    pub(super) fn depths(&self) -> &[f64] {
+        &self.seen.depths
+    }
+
+    /// ‖u‖² at the end, N m per metre of thickness, and the largest one at any time.
+    pub(super) fn energies(&self) -> [f64; 2] {
+        [self.seen.end.2, self.seen.energy]
+    }
+
+    /// The scales of the figures.
+    pub(super) fn scales(&self) -> Vec<f64> {
+        self.problem.figure_scales(&self.seen.sizes)
+    }
+
+    /// The figures at `time`, s, affine between the steps.
+    pub(super) fn figures_at(&self, time: f64) -> Vec<f64> {
+        let figures = &self.seen.figures;
+        let after = figures.partition_point(|(t, _)| *t < time).min(figures.len() - 1);
+        let [(t0, before), (t1, next)] = [&figures[after.saturating_sub(1)], &figures[after]];
+        let part = if t1 > t0 { ((time - t0) / (t1 - t0)).clamp(0.0, 1.0) } else { 1.0 };
+        before.iter().zip(next).map(|(a, b)| (1.0 - part) * a + part * b).collect()
+    }
+
+    /// ζ at the end at the vertices of each triangle of the undivided mesh. Collective.
+    pub(super) fn zeta(&self) -> [Vec<f64>; 3] {
+        let (triangles, zeta) = (&self.problem.body.mesh.triangles, &self.outcome.last.state.zeta);
+        let own = |i: usize| triangles.iter().map(|nodes| zeta[nodes[i]]).collect::<Vec<_>>();
+        [0, 1, 2].map(|i| self.gathered(&own(i)))
+    }
+
+    /// The normal reactions at the end on the edges of each triangle. Collective.
+    pub(super) fn reactions(&self) -> Vec<f64> {
+        self.problem.reactions(&self.outcome.last.state, self.seen.squares.len())
+    }
+
+    /// Values of this rank's triangles for all triangles of the undivided mesh. Collective.
+    pub(super) fn gathered(&self, own: &[f64]) -> Vec<f64> {
+        gathered(self.problem, own, self.seen.squares.len())
+    }
+
+    /// The relative error of u at the worst time, and the shares m_T of its square.
+    pub(super) fn relative(&self) -> (f64, Vec<f64>) {
+        let Seen { squares, worst, energy, end: (last, error, of_last), .. } = &self.seen;
+        if *worst == 0.0 {
+            return (0.0, vec![0.0; squares.len()]);
+        }
+        // What is left after unloading need not be exact.
+        let of_last = of_last.max(UNLOADED * energy);
+        let share = |(max, end): (&f64, &f64)| (max / energy).max(end / of_last);
+        let shares = squares.iter().zip(last).map(share).collect();
+        ((worst / energy).max(error / of_last).sqrt(), shares)
+    }
+}
+
+impl Seen {
+    /// Sees an accepted step; `at_end` says that it is the last one. Collective.
+    fn observe(
+        &mut self,
+        problem: &DiscreteProblem,
+        step: &Step,
+        at_end: bool,
+    ) -> Result<(), PetscError> {
+        let state = &step.state;
+        if !at_end {
+            let figures = step.figures();
+            let sizes = problem.figure_sizes(&figures);
+            self.sizes.resize(sizes.len(), 0.0);
+            self.sizes.iter_mut().zip(sizes).for_each(|(most, size)| *most = most.max(size));
+            self.figures.push((state.time, figures));
+        }
+        let end = problem.scene().time.map_or(1.0, |grid| grid.end);
+        let part = |time: f64| (INSTANTS as f64 * time / end + 1e-9).floor();
+        let due = match self.last {
+            None => true,
+            Some(before) => state.time > before && (at_end || part(state.time) > part(before)),
+        };
+        if !due {
+            return Ok(());
+        }
+        self.last = Some(state.time);
+        self.estimate(problem, state)
+    }
+
+    /// Estimates the errors of a state. Collective.
+    fn estimate(&mut self, problem: &DiscreteProblem, state: &State) -> Result<(), PetscError> {
+        let body = &problem.body;
+        let zeta = problem.zeta_at_points(&state.zeta);
+        let recovered = RecoveredStrains::new(body, &state.u)?;
+        let error = recovered.energy_error(&problem.elasticity, &zeta, &state.u);
+        let squares = gathered(problem, &error.squares, self.squares.len());
+        self.squares.iter_mut().zip(&squares).for_each(|(max, square)| *max = max.max(*square));
+        self.end = (squares, error.error, error.energy);
+        self.worst = self.worst.max(error.error);
+        self.energy = self.energy.max(error.energy);
+        self.displacement = self.displacement.max(body.nodes.partition.max_norm(&state.u));
+        for penetration in problem.penetrations(state) {
+            let deepest = &mut self.depths[penetration.triangle];
+            *deepest = deepest.max(penetration.depth);
+        }
+        Ok(())
+    }
+}
+
+/// Values of this rank's triangles for all `count` triangles of the undivided mesh. Collective.
+fn gathered(problem: &DiscreteProblem, own: &[f64], count: usize) -> Vec<f64> {
+    let body = &problem.body;
+    let mut values = vec![0.0; count];
+    let own = body.global_triangles.iter().zip(own).take(body.own_triangles);
+    own.for_each(|(&triangle, value)| values[triangle] = *value);
+    body.nodes.partition.comm().sum(&mut values);
+    values
+}

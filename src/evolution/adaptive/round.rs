@@ -1,0 +1,134 @@
+//! A mesh of the rounds: whether it is good enough to be measured, and how the next one is to be refined.
+
+use super::{
+    super::unresolved::unresolved, Adapted, measurement::Measurement, pilot::Pilot,
+    sizes::size_ratios,
+};
+use crate::{
+    mesh::{Mesh, Order, sorted},
+    scene::Scene,
+};
+use std::collections::HashSet;
+
+/// Parts of the accuracy asked for: what a mesh is made for, and what its estimates may be.
+const AIM: f64 = 0.7;
+const ENOUGH: f64 = 0.8;
+/// The part of the damage's error that its interpolation may take.
+const INTERPOLATION: f64 = 0.7;
+/// Where measured errors are too large, the estimated ones are made smaller by no more than this in a round.
+const LEAST_GOAL: f64 = 0.25;
+/// Where figures alone are asked for, they are measured once u and the damage are estimated to be so exact.
+const ROUGH: f64 = 0.1;
+/// Between the nodes the body may lie in the foundation by this part of the accuracy, relative to the
+/// largest displacement.
+const PENETRATION: f64 = 0.5;
+/// A triangle in which something is not resolved becomes smaller by this.
+const QUARTER: f64 = 0.25;
+
+/// A mesh with what a run with few steps showed on it.
+pub(super) struct Round<'a> {
+    scene: &'a Scene,
+    mesh: &'a Mesh,
+    pub(super) pilot: Pilot<'a>,
+    accuracy: f64,
+    /// The estimated relative error of u at the worst time, its shares, and the error of the damage.
+    error: f64,
+    shares: Vec<f64>,
+    damage_error: Option<f64>,
+    /// Edges on which a function of the scene is not resolved.
+    unresolved: HashSet<[usize; 2]>,
+    /// The depth, m, by which the body may lie in the foundation between the nodes.
+    deepest: f64,
+}
+
+impl<'a> Round<'a> {
+    pub(super) fn new(scene: &'a Scene, mesh: &'a Mesh, pilot: Pilot<'a>, accuracy: f64) -> Self {
+        let (error, shares) = pilot.relative();
+        let displacement = pilot.displacement();
+        Self {
+            unresolved: unresolved(scene, mesh, accuracy, displacement),
+            deepest: PENETRATION * accuracy * displacement,
+            damage_error: pilot.outcome.errors.damage_mesh,
+            scene,
+            mesh,
+            pilot,
+            accuracy,
+            error,
+            shares,
+        }
+    }
+
+    /// Whether the estimates, and what the mesh shows of the scene, are good enough for a measurement.
+    pub(super) fn is_enough(&self) -> bool {
+        // Where some figures alone are asked for, the estimates only have to be estimates.
+        let named = !self.scene.accuracy_of.is_empty();
+        let wanted = if named { self.accuracy.max(ROUGH) } else { self.accuracy };
+        self.error.max(self.damage_error.unwrap_or(0.0)) <= ENOUGH * wanted
+            && self.unresolved.is_empty()
+            && self.pilot.depths().iter().all(|&depth| depth <= self.deepest)
+    }
+
+    /// The mesh with its errors.
+    pub(super) fn adapted(&self, measured: Option<&Measurement>, rounds: usize) -> Adapted {
+        let stop_error = measured.zip(self.pilot.stop()).map(|(m, time)| m.stop * time);
+        let failing = |measured: &Measurement| measured.errors(&self.scene.accuracy_of).next();
+        Adapted {
+            mesh: self.mesh.clone().in_morton_order(),
+            unknowns: 2 * self.pilot.problem.body.nodes.partition.total(),
+            rounds,
+            error: self.error,
+            damage_error: self.damage_error,
+            stop_error: stop_error.filter(|error| error.is_finite()),
+            bars: measured.map_or_else(Vec::new, |measured| measured.bars.clone()),
+            worst: measured.and_then(failing),
+            short: None,
+        }
+    }
+
+    /// By how much to multiply the size of each triangle for the next mesh. A figure that few triangles
+    /// make inexact asks for smaller ones there; any other for smaller errors of u and the damage.
+    pub(super) fn size_ratios(&self, measured: Option<&Measurement>) -> Vec<f64> {
+        let (mut shares, mut depths) = (self.shares.clone(), self.pilot.depths().to_vec());
+        let mut coarse = vec![false; shares.len()];
+        let mut smaller = 1.0_f64;
+        if let Some(measured) = measured {
+            let larger = |(own, of_parts): (&mut f64, &f64)| *own = own.max(*of_parts);
+            shares.iter_mut().zip(&measured.shares).for_each(larger);
+            depths.iter_mut().zip(&measured.depths).for_each(larger);
+            let errors = measured.errors(&self.scene.accuracy_of);
+            for (name, error) in errors.filter(|(_, error)| *error > self.accuracy) {
+                match measured.places(&name) {
+                    Some(places) => coarse.iter_mut().zip(places).for_each(|(c, p)| *c |= p),
+                    None => smaller = smaller.min((AIM * self.accuracy / error).max(LEAST_GOAL)),
+                }
+            }
+        }
+        let of_u = self.accuracy_of_u().min(if smaller < 1.0 { smaller * self.error } else { 1.0 });
+        let order = if self.scene.order == Order::Quadratic { 2.0 } else { 1.0 };
+        let mut ratios = size_ratios(&shares, order, AIM * of_u);
+        if self.damage_error.is_some() {
+            let shares = self.pilot.gathered(&self.pilot.outcome.damage_indicators);
+            let aim = INTERPOLATION * AIM * smaller * self.accuracy;
+            let others = size_ratios(&shares, 2.0, aim);
+            ratios.iter_mut().zip(others).for_each(|(ratio, other)| *ratio = ratio.min(other));
+        }
+        for (t, &[a, b, c]) in self.mesh.triangles.iter().enumerate() {
+            coarse[t] |= depths[t] > self.deepest;
+            let mut sides = [[a, b], [b, c], [c, a]].into_iter();
+            coarse[t] |= sides.any(|side| self.unresolved.contains(&sorted(side)));
+        }
+        let coarse = ratios.iter_mut().zip(coarse).filter(|(_, coarse)| *coarse);
+        coarse.for_each(|(ratio, _)| *ratio = ratio.min(QUARTER));
+        ratios
+    }
+
+    /// A damage that is not exact enough asks for a u better than the accuracy.
+    fn accuracy_of_u(&self) -> f64 {
+        match self.damage_error {
+            Some(of_damage) if of_damage > ENOUGH * self.accuracy => {
+                self.accuracy.min(self.error * self.accuracy / of_damage)
+            }
+            _ => self.accuracy,
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! The sizes that triangles must have for an accuracy, and their bisection down to these sizes.
+//!
+//! On a triangle whose size is multiplied by r the error falls like r^p, p the order, and 1/r² triangles
+//! take its place: the least number of triangles for a given error Σ r_T^2p m_T has r_T ~ m_T^(−1/(2p+2)).
+
+use crate::mesh::{Mesh, MeshError, Refinement, twice_area};
+
+/// A triangle's size is multiplied by no less than this in a round.
+const LEAST_RATIO: f64 = 0.125;
+/// Triangles are bisected while they are larger than this many times their wanted area; see [`oversize`].
+const OVERSIZE: f64 = 1.5;
+/// A little less than 1: what equals the median up to rounding is bisected with it.
+const TIES: f64 = 1.0 - 1e-9;
+
+/// By how much to multiply the size of each triangle, with its share m_T = `shares` of the squared
+/// relative error, so that this becomes `aim`².
+pub(super) fn size_ratios(shares: &[f64], order: f64, aim: f64) -> Vec<f64> {
+    let exponent = 1.0 / (2.0 * order + 2.0);
+    let ratio = |factor: f64, share: f64| match share {
+        0.0 => 1.0,
+        share => (factor / share.powf(exponent)).min(1.0),
+    };
+    let error = |factor: f64| -> f64 {
+        shares.iter().map(|&share| ratio(factor, share).powf(2.0 * order) * share).sum()
+    };
+    let (mut low, mut high) = (0.0, shares.iter().copied().fold(0.0, f64::max).powf(exponent));
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if error(middle) > aim * aim {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    shares.iter().map(|&share| ratio(low, share).max(LEAST_RATIO)).collect()
+}
+
+/// Bisects the triangles until they are as small as `ratios` say.
+pub(super) fn divided(mut refinement: Refinement, ratios: &[f64]) -> Result<Refinement, MeshError> {
+    let (areas, oversize) = (areas(&refinement.mesh), oversize(ratios));
+    let mut wanted: Vec<f64> =
+        areas.iter().zip(ratios).map(|(a, r)| oversize * a * r * r).collect();
+    loop {
+        let areas = self::areas(&refinement.mesh);
+        let marked: Vec<bool> = areas.iter().zip(&wanted).map(|(a, wanted)| a > wanted).collect();
+        if !marked.contains(&true) {
+            return Ok(refinement);
+        }
+        refinement = refinement.refine(&marked)?;
+        wanted = refinement.parent_of_triangle.iter().map(|&parent| wanted[parent]).collect();
+    }
+}
+
+/// [`OVERSIZE`]; where that asks for no bisection, so little that of the triangles that are too large at all
+/// the half with the larger errors is bisected: a mesh that is short of the accuracy must not stay.
+fn oversize(ratios: &[f64]) -> f64 {
+    let mut squares: Vec<f64> = ratios.iter().map(|r| r * r).filter(|&r| r < 1.0).collect();
+    squares.sort_by(f64::total_cmp);
+    match squares.first() {
+        Some(least) if OVERSIZE * least >= 1.0 => TIES / squares[(squares.len() - 1) / 2],
+        _ => OVERSIZE,
+    }
+}
+
+/// |T| of each triangle, with straight sides, m².
+pub(super) fn areas(mesh: &Mesh) -> Vec<f64> {
+    let corners = mesh.triangles.iter().map(|t| t.map(|node| mesh.nodes[node]));
+    corners.map(|[a, b, c]| 0.5 * twice_area(a, b, c)).collect()
+}

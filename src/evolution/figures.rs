@@ -1,0 +1,157 @@
+//! The figures that a run prints, and how far off each of them may be.
+
+use super::{DiscreteProblem, Step, probe::OBSERVED};
+use serde::{Deserialize, Serialize};
+
+/// The figures of a [`StepRecord`](super::StepRecord) that have an error bar.
+const OF_RECORD: [&str; 5] = ["work", "displacement_max", "contact_force", "zeta_min", "zeta_mean"];
+/// A figure counts as no smaller than this part of the largest figure of its dimension: a force that
+/// symmetry makes zero has no relative error.
+const LEAST: f64 = 1e-3;
+/// A damage below this is negligible.
+const NEGLIGIBLE_DAMAGE: f64 = 1e-6;
+
+/// The dimension of a figure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Dimension {
+    /// J per metre of thickness.
+    Work,
+    /// m.
+    Length,
+    /// N per metre of thickness.
+    Force,
+    /// N.
+    Moment,
+    /// ζ, at its least or at a point, or its mean.
+    Damage,
+    /// Pa.
+    Stress,
+}
+
+/// A figure that a run prints.
+struct Figure {
+    name: String,
+    dimension: Dimension,
+    /// Figures of one group share a scale: the components of a force, of a displacement, of a stress.
+    group: usize,
+}
+
+/// The error bar of a figure of the last state.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Bar {
+    /// The name of the figure, as in `summary.json`.
+    pub name: String,
+    /// Its dimension.
+    pub dimension: Dimension,
+    /// How far off the figure may be, in its own unit.
+    pub bar: f64,
+    /// What the accuracy asked for is relative to: the largest value of the figure in the run, of a
+    /// damage ζ the largest 1 − ζ.
+    pub scale: f64,
+}
+
+impl Bar {
+    /// The bar over the scale.
+    pub fn relative(&self) -> f64 {
+        if self.bar > 0.0 { self.bar / self.scale } else { 0.0 }
+    }
+}
+
+impl DiscreteProblem {
+    /// All figures.
+    fn figures(&self) -> Vec<Figure> {
+        use Dimension::{Damage, Force, Length, Moment, Stress, Work};
+        let dimensions = [Work, Length, Force, Damage, Damage];
+        let of_record = OF_RECORD.iter().zip(dimensions).enumerate();
+        let of_record =
+            of_record.map(|(group, (&name, dimension))| (name.to_owned(), dimension, group));
+        let [forces, moments, first_probe] = [5, 6, 7];
+        let supports = 3 * self.supports.names.len();
+        let quantities = self.quantities().into_iter().enumerate().map(|(i, name)| {
+            let probe = i.saturating_sub(supports);
+            let first = first_probe + 2 * (probe / OBSERVED.len());
+            match (i < supports, i % 3, probe % OBSERVED.len()) {
+                (true, 2, _) => (name, Moment, moments),
+                (true, ..) => (name, Force, forces),
+                (false, _, 0 | 1) => (name, Length, first),
+                // The scale of a damage at a point is the largest damage of the body.
+                (false, _, 2) => (name, Damage, 3),
+                _ => (name, Stress, first + 1),
+            }
+        });
+        let figure = |(name, dimension, group)| Figure { name, dimension, group };
+        of_record.chain(quantities).map(figure).collect()
+    }
+
+    /// The names of all figures.
+    pub(super) fn figure_names(&self) -> Vec<String> {
+        self.figures().into_iter().map(|figure| figure.name).collect()
+    }
+
+    /// The error bars of all figures, from their errors and scales.
+    pub(super) fn bars(&self, errors: &[f64], scales: &[f64]) -> Vec<Bar> {
+        let bar =
+            |(Figure { name, dimension, .. }, (&bar, &scale))| Bar { name, dimension, bar, scale };
+        self.figures().into_iter().zip(errors.iter().zip(scales)).map(bar).collect()
+    }
+
+    /// The scale of each figure, from its largest |value| in a run, of a damage from the largest 1 − ζ:
+    /// the largest one of its group.
+    pub(super) fn figure_scales(&self, largest: &[f64]) -> Vec<f64> {
+        let figures = self.figures();
+        let most = |is_like: &dyn Fn(&Figure) -> bool| {
+            let like = figures.iter().zip(largest).filter(|(figure, _)| is_like(figure));
+            like.map(|(_, value)| *value).fold(0.0, f64::max)
+        };
+        let lever = (self.body.polar_inertia / self.body.area).sqrt();
+        let scale = |figure: &Figure| {
+            let own = most(&|other| other.group == figure.group);
+            let alike = match figure.dimension {
+                Dimension::Damage => return own.max(NEGLIGIBLE_DAMAGE),
+                Dimension::Moment => lever * most(&|other| other.dimension == Dimension::Force),
+                dimension => most(&|other| other.dimension == dimension),
+            };
+            own.max(LEAST * alike)
+        };
+        figures.iter().map(scale).collect()
+    }
+
+    /// The |values| of all figures, and 1 − ζ of a damage: what their scales come from.
+    pub(super) fn figure_sizes(&self, values: &[f64]) -> Vec<f64> {
+        let size = |(figure, value): (&Figure, &f64)| match figure.dimension {
+            Dimension::Damage => 1.0 - value,
+            _ => value.abs(),
+        };
+        self.figures().iter().zip(values).map(size).collect()
+    }
+
+    /// Adds to the error bars what the time steps may do, where the damage ζ is off by at most `most` at a
+    /// node and by `mean` in the mean and therefore u by `displacement` (relative, energy norm): u has no
+    /// other memory than ζ.
+    pub(super) fn add_step_errors(&self, bars: &mut [Bar], [most, mean, displacement]: [f64; 3]) {
+        for (bar, figure) in bars.iter_mut().zip(self.figures()) {
+            bar.bar += match (figure.dimension, figure.group) {
+                (Dimension::Damage, 4) => mean,
+                (Dimension::Damage, _) => most,
+                // σ = ζ𝒜ε(u).
+                (Dimension::Stress, _) => (displacement + most) * bar.scale,
+                _ => displacement * bar.scale,
+            };
+        }
+    }
+}
+
+impl Step {
+    /// The values of all figures, in the order of [`DiscreteProblem::bars`].
+    pub(super) fn figures(&self) -> Vec<f64> {
+        let record = &self.record;
+        let of_record = [
+            record.work,
+            record.displacement_max,
+            record.contact_force,
+            record.zeta_min,
+            record.zeta_mean,
+        ];
+        [&of_record[..], &self.quantities].concat()
+    }
+}

@@ -1,0 +1,159 @@
+//! Contact between the nodes: the conditions u·ν ≤ g hold at the nodes of Γ_C, and between them the body
+//! may lie in the foundation by
+//!
+//! p(s) = (u·ν)(s) − g(x(s), t), 0 < s < 1,
+//!
+//! where the gap is narrower or more curved than an edge shows.
+
+use super::{DiscreteProblem, State};
+use crate::{
+    fem::{Edge, Elements, parabola},
+    mesh::sorted,
+    scene::Gap,
+};
+use std::collections::HashMap;
+
+/// Points at which the penetration of an edge is sampled.
+const SAMPLES: usize = 64;
+/// A penetration above this part of the largest displacement is noted.
+const NOTED: f64 = 0.05;
+
+/// How far the body lies in the foundation between the nodes of an edge.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Penetration {
+    /// The triangle of the edge, in the undivided mesh.
+    pub(super) triangle: usize,
+    /// The largest p(s) of the edge, m.
+    pub(super) depth: f64,
+    /// Where it is, m.
+    at: [f64; 2],
+    /// The number of the boundary in the scene.
+    boundary: usize,
+}
+
+impl DiscreteProblem {
+    /// The edges of Γ_C between whose nodes the body lies in the foundation, in a state. Collective.
+    pub(super) fn penetrations(&self, state: &State) -> Vec<Penetration> {
+        let mut own = Vec::new();
+        let boundaries = self.scene().boundaries.iter().enumerate();
+        for (number, gap, curve) in boundaries.filter_map(|(number, boundary)| {
+            Some((number, boundary.gap()?, self.body.mesh.curves.get(&boundary.name)?))
+        }) {
+            let sides = self.sides(&curve.edges);
+            for (triangle, edge) in sides {
+                let (depth, [x, y]) = self.deepest(gap, &edge, state);
+                if depth > 0.0 {
+                    own.push([triangle as f64, depth, x, y, number as f64]);
+                }
+            }
+        }
+        let all = self.body.nodes.partition.comm().gather(own.as_flattened());
+        let penetration = |&[triangle, depth, x, y, boundary]: &[f64; 5]| Penetration {
+            triangle: triangle as usize,
+            depth,
+            at: [x, y],
+            boundary: boundary as usize,
+        };
+        all.as_chunks().0.iter().map(penetration).collect()
+    }
+
+    /// The normal reactions on the edges of Γ_C of each of the `count` triangles of the undivided mesh, N per
+    /// metre of thickness: a node shares its reaction between its edges. Collective.
+    pub(super) fn reactions(&self, state: &State, count: usize) -> Vec<f64> {
+        let curves = self.scene().boundaries.iter().filter(|boundary| boundary.gap().is_some());
+        let curves = curves.filter_map(|boundary| self.body.mesh.curves.get(&boundary.name));
+        let sides: Vec<_> = curves.flat_map(|curve| self.sides(&curve.edges)).collect();
+        let nodes = |edge: &Edge| edge.ends.into_iter().chain(edge.middle);
+        let mut edges_of_node: HashMap<usize, Vec<usize>> = HashMap::new();
+        for (triangle, edge) in &sides {
+            nodes(edge).for_each(|node| edges_of_node.entry(node).or_default().push(*triangle));
+        }
+        let mut reactions = vec![0.0; count];
+        for point in &state.contact {
+            let Some(triangles) = edges_of_node.get(&point.node) else { continue };
+            for &triangle in triangles {
+                reactions[triangle] += point.force / triangles.len() as f64;
+            }
+        }
+        self.body.nodes.partition.comm().sum(&mut reactions);
+        reactions
+    }
+
+    /// The triangle of each of these edges in the undivided mesh, and the nodes of u on the edge.
+    fn sides(&self, edges: &[[usize; 2]]) -> Vec<(usize, Edge)> {
+        let body = &self.body;
+        let wanted: HashMap<[usize; 2], [usize; 2]> =
+            edges.iter().map(|&edge| (sorted(edge), edge)).collect();
+        let mut sides = Vec::new();
+        for (t, &[a, b, c]) in body.mesh.triangles.iter().enumerate() {
+            for (i, side) in [[a, b], [b, c], [c, a]].into_iter().enumerate() {
+                if let Some(&directed) = wanted.get(&sorted(side)) {
+                    let edge = match body.elements() {
+                        Elements::Linear(_) => Edge { ends: directed, middle: None },
+                        Elements::Quadratic(cells) => {
+                            let nodes = cells.nodes[t];
+                            let at = |vertex: usize| {
+                                let corner = [a, b, c].iter().position(|&v| v == vertex);
+                                nodes[corner.unwrap_or(0)]
+                            };
+                            Edge { ends: directed.map(at), middle: Some(nodes[3 + i]) }
+                        }
+                    };
+                    sides.push((body.global_triangles[t], edge));
+                }
+            }
+        }
+        sides
+    }
+
+    /// The largest penetration between the nodes of an edge, less what its ends have, and where, m: normals
+    /// at nodes are means of two edges', so that the ends of an edge may lie in the foundation along its own.
+    fn deepest(&self, gap: &Gap, edge: &Edge, state: &State) -> (f64, [f64; 2]) {
+        let points = &self.body.nodes.points;
+        let u = |node: usize| [state.u[2 * node], state.u[2 * node + 1]];
+        let [p, q] = edge.ends.map(u);
+        let middle = edge.middle.map_or([0, 1].map(|k| 0.5 * (p[k] + q[k])), u);
+        let at = |s: f64| {
+            let [x, y] = edge.at(points, s);
+            let normal = gap.normal.unwrap_or_else(|| {
+                let [tx, ty] = edge.tangent(points, s);
+                let length = tx.hypot(ty);
+                [ty / length, -tx / length]
+            });
+            let u = parabola([p, middle, q], s);
+            (u[0] * normal[0] + u[1] * normal[1] - gap.distance.eval(x, y, state.time), [x, y])
+        };
+        let [first, last] = [0.0, 1.0].map(|s| at(s).0.max(0.0));
+        let samples = (0..SAMPLES).map(|i| (i as f64 + 0.5) / SAMPLES as f64).map(|s| {
+            let (depth, x) = at(s);
+            (depth - (first + s * (last - first)), x)
+        });
+        samples.fold((0.0, [0.0; 2]), |most, next| if next.0 > most.0 { next } else { most })
+    }
+
+    /// What the user should know about contact between the nodes in some states of a run. Collective.
+    pub(super) fn penetration_note<'s>(
+        &self,
+        states: impl Iterator<Item = &'s State>,
+    ) -> Option<String> {
+        if !self.has_contact() {
+            return None;
+        }
+        let (mut all, mut displacement) = (Vec::new(), 0.0_f64);
+        for state in states {
+            all.extend(self.penetrations(state));
+            displacement = displacement.max(self.body.nodes.partition.max_norm(&state.u));
+        }
+        let deepest = all.iter().max_by(|a, b| a.depth.total_cmp(&b.depth))?;
+        let Penetration { depth, at: [x, y], boundary, .. } = *deepest;
+        (depth > NOTED * displacement).then(|| {
+            format!(
+                "between its nodes boundary \"{}\" lies {depth:.1e} in the foundation at ({x:.4}, {y:.4}), \
+                 {:.0} % of the largest displacement: contact there is narrower than the mesh shows, \
+                 displacements and forces may be far off; refine there, or ask for an accuracy",
+                self.scene().boundaries[boundary].name,
+                100.0 * depth / displacement
+            )
+        })
+    }
+}
