@@ -125,11 +125,12 @@ impl DiscreteProblem {
         self.figures().iter().zip(values).map(size).collect()
     }
 
-    /// Adds to the error bars what the time steps may do, where the damage ζ is off by at most `most` at a
-    /// node and by `mean` in the mean and therefore u by `displacement` (relative, energy norm): u has no
-    /// other memory than ζ.
+    /// Adds to the error bars what the solver's tolerance allows, and what the time steps may do, where the
+    /// damage ζ is off by at most `most` at a node and by `mean` in the mean and therefore u by
+    /// `displacement` (relative, energy norm): u has no other memory than ζ.
     pub(super) fn add_step_errors(&self, bars: &mut [Bar], [most, mean, displacement]: [f64; 3]) {
         for (bar, figure) in bars.iter_mut().zip(self.figures()) {
+            bar.bar += self.tolerance * bar.scale;
             bar.bar += match (figure.dimension, figure.group) {
                 (Dimension::Damage, 4) => mean,
                 (Dimension::Damage, _) => most,

@@ -18,7 +18,7 @@ const TRIANGLES: usize = 500;
 /// The loads of a step may deviate from a straight line in time by this part of the largest ones.
 const DEVIATION: f64 = 0.05;
 /// Loads pass within a step if they swing by more than this part of the largest ones.
-const PASSING: f64 = 0.2;
+const PASSING: f64 = 0.5;
 /// Times that differ by less than this part of the run are one.
 const APART: f64 = 1e-9;
 /// Uniform steps that are looked at.

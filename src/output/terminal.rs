@@ -14,13 +14,17 @@ pub fn say(text: &str) {
     let _ = writeln!(io::stdout(), "{text}");
 }
 
+/// A smaller error bar than this part of its figure is shown as this part.
+const LEAST_BAR: f64 = 1e-6;
+
 /// A figure with its error bar, where it has one: `5.3570 ± 0.0004`, or `(1.8139 ± 0.0012)e-2`; the bar has
-/// one digit, or two if the first one is 1.
+/// one digit, or two if the first one is 1. No more than seven digits of the figure are shown.
 pub fn with_bar(value: f64, bar: Option<f64>) -> String {
     let exponent = |number: f64| number.abs().log10().floor() as i32;
     let bar = bar.filter(|bar| *bar > 0.0 && bar.is_finite() && value.is_finite());
     let Some(bar) = bar else { return format!("{value:.6e}") };
     let of_both = exponent(value.abs().max(bar));
+    let bar = bar.max(LEAST_BAR * value.abs());
     let last = exponent(bar) - i32::from(bar / 10_f64.powi(exponent(bar)) < 2.0);
     match of_both {
         -3..5 => {

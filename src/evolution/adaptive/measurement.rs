@@ -4,7 +4,10 @@
 //! F(h/2) − F(h) = (1 − 2^−p) e(h) the error e(h) is at most twice the change for every p ≥ 1. The change
 //! at one time may vanish by chance where it changes its sign: the bar of a figure is
 //!
-//! 2 max(|ΔF(T)|, (mean over t of ΔF(t)²)^½).
+//! 2 max(|ΔF(T)|, (mean over t of ΔF(t)²)^½),
+//!
+//! and of what depends on u no less than η² of its scale, with η the relative error of u in the energy norm:
+//! the relative error of the work of a constant load is η².
 
 use super::{
     super::{
@@ -23,14 +26,14 @@ use crate::{
 
 /// The error over the change, at most, of anything of first order or better.
 const ERROR_OVER_CHANGE: f64 = 2.0;
-/// The error over the change of the norm of a field, in which nothing cancels: 1.1 to 2.1 in P1 and P2
-/// (ACCURACY.md).
-const FIELD_ERROR_OVER_CHANGE: f64 = 1.5;
+/// The error over the change of the damage in L², in which nothing cancels, on meshes refined where the error
+/// is: that of second order.
+const FIELD_ERROR_OVER_CHANGE: f64 = 4.0 / 3.0;
 
 /// Triangles whose change is above this part of the largest are refined for a figure …
-const GOOD_PART: f64 = 0.25;
+const GOOD_PART: f64 = 0.5;
 /// … and they alone where they make this part of the whole change.
-const MOST: f64 = 0.7;
+const MOST: f64 = 0.5;
 
 /// What the bisection of a mesh changed.
 #[derive(Default)]
@@ -98,7 +101,7 @@ impl Measurement {
         };
         let mut measured = Self { displacement, energy, stop, shares, depths, ..Self::default() };
         if coarse.stop().or(fine.stop()).is_none() {
-            measured.bars = bars(coarse, &fine);
+            measured.bars = bars(coarse, &fine, coarse.relative().0.powi(2));
             (measured.damage, measured.zeta) = damage(mesh, &halved, coarse, &fine);
             measured.reactions = coarse.reactions().iter().map(|force| -force).collect();
             for (&parent, force) in halved.parent_of_triangle.iter().zip(fine.reactions()) {
@@ -146,8 +149,8 @@ impl Measurement {
     }
 }
 
-/// The error bars of the figures on the mesh of `coarse`.
-fn bars(coarse: &Pilot, fine: &Pilot) -> Vec<Bar> {
+/// The error bars of the figures on the mesh of `coarse`, with η² = `square`.
+fn bars(coarse: &Pilot, fine: &Pilot, square: f64) -> Vec<Bar> {
     let end = coarse.outcome.last.state.time;
     let times: Vec<f64> = (0..=INSTANTS).map(|i| end * i as f64 / INSTANTS as f64).collect();
     let changes: Vec<Vec<f64>> = (times.iter())
@@ -163,7 +166,12 @@ fn bars(coarse: &Pilot, fine: &Pilot) -> Vec<Bar> {
     };
     let scales = fine.scales();
     let errors: Vec<f64> = (0..scales.len()).map(error).collect();
-    coarse.problem.bars(&errors, &scales)
+    let mut bars = coarse.problem.bars(&errors, &scales);
+    let of_u = |bar: &&mut Bar| {
+        matches!(bar.dimension, Dimension::Work | Dimension::Length | Dimension::Stress)
+    };
+    bars.iter_mut().filter(of_u).for_each(|bar| bar.bar = bar.bar.max(square * bar.scale));
+    bars
 }
 
 /// ‖ζ_h − ζ_{h/2}‖ over ‖1 − ζ_{h/2}‖ at the end, as an error, and the largest |ζ_h − ζ_{h/2}| of each

@@ -86,10 +86,11 @@ impl<'a> Round<'a> {
     }
 
     /// By how much to multiply the size of each triangle for the next mesh. A figure that few triangles
-    /// make inexact asks for smaller ones there; any other for smaller errors of u and the damage.
+    /// make inexact asks for smaller ones there, with an error of first order in their size; any other for
+    /// smaller errors of u and the damage.
     pub(super) fn size_ratios(&self, measured: Option<&Measurement>) -> Vec<f64> {
         let (mut shares, mut depths) = (self.shares.clone(), self.pilot.depths().to_vec());
-        let mut coarse = vec![false; shares.len()];
+        let mut sizes = vec![1.0_f64; shares.len()];
         let mut smaller = 1.0_f64;
         if let Some(measured) = measured {
             let larger = |(own, of_parts): (&mut f64, &f64)| *own = own.max(*of_parts);
@@ -97,10 +98,15 @@ impl<'a> Round<'a> {
             depths.iter_mut().zip(&measured.depths).for_each(larger);
             let errors = measured.errors(&self.scene.accuracy_of);
             for (name, error) in errors.filter(|(_, error)| *error > self.accuracy) {
-                match measured.places(&name) {
-                    Some(places) => coarse.iter_mut().zip(places).for_each(|(c, p)| *c |= p),
-                    None => smaller = smaller.min((AIM * self.accuracy / error).max(LEAST_GOAL)),
-                }
+                let goal = (AIM * self.accuracy / error).max(LEAST_GOAL);
+                let Some(places) = measured.places(&name) else {
+                    // Errors of figures are products of two errors of fields.
+                    let is_figure = measured.bars.iter().any(|bar| bar.name == name);
+                    smaller = smaller.min(if is_figure { goal.sqrt() } else { goal });
+                    continue;
+                };
+                let here = sizes.iter_mut().zip(places).filter(|(_, here)| *here);
+                here.for_each(|(size, _)| *size = size.min(goal));
             }
         }
         let of_u = self.accuracy_of_u().min(if smaller < 1.0 { smaller * self.error } else { 1.0 });
@@ -113,13 +119,12 @@ impl<'a> Round<'a> {
             ratios.iter_mut().zip(others).for_each(|(ratio, other)| *ratio = ratio.min(other));
         }
         for (t, &[a, b, c]) in self.mesh.triangles.iter().enumerate() {
-            coarse[t] |= depths[t] > self.deepest;
             let mut sides = [[a, b], [b, c], [c, a]].into_iter();
-            coarse[t] |= sides.any(|side| self.unresolved.contains(&sorted(side)));
+            if depths[t] > self.deepest || sides.any(|s| self.unresolved.contains(&sorted(s))) {
+                sizes[t] = QUARTER;
+            }
         }
-        let coarse = ratios.iter_mut().zip(coarse).filter(|(_, coarse)| *coarse);
-        coarse.for_each(|(ratio, _)| *ratio = ratio.min(QUARTER));
-        ratios
+        ratios.iter().zip(sizes).map(|(ratio, size)| ratio.min(size)).collect()
     }
 
     /// A damage that is not exact enough asks for a u better than the accuracy.
