@@ -7,6 +7,7 @@
 mod support;
 
 mod adaptive;
+mod bars;
 mod anderson;
 mod certificate;
 mod chosen_steps;

@@ -1,0 +1,124 @@
+//! Error bars: a figure is off by no more than its bar, and the bar is no idle one.
+
+use crate::support::{run, square};
+use signorini::{
+    contact::SOLVERS,
+    evolution::{self, Adapted, Bar, DiscreteProblem, Outcome},
+    mesh::Mesh,
+    petsc::Session,
+    scene::Scene,
+};
+use std::path::Path;
+
+fn scene(text: &str) -> Scene {
+    Scene::parse(text, Path::new("law.toml"), &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A block that is clamped on the left, pressed on top, and rests on a foundation below.
+fn block(order: u8, more: &str, gap: &str, load: &str) -> Scene {
+    scene(&format!(
+        "{more}
+         mesh.file = 'given.msh'
+         discretisation.displacement = {order}
+         material = {{ young = 1000, poisson = 0.3, plane = 'stress' }}
+         boundary = [
+            {{ name = 'left', displacement = [0, 0] }},
+            {{ name = 'bottom', gap = \"{gap}\" }},
+            {{ name = 'top', traction = ['0', \"{load}\"] }},
+         ]"
+    ))
+}
+
+fn solved(scene: Scene, mesh: Mesh) -> Outcome {
+    let problem = DiscreteProblem::new(scene, mesh).unwrap_or_else(|error| panic!("{error}"));
+    run(&problem, SOLVERS[0])
+}
+
+fn adapted(scene: &Scene, mesh: Mesh, accuracy: f64) -> Adapted {
+    let session = Session::start(&[]).unwrap();
+    let found = evolution::adapted(&session, scene, mesh, SOLVERS[0], accuracy, &mut |_| {});
+    found.unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// work, displacement_max and contact_force.
+fn figures(outcome: &Outcome) -> [f64; 3] {
+    let record = &outcome.last.record;
+    [record.work, record.displacement_max, record.contact_force]
+}
+
+fn bar(bars: &[Bar], name: &str) -> f64 {
+    bars.iter().find(|bar| bar.name == name).unwrap_or_else(|| panic!("no bar of {name}")).bar
+}
+
+#[test]
+fn a_figure_on_a_given_mesh_is_off_by_no_more_than_its_bar_which_is_no_idle_one() {
+    // The corner of the clamp on the foundation makes figures converge slowly, in both orders.
+    for order in [1, 2] {
+        let scene = block(order, "", "0", "-5");
+        let exact = adapted(&block(2, "", "0", "-5"), square(4), 1e-3).mesh;
+        let exact = figures(&solved(block(2, "", "0", "-5"), exact));
+        for n in [4, 8, 16] {
+            let found = figures(&solved(scene.clone(), square(n)));
+            let session = Session::start(&[]).unwrap();
+            let bars = evolution::measured_bars(&session, &scene, &square(n), SOLVERS[0]);
+            let bars = bars.unwrap_or_else(|error| panic!("{error}"));
+            let names = ["work", "displacement_max", "contact_force"];
+            for ((name, found), exact) in names.iter().zip(found).zip(exact) {
+                let (error, bar) = ((found - exact).abs(), bar(&bars, name));
+                println!("order {order}, n = {n}, {name}: off by {error:.2e}, bar {bar:.2e}");
+                assert!(error < 1.02 * bar, "{name}: {error:e} beyond {bar:e}");
+                assert!(bar < 6.0 * error, "{name}: {bar:e} for {error:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn an_accuracy_is_that_of_every_figure() {
+    // A force that a clamp takes beside the foundation is far less exact than the norms of u.
+    let reference = adapted(&block(2, "", "0", "-5"), square(4), 1e-3).mesh;
+    let reference = figures(&solved(block(2, "", "0", "-5"), reference));
+    for accuracy in [0.03, 0.01] {
+        let scene = block(2, "", "0", "-5");
+        let Adapted { mesh, short, worst, .. } = adapted(&scene, square(2), accuracy);
+        let (name, error) = worst.expect("it is measured");
+        assert!(short.is_none() && error <= accuracy, "{short:?}, {name}: {error}");
+        for (found, exact) in figures(&solved(scene, mesh)).iter().zip(reference) {
+            assert!((found - exact).abs() < accuracy * exact, "{found} is not {exact}");
+        }
+    }
+}
+
+#[test]
+fn a_figure_asked_for_alone_takes_a_smaller_mesh() {
+    let all = adapted(&block(2, "", "0", "-5"), square(2), 3e-3).mesh.triangles.len();
+    let alone = block(2, "accuracy = 3e-3\naccuracy_of = ['work']", "0", "-5");
+    let Adapted { mesh, worst, .. } = adapted(&alone, square(2), 3e-3);
+    assert!(worst.is_some_and(|(name, error)| name == "work" && error <= 3e-3));
+    assert!(4 * mesh.triangles.len() < all, "{} of {all}", mesh.triangles.len());
+
+    let session = Session::start(&[]).unwrap();
+    let wrong = block(2, "accuracy = 3e-3\naccuracy_of = ['force']", "0", "-5");
+    let found = evolution::adapted(&session, &wrong, square(2), SOLVERS[0], 3e-3, &mut |_| {});
+    let message = found.err().map_or_else(String::new, |error| error.to_string());
+    assert!(message.contains("`force`") && message.contains("contact_force"), "{message}");
+}
+
+#[test]
+fn contact_between_the_nodes_is_found_and_noted() {
+    // A roller of radius 1 m, of which no node of a mesh of size 0.1 comes near; its contact is 8 mm wide.
+    let roller = || block(2, "", "0.00001 + 0.5*(x - 0.55)^2", "-0.05");
+    let given = solved(roller(), square(10));
+    assert_eq!(given.last.record.active_nodes, 0);
+    let problem = DiscreteProblem::new(roller(), square(10)).unwrap();
+    let notes = given.notes(&problem).join("\n");
+    assert!(notes.contains("between its nodes boundary \"bottom\""), "{notes}");
+    let exact = figures(&solved(roller(), adapted(&roller(), square(10), 3e-3).mesh));
+    assert!(exact[2] > 0.25 * 0.05, "the roller carries {}", exact[2]);
+    for accuracy in [0.1, 0.03] {
+        let found = solved(roller(), adapted(&roller(), square(10), accuracy).mesh);
+        for (found, exact) in figures(&found).iter().zip(exact) {
+            assert!((found - exact).abs() < accuracy * exact, "{found} is not {exact}");
+        }
+    }
+}
