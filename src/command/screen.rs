@@ -154,7 +154,7 @@ fn steps(grid: TimeGrid, unit: &str) -> String {
             let scheme = if grid.scheme == Scheme::Bdf2 { " (bdf2)" } else { "" };
             format!("{steps} steps of {} {unit} to t = {end}{scheme}", rounded(end / steps as f64))
         }
-        Stepping::Auto { tolerance } => {
+        Stepping::Auto { tolerance, .. } => {
             format!("to t = {end} in steps chosen for an error of ζ of {tolerance:e}")
         }
     }

@@ -210,6 +210,7 @@ fn refined(
 fn choose_steps(scene: &mut Scene, accuracy: f64) -> bool {
     let Some(grid) = &mut scene.time else { return false };
     let uniform = matches!(grid.stepping, Stepping::Uniform { .. });
-    grid.stepping = Stepping::Auto { tolerance: PILOT_TOLERANCE.min(2.0 * accuracy) };
+    grid.stepping =
+        Stepping::Auto { tolerance: PILOT_TOLERANCE.min(2.0 * accuracy), expected: [0.0; 2] };
     uniform
 }

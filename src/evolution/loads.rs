@@ -207,6 +207,13 @@ impl<'a> LoadCurve<'a> {
         &self.breaks[first..last.max(first)]
     }
 
+    /// Σ|·| of the forces and of the displacements at `time` over the largest ones; 0 where all are 0.
+    pub(super) fn sizes(&self, time: f64) -> [f64; 2] {
+        let values = self.problem.loads.sampled_at(time);
+        let size = |kind: usize| sum_abs(values[kind].iter().copied()) / self.largest[kind];
+        [size(0), size(1)].map(|size| if size.is_finite() { size } else { 0.0 })
+    }
+
     /// Whether loads, prescribed displacements and gaps are nearly linear in time from `start` to `end`.
     pub(super) fn is_nearly_linear(&mut self, start: f64, end: f64) -> bool {
         let [first, last] = [start, end].map(|time| self.problem.loads.sampled_at(time));

@@ -102,7 +102,7 @@ impl Outcome {
     /// or if it does not.
     fn chosen_steps(&self, problem: &DiscreteProblem, misses: bool) -> Option<String> {
         let error = self.damage_error.filter(|_| problem.damage().is_some())?;
-        let Stepping::Auto { tolerance } = problem.scene().time?.stepping else { return None };
+        let Stepping::Auto { tolerance, .. } = problem.scene().time?.stepping else { return None };
         // Where an accuracy is asked for, the tolerance is not the user's.
         let missed = error > tolerance && problem.scene().accuracy.is_none();
         let verdict = match missed {

@@ -161,7 +161,8 @@ fn time(keys: TimeKeys) -> Result<(TimeGrid, Option<String>), Fault> {
         if scheme == Some(Scheme::Euler) {
             return Err(("scheme", "must be \"bdf2\" where step = \"auto\"".to_owned()));
         }
-        let stepping = Stepping::Auto { tolerance: tolerance.unwrap_or(STEP_TOLERANCE) };
+        let stepping =
+            Stepping::Auto { tolerance: tolerance.unwrap_or(STEP_TOLERANCE), expected: [0.0; 2] };
         return Ok((TimeGrid { end, stepping, scheme: Scheme::Bdf2 }, None));
     };
     if tolerance.is_some() {

@@ -37,6 +37,10 @@ pub enum Stepping {
         /// The error of ζ over the damage done, at any node and in the mean, that the steps may cause;
         /// a run that fails must land so near ζ_*.
         tolerance: f64,
+        /// The damage expected at the end, max (ζ₀ − ζ) and its mean over the body, as far as an earlier
+        /// run of the scene has shown it: errors are compared with it. 0: not known; then the present
+        /// rate and the loads ahead tell.
+        expected: [f64; 2],
     },
 }
 

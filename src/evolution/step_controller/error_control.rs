@@ -1,6 +1,6 @@
 //! The lengths of chosen steps, from the estimated error of each.
 
-use super::PlannedStep;
+use super::{PlannedStep, forecast::Forecast};
 use crate::{
     archive::{Archive, ArchiveError},
     evolution::{DiscreteProblem, loads::LoadCurve},
@@ -13,57 +13,63 @@ use nalgebra::DVector;
 pub(super) struct ErrorControl<'a> {
     body: &'a Body,
     tolerance: f64,
+    /// The damage expected at the end, as in [`Stepping::Auto`].
+    expected: [f64; 2],
     /// T, s.
     end: f64,
     /// What steps must follow, where it depends on time.
     load_curve: Option<LoadCurve<'a>>,
+    forecast: Forecast,
     /// The length of the next step, s.
     next_length: f64,
     /// ζ₀.
     initial: DVector<f64>,
-    /// Per node, the sum of the truncation errors of the accepted steps.
-    truncation: DVector<f64>,
-    /// max |ζ − ζ₀| of the last accepted ζ.
-    damage: f64,
-    /// The estimated error of the last accepted ζ over the damage done.
-    pub(super) relative_error: f64,
+    /// max |ζ − ζ₀| and the mean of |ζ − ζ₀| of the last accepted ζ.
+    damage: [f64; 2],
 }
 
 /// A step is at most this part of the run.
 const COARSEST: f64 = 0.05;
 /// Steps that do not follow the loads are halved down to this part: no step follows a jump.
 const FOLLOWING: f64 = 1.0 / 2000.0;
-/// A run whose step falls below this part has failed.
-const FINEST: f64 = 1e-12;
-/// Damage below this is negligible: its error is judged as if it were so large.
+/// A run has failed whose step is shorter than this part of the time that the loads give, see [`Forecast`],
+/// times the square of the tolerance (which counts as at most `COARSE`). For after a jump of the loads a
+/// step is about as short as the tolerance times that time; and ζ falls to ζ_* no faster than the root of
+/// the time left, so that a run lands as near as its tolerance with steps of its square.
+const FINEST: f64 = 1e-2;
+const COARSE: f64 = 1e-2;
+/// Damage below this is negligible: its error counts as if it were so large.
 const NEGLIGIBLE: f64 = 1e-6;
-/// At the beginning of a run there is no damage yet to compare an error with, so what the present
-/// rate will do in this part of the run is added to it …
+/// The first step is as long as if the present rate did the damage of this part of the run.
 const HORIZON: f64 = 0.1;
-/// … but in no more than so many steps: the rate in a pulse, which takes short ones, does not last;
-const STEPS: f64 = 20.0;
-/// … and no more than this: a body that fails does so faster and faster, and early errors grow.
+/// No more damage than this is foreseen: a body that fails does so faster and faster, and early errors grow.
 const FORESEEN: f64 = 0.1;
-/// The error of a step may be this part of the tolerance, as truncation errors add up.
+/// The part of the tolerance that the steps aim at: errors grow after the steps that make them.
+const AIM: f64 = 0.7;
+/// The error that a step may add is this part of what the steps before have left of that …
 const SHARE: f64 = 0.25;
+/// … but what is left counts as no less than this part of it: it may be gone when less damage is done than
+/// was foreseen, and steps must not shrink to nothing then.
+const LEAST: f64 = 1.0 / 16.0;
 
 impl<'a> ErrorControl<'a> {
     /// From ζ₀ = `initial` at t = 0; `None` if the scene does not choose its steps.
     pub(super) fn new(problem: &'a DiscreteProblem, initial: &[f64]) -> Option<Self> {
         let grid = problem.scene().time?;
-        let Stepping::Auto { tolerance } = grid.stepping else { return None };
+        let Stepping::Auto { tolerance, expected } = grid.stepping else { return None };
         // The error of the first step may be half of what its last rate does in it.
         let first_length = 2.0 * SHARE * tolerance * HORIZON * grid.end;
+        let load_curve = LoadCurve::new(problem);
         Some(Self {
             body: &problem.body,
             tolerance,
+            expected,
             end: grid.end,
-            load_curve: LoadCurve::new(problem),
+            forecast: Forecast::new(load_curve.as_ref(), grid.end),
+            load_curve,
             next_length: first_length.min(COARSEST * grid.end),
             initial: DVector::from_column_slice(initial),
-            truncation: DVector::zeros(initial.len()),
-            damage: 0.0,
-            relative_error: 0.0,
+            damage: [0.0; 2],
         })
     }
 
@@ -71,9 +77,7 @@ impl<'a> ErrorControl<'a> {
     pub(super) fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
         self.load_curve.iter_mut().try_for_each(|curve| curve.archive(archive))?;
         archive.value(&mut self.next_length)?;
-        archive.value(&mut self.truncation)?;
-        archive.value(&mut self.damage)?;
-        archive.value(&mut self.relative_error)
+        archive.value(&mut self.damage)
     }
 
     /// The end and the length, s, of the step from `start`, which follows the loads if one can;
@@ -101,19 +105,23 @@ impl<'a> ErrorControl<'a> {
         }
     }
 
-    /// Makes the next step `length` s long; false where so short a step means that the run has failed.
-    pub(super) fn shorten(&mut self, length: f64) -> bool {
+    /// Makes the next step, from `start`, `length` s long; false where so short a step means that the run
+    /// has failed.
+    pub(super) fn shorten(&mut self, start: f64, length: f64) -> bool {
         self.next_length = length;
-        length > FINEST * self.end
+        let ahead = self.forecast.time_ahead(self.load_curve.as_ref(), start).min(self.end - start);
+        length > FINEST * self.tolerance.min(COARSE).powi(2) * ahead
     }
 
     /// How near ζ_* a run must land.
     pub(super) fn landing(&self) -> f64 {
-        self.tolerance * self.damage.max(NEGLIGIBLE)
+        self.tolerance * self.damage[0].max(NEGLIGIBLE)
     }
 
-    /// Compares the error of ζ_n = `zeta`, that is e_n and the truncation error, with the allowed one,
-    /// and chooses the length of the next step. `rate` is dζ/dt at t_n, 1/s. Collective.
+    /// Accepts a step if the error that it adds to ζ_n = `zeta` is, at the worst node and in the mean, at most
+    /// SHARE (AIM · tolerance · D − E), and chooses the length of the next one. Here `added` is e_n and the
+    /// truncation error, E = `error` that of the steps before, and D the damage at the end: the expected one,
+    /// or that done so far and what `rate` = dζ/dt at t_n, 1/s, and the loads ahead will do. Collective.
     ///
     /// # Errors
     /// The error is too large: the factor by which to shorten the step.
@@ -121,28 +129,36 @@ impl<'a> ErrorControl<'a> {
         &mut self,
         planned: &PlannedStep,
         zeta: &DVector<f64>,
-        [correction, truncation]: [&DVector<f64>; 2],
+        error: &DVector<f64>,
+        added: &DVector<f64>,
         rate: &DVector<f64>,
     ) -> Result<(), f64> {
         let damage = self.norms(&(zeta - &self.initial));
-        let error = self.norms(&(correction + truncation));
-        let rates = self.norms(rate);
-        let ahead = (HORIZON * self.end).min(STEPS * planned.length).min(self.end - planned.time);
+        let [error, added, rates] = [error, added, rate].map(|field| self.norms(field));
+        let ahead = self.forecast.time_ahead(self.load_curve.as_ref(), planned.time);
         let ratio = |j: usize| {
-            let reference = damage[j] + (ahead * rates[j]).clamp(NEGLIGIBLE, FORESEEN);
-            error[j] / (SHARE * self.tolerance * reference)
+            let foreseen = (ahead * rates[j]).clamp(NEGLIGIBLE, FORESEEN);
+            let reference = match self.expected[j] {
+                expected if expected > 0.0 => damage[j].max(expected),
+                _ => damage[j] + foreseen,
+            };
+            let budget = AIM * self.tolerance * reference;
+            added[j] / (SHARE * (budget - error[j]).max(LEAST * budget))
         };
         let ratio = ratio(0).max(ratio(1));
         if ratio > 1.0 {
             return Err(growth(ratio).clamp(0.2, 0.9));
         }
-        self.truncation += truncation;
-        let total = self.norms(&(&self.truncation + correction));
-        let relative = |j: usize| total[j] / damage[j].max(NEGLIGIBLE);
-        self.relative_error = relative(0).max(relative(1));
-        self.damage = damage[0];
+        self.damage = damage;
         self.next_length = (planned.length * growth(ratio).min(2.0)).min(COARSEST * self.end);
         Ok(())
+    }
+
+    /// An error of the last accepted ζ over the damage done. Collective.
+    pub(super) fn relative(&self, error: &DVector<f64>) -> f64 {
+        let error = self.norms(error);
+        let relative = |j: usize| error[j] / self.damage[j].max(NEGLIGIBLE);
+        relative(0).max(relative(1))
     }
 
     /// max |·| over the nodes, and the mean of |·| over the body. Collective.

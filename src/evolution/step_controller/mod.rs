@@ -13,6 +13,7 @@
 //! with ω = 0; Euler's have no correction.
 
 mod error_control;
+mod forecast;
 mod step_error;
 
 use super::{
@@ -167,9 +168,9 @@ impl<'a> StepController<'a> {
             let increment = &corrected - &self.zeta;
             let trapezoidal = planned.length * (&rate - 0.5 * &change);
             let truncation = TRUNCATION * (trapezoidal - &increment);
-            let errors = [&correction, &truncation];
+            let added = &correction + truncation;
             if let Some(chosen) = &mut self.chosen
-                && let Err(factor) = chosen.judge(planned, &damage.zeta, errors, &rate)
+                && let Err(factor) = chosen.judge(planned, &damage.zeta, &self.error, &added, &rate)
             {
                 let shorter = self.retry(planned, factor);
                 return shorter.ok_or_else(|| planned.failed(StepFailure::TooShort));
@@ -249,12 +250,14 @@ impl<'a> StepController<'a> {
 
     /// The estimated error of the last accepted ζ over the damage done, where steps are chosen.
     pub(super) fn damage_error(&self) -> Option<f64> {
-        self.chosen.as_ref().map(|chosen| chosen.relative_error)
+        let chosen = self.chosen.as_ref()?;
+        Some(self.step_error().map_or(0.0, |error| chosen.relative(&error)))
     }
 
     /// Makes the step again, shorter by this factor, where steps are chosen and not hopelessly short.
     fn retry(&mut self, planned: &PlannedStep, factor: f64) -> Option<Verdict> {
-        let possible = self.chosen.as_mut()?.shorten(planned.length * factor);
+        let start = planned.time - planned.length;
+        let possible = self.chosen.as_mut()?.shorten(start, planned.length * factor);
         possible.then_some(Verdict::Retry)
     }
 }

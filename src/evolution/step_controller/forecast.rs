@@ -1,0 +1,51 @@
+//! How much damage the loads ahead will do.
+
+use crate::evolution::loads::LoadCurve;
+
+/// The loads of a run in time. Strains are about proportional to the size s of the loads, and the damage
+/// source is about ½ λ_U |ε|²: from a rate ζ' at t the loads ahead do about ζ' ∫_t^T s(τ)² dτ / s(t)² more.
+pub(super) struct Forecast {
+    /// Rising times, s, and ∫_t^T s² from each of them to the end, s.
+    ahead: Vec<(f64, f64)>,
+}
+
+/// The loads are sampled at so many times, evenly, and at those where they are known not to be smooth.
+const TIMES: usize = 200;
+/// Loads with s² below this count as if they had it: they tell little about larger ones.
+const SMALL: f64 = 0.01;
+
+impl Forecast {
+    /// Samples the whole run, which ends at `end`, s; without a curve the loads do not change.
+    pub(super) fn new(curve: Option<&LoadCurve>, end: f64) -> Self {
+        let mut times = vec![0.0, end];
+        if let Some(curve) = curve {
+            times.extend((1..TIMES).map(|i| end * i as f64 / TIMES as f64));
+            times.extend(curve.breaks(0.0, end));
+            times.sort_by(f64::total_cmp);
+        }
+        let mut after = (end, 0.0);
+        let mut ahead: Vec<_> = (times.iter().rev())
+            .map(|&time| {
+                let mean = 0.5 * (square(curve, time) + square(curve, after.0));
+                after = (time, after.1 + (after.0 - time) * mean);
+                after
+            })
+            .collect();
+        ahead.reverse();
+        Self { ahead }
+    }
+
+    /// ∫_t^T s² / s(t)², s: for how long the present rate would have to last.
+    pub(super) fn time_ahead(&self, curve: Option<&LoadCurve>, time: f64) -> f64 {
+        let next =
+            self.ahead.partition_point(|(other, _)| *other <= time).min(self.ahead.len() - 1);
+        let ((start, from), (end, to)) = (self.ahead[next.max(1) - 1], self.ahead[next]);
+        let part = if end > start { (time - start) / (end - start) } else { 1.0 };
+        (from + part * (to - from)) / square(curve, time).max(SMALL)
+    }
+}
+
+/// s(t)².
+fn square(curve: Option<&LoadCurve>, time: f64) -> f64 {
+    curve.map_or(1.0, |curve| curve.sizes(time).iter().map(|size| size * size).sum())
+}
