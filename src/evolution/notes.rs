@@ -39,7 +39,8 @@ impl Outcome {
                  there allow no ζ below {least:.4}"
             ));
         }
-        notes.extend(self.bound_violation.note(problem.mass()));
+        let slowest = problem.slowest_diffusion();
+        notes.extend(self.bound_violation.note(problem.mass(), slowest));
         if let Some((steps, times, motion)) = &self.unconstrained {
             let [first, last] = times.map(rounded);
             let when = match steps {
@@ -177,6 +178,19 @@ impl DiscreteProblem {
         }
         notes.extend(self.sliver());
         notes
+    }
+
+    /// The least κ/h² of the body, 1/s, with h the longest side of a triangle. Collective.
+    fn slowest_diffusion(&self) -> f64 {
+        let (body, kappa) = (&self.body, self.diffusions());
+        let rate = |(t, corners): (usize, &[usize; 3])| {
+            let [a, b, c] = corners.map(|node| body.mesh.nodes[node]);
+            let side = |[x, y]: [f64; 2], [v, w]: [f64; 2]| (x - v).hypot(y - w);
+            let h = side(a, b).max(side(b, c)).max(side(c, a));
+            kappa.get(body.material(t)).map_or(f64::INFINITY, |kappa| kappa / (h * h))
+        };
+        let own = body.mesh.triangles.iter().enumerate().map(rate).fold(f64::INFINITY, f64::min);
+        body.nodes.partition.comm().min(own)
     }
 
     /// Whether u is too large for infinitesimal strains and rotations: |∇u| (Frobenius) above

@@ -156,6 +156,8 @@ pub struct BoundViolation {
     pub below: f64,
     /// The first step in which one was violated, and its time, s.
     pub first: Option<(usize, f64)>,
+    /// k in that step, s.
+    pub k: f64,
 }
 
 /// A violation counts above this, which is far above the error of the linear solver.
@@ -169,22 +171,29 @@ impl BoundViolation {
         if above.max(below) > ROUNDING {
             self.above = self.above.max(above);
             self.below = self.below.max(below);
-            self.first = self.first.or(Some((planned.n, time)));
+            if self.first.is_none() {
+                (self.first, self.k) = (Some((planned.n, time)), planned.k);
+            }
         }
     }
 
-    /// What the user should know about the violation, and what cures it.
-    pub fn note(&self, mass: Mass) -> Option<String> {
+    /// What the user should know about the violation, and what cures it, where `slowest` is the least
+    /// κ/h² of the body, 1/s.
+    pub fn note(&self, mass: Mass, slowest: f64) -> Option<String> {
         let (step, time) = self.first?;
         let sides = [("above", self.above), ("below", self.below)].into_iter();
         let sides = sides.filter(|(_, by)| *by > ROUNDING);
         let sides: Vec<String> = sides.map(|(side, by)| format!("{side} by {by:.1e}")).collect();
         let cure = match mass {
-            Mass::Consistent => {
+            Mass::Consistent if self.k * slowest < 1.0 => {
                 "κk is too small against h² for the consistent mass; set damage.mass = \
                  \"lumped\" (for meshes without obtuse angles), or refine the mesh there"
             }
             Mass::Lumped => "the mesh has obtuse angles, of which the lumped mass takes no care",
+            Mass::Consistent => {
+                "not because of the mass, as κk > h²: the mesh has obtuse angles, or the damage equation \
+                 is solved too inaccurately (zeta_error in history.csv)"
+            }
         };
         Some(format!(
             "ζ left the bounds of the damage equation, {}, first in step {step} (t = {time:.4e}): \

@@ -87,7 +87,7 @@ impl Step {
     /// Enters the accuracy of ζ_n; `None` means that it is exact, the damage solve being skipped.
     pub(super) fn set_damage_certificate(&mut self, certificate: Option<DamageCertificate>) {
         self.skipped_damage_solve = certificate.is_none();
-        let DamageCertificate { residual, error } = certificate.unwrap_or_default();
+        let DamageCertificate { residual, error, .. } = certificate.unwrap_or_default();
         self.record.zeta_residual = residual;
         self.record.zeta_error = error;
     }

@@ -1,6 +1,6 @@
 //! The damage system (28): (M + kκL) ζ_n = M ζ_{n−1} + k b(φ).
 
-use super::{Body, Triangle, body::at_quadratic_points, element::POINTS};
+use super::{Body, Triangle, body::at_quadratic_points, element::POINTS, pieces::Pieces};
 use crate::{
     cholesky::{LinearSolver, LinearSystem, Precision},
     mesh::Order,
@@ -71,87 +71,6 @@ pub fn source_load(body: &Body, mass: Mass, source: &[[f64; 3]]) -> Vec<f64> {
     load
 }
 
-/// How well ζ_n solves (28), from its residual r = (M + kκL)ζ_n − Mζ_{n−1} − kb.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct DamageCertificate {
-    /// ‖r‖₂ over the norm of the right-hand side (its mass lumped).
-    pub residual: f64,
-    /// An upper bound of the error of the solve in ζ_n at any node.
-    pub error: f64,
-}
-
-impl DamageCertificate {
-    /// For ζ_{n−1} = `before` and ζ_n = `after`, a step k = `step`, s, the source load b = `load`
-    /// and the diffusions κ of the materials, m²/s. Collective.
-    ///
-    /// The residual is summed triangle by triangle, without the matrices of the solver. On a
-    /// triangle T the least eigenvalue of M, |T|/12 [2 1 1; 1 2 1; 1 1 2], is a quarter of that of
-    /// the lumped mass |T|/3. So M + kκL ≥ M ≥ ¼W with W the diagonal matrix of the node areas w,
-    /// and the error e satisfies √w_i |e_i| ≤ ‖e‖_W ≤ 4 ‖W^-½ r‖; for the lumped mass, where
-    /// M = W, the 4 is 1.
-    pub fn of(
-        body: &Body,
-        mass: Mass,
-        diffusions: &[f64],
-        step: f64,
-        load: &[f64],
-        [before, after]: [&[f64]; 2],
-    ) -> Self {
-        let residual = residual(body, mass, (step, diffusions), [before, after]);
-        let (mut squares, mut weighted, mut rhs) = (0.0, 0.0, 0.0);
-        let mut least = f64::INFINITY;
-        for i in 0..body.vertices.partition.owned() {
-            let (area, b) = (body.vertices.weights[i], step * load[i]);
-            let r = residual[i] - b;
-            squares += r * r;
-            weighted += r * r / area;
-            rhs += (area * before[i] + b).powi(2);
-            least = area.min(least);
-        }
-        let comm = body.vertices.partition.comm();
-        let mut sums = [squares, weighted, rhs];
-        comm.sum(&mut sums);
-        let [squares, weighted, rhs] = sums;
-        let factor = match mass {
-            Mass::Consistent => 4.0,
-            Mass::Lumped => 1.0,
-        };
-        Self {
-            residual: (squares / rhs.max(f64::MIN_POSITIVE)).sqrt(),
-            error: factor * (weighted / comm.min(least)).sqrt(),
-        }
-    }
-}
-
-/// M(ζ_n − ζ_{n−1}) + kκL ζ_n, summed over the triangles, with k, s, and the κ of the materials, m²/s.
-fn residual(
-    body: &Body,
-    mass: Mass,
-    (step, diffusions): (f64, &[f64]),
-    [before, after]: [&[f64]; 2],
-) -> Vec<f64> {
-    let mut residual = vec![0.0; after.len()];
-    let triangles = body.mesh.triangles.iter().zip(&body.triangles);
-    for (t, (nodes, triangle)) in triangles.enumerate() {
-        let spread = step * diffusions[body.material(t)];
-        let zeta = nodes.map(|node| after[node]);
-        let change: [f64; 3] = std::array::from_fn(|i| zeta[i] - before[nodes[i]]);
-        // (Mv)_i is |T|/12 (Σ_j v_j + v_i) for the consistent mass and |T|/3 v_i for the lumped.
-        let (sum, own) = match mass {
-            Mass::Consistent => (change[0] + change[1] + change[2], triangle.area() / 12.0),
-            Mass::Lumped => (0.0, triangle.area() / 3.0),
-        };
-        let flux = [0, 1].map(|axis| {
-            let slope = |i: usize| zeta[i] * triangle.gradients()[i][axis];
-            spread * triangle.area() * (slope(0) + slope(1) + slope(2))
-        });
-        for ((node, change), [dx, dy]) in nodes.iter().zip(change).zip(triangle.gradients()) {
-            residual[*node] += own * (sum + change) + dx * flux[0] + dy * flux[1];
-        }
-    }
-    residual
-}
-
 /// The matrix M + kκL of (28) with its factor, made anew for each step length k. Where κ differs from
 /// material to material, L is Σ_T κ_T/κ L_T with κ that of the first.
 pub struct DamageSystem {
@@ -161,6 +80,9 @@ pub struct DamageSystem {
     solver: LinearSolver,
     rhs: Vector,
     unknown: Vector,
+    pieces: Pieces,
+    /// ‖`rhs`‖₂ of the last damage step.
+    rhs_size: f64,
     /// κ of the first material, m²/s.
     diffusion: f64,
     step: f64,
@@ -214,6 +136,8 @@ impl DamageSystem {
             solver: LinearSolver::new(session, "damage_", owned, Precision::Full)?,
             rhs: Vector::zeros(session, owned)?,
             unknown: Vector::zeros(session, owned)?,
+            pieces: Pieces::of(body)?,
+            rhs_size: 0.0,
             diffusion: diffusions[0],
             step,
             laplace_size: partition.norm(&diagonal, 1),
@@ -245,25 +169,34 @@ impl DamageSystem {
         self.mass.multiply(&self.unknown, &mut self.rhs)?;
         let step = self.step;
         self.rhs.write(|rhs| rhs.iter_mut().zip(load).for_each(|(r, b)| *r += step * b))?;
-        let solved = self.solve(1e-13 * self.rhs.norm()?)?;
+        self.rhs_size = self.rhs.norm()?;
+        let solved = self.solve(1e-13 * self.rhs_size)?;
         self.unknown.read(|unknown| zeta[..owned].copy_from_slice(unknown))?;
         Ok(solved)
     }
 
     /// Solves for `rhs` from `unknown` until ‖residual‖₂ ≤ `limit`; whether that was reached.
+    ///
+    /// The mean of the unknown x over each piece of the body is known, since 1ᵀL = 0: 1ᵀMx = 1ᵀ`rhs`. Where
+    /// kκL is much larger than M, this is lost in the rounding of their sum. So the system is solved for
+    /// what x differs by from its mean, and the mean of that is set to zero.
     fn solve(&mut self, limit: f64) -> Result<bool, PetscError> {
+        let pieces = &self.pieces;
+        let means = self.rhs.read(|rhs| pieces.means(rhs, |_, load| load))?;
+        self.rhs.write(|rhs| pieces.add(rhs, |area, piece| -area * means[piece]))?;
+        self.unknown.write(|x| pieces.add(x, |_, piece| -means[piece]))?;
         let system = LinearSystem::of(&self.matrix);
-        Ok(self.solver.solve(system, &self.rhs, &mut self.unknown, limit)?.converged)
+        let solve = self.solver.solve(system, &self.rhs, &mut self.unknown, limit)?;
+        let rest = self.unknown.read(|x| pieces.means(x, |area, x| area * x))?;
+        self.unknown.write(|x| pieces.add(x, |_, piece| means[piece] - rest[piece]))?;
+        Ok(solve.converged)
     }
 
     /// The largest [`DamageCertificate::residual`] of a solution as good as round-off allows:
     /// 1e-10, and where diffusion prevails what is lost in kκLζ, of which the terms are up to 1.
-    ///
-    /// # Errors
-    /// PETSc failed.
-    pub fn largest_residual(&self) -> Result<f64, PetscError> {
+    pub fn largest_residual(&self) -> f64 {
         let round_off = 8.0 * f64::EPSILON * self.step * self.diffusion * self.laplace_size;
-        Ok(1e-10 + round_off / self.rhs.norm()?.max(f64::MIN_POSITIVE))
+        1e-10 + round_off / self.rhs_size.max(f64::MIN_POSITIVE)
     }
 
     /// (M + kκL)⁻¹ k b of a source load b = `load`, at the nodes owned: what ζ_n changes by with the

@@ -18,12 +18,15 @@ mod stiffness;
 mod recovery;
 mod rigid_part;
 mod damage;
+mod damage_certificate;
+mod pieces;
 mod loads;
 mod location;
 
 pub(crate) use body::for_elements;
 pub use body::{Body, Cells, Elements, Nodes};
-pub use damage::{DamageCertificate, DamageSystem, Mass, source, source_load};
+pub use damage::{DamageSystem, Mass, source, source_load};
+pub use damage_certificate::DamageCertificate;
 pub use edge::{Edge, gauss_points, parabola};
 pub use elasticity::Elasticity;
 pub use element::{Element, QuadraturePoint};

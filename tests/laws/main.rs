@@ -13,6 +13,7 @@ mod certificate;
 mod chosen_steps;
 mod conditioning;
 mod constraints;
+mod conservation;
 mod contact;
 mod damage;
 mod elements;

@@ -3,7 +3,7 @@
 
 use crate::support::{Random, close, distorted, largest, moved, problem, run, square};
 use signorini::{
-    evolution::{DiscreteProblem, Outcome},
+    evolution::{BoundViolation, DiscreteProblem, Outcome},
     fem::{Body, DamageSystem, Mass, source, source_load},
     mesh::{Mesh, Order},
     model::DamageLaw,
@@ -138,6 +138,18 @@ fn a_run_says_when_it_leaves_the_bounds_and_only_then() {
     }
     assert_eq!(self::outcome(0.1, 1.0, "").1, [""; 0], "a larger kκ cures it");
     assert_eq!(self::outcome(0.1, 0.1, ", mass = 'lumped'").1, [""; 0], "lumping cures it");
+}
+
+#[test]
+fn the_mass_is_blamed_only_where_diffusion_is_small() {
+    let violation =
+        BoundViolation { above: 1e-3, first: Some((1, 0.1)), k: 0.1, ..BoundViolation::default() };
+    // kκ/h² = 0.1 and 10.
+    for (slowest, lumping_helps) in [(1.0, true), (100.0, false)] {
+        let note = violation.note(Mass::Consistent, slowest).unwrap();
+        assert_eq!(note.contains("set damage.mass"), lumping_helps, "{note}");
+        assert_eq!(note.contains("obtuse angles, or"), !lumping_helps, "{note}");
+    }
 }
 
 #[test]

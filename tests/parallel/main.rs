@@ -119,6 +119,21 @@ fn the_mild_square() {
     every_solver("square-mild", &["--set", "mesh.size=0.125", "--set", "time.step=0.25"]);
 }
 
+/// Diffusion so strong that the mass is lost in the rounding of M + kκL: no damage may be lost with it.
+#[test]
+fn the_mild_square_with_uniform_damage() {
+    let test_directory = example("square-mild");
+    let few = ["--set", "mesh.size=0.125", "--set", "time.step=0.25"];
+    for ranks in [1, 2] {
+        let out = format!("out/{ranks}");
+        let run = ["run", "scene.toml", "--set", "damage.diffusion=1e13", "--out", &out];
+        let said =
+            ProgramOutput::of(&mut on_ranks(&test_directory, ranks, &[&run[..], &few].concat()));
+        assert_eq!(said.code, Some(0), "{said:?}");
+        same_history(&test_directory, &out, "out/1");
+    }
+}
+
 #[test]
 fn the_lshape() {
     every_solver("lshape", &[&COARSE[..], &["--set", "time.step=0.25"]].concat());

@@ -1,0 +1,91 @@
+//! Diffusion neither makes nor removes damage: 1ᵀL = 0, so the mean of ζ over each piece of the body changes
+//! by the source alone, 1ᵀM(ζ_n − ζ_{n−1}) = k 1ᵀb, however large κk is.
+
+use crate::support::{Random, distorted, history, moved, shipped};
+use signorini::{
+    contact::SOLVERS,
+    fem::{Body, DamageCertificate, DamageSystem, Mass, source, source_load},
+    mesh::{Mesh, Order},
+    petsc::Session,
+};
+
+/// Two squares that do not touch.
+fn two_pieces() -> Mesh {
+    let (mut mesh, other) = (distorted(6), moved(distorted(6), |[x, y]| [x + 2.0, y]));
+    let before = mesh.nodes.len();
+    mesh.nodes.extend(&other.nodes);
+    mesh.triangles.extend(other.triangles.iter().map(|t| t.map(|node| node + before)));
+    mesh
+}
+
+#[test]
+fn the_mean_over_each_piece_changes_by_the_source_alone_however_large_the_diffusion() {
+    let (session, body) = (Session::start(&[]).unwrap(), Body::new(two_pieces(), Order::Linear));
+    let (nodes, areas) = (body.mesh.nodes.len(), &body.vertices.weights);
+    let mut random = Random::new(5);
+    let before: Vec<f64> = random.field(nodes).iter().map(|v| 0.6 + 0.3 * v).collect();
+    // The second piece has three times the source of the first.
+    let load: Vec<f64> = (random.field(nodes).iter().zip(areas).enumerate())
+        .map(|(i, (v, area))| -v.abs() * area * if i < nodes / 2 { 1.0 } else { 3.0 })
+        .collect();
+    let integral = |piece: usize, value: &dyn Fn(usize) -> f64| {
+        (piece * nodes / 2..(piece + 1) * nodes / 2).map(value).sum::<f64>()
+    };
+    for (mass, diffusion) in [Mass::Consistent, Mass::Lumped]
+        .into_iter()
+        .flat_map(|m| [1.0, 1e8, 1e11, 1e14].map(|d| (m, d)))
+    {
+        let step = 0.1;
+        let mut system = DamageSystem::new(&session, &body, mass, &[diffusion], step).unwrap();
+        let mut after = before.clone();
+        assert!(system.advance(&load, &mut after).unwrap());
+        let correction = system.correction(&load).unwrap().unwrap();
+        for piece in [0, 1] {
+            let added = step * integral(piece, &|i| load[i]);
+            let changes = [
+                integral(piece, &|i| areas[i] * (after[i] - before[i])),
+                integral(piece, &|i| areas[i] * correction[i]),
+            ];
+            for change in changes {
+                assert!((change - added).abs() < 1e-13, "{mass:?} {diffusion:e}: {change} {added}");
+            }
+        }
+        // The certificate sees what the residual does not.
+        let certify = |zeta: &[f64]| {
+            DamageCertificate::of(&body, mass, &[diffusion], step, &load, [&before, zeta])
+        };
+        let good = certify(&after);
+        assert!(good.balance < 1e-13 && good.error < 1e-10, "{diffusion:e}: {good:?}");
+        after.iter_mut().for_each(|z| *z += 1e-6);
+        let shifted = certify(&after);
+        assert!((shifted.balance - 1e-6).abs() < 1e-12, "{diffusion:e}: {shifted:?}");
+        assert!((1e-6..1e-3).contains(&shifted.error), "{diffusion:e}: {shifted:?}");
+    }
+}
+
+#[test]
+fn no_damage_is_lost_in_a_run_whose_diffusion_makes_it_uniform() {
+    let mean = |diffusion: &str| {
+        let sets = ["mesh.size=0.125", "mesh.parameters.grading=1", "time.step=0.1"];
+        let diffusion = format!("damage.diffusion={diffusion}");
+        let scene = shipped("square-mild", &[&sets[..], &[&diffusion]].concat());
+        let (steps, outcome) = history(&scene, SOLVERS[0]);
+        let (body, laws) = (&scene.body, scene.damage().unwrap());
+        for pair in steps.windows(2) {
+            let state = &pair[0].state;
+            let strain = scene.elasticity.strain_squared(body, &state.u);
+            let load = source_load(body, scene.mass(), &source(body, laws, &strain, &state.zeta));
+            let added = 0.1 * load.iter().sum::<f64>() / body.area;
+            let change = pair[1].record.zeta_mean - pair[0].record.zeta_mean;
+            assert!((change - added).abs() < 1e-13, "{diffusion}: {change} {added}");
+        }
+        assert!(steps.iter().all(|step| step.record.zeta_error < 1e-12), "{diffusion}");
+        let bounds = outcome.notes(&scene).into_iter().find(|note| note.contains("bounds"));
+        assert_eq!(bounds, None, "{diffusion}");
+        steps.last().unwrap().record.zeta_mean
+    };
+    let limit = mean("1e8");
+    for diffusion in ["1e10", "1e12", "1e14"] {
+        assert!((mean(diffusion) - limit).abs() < 1e-9, "{diffusion}");
+    }
+}
