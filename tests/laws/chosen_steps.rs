@@ -4,6 +4,7 @@ use crate::support::{distorted, history, largest, moved, problem, shipped, squar
 use signorini::{
     contact::SOLVERS,
     evolution::{DiscreteProblem, Outcome, Step},
+    scene::Stepping,
 };
 
 /// Damage done at the end, at the worst node and in the mean.
@@ -166,6 +167,24 @@ fn the_errors_of_all_steps_together_stay_within_the_tolerance() {
         let ratio = said / true_error;
         assert!((0.5..=2.0).contains(&ratio), "{load}: {ratio}");
     }
+}
+
+#[test]
+fn errors_are_compared_with_the_damage_expected_at_the_end_where_it_is_known() {
+    let run = |expected: [f64; 2]| {
+        let mut scene = pressed("-2*t", "step = 'auto'").scene().clone();
+        let stepping = Stepping::Auto { tolerance: 1e-3, expected };
+        scene.time.iter_mut().for_each(|grid| grid.stepping = stepping);
+        let problem = DiscreteProblem::new(scene, square(6)).unwrap();
+        let (steps, outcome) = history(&problem, SOLVERS[0]);
+        (done(&steps), outcome.last.record.step, outcome.damage_error.unwrap())
+    };
+    let damage = run([0.0; 2]).0;
+    // What is expected; a hundredth of it, which the damage soon exceeds; and ten times as much.
+    let [right, low, high] = [1.0, 0.01, 10.0].map(|factor| run(damage.map(|d| factor * d)));
+    println!("{right:?} {low:?} {high:?}");
+    assert!(right.2 < 1e-3 && high.2 > 2.0 * right.2, "{} {}", right.2, high.2);
+    assert!(high.1 < right.1 && right.1 < low.1, "{} {} {}", high.1, right.1, low.1);
 }
 
 #[test]
