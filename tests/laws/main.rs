@@ -39,5 +39,6 @@ mod rescue;
 mod rigid;
 mod scales;
 mod shipped_scenes;
+mod step_errors;
 mod undo;
 mod units;

@@ -1,0 +1,81 @@
+//! The estimated error of the time steps is the true one where that is known: in a body with the same
+//! strain everywhere ζ is uniform and obeys an ordinary differential equation.
+
+use crate::support::{distorted, history, problem};
+use signorini::{contact::SOLVERS, evolution::DiscreteProblem};
+
+/// A square with these laws of damage and supports, in uniform two-step backward differences.
+fn uniform(damage: &str, boundary: &str) -> DiscreteProblem {
+    let text = format!(
+        "material = {{ young = 100, poisson = 0, plane = 'stress' }}
+         damage = {{ diffusion = 1, lambda_w = 0, strain_cap = 1000, threshold = 0.01,
+                     initial = 1, {damage} }}
+         time = {{ end = 1, step = 0.04, scheme = 'bdf2' }}
+         boundary = [
+            {{ name = 'left', symmetry = true }},
+            {{ name = 'bottom', symmetry = true }},
+            {boundary}
+         ]"
+    );
+    problem(distorted(2), &text).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// The estimated error of the damage over the true one, where ζ(1) = `exact`.
+fn estimated_over_true(problem: &DiscreteProblem, exact: f64) -> f64 {
+    let (steps, outcome) = history(problem, SOLVERS[0]);
+    let last = steps.last().unwrap().record;
+    assert!((last.zeta_mean - last.zeta_min).abs() < 1e-12 && last.time == 1.0);
+    let error = (last.zeta_mean - exact).abs() / (1.0 - exact);
+    let ratio = outcome.errors.damage_steps.unwrap() / error;
+    println!("ζ = {exact}, error {error:.2e}, estimated over true: {ratio:.3}");
+    ratio
+}
+
+/// ζ(1) from ζ(0) = 1 and ζ' = `rate`(t, ζ), by Runge and Kutta's fourth-order method.
+fn integrated(rate: impl Fn(f64, f64) -> f64) -> f64 {
+    const STEPS: usize = 1000;
+    let k = 1.0 / STEPS as f64;
+    (0..STEPS).fold(1.0, |z, n| {
+        let t = n as f64 * k;
+        let a = rate(t, z);
+        let b = rate(t + 0.5 * k, z + 0.5 * k * a);
+        let c = rate(t + 0.5 * k, z + 0.5 * k * b);
+        let d = rate(t + k, z + k * c);
+        z + k / 6.0 * (a + 2.0 * b + 2.0 * c + d)
+    })
+}
+
+/// A prescribed strain ε_xx.
+fn stretched(strain: &str) -> String {
+    format!("{{ name = 'right', displacement = ['{strain}', 'free'] }}")
+}
+
+#[test]
+fn errors_that_steps_add_are_estimated_within_a_tenth() {
+    // ε = 0.05 t², ζ' = −½ λ_U ε²: no error of an early step changes what later ones add, and so little
+    // damage is done that none is taken to grow.
+    let problem = uniform("lambda_d = 0, lambda_u = 40", &stretched("0.05*t^2"));
+    let ratio = estimated_over_true(&problem, 1.0 - 0.05 / 5.0);
+    assert!((0.9..=1.1).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn errors_that_grow_with_the_damage_itself_are_estimated_within_0_8_and_1_25_of_them() {
+    // ζ' = −(λ_D (1 − ζ)/ζ + ½ λ_U ε²) under a strain that comes early and stays.
+    let strain = |t: f64| 0.05 * (1.0 - (-12.0 * t).exp());
+    let problem = uniform("lambda_d = 1.2, lambda_u = 80", &stretched("0.05*(1 - exp(-12*t))"));
+    let exact = integrated(|t, z| -(1.2 * (1.0 - z) / z + 40.0 * strain(t).powi(2)));
+    let ratio = estimated_over_true(&problem, exact);
+    assert!((0.8..=1.25).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn errors_that_grow_as_a_load_strains_a_weaker_body_are_estimated_within_0_8_and_1_25_of_them() {
+    // A stress σ that comes early and stays: ε = σ/(E ζ), ζ' = −½ λ_U ε².
+    let stress = |t: f64| 5.0 * (1.0 - (-12.0 * t).exp());
+    let load = "{ name = 'right', traction = ['5*(1 - exp(-12*t))', 0] }";
+    let problem = uniform("lambda_d = 0, lambda_u = 210", load);
+    let exact = integrated(|t, z| -105.0 * (0.01 * stress(t) / z).powi(2));
+    let ratio = estimated_over_true(&problem, exact);
+    assert!((0.8..=1.25).contains(&ratio), "{ratio}");
+}
