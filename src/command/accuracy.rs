@@ -31,10 +31,8 @@ pub(super) fn adapt(
         _ => error.into(),
     })?;
     if let Some(grid) = &mut scene.time {
-        grid.stepping = Stepping::Auto {
-            tolerance: SHARE_OF_STEPS * accuracy,
-            expected: adapted.damage,
-        };
+        grid.stepping =
+            Stepping::Auto { tolerance: SHARE_OF_STEPS * accuracy, expected: adapted.damage };
     }
     Ok(Some(adapted))
 }

