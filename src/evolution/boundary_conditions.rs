@@ -1,6 +1,5 @@
 //! What a scene asks for on the named parts of the boundary, in terms of the mesh.
 
-use super::unresolved::parts_of_edges;
 use crate::{
     contact::{FixedRow, GapRow, RigidMotions},
     fem::{Body, Edge},
@@ -51,13 +50,9 @@ impl MovingGap {
 /// A surface load on a part of the boundary.
 #[derive(Debug, Clone)]
 pub(super) struct Traction {
-    /// The boundary's name.
-    pub(super) boundary: String,
     pub(super) edges: Vec<Edge>,
     /// f_N, N/m².
     pub(super) force: SurfaceLoad,
-    /// See [`parts_of_edges`].
-    pub(super) parts: usize,
 }
 
 impl BoundaryConditions {
@@ -81,12 +76,9 @@ impl BoundaryConditions {
                 };
                 gaps.extend(gap_rows(gap, distance, &node).map(|row| (row, &gap.distance)));
             }
-            conditions.tractions.extend(boundary.loads().map(|force| Traction {
-                boundary: boundary.name.clone(),
-                edges: edges.clone(),
-                force: force.clone(),
-                parts: parts_of_edges(scene, mesh, curve, force),
-            }));
+            conditions.tractions.extend(
+                boundary.loads().map(|f| Traction { edges: edges.clone(), force: f.clone() }),
+            );
         }
         let (gaps, distances) = GapRow::joined(gaps);
         let moving = distances.into_iter().enumerate().map(|(number, distances)| MovingGap {

@@ -7,7 +7,6 @@ pub(super) use load_case::LoadCase;
 use super::{
     Loads, RunError, SetupError, State, Supports, agreed,
     boundary_conditions::BoundaryConditions,
-    notes,
     probe::{OBSERVED, Probes},
 };
 use crate::{
@@ -56,7 +55,7 @@ impl DiscreteProblem {
     ///
     /// # Errors
     /// The scene does not fit the mesh, contradicts itself, or its load drives a rigid motion.
-    pub fn new(mut scene: Scene, mesh: Mesh) -> Result<Self, SetupError> {
+    pub fn new(scene: Scene, mesh: Mesh) -> Result<Self, SetupError> {
         scene.check_mesh(&mesh)?;
         let mut body = Body::new(mesh, scene.order);
         body.materials = scene.materials_of(&body.mesh);
@@ -69,9 +68,6 @@ impl DiscreteProblem {
             })?;
         motions.pin_free(&body, &mut constraints);
         let certificate = Certificate::new(fixed, gaps);
-        let unresolved = |traction| notes::unresolved(&scene, &body.mesh, traction);
-        let unresolved: Vec<_> = conditions.tractions.iter().filter_map(unresolved).collect();
-        scene.notes.extend(unresolved);
         let loads = Loads::new(&body, &scene, conditions);
         let norms = (scene.sample_times(SAMPLES).into_iter())
             .map(|time| body.nodes.partition.norm(&loads.at(&body, time), 2));

@@ -41,6 +41,7 @@ mod mesh_error;
 mod notes;
 mod observer;
 mod outcome;
+mod parts;
 mod penetration;
 mod probe;
 mod state;

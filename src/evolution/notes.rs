@@ -1,16 +1,11 @@
 //! What the user should know about a problem or an answer that its residuals do not tell.
 
-use super::{
-    Accuracy, DiscreteProblem, Outcome,
-    boundary_conditions::Traction,
-    loads::LoadCurve,
-    unresolved::{TIMES, integrals},
-};
+use super::{Accuracy, DiscreteProblem, Outcome, loads::LoadCurve, unresolved};
 use crate::{
     fem::for_elements,
-    mesh::{Mesh, Order},
+    mesh::Order,
     model::Plane,
-    scene::{Expression, Scene, Stepping, rounded},
+    scene::{Stepping, rounded},
 };
 
 /// In plane strain with ν above this, P1 triangles lock: measured in the stability study. P2 triangles
@@ -25,8 +20,6 @@ const FREE_MOTIONS: usize = 6;
 /// a corner where the strain is singular, in every load.
 const LARGE: f64 = 0.1;
 const NOTICEABLE: f64 = 0.01;
-/// A resultant is noted if it is further than this from the finer one, relative to ∫|f|.
-const DIFFERENCE: f64 = 0.05;
 
 impl Outcome {
     /// What the user should know about the run of `problem`.
@@ -127,7 +120,7 @@ impl Outcome {
 
 impl DiscreteProblem {
     /// What the user should know before any solve: what was not taken as it is written, unconstrained
-    /// rigid motions, and tractions, a material or triangles that make the discretisation poor.
+    /// rigid motions, and functions, a material or triangles that make the discretisation poor.
     pub fn notes(&self) -> Vec<String> {
         let (scene, motions) = (self.scene(), &self.motions);
         let mut notes = scene.notes.clone();
@@ -151,6 +144,7 @@ impl DiscreteProblem {
             let more = motions.free.len() - FREE_MOTIONS;
             notes.push(format!("nothing prevents or drives {more} more such motions"));
         }
+        notes.extend(unresolved::notes(scene, self.mesh()));
         if let Some([start, end]) = LoadCurve::unresolved_step(self) {
             notes.push(format!(
                 "loads, displacements or gaps change within a time step, as between t = {start:.4e} and \
@@ -229,43 +223,4 @@ impl DiscreteProblem {
 /// So many steps, in words.
 fn counted(steps: usize) -> String {
     format!("{steps} step{}", if steps == 1 { "" } else { "s" })
-}
-
-/// A note if the resultant ∫f by the two Gauss points per edge is far from ∫f by many midpoints, relative
-/// to the largest ∫|f| of all sampled times: then f varies within the edges, is lost or counts twice.
-pub(super) fn unresolved(scene: &Scene, mesh: &Mesh, traction: &Traction) -> Option<String> {
-    let f = traction.force.expressions();
-    if !f.iter().any(Expression::depends_on_space) {
-        return None;
-    }
-    let mut times = scene.sample_times(TIMES);
-    times.truncate(if f.iter().any(Expression::depends_on_time) { usize::MAX } else { 1 });
-    let (mut largest, mut worst) = (0.0_f64, (0.0, [0.0; 4], 0.0));
-    for t in times {
-        let mut sums = [[0.0; 3]; 2];
-        for edge in &traction.edges {
-            let parts = integrals(mesh, &traction.force, traction.parts, edge.ends, t);
-            let sums = sums.as_flattened_mut().iter_mut();
-            sums.zip(parts.as_flattened()).for_each(|(sum, part)| *sum += part);
-        }
-        let [[gx, gy, coarse], [x, y, fine]] = sums;
-        largest = largest.max(coarse).max(fine);
-        let difference = (gx - x).hypot(gy - y);
-        if difference > worst.0 {
-            worst = (difference, [gx, gy, x, y], t);
-        }
-    }
-    let (difference, resultants, t) = worst;
-    (difference > DIFFERENCE * largest).then(|| {
-        // What cancels leaves rounding.
-        let rounded = |v: f64| if v.abs() > 1e-9 * largest { v } else { 0.0 };
-        let [gx, gy, x, y] = resultants.map(rounded);
-        let when = scene.time.map_or(String::new(), |_| format!(" at t = {t:.4e}"));
-        format!(
-            "the traction of boundary \"{}\" varies within the mesh's edges: its resultant on \
-             this mesh is ({gx:.4e}, {gy:.4e}) N/m{when}, integrated finely ({x:.4e}, {y:.4e}); \
-             refine there",
-            traction.boundary
-        )
-    })
 }

@@ -5,7 +5,7 @@
 //!
 //! where the gap is narrower or more curved than an edge shows.
 
-use super::{DiscreteProblem, State};
+use super::{DiscreteProblem, State, parts::edge_parts};
 use crate::{
     fem::{Edge, Elements, parabola},
     mesh::sorted,
@@ -13,8 +13,10 @@ use crate::{
 };
 use std::collections::HashMap;
 
-/// Points at which the penetration of an edge is sampled.
-const SAMPLES: usize = 64;
+/// Points at which the penetration of an edge is sampled, besides those at which its gap asks for it.
+const SAMPLES: usize = 16;
+/// How well the parts of an edge show its gap.
+const DEVIATION: f64 = 1e-3;
 /// A penetration above this part of the largest displacement is noted.
 const NOTED: f64 = 0.05;
 
@@ -124,7 +126,12 @@ impl DiscreteProblem {
             (u[0] * normal[0] + u[1] * normal[1] - gap.distance.eval(x, y, state.time), [x, y])
         };
         let [first, last] = [0.0, 1.0].map(|s| at(s).0.max(0.0));
-        let samples = (0..SAMPLES).map(|i| (i as f64 + 0.5) / SAMPLES as f64).map(|s| {
+        let line = [0.0, 0.5, 1.0].map(|s| edge.at(points, s));
+        let g = std::slice::from_ref(&gap.distance);
+        let parts = edge_parts(&[line], g, state.time, DEVIATION).into_iter();
+        let narrow = parts.map(|(_, [from, to])| 0.5 * (from + to));
+        let evenly = (0..SAMPLES).map(|i| (i as f64 + 0.5) / SAMPLES as f64);
+        let samples = evenly.chain(narrow).map(|s| {
             let (depth, x) = at(s);
             (depth - (first + s * (last - first)), x)
         });

@@ -1,32 +1,33 @@
-//! Edges on which a traction or a gap varies by more than the mesh shows.
+//! Edges and triangles on which initial damage or prescribed displacements vary by more than their values at
+//! the nodes show.
 
+use super::parts::{EdgePart, TrianglePart, edge_parts, triangle_parts, triangle_point};
 use crate::{
-    fem::{gauss_points, parabola},
-    mesh::{Curve, Mesh, sorted},
-    scene::{Expression, Scene, SurfaceLoad},
+    fem::{GAUSS, POINTS, midpoint, parabola, part_point},
+    mesh::{Curve, Mesh, Order, sorted},
+    scene::{Condition, Expression, Scene},
 };
 use std::collections::HashSet;
 
-/// Points at which the functions are sampled in an edge.
-const SAMPLES: usize = 64;
-/// Times at which a traction or a gap is sampled, about.
-pub(super) const TIMES: usize = 8;
-/// A load jumps if it changes by more than this part of its largest value from one sample of an edge to the
-/// next, at one of about so many times; edges are then integrated in so many parts.
-const JUMP: f64 = 0.25;
-const JUMP_TIMES: usize = 13;
-const PARTS: usize = 16;
-/// What a single edge may lose of the accuracy asked for.
-const SHARE: f64 = 0.1;
-/// Gaps count where they are less than this many times the largest displacement.
-const NEAR: f64 = 2.0;
+/// Times at which prescribed displacements are sampled, about.
+const TIMES: usize = 8;
+/// The part of the accuracy that the interpolation of the initial damage may take.
+const SHARE: f64 = 0.5;
+/// Edges shorter than this part of their curve are not halved for a prescribed displacement: it jumps.
+const SHORTEST: f64 = 1e-4;
+/// How well functions are integrated here, relatively, and with how many more parts than triangles.
+const DEVIATION: f64 = 1e-5;
+const MORE: f64 = 100_000.0;
+/// What nodes miss is noted if it is more than this part of the whole.
+const NOTED: f64 = 0.05;
 
 /// The edges, by their ends in increasing order, that must be halved for a relative `accuracy`, with
 /// `displacement` the largest |u|, m:
 ///
-/// - those on which the two Gauss points of a traction f miss more than a tenth of `accuracy` ∫|f|;
-/// - those near the foundation on which g is further than `accuracy` · `displacement` from its
-///   interpolation at ends and middle.
+/// - those on which a prescribed u_D is somewhere further than `accuracy` · `displacement` from its
+///   interpolation at the nodes;
+/// - the longest sides of the triangles with the largest ‖ζ₀ − Iζ₀‖_T, of so many that the sum over the
+///   others is Σ ‖ζ₀ − Iζ₀‖²_T ≤ (½ `accuracy` ‖1 − ζ₀‖)², all in L².
 pub(super) fn unresolved(
     scene: &Scene,
     mesh: &Mesh,
@@ -36,110 +37,165 @@ pub(super) fn unresolved(
     let mut found = HashSet::new();
     for boundary in &scene.boundaries {
         let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
-        if let Some(gap) = boundary.gap() {
-            let near = |edge: [usize; 2], t: f64| {
-                let at = |s: f64| {
-                    let [x, y] = place(mesh, edge, s);
-                    gap.distance.eval(x, y, t)
-                };
-                let [a, m, b] = [0.0, 0.5, 1.0].map(at);
-                let mut least = f64::INFINITY;
-                let mut deviation = 0.0_f64;
-                for s in samples() {
-                    let [shown] = parabola([[a], [m], [b]], s);
-                    let g = at(s);
-                    least = least.min(g).min(shown);
-                    deviation = deviation.max((g - shown).abs());
-                }
-                least < NEAR * displacement && deviation > accuracy * displacement
+        let shortest = SHORTEST * length(mesh, curve);
+        for u in displacements(&boundary.conditions) {
+            let missed = missed_displacements(scene, mesh, curve, u).0;
+            let edges = curve.edges.iter().zip(missed);
+            let lost = edges.filter(|(edge, missed)| {
+                *missed > accuracy * displacement && mesh.edge_normal(**edge).1 > shortest
+            });
+            found.extend(lost.map(|(edge, _)| sorted(*edge)));
+        }
+    }
+    if let Some(damage) = missed_damage(scene, mesh) {
+        let allowed = SHARE * accuracy;
+        let mut largest: Vec<_> = damage.squares.iter().copied().enumerate().collect();
+        largest.sort_by(|(_, a), (_, b)| b.total_cmp(a));
+        let mut rest: f64 = damage.squares.iter().sum();
+        for (triangle, square) in largest {
+            if rest <= allowed * allowed * damage.square {
+                break;
+            }
+            rest -= square;
+            found.extend(longest_side(mesh, triangle));
+        }
+    }
+    found
+}
+
+/// What the nodes miss of prescribed displacements and of the initial damage, if it is much.
+pub(super) fn notes(scene: &Scene, mesh: &Mesh) -> Vec<String> {
+    let mut notes = Vec::new();
+    for boundary in &scene.boundaries {
+        let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
+        for u in displacements(&boundary.conditions) {
+            let (missed, largest) = missed_displacements(scene, mesh, curve, u);
+            let worst =
+                missed.iter().copied().zip(&curve.edges).max_by(|(a, _), (b, _)| a.total_cmp(b));
+            let Some((missed, edge)) = worst.filter(|worst| worst.0 > NOTED * largest) else {
+                continue;
             };
-            let mut times = scene.sample_times(TIMES);
-            times.truncate(if gap.distance.depends_on_time() { usize::MAX } else { 1 });
-            let near = |edge: &&[usize; 2]| times.iter().any(|&t| near(**edge, t));
-            found.extend(curve.edges.iter().filter(near).copied().map(sorted));
-        }
-        for load in boundary.loads() {
-            found.extend(unresolved_load(scene, mesh, curve, load, accuracy));
+            let [x, y] = place(mesh, *edge, 0.5);
+            notes.push(format!(
+                "the displacement of boundary \"{}\" varies within the mesh's edges near ({x:.4}, {y:.4}): \
+                 up to {missed:.1e} {} of it is missed, of {largest:.1e} at most; refine there",
+                boundary.name, scene.units.length
+            ));
         }
     }
-    found
+    if let Some(damage) = missed_damage(scene, mesh).filter(|d| d.missed > NOTED * d.integral) {
+        let worst = (0..damage.squares.len())
+            .max_by(|a, b| damage.squares[*a].total_cmp(&damage.squares[*b]));
+        let corners = mesh.triangles[worst.unwrap_or(0)].map(|node| mesh.nodes[node]);
+        let [x, y] = [0, 1].map(|k| corners.iter().map(|corner| corner[k]).sum::<f64>() / 3.0);
+        // The rounding of nothing is nothing.
+        let shown = if damage.shown > 1e-9 * damage.integral { damage.shown } else { 0.0 };
+        notes.push(format!(
+            "the initial damage varies within the mesh's triangles near ({x:.4}, {y:.4}): ∫(1 − ζ) is {:.3e} \
+             on this mesh, integrated finely {:.3e}; refine there",
+            shown, damage.integral
+        ));
+    }
+    notes
 }
 
-/// The edges of a curve on which the two Gauss points of a `load` miss too much of it.
-fn unresolved_load(
+/// The components of prescribed displacements that depend on the place.
+fn displacements(conditions: &[Condition]) -> impl Iterator<Item = &Expression> {
+    let components = conditions.iter().filter_map(|condition| match condition {
+        Condition::Displacement(components) => Some(components),
+        _ => None,
+    });
+    components.flatten().flatten().filter(|u| u.depends_on_space())
+}
+
+/// max |u_D − Iu_D| on each edge of a curve at some times, m, with I the interpolation at the nodes of u, and
+/// the largest |u_D|.
+fn missed_displacements(
     scene: &Scene,
     mesh: &Mesh,
     curve: &Curve,
-    load: &SurfaceLoad,
-    accuracy: f64,
-) -> HashSet<[usize; 2]> {
-    let mut found = HashSet::new();
-    if !load.expressions().iter().any(Expression::depends_on_space) {
-        return found;
-    }
-    for t in scene.sample_times(TIMES) {
-        let parts = curve.edges.iter().map(|&edge| {
-            let [coarse, fine] = integrals(mesh, load, 1, edge, t);
-            (edge, (fine[0] - coarse[0]).hypot(fine[1] - coarse[1]), fine[2])
-        });
-        let parts: Vec<_> = parts.collect();
-        let total: f64 = parts.iter().map(|part| part.2).sum();
-        let lost = parts.iter().filter(|part| part.1 > SHARE * accuracy * total);
-        found.extend(lost.map(|part| sorted(part.0)));
-    }
-    found
-}
-
-fn samples() -> impl Iterator<Item = f64> {
-    (0..SAMPLES).map(|i| (i as f64 + 0.5) / SAMPLES as f64)
-}
-
-/// Into how many parts the edges of a curve are divided where a `load` is integrated: more than one if it
-/// jumps within an edge, at some time. By two Gauss points a jump that moves would cross an edge in two leaps.
-pub(super) fn parts_of_edges(
-    scene: &Scene,
-    mesh: &Mesh,
-    curve: &Curve,
-    load: &SurfaceLoad,
-) -> usize {
-    let f = load.expressions();
-    if !f.iter().any(Expression::depends_on_space) {
-        return 1;
-    }
-    let mut times = scene.sample_times(JUMP_TIMES);
-    times.truncate(if f.iter().any(Expression::depends_on_time) { usize::MAX } else { 1 });
-    let (mut largest, mut jump) = (0.0_f64, 0.0_f64);
-    for (&edge, &t) in curve.edges.iter().flat_map(|edge| times.iter().map(move |t| (edge, t))) {
-        let normal = mesh.edge_normal(edge).0;
-        let at = |s: f64| load.at(place(mesh, edge, s), normal, t);
-        let values: Vec<[f64; 2]> = samples().map(at).collect();
-        for pair in values.windows(2) {
-            let [a, b] = [pair[0], pair[1]];
-            largest = largest.max(b[0].hypot(b[1]));
-            jump = jump.max((b[0] - a[0]).hypot(b[1] - a[1]));
+    u: &Expression,
+) -> (Vec<f64>, f64) {
+    let line = |edge: &[usize; 2]| {
+        let [p, q] = edge.map(|node| mesh.nodes[node]);
+        [p, if scene.order == Order::Linear { midpoint(p, q) } else { mesh.midpoint(*edge) }, q]
+    };
+    let lines: Vec<_> = curve.edges.iter().map(line).collect();
+    let mut times = scene.sample_times(TIMES);
+    times.truncate(if u.depends_on_time() { usize::MAX } else { 1 });
+    let (mut missed, mut largest) = (vec![0.0_f64; lines.len()], 0.0_f64);
+    for t in times {
+        let at = |edge: usize, s: f64| {
+            let [x, y] = parabola(lines[edge], s);
+            u.eval(x, y, t)
+        };
+        for (edge, [from, to]) in edge_parts(&lines, std::slice::from_ref(u), t, DEVIATION) {
+            let part: EdgePart = (edge, [from, to]);
+            let [a, m, b] = [0.0, 0.5, 1.0].map(|s| at(part.0, s));
+            let middle = if scene.order == Order::Linear { 0.5 * (a + b) } else { m };
+            for s in [GAUSS[0], 0.5, GAUSS[1]].map(|s| from + s * (to - from)) {
+                let (value, [shown]) = (at(edge, s), parabola([[a], [middle], [b]], s));
+                missed[edge] = missed[edge].max((value - shown).abs());
+                largest = largest.max(value.abs());
+            }
         }
     }
-    if jump > JUMP * largest { PARTS } else { 1 }
+    (missed, largest)
 }
 
-/// ∫f_x, ∫f_y and ∫|f| of a load over an edge at time t: by the Gauss points of
-/// [`add_traction`](crate::fem::add_traction), and by many midpoints.
-pub(super) fn integrals(
-    mesh: &Mesh,
-    load: &SurfaceLoad,
-    parts: usize,
-    edge: [usize; 2],
-    t: f64,
-) -> [[f64; 3]; 2] {
-    let (normal, length) = mesh.edge_normal(edge);
-    let gauss = gauss_points([0.0; 2], [1.0, 0.0]).map(|[s, _]| s);
-    let gauss = (0..parts).flat_map(|i| gauss.map(|s| (i as f64 + s) / parts as f64));
-    [gauss.collect(), samples().collect()].map(|parts: Vec<f64>| {
-        let values = parts.iter().map(|&s| load.at(place(mesh, edge, s), normal, t));
-        let sum =
-            values.fold([0.0; 3], |[x, y, all], [fx, fy]| [x + fx, y + fy, all + fx.hypot(fy)]);
-        sum.map(|sum| sum * length / parts.len() as f64)
-    })
+/// What the vertices show of the initial damage.
+struct MissedDamage {
+    /// ‖ζ₀ − Iζ₀‖²_T of each triangle, and ‖1 − ζ₀‖², m².
+    squares: Vec<f64>,
+    square: f64,
+    /// ∫|ζ₀ − Iζ₀|, ∫(1 − ζ₀) and ∫(1 − Iζ₀), m².
+    missed: f64,
+    integral: f64,
+    shown: f64,
+}
+
+/// What the vertices miss of an initial damage that depends on the place.
+fn missed_damage(scene: &Scene, mesh: &Mesh) -> Option<MissedDamage> {
+    let initial = &scene.damage.as_ref()?.initial;
+    if !initial.depends_on_space() {
+        return None;
+    }
+    let six = |triangle: &[usize; 3]| {
+        let [a, b, c] = triangle.map(|node| mesh.nodes[node]);
+        [a, b, c, midpoint(a, b), midpoint(b, c), midpoint(c, a)]
+    };
+    let triangles: Vec<_> = mesh.triangles.iter().map(six).collect();
+    let at = |[x, y]: [f64; 2]| initial.eval(x, y, 0.0);
+    let squares = vec![0.0; triangles.len()];
+    let mut found = MissedDamage { squares, square: 0.0, missed: 0.0, integral: 0.0, shown: 0.0 };
+    let f = (std::slice::from_ref(initial), 1.0);
+    for part in triangle_parts(&triangles, f, &[0.0], [DEVIATION, MORE]) {
+        let (triangle, corners): TrianglePart = part;
+        let points = &triangles[triangle];
+        let [a, b, c] = [points[0], points[1], points[2]].map(at);
+        let weight = super::parts::centroid(&triangles, &part).1 / 3.0;
+        for point in POINTS.map(|point| part_point(&corners, point)) {
+            let value = at(triangle_point(points, point));
+            let shown = point[0] * a + point[1] * b + point[2] * c;
+            found.squares[triangle] += weight * (value - shown).powi(2);
+            found.square += weight * (1.0 - value).powi(2);
+            found.missed += weight * (value - shown).abs();
+            found.integral += weight * (1.0 - value);
+            found.shown += weight * (1.0 - shown);
+        }
+    }
+    Some(found)
+}
+
+/// The longest side of a triangle, by its ends in increasing order.
+fn longest_side(mesh: &Mesh, triangle: usize) -> Option<[usize; 2]> {
+    let [a, b, c] = mesh.triangles[triangle];
+    let sides = [[a, b], [b, c], [c, a]].into_iter().map(sorted);
+    sides.max_by(|p, q| mesh.edge_normal(*p).1.total_cmp(&mesh.edge_normal(*q).1))
+}
+
+fn length(mesh: &Mesh, curve: &Curve) -> f64 {
+    curve.edges.iter().map(|&edge| mesh.edge_normal(edge).1).sum()
 }
 
 /// The point x(s) of an edge, 0 ≤ s ≤ 1, m.

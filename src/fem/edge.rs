@@ -13,7 +13,7 @@ pub struct Edge {
 }
 
 /// The abscissae ½ ∓ 1/√12 of the two Gauss points of an edge, of weights ½.
-pub(super) const GAUSS: [f64; 2] = [0.211_324_865_405_187_08, 0.788_675_134_594_812_9];
+pub const GAUSS: [f64; 2] = [0.211_324_865_405_187_08, 0.788_675_134_594_812_9];
 
 /// The Gauss points of the straight edge from `p` to `q`.
 pub fn gauss_points(p: [f64; 2], q: [f64; 2]) -> [[f64; 2]; 2] {

@@ -52,6 +52,20 @@ fn quadratic_derivatives([a, b, c]: [f64; 3]) -> [[f64; 2]; 6] {
     ]
 }
 
+/// The Jacobian ∂x/∂λ of the isoparametric triangle of six nodes.
+fn jacobian(nodes: &[[f64; 2]; 6], derivatives: &[[f64; 2]; 6]) -> Matrix2<f64> {
+    let entry = |row: usize, column: usize| {
+        nodes.iter().zip(derivatives).map(|(x, d)| x[row] * d[column]).sum()
+    };
+    Matrix2::from_fn(entry)
+}
+
+/// Twice the area per reference area of the isoparametric triangle of six nodes at barycentric coordinates,
+/// m².
+pub(super) fn quadratic_measure(nodes: &[[f64; 2]; 6], point: [f64; 3]) -> f64 {
+    jacobian(nodes, &quadratic_derivatives(point)).determinant()
+}
+
 impl Quadratic {
     /// The isoparametric element of six nodes: x = Σ x_i φ_i(λ), so that a side is a parabola through
     /// its midpoint.
@@ -59,10 +73,7 @@ impl Quadratic {
         Self {
             points: POINTS.map(|point| {
                 let derivatives = quadratic_derivatives(point);
-                // The Jacobian ∂x/∂λ.
-                let jacobian: Matrix2<f64> = Matrix2::from_fn(|row, column| {
-                    nodes.iter().zip(&derivatives).map(|(x, d)| x[row] * d[column]).sum()
-                });
+                let jacobian = jacobian(&nodes, &derivatives);
                 let determinant = jacobian.determinant();
                 // J⁻ᵀ is the matrix of cofactors over the determinant.
                 let cofactors =

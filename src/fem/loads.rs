@@ -3,26 +3,49 @@
 use super::{
     Body, Edge, Elements,
     edge::GAUSS,
-    element::{POINTS, quadratic_values},
+    element::{POINTS, quadratic_measure, quadratic_values},
 };
+use nalgebra::Matrix3;
+use rustc_hash::FxHashMap as HashMap;
+
+/// The triangles, by their index in the undivided mesh, that are integrated in parts, and the barycentric
+/// coordinates of the corners of these.
+pub type Division = HashMap<usize, Vec<[[f64; 3]; 3]>>;
 
 /// The midpoint of the side from `p` to `q`: where [`add_body_force`] takes f_B for P1.
 pub fn midpoint(p: [f64; 2], q: [f64; 2]) -> [f64; 2] {
     [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])]
 }
 
+/// The barycentric coordinates in a triangle of the point at those in a part of it.
+pub fn part_point(corners: &[[f64; 3]; 3], point: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|k| corners.iter().zip(point).map(|(corner, l)| l * corner[k]).sum())
+}
+
 /// Adds the body force f_i = ∫_Ω f_B·φ_i to the nodal loads, with f_B in N/m³ as a function of the
 /// point: by the side midpoints for P1, which is exact where f_B is affine, by the quadrature points
-/// of the element for P2.
-pub fn add_body_force(body: &Body, force: impl Fn([f64; 2]) -> [f64; 2], load: &mut [f64]) {
+/// of the element for P2, and by three points in each part of the triangles that are divided.
+pub fn add_body_force(
+    body: &Body,
+    division: &Division,
+    force: impl Fn([f64; 2]) -> [f64; 2],
+    load: &mut [f64],
+) {
     let points = &body.nodes.points;
+    let parts = |t: usize| division.get(&body.global_triangles[t]);
     let mut add = |node: usize, weight: f64, f: [f64; 2]| {
         load[2 * node] += weight * f[0];
         load[2 * node + 1] += weight * f[1];
     };
     match body.elements() {
         Elements::Linear(cells) => {
-            for (nodes, element) in cells.nodes.iter().zip(cells.elements) {
+            for (t, (nodes, element)) in cells.nodes.iter().zip(cells.elements).enumerate() {
+                if let Some(parts) = parts(t) {
+                    let corners = nodes.map(|node| points[node]);
+                    let twice = |_| 2.0 * element.area();
+                    in_parts(parts, corners, |l| l, twice, &force, |i, w, f| add(nodes[i], w, f));
+                    continue;
+                }
                 for side in 0..3 {
                     let (a, b) = (nodes[side], nodes[(side + 1) % 3]);
                     let f = force(midpoint(points[a], points[b]));
@@ -33,12 +56,16 @@ pub fn add_body_force(body: &Body, force: impl Fn([f64; 2]) -> [f64; 2], load: &
         }
         Elements::Quadratic(cells) => {
             let values = POINTS.map(quadratic_values);
-            for (nodes, element) in cells.nodes.iter().zip(cells.elements) {
+            for (t, (nodes, element)) in cells.nodes.iter().zip(cells.elements).enumerate() {
+                let x = nodes.map(|node| points[node]);
+                if let Some(parts) = parts(t) {
+                    let twice = |l| quadratic_measure(&x, l);
+                    let add = |i: usize, w, f| add(nodes[i], w, f);
+                    in_parts(parts, x, quadratic_values, twice, &force, add);
+                    continue;
+                }
                 for (point, values) in element.points.iter().zip(&values) {
-                    let x = [0, 1].map(|k| {
-                        nodes.iter().zip(values).map(|(&node, value)| value * points[node][k]).sum()
-                    });
-                    let f = force(x);
+                    let f = force(weighted(&x, values));
                     nodes
                         .iter()
                         .zip(values)
@@ -49,28 +76,51 @@ pub fn add_body_force(body: &Body, force: impl Fn([f64; 2]) -> [f64; 2], load: &
     }
 }
 
-/// Adds the surface load f_i = ∫ f_N·φ_i over boundary `edges` to the nodal loads, with f_N in N/m² as
-/// a function of the point and the outward normal there. Two Gauss points an edge are exact, on
-/// straight edges, where f_N is quadratic for P1 and affine for P2; where it jumps, `parts` of each edge
-/// have two of their own.
+/// Adds ∫ f φ_i over the parts of an element with these nodes and functions φ_i, and `twice` the area per
+/// reference area, all by barycentric coordinates.
+fn in_parts<const N: usize>(
+    parts: &[[[f64; 3]; 3]],
+    nodes: [[f64; 2]; N],
+    functions: impl Fn([f64; 3]) -> [f64; N],
+    twice: impl Fn([f64; 3]) -> f64,
+    force: impl Fn([f64; 2]) -> [f64; 2],
+    mut add: impl FnMut(usize, f64, [f64; 2]),
+) {
+    for part in parts {
+        let share = Matrix3::from(*part).determinant().abs() / 6.0;
+        for point in POINTS.map(|point| part_point(part, point)) {
+            let values = functions(point);
+            let f = force(weighted(&nodes, &values));
+            let weight = share * twice(point);
+            (0..N).for_each(|i| add(i, weight * values[i], f));
+        }
+    }
+}
+
+/// Σ φ_i x_i.
+fn weighted<const N: usize>(points: &[[f64; 2]; N], values: &[f64; N]) -> [f64; 2] {
+    [0, 1].map(|k| points.iter().zip(values).map(|(x, value)| value * x[k]).sum())
+}
+
+/// Adds the surface load f_i = ∫ f_N·φ_i over `parts` of boundary edges, from and to an s each, to the nodal
+/// loads, with f_N in N/m² as a function of the point and the outward normal there. Two Gauss points a part
+/// are exact, on straight edges, where f_N is quadratic for P1 and affine for P2.
 pub fn add_traction(
     body: &Body,
-    edges: &[Edge],
-    parts: usize,
+    parts: impl IntoIterator<Item = (Edge, [f64; 2])>,
     traction: impl Fn([f64; 2], [f64; 2]) -> [f64; 2],
     load: &mut [f64],
 ) {
     let points = &body.nodes.points;
-    let part = 1.0 / parts as f64;
-    let places = || (0..parts).flat_map(|i| GAUSS.map(|s| part * (i as f64 + s)));
-    for edge in edges {
-        for s in places() {
+    for (edge, [from, to]) in parts {
+        for s in GAUSS.map(|s| from + s * (to - from)) {
             let [dx, dy] = edge.tangent(points, s);
             let length = dx.hypot(dy);
             let f = traction(edge.at(points, s), [dy / length, -dx / length]);
             for (node, value) in edge.values(s) {
-                load[2 * node] += 0.5 * part * length * value * f[0];
-                load[2 * node + 1] += 0.5 * part * length * value * f[1];
+                let weight = 0.5 * (to - from) * length * value;
+                load[2 * node] += weight * f[0];
+                load[2 * node + 1] += weight * f[1];
             }
         }
     }

@@ -58,6 +58,17 @@ impl Mesh {
         ([dy / length, -dx / length], length)
     }
 
+    /// The bounds of x and of y of these nodes, m.
+    pub fn bounds<'a>(&self, nodes: impl Iterator<Item = &'a usize>) -> [[f64; 2]; 2] {
+        let mut bounds = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+        for &node in nodes {
+            for (bounds, x) in bounds.iter_mut().zip(self.nodes[node]) {
+                *bounds = [bounds[0].min(x), bounds[1].max(x)];
+            }
+        }
+        bounds
+    }
+
     /// The edges of one triangle alone, the body on their left.
     pub fn boundary_edges(&self) -> Vec<[usize; 2]> {
         let sides = sides(&self.triangles);

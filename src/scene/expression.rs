@@ -1,16 +1,16 @@
 //! Expressions in x, y and t: parsed once, evaluated often.
 
+mod breaks;
+mod interval;
 mod parser;
 mod table;
 
+use interval::{Enclosure, Enclosure2};
 use parser::Parser;
 use serde::Deserialize;
-use std::{ops::Range, path::Path, sync::Arc};
+use std::{path::Path, sync::Arc};
 use table::Table;
 use toml::Value;
-
-/// Parts of a run in which an expression is looked at for breaks.
-const LOOKS: usize = 1000;
 
 /// A real function of x, y (m) and t (s), read from a scene.
 ///
@@ -65,23 +65,22 @@ enum Instruction {
     Number(f64),
     /// x, y or t, by its index.
     Variable(usize),
-    Unary(fn(f64) -> f64),
-    Arithmetic(fn(f64, f64) -> f64),
-    Binary(fn(f64, f64) -> f64),
+    Unary(fn(f64) -> f64, Enclosure),
+    Binary(fn(f64, f64) -> f64, Enclosure2),
     Compare(fn(&f64, &f64) -> bool),
     /// `if`.
     Choose,
     Table(Arc<Table>),
 }
-use Instruction::{Arithmetic, Binary, Choose, Compare, Number, Unary, Variable};
+use Instruction::{Binary, Choose, Compare, Number, Unary, Variable};
 
 impl Instruction {
     /// How many values it takes from the stack.
     fn takes(&self) -> usize {
         match self {
             Number(_) | Variable(_) => 0,
-            Unary(_) | Self::Table(_) => 1,
-            Arithmetic(_) | Binary(_) | Compare(_) => 2,
+            Unary(..) | Self::Table(_) => 1,
+            Binary(..) | Compare(_) => 2,
             Choose => 3,
         }
     }
@@ -133,8 +132,8 @@ impl Expression {
             stack[height] = match instruction {
                 Number(value) => *value,
                 Variable(i) => variables[*i],
-                Unary(apply) => apply(stack[height]),
-                Arithmetic(apply) | Binary(apply) => apply(stack[height], stack[height + 1]),
+                Unary(apply, _) => apply(stack[height]),
+                Binary(apply, _) => apply(stack[height], stack[height + 1]),
                 Compare(holds) => truth(stack[height], stack[height + 1], |a, b| holds(&a, &b)),
                 Choose if stack[height].is_nan() => f64::NAN,
                 Choose => stack[height + if stack[height] != 0.0 { 1 } else { 2 }],
@@ -162,63 +161,6 @@ impl Expression {
     pub fn depends_on_space(&self) -> bool {
         self.program.iter().any(|instruction| matches!(instruction, Variable(0 | 1)))
     }
-
-    /// Times up to `end`, s, rising, at which the expression may not be smooth: those of tables of t, and
-    /// those at which a function's argument (`abs`), if it depends on t alone, changes its sign, or its two
-    /// arguments (`min`, `<`) their order, as far as steps of a thousandth of `end` show it.
-    pub fn breaks(&self, end: f64) -> Vec<f64> {
-        let mut breaks = Vec::new();
-        // Where what is on the stack begins in the program.
-        let mut begins: Vec<usize> = Vec::new();
-        for (i, instruction) in self.program.iter().enumerate() {
-            let arguments = begins.split_off(begins.len() - instruction.takes());
-            let zero = || Self::constant(0.0);
-            match (instruction, &arguments[..]) {
-                (Instruction::Table(table), &[a])
-                    if matches!(self.program[a..i], [Variable(2)]) =>
-                {
-                    breaks.extend(table.arguments())
-                }
-                (Unary(_), &[a]) => breaks.extend(crossings(&self.part(a..i), &zero(), end)),
-                (Binary(_) | Compare(_), &[a, b]) => {
-                    breaks.extend(crossings(&self.part(a..b), &self.part(b..i), end));
-                }
-                _ => {}
-            }
-            begins.push(arguments.first().copied().unwrap_or(i));
-        }
-        breaks.sort_by(f64::total_cmp);
-        breaks.dedup();
-        breaks
-    }
-
-    /// A part of the program that leaves one value.
-    fn part(&self, instructions: Range<usize>) -> Self {
-        Self { program: self.program[instructions].to_vec(), height: self.height }
-    }
-}
-
-/// The times in (0, `end`], s, at which `a` and `b` change their order; none where they depend on space.
-fn crossings(a: &Expression, b: &Expression, end: f64) -> Vec<f64> {
-    let (in_space, in_time) = (Expression::depends_on_space, Expression::depends_on_time);
-    if [a, b].into_iter().any(in_space) || ![a, b].into_iter().any(in_time) {
-        return Vec::new();
-    }
-    let is_below = |t: f64| a.eval(0.0, 0.0, t) < b.eval(0.0, 0.0, t);
-    let parts = (0..LOOKS).map(|i| [i, i + 1].map(|i| end * i as f64 / LOOKS as f64));
-    let crossed = parts.filter(|&[from, to]| is_below(from) != is_below(to));
-    let bisected = |[mut from, mut to]: [f64; 2]| {
-        let before = is_below(from);
-        loop {
-            let middle = 0.5 * (from + to);
-            match is_below(middle) == before {
-                _ if middle <= from || middle >= to => return to,
-                true => from = middle,
-                false => to = middle,
-            }
-        }
-    };
-    crossed.map(bisected).collect()
 }
 
 /// 1 if `holds` of a and b, else 0; NaN if either is.

@@ -42,31 +42,33 @@ fn large_strains_and_rotations_are_noted_and_long_ways_are_not() {
 }
 
 #[test]
-fn a_traction_narrower_than_the_edges_is_noted() {
-    // Of 4 edges; the Gauss points next to ½ are 0.053 from it. A hat of half width w.
-    let notes = |traction: &str| pressed(0.0, traction).unwrap().notes();
-    let [note] = &notes("-100*max(0, 1 - abs(x - 0.5)/0.05)")[..] else { panic!("one note") };
-    let told = "the traction of boundary \"top\" varies within the mesh's edges: its resultant on \
-                this mesh is (0.0000e0, 0.0000e0) N/m, integrated finely (0.0000e0, -4.99";
-    assert!(note.starts_with(told) && note.ends_with("; refine there"), "{note}");
-    // Balanced, of no resultant in truth; smooth on the mesh; constant.
-    assert_eq!(notes("-1 - cos(8*pi*(x - 0.0528))").len(), 1);
-    for resolved in ["-1 - x^3", "-1 - sin(2*pi*x)", "-2"] {
-        assert_eq!(notes(resolved), [""; 0], "{resolved}");
+fn what_the_nodes_miss_of_a_displacement_or_the_initial_damage_is_noted() {
+    let notes = |initial: &str, displacement: &str| {
+        let text = format!(
+            "{MATERIAL}
+             time = {{ end = 1, step = 0.5 }}
+             damage = {{ diffusion = 1, lambda_d = 0, lambda_u = 1, lambda_w = 0, strain_cap = 1,
+                         threshold = 0.01, initial = '{initial}' }}
+             boundary = [{{ name = 'left', displacement = [0, 0] }},
+                         {{ name = 'top', displacement = ['free', '{displacement}'] }}]"
+        );
+        let notes = problem(square(8), &text).unwrap_or_else(|e| panic!("{e}")).notes();
+        notes.into_iter().filter(|note| note.contains("varies within")).collect::<Vec<_>>()
+    };
+    for (initial, displacement) in
+        [("1", "0"), ("1 - 0.5*x", "-0.01*x"), ("1 - 0.1*x*y", "-0.01*x^2*(1 + sin(t))")]
+    {
+        assert_eq!(notes(initial, displacement), [""; 0], "{initial} {displacement}");
     }
-    // It runs over the top and is 0 at first.
-    let running = "-t*max(0, 1 - abs(x - t)/0.05)";
-    let text = format!(
-        "{MATERIAL}
-         time = {{ end = 1, step = 0.1 }}
-         boundary = [{{ name = 'left', symmetry = true }}, {{ name = 'bottom', gap = 0 }},
-                     {{ name = 'top', traction = [0, '{running}'] }}]"
+    // Between the nodes at 0 and 1/8; ∫(1 − ζ) = 0.9 · 0.005 √π.
+    let [damage] = &notes("1 - 0.9*exp(-((x - 0.06)/0.005)^2)", "0")[..] else { panic!("one") };
+    assert!(
+        damage.contains("∫(1 − ζ) is 0.000e0 on this mesh, integrated finely 7.97"),
+        "{damage}"
     );
-    let notes = problem(square(4), &text).unwrap().notes();
-    // It also runs on within the steps.
-    let told = ["change within a time step", " N/m at t = "];
-    assert_eq!(notes.len(), told.len(), "{notes:?}");
-    assert!(told.iter().all(|told| notes.iter().any(|note| note.contains(told))), "{notes:?}");
+    let [missed] = &notes("1", "-0.01*exp(-((x - 0.56)/0.005)^2)")[..] else { panic!("one") };
+    let told = ["boundary \"top\"", "near (0.5625, 1.0000): up to 1.0e-2 m", "of 1.0e-2 at most"];
+    assert!(told.iter().all(|told| missed.contains(told)), "{missed}");
 }
 
 #[test]

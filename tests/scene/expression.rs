@@ -1,5 +1,9 @@
 //! The laws of expressions: precedence, names, numbers, and what is refused.
 
+#[path = "../common/mod.rs"]
+mod common;
+
+use common::Random;
 use signorini::scene::Expression;
 
 fn value(text: &str) -> f64 {
@@ -233,15 +237,152 @@ fn conditions_are_one_or_zero_and_choose() {
     assert_eq!(at(&deep, 3.0, 0.0, 0.0), 43.0);
 }
 
+/// The breaks in a run of one second, on the unit square.
+fn breaks(text: &str) -> Vec<f64> {
+    Expression::parse(text).expect(text).breaks([[0.0, 1.0]; 2], 1.0)
+}
+
 #[test]
 fn the_times_of_jumps_are_known() {
-    let breaks = |text: &str| Expression::parse(text).expect(text).breaks(1.0);
     assert_eq!(breaks("if(t >= 0.1*2 and t < 0.4, x < 3, exp(t))"), [0.2, 0.4]);
     assert_eq!(breaks("if(2*t < 1, 0, 1)"), [0.5]);
-    assert_eq!(breaks("abs(t - 0.3141)*x"), [0.3141]);
-    let found = breaks("max(0, 0.3 - t*t)");
-    assert!(!found.is_empty() && found.iter().all(|t| (t * t - 0.3).abs() < 1e-15), "{found:?}");
-    assert_eq!(breaks("min(t, 2) + if(x < t, 1, 2)"), Vec::<f64>::new());
+    assert_eq!(breaks("(t >= 0.3) - (t >= 0.3 + 1e-8)"), [0.3, 0.3 + 1e-8]);
+    // In a corner of the square, far below the thousandth of the run and of the side.
+    let blow = "if(abs(t - 0.5) < 1e-5 and x > 0.999 and y > 0.999, 500, 0)";
+    let [from, to] = breaks(blow)[..] else { panic!("two breaks") };
+    assert!((from - 0.49999).abs() < 1e-12 && (to - 0.50001).abs() < 1e-12, "{from} {to}");
+}
+
+#[test]
+fn pulses_are_followed_by_times_between_which_they_are_nearly_linear() {
+    for width in [1e-3, 1e-4, 1e-5] {
+        for text in [
+            format!("1 + exp(-((t - 0.5678)/{width})^2)"),
+            format!("-3 - x*max(0, 1 - abs(t - 0.5678)/{width})"),
+            format!("x*y/(1 + ((t - 0.5678)/{width})^4)"),
+        ] {
+            let (f, mut times) = (Expression::parse(&text).expect(&text), breaks(&text));
+            assert!((3..100).contains(&times.len()), "{text}: {}", times.len());
+            times.insert(0, 0.0);
+            times.push(1.0);
+            let at = |t: f64| f.eval(1.0, 1.0, t);
+            let range = (at(0.5678) - at(0.0)).abs();
+            for pair in times.windows(2) {
+                for i in 1..20 {
+                    let part = f64::from(i) / 20.0;
+                    let [from, to] = [pair[0], pair[1]];
+                    let line = (1.0 - part) * at(from) + part * at(to);
+                    let deviation = (at(from + part * (to - from)) - line).abs();
+                    assert!(deviation < 0.15 * range, "{text}: {deviation} in {pair:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn smooth_functions_and_rolling_ones_have_no_breaks_to_speak_of() {
+    for smooth in ["t", "x*sin(20*t)", "t*t - t + x*t", "exp(-((t - 0.5)/0.1)^2)", "min(t, 2)", "x"]
+    {
+        assert_eq!(breaks(smooth), [0.0; 0], "{smooth}");
+    }
+    for rolling in [
+        "if(x < t, 1, 2)",
+        "if(abs(x - t) < 1e-3, 1, 0)",
+        "max(0, 1 - abs(x - 0.5 + abs(0.5 - t))/0.01)",
+        "exp(-((x - 0.2 - 0.6*t)/1e-4)^2)",
+    ] {
+        assert!(breaks(rolling).len() < 10, "{rolling}: {:?}", breaks(rolling));
+    }
+}
+
+/// An expression of the operations of `random` that is at most so deep.
+fn random_expression(random: &mut Random, depth: usize) -> String {
+    if depth == 0 {
+        return match random.below(4) {
+            0 => format!("{:.3}", 3.0 * random.next()),
+            i => ["x", "y", "t"][i - 1].to_owned(),
+        };
+    }
+    let a = random_expression(random, depth - 1);
+    let b = random_expression(random, depth - 1);
+    let c = random_expression(random, depth - 1);
+    let unary = ["sin", "cos", "tan", "sqrt", "exp", "log", "abs", "-"];
+    let binary = ["+", "-", "*", "/", "^", "<", "<=", ">", ">=", "==", "!=", "and", "or"];
+    match random.below(25) {
+        i @ 0..8 => format!("{}({a})", unary[i]),
+        i @ 8..21 => format!("(({a}) {} ({b}))", binary[i - 8]),
+        21 => format!("min({a}, {b})"),
+        22 => format!("max({a}, {b})"),
+        23 => format!("atan2({a}, {b})"),
+        _ => format!("if({a}, {b}, {c})"),
+    }
+}
+
+#[test]
+fn the_range_contains_all_values_in_a_box() {
+    let mut random = Random::new(7);
+    let (mut bounded, mut decided) = (0, 0);
+    for _ in 0..3000 {
+        let depth = 1 + random.below(3);
+        let text = random_expression(&mut random, depth);
+        let f = Expression::parse(&text).unwrap_or_else(|e| panic!("`{text}` {e}"));
+        let scale = [1e-6, 0.1, 3.0][random.below(3)];
+        let space = [(); 3].map(|()| {
+            let from = [3.0 * random.next(), 0.0][usize::from(random.below(4) == 0)];
+            [from, from + scale * (1.0 + random.next())]
+        });
+        let [low, high] = f.range(space);
+        assert!(low <= high, "`{text}`");
+        bounded += usize::from(low.is_finite() && high.is_finite());
+        decided += usize::from(low == high);
+        let near = |bound: f64| 1e-12 * (1.0 + bound.abs());
+        for sample in 0..60 {
+            // Corners of the box, then points within.
+            let [x, y, t] = [0, 1, 2].map(|k| {
+                let [from, to] = space[k];
+                let part =
+                    if sample < 8 { f64::from(sample >> k & 1) } else { 0.5 + 0.5 * random.next() };
+                (from + part * (to - from)).min(to)
+            });
+            let value = f.eval(x, y, t);
+            let inside = value.is_nan()
+                || value == low
+                || value == high
+                || (value >= low - near(low) && value <= high + near(high));
+            assert!(inside, "`{text}` is {value} at ({x}, {y}, {t}), not in [{low}, {high}]");
+        }
+    }
+    assert!(bounded > 2000 && decided > 300, "{bounded} bounded, {decided} decided");
+}
+
+#[test]
+fn the_range_is_sharp_where_each_variable_occurs_once() {
+    let range = |text: &str, x: [f64; 2]| {
+        Expression::parse(text).expect(text).range([x, [0.5, 0.5], [0.0, 0.0]])
+    };
+    for (text, x, expected) in [
+        ("x^2", [-1.0, 2.0], [0.0, 4.0]),
+        ("x^3", [-1.0, 2.0], [-1.0, 8.0]),
+        ("abs(x - 1)", [0.0, 3.0], [0.0, 2.0]),
+        ("sin(x)", [0.0, 3.0], [0.0, 1.0]),
+        ("cos(x)", [1.0, 4.0], [-1.0, 1.0_f64.cos()]),
+        ("sqrt(x)", [-1e-17, 4.0], [0.0, 2.0]),
+        ("1/x", [2.0, 4.0], [0.25, 0.5]),
+        ("1/x", [-1.0, 1.0], [f64::NEG_INFINITY, f64::INFINITY]),
+        ("x < 1", [0.0, 0.5], [1.0, 1.0]),
+        ("x < 1", [1.0, 2.0], [0.0, 0.0]),
+        ("x < 1", [0.0, 1.0], [0.0, 1.0]),
+        ("if(x < 1, 3, 5 + x)", [0.0, 2.0], [3.0, 7.0]),
+        ("max(x, y)", [0.0, 2.0], [0.5, 2.0]),
+        ("atan2(y, x)", [-1.0, 1.0], [0.5_f64.atan2(1.0), 0.5_f64.atan2(-1.0)]),
+    ] {
+        assert_eq!(range(text, x), expected, "{text}");
+    }
+    let table = table("0,0\n1,3\n1,-1\n2,1", "table('load.csv', x)").expect("a table");
+    assert_eq!(table.range([[0.5, 1.5], [0.0; 2], [0.0; 2]]), [-1.0, 3.0]);
+    assert_eq!(table.range([[1.2, 1.5], [0.0; 2], [0.0; 2]]), [table.eval(1.2, 0.0, 0.0), 0.0]);
+    assert_eq!(table.range([[3.0, 4.0], [0.0; 2], [0.0; 2]]), [1.0, 1.0]);
 }
 
 /// The function of the table with the `content`.
@@ -261,10 +402,15 @@ fn a_table_is_piecewise_linear_and_constant_beyond_its_ends() {
         assert_eq!(of_t.eval(0.0, 0.0, t), expected, "{t}");
     }
     assert!(of_t.depends_on_time() && !of_t.depends_on_space());
-    assert_eq!(of_t.breaks(2.0), [0.0, 1.0, 2.5]);
+    // The jump; the kinks are as far apart as chosen steps look.
+    assert_eq!(of_t.breaks([[0.0; 2]; 2], 2.0), [1.0]);
     let of_x = table(text, "table('load.csv', abs(x))").expect("a table");
     assert_eq!(of_x.eval(-0.25, 7.0, 9.0), 1.5);
-    assert!(of_x.depends_on_space() && !of_x.depends_on_time() && of_x.breaks(2.0).is_empty());
+    assert!(
+        of_x.depends_on_space()
+            && !of_x.depends_on_time()
+            && of_x.breaks([[0.0, 3.0]; 2], 2.0).is_empty()
+    );
     assert!(of_x.eval(f64::NAN, 0.0, 0.0).is_nan());
 }
 

@@ -22,7 +22,9 @@ const ROUGH: f64 = 0.1;
 /// Between the nodes the body may lie in the foundation by this part of the accuracy, relative to the
 /// largest displacement.
 const PENETRATION: f64 = 0.5;
-/// A triangle in which something is not resolved becomes smaller by this.
+/// A triangle becomes smaller by this where a function of the scene is not resolved, and by this where the
+/// body lies in the foundation.
+const HALF: f64 = 0.5;
 const QUARTER: f64 = 0.25;
 
 /// A mesh with what a run with few steps showed on it.
@@ -121,7 +123,10 @@ impl<'a> Round<'a> {
         }
         for (t, &[a, b, c]) in self.mesh.triangles.iter().enumerate() {
             let mut sides = [[a, b], [b, c], [c, a]].into_iter();
-            if depths[t] > self.deepest || sides.any(|s| self.unresolved.contains(&sorted(s))) {
+            if sides.any(|side| self.unresolved.contains(&sorted(side))) {
+                sizes[t] = sizes[t].min(HALF);
+            }
+            if depths[t] > self.deepest {
                 sizes[t] = QUARTER;
             }
         }

@@ -3,8 +3,8 @@
 use super::{
     super::error::suggestion,
     Expression,
-    Instruction::{self, Arithmetic, Binary, Choose, Compare, Number, Unary, Variable},
-    Table, truth,
+    Instruction::{self, Binary, Choose, Compare, Number, Unary, Variable},
+    Table, interval, truth,
 };
 use std::{f64::consts::PI, path::Path, sync::Arc};
 
@@ -14,35 +14,35 @@ const NAMES: [(&str, Instruction); 15] = [
     ("y", Variable(1)),
     ("t", Variable(2)),
     ("pi", Number(PI)),
-    ("sin", Unary(f64::sin)),
-    ("cos", Unary(f64::cos)),
-    ("tan", Unary(f64::tan)),
-    ("sqrt", Unary(f64::sqrt)),
-    ("exp", Unary(f64::exp)),
-    ("log", Unary(f64::ln)),
-    ("abs", Unary(f64::abs)),
-    ("min", Binary(|a, b| if a < b || a.is_nan() { a } else { b })),
-    ("max", Binary(|a, b| if a > b || a.is_nan() { a } else { b })),
-    ("atan2", Binary(f64::atan2)),
+    ("sin", Unary(f64::sin, interval::sine)),
+    ("cos", Unary(f64::cos, interval::cosine)),
+    ("tan", Unary(f64::tan, interval::tangent)),
+    ("sqrt", Unary(f64::sqrt, interval::from_zero)),
+    ("exp", Unary(f64::exp, interval::monotone)),
+    ("log", Unary(f64::ln, interval::from_zero)),
+    ("abs", Unary(f64::abs, interval::absolute)),
+    ("min", Binary(|a, b| if a < b || a.is_nan() { a } else { b }, interval::corners)),
+    ("max", Binary(|a, b| if a > b || a.is_nan() { a } else { b }, interval::corners)),
+    ("atan2", Binary(f64::atan2, interval::angle)),
     ("if", Choose),
 ];
 /// What operators do, how strongly they bind, and how strongly an operator in their right operand
 /// must bind at least: `a - b` is taken from the left, `a^b` from the right. (One that begins with
 /// another comes first.)
 const OPERATORS: [(&str, Instruction, u8, u8); 13] = [
-    ("or", Binary(|a, b| truth(a, b, |a, b| a != 0.0 || b != 0.0)), 1, 2),
-    ("and", Binary(|a, b| truth(a, b, |a, b| a != 0.0 && b != 0.0)), 2, 3),
+    ("or", Binary(|a, b| truth(a, b, |a, b| a != 0.0 || b != 0.0), interval::logical), 1, 2),
+    ("and", Binary(|a, b| truth(a, b, |a, b| a != 0.0 && b != 0.0), interval::logical), 2, 3),
     ("<=", Compare(f64::le), 3, 4),
     (">=", Compare(f64::ge), 3, 4),
     ("==", Compare(f64::eq), 3, 4),
     ("!=", Compare(f64::ne), 3, 4),
     ("<", Compare(f64::lt), 3, 4),
     (">", Compare(f64::gt), 3, 4),
-    ("+", Arithmetic(|a, b| a + b), 4, 5),
-    ("-", Arithmetic(|a, b| a - b), 4, 5),
-    ("*", Arithmetic(|a, b| a * b), 5, 6),
-    ("/", Arithmetic(|a, b| a / b), 5, 6),
-    ("^", Arithmetic(f64::powf), 6, 6),
+    ("+", Binary(|a, b| a + b, interval::corners), 4, 5),
+    ("-", Binary(|a, b| a - b, interval::corners), 4, 5),
+    ("*", Binary(|a, b| a * b, interval::corners), 5, 6),
+    ("/", Binary(|a, b| a / b, interval::quotient), 5, 6),
+    ("^", Binary(f64::powf, interval::power), 6, 6),
 ];
 /// Of the operators only `^` binds stronger than a sign: `-x^2` is −(x²), and `2^-1` is ½.
 const SIGN: u8 = 6;
@@ -96,7 +96,7 @@ impl<'a> Parser<'a> {
         }
         if self.take("-") {
             self.expression(SIGN)?;
-            self.push(Unary(|a| -a));
+            self.push(Unary(|a| -a, interval::monotone));
         } else if self.take("+") {
             self.expression(SIGN)?;
         } else {

@@ -69,9 +69,12 @@ impl Table {
         }
     }
 
-    /// The a of all points.
-    pub(super) fn arguments(&self) -> impl Iterator<Item = f64> {
-        self.points.iter().map(|[a, _]| *a)
+    /// Values between which all f(a) of an interval of a lie: those at its ends and of the points in it.
+    pub(super) fn within(&self, [low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
+        // At a jump at the lower end the value after it counts.
+        let first = self.points.partition_point(|[a, _]| *a <= low);
+        let inside = self.points[first..].iter().take_while(move |[a, _]| *a <= high);
+        [self.at(low), self.at(high)].into_iter().chain(inside.map(|[_, f]| *f))
     }
 }
 

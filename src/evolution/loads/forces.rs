@@ -1,0 +1,174 @@
+//! Surface loads and body forces, in parts of edges and triangles in which they are resolved.
+
+use crate::{
+    evolution::{
+        boundary_conditions::Traction,
+        parts::{
+            EdgePart, TrianglePart, WHOLE, centroid, edge_parts, triangle_parts, triangle_points,
+        },
+    },
+    fem::{Body, Division, Edge, GAUSS, Subdomain, add_body_force, add_traction, parabola},
+    scene::{Expression, Scene, SurfaceLoad},
+};
+
+/// Errors of resultants, relative to ∫|f|: where loads are assembled …
+const DEVIATION: f64 = 1e-6;
+const DEVIATION_IN_BODY: f64 = 1e-5;
+/// … and where they are only sampled.
+const SAMPLED: f64 = 0.02;
+/// The parts of triangles that are added for a body force, at most: where it depends on time, when they are
+/// integrated in each step, and where it does not.
+const MORE: [f64; 2] = [10_000.0, 50_000.0];
+/// Times at which a body force is looked at, about.
+const TIMES: usize = 4;
+/// The body force is sampled in at most so many triangles, and so many parts of others.
+const TRIANGLES: usize = 500;
+
+/// A surface load on a part of the boundary.
+#[derive(Debug)]
+pub(super) struct SurfaceForce {
+    /// f_N, N/m².
+    force: SurfaceLoad,
+    /// All edges of the undivided body: their ends and middles, m. All ranks take the same parts of them.
+    lines: Vec<[[f64; 2]; 3]>,
+    /// The same on this rank, where it has them.
+    edges: Vec<Option<Edge>>,
+    /// The samples of a load that does not depend on time.
+    constant: Option<Vec<f64>>,
+}
+
+impl SurfaceForce {
+    pub(super) fn new(body: &Body, Traction { edges, force }: Traction) -> Self {
+        let points = &body.nodes.points;
+        let line = |edge: &Edge| [0.0, 0.5, 1.0].map(|s| edge.at(points, s));
+        let lines = edges.iter().map(line).collect();
+        let edges = edges.into_iter().map(Some).collect();
+        let mut new = Self { force, lines, edges, constant: None };
+        if !new.expressions().any(Expression::depends_on_time) {
+            let mut samples = Vec::new();
+            new.sample(0.0, true, &mut samples);
+            new.constant = Some(samples);
+        }
+        new
+    }
+
+    pub(super) fn restrict(self, subdomain: &Subdomain) -> Self {
+        let local = |edge: &Option<Edge>| subdomain.edges(edge.as_slice()).pop();
+        Self { edges: self.edges.iter().map(local).collect(), ..self }
+    }
+
+    pub(super) fn expressions(&self) -> impl Iterator<Item = &Expression> {
+        self.force.expressions().iter()
+    }
+
+    fn parts(&self, t: f64, deviation: f64) -> Vec<EdgePart> {
+        edge_parts(&self.lines, self.force.expressions(), t, deviation)
+    }
+
+    /// Adds the nodal loads at time t.
+    pub(super) fn add(&self, body: &Body, t: f64, load: &mut [f64]) {
+        let parts = self.parts(t, DEVIATION);
+        let parts = parts.into_iter().filter_map(|(edge, part)| Some((self.edges[edge]?, part)));
+        add_traction(body, parts, |x, normal| self.force.at(x, normal, t), load);
+    }
+
+    /// Whether there are edges that must be sampled in parts at some of these times.
+    pub(super) fn is_narrow(&self, times: &[f64]) -> bool {
+        let divided = |&t: &f64| self.parts(t, SAMPLED).len() > self.lines.len();
+        self.constant.is_none() && times.iter().any(divided)
+    }
+
+    /// The forces on all edges at time t, by expression: from the middles, or from parts of edges where the
+    /// load may be narrow.
+    pub(super) fn sample(&self, t: f64, narrow: bool, forces: &mut Vec<f64>) {
+        if let Some(constant) = &self.constant {
+            forces.extend(constant);
+            return;
+        }
+        let (first, expressions) = (forces.len(), self.force.expressions());
+        if !narrow {
+            for [p, [x, y], q] in &self.lines {
+                let length = (q[0] - p[0]).hypot(q[1] - p[1]);
+                forces.extend(expressions.iter().map(|f| length * f.eval(*x, *y, t)));
+            }
+            return;
+        }
+        forces.resize(first + expressions.len() * self.lines.len(), 0.0);
+        for (edge, [from, to]) in self.parts(t, SAMPLED) {
+            let [[px, py], _, [qx, qy]] = self.lines[edge];
+            let weight = 0.5 * (to - from) * (qx - px).hypot(qy - py);
+            for s in GAUSS {
+                let [x, y] = parabola(self.lines[edge], from + s * (to - from));
+                for (i, f) in expressions.iter().enumerate() {
+                    forces[first + expressions.len() * edge + i] += weight * f.eval(x, y, t);
+                }
+            }
+        }
+    }
+}
+
+/// A body force.
+#[derive(Debug)]
+pub(super) struct BodyForce {
+    /// f_B, N/m³.
+    force: [Expression; 2],
+    /// The triangles in which it is not resolved, in parts.
+    division: Division,
+    /// Centroids and areas, m and m², at which it is sampled.
+    samples: Vec<([f64; 2], f64)>,
+}
+
+impl BodyForce {
+    /// `None` where it is zero. Triangles are divided once, for all times.
+    pub(super) fn new(body: &Body, scene: &Scene) -> Option<Self> {
+        let force = scene.body_force.clone();
+        if force.iter().all(|f| f.as_constant() == Some(0.0)) {
+            return None;
+        }
+        let times = scene.sample_times(TIMES);
+        let in_time = force.iter().any(Expression::depends_on_time);
+        let (times, more) = if in_time { (&times[..], MORE[0]) } else { (&times[..1], MORE[1]) };
+        let in_space = force.iter().any(Expression::depends_on_space);
+        let triangles = triangle_points(body);
+        let limits = [DEVIATION_IN_BODY, more];
+        let parts = match in_space {
+            true => triangle_parts(&triangles, (&force, 0.0), times, limits),
+            false => (0..triangles.len()).map(|triangle| (triangle, WHOLE)).collect(),
+        };
+        let (whole, parts): (Vec<_>, Vec<_>) = parts.into_iter().partition(|part| part.1 == WHOLE);
+        let mut division = Division::default();
+        for (triangle, part) in &parts {
+            division.entry(*triangle).or_default().push(*part);
+        }
+        let samples = [whole, parts].iter().flat_map(|parts| samples(&triangles, parts)).collect();
+        Some(Self { force, division, samples })
+    }
+
+    pub(super) fn expressions(&self) -> impl Iterator<Item = &Expression> {
+        self.force.iter()
+    }
+
+    /// Adds the nodal loads at time t.
+    pub(super) fn add(&self, body: &Body, t: f64, load: &mut [f64]) {
+        let at = |[x, y]: [f64; 2]| self.force.each_ref().map(|f| f.eval(x, y, t));
+        add_body_force(body, &self.division, at, load);
+    }
+
+    /// The forces on some triangles at time t, by component.
+    pub(super) fn sample(&self, t: f64, forces: &mut Vec<f64>) {
+        let at = |([x, y], area): &([f64; 2], f64)| {
+            self.force.each_ref().map(|f| area * f.eval(*x, *y, t))
+        };
+        forces.extend(self.samples.iter().flat_map(at));
+    }
+}
+
+/// Every so many parts, which stand for those between them.
+fn samples(triangles: &[[[f64; 2]; 6]], parts: &[TrianglePart]) -> Vec<([f64; 2], f64)> {
+    let stride = parts.len().div_ceil(TRIANGLES).max(1);
+    let sample = |part: &TrianglePart| {
+        let (centroid, area) = centroid(triangles, part);
+        (centroid, stride as f64 * area)
+    };
+    parts.iter().step_by(stride).map(sample).collect()
+}

@@ -1,0 +1,210 @@
+//! Parts of edges and triangles that are so small that a quadrature rule integrates a function in each.
+//!
+//! A part with the measure m is bisected while, relative to the sum of ∫|f| over all parts,
+//!
+//! - m max |f − f₂| > `DEVIATION`, with f₂ the quadratic interpolation of f at ends and middles (corners
+//!   and midpoints of sides) and the maximum over the quadrature points; or
+//! - m times what [`Expression::range`] leaves above and below the values in these points > `HIDDEN`: a
+//!   peak between them may not be seen.
+
+use crate::{
+    fem::{Body, Elements, GAUSS, POINTS, midpoint, parabola, part_point, quadratic_values},
+    mesh::twice_area,
+    scene::Expression,
+};
+
+/// An edge, by its index, and where a part of it begins and ends, 0 ≤ s ≤ 1.
+pub(super) type EdgePart = (usize, [f64; 2]);
+/// A triangle, by its index, and the barycentric coordinates of the corners of a part of it.
+pub(super) type TrianglePart = (usize, [[f64; 3]; 3]);
+
+/// What a peak between the points seen may be, of ∫|f|.
+const HIDDEN: f64 = 1e-3;
+/// Ends and corners are sampled so far within, relative to the size of the part: jumps at nodes are in no
+/// part then.
+const WITHIN: f64 = 1e-7;
+/// A part is bisected so many times at most.
+const DEEPEST: usize = 40;
+/// The parts of one triangle alone.
+pub(super) const WHOLE: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+/// What is seen of functions in a part, each times its measure: ∫|f|, max |f − f₂|, and what may be hidden.
+struct Seen {
+    integral: f64,
+    deviation: f64,
+    hidden: f64,
+}
+
+/// Bisects parts until all are small enough for a `deviation`, or there are more than `most`.
+fn bisected<P: Copy>(
+    parts: impl Iterator<Item = P>,
+    [deviation, most]: [f64; 2],
+    look: impl Fn(P) -> Seen,
+    halves: impl Fn(P) -> [P; 2],
+) -> Vec<P> {
+    let (mut done, mut integral) = (Vec::new(), 0.0);
+    let mut open: Vec<(P, Seen)> = parts.map(|part| (part, look(part))).collect();
+    for _ in 0..DEEPEST {
+        let total = open.iter().fold(integral, |sum, (_, seen)| sum + seen.integral);
+        let mut coarse = Vec::new();
+        for (part, seen) in open {
+            if seen.deviation > deviation * total || seen.hidden > HIDDEN * total {
+                coarse.push(part);
+            } else {
+                integral += seen.integral;
+                done.push(part);
+            }
+        }
+        if (done.len() + 2 * coarse.len()) as f64 > most {
+            done.extend(coarse);
+            return done;
+        }
+        open = coarse.into_iter().flat_map(&halves).map(|part| (part, look(part))).collect();
+        if open.is_empty() {
+            return done;
+        }
+    }
+    done.extend(open.into_iter().map(|(part, _)| part));
+    done
+}
+
+/// The parts of edges, parabolas through three points each, in which `f` is integrated by two Gauss points
+/// at time `t` with errors of about `deviation` ∫|f|. What does not depend on the place needs one an edge.
+pub(super) fn edge_parts(
+    lines: &[[[f64; 2]; 3]],
+    f: &[Expression],
+    t: f64,
+    deviation: f64,
+) -> Vec<EdgePart> {
+    let whole = (0..lines.len()).map(|edge| (edge, [0.0, 1.0]));
+    if !f.iter().any(Expression::depends_on_space) {
+        return whole.collect();
+    }
+    let look = |(edge, [from, to]): EdgePart| {
+        let at = |s: f64| parabola(lines[edge], from + s * (to - from));
+        let nodes = [WITHIN, 0.5, 1.0 - WITHIN].map(at);
+        let [p, _, q] = nodes;
+        let measure = (q[0] - p[0]).hypot(q[1] - p[1]);
+        let points = GAUSS.map(at);
+        let interpolated = |[a, m, b]: [f64; 3]| GAUSS.map(|s| parabola([[a], [m], [b]], s)[0]);
+        seen(f, 0.0, &[t], nodes, [[0, 2, 1]], points, interpolated, measure)
+    };
+    let halves = |(edge, [from, to]): EdgePart| {
+        let middle = 0.5 * (from + to);
+        [(edge, [from, middle]), (edge, [middle, to])]
+    };
+    let most = (4 * lines.len() + 2000) as f64;
+    bisected(whole, [deviation, most], look, halves)
+}
+
+/// The parts of triangles, with the six points of a quadratic triangle each, in which `f` − `zero` is
+/// integrated with errors of about `deviation` ∫|f − zero| at all `times`, and so many more than triangles
+/// at most.
+pub(super) fn triangle_parts(
+    triangles: &[[[f64; 2]; 6]],
+    (f, zero): (&[Expression], f64),
+    times: &[f64],
+    [deviation, more]: [f64; 2],
+) -> Vec<TrianglePart> {
+    let whole = (0..triangles.len()).map(|triangle| (triangle, WHOLE));
+    let look = |(triangle, corners): TrianglePart| {
+        let at = |point| triangle_point(&triangles[triangle], part_point(&corners, point));
+        let shrunk = WHOLE.map(|corner| corner.map(|l| l + WITHIN * (1.0 / 3.0 - l)));
+        let [a, b, c] = shrunk;
+        let nodes = [a, b, c, mean(a, b), mean(b, c), mean(c, a)].map(at);
+        let [p, q, r, ..] = nodes;
+        let measure = 0.5 * twice_area(p, q, r).abs();
+        let interpolated = |values: [f64; 6]| {
+            POINTS.map(|point| quadratic_values(point).iter().zip(values).map(|(w, v)| w * v).sum())
+        };
+        let sides = [[0, 1, 3], [1, 2, 4], [2, 0, 5]];
+        seen(f, zero, times, nodes, sides, POINTS.map(at), interpolated, measure)
+    };
+    // Newest vertex bisection: the side between the first two corners is halved.
+    let halves = |(triangle, [a, b, c]): TrianglePart| {
+        let middle = mean(a, b);
+        [(triangle, [c, a, middle]), (triangle, [b, c, middle])]
+    };
+    bisected(whole, [deviation, triangles.len() as f64 + more], look, halves)
+}
+
+/// The point of a quadratic triangle of six points at barycentric coordinates, m.
+pub(super) fn triangle_point(points: &[[f64; 2]; 6], at: [f64; 3]) -> [f64; 2] {
+    let values = quadratic_values(at);
+    [0, 1].map(|k| points.iter().zip(values).map(|(x, value)| value * x[k]).sum())
+}
+
+/// The six points of each triangle of a body, m.
+pub(super) fn triangle_points(body: &Body) -> Vec<[[f64; 2]; 6]> {
+    let points = &body.nodes.points;
+    match body.elements() {
+        Elements::Linear(cells) => {
+            let straight = |nodes: &[usize; 3]| {
+                let [a, b, c] = nodes.map(|node| points[node]);
+                [a, b, c, midpoint(a, b), midpoint(b, c), midpoint(c, a)]
+            };
+            cells.nodes.iter().map(straight).collect()
+        }
+        Elements::Quadratic(cells) => {
+            cells.nodes.iter().map(|nodes| nodes.map(|node| points[node])).collect()
+        }
+    }
+}
+
+/// The centroid, m, and the area, m², of a part, with straight sides.
+pub(super) fn centroid(
+    triangles: &[[[f64; 2]; 6]],
+    (triangle, corners): &TrianglePart,
+) -> ([f64; 2], f64) {
+    let [p, q, r] = corners.map(|corner| triangle_point(&triangles[*triangle], corner));
+    ([0, 1].map(|k| (p[k] + q[k] + r[k]) / 3.0), 0.5 * twice_area(p, q, r).abs())
+}
+
+fn mean(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|k| 0.5 * (a[k] + b[k]))
+}
+
+/// What is seen of `f` − `zero` at the `nodes` of a part and its quadrature `points`. `sides` are the two
+/// ends and the middle of each side: on a parabola their control point 2m − (p + q)/2 bounds the side.
+#[allow(clippy::too_many_arguments, reason = "an edge and a triangle differ in all of these")]
+fn seen<const N: usize, const S: usize, const Q: usize>(
+    f: &[Expression],
+    zero: f64,
+    times: &[f64],
+    nodes: [[f64; 2]; N],
+    sides: [[usize; 3]; S],
+    points: [[f64; 2]; Q],
+    interpolated: impl Fn([f64; N]) -> [f64; Q],
+    measure: f64,
+) -> Seen {
+    let mut space = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+    let controls = sides
+        .map(|[p, q, m]| [0, 1].map(|k| 2.0 * nodes[m][k] - 0.5 * (nodes[p][k] + nodes[q][k])));
+    for point in nodes.iter().chain(&controls) {
+        for (bounds, x) in space.iter_mut().zip(point) {
+            *bounds = [bounds[0].min(*x), bounds[1].max(*x)];
+        }
+    }
+    let mut found = Seen { integral: 0.0, deviation: 0.0, hidden: 0.0 };
+    let period = [times.first(), times.last()].map(|t| t.copied().unwrap_or(0.0));
+    for f in f.iter().filter(|f| f.as_constant() != Some(zero)) {
+        let mut shown = [f64::INFINITY, f64::NEG_INFINITY];
+        let (mut integral, mut deviation) = (0.0_f64, 0.0_f64);
+        for &t in times {
+            let at = |[x, y]: [f64; 2]| f.eval(x, y, t);
+            let (values, checks) = (nodes.map(at), points.map(at));
+            for v in values.iter().chain(&checks) {
+                shown = [shown[0].min(*v), shown[1].max(*v)];
+            }
+            let sum: f64 = checks.iter().map(|v| (v - zero).abs()).sum();
+            integral = integral.max(sum / Q as f64);
+            for (check, value) in checks.iter().zip(interpolated(values)) {
+                deviation = deviation.max((check - value).abs());
+            }
+        }
+        let range = f.range([space[0], space[1], period]);
+        found.integral += measure * integral;
+        found.deviation = found.deviation.max(measure * deviation);
+        found.hidden = found.hidden.max(measure * (range[1] - shown[1]).max(shown[0] - range[0]));
+    }
+    found
+}
