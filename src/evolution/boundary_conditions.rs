@@ -2,7 +2,7 @@
 
 use crate::{
     contact::{FixedRow, GapRow, RigidMotions},
-    fem::{Body, Edge},
+    fem::{Body, Edge, normal_error},
     mesh::{BoundaryNode, Face, boundary_nodes, extent},
     scene::{Boundary, Condition, Expression, Gap, Scene, SurfaceLoad},
 };
@@ -24,6 +24,8 @@ pub(super) struct BoundaryConditions {
     pub(super) moving: Vec<MovingGap>,
     /// The surface loads of Γ_N.
     pub(super) tractions: Vec<Traction>,
+    /// Per node: how far the normal of an axis or a gap may be from that of the geometry, rad.
+    normal_errors: Vec<f64>,
 }
 
 /// A gap that depends on time.
@@ -59,15 +61,19 @@ impl BoundaryConditions {
     /// The conditions of `scene` on `body`, whose mesh has all curves that the scene names.
     pub(super) fn new(scene: &Scene, body: &Body) -> Self {
         let (mesh, points) = (&body.mesh, &body.nodes.points);
-        let mut conditions = Self::default();
+        let mut conditions = Self { normal_errors: vec![0.0; points.len()], ..Self::default() };
         let mut gaps = Vec::new();
         let start = if scene.time.is_some() { 0.0 } else { 1.0 };
         let rounding = ROUNDING * extent(points);
         for boundary in &scene.boundaries {
             let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
             let edges = body.edges(&curve.edges);
+            let follows_mesh = boundary.gap().is_none_or(|gap| gap.normal.is_none());
+            let normal_error = if follows_mesh { normal_error(&edges, points) } else { 0.0 };
             for node in boundary_nodes(edges.iter().flat_map(|edge| edge.faces(points))) {
                 conditions.add_fixed_rows(boundary, points, &node);
+                let largest = &mut conditions.normal_errors[node.node];
+                *largest = largest.max(normal_error);
                 let Some(gap) = boundary.gap() else { continue };
                 let [x, y] = points[node.node];
                 let distance = match gap.distance.eval(x, y, start) {
@@ -94,13 +100,15 @@ impl BoundaryConditions {
     /// Finds the rigid motions that the conditions do not prevent, and makes the normals of axes and
     /// gaps exactly orthogonal to the free motions to which they are orthogonal up to rounding.
     pub(super) fn resolve_motions(&mut self, body: &Body) -> RigidMotions {
-        let motions = RigidMotions::new(body, &self.fixed, &self.gaps);
+        let motions = RigidMotions::new(body, &self.fixed, &self.gaps, &self.normal_errors);
         let axes = self.fixed.iter_mut().zip(&self.prescribed);
         for (row, _) in axes.filter(|(_, value)| value.is_none()) {
-            row.direction = motions.tangential(body, row.node, row.direction);
+            row.direction =
+                motions.tangential(body, row.node, row.direction, self.normal_errors[row.node]);
         }
         for row in &mut self.gaps {
-            row.normal = motions.tangential(body, row.node, row.normal);
+            row.normal =
+                motions.tangential(body, row.node, row.normal, self.normal_errors[row.node]);
         }
         motions
     }

@@ -9,6 +9,7 @@ mod accuracy;
 mod certificate;
 mod datum;
 mod minimisation;
+mod one_of_many;
 mod rescue;
 
 pub use accuracy::Accuracy;
@@ -151,7 +152,8 @@ impl<'a> ContactStep<'a> {
         let (Judged { u, kkt, scales, force, unbalanced, contact, .. }, report) =
             self.solve_certified(step, &case)?;
         self.next.scales = scales;
-        self.next.active = active_bounds(&problem.constraints, &contact, 0.0);
+        let least = problem.tolerance * scales.force;
+        self.next.active = active_bounds(&problem.constraints, &contact, least);
         let unconstrained = self.unconstrained_motion(&contact, force);
         let u = self.next.datum.total(u);
         let state = State { time, u, zeta: zeta.to_vec(), contact };
@@ -219,8 +221,8 @@ impl<'a> ContactStep<'a> {
         Ok(())
     }
 
-    /// Solves until the certificate accepts the answer: more precisely, or from another datum, where
-    /// it does not. What the solver thinks of an answer does not matter then.
+    /// Solves until the certificate accepts the answer, and of many the one of least ∫|u|²: more
+    /// precisely, or from another datum, where it does not. What the solver thinks of an answer does not matter then.
     fn solve_certified(
         &mut self,
         step: usize,
@@ -261,7 +263,12 @@ impl<'a> ContactStep<'a> {
                 return Err(failed(ContactError::NotDefinite { method }));
             }
             if certified {
-                return Ok((judged, report));
+                let (judged, refused) = self.of_least_displacement(judged, case)?;
+                if attempt == ATTEMPTS || refused <= problem.tolerance {
+                    return Ok((judged, report));
+                }
+                tolerance *= 0.3 * problem.tolerance / refused;
+                continue;
             }
             if attempt == ATTEMPTS || judged.kkt.worst().is_nan() {
                 let (tolerance, residuals) = (problem.tolerance, judged.kkt);

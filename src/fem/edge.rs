@@ -1,7 +1,7 @@
 //! Boundary edges of the elements of u: a straight line or a parabola.
 
 use crate::mesh::Face;
-use std::array;
+use std::{array, collections::BTreeMap};
 
 /// The nodes of u on an edge x(s), 0 ≤ s ≤ 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,6 +26,27 @@ pub fn parabola<const D: usize>([p, m, q]: [[f64; D]; 3], s: f64) -> [f64; D] {
     array::from_fn(|k| p[k] + s * (q[k] - p[k]) + bulge * (m[k] - 0.5 * (p[k] + q[k])))
 }
 
+/// An offset below this part of the chord is rounding of coordinates.
+const STRAIGHT: f64 = 1e-12;
+
+/// An estimate of how far the normals of boundary edges are from those of the smooth curve that they stand for,
+/// rad: the largest angle between two curved edges that meet smoothly. Parabolas through the points of a
+/// circle that subtend 2φ are off by φ³/4 at their ends, less between them; where two meet, the
+/// angle is the sum of both.
+pub fn normal_error(edges: &[Edge], points: &[[f64; 2]]) -> f64 {
+    let mut faces = BTreeMap::<usize, Vec<Face>>::new();
+    let mut largest = 0.0_f64;
+    for edge in edges.iter().filter(|edge| edge.is_curved(points)) {
+        for (node, face) in edge.faces(points) {
+            let at_node = faces.entry(node).or_default();
+            let smooth = at_node.iter().filter(|other| other.continues(&face));
+            largest = smooth.map(|other| other.angle(&face)).fold(largest, f64::max);
+            at_node.push(face);
+        }
+    }
+    largest
+}
+
 impl Edge {
     /// x(s), m, from the coordinates of all nodes.
     pub fn at(&self, points: &[[f64; 2]], s: f64) -> [f64; 2] {
@@ -45,6 +66,12 @@ impl Edge {
     fn offset(&self, points: &[[f64; 2]]) -> [f64; 2] {
         let [p, q] = self.ends.map(|node| points[node]);
         self.middle.map_or([0.0; 2], |node| [0, 1].map(|k| points[node][k] - 0.5 * (p[k] + q[k])))
+    }
+
+    /// Whether its middle lies off its chord by more than rounding.
+    fn is_curved(&self, points: &[[f64; 2]]) -> bool {
+        let ([x, y], [p, q]) = (self.offset(points), self.ends.map(|node| points[node]));
+        x.hypot(y) > STRAIGHT * (q[0] - p[0]).hypot(q[1] - p[1])
     }
 
     /// The nodes with the values of their functions φ_i at s.

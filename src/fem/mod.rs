@@ -27,7 +27,7 @@ pub(crate) use body::for_elements;
 pub use body::{Body, Cells, Elements, Nodes};
 pub use damage::{DamageSystem, Mass, source, source_load};
 pub use damage_certificate::DamageCertificate;
-pub use edge::{Edge, GAUSS, gauss_points, parabola};
+pub use edge::{Edge, GAUSS, gauss_points, normal_error, parabola};
 pub use elasticity::Elasticity;
 pub use element::{Element, POINTS, QuadraturePoint, quadratic_values};
 pub use loads::{Division, add_body_force, add_traction, midpoint, part_point};

@@ -28,11 +28,15 @@ impl Face {
     /// Whether the other face continues this one smoothly, at an angle of no more than
     /// [`CORNER_ANGLE`] between their normals.
     pub fn continues(&self, other: &Self) -> bool {
+        // Round-off must not decide on a boundary whose edges turn by exactly 30°.
+        self.angle(other) <= CORNER_ANGLE + 1e-9
+    }
+
+    /// The angle between both normals, rad.
+    pub fn angle(&self, other: &Self) -> f64 {
         let ([a, b], [c, d]) = (self.normal, other.normal);
         // The cosine alone would lose small angles to rounding.
-        let angle = (a * d - b * c).abs().atan2(a * c + b * d);
-        // Round-off must not decide on a boundary whose edges turn by exactly 30°.
-        angle <= CORNER_ANGLE + 1e-9
+        (a * d - b * c).abs().atan2(a * c + b * d)
     }
 
     /// Both faces as one: the length-weighted mean of the normals, the sum of the lengths.

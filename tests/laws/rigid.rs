@@ -5,7 +5,7 @@ use signorini::{
     contact::{GapRow, RigidMotion, RigidMotions, SOLVERS},
     evolution::{DiscreteProblem, SetupError},
     fem::Body,
-    mesh::{Curve, Mesh, Order},
+    mesh::{Curve, Mesh, Order, Refinement},
 };
 use std::collections::BTreeMap;
 
@@ -226,10 +226,8 @@ fn an_axis_leaves_the_translation_along_it() {
     }
 }
 
-#[test]
-fn a_disc_in_a_ring_can_only_turn() {
-    // A regular polygon, its boundary all axis or all foundation: every normal passes
-    // through the centre.
+/// A disc of radius 1 around (3, 2) as a regular polygon of 16 corners, and with curved sides.
+fn discs() -> [Mesh; 2] {
     let corners = 16;
     let point = |i: usize| {
         let (s, c) = (std::f64::consts::TAU * i as f64 / corners as f64).sin_cos();
@@ -248,6 +246,13 @@ fn a_disc_in_a_ring_can_only_turn() {
         let sagitta = 1.0 - (std::f64::consts::PI / corners as f64).cos();
         round.set_offset([a, b], mesh.edge_normal([a, b]).0.map(|normal| sagitta * normal));
     }
+    [mesh, round]
+}
+
+#[test]
+fn a_disc_in_a_ring_can_only_turn() {
+    // Its boundary is all axis or all foundation: every normal passes through the centre.
+    let [mesh, round] = discs();
     for condition in ["symmetry = true", "gap = 0"] {
         for (order, mesh) in [(1, &mesh), (2, &mesh), (2, &round)] {
             let rim = format!("{{ name = 'rim', {condition} }}");
@@ -269,11 +274,75 @@ fn contact_on_opposite_sides_resists_both_ways_on_one_side_only_one() {
         (0..9).flat_map(|i| if i == 4 { force } else { [0.0; 2] }).collect()
     };
     // Nodes 3 and 5 are (0, ½) and (1, ½), 4 is the centre.
-    let between = RigidMotions::new(&body, &[], &[gap(3, [-1.0, 0.0]), gap(5, [1.0, 0.0])]);
+    let between =
+        RigidMotions::new(&body, &[], &[gap(3, [-1.0, 0.0]), gap(5, [1.0, 0.0])], &[0.0; 9]);
     assert!(between.check(&body, &load([1.0, 0.0])).is_ok());
     assert!(between.check(&body, &load([-1.0, 0.0])).is_ok());
     assert!(between.check(&body, &load([0.0, 1.0])).is_err());
-    let against = RigidMotions::new(&body, &[], &[gap(5, [1.0, 0.0])]);
+    let against = RigidMotions::new(&body, &[], &[gap(5, [1.0, 0.0])], &[0.0; 9]);
     assert!(against.check(&body, &load([1.0, 0.0])).is_ok());
     assert!(against.check(&body, &load([-1.0, 0.0])).is_err());
+}
+
+#[test]
+fn a_disc_refined_on_one_side_still_turns_in_its_ring() {
+    // Where parabolas of the same circle are bisected, and others are not, their normals miss the centre by
+    // φ³/16 and more; no such normal is a lever against turning.
+    let [_, round] = discs();
+    let mut refined = Refinement::start(round);
+    for _ in 0..4 {
+        let mesh = &refined.mesh;
+        let right = |nodes: &[usize; 3]| nodes.iter().any(|&node| mesh.nodes[node][0] > 3.95);
+        let marked: Vec<bool> = mesh.triangles.iter().map(right).collect();
+        refined = refined.refine(&marked).unwrap();
+    }
+    for condition in ["symmetry = true", "gap = '0.001*(1 + x - 3)'"] {
+        let load = "body.force = [1, 0]\n";
+        let rim = format!("boundary = [{{ name = 'rim', {condition} }}]");
+        let text = format!("{load}discretisation.displacement = 2\n{MATERIAL}\n{rim}");
+        let problem = problem(refined.mesh.clone(), &text).unwrap_or_else(|e| panic!("{e}"));
+        let [free] = &problem.motions.free[..] else { panic!("{:?}", problem.motions.free) };
+        let [at_centre, at_rim] = [[3.0, 2.0], [4.0, 2.0]].map(|x| free.at(0, x));
+        assert!(largest(&at_centre) < 1e-2 * at_rim[1].abs(), "{free}");
+        // Pressed to the right, it does not turn.
+        let outcome = run(&problem, SOLVERS[0]);
+        let u = outcome.last.state.u;
+        let mut rest = u.clone();
+        problem.motions.remove_free(&problem.body, &mut rest);
+        assert!(difference(&rest, &u) < 1e-9);
+        assert!(outcome.accuracy.displacement < 1e-6, "{}", outcome.accuracy.displacement);
+    }
+}
+
+#[test]
+fn of_many_answers_every_solver_gives_the_one_of_least_displacement() {
+    // A block stands on the one node below its load, or on the edge x = 0.7 of its foot: turning about
+    // that node is resisted by no force, on the edge to one side by the closed gap.
+    for order in [1, 2] {
+        for (foot, gap, leans) in [([0.0, 1.0], "0.01*abs(x-0.5)", false), ([0.3, 0.7], "0", true)]
+        {
+            let middle = if leans { 0.7 } else { 0.5 };
+            let scene = format!(
+                "{{ name = 'foot', gap = '{gap}' }}, {{ name = 'load', traction = [0, -1e-3] }}"
+            );
+            let mut answers = Vec::new();
+            for solver in SOLVERS {
+                let mesh = footed(foot, [middle - 0.1, middle + 0.1]);
+                let problem = of_order(order, mesh, &scene).unwrap();
+                let outcome = run(&problem, solver);
+                assert!(outcome.notes(&problem).iter().any(|note| note.contains("one of many")));
+                let u = outcome.last.state.u;
+                // ∫ u·m of the rotation m about the centre; the translation in x is free.
+                let nodes = problem.body.nodes.points.iter().zip(&problem.body.nodes.weights);
+                let about = |((x, area), u): ((&[f64; 2], &f64), &[f64])| {
+                    area * ((x[0] - middle) * u[1] - (x[1] - 0.5) * u[0])
+                };
+                let turn: f64 = nodes.zip(u.chunks(2)).map(about).sum();
+                assert!(leans || turn.abs() < 1e-8 * largest(&u), "{solver}: {turn:e}");
+                answers.push(u);
+            }
+            let [first, others @ ..] = &answers[..] else { panic!("no solvers") };
+            others.iter().for_each(|u| assert!(difference(u, first) < 1e-6));
+        }
+    }
 }

@@ -1,19 +1,20 @@
 //! What becomes of the motions that nothing prevents and nothing drives.
 
-use super::{PartMotion, RigidMotions};
+use super::{RigidMotion, RigidMotions};
 use crate::{contact::Constraints, fem::Body};
+use nalgebra::DVector;
 
-/// Normals turn by at most this (rad) to be tangential to free motions.
+/// Exact normals turn by at most this (rad) to be tangential to free motions.
 const TURN: f64 = 1e-3;
 
 impl RigidMotions {
-    /// ν at a node without its component along a free motion u where u·ν is so small that it is rounding:
-    /// the motion then leaves contact and symmetry axes exactly as they are.
-    pub fn tangential(&self, body: &Body, node: usize, normal: [f64; 2]) -> [f64; 2] {
+    /// ν at a node without its component along a free motion u where u·ν is so small that it is rounding
+    /// or within the `error` of ν, rad: the motion then leaves contact and symmetry axes exactly as they are.
+    pub fn tangential(&self, body: &Body, node: usize, normal: [f64; 2], error: f64) -> [f64; 2] {
         self.free.iter().fold(normal, |[nx, ny], motion| {
             let [x, y] = self.at(motion, &body.nodes.points, node);
             let (along, speed) = (x * nx + y * ny, x.hypot(y));
-            if along.abs() <= 1e-14 || along.abs() > TURN * speed {
+            if along.abs() <= 1e-14 || along.abs() > TURN.max(error) * speed {
                 return [nx, ny];
             }
             let [nx, ny] = [nx - along / speed * (x / speed), ny - along / speed * (y / speed)];
@@ -62,6 +63,21 @@ impl RigidMotions {
         load
     }
 
+    /// ∫u·m / ∫m·m of each motion m that contact alone constrains, and ∫m·m, m². Collective.
+    pub fn amplitudes(&self, body: &Body, u: &[f64]) -> (DVector<f64>, DVector<f64>) {
+        let momentum = |i: usize| [u[2 * i], u[2 * i + 1]].map(|u| body.nodes.weights[i] * u);
+        let sums = self.resultants(body, momentum);
+        let squares = self.resisted.iter().map(|motion| self.square(motion));
+        let squares = DVector::from_iterator(self.resisted.len(), squares);
+        let along = |j: usize, _| self.resisted[j].work(&sums) / squares[j];
+        (DVector::from_fn(self.resisted.len(), along), squares)
+    }
+
+    /// ∫m·m, m².
+    fn square(&self, motion: &RigidMotion) -> f64 {
+        motion.parts.iter().map(|part| self.parts[part.part].area * part.mean_square()).sum()
+    }
+
     /// The nodal displacements of the combination m of free motions with ∫m·v = f·v for all free
     /// motions v: they are orthogonal, so m = Σ (f·v/∫v·v) v. Collective.
     fn projection(&self, body: &Body, force: impl Fn(usize) -> [f64; 2]) -> Vec<f64> {
@@ -69,8 +85,7 @@ impl RigidMotions {
         let still = self.parts.iter().enumerate().map(|(i, part)| part.motion(i, &[0.0; 3]));
         let mut parts: Vec<_> = still.collect();
         for motion in &self.free {
-            let square = |part: &PartMotion| self.parts[part.part].area * part.mean_square();
-            let amplitude = motion.work(&sums) / motion.parts.iter().map(square).sum::<f64>();
+            let amplitude = motion.work(&sums) / self.square(motion);
             motion.parts.iter().for_each(|part| parts[part.part].add(amplitude, part));
         }
         let nodes = self.part_of_node.iter().zip(&body.nodes.points);

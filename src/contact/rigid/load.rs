@@ -43,7 +43,8 @@ fn disjoint(motion: &RigidMotion) -> String {
 }
 
 impl RigidMotions {
-    /// Checks that `load` (nodal forces, N) does no work on free motions and can be balanced by
+    /// Checks that `load` (nodal forces, N) does no work on free motions, as exactly as the normals of
+    /// the mesh determine these, and can be balanced by
     /// contact forces on the resisted ones: with N the u·ν of these and w the work on them, that
     /// min ‖Nᵀp − w‖ over p ≥ 0 is 0 (Farkas; the remainder itself is a motion that the load
     /// drives and contact allows).
@@ -61,8 +62,9 @@ impl RigidMotions {
             let sum: f64 = motion.parts.iter().map(|part| sums[part.part][3]).sum();
             (sum > UNLOADED * total).then_some(sum)
         };
-        for motion in &self.free {
-            if loaded(motion).is_some_and(|sum| motion.work(&sums).abs() > BALANCED * sum) {
+        for (motion, error) in self.free.iter().zip(&self.free_errors) {
+            let balanced = BALANCED + error;
+            if loaded(motion).is_some_and(|sum| motion.work(&sums).abs() > balanced * sum) {
                 return Err(self.driven(motion.clone(), &sums));
             }
         }

@@ -2,11 +2,13 @@
 //! space of K, and which of it contact constrains.
 
 mod free;
+mod least;
 mod load;
 mod motion;
 mod nonnegative;
 mod until_contact;
 
+pub(crate) use least::least_motion;
 pub use load::DrivenMotion;
 pub use motion::{PartMotion, RigidMotion};
 pub(crate) use until_contact::{rigid_motion_until_contact, unconstrained_motions};
@@ -26,6 +28,8 @@ use std::{collections::BTreeSet, ops::Range};
 pub struct RigidMotions {
     /// Unconstrained, even by contact in either sense.
     pub free: Vec<RigidMotion>,
+    /// Per free motion: the largest |u·ν| at axes and gaps, as much as the motion itself is uncertain.
+    free_errors: Vec<f64>,
     /// Those that contact resists in one sense, piece by piece.
     pub resisted: Vec<RigidMotion>,
     /// u·ν of the resisted motions, one row per gap condition of the undivided body.
@@ -60,13 +64,16 @@ const ROUNDING: f64 = 1e-9;
 const PREVENTED: f64 = 1e-14;
 
 impl RigidMotions {
-    /// From the fixed rows and the gap conditions, joined node by node as in the bounds.
-    pub fn new(body: &Body, fixed: &[FixedRow], gaps: &[GapRow]) -> Self {
+    /// From the fixed rows and the gap conditions, joined node by node as in the bounds. `normal_errors` are
+    /// how far the normals at each node may be from those of the geometry, rad: a motion u along a curved boundary
+    /// is free although |u·ν| is up to that times |u|.
+    pub fn new(body: &Body, fixed: &[FixedRow], gaps: &[GapRow], normal_errors: &[f64]) -> Self {
         let Components { part_of_triangle, part_of_node, pieces, hinges } = body.mesh.components();
         let part_of_node = body.with_midpoints(part_of_node, &part_of_triangle);
         let nodes = &body.nodes.points;
         let mut motions = Self {
             free: Vec::new(),
+            free_errors: Vec::new(),
             resisted: Vec::new(),
             normal: DMatrix::zeros(0, 0),
             parts: Part::all(body, &part_of_node, &pieces, &hinges),
@@ -80,10 +87,15 @@ impl RigidMotions {
             let fixed: Vec<_> = fixed.iter().filter(|row| here(row.node)).copied().collect();
             let hinges: Vec<_> = hinges.iter().filter(|hinge| here(hinge.0)).copied().collect();
             let normals: Vec<_> = normals.iter().filter(|row| here(row.0)).copied().collect();
-            let (free, resisted) = motions.of_piece(nodes, parts, &fixed, &hinges, &normals);
+            let (free, resisted) =
+                motions.of_piece(nodes, parts, &fixed, &hinges, (&normals, normal_errors));
             motions.free.extend(free);
             motions.resisted.extend(resisted);
         }
+        let axes = fixed.iter().map(|row| (row.node, row.direction));
+        let conditions: Vec<_> = normals.iter().copied().chain(axes).collect();
+        let errors = motions.normal_displacements(nodes, &motions.free, &conditions);
+        motions.free_errors = errors.column_iter().map(|column| column.amax()).collect();
         motions.normal = motions.normal_displacements(nodes, &motions.resisted, &normals);
         motions
     }
@@ -100,7 +112,7 @@ impl RigidMotions {
         parts: &[usize],
         fixed: &[FixedRow],
         hinges: &[(usize, [usize; 2])],
-        normals: &[(usize, [f64; 2])],
+        (normals, normal_errors): (&[(usize, [f64; 2])], &[f64]),
     ) -> (Vec<RigidMotion>, Vec<RigidMotion>) {
         let (mut free, mut resisted) = (Vec::new(), Vec::new());
         let row = |part: usize, node: usize, d: [f64; 2]| {
@@ -115,7 +127,8 @@ impl RigidMotions {
         for &FixedRow { node, direction: d } in fixed {
             let part = self.part_of_node[node];
             // An axis is exact, the normal of a polygon is not.
-            let weight = if d.contains(&0.0) { 1.0 } else { (PREVENTED / ROUNDING).sqrt() };
+            let uncertain = ROUNDING + normal_errors[node].powi(2);
+            let weight = if d.contains(&0.0) { 1.0 } else { (PREVENTED / uncertain).sqrt() };
             add(row(part, node, d) * self.parts[part].weight * weight);
         }
         for &(node, [a, b]) in hinges {
@@ -137,9 +150,14 @@ impl RigidMotions {
         let eigen = (contact.transpose() * &contact).symmetric_eigen();
         for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
             let v: DVector<f64> = basis.iter().zip(vector.iter()).map(|(m, c)| m * *c).sum();
-            match *value > ROUNDING * normals.len() as f64 {
-                true => resisted.push(motion(&v)),
-                false => free.push(motion(&v)),
+            let motion = motion(&v);
+            let tangential = |&(node, [nx, ny]): &(usize, [f64; 2])| {
+                let [x, y] = self.at(&motion, nodes, node);
+                (x * nx + y * ny).abs() <= ROUNDING.sqrt() + normal_errors[node] * x.hypot(y)
+            };
+            match *value > ROUNDING * normals.len() as f64 && !normals.iter().all(tangential) {
+                true => resisted.push(motion),
+                false => free.push(motion),
             }
         }
         (free, resisted)

@@ -157,7 +157,7 @@ impl Compliance<'_> {
         }
         let zeta = problem.zeta_at_points(&state.zeta);
         let internal = problem.elasticity.internal_force(&problem.body, &zeta, &state.u);
-        let mut residual = problem.load(state.time);
+        let mut residual = problem.motions.balanced(&problem.body, problem.load(state.time));
         residual.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
         self.set(&state.zeta, &state.contact)?;
         let correction = self.displacement(residual)?;

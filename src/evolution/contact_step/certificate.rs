@@ -1,11 +1,8 @@
-//! Judges an answer by its displacements alone: residuals, contact forces, unconstrained motions.
+//! Judges an answer by its displacements alone: residuals and contact forces.
 
 use super::ContactStep;
 use crate::{
-    contact::{
-        self, Answer, Constraints, ContactError, ContactOptions, ContactPoint, Kkt, RigidMotion,
-        Scales,
-    },
+    contact::{Answer, Constraints, ContactError, ContactOptions, ContactPoint, Kkt, Scales},
     evolution::discrete_problem::LoadCase,
     fem::RigidPart,
 };
@@ -125,25 +122,6 @@ impl ContactStep<'_> {
         let elasticity = &self.problem.elasticity;
         let rounding = elasticity.force_rounding(body, &self.zeta_at_points, &judged.u);
         body.nodes.partition.norm(&rounding, 2) / judged.scales.force
-    }
-
-    /// A rigid motion that the active nodes leave unconstrained. Without load (`force` = 0) the body
-    /// rests where it is.
-    pub(super) fn unconstrained_motion(
-        &self,
-        contact: &[ContactPoint],
-        force: f64,
-    ) -> Option<RigidMotion> {
-        // A residual at the tolerance does work of up to √N times that on a motion (Cauchy and
-        // Schwarz), which at the lever of one mesh width, 1/√N of the body, is a force √N times
-        // as large: a smaller force is no certain constraint.
-        let partition = &self.problem.body.nodes.partition;
-        let nodes = partition.total() as f64;
-        let least = nodes * self.problem.tolerance * force;
-        let active = active_bounds(&self.problem.constraints, contact, least);
-        let motions = contact::unconstrained_motions(partition.comm(), &self.rigid, &active);
-        let first = motions.first().filter(|_| force > 0.0)?;
-        self.problem.motions.combined(first)
     }
 }
 

@@ -1,0 +1,75 @@
+//! Rigid motions that no contact force resists: (26) has then many answers, with the same forces.
+
+use super::{ContactStep, active_bounds, certificate::Judged};
+use crate::{
+    contact::{self, ContactPoint, RigidMotion, least_motion},
+    evolution::discrete_problem::LoadCase,
+    petsc::PetscError,
+};
+use nalgebra::DVector;
+
+impl ContactStep<'_> {
+    /// The combinations of the motions that contact alone constrains along which no contact force above
+    /// `level` times F does work.
+    fn unresisted(&self, contact: &[ContactPoint], level: f64, force: f64) -> Vec<DVector<f64>> {
+        let active = active_bounds(&self.problem.constraints, contact, level * force);
+        let comm = self.problem.body.nodes.partition.comm();
+        contact::unconstrained_motions(comm, &self.rigid, &active)
+    }
+
+    /// The part of F below which a contact force is no certain constraint. A residual at the tolerance
+    /// does work of up to √N times that on a motion (Cauchy and Schwarz), which at the lever of
+    /// one mesh width, 1/√N of the body, is a force √N times as large.
+    fn uncertain(&self) -> f64 {
+        self.problem.body.nodes.partition.total() as f64 * self.problem.tolerance
+    }
+
+    /// A rigid motion that the active nodes leave unconstrained. Without load (`force` = 0) the body
+    /// rests where it is.
+    pub(super) fn unconstrained_motion(
+        &self,
+        contact: &[ContactPoint],
+        force: f64,
+    ) -> Option<RigidMotion> {
+        let motions = self.unresisted(contact, self.uncertain(), force);
+        let first = motions.first().filter(|_| force > 0.0)?;
+        self.problem.motions.combined(first)
+    }
+
+    /// The answer of least ∫|u|² among those that differ from a certified one by such a motion: every
+    /// solver's is then the same. Where it is not certified, because a force that was neglected counts, or is a
+    /// residual across a gap that opens, the answer stays, and the second value is the largest
+    /// residual of the other. Collective.
+    pub(super) fn of_least_displacement(
+        &mut self,
+        judged: Judged,
+        case: &LoadCase,
+    ) -> Result<(Judged, f64), PetscError> {
+        let mut refused = 0.0;
+        let problem = self.problem;
+        let tolerance = judged.kkt.worst().max(problem.tolerance);
+        for level in [self.uncertain(), problem.tolerance] {
+            let left = self.unresisted(&judged.contact, level, judged.force);
+            if left.is_empty() || judged.force == 0.0 {
+                break;
+            }
+            let before = self.next.datum.clone();
+            let total = before.total(judged.u.clone());
+            let (amplitudes, squares) = problem.motions.amplitudes(&problem.body, &total);
+            let (_, bounds) = before.pose(&problem.constraints, case);
+            let c: Vec<f64> = self.c.read(|c| bounds.iter().map(|b| c[b.dof]).collect())?;
+            let (comm, motions) = (problem.body.nodes.partition.comm(), (&self.rigid, &left[..]));
+            let so_far = (&amplitudes, &squares);
+            let Some(further) = least_motion(comm, motions, so_far, &bounds, &c) else { break };
+            let motion = problem.motions.displacement(&problem.body, &further);
+            self.next.datum.add(&problem.constraints, &motion);
+            let moved = self.certify(judged.u.clone(), case);
+            if moved.kkt.within(tolerance) {
+                return Ok((moved, 0.0));
+            }
+            refused = moved.kkt.worst();
+            self.next.datum = before;
+        }
+        Ok((judged, refused))
+    }
+}
