@@ -6,6 +6,7 @@
 //! unknown, measured from a rigid [`Datum`].
 
 mod accuracy;
+mod attempts;
 mod certificate;
 mod datum;
 mod minimisation;
@@ -22,11 +23,11 @@ use super::{
 };
 use crate::{
     archive::{Archive, ArchiveError},
-    contact::{self, ContactError, ContactReport, ContactSolver, Scales},
+    contact::{self, ContactSolver, Scales},
     fem::Stiffness,
     petsc::{PetscError, Session, Vector},
 };
-use certificate::{Judged, MOST_ROUNDING};
+use certificate::Judged;
 use datum::Datum;
 use minimisation::displacement;
 use nalgebra::DMatrix;
@@ -71,12 +72,6 @@ struct Memory {
     warm_start: Vec<f64>,
 }
 
-/// How often a solver is asked for one answer, more precisely or from another datum.
-const ATTEMPTS: usize = 3;
-/// An answer is mostly rigid if its rigid part is so many times the rest.
-const DOMINANT: f64 = 10.0;
-/// … and so far from a datum that was chosen before that even a certified answer is measured anew.
-const FAR: f64 = 1e3;
 /// Loads below this part of the largest of the run count as so much, or an answer to rounding
 /// (sin(pi) = 1.2e-16) would have to have as many digits as any other.
 const LEAST_LOAD: f64 = 1e-6;
@@ -219,82 +214,5 @@ impl<'a> ContactStep<'a> {
             datum.add(constraints, &problem.motions.displacement(&problem.body, &amplitudes));
         }
         Ok(())
-    }
-
-    /// Solves until the certificate accepts the answer, and of many the one of least ∫|u|²: more
-    /// precisely, or from another datum, where it does not. What the solver thinks of an answer does not matter then.
-    fn solve_certified(
-        &mut self,
-        step: usize,
-        case: &LoadCase,
-    ) -> Result<(Judged, ContactReport), RunError> {
-        let problem = self.problem;
-        let failed = |source| RunError::contact(problem, step, case.time, source);
-        let mut report = ContactReport::default();
-        let (mut tolerance, mut before, mut attempt) = (problem.tolerance, (None, None), 0);
-        loop {
-            attempt += 1;
-            let (lift, bounds) = self.next.datum.pose(&problem.constraints, case);
-            let solved = match self.solve_contact(case, &lift, &bounds, tolerance, before) {
-                // All ranks know that the method stopped short; other errors may be one rank's.
-                Err(error) if !error.stopped_short() => return Err(failed(error)),
-                solved => solved,
-            };
-            let u = displacement(problem, lift, &self.c)?;
-            let judged = self.phases.time("certificate", || self.certify(u, case));
-            let certified = judged.kkt.within(problem.tolerance);
-            let far = !self.next.datum.is_zero() && judged.rigid_max > FAR * judged.elastic_max;
-            before = (Some(judged.scales.force), None);
-            if (far || !certified) && attempt < ATTEMPTS && self.move_datum(&judged)? {
-                continue;
-            }
-            // Once a further attempt has not helped, or cannot, what rounding leaves is accepted.
-            let certified =
-                certified || (attempt > 1 || solved.is_err()) && self.is_exact_to_rounding(&judged);
-            match solved {
-                Ok(solved) => report.add(&solved),
-                Err(error) if !certified => return Err(failed(self.limited(error, &judged))),
-                Err(ContactError::NotConverged { report: spent, .. }) => report.add(&spent),
-                Err(_) => {}
-            }
-            let method = self.solver.name();
-            // Then a KKT point need not be a minimum, and which solver would notice is chance.
-            if judged.is_indefinite() {
-                return Err(failed(ContactError::NotDefinite { method }));
-            }
-            if certified {
-                let (judged, refused) = self.of_least_displacement(judged, case)?;
-                if attempt == ATTEMPTS || refused <= problem.tolerance {
-                    return Ok((judged, report));
-                }
-                tolerance *= 0.3 * problem.tolerance / refused;
-                continue;
-            }
-            if attempt == ATTEMPTS || judged.kkt.worst().is_nan() {
-                let (tolerance, residuals) = (problem.tolerance, judged.kkt);
-                let error = ContactError::NotCertified { method, tolerance, residuals };
-                return Err(failed(self.limited(error, &judged)));
-            }
-            tolerance *= 0.3 * problem.tolerance / judged.kkt.worst();
-            if judged.kkt.within(MOST_ROUNDING) {
-                before.1 = Some(judged.unbalanced);
-            }
-        }
-    }
-
-    /// Moves the datum by the rigid part of an answer, if the answer is mostly that.
-    fn move_datum(&mut self, judged: &Judged) -> Result<bool, PetscError> {
-        if judged.rigid_max <= DOMINANT * judged.elastic_max {
-            return Ok(false);
-        }
-        let (datum, constraints) = (&mut self.next.datum, &self.problem.constraints);
-        let nodes = &self.problem.body.nodes.points;
-        let motion: Vec<f64> = nodes.iter().flat_map(|&x| judged.rigid.at(x)).collect();
-        self.c.write(|c| {
-            datum.shift(constraints, c, 1.0);
-            datum.add(constraints, &motion);
-            datum.shift(constraints, c, -1.0);
-        })?;
-        Ok(true)
     }
 }

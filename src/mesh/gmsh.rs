@@ -110,7 +110,7 @@ pub fn mesh_geo(
     let lock = File::open(scratch.path()).map_err(MeshError::io(&mesh))?;
     let _ = lock.try_lock();
     let fresh = scratch.path().join("fresh.msh");
-    run(geo, parameters, order, &fresh)?;
+    run((geo, &text), parameters, order, &fresh)?;
     fs::rename(&fresh, &mesh).map_err(MeshError::io(&mesh))?;
     Ok(mesh)
 }
@@ -197,9 +197,18 @@ fn modified(path: &Path) -> io::Result<SystemTime> {
     fs::metadata(path).and_then(|data| data.modified())
 }
 
-/// What gmsh reads behind the `.geo`: that a parameter has not its value there is an error, and the option
-/// -order would give way to a Mesh.ElementOrder in the `.geo`.
-fn last_words(parameters: &BTreeMap<String, f64>, order: Order) -> String {
+/// Whether the `.geo` file `text` makes the largest length of an edge of the parameter `size`.
+fn bounds_by_size(text: &str) -> bool {
+    let values = ["Mesh.MeshSizeMax", "Mesh.CharacteristicLengthMax"].into_iter();
+    let mut values = values.flat_map(|option| text.split(option).skip(1));
+    let word = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    let of_size = |value: &str| value.split(|c| !word(c)).any(|w| w == "size");
+    values.any(|rest| rest.split(';').next().is_some_and(of_size))
+}
+
+/// What gmsh reads behind the `.geo` file `text`: that a parameter has not its value there is an error, and the
+/// options -order and -clmax would give way to a Mesh.ElementOrder and a Mesh.MeshSizeMax in the `.geo`.
+fn last_words(text: &str, parameters: &BTreeMap<String, f64>, order: Order) -> String {
     let kept = parameters.iter().map(|(name, value)| {
         format!(
             "If ({name} != {value})\n Error(\"`{name}` = {value}: the .geo file assigns it, which \
@@ -207,12 +216,14 @@ fn last_words(parameters: &BTreeMap<String, f64>, order: Order) -> String {
         )
     });
     let order = if order == Order::Quadratic { "Mesh.ElementOrder = 2;\n" } else { "" };
-    kept.chain([order.to_owned()]).collect()
+    let size = parameters.get("size").filter(|_| !bounds_by_size(text));
+    let size = size.map_or(String::new(), |size| format!("Mesh.MeshSizeMax = {size};\n"));
+    kept.chain([order.to_owned(), size]).collect()
 }
 
 /// Runs gmsh, which must leave `fresh` behind without a word of error.
 fn run(
-    geo: &Path,
+    (geo, text): (&Path, &str),
     parameters: &BTreeMap<String, f64>,
     order: Order,
     fresh: &Path,
@@ -227,7 +238,7 @@ fn run(
         }
     }
     let second = fresh.with_file_name("second.geo");
-    fs::write(&second, last_words(parameters, order)).map_err(MeshError::io(&second))?;
+    fs::write(&second, last_words(text, parameters, order)).map_err(MeshError::io(&second))?;
     // "./" keeps a path that begins with a dash from being taken for an option.
     command.arg("-o").arg(fresh).arg(Path::new(".").join(geo)).arg(second);
     // A file takes what it says, however much: a pipe would have to be read meanwhile.

@@ -1,7 +1,7 @@
 //! Where the conditioning or the discretisation is poor: answers stay right, or notes say not.
 
 use crate::support::{
-    close, difference, distorted, history, moved, order, problem, run, square, try_run,
+    close, close_to, difference, distorted, history, moved, order, problem, run, square, try_run,
 };
 use signorini::{contact::SOLVERS, evolution::DiscreteProblem, mesh::Mesh};
 use std::f64::consts::PI;
@@ -257,4 +257,19 @@ fn the_estimated_error_of_displacements_is_that_of_the_worst_step() {
     assert!(errors[at] > 0.1 * worst, "t = {}: {errors:?}", outcome.accuracy.time);
     let found = outcome.accuracy.displacement;
     assert!(0.1 * worst < found && found < 10.0 * worst, "{found} for {worst}");
+}
+
+#[test]
+fn residuals_of_rounding_are_accepted_by_the_error_of_the_answer() {
+    // A beam 200 times as long as high, graded to its clamp: a residual of 1e-6 F, the rounding of its internal
+    // forces, moves its tip by 1e-8 of its deflection 4 F L³/(E h³).
+    let grade = |s: f64| 200.0 * (1.15_f64.powf(100.0 * s) - 1.0) / (1.15_f64.powi(100) - 1.0);
+    let mesh = moved(Mesh::rectangle(1.0, 1.0, 100, 32), |[x, y]| [grade(x), y]);
+    let load =
+        "{ name = 'left', displacement = [0, 0] }, { name = 'right', traction = [0, -1e-6] }";
+    let problem = body(mesh, STRESS, "discretisation.displacement = 2", load);
+    let outcome = run(&problem, SOLVERS[0]);
+    let deflection = 4.0 * 1e-6 * 200.0_f64.powi(3) / 80.0;
+    close_to(outcome.last.record.displacement_max, deflection, 0.01);
+    assert!(outcome.accuracy.displacement < 1e-6, "{}", outcome.accuracy.displacement);
 }

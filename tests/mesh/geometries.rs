@@ -315,3 +315,26 @@ fn missing_gmsh_says_what_to_install() {
         .unwrap();
     assert!(child.status.success(), "{}", String::from_utf8_lossy(&child.stdout));
 }
+
+#[test]
+fn the_size_overrules_a_bound_that_the_file_sets() {
+    let text = "Point(1) = {0,0,0,1}; Point(2) = {1,0,0,1}; Point(3) = {1,1,0,1}; Point(4) = {0,1,0,1};
+        Line(1) = {1,2}; Line(2) = {2,3}; Line(3) = {3,4}; Line(4) = {4,1};
+        Curve Loop(1) = {1:4}; Plane Surface(1) = {1}; Physical Surface(\"body\") = {1};
+        Physical Curve(\"bottom\") = {1};\n";
+    let folder = tempfile::tempdir().unwrap();
+    for (number, (bound, size, edges)) in [
+        ("Mesh.MeshSizeMax = 0.1;", 0.5, 2),
+        ("Mesh.CharacteristicLengthMax = 0.5;", 0.1, 10),
+        // A bound of the size itself stays.
+        ("DefineConstant[ size = 1 ]; Mesh.MeshSizeMax = size/2;", 0.5, 4),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let geo = folder.path().join(format!("bound{number}.geo"));
+        fs::write(&geo, format!("{text}{bound}\n")).unwrap();
+        let mesh = load(&geo, &parameters([("size", size)]), Order::Linear).unwrap();
+        assert_eq!(mesh.curves["bottom"].edges.len(), edges, "{bound}");
+    }
+}

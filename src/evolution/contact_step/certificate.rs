@@ -1,6 +1,6 @@
 //! Judges an answer by its displacements alone: residuals and contact forces.
 
-use super::ContactStep;
+use super::{Accuracy, ContactStep};
 use crate::{
     contact::{Answer, Constraints, ContactError, ContactOptions, ContactPoint, Kkt, Scales},
     evolution::discrete_problem::LoadCase,
@@ -9,7 +9,7 @@ use crate::{
 
 /// Residuals are the effect of rounding if they are at most this many times its estimate.
 const ROUNDED: f64 = 10.0;
-/// Residuals above this are accepted only by a tolerance that is as large.
+/// Residuals above this are accepted only by a tolerance that is as large, or if they move no node far.
 pub(super) const MOST_ROUNDING: f64 = 1e-6;
 /// A deformation below this part of the datum is rounding.
 const CARRIED: f64 = 1e-14;
@@ -108,12 +108,20 @@ impl ContactStep<'_> {
         }
     }
 
-    /// Whether the residuals of u are no larger than the rounding of its internal forces: u is then the
-    /// exact answer for a stiffness whose entries are off by ε_machine. A tolerance below the usual one
-    /// is taken at its word.
-    pub(super) fn is_exact_to_rounding(&self, judged: &Judged) -> bool {
-        self.problem.tolerance >= ContactOptions::default().tolerance
-            && judged.kkt.within(self.rounding(judged).min(MOST_ROUNDING))
+    /// Whether u is the exact answer for a stiffness whose entries are off by ε_machine, with residuals up to
+    /// `MOST_ROUNDING` or an `error`, relative to the largest displacement, that is as small as
+    /// promised. A tolerance below the usual one is taken at its word.
+    pub(super) fn is_exact_to_rounding(&self, judged: &Judged, error: Option<f64>) -> bool {
+        let tolerance = self.problem.tolerance;
+        let is_small = |error| error <= Accuracy::promised(tolerance);
+        tolerance >= ContactOptions::default().tolerance
+            && self.is_rounding(judged)
+            && (judged.kkt.within(MOST_ROUNDING) || error.is_some_and(is_small))
+    }
+
+    /// Whether the residuals of u are no larger than the rounding of its internal forces.
+    pub(super) fn is_rounding(&self, judged: &Judged) -> bool {
+        judged.kkt.within(self.rounding(judged))
     }
 
     /// The rounding of the internal forces of u, ε_machine ‖|K||u|‖₂ / F.

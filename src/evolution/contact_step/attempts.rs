@@ -1,0 +1,109 @@
+//! Solves until the certificate accepts the answer.
+
+use super::{
+    ContactStep,
+    certificate::{Judged, MOST_ROUNDING},
+    minimisation::displacement,
+};
+use crate::{
+    contact::{ContactError, ContactReport},
+    evolution::{RunError, discrete_problem::LoadCase},
+    petsc::PetscError,
+};
+
+/// How often a solver is asked for one answer, more precisely or from another datum.
+const ATTEMPTS: usize = 3;
+/// An answer is mostly rigid if its rigid part is so many times the rest.
+const DOMINANT: f64 = 10.0;
+/// … and so far from a datum that was chosen before that even a certified answer is measured anew.
+const FAR: f64 = 1e3;
+
+impl ContactStep<'_> {
+    /// Solves until the certificate accepts the answer, and of many the one of least ∫|u|²: more
+    /// precisely, or from another datum, where it does not. What the solver thinks of an answer does not matter then.
+    pub(super) fn solve_certified(
+        &mut self,
+        step: usize,
+        case: &LoadCase,
+    ) -> Result<(Judged, ContactReport), RunError> {
+        let problem = self.problem;
+        let failed = |source| RunError::contact(problem, step, case.time, source);
+        let mut report = ContactReport::default();
+        let (mut tolerance, mut before, mut attempt) = (problem.tolerance, (None, None), 0);
+        let mut refined: Option<Vec<f64>> = None;
+        loop {
+            attempt += 1;
+            let (lift, bounds) = self.next.datum.pose(&problem.constraints, case);
+            let solved = match self.solve_contact(case, &lift, &bounds, tolerance, before) {
+                // All ranks know that the method stopped short; other errors may be one rank's.
+                Err(error) if !error.stopped_short() => return Err(failed(error)),
+                solved => solved,
+            };
+            let u = displacement(problem, lift, &self.c)?;
+            let judged = self.phases.time("certificate", || self.certify(u, case));
+            let certified = judged.kkt.within(problem.tolerance);
+            let far = !self.next.datum.is_zero() && judged.rigid_max > FAR * judged.elastic_max;
+            // What a solve for the forces that were left has changed is the error of the answer before.
+            let error = refined.take().map(|before| self.difference(&judged.u, &before));
+            before = (Some(judged.scales.force), None);
+            if (far || !certified) && attempt < ATTEMPTS && self.move_datum(&judged)? {
+                continue;
+            }
+            // Once a further attempt has not helped, or cannot, what rounding leaves is accepted.
+            let certified = certified
+                || (attempt > 1 || solved.is_err()) && self.is_exact_to_rounding(&judged, error);
+            match solved {
+                Ok(solved) => report.add(&solved),
+                Err(error) if !certified => return Err(failed(self.limited(error, &judged))),
+                Err(ContactError::NotConverged { report: spent, .. }) => report.add(&spent),
+                Err(_) => {}
+            }
+            let method = self.solver.name();
+            // Then a KKT point need not be a minimum, and which solver would notice is chance.
+            if judged.is_indefinite() {
+                return Err(failed(ContactError::NotDefinite { method }));
+            }
+            if certified {
+                let (judged, refused) = self.of_least_displacement(judged, case)?;
+                if attempt == ATTEMPTS || refused <= problem.tolerance {
+                    return Ok((judged, report));
+                }
+                tolerance *= 0.3 * problem.tolerance / refused;
+                continue;
+            }
+            if attempt == ATTEMPTS || judged.kkt.worst().is_nan() {
+                let (tolerance, residuals) = (problem.tolerance, judged.kkt);
+                let error = ContactError::NotCertified { method, tolerance, residuals };
+                return Err(failed(self.limited(error, &judged)));
+            }
+            tolerance *= 0.3 * problem.tolerance / judged.kkt.worst();
+            if self.is_rounding(&judged) || judged.kkt.within(MOST_ROUNDING) {
+                before.1 = Some(judged.unbalanced);
+                refined = Some(judged.u);
+            }
+        }
+    }
+
+    /// Moves the datum by the rigid part of an answer, if the answer is mostly that.
+    fn move_datum(&mut self, judged: &Judged) -> Result<bool, PetscError> {
+        if judged.rigid_max <= DOMINANT * judged.elastic_max {
+            return Ok(false);
+        }
+        let (datum, constraints) = (&mut self.next.datum, &self.problem.constraints);
+        let nodes = &self.problem.body.nodes.points;
+        let motion: Vec<f64> = nodes.iter().flat_map(|&x| judged.rigid.at(x)).collect();
+        self.c.write(|c| {
+            datum.shift(constraints, c, 1.0);
+            datum.add(constraints, &motion);
+            datum.shift(constraints, c, -1.0);
+        })?;
+        Ok(true)
+    }
+
+    /// max |u − v| / max |u|. Collective.
+    fn difference(&self, u: &[f64], v: &[f64]) -> f64 {
+        let partition = &self.problem.body.nodes.partition;
+        let difference: Vec<f64> = u.iter().zip(v).map(|(u, v)| u - v).collect();
+        partition.max_norm(&difference) / partition.max_norm(u)
+    }
+}
