@@ -126,8 +126,7 @@ def read_frame(path):
             # meshio.read would end the program where it finds a fault.
             return meshio.vtu.read(path)
         sources = [piece.get("Source") for piece in ElementTree.parse(path).findall(".//Piece")]
-    # A rank that has no triangles leaves an empty piece.
-    pieces = [piece for piece in (read_frame(path.parent / s) for s in sources) if piece.cells]
+    pieces = [read_frame(path.parent / source) for source in sources]
     numbers = [np.ravel(piece.point_data["global_node"]) for piece in pieces]
     _, first, place = np.unique(np.concatenate(numbers), return_index=True, return_inverse=True)
     starts = np.cumsum([0, *map(len, numbers)])

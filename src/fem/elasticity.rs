@@ -1,7 +1,7 @@
 //! The damaged elastic operator (ζ Aε(u), ε(v)) of (26), matrix-free, for the residuals that
 //! judge solvers.
 
-use super::{Body, for_elements};
+use super::{Body, Element, for_elements};
 use crate::model::Material;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
@@ -41,15 +41,20 @@ impl Elasticity {
         for_elements!(body, cells => cells.strains(u, squared))
     }
 
-    /// σ = ζ Aε(u), Pa, the mean over the quadrature points of each triangle, with `zeta` the values of
-    /// ζ at these points.
+    /// σ = ζ Aε(u), Pa, the mean Σ w_q σ_q / Σ w_q over each triangle, with `zeta` the values of ζ at the
+    /// quadrature points q.
     pub fn stresses(&self, body: &Body, zeta: &[f64], u: &[f64]) -> Vec<Vector3<f64>> {
         for_elements!(body, cells => {
             let points = cells.elements[0].points.len();
             let stresses = cells.strains(u, |t, strain| self.d(body, t) * strain);
             let stresses: Vec<_> = stresses.iter().zip(zeta).map(|(s, zeta)| s * *zeta).collect();
-            let mean = |of: &[Vector3<f64>]| of.iter().sum::<Vector3<f64>>() / points as f64;
-            stresses.chunks(points).map(mean).collect()
+            let triangles = stresses.chunks(points).zip(cells.elements);
+            let mean = |(stresses, element): (&[Vector3<f64>], &Element<_, _>)| {
+                let weights = element.points.iter().map(|point| point.weight);
+                let sum: Vector3<f64> = stresses.iter().zip(weights.clone()).map(|(s, w)| w * s).sum();
+                sum / weights.sum::<f64>()
+            };
+            triangles.map(mean).collect()
         })
     }
 

@@ -35,7 +35,7 @@ const MANY: usize = 999_999;
 /// writes its piece of a frame, `fields_NNNN_R.vtu`, and the first one the lists:
 /// `fields_NNNN.pvtu` names the pieces, `fields.pvd` the frames.
 ///
-/// A piece has the triangles that its rank owns and all nodes that it knows.
+/// A piece has the triangles that its rank owns and all nodes that it knows; a rank without triangles writes none.
 pub struct FieldWriter {
     files: Background<Files>,
     frames: usize,
@@ -48,6 +48,8 @@ struct Files {
     folder: PathBuf,
     /// `<Points>` and `<Cells>`, the same in every frame, in the element `<Piece>`.
     mesh: String,
+    /// The ranks that write a piece.
+    pieces: Vec<usize>,
     /// `fields.pvd`, on the first rank.
     list: GrowingFile,
     /// Γ_C, on the first rank.
@@ -66,7 +68,7 @@ struct Frame {
 }
 
 impl FieldWriter {
-    /// A writer for the body of `problem` into `folder`.
+    /// A writer for the body of `problem` into `folder`. Collective.
     ///
     /// # Errors
     /// The mesh cannot be encoded.
@@ -76,8 +78,11 @@ impl FieldWriter {
         let folder = folder.to_owned();
         let list = list_of_frames(folder.join("fields.pvd"));
         let contact = ContactWriter::new(&folder)?;
-        let ranks = problem.body.nodes.partition.comm().size();
-        let files = Background::new(Files { folder, mesh, list, contact }, ranks);
+        let comm = problem.body.nodes.partition.comm();
+        let triangles = comm.gather(&[problem.body.own_triangles as f64]);
+        let pieces = (0..comm.size()).filter(|&rank| triangles[rank] > 0.0).collect();
+        let files = Files { folder, mesh, pieces, list, contact };
+        let files = Background::new(files, comm.size());
         Ok(Self { files, frames: 0, last_time: None, digits })
     }
 
@@ -141,15 +146,17 @@ impl Files {
             true => (format!("{stem}.vtu"), format!("{stem}.vtu")),
             false => (piece_file(comm.rank()), format!("{stem}.pvtu")),
         };
-        let path = self.folder.join(own);
-        let text = self.piece(points, cells).map_err(|e| OutputError::new(&path, e))?;
-        write_whole(&path, text.as_bytes())?;
+        if self.pieces.contains(&comm.rank()) {
+            let path = self.folder.join(own);
+            let text = self.piece(points, cells).map_err(|e| OutputError::new(&path, e))?;
+            write_whole(&path, text.as_bytes())?;
+        }
         if !comm.is_root() {
             return Ok(());
         }
         self.contact.add(&format!("contact_{number}.vtu"), frame.time, &frame.contact)?;
         if !comm.is_serial() {
-            let text = list_of_pieces((0..comm.size()).map(piece_file), points, cells);
+            let text = list_of_pieces(self.pieces.iter().copied().map(piece_file), points, cells);
             write_whole(&self.folder.join(&whole), text.as_bytes())?;
         }
         self.list.add(entry(frame.time, &whole).as_bytes())

@@ -1,8 +1,8 @@
 //! The P2 elements, straight and curved, against formulas of their own: fields are interpolated as
 //! Σ λ_i v_i + Σ 4λ_iλ_j (v_ij − (v_i + v_j)/2), and derived by central differences, which are exact.
 
-use crate::support::{DAMAGE_LAW, Random, bent, close, curved_area, difference, distorted};
-use nalgebra::{Matrix2, Matrix3, SMatrix, SVector};
+use crate::support::{DAMAGE_LAW, Random, bent, close, curved_area, difference, distorted, square};
+use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector3};
 use signorini::{
     fem::{Body, Elasticity, Element, Elements, Mass, source, source_load},
     mesh::{Mesh, Order},
@@ -209,5 +209,33 @@ fn the_damage_source_is_taken_at_the_quadrature_points() {
         let load = source_load(&body, mass, &source(&body, &[law], &strain, &zeta));
         let error = difference(&load, &expected);
         assert!(error < 1e-14, "{error}");
+    }
+}
+
+#[test]
+fn the_stress_of_a_curved_triangle_is_its_mean() {
+    // ∫ ε(u) = ∮ (u ⊗ n + n ⊗ u)/2 ds: along a parabola u and x are quadratic, so Simpson's rule is exact.
+    let mesh = bent(&square(2), |[x, y]| [x + 0.2 * y * y, y + 0.15 * x * (1.0 - x)]);
+    let (body, elasticity) = (Body::new(mesh, Order::Quadratic), Elasticity::new([MATERIAL]));
+    let mut random = Random::new(5);
+    let points = &body.nodes.points;
+    let u: Vec<f64> = (0..2 * points.len()).map(|_| random.next()).collect();
+    let zeta = body.at_points(&vec![1.0; body.mesh.nodes.len()]);
+    let stresses = elasticity.stresses(&body, &zeta, &u);
+    for (stress, &[a, b, c]) in stresses.iter().zip(&body.mesh.triangles) {
+        let (mut area, mut strain) = (0.0, Vector3::zeros());
+        for edge in body.edges(&[[a, b], [b, c], [c, a]]) {
+            for (s, weight) in [(0.0, 1.0), (0.5, 4.0), (1.0, 1.0)].map(|(s, w)| (s, w / 6.0)) {
+                let ([x, y], [tx, ty]) = (edge.at(points, s), edge.tangent(points, s));
+                let (nx, ny) = (weight * ty, -weight * tx);
+                let [ux, uy] = [0, 1].map(|k| {
+                    edge.values(s).map(|(node, value)| value * u[2 * node + k]).sum::<f64>()
+                });
+                area += 0.5 * (x * nx + y * ny);
+                strain += Vector3::new(ux * nx, uy * ny, ux * ny + uy * nx);
+            }
+        }
+        let expected = MATERIAL.stiffness() * strain / area;
+        assert!((stress - expected).norm() < 1e-11 * expected.norm(), "{stress} is not {expected}");
     }
 }

@@ -318,7 +318,8 @@ fn missing_gmsh_says_what_to_install() {
 
 #[test]
 fn the_size_overrules_a_bound_that_the_file_sets() {
-    let text = "Point(1) = {0,0,0,1}; Point(2) = {1,0,0,1}; Point(3) = {1,1,0,1}; Point(4) = {0,1,0,1};
+    let text =
+        "Point(1) = {0,0,0,1}; Point(2) = {1,0,0,1}; Point(3) = {1,1,0,1}; Point(4) = {0,1,0,1};
         Line(1) = {1,2}; Line(2) = {2,3}; Line(3) = {3,4}; Line(4) = {4,1};
         Curve Loop(1) = {1:4}; Plane Surface(1) = {1}; Physical Surface(\"body\") = {1};
         Physical Curve(\"bottom\") = {1};\n";

@@ -2,7 +2,7 @@
 
 use crate::{
     on_ranks,
-    test_directory::{ProgramOutput, TestDirectory},
+    test_directory::{ProgramOutput, TestDirectory, square},
 };
 use std::{collections::BTreeMap, path::Path};
 use vtkio::model::{Attribute, DataSet, Piece, Vtk};
@@ -125,4 +125,26 @@ fn same_frames(order: &str) {
     }
     expected_names.sort();
     assert_eq!(test_directory.names("many"), expected_names);
+}
+
+#[test]
+fn a_rank_without_triangles_writes_no_piece() {
+    // Two triangles on four ranks; vtkio and meshio read no empty piece.
+    let test_directory = TestDirectory::new();
+    test_directory.write("square.msh", &square(1));
+    let said = ProgramOutput::of(&mut on_ranks(&test_directory, 4, &["run", "scene.toml"]));
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let (_, list) = test_directory.frames("out/scene").pop().expect("a frame");
+    let text = test_directory.read(&format!("out/scene/{list}"));
+    let pieces: Vec<&str> =
+        text.split("Source=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect();
+    assert!(!pieces.is_empty() && pieces.len() <= 2, "{pieces:?}");
+    let mut frame = Frame::default();
+    pieces
+        .iter()
+        .for_each(|file| add(&test_directory.path(&format!("out/scene/{file}")), &mut frame));
+    assert_eq!((frame.points.len(), frame.cells.len()), (4, 2));
+    let names = test_directory.names("out/scene");
+    let of_frame = |name: &&String| name.starts_with(&list.replace(".pvtu", "_"));
+    assert_eq!(names.iter().filter(of_frame).count(), pieces.len());
 }
