@@ -26,11 +26,10 @@ impl ContactStep<'_> {
         step: usize,
         case: &LoadCase,
     ) -> Result<(Judged, ContactReport), RunError> {
-        let problem = self.problem;
+        let (problem, asked) = (self.problem, self.problem.tolerance);
         let failed = |source| RunError::contact(problem, step, case.time, source);
-        let mut report = ContactReport::default();
-        let (mut tolerance, mut before, mut attempt) = (problem.tolerance, (None, None), 0);
-        let mut refined: Option<Vec<f64>> = None;
+        let (mut tolerance, mut attempt, mut refined) = (asked, 0, None::<Vec<f64>>);
+        let (mut before, mut report) = ((None, None), ContactReport::default());
         loop {
             attempt += 1;
             let (lift, bounds) = self.next.datum.pose(&problem.constraints, case);
@@ -41,7 +40,7 @@ impl ContactStep<'_> {
             };
             let u = displacement(problem, lift, &self.c)?;
             let judged = self.phases.time("certificate", || self.certify(u, case));
-            let certified = judged.kkt.within(problem.tolerance);
+            let certified = judged.kkt.within(asked);
             let far = !self.next.datum.is_zero() && judged.rigid_max > FAR * judged.elastic_max;
             // What a solve for the forces that were left has changed is the error of the answer before.
             let error = refined.take().map(|before| self.difference(&judged.u, &before));
@@ -58,25 +57,24 @@ impl ContactStep<'_> {
                 Err(ContactError::NotConverged { report: spent, .. }) => report.add(&spent),
                 Err(_) => {}
             }
-            let method = self.solver.name();
             // Then a KKT point need not be a minimum, and which solver would notice is chance.
             if judged.is_indefinite() {
-                return Err(failed(ContactError::NotDefinite { method }));
+                return Err(failed(ContactError::NotDefinite { method: self.solver.name() }));
             }
             if certified {
                 let (judged, refused) = self.of_least_displacement(judged, case)?;
-                if attempt == ATTEMPTS || refused <= problem.tolerance {
+                if attempt == ATTEMPTS || refused <= asked {
                     return Ok((judged, report));
                 }
-                tolerance *= 0.3 * problem.tolerance / refused;
+                tolerance *= 0.3 * asked / refused;
                 continue;
             }
             if attempt == ATTEMPTS || judged.kkt.worst().is_nan() {
-                let (tolerance, residuals) = (problem.tolerance, judged.kkt);
-                let error = ContactError::NotCertified { method, tolerance, residuals };
+                let (method, residuals) = (self.solver.name(), judged.kkt);
+                let error = ContactError::NotCertified { method, tolerance: asked, residuals };
                 return Err(failed(self.limited(error, &judged)));
             }
-            tolerance *= 0.3 * problem.tolerance / judged.kkt.worst();
+            tolerance *= 0.3 * asked / judged.kkt.worst();
             if self.is_rounding(&judged) || judged.kkt.within(MOST_ROUNDING) {
                 before.1 = Some(judged.unbalanced);
                 refined = Some(judged.u);
