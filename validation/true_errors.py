@@ -25,8 +25,9 @@ POINTS = np.array([[1 - 2 * b if i == j else b for j in range(3)]
 WEIGHTS = np.repeat([0.109951743655322, 0.223381589678011], 3)
 # Derivatives of the barycentric coordinates in the last two of them.
 SLOPES = np.array([[-1, -1], [1, 0], [0, 1]])
-# Newton's steps, for which sides that are nearly straight need few; elements passed on the way to a point.
-NEWTON, WALK = 8, 30
+# Newton's steps, for which sides that are nearly straight need few, and the longest; elements passed on the
+# way to a point.
+NEWTON, STEP, WALK = 12, 0.5, 30
 
 
 def shapes(l, nodes):
@@ -54,6 +55,8 @@ class Run:
         self.cells = next(iter(frame.cells_dict.values()))
         self.u = frame.point_data["displacement"][:, :2]
         self.zeta = frame.point_data["zeta"].ravel()
+        # Per element 0, or the number of its surface by name; None where all is one material.
+        self.material = frame.cell_data["material"][0].ravel() if "material" in frame.cell_data else None
         vertices = Triangulation(*self.points.T, self.cells[:, :3])
         self.find = vertices.get_trifinder()
         # Opposite each vertex.
@@ -79,7 +82,8 @@ class Run:
         l = np.full((len(points), 3), 1 / 3)
         for _ in range(NEWTON):
             x, jacobian = self.mapped(cell, l)
-            l = l + np.linalg.solve(jacobian, (points - x)[:, :, None])[:, :, 0] @ SLOPES.T
+            step = np.linalg.solve(jacobian, (points - x)[:, :, None])[:, :, 0] @ SLOPES.T
+            l = l + step / np.maximum(np.abs(step).max(axis=1, keepdims=True) / STEP, 1.0)
         return l
 
     def locate(self, points, inner):
@@ -91,6 +95,10 @@ class Run:
             if not lost.any():
                 break
             cell[lost] = self.find(*(points[lost] + part * (inner - points)[lost]).T)
+        # Between a chord and its arc: the element of the nearest middle.
+        middles = self.points[self.cells[:, :3]].mean(1)
+        for k in np.flatnonzero(cell < 0):
+            cell[k] = np.hypot(*(middles - points[k]).T).argmin()
         l = self.coordinates(cell, points)
         for _ in range(WALK):
             other = self.neighbours[cell, l.argmin(1)]
@@ -111,7 +119,8 @@ def elasticity(young, poisson, plane):
 
 
 def errors(reference, run, d):
-    """Relative errors of u and the damage (None without damage)."""
+    """Relative errors of u and the damage (None without damage); d for all, or for each element of the
+    reference. Not a number where nothing is deformed."""
     cells = np.repeat(np.arange(len(reference.cells)), len(POINTS))
     barycentric = np.tile(POINTS, (len(reference.cells), 1))
     points, jacobian = reference.mapped(cells, barycentric)
@@ -120,8 +129,10 @@ def errors(reference, run, d):
     inner = points.reshape(-1, len(POINTS), 2).mean(1).repeat(len(POINTS), axis=0)
     other, other_zeta = run.at(*run.locate(points, inner))
 
+    d = np.broadcast_to(d, (len(reference.cells), 3, 3))[cells]
+
     def energy(e):
-        return (weight * zeta * np.einsum("ni,ij,nj->n", e, d, e)).sum()
+        return (weight * zeta * np.einsum("ni,nij,nj->n", e, d, e)).sum()
 
     damage = (weight * (1 - zeta) ** 2).sum()
     lost = (weight * (other_zeta - zeta) ** 2).sum()
