@@ -6,34 +6,21 @@ nothing here was taken from the program, so that a fault of its assembly, bases 
 as a difference.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.sparse import coo_matrix, diags
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
+from conditions import as_rows, merged, merged_gaps, pair
 from lagrange import SIDES, Lagrange, derivatives, functions
-from scene import Expression, displacement_order
+from scene import Expression, displacement_order, of_material
 
-CORNER = np.pi / 6  # edges further apart meet in a corner
 DAMAGE = {"lambda_w": 0.0, "strain_cap": 1000.0, "threshold": 0.01, "initial": 1.0,
           "mass": "consistent"}
 # Barycentric coordinates of the points, of equal weights, that integrate the stiffness.
 POINTS = {1: np.full((1, 3), 1 / 3), 2: np.full((3, 3), 1 / 6) + 0.5 * np.eye(3)}
 # Of the nodes of an edge (ends, middle) the share of its length: the integrals of their functions.
 SHARES = {1: (1 / 2, 1 / 2), 2: (1 / 6, 1 / 6, 4 / 6)}
-
-
-@dataclass
-class Rows:
-    """Conditions d·u = value (or ≤ value), a row each: node, unit direction, value, and of contact
-    rows the tributary length."""
-
-    node: np.ndarray
-    direction: np.ndarray
-    value: np.ndarray
-    weight: np.ndarray
 
 
 class Discrete:
@@ -66,10 +53,12 @@ class Discrete:
         n = self.elements
         self.dof = np.stack([2 * n, 2 * n + 1], -1).reshape(len(n), -1)
         self.law = {**DAMAGE, **scene.get("damage", {})}
-        self.d = elasticity(scene["material"])
-        self.element = np.einsum("eqki,kl,eqlj,eq->eqij", self.b, self.d, self.b, self.weight)
+        self.young, poisson = (of_material(scene, mesh, "material", key) for key in ("young", "poisson"))
+        self.d = elasticity(self.young, poisson, scene["material"].get("plane", "stress"))
+        self.element = np.einsum("eqki,ekl,eqlj,eq->eqij", self.b, self.d, self.b, self.weight)
         self.boundaries = scene.get("boundary", [])
-        self.contact = self._contact_rows()
+        self._gaps = self._contact_faces()
+        self.contact = self.contact_rows(0.0)
         self.prescribed = self._prescribed()
 
     def element_stiffness(self, zeta):
@@ -145,9 +134,9 @@ class Discrete:
                 parts.setdefault(int(node), []).append((normal, part))
         return {node: merged(found) for node, found in parts.items()}
 
-    def _contact_rows(self):
-        """u·ν ≤ g: a fixed normal or those of the faces; where curves meet smoothly one row of
-        the mean normal and the smaller gap."""
+    def _contact_faces(self):
+        """(node, normal, length, gaps) of each row: a fixed normal or those of the faces; where
+        curves meet smoothly one row of the mean normal, and the gaps of both."""
         rows = {}
         for boundary in self.boundaries:
             if "gap" not in boundary:
@@ -157,13 +146,16 @@ class Discrete:
                 fixed = np.array([float(Expression(c)(0.0, 0.0, 0.0)) for c in fixed])
                 fixed = fixed / np.linalg.norm(fixed)
             for node, faces in self.faces(boundary["name"]).items():
-                g = float(gap.at(self.points[[node]])[0])
                 if fixed is not None:
                     faces = [(fixed, sum(length for _, length in faces))]
-                rows.setdefault(node, []).extend((n, w, g) for n, w in faces)
-        found = [(node, n, g, w) for node, parts in sorted(rows.items())
-                 for n, w, g in merged_gaps(parts)]
-        return as_rows(found)
+                rows.setdefault(node, []).extend((n, w, [gap]) for n, w in faces)
+        return [(node, n, w, gaps) for node, parts in sorted(rows.items())
+                for n, w, gaps in merged_gaps(parts)]
+
+    def contact_rows(self, t):
+        """u·ν ≤ g at time t, of several gaps the smallest."""
+        at = lambda node, gaps: min(float(g.at(self.points[[node]], t)[0]) for g in gaps)
+        return as_rows([(node, n, at(node, gaps), w) for node, n, w, gaps in self._gaps])
 
     def _prescribed(self):
         """(node, direction, expression or None for a symmetry's 0)."""
@@ -185,18 +177,17 @@ class Discrete:
         value = lambda node, e: 0.0 if e is None else float(e.at(self.points[[node]], t)[0])
         return as_rows([(node, d, value(node, e)) for node, d, e in self.prescribed])
 
-    def bad_input(self):
+    def bad_input(self, times):
         """A reason why the scene must be refused whatever its loads, or None; then whether a
         fixed normal points into the body at some of its edges only (either answer will do)."""
         some = False
         for boundary in self.boundaries:
             if "gap" not in boundary:
                 continue
-            gap = Expression(boundary["gap"]).at(
-                self.points[np.unique(self.space.on(self.mesh.edges(boundary["name"])))])
-            size = np.ptp(self.mesh.nodes, axis=0).max()
-            if not np.isfinite(gap).all() or (gap < -1e-9 * size).any():
-                return "gap negative", False
+            points = self.points[np.unique(self.space.on(self.mesh.edges(boundary["name"])))]
+            gap = Expression(boundary["gap"])
+            if not all(np.isfinite(gap.at(points, t)).all() for t in times):
+                return "gap not finite", False
             if "normal" in boundary:
                 n = np.array([float(Expression(c)(0.0, 0.0, 0.0)) for c in boundary["normal"]])
                 cosine = self.mesh.outward_normals(boundary["name"])[0] @ n / np.linalg.norm(n)
@@ -229,20 +220,23 @@ class Discrete:
     def damage_step(self, u, zeta, step):
         """ζ_n of (28): (M + kκL) ζ_n = M ζ_{n−1} + k b(φ(ε(u_{n−1}), ζ_{n−1})); of P1 with φ at the
         three vertices of a triangle and then integrated with the same M, of P2 at the points of the
-        stiffness; and how much of it may be rounding, where triangles are very thin."""
+        stiffness, with the law of its surface; and how much of it may be rounding, where triangles are very thin."""
         t, law = self.mesh.triangles, self.law
+        cap, breeds, strains, least, diffusion = (
+            of_material(self.scene, self.mesh, "damage", key, law[key])
+            for key in ("strain_cap", "lambda_d", "lambda_u", "lambda_w", "diffusion"))
         strain = np.einsum("eqki,ei->keq", self.b, u[self.dof])
         squared = strain[0] ** 2 + strain[1] ** 2 + 0.5 * strain[2] ** 2
-        psi = np.minimum(squared, law["strain_cap"])
+        psi = np.minimum(squared, cap[:, None])
         at = np.eye(3) if self.order == 1 else POINTS[2]
         eta = np.clip(zeta[t] @ at.T, law["threshold"], 1.0)
-        rate = law["lambda_d"] * (1 - eta) / eta + 0.5 * law["lambda_u"] * psi - law["lambda_w"]
-        phi = -np.maximum(rate, 0.0)
+        rate = breeds[:, None] * (1 - eta) / eta + 0.5 * strains[:, None] * psi
+        phi = -np.maximum(rate - least[:, None], 0.0)
         local = (np.ones((3, 3)) + np.eye(3)) / 12
         if law["mass"] == "lumped":
             local = np.eye(3) / 3
         mass = self.area[:, None, None] * local
-        laplace = np.einsum("eik,ejk,e->eij", self.gradient, self.gradient, self.area)
+        laplace = np.einsum("eik,ejk,e->eij", self.gradient, self.gradient, self.area * diffusion)
         rows, columns = (np.broadcast_to(v, mass.shape).ravel() for v in
                          (t[:, :, None], t[:, None, :]))
         n = len(zeta)
@@ -253,7 +247,7 @@ class Discrete:
             np.add.at(right, t, step * np.einsum("eij,ej->ei", mass, phi))
         else:
             np.add.at(right, t, step * (self.area / 3)[:, None] * (phi @ POINTS[2]))
-        matrix = m + step * law["diffusion"] * l
+        matrix = m + step * l
         # Jacobi scaling keeps pieces of very different size apart from rounding.
         scale = diags(1 / np.sqrt(matrix.diagonal()))
         factor = splu((scale @ matrix @ scale).tocsc())
@@ -263,57 +257,12 @@ class Discrete:
         return solution, np.abs(scale @ noise).max()
 
 
-def elasticity(material):
-    """D of plane stress; plane strain by E/(1−ν²) and ν/(1−ν)."""
-    e, nu = float(material["young"]), float(material["poisson"])
-    if material.get("plane", "stress") == "strain":
+def elasticity(e, nu, plane):
+    """D of plane stress for each triangle; plane strain by E/(1−ν²) and ν/(1−ν)."""
+    if plane == "strain":
         e, nu = e / (1 - nu**2), nu / (1 - nu)
-    shear = 0.5 * (1 - nu)
-    return e / (1 - nu**2) * np.array([[1, nu, 0], [nu, 1, 0], [0, 0, shear]])
-
-
-def pair(texts, points, t):
-    """Two expressions at points, (n, 2)."""
-    return np.stack([Expression(text).at(points, t) for text in texts], -1)
-
-
-def angle(a, b):
-    """The angle between two directions, exact also where it is small."""
-    return np.arctan2(abs(a[0] * b[1] - a[1] * b[0]), a @ b)
-
-
-def merged(parts):
-    """Joins (normal, length) of edges no further apart than a corner."""
-    faces = []
-    for normal, length in parts:
-        for k, (n, w) in enumerate(faces):
-            if angle(n, normal) <= CORNER + 1e-9:
-                mean = w * n + length * normal
-                faces[k] = (mean / np.linalg.norm(mean), w + length)
-                break
-        else:
-            faces.append((normal, length))
-    return faces
-
-
-def merged_gaps(parts):
-    """Joins (normal, length, gap) of curves that meet smoothly: the smaller gap counts."""
-    rows = []
-    for normal, length, gap in parts:
-        for k, (n, w, g) in enumerate(rows):
-            if angle(n, normal) < CORNER:
-                mean = w * n + length * normal
-                rows[k] = (mean / np.linalg.norm(mean), w + length, min(g, gap))
-                break
-        else:
-            rows.append((normal, length, gap))
-    return rows
-
-
-def as_rows(found):
-    """Rows from a list of (node, direction, value[, weight])."""
-    if not found:
-        return Rows(np.zeros(0, int), np.zeros((0, 2)), np.zeros(0), np.zeros(0))
-    node, direction, value, *weight = zip(*found)
-    return Rows(np.array(node), np.array(direction, float), np.array(value, float),
-                np.array(weight[0] if weight else np.ones(len(node))))
+    d = np.zeros((len(e), 3, 3))
+    d[:, 0, 0] = d[:, 1, 1] = 1.0
+    d[:, 0, 1] = d[:, 1, 0] = nu
+    d[:, 2, 2] = 0.5 * (1 - nu)
+    return (e / (1 - nu**2))[:, None, None] * d

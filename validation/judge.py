@@ -124,6 +124,13 @@ def traits(discrete):
             words.append("many rows")
     if discrete.clusters()[0] > 1:
         words.append("pieces")
+    words += ["P2"] if discrete.order == 2 else []
+    words += ["curved"] if discrete.space.curved() else []
+    words += ["materials"] if len(discrete.mesh.surfaces) > 1 else []
+    if (np.array([discrete.contact_rows(t).value for t in times(discrete.scene)]) < 0.0).any():
+        words.append("presses")
+    if any("t" in re.findall(r"\b[a-z]+\b", str(b.get("gap", ""))) for b in discrete.boundaries):
+        words.append("moves")
     if "time" not in discrete.scene and "t" in re.findall(r"\b[a-z]+\b", str(discrete.scene)):
         words.append("static with t")
     return " ".join(sorted(set(words)))
@@ -131,7 +138,7 @@ def traits(discrete):
 
 def expectation(discrete):
     """(reason to refuse the scene or None, whether either will do): by data and by the ranks."""
-    reason, either = discrete.bad_input()
+    reason, either = discrete.bad_input(times(discrete.scene))
     if reason:
         return reason, False
     zeta = np.ones(len(discrete.mesh.nodes))
@@ -140,12 +147,14 @@ def expectation(discrete):
     size = max(np.abs(value).max(initial=0.0) for value in values)
     # What the loads would move in a body without shape: prescribed values may all be rounding.
     loads = max(np.abs(discrete.load(t)).sum() for t in times(discrete.scene))
-    size = max(size, loads / float(discrete.scene["material"]["young"]))
+    size = max(size, loads / discrete.young.mean())
     for t in times(discrete.scene):
         step = Step(discrete, zeta, t)
         for name, value, low, high in (
             ("prescribed values contradict", step.contradiction, 1e-11 * size, 1e-7 * size),
             ("prescribed through the obstacle", step.penetration, 1e-13 * size, 1e-9 * size),
+            ("no room between obstacles", step.overlap, 1e-13 * size, 1e-9 * size),
+            ("hardly room between obstacles", step.squeezed, 1e-13 * size, np.inf),
             ("driven", step.driven, 1e-11, 1e-7),
         ):
             if value > high:
@@ -267,7 +276,8 @@ def judge_step(step, u, scale):
     scale = max(scale[0], size[0]), max(scale[1], size[1])
     if forces > FORCE or places > PLACE:
         return Verdict("wrong", f"forces off by {forces:.1e}, gaps by {places:.1e}"), scale
-    if not step.lift.any() and np.abs(step.f).max() <= EPSILON * scale[0]:
+    at_rest = not step.lift.any() and (step.b >= 0.0).all()
+    if at_rest and np.abs(step.f).max() <= EPSILON * scale[0]:
         return Verdict("right", "no load but rounding: every admissible place will do"), scale
     own = step.solve()
     own_forces, own_places, _ = residuals(step, own, scale)

@@ -27,10 +27,15 @@ def square(turn=0.0):
     return bodies.finish(rng, (points, triangles, bodies.sides(node)), 1.0, turn)
 
 
-def step_of(mesh, boundary, order=1, **more):
-    """A contact step of a scene on a mesh, undamaged, at t = 1."""
+def step_of(mesh, boundary, order=1, t=1.0, **more):
+    """A contact step of a scene on a mesh, undamaged, at time t."""
     discrete = Discrete(of_order({**SCENE, "boundary": boundary, **more}, order), mesh)
-    return Step(discrete, np.ones(len(mesh.nodes)), 1.0)
+    return Step(discrete, np.ones(len(mesh.nodes)), t)
+
+
+def wrong(step, u):
+    """1 if an answer is called wrong, 0 otherwise."""
+    return float(judge_step(step, u, (0, 0))[0].word == "wrong")
 
 
 def pressed(order, gap="0.01"):
@@ -100,9 +105,8 @@ def quadratic(order):
     yield "curved sides: affine field", np.abs(step.solve() - exact).max(), 1e-14
 
 
-def opposite(order):
-    """A tip between two plates with gaps of 0.001: the triangle (0,0), (2,∓0.4) clamped at its
-    end. Both rows are obeyed, and the force of the touching plate is a pressure."""
+def tip():
+    """The triangle (0,0), (2,∓0.4)."""
     rng = np.random.default_rng(3)
     shape = lambda s, t: (2 * s, 0.4 * s * (2 * t - 1))
     points, node, triangles = bodies.grid(rng, 10, 4, shape)
@@ -110,12 +114,22 @@ def opposite(order):
     triangles = triangles[[len(set(t)) == 3 for t in triangles.tolist()]]
     lines = {"lower": bodies.chain(np.r_[node[0, 0], node[1:, 0]]), "end": bodies.chain(node[-1]),
              "upper": bodies.chain(np.r_[node[0, 0], node[1:, -1]])}
-    mesh = bodies.finish(rng, (points, triangles, lines), 1.0, 0.0)
-    plates = [{"name": "end", "displacement": ["0", "0"]},
-              {"name": "lower", "gap": "0.001", "normal": ["0", "-1"]},
-              {"name": "upper", "gap": "0.001", "normal": ["0", "1"]}]
+    return bodies.finish(rng, (points, triangles, lines), 1.0, 0.0)
+
+
+def plates(low, high):
+    """The tip's conditions: clamped at its end, between two plates with these gaps."""
+    return [{"name": "end", "displacement": ["0", "0"]},
+            {"name": "lower", "gap": low, "normal": ["0", "-1"]},
+            {"name": "upper", "gap": high, "normal": ["0", "1"]}]
+
+
+def opposite(order):
+    """A tip between two plates with gaps of 0.001. Both rows are obeyed, and the force of the touching
+    plate is a pressure."""
     material = {"young": 1.0, "poisson": 0.3}
-    step = step_of(mesh, plates, order, material=material, body={"force": ["0.01", "0.003"]})
+    step = step_of(tip(), plates("0.001", "0.001"), order, material=material,
+                   body={"force": ["0.01", "0.003"]})
     own = step.solve()
     yield "wedge between plates: residuals", max(residuals(step, own)[:2]), 1e-12
     yield "wedge: the upper plate is obeyed", abs((along(step.rows, own) - 0.001).max()), 1e-15
@@ -168,9 +182,89 @@ def damage(order):
         yield f"no source: ∫ζ stays, {law['mass']}", abs(lost), 1e-14
 
 
+def layered():
+    """The unit square of two layers, the upper one a surface `core`."""
+    rng = np.random.default_rng(5)
+    shape = lambda s, t: (s, np.where(abs(t - 0.5) < 0.05, 0.5, t))
+    points, node, triangles = bodies.grid(rng, 8, 8, shape)
+    mesh = bodies.finish(rng, (points, triangles, bodies.sides(node)), 1.0, 0.0)
+    return replace(mesh, surfaces={"core": mesh.nodes[mesh.triangles, 1].mean(1) > 0.5})
+
+
+def materials(order):
+    """Layers in series, ν = 0: u_y = −∫p/E dy. The answers of other materials are wrong, and the damage
+    law counts by surface."""
+    mesh = layered()
+    boundary = [{"name": "west", "symmetry": True}, {"name": "south", "gap": "0"},
+                {"name": "north", "traction": ["0", "-3"]}]
+    pair = lambda low, high: step_of(mesh, boundary, order, material={
+        "young": low, "poisson": 0.0, "core": {"young": high}})
+    step = pair(80.0, 20.0)
+    y = step.discrete.points[:, 1]
+    below = -3 * np.minimum(y, 0.5) / 80 - 3 * np.maximum(y - 0.5, 0.0) / 20
+    exact = np.stack((0 * y, below), 1).ravel()
+    yield "layers: residuals of the exact field", max(residuals(step, exact)[:2]), 1e-14
+    yield "layers: own answer", np.abs(step.solve() - exact).max(), 1e-14
+    yield "planted: layers swapped", 1.0 - wrong(step, pair(20.0, 80.0).solve()), 0.5
+    yield "planted: one material", 1.0 - wrong(step, pair(80.0, 80.0).solve()), 0.5
+    law = {"diffusion": 0.5, "lambda_d": 0.1, "lambda_u": 0.0, "core": {"lambda_d": 0.3}}
+    scene = {**step.discrete.scene, "damage": law}
+    zeta = np.full(len(mesh.nodes), 0.8)
+    found, _ = Discrete(scene, mesh).damage_step(0 * exact, zeta, 0.1)
+    lost = (step.discrete.area * (0.8 - found)[mesh.triangles].mean(1)).sum()
+    yield "the law by surface: ∫ζ", abs(lost - 0.1 * 0.2 * 0.2 / 0.8), 1e-14
+    law["core"]["diffusion"] = 5.0
+    other, _ = Discrete(scene, mesh).damage_step(0 * exact, zeta, 0.1)
+    yield "planted: κ of another surface", float(np.abs(other - found).max() < 1e-6), 0.5
+
+
+def moving(order):
+    """Gaps count at their time; the body is pressed out of an obstacle that it rests in."""
+    gap = [{"name": "west", "symmetry": True}, {"name": "south", "gap": "0.02*t - 0.005"},
+           {"name": "north", "traction": ["0", "-3"]}]
+    early, late = (step_of(square(), gap, order, t) for t in (0.0, 1.0))
+    yield "moving gap: the answer of its time", wrong(early, pressed(order, "-0.005")[1]), 0.0
+    yield "planted: the answer of another time", 1.0 - wrong(late, early.solve()), 0.5
+    fixed = [{"name": "north", "displacement": ["0", "0"]}, {"name": "south", "gap": "-0.01"}]
+    step = step_of(square(), fixed, order, material={"young": 80.0, "poisson": 0.0})
+    exact = np.stack((0 * step.discrete.points[:, 0], 0.01 * (1 - step.discrete.points[:, 1])), 1)
+    # The symmetry of ν = 0 does not hold u_x at the corners: no shear acts.
+    yield "pressed without a load", np.abs(step.solve() - exact.ravel()).max(), 1e-14
+    yield "planted: at rest in the obstacle", 1.0 - wrong(step, 0 * exact.ravel()), 0.5
+    for low, high, refused in (("-0.001", "-0.001", 1.0), ("-0.001", "0.002", 0.0)):
+        # At the clamped end no gap counts but those that the body's rest enters.
+        scene = {**SCENE, "boundary": plates(low, high)[1:] + [{"name": "end", "symmetry": True}]}
+        discrete = Discrete(of_order(scene, order), tip())
+        reason = expectation(discrete)[0] or ""
+        yield f"plates of gaps {low}, {high}", abs(("room" in reason) - refused), 0.0
+
+
+def curved(order):
+    """On a disc with its middles on the circle the normals are radial, and the answer of its chords is
+    wrong."""
+    if order == 1:
+        return
+    mesh = bodies.finish(np.random.default_rng(4), bodies.disc(np.random.default_rng(4)), 1.0, 0.0)
+    ends = mesh.nodes[mesh.triangles[:, SIDES]]
+    middles = ends.mean(axis=2)
+    rim = (np.abs(np.hypot(*np.moveaxis(ends, -1, 0)) - 1.0) < 1e-12).all(axis=2)
+    middles[rim] /= np.hypot(*middles[rim].T)[:, None]
+    boundary = [{"name": "west", "displacement": ["0", "0"]}, {"name": "south", "gap": "0"},
+                {"name": "east", "traction": ["-1", "-2"]}]
+    step = step_of(replace(mesh, middles=middles), boundary, order)
+    ends = np.bincount(step.rows.node)[step.rows.node] > 1
+    inner = [node for node, faces in step.discrete.faces("south").items() if len(faces) == 1]
+    radial = step.discrete.points[step.rows.node]
+    whole = ~ends & np.isin(step.rows.node, inner)
+    off = np.abs(step.rows.direction - radial)[whole].max(axis=1)
+    yield "disc: normals are radial", np.sort(off)[:-2].max(), 1e-14
+    straight = step_of(mesh, boundary, order)
+    yield "planted: sides taken as chords", 1.0 - wrong(step, straight.solve()), 0.5
+
+
 def main():
     failed = 0
-    checks = (patch_test, planted, quadratic, opposite, ranks, damage)
+    checks = (patch_test, planted, quadratic, opposite, ranks, damage, materials, moving, curved)
     for check, order in itertools.product(checks, (1, 2)):
         for name, error, tolerance in check(order):
             good = error <= tolerance

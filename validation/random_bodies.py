@@ -5,6 +5,8 @@ A body is a `Triangulation` whose curves are its sides. Nodes and triangles are 
 so that nothing may rest on their order.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from lagrange import SIDES, Lagrange
@@ -199,7 +201,27 @@ def bent(rng, mesh):
     forward = np.where(t[:, SIDES][:, :, 0] < t[:, SIDES][:, :, 1], 1.0, -1.0)
     across = np.stack([chord[..., 1], -chord[..., 0]], -1) / length[..., None]
     move = (forward * height[edge.reshape(-1, 3)])[..., None] * across
-    return Triangulation(x, t, mesh.curves, ends.mean(axis=2) + move)
+    return replace(mesh, middles=ends.mean(axis=2) + move)
+
+
+def patched(rng, mesh):
+    """The body with one or two surfaces in it: the triangles on one side of a line, within a disc, or
+    any, some of them no more than touching each other in a node."""
+    centre, size = mesh.nodes[mesh.triangles].mean(axis=1), np.ptp(mesh.nodes, axis=0).max()
+    surfaces, taken = {}, np.zeros(len(centre), bool)
+    for name in ("core", "skin")[:int(rng.integers(1, 3))]:
+        middle, way = centre[rng.integers(len(centre))], rng.integers(3)
+        if way == 0:
+            inside = (centre - middle) @ rng.standard_normal(2) > 0.0
+        elif way == 1:
+            inside = np.hypot(*(centre - middle).T) < rng.uniform(0.05, 0.5) * size
+        else:
+            inside = rng.random(len(centre)) < rng.uniform(0.1, 0.6)
+        inside &= ~taken
+        if inside.any() and not inside.all():
+            surfaces[name] = inside
+            taken |= inside
+    return replace(mesh, surfaces=surfaces)
 
 
 def write_msh(mesh, path):
@@ -207,14 +229,20 @@ def write_msh(mesh, path):
     space = Lagrange(mesh, 1 if mesh.middles is None else 2)
     line, triangle = (1, 2) if mesh.middles is None else (8, 9)
     lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat"]
-    lines += ["$PhysicalNames", str(len(mesh.curves) + 1)]
+    # Surfaces are numbered behind the curves; 1 is the rest of the body.
+    first = len(mesh.curves) + 2
+    surface = np.ones(len(mesh.triangles), int)
+    for k, inside in enumerate(mesh.surfaces.values(), first):
+        surface[inside] = k
+    lines += ["$PhysicalNames", str(first - 1 + len(mesh.surfaces))]
     lines += [f'1 {k} "{name}"' for k, name in enumerate(mesh.curves, 2)] + ['2 1 "body"']
+    lines += [f'2 {k} "{name}"' for k, name in enumerate(mesh.surfaces, first)]
     lines += ["$EndPhysicalNames", "$Nodes", str(len(space.points))]
     lines += [f"{i} {x!r} {y!r} 0" for i, (x, y) in enumerate(space.points.tolist(), 1)]
     tags = lambda nodes: " ".join(str(node + 1) for node in nodes)
     elements = [f"{line} 2 {k} {k} {tags(nodes)}" for k, edges in enumerate(mesh.curves.values(), 2)
                 for nodes in space.on(edges)]
-    elements += [f"{triangle} 2 1 1 {tags(nodes)}" for nodes in space.elements]
+    elements += [f"{triangle} 2 {k} {k} {tags(nodes)}" for k, nodes in zip(surface, space.elements)]
     lines += ["$EndNodes", "$Elements", str(len(elements))]
     lines += [f"{i} {element}" for i, element in enumerate(elements, 1)]
     path.write_text("\n".join([*lines, "$EndElements", ""]), encoding="utf-8")

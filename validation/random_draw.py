@@ -19,13 +19,15 @@ PROFILES = ("1", "t", "cos(pi*t)", "(1 - 2*t)", "sin(2*pi*t)", "(0.2 + t^2)", "(
 
 @dataclass
 class Case:
-    """A scene to run."""
+    """A scene to run; its typical displacement, m, and strain."""
 
     kind: str
     scene: dict
     mesh: Triangulation
     solver: str
     ranks: int
+    move: float
+    strain: float
 
 
 class Draw:
@@ -292,7 +294,7 @@ def draw(seed, number, solvers):
     (conditions or OWN[make])(d, mesh)
     scene = d.scene(mesh, kind == "damage")
     return Case(kind, scene, mesh, str(rng.choice(solvers)),
-                int(rng.choice([1, 2, 3], p=[0.7, 0.15, 0.15])))
+                int(rng.choice([1, 2, 3], p=[0.7, 0.15, 0.15])), d.move, d.strain)
 
 
 def vector(direction):

@@ -2,8 +2,8 @@
 """Judges the program on random scenes: random_scenes.py [--count N] [--seed S] [--order 2] …
 
 Each scene (`random_draw`) is run with a drawn solver on one to three ranks, and its answer judged
-by code that shares nothing with the program (`judge`). With displacements of order 2 bodies have
-curved sides. Writes out/random/scenes.csv; scenes judged wrong or wrongly refused are kept in
+by code that shares nothing with the program (`judge`). Displacements of order 2, curved sides, several
+materials and moving gaps are drawn too (`random_variants`). Writes out/random/scenes.csv; scenes judged wrong or wrongly refused are kept in
 out/random/failures/ID with what was run, and make the exit code 1. `--again ID` runs a kept one once
 more. (`judge_check` tries the judge itself.)
 """
@@ -27,12 +27,11 @@ from pathlib import Path
 # The judge's matrices are small: threads would only wait for each other.
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", SCOTCH_PTHREAD_NUMBER="1")
 
-import numpy as np  # noqa: E402
-
 from judge import Verdict, judge  # noqa: E402
-from random_bodies import bent, write_msh  # noqa: E402
+from random_bodies import write_msh  # noqa: E402
 from random_draw import draw  # noqa: E402
-from scene import of_order, read_scene, write_scene  # noqa: E402
+from random_variants import vary  # noqa: E402
+from scene import read_scene, write_scene  # noqa: E402
 from solvers import solvers  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -102,9 +101,8 @@ def follow(folder, binary, solver, ranks, tolerance):
 def one(binary, out, seed, number, solver, order):
     """Draws, runs and judges scene `number`; keeps its files if it failed."""
     case = draw(seed, number, solvers(binary))
-    case.solver, case.scene = solver or case.solver, of_order(case.scene, order)
-    if order == 2:
-        case.mesh = bent(np.random.default_rng([seed, number, order]), case.mesh)
+    case.solver = solver or case.solver
+    vary(case, seed, number, order)
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         write_msh(case.mesh, folder / "mesh.msh")
@@ -145,7 +143,7 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--first", type=int, default=0, help="number of the first scene")
     parser.add_argument("--solver", help="this one instead of the one drawn")
-    parser.add_argument("--order", type=int, choices=[1, 2], default=1, help="of the displacements")
+    parser.add_argument("--order", type=int, choices=[1, 2], help="of the displacements (default: drawn)")
     parser.add_argument("--binary", type=Path, default=ROOT / "target" / "release" / "signorini")
     parser.add_argument("--out", type=Path, default=ROOT / "out" / "random")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())

@@ -9,7 +9,7 @@ and by Farkas.
 
 import numpy as np
 from scipy.linalg import null_space, qr
-from scipy.optimize import nnls
+from scipy.optimize import linprog, nnls
 from scipy.sparse import bmat, coo_matrix, diags, identity
 from scipy.sparse.linalg import splu
 
@@ -20,7 +20,7 @@ class Step:
     """One contact step: its algebra, whether it has a solution, and the solution."""
 
     def __init__(self, discrete, zeta, t):
-        self.discrete, self.rows = discrete, discrete.contact
+        self.discrete, self.rows = discrete, discrete.contact_rows(t)
         self.k, self.f = discrete.stiffness(zeta), discrete.load(t)
         self.prescribed = discrete.prescribed_rows(t)
         self.zeta = zeta
@@ -30,6 +30,7 @@ class Step:
         self.b = self.rows.value - along(self.rows, self.lift)
         self._motions()
         self.contradiction, self.penetration = self._contradiction(), self._penetration()
+        self.overlap, self.squeezed = self._overlap(), self._overlap(1e3)
         self.driven = self._driven()
 
     def _eliminate(self):
@@ -103,6 +104,21 @@ class Step:
             worst = max(worst, -room)
         return worst
 
+    def _overlap(self, reach=np.inf):
+        """How much room obstacles on several sides of a node lack: the least s of Av ≤ b + s, |v| no
+        larger than `reach` times the gaps."""
+        worst, rows = 0.0, self.rows
+        for node in np.setdiff1d(rows.node[rows.value < 0.0], self.prescribed.node):
+            at = rows.node == node
+            if at.sum() < 2:
+                continue
+            size = np.abs(rows.value[at]).max()
+            left = np.column_stack([rows.direction[at], -np.ones(at.sum())])
+            bounds = [(-reach, reach)] * 2 + [(0.0, None)]
+            found = linprog([0.0, 0.0, 1.0], left, rows.value[at] / size, bounds=bounds)
+            worst = max(worst, found.x[2] * size)
+        return worst
+
     def _driven(self):
         """How much of the load, relative, no contact force λ ≥ 0 balances (Farkas). Forces 1e11
         times the load do not count: they would live on the rounding of opposite normals."""
@@ -125,7 +141,8 @@ class Step:
         pins = qr(self.free.T, pivoting=True, mode="economic")[2] if self.free.size else []
         pinned = np.isin(np.arange(len(self.q)), pins[:self.free.shape[1]])
         self.h = h + self.size * diags(pinned * 1.0)
-        force = np.abs(self.q).max(initial=0.0)
+        # A body that rests in its obstacles is pressed without a load.
+        force = max(np.abs(self.q).max(initial=0.0), self.size * (-self.b).max(initial=0.0))
         v, self.active = np.zeros(len(self.q)), np.zeros(len(self.b), bool)
         lam = np.zeros(len(self.b))
         if force > 0.0:
