@@ -10,21 +10,27 @@ import re
 import sys
 from pathlib import Path
 
+from bars import barred, bars
+
 
 def row(name, value):
     return f"  {name:<30} {value}"
 
 
-def entry(name, value):
-    """The lines of an entry of summary.json; of a table those of its entries."""
+def entry(name, value, errors):
+    """The lines of an entry of summary.json; of a table those of its entries. Figures that have an
+    error bar stand with it."""
+    if name == "errors.figures":
+        return []
     if isinstance(value, dict):
-        return [line for below in value for line in entry(f"{name}.{below}", value[below])]
+        return [line for below in value for line in entry(f"{name}.{below}", value[below], errors)]
     if isinstance(value, list):
         # Others than notes are for figures.
         words = [word for word in value if isinstance(word, str)]
         return [row(name, " ".join(words))] if name.endswith("command") else [
             row(name, word) for word in words]
-    text = value if isinstance(value, str) else json.dumps(value)
+    bar = errors.get(name.removeprefix("quantities."))
+    text = value if isinstance(value, str) else bar and barred(value, bar) or json.dumps(value)
     return [] if value is None else [row(name, text)]
 
 
@@ -32,7 +38,9 @@ def description(folder):
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     if not isinstance(summary, dict) or "steps" not in summary:
         raise ValueError("it tells of no run")
-    lines = [line for name in summary if name != "phases" for line in entry(name, summary[name])]
+    errors = bars(summary)
+    lines = [line for name in summary if name != "phases"
+             for line in entry(name, summary[name], errors)]
     frames = []
     if (folder / "fields.pvd").exists():
         frames = re.findall('timestep="(.*?)".*?file="(.*?)"',

@@ -93,7 +93,8 @@ def draw_state(results, limits, figure=None):
 def _amplified(results, limits):
     """How the deformation is shown."""
     largest = np.linalg.norm(results.displacement, axis=1).max()
-    moves = f"displacements × {limits.factor:g} (largest {largest:.3g} {results.units['length']})"
+    largest = results.barred("displacement_max", largest) or f"{largest:.3g}"
+    moves = f"displacements × {limits.factor:g} (largest {largest} {results.units['length']})"
     return "unloaded" if results.unloaded else moves
 
 
@@ -119,4 +120,5 @@ def _paint_damage(axes, mesh, results, limits):
         vmin=low, vmax=high, rasterized=True,
     )
     draw_colourbar(axes, image, label)
-    return rf"damage, least $\zeta$ = {least_zeta(results.zeta.min())}"
+    least = results.zeta.min()
+    return rf"damage, least $\zeta$ = {results.barred('zeta_min', least) or least_zeta(least)}"

@@ -17,6 +17,7 @@ from string import Template
 
 import matplotlib.pyplot as plt
 
+from bars import barred, bars
 from contact_pressure import draw_evolution, draw_pressure
 from histories import draw_damage_history, draw_force_displacement, draw_histories
 from limits import limits_of
@@ -96,11 +97,13 @@ def slider(results):
 
 def facts(results):
     """What summary.json says of the last state, and the quantities that are asked for by name."""
-    summary, units = results.summary, results.units
-    rows = [(name, summary[key], html.escape(units.get(kind, "")))
+    summary, units, errors = results.summary, results.units, bars(results.summary)
+    rows = [(name, barred(summary[key], errors.get(key)) or summary[key],
+             html.escape(units.get(kind, "")))
             for key, name, kind in FACTS if summary.get(key) is not None]
     named = summary.get("quantities", {})
-    rows += [(html.escape(name), value, "") for name, value in named.items()]
+    rows += [(html.escape(name), barred(value, errors.get(name)) or value, "")
+             for name, value in named.items()]
     return table(rows)
 
 
@@ -135,7 +138,7 @@ def page(results):
     everything = states(results, evenly(results.frames, 400))
     errors = summary.get("errors") or {}
     percent = {key: "none" if value is None else f"{100 * value:.2g} %"
-               for key, value in errors.items()}
+               for key, value in errors.items() if key != "figures"}
     notes = [f"<li>{html.escape(note)}</li>" for note in summary.get("notes", [])]
     error = summary.get("error")
     ending = error and f"failed: {error}" or results.ending.replace("$_*$", "_*")

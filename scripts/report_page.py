@@ -20,6 +20,7 @@ PAGE = """<!DOCTYPE html>
   td, th { padding: .15rem .9rem .15rem 0; text-align: left; vertical-align: top;
            font-weight: normal; }
   td.number { text-align: right; font-variant-numeric: tabular-nums; }
+  .facts td:nth-child(2) { text-align: right; font-variant-numeric: tabular-nums; }
   td.bar { width: 16rem; }
   td.bar div { background: #2f6db3; height: .7rem; margin-top: .4rem; }
   pre { background: #f4f6f8; padding: .8rem; overflow-x: auto; font-size: 13px; }
@@ -32,7 +33,7 @@ PAGE = """<!DOCTYPE html>
 <h1>$title</h1>
 <p class="quiet">$subtitle</p>
 <p class="ending">$ending</p>
-<div class="pair"><div>$facts</div><div>$setting</div></div>
+<div class="pair"><div class="facts">$facts</div><div>$setting</div></div>
 $slider
 <h2>Last state</h2>
 $pictures

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bars import barred, bars
 from elements import Pieces
 
 # Parts of the largest value of a run that only round-off and the solver's tolerance (1e-10) leave.
@@ -115,6 +116,10 @@ class Results:
     def is_last(self):
         """Whether this is the last state of the run."""
         return self.time == self.frames[-1][0]
+
+    def barred(self, name, value):
+        """A figure of the last state with its error bar; None at other times, or without one."""
+        return barred(value, bars(self.summary).get(name)) if self.is_last else None
 
     @property
     def active(self):

@@ -18,10 +18,10 @@ macro_rules! scripts {
 }
 
 /// What the scripts import from each other.
-const SCRIPTS: [(&str, &str); 18] = scripts! {
-    "animation" "compare" "contact_pressure" "drawing" "elements" "expressions" "figures" "histories"
-    "info" "limits" "maps" "paraview_script" "paraview_view" "reading" "report" "report_page" "results"
-    "setting"
+const SCRIPTS: [(&str, &str); 19] = scripts! {
+    "animation" "bars" "compare" "contact_pressure" "drawing" "elements" "expressions" "figures"
+    "histories" "info" "limits" "maps" "paraview_script" "paraview_view" "reading" "report"
+    "report_page" "results" "setting"
 };
 /// Runs one of them.
 const EMBEDDED: &str = include_str!("../../scripts/embedded.py");

@@ -1,0 +1,31 @@
+"""Figures with their error bars, `errors.figures` of summary.json, as text."""
+
+from decimal import ROUND_CEILING, Decimal
+
+# A bar that is a smaller part of its figure is below the rounding of its digits.
+ROUNDING = 1e-15
+
+
+def bars(summary):
+    """The error bars of a run by the names of figures; empty where none were estimated."""
+    figures = (summary.get("errors") or {}).get("figures") or {}
+    return {name: bar for name, bar in figures.items() if bar is not None}
+
+
+def barred(value, bar):
+    """`5.3570 ± 0.0005`: the bar rounded up to its first digit, or to its second where the first is 1 or 2,
+    and the value to the same; `(1.4016 ± 0.0003)e-7` where decimals would be many. None
+    without a bar."""
+    if bar is None or bar <= ROUNDING * abs(value):
+        return None
+    value, bar = Decimal(repr(float(value))), Decimal(repr(float(bar)))
+    first = bar.adjusted()
+    last = first - (bar.scaleb(-first) < 3)
+    power = max(value, bar, key=abs).adjusted()
+    power = 0 if -4 <= power <= 6 else power
+    unit = Decimal(1).scaleb(last - power)
+    # Adding 0 takes the sign from a zero.
+    value = value.scaleb(-power).quantize(unit) + 0
+    bar = bar.scaleb(-power).quantize(unit, ROUND_CEILING)
+    text = f"{value:f} ± {bar:f}"
+    return f"({text})e{power}" if power else text
