@@ -32,7 +32,8 @@ export SIGNORINI_COMMIT := $(shell git describe --always --dirty 2>/dev/null)
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
 .PHONY: help deps deps-validate deps-random deps-bench build mesh run figures test validate random compare \
-    bench stability reference converge chart accuracy kills fuzz wrong clean
+    bench stability reference converge chart accuracy promises kills \
+    fuzz wrong clean
 
 help:
 	@echo 'make mesh && make run   mesh and solve the scenes of geo/, draw their figures into out/'
@@ -52,6 +53,7 @@ help:
 	@echo 'make converge   errors against it on nested meshes: Table 1, Figure 3; or STUDY=geo/a.toml'
 	@echo 'make chart      error against seconds: meshes, orders, --accuracy, solvers, FEniCSx; or CHART="geo/a.toml …"'
 	@echo 'make accuracy   true errors over the accuracy asked for (minutes); or ACCURACY="geo/a.toml …"'
+	@echo 'make promises   bars and "reached" of --accuracy on bodies that are not shipped (half an hour, once)'
 	@echo 'make kills      runs killed 50 times and restarted: the same checksums; or ARGS="--count 10"'
 	@echo 'make fuzz       10 million inputs for what reads meshes, scenes, expressions (nightly Rust, cargo-fuzz)'
 	@echo 'make wrong      43 wrong inputs and what the program says of them'
@@ -138,6 +140,10 @@ chart: build deps-validate
 
 accuracy: build
 	$(PYTHON) validation/asked.py --binary $(BINARY) $(ACCURACY)
+
+# Truths are kept in out/promises/truth.
+promises: build
+	$(PYTHON) validation/promises.py --binary $(BINARY) $(ARGS)
 
 kills: build deps
 	$(PYTHON) validation/kills.py --binary $(BINARY) $(ARGS)

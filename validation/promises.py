@@ -1,0 +1,237 @@
+#!/usr/bin/python3
+"""What `--accuracy` promises, tried on forty bodies that are not shipped: promises.py [--binary FILE] [NAME…]
+
+Runs the scenes of promises/scenes.py with `--accuracy` 0.1, 0.03 and 0.01 and compares every printed figure of
+the last state with a truth: quadratic elements on a fine mesh that is graded to the corners and to the
+features that the scene names, with hundreds of uniform steps of second order. It depends on no estimate. A second
+truth with 1.6 times the sizes and steps tells the first one's own error: their difference. Truths are kept in FOLDER/NAME-HASH (--truth).
+
+An error counts relative to the figure's scale, the largest value in the truth's run: of 1 − ζ for `zeta_min` and
+`zeta_mean`, of all components of all supports for forces, of all probes' for a kind of probe. Bars are
+`errors.figures` in summary.json where the program writes them. Writes FOLDER/promises.csv (--out): a row for each
+figure of each run. Exit code 1 if a bar or a "reached" does not hold.
+"""
+
+import argparse
+import csv
+import hashlib
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+
+sys.path.insert(1, str(Path(__file__).resolve().parent / "promises"))
+
+from scene import SceneError  # noqa: E402
+from scenes import scenes, table, texts, write  # noqa: E402
+from true_errors import Run, elasticity, errors  # noqa: E402
+
+ROOT = Path(__file__).resolve().parent.parent
+# Sizes of the second truth over those of the first.
+COARSER = 1.6
+# A force below this part of the largest, a damage below this, is rounding.
+ROUNDING = 1e-9
+# Seconds for a run, on a busy machine.
+LIMIT = 240
+FIELDS = ("scene", "accuracy", "told", "figure", "value", "truth", "truth_error", "scale", "error", "bar", "seconds")
+
+
+def make(binary, scene, folder, factor):
+    """Runs a scene's truth with its sizes times a factor, if that was not done before; its results and the
+    seconds it took."""
+    text = json.dumps(texts(scene, factor))
+    kept = folder / f"{scene.name}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
+    if not (kept / "seconds").exists():
+        kept.mkdir(parents=True, exist_ok=True)
+        started = time.perf_counter()
+        run(binary, write(scene, kept, factor), kept / "out")
+        (kept / "seconds").write_text(f"{time.perf_counter() - started:.1f}\n")
+    return kept / "out", float((kept / "seconds").read_text())
+
+
+def run(binary, path, out, *more):
+    """Runs a scene on one rank."""
+    command = [binary, "run", path, "--out", out, "--ranks", "1", *more]
+    try:
+        done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=LIMIT)
+    except subprocess.TimeoutExpired:
+        raise SceneError(f"no end within {LIMIT} s {' '.join(map(str, more))}") from None
+    summary = out / "summary.json"
+    if not summary.exists():
+        raise SceneError(f"{path}: {(done.stderr or done.stdout).strip()}")
+    return json.loads(summary.read_text())
+
+
+def figures(summary):
+    """The printed figures by name."""
+    names = ["work", "displacement_max", "contact_force"]
+    names += ["zeta_min", "zeta_mean"] if summary["errors"]["damage_mesh"] is not None else []
+    others = {k: v for k, v in summary["quantities"].items() if not k.endswith(".moment")}
+    return {**{name: summary[name] for name in names}, **others}
+
+
+def scales(out, names):
+    """By figure the largest value of its kind in the run."""
+    with open(out / "history.csv", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    largest = {n: max(abs((n.startswith("zeta_") or n.endswith(".zeta")) - float(row[n])) for row in rows) for n in names}
+
+    def kind(name):
+        last = name.rpartition(".")[2]
+        of = next((k for k in ("force_", "u_", "zeta", "stress", "von_mises") if last.startswith(k)), last)
+        return "stress" if of == "von_mises" else of
+
+    return {n: max(v for m, v in largest.items() if kind(m) == kind(n) and ("." in m) == ("." in n)) for n in names}
+
+
+class Truth:
+    """A scene's truth, with its own errors."""
+
+    def __init__(self, binary, scene, folder):
+        (fine, first), (coarse, second) = (make(binary, scene, folder, factor) for factor in (1.0, COARSER))
+        self.scene, self.seconds = scene, first + second
+        self.run, other = Run(fine), Run(coarse)
+        self.figures = figures(self.run.summary)
+        if self.run.summary["stopped_at"] is not None:
+            raise SceneError("the truth stops at ζ_*")
+        self.own = {name: abs(figures(other.summary)[name] - value) for name, value in self.figures.items()}
+        self.scales = scales(fine, self.figures)
+        self.norms = self.errors(other)
+
+    def errors(self, run):
+        """Of a run the errors of u in the energy norm and of the damage in L², by name; not those that have no
+        meaning."""
+        material = table(self.scene)
+        values = {**material["material"], **{k[9:]: v for k, v in material.items() if k.startswith("material.")}}
+        number = np.zeros(len(self.run.cells), int) if self.run.material is None else self.run.material
+        others = [values, *(values[name] for name in sorted(k for k, v in values.items() if isinstance(v, dict)))]
+        d = np.array([elasticity(of["young"], of["poisson"], values["plane"]) for of in others])[number]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            found = zip(("u", "damage"), errors(self.run, run, d))
+        return {name: error for name, error in found if error is not None and error < 1e3}
+
+
+def compare(truth, summary, result, accuracy, seconds):
+    """A row for each figure of a run."""
+    notes = [note for note in summary["notes"] if note.startswith("accuracy ")]
+    told = "NOT reached" if any("NOT" in note for note in notes) else "reached" if notes else "?"
+    head = {"scene": truth.scene.name, "accuracy": accuracy, "told": told, "seconds": f"{seconds:.2f}"}
+    given, bars = summary["errors"], summary["errors"].get("figures") or {}
+    force = max(scale for name, scale in truth.scales.items() if "force" in name)
+    for name, value in figures(summary).items():
+        scale, bar = truth.scales[name], bars.get(name)
+        # Nothing but rounding in the truth: no load does work, no foundation is touched.
+        if scale <= (ROUNDING * force if "force" in name else ROUNDING * ("zeta" in name)):
+            continue
+        yield {**head, "figure": name, "value": value, "truth": truth.figures[name],
+               "truth_error": truth.own[name] / scale, "scale": scale,
+               "error": abs(value - truth.figures[name]) / scale, "bar": None if bar is None else bar / scale}
+    for name, error in truth.errors(Run(result)).items():
+        parts = [given.get(f"{'displacement' if name == 'u' else name}_{part}") or 0.0 for part in ("mesh", "steps")]
+        yield {**head, "figure": name, "value": None, "truth": None, "truth_error": truth.norms.get(name, 0.0), "scale": 1.0,
+               "error": error, "bar": float(np.hypot(*parts))}
+
+
+def line(rows):
+    """One run on the screen: the largest errors over the accuracy asked for, with the bars where there are."""
+    first, worst = rows[0], sorted(rows, key=lambda row: -row["error"])[:4]
+    bar = lambda row: "" if row["bar"] is None else f" (bar {row['bar'] / row['accuracy']:.2f})"
+    shown = ", ".join(f"{row['figure']} {row['error'] / row['accuracy']:.2f}{bar(row)}" for row in worst)
+    own = max((row["truth_error"] for row in rows if row["value"] is not None), default=0.0)
+    return (f"{first['scene']:<19} {first['accuracy']:<5} {first['told']:<11} {float(first['seconds']):5.1f} s, errors "
+            f"over the accuracy: {shown}; figures of the truth to {own:.0e}")
+
+
+def bars_of(what, rows):
+    """How often the bars hold, how wide they are, and the worst three."""
+    rows = [row for row in rows if row["bar"] is not None]
+    missed = [row for row in rows if row["error"] > row["bar"] + row["truth_error"]]
+    # Where the truth is exact enough to tell.
+    ratios = [row["bar"] / row["error"] for row in rows if row["error"] > 10 * row["truth_error"]]
+    if not rows:
+        return [f"{what}: no bars"], 0
+    lines = [f"{what}: the bar holds in {len(rows) - len(missed)} of {len(rows)} cases; "
+             f"median bar over true error {median(ratios or [np.nan]):.2f}"]
+    worst = sorted(missed, key=lambda row: (row["bar"] + row["truth_error"]) / row["error"])[:3]
+    return lines + [f"  worst: {row['scene']} at {row['accuracy']}, {row['figure']}: error {row['error']:.2e} of the "
+                    f"scale, bar {row['bar']:.2e}, truth to {row['truth_error']:.0e}" for row in worst], len(missed)
+
+
+def reached_of(what, rows):
+    """In how many runs "reached" is true, and the worst three where it is not."""
+    runs, over = {}, {}
+    for row in rows:
+        runs.setdefault((row["scene"], row["accuracy"]), []).append(row)
+    told = {run: of for run, of in runs.items() if of[0]["told"] == "reached"}
+    for run, of in told.items():
+        if any(row["error"] > row["accuracy"] + row["truth_error"] for row in of):
+            over[run] = max(of, key=lambda row: row["error"] - row["truth_error"])
+    lines = [f'{what}: "reached" in {len(told)} of {len(runs)} runs, and true in {len(told) - len(over)} of these']
+    worst = sorted(over.items(), key=lambda item: -item[1]["error"] / item[1]["accuracy"])[:3]
+    return lines + [f"  worst: {name} at {accuracy}: {row['figure']} errs by {row['error'] / accuracy:.3g} times the "
+                    "accuracy" for (name, accuracy), row in worst], len(over)
+
+
+def summary_of(rows):
+    """What the trial says; and how many bars of figures and promises are broken."""
+    printed = [row for row in rows if row["value"] is not None]
+    norms = [row for row in rows if row["value"] is None]
+    (bars, missed), (told, over) = bars_of("printed figures", printed), reached_of("printed figures", printed)
+    name = "u in the energy norm, damage in L²"
+    seconds = sum(float(s) for _, _, s in {(r["scene"], r["accuracy"], r["seconds"]) for r in rows})
+    return [*bars, *bars_of(name, norms)[0], *told, *reached_of(name, norms)[0],
+            f"seconds of all runs: {seconds:.0f}"], missed + over
+
+
+def trial(binary, truth, accuracy):
+    """The rows of a scene with an accuracy."""
+    with tempfile.TemporaryDirectory() as folder:
+        path, out = write(truth.scene, Path(folder)), Path(folder) / "out"
+        started = time.perf_counter()
+        summary = run(binary, path, out, "--accuracy", accuracy)
+        return list(compare(truth, summary, out, accuracy, time.perf_counter() - started))
+
+
+def write_rows(rows, path):
+    """Writes the rows as CSV."""
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, FIELDS)
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--binary", type=Path, default=ROOT / "target" / "release" / "signorini")
+    parser.add_argument("--out", type=Path, default=ROOT / "out" / "promises")
+    parser.add_argument("--truth", type=Path, default=ROOT / "out" / "promises" / "truth")
+    parser.add_argument("--accuracy", type=float, nargs="+", default=[0.1, 0.03, 0.01])
+    parser.add_argument("names", nargs="*", help="of scenes, if not all")
+    arguments = parser.parse_args()
+    binary, rows = arguments.binary.resolve(), []
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    failed = 0
+    for scene in (s for s in scenes() if s.name in arguments.names or not arguments.names):
+        truth = None
+        for accuracy in arguments.accuracy:
+            try:
+                truth = truth or Truth(binary, scene, arguments.truth)
+                new = trial(binary, truth, accuracy)
+                rows += new
+                print(line(new), f"in {truth.seconds:.0f} s", flush=True)
+            except SceneError as error:
+                failed += 1
+                print(f"{scene.name} {accuracy}: {error}", flush=True)
+        write_rows(rows, arguments.out / "promises.csv")
+    lines, broken = summary_of(rows)
+    print(*lines, sep="\n")
+    return int(broken + failed > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
