@@ -81,7 +81,7 @@ fn figures_stand_with_their_error_bars_where_the_run_estimated_them() {
     }
     assert_eq!(test_directory.say(&["report", "out/scene"]).code, Some(0));
     let page = test_directory.read("out/scene/report.html");
-    for text in ["5.3570 ± 0.0005", "(1.401610 ± 0.000027)e-7"] {
+    for text in ["5.3570 ± 0.0005", "(1.40161 ± 0.00027)e-7"] {
         assert!(said.out.contains(text), "no `{text}` in: {}", said.out);
         assert!(page.contains(text), "no `{text}` in the report");
     }
