@@ -15,6 +15,8 @@ from conditions import as_rows, merged, merged_gaps, pair
 from lagrange import SIDES, Lagrange, derivatives, functions
 from scene import Expression, displacement_order, of_material
 
+# Lines at an angle below the first are one; at one below the second rounding may hide that they are two.
+SAME, ALIKE = 1e-8, 1e-4
 DAMAGE = {"lambda_w": 0.0, "strain_cap": 1000.0, "threshold": 0.01, "initial": 1.0,
           "mass": "consistent"}
 # Barycentric coordinates of the points, of equal weights, that integrate the stiffness.
@@ -178,8 +180,9 @@ class Discrete:
         return as_rows([(node, d, value(node, e)) for node, d, e in self.prescribed])
 
     def bad_input(self, times):
-        """A reason why the scene must be refused whatever its loads, or None; then whether a
-        fixed normal points into the body at some of its edges only (either answer will do)."""
+        """A reason why the scene must be refused whatever its loads, or None; then whether either answer
+        will do: a fixed normal points into the body at some of its edges only, or two lines of
+        contact at a node are hardly two."""
         some = False
         for boundary in self.boundaries:
             if "gap" not in boundary:
@@ -198,8 +201,10 @@ class Discrete:
         for node in np.setdiff1d(rows.node, list(prescribed)):
             lines = []
             for n in rows.direction[rows.node == node]:
-                if all(abs(n[0] * m[1] - n[1] * m[0]) > 1e-8 for m in lines):
+                sines = [abs(n[0] * m[1] - n[1] * m[0]) for m in lines]
+                if all(sine > SAME for sine in sines):
                     lines.append(n)
+                some |= any(SAME < sine < ALIKE for sine in sines)
             if len(lines) > 2:
                 return "more than two lines of contact at a node", False
         return None, some

@@ -72,18 +72,20 @@ def verdict_on(discrete, out, code, output):
     if found.word == "wrong":
         return found
     if code == 1:
-        return Verdict("refused wrongly", said + missed(discrete, frames))
+        why, excused = missed(discrete, frames)
+        return Verdict("either" if excused else "refused wrongly", said + why)
     return judge_stop(discrete, frames, out) or found
 
 
 def missed(discrete, frames):
-    """What is known of the step that a solver failed at: whether rounding alone explains it."""
+    """What is known of the step that a solver failed at, and whether rounding alone, larger than the
+    tolerance, explains it."""
     damaged = "damage" in discrete.scene
     if frames:
         last = frames[-1]
         zeta, later = last.zeta, [t for t in times(discrete.scene) if t > last.time * (1 + 1e-9)]
         if not later:
-            return ""
+            return "", False
         if damaged:
             zeta, _ = discrete.damage_step(last.u, zeta, later[0] - last.time)
     else:
@@ -91,10 +93,11 @@ def missed(discrete, frames):
     step = Step(discrete, zeta, later[0])
     own = step.solve()
     forces, places, (force, _) = residuals(step, own)
+    level = 1e-16 * discrete.element_sizes(zeta, own)[1].max() / (force or 1.0)
+    excused = level > TOLERANCE * ease(discrete)
     if forces > FORCE or places > PLACE:
-        return " (nor has the judge a good answer)"
-    level = 1e-16 * discrete.element_sizes(zeta, own)[1].max() / force
-    return " (rounding alone is near the tolerance)" if level > 0.01 * TOLERANCE else ""
+        return " (nor has the judge a good answer)", excused
+    return " (rounding alone is near the tolerance)" if level > 0.01 * TOLERANCE else "", excused
 
 
 def times(scene):
