@@ -5,7 +5,7 @@
 //!
 //! where the gap is narrower or more curved than an edge shows.
 
-use super::{DiscreteProblem, State, parts::edge_parts};
+use super::{DiscreteProblem, State};
 use crate::{
     fem::{Edge, Elements, parabola},
     mesh::sorted,
@@ -13,10 +13,10 @@ use crate::{
 };
 use std::collections::HashMap;
 
-/// Points at which the penetration of an edge is sampled, besides those at which its gap asks for it.
-const SAMPLES: usize = 16;
-/// How well the parts of an edge show its gap.
-const DEVIATION: f64 = 1e-3;
+/// Penetrations are found to this part of the largest displacement …
+const RESOLVED: f64 = 1e-3;
+/// … but for peaks of the foundation that are narrower than this part of an edge.
+const NARROWEST: f64 = 1e-5;
 /// A penetration above this part of the largest displacement is noted.
 const NOTED: f64 = 0.05;
 
@@ -37,13 +37,14 @@ impl DiscreteProblem {
     /// The edges of Γ_C between whose nodes the body lies in the foundation, in a state. Collective.
     pub(super) fn penetrations(&self, state: &State) -> Vec<Penetration> {
         let mut own = Vec::new();
+        let displacement = self.body.nodes.partition.max_norm(&state.u);
         let boundaries = self.scene().boundaries.iter().enumerate();
         for (number, gap, curve) in boundaries.filter_map(|(number, boundary)| {
             Some((number, boundary.gap()?, self.body.mesh.curves.get(&boundary.name)?))
         }) {
             let sides = self.sides(&curve.edges);
             for (triangle, edge) in sides {
-                let (depth, [x, y]) = self.deepest(gap, &edge, state);
+                let (depth, [x, y]) = self.deepest(gap, &edge, state, displacement);
                 if depth > 0.0 {
                     own.push([triangle as f64, depth, x, y, number as f64]);
                 }
@@ -108,34 +109,51 @@ impl DiscreteProblem {
         sides
     }
 
-    /// The largest penetration between the nodes of an edge, less what its ends have, and where, m: normals
-    /// at nodes are means of two edges', so that the ends of an edge may lie in the foundation along its own.
-    fn deepest(&self, gap: &Gap, edge: &Edge, state: &State) -> (f64, [f64; 2]) {
-        let points = &self.body.nodes.points;
+    /// The largest penetration between the nodes of an edge, less what its ends have, and where, m, to
+    /// [`RESOLVED`] of the `displacement`. (Normals at nodes are means of two edges', so that the ends of an
+    /// edge may lie in the foundation along its own.)
+    ///
+    /// Branch and bound: a part of the edge is halved as long as the most that u·ν may be there, less the
+    /// least that the gap may be ([`Expression::range`](crate::scene::Expression::range)), is above what was
+    /// found: no peak of the foundation is too narrow.
+    fn deepest(&self, gap: &Gap, edge: &Edge, state: &State, displacement: f64) -> (f64, [f64; 2]) {
+        let (points, t) = (&self.body.nodes.points, state.time);
         let u = |node: usize| [state.u[2 * node], state.u[2 * node + 1]];
         let [p, q] = edge.ends.map(u);
         let middle = edge.middle.map_or([0, 1].map(|k| 0.5 * (p[k] + q[k])), u);
-        let at = |s: f64| {
-            let [x, y] = edge.at(points, s);
+        let normal_displacement = |s: f64| {
             let normal = gap.normal.unwrap_or_else(|| {
                 let [tx, ty] = edge.tangent(points, s);
                 let length = tx.hypot(ty);
                 [ty / length, -tx / length]
             });
             let u = parabola([p, middle, q], s);
-            (u[0] * normal[0] + u[1] * normal[1] - gap.distance.eval(x, y, state.time), [x, y])
+            u[0] * normal[0] + u[1] * normal[1]
         };
-        let [first, last] = [0.0, 1.0].map(|s| at(s).0.max(0.0));
-        let line = [0.0, 0.5, 1.0].map(|s| edge.at(points, s));
-        let g = std::slice::from_ref(&gap.distance);
-        let parts = edge_parts(&[line], g, state.time, DEVIATION).into_iter();
-        let narrow = parts.map(|(_, [from, to])| 0.5 * (from + to));
-        let evenly = (0..SAMPLES).map(|i| (i as f64 + 0.5) / SAMPLES as f64);
-        let samples = evenly.chain(narrow).map(|s| {
-            let (depth, x) = at(s);
-            (depth - (first + s * (last - first)), x)
-        });
-        samples.fold((0.0, [0.0; 2]), |most, next| if next.0 > most.0 { next } else { most })
+        let depth = |s: f64| {
+            let [x, y] = edge.at(points, s);
+            normal_displacement(s) - gap.distance.eval(x, y, t)
+        };
+        let [first, last] = [0.0, 1.0].map(|s| depth(s).max(0.0));
+        let beyond = |s: f64| depth(s) - (first + s * (last - first));
+        let mut deepest = (0.0, 0.0);
+        let mut parts = vec![[0.0, 1.0]];
+        while let Some([from, to]) = parts.pop() {
+            let half = 0.5 * (from + to);
+            if beyond(half) > deepest.0 {
+                deepest = (beyond(half), half);
+            }
+            let along = [from, half, to];
+            let [a, m, b] = along.map(normal_displacement);
+            let most = a.max(m).max(b) + 0.25 * (a - 2.0 * m + b).abs();
+            let [x, y] = bounds(along.map(|s| edge.at(points, s)));
+            let [least, _] = gap.distance.range([x, y, [t; 2]]);
+            let hidden = most - least - deepest.0 > RESOLVED * displacement;
+            if hidden && to - from > NARROWEST {
+                parts.extend([[from, half], [half, to]]);
+            }
+        }
+        (deepest.0, edge.at(points, deepest.1))
     }
 
     /// What the user should know about contact between the nodes in some states of a run. Collective.
@@ -163,4 +181,12 @@ impl DiscreteProblem {
             )
         })
     }
+}
+
+/// The box around points, [x from, x to] and [y from, y to], m.
+fn bounds(points: [[f64; 2]; 3]) -> [[f64; 2]; 2] {
+    [0, 1].map(|k| {
+        let [a, b, c] = points.map(|point| point[k]);
+        [a.min(b).min(c), a.max(b).max(c)]
+    })
 }
