@@ -6,8 +6,8 @@ the last state with a truth: quadratic elements on a fine mesh that is graded to
 features that the scene names, with hundreds of uniform steps of second order. It depends on no estimate. A second
 truth with 1.6 times the sizes and steps tells the first one's own error: their difference. Truths are kept in FOLDER/NAME-HASH (--truth).
 
-An error counts relative to the figure's scale, the largest value in the truth's run: of 1 − ζ for `zeta_min` and
-`zeta_mean`, of all components of all supports for forces, of all probes' for a kind of probe. Bars are
+An error counts relative to the figure's scale, the largest value in the truth's run: of the largest 1 − ζ for
+`zeta_min` and ζ at a probe, of its mean for `zeta_mean`, of all components of all supports for forces, of all probes' for a kind of probe. Bars are
 `errors.figures` in summary.json where the program writes them. Writes FOLDER/promises.csv (--out): a row for each
 figure of each run. Exit code 1 if a bar or a "reached" does not hold.
 """
@@ -86,7 +86,12 @@ def scales(out, names):
         of = next((k for k in ("force_", "u_", "zeta", "stress", "von_mises") if last.startswith(k)), last)
         return "stress" if of == "von_mises" else of
 
-    return {n: max(v for m, v in largest.items() if kind(m) == kind(n) and ("." in m) == ("." in n)) for n in names}
+    def scale(name):
+        if kind(name) == "zeta" and name != "zeta_mean":
+            return largest.get("zeta_min", largest[name])
+        return max(v for m, v in largest.items() if kind(m) == kind(name) and ("." in m) == ("." in name))
+
+    return {name: scale(name) for name in names}
 
 
 class Truth:

@@ -64,7 +64,11 @@ pub(super) fn verdict(task: &Task, outcome: Option<&Outcome>) -> Option<String> 
     let mesh = format!(
         "P{degree} on {triangles} triangles, mesh {rounds} of those tried (kept as mesh.msh)"
     );
-    let Some(outcome) = outcome else { return Some(format!("accuracy {accuracy}: {mesh}")) };
+    let asked = match &scene.accuracy_of[..] {
+        [] => format!("accuracy {accuracy}"),
+        names => format!("accuracy {accuracy} of {}", names.join(", ")),
+    };
+    let Some(outcome) = outcome else { return Some(format!("{asked}: {mesh}")) };
     let is_asked =
         |name: &str| scene.accuracy_of.is_empty() || scene.accuracy_of.iter().any(|n| n == name);
     let bars = outcome.bars.iter().filter(|bar| is_asked(&bar.name));
@@ -78,7 +82,7 @@ pub(super) fn verdict(task: &Task, outcome: Option<&Outcome>) -> Option<String> 
     });
     let reasons: Vec<String> = missed.into_iter().chain(adapted.short.clone()).collect();
     Some(match reasons.is_empty() {
-        true => format!("accuracy {accuracy} reached: {mesh}"),
-        false => format!("accuracy {accuracy} NOT reached ({}): {mesh}", reasons.join("; ")),
+        true => format!("{asked} reached: {mesh}"),
+        false => format!("{asked} NOT reached ({}): {mesh}", reasons.join("; ")),
     })
 }

@@ -193,6 +193,6 @@ fn cost(problem: &DiscreteProblem) -> String {
         Some(Stepping::Auto { .. }) => format!("{once:.1} s and {:.1} ms a step", 1e3 * step),
     };
     // Twelve steps on the mesh and on one of four times as many triangles.
-    let bars = 12.0 * (step + 4.0 * 1.45 * step) + 5.0 * once;
+    let bars = 12.0 * (step + 4.0 * 1.45 * step) + 2.5 * once;
     format!("about {seconds}; about {megabytes:.0} MB; --bars about {bars:.1} s more")
 }

@@ -4,7 +4,7 @@ use super::{launch, task::Task};
 use signorini::{
     evolution::{Adapted, Outcome, StepRecord},
     output::terminal::{Progress, say, with_bar},
-    scene::{Scheme, Stepping, TimeGrid, rounded},
+    scene::{Scheme, Stepping, TimeGrid, Units, rounded},
 };
 use std::io::{self, IsTerminal, Write};
 
@@ -107,27 +107,7 @@ pub fn conclusion(
             let contact = format!("{active} of {nodes} nodes active, force {sum} {force}/{length}");
             lines.push(row("contact", contact));
         }
-        // Resultants come first, three for each support.
-        let supports = &task.problem.supports.names;
-        let resultants = quantities.chunks_exact(3).take(supports.len());
-        let resultants = resultants.map(|of| [0, 1, 2].map(|i| of[i].1));
-        let largest = |size: fn([f64; 3]) -> f64| resultants.clone().map(size).fold(0.0, f64::max);
-        let [force_most, moment_most] =
-            [largest(|[x, y, _]| x.hypot(y)), largest(|of| of[2].abs())];
-        let visible =
-            |value: f64, most: f64| if value.abs() < ROUNDING * most { 0.0 } else { value };
-        for (name, [x, y, moment]) in supports.iter().zip(resultants.clone()) {
-            let [x, y] = [x, y].map(|component| visible(component, force_most));
-            let moment = visible(moment, moment_most);
-            let figure = |value: f64, of: &str| match bar(&format!("{name}.{of}")) {
-                None => format!("{value:.4e}"),
-                bar => with_bar(value, bar),
-            };
-            let (x, y) = (figure(x, "force_x"), figure(y, "force_y"));
-            let resultant = format!("force ({x}, {y}) {force}/{length}");
-            let moment = figure(moment, "moment");
-            lines.push(row("support", format!("{name}: {resultant}, moment {moment} {force}")));
-        }
+        lines.extend(supports(task, quantities, &bar));
         if let Some(outcome) = outcome {
             let [first, rest @ ..] = outcome.errors.lines(outcome.stopped.as_ref());
             lines.push(row("errors", first));
@@ -139,6 +119,36 @@ pub fn conclusion(
     lines.extend(notes.iter().map(|note| row("note", note.clone())));
     if last.is_some() {
         lines.push(row("results", task.folder.display().to_string()));
+    }
+    lines
+}
+
+/// The resultants of the supports, a line each, with the error bars that `bar` knows by name.
+fn supports(
+    task: &Task,
+    quantities: &[(String, f64)],
+    bar: &dyn Fn(&str) -> Option<f64>,
+) -> Vec<String> {
+    let Units { length, force, .. } = &task.problem.scene().units;
+    let mut lines = Vec::new();
+    // Resultants come first, three for each support.
+    let supports = &task.problem.supports.names;
+    let resultants = quantities.chunks_exact(3).take(supports.len());
+    let resultants = resultants.map(|of| [0, 1, 2].map(|i| of[i].1));
+    let largest = |size: fn([f64; 3]) -> f64| resultants.clone().map(size).fold(0.0, f64::max);
+    let [force_most, moment_most] = [largest(|[x, y, _]| x.hypot(y)), largest(|of| of[2].abs())];
+    let visible = |value: f64, most: f64| if value.abs() < ROUNDING * most { 0.0 } else { value };
+    for (name, [x, y, moment]) in supports.iter().zip(resultants.clone()) {
+        let [x, y] = [x, y].map(|component| visible(component, force_most));
+        let moment = visible(moment, moment_most);
+        let figure = |value: f64, of: &str| match bar(&format!("{name}.{of}")) {
+            None => format!("{value:.4e}"),
+            bar => with_bar(value, bar),
+        };
+        let (x, y) = (figure(x, "force_x"), figure(y, "force_y"));
+        let resultant = format!("force ({x}, {y}) {force}/{length}");
+        let moment = figure(moment, "moment");
+        lines.push(row("support", format!("{name}: {resultant}, moment {moment} {force}")));
     }
     lines
 }

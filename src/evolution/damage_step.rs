@@ -116,7 +116,11 @@ impl DamageStep<'_> {
         }
         let min_max = partition.min_max(zeta.as_slice());
         let largest = min_max.0.abs().max(min_max.1);
-        if residual > largest_residual || certificate.balance > LARGEST_BALANCE * largest {
+        // A ζ that is below ζ_* whatever the error of the solve ends the run as it should.
+        let stops = min_max.0 + certificate.error <= problem.threshold();
+        let inexact =
+            residual > largest_residual || certificate.balance > LARGEST_BALANCE * largest;
+        if inexact && !stops {
             return Err(planned.failed(StepFailure::DamageResidual(residual)));
         }
         Ok(DamageUpdate { zeta, min_max, certificate: Some(certificate) })
