@@ -109,6 +109,19 @@ fn a_figure_asked_for_alone_takes_a_smaller_mesh() {
 }
 
 #[test]
+fn a_foundation_with_a_kink_between_the_nodes_is_found() {
+    // Contact at x = 0.37, where the edge of a coarse mesh is a hundred times as long as contact is wide.
+    let wedge = || block(2, "", "0.00002 + 0.05*abs(x - 0.37)", "-0.05");
+    let force = |accuracy| {
+        let found = solved(wedge(), adapted(&wedge(), square(4), accuracy).mesh);
+        found.last.record.contact_force
+    };
+    let exact = force(0.003);
+    assert!(exact > 1e-3, "the wedge carries {exact}");
+    assert!((force(0.1) - exact).abs() < 0.1 * exact);
+}
+
+#[test]
 fn contact_between_the_nodes_is_found_and_noted() {
     // A roller of radius 1 m, of which no node of a mesh of size 0.1 comes near; its contact is 8 mm wide.
     let roller = || block(2, "", "0.00001 + 0.5*(x - 0.57)^2", "-0.05");

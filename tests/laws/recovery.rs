@@ -88,7 +88,9 @@ fn with_contact_the_estimate_is_near_the_error_against_a_fine_quadratic_answer()
         let error = ((exact - work) / exact).sqrt();
         println!("P{degree}, {cells}: {estimate:.4} estimated, {error:.4} true");
         let ratio = estimate / error;
-        assert!((0.7..1.4).contains(&ratio), "P{degree}, {cells}: {ratio:.3} of {error:.4}");
+        // An estimate that is a tenth larger or smaller is none of these.
+        let expected = if degree == 1 { 0.85..0.99 } else { 1.10..1.28 };
+        assert!(expected.contains(&ratio), "P{degree}, {cells}: {ratio:.3} of {error:.4}");
     }
 }
 
