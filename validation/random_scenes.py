@@ -58,7 +58,11 @@ def run(binary, folder, solver, ranks):
             code = process.wait(LIMIT)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGTERM)  # mpiexec ends its ranks
-            process.wait()
+            try:
+                process.wait(10)
+            except subprocess.TimeoutExpired:  # a step without end
+                os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
             code = None
     return code, output.read_text(errors="replace")
 
