@@ -96,7 +96,7 @@ def missed(discrete, frames):
     level = 1e-16 * discrete.element_sizes(zeta, own)[1].max() / (force or 1.0)
     excused = level > TOLERANCE * ease(discrete)
     if forces > FORCE or places > PLACE:
-        return " (nor has the judge a good answer)", excused
+        return " (nor has the judge a good answer)", level > 0.1 * TOLERANCE * ease(discrete)
     return " (rounding alone is near the tolerance)" if level > 0.01 * TOLERANCE else "", excused
 
 
