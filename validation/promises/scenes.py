@@ -111,7 +111,7 @@ def scenes():
               probes="tip 8,.2 mid 4,.1"),
         Scene("slender-humps", BEAM, stiff, "left u 0|0; right u 0|0; top t 0|-2*(1+x/8); base gap 0.001+0.05*min((x-2.71)^2,(x-5.63)^2)",
               fine=("at 2.71 0 5e-4", "at 5.63 0 5e-4")),
-        Scene("arch", ARCH, stiff, "foot u 0|0; base gap 0; outer p 20*t*y^2", damage=law + "500"),
+        Scene("arch", ARCH, stiff, "foot u 0|0; base gap 0; outer p 20*t*y^2", damage=law + "500", largest=0.03),
         Scene("narrow-load", SQUARE, soft, "left u 0|0; base gap 0; top t 0|" + NARROW, truth=LOADED),
         Scene("narrow-load-roller", SQUARE, soft, f"left u 0|0; base gap {ROLLER}; top t 0|{NARROW}",
               fine=("at .55 0 1.5e-4",), truth=LOADED),
