@@ -80,7 +80,7 @@ pub enum AdaptError {
 /// The error of ζ over the damage done that the few steps of a run on a coarse mesh may make.
 const PILOT_TOLERANCE: f64 = 0.05;
 /// The part of the accuracy that the time steps of the last run may take.
-pub const SHARE_OF_STEPS: f64 = 0.5;
+pub const SHARE_OF_STEPS: f64 = 0.3;
 /// Rounds, and triangles of a mesh, at most.
 const ROUNDS: usize = 25;
 const MOST_TRIANGLES: usize = 4_000_000;
@@ -196,7 +196,8 @@ fn refined(
         let exhausted = rounds >= ROUNDS || triangles > MOST_TRIANGLES;
         let short = failed.or(exhausted.then(limit));
         let mut adapted = round.adapted(measured.as_ref(), rounds);
-        let reached = adapted.worst.as_ref().is_some_and(|(_, error)| *error <= accuracy);
+        let errors = measured.as_ref().map(|measured| measured.errors(&scene.accuracy_of));
+        let reached = errors.is_some_and(|errors| errors.iter().all(|e| e.excess(accuracy) <= 1.0));
         let ends = reached || short.is_some();
         adapted.short = short.filter(|_| !reached);
         seen(&adapted);

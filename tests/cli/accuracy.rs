@@ -20,7 +20,7 @@ fn an_accuracy_is_reached_and_its_mesh_is_kept() {
         "--set",
         "time.step='auto'",
         "--set",
-        "time.tolerance=0.025",
+        "time.tolerance=0.015",
         "--out",
         "out/again",
     ];

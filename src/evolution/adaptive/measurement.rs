@@ -35,6 +35,27 @@ const GOOD_PART: f64 = 0.5;
 /// … and they alone where they make this part of the whole change.
 const MOST: f64 = 0.5;
 
+/// The part of the accuracy that the mesh may take of a figure or norm, and of ζ at a node, to which the
+/// time steps add most.
+const SHARE: f64 = 0.95;
+const SHARE_OF_ZETA: f64 = 0.8;
+
+/// A measured error.
+pub(super) struct MeasuredError {
+    /// What it is the error of.
+    pub(super) name: String,
+    pub(super) relative: f64,
+    /// The part of the accuracy that it may take.
+    share: f64,
+}
+
+impl MeasuredError {
+    /// The error over what it may be for an accuracy.
+    pub(super) fn excess(&self, accuracy: f64) -> f64 {
+        self.relative / (self.share * accuracy)
+    }
+}
+
 /// What the bisection of a mesh changed.
 #[derive(Default)]
 pub(super) struct Measurement {
@@ -113,21 +134,27 @@ impl Measurement {
         Ok(measured)
     }
 
-    /// The measured relative errors and what they are the errors of, the largest first: those of the figures
-    /// `asked` for, or of all figures, of u, its energy, the damage and the time of ζ_*.
-    pub(super) fn errors(&self, asked: &[String]) -> impl Iterator<Item = (String, f64)> {
+    /// The measured errors, the largest of its share first: those of the figures `asked` for, or of all
+    /// figures, of u, its energy, the damage and the time of ζ_*.
+    pub(super) fn errors(&self, asked: &[String]) -> Vec<MeasuredError> {
         let norms = [
             ("damage", self.damage),
             ("displacement", self.displacement),
             ("energy", self.energy),
             ("stopped_at", self.stop),
         ];
-        let figures = self.bars.iter().map(|bar| (bar.name.as_str(), bar.relative()));
+        let norms = norms.map(|(name, error)| (name, error, SHARE));
+        let figures = self.bars.iter().map(|bar| {
+            let share = if bar.dimension == Dimension::Damage { SHARE_OF_ZETA } else { SHARE };
+            (bar.name.as_str(), bar.relative(), share)
+        });
         let is_asked = |name: &str| asked.is_empty() || asked.iter().any(|other| other == name);
-        let errors = figures.chain(norms).filter(|(name, _)| is_asked(name));
-        let mut errors: Vec<_> = errors.map(|(name, error)| (name.to_owned(), error)).collect();
-        errors.sort_by(|a, b| b.1.total_cmp(&a.1));
-        errors.into_iter()
+        let errors = figures.chain(norms).filter(|(name, ..)| is_asked(name));
+        let mut errors: Vec<_> = errors
+            .map(|(name, relative, share)| MeasuredError { name: name.to_owned(), relative, share })
+            .collect();
+        errors.sort_by(|a, b| (b.relative / b.share).total_cmp(&(a.relative / a.share)));
+        errors
     }
 
     /// The triangles that make most of the change of the figure `name`, where these are few: those in which

@@ -73,7 +73,10 @@ impl<'a> Round<'a> {
     /// The mesh with its errors.
     pub(super) fn adapted(&self, measured: Option<&Measurement>, rounds: usize) -> Adapted {
         let stop_error = measured.zip(self.pilot.stop()).map(|(m, time)| m.stop * time);
-        let failing = |measured: &Measurement| measured.errors(&self.scene.accuracy_of).next();
+        let worst = |measured: &Measurement| {
+            let errors = measured.errors(&self.scene.accuracy_of).into_iter();
+            errors.map(|error| (error.name, error.relative)).next()
+        };
         Adapted {
             mesh: self.mesh.clone().in_morton_order(),
             unknowns: 2 * self.pilot.problem.body.nodes.partition.total(),
@@ -83,7 +86,7 @@ impl<'a> Round<'a> {
             damage: self.pilot.damage(),
             stop_error: stop_error.filter(|error| error.is_finite()),
             bars: measured.map_or_else(Vec::new, |measured| measured.bars.clone()),
-            worst: measured.and_then(failing),
+            worst: measured.and_then(worst),
             short: None,
         }
     }
@@ -100,11 +103,11 @@ impl<'a> Round<'a> {
             shares.iter_mut().zip(&measured.shares).for_each(larger);
             depths.iter_mut().zip(&measured.depths).for_each(larger);
             let errors = measured.errors(&self.scene.accuracy_of);
-            for (name, error) in errors.filter(|(_, error)| *error > self.accuracy) {
-                let goal = (AIM * self.accuracy / error).max(LEAST_GOAL);
-                let Some(places) = measured.places(&name) else {
+            for error in errors.iter().filter(|error| error.excess(self.accuracy) > 1.0) {
+                let goal = (AIM / error.excess(self.accuracy)).max(LEAST_GOAL);
+                let Some(places) = measured.places(&error.name) else {
                     // Errors of figures are products of two errors of fields.
-                    let is_figure = measured.bars.iter().any(|bar| bar.name == name);
+                    let is_figure = measured.bars.iter().any(|bar| bar.name == error.name);
                     smaller = smaller.min(if is_figure { goal.sqrt() } else { goal });
                     continue;
                 };
