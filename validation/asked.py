@@ -4,7 +4,7 @@
 Runs scenes of geo/ that reach their end with `--accuracy` 0.1, 0.03, 0.01 and 0.003, without mesh
 parameters (a grading) and steps of their own, as chart.py does. Prints the errors of u (energy norm) and the
 damage (L²) at the end over the accuracy, the unknowns of u and the seconds of the whole process; exit
-code 1 if the larger error is above its accuracy or below 0.3 of it.
+code 1 if the larger error is above its accuracy. (That of a figure may ask for much less: make promises.)
 """
 
 import argparse
@@ -28,7 +28,7 @@ def main():
                 study.run(Choice("accuracy", accuracy=accuracy))
                 row = study.rows[-1]
                 u, damage, larger = (row[key] / accuracy for key in ("u", "damage", "error"))
-                outside += not 0.3 <= larger <= 1
+                outside += larger > 1
                 lines.append(f"{study.name}, {accuracy}: {larger:.2f} (u {u:.2f}, damage {damage:.2f}), "
                              f"{2 * row['nodes']} unknowns, {row['seconds']:.2f} s")
     print("true error over the accuracy", *lines, sep="\n")

@@ -2,7 +2,7 @@
 
 use super::{Failure, screen, task::Task};
 use signorini::{
-    evolution::{self, AdaptError, Adapted, Bar, Outcome, SHARE_OF_STEPS},
+    evolution::{self, AdaptError, Adapted, Bar, Outcome},
     mesh::{Mesh, Order},
     petsc::Session,
     scene::{Scene, Stepping},
@@ -31,8 +31,7 @@ pub(super) fn adapt(
         _ => error.into(),
     })?;
     if let Some(grid) = &mut scene.time {
-        grid.stepping =
-            Stepping::Auto { tolerance: SHARE_OF_STEPS * accuracy, expected: adapted.damage };
+        grid.stepping = Stepping::Auto { tolerance: adapted.steps, expected: adapted.damage };
     }
     Ok(Some(adapted))
 }

@@ -42,6 +42,8 @@ pub struct Adapted {
     pub damage: [f64; 2],
     /// How far off the mesh may put the time at which ζ_* is reached, s, once that is measured.
     pub stop_error: Option<f64>,
+    /// The tolerance of the time steps that keeps the error of ζ within the accuracy.
+    pub steps: f64,
     /// The error bars of the figures that the mesh makes, once they are measured.
     pub bars: Vec<Bar>,
     /// The largest of the measured relative errors and what it is the error of, once they are measured.
@@ -79,8 +81,6 @@ pub enum AdaptError {
 
 /// The error of ζ over the damage done that the few steps of a run on a coarse mesh may make.
 const PILOT_TOLERANCE: f64 = 0.05;
-/// The part of the accuracy that the time steps of the last run may take.
-pub const SHARE_OF_STEPS: f64 = 0.3;
 /// Rounds, and triangles of a mesh, at most.
 const ROUNDS: usize = 25;
 const MOST_TRIANGLES: usize = 4_000_000;

@@ -51,7 +51,7 @@ mod unresolved;
 
 pub use crate::contact::ContactPoint;
 pub use crate::phases::Phases;
-pub use adaptive::{AdaptError, Adapted, SHARE_OF_STEPS, adapted, measured_bars};
+pub use adaptive::{AdaptError, Adapted, adapted, measured_bars};
 pub use contact_step::{Accuracy, ContactStep};
 pub use discrete_problem::DiscreteProblem;
 pub use error::{RunError, SetupError, StepFailure};

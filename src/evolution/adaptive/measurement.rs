@@ -35,10 +35,8 @@ const GOOD_PART: f64 = 0.5;
 /// … and they alone where they make this part of the whole change.
 const MOST: f64 = 0.5;
 
-/// The part of the accuracy that the mesh may take of a figure or norm, and of ζ at a node, to which the
-/// time steps add most.
-const SHARE: f64 = 0.95;
-const SHARE_OF_ZETA: f64 = 0.8;
+/// The part of the accuracy that the mesh may take of a figure: the time steps add to it.
+const SHARE: f64 = 0.97;
 
 /// A measured error.
 pub(super) struct MeasuredError {
@@ -143,11 +141,8 @@ impl Measurement {
             ("energy", self.energy),
             ("stopped_at", self.stop),
         ];
-        let norms = norms.map(|(name, error)| (name, error, SHARE));
-        let figures = self.bars.iter().map(|bar| {
-            let share = if bar.dimension == Dimension::Damage { SHARE_OF_ZETA } else { SHARE };
-            (bar.name.as_str(), bar.relative(), share)
-        });
+        let norms = norms.map(|(name, error)| (name, error, 1.0));
+        let figures = self.bars.iter().map(|bar| (bar.name.as_str(), bar.relative(), SHARE));
         let is_asked = |name: &str| asked.is_empty() || asked.iter().any(|other| other == name);
         let errors = figures.chain(norms).filter(|(name, ..)| is_asked(name));
         let mut errors: Vec<_> = errors
@@ -155,6 +150,12 @@ impl Measurement {
             .collect();
         errors.sort_by(|a, b| (b.relative / b.share).total_cmp(&(a.relative / a.share)));
         errors
+    }
+
+    /// The largest relative error of the figures of ζ, which the time steps change most.
+    pub(super) fn of_zeta(&self) -> f64 {
+        let bars = self.bars.iter().filter(|bar| bar.dimension == Dimension::Damage);
+        bars.map(Bar::relative).fold(0.0, f64::max)
     }
 
     /// The triangles that make most of the change of the figure `name`, where these are few: those in which

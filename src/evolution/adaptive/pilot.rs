@@ -9,6 +9,8 @@ use crate::{
 
 /// Steps of the run; times, about, at which errors are estimated.
 pub(super) const INSTANTS: usize = 12;
+/// Where a run is only compared with another, strains are recovered at every so many of these times.
+const FEW: usize = 4;
 /// At the end, errors are relative to no less than this part of the largest ‖u‖².
 const UNLOADED: f64 = 1e-4;
 
@@ -22,7 +24,12 @@ pub(super) struct Pilot<'a> {
 /// What was seen of the steps of a run.
 #[derive(Default)]
 struct Seen {
+    /// Strains are recovered at every so many instants and at the end.
+    every: usize,
+    /// The instants so far, the time of the last one and that of the last recovered strains, s.
+    instants: usize,
     last: Option<f64>,
+    recovered: Option<f64>,
     /// max_t ‖ε* − ε(u)‖²_T, and the largest sum over T at any time.
     squares: Vec<f64>,
     worst: f64,
@@ -49,7 +56,8 @@ impl<'a> Pilot<'a> {
         estimated: bool,
     ) -> Result<Self, RunError> {
         let zeros = vec![0.0; triangles];
-        let mut seen = Seen { squares: zeros.clone(), depths: zeros, ..Seen::default() };
+        let every = if estimated { 1 } else { FEW };
+        let mut seen = Seen { every, squares: zeros.clone(), depths: zeros, ..Seen::default() };
         let phases = Phases::default();
         let mut observe = |step: &Step| Ok(seen.observe(problem, step, false)?);
         let run = if estimated { run } else { run_unestimated };
@@ -156,11 +164,22 @@ impl Seen {
             None => true,
             Some(before) => state.time > before && (at_end || part(state.time) > part(before)),
         };
-        if !due {
-            return Ok(());
+        if due {
+            self.last = Some(state.time);
+            self.instants += 1;
+            let largest = problem.body.nodes.partition.max_norm(&state.u);
+            self.displacement = self.displacement.max(largest);
+            for penetration in problem.penetrations(state) {
+                let deepest = &mut self.depths[penetration.triangle];
+                *deepest = deepest.max(penetration.depth);
+            }
         }
-        self.last = Some(state.time);
-        self.estimate(problem, state)
+        let turn = due && (self.instants - 1).is_multiple_of(self.every);
+        if turn || (at_end && self.recovered != Some(state.time)) {
+            self.recovered = Some(state.time);
+            self.estimate(problem, state)?;
+        }
+        Ok(())
     }
 
     /// Estimates the errors of a state. Collective.
@@ -174,11 +193,6 @@ impl Seen {
         self.end = (squares, error.error, error.energy);
         self.worst = self.worst.max(error.error);
         self.energy = self.energy.max(error.energy);
-        self.displacement = self.displacement.max(body.nodes.partition.max_norm(&state.u));
-        for penetration in problem.penetrations(state) {
-            let deepest = &mut self.depths[penetration.triangle];
-            *deepest = deepest.max(penetration.depth);
-        }
         Ok(())
     }
 }

@@ -1,7 +1,10 @@
 //! A mesh of the rounds: whether it is good enough to be measured, and how the next one is to be refined.
 
 use super::{
-    super::unresolved::unresolved, Adapted, measurement::Measurement, pilot::Pilot,
+    super::{step_controller::AIM as AIM_OF_STEPS, unresolved::unresolved},
+    Adapted,
+    measurement::Measurement,
+    pilot::Pilot,
     sizes::size_ratios,
 };
 use crate::{
@@ -15,6 +18,9 @@ const AIM: f64 = 0.7;
 const ENOUGH: f64 = 0.8;
 /// The part of the damage's error that its interpolation may take.
 const INTERPOLATION: f64 = 0.7;
+/// The tolerance of the time steps is what the mesh leaves of the accuracy, and this part of it at most.
+const SHARE_OF_STEPS: f64 = 0.5;
+const LEAST_OF_STEPS: f64 = 0.04;
 /// Where measured errors are too large, the estimated ones are made smaller by no more than this in a round.
 const LEAST_GOAL: f64 = 0.25;
 /// Where figures alone are asked for, they are measured once u and the damage are estimated to be so exact.
@@ -84,6 +90,13 @@ impl<'a> Round<'a> {
             error: self.error,
             damage_error: self.damage_error,
             damage: self.pilot.damage(),
+            steps: match measured {
+                Some(measured) if self.pilot.stop().is_none() => {
+                    let left = (self.accuracy - measured.of_zeta()).max(0.0) / AIM_OF_STEPS;
+                    left.clamp(LEAST_OF_STEPS * self.accuracy, SHARE_OF_STEPS * self.accuracy)
+                }
+                _ => SHARE_OF_STEPS * self.accuracy,
+            },
             stop_error: stop_error.filter(|error| error.is_finite()),
             bars: measured.map_or_else(Vec::new, |measured| measured.bars.clone()),
             worst: measured.and_then(worst),

@@ -24,6 +24,7 @@ use crate::{
     archive::{Archive, ArchiveError},
     scene::{Scheme, Stepping},
 };
+pub(super) use error_control::AIM;
 use error_control::ErrorControl;
 use nalgebra::DVector;
 
