@@ -162,7 +162,8 @@ fn steps(grid: TimeGrid, unit: &str) -> String {
     match grid.stepping {
         Stepping::Uniform { steps } => {
             let scheme = if grid.scheme == Scheme::Bdf2 { " (bdf2)" } else { "" };
-            format!("{steps} steps of {} {unit} to t = {end}{scheme}", rounded(end / steps as f64))
+            let noun = if steps == 1 { "step" } else { "steps" };
+            format!("{steps} {noun} of {} {unit} to t = {end}{scheme}", rounded(end / steps as f64))
         }
         Stepping::Auto { tolerance, .. } => {
             format!("to t = {end} in steps chosen for an error of ζ of {tolerance:e}")

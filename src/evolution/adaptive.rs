@@ -81,7 +81,7 @@ pub enum AdaptError {
 
 /// The error of ζ over the damage done that the few steps of a run on a coarse mesh may make.
 const PILOT_TOLERANCE: f64 = 0.05;
-/// Rounds, and triangles of a mesh, at most.
+/// Rounds, and triangles of a mesh or of its measurement, at most.
 const ROUNDS: usize = 25;
 const MOST_TRIANGLES: usize = 4_000_000;
 
@@ -110,6 +110,7 @@ pub fn adapted(
         reached = Some(mesh.clone());
     });
     match (refined, reached) {
+        (Err(error @ AdaptError::Setup(_)), _) => Err(error),
         (Err(error), Some(before)) => Ok(Adapted { short: Some(error.to_string()), ..before }),
         (refined, _) => refined,
     }
@@ -193,7 +194,7 @@ fn refined(
             None => (None, None),
         };
         let limit = || "no larger mesh and no further one is tried".to_owned();
-        let exhausted = rounds >= ROUNDS || triangles > MOST_TRIANGLES;
+        let exhausted = rounds >= ROUNDS || 4 * triangles > MOST_TRIANGLES;
         let short = failed.or(exhausted.then(limit));
         let mut adapted = round.adapted(measured.as_ref(), rounds);
         let errors = measured.as_ref().map(|measured| measured.errors(&scene.accuracy_of));

@@ -83,7 +83,7 @@ pub enum StepFailure {
     /// However short a chosen step is, its error is above the tolerance.
     #[error(
         "the damage changes too fast for time.tolerance, however short the step; does a load jump \
-         there? Set time.step to a number"
+         there? Set time.step to a number, and leave accuracy out"
     )]
     TooShort,
 }

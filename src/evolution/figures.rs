@@ -1,6 +1,7 @@
 //! The figures that a run prints, and how far off each of them may be.
 
 use super::{DiscreteProblem, Step, probe::OBSERVED};
+use crate::scene::{Expression, Stepping};
 use serde::{Deserialize, Serialize};
 
 /// The figures of a [`StepRecord`](super::StepRecord) that have an error bar.
@@ -8,6 +9,9 @@ const OF_RECORD: [&str; 5] = ["work", "displacement_max", "contact_force", "zeta
 /// A figure counts as no smaller than this part of the largest figure of its dimension: a force that
 /// symmetry makes zero has no relative error.
 const LEAST: f64 = 1e-3;
+/// The error of the integral of a body force that varies in space, relative: both meshes of a measurement
+/// may have the same.
+const BODY_FORCE: f64 = 1e-4;
 /// A damage below this is negligible.
 const NEGLIGIBLE_DAMAGE: f64 = 1e-6;
 
@@ -125,12 +129,19 @@ impl DiscreteProblem {
         self.figures().iter().zip(values).map(size).collect()
     }
 
-    /// Adds to the error bars what the solver's tolerance allows, and what the time steps may do, where the
-    /// damage ζ is off by at most `most` at a node and by `mean` in the mean and therefore u by
-    /// `displacement` (relative, energy norm): u has no other memory than ζ.
-    pub(super) fn add_step_errors(&self, bars: &mut [Bar], [most, mean, displacement]: [f64; 3]) {
+    /// Adds to the error bars what the solver's tolerance and the integration of body forces allow, and what
+    /// the time steps may do, where the damage ζ is off by at most `most` at a node and by `mean` in the mean
+    /// and therefore u by `displacement` (relative, energy norm): u has no other memory than ζ. The few steps
+    /// of a uniform grid may show but half of their error.
+    pub(super) fn add_step_errors(&self, bars: &mut [Bar], of_steps: [f64; 3]) {
+        let grid = self.scene().time.map(|grid| grid.stepping);
+        let uniform = matches!(grid, Some(Stepping::Uniform { .. }));
+        let [most, mean, displacement] = of_steps.map(|e| if uniform { 2.0 * e } else { e });
+        let varies = self.scene().body_force.iter().any(Expression::depends_on_space);
+        let forces = if varies { BODY_FORCE } else { 0.0 };
         for (bar, figure) in bars.iter_mut().zip(self.figures()) {
-            bar.bar += self.tolerance * bar.scale;
+            let of_zeta = figure.dimension == Dimension::Damage;
+            bar.bar += (self.tolerance + if of_zeta { 0.0 } else { forces }) * bar.scale;
             bar.bar += match (figure.dimension, figure.group) {
                 (Dimension::Damage, 4) => mean,
                 (Dimension::Damage, _) => most,

@@ -97,9 +97,14 @@ impl Outcome {
     }
 
     /// Enters the error bars that the mesh makes, `of_mesh`, and adds what the time steps may do. Where the
-    /// run stopped at ζ_* there are none: another mesh stops at another time.
+    /// run stopped at ζ_* there are none: another mesh stops at another time. Nor where the steps are too
+    /// few to tell their error.
     pub fn set_bars(&mut self, problem: &DiscreteProblem, of_mesh: &[Bar]) {
-        if self.stopped.is_some() {
+        let unknown = problem.damage().is_some()
+            && self.errors.zeta_steps.is_none()
+            && self.last.state.zeta != problem.initial_damage();
+        let unknown = problem.body.vertices.partition.comm().any(unknown);
+        if self.stopped.is_some() || unknown {
             return;
         }
         self.bars = of_mesh.to_vec();

@@ -158,9 +158,9 @@ impl Measurement {
         bars.map(Bar::relative).fold(0.0, f64::max)
     }
 
-    /// The triangles that make most of the change of the figure `name`, where these are few: those in which
-    /// ζ, for its least value, or the contact reactions, for a force, changed by a good part of the largest
-    /// change. `None` where the whole mesh made the change.
+    /// The triangles that make most of the change of the figure `name`: those in which ζ, for its least value
+    /// or its value at a point, or, where these are few, the contact reactions, for a force, changed by a good
+    /// part of the largest change. `None` where the whole mesh made the change.
     pub(super) fn places(&self, name: &str) -> Option<Vec<bool>> {
         let bar = self.bars.iter().find(|bar| bar.name == name)?;
         let changes = match bar.dimension {
@@ -174,8 +174,8 @@ impl Measurement {
         let change: f64 = changes.iter().sum();
         let of_marked: f64 =
             changes.iter().zip(&here).filter(|(_, here)| **here).map(|(c, _)| c).sum();
-        let is_most = bar.dimension == Dimension::Damage || of_marked.abs() > MOST * change.abs();
-        (largest > 0.0 && is_most && marked <= here.len() / 4).then_some(here)
+        let few = marked <= here.len() / 4 && of_marked.abs() > MOST * change.abs();
+        (largest > 0.0 && (bar.dimension == Dimension::Damage || few)).then_some(here)
     }
 }
 

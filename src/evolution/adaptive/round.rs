@@ -146,7 +146,13 @@ impl<'a> Round<'a> {
                 sizes[t] = QUARTER;
             }
         }
-        ratios.iter().zip(sizes).map(|(ratio, size)| ratio.min(size)).collect()
+        let mut ratios: Vec<f64> =
+            ratios.iter().zip(sizes).map(|(ratio, size)| ratio.min(size)).collect();
+        // Where no estimate tells which triangles are too large, all are.
+        if smaller < 1.0 && ratios.iter().all(|&ratio| ratio == 1.0) {
+            ratios.fill(smaller);
+        }
+        ratios
     }
 
     /// A damage that is not exact enough asks for a u better than the accuracy.
