@@ -192,7 +192,7 @@ impl DamageSystem {
         Ok(solve.converged)
     }
 
-    /// The largest [`DamageCertificate::residual`] of a solution as good as round-off allows:
+    /// The largest [residual](super::DamageCertificate::residual) of a solution as good as round-off allows:
     /// 1e-10, and where diffusion prevails what is lost in kκLζ, of which the terms are up to 1.
     pub fn largest_residual(&self) -> f64 {
         let round_off = 8.0 * f64::EPSILON * self.step * self.diffusion * self.laplace_size;
