@@ -100,10 +100,7 @@ impl Outcome {
     /// run stopped at ζ_* there are none: another mesh stops at another time. Nor where the steps are too
     /// few to tell their error.
     pub fn set_bars(&mut self, problem: &DiscreteProblem, of_mesh: &[Bar]) {
-        let unknown = problem.damage().is_some()
-            && self.errors.zeta_steps.is_none()
-            && self.last.state.zeta != problem.initial_damage();
-        let unknown = problem.body.vertices.partition.comm().any(unknown);
+        let unknown = problem.damage().is_some() && self.errors.zeta_steps.is_none();
         if self.stopped.is_some() || unknown {
             return;
         }
