@@ -144,6 +144,11 @@ impl SceneArguments {
         let asked = Vec::from_iter(accuracy.into_iter().chain(figures));
         let set = [&self.set[..], &asked, more].concat();
         let mut scene = Scene::read(&self.scene, &set).map_err(Failure::input)?;
+        if scene.accuracy.is_none() && !scene.accuracy_of.is_empty() {
+            return Err(Failure::input(
+                "accuracy_of has no effect without accuracy; add accuracy = 0.01, say, or --accuracy 0.01",
+            ));
+        }
         if let Some(file) = &self.mesh {
             let replaced = std::mem::replace(&mut scene.mesh, MeshSource::from_path(file));
             if !replaced.parameters.is_empty() {

@@ -9,6 +9,9 @@ const OF_RECORD: [&str; 5] = ["work", "displacement_max", "contact_force", "zeta
 /// A figure counts as no smaller than this part of the largest figure of its dimension: a force that
 /// symmetry makes zero has no relative error.
 const LEAST: f64 = 1e-3;
+/// A moment counts as no smaller than this part of the largest force at the body's radius of gyration: about
+/// a point near the line of its force it is small by choice of the point.
+const LEAST_MOMENT: f64 = 0.1;
 /// The error of the integral of a body force that varies in space, relative: both meshes of a measurement
 /// may have the same.
 const BODY_FORCE: f64 = 1e-4;
@@ -112,10 +115,12 @@ impl DiscreteProblem {
             let own = most(&|other| other.group == figure.group);
             let alike = match figure.dimension {
                 Dimension::Damage => return own.max(NEGLIGIBLE_DAMAGE),
-                Dimension::Moment => lever * most(&|other| other.dimension == Dimension::Force),
-                dimension => most(&|other| other.dimension == dimension),
+                Dimension::Moment => {
+                    LEAST_MOMENT * lever * most(&|other| other.dimension == Dimension::Force)
+                }
+                dimension => LEAST * most(&|other| other.dimension == dimension),
             };
-            own.max(LEAST * alike)
+            own.max(alike)
         };
         figures.iter().map(scale).collect()
     }

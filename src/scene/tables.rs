@@ -30,9 +30,6 @@ pub(super) fn scene(found: &mut Findings) -> Option<Scene> {
     let damage = found.build("damage", damage);
     let accuracy: Option<f64> = found.build("accuracy", Ok);
     let accuracy_of: Option<Vec<String>> = found.build("accuracy_of", Ok);
-    if accuracy_of.is_some() && accuracy.is_none() {
-        found.note("accuracy_of", "has no effect without accuracy; add accuracy = 0.01, say");
-    }
     let degree: Option<f64> = found.build("discretisation.displacement", Ok);
     let time = found.build("time", time);
     let body_force = found.build("body.force", Ok);
