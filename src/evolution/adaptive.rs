@@ -156,7 +156,7 @@ pub fn measured_bars(
     Ok(Measurement::new(session, &few, &mesh, &pilot, solver, rounds)?.bars)
 }
 
-/// The names of the figures of `scene` on `mesh`, if those that it asks for are among them.
+/// Checks that the figures for which `scene` asks an accuracy are among those that it has on `mesh`.
 fn check_figures(scene: &Scene, mesh: &Mesh) -> Result<(), SetupError> {
     if scene.accuracy_of.is_empty() {
         return Ok(());
