@@ -3,7 +3,7 @@
 use crate::{
     contact::{FixedRow, GapRow, RigidMotions},
     fem::{Body, Edge, normal_error},
-    mesh::{BoundaryNode, Face, boundary_nodes, extent, sorted},
+    mesh::{BoundaryNode, Face, boundary_nodes, extent},
     scene::{Boundary, Condition, Expression, Gap, Scene, SurfaceLoad},
 };
 
@@ -69,9 +69,7 @@ impl BoundaryConditions {
             let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
             let edges = body.edges(&curve.edges);
             let follows_mesh = boundary.gap().is_none_or(|gap| gap.normal.is_none());
-            let is_chord = |ends| mesh.curved.contains_key(&sorted(ends));
-            let normal_error =
-                if follows_mesh { normal_error(&edges, points, is_chord) } else { 0.0 };
+            let normal_error = if follows_mesh { normal_error(&edges, points) } else { 0.0 };
             for node in boundary_nodes(edges.iter().flat_map(|edge| edge.faces(points))) {
                 conditions.add_fixed_rows(boundary, points, &node);
                 let largest = &mut conditions.normal_errors[node.node];

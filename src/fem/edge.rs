@@ -30,34 +30,17 @@ pub fn parabola<const D: usize>([p, m, q]: [[f64; D]; 3], s: f64) -> [f64; D] {
 const STRAIGHT: f64 = 1e-12;
 
 /// An estimate of how far the normals of boundary edges are from those of the smooth curve that they stand for,
-/// rad, from two curved edges that meet smoothly at an angle α. Parabolas through the points of a circle that
-/// subtend 2φ are off by φ³/4 at their ends, less between them; where two meet, α is the sum of both. For
-/// straight edges, the chords of sides that are curved in the mesh (`is_chord`), the mean of the normals by the
-/// lengths l and l′ is off by α |l − l′|/(l + l′) on a circle.
-pub fn normal_error(
-    edges: &[Edge],
-    points: &[[f64; 2]],
-    is_chord: impl Fn([usize; 2]) -> bool,
-) -> f64 {
+/// rad: the largest angle between two curved edges that meet smoothly. Parabolas through the points of a
+/// circle that subtend 2φ are off by φ³/4 at their ends, less between them; where two meet, the
+/// angle is the sum of both.
+pub fn normal_error(edges: &[Edge], points: &[[f64; 2]]) -> f64 {
     let mut faces = BTreeMap::<usize, Vec<Face>>::new();
     let mut largest = 0.0_f64;
-    let curved = |edge: &&Edge| match edge.middle {
-        Some(_) => edge.is_curved(points),
-        None => is_chord(edge.ends),
-    };
-    for edge in edges.iter().filter(curved) {
+    for edge in edges.iter().filter(|edge| edge.is_curved(points)) {
         for (node, face) in edge.faces(points) {
             let at_node = faces.entry(node).or_default();
             let smooth = at_node.iter().filter(|other| other.continues(&face));
-            let error = |other: &Face| match edge.middle {
-                Some(_) => other.angle(&face),
-                None => {
-                    let (difference, sum) =
-                        (other.length - face.length, other.length + face.length);
-                    other.angle(&face) * difference.abs() / sum
-                }
-            };
-            largest = smooth.map(error).fold(largest, f64::max);
+            largest = smooth.map(|other| other.angle(&face)).fold(largest, f64::max);
             at_node.push(face);
         }
     }

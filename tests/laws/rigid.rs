@@ -296,16 +296,14 @@ fn a_disc_refined_on_one_side_still_turns_in_its_ring() {
         let marked: Vec<bool> = mesh.triangles.iter().map(right).collect();
         refined = refined.refine(&marked).unwrap();
     }
-    let conditions = ["symmetry = true", "gap = '0.001*(1 + x - 3)'"];
-    for (order, condition) in [1, 2].into_iter().flat_map(|k| conditions.map(|c| (k, c))) {
+    for condition in ["symmetry = true", "gap = '0.001*(1 + x - 3)'"] {
         let load = "body.force = [1, 0]\n";
         let rim = format!("boundary = [{{ name = 'rim', {condition} }}]");
-        let text = format!("{load}discretisation.displacement = {order}\n{MATERIAL}\n{rim}");
+        let text = format!("{load}discretisation.displacement = 2\n{MATERIAL}\n{rim}");
         let problem = problem(refined.mesh.clone(), &text).unwrap_or_else(|e| panic!("{e}"));
         let [free] = &problem.motions.free[..] else { panic!("{:?}", problem.motions.free) };
         let [at_centre, at_rim] = [[3.0, 2.0], [4.0, 2.0]].map(|x| free.at(0, x));
-        let off = if order == 1 { 0.03 } else { 0.01 };
-        assert!(largest(&at_centre) < off * at_rim[1].abs(), "{free}");
+        assert!(largest(&at_centre) < 1e-2 * at_rim[1].abs(), "{free}");
         // Pressed to the right, it does not turn.
         let outcome = run(&problem, SOLVERS[0]);
         let u = outcome.last.state.u;
