@@ -23,6 +23,8 @@ DAMAGE = {"lambda_w": 0.0, "strain_cap": 1000.0, "threshold": 0.01, "initial": 1
 POINTS = {1: np.full((1, 3), 1 / 3), 2: np.full((3, 3), 1 / 6) + 0.5 * np.eye(3)}
 # Of the nodes of an edge (ends, middle) the share of its length: the integrals of their functions.
 SHARES = {1: (1 / 2, 1 / 2), 2: (1 / 6, 1 / 6, 4 / 6)}
+# Parts of an edge in which a traction is integrated.
+PARTS = 256
 
 
 class Discrete:
@@ -89,7 +91,7 @@ class Discrete:
 
     def load(self, t):
         """∫ f_B·v by the midpoints of the sides (P1) or the points of the stiffness (P2), and
-        ∫ f_N·v by two Gauss points an edge."""
+        ∫ f_N·v finely, by two Gauss points in each of PARTS parts of an edge."""
         x, load = self.points, np.zeros((len(self.points), 2))
         if "body" in self.scene:
             rule = (POINTS[2], self.weight.T)
@@ -105,11 +107,12 @@ class Discrete:
             if "traction" not in boundary:
                 continue
             edges = self.mesh.edges(boundary["name"])
-            for s in 0.5 + 0.5 / np.sqrt(3) * np.array([-1, 1]):
+            gauss = 0.5 + 0.5 / np.sqrt(3) * np.array([-1, 1])
+            for s in ((np.arange(PARTS)[:, None] + gauss) / PARTS).ravel():
                 length = np.linalg.norm(self._tangents(edges, s), axis=1)[:, None]
                 values = functions(np.array([1 - s, s]), self.order)
                 points = np.einsum("n,end->ed", values, x[self.space.on(edges)])
-                force = 0.5 * length * pair(boundary["traction"], points, t)
+                force = 0.5 / PARTS * length * pair(boundary["traction"], points, t)
                 for node, value in zip(self.space.on(edges).T, values):
                     np.add.at(load, node, value * force)
         return load.ravel()

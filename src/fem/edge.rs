@@ -32,16 +32,20 @@ const STRAIGHT: f64 = 1e-12;
 /// An estimate of how far the normals of boundary edges are from those of the smooth curve that they stand for,
 /// rad: the largest angle between two curved edges that meet smoothly. Parabolas through the points of a
 /// circle that subtend 2φ are off by φ³/4 at their ends, less between them; where two meet, the
-/// angle is the sum of both.
+/// angle is the sum of both. A larger angle, more than twice this sum, is a corner of the geometry.
 pub fn normal_error(edges: &[Edge], points: &[[f64; 2]]) -> f64 {
-    let mut faces = BTreeMap::<usize, Vec<Face>>::new();
+    let mut faces = BTreeMap::<usize, Vec<(Face, f64)>>::new();
     let mut largest = 0.0_f64;
     for edge in edges.iter().filter(|edge| edge.is_curved(points)) {
+        let [[a, b], [c, d]] = [0.0, 1.0].map(|s| edge.tangent(points, s));
+        let half = 0.5 * (a * d - b * c).abs().atan2(a * c + b * d);
+        let at_end = 0.25 * half.powi(3);
         for (node, face) in edge.faces(points) {
             let at_node = faces.entry(node).or_default();
-            let smooth = at_node.iter().filter(|other| other.continues(&face));
-            largest = smooth.map(|other| other.angle(&face)).fold(largest, f64::max);
-            at_node.push(face);
+            let angles = at_node.iter().map(|(other, error)| (other.angle(&face), error + at_end));
+            let smooth = angles.filter(|(angle, expected)| *angle <= 2.0 * expected);
+            largest = smooth.map(|(angle, _)| angle).fold(largest, f64::max);
+            at_node.push((face, at_end));
         }
     }
     largest
