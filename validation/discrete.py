@@ -6,6 +6,7 @@ nothing here was taken from the program, so that a fault of its assembly, bases 
 as a difference.
 """
 
+import re
 import numpy as np
 from scipy.sparse import coo_matrix, diags
 from scipy.sparse.csgraph import connected_components
@@ -25,6 +26,11 @@ POINTS = {1: np.full((1, 3), 1 / 3), 2: np.full((3, 3), 1 / 6) + 0.5 * np.eye(3)
 SHARES = {1: (1 / 2, 1 / 2), 2: (1 / 6, 1 / 6, 4 / 6)}
 # Parts of an edge in which a traction is integrated.
 PARTS = 256
+
+
+def varies(texts):
+    """Whether any of some expressions depends on the place."""
+    return any(re.search(r"\b[xy]\b", str(text)) for text in texts)
 
 
 class Discrete:
@@ -91,7 +97,7 @@ class Discrete:
 
     def load(self, t):
         """∫ f_B·v by the midpoints of the sides (P1) or the points of the stiffness (P2), and
-        ∫ f_N·v finely, by two Gauss points in each of PARTS parts of an edge."""
+        ∫ f_N·v by two Gauss points an edge, or in each of PARTS parts of it where f_N depends on the place."""
         x, load = self.points, np.zeros((len(self.points), 2))
         if "body" in self.scene:
             rule = (POINTS[2], self.weight.T)
@@ -108,11 +114,12 @@ class Discrete:
                 continue
             edges = self.mesh.edges(boundary["name"])
             gauss = 0.5 + 0.5 / np.sqrt(3) * np.array([-1, 1])
-            for s in ((np.arange(PARTS)[:, None] + gauss) / PARTS).ravel():
+            parts = PARTS if varies(boundary["traction"]) else 1
+            for s in ((np.arange(parts)[:, None] + gauss) / parts).ravel():
                 length = np.linalg.norm(self._tangents(edges, s), axis=1)[:, None]
                 values = functions(np.array([1 - s, s]), self.order)
                 points = np.einsum("n,end->ed", values, x[self.space.on(edges)])
-                force = 0.5 / PARTS * length * pair(boundary["traction"], points, t)
+                force = 0.5 / parts * length * pair(boundary["traction"], points, t)
                 for node, value in zip(self.space.on(edges).T, values):
                     np.add.at(load, node, value * force)
         return load.ravel()
