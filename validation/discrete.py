@@ -97,7 +97,7 @@ class Discrete:
 
     def load(self, t):
         """∫ f_B·v by the midpoints of the sides (P1) or the points of the stiffness (P2), and
-        ∫ f_N·v by two Gauss points an edge, or in each of PARTS parts of it where f_N depends on the place."""
+        ∫ f_N·v by two Gauss points in each of PARTS parts of an edge."""
         x, load = self.points, np.zeros((len(self.points), 2))
         if "body" in self.scene:
             rule = (POINTS[2], self.weight.T)
@@ -114,7 +114,7 @@ class Discrete:
                 continue
             edges = self.mesh.edges(boundary["name"])
             gauss = 0.5 + 0.5 / np.sqrt(3) * np.array([-1, 1])
-            parts = PARTS if varies(boundary["traction"]) else 1
+            parts = PARTS
             for s in ((np.arange(parts)[:, None] + gauss) / parts).ravel():
                 length = np.linalg.norm(self._tangents(edges, s), axis=1)[:, None]
                 values = functions(np.array([1 - s, s]), self.order)

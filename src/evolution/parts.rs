@@ -67,7 +67,7 @@ fn bisected<P: Copy>(
     done
 }
 
-/// The parts of edges, parabolas through three points each, in which `f` is integrated by two Gauss points
+/// The parts of edges, parabolas through three points each, in which `f` is integrated by three Gauss points
 /// at time `t` with errors of about `deviation` ∫|f|. What does not depend on the place needs one an edge.
 pub(super) fn edge_parts(
     lines: &[[[f64; 2]; 3]],

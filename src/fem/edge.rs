@@ -15,6 +15,13 @@ pub struct Edge {
 /// The abscissae ½ ∓ 1/√12 of the two Gauss points of an edge, of weights ½.
 pub const GAUSS: [f64; 2] = [0.211_324_865_405_187_08, 0.788_675_134_594_812_9];
 
+/// The abscissae ½ and ½ ∓ √15/10 of the three Gauss points of an edge, and their weights.
+pub(super) const THREE_GAUSS: [[f64; 2]; 3] = [
+    [0.112_701_665_379_258_31, 5.0 / 18.0],
+    [0.5, 8.0 / 18.0],
+    [0.887_298_334_620_741_7, 5.0 / 18.0],
+];
+
 /// The Gauss points of the straight edge from `p` to `q`.
 pub fn gauss_points(p: [f64; 2], q: [f64; 2]) -> [[f64; 2]; 2] {
     GAUSS.map(|s| [p[0] + s * (q[0] - p[0]), p[1] + s * (q[1] - p[1])])

@@ -2,7 +2,7 @@
 
 use super::{
     Body, Edge, Elements,
-    edge::GAUSS,
+    edge::THREE_GAUSS,
     element::{POINTS, quadratic_measure, quadratic_values},
 };
 use nalgebra::Matrix3;
@@ -103,8 +103,8 @@ fn weighted<const N: usize>(points: &[[f64; 2]; N], values: &[f64; N]) -> [f64; 
 }
 
 /// Adds the surface load f_i = ∫ f_N·φ_i over `parts` of boundary edges, from and to an s each, to the nodal
-/// loads, with f_N in N/m² as a function of the point and the outward normal there. Two Gauss points a part
-/// are exact, on straight edges, where f_N is quadratic for P1 and affine for P2.
+/// loads, with f_N in N/m² as a function of the point and the outward normal there. Three Gauss points a part
+/// are exact, on straight edges, where f_N is a polynomial of degree 4 for P1 and 3 for P2.
 pub fn add_traction(
     body: &Body,
     parts: impl IntoIterator<Item = (Edge, [f64; 2])>,
@@ -113,12 +113,13 @@ pub fn add_traction(
 ) {
     let points = &body.nodes.points;
     for (edge, [from, to]) in parts {
-        for s in GAUSS.map(|s| from + s * (to - from)) {
+        for [s, share] in THREE_GAUSS {
+            let s = from + s * (to - from);
             let [dx, dy] = edge.tangent(points, s);
             let length = dx.hypot(dy);
             let f = traction(edge.at(points, s), [dy / length, -dx / length]);
             for (node, value) in edge.values(s) {
-                let weight = 0.5 * (to - from) * length * value;
+                let weight = share * (to - from) * length * value;
                 load[2 * node] += weight * f[0];
                 load[2 * node + 1] += weight * f[1];
             }
