@@ -22,11 +22,13 @@ const PETSC: &str = "\
     MatGetRow|MatRestoreRow|PetscObjectTypeCompare|MatMPIAIJGetSeqAIJ|MatSeqAIJGetArray|\
     MatSeqAIJRestoreArray|MatSeqAIJGetArrayRead|MatSeqAIJRestoreArrayRead|\
     MatNullSpaceCreate|MatNullSpaceDestroy|MatSetNearNullSpace|MatGetNearNullSpace|\
-    KSPGetPC|KSPSetTolerances|\
-    PCCreate|PCDestroy|PCSetType|PCSetOptionsPrefix|PCSetFromOptions|PCSetOperators|PCSetUp|PCApply|\
-    PCFactorSetMatSolverType|PCFactorGetMatrix|PCFactorGetMatSolverType|PCGetFailedReason|\
-    PCSetReusePreconditioner|PCGetOperators|PCShellSetContext|PCShellGetContext|\
-    PCShellSetApply|PCShellSetSetUp|\
+    MatNullSpaceSetFunction|MatSetNullSpace|MatSetTransposeNullSpace|\
+    MatCreateShell|MatShellSetOperation|MatShellGetContext|\
+    KSPCreate|KSPDestroy|KSPSetType|KSPSetOptionsPrefix|KSPSetFromOptions|KSPSetOperators|KSPSolve|\
+    KSPSetConvergenceTest|KSPSetNormType|KSPBuildResidual|KSPBuildSolution|KSPGetConvergedReason|KSPGetIterationNumber|KSPGetPC|KSPSetTolerances|\
+    PCRegister|PCCreate_Shell|PCSetType|PCSetUp|PCApply|PCSetReusePreconditioner|PCGetOperators|PCGetFailedReason|\
+    PCFactorSetMatSolverType|PCFactorGetMatrix|PCFactorGetMatSolverType|\
+    PCSetApplicationContext|PCGetApplicationContext|PCShellSetApply|PCShellSetSetUp|PCShellSetName|\
     TaoCreate|TaoDestroy|TaoSetType|TaoSetSolution|TaoSetVariableBounds|\
     TaoSetObjectiveAndGradient|TaoSetHessian|TaoSetFromOptions|TaoSetTolerances|\
     TaoSetMaximumIterations|TaoSolve|TaoGetIterationNumber|TaoGetConvergedReason|TaoGetLinearSolveIterations|TaoGetKSP";
@@ -59,7 +61,8 @@ fn main() {
                      ompi_mpi_(double|byte)|ompi_mpi_op_(sum|max|replace)";
     let headers = "#include <petsctao.h>\n#include <petscsf.h>\n#include <malloc.h>\n\
                    #include <dlfcn.h>\n#include <sys/mman.h>\n\
-                   void omp_set_max_active_levels(int);\n";
+                   void omp_set_max_active_levels(int);\n\
+                   PETSC_EXTERN PetscErrorCode PCCreate_Shell(PC);\n";
     declare("petsc", headers, &flags, PETSC, variables);
     let variables = "CHOLMOD_(LONG|REAL|DOUBLE|SUPERNODAL|GIVEN|NATURAL|PATTERN|OUT_OF_MEMORY)";
     declare("cholmod", "#include <suitesparse/cholmod.h>\n", &[], CHOLMOD, variables);

@@ -12,8 +12,8 @@ use serde::{Deserialize, Serialize};
 /// The factor P A Pᵀ = L Lᵀ of a sparse symmetric positive definite matrix, supernodal.
 ///
 /// CHOLMOD orders and factorises. The triangular solves are our own: they read L twice as fast, in
-/// half the bytes where single precision is enough, and stop between the forward and the backward solve,
-/// which the Schur complement of an interface needs.
+/// half the bytes where single precision is enough, and are two steps, between which the Schur complement
+/// of an interface is solved with.
 pub struct Cholesky {
     factor: Cholmod,
     precision: Precision,
@@ -97,7 +97,7 @@ impl Cholesky {
     fn is_accurate_enough(&mut self, a: &LowerTriangle) -> bool {
         let load: Vec<f64> = (0..a.size()).map(|i| 1.0 + (i as f64).sin()).collect();
         let mut x = vec![0.0; load.len()];
-        self.solve(&load, &mut x, |interface| interface.fill(0.0));
+        self.solve(&load, &mut x);
         let load = &load[..self.interior];
         let residual: f64 = a.multiply(&x).iter().zip(load).map(|(ax, b)| (b - ax).powi(2)).sum();
         residual <= LARGEST_RESIDUAL * LARGEST_RESIDUAL * load.iter().map(|b| b * b).sum::<f64>()
@@ -130,16 +130,26 @@ impl Cholesky {
         self.factor.order()
     }
 
-    /// The forward and the backward solve with L₁₁ and L₂₁,
+    /// The forward solve with L₁₁ and L₂₁, which returns y₂:
     ///
     /// ```text
     /// L = ⎡ L₁₁     ⎤        L₁₁ y₁ = (P b)₁,        y₂ = (P b)₂ − L₂₁ y₁,
-    ///     ⎣ L₂₁ L₂₂ ⎦        L₁₁ᵀ (P x)₁ = y₁ − L₂₁ᵀ (P x)₂;
+    ///     ⎣ L₂₁ L₂₂ ⎦        L₁₁ᵀ (P x)₁ = y₁ − L₂₁ᵀ (P x)₂.
     /// ```
-    ///
-    /// in between `interface` replaces y₂ by (P x)₂, also where these have no rows.
-    pub fn solve(&mut self, b: &[f64], x: &mut [f64], mut interface: impl FnMut(&mut [f64])) {
-        self.solver.solve(b, x, &mut interface);
+    pub fn forward(&mut self, b: &[f64]) -> Vec<f64> {
+        self.solver.forward(b)
+    }
+
+    /// The backward solve that belongs to the last [forward](Self::forward) one, for (P x)₂ = `interface`.
+    pub fn backward(&mut self, interface: &[f64], x: &mut [f64]) {
+        self.solver.backward(interface, x);
+    }
+
+    /// `x` ← A₁₁⁻¹ b₁, and 0 in the rows of the interface.
+    pub fn solve(&mut self, b: &[f64], x: &mut [f64]) {
+        let interface = vec![0.0; self.order().len() - self.interior];
+        self.forward(b);
+        self.backward(&interface, x);
     }
 
     /// The work of a factorisation, in bytes that a solve reads in the same time.

@@ -1,32 +1,29 @@
-//! The factor that preconditions a matrix, whatever makes it.
+//! The Cholesky factor of a matrix, kept as the preconditioner of later ones.
 
-mod method;
-mod shell;
-
-use super::{Choose, Precision, Reduction, RefactorisationPolicy};
+use super::{Condensed, Precision, Reduction, RefactorisationPolicy, substructure::Substructure};
 use crate::{
     archive::{Archive, ArchiveError},
-    petsc::{Communicator, Matrix, PetscError, Session, Vector},
+    petsc::{Communicator, KeptPreconditioner, Matrix, PetscError, Session, Vector},
 };
-use method::Method;
+use std::mem::take;
 
 /// A Cholesky factor: CHOLMOD's with solves of our own, by substructuring where there are several
-/// ranks or contact. On several ranks MUMPS takes its place (PCCHOLESKY) where their interface is too large,
-/// a cycle of algebraic multigrid (PCGAMG) where the matrix is very large. PETSc options can ask for
-/// any other preconditioner.
+/// ranks or contact.
 ///
 /// Fill-reducing ordering and symbolic factorisation are done once for each number of rows. A factor
 /// may be kept as the preconditioner of later matrices until [`RefactorisationPolicy`] finds a new one
-/// due.
+/// due. For a later matrix A = Σ ζ Aₜ, summed over triangles like A₀ = Σ ζ₀ Aₜ, the preconditioner is
+/// E^½ A₀⁻¹ E^½ with E = diag(A₀)/diag(A): where ζ/ζ₀ varies slowly, A is nearly E^-½ A₀ E^-½ for forces as
+/// concentrated as those at contact nodes and the edges of loads, of which A₀ alone would leave (ζ − ζ₀)/ζ₀.
 pub struct Factor {
     comm: Communicator,
-    prefix: String,
     /// Of the two factors of a substructure.
     precisions: [Precision; 2],
     /// The rows of the matrices to condense, and their owned unknowns that [`Self::restrict`] may prescribe.
     condensed: (usize, Vec<usize>),
-    /// The rows of the matrices that it is for, and the method, chosen with the first of them.
-    method: Option<(usize, Method)>,
+    /// The rows of the matrices that it is for, and the factor; `None` where these have too large an
+    /// interface, or are too large.
+    substructure: Option<(usize, Option<Box<Substructure>>)>,
     /// `None` before the first factorisation, and after one that failed.
     policy: Option<RefactorisationPolicy>,
     /// Applications in the present solve.
@@ -37,6 +34,10 @@ pub struct Factor {
     values: Vec<f64>,
     /// The diagonal of that matrix, the part of this rank.
     diagonal: Vec<f64>,
+    /// E^½ of the owned unknowns.
+    scaling: Vec<f64>,
+    /// E^½ r.
+    scaled: Vec<f64>,
     /// Whether the factor was loaded and is yet to be made.
     loaded: bool,
 }
@@ -45,35 +46,48 @@ pub struct Factor {
 /// n = 64 and 256, on one and two ranks: MUMPS 4 to 10, gamg 13 to 33, CHOLMOD through PETSc 10 to 19.
 const UNKNOWN_COST: f64 = 10.0;
 
+/// Rows above which several ranks use multigrid: the memory of factors grows faster than the rows.
+/// With 2.1 million on two ranks a step with factors was six times as fast, their set-up four times
+/// as slow, memory 10 % more; what is beyond was not measured.
+pub(super) const VERY_LARGE: usize = 2_500_000;
+
 impl Factor {
-    /// A factor whose PETSc options begin with `prefix` (`-elastic_pc_type …`).
-    pub fn new(session: &Session, prefix: &str, precision: Precision) -> Self {
+    /// A factor of no matrix yet.
+    pub fn new(session: &Session, precision: Precision) -> Self {
         Self {
             comm: session.comm(),
-            prefix: prefix.to_owned(),
             precisions: [precision; 2],
             condensed: (0, Vec::new()),
-            method: None,
+            substructure: None,
             policy: None,
             applications: 0,
             factorisations: 0,
             values: Vec::new(),
             diagonal: Vec::new(),
+            scaling: Vec::new(),
+            scaled: Vec::new(),
             loaded: false,
         }
     }
 
-    /// Makes factors of matrices like this one so that [`Self::restrict`] may prescribe these owned unknowns,
-    /// if there are not too many of them. Other unknowns than those of the last call discard the present
-    /// factor. Collective.
-    pub(crate) fn condense(
+    /// The ranks among which its matrices are divided.
+    pub(super) fn comm(&self) -> Communicator {
+        self.comm
+    }
+
+    /// Makes factors of matrices like this one so that [`Self::restrict`] may prescribe these owned unknowns.
+    /// Other unknowns than those of the last call discard the present factor. Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub fn set_condensed(
         &mut self,
         matrix: &Matrix,
         unknowns: impl Iterator<Item = usize>,
     ) -> Result<(), PetscError> {
         let condensed = (matrix.size()?, unknowns.collect());
         if self.comm.any(condensed != self.condensed) {
-            (self.condensed, self.method) = (condensed, None);
+            (self.condensed, self.substructure) = (condensed, None);
             self.policy = self.policy.take().filter(|_| self.loaded);
         }
         Ok(())
@@ -93,135 +107,218 @@ impl Factor {
         Ok(())
     }
 
+    /// The matrix of the factor that was loaded, like `matrix`, if that is yet to be made; with what
+    /// [`Self::keep_history`] takes back then.
+    pub(super) fn take_loaded(
+        &mut self,
+        matrix: &Matrix,
+    ) -> Result<Option<(Matrix, History)>, PetscError> {
+        if !take(&mut self.loaded) {
+            return Ok(None);
+        }
+        let mut copy = matrix.duplicate()?;
+        copy.set_entries(&self.values)?;
+        let history = History { policy: self.policy.take(), factorisations: self.factorisations };
+        Ok(Some((copy, history)))
+    }
+
+    /// Goes on from what a checkpoint told of the factor that was made again.
+    pub(super) fn keep_history(&mut self, history: History) {
+        (self.policy, self.factorisations) = (history.policy, history.factorisations);
+    }
+
     /// Makes the factor that was loaded again, of a matrix with the pattern of this one. Collective.
     ///
     /// # Errors
     /// The pattern is another, or as in [`Self::factorise`].
-    pub(super) fn remake(&mut self, matrix: &Matrix) -> Result<(), PetscError> {
-        if !std::mem::take(&mut self.loaded) {
-            return Ok(());
-        }
-        let mut copy = matrix.duplicate()?;
-        copy.set_entries(&self.values)?;
-        let (policy, factorisations) = (self.policy.take(), self.factorisations);
-        if self.factorise(&copy)? {
-            (self.policy, self.factorisations) = (policy, factorisations);
+    pub(crate) fn remake(&mut self, matrix: &Matrix) -> Result<(), PetscError> {
+        if let Some((loaded, history)) = self.take_loaded(matrix)?
+            && self.factorise(&loaded)?
+        {
+            self.keep_history(history);
         }
         Ok(())
     }
 
-    /// Factorises the present values of `matrix`; false if it is not positive definite: then there is
-    /// no factor. Where it is condensed a restriction must follow before it is applied. Collective.
+    /// Whether the factor is for matrices of so many rows.
+    pub(crate) fn is_for(&self, rows: usize) -> bool {
+        self.substructure.as_ref().is_some_and(|(size, _)| *size == rows)
+    }
+
+    /// The condensed unknowns that are coupled with others in `k` but not in `operator`.
+    pub(crate) fn masked(&self, k: &Matrix, operator: &Matrix) -> Result<Vec<usize>, PetscError> {
+        let mut masked = Vec::new();
+        for &unknown in &self.condensed.1 {
+            let row = k.rows().start + unknown as i32;
+            let coupled = |columns: &[i32], values: &[f64]| {
+                columns.iter().zip(values).any(|(column, value)| *column != row && *value != 0.0)
+            };
+            if k.read_row(row, coupled)? && !operator.read_row(row, coupled)? {
+                masked.push(unknown);
+            }
+        }
+        Ok(masked)
+    }
+
+    /// Whether there can be a factor of such a matrix; else its interface is too large, or itself.
+    /// Collective.
     ///
     /// # Errors
-    /// There is no memory for it, or PETSc options ask for what this PETSc does not have.
-    pub fn factorise(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
-        let (comm, entries) = (self.comm, matrix.entries() as f64);
-        let (definite, cost) = match self.method(matrix)? {
-            Method::Petsc(preconditioner) => (preconditioner.set_up(matrix)?, UNKNOWN_COST),
-            Method::Substructure { factor, condensed } => {
-                let definite = factor.factorise(matrix)? && (*condensed || factor.restrict(&[])?);
-                let work = comm.max(factor.work());
-                // An iteration reads the factor and the entries of the matrix with their columns.
-                let iteration = comm.max(factor.bytes() + 12.0 * entries);
-                (definite, work / iteration.max(1.0))
+    /// There is no memory for it.
+    pub(crate) fn analyse(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
+        let rows = matrix.size()?;
+        let substructure = match self.substructure.take() {
+            Some((size, substructure)) if size == rows => substructure,
+            _ if !self.comm.is_serial() && rows >= VERY_LARGE => None,
+            _ => {
+                let (of_rows, condensed) = &self.condensed;
+                let last = if *of_rows == rows { &condensed[..] } else { &[] };
+                let [precision, mut of_schur] = self.precisions;
+                if self.comm.any(!last.is_empty()) {
+                    // A condensed S tells contact forces.
+                    of_schur = Precision::Full;
+                }
+                let precisions = [precision, of_schur];
+                Substructure::new(self.comm, matrix, last, precisions)?.map(Box::new)
             }
         };
-        self.keep_precisions();
-        matrix.read_entries(&mut self.values)?;
-        self.diagonal = matrix.diagonal()?;
-        self.policy = definite.then(|| RefactorisationPolicy::new(cost));
-        self.factorisations += usize::from(definite);
+        let possible = substructure.is_some();
+        self.substructure = Some((rows, substructure));
+        Ok(possible)
+    }
+
+    fn substructure(&mut self) -> Option<&mut Substructure> {
+        self.substructure.as_mut()?.1.as_deref_mut()
+    }
+
+    /// Factorises the present values of `matrix`; false if it is not positive definite: then there is
+    /// no factor. A restriction must follow before it is applied, where unknowns are condensed. Collective.
+    ///
+    /// # Errors
+    /// There is no memory for it.
+    pub fn factorise(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
+        let (comm, entries) = (self.comm, matrix.entries() as f64);
+        self.analyse(matrix)?;
+        let condensed = self.is_condensed();
+        let Some(factor) = self.substructure() else {
+            return Err(PetscError::ours("the interface of a factor is too large"));
+        };
+        let definite = factor.factorise(matrix)? && (condensed || factor.restrict(&[])?);
+        let work = comm.max(factor.work());
+        // An iteration reads the factor and the entries of the matrix with their columns.
+        let iteration = comm.max(factor.bytes() + 12.0 * entries);
+        self.precisions = factor.precisions();
+        self.record(matrix, definite, Some(work / iteration.max(1.0)))?;
         Ok(definite)
     }
 
-    /// Whether factors of such a matrix can be restricted. Collective.
-    ///
-    /// # Errors
-    /// As in [`Self::factorise`].
-    pub(crate) fn is_condensed(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
-        Ok(matches!(self.method(matrix)?, Method::Substructure { condensed: true, .. }))
+    /// Notes that a preconditioner was made of `matrix`, at the `cost` of so many iterations, if that is known.
+    pub(super) fn record(
+        &mut self,
+        matrix: &Matrix,
+        definite: bool,
+        cost: Option<f64>,
+    ) -> Result<(), PetscError> {
+        matrix.read_entries(&mut self.values)?;
+        self.diagonal = matrix.diagonal()?;
+        self.scaling = vec![1.0; self.diagonal.len()];
+        let cost = cost.unwrap_or(UNKNOWN_COST);
+        self.policy = definite.then(|| RefactorisationPolicy::new(cost));
+        self.factorisations += usize::from(definite);
+        Ok(())
+    }
+
+    /// Whether there are unknowns that can be prescribed.
+    pub(crate) fn is_condensed(&self) -> bool {
+        match &self.substructure {
+            Some((rows, Some(_))) => {
+                *rows == self.condensed.0 && self.comm.any(!self.condensed.1.is_empty())
+            }
+            _ => false,
+        }
     }
 
     /// Prescribes some of the condensed unknowns of the matrix last factorised; false if what is left of it
     /// is not positive definite. Collective.
-    pub(super) fn restrict(&mut self, prescribed: &[usize]) -> Result<bool, PetscError> {
-        let Some((_, Method::Substructure { factor, .. })) = &mut self.method else {
-            return Ok(false);
-        };
+    ///
+    /// # Errors
+    /// There is no memory for it.
+    pub(crate) fn restrict(&mut self, prescribed: &[usize]) -> Result<bool, PetscError> {
+        let Some(factor) = self.substructure() else { return Ok(true) };
         let definite = factor.restrict(prescribed)?;
-        self.keep_precisions();
+        // A factor that needs all digits will need them after a checkpoint too.
+        self.precisions = factor.precisions();
         Ok(definite)
-    }
-
-    /// A factor that needs all digits will need them after a checkpoint too.
-    fn keep_precisions(&mut self) {
-        if let Some((_, Method::Substructure { factor, .. })) = &self.method {
-            self.precisions = factor.precisions();
-        }
     }
 
     /// Bytes that an application reads on this rank; 0 where unknown.
     pub fn bytes_per_application(&self) -> f64 {
-        match &self.method {
-            Some((_, Method::Substructure { factor, .. })) => factor.bytes(),
+        match &self.substructure {
+            Some((_, Some(factor))) => factor.bytes(),
             _ => 0.0,
         }
     }
 
-    /// `z` ← A⁻¹ `r`, A the matrix last factorised: a pair of triangular solves.
+    /// Sets E, of the factored matrix and this one; 1 where there is no quotient.
+    pub(super) fn set_scaling(&mut self, matrix: &Matrix) -> Result<(), PetscError> {
+        let diagonal = matrix.diagonal()?;
+        let root = |(old, new): (&f64, &f64)| match old * new > 0.0 {
+            true => (old / new).sqrt(),
+            false => 1.0,
+        };
+        self.scaling = self.diagonal.iter().zip(&diagonal).map(root).collect();
+        Ok(())
+    }
+
+    /// `z` ← E^½ A₀⁻¹ E^½ `r`, A₀ the matrix last factorised: a pair of triangular solves.
     ///
     /// # Errors
     /// Sizes differ, or nothing was factorised.
     pub fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
+        self.scale(r)?;
+        let Self { scaled, substructure: Some((_, Some(factor))), .. } = self else {
+            return Err(missing());
+        };
+        z.write(|z| factor.apply(scaled, z))?;
+        self.unscale(z)
+    }
+
+    /// E^½ r.
+    fn scale(&mut self, r: &Vector) -> Result<(), PetscError> {
         self.applications += 1;
-        let fits = self.exists() && r.owned() == z.owned();
-        match &mut self.method {
-            Some((_, Method::Petsc(preconditioner))) => preconditioner.apply(r, z),
-            Some((_, Method::Substructure { factor, .. })) if fits => {
-                r.read(|r| z.write(|z| factor.apply(r, z)))?
-            }
-            _ => Err(PetscError::ours("a factor is applied that was not made for such vectors")),
+        if !self.exists() || r.owned() != self.scaling.len() {
+            return Err(missing());
         }
+        let Self { scaled, scaling, .. } = self;
+        scaled.clear();
+        r.read(|r| scaled.extend(r.iter().zip(&*scaling).map(|(r, e)| e * r)))
     }
 
-    /// Prescribes these unknowns in the factor, where it is condensed; false if there is no factor then.
-    /// Collective.
-    pub(crate) fn prescribe(&mut self, unknowns: &[usize]) -> Result<bool, PetscError> {
-        let condensed =
-            matches!(self.method, Some((_, Method::Substructure { condensed: true, .. })));
-        Ok(self.exists() && (!condensed || self.restrict(unknowns)?))
+    fn unscale(&self, z: &mut Vector) -> Result<(), PetscError> {
+        z.write(|z| z.iter_mut().zip(&self.scaling).for_each(|(z, e)| *z *= e))
     }
 
-    /// As [`Self::apply`], but `choose` decides which of the condensed unknowns are prescribed; they are
-    /// returned if they are not the same as before. Collective.
+    /// The forward elimination of [`Self::apply`]: what is left of E^-½ A₀ E^-½ z = `r` for the condensed
+    /// unknowns. Collective.
     ///
     /// # Errors
-    /// As in [`Self::apply`], or the factor is not condensed, or the choice failed.
-    pub(super) fn apply_choosing<E: From<PetscError>>(
-        &mut self,
-        r: &Vector,
-        z: &mut Vector,
-        choose: Choose<E>,
-    ) -> Result<Option<Vec<usize>>, E> {
-        let Some((_, Method::Substructure { factor, condensed: true })) = &mut self.method else {
-            let detail = "unknowns are chosen in a factor that is not condensed";
-            return Err(PetscError::ours(detail).into());
-        };
-        self.applications += 1;
-        let chosen =
-            r.read(|r| z.write(|z| factor.apply_choosing(r, z, &self.condensed.1, choose)))???;
-        self.keep_precisions();
-        let prescribed = |values: Vec<Option<f64>>| {
-            let unknowns = self.condensed.1.iter().zip(values);
-            unknowns.filter_map(|(&i, value)| value.is_some().then_some(i)).collect()
-        };
-        Ok(chosen.map(prescribed))
+    /// As in [`Self::apply`].
+    pub(super) fn condense(&mut self, r: &Vector) -> Result<Condensed<'_>, PetscError> {
+        self.scale(r)?;
+        let Self { scaled, scaling, condensed, substructure, .. } = self;
+        let Some((_, Some(factor))) = substructure else { return Err(missing()) };
+        let scaling = condensed.1.iter().map(|&i| scaling[i]).collect();
+        Ok(factor.condense(scaled, &condensed.1, scaling))
     }
 
-    /// The owned diagonal entries of the matrix last factorised.
-    pub(super) fn diagonal(&self) -> &[f64] {
-        &self.diagonal
+    /// The back substitution: `z` from the last solution for the condensed unknowns. Collective.
+    ///
+    /// # Errors
+    /// Sizes differ.
+    pub(super) fn expand(&mut self, z: &mut Vector) -> Result<(), PetscError> {
+        let Some(factor) = self.substructure() else { return Err(missing()) };
+        z.write(|z| factor.expand(z))?;
+        self.unscale(z)
     }
 
     /// Factorisations made so far that did not fail.
@@ -236,15 +333,36 @@ impl Factor {
 
     /// Iterations that a solve with the factor of an earlier matrix is worth, where it is asked to divide the
     /// residual by e^`asked`; `None` if a new factor is due, or there is none.
-    pub(super) fn iteration_limit(&self, asked: f64) -> Option<usize> {
+    pub(crate) fn iteration_limit(&self, asked: f64) -> Option<usize> {
         self.policy.as_ref().and_then(|policy| policy.iteration_limit(asked))
     }
 
-    /// Ends a solve: its applications tell how good the factor still is.
-    pub(super) fn end_solve(&mut self, reduction: Reduction) {
-        let iterations = std::mem::take(&mut self.applications);
+    /// Ends a solve of so many iterations, or of the applications counted: they tell how good the factor
+    /// still is.
+    pub(crate) fn end_solve(&mut self, iterations: Option<usize>, reduction: Reduction) {
+        let applications = take(&mut self.applications);
         if let Some(policy) = &mut self.policy {
-            policy.solved(iterations, reduction);
+            policy.solved(iterations.unwrap_or(applications), reduction);
         }
+    }
+}
+
+/// What a checkpoint tells of a factor besides its matrix.
+pub(super) struct History {
+    policy: Option<RefactorisationPolicy>,
+    factorisations: usize,
+}
+
+fn missing() -> PetscError {
+    PetscError::ours("a factor is applied that was not made for such vectors")
+}
+
+impl KeptPreconditioner for Factor {
+    fn set_up(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
+        self.factorise(matrix)
+    }
+
+    fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
+        Self::apply(self, r, z)
     }
 }

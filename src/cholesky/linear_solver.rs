@@ -1,50 +1,40 @@
-//! Linear systems by conjugate gradients on a Cholesky factor that is kept.
+//! Linear systems by a KSP of PETSc on a preconditioner that is kept.
 
-mod conjugate_gradients;
+use super::{Booking, Condensed, Factor, LinearSystem, Precision, Reduction, factor::VERY_LARGE};
+use crate::petsc::{
+    KeptPreconditioner, Ksp, KspProblem, Matrix, Pattern, PetscError, Session, Vector, has_option,
+    set_default_option,
+};
+use std::{iter, mem::take};
 
-use super::{Condensed, Factor, LinearSystem, Precision};
-use crate::petsc::{Matrix, PetscError, Session, Vector};
-
-/// Chooses which of the condensed unknowns are prescribed, given the system that is left for them when
-/// all others are eliminated. The answer is `None` where the choice stays the same, else per unknown the
-/// change of its prescribed value, or `None` where it is free. The last solve of the system must be with
-/// that choice. Collective.
-pub type Choose<'a, E> = &'a mut dyn FnMut(&mut Condensed) -> Result<Option<Vec<Option<f64>>>, E>;
-
-/// Conjugate gradients (Hestenes and Stiefel, J. Res. Nat. Bur. Standards 49, 1952) preconditioned by
-/// a Cholesky factor: that of the matrix itself, which they polish, or that of an earlier system with
-/// other values, and where the factor is not condensed (`Factor::condense`) other prescribed unknowns.
+/// A KSP, by default conjugate gradients with a [`Factor`]: that of the matrix itself, which they polish, or
+/// that of an earlier system with other values, and where the factor is not condensed
+/// ([`Factor::set_condensed`]) other prescribed unknowns. Where no such factor is possible, or PETSc options
+/// ask for another preconditioner, one of PETSc's takes its place.
 ///
-/// Of an earlier A₀ = Σ ζ₀ Aₜ, summed over triangles, the preconditioner is A₀⁻¹E with E = diag(A₀)/diag(A):
-/// where ζ/ζ₀ varies slowly, A is nearly E⁻¹A₀ for forces as concentrated as those at contact nodes and the
-/// edges of loads, of which A₀ alone would leave (ζ − ζ₀)/ζ₀. It is not quite symmetric, so that the gradients
-/// are flexible (Notay, SIAM J. Sci. Comput. 22, 2000): each direction is made conjugate to the last one, not
-/// to what symmetry would make of it.
-///
-/// PETSc's KSPFCG would need a matrix without the prescribed unknowns for each set of them, and another
-/// product for the residual on them, which is the contact forces.
+/// The KSP solves A d = b − A x for the correction d of a start x, from d = 0: x is rounded once and not in
+/// each iteration, so that the residual stays nearer to b − A x (van der Vorst and Ye, SIAM J. Sci. Comput.
+/// 22, 2000).
 pub struct LinearSolver {
+    ksp: Ksp,
+    prefix: String,
     factor: Factor,
-    /// A with rows and columns of prescribed unknowns zeroed: what is factorised where the factor is not
-    /// condensed.
+    /// The rows of the matrices for which the preconditioner was chosen, and whether it is the factor.
+    chosen: Option<(usize, bool)>,
+    /// A with rows and columns of prescribed unknowns zeroed: what PETSc's preconditioners are made of.
     modified: Option<Matrix>,
     /// b − A x.
     residual: Vector,
-    /// r: the residual with 0 on prescribed unknowns; or E r.
-    free_residual: Vector,
-    /// ‖r‖₂, and at the start of the solve.
+    /// ‖b − A x‖₂ on the free unknowns, now and at the start.
     norm: f64,
     first_norm: f64,
-    /// E.
-    scaling: Vec<f64>,
-    /// z.
-    preconditioned: Vector,
-    /// p.
-    direction: Vector,
-    /// A p.
-    image: Vector,
     /// d.
     correction: Vector,
+    /// The factor's answer to the residual, and whether the KSP is to begin with it.
+    expanded: Vector,
+    prepared: bool,
+    /// Iterations since the start.
+    iterations: usize,
 }
 
 /// What a linear solve took.
@@ -62,9 +52,11 @@ pub struct SolveReport {
 /// rounding error of the factor, more where the entries of the matrix vary by many orders.
 const MOST_ITERATIONS: usize = 200;
 
+/// PETSC_ERR_MISSING_FACTOR: PETSc has no such package, or not for such a factor.
+const MISSING_FACTOR: i32 = 92;
+
 impl LinearSolver {
-    /// For systems of `owned` unknowns on this rank, with the PETSc options of
-    /// [`Factor`] under `prefix`.
+    /// For systems of `owned` unknowns on this rank, with PETSc options that begin with `prefix`.
     ///
     /// # Errors
     /// There is no memory for it.
@@ -74,28 +66,55 @@ impl LinearSolver {
         owned: usize,
         precision: Precision,
     ) -> Result<Self, PetscError> {
-        Self::with(session, Factor::new(session, prefix, precision), owned)
+        Self::with(session, prefix, Factor::new(session, precision), owned)
     }
 
     /// The same with a factor of its own.
     ///
     /// # Errors
     /// There is no memory for it.
-    pub fn with(session: &Session, factor: Factor, owned: usize) -> Result<Self, PetscError> {
+    pub fn with(
+        session: &Session,
+        prefix: &str,
+        factor: Factor,
+        owned: usize,
+    ) -> Result<Self, PetscError> {
         let zeros = || Vector::zeros(session, owned);
         Ok(Self {
+            ksp: Ksp::new(session, prefix, owned)?,
+            prefix: prefix.to_owned(),
             factor,
+            chosen: None,
             modified: None,
             residual: zeros()?,
-            free_residual: zeros()?,
             norm: 0.0,
             first_norm: 0.0,
-            scaling: Vec::new(),
-            preconditioned: zeros()?,
-            direction: zeros()?,
-            image: zeros()?,
             correction: zeros()?,
+            expanded: zeros()?,
+            prepared: false,
+            iterations: 0,
         })
+    }
+
+    /// Reads the PETSc options under a prefix and refuses what PETSc does not have before anything is
+    /// factorised. Collective.
+    ///
+    /// # Errors
+    /// They ask for what this PETSc does not have.
+    pub fn check_options(session: &Session, prefix: &str) -> Result<(), PetscError> {
+        let mut solver = Self::new(session, prefix, 1, Precision::Full)?;
+        let comm = session.comm();
+        let own = Pattern::new(1, iter::once((0, comm.rank() as i32)));
+        let identity = Matrix::with_pattern(session, 1, &own, &[1.0])?;
+        let chosen = solver.is_own(&identity);
+        if comm.any(chosen.is_err()) || matches!(chosen, Ok(true)) {
+            return chosen.map(drop);
+        }
+        // PETSc looks for the package of a factor when it factorises.
+        match solver.ksp.set_up(&identity, &mut solver.factor) {
+            Err(error) if error.code == MISSING_FACTOR => Err(error),
+            _ => Ok(()),
+        }
     }
 
     /// The factor.
@@ -103,42 +122,106 @@ impl LinearSolver {
         &mut self.factor
     }
 
-    /// Keeps only the factor.
-    pub fn into_factor(self) -> Factor {
-        self.factor
+    /// Whether the preconditioner of such matrices is the factor, chosen with the first of them. Collective.
+    fn is_own(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
+        let rows = matrix.size()?;
+        let own = match self.chosen {
+            Some((size, own)) if size == rows => own,
+            _ => self.choose(matrix, rows)?,
+        };
+        self.chosen = Some((rows, own));
+        Ok(own)
     }
 
-    /// Factorises the system; false if it is not positive definite.
+    /// The factor, where it is possible; or what PETSc's options ask for; else PETSc's factor, or multigrid.
+    fn choose(&mut self, matrix: &Matrix, rows: usize) -> Result<bool, PetscError> {
+        let (prefix, serial) = (&self.prefix, matrix.owned() == rows);
+        let asked = has_option(&format!("-{prefix}pc_type"))?
+            || has_option(&format!("-{prefix}pc_factor_mat_solver_type"))?;
+        // Ranks may be given unlike options.
+        if self.factor.comm().any(asked) || !self.factor.analyse(matrix)? {
+            // Left to itself CHOLMOD makes LDLᵀ of a small matrix, accepts negative pivots, and prints its
+            // warnings into the results. MUMPS' guess of the memory it needs is now and then too small.
+            let options = match serial {
+                true => &[
+                    ("cholmod_final_asis", "0"),
+                    ("cholmod_final_ll", "1"),
+                    ("cholmod_print", "0"),
+                ][..],
+                false => &[("mumps_icntl_14", "100")],
+            };
+            for (option, value) in options {
+                set_default_option(&format!("-{prefix}mat_{option}"), value)?;
+            }
+            let kind = if serial || rows < VERY_LARGE { c"cholesky" } else { c"gamg" };
+            self.ksp.set_preconditioner(kind, if serial { c"cholmod" } else { c"mumps" })?;
+        }
+        self.ksp.set_from_options()?;
+        self.ksp.is_kept()
+    }
+
+    /// Whether the condensed unknowns of such a matrix can be solved for alone ([`Self::condense`]).
+    /// Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub fn is_condensed(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
+        Ok(self.is_own(matrix)? && self.factor.analyse(matrix)? && self.factor.is_condensed())
+    }
+
+    /// Makes a new preconditioner of the system; false if it is not positive definite.
     ///
     /// # Errors
     /// PETSc or CHOLMOD failed.
     pub fn factorise(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
-        if self.factor.is_condensed(system.matrix)? {
-            return Ok(self.factor.factorise(system.matrix)? && self.restrict(system)?);
+        self.prepared = false;
+        if self.is_own(system.matrix)? && (self.is_condensed(system.matrix)? || system.is_free()) {
+            return Ok(self.ksp.set_up(system.matrix, &mut self.factor)? && self.restrict(system)?);
         }
-        let Some(prescribed) = system.prescribed else {
-            return self.factor.factorise(system.matrix);
-        };
-        let matrix = match &mut self.modified {
-            Some(matrix) => matrix,
-            none => none.insert(system.matrix.duplicate()?),
-        };
-        matrix.copy(system.matrix)?;
-        matrix.zero_rows_columns(prescribed, system.scale)?;
-        self.factor.factorise(matrix)
+        let (own, matrix) = (self.is_own(system.matrix)?, self.modified(system)?);
+        let definite = self.ksp.set_up(&matrix, &mut self.factor)?;
+        if !own {
+            self.factor.record(&matrix, definite, None)?;
+        }
+        self.modified = Some(matrix);
+        Ok(definite)
     }
 
-    /// Whether there is a factor that preconditions the system. In a condensed one the unknowns that the
+    /// A copy of the matrix without the prescribed unknowns.
+    fn modified(&mut self, system: LinearSystem) -> Result<Matrix, PetscError> {
+        let mut matrix = match self.modified.take() {
+            Some(matrix) => matrix,
+            None => system.matrix.duplicate()?,
+        };
+        matrix.copy(system.matrix)?;
+        if let Some(prescribed) = system.prescribed {
+            matrix.zero_rows_columns(prescribed, system.scale)?;
+        }
+        Ok(matrix)
+    }
+
+    /// Whether there is a preconditioner for the system. In a condensed factor the unknowns that the
     /// system prescribes are prescribed first.
     fn restrict(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
-        if !self.factor.exists() || !self.factor.is_condensed(system.matrix)? {
+        if !self.factor.exists() || !self.is_condensed(system.matrix)? {
             return Ok(self.factor.exists());
         }
         let restrict = || self.factor.restrict(system.prescribed.unwrap_or(&[]));
         system.book(|booking| booking.restriction, 0.0, restrict)
     }
 
-    /// Solves from the start `x` until ‖b − A x‖₂ ≤ `limit` on the free unknowns, with the factor
+    /// Makes the preconditioner of a checkpoint again.
+    fn remake(&mut self, system: LinearSystem) -> Result<(), PetscError> {
+        if let Some((matrix, history)) = self.factor.take_loaded(system.matrix)? {
+            let loaded = LinearSystem { matrix: &matrix, ..system };
+            if self.factorise(loaded)? {
+                self.factor.keep_history(history);
+            }
+        }
+        Ok(())
+    }
+
+    /// Solves from the start `x` until ‖b − A x‖₂ ≤ `limit` on the free unknowns, with the preconditioner
     /// that there is; without one `x` is left alone.
     ///
     /// # Errors
@@ -153,14 +236,16 @@ impl LinearSolver {
         if !self.restrict(system)? {
             return Ok(SolveReport::default());
         }
-        let mut report = self.start(system, b, x, limit)?;
-        let most = (limit, MOST_ITERATIONS);
-        self.iterate_choosing::<PetscError>(system, x, most, None, &mut report)?;
+        let converged = self.start(system, b, x, limit)?;
+        let mut report = SolveReport { converged, ..SolveReport::default() };
+        if !converged {
+            self.iterate(system, x, (limit, MOST_ITERATIONS), &mut report)?;
+        }
         Ok(report)
     }
 
-    /// As [`Self::solve`], with a new factor where one is due or the old one takes too long. The limit is
-    /// then missed only if the system is not positive definite, or too ill-conditioned for it.
+    /// As [`Self::solve`], with a new preconditioner where one is due or the old one takes too long. The limit
+    /// is then missed only if the system is not positive definite, or too ill-conditioned for it.
     ///
     /// # Errors
     /// PETSc or CHOLMOD failed.
@@ -171,75 +256,230 @@ impl LinearSolver {
         x: &mut Vector,
         limit: f64,
     ) -> Result<SolveReport, PetscError> {
-        self.solve_choosing::<PetscError>(system, b, x, limit, None)
+        self.start(system, b, x, limit)?;
+        self.finish(system, x, limit)
     }
 
-    /// As [`Self::solve_renewing`]; before the first iteration, unless the start is a solution, other
-    /// unknowns may be chosen to be prescribed, if the factor is condensed: for the matrix that it was made
-    /// of the choice and the answer are exact.
+    /// r ← b − A x; whether that is small enough already.
     ///
     /// # Errors
-    /// PETSc, CHOLMOD or the choice failed.
-    pub fn solve_choosing<E: From<PetscError>>(
+    /// PETSc or CHOLMOD failed.
+    pub fn start(
         &mut self,
         system: LinearSystem,
         b: &Vector,
+        x: &Vector,
+        limit: f64,
+    ) -> Result<bool, PetscError> {
+        self.remake(system)?;
+        (self.prepared, self.iterations) = (false, 0);
+        system.multiply(x, &mut self.residual)?;
+        self.residual.axpby(1.0, b, -1.0)?;
+        self.set_norm(system)?;
+        self.first_norm = self.norm;
+        if self.norm > limit && self.factor.exists() && self.is_own(system.matrix)? {
+            self.factor.set_scaling(system.matrix)?;
+        }
+        Ok(self.is_small(limit))
+    }
+
+    /// Whether ‖r‖₂ ≤ `limit` on the free unknowns; never where the norm overflows, as the limit of a
+    /// huge b does too.
+    fn is_small(&self, limit: f64) -> bool {
+        self.norm.is_finite() && self.norm <= limit
+    }
+
+    fn set_norm(&mut self, system: LinearSystem) -> Result<(), PetscError> {
+        self.norm = match system.prescribed {
+            None => self.residual.norm()?,
+            Some(prescribed) => {
+                self.correction.axpby(1.0, &self.residual, 0.0)?;
+                self.correction.write(|r| prescribed.iter().for_each(|&i| r[i] = 0.0))?;
+                self.correction.norm()?
+            }
+        };
+        Ok(())
+    }
+
+    /// Makes a new factor where one is due, given that the residual is to get as small as `limit`.
+    ///
+    /// # Errors
+    /// PETSc or CHOLMOD failed.
+    pub fn prepare(&mut self, system: LinearSystem, limit: f64) -> Result<(), PetscError> {
+        if self.factor.iteration_limit(self.asked(limit)).is_none() {
+            system.book(|booking| booking.factorisation, 0.0, || self.factorise(system))?;
+        }
+        Ok(())
+    }
+
+    /// Forward elimination: what the residual leaves for the condensed unknowns d. `None` if there is no
+    /// factor: A is not positive definite whatever is prescribed. Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub fn condense(&mut self, system: LinearSystem) -> Result<Option<Condensed<'_>>, PetscError> {
+        if !self.factor.exists() {
+            return Ok(None);
+        }
+        let (bytes, residual) = (0.5 * self.factor.bytes_per_application(), &self.residual);
+        let factor = &mut self.factor;
+        let name = |booking: &Booking| booking.triangular_solves;
+        system.book(name, bytes, || factor.condense(residual)).map(Some)
+    }
+
+    /// Back substitution: `x` ← `x` + d for the last solution of the condensed unknowns. Where that left the
+    /// prescribed ones where they were, the next iteration begins with d instead. Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub fn expand(
+        &mut self,
+        system: LinearSystem,
+        moved: bool,
+        x: &mut Vector,
+    ) -> Result<(), PetscError> {
+        let (bytes, d) = (0.5 * self.factor.bytes_per_application(), &mut self.expanded);
+        let expand = || self.factor.expand(d);
+        system.book(|booking| booking.triangular_solves, bytes, expand)?;
+        self.prepared = !moved;
+        if moved {
+            self.iterations += 1;
+            x.axpby(1.0, &self.expanded, 1.0)?;
+            system.multiply(&self.expanded, &mut self.correction)?;
+            self.residual.axpby(-1.0, &self.correction, 1.0)?;
+            self.set_norm(system)?;
+        }
+        Ok(())
+    }
+
+    /// Solves on, from the present residual, until that is at most `limit`, with a new preconditioner where
+    /// one is due or the old one takes too long.
+    ///
+    /// # Errors
+    /// PETSc or CHOLMOD failed.
+    pub fn finish(
+        &mut self,
+        system: LinearSystem,
         x: &mut Vector,
         limit: f64,
-        mut choose: Option<Choose<E>>,
-    ) -> Result<SolveReport, E> {
-        self.factor.remake(system.matrix)?;
-        let mut report = self.start(system, b, x, limit)?;
-        let mut chosen = None;
-        if let Some(most) = self.factor.iteration_limit((self.norm / limit).ln())
+    ) -> Result<SolveReport, PetscError> {
+        let converged = self.is_small(limit);
+        let mut report =
+            SolveReport { converged, iterations: self.iterations, ..SolveReport::default() };
+        if !converged
+            && let Some(most) = self.factor.iteration_limit(self.asked(limit))
             && self.restrict(system)?
         {
-            chosen = self.iterate_choosing(system, x, (limit, most), choose.take(), &mut report)?;
+            self.iterate(system, x, (limit, most), &mut report)?;
         }
         if !report.converged {
-            let prescribed = chosen.as_deref().or(system.prescribed);
-            let system = LinearSystem { prescribed, ..system };
             report.factorisations += 1;
             if system.book(|booking| booking.factorisation, 0.0, || self.factorise(system))? {
-                let limits = (limit, MOST_ITERATIONS);
-                self.iterate_choosing(system, x, limits, choose, &mut report)?;
+                self.iterate(system, x, (limit, MOST_ITERATIONS), &mut report)?;
             }
         }
         Ok(report)
     }
 
-    /// As [`Self::iterate`], after a choice of prescribed unknowns, which is returned where it is another.
-    fn iterate_choosing<E: From<PetscError>>(
+    /// By which e^a the residual is to be divided.
+    fn asked(&self, limit: f64) -> f64 {
+        (self.first_norm / limit).ln()
+    }
+
+    /// The KSP on the residual that there is, until ‖r‖₂ ≤ `limit` on the free unknowns, and at most so many
+    /// times.
+    fn iterate(
         &mut self,
         system: LinearSystem,
         x: &mut Vector,
         (limit, most): (f64, usize),
-        choose: Option<Choose<E>>,
         report: &mut SolveReport,
-    ) -> Result<Option<Vec<usize>>, E> {
-        if !report.converged {
-            self.set_scaling(system)?;
+    ) -> Result<(), PetscError> {
+        let own = self.is_own(system.matrix)?;
+        let factored = if own { None } else { self.modified.as_ref() };
+        let problem = KspProblem {
+            matrix: system.matrix,
+            factored: factored.unwrap_or(system.matrix),
+            prescribed: system.prescribed,
+            limit,
+            most,
+        };
+        // The forces on prescribed unknowns stand aside: PETSc would remove them from the right-hand side.
+        let prescribed = system.prescribed.unwrap_or(&[]);
+        let take_forces =
+            |r: &mut [f64]| prescribed.iter().map(|&i| take(&mut r[i])).collect::<Vec<_>>();
+        let forces = self.residual.write(take_forces)?;
+        let first = take(&mut self.prepared).then_some(&self.expanded);
+        let mut kept = Booked { factor: &mut self.factor, first, system };
+        let solved = self.ksp.solve(&problem, &mut kept, &self.residual, &mut self.correction)?;
+        x.axpby(1.0, &self.correction, 1.0)?;
+        self.residual.axpby(1.0, self.ksp.residual(), 0.0)?;
+        self.residual.write(|r| prescribed.iter().zip(forces).for_each(|(&i, p)| r[i] += p))?;
+        self.norm = solved.norm;
+        report.iterations += solved.iterations;
+        report.converged = self.is_small(limit);
+        self.end_solve(report.iterations, self.norm, limit);
+        Ok(())
+    }
+
+    /// Notes how many iterations the solve took that was to bring the residual from the norm at the start to
+    /// `limit` and brought it to `norm`.
+    pub fn end_solve(&mut self, iterations: usize, norm: f64, limit: f64) {
+        let reached = (self.first_norm / norm).ln();
+        let reduction = Reduction { asked: self.asked(limit), reached };
+        self.factor.end_solve(Some(iterations), reduction);
+    }
+
+    /// Whether a solve has taken as many iterations as the preconditioner is worth.
+    pub fn is_slow(&self, iterations: usize, limit: f64) -> bool {
+        self.factor.iteration_limit(self.asked(limit)).is_none_or(|most| iterations >= most)
+    }
+
+    /// Prescribes unknowns in the factor, where it is condensed; false if there is no preconditioner then.
+    /// Collective.
+    pub(crate) fn prescribe(&mut self, unknowns: &[usize]) -> Result<bool, PetscError> {
+        let exists = self.factor.exists();
+        Ok(exists && (!self.factor.is_condensed() || self.factor.restrict(unknowns)?))
+    }
+
+    /// `z` ← P⁻¹ `r` with the preconditioner that there is.
+    ///
+    /// # Errors
+    /// There is none.
+    pub(crate) fn precondition(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
+        match self.chosen {
+            Some((_, false)) => self.ksp.precondition(&mut self.factor, r, z),
+            _ => self.factor.apply(r, z),
         }
-        let condensed = !report.converged && self.factor.is_condensed(system.matrix)?;
-        let choose = choose.filter(|_| condensed);
-        let asked = choose.is_some();
-        let chosen = choose.map_or(Ok(None), |choose| self.apply_factor(system, Some(choose)))?;
-        let prescribed = chosen.as_deref().or(system.prescribed);
-        let system = LinearSystem { prescribed, ..system };
-        if chosen.is_some() {
-            report.iterations += 1;
-            x.axpby(1.0, &self.preconditioned, 1.0)?;
-            system.multiply(&self.preconditioned, &mut self.image)?;
-            self.residual.axpby(-1.0, &self.image, 1.0)?;
-            report.converged = self.is_reached(system, limit)?;
-        }
-        self.iterate(system, x, (limit, most), asked && chosen.is_none(), report)?;
-        Ok(chosen)
     }
 
     /// b − A x of the last solve on all unknowns: on prescribed ones, the forces that keep them
     /// there.
     pub fn residual(&self) -> &Vector {
         &self.residual
+    }
+}
+
+/// The factor in a solve, whose time is booked.
+struct Booked<'a> {
+    factor: &'a mut Factor,
+    /// Its answer to the first residual, if that is known.
+    first: Option<&'a Vector>,
+    system: LinearSystem<'a>,
+}
+
+impl KeptPreconditioner for Booked<'_> {
+    /// When it is made is decided outside.
+    fn set_up(&mut self, _matrix: &Matrix) -> Result<bool, PetscError> {
+        Ok(self.factor.exists())
+    }
+
+    fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
+        if let Some(first) = self.first.take() {
+            return z.axpby(1.0, first, 0.0);
+        }
+        let bytes = self.factor.bytes_per_application();
+        let apply = || self.factor.apply(r, z);
+        self.system.book(|booking| booking.triangular_solves, bytes, apply)
     }
 }

@@ -45,10 +45,9 @@ impl<'a> LinearSystem<'a> {
         self.book(|booking| booking.product, bytes, || self.matrix.multiply(x, y))
     }
 
-    /// `v` ← 0 on the prescribed unknowns.
-    pub(super) fn clear_prescribed(self, v: &mut Vector) -> Result<(), PetscError> {
-        let Some(prescribed) = self.prescribed else { return Ok(()) };
-        v.write(|v| prescribed.iter().for_each(|&i| v[i] = 0.0))
+    /// Whether no rank prescribes an unknown.
+    pub(super) fn is_free(self) -> bool {
+        self.prescribed.is_none()
     }
 
     /// Does `work`, which moves so many bytes, and books its time under a name.

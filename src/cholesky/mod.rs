@@ -36,7 +36,7 @@ mod raw {
 
 pub use cholesky::{Cholesky, Precision};
 pub use factor::Factor;
-pub use linear_solver::{Choose, LinearSolver, SolveReport};
+pub use linear_solver::{LinearSolver, SolveReport};
 pub use linear_system::{Booking, LinearSystem};
 pub use lower_triangle::LowerTriangle;
 pub use refactorisation::{Reduction, RefactorisationPolicy};

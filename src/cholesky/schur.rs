@@ -117,7 +117,7 @@ impl SchurComplement {
         let (Some(factor), Some(changes)) = (&mut self.factor, &self.changes) else { return };
         let prescribed = b.iter_mut().zip(&changes.prescribed).filter(|(_, p)| **p != 0.0);
         prescribed.for_each(|(b, _)| *b = 0.0);
-        factor.solve(b, x, |_| {});
+        factor.solve(b, x);
     }
 
     /// The precision of the factor.
@@ -138,17 +138,22 @@ impl SchurComplement {
 
 /// The system that is left for the condensed unknowns when all others are eliminated: S x = b − p with
 /// the forces p of what is prescribed.
+///
+/// The factor may be that of an earlier matrix A₀, in which case E^-½ A₀ E^-½ stands for the present one
+/// ([`Factor`](super::Factor)): then e = E^½ relates x = e x₀ and p = p₀/e to the unknowns and forces of A₀.
 pub struct Condensed<'a> {
     pub(super) schur: &'a mut SchurComplement,
     /// The places of this rank's condensed unknowns.
-    pub(super) own: &'a [usize],
+    pub(super) own: Vec<usize>,
+    /// e of this rank's condensed unknowns.
+    pub(super) scaling: Vec<f64>,
+    /// b₀ and x₀ of all places.
     pub(super) b: &'a [f64],
-    /// The solution last found, on all places.
     pub(super) x: &'a mut [f64],
 }
 
 impl Condensed<'_> {
-    /// The condensed unknowns of this rank, and the forces p there, where some are `prescribed`; `None` if
+    /// The condensed unknowns x of this rank, and the forces p there, where some are `prescribed`; `None` if
     /// what is left is not positive definite. Collective.
     ///
     /// # Errors
@@ -157,8 +162,9 @@ impl Condensed<'_> {
         &mut self,
         prescribed: &[Option<f64>],
     ) -> Result<Option<[Vec<f64>; 2]>, PetscError> {
-        let Self { schur, own, b, x } = self;
-        let given = || own.iter().zip(prescribed).filter_map(|(&i, value)| Some((i, (*value)?)));
+        let Self { schur, own, scaling, b, x } = self;
+        let unknowns = || own.iter().zip(&*scaling).zip(prescribed);
+        let given = || unknowns().filter_map(|((&i, e), value)| Some((i, (*value)? / e)));
         if !schur.restrict(given().map(|(i, _)| i), iter::empty())? {
             return Ok(None);
         }
@@ -167,13 +173,9 @@ impl Condensed<'_> {
         schur.comm.sum(x);
         let mut forces = b.to_vec();
         schur.solve_prescribed(&mut forces, x);
-        let of = |values: &[f64]| own.iter().map(|&i| values[i]).collect();
-        Ok(Some([of(x), of(&forces)]))
-    }
-
-    /// The forces b that the condensed unknowns of this rank are under.
-    pub fn loads(&self) -> Vec<f64> {
-        self.own.iter().map(|&i| self.b[i]).collect()
+        let places = || own.iter().zip(&*scaling);
+        let unknowns = places().map(|(&i, e)| e * x[i]).collect();
+        Ok(Some([unknowns, places().map(|(&i, e)| forces[i] / e).collect()]))
     }
 
     /// The condensed unknowns of this rank, none prescribed, with a diagonal D `added` to S and forces p:
@@ -186,15 +188,16 @@ impl Condensed<'_> {
         added: impl Iterator<Item = f64>,
         p: &[f64],
     ) -> Result<Option<Vec<f64>>, PetscError> {
-        let Self { schur, own, b, x } = self;
-        if !schur.restrict(iter::empty(), own.iter().copied().zip(added))? {
+        let Self { schur, own, scaling, b, x } = self;
+        let added = own.iter().zip(&*scaling).zip(added).map(|((&i, e), d)| (i, e * e * d));
+        if !schur.restrict(iter::empty(), added)? {
             return Ok(None);
         }
         let mut forces = vec![0.0; b.len()];
-        own.iter().zip(p).for_each(|(&i, p)| forces[i] = -p);
+        own.iter().zip(&*scaling).zip(p).for_each(|((&i, e), p)| forces[i] = -e * p);
         schur.comm.sum(&mut forces);
         forces.iter_mut().zip(*b).for_each(|(force, b)| *force += b);
         schur.solve(&mut forces, x);
-        Ok(Some(own.iter().map(|&i| x[i]).collect()))
+        Ok(Some(own.iter().zip(&*scaling).map(|(&i, e)| e * x[i]).collect()))
     }
 }

@@ -16,7 +16,7 @@
 //! L_Γ L_Γᵀ = c 1 − A_ΓI A_II⁻¹ A_IΓ, and its triangular solves do the rest.
 
 use super::{
-    Cholesky, Choose, LowerTriangle, Precision,
+    Cholesky, LowerTriangle, Precision,
     schur::{Condensed, SchurComplement},
 };
 use crate::petsc::{Communicator, Matrix, PetscError};
@@ -132,62 +132,69 @@ impl Substructure {
     /// Prescribes some of the condensed unknowns; false if what is left of the matrix is not positive
     /// definite. Collective.
     pub(super) fn restrict(&mut self, prescribed: &[usize]) -> Result<bool, PetscError> {
-        let Division { places, near, interior, .. } = &self.division;
-        let place = |&i: &usize| places[i] - interior - near.len();
+        let (places, shared) = (&self.division.places, self.division.shared());
+        let place = |&i: &usize| places[i] - shared;
         self.schur.restrict(prescribed.iter().map(place), iter::empty())
     }
 
     /// `z` ← A⁻¹ `r` on the owned unknowns, 0 on prescribed ones. Collective.
     pub(super) fn apply(&mut self, r: &[f64], z: &mut [f64]) {
-        self.apply_with(r, z, |schur, b, x| schur.solve(b, x));
-    }
-
-    /// The same with unknowns prescribed by `choose`, which solves for the owned unknowns `condensed`.
-    /// Collective.
-    pub(super) fn apply_choosing<E>(
-        &mut self,
-        r: &[f64],
-        z: &mut [f64],
-        condensed: &[usize],
-        choose: Choose<E>,
-    ) -> Result<Option<Vec<Option<f64>>>, E> {
-        let Division { places, near, interior, .. } = &self.division;
-        let place = |&i: &usize| places[i] - interior - near.len();
-        let own: Vec<usize> = condensed.iter().map(place).collect();
-        let mut chosen = Ok(None);
-        self.apply_with(r, z, |schur, b, x| {
-            chosen = choose(&mut Condensed { schur, own: &own, b, x });
-        });
-        chosen
-    }
-
-    fn apply_with(
-        &mut self,
-        r: &[f64],
-        z: &mut [f64],
-        mut solve_shared: impl FnMut(&mut SchurComplement, &mut [f64], &mut [f64]),
-    ) {
-        let Division { places, interface, near, interior } = &self.division;
-        if interface.is_empty() {
-            return self.local.solve(r, z, |_| {});
+        if self.division.interface.is_empty() {
+            return self.local.solve(r, z);
         }
+        self.eliminate(r);
+        let shared = self.division.shared();
         let [b, x] = &mut self.vectors;
-        b[interior + near.len()..].fill(0.0);
+        self.schur.solve(&mut b[shared..], &mut x[shared..]);
+        self.expand(z);
+    }
+
+    /// Eliminates the interior from A x = `r`. Collective.
+    fn eliminate(&mut self, r: &[f64]) {
+        let shared = self.division.shared();
+        let Division { places, near, .. } = &self.division;
+        let [b, _] = &mut self.vectors;
+        b[shared..].fill(0.0);
         places.iter().zip(r).for_each(|(&place, r)| b[place] = *r);
-        let (b_local, b_shared) = b.split_at_mut(interior + near.len());
-        let (x_local, x_shared) = x.split_at_mut(interior + near.len());
-        self.local.solve(b_local, x_local, |values| {
-            // The values are − A_ΓI A_II⁻¹ r_I.
-            near.iter().zip(values.iter()).for_each(|(&i, value)| b_shared[i] += value);
-            self.comm.sum(b_shared);
-            solve_shared(&mut self.schur, b_shared, x_shared);
-            values.iter_mut().zip(near).for_each(|(value, &i)| *value = x_shared[i]);
-        });
-        places.iter().zip(z).for_each(|(&place, z)| *z = x[place]);
+        let (b_local, b_shared) = b.split_at_mut(shared);
+        // − A_ΓI A_II⁻¹ r_I
+        let values = self.local.forward(b_local);
+        near.iter().zip(values).for_each(|(&i, value)| b_shared[i] += value);
+        self.comm.sum(b_shared);
+    }
+
+    /// The system S x = b that is left of A x = `r` for the owned unknowns `condensed`, of which e is the
+    /// `scaling`. Collective.
+    pub(super) fn condense(
+        &mut self,
+        r: &[f64],
+        condensed: &[usize],
+        scaling: Vec<f64>,
+    ) -> Condensed<'_> {
+        self.eliminate(r);
+        let Self { division, schur, vectors: [b, x], .. } = self;
+        let shared = division.shared();
+        let own = condensed.iter().map(|&i| division.places[i] - shared).collect();
+        Condensed { schur, own, scaling, b: &b[shared..], x: &mut x[shared..] }
+    }
+
+    /// `z` ← the solution for the last x of the interface. Collective.
+    pub(super) fn expand(&mut self, z: &mut [f64]) {
+        let Self { division, local, vectors, .. } = self;
+        let Division { places, near, .. } = &*division;
+        let (x_local, x_shared) = vectors[1].split_at_mut(division.shared());
+        let interface: Vec<f64> = near.iter().map(|&i| x_shared[i]).collect();
+        local.backward(&interface, x_local);
+        places.iter().zip(z).for_each(|(&place, z)| *z = vectors[1][place]);
     }
 }
 
 impl Division {
+    /// Where the third part of the places begins.
+    fn shared(&self) -> usize {
+        self.interior + self.near.len()
+    }
+
     /// Divides the unknowns of a matrix: of two neighbours on different ranks, the one on the higher
     /// rank belongs to the interface, with those `condensed`. `None` if that is too large. Collective.
     fn of(
@@ -229,7 +236,7 @@ impl Division {
 
     /// Reads the rows that this rank owns.
     fn blocks(&self, matrix: &Matrix) -> Result<Blocks, PetscError> {
-        let (interior, shared) = (self.interior, self.interior + self.near.len());
+        let (interior, shared) = (self.interior, self.shared());
         let (mut local, mut largest_row_sum) = (LowerTriangle::default(), 0.0_f64);
         let mut interface = DMatrix::zeros(self.interface.len(), self.interface.len());
         let rows = matrix.rows();
@@ -265,7 +272,7 @@ impl Division {
     /// in the interior of another rank.
     fn place(&self, first: i32, unknown: i32) -> Option<usize> {
         let owned = usize::try_from(unknown - first).ok().and_then(|i| self.places.get(i));
-        let shared = self.interior + self.near.len();
+        let shared = self.shared();
         let on_interface = || Some(shared + self.interface.binary_search(&unknown).ok()?);
         owned.copied().or_else(on_interface)
     }

@@ -29,9 +29,11 @@ pub(super) trait TriangularSolver {
     /// would be most of the memory of a run.
     fn take_values(&mut self, factor: &mut Cholmod);
 
-    /// L₁₁ y₁ = (P b)₁, y₂ = (P b)₂ − L₂₁ y₁; `interface` replaces y₂ by (P x)₂;
-    /// L₁₁ᵀ (P x)₁ = y₁ − L₂₁ᵀ (P x)₂.
-    fn solve(&mut self, b: &[f64], x: &mut [f64], interface: &mut dyn FnMut(&mut [f64]));
+    /// L₁₁ y₁ = (P b)₁; returns y₂ = (P b)₂ − L₂₁ y₁.
+    fn forward(&mut self, b: &[f64]) -> Vec<f64>;
+
+    /// L₁₁ᵀ (P x)₁ = y₁ − L₂₁ᵀ (P x)₂ for the y₁ of the last forward solve and (P x)₂ = `interface`.
+    fn backward(&mut self, interface: &[f64], x: &mut [f64]);
 
     /// Bytes that a solve reads.
     fn bytes(&self) -> f64;
@@ -175,21 +177,9 @@ impl<T: Number> Supernodal<T> {
         }
     }
 
-    /// Lets `interface` replace y₂ by (P x)₂, and scales y₁ as that.
-    fn solve_interface(&mut self, interface: &mut dyn FnMut(&mut [f64])) {
-        let interior = self.supernodes.last().map_or(0, |s| s.first + s.columns);
-        let (inner, outer) = self.y.split_at_mut(interior);
-        let number = |&y: &T| self.scale * convert_unchecked::<T, f64>(y);
-        let mut values: Vec<f64> = outer.iter().map(number).collect();
-        interface(&mut values);
-        if values.is_empty() {
-            return;
-        }
-        let scale = values.iter().fold(self.scale, |scale, value| scale.max(value.abs()));
-        let smaller = convert(self.scale / scale);
-        inner.iter_mut().for_each(|y| *y *= smaller);
-        outer.iter_mut().zip(values).for_each(|(y, value)| *y = convert(value / scale));
-        self.scale = scale;
+    /// The number of columns of L₁₁.
+    fn interior(&self) -> usize {
+        self.supernodes.last().map_or(0, |s| s.first + s.columns)
     }
 }
 
@@ -231,13 +221,26 @@ impl<T: Number> TriangularSolver for Supernodal<T> {
         }
     }
 
-    fn solve(&mut self, b: &[f64], x: &mut [f64], interface: &mut dyn FnMut(&mut [f64])) {
+    fn forward(&mut self, b: &[f64]) -> Vec<f64> {
         self.scale = b.iter().fold(f64::MIN_POSITIVE, |scale, b| scale.max(b.abs()));
         for (y, &row) in self.y.iter_mut().zip(&self.order) {
             *y = convert(b[row as usize] / self.scale);
         }
         self.solve_forward();
-        self.solve_interface(interface);
+        let number = |&y: &T| self.scale * convert_unchecked::<T, f64>(y);
+        self.y[self.interior()..].iter().map(number).collect()
+    }
+
+    fn backward(&mut self, interface: &[f64], x: &mut [f64]) {
+        let interior = self.interior();
+        let (inner, outer) = self.y.split_at_mut(interior);
+        let scale = interface.iter().fold(self.scale, |scale, value| scale.max(value.abs()));
+        if scale > self.scale {
+            let smaller = convert(self.scale / scale);
+            inner.iter_mut().for_each(|y| *y *= smaller);
+            self.scale = scale;
+        }
+        outer.iter_mut().zip(interface).for_each(|(y, value)| *y = convert(value / scale));
         self.solve_backward();
         for (&y, &row) in self.y.iter().zip(&self.order) {
             x[row as usize] = self.scale * convert_unchecked::<T, f64>(y);

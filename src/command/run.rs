@@ -17,7 +17,7 @@ use super::{
 use clap::Args;
 use signorini::{
     archive::Archive,
-    cholesky::{Factor, Precision},
+    cholesky::LinearSolver,
     evolution::{self, DiscreteProblem, Phases, RunError},
     mesh::Mesh,
     output,
@@ -114,8 +114,8 @@ fn read_shared(comm: Communicator, scene: &Scene) -> Result<Mesh, Failure> {
 fn check_factors(session: &Session, problem: &DiscreteProblem) -> Result<(), Failure> {
     let mut prefixes = ["elastic_"].into_iter().chain(problem.damage().map(|_| "damage_"));
     prefixes.try_for_each(|prefix| {
-        let checked = Factor::new(session, prefix, Precision::Full).check_options(session);
-        let refused = |error| format!("PETSc options that begin with -{prefix}pc_: {error}");
+        let checked = LinearSolver::check_options(session, prefix);
+        let refused = |error| format!("PETSc options that begin with -{prefix}: {error}");
         agree(session.comm(), checked.map_err(|error| Failure::input(refused(error))))
     })
 }

@@ -20,6 +20,7 @@ mod solvers;
 
 pub use certificate::{Answer, Certificate, ContactPoint};
 pub use constraints::Constraints;
+pub(crate) use elastic::PREFIX as ELASTIC;
 pub use error::{Conflict, ConstraintError, ContactError};
 pub use kkt::{Kkt, Scales};
 pub use problem::ContactProblem;

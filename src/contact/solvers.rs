@@ -16,7 +16,7 @@ pub use tao::TAO_TYPES;
 use super::{ContactError, ContactProblem};
 use crate::{
     archive::{Archive, ArchiveError},
-    cholesky::Factor,
+    cholesky::LinearSolver,
     petsc::{Session, Vector},
 };
 use active_set::ActiveSet;
@@ -44,8 +44,8 @@ pub trait ContactSolver {
         Ok(())
     }
 
-    /// The factor of K, of an earlier ζ and another active set, if the method keeps one.
-    fn into_factor(self: Box<Self>) -> Option<Factor> {
+    /// The solver of linear systems with K, of an earlier ζ and another active set, if the method keeps one.
+    fn into_linear_solver(self: Box<Self>) -> Option<LinearSolver> {
         None
     }
 

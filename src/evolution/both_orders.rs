@@ -10,12 +10,13 @@ use crate::{
     contact::{ContactPoint, SOLVERS},
     fem::{Cells, Elements},
     mesh::Order,
-    petsc::{PetscError, Session},
+    petsc::{Operator, PetscError, Session, solve_by_energy},
 };
 use fixed::Fixed;
 
 /// A scene in P1 and in P2 on one mesh, one of them that of a run.
 pub(super) struct BothOrders<'a> {
+    session: &'a Session,
     /// The order of the run.
     order: Order,
     coarse: &'a DiscreteProblem,
@@ -32,9 +33,9 @@ pub(super) struct BothOrders<'a> {
     correction: Option<Vec<f64>>,
 }
 
-/// An iteration that promises less than this part of the energy of a correction is the last one;
+/// The part of the energy of a correction that the iteration may leave;
 /// iterations at most.
-const REST: f64 = 0.02;
+const REST: f64 = 0.004;
 const ITERATIONS: usize = 30;
 
 impl<'a> BothOrders<'a> {
@@ -75,6 +76,7 @@ impl<'a> BothOrders<'a> {
         }
         let correction = None;
         Ok(Some(Self {
+            session,
             order,
             coarse,
             fine,
@@ -127,9 +129,8 @@ impl<'a> BothOrders<'a> {
         self.solve(&fixed, state.time, self.prolonged(&state.u))
     }
 
-    /// u at `time` by conjugate gradients from another field u. Their first direction is the correction
-    /// of the last state; the directions are made orthogonal in the flexible way (Notay, SIAM J. Sci.
-    /// Comput. 22, 2000).
+    /// u at `time` by conjugate gradients from another field u, after a step along the correction of the last
+    /// state.
     fn solve(
         &mut self,
         fixed: &Fixed,
@@ -145,39 +146,27 @@ impl<'a> BothOrders<'a> {
         constraints.bases.force_to_local(&mut residual);
         add(&mut residual, -1.0, &fixed.product(&start)?);
         fixed.clear_fixed(&mut residual);
-        let (mut direction, mut image) = (vec![0.0; start.len()], vec![0.0; start.len()]);
-        let (mut correction, mut stiffness, mut gained) = (image.clone(), f64::INFINITY, 0.0);
-        for _ in 0..ITERATIONS {
-            let (z, promised) = if let Some(mut correction) = self.correction.take() {
-                fixed.clear_fixed(&mut correction);
-                (correction, f64::INFINITY)
-            } else {
-                let Some(z) = self.preconditioned(fixed, &residual)? else { return Ok(None) };
-                let promised = partition.dot(&residual, &z, 2);
-                (z, promised)
-            };
-            if promised <= 0.0 {
-                break;
-            }
-            let beta = -partition.dot(&z, &image, 2) / stiffness;
-            direction.iter_mut().zip(&z).for_each(|(p, z)| *p = z + beta * *p);
-            image = fixed.product(&direction)?;
-            fixed.clear_fixed(&mut image);
-            stiffness = partition.dot(&direction, &image, 2);
-            if stiffness <= 0.0 {
-                return Ok(None);
-            }
-            let work = partition.dot(&direction, &residual, 2);
-            add(&mut correction, work / stiffness, &direction);
-            add(&mut residual, -work / stiffness, &image);
-            gained += work * work / stiffness;
-            if promised <= REST * gained {
-                break;
+        let (mut correction, mut gained) = (vec![0.0; start.len()], 0.0);
+        if let Some(mut last) = self.correction.take() {
+            fixed.clear_fixed(&mut last);
+            let image = fixed.free_product(&last)?;
+            let (work, stiffness) =
+                (partition.dot(&last, &residual, 2), partition.dot(&last, &image, 2));
+            if stiffness > 0.0 {
+                add(&mut correction, work / stiffness, &last);
+                add(&mut residual, -work / stiffness, &image);
+                gained = work * work / stiffness;
             }
         }
+        let session = self.session;
+        let owned = 2 * partition.owned();
+        let mut of_state = OfState { orders: self, fixed, gained, supported: true };
+        let found = solve_by_energy(session, &mut of_state, &residual[..owned], ITERATIONS)?;
+        let Some(found) = found.filter(|_| of_state.supported) else { return Ok(None) };
+        correction.iter_mut().zip(found).for_each(|(u, found)| *u += found);
         let mut u = start;
         add(&mut u, 1.0, &correction);
-        self.correction = (gained > 0.0).then_some(correction);
+        self.correction = Some(correction);
         constraints.bases.displacement_to_global(&mut u);
         partition.update(&mut u, 2)?;
         Ok(Some(u))
@@ -239,6 +228,38 @@ impl<'a> BothOrders<'a> {
     fn at_vertices(&self, fine: &[f64]) -> Vec<f64> {
         let values = |&node: &usize| [fine[2 * node], fine[2 * node + 1]];
         self.node_of_vertex.iter().flat_map(values).collect()
+    }
+}
+
+/// The linear problem of a state as conjugate gradients see it.
+struct OfState<'s, 'a> {
+    orders: &'s mut BothOrders<'a>,
+    fixed: &'s Fixed<'s>,
+    /// The energy of the correction before the iteration.
+    gained: f64,
+    /// Whether the active nodes support the body.
+    supported: bool,
+}
+
+impl Operator for OfState<'_, '_> {
+    fn multiply(&mut self, x: &[f64], y: &mut [f64]) -> Result<(), PetscError> {
+        let image = self.fixed.free_product(&self.fixed.extended(x))?;
+        y.copy_from_slice(&image[..y.len()]);
+        Ok(())
+    }
+
+    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<(), PetscError> {
+        let answer = self.orders.preconditioned(self.fixed, &self.fixed.extended(r))?;
+        self.supported = answer.is_some();
+        match answer {
+            Some(answer) => z.copy_from_slice(&answer[..z.len()]),
+            None => z.fill(0.0),
+        }
+        Ok(())
+    }
+
+    fn is_enough(&self, gained: f64, left: f64) -> bool {
+        left <= REST * (self.gained + gained)
     }
 }
 

@@ -4,12 +4,13 @@
 use super::DiscreteProblem;
 use crate::{
     fem::{Body, Elements, bubble_diffusion, bubble_mass},
-    petsc::PetscError,
+    petsc::{Operator, PetscError, Session, solve_by_energy},
 };
-use std::{array, mem};
+use std::array;
 
 /// The bubbles of a body, one in the place of each midpoint of its P2 nodes.
 pub(super) struct Bubbles<'a> {
+    session: &'a Session,
     body: &'a Body,
     /// The bubbles of the sides 01, 12, 20 of each triangle.
     sides: Vec<[usize; 3]>,
@@ -31,7 +32,7 @@ const ITERATIONS: usize = 30;
 
 impl<'a> Bubbles<'a> {
     /// Of the body of `fine`, which is of order 2.
-    pub(super) fn new(fine: &'a DiscreteProblem) -> Self {
+    pub(super) fn new(session: &'a Session, fine: &'a DiscreteProblem) -> Self {
         let body = &fine.body;
         let sides = match body.elements() {
             Elements::Quadratic(cells) => {
@@ -41,7 +42,7 @@ impl<'a> Bubbles<'a> {
         };
         let kappa = fine.diffusions();
         let diffusion = (0..body.triangles.len()).map(|t| kappa[body.material(t)]).collect();
-        Self { body, sides, diffusion }
+        Self { session, body, sides, diffusion }
     }
 
     /// The system of a step of `k` s, (β, w) + k (κ∇β, ∇w) for all bubbles w.
@@ -90,32 +91,51 @@ impl BubbleSystem<'_> {
     ) -> Result<Vec<[f64; 3]>, PetscError> {
         let Self { bubbles, k, ref diagonal } = *self;
         let (body, partition) = (bubbles.body, &bubbles.body.nodes.partition);
-        let mut b = bubbles.assembled(|t| {
+        let b = bubbles.assembled(|t| {
             let (mass, r) = (bubble_mass(&body.triangles[t], before[t]), residual(t));
             array::from_fn(|i| mass[i] + k * r[i])
         });
-        let scaled = |b: &[f64]| -> Vec<f64> {
-            b.iter().zip(diagonal).map(|(b, d)| if *d > 0.0 { b / d } else { 0.0 }).collect()
-        };
-        let mut beta = vec![0.0; b.len()];
-        let mut z = scaled(&b);
-        let mut direction = z.clone();
-        let mut rest = partition.dot(&b, &z, 1);
-        let enough = REST * REST * rest;
-        for _ in 0..ITERATIONS {
-            if rest <= enough {
-                break;
-            }
-            partition.update(&mut direction, 1)?;
-            let image = bubbles.assembled(|t| self.of(t, bubbles.on(t, &direction)));
-            let step = rest / partition.dot(&direction, &image, 1);
-            beta.iter_mut().zip(&direction).for_each(|(beta, p)| *beta += step * p);
-            b.iter_mut().zip(&image).for_each(|(b, image)| *b -= step * image);
-            z = scaled(&b);
-            let before = mem::replace(&mut rest, partition.dot(&b, &z, 1));
-            direction.iter_mut().zip(&z).for_each(|(p, z)| *p = z + rest / before * *p);
-        }
+        let owned = partition.owned();
+        let first = b[..owned].iter().zip(diagonal).filter(|(_, d)| **d > 0.0);
+        let start = partition.comm().total(first.map(|(b, d)| b * b / d).sum());
+        let mut operator = Iteration { system: self, start };
+        let found = solve_by_energy(bubbles.session, &mut operator, &b[..owned], ITERATIONS)?;
+        let mut beta = found.unwrap_or_default();
+        beta.resize(b.len(), 0.0);
         partition.update(&mut beta, 1)?;
         Ok((0..bubbles.sides.len()).map(|t| bubbles.on(t, &beta)).collect())
+    }
+}
+
+/// The system of the bubbles as conjugate gradients see it.
+struct Iteration<'a> {
+    system: &'a BubbleSystem<'a>,
+    /// rᵀD⁻¹r at the start.
+    start: f64,
+}
+
+impl Operator for Iteration<'_> {
+    fn multiply(&mut self, x: &[f64], y: &mut [f64]) -> Result<(), PetscError> {
+        let bubbles = self.system.bubbles;
+        let mut field = x.to_vec();
+        field.resize(bubbles.body.nodes.points.len(), 0.0);
+        bubbles.body.nodes.partition.update(&mut field, 1)?;
+        let image = bubbles.assembled(|t| self.system.of(t, bubbles.on(t, &field)));
+        // Nodes that are no bubbles.
+        let rows = image.iter().zip(&self.system.diagonal).zip(x);
+        y.iter_mut()
+            .zip(rows)
+            .for_each(|(y, ((image, d), x))| *y = if *d > 0.0 { *image } else { *x });
+        Ok(())
+    }
+
+    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<(), PetscError> {
+        let rows = r.iter().zip(&self.system.diagonal);
+        z.iter_mut().zip(rows).for_each(|(z, (r, d))| *z = if *d > 0.0 { r / d } else { *r });
+        Ok(())
+    }
+
+    fn is_enough(&self, _gained: f64, left: f64) -> bool {
+        left <= REST * REST * self.start
     }
 }

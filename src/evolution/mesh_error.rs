@@ -87,7 +87,7 @@ fn damage_error(
         problem,
         laws,
         diffusions: problem.diffusions(),
-        bubbles: Bubbles::new(fine),
+        bubbles: Bubbles::new(session, fine),
         change: vec![0.0; first.zeta.len()],
         middles: interpolation_error(&problem.body, &first.zeta)?,
         source: Vec::new(),

@@ -11,14 +11,16 @@
 
 mod blas;
 mod communicator;
+mod energy;
 mod error;
 mod ghosts;
 mod graph;
 mod handle;
+mod kept;
+mod ksp;
 mod matrix;
 mod options;
 mod pages;
-mod preconditioner;
 mod session;
 mod tao;
 mod vector;
@@ -34,11 +36,13 @@ pub use matrix::{Matrix, Pattern};
 pub use session::Session;
 pub use vector::Vector;
 
+pub(crate) use energy::{Operator, solve_by_energy};
 pub(crate) use ghosts::Ghosts;
 pub(crate) use graph::divide;
+pub(crate) use kept::KeptPreconditioner;
+pub(crate) use ksp::{Ksp, KspProblem};
 pub(crate) use options::{has_option, set_default_option};
 pub(crate) use pages::use_large_pages;
-pub(crate) use preconditioner::Preconditioner;
-pub(crate) use tao::{BoundedQuadratic, ShellPreconditioner, TaoReport};
+pub(crate) use tao::{BoundedQuadratic, TaoReport};
 
 use error::check;

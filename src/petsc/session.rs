@@ -1,8 +1,8 @@
 //! Starting and ending PETSc (PetscInitialize, PetscFinalize).
 
 use super::{
-    Communicator, PetscError, blas, check, error::keep_message, handle::OPEN_HANDLES, options,
-    options::c_string, raw,
+    Communicator, PetscError, blas, check, error::keep_message, handle::OPEN_HANDLES, kept,
+    options, options::c_string, raw,
 };
 use std::{
     env,
@@ -122,7 +122,8 @@ fn initialize(options: &[String]) -> Result<(), PetscError> {
     temporary.into_iter().for_each(|name| unsafe { env::remove_var(name) });
     started?;
     // SAFETY: PETSc runs; the handler needs no context.
-    check(unsafe { raw::PetscPushErrorHandler(Some(keep_message), ptr::null_mut()) })
+    check(unsafe { raw::PetscPushErrorHandler(Some(keep_message), ptr::null_mut()) })?;
+    kept::register()
 }
 
 /// `PETSC_COMM_WORLD`.

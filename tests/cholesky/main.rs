@@ -49,7 +49,7 @@ fn cholesky(a: &DMatrix<f64>, precision: Precision) -> Cholesky {
 /// max |b − A x| / max |b|.
 fn residual(a: &DMatrix<f64>, cholesky: &mut Cholesky, b: &DVector<f64>) -> f64 {
     let mut x = DVector::zeros(b.len());
-    cholesky.solve(b.as_slice(), x.as_mut_slice(), |interface| assert!(interface.is_empty()));
+    cholesky.solve(b.as_slice(), x.as_mut_slice());
     (b - a * x).amax() / b.amax()
 }
 
@@ -93,10 +93,9 @@ fn the_schur_complement_of_the_interface_is_left_to_the_caller() {
         for scale in [1.0, 1e60] {
             let mut found = DVector::zeros(61);
             let solution = x.rows(54, INTERFACE) * scale;
-            cholesky.solve(b.as_slice(), found.as_mut_slice(), |interface| {
-                assert!((DVector::from_column_slice(interface) - &reduced).amax() < rounding);
-                interface.copy_from_slice(solution.as_slice());
-            });
+            let left = DVector::from_vec(cholesky.forward(b.as_slice()));
+            assert!((left - &reduced).amax() < rounding);
+            cholesky.backward(solution.clone_owned().as_slice(), found.as_mut_slice());
             let interface = found.rows(54, INTERFACE) / scale;
             assert!((interface - x.rows(54, INTERFACE)).amax() < rounding);
             assert!(scale > 1.0 || (found - &x).amax() < rounding);
@@ -196,9 +195,9 @@ fn an_old_factor_solves_other_values_other_prescribed_unknowns_and_another_diago
     let (mut factorisations, mut worst) = (0, 0.0_f64);
     for turn in 0..8 {
         let mut a = coupled(SIZE, 5) * (1.0 + 0.01 * turn as f64);
-        [(3, 0.5), (turn, 1.0)].iter().for_each(|&(i, d)| a[(i, i)] += d);
+        [(3, 0.5), (turn, 0.1)].iter().for_each(|&(i, d)| a[(i, i)] += d);
         let matrix = matrix(&session, &a);
-        let prescribed: Vec<usize> = (20..22 + turn).collect();
+        let prescribed: Vec<usize> = (20..22 + turn / 4).collect();
         let system = LinearSystem { prescribed: Some(&prescribed), ..LinearSystem::of(&matrix) };
         let mut x = vector(&session, &DVector::from_element(SIZE, 0.25));
         let report = solver.solve_renewing(system, &right, &mut x, 1e-11).unwrap();
@@ -219,7 +218,7 @@ fn an_old_factor_solves_other_values_other_prescribed_unknowns_and_another_diago
 #[test]
 fn a_factor_takes_over_matrices_of_another_size() {
     let session = Session::start(&[]).unwrap();
-    let mut factor = Factor::new(&session, "test_", Precision::Full);
+    let mut factor = Factor::new(&session, Precision::Full);
     for size in [30, 50, 20] {
         let (a, b) = (coupled(size, 5), DVector::from_element(size, 1.0));
         assert!(factor.factorise(&matrix(&session, &a)).unwrap());

@@ -63,7 +63,7 @@ impl Elastic {
         let k = k.unwrap();
         let prescribed = k.matrix.duplicate().unwrap();
         let bounded = constraints.bounds.iter().map(|bound| bound.dof).collect();
-        let factor = Factor::new(session, "elastic_", Precision::Preconditioner);
+        let factor = Factor::new(session, Precision::Preconditioner);
         let mut elastic = Self { k, prescribed, bounded, factor };
         elastic.factorise();
         elastic

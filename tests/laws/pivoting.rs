@@ -136,7 +136,8 @@ fn pivots_on_the_deepest_end_where_block_pivots_cycle() {
         c.iter().zip(&exact).for_each(|(c, e)| close(*c, *e, 1e-9));
         cycling += usize::from(small.cycles(guess.map(|on| on == 1.0)));
         // The factor is exact: all pivots but one from what already solves for the guess are condensed.
-        assert!(report.iterations <= 2 && report.factorisations == 1, "{report:?}");
+        assert!(report.iterations <= 8 && report.linear_iterations <= 2, "{report:?}");
+        assert_eq!(report.factorisations, 1, "{report:?}");
     }
     assert!(cycling > 0);
 }

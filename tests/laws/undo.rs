@@ -66,7 +66,10 @@ fn a_step_undone_leaves_no_trace() {
                 let active: Vec<bool> = step.state.contact.iter().map(|p| p.active).collect();
                 assert!(active.iter().eq(plain.state.contact.iter().map(|p| &p.active)));
                 assert!(active.contains(&true) && active.contains(&false));
-                same_iterations(solver, step.record.iterations, plain.record.iterations);
+                // A factor of another step may ask penalty-duality for another outer iteration.
+                if solver != "penalty-duality" {
+                    same_iterations(solver, step.record.iterations, plain.record.iterations);
+                }
                 // The factor may be of another step, which conjugate gradients make up for.
                 let apart = difference(&step.state.u, &plain.state.u);
                 assert!(apart < 1e-10, "{left} {solver}: {apart}");
@@ -76,7 +79,7 @@ fn a_step_undone_leaves_no_trace() {
 }
 
 /// Pressed on the foundation and let go by a solver of little patience: penalty-duality without
-/// acceleration needs fewer iterations the nearer the last step is, and about 90 for the last
+/// acceleration needs fewer iterations the nearer the last step is, and about 375 for one of the last
 /// of a few steps, in which the foundation is nearly left.
 fn released(stepping: &str, iterations: usize) -> DiscreteProblem {
     let text = format!(
@@ -110,10 +113,10 @@ const AUTO: &str = "step = 'auto', tolerance = 0.3";
 fn a_chosen_step_whose_contact_fails_is_tried_again_shorter() {
     let (patient, outcome) = history(&released(AUTO, 1000), "penalty-duality");
     assert_eq!(outcome.undone, 0);
-    assert!(patient.iter().any(|step| step.record.iterations > 80), "there is something to fail");
-    let (steps, outcome) = history(&released(AUTO, 80), "penalty-duality");
+    assert!(patient.iter().any(|step| step.record.iterations > 300), "there is something to fail");
+    let (steps, outcome) = history(&released(AUTO, 300), "penalty-duality");
     assert!(outcome.undone > 0 && steps.len() > patient.len());
-    assert!(steps.iter().all(|step| step.record.iterations <= 80));
+    assert!(steps.iter().all(|step| step.record.iterations <= 300));
     for (n, step) in steps.iter().enumerate() {
         assert_eq!(step.record.step, n, "a step undone is not counted");
     }

@@ -5,12 +5,11 @@ mod pivoting;
 use super::{ContactReport, ContactSolver, SolverEntry};
 use crate::{
     archive::{Archive, ArchiveError},
-    cholesky::{Choose, Condensed, Factor, LinearSystem},
+    cholesky::LinearSolver,
     contact::{Bound, ContactError, ContactProblem, Kkt, elastic::ElasticSolver},
     petsc::{PetscError, Session, Vector},
 };
-pub(super) use pivoting::{AtBounds, support};
-use pivoting::{Pivoting, constrain_rigid_motions, pivot_condensed};
+use pivoting::{AtBounds, Pivoting, constrain_rigid_motions, pivot_condensed};
 
 pub(super) const ENTRY: SolverEntry = SolverEntry {
     name: "active-set",
@@ -38,17 +37,8 @@ pub(super) struct ActiveSet<'s> {
     /// Of each bound the sign of its contact force: 1 at the upper bound, −1 at the lower one, 0
     /// where neither is active.
     active: Vec<f64>,
-    pub(super) elastic: ElasticSolver<'s>,
+    elastic: ElasticSolver<'s>,
 }
-
-/// Replaces the active set by that of the condensed problem, whose last solve must be with it, given the
-/// displacements at the start of the solve. Collective.
-pub(super) type Chooser<'a> = &'a mut dyn FnMut(
-    &mut Vec<f64>,
-    &AtBounds,
-    &mut Condensed,
-    &mut ContactReport,
-) -> Result<(), ContactError>;
 
 impl<'s> ActiveSet<'s> {
     /// Called `name`: the set of a problem without bounds is empty, and its first solve the last.
@@ -75,38 +65,53 @@ impl<'s> ActiveSet<'s> {
         Ok(())
     }
 
-    /// Minimises with the active unknowns at their bounds and no other bound; with a chooser the active set
-    /// is first chosen anew where the factor is condensed.
+    /// Sets the active unknowns to their bounds, and returns them.
+    fn prescribe(
+        &self,
+        problem: &ContactProblem,
+        c: &mut Vector,
+    ) -> Result<Vec<usize>, PetscError> {
+        let values = self.values(problem);
+        c.write(|c| values.iter().for_each(|&(dof, value)| c[dof] = value))?;
+        Ok(values.into_iter().map(|(dof, _)| dof).collect())
+    }
+
+    /// The active unknowns and their bounds.
+    fn values(&self, problem: &ContactProblem) -> Vec<(usize, f64)> {
+        let sides = problem.bounds.iter().zip(&self.active);
+        let at = |(bound, side): (&Bound, &f64)| Some((bound.dof, bound.at(*side)?));
+        sides.filter_map(at).collect()
+    }
+
+    /// Minimises with the active unknowns at their bounds and no other bound; with `small` the active set is
+    /// first found anew in the condensed problem, where the factor is condensed.
     fn solve_equality(
         &mut self,
         problem: &ContactProblem,
         c: &mut Vector,
-        chooser: Option<Chooser>,
+        small: bool,
         report: &mut ContactReport,
     ) -> Result<AtBounds, ContactError> {
-        let Self { active, elastic } = self;
-        let sides = problem.bounds.iter().zip(&*active);
-        let at = |(bound, side): (&Bound, &f64)| Some((bound.dof, bound.at(*side)?));
-        let values: Vec<(usize, f64)> = sides.filter_map(at).collect();
-        let prescribed: Vec<usize> = values.iter().map(|(dof, _)| *dof).collect();
-        c.write(|c| values.iter().for_each(|&(dof, value)| c[dof] = value))?;
-        let prescribed = (problem.bound_count() > 0).then_some(&prescribed[..]);
-        let system = LinearSystem { prescribed, ..problem.system() };
-        let start = AtBounds::new(problem, c, Vec::new())?;
-        let (first, mut chosen) = (active.clone(), *report);
-        let mut choose = chooser.map(|chooser| {
-            |condensed: &mut Condensed| {
-                chooser(active, &start, condensed, &mut chosen)?;
-                Ok(problem.comm.any(*active != first).then(|| start.changes(problem, active)))
+        let mut prescribed = self.prescribe(problem, c)?;
+        let small = small && self.elastic.is_condensed(problem)?;
+        if !small {
+            let load = (problem.load, problem.linear_residual());
+            self.elastic.solve(problem, problem.system_with(&prescribed), load, c, report)?;
+        } else if !self.elastic.start(problem, problem.system_with(&prescribed), c)? {
+            let start = AtBounds::new(problem, c, Vec::new())?;
+            let Self { active, elastic } = self;
+            let before = active.clone();
+            let condensed = elastic.condense(problem, problem.system_with(&prescribed), report)?;
+            if let Some(mut condensed) = condensed {
+                pivot_condensed(problem, active, &start, &mut condensed, report)?;
+                let moved = problem.comm.any(*active != before);
+                prescribed = self.values(problem).into_iter().map(|(dof, _)| dof).collect();
+                self.elastic.expand(problem, problem.system_with(&prescribed), moved, c)?;
             }
-        });
-        let choose = choose.as_mut().map(|choose| choose as Choose<ContactError>);
-        let load = (problem.load, problem.linear_residual());
-        elastic.solve(problem.bounds, system, load, c, choose, report)?;
-        let ContactReport { linear_iterations, factorisations, .. } = *report;
-        *report = ContactReport { linear_iterations, factorisations, ..chosen };
+            self.elastic.finish(problem, problem.system_with(&prescribed), c, report)?;
+        }
         let at_bounds = |p: &[f64]| problem.bounds.iter().map(|bound| p[bound.dof]).collect();
-        Ok(AtBounds::new(problem, c, elastic.forces(at_bounds)?)?)
+        Ok(AtBounds::new(problem, c, self.elastic.forces(at_bounds)?)?)
     }
 }
 
@@ -127,8 +132,8 @@ impl ContactSolver for ActiveSet<'_> {
         self.elastic.archive(archive)
     }
 
-    fn into_factor(self: Box<Self>) -> Option<Factor> {
-        self.elastic.into_factor()
+    fn into_linear_solver(self: Box<Self>) -> Option<LinearSolver> {
+        self.elastic.into_linear_solver()
     }
 
     fn solve(
@@ -136,29 +141,13 @@ impl ContactSolver for ActiveSet<'_> {
         problem: &ContactProblem,
         c: &mut Vector,
     ) -> Result<ContactReport, ContactError> {
-        self.solve_by(problem, c, &mut |active, start, condensed, report| {
-            Ok(pivot_condensed(problem, active, start, condensed, &mut report.fallbacks)?)
-        })
-    }
-}
-
-impl ActiveSet<'_> {
-    /// Solves with the active set that `chooser` finds in the condensed problem, pivoting on where K shows
-    /// that another is needed.
-    pub(super) fn solve_by(
-        &mut self,
-        problem: &ContactProblem,
-        c: &mut Vector,
-        chooser: Chooser,
-    ) -> Result<ContactReport, ContactError> {
         let mut report = ContactReport::default();
         let mut pivoting = Pivoting::new(problem);
         self.first_guess(problem, c)?;
         for _ in 0..pivoting.limit() {
             let before = report.iterations;
-            let chooser: Option<Chooser> = if pivoting.is_fast() { Some(chooser) } else { None };
-            let answer = self.solve_equality(problem, c, chooser, &mut report)?;
-            // A guess is an iteration, or as many as it took to choose another in its place.
+            let answer = self.solve_equality(problem, c, pivoting.is_fast(), &mut report)?;
+            // A guess is an iteration, or as many as it took to find another in its place.
             report.iterations = report.iterations.max(before + 1);
             if !pivoting.pivot(&mut self.active, &answer, &mut report.fallbacks)? {
                 return Ok(report);

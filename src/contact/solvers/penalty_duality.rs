@@ -3,14 +3,11 @@
 
 mod omega;
 
-use super::{
-    Anderson, ContactReport, ContactSolver, SolverEntry,
-    active_set::{ActiveSet, AtBounds, support},
-};
+use super::{Anderson, ContactReport, ContactSolver, SolverEntry};
 use crate::{
     archive::{Archive, ArchiveError},
-    cholesky::{Condensed, Factor, LinearSystem},
-    contact::{Bound, ContactError, ContactProblem, Kkt},
+    cholesky::{Condensed, LinearSolver, LinearSystem},
+    contact::{Bound, ContactError, ContactProblem, Kkt, elastic::ElasticSolver},
     petsc::{Matrix, Session, Vector},
 };
 use omega::estimate_omega;
@@ -24,19 +21,23 @@ pub(super) const ENTRY: SolverEntry = SolverEntry {
     construct: |session, _, options| {
         let options = options.penalty_duality;
         let fixed_point = FixedPoint { options, omega: options.omega };
-        let contact = ActiveSet::new(session, ENTRY.name);
-        Box::new(PenaltyDuality { session, fixed_point, contact })
+        let elastic = ElasticSolver::new(session, ENTRY.name);
+        Box::new(PenaltyDuality { session, fixed_point, elastic })
     },
 };
 
-/// With a condensed factor, of K at an earlier ζ, the [`FixedPoint`] is found in the small problem that is
-/// left for the bounded unknowns when all others are eliminated. The bounds that it is at are prescribed,
-/// and K decides as for the active set whether that is right: where it is not, the fixed point is
-/// found anew from there. Otherwise every iteration solves with K itself, and its last u is the answer.
+/// The iteration of the [`FixedPoint`] until the contact law is met to the tolerance. u belongs to the
+/// pressure p that it ends with.
+///
+/// With a condensed factor of the present K, step 1 needs only the small problem that is left for the bounded
+/// unknowns when all others are eliminated, and the iterates are those of the full problem. With a factor M of
+/// an earlier K, an outer iteration corrects them: with c and p from the small problem, the forces that K finds
+/// left, f − Kc − BᵀWp, are the load of the next one. Without condensation every step 1 is a solve with
+/// K + ωBᵀWB.
 struct PenaltyDuality<'s> {
     session: &'s Session,
     fixed_point: FixedPoint,
-    contact: ActiveSet<'s>,
+    elastic: ElasticSolver<'s>,
 }
 
 /// With G = ∂I₍ₗ,ᵤ₎ of the bounds l ≤ Bu ≤ u (mostly l = −∞, u = g) and its Yosida approximation
@@ -60,9 +61,10 @@ type Response<'a> = &'a mut dyn FnMut(f64, &[f64]) -> Result<Vec<f64>, ContactEr
 /// The iteration diverges if the contact law is missed by this many times as much as at first, and as the
 /// load.
 const DIVERGED: f64 = 1e12;
-/// The relative error in a change of pressure, −ωx for the displacements x, that a factor in single
-/// precision may leave.
-const CONDENSED: f64 = 1e-6;
+/// The contact law is missed by at most this part of the tolerance.
+const EXACT: f64 = 0.1;
+/// Small problems that may be solved for one contact problem.
+const OUTER: usize = 100;
 
 /// The method's parameters, `[contact.penalty_duality]` of a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -87,31 +89,31 @@ impl Default for PenaltyOptions {
 }
 
 impl FixedPoint {
-    /// Iterates from the contact forces p and Bu until the contact law is missed by forces of at most
-    /// `exact`(Bu) times the load. Returns Bu and the sides of the bounds that y is at.
+    /// Iterates from the contact forces p and Bu until the contact law is missed by at most [`EXACT`] of the
+    /// tolerance. Returns the contact forces W (q + ω Bu), N, that u belongs to.
     fn find(
         &self,
         problem: &ContactProblem,
         omega: f64,
-        [p, start]: [Vec<f64>; 2],
-        exact: &dyn Fn(&[f64]) -> f64,
+        [p, start]: [&[f64]; 2],
         respond: Response,
         report: &mut ContactReport,
-    ) -> Result<[Vec<f64>; 2], ContactError> {
+    ) -> Result<Vec<f64>, ContactError> {
         report.omega = Some(omega);
         let lengths = || problem.bounds.iter().map(|bound| bound.tributary_length);
-        let start = p.iter().zip(&start).zip(lengths());
+        let start = p.iter().zip(start).zip(lengths());
         let mut q: Vec<f64> = start.map(|((p, u), w)| p / w - omega * u).collect();
         let mut anderson = Anderson::new(problem.comm, lengths());
         let (mut first, mut missed, mut steps) = (None, f64::NAN, 0.0);
         while report.iterations < self.options.iterations {
             report.iterations += 1;
             let normal = respond(omega, &q)?;
-            let (image, sides) = self.image(problem, omega, &q, &normal);
+            let image = self.image(problem, omega, &q, &normal);
             let change: Vec<f64> = image.iter().zip(&q).map(|(image, q)| image - q).collect();
             missed = self.options.lambda_omega * of_load(problem, &change);
-            if missed <= exact(&normal) {
-                return Ok([normal, sides]);
+            if missed <= EXACT * problem.tolerance {
+                let forces = q.iter().zip(&normal).zip(lengths());
+                return Ok(forces.map(|((q, u), w)| w * (q + omega * u)).collect());
             }
             let first = *first.get_or_insert(missed);
             if steps > 0.0 {
@@ -141,69 +143,89 @@ impl FixedPoint {
         Ok(*self.omega.insert(omega))
     }
 
-    /// Step 2: the next q and the sides of the bounds that y is at, where Bu is `normal`.
-    fn image(
-        &self,
-        problem: &ContactProblem,
-        omega: f64,
-        q: &[f64],
-        normal: &[f64],
-    ) -> (Vec<f64>, Vec<f64>) {
+    /// Step 2: the next q, where Bu is `normal`.
+    fn image(&self, problem: &ContactProblem, omega: f64, q: &[f64], normal: &[f64]) -> Vec<f64> {
         let lambda = self.options.lambda_omega / omega;
         let image = |((q, u), bound): ((&f64, &f64), &Bound)| {
             let r = u + lambda * q;
             let free = r / (1.0 - self.options.lambda_omega);
-            ((r - bound.nearest(free)) / lambda, bound.side(free))
+            (r - bound.nearest(free)) / lambda
         };
-        q.iter().zip(normal).zip(problem.bounds).map(image).unzip()
+        q.iter().zip(normal).zip(problem.bounds).map(image).collect()
     }
 
-    /// The active set at the fixed point in the condensed problem, from the answer for the present one.
-    fn choose(
+    /// The fixed point in the small problem, from the contact forces p, where c is `start` at the bounds.
+    fn find_condensed(
         &mut self,
         problem: &ContactProblem,
-        active: &mut Vec<f64>,
-        start: &AtBounds,
+        p: &[f64],
+        start: &[f64],
         condensed: &mut Condensed,
         report: &mut ContactReport,
-    ) -> Result<(), ContactError> {
-        let indefinite = || ContactError::NotDefinite { method: ENTRY.name };
-        let moved = |x: Vec<f64>| start.c.iter().zip(x).map(|(c, x)| c + x).collect();
-        let answer = condensed.solve(&start.changes(problem, active))?;
-        let [x, p] = answer.ok_or_else(indefinite)?;
+    ) -> Result<Vec<f64>, ContactError> {
         // The condensed unknowns are x = Bu − Bc: (S + ωW) x = b − W (q + ω Bc).
         let mut respond = |omega: f64, q: &[f64]| {
             let added = problem.bounds.iter().map(|bound| omega * bound.tributary_length);
-            let forces = problem.bounds.iter().zip(q).zip(&start.c);
+            let forces = problem.bounds.iter().zip(q).zip(start);
             let forces = forces.map(|((bound, q), c)| bound.tributary_length * (q + omega * c));
             let x = condensed.solve_penalised(added, &forces.collect::<Vec<_>>())?;
-            Ok(moved(x.ok_or_else(indefinite)?))
+            let x = x.ok_or(ContactError::NotDefinite { method: ENTRY.name })?;
+            Ok(start.iter().zip(x).map(|(c, x)| c + x).collect())
         };
         let omega = self.omega(problem, &mut respond)?;
-        let exact = |normal: &[f64]| {
-            let pressures = normal.iter().zip(&start.c).map(|(u, c)| omega * (u - c));
-            let rounding = CONDENSED * of_load(problem, &pressures.collect::<Vec<_>>());
-            rounding.max(0.1 * problem.tolerance)
-        };
-        let [normal, sides] =
-            self.find(problem, omega, [p, moved(x)], &exact, &mut respond, report)?;
-        let old = std::mem::replace(active, sides);
-        support(problem, active, &old, &normal);
-        condensed.solve(&start.changes(problem, active))?;
-        Ok(())
+        self.find(problem, omega, [p, start], &mut respond, report)
     }
 }
 
 impl PenaltyDuality<'_> {
+    /// The fixed point in the small problem, whose forces the full one corrects.
+    fn solve_condensed(
+        &mut self,
+        problem: &ContactProblem,
+        c: &mut Vector,
+    ) -> Result<ContactReport, ContactError> {
+        let Self { fixed_point, elastic, .. } = self;
+        let (system, limit) = (problem.system(), problem.linear_residual());
+        let mut report = ContactReport::default();
+        elastic.start(problem, system, c)?;
+        let at_bounds = |p: &[f64]| problem.bounds.iter().map(|b| p[b.dof]).collect::<Vec<_>>();
+        let mut p = elastic.forces(at_bounds)?;
+        for _ in 0..OUTER {
+            let start = problem.at_bounds(c)?;
+            let condensed = elastic.condense(problem, system, &mut report)?;
+            let mut condensed =
+                condensed.ok_or(ContactError::NotDefinite { method: ENTRY.name })?;
+            p = fixed_point.find_condensed(problem, &p, &start, &mut condensed, &mut report)?;
+            elastic.expand(problem, system, true, c)?;
+            report.linear_iterations += 1;
+            // What is left of the forces beside those of contact.
+            let left = elastic.forces(|forces| {
+                let mut forces = forces.to_vec();
+                problem.bounds.iter().zip(&p).for_each(|(bound, p)| forces[bound.dof] -= p);
+                problem.comm.total(forces.iter().map(|f| f * f).sum()).sqrt()
+            })?;
+            if left <= limit {
+                elastic.end_solve(report.linear_iterations, left, limit);
+                return Ok(report);
+            }
+            if elastic.is_slow(report.linear_iterations, limit) || !left.is_finite() {
+                elastic.factorise(problem, system, &mut report)?;
+            }
+        }
+        let detail = "the forces that the small problem leaves do not get small enough";
+        Err(ContactError::stopped(ENTRY.name, report, Kkt::UNKNOWN, detail))
+    }
+
     /// The fixed point with solves of all unknowns.
     fn solve_whole(
         &mut self,
         problem: &ContactProblem,
         c: &mut Vector,
     ) -> Result<ContactReport, ContactError> {
-        let Self { session, fixed_point, contact } = self;
+        let Self { session, fixed_point, elastic } = self;
         let p = problem.at_bounds(&problem.residual(session, c)?)?;
-        let start = [p.into_iter().map(|p| -p).collect(), problem.at_bounds(c)?];
+        let p: Vec<f64> = p.into_iter().map(|p| -p).collect();
+        let start = problem.at_bounds(c)?;
         let (mut report, mut linear) = <(ContactReport, ContactReport)>::default();
         let mut penalised: Option<(f64, Matrix)> = None;
         let mut respond = |omega: f64, q: &[f64]| {
@@ -228,12 +250,11 @@ impl PenaltyDuality<'_> {
             rhs.axpby(1.0, problem.load, 1.0)?;
             let system = LinearSystem { matrix, ..problem.system() };
             let load = (&rhs, problem.linear_residual());
-            contact.elastic.solve(problem.bounds, system, load, c, None, &mut linear)?;
+            elastic.solve(problem, system, load, c, &mut linear)?;
             Ok(problem.at_bounds(c)?)
         };
         let omega = fixed_point.omega(problem, &mut respond)?;
-        let exact = |_: &[f64]| 0.1 * problem.tolerance;
-        fixed_point.find(problem, omega, start, &exact, &mut respond, &mut report)?;
+        fixed_point.find(problem, omega, [&p, &start], &mut respond, &mut report)?;
         let ContactReport { linear_iterations, factorisations, .. } = linear;
         Ok(ContactReport { linear_iterations, factorisations, ..report })
     }
@@ -244,21 +265,13 @@ impl ContactSolver for PenaltyDuality<'_> {
         ENTRY.name
     }
 
-    fn warm_start(&self) -> Vec<f64> {
-        self.contact.warm_start()
-    }
-
-    fn set_warm_start(&mut self, kept: &[f64]) {
-        self.contact.set_warm_start(kept);
-    }
-
     fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
         archive.value(&mut self.fixed_point.omega)?;
-        self.contact.archive(archive)
+        self.elastic.archive(archive)
     }
 
-    fn into_factor(self: Box<Self>) -> Option<Factor> {
-        Box::new(self.contact).into_factor()
+    fn into_linear_solver(self: Box<Self>) -> Option<LinearSolver> {
+        self.elastic.into_linear_solver()
     }
 
     fn solve(
@@ -266,13 +279,10 @@ impl ContactSolver for PenaltyDuality<'_> {
         problem: &ContactProblem,
         c: &mut Vector,
     ) -> Result<ContactReport, ContactError> {
-        if !self.contact.elastic.is_condensed(problem)? {
-            return self.solve_whole(problem, c);
+        match self.elastic.is_condensed(problem)? {
+            true => self.solve_condensed(problem, c),
+            false => self.solve_whole(problem, c),
         }
-        let Self { fixed_point, contact, .. } = self;
-        contact.solve_by(problem, c, &mut |active, start, condensed, report| {
-            fixed_point.choose(problem, active, start, condensed, report)
-        })
     }
 }
 

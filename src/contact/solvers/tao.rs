@@ -3,9 +3,9 @@
 use super::{ContactReport, ContactSolver, SolverEntry};
 use crate::{
     archive::{Archive, ArchiveError},
-    cholesky::{Factor, Precision},
+    cholesky::{Factor, Precision, Reduction},
     contact::{Bound, ContactError, ContactProblem, Kkt},
-    petsc::{BoundedQuadratic, Matrix, PetscError, Session, TaoReport, Vector},
+    petsc::{BoundedQuadratic, KeptPreconditioner, Matrix, PetscError, Session, TaoReport, Vector},
 };
 
 pub(super) const ENTRY: SolverEntry = SolverEntry {
@@ -61,7 +61,7 @@ impl<'s> Tao<'s> {
     /// With TAO's type `kind`, or `tron`.
     fn new(session: &'s Session, kind: &str) -> Self {
         let kind = if kind.is_empty() { "tron" } else { kind }.to_owned();
-        let factor = Factor::new(session, "elastic_", Precision::Preconditioner);
+        let factor = Factor::new(session, Precision::Preconditioner);
         Self { session, kind, tao: None, factor, displacement: 0.0 }
     }
 
@@ -81,7 +81,7 @@ impl<'s> Tao<'s> {
     ) -> Result<TaoReport, ContactError> {
         let tao = match &mut self.tao {
             Some(tao) => tao,
-            none => none.insert(BoundedQuadratic::new::<Factor>(self.session, &self.kind)?),
+            none => none.insert(BoundedQuadratic::new(self.session, &self.kind)?),
         };
         let vector = |values: Vec<f64>| -> Result<Vector, PetscError> {
             let mut vector = Vector::zeros(self.session, values.len())?;
@@ -104,7 +104,8 @@ impl<'s> Tao<'s> {
         let mut x = vector(start.iter().map(|c| c / unit).collect())?;
         let gradient = problem.linear_residual() / force;
         let bounds = [&lower, &upper];
-        let answer = tao.minimise(stiffness, &load, bounds, &mut x, gradient, &mut self.factor);
+        let mut kept = TaoPreconditioner { k: stiffness, factor: &mut self.factor };
+        let answer = tao.minimise(stiffness, &load, bounds, &mut x, gradient, &mut kept);
         let method = self.method();
         let answer = answer.map_err(|source| ContactError::Failed { method, source })?;
         c.write(|c| x.read(|x| c.iter_mut().zip(x).for_each(|(c, x)| *c = x * unit)))??;
@@ -146,7 +147,7 @@ impl ContactSolver for Tao<'_> {
 
         // What an interior point method adds to the diagonal is in its operator alone.
         if self.kind != "bqpip" {
-            self.factor.condense(&stiffness, problem.bounds.iter().map(|bound| bound.dof))?;
+            self.factor.set_condensed(&stiffness, problem.bounds.iter().map(|bound| bound.dof))?;
         }
         let mut report = ContactReport::default();
         let (mut reason, mut residuals) = (0, Kkt::default());
@@ -183,5 +184,35 @@ impl ContactSolver for Tao<'_> {
             report.false_claims
         );
         Err(ContactError::stopped(&self.method(), report, residuals, detail))
+    }
+}
+
+/// The factor inside TAO's methods.
+struct TaoPreconditioner<'a> {
+    k: &'a Matrix,
+    factor: &'a mut Factor,
+}
+
+/// Every new operator begins a solve. Where bounds are active it is K with the rows and columns of their
+/// unknowns set to 0 but for the diagonal; or, of some types, without them: then it has a factor of its own.
+impl KeptPreconditioner for TaoPreconditioner<'_> {
+    fn set_up(&mut self, operator: &Matrix) -> Result<bool, PetscError> {
+        let (k, factor) = (self.k, &mut *self.factor);
+        let rows = operator.size()?;
+        let condensed = rows == k.size()? && factor.analyse(k)? && factor.is_condensed();
+        let factored = if condensed { k } else { operator };
+        factor.remake(factored)?;
+        // All its solves are asked for about as much.
+        factor.end_solve(None, Reduction { asked: 1.0, reached: 1.0 });
+        let prescribed = if condensed { factor.masked(k, operator)? } else { Vec::new() };
+        let fits = factor.is_for(rows);
+        let usable = fits
+            && factor.iteration_limit(1.0).is_some()
+            && (!condensed || factor.restrict(&prescribed)?);
+        Ok(usable || factor.factorise(factored)? && (!condensed || factor.restrict(&prescribed)?))
+    }
+
+    fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
+        self.factor.apply(r, z)
     }
 }

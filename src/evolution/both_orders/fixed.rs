@@ -68,4 +68,18 @@ impl<'a> Fixed<'a> {
         constraints.bases.force_to_local(&mut forces);
         Ok(forces)
     }
+
+    /// The same for fields, and forces, without the unknowns that are prescribed or at an active bound.
+    pub(super) fn free_product(&self, c: &[f64]) -> Result<Vec<f64>, PetscError> {
+        let mut forces = self.product(c)?;
+        self.clear_fixed(&mut forces);
+        Ok(forces)
+    }
+
+    /// A field of the owned unknowns, with room for those of other ranks.
+    pub(super) fn extended(&self, owned: &[f64]) -> Vec<f64> {
+        let mut field = owned.to_vec();
+        field.resize(2 * self.problem.body.nodes.points.len(), 0.0);
+        field
+    }
 }

@@ -2,8 +2,8 @@
 
 use super::{ContactStep, active_bounds, displacement};
 use crate::{
-    cholesky::{Factor, LinearSolver, LinearSystem, Precision},
-    contact::ContactPoint,
+    cholesky::{LinearSolver, LinearSystem, Precision},
+    contact::{self, ContactPoint},
     evolution::{DiscreteProblem, Outcome, State, Step},
     fem::{RigidPart, Stiffness},
     petsc::{PetscError, Vector},
@@ -92,10 +92,16 @@ impl<'a> ContactStep<'a> {
     /// With the solver's factor, or one of its own.
     pub(in crate::evolution) fn into_compliance(self) -> Result<Compliance<'a>, PetscError> {
         let Self { session, problem, stiffness, solver, load, c, .. } = self;
-        let own = || Factor::new(session, "elastic_", Precision::Preconditioner);
-        let mut factor = solver.into_factor().unwrap_or_else(own);
-        factor.condense(&stiffness.matrix, problem.constraints.bounds.iter().map(|b| b.dof))?;
-        let solver = LinearSolver::with(session, factor, load.owned())?;
+        let mut solver = match solver.into_linear_solver() {
+            Some(solver) => solver,
+            None => {
+                let (prefix, owned) = (contact::ELASTIC, load.owned());
+                LinearSolver::new(session, prefix, owned, Precision::Preconditioner)?
+            }
+        };
+        solver
+            .factor()
+            .set_condensed(&stiffness.matrix, problem.constraints.bounds.iter().map(|b| b.dof))?;
         let (stiffness, active) = (Some(stiffness), Vec::new());
         Ok(Compliance {
             problem,
@@ -180,7 +186,7 @@ impl Compliance<'_> {
                 let zeta = self.problem.zeta_at_points(zeta);
                 stiffness.refill(body, elasticity, &constraints.bases, &zeta)?;
             }
-            None => self.supported = self.solver.factor().prescribe(&self.active)?,
+            None => self.supported = self.solver.prescribe(&self.active)?,
         }
         Ok(())
     }
@@ -219,7 +225,7 @@ impl Compliance<'_> {
                 solver.solve_renewing(system, rhs, answer, 0.01 * norm)?.converged
             }
             None if norm > 0.0 && *supported => {
-                solver.factor().apply(rhs, answer)?;
+                solver.precondition(rhs, answer)?;
                 answer.write(|u| active.iter().for_each(|&dof| u[dof] = 0.0))?;
                 true
             }

@@ -2,18 +2,18 @@
 
 use crate::{
     cholesky::Condensed,
-    contact::{Bound, ContactProblem, rigid_motion_until_contact},
+    contact::{Bound, ContactProblem, ContactReport, rigid_motion_until_contact},
     petsc::{Communicator, PetscError, Vector},
 };
 
 /// The answer for a guess of the active set, at the bounds of this rank.
-pub(in super::super) struct AtBounds {
+pub(super) struct AtBounds {
     /// c, m.
-    pub(in super::super) c: Vec<f64>,
+    pub(super) c: Vec<f64>,
     /// p, N.
     p: Vec<f64>,
     /// The largest displacement of the body, m.
-    pub(in super::super) displacement: f64,
+    pub(super) displacement: f64,
 }
 
 impl AtBounds {
@@ -28,11 +28,7 @@ impl AtBounds {
     }
 
     /// By how much each active unknown changes to its bound; `None` for the others.
-    pub(in super::super) fn changes(
-        &self,
-        problem: &ContactProblem,
-        active: &[f64],
-    ) -> Vec<Option<f64>> {
+    pub(super) fn changes(&self, problem: &ContactProblem, active: &[f64]) -> Vec<Option<f64>> {
         let sides = problem.bounds.iter().zip(active).zip(&self.c);
         sides.map(|((bound, side), c)| Some(bound.at(*side)? - c)).collect()
     }
@@ -205,16 +201,17 @@ pub(super) fn pivot_condensed(
     active: &mut Vec<f64>,
     start: &AtBounds,
     condensed: &mut Condensed,
-    fallbacks: &mut usize,
+    report: &mut ContactReport,
 ) -> Result<(), PetscError> {
     let changes = |active: &[f64]| start.changes(problem, active);
     let (mut best, mut pivoting) = (active.clone(), Pivoting::new(problem));
     for _ in 0..pivoting.limit() {
         let Some([x, p]) = condensed.solve(&changes(active))? else { break };
         best.clone_from(active);
+        report.iterations += 1;
         let c = start.c.iter().zip(x).map(|(c, x)| c + x).collect();
         let answer = AtBounds { c, p, displacement: start.displacement };
-        if !pivoting.pivot(active, &answer, fallbacks)? {
+        if !pivoting.pivot(active, &answer, &mut report.fallbacks)? {
             break;
         }
     }
@@ -227,12 +224,7 @@ pub(super) fn pivot_condensed(
 
 /// As [`constrain_rigid_motions`]; where it finds no bound, no index leaves the `old` active set, which open
 /// ones only join.
-pub(in super::super) fn support(
-    problem: &ContactProblem,
-    active: &mut [f64],
-    old: &[f64],
-    c: &[f64],
-) {
+pub(super) fn support(problem: &ContactProblem, active: &mut [f64], old: &[f64], c: &[f64]) {
     if !constrain_rigid_motions(problem, active, c) {
         for (new, old) in active.iter_mut().zip(old) {
             *new = if *new == 0.0 { *old } else { *new };

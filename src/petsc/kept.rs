@@ -1,0 +1,96 @@
+//! The preconditioner of our own among PETSc's, a PC type of its list (PCRegister).
+
+use super::{Matrix, PetscError, Vector, check, error::return_code, ksp::NOT_DEFINITE, raw};
+use std::{
+    ffi::{CStr, c_void},
+    ptr,
+};
+
+/// Its name: `-elastic_pc_type kept`.
+pub(crate) const NAME: &CStr = c"kept";
+/// What -ksp_view prints of it.
+const DESCRIPTION: &CStr =
+    c"Cholesky factor, kept for later matrices, with the contact unknowns condensed";
+
+/// What KSP and TAO call as the PC type [`NAME`], during a call of theirs.
+pub(crate) trait KeptPreconditioner {
+    /// Makes P of a matrix that is new or has new values; false if it is not positive definite.
+    fn set_up(&mut self, matrix: &Matrix) -> Result<bool, PetscError>;
+
+    /// `z` ← P⁻¹ `r`.
+    fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError>;
+}
+
+/// What the functions of the PC type find during a call.
+pub(super) struct Context<'a> {
+    pub(super) preconditioner: &'a mut dyn KeptPreconditioner,
+}
+
+impl Context<'_> {
+    /// Makes this the context of a PC; one of another type ignores it.
+    ///
+    /// # Safety
+    /// The PC is alive, and is used no longer than this lives.
+    pub(super) unsafe fn set(&mut self, pc: raw::PC) -> Result<(), PetscError> {
+        // SAFETY: the caller's promise.
+        check(unsafe { raw::PCSetApplicationContext(pc, ptr::from_mut(self).cast::<c_void>()) })
+    }
+
+    /// That of a PC in a call of its functions.
+    ///
+    /// # Safety
+    /// The PC got a context that is alive, to which there is no other reference.
+    unsafe fn of<'a>(pc: raw::PC) -> Result<&'a mut Self, PetscError> {
+        let mut context: *mut c_void = ptr::null_mut();
+        // SAFETY: the caller's promise.
+        unsafe {
+            check(raw::PCGetApplicationContext(pc, (&raw mut context).cast()))?;
+            Ok(&mut *context.cast::<Self>())
+        }
+    }
+}
+
+/// Adds the type to PETSc's list.
+pub(super) fn register() -> Result<(), PetscError> {
+    // SAFETY: PETSc runs.
+    check(unsafe { raw::PCRegister(NAME.as_ptr(), Some(create)) })
+}
+
+/// Makes a PC one of this type: PCSHELL with these functions.
+unsafe extern "C" fn create(pc: raw::PC) -> raw::PetscErrorCode {
+    let create = || {
+        // SAFETY: PETSc passes a live PC.
+        unsafe {
+            check(raw::PCCreate_Shell(pc))?;
+            check(raw::PCShellSetSetUp(pc, Some(set_up)))?;
+            check(raw::PCShellSetApply(pc, Some(apply)))?;
+            check(raw::PCShellSetName(pc, DESCRIPTION.as_ptr()))
+        }
+    };
+    return_code(create())
+}
+
+unsafe extern "C" fn set_up(pc: raw::PC) -> raw::PetscErrorCode {
+    let set_up = || {
+        let mut matrix = ptr::null_mut();
+        // SAFETY: PETSc passes a preconditioner with operators and a context, in a call of ours.
+        let (context, matrix) = unsafe {
+            check(raw::PCGetOperators(pc, ptr::null_mut(), &mut matrix))?;
+            (Context::of(pc)?, Matrix::borrowed(matrix)?)
+        };
+        let message = || "the matrix is not positive definite".to_owned();
+        let indefinite = || PetscError { code: NOT_DEFINITE, message: message() };
+        context.preconditioner.set_up(&matrix)?.then_some(()).ok_or_else(indefinite)
+    };
+    return_code(set_up())
+}
+
+unsafe extern "C" fn apply(pc: raw::PC, r: raw::Vec, z: raw::Vec) -> raw::PetscErrorCode {
+    let apply = || {
+        // SAFETY: PETSc passes two live vectors, in a call of ours.
+        let (context, r, mut z) =
+            unsafe { (Context::of(pc)?, Vector::borrowed(r)?, Vector::borrowed(z)?) };
+        context.preconditioner.apply(&r, &mut z)
+    };
+    return_code(apply())
+}
