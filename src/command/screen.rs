@@ -8,9 +8,6 @@ use signorini::{
 };
 use std::io::{self, IsTerminal, Write};
 
-/// A component below this part of the largest force, a moment of the largest moment, is shown as zero.
-const ROUNDING: f64 = 1e-9;
-
 /// The progress bar counts thousandths of [0, T].
 const LENGTH: u64 = 1000;
 
@@ -135,12 +132,7 @@ fn supports(
     let supports = &task.problem.supports.names;
     let resultants = quantities.chunks_exact(3).take(supports.len());
     let resultants = resultants.map(|of| [0, 1, 2].map(|i| of[i].1));
-    let largest = |size: fn([f64; 3]) -> f64| resultants.clone().map(size).fold(0.0, f64::max);
-    let [force_most, moment_most] = [largest(|[x, y, _]| x.hypot(y)), largest(|of| of[2].abs())];
-    let visible = |value: f64, most: f64| if value.abs() < ROUNDING * most { 0.0 } else { value };
-    for (name, [x, y, moment]) in supports.iter().zip(resultants.clone()) {
-        let [x, y] = [x, y].map(|component| visible(component, force_most));
-        let moment = visible(moment, moment_most);
+    for (name, [x, y, moment]) in supports.iter().zip(resultants) {
         let figure = |value: f64, of: &str| match bar(&format!("{name}.{of}")) {
             None => format!("{value:.4e}"),
             bar => with_bar(value, bar),
