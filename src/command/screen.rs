@@ -27,7 +27,9 @@ pub fn open(task: &Task) -> Progress {
         _ => task.solver.clone(),
     };
     let mut lines = vec![scene.title.clone(), row("mesh", mesh), row("solver", solver)];
-    lines.extend(scene.time.map(|grid| row("time", steps(grid, &scene.units.time))));
+    let can_be_damaged = task.problem.damage().is_some();
+    lines
+        .extend(scene.time.map(|grid| row("time", steps(grid, &scene.units.time, can_be_damaged))));
     say(&lines.join("\n"));
 
     let mut progress = Progress::new("{bar:20} {wide_msg} {elapsed}, {eta} left", LENGTH);
@@ -149,13 +151,16 @@ pub fn row(name: &str, value: String) -> String {
     format!("  {name:<13} {value}")
 }
 
-fn steps(grid: TimeGrid, unit: &str) -> String {
+fn steps(grid: TimeGrid, unit: &str, can_be_damaged: bool) -> String {
     let end = grid.end;
     match grid.stepping {
         Stepping::Uniform { steps } => {
             let scheme = if grid.scheme == Scheme::Bdf2 { " (bdf2)" } else { "" };
             let noun = if steps == 1 { "step" } else { "steps" };
             format!("{steps} {noun} of {} {unit} to t = {end}{scheme}", rounded(end / steps as f64))
+        }
+        Stepping::Auto { .. } if !can_be_damaged => {
+            format!("to t = {end} in steps that follow the loads")
         }
         Stepping::Auto { tolerance, .. } => {
             format!("to t = {end} in steps chosen for an error of ζ of {tolerance:e}")
