@@ -61,7 +61,8 @@ fn main() {
                    #include <dlfcn.h>\n#include <sys/mman.h>\n\
                    void omp_set_max_active_levels(int);\n";
     declare("petsc", headers, &flags, PETSC, variables);
-    let variables = "CHOLMOD_(LONG|REAL|DOUBLE|SUPERNODAL|GIVEN|NATURAL|PATTERN|OUT_OF_MEMORY)";
+    let variables = "CHOLMOD_(LONG|REAL|DOUBLE|SUPERNODAL|GIVEN|NATURAL|PATTERN|OUT_OF_MEMORY|TOO_LARGE|\
+                     INVALID)";
     declare("cholmod", "#include <suitesparse/cholmod.h>\n", &[], CHOLMOD, variables);
 }
 
