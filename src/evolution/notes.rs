@@ -11,6 +11,8 @@ use crate::{
 /// In plane strain with ν above this, P1 triangles lock: measured in the stability study. P2 triangles
 /// converge more slowly as ν goes to ½, but do not lock (measured up to 0.4999).
 const LOCKING: f64 = 0.45;
+/// Times at which surface loads are looked at, about.
+const LOOKS: usize = 8;
 /// Triangles with a smaller angle are noted, degrees.
 const SLIVER: f64 = 1.0;
 /// So many free motions are noted one by one.
@@ -145,6 +147,7 @@ impl DiscreteProblem {
             notes.push(format!("nothing prevents or drives {more} more such motions"));
         }
         notes.extend(unresolved::notes(scene, self.mesh()));
+        notes.extend(self.loads.notes(&scene.sample_times(LOOKS)));
         if let Some([start, end]) = LoadCurve::unresolved_step(self) {
             notes.push(format!(
                 "loads, displacements or gaps change within a time step, as between t = {start:.4e} and \
