@@ -210,9 +210,10 @@ impl Cholmod {
             raw::CHOLMOD_OUT_OF_MEMORY => {
                 format!("there is not enough memory for a Cholesky factor{REMEDY}")
             }
-            // The matrices are valid: CHOLMOD finds them invalid where its 32-bit calls overflow.
+            // The matrix is valid: then the order is not. cholmod_l_metis does not look whether METIS, which
+            // has 32-bit indices, has failed.
             raw::CHOLMOD_TOO_LARGE | raw::CHOLMOD_INVALID => {
-                format!("the mesh is too large for a Cholesky factor with 32-bit indices{REMEDY}")
+                format!("the mesh is too large for a Cholesky factor (32-bit indices){REMEDY}")
             }
             status => format!("CHOLMOD failed with status {status}"),
         };
