@@ -64,7 +64,8 @@ fn main() {
                    void omp_set_max_active_levels(int);\n\
                    PETSC_EXTERN PetscErrorCode PCCreate_Shell(PC);\n";
     declare("petsc", headers, &flags, PETSC, variables);
-    let variables = "CHOLMOD_(LONG|REAL|DOUBLE|SUPERNODAL|GIVEN|NATURAL|PATTERN|OUT_OF_MEMORY)";
+    let variables = "CHOLMOD_(LONG|REAL|DOUBLE|SUPERNODAL|GIVEN|NATURAL|PATTERN|OUT_OF_MEMORY|TOO_LARGE|\
+                     INVALID)";
     declare("cholmod", "#include <suitesparse/cholmod.h>\n", &[], CHOLMOD, variables);
 }
 

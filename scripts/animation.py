@@ -1,4 +1,4 @@
-"""Animations of a run: the damage of the deforming body, the pressure along Γ_C."""
+"""Animations of a run: the damage, or the stress, of the deforming body; the pressure along Γ_C."""
 
 import matplotlib.pyplot as plt
 from matplotlib.animation import FFMpegWriter, PillowWriter
@@ -24,13 +24,15 @@ FRAMES, RATE = 50, 6
 
 
 def animate(results, factor, kind):
-    """Draws the animations `damage` and `pressure` into the result folder; yields their paths."""
+    """Draws the animations of the body, `damage` or without damage `stress`, and `pressure` into the
+    result folder; yields their paths."""
     writer = MOVIES[kind]
     if not writer.isAvailable():
         raise ResultError("--animate mp4 needs ffmpeg (Debian: apt install ffmpeg); or use gif")
     chosen = states(results, evenly(results.frames, FRAMES))
     limits = limits_of(chosen, factor)
-    for name, draw in (("damage", draw_state), ("pressure", draw_pressure)):
+    body = "damage" if limits.damaged else "stress"
+    for name, draw in ((body, draw_state), ("pressure", draw_pressure)):
         figure = draw(chosen[0], limits)
         if figure is None:
             continue

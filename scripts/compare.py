@@ -13,6 +13,7 @@ import json
 import os
 import subprocess
 import sys
+import textwrap
 import tomllib
 from pathlib import Path
 from xml.etree import ElementTree
@@ -29,6 +30,8 @@ TITLES = {
     "fallbacks": "fallbacks", "seconds": "seconds", "times_first": "times first", "kkt": "worst KKT",
     "difference_u": "Δu", "difference_zeta": "Δζ", "difference_pressure": "Δp",
 }
+# The title of a further column, where a solver failed, and its width.
+REASON, WIDTH = "why it failed", 90
 DIFFERENCES = ["difference_u", "difference_zeta", "difference_pressure"]
 KKT = ["kkt_stationarity", "kkt_primal", "kkt_dual", "kkt_complementarity"]
 
@@ -84,18 +87,20 @@ def read(folder, error):
              for key in ["iterations", "factorisations", "linear_iterations", "fallbacks"]}
     active = [row["active_nodes"] for row in history]
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8")) if history else {}
+    if not history:
+        taken = ["contact_changes", "iterations", "factorisations", "triangular_solves", "fallbacks",
+                 "seconds", *KKT]
+        return {"steps": 0, **dict.fromkeys(taken)}, None
     row = {
-        "steps": int(history[-1]["step"]) if history else 0,
+        "steps": int(history[-1]["step"]),
         "contact_changes": sum(a != b for a, b in zip(active, active[1:])),
         "iterations": total["iterations"],
         "factorisations": total["factorisations"],
         "triangular_solves": total["linear_iterations"],
         "fallbacks": total["fallbacks"],
         "seconds": summary.get("phases", {}).get("contact", 0.0),
-        **{key: max((row[key] for row in history), default=np.nan) for key in KKT},
+        **{key: max(row[key] for row in history) for key in KKT},
     }
-    if not history:
-        return row, None
     frames = ElementTree.parse(folder / "fields.pvd").findall(".//DataSet")
     meshes = [read_frame(folder / frame.get("file")) for frame in frames]
     frames = [mesh.point_data for mesh in meshes]
@@ -127,21 +132,31 @@ def settings(keys):
     return [word for key in keys for word in ("--set", key)]
 
 
+def cells(row, first):
+    """The cells of a solver, where the first one took `first` seconds; of a solver that failed only the
+    steps before it did."""
+    if row["error"]:
+        return [str(row[key]) if key in ("scene", "solver", "steps") else "FAILED" if key == "kkt" else "-"
+                for key in TITLES]
+    shown = dict(row, seconds=f"{row['seconds']:.3f}", times_first=f"{row['seconds'] / first:.1f}",
+                 kkt=f"{worst(row):.1e}", **{key: f"{row[key]:.1e}" for key in DIFFERENCES})
+    return [str(shown[key]) for key in TITLES]
+
+
 def table(rows):
     """The table in Markdown."""
-    first = {row["scene"]: row["seconds"] for row in reversed(rows)}
+    first = {row["scene"]: row["seconds"] for row in reversed(rows) if not row["error"]}
     lines = [list(TITLES.values())]
     for row in rows:
-        shown = dict(row, seconds=f"{row['seconds']:.3f}",
-                     times_first=f"{row['seconds'] / (first[row['scene']] or np.nan):.1f}",
-                     kkt="FAILED" if row["error"] else f"{worst(row):.1e}",
-                     **{key: f"{row[key]:.1e}" for key in DIFFERENCES})
-        lines.append([str(shown[key]) for key in TITLES])
+        lines.append(cells(row, first.get(row["scene"]) or np.nan))
+    if any(row["error"] for row in rows):
+        whys = [REASON, *(textwrap.shorten(row["error"], WIDTH, placeholder=" …") for row in rows)]
+        lines = [[*line, why] for line, why in zip(lines, whys)]
     widths = [max(map(len, column)) for column in zip(*lines)]
     lines.insert(1, ["-" * width for width in widths])
     return "\n".join(
         "| " + " | ".join(
-            cell.ljust(width) if k < 2 else cell.rjust(width)
+            cell.ljust(width) if k < 2 or k == len(TITLES) else cell.rjust(width)
             for k, (cell, width) in enumerate(zip(line, widths))) + " |"
         for line in lines)
 
@@ -190,7 +205,7 @@ def main(prog=None):
         writer.writeheader()
         writer.writerows(rows)
     print(f"written to {path}")
-    errors = [row["error"] for row in rows if row["error"]]
+    errors = [f"{row['scene']}, {row['solver']}: {row['error']}" for row in rows if row["error"]]
     print(*(f"error: {error}\n" for error in errors), sep="", end="", file=sys.stderr)
     return 1 if errors else 0
 

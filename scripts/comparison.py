@@ -22,7 +22,8 @@ def read(path):
         rows = list(csv.DictReader(file))
     for row in rows:
         for key in ["seconds", "iterations", "triangular_solves", *KKT]:
-            row[key] = float(row[key])
+            # A solver that failed at once has none.
+            row[key] = float(row[key] or "nan")
         row["kkt"] = max(row[key] for key in KKT)
     return rows
 
@@ -41,7 +42,7 @@ def bars(axes, rows, value, title, ticks=None):
         if ticks:
             axes.plot([x - 0.45 * width, x + 0.45 * width], 2 * [row[ticks]], color=INK, lw=1.8)
         if row["error"]:
-            axes.text(x, 1.1 * max(row[value], bottom), "failed", color=RED, fontsize=8,
+            axes.text(x, 1.1 * np.fmax(row[value], bottom), "failed", color=RED, fontsize=8,
                       rotation=90, ha="center", va="bottom")
     axes.set(yscale="log", xlim=(-0.5, len(scenes) - 0.5), ylim=(bottom, top))
     axes.set_xticks(range(len(scenes)), scenes, fontsize=8.5)

@@ -7,23 +7,24 @@ from drawing import BLUE, FAINT, along, canvas, draw_colourbar, headline, stress
 
 
 def draw_pressure(results, limits, figure=None):
-    """Pressure and gap along each piece of Γ_C; nodes in contact are filled."""
-    pieces = results.contact_pieces()
-    if not pieces:
+    """Pressure and gap along each part of each contact boundary; nodes in contact are filled."""
+    curves = results.curves
+    if not curves:
         return None
-    figure = canvas((max(7.2, min(3.8 * len(pieces), 14.0)), 4.6), figure)
+    figure = canvas((max(7.2, min(3.8 * len(curves), 14.0)), 4.6), figure)
     rows = figure.subplots(
-        2, len(pieces), squeeze=False, sharex="col", sharey="row",
+        2, len(curves), squeeze=False, sharex="col", sharey="row",
         gridspec_kw={"height_ratios": (2.2, 1)},
     )
     figure.set_constrained_layout_pads(wspace=0.08)
     factor, unit = stress_unit(limits.pressure, results.units)
-    for piece, (above, below) in zip(pieces, rows.T):
-        s, label = along(results.nodes[piece], results.units)
-        pressure, gap = results.pressure[piece] / factor, results.gap[piece]
+    for curve, name, (above, below) in zip(curves, _names(curves), rows.T):
+        s, label = along(curve.points, results.units)
+        pressure, gap = curve.pressure / factor, curve.gap
+        above.set_title(name, parse_math=False)
         active = pressure > 0.0
         # Markers shrink where nodes crowd.
-        size = np.clip(180.0 / len(piece), 1.5, 5.0)
+        size = np.clip(180.0 / len(curve.points), 1.5, 5.0)
         for axes, values in ((above, pressure), (below, gap)):
             axes.plot(s, values, color=BLUE, linewidth=1.2, zorder=2)
             for nodes, face in ((active, BLUE), (~active, "white")):
@@ -52,6 +53,16 @@ def draw_pressure(results, limits, figure=None):
     return figure
 
 
+def _names(curves):
+    """The name of each curve's boundary, numbered where the boundary has several parts."""
+    names, seen = [curve.name for curve in curves], {}
+    for k, name in enumerate(names):
+        seen[name] = seen.get(name, 0) + 1
+        if (count := sum(curve.name == name for curve in curves)) > 1:
+            names[k] = f"{name} ({seen[name]} of {count})"
+    return names
+
+
 def _scale(axes, largest):
     """Room from 0 to the largest value; a field that is 0 has no other tick."""
     if largest > 0.0:
@@ -62,19 +73,20 @@ def _scale(axes, largest):
 
 
 def draw_evolution(states, limits):
-    """The pressure along each piece of Γ_C (upwards) in time (to the right); white: open."""
+    """The pressure along each part of each contact boundary (upwards) in time (to the right); white: open."""
     first, last = states[0], states[-1]
-    pieces = first.contact_pieces()
-    if not pieces or len(states) < 3:
+    curves = first.curves
+    if not curves or len(states) < 3:
         return None
     figure, rows = plt.subplots(
-        len(pieces), 1, figsize=(7.2, 1.2 + min(2.8 * len(pieces), 8.0)), squeeze=False, sharex=True
+        len(curves), 1, figsize=(7.2, 1.2 + min(2.8 * len(curves), 8.0)), squeeze=False, sharex=True
     )
     factor, unit = stress_unit(limits.pressure, first.units)
     times = np.array([state.time for state in states])
-    for piece, axes in zip(pieces, rows[:, 0]):
-        s, label = along(first.nodes[piece], first.units)
-        pressure = np.array([state.pressure[piece] for state in states]).T / factor
+    for k, (curve, name, axes) in enumerate(zip(curves, _names(curves), rows[:, 0])):
+        s, label = along(curve.points, first.units)
+        pressure = np.array([state.curves[k].pressure for state in states]).T / factor
+        axes.set_title(name, parse_math=False)
         image = axes.pcolormesh(
             _between(times), _between(s), np.ma.masked_where(pressure <= 0.0, pressure),
             cmap="viridis_r", vmin=0.0, vmax=limits.pressure / factor or 1.0, rasterized=True,

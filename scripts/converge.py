@@ -1,7 +1,8 @@
-"""Draws the errors of `signorini-study converge` as the paper's Figure 3: converge.py FOLDER
+"""Draws the errors of `signorini-study converge`: converge.py FOLDER
 
-Reads FOLDER/converge.csv and draws FOLDER/converge.png: the error of Table 1 against h + k, beside
-the printed one where there is one, and all errors against h at the least k.
+Reads FOLDER/converge.csv and draws FOLDER/converge.png: the error of Table 1 against h + k, which for
+the paper's scene is its Figure 3 with the printed errors beside ours, and all errors against h at the
+least k.
 """
 
 import sys
@@ -39,7 +40,7 @@ def grid(axes):
     axes.set_axisbelow(True)
 
 
-def draw_figure_3(axes, rows):
+def draw_sums(axes, rows):
     """Table 1's error against h + k with the fitted orders, ours and the printed one."""
     printed = [row for row in rows if row["printed"] != ""]
     meshes = sorted({row["h"] for row in rows}, reverse=True)
@@ -60,8 +61,10 @@ def draw_figure_3(axes, rows):
         axes.loglog(ends, factor * ends**order, color=INK, lw=1, ls=style,
                     label=f"fit, {whose}: order {order:.2f}")
     axes.set(xlabel="h + k", ylabel="largest ‖ε(Δu)‖ + ‖Δζ‖ over time")
-    axes.set_title("Figure 3: error against h + k, each mesh with five k"
-                   + ("\n(dots: ours; crosses: the paper's Table 1)" if printed else ""), loc="left")
+    title = "error against h + k on each mesh"
+    if printed:
+        title = f"Figure 3: {title}\n(dots: ours; crosses: the paper's Table 1)"
+    axes.set_title(title, loc="left")
     axes.legend()
     grid(axes)
 
@@ -87,7 +90,7 @@ def draw(table):
     if len({row["h"] for row in rows}) < 2:
         sys.exit(f"{table}: an order needs two meshes; refine the reference more often")
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.8))
-    draw_figure_3(left, rows)
+    draw_sums(left, rows)
     draw_orders(right, rows)
     return figure
 

@@ -10,7 +10,8 @@ pressure       contact pressure and gap along Γ_C
 damage-history the least and the mean ζ in time, where there is damage to see
 force-displacement  the forces on the supports over the largest displacement
 
-and on request: contact-evolution, the pressure on Γ_C in time; damage and pressure as animations.
+and on request: contact-evolution, the pressure on Γ_C in time; damage (without damage: stress) and
+pressure as animations.
 """
 
 import argparse
@@ -60,7 +61,7 @@ def arguments_of(prog):
         "FORMAT"), help="png, svg, pdf, or several with commas (default: png)")
     parser.add_argument("--evolution", action="store_true", help="also contact-evolution")
     parser.add_argument("--animate", nargs="?", const="gif", choices=MOVIES, help=(
-        "also animations of damage and pressure: gif, or mp4 by ffmpeg (default: gif)"))
+        "also animations of damage (or stress) and pressure: gif, or mp4 by ffmpeg (default: gif)"))
     parser.add_argument("--paraview", action="store_true", help=(
         "only write open_in_paraview.py, for `paraview --script=OUT/open_in_paraview.py`"))
     arguments = parser.parse_args()

@@ -41,11 +41,11 @@ def _stress_top(state):
 
 def _pressure_top(state):
     """The largest contact pressure; where a corner presses, that which is exceeded in 1 % of Γ_C."""
-    pieces = state.contact_pieces()
-    if not pieces:
-        return 0.0
-    lengths = [np.linalg.norm(np.gradient(state.nodes[piece], axis=0), axis=1) for piece in pieces]
-    pressure = state.pressure[np.concatenate(pieces)]
+    curves = [curve for curve in state.curves if len(curve.points) > 1]
+    if not curves:
+        return state.pressure.max()
+    lengths = [np.linalg.norm(np.gradient(of.points, axis=0), axis=1) for of in curves]
+    pressure = np.concatenate([curve.pressure for curve in curves])
     largest, top = pressure.max(), _exceeded_in(0.01, pressure, np.concatenate(lengths))
     return top if largest > 4.0 * top > 0.0 else largest
 

@@ -10,13 +10,14 @@ from collections import defaultdict
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
+from itertools import groupby
 from pathlib import Path
 
 import meshio
 import numpy as np
 
 from elements import Pieces, counter_clockwise
-from results import ResultError, Results, without_roundoff
+from results import ContactCurve, ResultError, Results, without_roundoff
 
 # Opposite a node without any condition beside it.
 NOWHERE = np.zeros(2), np.zeros(2)
@@ -108,6 +109,7 @@ def with_fields(results, time, fields):
         contact=contact,
         tangents=tangents,
         obstacle=obstacle,
+        curves=_contact_curves(results.folder, time),
         displacement=points["displacement"][:, :2],
         zeta=np.ravel(points["zeta"]),
         von_mises=np.concatenate([np.ravel(cells["von_mises"][k]) for k in triangles(fields)]),
@@ -161,7 +163,10 @@ def _foundation(results, time, displacement):
     x + d with d·ν = g for both; it does not slide. Where boundaries meet smoothly the node has one.
     """
     displacements = dict(zip(map(tuple, results.nodes.tolist()), displacement))
-    conditions = _contact_rows(results.folder / "contact.csv").get(time, {})
+    conditions = defaultdict(list)
+    for row in _contact_rows(results.folder / "contact.csv").get(time, []):
+        normal = np.array([row["normal_x"], row["normal_y"]])
+        conditions[row["x"], row["y"]].append((normal, row["gap"]))
 
     def opposite(node, edge_normal):
         found = [(nu, gap + nu @ displacements[node]) for nu, gap in conditions.get(node, [])]
@@ -187,15 +192,26 @@ def _foundation(results, time, displacement):
 
 @cache
 def _contact_rows(path):
-    """Of contact.csv the normals and remaining gaps by time and node."""
-    rows = defaultdict(lambda: defaultdict(list))
+    """The rows of contact.csv by time, with numbers but for the name of the boundary."""
+    rows = defaultdict(list)
     if path.exists():
         with whole(path), open(path, newline="", encoding="utf-8") as file:
             for row in csv.DictReader(file):
-                x, y, nx, ny, gap = (
-                    float(row[c]) for c in ("x", "y", "normal_x", "normal_y", "gap"))
-                rows[float(row["time"])][x, y].append((np.array([nx, ny]), gap))
+                name = row.pop("boundary")
+                row = {key: float(value) for key, value in row.items()}
+                rows[row["time"]].append({**row, "boundary": name})
     return rows
+
+
+def _contact_curves(folder, time):
+    """The connected parts of each contact boundary, whose rows follow each other."""
+    rows = _contact_rows(folder / "contact.csv").get(time, [])
+    curves = []
+    for (name, _), part in groupby(rows, key=lambda row: (row["boundary"], row["part"])):
+        x, y, gap, pressure = np.array(
+            [[row[key] for key in ("x", "y", "gap", "pressure")] for row in part]).T
+        curves.append(ContactCurve(name, np.column_stack((x, y)), gap, pressure))
+    return curves
 
 
 def _number(text):

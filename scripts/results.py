@@ -51,6 +51,16 @@ def telling():
 
 
 @dataclass
+class ContactCurve:
+    """A connected part of a contact boundary, with the body on its left."""
+
+    name: str  # of the boundary
+    points: np.ndarray  # (n, 2): the nodes along it, m
+    gap: np.ndarray  # (n,), m
+    pressure: np.ndarray  # (n,), Pa
+
+
+@dataclass
 class Results:
     """A state of the body, by default the last accepted one, and what happened on the way to it."""
 
@@ -65,6 +75,7 @@ class Results:
     contact: np.ndarray = None  # (k, 2, 2): both ends of the edges of Γ_C, m
     tangents: np.ndarray = None  # (k, 2, 2): along which the body slides there, 0 where it cannot
     obstacle: np.ndarray = None  # (k, 2, 2): what is opposite them, m
+    curves: list = None  # the ContactCurves of Γ_C
     displacement: np.ndarray = None  # (n, 2), m
     zeta: np.ndarray = None  # (n,)
     von_mises: np.ndarray = None  # (m,), Pa
@@ -154,14 +165,6 @@ class Results:
             joined += zip(ends, ends[1:])
         return [np.array([at[end] for end in path]) for path in paths(joined)]
 
-    def contact_pieces(self):
-        """Γ_C as node paths: its connected pieces, the body on the left."""
-        edges = self.pieces.boundary()
-        edges = edges[np.isfinite(self.gap)[edges].all(axis=1)]
-        # From one end by way of the middle, if there is one, to the other.
-        edges = np.column_stack([edges[:, 0], edges[:, 2:], edges[:, 1]])
-        return paths([pair for edge in edges.tolist() for pair in zip(edge, edge[1:])])
-
     def foundation(self, factor=None):
         """The obstacle as polylines; with a factor, as the body deformed so many times meets it.
 
@@ -221,15 +224,24 @@ def without_roundoff(results):
     earlier = np.nanmax(results.history.get("displacement_max", [0.0]), initial=0.0)
     deformation = max(1e-14 * results.size, ROUNDING * max(largest, earlier))
     zeta = np.where(np.abs(1.0 - results.zeta) <= UNDAMAGED, 1.0, results.zeta)
-    gap = np.where(np.abs(results.gap) <= deformation, 0.0, results.gap)
-    results = replace(results, zeta=zeta, gap=gap)
+
+    def rounded(values, noise):
+        return np.where(np.abs(values) <= noise, 0.0, values)
+
+    def rounded_curves(noise):
+        return [replace(curve, gap=rounded(curve.gap, deformation),
+                        pressure=rounded(curve.pressure, noise)) for curve in results.curves]
+
+    results = replace(results, zeta=zeta, gap=rounded(results.gap, deformation))
     if largest <= deformation:
         names = ("displacement", "von_mises", "pressure")
-        return replace(results, **{name: 0.0 * getattr(results, name) for name in names})
+        zeros = {name: 0.0 * getattr(results, name) for name in names}
+        return replace(results, **zeros, curves=rounded_curves(np.inf))
     young = results.scene.get("material", {}).get("young")
     young = young if isinstance(young, (int, float)) else 0.0
     rigid = results.von_mises.max() <= ROUNDING * young * largest / results.size
     stress = results.von_mises * (not rigid)
     pressures = np.maximum(results.pressure.max(), stress.max())
-    noise = np.abs(results.pressure) <= ROUNDING * pressures
-    return replace(results, von_mises=stress, pressure=np.where(noise, 0.0, results.pressure))
+    noise = ROUNDING * pressures
+    return replace(results, von_mises=stress, pressure=rounded(results.pressure, noise),
+                   curves=rounded_curves(noise))

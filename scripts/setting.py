@@ -1,11 +1,13 @@
 """The picture of the physical setting: boundaries by name, loads and supports (paper, Figures 1, 2,
 4 and 7)."""
 
+import pathlib
 import textwrap
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
 from matplotlib.patheffects import withTickedStroke
 
 from drawing import (
@@ -36,8 +38,9 @@ def draw_setting(results, _limits):
               for path in paths([tuple(map(tuple, edge)) for edge in edges])]
     width, height = map_size(np.ptp(results.nodes, axis=0), 6.4)
     figure, axes = plt.subplots(figsize=(width, height + 0.7 + 0.2 * len(conditions)))
-    for outline in results.outline(results.nodes):
-        axes.fill(*outline.T, color="#edf1f5", zorder=0.5)
+    # The body is on the left of its outlines, so those of holes cut them out of the rest.
+    outlines = Path.make_compound_path(*map(Path, results.outline(results.nodes)))
+    axes.add_patch(PathPatch(outlines, facecolor="#edf1f5", edgecolor="none", zorder=0.5))
     draw_outline(axes, results.nodes, results, color=INK, linewidth=0.9, zorder=2)
     draw_foundation(axes, results)
 
@@ -96,7 +99,7 @@ def _loads(results, conditions, curves):
 
 def _folder(results):
     """Where the scene's tables are: beside its mesh."""
-    return Path(results.scene.get("mesh", {}).get("file", "")).parent
+    return pathlib.Path(results.scene.get("mesh", {}).get("file", "")).parent
 
 
 def _vectors(expressions, points, time, folder):

@@ -48,12 +48,17 @@ impl Interrupts {
         Self(())
     }
 
-    /// The signal that has come, if one has.
+    /// As [`received`].
     pub fn received(&self) -> Option<Signal> {
-        match RECEIVED.load(Ordering::Relaxed) as i32 {
-            0 => None,
-            number => Some(Signal(number)),
-        }
+        received()
+    }
+}
+
+/// The signal that has come, if one has.
+pub fn received() -> Option<Signal> {
+    match RECEIVED.load(Ordering::Relaxed) as i32 {
+        0 => None,
+        number => Some(Signal(number)),
     }
 }
 

@@ -22,6 +22,10 @@ pub(super) struct Cholmod {
 /// guide).
 const MUCH_WORK: f64 = 500.0;
 
+/// What to do where a factor cannot be made.
+const REMEDY: &str = ": take larger triangles, or multigrid in its place (-- -elastic_pc_type gamg \
+                      -damage_pc_type gamg)";
+
 /// Values are freed by so many at a time, 32 MB.
 const FREED: usize = 1 << 22;
 
@@ -203,7 +207,14 @@ impl Cholmod {
     /// The error of a call that was not `done`.
     fn check(&self, done: bool) -> Result<(), PetscError> {
         let message = || match self.common.status {
-            raw::CHOLMOD_OUT_OF_MEMORY => "not enough memory for a Cholesky factor".to_owned(),
+            raw::CHOLMOD_OUT_OF_MEMORY => {
+                format!("there is not enough memory for a Cholesky factor{REMEDY}")
+            }
+            // The matrix is valid: then the order is not. cholmod_l_metis does not look whether METIS, which
+            // has 32-bit indices, has failed.
+            raw::CHOLMOD_TOO_LARGE | raw::CHOLMOD_INVALID => {
+                format!("the mesh is too large for a Cholesky factor (32-bit indices){REMEDY}")
+            }
             status => format!("CHOLMOD failed with status {status}"),
         };
         done.then_some(()).ok_or_else(|| PetscError::ours(message()))

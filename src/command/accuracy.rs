@@ -3,6 +3,7 @@
 use super::{Failure, screen, task::Task};
 use signorini::{
     evolution::{self, AdaptError, Adapted, Bar, Outcome},
+    interrupt::{Interrupts, Signal},
     mesh::{Mesh, Order},
     petsc::Session,
     scene::{Scene, Stepping},
@@ -24,11 +25,12 @@ pub(super) fn adapt(
             screen::adapting(mesh, accuracy);
         }
     };
+    let _interrupts = Interrupts::defer();
     let adapt = || evolution::adapted(session, scene, mesh.clone(), solver, accuracy, &mut show);
     let adapted = made.map_or_else(adapt, Ok);
     let adapted = adapted.map_err(|error| match error {
         AdaptError::Setup(_) => Failure::input(error),
-        _ => error.into(),
+        error => error.signal().map_or_else(|| (&error).into(), interrupted),
     })?;
     if let Some(grid) = &mut scene.time {
         grid.stepping = Stepping::Auto { tolerance: adapted.steps, expected: adapted.damage };
@@ -43,14 +45,26 @@ pub(super) fn measure_bars(
     mesh: &Mesh,
     solver: &str,
 ) -> Result<Vec<Bar>, Failure> {
+    let _interrupts = Interrupts::defer();
     match evolution::measured_bars(session, scene, mesh, solver) {
         Ok(bars) => Ok(bars),
         Err(AdaptError::Setup(error)) => Err(Failure::input(error)),
-        Err(error) => {
-            scene.notes.push(format!("the error bars could not be measured: {error}"));
-            Ok(Vec::new())
-        }
+        Err(error) => match error.signal() {
+            Some(signal) => Err(interrupted(signal)),
+            None => {
+                scene.notes.push(format!("the error bars could not be measured: {error}"));
+                Ok(Vec::new())
+            }
+        },
     }
+}
+
+/// A signal has ended a run on a mesh that was tried.
+fn interrupted(signal: Signal) -> Failure {
+    let message = format!(
+        "ended by {signal} before the run began, while meshes were tried for its accuracy or error bars"
+    );
+    Failure { code: signal.exit_code(), message: Some(message) }
 }
 
 /// Whether the accuracy that was asked for is reached by the answer, and what is in its way; `None` where

@@ -188,7 +188,11 @@ fn cost(problem: &DiscreteProblem) -> String {
             let stepping = step * steps as f64;
             let moving = 0.65e-9 * (contact_nodes(problem) as f64).powi(3) * steps as f64;
             let [least, most] = [once + stepping, once + 3.0 * stepping + moving];
-            format!("{least:.1} to {most:.1} s in {steps} steps, the more the contact moves")
+            let [low, high] = [least, most].map(|seconds| format!("{seconds:.1}"));
+            match low == high {
+                true => format!("{low} s in {steps} steps"),
+                false => format!("{low} to {high} s in {steps} steps, the more the contact moves"),
+            }
         }
         Some(Stepping::Auto { .. }) => format!("{once:.1} s and {:.1} ms a step", 1e3 * step),
     };

@@ -8,9 +8,6 @@ use signorini::{
 };
 use std::io::{self, IsTerminal, Write};
 
-/// A component below this part of the largest force, a moment of the largest moment, is shown as zero.
-const ROUNDING: f64 = 1e-9;
-
 /// The progress bar counts thousandths of [0, T].
 const LENGTH: u64 = 1000;
 
@@ -30,7 +27,9 @@ pub fn open(task: &Task) -> Progress {
         _ => task.solver.clone(),
     };
     let mut lines = vec![scene.title.clone(), row("mesh", mesh), row("solver", solver)];
-    lines.extend(scene.time.map(|grid| row("time", steps(grid, &scene.units.time))));
+    let can_be_damaged = task.problem.damage().is_some();
+    lines
+        .extend(scene.time.map(|grid| row("time", steps(grid, &scene.units.time, can_be_damaged))));
     say(&lines.join("\n"));
 
     let mut progress = Progress::new("{bar:20} {wide_msg} {elapsed}, {eta} left", LENGTH);
@@ -135,12 +134,7 @@ fn supports(
     let supports = &task.problem.supports.names;
     let resultants = quantities.chunks_exact(3).take(supports.len());
     let resultants = resultants.map(|of| [0, 1, 2].map(|i| of[i].1));
-    let largest = |size: fn([f64; 3]) -> f64| resultants.clone().map(size).fold(0.0, f64::max);
-    let [force_most, moment_most] = [largest(|[x, y, _]| x.hypot(y)), largest(|of| of[2].abs())];
-    let visible = |value: f64, most: f64| if value.abs() < ROUNDING * most { 0.0 } else { value };
-    for (name, [x, y, moment]) in supports.iter().zip(resultants.clone()) {
-        let [x, y] = [x, y].map(|component| visible(component, force_most));
-        let moment = visible(moment, moment_most);
+    for (name, [x, y, moment]) in supports.iter().zip(resultants) {
         let figure = |value: f64, of: &str| match bar(&format!("{name}.{of}")) {
             None => format!("{value:.4e}"),
             bar => with_bar(value, bar),
@@ -157,13 +151,16 @@ pub fn row(name: &str, value: String) -> String {
     format!("  {name:<13} {value}")
 }
 
-fn steps(grid: TimeGrid, unit: &str) -> String {
+fn steps(grid: TimeGrid, unit: &str, can_be_damaged: bool) -> String {
     let end = grid.end;
     match grid.stepping {
         Stepping::Uniform { steps } => {
             let scheme = if grid.scheme == Scheme::Bdf2 { " (bdf2)" } else { "" };
             let noun = if steps == 1 { "step" } else { "steps" };
             format!("{steps} {noun} of {} {unit} to t = {end}{scheme}", rounded(end / steps as f64))
+        }
+        Stepping::Auto { .. } if !can_be_damaged => {
+            format!("to t = {end} in steps that follow the loads")
         }
         Stepping::Auto { tolerance, .. } => {
             format!("to t = {end} in steps chosen for an error of ζ of {tolerance:e}")

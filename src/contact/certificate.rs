@@ -36,7 +36,7 @@ pub struct ContactPoint {
     pub normal: [f64; 2],
     /// Normal reaction p, N per metre of thickness; positive in compression.
     pub force: f64,
-    /// The reaction over the node's tributary length, Pa.
+    /// The reaction over the node's tributary length, Pa; 0 where the node is open: there p is rounding.
     pub pressure: f64,
     /// g − u·ν: the gap that is left, m.
     pub gap: f64,
@@ -128,13 +128,14 @@ impl Certificate {
                 primal = worse(primal, scales.of_displacement(depth));
                 let Some(force) = force else { continue };
                 complementarity = worse(complementarity, scales.natural(force, *left));
+                let active = force > 0.0 && force * scales.displacement > left * scales.force;
                 points.push(ContactPoint {
                     node: at.node,
                     normal: gap.normal,
                     force,
-                    pressure: force / gap.tributary_length,
+                    pressure: if active { force / gap.tributary_length } else { 0.0 },
                     gap: *left,
-                    active: force > 0.0 && force * scales.displacement > left * scales.force,
+                    active,
                 });
             }
         }

@@ -92,15 +92,16 @@ pub enum ContactError {
     },
     /// Rounding keeps the answer from the tolerance.
     #[error(
-        "{source}; double precision reaches only about {attainable:.0e} here (triangles or parts much \
-         longer than wide, nearly incompressible or almost broken material): set contact.tolerance \
-         to that or more, or mend the mesh"
+        "{source}; double precision reaches only about {attainable:.0e} here {}",
+        advice(contrast)
     )]
     Limited {
         /// How the solve ended.
         source: Box<Self>,
         /// The tolerance that rounding allows, about.
         attainable: f64,
+        /// How much stiffer than another one a material is, where that is the cause.
+        contrast: Option<String>,
     },
     /// The answer satisfies the KKT conditions of a stiffness that is not positive definite.
     #[error(
@@ -113,6 +114,21 @@ pub enum ContactError {
     /// PETSc failed.
     #[error(transparent)]
     Petsc(#[from] PetscError),
+}
+
+/// Why rounding is large, and what to do.
+fn advice(contrast: &Option<String>) -> String {
+    match contrast {
+        Some(contrast) => format!(
+            "because {contrast}: check the units of both, or if they are meant, set contact.tolerance to \
+             that or more"
+        ),
+        None => {
+            "(triangles or parts much longer than wide, nearly incompressible or almost broken \
+                 material): set contact.tolerance to that or more, or mend the mesh"
+                .to_owned()
+        }
+    }
 }
 
 impl ContactError {

@@ -115,10 +115,18 @@ pub struct SolverEntry {
 }
 
 /// All solvers of problems with obstacles, the default first.
-pub static REGISTRY: [SolverEntry; 3] = [active_set::ENTRY, penalty_duality::ENTRY, tao::ENTRY];
+pub const REGISTRY: &[SolverEntry] = &[active_set::ENTRY, penalty_duality::ENTRY, tao::ENTRY];
 
 /// Their names.
-pub const SOLVERS: [&str; REGISTRY.len()] = [REGISTRY[0].name, REGISTRY[1].name, REGISTRY[2].name];
+pub const SOLVERS: [&str; REGISTRY.len()] = {
+    let mut names = [""; REGISTRY.len()];
+    let mut number = 0;
+    while number < names.len() {
+        names[number] = REGISTRY[number].name;
+        number += 1;
+    }
+    names
+};
 
 /// There is no contact solver of that name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

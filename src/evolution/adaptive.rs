@@ -14,6 +14,7 @@ mod sizes;
 
 use super::{DiscreteProblem, RunError, SetupError, figures::Bar, loads::LoadCurve};
 use crate::{
+    interrupt::Signal,
     mesh::{Mesh, MeshError, Refinement},
     petsc::{PetscError, Session},
     scene::{Scene, Stepping},
@@ -79,6 +80,16 @@ pub enum AdaptError {
     Petsc(#[from] PetscError),
 }
 
+impl AdaptError {
+    /// The signal that has ended a run, if one has.
+    pub fn signal(&self) -> Option<Signal> {
+        match self {
+            Self::Run { source: RunError::Interrupted(signal), .. } => Some(*signal),
+            _ => None,
+        }
+    }
+}
+
 /// The error of ζ over the damage done that the few steps of a run on a coarse mesh may make.
 const PILOT_TOLERANCE: f64 = 0.05;
 /// Rounds, and triangles of a mesh or of its measurement, at most.
@@ -111,6 +122,7 @@ pub fn adapted(
     });
     match (refined, reached) {
         (Err(error @ AdaptError::Setup(_)), _) => Err(error),
+        (Err(error), _) if error.signal().is_some() => Err(error),
         (Err(error), Some(before)) => Ok(Adapted { short: Some(error.to_string()), ..before }),
         (refined, _) => refined,
     }
@@ -190,6 +202,7 @@ fn refined(
         let measure = || Measurement::new(session, &scene, mesh, &round.pilot, solver, rounds);
         let (measured, failed) = match round.is_enough().then(measure) {
             Some(Ok(measured)) => (Some(measured), None),
+            Some(Err(error)) if error.signal().is_some() => return Err(error),
             Some(Err(error)) => (None, Some(error.to_string())),
             None => (None, None),
         };

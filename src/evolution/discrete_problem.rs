@@ -191,8 +191,7 @@ impl DiscreteProblem {
         let mut values = self.supports.resultants(&self.body, unbalanced, &state.contact);
         values.extend(self.probes.values(self, state));
         self.body.nodes.partition.comm().sum(&mut values);
-        // No -0.
-        values.iter().map(|value| value + 0.0).collect()
+        self.without_rounding(values)
     }
 
     /// η_*(ζ).

@@ -6,6 +6,10 @@ use serde::{Deserialize, Serialize};
 
 /// The figures of a [`StepRecord`](super::StepRecord) that have an error bar.
 const OF_RECORD: [&str; 5] = ["work", "displacement_max", "contact_force", "zeta_min", "zeta_mean"];
+/// The groups of the supports' forces and moments, and the first of two for each probe.
+const FORCES: usize = 5;
+const MOMENTS: usize = 6;
+const FIRST_PROBE: usize = 7;
 /// A figure counts as no smaller than this part of the largest figure of its dimension: a force that
 /// symmetry makes zero has no relative error.
 const LEAST: f64 = 1e-3;
@@ -17,6 +21,9 @@ const LEAST_MOMENT: f64 = 0.1;
 const BODY_FORCE: f64 = 1e-4;
 /// A damage below this is negligible.
 const NEGLIGIBLE_DAMAGE: f64 = 1e-6;
+
+/// A quantity below this part of the largest of its group is rounding, or the solver's tolerance.
+const ROUNDING: f64 = 1e-9;
 
 /// The dimension of a figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -72,14 +79,13 @@ impl DiscreteProblem {
         let of_record = OF_RECORD.iter().zip(dimensions).enumerate();
         let of_record =
             of_record.map(|(group, (&name, dimension))| (name.to_owned(), dimension, group));
-        let [forces, moments, first_probe] = [5, 6, 7];
         let supports = 3 * self.supports.names.len();
         let quantities = self.quantities().into_iter().enumerate().map(|(i, name)| {
             let probe = i.saturating_sub(supports);
-            let first = first_probe + 2 * (probe / OBSERVED.len());
+            let first = FIRST_PROBE + 2 * (probe / OBSERVED.len());
             match (i < supports, i % 3, probe % OBSERVED.len()) {
-                (true, 2, _) => (name, Moment, moments),
-                (true, ..) => (name, Force, forces),
+                (true, 2, _) => (name, Moment, MOMENTS),
+                (true, ..) => (name, Force, FORCES),
                 (false, _, 0 | 1) => (name, Length, first),
                 // The scale of a damage at a point is the largest damage of the body.
                 (false, _, 2) => (name, Damage, 3),
@@ -123,6 +129,29 @@ impl DiscreteProblem {
             own.max(alike)
         };
         figures.iter().map(scale).collect()
+    }
+
+    /// The values of [`Self::quantities`] with zeros in the place of rounding: among forces, moments, and
+    /// the components of the displacement or of the stress at a probe. A force at the body's radius of
+    /// gyration counts among the moments.
+    pub(super) fn without_rounding(&self, mut values: Vec<f64>) -> Vec<f64> {
+        let figures = &self.figures()[OF_RECORD.len()..];
+        let most = |group: usize| {
+            let alike = figures.iter().zip(&values).filter(|(figure, _)| figure.group == group);
+            alike.fold(0.0_f64, |most, (_, value)| most.max(value.abs()))
+        };
+        let lever = (self.body.polar_inertia / self.body.area).sqrt();
+        let rounding = figures.iter().map(|figure| match figure.dimension {
+            Dimension::Damage => 0.0,
+            Dimension::Moment => ROUNDING * most(MOMENTS).max(lever * most(FORCES)),
+            _ => ROUNDING * most(figure.group),
+        });
+        let rounding: Vec<f64> = rounding.collect();
+        for (value, rounding) in values.iter_mut().zip(rounding) {
+            // No -0.
+            *value = if value.abs() <= rounding { 0.0 } else { *value + 0.0 };
+        }
+        values
     }
 
     /// The |values| of all figures, and 1 − ζ of a damage: what their scales come from.

@@ -12,6 +12,9 @@ use crate::{
 };
 use forces::{BodyForce, SurfaceForce};
 
+/// What may be missed of the integral of a load is noted if it is more than this part.
+const NOTED: f64 = 0.05;
+
 /// (f(t), ·)_V and the values of the fixed rows and of the gap rows.
 #[derive(Debug)]
 pub struct Loads {
@@ -57,6 +60,27 @@ impl Loads {
     fn forces(&self) -> impl Iterator<Item = &Expression> {
         let surface = self.surface_forces.iter().flat_map(SurfaceForce::expressions);
         surface.chain(self.body_force.iter().flat_map(BodyForce::expressions))
+    }
+
+    /// What may be missed of the integrals of the body force and of the surface loads, as notes, if it is much.
+    pub(super) fn notes(&self, times: &[f64]) -> Vec<String> {
+        let body = self.body_force.iter();
+        let body = body.map(|force| ("the body force", "triangles", force.missed));
+        let surface = self.surface_forces.iter().map(|force| {
+            let missed = times.iter().map(|&t| force.missed(t)).fold(0.0, f64::max);
+            ("a traction or pressure", "edges", missed)
+        });
+        let note = |(name, elements, missed): (&str, &str, f64)| {
+            let part = match missed < 1.0 {
+                true => format!("up to {:.0} % of it", 100.0 * missed),
+                false => "much of it, or all,".to_owned(),
+            };
+            format!(
+                "{name} changes too sharply within the mesh's {elements} to be integrated: {part} may be \
+                 missed; refine the mesh where it changes"
+            )
+        };
+        body.chain(surface).filter(|(.., missed)| *missed > NOTED).map(note).collect()
     }
 
     /// Whether a load, a prescribed displacement or a gap depends on time.

@@ -7,10 +7,16 @@ use crate::{
     model::Plane,
     scene::{Stepping, rounded},
 };
+use std::iter::once;
 
 /// In plane strain with ν above this, P1 triangles lock: measured in the stability study. P2 triangles
 /// converge more slowly as ν goes to ½, but do not lock (measured up to 0.4999).
 const LOCKING: f64 = 0.45;
+/// Materials with moduli further apart than this factor are noted: the rounding of the stiffer one is then
+/// 1e-11 of the forces in the other, a tenth of the usual tolerance.
+const CONTRAST: f64 = 1e5;
+/// Times at which surface loads are looked at, about.
+const LOOKS: usize = 8;
 /// Triangles with a smaller angle are noted, degrees.
 const SLIVER: f64 = 1.0;
 /// So many free motions are noted one by one.
@@ -51,11 +57,13 @@ impl Outcome {
         let displacement = if unique { self.accuracy.displacement } else { 0.0 };
         let accuracy = Accuracy { displacement, ..self.accuracy };
         if self.kkt.worst() > problem.tolerance {
+            let usual = "a body much longer than wide, stretched triangles, nearly incompressible or \
+                         almost broken material";
             notes.push(format!(
                 "KKT residuals up to {:.1e}, above contact.tolerance, are all that double precision allows \
-                 here (a body much longer than wide, stretched triangles, nearly incompressible or almost \
-                 broken material)",
-                self.kkt.worst()
+                 here ({})",
+                self.kkt.worst(),
+                problem.contrast().as_deref().unwrap_or(usual)
             ));
         }
         notes.extend(self.penetration.clone());
@@ -144,7 +152,10 @@ impl DiscreteProblem {
             let more = motions.free.len() - FREE_MOTIONS;
             notes.push(format!("nothing prevents or drives {more} more such motions"));
         }
+        let check_units = |contrast| format!("{contrast}; if that is not meant, check their units");
+        notes.extend(self.contrast().map(check_units));
         notes.extend(unresolved::notes(scene, self.mesh()));
+        notes.extend(self.loads.notes(&scene.sample_times(LOOKS)));
         if let Some([start, end]) = LoadCurve::unresolved_step(self) {
             notes.push(format!(
                 "loads, displacements or gaps change within a time step, as between t = {start:.4e} and \
@@ -172,6 +183,27 @@ impl DiscreteProblem {
         }
         notes.extend(self.sliver());
         notes
+    }
+
+    /// By what factor the moduli of the softest and of the stiffest material of the body differ, if it is
+    /// large.
+    pub(super) fn contrast(&self) -> Option<String> {
+        let (scene, used) = (self.scene(), self.scene().materials_of(self.mesh()));
+        let names = once("[material]".to_owned())
+            .chain(scene.surfaces.keys().map(|name| format!("[material.{name}]")));
+        let materials = scene.materials().map(|material| material.young).zip(names).zip(0..);
+        let mut materials: Vec<_> =
+            materials.filter(|(_, number)| used.contains(number)).map(|(of, _)| of).collect();
+        materials.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+        let [(low, soft), .., (high, stiff)] = &materials[..] else { return None };
+        let unit = &scene.units.stress;
+        (high / low > CONTRAST).then(|| {
+            format!(
+                "E differs by a factor of {:.0e} between two materials: {high:e} {unit} in {stiff}, \
+                 {low:e} {unit} in {soft}",
+                high / low
+            )
+        })
     }
 
     /// The least κ/h² of the body, 1/s, with h the longest side of a triangle. Collective.

@@ -1,7 +1,10 @@
 //! Whoever is shown the accepted steps of a run, and how the run goes on.
 
 use super::Step;
-use crate::{archive::Archive, interrupt::Signal};
+use crate::{
+    archive::Archive,
+    interrupt::{self, Signal},
+};
 
 /// The answer of an observer: an error ends the run.
 pub type Observed<T = ()> = Result<T, Box<dyn std::error::Error + Send + Sync>>;
@@ -63,11 +66,11 @@ pub trait Observer {
     }
 }
 
-/// An observer that only looks.
+/// An observer that only looks; a signal, where these are deferred, ends the run.
 pub(super) struct Shown<'a>(pub(super) &'a mut dyn FnMut(&Step) -> Observed);
 
 impl Observer for Shown<'_> {
     fn accept(&mut self, step: &Step) -> Observed<Next> {
-        (self.0)(step).map(|()| Next::Step)
+        (self.0)(step).map(|()| interrupt::received().map_or(Next::Step, Next::End))
     }
 }

@@ -6,6 +6,9 @@
 //!   and midpoints of sides) and the maximum over the quadrature points; or
 //! - m times what [`Expression::range`] leaves above and below the values in these points > `HIDDEN`: a
 //!   peak between them may not be seen.
+//!
+//! The sum of both over all parts is what may be missed of ∫|f|. A strip that lies along the sides of triangles
+//! takes too many such parts: triangles that miss much are cut into slices along a side, if these miss less.
 
 use crate::{
     fem::{Body, Elements, GAUSS, POINTS, midpoint, parabola, part_point, quadratic_values},
@@ -27,11 +30,49 @@ const WITHIN: f64 = 1e-7;
 const DEEPEST: usize = 40;
 /// The parts of one triangle alone.
 pub(super) const WHOLE: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+/// Triangles are sliced where all together miss more than this part of ∫|f|: so many of them at most, each
+/// into so many slices at most.
+const MISSED: f64 = 1e-4;
+const SLICED: usize = 1000;
+const SLICES: usize = 200;
+/// How well slices are to be integrated, relatively.
+const DEVIATION_OF_SLICES: f64 = 1e-6;
 /// What is seen of functions in a part, each times its measure: ∫|f|, max |f − f₂|, and what may be hidden.
+#[derive(Clone, Copy)]
 struct Seen {
     integral: f64,
     deviation: f64,
     hidden: f64,
+}
+
+impl Seen {
+    /// What may be missed of the `integral` of |f| over all parts. Below the limit, what may be hidden is
+    /// mostly what the bounds of the function are too wide.
+    fn missed(&self, integral: f64) -> f64 {
+        self.deviation + if self.hidden > HIDDEN * integral { self.hidden } else { 0.0 }
+    }
+}
+
+/// Parts in which functions are integrated.
+pub(super) struct Parts<P> {
+    pub(super) parts: Vec<P>,
+    /// What may be missed of ∫|f|, at most, over the part that is seen.
+    pub(super) missed: f64,
+}
+
+impl<P> Parts<P> {
+    fn new(parts: Vec<(P, Seen)>) -> Self {
+        let [integral, missed] = sums(&parts, None);
+        let missed = if missed > 0.0 { missed / integral } else { 0.0 };
+        Self { parts: parts.into_iter().map(|(part, _)| part).collect(), missed }
+    }
+}
+
+/// ∫|f| over parts, and what may be missed of it, or of the `integral` over these and others.
+fn sums<P>(parts: &[(P, Seen)], integral: Option<f64>) -> [f64; 2] {
+    let own = parts.iter().map(|(_, seen)| seen.integral).sum();
+    let integral = integral.unwrap_or(own);
+    [own, parts.iter().map(|(_, seen)| seen.missed(integral)).sum()]
 }
 
 /// Bisects parts until all are small enough for a `deviation`, or there are more than `most`.
@@ -40,7 +81,7 @@ fn bisected<P: Copy>(
     [deviation, most]: [f64; 2],
     look: impl Fn(P) -> Seen,
     halves: impl Fn(P) -> [P; 2],
-) -> Vec<P> {
+) -> Vec<(P, Seen)> {
     let (mut done, mut integral) = (Vec::new(), 0.0);
     let mut open: Vec<(P, Seen)> = parts.map(|part| (part, look(part))).collect();
     for _ in 0..DEEPEST {
@@ -48,22 +89,23 @@ fn bisected<P: Copy>(
         let mut coarse = Vec::new();
         for (part, seen) in open {
             if seen.deviation > deviation * total || seen.hidden > HIDDEN * total {
-                coarse.push(part);
+                coarse.push((part, seen));
             } else {
                 integral += seen.integral;
-                done.push(part);
+                done.push((part, seen));
             }
         }
         if (done.len() + 2 * coarse.len()) as f64 > most {
             done.extend(coarse);
             return done;
         }
-        open = coarse.into_iter().flat_map(&halves).map(|part| (part, look(part))).collect();
+        let parts = coarse.into_iter().flat_map(|(part, _)| halves(part));
+        open = parts.map(|part| (part, look(part))).collect();
         if open.is_empty() {
             return done;
         }
     }
-    done.extend(open.into_iter().map(|(part, _)| part));
+    done.extend(open);
     done
 }
 
@@ -74,10 +116,10 @@ pub(super) fn edge_parts(
     f: &[Expression],
     t: f64,
     deviation: f64,
-) -> Vec<EdgePart> {
+) -> Parts<EdgePart> {
     let whole = (0..lines.len()).map(|edge| (edge, [0.0, 1.0]));
     if !f.iter().any(Expression::depends_on_space) {
-        return whole.collect();
+        return Parts { parts: whole.collect(), missed: 0.0 };
     }
     let look = |(edge, [from, to]): EdgePart| {
         let at = |s: f64| parabola(lines[edge], from + s * (to - from));
@@ -93,7 +135,7 @@ pub(super) fn edge_parts(
         [(edge, [from, middle]), (edge, [middle, to])]
     };
     let most = (4 * lines.len() + 2000) as f64;
-    bisected(whole, [deviation, most], look, halves)
+    Parts::new(bisected(whole, [deviation, most], look, halves))
 }
 
 /// The parts of triangles, with the six points of a quadratic triangle each, in which `f` − `zero` is
@@ -104,7 +146,7 @@ pub(super) fn triangle_parts(
     (f, zero): (&[Expression], f64),
     times: &[f64],
     [deviation, more]: [f64; 2],
-) -> Vec<TrianglePart> {
+) -> Parts<TrianglePart> {
     let whole = (0..triangles.len()).map(|triangle| (triangle, WHOLE));
     let look = |(triangle, corners): TrianglePart| {
         let at = |point| triangle_point(&triangles[triangle], part_point(&corners, point));
@@ -124,7 +166,60 @@ pub(super) fn triangle_parts(
         let middle = mean(a, b);
         [(triangle, [c, a, middle]), (triangle, [b, c, middle])]
     };
-    bisected(whole, [deviation, triangles.len() as f64 + more], look, halves)
+    let parts = bisected(whole, [deviation, triangles.len() as f64 + more], look, halves);
+    let [integral, missed] = sums(&parts, None);
+    if missed <= MISSED * integral {
+        return Parts::new(parts);
+    }
+    let mut of_triangles = vec![Vec::new(); triangles.len()];
+    parts.into_iter().for_each(|part| of_triangles[part.0.0].push(part));
+    let missed = |parts: &[(TrianglePart, Seen)]| sums(parts, Some(integral))[1];
+    let mut worst: Vec<_> = of_triangles.iter().map(|parts| missed(parts)).enumerate().collect();
+    worst.sort_by(|(_, a), (_, b)| b.total_cmp(a));
+    worst.truncate(SLICED);
+    for (triangle, _) in worst.into_iter().filter(|(_, missed)| *missed > 0.0) {
+        for side in 0..3 {
+            let Some(slices) = slices(&triangles[triangle], side, f, times) else { continue };
+            let slices = slices.into_iter().map(|corners| (triangle, corners));
+            let slices: Vec<_> = slices.map(|part| (part, look(part))).collect();
+            if missed(&slices) < missed(&of_triangles[triangle]) {
+                of_triangles[triangle] = slices;
+            }
+        }
+    }
+    Parts::new(of_triangles.into_iter().flatten().collect())
+}
+
+/// Slices of a triangle along one of its sides, two parts each, as thick as a line across them needs; none
+/// where these are too many.
+fn slices(
+    triangle: &[[f64; 2]; 6],
+    side: usize,
+    f: &[Expression],
+    times: &[f64],
+) -> Option<Vec<[[f64; 3]; 3]>> {
+    let [a, b, c] = [0, 1, 2].map(|i| WHOLE[(side + i) % 3]);
+    let across = mean(a, b);
+    let line = [c, mean(c, across), across].map(|point| triangle_point(triangle, point));
+    let ends = times.iter().flat_map(|&t| edge_parts(&[line], f, t, DEVIATION_OF_SLICES).parts);
+    let mut ends: Vec<f64> = ends.map(|(_, [_, to])| to).collect();
+    ends.sort_by(f64::total_cmp);
+    ends.dedup();
+    if ends.len() > SLICES {
+        return None;
+    }
+    let at = |corner: [f64; 3], r: f64| [0, 1, 2].map(|k| c[k] + r * (corner[k] - c[k]));
+    let mut from = 0.0;
+    let mut parts = Vec::new();
+    for to in ends {
+        let [p, q, r, s] = [at(a, from), at(a, to), at(b, to), at(b, from)];
+        parts.push([p, q, r]);
+        if from > 0.0 {
+            parts.push([p, r, s]);
+        }
+        from = to;
+    }
+    Some(parts)
 }
 
 /// The point of a quadratic triangle of six points at barycentric coordinates, m.

@@ -104,8 +104,8 @@ impl StepRecord {
         report: &ContactReport,
         kkt: &Kkt,
     ) -> Self {
-        let mut active: Vec<usize> =
-            state.contact.iter().filter(|point| point.active).map(|point| point.node).collect();
+        let pressing = || state.contact.iter().filter(|point| point.active);
+        let mut active: Vec<usize> = pressing().map(|point| point.node).collect();
         active.dedup();
         let partition = &problem.body.nodes.partition;
         let comm = partition.comm();
@@ -116,8 +116,8 @@ impl StepRecord {
             zeta_mean: problem.body.mean(&state.zeta),
             displacement_max: partition.max_norm(&state.u),
             work: partition.dot(load, &state.u, 2),
-            // An empty sum is -0.0, and so is one of reactions of nothing.
-            contact_force: comm.total(state.contact.iter().map(|point| point.force).sum()) + 0.0,
+            // An empty sum is -0.0.
+            contact_force: comm.total(pressing().map(|point| point.force).sum()) + 0.0,
             active_nodes: comm.count(active.len()),
             iterations: report.iterations,
             linear_iterations: report.linear_iterations,

@@ -187,6 +187,8 @@ impl Supports {
             let (place, [x, y], [nx, ny]) =
                 (self.place(point)?, body.nodes.points[point.node], point.normal);
             let active = f64::from(u8::from(point.active));
+            // No -0.
+            let [nx, ny] = [nx + 0.0, ny + 0.0];
             let at = [place.boundary as f64, place.part as f64, place.arc_length];
             Some([at[0], at[1], at[2], x, y, nx, ny, point.gap, point.pressure, active])
         };

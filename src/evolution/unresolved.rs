@@ -129,7 +129,7 @@ fn missed_displacements(
             let [x, y] = parabola(lines[edge], s);
             u.eval(x, y, t)
         };
-        for (edge, [from, to]) in edge_parts(&lines, std::slice::from_ref(u), t, DEVIATION) {
+        for (edge, [from, to]) in edge_parts(&lines, std::slice::from_ref(u), t, DEVIATION).parts {
             let part: EdgePart = (edge, [from, to]);
             let [a, m, b] = [0.0, 0.5, 1.0].map(|s| at(part.0, s));
             let middle = if scene.order == Order::Linear { 0.5 * (a + b) } else { m };
@@ -169,7 +169,7 @@ fn missed_damage(scene: &Scene, mesh: &Mesh) -> Option<MissedDamage> {
     let squares = vec![0.0; triangles.len()];
     let mut found = MissedDamage { squares, square: 0.0, missed: 0.0, integral: 0.0, shown: 0.0 };
     let f = (std::slice::from_ref(initial), 1.0);
-    for part in triangle_parts(&triangles, f, &[0.0], [DEVIATION, MORE]) {
+    for part in triangle_parts(&triangles, f, &[0.0], [DEVIATION, MORE]).parts {
         let (triangle, corners): TrianglePart = part;
         let points = &triangles[triangle];
         let [a, b, c] = [points[0], points[1], points[2]].map(at);

@@ -97,7 +97,7 @@ const FILES: [&str; 7] = [
     "open_in_paraview.py",
 ];
 /// The pictures of a run.
-const PICTURES: [&str; 8] = [
+const PICTURES: [&str; 9] = [
     "force-displacement",
     "setting",
     "deformed",
@@ -106,6 +106,7 @@ const PICTURES: [&str; 8] = [
     "damage-history",
     "contact-evolution",
     "damage",
+    "stress",
 ];
 /// Files that are not complete yet begin with this.
 const PARTIAL: &str = ".partial-";

@@ -140,17 +140,44 @@ impl SceneText {
         (document, tables)
     }
 
+    /// The value `1,5` in the line of the file that has the byte `at`, if a key of this line has one.
+    fn decimal_comma(&self, at: usize) -> Option<Problem> {
+        let before = self.file.get(..at)?;
+        let start = before.rfind('\n').map_or(0, |end| end + 1);
+        let line = self.file[start..].lines().next()?;
+        line.match_indices('=').find_map(|(equals, _)| {
+            let value = line[equals + 1..].trim_start();
+            let length = with_decimal_comma(value)?;
+            let key = line[..equals].trim_end();
+            let key = &key[key.rfind(['{', ',', ' ']).map_or(0, |end| end + 1)..];
+            let from = start + line.len() - value.len();
+            let number = &value[..length];
+            let mended = number.replace(',', ".");
+            let problem = format!("{key} is {number}: write a decimal point, {key} = {mended}");
+            Some((from..from + length, problem))
+        })
+    }
+
     /// Parses the file and puts the `--set` arguments in, in their order.
     pub(super) fn parse(&self) -> Result<DeValue<'_>, SceneError> {
         let (root, errors) = DeTable::parse_recoverable(&self.file);
-        let syntax = |error: &toml::de::Error| {
-            (error.span().unwrap_or(NOWHERE), format!("not valid TOML: {}", error.message()))
+        let mut commas = BTreeMap::new();
+        let mut syntax = |error: &toml::de::Error| {
+            let place = error.span().unwrap_or(NOWHERE);
+            match self.decimal_comma(place.start) {
+                // What else is wrong in this line may come of it.
+                Some((place, problem)) => commas
+                    .insert(place.start, problem.clone())
+                    .is_none()
+                    .then_some((place, problem)),
+                None => Some((place, format!("not valid TOML: {}", error.message()))),
+            }
         };
         // Behind an unclosed table, keys seem to be duplicates.
         let is_duplicate = |error: &toml::de::Error| error.message() == "duplicate key";
         let all = errors.first().is_none_or(is_duplicate);
         let told = errors.iter().filter(|error| all || !is_duplicate(error));
-        self.verdict(told.map(syntax).collect())?;
+        self.verdict(told.filter_map(&mut syntax).collect())?;
         let mut root = DeValue::Table(root.into_inner());
         let mut problems = Vec::new();
         for argument in &self.arguments {
@@ -196,6 +223,17 @@ pub(super) fn complete_paths(value: &mut toml::Value, folder: &Path, tables: &mu
         }
         _ => {}
     }
+}
+
+/// The length of the number with a decimal comma with which a text begins, like `-1,5e3`; none where it
+/// begins with another value.
+pub(super) fn with_decimal_comma(text: &str) -> Option<usize> {
+    let end = text.find(|c: char| !c.is_ascii_alphanumeric() && !"+-.,_".contains(c));
+    let number = text[..end.unwrap_or(text.len())].trim_end_matches(',');
+    let (whole, rest) = number.split_once(',')?;
+    let is_number = whole.parse::<i64>().is_ok() && rest.starts_with(|c: char| c.is_ascii_digit());
+    let mended = format!("{whole}.{rest}");
+    (is_number && mended.parse::<f64>().is_ok()).then_some(number.len())
 }
 
 /// What is wrong with a `--set` argument that is no TOML.

@@ -1,7 +1,7 @@
 //! What a scene file may hold: its JSON schema, against which a document is checked key by key. What is
 //! wrong with a value is noted and reading goes on, so that all problems of a scene are told at once.
 
-use super::document::{NOWHERE, Problem, SceneText, below, name_of};
+use super::document::{NOWHERE, Problem, SceneText, below, name_of, with_decimal_comma};
 use super::error::suggestion;
 use super::expression::Expression;
 use serde::de::{Deserialize, DeserializeOwned, IntoDeserializer};
@@ -239,6 +239,9 @@ fn judge(value: &toml::Value, schema: &Schema, folder: &Path) -> Result<(), Stri
     let found = match value {
         toml::Value::Array(_) | toml::Value::Table(_) => String::new(),
         toml::Value::Float(number) => format!(", but is {number:?}"),
+        toml::Value::String(text) if with_decimal_comma(text) == Some(text.len()) => {
+            format!(", but is {value}: write a decimal point")
+        }
         value => format!(", but is {value}"),
     };
     if holds { Ok(()) } else { Err(format!("must be {wanted}{found}")) }
@@ -271,7 +274,7 @@ fn judge_expression(
     };
     match expression.as_constant() {
         Some(value) if !value.is_finite() => Err(format!("must be finite, but is {value}")),
-        None if kind == "constant" => Err("must be a constant".to_owned()),
+        None if kind == "constant" => Err("must be a constant, without x, y and t".to_owned()),
         None if kind == "expression in x, y" && expression.depends_on_time() => {
             Err("depends on t; it must be a function of x and y alone".to_owned())
         }

@@ -332,34 +332,3 @@ fn the_solvers_are_listed_with_what_they_do() {
     let help = TestDirectory::new().say(&["run", "--help"]);
     assert!(REGISTRY.iter().all(|entry| help.out.contains(entry.summary)), "{}", help.out);
 }
-
-#[test]
-fn solvers_are_compared_at_order_2_and_on_the_mesh_of_an_accuracy() {
-    compared("discretisation.displacement=2");
-    compared("accuracy=0.05");
-}
-
-/// All solvers agree on the scene with a key overridden.
-fn compared(key: &str) {
-    let test_directory = TestDirectory::new();
-    let said = test_directory.say(&["compare", "scene.toml", "--set", key]);
-    if said.err.contains("apt install python3-matplotlib") {
-        return;
-    }
-    assert_eq!((said.code, said.err.as_str()), (Some(0), ""), "{said:?}");
-    let table = test_directory.read("out/compare/comparison.csv");
-    let mut reader = csv::Reader::from_reader(table.as_bytes());
-    let names = reader.headers().expect("a header").clone();
-    let rows: Vec<csv::StringRecord> = reader.records().map(|row| row.expect("a row")).collect();
-    assert_eq!(rows.len(), SOLVERS.len());
-    for row in &rows {
-        let value = |name: &str| &row[names.iter().position(|n| n == name).expect(name)];
-        for difference in ["difference_u", "difference_zeta", "difference_pressure"] {
-            let value: f64 = value(difference).parse().expect("a number");
-            assert!(value < 1e-8, "{difference}: {value}");
-        }
-        assert_eq!(value("error"), "");
-        // The scene has 10 steps; an accuracy chooses others.
-        assert_eq!(value("steps") == "10", key != "accuracy=0.05", "{key}: {row:?}");
-    }
-}

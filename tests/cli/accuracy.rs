@@ -1,6 +1,10 @@
 //! `signorini run --accuracy`.
 
-use crate::test_directory::{SCENE, TestDirectory};
+use crate::{
+    losses::signal,
+    test_directory::{SCENE, TestDirectory, square},
+};
+use std::{process::Stdio, thread::sleep, time::Duration};
 
 #[test]
 fn an_accuracy_is_reached_and_its_mesh_is_kept() {
@@ -68,6 +72,26 @@ fn error_bars_are_measured_where_they_are_asked_for() {
     assert_eq!(test_directory.summary("out/scene")["errors"]["figures"], serde_json::json!({}));
     test_directory.run(&[]);
     assert_eq!(test_directory.summary("out/scene")["errors"]["figures"], serde_json::json!({}));
+}
+
+#[test]
+fn a_signal_while_meshes_are_tried_says_so() {
+    for asked in [&["--accuracy", "1e-5"][..], &["--bars", "--mesh", "fine.msh"]] {
+        let directory = TestDirectory::new();
+        directory.write("fine.msh", &square(192));
+        // Where the load ends the answer is singular: no mesh is soon good enough.
+        let load = ["--set", "boundary.top.traction=[0, '-3*t*if(x < 0.5, 1, 0)']"];
+        let mut command = directory.command(&[&["run", "scene.toml"], asked, &load].concat());
+        let run = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+        let run = run.expect("the program starts");
+        sleep(Duration::from_secs(3));
+        signal(&run, "INT");
+        let said = run.wait_with_output().expect("it ends");
+        assert_eq!(said.status.code(), Some(130));
+        let error = String::from_utf8_lossy(&said.stderr);
+        assert!(error.contains("error: ended by SIGINT before the run began"), "{error}");
+        assert!(!directory.path("out/scene/history.csv").exists(), "nothing is written");
+    }
 }
 
 #[test]

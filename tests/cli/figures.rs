@@ -1,6 +1,6 @@
 //! Figures and reports, where there is a Python that draws them.
 
-use crate::test_directory::TestDirectory;
+use crate::test_directory::{SCENE, TestDirectory, square};
 
 #[test]
 fn figures_and_a_report_are_drawn_far_from_the_scripts() {
@@ -39,28 +39,92 @@ fn the_foundation_is_drawn_where_it_is_at_the_time_of_the_picture() {
         format!("{}\n[[boundary]]\nname = \"right\"\ngap = 0.2\n", directory.read("scene.toml"));
     directory.write("plates.toml", &scene);
     directory.say(&["run", "plates.toml", "--set", plates, "--set", "output.every=5"]);
+    let draws = "for time in (0.0, 0.5, 1.0):\n\
+         \x20   results = read_results(Path('out/plates'), time)\n\
+         \x20   points = sorted(p for line in results.foundation() for p in map(tuple, line.tolist()))\n\
+         \x20   print(len(points), points[0], points[-1], points[4])";
+    let Some(said) = python(&directory, draws) else { return };
+    let expected = "9 (0.0, -0.02) (1.2, 1.0) (1.2, -0.02)\n\
+                    9 (0.0, -0.015) (1.2, 1.0) (1.2, -0.015)\n\
+                    9 (0.0, -0.01) (1.2, 1.0) (1.2, -0.01)\n";
+    assert_eq!(said, expected);
+
+    // Γ_C has a panel for each boundary, also where they meet.
+    let panels = "from contact_pressure import draw_pressure\n\
+         from limits import limits_of\n\
+         results = read_results(Path('out/plates'))\n\
+         figure = draw_pressure(results, limits_of([results]))\n\
+         print([axes.get_title() for axes in figure.axes if axes.get_title()])\n\
+         print([len(curve.points) for curve in results.curves])\n\
+         print([bool(curve.pressure.any()) for curve in results.curves])";
+    let said = python(&directory, panels).expect("as before");
+    assert_eq!(said, "['bottom', 'right']\n[5, 5]\n[True, False]\n");
+}
+
+#[test]
+fn a_hole_is_drawn_empty() {
+    // The square without the two triangles of its middle cell.
+    let directory = TestDirectory::new();
+    let whole = square(3);
+    let cell =
+        |line: &&str| line.ends_with(" 2 2 5 1 6 7 11") || line.ends_with(" 2 2 5 1 6 11 10");
+    assert_eq!(whole.lines().filter(cell).count(), 2);
+    let holed: Vec<&str> = whole.lines().filter(|line| !cell(line)).collect();
+    directory
+        .write("square.msh", &(holed.join("\n").replace("Elements\n30", "Elements\n28") + "\n"));
+    directory.run(&["--set", "time.step=0.5"]);
+    let draws = "import numpy as np\n\
+         from setting import draw_setting\n\
+         figure = draw_setting(read_results(Path('out/scene')), None)\n\
+         figure.canvas.draw()\n\
+         for point in ((0.5, 0.52), (0.5, 0.1), (0.1, 0.5)):\n\
+         \x20   x, y = figure.axes[0].transData.transform(point).astype(int)\n\
+         \x20   print(bytes(np.asarray(figure.canvas.buffer_rgba())[-1 - y, x, :3]).hex())";
+    let Some(said) = python(&directory, draws) else { return };
+    assert_eq!(said, "ffffff\nedf1f5\nedf1f5\n");
+}
+
+#[test]
+fn a_body_without_damage_is_not_told_of_damage() {
+    let directory = TestDirectory::new();
+    let (elastic, damage) = SCENE.split_once("[damage]").expect("a table");
+    let (_, rest) = damage.split_once("[time]").expect("a table");
+    directory.write("scene.toml", &format!("{elastic}[time]{rest}"));
+    let said = directory.run(&["--set", "time.step='auto'"]);
+    assert!(said.out.contains("to t = 1 in steps that follow the loads"), "{}", said.out);
+    assert!(!said.out.contains('ζ'), "{}", said.out);
+    let drawn = directory.say(&["figures", "out/scene", "--animate"]);
+    if drawn.err.contains("apt install python3-matplotlib") {
+        return;
+    }
+    let names = directory.names("out/scene");
+    assert!(names.iter().any(|name| name == "stress.gif"), "{names:?}");
+    assert!(!names.iter().any(|name| name.starts_with("damage")), "{names:?}");
+    // The next run removes it.
+    directory.run(&[]);
+    assert!(!directory.names("out/scene").iter().any(|name| name == "stress.gif"));
+}
+
+/// What a Python program prints that has the scripts; none where Python lacks what these import.
+#[track_caller]
+fn python(directory: &TestDirectory, program: &str) -> Option<String> {
     let scripts = concat!(env!("CARGO_MANIFEST_DIR"), "/scripts");
-    let draws = format!(
+    let program = format!(
         "import sys; sys.path.insert(0, '{scripts}')\n\
          from pathlib import Path\n\
          from reading import read_results\n\
-         for time in (0.0, 0.5, 1.0):\n\
-         \x20   results = read_results(Path('out/plates'), time)\n\
-         \x20   points = sorted(p for line in results.foundation() for p in map(tuple, line.tolist()))\n\
-         \x20   print(len(points), points[0], points[-1], points[4])"
+         {program}"
     );
     let python = std::env::var("PYTHON").unwrap_or("/usr/bin/python3".to_owned());
     let said = std::process::Command::new(python)
-        .args(["-c", &draws])
+        .args(["-c", &program])
         .current_dir(directory.path("."))
         .output()
         .expect("Python");
     let error = String::from_utf8_lossy(&said.stderr);
     if error.contains("No module named") {
-        return;
+        return None;
     }
-    let expected = "9 (0.0, -0.02) (1.2, 1.0) (1.2, -0.02)\n\
-                    9 (0.0, -0.015) (1.2, 1.0) (1.2, -0.015)\n\
-                    9 (0.0, -0.01) (1.2, 1.0) (1.2, -0.01)\n";
-    assert_eq!(String::from_utf8_lossy(&said.stdout), expected, "{error}");
+    assert!(said.status.success(), "{error}");
+    Some(String::from_utf8_lossy(&said.stdout).into_owned())
 }

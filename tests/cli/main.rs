@@ -5,6 +5,7 @@ mod accuracy;
 mod test_directory;
 mod tutorial;
 mod check;
+mod compare;
 mod failing;
 mod fields;
 mod figures;

@@ -290,21 +290,54 @@ fn a_narrow_pressure_on_a_curved_edge_has_the_resultant_of_its_chord() {
 fn body_forces_narrower_than_triangles_have_their_resultant_and_moment() {
     let pi = std::f64::consts::PI;
     let bump = "exp(-((x - 0.31)^2 + (y - 0.6)^2)/0.01^2)/0.01^2";
-    // A strip that lies along the sides of the triangles is known to the width of the smallest parts; what
-    // depends on time is divided less, as it is integrated in each step.
+    // A strip, and others along sides of the triangles, which are far narrower. What depends on time is
+    // divided less, as it is integrated in each step.
     let strip = "if(abs(x - 0.6137) < 0.001, 500, 0)";
-    for (force, expected, tolerance) in
-        [(strip, [1.0, 0.6137], 0.03), (bump, [pi, 0.31 * pi], 1e-3)]
-    {
+    let along = "if(abs(x - 1/3) < 0.5e-6, 1e6, 0)";
+    let beside = "if(x > 1/3 and x < 1/3 + 1e-4, 1e4, 0)";
+    for (force, expected, tolerance) in [
+        (strip, [1.0, 0.6137], 1e-5),
+        (along, [1.0, 1.0 / 3.0], 1e-5),
+        (beside, [1.0, 1.0 / 3.0 + 0.5e-4], 1e-5),
+        (bump, [pi, 0.31 * pi], 1e-3),
+    ] {
         for (degree, in_time) in [(1, ""), (2, ""), (1, "*cos(t)"), (2, "*cos(t)")] {
             let boundary = "boundary = [{ name = 'bottom', displacement = [0, 0] }]";
             let text = format!("body.force = [0, '{force}{in_time}']\n{boundary}");
-            let [_, sum, moment] = resultant(&loaded(square(3), degree, &text), 0.0);
+            let problem = loaded(square(3), degree, &text);
+            assert_eq!(problem.notes(), [""; 0], "{force}");
+            let [_, sum, moment] = resultant(&problem, 0.0);
             for (value, expected) in [sum, moment].into_iter().zip(expected) {
                 let error = (value - expected).abs() / expected;
                 assert!(error < tolerance, "P{degree}: {force}{in_time}: {value}, {expected}");
             }
         }
+    }
+}
+
+#[test]
+fn loads_that_are_too_narrow_to_be_integrated_are_noted() {
+    let notes = |load: &str| {
+        let boundary = "boundary = [{ name = 'bottom', displacement = [0, 0] }";
+        let text = match load.split_once(' ') {
+            Some(("body", force)) => format!("body.force = [0, '{force}']\n{boundary}]"),
+            Some((_, force)) => {
+                format!("{boundary}, {{ name = 'top', traction = [0, '{force}'] }}]")
+            }
+            None => panic!("{load}"),
+        };
+        loaded(square(8), 1, &text).notes()
+    };
+    for (load, fragment) in [
+        ("body if(abs(y - 0.3*x - 0.2) < 1e-6, 1, 0)", "the body force changes too sharply"),
+        ("body if(abs(y - 0.3*x - 0.2) < 5e-4, 1, 0)", "% of it may be missed; refine the mesh"),
+        ("top sin(1e6*x)^2", "a traction or pressure changes too sharply"),
+    ] {
+        let notes = notes(load);
+        assert!(notes.len() == 1 && notes[0].contains(fragment), "{load}: {notes:?}");
+    }
+    for smooth in ["body x*(1 - x)*sin(3*y)", "body if(x^2 + y^2 < 0.3, 1, 0)", "top exp(-x)*x"] {
+        assert_eq!(notes(smooth), [""; 0], "{smooth}");
     }
 }
 

@@ -1,6 +1,6 @@
 //! What is told of an answer, or refused, besides its residuals.
 
-use crate::support::{bent, problem, run, square};
+use crate::support::{bent, problem, run, square, try_run};
 use signorini::{
     contact::{SOLVERS, SolverError},
     evolution::{self, DiscreteProblem, Phases, RunError, SetupError},
@@ -39,6 +39,36 @@ fn large_strains_and_rotations_are_noted_and_long_ways_are_not() {
         let notes = notes(problem(square(4), &turned).unwrap());
         assert_eq!(notes.iter().filter(|n| n.contains("|∇u|")).count(), told, "{angle}: {notes:?}");
     }
+}
+
+#[test]
+fn materials_of_very_different_stiffness_are_blamed_for_rounding() {
+    let scene = |young: &str, tolerance: &str| {
+        let mut mesh = square(8);
+        let is_low = |t: &[usize; 3]| t.iter().all(|&node| mesh.nodes[node][1] < 0.51);
+        let low = (0..mesh.triangles.len()).filter(|&t| is_low(&mesh.triangles[t])).collect();
+        mesh.surfaces = [("soil".to_owned(), low)].into();
+        let text = format!(
+            "material = {{ young = 30e9, poisson = 0.2, plane = 'strain', soil = {{ young = {young} }} }}
+             contact = {{ rescue = false, tolerance = {tolerance} }}
+             boundary = [{{ name = 'left', symmetry = true }}, {{ name = 'bottom', gap = 0 }},
+                         {{ name = 'top', traction = [0, '-1e-3*x'] }}]"
+        );
+        problem(mesh, &text).unwrap_or_else(|e| panic!("{e}"))
+    };
+    let names = "3e10 Pa in [material], 3e2 Pa in [material.soil]";
+    let contrast = scene("300", "1e-10");
+    let before = contrast.notes();
+    assert!(before.len() == 1 && before[0].contains(names), "{before:?}");
+    let after = run(&contrast, SOLVERS[0]).notes(&contrast);
+    let of_residuals = after.iter().find(|note| note.contains("KKT residuals")).expect("a note");
+    assert!(of_residuals.contains(names) && !of_residuals.contains("longer"), "{of_residuals}");
+    let refused = try_run(&scene("300", "9e-11"), SOLVERS[0]).expect_err("rounding").to_string();
+    for fragment in [names, "check the units of both"] {
+        assert!(refused.contains(fragment) && !refused.contains("mesh"), "{refused}");
+    }
+    // Concrete on clay.
+    assert_eq!(scene("3e6", "1e-10").notes(), [""; 0]);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! What is observed beside the fields: resultants of the supports, values at probes, Γ_C as a line.
 
 use crate::support::{bent, close, distorted, moved, problem, run, turn};
+use signorini::contact::SOLVERS;
 use std::collections::BTreeMap;
 
 /// The observed quantities of the last step by their names.
@@ -107,6 +108,28 @@ fn supports_balance_the_loads() {
             assert!(clamp.abs() > 0.01 && (*part == "force_x" || bottom.abs() > 0.01));
             close(clamp + bottom, -load, 1e-9);
         }
+    }
+}
+
+#[test]
+fn rounding_is_shown_as_zero() {
+    // The left half of the top is pressed and the right one pulled: part of the bottom is open, the axis
+    // exerts no vertical force, and neither does the bottom a horizontal one.
+    let text = "material = { young = 30e9, poisson = 0.2, plane = 'strain' }
+                boundary = [{ name = 'left', symmetry = true }, { name = 'bottom', gap = 0 },
+                            { name = 'right', symmetry = true },
+                            { name = 'top', traction = [0, '-4e5*if(x < 0.5, 1, -0.9)'] }]";
+    for solver in SOLVERS {
+        let problem = problem(distorted(8), text).unwrap_or_else(|e| panic!("{e}"));
+        let last = run(&problem, solver).last;
+        let rows = problem.supports.contact_rows(&problem.body, &last.state);
+        let open: Vec<_> = rows.iter().filter(|row| row.active == 0).collect();
+        assert!(!open.is_empty() && open.len() < rows.len(), "{solver}");
+        assert!(open.iter().all(|row| row.pressure == 0.0), "{solver}: {open:?}");
+        assert!(rows.iter().all(|row| row.active == 0 || row.pressure > 0.0));
+        let quantities = problem.quantities().into_iter().zip(last.quantities);
+        let zeros: Vec<_> = quantities.filter(|(_, value)| *value == 0.0).map(|of| of.0).collect();
+        assert_eq!(zeros, ["left.force_y", "bottom.force_x", "right.force_y"], "{solver}");
     }
 }
 

@@ -47,7 +47,7 @@ fn a_type_of_tao_that_is_asked_for_is_not_rescued() {
 
 #[test]
 fn a_rescuer_is_another_solver() {
-    for entry in &REGISTRY {
+    for entry in REGISTRY {
         let Some(name) = entry.rescuer else { continue };
         let (rescuer, _) = find(name).unwrap();
         assert!(rescuer.name != entry.name, "{}", entry.name);

@@ -116,7 +116,31 @@ const CASES: &[(&str, &str, &[&str])] = &[
     ),
     ("[mesh]", "discretisation = 2\n[mesh]", &["bad.toml:2: discretisation must be a table"]),
     ("title = \"Base\"", "title = 3", &["bad.toml:1: title must be a string"]),
+    // Decimal commas.
+    (
+        "young = 1e6",
+        "young = 1,5e6 # Pa",
+        &["bad.toml:7: young is 1,5e6: write a decimal point, young = 1.5e6"],
+    ),
+    (
+        "force = [0, \"-t\"]",
+        "force = [0, \"-0,5*t\"]",
+        &["bad.toml:22: body.force[1] has `,` at column 3", "expected; write a decimal point"],
+    ),
+    ("young = 1e6", "young = \"1,5\"", &["but is \"1,5\": write a decimal point"]),
 ];
+
+#[test]
+fn a_decimal_comma_is_one_problem() {
+    let mesh = "[mesh]\nfile = \"base.geo\"\nsize = 0.25\n";
+    assert!(BASE.contains("[mesh]\nfile"), "{BASE}");
+    let text = BASE.replacen("young = 1e6", "young = -1,5", 1);
+    assert_eq!(refusal(&text).matches("error").count(), 0, "only one: {}", refusal(&text));
+    // What else is in the line of a table in braces only seems to be wrong.
+    let text = format!("{mesh}material = {{ young = 1,5, poisson = 0.3, plane = \"strain\" }}\n");
+    assert_eq!(first_line(&text), "bad.toml:4: young is 1,5: write a decimal point, young = 1.5");
+    assert!(!refusal(&text).contains("not valid TOML"), "{}", refusal(&text));
+}
 
 /// Changes one text of the base scene at a time and looks for what is said about it, the line
 /// underlined.

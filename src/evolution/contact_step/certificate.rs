@@ -103,7 +103,11 @@ impl ContactStep<'_> {
             && judged.kkt.within(attainable)
             && attainable < 1.0
         {
-            true => ContactError::Limited { source: Box::new(error), attainable },
+            true => ContactError::Limited {
+                source: Box::new(error),
+                attainable,
+                contrast: self.problem.contrast(),
+            },
             false => error,
         }
     }

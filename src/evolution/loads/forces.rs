@@ -4,7 +4,8 @@ use crate::{
     evolution::{
         boundary_conditions::Traction,
         parts::{
-            EdgePart, TrianglePart, WHOLE, centroid, edge_parts, triangle_parts, triangle_points,
+            EdgePart, Parts, TrianglePart, WHOLE, centroid, edge_parts, triangle_parts,
+            triangle_points,
         },
     },
     fem::{Body, Division, Edge, GAUSS, Subdomain, add_body_force, add_traction, parabola},
@@ -61,20 +62,25 @@ impl SurfaceForce {
         self.force.expressions().iter()
     }
 
-    fn parts(&self, t: f64, deviation: f64) -> Vec<EdgePart> {
+    fn parts(&self, t: f64, deviation: f64) -> Parts<EdgePart> {
         edge_parts(&self.lines, self.force.expressions(), t, deviation)
+    }
+
+    /// What may be missed of ∫|f_N| at time t, relative.
+    pub(super) fn missed(&self, t: f64) -> f64 {
+        self.parts(t, DEVIATION).missed
     }
 
     /// Adds the nodal loads at time t.
     pub(super) fn add(&self, body: &Body, t: f64, load: &mut [f64]) {
-        let parts = self.parts(t, DEVIATION);
+        let parts = self.parts(t, DEVIATION).parts;
         let parts = parts.into_iter().filter_map(|(edge, part)| Some((self.edges[edge]?, part)));
         add_traction(body, parts, |x, normal| self.force.at(x, normal, t), load);
     }
 
     /// Whether there are edges that must be sampled in parts at some of these times.
     pub(super) fn is_narrow(&self, times: &[f64]) -> bool {
-        let divided = |&t: &f64| self.parts(t, SAMPLED).len() > self.lines.len();
+        let divided = |&t: &f64| self.parts(t, SAMPLED).parts.len() > self.lines.len();
         self.constant.is_none() && times.iter().any(divided)
     }
 
@@ -94,7 +100,7 @@ impl SurfaceForce {
             return;
         }
         forces.resize(first + expressions.len() * self.lines.len(), 0.0);
-        for (edge, [from, to]) in self.parts(t, SAMPLED) {
+        for (edge, [from, to]) in self.parts(t, SAMPLED).parts {
             let [[px, py], _, [qx, qy]] = self.lines[edge];
             let weight = 0.5 * (to - from) * (qx - px).hypot(qy - py);
             for s in GAUSS {
@@ -116,6 +122,8 @@ pub(super) struct BodyForce {
     division: Division,
     /// Centroids and areas, m and m², at which it is sampled.
     samples: Vec<([f64; 2], f64)>,
+    /// What may be missed of ∫|f_B|, relative.
+    pub(super) missed: f64,
 }
 
 impl BodyForce {
@@ -131,9 +139,12 @@ impl BodyForce {
         let in_space = force.iter().any(Expression::depends_on_space);
         let triangles = triangle_points(body);
         let limits = [DEVIATION_IN_BODY, more];
-        let parts = match in_space {
+        let Parts { parts, missed } = match in_space {
             true => triangle_parts(&triangles, (&force, 0.0), times, limits),
-            false => (0..triangles.len()).map(|triangle| (triangle, WHOLE)).collect(),
+            false => {
+                let parts = (0..triangles.len()).map(|triangle| (triangle, WHOLE)).collect();
+                Parts { parts, missed: 0.0 }
+            }
         };
         let (whole, parts): (Vec<_>, Vec<_>) = parts.into_iter().partition(|part| part.1 == WHOLE);
         let mut division = Division::default();
@@ -141,7 +152,7 @@ impl BodyForce {
             division.entry(*triangle).or_default().push(*part);
         }
         let samples = [whole, parts].iter().flat_map(|parts| samples(&triangles, parts)).collect();
-        Some(Self { force, division, samples })
+        Some(Self { force, division, samples, missed })
     }
 
     pub(super) fn expressions(&self) -> impl Iterator<Item = &Expression> {

@@ -244,7 +244,14 @@ impl<'a> Parser<'a> {
     fn unexpected(&mut self, expected: &str) -> String {
         let found = self.peek().map_or("the end".into(), |c| format!("`{c}`"));
         let column = self.column();
-        format!("has {found} at column {column} of the expression, where {expected} is expected")
+        let is_digit = |c: Option<char>| c.is_some_and(|c| c.is_ascii_digit());
+        let (before, after) = self.text.split_at(self.at);
+        let is_decimal = is_digit(before.chars().last()) && is_digit(after.chars().nth(1));
+        let comma =
+            if is_decimal && after.starts_with(',') { "; write a decimal point" } else { "" };
+        format!(
+            "has {found} at column {column} of the expression, where {expected} is expected{comma}"
+        )
     }
 }
 
