@@ -9,7 +9,6 @@ as a difference.
 import re
 import numpy as np
 from scipy.sparse import coo_matrix, diags
-from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from conditions import as_rows, merged, merged_gaps, pair
@@ -219,19 +218,6 @@ class Discrete:
                 return "more than two lines of contact at a node", False
         return None, some
 
-    def clusters(self):
-        """Of each triangle the number of its piece: triangles hang together by common edges (a
-        common node alone is a hinge)."""
-        t = self.mesh.triangles
-        sides = np.sort(np.vstack([t[:, [k, (k + 1) % 3]] for k in range(3)]), 1)
-        owner = np.tile(np.arange(len(t)), 3)
-        _, edge = np.unique(sides, axis=0, return_inverse=True)
-        order = np.argsort(edge.ravel(), kind="stable")
-        same = np.diff(edge.ravel()[order]) == 0
-        i, j = owner[order][:-1][same], owner[order][1:][same]
-        graph = coo_matrix((np.ones(len(i)), (i, j)), (len(t), len(t)))
-        return connected_components(graph, directed=False)
-
     def damage_step(self, u, zeta, step):
         """ζ_n of (28): (M + kκL) ζ_n = M ζ_{n−1} + k b(φ(ε(u_{n−1}), ζ_{n−1})); of P1 with φ at the
         three vertices of a triangle and then integrated with the same M, of P2 at the points of the
@@ -263,7 +249,7 @@ class Discrete:
         else:
             np.add.at(right, t, step * (self.area / 3)[:, None] * (phi @ POINTS[2]))
         matrix = m + step * l
-        # Jacobi scaling keeps pieces of very different size apart from rounding.
+        # Jacobi scaling keeps triangles of very different size apart from rounding.
         scale = diags(1 / np.sqrt(matrix.diagonal()))
         factor = splu((scale @ matrix @ scale).tocsc())
         solution = scale @ factor.solve(scale @ right)

@@ -126,8 +126,6 @@ def traits(discrete):
             words.append("opposite" if (n @ n.T).min() < -0.99 else "corner")
         if len(n) > 2 or len(n) > 1 and node in prescribed:
             words.append("many rows")
-    if discrete.clusters()[0] > 1:
-        words.append("pieces")
     words += ["P2"] if discrete.order == 2 else []
     words += ["curved"] if discrete.space.curved() else []
     words += ["materials"] if len(discrete.mesh.surfaces) > 1 else []

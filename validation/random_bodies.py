@@ -1,5 +1,5 @@
 """Random bodies for `random_scenes.py`: triangulated blocks, wedges, discs, arches, slit blocks,
-bodies cut from a grid of cells (corners, holes, pinches) and several of them together.
+and bodies cut from a grid of cells (corners, holes, pinches).
 
 A body is a `Triangulation` whose curves are its sides. Nodes and triangles are numbered at random,
 so that nothing may rest on their order.
@@ -8,6 +8,8 @@ so that nothing may rest on their order.
 from dataclasses import replace
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from lagrange import SIDES, Lagrange
 from triangulation import Triangulation, edge_keys
@@ -129,8 +131,21 @@ def slit(rng):
     return points, triangles, lines
 
 
+def largest_part(triangles):
+    """The most triangles that are connected through edges: one body."""
+    sides = np.sort(np.vstack([triangles[:, [k, (k + 1) % 3]] for k in range(3)]), 1)
+    owner = np.tile(np.arange(len(triangles)), 3)
+    _, edge = np.unique(sides, axis=0, return_inverse=True)
+    order = np.argsort(edge.ravel(), kind="stable")
+    same = np.diff(edge.ravel()[order]) == 0
+    i, j = owner[order][:-1][same], owner[order][1:][same]
+    graph = coo_matrix((np.ones(len(i)), (i, j)), (len(triangles), len(triangles)))
+    _, part = connected_components(graph, directed=False)
+    return triangles[part == np.bincount(part).argmax()]
+
+
 def cells(rng):
-    """Cells of a grid, some left out: re-entrant corners, holes, and parts that hang together by a
+    """Cells of a grid, some left out: re-entrant corners, holes, and corners that meet in a
     common node. Its sides are named by the directions they face, and split by chance."""
     shape = rng.integers(2, 5, 2)
     keep = rng.random(shape) < 0.75
@@ -140,7 +155,7 @@ def cells(rng):
     tilt = rng.choice([0, rng.uniform(-0.4, 0.4)])
     points, _, triangles = grid(rng, nx, ny, lambda s, t: (s * shape[0] + tilt * t, t * shape[1]))
     cell = np.stack(np.divmod(np.arange(nx * ny), ny), 1) // r
-    triangles = triangles[np.repeat(keep[cell[:, 0], cell[:, 1]], 2)]
+    triangles = largest_part(triangles[np.repeat(keep[cell[:, 0], cell[:, 1]], 2)])
     pairs = np.vstack([triangles[:, [k, (k + 1) % 3]] for k in range(3)])
     keys = edge_keys(pairs, len(points))
     _, first, count = np.unique(keys, return_index=True, return_counts=True)
@@ -153,19 +168,6 @@ def cells(rng):
         lines[name] = edges[(facing == k) & split]
         lines[f"{name}2"] = edges[(facing == k) & ~split]
     return points, triangles, {name: part for name, part in lines.items() if len(part)}
-
-
-def several(rng):
-    """Two or three bodies beside each other; their sides carry the number of the body."""
-    points, triangles, lines, x = np.zeros((0, 2)), np.zeros((0, 3), int), {}, 0.0
-    for k in range(int(rng.integers(2, 4))):
-        p, t, l = [block, disc, wedge][int(rng.integers(3))](rng)
-        p = p * 10 ** rng.uniform(-0.5, 0.5)
-        p[:, 0] += x - p[:, 0].min()
-        x = p[:, 0].max() + 0.3
-        lines.update({f"{name}_{k}": edges + len(points) for name, edges in l.items()})
-        points, triangles = np.vstack([points, p]), np.vstack([triangles, t + len(points)])
-    return points, triangles, lines
 
 
 def finish(rng, body, length, turn):

@@ -191,25 +191,6 @@ def cells(d, mesh):
             d.traction(name, mesh)
 
 
-def several(d, mesh):
-    """Of each piece: supported by conditions, in a box that only contact makes, on contact alone, or
-    free; driven or not."""
-    for k in sorted({name.rsplit("_", 1)[1] for name in mesh.curves}):
-        names = list(d.rng.permutation([n for n in mesh.curves if n.endswith(f"_{k}")]))
-        way = d.rng.random()
-        if way < 0.6:
-            d.support(names[0])
-        for name in names:
-            if name not in d.boundary and (0.6 < way < 0.85 or way < 0.95 and d.chance(0.5)):
-                d.gap(name)
-        if way < 0.95 and d.chance(0.6):
-            d.traction(names[-1], mesh)
-    free = [name for name in mesh.curves if not {"gap", "displacement", "symmetry"}
-            & set(d.boundary.get(name, {}))]
-    if not any("gap" in b for b in d.boundary.values()):
-        d.put(free[0], gap="0")
-
-
 def rounded(d, mesh):
     """A disc in a bore or an arch on its feet or over a mandrel: contact on curves."""
     names = list(mesh.curves)
@@ -272,7 +253,6 @@ KINDS = {
     "wedge": ((bodies.wedge,), wedge),
     "slit": ((bodies.slit,), slit),
     "cells": ((bodies.cells,), cells),
-    "pieces": ((bodies.several,), several),
     "round": ((bodies.disc, bodies.arch), rounded),
     "rolling": ((bodies.block,), block),
     "damage": ((bodies.block, bodies.slit, bodies.wedge, bodies.disc), None),

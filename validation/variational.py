@@ -3,8 +3,7 @@
 Prescribed rows are eliminated node by node with an orthonormal basis of what they leave, u = lift +
 Zv. An interior-point method then finds the active set, and one linear solve on it, refined, the
 answer. Neither knows of degenerate nodes: parallel, opposite and redundant rows are allowed.
-Whether there is a solution, and only one, is told by the ranks of the rigid motions of all pieces
-and by Farkas.
+Whether there is a solution, and only one, is told by the ranks of the rigid motions and by Farkas.
 """
 
 import numpy as np
@@ -56,24 +55,16 @@ class Step:
         self.z = coo_matrix((entries, (rows, columns)), (2 * n, count)).tocsc()
 
     def _motions(self):
-        """N: rigid motions of the pieces that agree at common nodes (hinges) and that no
-        prescribed row resists; those that no contact row resists either are `free`."""
-        x, t = self.discrete.points, self.discrete.elements
-        count, piece = self.discrete.clusters()
-        fields, first, ties = np.zeros((len(x), 2, 3 * count)), np.full(len(x), -1), []
-        for c in range(count):
-            nodes = np.unique(t[piece == c])
-            y = x[nodes] - x[nodes].mean(0)
-            y = y / np.abs(y).max()
-            local = np.zeros((len(nodes), 2, 3 * count))
-            local[:, 0, 3 * c] = local[:, 1, 3 * c + 1] = 1.0
-            local[:, 0, 3 * c + 2], local[:, 1, 3 * c + 2] = -y[:, 1], y[:, 0]
-            common = first[nodes] >= 0
-            ties.append((local[common] - fields[nodes[common]]).reshape(-1, 3 * count))
-            fields[nodes[~common]] = local[~common]
-            first[nodes] = c
+        """N: rigid motions of the body that no prescribed row resists; those that no contact row
+        resists either are `free`."""
+        x = self.discrete.points
+        y = x - x.mean(0)
+        y = y / np.abs(y).max()
+        fields = np.zeros((len(x), 2, 3))
+        fields[:, 0, 0] = fields[:, 1, 1] = 1.0
+        fields[:, 0, 2], fields[:, 1, 2] = -y[:, 1], y[:, 0]
         resisted = np.einsum("ri,rik->rk", self.prescribed.direction, fields[self.prescribed.node])
-        motions = fields.reshape(len(self.f), -1) @ kernel(np.vstack([*ties, resisted]), 3 * count)
+        motions = fields.reshape(len(self.f), -1) @ kernel(resisted, 3)
         motions = np.linalg.qr(motions)[0] if motions.size else motions
         self.n = unit(self.z.T @ motions)
         contact = self.a @ self.n

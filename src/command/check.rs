@@ -33,12 +33,10 @@ pub fn check(arguments: &SceneArguments) -> Result<(), Failure> {
 }
 
 fn describe_mesh(mesh: &Mesh, Units { length, .. }: &Units) -> String {
-    let pieces = mesh.components().pieces.len();
     format!(
-        "{} vertices, {} triangles in {pieces} piece{}, up to {} {length} wide, angles from {:.0}°",
+        "{} vertices, {} triangles, up to {} {length} wide, angles from {:.0}°",
         mesh.nodes.len(),
         mesh.triangles.len(),
-        if pieces == 1 { "" } else { "s" },
         short(extent(&mesh.nodes)),
         mesh.smallest_angle().0
     )

@@ -47,7 +47,7 @@ pub struct ContactPoint {
 /// An answer: u = `rigid` + `elastic` at each node.
 #[derive(Debug, Clone, Copy)]
 pub struct Answer<'a> {
-    /// A rigid motion of each piece of the body, m; empty if it is zero.
+    /// A rigid motion of the body, m; empty if it is zero.
     pub rigid: &'a [f64],
     /// The rest, which alone causes forces, m.
     pub elastic: &'a [f64],

@@ -9,7 +9,7 @@ use std::fmt;
 pub struct Scales {
     /// F: the largest ‖·‖₂ of the nodal loads and of the internal forces, N per metre of thickness.
     pub force: f64,
-    /// U: the largest displacement of a node against the rigid motion of its piece, m.
+    /// U: the largest displacement of a node against the rigid motion of the body, m.
     pub displacement: f64,
 }
 

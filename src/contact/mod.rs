@@ -24,7 +24,7 @@ pub(crate) use elastic::PREFIX as ELASTIC;
 pub use error::{Conflict, ConstraintError, ContactError};
 pub use kkt::{Kkt, Scales};
 pub use problem::ContactProblem;
-pub use rigid::{DrivenMotion, PartMotion, RigidMotion, RigidMotions};
+pub use rigid::{DrivenMotion, RigidMotions};
 pub(crate) use rigid::{least_motion, rigid_motion_until_contact, unconstrained_motions};
 pub use rows::{Bound, FixedRow, GapRow};
 pub use solvers::{

@@ -211,7 +211,10 @@ impl<'a> ContactStep<'a> {
             let c: Vec<f64> = self.c.read(|c| bounds.iter().map(|b| c[b.dof]).collect())?;
             let (amplitudes, _) =
                 contact::rigid_motion_until_contact(comm, motions, &bounds, &c, &mut active, false);
-            datum.add(constraints, &problem.motions.displacement(&problem.body, &amplitudes));
+            datum.add(
+                constraints,
+                &problem.motions.combined(&problem.body, &amplitudes).field(&problem.body),
+            );
         }
         Ok(())
     }

@@ -107,7 +107,6 @@ impl DiscreteProblem {
         Ok(Self {
             constraints: self.constraints.restrict(&subdomain),
             certificate: self.certificate.restrict(&subdomain),
-            motions: self.motions.restrict(&subdomain),
             loads: self.loads.restrict(&subdomain),
             supports: self.supports.restrict(&subdomain),
             probes: self.probes.restrict(&subdomain),

@@ -116,7 +116,7 @@ impl DiscreteProblem {
             let like = figures.iter().zip(largest).filter(|(figure, _)| is_like(figure));
             like.map(|(_, value)| *value).fold(0.0, f64::max)
         };
-        let lever = (self.body.polar_inertia / self.body.area).sqrt();
+        let lever = self.body.radius_of_gyration();
         let scale = |figure: &Figure| {
             let own = most(&|other| other.group == figure.group);
             let alike = match figure.dimension {

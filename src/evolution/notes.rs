@@ -19,8 +19,6 @@ const CONTRAST: f64 = 1e5;
 const LOOKS: usize = 8;
 /// Triangles with a smaller angle are noted, degrees.
 const SLIVER: f64 = 1.0;
-/// So many free motions are noted one by one.
-const FREE_MOTIONS: usize = 6;
 /// Infinitesimal strain theory supposes |∇u| ≪ 1. At `LARGE` the term ½ ∇uᵀ∇u of the strain, which
 /// it leaves out, is up to a twentieth of ∇u. A smaller part of the body than `NOTICEABLE` may be
 /// a corner where the strain is singular, in every load.
@@ -132,26 +130,11 @@ impl DiscreteProblem {
     pub fn notes(&self) -> Vec<String> {
         let (scene, motions) = (self.scene(), &self.motions);
         let mut notes = scene.notes.clone();
-        if motions.pieces > 1 {
-            let pieces = motions.pieces;
-            notes.push(format!(
-                "the mesh has {pieces} pieces (gmsh: Coherence joins those that touch)"
-            ));
-        }
-        if let Some([x, y]) = motions.hinge {
-            notes.push(format!(
-                "parts of the mesh meet in a single node, a hinge, as at ({x:.4}, {y:.4})"
-            ));
-        }
-        notes.extend(motions.free.iter().take(FREE_MOTIONS).map(|motion| {
+        notes.extend(motions.free.iter().map(|motion| {
             format!(
                 "nothing prevents or drives {motion}: of all answers the one of least ∫|u|² is given"
             )
         }));
-        if motions.free.len() > FREE_MOTIONS {
-            let more = motions.free.len() - FREE_MOTIONS;
-            notes.push(format!("nothing prevents or drives {more} more such motions"));
-        }
         let check_units = |contrast| format!("{contrast}; if that is not meant, check their units");
         notes.extend(self.contrast().map(check_units));
         notes.extend(unresolved::notes(scene, self.mesh()));

@@ -5,8 +5,8 @@ use super::{
 };
 use crate::{
     archive::{Archive, ArchiveError},
-    contact::{Kkt, RigidMotion},
-    fem::Mass,
+    contact::Kkt,
+    fem::{Mass, RigidMotion},
 };
 use serde::{Deserialize, Serialize};
 use std::{mem, rc::Rc};

@@ -2,8 +2,8 @@
 
 use super::DiscreteProblem;
 use crate::{
-    contact::{ContactPoint, ContactReport, Kkt, RigidMotion},
-    fem::DamageCertificate,
+    contact::{ContactPoint, ContactReport, Kkt},
+    fem::{DamageCertificate, RigidMotion},
 };
 use serde::{Deserialize, Serialize};
 

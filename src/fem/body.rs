@@ -219,16 +219,9 @@ impl Body {
         values
     }
 
-    /// Values at the nodes of u: those at the vertices, and at the midpoint of an edge the value of its
-    /// triangles, which must have the same.
-    pub fn with_midpoints<T: Copy>(&self, mut vertices: Vec<T>, triangles: &[T]) -> Vec<T> {
-        if let Some(quadratic) = &self.quadratic {
-            vertices.resize(self.nodes.points.len(), triangles[0]);
-            for (nodes, value) in quadratic.nodes.iter().zip(triangles) {
-                nodes[3..].iter().for_each(|&node| vertices[node] = *value);
-            }
-        }
-        vertices
+    /// r = √(∫|x − x̄|²/|Ω|), m: a rotation by 1/r moves the body as far as a unit translation.
+    pub fn radius_of_gyration(&self) -> f64 {
+        (self.polar_inertia / self.area).sqrt()
     }
 
     /// ∫ζ/|Ω| of a nodal field of ζ. Collective.

@@ -1,6 +1,6 @@
 //! The damage system (28): (M + kκL) ζ_n = M ζ_{n−1} + k b(φ).
 
-use super::{Body, Triangle, body::at_quadratic_points, element::POINTS, pieces::Pieces};
+use super::{Body, Nodes, Triangle, body::at_quadratic_points, element::POINTS};
 use crate::{
     cholesky::{LinearSolver, LinearSystem, Precision},
     mesh::Order,
@@ -9,6 +9,7 @@ use crate::{
 };
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
+use std::rc::Rc;
 
 /// How (28) integrates products with a test function λ_i: the mass M and the source load b.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
@@ -80,7 +81,8 @@ pub struct DamageSystem {
     solver: LinearSolver,
     rhs: Vector,
     unknown: Vector,
-    pieces: Pieces,
+    /// The nodes of ζ.
+    vertices: Rc<Nodes>,
     /// ‖`rhs`‖₂ of the last damage step.
     rhs_size: f64,
     /// κ of the first material, m²/s.
@@ -136,7 +138,7 @@ impl DamageSystem {
             solver: LinearSolver::new(session, "damage_", owned, Precision::Full)?,
             rhs: Vector::zeros(session, owned)?,
             unknown: Vector::zeros(session, owned)?,
-            pieces: Pieces::of(body)?,
+            vertices: Rc::clone(&body.vertices),
             rhs_size: 0.0,
             diffusion: diffusions[0],
             step,
@@ -177,18 +179,18 @@ impl DamageSystem {
 
     /// Solves for `rhs` from `unknown` until ‖residual‖₂ ≤ `limit`; whether that was reached.
     ///
-    /// The mean of the unknown x over each piece of the body is known, since 1ᵀL = 0: 1ᵀMx = 1ᵀ`rhs`. Where
+    /// The mean of the unknown x over the body is known, since 1ᵀL = 0: 1ᵀMx = 1ᵀ`rhs`. Where
     /// kκL is much larger than M, this is lost in the rounding of their sum. So the system is solved for
     /// what x differs by from its mean, and the mean of that is set to zero.
     fn solve(&mut self, limit: f64) -> Result<bool, PetscError> {
-        let pieces = &self.pieces;
-        let means = self.rhs.read(|rhs| pieces.means(rhs, |_, load| load))?;
-        self.rhs.write(|rhs| pieces.add(rhs, |area, piece| -area * means[piece]))?;
-        self.unknown.write(|x| pieces.add(x, |_, piece| -means[piece]))?;
+        let Nodes { weights, area, partition, .. } = &*self.vertices;
+        let mean = partition.comm().total(self.rhs.read(|rhs| rhs.iter().sum())?) / area;
+        self.rhs.write(|rhs| rhs.iter_mut().zip(weights).for_each(|(r, a)| *r -= a * mean))?;
+        self.unknown.write(|x| x.iter_mut().for_each(|x| *x -= mean))?;
         let system = LinearSystem::of(&self.matrix);
         let solve = self.solver.solve(system, &self.rhs, &mut self.unknown, limit)?;
-        let rest = self.unknown.read(|x| pieces.means(x, |area, x| area * x))?;
-        self.unknown.write(|x| pieces.add(x, |_, piece| means[piece] - rest[piece]))?;
+        let rest = self.unknown.read(|x| partition.dot(weights, x, 1))? / area;
+        self.unknown.write(|x| x.iter_mut().for_each(|x| *x += mean - rest))?;
         Ok(solve.converged)
     }
 

@@ -16,10 +16,9 @@ mod nodal_bases;
 mod elasticity;
 mod stiffness;
 mod recovery;
-mod rigid_part;
+mod rigid_motion;
 mod damage;
 mod damage_certificate;
-mod pieces;
 mod loads;
 mod location;
 
@@ -39,7 +38,7 @@ pub use quadratic::{
     diffusion_load, interpolation_error, mean_product, missing_mass, quadratic_load,
 };
 pub use recovery::{EnergyError, RecoveredStrains, strains_at_nodes};
-pub use rigid_part::RigidPart;
+pub use rigid_motion::{RigidMotion, resultant};
 pub use stiffness::Stiffness;
 pub use subdomain::Subdomain;
 pub use triangle::Triangle;

@@ -4,7 +4,6 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 mod boundary;
-mod components;
 mod error;
 mod gmsh;
 mod msh;
@@ -14,7 +13,6 @@ mod rectangle;
 mod refine;
 
 pub use boundary::{BoundaryNode, CORNER_ANGLE, Face, boundary_nodes};
-pub use components::Components;
 pub use error::MeshError;
 pub use gmsh::{Order, file, load, mesh_geo, scaling_factor};
 pub use msh::{announced_elements, parse, read};

@@ -9,7 +9,7 @@ fn a_scene_is_described_and_nothing_is_written() {
     let said = test_directory.say(&["check", "scene.toml"]);
     assert_eq!((said.code, said.err.as_str()), (Some(0), ""), "{said:?}");
     for fragment in [
-        "25 vertices, 32 triangles in 1 piece, up to 1 m wide, angles from 45°",
+        "25 vertices, 32 triangles, up to 1 m wide, angles from 45°",
         "50 displacements, 25 of the damage; 5 nodes of Γ_C",
         "gap from 0 to 0 m",
         // -3 t on the unit top.

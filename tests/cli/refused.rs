@@ -142,6 +142,21 @@ fn meshes() {
 }
 
 #[test]
+fn meshes_of_several_bodies() {
+    let corners = ["1 0 0 0", "2 1 0 0", "3 1 1 0", "4 3 0 0", "5 4 0 0", "6 4 1 0"];
+    for (second, problem) in [
+        ("2 2 2 5 1 4 5 6", "square.msh: the mesh has 2 pieces, around (0.666667, 0.333333) and"),
+        ("2 2 2 5 1 3 6 4", "square.msh: parts of the mesh meet in a single node only, at (1, 1)"),
+    ] {
+        let test_directory = TestDirectory::new();
+        test_directory.write("square.msh", &msh(&corners, &["1 2 2 5 1 1 2 3", second]));
+        test_directory.say(&["check", "scene.toml"]).fails(2, &[problem, "solve them one by one"]);
+        refused(&test_directory, &[], &[problem]);
+        refused(&test_directory, &["--ranks", "2"], &[problem]);
+    }
+}
+
+#[test]
 fn arguments() {
     let test_directory = TestDirectory::new();
     for (arguments, fragments) in [

@@ -9,26 +9,22 @@ const ROUNDING: f64 = 1e-9;
 
 /// How far to move along each rigid motion m_j from u, given at the bounds as `c`, so that
 ///
-/// Σ ∫m_j·m_j (t_j + a_j)² is least over lower ≤ c + Ra ≤ upper and a = Zy,
+/// Σ (t_j + a_j)² is least over lower ≤ c + Ra ≤ upper and a = Zy,
 ///
-/// where t_j = ∫u·m_j/∫m_j·m_j are the amplitudes of u, the columns of R the u·ν of the motions at the
-/// bounds, `rigid`, and the columns of Z the combinations that no contact force resists, `left`.
-/// With x = Lᵀy + L⁻¹ZᵀWt, W = diag ∫m_j·m_j and LLᵀ = ZᵀWZ, this is the least |x| over Gx ≥ h, which
-/// the residual of a nonnegative least squares problem tells (Lawson and Hanson, Solving Least
-/// Squares Problems, ch. 23.4). Collective.
+/// where t_j = ∫u·m_j/|Ω| are the `amplitudes` of u, the columns of R the u·ν of the motions at the
+/// bounds, `rigid`, and the orthonormal columns of Z the combinations that no contact force resists, `left`.
+/// With x = y + Zᵀt this is the least |x| over Gx ≥ h, which the residual of a nonnegative least
+/// squares problem gives (Lawson and Hanson, Solving Least Squares Problems, ch. 23.4). Collective.
 pub(crate) fn least_motion(
     comm: Communicator,
     (rigid, left): (&DMatrix<f64>, &[DVector<f64>]),
-    (amplitudes, squares): (&DVector<f64>, &DVector<f64>),
+    amplitudes: &DVector<f64>,
     bounds: &[Bound],
     c: &[f64],
 ) -> Option<DVector<f64>> {
     let z = DMatrix::from_columns(left);
-    let weighted = DMatrix::from_diagonal(squares) * &z;
-    let l = (z.transpose() * &weighted).cholesky()?.unpack();
-    let start = l.solve_lower_triangular(&(weighted.transpose() * amplitudes))?;
-    let inverse = l.transpose().solve_upper_triangular(&DMatrix::identity(l.nrows(), l.nrows()))?;
-    let normal = rigid * &z * &inverse;
+    let start = z.transpose() * amplitudes;
+    let normal = rigid * &z;
     let cut = ROUNDING * comm.max(normal.amax());
     // Each row: G and h of a bound, on its upper side −u·ν ≥ c − upper.
     let mut rows = Vec::new();
@@ -41,7 +37,7 @@ pub(crate) fn least_motion(
         }
     }
     let rows = comm.gather(&rows);
-    let size = l.nrows() + 1;
+    let size = start.len() + 1;
     let mut rows = DMatrix::from_row_slice(rows.len() / size, size, &rows);
     let scale = rows.column(size - 1).amax();
     let mut x = DVector::zeros(size - 1);
@@ -54,5 +50,5 @@ pub(crate) fn least_motion(
         }
         x = residual.rows(0, size - 1) * (-scale / residual[size - 1]);
     }
-    Some(z * inverse * (x - start))
+    Some(z * (x - start))
 }

@@ -5,7 +5,7 @@ use crate::{
     cholesky::{LinearSolver, LinearSystem, Precision},
     contact::{self, ContactPoint},
     evolution::{DiscreteProblem, Outcome, State, Step},
-    fem::{RigidPart, Stiffness},
+    fem::{RigidMotion, Stiffness},
     petsc::{PetscError, Vector},
 };
 use std::rc::Rc;
@@ -133,7 +133,7 @@ impl Compliance<'_> {
         // What is left of u after unloading is judged less well than what there was.
         let judged = if last.record.displacement_max < UNLOADED * max { most } else { last };
         let State { u, zeta, .. } = &judged.state;
-        let [rigid, rest] = RigidPart::of(body, u).max_norms(body, u);
+        let [rigid, rest] = RigidMotion::nearest(body, u).max_norms(body, u);
         // What is only carried along has no strains but rounding.
         let energy = match rest > CARRIED * rigid {
             true => problem.energy_error(zeta, u)?,

@@ -4,7 +4,7 @@ use super::{Accuracy, ContactStep};
 use crate::{
     contact::{Answer, Constraints, ContactError, ContactOptions, ContactPoint, Kkt, Scales},
     evolution::discrete_problem::LoadCase,
-    fem::RigidPart,
+    fem::RigidMotion,
 };
 
 /// Residuals are the effect of rounding if they are at most this many times its estimate.
@@ -31,7 +31,7 @@ pub(super) struct Judged {
     pub(super) unbalanced: Vec<f64>,
     pub(super) contact: Vec<ContactPoint>,
     /// The rigid part of u, max |·| of it and of the rest, m.
-    pub(super) rigid: RigidPart,
+    pub(super) rigid: RigidMotion,
     pub(super) rigid_max: f64,
     pub(super) elastic_max: f64,
 }
@@ -49,7 +49,7 @@ impl ContactStep<'_> {
     pub(super) fn certify(&self, u: Vec<f64>, case: &LoadCase) -> Judged {
         let problem = self.problem;
         let (body, partition) = (&problem.body, &problem.body.nodes.partition);
-        let rigid = RigidPart::of(body, &u);
+        let rigid = RigidMotion::nearest(body, &u);
         let [rigid_max, elastic_max] = rigid.max_norms(body, &u);
         let mut unbalanced = problem.elasticity.internal_force(body, &self.zeta_at_points, &u);
         // |f|², |Ku|², u·Ku and |u|².

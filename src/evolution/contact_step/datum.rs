@@ -6,7 +6,7 @@ use crate::{
 };
 use serde::{Deserialize, Serialize};
 
-/// A rigid motion of each piece of the body, from which displacements are measured.
+/// A rigid motion of the body, from which displacements are measured.
 ///
 /// A body that falls through a wide gap, or is carried along by prescribed displacements, deforms by
 /// a small part of the way that it goes, and u in double precision has no digits left for that part.

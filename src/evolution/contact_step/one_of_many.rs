@@ -2,8 +2,9 @@
 
 use super::{ContactStep, active_bounds, certificate::Judged};
 use crate::{
-    contact::{self, ContactPoint, RigidMotion, least_motion},
+    contact::{self, ContactPoint, least_motion},
     evolution::discrete_problem::LoadCase,
+    fem::RigidMotion,
     petsc::PetscError,
 };
 use nalgebra::DVector;
@@ -33,7 +34,7 @@ impl ContactStep<'_> {
     ) -> Option<RigidMotion> {
         let motions = self.unresisted(contact, self.uncertain(), force);
         let first = motions.first().filter(|_| force > 0.0)?;
-        self.problem.motions.combined(first)
+        Some(self.problem.motions.combined(&self.problem.body, first))
     }
 
     /// The answer of least ∫|u|² among those that differ from a certified one by such a motion: every
@@ -55,14 +56,15 @@ impl ContactStep<'_> {
             }
             let before = self.next.datum.clone();
             let total = before.total(judged.u.clone());
-            let (amplitudes, squares) = problem.motions.amplitudes(&problem.body, &total);
+            let amplitudes = problem.motions.amplitudes(&problem.body, &total);
             let (_, bounds) = before.pose(&problem.constraints, case);
             let c: Vec<f64> = self.c.read(|c| bounds.iter().map(|b| c[b.dof]).collect())?;
             let (comm, motions) = (problem.body.nodes.partition.comm(), (&self.rigid, &left[..]));
-            let so_far = (&amplitudes, &squares);
-            let Some(further) = least_motion(comm, motions, so_far, &bounds, &c) else { break };
-            let motion = problem.motions.displacement(&problem.body, &further);
-            self.next.datum.add(&problem.constraints, &motion);
+            let Some(further) = least_motion(comm, motions, &amplitudes, &bounds, &c) else {
+                break;
+            };
+            let motion = problem.motions.combined(&problem.body, &further);
+            self.next.datum.add(&problem.constraints, &motion.field(&problem.body));
             let moved = self.certify(judged.u.clone(), case);
             if moved.kkt.within(tolerance) {
                 return Ok((moved, 0.0));

@@ -58,7 +58,7 @@ impl DiscreteProblem {
     /// finite, contradict each other or go through the obstacle; obstacles leave a node no room.
     pub(in crate::evolution) fn load_case(&self, time: f64) -> Result<LoadCase, SetupError> {
         let load = self.motions.balanced(&self.body, self.checked_load(time)?);
-        let work = self.motions.work(&self.body, &load);
+        let work = self.motions.work(&self.body, |i| [load[2 * i], load[2 * i + 1]]);
         let prescribed = self.loads.prescribed_at(time);
         let gaps = self.loads.gaps_at(time);
         let (lift, bounds) = self.posed(time, &prescribed, &gaps)?;

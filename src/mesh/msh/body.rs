@@ -4,6 +4,7 @@ use super::{
     super::{Curve, Mesh, Side, extent, sides, twice_area},
     byte_reader::{Result, fault},
     contents::{Contents, Element, Node},
+    one_body,
 };
 use rustc_hash::{FxHashMap as HashMap, FxHashSet as HashSet};
 use std::collections::BTreeMap;
@@ -41,6 +42,7 @@ pub fn mesh(contents: &Contents) -> Result<Mesh> {
         );
         return fault(second.at, problem);
     }
+    one_body::check(&nodes, &triangles, &sides)?;
     let curves = curves(contents, &index, &sides)?;
     let mut mesh = Mesh { nodes, triangles, curves, surfaces, ..Mesh::default() };
     if !contents.midpoints.is_empty() {

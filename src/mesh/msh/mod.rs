@@ -4,6 +4,7 @@
 mod body;
 mod byte_reader;
 mod contents;
+mod one_body;
 mod v2;
 mod v4;
 mod write;

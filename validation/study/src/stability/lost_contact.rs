@@ -153,6 +153,6 @@ fn unbalanced(problem: &DiscreteProblem, state: &State) -> f64 {
         force += fy;
         moment += x * fy - y * fx;
     }
-    let turns = problem.motions.resisted() > 1;
+    let turns = problem.motions.resisted.len() > 1;
     (if turns { force.abs().max(moment.abs()) } else { force.abs() }) / size
 }

@@ -1,0 +1,73 @@
+//! Refuses triangles that make more than one body.
+
+use super::byte_reader::{Result, fault};
+use crate::mesh::{Side, twice_area};
+
+/// Checks that the triangles are one body: connected through their `sides`.
+pub fn check(nodes: &[[f64; 2]], triangles: &[[usize; 3]], sides: &[Side]) -> Result<()> {
+    let neighbours = sides.windows(2).filter(|pair| pair[0].edge == pair[1].edge);
+    let neighbours = neighbours.map(|pair| [pair[0].triangle, pair[1].triangle]);
+    let part = components(triangles.len(), neighbours);
+    if part.iter().all(|&part| part == 0) {
+        return Ok(());
+    }
+    // Triangles connected through nodes are one piece.
+    let mut first = vec![None; nodes.len()];
+    let corners = triangles.iter().enumerate().flat_map(|(t, nodes)| nodes.map(|node| (node, t)));
+    let meeting = corners.map(|(node, t)| (node, [*first[node].get_or_insert(t), t]));
+    let meeting: Vec<(usize, [usize; 2])> = meeting.collect();
+    let piece = components(triangles.len(), meeting.iter().map(|(_, pair)| *pair));
+    let pieces: Vec<usize> = (0..triangles.len()).filter(|&t| piece[t] == t).collect();
+    let around = |own: usize| place(centroid(nodes, triangles, |t| piece[t] == own));
+    let problem = if let [a, b, more @ ..] = &pieces[..] {
+        let (count, two) = (pieces.len(), if more.is_empty() { "" } else { " two of them" });
+        let [a, b] = [a, b].map(|own| around(*own));
+        format!("the mesh has {count} pieces,{two} around {a} and {b}; join them (gmsh: Coherence)")
+    } else {
+        let hinge = meeting.iter().find(|(_, [a, b])| part[*a] != part[*b]);
+        let at = hinge.map_or_else(String::new, |&(node, _)| place(nodes[node]));
+        format!("parts of the mesh meet in a single node only, at {at}; join them along an edge")
+    };
+    fault(None, problem + ", or solve them one by one")
+}
+
+/// The sets into which `links` join the numbers below `count`, by union–find: the least member of each
+/// number's set.
+fn components(count: usize, links: impl IntoIterator<Item = [usize; 2]>) -> Vec<usize> {
+    let mut parent: Vec<usize> = (0..count).collect();
+    for link in links {
+        let [a, b] = link.map(|mut i| {
+            while parent[i] != i {
+                parent[i] = parent[parent[i]];
+                i = parent[i];
+            }
+            i
+        });
+        parent[a.max(b)] = a.min(b);
+    }
+    // Parents come before their children.
+    (0..count).for_each(|i| parent[i] = parent[parent[i]]);
+    parent
+}
+
+/// The centroid of the triangles that are `counted`, m.
+fn centroid(
+    nodes: &[[f64; 2]],
+    triangles: &[[usize; 3]],
+    counted: impl Fn(usize) -> bool,
+) -> [f64; 2] {
+    let mut sums = [0.0; 3];
+    for (_, corners) in triangles.iter().enumerate().filter(|(t, _)| counted(*t)) {
+        let [a, b, c] = corners.map(|node| nodes[node]);
+        let area = twice_area(a, b, c);
+        let [x, y] = [0, 1].map(|k| area * (a[k] + b[k] + c[k]) / 3.0);
+        sums = [sums[0] + area, sums[1] + x, sums[2] + y];
+    }
+    [sums[1] / sums[0], sums[2] / sums[0]]
+}
+
+/// Coordinates with six digits: no -0.
+fn place(x: [f64; 2]) -> String {
+    let [x, y] = x.map(|v| format!("{v:.5e}").parse::<f64>().unwrap_or(v) + 0.0);
+    format!("({x}, {y})")
+}
