@@ -227,24 +227,33 @@ def patched(rng, mesh):
 
 
 def write_msh(mesh, path):
-    """MSH 2.2, text: numbers as Python prints them, which reads back exactly."""
+    """MSH 4.1, text: numbers as Python prints them, which reads back exactly. Each physical group is
+    an entity."""
     space = Lagrange(mesh, 1 if mesh.middles is None else 2)
     line, triangle = (1, 2) if mesh.middles is None else (8, 9)
-    lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat"]
-    # Surfaces are numbered behind the curves; 1 is the rest of the body.
-    first = len(mesh.curves) + 2
+    # Surface 1 is the rest of the body.
     surface = np.ones(len(mesh.triangles), int)
-    for k, inside in enumerate(mesh.surfaces.values(), first):
+    for k, inside in enumerate(mesh.surfaces.values(), 2):
         surface[inside] = k
-    lines += ["$PhysicalNames", str(first - 1 + len(mesh.surfaces))]
-    lines += [f'1 {k} "{name}"' for k, name in enumerate(mesh.curves, 2)] + ['2 1 "body"']
-    lines += [f'2 {k} "{name}"' for k, name in enumerate(mesh.surfaces, first)]
-    lines += ["$EndPhysicalNames", "$Nodes", str(len(space.points))]
-    lines += [f"{i} {x!r} {y!r} 0" for i, (x, y) in enumerate(space.points.tolist(), 1)]
-    tags = lambda nodes: " ".join(str(node + 1) for node in nodes)
-    elements = [f"{line} 2 {k} {k} {tags(nodes)}" for k, edges in enumerate(mesh.curves.values(), 2)
-                for nodes in space.on(edges)]
-    elements += [f"{triangle} 2 {k} {k} {tags(nodes)}" for k, nodes in zip(surface, space.elements)]
-    lines += ["$EndNodes", "$Elements", str(len(elements))]
-    lines += [f"{i} {element}" for i, element in enumerate(elements, 1)]
+    elements = np.asarray(space.elements)
+    groups = [(1, k, line, space.on(edges)) for k, edges in enumerate(mesh.curves.values(), 1)]
+    groups += [(2, k, triangle, elements[surface == k]) for k in np.unique(surface).tolist()]
+    names = [f'1 {k} "{name}"' for k, name in enumerate(mesh.curves, 1)]
+    names += ['2 1 "body"', *(f'2 {k} "{name}"' for k, name in enumerate(mesh.surfaces, 2))]
+    count = len(space.points)
+    lines = ["$MeshFormat", "4.1 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(names)), *names,
+             "$EndPhysicalNames", "$Entities"]
+    lines += [f"0 {len(mesh.curves)} {len(groups) - len(mesh.curves)} 0"]
+    lines += [f"{k} 0 0 0 0 0 0 1 {k} 0" for _, k, _, _ in groups]
+    lines += ["$EndEntities", "$Nodes", f"1 {count} 1 {count}", f"2 {groups[-1][1]} 0 {count}"]
+    lines += [str(i) for i in range(1, count + 1)]
+    lines += [f"{x!r} {y!r} 0" for x, y in space.points.tolist()]
+    total = sum(len(nodes) for _, _, _, nodes in groups)
+    lines += ["$EndNodes", "$Elements", f"{len(groups)} {total} 1 {total}"]
+    tag = 0
+    for dimension, k, kind, rows in groups:
+        lines.append(f"{dimension} {k} {kind} {len(rows)}")
+        for nodes in rows:
+            tag += 1
+            lines.append(" ".join(map(str, [tag, *(int(node) + 1 for node in nodes)])))
     path.write_text("\n".join([*lines, "$EndElements", ""]), encoding="utf-8")

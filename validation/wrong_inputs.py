@@ -15,7 +15,7 @@ from pathlib import Path
 GEO = Path(__file__).resolve().parent.parent / "geo"
 
 MESH = """$MeshFormat
-2.2 0 8
+4.1 0 8
 $EndMeshFormat
 $PhysicalNames
 4
@@ -24,20 +24,36 @@ $PhysicalNames
 1 3 "top"
 2 4 "body"
 $EndPhysicalNames
+$Entities
+0 3 1 0
+1 0 0 0 1 0 0 1 1 0
+2 0 0 0 0 1 0 1 2 0
+3 0 1 0 1 1 0 1 3 0
+4 0 0 0 1 1 0 1 4 0
+$EndEntities
 $Nodes
+1 4 1 4
+2 4 0 4
+1
+2
+3
 4
-1 0 0 0
-2 1 0 0
-3 1 1 0
-4 0 1 0
+0 0 0
+1 0 0
+1 1 0
+0 1 0
 $EndNodes
 $Elements
-5
-1 1 2 1 1 1 2
-2 1 2 3 3 3 4
-3 1 2 2 2 4 1
-4 2 2 4 4 1 2 3
-5 2 2 4 4 1 3 4
+4 5 1 5
+1 1 1 1
+1 1 2
+1 3 1 1
+2 3 4
+1 2 1 1
+3 4 1
+2 4 2 2
+4 1 2 3
+5 1 3 4
 $EndElements
 """
 
@@ -104,11 +120,11 @@ SCENES = [
 # (what is wrong, text of the mesh, its replacement)
 MESHES = [
     ("an empty mesh file", MESH, ""),
-    ("a mesh cut off", "4 2 2 4 4 1 2 3\n5 2 2 4 4 1 3 4\n$EndElements\n", "4 2 2 4"),
-    ("a node that is not there", "5 2 2 4 4 1 3 4", "5 2 2 4 4 1 3 9"),
-    ("a coordinate in words", "3 1 1 0", "3 one 1 0"),
-    ("a body out of the plane", "3 1 1 0", "3 1 1 0.5"),
-    ("another version", "2.2 0 8", "1 0 8"),
+    ("a mesh cut off", "4 1 2 3\n5 1 3 4\n$EndElements\n", "4 1 2"),
+    ("a node that is not there", "5 1 3 4", "5 1 3 9"),
+    ("a coordinate in words", "\n1 1 0\n", "\none 1 0\n"),
+    ("a body out of the plane", "\n1 1 0\n", "\n1 1 0.5\n"),
+    ("another version", "4.1 0 8", "9.9 0 8"),
 ]
 
 # (what is wrong, arguments)

@@ -8,6 +8,9 @@ use std::{
 };
 use tempfile::TempDir;
 
+#[path = "../common/msh.rs"]
+mod msh41;
+
 /// A square pressed on its foundation: a scene that takes ten quick steps.
 pub const SCENE: &str = include_str!("scene.toml");
 
@@ -144,7 +147,7 @@ impl ProgramOutput {
     }
 }
 
-/// The unit square in n × n cells of two triangles, MSH 2.2, sides and body named.
+/// The unit square in n × n cells of two triangles, sides and body named.
 pub fn square(n: usize) -> String {
     let node = |i: usize, j: usize| j * (n + 1) + i + 1;
     let mut nodes = Vec::new();
@@ -163,29 +166,19 @@ pub fn square(n: usize) -> String {
             (3, node(k, n), node(k + 1, n)),
             (4, node(0, k), node(0, k + 1)),
         ] {
-            add(&format!("1 2 {group} {group}"), format!("{a} {b}"));
+            add(&format!("1 {group}"), format!("{a} {b}"));
         }
     }
     for (j, i) in (0..n).flat_map(|j| (0..n).map(move |i| (j, i))) {
         let [a, b, c, d] = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)];
-        add("2 2 5 1", format!("{a} {b} {c}"));
-        add("2 2 5 1", format!("{a} {c} {d}"));
+        add("2 5", format!("{a} {b} {c}"));
+        add("2 5", format!("{a} {c} {d}"));
     }
     msh(&nodes, &elements)
 }
 
-/// A text file of version 2.2 with these nodes and elements.
+/// A text file of version 4.1 with these nodes and elements and the names of the square's groups.
 pub fn msh(nodes: &[impl AsRef<str>], elements: &[impl AsRef<str>]) -> String {
-    let section = |name: &str, lines: &[String]| {
-        format!("${name}\n{}\n{}\n$End{name}\n", lines.len(), lines.join("\n"))
-    };
     let names = ["1 1 \"bottom\"", "1 2 \"right\"", "1 3 \"top\"", "1 4 \"left\"", "2 5 \"body\""];
-    let own = |line: &str| line.to_owned();
-    [
-        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n".to_owned(),
-        section("PhysicalNames", &names.map(own)),
-        section("Nodes", &nodes.iter().map(|l| own(l.as_ref())).collect::<Vec<_>>()),
-        section("Elements", &elements.iter().map(|l| own(l.as_ref())).collect::<Vec<_>>()),
-    ]
-    .concat()
+    msh41::msh(&names, nodes, elements)
 }

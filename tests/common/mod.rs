@@ -1,6 +1,8 @@
 //! What several test programs share.
 #![allow(dead_code, reason = "each test program uses its part")]
 
+pub mod msh;
+
 use rand_xoshiro::{
     SplitMix64,
     rand_core::{Rng, SeedableRng},

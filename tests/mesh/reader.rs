@@ -1,11 +1,51 @@
 //! What every mesh file must give, whatever its version, its form and its writer.
 
-use crate::common::{check_laws, close, curve_length, fixture, read_bytes};
-use signorini::mesh::{Mesh, read};
-use std::{collections::BTreeMap, fs};
+use crate::common::{check_laws, close, curve_length, fixture, msh::msh, read_bytes};
+use signorini::mesh::{Curve, Mesh, read};
+use std::fs;
 
 /// The forms of a file besides version 4.1 as text.
 const OTHER_FORMS: [&str; 3] = ["41-binary", "22", "22-binary"];
+
+/// The mesh with nodes sorted by place, and triangles and edges by their nodes.
+fn sorted(mesh: Mesh) -> Mesh {
+    let mut order: Vec<usize> = (0..mesh.nodes.len()).collect();
+    let place = |i: &usize| mesh.nodes[*i].map(|x| (1e9 * x).round() as i64);
+    order.sort_by_key(place);
+    let mut number = vec![0; order.len()];
+    order.iter().enumerate().for_each(|(new, &old)| number[old] = new);
+    let renumbered = |triangle: &[usize; 3]| {
+        let mut nodes = triangle.map(|node| number[node]);
+        let least = (0..3).min_by_key(|&i| nodes[i]).unwrap();
+        nodes.rotate_left(least);
+        nodes
+    };
+    let all: Vec<_> = mesh.triangles.iter().map(renumbered).collect();
+    let mut triangles = all.clone();
+    triangles.sort_unstable();
+    let place = |t: &usize| triangles.binary_search(&all[*t]).unwrap();
+    let surface = |(name, old): (&String, &Vec<usize>)| {
+        let mut new: Vec<usize> = old.iter().map(place).collect();
+        new.sort_unstable();
+        (name.clone(), new)
+    };
+    let curve = |(name, old): (&String, &Curve)| {
+        let mut edges: Vec<_> = old.edges.iter().map(|e| e.map(|node| number[node])).collect();
+        edges.sort_unstable();
+        (name.clone(), Curve { edges, ..*old })
+    };
+    let midpoint = |(&[a, b], &x): (&[usize; 2], &[f64; 2])| {
+        let [a, b] = [number[a], number[b]];
+        ([a.min(b), a.max(b)], x)
+    };
+    Mesh {
+        nodes: order.iter().map(|&old| mesh.nodes[old]).collect(),
+        surfaces: mesh.surfaces.iter().map(surface).collect(),
+        curves: mesh.curves.iter().map(curve).collect(),
+        curved: mesh.curved.iter().map(midpoint).collect(),
+        triangles,
+    }
+}
 
 fn check_plate(mesh: &Mesh) {
     check_laws(mesh, 1.75, 8.0, 1);
@@ -42,10 +82,10 @@ fn check_plate(mesh: &Mesh) {
 #[test]
 fn every_form_gives_the_same_mesh() {
     for writer in ["plate", "newer"] {
-        let mesh = read(&fixture(&format!("{writer}-41"))).unwrap();
+        let mesh = sorted(read(&fixture(&format!("{writer}-41"))).unwrap());
         check_plate(&mesh);
         for form in OTHER_FORMS {
-            let other = read(&fixture(&format!("{writer}-{form}"))).unwrap();
+            let other = sorted(read(&fixture(&format!("{writer}-{form}"))).unwrap());
             // Text keeps 16 digits.
             for (p, q) in mesh.nodes.iter().flatten().zip(other.nodes.iter().flatten()) {
                 assert!((p - q).abs() < 1e-15, "{writer}-{form}: {p} is not {q}");
@@ -63,14 +103,20 @@ fn parametric_nodes_and_saved_extras_change_nothing() {
     let mesh = read(&fixture("plate-41-binary")).unwrap();
     assert!(mesh == read(&fixture("parametric-41-binary")).unwrap());
     check_plate(&read(&fixture("save-all-41-binary")).unwrap());
-    check_laws(&read(&fixture("save-all-22")).unwrap(), 1.75, 8.0, 1);
+    for other in ["save-all-22", "parametric-22", "version-40"] {
+        check_laws(&read(&fixture(other)).unwrap(), 1.75, 8.0, 1);
+    }
+    // MSH 1 has no names.
+    let mesh = read(&fixture("version-1")).unwrap();
+    check_laws(&mesh, 1.75, 8.0, 1);
+    assert_eq!(mesh.curves["77"].edges.len(), 2);
 }
 
 #[test]
 fn second_order_keeps_the_midpoints_of_curved_edges_only() {
     assert!(read(&fixture("second-order")).unwrap() == read(&fixture("plate-41")).unwrap());
     let binary = read(&fixture("second-order-22-binary")).unwrap();
-    assert!(binary == read(&fixture("plate-22-binary")).unwrap());
+    assert!(sorted(binary) == sorted(read(&fixture("plate-22-binary")).unwrap()));
 
     let disc = read(&fixture("disc-41")).unwrap();
     let rim = &disc.curves["rim"].edges;
@@ -82,8 +128,9 @@ fn second_order_keeps_the_midpoints_of_curved_edges_only() {
         let [x, y] = disc.midpoint(*edge);
         close(x.hypot(y), 1.0);
     }
+    let disc = sorted(disc);
     for form in OTHER_FORMS {
-        let other = read(&fixture(&format!("disc-{form}"))).unwrap();
+        let other = sorted(read(&fixture(&format!("disc-{form}"))).unwrap());
         for (p, q) in disc.curved.values().flatten().zip(other.curved.values().flatten()) {
             assert!((p - q).abs() < 1e-15, "{form}: {p} is not {q}");
         }
@@ -92,63 +139,75 @@ fn second_order_keeps_the_midpoints_of_curved_edges_only() {
     }
 }
 
-/// Two triangles on a square, one of them clockwise; stray tags and an unused node.
-const SQUARE: &str = "\
-$Comments
-anything $Nodes at all
-$EndComments
-$MeshFormat
-2.2 0 8
-$EndMeshFormat
-$PhysicalNames
-3
-1 5 \"ground floor\"
-1 6 \"ground floor\"
-2 1 \"body\"
-$EndPhysicalNames
-$Nodes
-5
-40 0 0 0
-7 1 0 1e-17
-1000000 1 1 0
-3 0 1 0
-99 5 5 5
-$EndNodes
-$Periodic
-0
-$EndPeriodic
-$Elements
-7
-1 15 2 1 1 40
-2 1 2 5 1 7 40
-3 1 2 8 1 7 1000000
-4 1 2 6 1 40 7
-5 2 2 1 1 40 1000000 7
-6 2 2 1 1 40 1000000 3
-9 1 2 8 1 40 1000000
-$EndElements
-";
+/// Two triangles on a square, one of them clockwise; stray tags and an unused node. The second triangle is in
+/// the surface `second`.
+fn square(second: usize, version: &str) -> String {
+    let names = ["1 5 \"ground floor\"", "1 6 \"ground floor\"", "2 1 \"body\""];
+    let nodes = ["40 0 0 0", "7 1 0 1e-17", "1000000 1 1 0", "3 0 1 0", "99 5 5 5"];
+    let last = format!("6 2 {second} 40 1000000 3");
+    let elements = [
+        "1 15 1 40",
+        "2 1 5 7 40",
+        "3 1 8 7 1000000",
+        "4 1 6 40 7",
+        "5 2 1 40 1000000 7",
+        &last,
+        "9 1 8 40 1000000",
+    ];
+    let comments = "$Comments\nanything $Nodes at all\n$EndComments\n";
+    let mesh = match version {
+        "4.1" => msh(&names, &nodes, &elements),
+        // MSH 2.2: tag, type, number of tags, group, entity, nodes. All are on one entity.
+        _ => {
+            let element = |line: &&str| {
+                let [tag, kind, rest] = line.splitn(3, ' ').collect::<Vec<_>>()[..] else {
+                    panic!()
+                };
+                let (group, nodes) = rest.split_once(' ').unwrap();
+                format!("{tag} {kind} 2 {group} 1 {nodes}")
+            };
+            let elements = elements.iter().map(element).collect::<Vec<_>>().join("\n");
+            format!(
+                "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n3\n{}\n$EndPhysicalNames\n\
+                 $Nodes\n5\n{}\n$EndNodes\n$Elements\n7\n{elements}\n$EndElements\n",
+                names.join("\n"),
+                nodes.join("\n")
+            )
+        }
+    };
+    mesh.replace("$Elements", "$Periodic\n0\n$EndPeriodic\n$Elements").replacen(
+        "$Mesh",
+        &(comments.to_owned() + "$Mesh"),
+        1,
+    )
+}
 
 #[test]
 fn tags_orientation_and_unused_nodes() {
-    let mesh = read_bytes(SQUARE).unwrap();
-    check_laws(&mesh, 1.0, 4.0, 0);
+    for version in ["4.1", "2.2"] {
+        let mesh = read_bytes(square(1, version)).unwrap();
+        check_laws(&mesh, 1.0, 4.0, 0);
+        assert_eq!(mesh.nodes.len(), 4);
+        let names: Vec<_> = mesh.curves.keys().collect();
+        assert_eq!(names, ["8", "ground floor"]);
+        // Groups of one name are one curve, with each edge once.
+        assert_eq!(mesh.curves["ground floor"].edges.len(), 1);
+        close(curve_length(&mesh, "ground floor"), 1.0);
+        assert_eq!(mesh.curves["8"].edges.len(), 1);
+        assert_eq!(mesh.curves["8"].interior_edges, 1);
+    }
+    let mesh = read_bytes(square(1, "4.1")).unwrap();
     assert_eq!(mesh.nodes, [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
     assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
-    let names: Vec<_> = mesh.curves.keys().collect();
-    assert_eq!(names, ["8", "ground floor"]);
-    // Groups of one name are one curve, with each edge once.
-    assert_eq!(mesh.curves["ground floor"].edges, [[0, 1]]);
-    assert_eq!(mesh.curves["8"].edges, [[1, 2]]);
-    assert_eq!(mesh.curves["8"].interior_edges, 1);
 }
 
 #[test]
 fn line_ends_and_a_missing_last_one_do_not_matter() {
-    let mesh = read_bytes(SQUARE).unwrap();
-    assert!(mesh == read_bytes(SQUARE.replace('\n', "\r\n")).unwrap());
-    assert!(mesh == read_bytes(SQUARE.trim_end()).unwrap());
-    assert!(mesh == read_bytes(format!("\n\n{SQUARE}\n\n")).unwrap());
+    let text = square(1, "4.1");
+    let mesh = read_bytes(&text).unwrap();
+    assert!(mesh == read_bytes(text.replace('\n', "\r\n")).unwrap());
+    assert!(mesh == read_bytes(text.trim_end()).unwrap());
+    assert!(mesh == read_bytes(format!("\n\n{text}\n\n")).unwrap());
 }
 
 #[test]
@@ -162,13 +221,17 @@ fn the_order_of_sections_does_not_matter() {
 
 #[test]
 fn without_physical_surfaces_all_triangles_are_the_body() {
-    let free = SQUARE.replace(" 2 2 1 1 ", " 2 2 0 1 ");
-    let named = read_bytes(SQUARE).unwrap();
+    let named = read_bytes(square(1, "4.1")).unwrap();
     assert!(named.surfaces.values().eq([&vec![0, 1]]));
-    assert!(Mesh { surfaces: BTreeMap::new(), ..named } == read_bytes(free).unwrap());
-    // With them only theirs, and the diagonal becomes boundary.
-    let half = SQUARE.replace("6 2 2 1 1", "6 2 2 0 1");
-    let mesh = read_bytes(half).unwrap();
-    check_laws(&mesh, 0.5, 2.0 + 2.0_f64.sqrt(), 0);
-    assert_eq!(mesh.curves["8"].edges, [[1, 2], [2, 0]]);
+    for version in ["4.1", "2.2"] {
+        let free =
+            square(0, version).replace("5 2 1 40", "5 2 0 40").replace("2 1 2 1\n5", "2 0 2 1\n5");
+        let free = free.replace("5 2 2 1 1 ", "5 2 2 0 1 ");
+        let free = read_bytes(free).unwrap();
+        assert!(free.surfaces.is_empty() && free.triangles.len() == 2);
+        // With them only theirs, and the diagonal becomes boundary.
+        let mesh = read_bytes(square(0, version)).unwrap();
+        check_laws(&mesh, 0.5, 2.0 + 2.0_f64.sqrt(), 0);
+        assert_eq!(mesh.curves["8"].edges.len(), 2);
+    }
 }

@@ -11,6 +11,10 @@ use std::collections::BTreeMap;
 
 /// Twice the area over the square of the longest side: below this a triangle is a line.
 const FLAT: f64 = 1e-10;
+/// What is said of triangles that another mesh of the same geometry may not have.
+const FLAT_TRIANGLE: &str = "has no area";
+const FOLDED: &str = "is folded";
+pub const DEGENERATE: [&str; 2] = [FLAT_TRIANGLE, FOLDED];
 /// |z| over the extent of the body: below this a node lies in the plane.
 const PLANAR: f64 = 1e-10;
 
@@ -62,17 +66,14 @@ fn check_planar(&Node { tag, point: [.., z], at }: &Node, limit: f64) -> Result<
 /// them are in each.
 fn triangles(contents: &Contents) -> (Vec<&Element<3>>, BTreeMap<String, Vec<usize>>) {
     let grouped = contents.triangles.iter().any(|t| t.group != 0);
-    // A triangle is listed once for each of its groups; the first listing counts. (What is listed twice
-    // in one group, or on two entities, stays and is found to overlap.)
+    // A triangle is listed once for each of its groups; the first listing counts.
     let mut first_listing = HashMap::default();
     let (mut elements, mut groups) = (Vec::new(), BTreeMap::<i32, Vec<usize>>::new());
     for triangle in contents.triangles.iter().filter(|t| !grouped || t.group != 0) {
         let mut nodes = triangle.nodes;
         nodes.sort_unstable();
-        let listing = (triangle.group, elements.len());
-        let (group, mut index) = *first_listing.entry((triangle.entity, nodes)).or_insert(listing);
-        if group == triangle.group {
-            index = elements.len();
+        let index = *first_listing.entry(nodes).or_insert(elements.len());
+        if index == elements.len() {
             elements.push(triangle);
         }
         groups.entry(triangle.group).or_default().push(index);
@@ -123,7 +124,7 @@ fn counter_clockwise(
     // Huge coordinates overflow the area.
     if twice.abs() <= flat([a, b, c]) || !twice.is_finite() {
         let problem = format!(
-            "triangle {tag} has no area: its nodes lie on a line, or squares of its coordinates are \
+            "triangle {tag} {FLAT_TRIANGLE}: its nodes lie on a line, or squares of its coordinates are \
              beyond double precision; mend the mesh there"
         );
         return fault(at, problem);
@@ -179,7 +180,7 @@ fn set_midpoints(
         if mesh.is_curved(triangle) && !mesh.jacobian_exceeds(bound, triangle) {
             let tag = element.tag;
             let problem = format!(
-                "curved triangle {tag} is folded: a midpoint of its edges lies too far off; mesh \
+                "curved triangle {tag} {FOLDED}: a midpoint of its edges lies too far off; mesh \
                  finer there, or mend it"
             );
             return fault(element.at, problem);

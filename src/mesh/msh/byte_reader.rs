@@ -25,15 +25,6 @@ pub fn not_a_mesh<T>(at: impl Into<Option<usize>>) -> Result<T> {
     fault(at, "not a gmsh mesh: it does not begin with $MeshFormat")
 }
 
-/// The error of a version that is not read.
-pub fn unsupported_version<T>(at: usize, version: f64) -> Result<T> {
-    let problem = format!(
-        "MSH version {version} is not supported, 4.1 and 2.2 are; convert the file with \
-         `gmsh OLD.msh -save -format msh41 -o NEW.msh` (or -format msh22)"
-    );
-    fault(at, problem)
-}
-
 /// What stands between the lines `$Name` and `$EndName`.
 pub struct Section<'a> {
     pub name: &'a str,
@@ -58,8 +49,6 @@ impl<'a> Section<'a> {
             let name = line.trim_ascii_end().strip_prefix(b"$");
             let name = match name.and_then(|name| str::from_utf8(name).ok()) {
                 Some(name @ ("MeshFormat" | "Comments")) => name,
-                // MSH 1 had no header.
-                Some("NOD" | "ELM") => return unsupported_version(at, 1.0),
                 _ if sections.is_empty() => return not_a_mesh(at),
                 Some(name) => name,
                 None => {
@@ -98,10 +87,8 @@ fn blanks(bytes: &[u8]) -> usize {
 pub enum Numbers {
     /// As words between blanks.
     Text,
-    /// Binary; tags and counts are `int`s of four bytes (MSH 2.2).
-    Binary2,
-    /// Binary; tags and counts are `size_t`s of eight bytes (MSH 4.1).
-    Binary4,
+    /// Binary; tags and counts are `size_t`s of eight bytes.
+    Binary,
 }
 
 /// Reads a section from front to back. No read goes beyond its end: counts need no check.
@@ -118,7 +105,7 @@ impl<'a> ByteReader<'a> {
     }
 
     /// Whether numbers are binary.
-    pub fn is_binary(&self) -> bool {
+    fn is_binary(&self) -> bool {
         self.numbers != Numbers::Text
     }
 
@@ -146,7 +133,7 @@ impl<'a> ByteReader<'a> {
 
     /// The rest of the line, without surrounding blanks.
     pub fn line(&mut self, what: &str) -> Result<Cow<'a, str>> {
-        let line = self.take(what, first_line(self.rest()).len().max(1))?;
+        let line = self.bytes(what, first_line(self.rest()).len().max(1))?;
         Ok(String::from_utf8_lossy(line.trim_ascii()))
     }
 
@@ -164,11 +151,7 @@ impl<'a> ByteReader<'a> {
 
     /// A tag or a count: a whole number that is not negative.
     pub fn size(&mut self, what: &str) -> Result<u64> {
-        if self.numbers != Numbers::Binary2 {
-            return self.number(what, u64::from_ne_bytes);
-        }
-        let (at, value) = (self.position, self.int(what)?);
-        u64::try_from(value).or_else(|_| expected(at, what, value))
+        self.number(what, u64::from_ne_bytes)
     }
 
     /// A `double`, which may be infinite or not a number.
@@ -184,16 +167,16 @@ impl<'a> ByteReader<'a> {
     ) -> Result<T> {
         let at = self.position();
         if self.is_binary() {
-            let bytes = self.take(what, N)?;
+            let bytes = self.bytes(what, N)?;
             return Ok(from_bytes(std::array::from_fn(|i| bytes[i])));
         }
         let length = self.rest().iter().take_while(|b| !b.is_ascii_whitespace()).count();
-        let word = String::from_utf8_lossy(self.take(what, length.max(1))?);
+        let word = String::from_utf8_lossy(self.bytes(what, length.max(1))?);
         word.parse().or_else(|_| expected(at, what, word))
     }
 
     /// The next `count` bytes.
-    fn take(&mut self, what: &str, count: usize) -> Result<&'a [u8]> {
+    pub fn bytes(&mut self, what: &str, count: usize) -> Result<&'a [u8]> {
         let Some(bytes) = self.rest().get(..count) else {
             let section = self.section.name;
             let problem = format!(

@@ -18,8 +18,6 @@ pub struct Element<const N: usize> {
     pub tag: u64,
     /// Tag of the physical group, 0 for none.
     pub group: i32,
-    /// Tag of the geometrical entity that it was meshed on, 0 when unknown.
-    pub entity: i32,
     /// Tags of its vertices.
     pub nodes: [u64; N],
     /// The byte where it is listed, for messages.
@@ -31,8 +29,10 @@ pub struct Element<const N: usize> {
 pub struct Contents {
     /// Names of the physical curves and surfaces by dimension and tag.
     pub names: BTreeMap<(i32, i32), String>,
-    /// Physical groups of the entities, by dimension and tag (MSH 4.1).
+    /// Physical groups of the entities, by dimension and tag.
     pub groups: HashMap<(i32, i32), Vec<i32>>,
+    /// Whether the entities are the physical groups themselves.
+    pub groups_are_entities: bool,
     pub nodes: Vec<Node>,
     /// The lines in physical groups, once for each group.
     pub lines: Vec<Element<2>>,
@@ -62,14 +62,13 @@ impl Contents {
         Ok(())
     }
 
-    /// Reads the nodes of the element `tag` of gmsh's `element_type`, which is on the geometrical
-    /// `entity` and listed at byte `at`. It is kept once for each of its physical `groups`, a triangle
+    /// Reads the nodes of the element `tag` of gmsh's `element_type`, which is listed at byte `at`. It is kept once for each of its physical `groups`, a triangle
     /// without any in group 0.
     pub fn read_element(
         &mut self,
         reader: &mut ByteReader,
         element_type: i32,
-        (tag, entity, at): (u64, i32, usize),
+        (tag, at): (u64, usize),
         groups: &[i32],
     ) -> Result<()> {
         let name = match element_type {
@@ -78,7 +77,7 @@ impl Contents {
                 if element_type == 8 {
                     self.read_midpoints(reader, &[nodes], tag, at)?;
                 }
-                let of = |&group: &i32| Element { tag, group, entity, nodes, at };
+                let of = |&group: &i32| Element { tag, group, nodes, at };
                 self.lines.extend(groups.iter().map(of));
                 return Ok(());
             }
@@ -88,7 +87,7 @@ impl Contents {
                     self.read_midpoints(reader, &[[a, b], [b, c], [c, a]], tag, at)?;
                 }
                 let groups = if groups.is_empty() { &[0] } else { groups };
-                let of = |&group: &i32| Element { tag, group, entity, nodes, at };
+                let of = |&group: &i32| Element { tag, group, nodes, at };
                 self.triangles.extend(groups.iter().map(of));
                 return Ok(());
             }

@@ -1,20 +1,19 @@
-//! Reads gmsh's `.msh` files, versions 4.1 and 2.2, text and binary
-//! (<https://gmsh.info/doc/texinfo/gmsh.html#File-formats>).
+//! Reads gmsh's `.msh` files of version 4.1, text and binary
+//! (<https://gmsh.info/doc/texinfo/gmsh.html#File-formats>); gmsh converts others.
 
 mod body;
 mod byte_reader;
 mod contents;
 mod one_body;
-mod v2;
 mod v4;
 mod write;
 
-use super::{Mesh, MeshError};
-use byte_reader::{
-    ByteReader, Numbers, Result, Section, expected, fault, not_a_mesh, unsupported_version,
-};
+pub(super) use body::DEGENERATE;
+
+use super::{Mesh, MeshError, gmsh};
+use byte_reader::{ByteReader, Numbers, Result, Section, expected, fault, not_a_mesh};
 use contents::Contents;
-use std::{fs, path::Path};
+use std::{collections::BTreeMap, ffi::OsString, fs, path::Path};
 
 /// Reads a `.msh` file.
 ///
@@ -22,20 +21,34 @@ use std::{fs, path::Path};
 /// the same name are one curve, as are physical surfaces. Nodes and triangles keep the order of the
 /// file.
 ///
+/// A file of another version, or of a machine with another byte order, is converted by gmsh.
+///
 /// # Errors
-/// The file cannot be read, or it is not the mesh of a plane body; the message says where.
+/// The file cannot be read or converted, or it is not the mesh of a plane body; the message says where.
 pub fn read(path: &Path) -> std::result::Result<Mesh, MeshError> {
-    parse(&fs::read(path).map_err(MeshError::io(path))?, path)
+    let bytes = fs::read(path).map_err(MeshError::io(path))?;
+    let Some(version) = foreign_version(&bytes) else { return parse(&bytes, path) };
+    let converted = converted(path, &bytes, version)?;
+    let mesh = sections_of(&converted)
+        .and_then(|sections| contents(&sections, version < 4.0))
+        // gmsh drops names that several groups have.
+        .and_then(|contents| {
+            let sections = sections_of(&bytes).unwrap_or_default();
+            Ok(Contents { names: names(&sections)?, ..contents })
+        })
+        .and_then(|contents| body::mesh(&contents));
+    // Bytes of what gmsh made are no places in the file.
+    mesh.map_err(|(_, problem)| MeshError::file(path, problem))
 }
 
-/// As [`read`], from the bytes of a file that would stand at `path`.
+/// As [`read`], from the bytes of a file of version 4.1 that would stand at `path`.
 ///
 /// # Errors
 /// As [`read`], but for the reading itself.
 pub fn parse(bytes: &[u8], path: &Path) -> std::result::Result<Mesh, MeshError> {
     let mut sections = Vec::new();
     let mesh = Section::split(bytes, &mut sections)
-        .and_then(|()| contents(&sections))
+        .and_then(|()| contents(&sections, false))
         .and_then(|contents| body::mesh(&contents));
     mesh.map_err(|(at, problem)| {
         let place = at.map_or_else(String::new, |at| place(at, bytes, &sections));
@@ -46,24 +59,54 @@ pub fn parse(bytes: &[u8], path: &Path) -> std::result::Result<Mesh, MeshError> 
 /// The number of elements that a `.msh` file announces, triangles for the most part; 0 where it is none.
 ///
 /// # Errors
-/// The file cannot be read.
+/// The file cannot be read or converted.
 pub fn announced_elements(path: &Path) -> std::result::Result<usize, MeshError> {
-    let bytes = fs::read(path).map_err(MeshError::io(path))?;
-    let mut sections = Vec::new();
-    // What else is wrong is told by who reads all of it.
-    let _ = Section::split(&bytes, &mut sections);
-    Ok(announced(&sections).unwrap_or(0) as usize)
+    let mut bytes = fs::read(path).map_err(MeshError::io(path))?;
+    if let Some(version) = foreign_version(&bytes) {
+        bytes = converted(path, &bytes, version)?;
+    }
+    let announced = sections_of(&bytes).ok().and_then(|sections| {
+        let named = |name| sections.iter().find(|section| section.name == name);
+        let numbers = format(named("MeshFormat")?).ok()?;
+        Some(v4::header(&mut ByteReader::new(named("Elements")?, numbers)).ok()?.1)
+    });
+    Ok(announced.unwrap_or(0) as usize)
 }
 
-/// The number of elements that the sections announce.
-fn announced(sections: &[Section]) -> Option<u64> {
-    let named = |name| sections.iter().find(|section| section.name == name);
-    let (version, numbers) = format(named("MeshFormat")?).ok()?;
-    let mut reader = ByteReader::new(named("Elements")?, numbers);
-    match version {
-        2 => reader.count_line().ok(),
-        _ => Some(v4::header(&mut reader).ok()?.1),
+fn sections_of(bytes: &[u8]) -> Result<Vec<Section<'_>>> {
+    let mut sections = Vec::new();
+    Section::split(bytes, &mut sections).map(|()| sections)
+}
+
+/// The version of a complete file that gmsh must convert: another one than 4.1, or with binary numbers of
+/// another byte order.
+fn foreign_version(bytes: &[u8]) -> Option<f64> {
+    if bytes.starts_with(b"$NOD") {
+        return Some(1.0);
     }
+    // Of another beginning gmsh would run the file as a script.
+    if ![&b"$MeshFormat"[..], b"$Comments"].iter().any(|first| bytes.starts_with(first)) {
+        return None;
+    }
+    let sections = sections_of(bytes).ok()?;
+    let mut reader =
+        ByteReader::new(sections.iter().find(|s| s.name == "MeshFormat")?, Numbers::Text);
+    let version = reader.real("a version").ok()?;
+    let is_binary = reader.int("a file type").ok()? == 1;
+    reader.line("a data size").ok()?;
+    let swapped =
+        is_binary && reader.bytes("the number 1", 4).ok()? == 1_i32.swap_bytes().to_ne_bytes();
+    (version != 4.1 || swapped).then_some(version)
+}
+
+/// What gmsh makes of a file of this version.
+///
+/// In versions before 4 each element names its group itself, and gmsh would put all groups of an entity's
+/// elements on the entity. With its tags switched the groups become the entities.
+fn converted(path: &Path, bytes: &[u8], version: f64) -> std::result::Result<Vec<u8>, MeshError> {
+    let switch = (version < 4.0).then_some("-switch_tags");
+    let arguments = ["-save", "-save_all", "-bin"].into_iter().chain(switch).map(OsString::from);
+    gmsh::run((path, Some(bytes)), arguments, "", "convert it to MSH 4.1")
 }
 
 /// The place of a byte for a message: a line of a text file, a byte of a binary one.
@@ -77,8 +120,9 @@ fn place(byte: usize, bytes: &[u8], sections: &[Section]) -> String {
     format!(", byte {byte}{section}")
 }
 
-/// What the sections list, in whatever order they stand.
-fn contents(sections: &[Section]) -> Result<Contents> {
+/// What the sections list, in whatever order they stand. The physical groups are those of the entities, or
+/// the entities themselves.
+fn contents(sections: &[Section], groups_are_entities: bool) -> Result<Contents> {
     let all = |name| sections.iter().filter(move |section| section.name == name);
     let Some(header) = all("MeshFormat").next() else {
         return if sections.is_empty() {
@@ -87,28 +131,21 @@ fn contents(sections: &[Section]) -> Result<Contents> {
             not_a_mesh(None)
         };
     };
-    let (version, numbers) = format(header)?;
-    let mut contents = Contents::default();
+    let numbers = format(header)?;
+    let names = names(sections)?;
+    let mut contents = Contents { names, groups_are_entities, ..Contents::default() };
     // The elements need the groups of their entities.
     let others = sections.iter().filter(|section| section.name != "Entities");
     for section in all("Entities").chain(others) {
         let mut reader = ByteReader::new(section, numbers);
-        let read = match (section.name, version) {
-            ("PhysicalNames", _) => physical_names,
-            ("Nodes", 2) => v2::nodes,
-            ("Elements", 2) => v2::elements,
-            ("Entities", 4) => v4::entities,
-            ("Nodes", 4) => v4::nodes,
-            ("Elements", 4) => v4::elements,
-            ("PartitionedEntities", _) => {
+        let read = match section.name {
+            "Entities" => v4::entities,
+            "Nodes" => v4::nodes,
+            "Elements" => v4::elements,
+            "PartitionedEntities" => {
                 let whole = "the mesh is partitioned; write it whole: mesh without -part, or \
                              without Mesh.NbPartitions in the .geo";
                 return fault(section.at, whole);
-            }
-            ("ParametricNodes", _) => {
-                let plain = "$ParametricNodes of MSH 2 are not supported; mesh without \
-                             -save_parametric (Mesh.SaveParametric = 0), or with -format msh41";
-                return fault(section.at, plain);
             }
             _ => continue,
         };
@@ -121,55 +158,53 @@ fn contents(sections: &[Section]) -> Result<Contents> {
     }
 }
 
-/// `$MeshFormat`: version, text or binary, size of a number; in a binary file then the integer 1,
-/// which shows its byte order. Returns the version's first digit.
-fn format(section: &Section) -> Result<(u8, Numbers)> {
+/// `$MeshFormat` of version 4.1: version, text or binary, size of a number; in a binary file then the
+/// integer 1.
+fn format(section: &Section) -> Result<Numbers> {
     let what = "version, file type and data size";
     let mut reader = ByteReader::new(section, Numbers::Text);
     let at = reader.position();
-    let (version, binary) = match reader.real("a version such as 4.1")? {
-        4.1 => (4, Numbers::Binary4),
-        2.0 | 2.1 | 2.2 => (2, Numbers::Binary2),
-        other => return unsupported_version(at, other),
-    };
+    let version = reader.real("a version such as 4.1")?;
+    if version != 4.1 {
+        return expected(at, "version 4.1", version);
+    }
     let at = reader.position();
     let (file_type, size) = (reader.int(what)?, reader.int(what)?);
     match file_type {
-        0 => return Ok((version, Numbers::Text)),
-        1 => reader.line(what)?,
+        0 => return Ok(Numbers::Text),
+        1 if size == 8 => reader.line(what)?,
+        1 => return expected(at, "numbers of 8 bytes", size),
         other => return expected(at, "file type 0 (text) or 1 (binary)", other),
     };
-    reader.numbers = binary;
+    reader.numbers = Numbers::Binary;
     let at = reader.position();
     match reader.int("the number 1")? {
-        1 if size == 8 => Ok((version, binary)),
-        one if one == 1 || one.swap_bytes() == 1 => {
-            let foreign = "its binary numbers are those of another machine (byte order or size); \
-                           convert it there with `gmsh OLD.msh -save -format msh41 -o NEW.msh` \
-                           (text, without -bin)";
-            fault(at, foreign)
-        }
+        1 => Ok(Numbers::Binary),
         other => expected(at, "the number 1", other),
     }
 }
 
-/// `$PhysicalNames`: dimension, tag, quoted name.
-fn physical_names(reader: &mut ByteReader, contents: &mut Contents) -> Result<()> {
-    let what = "dimension, tag and \"name\"";
-    reader.numbers = Numbers::Text;
-    for _ in 0..reader.count_line()? {
-        let at = reader.position();
-        let (dimension, tag) = (reader.int(what)?, reader.int(what)?);
-        let name = reader.line(what)?;
-        let quoted = name.strip_prefix('"').and_then(|name| name.strip_suffix('"'));
-        match dimension {
-            0..=3 if name.is_empty() => return expected(at, what, format!("{dimension} {tag}")),
-            1 | 2 => {
-                contents.names.insert((dimension, tag), quoted.unwrap_or(&name).to_owned());
+/// The names of the physical curves and surfaces by dimension and tag, from `$PhysicalNames`, which is text
+/// in any file: dimension, tag, quoted name.
+fn names(sections: &[Section]) -> Result<BTreeMap<(i32, i32), String>> {
+    let (mut names, what) = (BTreeMap::new(), "dimension, tag and \"name\"");
+    for section in sections.iter().filter(|section| section.name == "PhysicalNames") {
+        let mut reader = ByteReader::new(section, Numbers::Text);
+        for _ in 0..reader.count_line()? {
+            let at = reader.position();
+            let (dimension, tag) = (reader.int(what)?, reader.int(what)?);
+            let name = reader.line(what)?;
+            let quoted = name.strip_prefix('"').and_then(|name| name.strip_suffix('"'));
+            match dimension {
+                0..=3 if name.is_empty() => {
+                    return expected(at, what, format!("{dimension} {tag}"));
+                }
+                1 | 2 => drop(names.insert((dimension, tag), quoted.unwrap_or(&name).to_owned())),
+                0..=3 => {}
+                _ => return expected(at, what, dimension),
             }
-            0..=3 => {}
-            _ => return expected(at, what, dimension),
         }
+        reader.finish()?;
     }
-    Ok(())
+    Ok(names)
 }

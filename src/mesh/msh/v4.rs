@@ -63,11 +63,14 @@ pub fn elements(reader: &mut ByteReader, contents: &mut Contents) -> Result<()> 
         let entity = reader.int("an entity tag")?;
         let element_type = reader.int("an element type")?;
         let count = reader.size("a count")?;
-        let groups = contents.groups.get(&(dimension, entity)).cloned().unwrap_or_default();
+        let groups = match contents.groups_are_entities {
+            true => Vec::from_iter((entity != 0).then(|| entity.saturating_abs())),
+            false => contents.groups.get(&(dimension, entity)).cloned().unwrap_or_default(),
+        };
         for _ in 0..count {
             let at = reader.position();
             let tag = reader.size("an element tag")?;
-            contents.read_element(reader, element_type, (tag, entity, at), &groups)?;
+            contents.read_element(reader, element_type, (tag, at), &groups)?;
         }
         found += count;
     }

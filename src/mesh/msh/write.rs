@@ -1,66 +1,97 @@
-//! Writes a mesh as text in MSH 2.2, which gmsh and our reader turn into the same mesh again.
+//! Writes a mesh as text in MSH 4.1, which gmsh and our reader turn into the same mesh again.
 
 use crate::mesh::{Mesh, sides, sorted};
-use std::fmt::Write;
+use std::collections::BTreeMap;
 
 /// gmsh's element types: lines and triangles with straight and with curved sides.
 const LINES: [u8; 2] = [1, 8];
 const TRIANGLES: [u8; 2] = [2, 9];
 
 impl Mesh {
-    /// The text of an MSH file. Where an edge is curved, all elements are of second order.
+    /// The text of an MSH file. Where an edge is curved, all elements are of second order. Each curve is
+    /// an entity, and so is each set of surfaces that triangles have in common.
     pub fn to_msh(&self) -> String {
-        let order = usize::from(!self.curved.is_empty());
-        let midpoints = if order == 1 { self.midpoints() } else { Vec::new() };
-        let middle = |edge: [usize; 2]| {
-            let found = midpoints.binary_search_by_key(&sorted(edge), |(edge, _)| *edge);
-            found.ok().map(|i| self.nodes.len() + i)
-        };
-
-        let mut elements = Vec::new();
-        let mut names = String::new();
+        let midpoints = if self.curved.is_empty() { Vec::new() } else { self.midpoints() };
         let surfaces: Vec<(&str, Vec<usize>)> = match self.surfaces.is_empty() {
             true => vec![("body", (0..self.triangles.len()).collect())],
             false => self.surfaces.iter().map(|(name, t)| (&**name, t.clone())).collect(),
         };
-        for (group, (name, curve)) in (surfaces.len() + 1..).zip(&self.curves) {
-            names += &format!("1 {group} \"{name}\"\n");
-            for &[a, b] in &curve.edges {
-                let nodes = [Some(a), Some(b), middle([a, b])];
-                let nodes: Vec<usize> = nodes.into_iter().flatten().collect();
-                elements.push((LINES[order], [group, group], nodes));
-            }
-        }
-        // Triangle by triangle, so that they are read in their order, once for each surface.
         let mut groups = vec![Vec::new(); self.triangles.len()];
+        let mut names = String::new();
+        for (group, name) in (1..).zip(self.curves.keys()) {
+            names += &format!("1 {group} \"{name}\"\n");
+        }
         for (group, (name, triangles)) in (1..).zip(&surfaces) {
             names += &format!("2 {group} \"{name}\"\n");
             triangles.iter().for_each(|&t| groups[t].push(group));
         }
-        for (&[a, b, c], groups) in self.triangles.iter().zip(groups) {
-            let sides = [[a, b], [b, c], [c, a]].into_iter().filter_map(middle);
-            let nodes: Vec<usize> = [a, b, c].into_iter().chain(sides).collect();
-            let of = |group| (TRIANGLES[order], [group, 1], nodes.clone());
-            elements.extend(groups.into_iter().map(of));
+        let mut entities: BTreeMap<&[usize], usize> = BTreeMap::new();
+        for groups in &groups {
+            let next = entities.len() + 1;
+            entities.entry(groups).or_insert(next);
         }
+        // An entity: tag, bounding box (unused), physical groups, no boundary.
+        let entity = |tag: usize, groups: &[usize]| {
+            let listed: String = groups.iter().map(|group| format!(" {group}")).collect();
+            format!("{tag} 0 0 0 0 0 0 {}{listed} 0\n", groups.len())
+        };
+        let lines: String = (1..=self.curves.len()).map(|tag| entity(tag, &[tag])).collect();
+        let faces: String = entities.iter().map(|(groups, &tag)| entity(tag, groups)).collect();
 
-        let points = self.nodes.iter().chain(midpoints.iter().map(|(_, point)| point));
+        let count = self.nodes.len() + midpoints.len();
         let mut text = format!(
-            "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n{}\n{names}\
-             $EndPhysicalNames\n$Nodes\n{}\n",
+            "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n{}\n{names}$EndPhysicalNames\n\
+             $Entities\n0 {} {} 0\n{lines}{faces}$EndEntities\n$Nodes\n1 {count} 1 {count}\n2 1 0 {count}\n",
             self.curves.len() + surfaces.len(),
-            self.nodes.len() + midpoints.len()
+            self.curves.len(),
+            entities.len(),
         );
-        for (number, [x, y]) in (1..).zip(points) {
-            // Writing to a string does not fail.
-            let _ = writeln!(text, "{number} {x} {y} 0");
+        (1..=count).for_each(|tag| text += &format!("{tag}\n"));
+        let points = self.nodes.iter().chain(midpoints.iter().map(|(_, point)| point));
+        points.for_each(|[x, y]| text += &format!("{x} {y} 0\n"));
+        text + "$EndNodes\n" + &self.elements(&midpoints, &groups, &entities) + "$EndElements\n"
+    }
+
+    /// `$Elements` but for its last line. Triangles are listed in their order, in a block as long as they
+    /// are in the same surfaces.
+    fn elements(
+        &self,
+        midpoints: &[([usize; 2], [f64; 2])],
+        groups: &[Vec<usize>],
+        entities: &BTreeMap<&[usize], usize>,
+    ) -> String {
+        let order = usize::from(!midpoints.is_empty());
+        let middle = |edge: [usize; 2]| {
+            let found = midpoints.binary_search_by_key(&sorted(edge), |(edge, _)| *edge);
+            found.ok().map(|i| self.nodes.len() + i)
+        };
+        let (mut blocks, mut tag, mut text) = (0, 0, String::new());
+        let mut begin =
+            |text: &mut String, [dimension, entity]: [usize; 2], kind: u8, count: usize| {
+                blocks += 1;
+                *text += &format!("{dimension} {entity} {kind} {count}\n");
+            };
+        let mut add = |text: &mut String, nodes: &mut dyn Iterator<Item = usize>| {
+            tag += 1;
+            *text += &tag.to_string();
+            nodes.for_each(|node| *text += &format!(" {}", node + 1));
+            text.push('\n');
+        };
+        for (entity, curve) in (1..).zip(self.curves.values()) {
+            begin(&mut text, [1, entity], LINES[order], curve.edges.len());
+            for &[a, b] in &curve.edges {
+                add(&mut text, &mut [a, b].into_iter().chain(middle([a, b])));
+            }
         }
-        let _ = write!(text, "$EndNodes\n$Elements\n{}\n", elements.len());
-        for (number, (kind, [group, entity], nodes)) in (1..).zip(&elements) {
-            let nodes: Vec<String> = nodes.iter().map(|node| (node + 1).to_string()).collect();
-            let _ = writeln!(text, "{number} {kind} 2 {group} {entity} {}", nodes.join(" "));
+        let mut triangles = self.triangles.iter();
+        for run in groups.chunk_by(|a, b| a == b) {
+            begin(&mut text, [2, entities[&*run[0]]], TRIANGLES[order], run.len());
+            for &[a, b, c] in triangles.by_ref().take(run.len()) {
+                let sides = [[a, b], [b, c], [c, a]].into_iter().filter_map(middle);
+                add(&mut text, &mut [a, b, c].into_iter().chain(sides));
+            }
         }
-        text + "$EndElements\n"
+        format!("$Elements\n{blocks} {tag} 1 {tag}\n{text}")
     }
 
     /// The midpoints, m, of all edges, sorted by their ends in increasing order.

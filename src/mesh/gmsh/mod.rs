@@ -1,29 +1,23 @@
 //! Meshes `.geo` files with the gmsh command line.
 
-use super::{Mesh, MeshError, read};
-use crate::interrupt::Interrupts;
+mod process;
+
+pub(super) use process::run;
+
+use super::{Mesh, MeshError, parse, read};
 use std::{
-    collections::{BTreeMap, HashSet},
-    env,
-    fs::{self, File},
-    io,
+    collections::BTreeMap,
+    ffi::OsString,
+    fs::{self, Permissions},
+    io::{self, Write},
+    os::unix::fs::PermissionsExt,
     path::{Path, PathBuf},
-    process::{Child, Command, ExitStatus, Stdio},
-    thread::sleep,
-    time::{Duration, Instant, SystemTime},
+    time::SystemTime,
 };
 
-/// How many different lines of gmsh are shown; it can repeat an error by the hundred.
-const SHOWN: usize = 5;
-/// Seconds that gmsh may take, and the variable of the environment that sets another number.
-const SECONDS: f64 = 600.0;
-const SECONDS_VARIABLE: &str = "SIGNORINI_GMSH_SECONDS";
-/// How often it is looked whether gmsh has ended.
-const POLL: Duration = Duration::from_millis(5);
-/// The folders in which gmsh works begin with this.
-const SCRATCH: &str = ".meshing-";
-/// Such a folder is old after so long.
-const ABANDONED: Duration = Duration::from_secs(10);
+/// What gmsh is told for a further mesh where triangles of the last one are flat. At strong gradings its
+/// default algorithm makes such triangles by chance, MeshAdapt (1) does not, but takes ten times as long.
+const AGAIN: [&str; 2] = ["Mesh.RandomFactor = 1e-12", "Mesh.Algorithm = 1"];
 
 /// The order of the elements that gmsh makes of a `.geo`.
 ///
@@ -84,6 +78,7 @@ pub fn mesh_geo(
     parameters: &BTreeMap<String, f64>,
     order: Order,
 ) -> Result<PathBuf, MeshError> {
+    let started = SystemTime::now();
     let text = read_text(geo).map_err(MeshError::io(geo))?;
     let mut name = geo.file_stem().unwrap_or_default().to_owned();
     for (parameter, &value) in parameters {
@@ -101,18 +96,34 @@ pub fn mesh_geo(
         return Ok(mesh);
     }
 
-    // A directory rather than a file: gmsh creates the file with the usual permissions.
-    let folder = geo.with_file_name(".");
-    remove_abandoned(&folder);
-    let scratch = tempfile::Builder::new().prefix(SCRATCH).tempdir_in(folder);
-    let scratch = scratch.map_err(MeshError::io(&mesh))?;
-    // Locked until the mesh is made.
-    let lock = File::open(scratch.path()).map_err(MeshError::io(&mesh))?;
-    let _ = lock.try_lock();
-    let fresh = scratch.path().join("fresh.msh");
-    run((geo, &text), parameters, order, &fresh)?;
-    fs::rename(&fresh, &mesh).map_err(MeshError::io(&mesh))?;
+    let last = last_words(&text, parameters, order);
+    let mut bytes = run((geo, None), arguments(parameters), &last, "mesh it")?;
+    for option in AGAIN {
+        if !parse(&bytes, &mesh).is_err_and(|error| error.is_degenerate()) {
+            break;
+        }
+        let note = format!(
+            "note: {}: gmsh made flat triangles; meshing again with {option}\n",
+            geo.display()
+        );
+        // Where nobody can be told any more, the mesh is still made.
+        let _ = io::stderr().write_all(note.as_bytes());
+        bytes = run((geo, None), arguments(parameters), &format!("{last}{option};\n"), "mesh it")?;
+    }
+    write(&mesh, &bytes, started).map_err(MeshError::io(&mesh))?;
     Ok(mesh)
+}
+
+/// Writes a mesh that appears complete or not at all, with the usual permissions. It is as old as the `.geo`
+/// was read: a change since then is newer.
+fn write(path: &Path, bytes: &[u8], read: SystemTime) -> io::Result<()> {
+    let mut builder = tempfile::Builder::new();
+    let builder = builder.permissions(Permissions::from_mode(0o666));
+    let mut file = builder.tempfile_in(path.with_file_name("."))?;
+    file.write_all(bytes)?;
+    file.as_file().set_modified(read)?;
+    file.persist(path)?;
+    Ok(())
 }
 
 /// By what gmsh multiplies the lengths of a `.geo` file, `size` among them, when it writes the mesh:
@@ -132,22 +143,6 @@ pub fn scaling_factor(geo: &Path) -> Result<f64, MeshError> {
             format!("for an accuracy {OPTION} must be a number, as in `{OPTION} = 0.001;`");
         MeshError::file(geo, problem)
     })
-}
-
-/// Removes the folders of runs of gmsh that were killed: nobody has their locks.
-fn remove_abandoned(folder: &Path) {
-    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-        let path = entry.path();
-        // A new one may not be locked yet.
-        let old = || modified(&path).is_ok_and(|at| at.elapsed().is_ok_and(|age| age > ABANDONED));
-        let abandoned = entry.file_name().to_string_lossy().starts_with(SCRATCH)
-            && old()
-            && File::open(&path).is_ok_and(|folder| folder.try_lock().is_ok());
-        if abandoned {
-            // What cannot be removed harms nobody.
-            let _ = fs::remove_dir_all(path);
-        }
-    }
 }
 
 fn read_text(path: &Path) -> io::Result<String> {
@@ -221,82 +216,15 @@ fn last_words(text: &str, parameters: &BTreeMap<String, f64>, order: Order) -> S
     kept.chain([order.to_owned(), size]).collect()
 }
 
-/// Runs gmsh, which must leave `fresh` behind without a word of error.
-fn run(
-    (geo, text): (&Path, &str),
-    parameters: &BTreeMap<String, f64>,
-    order: Order,
-    fresh: &Path,
-) -> Result<(), MeshError> {
-    let mut command = Command::new("gmsh");
+/// gmsh's arguments for a mesh with these parameters.
+fn arguments(parameters: &BTreeMap<String, f64>) -> Vec<OsString> {
     // One thread: the same input then gives the same mesh, node by node.
-    command.args(["-2", "-format", "msh41", "-v", "1", "-nt", "1"]);
+    let mut arguments: Vec<String> = ["-2", "-nt", "1"].map(str::to_owned).into();
     for (name, value) in parameters {
-        command.args(["-setnumber", name, &value.to_string()]);
+        arguments.extend(["-setnumber".to_owned(), name.clone(), value.to_string()]);
         if name == "size" {
-            command.args(["-clmax", &value.to_string()]);
+            arguments.extend(["-clmax".to_owned(), value.to_string()]);
         }
     }
-    let second = fresh.with_file_name("second.geo");
-    fs::write(&second, last_words(text, parameters, order)).map_err(MeshError::io(&second))?;
-    // "./" keeps a path that begins with a dash from being taken for an option.
-    command.arg("-o").arg(fresh).arg(Path::new(".").join(geo)).arg(second);
-    // A file takes what it says, however much: a pipe would have to be read meanwhile.
-    let log = fresh.with_file_name("log");
-    let said = File::create(&log).and_then(|file| Ok([file.try_clone()?, file]));
-    let [out, err] = said.map_err(MeshError::io(&log))?;
-    let child = command.stdin(Stdio::null()).stdout(out).stderr(err).spawn();
-    let child = child.map_err(|source| match source.kind() {
-        io::ErrorKind::NotFound => MeshError::file(
-            geo,
-            "gmsh is needed to mesh this file and was not found; install it with `make deps` \
-             (Debian: apt install gmsh), or give a .msh file",
-        ),
-        _ => MeshError::io(Path::new("gmsh"))(source),
-    })?;
-    let status = wait(child, geo)?;
-
-    let said = read_text(&log).map_err(MeshError::io(&log))?;
-    // gmsh can report errors and still exit with success.
-    let is_error = |line: &str| line.trim_start().starts_with("Error");
-    if status.success() && fresh.exists() && !said.lines().any(is_error) {
-        return Ok(());
-    }
-    let mut seen = HashSet::new();
-    let lines: Vec<&str> = said.lines().filter(|line| seen.insert(*line)).take(SHOWN).collect();
-    let message = match lines.is_empty() {
-        true => format!("no message, {status}"),
-        false => lines.join("\n"),
-    };
-    Err(MeshError::file(geo, format!("gmsh could not mesh it:\n{message}")))
-}
-
-/// Waits for gmsh, which is ended with its time or by a signal to this process.
-fn wait(mut gmsh: Child, geo: &Path) -> Result<ExitStatus, MeshError> {
-    let (started, interrupts) = (Instant::now(), Interrupts::defer());
-    let limit = env::var(SECONDS_VARIABLE).ok().and_then(|text| text.parse().ok());
-    let limit = limit.unwrap_or(SECONDS);
-    loop {
-        if let Some(status) = gmsh.try_wait().map_err(MeshError::io(Path::new("gmsh")))? {
-            return Ok(status);
-        }
-        let late = started.elapsed().as_secs_f64() > limit;
-        let signal = interrupts.received();
-        if late || signal.is_some() {
-            // It may have ended by itself just now.
-            let _ = gmsh.kill();
-            let _ = gmsh.wait();
-        }
-        if let Some(signal) = signal {
-            return Err(MeshError::Interrupted(signal));
-        }
-        if late {
-            let problem = format!(
-                "gmsh has not meshed it in {limit} s and was ended; give a larger size, or more time \
-                 in the environment variable {SECONDS_VARIABLE}"
-            );
-            return Err(MeshError::file(geo, problem));
-        }
-        sleep(POLL);
-    }
+    arguments.into_iter().map(OsString::from).collect()
 }

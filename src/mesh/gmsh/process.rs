@@ -1,0 +1,113 @@
+//! Runs the gmsh command line.
+
+use crate::{interrupt::Interrupts, mesh::MeshError};
+use std::{
+    collections::HashSet,
+    env,
+    ffi::OsString,
+    fs::{self, File},
+    io,
+    path::Path,
+    process::{Child, Command, ExitStatus, Stdio},
+    thread::sleep,
+    time::{Duration, Instant},
+};
+
+/// How many different lines of gmsh are shown; it can repeat an error by the hundred.
+const SHOWN: usize = 5;
+/// Seconds that gmsh may take, and the variable of the environment that sets another number.
+const SECONDS: f64 = 600.0;
+const SECONDS_VARIABLE: &str = "SIGNORINI_GMSH_SECONDS";
+/// How often it is looked whether gmsh has ended.
+const POLL: Duration = Duration::from_millis(5);
+
+/// Runs gmsh with `arguments` on `input`, or on a mesh with these `bytes` that would stand there, and then on
+/// a file with the text `last`. Returns the bytes of the
+/// MSH 4.1 file that it makes. `task` completes "gmsh could not …" in messages.
+///
+/// # Errors
+/// gmsh is missing, takes too long or reports an error, or a signal came.
+pub fn run(
+    (input, bytes): (&Path, Option<&[u8]>),
+    arguments: impl IntoIterator<Item = OsString>,
+    last: &str,
+    task: &str,
+) -> Result<Vec<u8>, MeshError> {
+    let scratch = tempfile::tempdir().map_err(MeshError::io(&env::temp_dir()))?;
+    let [made, second, log] =
+        ["made.msh", "second.geo", "log"].map(|name| scratch.path().join(name));
+    fs::write(&second, last).map_err(MeshError::io(&second))?;
+    let mut command = Command::new("gmsh");
+    command.args(["-format", "msh41", "-v", "1"]).args(arguments).arg("-o").arg(&made);
+    match bytes {
+        // A copy, since gmsh would also run the options in a file INPUT.opt.
+        Some(bytes) => {
+            let copy = scratch.path().join("old.msh");
+            fs::write(&copy, bytes).map_err(MeshError::io(&copy))?;
+            command.arg(copy);
+        }
+        // "./" keeps a path that begins with a dash from being taken for an option.
+        None => drop(command.arg(Path::new(".").join(input))),
+    }
+    command.arg(&second);
+    // A file takes what it says, however much: a pipe would have to be read meanwhile.
+    let said = File::create(&log).and_then(|file| Ok([file.try_clone()?, file]));
+    let [out, err] = said.map_err(MeshError::io(&log))?;
+    let child = command.stdin(Stdio::null()).stdout(out).stderr(err).spawn();
+    let child = child.map_err(|source| match source.kind() {
+        io::ErrorKind::NotFound => {
+            let problem = format!(
+                "gmsh is needed to {task} and was not found; install it with `make deps` (Debian: \
+                 apt install gmsh)"
+            );
+            MeshError::file(input, problem)
+        }
+        _ => MeshError::io(Path::new("gmsh"))(source),
+    })?;
+    let status = wait(child, input, task)?;
+
+    let said = fs::read(&log).map_err(MeshError::io(&log))?;
+    let said = String::from_utf8_lossy(&said);
+    // gmsh can report errors and still exit with success.
+    let is_error = |line: &str| line.trim_start().starts_with("Error");
+    if status.success() && made.exists() && !said.lines().any(is_error) {
+        return fs::read(&made).map_err(MeshError::io(&made));
+    }
+    let mut seen = HashSet::new();
+    let lines: Vec<&str> = said.lines().filter(|line| seen.insert(*line)).take(SHOWN).collect();
+    let message = match lines.is_empty() {
+        true => format!("no message, {status}"),
+        false => lines.join("\n"),
+    };
+    Err(MeshError::file(input, format!("gmsh could not {task}:\n{message}")))
+}
+
+/// Waits for gmsh, which is ended with its time or by a signal to this process.
+fn wait(mut gmsh: Child, input: &Path, task: &str) -> Result<ExitStatus, MeshError> {
+    let (started, interrupts) = (Instant::now(), Interrupts::defer());
+    let limit = env::var(SECONDS_VARIABLE).ok().and_then(|text| text.parse().ok());
+    let limit = limit.unwrap_or(SECONDS);
+    loop {
+        if let Some(status) = gmsh.try_wait().map_err(MeshError::io(Path::new("gmsh")))? {
+            return Ok(status);
+        }
+        let late = started.elapsed().as_secs_f64() > limit;
+        let signal = interrupts.received();
+        if late || signal.is_some() {
+            // It may have ended by itself just now.
+            let _ = gmsh.kill();
+            let _ = gmsh.wait();
+        }
+        if let Some(signal) = signal {
+            return Err(MeshError::Interrupted(signal));
+        }
+        if late {
+            let problem = format!(
+                "gmsh could not {task} in {limit} s and was ended; give a larger size, or more time \
+                 in the environment variable {SECONDS_VARIABLE}"
+            );
+            return Err(MeshError::file(input, problem));
+        }
+        sleep(POLL);
+    }
+}
