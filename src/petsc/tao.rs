@@ -68,13 +68,12 @@ impl BoundedQuadratic {
                 check(raw::KSPGetPC(ksp, &mut pc))?;
                 check(raw::PCSetType(pc, kept::NAME.as_ptr()))?;
             }
-            check(raw::TaoSetMaximumIterations(tao, 200))?;
             check(raw::TaoSetFromOptions(tao))?;
             Ok(this)
         }
     }
 
-    /// Minimises from the start `x` until the gradient is about `limit` in ‖·‖₂, and leaves the
+    /// Minimises from the start `x` until the gradient is about `limit` in ‖·‖₂, or `most` iterations were made, and leaves the
     /// minimiser there; bounds may be ±infinite. That TAO did not converge is no error but a negative
     /// `reason`.
     pub(crate) fn minimise(
@@ -83,7 +82,7 @@ impl BoundedQuadratic {
         f: &Vector,
         [lower, upper]: [&Vector; 2],
         x: &mut Vector,
-        limit: f64,
+        (limit, most): (f64, usize),
         preconditioner: &mut dyn KeptPreconditioner,
     ) -> Result<TaoReport, PetscError> {
         for size in [k.owned(), f.owned(), lower.owned(), upper.owned()] {
@@ -104,6 +103,7 @@ impl BoundedQuadratic {
             check(raw::TaoSetObjectiveAndGradient(tao, own, Some(evaluate), context))?;
             check(raw::TaoSetHessian(tao, k.raw(), k.raw(), Some(keep_hessian), context))?;
             check(raw::TaoSetTolerances(tao, limit, 1e-13, 0.0))?;
+            check(raw::TaoSetMaximumIterations(tao, most as i32))?;
             check(raw::TaoGetKSP(tao, &mut ksp))?;
             if !ksp.is_null() {
                 check(raw::KSPSetTolerances(ksp, 1e-12, 0.5 * limit, f64::MAX, 200))?;
