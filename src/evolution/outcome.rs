@@ -135,7 +135,7 @@ impl Outcome {
             self.rescued.get_or_insert((0, solver.to_owned())).0 += 1;
         }
         if let Some(motion) = unconstrained {
-            let first = (0, [record.time; 2], motion.clone());
+            let first = (0, [record.time; 2], *motion);
             let (steps, [_, last], _) = self.unconstrained.get_or_insert(first);
             (*steps, *last) = (*steps + 1, record.time);
         }

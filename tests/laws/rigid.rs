@@ -52,7 +52,7 @@ fn footed(foot: [f64; 2], load: [f64; 2]) -> Mesh {
 #[test]
 fn a_clamped_side_holds_the_body() {
     let motions = motions(square(3), "{ name = 'left', displacement = [0, 0] }");
-    assert!(motions.all_prevented() && motions.free.is_empty() && motions.resisted.len() == 0);
+    assert!(motions.all_prevented() && motions.free.is_empty() && motions.resisted.is_empty());
 }
 
 #[test]
@@ -260,7 +260,7 @@ fn a_disc_in_a_ring_can_only_turn() {
             let motions = &problem.motions;
             let names: Vec<_> = motions.free.iter().map(RigidMotion::to_string).collect();
             assert_eq!(names, ["the rotation about (3.0000, 2.0000)"], "P{order}, {condition}");
-            assert_eq!(motions.resisted.len() > 0, condition == "gap = 0");
+            assert_eq!(!motions.resisted.is_empty(), condition == "gap = 0");
         }
     }
 }

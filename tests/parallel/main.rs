@@ -228,44 +228,62 @@ fn quadratic_displacements_under_a_rolling_load() {
     }
 }
 
-/// Four squares: one pressed on its foundation, one clamped with another that hangs on its corner,
-/// one pulled on both sides; the last two share a point and are a piece.
-const PIECES: &str = r#"
-DefineConstant[ size = 0.25 ];
-Point(1) = {0, 0, 0, size}; Point(2) = {1, 0, 0, size};
-Point(3) = {1, 1, 0, size}; Point(4) = {0, 1, 0, size};
-Point(5) = {2, 0, 0, size}; Point(6) = {3, 0, 0, size};
-Point(7) = {3, 1, 0, size}; Point(8) = {2, 1, 0, size};
-Point(9) = {4, 1, 0, size}; Point(10) = {4, 2, 0, size}; Point(11) = {3, 2, 0, size};
-Point(12) = {5, 0, 0, size}; Point(13) = {6, 0, 0, size};
-Point(14) = {6, 1, 0, size}; Point(15) = {5, 1, 0, size};
+#[test]
+fn a_body_that_may_slide_and_turn_is_the_same_on_all_ranks() {
+    let test_directory = TestDirectory::new();
+    let scene = |load: &str| {
+        format!(
+            "mesh.file = 'square.msh'
+             material = {{ young = 100, poisson = 0.3, plane = 'stress' }}
+             time = {{ end = 1, step = 0.5 }}
+             boundary = [
+                {{ name = 'bottom', gap = '0.01*x' }}, {{ name = 'top', traction = [{load}, '-2*t'] }},
+                {{ name = 'right', traction = ['t', 0] }}, {{ name = 'left', traction = ['-t', 0] }},
+             ]"
+        )
+    };
+    test_directory.write("scene.toml", &scene("0"));
+    for solver in ["active-set", "penalty-duality", "tao"] {
+        for ranks in 1..=2 {
+            let out = format!("{solver}-{ranks}");
+            let arguments = ["run", "scene.toml", "--solver", solver, "--out", &out];
+            let said = ProgramOutput::of(&mut on_ranks(&test_directory, ranks, &arguments));
+            assert_eq!(said.code, Some(0), "{out}: {said:?}");
+            if out != "active-set-1" {
+                same_history(&test_directory, &out, "active-set-1");
+            }
+        }
+    }
+    test_directory.write("scene.toml", &scene("'t'"));
+    let said = ProgramOutput::of(&mut on_ranks(&test_directory, 2, &["run", "scene.toml"]));
+    one_message(&said, 2, "against the horizontal translation");
+}
+
+/// Two squares that meet in the node (1, 1).
+const HINGED: &str = r#"
+Point(1) = {0, 0, 0, 0.5}; Point(2) = {1, 0, 0, 0.5};
+Point(3) = {1, 1, 0, 0.5}; Point(4) = {0, 1, 0, 0.5};
+Point(5) = {2, 1, 0, 0.5}; Point(6) = {2, 2, 0, 0.5}; Point(7) = {1, 2, 0, 0.5};
 Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 4}; Line(4) = {4, 1};
-Line(5) = {5, 6}; Line(6) = {6, 7}; Line(7) = {7, 8}; Line(8) = {8, 5};
-Line(9) = {7, 9}; Line(10) = {9, 10}; Line(11) = {10, 11}; Line(12) = {11, 7};
-Line(13) = {12, 13}; Line(14) = {13, 14}; Line(15) = {14, 15}; Line(16) = {15, 12};
-Curve Loop(1) = {1:4}; Curve Loop(2) = {5:8}; Curve Loop(3) = {9:12}; Curve Loop(4) = {13:16};
-Plane Surface(1) = {1}; Plane Surface(2) = {2}; Plane Surface(3) = {3}; Plane Surface(4) = {4};
-Physical Surface("body") = {1:4};
-Physical Curve("foot") = {1}; Physical Curve("top") = {3}; Physical Curve("clamp") = {8};
-Physical Curve("rest") = {9}; Physical Curve("lid") = {11};
-Physical Curve("pulled right") = {14}; Physical Curve("pulled left") = {16};
+Line(5) = {3, 5}; Line(6) = {5, 6}; Line(7) = {6, 7}; Line(8) = {7, 3};
+Curve Loop(1) = {1:4}; Curve Loop(2) = {5:8}; Plane Surface(1) = {1}; Plane Surface(2) = {2};
+Physical Surface("body") = {1, 2}; Physical Curve("bottom") = {1}; Physical Curve("left") = {4};
+Physical Curve("top") = {7};
 "#;
 
 #[test]
-fn a_mesh_in_pieces_is_refused_on_every_number_of_ranks() {
+fn several_bodies_are_refused_on_any_number_of_ranks() {
     let test_directory = TestDirectory::new();
-    test_directory.write("pieces.geo", PIECES);
-    test_directory.write(
-        "scene.toml",
-        "mesh.file = 'pieces.geo'
-         material = { young = 100, poisson = 0.3, plane = 'stress' }
-         boundary = [
-             { name = 'foot', gap = '0.01*x' }, { name = 'clamp', displacement = [0, 0] },
-         ]",
-    );
-    for ranks in 1..=2 {
+    test_directory.write("hinged.geo", HINGED);
+    let scene = test_directory.read("scene.toml").replace("square.msh", "hinged.geo");
+    test_directory.write("scene.toml", &scene);
+    for ranks in 1..=3 {
         let said = ProgramOutput::of(&mut on_ranks(&test_directory, ranks, &["run", "scene.toml"]));
-        one_message(&said, 2, "the mesh has 3 pieces");
+        one_message(
+            &said,
+            2,
+            "hinged.msh: parts of the mesh meet in a single node only, at (1, 1)",
+        );
     }
 }
 

@@ -133,7 +133,7 @@ impl<'a> ByteReader<'a> {
 
     /// The rest of the line, without surrounding blanks.
     pub fn line(&mut self, what: &str) -> Result<Cow<'a, str>> {
-        let line = self.bytes(what, first_line(self.rest()).len().max(1))?;
+        let line = self.take(what, first_line(self.rest()).len().max(1))?;
         Ok(String::from_utf8_lossy(line.trim_ascii()))
     }
 
@@ -167,16 +167,16 @@ impl<'a> ByteReader<'a> {
     ) -> Result<T> {
         let at = self.position();
         if self.is_binary() {
-            let bytes = self.bytes(what, N)?;
+            let bytes = self.take(what, N)?;
             return Ok(from_bytes(std::array::from_fn(|i| bytes[i])));
         }
         let length = self.rest().iter().take_while(|b| !b.is_ascii_whitespace()).count();
-        let word = String::from_utf8_lossy(self.bytes(what, length.max(1))?);
+        let word = String::from_utf8_lossy(self.take(what, length.max(1))?);
         word.parse().or_else(|_| expected(at, what, word))
     }
 
     /// The next `count` bytes.
-    pub fn bytes(&mut self, what: &str, count: usize) -> Result<&'a [u8]> {
+    fn take(&mut self, what: &str, count: usize) -> Result<&'a [u8]> {
         let Some(bytes) = self.rest().get(..count) else {
             let section = self.section.name;
             let problem = format!(

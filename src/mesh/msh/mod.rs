@@ -67,7 +67,7 @@ pub fn announced_elements(path: &Path) -> std::result::Result<usize, MeshError> 
     }
     let announced = sections_of(&bytes).ok().and_then(|sections| {
         let named = |name| sections.iter().find(|section| section.name == name);
-        let numbers = format(named("MeshFormat")?).ok()?;
+        let numbers = format(named("MeshFormat")?).ok()?.ok()?;
         Some(v4::header(&mut ByteReader::new(named("Elements")?, numbers)).ok()?.1)
     });
     Ok(announced.unwrap_or(0) as usize)
@@ -89,14 +89,8 @@ fn foreign_version(bytes: &[u8]) -> Option<f64> {
         return None;
     }
     let sections = sections_of(bytes).ok()?;
-    let mut reader =
-        ByteReader::new(sections.iter().find(|s| s.name == "MeshFormat")?, Numbers::Text);
-    let version = reader.real("a version").ok()?;
-    let is_binary = reader.int("a file type").ok()? == 1;
-    reader.line("a data size").ok()?;
-    let swapped =
-        is_binary && reader.bytes("the number 1", 4).ok()? == 1_i32.swap_bytes().to_ne_bytes();
-    (version != 4.1 || swapped).then_some(version)
+    let header = sections.iter().find(|section| section.name == "MeshFormat")?;
+    format(header).ok()?.err()
 }
 
 /// What gmsh makes of a file of this version.
@@ -131,7 +125,7 @@ fn contents(sections: &[Section], groups_are_entities: bool) -> Result<Contents>
             not_a_mesh(None)
         };
     };
-    let numbers = format(header)?;
+    let numbers = format(header)?.or_else(|version| expected(header.at, "version 4.1", version))?;
     let names = names(sections)?;
     let mut contents = Contents { names, groups_are_entities, ..Contents::default() };
     // The elements need the groups of their entities.
@@ -158,20 +152,17 @@ fn contents(sections: &[Section], groups_are_entities: bool) -> Result<Contents>
     }
 }
 
-/// `$MeshFormat` of version 4.1: version, text or binary, size of a number; in a binary file then the
-/// integer 1.
-fn format(section: &Section) -> Result<Numbers> {
+/// `$MeshFormat`: version, text or binary, size of a number; in a binary file then the integer 1. The form of
+/// the numbers of version 4.1, or of a file that gmsh must convert its version.
+fn format(section: &Section) -> Result<std::result::Result<Numbers, f64>> {
     let what = "version, file type and data size";
     let mut reader = ByteReader::new(section, Numbers::Text);
-    let at = reader.position();
     let version = reader.real("a version such as 4.1")?;
-    if version != 4.1 {
-        return expected(at, "version 4.1", version);
-    }
     let at = reader.position();
     let (file_type, size) = (reader.int(what)?, reader.int(what)?);
     match file_type {
-        0 => return Ok(Numbers::Text),
+        _ if version != 4.1 => return Ok(Err(version)),
+        0 => return Ok(Ok(Numbers::Text)),
         1 if size == 8 => reader.line(what)?,
         1 => return expected(at, "numbers of 8 bytes", size),
         other => return expected(at, "file type 0 (text) or 1 (binary)", other),
@@ -179,7 +170,8 @@ fn format(section: &Section) -> Result<Numbers> {
     reader.numbers = Numbers::Binary;
     let at = reader.position();
     match reader.int("the number 1")? {
-        1 => Ok(Numbers::Binary),
+        1 => Ok(Ok(Numbers::Binary)),
+        other if other.swap_bytes() == 1 => Ok(Err(version)),
         other => expected(at, "the number 1", other),
     }
 }
