@@ -6,7 +6,7 @@ use super::{
     handle::Handle,
     kept,
     kept::{Context, KeptPreconditioner},
-    options::{c_string, set_default_option},
+    options::{c_string, has_option, set_default_option},
     raw,
     session::world,
     vector::same_size,
@@ -103,7 +103,9 @@ impl BoundedQuadratic {
             check(raw::TaoSetObjectiveAndGradient(tao, own, Some(evaluate), context))?;
             check(raw::TaoSetHessian(tao, k.raw(), k.raw(), Some(keep_hessian), context))?;
             check(raw::TaoSetTolerances(tao, limit, 1e-13, 0.0))?;
-            check(raw::TaoSetMaximumIterations(tao, most as i32))?;
+            if !has_option("-tao_max_it")? {
+                check(raw::TaoSetMaximumIterations(tao, most as i32))?;
+            }
             check(raw::TaoGetKSP(tao, &mut ksp))?;
             if !ksp.is_null() {
                 check(raw::KSPSetTolerances(ksp, 1e-12, 0.5 * limit, f64::MAX, 200))?;

@@ -66,12 +66,14 @@ fn a_hole_is_drawn_empty() {
     // The square without the two triangles of its middle cell.
     let directory = TestDirectory::new();
     let whole = square(3);
-    let cell =
-        |line: &&str| line.ends_with(" 2 2 5 1 6 7 11") || line.ends_with(" 2 2 5 1 6 11 10");
-    assert_eq!(whole.lines().filter(cell).count(), 2);
-    let holed: Vec<&str> = whole.lines().filter(|line| !cell(line)).collect();
-    directory
-        .write("square.msh", &(holed.join("\n").replace("Elements\n30", "Elements\n28") + "\n"));
+    let lines: Vec<&str> = whole.lines().collect();
+    // Each triangle is a block of two lines.
+    let is_cell = |line: &str| line.ends_with(" 6 7 11") || line.ends_with(" 6 11 10");
+    let cell = |i: usize| is_cell(lines[i]) || lines.get(i + 1).is_some_and(|next| is_cell(next));
+    assert_eq!((0..lines.len()).filter(|&i| cell(i)).count(), 4);
+    let holed: Vec<&str> = (0..lines.len()).filter(|&i| !cell(i)).map(|i| lines[i]).collect();
+    let holed = holed.join("\n").replace("Elements\n30 30", "Elements\n28 28") + "\n";
+    directory.write("square.msh", &holed);
     directory.run(&["--set", "time.step=0.5"]);
     let draws = "import numpy as np\n\
          from setting import draw_setting\n\

@@ -7,8 +7,8 @@ use signorini::{
     mesh::Mesh,
 };
 
-/// A thin strip that contact alone keeps from sinking and tilting: its bending is so soft against
-/// its other stiffness that the proximal point iteration around TAO stalls.
+/// A thin strip that contact alone keeps from sinking and tilting: its bending is very soft against its
+/// other stiffness, and few iterations of penalty-duality do not get far.
 fn loose_strip(rescue: bool, iterations: usize) -> DiscreteProblem {
     let text = format!(
         "material = {{ young = 100, poisson = 0.3, plane = 'stress' }}
@@ -26,23 +26,22 @@ fn loose_strip(rescue: bool, iterations: usize) -> DiscreteProblem {
 #[test]
 fn the_active_set_answers_where_others_stop_short() {
     let exact = run(&loose_strip(false, 20), SOLVERS[0]);
-    for solver in ["tao", "penalty-duality"] {
-        let refused = try_run(&loose_strip(false, 20), solver).unwrap_err().to_string();
-        assert!(refused.starts_with(solver), "{refused}");
-        let problem = loose_strip(true, 20);
-        let outcome = run(&problem, solver);
-        assert!(outcome.kkt.within(problem.tolerance));
-        assert!(difference(&outcome.last.state.u, &exact.last.state.u) < 1e-8);
-        assert_eq!(outcome.rescued, Some((1, "active-set".to_owned())));
-        let notes = outcome.notes(&problem);
-        assert!(notes.iter().any(|note| note.ends_with("active-set gave the answer in its place")));
-    }
+    let solver = "penalty-duality";
+    let refused = try_run(&loose_strip(false, 20), solver).unwrap_err().to_string();
+    assert!(refused.starts_with(solver), "{refused}");
+    let problem = loose_strip(true, 20);
+    let outcome = run(&problem, solver);
+    assert!(outcome.kkt.within(problem.tolerance));
+    assert!(difference(&outcome.last.state.u, &exact.last.state.u) < 1e-8);
+    assert_eq!(outcome.rescued, Some((1, "active-set".to_owned())));
+    let notes = outcome.notes(&problem);
+    assert!(notes.iter().any(|note| note.ends_with("active-set gave the answer in its place")));
 }
 
 #[test]
 fn a_type_of_tao_that_is_asked_for_is_not_rescued() {
-    let refused = try_run(&loose_strip(true, 20), "tao:tron").unwrap_err().to_string();
-    assert!(refused.starts_with("tao:tron stopped after"), "{refused}");
+    let refused = try_run(&loose_strip(true, 20), "tao:blmvm").unwrap_err().to_string();
+    assert!(refused.starts_with("tao:blmvm stopped after"), "{refused}");
 }
 
 #[test]
