@@ -75,7 +75,7 @@ impl Factor {
         self.comm
     }
 
-    /// Makes factors of matrices like this one so that [`Self::restrict`] may prescribe these owned unknowns.
+    /// Makes factors of matrices like this one so that these owned unknowns may be prescribed.
     /// Other unknowns than those of the last call discard the present factor. Collective.
     ///
     /// # Errors
