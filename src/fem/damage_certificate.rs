@@ -92,7 +92,7 @@ fn residual(
             let slope = |i: usize| (zeta[i] - zeta[0]) * gradients[i][axis];
             spread * triangle.area() * (slope(1) + slope(2))
         });
-        let steepness = gradients.map(|[dx, dy]| dx.hypot(dy));
+        let steepness = gradients.map(|[dx, dy]| (dx * dx + dy * dy).sqrt());
         let rounding: f64 = zeta.iter().zip(steepness).map(|(z, steep)| steep * z.abs()).sum();
         let rounding = f64::EPSILON * spread * triangle.area() * rounding;
         for (i, (node, [dx, dy])) in nodes.iter().zip(gradients).enumerate() {

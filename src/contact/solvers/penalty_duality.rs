@@ -16,10 +16,12 @@ use serde::Deserialize;
 pub(super) const ENTRY: SolverEntry = SolverEntry {
     name: "penalty-duality",
     summary: "fixed-point iteration of Bermúdez and Moreno on the contact pressure, accelerated",
-    variants: &[],
+    variants: &["plain"],
     rescuer: Some("active-set"),
-    construct: |session, _, options| {
-        let options = options.penalty_duality;
+    construct: |session, variant, options| {
+        let mut options = options.penalty_duality;
+        // As published.
+        options.accelerate &= variant != "plain";
         let fixed_point = FixedPoint { options, omega: options.omega };
         let elastic = ElasticSolver::new(session, ENTRY.name);
         Box::new(PenaltyDuality { session, fixed_point, elastic })
@@ -249,7 +251,8 @@ impl PenaltyDuality<'_> {
             let mut rhs = at_bounds(&|i, w| -w * q[i])?;
             rhs.axpby(1.0, problem.load, 1.0)?;
             let system = LinearSystem { matrix, ..problem.system() };
-            let load = (&rhs, problem.linear_residual());
+            // A solve that leaves more than the law may be missed by would not move any more before that.
+            let load = (&rhs, EXACT * problem.linear_residual());
             elastic.solve(problem, system, load, c, &mut linear)?;
             Ok(problem.at_bounds(c)?)
         };

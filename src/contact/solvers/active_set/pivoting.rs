@@ -42,10 +42,15 @@ impl AtBounds {
 /// deepest tell the shape (as in the algorithm of Remez), and what does lie against the obstacle is halved
 /// each time.
 ///
-/// Where that takes long it may be a cycle, and the dual problem is solved, max over p ≥ 0 of the least
-/// energy (as Lawson and Hanson do, Solving Least Squares Problems, 1974, chapter 23): from p̄ ≥ 0 towards
-/// the forces p of the set, until those of the first indices that pull are zero, which leave it; the locally
-/// deepest join where none pulls. The energy then rises from each p̄ = p to the next, and no set returns.
+/// Where that takes long it may be a cycle, and the dual problem is solved: max over p ≥ 0 of the least energy
+/// Π(p) (as Lawson and Hanson do, Solving Least Squares Problems, 1974, chapter 23). From p̄ ≥ 0 the forces
+/// move towards those of the set, p, until the first that are to pull are zero. Their indices leave the set;
+/// where none pulls, the locally deepest join.
+///
+/// This ends for every convex problem. Π is concave and p its maximum for the set, so Π rises with every move
+/// that is not of length zero. Those that join have p̄ = 0, and ∂Π/∂p̄ > 0 is their depth: as Π rises towards
+/// p, some of their forces are positive. The others may leave by moves of length zero, at most as many as
+/// joined, and then Π rises. So no set has its p̄ = p a second time, and there are finitely many sets.
 ///
 /// Where K is singular and A leaves a rigid motion unconstrained, the body moves as the load drives it
 /// until further bounds are reached.
