@@ -311,7 +311,8 @@ def judge_step(step, u, scale):
     rounding_energy += (PAST * ANSWER) ** 2 * scale[0] * scale[1]
     strain = np.sqrt(max(energy, 0.0) / whole) if whole > 0.0 else 0.0
     figures = f"u differs by {by:.1e}, strains by {strain:.1e}"
-    allowed = ANSWER * easing + LOADS * inexact(step.discrete)
+    of_loads = LOADS * inexact(step.discrete) * np.linalg.norm(step.f) * step.sensitivity()
+    allowed = ANSWER * easing + of_loads / length
     if energy > (ENERGY * easing) ** 2 * max(whole, 0.0) + rounding_energy:
         return Verdict("wrong", figures, by), scale
     sure = by * length > move and easing == 1.0

@@ -10,7 +10,7 @@ use std::{
 pub(crate) const NAME: &CStr = c"kept";
 /// What -ksp_view prints of it.
 const DESCRIPTION: &CStr =
-    c"Cholesky factor, kept for later matrices, with the contact unknowns condensed";
+    c"Cholesky factor, kept for later matrices";
 
 /// What KSP and TAO call as the PC type [`NAME`], during a call of theirs.
 pub(crate) trait KeptPreconditioner {

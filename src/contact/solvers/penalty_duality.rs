@@ -129,9 +129,9 @@ impl FixedPoint {
         }
         let tolerance = problem.tolerance;
         let detail = format!(
-            "the tolerance {tolerance:.1e} is missed by contact pressures {missed:.1e} ({:.1e} times it) \
-             (ω = {omega:.3e} Pa/m)",
-            missed / tolerance
+            "the tolerance {tolerance:.1e} is missed by contact pressures {missed:.1e} ({:.1e} times what it \
+             allows them) (ω = {omega:.3e} Pa/m)",
+            missed / (EXACT * tolerance)
         );
         Err(ContactError::stopped(ENTRY.name, *report, Kkt::UNKNOWN, detail))
     }
