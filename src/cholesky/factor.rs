@@ -260,7 +260,7 @@ impl Factor {
     }
 
     /// Sets E, of the factored matrix and this one; 1 where there is no quotient.
-    pub(super) fn set_scaling(&mut self, matrix: &Matrix) -> Result<(), PetscError> {
+    pub(crate) fn set_scaling(&mut self, matrix: &Matrix) -> Result<(), PetscError> {
         let diagonal = matrix.diagonal()?;
         let root = |(old, new): (&f64, &f64)| match old * new > 0.0 {
             true => (old / new).sqrt(),

@@ -66,24 +66,11 @@ impl LinearSolver {
         owned: usize,
         precision: Precision,
     ) -> Result<Self, PetscError> {
-        Self::with(session, prefix, Factor::new(session, precision), owned)
-    }
-
-    /// The same with a factor of its own.
-    ///
-    /// # Errors
-    /// There is no memory for it.
-    pub fn with(
-        session: &Session,
-        prefix: &str,
-        factor: Factor,
-        owned: usize,
-    ) -> Result<Self, PetscError> {
         let zeros = || Vector::zeros(session, owned);
         Ok(Self {
             ksp: Ksp::new(session, prefix, owned)?,
             prefix: prefix.to_owned(),
-            factor,
+            factor: Factor::new(session, precision),
             chosen: None,
             modified: None,
             residual: zeros()?,
@@ -301,15 +288,17 @@ impl LinearSolver {
         Ok(())
     }
 
-    /// Makes a new factor where one is due, given that the residual is to get as small as `limit`.
+    /// Makes a new factor where one is due, given that the residual is to get as small as `limit`; how many
+    /// it made.
     ///
     /// # Errors
     /// PETSc or CHOLMOD failed.
-    pub fn prepare(&mut self, system: LinearSystem, limit: f64) -> Result<(), PetscError> {
-        if self.factor.iteration_limit(self.asked(limit)).is_none() {
+    pub fn prepare(&mut self, system: LinearSystem, limit: f64) -> Result<usize, PetscError> {
+        let due = self.factor.iteration_limit(self.asked(limit)).is_none();
+        if due {
             system.book(|booking| booking.factorisation, 0.0, || self.factorise(system))?;
         }
-        Ok(())
+        Ok(usize::from(due))
     }
 
     /// Forward elimination: what the residual leaves for the condensed unknowns d. `None` if there is no

@@ -10,7 +10,6 @@
 
 mod certificate;
 mod constraints;
-mod elastic;
 mod error;
 mod kkt;
 mod problem;
@@ -20,7 +19,6 @@ mod solvers;
 
 pub use certificate::{Answer, Certificate, ContactPoint};
 pub use constraints::Constraints;
-pub(crate) use elastic::PREFIX as ELASTIC;
 pub use error::{Conflict, ConstraintError, ContactError};
 pub use kkt::{Kkt, Scales};
 pub use problem::ContactProblem;
@@ -28,6 +26,7 @@ pub use rigid::{DrivenMotion, RigidMotions};
 pub(crate) use rigid::{least_motion, rigid_motion_until_contact, unconstrained_motions};
 pub use rows::{Bound, FixedRow, GapRow};
 pub use solvers::{
-    Anderson, BoxedSolver, ContactOptions, ContactReport, ContactSolver, PenaltyOptions, REGISTRY,
-    SOLVERS, SolverEntry, SolverError, TAO_TYPES, find, solvers, summaries,
+    Anderson, BoxedSolver, ContactOptions, ContactReport, ContactSolver, PREFIX as ELASTIC,
+    PenaltyOptions, REGISTRY, SOLVERS, SolverEntry, SolverError, TAO_TYPES, find, solvers,
+    summaries,
 };

@@ -2,6 +2,7 @@
 
 use super::{Bound, Kkt, Scales};
 use crate::{
+    cholesky::{Booking, LinearSystem},
     petsc::{Communicator, Matrix, PetscError, Session, Vector},
     phases::Phases,
 };
@@ -12,6 +13,8 @@ use nalgebra::{DMatrix, DVector};
 /// The unknowns c are displacements in the nodal bases of the constraints: each bound concerns
 /// one of them, prescribed ones have an identity row and load 0.
 pub struct ContactProblem<'a> {
+    /// PETSc.
+    pub session: &'a Session,
     /// K, N/m.
     pub stiffness: &'a Matrix,
     /// The size of K's diagonal, N/m.
@@ -37,6 +40,28 @@ pub struct ContactProblem<'a> {
 }
 
 impl ContactProblem<'_> {
+    /// K c = f on all unknowns.
+    pub(super) fn system(&self) -> LinearSystem<'_> {
+        let booking = Booking {
+            phases: self.phases,
+            factorisation: "contact/factorisation",
+            restriction: "contact/Schur complement",
+            triangular_solves: "contact/triangular solves",
+            product: "contact/products",
+        };
+        LinearSystem {
+            scale: self.stiffness_scale,
+            booking: Some(booking),
+            ..LinearSystem::of(self.stiffness)
+        }
+    }
+
+    /// The same with unknowns prescribed, all of them bounded.
+    pub(super) fn system_with<'a>(&'a self, prescribed: &'a [usize]) -> LinearSystem<'a> {
+        let prescribed = (self.bound_count() > 0).then_some(prescribed);
+        LinearSystem { prescribed, ..self.system() }
+    }
+
     /// ‖residual‖₂ that linear systems are solved to, N: below what the KKT residuals may be.
     pub(super) fn linear_residual(&self) -> f64 {
         0.3 * self.tolerance * self.scales.force
@@ -69,8 +94,8 @@ impl ContactProblem<'_> {
     }
 
     /// Kc − f, N.
-    pub(super) fn residual(&self, session: &Session, c: &Vector) -> Result<Vector, PetscError> {
-        let mut residual = Vector::zeros(session, c.owned())?;
+    pub(super) fn residual(&self, c: &Vector) -> Result<Vector, PetscError> {
+        let mut residual = Vector::zeros(self.session, c.owned())?;
         self.stiffness.multiply(c, &mut residual)?;
         residual.axpby(-1.0, self.load, 1.0)?;
         Ok(residual)
@@ -78,8 +103,8 @@ impl ContactProblem<'_> {
 
     /// The KKT residuals of `c` by the assembled K (the final word has the
     /// [`Certificate`](super::Certificate)).
-    pub(super) fn residuals(&self, session: &Session, c: &Vector) -> Result<Kkt, PetscError> {
-        let residual = self.residual(session, c)?;
+    pub(super) fn residuals(&self, c: &Vector) -> Result<Kkt, PetscError> {
+        let residual = self.residual(c)?;
         let scales = self.scales_at(c)?;
         residual.read(|r| {
             c.read(|c| {

@@ -13,55 +13,39 @@ pub use anderson::Anderson;
 pub use penalty_duality::PenaltyOptions;
 pub use tao::TAO_TYPES;
 
-use super::{ContactError, ContactProblem};
+use super::{ContactError, ContactProblem, Kkt};
 use crate::{
-    archive::{Archive, ArchiveError},
-    cholesky::LinearSolver,
-    petsc::{Session, Vector},
+    cholesky::{LinearSolver, SolveReport},
+    petsc::Vector,
 };
 use active_set::ActiveSet;
 use serde::Deserialize;
 
-/// A method for the contact problem.
+/// What PETSc options of the linear systems with K begin with.
+pub const PREFIX: &str = "elastic_";
+
+/// A method for the contact problem. It keeps nothing between solves.
 pub trait ContactSolver {
     /// The name a scene or `--solver` calls it by.
     fn name(&self) -> &'static str;
 
-    /// What the method keeps for the next solve besides `c` (a set, a multiplier), as numbers.
-    fn warm_start(&self) -> Vec<f64> {
-        Vec::new()
-    }
-
-    /// Goes back to an earlier [`Self::warm_start`], as if the solves since then had not been;
-    /// with nothing, to that of a new solver.
-    fn set_warm_start(&mut self, _kept: &[f64]) {}
-
-    /// Saves or loads what else it keeps from solve to solve: factors, estimates.
-    ///
-    /// # Errors
-    /// The archive is of another solver.
-    fn archive(&mut self, _archive: &mut Archive) -> Result<(), ArchiveError> {
-        Ok(())
-    }
-
-    /// The solver of linear systems with K, of an earlier ζ and another active set, if the method keeps one.
-    fn into_linear_solver(self: Box<Self>) -> Option<LinearSolver> {
-        None
-    }
-
-    /// Solves from the start `c` and leaves the solution there.
+    /// Solves from the start `c` and leaves the solution there. `elastic` solves the linear systems with K;
+    /// its factor may be that of an earlier K. `warm` is what the method left for the next solve (a set,
+    /// a parameter), empty at first.
     ///
     /// # Errors
     /// The method stopped short of the tolerance, or PETSc failed.
     fn solve(
-        &mut self,
+        &self,
         problem: &ContactProblem,
+        elastic: &mut LinearSolver,
+        warm: &mut Vec<f64>,
         c: &mut Vector,
     ) -> Result<ContactReport, ContactError>;
 }
 
 /// A solver of one kind or another.
-pub type BoxedSolver<'s> = Box<dyn ContactSolver + 's>;
+pub type BoxedSolver = Box<dyn ContactSolver>;
 
 /// What a contact solve took.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -87,6 +71,19 @@ pub struct ContactReport {
 }
 
 impl ContactReport {
+    /// Adds a linear solve of a method.
+    ///
+    /// # Errors
+    /// It did not converge.
+    fn add_solve(&mut self, method: &str, solve: SolveReport) -> Result<(), ContactError> {
+        self.linear_iterations += solve.iterations;
+        self.factorisations += solve.factorisations;
+        let detail = "the stiffness of its linear system is not positive definite, or too \
+                      ill-conditioned for the tolerance";
+        let stopped = || ContactError::stopped(method, *self, Kkt::UNKNOWN, detail);
+        solve.converged.then_some(()).ok_or_else(stopped)
+    }
+
     /// Adds what a further solve of the same problem took.
     pub fn add(&mut self, further: &Self) {
         self.iterations += further.iterations;
@@ -111,7 +108,7 @@ pub struct SolverEntry {
     /// The solver that is asked in its place where it stops short.
     pub rescuer: Option<&'static str>,
     /// A new one; the text is the variant, or empty.
-    pub construct: for<'s> fn(&'s Session, &str, &ContactOptions) -> BoxedSolver<'s>,
+    pub construct: fn(&str, &ContactOptions) -> BoxedSolver,
 }
 
 /// All solvers of problems with obstacles, the default first.
@@ -204,18 +201,17 @@ fn alike(name: &str) -> String {
 ///
 /// # Errors
 /// There is none of that name.
-pub fn solvers<'s>(
-    session: &'s Session,
+pub fn solvers(
     name: &str,
     bounded: bool,
     options: &ContactOptions,
-) -> Result<(BoxedSolver<'s>, Option<BoxedSolver<'s>>), SolverError> {
+) -> Result<(BoxedSolver, Option<BoxedSolver>), SolverError> {
     let (entry, variant) = find(name)?;
     if !bounded {
-        return Ok((Box::new(ActiveSet::new(session, "linear")), None));
+        return Ok((Box::new(ActiveSet { name: "linear" }), None));
     }
     let rescuer = entry.rescuer.filter(|_| options.rescue && variant.is_empty());
     let rescuer = rescuer.map(find).transpose()?;
-    let construct = |entry: &SolverEntry, variant| (entry.construct)(session, variant, options);
+    let construct = |entry: &SolverEntry, variant| (entry.construct)(variant, options);
     Ok((construct(entry, variant), rescuer.map(|(entry, variant)| construct(entry, variant))))
 }

@@ -23,7 +23,8 @@ use super::{
 };
 use crate::{
     archive::{Archive, ArchiveError},
-    contact::{self, ContactSolver, Scales},
+    cholesky::{LinearSolver, Precision},
+    contact::{self, BoxedSolver, Scales},
     fem::Stiffness,
     petsc::{PetscError, Session, Vector},
 };
@@ -39,9 +40,11 @@ pub struct ContactStep<'a> {
     session: &'a Session,
     problem: &'a DiscreteProblem,
     phases: &'a Phases,
-    solver: Box<dyn ContactSolver + 'a>,
+    solver: BoxedSolver,
     /// Who is asked where the solver stops short.
-    rescuer: Option<Box<dyn ContactSolver + 'a>>,
+    rescuer: Option<BoxedSolver>,
+    /// Solves the linear systems of both.
+    elastic: LinearSolver,
     stiffness: Stiffness,
     /// The triangle means of η_*(ζ) that K was filled with.
     zeta_at_points: Vec<f64>,
@@ -68,7 +71,7 @@ struct Memory {
     scales: Scales,
     /// Of each bound 1 if it is active, else 0.
     active: Vec<f64>,
-    /// The solver's warm start.
+    /// What the solver starts with.
     warm_start: Vec<f64>,
 }
 
@@ -96,7 +99,9 @@ impl<'a> ContactStep<'a> {
         })?;
         let options = &problem.scene().contact;
         let bounded = comm.any(!constraints.bounds.is_empty());
-        let (solver, rescuer) = contact::solvers(session, solver, bounded, options)?;
+        let (solver, rescuer) = contact::solvers(solver, bounded, options)?;
+        // Half the digits are enough for a preconditioner, and half the bytes to read.
+        let precision = Precision::Preconditioner;
         let memory = Memory {
             datum: Datum::default(),
             scales: Scales { force: LEAST_LOAD * problem.largest_load, displacement: 0.0 },
@@ -109,6 +114,7 @@ impl<'a> ContactStep<'a> {
             phases,
             solver,
             rescuer,
+            elastic: LinearSolver::new(session, contact::ELASTIC, unknowns, precision)?,
             stiffness,
             zeta_at_points: body.at_points(&vec![1.0; body.mesh.nodes.len()]),
             load: Vector::zeros(session, unknowns)?,
@@ -121,8 +127,8 @@ impl<'a> ContactStep<'a> {
         })
     }
 
-    /// Gives the solver a warm start as its own `warm_start` would: for the active set a 1
-    /// for each bound that is guessed to be active, else 0.
+    /// Gives the solver a warm start as it leaves one itself: for the active set a 1 for each bound that is
+    /// guessed to be active, else 0.
     pub fn set_warm_start(&mut self, warm_start: &[f64]) {
         self.accepted.warm_start = warm_start.to_vec();
     }
@@ -173,7 +179,6 @@ impl<'a> ContactStep<'a> {
         let mut c = self.c.read(<[f64]>::to_vec)?;
         self.next.datum.shift(&problem.constraints, &mut c, 1.0);
         self.phases.time("extrapolation", || self.extrapolation.accept(comm, time, c));
-        self.next.warm_start = self.solver.warm_start();
         self.accepted = self.next.clone();
         Ok(())
     }
@@ -182,8 +187,7 @@ impl<'a> ContactStep<'a> {
     pub(super) fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
         archive.value(&mut self.accepted)?;
         self.extrapolation.archive(archive)?;
-        self.solver.archive(archive)?;
-        self.rescuer.iter_mut().try_for_each(|rescuer| rescuer.archive(archive))
+        self.elastic.factor().archive(archive)
     }
 
     /// Starts from the accepted steps: sets c, the datum and the solver's warm start. Where the active
@@ -193,7 +197,6 @@ impl<'a> ContactStep<'a> {
         let (problem, comm) = (self.problem, self.problem.body.nodes.partition.comm());
         let constraints = &problem.constraints;
         self.next = self.accepted.clone();
-        self.solver.set_warm_start(&self.next.warm_start);
         let Memory { datum, active, .. } = &mut self.next;
         let unloaded = comm.all(case.load.iter().chain(&case.lift).all(|&value| value == 0.0));
         if unloaded {

@@ -3,6 +3,7 @@
 use crate::support::{close, history, problem};
 use nalgebra::{DMatrix, DVector};
 use signorini::{
+    cholesky::{LinearSolver, Precision},
     contact::{
         Bound, ContactError, ContactOptions, ContactProblem, ContactReport, SOLVERS, Scales, find,
         solvers,
@@ -52,6 +53,7 @@ impl Small {
         };
         let bounds: Vec<_> = self.gaps.iter().enumerate().map(bound).collect();
         let problem = ContactProblem {
+            session: &session,
             stiffness: &matrix,
             stiffness_scale: self.stiffness.trace() / size as f64,
             load: &load,
@@ -67,11 +69,12 @@ impl Small {
             phases: &Phases::default(),
         };
         let options = ContactOptions::default();
-        let (mut solver, _) = solvers(&session, name, true, &options).unwrap();
-        if name == "active-set" {
-            solver.set_warm_start(guess);
-        }
-        let report = solver.solve(&problem, &mut c)?;
+        let (solver, _) = solvers(name, true, &options).unwrap();
+        let mut elastic =
+            LinearSolver::new(&session, "elastic_", size, Precision::Preconditioner).unwrap();
+        elastic.factor().set_condensed(&matrix, 0..size).unwrap();
+        let mut warm = if name == "active-set" { guess.to_vec() } else { Vec::new() };
+        let report = solver.solve(&problem, &mut elastic, &mut warm, &mut c)?;
         Ok((c.read(<[f64]>::to_vec).unwrap(), report))
     }
 

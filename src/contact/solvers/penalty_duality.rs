@@ -5,10 +5,9 @@ mod omega;
 
 use super::{Anderson, ContactReport, ContactSolver, SolverEntry};
 use crate::{
-    archive::{Archive, ArchiveError},
     cholesky::{Condensed, LinearSolver, LinearSystem},
-    contact::{Bound, ContactError, ContactProblem, Kkt, elastic::ElasticSolver},
-    petsc::{Matrix, Session, Vector},
+    contact::{Bound, ContactError, ContactProblem, Kkt},
+    petsc::{Matrix, Vector},
 };
 use omega::estimate_omega;
 use serde::Deserialize;
@@ -18,13 +17,11 @@ pub(super) const ENTRY: SolverEntry = SolverEntry {
     summary: "fixed-point iteration of Bermúdez and Moreno on the contact pressure, accelerated",
     variants: &["plain"],
     rescuer: Some("active-set"),
-    construct: |session, variant, options| {
+    construct: |variant, options| {
         let mut options = options.penalty_duality;
         // As published.
         options.accelerate &= variant != "plain";
-        let fixed_point = FixedPoint { options, omega: options.omega };
-        let elastic = ElasticSolver::new(session, ENTRY.name);
-        Box::new(PenaltyDuality { session, fixed_point, elastic })
+        Box::new(PenaltyDuality { options })
     },
 };
 
@@ -36,10 +33,10 @@ pub(super) const ENTRY: SolverEntry = SolverEntry {
 /// an earlier K, an outer iteration corrects them: with c and p from the small problem, the forces that K finds
 /// left, f − Kc − BᵀWp, are the load of the next one. Without condensation every step 1 is a solve with
 /// K + ωBᵀWB.
-struct PenaltyDuality<'s> {
-    session: &'s Session,
-    fixed_point: FixedPoint,
-    elastic: ElasticSolver<'s>,
+///
+/// What it leaves to the next solve is ω, where it has estimated that.
+struct PenaltyDuality {
+    options: PenaltyOptions,
 }
 
 /// With G = ∂I₍ₗ,ᵤ₎ of the bounds l ≤ Bu ≤ u (mostly l = −∞, u = g) and its Yosida approximation
@@ -51,10 +48,10 @@ struct PenaltyDuality<'s> {
 /// B picks the bounded unknowns, W their tributary lengths; p = q + ω Bu is the contact pressure
 /// at the fixed point, which gives the first q from the start u. [`Anderson`] mixes the iterates:
 /// measured on this project's scenes, 11 to 30 iterations instead of 200 to 600.
-struct FixedPoint {
-    options: PenaltyOptions,
-    /// ω, Pa/m, once estimated.
-    omega: Option<f64>,
+struct FixedPoint<'a> {
+    options: &'a PenaltyOptions,
+    /// ω, Pa/m, or nothing before it is estimated.
+    omega: &'a mut Vec<f64>,
 }
 
 /// Step 1: Bu for ω and q.
@@ -90,7 +87,7 @@ impl Default for PenaltyOptions {
     }
 }
 
-impl FixedPoint {
+impl FixedPoint<'_> {
     /// Iterates from the contact forces p and Bu until the contact law is missed by at most [`EXACT`] of the
     /// tolerance. Returns the contact forces W (q + ω Bu), N, that u belongs to.
     fn find(
@@ -138,11 +135,13 @@ impl FixedPoint {
 
     /// ω, estimated in the first solve.
     fn omega(&mut self, problem: &ContactProblem, respond: Response) -> Result<f64, ContactError> {
-        let omega = match self.omega {
-            Some(omega) => omega,
-            None => estimate_omega(problem, respond)?,
-        };
-        Ok(*self.omega.insert(omega))
+        if let Some(omega) = self.options.omega {
+            return Ok(omega);
+        }
+        if self.omega.is_empty() {
+            self.omega.push(estimate_omega(problem, respond)?);
+        }
+        Ok(self.omega[0])
     }
 
     /// Step 2: the next q, where Bu is `normal`.
@@ -179,112 +178,103 @@ impl FixedPoint {
     }
 }
 
-impl PenaltyDuality<'_> {
-    /// The fixed point in the small problem, whose forces the full one corrects.
-    fn solve_condensed(
-        &mut self,
-        problem: &ContactProblem,
-        c: &mut Vector,
-    ) -> Result<ContactReport, ContactError> {
-        let Self { fixed_point, elastic, .. } = self;
-        let (system, limit) = (problem.system(), problem.linear_residual());
-        let mut report = ContactReport::default();
-        elastic.start(problem, system, c)?;
-        let at_bounds = |p: &[f64]| problem.bounds.iter().map(|b| p[b.dof]).collect::<Vec<_>>();
-        let mut p = elastic.forces(at_bounds)?;
-        for _ in 0..OUTER {
-            let start = problem.at_bounds(c)?;
-            let condensed = elastic.condense(problem, system, &mut report)?;
-            let mut condensed =
-                condensed.ok_or(ContactError::NotDefinite { method: ENTRY.name })?;
-            p = fixed_point.find_condensed(problem, &p, &start, &mut condensed, &mut report)?;
-            elastic.expand(problem, system, true, c)?;
-            report.linear_iterations += 1;
-            // What is left of the forces beside those of contact.
-            let left = elastic.forces(|forces| {
-                let mut forces = forces.to_vec();
-                problem.bounds.iter().zip(&p).for_each(|(bound, p)| forces[bound.dof] -= p);
-                problem.comm.total(forces.iter().map(|f| f * f).sum()).sqrt()
-            })?;
-            if left <= limit {
-                elastic.end_solve(report.linear_iterations, left, limit);
-                return Ok(report);
-            }
-            if elastic.is_slow(report.linear_iterations, limit) || !left.is_finite() {
-                elastic.factorise(problem, system, &mut report)?;
-            }
-        }
-        let detail = "the forces that the small problem leaves do not get small enough";
-        Err(ContactError::stopped(ENTRY.name, report, Kkt::UNKNOWN, detail))
-    }
-
-    /// The fixed point with solves of all unknowns.
-    fn solve_whole(
-        &mut self,
-        problem: &ContactProblem,
-        c: &mut Vector,
-    ) -> Result<ContactReport, ContactError> {
-        let Self { session, fixed_point, elastic } = self;
-        let p = problem.at_bounds(&problem.residual(session, c)?)?;
-        let p: Vec<f64> = p.into_iter().map(|p| -p).collect();
+/// The fixed point in the small problem, whose forces the full one corrects.
+fn solve_condensed(
+    mut fixed_point: FixedPoint,
+    problem: &ContactProblem,
+    elastic: &mut LinearSolver,
+    c: &mut Vector,
+) -> Result<ContactReport, ContactError> {
+    let (system, limit) = (problem.system(), problem.linear_residual());
+    let mut report = ContactReport::default();
+    elastic.start(system, problem.load, c, limit)?;
+    let mut p = problem.at_bounds(elastic.residual())?;
+    for _ in 0..OUTER {
         let start = problem.at_bounds(c)?;
-        let (mut report, mut linear) = <(ContactReport, ContactReport)>::default();
-        let mut penalised: Option<(f64, Matrix)> = None;
-        let mut respond = |omega: f64, q: &[f64]| {
-            let at_bounds = |value: &dyn Fn(usize, f64) -> f64| {
-                let mut vector = Vector::zeros(session, c.owned())?;
-                vector.write(|v| {
-                    for (i, bound) in problem.bounds.iter().enumerate() {
-                        v[bound.dof] = value(i, bound.tributary_length);
-                    }
-                })?;
-                Ok::<_, ContactError>(vector)
-            };
-            let matrix = match &mut penalised {
-                Some((of, matrix)) if *of == omega => matrix,
-                other => {
-                    let mut matrix = problem.stiffness.duplicate()?;
-                    matrix.add_diagonal(&at_bounds(&|_, w| omega * w)?)?;
-                    &mut other.insert((omega, matrix)).1
-                }
-            };
-            let mut rhs = at_bounds(&|i, w| -w * q[i])?;
-            rhs.axpby(1.0, problem.load, 1.0)?;
-            let system = LinearSystem { matrix, ..problem.system() };
-            // A solve that leaves more than the law may be missed by would not move any more before that.
-            let load = (&rhs, EXACT * problem.linear_residual());
-            elastic.solve(problem, system, load, c, &mut linear)?;
-            Ok(problem.at_bounds(c)?)
-        };
-        let omega = fixed_point.omega(problem, &mut respond)?;
-        fixed_point.find(problem, omega, [&p, &start], &mut respond, &mut report)?;
-        let ContactReport { linear_iterations, factorisations, .. } = linear;
-        Ok(ContactReport { linear_iterations, factorisations, ..report })
+        report.factorisations += elastic.prepare(system, limit)?;
+        let condensed = elastic.condense(system)?;
+        let mut condensed = condensed.ok_or(ContactError::NotDefinite { method: ENTRY.name })?;
+        p = fixed_point.find_condensed(problem, &p, &start, &mut condensed, &mut report)?;
+        elastic.expand(system, true, c)?;
+        report.linear_iterations += 1;
+        // What is left of the forces beside those of contact.
+        let left = elastic.residual().read(|forces| {
+            let mut forces = forces.to_vec();
+            problem.bounds.iter().zip(&p).for_each(|(bound, p)| forces[bound.dof] -= p);
+            problem.comm.total(forces.iter().map(|f| f * f).sum()).sqrt()
+        })?;
+        if left <= limit {
+            elastic.end_solve(report.linear_iterations, left, limit);
+            return Ok(report);
+        }
+        if elastic.is_slow(report.linear_iterations, limit) || !left.is_finite() {
+            report.factorisations += 1;
+            elastic.factorise(system)?;
+        }
     }
+    let detail = "the forces that the small problem leaves do not get small enough";
+    Err(ContactError::stopped(ENTRY.name, report, Kkt::UNKNOWN, detail))
 }
 
-impl ContactSolver for PenaltyDuality<'_> {
+/// The fixed point with solves of all unknowns.
+fn solve_whole(
+    mut fixed_point: FixedPoint,
+    problem: &ContactProblem,
+    elastic: &mut LinearSolver,
+    c: &mut Vector,
+) -> Result<ContactReport, ContactError> {
+    let p: Vec<f64> = problem.at_bounds(&problem.residual(c)?)?.into_iter().map(|p| -p).collect();
+    let start = problem.at_bounds(c)?;
+    let (mut report, mut linear) = <(ContactReport, ContactReport)>::default();
+    let mut penalised: Option<(f64, Matrix)> = None;
+    let mut respond = |omega: f64, q: &[f64]| {
+        let at_bounds = |value: &dyn Fn(usize, f64) -> f64| {
+            let mut vector = Vector::zeros(problem.session, c.owned())?;
+            vector.write(|v| {
+                for (i, bound) in problem.bounds.iter().enumerate() {
+                    v[bound.dof] = value(i, bound.tributary_length);
+                }
+            })?;
+            Ok::<_, ContactError>(vector)
+        };
+        let matrix = match &mut penalised {
+            Some((of, matrix)) if *of == omega => matrix,
+            other => {
+                let mut matrix = problem.stiffness.duplicate()?;
+                matrix.add_diagonal(&at_bounds(&|_, w| omega * w)?)?;
+                &mut other.insert((omega, matrix)).1
+            }
+        };
+        let mut rhs = at_bounds(&|i, w| -w * q[i])?;
+        rhs.axpby(1.0, problem.load, 1.0)?;
+        let system = LinearSystem { matrix, ..problem.system() };
+        // A solve that leaves more than the law may be missed by would not move any more before that.
+        let limit = EXACT * problem.linear_residual();
+        linear.add_solve(ENTRY.name, elastic.solve_renewing(system, &rhs, c, limit)?)?;
+        Ok(problem.at_bounds(c)?)
+    };
+    let omega = fixed_point.omega(problem, &mut respond)?;
+    fixed_point.find(problem, omega, [&p, &start], &mut respond, &mut report)?;
+    let ContactReport { linear_iterations, factorisations, .. } = linear;
+    Ok(ContactReport { linear_iterations, factorisations, ..report })
+}
+
+impl ContactSolver for PenaltyDuality {
     fn name(&self) -> &'static str {
         ENTRY.name
     }
 
-    fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
-        archive.value(&mut self.fixed_point.omega)?;
-        self.elastic.archive(archive)
-    }
-
-    fn into_linear_solver(self: Box<Self>) -> Option<LinearSolver> {
-        self.elastic.into_linear_solver()
-    }
-
     fn solve(
-        &mut self,
+        &self,
         problem: &ContactProblem,
+        elastic: &mut LinearSolver,
+        warm: &mut Vec<f64>,
         c: &mut Vector,
     ) -> Result<ContactReport, ContactError> {
-        match self.elastic.is_condensed(problem)? {
-            true => self.solve_condensed(problem, c),
-            false => self.solve_whole(problem, c),
+        let fixed_point = FixedPoint { options: &self.options, omega: warm };
+        match elastic.is_condensed(problem.stiffness)? {
+            true => solve_condensed(fixed_point, problem, elastic, c),
+            false => solve_whole(fixed_point, problem, elastic, c),
         }
     }
 }

@@ -2,18 +2,20 @@
 
 use super::{ContactReport, ContactSolver, SolverEntry};
 use crate::{
-    archive::{Archive, ArchiveError},
-    cholesky::{Factor, Precision, Reduction},
+    cholesky::{Factor, LinearSolver, Reduction},
     contact::{Bound, ContactError, ContactProblem, Kkt},
-    petsc::{BoundedQuadratic, KeptPreconditioner, Matrix, PetscError, Session, TaoReport, Vector},
+    petsc::{BoundedQuadratic, KeptPreconditioner, Matrix, PetscError, TaoReport, Vector},
 };
+use std::iter;
 
 pub(super) const ENTRY: SolverEntry = SolverEntry {
     name: "tao",
     summary: "PETSc's TAO, trust-region Newton method tron; tao:TYPE for its other types",
     variants: &TAO_TYPES,
     rescuer: Some("active-set"),
-    construct: |session, kind, _| Box::new(Tao::new(session, kind)),
+    construct: |kind, _| {
+        Box::new(Tao { kind: if kind.is_empty() { "tron" } else { kind }.to_owned() })
+    },
 };
 
 /// TAO's types for bounded variables, reached as `tao:TYPE`; some of them stall or err on
@@ -34,14 +36,9 @@ pub const TAO_TYPES: [&str; 12] = [
 ///
 /// Where K is singular, ½ρ|x − c/U|² with the last answer c is added (proximal point method,
 /// Rockafellar, SIAM J. Control Optim. 14, 1976). TAO is called again with the U it found until the
-/// KKT residuals are met, each time from the last answer.
-struct Tao<'s> {
-    session: &'s Session,
+/// KKT residuals are met, each time from the last answer. What it leaves to the next solve is U.
+struct Tao {
     kind: String,
-    tao: Option<BoundedQuadratic>,
-    factor: Factor,
-    /// U of the last solve, m; 0 before the first.
-    displacement: f64,
 }
 
 /// Calls of TAO for one contact problem, more where the proximal term slows them; and of these how
@@ -61,14 +58,7 @@ const BOX: f64 = 1e2;
 /// PETSC_INFINITY.
 const INFINITE: f64 = f64::MAX / 4.0;
 
-impl<'s> Tao<'s> {
-    /// With TAO's type `kind`, or `tron`.
-    fn new(session: &'s Session, kind: &str) -> Self {
-        let kind = if kind.is_empty() { "tron" } else { kind }.to_owned();
-        let factor = Factor::new(session, Precision::Preconditioner);
-        Self { session, kind, tao: None, factor, displacement: 0.0 }
-    }
-
+impl Tao {
     /// The solver's name, with its variant.
     fn method(&self) -> String {
         format!("{}:{}", ENTRY.name, self.kind)
@@ -76,19 +66,15 @@ impl<'s> Tao<'s> {
 
     /// Calls TAO from c for K/s + ρI = `stiffness` and U = `unit`, and leaves its answer in c.
     fn minimise(
-        &mut self,
+        &self,
         problem: &ContactProblem,
-        stiffness: &Matrix,
+        (tao, kept): (&mut BoundedQuadratic, &mut TaoPreconditioner),
         (proximal, most): (f64, usize),
         unit: f64,
         c: &mut Vector,
     ) -> Result<TaoReport, ContactError> {
-        let tao = match &mut self.tao {
-            Some(tao) => tao,
-            none => none.insert(BoundedQuadratic::new(self.session, &self.kind)?),
-        };
         let vector = |values: Vec<f64>| -> Result<Vector, PetscError> {
-            let mut vector = Vector::zeros(self.session, values.len())?;
+            let mut vector = Vector::zeros(problem.session, values.len())?;
             vector.set(&values)?;
             Ok(vector)
         };
@@ -108,8 +94,7 @@ impl<'s> Tao<'s> {
         let mut x = vector(start.iter().map(|c| c / unit).collect())?;
         let goal = (problem.linear_residual() / force, most);
         let bounds = [&lower, &upper];
-        let mut kept = TaoPreconditioner { k: stiffness, factor: &mut self.factor };
-        let answer = tao.minimise(stiffness, &load, bounds, &mut x, goal, &mut kept);
+        let answer = tao.minimise(kept.k, &load, bounds, &mut x, goal, kept);
         let method = self.method();
         let answer = answer.map_err(|source| ContactError::Failed { method, source })?;
         c.write(|c| x.read(|x| c.iter_mut().zip(x).for_each(|(c, x)| *c = x * unit)))??;
@@ -117,26 +102,16 @@ impl<'s> Tao<'s> {
     }
 }
 
-impl ContactSolver for Tao<'_> {
+impl ContactSolver for Tao {
     fn name(&self) -> &'static str {
         ENTRY.name
     }
 
-    fn warm_start(&self) -> Vec<f64> {
-        vec![self.displacement]
-    }
-
-    fn set_warm_start(&mut self, kept: &[f64]) {
-        self.displacement = kept.first().copied().unwrap_or(0.0);
-    }
-
-    fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
-        self.factor.archive(archive)
-    }
-
     fn solve(
-        &mut self,
+        &self,
         problem: &ContactProblem,
+        elastic: &mut LinearSolver,
+        warm: &mut Vec<f64>,
         c: &mut Vector,
     ) -> Result<ContactReport, ContactError> {
         let (proximal, calls) =
@@ -147,28 +122,31 @@ impl ContactSolver for Tao<'_> {
             problem.bounds.iter().map(|bound| bound.nearest(0.0).abs()).fold(0.0, f64::max);
         let estimate = problem.max_norm(problem.load)? / problem.stiffness_scale;
         let estimate = estimate.max(problem.comm.max(pushed));
-        let mut unit = if self.displacement > 0.0 { self.displacement } else { estimate };
-
-        // What an interior point method adds to the diagonal is in its operator alone.
-        if self.kind != "bqpip" {
-            self.factor.set_condensed(&stiffness, problem.bounds.iter().map(|bound| bound.dof))?;
+        let mut unit = warm.first().copied().unwrap_or(estimate);
+        let factor = elastic.factor();
+        if self.kind == "bqpip" {
+            // What an interior point method adds to the diagonal is in its operator alone.
+            factor.set_condensed(&stiffness, iter::empty())?;
         }
+        let mut tao = BoundedQuadratic::new(problem.session, &self.kind)?;
+        let mut kept = TaoPreconditioner { k: &stiffness, factor };
         let mut report = ContactReport::default();
         let (mut reason, mut residuals) = (0, Kkt::default());
         let (mut best, mut stalled) = (f64::INFINITY, 0);
         for call in 0..calls {
             let most = if call > 0 && proximal > 0.0 { FURTHER_ITERATIONS } else { ITERATIONS };
-            let factorisations = self.factor.factorisations();
-            let answer = self.minimise(problem, &stiffness, (proximal, most), unit, c)?;
+            let factorisations = kept.factor.factorisations();
+            let call = (&mut tao, &mut kept);
+            let answer = self.minimise(problem, call, (proximal, most), unit, c)?;
             report.iterations += answer.iterations;
             report.linear_iterations += answer.linear_iterations;
-            report.factorisations += self.factor.factorisations() - factorisations;
+            report.factorisations += kept.factor.factorisations() - factorisations;
             reason = answer.reason;
             let found = problem.max_norm(c)?;
             if found > 0.0 {
-                (unit, self.displacement) = (found, found);
+                (unit, *warm) = (found, vec![found]);
             }
-            residuals = problem.residuals(self.session, c)?;
+            residuals = problem.residuals(c)?;
             if residuals.within(0.5 * problem.tolerance) {
                 return Ok(report);
             }

@@ -2,8 +2,8 @@
 
 use super::{ContactStep, active_bounds, displacement};
 use crate::{
-    cholesky::{LinearSolver, LinearSystem, Precision},
-    contact::{self, ContactPoint},
+    cholesky::{LinearSolver, LinearSystem},
+    contact::ContactPoint,
     evolution::{DiscreteProblem, Outcome, State, Step},
     fem::{RigidMotion, Stiffness},
     petsc::{PetscError, Vector},
@@ -89,19 +89,11 @@ pub(in crate::evolution) struct Compliance<'a> {
 }
 
 impl<'a> ContactStep<'a> {
-    /// With the solver's factor, or one of its own.
+    /// With the factor of the last solve.
     pub(in crate::evolution) fn into_compliance(self) -> Result<Compliance<'a>, PetscError> {
-        let Self { session, problem, stiffness, solver, load, c, .. } = self;
-        let mut solver = match solver.into_linear_solver() {
-            Some(solver) => solver,
-            None => {
-                let (prefix, owned) = (contact::ELASTIC, load.owned());
-                LinearSolver::new(session, prefix, owned, Precision::Preconditioner)?
-            }
-        };
-        solver
-            .factor()
-            .set_condensed(&stiffness.matrix, problem.constraints.bounds.iter().map(|b| b.dof))?;
+        let Self { problem, stiffness, elastic: mut solver, load, c, .. } = self;
+        let bounded = problem.constraints.bounds.iter().map(|bound| bound.dof);
+        solver.factor().set_condensed(&stiffness.matrix, bounded)?;
         let (stiffness, active) = (Some(stiffness), Vec::new());
         Ok(Compliance {
             problem,
@@ -200,7 +192,9 @@ impl Compliance<'_> {
                 self.solver.factorise(system(self.problem, stiffness, &self.active))?;
             }
         }
-        self.stiffness = None;
+        if let Some(stiffness) = self.stiffness.take() {
+            self.solver.factor().set_scaling(&stiffness.matrix)?;
+        }
         Ok(())
     }
 

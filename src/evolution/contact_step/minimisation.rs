@@ -63,6 +63,7 @@ impl ContactStep<'_> {
             self.load.write(|load| load.iter_mut().zip(&unbalanced).for_each(|(f, r)| *f += r))?;
         }
         let contact = ContactProblem {
+            session: self.session,
             stiffness: &self.stiffness.matrix,
             stiffness_scale: self.stiffness.scale,
             load: &self.load,
@@ -74,7 +75,10 @@ impl ContactStep<'_> {
             comm,
             phases: self.phases,
         };
-        self.phases.time("contact", || self.solver.solve(&contact, &mut self.c))
+        let bounded = bounds.iter().map(|bound| bound.dof);
+        self.elastic.factor().set_condensed(contact.stiffness, bounded)?;
+        let Self { solver, elastic, next, c, .. } = self;
+        self.phases.time("contact", || solver.solve(&contact, elastic, &mut next.warm_start, c))
     }
 }
 

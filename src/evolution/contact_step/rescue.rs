@@ -23,7 +23,7 @@ impl ContactStep<'_> {
         let rescued = self.solve_by_one(step, time, zeta);
         let name = self.solver.name();
         self.rescuer.iter_mut().for_each(|asked| mem::swap(&mut self.solver, asked));
-        self.solver.set_warm_start(&[]);
+        self.next.warm_start.clear();
         match rescued {
             // What rounding allows is worth telling, if only the rescuer has found it.
             Err(RunError::Contact { source: further, .. })
