@@ -203,7 +203,9 @@ impl Factor {
         let Some(factor) = self.substructure() else {
             return Err(PetscError::ours("the interface of a factor is too large"));
         };
-        let definite = factor.factorise(matrix)? && (condensed || factor.restrict(&[])?);
+        // BLAS may take a pivot that is no number for a positive one.
+        let finite = comm.all(matrix.diagonal()?.iter().all(|entry| entry.is_finite()));
+        let definite = finite && factor.factorise(matrix)? && (condensed || factor.restrict(&[])?);
         let work = comm.max(factor.work());
         // An iteration reads the factor and the entries of the matrix with their columns.
         let iteration = comm.max(factor.bytes() + 12.0 * entries);
