@@ -100,18 +100,11 @@ impl Checkpoint {
         let read = read.and_then(|checkpoint| match checkpoint.header.origin.ranks {
             made if made == comm.size() => Ok(checkpoint),
             made => Err(format!(
-                "it was written on {made} ranks, and this is a run on {} (--ranks {made} goes on)",
+                "it was written on {made} ranks, and this run is on {} (use mpiexec -n {made})",
                 comm.size()
             )),
         });
         agree(comm, read.map(Some).map_err(|reason| refusal(&path, &reason)))
-    }
-
-    /// On how many ranks the latest checkpoint in `folder` was written, if there is one that can be read.
-    pub fn ranks(folder: &Path) -> Option<usize> {
-        let (_, path) = output::checkpoints(folder, 0).into_iter().max()?;
-        let checkpoint = Self::parse(&fs::read(path).ok()?).ok()?;
-        Some(checkpoint.header.origin.ranks)
     }
 
     fn parse(bytes: &[u8]) -> Result<Self, String> {
