@@ -15,7 +15,6 @@ use super::{
 };
 use clap::Args;
 use signorini::{
-    archive::Archive,
     cholesky::LinearSolver,
     evolution::{self, DiscreteProblem, Phases, RunError},
     mesh::Mesh,
@@ -83,9 +82,7 @@ fn read_shared(comm: Communicator, scene: &Scene) -> Result<Mesh, Failure> {
     let read = if comm.is_root() { read_mesh(scene, true) } else { Ok(Mesh::default()) };
     let mut mesh = agree(comm, read)?;
     if !comm.is_serial() {
-        let mut archive = Archive::saving();
-        archive.value(&mut mesh)?;
-        Archive::loading(comm.broadcast_bytes(archive.into_bytes())).value(&mut mesh)?;
+        mesh = postcard::from_bytes(&comm.broadcast_bytes(postcard::to_stdvec(&mesh)?))?;
     }
     Ok(mesh)
 }
@@ -162,7 +159,7 @@ fn read<'a>(
     agree(comm, check_mesh_is_kept(&scene, &folder))?;
     let restart = arguments.restart.then(|| Checkpoint::read(comm, &folder));
     let restart = restart.transpose()?.flatten();
-    let made = restart.as_ref().and_then(|checkpoint| checkpoint.header.adapted.clone());
+    let made = restart.as_ref().and_then(|checkpoint| checkpoint.adapted.clone());
     let adapt = || adapt(session, &mut scene, &mesh, &solver, made);
     let adapted = agree(comm, phases.time("adaptation", adapt))?;
     let mesh = adapted.as_ref().map_or(mesh, |adapted| adapted.mesh.clone());
@@ -208,8 +205,9 @@ fn solve(task: &Task, restart: Option<Checkpoint>, session: &Session) -> Result<
     agree(comm, checked)?;
     let mut recorder = agree(comm, Recorder::new(task).map_err(Failure::input))?;
     let (problem, phases) = (&task.problem, task.phases);
-    recorder.show_restart(restart.as_ref());
-    let saved = restart.map(|checkpoint| checkpoint.state);
+    let resumed = restart.as_ref().map_or(Ok(()), |checkpoint| recorder.resume(checkpoint));
+    agree(comm, resumed.map_err(Failure::from))?;
+    let saved = restart.map(|checkpoint| checkpoint.run);
     let mut result =
         evolution::run_from(session, problem, &task.solver, phases, &mut recorder, saved);
     if let Ok(outcome) = &mut result {

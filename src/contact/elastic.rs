@@ -2,7 +2,6 @@
 
 use super::{ContactError, ContactProblem, ContactReport, Kkt};
 use crate::{
-    archive::{Archive, ArchiveError},
     cholesky::{Booking, Condensed, Factor, LinearSolver, LinearSystem, Precision, SolveReport},
     petsc::{Matrix, PetscError, Session, Vector},
 };
@@ -34,40 +33,37 @@ impl ContactProblem<'_> {
 /// What PETSc options of these systems begin with.
 pub(crate) const PREFIX: &str = "elastic_";
 
+/// Half the digits are enough for a preconditioner, and half the bytes to read.
+fn new_factor(session: &Session) -> Factor {
+    Factor::new(session, Precision::Preconditioner)
+}
+
 /// A [`LinearSolver`] for the successive systems of a contact solver, which have the same pattern.
 pub(super) struct ElasticSolver<'s> {
     /// Whose systems they are, for messages.
     pub(super) method: &'static str,
     pub(super) session: &'s Session,
     solver: Option<LinearSolver>,
-    /// The factor of a checkpoint, before the first solve.
-    loaded: Option<Factor>,
+    /// That of the first solve, perhaps from a checkpoint.
+    first_factor: Option<Factor>,
 }
 
 impl<'s> ElasticSolver<'s> {
     pub(super) fn new(session: &'s Session, method: &'static str) -> Self {
-        Self { method, session, solver: None, loaded: None }
+        Self { method, session, solver: None, first_factor: Some(new_factor(session)) }
     }
 
-    /// Saves or loads the factor.
-    pub(super) fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
-        if let Some(solver) = &mut self.solver {
-            return solver.factor().archive(archive);
+    /// The factor, also before the first solve.
+    pub(super) fn factor(&mut self) -> Option<&mut Factor> {
+        match &mut self.solver {
+            Some(solver) => Some(solver.factor()),
+            None => self.first_factor.as_mut(),
         }
-        let mut factor = self.loaded.take().unwrap_or_else(|| self.new_factor());
-        factor.archive(archive)?;
-        self.loaded = Some(factor);
-        Ok(())
     }
 
     /// The solver, if it has solved anything.
     pub(super) fn into_linear_solver(self) -> Option<LinearSolver> {
         self.solver
-    }
-
-    fn new_factor(&self) -> Factor {
-        // Half the digits are enough for a preconditioner, and half the bytes to read.
-        Factor::new(self.session, Precision::Preconditioner)
     }
 
     /// Solves from the start `c` for the load `f` until the forces left on the free unknowns are at most
@@ -191,7 +187,7 @@ impl<'s> ElasticSolver<'s> {
         let mut solver = match self.solver.take() {
             Some(solver) => solver,
             None => {
-                let factor = self.loaded.take().unwrap_or_else(|| self.new_factor());
+                let factor = self.first_factor.take().unwrap_or_else(|| new_factor(self.session));
                 LinearSolver::with(self.session, PREFIX, factor, matrix.owned())?
             }
         };

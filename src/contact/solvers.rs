@@ -15,8 +15,7 @@ pub use tao::TAO_TYPES;
 
 use super::{ContactError, ContactProblem};
 use crate::{
-    archive::{Archive, ArchiveError},
-    cholesky::LinearSolver,
+    cholesky::{Factor, LinearSolver},
     petsc::{Session, Vector},
 };
 use active_set::ActiveSet;
@@ -36,12 +35,10 @@ pub trait ContactSolver {
     /// with nothing, to that of a new solver.
     fn set_warm_start(&mut self, _kept: &[f64]) {}
 
-    /// Saves or loads what else it keeps from solve to solve: factors, estimates.
-    ///
-    /// # Errors
-    /// The archive is of another solver.
-    fn archive(&mut self, _archive: &mut Archive) -> Result<(), ArchiveError> {
-        Ok(())
+    /// The factor that it keeps from solve to solve, if it does: with the warm start all that a
+    /// checkpoint needs.
+    fn factor(&mut self) -> Option<&mut Factor> {
+        None
     }
 
     /// The solver of linear systems with K, of an earlier ζ and another active set, if the method keeps one.

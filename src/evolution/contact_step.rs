@@ -22,7 +22,7 @@ use super::{
     discrete_problem::LoadCase, extrapolation::Extrapolation,
 };
 use crate::{
-    archive::{Archive, ArchiveError},
+    cholesky::{Factor, FactorState},
     contact::{self, ContactSolver, Scales},
     fem::Stiffness,
     petsc::{PetscError, Session, Vector},
@@ -70,6 +70,14 @@ struct Memory {
     active: Vec<f64>,
     /// The solver's warm start.
     warm_start: Vec<f64>,
+}
+
+/// What a checkpoint keeps of the contact steps.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct ContactState {
+    accepted: Memory,
+    extrapolation: Extrapolation,
+    factors: Vec<FactorState>,
 }
 
 /// Loads below this part of the largest of the run count as so much, or an answer to rounding
@@ -178,12 +186,26 @@ impl<'a> ContactStep<'a> {
         Ok(())
     }
 
-    /// Saves or loads what the accepted steps have left to the next one.
-    pub(super) fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
-        archive.value(&mut self.accepted)?;
-        self.extrapolation.archive(archive)?;
-        self.solver.archive(archive)?;
-        self.rescuer.iter_mut().try_for_each(|rescuer| rescuer.archive(archive))
+    /// What the accepted steps leave to the next one.
+    pub(super) fn state(&mut self) -> ContactState {
+        let factors = self.factors().map(|factor| factor.state()).collect();
+        let (accepted, extrapolation) = (self.accepted.clone(), self.extrapolation.clone());
+        ContactState { accepted, extrapolation, factors }
+    }
+
+    /// Goes back to the state of a checkpoint.
+    pub(super) fn set_state(&mut self, state: ContactState) {
+        let ContactState { accepted, extrapolation, factors } = state;
+        (self.accepted, self.extrapolation) = (accepted, extrapolation);
+        self.factors().zip(factors).for_each(|(factor, state)| factor.set_state(state));
+    }
+
+    /// The factors of the solver and of its rescuer.
+    fn factors(&mut self) -> impl Iterator<Item = &mut Factor> {
+        [Some(&mut self.solver), self.rescuer.as_mut()]
+            .into_iter()
+            .flatten()
+            .filter_map(|s| s.factor())
     }
 
     /// Starts from the accepted steps: sets c, the datum and the solver's warm start. Where the active

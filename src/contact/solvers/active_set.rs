@@ -4,8 +4,7 @@ mod pivoting;
 
 use super::{ContactReport, ContactSolver, SolverEntry};
 use crate::{
-    archive::{Archive, ArchiveError},
-    cholesky::LinearSolver,
+    cholesky::{Factor, LinearSolver},
     contact::{Bound, ContactError, ContactProblem, Kkt, elastic::ElasticSolver},
     petsc::{PetscError, Session, Vector},
 };
@@ -128,8 +127,8 @@ impl ContactSolver for ActiveSet<'_> {
         self.active = kept.to_vec();
     }
 
-    fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
-        self.elastic.archive(archive)
+    fn factor(&mut self) -> Option<&mut Factor> {
+        self.elastic.factor()
     }
 
     fn into_linear_solver(self: Box<Self>) -> Option<LinearSolver> {

@@ -5,8 +5,7 @@ mod omega;
 
 use super::{Anderson, ContactReport, ContactSolver, SolverEntry};
 use crate::{
-    archive::{Archive, ArchiveError},
-    cholesky::{Condensed, LinearSolver, LinearSystem},
+    cholesky::{Condensed, Factor, LinearSolver, LinearSystem},
     contact::{Bound, ContactError, ContactProblem, Kkt, elastic::ElasticSolver},
     petsc::{Matrix, Session, Vector},
 };
@@ -268,9 +267,17 @@ impl ContactSolver for PenaltyDuality<'_> {
         ENTRY.name
     }
 
-    fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
-        archive.value(&mut self.fixed_point.omega)?;
-        self.elastic.archive(archive)
+    /// ω, once it is known.
+    fn warm_start(&self) -> Vec<f64> {
+        self.fixed_point.omega.into_iter().collect()
+    }
+
+    fn set_warm_start(&mut self, kept: &[f64]) {
+        self.fixed_point.omega = kept.first().copied().or(self.fixed_point.options.omega);
+    }
+
+    fn factor(&mut self) -> Option<&mut Factor> {
+        self.elastic.factor()
     }
 
     fn into_linear_solver(self: Box<Self>) -> Option<LinearSolver> {

@@ -2,7 +2,6 @@
 
 use super::{ContactReport, ContactSolver, SolverEntry};
 use crate::{
-    archive::{Archive, ArchiveError},
     cholesky::{Factor, Precision, Reduction},
     contact::{Bound, ContactError, ContactProblem, Kkt},
     petsc::{BoundedQuadratic, KeptPreconditioner, Matrix, PetscError, Session, TaoReport, Vector},
@@ -130,8 +129,8 @@ impl ContactSolver for Tao<'_> {
         self.displacement = kept.first().copied().unwrap_or(0.0);
     }
 
-    fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
-        self.factor.archive(archive)
+    fn factor(&mut self) -> Option<&mut Factor> {
+        Some(&mut self.factor)
     }
 
     fn solve(
