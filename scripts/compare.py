@@ -62,7 +62,7 @@ def compared(scene, arguments):
         # A run that fails at once leaves an earlier one as it is.
         (folder / "history.csv").unlink(missing_ok=True)
         error = signorini(
-            "run", str(scene), "--solver", solver, "--ranks", "1", "--out", str(folder), *mesh,
+            "run", str(scene), "--solver", solver, "--out", str(folder), *mesh,
             *settings(["contact.rescue=false", *arguments.set]), "--", *arguments.petsc)
         row, state = read(folder, error)
         rows.append({"scene": scene.stem, "solver": solver, **row, **dict.fromkeys(DIFFERENCES),

@@ -38,7 +38,6 @@
 //! The modules stand in the order of their dependence: each uses only those above it.
 #![deny(unsafe_code)]
 
-pub mod archive;
 pub mod interrupt;
 pub mod phases;
 pub mod petsc;

@@ -24,7 +24,7 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Solve a scene; results go to out/<scene>/.
+    /// Solve a scene; results go to out/<scene>/. On several cores: mpiexec -n 4 signorini run SCENE.
     Run(command::RunArguments),
     /// Write NAME.geo and NAME.toml, a small geometry and scene that run as they are, to start from.
     New {

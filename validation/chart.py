@@ -144,8 +144,7 @@ class Study:
                 steps = list(csv.DictReader(file))
             return mean(float(step["seconds"]) for step in steps[2:] or steps)
 
-        command = [self.binary, "run", path, "--out", out, "--solver", choice.solver,
-                   "--ranks", "1"]
+        command = [self.binary, "run", path, "--out", out, "--solver", choice.solver]
         seconds, seconds_per_step = seconds_of(command, per_step, unmeshed)
         run = Run(out)
         u, damage = errors(self.reference, run, self.stiffness)

@@ -96,7 +96,7 @@ def make(binary, path, folder):
     write_scene(scene, kept)
     made_of.write_text(geometry, encoding="utf-8")
     for command in (["gmsh", "-2", "-v", "1", made_of, "-o", folder / "reference.msh"],
-                    [binary, "run", kept, "--out", results, "--ranks", "1"]):
+                    [binary, "run", kept, "--out", results]):
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     return results
 

@@ -63,8 +63,6 @@ class Bench:
         self.environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1",
                             "CCACHE_DIR": str(ROOT / "target" / "ccache")}
         out.mkdir(parents=True, exist_ok=True)
-        # Where the program can start ranks by itself it is told to stay alone.
-        self.has_ranks = "--ranks" in self.start([binary, "run", "--help"])[0]
         self.rivals = [name for name, module in (("FEniCSx", "dolfinx"), ("NGSolve", "ngsolve"))
                        if self.has(PYTHON[name], module)]
         self.speeds = self.machine()
@@ -109,7 +107,7 @@ class Bench:
             path = self.out / f"{case.name}-{case.accuracy:g}.msh"
             if not path.exists():
                 self.start([self.binary, "run", case.file(), "--accuracy", case.accuracy,
-                            "--out", self.out / "adapted", *self.alone()])
+                            "--out", self.out / "adapted"])
                 shutil.move(self.out / "adapted" / "mesh.msh", path)
             return path
         path = self.out / f"{geometry}-{case.n}.msh"
@@ -121,9 +119,6 @@ class Bench:
             part.rename(path)
         return path
 
-    def alone(self):
-        return ["--ranks", 1] if self.has_ranks else []
-
     def signorini(self, case, solver="active-set", ranks=1, frames=True, petsc=()):
         """A run, about 20 frames written unless told otherwise; its history and what `--profile`
         says of each phase in milliseconds per call."""
@@ -132,9 +127,7 @@ class Bench:
                    "--set", "time.step=0.01", "--set", f"time.end={case.steps / 100}", "--out", folder,
                    "--set", f"discretisation.displacement={case.order}", "--profile"]
         command += [] if frames else ["--set", "output.every=100000"]
-        if self.has_ranks:
-            command += ["--ranks", ranks]
-        elif ranks != 1:
+        if ranks != 1:
             command = ["mpiexec", "--allow-run-as-root", "--oversubscribe", "-n", ranks, *command]
         command += ["--", *petsc] if petsc else []
         said, whole = self.start(command)

@@ -56,7 +56,7 @@ def make(binary, scene, folder, factor):
 
 def run(binary, path, out, *more):
     """Runs a scene on one rank."""
-    command = [binary, "run", path, "--out", out, "--ranks", "1", *more]
+    command = [binary, "run", path, "--out", out, *more]
     try:
         done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=LIMIT)
     except subprocess.TimeoutExpired:

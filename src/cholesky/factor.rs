@@ -1,10 +1,8 @@
 //! The Cholesky factor of a matrix, kept as the preconditioner of later ones.
 
 use super::{Condensed, Precision, Reduction, RefactorisationPolicy, substructure::Substructure};
-use crate::{
-    archive::{Archive, ArchiveError},
-    petsc::{Communicator, KeptPreconditioner, Matrix, PetscError, Session, Vector},
-};
+use crate::petsc::{Communicator, KeptPreconditioner, Matrix, PetscError, Session, Vector};
+use serde::{Deserialize, Serialize};
 use std::mem::take;
 
 /// A Cholesky factor: CHOLMOD's with solves of our own, by substructuring where there are several
@@ -40,6 +38,16 @@ pub struct Factor {
     scaled: Vec<f64>,
     /// Whether the factor was loaded and is yet to be made.
     loaded: bool,
+}
+
+/// What a checkpoint keeps of a factor; see the fields of [`Factor`].
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct FactorState {
+    values: Vec<f64>,
+    precisions: [Precision; 2],
+    policy: Option<RefactorisationPolicy>,
+    applications: usize,
+    factorisations: usize,
 }
 
 /// The cost, in iterations, of a factorisation whose work is not known. Measured on square.toml with
@@ -93,18 +101,23 @@ impl Factor {
         Ok(())
     }
 
-    /// Saves or loads the factor as the values of the matrix that it was made of.
-    ///
-    /// # Errors
-    /// The archive has no factor there.
-    pub fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
-        archive.value(&mut self.values)?;
-        archive.value(&mut self.precisions)?;
-        archive.value(&mut self.policy)?;
-        archive.value(&mut self.applications)?;
-        archive.value(&mut self.factorisations)?;
-        self.loaded |= archive.is_loading() && self.policy.is_some();
-        Ok(())
+    /// What a checkpoint keeps.
+    pub fn state(&self) -> FactorState {
+        FactorState {
+            values: self.values.clone(),
+            precisions: self.precisions,
+            policy: self.policy,
+            applications: self.applications,
+            factorisations: self.factorisations,
+        }
+    }
+
+    /// Goes back to that of a checkpoint; the next solve makes the factor.
+    pub fn set_state(&mut self, state: FactorState) {
+        let FactorState { values, precisions, policy, applications, factorisations } = state;
+        self.loaded = policy.is_some();
+        (self.values, self.precisions, self.policy) = (values, precisions, policy);
+        (self.applications, self.factorisations) = (applications, factorisations);
     }
 
     /// The matrix of the factor that was loaded, like `matrix`, if that is yet to be made; with what

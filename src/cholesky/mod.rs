@@ -35,7 +35,7 @@ mod raw {
 }
 
 pub use cholesky::{Cholesky, Precision};
-pub use factor::Factor;
+pub use factor::{Factor, FactorState};
 pub use linear_solver::{LinearSolver, SolveReport};
 pub use linear_system::{Booking, LinearSystem};
 pub use lower_triangle::LowerTriangle;

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// is due as soon as Σ (mᵢ − ⌈aᵢ/ρ⌉) ≥ C, the cost of a factorisation. Where the loss per solve grows
 /// evenly that is the cheapest moment, otherwise it costs at most twice the cheapest. All is counted,
 /// nothing measured by the clock: equal runs decide alike, and so do all ranks.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct RefactorisationPolicy {
     /// C: iterations that take as long as a factorisation.
     cost: f64,

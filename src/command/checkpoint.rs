@@ -1,13 +1,13 @@
 //! Checkpoints: the files from which `signorini run --restart` goes on.
 //!
-//! Each rank has a file `checkpoint_STEP_RANK`: a line that tells the format, the hash of all that
-//! follows, and a [`Header`] before the state of the run. The first rank writes its file when all others
-//! have theirs, and older ones are removed after that: the latest one of the first rank is complete.
+//! Each rank has a file `checkpoint_STEP_RANK`: a line that names the format, the hash of all that
+//! follows, and a [`Checkpoint`]. The first rank writes its file when all others have theirs, and older
+//! ones are removed after that: the latest one of the first rank is complete.
 
-use super::{Failure, ranks::agree, task::Task};
+use super::{Failure, ranks::agree, recorder::Recorded, task::Task};
 use serde::{Deserialize, Serialize};
 use signorini::{
-    evolution::{Adapted, StepRecord},
+    evolution::{Adapted, RunState},
     output::{self, OutputError},
     petsc::Communicator,
 };
@@ -18,63 +18,37 @@ use std::{
     sync::LazyLock,
 };
 
-/// What a file begins with.
-const FORMAT: &[u8] = b"signorini checkpoint 1\n";
+/// The first line of a file.
+const FORMAT: &[u8] = b"signorini checkpoint 2\n";
 
-/// What the results depend on, to the last bit.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Origin {
+/// A run between two steps.
+#[derive(Serialize, Deserialize)]
+pub struct Checkpoint {
     ranks: usize,
-    /// The version and a hash of the program's file.
-    program: String,
-    /// Hashes of the scene as it is run with its tables and of PETSc's options, and of the mesh.
-    scene: u64,
-    mesh: u64,
-}
-
-/// What stands before the state of a run.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Header {
-    origin: Origin,
-    /// n and t_n, s.
-    pub step: usize,
-    pub time: f64,
+    origin: [u64; 3],
     /// How the mesh was adapted.
     pub adapted: Option<Adapted>,
+    pub recorded: Recorded,
+    pub run: RunState,
 }
 
-/// A checkpoint that was read.
-pub struct Checkpoint {
-    pub header: Header,
-    pub state: Vec<u8>,
+/// Hashes of what the results depend on, to the last bit: see [`DIFFERENCES`].
+fn origin(task: &Task) -> [u64; 3] {
+    /// Of the program that runs, also where another one has taken its place since.
+    static PROGRAM: LazyLock<u64> =
+        LazyLock::new(|| fs::read("/proc/self/exe").map_or(0, |file| hash(&file)));
+    // A mesh that cannot be encoded has no hash to differ by.
+    let mesh = postcard::to_stdvec(task.problem.mesh()).unwrap_or_default();
+    let scene = format!("{}{:?}", task.as_run, task.petsc);
+    [*PROGRAM, hash(&[scene.as_bytes(), &task.tables].concat()), hash(&mesh)]
 }
 
-impl Origin {
-    fn of(task: &Task) -> Self {
-        /// Of the program that runs, also where another one has taken its place since.
-        static PROGRAM: LazyLock<u64> =
-            LazyLock::new(|| fs::read("/proc/self/exe").map_or(0, |file| hash(&file)));
-        // A mesh that cannot be encoded has no hash to differ by.
-        let mesh = postcard::to_stdvec(task.problem.mesh()).unwrap_or_default();
-        let scene = format!("{}{:?}", task.as_run, task.petsc);
-        Self {
-            ranks: task.problem.body.nodes.partition.comm().size(),
-            program: format!("{} {:016x}", env!("CARGO_PKG_VERSION"), *PROGRAM),
-            scene: hash(&[scene.as_bytes(), &task.tables].concat()),
-            mesh: hash(&mesh),
-        }
-    }
-
-    /// What differs from the run that a checkpoint was `made` in.
-    fn difference(&self, made: &Self) -> Option<&'static str> {
-        let same = [self.program == made.program, self.scene == made.scene, self.mesh == made.mesh];
-        match same {
-            [false, ..] => Some("another build of the program wrote it"),
-            [_, false, _] => Some("the scene, its tables, --set or PETSc's options are others"),
-            [.., is_same] => (!is_same).then_some("the mesh is another"),
-        }
-    }
-}
+/// What it means that one of the hashes differs.
+const DIFFERENCES: [&str; 3] = [
+    "another build of the program wrote it",
+    "the scene, its tables, --set or PETSc's options are others",
+    "the mesh is another",
+];
 
 fn hash(bytes: &[u8]) -> u64 {
     let mut hasher = DefaultHasher::new();
@@ -97,21 +71,14 @@ impl Checkpoint {
         let path = path(folder, step as usize, comm.rank());
         let read = fs::read(&path).map_err(|error| error.to_string());
         let read = read.and_then(|bytes| Self::parse(&bytes));
-        let read = read.and_then(|checkpoint| match checkpoint.header.origin.ranks {
+        let read = read.and_then(|checkpoint| match checkpoint.ranks {
             made if made == comm.size() => Ok(checkpoint),
             made => Err(format!(
-                "it was written on {made} ranks, and this is a run on {} (--ranks {made} goes on)",
+                "it was written on {made} ranks, and this run is on {} (use mpiexec -n {made})",
                 comm.size()
             )),
         });
         agree(comm, read.map(Some).map_err(|reason| refusal(&path, &reason)))
-    }
-
-    /// On how many ranks the latest checkpoint in `folder` was written, if there is one that can be read.
-    pub fn ranks(folder: &Path) -> Option<usize> {
-        let (_, path) = output::checkpoints(folder, 0).into_iter().max()?;
-        let checkpoint = Self::parse(&fs::read(path).ok()?).ok()?;
-        Some(checkpoint.header.origin.ranks)
     }
 
     fn parse(bytes: &[u8]) -> Result<Self, String> {
@@ -120,17 +87,16 @@ impl Checkpoint {
         if *expected != hash(content).to_le_bytes() {
             return Err("it is damaged".to_owned());
         }
-        let (header, state): (Header, _) =
-            postcard::take_from_bytes(content).map_err(|error| error.to_string())?;
-        Ok(Self { header, state: state.to_vec() })
+        postcard::from_bytes(content).map_err(|_| DIFFERENCES[0].to_owned())
     }
 
     /// Refuses a checkpoint of another run.
     pub fn check(&self, task: &Task) -> Result<(), Failure> {
+        let mut origins = self.origin.into_iter().zip(origin(task));
+        let Some(difference) = origins.position(|(made, own)| made != own) else { return Ok(()) };
         let rank = task.problem.body.nodes.partition.comm().rank();
-        let path = path(&task.folder, self.header.step, rank);
-        let difference = Origin::of(task).difference(&self.header.origin);
-        difference.map_or(Ok(()), |what| Err(refusal(&path, what)))
+        let path = path(&task.folder, self.run.last().record.step, rank);
+        Err(refusal(&path, DIFFERENCES[difference]))
     }
 }
 
@@ -142,18 +108,14 @@ fn refusal(path: &Path, reason: &str) -> Failure {
 }
 
 /// Writes a checkpoint in the place of the one before. Collective.
-pub fn write(task: &Task, record: &StepRecord, state: &[u8]) -> Result<(), OutputError> {
+pub fn write(task: &Task, recorded: Recorded, run: RunState) -> Result<(), OutputError> {
     let (comm, folder) = (task.problem.body.nodes.partition.comm(), &task.folder);
-    let header = Header {
-        origin: Origin::of(task),
-        step: record.step,
-        time: record.time,
-        adapted: task.adapted.clone(),
-    };
-    let path = path(folder, record.step, comm.rank());
+    let (step, adapted) = (run.last().record.step, task.adapted.clone());
+    let path = path(folder, step, comm.rank());
+    let checkpoint =
+        Checkpoint { ranks: comm.size(), origin: origin(task), adapted, recorded, run };
     let write = || {
-        let header = postcard::to_stdvec(&header).map_err(|e| OutputError::new(&path, e))?;
-        let content = [&header, state].concat();
+        let content = postcard::to_stdvec(&checkpoint).map_err(|e| OutputError::new(&path, e))?;
         let file = [FORMAT, &hash(&content).to_le_bytes(), &content].concat();
         output::write_synced(&path, &file)
     };
@@ -163,7 +125,7 @@ pub fn write(task: &Task, record: &StepRecord, state: &[u8]) -> Result<(), Outpu
         written = write();
     }
     if comm.all(written.is_ok()) {
-        remove(folder, comm.rank(), Some(record.step));
+        remove(folder, comm.rank(), Some(step));
     }
     written
 }

@@ -3,7 +3,6 @@
 mod accuracy;
 mod check;
 mod checkpoint;
-mod launch;
 mod new;
 mod profile;
 mod provenance;

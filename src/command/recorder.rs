@@ -8,13 +8,13 @@ use super::{
     screen,
     task::Task,
 };
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use signorini::{
-    archive::Archive,
-    evolution::{Next, Observed, Observer, Outcome, RunError, Step, StepRecord},
+    evolution::{Next, Observed, Observer, Outcome, RunError, RunState, Step, StepRecord},
     interrupt::Interrupts,
     output::{
-        self, FieldWriter, OutputError, Table,
+        self, FieldWriter, FieldsWritten, OutputError, Table,
         terminal::{Progress, say},
         write_whole,
     },
@@ -42,6 +42,15 @@ pub(super) struct Recorder<'a> {
     saved: Instant,
 }
 
+/// What a checkpoint keeps of a recorder.
+#[derive(Serialize, Deserialize)]
+pub struct Recorded {
+    stepping: f64,
+    fields: FieldsWritten,
+    /// Bytes of `history.csv`.
+    history: Option<u64>,
+}
+
 impl<'a> Recorder<'a> {
     /// Shows what is to be solved.
     pub(super) fn new(task: &'a Task) -> Result<Self, OutputError> {
@@ -54,12 +63,22 @@ impl<'a> Recorder<'a> {
         Ok(Self { task, fields, bar, history, last, stepping, interrupts, saved })
     }
 
-    /// Shows where the run goes on from.
-    pub(super) fn show_restart(&self, restart: Option<&Checkpoint>) {
-        if let (Some(Checkpoint { header, .. }), Some(_)) = (restart, &self.bar) {
-            let from = format!("from step {}, t = {}", header.step, rounded(header.time));
-            say(&screen::row("restart", from));
+    /// Goes on from a checkpoint, and shows that.
+    pub(super) fn resume(
+        &mut self,
+        Checkpoint { recorded, run, .. }: &Checkpoint,
+    ) -> Result<(), OutputError> {
+        self.stepping = recorded.stepping;
+        self.fields.resume(&recorded.fields);
+        self.history.resume(recorded.history);
+        self.last = Some(run.last().clone());
+        if self.bar.is_none() {
+            return Ok(());
         }
+        let record = &run.last().record;
+        let from = format!("from step {}, t = {}", record.step, rounded(record.time));
+        say(&screen::row("restart", from));
+        output::remove_partial(&self.task.folder)
     }
 
     /// Puts the beginning of this run in the place of an earlier run's results.
@@ -113,12 +132,10 @@ impl<'a> Recorder<'a> {
                 true => self.history.add(&[(&step.record, &step.quantities)]),
                 false => Ok(()),
             };
-            // A frame that waited for its turn is older than this row.
-            let row = row.or_else(|error| self.fields.finish().and(Err(error)));
             // All ranks write the frame together, also where the row could not be written.
             match self.is_frame(&step.record) {
                 true => row.and(self.fields.add(&self.task.problem, &step.state)),
-                false => row.and(self.fields.check()),
+                false => row,
             }
         });
         self.last = Some(step.clone());
@@ -135,7 +152,6 @@ impl<'a> Recorder<'a> {
             }
             _ => Ok(()),
         };
-        let written = written.and(task.phases.time("output", || self.fields.finish()));
         let outcome = result.as_ref().ok();
         let mut notes = Vec::from_iter(accuracy::verdict(task, outcome));
         notes.extend(task.problem.notes());
@@ -190,19 +206,10 @@ impl Observer for Recorder<'_> {
         })
     }
 
-    fn archive(&mut self, last: &Step, archive: &mut Archive) -> Observed {
-        archive.value(&mut self.stepping)?;
-        self.fields.archive(archive)?;
-        self.history.archive(archive)?;
-        if archive.is_loading() && self.bar.is_some() {
-            output::remove_partial(&self.task.folder)?;
-        }
-        self.last = Some(last.clone());
-        Ok(())
-    }
-
-    fn keep(&mut self, last: &Step, archive: Archive) -> Observed {
-        checkpoint::write(self.task, &last.record, &archive.into_bytes())?;
+    fn keep(&mut self, state: RunState) -> Observed {
+        let (fields, history) = (self.fields.written(), self.history.length());
+        let recorded = Recorded { stepping: self.stepping, fields, history };
+        checkpoint::write(self.task, recorded, state)?;
         self.saved = Instant::now();
         Ok(())
     }

@@ -6,7 +6,6 @@ use super::{
     check::contact_nodes,
     check_petsc, check_solver,
     checkpoint::Checkpoint,
-    launch::{self, Ranks},
     ranks::{agree, barrier_or_abort},
     read_mesh,
     recorder::Recorder,
@@ -16,7 +15,6 @@ use super::{
 };
 use clap::Args;
 use signorini::{
-    archive::Archive,
     cholesky::LinearSolver,
     evolution::{self, DiscreteProblem, Phases, RunError},
     mesh::Mesh,
@@ -45,10 +43,6 @@ pub struct RunArguments {
     /// notes, also those that do not bear on the answer.
     #[arg(long)]
     profile: bool,
-    /// Processes that share the run, started by mpiexec: a number, or auto for as many as pay on the cores
-    /// there are (one for small meshes; those of the checkpoint with --restart).
-    #[arg(long, alias = "threads", value_name = "N", default_value = "auto")]
-    ranks: Ranks,
     /// Measure how far off the mesh puts each figure, by two runs with few steps, on the mesh and on this
     /// mesh bisected everywhere (`signorini check` says about how long that takes); with --accuracy that is
     /// done in any case.
@@ -66,14 +60,6 @@ pub struct RunArguments {
 impl RunArguments {
     /// Refuses what would silently have no effect.
     fn check(&self) -> Result<(), Failure> {
-        if let (Some(asked), Some(launched)) = (self.ranks.0, Communicator::launched())
-            && asked != launched
-            && !launch::is_launched()
-        {
-            return Err(Failure::input(format!(
-                "--ranks {asked} has no effect where mpiexec has started {launched}; leave one of them"
-            )));
-        }
         self.scene.check()?;
         self.solver.iter().try_for_each(|name| check_solver("--solver", name))?;
         check_petsc(&self.petsc)
@@ -89,13 +75,6 @@ impl RunArguments {
     fn folder(&self, scene: &Scene) -> PathBuf {
         self.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name))
     }
-
-    /// On how many ranks to run, unless that is said.
-    fn ranks(&self) -> Result<usize, Failure> {
-        let scene = self.read()?;
-        let checkpoint = self.restart.then(|| Checkpoint::ranks(&self.folder(&scene))).flatten();
-        checkpoint.map_or_else(|| launch::ranks_that_pay(&scene).map_err(Failure::mesh), Ok)
-    }
 }
 
 /// The mesh of a scene, as the first rank reads it. Collective.
@@ -103,9 +82,7 @@ fn read_shared(comm: Communicator, scene: &Scene) -> Result<Mesh, Failure> {
     let read = if comm.is_root() { read_mesh(scene, true) } else { Ok(Mesh::default()) };
     let mut mesh = agree(comm, read)?;
     if !comm.is_serial() {
-        let mut archive = Archive::saving();
-        archive.value(&mut mesh)?;
-        Archive::loading(comm.broadcast_bytes(archive.into_bytes())).value(&mut mesh)?;
+        mesh = postcard::from_bytes(&comm.broadcast_bytes(postcard::to_stdvec(&mesh)?))?;
     }
     Ok(mesh)
 }
@@ -134,28 +111,12 @@ fn check_mesh_is_kept(scene: &Scene, folder: &Path) -> Result<(), Failure> {
     )))
 }
 
-/// `signorini run SCENE`, on as many ranks as `mpiexec` has started, or are asked for, or pay.
+/// `signorini run SCENE`, on the ranks that `mpiexec` has started.
 pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let (started, phases) = (Instant::now(), Phases::default());
     let checked = arguments.check();
-    if checked.is_ok() && Communicator::launched().is_none() {
-        let that_pay = || phases.time("mesh", || arguments.ranks());
-        let ranks = arguments.ranks.0.map_or_else(that_pay, Ok)?;
-        if ranks > 1 {
-            match launch::on_ranks(ranks) {
-                Err(error) if arguments.ranks.0.is_some() => {
-                    return Err(Failure::input(format!("--ranks {ranks} needs mpiexec: {error}")));
-                }
-                Err(_) => {}
-                Ok(ended) => return ended,
-            }
-        }
-    }
     let options = if checked.is_ok() { &arguments.petsc[..] } else { &[] };
     let session = phases.time("petsc start", || Session::start(options))?;
-    if session.comm().is_root() {
-        launch::begin_first_rank();
-    }
     let task =
         agree(session.comm(), checked).and_then(|()| read(arguments, &session, &phases, started));
     let warns = task.is_ok() && session.comm().is_root();
@@ -198,7 +159,7 @@ fn read<'a>(
     agree(comm, check_mesh_is_kept(&scene, &folder))?;
     let restart = arguments.restart.then(|| Checkpoint::read(comm, &folder));
     let restart = restart.transpose()?.flatten();
-    let made = restart.as_ref().and_then(|checkpoint| checkpoint.header.adapted.clone());
+    let made = restart.as_ref().and_then(|checkpoint| checkpoint.adapted.clone());
     let adapt = || adapt(session, &mut scene, &mesh, &solver, made);
     let adapted = agree(comm, phases.time("adaptation", adapt))?;
     let mesh = adapted.as_ref().map_or(mesh, |adapted| adapted.mesh.clone());
@@ -244,8 +205,9 @@ fn solve(task: &Task, restart: Option<Checkpoint>, session: &Session) -> Result<
     agree(comm, checked)?;
     let mut recorder = agree(comm, Recorder::new(task).map_err(Failure::input))?;
     let (problem, phases) = (&task.problem, task.phases);
-    recorder.show_restart(restart.as_ref());
-    let saved = restart.map(|checkpoint| checkpoint.state);
+    let resumed = restart.as_ref().map_or(Ok(()), |checkpoint| recorder.resume(checkpoint));
+    agree(comm, resumed.map_err(Failure::from))?;
+    let saved = restart.map(|checkpoint| checkpoint.run);
     let mut result =
         evolution::run_from(session, problem, &task.solver, phases, &mut recorder, saved);
     if let Ok(outcome) = &mut result {

@@ -1,6 +1,6 @@
 //! What a run shows: what is to be solved, a progress bar, and the result in a few lines.
 
-use super::{launch, task::Task};
+use super::task::Task;
 use signorini::{
     evolution::{Adapted, Outcome, StepRecord},
     output::terminal::{Progress, say, with_bar},
@@ -15,12 +15,9 @@ const LENGTH: u64 = 1000;
 pub fn open(task: &Task) -> Progress {
     let (scene, partition) = (task.problem.scene(), &task.problem.body.nodes.partition);
     let mut mesh = format!("{} nodes, {} triangles", partition.total(), task.triangles);
-    let (ranks, cores) = (partition.comm().size(), launch::cores());
+    let ranks = partition.comm().size();
     if ranks > 1 {
         mesh += &format!(", on {ranks} ranks");
-    }
-    if ranks > cores {
-        mesh += &format!(" that take turns on {cores} cores: --ranks {cores} would be faster");
     }
     let solver = match task.contact_nodes {
         0 => format!("{} (no contact: one linear solve a step)", task.solver),

@@ -22,8 +22,7 @@ use super::{
     discrete_problem::LoadCase, extrapolation::Extrapolation,
 };
 use crate::{
-    archive::{Archive, ArchiveError},
-    cholesky::{LinearSolver, Precision},
+    cholesky::{FactorState, LinearSolver, Precision},
     contact::{self, BoxedSolver, Scales},
     fem::Stiffness,
     petsc::{PetscError, Session, Vector},
@@ -73,6 +72,14 @@ struct Memory {
     active: Vec<f64>,
     /// What the solver starts with.
     warm_start: Vec<f64>,
+}
+
+/// What a checkpoint keeps of the contact steps.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct ContactState {
+    accepted: Memory,
+    extrapolation: Extrapolation,
+    factor: FactorState,
 }
 
 /// Loads below this part of the largest of the run count as so much, or an answer to rounding
@@ -183,11 +190,17 @@ impl<'a> ContactStep<'a> {
         Ok(())
     }
 
-    /// Saves or loads what the accepted steps have left to the next one.
-    pub(super) fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
-        archive.value(&mut self.accepted)?;
-        self.extrapolation.archive(archive)?;
-        self.elastic.factor().archive(archive)
+    /// What the accepted steps leave to the next one.
+    pub(super) fn state(&mut self) -> ContactState {
+        let (accepted, extrapolation) = (self.accepted.clone(), self.extrapolation.clone());
+        ContactState { accepted, extrapolation, factor: self.elastic.factor().state() }
+    }
+
+    /// Goes back to the state of a checkpoint.
+    pub(super) fn set_state(&mut self, state: ContactState) {
+        let ContactState { accepted, extrapolation, factor } = state;
+        (self.accepted, self.extrapolation) = (accepted, extrapolation);
+        self.elastic.factor().set_state(factor);
     }
 
     /// Starts from the accepted steps: sets c, the datum and the solver's warm start. Where the active

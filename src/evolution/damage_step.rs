@@ -48,7 +48,7 @@ pub(super) struct DamageStep<'a> {
 }
 
 /// The damage source φ(ε(u), ζ) of a state; zero where there is no damage law.
-#[derive(Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct DamageSource {
     /// b_i = ∫ φ λ_i, m²/s.
     pub(super) load: DVector<f64>,

@@ -2,7 +2,6 @@
 
 use super::DiscreteProblem;
 use crate::{
-    archive::ArchiveError,
     contact::{ConstraintError, ContactError, DrivenMotion, SolverError},
     interrupt::Signal,
     petsc::PetscError,
@@ -50,9 +49,6 @@ pub enum RunError {
     /// A signal has ended the run behind an accepted step.
     #[error("ended by {0}")]
     Interrupted(Signal),
-    /// The state in a checkpoint is that of another run.
-    #[error(transparent)]
-    Archive(#[from] ArchiveError),
     /// Whoever was shown an accepted step could not go on (results that cannot be written).
     #[error(transparent)]
     Observer(Box<dyn std::error::Error + Send + Sync>),

@@ -1,16 +1,14 @@
 //! Predicts the next solution from the last ones.
 
-use crate::{
-    archive::{Archive, ArchiveError},
-    petsc::Communicator,
-};
+use crate::petsc::Communicator;
+use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
 /// Polynomials in time through the last accepted solutions, as starts for iterative solvers.
 ///
 /// Which degree predicts best depends on how smooth the evolution is and on how precisely
 /// the solutions are known: the degree that predicted the last solution best is used.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Extrapolation {
     /// (time, solution), the latest first.
     history: VecDeque<(f64, Vec<f64>)>,
@@ -23,12 +21,6 @@ const HIGHEST: usize = 4;
 const SAMPLE: usize = 4096;
 
 impl Extrapolation {
-    /// Saves or loads the solutions.
-    pub(super) fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
-        archive.value(&mut self.history)?;
-        archive.value(&mut self.degree)
-    }
-
     /// The predicted solution at `time`; `None` before any solution.
     pub fn at(&self, time: f64) -> Option<Vec<f64>> {
         let mut values = vec![0.0; self.history.front()?.1.len()];

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 const INTERVALS: usize = 5;
 
 /// States of a run at a few times, evenly spread over its steps.
-#[derive(Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Instants {
     /// Every so many steps.
     stride: usize,

@@ -64,18 +64,16 @@ pub use outcome::{BoundViolation, Outcome, Stop};
 pub use state::{State, Step, StepRecord};
 pub use supports::{ContactRow, Supports};
 
-use crate::{
-    archive::{Archive, ArchiveError},
-    petsc::{Communicator, Session},
-};
-use contact_step::Compliance;
+use crate::petsc::{Communicator, Session};
+use contact_step::{Compliance, ContactState};
 use damage_step::DamageStep;
 use instants::Instants;
 use mesh_error::mesh_error;
 use nalgebra::DVector;
 use observer::Shown;
+use serde::{Deserialize, Serialize};
 use std::time::Instant;
-use step_controller::{StepController, Verdict};
+use step_controller::{StepController, StepState, Verdict};
 
 /// Solves Problem VP^hk with the contact solver called `solver`; `accepted` sees every accepted
 /// step, n = 0 included.
@@ -103,7 +101,7 @@ pub fn run_from(
     solver: &str,
     phases: &Phases,
     observer: &mut dyn Observer,
-    saved: Option<Vec<u8>>,
+    saved: Option<RunState>,
 ) -> Result<Outcome, RunError> {
     let Run { damage_step, contact_step, controller, mut outcome, instants } =
         all_steps(session, problem, solver, phases, observer, saved)?;
@@ -134,7 +132,7 @@ fn all_steps<'a>(
     solver: &str,
     phases: &'a Phases,
     observer: &mut dyn Observer,
-    saved: Option<Vec<u8>>,
+    saved: Option<RunState>,
 ) -> Result<Run<'a>, RunError> {
     let damage_step = DamageStep { session, problem, phases, system: None };
     let mut contact_step = ContactStep::new(session, problem, solver, phases)?;
@@ -151,10 +149,10 @@ fn all_steps<'a>(
     let mut run = Run { damage_step, contact_step, controller, outcome, instants };
     match saved {
         None => run.show(observer)?,
-        Some(bytes) => {
-            let mut archive = Archive::loading(bytes);
-            run.archive(&mut archive)?;
-            observer.archive(&run.outcome.last, &mut archive).map_err(RunError::Observer)?;
+        Some(saved) => {
+            run.contact_step.set_state(saved.contact);
+            run.controller.set_state(saved.controller);
+            (run.outcome, run.instants) = (saved.outcome, saved.instants);
         }
     }
     while run.step(observer)? {}
@@ -216,23 +214,33 @@ impl Run<'_> {
         let next = Next::of_urgency(most);
         if next != Next::Step {
             let kept = self.damage_step.phases.time("checkpoint", || {
-                let mut archive = Archive::saving();
-                self.archive(&mut archive)?;
-                let last = &self.outcome.last;
-                let added = observer.archive(last, &mut archive);
-                added.and_then(|()| observer.keep(last, archive)).map_err(RunError::Observer)
+                observer.keep(RunState {
+                    contact: self.contact_step.state(),
+                    controller: self.controller.state(),
+                    outcome: self.outcome.clone(),
+                    instants: self.instants.clone(),
+                })
             });
-            agreed(comm, kept)?;
+            agreed(comm, kept.map_err(RunError::Observer))?;
         }
         if let Next::End(signal) = next { Err(RunError::Interrupted(signal)) } else { Ok(()) }
     }
+}
 
-    /// Saves or loads all that the next steps depend on. The damage system is made again.
-    fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
-        self.contact_step.archive(archive)?;
-        self.controller.archive(archive)?;
-        self.outcome.archive(archive)?;
-        archive.value(&mut self.instants)
+/// All that the next steps of a run depend on, to the last bit: a checkpoint keeps it. (A restart makes the
+/// damage system again.)
+#[derive(Debug, Serialize, Deserialize)]
+pub struct RunState {
+    contact: ContactState,
+    controller: StepState,
+    outcome: Outcome,
+    instants: Instants,
+}
+
+impl RunState {
+    /// The last accepted step.
+    pub fn last(&self) -> &Step {
+        &self.outcome.last
     }
 }
 
@@ -245,7 +253,7 @@ fn judge(
     instants: Instants,
 ) -> Result<(), RunError> {
     let (problem, phases) = (damage_step.problem, damage_step.phases);
-    outcome.bound_violation = controller.violation;
+    outcome.bound_violation = controller.violation();
     outcome.damage_error = controller.damage_error();
     outcome.accuracy = phases.time("accuracy", || compliance.accuracy(outcome))?;
     outcome.penetration = phases.time("accuracy", || {

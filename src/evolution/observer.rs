@@ -1,10 +1,7 @@
 //! Whoever is shown the accepted steps of a run, and how the run goes on.
 
-use super::Step;
-use crate::{
-    archive::Archive,
-    interrupt::{self, Signal},
-};
+use super::{RunState, Step};
+use crate::interrupt::{self, Signal};
 
 /// The answer of an observer: an error ends the run.
 pub type Observed<T = ()> = Result<T, Box<dyn std::error::Error + Send + Sync>>;
@@ -48,20 +45,11 @@ pub trait Observer {
     /// The run is to end.
     fn accept(&mut self, step: &Step) -> Observed<Next>;
 
-    /// Saves what a checkpoint needs of the observer, or goes back to it; `last` is the last accepted
-    /// step.
-    ///
-    /// # Errors
-    /// The archive is of another observer, or what it tells of is gone.
-    fn archive(&mut self, _last: &Step, _archive: &mut Archive) -> Observed {
-        Ok(())
-    }
-
     /// Keeps a checkpoint.
     ///
     /// # Errors
     /// It cannot be written.
-    fn keep(&mut self, _last: &Step, _archive: Archive) -> Observed {
+    fn keep(&mut self, _state: RunState) -> Observed {
         Ok(())
     }
 }

@@ -4,19 +4,19 @@ use super::{
     Accuracy, Bar, DiscreteProblem, ErrorBudget, Step, StepRecord, damage_step::PlannedStep,
 };
 use crate::{
-    archive::{Archive, ArchiveError},
     contact::Kkt,
     fem::{Mass, RigidMotion},
 };
 use serde::{Deserialize, Serialize};
 use std::{mem, rc::Rc};
 
-/// How a run ended that did not fail.
-#[derive(Debug, Clone, Default)]
+/// How a run ended that did not fail. A checkpoint leaves out what is known at the end only.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Outcome {
     /// The last accepted step.
     pub last: Step,
     /// The stop at ζ_*, if it was reached.
+    #[serde(skip)]
     pub stopped: Option<Stop>,
     /// Worst KKT residuals of all steps.
     pub kkt: Kkt,
@@ -29,22 +29,29 @@ pub struct Outcome {
     /// Steps in which another solver gave the answer, and which.
     pub rescued: Option<(usize, String)>,
     /// By how much ζ violated the bounds of its equation.
+    #[serde(skip)]
     pub bound_violation: BoundViolation,
     /// Steps in which the active nodes left a rigid motion unconstrained, the times of the first and of
     /// the last, s, and what motion it was in the first.
     pub unconstrained: Option<(usize, [f64; 2], RigidMotion)>,
     /// Estimated errors of the answers.
+    #[serde(skip)]
     pub accuracy: Accuracy,
     /// Where the errors of the last accepted state come from.
+    #[serde(skip)]
     pub errors: ErrorBudget,
     /// The error bars of the figures; none where they are not measured.
+    #[serde(skip)]
     pub bars: Vec<Bar>,
     /// What the user should know of contact between the nodes.
+    #[serde(skip)]
     pub(super) penetration: Option<String>,
     /// Of each triangle of this rank ‖z − Iz‖²_T / ‖ζ₀ − z‖², with z the last ζ in P2 and I its
     /// interpolation in P1. Empty where the error of the damage is not estimated.
+    #[serde(skip)]
     pub damage_indicators: Vec<f64>,
     /// Estimated error of the last ζ over the damage done, where steps are chosen.
+    #[serde(skip)]
     pub damage_error: Option<f64>,
     /// The steps of the largest stationarity residual and displacement before the last.
     pub(super) least_accurate: Option<Rc<Step>>,
@@ -81,19 +88,6 @@ impl Outcome {
         let mut outcome = Self { last: first, ..Self::default() };
         outcome.count_last();
         outcome
-    }
-
-    /// What a checkpoint keeps of a run that has not ended.
-    pub(super) fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
-        archive.value(&mut self.last)?;
-        archive.value(&mut self.kkt)?;
-        archive.value(&mut self.skipped_damage_solves)?;
-        archive.value(&mut self.undone)?;
-        archive.value(&mut self.fallbacks)?;
-        archive.value(&mut self.rescued)?;
-        archive.value(&mut self.unconstrained)?;
-        archive.value(&mut self.least_accurate)?;
-        archive.value(&mut self.most_displaced)
     }
 
     /// Enters the error bars that the mesh makes, `of_mesh`, and adds what the time steps may do. Where the

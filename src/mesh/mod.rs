@@ -15,7 +15,7 @@ mod refine;
 pub use boundary::{BoundaryNode, CORNER_ANGLE, Face, boundary_nodes};
 pub use error::MeshError;
 pub use gmsh::{Order, file, load, mesh_geo, scaling_factor};
-pub use msh::{announced_elements, parse, read};
+pub use msh::{parse, read};
 pub use refine::Refinement;
 
 /// A conforming triangulation of the body, with the named parts of its boundary.

@@ -6,14 +6,8 @@ use super::{
     vtk::{DataArray, REAL, cells_text, entry, list_of_frames, vtk_file},
     write_whole,
 };
-use crate::{
-    archive::Archive,
-    evolution::{ContactRow, Observed},
-};
-use std::{
-    io,
-    path::{Path, PathBuf},
-};
+use crate::evolution::ContactRow;
+use std::path::{Path, PathBuf};
 
 /// VTK_LINE.
 const LINE: u8 = 3;
@@ -21,8 +15,8 @@ const LINE: u8 = 3;
 /// Writes Γ_C in every frame, `contact_NNNN.vtu`, and all frames into `contact.csv`.
 pub(super) struct ContactWriter {
     folder: PathBuf,
-    list: GrowingFile,
-    table: Table,
+    pub(super) list: GrowingFile,
+    pub(super) table: Table,
 }
 
 impl ContactWriter {
@@ -31,12 +25,6 @@ impl ContactWriter {
         let list = list_of_frames(folder.join("contact.pvd"));
         let table = Table::new(folder.join("contact.csv"), &ContactRow::default(), &[])?;
         Ok(Self { folder: folder.to_owned(), list, table })
-    }
-
-    /// Saves how long list and table are, or goes back to that.
-    pub(super) fn archive(&mut self, archive: &mut Archive) -> Observed {
-        self.list.archive(archive)?;
-        self.table.archive(archive)
     }
 
     /// Writes Γ_C at `time`, s, if there is one, its lines as `file`.
@@ -53,15 +41,13 @@ impl ContactWriter {
             return Ok(());
         }
         self.table.add(rows)?;
-        let path = self.folder.join(file);
-        let text = lines(rows).map_err(|e| OutputError::new(&path, e))?;
-        write_whole(&path, text.as_bytes())?;
+        write_whole(&self.folder.join(file), lines(rows).as_bytes())?;
         self.list.add(entry(time, file).as_bytes())
     }
 }
 
 /// The contact nodes as points, each joined with the next one of its part of Γ_C.
-fn lines(rows: &[ContactRow]) -> io::Result<String> {
+fn lines(rows: &[ContactRow]) -> String {
     let is_joined = |&[i, j]: &[usize; 2]| {
         (&rows[i].boundary, rows[i].part) == (&rows[j].boundary, rows[j].part)
     };
@@ -75,12 +61,12 @@ fn lines(rows: &[ContactRow]) -> io::Result<String> {
         rows.iter().flat_map(|row| [row.normal_x, row.normal_y, 0.0].map(|n| -row.pressure * n));
     let piece = format!(
         "{}<PointData>\n{}{}{}{}{}</PointData>\n</Piece>\n",
-        cells_text(&points, &joined, LINE)?,
-        DataArray::new("pressure_on_body", REAL, 3, pressure).element()?,
-        scalar("normal_pressure", |row| row.pressure)?,
-        scalar("gap", |row| row.gap)?,
-        scalar("arc_length", |row| row.arc_length)?,
-        scalar("active", |row| f64::from(row.active))?,
+        cells_text(&points, &joined, LINE),
+        DataArray::new("pressure_on_body", REAL, 3, pressure).element(),
+        scalar("normal_pressure", |row| row.pressure),
+        scalar("gap", |row| row.gap),
+        scalar("arc_length", |row| row.arc_length),
+        scalar("active", |row| f64::from(row.active)),
     );
-    Ok(vtk_file("UnstructuredGrid", "", &piece))
+    vtk_file("UnstructuredGrid", "", &piece)
 }

@@ -1,16 +1,15 @@
 //! What a run leaves behind: `fields.pvd` with its frames, `history.csv`, `summary.json`; and what
 //! the commands share at the terminal.
 
-mod background;
 mod contact;
 mod growing_file;
 pub mod terminal;
 mod vtk;
 mod vtu;
 
-pub use vtu::FieldWriter;
+pub use vtu::{FieldWriter, FieldsWritten};
 
-use crate::{archive::Archive, evolution::Observed, scene::AS_RUN};
+use crate::scene::AS_RUN;
 use growing_file::GrowingFile;
 use serde::Serialize;
 use std::{
@@ -96,38 +95,26 @@ const FILES: [&str; 7] = [
     "report.html",
     "open_in_paraview.py",
 ];
-/// The pictures of a run.
-const PICTURES: [&str; 9] = [
-    "force-displacement",
-    "setting",
-    "deformed",
-    "stress-damage",
-    "pressure",
-    "damage-history",
-    "contact-evolution",
-    "damage",
-    "stress",
-];
+/// The pictures, in alphabetical order.
+const PICTURES: &str = "contact-evolution damage damage-history deformed force-displacement \
+     pressure setting stress stress-damage";
 /// Files that are not complete yet begin with this.
 const PARTIAL: &str = ".partial-";
 
-/// Whether `name` is that of a picture or an animation, of the end or another time: `NAME[_tTIME].png`.
-fn is_picture(name: &str) -> bool {
-    name.rsplit_once('.').is_some_and(|(stem, ending)| {
-        let name = stem.split_once("_t").map_or(stem, |(name, _)| name);
-        PICTURES.contains(&name) && ["png", "svg", "pdf", "gif", "mp4"].contains(&ending)
-    })
-}
-
-/// Whether `name` is that of a frame, of a piece or of a list of pieces: `fields_NNNN[_R].[p]vtu`, or
-/// `contact_NNNN.vtu`.
-fn is_frame(name: &str) -> bool {
-    let stem = name.strip_suffix(".vtu").or(name.strip_suffix(".pvtu"));
-    stem.and_then(|stem| stem.strip_prefix("fields_").or(stem.strip_prefix("contact_")))
-        .is_some_and(|numbers| {
-            let is_number = |n: &str| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit());
-            numbers.split('_').all(is_number)
-        })
+/// Whether `name` is that of a file which a run or its figures leave in a folder: frames are
+/// `fields_NNNN[_R].[p]vtu` and `contact_NNNN.vtu`, pictures `NAME[_tTIME].png`.
+fn is_result(name: &str) -> bool {
+    let (stem, ending) = name.rsplit_once('.').unwrap_or((name, ""));
+    let (kind, rest) = stem.split_once('_').unwrap_or((stem, ""));
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    match ending {
+        "vtu" | "pvtu" => ["fields", "contact"].contains(&kind) && rest.split('_').all(is_number),
+        "png" | "svg" | "pdf" | "gif" | "mp4" => {
+            PICTURES.split(' ').any(|known| known == kind)
+                && (stem == kind || rest.starts_with('t'))
+        }
+        _ => FILES.contains(&name),
+    }
 }
 
 /// The checkpoints of a rank in `folder`, `checkpoint_STEP_RANK`, with their steps.
@@ -169,10 +156,6 @@ pub fn prepare(folder: &Path, mesh: &Path) -> Result<(), OutputError> {
 /// Whether a run has left the mesh in `file`.
 pub fn is_adapted(file: &Path) -> bool {
     fs::read_to_string(file).is_ok_and(|text| text.ends_with(ADAPTED))
-}
-
-fn is_result(name: &str) -> bool {
-    is_frame(name) || is_picture(name) || FILES.contains(&name)
 }
 
 /// Whether both paths lead to one file.
@@ -221,12 +204,14 @@ impl Table {
         Ok(Self(GrowingFile::new(path, String::from_utf8_lossy(&header).into_owned(), "")))
     }
 
-    /// Saves how long the file is, or goes back to that length.
-    ///
-    /// # Errors
-    /// The file is gone or shorter.
-    pub fn archive(&mut self, archive: &mut Archive) -> Observed {
-        self.0.archive(archive)
+    /// Bytes of the file so far; `None` while there is no file.
+    pub fn length(&self) -> Option<u64> {
+        self.0.length
+    }
+
+    /// Goes on after so many bytes of the file that is there.
+    pub fn resume(&mut self, length: Option<u64>) {
+        self.0.length = length;
     }
 
     /// Appends rows.
@@ -234,7 +219,7 @@ impl Table {
     /// # Errors
     /// The file cannot be written.
     pub fn add<T: Serialize>(&mut self, rows: &[T]) -> Result<(), OutputError> {
-        let text = csv_text(false, rows).map_err(|e| OutputError::new(self.0.path(), e))?;
+        let text = csv_text(false, rows).map_err(|e| OutputError::new(&self.0.path, e))?;
         self.0.add(&text)
     }
 }

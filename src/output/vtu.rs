@@ -1,25 +1,21 @@
 //! Fields for ParaView: VTK XML unstructured grids and their collection over time.
-//!
-//! The files are written here and not by the VTK crate, which reads them back in the tests: it
-//! compresses value by value and took 0.9 s for a frame of 66,049 nodes.
 
 use super::{
     OutputError,
-    background::Background,
     contact::ContactWriter,
     growing_file::GrowingFile,
     vtk::{DataArray, INTEGER, REAL, cells_text, entry, list_of_frames, vtk_file},
     write_whole,
 };
 use crate::{
-    archive::Archive,
-    evolution::{ContactRow, DiscreteProblem, Observed, State},
+    evolution::{DiscreteProblem, State},
     fem::{Body, Elements},
-    petsc::{Communicator, PetscError},
+    petsc::PetscError,
     scene::{Scene, Stepping},
 };
+use serde::{Deserialize, Serialize};
 use std::{
-    io, iter,
+    iter,
     path::{Path, PathBuf},
 };
 
@@ -37,14 +33,6 @@ const MANY: usize = 999_999;
 ///
 /// A piece has the triangles that its rank owns and all nodes that it knows; a rank without triangles writes none.
 pub struct FieldWriter {
-    files: Background<Files>,
-    frames: usize,
-    last_time: Option<f64>,
-    digits: usize,
-}
-
-/// What the frames are written to.
-struct Files {
     folder: PathBuf,
     /// `<Points>` and `<Cells>`, the same in every frame, in the element `<Piece>`.
     mesh: String,
@@ -54,48 +42,51 @@ struct Files {
     list: GrowingFile,
     /// Γ_C, on the first rank.
     contact: ContactWriter,
+    frames: usize,
+    last_time: Option<f64>,
+    digits: usize,
 }
 
-/// A frame as numbers.
-struct Frame {
-    /// Its number, with all digits.
-    number: String,
-    time: f64,
-    comm: Communicator,
-    points: Vec<DataArray>,
-    cells: Vec<DataArray>,
-    contact: Vec<ContactRow>,
+/// What a checkpoint keeps of the frames written.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct FieldsWritten {
+    frames: usize,
+    last_time: Option<f64>,
+    /// Bytes of `fields.pvd`, `contact.pvd` and `contact.csv`.
+    lengths: [Option<u64>; 3],
 }
 
 impl FieldWriter {
     /// A writer for the body of `problem` into `folder`. Collective.
     ///
     /// # Errors
-    /// The mesh cannot be encoded.
+    /// The names of the columns of `contact.csv` cannot be written.
     pub fn new(folder: &Path, problem: &DiscreteProblem) -> Result<Self, OutputError> {
-        let mesh = mesh_text(&problem.body).map_err(|e| OutputError::new(folder, e))?;
-        let digits = digits(problem.scene());
-        let folder = folder.to_owned();
-        let list = list_of_frames(folder.join("fields.pvd"));
-        let contact = ContactWriter::new(&folder)?;
         let comm = problem.body.nodes.partition.comm();
         let triangles = comm.gather(&[problem.body.own_triangles as f64]);
-        let pieces = (0..comm.size()).filter(|&rank| triangles[rank] > 0.0).collect();
-        let files = Files { folder, mesh, pieces, list, contact };
-        let files = Background::new(files, comm.size());
-        Ok(Self { files, frames: 0, last_time: None, digits })
+        Ok(Self {
+            folder: folder.to_owned(),
+            mesh: mesh_text(&problem.body),
+            pieces: (0..comm.size()).filter(|&rank| triangles[rank] > 0.0).collect(),
+            list: list_of_frames(folder.join("fields.pvd")),
+            contact: ContactWriter::new(folder)?,
+            frames: 0,
+            last_time: None,
+            digits: digits(problem.scene()),
+        })
     }
 
-    /// Saves how many frames there are, or goes back to so many.
-    ///
-    /// # Errors
-    /// A frame before could not be written, or a list of theirs is gone.
-    pub fn archive(&mut self, archive: &mut Archive) -> Observed {
-        archive.value(&mut self.frames)?;
-        archive.value(&mut self.last_time)?;
-        let mut files = self.files.wait()?;
-        files.list.archive(archive)?;
-        files.contact.archive(archive)
+    /// How far the files are written.
+    pub fn written(&self) -> FieldsWritten {
+        let lengths = [self.list.length, self.contact.list.length, self.contact.table.0.length];
+        FieldsWritten { frames: self.frames, last_time: self.last_time, lengths }
+    }
+
+    /// Goes on after the frames of a checkpoint.
+    pub fn resume(&mut self, written: &FieldsWritten) {
+        (self.frames, self.last_time) = (written.frames, written.last_time);
+        let files = [&mut self.list, &mut self.contact.list, &mut self.contact.table.0];
+        files.into_iter().zip(written.lengths).for_each(|(file, length)| file.length = length);
     }
 
     /// Time of the last frame, s.
@@ -103,73 +94,48 @@ impl FieldWriter {
         self.last_time
     }
 
-    /// Writes a frame and the lists that name it, or has them written while the run goes on. Collective.
+    /// Writes a frame and the lists that name it. Collective.
     ///
     /// # Errors
-    /// A file of this frame, or of one before, cannot be written.
+    /// A file cannot be written.
     pub fn add(&mut self, problem: &DiscreteProblem, state: &State) -> Result<(), OutputError> {
-        let number = format!("{:0width$}", self.frames, width = self.digits);
+        let stem = format!("fields_{:0width$}", self.frames, width = self.digits);
+        let contact_file = format!("contact_{:0width$}.vtu", self.frames, width = self.digits);
         (self.frames, self.last_time) = (self.frames + 1, Some(state.time));
         // All ranks collect Γ_C, also where one could not collect its fields.
         let contact = problem.supports.contact_rows(&problem.body, state);
         let (cells, comm) = (cell_data(problem, state), problem.body.nodes.partition.comm());
         let points = point_data(problem, state);
         let points = points.map_err(|e| OutputError::new(Path::new("a frame"), e))?;
-        let frame = Frame { number, time: state.time, comm, points, cells, contact };
-        self.files.add(move |files| files.write(&frame))
-    }
-
-    /// Whether all frames could be written so far.
-    ///
-    /// # Errors
-    /// Why one could not.
-    pub fn check(&mut self) -> Result<(), OutputError> {
-        self.files.check()
-    }
-
-    /// Waits until all frames are written.
-    ///
-    /// # Errors
-    /// One could not be written.
-    pub fn finish(&mut self) -> Result<(), OutputError> {
-        self.files.wait().map(|_| ())
-    }
-}
-
-impl Files {
-    /// Writes a frame and the lists that name it.
-    fn write(&mut self, frame: &Frame) -> Result<(), OutputError> {
-        let Frame { number, comm, points, cells, .. } = frame;
-        let stem = format!("fields_{number}");
         let piece_file = |rank| format!("{stem}_{rank}.vtu");
         let (own, whole) = match comm.is_serial() {
             true => (format!("{stem}.vtu"), format!("{stem}.vtu")),
             false => (piece_file(comm.rank()), format!("{stem}.pvtu")),
         };
         if self.pieces.contains(&comm.rank()) {
-            let path = self.folder.join(own);
-            let text = self.piece(points, cells).map_err(|e| OutputError::new(&path, e))?;
-            write_whole(&path, text.as_bytes())?;
+            let text = self.piece(&points, &cells);
+            write_whole(&self.folder.join(own), text.as_bytes())?;
         }
         if !comm.is_root() {
             return Ok(());
         }
-        self.contact.add(&format!("contact_{number}.vtu"), frame.time, &frame.contact)?;
+        self.contact.add(&contact_file, state.time, &contact)?;
         if !comm.is_serial() {
-            let text = list_of_pieces(self.pieces.iter().copied().map(piece_file), points, cells);
+            let files = self.pieces.iter().copied().map(piece_file);
+            let text = list_of_pieces(files, &points, &cells);
             write_whole(&self.folder.join(&whole), text.as_bytes())?;
         }
-        self.list.add(entry(frame.time, &whole).as_bytes())
+        self.list.add(entry(state.time, &whole).as_bytes())
     }
 
-    fn piece(&self, points: &[DataArray], cells: &[DataArray]) -> io::Result<String> {
-        let points = points.iter().map(DataArray::element).collect::<io::Result<String>>()?;
-        let cells = cells.iter().map(DataArray::element).collect::<io::Result<String>>()?;
+    fn piece(&self, points: &[DataArray], cells: &[DataArray]) -> String {
+        let [points, cells] =
+            [points, cells].map(|arrays| arrays.iter().map(DataArray::element).collect::<String>());
         let piece = format!(
             "{}<PointData>\n{points}</PointData>\n<CellData>\n{cells}</CellData>\n</Piece>\n",
             self.mesh
         );
-        Ok(vtk_file("UnstructuredGrid", "", &piece))
+        vtk_file("UnstructuredGrid", "", &piece)
     }
 }
 
@@ -185,7 +151,7 @@ fn digits(scene: &Scene) -> usize {
 }
 
 /// The mesh of this rank.
-fn mesh_text(body: &Body) -> io::Result<String> {
+fn mesh_text(body: &Body) -> String {
     let own = body.own_triangles;
     match body.elements() {
         Elements::Linear(cells) => cells_text(&body.nodes.points, &cells.nodes[..own], TRIANGLE),

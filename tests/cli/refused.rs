@@ -152,7 +152,6 @@ fn meshes_of_several_bodies() {
         test_directory.write("square.msh", &msh(&corners, &["1 2 5 1 2 3", second]));
         test_directory.say(&["check", "scene.toml"]).fails(2, &[problem, "solve them one by one"]);
         refused(&test_directory, &[], &[problem]);
-        refused(&test_directory, &["--ranks", "2"], &[problem]);
     }
 }
 

@@ -1,6 +1,5 @@
 //! The program on several ranks, from outside: the same answers, whole results, one voice.
 
-mod launched;
 mod vtu_pieces;
 mod repeat;
 
@@ -9,7 +8,13 @@ mod repeat;
 mod test_directory;
 
 use signorini::petsc::Communicator;
-use std::{fs, path::Path, process::Command};
+use std::{
+    fs::{self, File},
+    path::Path,
+    process::{Command, Stdio},
+    thread::sleep,
+    time::{Duration, Instant},
+};
 use test_directory::{ProgramOutput, TestDirectory};
 
 /// Answers on several ranks may differ by this, relative to the largest value of a run.
@@ -307,6 +312,35 @@ fn the_first_rank_makes_the_mesh_for_all() {
     let said = ProgramOutput::of(&mut on_ranks(&test_directory, 3, &arguments));
     assert_eq!(said.code, Some(0), "{said:?}");
     assert!(said.out.contains("25 nodes, 32 triangles, on 3 ranks"), "{}", said.out);
+}
+
+/// mpiexec forwards SIGUSR1 and SIGUSR2 to its ranks (mpiexec(1), "Signal Propagation").
+#[test]
+fn signals_end_ranks_with_their_state_and_a_restart_goes_on() {
+    let test_directory = TestDirectory::new();
+    let endless = ["run", "scene.toml", "--set", "time.step=1e-6"];
+    for (name, meant, code, restart) in
+        [("USR1", "SIGINT", 130, &[][..]), ("USR2", "SIGTERM", 143, &["--restart"])]
+    {
+        let said = File::create(test_directory.path("said")).expect("a file");
+        let mut run = on_ranks(&test_directory, 2, &[&endless, restart].concat());
+        let mut run = run.stdout(said).stderr(Stdio::null()).spawn().expect("mpiexec starts");
+        let started = Instant::now();
+        while !test_directory.read("said").contains("time  ")
+            || !test_directory.path("out/scene/fields.pvd").exists()
+        {
+            assert!(started.elapsed() < Duration::from_secs(60), "no frame appears");
+            sleep(Duration::from_millis(5));
+        }
+        let kill = Command::new("kill").args(["-s", name, &run.id().to_string()]).status();
+        assert!(kill.expect("kill").success());
+        assert_eq!(run.wait().expect("it ends").code(), Some(code));
+        let error = test_directory.summary("out/scene")["error"].to_string();
+        assert!(error.contains(meant), "{error}");
+        let names = test_directory.names("out/scene");
+        assert!(names.iter().any(|file| file.starts_with("checkpoint_")), "{names:?}");
+    }
+    assert!(test_directory.read("said").contains("restart       from step"));
 }
 
 /// One message, whatever `mpiexec` adds of its own.

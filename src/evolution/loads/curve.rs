@@ -1,7 +1,6 @@
 //! How loads, prescribed displacements and gaps change between the ends of steps.
 
 use crate::{
-    archive::{Archive, ArchiveError},
     evolution::DiscreteProblem,
     scene::{Condition, Expression, Stepping},
 };
@@ -63,7 +62,7 @@ fn breaks(problem: &DiscreteProblem, end: f64) -> Vec<f64> {
 pub(in crate::evolution) struct LoadCurve<'a> {
     problem: &'a DiscreteProblem,
     /// The largest Σ|·| of the forces and of the displacements at any time sampled.
-    largest: [f64; 2],
+    pub(in crate::evolution) largest: [f64; 2],
     /// Times that must be looked at, rising, s.
     breaks: Vec<f64>,
     /// Per surface load whether it varies within edges.
@@ -87,14 +86,6 @@ impl<'a> LoadCurve<'a> {
             times.for_each(|time| _ = curve.sample(time));
             curve
         })
-    }
-
-    /// Saves or loads the largest values so far.
-    pub(in crate::evolution) fn archive(
-        &mut self,
-        archive: &mut Archive,
-    ) -> Result<(), ArchiveError> {
-        archive.value(&mut self.largest)
     }
 
     /// The breaks between two times.

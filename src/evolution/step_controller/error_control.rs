@@ -2,7 +2,6 @@
 
 use super::{PlannedStep, forecast::Forecast};
 use crate::{
-    archive::{Archive, ArchiveError},
     evolution::{DiscreteProblem, loads::LoadCurve},
     fem::Body,
     scene::Stepping,
@@ -73,11 +72,16 @@ impl<'a> ErrorControl<'a> {
         })
     }
 
-    /// Saves or loads what the accepted steps have left.
-    pub(super) fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
-        self.load_curve.iter_mut().try_for_each(|curve| curve.archive(archive))?;
-        archive.value(&mut self.next_length)?;
-        archive.value(&mut self.damage)
+    /// What the accepted steps leave: the next length, the damage, the largest loads sampled.
+    pub(super) fn state(&self) -> (f64, [f64; 2], [f64; 2]) {
+        let largest = self.load_curve.as_ref().map_or([0.0; 2], |curve| curve.largest);
+        (self.next_length, self.damage, largest)
+    }
+
+    /// Goes back to the state of a checkpoint.
+    pub(super) fn set_state(&mut self, (next_length, damage, largest): (f64, [f64; 2], [f64; 2])) {
+        (self.next_length, self.damage) = (next_length, damage);
+        self.load_curve.iter_mut().for_each(|curve| curve.largest = largest);
     }
 
     /// The end and the length, s, of the step from `start`, which follows the loads if one can;

@@ -20,13 +20,11 @@ use super::{
     BoundViolation, DiscreteProblem, RunError, Step, StepFailure, Stop,
     damage_step::{DamageSource, DamageStep, DamageUpdate, PlannedStep},
 };
-use crate::{
-    archive::{Archive, ArchiveError},
-    scene::{Scheme, Stepping},
-};
+use crate::scene::{Scheme, Stepping};
 pub(super) use error_control::AIM;
 use error_control::ErrorControl;
 use nalgebra::DVector;
+use serde::{Deserialize, Serialize};
 
 /// What becomes of a step.
 pub(super) enum Verdict {
@@ -46,6 +44,12 @@ pub(super) struct StepController<'a> {
     chosen: Option<ErrorControl<'a>>,
     /// Whether steps are two-step backward differences; else Euler's.
     two_step: bool,
+    memory: StepState,
+}
+
+/// What the controller knows of the accepted steps: a checkpoint keeps it.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct StepState {
     /// k_{n−1}, s; infinite before the first step, so that ω = 0.
     length: f64,
     /// ζ̃_{n−1}, ζ̃_{n−1} − ζ̃_{n−2}, and the rate of the formula at t_{n−1}, 1/s.
@@ -66,8 +70,11 @@ pub(super) struct StepController<'a> {
     last_error: Option<DVector<f64>>,
     /// The time since errors have last grown, s.
     not_grown: f64,
+    /// Bounds on ζ̃_{n−1} by the maximum principle, see [`BoundViolation`].
     bounds: (f64, f64),
-    pub(super) violation: BoundViolation,
+    violation: BoundViolation,
+    /// The state of the error control where steps are chosen; entered when it is saved.
+    chosen: Option<(f64, [f64; 2], [f64; 2])>,
 }
 
 /// In a smooth evolution with equal steps the increments of the formula are off by ⅓ k³ζ‴, those of
@@ -80,11 +87,7 @@ impl<'a> StepController<'a> {
     pub(super) fn new(problem: &'a DiscreteProblem, zeta: &[f64], source: DamageSource) -> Self {
         let zeros = DVector::zeros(zeta.len());
         let chosen = ErrorControl::new(problem, zeta);
-        let bdf2 = problem.scene().time.is_some_and(|grid| grid.scheme == Scheme::Bdf2);
-        Self {
-            problem,
-            two_step: bdf2 || chosen.is_some(),
-            chosen,
+        let memory = StepState {
             length: f64::INFINITY,
             zeta: DVector::from_column_slice(zeta),
             change: zeros.clone(),
@@ -98,26 +101,24 @@ impl<'a> StepController<'a> {
             not_grown: 0.0,
             bounds: problem.body.vertices.partition.min_max(zeta),
             violation: BoundViolation::default(),
-        }
+            chosen: None,
+        };
+        let bdf2 = problem.scene().time.is_some_and(|grid| grid.scheme == Scheme::Bdf2);
+        Self { problem, two_step: bdf2 || chosen.is_some(), chosen, memory }
     }
 
-    /// Saves or loads what it knows of the accepted steps.
-    pub(super) fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
-        self.chosen.iter_mut().try_for_each(|chosen| chosen.archive(archive))?;
-        archive.value(&mut self.length)?;
-        for field in
-            [&mut self.zeta, &mut self.change, &mut self.load_change, &mut self.rate_change]
-        {
-            archive.value(field)?;
+    /// What it knows of the accepted steps.
+    pub(super) fn state(&self) -> StepState {
+        let chosen = self.chosen.as_ref().map(ErrorControl::state);
+        StepState { chosen, ..self.memory.clone() }
+    }
+
+    /// Goes back to the state of a checkpoint.
+    pub(super) fn set_state(&mut self, state: StepState) {
+        if let (Some(chosen), Some(state)) = (&mut self.chosen, state.chosen) {
+            chosen.set_state(state);
         }
-        archive.value(&mut self.rate)?;
-        archive.value(&mut self.source)?;
-        archive.value(&mut self.delay)?;
-        archive.value(&mut self.error)?;
-        archive.value(&mut self.last_error)?;
-        archive.value(&mut self.not_grown)?;
-        archive.value(&mut self.bounds)?;
-        archive.value(&mut self.violation)
+        self.memory = state;
     }
 
     /// The step after the accepted one `last`; `None` at the end of time.
@@ -130,17 +131,19 @@ impl<'a> StepController<'a> {
             }
             _ => return None,
         };
-        let omega = if self.two_step { length / self.length } else { 0.0 };
+        let omega = if self.two_step { length / self.memory.length } else { 0.0 };
         let beta = omega * omega / (1.0 + 2.0 * omega);
         let k = length * (1.0 + omega) / (1.0 + 2.0 * omega);
-        let shift = beta * &self.change;
-        let (lower, upper) =
-            shifted(self.bounds, self.problem.body.vertices.partition.min_max(shift.as_slice()));
+        let shift = beta * &self.memory.change;
+        let (lower, upper) = shifted(
+            self.memory.bounds,
+            self.problem.body.vertices.partition.min_max(shift.as_slice()),
+        );
         // φ ≤ 0, so b ≤ 0 and b̂_n ≥ (1 + ω) b_{n−1}. What is not a number must stay so.
-        let lower = lower + k * ((1.0 + omega) * self.source.min);
-        let load =
-            (&self.source.load + omega * &self.load_change).map(|b| if b > 0.0 { 0.0 } else { b });
-        let (start, bounds) = (&self.zeta + shift, (lower, upper));
+        let lower = lower + k * ((1.0 + omega) * self.memory.source.min);
+        let load = (&self.memory.source.load + omega * &self.memory.load_change)
+            .map(|b| if b > 0.0 { 0.0 } else { b });
+        let (start, bounds) = (&self.memory.zeta + shift, (lower, upper));
         Some(PlannedStep { n, time, length, k, start, load, bounds })
     }
 
@@ -165,39 +168,40 @@ impl<'a> StepController<'a> {
         if self.two_step {
             // The rate before the first step is that of its source, which needs no correction.
             let first = || &rate - &correction / planned.k;
-            let change = &rate - self.rate.clone().unwrap_or_else(first);
-            let increment = &corrected - &self.zeta;
+            let change = &rate - self.memory.rate.clone().unwrap_or_else(first);
+            let increment = &corrected - &self.memory.zeta;
             let trapezoidal = planned.length * (&rate - 0.5 * &change);
             let truncation = TRUNCATION * (trapezoidal - &increment);
             let added = &correction + truncation;
             if let Some(chosen) = &mut self.chosen
-                && let Err(factor) = chosen.judge(planned, &damage.zeta, &self.error, &added, &rate)
+                && let Err(factor) =
+                    chosen.judge(planned, &damage.zeta, &self.memory.error, &added, &rate)
             {
                 let shorter = self.retry(planned, factor);
                 return shorter.ok_or_else(|| planned.failed(StepFailure::TooShort));
             }
             let error = self.integrated(planned.length, &rate, &change) - increment;
-            step_error::add_delay(&mut self.delay, &error, &rate);
+            step_error::add_delay(&mut self.memory.delay, &error, &rate);
             self.grow_error(planned.length, &error);
-            damage_step.diffuse(planned, &mut self.error)?;
-            self.rate_change = change;
+            damage_step.diffuse(planned, &mut self.memory.error)?;
+            self.memory.rate_change = change;
         } else {
             self.add_euler_delay(planned, &rate);
         }
-        self.violation.observe(planned, damage.min_max, planned.time);
+        self.memory.violation.observe(planned, damage.min_max, planned.time);
         let (lower, upper) = planned.bounds;
         let tightened = (lower.max(damage.min_max.0), upper.min(damage.min_max.1));
         let partition = &self.problem.body.vertices.partition;
-        self.bounds = shifted(tightened, partition.min_max(correction.as_slice()));
-        self.length = planned.length;
+        self.memory.bounds = shifted(tightened, partition.min_max(correction.as_slice()));
+        self.memory.length = planned.length;
         if self.two_step {
-            self.last_error = Some(correction);
+            self.memory.last_error = Some(correction);
         }
-        self.change = &corrected - &self.zeta;
-        self.zeta = corrected;
-        self.rate = Some(rate);
-        self.load_change = &source.load - &self.source.load;
-        self.source = source;
+        self.memory.change = &corrected - &self.memory.zeta;
+        self.memory.zeta = corrected;
+        self.memory.rate = Some(rate);
+        self.memory.load_change = &source.load - &self.memory.source.load;
+        self.memory.source = source;
         Ok(Verdict::Accept(step))
     }
 
@@ -210,7 +214,7 @@ impl<'a> StepController<'a> {
     ) -> Verdict {
         let (zeta_min, level) = (damage.min_max.0, self.problem.threshold());
         let (time, delays) = if self.two_step {
-            let from = self.problem.body.vertices.partition.min_max(self.zeta.as_slice()).0;
+            let from = self.problem.body.vertices.partition.min_max(self.memory.zeta.as_slice()).0;
             let part = if from > level { (from - level) / (from - zeta_min) } else { 0.0 };
             // The last ζ that is written counts as well as its correction ζ̃.
             if let Some(chosen) = &self.chosen
@@ -225,7 +229,7 @@ impl<'a> StepController<'a> {
             self.add_euler_delay(planned, &planned.rate(&damage.zeta));
             (planned.time, 2.0)
         };
-        self.violation.observe(planned, damage.min_max, time);
+        self.memory.violation.observe(planned, damage.min_max, time);
         let delay = self.delay_at_weakest_node(damage.zeta.as_slice()).abs();
         let uncertainty = planned.length + delays * delay;
         let least_admissible = planned.bounds.0;
@@ -247,6 +251,11 @@ impl<'a> StepController<'a> {
             _ => None,
         };
         shorter.ok_or(failure)
+    }
+
+    /// By how much ζ violated the bounds of its equation.
+    pub(super) fn violation(&self) -> BoundViolation {
+        self.memory.violation
     }
 
     /// The estimated error of the last accepted ζ over the damage done, where steps are chosen.

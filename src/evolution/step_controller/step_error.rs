@@ -11,7 +11,7 @@ impl StepController<'_> {
     /// The estimated error of the last accepted ζ from the time steps, at the nodes; `None` before the
     /// first step, or of Euler's before the second, which tells the error of the first.
     pub(in crate::evolution) fn step_error(&self) -> Option<DVector<f64>> {
-        Some(&self.error + self.last_error.as_ref()?)
+        Some(&self.memory.error + self.memory.last_error.as_ref()?)
     }
 
     /// ∫ ζ' over a step of k = `length`, s, from its rate f_n and f_n − f_{n−1} = `change` to third order:
@@ -22,19 +22,19 @@ impl StepController<'_> {
         rate: &DVector<f64>,
         change: &DVector<f64>,
     ) -> DVector<f64> {
-        let omega = length / self.length;
-        let curvature = change - omega * &self.rate_change;
+        let omega = length / self.memory.length;
+        let curvature = change - omega * &self.memory.rate_change;
         length * (rate - 0.5 * change - omega / (6.0 * (1.0 + omega)) * curvature)
     }
 
     /// Adds the delay of the Euler step before the one with this `rate`: (28) takes the source at the
     /// beginning of a step, so its error is ½ k (ζ'_n − ζ'_{n−1}).
     pub(super) fn add_euler_delay(&mut self, planned: &PlannedStep, rate: &DVector<f64>) {
-        if let Some(before) = &self.rate {
+        if let Some(before) = &self.memory.rate {
             let error = 0.5 * planned.k * (rate - before);
-            add_delay(&mut self.delay, &error, &(0.5 * (rate + before)));
+            add_delay(&mut self.memory.delay, &error, &(0.5 * (rate + before)));
             self.grow_error(planned.length, &error);
-            self.last_error = Some(error);
+            self.memory.last_error = Some(error);
         }
     }
 
@@ -42,19 +42,19 @@ impl StepController<'_> {
     /// r = −ζ', an error δζ changes the source φ = −(λ_D (1−ζ)/ζ + ½ λ_U |ε|² − λ_W) by
     /// λ_D/ζ² δζ, and under a given load, where |ε| ~ 1/ζ, by 2 (r − λ_D (1−ζ)/ζ + λ_W)/ζ δζ more.
     pub(super) fn grow_error(&mut self, length: f64, error: &DVector<f64>) {
-        self.not_grown += length;
+        self.memory.not_grown += length;
         let end = self.problem.scene().time.map_or(0.0, |grid| grid.end);
-        let (laws, rate) = match (self.problem.damage(), &self.rate) {
-            (Some(laws), Some(rate)) if self.not_grown > GROWTH_STEP * end => (laws, rate),
+        let (laws, rate) = match (self.problem.damage(), &self.memory.rate) {
+            (Some(laws), Some(rate)) if self.memory.not_grown > GROWTH_STEP * end => (laws, rate),
             _ => {
-                self.error += error;
+                self.memory.error += error;
                 return;
             }
         };
-        let length = std::mem::take(&mut self.not_grown);
-        for (i, own) in self.error.iter_mut().enumerate() {
+        let length = std::mem::take(&mut self.memory.not_grown);
+        for (i, own) in self.memory.error.iter_mut().enumerate() {
             let growth = |law: &DamageLaw| {
-                let zeta = law.truncate(self.zeta[i]);
+                let zeta = law.truncate(self.memory.zeta[i]);
                 let internal = law.lambda_d * (1.0 - zeta) / zeta;
                 let external = (law.lambda_w - rate[i] - internal).max(0.0);
                 law.lambda_d / (zeta * zeta) + 2.0 * external / zeta
@@ -74,7 +74,7 @@ impl StepController<'_> {
         let weakest = nodes.min_by(|&a, &b| zeta[a].total_cmp(&zeta[b]));
         let comm = self.problem.body.vertices.partition.comm();
         let (_, rank) = comm.min_with_rank(weakest.map_or(f64::INFINITY, |i| zeta[i]));
-        comm.broadcast(rank, weakest.map_or(0.0, |i| self.delay[i]))
+        comm.broadcast(rank, weakest.map_or(0.0, |i| self.memory.delay[i]))
     }
 }
 

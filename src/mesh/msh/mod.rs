@@ -56,23 +56,6 @@ pub fn parse(bytes: &[u8], path: &Path) -> std::result::Result<Mesh, MeshError> 
     })
 }
 
-/// The number of elements that a `.msh` file announces, triangles for the most part; 0 where it is none.
-///
-/// # Errors
-/// The file cannot be read or converted.
-pub fn announced_elements(path: &Path) -> std::result::Result<usize, MeshError> {
-    let mut bytes = fs::read(path).map_err(MeshError::io(path))?;
-    if let Some(version) = foreign_version(&bytes) {
-        bytes = converted(path, &bytes, version)?;
-    }
-    let announced = sections_of(&bytes).ok().and_then(|sections| {
-        let named = |name| sections.iter().find(|section| section.name == name);
-        let numbers = format(named("MeshFormat")?).ok()?.ok()?;
-        Some(v4::header(&mut ByteReader::new(named("Elements")?, numbers)).ok()?.1)
-    });
-    Ok(announced.unwrap_or(0) as usize)
-}
-
 fn sections_of(bytes: &[u8]) -> Result<Vec<Section<'_>>> {
     let mut sections = Vec::new();
     Section::split(bytes, &mut sections).map(|()| sections)
