@@ -10,7 +10,6 @@ ARGS ?=
 STUDY ?= geo/square-table1.toml
 # Those of `make accuracy`: all that reach T.
 ACCURACY ?= $(filter-out geo/square.toml, $(sort $(wildcard geo/*.toml)))
-STUDY_NAME = $(basename $(notdir $(firstword $(STUDY))))
 CHART ?= $(addprefix geo/, square-mild.toml square-table1.toml lshape.toml bridge-half.toml \
     lshape-rolling.toml)
 
@@ -51,7 +50,7 @@ help:
 	@echo 'make stability  the maps of where methods fail; or MAPS="step-size …"'
 	@echo 'make reference  the reference solution of a scene, unless it is there (minutes); or STUDY=geo/a.toml'
 	@echo 'make converge   errors against it on nested meshes: Table 1, Figure 3; or STUDY=geo/a.toml'
-	@echo 'make chart      error against seconds: meshes, orders, --accuracy, solvers, FEniCSx; or CHART="geo/a.toml …"'
+	@echo 'make chart      error against seconds: meshes, orders, --accuracy, solvers; or CHART="geo/a.toml …"'
 	@echo 'make accuracy   true errors over the accuracy asked for (minutes); or ACCURACY="geo/a.toml …"'
 	@echo 'make promises   bars and "reached" of --accuracy on bodies that are not shipped (half an hour, once)'
 	@echo 'make kills      runs killed 50 times and restarted: the same checksums; or ARGS="--count 10"'
@@ -127,19 +126,17 @@ stability: build
 	$(PYTHON) scripts/stability.py out/stability $(MAPS)
 
 reference: build
-	$(STUDIES) reference $(STUDY)
+	$(PYTHON) validation/converge.py --binary $(BINARY) $(ARGS) --reference $(STUDY)
 
-converge: reference
-	$(STUDIES) converge $(STUDY)
-	$(PYTHON) scripts/converge.py out/converge/$(STUDY_NAME)
+converge: build
+	$(PYTHON) validation/converge.py --binary $(BINARY) $(ARGS) $(STUDY)
 
 # Whole processes against references of their own, which are kept (minutes); out/chart/chart.png.
-chart: build deps-validate
+chart: build deps
 	$(PYTHON) validation/chart.py --binary $(BINARY) $(CHART)
-	$(PYTHON) scripts/chart.py out/chart
 
 accuracy: build
-	$(PYTHON) validation/asked.py --binary $(BINARY) $(ACCURACY)
+	$(PYTHON) validation/chart.py --asked --binary $(BINARY) $(ACCURACY)
 
 # Truths are kept in out/promises/truth.
 promises: build
