@@ -31,8 +31,8 @@ export SIGNORINI_COMMIT := $(shell git describe --always --dirty 2>/dev/null)
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
 .PHONY: help deps deps-validate deps-random deps-bench build mesh run figures test validate random compare \
-    bench stability reference converge chart accuracy promises kills \
-    fuzz wrong clean
+    bench stability reference converge chart accuracy promises \
+    fuzz clean
 
 help:
 	@echo 'make mesh && make run   mesh and solve the scenes of geo/, draw their figures into out/'
@@ -53,9 +53,7 @@ help:
 	@echo 'make chart      error against seconds: meshes, orders, --accuracy, solvers; or CHART="geo/a.toml …"'
 	@echo 'make accuracy   true errors over the accuracy asked for (minutes); or ACCURACY="geo/a.toml …"'
 	@echo 'make promises   bars and "reached" of --accuracy on bodies that are not shipped (half an hour, once)'
-	@echo 'make kills      runs killed 50 times and restarted: the same checksums; or ARGS="--count 10"'
 	@echo 'make fuzz       10 million inputs for what reads meshes, scenes, expressions (nightly Rust, cargo-fuzz)'
-	@echo 'make wrong      43 wrong inputs and what the program says of them'
 	@echo 'make clean      remove the build, the results and the meshes'
 
 deps:
@@ -123,7 +121,7 @@ bench: build deps-bench
 
 stability: build
 	$(STUDIES) stability $(MAPS)
-	$(PYTHON) scripts/stability.py out/stability $(MAPS)
+	$(PYTHON) validation/stability.py out/stability $(MAPS)
 
 reference: build
 	$(PYTHON) validation/converge.py --binary $(BINARY) $(ARGS) --reference $(STUDY)
@@ -141,9 +139,6 @@ accuracy: build
 # Truths are kept in out/promises/truth.
 promises: build
 	$(PYTHON) validation/promises.py --binary $(BINARY) $(ARGS)
-
-kills: build deps
-	$(PYTHON) validation/kills.py --binary $(BINARY) $(ARGS)
 
 # What is found stays in target/fuzz; the seeds are those of the tests. FUZZ_RUNS meshes and as many
 # expressions.
@@ -167,9 +162,6 @@ fuzz: deps
 	        target/fuzz/corpus/$$target $$seeds -- -runs=$$runs -dict=validation/fuzz/words.dict \
 	        -max_len=16384 -timeout=10 -rss_limit_mb=1024 -print_final_stats=1; \
 	done
-
-wrong: build
-	$(PYTHON) validation/wrong_inputs.py --binary $(BINARY)
 
 clean:
 	rm -rf target out geo/*.msh scripts/__pycache__ scripts/*/__pycache__ validation/__pycache__
