@@ -18,9 +18,6 @@ PACKAGES := petsc-dev libsuitesparse-dev libopenblas0-serial libclang-dev pkg-co
     python3-meshio python3-matplotlib
 PACKAGES_VALIDATE := python3-dolfinx-real
 PACKAGES_RANDOM := python3-scipy
-# For NGSolve: its Python, and what compiles its forms and keeps them.
-PACKAGES_BENCH := python3-venv g++ ccache
-NGSOLVE := target/ngsolve
 
 BINARY := target/release/signorini
 # The studies: a program of their own in validation/study.
@@ -30,7 +27,7 @@ export SIGNORINI_COMMIT := $(shell git describe --always --dirty 2>/dev/null)
 # rustup puts cargo where a shell opened before does not look.
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
-.PHONY: help deps deps-validate deps-random deps-bench build mesh run figures test validate random compare \
+.PHONY: help deps deps-validate deps-random build mesh run figures test validate random compare \
     bench stability reference converge chart accuracy promises \
     fuzz clean
 
@@ -64,13 +61,6 @@ deps-validate: deps
 
 deps-random: deps
 	@scripts/deps.sh $(PACKAGES_RANDOM)
-
-# Without the network the bench leaves NGSolve out.
-deps-bench: deps-validate
-	@scripts/deps.sh $(PACKAGES_BENCH)
-	@test -x $(NGSOLVE)/bin/ngscxx || { \
-	    $(PYTHON) -m venv --system-site-packages $(NGSOLVE) && \
-	    $(NGSOLVE)/bin/pip install --quiet ngsolve==6.2.2608; } || rm -rf $(NGSOLVE)
 
 build: deps
 	cargo build --release --locked
@@ -115,9 +105,8 @@ compare: build
 	[ $$code -eq 2 ] || $(PYTHON) scripts/comparison.py out/compare; exit $$code
 
 # Side by side on this machine: `make bench ARGS=--quick` for small meshes, one round.
-bench: build deps-bench
+bench: build deps-validate
 	$(PYTHON) validation/bench.py --binary $(BINARY) $(ARGS)
-	$(PYTHON) scripts/bench.py out/bench
 
 stability: build
 	$(STUDIES) stability $(MAPS)

@@ -13,12 +13,10 @@ from scipy.sparse.linalg import splu
 
 from conditions import as_rows, merged, merged_gaps, pair
 from lagrange import SIDES, Lagrange, derivatives, functions
-from scene import Expression, displacement_order, elasticity, of_material
+from scene import DAMAGE, Expression, displacement_order, elasticity, of_material
 
 # Lines at an angle below the first are one; at one below the second rounding may hide that they are two.
 SAME, ALIKE = 1e-8, 1e-4
-DAMAGE = {"lambda_w": 0.0, "strain_cap": 1000.0, "threshold": 0.01, "initial": 1.0,
-          "mass": "consistent"}
 # Barycentric coordinates of the points, of equal weights, that integrate the stiffness.
 POINTS = {1: np.full((1, 3), 1 / 3), 2: np.full((3, 3), 1 / 6) + 0.5 * np.eye(3)}
 # Of the nodes of an edge (ends, middle) the share of its length: the integrals of their functions.

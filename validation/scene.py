@@ -112,6 +112,10 @@ def elasticity(young, poisson, plane="stress"):
     return (e / (1 - nu**2))[..., None, None] * d
 
 
+# What [damage] has where a scene leaves it out.
+DAMAGE = {"lambda_w": 0.0, "strain_cap": 1000.0, "threshold": 0.01, "initial": 1.0, "mass": "consistent"}
+
+
 def displacement_order(scene):
     """The polynomial degree of the displacements; that of ζ is 1."""
     return scene.get("discretisation", {}).get("displacement", 1)
