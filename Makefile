@@ -10,7 +10,6 @@ ARGS ?=
 STUDY ?= geo/square-table1.toml
 # Those of `make accuracy`: all that reach T.
 ACCURACY ?= $(filter-out geo/square.toml, $(sort $(wildcard geo/*.toml)))
-STUDY_NAME = $(basename $(notdir $(firstword $(STUDY))))
 CHART ?= $(addprefix geo/, square-mild.toml square-table1.toml lshape.toml bridge-half.toml \
     lshape-rolling.toml)
 
@@ -19,9 +18,6 @@ PACKAGES := petsc-dev libsuitesparse-dev libopenblas0-serial libclang-dev pkg-co
     python3-meshio python3-matplotlib
 PACKAGES_VALIDATE := python3-dolfinx-real
 PACKAGES_RANDOM := python3-scipy
-# For NGSolve: its Python, and what compiles its forms and keeps them.
-PACKAGES_BENCH := python3-venv g++ ccache
-NGSOLVE := target/ngsolve
 
 BINARY := target/release/signorini
 # The studies: a program of their own in validation/study.
@@ -31,9 +27,9 @@ export SIGNORINI_COMMIT := $(shell git describe --always --dirty 2>/dev/null)
 # rustup puts cargo where a shell opened before does not look.
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
-.PHONY: help deps deps-validate deps-random deps-bench build mesh run figures test validate random compare \
-    bench stability reference converge chart accuracy promises kills \
-    fuzz wrong clean
+.PHONY: help deps deps-validate deps-random build mesh run figures test validate random compare \
+    bench stability reference converge chart accuracy promises \
+    fuzz clean
 
 help:
 	@echo 'make mesh && make run   mesh and solve the scenes of geo/, draw their figures into out/'
@@ -51,12 +47,10 @@ help:
 	@echo 'make stability  the maps of where methods fail; or MAPS="step-size …"'
 	@echo 'make reference  the reference solution of a scene, unless it is there (minutes); or STUDY=geo/a.toml'
 	@echo 'make converge   errors against it on nested meshes: Table 1, Figure 3; or STUDY=geo/a.toml'
-	@echo 'make chart      error against seconds: meshes, orders, --accuracy, solvers, FEniCSx; or CHART="geo/a.toml …"'
+	@echo 'make chart      error against seconds: meshes, orders, --accuracy, solvers; or CHART="geo/a.toml …"'
 	@echo 'make accuracy   true errors over the accuracy asked for (minutes); or ACCURACY="geo/a.toml …"'
 	@echo 'make promises   bars and "reached" of --accuracy on bodies that are not shipped (half an hour, once)'
-	@echo 'make kills      runs killed 50 times and restarted: the same checksums; or ARGS="--count 10"'
 	@echo 'make fuzz       10 million inputs for what reads meshes, scenes, expressions (nightly Rust, cargo-fuzz)'
-	@echo 'make wrong      43 wrong inputs and what the program says of them'
 	@echo 'make clean      remove the build, the results and the meshes'
 
 deps:
@@ -67,13 +61,6 @@ deps-validate: deps
 
 deps-random: deps
 	@scripts/deps.sh $(PACKAGES_RANDOM)
-
-# Without the network the bench leaves NGSolve out.
-deps-bench: deps-validate
-	@scripts/deps.sh $(PACKAGES_BENCH)
-	@test -x $(NGSOLVE)/bin/ngscxx || { \
-	    $(PYTHON) -m venv --system-site-packages $(NGSOLVE) && \
-	    $(NGSOLVE)/bin/pip install --quiet ngsolve==6.2.2608; } || rm -rf $(NGSOLVE)
 
 build: deps
 	cargo build --release --locked
@@ -118,35 +105,29 @@ compare: build
 	[ $$code -eq 2 ] || $(PYTHON) scripts/comparison.py out/compare; exit $$code
 
 # Side by side on this machine: `make bench ARGS=--quick` for small meshes, one round.
-bench: build deps-bench
+bench: build deps-validate
 	$(PYTHON) validation/bench.py --binary $(BINARY) $(ARGS)
-	$(PYTHON) scripts/bench.py out/bench
 
 stability: build
 	$(STUDIES) stability $(MAPS)
-	$(PYTHON) scripts/stability.py out/stability $(MAPS)
+	$(PYTHON) validation/stability.py out/stability $(MAPS)
 
 reference: build
-	$(STUDIES) reference $(STUDY)
+	$(PYTHON) validation/converge.py --binary $(BINARY) $(ARGS) --reference $(STUDY)
 
-converge: reference
-	$(STUDIES) converge $(STUDY)
-	$(PYTHON) scripts/converge.py out/converge/$(STUDY_NAME)
+converge: build
+	$(PYTHON) validation/converge.py --binary $(BINARY) $(ARGS) $(STUDY)
 
 # Whole processes against references of their own, which are kept (minutes); out/chart/chart.png.
-chart: build deps-validate
+chart: build deps
 	$(PYTHON) validation/chart.py --binary $(BINARY) $(CHART)
-	$(PYTHON) scripts/chart.py out/chart
 
 accuracy: build
-	$(PYTHON) validation/asked.py --binary $(BINARY) $(ACCURACY)
+	$(PYTHON) validation/chart.py --asked --binary $(BINARY) $(ACCURACY)
 
 # Truths are kept in out/promises/truth.
 promises: build
 	$(PYTHON) validation/promises.py --binary $(BINARY) $(ARGS)
-
-kills: build deps
-	$(PYTHON) validation/kills.py --binary $(BINARY) $(ARGS)
 
 # What is found stays in target/fuzz; the seeds are those of the tests. FUZZ_RUNS meshes and as many
 # expressions.
@@ -170,9 +151,6 @@ fuzz: deps
 	        target/fuzz/corpus/$$target $$seeds -- -runs=$$runs -dict=validation/fuzz/words.dict \
 	        -max_len=16384 -timeout=10 -rss_limit_mb=1024 -print_final_stats=1; \
 	done
-
-wrong: build
-	$(PYTHON) validation/wrong_inputs.py --binary $(BINARY)
 
 clean:
 	rm -rf target out geo/*.msh scripts/__pycache__ scripts/*/__pycache__ validation/__pycache__

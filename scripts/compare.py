@@ -8,7 +8,6 @@ the mesh that the first solver adapts. The results of a run are in OUT/SCENE-SOL
 OUT/comparison.csv. What follows `--` are PETSc options."""
 
 import argparse
-import csv
 import json
 import os
 import subprocess
@@ -16,12 +15,11 @@ import sys
 import textwrap
 import tomllib
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 
-from reading import read_frame
-from results import read_table
+from reading import frames_of, read_frame
+from results import markdown, read_table, write_table
 
 # Titles of the printed table; the others are shown in comparison.csv alone.
 TITLES = {
@@ -101,8 +99,7 @@ def read(folder, error):
         "seconds": summary.get("phases", {}).get("contact", 0.0),
         **{key: max(row[key] for row in history) for key in KKT},
     }
-    frames = ElementTree.parse(folder / "fields.pvd").findall(".//DataSet")
-    meshes = [read_frame(folder / frame.get("file")) for frame in frames]
+    meshes = [read_frame(path) for _, path in frames_of(folder)]
     frames = [mesh.point_data for mesh in meshes]
     scales = [max(row["displacement_max"] for row in history), 1.0,
               max(np.max(np.abs(frame["normal_pressure"])) for frame in frames)]
@@ -146,19 +143,13 @@ def cells(row, first):
 def table(rows):
     """The table in Markdown."""
     first = {row["scene"]: row["seconds"] for row in reversed(rows) if not row["error"]}
-    lines = [list(TITLES.values())]
-    for row in rows:
-        lines.append(cells(row, first.get(row["scene"]) or np.nan))
+    header = list(TITLES.values())
+    lines = [cells(row, first.get(row["scene"]) or np.nan) for row in rows]
     if any(row["error"] for row in rows):
-        whys = [REASON, *(textwrap.shorten(row["error"], WIDTH, placeholder=" …") for row in rows)]
-        lines = [[*line, why] for line, why in zip(lines, whys)]
-    widths = [max(map(len, column)) for column in zip(*lines)]
-    lines.insert(1, ["-" * width for width in widths])
-    return "\n".join(
-        "| " + " | ".join(
-            cell.ljust(width) if k < 2 or k == len(TITLES) else cell.rjust(width)
-            for k, (cell, width) in enumerate(zip(line, widths))) + " |"
-        for line in lines)
+        header.append(REASON)
+        for line, row in zip(lines, rows):
+            line.append(textwrap.shorten(row["error"], WIDTH, placeholder=" …"))
+    return markdown(header, lines, left=(0, 1, len(TITLES)))
 
 
 def arguments_of(prog):
@@ -200,10 +191,7 @@ def main(prog=None):
         return 2
     print(table(rows))
     path = arguments.out / "comparison.csv"
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, rows[0].keys())
-        writer.writeheader()
-        writer.writerows(rows)
+    write_table(rows, path)
     print(f"written to {path}")
     errors = [f"{row['scene']}, {row['solver']}: {row['error']}" for row in rows if row["error"]]
     print(*(f"error: {error}\n" for error in errors), sep="", end="", file=sys.stderr)

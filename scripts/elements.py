@@ -73,6 +73,21 @@ def functions(barycentric, nodes):
     return np.vstack([barycentric * (2 * barycentric - 1), 4 * np.array(middles)]).T
 
 
+def derivatives(barycentric, nodes):
+    """∂φ_n/∂λ_k of the functions of a triangle, P1 or with 6 nodes P2, at points as in `functions`:
+    (points, functions, 3)."""
+    points = barycentric.T
+    found = np.zeros((len(points), nodes, 3))
+    if nodes == 3:
+        found[:] = np.eye(3)
+        return found
+    for i in range(3):
+        j = (i + 1) % 3
+        found[:, i, i] = 4 * points[:, i] - 1
+        found[:, 3 + i, i], found[:, 3 + i, j] = 4 * points[:, j], 4 * points[:, i]
+    return found
+
+
 def sides_of(elements):
     """The sides of all elements, (3m, 2) or (3m, 3), with the element on their left."""
     return elements[:, SIDES[:, :elements.shape[1] // 3 + 1]].swapaxes(0, 1).reshape(

@@ -43,10 +43,7 @@ def read_results(folder, time=None):
             rows = list(csv.DictReader(file))
         with whole(folder / "scene.toml") as file:
             scene = tomllib.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
-        with whole(folder / "fields.pvd") as file:
-            frames = ElementTree.parse(file).findall(".//DataSet")
-        frames = [(float(frame.get("timestep")), folder / frame.get("file")) for frame in frames]
-        frames.sort(key=lambda frame: frame[0])
+        frames = frames_of(folder)
         chosen = frames[-1 if time is None else nearest(frames, time)]
         fields = read_frame(chosen[1])
         elements = np.vstack([fields.cells[k].data for k in triangles(fields)])
@@ -72,6 +69,14 @@ def read_results(folder, time=None):
         raise ResultError(f"{folder}: fields.pvd lists no frame") from None
     except ValueError as error:
         raise ResultError(f"{folder}: {error}") from None
+
+
+def frames_of(folder):
+    """(time, file) of each frame that fields.pvd lists, in the order of time."""
+    with whole(folder / "fields.pvd") as file:
+        frames = ElementTree.parse(file).findall(".//DataSet")
+        frames = [(float(frame.get("timestep")), folder / frame.get("file")) for frame in frames]
+    return sorted(frames, key=lambda frame: frame[0])
 
 
 def nearest(frames, time):

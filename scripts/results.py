@@ -31,6 +31,25 @@ def read_table(path):
         return [{key: value(text) for key, text in row.items()} for row in csv.DictReader(file)]
 
 
+def write_table(rows, path):
+    """Writes dictionaries as a CSV file, a column for each key in the order of appearance."""
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(dict.fromkeys(key for row in rows for key in row)))
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def markdown(header, rows, left=()):
+    """A table in Markdown, with the columns of these numbers to the left and the others to the right."""
+    rows = [[str(cell) for cell in row] for row in (header, *rows)]
+    widths = [max(map(len, column)) for column in zip(*rows)]
+    rows.insert(1, ["-" * (width - (k not in left)) + ":" * (k not in left)
+                    for k, width in enumerate(widths)])
+    return "\n".join("| " + " | ".join(
+        cell.ljust(width) if k in left else cell.rjust(width)
+        for k, (cell, width) in enumerate(zip(row, widths))) + " |" for row in rows)
+
+
 class ResultError(Exception):
     """The folder does not hold what a figure needs: said in one line."""
 

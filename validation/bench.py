@@ -1,229 +1,400 @@
 #!/usr/bin/python3
-"""Measures speed, everything side by side in one run: bench.py --binary FILE [--quick] [PART…]
+"""Measures speed, everything side by side in one run: bench.py [--binary FILE] [--quick] [PART…]
 
-compare  seconds per step and of the whole process, files written by all: signorini against a loop in
-         FEniCSx and one in NGSolve (loop.py) whose Cholesky factor is kept as a preconditioner or made
-         for every linear system; in square-mild, where contact stays as it is, and lshape-rolling, where
-         it goes from no node to all and back; for displacements of order 1 and 2, on uniform meshes
-         and on those that `--accuracy` finds; and against the floor (floor.py): the bytes that the
-         passes of a step must move over the speed of memory, the operations of the factorisations
-         that were made over that of dgemm
+compare  seconds per step and of the whole process, files written by all: signorini against a loop in FEniCSx
+         (fenicsx.py) whose Cholesky factor is kept as a preconditioner or made anew for every linear system; in
+         square-mild, where contact stays as it is, and lshape-rolling, where it goes from no node to all and
+         back; P1 and P2, on uniform meshes and on those that `--accuracy` finds; and against the floor: the
+         bytes that the passes of a step must move, once, over the speed of memory, and the operations of the
+         factorisations that were made over that of dgemm. The entries of K are those of FEniCSx's matrix,
+         entries and operations of its factor those of MUMPS; neither is taken from signorini
 growth   time per step and peak memory up to two million unknowns
 ranks    whole runs on 1, 2 and 4 ranks with our factors (one rank: growth), with MUMPS and with PETSc's
          multigrid (gamg), these two on 4 ranks alone where the mesh is largest
 
 k = 0.01. A step is the mean of all but the first, which makes what the others keep. Programs take turns,
 because the machine may be shared: a row has the medians over the rounds, ratios are taken round by round.
-All use the same meshes, tolerance and one thread each. What compiling forms takes is left out. A program
-whose answer differs from ours by more than 1e-6 is left out. Writes OUT/bench.csv; scripts/bench.py
-prints and draws it.
+All use the same meshes, tolerance and one thread each. A program whose answer differs from ours by more than 1e-6
+is left out. Writes OUT/bench.csv, prints the tables of SPEED.md and draws OUT/bench.png.
 """
 
 import argparse
+import json
+import os
+import re
+import shutil
+import subprocess
 import sys
 import time
-from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
 
-from programs import SAME, TOLERANCE, Bench, Case, Failure
+import numpy as np
 
-PARTS = ["compare", "growth", "ranks"]
-OURS = ("signorini", "active-set")
-SOLVERS = [("signorini", "penalty-duality"), ("signorini", "tao")]
-KEPT = [("FEniCSx", "kept"), ("NGSolve", "kept")]
-ANEW = [("FEniCSx", "anew"), ("NGSolve", "anew")]
+from shared import ROOT
+from drawing import BLUE, FAINT, GREEN, INK, RED, plt
+from results import markdown, read_table, write_table
+
+# Largest difference of a competitor's answer from ours to the same discrete problem, and KKT residual of an answer.
+SAME, TOLERANCE = 1e-6, 1e-10
+# After how many iterations the loop renews a factor that it keeps: what was fastest where contact moves.
+KEEP = {"kept": 7, "anew": 0}
+# Instructions of the processor that OpenBLAS has kernels for; Debian's takes the oldest ones on a
+# processor that is younger than itself.
+KERNELS = {"avx512f": "SkylakeX", "avx2": "Haswell"}
+OURS, FROZEN, KEPT, ANEW = "signorini", "frozen", "FEniCSx, factor kept", "FEniCSx, a factor for every system"
+RIVALS = {KEPT: ("kept", "#8e5aa8"), ANEW: ("anew", "#c9aed6")}
+# Scene and .geo, order, cells along the contact or accuracy, rounds, programs.
+SCENES = {"stays": ("square-mild", "square"), "moves": ("lshape-rolling", "lshape"), FROZEN: ("lshape", "lshape")}
+ALL, FEWER = (OURS, KEPT, ANEW, FROZEN), (OURS, KEPT)
+CASES = {
+    False: [("stays", 1, 64, 3, ALL), ("stays", 1, 128, 3, ALL), ("stays", 1, 256, 2, ALL), ("stays", 2, 64, 2, ALL),
+            ("stays", 2, 0.01, 3, ALL), ("moves", 1, 24, 3, ALL), ("moves", 1, 48, 3, ALL), ("moves", 1, 68, 1, ALL),
+            ("moves", 1, 136, 1, FEWER), ("moves", 2, 24, 2, ALL), ("moves", 2, 0.01, 3, ALL)],
+    True: [("stays", 1, 64, 1, ALL), ("stays", 2, 32, 1, FEWER), ("moves", 1, 16, 1, ALL), ("moves", 2, 0.1, 1, FEWER)],
+}
 # Phases of `--profile` that the floor has, made once in every step.
 PASSES = ["stiffness refill", "products", "triangular solves", "vectors", "damage source", "damage solve"]
 # What PETSc has in the place of our factors.
 PRECONDITIONERS = {
+    "ours": [],
     "MUMPS": [word for of in ("elastic", "damage") for word in (
         f"-{of}_pc_type", "cholesky", f"-{of}_pc_factor_mat_solver_type", "mumps")],
     "gamg": [word for of in ("elastic", "damage") for word in (f"-{of}_pc_type", "gamg")],
 }
-# Steps of runs that are to tell size and ranks.
-STEPS = 10
-# Steps of a loop that factorises always, where one step costs as another.
-FEW = 20
+# Steps of a run, of one that is to measure size and ranks, and of a loop that factorises always.
+STEPS, SHORT, FEW = 100, 10, 20
 
 
-@dataclass(frozen=True)
-class Turns:
-    """A case, how often signorini and the loops that keep their factors take their turn, and the other
-    programs, whose turn comes once."""
-
-    case: Case
-    rounds: int = 3
-    others: tuple = ()
-    kept: tuple = tuple(KEPT)
+class Failure(Exception):
+    """A program that did not do what it was asked: said in one line."""
 
 
-FULL = [
-    Turns(Case("stays", 1, 64), 3, (*SOLVERS, *ANEW)),
-    Turns(Case("stays", 1, 128), 3, (*SOLVERS, *ANEW)),
-    Turns(Case("stays", 1, 256), 2, tuple(ANEW)),
-    Turns(Case("stays", 2, 64), 2, tuple(ANEW)),
-    Turns(Case("stays", 2, accuracy=0.01), 3, tuple(ANEW)),
-    Turns(Case("moves", 1, 24), 3, (*SOLVERS, *ANEW)),
-    Turns(Case("moves", 1, 48), 3, (*SOLVERS, *ANEW)),
-    Turns(Case("moves", 1, 68), 1, tuple(ANEW)),
-    Turns(Case("moves", 1, 136, steps=60), 1, kept=(("FEniCSx", "kept"),)),
-    Turns(Case("moves", 2, 24), 2, tuple(ANEW)),
-    Turns(Case("moves", 2, accuracy=0.01), 3, tuple(ANEW)),
-]
-QUICK = [
-    Turns(Case("stays", 1, 64), 1, tuple(ANEW)),
-    Turns(Case("stays", 2, 32), 1),
-    Turns(Case("moves", 1, 16), 1, (*SOLVERS, *ANEW)),
-    Turns(Case("moves", 2, accuracy=0.1), 1),
-]
+class Bench:
+    """Runs the programs; rows of what they took."""
+
+    def __init__(self, binary, out):
+        self.binary, self.out, self.rows, self.compiled = str(binary), out, [], set()
+        self.environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+        out.mkdir(parents=True, exist_ok=True)
+        # The same script measures this machine, alone in a process for each kind of kernels.
+        floor = [sys.executable, __file__, "--floor"]
+        flags = Path("/proc/cpuinfo").read_text(encoding="utf-8").split()
+        kernels = [{"OPENBLAS_CORETYPE": core} for flag, core in KERNELS.items() if flag in flags][:1]
+        installed, *best = (json.loads(self.start(floor, **more)[0]) for more in ({}, *kernels))
+        self.speeds = {**(best or [installed])[0], "dgemm as installed": installed["dgemm"]}
+
+    def start(self, command, **environment):
+        """Runs a command to its end: its output and wall seconds."""
+        began = time.perf_counter()
+        done = subprocess.run(list(map(str, command)), env={**self.environment, **environment}, text=True,
+                              cwd=self.out, capture_output=True)
+        seconds = time.perf_counter() - began
+        if done.returncode != 0:
+            lines = (done.stderr.strip() or done.stdout.strip() or "no message").splitlines()
+            wrong = [line for line in lines if line.startswith("error:")] or lines[-1:]
+            raise Failure(f"{Path(command[0]).name} … failed: {wrong[0]}")
+        return done.stdout, seconds
+
+    def mesh(self, scene, geometry, size):
+        """The mesh of a case, made once."""
+        adapted = size < 1
+        path = self.out / f"{scene if adapted else geometry}-{size}.msh"
+        if path.exists():
+            return path
+        if adapted:
+            self.start([self.binary, "run", ROOT / "geo" / f"{scene}.toml", "--accuracy", size,
+                        "--out", self.out / "adapted"])
+            shutil.move(self.out / "adapted" / "mesh.msh", path)
+        else:
+            number = ["n", size] if geometry == "square" else ["size", 2 / size]
+            self.start(["gmsh", "-2", ROOT / "geo" / f"{geometry}.geo", "-setnumber", *number, "-o", path, "-v", "1"])
+        return path
+
+    def signorini(self, scene, mesh, order, steps=STEPS, ranks=1, frames=True, petsc=()):
+        """A run, about 20 frames written unless told otherwise: its row, its history, and seconds per call of each
+        phase of `--profile`."""
+        folder = self.out / "run"
+        launcher = ["mpiexec", "--allow-run-as-root", "--oversubscribe", "-n", ranks] if ranks != 1 else []
+        said, whole = self.start([
+            *launcher, self.binary, "run", ROOT / "geo" / f"{scene}.toml", "--mesh", mesh, "--out", folder,
+            "--set", "time.step=0.01", "--set", f"time.end={steps / 100}", "--profile",
+            "--set", f"discretisation.displacement={order}",
+            *([] if frames else ["--set", "output.every=100000"]), "--", *petsc])
+        summary = json.loads((folder / "summary.json").read_text())
+        history = read_table(folder / "history.csv")
+        # The first step also makes what all others keep.
+        mean = lambda key: sum(row[key] for row in history[2:]) / len(history[2:])
+        phases = dict(re.findall(r"^ +([A-Za-z ]+?) +\d+ +[\d.]+ +[\d.]+ % +([\d.]+)", said, re.MULTILINE))
+        peak = re.findall(r"peak memory (\d+)", said)
+        row = {"nodes": summary["nodes"], "seconds_per_step": mean("seconds"), "whole_seconds": whole,
+               "solves": mean("linear_iterations"), "factorisations": mean("factorisations"),
+               "kkt": max(summary["kkt"].values()), "peak_mb": float(peak[-1]) if peak else np.nan}
+        return row, history, {name: 1e-3 * float(ms) for name, ms in phases.items()}
+
+    def fenicsx(self, scene, mesh, order, method, steps):
+        """The loop, its forms compiled, and its last state."""
+        command = [sys.executable, ROOT / "validation" / "fenicsx.py", ROOT / "geo" / f"{scene}.toml", mesh,
+                   "--order", order, "--keep", KEEP[method]]
+        if (scene, order) not in self.compiled:
+            self.start([*command, "--steps", 1])
+            self.compiled.add((scene, order))
+        said, whole = self.start([*command, "--steps", steps, "--out", self.out / "run" / "loop"])
+        last = json.loads(said.strip().splitlines()[-1])
+        return {"nodes": last["nodes"], "seconds_per_step": float(np.mean(last["seconds"][1:])),
+                "whole_seconds": whole if steps == STEPS else np.nan, "solves": last["iterations"] / (steps - 1),
+                "factorisations": last["factorisations"] / (steps - 1), "kkt": last["kkt"],
+                "peak_mb": last["peak_mb"]}, last
+
+    def keep(self, part, row):
+        self.rows.append({"part": part, **row, **self.speeds})
+        words = " ".join(f"{row[key]}" for key in ("contact", "order", "mesh", "n", "ranks", "program") if key in row)
+        print(f"{part}: {words}: {1e3 * row['seconds_per_step']:.3g} ms per step", file=sys.stderr, flush=True)
 
 
-def compare(bench, quick):
-    for turns in QUICK if quick else FULL:
-        case = turns.case
-        programs = [OURS, *turns.kept, *turns.others]
-        if case.contact == "moves" and not case.accuracy:
-            # The same body and mesh where contact moves in one step of a hundred.
-            programs.append(("signorini", "frozen"))
-        programs = [p for p in programs if p[0] == "signorini" or p[0] in bench.rivals]
-        found = {p: [] for p in programs}
-        for turn in range(turns.rounds):
-            for program in programs:
-                if turn == 0 or program in [OURS, *KEPT]:
-                    found[program].append(one(bench, case, program))
-        floor = floor_of(bench, case, found[OURS])
-        for program, runs in found.items():
-            if wrong := fault(runs, found[OURS][0][1]):
-                print(f"left out: {case.mesh_name}, {' '.join(program)}: {wrong}", file=sys.stderr)
-                continue
-            row = medians([run[0] for run in runs])
-            for key in ("seconds_per_step", "whole_seconds"):
-                ratios = [run[0][key] / ours[0][key] for run, ours in zip(runs, found[OURS])
-                          if run[0][key] and ours[0][key]]
-                if ratios:
-                    row |= {f"{key}_over_ours": median(ratios), f"{key}_over_ours_least": min(ratios),
-                            f"{key}_over_ours_most": max(ratios)}
-            if program == OURS:
-                row |= floor
-            keep(bench, case, program, row, len(runs))
-
-
-def one(bench, case, program):
-    """A run of a program: its row, its last state or history, and its phases."""
-    name, method = program
-    if program == ("signorini", "frozen"):
-        row, history, phases = bench.signorini(replace(case, scene="lshape"))
-        return {**row, "whole_seconds": None}, None, phases
-    if name == "signorini":
-        return bench.signorini(case, method)
-    few = method == "anew" and case.contact == "stays" and case.steps > FEW
-    try:
-        row, told = bench.loop(case, name, method, FEW if few else case.steps)
-    except Failure as failure:
-        return {"failure": failure}, None, None
-    return ({**row, "whole_seconds": None} if few else row), told, None
-
-
-def fault(runs, history):
-    """Why the times of a program do not count: all must solve the same problem."""
-    for row, told, _ in runs:
-        if "failure" in row:
-            return row["failure"]
-        if row["kkt"] > TOLERANCE:
-            return f"KKT {row['kkt']:.1e}"
-        for key in ("zeta_min", "displacement_max", "work") if isinstance(told, dict) else ():
-            ours = history[told["steps"]][key]
-            apart = abs(told[key] - ours) / max(abs(step[key]) for step in history)
-            row["apart"] = max(row.get("apart", 0.0), apart)
-            if apart > SAME:
-                return f"{key} is {apart:.0e} apart from that of signorini"
+def differs(last, history, row):
+    """Why the times of a program do not count, or None: all must solve the same problem."""
+    if row["kkt"] > TOLERANCE:
+        return f"KKT {row['kkt']:.1e}"
+    for key in ("zeta_min", "displacement_max", "work"):
+        apart = abs(last[key] - history[last["steps"]][key]) / max(abs(step[key]) for step in history)
+        if apart > SAME:
+            return f"{key} is {apart:.0e} apart from that of signorini"
     return None
 
 
-def floor_of(bench, case, runs):
+def compare(bench, quick):
+    """All programs on all cases."""
+    for contact, order, size, rounds, programs in CASES[quick]:
+        (scene, geometry), case = SCENES[contact], {"contact": contact, "order": order}
+        mesh = bench.mesh(scene, geometry, size)
+        case["mesh"] = f"accuracy {size}" if size < 1 else f"n = {size}"
+        found, ours, phases = {program: [] for program in programs}, [], []
+        for turn in range(rounds):
+            for program in programs:
+                try:
+                    if program == OURS:
+                        row, history, passes = bench.signorini(scene, mesh, order)
+                        ours.append(row)
+                        phases.append(passes)
+                    elif program == FROZEN and contact == "moves" and size >= 1:
+                        # The same body and mesh where contact moves in one step of a hundred.
+                        row = bench.signorini(SCENES[FROZEN][0], mesh, order)[0]
+                    elif program in RIVALS and (program == KEPT or turn == 0):
+                        few = program == ANEW and contact == "stays"
+                        row, last = bench.fenicsx(scene, mesh, order, RIVALS[program][0], FEW if few else STEPS)
+                        if wrong := differs(last, history, row):
+                            raise Failure(wrong)
+                    else:
+                        continue
+                    found[program].append({**row, **{
+                        f"{key}_over_ours": row[key] / ours[-1][key] for key in ("seconds_per_step", "whole_seconds")}})
+                except Failure as failure:
+                    print(f"left out: {case}, {program}: {failure}", file=sys.stderr)
+        for program, runs in found.items():
+            if runs:
+                row = {key: median(run[key] for run in runs) for key in runs[0]}
+                more = floor_of(bench, scene, mesh, order, row, phases) if program == OURS else {}
+                bench.keep("compare", {**case, "program": program, **row, **more})
+
+
+def floor_of(bench, scene, mesh, order, row, phases):
     """Seconds of the floor, beside those of our own passes."""
-    if "FEniCSx" not in bench.rivals:
-        return {}
-    passes, speeds = bench.passes(case), bench.speeds
-    row = {}
-    for name in PASSES:
-        row[f"floor {name}"] = passes[name] / speeds["copy"]
-    made = median(run[0]["factorisations"] for run in runs)
-    row["floor"] = sum(row.values())
-    row["floor factorisation"] = passes["factorisation"] / speeds["dgemm"]
-    row["floor"] += made * row["floor factorisation"]
-    row["step_over_floor"] = median(run[0]["seconds_per_step"] for run in runs) / row["floor"]
-    for name in [*PASSES, "factorisation"]:
-        if all(name in run[2] for run in runs):
-            row[f"ours {name}"] = median(run[2][name] for run in runs)
-    return row
-
-
-def medians(rows):
-    """The row of medians; the ratio of what differs from round to round is in the others."""
-    number = lambda values: all(isinstance(v, (int, float)) for v in values)
-    columns = {key: [row.get(key) for row in rows] for key in rows[0]}
-    return {key: median(values) if number(values) else values[0] for key, values in columns.items()}
-
-
-def keep(bench, case, program, row, rounds):
-    bench.rows.append({"part": bench.part, "contact": case.contact, "scene": case.name, "order": case.order,
-                       "mesh": case.mesh_name, "n": case.n, "steps": case.steps, "rounds": rounds,
-                       **row, "method": program[1], **bench.speeds})
-    whole = f", whole {row['whole_seconds']:.2f} s" if row.get("whole_seconds") else ""
-    print(f"{bench.part}: contact {case.contact}, order {case.order}, {case.mesh_name}: "
-          f"{' '.join(program)} {1e3 * row['seconds_per_step']:.3g} ms per step{whole}",
-          file=sys.stderr, flush=True)
+    said, _ = bench.start([sys.executable, __file__, "--floor", ROOT / "geo" / f"{scene}.toml", mesh, order])
+    passes = json.loads(said)
+    floor = {f"floor {name}": passes[name] / bench.speeds["copy"] for name in PASSES}
+    total = sum(floor.values())
+    floor["floor factorisation"] = passes["factorisation"] / bench.speeds["dgemm"]
+    total += row["factorisations"] * floor["floor factorisation"]
+    ours = {f"ours {name}": median(run[name] for run in phases)
+            for name in (*PASSES, "factorisation") if all(name in run for run in phases)}
+    return {**floor, **ours, "floor": total, "step_over_floor": row["seconds_per_step"] / total}
 
 
 def growth(bench, quick):
     """Time and memory over the size."""
     for n in (32, 64, 128, 256) if quick else (64, 128, 256, 512, 1024):
-        case = Case("stays", 1, n, steps=STEPS)
-        row, _, _ = bench.signorini(case, frames=False)
-        keep(bench, case, OURS, row, 1)
+        row, _, _ = bench.signorini("square-mild", bench.mesh("", "square", n), 1, SHORT, frames=False)
+        bench.keep("growth", {"n": n, "ranks": 1, "program": "ours", **row})
 
 
 def ranks(bench, quick):
     """Whole runs on several ranks, with each way to precondition."""
     for n, petsc in [(128, (1, 2, 4))] if quick else [(512, (1, 2, 4)), (1024, (4,))]:
-        case, answer = Case("stays", 1, n, steps=STEPS), None
-        for method in ("active-set", *PRECONDITIONERS):
-            for count in petsc if method in PRECONDITIONERS else (2, 4):
-                options = PRECONDITIONERS.get(method, ())
-                try:
-                    row, history, _ = bench.signorini(case, ranks=count, frames=False, petsc=options)
-                except (Failure, FileNotFoundError) as failure:
-                    print(f"left out: {method} on {count} ranks: {failure}", file=sys.stderr)
-                    continue
+        answer = None
+        for program, options in PRECONDITIONERS.items():
+            for count in petsc if options else (2, 4):
+                row, history, _ = bench.signorini("square-mild", bench.mesh("", "square", n), 1, SHORT, count, False,
+                                                  options)
                 answer = answer or history
-                if wrong := fault([(row, {"steps": STEPS, **history[STEPS]}, None)], answer):
-                    print(f"left out: {method} on {count} ranks: {wrong}", file=sys.stderr)
+                if wrong := differs({"steps": SHORT, **history[SHORT]}, answer, row):
+                    print(f"left out: {program} on {count} ranks: {wrong}", file=sys.stderr)
                 else:
-                    keep(bench, case, ("signorini", method), row, 1)
+                    bench.keep("ranks", {"n": n, "ranks": count, "program": program, **row})
+
+
+def machine():
+    """Bytes and operations per second of one core: the best of five copies of an array that no cache holds, and
+    of five products of dense matrices."""
+    def best(work):
+        seconds = []
+        for _ in range(5):
+            began = time.perf_counter()
+            work()
+            seconds.append(time.perf_counter() - began)
+        return min(seconds)
+
+    a, b, c = np.ones(1 << 26), np.ones(1 << 26), np.ones((3000, 3000))
+    return {"copy": 16 * len(a) / best(lambda: np.copyto(b, a)), "dgemm": 2 * len(c) ** 3 / best(lambda: c @ c)}
+
+
+def least_work(scene, mesh, order):
+    """Bytes of each pass of a step; matrices with 8 bytes an entry, 4 for the column of a scalar or of a block of
+    2×2; factors in single precision, read twice for a pair of triangular solves."""
+    from petsc4py import PETSc
+
+    from fenicsx import Body, Contact, Damage
+    from scene import of_order, read_scene
+    from triangulation import read_triangulation
+
+    def analysis(matrix):
+        """Entries and operations of the Cholesky factor."""
+        pc = PETSc.PC().create(PETSc.COMM_SELF)
+        pc.setOperators(matrix)
+        pc.setType("cholesky")
+        pc.setFactorSolverType("mumps")
+        pc.setUp()
+        return pc.getFactorMatrix().getMumpsInfog(29), pc.getFactorMatrix().getMumpsRinfog(3)
+
+    body = Body(of_order(read_scene(scene), int(order)), read_triangulation(mesh))
+    contact, damage = Contact(body), Damage(body, 0.01)
+    contact.solve(0.0, np.ones(len(body.mesh.nodes)))
+    (factor, operations), (damage_factor, _) = (analysis(matrix) for matrix in (contact.reduced, damage.matrix))
+    entries, damage_entries = (matrix.getInfo()["nz_used"] for matrix in (contact.reduced, damage.matrix))
+    unknowns, vertices = len(contact.u), len(body.mesh.nodes)
+    elements = 4 * body.nodes.elements.size
+    return {
+        "stiffness refill": 8 * entries + elements + 8 * unknowns + 8 * vertices,
+        "products": 9 * entries + 16 * unknowns,
+        "triangular solves": 8 * factor + 32 * unknowns,
+        # u ← u + αp, r ← r − αq, rᵀz, p ← z + βp.
+        "vectors": 8 * 11 * unknowns,
+        "damage source": elements + 8 * unknowns + 16 * vertices,
+        "damage solve": 8 * damage_factor + 12 * damage_entries + 48 * vertices,
+        "factorisation": operations,
+    }
+
+
+def number(value, scale=1.0):
+    """Three digits, nothing where there is no value."""
+    return f"{scale * value:.3g}" if isinstance(value, (int, float)) and np.isfinite(value) else ""
+
+
+def exponent(rows, key):
+    """The order of growth with the nodes and the factor, of n = 64 and more."""
+    rows = [row for row in rows if row["n"] >= 64] or rows
+    return np.polyfit(np.log([row["nodes"] for row in rows]), np.log([row[key] for row in rows]), 1)
+
+
+def report(rows):
+    """Prints the tables of SPEED.md."""
+    cases = {}
+    for row in rows:
+        if row["part"] == "compare":
+            cases.setdefault((row["contact"], row["order"], row["mesh"]), {})[row["program"]] = row
+    times = lambda case, program, key: number(case.get(program, {}).get(f"{key}_over_ours"))
+    lines, passes = [], []
+    for name, case in cases.items():
+        ours, frozen = case[OURS], case.get(FROZEN, {}).get("seconds_per_step_over_ours")
+        lines.append([*name, ours["nodes"], number(ours["seconds_per_step"], 1e3),
+                      *(times(case, program, "seconds_per_step") for program in RIVALS),
+                      number(frozen and 1 / frozen), number(ours["floor"], 1e3), number(ours["step_over_floor"]),
+                      number(ours["whole_seconds"]), times(case, KEPT, "whole_seconds")])
+        passes.append([*name, *(f"{number(ours.get(f'ours {of}'), 1e3)} / {number(ours[f'floor {of}'], 1e3)}"
+                                for of in (*PASSES, "factorisation"))])
+    if cases:
+        head = ["contact", "order", "mesh"]
+        print(markdown([*head, "nodes", "ms per step", "× FEniCSx", "× anew", "over frozen", "floor, ms",
+                        "step / floor", "whole, s", "× FEniCSx"], lines), end="\n\n")
+        print(f"Milliseconds of a pass, ours / floor: {ours['copy'] / 1e9:.1f} GB/s, {ours['dgemm'] / 1e9:.1f} Gflop/s "
+              f"({ours['dgemm as installed'] / 1e9:.1f} with the BLAS as it is installed)\n")
+        print(markdown([*head, *PASSES, "factorisation"], passes), end="\n\n")
+    others = sorted((row for row in rows if row["part"] != "compare"),
+                    key=lambda row: (row["n"], row["program"], row["ranks"]))
+    lines = [[row["n"], row["program"], row["ranks"], number(row["seconds_per_step"], 1e3), number(row["solves"]),
+              number(row["whole_seconds"]), number(row["whole_seconds"] - SHORT * row["seconds_per_step"]),
+              number(row["peak_mb"])] for row in others]
+    if lines:
+        print(markdown(["n", "factor", "ranks", "ms per step", "solves", "whole, s", "else, s", "peak MB"], lines))
+    if grown := [row for row in rows if row["part"] == "growth"]:
+        print("\nfrom n = 64 " + ", ".join(f"{name} grows like N^{exponent(grown, key)[0]:.2f}" for name, key in (
+            ("a step", "seconds_per_step"), ("a whole run", "whole_seconds"), ("memory", "peak_mb"))))
+    return cases, grown
+
+
+def draw(rows, picture):
+    """Multiples of our time, in groups, and growth."""
+    cases, grown = report(rows)
+    figure = plt.figure(figsize=(15, 12))
+    grid = figure.add_gridspec(3, 2, height_ratios=[1.3, 1.3, 1])
+    titles = {"seconds_per_step": "a step", "whole_seconds": "the whole process, files written"}
+    for place, (key, title) in enumerate(titles.items() if cases else ()):
+        axes = figure.add_subplot(grid[place, :])
+        at = np.arange(len(cases))
+        axes.bar(at - 0.25, 1.0, 0.24, color=BLUE, label="signorini")
+        for k, (program, (_, colour)) in enumerate(RIVALS.items()):
+            heights = [case.get(program, {}).get(f"{key}_over_ours", np.nan) for case in cases.values()]
+            bars = axes.bar(at + 0.25 * k, heights, 0.24, color=colour, label=program)
+            axes.bar_label(bars, [number(h) for h in heights], fontsize=6.5, padding=1)
+        if key == "seconds_per_step":
+            floor = [1 / case[OURS]["step_over_floor"] for case in cases.values()]
+            axes.hlines(floor, at - 0.37, at - 0.13, color=RED, lw=2,
+                        label="floor: bytes over copy, operations over dgemm")
+        axes.set_xticks(at, [f"contact {contact}\nP{order}, {mesh}\nours: {number(case[OURS][key])} s"
+                             for (contact, order, mesh), case in cases.items()], fontsize=7.5)
+        axes.set(yscale="log", ylabel="times ours", title=title)
+        axes.legend(fontsize=8, ncols=3, loc="upper left")
+    growing = (("seconds_per_step", 1e3, "ms per step"), ("peak_mb", 1.0, "peak memory, MB"))
+    for place, (key, scale, label) in enumerate(growing if grown else ()):
+        axes, (power, start) = figure.add_subplot(grid[2, place]), exponent(grown, key)
+        nodes = np.array([row["nodes"] for row in grown])
+        axes.loglog(2 * nodes, [scale * row[key] for row in grown], "o-", color=GREEN, ms=5, lw=1.2)
+        axes.loglog(2 * nodes, scale * np.exp(start) * nodes**power, ":", color=INK, lw=1, label=f"N^{power:.2f}")
+        axes.set(xlabel="unknowns", ylabel=label, title="signorini, contact stays")
+        axes.legend(fontsize=8)
+    for axes in figure.axes:
+        axes.grid(axis="y", color=FAINT, alpha=0.35, linewidth=0.6)
+        axes.set_axisbelow(True)
+    figure.savefig(picture)
+    print(picture)
 
 
 def main():
+    parts = {"compare": compare, "growth": growth, "ranks": ranks}
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}")
-    parser.add_argument("--binary", type=Path, required=True)
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(parts)}")
+    parser.add_argument("--binary", type=Path, default=ROOT / "target" / "release" / "signorini")
     parser.add_argument("--out", type=Path, default=Path("out/bench"))
     parser.add_argument("--quick", action="store_true", help="small meshes, one round")
+    parser.add_argument("--floor", nargs="*", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
-    if unknown := set(arguments.parts) - set(PARTS):
-        parser.error(f"there is no part {', '.join(unknown)}; there are {', '.join(PARTS)}")
-    began = time.perf_counter()
+    if arguments.floor is not None:
+        print(json.dumps(least_work(*arguments.floor) if arguments.floor else machine()))
+        return
+    if unknown := set(arguments.parts) - set(parts):
+        parser.error(f"there is no part {', '.join(unknown)}; there are {', '.join(parts)}")
     bench = Bench(arguments.binary.resolve(), arguments.out.resolve())
     try:
-        for part in arguments.parts or PARTS:
-            bench.part = part
-            globals()[part](bench, arguments.quick)
+        for part in arguments.parts or parts:
+            parts[part](bench, arguments.quick)
     except Failure as failure:
         sys.exit(f"error: {failure}")
     finally:
-        bench.write()
-    print(f"{bench.out / 'bench.csv'}: {time.perf_counter() - began:.0f} s", file=sys.stderr)
+        for folder in ("run", "adapted"):
+            shutil.rmtree(bench.out / folder, ignore_errors=True)
+        if bench.rows:
+            write_table(bench.rows, bench.out / "bench.csv")
+    draw(bench.rows, bench.out / "bench.png")
 
 
 if __name__ == "__main__":

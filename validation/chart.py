@@ -1,36 +1,42 @@
 #!/usr/bin/python3
-"""Error against seconds, whole processes: chart.py --binary FILE SCENE…
+"""Error against seconds, whole processes: chart.py [--binary FILE] [--asked] SCENE…
 
 Of each scene of geo/: the paper's method (P1, uniform mesh, uniform steps), meshes graded by the .geo
-in P1 and P2, `--accuracy` from 0.1 to 0.001, the other contact solvers, the scene as it is shipped, and
-the FEniCSx loop. The seconds are those from start to end of the process, gmsh, adaptation and output
-included, on one core, as FEniCSx has; of a run below three seconds the median of three. FEniCSx is
-given the mesh, its forms are compiled, and it writes nothing. The error is the larger of those of u
-(energy norm) and of the damage (L²) at the end, relative, against the reference of graded_reference.py
-in out/reference/graded.
-Writes out/chart/<scene>/chart.csv; scripts/chart.py draws it.
+in P1 and P2, `--accuracy` from 0.1 to 0.001, the other contact solvers, and the scene as shipped. The
+seconds are those from start to end of the process, gmsh, adaptation and output included, on one core;
+of a run below three seconds the median of three. The error is the larger of those of u (energy norm) and
+of the damage (L²) at the end, relative, against the reference of references.py in out/reference/graded.
+
+Writes out/chart/<scene>/chart.csv and draws out/chart/chart.png, a panel per scene. Prints the Pareto front
+of each scene (the runs to which no other is both faster and more accurate) and how many times the seconds of
+`--accuracy` the paper's method takes for some errors.
+
+With --asked only `--accuracy` 0.1, 0.03, 0.01 and 0.003 are run, and the errors are printed over the accuracy asked
+for; exit code 1 if the larger one is above it. (The accuracy is also that of every figure: make promises.)
 """
 
 import argparse
-import csv
 import itertools
-import json
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from statistics import mean, median
+from statistics import median
 
-import graded_reference
-from programs import KEEP, SAME
-from scene import read_scene, write_scene
-from true_errors import Run, elasticity, errors
+import numpy as np
+from matplotlib.ticker import FuncFormatter
 
-ROOT = Path(__file__).resolve().parent.parent
+import references
+from shared import ROOT
+from drawing import BLUE, FAINT, GREEN, INK, RED, plt
+from results import write_table
+from scene import elasticity, read_scene, write_scene
+from true_errors import Run, errors
+
 SHORT, PASSES = 3.0, 3
 ENVIRONMENT = {**os.environ, "OMP_NUM_THREADS": "1"}
 # Largest size, m, and how often it is halved, in P1; the grading in P1, those in P2.
@@ -41,6 +47,18 @@ MESHES = {
     "bridge-half": (0.5, 5, 32, (32, 1024)),
     "lshape-rolling": (0.5, 4, 32, (32, 1024)),
 }
+ASKED = (0.1, 0.03, 0.01, 0.003)
+# Label, series, solver and style of the panels; drawn in this order.
+KINDS = [
+    ("the paper's method: P1, uniform mesh and steps", "P1 uniform", "active-set", BLUE, "o"),
+    ("the same by tao", "P1 uniform", "tao", GREEN, "o"),
+    ("the same by penalty-duality", "P1 uniform", "penalty-duality", "#d08a1d", "o"),
+    ("P1, graded mesh", "P1 graded", "active-set", "#4fa3a5", "^"),
+    ("P2, graded mesh", "P2 graded", "active-set", "#7a6a3a", "v"),
+    ("--accuracy 0.1 … 0.001", "accuracy", "active-set", RED, "D"),
+    ("the same by tao", "accuracy", "tao", GREEN, "D"),
+    ("the same by penalty-duality", "accuracy", "penalty-duality", "#d08a1d", "D"),
+]
 
 
 @dataclass(frozen=True)
@@ -54,8 +72,6 @@ class Choice:
     size: float = None
     grading: float = 1
     step: object = None
-    # A mesh that is there, instead of a size.
-    mesh: str = None
 
     def scene(self, shipped):
         """The shipped scene with this choice."""
@@ -70,17 +86,20 @@ class Choice:
         scene["time"] = {**shipped["time"], "step": self.step}
         if self.step == "auto":
             scene["time"]["tolerance"] = 0.03
-        if self.mesh:
-            scene["mesh"]["file"] = self.mesh
-        else:
-            scene["mesh"]["size"] = self.size
-            if self.grading != 1:
-                scene["mesh"]["parameters"] = {"grading": self.grading}
+        scene["mesh"]["size"] = self.size
+        if self.grading != 1:
+            scene["mesh"]["parameters"] = {"grading": self.grading}
         return scene
+
+    def __str__(self):
+        parts = [f"accuracy {self.accuracy:g}" if self.accuracy else self.series]
+        parts += [f"{name} {getattr(self, name)}" for name in ("size", "grading", "step")
+                  if getattr(self, name) not in (None, 1)]
+        return ", ".join(parts + [self.solver] * (self.solver != "active-set"))
 
 
 def choices(name):
-    """The runs of a scene, but those on its adapted meshes."""
+    """The runs of a scene."""
     largest, halvings, linear, quadratic = MESHES[name]
     sizes = [largest / 2**k for k in range(halvings + 1)]
     yield Choice("as shipped")
@@ -100,21 +119,6 @@ def choices(name):
         yield Choice("accuracy", solver, accuracy=0.01)
 
 
-def seconds_of(command, per_step, before=lambda: None):
-    """Wall time of a command and what `per_step` makes of what it said; medians of three if it is
-    short."""
-    times, steps = [], []
-    while len(times) < (PASSES if not times or times[0] < SHORT else 1):
-        before()
-        started = time.perf_counter()
-        done = subprocess.run(list(map(str, command)), capture_output=True, text=True, env=ENVIRONMENT)
-        times.append(time.perf_counter() - started)
-        if done.returncode != 0:
-            raise subprocess.CalledProcessError(done.returncode, command, done.stdout, done.stderr)
-        steps.append(per_step(done.stdout))
-    return median(times), median(steps)
-
-
 class Study:
     """The runs of one scene and their rows."""
 
@@ -123,117 +127,150 @@ class Study:
         self.shipped = read_scene(path)
         self.name = Path(path).stem
         shutil.copy(Path(path).parent / self.shipped["mesh"]["file"], folder)
-        kept = graded_reference.make(binary, path, ROOT / "out" / "reference" / "graded" / self.name)
+        kept = references.graded(self.binary, path, ROOT / "out" / "reference" / "graded" / self.name)
         self.reference = Run(kept)
         material = self.shipped["material"]
         self.stiffness = elasticity(material["young"], material["poisson"], material["plane"])
         self.rows = []
 
     def run(self, choice):
-        """Makes a run, judges it and adds its row; the folder of its results."""
-        path, out = self.folder / f"{self.name}.toml", self.folder / "out"
+        """Adds the row of a run, or reports why it failed."""
+        path, out, times = self.folder / f"{self.name}.toml", self.folder / "out", []
         write_scene(choice.scene(self.shipped), path)
-
-        def unmeshed():
-            for mesh in set(self.folder.glob("*.msh")) - {self.folder / str(choice.mesh)}:
+        command = [str(self.binary), "run", path, "--out", out, "--solver", choice.solver]
+        while len(times) < (PASSES if not times or times[0] < SHORT else 1):
+            for mesh in self.folder.glob("*.msh"):
                 mesh.unlink()
-
-        def per_step(_said):
-            # The first step makes what the others keep; without time there is no other.
-            with open(out / "history.csv", encoding="utf-8") as file:
-                steps = list(csv.DictReader(file))
-            return mean(float(step["seconds"]) for step in steps[2:] or steps)
-
-        command = [self.binary, "run", path, "--out", out, "--solver", choice.solver]
-        seconds, seconds_per_step = seconds_of(command, per_step, unmeshed)
+            started = time.perf_counter()
+            done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT)
+            times.append(time.perf_counter() - started)
+            if done.returncode != 0:
+                print(f"{self.name}, {choice}: {done.stderr.strip()}", file=sys.stderr, flush=True)
+                return
         run = Run(out)
         u, damage = errors(self.reference, run, self.stiffness)
         damage = damage or 0.0
-        row = {key: getattr(choice, key) for key in
-               ("series", "solver", "accuracy", "order", "size", "grading", "step")}
-        row |= {key: run.summary[key] for key in
-                ("nodes", "triangles", "steps", "zeta_min", "displacement_max")}
-        self.add({**row, "seconds": seconds, "seconds_per_step": seconds_per_step, "u": u,
-                  "damage": damage, "error": max(u, damage)})
-        return out
-
-    def add(self, row):
+        row = {"run": str(choice), "series": choice.series, "solver": choice.solver,
+               "accuracy": choice.accuracy, "nodes": run.summary["nodes"], "steps": run.summary["steps"],
+               "seconds": median(times), "u": u, "damage": damage, "error": max(u, damage)}
         self.rows.append(row)
-        told = ", ".join(f"{key} {row[key]}" for key in
-                         ("accuracy", "order", "size", "grading", "step") if row[key] is not None)
-        print(f"{self.name}, {row['series']}, {row['solver']}: {told}: {row['nodes']} nodes, "
-              f"{row['seconds']:.3f} s, u {100 * row['u']:.3f} %, damage {100 * row['damage']:.3f} %",
-              flush=True)
+        print(f"{self.name}: {line(row)}", flush=True)
 
-    def fenicsx(self, order, mesh, factor):
-        """The FEniCSx loop on a mesh with k = 0.01, next to ours on the same mesh."""
-        kept = self.folder / "given.msh"
-        shutil.copy(mesh, kept)
-        self.run(Choice("same mesh as FEniCSx", order=order, step=0.01, mesh=kept.name))
-        ours = self.rows[-1]
-        loop = [sys.executable, ROOT / "validation" / "loop.py", "fenicsx",
-                self.folder / f"{self.name}.toml", kept, "--keep", KEEP["FEniCSx"] if factor == "kept" else 0, "--steps"]
-        # The first run compiles the forms.
-        subprocess.run(list(map(str, [*loop, 1])), capture_output=True, check=True,
-                       text=True, env=ENVIRONMENT)
-        apart = []
 
-        def seconds_per_step(said):
-            said = json.loads(said)
-            apart.append(max(abs(said[key] / ours[key] - 1) for key in ("zeta_min", "displacement_max")))
-            return mean(said["seconds"][1:])
+def line(row):
+    """A run as text."""
+    return (f"{row['seconds']:8.3f} s  u {100 * row['u']:7.3f} %  damage {100 * row['damage']:7.3f} %"
+            f"  {row['nodes']:7.0f} nodes  {row['run']}")
 
-        steps = round(self.shipped["time"]["end"] / 0.01)
-        seconds, per_step = seconds_of([*loop, steps], seconds_per_step)
-        if max(apart) > SAME:
-            sys.exit(f"{self.name}: FEniCSx P{order} differs from ours by {max(apart):.1e}")
-        self.add({**ours, "series": f"FEniCSx P{order}", "solver": f"factor {factor}",
-                  "seconds": seconds, "seconds_per_step": per_step})
-        print(f"  per step {per_step / ours['seconds_per_step']:.1f} times ours, "
-              f"answers {max(apart):.0e} apart", flush=True)
 
-    def all(self):
-        """Every run of the chart."""
-        for choice in choices(self.name):
-            self.attempt(self.run, choice)
-        largest = MESHES[self.name][0]
-        for size in (largest, largest / 2):
-            self.run(Choice("mesh", order=1, size=size, step=0.05))
-            self.rows.pop()
-            self.attempt(self.fenicsx, 1, next(self.folder.glob("*size*.msh")), "kept")
-        for accuracy, factor in ((0.03, "kept"), (0.01, "kept"), (0.01, "anew")):
-            out = self.run(Choice("mesh", accuracy=accuracy))
-            self.rows.pop()
-            self.attempt(self.fenicsx, 2, out / "mesh.msh", factor)
+def front(rows):
+    """The runs to which no other is both faster and more accurate, by rising seconds."""
+    best, kept = np.inf, []
+    for row in sorted(rows, key=lambda row: (row["seconds"], row["error"])):
+        if row["error"] < best:
+            best = row["error"]
+            kept.append(row)
+    return kept
 
-    def attempt(self, make, *arguments):
-        """Makes a row, or says why a program failed."""
-        try:
-            make(*arguments)
-        except subprocess.CalledProcessError as failed:
-            told = failed.stderr.strip().splitlines()[-1:]
-            print(f"{self.name}, {make.__name__} {arguments}: {told}", file=sys.stderr, flush=True)
 
-    def write(self):
-        target = ROOT / "out" / "chart" / self.name / "chart.csv"
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with open(target, "w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, self.rows[0])
-            writer.writeheader()
-            writer.writerows(self.rows)
-        print(target)
+def knee(members):
+    """The run of a front farthest below the straight line between its ends, in logarithms."""
+    if len(members) < 3:
+        return None
+    x, y = np.log([[row["seconds"], row["error"]] for row in members]).T
+    depth = y[0] + (x - x[0]) / (x[-1] - x[0]) * (y[-1] - y[0]) - y
+    return members[int(depth.argmax())]
+
+
+def seconds_for(error, rows):
+    """Seconds for an error on the front of `rows`, on straight lines in logarithms, and whether they
+    lie beyond the last run: then on the line fitted to the last four."""
+    members = front(rows)
+    x, y = np.log([[row["error"], row["seconds"]] for row in members]).T
+    if error >= members[-1]["error"]:
+        return np.exp(np.interp(np.log(error), x[::-1], y[::-1])), False
+    slope, at_one = np.polyfit(x[-4:], y[-4:], 1)
+    return np.exp(at_one + slope * np.log(error)), True
+
+
+def draw(axes, name, rows):
+    """The panel of a scene."""
+    for label, series, solver, colour, marker in KINDS:
+        of = [row for row in rows if (row["series"], row["solver"]) == (series, solver)]
+        axes.plot([row["seconds"] for row in of], [100 * row["error"] for row in of], marker,
+                  color=colour, ms=4.5, alpha=0.8, mew=0, label=label)
+    members = front(rows)
+    axes.step([row["seconds"] for row in members], [100 * row["error"] for row in members], where="post",
+              color=INK, lw=0.9, zorder=1, label="Pareto front")
+    for row in rows:
+        if row["series"] == "as shipped":
+            axes.plot(row["seconds"], 100 * row["error"], "*", color="white", mec=INK, ms=13, mew=1.1,
+                      label="as shipped", zorder=5)
+    axes.set(xscale="log", yscale="log", title=name, xlabel="seconds of the whole process",
+             ylabel="larger error of u and of the damage (%)")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.grid(which="both", color=FAINT, alpha=0.3, linewidth=0.5)
+    axes.set_axisbelow(True)
+
+
+def report(name, rows):
+    """The front and the ratios of a scene, as text."""
+    members = front(rows)
+    bend = knee(members)
+    print(f"\n{name}: the front, and the scene as shipped")
+    for row in members + [row for row in rows if row["series"] == "as shipped"]:
+        print(f"  {line(row)}{'   (knee)' if row is bend else ''}")
+    paper, asked = ([row for row in rows if row["series"] == series and row["solver"] == "active-set"]
+                    for series in ("P1 uniform", "accuracy"))
+    for error in ASKED:
+        (long, beyond), (short, _) = seconds_for(error, paper), seconds_for(error, asked)
+        print(f"  {100 * error:g} %: the paper's method {long:.3g} s{' (extrapolated)' if beyond else ''}, "
+              f"--accuracy {short:.3g} s: {long / short:.3g} times")
+
+
+def draw_all(tables, picture):
+    """A panel per scene, and one with what the marks mean."""
+    columns = min(3, len(tables))
+    rows = -(-(len(tables) + 1) // columns)
+    figure, axes = plt.subplots(rows, columns, squeeze=False, figsize=(4.6 * columns, 4.1 * rows))
+    axes = list(axes.flat)
+    for axis, (name, table) in zip(axes, tables.items()):
+        draw(axis, name, table)
+        report(name, table)
+    for axis in axes[len(tables):]:
+        axis.axis("off")
+    axes[len(tables)].legend(*axes[0].get_legend_handles_labels(), loc="center", fontsize=9.5)
+    figure.savefig(picture)
+    print(f"\n{picture}")
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--binary", default="target/release/signorini")
-    parser.add_argument("scenes", nargs="+")
+    parser.add_argument("--binary", type=Path, default=ROOT / "target" / "release" / "signorini")
+    parser.add_argument("--asked", action="store_true", help="the accuracy asked for against the true error")
+    parser.add_argument("scenes", nargs="+", type=Path)
     arguments = parser.parse_args()
+    tables, out = {}, ROOT / "out" / "chart"
     for path in arguments.scenes:
         with tempfile.TemporaryDirectory() as folder:
             study = Study(arguments.binary, path, Path(folder))
-            study.all()
-            study.write()
+            asked = (Choice("accuracy", accuracy=accuracy) for accuracy in ASKED)
+            for choice in asked if arguments.asked else choices(study.name):
+                study.run(choice)
+            tables[study.name] = study.rows
+    if arguments.asked:
+        print("true error over the accuracy")
+        for name, rows in tables.items():
+            for row in rows:
+                u, damage, larger = (row[key] / row["accuracy"] for key in ("u", "damage", "error"))
+                print(f"{name}, {row['accuracy']}: {larger:.2f} (u {u:.2f}, damage {damage:.2f}), "
+                      f"{2 * row['nodes']} unknowns, {row['seconds']:.2f} s")
+        sys.exit(any(row["error"] > row["accuracy"] for rows in tables.values() for row in rows))
+    for name, rows in tables.items():
+        (out / name).mkdir(parents=True, exist_ok=True)
+        write_table(rows, out / name / "chart.csv")
+    draw_all(tables, out / "chart.png")
 
 
 if __name__ == "__main__":

@@ -13,12 +13,10 @@ from scipy.sparse.linalg import splu
 
 from conditions import as_rows, merged, merged_gaps, pair
 from lagrange import SIDES, Lagrange, derivatives, functions
-from scene import Expression, displacement_order, of_material
+from scene import DAMAGE, Expression, displacement_order, elasticity, of_material
 
 # Lines at an angle below the first are one; at one below the second rounding may hide that they are two.
 SAME, ALIKE = 1e-8, 1e-4
-DAMAGE = {"lambda_w": 0.0, "strain_cap": 1000.0, "threshold": 0.01, "initial": 1.0,
-          "mass": "consistent"}
 # Barycentric coordinates of the points, of equal weights, that integrate the stiffness.
 POINTS = {1: np.full((1, 3), 1 / 3), 2: np.full((3, 3), 1 / 6) + 0.5 * np.eye(3)}
 # Of the nodes of an edge (ends, middle) the share of its length: the integrals of their functions.
@@ -256,14 +254,3 @@ class Discrete:
         signs = np.where(np.arange(n) % 2, 1.0, -1.0)
         noise = factor.solve(scale @ (2e-15 * signs * (abs(matrix) @ np.abs(solution))))
         return solution, np.abs(scale @ noise).max()
-
-
-def elasticity(e, nu, plane):
-    """D of plane stress for each triangle; plane strain by E/(1−ν²) and ν/(1−ν)."""
-    if plane == "strain":
-        e, nu = e / (1 - nu**2), nu / (1 - nu)
-    d = np.zeros((len(e), 3, 3))
-    d[:, 0, 0] = d[:, 1, 1] = 1.0
-    d[:, 0, 1] = d[:, 1, 0] = nu
-    d[:, 2, 2] = 0.5 * (1 - nu)
-    return (e / (1 - nu**2))[:, None, None] * d

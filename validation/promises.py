@@ -1,10 +1,10 @@
 #!/usr/bin/python3
 """What `--accuracy` promises, tried on forty bodies that are not shipped: promises.py [--binary FILE] [NAME…]
 
-Runs the scenes of promises/scenes.py with `--accuracy` 0.1, 0.03 and 0.01 and compares every printed figure of
+Runs the scenes of scenes.py with `--accuracy` 0.1, 0.03 and 0.01 and compares every printed figure of
 the last state with a truth: quadratic elements on a fine mesh that is graded to the corners and to the
 features that the scene names, with hundreds of uniform steps of second order. It depends on no estimate. A second
-truth with 1.6 times the sizes and steps tells the first one's own error: their difference. Truths are kept in FOLDER/NAME-HASH (--truth).
+truth with 1.6 times the sizes and steps tells the first one's own error: their difference. Truths are kept in FOLDER/NAME-FACTOR (--truth).
 
 An error counts relative to the figure's scale, the largest value in the truth's run: of the largest 1 − ζ for
 `zeta_min` and ζ at a probe, of its mean for `zeta_mean`, of all components of all supports for forces, of all probes' for a kind of probe. Bars are
@@ -13,8 +13,6 @@ figure of each run. Exit code 1 if a bar or a "reached" does not hold.
 """
 
 import argparse
-import csv
-import hashlib
 import json
 import subprocess
 import sys
@@ -25,45 +23,40 @@ from statistics import median
 
 import numpy as np
 
-sys.path.insert(1, str(Path(__file__).resolve().parent / "promises"))
+from shared import ROOT
+from references import kept
+from results import read_table, write_table
+from scene import SceneError, elasticity
+from scenes import scenes, table, texts, write
+from true_errors import Run, errors
 
-from scene import SceneError  # noqa: E402
-from scenes import scenes, table, texts, write  # noqa: E402
-from true_errors import Run, elasticity, errors  # noqa: E402
-
-ROOT = Path(__file__).resolve().parent.parent
 # Sizes of the second truth over those of the first.
 COARSER = 1.6
 # A force below this part of the largest, a damage below this, is rounding.
 ROUNDING = 1e-9
 # Seconds for a run, on a busy machine.
 LIMIT = 240
-FIELDS = ("scene", "accuracy", "told", "figure", "value", "truth", "truth_error", "scale", "error", "bar", "seconds")
 
 
 def make(binary, scene, folder, factor):
-    """Runs a scene's truth with its sizes times a factor, if that was not done before; its results and the
-    seconds it took."""
-    text = json.dumps(texts(scene, factor))
-    kept = folder / f"{scene.name}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
-    if not (kept / "seconds").exists():
-        kept.mkdir(parents=True, exist_ok=True)
-        started = time.perf_counter()
-        run(binary, write(scene, kept, factor), kept / "out")
-        (kept / "seconds").write_text(f"{time.perf_counter() - started:.1f}\n")
-    return kept / "out", float((kept / "seconds").read_text())
+    """The results of a scene's truth with its sizes times a factor."""
+    geometry, content = texts(scene, factor)
+    try:
+        return kept(binary, folder / f"{scene.name}-{factor:g}", content, geometry, limit=LIMIT)
+    except (subprocess.TimeoutExpired, subprocess.CalledProcessError) as error:
+        raise SceneError(str(error)) from None
 
 
-def run(binary, path, out, *more):
-    """Runs a scene on one rank."""
-    command = [binary, "run", path, "--out", out, *more]
+def run(binary, path, out, accuracy):
+    """The summary of a run of a scene on one rank."""
+    command = [binary, "run", path, "--out", out, "--accuracy", accuracy]
     try:
         done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=LIMIT)
     except subprocess.TimeoutExpired:
-        raise SceneError(f"no end within {LIMIT} s {' '.join(map(str, more))}") from None
+        raise SceneError(f"no end within {LIMIT} s") from None
     summary = out / "summary.json"
     if not summary.exists():
-        raise SceneError(f"{path}: {(done.stderr or done.stdout).strip()}")
+        raise SceneError((done.stderr or done.stdout).strip())
     return json.loads(summary.read_text())
 
 
@@ -77,9 +70,8 @@ def figures(summary):
 
 def scales(out, names):
     """By figure the largest value of its kind in the run."""
-    with open(out / "history.csv", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    largest = {n: max(abs((n.startswith("zeta_") or n.endswith(".zeta")) - float(row[n])) for row in rows) for n in names}
+    rows = read_table(out / "history.csv")
+    largest = {n: max(abs((n.startswith("zeta_") or n.endswith(".zeta")) - row[n]) for row in rows) for n in names}
 
     def kind(name):
         last = name.rpartition(".")[2]
@@ -98,8 +90,8 @@ class Truth:
     """A scene's truth, with its own errors."""
 
     def __init__(self, binary, scene, folder):
-        (fine, first), (coarse, second) = (make(binary, scene, folder, factor) for factor in (1.0, COARSER))
-        self.scene, self.seconds = scene, first + second
+        fine, coarse = (make(binary, scene, folder, factor) for factor in (1.0, COARSER))
+        self.scene = scene
         self.run, other = Run(fine), Run(coarse)
         self.figures = figures(self.run.summary)
         if self.run.summary["stopped_at"] is not None:
@@ -198,16 +190,8 @@ def trial(binary, truth, accuracy):
     with tempfile.TemporaryDirectory() as folder:
         path, out = write(truth.scene, Path(folder)), Path(folder) / "out"
         started = time.perf_counter()
-        summary = run(binary, path, out, "--accuracy", accuracy)
+        summary = run(binary, path, out, accuracy)
         return list(compare(truth, summary, out, accuracy, time.perf_counter() - started))
-
-
-def write_rows(rows, path):
-    """Writes the rows as CSV."""
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, FIELDS)
-        writer.writeheader()
-        writer.writerows(rows)
 
 
 def main():
@@ -228,11 +212,11 @@ def main():
                 truth = truth or Truth(binary, scene, arguments.truth)
                 new = trial(binary, truth, accuracy)
                 rows += new
-                print(line(new), f"in {truth.seconds:.0f} s", flush=True)
+                print(line(new), flush=True)
             except SceneError as error:
                 failed += 1
                 print(f"{scene.name} {accuracy}: {error}", flush=True)
-        write_rows(rows, arguments.out / "promises.csv")
+        write_table(rows, arguments.out / "promises.csv")
     lines, broken = summary_of(rows)
     print(*lines, sep="\n")
     return int(broken + failed > 0)

@@ -99,6 +99,23 @@ def of_material(scene, mesh, table, key, default=None):
     return values
 
 
+def elasticity(young, poisson, plane="stress"):
+    """D of the paper's σ = 𝒜ε for (ε_xx, ε_yy, 2ε_xy), from numbers or from a value for each triangle (n): (…, 3, 3).
+    Plane strain is plane stress with E/(1 − ν²) and ν/(1 − ν)."""
+    e, nu = np.asarray(young, float), np.asarray(poisson, float)
+    if plane == "strain":
+        e, nu = e / (1 - nu**2), nu / (1 - nu)
+    d = np.zeros((*e.shape, 3, 3))
+    d[..., 0, 0] = d[..., 1, 1] = 1.0
+    d[..., 0, 1] = d[..., 1, 0] = nu
+    d[..., 2, 2] = 0.5 * (1 - nu)
+    return (e / (1 - nu**2))[..., None, None] * d
+
+
+# What [damage] has where a scene leaves it out.
+DAMAGE = {"lambda_w": 0.0, "strain_cap": 1000.0, "threshold": 0.01, "initial": 1.0, "mass": "consistent"}
+
+
 def displacement_order(scene):
     """The polynomial degree of the displacements; that of ζ is 1."""
     return scene.get("discretisation", {}).get("displacement", 1)

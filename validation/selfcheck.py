@@ -9,7 +9,7 @@ import sys
 
 import numpy as np
 
-from damage import evolve
+from fenicsx import evolve
 from lagrange import SIDES, Lagrange
 from scene import of_order
 from triangulation import Triangulation
@@ -46,7 +46,7 @@ def pressed(gap="0", **extra):
 
 def solved(scene, mesh, order):
     """The state at the end and the coordinates of the nodes of u."""
-    state, _ = evolve(of_order(scene, order), mesh)
+    *_, state = evolve(of_order(scene, order), mesh)
     return state, *Lagrange(mesh, order).points.T
 
 

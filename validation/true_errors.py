@@ -1,22 +1,21 @@
 """True errors of runs against a finer run: u in the energy norm, the damage in L², at the last time.
 
-    /usr/bin/python3 validation/true_errors.py SCENE.toml REFERENCE RUN…
-
 Folders of results of either order, with straight or curved sides: integrals are taken at quadrature
 points of the reference, and a run is evaluated there, its elements being found by Newton's method. Where
 a boundary is curved two meshes differ there by the error of their parabolas; a run's element is continued
 up to the reference's. The reference should be quadratic, on a mesh graded geometrically to every corner
-and end of contact, with steps of its own: it shares nothing with the estimates it judges. Prints, for
-each run, estimated and true relative errors and their ratio."""
+and end of contact, with steps of its own: it shares nothing with the estimates it checks."""
 
 import json
-import sys
-import tomllib
 from pathlib import Path
 
-import meshio
 import numpy as np
 from matplotlib.tri import Triangulation
+
+import shared  # noqa: F401
+from elements import derivatives, functions
+from reading import frames_of, read_frame
+from scene import elasticity
 
 # Barycentric points and weights of the rule of degree 4 with six points.
 NEAR, FAR = 0.816847572980459, 0.108103018168070
@@ -30,27 +29,14 @@ SLOPES = np.array([[-1, -1], [1, 0], [0, 1]])
 NEWTON, STEP, WALK = 12, 0.5, 30
 
 
-def shapes(l, nodes):
-    """Shape functions of the element of so many nodes at barycentric coordinates (n, 3), and their
-    derivatives (n, nodes, 2)."""
-    if nodes == 3:
-        return l, np.broadcast_to(SLOPES, (len(l), 3, 2))
-    sides = [(0, 1), (1, 2), (2, 0)]
-    values = [l[:, i] * (2 * l[:, i] - 1) for i in range(3)] + [4 * l[:, i] * l[:, j] for i, j in sides]
-    vertex = [(4 * l[:, i, None] - 1) * SLOPES[i] for i in range(3)]
-    middle = [4 * (l[:, i, None] * SLOPES[j] + l[:, j, None] * SLOPES[i]) for i, j in sides]
-    return np.stack(values, axis=1), np.stack(vertex + middle, axis=1)
-
-
 class Run:
-    """The last frame of a run."""
+    """A run at its last frame."""
 
     def __init__(self, folder):
         folder = Path(folder)
-        self.summary = json.loads((folder / "summary.json").read_text())
-        if any(folder.glob("*.pvtu")):
-            sys.exit(f"{folder}: a run on several ranks; the judge wants one piece")
-        frame = meshio.read(sorted(folder.glob("fields_*.vtu"))[-1])
+        self.summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        self.frames = frames_of(folder)
+        frame = read_frame(self.frames[-1][1])
         self.points = frame.points[:, :2]
         self.cells = next(iter(frame.cells_dict.values()))
         self.u = frame.point_data["displacement"][:, :2]
@@ -65,15 +51,17 @@ class Run:
     def mapped(self, cell, l):
         """Points of elements (n) at barycentric coordinates (n, 3), and ∂x/∂(l₁, l₂)."""
         nodes = self.points[self.cells[cell]]
-        values, slopes = shapes(l, nodes.shape[1])
+        values, slopes = functions(l.T, nodes.shape[1]), derivatives(l.T, nodes.shape[1]) @ SLOPES
         return np.einsum("nk,nkd->nd", values, nodes), np.einsum("nkd,nke->nde", nodes, slopes)
+
+    def gradients(self, cell, l):
+        """∇φ of the functions of elements (n) at barycentric coordinates (n, 3): (n, functions, 2)."""
+        return derivatives(l.T, self.cells.shape[1]) @ SLOPES @ np.linalg.inv(self.mapped(cell, l)[1])
 
     def at(self, cell, l):
         """Strain (xx, yy, 2xy) and ζ at barycentric coordinates (n, 3) of elements (n)."""
         nodes = self.cells[cell]
-        _, slopes = shapes(l, nodes.shape[1])
-        gradients = slopes @ np.linalg.inv(self.mapped(cell, l)[1])
-        h = np.einsum("nkc,nkd->ncd", self.u[nodes], gradients)
+        h = np.einsum("nkc,nkd->ncd", self.u[nodes], self.gradients(cell, l))
         strain = np.stack([h[:, 0, 0], h[:, 1, 1], h[:, 0, 1] + h[:, 1, 0]], axis=1)
         return strain, (self.zeta[nodes[:, :3]] * l).sum(1)
 
@@ -110,14 +98,6 @@ class Run:
         return cell, l
 
 
-def elasticity(young, poisson, plane):
-    """The matrix of the paper's 𝒜 for (ε_xx, ε_yy, 2ε_xy)."""
-    if plane == "strain":
-        young, poisson = young / (1 - poisson**2), poisson / (1 - poisson)
-    return young / (1 - poisson**2) * np.array(
-        [[1, poisson, 0], [poisson, 1, 0], [0, 0, (1 - poisson) / 2]])
-
-
 def errors(reference, run, d):
     """Relative errors of u and the damage (None without damage); d for all, or for each element of the
     reference. Not a number where nothing is deformed."""
@@ -137,25 +117,3 @@ def errors(reference, run, d):
     damage = (weight * (1 - zeta) ** 2).sum()
     lost = (weight * (other_zeta - zeta) ** 2).sum()
     return np.sqrt(energy(other - strain) / energy(strain)), np.sqrt(lost / damage) if damage else None
-
-
-def main():
-    scene, reference, *runs = sys.argv[1:]
-    material = tomllib.loads(Path(scene).read_text())["material"]
-    d = elasticity(material["young"], material["poisson"], material["plane"])
-    reference = Run(reference)
-    for folder in runs:
-        run = Run(folder)
-        estimates = run.summary["errors"]
-        u, damage = errors(reference, run, d)
-        told = estimates["displacement_mesh"]
-        line = f"{folder}: u {100 * u:.3f} %, estimated {100 * told:.3f} % ({told / u:.2f})"
-        if damage is not None:
-            parts = [estimates.get(key) or 0.0 for key in ("damage_mesh", "damage_steps")]
-            told = np.hypot(*parts)
-            line += f"; damage {100 * damage:.3f} %, estimated {100 * told:.3f} % ({told / damage:.2f})"
-        print(line)
-
-
-if __name__ == "__main__":
-    main()

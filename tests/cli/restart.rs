@@ -58,9 +58,15 @@ fn wait_for_step(directory: &TestDirectory, folder: &str, step: usize) {
 
 #[test]
 fn a_killed_run_goes_on_as_if_it_had_not_been() {
-    for solver in ["active-set", "penalty-duality", "tao"] {
+    for choice in [
+        ["--solver", "active-set"],
+        ["--solver", "penalty-duality"],
+        ["--solver", "tao"],
+        ["--set", "discretisation.displacement=2"],
+        ["--set", "time.scheme=bdf2"],
+    ] {
         let directory = TestDirectory::new();
-        let arguments = [&LONG[..], &["--solver", solver]].concat();
+        let arguments = [&LONG[..], &choice].concat();
         directory.run(&[&arguments[..], &["--out", "whole"]].concat());
         let expected = results(&directory, "whole");
         assert!(expected.keys().all(|name| !name.starts_with("checkpoint")), "it is of no use now");
@@ -76,7 +82,7 @@ fn a_killed_run_goes_on_as_if_it_had_not_been() {
             run = start(&directory, "killed", &[&arguments[..], &["--restart"]].concat());
         }
         assert_eq!(run.wait().expect("it ends").code(), Some(0));
-        assert!(results(&directory, "killed") == expected, "{solver}");
+        assert!(results(&directory, "killed") == expected, "{choice:?}");
     }
 }
 

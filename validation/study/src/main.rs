@@ -1,13 +1,18 @@
 //! The command line of the studies.
 #![forbid(unsafe_code)]
 
-mod command;
-
 use clap::{Parser, Subcommand};
-use signorini::petsc::Communicator;
-use std::{env, process::ExitCode};
+use signorini::{
+    output::{self, terminal::say},
+    petsc::{Communicator, Session},
+};
+use signorini_study::{
+    StudyError,
+    stability::{MAPS, make},
+};
+use std::{env, path::{Path, PathBuf}, process::ExitCode, time::Instant};
 
-/// Studies of signorini: where methods fail, orders of convergence.
+/// Studies of signorini: where methods fail.
 #[derive(Parser)]
 #[command(
     version,
@@ -23,17 +28,23 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     /// Make the maps of where methods fail.
-    Stability(command::StabilityArguments),
-    /// Compute the reference solution of `converge`, unless it is there.
-    Reference(command::ReferenceArguments),
-    /// Errors on nested meshes against the reference; by default the paper's Table 1 and Figure 3.
-    Converge(command::StudyArguments),
+    Stability {
+        /// Maps to make [default: all].
+        #[arg(value_name = "MAP")]
+        maps: Vec<String>,
+        /// Folder for the tables.
+        #[arg(long, value_name = "DIR", default_value = "out/stability")]
+        out: PathBuf,
+        /// PETSc options.
+        #[arg(last = true, value_name = "PETSC OPTIONS")]
+        petsc: Vec<String>,
+    },
 }
 
 fn main() -> ExitCode {
-    let command = Arguments::parse().command;
+    let Command::Stability { maps, out, petsc } = Arguments::parse().command;
     if Communicator::launched().is_some_and(|ranks| ranks > 1) {
-        // Every rank comes here; that one speaks needs no communication.
+        // Every rank comes here; choosing the one that writes needs no communication.
         let rank =
             ["OMPI_COMM_WORLD_RANK", "PMI_RANK"].into_iter().find_map(|name| env::var(name).ok());
         if rank.is_none_or(|rank| rank == "0") {
@@ -41,16 +52,45 @@ fn main() -> ExitCode {
         }
         return ExitCode::from(2);
     }
-    let result = match command {
-        Command::Stability(arguments) => command::stability(&arguments),
-        Command::Reference(arguments) => command::reference(&arguments),
-        Command::Converge(arguments) => command::convergence(&arguments),
-    };
-    match result {
+    match stability(&maps, &out, &petsc) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
             ExitCode::from(if error.is_input() { 2 } else { 1 })
         }
+    }
+}
+
+/// Makes the maps and counts their rows.
+fn stability(maps: &[String], out: &Path, petsc: &[String]) -> Result<(), StudyError> {
+    let names: Vec<&str> = MAPS.iter().map(|(name, _)| *name).collect();
+    if let Some(unknown) = maps.iter().find(|map| !names.contains(&map.as_str())) {
+        let known = names.join(", ");
+        return Err(StudyError::UnknownMap(format!(
+            "there is no map `{unknown}`; there are {known}"
+        )));
+    }
+    output::create(out)?;
+    let session = Session::start(petsc)?;
+    let mut wrong = 0;
+    for &(name, map) in MAPS {
+        if !maps.is_empty() && !maps.iter().any(|map| map == name) {
+            continue;
+        }
+        let started = Instant::now();
+        let counts = make(&session, (name, map), out)?;
+        wrong += counts.wrong;
+        say(&format!(
+            "{name:<18} {:>5} correct {:>5} refused {:>5} wrong  {:>6.1} s",
+            counts.correct,
+            counts.refused,
+            counts.wrong,
+            started.elapsed().as_secs_f64()
+        ));
+    }
+    session.finalize()?;
+    match wrong {
+        0 => Ok(()),
+        n => Err(StudyError::Wrong(n)),
     }
 }

@@ -1,15 +1,14 @@
-"""Reference solutions made without the program's estimates: P2 on meshes graded to every singularity.
-
-    /usr/bin/python3 validation/graded_reference.py BINARY SCENE.toml FOLDER
+"""Reference solutions, kept until the scene or the mesh they belong to changes; and those of the scenes of geo/:
+P2 on meshes graded to every singularity, made without the program's estimates.
 
 Where u − u(corner) ~ r^α, triangles of size h ~ r^(1 − α/3) share the energy error of P2 evenly; α is near ½
 at the ends of obstacles and re-entrant corners, so the sides are min(LARGEST, STRENGTH r^(5/6)) m
-long, r being the distance to the nearest corner, and smaller near Γ_C where contact moves. gmsh makes
-the mesh, the program solves on it with chosen steps, and the first and last states are kept in FOLDER/results.
+long, r being the distance to the nearest corner, and smaller near Γ_C where contact moves. The program
+solves on it with adaptive steps.
 """
 
+import shutil
 import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -37,10 +36,8 @@ class Grading:
     # Near Γ_C and where the damage is steep, as expressions of gmsh.
     near: tuple = ()
     outline: str = None
-    # Of chosen steps; the damage of the squares depends on them most.
+    # Of adaptive steps; the damage of the squares depends on them most.
     tolerance: float = 1e-3
-    # Whether sides follow the geometry as parabolas.
-    curved: bool = False
 
     def geometry(self, file):
         """The text of a .geo: the body of another, with this size."""
@@ -57,7 +54,7 @@ class Grading:
             *(f"Mesh.MeshSize{option} = 0;" for option in
               ("ExtendFromBoundary", "FromPoints", "FromCurvature")),
             # The other algorithms leave triangles without area at such sizes.
-            "Mesh.Algorithm = 1;", *(["Mesh.ElementOrder = 2;"] if self.curved else []), ""])
+            "Mesh.Algorithm = 1;", ""])
 
 
 LSHAPE = [(2, 4), (6, 4), (8, 4), (0, 0), (2, 0), (0, 6), (8, 6)]
@@ -68,40 +65,53 @@ GRADINGS = {
     "bridge-half.geo": Grading(FOOT, 0.05, 0.15, ("0.02 + 0.2 * y",)),
     "bridge.geo": Grading(FOOT + [(12 - x, y) for x, y in FOOT], 0.05, 0.15, ("0.02 + 0.2 * y",)),
     # The end of contact, where sides need be no shorter than 0.02 mm.
-    "hertz.geo": Grading([(5.37e-3, 2.9e-4)], 0.015, 2e-3, curved=True),
+    "hertz.geo": Grading([(5.37e-3, 2.9e-4)], 0.015, 2e-3),
     "beam.geo": Grading([(0, 0), (8, 0), (8, 0.5), (0, 0.5)], 0.04, 0.04,
                         ("0.015 + 0.3 * y", "0.008 + 0.05 * (4 - abs(x - 4))")),
 }
 
 
-def make(binary, path, folder):
-    """The reference of a scene of geo/: the results kept in this folder, made anew if the scene or the
-    mesh is another."""
-    path, folder = Path(path), Path(folder)
+def kept(binary, folder, scene, geometry, refinements=0, limit=None):
+    """The results of a scene on the mesh of a .geo text, refined so often: those in `folder`, if they are of this
+    scene and text, else new ones. A run longer than `limit` seconds raises subprocess.TimeoutExpired."""
+    results, file, made_of = folder / "results", folder / "reference.toml", folder / "reference.geo"
+    mesh = f"refined{refinements}.msh" if refinements else made_of.name
+    scene = {**scene, "mesh": {"file": mesh}}
+    if (results / "summary.json").exists() and read_scene(file) == scene and (
+            made_of.read_text(encoding="utf-8") == geometry):
+        return results
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    write_scene(scene, file)
+    made_of.write_text(geometry, encoding="utf-8")
+    if refinements:
+        subprocess.run(["gmsh", "-2", "-v", "1", made_of, "-o", folder / "reference.msh"], check=True)
+        refine(folder / "reference.msh", refinements)
+    subprocess.run([binary, "run", file, "--out", results], check=True, timeout=limit,
+                   stdout=subprocess.DEVNULL)
+    return results
+
+
+def refine(mesh, count):
+    """The mesh, and `count` meshes beside it, each cutting every triangle of the one before into four by the
+    middles of its sides."""
+    meshes = [mesh]
+    for k in range(1, count + 1):
+        meshes.append(mesh.with_name(f"refined{k}.msh"))
+        subprocess.run(["gmsh", meshes[-2], "-refine", "-v", "1", "-format", "msh41", "-o", meshes[-1]],
+                       check=True)
+    return meshes
+
+
+def graded(binary, path, folder):
+    """The reference of a scene of geo/."""
+    path = Path(path)
     scene = read_scene(path)
     file = path.parent / scene["mesh"]["file"]
     grading = GRADINGS[file.name]
-    geometry = grading.geometry(file)
     scene = {key: value for key, value in scene.items() if key != "accuracy"}
-    scene["mesh"] = {"file": "reference.msh"}
     scene["discretisation"] = {"displacement": 2}
     if "time" in scene:
         scene["time"] = {**scene["time"], "step": "auto", "tolerance": grading.tolerance}
     scene["output"] = {"every": 1000000}
-    results, kept, made_of = folder / "results", folder / "reference.toml", folder / "reference.geo"
-    if (results / "summary.json").exists() and read_scene(kept) == scene and (
-            made_of.read_text(encoding="utf-8") == geometry):
-        return results
-    folder.mkdir(parents=True, exist_ok=True)
-    write_scene(scene, kept)
-    made_of.write_text(geometry, encoding="utf-8")
-    for command in (["gmsh", "-2", "-v", "1", made_of, "-o", folder / "reference.msh"],
-                    [binary, "run", kept, "--out", results]):
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    return results
-
-
-if __name__ == "__main__":
-    if len(sys.argv) != 4:
-        sys.exit(__doc__)
-    print(make(*sys.argv[1:]))
+    return kept(binary, Path(folder), scene, grading.geometry(file))

@@ -1,17 +1,13 @@
 """Forty bodies that nobody tuned the program on: obstacles between nodes, thin layers, pads, narrow loads,
 steep damage, pulses in time, pins, notches.
 
-A scene is a row of strings (`Scene`); `write` makes its .geo and .toml, `write_truth` the same with quadratic
+A scene is a row of strings (`Scene`); `texts` makes its .geo and its table, of a truth with quadratic
 elements on a fine mesh that is graded to the body's corners and to the features that the row names.
 """
 
-import sys
 from dataclasses import dataclass
-from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
-from scene import write_scene  # noqa: E402
+from scene import write_scene
 
 SQUARE = {"body": "0,0 base 1,0 right 1,1 top 0,1 left"}
 STRIP = {"body": "0,0 base 4,0 right 4,1 top 0,1 left"}
@@ -250,9 +246,9 @@ def texts(scene, factor=0.0):
     return "\n".join([*lines, *fields(scene, outline.points, factor), ""]), content
 
 
-def write(scene, folder, factor=0.0):
+def write(scene, folder):
     """Writes NAME.geo and NAME.toml into a folder; the path of the latter."""
-    geometry, content = texts(scene, factor)
+    geometry, content = texts(scene)
     (folder / f"{scene.name}.geo").write_text(geometry, encoding="utf-8")
     write_scene(content, folder / f"{scene.name}.toml")
     return folder / f"{scene.name}.toml"

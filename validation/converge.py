@@ -1,0 +1,285 @@
+#!/usr/bin/python3
+"""Orders of convergence on nested meshes; of geo/square-table1.toml the paper's Table 1 and Figure 3:
+
+    converge.py [--binary FILE] [--reference] SCENE
+
+The coarsest mesh (8 times as coarse as the scene's) is refined by the midpoints of all sides. The reference is P1
+by `bdf2` on the last refinement, kept in out/reference/nested/; --reference makes it alone. The runs are P1 by
+Euler's scheme on the coarsest mesh and up to four refinements, k = T/50 … T/1000. All are compared at 51
+times. On nested meshes of a polygon the norms of differences are exact. Prints the errors, and writes
+converge.csv and converge.png into out/converge/<scene>.
+"""
+
+import argparse
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from shared import ROOT
+from drawing import FAINT, INK, plt
+from reading import read_frame
+from references import kept, refine
+from results import markdown, write_table
+from scene import read_scene, write_scene
+from true_errors import Run
+
+INTERVALS, MESHES, COARSER = 50, 5, 8
+# T/k of the runs: k = 0.02 … 0.001 s in Table 1.
+STEPS = (50, 100, 200, 500, 1000)
+# "Example I: Numerical errors obtained with different n and k": a row for n = 4, 8, 16, 32, 64, h = √2/n.
+TABLE_1 = """
+0.03027 0.02931 0.02884 0.02856 0.02856
+0.01934 0.01803 0.01739 0.01701 0.01688
+0.01594 0.01167 0.01003 0.009247 0.008794
+0.007324 0.005391 0.004471 0.003956 0.003794
+0.005254 0.003095 0.002029 0.001441 0.001269"""
+TABLE_1 = [[float(word) for word in line.split()] for line in TABLE_1.strip().splitlines()]
+PAPER = "square-table1"
+# Errors by their columns; the first four are norms of the reference, too.
+MEASURES = {
+    "strain": "‖ε(Δu)‖ in L²",
+    "gradient": "|Δu| in H¹",
+    "zeta": "‖Δζ‖ in L²",
+    "zeta_gradient": "|Δζ| in H¹",
+    "sum": "‖ε(Δu)‖ + ‖Δζ‖ in L² (Corollary 7)",
+    "nodal": "|Δu| in H¹ at the nodes + ‖Δζ‖ in L²",
+}
+NORMS = list(MEASURES)[:4]
+COLOURS = ["#2f6db3", "#d08a1d", "#3d8f5a", "#8e5aa8", "#c0392b"]
+
+
+class Fields:
+    """(u_x, u_y, ζ) of a run in P1 at its nodes, at all times: (times, nodes, 3)."""
+
+    def __init__(self, folder):
+        self.run = run = Run(folder)
+        frames = (read_frame(path).point_data for _, path in run.frames)
+        self.values = np.array([np.column_stack([frame["displacement"][:, :2], frame["zeta"]])
+                                for frame in frames])
+        corners = run.points[run.cells]
+        self.edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+        every, middle = np.arange(len(run.cells)), np.full((len(run.cells), 3), 1 / 3)
+        self.gradients = run.gradients(every, middle)
+        self.areas = 0.5 * np.abs(np.linalg.det(run.mapped(every, middle)[1]))
+        self.inner = np.empty_like(run.points)
+        self.inner[run.cells] = corners.mean(axis=1)[:, None]
+
+    def at(self, other):
+        """The values at the nodes of another mesh of the body."""
+        cell, place = self.run.locate(other.run.points, other.inner)
+        return np.einsum("nk,tnkc->tnc", place, self.values[:, self.run.cells[cell]])
+
+    def norms(self, values):
+        """Of fields (nodes, 3) on this mesh ‖ε(u)‖, |u|, ‖ζ‖ and |ζ|."""
+        corners = values[self.run.cells]
+        h = np.einsum("mkc,mkd->mcd", corners, self.gradients)
+        u, zeta = h[:, :2], corners[:, :, 2]
+        strain = 0.5 * (u + u.swapaxes(1, 2))
+        squares = ((strain**2).sum((1, 2)), (u**2).sum((1, 2)),
+                   ((zeta**2).sum(1) + zeta.sum(1) ** 2) / 12, (h[:, 2] ** 2).sum(1))
+        return np.sqrt([self.areas @ square for square in squares])
+
+
+class Study:
+    """A scene with its nested meshes."""
+
+    def __init__(self, arguments):
+        path = arguments.scene
+        self.binary, self.name, self.refinements = arguments.binary.resolve(), path.stem, arguments.refinements
+        scene = read_scene(path)
+        if "time" not in scene:
+            sys.exit(f"{path}: orders of convergence need a scene with [time]")
+        self.end = float(scene["time"]["end"])
+        self.step = arguments.step or self.end / 1000
+        every = self.end / INTERVALS / self.step
+        if not (every > 0.5 and abs(every - round(every)) < 1e-6):
+            sys.exit(f"--step: must divide {self.end / INTERVALS:g} s, but is {self.step:g}")
+        file = path.parent / scene["mesh"]["file"]
+        if file.suffix != ".geo":
+            sys.exit(f"{path}: the meshes are made from a .geo, but mesh.file is {file.name}")
+        parameters = dict(scene["mesh"].get("parameters", {}))
+        if size := arguments.size or COARSER * scene["mesh"].get("size", 0):
+            parameters["size"] = size
+        if arguments.grading:
+            parameters["grading"] = arguments.grading
+        lines = [f"{name} = {value};" for name, value in parameters.items()]
+        self.geometry = "\n".join([*lines, file.read_text(encoding="utf-8")])
+        self.scene = {key: scene[key] for key in scene if key not in ("accuracy", "discretisation")}
+        words = "".join(f"-{name}{value:g}" for name, value in parameters.items())
+        self.folder = (ROOT / "out" / "reference" / "nested"
+                       / f"{self.name}{words}-refined{self.refinements}-k{self.step:g}")
+
+    def timed(self, step, scheme):
+        """The scene with uniform steps, a frame at each of the times that are compared."""
+        time = {"end": self.end, "step": step, "scheme": scheme}
+        every = round(self.end / INTERVALS / step)
+        return {**self.scene, "time": time, "output": {"every": every, "checkpoint": 0}}
+
+    def reference(self):
+        """The folder of the reference's results."""
+        return kept(self.binary, self.folder, self.timed(self.step, "bdf2"), self.geometry, self.refinements)
+
+    def rows(self):
+        """A row for each run, mesh by mesh."""
+        exact = Fields(self.reference())
+        size = np.max([exact.norms(values) for values in exact.values], axis=0)
+        if self.step > 1.001 * self.end / STEPS[0] or not self.refinements:
+            sys.exit("no mesh and step of the study is coarser than this reference")
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "scene.toml"
+            for mesh in refine(self.folder / "reference.msh", min(self.refinements - 1, MESHES - 1)):
+                for count in (count for count in STEPS if self.end / count > 0.999 * self.step):
+                    scene = {**self.timed(self.end / count, "euler"), "mesh": {"file": str(mesh)}}
+                    write_scene(scene, path)
+                    out = Path(folder) / "out"
+                    subprocess.run([self.binary, "run", path, "--out", out], check=True,
+                                   stdout=subprocess.DEVNULL)
+                    yield self.row(exact, size, Fields(out), self.end / count)
+
+    def row(self, exact, size, fields, k):
+        """The errors of a run: the largest over time."""
+        if len(fields.values) != len(exact.values):
+            sys.exit(f"{self.name}: the run stops at ζ_*; choose a scene that reaches its end")
+        found = [exact.norms(ours - theirs) for ours, theirs in zip(fields.at(exact), exact.values)]
+        nodal = [fields.norms(ours - theirs)[1] for ours, theirs in zip(fields.values, exact.at(fields))]
+        worst, h = np.max(found, axis=0), fields.edges.max()
+        row = {"nodes": len(fields.run.points), "h": h, "k": k, "h_plus_k": h + k, **dict(zip(NORMS, worst))}
+        row |= {"sum": max(norms[0] + norms[2] for norms in found), "nodal": max(nodal) + worst[2]}
+        row |= {f"{name}_relative": value for name, value in zip(NORMS, worst / size)}
+        return {**row, "printed": printed(h, k) if self.name == PAPER else None}
+
+
+def printed(h, k):
+    """The number of Table 1 for h and k, if there is one."""
+    j, column = round(np.log2(np.sqrt(2) / h / 4)), [c for c, n in enumerate(STEPS) if abs(k * n - 1) < 1e-6]
+    fits = 0 <= j < MESHES and abs(h * 4 * 2**j / np.sqrt(2) - 1) < 1e-6
+    return TABLE_1[j][column[0]] if fits and column else None
+
+
+def fit(x, y):
+    """The order p of y ~ x^p by least squares, and the factor; not numbers where x is one point."""
+    if len(set(x)) < 2:
+        return np.nan, np.nan
+    p, logarithm = np.polyfit(np.log(x), np.log(y), 1)
+    return p, np.exp(logarithm)
+
+
+def column(rows, name):
+    return np.array([row[name] for row in rows])
+
+
+def text(rows, cell, title, mesh):
+    """A line for each mesh and a column for each step."""
+    steps = sorted({row["k"] for row in rows}, reverse=True)
+    of = {(row["h"], row["k"]): row for row in rows}
+    lines = [[mesh(h), *(cell(of[h, k]) for k in steps)] for h in dict.fromkeys(row["h"] for row in rows)]
+    return markdown([title, *(f"k = {k:g}" for k in steps)], lines)
+
+
+def report(rows):
+    """Prints the errors with their orders, and beside those of Table 1."""
+    least = [row for row in rows if row["k"] == min(column(rows, "k"))]
+    finest = [row for row in rows if row["h"] == min(column(rows, "h"))]
+    of_paper = [row for row in rows if row["printed"]]
+    for name, title in MEASURES.items():
+        print(f"{title}, largest over time\n")
+        print(text(rows, lambda row: f"{row[name]:.4g}", "h", lambda h: f"{h:.4g}"))
+        orders = [fit(column(of, x), column(of, name))[0] for of, x in ((rows, "h_plus_k"), (least, "h"))]
+        growth = np.polyfit(column(finest, "k"), column(finest, name), 1)[0] if len(finest) > 1 else np.nan
+        print(f"\norder {orders[0]:.2f} in h + k over all runs, {orders[1]:.2f} in h at the smallest k; "
+              f"on the finest mesh it grows with k by {growth:.1e} per second\n")
+    for name in ("sum", "nodal") if of_paper else ():
+        ratios = column(of_paper, name) / column(of_paper, "printed")
+        orders = [fit(column(of_paper, "h_plus_k"), column(of_paper, of))[0] for of in (name, "printed")]
+        print(f"{MEASURES[name]}, in brackets over Table 1 of the paper\n")
+        print(text(of_paper, lambda row: f"{row[name]:.4g} ({row[name] / row['printed']:.2f})", "n",
+                   lambda h: f"{np.sqrt(2) / h:.0f}"))
+        print(f"\nratios {ratios.min():.2f} to {ratios.max():.2f}, {ratios.mean():.2f} in the mean; order in h + k "
+              f"{orders[0]:.2f}, the paper's {orders[1]:.2f}\n")
+
+
+def draw_sums(axes, rows):
+    """Table 1's error against h + k with the fitted orders, ours and the printed one."""
+    of_paper = [row for row in rows if row["printed"]]
+    for colour, h in zip(COLOURS, dict.fromkeys(row["h"] for row in rows)):
+        label = f"n = {np.sqrt(2.0) / h:.0f}" if of_paper else f"h = {h:.3g}"
+        for chosen, name, style in ((rows, "sum", "o-"), (of_paper, "printed", "x--")):
+            chosen = [row for row in chosen if row["h"] == h]
+            axes.loglog(column(chosen, "h_plus_k"), column(chosen, name), style, color=colour, ms=4.5, lw=0.9,
+                        label=label if name == "sum" else None)
+    for of, name, style, whose in ((rows, "sum", "-", "ours"), (of_paper, "printed", "--", "print")):
+        if of:
+            x = column(of, "h_plus_k")
+            order, factor = fit(x, column(of, name))
+            ends = np.array([x.min(), x.max()])
+            axes.loglog(ends, factor * ends**order, color=INK, lw=1, ls=style,
+                        label=f"fit, {whose}: order {order:.2f}")
+    axes.set(xlabel="h + k", ylabel="largest ‖ε(Δu)‖ + ‖Δζ‖ over time")
+    title = "error against h + k on each mesh"
+    axes.set_title(f"Figure 3: {title}\n(dots: ours; crosses: the paper's Table 1)" if of_paper else title,
+                   loc="left")
+
+
+def draw_orders(axes, rows):
+    """All errors against h at the smallest k."""
+    least = min(column(rows, "k"))
+    rows = [row for row in rows if row["k"] == least]
+    h = column(rows, "h")
+    for colour, name in zip(COLOURS, NORMS):
+        errors = column(rows, f"{name}_relative")
+        order, factor = fit(h, errors)
+        axes.loglog(h, errors, "o", color=colour, ms=4.5, label=f"{MEASURES[name]}: order {order:.2f}")
+        axes.loglog(h, factor * h**order, color=colour, lw=1)
+    axes.set(xlabel="h: the longest edge", ylabel="error relative to the reference's norm")
+    axes.set_title(f"all errors at k = {least:g}, largest over time", loc="left")
+
+
+def draw(rows, path):
+    """Both figures side by side."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.8))
+    draw_sums(left, rows)
+    draw_orders(right, rows)
+    for axes in (left, right):
+        low, high = axes.get_xlim()
+        powers = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))))
+        ticks = [m * 10.0**power for power in powers for m in (1, 2, 5)]
+        ticks = [tick for tick in ticks if low <= tick <= high]
+        axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+        axes.set_xticks([], minor=True)
+        axes.grid(which="both", color=FAINT, alpha=0.3, linewidth=0.5)
+        axes.set_axisbelow(True)
+        axes.legend()
+    figure.savefig(path)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("scene", type=Path, nargs="?", default=ROOT / "geo" / f"{PAPER}.toml")
+    parser.add_argument("--binary", type=Path, default=ROOT / "target" / "release" / "signorini")
+    parser.add_argument("--reference", action="store_true", help="only make the reference")
+    parser.add_argument("--refinements", type=int, default=6, help="of the coarsest mesh for the reference")
+    parser.add_argument("--size", type=float, help="of the coarsest mesh, m (default: 8 times the scene's)")
+    parser.add_argument("--grading", type=float, help="of the coarsest mesh (default: the scene's)")
+    parser.add_argument("--step", type=float, help="of the reference, s (default: T/1000)")
+    parser.add_argument("--out", type=Path, help="folder for the table and the figure (default: out/converge/<scene>)")
+    arguments = parser.parse_args()
+    study = Study(arguments)
+    if arguments.reference:
+        print(study.reference())
+        return
+    rows = list(study.rows())
+    report(rows)
+    out = arguments.out or ROOT / "out" / "converge" / study.name
+    out.mkdir(parents=True, exist_ok=True)
+    write_table(rows, out / "converge.csv")
+    print(out / "converge.csv")
+    if len({row["h"] for row in rows}) > 1:
+        draw(rows, out / "converge.png")
+        print(out / "converge.png")
+
+
+if __name__ == "__main__":
+    main()
