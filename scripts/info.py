@@ -63,6 +63,8 @@ def main(prog=None):
     folder = parser.parse_args().folder
     try:
         print(description(folder))
+    except BrokenPipeError:
+        raise
     except (OSError, ValueError) as error:
         problem = error.strerror if isinstance(error, OSError) else error
         print(f"error: {folder / 'summary.json'}: {problem}; name a folder of results, out/SCENE",
