@@ -267,13 +267,13 @@ impl ContactSolver for PenaltyDuality<'_> {
         ENTRY.name
     }
 
-    /// ω, once it is known.
+    /// ω, which is estimated once in a run.
     fn warm_start(&self) -> Vec<f64> {
         self.fixed_point.omega.into_iter().collect()
     }
 
     fn set_warm_start(&mut self, kept: &[f64]) {
-        self.fixed_point.omega = kept.first().copied().or(self.fixed_point.options.omega);
+        self.fixed_point.omega = kept.first().copied().or(self.fixed_point.omega);
     }
 
     fn factor(&mut self) -> Option<&mut Factor> {
