@@ -40,6 +40,7 @@
 
 pub mod interrupt;
 pub mod phases;
+mod suggestion;
 pub mod petsc;
 pub mod cholesky;
 pub mod mesh;

@@ -2,7 +2,7 @@
 
 use super::{Failure, screen, task::Task};
 use signorini::{
-    evolution::{self, AdaptError, Adapted, Bar, Outcome},
+    evolution::{self, AdaptError, Adapted, Bar, Outcome, percent},
     interrupt::{Interrupts, Signal},
     mesh::{Mesh, Order},
     petsc::Session,
@@ -89,8 +89,7 @@ pub(super) fn verdict(task: &Task, outcome: Option<&Outcome>) -> Option<String> 
     let norms = scene.accuracy_of.is_empty().then_some(&adapted.worst).into_iter().flatten();
     let worst = bars.chain(norms.cloned()).max_by(|a, b| a.1.total_cmp(&b.1));
     let missed = worst.filter(|(_, error)| *error > accuracy).map(|(name, error)| {
-        let unit =
-            if error.is_finite() { format!("{:.2} %", 100.0 * error) } else { "?".to_owned() };
+        let unit = if error.is_finite() { percent(error) } else { "?".to_owned() };
         format!("{name} is exact to {unit} only")
     });
     let reasons: Vec<String> = missed.into_iter().chain(adapted.short.clone()).collect();

@@ -136,34 +136,29 @@ fn short(value: f64) -> String {
 
 /// The resultants of the loads at the start and at the end.
 fn loads(problem: &DiscreteProblem) -> Vec<String> {
-    let nodes = &problem.body.nodes.points;
     let Units { length, force, .. } = &problem.scene().units;
-    let resultant = |t: f64| {
-        let mut sum = [0.0; 3];
-        for (f, [x, y]) in problem.load(t).chunks_exact(2).zip(nodes) {
-            let more = [f[0], f[1], x * f[1] - y * f[0]];
-            sum = [0, 1, 2].map(|k| sum[k] + more[k]);
-        }
-        let [fx, fy, moment] = sum.map(short);
+    let line = |t: f64| {
+        let load = problem.load(t);
+        let at_points = || load.chunks_exact(2).zip(&problem.body.nodes.points);
+        let sum = |part: fn(&[f64], &[f64; 2]) -> f64| {
+            short(at_points().map(|(f, point)| part(f, point)).sum::<f64>() + 0.0)
+        };
+        let [x, y] = [sum(|f, _| f[0]), sum(|f, _| f[1])];
+        let moment = sum(|f, [x, y]| x * f[1] - y * f[0]);
         let moment = format!("moment about (0, 0) {moment} {force}");
-        row("loads", format!("t = {t}: ({fx}, {fy}) {force}/{length}, {moment}"))
+        row("loads", format!("t = {t}: ({x}, {y}) {force}/{length}, {moment}"))
     };
-    problem.scene().sample_times(1).into_iter().map(resultant).collect()
+    problem.scene().sample_times(1).into_iter().map(line).collect()
 }
 
 /// Which rigid motions there are and what supports the body against them.
 fn support(problem: &DiscreteProblem) -> Vec<String> {
     let motions = &problem.motions;
-    let against = motions.resisted.iter().map(|motion| {
-        row(
-            "support",
-            format!("only contact supports the body against {motion}, and in one direction"),
-        )
-    });
-    match motions.all_prevented() {
-        true => vec![row("support", "displacements and axes prevent all rigid motions".to_owned())],
-        false => against.collect(),
+    if motions.all_prevented() {
+        return vec![row("support", "displacements and axes prevent all rigid motions".to_owned())];
     }
+    let by_contact = |motion| format!("only contact supports the body against {motion}, one way");
+    motions.resisted.iter().map(|motion| row("support", by_contact(motion))).collect()
 }
 
 /// What a run takes on one rank, from runs of 300 to 66,000 nodes at both orders: seconds within a factor
@@ -172,29 +167,24 @@ fn support(problem: &DiscreteProblem) -> Vec<String> {
 /// 0.65 ns m³ (measured on a body of 200 × 1 with m = 800 and 2000).
 fn cost(problem: &DiscreteProblem) -> String {
     let scene = problem.scene();
-    if scene.accuracy.is_some() {
-        return "mesh and steps are chosen by the run for the accuracy that is asked for"
-            .to_owned();
-    }
-    let nodes = problem.body.nodes.points.len() as f64;
+    let (nodes, contact) = (problem.body.nodes.points.len() as f64, contact_nodes(problem) as f64);
     let step = 0.7e-6 * nodes * (nodes / 4225.0).powf(0.27);
     let once = 0.05 + 50e-6 * nodes;
     let megabytes = 50.0 + 8e-3 * nodes;
+    // Twelve steps on the mesh and on one of four times as many triangles.
+    let bars = 12.0 * (step + 4.0 * 1.45 * step) + 2.5 * once;
     let seconds = match scene.time.map(|grid| grid.stepping) {
+        _ if scene.accuracy.is_some() => {
+            return "mesh and steps are chosen by the run for the accuracy that is asked for"
+                .to_owned();
+        }
         None => format!("{once:.1} s"),
         Some(Stepping::Uniform { steps }) => {
-            let stepping = step * steps as f64;
-            let moving = 0.65e-9 * (contact_nodes(problem) as f64).powi(3) * steps as f64;
-            let [least, most] = [once + stepping, once + 3.0 * stepping + moving];
-            let [low, high] = [least, most].map(|seconds| format!("{seconds:.1}"));
-            match low == high {
-                true => format!("{low} s in {steps} steps"),
-                false => format!("{low} to {high} s in {steps} steps, the more the contact moves"),
-            }
+            let moving = 3.0 * step + 0.65e-9 * contact.powi(3);
+            let [least, most] = [step, moving].map(|step| once + steps as f64 * step);
+            format!("{least:.1} s in {steps} steps, or {most:.1} s if contact moves")
         }
         Some(Stepping::Auto { .. }) => format!("{once:.1} s and {:.1} ms a step", 1e3 * step),
     };
-    // Twelve steps on the mesh and on one of four times as many triangles.
-    let bars = 12.0 * (step + 4.0 * 1.45 * step) + 2.5 * once;
     format!("about {seconds}; about {megabytes:.0} MB; --bars about {bars:.1} s more")
 }

@@ -57,23 +57,18 @@ fn cells(name: String, phase: Phase, wall: f64) -> [(&'static str, String); 7] {
 
 /// The share of the unavoidable work in `stepping`, the seconds of `steps` steps, and the peak memory.
 pub fn remarks(phases: &Phases, steps: usize, stepping: f64) -> Vec<String> {
-    let mut remarks = Vec::new();
-    let mean = |name| phases.get(name).map(|p| (name, p.seconds / p.calls.max(1) as f64));
-    let parts: Vec<(&str, f64)> = UNAVOIDABLE.into_iter().filter_map(mean).collect();
-    if steps > 0 && !parts.is_empty() {
-        let unavoidable: f64 = parts.iter().map(|(_, seconds)| seconds).sum();
-        let names: Vec<&str> =
-            parts.iter().map(|(name, _)| name.trim_start_matches("contact/")).collect();
-        remarks.push(format!(
-            " unavoidable work, once per step ({}): {:.2} ms,\n {:.0} % of the {:.2} ms that a step took",
-            names.join(", "),
-            1e3 * unavoidable,
-            100.0 * unavoidable * steps as f64 / stepping,
-            1e3 * stepping / steps as f64
-        ));
-    }
-    remarks.extend(peak_memory().map(|mb| format!(" peak memory {mb:.0} MB")));
-    remarks
+    let mean = |name: &&str| phases.get(name).map(|p| 1e3 * p.seconds / p.calls.max(1) as f64);
+    let unavoidable: f64 = UNAVOIDABLE.iter().filter_map(mean).sum();
+    let step = 1e3 * stepping / steps as f64;
+    let share = (steps > 0).then(|| {
+        format!(
+            " unavoidable work, once per step (refill, product, triangular solves, damage): \
+             {unavoidable:.2} ms,\n {:.0} % of the {step:.2} ms that a step took",
+            100.0 * unavoidable / step
+        )
+    });
+    let memory = peak_memory().map(|mb| format!(" peak memory {mb:.0} MB"));
+    share.into_iter().chain(memory).collect()
 }
 
 /// The most memory this process has used, MB, where Linux tells (proc(5), VmHWM).

@@ -2,7 +2,7 @@
 
 use super::task::Task;
 use signorini::{
-    evolution::{Adapted, Outcome, StepRecord},
+    evolution::{Adapted, Outcome, StepRecord, percent},
     output::terminal::{Progress, say, with_bar},
     scene::{Scheme, Stepping, TimeGrid, Units, rounded},
 };
@@ -39,19 +39,17 @@ pub fn adapting(mesh: &Adapted, accuracy: f64) {
     if !io::stderr().is_terminal() {
         return;
     }
-    let percent = |error: f64| format!("{:.2} %", 100.0 * error);
-    let of_damage = mesh.damage_error.map_or(String::new(), |e| format!(", damage {}", percent(e)));
-    let measured = mesh.worst.as_ref();
-    let measured = measured.map(|(name, error)| format!("; measured: {name} {}", percent(*error)));
     let (rounds, triangles, unknowns) = (mesh.rounds, mesh.mesh.triangles.len(), mesh.unknowns);
-    let _ = writeln!(
-        io::stderr(),
-        "  adapting      mesh {rounds}: {triangles} triangles, {unknowns} unknowns, error of u {}{of_damage}{} \
-         (accuracy {})",
-        percent(mesh.error),
-        measured.unwrap_or_default(),
+    let errors = [("error of u", Some(mesh.error)), ("damage", mesh.damage_error)]
+        .into_iter()
+        .chain(mesh.worst.iter().map(|(name, error)| (&**name, Some(*error))))
+        .filter_map(|(name, error)| Some(format!("{name} {}", percent(error?))));
+    let text = format!(
+        "mesh {rounds}: {triangles} triangles, {unknowns} unknowns, {} (accuracy {})",
+        errors.collect::<Vec<_>>().join(", "),
         percent(accuracy)
     );
+    let _ = writeln!(io::stderr(), "{}", row("adapting", text));
 }
 
 /// Shows an accepted step of a run to t = `end`.
@@ -72,50 +70,45 @@ pub fn conclusion(
     outcome: Option<&Outcome>,
     notes: &[String],
 ) -> Vec<String> {
-    let mut lines = vec![row("end", ending(last, outcome))];
-    if let Some(last) = last {
-        let bar = |name: &str| outcome.and_then(|of| of.errors.figures.get(name).copied());
-        let damage = match last.zeta_min {
-            1.0 => "none".to_owned(),
-            least => match (bar("zeta_min"), bar("zeta_mean")) {
-                (None, None) => format!("min ζ {least:.6}, mean ζ {:.6}", last.zeta_mean),
-                (of_least, of_mean) => format!(
-                    "min ζ {}, mean ζ {}",
-                    with_bar(least, of_least),
-                    with_bar(last.zeta_mean, of_mean)
-                ),
-            },
-        };
-        lines.push(row("damage", damage));
-        let units = &task.problem.scene().units;
-        let (length, force) = (&units.length, &units.force);
-        lines.push(row(
-            "displacement",
-            format!(
-                "largest {} {length}",
-                with_bar(last.displacement_max, bar("displacement_max"))
-            ),
-        ));
-        lines.push(row("work", format!("{} {}", with_bar(last.work, bar("work")), units.work())));
-        if task.contact_nodes > 0 {
-            let (active, nodes) = (last.active_nodes, task.contact_nodes);
-            let sum = with_bar(last.contact_force, bar("contact_force"));
-            let contact = format!("{active} of {nodes} nodes active, force {sum} {force}/{length}");
-            lines.push(row("contact", contact));
+    let notes = notes.iter().map(|note| row("note", note.clone()));
+    let end = row("end", ending(last, outcome));
+    let Some(last) = last else { return [end].into_iter().chain(notes).collect() };
+    let bar = |name: &str| outcome.and_then(|of| of.errors.figures.get(name).copied());
+    let figure = |value: f64, name: &str| with_bar(value, bar(name));
+    let zeta = |value: f64, name: &str| match (bar("zeta_min"), bar("zeta_mean")) {
+        (None, None) => format!("{value:.6}"),
+        _ => figure(value, name),
+    };
+    let damage = match (last.zeta_min, last.zeta_mean) {
+        (1.0, _) => "none".to_owned(),
+        (least, mean) => {
+            format!("min ζ {}, mean ζ {}", zeta(least, "zeta_min"), zeta(mean, "zeta_mean"))
         }
-        lines.extend(supports(task, quantities, &bar));
-        if let Some(outcome) = outcome {
-            let [first, rest @ ..] = outcome.errors.lines(outcome.stopped.as_ref());
-            lines.push(row("errors", first));
-            lines.extend(rest.map(|line| row("", line)));
-        }
-        let kkt = outcome.map_or(last.kkt(), |outcome| outcome.kkt);
-        lines.push(row("residuals", kkt.to_string()));
+    };
+    let units = &task.problem.scene().units;
+    let (length, force) = (&units.length, &units.force);
+    let displacement = figure(last.displacement_max, "displacement_max");
+    let mut lines = vec![
+        end,
+        row("damage", damage),
+        row("displacement", format!("largest {displacement} {length}")),
+        row("work", format!("{} {}", figure(last.work, "work"), units.work())),
+    ];
+    if task.contact_nodes > 0 {
+        let (active, nodes) = (last.active_nodes, task.contact_nodes);
+        let sum = figure(last.contact_force, "contact_force");
+        let contact = format!("{active} of {nodes} nodes active, force {sum} {force}/{length}");
+        lines.push(row("contact", contact));
     }
-    lines.extend(notes.iter().map(|note| row("note", note.clone())));
-    if last.is_some() {
-        lines.push(row("results", task.folder.display().to_string()));
+    lines.extend(supports(task, quantities, &bar));
+    if let Some(outcome) = outcome {
+        let names = ["errors", "", "", ""].into_iter();
+        let errors = names.zip(outcome.errors.lines(outcome.stopped.as_ref()));
+        lines.extend(errors.map(|(name, line)| row(name, line)));
     }
+    lines.push(row("residuals", outcome.map_or(last.kkt(), |outcome| outcome.kkt).to_string()));
+    lines.extend(notes);
+    lines.push(row("results", task.folder.display().to_string()));
     lines
 }
 
@@ -126,22 +119,17 @@ fn supports(
     bar: &dyn Fn(&str) -> Option<f64>,
 ) -> Vec<String> {
     let Units { length, force, .. } = &task.problem.scene().units;
-    let mut lines = Vec::new();
     // Resultants come first, three for each support.
-    let supports = &task.problem.supports.names;
-    let resultants = quantities.chunks_exact(3).take(supports.len());
-    let resultants = resultants.map(|of| [0, 1, 2].map(|i| of[i].1));
-    for (name, [x, y, moment]) in supports.iter().zip(resultants) {
-        let figure = |value: f64, of: &str| match bar(&format!("{name}.{of}")) {
-            None => format!("{value:.4e}"),
-            bar => with_bar(value, bar),
+    let line = |(name, of): (&String, &[(String, f64)])| {
+        let figure = |i: usize, part: &str| match bar(&format!("{name}.{part}")) {
+            None => format!("{:.4e}", of[i].1),
+            bar => with_bar(of[i].1, bar),
         };
-        let (x, y) = (figure(x, "force_x"), figure(y, "force_y"));
+        let [x, y, moment] = [figure(0, "force_x"), figure(1, "force_y"), figure(2, "moment")];
         let resultant = format!("force ({x}, {y}) {force}/{length}");
-        let moment = figure(moment, "moment");
-        lines.push(row("support", format!("{name}: {resultant}, moment {moment} {force}")));
-    }
-    lines
+        row("support", format!("{name}: {resultant}, moment {moment} {force}"))
+    };
+    task.problem.supports.names.iter().zip(quantities.chunks_exact(3)).map(line).collect()
 }
 
 pub fn row(name: &str, value: String) -> String {

@@ -17,6 +17,7 @@ use super::{ContactError, ContactProblem, Kkt};
 use crate::{
     cholesky::{LinearSolver, SolveReport},
     petsc::Vector,
+    suggestion::suggestion,
 };
 use active_set::ActiveSet;
 use serde::Deserialize;
@@ -127,7 +128,7 @@ pub const SOLVERS: [&str; REGISTRY.len()] = {
 
 /// There is no contact solver of that name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("there is no contact solver `{name}`{}; there are {}", alike(name), listing())]
+#[error("there is no contact solver `{name}`{}", suggestion(name, &names()))]
 pub struct SolverError {
     /// The name.
     pub name: String,
@@ -173,26 +174,13 @@ pub fn summaries() -> String {
     REGISTRY.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
-/// The names that [`find`] knows, in words.
-fn listing() -> String {
-    let variants = REGISTRY.iter().filter(|entry| !entry.variants.is_empty());
-    let variants = variants.map(|entry| {
-        format!(", and {}:TYPE with TYPE one of {}", entry.name, entry.variants.join(", "))
-    });
-    SOLVERS.join(", ") + &variants.collect::<String>()
-}
-
-/// An aside of a message: the known name that is most like `name`, or nothing where none is at least
-/// half alike.
-fn alike(name: &str) -> String {
-    let names = REGISTRY.iter().flat_map(|entry| {
+/// The names that [`find`] knows.
+fn names() -> Vec<String> {
+    let of = |entry: &SolverEntry| {
         let variants = entry.variants.iter().map(|variant| format!("{}:{variant}", entry.name));
-        variants.chain([entry.name.to_owned()])
-    });
-    let likeness = |known: &String| strsim::normalized_damerau_levenshtein(name, known);
-    let nearest = names.max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
-    let meant = nearest.filter(|known| likeness(known) >= 0.5);
-    meant.map_or_else(String::new, |known| format!(" (did you mean `{known}`?)"))
+        [entry.name.to_owned()].into_iter().chain(variants).collect::<Vec<_>>()
+    };
+    REGISTRY.iter().flat_map(of).collect()
 }
 
 /// The solver called `name`, and the one to ask in its place where it stops short: none of a variant,

@@ -116,7 +116,7 @@ impl ErrorBudget {
 }
 
 /// An error in percent, with two digits.
-fn percent(error: f64) -> String {
+pub fn percent(error: f64) -> String {
     match 100.0 * error {
         error if error == 0.0 || !error.is_finite() => format!("{error} %"),
         error if error < 0.01 => format!("{error:.0e} %"),

@@ -55,7 +55,7 @@ pub use adaptive::{AdaptError, Adapted, adapted, measured_bars};
 pub use contact_step::{Accuracy, ContactStep};
 pub use discrete_problem::DiscreteProblem;
 pub use error::{RunError, SetupError, StepFailure};
-pub use error_budget::ErrorBudget;
+pub use error_budget::{ErrorBudget, percent};
 pub use extrapolation::Extrapolation;
 pub use figures::Bar;
 pub use loads::Loads;

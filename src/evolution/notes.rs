@@ -1,6 +1,8 @@
 //! What the user should know about a problem or an answer that its residuals do not tell.
 
-use super::{Accuracy, DiscreteProblem, Outcome, loads::LoadCurve, unresolved};
+use super::{
+    Accuracy, DiscreteProblem, Outcome, error_budget::percent, loads::LoadCurve, unresolved,
+};
 use crate::{
     fem::for_elements,
     mesh::Order,
@@ -26,76 +28,69 @@ const LARGE: f64 = 0.1;
 const NOTICEABLE: f64 = 0.01;
 
 impl Outcome {
-    /// What the user should know about the run of `problem`.
+    /// What the user should know about the run of `problem`. Collective.
     pub fn notes(&self, problem: &DiscreteProblem) -> Vec<String> {
-        let mut notes = Vec::new();
-        let early = |level: &f64| *level > problem.threshold();
-        if let Some(least) = self.stopped.map(|stop| stop.least_admissible).filter(early) {
-            notes.push(format!(
-                "ζ_* was reached too early, or should not be reached at all: the sources up to \
-                 there allow no ζ below {least:.4}"
-            ));
-        }
-        let slowest = problem.slowest_diffusion();
-        notes.extend(self.bound_violation.note(problem.mass(), slowest));
-        if let Some((steps, times, motion)) = &self.unconstrained {
-            let [first, last] = times.map(rounded);
-            let when = match steps {
-                1 => format!("at t = {first}"),
-                steps => format!("in {steps} steps, at t = {first} first and t = {last} last"),
-            };
-            // Nodes that touch without force may still be in the way.
-            notes.push(format!(
-                "{when}, no active contact node supports the body against {motion}: the answer may \
-                 be one of many"
-            ));
-        }
-        // That an unconstrained body has no one answer is said already.
+        let least = self.stopped.map(|stop| stop.least_admissible);
+        let early = least.filter(|least| *least > problem.threshold());
+        let usual =
+            "a slender body, stretched triangles, nearly incompressible or almost broken material";
+        let contrast = problem.contrast();
+        let (worst, cause) = (self.kkt.worst(), contrast.as_deref().unwrap_or(usual));
+        // A body with an unconstrained motion has no one answer; its own note says so.
         let unique = self.unconstrained.is_none();
         let displacement = if unique { self.accuracy.displacement } else { 0.0 };
         let accuracy = Accuracy { displacement, ..self.accuracy };
-        if self.kkt.worst() > problem.tolerance {
-            let usual = "a body much longer than wide, stretched triangles, nearly incompressible or \
-                         almost broken material";
-            notes.push(format!(
-                "KKT residuals up to {:.1e}, above contact.tolerance, are all that double precision allows \
-                 here ({})",
-                self.kkt.worst(),
-                problem.contrast().as_deref().unwrap_or(usual)
-            ));
-        }
-        notes.extend(self.penetration.clone());
-        notes.extend(accuracy.notes(problem.tolerance));
-        notes.extend(problem.large_gradients(&self.last.state.u));
-        if let Some((steps, solver)) = &self.rescued {
-            notes.push(format!(
-                "in {} the contact solver stopped short of the tolerance, and {solver} gave the \
-                 answer in its place",
-                counted(*steps)
-            ));
-        }
-        notes.extend(self.chosen_steps(problem, true));
-        notes
+        let of_residuals = [
+            early.map(|least| {
+                format!(
+                    "ζ_* was reached too early or wrongly: the sources allow no ζ below {least:.4}"
+                )
+            }),
+            self.bound_violation.note(problem.mass(), problem.slowest_diffusion()),
+            self.unconstrained.as_ref().map(|(steps, times, motion)| {
+                let [first, last] = times.map(rounded);
+                let when = match steps {
+                    1 => format!("at t = {first}"),
+                    steps => format!("in {steps} steps, at t = {first} first and t = {last} last"),
+                };
+                // Nodes that touch without force may still be in the way.
+                let problem = "no active contact node supports the body against";
+                format!("{when}, {problem} {motion}: the answer may be one of many")
+            }),
+            (worst > problem.tolerance).then(|| {
+                format!(
+                    "KKT residuals up to {worst:.1e} are all that double precision allows ({cause})"
+                )
+            }),
+            self.penetration.clone(),
+        ];
+        let of_model = [
+            problem.large_gradients(&self.last.state.u),
+            self.rescued.as_ref().map(|(steps, solver)| {
+                let steps = counted(*steps);
+                format!("in {steps} the solver missed the tolerance and {solver} gave the answer")
+            }),
+            self.chosen_steps(problem, true),
+        ];
+        let notes = of_residuals.into_iter().flatten().chain(accuracy.notes(problem.tolerance));
+        notes.chain(of_model.into_iter().flatten()).collect()
     }
 
     /// What the run of `problem` did on its way; its answer is none the worse for it.
     pub fn remarks(&self, problem: &DiscreteProblem) -> Vec<String> {
-        let mut notes = Vec::new();
-        if self.skipped_damage_solves > 0 && problem.damage().is_some() {
-            notes.push(format!(
-                "the damage solve was skipped in {} of {} steps: no source, uniform ζ",
-                self.skipped_damage_solves, self.last.record.step
-            ));
-        }
-        if self.fallbacks > 0 {
-            let steps = counted(self.fallbacks);
-            notes.push(format!("in {steps} the contact solver left its fast path"));
-        }
-        if self.undone > 0 {
-            notes.push(format!("{} steps were undone and tried again, shorter", self.undone));
-        }
-        notes.extend(self.chosen_steps(problem, false));
-        notes
+        let (skipped, steps) = (self.skipped_damage_solves, self.last.record.step);
+        let remarks = [
+            (skipped > 0 && problem.damage().is_some()).then(|| {
+                format!("the damage solve was skipped in {skipped} of {steps} steps: no source, uniform ζ")
+            }),
+            (self.fallbacks > 0).then(|| {
+                format!("in {} the contact solver left its fast path", counted(self.fallbacks))
+            }),
+            (self.undone > 0)
+                .then(|| format!("{} steps were rejected and tried again, shorter", self.undone)),
+            self.chosen_steps(problem, false),
+        ];
+        remarks.into_iter().flatten().collect()
     }
 
     /// How many steps were chosen, and how exact the damage is for it, if that `misses` the tolerance,
@@ -103,22 +98,18 @@ impl Outcome {
     fn chosen_steps(&self, problem: &DiscreteProblem, misses: bool) -> Option<String> {
         let error = self.damage_error.filter(|_| problem.damage().is_some())?;
         let Stepping::Auto { tolerance, .. } = problem.scene().time?.stepping else { return None };
-        // Where an accuracy is asked for, the tolerance is not the user's.
+        // Where an accuracy is asked for, the program has set the tolerance.
         let missed = error > tolerance && problem.scene().accuracy.is_none();
         let verdict = match missed {
             true => format!(", more than time.tolerance = {tolerance}: lower it"),
             false => String::new(),
         };
-        // Two decimals, or three digits where these would say too little.
-        let percent = match 100.0 * error {
-            percent if percent > 0.0 && percent < 0.1 => format!("{percent:.2e} %"),
-            percent => format!("{percent:.2} %"),
-        };
         (missed == misses).then(|| {
             format!(
-                "{} steps chosen: the damage is exact in time to about {percent} of the damage \
-                 done (two or three times that where the load swings or jumps){verdict}",
-                self.last.record.step
+                "{} steps chosen: the time error of the damage is about {} of it, or three times that \
+                 where the load jumps{verdict}",
+                self.last.record.step,
+                percent(error)
             )
         })
     }
@@ -126,45 +117,42 @@ impl Outcome {
 
 impl DiscreteProblem {
     /// What the user should know before any solve: what was not taken as it is written, unconstrained
-    /// rigid motions, and functions, a material or triangles that make the discretisation poor.
+    /// rigid motions, and functions, a material or triangles that make the discretisation poor. Collective.
     pub fn notes(&self) -> Vec<String> {
-        let (scene, motions) = (self.scene(), &self.motions);
+        let (scene, linear) = (self.scene(), self.scene().order == Order::Linear);
+        let poisson = scene.materials().map(|material| material.poisson).fold(-1.0, f64::max);
+        let locks = linear && scene.material.plane == Plane::Strain && poisson > LOCKING;
+        let is_curved = self.body.nodes.partition.comm().any(!self.body.mesh.curved.is_empty());
         let mut notes = scene.notes.clone();
-        notes.extend(motions.free.iter().map(|motion| {
-            format!(
-                "nothing prevents or drives {motion}: of all answers the one of least ∫|u|² is given"
-            )
+        notes.extend(self.motions.free.iter().map(|motion| {
+            format!("nothing prevents or drives {motion}: of all answers the one of least ∫|u|² is given")
         }));
-        let check_units = |contrast| format!("{contrast}; if that is not meant, check their units");
-        notes.extend(self.contrast().map(check_units));
+        let contrast = self.contrast();
+        notes.extend(contrast.map(|it| format!("{it}; if that is not meant, check their units")));
         notes.extend(unresolved::notes(scene, self.mesh()));
         notes.extend(self.loads.notes(&scene.sample_times(LOOKS)));
-        if let Some([start, end]) = LoadCurve::unresolved_step(self) {
-            notes.push(format!(
-                "loads, displacements or gaps change within a time step, as between t = {start:.4e} and \
-                 {end:.4e}: what happens there counts only at its ends; shorten time.step, or set it to \
-                 \"auto\""
-            ));
-        }
-        if scene.damage.is_some() && scene.time.is_none() {
-            let note = "[damage] without [time]: in this static solve ζ stays damage.initial";
-            notes.push(note.to_owned());
-        }
-        let poisson = scene.materials().map(|material| material.poisson).fold(-1.0, f64::max);
-        let linear = scene.order == Order::Linear;
-        if linear && scene.material.plane == Plane::Strain && poisson > LOCKING {
-            notes.push(format!(
-                "nearly incompressible (plane strain, ν = {poisson} > {LOCKING}): linear triangles \
-                 lock, displacements may be far too small; compare with a mesh half as fine, or \
-                 take discretisation.displacement = 2"
-            ));
-        }
-        if linear && self.body.nodes.partition.comm().any(!self.body.mesh.curved.is_empty()) {
-            let note = "the mesh's curved sides count as straight: discretisation.displacement = 2 would \
-                        follow them";
-            notes.push(note.to_owned());
-        }
-        notes.extend(self.sliver());
+        let others = [
+            LoadCurve::unresolved_step(self).map(|[start, end]| {
+                format!(
+                    "loads, displacements or gaps change within a time step, as from t = {start:.4e} \
+                     to {end:.4e}: shorten time.step, or set it to \"auto\""
+                )
+            }),
+            (scene.damage.is_some() && scene.time.is_none()).then(|| {
+                "[damage] without [time]: in this static solve ζ stays damage.initial".to_owned()
+            }),
+            locks.then(|| {
+                format!(
+                    "linear triangles lock in plane strain with ν = {poisson} > {LOCKING}: displacements \
+                     may be far too small; set discretisation.displacement = 2"
+                )
+            }),
+            (linear && is_curved).then(|| {
+                "curved sides count as straight; discretisation.displacement = 2 follows them".to_owned()
+            }),
+            self.sliver(),
+        ];
+        notes.extend(others.into_iter().flatten());
         notes
     }
 
@@ -213,8 +201,8 @@ impl DiscreteProblem {
         let part = body.nodes.partition.comm().total(large) / body.area;
         (part > NOTICEABLE).then(|| {
             format!(
-                "|∇u| exceeds {LARGE} in {:.0} % of the body: strains or rotations are not small, \
-                 and linear elasticity, which supposes they are, is a poor model of this load",
+                "|∇u| exceeds {LARGE} in {:.0} % of the body: too much for small strains and rotations, \
+                 and so for linear elasticity",
                 100.0 * part
             )
         })
@@ -228,8 +216,7 @@ impl DiscreteProblem {
         let [x, y] = at.map(|coordinate| comm.broadcast(rank, coordinate));
         (angle < SLIVER).then(|| {
             format!(
-                "a triangle at ({x:.4}, {y:.4}) has an angle of {angle:.1e}°: round-off grows as \
-                 angles shrink; mend the mesh there if that is not meant"
+                "a triangle at ({x:.4}, {y:.4}) has an angle of {angle:.1e}°: mend the mesh there"
             )
         })
     }

@@ -4,12 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::boundary::{Boundary, Condition, SurfaceLoad, contradiction};
 use super::document::{NOWHERE, Problem};
-use super::error::{SceneError, suggestion};
+use super::error::SceneError;
 use super::expression::Expression;
 use super::{Damage, Probe, Scene, may_start_at, rounded};
 use crate::{
     fem::{gauss_points, midpoint},
     mesh::{Curve, Mesh},
+    suggestion::suggestion,
 };
 
 /// A fixed normal whose cosine with an edge's outward normal is at most this does not point out of

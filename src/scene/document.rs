@@ -11,7 +11,8 @@ use serde::{Deserialize, de::IntoDeserializer};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{MOST_SHOWN, SceneError, suggestion};
+use super::error::{MOST_SHOWN, SceneError};
+use crate::suggestion::suggestion;
 
 /// Where something is wrong, and what.
 pub(super) type Problem = (Range<usize>, String);

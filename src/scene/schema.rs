@@ -2,8 +2,8 @@
 //! wrong with a value is noted and reading goes on, so that all problems of a scene are told at once.
 
 use super::document::{NOWHERE, Problem, SceneText, below, name_of, with_decimal_comma};
-use super::error::suggestion;
 use super::expression::Expression;
+use crate::suggestion::suggestion;
 use serde::de::{Deserialize, DeserializeOwned, IntoDeserializer};
 use serde_json::Value as Schema;
 use std::{

@@ -5,63 +5,13 @@ use serde_json::Value;
 use signorini::contact::{REGISTRY, SOLVERS};
 use std::process::Stdio;
 
-const KEYS: [&str; 27] = [
-    "quantities",
-    "provenance",
-    "scene",
-    "title",
-    "solver",
-    "ranks",
-    "nodes",
-    "triangles",
-    "steps",
-    "end_time",
-    "stopped_at",
-    "stopped_uncertainty",
-    "zeta_min",
-    "zeta_mean",
-    "displacement_max",
-    "work",
-    "contact_force",
-    "active_nodes",
-    "boundaries",
-    "contact_nodes",
-    "errors",
-    "kkt",
-    "wall_seconds",
-    "seconds_per_step",
-    "phases",
-    "units",
-    "notes",
-];
-const COLUMNS: [&str; 26] = [
-    "step",
-    "time",
-    "zeta_min",
-    "zeta_mean",
-    "displacement_max",
-    "work",
-    "contact_force",
-    "active_nodes",
-    "iterations",
-    "linear_iterations",
-    "factorisations",
-    "fallbacks",
-    "contraction",
-    "kkt_stationarity",
-    "kkt_primal",
-    "kkt_dual",
-    "kkt_complementarity",
-    "zeta_residual",
-    "zeta_error",
-    "seconds",
-    "left.force_x",
-    "left.force_y",
-    "left.moment",
-    "bottom.force_x",
-    "bottom.force_y",
-    "bottom.moment",
-];
+const KEYS: &str = "quantities provenance scene title solver ranks nodes triangles steps end_time stopped_at \
+    stopped_uncertainty zeta_min zeta_mean displacement_max work contact_force active_nodes \
+    boundaries contact_nodes errors kkt wall_seconds seconds_per_step phases units notes";
+const COLUMNS: &str = "step time zeta_min zeta_mean displacement_max work contact_force active_nodes iterations \
+    linear_iterations factorisations fallbacks contraction kkt_stationarity kkt_primal \
+    kkt_dual kkt_complementarity zeta_residual zeta_error seconds left.force_x left.force_y \
+    left.moment bottom.force_x bottom.force_y bottom.moment";
 
 fn keys(value: &Value) -> Vec<&str> {
     let mut keys: Vec<&str> = value.as_object().expect("an object").keys().map(|k| &**k).collect();
@@ -69,7 +19,8 @@ fn keys(value: &Value) -> Vec<&str> {
     keys
 }
 
-fn sorted<const N: usize>(mut names: [&str; N]) -> [&str; N] {
+fn sorted(names: &str) -> Vec<&str> {
+    let mut names: Vec<&str> = names.split(' ').collect();
     names.sort_unstable();
     names
 }
@@ -92,7 +43,7 @@ fn summary() {
     let summary = test_directory.summary("out/scene");
     assert_eq!(keys(&summary), sorted(KEYS));
     let kkt = &summary["kkt"];
-    assert_eq!(keys(kkt), sorted(["stationarity", "primal", "dual", "complementarity"]));
+    assert_eq!(keys(kkt), sorted("stationarity primal dual complementarity"));
     assert!(kkt.as_object().expect("an object").values().all(|v| number(v) <= 1e-10));
     assert_eq!(summary["scene"], "scene");
     assert_eq!(summary["title"], "Pressed square");
@@ -121,7 +72,7 @@ fn history() {
     let test_directory = TestDirectory::new();
     test_directory.run(&[]);
     let (names, rows) = test_directory.history("out/scene");
-    assert_eq!(names, COLUMNS);
+    assert_eq!(names.join(" "), COLUMNS);
     assert_eq!(rows.len(), 11);
     let column = |name: &str| names.iter().position(|n| n == name).expect("a column");
     for (n, row) in rows.iter().enumerate() {

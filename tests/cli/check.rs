@@ -16,7 +16,7 @@ fn a_scene_is_described_and_nothing_is_written() {
         "t = 0: (0, 0) N/m, moment about (0, 0) 0 N",
         "t = 1: (0, -3) N/m, moment about (0, 0) -1.5 N",
         "only contact supports the body against the vertical translation",
-        "about 0.1 s in 10 steps; about",
+        "about 0.1 s in 10 steps, or 0.1 s",
     ] {
         assert!(said.out.contains(fragment), "no `{fragment}` in: {}", said.out);
     }

@@ -28,73 +28,18 @@ fn changed(old: &str, new: &str) -> TestDirectory {
 
 /// (a text of the scene, what replaces it, what the message says)
 const SCENES: &[(&str, &str, &[&str])] = &[
+    // A case of each kind; tests/scene has all that a scene may have wrong.
     ("young", "yuong", &["scene.toml:5: unknown key material.yuong", "did you mean `young`?"]),
-    ("young = 80", "young = \"80\"", &["scene.toml:5: material.young must be a number"]),
-    ("young = 80\n", "", &["scene.toml:4: material.young is required but missing"]),
     ("[time]", "[time", &["scene.toml:16: not valid TOML: unclosed table"]),
     ("young = 80", "young = -80", &["scene.toml:5: material.young must be positive"]),
-    ("poisson = 0.3", "poisson = 0.5", &["scene.toml:6: material.poisson must be between"]),
-    ("poisson = 0.3", "poisson = -1", &["scene.toml:6: material.poisson must be between"]),
-    ("diffusion = 0.01", "diffusion = 0", &["scene.toml:9: damage.diffusion must be positive"]),
-    ("diffusion = 0.01", "diffusion = -1", &["scene.toml:9: damage.diffusion must be positive"]),
-    ("initial = 1", "initial = 0", &["scene.toml:15: damage.initial must be in (0.01, 1]"]),
-    ("initial = 1", "initial = 1.1", &["scene.toml:15: damage.initial must be in (0.01, 1]"]),
-    ("initial = 1", "initial = \"1 - x\"", &["scene.toml:15: damage.initial is 0 at (1, 0)"]),
-    ("step = 0.1", "step = 0", &["scene.toml:18: time.step must be positive"]),
-    ("step = 0.1", "step = -0.1", &["scene.toml:18: time.step must be positive"]),
-    ("step = 0.1", "step = 2", &["scene.toml:18: time.step must be positive and at most the end"]),
-    ("step = 0.1", "step = 1e-12", &["scene.toml:18: time.step is ", "more than 1e9 steps"]),
-    ("step = 0.1", "step = \"small\"", &["scene.toml:18: time.step must be a number"]),
-    ("[time]", "[tiem]", &["scene.toml:16: unknown key tiem", "did you mean `time`?"]),
-    ("\"stress\"", "\"stres\"", &["material.plane must be \"stress\" or \"strain\""]),
-    ("\"-3*t\"", "\"sine(t)\"", &["the unknown function `sine`", "did you mean `sin`?"]),
-    ("\"-3*t\"", "\"-3*(t + 1\"", &["traction[1] has the end at column 10", "or `)`"]),
-    ("[\"0\", \"-3*t\"]", "[\"-3*t\"]", &["traction must have two components, but has 1"]),
-    ("gap = \"0\"", "gap = \"0\"\nnormal = [\"0\", \"1\"]", &["normal points into the body at"]),
-    ("gap = \"0\"", "gap = \"1/(t-0.5)\"", &["scene.toml:26: ", "gap is inf at (", "t = 0.5"]),
-    ("gap = \"0\"", "pressure = \"log(x - 2)\"", &["scene.toml:26: ", "pressure is NaN"]),
-    ("\"-3*t\"", "\"table('load.csv')\"", &["scene.toml:29: ", "load.csv: No such file"]),
-    ("\"-3*t\"", "\"-3*\"", &["scene.toml:29: boundary.top.traction[1] has the end at column"]),
     ("\"-3*t\"", "\"-3*s\"", &["scene.toml:29: ", "unknown", "`s`"]),
-    ("\"-3*t\"", "\"log(0)\"", &["scene.toml:29: ", "traction[1] must be finite"]),
-    ("\"-3*t\"", "\"sqrt(x-2)\"", &["scene.toml:29: ", "traction[1] is NaN at"]),
-    (
-        "name = \"top\"",
-        "name = \"toop\"",
-        &["scene.toml:28: ", "\"toop\" is no physical curve", "`top`", "bottom, left, right, top"],
-    ),
-    (
-        "name = \"top\"\ntraction",
-        "name = \"left\"\ntraction",
-        &["scene.toml:27: boundary.left", "is given twice, first at scene.toml:21"],
-    ),
-    ("symmetry = true\n", "", &["scene.toml:21: boundary.left", "has nothing in it"]),
-    ("square.msh", "square.stl", &["scene.toml:3: mesh.file must be a .geo or .msh file"]),
+    ("\"-3*t\"", "\"table('load.csv')\"", &["scene.toml:29: ", "load.csv: No such file"]),
     ("square.msh", "none.msh", &["none.msh: No such file"]),
     ("square.msh", "none.geo", &["none.geo: No such file"]),
-    (
-        "[contact]",
-        "[contact]\nsolver = \"simplex\"",
-        &[
-            "scene.toml:20: contact.solver is unknown: there is no contact solver `simplex`",
-            "penalty-dual",
-        ],
-    ),
-    (
-        "\"-3*t\"",
-        "\"1/(t-0.5)\"",
-        &["scene.toml:29: boundary.top.traction[1] is inf at (", "t = 0.5"],
-    ),
-    (
-        "traction = [\"0\", \"-3*t\"]",
-        "displacement = [\"0\", \"0.01/(t-0.5)\"]",
-        &["scene.toml:29: boundary.top.displacement[1] is inf at (0.25, 1), t = 0.5"],
-    ),
-    (
-        "[contact]",
-        "[body]\nforce = [\"0\", \"log(0.65 - t)\"]\n[contact]",
-        &["scene.toml:20: body.force[1] is NaN at (", "t = 0.7"],
-    ),
+    // What the mesh shows, or a time of the run.
+    ("name = \"top\"", "name = \"toop\"", &["scene.toml:28: ", "no physical curve", "`top`"]),
+    ("initial = 1", "initial = \"1 - x\"", &["scene.toml:15: damage.initial is 0 at (1, 0)"]),
+    ("gap = \"0\"", "gap = \"1/(t-0.5)\"", &["scene.toml:26: ", "gap is inf at (", "t = 0.5"]),
     // Nothing supports it: the message names the motion.
     (
         "[\"0\", \"-3*t\"]",
@@ -105,11 +50,6 @@ const SCENES: &[(&str, &str, &[&str])] = &[
         "name = \"left\"\nsymmetry = true",
         "name = \"right\"\ntraction = [\"t\", \"0\"]",
         &["nothing supports the body against the horizontal translation", "the load drives it"],
-    ),
-    (
-        "gap = \"0\"",
-        "traction = [\"0\", \"3*t + 1e-3\"]",
-        &["scene.toml: at t = 0, nothing supports the body against the vertical translation"],
     ),
 ];
 
@@ -189,7 +129,7 @@ fn arguments() {
     let said = test_directory.say(&["compare", "scene.toml", "--solvers", "tao,simplex"]);
     said.fails(
         2,
-        &["contact.solver is unknown", "`simplex`", "active-set, penalty-duality, tao", "tao:TYPE"],
+        &["contact.solver is unknown", "`simplex`", "active-set, penalty-duality", "tao:tron"],
     );
     assert!(!test_directory.path("out/compare").exists());
     test_directory.say(&["run"]).fails(2, &["<SCENE>"]);

@@ -1,11 +1,9 @@
 //! Scenes: the shipped ones, and what they turn into.
 
-mod boundaries;
 mod errors;
 mod expression;
 mod keys;
 mod mesh;
-mod numbers;
 mod set;
 
 use std::path::{Path, PathBuf};

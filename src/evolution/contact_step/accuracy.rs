@@ -49,29 +49,29 @@ impl Accuracy {
 
     /// What the user should know about these errors at a KKT tolerance; nothing if they are small.
     pub fn notes(&self, tolerance: f64) -> Vec<String> {
-        let mut notes = Vec::new();
-        if self.displacement.is_infinite() {
-            notes.push(format!(
-                "at t = {:.4e}, the active contact nodes alone do not support the body: how exact the \
-                 displacements are cannot be estimated",
-                self.time
-            ));
-        } else if self.displacement > Self::promised(tolerance) {
-            notes.push(format!(
-                "the stiffness is ill-conditioned (a slender or very soft part?): small as the residuals \
-                 are, displacements are exact only to about {:.0e} of the largest at t = {:.4e}",
-                self.displacement, self.time
-            ));
-        }
-        if self.energy > COARSE {
-            notes.push(format!(
+        let (displacement, time) = (self.displacement, self.time);
+        let support = match displacement {
+            f64::INFINITY => Some(format!(
+                "at t = {time:.4e}, the active contact nodes alone do not support the body: how exact the \
+                 displacements are cannot be estimated"
+            )),
+            _ => (displacement > Self::promised(tolerance)).then(|| {
+                format!(
+                    "the stiffness is ill-conditioned (a slender or very soft part?): small as the \
+                     residuals are, displacements are exact only to about {displacement:.0e} of the \
+                     largest at t = {time:.4e}"
+                )
+            }),
+        };
+        let energy = (self.energy > COARSE).then(|| {
+            format!(
                 "the mesh is too coarse for this answer: strains jump from triangle to triangle \
                  by about {:.0} % (energy norm), and displacements may be far too small; use \
                  smaller or less stretched triangles, several across a part that bends",
                 100.0 * self.energy
-            ));
-        }
-        notes
+            )
+        });
+        [support, energy].into_iter().flatten().collect()
     }
 }
 

@@ -1,11 +1,11 @@
 //! From the text of an expression to its program.
 
 use super::{
-    super::error::suggestion,
     Expression,
     Instruction::{self, Binary, Choose, Compare, Number, Unary, Variable},
     Table, interval, truth,
 };
+use crate::suggestion::suggestion;
 use std::{f64::consts::PI, path::Path, sync::Arc};
 
 /// All names, and what they stand for.
