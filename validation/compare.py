@@ -40,8 +40,7 @@ import shared  # noqa: F401
 from lagrange import Lagrange
 from reading import frames_of, read_frame
 from results import ResultError, read_table
-from scene import SceneError, displacement_order, of_order, read_scene, write_scene
-from solvers import solvers
+from scene import SceneError, displacement_order, of_order, read_scene, solvers, write_scene
 from triangulation import mesh_geometry, read_triangulation
 
 TOLERANCE = {"elastic": 1e-10, "contact": 1e-8, "damage": 1e-8}

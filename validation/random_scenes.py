@@ -31,8 +31,7 @@ from judge import Verdict, judge  # noqa: E402
 from random_bodies import write_msh  # noqa: E402
 from random_draw import draw  # noqa: E402
 from random_variants import vary  # noqa: E402
-from scene import read_scene, write_scene  # noqa: E402
-from solvers import solvers  # noqa: E402
+from scene import read_scene, solvers, write_scene  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent.parent
 LIMIT = 120  # seconds a run may take, on a busy machine
