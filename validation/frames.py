@@ -6,6 +6,9 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 
+import shared  # noqa: F401
+from reading import frames_of
+
 
 @dataclass
 class Frame:
@@ -25,12 +28,11 @@ def read_frames(space, out):
     """Every frame written, nodes as in the finite element `space` of u; pieces are matched triangle
     by triangle, as slits have two nodes at one point."""
     place = {key(space.points[t]): t for t in space.elements}
-    collection = out / "fields.pvd"
-    if not collection.exists():
+    if not (out / "fields.pvd").exists():
         return []
     frames = []
-    for entry in ElementTree.parse(collection).iter("DataSet"):
-        pieces = [out / entry.get("file")]
+    for time, path in frames_of(out):
+        pieces = [path]
         if pieces[0].suffix == ".pvtu":
             pieces = [out / p.get("Source") for p in ElementTree.parse(pieces[0]).iter("Piece")]
         values, apart, seen = np.full((len(space.points), 5), np.nan), 0.0, 0
@@ -49,7 +51,7 @@ def read_frames(space, out):
         u, (zeta, gap, pressure) = values[:, :2].ravel(), values[:, 2:].T
         vertices = zeta[:len(space.mesh.nodes)]
         apart, zeta = max(apart, np.abs(space.spread(vertices) - zeta).max()), vertices
-        frames.append(Frame(float(entry.get("timestep")), u, zeta, gap, pressure, apart))
+        frames.append(Frame(time, u, zeta, gap, pressure, apart))
     return frames
 
 
