@@ -10,7 +10,12 @@ use signorini_study::{
     StudyError,
     stability::{MAPS, make},
 };
-use std::{env, path::{Path, PathBuf}, process::ExitCode, time::Instant};
+use std::{
+    env,
+    path::{Path, PathBuf},
+    process::ExitCode,
+    time::Instant,
+};
 
 /// Studies of signorini: where methods fail.
 #[derive(Parser)]
