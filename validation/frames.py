@@ -27,6 +27,7 @@ class Frame:
 def read_frames(space, out):
     """Every frame written, nodes as in the finite element `space` of u; pieces are matched triangle
     by triangle, as slits have two nodes at one point."""
+    size = np.ptp(space.points, axis=0).max()
     place = {key(space.points[t]): t for t in space.elements}
     if not (out / "fields.pvd").exists():
         return []
@@ -43,6 +44,8 @@ def read_frames(space, out):
                 nodes = place[key(data.points[cell, :2])]
                 # Both lists in the order of their points.
                 a, b = (order(points) for points in (space.points[nodes], data.points[cell, :2]))
+                if np.abs(space.points[nodes[a]] - data.points[cell[b], :2]).max() > 1e-9 * size:
+                    raise ValueError("a middle of a side is not where the mesh has it")
                 old, new = values[nodes[a]], field[cell[b]]
                 apart = max(apart, np.nanmax(np.abs(old - new), initial=0.0))
                 values[nodes[a]] = new
@@ -56,10 +59,12 @@ def read_frames(space, out):
 
 
 def key(points):
-    """A triangle by the coordinates of its nodes."""
-    return tuple(map(tuple, (points[order(points)] + 0.0).tolist()))
+    """A triangle by the coordinates of its vertices."""
+    return tuple(map(tuple, (points[order(points)[:3]] + 0.0).tolist()))
 
 
 def order(points):
-    """Nodes sorted by their coordinates."""
-    return np.lexsort((points[:, 1], points[:, 0]))
+    """The vertices sorted by their coordinates, then the middles of the sides between them."""
+    p = np.lexsort((points[:3, 1], points[:3, 0]))
+    # Side k lies opposite vertex k − 1.
+    return p if len(points) == 3 else np.r_[p, 3 + (p[[2, 0, 1]] + 1) % 3]
