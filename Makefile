@@ -88,7 +88,7 @@ test: deps
 	cargo test --locked
 	$(PYTHON) -m compileall -q scripts validation
 
-validate: build deps-validate
+validate: build deps-validate deps-random
 	$(PYTHON) validation/selfcheck.py
 	$(PYTHON) validation/compare.py --binary $(BINARY) validation/layers.toml $(addprefix geo/, \
 	    square-mild.toml lshape.toml lshape-rolling.toml beam.toml bridge-half.toml hertz.toml)

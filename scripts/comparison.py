@@ -4,12 +4,14 @@ Reads FOLDER/comparison.csv and draws FOLDER/comparison.png: what each solver to
 scene, how well it did, and one against the other.
 """
 
-import csv
+import sys
+from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 
-from drawing import FAINT, INK, RED, draw_table
+from drawing import FAINT, INK, RED
+from results import read_table
 
 COLOURS = ["#2f6db3", "#d08a1d", "#3d8f5a", "#8e5aa8", "#4fa3a5", "#a3554f"]
 MARKERS = ["o", "s", "^", "D", "v", "P", "X", "<", ">", "*"]
@@ -17,13 +19,10 @@ KKT = ["kkt_stationarity", "kkt_primal", "kkt_dual", "kkt_complementarity"]
 
 
 def read(path):
-    """The rows of the table with numbers where there are any; the worst KKT residual added."""
-    with open(path, newline="") as file:
-        rows = list(csv.DictReader(file))
+    """The rows of the table; not a number where a solver failed at once; the worst KKT residual added."""
+    rows = read_table(path)
     for row in rows:
-        for key in ["seconds", "iterations", "triangular_solves", *KKT]:
-            # A solver that failed at once has none.
-            row[key] = float(row[key] or "nan")
+        row |= {key: np.nan for key in ["seconds", "iterations", "triangular_solves", *KKT] if row[key] == ""}
         row["kkt"] = max(row[key] for key in KKT)
     return rows
 
@@ -88,4 +87,8 @@ def draw(table):
 
 
 if __name__ == "__main__":
-    draw_table(__doc__, "comparison", "signorini compare", draw)
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    table = Path(sys.argv[1]) / "comparison.csv"
+    draw(table).savefig(table.with_suffix(".png"))
+    print(table.with_suffix(".png"))

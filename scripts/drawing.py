@@ -1,8 +1,6 @@
 """What the figures share: style, maps with equal aspect, scales that can be read."""
 
-import sys
 import textwrap
-from pathlib import Path
 
 import matplotlib
 
@@ -29,23 +27,6 @@ plt.rcParams.update({
     "axes.spines.right": False,
     "legend.frameon": False,
 })
-
-
-def draw_table(usage, name, command, draw):
-    """Draws FOLDER/<name>.csv, which `command` writes, into <name>.png beside it.
-
-    FOLDER is the script's only argument; `draw` makes a figure of the table's path.
-    """
-    if len(sys.argv) != 2:
-        sys.exit(usage)
-    table = Path(sys.argv[1]) / f"{name}.csv"
-    if not table.exists():
-        sys.exit(f"no {table}: run `{command}` first")
-    picture = table.with_suffix(".png")
-    figure = draw(table)
-    figure.savefig(picture)
-    plt.close(figure)
-    print(picture)
 
 
 def canvas(size, figure=None):

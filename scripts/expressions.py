@@ -1,59 +1,79 @@
-"""Evaluates the expressions of a scene for pictures: in x, y and t, as the solver reads them."""
+"""The expressions of a scene in x, y and t, as the solver reads them."""
 
-import math
+import ast
 import re
 
 import numpy as np
 
-NAMES = {
-    "pi": math.pi, "sin": math.sin, "cos": math.cos, "tan": math.tan, "sqrt": math.sqrt,
-    "exp": math.exp, "log": math.log, "abs": abs, "min": min, "max": max, "atan2": math.atan2,
-    "if": lambda condition, a, b: a if condition else b,
+NUMPY_FUNCTIONS = {
+    "pi": np.pi, "sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt,
+    "exp": np.exp, "log": np.log, "abs": np.abs,
+    "min": np.minimum, "max": np.maximum, "atan2": np.arctan2,
+    "if_": np.where, "And": np.logical_and, "Or": np.logical_or,
 }
-TOKEN = re.compile(r'(?P<number>(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)|(?P<name>[A-Za-z_]\w*)'
-                   r'|(?P<text>"[^"\\]*")|[-+*/^(),<>=!\s]')
+ALLOWED = (
+    ast.Expression, ast.BinOp, ast.UnaryOp, ast.Call, ast.Name, ast.Load, ast.Constant,
+    ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.USub, ast.UAdd,
+    ast.Compare, ast.Lt, ast.LtE, ast.Gt, ast.GtE,
+)
+
+
+class ExpressionError(Exception):
+    """The text is no expression: said in one line."""
+
+
+class _Functions(ast.NodeTransformer):
+    """Writes `and` and `or` as functions, which fields have."""
+
+    def visit_BoolOp(self, node):
+        self.generic_visit(node)
+        name = ast.Name(type(node.op).__name__, ast.Load())
+        first, *others = node.values
+        for other in others:
+            first = ast.Call(name, [first, other], [])
+        return ast.fix_missing_locations(ast.copy_location(first, node))
+
+
+class Expression:
+    """A formula in x, y, t, evaluated in whatever arithmetic the names are bound to.
+
+    The same text gives values at points (NumPy) and variational forms (UFL). Tables are files in `folder`.
+    """
+
+    def __init__(self, text, folder=None):
+        self.text, self.folder = str(text), folder
+        try:
+            # Python writes ^ as **; its ^ would bind more loosely than +. Its `if` is no function.
+            text = re.sub(r"\bif\s*\(", "if_(", self.text.strip().replace("^", "**"))
+            tree = _Functions().visit(ast.parse(text, mode="eval"))
+            names = {*NUMPY_FUNCTIONS, "x", "y", "t", *(["table"] if folder else [])}
+            for node in ast.walk(tree):
+                if not isinstance(node, ALLOWED):
+                    raise ExpressionError(f"expression '{self.text}': {type(node).__name__} is not allowed")
+                if isinstance(node, ast.Name) and node.id not in names:
+                    raise ExpressionError(f"expression '{self.text}': unknown name '{node.id}'")
+            self._code = compile(tree, self.text, "eval")
+        except (SyntaxError, RecursionError, MemoryError) as error:
+            raise ExpressionError(f"expression '{self.text}': {error}") from None
+
+    def __call__(self, x, y, t, functions=NUMPY_FUNCTIONS):
+        def table(name, argument=t):
+            rows = np.genfromtxt(self.folder / name, delimiter=",")
+            return np.interp(argument, *rows[~np.isnan(rows).any(axis=1)].T)
+
+        return eval(self._code, {"__builtins__": {}}, {**functions, "table": table, "x": x, "y": y, "t": t})
+
+    def at(self, points, t=0.0):
+        """Values at an (n, 2) array of points."""
+        with np.errstate(all="ignore"):
+            values = self(points[:, 0], points[:, 1], t)
+        return np.broadcast_to(np.asarray(values, float), len(points)).copy()
 
 
 def evaluate(expression, points, t, folder):
-    """The values of an expression, or of a number, at points (n, 2), m, and a time t, s; 0 where it
-    is not defined, or is none that pictures know. Tables are in `folder`."""
+    """The values of an expression, or of a number, for pictures; 0 where it is not defined, or is none."""
     try:
-        program = compile(_as_python(str(expression)), "expression", "eval")
-    except (SyntaxError, RecursionError, MemoryError):
+        values = Expression(expression, folder).at(points, t)
+    except (ExpressionError, TypeError, ValueError, ArithmeticError, OSError):
         return np.zeros(len(points))
-    tables = {}
-
-    def table(name, argument=t):
-        if name not in tables:
-            tables[name] = np.genfromtxt(folder / name, delimiter=",")
-        rows = tables[name][~np.isnan(tables[name]).any(axis=1)]
-        return np.interp(argument, *rows.T)
-
-    def value(x, y):
-        names = {**NAMES, "table": table, "x": x, "y": y, "t": t}
-        try:
-            value = float(eval(program, {"__builtins__": {}, "names": names}))
-            return value if math.isfinite(value) else 0.0
-        except (KeyError, TypeError, ValueError, ArithmeticError, OSError):
-            return 0.0
-
-    return np.array([value(x, y) for x, y in points.tolist()])
-
-
-def _as_python(text):
-    """The expression in Python's notation. Every name is looked up in a table: the text can reach
-    nothing else."""
-    python, end = [], 0
-    for token in TOKEN.finditer(text):
-        if token.start() != end:
-            break
-        end = token.end()
-        if token["name"] in ("and", "or"):
-            python.append(f" {token[0]} ")
-        elif token["name"]:
-            python.append(f"names[{token[0]!r}]")
-        else:
-            python.append(repr(float(token[0])) if token["number"] else token[0])
-    if end != len(text):
-        raise SyntaxError(text)
-    return "".join(python).replace("^", "**").strip()
+    return np.where(np.isfinite(values), values, 0.0)

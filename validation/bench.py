@@ -353,6 +353,7 @@ def draw(rows, picture):
         axes.set_xticks(at, [f"contact {contact}\nP{order}, {mesh}\nours: {number(case[OURS][key])} s"
                              for (contact, order, mesh), case in cases.items()], fontsize=7.5)
         axes.set(yscale="log", ylabel="times ours", title=title)
+        axes.set_ylim(top=2 * axes.get_ylim()[1])
         axes.legend(fontsize=8, ncols=3, loc="upper left")
     growing = (("seconds_per_step", 1e3, "ms per step"), ("peak_mb", 1.0, "peak memory, MB"))
     for place, (key, scale, label) in enumerate(growing if grown else ()):

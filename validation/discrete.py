@@ -7,13 +7,17 @@ as a difference.
 """
 
 import re
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import splu
 
-from conditions import as_rows, merged, merged_gaps, pair
-from lagrange import SIDES, Lagrange, derivatives, functions
-from scene import DAMAGE, Expression, displacement_order, elasticity, of_material
+import shared  # noqa: F401
+from elements import derivatives, functions
+from expressions import Expression
+from lagrange import SIDES, Lagrange
+from scene import DAMAGE, displacement_order, elasticity, of_material
 
 # Lines at an angle below the first are one; at one below the second rounding may hide that they are two.
 SAME, ALIKE = 1e-8, 1e-4
@@ -23,6 +27,7 @@ POINTS = {1: np.full((1, 3), 1 / 3), 2: np.full((3, 3), 1 / 6) + 0.5 * np.eye(3)
 SHARES = {1: (1 / 2, 1 / 2), 2: (1 / 6, 1 / 6, 4 / 6)}
 # Parts of an edge in which a traction is integrated.
 PARTS = 256
+CORNER = np.pi / 6  # edges further apart meet in a corner
 
 
 def varies(texts):
@@ -46,7 +51,7 @@ class Discrete:
         self.gradient = np.stack([-side[..., 1], side[..., 0]], -1) / (2 * self.area)[:, None, None]
         # ∇φ of each triangle at the quadrature points: on the straight one, then on its image under
         # the map that moves the middles of sides, X ↦ X + Σ φ_m(X) offset_m, of Jacobian F.
-        local = derivatives(POINTS[self.order], self.order)
+        local = derivatives(POINTS[self.order].T, self.elements.shape[1])
         straight = np.einsum("qnk,ekd->eqnd", local, self.gradient)
         offsets = self.space.offsets(t[:, SIDES].reshape(-1, 2)).reshape(-1, 3, 2)
         jacobian = np.eye(2) + np.einsum(
@@ -101,7 +106,7 @@ class Discrete:
             if self.order == 1:
                 rule = (0.5 - 0.5 * np.eye(3), [self.area / 3] * 3)
             for barycentric, weight in zip(*rule):
-                values = functions(barycentric, self.order)
+                values = functions(barycentric[:, None], self.elements.shape[1])[0]
                 points = np.einsum("n,end->ed", values, x[self.elements])
                 force = pair(self.scene["body"]["force"], points, t) * weight[:, None]
                 for node, value in zip(self.elements.T, values):
@@ -114,7 +119,7 @@ class Discrete:
             parts = PARTS
             for s in ((np.arange(parts)[:, None] + gauss) / parts).ravel():
                 length = np.linalg.norm(self._tangents(edges, s), axis=1)[:, None]
-                values = functions(np.array([1 - s, s]), self.order)
+                values = functions(np.array([[1 - s], [s]]), self.order + 1)[0]
                 points = np.einsum("n,end->ed", values, x[self.space.on(edges)])
                 force = 0.5 / parts * length * pair(boundary["traction"], points, t)
                 for node, value in zip(self.space.on(edges).T, values):
@@ -140,8 +145,8 @@ class Discrete:
             chord = q - p
             turn = np.sign(chord[:, 1] * outward[:, 0] - chord[:, 0] * outward[:, 1])
             for node, normal, part in zip(nodes, turn[:, None] * normals, share * length):
-                parts.setdefault(int(node), []).append((normal, part))
-        return {node: merged(found) for node, found in parts.items()}
+                parts.setdefault(int(node), []).append((normal, part, []))
+        return {node: [face[:2] for face in merged(found)] for node, found in parts.items()}
 
     def _contact_faces(self):
         """(node, normal, length, gaps) of each row: a fixed normal or those of the faces; where
@@ -159,7 +164,7 @@ class Discrete:
                     faces = [(fixed, sum(length for _, length in faces))]
                 rows.setdefault(node, []).extend((n, w, [gap]) for n, w in faces)
         return [(node, n, w, gaps) for node, parts in sorted(rows.items())
-                for n, w, gaps in merged_gaps(parts)]
+                for n, w, gaps in merged(parts, CORNER)]
 
     def contact_rows(self, t):
         """u·ν ≤ g at time t, of several gaps the smallest."""
@@ -254,3 +259,48 @@ class Discrete:
         signs = np.where(np.arange(n) % 2, 1.0, -1.0)
         noise = factor.solve(scale @ (2e-15 * signs * (abs(matrix) @ np.abs(solution))))
         return solution, np.abs(scale @ noise).max()
+
+
+@dataclass
+class Rows:
+    """Conditions d·u = value (or ≤ value), a row each: node, unit direction, value, and of contact
+    rows the tributary length."""
+
+    node: np.ndarray
+    direction: np.ndarray
+    value: np.ndarray
+    weight: np.ndarray
+
+
+def pair(texts, points, t):
+    """Two expressions at points, (n, 2)."""
+    return np.stack([Expression(text).at(points, t) for text in texts], -1)
+
+
+def angle(a, b):
+    """The angle between two directions, exact also where it is small."""
+    return np.arctan2(abs(a[0] * b[1] - a[1] * b[0]), a @ b)
+
+
+def merged(parts, largest=CORNER + 1e-9):
+    """Joins (normal, length, gaps) of edges or curves whose normals are at an angle below the largest: of the gaps the
+    smallest counts."""
+    rows = []
+    for normal, length, gaps in parts:
+        for k, (n, w, others) in enumerate(rows):
+            if angle(n, normal) < largest:
+                mean = w * n + length * normal
+                rows[k] = (mean / np.linalg.norm(mean), w + length, others + gaps)
+                break
+        else:
+            rows.append((normal, length, gaps))
+    return rows
+
+
+def as_rows(found):
+    """Rows from a list of (node, direction, value[, weight])."""
+    if not found:
+        return Rows(np.zeros(0, int), np.zeros((0, 2)), np.zeros(0), np.zeros(0))
+    node, direction, value, *weight = zip(*found)
+    return Rows(np.array(node), np.array(direction, float), np.array(value, float),
+                np.array(weight[0] if weight else np.ones(len(node))))

@@ -34,8 +34,10 @@ from dolfinx.io import XDMFFile
 from mpi4py import MPI
 from petsc4py import PETSc
 
+import shared  # noqa: F401
+from expressions import Expression
 from lagrange import Lagrange
-from scene import DAMAGE, Expression, SceneError, displacement_order, of_material, of_order, read_scene
+from scene import DAMAGE, SceneError, displacement_order, of_material, of_order, read_scene
 from triangulation import edge_keys, read_triangulation
 
 logging.disable(logging.INFO)  # the form compiler reports each of its builds

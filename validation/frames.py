@@ -6,6 +6,9 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 
+import shared  # noqa: F401
+from reading import frames_of
+
 
 @dataclass
 class Frame:
@@ -24,13 +27,13 @@ class Frame:
 def read_frames(space, out):
     """Every frame written, nodes as in the finite element `space` of u; pieces are matched triangle
     by triangle, as slits have two nodes at one point."""
+    size = np.ptp(space.points, axis=0).max()
     place = {key(space.points[t]): t for t in space.elements}
-    collection = out / "fields.pvd"
-    if not collection.exists():
+    if not (out / "fields.pvd").exists():
         return []
     frames = []
-    for entry in ElementTree.parse(collection).iter("DataSet"):
-        pieces = [out / entry.get("file")]
+    for time, path in frames_of(out):
+        pieces = [path]
         if pieces[0].suffix == ".pvtu":
             pieces = [out / p.get("Source") for p in ElementTree.parse(pieces[0]).iter("Piece")]
         values, apart, seen = np.full((len(space.points), 5), np.nan), 0.0, 0
@@ -41,6 +44,8 @@ def read_frames(space, out):
                 nodes = place[key(data.points[cell, :2])]
                 # Both lists in the order of their points.
                 a, b = (order(points) for points in (space.points[nodes], data.points[cell, :2]))
+                if np.abs(space.points[nodes[a]] - data.points[cell[b], :2]).max() > 1e-9 * size:
+                    raise ValueError("a middle of a side is not where the mesh has it")
                 old, new = values[nodes[a]], field[cell[b]]
                 apart = max(apart, np.nanmax(np.abs(old - new), initial=0.0))
                 values[nodes[a]] = new
@@ -49,15 +54,17 @@ def read_frames(space, out):
         u, (zeta, gap, pressure) = values[:, :2].ravel(), values[:, 2:].T
         vertices = zeta[:len(space.mesh.nodes)]
         apart, zeta = max(apart, np.abs(space.spread(vertices) - zeta).max()), vertices
-        frames.append(Frame(float(entry.get("timestep")), u, zeta, gap, pressure, apart))
+        frames.append(Frame(time, u, zeta, gap, pressure, apart))
     return frames
 
 
 def key(points):
-    """A triangle by the coordinates of its nodes."""
-    return tuple(map(tuple, (points[order(points)] + 0.0).tolist()))
+    """A triangle by the coordinates of its vertices."""
+    return tuple(map(tuple, (points[order(points)[:3]] + 0.0).tolist()))
 
 
 def order(points):
-    """Nodes sorted by their coordinates."""
-    return np.lexsort((points[:, 1], points[:, 0]))
+    """The vertices sorted by their coordinates, then the middles of the sides between them."""
+    p = np.lexsort((points[:3, 1], points[:3, 0]))
+    # Side k lies opposite vertex k − 1.
+    return p if len(points) == 3 else np.r_[p, 3 + (p[[2, 0, 1]] + 1) % 3]

@@ -16,7 +16,8 @@ from scipy.optimize import nnls
 
 from discrete import Discrete, varies
 from frames import read_frames
-from scene import Expression, read_scene
+from expressions import Expression
+from scene import read_scene
 from triangulation import read_triangulation
 from variational import Step, along, without
 

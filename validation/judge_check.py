@@ -4,27 +4,28 @@ displacements of order 1 and 2.
 Run: /usr/bin/python3 validation/judge_check.py
 """
 
-import itertools
 import sys
 from dataclasses import replace
 
 import numpy as np
 
+import exact
 import random_bodies as bodies
 from discrete import Discrete
+from exact import layered, square
 from judge import expectation, judge_step, residuals
 from lagrange import SIDES
 from scene import of_order
 from variational import Step, along
 
-SCENE = {"material": {"young": 80.0, "poisson": 0.3}}
+SCENE = {"material": exact.MATERIAL}
 
 
-def square(turn=0.0):
-    """The unit square with its sides, turned."""
-    rng = np.random.default_rng(5)
-    points, node, triangles = bodies.grid(rng, 8, 8, lambda s, t: (s, t))
-    return bodies.finish(rng, (points, triangles, bodies.sides(node)), 1.0, turn)
+def answer_of(problem, order):
+    """The contact step of a problem of exact.py, and its exact answer."""
+    _, mesh, scene, field = problem
+    discrete = Discrete(of_order(scene, order), mesh)
+    return Step(discrete, np.ones(len(mesh.nodes)), 1.0), np.stack(field(*discrete.points.T), 1).ravel()
 
 
 def step_of(mesh, boundary, order=1, t=1.0, **more):
@@ -39,20 +40,16 @@ def wrong(step, u):
 
 
 def pressed(order, gap="0.01"):
-    """A square under pressure 3, supported by a symmetry axis and contact, and its exact answer
-    u_y = −p y/E − g, u_x = νp x/E."""
-    mesh = square()
-    step = step_of(mesh, [{"name": "west", "symmetry": True}, {"name": "south", "gap": gap},
-                          {"name": "north", "traction": ["0", "-3"]}], order)
-    x, y = step.discrete.points.T
-    return step, np.stack((0.3 * 3 / 80 * x, -3 / 80 * y - float(gap)), 1).ravel()
+    """A square under pressure, and its exact answer."""
+    return answer_of(exact.pressed(gap), order)
 
 
-def patch_test(order):
-    """The exact field keeps every condition and is the judge's own answer, also turned."""
-    step, exact = pressed(order)
-    yield "patch test: residuals of the exact field", max(residuals(step, exact)[:2]), 1e-14
-    yield "patch test: own answer", np.abs(step.solve() - exact).max(), 1e-14
+def answers(order):
+    """The exact fields keep every condition and are the judge's own answers; the patch test also turned."""
+    for problem in exact.problems(order):
+        step, field = answer_of(problem, order)
+        yield f"{problem[0]}: residuals of the exact field", max(residuals(step, field)[:2]), 1e-14
+        yield f"{problem[0]}: own answer", np.abs(step.solve() - field).max(), 1e-14
     mesh = square(0.7)
     direction = [repr(float(3 * c)) for c in -mesh.outward_normals("north")[0].mean(0)]
     step = step_of(mesh, [{"name": "west", "symmetry": True}, {"name": "south", "gap": "0"},
@@ -64,45 +61,21 @@ def patch_test(order):
 def planted(order):
     """What is not the answer is called wrong: scaled, lifted, through the obstacle, glued, one node
     off by 1e-5 of the answer, the answer of another gap."""
-    step, exact = pressed(order)
+    step, right = pressed(order)
     x = step.discrete.points
-    one = np.zeros_like(exact)
-    one[2 * int(np.argmin(np.hypot(*(x - 0.5).T)))] = 1e-5 * np.abs(exact).max()
+    one = np.zeros_like(right)
+    one[2 * int(np.argmin(np.hypot(*(x - 0.5).T)))] = 1e-5 * np.abs(right).max()
     up = np.tile([0.0, 1.0], len(x))
-    faults = {"scaled": 1.001 * exact, "lifted": exact + 1e-5 * up, "through": exact - 1e-5 * up,
-              "one node": exact + one, "other gap": pressed(order, "0.02")[1], "zero": 0 * exact}
+    faults = {"scaled": 1.001 * right, "lifted": right + 1e-5 * up, "through": right - 1e-5 * up,
+              "one node": right + one, "other gap": pressed(order, "0.02")[1], "zero": 0 * right}
     for name, u in faults.items():
         yield f"planted: {name}", float(judge_step(step, u, (0, 0))[0].word == "right"), 0.5
-    yield "exact is right", float(judge_step(step, exact, (0, 0))[0].word != "right"), 0.5
+    yield "exact is right", float(judge_step(step, right, (0, 0))[0].word != "right"), 0.5
     # Pulled off its foundation: an answer that sticks to it has tensile contact forces.
     pull = [{"name": "north", "displacement": ["0", "0.1"]}, {"name": "south", "gap": "0"}]
     free = step_of(square(), pull, order)
     glued = step_of(square(), [pull[0], {"name": "south", "displacement": ["free", "0"]}], order)
     yield "glued is wrong", float(judge_step(free, glued.solve(), (0, 0))[0].word != "wrong"), 0.5
-
-
-def quadratic(order):
-    """u = (x² − xy, y²/2), which P2 has, with its body force (see selfcheck.py)."""
-    if order == 1:
-        return
-    boundary = [{"name": name, "displacement": ["x^2 - x*y", "0.5*y^2"]}
-                for name in ("south", "east", "north", "west")]
-    scale = 80 * 16 / 15
-    step = step_of(square(), boundary, order, material={"young": 80.0, "poisson": 0.25},
-                   body={"force": [repr(-2 * scale), repr(-0.375 * scale)]})
-    x, y = step.discrete.points.T
-    exact = np.stack((x**2 - x * y, 0.5 * y**2), 1).ravel()
-    yield "quadratic field", np.abs(step.solve() - exact).max(), 1e-14
-    # Isoparametric elements have all affine fields.
-    mesh = square()
-    x, y = mesh.nodes[mesh.triangles[:, SIDES]].mean(axis=2).transpose(2, 0, 1)
-    moved = np.stack((x + 0.01 * np.sin(7 * x + 3 * y), y + 0.01 * np.cos(5 * x - 6 * y)), -1)
-    for condition in boundary:
-        condition["displacement"] = ["1 + 2*x - 3*y", "x + 0.5*y"]
-    step = step_of(replace(mesh, middles=moved), boundary, order)
-    x, y = step.discrete.points.T
-    exact = np.stack((1 + 2 * x - 3 * y, x + 0.5 * y), 1).ravel()
-    yield "curved sides: affine field", np.abs(step.solve() - exact).max(), 1e-14
 
 
 def tip():
@@ -160,56 +133,36 @@ def loose(mesh, corner, order):
 
 def damage(order):
     """Uniform strain: ζ obeys the scalar Euler recursion; without a source ∫ζ is conserved."""
-    step, exact = pressed(order)
-    law = {"diffusion": 0.5, "lambda_d": 0.1, "lambda_u": 20.0}
+    step, right = pressed(order)
+    law = dict(exact.LAW)
     discrete = Discrete({**step.discrete.scene, "damage": law}, step.discrete.mesh)
     zeta = np.full(len(discrete.mesh.nodes), 0.8)
     squared = (3 / 80) ** 2 * (1 + 0.3**2)
     exact_zeta = 0.8 - 0.1 * (0.1 * 0.2 / 0.8 + 10.0 * squared)
-    found, _ = discrete.damage_step(exact, zeta, 0.1)
+    found, _ = discrete.damage_step(right, zeta, 0.1)
     yield "uniform damage", np.abs(found - exact_zeta).max(), 1e-14
     law["lambda_d"] = law["lambda_u"] = 0.0
     for law["mass"] in ("consistent", "lumped"):
         discrete = Discrete({**step.discrete.scene, "damage": law}, step.discrete.mesh)
         zeta = 0.5 + 0.4 * discrete.mesh.nodes[:, 0] ** 2
         mean = lambda z: (z[discrete.mesh.triangles].mean(1) * discrete.area).sum()
-        lost = mean(discrete.damage_step(0 * exact, zeta, 0.1)[0]) - mean(zeta)
+        lost = mean(discrete.damage_step(0 * right, zeta, 0.1)[0]) - mean(zeta)
         yield f"no source: ∫ζ stays, {law['mass']}", abs(lost), 1e-14
 
 
-def layered():
-    """The unit square of two layers, the upper one a surface `core`."""
-    rng = np.random.default_rng(5)
-    shape = lambda s, t: (s, np.where(abs(t - 0.5) < 0.05, 0.5, t))
-    points, node, triangles = bodies.grid(rng, 8, 8, shape)
-    mesh = bodies.finish(rng, (points, triangles, bodies.sides(node)), 1.0, 0.0)
-    return replace(mesh, surfaces={"core": mesh.nodes[mesh.triangles, 1].mean(1) > 0.5})
-
-
 def materials(order):
-    """Layers in series, ν = 0: u_y = −∫p/E dy. The answers of other materials are wrong, and the damage
-    law counts by surface."""
-    mesh = layered()
-    boundary = [{"name": "west", "symmetry": True}, {"name": "south", "gap": "0"},
-                {"name": "north", "traction": ["0", "-3"]}]
-    pair = lambda low, high: step_of(mesh, boundary, order, material={
-        "young": low, "poisson": 0.0, "core": {"young": high}})
-    step = pair(80.0, 20.0)
-    y = step.discrete.points[:, 1]
-    below = -3 * np.minimum(y, 0.5) / 80 - 3 * np.maximum(y - 0.5, 0.0) / 20
-    exact = np.stack((0 * y, below), 1).ravel()
-    yield "layers: residuals of the exact field", max(residuals(step, exact)[:2]), 1e-14
-    yield "layers: own answer", np.abs(step.solve() - exact).max(), 1e-14
-    yield "planted: layers swapped", 1.0 - wrong(step, pair(20.0, 80.0).solve()), 0.5
-    yield "planted: one material", 1.0 - wrong(step, pair(80.0, 80.0).solve()), 0.5
-    law = {"diffusion": 0.5, "lambda_d": 0.1, "lambda_u": 0.0, "core": {"lambda_d": 0.3}}
+    """The answers of other materials are wrong, and the damage law counts by surface."""
+    step, right = answer_of(exact.layers(), order)
+    for name, other in (("layers swapped", (20.0, 80.0)), ("one material", (80.0, 80.0))):
+        yield f"planted: {name}", 1.0 - wrong(step, answer_of(exact.layers(*other), order)[1]), 0.5
+    law, mesh = {"diffusion": 0.5, "lambda_d": 0.1, "lambda_u": 0.0, "core": {"lambda_d": 0.3}}, layered()
     scene = {**step.discrete.scene, "damage": law}
     zeta = np.full(len(mesh.nodes), 0.8)
-    found, _ = Discrete(scene, mesh).damage_step(0 * exact, zeta, 0.1)
+    found, _ = Discrete(scene, mesh).damage_step(0 * right, zeta, 0.1)
     lost = (step.discrete.area * (0.8 - found)[mesh.triangles].mean(1)).sum()
     yield "the law by surface: ∫ζ", abs(lost - 0.1 * 0.2 * 0.2 / 0.8), 1e-14
     law["core"]["diffusion"] = 5.0
-    other, _ = Discrete(scene, mesh).damage_step(0 * exact, zeta, 0.1)
+    other, _ = Discrete(scene, mesh).damage_step(0 * right, zeta, 0.1)
     yield "planted: κ of another surface", float(np.abs(other - found).max() < 1e-6), 0.5
 
 
@@ -222,10 +175,10 @@ def moving(order):
     yield "planted: the answer of another time", 1.0 - wrong(late, early.solve()), 0.5
     fixed = [{"name": "north", "displacement": ["0", "0"]}, {"name": "south", "gap": "-0.01"}]
     step = step_of(square(), fixed, order, material={"young": 80.0, "poisson": 0.0})
-    exact = np.stack((0 * step.discrete.points[:, 0], 0.01 * (1 - step.discrete.points[:, 1])), 1)
+    right = np.stack((0 * step.discrete.points[:, 0], 0.01 * (1 - step.discrete.points[:, 1])), 1)
     # The symmetry of ν = 0 does not hold u_x at the corners: no shear acts.
-    yield "pressed without a load", np.abs(step.solve() - exact.ravel()).max(), 1e-14
-    yield "planted: at rest in the obstacle", 1.0 - wrong(step, 0 * exact.ravel()), 0.5
+    yield "pressed without a load", np.abs(step.solve() - right.ravel()).max(), 1e-14
+    yield "planted: at rest in the obstacle", 1.0 - wrong(step, 0 * right.ravel()), 0.5
     for low, high, refused in (("-0.001", "-0.001", 1.0), ("-0.001", "0.002", 0.0)):
         # At the clamped end no gap counts but those that the body's rest enters.
         scene = {**SCENE, "boundary": plates(low, high)[1:] + [{"name": "end", "symmetry": True}]}
@@ -257,17 +210,5 @@ def curved(order):
     yield "planted: sides taken as chords", 1.0 - wrong(step, straight.solve()), 0.5
 
 
-def main():
-    failed = 0
-    checks = (patch_test, planted, quadratic, opposite, ranks, damage, materials, moving, curved)
-    for check, order in itertools.product(checks, (1, 2)):
-        for name, error, tolerance in check(order):
-            good = error <= tolerance
-            failed += not good
-            word = "ok" if good else "FAILED"
-            print(f"{name:<42} P{order} {error:9.1e} ≤ {tolerance:.0e}  {word}")
-    return 1 if failed else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(exact.run((answers, planted, opposite, ranks, damage, materials, moving, curved), 48))

@@ -55,26 +55,3 @@ class Lagrange:
         spread[self.elements] = np.hstack(
             [values[self.mesh.triangles], values[self.mesh.triangles[:, SIDES]].mean(axis=2)])
         return spread
-
-
-def functions(barycentric, order):
-    """The functions of an element (triangle or edge) at a point: its barycentric coordinates λ, or
-    for order 2 λ_i (2λ_i − 1) of the corners and 4λ_i λ_j of the middles."""
-    if order == 1:
-        return barycentric
-    corners = len(barycentric)
-    sides = SIDES if corners == 3 else np.array([[0, 1]])
-    middles = 4 * barycentric[sides].prod(axis=1)
-    return np.r_[barycentric * (2 * barycentric - 1), middles]
-
-
-def derivatives(points, order):
-    """∂φ_n/∂λ_k of a triangle's functions at points with coordinates λ: (points, functions, 3)."""
-    if order == 1:
-        return np.broadcast_to(np.eye(3), (len(points), 3, 3))
-    found = np.zeros((len(points), 6, 3))
-    for q, point in enumerate(points):
-        found[q, :3] = np.diag(4 * point - 1)
-        for n, (i, j) in enumerate(SIDES, 3):
-            found[q, n, [i, j]] = 4 * point[[j, i]]
-    return found

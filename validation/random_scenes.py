@@ -3,13 +3,12 @@
 
 Each scene (`random_draw`) is run with a drawn solver on one to three ranks, and its answer judged
 by code that shares nothing with the program (`judge`). Displacements of order 2, curved sides, several
-materials and moving gaps are drawn too (`random_variants`). Writes out/random/scenes.csv; scenes judged wrong or wrongly refused are kept in
+materials and moving gaps are drawn too. Writes out/random/scenes.csv; scenes judged wrong or wrongly refused are kept in
 out/random/failures/ID with what was run, and make the exit code 1. `--again ID` runs a kept one once
 more. (`judge_check` tries the judge itself.)
 """
 
 import argparse
-import csv
 import json
 import os
 import re
@@ -27,21 +26,18 @@ from pathlib import Path
 # The judge's matrices are small: threads would only wait for each other.
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", SCOTCH_PTHREAD_NUMBER="1")
 
+from shared import ROOT  # noqa: E402
 from judge import Verdict, judge  # noqa: E402
 from random_bodies import write_msh  # noqa: E402
-from random_draw import draw  # noqa: E402
-from random_variants import vary  # noqa: E402
-from scene import read_scene, write_scene  # noqa: E402
-from solvers import solvers  # noqa: E402
+from random_draw import draw, vary  # noqa: E402
+from results import write_table  # noqa: E402
+from scene import read_scene, solvers, write_scene  # noqa: E402
 
-ROOT = Path(__file__).resolve().parent.parent
 LIMIT = 120  # seconds a run may take, on a busy machine
 # Ranks that wait for each other leave the cores to others.
 ENVIRONMENT = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
                "OMPI_MCA_mpi_yield_when_idle": "1"}
 BAD = ("wrong", "refused wrongly", "no verdict")
-FIELDS = ("id", "kind", "solver", "ranks", "nodes", "traits", "verdict", "difference", "seconds",
-          "reason")
 
 
 def run(binary, folder, solver, ranks):
@@ -169,10 +165,7 @@ def main():
         for done in as_completed(runs):
             rows.append(done.result())
     rows.sort(key=lambda row: int(row["id"].split("-")[1]))
-    with open(out / "scenes.csv", "w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, FIELDS)
-        writer.writeheader()
-        writer.writerows(rows)
+    write_table(rows, out / "scenes.csv")
     print(summarise(rows))
     return int(any(row["verdict"] in BAD for row in rows))
 

@@ -1,12 +1,9 @@
-"""Scene files: the same TOML the program reads, and its expressions in x, y, t.
-
-Only what a comparison needs is read here; the program itself judges whether a scene
-is well formed.
+"""Scene files: the same TOML the program reads. Only what a comparison needs is read here; the program
+itself checks whether a scene is well formed.
 """
 
-import ast
 import json
-import re
+import subprocess
 import tomllib
 from pathlib import Path
 
@@ -15,64 +12,6 @@ import numpy as np
 
 class SceneError(Exception):
     """Something the user can mend: said in one line, without a traceback."""
-
-
-NUMPY_FUNCTIONS = {
-    "pi": np.pi, "sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt,
-    "exp": np.exp, "log": np.log, "abs": np.abs,
-    "min": np.minimum, "max": np.maximum, "atan2": np.arctan2,
-    "if_": np.where, "And": np.logical_and, "Or": np.logical_or,
-}
-
-_ALLOWED = (
-    ast.Expression, ast.BinOp, ast.UnaryOp, ast.Call, ast.Name, ast.Load, ast.Constant,
-    ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.USub, ast.UAdd,
-    ast.Compare, ast.Lt, ast.LtE, ast.Gt, ast.GtE,
-)
-
-
-class _Functions(ast.NodeTransformer):
-    """Writes `and` and `or` as functions, which fields have."""
-
-    def visit_BoolOp(self, node):
-        self.generic_visit(node)
-        name = ast.Name(type(node.op).__name__, ast.Load())
-        first, *others = node.values
-        for other in others:
-            first = ast.Call(name, [first, other], [])
-        return ast.fix_missing_locations(ast.copy_location(first, node))
-
-
-class Expression:
-    """A formula in x, y, t, evaluated in whatever arithmetic the names are bound to.
-
-    The same text gives nodal values (NumPy) and variational forms (UFL).
-    """
-
-    def __init__(self, text):
-        self.text = str(text)
-        try:
-            # Python writes ^ as **; its ^ would bind more loosely than +. Its `if` is no function.
-            text = re.sub(r"\bif\s*\(", "if_(", self.text.strip().replace("^", "**"))
-            tree = _Functions().visit(ast.parse(text, mode="eval"))
-        except SyntaxError as error:
-            raise SceneError(f"expression '{self.text}': {error.msg}") from None
-        names = set(NUMPY_FUNCTIONS) | {"x", "y", "t"}
-        for node in ast.walk(tree):
-            if not isinstance(node, _ALLOWED):
-                raise SceneError(f"expression '{self.text}': {type(node).__name__} is not allowed")
-            if isinstance(node, ast.Name) and node.id not in names:
-                raise SceneError(f"expression '{self.text}': unknown name '{node.id}'")
-        self._code = compile(tree, self.text, "eval")
-
-    def __call__(self, x, y, t, functions=NUMPY_FUNCTIONS):
-        return eval(self._code, {"__builtins__": {}}, {**functions, "x": x, "y": y, "t": t})
-
-    def at(self, points, t=0.0):
-        """Values at an (n, 2) array of points."""
-        with np.errstate(all="ignore"):
-            values = self(points[:, 0], points[:, 1], t)
-        return np.broadcast_to(np.asarray(values, float), len(points)).copy()
 
 
 def read_scene(path):
@@ -158,3 +97,9 @@ def _is_table(value):
     return isinstance(value, dict) or (
         isinstance(value, list) and bool(value) and isinstance(value[0], dict)
     )
+
+
+def solvers(binary):
+    """The names of the program's contact solvers, the default first."""
+    listing = subprocess.run([str(binary), "solvers"], capture_output=True, text=True, check=True)
+    return [line.split("\t")[0] for line in listing.stdout.splitlines()]

@@ -12,12 +12,7 @@ use signorini::{
     petsc::Session,
     scene::Scene,
 };
-use slope::slope;
 use std::{collections::BTreeMap, fs, path::Path};
-
-// The studies fit orders too.
-#[path = "../../validation/study/src/slope.rs"]
-mod slope;
 
 /// A damage law of which every constant counts.
 pub const DAMAGE_LAW: DamageLaw = DamageLaw {
@@ -200,4 +195,19 @@ pub fn order(sizes: &[f64], errors: &[f64]) -> f64 {
 pub fn same_iterations(solver: &str, a: usize, b: usize) {
     let apart = a.abs_diff(b);
     assert!(apart <= 2 + a.max(b) / 4, "{solver}: {a} and {b} iterations");
+}
+
+/// The slope of y over x by least squares, Σ(x−x̄)(y−ȳ)/Σ(x−x̄)²; not a number of fewer than two
+/// points.
+fn slope(points: impl IntoIterator<Item = (f64, f64)>) -> f64 {
+    let points: Vec<_> = points.into_iter().collect();
+    let mean =
+        |value: fn(&(f64, f64)) -> f64| points.iter().map(value).sum::<f64>() / points.len() as f64;
+    let (x, y) = (mean(|p| p.0), mean(|p| p.1));
+    let (mut xy, mut xx) = (0.0, 0.0);
+    for point in &points {
+        xy += (point.0 - x) * (point.1 - y);
+        xx += (point.0 - x) * (point.0 - x);
+    }
+    xy / xx
 }
