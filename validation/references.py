@@ -26,6 +26,16 @@ Physical Curve("top") = {3}; Physical Curve("left") = {4};
 """
 
 
+def size_fields(sizes):
+    """Lines of a .geo that make triangles as small as the smallest of some expressions of gmsh, m."""
+    first, last = 101, 100 + len(sizes)
+    return [*(f'Field[{k}] = MathEval; Field[{k}].F = "{size}";' for k, size in enumerate(sizes, first)),
+            f"Field[100] = Min; Field[100].FieldsList = {{{first} : {last}}}; Background Field = 100;",
+            *(f"Mesh.MeshSize{option} = 0;" for option in ("ExtendFromBoundary", "FromPoints", "FromCurvature")),
+            # The other algorithms leave triangles without area at such sizes.
+            "Mesh.Algorithm = 1;"]
+
+
 @dataclass
 class Grading:
     """The size of a reference's triangles, m."""
@@ -44,17 +54,7 @@ class Grading:
         r = [f"((x - {x})^2 + (y - {y})^2)" for x, y in self.corners]
         sizes = [f"{self.strength} * {square}^(5 / 12) + 3e-7" for square in r]
         sizes += [str(self.largest), *self.near]
-        first = 101
-        fields = [f'Field[{first + i}] = MathEval; Field[{first + i}].F = "{size}";'
-                  for i, size in enumerate(sizes)]
-        return "\n".join([
-            self.outline or f'Include "{file.resolve()}";', *fields,
-            f"Field[100] = Min; Field[100].FieldsList = {{{first} : {first + len(sizes) - 1}}};",
-            "Background Field = 100;",
-            *(f"Mesh.MeshSize{option} = 0;" for option in
-              ("ExtendFromBoundary", "FromPoints", "FromCurvature")),
-            # The other algorithms leave triangles without area at such sizes.
-            "Mesh.Algorithm = 1;", ""])
+        return "\n".join([self.outline or f'Include "{file.resolve()}";', *size_fields(sizes), ""])
 
 
 LSHAPE = [(2, 4), (6, 4), (8, 4), (0, 0), (2, 0), (0, 6), (8, 6)]
@@ -75,9 +75,10 @@ def kept(binary, folder, scene, geometry, refinements=0, limit=None):
     """The results of a scene on the mesh of a .geo text, refined so often: those in `folder`, if they are of this
     scene and text, else new ones. A run longer than `limit` seconds raises subprocess.TimeoutExpired."""
     results, file, made_of = folder / "results", folder / "reference.toml", folder / "reference.geo"
+    complete = folder / "complete"
     mesh = f"refined{refinements}.msh" if refinements else made_of.name
     scene = {**scene, "mesh": {"file": mesh}}
-    if (results / "summary.json").exists() and read_scene(file) == scene and (
+    if complete.exists() and read_scene(file) == scene and (
             made_of.read_text(encoding="utf-8") == geometry):
         return results
     shutil.rmtree(folder, ignore_errors=True)
@@ -89,6 +90,7 @@ def kept(binary, folder, scene, geometry, refinements=0, limit=None):
         refine(folder / "reference.msh", refinements)
     subprocess.run([binary, "run", file, "--out", results], check=True, timeout=limit,
                    stdout=subprocess.DEVNULL)
+    complete.touch()
     return results
 
 

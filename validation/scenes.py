@@ -7,6 +7,7 @@ elements on a fine mesh that is graded to the body's corners and to the features
 
 from dataclasses import dataclass
 
+from references import size_fields
 from scene import write_scene
 
 SQUARE = {"body": "0,0 base 1,0 right 1,1 top 0,1 left"}
@@ -197,10 +198,7 @@ def fields(scene, points, factor):
         return f"{finest}+0.2*sqrt({squares})"
 
     wanted = [size(f"at {x} {y} {least}") for x, y in corners] + [size(f) for f in scene.fine] + [str(largest)]
-    lines = [f'Field[{k}] = MathEval; Field[{k}].F = "{factor}*({f})";' for k, f in enumerate(wanted, 1)]
-    return [*lines, f"Field[1000] = Min; Field[1000].FieldsList = {{1 : {len(wanted)}}}; Background Field = 1000;",
-            *(f"Mesh.MeshSize{o} = 0;" for o in ("ExtendFromBoundary", "FromPoints", "FromCurvature")),
-            "Mesh.Algorithm = 1;"]
+    return size_fields([f"{factor}*({f})" for f in wanted])
 
 
 def table(scene):

@@ -15,7 +15,6 @@ from matplotlib.tri import Triangulation
 import shared  # noqa: F401
 from elements import derivatives, functions
 from reading import frames_of, read_frame
-from scene import elasticity
 
 # Barycentric points and weights of the rule of degree 4 with six points.
 NEAR, FAR = 0.816847572980459, 0.108103018168070
