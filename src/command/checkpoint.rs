@@ -7,7 +7,8 @@
 use super::{Failure, ranks::agree, task::Task};
 use serde::{Deserialize, Serialize};
 use signorini::{
-    evolution::{Adapted, StepRecord},
+    estimate::Adapted,
+    evolution::StepRecord,
     output::{self, OutputError},
     petsc::Communicator,
 };

@@ -2,7 +2,8 @@
 
 use super::{launch, task::Task};
 use signorini::{
-    evolution::{Adapted, Outcome, StepRecord},
+    estimate::Adapted,
+    evolution::{Outcome, StepRecord},
     output::terminal::{Progress, say, with_bar},
     scene::{Scheme, Stepping, TimeGrid, Units, rounded},
 };

@@ -2,8 +2,12 @@
 
 mod curve;
 mod forces;
+mod parts;
 
-pub(super) use curve::LoadCurve;
+pub(crate) use curve::LoadCurve;
+pub(crate) use parts::{
+    EdgePart, TrianglePart, centroid, edge_parts, triangle_parts, triangle_point,
+};
 
 use super::boundary_conditions::{BoundaryConditions, MovingGap};
 use crate::{

@@ -1,7 +1,8 @@
 //! What the user should know about a problem or an answer that its residuals do not tell.
 
-use super::{Accuracy, DiscreteProblem, Outcome, loads::LoadCurve, unresolved};
+use super::{Accuracy, DiscreteProblem, Outcome, loads::LoadCurve};
 use crate::{
+    estimate::unresolved_notes,
     fem::for_elements,
     mesh::Order,
     model::Plane,
@@ -137,7 +138,7 @@ impl DiscreteProblem {
         }));
         let check_units = |contrast| format!("{contrast}; if that is not meant, check their units");
         notes.extend(self.contrast().map(check_units));
-        notes.extend(unresolved::notes(scene, self.mesh()));
+        notes.extend(unresolved_notes(scene, self.mesh()));
         notes.extend(self.loads.notes(&scene.sample_times(LOOKS)));
         if let Some([start, end]) = LoadCurve::unresolved_step(self) {
             notes.push(format!(

@@ -1,11 +1,10 @@
 //! How a run ended that did not fail.
 
-use super::{
-    Accuracy, Bar, DiscreteProblem, ErrorBudget, Step, StepRecord, damage_step::PlannedStep,
-};
+use super::{Accuracy, DiscreteProblem, Step, StepRecord, damage_step::PlannedStep};
 use crate::{
     archive::{Archive, ArchiveError},
     contact::Kkt,
+    estimate::{Bar, ErrorBudget},
     fem::{Mass, RigidMotion},
 };
 use serde::{Deserialize, Serialize};
@@ -40,7 +39,7 @@ pub struct Outcome {
     /// The error bars of the figures; none where they are not measured.
     pub bars: Vec<Bar>,
     /// What the user should know of contact between the nodes.
-    pub(super) penetration: Option<String>,
+    pub(crate) penetration: Option<String>,
     /// Of each triangle of this rank ‖z − Iz‖²_T / ‖ζ₀ − z‖², with z the last ζ in P2 and I its
     /// interpolation in P1. Empty where the error of the damage is not estimated.
     pub damage_indicators: Vec<f64>,

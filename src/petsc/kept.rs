@@ -9,8 +9,7 @@ use std::{
 /// Its name: `-elastic_pc_type kept`.
 pub(crate) const NAME: &CStr = c"kept";
 /// What -ksp_view prints of it.
-const DESCRIPTION: &CStr =
-    c"Cholesky factor, kept for later matrices";
+const DESCRIPTION: &CStr = c"Cholesky factor, kept for later matrices";
 
 /// What KSP and TAO call as the PC type [`NAME`], during a call of theirs.
 pub(crate) trait KeptPreconditioner {

@@ -36,7 +36,7 @@ pub struct Accuracy {
     /// The time of the step of which `displacement` is, s.
     pub time: f64,
     /// Of the discretisation in the last step, in the energy norm
-    /// ([`RecoveredStrains`](crate::fem::RecoveredStrains)); where that is unloaded, in the step of the
+    /// ([`RecoveredStrains`](crate::estimate::RecoveredStrains)); where that is unloaded, in the step of the
     /// largest displacement.
     pub energy: f64,
 }
@@ -76,8 +76,8 @@ impl Accuracy {
 }
 
 /// The displacements that small forces cause at states of a run, their active nodes fixed.
-pub(in crate::evolution) struct Compliance<'a> {
-    pub(in crate::evolution) problem: &'a DiscreteProblem,
+pub(crate) struct Compliance<'a> {
+    pub(crate) problem: &'a DiscreteProblem,
     /// K, until only its factor is kept.
     stiffness: Option<Stiffness>,
     /// The unknowns that are fixed, and whether the factor is definite with them.
@@ -90,7 +90,7 @@ pub(in crate::evolution) struct Compliance<'a> {
 
 impl<'a> ContactStep<'a> {
     /// With the solver's factor, or one of its own.
-    pub(in crate::evolution) fn into_compliance(self) -> Result<Compliance<'a>, PetscError> {
+    pub(crate) fn into_compliance(self) -> Result<Compliance<'a>, PetscError> {
         let Self { session, problem, stiffness, solver, load, c, .. } = self;
         let mut solver = match solver.into_linear_solver() {
             Some(solver) => solver,
@@ -119,10 +119,7 @@ impl Compliance<'_> {
     /// Estimates the errors of the last answer of a run, and of the one with the largest stationarity
     /// residual before it, relative to the largest displacement; that only if the first error, enlarged by
     /// the ratio of the two residuals, comes near to what is promised. The kept factor is mostly good enough.
-    pub(in crate::evolution) fn accuracy(
-        &mut self,
-        outcome: &Outcome,
-    ) -> Result<Accuracy, PetscError> {
+    pub(crate) fn accuracy(&mut self, outcome: &Outcome) -> Result<Accuracy, PetscError> {
         let problem = self.problem;
         let body = &problem.body;
         let last = &outcome.last;
@@ -172,11 +169,7 @@ impl Compliance<'_> {
     }
 
     /// Takes the nodal damage and the active nodes of a state. Collective.
-    pub(in crate::evolution) fn set(
-        &mut self,
-        zeta: &[f64],
-        contact: &[ContactPoint],
-    ) -> Result<(), PetscError> {
+    pub(crate) fn set(&mut self, zeta: &[f64], contact: &[ContactPoint]) -> Result<(), PetscError> {
         let DiscreteProblem { body, elasticity, constraints, .. } = self.problem;
         let flags = active_bounds(constraints, contact, 0.0);
         let active = constraints.bounds.iter().zip(flags).filter(|(_, active)| *active > 0.0);
@@ -193,7 +186,7 @@ impl Compliance<'_> {
 
     /// Gives back K, which is much of the memory, and keeps a factor of it, if need be that of a state.
     /// Collective.
-    pub(in crate::evolution) fn keep_factor(&mut self, state: &State) -> Result<(), PetscError> {
+    pub(crate) fn keep_factor(&mut self, state: &State) -> Result<(), PetscError> {
         if !self.solver.factor().exists() {
             self.set(&state.zeta, &state.contact)?;
             if let Some(stiffness) = &self.stiffness {
@@ -206,7 +199,7 @@ impl Compliance<'_> {
 
     /// K(ζ)⁻¹ of nodal `forces`, N per metre of thickness, to a digit or more, the active nodes fixed; or
     /// about that, by the factor alone. `None` if these nodes do not support the body. Collective.
-    pub(in crate::evolution) fn displacement(
+    pub(crate) fn displacement(
         &mut self,
         mut forces: Vec<f64>,
     ) -> Result<Option<Vec<f64>>, PetscError> {

@@ -9,19 +9,19 @@ const UNLOADED: f64 = 1e-14;
 
 /// What the contact problem (26) of one time is posed with.
 #[derive(Debug)]
-pub(in crate::evolution) struct LoadCase {
+pub(crate) struct LoadCase {
     /// t, s.
-    pub(in crate::evolution) time: f64,
+    pub(crate) time: f64,
     /// Nodal loads f, N per metre of thickness, and their work on the motions that contact resists.
-    pub(in crate::evolution) load: Vec<f64>,
-    pub(in crate::evolution) work: DVector<f64>,
+    pub(crate) load: Vec<f64>,
+    pub(crate) work: DVector<f64>,
     /// The values of the prescribed rows, m, and the unknowns prescribed by them, 0 elsewhere.
-    pub(in crate::evolution) prescribed: Vec<f64>,
-    pub(in crate::evolution) lift: Vec<f64>,
+    pub(crate) prescribed: Vec<f64>,
+    pub(crate) lift: Vec<f64>,
     /// The bounds on the other unknowns.
-    pub(in crate::evolution) bounds: Vec<Bound>,
+    pub(crate) bounds: Vec<Bound>,
     /// The gaps of all gap rows, m, where any depends on time.
-    pub(in crate::evolution) gaps: Vec<f64>,
+    pub(crate) gaps: Vec<f64>,
 }
 
 impl DiscreteProblem {
@@ -56,7 +56,7 @@ impl DiscreteProblem {
     /// # Errors
     /// The load is not finite or drives an unconstrained rigid motion; prescribed values are not
     /// finite, contradict each other or go through the obstacle; obstacles leave a node no room.
-    pub(in crate::evolution) fn load_case(&self, time: f64) -> Result<LoadCase, SetupError> {
+    pub(crate) fn load_case(&self, time: f64) -> Result<LoadCase, SetupError> {
         let load = self.motions.balanced(&self.body, self.checked_load(time)?);
         let work = self.motions.work(&self.body, |i| [load[2 * i], load[2 * i + 1]]);
         let prescribed = self.loads.prescribed_at(time);

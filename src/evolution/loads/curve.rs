@@ -60,7 +60,7 @@ fn breaks(problem: &DiscreteProblem, end: f64) -> Vec<f64> {
 /// steps.
 ///
 /// Every rank samples those of the whole body, so that all ranks choose the same steps.
-pub(in crate::evolution) struct LoadCurve<'a> {
+pub(crate) struct LoadCurve<'a> {
     problem: &'a DiscreteProblem,
     /// The largest Σ|·| of the forces and of the displacements at any time sampled.
     largest: [f64; 2],
@@ -74,7 +74,7 @@ pub(in crate::evolution) struct LoadCurve<'a> {
 
 impl<'a> LoadCurve<'a> {
     /// Samples the whole run; `None` where nothing depends on time.
-    pub(in crate::evolution) fn new(problem: &'a DiscreteProblem) -> Option<Self> {
+    pub(crate) fn new(problem: &'a DiscreteProblem) -> Option<Self> {
         let end = problem.scene().time?.end;
         problem.loads.depend_on_time().then(|| {
             let breaks = breaks(problem, end);
@@ -90,15 +90,12 @@ impl<'a> LoadCurve<'a> {
     }
 
     /// Saves or loads the largest values so far.
-    pub(in crate::evolution) fn archive(
-        &mut self,
-        archive: &mut Archive,
-    ) -> Result<(), ArchiveError> {
+    pub(crate) fn archive(&mut self, archive: &mut Archive) -> Result<(), ArchiveError> {
         archive.value(&mut self.largest)
     }
 
     /// The breaks between two times.
-    pub(in crate::evolution) fn breaks(&self, start: f64, end: f64) -> &[f64] {
+    pub(crate) fn breaks(&self, start: f64, end: f64) -> &[f64] {
         let apart = APART * self.end;
         let place = |time: f64| self.breaks.partition_point(|other| *other <= time);
         let (first, last) = (place(start + apart), place(end - apart));
@@ -106,14 +103,14 @@ impl<'a> LoadCurve<'a> {
     }
 
     /// Σ|·| of the forces and of the displacements at `time` over the largest ones; 0 where all are 0.
-    pub(in crate::evolution) fn sizes(&self, time: f64) -> [f64; 2] {
+    pub(crate) fn sizes(&self, time: f64) -> [f64; 2] {
         let values = self.problem.loads.sampled_at(time, &self.narrow);
         let size = |kind: usize| sum_abs(values[kind].iter().copied()) / self.largest[kind];
         [size(0), size(1)].map(|size| if size.is_finite() { size } else { 0.0 })
     }
 
     /// Whether loads, prescribed displacements and gaps are nearly linear in time from `start` to `end`.
-    pub(in crate::evolution) fn is_nearly_linear(&mut self, start: f64, end: f64) -> bool {
+    pub(crate) fn is_nearly_linear(&mut self, start: f64, end: f64) -> bool {
         let [first, last] =
             [start, end].map(|time| self.problem.loads.sampled_at(time, &self.narrow));
         let parts = (1..=POINTS).map(|point| point as f64 / (POINTS + 1) as f64);
@@ -132,7 +129,7 @@ impl<'a> LoadCurve<'a> {
 
     /// The first uniform step within which they are not nearly linear, s, of some evenly chosen ones and
     /// those with breaks: what happens there counts only at its ends.
-    pub(in crate::evolution) fn unresolved_step(problem: &'a DiscreteProblem) -> Option<[f64; 2]> {
+    pub(crate) fn unresolved_step(problem: &'a DiscreteProblem) -> Option<[f64; 2]> {
         let grid = problem.scene().time?;
         let Stepping::Uniform { steps } = grid.stepping else { return None };
         let mut curve = Self::new(problem)?;
@@ -153,7 +150,7 @@ impl<'a> LoadCurve<'a> {
 
     /// Whether the sum of all forces, or of all displacements and gaps, swings within a uniform step by more
     /// than [`PASSING`] of the largest: a load that comes and goes between two steps, not one that moves.
-    pub(in crate::evolution) fn pass_within_steps(problem: &'a DiscreteProblem) -> bool {
+    pub(crate) fn pass_within_steps(problem: &'a DiscreteProblem) -> bool {
         let Some(grid) = problem.scene().time else { return false };
         let Stepping::Uniform { steps } = grid.stepping else { return false };
         let Some(mut curve) = Self::new(problem) else { return false };

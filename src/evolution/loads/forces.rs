@@ -1,13 +1,10 @@
 //! Surface loads and body forces, in parts of edges and triangles in which they are resolved.
 
+use super::parts::{
+    EdgePart, Parts, TrianglePart, WHOLE, centroid, edge_parts, triangle_parts, triangle_points,
+};
 use crate::{
-    evolution::{
-        boundary_conditions::Traction,
-        parts::{
-            EdgePart, Parts, TrianglePart, WHOLE, centroid, edge_parts, triangle_parts,
-            triangle_points,
-        },
-    },
+    evolution::boundary_conditions::Traction,
     fem::{Body, Division, Edge, GAUSS, Subdomain, add_body_force, add_traction, parabola},
     scene::{Expression, Scene, SurfaceLoad},
 };

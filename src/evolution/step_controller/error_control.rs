@@ -45,7 +45,7 @@ const HORIZON: f64 = 0.1;
 /// No more damage than this is foreseen: a body that fails does so faster and faster, and early errors grow.
 const FORESEEN: f64 = 0.1;
 /// The part of the tolerance that the steps aim at: errors grow after the steps that make them.
-pub(in crate::evolution) const AIM: f64 = 0.7;
+pub(crate) const AIM: f64 = 0.7;
 /// The error that a step may add is this part of what the steps before have left of that …
 const SHARE: f64 = 0.25;
 /// … but what is left counts as no less than this part of it: it may be gone when less damage is done than

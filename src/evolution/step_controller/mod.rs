@@ -24,7 +24,7 @@ use crate::{
     archive::{Archive, ArchiveError},
     scene::{Scheme, Stepping},
 };
-pub(super) use error_control::AIM;
+pub(crate) use error_control::AIM;
 use error_control::ErrorControl;
 use nalgebra::DVector;
 
@@ -40,7 +40,7 @@ pub(super) enum Verdict {
 
 /// Plans the steps of a run and judges them. What it knows of the accepted steps changes when it
 /// answers [`Verdict::Accept`], and only then.
-pub(super) struct StepController<'a> {
+pub(crate) struct StepController<'a> {
     problem: &'a DiscreteProblem,
     /// Error control of the damage; `None` where steps are uniform.
     chosen: Option<ErrorControl<'a>>,
@@ -67,7 +67,7 @@ pub(super) struct StepController<'a> {
     /// The time since errors have last grown, s.
     not_grown: f64,
     bounds: (f64, f64),
-    pub(super) violation: BoundViolation,
+    pub(crate) violation: BoundViolation,
 }
 
 /// In a smooth evolution with equal steps the increments of the formula are off by ⅓ k³ζ‴, those of
@@ -250,7 +250,7 @@ impl<'a> StepController<'a> {
     }
 
     /// The estimated error of the last accepted ζ over the damage done, where steps are chosen.
-    pub(super) fn damage_error(&self) -> Option<f64> {
+    pub(crate) fn damage_error(&self) -> Option<f64> {
         let chosen = self.chosen.as_ref()?;
         Some(self.step_error().map_or(0.0, |error| chosen.relative(&error)))
     }

@@ -10,7 +10,7 @@ const GROWTH_STEP: f64 = 1.0 / 32.0;
 impl StepController<'_> {
     /// The estimated error of the last accepted ζ from the time steps, at the nodes; `None` before the
     /// first step, or of Euler's before the second, which tells the error of the first.
-    pub(in crate::evolution) fn step_error(&self) -> Option<DVector<f64>> {
+    pub(crate) fn step_error(&self) -> Option<DVector<f64>> {
         Some(&self.error + self.last_error.as_ref()?)
     }
 

@@ -17,9 +17,9 @@ use crate::{
 };
 
 /// An edge, by its index, and where a part of it begins and ends, 0 ≤ s ≤ 1.
-pub(super) type EdgePart = (usize, [f64; 2]);
+pub(crate) type EdgePart = (usize, [f64; 2]);
 /// A triangle, by its index, and the barycentric coordinates of the corners of a part of it.
-pub(super) type TrianglePart = (usize, [[f64; 3]; 3]);
+pub(crate) type TrianglePart = (usize, [[f64; 3]; 3]);
 
 /// What a peak between the points seen may be, of ∫|f|.
 const HIDDEN: f64 = 1e-3;
@@ -29,7 +29,7 @@ const WITHIN: f64 = 1e-7;
 /// A part is bisected so many times at most.
 const DEEPEST: usize = 40;
 /// The parts of one triangle alone.
-pub(super) const WHOLE: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+pub(crate) const WHOLE: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 /// Triangles are sliced where all together miss more than this part of ∫|f|: so many of them at most, each
 /// into so many slices at most.
 const MISSED: f64 = 1e-4;
@@ -54,10 +54,10 @@ impl Seen {
 }
 
 /// Parts in which functions are integrated.
-pub(super) struct Parts<P> {
-    pub(super) parts: Vec<P>,
+pub(crate) struct Parts<P> {
+    pub(crate) parts: Vec<P>,
     /// What may be missed of ∫|f|, at most, over the part that is seen.
-    pub(super) missed: f64,
+    pub(crate) missed: f64,
 }
 
 impl<P> Parts<P> {
@@ -111,7 +111,7 @@ fn bisected<P: Copy>(
 
 /// The parts of edges, parabolas through three points each, in which `f` is integrated by three Gauss points
 /// at time `t` with errors of about `deviation` ∫|f|. What does not depend on the place needs one an edge.
-pub(super) fn edge_parts(
+pub(crate) fn edge_parts(
     lines: &[[[f64; 2]; 3]],
     f: &[Expression],
     t: f64,
@@ -141,7 +141,7 @@ pub(super) fn edge_parts(
 /// The parts of triangles, with the six points of a quadratic triangle each, in which `f` − `zero` is
 /// integrated with errors of about `deviation` ∫|f − zero| at all `times`, and so many more than triangles
 /// at most.
-pub(super) fn triangle_parts(
+pub(crate) fn triangle_parts(
     triangles: &[[[f64; 2]; 6]],
     (f, zero): (&[Expression], f64),
     times: &[f64],
@@ -223,13 +223,13 @@ fn slices(
 }
 
 /// The point of a quadratic triangle of six points at barycentric coordinates, m.
-pub(super) fn triangle_point(points: &[[f64; 2]; 6], at: [f64; 3]) -> [f64; 2] {
+pub(crate) fn triangle_point(points: &[[f64; 2]; 6], at: [f64; 3]) -> [f64; 2] {
     let values = quadratic_values(at);
     [0, 1].map(|k| points.iter().zip(values).map(|(x, value)| value * x[k]).sum())
 }
 
 /// The six points of each triangle of a body, m.
-pub(super) fn triangle_points(body: &Body) -> Vec<[[f64; 2]; 6]> {
+pub(crate) fn triangle_points(body: &Body) -> Vec<[[f64; 2]; 6]> {
     let points = &body.nodes.points;
     match body.elements() {
         Elements::Linear(cells) => {
@@ -246,7 +246,7 @@ pub(super) fn triangle_points(body: &Body) -> Vec<[[f64; 2]; 6]> {
 }
 
 /// The centroid, m, and the area, m², of a part, with straight sides.
-pub(super) fn centroid(
+pub(crate) fn centroid(
     triangles: &[[[f64; 2]; 6]],
     (triangle, corners): &TrianglePart,
 ) -> ([f64; 2], f64) {

@@ -1,10 +1,12 @@
 //! The figures that a run prints, and how far off each of them may be.
 
-use super::{DiscreteProblem, Step, probe::OBSERVED};
-use crate::scene::{Expression, Stepping};
+use crate::{
+    evolution::{DiscreteProblem, OBSERVED, Step},
+    scene::{Expression, Stepping},
+};
 use serde::{Deserialize, Serialize};
 
-/// The figures of a [`StepRecord`](super::StepRecord) that have an error bar.
+/// The figures of a [`StepRecord`](crate::evolution::StepRecord) that have an error bar.
 const OF_RECORD: [&str; 5] = ["work", "displacement_max", "contact_force", "zeta_min", "zeta_mean"];
 /// The groups of the supports' forces and moments, and the first of two for each probe.
 const FORCES: usize = 5;
@@ -97,12 +99,12 @@ impl DiscreteProblem {
     }
 
     /// The names of all figures.
-    pub(super) fn figure_names(&self) -> Vec<String> {
+    pub(crate) fn figure_names(&self) -> Vec<String> {
         self.figures().into_iter().map(|figure| figure.name).collect()
     }
 
     /// The error bars of all figures, from their errors and scales.
-    pub(super) fn bars(&self, errors: &[f64], scales: &[f64]) -> Vec<Bar> {
+    pub(crate) fn bars(&self, errors: &[f64], scales: &[f64]) -> Vec<Bar> {
         let bar =
             |(Figure { name, dimension, .. }, (&bar, &scale))| Bar { name, dimension, bar, scale };
         self.figures().into_iter().zip(errors.iter().zip(scales)).map(bar).collect()
@@ -110,7 +112,7 @@ impl DiscreteProblem {
 
     /// The scale of each figure, from its largest |value| in a run, of a damage from the largest 1 − ζ:
     /// the largest one of its group.
-    pub(super) fn figure_scales(&self, largest: &[f64]) -> Vec<f64> {
+    pub(crate) fn figure_scales(&self, largest: &[f64]) -> Vec<f64> {
         let figures = self.figures();
         let most = |is_like: &dyn Fn(&Figure) -> bool| {
             let like = figures.iter().zip(largest).filter(|(figure, _)| is_like(figure));
@@ -134,7 +136,7 @@ impl DiscreteProblem {
     /// The values of [`Self::quantities`] with zeros in the place of rounding: among forces, moments, and
     /// the components of the displacement or of the stress at a probe. A force at the body's radius of
     /// gyration counts among the moments.
-    pub(super) fn without_rounding(&self, mut values: Vec<f64>) -> Vec<f64> {
+    pub(crate) fn without_rounding(&self, mut values: Vec<f64>) -> Vec<f64> {
         let figures = &self.figures()[OF_RECORD.len()..];
         let most = |group: usize| {
             let alike = figures.iter().zip(&values).filter(|(figure, _)| figure.group == group);
@@ -155,7 +157,7 @@ impl DiscreteProblem {
     }
 
     /// The |values| of all figures, and 1 − ζ of a damage: what their scales come from.
-    pub(super) fn figure_sizes(&self, values: &[f64]) -> Vec<f64> {
+    pub(crate) fn figure_sizes(&self, values: &[f64]) -> Vec<f64> {
         let size = |(figure, value): (&Figure, &f64)| match figure.dimension {
             Dimension::Damage => 1.0 - value,
             _ => value.abs(),
@@ -167,7 +169,7 @@ impl DiscreteProblem {
     /// the time steps may do, where the damage ζ is off by at most `most` at a node and by `mean` in the mean
     /// and therefore u by `displacement` (relative, energy norm): u has no other memory than ζ. The few steps
     /// of a uniform grid may show but half of their error.
-    pub(super) fn add_step_errors(&self, bars: &mut [Bar], of_steps: [f64; 3]) {
+    pub(crate) fn add_step_errors(&self, bars: &mut [Bar], of_steps: [f64; 3]) {
         let grid = self.scene().time.map(|grid| grid.stepping);
         let uniform = matches!(grid, Some(Stepping::Uniform { .. }));
         let [most, mean, displacement] = of_steps.map(|e| if uniform { 2.0 * e } else { e });
@@ -189,7 +191,7 @@ impl DiscreteProblem {
 
 impl Step {
     /// The values of all figures, in the order of [`DiscreteProblem::bars`].
-    pub(super) fn figures(&self) -> Vec<f64> {
+    pub(crate) fn figures(&self) -> Vec<f64> {
         let record = &self.record;
         let of_record = [
             record.work,

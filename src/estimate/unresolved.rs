@@ -1,8 +1,8 @@
 //! Edges and triangles on which initial damage or prescribed displacements vary by more than their values at
 //! the nodes show.
 
-use super::parts::{EdgePart, TrianglePart, edge_parts, triangle_parts, triangle_point};
 use crate::{
+    evolution::{EdgePart, TrianglePart, centroid, edge_parts, triangle_parts, triangle_point},
     fem::{GAUSS, POINTS, midpoint, parabola, part_point},
     mesh::{Curve, Mesh, Order, sorted},
     scene::{Condition, Expression, Scene},
@@ -64,7 +64,7 @@ pub(super) fn unresolved(
 }
 
 /// What the nodes miss of prescribed displacements and of the initial damage, if it is much.
-pub(super) fn notes(scene: &Scene, mesh: &Mesh) -> Vec<String> {
+pub(crate) fn notes(scene: &Scene, mesh: &Mesh) -> Vec<String> {
     let mut notes = Vec::new();
     for boundary in &scene.boundaries {
         let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
@@ -173,7 +173,7 @@ fn missed_damage(scene: &Scene, mesh: &Mesh) -> Option<MissedDamage> {
         let (triangle, corners): TrianglePart = part;
         let points = &triangles[triangle];
         let [a, b, c] = [points[0], points[1], points[2]].map(at);
-        let weight = super::parts::centroid(&triangles, &part).1 / 3.0;
+        let weight = centroid(&triangles, &part).1 / 3.0;
         for point in POINTS.map(|point| part_point(&corners, point)) {
             let value = at(triangle_point(points, point));
             let shown = point[0] * a + point[1] * b + point[2] * c;

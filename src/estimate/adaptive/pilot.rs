@@ -1,9 +1,9 @@
 //! A run with few time steps: how the error of u is spread over the triangles, where the body lies in the
 //! foundation between the nodes, and the figures at the times of its steps.
 
-use super::super::{DiscreteProblem, Outcome, Phases, RunError, State, Step, run, run_unestimated};
 use crate::{
-    fem::RecoveredStrains,
+    estimate::RecoveredStrains,
+    evolution::{DiscreteProblem, Outcome, Phases, RunError, State, Step, run, run_unestimated},
     petsc::{PetscError, Session},
 };
 

@@ -1,6 +1,6 @@
 //! A run at a few times, kept for the estimates at its end.
 
-use super::{State, Step};
+use crate::evolution::{State, Step};
 use serde::{Deserialize, Serialize};
 
 /// So many intervals of time at least and about twice as many at most, if there are so many steps; with
@@ -9,21 +9,21 @@ const INTERVALS: usize = 5;
 
 /// States of a run at a few times, evenly spread over its steps.
 #[derive(Serialize, Deserialize)]
-pub(super) struct Instants {
+pub(crate) struct Instants {
     /// Every so many steps.
     stride: usize,
-    pub(super) states: Vec<State>,
+    pub(crate) states: Vec<State>,
     /// t_n and min ζ_n of all steps.
-    pub(super) falling: Vec<(f64, f64)>,
+    pub(crate) falling: Vec<(f64, f64)>,
 }
 
 impl Instants {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self { stride: 1, states: Vec::new(), falling: Vec::new() }
     }
 
     /// Sees an accepted step.
-    pub(super) fn observe(&mut self, step: &Step) {
+    pub(crate) fn observe(&mut self, step: &Step) {
         self.falling.push((step.state.time, step.record.zeta_min));
         if !step.record.step.is_multiple_of(self.stride) {
             return;
@@ -37,7 +37,7 @@ impl Instants {
     }
 
     /// The last state becomes the last of these.
-    pub(super) fn end(&mut self, last: &State) {
+    pub(crate) fn end(&mut self, last: &State) {
         if let [.., before, end] = &self.states[..]
             && last.time - end.time < 0.5 * (end.time - before.time)
         {
@@ -47,7 +47,7 @@ impl Instants {
     }
 
     /// How long after `time` min ζ of the run falls to `level`, s; `None` where it does not.
-    pub(super) fn delay(&self, time: f64, level: f64) -> Option<f64> {
+    pub(crate) fn delay(&self, time: f64, level: f64) -> Option<f64> {
         let after = self.falling.iter().position(|(_, zeta)| *zeta <= level)?;
         let (t, zeta) = self.falling[after];
         let (t0, zeta0) = self.falling[after.saturating_sub(1)];

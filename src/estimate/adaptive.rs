@@ -12,8 +12,9 @@ mod pilot;
 mod round;
 mod sizes;
 
-use super::{DiscreteProblem, RunError, SetupError, figures::Bar, loads::LoadCurve};
+use super::Bar;
 use crate::{
+    evolution::{DiscreteProblem, LoadCurve, RunError, SetupError},
     interrupt::Signal,
     mesh::{Mesh, MeshError, Refinement},
     petsc::{PetscError, Session},

@@ -1,13 +1,11 @@
 //! A mesh of the rounds: whether it is good enough to be measured, and how the next one is to be refined.
 
 use super::{
-    super::{step_controller::AIM as AIM_OF_STEPS, unresolved::unresolved},
-    Adapted,
-    measurement::Measurement,
-    pilot::Pilot,
+    super::unresolved::unresolved, Adapted, measurement::Measurement, pilot::Pilot,
     sizes::size_ratios,
 };
 use crate::{
+    evolution::AIM as AIM_OF_STEPS,
     mesh::{Mesh, Order, sorted},
     scene::Scene,
 };

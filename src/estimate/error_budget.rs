@@ -1,7 +1,10 @@
 //! The error budget of a run: how large the errors of mesh, time steps and solver are.
 
-use super::{DiscreteProblem, Outcome, State, Stop, mesh_error::DamageError};
-use crate::{fem::RecoveredStrains, petsc::PetscError};
+use super::{RecoveredStrains, damage_error::DamageError};
+use crate::{
+    evolution::{DiscreteProblem, Outcome, State, Stop},
+    petsc::PetscError,
+};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -29,7 +32,7 @@ pub struct ErrorBudget {
     pub can_be_damaged: bool,
     /// The error of ζ from the time steps, at a node and in the mean.
     #[serde(skip)]
-    pub(super) zeta_steps: Option<[f64; 2]>,
+    pub(crate) zeta_steps: Option<[f64; 2]>,
 }
 
 /// Above this the mesh is called the limit.
@@ -129,7 +132,7 @@ fn percent(error: f64) -> String {
 
 impl DiscreteProblem {
     /// The estimated error of u in the energy norm, relative, from the mesh. Collective.
-    pub(super) fn energy_error(&self, zeta: &[f64], u: &[f64]) -> Result<f64, PetscError> {
+    pub(crate) fn energy_error(&self, zeta: &[f64], u: &[f64]) -> Result<f64, PetscError> {
         let recovered = RecoveredStrains::new(&self.body, u)?;
         let zeta = self.zeta_at_points(zeta);
         Ok(recovered.energy_error(&self.elasticity, &zeta, u).relative())

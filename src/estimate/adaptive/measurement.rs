@@ -10,15 +10,13 @@
 //! norm: the relative error of the work of a constant load is η².
 
 use super::{
-    super::{
-        DiscreteProblem,
-        figures::{Bar, Dimension},
-    },
+    super::figures::{Bar, Dimension},
     AdaptError,
     pilot::{INSTANTS, Pilot},
     sizes::areas,
 };
 use crate::{
+    evolution::DiscreteProblem,
     mesh::{Mesh, Order, Refinement},
     petsc::Session,
     scene::Scene,

@@ -1,12 +1,10 @@
 //! Recovered strains: how well a mesh resolves displacements.
 
-use super::{
-    Body, Cells, Elasticity, Triangle,
-    body::for_elements,
-    element::{POINTS, quadratic_values},
-    quadratic::mean_product,
+use super::hierarchical::{coefficients, mass};
+use crate::{
+    fem::{Body, Cells, Elasticity, POINTS, for_elements, quadratic_values},
+    petsc::PetscError,
 };
-use crate::petsc::PetscError;
 use nalgebra::{Matrix6, Matrix6x3, Vector3, Vector6};
 
 /// An estimate of the error of u in the energy norm, ‖v‖² = ∫ ζ Aε(v) : ε(v).
@@ -75,15 +73,16 @@ impl<'a> RecoveredStrains<'a> {
     /// points. Collective.
     pub fn energy_error(&self, elasticity: &Elasticity, zeta: &[f64], u: &[f64]) -> EnergyError {
         let Self { body, per_triangle, .. } = *self;
-        let square = |(t, triangle): (usize, &Triangle)| {
+        let square = |t: usize| {
             let own = per_triangle * t..per_triangle * (t + 1);
             let mean = zeta[own].iter().sum::<f64>() / per_triangle as f64;
-            let difference = self.difference(t);
-            let stress = difference.map(|strain| elasticity.d(body, t) * strain);
-            mean * triangle.area() * mean_product(&difference, &stress, Vector3::dot)
+            // ∫ e_i e_j of the components of e = ε* − ε(u).
+            let difference = self.difference(t).map(|strain| strain.transpose());
+            let difference = coefficients(Matrix6x3::from_rows(&difference));
+            let products = difference.transpose() * mass(&body.triangles[t]) * difference;
+            mean * elasticity.d(body, t).dot(&products)
         };
-        let own = body.triangles.iter().enumerate().take(body.own_triangles);
-        let squares: Vec<f64> = own.map(square).collect();
+        let squares: Vec<f64> = (0..body.own_triangles).map(square).collect();
         let points = per_triangle * body.own_triangles;
         let energy: f64 = elasticity.energies(body, zeta, u).iter().take(points).sum();
         let mut sums = [squares.iter().sum(), energy];
