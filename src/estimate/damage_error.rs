@@ -14,16 +14,16 @@ use super::{
     hierarchical::{affine, coefficients, interpolation_error, laplace, mass, values},
     instants::Instants,
     order_pair::OrderPair,
+    quadratic_system::QuadraticSystem,
 };
 use crate::{
     evolution::{
         Compliance, DamageStep, DiscreteProblem, Outcome, Phases, RunError, State, agreed,
     },
-    fem::DamageSystem,
     model::DamageLaw,
-    petsc::{Operator, PetscError, Session, solve_by_energy},
+    petsc::PetscError,
 };
-use nalgebra::{Matrix6, Vector3, Vector6};
+use nalgebra::{Vector3, Vector6};
 
 /// The estimated error that the mesh makes in the damage.
 pub(super) struct DamageError {
@@ -37,10 +37,6 @@ pub(super) struct DamageError {
     /// at which both still fall; `None` if there is no such instant.
     pub(super) delay: Option<f64>,
 }
-
-/// The part of the energy of a change of e that the iteration may leave, and its largest number of iterations.
-const REST: f64 = 0.01;
-const ITERATIONS: usize = 30;
 
 /// The error that the mesh makes in the last damage. It is `None` without damage, and where the active nodes
 /// of a state alone do not support the body. Collective.
@@ -86,11 +82,11 @@ fn error_at_end(
         let load = damage_step.source(state).load.as_slice().to_vec();
         if let Some((before, load_before, source_before)) = &before {
             let means = load.iter().zip(load_before).map(|(b, before)| 0.5 * (b + before));
-            let rates = error.sampled_rates([before, state], &means.collect::<Vec<_>>())?;
+            let skipped = error.skipped_rates([before, state], means.collect())?;
             let next = error.source(state, &strains);
             let source = next.iter().zip(source_before).map(|(f, before)| 0.5 * (f + before));
             let source: Vec<_> = source.collect();
-            error.advance(damage_step, [before, state], &rates, &source)?;
+            error.advance(damage_step, [before, state], &skipped, &source)?;
         }
         before = Some((state, load, error.source(state, &strains)));
         let minimum = error.minimum(state);
@@ -133,12 +129,12 @@ impl<'a> ZetaError<'a> {
         Ok(Self { problem, laws, diffusions, fine, nodes, node_of_vertex, field })
     }
 
-    /// From one state to the next, with the mean `source` φ* between them and the `rates` ζ′ of the run.
+    /// From one state to the next, with the mean `source` φ* between them and the `skipped` rates.
     fn advance(
         &mut self,
         damage_step: &mut DamageStep,
         [before, state]: [&State; 2],
-        rates: &[f64],
+        skipped: &[f64],
         source: &[Vector6<f64>],
     ) -> Result<(), RunError> {
         let (body, k) = (&self.problem.body, state.time - before.time);
@@ -148,42 +144,45 @@ impl<'a> ZetaError<'a> {
             let vertices = body.mesh.triangles[t];
             let (mass, diffusion) =
                 (mass(triangle), self.diffusions[body.material(t)] * laplace(triangle));
-            let source = coefficients(source[t]) - affine(vertices.map(|i| rates[i]));
-            let zeta = affine(vertices.map(|i| state.zeta[i])) + self.on(t);
-            let of_triangle = k * (mass * source - diffusion * zeta);
+            let [now, before, skipped] =
+                [&state.zeta[..], &before.zeta, skipped].map(|f| affine(vertices.map(|i| f[i])));
+            let source = coefficients(source[t]) - (now - before) / k;
+            let mut of_triangle = mass * (source + skipped) - diffusion * (now + self.on(t));
+            // At the vertices the skipped rates make up for the residual of ζ exactly.
+            let excess = triangle.area() / 3.0 * skipped - mass * skipped;
+            (0..3).for_each(|i| of_triangle[i] += excess[i]);
             let nodes = self.nodes[t].iter().zip(&of_triangle);
-            nodes.for_each(|(&node, of_node)| load[node] += of_node);
+            nodes.for_each(|(&node, of_node)| load[node] += k * of_node);
             matrices.push(mass + k * diffusion);
         }
         let session = damage_step.session;
-        let mut step = Step::new(self, &matrices, damage_step.system(k)?, k);
-        let change = step.solve(session, load)?;
+        let (vertices, linear) = (&self.node_of_vertex, damage_step.system(k)?);
+        let owned = &vertices[..body.vertices.partition.owned()];
+        let mut system =
+            QuadraticSystem::new(&self.fine.body, self.nodes, matrices, owned, (linear, k));
+        let change = system.solve(session, &load)?;
         self.field.iter_mut().zip(change).for_each(|(e, change)| *e += change);
         Ok(())
     }
 
-    /// The rates ζ′ between two states as the sources at these two alone would make them; the run has made
-    /// many steps between them. With their `mean` load b, the change of rate at a vertex is −1 over its
-    /// weight times the residual (M ζ′ + κL ζ_n − b)_i.
-    fn sampled_rates(
+    /// The run has made many steps between two states. Their sources differ from the mean of the sources at
+    /// these two, and make rates that no long step can see: (M ζ′ + κL ζ_n − b)_i over the weight of vertex i,
+    /// with b = `mean` the mean load of the two. Collective.
+    fn skipped_rates(
         &self,
         [before, state]: [&State; 2],
-        mean: &[f64],
+        mean: Vec<f64>,
     ) -> Result<Vec<f64>, PetscError> {
-        let body = &self.problem.body;
-        let k = state.time - before.time;
-        let mut rates: Vec<f64> =
-            state.zeta.iter().zip(&before.zeta).map(|(now, before)| (now - before) / k).collect();
-        let mut residual: Vec<f64> = mean.iter().map(|b| -b).collect();
+        let (body, k) = (&self.problem.body, state.time - before.time);
+        let mut rates: Vec<f64> = mean.into_iter().map(|b| -b).collect();
         for (t, (nodes, triangle)) in body.mesh.triangles.iter().zip(&body.triangles).enumerate() {
-            let [rate, zeta] =
-                [&rates, &state.zeta].map(|field| Vector3::from(nodes.map(|i| field[i])));
+            let [now, before] =
+                [&state.zeta, &before.zeta].map(|field| Vector3::from(nodes.map(|i| field[i])));
             let diffusion = self.diffusions[body.material(t)] * triangle.laplace();
-            let of_triangle = self.problem.mass().of(triangle) * rate + diffusion * zeta;
-            nodes.iter().zip(&of_triangle).for_each(|(&node, of_node)| residual[node] += of_node);
+            let residual = self.problem.mass().of(triangle) * (now - before) / k + diffusion * now;
+            nodes.iter().zip(&residual).for_each(|(&node, of_node)| rates[node] += of_node);
         }
-        let residuals = residual.iter().zip(&body.vertices.weights);
-        rates.iter_mut().zip(residuals).for_each(|(rate, (r, weight))| *rate -= r / weight);
+        rates.iter_mut().zip(&body.vertices.weights).for_each(|(rate, weight)| *rate /= weight);
         body.vertices.partition.update(&mut rates, 1)?;
         Ok(rates)
     }
@@ -240,67 +239,5 @@ impl<'a> ZetaError<'a> {
         indicators.iter_mut().for_each(|square| *square /= sums[1]);
         let (relative, change) = ((sums[0] / sums[1]).sqrt(), self.at_vertices());
         relative.is_finite().then_some(DamageError { relative, change, indicators, delay })
-    }
-}
-
-/// The matrix M + kκL of a step of length k in the hierarchical basis.
-struct Step<'s, 'a> {
-    error: &'s ZetaError<'a>,
-    matrices: &'s [Matrix6<f64>],
-    diagonal: Vec<f64>,
-    /// The system of P1, which preconditions the vertices.
-    system: &'s mut DamageSystem,
-    k: f64,
-}
-
-impl<'s, 'a> Step<'s, 'a> {
-    fn new(
-        error: &'s ZetaError<'a>,
-        matrices: &'s [Matrix6<f64>],
-        system: &'s mut DamageSystem,
-        k: f64,
-    ) -> Self {
-        let mut diagonal = vec![0.0; error.field.len()];
-        for (nodes, matrix) in error.nodes.iter().zip(matrices) {
-            nodes.iter().zip(&matrix.diagonal()).for_each(|(&node, d)| diagonal[node] += d);
-        }
-        Self { error, matrices, diagonal, system, k }
-    }
-
-    /// The field with this load. Collective.
-    fn solve(&mut self, session: &Session, load: Vec<f64>) -> Result<Vec<f64>, PetscError> {
-        let partition = &self.error.fine.body.nodes.partition;
-        let found = solve_by_energy(session, self, &load[..partition.owned()], ITERATIONS)?;
-        partition.field(found.unwrap_or_default(), 1)
-    }
-}
-
-impl Operator for Step<'_, '_> {
-    fn multiply(&mut self, x: &[f64], y: &mut [f64]) -> Result<(), PetscError> {
-        let partition = &self.error.fine.body.nodes.partition;
-        let field = partition.field(x.to_vec(), 1)?;
-        let mut image = vec![0.0; field.len()];
-        for (nodes, matrix) in self.error.nodes.iter().zip(self.matrices) {
-            let of_triangle = matrix * Vector6::from(nodes.map(|node| field[node]));
-            nodes.iter().zip(&of_triangle).for_each(|(&node, value)| image[node] += value);
-        }
-        y.copy_from_slice(&image[..y.len()]);
-        Ok(())
-    }
-
-    /// The bubbles are preconditioned by their diagonal, which is good on any mesh; the vertices by the
-    /// factor of P1.
-    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<(), PetscError> {
-        z.iter_mut().zip(r).zip(&self.diagonal).for_each(|((z, r), diagonal)| *z = r / diagonal);
-        let owned = self.error.problem.body.vertices.partition.owned();
-        let vertices = &self.error.node_of_vertex[..owned];
-        let load: Vec<f64> = vertices.iter().map(|&node| r[node] / self.k).collect();
-        let solved = self.system.correction(&load)?.unwrap_or_default();
-        vertices.iter().zip(solved).for_each(|(&node, change)| z[node] = change);
-        Ok(())
-    }
-
-    fn is_enough(&self, gained: f64, left: f64) -> bool {
-        left <= REST * gained
     }
 }

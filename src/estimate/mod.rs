@@ -23,6 +23,7 @@ mod order_pair;
 mod fine_solve;
 mod fine_strains;
 mod instants;
+mod quadratic_system;
 mod damage_error;
 mod error_budget;
 mod figures;
@@ -41,9 +42,8 @@ use crate::evolution::{Compliance, DamageStep, Outcome, RunError, StepController
 use damage_error::damage_error;
 use nalgebra::DVector;
 
-/// A coarse mesh shows less than half of the delay of the damage: the bar of the time of ζ_* is this many
-/// times the delay.
-const DELAYS: f64 = 3.0;
+/// The bar of the time of ζ_* over the estimated delay of the damage, of which a coarse mesh may not show all.
+const DELAYS: f64 = 2.0;
 
 /// Enters the estimated errors of a run that has ended in its outcome. Collective.
 pub(crate) fn estimate_run(
