@@ -13,13 +13,11 @@ use super::{
     fine_strains::FineStrains,
     hierarchical::{affine, coefficients, interpolation_error, laplace, mass, values},
     instants::Instants,
-    order_pair::OrderPair,
     quadratic_system::QuadraticSystem,
 };
 use crate::{
-    evolution::{
-        Compliance, DamageStep, DiscreteProblem, Outcome, Phases, RunError, State, agreed,
-    },
+    evolution::{DamageStep, DiscreteProblem, Outcome, Phases, RunError, State, agreed},
+    mesh::Order,
     model::DamageLaw,
     petsc::PetscError,
 };
@@ -38,12 +36,11 @@ pub(super) struct DamageError {
     pub(super) delay: Option<f64>,
 }
 
-/// The error that the mesh makes in the last damage. It is `None` without damage, and where the active nodes
-/// of a state alone do not support the body. Collective.
+/// The error that the mesh makes in the last damage. It is `None` without damage, and if the contact problem in
+/// the other order of u has no answer. Collective.
 pub(super) fn damage_error(
     problem: &DiscreteProblem,
     damage_step: &mut DamageStep,
-    compliance: Compliance,
     mut instants: Instants,
     outcome: &Outcome,
 ) -> Option<DamageError> {
@@ -54,7 +51,7 @@ pub(super) fn damage_error(
     instants.end(last);
     let stopped = outcome.stopped.is_some();
     instants.falling.extend(outcome.stopped.map(|stop| (stop.time, problem.threshold())));
-    let error = error_at_end(problem, damage_step, compliance, laws, &instants, stopped);
+    let error = error_at_end(problem, damage_step, laws, &instants, stopped);
     agreed(comm, error).ok().flatten()
 }
 
@@ -62,7 +59,6 @@ pub(super) fn damage_error(
 fn error_at_end(
     problem: &DiscreteProblem,
     damage_step: &mut DamageStep,
-    compliance: Compliance,
     laws: &[DamageLaw],
     instants: &Instants,
     stopped: bool,
@@ -70,15 +66,14 @@ fn error_at_end(
     let [first, .., last] = &instants.states[..] else { return Ok(None) };
     let (session, phases) = (damage_step.session, Phases::default());
     let other = problem.of_other_order(session)?;
-    let pair = OrderPair::new(session, problem, &other, compliance, last, &phases)?;
-    let fine = pair.problems()[1];
+    let fine = if other.body.order() == Order::Quadratic { &other } else { problem };
     let Some(nodes) = fine.body.quadratic_nodes() else { return Ok(None) };
-    let mut strains = FineStrains::new(pair, stopped);
+    let mut strains = FineStrains::new(session, [problem, &other], &phases, stopped)?;
     let mut error = ZetaError::new(problem, laws, fine, nodes, &first.zeta)?;
     let (initial, mut delay) = (error.field.clone(), None);
     let mut before: Option<(&State, Vec<f64>, Vec<Vector6<f64>>)> = None;
     for state in &instants.states {
-        let Some(strains) = strains.squared(state)? else { return Ok(None) };
+        let strains = strains.squared(state)?;
         let load = damage_step.source(state).load.as_slice().to_vec();
         if let Some((before, load_before, source_before)) = &before {
             let means = load.iter().zip(load_before).map(|(b, before)| 0.5 * (b + before));
