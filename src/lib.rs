@@ -49,4 +49,5 @@ pub mod fem;
 pub mod contact;
 pub mod scene;
 pub mod evolution;
+pub mod estimate;
 pub mod output;

@@ -2,7 +2,8 @@
 
 use super::{Failure, screen, task::Task};
 use signorini::{
-    evolution::{self, AdaptError, Adapted, Bar, Outcome, percent},
+    estimate::{self, AdaptError, Adapted, Bar, percent},
+    evolution::Outcome,
     interrupt::{Interrupts, Signal},
     mesh::{Mesh, Order},
     petsc::Session,
@@ -26,7 +27,7 @@ pub(super) fn adapt(
         }
     };
     let _interrupts = Interrupts::defer();
-    let adapt = || evolution::adapted(session, scene, mesh.clone(), solver, accuracy, &mut show);
+    let adapt = || estimate::adapted(session, scene, mesh.clone(), solver, accuracy, &mut show);
     let adapted = made.map_or_else(adapt, Ok);
     let adapted = adapted.map_err(|error| match error {
         AdaptError::Setup(_) => Failure::input(error),
@@ -46,7 +47,7 @@ pub(super) fn measure_bars(
     solver: &str,
 ) -> Result<Vec<Bar>, Failure> {
     let _interrupts = Interrupts::defer();
-    match evolution::measured_bars(session, scene, mesh, solver) {
+    match estimate::measured_bars(session, scene, mesh, solver) {
         Ok(bars) => Ok(bars),
         Err(AdaptError::Setup(error)) => Err(Failure::input(error)),
         Err(error) => match error.signal() {

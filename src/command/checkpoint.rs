@@ -7,7 +7,8 @@
 use super::{Failure, ranks::agree, recorder::Recorded, task::Task};
 use serde::{Deserialize, Serialize};
 use signorini::{
-    evolution::{Adapted, RunState},
+    estimate::Adapted,
+    evolution::RunState,
     output::{self, OutputError},
     petsc::Communicator,
 };

@@ -2,7 +2,8 @@
 
 use super::task::Task;
 use signorini::{
-    evolution::{Adapted, Outcome, StepRecord, percent},
+    estimate::{Adapted, percent},
+    evolution::{Outcome, StepRecord},
     output::terminal::{Progress, say, with_bar},
     scene::{Scheme, Stepping, TimeGrid, Units, rounded},
 };

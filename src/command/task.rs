@@ -1,6 +1,9 @@
 //! What a run works on.
 
-use signorini::evolution::{Adapted, Bar, DiscreteProblem, Phases};
+use signorini::{
+    estimate::{Adapted, Bar},
+    evolution::{DiscreteProblem, Phases},
+};
 use std::{fs::File, path::PathBuf, time::Instant};
 
 /// A run whose input is good.

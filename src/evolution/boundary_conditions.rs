@@ -1,4 +1,4 @@
-//! What a scene asks for on the named parts of the boundary, in terms of the mesh.
+//! The conditions of a scene on the named parts of the boundary, node by node and edge by edge.
 
 use crate::{
     contact::{FixedRow, GapRow, RigidMotions},
@@ -7,9 +7,9 @@ use crate::{
     scene::{Boundary, Condition, Expression, Gap, Scene, SurfaceLoad},
 };
 
-/// A constant gap nearer to zero than this, relative to the size of the body, is zero: nodes on curved
-/// boundaries carry the mesh generator's rounding, differences like `0.3-0.1*3` their own.
-const ROUNDING: f64 = 1e-12;
+/// A constant gap smaller than this fraction of the size of the body is zero. Nodes on curved boundaries carry
+/// the mesh generator's rounding, and differences like `0.3-0.1*3` their own.
+const ZERO_GAP: f64 = 1e-12;
 
 /// The conditions of all boundaries.
 #[derive(Debug, Default)]
@@ -20,7 +20,7 @@ pub(super) struct BoundaryConditions {
     pub(super) prescribed: Vec<Option<([f64; 2], Expression)>>,
     /// The gap conditions u·ν ≤ g of Γ_C, by node, joined where boundaries meet smoothly.
     pub(super) gaps: Vec<GapRow>,
-    /// Of these the ones that depend on time.
+    /// The gaps that depend on time.
     pub(super) moving: Vec<MovingGap>,
     /// The surface loads of Γ_N.
     pub(super) tractions: Vec<Traction>,
@@ -64,7 +64,7 @@ impl BoundaryConditions {
         let mut conditions = Self { normal_errors: vec![0.0; points.len()], ..Self::default() };
         let mut gaps = Vec::new();
         let start = if scene.time.is_some() { 0.0 } else { 1.0 };
-        let rounding = ROUNDING * extent(points);
+        let rounding = ZERO_GAP * extent(points);
         for boundary in &scene.boundaries {
             let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
             let edges = body.edges(&curve.edges);

@@ -14,8 +14,8 @@ mod one_of_many;
 mod rescue;
 
 pub use accuracy::Accuracy;
-pub(super) use accuracy::Compliance;
-pub(super) use certificate::active_bounds;
+pub(crate) use accuracy::Compliance;
+use certificate::active_bounds;
 
 use super::{
     DiscreteProblem, Phases, RunError, State, Step, StepFailure, StepRecord, agreed,

@@ -10,61 +10,61 @@ use serde::{Deserialize, Serialize};
 
 /// A step to be made from t_{n−1} to t_n, with the damage step
 /// (M + kκL) ζ_n = M · `start` + k · `load`.
-pub(super) struct PlannedStep {
-    pub(super) n: usize,
+pub(crate) struct PlannedStep {
+    pub(crate) n: usize,
     /// t_n, s.
-    pub(super) time: f64,
+    pub(crate) time: f64,
     /// k_n = t_n − t_{n−1}, s.
-    pub(super) length: f64,
+    pub(crate) length: f64,
     /// k, s.
-    pub(super) k: f64,
+    pub(crate) k: f64,
     /// ζ_{n−1}, or what stands in its place.
-    pub(super) start: DVector<f64>,
+    pub(crate) start: DVector<f64>,
     /// b_{n−1}, or what stands in its place, m²/s.
-    pub(super) load: DVector<f64>,
+    pub(crate) load: DVector<f64>,
     /// The bounds on ζ_n of [`BoundViolation`].
-    pub(super) bounds: (f64, f64),
+    pub(crate) bounds: (f64, f64),
 }
 
 impl PlannedStep {
     /// The rate of the formula at t_n, (ζ̃_n − `start`) / k, for ζ̃_n = `zeta`.
-    pub(super) fn rate(&self, zeta: &DVector<f64>) -> DVector<f64> {
+    pub(crate) fn rate(&self, zeta: &DVector<f64>) -> DVector<f64> {
         (zeta - &self.start) / self.k
     }
 
     /// The error of a step that has no answer.
-    pub(super) fn failed(&self, source: StepFailure) -> RunError {
+    pub(crate) fn failed(&self, source: StepFailure) -> RunError {
         RunError::Step { step: self.n, time: self.time, source }
     }
 }
 
 /// Solves the damage systems (M + kκL) ζ_n = M ζ_{n−1} + k b_{n−1} of a run.
-pub(super) struct DamageStep<'a> {
-    pub(super) session: &'a Session,
-    pub(super) problem: &'a DiscreteProblem,
-    pub(super) phases: &'a Phases,
+pub(crate) struct DamageStep<'a> {
+    pub(crate) session: &'a Session,
+    pub(crate) problem: &'a DiscreteProblem,
+    pub(crate) phases: &'a Phases,
     /// k and M + kκL, factorised by the first step that needs it.
-    pub(super) system: Option<(f64, DamageSystem)>,
+    pub(crate) system: Option<(f64, DamageSystem)>,
 }
 
 /// The damage source φ(ε(u), ζ) of a state; zero where there is no damage law.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub(super) struct DamageSource {
+pub(crate) struct DamageSource {
     /// b_i = ∫ φ λ_i, m²/s.
-    pub(super) load: DVector<f64>,
+    pub(crate) load: DVector<f64>,
     /// min φ ≤ 0, 1/s.
-    pub(super) min: f64,
+    pub(crate) min: f64,
 }
 
 /// The answer of a damage step.
-pub(super) struct DamageUpdate {
+pub(crate) struct DamageUpdate {
     /// ζ_n at the nodes.
-    pub(super) zeta: DVector<f64>,
+    pub(crate) zeta: DVector<f64>,
     /// min ζ_n and max ζ_n.
-    pub(super) min_max: (f64, f64),
+    pub(crate) min_max: (f64, f64),
     /// The accuracy of ζ_n. `None` where the solve was skipped: a uniform ζ_{n−1} without source
     /// stays exactly as it is.
-    pub(super) certificate: Option<DamageCertificate>,
+    pub(crate) certificate: Option<DamageCertificate>,
 }
 
 /// The largest [`DamageCertificate::balance`] of a step, over the largest |ζ|: far above rounding.
@@ -72,7 +72,7 @@ const LARGEST_BALANCE: f64 = 1e-10;
 
 impl DamageStep<'_> {
     /// The damage source of a state.
-    pub(super) fn source(&self, state: &State) -> DamageSource {
+    pub(crate) fn source(&self, state: &State) -> DamageSource {
         let (problem, body) = (self.problem, &self.problem.body);
         let Some(laws) = problem.damage() else {
             return DamageSource { load: DVector::zeros(state.zeta.len()), min: 0.0 };
@@ -91,7 +91,7 @@ impl DamageStep<'_> {
     ///
     /// # Errors
     /// The system has no finite solution, or was solved too inaccurately.
-    pub(super) fn solve(&mut self, planned: &PlannedStep) -> Result<DamageUpdate, RunError> {
+    pub(crate) fn solve(&mut self, planned: &PlannedStep) -> Result<DamageUpdate, RunError> {
         let (problem, phases) = (self.problem, self.phases);
         let partition = &problem.body.vertices.partition;
         let (start, load) = (planned.start.as_slice(), planned.load.as_slice());
@@ -131,7 +131,7 @@ impl DamageStep<'_> {
     ///
     /// # Errors
     /// The system has no finite solution.
-    pub(super) fn correction(
+    pub(crate) fn correction(
         &mut self,
         planned: &PlannedStep,
         load: DVector<f64>,
@@ -151,7 +151,7 @@ impl DamageStep<'_> {
 
     /// Replaces an error δ = `error` of ζ_{n−1} by what diffusion leaves of it after a planned step of
     /// length k_n, δ + (k_n/k) ((M + kκL)⁻¹ M δ − δ); where that has no answer it stays. Collective.
-    pub(super) fn diffuse(
+    pub(crate) fn diffuse(
         &mut self,
         planned: &PlannedStep,
         error: &mut DVector<f64>,
@@ -176,7 +176,7 @@ impl DamageStep<'_> {
     }
 
     /// The damage system of a step of `k` s, factorised.
-    pub(super) fn system(&mut self, k: f64) -> Result<&mut DamageSystem, PetscError> {
+    pub(crate) fn system(&mut self, k: f64) -> Result<&mut DamageSystem, PetscError> {
         let (session, problem, phases) = (self.session, self.problem, self.phases);
         let system = match self.system.take() {
             Some((factorised, system)) if factorised == k => system,

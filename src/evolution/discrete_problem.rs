@@ -2,7 +2,7 @@
 
 mod load_case;
 
-pub(super) use load_case::LoadCase;
+pub(crate) use load_case::LoadCase;
 
 use super::{
     Loads, RunError, SetupError, State, Supports, agreed,
@@ -121,7 +121,7 @@ impl DiscreteProblem {
     ///
     /// # Errors
     /// At its nodes the scene contradicts itself, or PETSc failed.
-    pub(super) fn of_other_order(&self, session: &Session) -> Result<Self, RunError> {
+    pub(crate) fn of_other_order(&self, session: &Session) -> Result<Self, RunError> {
         let mut scene = self.scene.clone();
         scene.order = match scene.order {
             Order::Linear => Order::Quadratic,
@@ -186,7 +186,7 @@ impl DiscreteProblem {
     }
 
     /// Their values in a state that leaves the nodal forces `unbalanced`, f − Ku. Collective.
-    pub(super) fn quantities_in(&self, state: &State, unbalanced: &[f64]) -> Vec<f64> {
+    pub(crate) fn quantities_in(&self, state: &State, unbalanced: &[f64]) -> Vec<f64> {
         let mut values = self.supports.resultants(&self.body, unbalanced, &state.contact);
         values.extend(self.probes.values(self, state));
         self.body.nodes.partition.comm().sum(&mut values);
@@ -194,7 +194,7 @@ impl DiscreteProblem {
     }
 
     /// η_*(ζ).
-    pub(super) fn truncated(&self, zeta: f64) -> f64 {
+    pub(crate) fn truncated(&self, zeta: f64) -> f64 {
         self.scene.damage.as_ref().map_or(zeta, |damage| damage.law.truncate(zeta))
     }
 

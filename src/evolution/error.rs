@@ -40,21 +40,21 @@ pub enum RunError {
     /// The scene contradicts itself at some time.
     #[error(transparent)]
     Setup(#[from] SetupError),
-    /// Another rank failed where this one did not.
+    /// Another rank failed, but this one did not.
     #[error("another rank failed")]
     OnAnotherRank,
     /// PETSc failed.
     #[error(transparent)]
     Petsc(#[from] PetscError),
-    /// A signal has ended the run behind an accepted step.
+    /// A signal has ended the run after an accepted step.
     #[error("ended by {0}")]
     Interrupted(Signal),
-    /// Whoever was shown an accepted step could not go on (results that cannot be written).
+    /// An observer failed (its results cannot be written).
     #[error(transparent)]
     Observer(Box<dyn std::error::Error + Send + Sync>),
 }
 
-/// What failed in a step, if not contact.
+/// The part of a step that failed, other than contact.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum StepFailure {
     /// The damage system has no finite solution.
@@ -70,13 +70,13 @@ pub enum StepFailure {
          begin with -damage_pc_"
     )]
     DamageResidual(f64),
-    /// Displacements whose energy would overflow.
+    /// The energy of the displacements would overflow.
     #[error(
-        "the largest displacement is {0:.1e}, too large to go on with; look for extreme numbers in \
-         [material] and the loads, and at their units"
+        "the largest displacement is {0:.1e}, which is too large; check the units and look for extreme \
+         numbers in [material] and the loads"
     )]
     TooLarge(f64),
-    /// However short a chosen step is, its error is above the tolerance.
+    /// The error of an adaptive step is above the tolerance, however short the step is.
     #[error(
         "the damage changes too fast for time.tolerance, however short the step; does a load jump \
          there? Set time.step to a number, and leave accuracy out"
@@ -85,8 +85,8 @@ pub enum StepFailure {
 }
 
 impl RunError {
-    /// The contact solve of a step failed. What to try depends on the scene: another solver helps
-    /// where there is contact, shorter steps help after the first solve.
+    /// The contact solve of a step failed. The advice depends on the scene: another solver helps only with
+    /// contact, and shorter steps help only after the first solve.
     pub(super) fn contact(
         problem: &DiscreteProblem,
         step: usize,
@@ -108,7 +108,7 @@ impl RunError {
     }
 }
 
-/// The scene and its mesh do not make a problem: bad input.
+/// The scene and its mesh do not make a problem: the input is wrong.
 #[derive(Debug, thiserror::Error)]
 pub enum SetupError {
     /// The scene does not fit the mesh.

@@ -2,8 +2,12 @@
 
 mod curve;
 mod forces;
+mod parts;
 
-pub(super) use curve::LoadCurve;
+pub(crate) use curve::LoadCurve;
+pub(crate) use parts::{
+    EdgePart, TrianglePart, centroid, edge_parts, triangle_parts, triangle_point,
+};
 
 use super::boundary_conditions::{BoundaryConditions, MovingGap};
 use crate::{
@@ -12,16 +16,16 @@ use crate::{
 };
 use forces::{BodyForce, SurfaceForce};
 
-/// What may be missed of the integral of a load is noted if it is more than this part.
+/// A note is given if more than this fraction of the integral of a load may be missed.
 const NOTED: f64 = 0.05;
 
-/// (f(t), ·)_V and the values of the fixed rows and of the gap rows.
+/// The nodal loads, the values of the fixed rows and the gaps, as functions of time.
 #[derive(Debug)]
 pub struct Loads {
     /// f_B, if it is not zero.
     body_force: Option<BodyForce>,
     surface_forces: Vec<SurfaceForce>,
-    /// Of each fixed row: the point and the component's expression, `None` for a symmetry's 0.
+    /// Per fixed row: the point and the expression of the component; `None` for the 0 of a symmetry axis.
     prescribed: Vec<Option<([f64; 2], Expression)>>,
     /// The gaps of all gap rows at the first solve, m, and those that depend on time.
     gaps: Vec<f64>,
@@ -46,7 +50,7 @@ impl Loads {
         loads
     }
 
-    /// The loads on a rank's subdomain. Values of the fixed rows are needed wherever one is known.
+    /// The loads on the subdomain of a rank. The fixed rows stay whole.
     pub(super) fn restrict(self, subdomain: &Subdomain) -> Self {
         let local = |force: SurfaceForce| force.restrict(subdomain);
         Self {
@@ -62,7 +66,7 @@ impl Loads {
         surface.chain(self.body_force.iter().flat_map(BodyForce::expressions))
     }
 
-    /// What may be missed of the integrals of the body force and of the surface loads, as notes, if it is much.
+    /// Notes on loads of whose integrals a large part may be missed.
     pub(super) fn notes(&self, times: &[f64]) -> Vec<String> {
         let body = self.body_force.iter();
         let body = body.map(|force| ("the body force", "triangles", force.missed));
@@ -83,7 +87,7 @@ impl Loads {
         body.chain(surface).filter(|(.., missed)| *missed > NOTED).map(note).collect()
     }
 
-    /// Whether a load, a prescribed displacement or a gap depends on time.
+    /// Does a load, a prescribed displacement or a gap depend on time?
     pub fn depend_on_time(&self) -> bool {
         let mut prescribed = self.prescribed.iter().flatten().map(|(_, expression)| expression);
         self.constant.is_none()
@@ -91,7 +95,7 @@ impl Loads {
             || prescribed.any(Expression::depends_on_time)
     }
 
-    /// Whether the body force depends on time.
+    /// Does the body force depend on time?
     pub fn body_force_depends_on_time(&self) -> bool {
         let mut body_force = self.body_force.iter().flat_map(BodyForce::expressions);
         body_force.any(Expression::depends_on_time)
@@ -108,7 +112,7 @@ impl Loads {
         self.prescribed.iter().map(|row| row.as_ref().map_or(0.0, value)).collect()
     }
 
-    /// The gaps of all gap rows at time t, m; none where no gap depends on time.
+    /// The gaps of all gap rows at time t, m; empty if no gap depends on time.
     pub fn gaps_at(&self, t: f64) -> Vec<f64> {
         let mut gaps = if self.moving.is_empty() { Vec::new() } else { self.gaps.clone() };
         self.moving.iter().for_each(|gap| gaps[gap.number] = gap.at(t));
@@ -116,13 +120,11 @@ impl Loads {
     }
 
     /// The forces at time t, N per metre of thickness, on each edge under traction and on a sample of
-    /// the triangles, and the prescribed displacements and the changes of gaps, m. On every rank those
-    /// of the whole body: much less work than the nodal loads. Per surface load it must be known whether it
-    /// is narrow.
-    fn sampled_at(&self, t: f64, narrow: &[bool]) -> [Vec<f64>; 2] {
+    /// the triangles, and the prescribed displacements and the changes of gaps, m. Every rank samples the
+    /// whole body, which takes much less work than the nodal loads.
+    fn sampled_at(&self, t: f64) -> [Vec<f64>; 2] {
         let mut forces = Vec::new();
-        let surface_forces = self.surface_forces.iter().zip(narrow);
-        surface_forces.for_each(|(force, narrow)| force.sample(t, *narrow, &mut forces));
+        self.surface_forces.iter().for_each(|force| force.sample(t, &mut forces));
         self.body_force.iter().for_each(|force| force.sample(t, &mut forces));
         let mut displacements = self.prescribed_at(t);
         displacements.extend(self.moving.iter().map(|gap| gap.at(t) - self.gaps[gap.number]));

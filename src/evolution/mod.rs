@@ -23,57 +23,49 @@
 //! [`run`] is this loop; a step controller plans each step and judges it, so that steps may be chosen as
 //! well as uniform.
 
-mod adaptive;
-mod best_strains;
-mod both_orders;
 mod boundary_conditions;
-mod bubbles;
 mod contact_step;
 mod damage_step;
 mod discrete_problem;
 mod error;
-mod error_budget;
 mod extrapolation;
-mod figures;
-mod instants;
 mod loads;
-mod mesh_error;
 mod notes;
 mod observer;
 mod outcome;
-mod parts;
-mod penetration;
 mod probe;
 mod state;
 mod step_controller;
 mod supports;
-mod unresolved;
 
 pub use crate::contact::ContactPoint;
 pub use crate::phases::Phases;
-pub use adaptive::{AdaptError, Adapted, adapted, measured_bars};
+pub(crate) use contact_step::Compliance;
 pub use contact_step::{Accuracy, ContactStep};
+pub(crate) use damage_step::DamageStep;
 pub use discrete_problem::DiscreteProblem;
 pub use error::{RunError, SetupError, StepFailure};
-pub use error_budget::{ErrorBudget, percent};
 pub use extrapolation::Extrapolation;
-pub use figures::Bar;
 pub use loads::Loads;
+pub(crate) use loads::{
+    EdgePart, LoadCurve, TrianglePart, centroid, edge_parts, triangle_parts, triangle_point,
+};
 pub use observer::{Next, Observed, Observer};
 pub use outcome::{BoundViolation, Outcome, Stop};
+pub(crate) use probe::OBSERVED;
 pub use state::{State, Step, StepRecord};
+pub(crate) use step_controller::{AIM, StepController};
 pub use supports::{ContactRow, Supports};
 
-use crate::petsc::{Communicator, Session};
-use contact_step::{Compliance, ContactState};
-use damage_step::DamageStep;
-use instants::Instants;
-use mesh_error::mesh_error;
-use nalgebra::DVector;
+use crate::{
+    estimate::{Instants, estimate_run},
+    petsc::{Communicator, Session},
+};
+use contact_step::ContactState;
 use observer::Shown;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
-use step_controller::{StepController, StepState, Verdict};
+use step_controller::{StepState, Verdict};
 
 /// Solves Problem VP^hk with the contact solver called `solver`; `accepted` sees every accepted
 /// step, n = 0 included.
@@ -106,7 +98,7 @@ pub fn run_from(
     let Run { damage_step, contact_step, controller, mut outcome, instants } =
         all_steps(session, problem, solver, phases, observer, saved)?;
     let compliance = contact_step.into_compliance()?;
-    judge(&mut outcome, &controller, damage_step, compliance, instants)?;
+    estimate_run(&mut outcome, &controller, damage_step, compliance, instants)?;
     Ok(outcome)
 }
 
@@ -114,7 +106,7 @@ pub fn run_from(
 ///
 /// # Errors
 /// See [`run`].
-fn run_unestimated(
+pub(crate) fn run_unestimated(
     session: &Session,
     problem: &DiscreteProblem,
     solver: &str,
@@ -204,14 +196,8 @@ impl Run<'_> {
     fn show(&mut self, observer: &mut dyn Observer) -> Result<(), RunError> {
         self.instants.observe(&self.outcome.last);
         let comm = self.damage_step.problem.body.nodes.partition.comm();
-        let wanted = observer.accept(&self.outcome.last);
-        // One reduction for failures and wishes alike.
-        let most = comm.max(wanted.as_ref().map_or(f64::INFINITY, |next| next.urgency()));
-        wanted.map_err(RunError::Observer)?;
-        if most.is_infinite() {
-            return Err(RunError::OnAnotherRank);
-        }
-        let next = Next::of_urgency(most);
+        let wanted = observer.accept(&self.outcome.last).map_err(RunError::Observer);
+        let next = Next::of_urgency(comm.max(agreed(comm, wanted)?.urgency()));
         if next != Next::Step {
             let kept = self.damage_step.phases.time("checkpoint", || {
                 observer.keep(RunState {
@@ -244,37 +230,11 @@ impl RunState {
     }
 }
 
-/// Estimates the errors of a run that has ended. Collective.
-fn judge(
-    outcome: &mut Outcome,
-    controller: &StepController,
-    mut damage_step: DamageStep,
-    mut compliance: Compliance,
-    instants: Instants,
-) -> Result<(), RunError> {
-    let (problem, phases) = (damage_step.problem, damage_step.phases);
-    outcome.bound_violation = controller.violation();
-    outcome.damage_error = controller.damage_error();
-    outcome.accuracy = phases.time("accuracy", || compliance.accuracy(outcome))?;
-    outcome.penetration = phases.time("accuracy", || {
-        let states = instants.states.iter().chain([&outcome.last.state]);
-        problem.penetration_note(states)
-    });
-    let mesh = phases.time("mesh error", || {
-        mesh_error(problem, &mut damage_step, compliance, instants, outcome)
-    });
-    if let (Some(stop), Some(error)) = (&mut outcome.stopped, &mesh) {
-        stop.from_mesh = error.delay.map(|delay| 3.0 * delay.abs());
-    }
-    outcome.damage_indicators = mesh.as_ref().map_or_else(Vec::new, |mesh| mesh.indicators.clone());
-    let steps = controller.step_error().filter(|_| problem.damage().is_some());
-    outcome.errors =
-        ErrorBudget::new(problem, outcome, mesh, steps.as_ref().map(DVector::as_slice));
-    Ok(())
-}
-
 /// All ranks go on, or none. Collective.
-fn agreed<T, E: Into<RunError>>(comm: Communicator, result: Result<T, E>) -> Result<T, RunError> {
+pub(crate) fn agreed<T, E: Into<RunError>>(
+    comm: Communicator,
+    result: Result<T, E>,
+) -> Result<T, RunError> {
     let failed = comm.any(result.is_err());
     match result {
         Ok(_) if failed => Err(RunError::OnAnotherRank),

@@ -1,9 +1,8 @@
 //! What the user should know about a problem or an answer that its residuals do not tell.
 
-use super::{
-    Accuracy, DiscreteProblem, Outcome, error_budget::percent, loads::LoadCurve, unresolved,
-};
+use super::{Accuracy, DiscreteProblem, Outcome, loads::LoadCurve};
 use crate::{
+    estimate::{percent, unresolved_notes},
     fem::for_elements,
     mesh::Order,
     model::Plane,
@@ -127,9 +126,9 @@ impl DiscreteProblem {
         notes.extend(self.motions.free.iter().map(|motion| {
             format!("nothing prevents or drives {motion}: of all answers the one of least ∫|u|² is given")
         }));
-        let contrast = self.contrast();
-        notes.extend(contrast.map(|it| format!("{it}; if that is not meant, check their units")));
-        notes.extend(unresolved::notes(scene, self.mesh()));
+        let check_units = |contrast| format!("{contrast}; if that is not meant, check their units");
+        notes.extend(self.contrast().map(check_units));
+        notes.extend(unresolved_notes(scene, self.mesh()));
         notes.extend(self.loads.notes(&scene.sample_times(LOOKS)));
         let others = [
             LoadCurve::unresolved_step(self).map(|[start, end]| {

@@ -1,4 +1,4 @@
-//! Whoever is shown the accepted steps of a run, and how the run goes on.
+//! Observers of a run: they see its accepted steps and decide how it goes on.
 
 use super::{RunState, Step};
 use crate::interrupt::{self, Signal};
@@ -6,19 +6,19 @@ use crate::interrupt::{self, Signal};
 /// The answer of an observer: an error ends the run.
 pub type Observed<T = ()> = Result<T, Box<dyn std::error::Error + Send + Sync>>;
 
-/// How a run goes on behind an accepted step.
+/// How a run goes on after an accepted step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Next {
-    /// With the next step.
+    /// The next step follows.
     Step,
-    /// With a checkpoint, then the next step.
+    /// A checkpoint is written, then the next step follows.
     Checkpoint,
-    /// It ends with a checkpoint, because this signal has come.
+    /// This signal has come: a checkpoint is written, and the run ends.
     End(Signal),
 }
 
 impl Next {
-    /// Of what several ranks want the most urgent is done. Signals have numbers above 1.
+    /// Ranks may disagree; the largest urgency decides for all. Signals have numbers above 1.
     pub(super) fn urgency(self) -> f64 {
         match self {
             Self::Step => 0.0,
@@ -36,13 +36,13 @@ impl Next {
     }
 }
 
-/// Is shown the accepted steps of a run on its rank. Every function is called on all ranks. An
-/// observer that only looks has nothing for checkpoints.
+/// Sees the accepted steps of a run on its rank. Every function is called on all ranks. An observer without
+/// output keeps nothing in checkpoints.
 pub trait Observer {
-    /// Sees an accepted step and says how to go on.
+    /// Sees an accepted step and decides how the run goes on.
     ///
     /// # Errors
-    /// The run is to end.
+    /// The observer failed; the run ends.
     fn accept(&mut self, step: &Step) -> Observed<Next>;
 
     /// Keeps a checkpoint.
@@ -54,7 +54,7 @@ pub trait Observer {
     }
 }
 
-/// An observer that only looks; a signal, where these are deferred, ends the run.
+/// An observer without output. A signal ends the run, where signals are deferred.
 pub(super) struct Shown<'a>(pub(super) &'a mut dyn FnMut(&Step) -> Observed);
 
 impl Observer for Shown<'_> {

@@ -1,16 +1,15 @@
-//! How a run ended that did not fail.
+//! The outcome of a run that did not fail.
 
-use super::{
-    Accuracy, Bar, DiscreteProblem, ErrorBudget, Step, StepRecord, damage_step::PlannedStep,
-};
+use super::{Accuracy, DiscreteProblem, Step, StepRecord, damage_step::PlannedStep};
 use crate::{
     contact::Kkt,
+    estimate::{Bar, ErrorBudget},
     fem::{Mass, RigidMotion},
 };
 use serde::{Deserialize, Serialize};
 use std::{mem, rc::Rc};
 
-/// How a run ended that did not fail. A checkpoint leaves out what is known at the end only.
+/// The outcome of a run that did not fail. A checkpoint leaves out what is known at the end only.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Outcome {
     /// The last accepted step.
@@ -22,17 +21,17 @@ pub struct Outcome {
     pub kkt: Kkt,
     /// Accepted steps whose damage solve was skipped, because a uniform ζ had no source.
     pub skipped_damage_solves: usize,
-    /// Steps that were made again, shorter.
+    /// Rejected steps, made again shorter.
     pub undone: usize,
     /// Steps in which the solver that gave the answer left its fast path.
     pub fallbacks: usize,
-    /// Steps in which another solver gave the answer, and which.
+    /// The number of steps in which another solver gave the answer, and its name.
     pub rescued: Option<(usize, String)>,
     /// By how much ζ violated the bounds of its equation.
     #[serde(skip)]
     pub bound_violation: BoundViolation,
-    /// Steps in which the active nodes left a rigid motion unconstrained, the times of the first and of
-    /// the last, s, and what motion it was in the first.
+    /// The number of steps in which the active nodes left a rigid motion unconstrained; the times of the first and
+    /// the last, s; and the motion in the first.
     pub unconstrained: Option<(usize, [f64; 2], RigidMotion)>,
     /// Estimated errors of the answers.
     #[serde(skip)]
@@ -43,14 +42,14 @@ pub struct Outcome {
     /// The error bars of the figures; none where they are not measured.
     #[serde(skip)]
     pub bars: Vec<Bar>,
-    /// What the user should know of contact between the nodes.
+    /// A note on contact between the nodes.
     #[serde(skip)]
-    pub(super) penetration: Option<String>,
-    /// Of each triangle of this rank ‖z − Iz‖²_T / ‖ζ₀ − z‖², with z the last ζ in P2 and I its
-    /// interpolation in P1. Empty where the error of the damage is not estimated.
+    pub(crate) penetration: Option<String>,
+    /// Per triangle of this rank: ‖z − Iz‖²_T / ‖ζ₀ − z‖², with z the last damage in P2 and Iz its interpolation
+    /// in P1. Empty if the error of the damage is not estimated.
     #[serde(skip)]
     pub damage_indicators: Vec<f64>,
-    /// Estimated error of the last ζ over the damage done, where steps are chosen.
+    /// Estimated error of the last ζ over the damage done, for adaptive steps.
     #[serde(skip)]
     pub damage_error: Option<f64>,
     /// The steps of the largest stationarity residual and displacement before the last.
@@ -67,11 +66,12 @@ pub struct Stop {
     pub zeta_min: f64,
     /// The least ζ that the sources so far allow: above ζ_* the stop comes too early.
     pub least_admissible: f64,
-    /// How far off the steps may put the time, s: the last one and twice the estimated delay of all.
+    /// How far off the time may be because of the steps, s: the length of the last one and twice the estimated
+    /// delay of all steps.
     pub uncertainty: f64,
-    /// How far off the mesh may put it, s: three times the estimated delay, of which a coarse mesh shows
-    /// less than half, and if the mesh was adapted no less than the time moved from the mesh before.
-    /// `None` where it is not estimated.
+    /// How far off the time may be because of the mesh, s: twice the estimated delay, as a coarse mesh may show less
+    /// than all of it. After adaptation it is at least the difference from the mesh before. `None` if it
+    /// is not estimated.
     pub from_mesh: Option<f64>,
 }
 
@@ -83,16 +83,16 @@ impl Stop {
 }
 
 impl Outcome {
-    /// Of a run whose first solve, (27), is `first`.
+    /// The outcome of a run after its first solve, (27).
     pub(super) fn new(first: Step) -> Self {
         let mut outcome = Self { last: first, ..Self::default() };
         outcome.count_last();
         outcome
     }
 
-    /// Enters the error bars that the mesh makes, `of_mesh`, and adds what the time steps may do. Where the
-    /// run stopped at ζ_* there are none: another mesh stops at another time. Nor where the steps are too
-    /// few to tell their error.
+    /// Enters the error bars `of_mesh` that the mesh makes, and adds the errors of the time steps. There are no
+    /// bars if the run stopped at ζ_*, because another mesh stops at another time; and none if the steps are too
+    /// few to estimate their error.
     pub fn set_bars(&mut self, problem: &DiscreteProblem, of_mesh: &[Bar]) {
         let unknown = problem.damage().is_some() && self.errors.zeta_steps.is_none();
         if self.stopped.is_some() || unknown {
@@ -156,15 +156,15 @@ pub struct BoundViolation {
     pub k: f64,
 }
 
-/// A violation counts above this, which is far above the error of the linear solver.
-const ROUNDING: f64 = 1e-10;
+/// A violation of ζ counts above this, which is far above the error of the linear solver.
+const COUNTED: f64 = 1e-10;
 
 impl BoundViolation {
     /// Compares min ζ_n and max ζ_n with the bounds of the step, which ends at `time`.
     pub(super) fn observe(&mut self, planned: &PlannedStep, (min, max): (f64, f64), time: f64) {
         let (lower, upper) = planned.bounds;
         let (above, below) = (max - upper, lower - min);
-        if above.max(below) > ROUNDING {
+        if above.max(below) > COUNTED {
             self.above = self.above.max(above);
             self.below = self.below.max(below);
             if self.first.is_none() {
@@ -173,12 +173,11 @@ impl BoundViolation {
         }
     }
 
-    /// What the user should know about the violation, and what cures it, where `slowest` is the least
-    /// κ/h² of the body, 1/s.
+    /// A note on the violation and its cure; `slowest` is the least κ/h² of the body, 1/s.
     pub fn note(&self, mass: Mass, slowest: f64) -> Option<String> {
         let (step, time) = self.first?;
         let sides = [("above", self.above), ("below", self.below)].into_iter();
-        let sides = sides.filter(|(_, by)| *by > ROUNDING);
+        let sides = sides.filter(|(_, by)| *by > COUNTED);
         let sides: Vec<String> = sides.map(|(side, by)| format!("{side} by {by:.1e}")).collect();
         let cure = match mass {
             Mass::Consistent if self.k * slowest < 1.0 => {

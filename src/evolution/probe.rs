@@ -20,7 +20,7 @@ struct Place {
 }
 
 /// What is observed at each probe: displacement, m; damage; stress, Pa.
-pub(super) const OBSERVED: [&str; 7] =
+pub(crate) const OBSERVED: [&str; 7] =
     ["u_x", "u_y", "zeta", "stress_xx", "stress_yy", "stress_xy", "von_mises"];
 
 impl Probes {

@@ -207,16 +207,35 @@ impl Body {
         }
     }
 
-    /// A nodal field of ζ at the nodes of u: at the midpoint of an edge the mean of its ends.
-    pub fn at_nodes(&self, zeta: &[f64]) -> Vec<f64> {
-        let Some(quadratic) = &self.quadratic else { return zeta.to_vec() };
-        let mut values = vec![0.0; self.nodes.points.len()];
-        for (vertices, nodes) in self.mesh.triangles.iter().zip(&quadratic.nodes) {
-            let [p, q, r] = vertices.map(|vertex| zeta[vertex]);
-            let own = [p, q, r, 0.5 * (p + q), 0.5 * (q + r), 0.5 * (r + p)];
-            nodes.iter().zip(own).for_each(|(&node, value)| values[node] = value);
+    /// A field at the vertices, of `block` values each, at the nodes of u: at the midpoint of an edge the
+    /// mean of its ends.
+    pub fn at_nodes(&self, field: &[f64], block: usize) -> Vec<f64> {
+        let Some(nodes) = self.quadratic_nodes() else { return field.to_vec() };
+        let mut values = vec![0.0; block * self.nodes.points.len()];
+        for (vertices, nodes) in self.mesh.triangles.iter().zip(nodes) {
+            for k in 0..block {
+                let [p, q, r] = vertices.map(|vertex| field[block * vertex + k]);
+                let own = [p, q, r, 0.5 * (p + q), 0.5 * (q + r), 0.5 * (r + p)];
+                nodes.iter().zip(own).for_each(|(&node, value)| values[block * node + k] = value);
+            }
         }
         values
+    }
+
+    /// The six nodes of each P2 element; `None` for P1.
+    pub fn quadratic_nodes(&self) -> Option<&[[usize; 6]]> {
+        self.quadratic.as_ref().map(|quadratic| &quadratic.nodes[..])
+    }
+
+    /// The node of u at each vertex.
+    pub fn node_of_vertex(&self) -> Vec<usize> {
+        let vertices = self.mesh.nodes.len();
+        let Some(nodes) = self.quadratic_nodes() else { return (0..vertices).collect() };
+        let mut node_of_vertex = vec![0; vertices];
+        for (vertices, nodes) in self.mesh.triangles.iter().zip(nodes) {
+            vertices.iter().zip(nodes).for_each(|(&vertex, &node)| node_of_vertex[vertex] = node);
+        }
+        node_of_vertex
     }
 
     /// r = √(∫|x − x̄|²/|Ω|), m: a rotation by 1/r moves the body as far as a unit translation.

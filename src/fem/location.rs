@@ -23,7 +23,7 @@ pub struct PointValues {
     pub strain: Vector3<f64>,
 }
 
-/// A point may lie outside its triangle by this part of its height: between a chord and its arc.
+/// A point between a chord and its arc may lie outside its triangle, by this fraction of the height.
 const OUTSIDE: f64 = 0.05;
 /// Corrections of λ in a curved triangle; each squares an error of the size of the curvature.
 const CORRECTIONS: usize = 8;
@@ -32,15 +32,10 @@ impl Location {
     /// The location of `point`, m, in the undivided `body`; `None` if it lies outside.
     pub fn of(point: [f64; 2], body: &Body) -> Option<Self> {
         let least = |l: &[f64; 3]| l.iter().copied().fold(f64::INFINITY, f64::min);
-        let candidates = (0..body.triangles.len()).map(|triangle| Self {
-            triangle,
-            barycentric: barycentric(
-                body,
-                triangle,
-                point,
-                [1.0 / 3.0; 3],
-                centroid(body, triangle),
-            ),
+        let candidates = (0..body.triangles.len()).map(|triangle| {
+            let vertex = body.mesh.nodes[body.mesh.triangles[triangle][0]];
+            let barycentric = barycentric(body, triangle, point, [1.0, 0.0, 0.0], vertex);
+            Self { triangle, barycentric }
         });
         let best = candidates
             .max_by(|a, b| least(&a.barycentric).total_cmp(&least(&b.barycentric)))?
@@ -84,11 +79,6 @@ impl Location {
         let vertices = body.mesh.triangles[t].map(|node| zeta[node]);
         PointValues { u, zeta: vertices.iter().zip(&lambda).map(|(z, l)| z * l).sum(), strain }
     }
-}
-
-fn centroid(body: &Body, t: usize) -> [f64; 2] {
-    let nodes = body.mesh.triangles[t].map(|node| body.mesh.nodes[node]);
-    [0, 1].map(|k| nodes.iter().map(|x| x[k]).sum::<f64>() / 3.0)
 }
 
 /// λ of `point` in the straight triangle `t`, in which λ = `at` has the place `image`.

@@ -7,7 +7,6 @@
 
 mod element;
 mod triangle;
-mod quadratic;
 mod edge;
 mod partition;
 mod body;
@@ -15,7 +14,6 @@ mod subdomain;
 mod nodal_bases;
 mod elasticity;
 mod stiffness;
-mod recovery;
 mod rigid_motion;
 mod damage;
 mod damage_certificate;
@@ -33,11 +31,6 @@ pub use loads::{Division, add_body_force, add_traction, midpoint, part_point};
 pub use location::{Location, PointValues};
 pub use nodal_bases::NodalBases;
 pub use partition::Partition;
-pub use quadratic::{
-    affine_diffusion, bubble_diffusion, bubble_flux, bubble_load, bubble_mass, bulged,
-    diffusion_load, interpolation_error, mean_product, missing_mass, quadratic_load,
-};
-pub use recovery::{EnergyError, RecoveredStrains, strains_at_nodes};
 pub use rigid_motion::{RigidMotion, resultant};
 pub use stiffness::Stiffness;
 pub use subdomain::Subdomain;

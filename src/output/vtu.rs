@@ -176,7 +176,7 @@ fn point_data(problem: &DiscreteProblem, state: &State) -> Result<Vec<DataArray>
     let displacement = state.u.chunks_exact(2).flat_map(|u| [u[0], u[1], 0.0]);
     let mut arrays = vec![
         DataArray::new("displacement", REAL, 3, displacement),
-        DataArray::new("zeta", REAL, 1, problem.body.at_nodes(&state.zeta).into_iter()),
+        DataArray::new("zeta", REAL, 1, problem.body.at_nodes(&state.zeta, 1).into_iter()),
         DataArray::new("normal_pressure", REAL, 1, pressure.into_iter()),
         DataArray::new("gap", REAL, 1, gap.into_iter()),
     ];

@@ -3,7 +3,8 @@
 use crate::support::{run, square};
 use signorini::{
     contact::SOLVERS,
-    evolution::{self, Adapted, DiscreteProblem},
+    estimate::{self, Adapted},
+    evolution::DiscreteProblem,
     mesh::Mesh,
     petsc::Session,
     scene::Scene,
@@ -48,7 +49,7 @@ fn adapted(accuracy: f64) -> Adapted {
     let mut triangles = 0;
     let mut seen = |mesh: &Adapted| triangles = mesh.mesh.triangles.len();
     let found =
-        evolution::adapted(&session, &scene(accuracy), mesh(2), SOLVERS[0], accuracy, &mut seen);
+        estimate::adapted(&session, &scene(accuracy), mesh(2), SOLVERS[0], accuracy, &mut seen);
     let found = found.unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(triangles, found.mesh.triangles.len(), "the last mesh shown is the answer");
     found
@@ -84,7 +85,7 @@ fn a_load_narrower_than_the_first_triangles_is_found() {
     let (width, accuracy) = (0.004, 0.1);
     let scene = loaded(accuracy, &format!("-exp(-((x - 0.31)/{width})^2)"));
     let session = Session::start(&[]).unwrap();
-    let found = evolution::adapted(&session, &scene, mesh(2), SOLVERS[0], accuracy, &mut |_| {});
+    let found = estimate::adapted(&session, &scene, mesh(2), SOLVERS[0], accuracy, &mut |_| {});
     let mesh = found.unwrap_or_else(|error| panic!("{error}")).mesh;
     drop(session);
     let problem = DiscreteProblem::new(scene, mesh).unwrap_or_else(|error| panic!("{error}"));
@@ -110,7 +111,7 @@ fn a_slender_body_reaches_every_accuracy_in_few_rounds() {
             Scene::parse(&text, Path::new("law.toml"), &[]).unwrap_or_else(|e| panic!("{e}"));
         let session = Session::start(&[]).unwrap();
         let strip = Mesh::rectangle(50.0, 1.0, 4, 1);
-        let found = evolution::adapted(&session, &scene, strip, SOLVERS[0], accuracy, &mut |_| {});
+        let found = estimate::adapted(&session, &scene, strip, SOLVERS[0], accuracy, &mut |_| {});
         let Adapted { mesh, rounds, error, short, .. } = found.unwrap_or_else(|e| panic!("{e}"));
         println!("{accuracy}: {error:.5}, {} triangles, mesh {rounds}", mesh.triangles.len());
         assert!(short.is_none() && error <= accuracy && rounds <= 10, "{short:?}, mesh {rounds}");

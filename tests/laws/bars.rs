@@ -3,7 +3,8 @@
 use crate::support::{run, square};
 use signorini::{
     contact::SOLVERS,
-    evolution::{self, Adapted, Bar, DiscreteProblem, Outcome},
+    estimate::{self, Adapted, Bar},
+    evolution::{DiscreteProblem, Outcome},
     mesh::Mesh,
     petsc::Session,
     scene::Scene,
@@ -36,7 +37,7 @@ fn solved(scene: Scene, mesh: Mesh) -> Outcome {
 
 fn adapted(scene: &Scene, mesh: Mesh, accuracy: f64) -> Adapted {
     let session = Session::start(&[]).unwrap();
-    let found = evolution::adapted(&session, scene, mesh, SOLVERS[0], accuracy, &mut |_| {});
+    let found = estimate::adapted(&session, scene, mesh, SOLVERS[0], accuracy, &mut |_| {});
     found.unwrap_or_else(|error| panic!("{error}"))
 }
 
@@ -61,7 +62,7 @@ fn a_figure_on_a_given_mesh_is_off_by_no_more_than_its_bar_which_is_no_idle_one(
         for n in [4, 8, 16] {
             let found = figures(&solved(scene.clone(), square(n)));
             let session = Session::start(&[]).unwrap();
-            let bars = evolution::measured_bars(&session, &scene, &square(n), SOLVERS[0]);
+            let bars = estimate::measured_bars(&session, &scene, &square(n), SOLVERS[0]);
             let bars = bars.unwrap_or_else(|error| panic!("{error}"));
             let names = ["work", "displacement_max", "contact_force"];
             for ((name, found), exact) in names.iter().zip(found).zip(exact) {
@@ -103,7 +104,7 @@ fn a_figure_asked_for_alone_takes_a_smaller_mesh() {
 
     let session = Session::start(&[]).unwrap();
     let wrong = block(2, "accuracy = 3e-3\naccuracy_of = ['force']", "0", "-5");
-    let found = evolution::adapted(&session, &wrong, square(2), SOLVERS[0], 3e-3, &mut |_| {});
+    let found = estimate::adapted(&session, &wrong, square(2), SOLVERS[0], 3e-3, &mut |_| {});
     let message = found.err().map_or_else(String::new, |error| error.to_string());
     assert!(message.contains("`force`") && message.contains("contact_force"), "{message}");
 }

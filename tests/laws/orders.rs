@@ -4,8 +4,9 @@ use crate::support::{distorted, order, problem, run, unstructured};
 use nalgebra::Vector3;
 use signorini::{
     contact::SOLVERS,
+    estimate::RecoveredStrains,
     evolution::DiscreteProblem,
-    fem::{Elements, RecoveredStrains},
+    fem::Elements,
     mesh::{Mesh, twice_area},
 };
 use std::fmt::Write;

@@ -3,7 +3,8 @@
 use crate::support::{order, run, square};
 use signorini::{
     contact::SOLVERS,
-    evolution::{self, DiscreteProblem},
+    estimate,
+    evolution::DiscreteProblem,
     mesh::Mesh,
     petsc::Session,
     scene::{Expression, Scene},
@@ -107,7 +108,7 @@ fn the_pressure_under_a_punch_comes_at_the_rate_of_smooth_solutions() {
     for accuracy in [0.03, 0.01, 3e-3, 1e-3] {
         let session = Session::start(&[]).unwrap();
         let found =
-            evolution::adapted(&session, &exact.scene(), mesh(), SOLVERS[0], accuracy, &mut |_| {});
+            estimate::adapted(&session, &exact.scene(), mesh(), SOLVERS[0], accuracy, &mut |_| {});
         let mesh = found.unwrap_or_else(|error| panic!("{error}")).mesh;
         drop(session);
         let problem = DiscreteProblem::new(exact.scene(), mesh).unwrap();

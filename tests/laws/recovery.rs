@@ -3,7 +3,8 @@
 use crate::support::{ORDERS, distorted, problem, run, square, unstructured};
 use signorini::{
     contact::SOLVERS,
-    fem::{Body, Elasticity, RecoveredStrains, strains_at_nodes},
+    estimate::{RecoveredStrains, strains_at_nodes},
+    fem::{Body, Elasticity},
     mesh::{Mesh, Order},
     model::{Material, Plane},
 };

@@ -120,8 +120,8 @@ fn the_whole_bridge_is_symmetric_and_twice_its_half() {
         for solver in SOLVERS {
             let full = run(&whole, solver).last;
             let part = run(&half, solver).last;
-            let full_zeta = whole.body.at_nodes(&full.state.zeta);
-            let part_zeta = half.body.at_nodes(&part.state.zeta);
+            let full_zeta = whole.body.at_nodes(&full.state.zeta, 1);
+            let part_zeta = half.body.at_nodes(&part.state.zeta, 1);
             let size = largest(&full.state.u);
             let nodes = &whole.body.nodes.points;
             for (i, [x, y]) in nodes.iter().enumerate() {

@@ -4,29 +4,29 @@ use super::DiscreteProblem;
 use crate::{contact::Bound, evolution::SetupError};
 use nalgebra::DVector;
 
-/// A load below this part of the largest is rounding.
-const UNLOADED: f64 = 1e-14;
+/// A load below this fraction of the largest load of the run is rounding.
+const ZERO_LOAD: f64 = 1e-14;
 
-/// What the contact problem (26) of one time is posed with.
+/// The data of the contact problem (26) at one time.
 #[derive(Debug)]
-pub(in crate::evolution) struct LoadCase {
+pub(crate) struct LoadCase {
     /// t, s.
-    pub(in crate::evolution) time: f64,
+    pub(crate) time: f64,
     /// Nodal loads f, N per metre of thickness, and their work on the motions that contact resists.
-    pub(in crate::evolution) load: Vec<f64>,
-    pub(in crate::evolution) work: DVector<f64>,
+    pub(crate) load: Vec<f64>,
+    pub(crate) work: DVector<f64>,
     /// The values of the prescribed rows, m, and the unknowns prescribed by them, 0 elsewhere.
-    pub(in crate::evolution) prescribed: Vec<f64>,
-    pub(in crate::evolution) lift: Vec<f64>,
+    pub(crate) prescribed: Vec<f64>,
+    pub(crate) lift: Vec<f64>,
     /// The bounds on the other unknowns.
-    pub(in crate::evolution) bounds: Vec<Bound>,
+    pub(crate) bounds: Vec<Bound>,
     /// The gaps of all gap rows, m, where any depends on time.
-    pub(in crate::evolution) gaps: Vec<f64>,
+    pub(crate) gaps: Vec<f64>,
 }
 
 impl DiscreteProblem {
-    /// Checks what depends on time, where times are known beforehand
-    /// ([`sample_times`](crate::scene::Scene::sample_times)), so that bad input is refused before anything is written.
+    /// Checks the data that depend on time, at times known beforehand
+    /// ([`sample_times`](crate::scene::Scene::sample_times)). Bad input is then refused before any output.
     pub(super) fn check_times(&self) -> Result<(), SetupError> {
         // A body force is as much work as the loads of a step.
         let most = if self.loads.body_force_depends_on_time() { 100 } else { 1000 };
@@ -45,18 +45,18 @@ impl DiscreteProblem {
     /// (sin(pi) = 1.2e-16) counts as zero.
     pub fn load(&self, time: f64) -> Vec<f64> {
         let mut load = self.loads.at(&self.body, time);
-        if self.body.nodes.partition.norm(&load, 2) <= UNLOADED * self.largest_load {
+        if self.body.nodes.partition.norm(&load, 2) <= ZERO_LOAD * self.largest_load {
             load.fill(0.0);
         }
         load
     }
 
-    /// What (26) is posed with at `time`.
+    /// The data of (26) at `time`.
     ///
     /// # Errors
     /// The load is not finite or drives an unconstrained rigid motion; prescribed values are not
     /// finite, contradict each other or go through the obstacle; obstacles leave a node no room.
-    pub(in crate::evolution) fn load_case(&self, time: f64) -> Result<LoadCase, SetupError> {
+    pub(crate) fn load_case(&self, time: f64) -> Result<LoadCase, SetupError> {
         let load = self.motions.balanced(&self.body, self.checked_load(time)?);
         let work = self.motions.work(&self.body, |i| [load[2 * i], load[2 * i + 1]]);
         let prescribed = self.loads.prescribed_at(time);
@@ -77,7 +77,7 @@ impl DiscreteProblem {
         Ok(load)
     }
 
-    /// Which value is not finite at `time`, as far as this rank knows.
+    /// The error that a value is not finite at `time`; it says which one, if this rank knows.
     fn not_finite(&self, time: f64) -> SetupError {
         match self.scene.check_values(&self.body.mesh, &[time]) {
             Err(error) => error.into(),

@@ -1,28 +1,26 @@
-//! How loads, prescribed displacements and gaps change between the ends of steps.
+//! Loads, prescribed displacements and gaps as functions of time, for the choice of steps.
 
 use crate::{
     evolution::DiscreteProblem,
-    scene::{Condition, Expression, Stepping},
+    scene::{Condition, Expression, Stepping, TimeGrid},
 };
 
-/// The loads of a step may deviate from a straight line in time by this part of the largest ones.
+/// Forces are nearly linear in time if they stay this near to a straight line, as a fraction of the largest.
 const DEVIATION: f64 = 0.05;
-/// Loads pass within a step if they swing by more than this part of the largest ones.
+/// Loads pass by within a step if their sum swings by more than this fraction of the largest.
 const PASSING: f64 = 0.5;
-/// Times that differ by less than this part of the run are one.
+/// Times that differ by less than this fraction of the run count as one.
 const APART: f64 = 1e-9;
-/// Uniform steps that are looked at.
+/// Uniform steps that are sampled for the note about loads within a step.
 const STEPS: usize = 50;
 /// Times sampled within a step.
 const POINTS: usize = 16;
-/// Times at which loads are looked at whether they vary within edges, besides those of pulses and jumps.
-const LOOKS: usize = 16;
-/// A boundary is looked at for pulses and jumps in so many parts: what happens in one at some time may undo
-/// what happens in another.
+/// Parts of a boundary that are searched for pulses and jumps: one may hide another in the same part.
 const BOXES: usize = 4;
 
-/// Times within the run of `problem` at which what depends on time is not nearly linear, and one between
-/// each two of them, s: rising, further apart than rounding of the `end`. See [`Expression::breaks`].
+/// Times within the run of `problem` at which a load, a prescribed displacement or a gap may not be smooth, and
+/// one time between each two of them, s. They rise and differ by more than rounding of the `end`. See
+/// [`Expression::breaks`].
 fn breaks(problem: &DiscreteProblem, end: f64) -> Vec<f64> {
     let (scene, mesh) = (problem.scene(), problem.mesh());
     let mut breaks = Vec::new();
@@ -55,41 +53,34 @@ fn breaks(problem: &DiscreteProblem, end: f64) -> Vec<f64> {
     breaks
 }
 
-/// The forces, prescribed displacements and changes of gaps of a run, sampled between the ends of its
-/// steps.
+/// The forces, prescribed displacements and changes of gaps of a run, sampled in time.
 ///
-/// Every rank samples those of the whole body, so that all ranks choose the same steps.
-pub(in crate::evolution) struct LoadCurve<'a> {
+/// Every rank samples the whole body, so that all ranks choose the same steps.
+pub(crate) struct LoadCurve<'a> {
     problem: &'a DiscreteProblem,
     /// The largest Σ|·| of the forces and of the displacements at any time sampled.
-    pub(in crate::evolution) largest: [f64; 2],
-    /// Times that must be looked at, rising, s.
+    pub(crate) largest: [f64; 2],
+    /// Times that must be sampled, s, in rising order.
     breaks: Vec<f64>,
-    /// Per surface load whether it varies within edges.
-    narrow: Vec<bool>,
     /// The end of the run, s.
     end: f64,
 }
 
 impl<'a> LoadCurve<'a> {
     /// Samples the whole run; `None` where nothing depends on time.
-    pub(in crate::evolution) fn new(problem: &'a DiscreteProblem) -> Option<Self> {
+    pub(crate) fn new(problem: &'a DiscreteProblem) -> Option<Self> {
         let end = problem.scene().time?.end;
         problem.loads.depend_on_time().then(|| {
             let breaks = breaks(problem, end);
-            let looks = [problem.scene().sample_times(LOOKS), breaks.clone()].concat();
-            let surface_forces = problem.loads.surface_forces.iter();
-            let narrow = surface_forces.map(|force| force.is_narrow(&looks)).collect();
-            let (largest, known) = ([0.0; 2], breaks.clone());
-            let mut curve = Self { problem, largest, breaks: known, narrow, end };
-            let times = problem.scene().sample_times(100).into_iter().chain(breaks);
+            let times = problem.scene().sample_times(100).into_iter().chain(breaks.clone());
+            let mut curve = Self { problem, largest: [0.0; 2], breaks, end };
             times.for_each(|time| _ = curve.sample(time));
             curve
         })
     }
 
     /// The breaks between two times.
-    pub(in crate::evolution) fn breaks(&self, start: f64, end: f64) -> &[f64] {
+    pub(crate) fn breaks(&self, start: f64, end: f64) -> &[f64] {
         let apart = APART * self.end;
         let place = |time: f64| self.breaks.partition_point(|other| *other <= time);
         let (first, last) = (place(start + apart), place(end - apart));
@@ -97,78 +88,69 @@ impl<'a> LoadCurve<'a> {
     }
 
     /// Σ|·| of the forces and of the displacements at `time` over the largest ones; 0 where all are 0.
-    pub(in crate::evolution) fn sizes(&self, time: f64) -> [f64; 2] {
-        let values = self.problem.loads.sampled_at(time, &self.narrow);
+    pub(crate) fn sizes(&self, time: f64) -> [f64; 2] {
+        let values = self.problem.loads.sampled_at(time);
         let size = |kind: usize| sum_abs(values[kind].iter().copied()) / self.largest[kind];
         [size(0), size(1)].map(|size| if size.is_finite() { size } else { 0.0 })
     }
 
-    /// Whether loads, prescribed displacements and gaps are nearly linear in time from `start` to `end`.
-    pub(in crate::evolution) fn is_nearly_linear(&mut self, start: f64, end: f64) -> bool {
-        let [first, last] =
-            [start, end].map(|time| self.problem.loads.sampled_at(time, &self.narrow));
+    /// Are loads, prescribed displacements and gaps nearly linear in time from `start` to `end`?
+    pub(crate) fn is_nearly_linear(&mut self, start: f64, end: f64) -> bool {
+        let deviations = self.deviations(start, end, <[f64]>::to_vec);
+        (0..2).all(|kind| deviations[kind] <= DEVIATION * self.largest[kind])
+    }
+
+    /// How far forces and displacements are from the straight lines between their values at `start` and
+    /// `end`: the largest Σ|·| at the times sampled. Compared are the results of `of`.
+    fn deviations(&mut self, start: f64, end: f64, of: impl Fn(&[f64]) -> Vec<f64>) -> [f64; 2] {
+        let [first, last] = [start, end].map(|time| self.sample(time).map(|values| of(&values)));
         let parts = (1..=POINTS).map(|point| point as f64 / (POINTS + 1) as f64);
         let breaks = self.breaks(start, end).iter().map(|time| (time - start) / (end - start));
-        let parts: Vec<f64> = parts.chain(breaks).collect();
-        parts.into_iter().all(|part| {
-            let values = self.sample(start + part * (end - start));
-            !(0..2).any(|kind| {
+        let mut deviations = [0.0_f64; 2];
+        for part in parts.chain(breaks).collect::<Vec<f64>>() {
+            let values = self.sample(start + part * (end - start)).map(|values| of(&values));
+            for (kind, deviation) in deviations.iter_mut().enumerate() {
                 let line = first[kind].iter().zip(&last[kind]);
                 let line = line.map(|(first, last)| (1.0 - part) * first + part * last);
-                let deviation = sum_abs(values[kind].iter().zip(line).map(|(v, line)| v - line));
-                deviation > DEVIATION * self.largest[kind]
-            })
-        })
-    }
-
-    /// The first uniform step within which they are not nearly linear, s, of some evenly chosen ones and
-    /// those with breaks: what happens there counts only at its ends.
-    pub(in crate::evolution) fn unresolved_step(problem: &'a DiscreteProblem) -> Option<[f64; 2]> {
-        let grid = problem.scene().time?;
-        let Stepping::Uniform { steps } = grid.stepping else { return None };
-        let mut curve = Self::new(problem)?;
-        let evenly = steps.min(STEPS);
-        let mut looked_at: Vec<usize> = (0..evenly).map(|i| i * steps / evenly).collect();
-        let step = |time: &f64| ((time / grid.end * steps as f64) as usize).min(steps - 1);
-        looked_at.extend(curve.breaks.iter().map(step));
-        looked_at.sort_unstable();
-        looked_at.dedup();
-        let ends = |n: usize| [grid.time(n, steps), grid.time(n + 1, steps)];
-        // A jump at the very end belongs to the next step.
-        let before = 2.0 * APART * grid.end;
-        looked_at
-            .into_iter()
-            .map(ends)
-            .find(|[start, end]| !curve.is_nearly_linear(*start, end - before))
-    }
-
-    /// Whether the sum of all forces, or of all displacements and gaps, swings within a uniform step by more
-    /// than [`PASSING`] of the largest: a load that comes and goes between two steps, not one that moves.
-    pub(in crate::evolution) fn pass_within_steps(problem: &'a DiscreteProblem) -> bool {
-        let Some(grid) = problem.scene().time else { return false };
-        let Stepping::Uniform { steps } = grid.stepping else { return false };
-        let Some(mut curve) = Self::new(problem) else { return false };
-        let size = |values: &Vec<f64>| sum_abs(values.iter().copied());
-        let mut swings = [0.0_f64; 2];
-        for n in 0..steps {
-            let [start, end] = [grid.time(n, steps), grid.time(n + 1, steps)];
-            let [first, last] = [start, end].map(|time| curve.sample(time).each_ref().map(size));
-            let parts = (1..=POINTS).map(|point| point as f64 / (POINTS + 1) as f64);
-            let breaks = curve.breaks(start, end).iter().map(|time| (time - start) / (end - start));
-            for part in parts.chain(breaks).collect::<Vec<f64>>() {
-                let now = curve.sample(start + part * (end - start)).each_ref().map(size);
-                for kind in 0..2 {
-                    let line = (1.0 - part) * first[kind] + part * last[kind];
-                    swings[kind] = swings[kind].max((now[kind] - line).abs());
-                }
+                *deviation =
+                    deviation.max(sum_abs(values[kind].iter().zip(line).map(|(v, l)| v - l)));
             }
         }
-        (0..2).any(|kind| swings[kind] > PASSING * curve.largest[kind])
+        deviations
+    }
+
+    /// The ends, s, of the first uniform step within which the loads are not nearly linear, among some evenly
+    /// spread ones and those with breaks. The run sees the loads only at the ends of the step.
+    pub(crate) fn unresolved_step(problem: &'a DiscreteProblem) -> Option<[f64; 2]> {
+        let (grid, steps) = uniform_steps(problem)?;
+        let mut curve = Self::new(problem)?;
+        let evenly = steps.min(STEPS);
+        let mut sampled: Vec<usize> = (0..evenly).map(|i| i * steps / evenly).collect();
+        let step = |time: &f64| ((time / grid.end * steps as f64) as usize).min(steps - 1);
+        sampled.extend(curve.breaks.iter().map(step));
+        sampled.sort_unstable();
+        sampled.dedup();
+        // A jump at the very end belongs to the next step.
+        let before = 2.0 * APART * grid.end;
+        let ends = sampled.into_iter().map(|n| [grid.time(n, steps), grid.time(n + 1, steps)]);
+        ends.into_iter().find(|[start, end]| !curve.is_nearly_linear(*start, end - before))
+    }
+
+    /// Do loads come and go within a uniform step? They do if the sum of all forces, or of all displacements
+    /// and gaps, swings by more than [`PASSING`] of the largest. A load that moves does not.
+    pub(crate) fn pass_within_steps(problem: &'a DiscreteProblem) -> bool {
+        let Some((grid, steps)) = uniform_steps(problem) else { return false };
+        let Some(mut curve) = Self::new(problem) else { return false };
+        let size = |values: &[f64]| vec![sum_abs(values.iter().copied())];
+        (0..steps).any(|n| {
+            let swings = curve.deviations(grid.time(n, steps), grid.time(n + 1, steps), size);
+            (0..2).any(|kind| swings[kind] > PASSING * curve.largest[kind])
+        })
     }
 
     /// Forces and displacements at `time`; the largest ones are kept.
     fn sample(&mut self, time: f64) -> [Vec<f64>; 2] {
-        let values = self.problem.loads.sampled_at(time, &self.narrow);
+        let values = self.problem.loads.sampled_at(time);
         for (largest, values) in self.largest.iter_mut().zip(&values) {
             let sum = sum_abs(values.iter().copied());
             // An infinite one is refused as soon as a step ends there.
@@ -180,7 +162,16 @@ impl<'a> LoadCurve<'a> {
     }
 }
 
-/// Σ|·|: unlike the maximum it hardly changes while a load rolls over the boundary.
+/// The time grid of a scene with uniform steps, and their number.
+fn uniform_steps(problem: &DiscreteProblem) -> Option<(TimeGrid, usize)> {
+    let grid = problem.scene().time?;
+    match grid.stepping {
+        Stepping::Uniform { steps } => Some((grid, steps)),
+        Stepping::Auto { .. } => None,
+    }
+}
+
+/// Σ|·|. Unlike the maximum, it hardly changes while a load rolls over the boundary.
 fn sum_abs(values: impl Iterator<Item = f64>) -> f64 {
     values.map(f64::abs).sum()
 }

@@ -1,28 +1,25 @@
 //! Surface loads and body forces, in parts of edges and triangles in which they are resolved.
 
+use super::parts::{
+    EdgePart, Parts, TrianglePart, WHOLE, centroid, edge_parts, triangle_parts, triangle_points,
+};
 use crate::{
-    evolution::{
-        boundary_conditions::Traction,
-        parts::{
-            EdgePart, Parts, TrianglePart, WHOLE, centroid, edge_parts, triangle_parts,
-            triangle_points,
-        },
-    },
+    evolution::boundary_conditions::Traction,
     fem::{Body, Division, Edge, GAUSS, Subdomain, add_body_force, add_traction, parabola},
     scene::{Expression, Scene, SurfaceLoad},
 };
 
-/// Errors of resultants, relative to ∫|f|: where loads are assembled …
+/// Errors of resultants, relative to ∫|f|, of loads that are assembled …
 const DEVIATION: f64 = 1e-6;
 const DEVIATION_IN_BODY: f64 = 1e-5;
-/// … and where they are only sampled.
+/// … and of surface loads that are only sampled.
 const SAMPLED: f64 = 0.02;
-/// The parts of triangles that are added for a body force, at most: where it depends on time, when they are
-/// integrated in each step, and where it does not.
+/// The largest number of parts of triangles that are added for a body force: for one that depends on time, which
+/// is integrated in each step, and for a constant one.
 const MORE: [f64; 2] = [10_000.0, 50_000.0];
-/// Times at which a body force is looked at, about.
+/// The approximate number of times at which a body force is sampled to divide triangles.
 const TIMES: usize = 4;
-/// The body force is sampled in at most so many triangles, and so many parts of others.
+/// The largest number of triangles in which a body force is sampled, and of parts of divided triangles.
 const TRIANGLES: usize = 500;
 
 /// A surface load on a part of the boundary.
@@ -30,9 +27,9 @@ const TRIANGLES: usize = 500;
 pub(super) struct SurfaceForce {
     /// f_N, N/m².
     force: SurfaceLoad,
-    /// All edges of the undivided body: their ends and middles, m. All ranks take the same parts of them.
+    /// Its edges in the undivided body: ends and middles, m. All ranks divide them alike.
     lines: Vec<[[f64; 2]; 3]>,
-    /// The same on this rank, where it has them.
+    /// The same edges on this rank; `None` for those of other ranks.
     edges: Vec<Option<Edge>>,
     /// The samples of a load that does not depend on time.
     constant: Option<Vec<f64>>,
@@ -47,7 +44,7 @@ impl SurfaceForce {
         let mut new = Self { force, lines, edges, constant: None };
         if !new.expressions().any(Expression::depends_on_time) {
             let mut samples = Vec::new();
-            new.sample(0.0, true, &mut samples);
+            new.sample(0.0, &mut samples);
             new.constant = Some(samples);
         }
         new
@@ -66,7 +63,7 @@ impl SurfaceForce {
         edge_parts(&self.lines, self.force.expressions(), t, deviation)
     }
 
-    /// What may be missed of ∫|f_N| at time t, relative.
+    /// The fraction of ∫|f_N| that may be missed at time t.
     pub(super) fn missed(&self, t: f64) -> f64 {
         self.parts(t, DEVIATION).missed
     }
@@ -78,27 +75,13 @@ impl SurfaceForce {
         add_traction(body, parts, |x, normal| self.force.at(x, normal, t), load);
     }
 
-    /// Whether there are edges that must be sampled in parts at some of these times.
-    pub(super) fn is_narrow(&self, times: &[f64]) -> bool {
-        let divided = |&t: &f64| self.parts(t, SAMPLED).parts.len() > self.lines.len();
-        self.constant.is_none() && times.iter().any(divided)
-    }
-
-    /// The forces on all edges at time t, by expression: from the middles, or from parts of edges where the
-    /// load may be narrow.
-    pub(super) fn sample(&self, t: f64, narrow: bool, forces: &mut Vec<f64>) {
+    /// The forces on all edges at time t, by expression.
+    pub(super) fn sample(&self, t: f64, forces: &mut Vec<f64>) {
         if let Some(constant) = &self.constant {
             forces.extend(constant);
             return;
         }
         let (first, expressions) = (forces.len(), self.force.expressions());
-        if !narrow {
-            for [p, [x, y], q] in &self.lines {
-                let length = (q[0] - p[0]).hypot(q[1] - p[1]);
-                forces.extend(expressions.iter().map(|f| length * f.eval(*x, *y, t)));
-            }
-            return;
-        }
         forces.resize(first + expressions.len() * self.lines.len(), 0.0);
         for (edge, [from, to]) in self.parts(t, SAMPLED).parts {
             let [[px, py], _, [qx, qy]] = self.lines[edge];
@@ -118,16 +101,16 @@ impl SurfaceForce {
 pub(super) struct BodyForce {
     /// f_B, N/m³.
     force: [Expression; 2],
-    /// The triangles in which it is not resolved, in parts.
+    /// The parts of the triangles in which it is not resolved.
     division: Division,
     /// Centroids and areas, m and m², at which it is sampled.
     samples: Vec<([f64; 2], f64)>,
-    /// What may be missed of ∫|f_B|, relative.
+    /// The fraction of ∫|f_B| that may be missed.
     pub(super) missed: f64,
 }
 
 impl BodyForce {
-    /// `None` where it is zero. Triangles are divided once, for all times.
+    /// `None` if it is zero. Triangles are divided once, for all times.
     pub(super) fn new(body: &Body, scene: &Scene) -> Option<Self> {
         let force = scene.body_force.clone();
         if force.iter().all(|f| f.as_constant() == Some(0.0)) {
@@ -174,7 +157,7 @@ impl BodyForce {
     }
 }
 
-/// Every so many parts, which stand for those between them.
+/// The centroids of some of the parts, each with the area of the parts that it stands for.
 fn samples(triangles: &[[[f64; 2]; 6]], parts: &[TrianglePart]) -> Vec<([f64; 2], f64)> {
     let stride = parts.len().div_ceil(TRIANGLES).max(1);
     let sample = |part: &TrianglePart| {

@@ -1,4 +1,4 @@
-//! The lengths of chosen steps, from the estimated error of each.
+//! Adaptive steps: their lengths, from the estimated error of each.
 
 use super::{PlannedStep, forecast::Forecast};
 use crate::{
@@ -8,7 +8,7 @@ use crate::{
 };
 use nalgebra::DVector;
 
-/// Keeps the error of ζ, over the damage done, below a tolerance: at the worst node and in the mean.
+/// Keeps the error of ζ below a tolerance, relative to the damage done: at the worst node and in the mean.
 pub(super) struct ErrorControl<'a> {
     body: &'a Body,
     tolerance: f64,
@@ -16,7 +16,7 @@ pub(super) struct ErrorControl<'a> {
     expected: [f64; 2],
     /// T, s.
     end: f64,
-    /// What steps must follow, where it depends on time.
+    /// The loads in time; `None` if they are constant.
     load_curve: Option<LoadCurve<'a>>,
     forecast: Forecast,
     /// The length of the next step, s.
@@ -27,36 +27,33 @@ pub(super) struct ErrorControl<'a> {
     damage: [f64; 2],
 }
 
-/// A step is at most this part of the run.
-const COARSEST: f64 = 0.05;
-/// Steps that do not follow the loads are halved down to this part: no step follows a jump.
-const FOLLOWING: f64 = 1.0 / 2000.0;
-/// A run has failed whose step is shorter than this part of the time that the loads give, see [`Forecast`],
-/// times the square of the tolerance (which counts as at most `COARSE`). For after a jump of the loads a
-/// step is about as short as the tolerance times that time; and ζ falls to ζ_* no faster than the root of
-/// the time left, so that a run lands as near as its tolerance with steps of its square.
-const FINEST: f64 = 1e-2;
-const COARSE: f64 = 1e-2;
-/// Damage below this is negligible: its error counts as if it were so large.
-const NEGLIGIBLE: f64 = 1e-6;
-/// The first step is as long as if the present rate did the damage of this part of the run.
+/// The longest step, as a fraction of the run.
+const LONGEST: f64 = 0.05;
+/// The first step is as long as if the present rate of damage lasted for this fraction of the run.
 const HORIZON: f64 = 0.1;
-/// No more damage than this is foreseen: a body that fails does so faster and faster, and early errors grow.
+/// A step within which the loads are not nearly linear in time is halved, down to this fraction of the run.
+/// Shorter steps would not follow a jump either.
+const FOLLOWING: f64 = 1.0 / 2000.0;
+/// A run that needs a shorter step than this fraction of it has failed.
+const SHORTEST: f64 = 1e-12;
+/// Errors are relative to at least this damage.
+const NEGLIGIBLE: f64 = 1e-6;
+/// The most damage that is foreseen. A body that fails does so faster and faster, and early errors grow.
 const FORESEEN: f64 = 0.1;
-/// The part of the tolerance that the steps aim at: errors grow after the steps that make them.
-pub(in crate::evolution) const AIM: f64 = 0.7;
-/// The error that a step may add is this part of what the steps before have left of that …
+/// The steps aim at this fraction of the tolerance, because the error of a step grows in later steps.
+pub(crate) const AIM: f64 = 0.7;
+/// The error of one step may be this fraction of what the errors of the steps before leave of the aim …
 const SHARE: f64 = 0.25;
-/// … but what is left counts as no less than this part of it: it may be gone when less damage is done than
-/// was foreseen, and steps must not shrink to nothing then.
+/// … where they leave at least this fraction of it. They may have used it up, if there is less damage than was
+/// foreseen.
 const LEAST: f64 = 1.0 / 16.0;
 
 impl<'a> ErrorControl<'a> {
-    /// From ζ₀ = `initial` at t = 0; `None` if the scene does not choose its steps.
+    /// From ζ₀ = `initial` at t = 0; `None` if the scene has uniform steps.
     pub(super) fn new(problem: &'a DiscreteProblem, initial: &[f64]) -> Option<Self> {
         let grid = problem.scene().time?;
         let Stepping::Auto { tolerance, expected } = grid.stepping else { return None };
-        // The error of the first step may be half of what its last rate does in it.
+        // The error of the first step is at most half of its damage at its last rate.
         let first_length = 2.0 * SHARE * tolerance * HORIZON * grid.end;
         let load_curve = LoadCurve::new(problem);
         Some(Self {
@@ -66,7 +63,7 @@ impl<'a> ErrorControl<'a> {
             end: grid.end,
             forecast: Forecast::new(load_curve.as_ref(), grid.end),
             load_curve,
-            next_length: first_length.min(COARSEST * grid.end),
+            next_length: first_length.min(LONGEST * grid.end),
             initial: DVector::from_column_slice(initial),
             damage: [0.0; 2],
         })
@@ -84,8 +81,8 @@ impl<'a> ErrorControl<'a> {
         self.load_curve.iter_mut().for_each(|curve| curve.largest = largest);
     }
 
-    /// The end and the length, s, of the step from `start`, which follows the loads if one can;
-    /// `None` at the end of time.
+    /// The end and the length, s, of the step from `start`. Within it the loads are nearly linear in time,
+    /// unless they jump. It is `None` at the end of the run.
     pub(super) fn choose(&mut self, start: f64) -> Option<(f64, f64)> {
         loop {
             let rest = self.end - start;
@@ -101,7 +98,7 @@ impl<'a> ErrorControl<'a> {
                 return Some((time, length));
             }
             if length <= FOLLOWING * self.end {
-                // Where it is known when a load jumps, no pulse is left out.
+                // The step ends at the first jump whose time is known, so that no pulse is left out.
                 let known = curve.breaks(start, time).first();
                 return Some(known.map_or((time, length), |&time| (time, time - start)));
             }
@@ -109,23 +106,24 @@ impl<'a> ErrorControl<'a> {
         }
     }
 
-    /// Makes the next step, from `start`, `length` s long; false where so short a step means that the run
-    /// has failed.
-    pub(super) fn shorten(&mut self, start: f64, length: f64) -> bool {
+    /// Makes the next step `length` s long; false if that is so short that the run has failed.
+    pub(super) fn shorten(&mut self, length: f64) -> bool {
         self.next_length = length;
-        let ahead = self.forecast.time_ahead(self.load_curve.as_ref(), start).min(self.end - start);
-        length > FINEST * self.tolerance.min(COARSE).powi(2) * ahead
+        length > SHORTEST * self.end
     }
 
-    /// How near ζ_* a run must land.
+    /// The largest distance of min ζ from ζ_* at which a run may stop.
     pub(super) fn landing(&self) -> f64 {
         self.tolerance * self.damage[0].max(NEGLIGIBLE)
     }
 
-    /// Accepts a step if the error that it adds to ζ_n = `zeta` is, at the worst node and in the mean, at most
-    /// SHARE (AIM · tolerance · D − E), and chooses the length of the next one. Here `added` is e_n and the
-    /// truncation error, E = `error` that of the steps before, and D the damage at the end: the expected one,
-    /// or that done so far and what `rate` = dζ/dt at t_n, 1/s, and the loads ahead will do. Collective.
+    /// Accepts a step to ζ_n = `zeta` if `added`, the error that it adds, is at most
+    /// SHARE (AIM · tolerance · D − E) at the worst node and in the mean, and sets the length of the next step.
+    ///
+    /// Here E = `error` is the error of the steps before. D is the damage at the end: the expected one, or else
+    /// the damage so far and what the loads ahead will do from the present `rate` = dζ/dt, 1/s
+    /// ([`Forecast`]).
+    /// Collective.
     ///
     /// # Errors
     /// The error is too large: the factor by which to shorten the step.
@@ -154,7 +152,7 @@ impl<'a> ErrorControl<'a> {
             return Err(growth(ratio).clamp(0.2, 0.9));
         }
         self.damage = damage;
-        self.next_length = (planned.length * growth(ratio).min(2.0)).min(COARSEST * self.end);
+        self.next_length = (planned.length * growth(ratio).min(2.0)).min(LONGEST * self.end);
         Ok(())
     }
 

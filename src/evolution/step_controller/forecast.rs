@@ -1,17 +1,17 @@
-//! How much damage the loads ahead will do.
+//! A forecast of the damage that the loads ahead will do.
 
 use crate::evolution::loads::LoadCurve;
 
-/// The loads of a run in time. Strains are about proportional to the size s of the loads, and the damage
-/// source is about ½ λ_U |ε|²: from a rate ζ' at t the loads ahead do about ζ' ∫_t^T s(τ)² dτ / s(t)² more.
+/// The loads of a run in time. Strains are about proportional to the size s of the loads, and the damage source is
+/// about ½ λ_U |ε|². With the rate ζ' at t, the loads ahead do about ζ' ∫_t^T s(τ)² dτ / s(t)² more damage.
 pub(super) struct Forecast {
     /// Rising times, s, and ∫_t^T s² from each of them to the end, s.
     ahead: Vec<(f64, f64)>,
 }
 
-/// The loads are sampled at so many times, evenly, and at those where they are known not to be smooth.
+/// The number of evenly spread times at which loads are sampled, besides those at which they are not smooth.
 const TIMES: usize = 200;
-/// Loads with s² below this count as if they had it: they tell little about larger ones.
+/// The least s² of a load: smaller ones say little about the damage of larger ones.
 const SMALL: f64 = 0.01;
 
 impl Forecast {
@@ -35,7 +35,7 @@ impl Forecast {
         Self { ahead }
     }
 
-    /// ∫_t^T s² / s(t)², s: for how long the present rate would have to last.
+    /// ∫_t^T s² / s(t)², s: the time in which the present rate would do the damage ahead.
     pub(super) fn time_ahead(&self, curve: Option<&LoadCurve>, time: f64) -> f64 {
         let next =
             self.ahead.partition_point(|(other, _)| *other <= time).min(self.ahead.len() - 1);

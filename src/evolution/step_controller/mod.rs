@@ -1,8 +1,9 @@
 //! Step control: which steps are made, and whether they are accepted.
 //!
-//! Steps are uniform, Euler's (25) or by the scheme "bdf2", or chosen by their error. The last two are
-//! two-step backward differences with an extrapolated source (Hairer, Nørsett, Wanner, *Solving
-//! Ordinary Differential Equations I*, III.5): with the step k_n = ω k_{n−1},
+//! Steps are uniform or adaptive. Uniform ones are Euler's (25) or, with the scheme "bdf2", two-step backward
+//! differences with an extrapolated source (Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations
+//! I*, III.5). Adaptive ones are two-step differences whose lengths follow their errors. With the step
+//! k_n = ω k_{n−1},
 //!
 //! (M + kκL) ζ_n = M (ζ̃_{n−1} + β (ζ̃_{n−1} − ζ̃_{n−2})) + k b̂_n,
 //! k = k_n (1+ω)/(1+2ω), β = ω²/(1+2ω), b̂_n = b_{n−1} + ω (b_{n−1} − b_{n−2}),
@@ -21,7 +22,7 @@ use super::{
     damage_step::{DamageSource, DamageStep, DamageUpdate, PlannedStep},
 };
 use crate::scene::{Scheme, Stepping};
-pub(super) use error_control::AIM;
+pub(crate) use error_control::AIM;
 use error_control::ErrorControl;
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
@@ -30,19 +31,19 @@ use serde::{Deserialize, Serialize};
 pub(super) enum Verdict {
     /// It is accepted.
     Accept(Box<Step>),
-    /// It is to be made again, shorter.
+    /// The step is rejected and made again, shorter.
     Retry,
     /// ζ_* is reached: the run ends before this step.
     Stop(Stop),
 }
 
-/// Plans the steps of a run and judges them. What it knows of the accepted steps changes when it
-/// answers [`Verdict::Accept`], and only then.
-pub(super) struct StepController<'a> {
+/// Plans the steps of a run, and accepts or rejects them. Its memory of the accepted steps changes only with
+/// [`Verdict::Accept`].
+pub(crate) struct StepController<'a> {
     problem: &'a DiscreteProblem,
-    /// Error control of the damage; `None` where steps are uniform.
+    /// Error control of the damage; `None` for uniform steps.
     chosen: Option<ErrorControl<'a>>,
-    /// Whether steps are two-step backward differences; else Euler's.
+    /// Are the steps two-step backward differences? Otherwise they are Euler's.
     two_step: bool,
     memory: StepState,
 }
@@ -61,15 +62,14 @@ pub(super) struct StepState {
     /// The damage source at t_{n−1}, and b_{n−1} − b_{n−2}, m²/s.
     source: DamageSource,
     load_change: DVector<f64>,
-    /// Per node, Σ error / rate of the steps: by how much it reaches a given ζ too late or too early,
-    /// s. (An error δζ shifts an autonomous evolution by δζ/ζ', once and for all.)
+    /// Per node, Σ error / rate of the steps: by how much ζ reaches a given value too late, s. An error δζ
+    /// shifts an autonomous evolution by δζ/ζ'.
     delay: DVector<f64>,
-    /// The error of ζ̃ from the steps: what they add to it, how it has grown and, of two-step differences,
-    /// how it has diffused since; and what the last step adds to that of ζ, once that is known.
+    /// The error of ζ̃ from the steps so far. It grows with the damage and, for two-step differences, it
+    /// diffuses.
     error: DVector<f64>,
+    /// What the last step adds to the error of ζ, once that is known.
     last_error: Option<DVector<f64>>,
-    /// The time since errors have last grown, s.
-    not_grown: f64,
     /// Bounds on ζ̃_{n−1} by the maximum principle, see [`BoundViolation`].
     bounds: (f64, f64),
     violation: BoundViolation,
@@ -77,9 +77,9 @@ pub(super) struct StepState {
     chosen: Option<(f64, [f64; 2], [f64; 2])>,
 }
 
-/// In a smooth evolution with equal steps the increments of the formula are off by ⅓ k³ζ‴, those of
-/// the trapezoidal rule by 1/12: the first is this multiple of their difference, by which steps are
-/// chosen. What they add up to is told by a rule of third order.
+/// In a smooth evolution with equal steps the increments of the formula are off by ⅓ k³ζ‴, and those of
+/// the trapezoidal rule by 1/12 k³ζ‴. The first error is this multiple of their difference. It decides the
+/// lengths of the steps; a rule of third order estimates the sum of their errors.
 const TRUNCATION: f64 = 4.0 / 3.0;
 
 impl<'a> StepController<'a> {
@@ -98,7 +98,6 @@ impl<'a> StepController<'a> {
             delay: zeros.clone(),
             error: zeros,
             last_error: None,
-            not_grown: 0.0,
             bounds: problem.body.vertices.partition.min_max(zeta),
             violation: BoundViolation::default(),
             chosen: None,
@@ -147,7 +146,7 @@ impl<'a> StepController<'a> {
         Some(PlannedStep { n, time, length, k, start, load, bounds })
     }
 
-    /// Judges a step whose ζ_n and u_n are known.
+    /// Accepts or rejects a step whose ζ_n and u_n are known.
     ///
     /// # Errors
     /// The error is too large however short the step is, or the correction e_n has no answer.
@@ -181,12 +180,11 @@ impl<'a> StepController<'a> {
                 return shorter.ok_or_else(|| planned.failed(StepFailure::TooShort));
             }
             let error = self.integrated(planned.length, &rate, &change) - increment;
-            step_error::add_delay(&mut self.memory.delay, &error, &rate);
-            self.grow_error(planned.length, &error);
+            self.add_error(planned.length, &error, &rate);
             damage_step.diffuse(planned, &mut self.memory.error)?;
             self.memory.rate_change = change;
         } else {
-            self.add_euler_delay(planned, &rate);
+            self.add_euler_error(planned, &rate);
         }
         self.memory.violation.observe(planned, damage.min_max, planned.time);
         let (lower, upper) = planned.bounds;
@@ -205,7 +203,7 @@ impl<'a> StepController<'a> {
         Ok(Verdict::Accept(step))
     }
 
-    /// Judges a step from `last` that reaches ζ_*: a stop, or a shorter step that lands nearer.
+    /// Decides about a step from `last` that reaches ζ_*: the run stops, or a shorter step lands nearer.
     pub(super) fn judge_stop(
         &mut self,
         planned: &PlannedStep,
@@ -225,18 +223,18 @@ impl<'a> StepController<'a> {
             }
             (last.state.time + part * planned.length, 1.0)
         } else {
-            // This step tells the error of the one before.
-            self.add_euler_delay(planned, &planned.rate(&damage.zeta));
+            // This step shows the error of the one before.
+            self.add_euler_error(planned, &planned.rate(&damage.zeta));
             (planned.time, 2.0)
         };
         self.memory.violation.observe(planned, damage.min_max, time);
-        let delay = self.delay_at_weakest_node(damage.zeta.as_slice()).abs();
-        let uncertainty = planned.length + delays * delay;
+        let delay = self.delay_at_weakest_node(damage.zeta.as_slice());
+        let uncertainty = planned.length + delays * delay.abs();
         let least_admissible = planned.bounds.0;
         Verdict::Stop(Stop { time, zeta_min, least_admissible, uncertainty, from_mesh: None })
     }
 
-    /// Judges a step whose solves failed: where steps are chosen, a shorter step may do better.
+    /// Decides about a step whose solves failed: with adaptive steps, a shorter one may succeed.
     ///
     /// # Errors
     /// `failure`, if no shorter step is to be tried.
@@ -254,20 +252,19 @@ impl<'a> StepController<'a> {
     }
 
     /// By how much ζ violated the bounds of its equation.
-    pub(super) fn violation(&self) -> BoundViolation {
+    pub(crate) fn violation(&self) -> BoundViolation {
         self.memory.violation
     }
 
-    /// The estimated error of the last accepted ζ over the damage done, where steps are chosen.
-    pub(super) fn damage_error(&self) -> Option<f64> {
+    /// The estimated error of the last accepted ζ over the damage done, for adaptive steps.
+    pub(crate) fn damage_error(&self) -> Option<f64> {
         let chosen = self.chosen.as_ref()?;
         Some(self.step_error().map_or(0.0, |error| chosen.relative(&error)))
     }
 
-    /// Makes the step again, shorter by this factor, where steps are chosen and not hopelessly short.
+    /// Makes the step again, shorter by this factor, if steps are adaptive and not hopelessly short.
     fn retry(&mut self, planned: &PlannedStep, factor: f64) -> Option<Verdict> {
-        let start = planned.time - planned.length;
-        let possible = self.chosen.as_mut()?.shorten(start, planned.length * factor);
+        let possible = self.chosen.as_mut()?.shorten(planned.length * factor);
         possible.then_some(Verdict::Retry)
     }
 }

@@ -1,29 +1,29 @@
-//! A run at a few times, kept for the estimates at its end.
+//! Some states of a run, kept for the estimates at its end.
 
-use super::{State, Step};
+use crate::evolution::{State, Step};
 use serde::{Deserialize, Serialize};
 
-/// So many intervals of time at least and about twice as many at most, if there are so many steps; with
-/// three the error of a load that swings once was estimated at 0.6 of it.
+/// The least number of intervals between the states that are kept; there are at most twice as many. With three
+/// the estimated error of a load that swings once is too small by a factor 0.6.
 const INTERVALS: usize = 5;
 
-/// States of a run at a few times, evenly spread over its steps.
+/// States of a run, evenly spread over its steps.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(super) struct Instants {
-    /// Every so many steps.
+pub(crate) struct Instants {
+    /// The number of steps between two states.
     stride: usize,
-    pub(super) states: Vec<State>,
+    pub(crate) states: Vec<State>,
     /// t_n and min ζ_n of all steps.
-    pub(super) falling: Vec<(f64, f64)>,
+    pub(crate) falling: Vec<(f64, f64)>,
 }
 
 impl Instants {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self { stride: 1, states: Vec::new(), falling: Vec::new() }
     }
 
-    /// Sees an accepted step.
-    pub(super) fn observe(&mut self, step: &Step) {
+    /// Sees an accepted step. When there are too many states, every other one is dropped.
+    pub(crate) fn observe(&mut self, step: &Step) {
         self.falling.push((step.state.time, step.record.zeta_min));
         if !step.record.step.is_multiple_of(self.stride) {
             return;
@@ -36,8 +36,8 @@ impl Instants {
         }
     }
 
-    /// The last state becomes the last of these.
-    pub(super) fn end(&mut self, last: &State) {
+    /// Appends the last state of the run. It replaces the one before if that is close to it.
+    pub(crate) fn end(&mut self, last: &State) {
         if let [.., before, end] = &self.states[..]
             && last.time - end.time < 0.5 * (end.time - before.time)
         {
@@ -46,8 +46,8 @@ impl Instants {
         self.states.push(last.clone());
     }
 
-    /// How long after `time` min ζ of the run falls to `level`, s; `None` where it does not.
-    pub(super) fn delay(&self, time: f64, level: f64) -> Option<f64> {
+    /// How long after `time` min ζ of the run falls to `level`, s; `None` if it does not.
+    pub(crate) fn delay(&self, time: f64, level: f64) -> Option<f64> {
         let after = self.falling.iter().position(|(_, zeta)| *zeta <= level)?;
         let (t, zeta) = self.falling[after];
         let (t0, zeta0) = self.falling[after.saturating_sub(1)];

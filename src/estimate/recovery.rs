@@ -1,12 +1,10 @@
-//! Recovered strains: how well a mesh resolves displacements.
+//! Recovered strains: an estimate of how well a mesh resolves displacements.
 
-use super::{
-    Body, Cells, Elasticity, Triangle,
-    body::for_elements,
-    element::{POINTS, quadratic_values},
-    quadratic::mean_product,
+use super::hierarchical::{coefficients, mass};
+use crate::{
+    fem::{Body, Cells, Elasticity, POINTS, for_elements, quadratic_values},
+    petsc::PetscError,
 };
-use crate::petsc::PetscError;
 use nalgebra::{Matrix6, Matrix6x3, Vector3, Vector6};
 
 /// An estimate of the error of u in the energy norm, ‖v‖² = ∫ ζ Aε(v) : ε(v).
@@ -20,10 +18,9 @@ pub struct EnergyError {
     pub energy: f64,
 }
 
-/// A vertex's fit is from its own triangles if there are so many; else from its neighbours' fits, if these
-/// are.
+/// Triangles needed to fit at a vertex; with fewer, the fits of its neighbours are averaged.
 const ENOUGH: usize = 4;
-/// Multiples of the trace of the normal matrix on its diagonal: they decide where a fit is not unique.
+/// This fraction of its trace is added to the diagonal of a normal matrix. It decides where the fit is not unique.
 const REGULARISATION: f64 = 1e-13;
 
 /// A strain (ε_xx, ε_yy, 2ε_xy) as a polynomial in (x, y) − x_v about a vertex: the coefficients of
@@ -40,17 +37,18 @@ impl EnergyError {
 /// Strains recovered from nodal u (Zienkiewicz and Zhu, Int. J. Numer. Meth. Eng. 33, 1992:
 /// superconvergent patch recovery).
 ///
-/// Around each vertex, ε(u) at the quadrature points of its triangles is fitted by a polynomial of
-/// the degree of u; ε* is the interpolant of the order of u of these fits, at the midpoint of an
-/// edge their mean. A vertex of few triangles, at a boundary, has the mean of its neighbours' fits, or
-/// where they too have few, in a thin layer, a fit of lower degree. Where two materials meet strains jump:
-/// each has fits of its own.
+/// Around each vertex, a polynomial of the degree of u is fitted to ε(u) at the quadrature points of its
+/// triangles. At a vertex ε* is the value of its fit, and at a midpoint the mean of the fits of both ends.
+///
+/// A vertex at a boundary may have too few triangles. It takes the mean of its neighbours' fits or, in a layer
+/// one triangle thick, a fit of lower degree. Strains jump where two materials meet, so each material has its
+/// own fits.
 pub struct RecoveredStrains<'a> {
     body: &'a Body,
-    /// ε(u) at the quadrature points, so many in a triangle.
+    /// ε(u) at the quadrature points, `per_triangle` of them in each triangle.
     strains: Vec<Vector3<f64>>,
     per_triangle: usize,
-    /// Of each material the fits of the vertices.
+    /// Per material: the fits of the vertices.
     fits: Vec<Vec<Fit>>,
 }
 
@@ -75,15 +73,16 @@ impl<'a> RecoveredStrains<'a> {
     /// points. Collective.
     pub fn energy_error(&self, elasticity: &Elasticity, zeta: &[f64], u: &[f64]) -> EnergyError {
         let Self { body, per_triangle, .. } = *self;
-        let square = |(t, triangle): (usize, &Triangle)| {
+        let square = |t: usize| {
             let own = per_triangle * t..per_triangle * (t + 1);
             let mean = zeta[own].iter().sum::<f64>() / per_triangle as f64;
-            let difference = self.difference(t);
-            let stress = difference.map(|strain| elasticity.d(body, t) * strain);
-            mean * triangle.area() * mean_product(&difference, &stress, Vector3::dot)
+            // ∫ e_i e_j of the components of e = ε* − ε(u).
+            let difference = self.difference(t).map(|strain| strain.transpose());
+            let difference = coefficients(Matrix6x3::from_rows(&difference));
+            let products = difference.transpose() * mass(&body.triangles[t]) * difference;
+            mean * elasticity.d(body, t).dot(&products)
         };
-        let own = body.triangles.iter().enumerate().take(body.own_triangles);
-        let squares: Vec<f64> = own.map(square).collect();
+        let squares: Vec<f64> = (0..body.own_triangles).map(square).collect();
         let points = per_triangle * body.own_triangles;
         let energy: f64 = elasticity.energies(body, zeta, u).iter().take(points).sum();
         let mut sums = [squares.iter().sum(), energy];
@@ -154,10 +153,10 @@ fn sample_points<const N: usize, const Q: usize>(
     cells.nodes.iter().flat_map(|nodes| values.iter().map(move |v| place(nodes, v))).collect()
 }
 
-/// The triangles of one material around each vertex, rising, in one list.
+/// The triangles of one material around each vertex, vertex after vertex in one list.
 struct TrianglesAround {
     triangles: Vec<usize>,
-    /// Where those of each vertex end.
+    /// Per vertex: where its triangles end in the list.
     ends: Vec<usize>,
 }
 
@@ -165,7 +164,7 @@ impl TrianglesAround {
     fn new(body: &Body, material: usize) -> Self {
         let triangles = body.mesh.triangles.iter().enumerate();
         let own = triangles.filter(|(t, _)| body.material(*t) == material);
-        // Where those of each vertex begin, then, as they are put there, end.
+        // At first where the triangles of each vertex begin; each one entered moves this on towards the end.
         let mut ends = vec![0; body.mesh.nodes.len() + 1];
         own.clone().flat_map(|(_, triangle)| triangle).for_each(|&vertex| ends[vertex + 1] += 1);
         (1..ends.len()).for_each(|i| ends[i] += ends[i - 1]);
@@ -185,7 +184,7 @@ impl TrianglesAround {
     }
 }
 
-/// The fit of each vertex to the strains of one material; a vertex outside of it has a meaningless one.
+/// The fit of each vertex to the strains of one material. Fits of vertices outside the material are not used.
 fn fits(
     body: &Body,
     material: usize,
@@ -201,15 +200,15 @@ fn fits(
         let own = around.of(vertex).iter().flat_map(|t| per_triangle * t..per_triangle * (t + 1));
         fit(vertices[vertex], own.map(|q| (samples[q], strains[q])), degree)
     };
-    // Each vertex's fit (18 entries), and 1 where it has one.
+    // Per vertex: its fit (18 entries), then 1 once it has one.
     let mut fields = vec![[0.0; 19]; nodes];
     let known = |fit: Fit| std::array::from_fn(|i| fit.as_slice().get(i).copied().unwrap_or(1.0));
     for vertex in (0..partition.owned()).filter(|&vertex| around.of(vertex).len() >= ENOUGH) {
         fields[vertex] = known(own_fit(vertex, degree));
     }
     partition.update(fields.as_flattened_mut(), 19)?;
-    // The others have the mean of their neighbours' fits, and then corners, whose neighbours are such
-    // vertices. Carried further, over several triangles, a polynomial is no fit any more.
+    // The other vertices take the mean of their neighbours' fits. Corners come second, because their neighbours
+    // are such vertices. Over more triangles than that a polynomial must not be extrapolated.
     for most in [usize::MAX, 1] {
         let before = fields.clone();
         let is_left =
@@ -227,8 +226,8 @@ fn fits(
         }
         partition.update(fields.as_flattened_mut(), 19)?;
     }
-    // Vertices further from those of enough triangles, as in strips one triangle thick, have fits of the
-    // degree of the strains themselves, which a single triangle determines.
+    // Vertices still without a fit, as in strips one triangle thick, take one of the degree of the strains
+    // themselves, which a single triangle determines.
     for (vertex, field) in fields.iter_mut().enumerate().take(partition.owned()) {
         if field[18] == 0.0 {
             *field = known(own_fit(vertex, degree - 1));

@@ -1,33 +1,33 @@
-//! Edges and triangles on which initial damage or prescribed displacements vary by more than their values at
-//! the nodes show.
+//! Data that the nodes do not resolve: prescribed displacements and the initial damage enter by their values at
+//! nodes, and may vary by more between them.
 
-use super::parts::{EdgePart, TrianglePart, edge_parts, triangle_parts, triangle_point};
 use crate::{
+    evolution::{EdgePart, TrianglePart, centroid, edge_parts, triangle_parts, triangle_point},
     fem::{GAUSS, POINTS, midpoint, parabola, part_point},
     mesh::{Curve, Mesh, Order, sorted},
     scene::{Condition, Expression, Scene},
 };
 use std::collections::HashSet;
 
-/// Times at which prescribed displacements are sampled, about.
+/// The approximate number of times at which prescribed displacements are sampled.
 const TIMES: usize = 8;
-/// The part of the accuracy that the interpolation of the initial damage may take.
+/// The fraction of the accuracy that the interpolation of the initial damage may take.
 const SHARE: f64 = 0.5;
-/// Edges shorter than this part of their curve are not halved for a prescribed displacement: it jumps.
+/// An edge shorter than this fraction of its curve is not halved for a displacement: that must jump there.
 const SHORTEST: f64 = 1e-4;
-/// How well functions are integrated here, relatively, and with how many more parts than triangles.
+/// The relative error of integrals here, and the number of parts of triangles that may be added for it.
 const DEVIATION: f64 = 1e-5;
 const MORE: f64 = 100_000.0;
-/// What nodes miss is noted if it is more than this part of the whole.
+/// An error above this fraction of the whole is noted.
 const NOTED: f64 = 0.05;
 
-/// The edges, by their ends in increasing order, that must be halved for a relative `accuracy`, with
-/// `displacement` the largest |u|, m:
+/// The edges that must be halved for a relative `accuracy`, by their ends in increasing order. The largest
+/// |u| is `displacement`, m. There are two kinds:
 ///
-/// - those on which a prescribed u_D is somewhere further than `accuracy` · `displacement` from its
-///   interpolation at the nodes;
-/// - the longest sides of the triangles with the largest ‖ζ₀ − Iζ₀‖_T, of so many that the sum over the
-///   others is Σ ‖ζ₀ − Iζ₀‖²_T ≤ (½ `accuracy` ‖1 − ζ₀‖)², all in L².
+/// - edges on which |u_D − Iu_D| exceeds `accuracy` · `displacement` somewhere, with Iu_D the interpolation of
+///   u_D at the nodes;
+/// - the longest sides of the triangles with the largest ‖ζ₀ − Iζ₀‖_T in L². There are as many as it takes for
+///   the others to have Σ ‖ζ₀ − Iζ₀‖²_T ≤ (½ `accuracy` ‖1 − ζ₀‖)².
 pub(super) fn unresolved(
     scene: &Scene,
     mesh: &Mesh,
@@ -63,8 +63,8 @@ pub(super) fn unresolved(
     found
 }
 
-/// What the nodes miss of prescribed displacements and of the initial damage, if it is much.
-pub(super) fn notes(scene: &Scene, mesh: &Mesh) -> Vec<String> {
+/// Notes on prescribed displacements and initial damage that vary much between the nodes.
+pub(crate) fn notes(scene: &Scene, mesh: &Mesh) -> Vec<String> {
     let mut notes = Vec::new();
     for boundary in &scene.boundaries {
         let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
@@ -88,7 +88,6 @@ pub(super) fn notes(scene: &Scene, mesh: &Mesh) -> Vec<String> {
             .max_by(|a, b| damage.squares[*a].total_cmp(&damage.squares[*b]));
         let corners = mesh.triangles[worst.unwrap_or(0)].map(|node| mesh.nodes[node]);
         let [x, y] = [0, 1].map(|k| corners.iter().map(|corner| corner[k]).sum::<f64>() / 3.0);
-        // The rounding of nothing is nothing.
         let shown = if damage.shown > 1e-9 * damage.integral { damage.shown } else { 0.0 };
         notes.push(format!(
             "the initial damage varies within the mesh's triangles near ({x:.4}, {y:.4}): ∫(1 − ζ) is {:.3e} \
@@ -108,8 +107,7 @@ fn displacements(conditions: &[Condition]) -> impl Iterator<Item = &Expression> 
     components.flatten().flatten().filter(|u| u.depends_on_space())
 }
 
-/// max |u_D − Iu_D| on each edge of a curve at some times, m, with I the interpolation at the nodes of u, and
-/// the largest |u_D|.
+/// Per edge of a curve: max |u_D − Iu_D| at some times, m. Then the largest |u_D| of all edges, m.
 fn missed_displacements(
     scene: &Scene,
     mesh: &Mesh,
@@ -143,7 +141,7 @@ fn missed_displacements(
     (missed, largest)
 }
 
-/// What the vertices show of the initial damage.
+/// How far the initial damage is from its interpolation at the vertices.
 struct MissedDamage {
     /// ‖ζ₀ − Iζ₀‖²_T of each triangle, and ‖1 − ζ₀‖², m².
     squares: Vec<f64>,
@@ -154,7 +152,7 @@ struct MissedDamage {
     shown: f64,
 }
 
-/// What the vertices miss of an initial damage that depends on the place.
+/// The interpolation error of the initial damage; `None` if it is the same everywhere.
 fn missed_damage(scene: &Scene, mesh: &Mesh) -> Option<MissedDamage> {
     let initial = &scene.damage.as_ref()?.initial;
     if !initial.depends_on_space() {
@@ -173,7 +171,7 @@ fn missed_damage(scene: &Scene, mesh: &Mesh) -> Option<MissedDamage> {
         let (triangle, corners): TrianglePart = part;
         let points = &triangles[triangle];
         let [a, b, c] = [points[0], points[1], points[2]].map(at);
-        let weight = super::parts::centroid(&triangles, &part).1 / 3.0;
+        let weight = centroid(&triangles, &part).1 / 3.0;
         for point in POINTS.map(|point| part_point(&corners, point)) {
             let value = at(triangle_point(points, point));
             let shown = point[0] * a + point[1] * b + point[2] * c;

@@ -1,4 +1,4 @@
-//! Parts of edges and triangles that are so small that a quadrature rule integrates a function in each.
+//! Division of edges and triangles into parts so small that a quadrature rule integrates a function in each.
 //!
 //! A part with the measure m is bisected while, relative to the sum of ∫|f| over all parts,
 //!
@@ -17,27 +17,28 @@ use crate::{
 };
 
 /// An edge, by its index, and where a part of it begins and ends, 0 ≤ s ≤ 1.
-pub(super) type EdgePart = (usize, [f64; 2]);
+pub(crate) type EdgePart = (usize, [f64; 2]);
 /// A triangle, by its index, and the barycentric coordinates of the corners of a part of it.
-pub(super) type TrianglePart = (usize, [[f64; 3]; 3]);
+pub(crate) type TrianglePart = (usize, [[f64; 3]; 3]);
 
-/// What a peak between the points seen may be, of ∫|f|.
+/// The fraction of ∫|f| that may be hidden in a peak between the points sampled.
 const HIDDEN: f64 = 1e-3;
-/// Ends and corners are sampled so far within, relative to the size of the part: jumps at nodes are in no
-/// part then.
+/// Ends and corners are sampled this far inside, relative to the size of the part. Then a jump at a node lies in no
+/// part.
 const WITHIN: f64 = 1e-7;
-/// A part is bisected so many times at most.
+/// The largest number of bisections of a part.
 const DEEPEST: usize = 40;
-/// The parts of one triangle alone.
-pub(super) const WHOLE: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-/// Triangles are sliced where all together miss more than this part of ∫|f|: so many of them at most, each
-/// into so many slices at most.
+/// A triangle as its only part.
+pub(crate) const WHOLE: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+/// If all triangles together miss more than this fraction of ∫|f|, some are sliced.
 const MISSED: f64 = 1e-4;
+/// The largest number of triangles that are sliced, and of slices of a triangle.
 const SLICED: usize = 1000;
 const SLICES: usize = 200;
-/// How well slices are to be integrated, relatively.
+/// The relative error of the integral over slices.
 const DEVIATION_OF_SLICES: f64 = 1e-6;
-/// What is seen of functions in a part, each times its measure: ∫|f|, max |f − f₂|, and what may be hidden.
+/// The functions in a part, each value times the measure of the part: ∫|f|, max |f − f₂|, and the largest hidden
+/// peak.
 #[derive(Clone, Copy)]
 struct Seen {
     integral: f64,
@@ -46,18 +47,18 @@ struct Seen {
 }
 
 impl Seen {
-    /// What may be missed of the `integral` of |f| over all parts. Below the limit, what may be hidden is
-    /// mostly what the bounds of the function are too wide.
+    /// The part of the `integral` of |f| over all parts that may be missed. A hidden peak below the limit does not
+    /// count: mostly it is only that the bounds of the function are too wide.
     fn missed(&self, integral: f64) -> f64 {
         self.deviation + if self.hidden > HIDDEN * integral { self.hidden } else { 0.0 }
     }
 }
 
 /// Parts in which functions are integrated.
-pub(super) struct Parts<P> {
-    pub(super) parts: Vec<P>,
-    /// What may be missed of ∫|f|, at most, over the part that is seen.
-    pub(super) missed: f64,
+pub(crate) struct Parts<P> {
+    pub(crate) parts: Vec<P>,
+    /// The largest part of ∫|f| that may be missed, over the part that is not.
+    pub(crate) missed: f64,
 }
 
 impl<P> Parts<P> {
@@ -68,7 +69,7 @@ impl<P> Parts<P> {
     }
 }
 
-/// ∫|f| over parts, and what may be missed of it, or of the `integral` over these and others.
+/// ∫|f| over parts, and the part that may be missed of it, or of the `integral` over these and other parts.
 fn sums<P>(parts: &[(P, Seen)], integral: Option<f64>) -> [f64; 2] {
     let own = parts.iter().map(|(_, seen)| seen.integral).sum();
     let integral = integral.unwrap_or(own);
@@ -111,7 +112,7 @@ fn bisected<P: Copy>(
 
 /// The parts of edges, parabolas through three points each, in which `f` is integrated by three Gauss points
 /// at time `t` with errors of about `deviation` ∫|f|. What does not depend on the place needs one an edge.
-pub(super) fn edge_parts(
+pub(crate) fn edge_parts(
     lines: &[[[f64; 2]; 3]],
     f: &[Expression],
     t: f64,
@@ -138,10 +139,9 @@ pub(super) fn edge_parts(
     Parts::new(bisected(whole, [deviation, most], look, halves))
 }
 
-/// The parts of triangles, with the six points of a quadratic triangle each, in which `f` − `zero` is
-/// integrated with errors of about `deviation` ∫|f − zero| at all `times`, and so many more than triangles
-/// at most.
-pub(super) fn triangle_parts(
+/// The parts of quadratic triangles of six points in which `f` − `zero` is integrated with errors of about
+/// `deviation` ∫|f − zero| at all `times`. There are at most `more` parts more than triangles.
+pub(crate) fn triangle_parts(
     triangles: &[[[f64; 2]; 6]],
     (f, zero): (&[Expression], f64),
     times: &[f64],
@@ -190,8 +190,8 @@ pub(super) fn triangle_parts(
     Parts::new(of_triangles.into_iter().flatten().collect())
 }
 
-/// Slices of a triangle along one of its sides, two parts each, as thick as a line across them needs; none
-/// where these are too many.
+/// Slices of a triangle along one of its sides, in two parts each. They are as thick as the integral along a line
+/// across them needs. `None` if there are too many.
 fn slices(
     triangle: &[[f64; 2]; 6],
     side: usize,
@@ -223,13 +223,13 @@ fn slices(
 }
 
 /// The point of a quadratic triangle of six points at barycentric coordinates, m.
-pub(super) fn triangle_point(points: &[[f64; 2]; 6], at: [f64; 3]) -> [f64; 2] {
+pub(crate) fn triangle_point(points: &[[f64; 2]; 6], at: [f64; 3]) -> [f64; 2] {
     let values = quadratic_values(at);
     [0, 1].map(|k| points.iter().zip(values).map(|(x, value)| value * x[k]).sum())
 }
 
 /// The six points of each triangle of a body, m.
-pub(super) fn triangle_points(body: &Body) -> Vec<[[f64; 2]; 6]> {
+pub(crate) fn triangle_points(body: &Body) -> Vec<[[f64; 2]; 6]> {
     let points = &body.nodes.points;
     match body.elements() {
         Elements::Linear(cells) => {
@@ -246,7 +246,7 @@ pub(super) fn triangle_points(body: &Body) -> Vec<[[f64; 2]; 6]> {
 }
 
 /// The centroid, m, and the area, m², of a part, with straight sides.
-pub(super) fn centroid(
+pub(crate) fn centroid(
     triangles: &[[[f64; 2]; 6]],
     (triangle, corners): &TrianglePart,
 ) -> ([f64; 2], f64) {
@@ -258,8 +258,8 @@ fn mean(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|k| 0.5 * (a[k] + b[k]))
 }
 
-/// What is seen of `f` − `zero` at the `nodes` of a part and its quadrature `points`. `sides` are the two
-/// ends and the middle of each side: on a parabola their control point 2m − (p + q)/2 bounds the side.
+/// Samples `f` − `zero` at the `nodes` of a part and its quadrature `points`. `sides` are the two ends and the
+/// middle of each side. The control point 2m − (p + q)/2 of a parabolic side bounds it.
 #[allow(clippy::too_many_arguments, reason = "an edge and a triangle differ in all of these")]
 fn seen<const N: usize, const S: usize, const Q: usize>(
     f: &[Expression],

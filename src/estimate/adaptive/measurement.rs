@@ -1,73 +1,70 @@
-//! What a mesh does to the figures, measured: the same few steps on the mesh bisected everywhere.
+//! The measured errors of figures: the same few steps on the mesh bisected everywhere.
 //!
-//! With the size of all triangles halved, an error of order p falls by 2^p, so that of the change
-//! F(h/2) − F(h) = (1 − 2^−p) e(h) the error e(h) is twice the change for p = 1, and at most 2½ times for
-//! p ≥ 0.74. The change at one time may vanish by chance where it changes its sign: the bar of a figure is
+//! This halves the size of all triangles, and an error of order p falls by 2^p. The figure F changes by
+//! F(h/2) − F(h) = (1 − 2^−p) e(h). So its error e(h) is twice the change for p = 1, and at most 2½ times the
+//! change for p ≥ 0.74. The change at one time may be zero by chance, so the bar of a figure is
 //!
-//! 2½ max(|ΔF(T)|, (mean over t of ΔF(t)²)^½),
+//! 2½ max(|ΔF(T)|, (mean over t of ΔF(t)²)^½).
 //!
-//! and of what depends on u no less than η²/10 of its scale, with η the relative error of u in the energy
-//! norm: the relative error of the work of a constant load is η².
+//! A figure that depends on u has at least the bar η²/10 of its scale, with η the relative error of u in the
+//! energy norm: the relative error of the work of a constant load is η².
 
 use super::{
-    super::{
-        DiscreteProblem,
-        figures::{Bar, Dimension},
-    },
+    super::figures::{Bar, Dimension},
     AdaptError,
     pilot::{INSTANTS, Pilot},
     sizes::areas,
 };
 use crate::{
+    evolution::DiscreteProblem,
     mesh::{Mesh, Order, Refinement},
     petsc::Session,
     scene::Scene,
 };
 
-/// The error over the change, at most, of anything of about first order or better.
+/// The error over the change, at most, for figures of about first order or better.
 const ERROR_OVER_CHANGE: f64 = 2.5;
-/// The error over the change of the damage in L², in which nothing cancels, on meshes refined where the error
-/// is: that of second order.
+/// The error over the change of the damage in L². Nothing cancels there, and adapted meshes reach the second
+/// order.
 const FIELD_ERROR_OVER_CHANGE: f64 = 4.0 / 3.0;
 
-/// Triangles whose change is above this part of the largest are refined for a figure …
+/// Triangles whose change is above this fraction of the largest are refined for a figure …
 const GOOD_PART: f64 = 0.5;
-/// … and they alone where they make this part of the whole change.
+/// … and no others, if they make this fraction of the whole change.
 const MOST: f64 = 0.5;
 
-/// The part of the accuracy that the mesh may take of a figure: the time steps add to it.
+/// The fraction of the accuracy of a figure that the mesh may use; the time steps use the rest.
 const SHARE: f64 = 0.97;
 
 /// A measured error.
 pub(super) struct MeasuredError {
-    /// What it is the error of.
+    /// The name of the figure or norm.
     pub(super) name: String,
     pub(super) relative: f64,
-    /// The part of the accuracy that it may take.
+    /// The fraction of the accuracy that it may use.
     share: f64,
 }
 
 impl MeasuredError {
-    /// The error over what it may be for an accuracy.
+    /// The error over the allowed one for an accuracy.
     pub(super) fn excess(&self, accuracy: f64) -> f64 {
         self.relative / (self.share * accuracy)
     }
 }
 
-/// What the bisection of a mesh changed.
+/// The errors of a run, from its changes when the mesh is bisected.
 #[derive(Default)]
 pub(super) struct Measurement {
     /// The error bars of the figures; none where the run ends at ζ_*.
     pub(super) bars: Vec<Bar>,
     /// The error of ζ at the end over the damage, in L².
     pub(super) damage: f64,
-    /// The relative error of u, the larger of what is estimated on the bisected mesh at the worst time and,
-    /// without damage, what its change is at the end.
+    /// The relative error of u: the estimate on the bisected mesh at the worst time or, if that is larger and there
+    /// is no damage, the error by its change at the end.
     pub(super) displacement: f64,
     /// The error of ‖u‖² over its largest value.
     pub(super) energy: f64,
-    /// How far off the time is at which ζ_* is reached, over that time: infinite where one of the two runs
-    /// does not reach it.
+    /// The relative error of the time of ζ_*; infinite if only one of the two runs reaches it.
     pub(super) stop: f64,
     /// For each triangle of the mesh: its share of the squared relative error of u, by the estimates on its
     /// parts, and the largest penetration at their edges, m.
@@ -132,8 +129,8 @@ impl Measurement {
         Ok(measured)
     }
 
-    /// The measured errors, the largest of its share first: those of the figures `asked` for, or of all
-    /// figures, of u, its energy, the damage and the time of ζ_*.
+    /// The measured errors: of the figures `asked` for, or of all figures, of u, its energy, the damage and the time
+    /// of ζ_*. The largest over its share comes first.
     pub(super) fn errors(&self, asked: &[String]) -> Vec<MeasuredError> {
         let norms = [
             ("damage", self.damage),
@@ -152,15 +149,15 @@ impl Measurement {
         errors
     }
 
-    /// The largest relative error of the figures of ζ, which the time steps change most.
+    /// The largest relative error of the figures of ζ; the time steps change these most.
     pub(super) fn of_zeta(&self) -> f64 {
         let bars = self.bars.iter().filter(|bar| bar.dimension == Dimension::Damage);
         bars.map(Bar::relative).fold(0.0, f64::max)
     }
 
-    /// The triangles that make most of the change of the figure `name`: those in which ζ, for its least value
-    /// or its value at a point, or, where these are few, the contact reactions, for a force, changed by a good
-    /// part of the largest change. `None` where the whole mesh made the change.
+    /// The triangles that make most of the change of the figure `name`. For min ζ and ζ at a point, these are the
+    /// triangles in which ζ changed by a good part of the largest change; for forces and moments, those in which
+    /// the contact reactions did, if they are few. `None` if the whole mesh makes the change.
     pub(super) fn places(&self, name: &str) -> Option<Vec<bool>> {
         let bar = self.bars.iter().find(|bar| bar.name == name)?;
         let changes = match bar.dimension {
@@ -179,9 +176,10 @@ impl Measurement {
     }
 }
 
-/// The relative error of u at the end from the change of the potential energy J = ½‖u‖² − fᵀu, where the
-/// material is not damaged: the minimum over nested spaces obeys ½‖u_h − u_{h/2}‖² ≤ J(u_h) − J(u_{h/2}),
-/// with equality where no contact opens or closes, and ‖u_h − u‖² is 4/3 of the left side for order 1.
+/// The relative error of u at the end, without damage, from the change of the potential energy J = ½‖u‖² − fᵀu.
+///
+/// The minima over nested spaces obey ½‖u_h − u_{h/2}‖² ≤ J(u_h) − J(u_{h/2}), with equality if no contact opens or
+/// closes. For order 1, ‖u_h − u‖² is 4/3 of ‖u_h − u_{h/2}‖².
 fn change_of_u(coarse: &Pilot, fine: &Pilot) -> f64 {
     if coarse.problem.damage().is_some() {
         return 0.0;

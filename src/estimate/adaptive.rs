@@ -1,19 +1,22 @@
-//! Meshes for an accuracy that is asked for, instead of a size.
+//! Meshes for an accuracy instead of a size.
 //!
-//! From a coarse mesh, runs with few time steps estimate how the error of u is spread over the triangles,
-//! m_T = max_t ‖ε* − ε(u(t))‖²_T / max_t ‖u(t)‖², at the end relative to the ‖u‖² there, and the part of
-//! the damage's error that its P1 interpolation makes. Triangles are bisected down to the sizes that these
-//! estimates ask for, round after round, until the estimates are small enough. Estimates see only what the
-//! mesh shows: therefore a [`Measurement`] ends the rounds. The same steps on the mesh bisected everywhere
-//! must change every figure by less than its share of the accuracy, or the rounds go on.
+//! The rounds start from a coarse mesh. In each, a run with few time steps estimates two errors per triangle:
+//! that of u, m_T = max_t ‖ε* − ε(u(t))‖²_T / max_t ‖u(t)‖² (at the end relative to ‖u‖² there), and that of
+//! interpolating the damage in P1. Triangles are bisected down to the sizes that these estimates ask for, until
+//! the estimates are small enough.
+//!
+//! An estimate misses details that are finer than the mesh. So the rounds end with a [`Measurement`]: the same
+//! steps on the mesh bisected everywhere. If a figure then changes by more than its share of the accuracy, the
+//! rounds go on.
 
 mod measurement;
 mod pilot;
 mod round;
 mod sizes;
 
-use super::{DiscreteProblem, RunError, SetupError, figures::Bar, loads::LoadCurve};
+use super::Bar;
 use crate::{
+    evolution::{DiscreteProblem, LoadCurve, RunError, SetupError},
     interrupt::Signal,
     mesh::{Mesh, MeshError, Refinement},
     petsc::{PetscError, Session},
@@ -38,18 +41,17 @@ pub struct Adapted {
     pub error: f64,
     /// That of the damage at the end.
     pub damage_error: Option<f64>,
-    /// The damage at the end, max (ζ₀ − ζ) and its mean, as far as the few steps show it; 0 where the run
-    /// stops at ζ_*.
+    /// The damage at the end of the run with few steps, max (ζ₀ − ζ) and its mean; 0 if the run stops at ζ_*.
     pub damage: [f64; 2],
-    /// How far off the mesh may put the time at which ζ_* is reached, s, once that is measured.
+    /// How far off the time of ζ_* may be because of the mesh, s, once it is measured.
     pub stop_error: Option<f64>,
     /// The tolerance of the time steps that keeps the error of ζ within the accuracy.
     pub steps: f64,
-    /// The error bars of the figures that the mesh makes, once they are measured.
+    /// The error bars of the figures because of the mesh, once they are measured.
     pub bars: Vec<Bar>,
-    /// The largest of the measured relative errors and what it is the error of, once they are measured.
+    /// The largest of the measured relative errors and its name, once they are measured.
     pub worst: Option<(String, f64)>,
-    /// Why the accuracy was not reached, if it was not.
+    /// The reason why the accuracy was not reached, if it was not.
     pub short: Option<String>,
 }
 
@@ -90,16 +92,16 @@ impl AdaptError {
     }
 }
 
-/// The error of ζ over the damage done that the few steps of a run on a coarse mesh may make.
+/// The tolerance of the time steps of the runs with few steps.
 const PILOT_TOLERANCE: f64 = 0.05;
-/// Rounds, and triangles of a mesh or of its measurement, at most.
+/// The largest number of rounds, and of triangles of a mesh or its measurement.
 const ROUNDS: usize = 25;
 const MOST_TRIANGLES: usize = 4_000_000;
 
-/// Refines `mesh` until the measured errors of the figures in a run of `scene`, those of u (energy norm) and
-/// of the damage are at most `accuracy`; where the run ends at ζ_*, those of u and of that time. What the
-/// time steps add is for the caller. `seen` is shown each mesh with its errors. Where a run on a refined
-/// mesh fails, the mesh before it is the answer. Collective: all ranks have the same mesh.
+/// Refines `mesh` until the measured errors in a run of `scene` are at most `accuracy`: those of the figures, of u
+/// (energy norm) and of the damage, or of u and the time of ζ_* if the run ends there. The caller must care for
+/// the errors of the time steps. `seen` is called with each mesh and its errors. If a run on a refined mesh fails,
+/// the mesh before is the answer. Collective: all ranks get the same mesh.
 ///
 /// # Errors
 /// See [`AdaptError`].
@@ -128,7 +130,7 @@ pub fn adapted(
     }
 }
 
-/// A scene with few uniform steps; with chosen ones where loads or gaps pass by within these.
+/// A scene with few uniform steps, or with adaptive ones if loads or gaps pass by within these.
 fn with_passing_loads(
     session: &Session,
     mut scene: Scene,
@@ -142,8 +144,8 @@ fn with_passing_loads(
     Ok(scene)
 }
 
-/// The error bars of the figures of `scene` that `mesh` makes, measured by two runs with few steps, on the
-/// mesh and on this mesh bisected everywhere. Empty where the run ends at ζ_*. Collective.
+/// The error bars of the figures of `scene` because of `mesh`, measured by two runs with few steps: on the mesh
+/// and on the mesh bisected everywhere. There are none if the run ends at ζ_*. Collective.
 ///
 /// # Errors
 /// See [`AdaptError`].
@@ -168,7 +170,7 @@ pub fn measured_bars(
     Ok(Measurement::new(session, &few, &mesh, &pilot, solver, rounds)?.bars)
 }
 
-/// Checks that the figures for which `scene` asks an accuracy are among those that it has on `mesh`.
+/// Checks that `scene` has the figures for which it asks an accuracy.
 fn check_figures(scene: &Scene, mesh: &Mesh) -> Result<(), SetupError> {
     if scene.accuracy_of.is_empty() {
         return Ok(());
@@ -177,7 +179,7 @@ fn check_figures(scene: &Scene, mesh: &Mesh) -> Result<(), SetupError> {
     Ok(scene.check_figures(&names.iter().map(String::as_str).collect::<Vec<_>>())?)
 }
 
-/// Refines `mesh` for a scene with few steps, without an answer where a run fails.
+/// Refines `mesh` for a scene with few steps; an error if a run fails.
 fn refined(
     session: &Session,
     mut scene: Scene,
@@ -223,8 +225,8 @@ fn refined(
     }
 }
 
-/// Where ζ_* is reached, by the body or by too long steps, the steps are chosen by their error from then on;
-/// false if they are already.
+/// Makes the steps adaptive, because ζ_* is reached: by the body, or only because the steps are too long. False
+/// if they are adaptive already.
 fn choose_steps(scene: &mut Scene, accuracy: f64) -> bool {
     let Some(grid) = &mut scene.time else { return false };
     let uniform = matches!(grid.stepping, Stepping::Uniform { .. });

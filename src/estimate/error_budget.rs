@@ -1,44 +1,47 @@
-//! The error budget of a run: how large the errors of mesh, time steps and solver are.
+//! The error budget of a run: the errors of the mesh, the time steps and the solver.
 
-use super::{DiscreteProblem, Outcome, State, Stop, mesh_error::DamageError};
-use crate::{fem::RecoveredStrains, petsc::PetscError};
+use super::{RecoveredStrains, damage_error::DamageError};
+use crate::{
+    evolution::{DiscreteProblem, Outcome, State, Stop},
+    petsc::PetscError,
+};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Estimated relative errors of the last accepted state: of u in the energy norm, of the damage
-/// ζ₀ − ζ in L². `None` without damage; from the time steps also where these are too few to tell.
+/// Estimated relative errors of the last accepted state: of u in the energy norm, and of the damage ζ₀ − ζ in
+/// L². They are `None` without damage; those of the time steps also if the steps are too few to estimate.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ErrorBudget {
-    /// Of u, from the mesh.
+    /// The error of u from the mesh.
     pub displacement_mesh: f64,
-    /// Of the damage, from the mesh; `None` also where the run stopped at ζ_*: near it the error grows
-    /// without bound.
+    /// The error of the damage from the mesh; `None` also if the run stopped at ζ_*, near which it grows without
+    /// bound.
     pub damage_mesh: Option<f64>,
-    /// Of u, from the time steps.
+    /// The error of u from the time steps.
     pub displacement_steps: Option<f64>,
-    /// Of the damage, from the time steps.
+    /// The error of the damage from the time steps.
     pub damage_steps: Option<f64>,
-    /// Of the largest displacement, from the solver; infinite where the active nodes alone do not support
+    /// The error of the largest displacement from the solver; infinite if the active nodes alone do not support
     /// the body.
     pub solver: f64,
-    /// The error bars of the figures by their names, from mesh and time steps, each in the unit of its
-    /// figure; empty where they are not measured.
+    /// The error bars of the figures by their names, from mesh and time steps, each in the unit of its figure.
+    /// Empty if they are not measured.
     pub figures: BTreeMap<String, f64>,
-    /// Whether the material can be damaged.
+    /// Can the material be damaged?
     #[serde(skip)]
     pub can_be_damaged: bool,
     /// The error of ζ from the time steps, at a node and in the mean.
     #[serde(skip)]
-    pub(super) zeta_steps: Option<[f64; 2]>,
+    pub(crate) zeta_steps: Option<[f64; 2]>,
 }
 
-/// Above this the mesh is called the limit.
+/// If its error is above this, the mesh is called the limit of the answer.
 const LARGE: f64 = 0.05;
-/// Where all are below this there is nothing to spend on.
+/// If all errors are below this, there is no advice.
 const NEGLIGIBLE: f64 = 1e-9;
 
 impl ErrorBudget {
-    /// Of the last accepted state, from the estimated errors `mesh` and `steps` of its ζ. Collective.
+    /// The budget of the last accepted state, from the estimated errors `mesh` and `steps` of its ζ. Collective.
     pub(super) fn new(
         problem: &DiscreteProblem,
         outcome: &Outcome,
@@ -64,8 +67,8 @@ impl ErrorBudget {
         }
     }
 
-    /// The errors by their causes, and which cause to spend on; of a run that stopped at ζ_* those of the
-    /// time instead of the damage.
+    /// The errors by their causes, and advice on which cause to reduce. For a run that stopped at ζ_* they are
+    /// errors of that time instead of the damage.
     pub fn lines(&self, stopped: Option<&Stop>) -> [String; 4] {
         let of_damage = |error: Option<f64>| match error {
             Some(error) => format!("damage {}", percent(error)),
@@ -129,7 +132,7 @@ pub fn percent(error: f64) -> String {
 
 impl DiscreteProblem {
     /// The estimated error of u in the energy norm, relative, from the mesh. Collective.
-    pub(super) fn energy_error(&self, zeta: &[f64], u: &[f64]) -> Result<f64, PetscError> {
+    pub(crate) fn energy_error(&self, zeta: &[f64], u: &[f64]) -> Result<f64, PetscError> {
         let recovered = RecoveredStrains::new(&self.body, u)?;
         let zeta = self.zeta_at_points(zeta);
         Ok(recovered.energy_error(&self.elasticity, &zeta, u).relative())
@@ -150,9 +153,9 @@ impl DiscreteProblem {
         (sums[1] > 0.0).then(|| (sums[0] / sums[1]).sqrt())
     }
 
-    /// The relative error of u in the energy norm that errors δζ = `error` of ζ cause, at most:
-    /// ‖δζ/ζ ε(u)‖ over ‖ε(u)‖, since K δu = −δK u; for large δζ with the larger of both ζ, and at no
-    /// place more than ε(u) itself. Collective.
+    /// A bound on the relative error of u in the energy norm that errors δζ = `error` of ζ cause. As
+    /// K δu = −δK u, it is ‖δζ/ζ ε(u)‖ over ‖ε(u)‖. For large δζ the larger one of ζ and ζ + δζ counts, and the
+    /// factor is at most 1. Collective.
     pub(super) fn displacement_error_of(&self, error: &[f64], state: &State) -> f64 {
         let body = &self.body;
         let (zeta, error) = (self.zeta_at_points(&state.zeta), body.at_points(error));

@@ -5,8 +5,8 @@
 //!
 //! where the gap is narrower or more curved than an edge shows.
 
-use super::{DiscreteProblem, State};
 use crate::{
+    evolution::{DiscreteProblem, State},
     fem::{Edge, Elements, parabola},
     mesh::sorted,
     scene::Gap,

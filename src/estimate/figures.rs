@@ -1,29 +1,31 @@
 //! The figures that a run prints, and how far off each of them may be.
 
-use super::{DiscreteProblem, Step, probe::OBSERVED};
-use crate::scene::{Expression, Stepping};
+use crate::{
+    evolution::{DiscreteProblem, OBSERVED, Step},
+    scene::{Expression, Stepping},
+};
 use serde::{Deserialize, Serialize};
 
-/// The figures of a [`StepRecord`](super::StepRecord) that have an error bar.
+/// The figures of a [`StepRecord`](crate::evolution::StepRecord) that have an error bar.
 const OF_RECORD: [&str; 5] = ["work", "displacement_max", "contact_force", "zeta_min", "zeta_mean"];
 /// The groups of the supports' forces and moments, and the first of two for each probe.
 const FORCES: usize = 5;
 const MOMENTS: usize = 6;
 const FIRST_PROBE: usize = 7;
-/// A figure counts as no smaller than this part of the largest figure of its dimension: a force that
-/// symmetry makes zero has no relative error.
+/// The scale of a figure is at least this fraction of the largest figure of its dimension. Otherwise a force that
+/// is zero by symmetry would have no relative error.
 const LEAST: f64 = 1e-3;
-/// A moment counts as no smaller than this part of the largest force at the body's radius of gyration: about
-/// a point near the line of its force it is small by choice of the point.
+/// The scale of a moment is at least this fraction of the largest force times the body's radius of gyration. A
+/// moment is small about any point near the line of its force.
 const LEAST_MOMENT: f64 = 0.1;
-/// The error of the integral of a body force that varies in space, relative: both meshes of a measurement
-/// may have the same.
+/// The relative error of the integral of a body force that varies in space. Both meshes of a measurement may
+/// have the same error, which the measurement then misses.
 const BODY_FORCE: f64 = 1e-4;
 /// A damage below this is negligible.
 const NEGLIGIBLE_DAMAGE: f64 = 1e-6;
 
-/// A quantity below this part of the largest of its group is rounding, or the solver's tolerance.
-const ROUNDING: f64 = 1e-9;
+/// A quantity below this fraction of the largest of its group is rounding, and shown as zero.
+const SHOWN_AS_ZERO: f64 = 1e-9;
 
 /// The dimension of a figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -59,7 +61,7 @@ pub struct Bar {
     pub dimension: Dimension,
     /// How far off the figure may be, in its own unit.
     pub bar: f64,
-    /// What the accuracy asked for is relative to: the largest value of the figure in the run, of a
+    /// The accuracy asked for is relative to this: the largest value of the figure in the run, and for a
     /// damage ζ the largest 1 − ζ.
     pub scale: f64,
 }
@@ -97,20 +99,20 @@ impl DiscreteProblem {
     }
 
     /// The names of all figures.
-    pub(super) fn figure_names(&self) -> Vec<String> {
+    pub(crate) fn figure_names(&self) -> Vec<String> {
         self.figures().into_iter().map(|figure| figure.name).collect()
     }
 
     /// The error bars of all figures, from their errors and scales.
-    pub(super) fn bars(&self, errors: &[f64], scales: &[f64]) -> Vec<Bar> {
+    pub(crate) fn bars(&self, errors: &[f64], scales: &[f64]) -> Vec<Bar> {
         let bar =
             |(Figure { name, dimension, .. }, (&bar, &scale))| Bar { name, dimension, bar, scale };
         self.figures().into_iter().zip(errors.iter().zip(scales)).map(bar).collect()
     }
 
-    /// The scale of each figure, from its largest |value| in a run, of a damage from the largest 1 − ζ:
-    /// the largest one of its group.
-    pub(super) fn figure_scales(&self, largest: &[f64]) -> Vec<f64> {
+    /// The scale of each figure, from the `largest` [sizes](Self::figure_sizes) of a run: the largest size in its
+    /// group.
+    pub(crate) fn figure_scales(&self, largest: &[f64]) -> Vec<f64> {
         let figures = self.figures();
         let most = |is_like: &dyn Fn(&Figure) -> bool| {
             let like = figures.iter().zip(largest).filter(|(figure, _)| is_like(figure));
@@ -131,20 +133,20 @@ impl DiscreteProblem {
         figures.iter().map(scale).collect()
     }
 
-    /// The values of [`Self::quantities`] with zeros in the place of rounding: among forces, moments, and
-    /// the components of the displacement or of the stress at a probe. A force at the body's radius of
-    /// gyration counts among the moments.
-    pub(super) fn without_rounding(&self, mut values: Vec<f64>) -> Vec<f64> {
+    /// The values of [`Self::quantities`] with zeros in place of rounding. Forces are compared with forces,
+    /// moments with moments, and with forces times the body's radius of gyration; at a probe the components of
+    /// the displacement, and those of the stress.
+    pub(crate) fn without_rounding(&self, mut values: Vec<f64>) -> Vec<f64> {
         let figures = &self.figures()[OF_RECORD.len()..];
         let most = |group: usize| {
             let alike = figures.iter().zip(&values).filter(|(figure, _)| figure.group == group);
             alike.fold(0.0_f64, |most, (_, value)| most.max(value.abs()))
         };
-        let lever = (self.body.polar_inertia / self.body.area).sqrt();
+        let lever = self.body.radius_of_gyration();
         let rounding = figures.iter().map(|figure| match figure.dimension {
             Dimension::Damage => 0.0,
-            Dimension::Moment => ROUNDING * most(MOMENTS).max(lever * most(FORCES)),
-            _ => ROUNDING * most(figure.group),
+            Dimension::Moment => SHOWN_AS_ZERO * most(MOMENTS).max(lever * most(FORCES)),
+            _ => SHOWN_AS_ZERO * most(figure.group),
         });
         let rounding: Vec<f64> = rounding.collect();
         for (value, rounding) in values.iter_mut().zip(rounding) {
@@ -154,8 +156,8 @@ impl DiscreteProblem {
         values
     }
 
-    /// The |values| of all figures, and 1 − ζ of a damage: what their scales come from.
-    pub(super) fn figure_sizes(&self, values: &[f64]) -> Vec<f64> {
+    /// The sizes of all figures, from which their scales come: |value|, and 1 − ζ for a damage.
+    pub(crate) fn figure_sizes(&self, values: &[f64]) -> Vec<f64> {
         let size = |(figure, value): (&Figure, &f64)| match figure.dimension {
             Dimension::Damage => 1.0 - value,
             _ => value.abs(),
@@ -163,11 +165,13 @@ impl DiscreteProblem {
         self.figures().iter().zip(values).map(size).collect()
     }
 
-    /// Adds to the error bars what the solver's tolerance and the integration of body forces allow, and what
-    /// the time steps may do, where the damage ζ is off by at most `most` at a node and by `mean` in the mean
-    /// and therefore u by `displacement` (relative, energy norm): u has no other memory than ζ. The few steps
-    /// of a uniform grid may show but half of their error.
-    pub(super) fn add_step_errors(&self, bars: &mut [Bar], of_steps: [f64; 3]) {
+    /// Adds to the error bars the solver's tolerance, the error of the integrals of body forces, and the errors
+    /// of the time steps.
+    ///
+    /// The steps put ζ off by at most `most` at a node, by `mean` in the mean, and so u by `displacement`
+    /// (relative, energy norm): u depends on the past only through ζ. A few uniform steps may show only half of
+    /// their error, which is doubled for them.
+    pub(crate) fn add_step_errors(&self, bars: &mut [Bar], of_steps: [f64; 3]) {
         let grid = self.scene().time.map(|grid| grid.stepping);
         let uniform = matches!(grid, Some(Stepping::Uniform { .. }));
         let [most, mean, displacement] = of_steps.map(|e| if uniform { 2.0 * e } else { e });
@@ -189,7 +193,7 @@ impl DiscreteProblem {
 
 impl Step {
     /// The values of all figures, in the order of [`DiscreteProblem::bars`].
-    pub(super) fn figures(&self) -> Vec<f64> {
+    pub(crate) fn figures(&self) -> Vec<f64> {
         let record = &self.record;
         let of_record = [
             record.work,

@@ -1,39 +1,40 @@
-//! A mesh of the rounds: whether it is good enough to be measured, and how the next one is to be refined.
+//! One round: is its mesh good enough to be measured, and how is the next one refined?
 
 use super::{
-    super::{step_controller::AIM as AIM_OF_STEPS, unresolved::unresolved},
-    Adapted,
-    measurement::Measurement,
-    pilot::Pilot,
+    super::unresolved::unresolved, Adapted, measurement::Measurement, pilot::Pilot,
     sizes::size_ratios,
 };
 use crate::{
+    evolution::AIM as AIM_OF_STEPS,
     mesh::{Mesh, Order, sorted},
     scene::Scene,
 };
 use std::collections::HashSet;
 
-/// Parts of the accuracy asked for: what a mesh is made for, and what its estimates may be.
+/// A mesh is refined for this fraction of the accuracy asked for …
 const AIM: f64 = 0.7;
+/// … and good enough if its estimates are at most this fraction of it.
 const ENOUGH: f64 = 0.8;
-/// The part of the damage's error that its interpolation may take.
+/// The fraction of the damage's error that its interpolation may take.
 const INTERPOLATION: f64 = 0.7;
-/// The tolerance of the time steps is what the mesh leaves of the accuracy, and this part of it at most.
+/// The time steps may use the part of the accuracy that the mesh leaves: at most and at least these fractions of
+/// the accuracy.
 const SHARE_OF_STEPS: f64 = 0.5;
 const LEAST_OF_STEPS: f64 = 0.04;
-/// Where measured errors are too large, the estimated ones are made smaller by no more than this in a round.
+/// If measured errors are too large, the estimated ones are reduced, in a round by no smaller factor than this.
 const LEAST_GOAL: f64 = 0.25;
-/// Where figures alone are asked for, they are measured once u and the damage are estimated to be so exact.
+/// If the user asks for the accuracy of some figures only, these are measured once u and the damage have at most
+/// this estimated error.
 const ROUGH: f64 = 0.1;
-/// Between the nodes the body may lie in the foundation by this part of the accuracy, relative to the
-/// largest displacement.
+/// Between the nodes the body may penetrate the foundation by this fraction of the accuracy times the largest
+/// displacement.
 const PENETRATION: f64 = 0.5;
-/// A triangle becomes smaller by this where a function of the scene is not resolved, and by this where the
-/// body lies in the foundation.
+/// The size of a triangle is multiplied by this where data of the scene are not resolved …
 const HALF: f64 = 0.5;
+/// … and by this where the body penetrates the foundation.
 const QUARTER: f64 = 0.25;
 
-/// A mesh with what a run with few steps showed on it.
+/// A mesh and a run with few steps on it.
 pub(super) struct Round<'a> {
     scene: &'a Scene,
     mesh: &'a Mesh,
@@ -66,9 +67,9 @@ impl<'a> Round<'a> {
         }
     }
 
-    /// Whether the estimates, and what the mesh shows of the scene, are good enough for a measurement.
+    /// Is the mesh good enough for a measurement? Its estimates are small, and the data of the scene resolved.
     pub(super) fn is_enough(&self) -> bool {
-        // Where some figures alone are asked for, the estimates only have to be estimates.
+        // For some figures alone, the estimates only have to be reliable.
         let named = !self.scene.accuracy_of.is_empty();
         let wanted = if named { self.accuracy.max(ROUGH) } else { self.accuracy };
         self.error.max(self.damage_error.unwrap_or(0.0)) <= ENOUGH * wanted
@@ -104,9 +105,9 @@ impl<'a> Round<'a> {
         }
     }
 
-    /// By how much to multiply the size of each triangle for the next mesh. A figure that few triangles
-    /// make inexact asks for smaller ones there, with an error of first order in their size; any other for
-    /// smaller errors of u and the damage.
+    /// The factors by which to multiply the sizes of the triangles for the next mesh. If a few triangles make
+    /// the error of a figure, these become smaller, as the error is of first order in their size. Any other
+    /// error asks for smaller errors of u and the damage.
     pub(super) fn size_ratios(&self, measured: Option<&Measurement>) -> Vec<f64> {
         let (mut shares, mut depths) = (self.shares.clone(), self.pilot.depths().to_vec());
         let mut sizes = vec![1.0_f64; shares.len()];
@@ -148,14 +149,14 @@ impl<'a> Round<'a> {
         }
         let mut ratios: Vec<f64> =
             ratios.iter().zip(sizes).map(|(ratio, size)| ratio.min(size)).collect();
-        // Where no estimate tells which triangles are too large, all are.
+        // If no estimate shows which triangles are too large, all are.
         if smaller < 1.0 && ratios.iter().all(|&ratio| ratio == 1.0) {
             ratios.fill(smaller);
         }
         ratios
     }
 
-    /// A damage that is not exact enough asks for a u better than the accuracy.
+    /// The accuracy of u that the next mesh needs: a damage that is not exact enough needs a better u.
     fn accuracy_of_u(&self) -> f64 {
         match self.damage_error {
             Some(of_damage) if of_damage > ENOUGH * self.accuracy => {

@@ -1,19 +1,19 @@
-//! The sizes that triangles must have for an accuracy, and their bisection down to these sizes.
+//! The sizes of the triangles for an accuracy, and bisection down to these sizes.
 //!
 //! On a triangle whose size is multiplied by r the error falls like r^p, p the order, and 1/r² triangles
 //! take its place: the least number of triangles for a given error Σ r_T^2p m_T has r_T ~ m_T^(−1/(2p+2)).
 
 use crate::mesh::{Mesh, MeshError, Refinement, twice_area};
 
-/// A triangle's size is multiplied by no less than this in a round.
+/// The least factor by which the size of a triangle is multiplied in a round.
 const LEAST_RATIO: f64 = 0.125;
 /// Triangles are bisected while they are larger than this many times their wanted area; see [`oversize`].
 const OVERSIZE: f64 = 1.5;
-/// A little less than 1: what equals the median up to rounding is bisected with it.
+/// A little less than 1, so that triangles equal to the median up to rounding are bisected with it.
 const TIES: f64 = 1.0 - 1e-9;
 
-/// By how much to multiply the size of each triangle, with its share m_T = `shares` of the squared
-/// relative error, so that this becomes `aim`².
+/// The factors by which to multiply the sizes of the triangles, so that the squared relative error becomes
+/// `aim`². Triangle T has the share m_T of it now.
 pub(super) fn size_ratios(shares: &[f64], order: f64, aim: f64) -> Vec<f64> {
     let exponent = 1.0 / (2.0 * order + 2.0);
     let ratio = |factor: f64, share: f64| match share {
@@ -51,8 +51,8 @@ pub(super) fn divided(mut refinement: Refinement, ratios: &[f64]) -> Result<Refi
     }
 }
 
-/// [`OVERSIZE`]; where that asks for no bisection, so little that of the triangles that are too large at all
-/// the half with the larger errors is bisected: a mesh that is short of the accuracy must not stay.
+/// [`OVERSIZE`], unless it asks for no bisection at all. Then it is so small that the half with the larger errors
+/// of all triangles that are too large is bisected: a mesh that misses the accuracy must change.
 fn oversize(ratios: &[f64]) -> f64 {
     let mut squares: Vec<f64> = ratios.iter().map(|r| r * r).filter(|&r| r < 1.0).collect();
     squares.sort_by(f64::total_cmp);

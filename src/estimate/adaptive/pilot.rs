@@ -1,35 +1,32 @@
 //! A run with few time steps: how the error of u is spread over the triangles, where the body lies in the
 //! foundation between the nodes, and the figures at the times of its steps.
 
-use super::super::{DiscreteProblem, Outcome, Phases, RunError, State, Step, run, run_unestimated};
 use crate::{
-    fem::RecoveredStrains,
+    estimate::RecoveredStrains,
+    evolution::{DiscreteProblem, Outcome, Phases, RunError, State, Step, run, run_unestimated},
     petsc::{PetscError, Session},
 };
 
-/// Steps of the run; times, about, at which errors are estimated.
+/// Steps of the run, and instants, evenly spread, at which its errors are estimated.
 pub(super) const INSTANTS: usize = 12;
-/// Where a run is only compared with another, strains are recovered at every so many of these times.
-const FEW: usize = 4;
-/// At the end, errors are relative to no less than this part of the largest ‖u‖².
-const UNLOADED: f64 = 1e-4;
+/// Instants at which errors are estimated in a run that is only compared with another.
+const FEW: usize = 3;
+/// Errors at the end are relative to at least this fraction of the largest ‖u‖².
+const LEAST_ENERGY: f64 = 1e-4;
 
-/// What a run with few steps shows, triangle by triangle of the undivided mesh.
+/// A run with few steps, and its errors on each triangle of the undivided mesh.
 pub(super) struct Pilot<'a> {
     pub(super) problem: &'a DiscreteProblem,
     pub(super) outcome: Outcome,
     seen: Seen,
 }
 
-/// What was seen of the steps of a run.
+/// The errors of the steps of a run.
 #[derive(Default)]
 struct Seen {
-    /// Strains are recovered at every so many instants and at the end.
-    every: usize,
-    /// The instants so far, the time of the last one and that of the last recovered strains, s.
+    /// The instants at which errors are estimated, and the time of the last one so far, s.
     instants: usize,
     last: Option<f64>,
-    recovered: Option<f64>,
     /// max_t ‖ε* − ε(u)‖²_T, and the largest sum over T at any time.
     squares: Vec<f64>,
     worst: f64,
@@ -56,13 +53,15 @@ impl<'a> Pilot<'a> {
         estimated: bool,
     ) -> Result<Self, RunError> {
         let zeros = vec![0.0; triangles];
-        let every = if estimated { 1 } else { FEW };
-        let mut seen = Seen { every, squares: zeros.clone(), depths: zeros, ..Seen::default() };
+        let instants = if estimated { INSTANTS } else { FEW };
+        let mut seen = Seen { instants, squares: zeros.clone(), depths: zeros, ..Seen::default() };
         let phases = Phases::default();
-        let mut observe = |step: &Step| Ok(seen.observe(problem, step, false)?);
+        let mut observe = |step: &Step| Ok(seen.observe(problem, step)?);
         let run = if estimated { run } else { run_unestimated };
         let outcome = run(session, problem, solver, &phases, &mut observe)?;
-        seen.observe(problem, &outcome.last, true)?;
+        if seen.last != Some(outcome.last.state.time) {
+            seen.estimate(problem, &outcome.last.state)?;
+        }
         Ok(Self { problem, outcome, seen })
     }
 
@@ -134,8 +133,8 @@ impl<'a> Pilot<'a> {
         if *worst == 0.0 {
             return (0.0, vec![0.0; squares.len()]);
         }
-        // What is left after unloading need not be exact.
-        let of_last = of_last.max(UNLOADED * energy);
+        // After unloading, the rest of the deformation need not be exact.
+        let of_last = of_last.max(LEAST_ENERGY * energy);
         let share = |(max, end): (&f64, &f64)| (max / energy).max(end / of_last);
         let shares = squares.iter().zip(last).map(share).collect();
         ((worst / energy).max(error / of_last).sqrt(), shares)
@@ -143,48 +142,31 @@ impl<'a> Pilot<'a> {
 }
 
 impl Seen {
-    /// Sees an accepted step; `at_end` says that it is the last one. Collective.
-    fn observe(
-        &mut self,
-        problem: &DiscreteProblem,
-        step: &Step,
-        at_end: bool,
-    ) -> Result<(), PetscError> {
-        let state = &step.state;
-        if !at_end {
-            let figures = step.figures();
-            let sizes = problem.figure_sizes(&figures);
-            self.sizes.resize(sizes.len(), 0.0);
-            self.sizes.iter_mut().zip(sizes).for_each(|(most, size)| *most = most.max(size));
-            self.figures.push((state.time, figures));
-        }
+    /// Sees an accepted step. Collective.
+    fn observe(&mut self, problem: &DiscreteProblem, step: &Step) -> Result<(), PetscError> {
+        let time = step.state.time;
+        let figures = step.figures();
+        let sizes = problem.figure_sizes(&figures);
+        self.sizes.resize(sizes.len(), 0.0);
+        self.sizes.iter_mut().zip(sizes).for_each(|(most, size)| *most = most.max(size));
+        self.figures.push((time, figures));
         let end = problem.scene().time.map_or(1.0, |grid| grid.end);
-        let part = |time: f64| (INSTANTS as f64 * time / end + 1e-9).floor();
-        let due = match self.last {
-            None => true,
-            Some(before) => state.time > before && (at_end || part(state.time) > part(before)),
-        };
-        if due {
-            self.last = Some(state.time);
-            self.instants += 1;
-            let largest = problem.body.nodes.partition.max_norm(&state.u);
-            self.displacement = self.displacement.max(largest);
-            for penetration in problem.penetrations(state) {
-                let deepest = &mut self.depths[penetration.triangle];
-                *deepest = deepest.max(penetration.depth);
-            }
+        let part = |time: f64| (self.instants as f64 * time / end + 1e-9).floor();
+        match self.last.is_none_or(|before| part(time) > part(before)) {
+            true => self.estimate(problem, &step.state),
+            false => Ok(()),
         }
-        let turn = due && (self.instants - 1).is_multiple_of(self.every);
-        if turn || (at_end && self.recovered != Some(state.time)) {
-            self.recovered = Some(state.time);
-            self.estimate(problem, state)?;
-        }
-        Ok(())
     }
 
     /// Estimates the errors of a state. Collective.
     fn estimate(&mut self, problem: &DiscreteProblem, state: &State) -> Result<(), PetscError> {
         let body = &problem.body;
+        self.last = Some(state.time);
+        self.displacement = self.displacement.max(body.nodes.partition.max_norm(&state.u));
+        for penetration in problem.penetrations(state) {
+            let deepest = &mut self.depths[penetration.triangle];
+            *deepest = deepest.max(penetration.depth);
+        }
         let zeta = problem.zeta_at_points(&state.zeta);
         let recovered = RecoveredStrains::new(body, &state.u)?;
         let error = recovered.energy_error(&problem.elasticity, &zeta, &state.u);

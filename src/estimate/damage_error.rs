@@ -1,0 +1,238 @@
+//! The error that the mesh makes in the damage.
+//!
+//! Let z be the damage on a much finer mesh, and ζ the damage of the run. Their difference e = z − ζ is
+//! sought as a quadratic function. Equation (25) for z, less what ζ makes of it, reads
+//!
+//! (e_n − e_{n−1}, w) + k (κ∇e_n, ∇w) = k (φ* − ζ′, w) − k (κ∇ζ_n, ∇w) for all quadratic w.
+//!
+//! It is solved for about ten long steps between states of the run, by conjugate gradients in the
+//! hierarchical basis. The source φ* of z comes from the strains of a much finer mesh ([`FineStrains`]) at
+//! the same ζ. Strains under the same stress are proportional to 1/ζ, so φ* = φ((ζ/z)² |ε*|², z).
+
+use super::{
+    fine_strains::FineStrains,
+    hierarchical::{affine, coefficients, interpolation_error, laplace, mass, values},
+    instants::Instants,
+    quadratic_system::QuadraticSystem,
+};
+use crate::{
+    evolution::{DamageStep, DiscreteProblem, Outcome, Phases, RunError, State, agreed},
+    mesh::Order,
+    model::DamageLaw,
+    petsc::PetscError,
+};
+use nalgebra::{Vector3, Vector6};
+
+/// The estimated error that the mesh makes in the damage.
+pub(super) struct DamageError {
+    /// ‖z − ζ‖ / ‖ζ₀ − z‖ in L².
+    pub(super) relative: f64,
+    /// z − ζ at the vertices.
+    pub(super) change: Vec<f64>,
+    /// See [`Outcome::damage_indicators`].
+    pub(super) indicators: Vec<f64>,
+    /// How long after z the ζ of the run has fallen to the same minimum, s. It is taken at the last instant
+    /// at which both still fall; `None` if there is no such instant.
+    pub(super) delay: Option<f64>,
+}
+
+/// The error that the mesh makes in the last damage. It is `None` without damage, and if the contact problem in
+/// the other order of u has no answer. Collective.
+pub(super) fn damage_error(
+    problem: &DiscreteProblem,
+    damage_step: &mut DamageStep,
+    mut instants: Instants,
+    outcome: &Outcome,
+) -> Option<DamageError> {
+    let comm = problem.body.nodes.partition.comm();
+    let last = &outcome.last.state;
+    let undamaged = comm.all(last.zeta == problem.initial_damage());
+    let laws = problem.damage().filter(|_| !undamaged)?;
+    instants.end(last);
+    let stopped = outcome.stopped.is_some();
+    instants.falling.extend(outcome.stopped.map(|stop| (stop.time, problem.threshold())));
+    let error = error_at_end(problem, damage_step, laws, &instants, stopped);
+    agreed(comm, error).ok().flatten()
+}
+
+/// Follows e from the first instant to the last. The run may have `stopped` at ζ_*.
+fn error_at_end(
+    problem: &DiscreteProblem,
+    damage_step: &mut DamageStep,
+    laws: &[DamageLaw],
+    instants: &Instants,
+    stopped: bool,
+) -> Result<Option<DamageError>, RunError> {
+    let [first, .., last] = &instants.states[..] else { return Ok(None) };
+    let (session, phases) = (damage_step.session, Phases::default());
+    let other = problem.of_other_order(session)?;
+    let fine = if other.body.order() == Order::Quadratic { &other } else { problem };
+    let Some(nodes) = fine.body.quadratic_nodes() else { return Ok(None) };
+    let mut strains = FineStrains::new(session, [problem, &other], &phases, stopped)?;
+    let mut error = ZetaError::new(problem, laws, fine, nodes, &first.zeta)?;
+    let (initial, mut delay) = (error.field.clone(), None);
+    let mut before: Option<(&State, Vec<f64>, Vec<Vector6<f64>>)> = None;
+    for state in &instants.states {
+        let strains = strains.squared(state)?;
+        let load = damage_step.source(state).load.as_slice().to_vec();
+        if let Some((before, load_before, source_before)) = &before {
+            let means = load.iter().zip(load_before).map(|(b, before)| 0.5 * (b + before));
+            let skipped = error.skipped_rates([before, state], means.collect())?;
+            let next = error.source(state, &strains);
+            let source = next.iter().zip(source_before).map(|(f, before)| 0.5 * (f + before));
+            let source: Vec<_> = source.collect();
+            error.advance(damage_step, [before, state], &skipped, &source)?;
+        }
+        before = Some((state, load, error.source(state, &strains)));
+        let minimum = error.minimum(state);
+        if minimum > problem.threshold() {
+            delay = instants.delay(state.time, minimum).or(delay);
+        }
+    }
+    Ok(error.at_end(&initial, last, delay))
+}
+
+/// e = z − ζ at an instant.
+struct ZetaError<'a> {
+    problem: &'a DiscreteProblem,
+    /// The damage laws and κ, m²/s, of the materials by their numbers.
+    laws: &'a [DamageLaw],
+    diffusions: Vec<f64>,
+    /// The problem in P2, the six nodes of each of its triangles, and its node at each vertex.
+    fine: &'a DiscreteProblem,
+    nodes: &'a [[usize; 6]],
+    node_of_vertex: Vec<usize>,
+    /// The coefficients of e in the hierarchical basis, by the nodes of P2.
+    field: Vec<f64>,
+}
+
+impl<'a> ZetaError<'a> {
+    /// At the start, where ζ interpolates ζ₀.
+    fn new(
+        problem: &'a DiscreteProblem,
+        laws: &'a [DamageLaw],
+        fine: &'a DiscreteProblem,
+        nodes: &'a [[usize; 6]],
+        initial: &[f64],
+    ) -> Result<Self, PetscError> {
+        let mut field = vec![0.0; fine.body.nodes.points.len()];
+        for (nodes, heights) in nodes.iter().zip(interpolation_error(&problem.body, initial)?) {
+            nodes[3..].iter().zip(heights).for_each(|(&node, height)| field[node] = height);
+        }
+        let node_of_vertex = fine.body.node_of_vertex();
+        let diffusions = problem.diffusions();
+        Ok(Self { problem, laws, diffusions, fine, nodes, node_of_vertex, field })
+    }
+
+    /// From one state to the next, with the mean `source` φ* between them and the `skipped` rates.
+    fn advance(
+        &mut self,
+        damage_step: &mut DamageStep,
+        [before, state]: [&State; 2],
+        skipped: &[f64],
+        source: &[Vector6<f64>],
+    ) -> Result<(), RunError> {
+        let (body, k) = (&self.problem.body, state.time - before.time);
+        let mut load = vec![0.0; self.field.len()];
+        let mut matrices = Vec::with_capacity(source.len());
+        for (t, triangle) in body.triangles.iter().enumerate() {
+            let vertices = body.mesh.triangles[t];
+            let (mass, diffusion) =
+                (mass(triangle), self.diffusions[body.material(t)] * laplace(triangle));
+            let [now, before, skipped] =
+                [&state.zeta[..], &before.zeta, skipped].map(|f| affine(vertices.map(|i| f[i])));
+            let source = coefficients(source[t]) - (now - before) / k;
+            let mut of_triangle = mass * (source + skipped) - diffusion * (now + self.on(t));
+            // At the vertices the skipped rates make up for the residual of ζ exactly.
+            let excess = triangle.area() / 3.0 * skipped - mass * skipped;
+            (0..3).for_each(|i| of_triangle[i] += excess[i]);
+            let nodes = self.nodes[t].iter().zip(&of_triangle);
+            nodes.for_each(|(&node, of_node)| load[node] += k * of_node);
+            matrices.push(mass + k * diffusion);
+        }
+        let session = damage_step.session;
+        let (vertices, linear) = (&self.node_of_vertex, damage_step.system(k)?);
+        let owned = &vertices[..body.vertices.partition.owned()];
+        let mut system =
+            QuadraticSystem::new(&self.fine.body, self.nodes, matrices, owned, (linear, k));
+        let change = system.solve(session, &load)?;
+        self.field.iter_mut().zip(change).for_each(|(e, change)| *e += change);
+        Ok(())
+    }
+
+    /// The run has made many steps between two states. Their sources differ from the mean of the sources at
+    /// these two, and make rates that no long step can see: (M ζ′ + κL ζ_n − b)_i over the weight of vertex i,
+    /// with b = `mean` the mean load of the two. Collective.
+    fn skipped_rates(
+        &self,
+        [before, state]: [&State; 2],
+        mean: Vec<f64>,
+    ) -> Result<Vec<f64>, PetscError> {
+        let (body, k) = (&self.problem.body, state.time - before.time);
+        let mut rates: Vec<f64> = mean.into_iter().map(|b| -b).collect();
+        for (t, (nodes, triangle)) in body.mesh.triangles.iter().zip(&body.triangles).enumerate() {
+            let [now, before] =
+                [&state.zeta, &before.zeta].map(|field| Vector3::from(nodes.map(|i| field[i])));
+            let diffusion = self.diffusions[body.material(t)] * triangle.laplace();
+            let residual = self.problem.mass().of(triangle) * (now - before) / k + diffusion * now;
+            nodes.iter().zip(&residual).for_each(|(&node, of_node)| rates[node] += of_node);
+        }
+        rates.iter_mut().zip(&body.vertices.weights).for_each(|(rate, weight)| *rate /= weight);
+        body.vertices.partition.update(&mut rates, 1)?;
+        Ok(rates)
+    }
+
+    /// The coefficients of e on triangle `t`.
+    fn on(&self, t: usize) -> Vector6<f64> {
+        self.nodes[t].map(|node| self.field[node]).into()
+    }
+
+    /// e at the vertices.
+    fn at_vertices(&self) -> Vec<f64> {
+        self.node_of_vertex.iter().map(|&node| self.field[node]).collect()
+    }
+
+    /// min z at the vertices. Collective.
+    fn minimum(&self, state: &State) -> f64 {
+        let z = state.zeta.iter().zip(self.at_vertices()).map(|(zeta, e)| zeta + e);
+        self.problem.body.vertices.partition.min_max(&z.collect::<Vec<_>>()).0
+    }
+
+    /// φ* of `state` at the vertices and midpoints of each triangle, 1/s, with |ε*|² = `strain_squared`.
+    fn source(&self, state: &State, strain_squared: &[Vector6<f64>]) -> Vec<Vector6<f64>> {
+        let body = &self.problem.body;
+        let of_triangle = |(t, nodes): (usize, &[usize; 3])| {
+            let law = &self.laws[body.material(t)];
+            let zeta = affine(nodes.map(|node| state.zeta[node]));
+            let (zeta, z) = (values(zeta), values(zeta + self.on(t)));
+            Vector6::from_fn(|i, _| {
+                let (zeta, z) = (law.truncate(zeta[i]), law.truncate(z[i]));
+                law.source((zeta / z).powi(2) * strain_squared[t][i], z)
+            })
+        };
+        body.mesh.triangles.iter().enumerate().map(of_triangle).collect()
+    }
+
+    /// The error in the `last` state, from the `initial` e. Collective.
+    fn at_end(self, initial: &[f64], last: &State, delay: Option<f64>) -> Option<DamageError> {
+        let body = &self.problem.body;
+        let start = self.problem.initial_damage();
+        let (mut sums, mut indicators) = ([0.0; 2], Vec::with_capacity(body.own_triangles));
+        for (t, nodes) in body.mesh.triangles.iter().enumerate().take(body.own_triangles) {
+            let mass = mass(&body.triangles[t]);
+            let square = |v: Vector6<f64>| v.dot(&(mass * v));
+            let error = self.on(t);
+            // ζ₀ − z.
+            let mut damage = affine(nodes.map(|node| start[node] - last.zeta[node])) - error;
+            (3..6).for_each(|i| damage[i] += initial[self.nodes[t][i]]);
+            let bubbles = error - affine([error[0], error[1], error[2]]);
+            sums[0] += square(error);
+            sums[1] += square(damage);
+            indicators.push(square(bubbles));
+        }
+        body.vertices.partition.comm().sum(&mut sums);
+        indicators.iter_mut().for_each(|square| *square /= sums[1]);
+        let (relative, change) = ((sums[0] / sums[1]).sqrt(), self.at_vertices());
+        relative.is_finite().then_some(DamageError { relative, change, indicators, delay })
+    }
+}

@@ -1,0 +1,79 @@
+//! Strains as a much finer mesh would have them, from the displacements u₁ in P1 and u₂ in P2.
+//!
+//! In the energy norm errors are orthogonal to what a mesh resolves, so squares add up. With the
+//! estimated error η of u₂,
+//!
+//! |ε*|² = |ε(u₂)|² + c (|ε(u₂)|² − |ε(u₁)|²), c = η²/‖u₂ − u₁‖², but no more than 1.
+//!
+//! A run that reached ζ_* did so at a singular point, where both orders converge alike: there c = 1.
+
+use super::recovery::{RecoveredStrains, strains_at_nodes};
+use crate::{
+    contact::SOLVERS,
+    evolution::{ContactStep, DiscreteProblem, Phases, RunError, State},
+    mesh::Order,
+    petsc::Session,
+};
+use nalgebra::{Vector3, Vector6};
+
+/// A run and the same scene in the other order of u, on the same mesh and for the same damage.
+pub(super) struct FineStrains<'a> {
+    run: &'a DiscreteProblem,
+    other: &'a DiscreteProblem,
+    /// The contact step of the other order.
+    contact_step: ContactStep<'a>,
+    /// Did the run stop at ζ_*?
+    stopped: bool,
+}
+
+impl<'a> FineStrains<'a> {
+    pub(super) fn new(
+        session: &'a Session,
+        [run, other]: [&'a DiscreteProblem; 2],
+        phases: &'a Phases,
+        stopped: bool,
+    ) -> Result<Self, RunError> {
+        let contact_step = ContactStep::new(session, other, SOLVERS[0], phases)?;
+        Ok(Self { run, other, contact_step, stopped })
+    }
+
+    /// |ε*|² at the vertices and midpoints of each triangle in a state of the run. Collective.
+    ///
+    /// # Errors
+    /// PETSc or the contact step failed, or the scene contradicts itself at the nodes of the other order.
+    pub(super) fn squared(&mut self, state: &State) -> Result<Vec<Vector6<f64>>, RunError> {
+        let solved = self.contact_step.solve(0, state.time, &state.zeta)?;
+        self.contact_step.accept(state.time)?;
+        let [(coarse, u1), (fine, u2)] = match self.run.body.order() {
+            Order::Linear => [(self.run, &state.u), (self.other, &solved.state.u)],
+            Order::Quadratic => [(self.other, &solved.state.u), (self.run, &state.u)],
+        };
+        let body = &coarse.body;
+        let square = |e: Vector3<f64>| e[0] * e[0] + e[1] * e[1] + 0.5 * e[2] * e[2];
+        let mut squares = Vec::with_capacity(body.triangles.len());
+        let mut distance = 0.0;
+        let strains = strains_at_nodes(body, u1).zip(strains_at_nodes(&fine.body, u2));
+        for (t, (e1, e2)) in strains.enumerate() {
+            if t < body.own_triangles {
+                // Strains are affine, so the midpoints integrate ‖u₂ − u₁‖² exactly.
+                let d = coarse.elasticity.d(body, t);
+                let zeta = body.mesh.triangles[t].map(|node| state.zeta[node]);
+                let weight = zeta.iter().sum::<f64>() / 9.0 * body.triangles[t].area();
+                let midpoints = (3..6).map(|i| e2[i] - e1[i]);
+                distance += weight * midpoints.map(|e| e.dot(&(d * e))).sum::<f64>();
+            }
+            squares.push([e1, e2].map(|e| Vector6::from(e.map(square))));
+        }
+        let distance = body.nodes.partition.comm().total(distance);
+        let c = if self.stopped {
+            1.0
+        } else {
+            let recovered = RecoveredStrains::new(&fine.body, u2)?;
+            let zeta = fine.zeta_at_points(&state.zeta);
+            let error = recovered.energy_error(&fine.elasticity, &zeta, u2).error;
+            (error / distance).min(1.0)
+        };
+        let fine = |[s1, s2]: [Vector6<f64>; 2]| (s2 + c * (s2 - s1)).map(|square| square.max(0.0));
+        Ok(squares.into_iter().map(fine).collect())
+    }
+}

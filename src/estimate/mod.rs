@@ -1,0 +1,74 @@
+//! How far off an answer is, and the mesh that it takes.
+//!
+//! A run gives the answer of a discrete problem. This room estimates how far that is from the answer of the
+//! scene, and refines meshes until the difference is as small as the user asks for. Four estimates do it:
+//!
+//! - [`RecoveredStrains`]: the error of u in the energy norm, triangle by triangle, from strains that are
+//!   fitted around each vertex;
+//! - the error of the damage: (25) once more, for the difference from a much finer mesh;
+//! - [`Bar`]: how far off each printed figure may be, measured by a second run on the mesh bisected
+//!   everywhere;
+//! - [`ErrorBudget`]: what the mesh, the time steps and the solver contribute.
+//!
+//! [`adapted`] makes a mesh for an accuracy: rounds of a run with few steps, estimates and bisection, which
+//! a measurement ends ([`Adapted`]).
+//!
+//! What crosses the door: at the end of a run `evolution` hands over its last state, some earlier ones and
+//! its factor of K, and enters the estimates in its [`Outcome`]. `command` asks for an adapted mesh and for
+//! error bars. Nothing here changes the answer of a run.
+
+mod hierarchical;
+mod recovery;
+mod fine_strains;
+mod instants;
+mod quadratic_system;
+mod damage_error;
+mod error_budget;
+mod figures;
+mod penetration;
+mod unresolved;
+mod adaptive;
+
+pub use adaptive::{AdaptError, Adapted, adapted, measured_bars};
+pub use error_budget::{ErrorBudget, percent};
+pub use figures::Bar;
+pub(crate) use instants::Instants;
+pub use recovery::{EnergyError, RecoveredStrains, strains_at_nodes};
+pub(crate) use unresolved::notes as unresolved_notes;
+
+use crate::evolution::{Compliance, DamageStep, Outcome, RunError, StepController};
+use damage_error::damage_error;
+use nalgebra::DVector;
+
+/// The bar of the time of ζ_* over the estimated delay of the damage, of which a coarse mesh may not show all.
+const DELAYS: f64 = 2.0;
+
+/// Enters the estimated errors of a run that has ended in its outcome. Collective.
+pub(crate) fn estimate_run(
+    outcome: &mut Outcome,
+    controller: &StepController,
+    mut damage_step: DamageStep,
+    mut compliance: Compliance,
+    instants: Instants,
+) -> Result<(), RunError> {
+    let (problem, phases) = (damage_step.problem, damage_step.phases);
+    outcome.bound_violation = controller.violation();
+    outcome.damage_error = controller.damage_error();
+    outcome.accuracy = phases.time("accuracy", || compliance.accuracy(outcome))?;
+    outcome.penetration = phases.time("accuracy", || {
+        let states = instants.states.iter().chain([&outcome.last.state]);
+        problem.penetration_note(states)
+    });
+    // The factor of the run makes room for that of the other order.
+    drop(compliance);
+    let mesh =
+        phases.time("mesh error", || damage_error(problem, &mut damage_step, instants, outcome));
+    if let (Some(stop), Some(error)) = (&mut outcome.stopped, &mesh) {
+        stop.from_mesh = error.delay.map(|delay| DELAYS * delay.abs());
+    }
+    outcome.damage_indicators = mesh.as_ref().map_or_else(Vec::new, |mesh| mesh.indicators.clone());
+    let steps = controller.step_error().filter(|_| problem.damage().is_some());
+    outcome.errors =
+        ErrorBudget::new(problem, outcome, mesh, steps.as_ref().map(DVector::as_slice));
+    Ok(())
+}
