@@ -29,7 +29,7 @@ pub(crate) use error_control::AIM;
 use error_control::ErrorControl;
 use nalgebra::DVector;
 
-/// What becomes of a step.
+/// The decision about a step.
 pub(super) enum Verdict {
     /// It is accepted.
     Accept(Box<Step>),
@@ -64,7 +64,7 @@ pub(crate) struct StepController<'a> {
     /// The error of ζ̃ from the steps so far. It grows with the damage and, for two-step differences, it
     /// diffuses.
     error: DVector<f64>,
-    /// What the last step adds to the error of ζ, once that is known.
+    /// The error that the last step adds to ζ, once it is known.
     last_error: Option<DVector<f64>>,
     bounds: (f64, f64),
     pub(crate) violation: BoundViolation,
