@@ -35,7 +35,8 @@
 //!
 //! (27) is (26) at t = 0. A run stops where min ζ reaches ζ_*. Start reading at [`evolution::run`].
 //!
-//! The modules stand in the order of their dependence: each uses only those above it.
+//! The modules stand in the order of their dependence: each uses only those above it. There is one exception:
+//! at the end of a run `evolution` calls `estimate`, which enters the estimated errors in the outcome.
 #![deny(unsafe_code)]
 
 pub mod interrupt;

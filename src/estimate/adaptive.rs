@@ -74,7 +74,7 @@ pub enum AdaptError {
         rounds: usize,
         /// Its triangles.
         triangles: usize,
-        /// What failed.
+        /// The failure of the run.
         source: RunError,
     },
     /// PETSc failed.

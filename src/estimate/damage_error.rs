@@ -21,7 +21,7 @@ use crate::{
     model::DamageLaw,
     petsc::PetscError,
 };
-use nalgebra::{Vector3, Vector6};
+use nalgebra::{Matrix6, Vector3, Vector6};
 
 /// The estimated error that the mesh makes in the damage.
 pub(super) struct DamageError {
@@ -71,19 +71,16 @@ fn error_at_end(
     let mut strains = FineStrains::new(session, [problem, &other], &phases, stopped)?;
     let mut error = ZetaError::new(problem, laws, fine, nodes, &first.zeta)?;
     let (initial, mut delay) = (error.field.clone(), None);
-    let mut before: Option<(&State, Vec<f64>, Vec<Vector6<f64>>)> = None;
+    let mut before: Option<Sources> = None;
     for state in &instants.states {
         let strains = strains.squared(state)?;
         let load = damage_step.source(state).load.as_slice().to_vec();
-        if let Some((before, load_before, source_before)) = &before {
-            let means = load.iter().zip(load_before).map(|(b, before)| 0.5 * (b + before));
-            let skipped = error.skipped_rates([before, state], means.collect())?;
-            let next = error.source(state, &strains);
-            let source = next.iter().zip(source_before).map(|(f, before)| 0.5 * (f + before));
-            let source: Vec<_> = source.collect();
-            error.advance(damage_step, [before, state], &skipped, &source)?;
+        let mut now = Sources { state, load, fine: error.source(state, &strains) };
+        if let Some(before) = &before {
+            error.advance(damage_step, before, &now)?;
+            now.fine = error.source(state, &strains);
         }
-        before = Some((state, load, error.source(state, &strains)));
+        before = Some(now);
         let minimum = error.minimum(state);
         if minimum > problem.threshold() {
             delay = instants.delay(state.time, minimum).or(delay);
@@ -92,12 +89,20 @@ fn error_at_end(
     Ok(error.at_end(&initial, last, delay))
 }
 
+/// A state of the run with the load b of its own source, m²/s, and the source φ* of z.
+struct Sources<'s> {
+    state: &'s State,
+    load: Vec<f64>,
+    fine: Vec<Vector6<f64>>,
+}
+
 /// e = z − ζ at an instant.
 struct ZetaError<'a> {
     problem: &'a DiscreteProblem,
-    /// The damage laws and κ, m²/s, of the materials by their numbers.
+    /// The damage laws of the materials by their numbers.
     laws: &'a [DamageLaw],
-    diffusions: Vec<f64>,
+    /// κL of each triangle, m²/s.
+    diffusions: Vec<Matrix6<f64>>,
     /// The problem in P2, the six nodes of each of its triangles, and its node at each vertex.
     fine: &'a DiscreteProblem,
     nodes: &'a [[usize; 6]],
@@ -120,29 +125,31 @@ impl<'a> ZetaError<'a> {
             nodes[3..].iter().zip(heights).for_each(|(&node, height)| field[node] = height);
         }
         let node_of_vertex = fine.body.node_of_vertex();
-        let diffusions = problem.diffusions();
+        let (body, kappa) = (&problem.body, problem.diffusions());
+        let diffusion = |(t, triangle)| kappa[body.material(t)] * laplace(triangle);
+        let diffusions = body.triangles.iter().enumerate().map(diffusion).collect();
         Ok(Self { problem, laws, diffusions, fine, nodes, node_of_vertex, field })
     }
 
-    /// From one state to the next, with the mean `source` φ* between them and the `skipped` rates.
+    /// From one state to the next, with the mean of their sources φ*.
     fn advance(
         &mut self,
         damage_step: &mut DamageStep,
-        [before, state]: [&State; 2],
-        skipped: &[f64],
-        source: &[Vector6<f64>],
+        before: &Sources,
+        now: &Sources,
     ) -> Result<(), RunError> {
-        let (body, k) = (&self.problem.body, state.time - before.time);
+        let (body, k) = (&self.problem.body, now.state.time - before.state.time);
+        let skipped = self.skipped_rates(before, now)?;
         let mut load = vec![0.0; self.field.len()];
-        let mut matrices = Vec::with_capacity(source.len());
+        let mut matrices = Vec::with_capacity(body.triangles.len());
         for (t, triangle) in body.triangles.iter().enumerate() {
             let vertices = body.mesh.triangles[t];
-            let (mass, diffusion) =
-                (mass(triangle), self.diffusions[body.material(t)] * laplace(triangle));
-            let [now, before, skipped] =
-                [&state.zeta[..], &before.zeta, skipped].map(|f| affine(vertices.map(|i| f[i])));
-            let source = coefficients(source[t]) - (now - before) / k;
-            let mut of_triangle = mass * (source + skipped) - diffusion * (now + self.on(t));
+            let (mass, diffusion) = (mass(triangle), self.diffusions[t]);
+            let source = coefficients(0.5 * (before.fine[t] + now.fine[t]));
+            let [zeta, zeta_before, skipped] = [&now.state.zeta, &before.state.zeta, &skipped]
+                .map(|field| affine(vertices.map(|i| field[i])));
+            let rate = (zeta - zeta_before) / k - skipped;
+            let mut of_triangle = mass * (source - rate) - diffusion * (zeta + self.on(t));
             // At the vertices the skipped rates make up for the residual of ζ exactly.
             let excess = triangle.area() / 3.0 * skipped - mass * skipped;
             (0..3).for_each(|i| of_triangle[i] += excess[i]);
@@ -162,18 +169,15 @@ impl<'a> ZetaError<'a> {
 
     /// The run has made many steps between two states. Their sources differ from the mean of the sources at
     /// these two, and make rates that no long step can see: (M ζ′ + κL ζ_n − b)_i over the weight of vertex i,
-    /// with b = `mean` the mean load of the two. Collective.
-    fn skipped_rates(
-        &self,
-        [before, state]: [&State; 2],
-        mean: Vec<f64>,
-    ) -> Result<Vec<f64>, PetscError> {
-        let (body, k) = (&self.problem.body, state.time - before.time);
-        let mut rates: Vec<f64> = mean.into_iter().map(|b| -b).collect();
+    /// with b the mean load of the two. Collective.
+    fn skipped_rates(&self, before: &Sources, now: &Sources) -> Result<Vec<f64>, PetscError> {
+        let (body, k) = (&self.problem.body, now.state.time - before.state.time);
+        let loads = now.load.iter().zip(&before.load);
+        let mut rates: Vec<f64> = loads.map(|(b, before)| -0.5 * (b + before)).collect();
         for (t, (nodes, triangle)) in body.mesh.triangles.iter().zip(&body.triangles).enumerate() {
             let [now, before] =
-                [&state.zeta, &before.zeta].map(|field| Vector3::from(nodes.map(|i| field[i])));
-            let diffusion = self.diffusions[body.material(t)] * triangle.laplace();
+                [now, before].map(|sources| Vector3::from(nodes.map(|i| sources.state.zeta[i])));
+            let diffusion = self.diffusions[t].fixed_view::<3, 3>(0, 0);
             let residual = self.problem.mass().of(triangle) * (now - before) / k + diffusion * now;
             nodes.iter().zip(&residual).for_each(|(&node, of_node)| rates[node] += of_node);
         }

@@ -24,7 +24,13 @@ pub(super) struct FineStrains<'a> {
     contact_step: ContactStep<'a>,
     /// Did the run stop at ζ_*?
     stopped: bool,
+    /// c, and ‖u₂ − u₁‖²/‖u₁‖² at the state from which it comes.
+    c: f64,
+    relative: f64,
 }
+
+/// c is found again when ‖u₂ − u₁‖²/‖u₁‖² has changed by more than this factor.
+const CHANGE: f64 = 1.5;
 
 impl<'a> FineStrains<'a> {
     pub(super) fn new(
@@ -34,7 +40,7 @@ impl<'a> FineStrains<'a> {
         stopped: bool,
     ) -> Result<Self, RunError> {
         let contact_step = ContactStep::new(session, other, SOLVERS[0], phases)?;
-        Ok(Self { run, other, contact_step, stopped })
+        Ok(Self { run, other, contact_step, stopped, c: 1.0, relative: 0.0 })
     }
 
     /// |ε*|² at the vertices and midpoints of each triangle in a state of the run. Collective.
@@ -51,28 +57,31 @@ impl<'a> FineStrains<'a> {
         let body = &coarse.body;
         let square = |e: Vector3<f64>| e[0] * e[0] + e[1] * e[1] + 0.5 * e[2] * e[2];
         let mut squares = Vec::with_capacity(body.triangles.len());
-        let mut distance = 0.0;
+        // ‖u₂ − u₁‖² and ‖u₁‖².
+        let mut energies = [0.0; 2];
         let strains = strains_at_nodes(body, u1).zip(strains_at_nodes(&fine.body, u2));
         for (t, (e1, e2)) in strains.enumerate() {
             if t < body.own_triangles {
-                // Strains are affine, so the midpoints integrate ‖u₂ − u₁‖² exactly.
+                // Strains are affine, so the midpoints integrate their products exactly.
                 let d = coarse.elasticity.d(body, t);
                 let zeta = body.mesh.triangles[t].map(|node| state.zeta[node]);
                 let weight = zeta.iter().sum::<f64>() / 9.0 * body.triangles[t].area();
-                let midpoints = (3..6).map(|i| e2[i] - e1[i]);
-                distance += weight * midpoints.map(|e| e.dot(&(d * e))).sum::<f64>();
+                for (sum, e) in (3..6).flat_map(|i| [(0, e2[i] - e1[i]), (1, e1[i])]) {
+                    energies[sum] += weight * e.dot(&(d * e));
+                }
             }
             squares.push([e1, e2].map(|e| Vector6::from(e.map(square))));
         }
-        let distance = body.nodes.partition.comm().total(distance);
-        let c = if self.stopped {
-            1.0
-        } else {
+        body.nodes.partition.comm().sum(&mut energies);
+        let relative = energies[0] / energies[1];
+        let near = self.relative / CHANGE..=self.relative * CHANGE;
+        if !self.stopped && !near.contains(&relative) {
             let recovered = RecoveredStrains::new(&fine.body, u2)?;
             let zeta = fine.zeta_at_points(&state.zeta);
             let error = recovered.energy_error(&fine.elasticity, &zeta, u2).error;
-            (error / distance).min(1.0)
-        };
+            (self.c, self.relative) = ((error / energies[0]).min(1.0), relative);
+        }
+        let c = self.c;
         let fine = |[s1, s2]: [Vector6<f64>; 2]| (s2 + c * (s2 - s1)).map(|square| square.max(0.0));
         Ok(squares.into_iter().map(fine).collect())
     }

@@ -41,7 +41,7 @@ use damage_error::damage_error;
 use nalgebra::DVector;
 
 /// The bar of the time of ζ_* over the estimated delay of the damage, of which a coarse mesh may not show all.
-const DELAYS: f64 = 2.0;
+const DELAYS: f64 = 1.5;
 
 /// Enters the estimated errors of a run that has ended in its outcome. Collective.
 pub(crate) fn estimate_run(

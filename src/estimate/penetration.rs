@@ -13,11 +13,11 @@ use crate::{
 };
 use std::collections::HashMap;
 
-/// Penetrations are found to this part of the largest displacement …
+/// The error of penetrations, as a fraction of the largest displacement …
 const RESOLVED: f64 = 1e-3;
-/// … but for peaks of the foundation that are narrower than this part of an edge.
+/// … except at peaks of the foundation that are narrower than this fraction of an edge.
 const NARROWEST: f64 = 1e-5;
-/// A penetration above this part of the largest displacement is noted.
+/// A penetration above this fraction of the largest displacement is noted.
 const NOTED: f64 = 0.05;
 
 /// How far the body lies in the foundation between the nodes of an edge.
@@ -109,13 +109,12 @@ impl DiscreteProblem {
         sides
     }
 
-    /// The largest penetration between the nodes of an edge, less what its ends have, and where, m, to
-    /// [`RESOLVED`] of the `displacement`. (Normals at nodes are means of two edges', so that the ends of an
-    /// edge may lie in the foundation along its own.)
+    /// The largest penetration between the nodes of an edge and its place, m, to [`RESOLVED`] of the `displacement`.
+    /// It is measured from the line between the penetrations at the ends. These need not be zero, because the
+    /// normal at a node is the mean of the normals of two edges.
     ///
-    /// Branch and bound: a part of the edge is halved as long as the most that u·ν may be there, less the
-    /// least that the gap may be ([`Expression::range`](crate::scene::Expression::range)), is above what was
-    /// found: no peak of the foundation is too narrow.
+    /// Branch and bound: a part of the edge is halved as long as the largest u·ν possible there, less the least
+    /// gap possible ([`Expression::range`](crate::scene::Expression::range)), exceeds the depth found so far.
     fn deepest(&self, gap: &Gap, edge: &Edge, state: &State, displacement: f64) -> (f64, [f64; 2]) {
         let (points, t) = (&self.body.nodes.points, state.time);
         let u = |node: usize| [state.u[2 * node], state.u[2 * node + 1]];
@@ -156,7 +155,7 @@ impl DiscreteProblem {
         (deepest.0, edge.at(points, deepest.1))
     }
 
-    /// What the user should know about contact between the nodes in some states of a run. Collective.
+    /// A note on contact between the nodes in some states of a run, if there is much. Collective.
     pub(super) fn penetration_note<'s>(
         &self,
         states: impl Iterator<Item = &'s State>,

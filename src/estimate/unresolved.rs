@@ -3,7 +3,7 @@
 
 use crate::{
     evolution::{EdgePart, TrianglePart, centroid, edge_parts, triangle_parts, triangle_point},
-    fem::{GAUSS, POINTS, midpoint, parabola, part_point},
+    fem::{GAUSS, POINTS, midpoint, parabola, part_point, six_points},
     mesh::{Curve, Mesh, Order, sorted},
     scene::{Condition, Expression, Scene},
 };
@@ -158,10 +158,7 @@ fn missed_damage(scene: &Scene, mesh: &Mesh) -> Option<MissedDamage> {
     if !initial.depends_on_space() {
         return None;
     }
-    let six = |triangle: &[usize; 3]| {
-        let [a, b, c] = triangle.map(|node| mesh.nodes[node]);
-        [a, b, c, midpoint(a, b), midpoint(b, c), midpoint(c, a)]
-    };
+    let six = |triangle: &[usize; 3]| six_points(triangle.map(|node| mesh.nodes[node]));
     let triangles: Vec<_> = mesh.triangles.iter().map(six).collect();
     let at = |[x, y]: [f64; 2]| initial.eval(x, y, 0.0);
     let squares = vec![0.0; triangles.len()];

@@ -18,9 +18,9 @@ pub(crate) struct PlannedStep {
     pub(crate) length: f64,
     /// k, s.
     pub(crate) k: f64,
-    /// ζ_{n−1}, or what stands in its place.
+    /// ζ_{n−1}, or the start of a two-step formula.
     pub(crate) start: DVector<f64>,
-    /// b_{n−1}, or what stands in its place, m²/s.
+    /// b_{n−1}, or the extrapolated source of a two-step formula, m²/s.
     pub(crate) load: DVector<f64>,
     /// The bounds on ζ_n of [`BoundViolation`].
     pub(crate) bounds: (f64, f64),
@@ -126,8 +126,7 @@ impl DamageStep<'_> {
         Ok(DamageUpdate { zeta, min_max, certificate: Some(certificate) })
     }
 
-    /// (M + kκL)⁻¹ k b: what ζ_n of a planned step changes by if its source load changes by
-    /// b = `load`, m²/s.
+    /// (M + kκL)⁻¹ k b: the change of ζ_n in a planned step if its source load changes by b = `load`, m²/s.
     ///
     /// # Errors
     /// The system has no finite solution.
@@ -149,8 +148,8 @@ impl DamageStep<'_> {
         if finite { Ok(DVector::from_vec(change)) } else { Err(failed()) }
     }
 
-    /// Replaces an error δ = `error` of ζ_{n−1} by what diffusion leaves of it after a planned step of
-    /// length k_n, δ + (k_n/k) ((M + kκL)⁻¹ M δ − δ); where that has no answer it stays. Collective.
+    /// Lets an error δ = `error` of ζ_{n−1} diffuse for a planned step of length k_n: δ becomes
+    /// δ + (k_n/k) ((M + kκL)⁻¹ M δ − δ). It stays if the solve fails. Collective.
     pub(crate) fn diffuse(
         &mut self,
         planned: &PlannedStep,
@@ -170,7 +169,7 @@ impl DamageStep<'_> {
         Ok(())
     }
 
-    /// Whether a source load is zero on all ranks. Collective.
+    /// Is a source load zero on all ranks? Collective.
     fn is_zero(&self, load: &[f64]) -> bool {
         self.problem.body.vertices.partition.comm().all(load.iter().all(|&b| b == 0.0))
     }

@@ -1,4 +1,4 @@
-//! The discrete problem: a scene bound to its mesh, all that does not change from step to step.
+//! The discrete problem: a scene bound to its mesh, with everything that is the same in all steps.
 
 mod load_case;
 
@@ -30,7 +30,7 @@ pub struct DiscreteProblem {
     laws: Vec<DamageLaw>,
     /// Displacement conditions as unknowns and bounds, for the solvers.
     pub constraints: Constraints,
-    /// The same conditions as posed, to judge answers by.
+    /// The same conditions as posed, to certify answers.
     pub certificate: Certificate,
     /// Rigid motions that Γ_D leaves unconstrained.
     pub motions: RigidMotions,
@@ -44,7 +44,7 @@ pub struct DiscreteProblem {
     /// KKT tolerance.
     pub tolerance: f64,
     scene: Scene,
-    /// Where `body` is a part: the undivided mesh and the ranks that own its vertices.
+    /// If `body` is a subdomain: the undivided mesh and the ranks that own its vertices.
     undivided: Option<(Mesh, Vec<usize>)>,
 }
 
@@ -134,7 +134,7 @@ impl DiscreteProblem {
         Ok(other.divide(session, owners)?)
     }
 
-    /// Whether there is a Γ_C.
+    /// Is there a Γ_C?
     pub fn has_contact(&self) -> bool {
         self.scene.boundaries.iter().any(|boundary| boundary.gap().is_some())
     }
@@ -173,9 +173,9 @@ impl DiscreteProblem {
         self.scene.damage.as_ref().map_or(0.0, |damage| damage.law.threshold)
     }
 
-    /// What is observed in every step beside its record: of each supporting boundary the resultant of
-    /// its forces on the body, N per metre of thickness, and their moment about the origin, N; at
-    /// each probe displacement, m, damage and stress, Pa.
+    /// The names of the quantities of a step beside its record. Per supporting boundary: the resultant of its
+    /// forces on the body, N per metre of thickness, and their moment about the origin, N. Per probe:
+    /// displacement, m, damage and stress, Pa.
     pub fn quantities(&self) -> Vec<String> {
         let resultants = ["force_x", "force_y", "moment"];
         let probes: Vec<_> = self.scene.probes.iter().map(|probe| probe.name.clone()).collect();

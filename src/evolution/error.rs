@@ -19,9 +19,9 @@ pub enum RunError {
         step: usize,
         /// Its time, s; none where there is no time.
         time: Option<f64>,
-        /// What failed.
+        /// The failure.
         source: Box<ContactError>,
-        /// What to try, to follow the source; empty where the source says it.
+        /// Advice that follows the source; empty if the source contains it.
         advice: &'static str,
     },
     /// Another part of a step failed; the steps before it are accepted.
@@ -31,7 +31,7 @@ pub enum RunError {
         step: usize,
         /// Its time, s.
         time: f64,
-        /// What failed.
+        /// The failure.
         source: StepFailure,
     },
     /// There is no contact solver of that name, or it cannot solve such problems.
@@ -121,7 +121,7 @@ pub enum SetupError {
         scene: PathBuf,
         /// The time, s; none where they do at any.
         time: Option<f64>,
-        /// What contradicts what.
+        /// The contradiction.
         source: ConstraintError,
     },
     /// A load, a prescribed displacement or a gap is not finite, and this rank cannot tell where.

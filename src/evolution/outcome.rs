@@ -69,8 +69,8 @@ pub struct Stop {
     /// How far off the time may be because of the steps, s: the length of the last one and twice the estimated
     /// delay of all steps.
     pub uncertainty: f64,
-    /// How far off the time may be because of the mesh, s: twice the estimated delay, as a coarse mesh may show less
-    /// than all of it. After adaptation it is at least the difference from the mesh before. `None` if it
+    /// How far off the time may be because of the mesh, s: 1.5 times the estimated delay, as a coarse mesh may
+    /// not show all of it. After adaptation it is at least the difference from the mesh before. `None` if it
     /// is not estimated.
     pub from_mesh: Option<f64>,
 }

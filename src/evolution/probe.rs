@@ -19,7 +19,7 @@ struct Place {
     triangle: Option<usize>,
 }
 
-/// What is observed at each probe: displacement, m; damage; stress, Pa.
+/// The quantities at each probe: displacement, m; damage; stress, Pa.
 pub(crate) const OBSERVED: [&str; 7] =
     ["u_x", "u_y", "zeta", "stress_xx", "stress_yy", "stress_xy", "von_mises"];
 
@@ -51,7 +51,7 @@ impl Probes {
         Self { places: self.places.iter().map(local).collect() }
     }
 
-    /// What is observed at all probes, as far as this rank owns them; 0 elsewhere. The stress is
+    /// The quantities at all probes; 0 at those of other ranks. The stress is
     /// σ = η_*(ζ) 𝒜ε(u) at the point.
     pub(super) fn values(&self, problem: &DiscreteProblem, state: &State) -> Vec<f64> {
         let values = |Place { location, triangle }: &Place| {

@@ -16,12 +16,12 @@ pub struct Step {
     pub record: StepRecord,
     /// The rest of the row: [`DiscreteProblem::quantities`].
     pub quantities: Vec<f64>,
-    /// What the contact solve took; not in archives.
+    /// The effort of the contact solve; not in archives.
     #[serde(skip)]
     pub report: ContactReport,
     /// A rigid motion that the active nodes leave unconstrained, if there is one.
     pub unconstrained: Option<RigidMotion>,
-    /// Whether no damage solve was needed.
+    /// Was the damage solve skipped?
     pub skipped_damage_solve: bool,
 }
 
@@ -84,7 +84,7 @@ pub struct StepRecord {
 }
 
 impl Step {
-    /// Enters the accuracy of ζ_n; `None` means that it is exact, the damage solve being skipped.
+    /// Enters the accuracy of ζ_n; `None` means that the damage solve was skipped, so ζ_n is exact.
     pub(super) fn set_damage_certificate(&mut self, certificate: Option<DamageCertificate>) {
         self.skipped_damage_solve = certificate.is_none();
         let DamageCertificate { residual, error, .. } = certificate.unwrap_or_default();
@@ -94,8 +94,8 @@ impl Step {
 }
 
 impl StepRecord {
-    /// Of the step n = `step` with the nodal loads `load`. What the damage step and the step controller
-    /// tell is still zero.
+    /// The record of the step n = `step` with the nodal loads `load`. The entries of the damage step and the step
+    /// controller are still zero.
     pub(super) fn new(
         problem: &DiscreteProblem,
         step: usize,

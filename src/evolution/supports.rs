@@ -14,9 +14,9 @@ use std::collections::{BTreeMap, BTreeSet};
 pub struct Supports {
     /// Their names, in the order of the scene.
     pub names: Vec<String>,
-    /// Of each node with a prescribed displacement the boundaries that prescribe it.
+    /// Per node with a prescribed displacement: the boundaries that prescribe it.
     prescribed: BTreeMap<usize, Vec<Prescribed>>,
-    /// Where each node of Γ_C lies, once for each edge of Γ_C that it belongs to.
+    /// Per node of Γ_C: its places, one for each of its edges on Γ_C.
     contact: BTreeMap<usize, Vec<Place>>,
 }
 
@@ -137,8 +137,8 @@ impl Supports {
         }
     }
 
-    /// The boundary that exerts the force of a contact point: of several at its node the one whose
-    /// normal is nearest.
+    /// The place of a contact point. If its node is on several boundaries, the one with the nearest normal exerts
+    /// the force.
     fn place(&self, point: &ContactPoint) -> Option<Place> {
         let along =
             |place: &&Place| point.normal[0] * place.normal[0] + point.normal[1] * place.normal[1];
@@ -146,10 +146,12 @@ impl Supports {
         places.rev().max_by(|a, b| along(a).total_cmp(&along(b))).copied()
     }
 
-    /// Of each boundary F = Σ R_i, N per metre of thickness, and M = Σ x_i × R_i about the origin,
-    /// positive anticlockwise, N; (F_x, F_y, M) in turn, this rank's part. R_i = (Ku − f)_i is the force
-    /// on the body at node i, with f − Ku `unbalanced`; of a node where displacements are prescribed
-    /// and a gap is closed the obstacle has its normal reactions, and the other boundaries the rest.
+    /// Per boundary: (F_x, F_y, M), this rank's part, with F = Σ R_i, N per metre of thickness, and M = Σ x_i × R_i
+    /// about the origin, positive anticlockwise, N.
+    ///
+    /// R_i = (Ku − f)_i is the force on the body at node i; `unbalanced` is f − Ku. If displacements are
+    /// prescribed at a node and its gap is closed, the obstacle exerts the normal reaction and the other
+    /// boundaries exert the rest.
     pub(super) fn resultants(
         &self,
         body: &Body,
@@ -180,8 +182,7 @@ impl Supports {
         sums
     }
 
-    /// Γ_C in a state, boundary by boundary and along them, on every rank that of the whole body.
-    /// Collective.
+    /// The rows of Γ_C in a state, boundary by boundary and along each; every rank gets all rows. Collective.
     pub fn contact_rows(&self, body: &Body, state: &State) -> Vec<ContactRow> {
         let row = |point: &ContactPoint| {
             let (place, [x, y], [nx, ny]) =
@@ -219,8 +220,8 @@ impl Supports {
     }
 }
 
-/// The parts of a force F, N/m, that boundaries exert which prescribe the displacement of a node: F = αd + βe
-/// of two that prescribe the components along d and e; else the whole, if there is one that prescribes both.
+/// Divides the force F at a node, N/m, between the boundaries that prescribe its displacement. If two of them
+/// prescribe the components along d and e, they exert αd and βe with F = αd + βe. Otherwise one exerts F.
 fn parts(prescribed: &[Prescribed], force: [f64; 2]) -> Vec<(usize, [f64; 2])> {
     /// The sine of the least angle between two directions that are not one.
     const ONE: f64 = 1e-6;

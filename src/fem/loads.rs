@@ -17,6 +17,11 @@ pub fn midpoint(p: [f64; 2], q: [f64; 2]) -> [f64; 2] {
     [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])]
 }
 
+/// The corners of a straight triangle, then the midpoints of the sides 01, 12, 20, m.
+pub fn six_points([a, b, c]: [[f64; 2]; 3]) -> [[f64; 2]; 6] {
+    [a, b, c, midpoint(a, b), midpoint(b, c), midpoint(c, a)]
+}
+
 /// The barycentric coordinates in a triangle of the point at those in a part of it.
 pub fn part_point(corners: &[[f64; 3]; 3], point: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|k| corners.iter().zip(point).map(|(corner, l)| l * corner[k]).sum())

@@ -27,7 +27,7 @@ pub use damage_certificate::DamageCertificate;
 pub use edge::{Edge, GAUSS, gauss_points, normal_error, parabola};
 pub use elasticity::Elasticity;
 pub use element::{Element, POINTS, QuadraturePoint, quadratic_values};
-pub use loads::{Division, add_body_force, add_traction, midpoint, part_point};
+pub use loads::{Division, add_body_force, add_traction, midpoint, part_point, six_points};
 pub use location::{Location, PointValues};
 pub use nodal_bases::NodalBases;
 pub use partition::Partition;

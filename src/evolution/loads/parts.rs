@@ -11,7 +11,7 @@
 //! takes too many such parts: triangles that miss much are cut into slices along a side, if these miss less.
 
 use crate::{
-    fem::{Body, Elements, GAUSS, POINTS, midpoint, parabola, part_point, quadratic_values},
+    fem::{Body, GAUSS, POINTS, parabola, part_point, quadratic_values, six_points},
     mesh::twice_area,
     scene::Expression,
 };
@@ -231,17 +231,9 @@ pub(crate) fn triangle_point(points: &[[f64; 2]; 6], at: [f64; 3]) -> [f64; 2] {
 /// The six points of each triangle of a body, m.
 pub(crate) fn triangle_points(body: &Body) -> Vec<[[f64; 2]; 6]> {
     let points = &body.nodes.points;
-    match body.elements() {
-        Elements::Linear(cells) => {
-            let straight = |nodes: &[usize; 3]| {
-                let [a, b, c] = nodes.map(|node| points[node]);
-                [a, b, c, midpoint(a, b), midpoint(b, c), midpoint(c, a)]
-            };
-            cells.nodes.iter().map(straight).collect()
-        }
-        Elements::Quadratic(cells) => {
-            cells.nodes.iter().map(|nodes| nodes.map(|node| points[node])).collect()
-        }
+    match body.quadratic_nodes() {
+        Some(nodes) => nodes.iter().map(|nodes| nodes.map(|node| points[node])).collect(),
+        None => body.mesh.triangles.iter().map(|t| six_points(t.map(|i| points[i]))).collect(),
     }
 }
 

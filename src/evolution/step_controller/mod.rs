@@ -27,7 +27,7 @@ use error_control::ErrorControl;
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
-/// What becomes of a step.
+/// The decision about a step.
 pub(super) enum Verdict {
     /// It is accepted.
     Accept(Box<Step>),
@@ -68,7 +68,7 @@ pub(super) struct StepState {
     /// The error of ζ̃ from the steps so far. It grows with the damage and, for two-step differences, it
     /// diffuses.
     error: DVector<f64>,
-    /// What the last step adds to the error of ζ, once that is known.
+    /// The error that the last step adds to ζ, once it is known.
     last_error: Option<DVector<f64>>,
     /// Bounds on ζ̃_{n−1} by the maximum principle, see [`BoundViolation`].
     bounds: (f64, f64),
