@@ -21,7 +21,7 @@ pub(super) struct QuadraticSystem<'a> {
 
 /// The fraction of the energy of the solution that the iteration may leave, and its largest number of
 /// iterations.
-const REST: f64 = 1e-4;
+const REST: f64 = 1e-3;
 const ITERATIONS: usize = 30;
 
 impl<'a> QuadraticSystem<'a> {
