@@ -162,29 +162,32 @@ impl LinearSolver {
     /// PETSc or CHOLMOD failed.
     pub fn factorise(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
         self.prepared = false;
-        if self.is_own(system.matrix)? && (self.is_condensed(system.matrix)? || system.is_free()) {
-            return Ok(self.ksp.set_up(system.matrix, &mut self.factor)? && self.restrict(system)?);
-        }
-        let (own, matrix) = (self.is_own(system.matrix)?, self.modified(system)?);
-        let definite = self.ksp.set_up(&matrix, &mut self.factor)?;
+        let own = self.is_own(system.matrix)?;
+        self.modify(system)?;
+        let matrix = self.modified.as_ref().unwrap_or(system.matrix);
+        let definite = self.ksp.set_up(matrix, &mut self.factor)?;
         if !own {
-            self.factor.record(&matrix, definite, None)?;
+            self.factor.record(matrix, definite, None)?;
         }
-        self.modified = Some(matrix);
-        Ok(definite)
+        Ok(definite && self.restrict(system)?)
     }
 
-    /// A copy of the matrix without the prescribed unknowns.
-    fn modified(&mut self, system: LinearSystem) -> Result<Matrix, PetscError> {
-        let mut matrix = match self.modified.take() {
+    /// Prescribes unknowns in a copy of the matrix, unless the preconditioner takes care of them: the factor
+    /// does where it is condensed.
+    fn modify(&mut self, system: LinearSystem) -> Result<(), PetscError> {
+        let kept = self.modified.take();
+        let Some(prescribed) = system.prescribed else { return Ok(()) };
+        if self.is_condensed(system.matrix)? {
+            return Ok(());
+        }
+        let mut matrix = match kept {
             Some(matrix) => matrix,
             None => system.matrix.duplicate()?,
         };
         matrix.copy(system.matrix)?;
-        if let Some(prescribed) = system.prescribed {
-            matrix.zero_rows_columns(prescribed, system.scale)?;
-        }
-        Ok(matrix)
+        matrix.zero_rows_columns(prescribed, system.scale)?;
+        self.modified = Some(matrix);
+        Ok(())
     }
 
     /// Whether there is a preconditioner for the system. In a condensed factor the unknowns that the
@@ -384,27 +387,30 @@ impl LinearSolver {
         (limit, most): (f64, usize),
         report: &mut SolveReport,
     ) -> Result<(), PetscError> {
-        let own = self.is_own(system.matrix)?;
-        let factored = if own { None } else { self.modified.as_ref() };
-        let problem = KspProblem {
-            matrix: system.matrix,
-            factored: factored.unwrap_or(system.matrix),
-            prescribed: system.prescribed,
-            limit,
-            most,
-        };
-        // The forces on prescribed unknowns stand aside: PETSc would remove them from the right-hand side.
+        self.modify(system)?;
         let prescribed = system.prescribed.unwrap_or(&[]);
-        let take_forces =
-            |r: &mut [f64]| prescribed.iter().map(|&i| take(&mut r[i])).collect::<Vec<_>>();
-        let forces = self.residual.write(take_forces)?;
+        let clear = |d: &mut [f64]| prescribed.iter().for_each(|&i| d[i] = 0.0);
+        if self.modified.is_some() {
+            self.expanded.axpby(1.0, &self.residual, 0.0)?;
+            self.expanded.write(clear)?;
+        }
         let first = take(&mut self.prepared).then_some(&self.expanded);
+        let (matrix, b) = match &self.modified {
+            Some(matrix) => (matrix, &self.expanded),
+            None => (system.matrix, &self.residual),
+        };
+        let problem = KspProblem { matrix, prescribed: system.prescribed, limit, most };
         let mut kept = Booked { factor: &mut self.factor, first, system };
-        let solved = self.ksp.solve(&problem, &mut kept, &self.residual, &mut self.correction)?;
-        x.axpby(1.0, &self.correction, 1.0)?;
-        self.residual.axpby(1.0, self.ksp.residual(), 0.0)?;
-        self.residual.write(|r| prescribed.iter().zip(forces).for_each(|(&i, p)| r[i] += p))?;
+        let solved = self.ksp.solve(&problem, &mut kept, b, &mut self.correction)?;
         self.norm = solved.norm;
+        if self.modified.is_some() {
+            self.correction.write(clear)?;
+            system.multiply(&self.correction, &mut self.expanded)?;
+            self.residual.axpby(-1.0, &self.expanded, 1.0)?;
+        } else {
+            self.residual.axpby(1.0, self.ksp.residual(), 0.0)?;
+        }
+        x.axpby(1.0, &self.correction, 1.0)?;
         report.iterations += solved.iterations;
         report.converged = self.is_small(limit);
         self.end_solve(report.iterations, self.norm, limit);

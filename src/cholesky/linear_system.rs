@@ -45,11 +45,6 @@ impl<'a> LinearSystem<'a> {
         self.book(|booking| booking.product, bytes, || self.matrix.multiply(x, y))
     }
 
-    /// Whether no rank prescribes an unknown.
-    pub(super) fn is_free(self) -> bool {
-        self.prescribed.is_none()
-    }
-
     /// Does `work`, which moves so many bytes, and books its time under a name.
     pub(super) fn book<R>(
         self,

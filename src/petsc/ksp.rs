@@ -32,11 +32,10 @@ pub(crate) struct Ksp {
 
 /// A linear system as a KSP solves it from the start 0: A x = b on the unknowns that are not prescribed.
 pub(crate) struct KspProblem<'a> {
-    /// A.
+    /// A, of which PETSc's own preconditioners are made.
     pub(crate) matrix: &'a Matrix,
-    /// The matrix of which PETSc's own preconditioners are made, `matrix` for others.
-    pub(crate) factored: &'a Matrix,
-    /// Owned unknowns that stay 0; `None` where no rank has any.
+    /// Owned unknowns that stay 0, because the preconditioner's answer is 0 there or because A has no
+    /// other entry in their rows and columns than the diagonal, and b is 0; `None` where no rank has any.
     pub(crate) prescribed: Option<&'a [usize]>,
     /// The largest ‖b − A x‖₂ of the free unknowns.
     pub(crate) limit: f64,
@@ -166,10 +165,6 @@ impl Ksp {
 
     /// Solves for `x` (KSPSolve) with the preconditioner that there is, until the residual of the free
     /// unknowns is small enough or the type of KSP gives up. [`Self::residual`] is then b − A x.
-    ///
-    /// Where unknowns are prescribed, what the preconditioner changes of them is removed as PETSc removes a
-    /// null space (MatNullSpaceSetFunction), so that directions stay 0 there; the residual there is the
-    /// force that keeps them.
     pub(crate) fn solve(
         &mut self,
         problem: &KspProblem,
@@ -183,21 +178,15 @@ impl Ksp {
         let mut test = Test { problem, residual, work, norm: None };
         let pointer = ptr::from_mut(&mut test).cast::<c_void>();
         let (a, most) = (problem.matrix.raw(), c_int::try_from(problem.most).unwrap_or(c_int::MAX));
-        let space = problem.prescribed.map(|_| null_space(problem)).transpose()?;
-        let raw_space = space.as_ref().map_or(ptr::null_mut(), Handle::raw);
         let mut iterations = 0;
         // SAFETY: live handles of matching layout; what the callbacks point to outlives the solve, in which
-        // alone they run. The transposed null space would change b.
+        // alone they run.
         unsafe {
-            check(raw::MatSetNullSpace(a, raw_space))?;
-            check(raw::MatSetTransposeNullSpace(a, ptr::null_mut()))?;
-            check(raw::KSPSetOperators(ksp, a, problem.factored.raw()))?;
+            check(raw::KSPSetOperators(ksp, a, a))?;
             context.set(pc)?;
             check(raw::KSPSetTolerances(ksp, 1e-14, 0.0, f64::MAX, most))?;
             check(raw::KSPSetConvergenceTest(ksp, Some(is_converged), pointer, None))?;
-            let solved = check(raw::KSPSolve(ksp, b.raw(), x.raw()));
-            check(raw::MatSetNullSpace(a, ptr::null_mut()))?;
-            solved?;
+            check(raw::KSPSolve(ksp, b.raw(), x.raw()))?;
             check(raw::KSPGetIterationNumber(ksp, &mut iterations))?;
         }
         let tested = test.norm;
@@ -229,32 +218,6 @@ fn free_norm(
     work.axpby(1.0, r, 0.0)?;
     work.write(|r| prescribed.iter().for_each(|&i| r[i] = 0.0))?;
     work.norm()
-}
-
-/// The null space whose removal sets the prescribed unknowns to 0.
-fn null_space(problem: &KspProblem) -> Result<Handle<raw::_p_MatNullSpace>, PetscError> {
-    let constant = raw::PetscBool::PETSC_FALSE;
-    let space = Handle::new(raw::MatNullSpaceDestroy, |space| {
-        // SAFETY: a fresh handle, no vectors.
-        unsafe { raw::MatNullSpaceCreate(world(), constant, 0, ptr::null(), space) }
-    })?;
-    let context = ptr::from_ref(problem).cast_mut().cast::<c_void>();
-    // SAFETY: a live handle; the context outlives the solve, in which alone the space is used.
-    check(unsafe { raw::MatNullSpaceSetFunction(space.raw(), Some(clear_prescribed), context) })?;
-    Ok(space)
-}
-
-unsafe extern "C" fn clear_prescribed(
-    _space: raw::MatNullSpace,
-    z: raw::Vec,
-    context: *mut c_void,
-) -> raw::PetscErrorCode {
-    let clear = || {
-        // SAFETY: `solve` passed a problem that lives during the solve; PETSc passes a live vector.
-        let (problem, mut z) = unsafe { (&*context.cast::<KspProblem>(), Vector::borrowed(z)?) };
-        z.write(|z| problem.prescribed.into_iter().flatten().for_each(|&i| z[i] = 0.0))
-    };
-    return_code(clear())
 }
 
 unsafe extern "C" fn is_converged(

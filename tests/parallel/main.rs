@@ -20,6 +20,9 @@ use test_directory::{ProgramOutput, TestDirectory};
 /// Answers on several ranks may differ by this, relative to the largest value of a run.
 const SAME: f64 = 1e-8;
 
+/// After so many seconds a run is ended: it would never end by itself.
+const LONGEST: &str = "300";
+
 /// A coarser mesh of the scenes that are graded.
 const COARSE: [&str; 4] = ["--set", "mesh.size=0.5", "--set", "mesh.parameters.grading=8"];
 
@@ -27,7 +30,8 @@ const COARSE: [&str; 4] = ["--set", "mesh.size=0.5", "--set", "mesh.parameters.g
 pub fn on_ranks(test_directory: &TestDirectory, ranks: usize, arguments: &[&str]) -> Command {
     let mut command = Command::new("mpiexec");
     command
-        .args(["-n", &ranks.to_string(), "--oversubscribe", env!("CARGO_BIN_EXE_signorini")])
+        .args(["-n", &ranks.to_string(), "--oversubscribe", "--timeout", LONGEST])
+        .arg(env!("CARGO_BIN_EXE_signorini"))
         .args(arguments)
         .current_dir(test_directory.path(""))
         .envs([("OMPI_ALLOW_RUN_AS_ROOT", "1"), ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")])
@@ -403,6 +407,7 @@ fn every_kind_of_factor_gives_the_same_answer() {
         let arguments = [&["run", "scene.toml", "--out", kind], &few[..], &options].concat();
         let said = ProgramOutput::of(&mut on_ranks(&test_directory, 3, &arguments));
         assert_eq!((said.code, said.err.as_str()), (Some(0), ""), "{said:?}");
+        assert!(!said.out.contains("in its place"), "another solver answered: {said:?}");
         same_history(&test_directory, kind, "one");
     }
 }
