@@ -25,7 +25,7 @@ const PETSC: &str = "\
     MatCreateShell|MatShellSetOperation|MatShellGetContext|\
     KSPCreate|KSPDestroy|KSPSetType|KSPSetOptionsPrefix|KSPSetFromOptions|KSPSetOperators|KSPSolve|\
     KSPSetConvergenceTest|KSPSetNormType|KSPBuildResidual|KSPBuildSolution|KSPGetConvergedReason|KSPGetIterationNumber|KSPGetPC|KSPSetTolerances|\
-    PCRegister|PCCreate_Shell|PCSetType|PCSetUp|PCSetReusePreconditioner|PCGetOperators|PCGetFailedReason|\
+    PCRegister|PCCreate_Shell|PCSetType|PCSetUp|PCApply|PCSetReusePreconditioner|PCGetOperators|PCGetFailedReason|\
     PCFactorSetMatSolverType|PCFactorGetMatrix|PCFactorGetMatSolverType|\
     PCSetApplicationContext|PCGetApplicationContext|PCShellSetApply|PCShellSetSetUp|PCShellSetName|\
     TaoCreate|TaoDestroy|TaoSetType|TaoSetSolution|TaoSetVariableBounds|\

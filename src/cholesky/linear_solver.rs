@@ -430,6 +430,24 @@ impl LinearSolver {
         self.factor.iteration_limit(self.asked(limit)).is_none_or(|most| iterations >= most)
     }
 
+    /// Prescribes unknowns in the factor, where it is condensed; false if there is no preconditioner then.
+    /// Collective.
+    pub(crate) fn prescribe(&mut self, unknowns: &[usize]) -> Result<bool, PetscError> {
+        let exists = self.factor.exists();
+        Ok(exists && (!self.factor.is_condensed() || self.factor.restrict(unknowns)?))
+    }
+
+    /// `z` ← P⁻¹ `r` with the preconditioner that there is.
+    ///
+    /// # Errors
+    /// There is none.
+    pub(crate) fn precondition(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
+        match self.chosen {
+            Some((_, false)) => self.ksp.precondition(&mut self.factor, r, z),
+            _ => self.factor.apply(r, z),
+        }
+    }
+
     /// b − A x of the last solve on all unknowns: on prescribed ones, the forces that keep them
     /// there.
     pub fn residual(&self) -> &Vector {

@@ -13,11 +13,13 @@ use super::{
     fine_strains::FineStrains,
     hierarchical::{affine, coefficients, interpolation_error, laplace, mass, values},
     instants::Instants,
+    order_pair::OrderPair,
     quadratic_system::QuadraticSystem,
 };
 use crate::{
-    evolution::{DamageStep, DiscreteProblem, Outcome, Phases, RunError, State, agreed},
-    mesh::Order,
+    evolution::{
+        Compliance, DamageStep, DiscreteProblem, Outcome, Phases, RunError, State, agreed,
+    },
     model::DamageLaw,
     petsc::PetscError,
 };
@@ -36,11 +38,12 @@ pub(super) struct DamageError {
     pub(super) delay: Option<f64>,
 }
 
-/// The error that the mesh makes in the last damage. It is `None` without damage, and if the contact problem in
-/// the other order of u has no answer. Collective.
+/// The error that the mesh makes in the last damage. It is `None` without damage, and where the active nodes
+/// of a state alone do not support the body. Collective.
 pub(super) fn damage_error(
     problem: &DiscreteProblem,
     damage_step: &mut DamageStep,
+    compliance: Compliance,
     mut instants: Instants,
     outcome: &Outcome,
 ) -> Option<DamageError> {
@@ -51,7 +54,7 @@ pub(super) fn damage_error(
     instants.end(last);
     let stopped = outcome.stopped.is_some();
     instants.falling.extend(outcome.stopped.map(|stop| (stop.time, problem.threshold())));
-    let error = error_at_end(problem, damage_step, laws, &instants, stopped);
+    let error = error_at_end(problem, damage_step, compliance, laws, &instants, stopped);
     agreed(comm, error).ok().flatten()
 }
 
@@ -59,6 +62,7 @@ pub(super) fn damage_error(
 fn error_at_end(
     problem: &DiscreteProblem,
     damage_step: &mut DamageStep,
+    compliance: Compliance,
     laws: &[DamageLaw],
     instants: &Instants,
     stopped: bool,
@@ -66,14 +70,15 @@ fn error_at_end(
     let [first, .., last] = &instants.states[..] else { return Ok(None) };
     let (session, phases) = (damage_step.session, Phases::default());
     let other = problem.of_other_order(session)?;
-    let fine = if other.body.order() == Order::Quadratic { &other } else { problem };
+    let pair = OrderPair::new(session, problem, &other, compliance, last, &phases)?;
+    let fine = pair.problems()[1];
     let Some(nodes) = fine.body.quadratic_nodes() else { return Ok(None) };
-    let mut strains = FineStrains::new(session, [problem, &other], &phases, stopped)?;
+    let mut strains = FineStrains::new(pair, stopped);
     let mut error = ZetaError::new(problem, laws, fine, nodes, &first.zeta)?;
     let (initial, mut delay) = (error.field.clone(), None);
     let mut before: Option<Sources> = None;
     for state in &instants.states {
-        let strains = strains.squared(state)?;
+        let Some(strains) = strains.squared(state)? else { return Ok(None) };
         let load = damage_step.source(state).load.as_slice().to_vec();
         let mut now = Sources { state, load, fine: error.source(state, &strains) };
         if let Some(before) = &before {

@@ -7,21 +7,16 @@
 //!
 //! A run that reached ζ_* did so at a singular point, where both orders converge alike: there c = 1.
 
-use super::recovery::{RecoveredStrains, strains_at_nodes};
-use crate::{
-    contact::SOLVERS,
-    evolution::{ContactStep, DiscreteProblem, Phases, RunError, State},
-    mesh::Order,
-    petsc::Session,
+use super::{
+    order_pair::OrderPair,
+    recovery::{RecoveredStrains, strains_at_nodes},
 };
+use crate::evolution::{RunError, State};
 use nalgebra::{Vector3, Vector6};
 
-/// A run and the same scene in the other order of u, on the same mesh and for the same damage.
+/// The strains of the states of a run.
 pub(super) struct FineStrains<'a> {
-    run: &'a DiscreteProblem,
-    other: &'a DiscreteProblem,
-    /// The contact step of the other order.
-    contact_step: ContactStep<'a>,
+    pair: OrderPair<'a>,
     /// Did the run stop at ζ_*?
     stopped: bool,
     /// c, and ‖u₂ − u₁‖²/‖u₁‖² at the state from which it comes.
@@ -33,33 +28,24 @@ pub(super) struct FineStrains<'a> {
 const CHANGE: f64 = 1.5;
 
 impl<'a> FineStrains<'a> {
-    pub(super) fn new(
-        session: &'a Session,
-        [run, other]: [&'a DiscreteProblem; 2],
-        phases: &'a Phases,
-        stopped: bool,
-    ) -> Result<Self, RunError> {
-        let contact_step = ContactStep::new(session, other, SOLVERS[0], phases)?;
-        Ok(Self { run, other, contact_step, stopped, c: 1.0, relative: 0.0 })
+    pub(super) fn new(pair: OrderPair<'a>, stopped: bool) -> Self {
+        Self { pair, stopped, c: 1.0, relative: 0.0 }
     }
 
-    /// |ε*|² at the vertices and midpoints of each triangle in a state of the run. Collective.
+    /// |ε*|² at the vertices and midpoints of each triangle. It is `None` where the active nodes do not
+    /// support the body. Collective.
     ///
     /// # Errors
-    /// PETSc or the contact step failed, or the scene contradicts itself at the nodes of the other order.
-    pub(super) fn squared(&mut self, state: &State) -> Result<Vec<Vector6<f64>>, RunError> {
-        let solved = self.contact_step.solve(0, state.time, &state.zeta)?;
-        self.contact_step.accept(state.time)?;
-        let [(coarse, u1), (fine, u2)] = match self.run.body.order() {
-            Order::Linear => [(self.run, &state.u), (self.other, &solved.state.u)],
-            Order::Quadratic => [(self.other, &solved.state.u), (self.run, &state.u)],
-        };
+    /// PETSc failed, or the scene contradicts itself at the nodes of the other order.
+    pub(super) fn squared(&mut self, state: &State) -> Result<Option<Vec<Vector6<f64>>>, RunError> {
+        let Some([u1, u2]) = self.pair.displacements(state)? else { return Ok(None) };
+        let [coarse, fine] = self.pair.problems();
         let body = &coarse.body;
         let square = |e: Vector3<f64>| e[0] * e[0] + e[1] * e[1] + 0.5 * e[2] * e[2];
         let mut squares = Vec::with_capacity(body.triangles.len());
         // ‖u₂ − u₁‖² and ‖u₁‖².
         let mut energies = [0.0; 2];
-        let strains = strains_at_nodes(body, u1).zip(strains_at_nodes(&fine.body, u2));
+        let strains = strains_at_nodes(body, &u1).zip(strains_at_nodes(&fine.body, &u2));
         for (t, (e1, e2)) in strains.enumerate() {
             if t < body.own_triangles {
                 // Strains are affine, so the midpoints integrate their products exactly.
@@ -76,13 +62,13 @@ impl<'a> FineStrains<'a> {
         let relative = energies[0] / energies[1];
         let near = self.relative / CHANGE..=self.relative * CHANGE;
         if !self.stopped && !near.contains(&relative) {
-            let recovered = RecoveredStrains::new(&fine.body, u2)?;
+            let recovered = RecoveredStrains::new(&fine.body, &u2)?;
             let zeta = fine.zeta_at_points(&state.zeta);
-            let error = recovered.energy_error(&fine.elasticity, &zeta, u2).error;
+            let error = recovered.energy_error(&fine.elasticity, &zeta, &u2).error;
             (self.c, self.relative) = ((error / energies[0]).min(1.0), relative);
         }
         let c = self.c;
         let fine = |[s1, s2]: [Vector6<f64>; 2]| (s2 + c * (s2 - s1)).map(|square| square.max(0.0));
-        Ok(squares.into_iter().map(fine).collect())
+        Ok(Some(squares.into_iter().map(fine).collect()))
     }
 }

@@ -19,6 +19,8 @@
 
 mod hierarchical;
 mod recovery;
+mod order_pair;
+mod fine_solve;
 mod fine_strains;
 mod instants;
 mod quadratic_system;
@@ -59,10 +61,9 @@ pub(crate) fn estimate_run(
         let states = instants.states.iter().chain([&outcome.last.state]);
         problem.penetration_note(states)
     });
-    // The factor of the run makes room for that of the other order.
-    drop(compliance);
-    let mesh =
-        phases.time("mesh error", || damage_error(problem, &mut damage_step, instants, outcome));
+    let mesh = phases.time("mesh error", || {
+        damage_error(problem, &mut damage_step, compliance, instants, outcome)
+    });
     if let (Some(stop), Some(error)) = (&mut outcome.stopped, &mesh) {
         stop.from_mesh = error.delay.map(|delay| DELAYS * delay.abs());
     }

@@ -15,7 +15,7 @@ mod rescue;
 
 pub use accuracy::Accuracy;
 pub(crate) use accuracy::Compliance;
-use certificate::active_bounds;
+pub(crate) use certificate::active_bounds;
 
 use super::{
     DiscreteProblem, Phases, RunError, State, Step, StepFailure, StepRecord, agreed,

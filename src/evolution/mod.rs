@@ -40,10 +40,11 @@ mod supports;
 
 pub use crate::contact::ContactPoint;
 pub use crate::phases::Phases;
-pub(crate) use contact_step::Compliance;
 pub use contact_step::{Accuracy, ContactStep};
+pub(crate) use contact_step::{Compliance, active_bounds};
 pub(crate) use damage_step::DamageStep;
 pub use discrete_problem::DiscreteProblem;
+pub(crate) use discrete_problem::LoadCase;
 pub use error::{RunError, SetupError, StepFailure};
 pub use extrapolation::Extrapolation;
 pub use loads::Loads;

@@ -163,6 +163,22 @@ impl Ksp {
         Ok(negative == 0)
     }
 
+    /// `z` ← P⁻¹ `r` (PCApply).
+    pub(crate) fn precondition(
+        &self,
+        kept: &mut dyn KeptPreconditioner,
+        r: &Vector,
+        z: &mut Vector,
+    ) -> Result<(), PetscError> {
+        let pc = self.pc()?;
+        let mut context = Context { preconditioner: kept };
+        // SAFETY: live handles, distinct by borrowing; the context outlives the call.
+        unsafe {
+            context.set(pc)?;
+            check(raw::PCApply(pc, r.raw(), z.raw()))
+        }
+    }
+
     /// Solves for `x` (KSPSolve) with the preconditioner that there is, until the residual of the free
     /// unknowns is small enough or the type of KSP gives up. [`Self::residual`] is then b − A x.
     pub(crate) fn solve(

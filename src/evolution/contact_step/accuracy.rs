@@ -78,9 +78,11 @@ impl Accuracy {
 /// The displacements that small forces cause at states of a run, their active nodes fixed.
 pub(crate) struct Compliance<'a> {
     pub(crate) problem: &'a DiscreteProblem,
-    stiffness: Stiffness,
-    /// The unknowns at active bounds.
+    /// K, until only its factor is kept.
+    stiffness: Option<Stiffness>,
+    /// The unknowns that are fixed, and whether the factor is definite with them.
     active: Vec<usize>,
+    supported: bool,
     solver: LinearSolver,
     rhs: Vector,
     answer: Vector,
@@ -92,7 +94,15 @@ impl<'a> ContactStep<'a> {
         let Self { problem, stiffness, elastic: mut solver, load, c, .. } = self;
         let bounded = problem.constraints.bounds.iter().map(|bound| bound.dof);
         solver.factor().set_condensed(&stiffness.matrix, bounded)?;
-        Ok(Compliance { problem, stiffness, active: Vec::new(), solver, rhs: load, answer: c })
+        Ok(Compliance {
+            problem,
+            stiffness: Some(stiffness),
+            active: Vec::new(),
+            supported: false,
+            solver,
+            rhs: load,
+            answer: c,
+        })
     }
 }
 
@@ -150,28 +160,64 @@ impl Compliance<'_> {
     }
 
     /// Takes the nodal damage and the active nodes of a state. Collective.
-    fn set(&mut self, zeta: &[f64], contact: &[ContactPoint]) -> Result<(), PetscError> {
+    pub(crate) fn set(&mut self, zeta: &[f64], contact: &[ContactPoint]) -> Result<(), PetscError> {
         let DiscreteProblem { body, elasticity, constraints, .. } = self.problem;
         let flags = active_bounds(constraints, contact, 0.0);
         let active = constraints.bounds.iter().zip(flags).filter(|(_, active)| *active > 0.0);
         self.active = active.map(|(bound, _)| bound.dof).collect();
-        let zeta = self.problem.zeta_at_points(zeta);
-        self.stiffness.refill(body, elasticity, &constraints.bases, &zeta)
+        match &mut self.stiffness {
+            Some(stiffness) => {
+                let zeta = self.problem.zeta_at_points(zeta);
+                stiffness.refill(body, elasticity, &constraints.bases, &zeta)?;
+            }
+            None => self.supported = self.solver.prescribe(&self.active)?,
+        }
+        Ok(())
     }
 
-    /// K(ζ)⁻¹ of nodal `forces`, N per metre of thickness, to a digit or more, the active nodes fixed. `None` if
-    /// these nodes do not support the body. Collective.
-    fn displacement(&mut self, mut forces: Vec<f64>) -> Result<Option<Vec<f64>>, PetscError> {
-        let Self { problem, stiffness, active, solver, rhs, answer } = self;
+    /// Gives back K, which is much of the memory, and keeps a factor of it, if need be that of a state.
+    /// Collective.
+    pub(crate) fn keep_factor(&mut self, state: &State) -> Result<(), PetscError> {
+        if !self.solver.factor().exists() {
+            self.set(&state.zeta, &state.contact)?;
+            if let Some(stiffness) = &self.stiffness {
+                self.solver.factorise(system(self.problem, stiffness, &self.active))?;
+            }
+        }
+        if let Some(stiffness) = self.stiffness.take() {
+            // The factor may be that of another matrix, such as the scaled K of TAO.
+            self.solver.factor().set_scaling(&stiffness.matrix)?;
+        }
+        Ok(())
+    }
+
+    /// K(ζ)⁻¹ of nodal `forces`, N per metre of thickness, to a digit or more, the active nodes fixed; or
+    /// about that, by the factor alone. `None` if these nodes do not support the body. Collective.
+    pub(crate) fn displacement(
+        &mut self,
+        mut forces: Vec<f64>,
+    ) -> Result<Option<Vec<f64>>, PetscError> {
+        let Self { problem, stiffness, active, supported, solver, rhs, answer } = self;
         let bases = &problem.constraints.bases;
         bases.force_to_local(&mut forces);
         bases.zero_fixed(&mut forces);
         active.iter().for_each(|&dof| forces[dof] = 0.0);
         rhs.set(&forces[..rhs.owned()])?;
         answer.write(|u| u.fill(0.0))?;
-        // A factor that is kept leaves a digit of the error less.
-        let (system, limit) = (system(problem, stiffness, active), 0.01 * rhs.norm()?);
-        let solved = solver.solve_renewing(system, rhs, answer, limit)?.converged;
+        let norm = rhs.norm()?;
+        let solved = match stiffness {
+            Some(stiffness) => {
+                // A factor that is kept leaves a digit of the error less.
+                let system = system(problem, stiffness, active);
+                solver.solve_renewing(system, rhs, answer, 0.01 * norm)?.converged
+            }
+            None if norm > 0.0 && *supported => {
+                solver.precondition(rhs, answer)?;
+                answer.write(|u| active.iter().for_each(|&dof| u[dof] = 0.0))?;
+                true
+            }
+            None => norm == 0.0,
+        };
         solved.then(|| displacement(problem, vec![0.0; forces.len()], answer)).transpose()
     }
 }

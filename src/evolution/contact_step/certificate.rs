@@ -138,7 +138,7 @@ impl ContactStep<'_> {
 }
 
 /// 1 for each bound that a contact force above `least`, N/m, acts on, else 0.
-pub(super) fn active_bounds(of: &Constraints, contact: &[ContactPoint], least: f64) -> Vec<f64> {
+pub(crate) fn active_bounds(of: &Constraints, contact: &[ContactPoint], least: f64) -> Vec<f64> {
     let mut active = vec![0.0; of.bounds.len()];
     for point in contact.iter().filter(|point| point.active && point.force > least) {
         if let Some(bound) = of.bound_along(point.node, point.normal) {
