@@ -152,6 +152,7 @@ impl<'a> Recorder<'a> {
             }
             _ => Ok(()),
         };
+        let written = written.and(task.phases.time("output", || self.fields.complete()));
         let outcome = result.as_ref().ok();
         let mut notes = Vec::from_iter(accuracy::verdict(task, outcome));
         notes.extend(task.problem.notes());
@@ -207,6 +208,7 @@ impl Observer for Recorder<'_> {
     }
 
     fn keep(&mut self, state: RunState) -> Observed {
+        self.fields.complete()?;
         let (fields, history) = (self.fields.written(), self.history.length());
         let recorded = Recorded { stepping: self.stepping, fields, history };
         checkpoint::write(self.task, recorded, state)?;

@@ -101,6 +101,9 @@ struct Sources<'s> {
     fine: Vec<Vector6<f64>>,
 }
 
+/// Steps whose lengths differ by less than this factor share a preconditioner.
+const ALIKE: f64 = 1.7;
+
 /// e = z − ζ at an instant.
 struct ZetaError<'a> {
     problem: &'a DiscreteProblem,
@@ -114,6 +117,8 @@ struct ZetaError<'a> {
     node_of_vertex: Vec<usize>,
     /// The coefficients of e in the hierarchical basis, by the nodes of P2.
     field: Vec<f64>,
+    /// The length of the step for which the preconditioner was made, s.
+    preconditioned: f64,
 }
 
 impl<'a> ZetaError<'a> {
@@ -133,7 +138,16 @@ impl<'a> ZetaError<'a> {
         let (body, kappa) = (&problem.body, problem.diffusions());
         let diffusion = |(t, triangle)| kappa[body.material(t)] * laplace(triangle);
         let diffusions = body.triangles.iter().enumerate().map(diffusion).collect();
-        Ok(Self { problem, laws, diffusions, fine, nodes, node_of_vertex, field })
+        Ok(Self {
+            problem,
+            laws,
+            diffusions,
+            fine,
+            nodes,
+            node_of_vertex,
+            field,
+            preconditioned: 0.0,
+        })
     }
 
     /// From one state to the next, with the mean of their sources φ*.
@@ -162,11 +176,13 @@ impl<'a> ZetaError<'a> {
             nodes.for_each(|(&node, of_node)| load[node] += k * of_node);
             matrices.push(mass + k * diffusion);
         }
+        if !(self.preconditioned / ALIKE..=self.preconditioned * ALIKE).contains(&k) {
+            self.preconditioned = k;
+        }
         let session = damage_step.session;
-        let (vertices, linear) = (&self.node_of_vertex, damage_step.system(k)?);
-        let owned = &vertices[..body.vertices.partition.owned()];
-        let mut system =
-            QuadraticSystem::new(&self.fine.body, self.nodes, matrices, owned, (linear, k));
+        let linear = (damage_step.system(self.preconditioned)?, self.preconditioned);
+        let owned = &self.node_of_vertex[..body.vertices.partition.owned()];
+        let mut system = QuadraticSystem::new(&self.fine.body, self.nodes, matrices, owned, linear);
         let change = system.solve(session, &load)?;
         self.field.iter_mut().zip(change).for_each(|(e, change)| *e += change);
         Ok(())

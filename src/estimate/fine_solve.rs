@@ -7,7 +7,8 @@ use crate::{
     petsc::{Operator, PetscError, Session, solve_by_energy},
 };
 
-/// A problem in P2, solved by conjugate gradients that start from the displacements in P1.
+/// A problem in P2, solved by conjugate gradients that start from the displacements in P1 and a step along what
+/// the last solve added to those.
 ///
 /// The preconditioner is the sum of two corrections: K₁⁻¹ of the forces as P1 sees them, and the residual
 /// over the diagonal of K (Xu, SIAM Review 34, 1992).
@@ -22,6 +23,8 @@ pub(super) struct FineSolve<'a> {
     middles: Vec<(usize, [usize; 2])>,
     /// The mean diagonal entry of K at each node of P2 in the last state, N/m.
     diagonal: Vec<f64>,
+    /// What the last solve added to its start.
+    change: Option<Vec<f64>>,
 }
 
 /// The part of the energy of u₂ − u₁ that the iteration may leave, and its largest number of iterations.
@@ -48,7 +51,7 @@ impl<'a> FineSolve<'a> {
         let middles = middles.filter_map(|(middle, ends)| Some((middle, ends?))).collect();
         let diagonal = stiffness_diagonal(problem, last);
         let node_of_vertex = body.node_of_vertex();
-        Self { session, problem, compliance, node_of_vertex, middles, diagonal }
+        Self { session, problem, compliance, node_of_vertex, middles, diagonal, change: None }
     }
 
     /// u₂ of a state in P1. It is `None` where the active nodes do not support the body. Collective.
@@ -60,6 +63,7 @@ impl<'a> FineSolve<'a> {
         let mut system = System {
             zeta_at_points: self.problem.zeta_at_points(&state.zeta),
             active: self.active_bounds(state)?,
+            gained: 0.0,
             supported: true,
             solve: self,
         };
@@ -68,10 +72,13 @@ impl<'a> FineSolve<'a> {
         constraints.bases.force_to_local(&mut residual);
         residual.iter_mut().zip(system.product(&c)?).for_each(|(f, image)| *f -= image);
         system.clear_fixed(&mut residual);
+        let along = system.along_last_change(&mut residual)?;
         let (session, owned) = (system.solve.session, 2 * partition.owned());
         let change = solve_by_energy(session, &mut system, &residual[..owned], ITERATIONS)?;
-        let Some(change) = change.filter(|_| system.supported) else { return Ok(None) };
-        c.iter_mut().zip(change).for_each(|(c, change)| *c += change);
+        let Some(mut change) = change.filter(|_| system.supported) else { return Ok(None) };
+        change.iter_mut().zip(along).for_each(|(change, along)| *change += along);
+        c.iter_mut().zip(&change).for_each(|(c, change)| *c += change);
+        self.change = Some(change);
         constraints.bases.displacement_to_global(&mut c);
         partition.update(&mut c, 2)?;
         Ok(Some(c))
@@ -115,6 +122,8 @@ struct System<'s, 'a> {
     zeta_at_points: Vec<f64>,
     /// Per bound: is it active?
     active: Vec<bool>,
+    /// The energy of the change before the iteration, N m per metre of thickness.
+    gained: f64,
     /// Do the active nodes support the body?
     supported: bool,
 }
@@ -140,6 +149,23 @@ impl System<'_, '_> {
         let constraints = &self.solve.problem.constraints;
         constraints.bases.zero_fixed(field);
         self.active().for_each(|place| field[constraints.bounds[place].dof] = 0.0);
+    }
+
+    /// The step (d·r / d·Kd) d along the change d of the last state, which it takes from the `residual` r:
+    /// between two states the change keeps its shape. Collective.
+    fn along_last_change(&mut self, residual: &mut [f64]) -> Result<Vec<f64>, PetscError> {
+        let Some(last) = self.solve.change.take() else { return Ok(vec![0.0; residual.len()]) };
+        let mut d = self.extended(&last);
+        self.clear_fixed(&mut d);
+        let mut image = self.product(&d)?;
+        self.clear_fixed(&mut image);
+        let partition = &self.solve.problem.body.nodes.partition;
+        let (work, stiffness) = (partition.dot(&d, residual, 2), partition.dot(&d, &image, 2));
+        let step = if stiffness > 0.0 { work / stiffness } else { 0.0 };
+        residual.iter_mut().zip(image).for_each(|(r, image)| *r -= step * image);
+        d.iter_mut().for_each(|d| *d *= step);
+        self.gained = step * work;
+        Ok(d)
     }
 
     /// K c, element by element.
@@ -191,7 +217,7 @@ impl Operator for System<'_, '_> {
     }
 
     fn is_enough(&self, gained: f64, left: f64) -> bool {
-        left <= REST * gained
+        left <= REST * (self.gained + gained)
     }
 }
 

@@ -15,7 +15,7 @@ pub(super) struct QuadraticSystem<'a> {
     diagonal: Vec<f64>,
     /// The nodes at the vertices that this rank owns.
     vertices: &'a [usize],
-    /// The matrix of P1 with its factor, and its k, s.
+    /// The matrix of P1 of a step of about this length with its factor, and the length, s.
     linear: (&'a mut DamageSystem, f64),
 }
 

