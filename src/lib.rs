@@ -49,6 +49,7 @@ pub mod model;
 pub mod fem;
 pub mod contact;
 pub mod scene;
+pub mod problem;
 pub mod evolution;
 pub mod estimate;
 pub mod output;

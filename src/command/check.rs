@@ -3,9 +3,9 @@
 use super::{Failure, SceneArguments, ranks::require_one_process, read_mesh, screen::row};
 use comfy_table::presets;
 use signorini::{
-    evolution::DiscreteProblem,
     mesh::{Mesh, extent},
     output::terminal::{self, say},
+    problem::DiscreteProblem,
     scene::{Boundary, Condition, Scene, Stepping, SurfaceLoad, Units},
 };
 

@@ -16,10 +16,11 @@ use super::{
 use clap::Args;
 use signorini::{
     cholesky::LinearSolver,
-    evolution::{self, DiscreteProblem, Phases, RunError},
+    evolution::{self, Phases, RunError},
     mesh::Mesh,
     output,
     petsc::{Communicator, Session},
+    problem::DiscreteProblem,
     scene::Scene,
 };
 use std::{

@@ -2,7 +2,8 @@
 
 use signorini::{
     estimate::{Adapted, Bar},
-    evolution::{DiscreteProblem, Phases},
+    evolution::Phases,
+    problem::DiscreteProblem,
 };
 use std::{fs::File, path::PathBuf, time::Instant};
 

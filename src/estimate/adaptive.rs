@@ -16,10 +16,11 @@ mod sizes;
 
 use super::Bar;
 use crate::{
-    evolution::{DiscreteProblem, LoadCurve, RunError, SetupError},
+    evolution::RunError,
     interrupt::Signal,
     mesh::{Mesh, MeshError, Refinement},
     petsc::{PetscError, Session},
+    problem::{DiscreteProblem, LoadCurve, SetupError},
     scene::{Scene, Stepping},
 };
 use measurement::Measurement;

@@ -17,11 +17,10 @@ use super::{
     quadratic_system::QuadraticSystem,
 };
 use crate::{
-    evolution::{
-        Compliance, DamageStep, DiscreteProblem, Outcome, Phases, RunError, State, agreed,
-    },
+    evolution::{Compliance, DamageStep, Outcome, Phases, RunError, agreed},
     model::DamageLaw,
     petsc::PetscError,
+    problem::{DiscreteProblem, State},
 };
 use nalgebra::{Matrix6, Vector3, Vector6};
 
@@ -69,7 +68,8 @@ fn error_at_end(
 ) -> Result<Option<DamageError>, RunError> {
     let [first, .., last] = &instants.states[..] else { return Ok(None) };
     let (session, phases) = (damage_step.session, Phases::default());
-    let other = problem.of_other_order(session)?;
+    let comm = problem.body.nodes.partition.comm();
+    let other = agreed(comm, problem.of_other_order())?.restrict_as(session, problem)?;
     let pair = OrderPair::new(session, problem, &other, compliance, last, &phases)?;
     let fine = pair.problems()[1];
     let Some(nodes) = fine.body.quadratic_nodes() else { return Ok(None) };

@@ -2,8 +2,9 @@
 
 use super::{RecoveredStrains, damage_error::DamageError};
 use crate::{
-    evolution::{DiscreteProblem, Outcome, State, Stop},
+    evolution::{Outcome, Stop},
     petsc::PetscError,
+    problem::{DiscreteProblem, State},
 };
 use serde::Serialize;
 use std::collections::BTreeMap;

@@ -1,7 +1,8 @@
 //! The figures that a run prints, and how far off each of them may be.
 
 use crate::{
-    evolution::{DiscreteProblem, OBSERVED, Step},
+    evolution::Step,
+    problem::{DiscreteProblem, OBSERVED},
     scene::{Expression, Stepping},
 };
 use serde::{Deserialize, Serialize};

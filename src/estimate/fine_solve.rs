@@ -2,9 +2,10 @@
 
 use crate::{
     contact::ContactPoint,
-    evolution::{Compliance, DiscreteProblem, LoadCase, RunError, State, active_bounds},
+    evolution::{Compliance, RunError, active_bounds},
     fem::Elements,
     petsc::{Operator, PetscError, Session, solve_by_energy},
+    problem::{DiscreteProblem, LoadCase, State},
 };
 
 /// A problem in P2, solved by conjugate gradients that start from the displacements in P1 and a step along what

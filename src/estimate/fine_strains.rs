@@ -11,7 +11,7 @@ use super::{
     order_pair::OrderPair,
     recovery::{RecoveredStrains, strains_at_nodes},
 };
-use crate::evolution::{RunError, State};
+use crate::{evolution::RunError, problem::State};
 use nalgebra::{Vector3, Vector6};
 
 /// The strains of the states of a run.

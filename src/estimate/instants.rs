@@ -1,6 +1,6 @@
 //! Some states of a run, kept for the estimates at its end.
 
-use crate::evolution::{State, Step};
+use crate::{evolution::Step, problem::State};
 use serde::{Deserialize, Serialize};
 
 /// The least number of intervals between the states that are kept; there are at most twice as many. With three

@@ -3,9 +3,10 @@
 use super::fine_solve::FineSolve;
 use crate::{
     contact::SOLVERS,
-    evolution::{Compliance, ContactStep, DiscreteProblem, Phases, RunError, State},
+    evolution::{Compliance, ContactStep, Phases, RunError},
     mesh::Order,
     petsc::Session,
+    problem::{DiscreteProblem, State},
 };
 
 /// A scene in P1 and in P2 on one mesh. One of the two is the problem of a run.

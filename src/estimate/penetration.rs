@@ -6,9 +6,9 @@
 //! where the gap is narrower or more curved than an edge shows.
 
 use crate::{
-    evolution::{DiscreteProblem, State},
     fem::{Edge, Elements, parabola},
     mesh::sorted,
+    problem::{DiscreteProblem, State},
     scene::Gap,
 };
 use std::collections::HashMap;

@@ -2,9 +2,9 @@
 //! nodes, and may vary by more between them.
 
 use crate::{
-    evolution::{EdgePart, TrianglePart, centroid, edge_parts, triangle_parts, triangle_point},
     fem::{GAUSS, POINTS, midpoint, parabola, part_point, six_points},
     mesh::{Curve, Mesh, Order, sorted},
+    problem::{EdgePart, TrianglePart, centroid, edge_parts, triangle_parts, triangle_point},
     scene::{Condition, Expression, Scene},
 };
 use std::collections::HashSet;

@@ -18,8 +18,8 @@ pub(crate) use accuracy::Compliance;
 pub(crate) use certificate::active_bounds;
 
 use super::{
-    DiscreteProblem, Phases, RunError, State, Step, StepFailure, StepRecord, agreed,
-    discrete_problem::LoadCase, extrapolation::Extrapolation,
+    DiscreteProblem, LoadCase, Phases, RunError, State, Step, StepFailure, StepRecord, agreed,
+    extrapolation::Extrapolation,
 };
 use crate::{
     cholesky::{FactorState, LinearSolver, Precision},

@@ -1,13 +1,12 @@
 //! Why there is no run, or why it ends early.
 
-use super::DiscreteProblem;
+use super::{DiscreteProblem, SetupError};
 use crate::{
-    contact::{ConstraintError, ContactError, DrivenMotion, SolverError},
+    contact::{ContactError, SolverError},
     interrupt::Signal,
     petsc::PetscError,
-    scene::{SceneError, rounded},
+    scene::rounded,
 };
-use std::path::PathBuf;
 
 /// Why a run ended early.
 #[derive(Debug, thiserror::Error)]
@@ -106,45 +105,4 @@ impl RunError {
         let time = problem.scene().time.map(|_| time);
         Self::Contact { step, time, source: Box::new(source), advice }
     }
-}
-
-/// The scene and its mesh do not make a problem: the input is wrong.
-#[derive(Debug, thiserror::Error)]
-pub enum SetupError {
-    /// The scene does not fit the mesh.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// Displacement conditions contradict each other.
-    #[error("{scene}: {}{source}", time.map_or(String::new(), |t| format!("at t = {}, ", rounded(t))))]
-    Constraint {
-        /// The scene file.
-        scene: PathBuf,
-        /// The time, s; none where they do at any.
-        time: Option<f64>,
-        /// The contradiction.
-        source: ConstraintError,
-    },
-    /// A load, a prescribed displacement or a gap is not finite, and this rank cannot tell where.
-    #[error(
-        "{scene}: a traction, the body force, a prescribed displacement or a gap is not finite or too \
-         large at t = {}; check its expression for divisions by zero, roots and logarithms \
-         of negative numbers",
-        rounded(*time)
-    )]
-    NotFinite {
-        /// The scene file.
-        scene: PathBuf,
-        /// The time, s.
-        time: f64,
-    },
-    /// The load drives a rigid motion.
-    #[error("{scene}: at t = {}, {source}", rounded(*time))]
-    Driven {
-        /// The scene file.
-        scene: PathBuf,
-        /// The first such time, s.
-        time: f64,
-        /// The motion.
-        source: DrivenMotion,
-    },
 }

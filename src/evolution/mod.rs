@@ -23,44 +23,33 @@
 //! [`run`] is this loop; a step controller plans each step and judges it, so that steps may be chosen as
 //! well as uniform.
 
-mod boundary_conditions;
 mod contact_step;
 mod damage_step;
-mod discrete_problem;
 mod error;
 mod extrapolation;
-mod loads;
 mod notes;
 mod observer;
 mod outcome;
-mod probe;
 mod state;
 mod step_controller;
-mod supports;
 
 pub use crate::contact::ContactPoint;
 pub use crate::phases::Phases;
+pub use crate::problem::{ContactRow, DiscreteProblem, Loads, SetupError, State, Supports};
 pub use contact_step::{Accuracy, ContactStep};
 pub(crate) use contact_step::{Compliance, active_bounds};
 pub(crate) use damage_step::DamageStep;
-pub use discrete_problem::DiscreteProblem;
-pub(crate) use discrete_problem::LoadCase;
-pub use error::{RunError, SetupError, StepFailure};
+pub use error::{RunError, StepFailure};
 pub use extrapolation::Extrapolation;
-pub use loads::Loads;
-pub(crate) use loads::{
-    EdgePart, LoadCurve, TrianglePart, centroid, edge_parts, triangle_parts, triangle_point,
-};
 pub use observer::{Next, Observed, Observer};
 pub use outcome::{BoundViolation, Outcome, Stop};
-pub(crate) use probe::OBSERVED;
-pub use state::{State, Step, StepRecord};
+pub use state::{Step, StepRecord};
 pub(crate) use step_controller::{AIM, StepController};
-pub use supports::{ContactRow, Supports};
 
 use crate::{
     estimate::{Instants, estimate_run},
     petsc::{Communicator, Session},
+    problem::{LoadCase, LoadCurve},
 };
 use contact_step::ContactState;
 use observer::Shown;

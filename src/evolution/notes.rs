@@ -1,6 +1,6 @@
 //! What the user should know about a problem or an answer that its residuals do not tell.
 
-use super::{Accuracy, DiscreteProblem, Outcome, loads::LoadCurve};
+use super::{Accuracy, DiscreteProblem, LoadCurve, Outcome};
 use crate::{
     estimate::{percent, unresolved_notes},
     fem::for_elements,

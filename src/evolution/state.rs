@@ -1,8 +1,8 @@
 //! A step: its fields and its quantities of interest.
 
-use super::DiscreteProblem;
+use super::{DiscreteProblem, State};
 use crate::{
-    contact::{ContactPoint, ContactReport, Kkt},
+    contact::{ContactReport, Kkt},
     fem::{DamageCertificate, RigidMotion},
 };
 use serde::{Deserialize, Serialize};
@@ -23,19 +23,6 @@ pub struct Step {
     pub unconstrained: Option<RigidMotion>,
     /// Was the damage solve skipped?
     pub skipped_damage_solve: bool,
-}
-
-/// The fields of a step.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub struct State {
-    /// t, s.
-    pub time: f64,
-    /// Displacements (u_x, u_y) in turn, m.
-    pub u: Vec<f64>,
-    /// ζ at the nodes.
-    pub zeta: Vec<f64>,
-    /// The nodes of Γ_C that carry a gap condition; two entries at a corner.
-    pub contact: Vec<ContactPoint>,
 }
 
 /// The quantities of interest of a step: a row of `history.csv`.

@@ -8,9 +8,9 @@ use super::{
     write_whole,
 };
 use crate::{
-    evolution::{DiscreteProblem, State},
     fem::{Body, Elements},
     petsc::PetscError,
+    problem::{DiscreteProblem, State},
     scene::{Scene, Stepping},
 };
 use serde::{Deserialize, Serialize};

@@ -16,9 +16,9 @@ use super::{
     sizes::areas,
 };
 use crate::{
-    evolution::DiscreteProblem,
     mesh::{Mesh, Order, Refinement},
     petsc::Session,
+    problem::DiscreteProblem,
     scene::Scene,
 };
 

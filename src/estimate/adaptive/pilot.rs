@@ -3,8 +3,9 @@
 
 use crate::{
     estimate::RecoveredStrains,
-    evolution::{DiscreteProblem, Outcome, Phases, RunError, State, Step, run, run_unestimated},
+    evolution::{Outcome, Phases, RunError, Step, run, run_unestimated},
     petsc::{PetscError, Session},
+    problem::{DiscreteProblem, State},
 };
 
 /// Steps of the run, and instants, evenly spread, at which its errors are estimated.

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     contact::{ContactError, ContactReport},
-    evolution::{RunError, discrete_problem::LoadCase},
+    evolution::{LoadCase, RunError},
     petsc::PetscError,
 };
 

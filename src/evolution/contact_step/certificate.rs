@@ -3,8 +3,8 @@
 use super::{Accuracy, ContactStep};
 use crate::{
     contact::{Answer, Constraints, ContactError, ContactOptions, ContactPoint, Kkt, Scales},
-    evolution::discrete_problem::LoadCase,
     fem::RigidMotion,
+    problem::LoadCase,
 };
 
 /// Residuals are the effect of rounding if they are at most this many times its estimate.

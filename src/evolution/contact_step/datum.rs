@@ -2,7 +2,7 @@
 
 use crate::{
     contact::{Bound, Constraints},
-    evolution::discrete_problem::LoadCase,
+    problem::LoadCase,
 };
 use serde::{Deserialize, Serialize};
 

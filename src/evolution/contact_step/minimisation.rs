@@ -3,7 +3,7 @@
 use super::ContactStep;
 use crate::{
     contact::{Bound, ContactError, ContactProblem, ContactReport, Scales},
-    evolution::{DiscreteProblem, discrete_problem::LoadCase},
+    evolution::{DiscreteProblem, LoadCase},
     petsc::{PetscError, Vector},
 };
 

@@ -3,9 +3,9 @@
 use super::{ContactStep, active_bounds, certificate::Judged};
 use crate::{
     contact::{self, ContactPoint, least_motion},
-    evolution::discrete_problem::LoadCase,
     fem::RigidMotion,
     petsc::PetscError,
+    problem::LoadCase,
 };
 use nalgebra::DVector;
 

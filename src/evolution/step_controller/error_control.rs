@@ -2,7 +2,7 @@
 
 use super::{PlannedStep, forecast::Forecast};
 use crate::{
-    evolution::{DiscreteProblem, loads::LoadCurve},
+    evolution::{DiscreteProblem, LoadCurve},
     fem::Body,
     scene::Stepping,
 };

@@ -1,6 +1,6 @@
 //! A forecast of the damage that the loads ahead will do.
 
-use crate::evolution::loads::LoadCurve;
+use crate::evolution::LoadCurve;
 
 /// The loads of a run in time. Strains are about proportional to the size s of the loads, and the damage source is
 /// about ½ λ_U |ε|². With the rate ζ' at t, the loads ahead do about ζ' ∫_t^T s(τ)² dτ / s(t)² more damage.

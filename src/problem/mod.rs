@@ -1,14 +1,35 @@
-//! The discrete problem: a scene bound to its mesh, with everything that is the same in all steps.
+//! The discrete problem: a scene on its mesh, with everything that is the same in all steps.
+//!
+//! The scene says what is asked, the mesh where; here both become numbers:
+//!
+//! - [`DiscreteProblem`]: the body, its materials, what supports it, and the tolerance;
+//! - [`Loads`]: nodal loads, prescribed displacements and gaps at any time, from the functions of the scene,
+//!   which are divided until no narrow load or gap is overlooked ([`LoadCase`] has those of one time);
+//! - [`Supports`] and probes: resultants and values at points, which are printed;
+//! - [`State`]: time, displacements, damage and contact at one time.
+//!
+//! What crosses the door: `evolution` steps a [`DiscreteProblem`] from [`State`] to [`State`]; `estimate` asks
+//! how well mesh and steps show the functions; `output` writes states. What is wrong with a scene on its mesh is
+//! a [`SetupError`].
 
+mod boundary_conditions;
+mod error;
 mod load_case;
+mod loads;
+mod probe;
+mod state;
+mod supports;
 
+pub use error::SetupError;
 pub(crate) use load_case::LoadCase;
-
-use super::{
-    Loads, RunError, SetupError, State, Supports, agreed,
-    boundary_conditions::BoundaryConditions,
-    probe::{OBSERVED, Probes},
+pub use loads::Loads;
+pub(crate) use loads::{
+    EdgePart, LoadCurve, TrianglePart, centroid, edge_parts, triangle_parts, triangle_point,
 };
+pub(crate) use probe::OBSERVED;
+pub use state::State;
+pub use supports::{ContactRow, Supports};
+
 use crate::{
     contact::{Certificate, Constraints, RigidMotions},
     fem::{Body, Elasticity, Mass, Subdomain},
@@ -17,6 +38,8 @@ use crate::{
     petsc::{PetscError, Session},
     scene::Scene,
 };
+use boundary_conditions::BoundaryConditions;
+use probe::Probes;
 use std::collections::BTreeMap;
 
 /// A scene on its mesh, ready to be stepped.
@@ -40,7 +63,7 @@ pub struct DiscreteProblem {
     pub supports: Supports,
     probes: Probes,
     /// The largest ‖·‖₂ of the nodal loads at some times of the run, N per metre of thickness.
-    pub(super) largest_load: f64,
+    pub(crate) largest_load: f64,
     /// KKT tolerance.
     pub tolerance: f64,
     scene: Scene,
@@ -50,6 +73,7 @@ pub struct DiscreteProblem {
 
 /// Times at which the loads of a run are sampled for the largest.
 const SAMPLES: usize = 9;
+
 impl DiscreteProblem {
     /// Binds `scene` to `mesh` and checks that there is a solution at all times.
     ///
@@ -116,22 +140,29 @@ impl DiscreteProblem {
         })
     }
 
-    /// The same scene on the same mesh, and this rank's same triangles of it, with displacements of the
-    /// other order. Collective.
+    /// The same scene on the same undivided mesh with displacements of the other order.
     ///
     /// # Errors
-    /// At its nodes the scene contradicts itself, or PETSc failed.
-    pub(crate) fn of_other_order(&self, session: &Session) -> Result<Self, RunError> {
+    /// At its nodes the scene contradicts itself.
+    pub(crate) fn of_other_order(&self) -> Result<Self, SetupError> {
         let mut scene = self.scene.clone();
         scene.order = match scene.order {
             Order::Linear => Order::Quadratic,
             Order::Quadratic => Order::Linear,
         };
-        let Some((mesh, owners)) = self.undivided.clone() else {
-            return Ok(Self::new(scene, self.body.mesh.clone())?);
-        };
-        let other = agreed(self.body.nodes.partition.comm(), Self::new(scene, mesh))?;
-        Ok(other.divide(session, owners)?)
+        Self::new(scene, self.mesh().clone())
+    }
+
+    /// The part of this rank in a problem that every rank has made: the triangles that it has of `other`, a problem
+    /// on the same mesh. Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub(crate) fn restrict_as(self, session: &Session, other: &Self) -> Result<Self, PetscError> {
+        match &other.undivided {
+            Some((_, owners)) => self.divide(session, owners.clone()),
+            None => Ok(self),
+        }
     }
 
     /// Is there a Γ_C?

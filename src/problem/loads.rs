@@ -67,7 +67,7 @@ impl Loads {
     }
 
     /// Notes on loads of whose integrals a large part may be missed.
-    pub(super) fn notes(&self, times: &[f64]) -> Vec<String> {
+    pub(crate) fn notes(&self, times: &[f64]) -> Vec<String> {
         let body = self.body_force.iter();
         let body = body.map(|force| ("the body force", "triangles", force.missed));
         let surface = self.surface_forces.iter().map(|force| {

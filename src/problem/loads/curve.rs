@@ -1,7 +1,7 @@
 //! Loads, prescribed displacements and gaps as functions of time, for the choice of steps.
 
 use crate::{
-    evolution::DiscreteProblem,
+    problem::DiscreteProblem,
     scene::{Condition, Expression, Stepping, TimeGrid},
 };
 

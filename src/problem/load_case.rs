@@ -1,7 +1,7 @@
 //! The loads, prescribed displacements and gaps at one time.
 
-use super::DiscreteProblem;
-use crate::{contact::Bound, evolution::SetupError};
+use super::{DiscreteProblem, SetupError};
+use crate::contact::Bound;
 use nalgebra::DVector;
 
 /// A load below this fraction of the largest load of the run is rounding.

@@ -4,8 +4,8 @@ use super::parts::{
     EdgePart, Parts, TrianglePart, WHOLE, centroid, edge_parts, triangle_parts, triangle_points,
 };
 use crate::{
-    evolution::boundary_conditions::Traction,
     fem::{Body, Division, Edge, GAUSS, Subdomain, add_body_force, add_traction, parabola},
+    problem::boundary_conditions::Traction,
     scene::{Expression, Scene, SurfaceLoad},
 };
 
