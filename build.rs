@@ -32,7 +32,7 @@ const PETSC: &str = "\
     TaoSetObjectiveAndGradient|TaoSetHessian|TaoSetFromOptions|TaoSetTolerances|\
     TaoSetMaximumIterations|TaoSolve|TaoGetIterationNumber|TaoGetConvergedReason|TaoGetLinearSolveIterations|TaoGetKSP";
 
-/// Everything the `cholesky` module calls.
+/// Everything the `linear` module calls.
 const CHOLMOD: &str = "\
     cholmod_l_start|cholmod_l_finish|cholmod_l_analyze|cholmod_l_analyze_p|cholmod_l_factorize|\
     cholmod_l_camd|cholmod_l_metis|cholmod_l_change_factor|cholmod_l_free_factor|cholmod_l_realloc";

@@ -43,7 +43,7 @@ pub mod interrupt;
 pub mod phases;
 mod suggestion;
 pub mod petsc;
-pub mod cholesky;
+pub mod linear;
 pub mod mesh;
 pub mod model;
 pub mod fem;

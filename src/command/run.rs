@@ -15,8 +15,8 @@ use super::{
 };
 use clap::Args;
 use signorini::{
-    cholesky::LinearSolver,
     evolution::{self, Phases, RunError},
+    linear::LinearSolver,
     mesh::Mesh,
     output,
     petsc::{Communicator, Session},

@@ -2,7 +2,7 @@
 
 use super::{Bound, Kkt, Scales};
 use crate::{
-    cholesky::{Booking, LinearSystem},
+    linear::{Booking, LinearSystem},
     petsc::{Communicator, Matrix, PetscError, Session, Vector},
     phases::Phases,
 };

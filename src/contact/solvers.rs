@@ -15,7 +15,7 @@ pub use tao::TAO_TYPES;
 
 use super::{ContactError, ContactProblem, Kkt};
 use crate::{
-    cholesky::{LinearSolver, SolveReport},
+    linear::{LinearSolver, SolveReport},
     petsc::Vector,
     suggestion::suggestion,
 };

@@ -22,9 +22,9 @@ use super::{
     extrapolation::Extrapolation,
 };
 use crate::{
-    cholesky::{FactorState, LinearSolver, Precision},
     contact::{self, BoxedSolver, Scales},
     fem::Stiffness,
+    linear::{FactorState, LinearSolver, Precision},
     petsc::{PetscError, Session, Vector},
 };
 use certificate::Judged;

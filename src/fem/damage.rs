@@ -2,7 +2,7 @@
 
 use super::{Body, Nodes, Triangle, body::at_quadratic_points, element::POINTS};
 use crate::{
-    cholesky::{LinearSolver, LinearSystem, Precision},
+    linear::{LinearSolver, LinearSystem, Precision},
     mesh::Order,
     model::DamageLaw,
     petsc::{Matrix, Pattern, PetscError, Session, Vector},

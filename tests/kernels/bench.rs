@@ -3,10 +3,10 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use signorini::{
-    cholesky::{Factor, Precision},
     contact::SOLVERS,
     evolution::{ContactStep, DiscreteProblem},
     fem::{DamageSystem, Stiffness, source, source_load},
+    linear::{Factor, Precision},
     mesh::Mesh,
     petsc::{Matrix, Session, Vector},
     phases::Phases,

@@ -3,11 +3,11 @@
 use crate::support::{close, history, problem};
 use nalgebra::{DMatrix, DVector};
 use signorini::{
-    cholesky::{LinearSolver, Precision},
     contact::{
         Bound, ContactError, ContactOptions, ContactProblem, ContactReport, SOLVERS, Scales, find,
         solvers,
     },
+    linear::{LinearSolver, Precision},
     mesh::Mesh,
     petsc::{Communicator, Matrix, Pattern, Session, Vector},
     phases::Phases,

@@ -4,8 +4,8 @@ mod pivoting;
 
 use super::{ContactReport, ContactSolver, SolverEntry};
 use crate::{
-    cholesky::LinearSolver,
     contact::{Bound, ContactError, ContactProblem, Kkt},
+    linear::LinearSolver,
     petsc::{PetscError, Vector},
 };
 use pivoting::{AtBounds, Pivoting, constrain_rigid_motions, pivot_condensed};

@@ -5,8 +5,8 @@ mod omega;
 
 use super::{Anderson, ContactReport, ContactSolver, SolverEntry};
 use crate::{
-    cholesky::{Condensed, LinearSolver, LinearSystem},
     contact::{Bound, ContactError, ContactProblem, Kkt},
+    linear::{Condensed, LinearSolver, LinearSystem},
     petsc::{Matrix, Vector},
 };
 use omega::estimate_omega;

@@ -2,8 +2,8 @@
 
 use super::{ContactReport, ContactSolver, SolverEntry};
 use crate::{
-    cholesky::{Factor, LinearSolver, Reduction},
     contact::{Bound, ContactError, ContactProblem, Kkt},
+    linear::{Factor, LinearSolver, Reduction},
     petsc::{BoundedQuadratic, KeptPreconditioner, Matrix, PetscError, TaoReport, Vector},
 };
 use std::iter;

@@ -2,10 +2,10 @@
 
 use super::{ContactStep, active_bounds, displacement};
 use crate::{
-    cholesky::{LinearSolver, LinearSystem},
     contact::ContactPoint,
     evolution::{DiscreteProblem, Outcome, State, Step},
     fem::{RigidMotion, Stiffness},
+    linear::{LinearSolver, LinearSystem},
     petsc::{PetscError, Vector},
 };
 use std::rc::Rc;

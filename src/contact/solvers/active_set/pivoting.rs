@@ -1,8 +1,8 @@
 //! How the active set changes.
 
 use crate::{
-    cholesky::Condensed,
     contact::{Bound, ContactProblem, ContactReport, rigid_motion_until_contact},
+    linear::Condensed,
     petsc::{Communicator, PetscError, Vector},
 };
 

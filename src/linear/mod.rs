@@ -1,9 +1,9 @@
-//! The Cholesky factor that is kept across matrices, and what solves with it.
+//! Linear systems: PETSc's KSP with a Cholesky factor that is kept across matrices.
 //!
 //! Every linear system of a run is symmetric positive definite: (M + kκL) ζ = b of the damage step
 //! and K(ζ) u = f of the contact step, with prescribed or penalised unknowns. The factor of one
 //! matrix preconditions conjugate gradients for the next ones, until it costs more iterations than
-//! a new one ([`RefactorisationPolicy`]).
+//! a new one ([`RefactorisationPolicy`]). Both are asked for through a [`LinearSolver`].
 //!
 //! - On one rank CHOLMOD computes L Lᵀ = P A Pᵀ; the triangular solves L y = P b and Lᵀ (P x) = y
 //!   are our own ([`Cholesky`]).
@@ -13,9 +13,11 @@
 //! - Where Γ is too large, or PETSc options ask for it, a preconditioner of PETSc takes its place
 //!   ([`Factor`]).
 //!
+//! What crosses the door: a [`LinearSystem`] and the residual that it may leave. Contact solvers also ask for
+//! the small problem of the unknowns that may be prescribed ([`Condensed`]), and solve that by their own means.
+//!
 //! Unsafe code is where CHOLMOD is called, in `cholmod.rs`.
 
-#[expect(clippy::module_inception, reason = "the factor gives the room its name")]
 mod cholesky;
 #[allow(unsafe_code)]
 mod cholmod;

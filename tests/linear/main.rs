@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use signorini::{
-    cholesky::{
+    linear::{
         Cholesky, Factor, LinearSolver, LinearSystem, LowerTriangle, Precision, Reduction,
         RefactorisationPolicy,
     },
