@@ -45,7 +45,7 @@ impl ContactProblem<'_> {
         let booking = Booking {
             phases: self.phases,
             factorisation: "contact/factorisation",
-            restriction: "contact/Schur complement",
+            prescription: "contact/Schur complement",
             triangular_solves: "contact/triangular solves",
             product: "contact/products",
         };

@@ -17,7 +17,7 @@ pub struct Factor {
     comm: Communicator,
     /// Of the two factors of a substructure.
     precisions: [Precision; 2],
-    /// The rows of the matrices to condense, and their owned unknowns that [`Self::restrict`] may prescribe.
+    /// The rows of the matrices to condense, and their owned unknowns that [`Self::prescribe`] may prescribe.
     condensed: (usize, Vec<usize>),
     /// The rows of the matrices that it is for, and the factor; `None` where these have too large an
     /// interface, or are too large.
@@ -205,7 +205,7 @@ impl Factor {
     }
 
     /// Factorises the present values of `matrix`; false if it is not positive definite: then there is
-    /// no factor. A restriction must follow before it is applied, where unknowns are condensed. Collective.
+    /// no factor. Unknowns must be prescribed before it is applied, where unknowns are condensed. Collective.
     ///
     /// # Errors
     /// There is no memory for it.
@@ -218,7 +218,8 @@ impl Factor {
         };
         // BLAS may take a pivot that is no number for a positive one.
         let finite = comm.all(matrix.diagonal()?.iter().all(|entry| entry.is_finite()));
-        let definite = finite && factor.factorise(matrix)? && (condensed || factor.restrict(&[])?);
+        let definite =
+            finite && factor.factorise(matrix)? && (condensed || factor.prescribe(&[])?);
         let work = comm.max(factor.work());
         // An iteration reads the factor and the entries of the matrix with their columns.
         let iteration = comm.max(factor.bytes() + 12.0 * entries);
@@ -258,9 +259,9 @@ impl Factor {
     ///
     /// # Errors
     /// There is no memory for it.
-    pub(crate) fn restrict(&mut self, prescribed: &[usize]) -> Result<bool, PetscError> {
+    pub(crate) fn prescribe(&mut self, prescribed: &[usize]) -> Result<bool, PetscError> {
         let Some(factor) = self.substructure() else { return Ok(true) };
-        let definite = factor.restrict(prescribed)?;
+        let definite = factor.prescribe(prescribed)?;
         // A factor that needs all digits will need them after a checkpoint too.
         self.precisions = factor.precisions();
         Ok(definite)

@@ -169,7 +169,7 @@ impl LinearSolver {
         if !own {
             self.factor.record(matrix, definite, None)?;
         }
-        Ok(definite && self.restrict(system)?)
+        Ok(definite && self.is_ready(system)?)
     }
 
     /// Prescribes unknowns in a copy of the matrix, unless the preconditioner takes care of them: the factor
@@ -192,12 +192,9 @@ impl LinearSolver {
 
     /// Whether there is a preconditioner for the system. In a condensed factor the unknowns that the
     /// system prescribes are prescribed first.
-    fn restrict(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
-        if !self.factor.exists() || !self.is_condensed(system.matrix)? {
-            return Ok(self.factor.exists());
-        }
-        let restrict = || self.factor.restrict(system.prescribed.unwrap_or(&[]));
-        system.book(|booking| booking.restriction, 0.0, restrict)
+    fn is_ready(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
+        let prescribe = || self.prescribe(system.prescribed.unwrap_or(&[]));
+        system.book(|booking| booking.prescription, 0.0, prescribe)
     }
 
     /// Makes the preconditioner of a checkpoint again.
@@ -223,7 +220,7 @@ impl LinearSolver {
         x: &mut Vector,
         limit: f64,
     ) -> Result<SolveReport, PetscError> {
-        if !self.restrict(system)? {
+        if !self.is_ready(system)? {
             return Ok(SolveReport::default());
         }
         let converged = self.start(system, b, x, limit)?;
@@ -360,7 +357,7 @@ impl LinearSolver {
             SolveReport { converged, iterations: self.iterations, ..SolveReport::default() };
         if !converged
             && let Some(most) = self.factor.iteration_limit(self.asked(limit))
-            && self.restrict(system)?
+            && self.is_ready(system)?
         {
             self.iterate(system, x, (limit, most), &mut report)?;
         }
@@ -434,7 +431,7 @@ impl LinearSolver {
     /// Collective.
     pub(crate) fn prescribe(&mut self, unknowns: &[usize]) -> Result<bool, PetscError> {
         let exists = self.factor.exists();
-        Ok(exists && (!self.factor.is_condensed() || self.factor.restrict(unknowns)?))
+        Ok(exists && (!self.factor.is_condensed() || self.factor.prescribe(unknowns)?))
     }
 
     /// `z` ← P⁻¹ `r` with the preconditioner that there is.

@@ -26,7 +26,7 @@ pub struct Booking<'a> {
     /// A new factor.
     pub factorisation: &'static str,
     /// The same for other prescribed unknowns, where that takes less.
-    pub restriction: &'static str,
+    pub prescription: &'static str,
     /// An application of the factor.
     pub triangular_solves: &'static str,
     /// A product with A.

@@ -49,7 +49,7 @@ impl SchurComplement {
 
     /// Prescribes unknowns and adds to diagonal entries of S, those that this rank owns; false if what is
     /// left is not positive definite. Without changes the factor stays. Collective.
-    pub(super) fn restrict(
+    pub(super) fn prescribe(
         &mut self,
         prescribed: impl Iterator<Item = usize>,
         added: impl Iterator<Item = (usize, f64)>,
@@ -165,7 +165,7 @@ impl Condensed<'_> {
         let Self { schur, own, scaling, b, x } = self;
         let unknowns = || own.iter().zip(&*scaling).zip(prescribed);
         let given = || unknowns().filter_map(|((&i, e), value)| Some((i, (*value)? / e)));
-        if !schur.restrict(given().map(|(i, _)| i), iter::empty())? {
+        if !schur.prescribe(given().map(|(i, _)| i), iter::empty())? {
             return Ok(None);
         }
         x.fill(0.0);
@@ -190,7 +190,7 @@ impl Condensed<'_> {
     ) -> Result<Option<Vec<f64>>, PetscError> {
         let Self { schur, own, scaling, b, x } = self;
         let added = own.iter().zip(&*scaling).zip(added).map(|((&i, e), d)| (i, e * e * d));
-        if !schur.restrict(iter::empty(), added)? {
+        if !schur.prescribe(iter::empty(), added)? {
             return Ok(None);
         }
         let mut forces = vec![0.0; b.len()];

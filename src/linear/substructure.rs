@@ -103,7 +103,7 @@ impl Substructure {
     }
 
     /// Factorises the present values of a matrix of the same pattern; false if it is not positive
-    /// definite, whatever of the interface is prescribed. [`Self::restrict`] is to follow. Collective.
+    /// definite, whatever of the interface is prescribed. [`Self::prescribe`] is to follow. Collective.
     pub(super) fn factorise(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
         let near = &self.division.near;
         let Blocks { mut local, interface: mut schur, largest_row_sum } =
@@ -131,10 +131,10 @@ impl Substructure {
 
     /// Prescribes some of the condensed unknowns; false if what is left of the matrix is not positive
     /// definite. Collective.
-    pub(super) fn restrict(&mut self, prescribed: &[usize]) -> Result<bool, PetscError> {
+    pub(super) fn prescribe(&mut self, prescribed: &[usize]) -> Result<bool, PetscError> {
         let (places, shared) = (&self.division.places, self.division.shared());
         let place = |&i: &usize| places[i] - shared;
-        self.schur.restrict(prescribed.iter().map(place), iter::empty())
+        self.schur.prescribe(prescribed.iter().map(place), iter::empty())
     }
 
     /// `z` ← A⁻¹ `r` on the owned unknowns, 0 on prescribed ones. Collective.

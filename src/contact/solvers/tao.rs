@@ -192,8 +192,9 @@ impl KeptPreconditioner for TaoPreconditioner<'_> {
         let fits = factor.is_for(rows);
         let usable = fits
             && factor.iteration_limit(1.0).is_some()
-            && (!condensed || factor.restrict(&prescribed)?);
-        Ok(usable || factor.factorise(factored)? && (!condensed || factor.restrict(&prescribed)?))
+            && (!condensed || factor.prescribe(&prescribed)?);
+        Ok(usable
+            || factor.factorise(factored)? && (!condensed || factor.prescribe(&prescribed)?))
     }
 
     fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
