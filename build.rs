@@ -24,7 +24,7 @@ const PETSC: &str = "\
     MatNullSpaceCreate|MatNullSpaceDestroy|MatSetNearNullSpace|MatGetNearNullSpace|\
     MatCreateShell|MatShellSetOperation|MatShellGetContext|\
     KSPCreate|KSPDestroy|KSPSetType|KSPSetOptionsPrefix|KSPSetFromOptions|KSPSetOperators|KSPSolve|\
-    KSPSetConvergenceTest|KSPSetNormType|KSPBuildResidual|KSPBuildSolution|KSPGetConvergedReason|KSPGetIterationNumber|KSPGetPC|KSPSetTolerances|\
+    KSPSetConvergenceTest|KSPSetNormType|KSPBuildResidual|KSPBuildSolution|KSPGetConvergedReason|KSPGetIterationNumber|KSPGetPC|KSPSetTolerances|KSPGetTolerances|\
     PCRegister|PCCreate_Shell|PCSetType|PCSetUp|PCApply|PCSetReusePreconditioner|PCGetOperators|PCGetFailedReason|\
     PCFactorSetMatSolverType|PCFactorGetMatrix|PCFactorGetMatSolverType|\
     PCSetApplicationContext|PCGetApplicationContext|PCShellSetApply|PCShellSetSetUp|PCShellSetName|\

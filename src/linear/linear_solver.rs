@@ -49,7 +49,8 @@ pub struct SolveReport {
 }
 
 /// Iterations that the factor of the system itself may need. It takes one or two to remove the
-/// rounding error of the factor, more where the entries of the matrix vary by many orders.
+/// rounding error of the factor, more where the entries of the matrix vary by many orders. What preconditioners
+/// of PETSc may need is left to PETSc (`-ksp_max_it`).
 const MOST_ITERATIONS: usize = 200;
 
 /// PETSC_ERR_MISSING_FACTOR: PETSc has no such package, or not for such a factor.
@@ -226,7 +227,7 @@ impl LinearSolver {
         let converged = self.start(system, b, x, limit)?;
         let mut report = SolveReport { converged, ..SolveReport::default() };
         if !converged {
-            self.iterate(system, x, (limit, MOST_ITERATIONS), &mut report)?;
+            self.iterate(system, x, (limit, None), &mut report)?;
         }
         Ok(report)
     }
@@ -359,12 +360,12 @@ impl LinearSolver {
             && let Some(most) = self.factor.iteration_limit(self.asked(limit))
             && self.is_ready(system)?
         {
-            self.iterate(system, x, (limit, most), &mut report)?;
+            self.iterate(system, x, (limit, Some(most)), &mut report)?;
         }
         if !report.converged {
             report.factorisations += 1;
             if system.book(|booking| booking.factorisation, 0.0, || self.factorise(system))? {
-                self.iterate(system, x, (limit, MOST_ITERATIONS), &mut report)?;
+                self.iterate(system, x, (limit, None), &mut report)?;
             }
         }
         Ok(report)
@@ -375,15 +376,16 @@ impl LinearSolver {
         (self.first_norm / limit).ln()
     }
 
-    /// The KSP on the residual that there is, until ‖r‖₂ ≤ `limit` on the free unknowns, and at most so many
-    /// times.
+    /// The KSP on the residual that there is, until ‖r‖₂ ≤ `limit` on the free unknowns, with at most so many
+    /// iterations, or as many as a preconditioner of the system itself may need.
     fn iterate(
         &mut self,
         system: LinearSystem,
         x: &mut Vector,
-        (limit, most): (f64, usize),
+        (limit, most): (f64, Option<usize>),
         report: &mut SolveReport,
     ) -> Result<(), PetscError> {
+        let most = most.or(self.is_own(system.matrix)?.then_some(MOST_ITERATIONS));
         self.modify(system)?;
         let prescribed = system.prescribed.unwrap_or(&[]);
         let clear = |d: &mut [f64]| prescribed.iter().for_each(|&i| d[i] = 0.0);

@@ -28,6 +28,8 @@ pub(crate) struct Ksp {
     /// The residual of the last test, and a vector that PETSc may need to build it.
     residual: Vector,
     work: Vector,
+    /// Iterations that PETSc and its options allow (`-ksp_max_it`).
+    most: c_int,
 }
 
 /// A linear system as a KSP solves it from the start 0: A x = b on the unknowns that are not prescribed.
@@ -39,8 +41,8 @@ pub(crate) struct KspProblem<'a> {
     pub(crate) prescribed: Option<&'a [usize]>,
     /// The largest ‖b − A x‖₂ of the free unknowns.
     pub(crate) limit: f64,
-    /// Iterations allowed.
-    pub(crate) most: usize,
+    /// Iterations allowed; `None` as many as PETSc and its options allow.
+    pub(crate) most: Option<usize>,
 }
 
 /// What a solve took.
@@ -71,7 +73,7 @@ impl Ksp {
             unsafe { raw::KSPCreate(world(), handle) }
         })?;
         let zeros = || Vector::zeros(session, owned);
-        let this = Self { handle, residual: zeros()?, work: zeros()? };
+        let this = Self { handle, residual: zeros()?, work: zeros()?, most: 0 };
         let ksp = this.handle.raw();
         // SAFETY: a live handle, strings that live during the calls.
         unsafe {
@@ -95,9 +97,13 @@ impl Ksp {
     }
 
     /// Reads the options (KSPSetFromOptions).
-    pub(crate) fn set_from_options(&self) -> Result<(), PetscError> {
-        // SAFETY: a live handle.
-        check(unsafe { raw::KSPSetFromOptions(self.handle.raw()) })
+    pub(crate) fn set_from_options(&mut self) -> Result<(), PetscError> {
+        let (ksp, unused) = (self.handle.raw(), ptr::null_mut());
+        // SAFETY: a live handle; PETSc takes null for what is not asked.
+        unsafe {
+            check(raw::KSPSetFromOptions(ksp))?;
+            check(raw::KSPGetTolerances(ksp, unused, unused, unused, &mut self.most))
+        }
     }
 
     /// Whether the preconditioner is of the type [`kept::NAME`].
@@ -193,7 +199,8 @@ impl Ksp {
         let Self { residual, work, .. } = self;
         let mut test = Test { problem, residual, work, norm: None };
         let pointer = ptr::from_mut(&mut test).cast::<c_void>();
-        let (a, most) = (problem.matrix.raw(), c_int::try_from(problem.most).unwrap_or(c_int::MAX));
+        let a = problem.matrix.raw();
+        let most = problem.most.and_then(|most| most.try_into().ok()).unwrap_or(self.most);
         let mut iterations = 0;
         // SAFETY: live handles of matching layout; what the callbacks point to outlives the solve, in which
         // alone they run.
@@ -254,7 +261,7 @@ unsafe extern "C" fn is_converged(
             raw::KSPConvergedReason::KSP_CONVERGED_ATOL
         } else if !found.is_finite() {
             raw::KSPConvergedReason::KSP_DIVERGED_NANORINF
-        } else if iteration as usize >= problem.most {
+        } else if problem.most.is_some_and(|most| iteration as usize >= most) {
             raw::KSPConvergedReason::KSP_DIVERGED_ITS
         } else {
             raw::KSPConvergedReason::KSP_CONVERGED_ITERATING
