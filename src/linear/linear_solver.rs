@@ -126,8 +126,12 @@ impl LinearSolver {
         let (prefix, serial) = (&self.prefix, matrix.owned() == rows);
         let asked = has_option(&format!("-{prefix}pc_type"))?
             || has_option(&format!("-{prefix}pc_factor_mat_solver_type"))?;
+        let comm = self.factor.comm();
+        if !comm.any(has_option(&format!("-{prefix}ksp_type"))?) {
+            self.ksp.set_residual_norm()?;
+        }
         // Ranks may be given unlike options.
-        if self.factor.comm().any(asked) || !self.factor.analyse(matrix)? {
+        if comm.any(asked) || !self.factor.analyse(matrix)? {
             // Left to itself CHOLMOD makes LDLᵀ of a small matrix, accepts negative pivots, and prints its
             // warnings into the results. MUMPS' guess of the memory it needs is now and then too small.
             let options = match serial {

@@ -79,8 +79,6 @@ impl Ksp {
         unsafe {
             check(raw::KSPSetOptionsPrefix(ksp, prefix.as_ptr()))?;
             check(raw::KSPSetType(ksp, c"cg".as_ptr()))?;
-            // Other norms would take one more application of the preconditioner.
-            check(raw::KSPSetNormType(ksp, raw::KSPNormType::KSP_NORM_UNPRECONDITIONED))?;
             check(raw::PCSetType(this.pc()?, kept::NAME.as_ptr()))?;
         }
         Ok(this)
@@ -94,6 +92,14 @@ impl Ksp {
             check(raw::PCSetType(pc, kind.as_ptr()))?;
             check(raw::PCFactorSetMatSolverType(pc, package.as_ptr()))
         }
+    }
+
+    /// Makes CG test ‖r‖₂ (KSPSetNormType). With PETSc's default norm it would apply the preconditioner once
+    /// more per solve; other types need not know ‖r‖₂.
+    pub(crate) fn set_residual_norm(&self) -> Result<(), PetscError> {
+        let norm = raw::KSPNormType::KSP_NORM_UNPRECONDITIONED;
+        // SAFETY: a live handle.
+        check(unsafe { raw::KSPSetNormType(self.handle.raw(), norm) })
     }
 
     /// Reads the options (KSPSetFromOptions).
