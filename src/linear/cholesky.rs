@@ -11,9 +11,9 @@ use serde::{Deserialize, Serialize};
 
 /// The factor P A Pᵀ = L Lᵀ of a sparse symmetric positive definite matrix, supernodal.
 ///
-/// CHOLMOD orders and factorises. The triangular solves are our own: they read L twice as fast, in
-/// half the bytes where single precision is enough, and are two steps, between which the Schur complement
-/// of an interface is solved with.
+/// CHOLMOD orders and factorises. The triangular solves are our own. They read L faster than CHOLMOD's, and
+/// half the bytes in single precision. Between the forward and the backward solve the Schur complement of an
+/// interface can be solved.
 pub struct Cholesky {
     factor: Cholmod,
     precision: Precision,
@@ -25,28 +25,25 @@ pub struct Cholesky {
 /// Digits of the entries of L.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Precision {
-    /// Seven (`f32`) if that makes a good preconditioner, else sixteen.
+    /// Seven (`f32`) if this makes a good preconditioner, else sixteen.
     Preconditioner,
     /// Sixteen (`f64`).
     Full,
 }
 
-/// The largest residual ‖b − A x‖₂/‖b‖₂ of a solve in single precision for which the factor is kept
-/// in that precision. With 3e-3 (the unit square, n = 256) iterations were no more than in double precision;
-/// with 0.2 (the L, 259,000 unknowns) no more where contact stays and a quarter more where it moves, at half
-/// the time each.
+/// The largest residual ‖b − A x‖₂/‖b‖₂ of a solve for which the factor stays in single precision. Up to this
+/// residual the iterations are hardly more than in double precision, and each takes half the time.
 const LARGEST_RESIDUAL: f64 = 0.3;
 
-/// Bytes that a solve reads in the time of one floating-point operation of a factorisation, and in the
-/// time of its other work per entry of L (assembly, copies). Seconds of a factorisation were
-/// 0.065 ns · operations + 16.5 ns · entries within 10 % (square and L, 4,000 to 530,000 unknowns, one
-/// core of a Xeon with AVX-512, OpenBLAS), those of an iteration 0.06 to 0.13 ns per byte.
+/// The cost of a factorisation in bytes that a solve reads in the same time: per floating-point operation,
+/// and per entry of L (assembly, copies). They fit measured times within 10 % on one processor, for 4,000 to
+/// 530,000 unknowns.
 const BYTES_PER_OPERATION: f64 = 0.8;
 const BYTES_PER_ENTRY: f64 = 200.0;
 
 impl Cholesky {
-    /// Orders and analyses `a`: in the `order` given (the row of A of each row of L), else by a choice that
-    /// leaves L sparse. The last `interface` rows, also the last in the order, are not solved for.
+    /// Orders and analyses `a`, in the given `order` (the row of A of each row of L) or a fill-reducing one.
+    /// The last `interface` rows are the last in the order too; [`Self::solve`] leaves them out.
     ///
     /// # Errors
     /// There is no memory for it.
@@ -68,8 +65,8 @@ impl Cholesky {
         Ok(Self { factor, precision, interior, solver })
     }
 
-    /// Factorises `a`, which has the pattern that was analysed: L₂₂, the block of the interface rows,
-    /// with L₂₂ L₂₂ᵀ = A₂₂ − A₂₁ A₁₁⁻¹ A₁₂. `None` if `a` is not positive definite.
+    /// Factorises `a`, which has the analysed pattern. Returns L₂₂, the block of the interface rows, with L₂₂
+    /// L₂₂ᵀ = A₂₂ − A₂₁ A₁₁⁻¹ A₁₂. `None` if `a` is not positive definite.
     ///
     /// # Errors
     /// There is no memory for it.
@@ -83,7 +80,7 @@ impl Cholesky {
         if self.precision == Precision::Preconditioner && !self.is_accurate_enough(a) {
             self.precision = Precision::Full;
             self.solver = Box::new(Supernodal::<f64>::new(&self.factor, self.interior));
-            // What is left of the values may be too short for CHOLMOD to write to.
+            // The rest of the values may be too short for CHOLMOD to write to.
             self.factor.free_values()?;
             self.factor.factorise(a)?;
             self.solver.take_values(&mut self.factor);
@@ -92,8 +89,8 @@ impl Cholesky {
         Ok(Some(block))
     }
 
-    /// Whether solves come near to those with `a`: tried with a load both smooth and rough, of which an
-    /// inexact factor of an ill-conditioned matrix leaves much.
+    /// Is the factor accurate enough for `a`? The test load is both smooth and rough: an inexact factor of an
+    /// ill-conditioned matrix leaves a large residual.
     fn is_accurate_enough(&mut self, a: &LowerTriangle) -> bool {
         let load: Vec<f64> = (0..a.size()).map(|i| 1.0 + (i as f64).sin()).collect();
         let mut x = vec![0.0; load.len()];
@@ -120,7 +117,7 @@ impl Cholesky {
         block
     }
 
-    /// The digits of L: full ones from the first factorisation on that needed them.
+    /// The precision of L. After the first factorisation that needs full precision it stays full.
     pub fn precision(&self) -> Precision {
         self.precision
     }
@@ -152,7 +149,7 @@ impl Cholesky {
         self.backward(&interface, x);
     }
 
-    /// The work of a factorisation, in bytes that a solve reads in the same time.
+    /// The time of a factorisation, as the number of bytes that solves read in this time.
     pub(super) fn work(&self) -> f64 {
         let [operations, entries] = self.factor.operations_and_entries();
         BYTES_PER_OPERATION * operations + BYTES_PER_ENTRY * entries

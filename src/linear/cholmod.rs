@@ -18,20 +18,20 @@ pub(super) struct Cholmod {
     allocated: usize,
 }
 
-/// Operations for each entry of L from which on CHOLMOD tries another order (`cholmod_analyze` in its user
+/// CHOLMOD tries another order above this number of operations per entry of L (`cholmod_analyze` in its user
 /// guide).
 const MUCH_WORK: f64 = 500.0;
 
-/// What to do where a factor cannot be made.
+/// Advice for a matrix without a factor.
 const REMEDY: &str = ": take larger triangles, or multigrid in its place (-- -elastic_pc_type gamg \
                       -damage_pc_type gamg)";
 
-/// Values are freed by so many at a time, 32 MB.
+/// Values are freed in blocks of 32 MB; this is the number of values.
 const FREED: usize = 1 << 22;
 
 impl Cholmod {
     /// Orders and analyses `a`, with the last `interface` rows at the end: by minimum degree, or by nested
-    /// dissection where that leaves less of much work, which is when CHOLMOD tries it, too.
+    /// dissection if it needs fewer operations. It tries nested dissection where CHOLMOD does.
     pub(super) fn ordered(a: &mut LowerTriangle, interface: usize) -> Result<Self, PetscError> {
         if interface == 0 {
             let mut this = Self::start();
@@ -98,7 +98,7 @@ impl Cholmod {
         this
     }
 
-    /// Itself, if there is an analysed factor.
+    /// This factor, if it is analysed.
     fn analysed(self) -> Result<Self, PetscError> {
         self.check(!self.factor.is_null())?;
         if self.order().iter().copied().eq(0..self.order().len() as i64) {
@@ -109,15 +109,15 @@ impl Cholmod {
         Ok(self)
     }
 
-    /// Factorises `a`, which has the pattern that was analysed; false if it is not positive definite
-    /// (cholmod_l_factorize).
+    /// Factorises `a`, which has the analysed pattern (cholmod_l_factorize). It returns false if `a` is not
+    /// positive definite.
     pub(super) fn factorise(&mut self, a: &mut LowerTriangle) -> Result<bool, PetscError> {
         let (mut view, common) = (a.view(), &mut *self.common);
         let real = raw::CHOLMOD_REAL as i32;
         // SAFETY: live handles; the view describes arrays that live during the call, and x as many values
         // as the factor tells.
         let done = unsafe {
-            // CHOLMOD takes the memory for L if there is none.
+            // CHOLMOD allocates L if it has no memory yet.
             let taken = raw::cholmod_l_change_factor(real, 1, 1, 1, 1, self.factor, common) != 0;
             let raw::cholmod_factor { x, xsize, .. } = *self.factor;
             if taken && !x.is_null() {
@@ -133,7 +133,7 @@ impl Cholmod {
         }
     }
 
-    /// Frees the values of L but for about the first `length` (cholmod_l_realloc).
+    /// Frees the values of L except about the first `length` (cholmod_l_realloc).
     pub(super) fn truncate_values(&mut self, length: usize) {
         if self.allocated >= length + FREED {
             // SAFETY: a live factor with so many values in its block of memory.
@@ -171,8 +171,8 @@ impl Cholmod {
         unsafe { indices((*self.factor).Perm, (*self.factor).n) }
     }
 
-    /// Of each supernode its columns, its rows (first those of the diagonal block), and where its
-    /// [`Self::values`] begin.
+    /// Per supernode: its columns, its rows (those of the diagonal block first), and the beginning of its
+    /// [`Self::values`].
     pub(super) fn supernodes(&self) -> impl Iterator<Item = (Range<usize>, &[i64], usize)> {
         // SAFETY: an analysed supernodal factor has these arrays of 64-bit indices.
         let [columns, rows, values, s] = unsafe {
@@ -188,8 +188,7 @@ impl Cholmod {
             .map(move |((columns, rows), value)| (range(columns), &s[range(rows)], *value as usize))
     }
 
-    /// The values of L that are in memory: of each supernode its dense columns from the diagonal block
-    /// down.
+    /// The values of L in memory: per supernode, its dense columns from the diagonal block down.
     pub(super) fn values(&self) -> &[f64] {
         // SAFETY: the array x of a factor is null or has `allocated` values.
         unsafe {
@@ -210,8 +209,8 @@ impl Cholmod {
             raw::CHOLMOD_OUT_OF_MEMORY => {
                 format!("there is not enough memory for a Cholesky factor{REMEDY}")
             }
-            // The matrix is valid: then the order is not. cholmod_l_metis does not look whether METIS, which
-            // has 32-bit indices, has failed.
+            // The matrix is valid, so the order is not: METIS has 32-bit indices, and cholmod_l_metis does
+            // not check whether it failed.
             raw::CHOLMOD_TOO_LARGE | raw::CHOLMOD_INVALID => {
                 format!("the mesh is too large for a Cholesky factor (32-bit indices){REMEDY}")
             }

@@ -5,42 +5,43 @@ use crate::petsc::{Communicator, KeptPreconditioner, Matrix, PetscError, Session
 use serde::{Deserialize, Serialize};
 use std::mem::take;
 
-/// A Cholesky factor: CHOLMOD's with solves of our own, by substructuring where there are several
-/// ranks or contact.
+/// A Cholesky factor: CHOLMOD's with our own solves. With several ranks or with contact it uses
+/// substructuring.
 ///
-/// Fill-reducing ordering and symbolic factorisation are done once for each number of rows. A factor
-/// may be kept as the preconditioner of later matrices until [`RefactorisationPolicy`] finds a new one
-/// due. For a later matrix A = Σ ζ Aₜ, summed over triangles like A₀ = Σ ζ₀ Aₜ, the preconditioner is
-/// E^½ A₀⁻¹ E^½ with E = diag(A₀)/diag(A): where ζ/ζ₀ varies slowly, A is nearly E^-½ A₀ E^-½ for forces as
-/// concentrated as those at contact nodes and the edges of loads, of which A₀ alone would leave (ζ − ζ₀)/ζ₀.
+/// It orders and analyses once for each number of rows. A factor is the preconditioner of later matrices
+/// until [`RefactorisationPolicy`] finds a new one due. Let A₀ = Σ ζ₀ Aₜ be the factored matrix, summed over
+/// triangles, and A = Σ ζ Aₜ a later one. The preconditioner is E^½ A₀⁻¹ E^½ with E = diag(A₀)/diag(A). Where
+/// ζ/ζ₀ varies slowly, A is nearly E^-½ A₀ E^-½ for concentrated forces, as at contact nodes. With A₀⁻¹ alone
+/// the part (ζ − ζ₀)/ζ₀ of such forces would remain.
 pub struct Factor {
     comm: Communicator,
-    /// Of the two factors of a substructure.
+    /// The precisions of the two factors of a substructure.
     precisions: [Precision; 2],
-    /// The rows of the matrices to condense, and their owned unknowns that [`Self::prescribe`] may prescribe.
+    /// The number of rows of the matrices to condense, and the owned unknowns that [`Self::prescribe`] may
+    /// prescribe.
     condensed: (usize, Vec<usize>),
-    /// The rows of the matrices that it is for, and the factor; `None` where these have too large an
-    /// interface, or are too large.
+    /// The number of rows of its matrices, and the factor. `None` if the matrices or their interface are too
+    /// large.
     substructure: Option<(usize, Option<Box<Substructure>>)>,
-    /// `None` before the first factorisation, and after one that failed.
+    /// `None` before the first factorisation and after a failed one.
     policy: Option<RefactorisationPolicy>,
     /// Applications in the present solve.
     applications: usize,
-    /// Factorisations that did not fail.
+    /// Factorisations that succeeded.
     factorisations: usize,
-    /// The values of the matrix last factorised, from which a checkpoint makes the same factor.
+    /// The values of the last factored matrix. A restart makes the same factor from them.
     values: Vec<f64>,
-    /// The diagonal of that matrix, the part of this rank.
+    /// The diagonal of this matrix, owned rows.
     diagonal: Vec<f64>,
     /// E^½ of the owned unknowns.
     scaling: Vec<f64>,
     /// E^½ r.
     scaled: Vec<f64>,
-    /// Whether the factor was loaded and is yet to be made.
+    /// Was a checkpoint loaded whose factor must still be made?
     loaded: bool,
 }
 
-/// What a checkpoint keeps of a factor; see the fields of [`Factor`].
+/// The state of a factor in a checkpoint; see the fields of [`Factor`].
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct FactorState {
     values: Vec<f64>,
@@ -50,13 +51,11 @@ pub struct FactorState {
     factorisations: usize,
 }
 
-/// The cost, in iterations, of a factorisation whose work is not known. Measured on square.toml with
-/// n = 64 and 256, on one and two ranks: MUMPS 4 to 10, gamg 13 to 33, CHOLMOD through PETSc 10 to 19.
+/// The assumed cost, in iterations, of making a preconditioner of PETSc: between the costs of MUMPS and gamg.
 const UNKNOWN_COST: f64 = 10.0;
 
-/// Rows above which several ranks use multigrid: the memory of factors grows faster than the rows.
-/// With 2.1 million on two ranks a step with factors was six times as fast, their set-up four times
-/// as slow, memory 10 % more; what is beyond was not measured.
+/// The number of rows above which several ranks use multigrid: the memory of factors grows faster than the
+/// number of rows. Below it steps with factors are faster (SPEED.md, section 2).
 pub(super) const VERY_LARGE: usize = 2_500_000;
 
 impl Factor {
@@ -83,8 +82,8 @@ impl Factor {
         self.comm
     }
 
-    /// Makes factors of matrices like this one so that these owned unknowns may be prescribed.
-    /// Other unknowns than those of the last call discard the present factor. Collective.
+    /// Condenses factors of matrices of this size: these owned unknowns may be prescribed. A change of these
+    /// unknowns discards the factor. Collective.
     ///
     /// # Errors
     /// PETSc failed.
@@ -101,7 +100,7 @@ impl Factor {
         Ok(())
     }
 
-    /// What a checkpoint keeps.
+    /// The state for a checkpoint.
     pub fn state(&self) -> FactorState {
         FactorState {
             values: self.values.clone(),
@@ -112,7 +111,7 @@ impl Factor {
         }
     }
 
-    /// Goes back to that of a checkpoint; the next solve makes the factor.
+    /// Restores the state of a checkpoint. The next solve makes the factor.
     pub fn set_state(&mut self, state: FactorState) {
         let FactorState { values, precisions, policy, applications, factorisations } = state;
         self.loaded = policy.is_some();
@@ -120,8 +119,8 @@ impl Factor {
         (self.applications, self.factorisations) = (applications, factorisations);
     }
 
-    /// The matrix of the factor that was loaded, like `matrix`, if that is yet to be made; with what
-    /// [`Self::keep_history`] takes back then.
+    /// The matrix of a loaded factor that must still be made, with the pattern of `matrix`, and its history
+    /// for [`Self::keep_history`].
     pub(super) fn take_loaded(
         &mut self,
         matrix: &Matrix,
@@ -135,15 +134,14 @@ impl Factor {
         Ok(Some((copy, history)))
     }
 
-    /// Goes on from what a checkpoint told of the factor that was made again.
+    /// Restores the history of a factor that was made again.
     pub(super) fn keep_history(&mut self, history: History) {
         (self.policy, self.factorisations) = (history.policy, history.factorisations);
     }
 
-    /// Makes the factor that was loaded again, of a matrix with the pattern of this one. Collective.
+    /// Makes a loaded factor again, of a matrix with the pattern of this one. Collective.
     ///
-    /// # Errors
-    /// The pattern is another, or as in [`Self::factorise`].
+    /// # Errors The pattern differs, or as in [`Self::factorise`].
     pub(crate) fn remake(&mut self, matrix: &Matrix) -> Result<(), PetscError> {
         if let Some((loaded, history)) = self.take_loaded(matrix)?
             && self.factorise(&loaded)?
@@ -153,7 +151,7 @@ impl Factor {
         Ok(())
     }
 
-    /// Whether the factor is for matrices of so many rows.
+    /// Is the factor for matrices with this number of rows?
     pub(crate) fn is_for(&self, rows: usize) -> bool {
         self.substructure.as_ref().is_some_and(|(size, _)| *size == rows)
     }
@@ -173,7 +171,7 @@ impl Factor {
         Ok(masked)
     }
 
-    /// Whether there can be a factor of such a matrix; else its interface is too large, or itself.
+    /// Analyses the matrix. It returns false if the matrix or its interface is too large for a factor.
     /// Collective.
     ///
     /// # Errors
@@ -188,7 +186,7 @@ impl Factor {
                 let last = if *of_rows == rows { &condensed[..] } else { &[] };
                 let [precision, mut of_schur] = self.precisions;
                 if self.comm.any(!last.is_empty()) {
-                    // A condensed S tells contact forces.
+                    // A condensed S determines contact forces.
                     of_schur = Precision::Full;
                 }
                 let precisions = [precision, of_schur];
@@ -204,8 +202,8 @@ impl Factor {
         self.substructure.as_mut()?.1.as_deref_mut()
     }
 
-    /// Factorises the present values of `matrix`; false if it is not positive definite: then there is
-    /// no factor. Unknowns must be prescribed before it is applied, where unknowns are condensed. Collective.
+    /// Factorises `matrix`. It returns false, and leaves no factor, if the matrix is not positive definite.
+    /// Call [`Self::prescribe`] before applying a condensed factor. Collective.
     ///
     /// # Errors
     /// There is no memory for it.
@@ -216,7 +214,7 @@ impl Factor {
         let Some(factor) = self.substructure() else {
             return Err(PetscError::ours("the interface of a factor is too large"));
         };
-        // BLAS may take a pivot that is no number for a positive one.
+        // BLAS may accept NaN as a positive pivot.
         let finite = comm.all(matrix.diagonal()?.iter().all(|entry| entry.is_finite()));
         let definite =
             finite && factor.factorise(matrix)? && (condensed || factor.prescribe(&[])?);
@@ -228,7 +226,7 @@ impl Factor {
         Ok(definite)
     }
 
-    /// Notes that a preconditioner was made of `matrix`, at the `cost` of so many iterations, if that is known.
+    /// Records a new preconditioner of `matrix` and its `cost` in iterations, if it is known.
     pub(super) fn record(
         &mut self,
         matrix: &Matrix,
@@ -244,7 +242,7 @@ impl Factor {
         Ok(())
     }
 
-    /// Whether there are unknowns that can be prescribed.
+    /// Does the factor have condensed unknowns?
     pub(crate) fn is_condensed(&self) -> bool {
         match &self.substructure {
             Some((rows, Some(_))) => {
@@ -254,20 +252,20 @@ impl Factor {
         }
     }
 
-    /// Prescribes some of the condensed unknowns of the matrix last factorised; false if what is left of it
-    /// is not positive definite. Collective.
+    /// Prescribes some of the condensed unknowns of the factored matrix. It returns false if the rest is not
+    /// positive definite. Collective.
     ///
     /// # Errors
     /// There is no memory for it.
     pub(crate) fn prescribe(&mut self, prescribed: &[usize]) -> Result<bool, PetscError> {
         let Some(factor) = self.substructure() else { return Ok(true) };
         let definite = factor.prescribe(prescribed)?;
-        // A factor that needs all digits will need them after a checkpoint too.
+        // A restart needs the same precision.
         self.precisions = factor.precisions();
         Ok(definite)
     }
 
-    /// Bytes that an application reads on this rank; 0 where unknown.
+    /// Bytes that an application reads on this rank; 0 if unknown.
     pub fn bytes_per_application(&self) -> f64 {
         match &self.substructure {
             Some((_, Some(factor))) => factor.bytes(),
@@ -275,7 +273,7 @@ impl Factor {
         }
     }
 
-    /// Sets E, of the factored matrix and this one; 1 where there is no quotient.
+    /// Sets E for this matrix. E is 1 where the quotient is not positive.
     pub(crate) fn set_scaling(&mut self, matrix: &Matrix) -> Result<(), PetscError> {
         let diagonal = matrix.diagonal()?;
         let root = |(old, new): (&f64, &f64)| match old * new > 0.0 {
@@ -286,10 +284,9 @@ impl Factor {
         Ok(())
     }
 
-    /// `z` ← E^½ A₀⁻¹ E^½ `r`, A₀ the matrix last factorised: a pair of triangular solves.
+    /// `z` ← E^½ A₀⁻¹ E^½ `r` with the factored matrix A₀: a pair of triangular solves.
     ///
-    /// # Errors
-    /// Sizes differ, or nothing was factorised.
+    /// # Errors Sizes differ, or there is no factor.
     pub fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
         self.scale(r)?;
         let Self { scaled, substructure: Some((_, Some(factor))), .. } = self else {
@@ -314,8 +311,8 @@ impl Factor {
         z.write(|z| z.iter_mut().zip(&self.scaling).for_each(|(z, e)| *z *= e))
     }
 
-    /// The forward elimination of [`Self::apply`]: what is left of E^-½ A₀ E^-½ z = `r` for the condensed
-    /// unknowns. Collective.
+    /// The forward elimination of [`Self::apply`]: reduces E^-½ A₀ E^-½ z = `r` to the condensed unknowns.
+    /// Collective.
     ///
     /// # Errors
     /// As in [`Self::apply`].
@@ -337,24 +334,23 @@ impl Factor {
         self.unscale(z)
     }
 
-    /// Factorisations made so far that did not fail.
+    /// The number of successful factorisations.
     pub fn factorisations(&self) -> usize {
         self.factorisations
     }
 
-    /// Whether the last factorisation went well.
+    /// Is there a factor?
     pub(crate) fn exists(&self) -> bool {
         self.policy.is_some()
     }
 
-    /// Iterations that a solve with the factor of an earlier matrix is worth, where it is asked to divide the
-    /// residual by e^`asked`; `None` if a new factor is due, or there is none.
+    /// The largest number of iterations for a solve with this factor that divides the residual by e^`asked`.
+    /// `None` if there is no factor or a new one is due.
     pub(crate) fn iteration_limit(&self, asked: f64) -> Option<usize> {
         self.policy.as_ref().and_then(|policy| policy.iteration_limit(asked))
     }
 
-    /// Ends a solve of so many iterations, or of the applications counted: they tell how good the factor
-    /// still is.
+    /// Records the iterations of a solve, or the counted applications, for the refactorisation policy.
     pub(crate) fn end_solve(&mut self, iterations: Option<usize>, reduction: Reduction) {
         let applications = take(&mut self.applications);
         if let Some(policy) = &mut self.policy {
@@ -363,7 +359,7 @@ impl Factor {
     }
 }
 
-/// What a checkpoint tells of a factor besides its matrix.
+/// The history of a factor in a checkpoint, beside its matrix.
 pub(super) struct History {
     policy: Option<RefactorisationPolicy>,
     factorisations: usize,

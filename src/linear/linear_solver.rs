@@ -7,21 +7,20 @@ use crate::petsc::{
 };
 use std::{iter, mem::take};
 
-/// A KSP, by default conjugate gradients with a [`Factor`]: that of the matrix itself, which they polish, or
-/// that of an earlier system with other values, and where the factor is not condensed
-/// ([`Factor::set_condensed`]) other prescribed unknowns. Where no such factor is possible, or PETSc options
-/// ask for another preconditioner, one of PETSc's takes its place.
+/// A KSP, by default conjugate gradients with a [`Factor`] of this matrix or of an earlier one. PETSc options
+/// may choose another preconditioner. If the matrix is too large for a factor, a preconditioner of PETSc
+/// replaces it.
 ///
-/// The KSP solves A d = b − A x for the correction d of a start x, from d = 0: x is rounded once and not in
-/// each iteration, so that the residual stays nearer to b − A x (van der Vorst and Ye, SIAM J. Sci. Comput.
-/// 22, 2000).
+/// The KSP solves A d = b − A x for the correction d of a start x, and begins with d = 0. So x is rounded
+/// once, not in each iteration, and the residual stays close to b − A x (van der Vorst and Ye, SIAM J. Sci.
+/// Comput. 22, 2000).
 pub struct LinearSolver {
     ksp: Ksp,
     prefix: String,
     factor: Factor,
-    /// The rows of the matrices for which the preconditioner was chosen, and whether it is the factor.
+    /// The number of rows for which the preconditioner was chosen, and whether it is the factor.
     chosen: Option<(usize, bool)>,
-    /// A with rows and columns of prescribed unknowns zeroed: what PETSc's preconditioners are made of.
+    /// A with the rows and columns of prescribed unknowns zeroed, for preconditioners of PETSc.
     modified: Option<Matrix>,
     /// b − A x.
     residual: Vector,
@@ -30,17 +29,17 @@ pub struct LinearSolver {
     first_norm: f64,
     /// d.
     correction: Vector,
-    /// The factor's answer to the residual, and whether the KSP is to begin with it.
+    /// P⁻¹ r of the first residual, and whether the KSP begins with it.
     expanded: Vector,
     prepared: bool,
     /// Iterations since the start.
     iterations: usize,
 }
 
-/// What a linear solve took.
+/// The cost of a linear solve.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct SolveReport {
-    /// Whether the residual came down to its limit.
+    /// Did the residual reach its limit?
     pub converged: bool,
     /// Iterations, each a product and a pair of triangular solves.
     pub iterations: usize,
@@ -48,19 +47,18 @@ pub struct SolveReport {
     pub factorisations: usize,
 }
 
-/// Iterations that the factor of the system itself may need. It takes one or two to remove the
-/// rounding error of the factor, more where the entries of the matrix vary by many orders. What preconditioners
-/// of PETSc may need is left to PETSc (`-ksp_max_it`).
+/// The largest number of iterations with the factor of the system itself. One or two remove the rounding
+/// error of the factor; more are needed if the entries of the matrix vary by many orders. `-ksp_max_it`
+/// limits the iterations with preconditioners of PETSc.
 const MOST_ITERATIONS: usize = 200;
 
-/// PETSC_ERR_MISSING_FACTOR: PETSc has no such package, or not for such a factor.
+/// PETSC_ERR_MISSING_FACTOR: PETSc lacks the package, or the package lacks this kind of factor.
 const MISSING_FACTOR: i32 = 92;
 
 impl LinearSolver {
-    /// For systems of `owned` unknowns on this rank, with PETSc options that begin with `prefix`.
+    /// For systems with `owned` unknowns on this rank. Its PETSc options begin with `prefix`.
     ///
-    /// # Errors
-    /// There is no memory for it.
+    /// # Errors The memory does not suffice.
     pub fn new(
         session: &Session,
         prefix: &str,
@@ -84,11 +82,9 @@ impl LinearSolver {
         })
     }
 
-    /// Reads the PETSc options under a prefix and refuses what PETSc does not have before anything is
-    /// factorised. Collective.
+    /// Checks the PETSc options with this prefix before the first factorisation. Collective.
     ///
-    /// # Errors
-    /// They ask for what this PETSc does not have.
+    /// # Errors An option names a type that this PETSc lacks.
     pub fn check_options(session: &Session, prefix: &str) -> Result<(), PetscError> {
         let mut solver = Self::new(session, prefix, 1, Precision::Full)?;
         let comm = session.comm();
@@ -110,7 +106,7 @@ impl LinearSolver {
         &mut self.factor
     }
 
-    /// Whether the preconditioner of such matrices is the factor, chosen with the first of them. Collective.
+    /// Is the factor the preconditioner of matrices of this size? The first such matrix decides. Collective.
     fn is_own(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
         let rows = matrix.size()?;
         let own = match self.chosen {
@@ -121,7 +117,8 @@ impl LinearSolver {
         Ok(own)
     }
 
-    /// The factor, where it is possible; or what PETSc's options ask for; else PETSc's factor, or multigrid.
+    /// Chooses the factor, or the preconditioner of the PETSc options. If the matrix is too large for the
+    /// factor, a factor of PETSc or multigrid replaces it.
     fn choose(&mut self, matrix: &Matrix, rows: usize) -> Result<bool, PetscError> {
         let (prefix, serial) = (&self.prefix, matrix.owned() == rows);
         let asked = has_option(&format!("-{prefix}pc_type"))?
@@ -130,10 +127,10 @@ impl LinearSolver {
         if !comm.any(has_option(&format!("-{prefix}ksp_type"))?) {
             self.ksp.set_residual_norm()?;
         }
-        // Ranks may be given unlike options.
+        // The ranks may have different options.
         if comm.any(asked) || !self.factor.analyse(matrix)? {
-            // Left to itself CHOLMOD makes LDLᵀ of a small matrix, accepts negative pivots, and prints its
-            // warnings into the results. MUMPS' guess of the memory it needs is now and then too small.
+            // By default CHOLMOD makes LDLᵀ of a small matrix, accepts negative pivots, and prints warnings
+            // to the standard output. MUMPS sometimes estimates too little memory.
             let options = match serial {
                 true => &[
                     ("cholmod_final_asis", "0"),
@@ -152,8 +149,7 @@ impl LinearSolver {
         self.ksp.is_kept()
     }
 
-    /// Whether the condensed unknowns of such a matrix can be solved for alone ([`Self::condense`]).
-    /// Collective.
+    /// Can [`Self::condense`] reduce a system with this matrix to the condensed unknowns? Collective.
     ///
     /// # Errors
     /// PETSc failed.
@@ -161,7 +157,7 @@ impl LinearSolver {
         Ok(self.is_own(matrix)? && self.factor.analyse(matrix)? && self.factor.is_condensed())
     }
 
-    /// Makes a new preconditioner of the system; false if it is not positive definite.
+    /// Makes a new preconditioner of the system. It returns false if the system is not positive definite.
     ///
     /// # Errors
     /// PETSc or CHOLMOD failed.
@@ -177,8 +173,8 @@ impl LinearSolver {
         Ok(definite && self.is_ready(system)?)
     }
 
-    /// Prescribes unknowns in a copy of the matrix, unless the preconditioner takes care of them: the factor
-    /// does where it is condensed.
+    /// Prescribes unknowns in a copy of the matrix. A condensed factor needs no copy: it prescribes them
+    /// itself.
     fn modify(&mut self, system: LinearSystem) -> Result<(), PetscError> {
         let kept = self.modified.take();
         let Some(prescribed) = system.prescribed else { return Ok(()) };
@@ -195,8 +191,7 @@ impl LinearSolver {
         Ok(())
     }
 
-    /// Whether there is a preconditioner for the system. In a condensed factor the unknowns that the
-    /// system prescribes are prescribed first.
+    /// Is there a preconditioner for the system? Prescribes the unknowns of the system in a condensed factor.
     fn is_ready(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
         let prescribe = || self.prescribe(system.prescribed.unwrap_or(&[]));
         system.book(|booking| booking.prescription, 0.0, prescribe)
@@ -213,11 +208,10 @@ impl LinearSolver {
         Ok(())
     }
 
-    /// Solves from the start `x` until ‖b − A x‖₂ ≤ `limit` on the free unknowns, with the preconditioner
-    /// that there is; without one `x` is left alone.
+    /// Solves from the start `x` until ‖b − A x‖₂ ≤ `limit` on the free unknowns, with the present
+    /// preconditioner. Without a preconditioner `x` does not change.
     ///
-    /// # Errors
-    /// PETSc failed. Whether the limit was reached stands in the report.
+    /// # Errors PETSc failed. The report says whether the limit was reached.
     pub fn solve(
         &mut self,
         system: LinearSystem,
@@ -236,8 +230,9 @@ impl LinearSolver {
         Ok(report)
     }
 
-    /// As [`Self::solve`], with a new preconditioner where one is due or the old one takes too long. The limit
-    /// is then missed only if the system is not positive definite, or too ill-conditioned for it.
+    /// As [`Self::solve`], but with a new preconditioner if one is due or the old one needs too many
+    /// iterations. The solve misses the limit only if the system is not positive definite or too
+    /// ill-conditioned.
     ///
     /// # Errors
     /// PETSc or CHOLMOD failed.
@@ -252,7 +247,7 @@ impl LinearSolver {
         self.finish(system, x, limit)
     }
 
-    /// r ← b − A x; whether that is small enough already.
+    /// r ← b − A x. Is ‖r‖₂ ≤ `limit` already?
     ///
     /// # Errors
     /// PETSc or CHOLMOD failed.
@@ -275,8 +270,8 @@ impl LinearSolver {
         Ok(self.is_small(limit))
     }
 
-    /// Whether ‖r‖₂ ≤ `limit` on the free unknowns; never where the norm overflows, as the limit of a
-    /// huge b does too.
+    /// Is ‖r‖₂ ≤ `limit` on the free unknowns? False if the norm overflows: for a huge b the limit overflows
+    /// too.
     fn is_small(&self, limit: f64) -> bool {
         self.norm.is_finite() && self.norm <= limit
     }
@@ -293,8 +288,7 @@ impl LinearSolver {
         Ok(())
     }
 
-    /// Makes a new factor where one is due, given that the residual is to get as small as `limit`; how many
-    /// it made.
+    /// Makes a new factor if one is due for a solve to `limit`. Returns the number of factorisations.
     ///
     /// # Errors
     /// PETSc or CHOLMOD failed.
@@ -306,8 +300,8 @@ impl LinearSolver {
         Ok(usize::from(due))
     }
 
-    /// Forward elimination: what the residual leaves for the condensed unknowns d. `None` if there is no
-    /// factor: A is not positive definite whatever is prescribed. Collective.
+    /// Forward elimination: reduces A d = r to the condensed unknowns. `None` without a factor: A is then not
+    /// positive definite, whatever unknowns are prescribed. Collective.
     ///
     /// # Errors
     /// PETSc failed.
@@ -321,8 +315,8 @@ impl LinearSolver {
         system.book(name, bytes, || factor.condense(residual)).map(Some)
     }
 
-    /// Back substitution: `x` ← `x` + d for the last solution of the condensed unknowns. Where that left the
-    /// prescribed ones where they were, the next iteration begins with d instead. Collective.
+    /// Back substitution: `x` ← `x` + d from the last solution for the condensed unknowns. If no prescribed
+    /// unknown has `moved`, the next iteration begins with d instead. Collective.
     ///
     /// # Errors
     /// PETSc failed.
@@ -346,8 +340,8 @@ impl LinearSolver {
         Ok(())
     }
 
-    /// Solves on, from the present residual, until that is at most `limit`, with a new preconditioner where
-    /// one is due or the old one takes too long.
+    /// Solves on from the present residual to `limit`, with a new preconditioner if one is due or the old one
+    /// needs too many iterations.
     ///
     /// # Errors
     /// PETSc or CHOLMOD failed.
@@ -375,13 +369,13 @@ impl LinearSolver {
         Ok(report)
     }
 
-    /// By which e^a the residual is to be divided.
+    /// ln(‖r₀‖₂ / `limit`): the reduction of the residual that the solve needs.
     fn asked(&self, limit: f64) -> f64 {
         (self.first_norm / limit).ln()
     }
 
-    /// The KSP on the residual that there is, until ‖r‖₂ ≤ `limit` on the free unknowns, with at most so many
-    /// iterations, or as many as a preconditioner of the system itself may need.
+    /// Runs the KSP on the present residual until ‖r‖₂ ≤ `limit` on the free unknowns. Without a number of
+    /// iterations, a preconditioner of the system itself has its usual limit.
     fn iterate(
         &mut self,
         system: LinearSystem,
@@ -420,30 +414,29 @@ impl LinearSolver {
         Ok(())
     }
 
-    /// Notes how many iterations the solve took that was to bring the residual from the norm at the start to
-    /// `limit` and brought it to `norm`.
+    /// Records a solve for the refactorisation policy: its iterations, and the `norm` that it reached instead
+    /// of `limit`.
     pub fn end_solve(&mut self, iterations: usize, norm: f64, limit: f64) {
         let reached = (self.first_norm / norm).ln();
         let reduction = Reduction { asked: self.asked(limit), reached };
         self.factor.end_solve(Some(iterations), reduction);
     }
 
-    /// Whether a solve has taken as many iterations as the preconditioner is worth.
+    /// Has a solve used all iterations that the preconditioner is worth?
     pub fn is_slow(&self, iterations: usize, limit: f64) -> bool {
         self.factor.iteration_limit(self.asked(limit)).is_none_or(|most| iterations >= most)
     }
 
-    /// Prescribes unknowns in the factor, where it is condensed; false if there is no preconditioner then.
+    /// Prescribes unknowns in a condensed factor. It returns false if there is no preconditioner afterwards.
     /// Collective.
     pub(crate) fn prescribe(&mut self, unknowns: &[usize]) -> Result<bool, PetscError> {
         let exists = self.factor.exists();
         Ok(exists && (!self.factor.is_condensed() || self.factor.prescribe(unknowns)?))
     }
 
-    /// `z` ← P⁻¹ `r` with the preconditioner that there is.
+    /// `z` ← P⁻¹ `r` with the present preconditioner.
     ///
-    /// # Errors
-    /// There is none.
+    /// # Errors There is no preconditioner.
     pub(crate) fn precondition(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
         match self.chosen {
             Some((_, false)) => self.ksp.precondition(&mut self.factor, r, z),
@@ -451,23 +444,22 @@ impl LinearSolver {
         }
     }
 
-    /// b − A x of the last solve on all unknowns: on prescribed ones, the forces that keep them
-    /// there.
+    /// b − A x of the last solve. On prescribed unknowns these are the forces that prescribe them.
     pub fn residual(&self) -> &Vector {
         &self.residual
     }
 }
 
-/// The factor in a solve, whose time is booked.
+/// The factor during a solve; its time is booked.
 struct Booked<'a> {
     factor: &'a mut Factor,
-    /// Its answer to the first residual, if that is known.
+    /// P⁻¹ r of the first residual, if it is known.
     first: Option<&'a Vector>,
     system: LinearSystem<'a>,
 }
 
 impl KeptPreconditioner for Booked<'_> {
-    /// When it is made is decided outside.
+    /// The linear solver decides when to factorise.
     fn set_up(&mut self, _matrix: &Matrix) -> Result<bool, PetscError> {
         Ok(self.factor.exists())
     }

@@ -12,20 +12,21 @@ pub struct LinearSystem<'a> {
     pub matrix: &'a Matrix,
     /// The unknowns that keep their values in x (Dirichlet conditions); `None` where no rank has any.
     pub prescribed: Option<&'a [usize]>,
-    /// The size of A's diagonal entries: what prescribed unknowns have there in the factored matrix.
+    /// The size of the diagonal entries of A. Prescribed unknowns get this diagonal entry in the factored
+    /// matrix.
     pub scale: f64,
-    /// Where the time of a solve's parts is booked.
+    /// The phases to which the parts of a solve book their time.
     pub booking: Option<Booking<'a>>,
 }
 
-/// Names of the phases that a solve consists of.
+/// The names of the phases of a solve.
 #[derive(Clone, Copy)]
 pub struct Booking<'a> {
-    /// Where they are booked.
+    /// The record of phases.
     pub phases: &'a Phases,
     /// A new factor.
     pub factorisation: &'static str,
-    /// The same for other prescribed unknowns, where that takes less.
+    /// A change of the prescribed unknowns in a condensed factor.
     pub prescription: &'static str,
     /// An application of the factor.
     pub triangular_solves: &'static str,
@@ -45,7 +46,7 @@ impl<'a> LinearSystem<'a> {
         self.book(|booking| booking.product, bytes, || self.matrix.multiply(x, y))
     }
 
-    /// Does `work`, which moves so many bytes, and books its time under a name.
+    /// Does `work`, which reads and writes `bytes`, and books its time under a name.
     pub(super) fn book<R>(
         self,
         name: impl FnOnce(&Booking) -> &'static str,

@@ -12,7 +12,7 @@ pub struct LowerTriangle {
 }
 
 impl Default for LowerTriangle {
-    /// Without columns; they are added one after the other.
+    /// A matrix without columns.
     fn default() -> Self {
         Self { starts: vec![0], rows: Vec::new(), values: Vec::new() }
     }
@@ -30,8 +30,8 @@ impl LowerTriangle {
         self.starts.push(self.rows.len() as i64);
     }
 
-    /// Adds so many columns with `diagonal` on the diagonal and zeros in the first of them. When that is
-    /// eliminated all entries below it fill: the pattern of the factor is that of a full block.
+    /// Adds columns with `diagonal` on the diagonal and zeros in the first of them. Eliminating the first
+    /// column fills all entries below it, so the factor has a full block there.
     pub fn push_coupled(&mut self, columns: usize, diagonal: f64) {
         let first = self.size();
         for j in first..first + columns {
@@ -61,7 +61,7 @@ impl LowerTriangle {
         y
     }
 
-    /// What CHOLMOD reads (`cholmod_sparse` in its user guide); valid while this is not changed.
+    /// A view for CHOLMOD (`cholmod_sparse` in its user guide). It is valid until the triangle changes.
     pub(super) fn view(&mut self) -> raw::cholmod_sparse {
         raw::cholmod_sparse {
             nrow: self.size(),

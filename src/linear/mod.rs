@@ -5,16 +5,15 @@
 //! matrix preconditions conjugate gradients for the next ones, until it costs more iterations than
 //! a new one ([`RefactorisationPolicy`]). Both are asked for through a [`LinearSolver`].
 //!
-//! - On one rank CHOLMOD computes L Lᵀ = P A Pᵀ; the triangular solves L y = P b and Lᵀ (P x) = y
-//!   are our own ([`Cholesky`]).
-//! - Unknowns Γ between ranks, and those of contact, come last: each rank eliminates its interior
-//!   unknowns I, and all share the dense Schur complement S = A_ΓΓ − Σ A_ΓI A_II⁻¹ A_IΓ
-//!   (`substructure`). What is prescribed, or penalised, of contact changes S alone.
-//! - Where Γ is too large, or PETSc options ask for it, a preconditioner of PETSc takes its place
-//!   ([`Factor`]).
+//! - On one rank CHOLMOD computes L Lᵀ = P A Pᵀ; the triangular solves L y = P b and Lᵀ (P x) = y are our own
+//!   ([`Cholesky`]). - Unknowns Γ between ranks, and those of contact, come last: each rank eliminates its
+//!   interior unknowns I, and all share the dense Schur complement S = A_ΓΓ − Σ A_ΓI A_II⁻¹ A_IΓ
+//!   (`substructure`). Prescribed and penalised contact unknowns change S alone. - If Γ is too large, or
+//!   PETSc options choose it, a preconditioner of PETSc replaces the factor ([`Factor`]).
 //!
-//! What crosses the door: a [`LinearSystem`] and the residual that it may leave. Contact solvers also ask for
-//! the small problem of the unknowns that may be prescribed ([`Condensed`]), and solve that by their own means.
+//! What crosses the door: a [`LinearSystem`] and the largest residual of its solution. Contact solvers also
+//! get the small problem of the unknowns that may be prescribed ([`Condensed`]). They solve it by their own
+//! methods.
 //!
 //! Unsafe code is where CHOLMOD is called, in `cholmod.rs`.
 

@@ -2,14 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Compares what the age of a factor has cost with what a new one costs, both in iterations.
+/// Compares the iterations lost to the age of a factor with the cost of a new factor.
 ///
-/// Let a solve with the factor of an earlier matrix take mᵢ iterations to divide the residual by e^aᵢ or
-/// more, and let e^ρ be the most by which an iteration has divided it in the mean of a solve since the
-/// first with the factor, which is that of its own matrix: a new factor would soon take about ⌈aᵢ/ρ⌉. One
-/// is due as soon as Σ (mᵢ − ⌈aᵢ/ρ⌉) ≥ C, the cost of a factorisation. Where the loss per solve grows
-/// evenly that is the cheapest moment, otherwise it costs at most twice the cheapest. All is counted,
-/// nothing measured by the clock: equal runs decide alike, and so do all ranks.
+/// Let solve i with the kept factor divide the residual by e^aᵢ in mᵢ iterations. Let ρ be the largest ln of
+/// the mean reduction per iteration in a solve since the factor was new. A new factor would need about ⌈aᵢ/ρ⌉
+/// iterations. It is due when Σ (mᵢ − ⌈aᵢ/ρ⌉) ≥ C, the cost of a factorisation. If the loss per solve grows
+/// evenly, this is the cheapest moment; otherwise the cost is at most twice the minimum. The policy counts
+/// iterations and reads no clock, so that equal runs and all ranks decide alike.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct RefactorisationPolicy {
     /// C: iterations that take as long as a factorisation.
@@ -20,30 +19,30 @@ pub struct RefactorisationPolicy {
     lost: usize,
 }
 
-/// By what a solve divides the residual, as logarithms; equal ones where that is not known.
+/// The reductions of the residual in a solve, as logarithms. They are equal if the reached one is not known.
 #[derive(Debug, Clone, Copy)]
 pub struct Reduction {
-    /// a: what it was asked to.
+    /// a, the reduction that the solve needs.
     pub asked: f64,
-    /// What it did.
+    /// The reduction that it reached.
     pub reached: f64,
 }
 
-/// Iterations that a solve with an old factor may take beyond those with a new one: at least, at most.
+/// Extra iterations that a solve with an old factor may take: the lower and the upper limit.
 const EXTRA_ITERATIONS: [usize; 2] = [3, 200];
-/// A quotient of logarithms so little above a whole number is that.
+/// A quotient this close above a whole number counts as that number.
 const ROUNDING: f64 = 1e-9;
 
 impl RefactorisationPolicy {
-    /// For a factor just made, at the `cost` of so many iterations.
+    /// For a new factor whose `cost` is given in iterations.
     pub fn new(cost: f64) -> Self {
         Self { cost, rate: None, lost: 0 }
     }
 
-    /// Counts a solve of so many iterations; one without any tells nothing.
+    /// Counts a solve with this number of iterations; a solve without iterations does not count.
     ///
-    /// Iterations beyond ½ C count as lost even in the best solve: successive matrices that differ so
-    /// much, as those of an interior-point method, need a factor each.
+    /// Iterations beyond ½ C count as lost even in the best solve. The matrices of an interior-point method
+    /// differ so much that each needs a factor.
     pub fn solved(&mut self, iterations: usize, reduction: Reduction) {
         if iterations > 0 {
             let rate = reduction.reached / iterations as f64;
@@ -53,8 +52,8 @@ impl RefactorisationPolicy {
         }
     }
 
-    /// Iterations after which a solve that is `asked` for this has lost what a new factor costs; `None` if
-    /// one is due.
+    /// The number of iterations after which a solve has lost the cost of a new factor. `None` if a new factor
+    /// is due.
     pub fn iteration_limit(&self, asked: f64) -> Option<usize> {
         let left = self.cost - self.lost as f64;
         let [least, most] = EXTRA_ITERATIONS;

@@ -5,50 +5,50 @@ use crate::petsc::{Communicator, PetscError};
 use nalgebra::{DMatrix, DVectorView, DVectorViewMut};
 use std::iter;
 
-/// S of a matrix, and the factor of what prescribed unknowns F̄ and an added diagonal D make of it:
+/// S of a matrix, and the factor of S with prescribed unknowns F̄ and an added diagonal D:
 ///
 /// ```text
 /// S_D = S + D,   (S_D)_FF x_F = b_F − (S_D)_FF̄ x_F̄,   x_F̄ given.
 /// ```
 ///
-/// Rows and columns of prescribed unknowns are those of a scaled identity in the factored matrix. All
-/// ranks have the same.
+/// In the factored matrix prescribed unknowns have the rows and columns of a scaled identity. All ranks have
+/// the same factor.
 pub(super) struct SchurComplement {
     comm: Communicator,
     /// The precision of the first factor.
     precision: Precision,
-    /// S; without rows where there is no such unknown.
+    /// S; without rows if Γ is empty.
     matrix: DMatrix<f64>,
     /// The size of its entries.
     scale: f64,
-    /// Of S_D, with its changes.
+    /// The factor of S_D, and the changes that made S_D.
     factor: Option<Cholesky>,
     changes: Option<Changes>,
 }
 
-/// What makes S_D of S.
+/// The changes that make S_D of S.
 #[derive(Clone, PartialEq)]
 struct Changes {
-    /// Of each unknown 1 if it is prescribed, else 0.
+    /// Per unknown: 1 if it is prescribed, else 0.
     prescribed: Vec<f64>,
     /// D.
     added: Vec<f64>,
 }
 
 impl SchurComplement {
-    /// A complement that is yet to be set.
+    /// A complement without values.
     pub(super) fn new(comm: Communicator, precision: Precision) -> Self {
         let matrix = DMatrix::zeros(0, 0);
         Self { comm, precision, matrix, scale: 1.0, factor: None, changes: None }
     }
 
-    /// Replaces S, whose entries are about as large as `scale`; it has no factor yet.
+    /// Replaces S, whose entries have about the size `scale`, and discards the factor.
     pub(super) fn set(&mut self, matrix: DMatrix<f64>, scale: f64) {
         (self.matrix, self.scale, self.changes) = (matrix, scale, None);
     }
 
-    /// Prescribes unknowns and adds to diagonal entries of S, those that this rank owns; false if what is
-    /// left is not positive definite. Without changes the factor stays. Collective.
+    /// Prescribes owned unknowns and adds to their diagonal entries of S. It returns false if the rest is not
+    /// positive definite. The factor stays if no change was made. Collective.
     pub(super) fn prescribe(
         &mut self,
         prescribed: impl Iterator<Item = usize>,
@@ -125,7 +125,7 @@ impl SchurComplement {
         self.factor.as_ref().map_or(self.precision, Cholesky::precision)
     }
 
-    /// The work of a factorisation, in bytes that a solve reads in the same time.
+    /// The time of a factorisation, as the number of bytes that solves read in this time.
     pub(super) fn work(&self) -> f64 {
         self.factor.as_ref().map_or(0.0, Cholesky::work)
     }
@@ -136,11 +136,11 @@ impl SchurComplement {
     }
 }
 
-/// The system that is left for the condensed unknowns when all others are eliminated: S x = b − p with
-/// the forces p of what is prescribed.
+/// The system of the condensed unknowns after the elimination of all others: S x = b − p, with the forces p
+/// on prescribed unknowns.
 ///
-/// The factor may be that of an earlier matrix A₀, in which case E^-½ A₀ E^-½ stands for the present one
-/// ([`Factor`](super::Factor)): then e = E^½ relates x = e x₀ and p = p₀/e to the unknowns and forces of A₀.
+/// If the factor is that of an earlier matrix A₀, then E^-½ A₀ E^-½ replaces the present matrix
+/// ([`Factor`](super::Factor)). With e = E^½, x = e x₀ and p = p₀/e for the unknowns x₀ and forces p₀ of A₀.
 pub struct Condensed<'a> {
     pub(super) schur: &'a mut SchurComplement,
     /// The places of this rank's condensed unknowns.
@@ -153,8 +153,8 @@ pub struct Condensed<'a> {
 }
 
 impl Condensed<'_> {
-    /// The condensed unknowns x of this rank, and the forces p there, where some are `prescribed`; `None` if
-    /// what is left is not positive definite. Collective.
+    /// The condensed unknowns x of this rank and the forces p there, if some are `prescribed`. `None` if the
+    /// rest is not positive definite. Collective.
     ///
     /// # Errors
     /// There is no memory for it.
@@ -178,8 +178,8 @@ impl Condensed<'_> {
         Ok(Some([unknowns, places().map(|(&i, e)| forces[i] / e).collect()]))
     }
 
-    /// The condensed unknowns of this rank, none prescribed, with a diagonal D `added` to S and forces p:
-    /// (S + D) x = b − p; `None` if S + D is not positive definite. Collective.
+    /// The condensed unknowns of this rank without prescribed ones: (S + D) x = b − p, with a diagonal D
+    /// `added` to S and forces p. `None` if S + D is not positive definite. Collective.
     ///
     /// # Errors
     /// There is no memory for it.

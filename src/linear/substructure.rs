@@ -1,9 +1,8 @@
 //! A Cholesky factor over the ranks by substructuring (Przemieniecki, AIAA J. 1, 1963).
 //!
-//! The unknowns of a rank are interior (I), with neighbours on this rank and in the interface only, or
-//! belong to the interface Γ: the unknowns between the ranks, and those that may be prescribed or get
-//! another diagonal, on which the interior and its factor then do not depend. A x = b is solved by block
-//! elimination:
+//! Γ, the interface, has the unknowns between the ranks and those that may be prescribed or get another
+//! diagonal. The other unknowns of a rank are its interior I. They are coupled only with each other and with
+//! Γ. Their factor does not depend on prescribed unknowns. Block elimination solves A x = b:
 //!
 //! ```text
 //! S = A_ΓΓ − Σ A_ΓI A_II⁻¹ A_IΓ              the Schur complement, dense, the same on all ranks,
@@ -11,9 +10,8 @@
 //! A_II x_I = b_I − A_IΓ x_Γ                  by each rank for its own interior (sums over ranks).
 //! ```
 //!
-//! A rank factorises its interior together with the part of the interface next to it, with c 1 in the
-//! place of A_ΓΓ: the last block of that factor then tells its part of S,
-//! L_Γ L_Γᵀ = c 1 − A_ΓI A_II⁻¹ A_IΓ, and its triangular solves do the rest.
+//! A rank factorises its interior together with the neighbouring part of Γ, with c 1 in place of A_ΓΓ. The
+//! last block of this factor gives the rank's part of S: L_Γ L_Γᵀ = c 1 − A_ΓI A_II⁻¹ A_IΓ.
 
 use super::{
     Cholesky, LowerTriangle, Precision,
@@ -27,7 +25,7 @@ use std::iter;
 pub(super) struct Substructure {
     comm: Communicator,
     division: Division,
-    /// Of the interior and the interface next to it.
+    /// The factor of the interior and the neighbouring interface.
     local: Cholesky,
     /// S.
     schur: SchurComplement,
@@ -38,19 +36,19 @@ pub(super) struct Substructure {
 /// The unknowns of a rank. Their *places* are those of a vector of three parts: the interior of the
 /// rank, the interface next to it, the interface of all ranks.
 struct Division {
-    /// Of each owned unknown its place, in the first or the third part.
+    /// Per owned unknown: its place, in the first or the third part.
     places: Vec<usize>,
     /// Global indices of all ranks' unknowns of Γ, increasing.
     interface: Vec<i32>,
-    /// Indices in `interface` of those next to this rank's interior, increasing.
+    /// Indices in `interface` of the neighbours of this rank's interior, increasing.
     near: Vec<usize>,
     /// The number of interior unknowns.
     interior: usize,
 }
 
-/// The part of a matrix that a rank has.
+/// The part of a matrix on this rank.
 struct Blocks {
-    /// The interior and the interface next to it, [A_II A_IΓ; A_ΓI c 1]: of its columns the first.
+    /// The first columns of [A_II A_IΓ; A_ΓI c 1], the interior and the neighbouring interface.
     local: LowerTriangle,
     /// A_ΓΓ in the rows that this rank owns.
     interface: DMatrix<f64>,
@@ -58,15 +56,13 @@ struct Blocks {
     largest_row_sum: f64,
 }
 
-/// Interface unknowns up to which a dense Schur complement on every rank is tried: then it takes
-/// 290 MB. At 2100 unknowns steps were five times as fast as with MUMPS; of 2.1 million unknowns on 4
-/// ranks, where it is near this, eight times, and the factorisation took 1.8 times as long.
+/// The largest number of interface unknowns for a dense Schur complement on every rank, which then takes 290
+/// MB. Steps are faster than with MUMPS up to this number (SPEED.md, section 2).
 const LARGEST_INTERFACE: usize = 6000;
 
 impl Substructure {
-    /// Divides, orders and analyses the unknowns of a matrix, with the owned ones `condensed` in the
-    /// interface, for factors of these precisions, that of S the second; `None` if the interface is too
-    /// large. Collective.
+    /// Divides, orders and analyses the unknowns of a matrix. Γ contains the owned unknowns `condensed`. The
+    /// second precision is for S. `None` if Γ is too large. Collective.
     pub(super) fn new(
         comm: Communicator,
         matrix: &Matrix,
@@ -87,7 +83,7 @@ impl Substructure {
         Ok(comm.all(in_place).then_some(this))
     }
 
-    /// The work of a factorisation on this rank, in bytes that a solve reads in the same time.
+    /// The time of a factorisation on this rank, as the number of bytes that solves read in this time.
     pub(super) fn work(&self) -> f64 {
         self.local.work() + self.schur.work()
     }
@@ -102,8 +98,8 @@ impl Substructure {
         self.local.bytes() + self.schur.bytes()
     }
 
-    /// Factorises the present values of a matrix of the same pattern; false if it is not positive
-    /// definite, whatever of the interface is prescribed. [`Self::prescribe`] is to follow. Collective.
+    /// Factorises a matrix with the same pattern. It returns false if the matrix is not positive definite,
+    /// whatever unknowns are prescribed. Call [`Self::prescribe`] next. Collective.
     pub(super) fn factorise(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
         let near = &self.division.near;
         let Blocks { mut local, interface: mut schur, largest_row_sum } =
@@ -129,7 +125,7 @@ impl Substructure {
         Ok(true)
     }
 
-    /// Prescribes some of the condensed unknowns; false if what is left of the matrix is not positive
+    /// Prescribes some of the condensed unknowns. It returns false if the rest of the matrix is not positive
     /// definite. Collective.
     pub(super) fn prescribe(&mut self, prescribed: &[usize]) -> Result<bool, PetscError> {
         let (places, shared) = (&self.division.places, self.division.shared());
@@ -163,8 +159,8 @@ impl Substructure {
         self.comm.sum(b_shared);
     }
 
-    /// The system S x = b that is left of A x = `r` for the owned unknowns `condensed`, of which e is the
-    /// `scaling`. Collective.
+    /// The system S x = b of the owned unknowns `condensed` after the elimination of the interior from A x =
+    /// `r`. Their e is `scaling`. Collective.
     pub(super) fn condense(
         &mut self,
         r: &[f64],
@@ -195,8 +191,8 @@ impl Division {
         self.interior + self.near.len()
     }
 
-    /// Divides the unknowns of a matrix: of two neighbours on different ranks, the one on the higher
-    /// rank belongs to the interface, with those `condensed`. `None` if that is too large. Collective.
+    /// Divides the unknowns of a matrix. Of two neighbours on different ranks, the one on the higher rank
+    /// belongs to Γ. So do those in `condensed`. `None` if Γ is too large. Collective.
     fn of(
         comm: Communicator,
         matrix: &Matrix,
@@ -268,8 +264,7 @@ impl Division {
         Ok(Blocks { local, interface, largest_row_sum })
     }
 
-    /// The place of an unknown, given by its global index and the first one that this rank owns; `None`
-    /// in the interior of another rank.
+    /// The place of an unknown with this global index; `None` in the interior of another rank.
     fn place(&self, first: i32, unknown: i32) -> Option<usize> {
         let owned = usize::try_from(unknown - first).ok().and_then(|i| self.places.get(i));
         let shared = self.shared();

@@ -1,14 +1,14 @@
 //! Triangular solves with a supernodal Cholesky factor.
 //!
-//! L is a sequence of supernodes, consecutive columns with the same rows below their diagonal block
-//! (Ng and Peyton, SIAM J. Sci. Comput. 14, 1993). Of a supernode with the diagonal block D and the
-//! rows B below it, the forward solve makes y_s ← D⁻¹ y_s and then y_rows ← y_rows − B y_s; the
-//! backward solve, from the last supernode to the first, y_s ← D⁻ᵀ (y_s − Bᵀ y_rows).
+//! L is a sequence of supernodes, consecutive columns with the same rows below their diagonal block (Ng and
+//! Peyton, SIAM J. Sci. Comput. 14, 1993). Let a supernode have the diagonal block D and the rows B below it.
+//! The forward solve computes y_s ← D⁻¹ y_s and then y_rows ← y_rows − B y_s. The backward solve goes from
+//! the last supernode to the first: y_s ← D⁻ᵀ (y_s − Bᵀ y_rows).
 //!
-//! Both are limited by the reading of L, so L is stored in the order in which it is read: a supernode
-//! is cut into panels of [`PANEL_WIDTH`] columns, a panel into its triangle at the diagonal and tiles
-//! of [`TILE_HEIGHT`] rows below. The entries of y that a supernode works on are gathered first in a
-//! front: its own, padded to whole panels, then those of the rows below.
+//! Reading L limits the speed of both, so L is stored in the order of reading. A supernode is cut into panels
+//! of [`PANEL_WIDTH`] columns. A panel is cut into its triangle at the diagonal and tiles of [`TILE_HEIGHT`]
+//! rows. The entries of y for a supernode are first gathered in a front: its own entries, padded to whole
+//! panels, then those of the rows below.
 
 use super::{
     cholmod::Cholmod,
@@ -18,15 +18,15 @@ use crate::petsc::use_large_pages;
 use nalgebra::{convert, convert_unchecked};
 use std::mem::take;
 
-/// Solves with the first rows and columns of a factor, and forms what they leave of the others: see
+/// Solves with the first rows and columns of a factor and eliminates them from the others: see
 /// [`Cholesky::solve`](super::Cholesky::solve).
 pub(super) trait TriangularSolver {
-    /// Frees its values: there is nothing to solve with until others are taken.
+    /// Frees the values. Solves need new values first.
     fn clear(&mut self);
 
-    /// Takes the values of L₁₁ and L₂₁, of each supernode its columns from the diagonal block down,
-    /// whatever stands above the diagonal, and frees those of the factor meanwhile: two copies of L
-    /// would be most of the memory of a run.
+    /// Takes the values of L₁₁ and L₂₁ supernode by supernode, its columns from the diagonal block down, and
+    /// ignores entries above the diagonal. It frees the values of the factor meanwhile: two copies of L would
+    /// be most of the memory of a run.
     fn take_values(&mut self, factor: &mut Cholmod);
 
     /// L₁₁ y₁ = (P b)₁; returns y₂ = (P b)₂ − L₂₁ y₁.
@@ -57,8 +57,7 @@ impl Supernode {
         (PANEL_WIDTH * self.panels() + self.below).div_ceil(TILE_HEIGHT)
     }
 
-    /// The first tile of the front below a panel's triangle; it may contain rows of the triangle, for
-    /// which it has zeros.
+    /// The first tile of the front below a panel's triangle. It has zeros in rows of the triangle.
     fn first_tile(panel: usize) -> usize {
         PANEL_WIDTH * (panel + 1) / TILE_HEIGHT
     }
@@ -79,11 +78,11 @@ pub(super) struct Supernodal<T> {
     /// P: the row of A of each row of L.
     order: Vec<u32>,
     supernodes: Vec<Supernode>,
-    /// Of each supernode the rows below its diagonal block.
+    /// Per supernode: the rows below its diagonal block.
     rows: Vec<u32>,
-    /// Of each panel the triangle at the diagonal.
+    /// Per panel: the triangle at the diagonal.
     diagonal: Vec<DiagonalBlock<T>>,
-    /// Of each panel what stands below its triangle.
+    /// Per panel: the tiles below its triangle.
     tiles: Vec<Tile<T>>,
     /// P b, y or P x, divided by `scale`: the exponents of `f32` end at 10^±38.
     y: Vec<T>,
@@ -194,7 +193,7 @@ impl<T: Number> TriangularSolver for Supernodal<T> {
         use_large_pages(&self.tiles);
         let (mut diagonal, mut tiles) = (&mut self.diagonal[..], &mut self.tiles[..]);
         let starts: Vec<usize> = factor.supernodes().map(|(.., start)| start).collect();
-        // From the last one, so that those taken stand at the end and can be freed.
+        // From the last supernode on: values at the end of the factor can be freed.
         for (s, start) in self.supernodes.iter().zip(starts).rev() {
             let (others, panels) = split_back(diagonal, s.panels());
             diagonal = others;
@@ -252,7 +251,7 @@ impl<T: Number> TriangularSolver for Supernodal<T> {
     }
 }
 
-/// The last `count` entries, behind the others.
+/// The last `count` entries and the rest.
 fn split_back<U>(entries: &mut [U], count: usize) -> (&mut [U], &mut [U]) {
     entries.split_at_mut(entries.len() - count)
 }

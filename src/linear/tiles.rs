@@ -4,12 +4,12 @@ use nalgebra::{RealField, convert};
 use std::ops::{Add, Mul, Sub};
 use wide::{f32x8, f64x8};
 
-/// Columns of a panel: they are worked on together, so that the vector is read once for all.
+/// Columns of a panel. One pass over the vector serves all of them.
 pub(super) const PANEL_WIDTH: usize = 4;
 /// Rows of a tile.
 pub(super) const TILE_HEIGHT: usize = 8;
 
-/// A number that comes in lanes of [`TILE_HEIGHT`], worked on side by side (SIMD).
+/// A number type with SIMD lanes of [`TILE_HEIGHT`] numbers.
 pub(super) trait Number: RealField + Copy {
     /// From an array, or from one number for all lanes.
     type Lanes: Copy
@@ -44,7 +44,7 @@ impl<T: Number> DiagonalBlock<T> {
         Self(columns)
     }
 
-    /// Takes over the entries of a column from the diagonal down; those missing stay.
+    /// Sets the entries of a column from the diagonal down; further entries stay.
     pub(super) fn set_column(&mut self, column: usize, values: &[f64]) {
         for (k, &value) in values.iter().enumerate() {
             self.0[column][column + k] = convert(if k == 0 { value.recip() } else { value });
@@ -85,8 +85,8 @@ pub(super) fn subtract<T: Number>(
     }
 }
 
-/// Bᵀ `x`, B the rows of a panel that are stored in `tiles`. From the last tile to the first: a sweep
-/// through a whole factor then goes one way in memory, which the processor sees and fetches ahead.
+/// Bᵀ `x`, B the rows of a panel that are stored in `tiles`. It goes from the last tile to the first, so that
+/// a sweep reads the factor in one direction, and the processor can prefetch.
 pub(super) fn transposed_product<T: Number>(
     tiles: &[Tile<T>],
     x: &[[T; TILE_HEIGHT]],
