@@ -1,7 +1,7 @@
-//! Judges an answer in global coordinates, by the conditions as they were posed.
+//! Certifies an answer in global coordinates, by the conditions as they were posed.
 //!
-//! Nothing here comes from a solver: no nodal basis, no bound on an unknown, no mask of prescribed
-//! ones. A fault in any of these makes u wrong, and cannot hide here.
+//! This code shares nothing with the solvers: no nodal basis, no bound on an unknown, no mask of prescribed
+//! unknowns. A fault in any of these makes u wrong, and the certificate shows it.
 
 use super::{FixedRow, GapRow, Kkt, Scales, kkt::worse};
 use crate::{fem::Subdomain, petsc::Communicator};
@@ -9,7 +9,7 @@ use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// The conditions of a body, node by node, for the nodes that this rank owns.
+/// The conditions at the nodes that this rank owns.
 #[derive(Debug, Clone)]
 pub struct Certificate {
     nodes: Vec<Conditions>,
@@ -27,7 +27,7 @@ struct Conditions {
     gaps: Vec<(GapRow, usize)>,
 }
 
-/// A gap condition at a node and how it is met.
+/// A gap condition at a node, with its gap and reaction.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct ContactPoint {
     /// The node.
@@ -36,11 +36,11 @@ pub struct ContactPoint {
     pub normal: [f64; 2],
     /// Normal reaction p, N per metre of thickness; positive in compression.
     pub force: f64,
-    /// The reaction over the node's tributary length, Pa; 0 where the node is open: there p is rounding.
+    /// The reaction over the node's tributary length, Pa. It is 0 at an inactive node, where p is rounding.
     pub pressure: f64,
-    /// g − u·ν: the gap that is left, m.
+    /// The remaining gap g − u·ν, m.
     pub gap: f64,
-    /// Whether the node is active, p/F > (g − u·ν)/U.
+    /// Is the node active, p/F > (g − u·ν)/U?
     pub active: bool,
 }
 
@@ -49,23 +49,23 @@ pub struct ContactPoint {
 pub struct Answer<'a> {
     /// A rigid motion of the body, m; empty if it is zero.
     pub rigid: &'a [f64],
-    /// The rest, which alone causes forces, m.
+    /// The rest of u, which causes the forces, m.
     pub elastic: &'a [f64],
-    /// f − Ku, N per metre of thickness: what supports and obstacles must carry.
+    /// f − Ku, N per metre of thickness: the forces that supports and obstacles must carry.
     pub unbalanced: &'a [f64],
     /// The values of the prescribed rows, m.
     pub prescribed: &'a [f64],
-    /// The gaps of all gap rows at the time, m; none where no gap depends on time.
+    /// The gaps of all gap rows at this time, m; empty if no gap depends on time.
     pub gaps: &'a [f64],
 }
 
-/// A normal that has less than this outside the prescribed directions acts along them.
+/// A normal lies in the span of the prescribed directions if its part outside is below this.
 const ALONG: f64 = 1e-6;
-/// Prescribed values that agree to this have no difference, relative to the largest of them.
+/// Relative difference below which two prescribed values count as equal.
 const ROUNDING: f64 = 1e-12;
 
 impl Certificate {
-    /// From the rows of the whole body.
+    /// The certificate of the undivided body, from its rows.
     pub fn new(fixed: &[FixedRow], gaps: &[GapRow]) -> Self {
         let mut nodes = BTreeMap::<usize, Conditions>::new();
         for (number, row) in fixed.iter().enumerate() {
@@ -91,13 +91,12 @@ impl Certificate {
         Self { nodes, posed: self.posed }
     }
 
-    /// The residuals of an answer at the nodes `0..owned` and how its gap conditions are met.
-    /// Collective.
+    /// The residuals of an answer at the nodes `0..owned`, and its gap conditions. Collective.
     ///
-    /// Of f − Ku at a node, prescribed directions carry their part, and gap conditions what lies in
-    /// the cone Σ p ν, p ≥ 0, of their normals. What remains is a pull (dual) where the normals
-    /// span the rest of the plane, else it is split: along the normal a pull, across it unbalanced.
-    /// Where some condition is judged by no rank, no residual is a number.
+    /// Prescribed directions carry their part of f − Ku at a node. Gap conditions carry the part in the cone
+    /// Σ p ν, p ≥ 0, of their normals. If the normals span the rest of the plane, the remainder counts as a
+    /// pull (dual). Otherwise its part along the normal is a pull, and its part across is unbalanced. The
+    /// residuals are NaN if a condition belongs to no rank.
     pub fn judge(
         &self,
         answer: Answer,
@@ -156,20 +155,20 @@ impl Certificate {
     }
 }
 
-/// What becomes of f − Ku at a node.
+/// How a node carries f − Ku.
 struct Carried {
     /// p of each gap condition; `None` where the normal displacement is prescribed.
     forces: Vec<Option<f64>>,
     /// |·|² of the part against the normals.
     pull: f64,
-    /// |·|² of the part that nothing can carry.
+    /// |·|² of the unbalanced part.
     across: f64,
 }
 
 impl Conditions {
-    /// The largest |ū − u·d|/U of the node's prescribed rows u·d = ū. With the rigid part r and the
-    /// elastic part e of u the difference is (ū − r·d) − e·d: ū and r·d may be much larger than U, and a
-    /// difference within the rounding of these counts as none.
+    /// The largest |ū − u·d|/U of the node's prescribed rows u·d = ū. With the rigid part r and the elastic
+    /// part e of u the difference is (ū − r·d) − e·d. Both ū and r·d may be much larger than U; a difference
+    /// within their rounding counts as zero.
     fn prescribed_error(&self, answer: Answer, scales: Scales) -> f64 {
         let error = |(direction, row): &(Vector2<f64>, usize)| {
             let value = answer.prescribed[*row];
@@ -188,7 +187,7 @@ impl Conditions {
         }
     }
 
-    /// g − u·ν of each gap condition, the rigid part first: both are large where the gap is.
+    /// g − u·ν of each gap condition. The rigid part is subtracted first: it is as large as a large gap.
     fn gaps_left(&self, answer: Answer) -> Vec<f64> {
         let (rigid, elastic) = (self.rigid(answer), vector(answer.elastic, self.node));
         let left = |(gap, number): &(GapRow, usize)| {
@@ -200,7 +199,7 @@ impl Conditions {
 
     /// Splits `force` among the conditions, whose gaps have `left`.
     fn carry(&self, force: Vector2<f64>, left: &[f64]) -> Carried {
-        // Prescribed directions carry whatever acts along them.
+        // Prescribed directions carry all forces along them.
         let free: Vec<Vector2<f64>> = match self.fixed.split_first() {
             None => vec![Vector2::x(), Vector2::y()],
             Some(((d, _), others)) if others.iter().all(|(e, _)| d.perp(e).abs() <= ALONG) => {
@@ -229,9 +228,9 @@ impl Conditions {
     }
 }
 
-/// Multipliers p ≥ 0 of the `bearing` normals whose Σ p ν is nearest to `force`, and what is left of it.
-/// A vector in the plane lies in the cone of at most two of them; of several such pairs, the one
-/// whose gaps have the least `left`.
+/// Multipliers p ≥ 0 of the `bearing` normals such that Σ p ν is nearest to `force`, and the remainder. A
+/// vector in the plane lies in the cone of at most two normals. Of several such pairs the function takes the
+/// one with the smallest remaining gaps, `left`.
 fn cone(
     force: Vector2<f64>,
     normals: &[Vector2<f64>],

@@ -13,25 +13,26 @@ use std::collections::BTreeMap;
 pub struct Constraints {
     /// The nodal bases; prescribed unknowns are fixed there (and later the pins of free motions).
     pub bases: NodalBases,
-    /// The bounded unknowns, rising, each with its first gap condition; [`Self::pose`] adds the others.
+    /// The bounded unknowns in increasing order, each with its first gap condition. [`Self::pose`] adds the
+    /// others.
     pub bounds: Vec<Bound>,
     /// The numbers of these conditions among all gap rows.
     first: Vec<usize>,
-    /// Unknowns that take the value of a fixed row: (dof, row).
+    /// Unknowns with the value of a fixed row: (dof, row).
     prescribed: Vec<(usize, usize)>,
-    /// Fixed rows whose direction other rows determine already, with their numbers.
+    /// Fixed rows in directions that other rows prescribe already, with their numbers.
     implied: Vec<(FixedRow, usize)>,
     further: Vec<FurtherGap>,
 }
 
-/// A gap condition for which there is no further unknown, u·ν = u_D·ν + b c ≤ g: u_D is what the
-/// prescribed unknowns of the node make of u.
+/// A gap condition without an unknown of its own, u·ν = u_D·ν + b c ≤ g. Here u_D is the part of u from the
+/// prescribed unknowns of the node.
 #[derive(Debug, Clone, Copy)]
 struct FurtherGap {
     row: GapRow,
     /// Its number among all gap rows.
     number: usize,
-    /// The unknown c, bounded by another gap condition already, and b; `None` where u·ν is prescribed.
+    /// The unknown c, which has a bound from another gap condition, and b; `None` if u·ν is prescribed.
     bounded: Option<(usize, f64)>,
 }
 
@@ -40,18 +41,17 @@ type AtNode<'a> = (Vec<usize>, Vec<(usize, &'a mut GapRow)>);
 
 /// Directions whose lines are closer than this angle, rad, are one direction.
 const PARALLEL: f64 = 1e-8;
-/// Directions closer than this angle, rad, but not one, are refused: the basis they make at a node
-/// loses as many digits as the angle has zeros. (A contact solve reaches the default tolerance
-/// down to here.)
+/// Directions closer than this angle, rad, that are not one direction, are refused: their basis at a node
+/// loses too many digits. Contact solves reach the default tolerance down to this angle.
 pub(super) const DEPENDENT: f64 = 1e-4;
-/// Prescribed values may differ by this much of the largest, and a gap may lack this much of the
-/// body's size: rounding of coordinates and expressions.
+/// Rounding of coordinates and expressions: relative difference of prescribed values, and missing gap over
+/// the body's size, that are accepted.
 const ROUNDING: f64 = 1e-12;
 
 impl Constraints {
-    /// Combines all rows node by node, gap rows being joined ([`GapRow::joined`]); `coordinates`, m,
-    /// are for error messages. Gaps along one line get exactly this line as their normal, so that
-    /// they cannot contradict each other by rounding.
+    /// Combines all rows node by node; gap rows must be joined ([`GapRow::joined`]). Error messages need the
+    /// `coordinates`, m. Gaps along one line get exactly this line as their normal, so that rounding makes no
+    /// contradiction.
     ///
     /// # Errors
     /// Directions at a node are nearly dependent, or too many for its two unknowns.
@@ -77,8 +77,7 @@ impl Constraints {
         };
         for (node, (numbers, gaps)) in nodes {
             let error = |conflict| ConstraintError { at: coordinates[node], conflict };
-            // The basis of a node: its prescribed directions, then the normals of its gaps as far
-            // as they are independent of these and of each other.
+            // The basis of a node: its prescribed directions, then the independent normals of its gaps.
             let mut basis = constraints.prescribe(node, &numbers, fixed);
             let prescribed = basis.len();
             for gap in gaps {
@@ -105,16 +104,15 @@ impl Constraints {
         basis
     }
 
-    /// Adds a gap condition at a node whose first `prescribed` directions are prescribed. A gap
-    /// along an earlier normal (or against it: a node between two plates) is one more side of the
-    /// same unknown.
+    /// Adds a gap condition at a node whose first `prescribed` directions are prescribed. A gap along or
+    /// against an earlier normal (a node between two plates) bounds the same unknown.
     fn add_gap(
         &mut self,
         (number, gap): (usize, &mut GapRow),
         basis: &mut Vec<[f64; 2]>,
         prescribed: usize,
     ) -> Result<(), Conflict> {
-        // Where nothing is left to move, no unknown is needed.
+        // If the displacement is prescribed, the gap needs no unknown.
         let line = if prescribed == 2 { None } else { parallel(basis, gap.normal)? };
         if let Some(line) = line {
             gap.normal = along(basis[line], gap.normal);
@@ -164,7 +162,7 @@ impl Constraints {
         self.prescribed.iter().map(|&(dof, _)| dof)
     }
 
-    /// The place in `bounds` of the unknown that a contact force along `normal` at `node` acts on.
+    /// The place in `bounds` of the unknown on which a contact force along `normal` acts at `node`.
     pub fn bound_along(&self, node: usize, normal: [f64; 2]) -> Option<usize> {
         let first = self.bounds.partition_point(|bound| bound.node < node);
         let at_node = (first..self.bounds.len()).take_while(|&i| self.bounds[i].node == node);
@@ -172,13 +170,12 @@ impl Constraints {
         at_node.min_by(|i, j| off(i).total_cmp(&off(j)))
     }
 
-    /// The prescribed unknowns c_D, m (0 elsewhere; two entries per node), where `values[row]` is u·d of
-    /// each fixed row, and the bounds on the others. `gaps` are those of all gap rows at the time; none
-    /// where no gap depends on time.
+    /// The prescribed unknowns c_D, m (0 elsewhere; two entries per node), and the bounds on the others.
+    /// `values[row]` is u·d of each fixed row. `gaps` has the gaps of all gap rows at this time; it is empty
+    /// if no gap depends on time.
     ///
-    /// # Errors
-    /// Values contradict each other or go through the obstacle, or obstacles on both sides of a node
-    /// leave it no room.
+    /// # Errors Values contradict each other or go through the obstacle, or the obstacles on both sides of a
+    /// node overlap.
     pub fn pose(
         &self,
         values: &[f64],
@@ -228,8 +225,8 @@ impl Constraints {
         Ok((lift, bounds))
     }
 
-    /// The conditions that concern a rank: prescribed unknowns of its subdomain, all others of the nodes
-    /// that it owns. All rows keep their numbers.
+    /// The conditions of a rank: prescribed unknowns of its subdomain, and the other conditions of its owned
+    /// nodes. All rows keep their numbers.
     pub fn restrict(&self, subdomain: &Subdomain) -> Self {
         let owned = |node: usize| subdomain.owned(node);
         let renumbered = |dof: usize, node: usize| 2 * node + dof % 2;

@@ -1,4 +1,4 @@
-//! What can be wrong with contact conditions, and with the answer of a solver.
+//! Errors in contact conditions and in the answers of solvers.
 
 use super::{ContactReport, Kkt, constraints::DEPENDENT};
 use crate::petsc::{Communicator, PetscError};
@@ -9,14 +9,14 @@ use crate::petsc::{Communicator, PetscError};
 pub struct ConstraintError {
     /// Coordinates of the node, m.
     pub at: [f64; 2],
-    /// What is wrong there.
+    /// The contradiction.
     pub conflict: Conflict,
 }
 
 /// How displacement conditions contradict each other.
 #[derive(Debug, Clone, thiserror::Error)]
 pub enum Conflict {
-    /// A prescribed displacement goes so far, m, through the obstacle.
+    /// A prescribed displacement goes through the obstacle; the depth, m.
     #[error(
         "the prescribed displacement goes {0:.3e} m through the obstacle: a node that is both \
          prescribed and in contact keeps its prescribed value, which must respect the gap"
@@ -28,19 +28,18 @@ pub enum Conflict {
         values[0], values[1], direction[0], direction[1]
     )]
     Contradicts {
-        /// The value that the other conditions imply and the one prescribed, m.
+        /// The value implied by the other conditions, and the prescribed one, m.
         values: [f64; 2],
         /// The common direction.
         direction: [f64; 2],
     },
-    /// Two obstacles leave a node no place; the gaps lack so much, m.
+    /// Two obstacles overlap at a node; by how much, m.
     #[error(
         "the obstacles on both sides leave no room: the node would have to be {0:.3e} m inside one \
          of them; widen a gap or change the displacement prescribed there"
     )]
     NoRoom(f64),
-    /// Directions too near to each other to be unknowns of their own, too far apart to be one: the
-    /// angle between their lines, rad.
+    /// Two directions are nearly parallel; the angle between their lines, rad.
     #[error(
         "two conditions (prescribed directions or contact normals) differ from one line by an angle \
          of only {0:.1e}: double precision cannot tell their effects apart; open the wedge there \
@@ -55,21 +54,21 @@ pub enum Conflict {
     TooMany,
 }
 
-/// A contact solve that did not end well.
+/// A failed contact solve.
 ///
-/// [`RunError`](crate::evolution::RunError) adds what to try, which depends on the scene.
+/// [`RunError`](crate::evolution::RunError) adds advice, which depends on the scene.
 #[derive(Debug, thiserror::Error)]
 pub enum ContactError {
-    /// The method ended above the tolerance; it has left in c the best that it could do.
+    /// The method ended above the tolerance. It leaves its best answer in c.
     #[error("{method} stopped after {} iterations: {detail}", report.iterations)]
     NotConverged {
         /// The solver's name, with its variant.
         method: String,
-        /// What it took.
+        /// The cost of the solve.
         report: Box<ContactReport>,
-        /// The residuals where it stood, if it knows them.
+        /// The residuals at the end, if known.
         residuals: Kkt,
-        /// Why it stopped and where it stood.
+        /// The reason.
         detail: String,
     },
     /// PETSc failed inside the method.
@@ -77,7 +76,7 @@ pub enum ContactError {
     Failed {
         /// The solver's name, with its variant.
         method: String,
-        /// What PETSc said.
+        /// The error of PETSc.
         source: PetscError,
     },
     /// The answer does not satisfy the KKT conditions.
@@ -96,11 +95,11 @@ pub enum ContactError {
         advice(contrast)
     )]
     Limited {
-        /// How the solve ended.
+        /// The error of the solve.
         source: Box<Self>,
-        /// The tolerance that rounding allows, about.
+        /// The approximate tolerance that rounding allows.
         attainable: f64,
-        /// How much stiffer than another one a material is, where that is the cause.
+        /// The contrast of stiffness between two materials, if it is the cause.
         contrast: Option<String>,
     },
     /// The answer satisfies the KKT conditions of a stiffness that is not positive definite.
@@ -116,7 +115,7 @@ pub enum ContactError {
     Petsc(#[from] PetscError),
 }
 
-/// Why rounding is large, and what to do.
+/// The reason for large rounding, and advice.
 fn advice(contrast: &Option<String>) -> String {
     match contrast {
         Some(contrast) => format!(
@@ -143,24 +142,23 @@ impl ContactError {
         Self::NotConverged { method, report, residuals, detail: detail.into() }
     }
 
-    /// Whether the method stopped short of its tolerance, which all ranks then know.
+    /// Did the method stop above its tolerance? All ranks know this error.
     pub fn stopped_short(&self) -> bool {
         matches!(self, Self::NotConverged { .. })
     }
 
-    /// Whether the method missed its tolerance although rounding need not keep an answer from it: other
-    /// settings may help.
+    /// Did the method miss a tolerance that rounding allows? Other settings may help.
     pub fn is_missed(&self) -> bool {
         matches!(self, Self::NotConverged { .. } | Self::NotCertified { .. })
     }
 
-    /// Whether rounding keeps the answer from the tolerance.
+    /// Does rounding keep the answer from the tolerance?
     pub fn is_limited(&self) -> bool {
         matches!(self, Self::Limited { .. })
     }
 
-    /// Whether another method may do better, as all ranks know. (Of an error inside PETSc others
-    /// than this rank may know nothing.)
+    /// May another method succeed? All ranks return the same, so an error inside PETSc counts only on one
+    /// rank.
     pub fn may_be_rescued(&self, comm: Communicator) -> bool {
         match self {
             Self::Failed { .. } => comm.is_serial(),

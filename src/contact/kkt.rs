@@ -1,15 +1,15 @@
-//! The Karush–Kuhn–Tucker residuals of an answer, whoever computed it.
+//! The Karush–Kuhn–Tucker residuals of an answer.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// What counts as 1 in relative residuals: the sizes of forces and of displacements in a run so
-/// far, so that a load that passes zero, or a gap much wider than a displacement, changes nothing.
+/// The scales of relative residuals: the largest forces and displacements of the run so far. With them a load
+/// that passes zero, or a gap much wider than a displacement, does not change the residuals.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Scales {
     /// F: the largest ‖·‖₂ of the nodal loads and of the internal forces, N per metre of thickness.
     pub force: f64,
-    /// U: the largest displacement of a node against the rigid motion of the body, m.
+    /// U: the largest displacement of a node relative to the rigid motion of the body, m.
     pub displacement: f64,
 }
 
@@ -32,16 +32,15 @@ impl Scales {
         relative(displacement, self.displacement)
     }
 
-    /// The natural residual min(p/F, (g − u·ν)/U) of a force p > 0 across an open gap: it means
-    /// the same for every gap and load (Facchinei and Pang, Finite-Dimensional Variational
-    /// Inequalities and Complementarity Problems I, section 1.5.1: the min function).
+    /// The natural residual min(p/F, (g − u·ν)/U) of a force p > 0 across an open gap. It does not depend on
+    /// the sizes of gap and load (Facchinei and Pang, Finite-Dimensional Variational Inequalities and
+    /// Complementarity Problems I, section 1.5.1: the min function).
     pub fn natural(self, force: f64, gap: f64) -> f64 {
         self.of_force(force.max(0.0)).min(self.of_displacement(gap.max(0.0)))
     }
 }
 
-/// Relative KKT residuals of u. The multiplier p of a gap condition is the contact force that u
-/// itself implies.
+/// Relative KKT residuals of u. The multiplier p of a gap condition is the contact force that follows from u.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Kkt {
     /// ‖the part of f − Ku that no support can carry‖₂ / F.
@@ -55,7 +54,7 @@ pub struct Kkt {
 }
 
 impl Kkt {
-    /// Of an answer that cannot be judged.
+    /// The residuals of an answer that cannot be certified.
     pub const UNKNOWN: Self = Self {
         stationarity: f64::NAN,
         primal: f64::NAN,
@@ -68,12 +67,12 @@ impl Kkt {
         self.named().into_iter().fold(0.0, |worst, (_, value)| worse(worst, value))
     }
 
-    /// Whether all are at most `tolerance` (NaN is not).
+    /// Are all at most `tolerance`? False for NaN.
     pub fn within(&self, tolerance: f64) -> bool {
         self.worst() <= tolerance
     }
 
-    /// Which residuals miss `tolerance`, and by what factor.
+    /// The residuals above `tolerance`, and by what factor they exceed it.
     pub fn missed(&self, tolerance: f64) -> String {
         let missed =
             self.named().into_iter().filter(|(_, value)| value.is_nan() || *value > tolerance);
@@ -115,7 +114,7 @@ fn relative(residual: f64, scale: f64) -> f64 {
     if residual == 0.0 { 0.0 } else { residual / scale }
 }
 
-/// The larger; NaN if either is, which f64::max would forget.
+/// The maximum; NaN if either is NaN, unlike f64::max.
 pub(super) fn worse(a: f64, b: f64) -> f64 {
     if b > a || b.is_nan() { b } else { a }
 }

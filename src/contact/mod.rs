@@ -1,12 +1,13 @@
-//! Frictionless contact: the discrete problem (26), its solvers, and the residuals that judge them.
+//! Frictionless contact: the discrete problem (26), its solvers, and the certificate of their answers.
 //!
 //! ```text
 //! min ½ cᵀKc − fᵀc   subject to   lower_i ≤ c_i ≤ upper_i on the contact unknowns
 //! ```
 //!
-//! [`Constraints`] chooses unknowns c so that each contact condition bounds one of them,
-//! [`RigidMotions`] finds the null space of K, [`solvers()`] makes a solver of [`REGISTRY`] by its
-//! name, and the [`Certificate`] judges u, whoever computed it.
+//! [`Constraints`] chooses unknowns c such that each contact condition bounds one of them. [`RigidMotions`]
+//! finds the null space of K. A [`ContactSolver`] solves a [`ContactProblem`]; [`solvers()`] makes one of
+//! [`REGISTRY`] by its name. The [`Certificate`] computes the KKT residuals of u and shares no code with the
+//! solvers.
 
 mod certificate;
 mod constraints;

@@ -17,25 +17,25 @@ pub struct ContactProblem<'a> {
     pub session: &'a Session,
     /// K, N/m.
     pub stiffness: &'a Matrix,
-    /// The size of K's diagonal, N/m.
+    /// The size of the diagonal of K, N/m.
     pub stiffness_scale: f64,
-    /// f, N: loads less the forces of prescribed displacements.
+    /// f, N: loads minus the forces of prescribed displacements.
     pub load: &'a Vector,
-    /// The bounded unknowns of this rank, by rising `dof`.
+    /// The bounded unknowns of this rank, in increasing order of `dof`.
     pub bounds: &'a [Bound],
-    /// u·ν of the rigid motions that contact alone constrains, one row per bound; no columns
-    /// where K is positive definite.
+    /// u·ν of the rigid motions that contact alone constrains, one row per bound. Without columns K is
+    /// positive definite.
     pub rigid: &'a DMatrix<f64>,
     /// The work of the load on each of these motions.
     pub work: &'a DVector<f64>,
-    /// What counts as 1 in relative residuals; displacements larger than its own raise it.
+    /// The scales of relative residuals; larger displacements raise them.
     pub scales: Scales,
     /// KKT residuals to reach, relative.
     pub tolerance: f64,
-    /// The ranks among which the unknowns are divided: each bound is known to the owner of its
-    /// unknown, and what is decided is decided by all.
+    /// The ranks among which the unknowns are divided. The owner of an unknown knows its bound. All ranks
+    /// decide together.
     pub comm: Communicator,
-    /// Where the parts of the solve book their time, as `contact/…`.
+    /// The phases `contact/…` to which the parts of the solve book their time.
     pub phases: &'a Phases,
 }
 
@@ -62,12 +62,12 @@ impl ContactProblem<'_> {
         LinearSystem { prescribed, ..self.system() }
     }
 
-    /// ‖residual‖₂ that linear systems are solved to, N: below what the KKT residuals may be.
+    /// The largest ‖residual‖₂ of linear systems, N: below the tolerance of the KKT residuals.
     pub(super) fn linear_residual(&self) -> f64 {
         0.3 * self.tolerance * self.scales.force
     }
 
-    /// Whether K is positive definite.
+    /// Is K positive definite?
     pub(super) fn definite(&self) -> bool {
         self.rigid.ncols() == 0
     }
@@ -87,7 +87,7 @@ impl ContactProblem<'_> {
         v.read(|v| self.bounds.iter().map(|bound| v[bound.dof]).collect())
     }
 
-    /// The scales for an iterate c: a displacement larger than that of the scales raises it.
+    /// The scales for an iterate c: a larger displacement raises them.
     pub(super) fn scales_at(&self, c: &Vector) -> Result<Scales, PetscError> {
         let displacement = self.scales.displacement.max(self.max_norm(c)?);
         Ok(Scales { displacement, ..self.scales })
@@ -101,8 +101,8 @@ impl ContactProblem<'_> {
         Ok(residual)
     }
 
-    /// The KKT residuals of `c` by the assembled K (the final word has the
-    /// [`Certificate`](super::Certificate)).
+    /// The KKT residuals of `c` with the assembled K. (The [`Certificate`](super::Certificate) decides about
+    /// an answer.)
     pub(super) fn residuals(&self, c: &Vector) -> Result<Kkt, PetscError> {
         let residual = self.residual(c)?;
         let scales = self.scales_at(c)?;
@@ -117,9 +117,8 @@ impl ContactProblem<'_> {
         })?
     }
 
-    /// The KKT residuals when Σ r² over the unbounded unknowns of this rank is `free`, N², and the
-    /// contact force p and the unknown c of each bound are `bounded`, in the order of the bounds.
-    /// Collective.
+    /// The KKT residuals, from Σ r² over the unbounded unknowns of this rank, `free`, N², and from p and c of
+    /// each bound, `bounded`. Collective.
     pub(super) fn kkt(
         &self,
         free: f64,

@@ -19,17 +19,16 @@ pub struct GapRow {
     pub node: usize,
     /// ν, a unit vector.
     pub normal: [f64; 2],
-    /// g, m, negative where body and obstacle overlap; of a gap that depends on time, that of the first
-    /// solve.
+    /// g, m, negative if body and obstacle overlap. If the gap depends on time, its value in the first solve.
     pub gap: f64,
     /// The node's tributary length of Γ_C, m.
     pub tributary_length: f64,
 }
 
 impl GapRow {
-    /// The rows by node: those of one smooth boundary become one, of the mean normal, the sum of
-    /// the lengths and the smallest gap; across a corner both stay. Also the `T` of the rows that each
-    /// is made of.
+    /// Joins rows by node. The rows of one smooth boundary become one row with the mean normal, the sum of
+    /// the lengths and the smallest gap. At a corner both rows stay. Returns with each row the `T` of its
+    /// parts.
     pub fn joined<T>(rows: impl IntoIterator<Item = (Self, T)>) -> (Vec<Self>, Vec<Vec<T>>) {
         let mut nodes: BTreeMap<usize, Vec<(Self, Vec<T>)>> = BTreeMap::new();
         for (new, of_new) in rows {
@@ -47,8 +46,7 @@ impl GapRow {
         nodes.into_values().flatten().unzip()
     }
 
-    /// Its gap, m: its own, or where gaps depend on time, that of its `number` among all of them at
-    /// the time.
+    /// Its gap, m: its own one, or if gaps depend on time, the entry `number` of all gaps at this time.
     pub(super) fn gap_of(&self, number: usize, gaps: &[f64]) -> f64 {
         gaps.get(number).copied().unwrap_or(self.gap)
     }
@@ -67,16 +65,16 @@ pub struct Bound {
     pub node: usize,
     /// ν: the unknown is u·ν.
     pub normal: [f64; 2],
-    /// Least u·ν, m: −∞ unless an obstacle stands on the other side too.
+    /// Lower bound of u·ν, m: −∞ without an obstacle on the other side.
     pub lower: f64,
-    /// Largest u·ν, m.
+    /// Upper bound of u·ν, m.
     pub upper: f64,
     /// The node's tributary length of Γ_C, m.
     pub tributary_length: f64,
 }
 
 impl Bound {
-    /// Whether the obstacles leave the unknown one value.
+    /// Do the obstacles allow a single value?
     pub fn is_equality(&self) -> bool {
         self.lower == self.upper
     }
@@ -91,7 +89,7 @@ impl Bound {
         if c >= self.upper { 1.0 } else { -f64::from(c <= self.lower) }
     }
 
-    /// The value nearest to `c` that both sides admit, m.
+    /// The admissible value nearest to `c`, m.
     pub fn nearest(&self, c: f64) -> f64 {
         c.max(self.lower).min(self.upper)
     }

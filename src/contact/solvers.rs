@@ -1,8 +1,7 @@
 //! The contact solvers and the one table of them.
 //!
-//! A solver is a file that implements [`ContactSolver`] and defines its [`SolverEntry`] (and the
-//! struct of its own options, if it has any); it becomes one of the program's by its `mod` line,
-//! its place in [`REGISTRY`] and, for options, its field of [`ContactOptions`], all in this file.
+//! To add a solver, write a file that implements [`ContactSolver`] and defines a [`SolverEntry`]. In this
+//! file add its `mod` line, its entry in [`REGISTRY`] and, if it has options, a field of [`ContactOptions`].
 
 mod active_set;
 mod anderson;
@@ -22,20 +21,19 @@ use crate::{
 use active_set::ActiveSet;
 use serde::Deserialize;
 
-/// What PETSc options of the linear systems with K begin with.
+/// The prefix of PETSc options for linear systems with K.
 pub const PREFIX: &str = "elastic_";
 
 /// A method for the contact problem. It keeps nothing between solves.
 pub trait ContactSolver {
-    /// The name a scene or `--solver` calls it by.
+    /// Its name in a scene and for `--solver`.
     fn name(&self) -> &'static str;
 
-    /// Solves from the start `c` and leaves the solution there. `elastic` solves the linear systems with K;
-    /// its factor may be that of an earlier K. `warm` is what the method left for the next solve (a set,
-    /// a parameter), empty at first.
+    /// Solves from the start `c` and replaces it by the solution. `elastic` solves linear systems with K; its
+    /// factor may be that of an earlier K. `warm` is the warm start that the method left in the last solve
+    /// (an active set, a parameter), empty at first.
     ///
-    /// # Errors
-    /// The method stopped short of the tolerance, or PETSc failed.
+    /// # Errors The method stopped above the tolerance, or PETSc failed.
     fn solve(
         &self,
         problem: &ContactProblem,
@@ -45,10 +43,10 @@ pub trait ContactSolver {
     ) -> Result<ContactReport, ContactError>;
 }
 
-/// A solver of one kind or another.
+/// A contact solver.
 pub type BoxedSolver = Box<dyn ContactSolver>;
 
-/// What a contact solve took.
+/// The cost of a contact solve.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ContactReport {
     /// Iterations of the method itself.
@@ -57,17 +55,15 @@ pub struct ContactReport {
     pub linear_iterations: usize,
     /// Factorisations (not those of a preconditioner chosen by PETSc options).
     pub factorisations: usize,
-    /// Times the method had to leave its fast path for a slower one that always ends, or another
-    /// solver was asked in its place.
+    /// Times the method left its fast path for a slower one that always ends, or another solver replaced it.
     pub fallbacks: usize,
-    /// The solver that gave the answer in the place of the one that was asked.
+    /// The solver that computed the answer in place of the chosen one.
     pub rescued_by: Option<&'static str>,
-    /// Mean factor by which an iteration shrank the change of the multiplier, where the method
-    /// is a fixed-point iteration.
+    /// Mean contraction of the multiplier's change per iteration, for a fixed-point method.
     pub contraction: Option<f64>,
     /// ω of penalty-duality, Pa/m.
     pub omega: Option<f64>,
-    /// Calls of TAO that claimed convergence to an answer which the KKT residuals rejected.
+    /// Calls of TAO that reported convergence although the KKT residuals were too large.
     pub false_claims: usize,
 }
 
@@ -85,7 +81,7 @@ impl ContactReport {
         solve.converged.then_some(()).ok_or_else(stopped)
     }
 
-    /// Adds what a further solve of the same problem took.
+    /// Adds the cost of a further solve of the same problem.
     pub fn add(&mut self, further: &Self) {
         self.iterations += further.iterations;
         self.linear_iterations += further.linear_iterations;
@@ -98,21 +94,21 @@ impl ContactReport {
     }
 }
 
-/// A solver as the program knows it.
+/// An entry of the table of solvers.
 pub struct SolverEntry {
-    /// What a scene or `--solver` calls it.
+    /// Its name in a scene and for `--solver`.
     pub name: &'static str,
-    /// What it does, in a line of `--help`.
+    /// Its line in `--help`.
     pub summary: &'static str,
-    /// Its variants, reached as `name:VARIANT`.
+    /// Its variants, written `name:VARIANT`.
     pub variants: &'static [&'static str],
-    /// The solver that is asked in its place where it stops short.
+    /// The solver that replaces it if it stops above the tolerance.
     pub rescuer: Option<&'static str>,
-    /// A new one; the text is the variant, or empty.
+    /// Makes a solver; the text is the variant, or empty.
     pub construct: fn(&str, &ContactOptions) -> BoxedSolver,
 }
 
-/// All solvers of problems with obstacles, the default first.
+/// All contact solvers, the default first.
 pub const REGISTRY: &[SolverEntry] = &[active_set::ENTRY, penalty_duality::ENTRY, tao::ENTRY];
 
 /// Their names.
@@ -142,7 +138,7 @@ pub struct ContactOptions {
     pub solver: Option<String>,
     /// Relative tolerance of the KKT residuals, in (0, 1).
     pub tolerance: f64,
-    /// Whether another solver may answer where the one asked for stops short.
+    /// May another solver replace one that stops above the tolerance?
     pub rescue: bool,
     /// Parameters of the penalty-duality method.
     pub penalty_duality: PenaltyOptions,
@@ -155,10 +151,9 @@ impl Default for ContactOptions {
     }
 }
 
-/// The solver called `name`, and its variant: empty, or what stands behind a colon.
+/// The solver `name` and its variant, the text behind a colon.
 ///
-/// # Errors
-/// There is none of that name.
+/// # Errors There is no solver of this name.
 pub fn find(name: &str) -> Result<(&'static SolverEntry, &str), SolverError> {
     let (solver, variant) = name.split_once(':').unwrap_or((name, ""));
     let known = |entry: &&SolverEntry| {
@@ -168,7 +163,7 @@ pub fn find(name: &str) -> Result<(&'static SolverEntry, &str), SolverError> {
     found.ok_or_else(|| SolverError { name: name.to_owned() })
 }
 
-/// All solvers and what they do, a line each, for `--help`.
+/// All solvers and their summaries, a line each, for `--help`.
 pub fn summaries() -> String {
     let line = |entry: &SolverEntry| format!("{:<16} {}", entry.name, entry.summary);
     REGISTRY.iter().map(line).collect::<Vec<_>>().join("\n")
@@ -183,9 +178,9 @@ fn names() -> Vec<String> {
     REGISTRY.iter().flat_map(of).collect()
 }
 
-/// The solver called `name`, and the one to ask in its place where it stops short: none of a variant,
-/// so that one sees what that does by itself, nor where the options forbid it. Without bounds every
-/// name means one linear solve, which is what the active set makes of them.
+/// The solver `name`, and the solver that replaces it if it stops above the tolerance. A variant has no
+/// replacement, so that its own result is seen, and `rescue = false` forbids one. Without bounds every name
+/// means one linear solve, by the active set method.
 ///
 /// # Errors
 /// There is none of that name.

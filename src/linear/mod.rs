@@ -5,11 +5,12 @@
 //! matrix preconditions conjugate gradients for the next ones, until it costs more iterations than
 //! a new one ([`RefactorisationPolicy`]). Both are asked for through a [`LinearSolver`].
 //!
-//! - On one rank CHOLMOD computes L Lᵀ = P A Pᵀ; the triangular solves L y = P b and Lᵀ (P x) = y are our own
-//!   ([`Cholesky`]). - Unknowns Γ between ranks, and those of contact, come last: each rank eliminates its
-//!   interior unknowns I, and all share the dense Schur complement S = A_ΓΓ − Σ A_ΓI A_II⁻¹ A_IΓ
-//!   (`substructure`). Prescribed and penalised contact unknowns change S alone. - If Γ is too large, or
-//!   PETSc options choose it, a preconditioner of PETSc replaces the factor ([`Factor`]).
+//! - On one rank CHOLMOD computes L Lᵀ = P A Pᵀ. The triangular solves L y = P b and Lᵀ (P x) = y are our own
+//!   ([`Cholesky`]).
+//! - The unknowns Γ between ranks, and those of contact, come last. Each rank eliminates its interior
+//!   unknowns I. All ranks share the dense Schur complement S = A_ΓΓ − Σ A_ΓI A_II⁻¹ A_IΓ (`substructure`).
+//!   Prescribed and penalised contact unknowns change S alone.
+//! - If Γ is too large, or PETSc options choose it, a preconditioner of PETSc replaces the factor ([`Factor`]).
 //!
 //! What crosses the door: a [`LinearSystem`] and the largest residual of its solution. Contact solvers also
 //! get the small problem of the unknowns that may be prescribed ([`Condensed`]). They solve it by their own

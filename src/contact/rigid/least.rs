@@ -1,20 +1,21 @@
-//! Of many answers the one of least ∫|u|².
+//! The answer with the minimum ∫|u|² among many.
 
 use super::nonnegative::nonnegative;
 use crate::{contact::Bound, petsc::Communicator};
 use nalgebra::{DMatrix, DVector};
 
-/// u·ν below this part of the largest of a motion is rounding.
+/// u·ν below this fraction of the largest u·ν of a motion is rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// How far to move along each rigid motion m_j from u, given at the bounds as `c`, so that
+/// The amplitude of each rigid motion m_j that moves the answer u, at the bounds `c`, such that
 ///
-/// Σ (t_j + a_j)² is least over lower ≤ c + Ra ≤ upper and a = Zy,
+/// Σ (t_j + a_j)² is minimal over lower ≤ c + Ra ≤ upper and a = Zy.
 ///
-/// where t_j = ∫u·m_j/|Ω| are the `amplitudes` of u, the columns of R the u·ν of the motions at the
-/// bounds, `rigid`, and the orthonormal columns of Z the combinations that no contact force resists, `left`.
-/// With x = y + Zᵀt this is the least |x| over Gx ≥ h, which the residual of a nonnegative least
-/// squares problem gives (Lawson and Hanson, Solving Least Squares Problems, ch. 23.4). Collective.
+/// Here t_j = ∫u·m_j/|Ω| are the `amplitudes` of u. The columns of R, `rigid`, are u·ν of the motions at the
+/// bounds. The orthonormal columns of Z, `left`, are the combinations without resistance by contact forces.
+/// With x = y + Zᵀt the function minimises |x| over Gx ≥ h. The solution follows from the residual of a
+/// nonnegative least squares problem (Lawson and Hanson, Solving Least Squares Problems, ch. 23.4).
+/// Collective.
 pub(crate) fn least_motion(
     comm: Communicator,
     (rigid, left): (&DMatrix<f64>, &[DVector<f64>]),
@@ -26,7 +27,7 @@ pub(crate) fn least_motion(
     let start = z.transpose() * amplitudes;
     let normal = rigid * &z;
     let cut = ROUNDING * comm.max(normal.amax());
-    // Each row: G and h of a bound, on its upper side −u·ν ≥ c − upper.
+    // Per row: G and h of a bound; for the upper bound −u·ν ≥ c − upper.
     let mut rows = Vec::new();
     for ((row, bound), c) in normal.row_iter().zip(bounds).zip(c) {
         for (side, room) in [(1.0, bound.upper - c), (-1.0, c - bound.lower)] {

@@ -1,17 +1,17 @@
-//! Whether a load drives the motions that prescribed displacements leave.
+//! Checks whether a load drives a rigid motion without support.
 
 use super::{RigidMotions, nonnegative::nonnegative};
 use crate::fem::{Body, RigidMotion, resultant};
 use nalgebra::DVector;
 
-/// Work of a load on a free motion that may be rounding, relative to Σ|f|.
+/// Relative to Σ|f|: work of a load on a free motion up to this is rounding.
 const BALANCED: f64 = 1e-9;
-/// The same where contact forces balance it.
+/// The same for a motion that contact forces balance.
 const REMAINDER: f64 = 1e-8;
-/// A component of the resultant below this, relative to Σ|f|, is shown as zero.
+/// Relative to Σ|f|: a smaller component of the resultant is shown as zero.
 const ROUNDING: f64 = 1e-12;
 
-/// The load does work on a rigid motion that nothing prevents.
+/// The load does work on a rigid motion without support.
 #[derive(Debug, Clone, thiserror::Error)]
 #[error(
     "nothing supports the body against {motion}, and the load drives it (resultant ({:.4e}, {:.4e}) N/m, \
@@ -29,14 +29,12 @@ pub struct DrivenMotion {
 }
 
 impl RigidMotions {
-    /// Checks that `load` (nodal forces, N) does no work on free motions, as exactly as the normals of
-    /// the mesh determine these, and can be balanced by
-    /// contact forces on the resisted ones: with N the u·ν of these and w the work on them, that
-    /// min ‖Nᵀp − w‖ over p ≥ 0 is 0 (Farkas; the remainder itself is a motion that the load
-    /// drives and contact allows). Collective.
+    /// Checks two conditions on `load` (nodal forces, N). It does no work on free motions, within the
+    /// accuracy of the normals of the mesh. Contact forces can balance it on the resisted motions: min ‖Nᵀp −
+    /// w‖ over p ≥ 0 is 0, with u·ν of the motions in N and the work on them in w. Otherwise the remainder is
+    /// a motion that the load drives and contact allows (lemma of Farkas). Collective.
     ///
-    /// # Errors
-    /// The load drives a motion, which the error names.
+    /// # Errors The load drives a motion; the error names it.
     pub fn check(&self, body: &Body, load: &[f64]) -> Result<(), DrivenMotion> {
         if self.all_prevented() {
             return Ok(());

@@ -1,5 +1,5 @@
-//! The rigid motions of the body that prescribed displacements leave: the null space of K, and which of
-//! it contact constrains.
+//! The rigid motions that prescribed displacements allow: the null space of K. Contact constrains some of
+//! them.
 
 mod least;
 mod load;
@@ -14,39 +14,37 @@ use super::{Bound, Constraints, FixedRow, GapRow};
 use crate::fem::{Body, RigidMotion, resultant};
 use nalgebra::{DMatrix, DVector};
 
-/// The rigid motions that prescribed displacements leave, orthonormal with respect to ∫u·v/|Ω|.
+/// The rigid motions that prescribed displacements allow, orthonormal with respect to ∫u·v/|Ω|.
 #[derive(Debug, Clone)]
 pub struct RigidMotions {
-    /// Unconstrained, even by contact in either sense.
+    /// Free motions: contact constrains them in neither sense.
     pub free: Vec<RigidMotion>,
-    /// Per free motion: the largest |u·ν| at axes and gaps, as much as the motion itself is uncertain.
+    /// Per free motion: the largest |u·ν| at axes and gaps, which is the uncertainty of the motion.
     free_errors: Vec<f64>,
-    /// Those that contact resists in one sense: the null space of K once the free ones are pinned.
+    /// Resisted motions: contact resists them in one sense. They are the null space of K with pinned free
+    /// motions.
     pub resisted: Vec<RigidMotion>,
     /// u·ν of the resisted motions, one row per gap condition of the undivided body.
     normal: DMatrix<f64>,
 }
 
-/// Squares of motions are zero below this, relative, that is motions below 3e-5. gmsh cuts a
-/// circle into edges that are equal to 1e-8, by which a disc in a bore turns freely to 5e-10
-/// (measured); forces within the KKT tolerance 1e-10 cannot tell motions below 1e-5 from none;
-/// and one node among a thousand that stops a motion squarely is still 1e-3.
+/// Relative squares of motions below this count as zero, that is motions below 3e-5. They lie between the
+/// accuracy of gmsh's circles, 1e-8, and a motion that one node in a thousand stops, 1e-3.
 const ROUNDING: f64 = 1e-9;
-/// Squares of motions that prescribed displacements prevent are above this, relative: rounding of
-/// the Gram matrix and its eigenvalues. A clamp as short as 1e-6 of the body still prevents its
-/// rotation.
+/// Relative squares of motions above this are prevented. Below it they are rounding of the Gram matrix and
+/// its eigenvalues. A clamp of 1e-6 of the body's length prevents its rotation.
 const PREVENTED: f64 = 1e-14;
-/// Exact normals turn by at most this (rad) to be tangential to free motions.
+/// Normals turn by at most this angle, rad, to become perpendicular to free motions.
 const TURN: f64 = 1e-3;
 
 impl RigidMotions {
-    /// From the fixed rows and the gap conditions, joined node by node as in the bounds. `normal_errors` are
-    /// how far the normals at each node may be from those of the geometry, rad: a motion u along a curved boundary
-    /// is free although |u·ν| is up to that times |u|.
+    /// From the fixed rows and the joined gap conditions. `normal_errors` bounds the angle between the
+    /// normals of mesh and geometry at each node, rad. A motion u along a curved boundary is free although
+    /// |u·ν| may be this angle times |u|.
     ///
-    /// The motions with the coordinates v ([`RigidMotion::new`]) that prescribed displacements leave are the null
-    /// space of Σ r rᵀ over their rows r·v = 0. Of these, the free ones are in the null space of u·ν at
-    /// the gap conditions too.
+    /// Prescribed displacements are rows r·v = 0 for the coordinates v of a motion ([`RigidMotion::new`]).
+    /// They allow the null space of Σ r rᵀ. The free motions in it are also in the null space of u·ν at the
+    /// gap conditions.
     pub fn new(body: &Body, fixed: &[FixedRow], gaps: &[GapRow], normal_errors: &[f64]) -> Self {
         let points = &body.nodes.points;
         let ([cx, cy], radius) = (body.centroid, body.radius_of_gyration());
@@ -91,7 +89,7 @@ impl RigidMotions {
         Self { free, free_errors, resisted, normal }
     }
 
-    /// Whether prescribed displacements prevent all rigid motions (K is then positive definite).
+    /// Do prescribed displacements prevent all rigid motions? K is then positive definite.
     pub fn all_prevented(&self) -> bool {
         self.free.is_empty() && self.resisted.is_empty()
     }
@@ -114,8 +112,8 @@ impl RigidMotions {
         self.work(body, |i| [u[2 * i], u[2 * i + 1]].map(|u| weights[i] * u)) / body.area
     }
 
-    /// ν at a node without its component along a free motion u where u·ν is so small that it is rounding
-    /// or within the `error` of ν, rad: the motion then leaves contact and symmetry axes exactly as they are.
+    /// ν at a node without its component along a free motion u, if u·ν is within rounding or the `error` of
+    /// ν, rad. The motion then changes neither contact nor symmetry conditions.
     pub fn tangential(&self, body: &Body, node: usize, normal: [f64; 2], error: f64) -> [f64; 2] {
         self.free.iter().fold(normal, |[nx, ny], motion| {
             let [x, y] = motion.at(body.nodes.points[node]);
@@ -129,8 +127,8 @@ impl RigidMotions {
         })
     }
 
-    /// Pins one unknown for each free motion. The load being balanced, the pins carry no
-    /// force: any solution so found is exact up to the motion, which [`Self::remove_free`] takes out.
+    /// Pins one unknown for each free motion. A balanced load causes no force in the pins, so the solution is
+    /// exact up to the motion, which [`Self::remove_free`] removes.
     pub fn pin_free(&self, body: &Body, constraints: &mut Constraints) {
         let mut fields: Vec<Vec<f64>> = self.free.iter().map(|m| m.field(body)).collect();
         fields.iter_mut().for_each(|f| constraints.bases.displacement_to_local(f));
@@ -149,7 +147,7 @@ impl RigidMotions {
         }
     }
 
-    /// Removes the free motions from u: the answer of least ∫|u|².
+    /// Removes the free motions from u: the answer with the minimum ∫|u|².
     pub fn remove_free(&self, body: &Body, u: &mut [f64]) {
         if !self.free.is_empty() {
             let weights = &body.nodes.weights;
@@ -159,8 +157,8 @@ impl RigidMotions {
         }
     }
 
-    /// `load` (nodal forces, N) less the body force that does the same work on free motions. That
-    /// work is rounding where [`Self::check`] accepts the load, and no pin then carries it.
+    /// `load` (nodal forces, N) minus the body force that does the same work on free motions. If
+    /// [`Self::check`] accepts the load, this work is rounding; without it the pins carry no force.
     pub fn balanced(&self, body: &Body, mut load: Vec<f64>) -> Vec<f64> {
         if !self.free.is_empty() {
             let balance = self.projection(body, |i| [load[2 * i], load[2 * i + 1]]).field(body);
@@ -192,7 +190,7 @@ fn normal_displacements(
     })
 }
 
-/// An orthonormal basis of what a Gram matrix maps to at most `cut` times itself.
+/// An orthonormal basis of the eigenvectors of a Gram matrix with eigenvalues up to `cut`.
 fn null_space(gram: DMatrix<f64>, cut: f64) -> Vec<DVector<f64>> {
     let eigen = gram.symmetric_eigen();
     let pairs = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());

@@ -2,11 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Rows are dependent if one has less than this part outside the span of the others.
+/// A row is dependent if its part outside the span of the others is below this, relative.
 const RANK: f64 = 1e-13;
 
-/// p ≥ 0 of least ‖Aᵀp − b‖ (Lawson and Hanson, Solving Least Squares Problems, ch. 23),
-/// for an A with few columns: at most as many p_i are positive at a time.
+/// The p ≥ 0 that minimises ‖Aᵀp − b‖ (Lawson and Hanson, Solving Least Squares Problems, ch. 23). A has few
+/// columns; at most this number of p_i is positive.
 pub(super) fn nonnegative(a: &DMatrix<f64>, b: &DVector<f64>) -> DVector<f64> {
     let rows = a.nrows();
     let mut p = DVector::zeros(rows);
@@ -23,8 +23,8 @@ pub(super) fn nonnegative(a: &DMatrix<f64>, b: &DVector<f64>) -> DVector<f64> {
         }
         loop {
             let columns = a.select_rows(&positive).transpose();
-            // A row enters only if the remainder has a part along it: no combination of the others. By
-            // QR, since nalgebra's singular values err by up to 1e-4 here and let the iteration circle.
+            // A row enters only if it is independent of the others. QR decides this: with nalgebra's singular
+            // values, which err by up to 1e-4 here, the iteration can cycle.
             let independent = RANK * columns.amax();
             let qr = columns.qr();
             let r = qr.r();
@@ -57,8 +57,8 @@ pub(super) fn nonnegative(a: &DMatrix<f64>, b: &DVector<f64>) -> DVector<f64> {
 mod tests {
     use super::{DMatrix, DVector, nonnegative};
 
-    /// A load over two supports is carried by them: p ≥ 0 with Aᵀp = b exists and is found. On these
-    /// rows, orthogonal but for rounding, nalgebra's singular values are off by 3e-4.
+    /// Two supports carry a load between them: the function finds p ≥ 0 with Aᵀp = b. On these rows,
+    /// orthogonal up to rounding, nalgebra's singular values err by 3e-4.
     #[test]
     fn a_load_between_two_supports_is_carried() {
         let near = [-1.000000000002524, -0.8164965809256531];

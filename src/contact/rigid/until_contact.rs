@@ -4,12 +4,12 @@ use super::null_space;
 use crate::{contact::Bound, petsc::Communicator};
 use nalgebra::{DMatrix, DVector};
 
-/// Work on a motion below this part of the load's work on all is rounding.
+/// Work on a motion below this fraction of the load's work on all motions is rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// The combinations (orthonormal) of the motions `rigid`, u·ν at the bounds, a column each, that
-/// are left when u·ν is prescribed on the `active` bounds: the null space of the rows of `rigid`
-/// there. An active bound has a side, 1 the upper and −1 the lower one, another 0. Collective.
+/// The orthonormal combinations of rigid motions that the `active` bounds allow: the null space of the rows
+/// of `rigid` at active bounds. `rigid` has u·ν at the bounds, a column per motion. The entry of `active` is
+/// 1 at an active upper bound, −1 at an active lower one, else 0. Collective.
 pub(crate) fn unconstrained_motions(
     comm: Communicator,
     rigid: &DMatrix<f64>,
@@ -26,13 +26,13 @@ pub(crate) fn unconstrained_motions(
     null_space(gram, 1e-10 * comm.total(rigid.norm_squared()))
 }
 
-/// Lets the body move from c, given at the bounds, with u·ν kept at the `active` bounds, as the load
-/// drives it until it reaches a further bound, which becomes active, and again until no rigid motion is left. `rigid` are
-/// the u·ν of its motions at the bounds, a column each, `work` that of the load on them. Returns how far
-/// it moves along each motion, m, and whether the active bounds then constrain all. Collective.
+/// Moves the body as the load drives it, with fixed u·ν at the `active` bounds, until it reaches a further
+/// bound. This bound becomes active. The function repeats this until no rigid motion remains. `c` is the
+/// start at the bounds, `rigid` has u·ν of the motions there, a column each, and `work` the load's work on
+/// them. Returns the amplitude of each motion, m, and whether the active bounds then constrain all motions.
+/// Collective.
 ///
-/// Where the load drives none of the motions left, the body stays, or with `undriven`, any motion
-/// does.
+/// If the load drives none of the remaining motions, the body stays; with `undriven` it takes any of them.
 pub(crate) fn rigid_motion_until_contact(
     comm: Communicator,
     (rigid, work): (&DMatrix<f64>, &DVector<f64>),

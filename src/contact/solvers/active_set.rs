@@ -29,14 +29,13 @@ pub(super) const ENTRY: SolverEntry = SolverEntry {
 /// Kunisch, SIAM J. Optim. 13, 2003: a semismooth Newton method). The active set of the last step
 /// is the first of this one.
 ///
-/// With a condensed factor, of K at an earlier ζ, that is done first in the small problem that is left for
-/// the bounded unknowns when all others are eliminated, and K decides whether the set found there is
-/// right. [`Pivoting`] has the rules of both.
+/// A condensed factor, perhaps of K at an earlier ζ, gives a small problem for the bounded unknowns. The
+/// method first finds the active set of this problem, and then checks the set with K. [`Pivoting`] has the
+/// rules for both.
 ///
-/// The active set is, of each bound, the sign of its contact force: 1 at the upper bound, −1 at the lower
-/// one, 0 where neither is active.
+/// The active set has an entry per bound: 1 if the upper bound is active, −1 if the lower one is, else 0.
 pub(super) struct ActiveSet {
-    /// Of a problem without bounds the set is empty, and its first solve the last: then not its own name.
+    /// Its name, or `linear` for a problem without bounds, which takes one linear solve.
     pub(super) name: &'static str,
 }
 
@@ -62,7 +61,7 @@ impl ContactSolver for ActiveSet {
                 true => self.solve_condensed(problem, elastic, warm, c, &mut report)?,
                 false => self.solve_whole(problem, elastic, warm, c, &mut report)?,
             };
-            // A guess is an iteration, or as many as it took to find another in its place.
+            // A guess counts as one iteration, or as the iterations of the small problem.
             report.iterations = report.iterations.max(before + 1);
             if !pivoting.pivot(warm, &answer, &mut report.fallbacks)? {
                 return Ok(report);
@@ -74,7 +73,7 @@ impl ContactSolver for ActiveSet {
 }
 
 impl ActiveSet {
-    /// Minimises with the active unknowns at their bounds and no other bound.
+    /// Solves with the active unknowns at their bounds, without other bounds.
     fn solve_whole(
         &self,
         problem: &ContactProblem,
@@ -90,7 +89,7 @@ impl ActiveSet {
         answer(problem, elastic, c)
     }
 
-    /// The same, but the active set is first found anew in the condensed problem.
+    /// The same, after finding the active set of the condensed problem.
     fn solve_condensed(
         &self,
         problem: &ContactProblem,
@@ -118,7 +117,7 @@ impl ActiveSet {
     }
 }
 
-/// The set to begin with: the last one, or the bounds that the start reaches.
+/// The first active set: the last one, or the bounds that the start reaches.
 fn first_guess(
     problem: &ContactProblem,
     active: &mut Vec<f64>,
@@ -128,7 +127,7 @@ fn first_guess(
     if active.len() != problem.bounds.len() {
         *active = problem.bounds.iter().zip(&c).map(|(b, c)| b.side(*c)).collect();
     }
-    // A lower bound may have been one for the last problem only.
+    // The last problem may have had a lower bound that this one lacks.
     for (side, bound) in active.iter_mut().zip(problem.bounds) {
         if *side < 0.0 && bound.lower.is_infinite() {
             *side = 0.0;
@@ -158,7 +157,7 @@ fn values(problem: &ContactProblem, active: &[f64]) -> Vec<(usize, f64)> {
     sides.filter_map(at).collect()
 }
 
-/// What the last solve left at the bounds.
+/// The answer of the last solve at the bounds.
 fn answer(
     problem: &ContactProblem,
     elastic: &LinearSolver,

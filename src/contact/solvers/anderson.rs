@@ -6,10 +6,9 @@ use nalgebra::{DMatrix, DVector};
 /// Anderson's mixing of the last few iterates (J. ACM 12, 1965; Walker and Ni, SIAM J. Numer.
 /// Anal. 49, 2011, type II), in a weighted norm.
 ///
-/// The map of a contact law is only piecewise affine, so mixing can overshoot when the active set
-/// changes: when the residual exceeds ten times the best one seen, the history
-/// is dropped and the iteration goes on from the mean of q and T(q), which cannot move away
-/// from a fixed point of a nonexpansive map.
+/// The map of a contact law is piecewise affine, so mixing can overshoot when the active set changes. If the
+/// residual exceeds ten times the minimum so far, the method drops its history and continues from the mean of
+/// q and T(q). For a nonexpansive map this step does not move away from a fixed point.
 pub struct Anderson {
     /// Square roots of the norm's weights.
     weights: Vec<f64>,
@@ -20,13 +19,13 @@ pub struct Anderson {
     comm: Communicator,
 }
 
-/// Iterates mixed: more than ten no longer pays on the scenes of this project.
+/// The number of mixed iterates; more did not save iterations.
 const DEPTH: usize = 10;
 const OVERSHOOT: f64 = 10.0;
 /// Differences of iterates smaller than this, relative to the largest, are rounding.
 const RANK: f64 = 1e-10;
-/// Residuals that hardly differ (a free body drifting towards its foundation) would be
-/// extrapolated out of sight; beyond this many times a difference the plain step is taken.
+/// Nearly equal residuals (a free body that drifts towards its foundation) would be extrapolated too far.
+/// Beyond this multiple of a difference the method takes the plain step.
 const FARTHEST: f64 = 1e6;
 
 impl Anderson {
@@ -53,7 +52,7 @@ impl Anderson {
         self.mix()
     }
 
-    /// T(q_k) less the combination of differences that cancels most of the residual.
+    /// T(q_k) minus the combination of differences that minimises the residual.
     fn mix(&self) -> Vec<f64> {
         let Some(((image, residual), earlier)) = self.history.split_last() else {
             return Vec::new();
@@ -81,9 +80,8 @@ impl Anderson {
         next
     }
 
-    /// A least squares problem of the same answer whose rows all ranks have: of each rank the
-    /// triangle that an orthogonal transformation makes of its rows (Demmel, Grigori, Hoemmen and
-    /// Langou, SIAM J. Sci. Comput. 34, 2012).
+    /// An equivalent least squares problem with the same rows on all ranks: per rank the triangle R of the QR
+    /// factorisation of its rows (Demmel, Grigori, Hoemmen and Langou, SIAM J. Sci. Comput. 34, 2012).
     fn condensed(&self, a: DMatrix<f64>, b: DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
         if self.comm.is_serial() {
             return (a, b);

@@ -25,16 +25,15 @@ pub(super) const ENTRY: SolverEntry = SolverEntry {
     },
 };
 
-/// The iteration of the [`FixedPoint`] until the contact law is met to the tolerance. u belongs to the
-/// pressure p that it ends with.
+/// Iterates the [`FixedPoint`] until the contact law holds to the tolerance. The answer u is the response to
+/// the last pressure p.
 ///
-/// With a condensed factor of the present K, step 1 needs only the small problem that is left for the bounded
-/// unknowns when all others are eliminated, and the iterates are those of the full problem. With a factor M of
-/// an earlier K, an outer iteration corrects them: with c and p from the small problem, the forces that K finds
-/// left, f − Kc − BᵀWp, are the load of the next one. Without condensation every step 1 is a solve with
-/// K + ωBᵀWB.
+/// With a condensed factor of the present K, step 1 solves only the small problem of the bounded unknowns.
+/// The iterates are those of the full problem. With a factor of an earlier K an outer iteration corrects
+/// them: c and p of the small problem leave the forces f − Kc − BᵀWp, which are the load of the next small
+/// problem. Without condensation each step 1 is a solve with K + ωBᵀWB.
 ///
-/// What it leaves to the next solve is ω, where it has estimated that.
+/// Its warm start for the next solve is the estimated ω.
 struct PenaltyDuality {
     options: PenaltyOptions,
 }
@@ -45,24 +44,24 @@ struct PenaltyDuality {
 /// 1. solve (K + ω BᵀWB) u = f − BᵀW q,
 /// 2. r = Bu + λq,  y = r/(1 − λω) or the bound nearest to it,  q ← (r − y)/λ.
 ///
-/// B picks the bounded unknowns, W their tributary lengths; p = q + ω Bu is the contact pressure
-/// at the fixed point, which gives the first q from the start u. [`Anderson`] mixes the iterates:
-/// measured on this project's scenes, 11 to 30 iterations instead of 200 to 600.
+/// B selects the bounded unknowns, and W has their tributary lengths. p = q + ω Bu is the contact pressure at
+/// the fixed point; it gives the first q from the start u. [`Anderson`] mixes the iterates, which saves most
+/// of them (SPEED.md, section 3).
 struct FixedPoint<'a> {
     options: &'a PenaltyOptions,
-    /// ω, Pa/m, or nothing before it is estimated.
+    /// ω, Pa/m; empty before its estimate.
     omega: &'a mut Vec<f64>,
 }
 
 /// Step 1: Bu for ω and q.
 type Response<'a> = &'a mut dyn FnMut(f64, &[f64]) -> Result<Vec<f64>, ContactError>;
 
-/// The iteration diverges if the contact law is missed by this many times as much as at first, and as the
-/// load.
+/// The iteration has diverged if the residual of the contact law exceeds this multiple of the first residual
+/// and of the load.
 const DIVERGED: f64 = 1e12;
-/// The contact law is missed by at most this part of the tolerance.
+/// The residual of the contact law is at most this fraction of the tolerance.
 const EXACT: f64 = 0.1;
-/// Small problems that may be solved for one contact problem.
+/// The largest number of small problems for one contact problem.
 const OUTER: usize = 100;
 
 /// The method's parameters, `[contact.penalty_duality]` of a scene.
@@ -71,13 +70,13 @@ const OUTER: usize = 100;
 pub struct PenaltyOptions {
     /// ω > 0, Pa/m; estimated from the boundary compliance when absent.
     pub omega: Option<f64>,
-    /// λω in (0, 1). On a compliance eigenvalue s the error of q is multiplied by
-    /// 1 − s/(λ(1 + ωs)) where all nodes are active and by −λω/(1 − λω) · (1 − s/(λ(1 + ωs)))
-    /// where none are: at most 1 in size for every s only if λω is ½, the default.
+    /// λω in (0, 1). On a compliance eigenvalue s the error of q is multiplied by 1 − s/(λ(1 + ωs)) if all
+    /// nodes are active, and by −λω/(1 − λω) · (1 − s/(λ(1 + ωs))) if none is. Both are at most 1 in size for
+    /// every s only if λω is ½, the default.
     pub lambda_omega: f64,
-    /// Whether Anderson mixes the iterates.
+    /// Does [`Anderson`] mix the iterates?
     pub accelerate: bool,
-    /// Iterations allowed for one contact problem.
+    /// The largest number of iterations for one contact problem.
     pub iterations: usize,
 }
 
@@ -88,8 +87,8 @@ impl Default for PenaltyOptions {
 }
 
 impl FixedPoint<'_> {
-    /// Iterates from the contact forces p and Bu until the contact law is missed by at most [`EXACT`] of the
-    /// tolerance. Returns the contact forces W (q + ω Bu), N, that u belongs to.
+    /// Iterates from the contact forces p and Bu until the residual of the contact law is at most [`EXACT`]
+    /// times the tolerance. Returns the contact forces of the answer, W (q + ω Bu), N.
     fn find(
         &self,
         problem: &ContactProblem,
@@ -178,7 +177,7 @@ impl FixedPoint<'_> {
     }
 }
 
-/// The fixed point in the small problem, whose forces the full one corrects.
+/// The fixed point of small problems; residuals of the full problem correct them.
 fn solve_condensed(
     mut fixed_point: FixedPoint,
     problem: &ContactProblem,
@@ -197,7 +196,7 @@ fn solve_condensed(
         p = fixed_point.find_condensed(problem, &p, &start, &mut condensed, &mut report)?;
         elastic.expand(system, true, c)?;
         report.linear_iterations += 1;
-        // What is left of the forces beside those of contact.
+        // ‖f − Kc − BᵀWp‖₂: the forces without the contact forces.
         let left = elastic.residual().read(|forces| {
             let mut forces = forces.to_vec();
             problem.bounds.iter().zip(&p).for_each(|(bound, p)| forces[bound.dof] -= p);
@@ -248,7 +247,8 @@ fn solve_whole(
         let mut rhs = at_bounds(&|i, w| -w * q[i])?;
         rhs.axpby(1.0, problem.load, 1.0)?;
         let system = LinearSystem { matrix, ..problem.system() };
-        // A solve that leaves more than the law may be missed by would not move any more before that.
+        // The linear residual must be below the tolerance of the contact law, or the iteration stalls above
+        // it.
         let limit = EXACT * problem.linear_residual();
         linear.add_solve(ENTRY.name, elastic.solve_renewing(system, &rhs, c, limit)?)?;
         Ok(problem.at_bounds(c)?)

@@ -27,47 +27,46 @@ impl AtBounds {
         Ok(Self { c: problem.at_bounds(c)?, p, displacement })
     }
 
-    /// By how much each active unknown changes to its bound; `None` for the others.
+    /// The change of each active unknown to its bound; `None` for the others.
     pub(super) fn changes(&self, problem: &ContactProblem, active: &[f64]) -> Vec<Option<f64>> {
         let sides = problem.bounds.iter().zip(active).zip(&self.c);
         sides.map(|((bound, side), c)| Some(bound.at(*side)? - c)).collect()
     }
 }
 
-/// Changes of the active set by what violates the conditions: indices that pull leave it, and of those
-/// beyond their bounds the locally deepest join it, to which K couples none that is deeper.
+/// Updates the active set by the violating indices. Indices with a pulling force leave the set. Of the
+/// indices beyond their bounds the locally deepest join it: K couples them to no deeper one.
 ///
-/// Pivoting on all violating indices would press whole stretches of a slender body to an obstacle that it
-/// touches in a point or two: there they pull, and when released go through the opposite obstacle. The locally
-/// deepest tell the shape (as in the algorithm of Remez), and what does lie against the obstacle is halved
-/// each time.
+/// Pivoting on all violating indices would press long parts of a slender body to an obstacle that it touches
+/// in a few points. There they pull, and after their release they penetrate the opposite obstacle. The
+/// locally deepest indices describe the shape, as in the algorithm of Remez. Where the body lies against the
+/// obstacle, each update halves the penetrating part.
 ///
-/// Where that takes long it may be a cycle, and the dual problem is solved: max over p ≥ 0 of the least energy
-/// Π(p) (as Lawson and Hanson do, Solving Least Squares Problems, 1974, chapter 23). From p̄ ≥ 0 the forces
-/// move towards those of the set, p, until the first that are to pull are zero. Their indices leave the set;
-/// where none pulls, the locally deepest join.
+/// After many updates, perhaps in a cycle, the method solves the dual problem: it maximises the minimum
+/// energy Π(p) over p ≥ 0 (as Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23). From p̄ ≥
+/// 0 the forces move towards the forces p of the set, until the first decreasing ones are zero. Their indices
+/// leave the set. If no force of the set pulls, the locally deepest indices join.
 ///
-/// This ends for every convex problem. Π is concave and p its maximum for the set, so Π rises with every move
-/// that is not of length zero. Those that join have p̄ = 0, and ∂Π/∂p̄ > 0 is their depth: as Π rises towards
-/// p, some of their forces are positive. The others may leave by moves of length zero, at most as many as
-/// joined, and then Π rises. So no set has its p̄ = p a second time, and there are finitely many sets.
+/// This ends for every convex problem. Π is concave and p is its maximum for the set, so Π increases in every
+/// move of positive length. Joining indices have p̄ = 0 and ∂Π/∂p̄ > 0, their depth. Π increases towards p,
+/// so some of their forces are positive. The others may leave in moves of length zero, at most as many as
+/// joined. Then Π increases. So no set reaches p̄ = p twice, and there are finitely many sets.
 ///
-/// Where K is singular and A leaves a rigid motion unconstrained, the body moves as the load drives it
-/// until further bounds are reached.
+/// If K is singular and the active set leaves a rigid motion unconstrained, the body moves as the load drives
+/// it until it reaches further bounds.
 pub(super) struct Pivoting<'p> {
     problem: &'p ContactProblem<'p>,
-    /// Pivots that may still be made before the dual problem is solved.
+    /// The number of updates before the dual problem.
     primal_pivots: usize,
-    /// p̄ of the dual problem, N, positive where a bound presses.
+    /// p̄ of the dual problem, N, positive for pressing bounds.
     forces: Option<Vec<f64>>,
 }
 
-/// Pivots before the dual problem is solved: on 1800 steps of strips 40 to 200 times as long as high the
-/// median was 5.
+/// The number of updates before the dual problem. Slender strips need about 5 (STABILITY.md).
 const PRIMAL_PIVOTS: usize = 20;
-/// Up to so many the condensed problem is asked before each.
+/// The number of updates for which the condensed problem is solved first.
 const FAST: usize = 5;
-/// Depths that differ by less than this, relatively, are equal.
+/// Relative difference below which two depths count as equal.
 const EQUAL: f64 = 1e-6;
 
 /// An index that violates the conditions.
@@ -76,7 +75,7 @@ struct Violation {
     index: usize,
     /// The sign that its contact force should have.
     side: f64,
-    /// How far c is beyond a bound that is not active, m; 0 for an active one, which pulls.
+    /// The distance of c beyond an inactive bound, m; 0 for an active bound with a pulling force.
     depth: f64,
 }
 
@@ -86,19 +85,19 @@ impl<'p> Pivoting<'p> {
         Self { problem, primal_pivots: PRIMAL_PIVOTS, forces: None }
     }
 
-    /// Changes after which it is given up.
+    /// The number of updates after which the method gives up.
     pub(super) fn limit(&self) -> usize {
         30 + PRIMAL_PIVOTS + 5 * self.problem.bound_count()
     }
 
-    /// Whether few changes were made yet.
+    /// True while fewer than `FAST` updates were made.
     pub(super) fn is_fast(&self) -> bool {
         self.primal_pivots + FAST > PRIMAL_PIVOTS
     }
 
-    /// Changes the active set, whose answer is given; false if that is admissible, or nothing changes: the
-    /// forces of bounds that support a balanced body are rounding, and the certificate judges them.
-    /// Counts the change to the dual problem among the `fallbacks`. Collective.
+    /// Updates the active set from its answer. It returns false if the answer is admissible or the set does
+    /// not change: the remaining violations are rounding, and the certificate decides. It counts the change
+    /// to the dual problem in `fallbacks`. Collective.
     pub(super) fn pivot(
         &mut self,
         active: &mut [f64],
@@ -121,8 +120,8 @@ impl<'p> Pivoting<'p> {
         Ok(choices.into_iter().any(|chosen| self.change(active, chosen, answer)))
     }
 
-    /// Moves p̄ towards the forces of the active set, and returns the indices that are to leave it; `None` if
-    /// it gets there. Collective.
+    /// Moves p̄ towards the forces of the active set. Returns the indices that leave the set, or `None` if p̄
+    /// reaches these forces. Collective.
     fn ascend(
         &mut self,
         active: &[f64],
@@ -147,8 +146,8 @@ impl<'p> Pivoting<'p> {
         Some(leaving)
     }
 
-    /// Gives the `chosen` indices their sides, and the body the support that it then lacks; whether the
-    /// active set is then another. Collective.
+    /// Gives the `chosen` indices their sides, and adds bounds that support the body. Has the active set
+    /// changed? Collective.
     fn change(&self, active: &mut [f64], chosen: &[Violation], answer: &AtBounds) -> bool {
         let old = active.to_vec();
         chosen.iter().for_each(|one| active[one.index] = one.side);
@@ -156,8 +155,8 @@ impl<'p> Pivoting<'p> {
         self.problem.comm.any(*active != old[..])
     }
 
-    /// Of the `violating` indices those that pull, and those beyond their bounds to which K couples none that
-    /// is deeper.
+    /// The `violating` indices with a pulling force, and those beyond their bounds that K couples to no
+    /// deeper one.
     fn locally_deepest(&self, violating: &[Violation]) -> Result<Vec<Violation>, PetscError> {
         let ContactProblem { stiffness, bounds, .. } = self.problem;
         let row = |one: &Violation| stiffness.rows().start + bounds[one.index].dof as i32;
@@ -175,8 +174,8 @@ impl<'p> Pivoting<'p> {
         Ok(deepest)
     }
 
-    /// The indices that violate the conditions beyond what the KKT tolerance allows: p = f − Kc is at
-    /// least 0 at an upper bound and at most 0 at a lower one, and lower ≤ c ≤ upper elsewhere.
+    /// The indices that violate the conditions beyond the KKT tolerance: p = f − Kc ≥ 0 at an upper bound, p
+    /// ≤ 0 at a lower one, and lower ≤ c ≤ upper elsewhere.
     fn violating(&self, active: &[f64], answer: &AtBounds) -> Vec<Violation> {
         let problem = self.problem;
         let slack = 0.1 * problem.tolerance;
@@ -199,8 +198,8 @@ impl<'p> Pivoting<'p> {
     }
 }
 
-/// Pivots in the problem of the bounded unknowns alone, from `start`, with the active set at its bounds,
-/// until that is admissible there. Collective.
+/// Updates the active set in the small problem of the bounded unknowns, from `start`, until its answer is
+/// admissible. Collective.
 pub(super) fn pivot_condensed(
     problem: &ContactProblem,
     active: &mut Vec<f64>,
@@ -227,8 +226,7 @@ pub(super) fn pivot_condensed(
     Ok(())
 }
 
-/// As [`constrain_rigid_motions`]; where it finds no bound, no index leaves the `old` active set, which open
-/// ones only join.
+/// As [`constrain_rigid_motions`]. If it finds no bound, all indices of the `old` active set stay.
 pub(super) fn support(problem: &ContactProblem, active: &mut [f64], old: &[f64], c: &[f64]) {
     if !constrain_rigid_motions(problem, active, c) {
         for (new, old) in active.iter_mut().zip(old) {
@@ -237,9 +235,9 @@ pub(super) fn support(problem: &ContactProblem, active: &mut [f64], old: &[f64],
     }
 }
 
-/// Where the active set leaves a rigid motion unconstrained: lets the body move as the load drives it,
-/// from c at the bounds, until it reaches a further bound. False if there is none; the load being
-/// balanced, it is then rounding that drives the motion. Collective.
+/// If the active set leaves a rigid motion unconstrained, moves the body as the load drives it, from c at the
+/// bounds, to a further bound. It returns false if there is no such bound: the load is balanced, and rounding
+/// drives the motion. Collective.
 pub(super) fn constrain_rigid_motions(
     problem: &ContactProblem,
     active: &mut [f64],
@@ -249,8 +247,7 @@ pub(super) fn constrain_rigid_motions(
     rigid_motion_until_contact(problem.comm, motions, problem.bounds, c, active, true).1
 }
 
-/// The last of all ranks' `violating` indices, which are numbered rank by rank; nothing on the
-/// others.
+/// The last `violating` index of all ranks; empty on the other ranks.
 fn last<T>(comm: Communicator, violating: &[T]) -> &[T] {
     let owner = if violating.is_empty() { -1.0 } else { comm.rank() as f64 };
     let is_owner = comm.max(owner) == comm.rank() as f64;
