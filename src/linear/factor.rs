@@ -203,7 +203,7 @@ impl Factor {
     }
 
     /// Factorises `matrix`. It returns false, and leaves no factor, if the matrix is not positive definite.
-    /// Call [`Self::prescribe`] before applying a condensed factor. Collective.
+    /// Call `prescribe` before applying a condensed factor. Collective.
     ///
     /// # Errors
     /// There is no memory for it.

@@ -4,7 +4,7 @@
 //!
 //! - [`DiscreteProblem`]: the body, its materials, what supports it, and the tolerance;
 //! - [`Loads`]: nodal loads, prescribed displacements and gaps at any time, from the functions of the scene,
-//!   which are divided until no narrow load or gap is overlooked ([`LoadCase`] has those of one time);
+//!   which are divided until no narrow load or gap is overlooked (`LoadCase` has those of one time);
 //! - [`Supports`] and probes: resultants and values at points, which are printed;
 //! - [`State`]: time, displacements, damage and contact at one time.
 //!
