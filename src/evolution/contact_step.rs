@@ -2,8 +2,8 @@
 //!
 //! u_n minimises ½ uᵀK(ζ_n)u − f_nᵀu over u·ν ≤ g on Γ_C and u = u_D on Γ_D.
 //!
-//! The unknowns are c, the displacements in the nodal bases, where every condition concerns one
-//! unknown, measured from a rigid [`Datum`].
+//! The unknowns are c, the displacements in the nodal bases, where every condition concerns one unknown. They
+//! are measured from a rigid motion of the body, the [`Datum`].
 
 mod accuracy;
 mod attempts;
@@ -40,41 +40,41 @@ pub struct ContactStep<'a> {
     problem: &'a DiscreteProblem,
     phases: &'a Phases,
     solver: BoxedSolver,
-    /// Who is asked where the solver stops short.
+    /// The solver that replaces it if it stops above the tolerance.
     rescuer: Option<BoxedSolver>,
-    /// Solves the linear systems of both.
+    /// The linear solver of both.
     elastic: LinearSolver,
     stiffness: Stiffness,
-    /// The triangle means of η_*(ζ) that K was filled with.
+    /// η_*(ζ) at the quadrature points, from which K was assembled.
     zeta_at_points: Vec<f64>,
-    /// The load of the free unknowns, and these.
+    /// The load of the free unknowns, and the free unknowns c.
     load: Vector,
     c: Vector,
-    /// What every solve starts from, and what the last solve will leave if its step is accepted.
+    /// The start of every solve, and the start after the present step if it is accepted.
     accepted: Memory,
     next: Memory,
     /// c of the accepted steps.
     extrapolation: Extrapolation,
-    /// Whether this rank knows all triangles around its nodes.
+    /// Does every rank know all triangles around its nodes?
     covered: bool,
-    /// u·ν at the bounds of the rigid motions that only contact constrains, a column each.
+    /// u·ν at the bounds for the rigid motions that only contact constrains, a column each.
     rigid: DMatrix<f64>,
 }
 
-/// What a step leaves to the next one.
+/// The start of a step, from the steps before.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Memory {
-    /// Where displacements are measured from.
+    /// The rigid motion from which displacements are measured.
     datum: Datum,
-    /// The largest scales of residuals so far.
+    /// The scales of residuals: maxima of the run so far.
     scales: Scales,
-    /// Of each bound 1 if it is active, else 0.
+    /// Per bound: 1 if it is active, else 0.
     active: Vec<f64>,
-    /// What the solver starts with.
+    /// The warm start of the solver.
     warm_start: Vec<f64>,
 }
 
-/// What a checkpoint keeps of the contact steps.
+/// The state of the contact steps in a checkpoint.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct ContactState {
     accepted: Memory,
@@ -82,8 +82,8 @@ pub(super) struct ContactState {
     factor: FactorState,
 }
 
-/// Loads below this part of the largest of the run count as so much, or an answer to rounding
-/// (sin(pi) = 1.2e-16) would have to have as many digits as any other.
+/// Lower bound of the force scale, relative to the largest load of the run. Without it, the answer to a
+/// rounded load (sin(pi) = 1.2e-16) would need full accuracy.
 const LEAST_LOAD: f64 = 1e-6;
 /// Energies of larger displacements, m, overflow.
 const LARGEST: f64 = 1e150;
@@ -107,7 +107,7 @@ impl<'a> ContactStep<'a> {
         let options = &problem.scene().contact;
         let bounded = comm.any(!constraints.bounds.is_empty());
         let (solver, rescuer) = contact::solvers(solver, bounded, options)?;
-        // Half the digits are enough for a preconditioner, and half the bytes to read.
+        // A preconditioner in single precision is good enough and has half the bytes.
         let precision = Precision::Preconditioner;
         let memory = Memory {
             datum: Datum::default(),
@@ -134,14 +134,14 @@ impl<'a> ContactStep<'a> {
         })
     }
 
-    /// Gives the solver a warm start as it leaves one itself: for the active set a 1 for each bound that is
-    /// guessed to be active, else 0.
+    /// Sets the warm start of the solver. For the active set: 1 for each bound that is assumed active, else
+    /// 0.
     pub fn set_warm_start(&mut self, warm_start: &[f64]) {
         self.accepted.warm_start = warm_start.to_vec();
     }
 
-    /// u_n at `time` for the nodal damage `zeta`, by the present solver. Every solve starts from the
-    /// accepted steps, whatever was solved since the last of them.
+    /// u_n at `time` for the nodal damage `zeta`, by the present solver. Every solve starts from the accepted
+    /// steps; rejected solves have no effect.
     fn solve_by_one(&mut self, step: usize, time: f64, zeta: &[f64]) -> Result<Step, RunError> {
         let started = Instant::now();
         let (problem, phases) = (self.problem, self.phases);
@@ -177,7 +177,7 @@ impl<'a> ContactStep<'a> {
         Ok(Step { state, record, quantities, report, unconstrained, skipped_damage_solve: false })
     }
 
-    /// The last solve, at `time`, belongs to an accepted step.
+    /// Accepts the last solve, at `time`.
     ///
     /// # Errors
     /// PETSc failed.
@@ -190,22 +190,21 @@ impl<'a> ContactStep<'a> {
         Ok(())
     }
 
-    /// What the accepted steps leave to the next one.
+    /// The state for a checkpoint.
     pub(super) fn state(&mut self) -> ContactState {
         let (accepted, extrapolation) = (self.accepted.clone(), self.extrapolation.clone());
         ContactState { accepted, extrapolation, factor: self.elastic.factor().state() }
     }
 
-    /// Goes back to the state of a checkpoint.
+    /// Restores the state of a checkpoint.
     pub(super) fn set_state(&mut self, state: ContactState) {
         let ContactState { accepted, extrapolation, factor } = state;
         (self.accepted, self.extrapolation) = (accepted, extrapolation);
         self.elastic.factor().set_state(factor);
     }
 
-    /// Starts from the accepted steps: sets c, the datum and the solver's warm start. Where the active
-    /// bounds do not support the body, the datum, and c with it, moves to where the load drives the
-    /// body as a rigid one.
+    /// Starts from the accepted steps: sets c, the datum and the solver's warm start. If the active bounds do
+    /// not support the body, the datum and c move as the load drives the rigid body.
     fn start(&mut self, case: &LoadCase) -> Result<(), PetscError> {
         let (problem, comm) = (self.problem, self.problem.body.nodes.partition.comm());
         let constraints = &problem.constraints;

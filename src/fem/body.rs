@@ -1,4 +1,4 @@
-//! The body: its triangulation, the nodes and elements of u and ζ on it, and which this rank owns.
+//! The body: its triangulation, and the nodes and elements of u and ζ with their owners.
 
 use super::{
     Edge, Partition, Triangle,
@@ -16,17 +16,17 @@ pub struct Body {
     pub mesh: Mesh,
     /// The P1 triangles of ζ, one per triangle of the mesh, with straight sides.
     pub triangles: Vec<Triangle>,
-    /// The first so many triangles belong to this rank; every triangle belongs to one rank.
+    /// The number of triangles that belong to this rank; they come first. Every triangle belongs to one rank.
     pub own_triangles: usize,
     /// Index of each triangle in the undivided mesh.
     pub global_triangles: Vec<usize>,
-    /// The number of the material of each triangle; empty where there is only one.
+    /// The number of the material of each triangle; empty if there is only one material.
     pub materials: Vec<u32>,
     /// The nodes of ζ: the vertices.
     pub vertices: Rc<Nodes>,
     /// The nodes of u: the vertices, and for P2 the midpoints of the edges.
     pub nodes: Rc<Nodes>,
-    /// The elements of u, unless they are the P1 triangles.
+    /// The P2 elements of u; `None` for P1.
     pub(super) quadratic: Option<QuadraticElements>,
     /// |Ω| of the undivided body, m².
     pub area: f64,
@@ -102,7 +102,7 @@ impl<const N: usize, const Q: usize> Cells<'_, N, Q> {
         elements.map(|(t, element)| element.points[0].gradient(&self.gather(t, u))).collect()
     }
 
-    /// A function of the triangles and the strains (ε_xx, ε_yy, 2ε_xy) of nodal u at all quadrature
+    /// Values of a function of the triangle and the strain (ε_xx, ε_yy, 2ε_xy) of nodal u, at all quadrature
     /// points, triangle by triangle.
     #[inline(always)]
     pub fn strains<T>(&self, u: &[f64], of: impl Fn(usize, Vector3<f64>) -> T) -> Vec<T> {
@@ -186,8 +186,8 @@ impl Body {
         if self.quadratic.is_some() { Order::Quadratic } else { Order::Linear }
     }
 
-    /// Whether this rank knows all triangles around the nodes that it owns: their parts of
-    /// ∫ φ_i add up to the value in the undivided body.
+    /// Does this rank know all triangles around its owned nodes? Then their parts of ∫ φ_i sum to the value
+    /// in the undivided body.
     pub fn is_covered(&self) -> bool {
         let known = match &self.quadratic {
             None => linear_weights(&self.mesh, &self.triangles),
@@ -207,7 +207,7 @@ impl Body {
         }
     }
 
-    /// A field at the vertices, of `block` values each, at the nodes of u: at the midpoint of an edge the
+    /// A field with `block` components from the vertices to the nodes of u. The midpoint of an edge gets the
     /// mean of its ends.
     pub fn at_nodes(&self, field: &[f64], block: usize) -> Vec<f64> {
         let Some(nodes) = self.quadratic_nodes() else { return field.to_vec() };
@@ -249,7 +249,7 @@ impl Body {
         partition.dot(weights, zeta, 1) / area
     }
 
-    /// The nodes of u on edges of the undivided mesh, given by their vertices.
+    /// The nodes of u on edges of the undivided mesh, which are given by their vertices.
     pub fn edges(&self, edges: &[[usize; 2]]) -> Vec<Edge> {
         let middle = |ends| self.quadratic.as_ref().map(|q| q.middle[&sorted(ends)]);
         edges.iter().map(|&ends| Edge { ends, middle: middle(ends) }).collect()
@@ -257,8 +257,8 @@ impl Body {
 }
 
 impl QuadraticElements {
-    /// The coordinates of the nodes (vertices, then midpoints, numbered as the triangles first meet
-    /// their edges) and the elements.
+    /// The coordinates of the nodes and the elements. Midpoints follow the vertices, in the order of the
+    /// triangles.
     fn new(mesh: &Mesh) -> (Vec<[f64; 2]>, Self) {
         let mut points = mesh.nodes.clone();
         let mut middle =

@@ -18,8 +18,8 @@ pub enum Mass {
     /// Exactly, as in the paper.
     #[default]
     Consistent,
-    /// By the values at the vertices: M is diagonal (its rows summed). Where L has no positive
-    /// entry off its diagonal (no obtuse angles), ζ obeys the maximum principle for every k.
+    /// By the values at the vertices: M is diagonal, with the row sums. If L has no positive entry off its
+    /// diagonal (no obtuse angles), ζ obeys the maximum principle for every k.
     Lumped,
 }
 
@@ -54,8 +54,8 @@ pub fn source(
     body.mesh.triangles.iter().enumerate().map(of_triangle).collect()
 }
 
-/// The load b_i = ∫ φ λ_i, m²/s, of a source φ as [`source`] gives it: for P1 affine between the
-/// vertices, for P2 by the quadrature points.
+/// The load b_i = ∫ φ λ_i, m²/s, of a source φ from [`source`]. For P1 φ is affine between the vertices; for
+/// P2 the quadrature points integrate it.
 pub fn source_load(body: &Body, mass: Mass, source: &[[f64; 3]]) -> Vec<f64> {
     let mut load = vec![0.0; body.mesh.nodes.len()];
     let values = Matrix3::from(POINTS) / 3.0;
@@ -72,8 +72,8 @@ pub fn source_load(body: &Body, mass: Mass, source: &[[f64; 3]]) -> Vec<f64> {
     load
 }
 
-/// The matrix M + kκL of (28) with its factor, made anew for each step length k. Where κ differs from
-/// material to material, L is Σ_T κ_T/κ L_T with κ that of the first.
+/// The matrix M + kκL of (28) with its factor, made anew for each step length k. With several materials L is
+/// Σ_T κ_T/κ L_T, where κ belongs to the first material.
 pub struct DamageSystem {
     mass: Matrix,
     laplace: Matrix,
@@ -134,7 +134,7 @@ impl DamageSystem {
             matrix: mass.duplicate()?,
             mass,
             laplace,
-            // One iteration with all digits costs less than two with half of them.
+            // One iteration in double precision costs less than two in single precision.
             solver: LinearSolver::new(session, "damage_", owned, Precision::Full)?,
             rhs: Vector::zeros(session, owned)?,
             unknown: Vector::zeros(session, owned)?,
@@ -148,8 +148,8 @@ impl DamageSystem {
         Ok(system)
     }
 
-    /// Refills and factorises the matrix for another step length k, s. A matrix that is not positive
-    /// definite is no error here: the solves do not converge.
+    /// Refills and factorises the matrix for another step length k, s. If the matrix is not positive
+    /// definite, the solves fail later.
     ///
     /// # Errors
     /// PETSc or CHOLMOD failed.
@@ -177,11 +177,11 @@ impl DamageSystem {
         Ok(solved)
     }
 
-    /// Solves for `rhs` from `unknown` until ‖residual‖₂ ≤ `limit`; whether that was reached.
+    /// Solves for `rhs` from `unknown` until ‖residual‖₂ ≤ `limit`. It returns whether the limit was reached.
     ///
-    /// The mean of the unknown x over the body is known, since 1ᵀL = 0: 1ᵀMx = 1ᵀ`rhs`. Where
-    /// kκL is much larger than M, this is lost in the rounding of their sum. So the system is solved for
-    /// what x differs by from its mean, and the mean of that is set to zero.
+    /// The mean of the unknown x over the body is known: 1ᵀL = 0, so 1ᵀMx = 1ᵀ`rhs`. If kκL is much larger
+    /// than M, the rounding of their sum loses this mean. So the solve is for x minus its mean, and sets the
+    /// mean of this difference to zero.
     fn solve(&mut self, limit: f64) -> Result<bool, PetscError> {
         let Nodes { weights, area, partition, .. } = &*self.vertices;
         let mean = partition.comm().total(self.rhs.read(|rhs| rhs.iter().sum())?) / area;
@@ -194,21 +194,20 @@ impl DamageSystem {
         Ok(solve.converged)
     }
 
-    /// The largest [residual](super::DamageCertificate::residual) of a solution as good as round-off allows:
-    /// 1e-10, and where diffusion prevails what is lost in kκLζ, of which the terms are up to 1.
+    /// The largest [residual](super::DamageCertificate::residual) that rounding can leave: 1e-10, or more if
+    /// the rounding of kκLζ dominates.
     pub fn largest_residual(&self) -> f64 {
         let round_off = 8.0 * f64::EPSILON * self.step * self.diffusion * self.laplace_size;
         1e-10 + round_off / self.rhs_size.max(f64::MIN_POSITIVE)
     }
 
-    /// (M + kκL)⁻¹ k b of a source load b = `load`, at the nodes owned: what ζ_n changes by with the
-    /// load. `None` if the linear solver failed.
+    /// (M + kκL)⁻¹ k b at the owned nodes: the change of ζ_n for a change b = `load` of the source load.
+    /// `None` if the linear solver failed.
     ///
     /// # Errors
     /// PETSc failed.
     pub fn correction(&mut self, load: &[f64]) -> Result<Option<Vec<f64>>, PetscError> {
-        /// ‖k b‖₂ below which the change is less than any digit of ζ, and its energy bᵀ(M + kκL)⁻¹b
-        /// less than the least double.
+        /// ‖k b‖₂ below which the change does not affect ζ, and its energy bᵀ(M + kκL)⁻¹b underflows.
         const NEGLIGIBLE: f64 = 1e-150;
         let step = self.step;
         self.rhs.write(|rhs| rhs.iter_mut().zip(load).for_each(|(r, b)| *r = step * b))?;

@@ -1,8 +1,8 @@
-//! How well a damage step solves (28).
+//! The residual and the error of a damage step (28).
 
 use super::{Body, Mass};
 
-/// How well ζ_n solves (28), from its residual r = (M + kκL)ζ_n − Mζ_{n−1} − kb.
+/// The accuracy of ζ_n in (28), from the residual r = (M + kκL)ζ_n − Mζ_{n−1} − kb.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct DamageCertificate {
     /// ‖r‖₂ over the norm of the right-hand side (its mass lumped).
@@ -24,10 +24,10 @@ impl DamageCertificate {
     /// and the error e satisfies √w_i |e_i| ≤ ‖e‖_W ≤ 4 ‖W^-½ r‖; for the lumped mass, where
     /// M = W, the 4 is 1.
     ///
-    /// Where diffusion prevails, kκL makes a large residual of the rounding of ζ_n to double precision. Then
-    /// the smaller bound is the sum of the balance, of the same for the part of r above that rounding, and
-    /// of the rounding times the condition of L, on N vertices about N (Bank and Scott, *On the
-    /// conditioning of finite element equations with highly refined meshes*).
+    /// If diffusion dominates, the rounding of ζ_n in kκLζ_n makes a large residual. Then a smaller bound is
+    /// the sum of three terms: the balance, the same bound for the part of r above this rounding, and the
+    /// rounding times the condition of L, about N for N vertices (Bank and Scott, *On the conditioning of
+    /// finite element equations with highly refined meshes*).
     pub fn of(
         body: &Body,
         mass: Mass,

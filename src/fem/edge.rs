@@ -33,13 +33,13 @@ pub fn parabola<const D: usize>([p, m, q]: [[f64; D]; 3], s: f64) -> [f64; D] {
     array::from_fn(|k| p[k] + s * (q[k] - p[k]) + bulge * (m[k] - 0.5 * (p[k] + q[k])))
 }
 
-/// An offset below this part of the chord is rounding of coordinates.
+/// An offset below this fraction of the chord is rounding of coordinates.
 const STRAIGHT: f64 = 1e-12;
 
-/// An estimate of how far the normals of boundary edges are from those of the smooth curve that they stand for,
-/// rad: the largest angle between two curved edges that meet smoothly. Parabolas through the points of a
-/// circle that subtend 2φ are off by φ³/4 at their ends, less between them; where two meet, the
-/// angle is the sum of both. A larger angle, more than twice this sum, is a corner of the geometry.
+/// An estimate of the angle between the normals of boundary edges and of the smooth curve that they
+/// approximate, rad. It is the largest angle between two curved edges that meet smoothly. A parabola through
+/// points of a circle that subtend 2φ errs by φ³/4 at its ends, so two meet at twice this angle. More than
+/// twice that angle is a corner of the geometry.
 pub fn normal_error(edges: &[Edge], points: &[[f64; 2]]) -> f64 {
     let mut faces = BTreeMap::<usize, Vec<(Face, f64)>>::new();
     let mut largest = 0.0_f64;
@@ -73,13 +73,13 @@ impl Edge {
         [0, 1].map(|k| q[k] - p[k] + 4.0 * (1.0 - 2.0 * s) * offset[k])
     }
 
-    /// How far the middle lies from that of the chord, m.
+    /// The distance of the middle from the middle of the chord, m.
     fn offset(&self, points: &[[f64; 2]]) -> [f64; 2] {
         let [p, q] = self.ends.map(|node| points[node]);
         self.middle.map_or([0.0; 2], |node| [0, 1].map(|k| points[node][k] - 0.5 * (p[k] + q[k])))
     }
 
-    /// Whether its middle lies off its chord by more than rounding.
+    /// Is the edge curved, beyond rounding?
     fn is_curved(&self, points: &[[f64; 2]]) -> bool {
         let ([x, y], [p, q]) = (self.offset(points), self.ends.map(|node| points[node]));
         x.hypot(y) > STRAIGHT * (q[0] - p[0]).hypot(q[1] - p[1])

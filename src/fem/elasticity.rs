@@ -1,5 +1,4 @@
-//! The damaged elastic operator (ζ Aε(u), ε(v)) of (26), matrix-free, for the residuals that
-//! judge solvers.
+//! The damaged elastic operator (ζ Aε(u), ε(v)) of (26) without a matrix, for certificates.
 
 use super::{Body, Element, for_elements};
 use crate::model::Material;
@@ -91,9 +90,9 @@ impl Elasticity {
         })
     }
 
-    /// The rounding error that double precision leaves in the internal forces of u: at each node
-    /// ε_machine Σ ζ |K_T||u| over the quadrature points of its triangles T, N per metre of thickness
-    /// (Oettli and Prager, Numer. Math. 6, 1964).
+    /// The rounding error of the internal forces of u: at each node ε_machine Σ ζ |K_T||u| over the
+    /// quadrature points of its triangles T, N per metre of thickness (Oettli and Prager, Numer. Math. 6,
+    /// 1964).
     pub fn force_rounding(&self, body: &Body, zeta: &[f64], u: &[f64]) -> Vec<f64> {
         for_elements!(body, cells => {
             let mut rounding = vec![0.0; u.len()];

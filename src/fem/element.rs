@@ -1,8 +1,8 @@
-//! The elements: the P1 triangle, and the P2 triangle, curved where its edges are.
+//! The elements: the P1 triangle, and the P2 triangle with straight or curved sides.
 
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector3};
 
-/// What an element of N nodes contributes to an integral, at its Q quadrature points.
+/// An element with N nodes: gradients and weights at its Q quadrature points.
 ///
 /// P1 is `Element<3, 1>`: gradients are constant and the point stands for the triangle. P2 is
 /// `Element<6, 3>`: the three vertices, then the midpoints of the sides 01, 12, 20, integrated at the
@@ -123,8 +123,8 @@ impl<const N: usize> QuadraturePoint<N> {
         Matrix3x2::new(dx, 0.0, 0.0, dy, dy, dx)
     }
 
-    /// The point's part of the 2×2 block K_ij = ∫ Aε(φ_i) : ε(φ_j) of two nodes, w B_iᵀ D B_j, N/m per
-    /// metre of thickness, from the matrix D of A.
+    /// The contribution of the point to the 2×2 block K_ij = ∫ Aε(φ_i) : ε(φ_j) of two nodes, w B_iᵀ D B_j,
+    /// N/m per metre of thickness, from the matrix D of A.
     pub fn stiffness(&self, d: &Matrix3<f64>, i: usize, j: usize) -> Matrix2<f64> {
         self.strain_matrix(i).transpose() * d * self.strain_matrix(j) * self.weight
     }
@@ -147,8 +147,8 @@ impl<const N: usize> QuadraturePoint<N> {
         Matrix2::from_fn(entry)
     }
 
-    /// The point's part of the nodal forces F_i = ∫ σ : ε(φ_i), w B_iᵀ σ, of a stress
-    /// (σ_xx, σ_yy, σ_xy) there.
+    /// The contribution of the point to the nodal forces F_i = ∫ σ : ε(φ_i), w B_iᵀ σ, of a stress (σ_xx,
+    /// σ_yy, σ_xy) there.
     #[inline(always)]
     pub fn force(&self, stress: &Vector3<f64>) -> [[f64; 2]; N] {
         self.gradients.map(|[dx, dy]| {

@@ -8,8 +8,8 @@ use super::{
 use nalgebra::Matrix3;
 use rustc_hash::FxHashMap as HashMap;
 
-/// The triangles, by their index in the undivided mesh, that are integrated in parts, and the barycentric
-/// coordinates of the corners of these.
+/// The triangles that are integrated in parts, by their index in the undivided mesh. Per part: the
+/// barycentric coordinates of its corners.
 pub type Division = HashMap<usize, Vec<[[f64; 3]; 3]>>;
 
 /// The midpoint of the side from `p` to `q`: where [`add_body_force`] takes f_B for P1.
@@ -22,14 +22,14 @@ pub fn six_points([a, b, c]: [[f64; 2]; 3]) -> [[f64; 2]; 6] {
     [a, b, c, midpoint(a, b), midpoint(b, c), midpoint(c, a)]
 }
 
-/// The barycentric coordinates in a triangle of the point at those in a part of it.
+/// From barycentric coordinates in a part of a triangle to those in the triangle.
 pub fn part_point(corners: &[[f64; 3]; 3], point: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|k| corners.iter().zip(point).map(|(corner, l)| l * corner[k]).sum())
 }
 
-/// Adds the body force f_i = ∫_Ω f_B·φ_i to the nodal loads, with f_B in N/m³ as a function of the
-/// point: by the side midpoints for P1, which is exact where f_B is affine, by the quadrature points
-/// of the element for P2, and by three points in each part of the triangles that are divided.
+/// Adds the body force f_i = ∫_Ω f_B·φ_i to the nodal loads, with f_B in N/m³ as a function of the point. The
+/// integration points are the side midpoints for P1, which is exact for affine f_B, and the quadrature points
+/// of the element for P2. A divided triangle has three points in each part.
 pub fn add_body_force(
     body: &Body,
     division: &Division,
@@ -54,7 +54,7 @@ pub fn add_body_force(
                 for side in 0..3 {
                     let (a, b) = (nodes[side], nodes[(side + 1) % 3]);
                     let f = force(midpoint(points[a], points[b]));
-                    // At a side's midpoint both its end functions are ½ and the third is 0.
+                    // At the midpoint of a side the functions of its ends are ½, and the third one is 0.
                     [a, b].into_iter().for_each(|node| add(node, element.area() / 6.0, f));
                 }
             }

@@ -23,9 +23,9 @@ pub struct PointValues {
     pub strain: Vector3<f64>,
 }
 
-/// A point between a chord and its arc may lie outside its triangle, by this fraction of the height.
+/// A point between a chord and its arc may lie outside the triangle by this fraction of its height.
 const OUTSIDE: f64 = 0.05;
-/// Corrections of λ in a curved triangle; each squares an error of the size of the curvature.
+/// The number of Newton steps for λ in a curved triangle.
 const CORRECTIONS: usize = 8;
 
 impl Location {

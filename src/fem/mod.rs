@@ -1,5 +1,7 @@
-//! Continuous finite elements (22), (23), P1 for ζ and P1 or P2 for u: from laws to matrices and
-//! vectors.
+//! Continuous finite elements (22), (23), P1 for ζ and P1 or P2 for u: from laws to matrices and vectors. A
+//! [`Body`] has the nodes and elements. [`Elasticity`] evaluates strains, stresses and internal forces,
+//! [`Stiffness`] assembles K, and [`DamageSystem`] solves (28). [`DamageCertificate`] checks its answer
+//! without its matrices.
 //!
 //! Fields are plain slices over the nodes of this rank's subdomain, owned ones first, then ghosts:
 //! one value per vertex (ζ) or two in turn per node (u_x, u_y). [`Partition`] alone knows which are

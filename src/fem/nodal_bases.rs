@@ -50,7 +50,7 @@ impl NodalBases {
         self.bases.push((node, directions, inverse));
     }
 
-    /// Takes unknown `dof` (2·node + component) out of the system.
+    /// Fixes unknown `dof` (2·node + component).
     pub fn fix(&mut self, dof: usize) {
         self.fixed[dof] = true;
     }

@@ -1,4 +1,4 @@
-//! Which nodes this rank owns, and the communication of values with the ranks that own the others.
+//! Ownership of nodes, and the exchange of values between ranks.
 
 use crate::petsc::{Communicator, Ghosts, PetscError};
 

@@ -66,7 +66,7 @@ impl RigidMotion {
         ax * fx + ay * fy + self.rotation * moment
     }
 
-    /// The largest nodal |·| of the motion and of u less the motion, m. Collective.
+    /// The largest nodal |·| of the motion, and of u minus the motion, m. Collective.
     pub fn max_norms(&self, body: &Body, u: &[f64]) -> [f64; 2] {
         let (mut rigid, mut rest) = (0.0_f64, 0.0_f64);
         let nodes = body.nodes.points.iter().zip(u.as_chunks::<2>().0);
@@ -92,7 +92,7 @@ pub fn resultant(body: &Body, force: impl Fn(usize) -> [f64; 2]) -> [f64; 3] {
     sums
 }
 
-/// A component of a motion that moves the body less than this, relative, is left out of its name.
+/// The name of a motion leaves out components that move the body less than this, relative.
 const NEGLIGIBLE: f64 = 1e-6;
 
 impl fmt::Display for RigidMotion {

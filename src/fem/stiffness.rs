@@ -7,17 +7,17 @@ use nalgebra::{Matrix2, Matrix3};
 /// The stiffness matrix K_ij = Σ_q w_q ζ_q Aε(φ_i) : ε(φ_j) over the quadrature points q of the
 /// elements, in the unknowns of [`NodalBases`]. The pattern is made once, values are refilled.
 ///
-/// K consists of 2×2 blocks, one for each pair of nodes with a common triangle. A refill adds those of
-/// every element in turn where they are stored.
+/// K consists of 2×2 blocks, one for each pair of nodes with a common triangle. A refill adds the blocks of
+/// each element to the stored entries.
 pub struct Stiffness {
     /// K, symmetric; rows and columns of fixed unknowns have only a diagonal.
     pub matrix: Matrix,
     /// Mean diagonal entry of the undamaged K, N/m: the scale of the matrix.
     pub scale: f64,
-    /// For each element and two of its nodes (i, j) the places of both rows of K_ij among the stored
-    /// entries; `NOWHERE` where another rank has them, or i ≠ j and one of the two is fixed.
+    /// Per element and pair of its nodes (i, j): the places of both rows of K_ij among the stored entries.
+    /// `NOWHERE` if another rank owns the row, or if i ≠ j and one of the unknowns is fixed.
     places: Vec<[u32; 2]>,
-    /// The places of the entries in rows or columns of fixed unknowns, and whether on the diagonal.
+    /// The places of the entries in rows or columns of fixed unknowns. Is the entry on the diagonal?
     fixed: Vec<(u32, bool)>,
 }
 
@@ -80,7 +80,7 @@ impl Stiffness {
         Ok(stiffness)
     }
 
-    /// Bytes that a refill moves: of each element nodes, points, places and ζ once; K is written,
+    /// Bytes that a refill reads and writes: nodes, points, places and ζ of each element once; K is written,
     /// read and written again.
     pub fn bytes_per_refill(&self, body: &Body) -> f64 {
         let elements = for_elements!(body, cells => {
@@ -157,8 +157,8 @@ fn add(entries: &mut [f64], places: [u32; 2], block: &Matrix2<f64>) {
     }
 }
 
-/// The translations and the rotation in the unknowns of `bases`, 0 on fixed ones: what multigrid
-/// must represent on its coarse levels.
+/// The translations and the rotation in the unknowns of `bases`, 0 on fixed ones. The coarse levels of
+/// multigrid must represent them.
 fn rigid_motions(
     session: &Session,
     body: &Body,

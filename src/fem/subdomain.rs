@@ -1,4 +1,4 @@
-//! The part of a body that a rank keeps, of the undivided body that every rank knows at first.
+//! The subdomain of a rank. At first every rank has the undivided body.
 
 use super::{Body, Edge, Nodes, Partition, body::QuadraticElements};
 use crate::{
@@ -11,8 +11,8 @@ use std::{
     rc::Rc,
 };
 
-/// The nodes and triangles that a rank keeps: the nodes it owns, the triangles around them, and
-/// the other nodes of these as ghosts.
+/// The nodes and triangles of a subdomain: the owned nodes, the triangles around them, and the other nodes of
+/// these triangles as ghosts.
 ///
 /// *Local* indices count these nodes and triangles; all others are indices in the undivided body.
 /// (PETSc numbers the nodes a third way, see [`Partition`].)
@@ -20,14 +20,14 @@ use std::{
 pub struct Subdomain {
     /// The vertices, nodes of ζ.
     vertices: LocalNodes,
-    /// The nodes of u, unless they are the vertices.
+    /// The nodes of u for P2; `None` if they are the vertices.
     quadratic: Option<LocalNodes>,
-    /// Index in the undivided mesh of each local triangle; first those that belong to the rank.
+    /// Index in the undivided mesh of each local triangle; the triangles that belong to the rank come first.
     triangles: Vec<usize>,
     own_triangles: usize,
 }
 
-/// The nodes of a space that a rank keeps.
+/// The nodes of a space in a subdomain.
 #[derive(Debug)]
 struct LocalNodes {
     /// Index in the undivided body of each local node, owned ones first.
@@ -38,8 +38,8 @@ struct LocalNodes {
 }
 
 impl LocalNodes {
-    /// Of a space whose nodes belong to the ranks `owner`, the nodes that this rank owns and, as
-    /// ghosts, the others of `kept`. Collective.
+    /// From the `owner` of each node of a space: the owned nodes of this rank, and the other nodes in `kept`
+    /// as ghosts. Collective.
     fn new(
         session: &Session,
         owner: &[usize],
@@ -50,8 +50,8 @@ impl LocalNodes {
         let owned = nodes.len();
         let ghosts: BTreeSet<usize> = kept.filter(|&i| owner[i] != comm.rank()).collect();
         nodes.extend(ghosts);
-        // PETSc numbers the nodes owner by owner: the index of each node among those of its owner,
-        // and the first number of each owner.
+        // PETSc numbers the nodes owner by owner. The index of each node among the nodes of its owner, and
+        // the first number of each owner.
         let mut counts = vec![0; comm.size()];
         let mut index = vec![0; total];
         for (index, &owner) in index.iter_mut().zip(owner) {
@@ -82,7 +82,7 @@ impl LocalNodes {
         triangles.iter().map(|&t| undivided[t].map(|node| self.local[&node])).collect()
     }
 
-    /// The edges of a curve that have an end which the rank owns.
+    /// The edges of a curve with an owned end.
     fn curve(&self, undivided: &Curve) -> Curve {
         let local = |edge: &[usize; 2]| {
             let [a, b] = edge.map(|node| self.local.get(&node).copied());
@@ -92,7 +92,7 @@ impl LocalNodes {
         Curve { edges, interior_edges: undivided.interior_edges }
     }
 
-    /// The nodes as such of the subdomain.
+    /// The nodes of the subdomain as [`Nodes`].
     fn restrict(self, undivided: &Nodes) -> Rc<Nodes> {
         Rc::new(Nodes {
             points: self.field(&undivided.points, 1),

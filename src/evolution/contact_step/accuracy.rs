@@ -1,4 +1,4 @@
-//! How large the errors of an answer may be although its KKT residuals are small.
+//! The errors of an answer with small KKT residuals.
 
 use super::{ContactStep, active_bounds, displacement};
 use crate::{
@@ -10,7 +10,7 @@ use crate::{
 };
 use std::rc::Rc;
 
-/// Displacements are promised to this, relative, or to `TOLERANCES` times the KKT tolerance.
+/// The promised relative error of displacements, or `TOLERANCES` times the KKT tolerance if larger.
 const DISPLACEMENT: f64 = 1e-6;
 const TOLERANCES: f64 = 100.0;
 /// A mesh is too coarse if the energy norm is estimated to be off by more than this: the
@@ -19,7 +19,7 @@ const COARSE: f64 = 0.5;
 /// The discretisation is judged at the last step, unless its displacements are less than this part of
 /// the largest.
 const UNLOADED: f64 = 0.01;
-/// A deformation below this part of a rigid motion is taken for rounding.
+/// A deformation below this fraction of a rigid motion counts as rounding.
 const CARRIED: f64 = 1e-11;
 /// An estimate up to this part of the promised error is not repeated for another step.
 const SAFE: f64 = 0.1;
@@ -42,12 +42,12 @@ pub struct Accuracy {
 }
 
 impl Accuracy {
-    /// How exact displacements should be, relative, at a KKT tolerance.
+    /// The promised relative error of displacements at a KKT tolerance.
     pub fn promised(tolerance: f64) -> f64 {
         DISPLACEMENT.max(TOLERANCES * tolerance)
     }
 
-    /// What the user should know about these errors at a KKT tolerance; nothing if they are small.
+    /// Notes on these errors at a KKT tolerance; empty if they are small.
     pub fn notes(&self, tolerance: f64) -> Vec<String> {
         let (displacement, time) = (self.displacement, self.time);
         let support = match displacement {
@@ -118,11 +118,11 @@ impl Compliance<'_> {
             |before: &&Rc<Step>| before.record.displacement_max > last.record.displacement_max;
         let most = outcome.most_displaced.as_ref().filter(larger).map_or(last, Rc::as_ref);
         let max = most.record.displacement_max;
-        // What is left of u after unloading is judged less well than what there was.
+        // After unloading, the rest of u says little about the discretisation.
         let judged = if last.record.displacement_max < UNLOADED * max { most } else { last };
         let State { u, zeta, .. } = &judged.state;
         let [rigid, rest] = RigidMotion::nearest(body, u).max_norms(body, u);
-        // What is only carried along has no strains but rounding.
+        // A body in rigid motion has no strains but rounding.
         let energy = match rest > CARRIED * rigid {
             true => problem.energy_error(zeta, u)?,
             false => 0.0,
@@ -142,8 +142,7 @@ impl Compliance<'_> {
         Ok(accuracy)
     }
 
-    /// max |K⁻¹(f − Ku)| / `max`, the active nodes fixed: the correction that the residual forces ask
-    /// for.
+    /// max |K⁻¹(f − Ku)| / `max` with fixed active nodes: the correction for the residual forces.
     fn displacement_error(&mut self, state: &State, max: f64) -> Result<f64, PetscError> {
         let problem = self.problem;
         if max == 0.0 || problem.body.nodes.partition.max_norm(&state.u) == 0.0 {
@@ -191,8 +190,8 @@ impl Compliance<'_> {
         Ok(())
     }
 
-    /// K(ζ)⁻¹ of nodal `forces`, N per metre of thickness, to a digit or more, the active nodes fixed; or
-    /// about that, by the factor alone. `None` if these nodes do not support the body. Collective.
+    /// K(ζ)⁻¹ of nodal `forces`, N per metre of thickness, with fixed active nodes, to a digit or more; or
+    /// approximately, by the factor alone. `None` if these nodes do not support the body. Collective.
     pub(crate) fn displacement(
         &mut self,
         mut forces: Vec<f64>,

@@ -11,16 +11,18 @@ use crate::{
     petsc::PetscError,
 };
 
-/// How often a solver is asked for one answer, more precisely or from another datum.
+/// The largest number of solves for one answer: with a smaller tolerance or another datum.
 const ATTEMPTS: usize = 3;
-/// An answer is mostly rigid if its rigid part is so many times the rest.
+/// An answer is mostly rigid if its rigid part exceeds this multiple of the rest.
 const DOMINANT: f64 = 10.0;
-/// … and so far from a datum that was chosen before that even a certified answer is measured anew.
+/// Above this multiple even a certified answer is solved again from a new datum, if the present one is not
+/// zero.
 const FAR: f64 = 1e3;
 
 impl ContactStep<'_> {
-    /// Solves until the certificate accepts the answer, and of many the one of least ∫|u|²: more
-    /// precisely, or from another datum, where it does not. What the solver thinks of an answer does not matter then.
+    /// Solves until the certificate accepts the answer, with a smaller tolerance or another datum in each
+    /// attempt. Among many answers it takes the one with the minimum ∫|u|². The certificate decides, not the
+    /// solver.
     pub(super) fn solve_certified(
         &mut self,
         step: usize,
@@ -34,7 +36,8 @@ impl ContactStep<'_> {
             attempt += 1;
             let (lift, bounds) = self.next.datum.pose(&problem.constraints, case);
             let solved = match self.solve_contact(case, &lift, &bounds, tolerance, before) {
-                // All ranks know that the method stopped short; other errors may be one rank's.
+                // All ranks know that the method stopped above its tolerance. Other errors may concern one
+                // rank.
                 Err(error) if !error.stopped_short() => return Err(failed(error)),
                 solved => solved,
             };
@@ -42,13 +45,13 @@ impl ContactStep<'_> {
             let judged = self.phases.time("certificate", || self.certify(u, case));
             let certified = judged.kkt.within(asked);
             let far = !self.next.datum.is_zero() && judged.rigid_max > FAR * judged.elastic_max;
-            // What a solve for the forces that were left has changed is the error of the answer before.
+            // The change by a solve for the unbalanced forces is the error of the answer before.
             let error = refined.take().map(|before| self.difference(&judged.u, &before));
             before = (Some(judged.scales.force), None);
             if (far || !certified) && attempt < ATTEMPTS && self.move_datum(&judged)? {
                 continue;
             }
-            // Once a further attempt has not helped, or cannot, what rounding leaves is accepted.
+            // If a further attempt does not help, or is impossible, residuals within rounding are accepted.
             let certified = certified
                 || (attempt > 1 || solved.is_err()) && self.is_exact_to_rounding(&judged, error);
             match solved {
@@ -57,7 +60,7 @@ impl ContactStep<'_> {
                 Err(ContactError::NotConverged { report: spent, .. }) => report.add(&spent),
                 Err(_) => {}
             }
-            // Then a KKT point need not be a minimum, and which solver would notice is chance.
+            // A KKT point of an indefinite K need not be a minimum, and a solver may not notice.
             if judged.is_indefinite() {
                 return Err(failed(ContactError::NotDefinite { method: self.solver.name() }));
             }

@@ -1,4 +1,4 @@
-//! Judges an answer by its displacements alone: residuals and contact forces.
+//! Certifies an answer by its displacements alone: residuals and contact forces.
 
 use super::{Accuracy, ContactStep};
 use crate::{
@@ -7,16 +7,16 @@ use crate::{
     problem::LoadCase,
 };
 
-/// Residuals are the effect of rounding if they are at most this many times its estimate.
+/// Residuals up to this multiple of the estimated rounding count as rounding.
 const ROUNDED: f64 = 10.0;
-/// Residuals above this are accepted only by a tolerance that is as large, or if they move no node far.
+/// Larger residuals are accepted only with a tolerance as large, or if the estimated error of u is small.
 pub(super) const MOST_ROUNDING: f64 = 1e-6;
-/// A deformation below this part of the datum is rounding.
+/// A deformation below this fraction of the datum is rounding.
 const CARRIED: f64 = 1e-14;
-/// The cosine between u and its elastic forces is below this only if K is indefinite.
+/// If the cosine between u and its elastic forces is below this, K is indefinite.
 const NEGATIVE_ENERGY: f64 = -1e-10;
 
-/// An answer and what the certificate found.
+/// An answer with its certificate.
 pub(super) struct Judged {
     /// The displacements from the datum, m.
     pub(super) u: Vec<f64>,
@@ -37,15 +37,15 @@ pub(super) struct Judged {
 }
 
 impl Judged {
-    /// Whether u shows that K is not positive definite.
+    /// Does u show that K is not positive definite?
     pub(super) fn is_indefinite(&self) -> bool {
         self.energy < NEGATIVE_ENERGY
     }
 }
 
 impl ContactStep<'_> {
-    /// Judges u, measured from the datum, by forces summed triangle by triangle, without the assembled
-    /// K of the solvers.
+    /// Certifies u, measured from the datum, by forces summed triangle by triangle, without the assembled K
+    /// of the solvers.
     pub(super) fn certify(&self, u: Vec<f64>, case: &LoadCase) -> Judged {
         let problem = self.problem;
         let (body, partition) = (&problem.body, &problem.body.nodes.partition);
@@ -81,9 +81,9 @@ impl ContactStep<'_> {
         Judged { u, kkt, scales, force, energy, unbalanced, contact, rigid, rigid_max, elastic_max }
     }
 
-    /// The scales of an answer, not below those of the run so far, nor below the rounding of the datum
-    /// (a body that is only carried along has no other scales); and with displacements not below
-    /// those that the forces cause at least.
+    /// The scales of an answer. Lower bounds are the scales of the run so far and the rounding of the datum:
+    /// a body that only moves rigidly has no other scale. The displacement scale is at least what the forces
+    /// cause.
     pub(super) fn run_scales(&self, answer: Scales) -> Scales {
         let (datum, run) = (&self.next.datum, self.accepted.scales);
         let rounding = match datum.is_zero() {
@@ -95,8 +95,8 @@ impl ContactStep<'_> {
         Scales { force, displacement: answer.displacement.max(run.displacement).max(least) }
     }
 
-    /// Adds to an error the tolerance that double precision can reach, from the rounding of the
-    /// internal forces of u, if that explains the error.
+    /// Adds to an error the tolerance that double precision allows, if the rounding of the internal forces of
+    /// u explains the error.
     pub(super) fn limited(&self, error: ContactError, judged: &Judged) -> ContactError {
         let attainable = ROUNDED * self.rounding(judged);
         match attainable > self.problem.tolerance
@@ -112,9 +112,9 @@ impl ContactStep<'_> {
         }
     }
 
-    /// Whether u is the exact answer for a stiffness whose entries are off by ε_machine, with residuals up to
-    /// `MOST_ROUNDING` or an `error`, relative to the largest displacement, that is as small as
-    /// promised. A tolerance below the usual one is taken at its word.
+    /// Is u the exact answer for a stiffness whose entries differ by ε_machine? Its residuals must be at most
+    /// `MOST_ROUNDING`, or its `error`, relative to the largest displacement, as small as promised. If the
+    /// user asks for a smaller tolerance than the default, rounding is no excuse.
     pub(super) fn is_exact_to_rounding(&self, judged: &Judged, error: Option<f64>) -> bool {
         let tolerance = self.problem.tolerance;
         let is_small = |error| error <= Accuracy::promised(tolerance);
@@ -123,7 +123,7 @@ impl ContactStep<'_> {
             && (judged.kkt.within(MOST_ROUNDING) || error.is_some_and(is_small))
     }
 
-    /// Whether the residuals of u are no larger than the rounding of its internal forces.
+    /// Are the residuals of u at most the rounding of its internal forces?
     pub(super) fn is_rounding(&self, judged: &Judged) -> bool {
         judged.kkt.within(self.rounding(judged))
     }
@@ -137,7 +137,7 @@ impl ContactStep<'_> {
     }
 }
 
-/// 1 for each bound that a contact force above `least`, N/m, acts on, else 0.
+/// Per bound: 1 if a contact force above `least`, N/m, acts on it, else 0.
 pub(crate) fn active_bounds(of: &Constraints, contact: &[ContactPoint], least: f64) -> Vec<f64> {
     let mut active = vec![0.0; of.bounds.len()];
     for point in contact.iter().filter(|point| point.active && point.force > least) {

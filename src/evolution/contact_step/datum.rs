@@ -1,4 +1,4 @@
-//! Where displacements are measured from.
+//! The rigid motion from which displacements are measured.
 
 use crate::{
     contact::{Bound, Constraints},
@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 
 /// A rigid motion of the body, from which displacements are measured.
 ///
-/// A body that falls through a wide gap, or is carried along by prescribed displacements, deforms by
-/// a small part of the way that it goes, and u in double precision has no digits left for that part.
-/// Measured from the end of the way it has all of them. A rigid motion causes no forces, so (26)
-/// holds for the rest of u as it stands, with gaps and prescribed values less the motion.
+/// A body that falls through a wide gap, or moves with prescribed displacements, deforms by a small part of
+/// its motion. The digits of u in double precision do not suffice for this part. Measured from a rigid motion
+/// near the answer, the deformation has all digits. A rigid motion causes no forces, so (26) holds for the
+/// rest of u, with gaps and prescribed values minus the motion.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Datum {
     /// Its nodal displacements, m; empty while they are zero.

@@ -1,4 +1,4 @@
-//! (26) as its solver takes it: in the unknowns c, with all loads on the free ones.
+//! (26) for the solvers: in the unknowns c, with all loads on the free unknowns.
 
 use super::ContactStep;
 use crate::{
@@ -7,16 +7,17 @@ use crate::{
     petsc::{PetscError, Vector},
 };
 
-/// A force scale below this part of the forces that prescribed displacements or obstacles cause, as they
-/// move the nodes there alone, is rounding.
+/// Lower bound of the force scale, relative to the forces that prescribed displacements or obstacles cause if
+/// they move their own nodes alone.
 const LIFTED: f64 = 1e-2;
 
 impl ContactStep<'_> {
-    /// Replaces c by the solution of (26) for the load of the free unknowns, f − K u_D with u_D the
-    /// displacements of the prescribed ones, `lift`.
+    /// Replaces c by the solution of (26). The load of the free unknowns is f − K u_D, with the prescribed
+    /// displacements u_D, `lift`.
     ///
-    /// Of the answer c before, the certificate may have told the force scale F of residuals, and f − Ku, `unbalanced`:
-    /// the load is then K c plus that, so that rounding of the assembled K does not count.
+    /// A further attempt has two results of the certificate for the present c: the force scale F, and f − Ku,
+    /// `unbalanced`. The load is then K c plus `unbalanced`, so that the rounding of the assembled K has no
+    /// effect.
     pub(super) fn solve_contact(
         &mut self,
         case: &LoadCase,

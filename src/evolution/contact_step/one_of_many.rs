@@ -1,4 +1,4 @@
-//! Rigid motions that no contact force resists: (26) has then many answers, with the same forces.
+//! Rigid motions without resistance by contact forces: (26) then has many answers, with the same forces.
 
 use super::{ContactStep, active_bounds, certificate::Judged};
 use crate::{
@@ -10,23 +10,21 @@ use crate::{
 use nalgebra::DVector;
 
 impl ContactStep<'_> {
-    /// The combinations of the motions that contact alone constrains along which no contact force above
-    /// `level` times F does work.
+    /// The combinations of motions along which no contact force above `level` times F does work.
     fn unresisted(&self, contact: &[ContactPoint], level: f64, force: f64) -> Vec<DVector<f64>> {
         let active = active_bounds(&self.problem.constraints, contact, level * force);
         let comm = self.problem.body.nodes.partition.comm();
         contact::unconstrained_motions(comm, &self.rigid, &active)
     }
 
-    /// The part of F below which a contact force is no certain constraint. A residual at the tolerance
-    /// does work of up to √N times that on a motion (Cauchy and Schwarz), which at the lever of
-    /// one mesh width, 1/√N of the body, is a force √N times as large.
+    /// The fraction of F below which a contact force is uncertain. A residual at the tolerance does work up
+    /// to √N times the tolerance on a motion (Cauchy and Schwarz). At a lever of one mesh width, 1/√N of the
+    /// body, this is a force √N times as large.
     fn uncertain(&self) -> f64 {
         self.problem.body.nodes.partition.total() as f64 * self.problem.tolerance
     }
 
-    /// A rigid motion that the active nodes leave unconstrained. Without load (`force` = 0) the body
-    /// rests where it is.
+    /// A rigid motion that the active nodes leave unconstrained. Without load (`force` = 0) the body rests.
     pub(super) fn unconstrained_motion(
         &self,
         contact: &[ContactPoint],
@@ -37,10 +35,10 @@ impl ContactStep<'_> {
         Some(self.problem.motions.combined(&self.problem.body, first))
     }
 
-    /// The answer of least ∫|u|² among those that differ from a certified one by such a motion: every
-    /// solver's is then the same. Where it is not certified, because a force that was neglected counts, or is a
-    /// residual across a gap that opens, the answer stays, and the second value is the largest
-    /// residual of the other. Collective.
+    /// Among the answers that differ from a certified one by such a motion, the answer with the minimum
+    /// ∫|u|². It is the same for every solver. If the certificate rejects it, because a neglected force
+    /// matters, the answer stays; the second value is then the largest residual of the rejected answer.
+    /// Collective.
     pub(super) fn of_least_displacement(
         &mut self,
         judged: Judged,
