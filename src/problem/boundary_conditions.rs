@@ -7,8 +7,8 @@ use crate::{
     scene::{Boundary, Condition, Expression, Gap, Scene, SurfaceLoad},
 };
 
-/// A constant gap smaller than this fraction of the size of the body is zero. Nodes on curved boundaries carry
-/// the mesh generator's rounding, and differences like `0.3-0.1*3` their own.
+/// A constant gap below this fraction of the body's size counts as zero. The mesh generator rounds the nodes of
+/// curved boundaries, and differences like `0.3-0.1*3` are rounded as well.
 const ZERO_GAP: f64 = 1e-12;
 
 /// The conditions of all boundaries.
@@ -16,15 +16,15 @@ const ZERO_GAP: f64 = 1e-12;
 pub(super) struct BoundaryConditions {
     /// Prescribed components and symmetry axes as rows u·d = value.
     pub(super) fixed: Vec<FixedRow>,
-    /// The values of these rows: a point and an expression, `None` for the 0 of a symmetry axis.
+    /// Per row: the point and the expression of its value; `None` on a symmetry axis, where the value is 0.
     pub(super) prescribed: Vec<Option<([f64; 2], Expression)>>,
-    /// The gap conditions u·ν ≤ g of Γ_C, by node, joined where boundaries meet smoothly.
+    /// The gap conditions u·ν ≤ g at the nodes of Γ_C, joined where boundaries meet smoothly.
     pub(super) gaps: Vec<GapRow>,
     /// The gaps that depend on time.
     pub(super) moving: Vec<MovingGap>,
     /// The surface loads of Γ_N.
     pub(super) tractions: Vec<Traction>,
-    /// Per node: how far the normal of an axis or a gap may be from that of the geometry, rad.
+    /// Per node: the largest possible angle between the mesh normal and the exact normal, rad.
     normal_errors: Vec<f64>,
 }
 
@@ -33,19 +33,18 @@ pub(super) struct BoundaryConditions {
 pub(super) struct MovingGap {
     /// The number of its row.
     pub(super) number: usize,
-    /// Where it is, m.
+    /// The node, m.
     pub(super) point: [f64; 2],
-    /// The distances, of which the least counts, m.
+    /// The distances, m; the gap is their minimum.
     pub(super) distances: Vec<Expression>,
 }
 
 impl MovingGap {
-    /// g at a time, m; NaN if any distance is.
+    /// g at time t, m; NaN if any distance is NaN.
     pub(super) fn at(&self, t: f64) -> f64 {
         let [x, y] = self.point;
         let distances = self.distances.iter().map(|g| g.eval(x, y, t));
-        distances
-            .fold(f64::INFINITY, |least, g| if least.is_nan() || g >= least { least } else { g })
+        distances.fold(f64::INFINITY, |min, g| if min.is_nan() || g >= min { min } else { g })
     }
 }
 
@@ -97,8 +96,8 @@ impl BoundaryConditions {
         Self { gaps, ..conditions }
     }
 
-    /// Finds the rigid motions that the conditions do not prevent, and makes the normals of axes and
-    /// gaps exactly orthogonal to the free motions to which they are orthogonal up to rounding.
+    /// Finds the rigid motions that the conditions do not prevent. If the normal of an axis or a gap is orthogonal
+    /// to a free motion up to rounding, it becomes exactly orthogonal.
     pub(super) fn resolve_motions(&mut self, body: &Body) -> RigidMotions {
         let motions = RigidMotions::new(body, &self.fixed, &self.gaps, &self.normal_errors);
         let axes = self.fixed.iter_mut().zip(&self.prescribed);
@@ -133,7 +132,7 @@ impl BoundaryConditions {
     }
 }
 
-/// The rows of a gap of the width `distance`, m, at a node.
+/// The rows of a gap of width `distance`, m, at a node.
 fn gap_rows(gap: &Gap, distance: f64, at: &BoundaryNode) -> impl Iterator<Item = GapRow> {
     let faces = match gap.normal {
         Some(normal) => {

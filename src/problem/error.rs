@@ -1,4 +1,4 @@
-//! Why a scene on its mesh is no problem.
+//! Errors of a scene on its mesh.
 
 use crate::{
     contact::{ConstraintError, DrivenMotion},
@@ -6,7 +6,7 @@ use crate::{
 };
 use std::path::PathBuf;
 
-/// The scene and its mesh do not make a problem: the input is wrong.
+/// Errors in the input: the scene and its mesh do not pose a problem.
 #[derive(Debug, thiserror::Error)]
 pub enum SetupError {
     /// The scene does not fit the mesh.
@@ -17,12 +17,12 @@ pub enum SetupError {
     Constraint {
         /// The scene file.
         scene: PathBuf,
-        /// The time, s; none where they do at any.
+        /// The time, s; `None` if they contradict each other at all times.
         time: Option<f64>,
         /// The contradiction.
         source: ConstraintError,
     },
-    /// A load, a prescribed displacement or a gap is not finite, and this rank cannot tell where.
+    /// A load, a prescribed displacement or a gap is not finite, and this rank does not know where.
     #[error(
         "{scene}: a traction, the body force, a prescribed displacement or a gap is not finite or too \
          large at t = {}; check its expression for divisions by zero, roots and logarithms \

@@ -4,7 +4,7 @@ use super::{DiscreteProblem, SetupError};
 use crate::contact::Bound;
 use nalgebra::DVector;
 
-/// A load below this fraction of the largest load of the run is rounding.
+/// A load below this fraction of the largest load of the run counts as zero (rounding).
 const ZERO_LOAD: f64 = 1e-14;
 
 /// The data of the contact problem (26) at one time.
@@ -20,15 +20,15 @@ pub(crate) struct LoadCase {
     pub(crate) lift: Vec<f64>,
     /// The bounds on the other unknowns.
     pub(crate) bounds: Vec<Bound>,
-    /// The gaps of all gap rows, m, where any depends on time.
+    /// The gaps of all gap rows, m; empty if none depends on time.
     pub(crate) gaps: Vec<f64>,
 }
 
 impl DiscreteProblem {
-    /// Checks the data that depend on time, at times known beforehand
-    /// ([`sample_times`](crate::scene::Scene::sample_times)). Bad input is then refused before any output.
+    /// Checks the data at sampled times ([`sample_times`](crate::scene::Scene::sample_times)), so that bad input is
+    /// rejected before any output.
     pub(super) fn check_times(&self) -> Result<(), SetupError> {
-        // A body force is as much work as the loads of a step.
+        // Integrating a body force costs as much as the loads of a step, so fewer times are checked.
         let most = if self.loads.body_force_depends_on_time() { 100 } else { 1000 };
         let mut times = self.scene.sample_times(most);
         times.truncate(if self.loads.depend_on_time() { usize::MAX } else { 1 });
@@ -41,8 +41,8 @@ impl DiscreteProblem {
         Ok(())
     }
 
-    /// Nodal loads at `time`, N per metre of thickness; rounding of the largest load of the run
-    /// (sin(pi) = 1.2e-16) counts as zero.
+    /// Nodal loads at `time`, N per metre of thickness. Rounding (sin(pi) = 1.2e-16 of the largest load) counts as
+    /// zero.
     pub fn load(&self, time: f64) -> Vec<f64> {
         let mut load = self.loads.at(&self.body, time);
         if self.body.nodes.partition.norm(&load, 2) <= ZERO_LOAD * self.largest_load {
@@ -54,8 +54,8 @@ impl DiscreteProblem {
     /// The data of (26) at `time`.
     ///
     /// # Errors
-    /// The load is not finite or drives an unconstrained rigid motion; prescribed values are not
-    /// finite, contradict each other or go through the obstacle; obstacles leave a node no room.
+    /// The load is not finite or drives an unconstrained rigid motion; prescribed values are not finite, contradict
+    /// each other or penetrate the obstacle; or the obstacles leave a node no space.
     pub(crate) fn load_case(&self, time: f64) -> Result<LoadCase, SetupError> {
         let load = self.motions.balanced(&self.body, self.checked_load(time)?);
         let work = self.motions.work(&self.body, |i| [load[2 * i], load[2 * i + 1]]);
@@ -65,8 +65,7 @@ impl DiscreteProblem {
         Ok(LoadCase { time, load, work, prescribed, lift, bounds, gaps })
     }
 
-    /// The nodal loads at `time`, if they are finite and drive no unconstrained rigid motion.
-    /// Collective.
+    /// The nodal loads at `time`, if they are finite and drive no unconstrained rigid motion. Collective.
     fn checked_load(&self, time: f64) -> Result<Vec<f64>, SetupError> {
         let load = self.load(time);
         if !self.body.nodes.partition.comm().all(load.iter().all(|f| f.is_finite())) {
@@ -77,7 +76,7 @@ impl DiscreteProblem {
         Ok(load)
     }
 
-    /// The error that a value is not finite at `time`; it says which one, if this rank knows.
+    /// The error for a value that is not finite at `time`. It names the value if this rank finds it.
     fn not_finite(&self, time: f64) -> SetupError {
         match self.scene.check_values(&self.body.mesh, &[time]) {
             Err(error) => error.into(),
@@ -85,8 +84,8 @@ impl DiscreteProblem {
         }
     }
 
-    /// The unknowns prescribed at `time` by the `values` of the prescribed rows, and the bounds on the
-    /// others, with the `gaps` of all gap rows where any depends on time.
+    /// The prescribed unknowns and the bounds on the others at `time`, from the `values` of the prescribed rows and
+    /// the `gaps` of all gap rows (empty if none depends on time).
     fn posed(
         &self,
         time: f64,

@@ -16,7 +16,7 @@ use crate::{
 };
 use forces::{BodyForce, SurfaceForce};
 
-/// A note is given if more than this fraction of the integral of a load may be missed.
+/// The user gets a note if more than this fraction of the integral of a load may be missed.
 const NOTED: f64 = 0.05;
 
 /// The nodal loads, the values of the fixed rows and the gaps, as functions of time.
@@ -27,10 +27,10 @@ pub struct Loads {
     surface_forces: Vec<SurfaceForce>,
     /// Per fixed row: the point and the expression of the component; `None` for the 0 of a symmetry axis.
     prescribed: Vec<Option<([f64; 2], Expression)>>,
-    /// The gaps of all gap rows at the first solve, m, and those that depend on time.
+    /// The gaps of all gap rows at the first solve, m, and the gaps that depend on time.
     gaps: Vec<f64>,
     moving: Vec<MovingGap>,
-    /// The load, where it does not depend on time.
+    /// The nodal loads, if they do not depend on time.
     constant: Option<Vec<f64>>,
 }
 
@@ -50,7 +50,7 @@ impl Loads {
         loads
     }
 
-    /// The loads on the subdomain of a rank. The fixed rows stay whole.
+    /// The loads on the subdomain of a rank. Every rank keeps all fixed rows.
     pub(super) fn restrict(self, subdomain: &Subdomain) -> Self {
         let local = |force: SurfaceForce| force.restrict(subdomain);
         Self {
@@ -66,7 +66,7 @@ impl Loads {
         surface.chain(self.body_force.iter().flat_map(BodyForce::expressions))
     }
 
-    /// Notes on loads of whose integrals a large part may be missed.
+    /// Notes on loads whose integrals may miss a large part.
     pub(crate) fn notes(&self, times: &[f64]) -> Vec<String> {
         let body = self.body_force.iter();
         let body = body.map(|force| ("the body force", "triangles", force.missed));
@@ -119,9 +119,9 @@ impl Loads {
         gaps
     }
 
-    /// The forces at time t, N per metre of thickness, on each edge under traction and on a sample of
-    /// the triangles, and the prescribed displacements and the changes of gaps, m. Every rank samples the
-    /// whole body, which takes much less work than the nodal loads.
+    /// Samples at time t: the forces on each edge under traction and on some triangles, N per metre of thickness;
+    /// and the prescribed displacements and the changes of gaps, m. Every rank samples the whole body, which costs
+    /// much less than the nodal loads.
     fn sampled_at(&self, t: f64) -> [Vec<f64>; 2] {
         let mut forces = Vec::new();
         self.surface_forces.iter().for_each(|force| force.sample(t, &mut forces));

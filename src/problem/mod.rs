@@ -1,16 +1,16 @@
 //! The discrete problem: a scene on its mesh, with everything that is the same in all steps.
 //!
-//! The scene says what is asked, the mesh where; here both become numbers:
+//! The scene has functions and names; the mesh has nodes and named curves. This room combines them:
 //!
-//! - [`DiscreteProblem`]: the body, its materials, what supports it, and the tolerance;
-//! - [`Loads`]: nodal loads, prescribed displacements and gaps at any time, from the functions of the scene,
-//!   which are divided until no narrow load or gap is overlooked (`LoadCase` has those of one time);
-//! - [`Supports`] and probes: resultants and values at points, which are printed;
+//! - [`DiscreteProblem`]: the body, its materials, its supports and the tolerance;
+//! - [`Loads`]: nodal loads, prescribed displacements and gaps as functions of time, integrated so finely that no
+//!   narrow load is overlooked (`LoadCase`: their values at one time);
+//! - [`Supports`] and probes: the printed resultants and values at points;
 //! - [`State`]: time, displacements, damage and contact at one time.
 //!
-//! What crosses the door: `evolution` steps a [`DiscreteProblem`] from [`State`] to [`State`]; `estimate` asks
-//! how well mesh and steps show the functions; `output` writes states. What is wrong with a scene on its mesh is
-//! a [`SetupError`].
+//! What crosses the door: `evolution` advances a [`DiscreteProblem`] from [`State`] to [`State`]; `estimate` checks
+//! how well mesh and steps resolve the functions; `output` writes states. A scene that does not fit its mesh is a
+//! [`SetupError`].
 
 mod boundary_conditions;
 mod error;
@@ -42,14 +42,14 @@ use boundary_conditions::BoundaryConditions;
 use probe::Probes;
 use std::collections::BTreeMap;
 
-/// A scene on its mesh, ready to be stepped.
+/// A scene on its mesh, ready for the time steps.
 #[derive(Debug)]
 pub struct DiscreteProblem {
     /// The body.
     pub body: Body,
     /// The undamaged elastic operator.
     pub elasticity: Elasticity,
-    /// The damage laws of the materials by their numbers; none where the body is not damaged in time.
+    /// The damage law of each material, by its number; empty if the damage does not evolve.
     laws: Vec<DamageLaw>,
     /// Displacement conditions as unknowns and bounds, for the solvers.
     pub constraints: Constraints,
@@ -62,7 +62,7 @@ pub struct DiscreteProblem {
     /// The boundaries that support the body.
     pub supports: Supports,
     probes: Probes,
-    /// The largest ‖·‖₂ of the nodal loads at some times of the run, N per metre of thickness.
+    /// max ‖·‖₂ of the nodal loads over sampled times of the run, N per metre of thickness.
     pub(crate) largest_load: f64,
     /// KKT tolerance.
     pub tolerance: f64,
@@ -71,11 +71,11 @@ pub struct DiscreteProblem {
     undivided: Option<(Mesh, Vec<usize>)>,
 }
 
-/// Times at which the loads of a run are sampled for the largest.
+/// Number of times at which the loads of a run are sampled for their maximum.
 const SAMPLES: usize = 9;
 
 impl DiscreteProblem {
-    /// Binds `scene` to `mesh` and checks that there is a solution at all times.
+    /// Binds `scene` to `mesh` and checks at sampled times that a solution exists.
     ///
     /// # Errors
     /// The scene does not fit the mesh, contradicts itself, or its load drives a rigid motion.
@@ -114,7 +114,7 @@ impl DiscreteProblem {
         Ok(problem)
     }
 
-    /// The part of this rank's subdomain in a problem that every rank has made. Collective.
+    /// Restricts a problem that every rank has made to this rank's subdomain. Collective.
     ///
     /// # Errors
     /// PETSc cannot divide the mesh.
@@ -125,7 +125,7 @@ impl DiscreteProblem {
         }
     }
 
-    /// The part of this rank, from the owners of all vertices.
+    /// Restricts the problem to this rank's subdomain, from the owners of all vertices.
     fn divide(self, session: &Session, owners: Vec<usize>) -> Result<Self, PetscError> {
         let subdomain = Subdomain::new(session, &self.body, &owners)?;
         Ok(Self {
@@ -143,7 +143,7 @@ impl DiscreteProblem {
     /// The same scene on the same undivided mesh with displacements of the other order.
     ///
     /// # Errors
-    /// At its nodes the scene contradicts itself.
+    /// The scene contradicts itself at the nodes of the other order.
     pub(crate) fn of_other_order(&self) -> Result<Self, SetupError> {
         let mut scene = self.scene.clone();
         scene.order = match scene.order {
@@ -153,8 +153,8 @@ impl DiscreteProblem {
         Self::new(scene, self.mesh().clone())
     }
 
-    /// The part of this rank in a problem that every rank has made: the triangles that it has of `other`, a problem
-    /// on the same mesh. Collective.
+    /// Restricts a problem that every rank has made to the triangles that this rank has in `other`, a problem on
+    /// the same mesh. Collective.
     ///
     /// # Errors
     /// PETSc failed.
@@ -170,27 +170,27 @@ impl DiscreteProblem {
         self.scene.boundaries.iter().any(|boundary| boundary.gap().is_some())
     }
 
-    /// The time of the first solve, s: 0, or 1 where there is no time.
+    /// The time of the first solve, s: 0, or 1 for a static problem.
     pub fn start(&self) -> f64 {
         if self.scene.time.is_some() { 0.0 } else { 1.0 }
     }
 
-    /// The damage laws of the materials by their numbers, where these can be damaged in time.
+    /// The damage law of each material, by its number; `None` if the damage does not evolve.
     pub fn damage(&self) -> Option<&[DamageLaw]> {
         Some(&self.laws[..]).filter(|laws| !laws.is_empty())
     }
 
-    /// The κ of the materials by their numbers, m²/s.
+    /// κ of each material, by its number, m²/s.
     pub fn diffusions(&self) -> Vec<f64> {
         self.laws.iter().map(|law| law.diffusion).collect()
     }
 
-    /// How the damage steps are integrated.
+    /// The mass matrix of the damage steps.
     pub fn mass(&self) -> Mass {
         self.scene.damage.as_ref().map(|damage| damage.mass).unwrap_or_default()
     }
 
-    /// ζ₀ at the nodes: π^h ζ₀, or 1 for a material that is not damaged.
+    /// ζ₀ at the nodes: π^h ζ₀, or 1 without damage.
     pub fn initial_damage(&self) -> Vec<f64> {
         let points = &self.body.mesh.nodes;
         match &self.scene.damage {
@@ -199,13 +199,13 @@ impl DiscreteProblem {
         }
     }
 
-    /// ζ_*, 0 for a material that is not damaged.
+    /// ζ_*, or 0 without damage.
     pub fn threshold(&self) -> f64 {
         self.scene.damage.as_ref().map_or(0.0, |damage| damage.law.threshold)
     }
 
-    /// The names of the quantities of a step beside its record. Per supporting boundary: the resultant of its
-    /// forces on the body, N per metre of thickness, and their moment about the origin, N. Per probe:
+    /// The names of the quantities of a step that are not in its record. Per supporting boundary: the resultant of
+    /// its forces on the body, N per metre of thickness, and their moment about the origin, N. Per probe:
     /// displacement, m, damage and stress, Pa.
     pub fn quantities(&self) -> Vec<String> {
         let resultants = ["force_x", "force_y", "moment"];
@@ -216,7 +216,7 @@ impl DiscreteProblem {
         [columns(&self.supports.names, &resultants), columns(&probes, &OBSERVED)].concat()
     }
 
-    /// Their values in a state that leaves the nodal forces `unbalanced`, f − Ku. Collective.
+    /// The values of [`Self::quantities`] in a state with the residual forces `unbalanced` = f − Ku. Collective.
     pub(crate) fn quantities_in(&self, state: &State, unbalanced: &[f64]) -> Vec<f64> {
         let mut values = self.supports.resultants(&self.body, unbalanced, &state.contact);
         values.extend(self.probes.values(self, state));

@@ -1,4 +1,4 @@
-//! Points of the body at which every step is observed.
+//! Points of the body at which every step reports displacement, damage and stress.
 
 use super::{DiscreteProblem, SetupError, State};
 use crate::{
@@ -15,7 +15,7 @@ pub(super) struct Probes {
 #[derive(Debug, Clone)]
 struct Place {
     location: Location,
-    /// This rank's triangle, if it is one of its own.
+    /// The triangle on this rank; `None` if another rank owns it.
     triangle: Option<usize>,
 }
 
@@ -27,7 +27,7 @@ impl Probes {
     /// Finds the probes of `scene` in the undivided `body`.
     ///
     /// # Errors
-    /// A probe lies outside of it.
+    /// A probe lies outside the body.
     pub(super) fn new(scene: &Scene, body: &Body) -> Result<Self, SetupError> {
         let (mut places, mut outside) = (Vec::new(), Vec::new());
         for probe in &scene.probes {
@@ -51,8 +51,7 @@ impl Probes {
         Self { places: self.places.iter().map(local).collect() }
     }
 
-    /// The quantities at all probes; 0 at those of other ranks. The stress is
-    /// σ = η_*(ζ) 𝒜ε(u) at the point.
+    /// The quantities at all probes; 0 at probes of other ranks. The stress is σ = η_*(ζ) 𝒜ε(u) at the point.
     pub(super) fn values(&self, problem: &DiscreteProblem, state: &State) -> Vec<f64> {
         let values = |Place { location, triangle }: &Place| {
             let Some(t) = *triangle else { return [0.0; OBSERVED.len()] };

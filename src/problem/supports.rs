@@ -16,7 +16,7 @@ pub struct Supports {
     pub names: Vec<String>,
     /// Per node with a prescribed displacement: the boundaries that prescribe it.
     prescribed: BTreeMap<usize, Vec<Prescribed>>,
-    /// Per node of Γ_C: its places, one for each of its edges on Γ_C.
+    /// Per node of Γ_C: its place on each of its edges on Γ_C.
     contact: BTreeMap<usize, Vec<Place>>,
 }
 
@@ -32,7 +32,7 @@ struct Prescribed {
 #[derive(Debug, Clone, Copy)]
 struct Place {
     boundary: usize,
-    /// Which connected part of the boundary, from 0.
+    /// The number of the connected part of the boundary, from 0.
     part: usize,
     /// The length of the part up to the node, m, with the body on the left.
     arc_length: f64,
@@ -40,14 +40,14 @@ struct Place {
     normal: [f64; 2],
 }
 
-/// A row of `contact.csv`: a gap condition at a node of Γ_C and how it is met.
+/// A row of `contact.csv`: a gap condition at a node of Γ_C, its remaining gap and its pressure.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct ContactRow {
     /// t, s.
     pub time: f64,
     /// The boundary.
     pub boundary: String,
-    /// Which connected part of it, from 0.
+    /// The number of the connected part of the boundary, from 0.
     pub part: usize,
     /// The length of the part up to the node, m, with the body on the left.
     pub arc_length: f64,
@@ -59,11 +59,11 @@ pub struct ContactRow {
     pub normal_x: f64,
     /// See `normal_x`.
     pub normal_y: f64,
-    /// g − u·ν: the gap that is left, m.
+    /// The remaining gap g − u·ν, m.
     pub gap: f64,
     /// Pa, positive in compression.
     pub pressure: f64,
-    /// 1 where the node is active, else 0.
+    /// 1 if the node is active, else 0.
     pub active: u8,
 }
 
@@ -137,8 +137,8 @@ impl Supports {
         }
     }
 
-    /// The place of a contact point. If its node is on several boundaries, the one with the nearest normal exerts
-    /// the force.
+    /// The place of a contact point. If its node is on several boundaries, the boundary with the nearest normal
+    /// exerts the force.
     fn place(&self, point: &ContactPoint) -> Option<Place> {
         let along =
             |place: &&Place| point.normal[0] * place.normal[0] + point.normal[1] * place.normal[1];
@@ -223,13 +223,13 @@ impl Supports {
 /// Divides the force F at a node, N/m, between the boundaries that prescribe its displacement. If two of them
 /// prescribe the components along d and e, they exert αd and βe with F = αd + βe. Otherwise one exerts F.
 fn parts(prescribed: &[Prescribed], force: [f64; 2]) -> Vec<(usize, [f64; 2])> {
-    /// The sine of the least angle between two directions that are not one.
-    const ONE: f64 = 1e-6;
+    /// Directions are parallel if the sine of the angle between them is at most this.
+    const SINE: f64 = 1e-6;
     let cross = |[a, b]: [f64; 2], [c, d]: [f64; 2]| a * d - b * c;
     let first = prescribed.iter().find(|of| of.direction.is_none()).unwrap_or(&prescribed[0]);
     let other = |d: [f64; 2]| {
         let directions = prescribed.iter().filter_map(|of| Some((of.boundary, of.direction?)));
-        directions.map(move |(other, e)| (d, other, e)).find(|&(d, _, e)| cross(d, e).abs() > ONE)
+        directions.map(move |(other, e)| (d, other, e)).find(|&(d, _, e)| cross(d, e).abs() > SINE)
     };
     match first.direction.and_then(other) {
         None => vec![(first.boundary, force)],
@@ -240,8 +240,7 @@ fn parts(prescribed: &[Prescribed], force: [f64; 2]) -> Vec<(usize, [f64; 2])> {
     }
 }
 
-/// The connected parts of edges that have the body on their left, each in the order in which they follow
-/// each other.
+/// The connected parts of a curve, each with its edges in order. The body is on the left of all edges.
 fn connected(edges: &[Edge]) -> Vec<Vec<Edge>> {
     let mut after: BTreeMap<usize, Edge> = edges.iter().map(|edge| (edge.ends[0], *edge)).collect();
     let ends: BTreeSet<usize> = edges.iter().map(|edge| edge.ends[1]).collect();

@@ -5,22 +5,22 @@ use crate::{
     scene::{Condition, Expression, Stepping, TimeGrid},
 };
 
-/// Forces are nearly linear in time if they stay this near to a straight line, as a fraction of the largest.
+/// Loads count as linear in time if they deviate from a straight line by at most this fraction of the largest.
 const DEVIATION: f64 = 0.05;
-/// Loads pass by within a step if their sum swings by more than this fraction of the largest.
+/// Loads pass by within a step if their sum deviates from a straight line by more than this fraction of the
+/// largest.
 const PASSING: f64 = 0.5;
 /// Times that differ by less than this fraction of the run count as one.
 const APART: f64 = 1e-9;
-/// Uniform steps that are sampled for the note about loads within a step.
+/// Number of uniform steps sampled for the note about loads within a step.
 const STEPS: usize = 50;
-/// Times sampled within a step.
+/// Number of times sampled within a step.
 const POINTS: usize = 16;
-/// Parts of a boundary that are searched for pulses and jumps: one may hide another in the same part.
+/// Number of parts of a boundary searched for pulses and jumps. One pulse may hide another in the same part.
 const BOXES: usize = 4;
 
-/// Times within the run of `problem` at which a load, a prescribed displacement or a gap may not be smooth, and
-/// one time between each two of them, s. They rise and differ by more than rounding of the `end`. See
-/// [`Expression::breaks`].
+/// Times, s, at which a load, a prescribed displacement or a gap of `problem` may not be smooth, and one time
+/// between each two of them. They increase and differ by more than rounding. See [`Expression::breaks`].
 fn breaks(problem: &DiscreteProblem, end: f64) -> Vec<f64> {
     let (scene, mesh) = (problem.scene(), problem.mesh());
     let mut breaks = Vec::new();
@@ -58,16 +58,16 @@ fn breaks(problem: &DiscreteProblem, end: f64) -> Vec<f64> {
 /// Every rank samples the whole body, so that all ranks choose the same steps.
 pub(crate) struct LoadCurve<'a> {
     problem: &'a DiscreteProblem,
-    /// The largest Σ|·| of the forces and of the displacements at any time sampled.
+    /// max Σ|·| of the forces and of the displacements over the sampled times.
     pub(crate) largest: [f64; 2],
-    /// Times that must be sampled, s, in rising order.
+    /// Times that must be sampled, s, in increasing order.
     breaks: Vec<f64>,
     /// The end of the run, s.
     end: f64,
 }
 
 impl<'a> LoadCurve<'a> {
-    /// Samples the whole run; `None` where nothing depends on time.
+    /// Samples the whole run; `None` if nothing depends on time.
     pub(crate) fn new(problem: &'a DiscreteProblem) -> Option<Self> {
         let end = problem.scene().time?.end;
         problem.loads.depend_on_time().then(|| {
@@ -87,7 +87,7 @@ impl<'a> LoadCurve<'a> {
         &self.breaks[first..last.max(first)]
     }
 
-    /// Σ|·| of the forces and of the displacements at `time` over the largest ones; 0 where all are 0.
+    /// Σ|·| of the forces and of the displacements at `time`, relative to the largest sums; 0 if all are 0.
     pub(crate) fn sizes(&self, time: f64) -> [f64; 2] {
         let values = self.problem.loads.sampled_at(time);
         let size = |kind: usize| sum_abs(values[kind].iter().copied()) / self.largest[kind];
@@ -100,8 +100,8 @@ impl<'a> LoadCurve<'a> {
         (0..2).all(|kind| deviations[kind] <= DEVIATION * self.largest[kind])
     }
 
-    /// How far forces and displacements are from the straight lines between their values at `start` and
-    /// `end`: the largest Σ|·| at the times sampled. Compared are the results of `of`.
+    /// Deviations of forces and displacements, each mapped by `of`, from straight lines between `start` and `end`:
+    /// max Σ|·| over the sampled times.
     fn deviations(&mut self, start: f64, end: f64, of: impl Fn(&[f64]) -> Vec<f64>) -> [f64; 2] {
         let [first, last] = [start, end].map(|time| self.sample(time).map(|values| of(&values)));
         let parts = (1..=POINTS).map(|point| point as f64 / (POINTS + 1) as f64);
@@ -119,8 +119,8 @@ impl<'a> LoadCurve<'a> {
         deviations
     }
 
-    /// The ends, s, of the first uniform step within which the loads are not nearly linear, among some evenly
-    /// spread ones and those with breaks. The run sees the loads only at the ends of the step.
+    /// The ends, s, of the first sampled uniform step within which the loads are not nearly linear. The samples are
+    /// evenly spaced steps and all steps with breaks. A run evaluates the loads only at the ends of a step.
     pub(crate) fn unresolved_step(problem: &'a DiscreteProblem) -> Option<[f64; 2]> {
         let (grid, steps) = uniform_steps(problem)?;
         let mut curve = Self::new(problem)?;
@@ -136,8 +136,8 @@ impl<'a> LoadCurve<'a> {
         ends.into_iter().find(|[start, end]| !curve.is_nearly_linear(*start, end - before))
     }
 
-    /// Do loads come and go within a uniform step? They do if the sum of all forces, or of all displacements
-    /// and gaps, swings by more than [`PASSING`] of the largest. A load that moves does not.
+    /// Do loads come and go within a uniform step? Then the sum of all forces, or of all displacements and gaps,
+    /// deviates from a straight line by more than [`PASSING`] of the largest sum. A load that moves keeps its sum.
     pub(crate) fn pass_within_steps(problem: &'a DiscreteProblem) -> bool {
         let Some((grid, steps)) = uniform_steps(problem) else { return false };
         let Some(mut curve) = Self::new(problem) else { return false };
@@ -148,12 +148,12 @@ impl<'a> LoadCurve<'a> {
         })
     }
 
-    /// Forces and displacements at `time`; the largest ones are kept.
+    /// The forces and displacements at `time`. Updates the largest sums.
     fn sample(&mut self, time: f64) -> [Vec<f64>; 2] {
         let values = self.problem.loads.sampled_at(time);
         for (largest, values) in self.largest.iter_mut().zip(&values) {
             let sum = sum_abs(values.iter().copied());
-            // An infinite one is refused as soon as a step ends there.
+            // An infinite load is rejected as soon as a step ends there.
             if sum.is_finite() {
                 *largest = largest.max(sum);
             }

@@ -1,4 +1,4 @@
-//! Surface loads and body forces, in parts of edges and triangles in which they are resolved.
+//! Surface loads and body forces, integrated over parts of edges and triangles that resolve them.
 
 use super::parts::{
     EdgePart, Parts, TrianglePart, WHOLE, centroid, edge_parts, triangle_parts, triangle_points,
@@ -9,27 +9,26 @@ use crate::{
     scene::{Expression, Scene, SurfaceLoad},
 };
 
-/// Errors of resultants, relative to ∫|f|, of loads that are assembled …
+/// Allowed errors of resultants relative to ∫|f|: for assembled surface loads and body forces …
 const DEVIATION: f64 = 1e-6;
 const DEVIATION_IN_BODY: f64 = 1e-5;
-/// … and of surface loads that are only sampled.
+/// … and for surface loads that are only sampled.
 const SAMPLED: f64 = 0.02;
-/// The largest number of parts of triangles that are added for a body force: for one that depends on time, which
-/// is integrated in each step, and for a constant one.
+/// Maximum number of triangle parts added for a body force: one that depends on time, and a constant one.
 const MORE: [f64; 2] = [10_000.0, 50_000.0];
 /// The approximate number of times at which a body force is sampled to divide triangles.
 const TIMES: usize = 4;
-/// The largest number of triangles in which a body force is sampled, and of parts of divided triangles.
-const TRIANGLES: usize = 500;
+/// Maximum number of undivided triangles in which a body force is sampled, and of parts of divided ones.
+const MAX_SAMPLES: usize = 500;
 
 /// A surface load on a part of the boundary.
 #[derive(Debug)]
 pub(super) struct SurfaceForce {
     /// f_N, N/m².
     force: SurfaceLoad,
-    /// Its edges in the undivided body: ends and middles, m. All ranks divide them alike.
+    /// Its edges in the undivided body: ends and middles, m. All ranks divide them in the same way.
     lines: Vec<[[f64; 2]; 3]>,
-    /// The same edges on this rank; `None` for those of other ranks.
+    /// The same edges on this rank; `None` for edges of other ranks.
     edges: Vec<Option<Edge>>,
     /// The samples of a load that does not depend on time.
     constant: Option<Vec<f64>>,
@@ -103,7 +102,7 @@ pub(super) struct BodyForce {
     force: [Expression; 2],
     /// The parts of the triangles in which it is not resolved.
     division: Division,
-    /// Centroids and areas, m and m², at which it is sampled.
+    /// The sample points, m, each with the area that it represents, m².
     samples: Vec<([f64; 2], f64)>,
     /// The fraction of ∫|f_B| that may be missed.
     pub(super) missed: f64,
@@ -157,9 +156,9 @@ impl BodyForce {
     }
 }
 
-/// The centroids of some of the parts, each with the area of the parts that it stands for.
+/// The centroids of evenly spread parts, each with the area that it represents.
 fn samples(triangles: &[[[f64; 2]; 6]], parts: &[TrianglePart]) -> Vec<([f64; 2], f64)> {
-    let stride = parts.len().div_ceil(TRIANGLES).max(1);
+    let stride = parts.len().div_ceil(MAX_SAMPLES).max(1);
     let sample = |part: &TrianglePart| {
         let (centroid, area) = centroid(triangles, part);
         (centroid, stride as f64 * area)

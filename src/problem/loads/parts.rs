@@ -1,14 +1,14 @@
-//! Division of edges and triangles into parts so small that a quadrature rule integrates a function in each.
+//! Divides edges and triangles into parts so small that a quadrature rule integrates a function in each part.
 //!
 //! A part with the measure m is bisected while, relative to the sum of ∫|f| over all parts,
 //!
 //! - m max |f − f₂| > `DEVIATION`, with f₂ the quadratic interpolation of f at ends and middles (corners
 //!   and midpoints of sides) and the maximum over the quadrature points; or
-//! - m times what [`Expression::range`] leaves above and below the values in these points > `HIDDEN`: a
-//!   peak between them may not be seen.
+//! - m times the distance of the bounds [`Expression::range`] from the values at these points > `HIDDEN`: a peak
+//!   between the points may be missed.
 //!
-//! The sum of both over all parts is what may be missed of ∫|f|. A strip that lies along the sides of triangles
-//! takes too many such parts: triangles that miss much are cut into slices along a side, if these miss less.
+//! The sum of both over all parts bounds the missed part of ∫|f|. A strip along the sides of triangles would need
+//! too many parts. Triangles that miss much are therefore cut into slices along a side, if slices miss less.
 
 use crate::{
     fem::{Body, GAUSS, POINTS, parabola, part_point, quadratic_values, six_points},
@@ -16,39 +16,39 @@ use crate::{
     scene::Expression,
 };
 
-/// An edge, by its index, and where a part of it begins and ends, 0 ≤ s ≤ 1.
+/// A part of an edge: the index of the edge, and the start and the end of the part, 0 ≤ s ≤ 1.
 pub(crate) type EdgePart = (usize, [f64; 2]);
-/// A triangle, by its index, and the barycentric coordinates of the corners of a part of it.
+/// A part of a triangle: the index of the triangle, and the barycentric coordinates of the part's corners.
 pub(crate) type TrianglePart = (usize, [[f64; 3]; 3]);
 
-/// The fraction of ∫|f| that may be hidden in a peak between the points sampled.
+/// The fraction of ∫|f| that may be hidden in a peak between the sample points.
 const HIDDEN: f64 = 1e-3;
 /// Ends and corners are sampled this far inside, relative to the size of the part. Then a jump at a node lies in no
 /// part.
 const WITHIN: f64 = 1e-7;
-/// The largest number of bisections of a part.
-const DEEPEST: usize = 40;
+/// Maximum number of bisections of a part.
+const MAX_BISECTIONS: usize = 40;
 /// A triangle as its only part.
 pub(crate) const WHOLE: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 /// If all triangles together miss more than this fraction of ∫|f|, some are sliced.
 const MISSED: f64 = 1e-4;
-/// The largest number of triangles that are sliced, and of slices of a triangle.
-const SLICED: usize = 1000;
-const SLICES: usize = 200;
+/// Maximum number of sliced triangles, and of slices per triangle.
+const MAX_SLICED: usize = 1000;
+const MAX_SLICES: usize = 200;
 /// The relative error of the integral over slices.
 const DEVIATION_OF_SLICES: f64 = 1e-6;
-/// The functions in a part, each value times the measure of the part: ∫|f|, max |f − f₂|, and the largest hidden
-/// peak.
+/// Samples of the functions in a part, times the measure of the part: ∫|f|, max |f − f₂|, and the highest peak that
+/// may be hidden.
 #[derive(Clone, Copy)]
-struct Seen {
+struct Sampled {
     integral: f64,
     deviation: f64,
     hidden: f64,
 }
 
-impl Seen {
-    /// The part of the `integral` of |f| over all parts that may be missed. A hidden peak below the limit does not
-    /// count: mostly it is only that the bounds of the function are too wide.
+impl Sampled {
+    /// The part of ∫|f| that may be missed here; `integral` is ∫|f| over all parts. A hidden peak below the limit
+    /// does not count: usually the bounds of the function are only too wide.
     fn missed(&self, integral: f64) -> f64 {
         self.deviation + if self.hidden > HIDDEN * integral { self.hidden } else { 0.0 }
     }
@@ -57,43 +57,43 @@ impl Seen {
 /// Parts in which functions are integrated.
 pub(crate) struct Parts<P> {
     pub(crate) parts: Vec<P>,
-    /// The largest part of ∫|f| that may be missed, over the part that is not.
+    /// Upper bound of the missed part of ∫|f|, relative to the integral found.
     pub(crate) missed: f64,
 }
 
 impl<P> Parts<P> {
-    fn new(parts: Vec<(P, Seen)>) -> Self {
+    fn new(parts: Vec<(P, Sampled)>) -> Self {
         let [integral, missed] = sums(&parts, None);
         let missed = if missed > 0.0 { missed / integral } else { 0.0 };
         Self { parts: parts.into_iter().map(|(part, _)| part).collect(), missed }
     }
 }
 
-/// ∫|f| over parts, and the part that may be missed of it, or of the `integral` over these and other parts.
-fn sums<P>(parts: &[(P, Seen)], integral: Option<f64>) -> [f64; 2] {
-    let own = parts.iter().map(|(_, seen)| seen.integral).sum();
+/// ∫|f| over `parts`, and how much of it may be missed. `integral` is ∫|f| over these and all other parts.
+fn sums<P>(parts: &[(P, Sampled)], integral: Option<f64>) -> [f64; 2] {
+    let own = parts.iter().map(|(_, sampled)| sampled.integral).sum();
     let integral = integral.unwrap_or(own);
-    [own, parts.iter().map(|(_, seen)| seen.missed(integral)).sum()]
+    [own, parts.iter().map(|(_, sampled)| sampled.missed(integral)).sum()]
 }
 
-/// Bisects parts until all are small enough for a `deviation`, or there are more than `most`.
+/// Bisects parts until all are small enough for a `deviation`, or there would be more than `most`.
 fn bisected<P: Copy>(
     parts: impl Iterator<Item = P>,
     [deviation, most]: [f64; 2],
-    look: impl Fn(P) -> Seen,
+    sample: impl Fn(P) -> Sampled,
     halves: impl Fn(P) -> [P; 2],
-) -> Vec<(P, Seen)> {
+) -> Vec<(P, Sampled)> {
     let (mut done, mut integral) = (Vec::new(), 0.0);
-    let mut open: Vec<(P, Seen)> = parts.map(|part| (part, look(part))).collect();
-    for _ in 0..DEEPEST {
-        let total = open.iter().fold(integral, |sum, (_, seen)| sum + seen.integral);
+    let mut open: Vec<(P, Sampled)> = parts.map(|part| (part, sample(part))).collect();
+    for _ in 0..MAX_BISECTIONS {
+        let total = open.iter().fold(integral, |sum, (_, sampled)| sum + sampled.integral);
         let mut coarse = Vec::new();
-        for (part, seen) in open {
-            if seen.deviation > deviation * total || seen.hidden > HIDDEN * total {
-                coarse.push((part, seen));
+        for (part, sampled) in open {
+            if sampled.deviation > deviation * total || sampled.hidden > HIDDEN * total {
+                coarse.push((part, sampled));
             } else {
-                integral += seen.integral;
-                done.push((part, seen));
+                integral += sampled.integral;
+                done.push((part, sampled));
             }
         }
         if (done.len() + 2 * coarse.len()) as f64 > most {
@@ -101,7 +101,7 @@ fn bisected<P: Copy>(
             return done;
         }
         let parts = coarse.into_iter().flat_map(|(part, _)| halves(part));
-        open = parts.map(|part| (part, look(part))).collect();
+        open = parts.map(|part| (part, sample(part))).collect();
         if open.is_empty() {
             return done;
         }
@@ -110,8 +110,8 @@ fn bisected<P: Copy>(
     done
 }
 
-/// The parts of edges, parabolas through three points each, in which `f` is integrated by three Gauss points
-/// at time `t` with errors of about `deviation` ∫|f|. What does not depend on the place needs one an edge.
+/// Divides edges, parabolas through three points each, so that the Gauss points of each part integrate `f` at time
+/// `t` with errors of about `deviation` ∫|f|. A function that is constant in space needs one part per edge.
 pub(crate) fn edge_parts(
     lines: &[[[f64; 2]; 3]],
     f: &[Expression],
@@ -122,25 +122,25 @@ pub(crate) fn edge_parts(
     if !f.iter().any(Expression::depends_on_space) {
         return Parts { parts: whole.collect(), missed: 0.0 };
     }
-    let look = |(edge, [from, to]): EdgePart| {
+    let sample = |(edge, [from, to]): EdgePart| {
         let at = |s: f64| parabola(lines[edge], from + s * (to - from));
         let nodes = [WITHIN, 0.5, 1.0 - WITHIN].map(at);
         let [p, _, q] = nodes;
         let measure = (q[0] - p[0]).hypot(q[1] - p[1]);
         let points = GAUSS.map(at);
         let interpolated = |[a, m, b]: [f64; 3]| GAUSS.map(|s| parabola([[a], [m], [b]], s)[0]);
-        seen(f, 0.0, &[t], nodes, [[0, 2, 1]], points, interpolated, measure)
+        sampled(f, 0.0, &[t], nodes, [[0, 2, 1]], points, interpolated, measure)
     };
     let halves = |(edge, [from, to]): EdgePart| {
         let middle = 0.5 * (from + to);
         [(edge, [from, middle]), (edge, [middle, to])]
     };
     let most = (4 * lines.len() + 2000) as f64;
-    Parts::new(bisected(whole, [deviation, most], look, halves))
+    Parts::new(bisected(whole, [deviation, most], sample, halves))
 }
 
-/// The parts of quadratic triangles of six points in which `f` − `zero` is integrated with errors of about
-/// `deviation` ∫|f − zero| at all `times`. There are at most `more` parts more than triangles.
+/// Divides quadratic triangles of six points so that `f` − `zero` is integrated at all `times` with errors of about
+/// `deviation` ∫|f − zero|. At most `more` parts are added.
 pub(crate) fn triangle_parts(
     triangles: &[[[f64; 2]; 6]],
     (f, zero): (&[Expression], f64),
@@ -148,7 +148,7 @@ pub(crate) fn triangle_parts(
     [deviation, more]: [f64; 2],
 ) -> Parts<TrianglePart> {
     let whole = (0..triangles.len()).map(|triangle| (triangle, WHOLE));
-    let look = |(triangle, corners): TrianglePart| {
+    let sample = |(triangle, corners): TrianglePart| {
         let at = |point| triangle_point(&triangles[triangle], part_point(&corners, point));
         let shrunk = WHOLE.map(|corner| corner.map(|l| l + WITHIN * (1.0 / 3.0 - l)));
         let [a, b, c] = shrunk;
@@ -159,29 +159,29 @@ pub(crate) fn triangle_parts(
             POINTS.map(|point| quadratic_values(point).iter().zip(values).map(|(w, v)| w * v).sum())
         };
         let sides = [[0, 1, 3], [1, 2, 4], [2, 0, 5]];
-        seen(f, zero, times, nodes, sides, POINTS.map(at), interpolated, measure)
+        sampled(f, zero, times, nodes, sides, POINTS.map(at), interpolated, measure)
     };
     // Newest vertex bisection: the side between the first two corners is halved.
     let halves = |(triangle, [a, b, c]): TrianglePart| {
         let middle = mean(a, b);
         [(triangle, [c, a, middle]), (triangle, [b, c, middle])]
     };
-    let parts = bisected(whole, [deviation, triangles.len() as f64 + more], look, halves);
+    let parts = bisected(whole, [deviation, triangles.len() as f64 + more], sample, halves);
     let [integral, missed] = sums(&parts, None);
     if missed <= MISSED * integral {
         return Parts::new(parts);
     }
     let mut of_triangles = vec![Vec::new(); triangles.len()];
     parts.into_iter().for_each(|part| of_triangles[part.0.0].push(part));
-    let missed = |parts: &[(TrianglePart, Seen)]| sums(parts, Some(integral))[1];
+    let missed = |parts: &[(TrianglePart, Sampled)]| sums(parts, Some(integral))[1];
     let mut worst: Vec<_> = of_triangles.iter().map(|parts| missed(parts)).enumerate().collect();
     worst.sort_by(|(_, a), (_, b)| b.total_cmp(a));
-    worst.truncate(SLICED);
+    worst.truncate(MAX_SLICED);
     for (triangle, _) in worst.into_iter().filter(|(_, missed)| *missed > 0.0) {
         for side in 0..3 {
             let Some(slices) = slices(&triangles[triangle], side, f, times) else { continue };
             let slices = slices.into_iter().map(|corners| (triangle, corners));
-            let slices: Vec<_> = slices.map(|part| (part, look(part))).collect();
+            let slices: Vec<_> = slices.map(|part| (part, sample(part))).collect();
             if missed(&slices) < missed(&of_triangles[triangle]) {
                 of_triangles[triangle] = slices;
             }
@@ -190,8 +190,8 @@ pub(crate) fn triangle_parts(
     Parts::new(of_triangles.into_iter().flatten().collect())
 }
 
-/// Slices of a triangle along one of its sides, in two parts each. They are as thick as the integral along a line
-/// across them needs. `None` if there are too many.
+/// Slices of a triangle along one of its sides, in two parts each. Their thickness resolves `f` along a line across
+/// them. `None` if there are too many.
 fn slices(
     triangle: &[[f64; 2]; 6],
     side: usize,
@@ -205,7 +205,7 @@ fn slices(
     let mut ends: Vec<f64> = ends.map(|(_, [_, to])| to).collect();
     ends.sort_by(f64::total_cmp);
     ends.dedup();
-    if ends.len() > SLICES {
+    if ends.len() > MAX_SLICES {
         return None;
     }
     let at = |corner: [f64; 3], r: f64| [0, 1, 2].map(|k| c[k] + r * (corner[k] - c[k]));
@@ -250,10 +250,10 @@ fn mean(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|k| 0.5 * (a[k] + b[k]))
 }
 
-/// Samples `f` − `zero` at the `nodes` of a part and its quadrature `points`. `sides` are the two ends and the
-/// middle of each side. The control point 2m − (p + q)/2 of a parabolic side bounds it.
+/// Samples `f` − `zero` at the `nodes` of a part and its quadrature `points`. `sides` has the two ends and the
+/// middle of each side. A parabolic side lies in the box of its ends and its control point 2m − (p + q)/2.
 #[allow(clippy::too_many_arguments, reason = "an edge and a triangle differ in all of these")]
-fn seen<const N: usize, const S: usize, const Q: usize>(
+fn sampled<const N: usize, const S: usize, const Q: usize>(
     f: &[Expression],
     zero: f64,
     times: &[f64],
@@ -262,7 +262,7 @@ fn seen<const N: usize, const S: usize, const Q: usize>(
     points: [[f64; 2]; Q],
     interpolated: impl Fn([f64; N]) -> [f64; Q],
     measure: f64,
-) -> Seen {
+) -> Sampled {
     let mut space = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
     let controls = sides
         .map(|[p, q, m]| [0, 1].map(|k| 2.0 * nodes[m][k] - 0.5 * (nodes[p][k] + nodes[q][k])));
@@ -271,7 +271,7 @@ fn seen<const N: usize, const S: usize, const Q: usize>(
             *bounds = [bounds[0].min(*x), bounds[1].max(*x)];
         }
     }
-    let mut found = Seen { integral: 0.0, deviation: 0.0, hidden: 0.0 };
+    let mut found = Sampled { integral: 0.0, deviation: 0.0, hidden: 0.0 };
     let period = [times.first(), times.last()].map(|t| t.copied().unwrap_or(0.0));
     for f in f.iter().filter(|f| f.as_constant() != Some(zero)) {
         let mut shown = [f64::INFINITY, f64::NEG_INFINITY];
