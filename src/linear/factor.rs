@@ -178,7 +178,12 @@ impl Factor {
     /// There is no memory for it.
     pub(crate) fn analyse(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
         let rows = matrix.size()?;
-        let substructure = match self.substructure.take() {
+        let before = self.substructure.take();
+        if before.as_ref().is_none_or(|(size, _)| *size != rows) && !self.loaded {
+            // The factor of another matrix, or a preconditioner of PETSc, is none for this one.
+            self.policy = None;
+        }
+        let substructure = match before {
             Some((size, substructure)) if size == rows => substructure,
             _ if !self.comm.is_serial() && rows >= VERY_LARGE => None,
             _ => {
