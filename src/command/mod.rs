@@ -96,8 +96,14 @@ fn check_petsc(options: &[String]) -> Result<(), Failure> {
     }
 }
 
-/// Where an accuracy is asked for, the first mesh of a `.geo` has about so many triangles along the body.
-const CELLS: f64 = 4.0;
+/// The approximate number of triangles along the body in the first mesh of a `.geo` for an accuracy. Refined sides
+/// stay on the parabolas of this mesh, whose distance from an arc is of fourth order in the length of its sides. So
+/// the number increases for high accuracies.
+fn cells(accuracy: f64) -> f64 {
+    /// Below this accuracy a mesh with four triangles along the body follows arcs too coarsely.
+    const COARSE: f64 = 0.01;
+    4.0 * (COARSE / accuracy).cbrt().max(1.0)
+}
 
 /// A scene and what overrides parts of it.
 #[derive(Args)]
@@ -167,12 +173,16 @@ impl SceneArguments {
 fn read_mesh(scene: &Scene, adapts: bool) -> Result<Mesh, Failure> {
     let MeshSource { file, parameters } = &scene.mesh;
     let (mut parameters, mut order) = (parameters.clone(), scene.order);
-    if adapts && scene.accuracy.is_some() && file.extension().is_none_or(|kind| kind != "msh") {
-        // Of order 1, too: bisected sides then follow curved boundaries.
+    if let Some(accuracy) = scene.accuracy
+        && adapts
+        && file.extension().is_none_or(|kind| kind != "msh")
+    {
+        // Of order 1, too: bisected sides then follow curved boundaries, as well as the parabolas of this mesh.
         order = Order::Quadratic;
         let usual = mesh::load(file, &parameters, Order::Linear).map_err(Failure::mesh)?;
         let scaling = mesh::scaling_factor(file).map_err(Failure::mesh)?;
-        parameters.insert("size".to_owned(), mesh::extent(&usual.nodes) / scaling / CELLS);
+        parameters
+            .insert("size".to_owned(), mesh::extent(&usual.nodes) / scaling / cells(accuracy));
     }
     mesh::load(file, &parameters, order).map_err(Failure::mesh)
 }
