@@ -190,6 +190,8 @@ def main(prog=None):
         print(f"error: {error.filename}: {error.strerror}", file=sys.stderr)
         return 2
     print(table(rows))
+    print("Δ: largest differences from the answer with the smallest residuals; "
+          "times first: over the seconds of the scene's first solver")
     path = arguments.out / "comparison.csv"
     write_table(rows, path)
     print(f"written to {path}")

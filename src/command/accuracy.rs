@@ -7,7 +7,7 @@ use signorini::{
     interrupt::{Interrupts, Signal},
     mesh::{Mesh, Order},
     petsc::Session,
-    scene::{Scene, Stepping},
+    scene::{Scene, Stepping, rounded},
 };
 
 /// Where the scene asks for an accuracy, a mesh that has it, or the one `made` in the run that goes on,
@@ -83,6 +83,13 @@ pub(super) fn verdict(task: &Task, outcome: Option<&Outcome>) -> Option<String> 
         names => format!("accuracy {accuracy} of {}", names.join(", ")),
     };
     let Some(outcome) = outcome else { return Some(format!("{asked}: {mesh}")) };
+    if let Some(stop) = outcome.stopped {
+        return Some(format!(
+            "{asked}: the run stops at ζ_*, at {} ± {:.1e} s; figures at such a stop have no bars: {mesh}",
+            rounded(stop.time),
+            stop.bar()
+        ));
+    }
     let is_asked =
         |name: &str| scene.accuracy_of.is_empty() || scene.accuracy_of.iter().any(|n| n == name);
     let bars = outcome.bars.iter().filter(|bar| is_asked(&bar.name));

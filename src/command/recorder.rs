@@ -180,7 +180,7 @@ impl<'a> Recorder<'a> {
         if task.profile {
             shown.clone_from(&notes);
         }
-        let mut lines = screen::conclusion(task, record, &quantities, outcome, &shown);
+        let mut lines = screen::conclusion(task, record, &quantities, result.as_ref(), &shown);
         if task.profile {
             let steps = record.map_or(0, |record| record.step);
             lines.push(String::new());

@@ -122,7 +122,9 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         agree(session.comm(), checked).and_then(|()| read(arguments, &session, &phases, started));
     let warns = task.is_ok() && session.comm().is_root();
     let result = task.and_then(|(task, restart)| solve(&task, restart, &session));
-    let unused = session.unused_options();
+    let mut unused = session.unused_options();
+    // PETSc reads it at its end.
+    unused.retain(|option| !option.starts_with("-options_left"));
     let finalized = session.finalize().map_err(Failure::from);
     if warns && !unused.is_empty() {
         tell("warning", &format!("PETSc options that nothing read: {}", unused.join(" ")));

@@ -3,7 +3,7 @@
 use super::task::Task;
 use signorini::{
     estimate::{Adapted, percent},
-    evolution::{Outcome, StepRecord},
+    evolution::{Outcome, RunError, StepRecord},
     output::terminal::{Progress, say, with_bar},
     scene::{Scheme, Stepping, TimeGrid, Units, rounded},
 };
@@ -62,17 +62,18 @@ pub fn progress(bar: &mut Progress, record: &StepRecord, end: f64) {
     bar.show((LENGTH as f64 * record.time / end) as u64, message);
 }
 
-/// How a run ended and what its last accepted state tells, a line each; `outcome` is none if the run
-/// failed, `last` if it failed at the first solve.
+/// The end of a run and the quantities of its last accepted state, a line each. `last` is `None` if the first
+/// solve failed.
 pub fn conclusion(
     task: &Task,
     last: Option<StepRecord>,
     quantities: &[(String, f64)],
-    outcome: Option<&Outcome>,
+    result: Result<&Outcome, &RunError>,
     notes: &[String],
 ) -> Vec<String> {
     let notes = notes.iter().map(|note| row("note", note.clone()));
-    let end = row("end", ending(last, outcome));
+    let end = row("end", ending(last, result));
+    let outcome = result.ok();
     let Some(last) = last else { return [end].into_iter().chain(notes).collect() };
     let bar = |name: &str| outcome.and_then(|of| of.errors.figures.get(name).copied());
     let figure = |value: f64, name: &str| with_bar(value, bar(name));
@@ -154,14 +155,17 @@ fn steps(grid: TimeGrid, unit: &str, can_be_damaged: bool) -> String {
     }
 }
 
-fn ending(last: Option<StepRecord>, outcome: Option<&Outcome>) -> String {
+fn ending(last: Option<StepRecord>, result: Result<&Outcome, &RunError>) -> String {
     let Some(StepRecord { step, time, .. }) = last else {
         return "FAILED at the first solve; there is no state to save".to_owned();
     };
     let end = rounded(time);
-    match outcome.map(|outcome| outcome.stopped) {
-        None => format!("FAILED after t = {end}; the state there is saved"),
-        Some(Some(stop)) => format!(
+    match result.map(|outcome| outcome.stopped) {
+        Err(RunError::Interrupted(_)) => {
+            format!("interrupted after t = {end}; the state there is saved, --restart goes on")
+        }
+        Err(_) => format!("FAILED after t = {end}; the state there is saved"),
+        Ok(Some(stop)) => format!(
             "STOPPED at t = {} ± {:.1e}{}: min ζ = {:.4} there reaches ζ_*; \
              saved is the state before, t = {end} (step {step})",
             rounded(stop.time),
@@ -169,7 +173,7 @@ fn ending(last: Option<StepRecord>, outcome: Option<&Outcome>) -> String {
             if stop.from_mesh.is_some() { "" } else { " (the time steps alone)" },
             stop.zeta_min,
         ),
-        Some(None) if step == 0 => format!("solved at t = {end}"),
-        Some(None) => format!("finished at t = {end} after {step} steps"),
+        Ok(None) if step == 0 => format!("solved at t = {end}"),
+        Ok(None) => format!("finished at t = {end} after {step} steps"),
     }
 }

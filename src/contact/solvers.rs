@@ -76,7 +76,7 @@ impl ContactReport {
         self.linear_iterations += solve.iterations;
         self.factorisations += solve.factorisations;
         let detail = "the stiffness of its linear system is not positive definite, or too \
-                      ill-conditioned for the tolerance";
+                      ill-conditioned for the tolerance, or a KSP of PETSc options has not converged";
         let stopped = || ContactError::stopped(method, *self, Kkt::UNKNOWN, detail);
         solve.converged.then_some(()).ok_or_else(stopped)
     }

@@ -59,7 +59,8 @@ pub enum StepFailure {
     /// The damage system has no finite solution.
     #[error(
         "the damage equation has no finite answer: its source overflows or its matrix is not \
-         positive definite; look for extreme numbers in [damage], the loads and the mesh"
+         positive definite; look for extreme numbers in [damage], the loads and the mesh, and for PETSc \
+         options that begin with -damage_"
     )]
     Damage,
     /// The relative residual of the damage system is above its tolerance.
