@@ -40,7 +40,7 @@ pub struct StepRecord {
     pub displacement_max: f64,
     /// fᵀu, of the loads alone, J per metre of thickness.
     pub work: f64,
-    /// Σ normal reactions of Γ_C, not the length of their resultant, N per metre of thickness.
+    /// Σ normal reactions of Γ_C (not their resultant), N per metre of thickness.
     pub contact_force: f64,
     /// Nodes in contact: those of Γ_C in the active set.
     pub active_nodes: usize,
@@ -54,9 +54,9 @@ pub struct StepRecord {
     pub fallbacks: usize,
     /// Contraction per iteration of a fixed-point method; empty for others.
     pub contraction: Option<f64>,
-    /// KKT residual, relative: nodal forces that nothing carries.
+    /// KKT residual, relative: unbalanced nodal forces.
     pub kkt_stationarity: f64,
-    /// KKT residual, relative: how far nodes are in the foundation.
+    /// KKT residual, relative: penetration of nodes into the foundation.
     pub kkt_primal: f64,
     /// KKT residual, relative: contact forces that pull.
     pub kkt_dual: f64,
@@ -71,7 +71,7 @@ pub struct StepRecord {
 }
 
 impl Step {
-    /// Enters the accuracy of ζ_n; `None` means that the damage solve was skipped, so ζ_n is exact.
+    /// Sets the accuracy of ζ_n; `None` means that the damage solve was skipped, so ζ_n is exact.
     pub(super) fn set_damage_certificate(&mut self, certificate: Option<DamageCertificate>) {
         self.skipped_damage_solve = certificate.is_none();
         let DamageCertificate { residual, error, .. } = certificate.unwrap_or_default();
@@ -91,8 +91,8 @@ impl StepRecord {
         report: &ContactReport,
         kkt: &Kkt,
     ) -> Self {
-        let pressing = || state.contact.iter().filter(|point| point.active);
-        let mut active: Vec<usize> = pressing().map(|point| point.node).collect();
+        let points = || state.contact.iter().filter(|point| point.active);
+        let mut active: Vec<usize> = points().map(|point| point.node).collect();
         active.dedup();
         let partition = &problem.body.nodes.partition;
         let comm = partition.comm();
@@ -104,7 +104,7 @@ impl StepRecord {
             displacement_max: partition.max_norm(&state.u),
             work: partition.dot(load, &state.u, 2),
             // An empty sum is -0.0.
-            contact_force: comm.total(pressing().map(|point| point.force).sum()) + 0.0,
+            contact_force: comm.total(points().map(|point| point.force).sum()) + 0.0,
             active_nodes: comm.count(active.len()),
             iterations: report.iterations,
             linear_iterations: report.linear_iterations,

@@ -1,4 +1,4 @@
-//! (26) as its solver takes it: in the unknowns c, with all loads on the free ones.
+//! (26) in the form for its solver: in the unknowns c, with all loads on the free unknowns.
 
 use super::ContactStep;
 use crate::{
@@ -7,16 +7,16 @@ use crate::{
     petsc::{PetscError, Vector},
 };
 
-/// A force scale below this part of the forces that prescribed displacements or obstacles cause, as they
-/// move the nodes there alone, is rounding.
+/// The force scale is at least this fraction of the forces due to prescribed displacements or obstacles, if these
+/// move only their own nodes. Smaller forces are rounding.
 const LIFTED: f64 = 1e-2;
 
 impl ContactStep<'_> {
-    /// Replaces c by the solution of (26) for the load of the free unknowns, f − K u_D with u_D the
-    /// displacements of the prescribed ones, `lift`.
+    /// Replaces c by the solution of (26) with the load f − K u_D of the free unknowns, where u_D = `lift` has the
+    /// prescribed unknowns.
     ///
-    /// Of the answer c before, the certificate may have told the force scale F of residuals, and f − Ku, `unbalanced`:
-    /// the load is then K c plus that, so that rounding of the assembled K does not count.
+    /// The certificate of the previous answer c may give the force scale F and the residual forces
+    /// `unbalanced` = f − Ku. The load is then K c + `unbalanced`, so that rounding of the assembled K cancels.
     pub(super) fn solve_contact(
         &mut self,
         case: &LoadCase,

@@ -1,6 +1,6 @@
-//! Rigid motions that no contact force resists: (26) has then many answers, with the same forces.
+//! Rigid motions that no contact force resists. (26) then has many answers with the same forces.
 
-use super::{ContactStep, active_bounds, certificate::Judged};
+use super::{ContactStep, active_bounds, certificate::Candidate};
 use crate::{
     contact::{self, ContactPoint, least_motion},
     fem::RigidMotion,
@@ -10,22 +10,22 @@ use crate::{
 use nalgebra::DVector;
 
 impl ContactStep<'_> {
-    /// The combinations of the motions that contact alone constrains along which no contact force above
-    /// `level` times F does work.
+    /// Combinations of the rigid motions that only contact constrains. No contact force above `level` times F does
+    /// work on them.
     fn unresisted(&self, contact: &[ContactPoint], level: f64, force: f64) -> Vec<DVector<f64>> {
         let active = active_bounds(&self.problem.constraints, contact, level * force);
         let comm = self.problem.body.nodes.partition.comm();
         contact::unconstrained_motions(comm, &self.rigid, &active)
     }
 
-    /// The part of F below which a contact force is no certain constraint. A residual at the tolerance
-    /// does work of up to √N times that on a motion (Cauchy and Schwarz), which at the lever of
-    /// one mesh width, 1/√N of the body, is a force √N times as large.
+    /// Contact forces below this fraction of F may be residuals, so they do not count as constraints. By Cauchy and
+    /// Schwarz, a residual τF does the work of a force √N τF on a rigid motion. At a lever of one mesh width, 1/√N
+    /// of the body, this is a force N τF.
     fn uncertain(&self) -> f64 {
         self.problem.body.nodes.partition.total() as f64 * self.problem.tolerance
     }
 
-    /// A rigid motion that the active nodes leave unconstrained. Without load (`force` = 0) the body
+    /// A rigid motion that the active nodes leave unconstrained. `None` without load (`force` = 0): the body then
     /// rests where it is.
     pub(super) fn unconstrained_motion(
         &self,
@@ -37,25 +37,25 @@ impl ContactStep<'_> {
         Some(self.problem.motions.combined(&self.problem.body, first))
     }
 
-    /// The answer of least ∫|u|² among those that differ from a certified one by such a motion: every
-    /// solver's is then the same. Where it is not certified, because a force that was neglected counts, or is a
-    /// residual across a gap that opens, the answer stays, and the second value is the largest
-    /// residual of the other. Collective.
-    pub(super) fn of_least_displacement(
+    /// The answer of minimum ∫|u|² among all that differ from the certified `candidate` by an unresisted motion; it
+    /// does not depend on the solver. Its certificate may fail if a neglected contact force counts or acts across
+    /// an opening gap. Then `candidate` is returned with the largest residual of the rejected answer; otherwise
+    /// this residual is 0. Collective.
+    pub(super) fn of_minimum_displacement(
         &mut self,
-        judged: Judged,
+        candidate: Candidate,
         case: &LoadCase,
-    ) -> Result<(Judged, f64), PetscError> {
-        let mut refused = 0.0;
+    ) -> Result<(Candidate, f64), PetscError> {
+        let mut rejected = 0.0;
         let problem = self.problem;
-        let tolerance = judged.kkt.worst().max(problem.tolerance);
+        let tolerance = candidate.kkt.worst().max(problem.tolerance);
         for level in [self.uncertain(), problem.tolerance] {
-            let left = self.unresisted(&judged.contact, level, judged.force);
-            if left.is_empty() || judged.force == 0.0 {
+            let left = self.unresisted(&candidate.contact, level, candidate.force);
+            if left.is_empty() || candidate.force == 0.0 {
                 break;
             }
-            let before = self.next.datum.clone();
-            let total = before.total(judged.u.clone());
+            let before = self.next.reference.clone();
+            let total = before.total(candidate.u.clone());
             let amplitudes = problem.motions.amplitudes(&problem.body, &total);
             let (_, bounds) = before.pose(&problem.constraints, case);
             let c: Vec<f64> = self.c.read(|c| bounds.iter().map(|b| c[b.dof]).collect())?;
@@ -64,14 +64,14 @@ impl ContactStep<'_> {
                 break;
             };
             let motion = problem.motions.combined(&problem.body, &further);
-            self.next.datum.add(&problem.constraints, &motion.field(&problem.body));
-            let moved = self.certify(judged.u.clone(), case);
+            self.next.reference.add(&problem.constraints, &motion.field(&problem.body));
+            let moved = self.certify(candidate.u.clone(), case);
             if moved.kkt.within(tolerance) {
                 return Ok((moved, 0.0));
             }
-            refused = moved.kkt.worst();
-            self.next.datum = before;
+            rejected = moved.kkt.worst();
+            self.next.reference = before;
         }
-        Ok((judged, refused))
+        Ok((candidate, rejected))
     }
 }

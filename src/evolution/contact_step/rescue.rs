@@ -1,12 +1,12 @@
-//! Another solver for the steps in which the one that was asked for stops short of the tolerance.
+//! A second solver for steps in which the chosen solver stops short of the tolerance.
 
 use super::ContactStep;
 use crate::evolution::{RunError, Step};
 use std::mem;
 
 impl ContactStep<'_> {
-    /// u_n at `time` for the nodal damage `zeta`, from the solver or, where that stops short, from its
-    /// rescuer; the step's report tells. Every solve starts from the accepted steps.
+    /// u_n at `time` for the nodal damage `zeta`, from the solver or, if it stops short, from its rescuer, which
+    /// the step's report then names. Every solve starts from the accepted steps.
     ///
     /// # Errors
     /// The solver failed, or neither its answers nor those of its rescuer met the KKT tolerance.
@@ -18,14 +18,14 @@ impl ContactStep<'_> {
             return solved;
         };
         mem::swap(&mut self.solver, rescuer);
-        // One solver's warm start is none for another, and what the solver believed has misled it.
+        // The rescuer cannot use the solver's warm start, and after this failure the solver should not either.
         self.accepted.warm_start.clear();
         let rescued = self.solve_by_one(step, time, zeta);
         let name = self.solver.name();
-        self.rescuer.iter_mut().for_each(|asked| mem::swap(&mut self.solver, asked));
+        self.rescuer.iter_mut().for_each(|other| mem::swap(&mut self.solver, other));
         self.next.warm_start.clear();
         match rescued {
-            // What rounding allows is worth telling, if only the rescuer has found it.
+            // The first error is reported, unless only the rescuer's error states the limit by rounding.
             Err(RunError::Contact { source: further, .. })
                 if source.is_limited() || !further.is_limited() =>
             {
