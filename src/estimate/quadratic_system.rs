@@ -15,12 +15,11 @@ pub(super) struct QuadraticSystem<'a> {
     diagonal: Vec<f64>,
     /// The nodes at the vertices that this rank owns.
     vertices: &'a [usize],
-    /// The matrix of P1 of a step of about this length with its factor, and the length, s.
+    /// The factorised system in P1 for a step of about this length, and the length of that step, s.
     linear: (&'a mut DamageSystem, f64),
 }
 
-/// The fraction of the energy of the solution that the iteration may leave, and its largest number of
-/// iterations.
+/// The fraction of the energy of the solution that the iteration may leave, and the maximum number of iterations.
 const REST: f64 = 1e-3;
 const ITERATIONS: usize = 30;
 
