@@ -49,7 +49,7 @@ pub struct Adapted {
     pub steps: f64,
     /// The error bars of the figures from the mesh, once they are measured.
     pub bars: Vec<Bar>,
-    /// The largest measured relative error and its name, once it is measured.
+    /// The maximum measured relative error and its name, once it is measured.
     pub worst: Option<(String, f64)>,
     /// The reason why the accuracy was not reached, if it was not.
     pub short: Option<String>,

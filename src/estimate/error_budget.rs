@@ -9,7 +9,7 @@ use crate::{
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Estimated relative errors of the last accepted state: of u in the energy norm, and of the damage ζ₀ − ζ in L².
+/// Estimated relative errors of the last accepted state: for u in the energy norm, and for the damage ζ₀ − ζ in L².
 /// They are `None` without damage. The errors of the time steps are also `None` if the steps are too few for an
 /// estimate.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
@@ -22,8 +22,8 @@ pub struct ErrorBudget {
     pub displacement_steps: Option<f64>,
     /// The error of the damage from the time steps.
     pub damage_steps: Option<f64>,
-    /// The error of the largest displacement from the solver; infinite if the active nodes alone do not support
-    /// the body.
+    /// The error of the maximum displacement from the solver; infinite if the active nodes alone do not support the
+    /// body.
     pub solver: f64,
     /// The error bars of the figures by their names, from mesh and time steps, each in the unit of its figure.
     /// Empty if they are not measured.

@@ -16,7 +16,7 @@ const FIRST_PROBE: usize = 7;
 /// The scale of a figure is at least this fraction of the largest figure of its dimension. Otherwise a force that
 /// is zero by symmetry would have no relative error.
 const MIN_SCALE: f64 = 1e-3;
-/// The scale of a moment is at least this fraction of the largest force times the body's radius of gyration. A
+/// The scale of a moment is at least this fraction of the maximum force times the body's radius of gyration. A
 /// moment is small about any point near the line of its force.
 const MIN_MOMENT_SCALE: f64 = 0.1;
 /// The relative error of the integral of a body force that varies in space. Both meshes of a measurement may
@@ -62,8 +62,8 @@ pub struct Bar {
     pub dimension: Dimension,
     /// The error bar, in the unit of the figure.
     pub bar: f64,
-    /// The scale of the required accuracy: the largest value of the figure in the run, and for a damage ζ the
-    /// largest 1 − ζ.
+    /// The scale of the required accuracy: the maximum value of the figure in the run, and for a damage ζ the
+    /// maximum 1 − ζ.
     pub scale: f64,
 }
 
@@ -89,7 +89,7 @@ impl DiscreteProblem {
                 (true, 2, _) => (name, Moment, MOMENTS),
                 (true, ..) => (name, Force, FORCES),
                 (false, _, 0 | 1) => (name, Length, first),
-                // The scale of a damage at a point is the largest damage of the body.
+                // The scale of a damage at a point is the maximum damage of the body.
                 (false, _, 2) => (name, Damage, 3),
                 _ => (name, Stress, first + 1),
             }
@@ -134,7 +134,7 @@ impl DiscreteProblem {
     }
 
     /// The values of [`Self::quantities`] with zeros in place of rounding. A value is compared with the largest of
-    /// its group, and a moment also with the largest force times the body's radius of gyration.
+    /// its group, and a moment also with the maximum force times the body's radius of gyration.
     pub(crate) fn without_rounding(&self, mut values: Vec<f64>) -> Vec<f64> {
         let figures = &self.figures()[OF_RECORD.len()..];
         let most = |group: usize| {

@@ -11,8 +11,8 @@ use crate::{
 /// A problem in P2, solved by conjugate gradients. They start from the displacements in P1, plus a step along the
 /// change by the last solve.
 ///
-/// The preconditioner is the sum of two corrections: K₁⁻¹ of the forces as P1 sees them, and the residual
-/// over the diagonal of K (Xu, SIAM Review 34, 1992).
+/// The preconditioner is the sum of two corrections: K₁⁻¹ times the forces transferred to P1, and the residual over
+/// the diagonal of K (Xu, SIAM Review 34, 1992).
 pub(super) struct FineSolve<'a> {
     session: &'a Session,
     problem: &'a DiscreteProblem,
@@ -180,7 +180,7 @@ impl System<'_, '_> {
         Ok(forces)
     }
 
-    /// The owned entries of a field with room for those of other ranks.
+    /// The owned entries of a field with room for the entries of other ranks.
     fn extended(&self, owned: &[f64]) -> Vec<f64> {
         let mut field = owned.to_vec();
         field.resize(2 * self.solve.problem.body.nodes.points.len(), 0.0);

@@ -5,7 +5,7 @@
 //!
 //! |ε*|² = |ε(u₂)|² + c (|ε(u₂)|² − |ε(u₁)|²), c = η²/‖u₂ − u₁‖², but at most 1.
 //!
-//! A run reaches ζ_* at a singular point, where both orders converge at the same rate: there c = 1.
+//! A run reaches ζ_* at a singular point, where both orders converge at the same rate; then c = 1.
 
 use super::{
     order_pair::OrderPair,

@@ -36,7 +36,7 @@ impl Instants {
         }
     }
 
-    /// Appends the last state of the run. It replaces the one before if that is close to it.
+    /// Appends the last state of the run. If the state before is close to it, that state is dropped.
     pub(crate) fn end(&mut self, last: &State) {
         if let [.., before, end] = &self.states[..]
             && last.time - end.time < 0.5 * (end.time - before.time)

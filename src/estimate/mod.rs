@@ -7,13 +7,13 @@
 //!   fitted around each vertex;
 //! - the error of the damage: (25) is solved again, for the difference from a much finer mesh;
 //! - [`Bar`]: the error bar of each printed figure, measured by a second run on the mesh bisected everywhere;
-//! - [`ErrorBudget`]: what the mesh, the time steps and the solver contribute.
+//! - [`ErrorBudget`]: the errors by the mesh, the time steps and the solver.
 //!
 //! [`adapted`] makes a mesh for an accuracy ([`Adapted`]). Each round has a run with few steps, estimates and
 //! bisection. A measurement ends the rounds.
 //!
 //! What crosses the door: at the end of a run `evolution` hands over its last state, some earlier states and its
-//! factor of K, and gets the estimates in its [`Outcome`]. `command` requests an adapted mesh and error bars.
+//! factor of K. It gets the estimates in its [`Outcome`]. `command` requests an adapted mesh and error bars.
 //! Nothing here changes the answer of a run.
 
 mod hierarchical;

@@ -13,11 +13,11 @@ use crate::{
 };
 use std::collections::HashMap;
 
-/// The error of penetrations, as a fraction of the largest displacement …
+/// The error of penetrations, as a fraction of the maximum displacement …
 const RESOLVED: f64 = 1e-3;
 /// … except at peaks of the foundation that are narrower than this fraction of an edge.
 const NARROWEST: f64 = 1e-5;
-/// A penetration above this fraction of the largest displacement is noted.
+/// A penetration above this fraction of the maximum displacement is noted.
 const NOTED: f64 = 0.05;
 
 /// The penetration of the foundation between the nodes of an edge.
@@ -25,7 +25,7 @@ const NOTED: f64 = 0.05;
 pub(super) struct Penetration {
     /// The triangle of the edge, in the undivided mesh.
     pub(super) triangle: usize,
-    /// The largest p(s) of the edge, m.
+    /// The maximum p(s) of the edge, m.
     pub(super) depth: f64,
     /// Where it is, m.
     at: [f64; 2],
@@ -109,12 +109,12 @@ impl DiscreteProblem {
         sides
     }
 
-    /// The largest penetration between the nodes of an edge and its place, m, to [`RESOLVED`] of the `displacement`.
-    /// It is measured from the line between the penetrations at the ends. These need not be zero, because the
-    /// normal at a node is the mean of the normals of two edges.
+    /// The maximum penetration between the nodes of an edge and its place, m, to [`RESOLVED`] of the
+    /// `displacement`. It is measured from the line between the penetrations at the ends. These need not be zero,
+    /// because the normal at a node is the mean of the normals of two edges.
     ///
-    /// Branch and bound: a part of the edge is halved while the upper bound of u·ν there, less the lower bound of
-    /// the gap ([`Expression::range`](crate::scene::Expression::range)), exceeds the depth found so far.
+    /// Branch and bound: a part of the edge is halved while max u·ν − min g there may exceed the depth found so
+    /// far; see [`Expression::range`](crate::scene::Expression::range).
     fn deepest(&self, gap: &Gap, edge: &Edge, state: &State, displacement: f64) -> (f64, [f64; 2]) {
         let (points, t) = (&self.body.nodes.points, state.time);
         let u = |node: usize| [state.u[2 * node], state.u[2 * node + 1]];
@@ -173,8 +173,8 @@ impl DiscreteProblem {
         (depth > NOTED * displacement).then(|| {
             format!(
                 "between its nodes boundary \"{}\" lies {depth:.1e} in the foundation at ({x:.4}, {y:.4}), \
-                 {:.0} % of the largest displacement: contact there is narrower than the mesh shows, \
-                 displacements and forces may be far off; refine there, or ask for an accuracy",
+                 {:.0} % of the largest displacement: displacements and forces may be far off; \
+                 refine the mesh there, or set accuracy",
                 self.scene().boundaries[boundary].name,
                 100.0 * depth / displacement
             )

@@ -1,4 +1,4 @@
-//! Recovered strains: an estimate of how well a mesh resolves displacements.
+//! Recovered strains, to estimate the discretisation error of displacements.
 
 use super::hierarchical::{coefficients, mass};
 use crate::{
@@ -225,8 +225,8 @@ fn fits(
         }
         partition.update(fields.as_flattened_mut(), 19)?;
     }
-    // Vertices still without a fit, as in strips one triangle thick, take a fit of the degree of the strains, which
-    // a single triangle determines.
+    // Other vertices, as in strips one triangle thick, take a fit of the degree of the strains. One triangle
+    // determines it.
     for (vertex, field) in fields.iter_mut().enumerate().take(partition.owned()) {
         if field[18] == 0.0 {
             *field = known(own_fit(vertex, degree - 1));

@@ -22,8 +22,8 @@ const MAX_ADDED: f64 = 100_000.0;
 /// An error above this fraction of the whole is noted.
 const NOTED: f64 = 0.05;
 
-/// The edges that must be halved for a relative `accuracy`, by their ends in increasing order. The largest
-/// |u| is `displacement`, m. There are two kinds:
+/// The edges that must be halved for a relative `accuracy`, by their ends in increasing order. The maximum |u| is
+/// `displacement`, m. There are two kinds:
 ///
 /// - edges on which |u_D − Iu_D| exceeds `accuracy` · `displacement` somewhere, with Iu_D the interpolation of
 ///   u_D at the nodes;
@@ -108,7 +108,7 @@ fn displacements(conditions: &[Condition]) -> impl Iterator<Item = &Expression> 
     components.flatten().flatten().filter(|u| u.depends_on_space())
 }
 
-/// Per edge of a curve: max |u_D − Iu_D| at some times, m. Then the largest |u_D| of all edges, m.
+/// Per edge of a curve: max |u_D − Iu_D| at some times, m. Then the maximum |u_D| of all edges, m.
 fn missed_displacements(
     scene: &Scene,
     mesh: &Mesh,

@@ -66,7 +66,7 @@ pub struct ContactStep<'a> {
 struct Memory {
     /// The reference configuration of the displacements.
     reference: Reference,
-    /// The largest scales of residuals so far.
+    /// The maximum scales of residuals so far.
     scales: Scales,
     /// Per bound: 1 if it is active, else 0.
     active: Vec<f64>,
@@ -82,7 +82,7 @@ pub(super) struct ContactState {
     factor: FactorState,
 }
 
-/// The force scale is at least this fraction of the largest load. Otherwise the answer to a rounded zero
+/// The force scale is at least this fraction of the maximum load. Otherwise the answer to a rounded zero
 /// (sin(pi) = 1.2e-16) would need as many digits as any other.
 const MIN_LOAD: f64 = 1e-6;
 /// The energies of larger displacements, m, overflow.
@@ -204,8 +204,7 @@ impl<'a> ContactStep<'a> {
     }
 
     /// Starts from the accepted steps: sets c, the reference and the solver's warm start. If the active bounds do
-    /// not support the body, the reference moves by the rigid motion along which the load drives the body until
-    /// contact.
+    /// not support the body, the load drives it as a rigid body until contact, and the reference follows.
     fn start(&mut self, case: &LoadCase) -> Result<(), PetscError> {
         let (problem, comm) = (self.problem, self.problem.body.nodes.partition.comm());
         let constraints = &problem.constraints;

@@ -198,8 +198,8 @@ impl DiscreteProblem {
         let part = body.nodes.partition.comm().total(large) / body.area;
         (part > NOTICEABLE).then(|| {
             format!(
-                "|∇u| exceeds {LARGE} in {:.0} % of the body: too much for small strains and rotations, \
-                 and so for linear elasticity",
+                "|∇u| exceeds {LARGE} in {:.0} % of the body: strains or rotations are too large \
+                 for linear elasticity",
                 100.0 * part
             )
         })

@@ -52,7 +52,7 @@ pub struct Outcome {
     /// Estimated error of the last ζ over the damage done, for adaptive steps.
     #[serde(skip)]
     pub damage_error: Option<f64>,
-    /// The steps with the largest stationarity residual and the largest displacement before the last step.
+    /// The steps with the maximum stationarity residual and the maximum displacement before the last step.
     pub(super) least_accurate: Option<Rc<Step>>,
     pub(super) most_displaced: Option<Rc<Step>>,
 }
@@ -90,7 +90,7 @@ impl Outcome {
     }
 
     /// Sets the error bars: the errors `of_mesh` plus the errors of the time steps. There are none if the run
-    /// stopped at ζ_*, as another mesh stops at another time, or has too few steps to estimate their error.
+    /// stopped at ζ_*, because another mesh stops at another time, or if it has too few steps for an estimate.
     pub fn set_bars(&mut self, problem: &DiscreteProblem, of_mesh: &[Bar]) {
         let unknown = problem.damage().is_some() && self.errors.zeta_steps.is_none();
         if self.stopped.is_some() || unknown {

@@ -36,19 +36,19 @@ pub struct StepRecord {
     pub zeta_min: f64,
     /// Mean of ζ, ∫ζ/|Ω|.
     pub zeta_mean: f64,
-    /// Largest nodal |u|, m.
+    /// Maximum nodal |u|, m.
     pub displacement_max: f64,
     /// fᵀu, of the loads alone, J per metre of thickness.
     pub work: f64,
     /// Σ normal reactions of Γ_C (not their resultant), N per metre of thickness.
     pub contact_force: f64,
-    /// Nodes in contact: those of Γ_C in the active set.
+    /// Nodes of Γ_C in the active set.
     pub active_nodes: usize,
     /// Iterations of the contact solver.
     pub iterations: usize,
     /// Iterations of the linear solvers inside it.
     pub linear_iterations: usize,
-    /// Factorisations (not those of a preconditioner chosen by PETSc options).
+    /// Factorisations, except by a preconditioner from PETSc options.
     pub factorisations: usize,
     /// Times the contact solver left its fast path.
     pub fallbacks: usize,

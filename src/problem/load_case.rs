@@ -4,7 +4,7 @@ use super::{DiscreteProblem, SetupError};
 use crate::contact::Bound;
 use nalgebra::DVector;
 
-/// A load below this fraction of the largest load of the run counts as zero (rounding).
+/// A load below this fraction of the maximum load of the run counts as zero (rounding).
 const ZERO_LOAD: f64 = 1e-14;
 
 /// The data of the contact problem (26) at one time.
@@ -41,7 +41,7 @@ impl DiscreteProblem {
         Ok(())
     }
 
-    /// Nodal loads at `time`, N per metre of thickness. Rounding (sin(pi) = 1.2e-16 of the largest load) counts as
+    /// Nodal loads at `time`, N per metre of thickness. Rounding (sin(pi) = 1.2e-16 of the maximum load) counts as
     /// zero.
     pub fn load(&self, time: f64) -> Vec<f64> {
         let mut load = self.loads.at(&self.body, time);
@@ -84,8 +84,8 @@ impl DiscreteProblem {
         }
     }
 
-    /// The prescribed unknowns and the bounds on the others at `time`, from the `values` of the prescribed rows and
-    /// the `gaps` of all gap rows (empty if none depends on time).
+    /// The prescribed unknowns and the bounds on the others at `time`. `values` are the values of the prescribed
+    /// rows. `gaps` are the gaps of all gap rows, or empty if none depends on time.
     fn posed(
         &self,
         time: f64,

@@ -61,15 +61,15 @@ pub(super) struct Measurement {
     /// The relative error of u: the estimate on the bisected mesh at the worst time. Without damage, the error by
     /// the change of u at the end counts if it is larger.
     pub(super) displacement: f64,
-    /// The error of ‖u‖² over its largest value.
+    /// The error of ‖u‖² over its maximum value.
     pub(super) energy: f64,
     /// The relative error of the time of ζ_*; infinite if only one of the two runs reaches it.
     pub(super) stop: f64,
     /// Per triangle of the mesh: its share of the squared relative error of u, from the estimates on its parts, and
-    /// the largest penetration at their edges, m.
+    /// the maximum penetration at their edges, m.
     pub(super) shares: Vec<f64>,
     pub(super) depths: Vec<f64>,
-    /// Per triangle: the change of the reactions on its edges, N per metre of thickness, and the largest change of
+    /// Per triangle: the change of the reactions on its edges, N per metre of thickness, and the maximum change of
     /// ζ at its nodes and midpoints.
     reactions: Vec<f64>,
     zeta: Vec<f64>,
@@ -148,14 +148,14 @@ impl Measurement {
         errors
     }
 
-    /// The largest relative error of the figures of ζ; the time steps change these most.
+    /// The maximum relative error of the figures of ζ; the time steps change these most.
     pub(super) fn of_zeta(&self) -> f64 {
         let bars = self.bars.iter().filter(|bar| bar.dimension == Dimension::Damage);
         bars.map(Bar::relative).fold(0.0, f64::max)
     }
 
     /// Per triangle: does it cause most of the change of the figure `name`? For min ζ and ζ at a point, ζ changes
-    /// there by a large part of its largest change. For forces and moments, the contact reactions do so, in few
+    /// there by a large part of its maximum change. For forces and moments, the contact reactions do so, in few
     /// triangles. `None` if the whole mesh causes the change.
     pub(super) fn places(&self, name: &str) -> Option<Vec<bool>> {
         let bar = self.bars.iter().find(|bar| bar.name == name)?;
@@ -216,8 +216,8 @@ fn bars(coarse: &Pilot, fine: &Pilot, square: f64) -> Vec<Bar> {
     bars
 }
 
-/// ‖ζ_h − ζ_{h/2}‖ over ‖1 − ζ_{h/2}‖ at the end, as an error, and the largest |ζ_h − ζ_{h/2}| of each
-/// triangle of `mesh`. Collective.
+/// ‖ζ_h − ζ_{h/2}‖ over ‖1 − ζ_{h/2}‖ at the end, as an error, and the maximum |ζ_h − ζ_{h/2}| of each triangle of
+/// `mesh`. Collective.
 fn damage(mesh: &Mesh, halved: &Refinement, coarse: &Pilot, fine: &Pilot) -> (f64, Vec<f64>) {
     let mut before = at_vertices(mesh, &coarse.zeta());
     let middles = halved.halved_edges.iter().map(|&[a, b]| 0.5 * (before[a] + before[b]));

@@ -12,7 +12,7 @@ use crate::{
 pub(super) const INSTANTS: usize = 12;
 /// Number of these times in a run that is only compared with another.
 const FEW: usize = 3;
-/// Errors at the end are relative to at least this fraction of the largest ‖u‖².
+/// Errors at the end are relative to at least this fraction of the maximum ‖u‖².
 const MIN_ENERGY: f64 = 1e-4;
 
 /// A run with few steps, and its errors on each triangle of the undivided mesh.
@@ -28,17 +28,17 @@ struct History {
     /// The number of times at which errors are estimated, and the last such time so far, s.
     instants: usize,
     last: Option<f64>,
-    /// max_t ‖ε* − ε(u)‖²_T, and the largest sum over T at any time.
+    /// max_t ‖ε* − ε(u)‖²_T, and the maximum sum over T at any time.
     squares: Vec<f64>,
     worst: f64,
-    /// max_t ‖u‖², and the largest |u| at any time, m.
+    /// max_t ‖u‖², and the maximum |u| at any time, m.
     energy: f64,
     displacement: f64,
     /// ‖ε* − ε(u)‖²_T, their sum and ‖u‖² at the last time.
     end: (Vec<f64>, f64, f64),
-    /// The largest penetration at an edge of each triangle at any time, m.
+    /// The maximum penetration at an edge of each triangle at any time, m.
     depths: Vec<f64>,
-    /// The times of all steps, s, with their figures, and the largest size of each figure.
+    /// The times of all steps, s, with their figures, and the maximum size of each figure.
     figures: Vec<(f64, Vec<f64>)>,
     sizes: Vec<f64>,
 }
@@ -71,7 +71,7 @@ impl<'a> Pilot<'a> {
         self.outcome.stopped.as_ref().map(|stop| stop.time)
     }
 
-    /// max (ζ₀ − ζ) at the end and its mean over the body; 0 where ζ_* was reached. Collective.
+    /// max (ζ₀ − ζ) at the end and its mean over the body; 0 if ζ_* was reached. Collective.
     pub(super) fn damage(&self) -> [f64; 2] {
         if self.outcome.stopped.is_some() {
             return [0.0; 2];
@@ -82,17 +82,17 @@ impl<'a> Pilot<'a> {
         [body.vertices.partition.min_max(&done).1, body.mean(&done)].map(|damage| damage.max(0.0))
     }
 
-    /// The largest |u| at any time, m.
+    /// The maximum |u| at any time, m.
     pub(super) fn displacement(&self) -> f64 {
         self.history.displacement
     }
 
-    /// The largest penetration at an edge of each triangle at any time, m.
+    /// The maximum penetration at an edge of each triangle at any time, m.
     pub(super) fn depths(&self) -> &[f64] {
         &self.history.depths
     }
 
-    /// ‖u‖² at the end, N m per metre of thickness, and the largest one at any time.
+    /// ‖u‖² at the end, N m per metre of thickness, and the maximum at any time.
     pub(super) fn energies(&self) -> [f64; 2] {
         [self.history.end.2, self.history.energy]
     }

@@ -11,7 +11,7 @@ use crate::{
 };
 use std::collections::HashSet;
 
-/// A mesh is refined for this fraction of the accuracy asked for …
+/// A mesh is refined for this fraction of the required accuracy …
 const AIM: f64 = 0.7;
 /// … and good enough if its estimates are at most this fraction of it.
 const ENOUGH: f64 = 0.8;
@@ -25,7 +25,7 @@ const MIN_GOAL: f64 = 0.25;
 /// If the accuracy is required for some figures only, these are measured once u and the damage have at most this
 /// estimated error.
 const ROUGH: f64 = 0.1;
-/// Allowed penetration between the nodes, as a fraction of the accuracy times the largest displacement.
+/// Allowed penetration between the nodes, as a fraction of the accuracy times the maximum displacement.
 const PENETRATION: f64 = 0.5;
 /// The size of a triangle is multiplied by this where data of the scene are not resolved …
 const HALF: f64 = 0.5;

@@ -17,7 +17,7 @@ const TOLERANCES: f64 = 100.0;
 /// load is then too small by about the square of this error.
 const COARSE: f64 = 0.5;
 /// The discretisation error is estimated at the last step, unless its displacements are below this fraction of the
-/// largest displacement of the run.
+/// maximum displacement of the run.
 const UNLOADED: f64 = 0.01;
 /// A deformation below this fraction of the rigid motion counts as rounding.
 const CARRIED: f64 = 1e-11;
@@ -31,12 +31,12 @@ pub struct Accuracy {
     /// KKT residuals bound forces; if K is ill-conditioned, small forces move u far. Infinite if the active nodes
     /// alone do not support the body.
     ///
-    /// The larger error of two steps: the last one, and the one with the largest stationarity residual.
+    /// The larger error of two steps: the last one, and the one with the maximum stationarity residual.
     pub displacement: f64,
     /// The time of this step, s.
     pub time: f64,
     /// The discretisation error in the energy norm ([`RecoveredStrains`](crate::estimate::RecoveredStrains)) in the
-    /// last step, or if it is unloaded, in the step with the largest displacement.
+    /// last step. If it is unloaded: in the step with the maximum displacement.
     pub energy: f64,
 }
 
@@ -64,9 +64,9 @@ impl Accuracy {
         };
         let energy = (self.energy > COARSE).then(|| {
             format!(
-                "the mesh is too coarse for this answer: strains jump from triangle to triangle \
-                 by about {:.0} % (energy norm), and displacements may be far too small; use \
-                 smaller or less stretched triangles, several across a part that bends",
+                "the mesh is too coarse: strains jump between triangles by about {:.0} % (energy \
+                 norm), and displacements may be far too small; use smaller or less stretched \
+                 triangles, several across a part that bends",
                 100.0 * self.energy
             )
         });
@@ -106,9 +106,9 @@ impl<'a> ContactStep<'a> {
 }
 
 impl Compliance<'_> {
-    /// Estimates the errors of the last step of a run, relative to the largest displacement. The step with the
-    /// largest stationarity residual follows only if the first error, times the ratio of the two residuals, comes
-    /// near the promised error. The kept factor is usually good enough.
+    /// Estimates the errors of the last step of a run, relative to the maximum displacement. The step with the
+    /// maximum stationarity residual follows if the first error times the ratio of the residuals comes near the
+    /// promised error. The kept factor is usually good enough.
     pub(crate) fn accuracy(&mut self, outcome: &Outcome) -> Result<Accuracy, PetscError> {
         let problem = self.problem;
         let body = &problem.body;

@@ -92,8 +92,8 @@ impl ContactStep<'_> {
         }
     }
 
-    /// The scales of an answer: at least the scales of the run so far, and the rounding of the reference motion
-    /// (the only scale of a body that moves rigidly). The displacement scale is at least the force scale over the
+    /// The scales of an answer, at least the scales of the run so far. They include the rounding of the reference
+    /// motion, the only scale of a body that moves rigidly. The displacement scale is at least force scale /
     /// stiffness.
     pub(super) fn run_scales(&self, answer: Scales) -> Scales {
         let (reference, run) = (&self.next.reference, self.accepted.scales);

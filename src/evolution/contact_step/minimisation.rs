@@ -7,13 +7,13 @@ use crate::{
     petsc::{PetscError, Vector},
 };
 
-/// The force scale is at least this fraction of the forces due to prescribed displacements or obstacles, if these
-/// move only their own nodes. Smaller forces are rounding.
+/// The force scale is at least this fraction of the forces if prescribed displacements or obstacles move their own
+/// nodes alone. Smaller forces are rounding.
 const LIFTED: f64 = 1e-2;
 
 impl ContactStep<'_> {
-    /// Replaces c by the solution of (26) with the load f − K u_D of the free unknowns, where u_D = `lift` has the
-    /// prescribed unknowns.
+    /// Replaces c by the solution of (26) with the load f − K u_D of the free unknowns; u_D = `lift` has the
+    /// prescribed ones.
     ///
     /// The certificate of the previous answer c may give the force scale F and the residual forces
     /// `unbalanced` = f − Ku. The load is then K c + `unbalanced`, so that rounding of the assembled K cancels.

@@ -39,7 +39,7 @@ impl ContactStep<'_> {
 
     /// The answer of minimum ∫|u|² among all that differ from the certified `candidate` by an unresisted motion; it
     /// does not depend on the solver. Its certificate may fail if a neglected contact force counts or acts across
-    /// an opening gap. Then `candidate` is returned with the largest residual of the rejected answer; otherwise
+    /// an opening gap. Then `candidate` is returned with the maximum residual of the rejected answer; otherwise
     /// this residual is 0. Collective.
     pub(super) fn of_minimum_displacement(
         &mut self,

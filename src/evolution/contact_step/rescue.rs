@@ -5,11 +5,11 @@ use crate::evolution::{RunError, Step};
 use std::mem;
 
 impl ContactStep<'_> {
-    /// u_n at `time` for the nodal damage `zeta`, from the solver or, if it stops short, from its rescuer, which
-    /// the step's report then names. Every solve starts from the accepted steps.
+    /// u_n at `time` for the nodal damage `zeta`, from the solver. If it stops short, its rescuer solves the step,
+    /// and the step's report names it. Every solve starts from the accepted steps.
     ///
     /// # Errors
-    /// The solver failed, or neither its answers nor those of its rescuer met the KKT tolerance.
+    /// The solver failed, or neither its answers nor its rescuer's met the KKT tolerance.
     pub fn solve(&mut self, step: usize, time: f64, zeta: &[f64]) -> Result<Step, RunError> {
         let comm = self.problem.body.nodes.partition.comm();
         let solved = self.solve_by_one(step, time, zeta);

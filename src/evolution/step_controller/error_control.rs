@@ -69,7 +69,7 @@ impl<'a> ErrorControl<'a> {
         })
     }
 
-    /// The state for a checkpoint: the next length, the damage, the largest sampled loads.
+    /// The state for a checkpoint: the next length, the damage, the maximum sampled loads.
     pub(super) fn state(&self) -> (f64, [f64; 2], [f64; 2]) {
         let largest = self.load_curve.as_ref().map_or([0.0; 2], |curve| curve.largest);
         (self.next_length, self.damage, largest)
@@ -117,8 +117,8 @@ impl<'a> ErrorControl<'a> {
         self.tolerance * self.damage[0].max(NEGLIGIBLE)
     }
 
-    /// Accepts a step to ζ_n = `zeta` if `added`, the error that it adds, is at most
-    /// SHARE (AIM · tolerance · D − E) at the worst node and in the mean, and sets the length of the next step.
+    /// Accepts a step to ζ_n = `zeta` and sets the length of the next step. At the worst node and in the mean, the
+    /// error `added` by the step must be at most SHARE (AIM · tolerance · D − E).
     ///
     /// Here E = `error` is the error of the steps before. D is the damage at the end: the expected one, or else the
     /// damage so far plus the forecast for the loads ahead from the present `rate` = dζ/dt, 1/s ([`Forecast`]).

@@ -1,4 +1,4 @@
-//! Step control: which steps are made, and whether they are accepted.
+//! Step control: plans steps, and accepts or rejects them.
 //!
 //! Steps are uniform or adaptive. Uniform ones are Euler's (25) or, with the scheme "bdf2", two-step backward
 //! differences with an extrapolated source (Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations
@@ -76,8 +76,8 @@ pub(super) struct StepState {
 }
 
 /// The ratio of the error of a step to its difference from the trapezoidal rule. In a smooth evolution with equal
-/// steps, the increments of the formula are off by ⅓ k³ζ‴, and those of the trapezoidal rule by 1/12 k³ζ‴. This
-/// error controls the lengths of the steps; a rule of third order estimates their accumulated error.
+/// steps, the increments of the formula are off by ⅓ k³ζ‴, and the trapezoidal rule is off by 1/12 k³ζ‴. This error
+/// controls the lengths of the steps; a rule of third order estimates their accumulated error.
 const TRUNCATION: f64 = 4.0 / 3.0;
 
 impl<'a> StepController<'a> {

@@ -1,4 +1,4 @@
-//! The errors that time steps make in ζ, and how they grow.
+//! The errors of ζ from the time steps, and their growth.
 
 use super::{PlannedStep, StepController};
 use crate::model::DamageLaw;
@@ -24,7 +24,7 @@ impl StepController<'_> {
         length * (rate - 0.5 * change - omega / (6.0 * (1.0 + omega)) * curvature)
     }
 
-    /// Adds the error of the Euler step before the one with this `rate`: (28) takes the source at the
+    /// Adds the error of the previous Euler step; `rate` is the rate of this step: (28) takes the source at the
     /// beginning of a step, so the error is ½ k (ζ'_n − ζ'_{n−1}).
     pub(super) fn add_euler_error(&mut self, planned: &PlannedStep, rate: &DVector<f64>) {
         if let Some(before) = &self.memory.rate {

@@ -19,8 +19,8 @@ const POINTS: usize = 16;
 /// Number of parts of a boundary searched for pulses and jumps. One pulse may hide another in the same part.
 const BOXES: usize = 4;
 
-/// Times, s, at which a load, a prescribed displacement or a gap of `problem` may not be smooth, and one time
-/// between each two of them. They increase and differ by more than rounding. See [`Expression::breaks`].
+/// Times, s, at which a load, a prescribed displacement or a gap of `problem` may not be smooth, with one time
+/// between each two. They increase and differ by more than rounding. See [`Expression::breaks`].
 fn breaks(problem: &DiscreteProblem, end: f64) -> Vec<f64> {
     let (scene, mesh) = (problem.scene(), problem.mesh());
     let mut breaks = Vec::new();
@@ -87,7 +87,7 @@ impl<'a> LoadCurve<'a> {
         &self.breaks[first..last.max(first)]
     }
 
-    /// Σ|·| of the forces and of the displacements at `time`, relative to the largest sums; 0 if all are 0.
+    /// Σ|·| of the forces and of the displacements at `time`, relative to the maximum sums; 0 if all are 0.
     pub(crate) fn sizes(&self, time: f64) -> [f64; 2] {
         let values = self.problem.loads.sampled_at(time);
         let size = |kind: usize| sum_abs(values[kind].iter().copied()) / self.largest[kind];
@@ -137,7 +137,7 @@ impl<'a> LoadCurve<'a> {
     }
 
     /// Do loads come and go within a uniform step? Then the sum of all forces, or of all displacements and gaps,
-    /// deviates from a straight line by more than [`PASSING`] of the largest sum. A load that moves keeps its sum.
+    /// deviates from a straight line by more than [`PASSING`] of the maximum sum. A load that moves keeps its sum.
     pub(crate) fn pass_within_steps(problem: &'a DiscreteProblem) -> bool {
         let Some((grid, steps)) = uniform_steps(problem) else { return false };
         let Some(mut curve) = Self::new(problem) else { return false };
@@ -148,7 +148,7 @@ impl<'a> LoadCurve<'a> {
         })
     }
 
-    /// The forces and displacements at `time`. Updates the largest sums.
+    /// The forces and displacements at `time`. Updates the maximum sums.
     fn sample(&mut self, time: f64) -> [Vec<f64>; 2] {
         let values = self.problem.loads.sampled_at(time);
         for (largest, values) in self.largest.iter_mut().zip(&values) {
