@@ -4,9 +4,8 @@
 //! the error of u, m_T = max_t ‖ε* − ε(u(t))‖²_T / max_t ‖u(t)‖² (at the end relative to ‖u‖² there), and the
 //! interpolation error of the damage in P1. Triangles are bisected until these estimates are small enough.
 //!
-//! An estimate misses details that are finer than the mesh. Therefore the rounds end with a [`Measurement`]: the
-//! same steps on the mesh bisected everywhere. If a figure then changes by more than its share of the accuracy, the
-//! rounds go on.
+//! An estimate misses details finer than the mesh, so a [`Measurement`] ends the rounds: the same steps on the mesh
+//! bisected everywhere. If a figure then changes by more than its share of the accuracy, the rounds go on.
 
 mod measurement;
 mod pilot;

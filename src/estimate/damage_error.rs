@@ -188,9 +188,8 @@ impl<'a> ZetaError<'a> {
         Ok(())
     }
 
-    /// The rates that a long step misses. The run makes many steps between two states, and their sources differ
-    /// from the mean b of the sources of these two. At vertex i the rate is (M ζ′ + κL ζ_n − b)_i over the weight
-    /// of i. Collective.
+    /// The rates that a long step misses. The run makes many steps between two states, whose sources differ from
+    /// the mean b of both states. At vertex i the rate is (M ζ′ + κL ζ_n − b)_i over the weight of i. Collective.
     fn skipped_rates(&self, before: &Sources, now: &Sources) -> Result<Vec<f64>, PetscError> {
         let (body, k) = (&self.problem.body, now.state.time - before.state.time);
         let loads = now.load.iter().zip(&before.load);

@@ -10,8 +10,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Estimated relative errors of the last accepted state: for u in the energy norm, and for the damage ζ₀ − ζ in L².
-/// They are `None` without damage. The errors of the time steps are also `None` if the steps are too few for an
-/// estimate.
+/// They are `None` without damage. The errors of the time steps are also `None` if there are too few steps.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ErrorBudget {
     /// The error of u from the mesh.
@@ -22,11 +21,9 @@ pub struct ErrorBudget {
     pub displacement_steps: Option<f64>,
     /// The error of the damage from the time steps.
     pub damage_steps: Option<f64>,
-    /// The error of the maximum displacement from the solver; infinite if the active nodes alone do not support the
-    /// body.
+    /// The error of max |u| from the solver; infinite if the active nodes alone do not support the body.
     pub solver: f64,
-    /// The error bars of the figures by their names, from mesh and time steps, each in the unit of its figure.
-    /// Empty if they are not measured.
+    /// Per name of a figure: its error bar from mesh and time steps, in its unit. Empty if they are not measured.
     pub figures: BTreeMap<String, f64>,
     /// Can the material be damaged?
     #[serde(skip)]
@@ -154,9 +151,8 @@ impl DiscreteProblem {
         (sums[1] > 0.0).then(|| (sums[0] / sums[1]).sqrt())
     }
 
-    /// A bound on the relative error of u in the energy norm that errors δζ = `error` of ζ cause. As K δu = −δK u,
-    /// it is ‖δζ/ζ ε(u)‖ over ‖ε(u)‖. For large δζ the larger of ζ and ζ + δζ counts, and the factor is at most 1.
-    /// Collective.
+    /// A bound on the relative error of u in the energy norm due to errors δζ = `error`. As K δu = −δK u, it is
+    /// ‖δζ/ζ ε(u)‖ over ‖ε(u)‖. For large δζ, max(ζ, ζ + δζ) replaces ζ, and the factor is at most 1. Collective.
     pub(super) fn displacement_error_of(&self, error: &[f64], state: &State) -> f64 {
         let body = &self.body;
         let (zeta, error) = (self.zeta_at_points(&state.zeta), body.at_points(error));

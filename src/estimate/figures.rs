@@ -45,7 +45,6 @@ pub enum Dimension {
     Stress,
 }
 
-/// A figure that a run prints.
 struct Figure {
     name: String,
     dimension: Dimension,
@@ -62,8 +61,7 @@ pub struct Bar {
     pub dimension: Dimension,
     /// The error bar, in the unit of the figure.
     pub bar: f64,
-    /// The scale of the required accuracy: the maximum value of the figure in the run, and for a damage ζ the
-    /// maximum 1 − ζ.
+    /// The scale of its relative error: the maximum of the figure in the run, and of 1 − ζ for a damage ζ.
     pub scale: f64,
 }
 
@@ -98,7 +96,6 @@ impl DiscreteProblem {
         of_record.chain(quantities).map(figure).collect()
     }
 
-    /// The names of all figures.
     pub(crate) fn figure_names(&self) -> Vec<String> {
         self.figures().into_iter().map(|figure| figure.name).collect()
     }
@@ -110,8 +107,7 @@ impl DiscreteProblem {
         self.figures().into_iter().zip(errors.iter().zip(scales)).map(bar).collect()
     }
 
-    /// The scale of each figure, from the `largest` [sizes](Self::figure_sizes) of a run: the largest size in its
-    /// group.
+    /// The scale of each figure, from the `largest` [sizes](Self::figure_sizes) of a run: the maximum of its group.
     pub(crate) fn figure_scales(&self, largest: &[f64]) -> Vec<f64> {
         let figures = self.figures();
         let most = |is_like: &dyn Fn(&Figure) -> bool| {
@@ -164,8 +160,7 @@ impl DiscreteProblem {
         self.figures().iter().zip(values).map(size).collect()
     }
 
-    /// Adds to the error bars the solver's tolerance, the error of the integrals of body forces, and the errors
-    /// of the time steps.
+    /// Adds to the error bars the solver's tolerance and the errors of body-force integrals and time steps.
     ///
     /// The steps change ζ by at most `most` at a node and by `mean` on average, and so u by `displacement`
     /// (relative, energy norm): u depends on the past only through ζ. A few uniform steps may show only half of

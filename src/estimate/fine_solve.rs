@@ -8,8 +8,7 @@ use crate::{
     problem::{DiscreteProblem, LoadCase, State},
 };
 
-/// A problem in P2, solved by conjugate gradients. They start from the displacements in P1, plus a step along the
-/// change by the last solve.
+/// A problem in P2, solved by conjugate gradients. They start from u in P1, plus a step along the last change.
 ///
 /// The preconditioner is the sum of two corrections: K₁⁻¹ times the forces transferred to P1, and the residual over
 /// the diagonal of K (Xu, SIAM Review 34, 1992).

@@ -1,7 +1,7 @@
 //! Estimated strains on a much finer mesh, from the displacements u₁ in P1 and u₂ in P2.
 //!
-//! In the energy norm, errors are orthogonal to the functions of a mesh, so squares add up. With the estimated
-//! error η of u₂,
+//! In the energy norm, errors are orthogonal to the mesh functions; squares add up. With the estimated error η of
+//! u₂,
 //!
 //! |ε*|² = |ε(u₂)|² + c (|ε(u₂)|² − |ε(u₁)|²), c = η²/‖u₂ − u₁‖², but at most 1.
 //!
@@ -32,8 +32,7 @@ impl<'a> FineStrains<'a> {
         Self { pair, stopped, c: 1.0, relative: 0.0 }
     }
 
-    /// |ε*|² at the vertices and midpoints of each triangle. `None` if the active nodes do not support the body.
-    /// Collective.
+    /// |ε*|² at the six nodes of each triangle. `None` if the active nodes do not support the body. Collective.
     ///
     /// # Errors
     /// PETSc failed, or the scene contradicts itself at the nodes of the other order.

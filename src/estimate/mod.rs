@@ -3,8 +3,7 @@
 //! A run solves a discrete problem. This room estimates the difference from the exact solution of the scene, and
 //! refines meshes until the difference is within the required accuracy. There are four estimates:
 //!
-//! - [`RecoveredStrains`]: the error of u in the energy norm, triangle by triangle, from strains that are
-//!   fitted around each vertex;
+//! - [`RecoveredStrains`]: the error of u in the energy norm, per triangle, from strains fitted around each vertex;
 //! - the error of the damage: (25) is solved again, for the difference from a much finer mesh;
 //! - [`Bar`]: the error bar of each printed figure, measured by a second run on the mesh bisected everywhere;
 //! - [`ErrorBudget`]: the errors by the mesh, the time steps and the solver.

@@ -1,5 +1,4 @@
-//! Penetration between the nodes. The conditions u·ν ≤ g hold at the nodes of Γ_C. Between them the body may
-//! penetrate the foundation by
+//! Penetration: u·ν ≤ g holds at the nodes of Γ_C. Between them the body may penetrate the foundation by
 //!
 //! p(s) = (u·ν)(s) − g(x(s), t), 0 < s < 1,
 //!

@@ -62,8 +62,7 @@ impl Operator for QuadraticSystem<'_> {
         Ok(())
     }
 
-    /// Divides the bubbles by the diagonal, a good preconditioner on any mesh. Applies the inverse of the P1 matrix
-    /// at the vertices.
+    /// Divides the bubbles by the diagonal, and applies the inverse of the P1 matrix at the vertices.
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<(), PetscError> {
         z.iter_mut().zip(r).zip(&self.diagonal).for_each(|((z, r), diagonal)| *z = r / diagonal);
         let (linear, k) = &mut self.linear;

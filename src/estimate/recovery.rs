@@ -23,8 +23,7 @@ const ENOUGH: usize = 4;
 /// This fraction of its trace is added to the diagonal of a normal matrix. It makes the fit unique.
 const REGULARISATION: f64 = 1e-13;
 
-/// A strain (ε_xx, ε_yy, 2ε_xy) as a polynomial in (x, y) − x_v about a vertex: the coefficients of
-/// 1, x, y, x², xy, y² (rows).
+/// A strain (ε_xx, ε_yy, 2ε_xy) as a polynomial about a vertex: the coefficients of 1, x, y, x², xy, y² (rows).
 type Fit = Matrix6x3<f64>;
 
 impl EnergyError {
@@ -68,8 +67,7 @@ impl<'a> RecoveredStrains<'a> {
         Ok(Self { body, strains, per_triangle, fits })
     }
 
-    /// An estimate of the error of u in the energy norm, with `zeta` the values of ζ at the quadrature
-    /// points. Collective.
+    /// Estimates the error of u in the energy norm; `zeta` is ζ at the quadrature points. Collective.
     pub fn energy_error(&self, elasticity: &Elasticity, zeta: &[f64], u: &[f64]) -> EnergyError {
         let Self { body, per_triangle, .. } = *self;
         let square = |t: usize| {
@@ -225,8 +223,7 @@ fn fits(
         }
         partition.update(fields.as_flattened_mut(), 19)?;
     }
-    // Other vertices, as in strips one triangle thick, take a fit of the degree of the strains. One triangle
-    // determines it.
+    // Other vertices, as in strips one triangle thick, take a fit of the strains' degree: one triangle suffices.
     for (vertex, field) in fields.iter_mut().enumerate().take(partition.owned()) {
         if field[18] == 0.0 {
             *field = known(own_fit(vertex, degree - 1));

@@ -13,8 +13,7 @@ use std::collections::HashSet;
 const TIMES: usize = 8;
 /// The fraction of the accuracy that the interpolation of the initial damage may take.
 const SHARE: f64 = 0.5;
-/// An edge shorter than this fraction of its curve is not halved for a displacement: the displacement must jump
-/// there.
+/// An edge shorter than this fraction of its curve is not halved: the displacement must jump there.
 const SHORTEST: f64 = 1e-4;
 /// Allowed relative error of the integrals, and the number of triangle parts that may be added for it.
 const DEVIATION: f64 = 1e-5;
@@ -25,8 +24,7 @@ const NOTED: f64 = 0.05;
 /// The edges that must be halved for a relative `accuracy`, by their ends in increasing order. The maximum |u| is
 /// `displacement`, m. There are two kinds:
 ///
-/// - edges on which |u_D − Iu_D| exceeds `accuracy` · `displacement` somewhere, with Iu_D the interpolation of
-///   u_D at the nodes;
+/// - edges on which |u_D − Iu_D| exceeds `accuracy` · `displacement`, with Iu_D the nodal interpolation of u_D;
 /// - the longest sides of the triangles with the largest ‖ζ₀ − Iζ₀‖_T in L². The triangles left out have Σ
 ///   ‖ζ₀ − Iζ₀‖²_T ≤ (½ `accuracy` ‖1 − ζ₀‖)².
 pub(super) fn unresolved(

@@ -134,8 +134,7 @@ impl<'a> ContactStep<'a> {
         })
     }
 
-    /// Sets the solver's warm start, in the solver's own form. For the active set: per bound 1 if it is guessed to
-    /// be active, else 0.
+    /// Sets the solver's warm start, in its own form. Active set: 1 per bound guessed to be active, else 0.
     pub fn set_warm_start(&mut self, warm_start: &[f64]) {
         self.accepted.warm_start = warm_start.to_vec();
     }

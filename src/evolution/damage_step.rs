@@ -55,7 +55,6 @@ pub(crate) struct DamageSource {
     pub(crate) min: f64,
 }
 
-/// The answer of a damage step.
 pub(crate) struct DamageUpdate {
     /// ζ_n at the nodes.
     pub(crate) zeta: DVector<f64>,

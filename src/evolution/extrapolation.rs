@@ -44,8 +44,7 @@ impl Extrapolation {
         self.history.truncate(MAX_DEGREE + 1);
     }
 
-    /// Per possible degree: the squared error of its prediction of `solution` at `time`, over a sample of the
-    /// entries. Collective.
+    /// Per possible degree: its squared error for `solution` at `time`, over some entries. Collective.
     fn errors(&self, comm: Communicator, time: f64, solution: &[f64]) -> Vec<f64> {
         let weights: Vec<_> = (0..self.history.len()).map(|d| self.weights(d, time)).collect();
         let mut errors = vec![0.0; weights.len()];

@@ -60,8 +60,7 @@ use serde::{Deserialize, Serialize};
 use std::time::Instant;
 use step_controller::{Decision, StepState};
 
-/// Solves Problem VP^hk with the contact solver called `solver`; `accepted` is called for every accepted step,
-/// n = 0 included.
+/// Solves Problem VP^hk with the contact solver called `solver`; `accepted` is called for every accepted step.
 ///
 /// # Errors
 /// See [`RunError`]; every accepted step has been seen by then.
@@ -75,8 +74,7 @@ pub fn run(
     run_from(session, problem, solver, phases, &mut Callback(accepted), None)
 }
 
-/// As [`run`], with an `observer` that may keep checkpoints and end the run. If `saved` is given, the run continues
-/// from this checkpoint.
+/// As [`run`], with an `observer` that may keep checkpoints and end the run. It starts from `saved`, if given.
 ///
 /// # Errors
 /// See [`RunError`]; every accepted step has been seen by then.
@@ -110,7 +108,6 @@ pub(crate) fn run_unestimated(
     all_steps(session, problem, solver, phases, observer, None).map(|run| run.outcome)
 }
 
-/// Makes all steps of a run.
 fn all_steps<'a>(
     session: &'a Session,
     problem: &'a DiscreteProblem,
@@ -207,8 +204,7 @@ impl Run<'_> {
     }
 }
 
-/// The content of a checkpoint: everything on which the next steps depend, to the last bit. (A restart makes the
-/// damage system again.)
+/// A checkpoint: all that determines the next steps, to the last bit. (A restart makes the damage system again.)
 #[derive(Debug, Serialize, Deserialize)]
 pub struct RunState {
     contact: ContactState,

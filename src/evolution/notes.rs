@@ -10,8 +10,7 @@ use crate::{
 };
 use std::iter::once;
 
-/// In plane strain, P1 triangles lock if ν is larger (STABILITY.md). P2 triangles converge more slowly as ν goes to
-/// ½, but do not lock.
+/// In plane strain, P1 triangles lock if ν is larger (STABILITY.md). P2 triangles only converge more slowly.
 const LOCKING: f64 = 0.45;
 /// A note is given if two moduli differ by a larger factor. The rounding of the stiffer material is then 1e-11 of
 /// the forces in the other one, a tenth of the default tolerance.
@@ -21,8 +20,7 @@ const TIMES: usize = 8;
 /// A note is given if a triangle has a smaller angle, degrees.
 const SLIVER: f64 = 1.0;
 /// Infinitesimal strain theory requires |∇u| ≪ 1. At `LARGE` the neglected term ½ ∇uᵀ∇u of the strain is up to a
-/// twentieth of ∇u. A part of the body below `NOTICEABLE` may be a corner, where strains are singular under any
-/// load.
+/// twentieth of ∇u. A part of the body below `NOTICEABLE` may be a corner with singular strains.
 const LARGE: f64 = 0.1;
 const NOTICEABLE: f64 = 0.01;
 

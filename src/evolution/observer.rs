@@ -36,8 +36,7 @@ impl Next {
     }
 }
 
-/// Sees the accepted steps of a run on its rank. Every function is called on all ranks. The default `keep` stores
-/// nothing.
+/// Sees the accepted steps of a run. Every function is called on all ranks. By default `keep` stores nothing.
 pub trait Observer {
     /// Sees an accepted step and decides how the run goes on.
     ///

@@ -103,7 +103,6 @@ impl Outcome {
         self.errors.figures = self.bars.iter().map(|bar| (bar.name.clone(), bar.bar)).collect();
     }
 
-    /// Appends an accepted step.
     pub(super) fn accept(&mut self, step: Step) {
         let before = Rc::new(mem::replace(&mut self.last, step));
         let keep_larger = |kept: &mut Option<Rc<Step>>, of: fn(&StepRecord) -> f64| {

@@ -81,8 +81,7 @@ impl Step {
 }
 
 impl StepRecord {
-    /// The record of the step n = `step` with the nodal loads `load`. The entries of the damage step and the step
-    /// controller are still zero.
+    /// The record of the step n = `step` with the nodal loads `load`. Entries of the damage step are zero.
     pub(super) fn new(
         problem: &DiscreteProblem,
         step: usize,

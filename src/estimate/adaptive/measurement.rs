@@ -69,15 +69,13 @@ pub(super) struct Measurement {
     /// the maximum penetration at their edges, m.
     pub(super) shares: Vec<f64>,
     pub(super) depths: Vec<f64>,
-    /// Per triangle: the change of the reactions on its edges, N per metre of thickness, and the maximum change of
-    /// ζ at its nodes and midpoints.
+    /// Per triangle: the change of the reactions on its edges, N per metre of thickness, and max |Δζ| there.
     reactions: Vec<f64>,
     zeta: Vec<f64>,
 }
 
 impl Measurement {
-    /// Compares the run `coarse` of `scene` on `mesh` with the same one on this mesh bisected everywhere.
-    /// Collective.
+    /// Compares the run `coarse` of `scene` on `mesh` with the same run on the bisected mesh. Collective.
     ///
     /// # Errors
     /// A triangle cannot be bisected, or the run on the bisected mesh fails.
@@ -216,8 +214,7 @@ fn bars(coarse: &Pilot, fine: &Pilot, square: f64) -> Vec<Bar> {
     bars
 }
 
-/// ‖ζ_h − ζ_{h/2}‖ over ‖1 − ζ_{h/2}‖ at the end, as an error, and the maximum |ζ_h − ζ_{h/2}| of each triangle of
-/// `mesh`. Collective.
+/// The final error ‖ζ_h − ζ_{h/2}‖ / ‖1 − ζ_{h/2}‖, and max |ζ_h − ζ_{h/2}| per triangle. Collective.
 fn damage(mesh: &Mesh, halved: &Refinement, coarse: &Pilot, fine: &Pilot) -> (f64, Vec<f64>) {
     let mut before = at_vertices(mesh, &coarse.zeta());
     let middles = halved.halved_edges.iter().map(|&[a, b]| 0.5 * (before[a] + before[b]));

@@ -1,5 +1,4 @@
-//! A run with few time steps. It gives the error of u on each triangle, the penetration between the nodes, and the
-//! figures at the times of its steps.
+//! A run with few time steps, the error of u and the penetration on each triangle, and the figures of all steps.
 
 use crate::{
     estimate::RecoveredStrains,

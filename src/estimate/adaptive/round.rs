@@ -22,8 +22,7 @@ const MAX_SHARE_OF_STEPS: f64 = 0.5;
 const MIN_SHARE_OF_STEPS: f64 = 0.04;
 /// If measured errors are too large, a round reduces the estimated errors by at most this factor.
 const MIN_GOAL: f64 = 0.25;
-/// If the accuracy is required for some figures only, these are measured once u and the damage have at most this
-/// estimated error.
+/// If the accuracy is required for some figures only, these are measured once all estimates are this small.
 const ROUGH: f64 = 0.1;
 /// Allowed penetration between the nodes, as a fraction of the accuracy times the maximum displacement.
 const PENETRATION: f64 = 0.5;

@@ -12,8 +12,7 @@ const OVERSIZE: f64 = 1.5;
 /// Slightly below 1, so that triangles equal to the median up to rounding are bisected as well.
 const TIES: f64 = 1.0 - 1e-9;
 
-/// The factors by which to multiply the sizes of the triangles, so that the squared relative error Σ m_T (`shares`)
-/// becomes `aim`².
+/// The factors for the sizes of the triangles, so that the squared relative error Σ m_T (`shares`) becomes `aim`².
 pub(super) fn size_ratios(shares: &[f64], order: f64, aim: f64) -> Vec<f64> {
     let exponent = 1.0 / (2.0 * order + 2.0);
     let ratio = |factor: f64, share: f64| match share {

@@ -16,8 +16,8 @@ const TOLERANCES: f64 = 100.0;
 /// A mesh is too coarse if the estimated relative error in the energy norm is larger. The displacement under the
 /// load is then too small by about the square of this error.
 const COARSE: f64 = 0.5;
-/// The discretisation error is estimated at the last step, unless its displacements are below this fraction of the
-/// maximum displacement of the run.
+/// The last step is used to estimate the discretisation error, unless its max |u| is below this fraction of the
+/// run's.
 const UNLOADED: f64 = 0.01;
 /// A deformation below this fraction of the rigid motion counts as rounding.
 const CARRIED: f64 = 1e-11;
@@ -27,9 +27,9 @@ const SAFE: f64 = 0.1;
 /// Estimated errors of an answer, relative.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Accuracy {
-    /// The error of u over max |u|, against the exact answer of the discrete problem with the same active nodes.
-    /// KKT residuals bound forces; if K is ill-conditioned, small forces move u far. Infinite if the active nodes
-    /// alone do not support the body.
+    /// The error of u over max |u|, against the exact discrete answer with the same active nodes. KKT residuals
+    /// bound forces; with an ill-conditioned K, small forces move u far. Infinite if the active nodes alone do not
+    /// support the body.
     ///
     /// The larger error of two steps: the last one, and the one with the maximum stationarity residual.
     pub displacement: f64,
@@ -173,8 +173,7 @@ impl Compliance<'_> {
         Ok(())
     }
 
-    /// Frees K, a large part of the memory, and keeps its factor. If there is no factor, it factorises K at
-    /// `state`. Collective.
+    /// Frees K, a large part of the memory, and keeps its factor, if need be a new one at `state`. Collective.
     pub(crate) fn keep_factor(&mut self, state: &State) -> Result<(), PetscError> {
         if !self.solver.factor().exists() {
             self.set(&state.zeta, &state.contact)?;

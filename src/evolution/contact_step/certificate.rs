@@ -44,8 +44,7 @@ impl Candidate {
 }
 
 impl ContactStep<'_> {
-    /// The KKT residuals of u, measured from the reference. Forces are summed triangle by triangle, independently
-    /// of the solvers' assembled K.
+    /// The KKT residuals of u, measured from the reference. Forces are summed by triangles, not from K.
     pub(super) fn certify(&self, u: Vec<f64>, case: &LoadCase) -> Candidate {
         let problem = self.problem;
         let (body, partition) = (&problem.body, &problem.body.nodes.partition);
@@ -93,8 +92,7 @@ impl ContactStep<'_> {
     }
 
     /// The scales of an answer, at least the scales of the run so far. They include the rounding of the reference
-    /// motion, the only scale of a body that moves rigidly. The displacement scale is at least force scale /
-    /// stiffness.
+    /// motion, the only scale of a rigid body. The displacement scale is at least force scale / stiffness.
     pub(super) fn run_scales(&self, answer: Scales) -> Scales {
         let (reference, run) = (&self.next.reference, self.accepted.scales);
         let rounding = match reference.is_zero() {
@@ -106,8 +104,7 @@ impl ContactStep<'_> {
         Scales { force, displacement: answer.displacement.max(run.displacement).max(min) }
     }
 
-    /// Adds to an error the tolerance that double precision can reach, if rounding of the internal forces of u
-    /// explains the error.
+    /// Adds to an error the tolerance that double precision can reach, if this explains the error.
     pub(super) fn limited(&self, error: ContactError, candidate: &Candidate) -> ContactError {
         let attainable = ROUNDED * self.rounding(candidate);
         match attainable > self.problem.tolerance
@@ -124,8 +121,7 @@ impl ContactStep<'_> {
     }
 
     /// Is u exact for a stiffness whose entries are off by ε_machine? In addition, its residuals must be at most
-    /// `MAX_ROUNDING`, or its `error` (relative to max |u|) at most the promised one. A tolerance below the
-    /// default must be met itself.
+    /// `MAX_ROUNDING`, or its relative `error` at most the promised one. A tolerance below the default must be met.
     pub(super) fn is_exact_to_rounding(&self, candidate: &Candidate, error: Option<f64>) -> bool {
         let tolerance = self.problem.tolerance;
         let is_small = |error| error <= Accuracy::promised(tolerance);

@@ -12,8 +12,7 @@ use crate::{
 const LIFTED: f64 = 1e-2;
 
 impl ContactStep<'_> {
-    /// Replaces c by the solution of (26) with the load f − K u_D of the free unknowns; u_D = `lift` has the
-    /// prescribed ones.
+    /// Replaces c by the solution of (26) for the load f − K u_D, with u_D = `lift` the prescribed unknowns.
     ///
     /// The certificate of the previous answer c may give the force scale F and the residual forces
     /// `unbalanced` = f − Ku. The load is then K c + `unbalanced`, so that rounding of the assembled K cancels.

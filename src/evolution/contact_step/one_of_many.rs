@@ -10,23 +10,21 @@ use crate::{
 use nalgebra::DVector;
 
 impl ContactStep<'_> {
-    /// Combinations of the rigid motions that only contact constrains. No contact force above `level` times F does
-    /// work on them.
+    /// The rigid motions that only contact constrains and no contact force above `level` times F resists.
     fn unresisted(&self, contact: &[ContactPoint], level: f64, force: f64) -> Vec<DVector<f64>> {
         let active = active_bounds(&self.problem.constraints, contact, level * force);
         let comm = self.problem.body.nodes.partition.comm();
         contact::unconstrained_motions(comm, &self.rigid, &active)
     }
 
-    /// Contact forces below this fraction of F may be residuals, so they do not count as constraints. By Cauchy and
-    /// Schwarz, a residual τF does the work of a force √N τF on a rigid motion. At a lever of one mesh width, 1/√N
-    /// of the body, this is a force N τF.
+    /// Contact forces below this fraction of F may be residuals and do not count. By Cauchy and Schwarz, a residual
+    /// τF works on a rigid motion like a force √N τF. At a lever of one mesh width, 1/√N of the body, this is a
+    /// force N τF.
     fn uncertain(&self) -> f64 {
         self.problem.body.nodes.partition.total() as f64 * self.problem.tolerance
     }
 
-    /// A rigid motion that the active nodes leave unconstrained. `None` without load (`force` = 0): the body then
-    /// rests where it is.
+    /// A rigid motion that the active nodes leave unconstrained. `None` without load (`force` = 0).
     pub(super) fn unconstrained_motion(
         &self,
         contact: &[ContactPoint],
@@ -39,8 +37,7 @@ impl ContactStep<'_> {
 
     /// The answer of minimum ∫|u|² among all that differ from the certified `candidate` by an unresisted motion; it
     /// does not depend on the solver. Its certificate may fail if a neglected contact force counts or acts across
-    /// an opening gap. Then `candidate` is returned with the maximum residual of the rejected answer; otherwise
-    /// this residual is 0. Collective.
+    /// an opening gap. Then `candidate` is returned with the residual of the rejected answer, else 0. Collective.
     pub(super) fn of_minimum_displacement(
         &mut self,
         candidate: Candidate,

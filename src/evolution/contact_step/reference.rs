@@ -9,9 +9,8 @@ use serde::{Deserialize, Serialize};
 /// A rigid motion of the body, from which displacements are measured.
 ///
 /// A body may fall through a wide gap or follow prescribed displacements. Its deformation is then a small part of
-/// u, for which double precision leaves few digits. Measured from the end of the rigid motion, the deformation has
-/// all digits. A rigid motion causes no forces, so (26) holds for the rest of u, with the motion subtracted from
-/// gaps and prescribed values.
+/// u, for which double precision leaves few digits. Measured from the end of the rigid motion it has all digits. A
+/// rigid motion causes no forces, so (26) holds for the rest of u with gaps and prescribed values less the motion.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Reference {
     /// Its nodal displacements, m; empty while they are zero.
@@ -38,8 +37,7 @@ impl Reference {
         (lift, bounds)
     }
 
-    /// Adds `sign` times the motion to the free unknowns c. With −1, c measured from zero becomes c measured from
-    /// the reference; 1 reverts this.
+    /// Adds `sign` times the motion to the free unknowns c: −1 changes to the reference, 1 back to zero.
     pub(super) fn translate(&self, of: &Constraints, c: &mut [f64], sign: f64) {
         let unknowns = c.iter_mut().zip(&self.unknowns).zip(of.bases.fixed());
         unknowns.filter(|(_, fixed)| !**fixed).for_each(|((c, own), _)| *c += sign * own);

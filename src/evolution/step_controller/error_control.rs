@@ -44,8 +44,7 @@ const MAX_FORECAST: f64 = 0.1;
 pub(crate) const AIM: f64 = 0.7;
 /// One step may add this fraction of the remaining error …
 const SHARE: f64 = 0.25;
-/// … which is at least this fraction of the aim. Earlier steps may have used it up, if the damage is below its
-/// forecast.
+/// … which is at least this fraction of the aim. Earlier steps may have used it up.
 const MIN_REST: f64 = 1.0 / 16.0;
 
 impl<'a> ErrorControl<'a> {
@@ -121,8 +120,7 @@ impl<'a> ErrorControl<'a> {
     /// error `added` by the step must be at most SHARE (AIM · tolerance · D − E).
     ///
     /// Here E = `error` is the error of the steps before. D is the damage at the end: the expected one, or else the
-    /// damage so far plus the forecast for the loads ahead from the present `rate` = dζ/dt, 1/s ([`Forecast`]).
-    /// Collective.
+    /// damage so far plus the [`Forecast`] from the present `rate` = dζ/dt, 1/s. Collective.
     ///
     /// # Errors
     /// The error is too large: the factor by which to shorten the step.

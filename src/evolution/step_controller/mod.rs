@@ -36,8 +36,7 @@ pub(super) enum Decision {
     Stop(Stop),
 }
 
-/// Plans the steps of a run, and accepts or rejects them. Its memory of the accepted steps changes only with
-/// [`Decision::Accept`].
+/// Plans the steps of a run, and accepts or rejects them. Its memory changes only with [`Decision::Accept`].
 pub(crate) struct StepController<'a> {
     problem: &'a DiscreteProblem,
     /// Error control of the damage; `None` for uniform steps.
@@ -249,7 +248,6 @@ impl<'a> StepController<'a> {
         shorter.ok_or(failure)
     }
 
-    /// The violation of the bounds on ζ.
     pub(crate) fn violation(&self) -> BoundViolation {
         self.memory.violation
     }

@@ -34,8 +34,7 @@ impl StepController<'_> {
         }
     }
 
-    /// Adds the error of a step of `length` s, in which ζ has this `rate`, to the earlier errors. These have grown
-    /// by the factor 1 + `length` · g.
+    /// Adds the `error` of a step of `length` s to the earlier errors, which grow by the factor 1 + `length` · g.
     ///
     /// With r = −ζ', an error δζ changes the source φ = −(λ_D (1−ζ)/ζ + ½ λ_U |ε|² − λ_W) by λ_D/ζ² δζ. Under
     /// a given load |ε| is proportional to 1/ζ, which changes φ by 2 (r − λ_D (1−ζ)/ζ + λ_W)/ζ δζ more. The

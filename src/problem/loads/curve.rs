@@ -7,8 +7,7 @@ use crate::{
 
 /// Loads count as linear in time if they deviate from a straight line by at most this fraction of the largest.
 const DEVIATION: f64 = 0.05;
-/// Loads pass by within a step if their sum deviates from a straight line by more than this fraction of the
-/// largest.
+/// Loads pass by within a step if their sum deviates from a straight line by more than this fraction.
 const PASSING: f64 = 0.5;
 /// Times that differ by less than this fraction of the run count as one.
 const APART: f64 = 1e-9;
@@ -100,8 +99,7 @@ impl<'a> LoadCurve<'a> {
         (0..2).all(|kind| deviations[kind] <= DEVIATION * self.largest[kind])
     }
 
-    /// Deviations of forces and displacements, each mapped by `of`, from straight lines between `start` and `end`:
-    /// max Σ|·| over the sampled times.
+    /// Deviations of `of`(forces) and `of`(displacements) from straight lines in time: max Σ|·| over the samples.
     fn deviations(&mut self, start: f64, end: f64, of: impl Fn(&[f64]) -> Vec<f64>) -> [f64; 2] {
         let [first, last] = [start, end].map(|time| self.sample(time).map(|values| of(&values)));
         let parts = (1..=POINTS).map(|point| point as f64 / (POINTS + 1) as f64);
