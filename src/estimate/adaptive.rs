@@ -1,13 +1,11 @@
-//! Meshes for an accuracy instead of a size.
+//! Meshes for an accuracy.
 //!
-//! The rounds start from a coarse mesh. In each, a run with few time steps estimates two errors per triangle:
-//! that of u, m_T = max_t ‖ε* − ε(u(t))‖²_T / max_t ‖u(t)‖² (at the end relative to ‖u‖² there), and that of
-//! interpolating the damage in P1. Triangles are bisected down to the sizes that these estimates ask for, until
-//! the estimates are small enough.
+//! The rounds start from a coarse mesh. In each round, a run with few time steps estimates two errors per triangle:
+//! the error of u, m_T = max_t ‖ε* − ε(u(t))‖²_T / max_t ‖u(t)‖² (at the end relative to ‖u‖² there), and the
+//! interpolation error of the damage in P1. Triangles are bisected until these estimates are small enough.
 //!
-//! An estimate misses details that are finer than the mesh. So the rounds end with a [`Measurement`]: the same
-//! steps on the mesh bisected everywhere. If a figure then changes by more than its share of the accuracy, the
-//! rounds go on.
+//! An estimate misses details finer than the mesh, so a [`Measurement`] ends the rounds: the same steps on the mesh
+//! bisected everywhere. If a figure then changes by more than its share of the accuracy, the rounds go on.
 
 mod measurement;
 mod pilot;
@@ -36,27 +34,27 @@ pub struct Adapted {
     pub mesh: Mesh,
     /// Displacement components at its nodes.
     pub unknowns: usize,
-    /// Runs that were made on meshes before it.
+    /// The number of rounds so far, with the round of this mesh.
     pub rounds: usize,
     /// The estimated relative error of u on it, in the energy norm, at the worst time.
     pub error: f64,
-    /// That of the damage at the end.
+    /// The estimated relative error of the damage at the end.
     pub damage_error: Option<f64>,
     /// The damage at the end of the run with few steps, max (ζ₀ − ζ) and its mean; 0 if the run stops at ζ_*.
     pub damage: [f64; 2],
-    /// How far off the time of ζ_* may be because of the mesh, s, once it is measured.
+    /// The error of the time of ζ_* from the mesh, s, once it is measured.
     pub stop_error: Option<f64>,
     /// The tolerance of the time steps that keeps the error of ζ within the accuracy.
     pub steps: f64,
-    /// The error bars of the figures because of the mesh, once they are measured.
+    /// The error bars of the figures from the mesh, once they are measured.
     pub bars: Vec<Bar>,
-    /// The largest of the measured relative errors and its name, once they are measured.
+    /// The maximum measured relative error and its name, once it is measured.
     pub worst: Option<(String, f64)>,
     /// The reason why the accuracy was not reached, if it was not.
     pub short: Option<String>,
 }
 
-/// Why no mesh was found.
+/// Errors that prevent an adapted mesh.
 #[derive(Debug, thiserror::Error)]
 pub enum AdaptError {
     /// The scene does not fit a mesh.
@@ -65,15 +63,15 @@ pub enum AdaptError {
     /// A triangle cannot be divided.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// A run on a mesh that was tried failed.
+    /// The run on the mesh of a round failed.
     #[error(
-        "mesh {rounds} of those tried for the accuracy, of {triangles} triangles: {source} (a run of the \
-         same scene without `accuracy` keeps its results up to there)"
+        "round {rounds} of the mesh adaptation, with {triangles} triangles: {source}; to keep the results \
+         up to this error, remove `accuracy`"
     )]
     Run {
-        /// The number of the mesh.
+        /// The number of the round.
         rounds: usize,
-        /// Its triangles.
+        /// The triangles of its mesh.
         triangles: usize,
         /// The failure of the run.
         source: RunError,
@@ -84,7 +82,7 @@ pub enum AdaptError {
 }
 
 impl AdaptError {
-    /// The signal that has ended a run, if one has.
+    /// The signal that ended a run, if there was one.
     pub fn signal(&self) -> Option<Signal> {
         match self {
             Self::Run { source: RunError::Interrupted(signal), .. } => Some(*signal),
@@ -95,14 +93,14 @@ impl AdaptError {
 
 /// The tolerance of the time steps of the runs with few steps.
 const PILOT_TOLERANCE: f64 = 0.05;
-/// The largest number of rounds, and of triangles of a mesh or its measurement.
-const ROUNDS: usize = 25;
-const MOST_TRIANGLES: usize = 4_000_000;
+/// Maximum number of rounds, and of triangles of a mesh or its measurement.
+const MAX_ROUNDS: usize = 25;
+const MAX_TRIANGLES: usize = 4_000_000;
 
-/// Refines `mesh` until the measured errors in a run of `scene` are at most `accuracy`: those of the figures, of u
-/// (energy norm) and of the damage, or of u and the time of ζ_* if the run ends there. The caller must care for
-/// the errors of the time steps. `seen` is called with each mesh and its errors. If a run on a refined mesh fails,
-/// the mesh before is the answer. Collective: all ranks get the same mesh.
+/// Refines `mesh` until the measured errors in a run of `scene` are at most `accuracy`: the errors of the figures,
+/// of u (energy norm) and of the damage. If the run ends at ζ_*, only the errors of u and of this time count. The
+/// caller controls the errors of the time steps. `seen` is called with each mesh and its errors. If a run on a
+/// refined mesh fails, the mesh of the round before is returned. Collective: all ranks get the same mesh.
 ///
 /// # Errors
 /// See [`AdaptError`].
@@ -131,7 +129,7 @@ pub fn adapted(
     }
 }
 
-/// A scene with few uniform steps, or with adaptive ones if loads or gaps pass by within these.
+/// A scene with its few uniform steps, or with adaptive ones if loads or gaps pass by within a step.
 fn with_passing_loads(
     session: &Session,
     mut scene: Scene,
@@ -140,13 +138,13 @@ fn with_passing_loads(
 ) -> Result<Scene, AdaptError> {
     let problem = DiscreteProblem::new(scene.clone(), mesh.clone())?.restrict(session)?;
     if LoadCurve::pass_within_steps(&problem) {
-        choose_steps(&mut scene, accuracy);
+        make_steps_adaptive(&mut scene, accuracy);
     }
     Ok(scene)
 }
 
-/// The error bars of the figures of `scene` because of `mesh`, measured by two runs with few steps: on the mesh
-/// and on the mesh bisected everywhere. There are none if the run ends at ζ_*. Collective.
+/// The error bars of the figures of `scene` from `mesh`, measured by two runs with few steps: on the mesh and on
+/// the mesh bisected everywhere. Empty if the run ends at ζ_*. Collective.
 ///
 /// # Errors
 /// See [`AdaptError`].
@@ -171,7 +169,7 @@ pub fn measured_bars(
     Ok(Measurement::new(session, &few, &mesh, &pilot, solver, rounds)?.bars)
 }
 
-/// Checks that `scene` has the figures for which it asks an accuracy.
+/// Checks that the figures for which `scene` requires an accuracy exist.
 fn check_figures(scene: &Scene, mesh: &Mesh) -> Result<(), SetupError> {
     if scene.accuracy_of.is_empty() {
         return Ok(());
@@ -198,7 +196,7 @@ fn refined(
         let problem = DiscreteProblem::new(scene.clone(), mesh.clone())?.restrict(session)?;
         let pilot = Pilot::run(session, &problem, solver, triangles, true)
             .map_err(|source| AdaptError::Run { rounds, triangles, source })?;
-        if pilot.stop().is_some() && choose_steps(&mut scene, accuracy) {
+        if pilot.stop().is_some() && make_steps_adaptive(&mut scene, accuracy) {
             continue;
         }
         let round = Round::new(&scene, mesh, pilot, accuracy);
@@ -209,8 +207,8 @@ fn refined(
             Some(Err(error)) => (None, Some(error.to_string())),
             None => (None, None),
         };
-        let limit = || "no larger mesh and no further one is tried".to_owned();
-        let exhausted = rounds >= ROUNDS || 4 * triangles > MOST_TRIANGLES;
+        let limit = || "the limit on rounds or triangles is reached".to_owned();
+        let exhausted = rounds >= MAX_ROUNDS || 4 * triangles > MAX_TRIANGLES;
         let short = failed.or(exhausted.then(limit));
         let mut adapted = round.adapted(measured.as_ref(), rounds);
         let errors = measured.as_ref().map(|measured| measured.errors(&scene.accuracy_of));
@@ -226,9 +224,8 @@ fn refined(
     }
 }
 
-/// Makes the steps adaptive, because ζ_* is reached: by the body, or only because the steps are too long. False
-/// if they are adaptive already.
-fn choose_steps(scene: &mut Scene, accuracy: f64) -> bool {
+/// Makes the steps adaptive: too long steps may reach ζ_* or miss loads. False if they are adaptive already.
+fn make_steps_adaptive(scene: &mut Scene, accuracy: f64) -> bool {
     let Some(grid) = &mut scene.time else { return false };
     let uniform = matches!(grid.stepping, Stepping::Uniform { .. });
     grid.stepping =

@@ -1,13 +1,13 @@
 //! The error that the mesh makes in the damage.
 //!
-//! Let z be the damage on a much finer mesh, and ζ the damage of the run. Their difference e = z − ζ is
-//! sought as a quadratic function. Equation (25) for z, less what ζ makes of it, reads
+//! Let z be the damage on a much finer mesh, and ζ the damage of the run. Their difference e = z − ζ is sought as a
+//! quadratic function. Equation (25) for z, less its residual for ζ, reads
 //!
 //! (e_n − e_{n−1}, w) + k (κ∇e_n, ∇w) = k (φ* − ζ′, w) − k (κ∇ζ_n, ∇w) for all quadratic w.
 //!
-//! It is solved for about ten long steps between states of the run, by conjugate gradients in the
-//! hierarchical basis. The source φ* of z comes from the strains of a much finer mesh ([`FineStrains`]) at
-//! the same ζ. Strains under the same stress are proportional to 1/ζ, so φ* = φ((ζ/z)² |ε*|², z).
+//! It is solved in five to ten long steps between states of the run, by conjugate gradients in the hierarchical
+//! basis. The source φ* of z comes from the strains of a much finer mesh ([`FineStrains`]) at the same ζ. Strains
+//! under the same stress are proportional to 1/ζ, so φ* = φ((ζ/z)² |ε*|², z).
 
 use super::{
     fine_strains::FineStrains,
@@ -32,13 +32,13 @@ pub(super) struct DamageError {
     pub(super) change: Vec<f64>,
     /// See [`Outcome::damage_indicators`].
     pub(super) indicators: Vec<f64>,
-    /// How long after z the ζ of the run has fallen to the same minimum, s. It is taken at the last instant
-    /// at which both still fall; `None` if there is no such instant.
+    /// The delay, s, with which the run reaches the minimum of z. It is taken at the last state at which min ζ and
+    /// min z still fall; `None` if there is no such state.
     pub(super) delay: Option<f64>,
 }
 
-/// The error that the mesh makes in the last damage. It is `None` without damage, and where the active nodes
-/// of a state alone do not support the body. Collective.
+/// The error that the mesh makes in the last damage. `None` without damage, and if the active nodes of a state
+/// alone do not support the body. Collective.
 pub(super) fn damage_error(
     problem: &DiscreteProblem,
     damage_step: &mut DamageStep,
@@ -169,7 +169,7 @@ impl<'a> ZetaError<'a> {
                 .map(|field| affine(vertices.map(|i| field[i])));
             let rate = (zeta - zeta_before) / k - skipped;
             let mut of_triangle = mass * (source - rate) - diffusion * (zeta + self.on(t));
-            // At the vertices the skipped rates make up for the residual of ζ exactly.
+            // At the vertices the skipped rates balance the residual of ζ exactly.
             let excess = triangle.area() / 3.0 * skipped - mass * skipped;
             (0..3).for_each(|i| of_triangle[i] += excess[i]);
             let nodes = self.nodes[t].iter().zip(&of_triangle);
@@ -188,9 +188,8 @@ impl<'a> ZetaError<'a> {
         Ok(())
     }
 
-    /// The run has made many steps between two states. Their sources differ from the mean of the sources at
-    /// these two, and make rates that no long step can see: (M ζ′ + κL ζ_n − b)_i over the weight of vertex i,
-    /// with b the mean load of the two. Collective.
+    /// The rates that a long step misses. The run makes many steps between two states, whose sources differ from
+    /// the mean b of both states. At vertex i the rate is (M ζ′ + κL ζ_n − b)_i over the weight of i. Collective.
     fn skipped_rates(&self, before: &Sources, now: &Sources) -> Result<Vec<f64>, PetscError> {
         let (body, k) = (&self.problem.body, now.state.time - before.state.time);
         let loads = now.load.iter().zip(&before.load);

@@ -9,24 +9,21 @@ use crate::{
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Estimated relative errors of the last accepted state: of u in the energy norm, and of the damage ζ₀ − ζ in
-/// L². They are `None` without damage; those of the time steps also if the steps are too few to estimate.
+/// Estimated relative errors of the last accepted state: for u in the energy norm, and for the damage ζ₀ − ζ in L².
+/// They are `None` without damage. The errors of the time steps are also `None` if there are too few steps.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ErrorBudget {
     /// The error of u from the mesh.
     pub displacement_mesh: f64,
-    /// The error of the damage from the mesh; `None` also if the run stopped at ζ_*, near which it grows without
-    /// bound.
+    /// The error of the damage from the mesh; also `None` if the run stopped at ζ_*, where it grows without bound.
     pub damage_mesh: Option<f64>,
     /// The error of u from the time steps.
     pub displacement_steps: Option<f64>,
     /// The error of the damage from the time steps.
     pub damage_steps: Option<f64>,
-    /// The error of the largest displacement from the solver; infinite if the active nodes alone do not support
-    /// the body.
+    /// The error of max |u| from the solver; infinite if the active nodes alone do not support the body.
     pub solver: f64,
-    /// The error bars of the figures by their names, from mesh and time steps, each in the unit of its figure.
-    /// Empty if they are not measured.
+    /// Per name of a figure: its error bar from mesh and time steps, in its unit. Empty if they are not measured.
     pub figures: BTreeMap<String, f64>,
     /// Can the material be damaged?
     #[serde(skip)]
@@ -36,7 +33,7 @@ pub struct ErrorBudget {
     pub(crate) zeta_steps: Option<[f64; 2]>,
 }
 
-/// If its error is above this, the mesh is called the limit of the answer.
+/// If the error of the mesh is larger, the advice calls the mesh the limit of the answer.
 const LARGE: f64 = 0.05;
 /// If all errors are below this, there is no advice.
 const NEGLIGIBLE: f64 = 1e-9;
@@ -68,8 +65,8 @@ impl ErrorBudget {
         }
     }
 
-    /// The errors by their causes, and advice on which cause to reduce. For a run that stopped at ζ_* they are
-    /// errors of that time instead of the damage.
+    /// The errors by their causes, and advice on which cause to reduce. For a run that stopped at ζ_*, the error of
+    /// that time replaces the error of the damage.
     pub fn lines(&self, stopped: Option<&Stop>) -> [String; 4] {
         let of_damage = |error: Option<f64>| match error {
             Some(error) => format!("damage {}", percent(error)),
@@ -154,9 +151,8 @@ impl DiscreteProblem {
         (sums[1] > 0.0).then(|| (sums[0] / sums[1]).sqrt())
     }
 
-    /// A bound on the relative error of u in the energy norm that errors δζ = `error` of ζ cause. As
-    /// K δu = −δK u, it is ‖δζ/ζ ε(u)‖ over ‖ε(u)‖. For large δζ the larger one of ζ and ζ + δζ counts, and the
-    /// factor is at most 1. Collective.
+    /// A bound on the relative error of u in the energy norm due to errors δζ = `error`. As K δu = −δK u, it is
+    /// ‖δζ/ζ ε(u)‖ over ‖ε(u)‖. For large δζ, max(ζ, ζ + δζ) replaces ζ, and the factor is at most 1. Collective.
     pub(super) fn displacement_error_of(&self, error: &[f64], state: &State) -> f64 {
         let body = &self.body;
         let (zeta, error) = (self.zeta_at_points(&state.zeta), body.at_points(error));

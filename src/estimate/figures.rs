@@ -1,4 +1,4 @@
-//! The figures that a run prints, and how far off each of them may be.
+//! The figures that a run prints, and their error bars.
 
 use crate::{
     evolution::Step,
@@ -9,16 +9,16 @@ use serde::{Deserialize, Serialize};
 
 /// The figures of a [`StepRecord`](crate::evolution::StepRecord) that have an error bar.
 const OF_RECORD: [&str; 5] = ["work", "displacement_max", "contact_force", "zeta_min", "zeta_mean"];
-/// The groups of the supports' forces and moments, and the first of two for each probe.
+/// The groups of the supports' forces and moments, and the first of two groups per probe.
 const FORCES: usize = 5;
 const MOMENTS: usize = 6;
 const FIRST_PROBE: usize = 7;
 /// The scale of a figure is at least this fraction of the largest figure of its dimension. Otherwise a force that
 /// is zero by symmetry would have no relative error.
-const LEAST: f64 = 1e-3;
-/// The scale of a moment is at least this fraction of the largest force times the body's radius of gyration. A
+const MIN_SCALE: f64 = 1e-3;
+/// The scale of a moment is at least this fraction of the maximum force times the body's radius of gyration. A
 /// moment is small about any point near the line of its force.
-const LEAST_MOMENT: f64 = 0.1;
+const MIN_MOMENT_SCALE: f64 = 0.1;
 /// The relative error of the integral of a body force that varies in space. Both meshes of a measurement may
 /// have the same error, which the measurement then misses.
 const BODY_FORCE: f64 = 1e-4;
@@ -39,13 +39,12 @@ pub enum Dimension {
     Force,
     /// N.
     Moment,
-    /// ζ, at its least or at a point, or its mean.
+    /// min ζ, mean ζ, or ζ at a point.
     Damage,
     /// Pa.
     Stress,
 }
 
-/// A figure that a run prints.
 struct Figure {
     name: String,
     dimension: Dimension,
@@ -60,10 +59,9 @@ pub struct Bar {
     pub name: String,
     /// Its dimension.
     pub dimension: Dimension,
-    /// How far off the figure may be, in its own unit.
+    /// The error bar, in the unit of the figure.
     pub bar: f64,
-    /// The accuracy asked for is relative to this: the largest value of the figure in the run, and for a
-    /// damage ζ the largest 1 − ζ.
+    /// The scale of its relative error: the maximum of the figure in the run, and of 1 − ζ for a damage ζ.
     pub scale: f64,
 }
 
@@ -75,7 +73,6 @@ impl Bar {
 }
 
 impl DiscreteProblem {
-    /// All figures.
     fn figures(&self) -> Vec<Figure> {
         use Dimension::{Damage, Force, Length, Moment, Stress, Work};
         let dimensions = [Work, Length, Force, Damage, Damage];
@@ -90,7 +87,7 @@ impl DiscreteProblem {
                 (true, 2, _) => (name, Moment, MOMENTS),
                 (true, ..) => (name, Force, FORCES),
                 (false, _, 0 | 1) => (name, Length, first),
-                // The scale of a damage at a point is the largest damage of the body.
+                // The scale of a damage at a point is the maximum damage of the body.
                 (false, _, 2) => (name, Damage, 3),
                 _ => (name, Stress, first + 1),
             }
@@ -99,7 +96,6 @@ impl DiscreteProblem {
         of_record.chain(quantities).map(figure).collect()
     }
 
-    /// The names of all figures.
     pub(crate) fn figure_names(&self) -> Vec<String> {
         self.figures().into_iter().map(|figure| figure.name).collect()
     }
@@ -111,8 +107,7 @@ impl DiscreteProblem {
         self.figures().into_iter().zip(errors.iter().zip(scales)).map(bar).collect()
     }
 
-    /// The scale of each figure, from the `largest` [sizes](Self::figure_sizes) of a run: the largest size in its
-    /// group.
+    /// The scale of each figure, from the `largest` [sizes](Self::figure_sizes) of a run: the maximum of its group.
     pub(crate) fn figure_scales(&self, largest: &[f64]) -> Vec<f64> {
         let figures = self.figures();
         let most = |is_like: &dyn Fn(&Figure) -> bool| {
@@ -125,18 +120,17 @@ impl DiscreteProblem {
             let alike = match figure.dimension {
                 Dimension::Damage => return own.max(NEGLIGIBLE_DAMAGE),
                 Dimension::Moment => {
-                    LEAST_MOMENT * lever * most(&|other| other.dimension == Dimension::Force)
+                    MIN_MOMENT_SCALE * lever * most(&|other| other.dimension == Dimension::Force)
                 }
-                dimension => LEAST * most(&|other| other.dimension == dimension),
+                dimension => MIN_SCALE * most(&|other| other.dimension == dimension),
             };
             own.max(alike)
         };
         figures.iter().map(scale).collect()
     }
 
-    /// The values of [`Self::quantities`] with zeros in place of rounding. Forces are compared with forces,
-    /// moments with moments, and with forces times the body's radius of gyration; at a probe the components of
-    /// the displacement, and those of the stress.
+    /// The values of [`Self::quantities`] with zeros in place of rounding. A value is compared with the largest of
+    /// its group, and a moment also with the maximum force times the body's radius of gyration.
     pub(crate) fn without_rounding(&self, mut values: Vec<f64>) -> Vec<f64> {
         let figures = &self.figures()[OF_RECORD.len()..];
         let most = |group: usize| {
@@ -166,12 +160,11 @@ impl DiscreteProblem {
         self.figures().iter().zip(values).map(size).collect()
     }
 
-    /// Adds to the error bars the solver's tolerance, the error of the integrals of body forces, and the errors
-    /// of the time steps.
+    /// Adds to the error bars the solver's tolerance and the errors of body-force integrals and time steps.
     ///
-    /// The steps put ζ off by at most `most` at a node, by `mean` in the mean, and so u by `displacement`
+    /// The steps change ζ by at most `most` at a node and by `mean` on average, and so u by `displacement`
     /// (relative, energy norm): u depends on the past only through ζ. A few uniform steps may show only half of
-    /// their error, which is doubled for them.
+    /// their error, which is therefore doubled.
     pub(crate) fn add_step_errors(&self, bars: &mut [Bar], of_steps: [f64; 3]) {
         let grid = self.scene().time.map(|grid| grid.stepping);
         let uniform = matches!(grid, Some(Stepping::Uniform { .. }));

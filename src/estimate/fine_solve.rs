@@ -1,4 +1,4 @@
-//! The displacements in P2 at the damage and the active nodes of a state in P1.
+//! The displacements in P2 for the damage and the active nodes of a state in P1.
 
 use crate::{
     contact::ContactPoint,
@@ -8,15 +8,14 @@ use crate::{
     problem::{DiscreteProblem, LoadCase, State},
 };
 
-/// A problem in P2, solved by conjugate gradients that start from the displacements in P1 and a step along what
-/// the last solve added to those.
+/// A problem in P2, solved by conjugate gradients. They start from u in P1, plus a step along the last change.
 ///
-/// The preconditioner is the sum of two corrections: K₁⁻¹ of the forces as P1 sees them, and the residual
-/// over the diagonal of K (Xu, SIAM Review 34, 1992).
+/// The preconditioner is the sum of two corrections: K₁⁻¹ times the forces transferred to P1, and the residual over
+/// the diagonal of K (Xu, SIAM Review 34, 1992).
 pub(super) struct FineSolve<'a> {
     session: &'a Session,
     problem: &'a DiscreteProblem,
-    /// K₁⁻¹, of about the last state of the run.
+    /// K₁⁻¹, for a state near the end of the run.
     compliance: Compliance<'a>,
     /// The node of P2 at each vertex.
     node_of_vertex: Vec<usize>,
@@ -24,11 +23,11 @@ pub(super) struct FineSolve<'a> {
     middles: Vec<(usize, [usize; 2])>,
     /// The mean diagonal entry of K at each node of P2 in the last state, N/m.
     diagonal: Vec<f64>,
-    /// What the last solve added to its start.
+    /// The change of c by the last solve.
     change: Option<Vec<f64>>,
 }
 
-/// The part of the energy of u₂ − u₁ that the iteration may leave, and its largest number of iterations.
+/// The fraction of the energy of u₂ − u₁ that the iteration may leave, and the maximum number of iterations.
 const REST: f64 = 0.004;
 const ITERATIONS: usize = 30;
 
@@ -55,7 +54,7 @@ impl<'a> FineSolve<'a> {
         Self { session, problem, compliance, node_of_vertex, middles, diagonal, change: None }
     }
 
-    /// u₂ of a state in P1. It is `None` where the active nodes do not support the body. Collective.
+    /// u₂ of a state in P1. `None` if the active nodes do not support the body. Collective.
     pub(super) fn displacement(&mut self, state: &State) -> Result<Option<Vec<f64>>, RunError> {
         self.compliance.set(&state.zeta, &state.contact)?;
         let DiscreteProblem { body, constraints, .. } = self.problem;
@@ -104,7 +103,7 @@ impl<'a> FineSolve<'a> {
         Ok(bounds.map(|(bound, flag)| flag > 0.0 || between[bound.node]).collect())
     }
 
-    /// Forces at the nodes of P2 as P1 sees them: half of those at a midpoint act at each end.
+    /// Transfers forces from the nodes of P2 to P1: each end of an edge gets half of the force at the midpoint.
     fn at_vertices(&self, fine: &[f64]) -> Vec<f64> {
         let own = self.node_of_vertex.iter().flat_map(|&node| [fine[2 * node], fine[2 * node + 1]]);
         let mut coarse: Vec<f64> = own.collect();
@@ -130,12 +129,12 @@ struct System<'s, 'a> {
 }
 
 impl System<'_, '_> {
-    /// The places of the active bounds.
+    /// The indices of the active bounds.
     fn active(&self) -> impl Iterator<Item = usize> {
         (0..self.active.len()).filter(|&place| self.active[place])
     }
 
-    /// The unknowns that the iteration starts from: those of u₁, but for the prescribed ones and the bounds.
+    /// The initial unknowns: u₁, except at prescribed unknowns and active bounds.
     fn start(&self, state: &State, case: &LoadCase) -> Vec<f64> {
         let DiscreteProblem { body, constraints, .. } = self.solve.problem;
         let mut c = body.at_nodes(&state.u, 2);
@@ -152,8 +151,8 @@ impl System<'_, '_> {
         self.active().for_each(|place| field[constraints.bounds[place].dof] = 0.0);
     }
 
-    /// The step (d·r / d·Kd) d along the change d of the last state, which it takes from the `residual` r:
-    /// between two states the change keeps its shape. Collective.
+    /// The step (d·r / d·Kd) d along the change d of the last state, because d hardly changes its shape between two
+    /// states. Subtracts the forces of the step from the `residual` r. Collective.
     fn along_last_change(&mut self, residual: &mut [f64]) -> Result<Vec<f64>, PetscError> {
         let Some(last) = self.solve.change.take() else { return Ok(vec![0.0; residual.len()]) };
         let mut d = self.extended(&last);
@@ -180,7 +179,7 @@ impl System<'_, '_> {
         Ok(forces)
     }
 
-    /// The owned entries of a field with room for those of other ranks.
+    /// The owned entries of a field with room for the entries of other ranks.
     fn extended(&self, owned: &[f64]) -> Vec<f64> {
         let mut field = owned.to_vec();
         field.resize(2 * self.solve.problem.body.nodes.points.len(), 0.0);

@@ -1,11 +1,11 @@
-//! Strains as a much finer mesh would have them, from the displacements u₁ in P1 and u₂ in P2.
+//! Estimated strains on a much finer mesh, from the displacements u₁ in P1 and u₂ in P2.
 //!
-//! In the energy norm errors are orthogonal to what a mesh resolves, so squares add up. With the
-//! estimated error η of u₂,
+//! In the energy norm, errors are orthogonal to the mesh functions; squares add up. With the estimated error η of
+//! u₂,
 //!
-//! |ε*|² = |ε(u₂)|² + c (|ε(u₂)|² − |ε(u₁)|²), c = η²/‖u₂ − u₁‖², but no more than 1.
+//! |ε*|² = |ε(u₂)|² + c (|ε(u₂)|² − |ε(u₁)|²), c = η²/‖u₂ − u₁‖², but at most 1.
 //!
-//! A run that reached ζ_* did so at a singular point, where both orders converge alike: there c = 1.
+//! A run reaches ζ_* at a singular point, where both orders converge at the same rate; then c = 1.
 
 use super::{
     order_pair::OrderPair,
@@ -19,12 +19,12 @@ pub(super) struct FineStrains<'a> {
     pair: OrderPair<'a>,
     /// Did the run stop at ζ_*?
     stopped: bool,
-    /// c, and ‖u₂ − u₁‖²/‖u₁‖² at the state from which it comes.
+    /// c, and ‖u₂ − u₁‖²/‖u₁‖² at the state for which c was computed.
     c: f64,
     relative: f64,
 }
 
-/// c is found again when ‖u₂ − u₁‖²/‖u₁‖² has changed by more than this factor.
+/// c is computed again when ‖u₂ − u₁‖²/‖u₁‖² has changed by more than this factor.
 const CHANGE: f64 = 1.5;
 
 impl<'a> FineStrains<'a> {
@@ -32,8 +32,7 @@ impl<'a> FineStrains<'a> {
         Self { pair, stopped, c: 1.0, relative: 0.0 }
     }
 
-    /// |ε*|² at the vertices and midpoints of each triangle. It is `None` where the active nodes do not
-    /// support the body. Collective.
+    /// |ε*|² at the six nodes of each triangle. `None` if the active nodes do not support the body. Collective.
     ///
     /// # Errors
     /// PETSc failed, or the scene contradicts itself at the nodes of the other order.

@@ -2,8 +2,8 @@
 //!
 //! λ_a, λ_b, λ_c, w_ab = 4λ_aλ_b, w_bc, w_ca.
 //!
-//! The first three coefficients are the values at the vertices. The others are the heights of the bubbles
-//! on the sides: how far the values at the midpoints are from those of the affine part.
+//! The first three coefficients are the values at the vertices. The others are the heights of the bubbles on the
+//! sides: the values at the midpoints minus the affine part.
 
 use crate::{
     fem::{Body, Triangle},
@@ -50,7 +50,7 @@ pub(super) fn mass(triangle: &Triangle) -> Matrix6<f64> {
         })
 }
 
-/// The Laplace matrix ∫ ∇v·∇w, from that of the vertices L_ij = ∫ ∇λ_i·∇λ_j and ∇w_ab = 4(λ_a∇λ_b + λ_b∇λ_a).
+/// The Laplace matrix ∫ ∇v·∇w, from L_ij = ∫ ∇λ_i·∇λ_j and ∇w_ab = 4(λ_a∇λ_b + λ_b∇λ_a).
 pub(super) fn laplace(triangle: &Triangle) -> Matrix6<f64> {
     let (vertices, mass) = (triangle.laplace(), triangle.mass() / triangle.area());
     let terms = |side: usize| {

@@ -3,8 +3,8 @@
 use crate::{evolution::Step, problem::State};
 use serde::{Deserialize, Serialize};
 
-/// The least number of intervals between the states that are kept; there are at most twice as many. With three
-/// the estimated error of a load that swings once is too small by a factor 0.6.
+/// Minimum number of intervals between the kept states; there are at most twice as many. Fewer intervals
+/// underestimate the error under a load that rises and falls once.
 const INTERVALS: usize = 5;
 
 /// States of a run, evenly spread over its steps.
@@ -22,7 +22,7 @@ impl Instants {
         Self { stride: 1, states: Vec::new(), falling: Vec::new() }
     }
 
-    /// Sees an accepted step. When there are too many states, every other one is dropped.
+    /// Records an accepted step. If there are too many states, every other state is dropped.
     pub(crate) fn observe(&mut self, step: &Step) {
         self.falling.push((step.state.time, step.record.zeta_min));
         if !step.record.step.is_multiple_of(self.stride) {
@@ -36,7 +36,7 @@ impl Instants {
         }
     }
 
-    /// Appends the last state of the run. It replaces the one before if that is close to it.
+    /// Appends the last state of the run. If the state before is close to it, that state is dropped.
     pub(crate) fn end(&mut self, last: &State) {
         if let [.., before, end] = &self.states[..]
             && last.time - end.time < 0.5 * (end.time - before.time)
@@ -46,7 +46,7 @@ impl Instants {
         self.states.push(last.clone());
     }
 
-    /// How long after `time` min ζ of the run falls to `level`, s; `None` if it does not.
+    /// The delay after `time`, s, with which min ζ of the run falls to `level`; `None` if it does not.
     pub(crate) fn delay(&self, time: f64, level: f64) -> Option<f64> {
         let after = self.falling.iter().position(|(_, zeta)| *zeta <= level)?;
         let (t, zeta) = self.falling[after];

@@ -1,21 +1,19 @@
-//! How far off an answer is, and the mesh that it takes.
+//! Error estimates, and meshes adapted to an accuracy.
 //!
-//! A run gives the answer of a discrete problem. This room estimates how far that is from the answer of the
-//! scene, and refines meshes until the difference is as small as the user asks for. Four estimates do it:
+//! A run solves a discrete problem. This room estimates the difference from the exact solution of the scene, and
+//! refines meshes until the difference is within the required accuracy. There are four estimates:
 //!
-//! - [`RecoveredStrains`]: the error of u in the energy norm, triangle by triangle, from strains that are
-//!   fitted around each vertex;
-//! - the error of the damage: (25) once more, for the difference from a much finer mesh;
-//! - [`Bar`]: how far off each printed figure may be, measured by a second run on the mesh bisected
-//!   everywhere;
-//! - [`ErrorBudget`]: what the mesh, the time steps and the solver contribute.
+//! - [`RecoveredStrains`]: the error of u in the energy norm, per triangle, from strains fitted around each vertex;
+//! - the error of the damage: (25) is solved again, for the difference from a much finer mesh;
+//! - [`Bar`]: the error bar of each printed figure, measured by a second run on the mesh bisected everywhere;
+//! - [`ErrorBudget`]: the errors by the mesh, the time steps and the solver.
 //!
-//! [`adapted`] makes a mesh for an accuracy: rounds of a run with few steps, estimates and bisection, which
-//! a measurement ends ([`Adapted`]).
+//! [`adapted`] makes a mesh for an accuracy ([`Adapted`]). Each round has a run with few steps, estimates and
+//! bisection. A measurement ends the rounds.
 //!
-//! What crosses the door: at the end of a run `evolution` hands over its last state, some earlier ones and
-//! its factor of K, and enters the estimates in its [`Outcome`]. `command` asks for an adapted mesh and for
-//! error bars. Nothing here changes the answer of a run.
+//! What crosses the door: at the end of a run `evolution` hands over its last state, some earlier states and its
+//! factor of K. It gets the estimates in its [`Outcome`]. `command` requests an adapted mesh and error bars.
+//! Nothing here changes the answer of a run.
 
 mod hierarchical;
 mod recovery;
@@ -42,10 +40,10 @@ use crate::evolution::{Compliance, DamageStep, Outcome, RunError, StepController
 use damage_error::damage_error;
 use nalgebra::DVector;
 
-/// The bar of the time of ζ_* over the estimated delay of the damage, of which a coarse mesh may not show all.
+/// The error bar of the time of ζ_* over the estimated delay. A coarse mesh may not show all of the delay.
 const DELAYS: f64 = 1.5;
 
-/// Enters the estimated errors of a run that has ended in its outcome. Collective.
+/// Estimates the errors of a finished run and enters them in its outcome. Collective.
 pub(crate) fn estimate_run(
     outcome: &mut Outcome,
     controller: &StepController,

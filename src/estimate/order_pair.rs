@@ -16,11 +16,11 @@ pub(super) struct OrderPair<'a> {
     solve: OtherOrder<'a>,
 }
 
-/// How the displacements of the other order are found.
+/// The solver for the displacements of the other order.
 enum OtherOrder<'a> {
     /// In P1 by a contact step.
     Coarse(Box<ContactStep<'a>>),
-    /// In P2 by conjugate gradients, as a factor in P2 would take several times the memory of the run.
+    /// In P2 by conjugate gradients, because a factor in P2 would take several times the memory of the run.
     Fine(Box<FineSolve<'a>>),
 }
 
@@ -36,7 +36,7 @@ impl<'a> OrderPair<'a> {
     ) -> Result<Self, RunError> {
         let solve = match run.body.order() {
             Order::Linear => {
-                // K makes room for the elements of P2.
+                // Frees K, because the elements of P2 need its memory.
                 compliance.keep_factor(last)?;
                 OtherOrder::Fine(Box::new(FineSolve::new(session, other, compliance, last)))
             }
@@ -57,8 +57,7 @@ impl<'a> OrderPair<'a> {
         }
     }
 
-    /// u₁ and u₂ of a state of the run. It is `None` where the active nodes do not support the body.
-    /// Collective.
+    /// u₁ and u₂ of a state of the run. `None` if the active nodes do not support the body. Collective.
     ///
     /// # Errors
     /// PETSc or the contact step failed, or the scene contradicts itself at the other nodes.

@@ -1,9 +1,8 @@
-//! Contact between the nodes: the conditions u·ν ≤ g hold at the nodes of Γ_C, and between them the body
-//! may lie in the foundation by
+//! Penetration: u·ν ≤ g holds at the nodes of Γ_C. Between them the body may penetrate the foundation by
 //!
 //! p(s) = (u·ν)(s) − g(x(s), t), 0 < s < 1,
 //!
-//! where the gap is narrower or more curved than an edge shows.
+//! if the gap is narrower or more curved than an edge can resolve.
 
 use crate::{
     fem::{Edge, Elements, parabola},
@@ -13,19 +12,19 @@ use crate::{
 };
 use std::collections::HashMap;
 
-/// The error of penetrations, as a fraction of the largest displacement …
+/// The error of penetrations, as a fraction of the maximum displacement …
 const RESOLVED: f64 = 1e-3;
 /// … except at peaks of the foundation that are narrower than this fraction of an edge.
 const NARROWEST: f64 = 1e-5;
-/// A penetration above this fraction of the largest displacement is noted.
+/// A penetration above this fraction of the maximum displacement is noted.
 const NOTED: f64 = 0.05;
 
-/// How far the body lies in the foundation between the nodes of an edge.
+/// The penetration of the foundation between the nodes of an edge.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Penetration {
     /// The triangle of the edge, in the undivided mesh.
     pub(super) triangle: usize,
-    /// The largest p(s) of the edge, m.
+    /// The maximum p(s) of the edge, m.
     pub(super) depth: f64,
     /// Where it is, m.
     at: [f64; 2],
@@ -34,7 +33,7 @@ pub(super) struct Penetration {
 }
 
 impl DiscreteProblem {
-    /// The edges of Γ_C between whose nodes the body lies in the foundation, in a state. Collective.
+    /// The penetrations of the foundation between the nodes of Γ_C, in a state. Collective.
     pub(super) fn penetrations(&self, state: &State) -> Vec<Penetration> {
         let mut own = Vec::new();
         let displacement = self.body.nodes.partition.max_norm(&state.u);
@@ -60,8 +59,8 @@ impl DiscreteProblem {
         all.as_chunks().0.iter().map(penetration).collect()
     }
 
-    /// The normal reactions on the edges of Γ_C of each of the `count` triangles of the undivided mesh, N per
-    /// metre of thickness: a node shares its reaction between its edges. Collective.
+    /// The normal reactions on the edges of Γ_C of each of the `count` triangles of the undivided mesh, N per metre
+    /// of thickness: a node divides its reaction equally among its edges. Collective.
     pub(super) fn reactions(&self, state: &State, count: usize) -> Vec<f64> {
         let curves = self.scene().boundaries.iter().filter(|boundary| boundary.gap().is_some());
         let curves = curves.filter_map(|boundary| self.body.mesh.curves.get(&boundary.name));
@@ -109,12 +108,12 @@ impl DiscreteProblem {
         sides
     }
 
-    /// The largest penetration between the nodes of an edge and its place, m, to [`RESOLVED`] of the `displacement`.
-    /// It is measured from the line between the penetrations at the ends. These need not be zero, because the
-    /// normal at a node is the mean of the normals of two edges.
+    /// The maximum penetration between the nodes of an edge and its place, m, to [`RESOLVED`] of the
+    /// `displacement`. It is measured from the line between the penetrations at the ends. These need not be zero,
+    /// because the normal at a node is the mean of the normals of two edges.
     ///
-    /// Branch and bound: a part of the edge is halved as long as the largest u·ν possible there, less the least
-    /// gap possible ([`Expression::range`](crate::scene::Expression::range)), exceeds the depth found so far.
+    /// Branch and bound: a part of the edge is halved while max u·ν − min g there may exceed the depth found so
+    /// far; see [`Expression::range`](crate::scene::Expression::range).
     fn deepest(&self, gap: &Gap, edge: &Edge, state: &State, displacement: f64) -> (f64, [f64; 2]) {
         let (points, t) = (&self.body.nodes.points, state.time);
         let u = |node: usize| [state.u[2 * node], state.u[2 * node + 1]];
@@ -144,10 +143,10 @@ impl DiscreteProblem {
             }
             let along = [from, half, to];
             let [a, m, b] = along.map(normal_displacement);
-            let most = a.max(m).max(b) + 0.25 * (a - 2.0 * m + b).abs();
+            let max = a.max(m).max(b) + 0.25 * (a - 2.0 * m + b).abs();
             let [x, y] = bounds(along.map(|s| edge.at(points, s)));
-            let [least, _] = gap.distance.range([x, y, [t; 2]]);
-            let hidden = most - least - deepest.0 > RESOLVED * displacement;
+            let [min, _] = gap.distance.range([x, y, [t; 2]]);
+            let hidden = max - min - deepest.0 > RESOLVED * displacement;
             if hidden && to - from > NARROWEST {
                 parts.extend([[from, half], [half, to]]);
             }
@@ -173,8 +172,8 @@ impl DiscreteProblem {
         (depth > NOTED * displacement).then(|| {
             format!(
                 "between its nodes boundary \"{}\" lies {depth:.1e} in the foundation at ({x:.4}, {y:.4}), \
-                 {:.0} % of the largest displacement: contact there is narrower than the mesh shows, \
-                 displacements and forces may be far off; refine there, or ask for an accuracy",
+                 {:.0} % of the largest displacement: displacements and forces may be far off; \
+                 refine the mesh there, or set accuracy",
                 self.scene().boundaries[boundary].name,
                 100.0 * depth / displacement
             )

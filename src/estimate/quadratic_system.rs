@@ -15,12 +15,11 @@ pub(super) struct QuadraticSystem<'a> {
     diagonal: Vec<f64>,
     /// The nodes at the vertices that this rank owns.
     vertices: &'a [usize],
-    /// The matrix of P1 of a step of about this length with its factor, and the length, s.
+    /// The factorised system in P1 for a step of about this length, and the length of that step, s.
     linear: (&'a mut DamageSystem, f64),
 }
 
-/// The fraction of the energy of the solution that the iteration may leave, and its largest number of
-/// iterations.
+/// The fraction of the energy of the solution that the iteration may leave, and the maximum number of iterations.
 const REST: f64 = 1e-3;
 const ITERATIONS: usize = 30;
 
@@ -63,8 +62,7 @@ impl Operator for QuadraticSystem<'_> {
         Ok(())
     }
 
-    /// Divides the bubbles by the diagonal, which is a good preconditioner on any mesh, and applies the inverse
-    /// of the P1 matrix to the vertices.
+    /// Divides the bubbles by the diagonal, and applies the inverse of the P1 matrix at the vertices.
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<(), PetscError> {
         z.iter_mut().zip(r).zip(&self.diagonal).for_each(|((z, r), diagonal)| *z = r / diagonal);
         let (linear, k) = &mut self.linear;

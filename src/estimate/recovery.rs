@@ -1,4 +1,4 @@
-//! Recovered strains: an estimate of how well a mesh resolves displacements.
+//! Recovered strains, to estimate the discretisation error of displacements.
 
 use super::hierarchical::{coefficients, mass};
 use crate::{
@@ -12,7 +12,7 @@ use nalgebra::{Matrix6, Matrix6x3, Vector3, Vector6};
 pub struct EnergyError {
     /// ‖ε* − ε(u)‖² on each triangle that belongs to this rank, N m per metre of thickness.
     pub squares: Vec<f64>,
-    /// Its sum and ‖u‖², over the undivided body.
+    /// The sum of these squares and ‖u‖², over the undivided body.
     pub error: f64,
     /// See `error`.
     pub energy: f64,
@@ -20,15 +20,14 @@ pub struct EnergyError {
 
 /// Triangles needed to fit at a vertex; with fewer, the fits of its neighbours are averaged.
 const ENOUGH: usize = 4;
-/// This fraction of its trace is added to the diagonal of a normal matrix. It decides where the fit is not unique.
+/// This fraction of its trace is added to the diagonal of a normal matrix. It makes the fit unique.
 const REGULARISATION: f64 = 1e-13;
 
-/// A strain (ε_xx, ε_yy, 2ε_xy) as a polynomial in (x, y) − x_v about a vertex: the coefficients of
-/// 1, x, y, x², xy, y² (rows).
+/// A strain (ε_xx, ε_yy, 2ε_xy) as a polynomial about a vertex: the coefficients of 1, x, y, x², xy, y² (rows).
 type Fit = Matrix6x3<f64>;
 
 impl EnergyError {
-    /// Relative to the energy norm of u.
+    /// The error relative to the energy norm of u.
     pub fn relative(&self) -> f64 {
         if self.error == 0.0 { 0.0 } else { (self.error / self.energy).sqrt() }
     }
@@ -40,9 +39,8 @@ impl EnergyError {
 /// Around each vertex, a polynomial of the degree of u is fitted to ε(u) at the quadrature points of its
 /// triangles. At a vertex ε* is the value of its fit, and at a midpoint the mean of the fits of both ends.
 ///
-/// A vertex at a boundary may have too few triangles. It takes the mean of its neighbours' fits or, in a layer
-/// one triangle thick, a fit of lower degree. Strains jump where two materials meet, so each material has its
-/// own fits.
+/// A vertex at a boundary may have too few triangles. It takes the mean of its neighbours' fits or, in a layer one
+/// triangle thick, a fit of lower degree. Strains jump where two materials meet, so each material has its own fits.
 pub struct RecoveredStrains<'a> {
     body: &'a Body,
     /// ε(u) at the quadrature points, `per_triangle` of them in each triangle.
@@ -53,7 +51,7 @@ pub struct RecoveredStrains<'a> {
 }
 
 impl<'a> RecoveredStrains<'a> {
-    /// From nodal u. Collective.
+    /// Recovers the strains of nodal u. Collective.
     ///
     /// # Errors
     /// PETSc failed.
@@ -69,8 +67,7 @@ impl<'a> RecoveredStrains<'a> {
         Ok(Self { body, strains, per_triangle, fits })
     }
 
-    /// An estimate of the error of u in the energy norm, with `zeta` the values of ζ at the quadrature
-    /// points. Collective.
+    /// Estimates the error of u in the energy norm; `zeta` is ζ at the quadrature points. Collective.
     pub fn energy_error(&self, elasticity: &Elasticity, zeta: &[f64], u: &[f64]) -> EnergyError {
         let Self { body, per_triangle, .. } = *self;
         let square = |t: usize| {
@@ -90,8 +87,8 @@ impl<'a> RecoveredStrains<'a> {
         EnergyError { squares, error: sums[0], energy: sums[1] }
     }
 
-    /// ε* − ε(u) on triangle `t`, at the vertices and the midpoints of the sides 01, 12, 20. (Between
-    /// the quadrature points ε(u) is affine, but for curved triangles.)
+    /// ε* − ε(u) on triangle `t`, at the vertices and the midpoints of the sides 01, 12, 20. (ε(u) is affine
+    /// between the quadrature points, except on curved triangles.)
     fn difference(&self, t: usize) -> [Vector3<f64>; 6] {
         let (body, triangle) = (self.body, self.body.mesh.triangles[t]);
         let fits = &self.fits[body.material(t)];
@@ -164,7 +161,7 @@ impl TrianglesAround {
     fn new(body: &Body, material: usize) -> Self {
         let triangles = body.mesh.triangles.iter().enumerate();
         let own = triangles.filter(|(t, _)| body.material(*t) == material);
-        // At first where the triangles of each vertex begin; each one entered moves this on towards the end.
+        // `ends` first holds the start of each vertex's list; each entry moves it towards the end of the list.
         let mut ends = vec![0; body.mesh.nodes.len() + 1];
         own.clone().flat_map(|(_, triangle)| triangle).for_each(|&vertex| ends[vertex + 1] += 1);
         (1..ends.len()).for_each(|i| ends[i] += ends[i - 1]);
@@ -200,15 +197,15 @@ fn fits(
         let own = around.of(vertex).iter().flat_map(|t| per_triangle * t..per_triangle * (t + 1));
         fit(vertices[vertex], own.map(|q| (samples[q], strains[q])), degree)
     };
-    // Per vertex: its fit (18 entries), then 1 once it has one.
+    // Per vertex: its fit (18 entries), then 1 if the fit is known, else 0.
     let mut fields = vec![[0.0; 19]; nodes];
     let known = |fit: Fit| std::array::from_fn(|i| fit.as_slice().get(i).copied().unwrap_or(1.0));
     for vertex in (0..partition.owned()).filter(|&vertex| around.of(vertex).len() >= ENOUGH) {
         fields[vertex] = known(own_fit(vertex, degree));
     }
     partition.update(fields.as_flattened_mut(), 19)?;
-    // The other vertices take the mean of their neighbours' fits. Corners come second, because their neighbours
-    // are such vertices. Over more triangles than that a polynomial must not be extrapolated.
+    // The other vertices take the mean of their neighbours' fits. Corners, with one triangle, come second, because
+    // their neighbours get fits in the first pass. Over more triangles a mean of means would extrapolate too far.
     for most in [usize::MAX, 1] {
         let before = fields.clone();
         let is_left =
@@ -226,8 +223,7 @@ fn fits(
         }
         partition.update(fields.as_flattened_mut(), 19)?;
     }
-    // Vertices still without a fit, as in strips one triangle thick, take one of the degree of the strains
-    // themselves, which a single triangle determines.
+    // Other vertices, as in strips one triangle thick, take a fit of the strains' degree: one triangle suffices.
     for (vertex, field) in fields.iter_mut().enumerate().take(partition.owned()) {
         if field[18] == 0.0 {
             *field = known(own_fit(vertex, degree - 1));
@@ -243,7 +239,7 @@ fn fit(
     samples: impl Iterator<Item = ([f64; 2], Vector3<f64>)> + Clone,
     degree: usize,
 ) -> Fit {
-    /// How many monomials there are up to each degree.
+    /// Number of monomials up to each degree.
     const COUNT: [usize; 3] = [1, 3, 6];
     let offset = |x: [f64; 2]| [x[0] - centre[0], x[1] - centre[1]];
     let size = samples.clone().map(|(x, _)| offset(x)).map(|[x, y]| x.hypot(y)).fold(0.0, f64::max);

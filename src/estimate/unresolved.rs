@@ -1,5 +1,5 @@
-//! Data that the nodes do not resolve: prescribed displacements and the initial damage enter by their values at
-//! nodes, and may vary by more between them.
+//! Data that the nodes do not resolve. Prescribed displacements and the initial damage enter by their values at
+//! nodes, and may vary more between them.
 
 use crate::{
     fem::{GAUSS, POINTS, midpoint, parabola, part_point, six_points},
@@ -13,21 +13,20 @@ use std::collections::HashSet;
 const TIMES: usize = 8;
 /// The fraction of the accuracy that the interpolation of the initial damage may take.
 const SHARE: f64 = 0.5;
-/// An edge shorter than this fraction of its curve is not halved for a displacement: that must jump there.
+/// An edge shorter than this fraction of its curve is not halved: the displacement must jump there.
 const SHORTEST: f64 = 1e-4;
-/// The relative error of integrals here, and the number of parts of triangles that may be added for it.
+/// Allowed relative error of the integrals, and the number of triangle parts that may be added for it.
 const DEVIATION: f64 = 1e-5;
-const MORE: f64 = 100_000.0;
+const MAX_ADDED: f64 = 100_000.0;
 /// An error above this fraction of the whole is noted.
 const NOTED: f64 = 0.05;
 
-/// The edges that must be halved for a relative `accuracy`, by their ends in increasing order. The largest
-/// |u| is `displacement`, m. There are two kinds:
+/// The edges that must be halved for a relative `accuracy`, by their ends in increasing order. The maximum |u| is
+/// `displacement`, m. There are two kinds:
 ///
-/// - edges on which |u_D − Iu_D| exceeds `accuracy` · `displacement` somewhere, with Iu_D the interpolation of
-///   u_D at the nodes;
-/// - the longest sides of the triangles with the largest ‖ζ₀ − Iζ₀‖_T in L². There are as many as it takes for
-///   the others to have Σ ‖ζ₀ − Iζ₀‖²_T ≤ (½ `accuracy` ‖1 − ζ₀‖)².
+/// - edges on which |u_D − Iu_D| exceeds `accuracy` · `displacement`, with Iu_D the nodal interpolation of u_D;
+/// - the longest sides of the triangles with the largest ‖ζ₀ − Iζ₀‖_T in L². The triangles left out have Σ
+///   ‖ζ₀ − Iζ₀‖²_T ≤ (½ `accuracy` ‖1 − ζ₀‖)².
 pub(super) fn unresolved(
     scene: &Scene,
     mesh: &Mesh,
@@ -107,7 +106,7 @@ fn displacements(conditions: &[Condition]) -> impl Iterator<Item = &Expression> 
     components.flatten().flatten().filter(|u| u.depends_on_space())
 }
 
-/// Per edge of a curve: max |u_D − Iu_D| at some times, m. Then the largest |u_D| of all edges, m.
+/// Per edge of a curve: max |u_D − Iu_D| at some times, m. Then the maximum |u_D| of all edges, m.
 fn missed_displacements(
     scene: &Scene,
     mesh: &Mesh,
@@ -164,7 +163,7 @@ fn missed_damage(scene: &Scene, mesh: &Mesh) -> Option<MissedDamage> {
     let squares = vec![0.0; triangles.len()];
     let mut found = MissedDamage { squares, square: 0.0, missed: 0.0, integral: 0.0, shown: 0.0 };
     let f = (std::slice::from_ref(initial), 1.0);
-    for part in triangle_parts(&triangles, f, &[0.0], [DEVIATION, MORE]).parts {
+    for part in triangle_parts(&triangles, f, &[0.0], [DEVIATION, MAX_ADDED]).parts {
         let (triangle, corners): TrianglePart = part;
         let points = &triangles[triangle];
         let [a, b, c] = [points[0], points[1], points[2]].map(at);

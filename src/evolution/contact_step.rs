@@ -2,13 +2,13 @@
 //!
 //! u_n minimises ½ uᵀK(ζ_n)u − f_nᵀu over u·ν ≤ g on Γ_C and u = u_D on Γ_D.
 //!
-//! The unknowns are c, the displacements in the nodal bases, where every condition concerns one unknown. They
-//! are measured from a rigid motion of the body, the [`Datum`].
+//! The unknowns c are the displacements in the nodal bases, in which every condition concerns one unknown. They are
+//! measured from a rigid [`Reference`] motion.
 
 mod accuracy;
 mod attempts;
 mod certificate;
-mod datum;
+mod reference;
 mod minimisation;
 mod one_of_many;
 mod rescue;
@@ -27,10 +27,10 @@ use crate::{
     linear::{FactorState, LinearSolver, Precision},
     petsc::{PetscError, Session, Vector},
 };
-use certificate::Judged;
-use datum::Datum;
+use certificate::Candidate;
 use minimisation::displacement;
 use nalgebra::DMatrix;
+use reference::Reference;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -40,41 +40,41 @@ pub struct ContactStep<'a> {
     problem: &'a DiscreteProblem,
     phases: &'a Phases,
     solver: BoxedSolver,
-    /// The solver that replaces it if it stops above the tolerance.
+    /// The solver for steps in which `solver` stops short of the tolerance.
     rescuer: Option<BoxedSolver>,
-    /// The linear solver of both.
+    /// Solves the linear systems of both solvers.
     elastic: LinearSolver,
     stiffness: Stiffness,
-    /// η_*(ζ) at the quadrature points, from which K was assembled.
+    /// η_*(ζ) at the quadrature points, with which K was assembled.
     zeta_at_points: Vec<f64>,
-    /// The load of the free unknowns, and the free unknowns c.
+    /// The load of the free unknowns, and these unknowns c.
     load: Vector,
     c: Vector,
-    /// The start of every solve, and the start after the present step if it is accepted.
+    /// The memory from which every solve starts, and its update in case the step is accepted.
     accepted: Memory,
     next: Memory,
     /// c of the accepted steps.
     extrapolation: Extrapolation,
-    /// Does every rank know all triangles around its nodes?
+    /// Does every rank know all triangles around its own nodes?
     covered: bool,
-    /// u·ν at the bounds for the rigid motions that only contact constrains, a column each.
+    /// u·ν at the bounds, one column per rigid motion that only contact constrains.
     rigid: DMatrix<f64>,
 }
 
-/// The start of a step, from the steps before.
+/// The data that an accepted step passes to the next one.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Memory {
-    /// The rigid motion from which displacements are measured.
-    datum: Datum,
-    /// The scales of residuals: maxima of the run so far.
+    /// The reference configuration of the displacements.
+    reference: Reference,
+    /// The maximum scales of residuals so far.
     scales: Scales,
     /// Per bound: 1 if it is active, else 0.
     active: Vec<f64>,
-    /// The warm start of the solver.
+    /// The solver's warm start, in the solver's own form.
     warm_start: Vec<f64>,
 }
 
-/// The state of the contact steps in a checkpoint.
+/// The contact steps' part of a checkpoint.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct ContactState {
     accepted: Memory,
@@ -82,14 +82,14 @@ pub(super) struct ContactState {
     factor: FactorState,
 }
 
-/// Lower bound of the force scale, relative to the largest load of the run. Without it, the answer to a
-/// rounded load (sin(pi) = 1.2e-16) would need full accuracy.
-const LEAST_LOAD: f64 = 1e-6;
-/// Energies of larger displacements, m, overflow.
-const LARGEST: f64 = 1e150;
+/// The force scale is at least this fraction of the maximum load. Otherwise the answer to a rounded zero
+/// (sin(pi) = 1.2e-16) would need as many digits as any other.
+const MIN_LOAD: f64 = 1e-6;
+/// The energies of larger displacements, m, overflow.
+const MAX_DISPLACEMENT: f64 = 1e150;
 
 impl<'a> ContactStep<'a> {
-    /// With the contact solver called `solver`.
+    /// The contact step with the solver called `solver`.
     ///
     /// # Errors
     /// There is no solver of that name, or PETSc failed.
@@ -107,11 +107,11 @@ impl<'a> ContactStep<'a> {
         let options = &problem.scene().contact;
         let bounded = comm.any(!constraints.bounds.is_empty());
         let (solver, rescuer) = contact::solvers(solver, bounded, options)?;
-        // A preconditioner in single precision is good enough and has half the bytes.
+        // A preconditioner needs only single precision, which halves the bytes to read.
         let precision = Precision::Preconditioner;
         let memory = Memory {
-            datum: Datum::default(),
-            scales: Scales { force: LEAST_LOAD * problem.largest_load, displacement: 0.0 },
+            reference: Reference::default(),
+            scales: Scales { force: MIN_LOAD * problem.largest_load, displacement: 0.0 },
             active: vec![0.0; constraints.bounds.len()],
             warm_start: Vec::new(),
         };
@@ -134,14 +134,13 @@ impl<'a> ContactStep<'a> {
         })
     }
 
-    /// Sets the warm start of the solver. For the active set: 1 for each bound that is assumed active, else
-    /// 0.
+    /// Sets the solver's warm start, in its own form. Active set: 1 per bound guessed to be active, else 0.
     pub fn set_warm_start(&mut self, warm_start: &[f64]) {
         self.accepted.warm_start = warm_start.to_vec();
     }
 
-    /// u_n at `time` for the nodal damage `zeta`, by the present solver. Every solve starts from the accepted
-    /// steps; rejected solves have no effect.
+    /// u_n at `time` for the nodal damage `zeta`, by the current solver. Every solve starts from the accepted
+    /// steps; rejected steps leave no trace.
     fn solve_by_one(&mut self, step: usize, time: f64, zeta: &[f64]) -> Result<Step, RunError> {
         let started = Instant::now();
         let (problem, phases) = (self.problem, self.phases);
@@ -157,34 +156,34 @@ impl<'a> ContactStep<'a> {
         }
         let case = agreed(comm, phases.time("loads", || problem.load_case(time)))?;
         self.start(&case)?;
-        let (Judged { u, kkt, scales, force, unbalanced, contact, .. }, report) =
+        let (Candidate { u, kkt, scales, force, unbalanced, contact, .. }, report) =
             self.solve_certified(step, &case)?;
         self.next.scales = scales;
-        let least = problem.tolerance * scales.force;
-        self.next.active = active_bounds(&problem.constraints, &contact, least);
+        let limit = problem.tolerance * scales.force;
+        self.next.active = active_bounds(&problem.constraints, &contact, limit);
         let unconstrained = self.unconstrained_motion(&contact, force);
-        let u = self.next.datum.total(u);
+        let u = self.next.reference.total(u);
         let state = State { time, u, zeta: zeta.to_vec(), contact };
         let (mut record, quantities) = phases.time("step record", || {
             let record = StepRecord::new(problem, step, &state, &case.load, &report, &kkt);
             (record, problem.quantities_in(&state, &unbalanced))
         });
         record.seconds = started.elapsed().as_secs_f64();
-        if !(0.0..=LARGEST).contains(&record.displacement_max) {
+        if !(0.0..=MAX_DISPLACEMENT).contains(&record.displacement_max) {
             let source = StepFailure::TooLarge(record.displacement_max);
             return Err(RunError::Step { step, time, source });
         }
         Ok(Step { state, record, quantities, report, unconstrained, skipped_damage_solve: false })
     }
 
-    /// Accepts the last solve, at `time`.
+    /// Accepts the step of the last solve, at `time`.
     ///
     /// # Errors
     /// PETSc failed.
     pub fn accept(&mut self, time: f64) -> Result<(), PetscError> {
         let (problem, comm) = (self.problem, self.problem.body.nodes.partition.comm());
         let mut c = self.c.read(<[f64]>::to_vec)?;
-        self.next.datum.shift(&problem.constraints, &mut c, 1.0);
+        self.next.reference.translate(&problem.constraints, &mut c, 1.0);
         self.phases.time("extrapolation", || self.extrapolation.accept(comm, time, c));
         self.accepted = self.next.clone();
         Ok(())
@@ -196,37 +195,37 @@ impl<'a> ContactStep<'a> {
         ContactState { accepted, extrapolation, factor: self.elastic.factor().state() }
     }
 
-    /// Restores the state of a checkpoint.
+    /// Goes back to the state of a checkpoint.
     pub(super) fn set_state(&mut self, state: ContactState) {
         let ContactState { accepted, extrapolation, factor } = state;
         (self.accepted, self.extrapolation) = (accepted, extrapolation);
         self.elastic.factor().set_state(factor);
     }
 
-    /// Starts from the accepted steps: sets c, the datum and the solver's warm start. If the active bounds do
-    /// not support the body, the datum and c move as the load drives the rigid body.
+    /// Starts from the accepted steps: sets c, the reference and the solver's warm start. If the active bounds do
+    /// not support the body, the load drives it as a rigid body until contact, and the reference follows.
     fn start(&mut self, case: &LoadCase) -> Result<(), PetscError> {
         let (problem, comm) = (self.problem, self.problem.body.nodes.partition.comm());
         let constraints = &problem.constraints;
         self.next = self.accepted.clone();
-        let Memory { datum, active, .. } = &mut self.next;
+        let Memory { reference, active, .. } = &mut self.next;
         let unloaded = comm.all(case.load.iter().chain(&case.lift).all(|&value| value == 0.0));
         if unloaded {
-            *datum = Datum::default();
+            *reference = Reference::default();
         }
         self.phases.time("extrapolation", || {
             let predicted = self.extrapolation.at(case.time);
             let mut c = predicted.unwrap_or_else(|| vec![0.0; self.c.owned()]);
-            datum.shift(constraints, &mut c, -1.0);
+            reference.translate(constraints, &mut c, -1.0);
             self.c.set(&c)
         })?;
         if !unloaded && !contact::unconstrained_motions(comm, &self.rigid, active).is_empty() {
-            let (_, bounds) = datum.pose(constraints, case);
+            let (_, bounds) = reference.pose(constraints, case);
             let (motions, mut active) = ((&self.rigid, &case.work), active.clone());
             let c: Vec<f64> = self.c.read(|c| bounds.iter().map(|b| c[b.dof]).collect())?;
             let (amplitudes, _) =
                 contact::rigid_motion_until_contact(comm, motions, &bounds, &c, &mut active, false);
-            datum.add(
+            reference.add(
                 constraints,
                 &problem.motions.combined(&problem.body, &amplitudes).field(&problem.body),
             );

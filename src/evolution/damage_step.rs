@@ -8,15 +8,14 @@ use crate::{
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
-/// A step to be made from t_{n−1} to t_n, with the damage step
-/// (M + kκL) ζ_n = M · `start` + k · `load`.
+/// A planned step from t_{n−1} to t_n, with the damage system (M + kκL) ζ_n = M · `start` + k · `load`.
 pub(crate) struct PlannedStep {
     pub(crate) n: usize,
     /// t_n, s.
     pub(crate) time: f64,
     /// k_n = t_n − t_{n−1}, s.
     pub(crate) length: f64,
-    /// k, s.
+    /// k of this formula, s.
     pub(crate) k: f64,
     /// ζ_{n−1}, or the start of a two-step formula.
     pub(crate) start: DVector<f64>,
@@ -32,7 +31,7 @@ impl PlannedStep {
         (zeta - &self.start) / self.k
     }
 
-    /// The error of a step that has no answer.
+    /// The error of this step if it has no answer.
     pub(crate) fn failed(&self, source: StepFailure) -> RunError {
         RunError::Step { step: self.n, time: self.time, source }
     }
@@ -47,7 +46,7 @@ pub(crate) struct DamageStep<'a> {
     pub(crate) system: Option<(f64, DamageSystem)>,
 }
 
-/// The damage source φ(ε(u), ζ) of a state; zero where there is no damage law.
+/// The damage source φ(ε(u), ζ) of a state; zero without a damage law.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(crate) struct DamageSource {
     /// b_i = ∫ φ λ_i, m²/s.
@@ -56,19 +55,17 @@ pub(crate) struct DamageSource {
     pub(crate) min: f64,
 }
 
-/// The answer of a damage step.
 pub(crate) struct DamageUpdate {
     /// ζ_n at the nodes.
     pub(crate) zeta: DVector<f64>,
     /// min ζ_n and max ζ_n.
     pub(crate) min_max: (f64, f64),
-    /// The accuracy of ζ_n. `None` where the solve was skipped: a uniform ζ_{n−1} without source
-    /// stays exactly as it is.
+    /// The accuracy of ζ_n. `None` if the solve was skipped: a uniform ζ_{n−1} without source does not change.
     pub(crate) certificate: Option<DamageCertificate>,
 }
 
-/// The largest [`DamageCertificate::balance`] of a step, over the largest |ζ|: far above rounding.
-const LARGEST_BALANCE: f64 = 1e-10;
+/// Maximum accepted [`DamageCertificate::balance`] of a step, relative to max |ζ|: far above rounding.
+const MAX_BALANCE: f64 = 1e-10;
 
 impl DamageStep<'_> {
     /// The damage source of a state.
@@ -116,10 +113,9 @@ impl DamageStep<'_> {
         }
         let min_max = partition.min_max(zeta.as_slice());
         let largest = min_max.0.abs().max(min_max.1);
-        // A ζ that is below ζ_* whatever the error of the solve ends the run as it should.
+        // If ζ is below ζ_* whatever the error of the solve is, the run stops as it should.
         let stops = min_max.0 + certificate.error <= problem.threshold();
-        let inexact =
-            residual > largest_residual || certificate.balance > LARGEST_BALANCE * largest;
+        let inexact = residual > largest_residual || certificate.balance > MAX_BALANCE * largest;
         if inexact && !stops {
             return Err(planned.failed(StepFailure::DamageResidual(residual)));
         }
@@ -148,8 +144,8 @@ impl DamageStep<'_> {
         if finite { Ok(DVector::from_vec(change)) } else { Err(failed()) }
     }
 
-    /// Lets an error δ = `error` of ζ_{n−1} diffuse for a planned step of length k_n: δ becomes
-    /// δ + (k_n/k) ((M + kκL)⁻¹ M δ − δ). It stays if the solve fails. Collective.
+    /// Lets an error δ = `error` of ζ_{n−1} diffuse for a planned step of length k_n: δ becomes δ + (k_n/k)
+    /// ((M + kκL)⁻¹ M δ − δ). It is unchanged if the solve fails. Collective.
     pub(crate) fn diffuse(
         &mut self,
         planned: &PlannedStep,

@@ -1,4 +1,4 @@
-//! Why there is no run, or why it ends early.
+//! Errors that prevent a run or end it early.
 
 use super::{DiscreteProblem, SetupError};
 use crate::{
@@ -16,7 +16,7 @@ pub enum RunError {
     Contact {
         /// The step.
         step: usize,
-        /// Its time, s; none where there is no time.
+        /// Its time, s; `None` for a static problem.
         time: Option<f64>,
         /// The failure.
         source: Box<ContactError>,
@@ -33,7 +33,7 @@ pub enum RunError {
         /// The failure.
         source: StepFailure,
     },
-    /// There is no contact solver of that name, or it cannot solve such problems.
+    /// The contact solver does not exist, or it cannot solve this problem.
     #[error(transparent)]
     Solver(#[from] SolverError),
     /// The scene contradicts itself at some time.
@@ -78,8 +78,8 @@ pub enum StepFailure {
     TooLarge(f64),
     /// The error of an adaptive step is above the tolerance, however short the step is.
     #[error(
-        "the damage changes too fast for time.tolerance, however short the step; does a load jump \
-         there? Set time.step to a number, and leave accuracy out"
+        "the damage changes too fast for time.tolerance, however short the step (does a load \
+         jump?); set time.step to a number and remove accuracy"
     )]
     TooShort,
 }

@@ -4,10 +4,10 @@ use crate::petsc::Communicator;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
-/// Polynomials in time through the last accepted solutions, as starts for iterative solvers.
+/// Extrapolates the last accepted solutions by polynomials in time, as initial guesses for iterative solvers.
 ///
-/// Which degree predicts best depends on how smooth the evolution is and on how precisely
-/// the solutions are known: the degree that predicted the last solution best is used.
+/// The best degree depends on how smooth the evolution is and how precise the solutions are. The degree that
+/// predicted the last solution best is used.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Extrapolation {
     /// (time, solution), the latest first.
@@ -15,9 +15,9 @@ pub struct Extrapolation {
     degree: usize,
 }
 
-/// Above this degree the tolerance of the solutions, magnified by 2^(degree + 1), prevails.
-const HIGHEST: usize = 4;
-/// Entries of a solution by which predictions are compared, on each rank.
+/// Maximum degree. Above it the tolerance of the solutions, magnified by 2^(degree + 1), dominates.
+const MAX_DEGREE: usize = 4;
+/// Number of entries per rank by which predictions are compared.
 const SAMPLE: usize = 4096;
 
 impl Extrapolation {
@@ -30,22 +30,21 @@ impl Extrapolation {
         Some(values)
     }
 
-    /// Adds the part that this rank owns of an accepted solution. Collective.
+    /// Adds this rank's part of an accepted solution. Collective.
     pub fn accept(&mut self, comm: Communicator, time: f64, solution: Vec<f64>) {
         let errors = self.errors(comm, time, &solution);
         let best = (0..errors.len()).min_by(|&a, &b| errors[a].total_cmp(&errors[b]));
-        // One degree more than was possible so far is tried as soon as the highest was best.
+        // If the highest possible degree was best, the next prediction uses one degree more.
         self.degree = match best {
-            Some(degree) if degree + 1 == errors.len() && degree < HIGHEST => degree + 1,
+            Some(degree) if degree + 1 == errors.len() && degree < MAX_DEGREE => degree + 1,
             Some(degree) => degree,
             None => 0,
         };
         self.history.push_front((time, solution));
-        self.history.truncate(HIGHEST + 1);
+        self.history.truncate(MAX_DEGREE + 1);
     }
 
-    /// For every possible degree, the squared error of its prediction of the `solution` at `time`, in
-    /// a sample of the entries. Collective.
+    /// Per possible degree: its squared error for `solution` at `time`, over some entries. Collective.
     fn errors(&self, comm: Communicator, time: f64, solution: &[f64]) -> Vec<f64> {
         let weights: Vec<_> = (0..self.history.len()).map(|d| self.weights(d, time)).collect();
         let mut errors = vec![0.0; weights.len()];
@@ -60,8 +59,7 @@ impl Extrapolation {
         errors
     }
 
-    /// The weights (Lagrange) of the last `degree` + 1 solutions in the polynomial through them, at
-    /// `time`.
+    /// The weights (Lagrange) of the last `degree` + 1 solutions in the polynomial through them, at `time`.
     fn weights(&self, degree: usize, time: f64) -> Vec<f64> {
         let times = || self.history.iter().take(degree + 1).map(|(time, _)| *time).enumerate();
         let weight = |(i, own): (usize, f64)| -> f64 {

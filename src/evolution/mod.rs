@@ -16,12 +16,15 @@
 //! - the program stops when min ζ_n ≤ ζ_*;
 //! - (26): u_n minimises ½ uᵀK(ζ_n)u − f_nᵀu over U_n.
 //!
-//! Affine displacements have one strain in a triangle. There φ is taken at the three vertices, from
-//! their ζ and that strain, and integrated as an affine function; and η_*(ζ) by its mean over the three
-//! vertices. For quadratic ones, φ and η_*(ζ)𝒜ε(u) are taken at three quadrature points.
+//! Affine displacements have one strain in a triangle. There φ is evaluated at the three vertices and integrated as
+//! an affine function, and η_*(ζ) enters by its mean over the vertices. For quadratic displacements, φ and
+//! η_*(ζ)𝒜ε(u) are evaluated at three quadrature points.
 //!
-//! [`run`] is this loop; a step controller plans each step and judges it, so that steps may be chosen as
-//! well as uniform.
+//! [`run`] is this loop. [`ContactStep`] solves and certifies (26), `DamageStep` solves (28), and `StepController`
+//! plans each step and accepts or rejects it; steps are uniform or adaptive.
+//!
+//! What crosses the door: `command` starts a run of a [`DiscreteProblem`] with an [`Observer`], which sees every
+//! accepted [`Step`]. At the end `estimate` enters its error estimates in the [`Outcome`].
 
 mod contact_step;
 mod damage_step;
@@ -52,13 +55,12 @@ use crate::{
     problem::{LoadCase, LoadCurve},
 };
 use contact_step::ContactState;
-use observer::Shown;
+use observer::Callback;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
-use step_controller::{StepState, Verdict};
+use step_controller::{Decision, StepState};
 
-/// Solves Problem VP^hk with the contact solver called `solver`; `accepted` sees every accepted
-/// step, n = 0 included.
+/// Solves Problem VP^hk with the contact solver called `solver`; `accepted` is called for every accepted step.
 ///
 /// # Errors
 /// See [`RunError`]; every accepted step has been seen by then.
@@ -69,11 +71,10 @@ pub fn run(
     phases: &Phases,
     accepted: &mut dyn FnMut(&Step) -> Observed,
 ) -> Result<Outcome, RunError> {
-    run_from(session, problem, solver, phases, &mut Shown(accepted), None)
+    run_from(session, problem, solver, phases, &mut Callback(accepted), None)
 }
 
-/// As [`run`], for an `observer` that may keep checkpoints and end the run; from the state `saved` in
-/// one of them, if it is given.
+/// As [`run`], with an `observer` that may keep checkpoints and end the run. It starts from `saved`, if given.
 ///
 /// # Errors
 /// See [`RunError`]; every accepted step has been seen by then.
@@ -92,7 +93,7 @@ pub fn run_from(
     Ok(outcome)
 }
 
-/// As [`run`], without the estimates at its end.
+/// As [`run`], without error estimates.
 ///
 /// # Errors
 /// See [`run`].
@@ -103,11 +104,10 @@ pub(crate) fn run_unestimated(
     phases: &Phases,
     accepted: &mut dyn FnMut(&Step) -> Observed,
 ) -> Result<Outcome, RunError> {
-    let observer = &mut Shown(accepted);
+    let observer = &mut Callback(accepted);
     all_steps(session, problem, solver, phases, observer, None).map(|run| run.outcome)
 }
 
-/// Makes all steps of a run.
 fn all_steps<'a>(
     session: &'a Session,
     problem: &'a DiscreteProblem,
@@ -130,7 +130,7 @@ fn all_steps<'a>(
     let (outcome, instants) = (Outcome::new(first), Instants::new());
     let mut run = Run { damage_step, contact_step, controller, outcome, instants };
     match saved {
-        None => run.show(observer)?,
+        None => run.report(observer)?,
         Some(saved) => {
             run.contact_step.set_state(saved.contact);
             run.controller.set_state(saved.controller);
@@ -151,30 +151,30 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Makes a step, or finds that it has to be shorter; false at the end of the run.
+    /// Tries a step, which is accepted or rejected; false at the end of the run.
     fn step(&mut self, observer: &mut dyn Observer) -> Result<bool, RunError> {
         let started = Instant::now();
         let Self { damage_step, contact_step, controller, outcome, .. } = self;
         let Some(planned) = controller.plan(&outcome.last) else { return Ok(false) };
         // (28): ζ_n from ζ_{n−1} and u_{n−1}.
-        let verdict = damage_step.solve(&planned).and_then(|damage| {
+        let decision = damage_step.solve(&planned).and_then(|damage| {
             if damage.min_max.0 <= damage_step.problem.threshold() {
-                return Ok(controller.judge_stop(&planned, &damage, &outcome.last));
+                return Ok(controller.decide_stop(&planned, &damage, &outcome.last));
             }
             // (26): u_n from ζ_n.
             let mut step = contact_step.solve(planned.n, planned.time, damage.zeta.as_slice())?;
             step.set_damage_certificate(damage.certificate);
-            controller.judge(&planned, &damage, Box::new(step), damage_step)
+            controller.decide(&planned, &damage, Box::new(step), damage_step)
         });
-        match verdict.or_else(|failure| controller.judge_failure(&planned, failure))? {
-            Verdict::Accept(mut step) => {
+        match decision.or_else(|failure| controller.decide_failure(&planned, failure))? {
+            Decision::Accept(mut step) => {
                 contact_step.accept(planned.time)?;
                 step.record.seconds = started.elapsed().as_secs_f64();
                 outcome.accept(*step);
-                self.show(observer)?;
+                self.report(observer)?;
             }
-            Verdict::Retry => outcome.undone += 1,
-            Verdict::Stop(stop) => {
+            Decision::Retry => outcome.undone += 1,
+            Decision::Stop(stop) => {
                 outcome.stopped = Some(stop);
                 return Ok(false);
             }
@@ -182,8 +182,9 @@ impl Run<'_> {
         Ok(true)
     }
 
-    /// Shows the last accepted step, and does what the observers of all ranks then want. Collective.
-    fn show(&mut self, observer: &mut dyn Observer) -> Result<(), RunError> {
+    /// Reports the last accepted step to the observer. Then the run goes on, keeps a checkpoint or ends, as the
+    /// observers of all ranks decide. Collective.
+    fn report(&mut self, observer: &mut dyn Observer) -> Result<(), RunError> {
         self.instants.observe(&self.outcome.last);
         let comm = self.damage_step.problem.body.nodes.partition.comm();
         let wanted = observer.accept(&self.outcome.last).map_err(RunError::Observer);
@@ -203,8 +204,7 @@ impl Run<'_> {
     }
 }
 
-/// All that the next steps of a run depend on, to the last bit: a checkpoint keeps it. (A restart makes the
-/// damage system again.)
+/// A checkpoint: all that determines the next steps, to the last bit. (A restart makes the damage system again.)
 #[derive(Debug, Serialize, Deserialize)]
 pub struct RunState {
     contact: ContactState,
@@ -220,7 +220,7 @@ impl RunState {
     }
 }
 
-/// All ranks go on, or none. Collective.
+/// Fails on all ranks if `result` is an error on any rank. Collective.
 pub(crate) fn agreed<T, E: Into<RunError>>(
     comm: Communicator,
     result: Result<T, E>,

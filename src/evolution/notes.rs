@@ -1,4 +1,4 @@
-//! What the user should know about a problem or an answer that its residuals do not tell.
+//! Notes for the user on a problem or an answer, beyond its residuals.
 
 use super::{Accuracy, DiscreteProblem, LoadCurve, Outcome};
 use crate::{
@@ -10,24 +10,22 @@ use crate::{
 };
 use std::iter::once;
 
-/// In plane strain with ν above this, P1 triangles lock: measured in the stability study. P2 triangles
-/// converge more slowly as ν goes to ½, but do not lock (measured up to 0.4999).
+/// In plane strain, P1 triangles lock if ν is larger (STABILITY.md). P2 triangles only converge more slowly.
 const LOCKING: f64 = 0.45;
-/// Materials with moduli further apart than this factor are noted: the rounding of the stiffer one is then
-/// 1e-11 of the forces in the other, a tenth of the usual tolerance.
+/// A note is given if two moduli differ by a larger factor. The rounding of the stiffer material is then 1e-11 of
+/// the forces in the other one, a tenth of the default tolerance.
 const CONTRAST: f64 = 1e5;
-/// Times at which surface loads are looked at, about.
-const LOOKS: usize = 8;
-/// Triangles with a smaller angle are noted, degrees.
+/// Approximate number of sample times of surface loads.
+const TIMES: usize = 8;
+/// A note is given if a triangle has a smaller angle, degrees.
 const SLIVER: f64 = 1.0;
-/// Infinitesimal strain theory supposes |∇u| ≪ 1. At `LARGE` the term ½ ∇uᵀ∇u of the strain, which
-/// it leaves out, is up to a twentieth of ∇u. A smaller part of the body than `NOTICEABLE` may be
-/// a corner where the strain is singular, in every load.
+/// Infinitesimal strain theory requires |∇u| ≪ 1. At `LARGE` the neglected term ½ ∇uᵀ∇u of the strain is up to a
+/// twentieth of ∇u. A part of the body below `NOTICEABLE` may be a corner with singular strains.
 const LARGE: f64 = 0.1;
 const NOTICEABLE: f64 = 0.01;
 
 impl Outcome {
-    /// What the user should know about the run of `problem`. Collective.
+    /// Notes for the user on the run of `problem`. Collective.
     pub fn notes(&self, problem: &DiscreteProblem) -> Vec<String> {
         let least = self.stopped.map(|stop| stop.least_admissible);
         let early = least.filter(|least| *least > problem.threshold());
@@ -35,7 +33,7 @@ impl Outcome {
             "a slender body, stretched triangles, nearly incompressible or almost broken material";
         let contrast = problem.contrast();
         let (worst, cause) = (self.kkt.worst(), contrast.as_deref().unwrap_or(usual));
-        // A body with an unconstrained motion has no one answer; its own note says so.
+        // With an unconstrained motion the answer is not unique, and another note says so.
         let unique = self.unconstrained.is_none();
         let displacement = if unique { self.accuracy.displacement } else { 0.0 };
         let accuracy = Accuracy { displacement, ..self.accuracy };
@@ -52,7 +50,7 @@ impl Outcome {
                     1 => format!("at t = {first}"),
                     steps => format!("in {steps} steps, at t = {first} first and t = {last} last"),
                 };
-                // Nodes that touch without force may still be in the way.
+                // Nodes that touch without force may still block the motion.
                 let problem = "no active contact node supports the body against";
                 format!("{when}, {problem} {motion}: the answer may be one of many")
             }),
@@ -69,13 +67,13 @@ impl Outcome {
                 let steps = counted(*steps);
                 format!("in {steps} the solver missed the tolerance and {solver} gave the answer")
             }),
-            self.chosen_steps(problem, true),
+            self.adaptive_steps_note(problem, true),
         ];
         let notes = of_residuals.into_iter().flatten().chain(accuracy.notes(problem.tolerance));
         notes.chain(of_model.into_iter().flatten()).collect()
     }
 
-    /// What the run of `problem` did on its way; its answer is none the worse for it.
+    /// Remarks on how the run of `problem` went; none is a warning.
     pub fn remarks(&self, problem: &DiscreteProblem) -> Vec<String> {
         let (skipped, steps) = (self.skipped_damage_solves, self.last.record.step);
         let remarks = [
@@ -87,26 +85,25 @@ impl Outcome {
             }),
             (self.undone > 0)
                 .then(|| format!("{} steps were rejected and tried again, shorter", self.undone)),
-            self.chosen_steps(problem, false),
+            self.adaptive_steps_note(problem, false),
         ];
         remarks.into_iter().flatten().collect()
     }
 
-    /// How many steps were chosen, and how exact the damage is for it, if that `misses` the tolerance,
-    /// or if it does not.
-    fn chosen_steps(&self, problem: &DiscreteProblem, misses: bool) -> Option<String> {
+    /// A note on the adaptive steps, if their time error `misses` the tolerance or if it does not.
+    fn adaptive_steps_note(&self, problem: &DiscreteProblem, misses: bool) -> Option<String> {
         let error = self.damage_error.filter(|_| problem.damage().is_some())?;
         let Stepping::Auto { tolerance, .. } = problem.scene().time?.stepping else { return None };
-        // Where an accuracy is asked for, the program has set the tolerance.
+        // If an accuracy is required, the program has set the tolerance itself.
         let missed = error > tolerance && problem.scene().accuracy.is_none();
-        let verdict = match missed {
+        let advice = match missed {
             true => format!(", more than time.tolerance = {tolerance}: lower it"),
             false => String::new(),
         };
         (missed == misses).then(|| {
             format!(
-                "{} steps chosen: the time error of the damage is about {} of it, or three times that \
-                 where the load jumps{verdict}",
+                "{} steps chosen: the time error of the damage is about {} of it, or three times as much \
+                 if the load jumps{advice}",
                 self.last.record.step,
                 percent(error)
             )
@@ -115,8 +112,8 @@ impl Outcome {
 }
 
 impl DiscreteProblem {
-    /// What the user should know before any solve: what was not taken as it is written, unconstrained
-    /// rigid motions, and functions, a material or triangles that make the discretisation poor. Collective.
+    /// Notes for the user before any solve: input that was changed, unconstrained rigid motions, and functions,
+    /// materials or triangles that make the discretisation poor. Collective.
     pub fn notes(&self) -> Vec<String> {
         let (scene, linear) = (self.scene(), self.scene().order == Order::Linear);
         let poisson = scene.materials().map(|material| material.poisson).fold(-1.0, f64::max);
@@ -124,12 +121,12 @@ impl DiscreteProblem {
         let is_curved = self.body.nodes.partition.comm().any(!self.body.mesh.curved.is_empty());
         let mut notes = scene.notes.clone();
         notes.extend(self.motions.free.iter().map(|motion| {
-            format!("nothing prevents or drives {motion}: of all answers the one of least ∫|u|² is given")
+            format!("nothing prevents or drives {motion}: the answer given has the minimum ∫|u|²")
         }));
         let check_units = |contrast| format!("{contrast}; if that is not meant, check their units");
         notes.extend(self.contrast().map(check_units));
         notes.extend(unresolved_notes(scene, self.mesh()));
-        notes.extend(self.loads.notes(&scene.sample_times(LOOKS)));
+        notes.extend(self.loads.notes(&scene.sample_times(TIMES)));
         let others = [
             LoadCurve::unresolved_step(self).map(|[start, end]| {
                 format!(
@@ -155,8 +152,7 @@ impl DiscreteProblem {
         notes
     }
 
-    /// By what factor the moduli of the softest and of the stiffest material of the body differ, if it is
-    /// large.
+    /// A note on the ratio of the moduli of the stiffest and the softest material, if it is large.
     pub(super) fn contrast(&self) -> Option<String> {
         let (scene, used) = (self.scene(), self.scene().materials_of(self.mesh()));
         let names = once("[material]".to_owned())
@@ -176,7 +172,7 @@ impl DiscreteProblem {
         })
     }
 
-    /// The least κ/h² of the body, 1/s, with h the longest side of a triangle. Collective.
+    /// min κ/h² over the triangles, 1/s, with h the longest side. Collective.
     fn slowest_diffusion(&self) -> f64 {
         let (body, kappa) = (&self.body, self.diffusions());
         let rate = |(t, corners): (usize, &[usize; 3])| {
@@ -189,8 +185,8 @@ impl DiscreteProblem {
         body.nodes.partition.comm().min(own)
     }
 
-    /// Whether u is too large for infinitesimal strains and rotations: |∇u| (Frobenius) above
-    /// `LARGE` in a noticeable part of the body. A translation, however far, is not.
+    /// A note if u is too large for infinitesimal strains: |∇u| (Frobenius) above `LARGE` in a noticeable part of
+    /// the body. A translation does not count.
     fn large_gradients(&self, u: &[f64]) -> Option<String> {
         let body = &self.body;
         let gradients = for_elements!(body, cells => cells.gradients(u));
@@ -200,18 +196,18 @@ impl DiscreteProblem {
         let part = body.nodes.partition.comm().total(large) / body.area;
         (part > NOTICEABLE).then(|| {
             format!(
-                "|∇u| exceeds {LARGE} in {:.0} % of the body: too much for small strains and rotations, \
-                 and so for linear elasticity",
+                "|∇u| exceeds {LARGE} in {:.0} % of the body: strains or rotations are too large \
+                 for linear elasticity",
                 100.0 * part
             )
         })
     }
 
-    /// The triangle with the smallest angle, if that is small.
+    /// A note on the triangle with the smallest angle, if this angle is small.
     fn sliver(&self) -> Option<String> {
-        let (least, at) = self.body.mesh.smallest_angle();
+        let (own, at) = self.body.mesh.smallest_angle();
         let comm = self.body.nodes.partition.comm();
-        let (angle, rank) = comm.min_with_rank(least);
+        let (angle, rank) = comm.min_with_rank(own);
         let [x, y] = at.map(|coordinate| comm.broadcast(rank, coordinate));
         (angle < SLIVER).then(|| {
             format!(
@@ -221,7 +217,7 @@ impl DiscreteProblem {
     }
 }
 
-/// So many steps, in words.
+/// "1 step" or "n steps".
 fn counted(steps: usize) -> String {
     format!("{steps} step{}", if steps == 1 { "" } else { "s" })
 }

@@ -18,7 +18,7 @@ pub enum Next {
 }
 
 impl Next {
-    /// Ranks may disagree; the largest urgency decides for all. Signals have numbers above 1.
+    /// The observers of the ranks may disagree; the largest urgency decides. Signals have numbers above 1.
     pub(super) fn urgency(self) -> f64 {
         match self {
             Self::Step => 0.0,
@@ -36,8 +36,7 @@ impl Next {
     }
 }
 
-/// Sees the accepted steps of a run on its rank. Every function is called on all ranks. An observer without
-/// output keeps nothing in checkpoints.
+/// Sees the accepted steps of a run. Every function is called on all ranks. By default `keep` stores nothing.
 pub trait Observer {
     /// Sees an accepted step and decides how the run goes on.
     ///
@@ -54,10 +53,10 @@ pub trait Observer {
     }
 }
 
-/// An observer without output. A signal ends the run, where signals are deferred.
-pub(super) struct Shown<'a>(pub(super) &'a mut dyn FnMut(&Step) -> Observed);
+/// An observer that only calls a function. A deferred signal ends the run.
+pub(super) struct Callback<'a>(pub(super) &'a mut dyn FnMut(&Step) -> Observed);
 
-impl Observer for Shown<'_> {
+impl Observer for Callback<'_> {
     fn accept(&mut self, step: &Step) -> Observed<Next> {
         (self.0)(step).map(|()| interrupt::received().map_or(Next::Step, Next::End))
     }

@@ -9,7 +9,7 @@ use crate::{
 use serde::{Deserialize, Serialize};
 use std::{mem, rc::Rc};
 
-/// The outcome of a run that did not fail. A checkpoint leaves out what is known at the end only.
+/// The outcome of a run that did not fail. A checkpoint omits the fields that are known only at the end.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Outcome {
     /// The last accepted step.
@@ -27,11 +27,11 @@ pub struct Outcome {
     pub fallbacks: usize,
     /// The number of steps in which another solver gave the answer, and its name.
     pub rescued: Option<(usize, String)>,
-    /// By how much ζ violated the bounds of its equation.
+    /// The violation of the bounds on ζ.
     #[serde(skip)]
     pub bound_violation: BoundViolation,
     /// The number of steps in which the active nodes left a rigid motion unconstrained; the times of the first and
-    /// the last, s; and the motion in the first.
+    /// the last such step, s; and the motion in the first.
     pub unconstrained: Option<(usize, [f64; 2], RigidMotion)>,
     /// Estimated errors of the answers.
     #[serde(skip)]
@@ -39,7 +39,7 @@ pub struct Outcome {
     /// Where the errors of the last accepted state come from.
     #[serde(skip)]
     pub errors: ErrorBudget,
-    /// The error bars of the figures; none where they are not measured.
+    /// The error bars of the figures; empty if they are not measured.
     #[serde(skip)]
     pub bars: Vec<Bar>,
     /// A note on contact between the nodes.
@@ -52,7 +52,7 @@ pub struct Outcome {
     /// Estimated error of the last ζ over the damage done, for adaptive steps.
     #[serde(skip)]
     pub damage_error: Option<f64>,
-    /// The steps of the largest stationarity residual and displacement before the last.
+    /// The steps with the maximum stationarity residual and the maximum displacement before the last step.
     pub(super) least_accurate: Option<Rc<Step>>,
     pub(super) most_displaced: Option<Rc<Step>>,
 }
@@ -60,23 +60,22 @@ pub struct Outcome {
 /// The stop at ζ_*.
 #[derive(Debug, Clone, Copy)]
 pub struct Stop {
-    /// When, s: the first t_n with min ζ ≤ ζ_*; of two-step differences, the interpolated time.
+    /// The time, s: the first t_n with min ζ ≤ ζ_*, or with two-step differences an interpolated time.
     pub time: f64,
-    /// The min ζ found there, which is not accepted.
+    /// min ζ of the step that reached ζ_* and is not accepted.
     pub zeta_min: f64,
-    /// The least ζ that the sources so far allow: above ζ_* the stop comes too early.
+    /// The smallest ζ that the sources so far allow. If it is above ζ_*, the stop is too early.
     pub least_admissible: f64,
-    /// How far off the time may be because of the steps, s: the length of the last one and twice the estimated
-    /// delay of all steps.
+    /// The error bar of the time from the steps, s: the length of the last step plus the estimated delay of all
+    /// steps, which Euler's steps count twice.
     pub uncertainty: f64,
-    /// How far off the time may be because of the mesh, s: 1.5 times the estimated delay, as a coarse mesh may
-    /// not show all of it. After adaptation it is at least the difference from the mesh before. `None` if it
-    /// is not estimated.
+    /// The error bar of the time from the mesh, s: 1.5 times the estimated delay, because a coarse mesh may not
+    /// show all of it. After adaptation it is at least the measured error. `None` if it is not estimated.
     pub from_mesh: Option<f64>,
 }
 
 impl Stop {
-    /// How far off the time may be, s.
+    /// The error bar of the time, s.
     pub fn bar(&self) -> f64 {
         self.uncertainty + self.from_mesh.unwrap_or(0.0)
     }
@@ -90,9 +89,8 @@ impl Outcome {
         outcome
     }
 
-    /// Enters the error bars `of_mesh` that the mesh makes, and adds the errors of the time steps. There are no
-    /// bars if the run stopped at ζ_*, because another mesh stops at another time; and none if the steps are too
-    /// few to estimate their error.
+    /// Sets the error bars: the errors `of_mesh` plus the errors of the time steps. There are none if the run
+    /// stopped at ζ_*, because another mesh stops at another time, or if it has too few steps for an estimate.
     pub fn set_bars(&mut self, problem: &DiscreteProblem, of_mesh: &[Bar]) {
         let unknown = problem.damage().is_some() && self.errors.zeta_steps.is_none();
         if self.stopped.is_some() || unknown {
@@ -105,7 +103,6 @@ impl Outcome {
         self.errors.figures = self.bars.iter().map(|bar| (bar.name.clone(), bar.bar)).collect();
     }
 
-    /// A further step is accepted.
     pub(super) fn accept(&mut self, step: Step) {
         let before = Rc::new(mem::replace(&mut self.last, step));
         let keep_larger = |kept: &mut Option<Rc<Step>>, of: fn(&StepRecord) -> f64| {
@@ -136,21 +133,21 @@ impl Outcome {
     }
 }
 
-/// By how much ζ violated the bounds of its equation in a run.
+/// The violation of the bounds on ζ in a run.
 ///
-/// A step (28) that is not discretised in space obeys the maximum principle: φ ≤ 0, so max ζ never
-/// rises, and min ζ falls by no more than k min φ,
+/// Without discretisation in space, a step (28) obeys the maximum principle: φ ≤ 0, so max ζ never rises, and min ζ
+/// falls by at most k |min φ|,
 ///
 /// min ζ_{n−1} + k min φ_{n−1} ≤ ζ_n ≤ max ζ_{n−1}.
 ///
-/// Both bounds are carried on from the first step, so that small violations in many steps add up.
+/// The bounds continue from step to step, so that small violations in many steps add up.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct BoundViolation {
-    /// The largest ζ above its upper bound.
+    /// Maximum of ζ minus its upper bound.
     pub above: f64,
-    /// The largest distance of a ζ below its lower bound.
+    /// Maximum of the lower bound minus ζ.
     pub below: f64,
-    /// The first step in which one was violated, and its time, s.
+    /// The first step that violated a bound, and its time, s.
     pub first: Option<(usize, f64)>,
     /// k in that step, s.
     pub k: f64,
@@ -173,7 +170,7 @@ impl BoundViolation {
         }
     }
 
-    /// A note on the violation and its cure; `slowest` is the least κ/h² of the body, 1/s.
+    /// A note on the violation and its cure; `slowest` is min κ/h² over the body, 1/s.
     pub fn note(&self, mass: Mass, slowest: f64) -> Option<String> {
         let (step, time) = self.first?;
         let sides = [("above", self.above), ("below", self.below)].into_iter();
@@ -184,7 +181,7 @@ impl BoundViolation {
                 "κk is too small against h² for the consistent mass; set damage.mass = \
                  \"lumped\" (for meshes without obtuse angles), or refine the mesh there"
             }
-            Mass::Lumped => "the mesh has obtuse angles, of which the lumped mass takes no care",
+            Mass::Lumped => "the mesh has obtuse angles, for which the lumped mass fails",
             Mass::Consistent => {
                 "not because of the mass, as κk > h²: the mesh has obtuse angles, or the damage equation \
                  is solved too inaccurately (zeta_error in history.csv)"

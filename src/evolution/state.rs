@@ -36,27 +36,27 @@ pub struct StepRecord {
     pub zeta_min: f64,
     /// Mean of ζ, ∫ζ/|Ω|.
     pub zeta_mean: f64,
-    /// Largest nodal |u|, m.
+    /// Maximum nodal |u|, m.
     pub displacement_max: f64,
     /// fᵀu, of the loads alone, J per metre of thickness.
     pub work: f64,
-    /// Σ normal reactions of Γ_C, not the length of their resultant, N per metre of thickness.
+    /// Σ normal reactions of Γ_C (not their resultant), N per metre of thickness.
     pub contact_force: f64,
-    /// Nodes in contact: those of Γ_C in the active set.
+    /// Nodes of Γ_C in the active set.
     pub active_nodes: usize,
     /// Iterations of the contact solver.
     pub iterations: usize,
     /// Iterations of the linear solvers inside it.
     pub linear_iterations: usize,
-    /// Factorisations (not those of a preconditioner chosen by PETSc options).
+    /// Factorisations, except by a preconditioner from PETSc options.
     pub factorisations: usize,
     /// Times the contact solver left its fast path.
     pub fallbacks: usize,
     /// Contraction per iteration of a fixed-point method; empty for others.
     pub contraction: Option<f64>,
-    /// KKT residual, relative: nodal forces that nothing carries.
+    /// KKT residual, relative: unbalanced nodal forces.
     pub kkt_stationarity: f64,
-    /// KKT residual, relative: how far nodes are in the foundation.
+    /// KKT residual, relative: penetration of nodes into the foundation.
     pub kkt_primal: f64,
     /// KKT residual, relative: contact forces that pull.
     pub kkt_dual: f64,
@@ -71,7 +71,7 @@ pub struct StepRecord {
 }
 
 impl Step {
-    /// Enters the accuracy of ζ_n; `None` means that the damage solve was skipped, so ζ_n is exact.
+    /// Sets the accuracy of ζ_n; `None` means that the damage solve was skipped, so ζ_n is exact.
     pub(super) fn set_damage_certificate(&mut self, certificate: Option<DamageCertificate>) {
         self.skipped_damage_solve = certificate.is_none();
         let DamageCertificate { residual, error, .. } = certificate.unwrap_or_default();
@@ -81,8 +81,7 @@ impl Step {
 }
 
 impl StepRecord {
-    /// The record of the step n = `step` with the nodal loads `load`. The entries of the damage step and the step
-    /// controller are still zero.
+    /// The record of the step n = `step` with the nodal loads `load`. Entries of the damage step are zero.
     pub(super) fn new(
         problem: &DiscreteProblem,
         step: usize,
@@ -91,8 +90,8 @@ impl StepRecord {
         report: &ContactReport,
         kkt: &Kkt,
     ) -> Self {
-        let pressing = || state.contact.iter().filter(|point| point.active);
-        let mut active: Vec<usize> = pressing().map(|point| point.node).collect();
+        let points = || state.contact.iter().filter(|point| point.active);
+        let mut active: Vec<usize> = points().map(|point| point.node).collect();
         active.dedup();
         let partition = &problem.body.nodes.partition;
         let comm = partition.comm();
@@ -104,7 +103,7 @@ impl StepRecord {
             displacement_max: partition.max_norm(&state.u),
             work: partition.dot(load, &state.u, 2),
             // An empty sum is -0.0.
-            contact_force: comm.total(pressing().map(|point| point.force).sum()) + 0.0,
+            contact_force: comm.total(points().map(|point| point.force).sum()) + 0.0,
             active_nodes: comm.count(active.len()),
             iterations: report.iterations,
             linear_iterations: report.linear_iterations,

@@ -20,7 +20,6 @@ pub(super) struct BoundaryConditions {
     pub(super) prescribed: Vec<Option<([f64; 2], Expression)>>,
     /// The gap conditions u·ν ≤ g at the nodes of Γ_C, joined where boundaries meet smoothly.
     pub(super) gaps: Vec<GapRow>,
-    /// The gaps that depend on time.
     pub(super) moving: Vec<MovingGap>,
     /// The surface loads of Γ_N.
     pub(super) tractions: Vec<Traction>,

@@ -4,7 +4,7 @@ use super::{DiscreteProblem, SetupError};
 use crate::contact::Bound;
 use nalgebra::DVector;
 
-/// A load below this fraction of the largest load of the run counts as zero (rounding).
+/// A load below this fraction of the maximum load of the run counts as zero (rounding).
 const ZERO_LOAD: f64 = 1e-14;
 
 /// The data of the contact problem (26) at one time.
@@ -25,8 +25,7 @@ pub(crate) struct LoadCase {
 }
 
 impl DiscreteProblem {
-    /// Checks the data at sampled times ([`sample_times`](crate::scene::Scene::sample_times)), so that bad input is
-    /// rejected before any output.
+    /// Checks the data at sampled times ([`sample_times`](crate::scene::Scene::sample_times)), before any output.
     pub(super) fn check_times(&self) -> Result<(), SetupError> {
         // Integrating a body force costs as much as the loads of a step, so fewer times are checked.
         let most = if self.loads.body_force_depends_on_time() { 100 } else { 1000 };
@@ -41,8 +40,7 @@ impl DiscreteProblem {
         Ok(())
     }
 
-    /// Nodal loads at `time`, N per metre of thickness. Rounding (sin(pi) = 1.2e-16 of the largest load) counts as
-    /// zero.
+    /// Nodal loads at `time`, N per metre of thickness. Rounding, as in sin(pi) = 1.2e-16, counts as zero.
     pub fn load(&self, time: f64) -> Vec<f64> {
         let mut load = self.loads.at(&self.body, time);
         if self.body.nodes.partition.norm(&load, 2) <= ZERO_LOAD * self.largest_load {
@@ -84,8 +82,8 @@ impl DiscreteProblem {
         }
     }
 
-    /// The prescribed unknowns and the bounds on the others at `time`, from the `values` of the prescribed rows and
-    /// the `gaps` of all gap rows (empty if none depends on time).
+    /// The prescribed unknowns and the bounds on the others at `time`. `values` are the values of the prescribed
+    /// rows. `gaps` are the gaps of all gap rows, or empty if none depends on time.
     fn posed(
         &self,
         time: f64,

@@ -60,7 +60,6 @@ impl Loads {
         }
     }
 
-    /// The expressions of all forces.
     fn forces(&self) -> impl Iterator<Item = &Expression> {
         let surface = self.surface_forces.iter().flat_map(SurfaceForce::expressions);
         surface.chain(self.body_force.iter().flat_map(BodyForce::expressions))
@@ -119,9 +118,9 @@ impl Loads {
         gaps
     }
 
-    /// Samples at time t: the forces on each edge under traction and on some triangles, N per metre of thickness;
-    /// and the prescribed displacements and the changes of gaps, m. Every rank samples the whole body, which costs
-    /// much less than the nodal loads.
+    /// Samples at time t: forces on loaded edges and some triangles, N per metre of thickness; prescribed
+    /// displacements and gap changes, m. Every rank samples the whole body, which costs much less than the nodal
+    /// loads.
     fn sampled_at(&self, t: f64) -> [Vec<f64>; 2] {
         let mut forces = Vec::new();
         self.surface_forces.iter().for_each(|force| force.sample(t, &mut forces));

@@ -9,8 +9,7 @@
 //! - [`State`]: time, displacements, damage and contact at one time.
 //!
 //! What crosses the door: `evolution` advances a [`DiscreteProblem`] from [`State`] to [`State`]; `estimate` checks
-//! how well mesh and steps resolve the functions; `output` writes states. A scene that does not fit its mesh is a
-//! [`SetupError`].
+//! how well mesh and steps resolve the functions; `output` writes states. Bad input is a [`SetupError`].
 
 mod boundary_conditions;
 mod error;
@@ -153,8 +152,7 @@ impl DiscreteProblem {
         Self::new(scene, self.mesh().clone())
     }
 
-    /// Restricts a problem that every rank has made to the triangles that this rank has in `other`, a problem on
-    /// the same mesh. Collective.
+    /// Restricts a problem on the mesh of `other` to the triangles that this rank has there. Collective.
     ///
     /// # Errors
     /// PETSc failed.

@@ -6,7 +6,6 @@ use crate::{
     scene::Scene,
 };
 
-/// The probes of a scene.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Probes {
     places: Vec<Place>,

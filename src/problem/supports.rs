@@ -126,7 +126,6 @@ impl Supports {
         }
     }
 
-    /// The supports at the nodes that a rank owns.
     pub(super) fn restrict(&self, subdomain: &Subdomain) -> Self {
         let own = |node: &usize| subdomain.owned(*node);
         let (prescribed, contact) = (self.prescribed.iter(), self.contact.iter());
@@ -137,8 +136,7 @@ impl Supports {
         }
     }
 
-    /// The place of a contact point. If its node is on several boundaries, the boundary with the nearest normal
-    /// exerts the force.
+    /// The place of a contact point. On several boundaries, the one with the nearest normal exerts the force.
     fn place(&self, point: &ContactPoint) -> Option<Place> {
         let along =
             |place: &&Place| point.normal[0] * place.normal[0] + point.normal[1] * place.normal[1];
@@ -149,9 +147,8 @@ impl Supports {
     /// Per boundary: (F_x, F_y, M), this rank's part, with F = Σ R_i, N per metre of thickness, and M = Σ x_i × R_i
     /// about the origin, positive anticlockwise, N.
     ///
-    /// R_i = (Ku − f)_i is the force on the body at node i; `unbalanced` is f − Ku. If displacements are
-    /// prescribed at a node and its gap is closed, the obstacle exerts the normal reaction and the other
-    /// boundaries exert the rest.
+    /// R_i = (Ku − f)_i is the force on the body at node i; `unbalanced` is f − Ku. At a prescribed node with a
+    /// closed gap, the obstacle exerts the normal reaction and the other boundaries exert the rest.
     pub(super) fn resultants(
         &self,
         body: &Body,

@@ -22,15 +22,14 @@ use crate::{
     scene::Scene,
 };
 
-/// The error over the change, at most, for figures of about first order or better.
+/// Maximum of error over change, for figures of about first order or better.
 const ERROR_OVER_CHANGE: f64 = 2.5;
-/// The error over the change of the damage in L². Nothing cancels there, and adapted meshes reach the second
-/// order.
+/// Error over change of the damage in L². No signs cancel there, and adapted meshes reach second order.
 const FIELD_ERROR_OVER_CHANGE: f64 = 4.0 / 3.0;
 
 /// Triangles whose change is above this fraction of the largest are refined for a figure …
 const GOOD_PART: f64 = 0.5;
-/// … and no others, if they make this fraction of the whole change.
+/// … and no others, if they cause more than this fraction of the whole change.
 const MOST: f64 = 0.5;
 
 /// The fraction of the accuracy of a figure that the mesh may use; the time steps use the rest.
@@ -46,7 +45,7 @@ pub(super) struct MeasuredError {
 }
 
 impl MeasuredError {
-    /// The error over the allowed one for an accuracy.
+    /// The error over the error that an accuracy allows.
     pub(super) fn excess(&self, accuracy: f64) -> f64 {
         self.relative / (self.share * accuracy)
     }
@@ -55,30 +54,28 @@ impl MeasuredError {
 /// The errors of a run, from its changes when the mesh is bisected.
 #[derive(Default)]
 pub(super) struct Measurement {
-    /// The error bars of the figures; none where the run ends at ζ_*.
+    /// The error bars of the figures; empty if the run ends at ζ_*.
     pub(super) bars: Vec<Bar>,
     /// The error of ζ at the end over the damage, in L².
     pub(super) damage: f64,
-    /// The relative error of u: the estimate on the bisected mesh at the worst time or, if that is larger and there
-    /// is no damage, the error by its change at the end.
+    /// The relative error of u: the estimate on the bisected mesh at the worst time. Without damage, the error by
+    /// the change of u at the end counts if it is larger.
     pub(super) displacement: f64,
-    /// The error of ‖u‖² over its largest value.
+    /// The error of ‖u‖² over its maximum value.
     pub(super) energy: f64,
     /// The relative error of the time of ζ_*; infinite if only one of the two runs reaches it.
     pub(super) stop: f64,
-    /// For each triangle of the mesh: its share of the squared relative error of u, by the estimates on its
-    /// parts, and the largest penetration at their edges, m.
+    /// Per triangle of the mesh: its share of the squared relative error of u, from the estimates on its parts, and
+    /// the maximum penetration at their edges, m.
     pub(super) shares: Vec<f64>,
     pub(super) depths: Vec<f64>,
-    /// For each triangle the change of the reactions on its edges, N per metre of thickness, and the largest
-    /// change of ζ at its nodes and midpoints.
+    /// Per triangle: the change of the reactions on its edges, N per metre of thickness, and max |Δζ| there.
     reactions: Vec<f64>,
     zeta: Vec<f64>,
 }
 
 impl Measurement {
-    /// Compares the run `coarse` of `scene` on `mesh` with the same one on this mesh bisected everywhere.
-    /// Collective.
+    /// Compares the run `coarse` of `scene` on `mesh` with the same run on the bisected mesh. Collective.
     ///
     /// # Errors
     /// A triangle cannot be bisected, or the run on the bisected mesh fails.
@@ -103,7 +100,7 @@ impl Measurement {
         };
         let (displacement, of_parts) = fine.relative();
         let displacement = displacement.max(change_of_u(coarse, &fine));
-        // An error of order p on the parts was 2^p times as large on the whole.
+        // The squared error of order p on the whole triangle is 4^p times the sum on its parts.
         let growth = if scene.order == Order::Quadratic { 16.0 } else { 4.0 };
         let count = mesh.triangles.len();
         let (mut shares, mut depths) = (vec![0.0; count], vec![0.0_f64; count]);
@@ -129,9 +126,9 @@ impl Measurement {
         Ok(measured)
     }
 
-    /// The measured errors: of the figures `asked` for, or of all figures, of u, its energy, the damage and the time
-    /// of ζ_*. The largest over its share comes first.
-    pub(super) fn errors(&self, asked: &[String]) -> Vec<MeasuredError> {
+    /// The measured errors of the figures and norms in `names`, or of all: the figures, u, its energy, the damage
+    /// and the time of ζ_*. The largest error over its share comes first.
+    pub(super) fn errors(&self, names: &[String]) -> Vec<MeasuredError> {
         let norms = [
             ("damage", self.damage),
             ("displacement", self.displacement),
@@ -140,8 +137,8 @@ impl Measurement {
         ];
         let norms = norms.map(|(name, error)| (name, error, 1.0));
         let figures = self.bars.iter().map(|bar| (bar.name.as_str(), bar.relative(), SHARE));
-        let is_asked = |name: &str| asked.is_empty() || asked.iter().any(|other| other == name);
-        let errors = figures.chain(norms).filter(|(name, ..)| is_asked(name));
+        let is_named = |name: &str| names.is_empty() || names.iter().any(|other| other == name);
+        let errors = figures.chain(norms).filter(|(name, ..)| is_named(name));
         let mut errors: Vec<_> = errors
             .map(|(name, relative, share)| MeasuredError { name: name.to_owned(), relative, share })
             .collect();
@@ -149,15 +146,15 @@ impl Measurement {
         errors
     }
 
-    /// The largest relative error of the figures of ζ; the time steps change these most.
+    /// The maximum relative error of the figures of ζ; the time steps change these most.
     pub(super) fn of_zeta(&self) -> f64 {
         let bars = self.bars.iter().filter(|bar| bar.dimension == Dimension::Damage);
         bars.map(Bar::relative).fold(0.0, f64::max)
     }
 
-    /// The triangles that make most of the change of the figure `name`. For min ζ and ζ at a point, these are the
-    /// triangles in which ζ changed by a good part of the largest change; for forces and moments, those in which
-    /// the contact reactions did, if they are few. `None` if the whole mesh makes the change.
+    /// Per triangle: does it cause most of the change of the figure `name`? For min ζ and ζ at a point, ζ changes
+    /// there by a large part of its maximum change. For forces and moments, the contact reactions do so, in few
+    /// triangles. `None` if the whole mesh causes the change.
     pub(super) fn places(&self, name: &str) -> Option<Vec<bool>> {
         let bar = self.bars.iter().find(|bar| bar.name == name)?;
         let changes = match bar.dimension {
@@ -217,8 +214,7 @@ fn bars(coarse: &Pilot, fine: &Pilot, square: f64) -> Vec<Bar> {
     bars
 }
 
-/// ‖ζ_h − ζ_{h/2}‖ over ‖1 − ζ_{h/2}‖ at the end, as an error, and the largest |ζ_h − ζ_{h/2}| of each
-/// triangle of `mesh`. Collective.
+/// The final error ‖ζ_h − ζ_{h/2}‖ / ‖1 − ζ_{h/2}‖, and max |ζ_h − ζ_{h/2}| per triangle. Collective.
 fn damage(mesh: &Mesh, halved: &Refinement, coarse: &Pilot, fine: &Pilot) -> (f64, Vec<f64>) {
     let mut before = at_vertices(mesh, &coarse.zeta());
     let middles = halved.halved_edges.iter().map(|&[a, b]| 0.5 * (before[a] + before[b]));

@@ -1,5 +1,4 @@
-//! A run with few time steps: how the error of u is spread over the triangles, where the body lies in the
-//! foundation between the nodes, and the figures at the times of its steps.
+//! A run with few time steps, the error of u and the penetration on each triangle, and the figures of all steps.
 
 use crate::{
     estimate::RecoveredStrains,
@@ -8,44 +7,43 @@ use crate::{
     problem::{DiscreteProblem, State},
 };
 
-/// Steps of the run, and instants, evenly spread, at which its errors are estimated.
+/// Number of steps of the run, and of evenly spread times at which its errors are estimated.
 pub(super) const INSTANTS: usize = 12;
-/// Instants at which errors are estimated in a run that is only compared with another.
+/// Number of these times in a run that is only compared with another.
 const FEW: usize = 3;
-/// Errors at the end are relative to at least this fraction of the largest ‖u‖².
-const LEAST_ENERGY: f64 = 1e-4;
+/// Errors at the end are relative to at least this fraction of the maximum ‖u‖².
+const MIN_ENERGY: f64 = 1e-4;
 
 /// A run with few steps, and its errors on each triangle of the undivided mesh.
 pub(super) struct Pilot<'a> {
     pub(super) problem: &'a DiscreteProblem,
     pub(super) outcome: Outcome,
-    seen: Seen,
+    history: History,
 }
 
-/// The errors of the steps of a run.
+/// The figures and the estimated errors of the steps of a run.
 #[derive(Default)]
-struct Seen {
-    /// The instants at which errors are estimated, and the time of the last one so far, s.
+struct History {
+    /// The number of times at which errors are estimated, and the last such time so far, s.
     instants: usize,
     last: Option<f64>,
-    /// max_t ‖ε* − ε(u)‖²_T, and the largest sum over T at any time.
+    /// max_t ‖ε* − ε(u)‖²_T, and the maximum sum over T at any time.
     squares: Vec<f64>,
     worst: f64,
-    /// max_t ‖u‖², and the largest |u| at any time, m.
+    /// max_t ‖u‖², and the maximum |u| at any time, m.
     energy: f64,
     displacement: f64,
     /// ‖ε* − ε(u)‖²_T, their sum and ‖u‖² at the last time.
     end: (Vec<f64>, f64, f64),
-    /// The largest penetration at an edge of each triangle at any time, m.
+    /// The maximum penetration at an edge of each triangle at any time, m.
     depths: Vec<f64>,
-    /// The times of all steps, s, with their figures, and the largest sizes of these.
+    /// The times of all steps, s, with their figures, and the maximum size of each figure.
     figures: Vec<(f64, Vec<f64>)>,
     sizes: Vec<f64>,
 }
 
 impl<'a> Pilot<'a> {
-    /// Runs `problem` on a mesh of `triangles` triangles, and estimates the errors at its end if they are
-    /// `estimated`. Collective.
+    /// Runs `problem` on a mesh of `triangles` triangles, with estimates at its end if `estimated`. Collective.
     pub(super) fn run(
         session: &Session,
         problem: &'a DiscreteProblem,
@@ -55,15 +53,16 @@ impl<'a> Pilot<'a> {
     ) -> Result<Self, RunError> {
         let zeros = vec![0.0; triangles];
         let instants = if estimated { INSTANTS } else { FEW };
-        let mut seen = Seen { instants, squares: zeros.clone(), depths: zeros, ..Seen::default() };
+        let mut history =
+            History { instants, squares: zeros.clone(), depths: zeros, ..History::default() };
         let phases = Phases::default();
-        let mut observe = |step: &Step| Ok(seen.observe(problem, step)?);
+        let mut observe = |step: &Step| Ok(history.observe(problem, step)?);
         let run = if estimated { run } else { run_unestimated };
         let outcome = run(session, problem, solver, &phases, &mut observe)?;
-        if seen.last != Some(outcome.last.state.time) {
-            seen.estimate(problem, &outcome.last.state)?;
+        if history.last != Some(outcome.last.state.time) {
+            history.estimate(problem, &outcome.last.state)?;
         }
-        Ok(Self { problem, outcome, seen })
+        Ok(Self { problem, outcome, history })
     }
 
     /// The time at which ζ_* was reached, s.
@@ -71,7 +70,7 @@ impl<'a> Pilot<'a> {
         self.outcome.stopped.as_ref().map(|stop| stop.time)
     }
 
-    /// max (ζ₀ − ζ) at the end and its mean over the body; 0 where ζ_* was reached. Collective.
+    /// max (ζ₀ − ζ) at the end and its mean over the body; 0 if ζ_* was reached. Collective.
     pub(super) fn damage(&self) -> [f64; 2] {
         if self.outcome.stopped.is_some() {
             return [0.0; 2];
@@ -82,29 +81,29 @@ impl<'a> Pilot<'a> {
         [body.vertices.partition.min_max(&done).1, body.mean(&done)].map(|damage| damage.max(0.0))
     }
 
-    /// The largest |u| at any time, m.
+    /// The maximum |u| at any time, m.
     pub(super) fn displacement(&self) -> f64 {
-        self.seen.displacement
+        self.history.displacement
     }
 
-    /// The largest penetration at an edge of each triangle at any time, m.
+    /// The maximum penetration at an edge of each triangle at any time, m.
     pub(super) fn depths(&self) -> &[f64] {
-        &self.seen.depths
+        &self.history.depths
     }
 
-    /// ‖u‖² at the end, N m per metre of thickness, and the largest one at any time.
+    /// ‖u‖² at the end, N m per metre of thickness, and the maximum at any time.
     pub(super) fn energies(&self) -> [f64; 2] {
-        [self.seen.end.2, self.seen.energy]
+        [self.history.end.2, self.history.energy]
     }
 
     /// The scales of the figures.
     pub(super) fn scales(&self) -> Vec<f64> {
-        self.problem.figure_scales(&self.seen.sizes)
+        self.problem.figure_scales(&self.history.sizes)
     }
 
     /// The figures at `time`, s, affine between the steps.
     pub(super) fn figures_at(&self, time: f64) -> Vec<f64> {
-        let figures = &self.seen.figures;
+        let figures = &self.history.figures;
         let after = figures.partition_point(|(t, _)| *t < time).min(figures.len() - 1);
         let [(t0, before), (t1, next)] = [&figures[after.saturating_sub(1)], &figures[after]];
         let part = if t1 > t0 { ((time - t0) / (t1 - t0)).clamp(0.0, 1.0) } else { 1.0 };
@@ -120,30 +119,30 @@ impl<'a> Pilot<'a> {
 
     /// The normal reactions at the end on the edges of each triangle. Collective.
     pub(super) fn reactions(&self) -> Vec<f64> {
-        self.problem.reactions(&self.outcome.last.state, self.seen.squares.len())
+        self.problem.reactions(&self.outcome.last.state, self.history.squares.len())
     }
 
     /// Values of this rank's triangles for all triangles of the undivided mesh. Collective.
     pub(super) fn gathered(&self, own: &[f64]) -> Vec<f64> {
-        gathered(self.problem, own, self.seen.squares.len())
+        gathered(self.problem, own, self.history.squares.len())
     }
 
     /// The relative error of u at the worst time, and the shares m_T of its square.
     pub(super) fn relative(&self) -> (f64, Vec<f64>) {
-        let Seen { squares, worst, energy, end: (last, error, of_last), .. } = &self.seen;
+        let History { squares, worst, energy, end: (last, error, of_last), .. } = &self.history;
         if *worst == 0.0 {
             return (0.0, vec![0.0; squares.len()]);
         }
-        // After unloading, the rest of the deformation need not be exact.
-        let of_last = of_last.max(LEAST_ENERGY * energy);
+        // After unloading, the remaining deformation need not be exact.
+        let of_last = of_last.max(MIN_ENERGY * energy);
         let share = |(max, end): (&f64, &f64)| (max / energy).max(end / of_last);
         let shares = squares.iter().zip(last).map(share).collect();
         ((worst / energy).max(error / of_last).sqrt(), shares)
     }
 }
 
-impl Seen {
-    /// Sees an accepted step. Collective.
+impl History {
+    /// Records an accepted step. Collective.
     fn observe(&mut self, problem: &DiscreteProblem, step: &Step) -> Result<(), PetscError> {
         let time = step.state.time;
         let figures = step.figures();

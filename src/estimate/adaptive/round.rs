@@ -11,23 +11,20 @@ use crate::{
 };
 use std::collections::HashSet;
 
-/// A mesh is refined for this fraction of the accuracy asked for …
+/// A mesh is refined for this fraction of the required accuracy …
 const AIM: f64 = 0.7;
 /// … and good enough if its estimates are at most this fraction of it.
 const ENOUGH: f64 = 0.8;
 /// The fraction of the damage's error that its interpolation may take.
 const INTERPOLATION: f64 = 0.7;
-/// The time steps may use the part of the accuracy that the mesh leaves: at most and at least these fractions of
-/// the accuracy.
-const SHARE_OF_STEPS: f64 = 0.5;
-const LEAST_OF_STEPS: f64 = 0.04;
-/// If measured errors are too large, the estimated ones are reduced, in a round by no smaller factor than this.
-const LEAST_GOAL: f64 = 0.25;
-/// If the user asks for the accuracy of some figures only, these are measured once u and the damage have at most
-/// this estimated error.
+/// The time steps may use the part of the accuracy that the mesh leaves, but at most and at least these fractions.
+const MAX_SHARE_OF_STEPS: f64 = 0.5;
+const MIN_SHARE_OF_STEPS: f64 = 0.04;
+/// If measured errors are too large, a round reduces the estimated errors by at most this factor.
+const MIN_GOAL: f64 = 0.25;
+/// If the accuracy is required for some figures only, these are measured once all estimates are this small.
 const ROUGH: f64 = 0.1;
-/// Between the nodes the body may penetrate the foundation by this fraction of the accuracy times the largest
-/// displacement.
+/// Allowed penetration between the nodes, as a fraction of the accuracy times the maximum displacement.
 const PENETRATION: f64 = 0.5;
 /// The size of a triangle is multiplied by this where data of the scene are not resolved …
 const HALF: f64 = 0.5;
@@ -46,7 +43,7 @@ pub(super) struct Round<'a> {
     damage_error: Option<f64>,
     /// Edges on which a function of the scene is not resolved.
     unresolved: HashSet<[usize; 2]>,
-    /// The depth, m, by which the body may lie in the foundation between the nodes.
+    /// The allowed penetration between the nodes, m.
     deepest: f64,
 }
 
@@ -67,7 +64,7 @@ impl<'a> Round<'a> {
         }
     }
 
-    /// Is the mesh good enough for a measurement? Its estimates are small, and the data of the scene resolved.
+    /// Is the mesh good enough for a measurement? Its estimates must be small and the data of the scene resolved.
     pub(super) fn is_enough(&self) -> bool {
         // For some figures alone, the estimates only have to be reliable.
         let named = !self.scene.accuracy_of.is_empty();
@@ -94,9 +91,12 @@ impl<'a> Round<'a> {
             steps: match measured {
                 Some(measured) if self.pilot.stop().is_none() => {
                     let left = (self.accuracy - measured.of_zeta()).max(0.0) / AIM_OF_STEPS;
-                    left.clamp(LEAST_OF_STEPS * self.accuracy, SHARE_OF_STEPS * self.accuracy)
+                    left.clamp(
+                        MIN_SHARE_OF_STEPS * self.accuracy,
+                        MAX_SHARE_OF_STEPS * self.accuracy,
+                    )
                 }
-                _ => SHARE_OF_STEPS * self.accuracy,
+                _ => MAX_SHARE_OF_STEPS * self.accuracy,
             },
             stop_error: stop_error.filter(|error| error.is_finite()),
             bars: measured.map_or_else(Vec::new, |measured| measured.bars.clone()),
@@ -105,9 +105,9 @@ impl<'a> Round<'a> {
         }
     }
 
-    /// The factors by which to multiply the sizes of the triangles for the next mesh. If a few triangles make
-    /// the error of a figure, these become smaller, as the error is of first order in their size. Any other
-    /// error asks for smaller errors of u and the damage.
+    /// The factors by which to multiply the sizes of the triangles for the next mesh. If a few triangles cause the
+    /// error of a figure, these become smaller; the error is of first order in their size. Any other error requires
+    /// smaller errors of u and the damage.
     pub(super) fn size_ratios(&self, measured: Option<&Measurement>) -> Vec<f64> {
         let (mut shares, mut depths) = (self.shares.clone(), self.pilot.depths().to_vec());
         let mut sizes = vec![1.0_f64; shares.len()];
@@ -118,7 +118,7 @@ impl<'a> Round<'a> {
             depths.iter_mut().zip(&measured.depths).for_each(larger);
             let errors = measured.errors(&self.scene.accuracy_of);
             for error in errors.iter().filter(|error| error.excess(self.accuracy) > 1.0) {
-                let goal = (AIM / error.excess(self.accuracy)).max(LEAST_GOAL);
+                let goal = (AIM / error.excess(self.accuracy)).max(MIN_GOAL);
                 let Some(places) = measured.places(&error.name) else {
                     // Errors of figures are products of two errors of fields.
                     let is_figure = measured.bars.iter().any(|bar| bar.name == error.name);
@@ -149,14 +149,14 @@ impl<'a> Round<'a> {
         }
         let mut ratios: Vec<f64> =
             ratios.iter().zip(sizes).map(|(ratio, size)| ratio.min(size)).collect();
-        // If no estimate shows which triangles are too large, all are.
+        // If no estimate shows which triangles are too large, all become smaller.
         if smaller < 1.0 && ratios.iter().all(|&ratio| ratio == 1.0) {
             ratios.fill(smaller);
         }
         ratios
     }
 
-    /// The accuracy of u that the next mesh needs: a damage that is not exact enough needs a better u.
+    /// The accuracy of u that the next mesh needs: a damage with too large an error needs a better u.
     fn accuracy_of_u(&self) -> f64 {
         match self.damage_error {
             Some(of_damage) if of_damage > ENOUGH * self.accuracy => {

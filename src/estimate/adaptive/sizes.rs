@@ -1,19 +1,18 @@
 //! The sizes of the triangles for an accuracy, and bisection down to these sizes.
 //!
-//! On a triangle whose size is multiplied by r the error falls like r^p, p the order, and 1/r² triangles
-//! take its place: the least number of triangles for a given error Σ r_T^2p m_T has r_T ~ m_T^(−1/(2p+2)).
+//! If the size of a triangle is multiplied by r, its error falls like r^p, with p the order, and 1/r² triangles
+//! replace it. The minimum number of triangles for a given squared error Σ r_T^2p m_T has r_T ~ m_T^(−1/(2p+2)).
 
 use crate::mesh::{Mesh, MeshError, Refinement, twice_area};
 
-/// The least factor by which the size of a triangle is multiplied in a round.
-const LEAST_RATIO: f64 = 0.125;
+/// Minimum factor by which the size of a triangle is multiplied in a round.
+const MIN_RATIO: f64 = 0.125;
 /// Triangles are bisected while they are larger than this many times their wanted area; see [`oversize`].
 const OVERSIZE: f64 = 1.5;
-/// A little less than 1, so that triangles equal to the median up to rounding are bisected with it.
+/// Slightly below 1, so that triangles equal to the median up to rounding are bisected as well.
 const TIES: f64 = 1.0 - 1e-9;
 
-/// The factors by which to multiply the sizes of the triangles, so that the squared relative error becomes
-/// `aim`². Triangle T has the share m_T of it now.
+/// The factors for the sizes of the triangles, so that the squared relative error Σ m_T (`shares`) becomes `aim`².
 pub(super) fn size_ratios(shares: &[f64], order: f64, aim: f64) -> Vec<f64> {
     let exponent = 1.0 / (2.0 * order + 2.0);
     let ratio = |factor: f64, share: f64| match share {
@@ -32,7 +31,7 @@ pub(super) fn size_ratios(shares: &[f64], order: f64, aim: f64) -> Vec<f64> {
             low = middle;
         }
     }
-    shares.iter().map(|&share| ratio(low, share).max(LEAST_RATIO)).collect()
+    shares.iter().map(|&share| ratio(low, share).max(MIN_RATIO)).collect()
 }
 
 /// Bisects the triangles until they are as small as `ratios` say.
@@ -51,13 +50,13 @@ pub(super) fn divided(mut refinement: Refinement, ratios: &[f64]) -> Result<Refi
     }
 }
 
-/// [`OVERSIZE`], unless it asks for no bisection at all. Then it is so small that the half with the larger errors
-/// of all triangles that are too large is bisected: a mesh that misses the accuracy must change.
+/// [`OVERSIZE`], or less if no triangle would be bisected, because a mesh that misses the accuracy must change.
+/// Then the worse half of the triangles that are too large is bisected.
 fn oversize(ratios: &[f64]) -> f64 {
     let mut squares: Vec<f64> = ratios.iter().map(|r| r * r).filter(|&r| r < 1.0).collect();
     squares.sort_by(f64::total_cmp);
     match squares.first() {
-        Some(least) if OVERSIZE * least >= 1.0 => TIES / squares[(squares.len() - 1) / 2],
+        Some(min) if OVERSIZE * min >= 1.0 => TIES / squares[(squares.len() - 1) / 2],
         _ => OVERSIZE,
     }
 }

@@ -1,4 +1,4 @@
-//! The errors of an answer with small KKT residuals.
+//! Estimates the errors of an answer whose KKT residuals are small.
 
 use super::{ContactStep, active_bounds, displacement};
 use crate::{
@@ -10,34 +10,33 @@ use crate::{
 };
 use std::rc::Rc;
 
-/// The promised relative error of displacements, or `TOLERANCES` times the KKT tolerance if larger.
+/// The promised relative error of displacements is the larger of this and `TOLERANCES` times the KKT tolerance.
 const DISPLACEMENT: f64 = 1e-6;
 const TOLERANCES: f64 = 100.0;
-/// A mesh is too coarse if the energy norm is estimated to be off by more than this: the
-/// displacement under the load is then too small by about the square of it.
+/// A mesh is too coarse if the estimated relative error in the energy norm is larger. The displacement under the
+/// load is then too small by about the square of this error.
 const COARSE: f64 = 0.5;
-/// The discretisation is judged at the last step, unless its displacements are less than this part of
-/// the largest.
+/// The last step is used to estimate the discretisation error, unless its max |u| is below this fraction of the
+/// run's.
 const UNLOADED: f64 = 0.01;
-/// A deformation below this fraction of a rigid motion counts as rounding.
+/// A deformation below this fraction of the rigid motion counts as rounding.
 const CARRIED: f64 = 1e-11;
-/// An estimate up to this part of the promised error is not repeated for another step.
+/// An estimate up to this fraction of the promised error is not repeated for a second step.
 const SAFE: f64 = 0.1;
 
 /// Estimated errors of an answer, relative.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Accuracy {
-    /// Of the largest displacement, against the exact answer of the discrete problem with the
-    /// same active nodes. The KKT residuals bound forces; where K is ill-conditioned small
-    /// forces move u far. Infinite where the active nodes alone do not support the body.
+    /// The error of u over max |u|, against the exact discrete answer with the same active nodes. KKT residuals
+    /// bound forces; with an ill-conditioned K, small forces move u far. Infinite if the active nodes alone do not
+    /// support the body.
     ///
-    /// The larger of two: of the last step, and of the step with the largest stationarity residual.
+    /// The larger error of two steps: the last one, and the one with the maximum stationarity residual.
     pub displacement: f64,
-    /// The time of the step of which `displacement` is, s.
+    /// The time of this step, s.
     pub time: f64,
-    /// Of the discretisation in the last step, in the energy norm
-    /// ([`RecoveredStrains`](crate::estimate::RecoveredStrains)); where that is unloaded, in the step of the
-    /// largest displacement.
+    /// The discretisation error in the energy norm ([`RecoveredStrains`](crate::estimate::RecoveredStrains)) in the
+    /// last step. If it is unloaded: in the step with the maximum displacement.
     pub energy: f64,
 }
 
@@ -47,27 +46,27 @@ impl Accuracy {
         DISPLACEMENT.max(TOLERANCES * tolerance)
     }
 
-    /// Notes on these errors at a KKT tolerance; empty if they are small.
+    /// Notes for the user on these errors at a KKT tolerance; none if they are small.
     pub fn notes(&self, tolerance: f64) -> Vec<String> {
         let (displacement, time) = (self.displacement, self.time);
         let support = match displacement {
             f64::INFINITY => Some(format!(
-                "at t = {time:.4e}, the active contact nodes alone do not support the body: how exact the \
-                 displacements are cannot be estimated"
+                "at t = {time:.4e}, the active contact nodes alone do not support the body: the error of \
+                 the displacements cannot be estimated"
             )),
             _ => (displacement > Self::promised(tolerance)).then(|| {
                 format!(
-                    "the stiffness is ill-conditioned (a slender or very soft part?): small as the \
-                     residuals are, displacements are exact only to about {displacement:.0e} of the \
-                     largest at t = {time:.4e}"
+                    "the stiffness is ill-conditioned (a slender or very soft part?): displacements \
+                     at t = {time:.4e} are exact only to about {displacement:.0e} of the largest, \
+                     although the residuals are small"
                 )
             }),
         };
         let energy = (self.energy > COARSE).then(|| {
             format!(
-                "the mesh is too coarse for this answer: strains jump from triangle to triangle \
-                 by about {:.0} % (energy norm), and displacements may be far too small; use \
-                 smaller or less stretched triangles, several across a part that bends",
+                "the mesh is too coarse: strains jump between triangles by about {:.0} % (energy \
+                 norm), and displacements may be far too small; use smaller or less stretched \
+                 triangles, several across a part that bends",
                 100.0 * self.energy
             )
         });
@@ -75,12 +74,12 @@ impl Accuracy {
     }
 }
 
-/// The displacements that small forces cause at states of a run, their active nodes fixed.
+/// Displacements caused by small forces at a state of a run, with the active nodes fixed.
 pub(crate) struct Compliance<'a> {
     pub(crate) problem: &'a DiscreteProblem,
     /// K, until only its factor is kept.
     stiffness: Option<Stiffness>,
-    /// The unknowns that are fixed, and whether the factor is definite with them.
+    /// The fixed unknowns; is the factor positive definite with them?
     active: Vec<usize>,
     supported: bool,
     solver: LinearSolver,
@@ -89,7 +88,7 @@ pub(crate) struct Compliance<'a> {
 }
 
 impl<'a> ContactStep<'a> {
-    /// With the factor of the last solve.
+    /// The compliance, with the factor of the last solve.
     pub(crate) fn into_compliance(self) -> Result<Compliance<'a>, PetscError> {
         let Self { problem, stiffness, elastic: mut solver, load, c, .. } = self;
         let bounded = problem.constraints.bounds.iter().map(|bound| bound.dof);
@@ -107,9 +106,9 @@ impl<'a> ContactStep<'a> {
 }
 
 impl Compliance<'_> {
-    /// Estimates the errors of the last answer of a run, and of the one with the largest stationarity
-    /// residual before it, relative to the largest displacement; that only if the first error, enlarged by
-    /// the ratio of the two residuals, comes near to what is promised. The kept factor is mostly good enough.
+    /// Estimates the errors of the last step of a run, relative to the maximum displacement. The step with the
+    /// maximum stationarity residual follows if the first error times the ratio of the residuals comes near the
+    /// promised error. The kept factor is usually good enough.
     pub(crate) fn accuracy(&mut self, outcome: &Outcome) -> Result<Accuracy, PetscError> {
         let problem = self.problem;
         let body = &problem.body;
@@ -118,11 +117,11 @@ impl Compliance<'_> {
             |before: &&Rc<Step>| before.record.displacement_max > last.record.displacement_max;
         let most = outcome.most_displaced.as_ref().filter(larger).map_or(last, Rc::as_ref);
         let max = most.record.displacement_max;
-        // After unloading, the rest of u says little about the discretisation.
-        let judged = if last.record.displacement_max < UNLOADED * max { most } else { last };
-        let State { u, zeta, .. } = &judged.state;
+        // The small u left after unloading gives a poor estimate of the discretisation error.
+        let estimated = if last.record.displacement_max < UNLOADED * max { most } else { last };
+        let State { u, zeta, .. } = &estimated.state;
         let [rigid, rest] = RigidMotion::nearest(body, u).max_norms(body, u);
-        // A body in rigid motion has no strains but rounding.
+        // The strains of a body that only moves rigidly are rounding.
         let energy = match rest > CARRIED * rigid {
             true => problem.energy_error(zeta, u)?,
             false => 0.0,
@@ -142,7 +141,7 @@ impl Compliance<'_> {
         Ok(accuracy)
     }
 
-    /// max |K⁻¹(f − Ku)| / `max` with fixed active nodes: the correction for the residual forces.
+    /// max |K⁻¹(f − Ku)| / `max` with the active nodes fixed: the correction by the residual forces.
     fn displacement_error(&mut self, state: &State, max: f64) -> Result<f64, PetscError> {
         let problem = self.problem;
         if max == 0.0 || problem.body.nodes.partition.max_norm(&state.u) == 0.0 {
@@ -158,7 +157,7 @@ impl Compliance<'_> {
         Ok(correction.map_or(f64::INFINITY, max_norm))
     }
 
-    /// Takes the nodal damage and the active nodes of a state. Collective.
+    /// Sets the nodal damage and the active nodes of a state. Collective.
     pub(crate) fn set(&mut self, zeta: &[f64], contact: &[ContactPoint]) -> Result<(), PetscError> {
         let DiscreteProblem { body, elasticity, constraints, .. } = self.problem;
         let flags = active_bounds(constraints, contact, 0.0);
@@ -174,8 +173,7 @@ impl Compliance<'_> {
         Ok(())
     }
 
-    /// Gives back K, which is much of the memory, and keeps a factor of it, if need be that of a state.
-    /// Collective.
+    /// Frees K, a large part of the memory, and keeps its factor, if need be a new one at `state`. Collective.
     pub(crate) fn keep_factor(&mut self, state: &State) -> Result<(), PetscError> {
         if !self.solver.factor().exists() {
             self.set(&state.zeta, &state.contact)?;
@@ -184,14 +182,14 @@ impl Compliance<'_> {
             }
         }
         if let Some(stiffness) = self.stiffness.take() {
-            // The factor may be that of another matrix, such as the scaled K of TAO.
+            // The factor may belong to another matrix, such as TAO's scaled K.
             self.solver.factor().set_scaling(&stiffness.matrix)?;
         }
         Ok(())
     }
 
-    /// K(ζ)⁻¹ of nodal `forces`, N per metre of thickness, with fixed active nodes, to a digit or more; or
-    /// approximately, by the factor alone. `None` if these nodes do not support the body. Collective.
+    /// K(ζ)⁻¹ times nodal `forces`, N per metre of thickness, with the active nodes fixed: to one digit or more, or
+    /// after [`Self::keep_factor`] only by the factor. `None` if these nodes do not support the body. Collective.
     pub(crate) fn displacement(
         &mut self,
         mut forces: Vec<f64>,
@@ -206,7 +204,7 @@ impl Compliance<'_> {
         let norm = rhs.norm()?;
         let solved = match stiffness {
             Some(stiffness) => {
-                // A factor that is kept leaves a digit of the error less.
+                // With an old factor, the error may have one digit less than the residual.
                 let system = system(problem, stiffness, active);
                 solver.solve_renewing(system, rhs, answer, 0.01 * norm)?.converged
             }

@@ -1,8 +1,8 @@
-//! Solves until the certificate accepts the answer.
+//! Repeats the contact solve until the answer is certified.
 
 use super::{
     ContactStep,
-    certificate::{Judged, MOST_ROUNDING},
+    certificate::{Candidate, MAX_ROUNDING},
     minimisation::displacement,
 };
 use crate::{
@@ -11,92 +11,90 @@ use crate::{
     petsc::PetscError,
 };
 
-/// The largest number of solves for one answer: with a smaller tolerance or another datum.
+/// Maximum number of solves for one answer, each to a smaller tolerance or from another reference.
 const ATTEMPTS: usize = 3;
-/// An answer is mostly rigid if its rigid part exceeds this multiple of the rest.
+/// An answer is mostly rigid if its rigid part is more than this many times the rest.
 const DOMINANT: f64 = 10.0;
-/// Above this multiple even a certified answer is solved again from a new datum, if the present one is not
-/// zero.
+/// Above this ratio a reference other than zero is renewed, even if the answer is certified.
 const FAR: f64 = 1e3;
 
 impl ContactStep<'_> {
-    /// Solves until the certificate accepts the answer, with a smaller tolerance or another datum in each
-    /// attempt. Among many answers it takes the one with the minimum ∫|u|². The certificate decides, not the
-    /// solver.
+    /// Solves until the answer is certified, each time to a smaller tolerance or from another reference. The
+    /// solver's own convergence test does not count. If there are many answers, returns the one with minimum ∫|u|².
     pub(super) fn solve_certified(
         &mut self,
         step: usize,
         case: &LoadCase,
-    ) -> Result<(Judged, ContactReport), RunError> {
-        let (problem, asked) = (self.problem, self.problem.tolerance);
+    ) -> Result<(Candidate, ContactReport), RunError> {
+        let (problem, required) = (self.problem, self.problem.tolerance);
         let failed = |source| RunError::contact(problem, step, case.time, source);
-        let (mut tolerance, mut attempt, mut refined) = (asked, 0, None::<Vec<f64>>);
+        let (mut tolerance, mut attempt, mut refined) = (required, 0, None::<Vec<f64>>);
         let (mut before, mut report) = ((None, None), ContactReport::default());
         loop {
             attempt += 1;
-            let (lift, bounds) = self.next.datum.pose(&problem.constraints, case);
+            let (lift, bounds) = self.next.reference.pose(&problem.constraints, case);
             let solved = match self.solve_contact(case, &lift, &bounds, tolerance, before) {
-                // All ranks know that the method stopped above its tolerance. Other errors may concern one
-                // rank.
+                // All ranks know that the method stopped short. Any other error may concern one rank only.
                 Err(error) if !error.stopped_short() => return Err(failed(error)),
                 solved => solved,
             };
             let u = displacement(problem, lift, &self.c)?;
-            let judged = self.phases.time("certificate", || self.certify(u, case));
-            let certified = judged.kkt.within(asked);
-            let far = !self.next.datum.is_zero() && judged.rigid_max > FAR * judged.elastic_max;
-            // The change by a solve for the unbalanced forces is the error of the answer before.
-            let error = refined.take().map(|before| self.difference(&judged.u, &before));
-            before = (Some(judged.scales.force), None);
-            if (far || !certified) && attempt < ATTEMPTS && self.move_datum(&judged)? {
+            let candidate = self.phases.time("certificate", || self.certify(u, case));
+            let certified = candidate.kkt.within(required);
+            let far =
+                !self.next.reference.is_zero() && candidate.rigid_max > FAR * candidate.elastic_max;
+            // The change by a solve for the residual forces is the error of the answer before.
+            let error = refined.take().map(|before| self.difference(&candidate.u, &before));
+            before = (Some(candidate.scales.force), None);
+            if (far || !certified) && attempt < ATTEMPTS && self.move_reference(&candidate)? {
                 continue;
             }
-            // If a further attempt does not help, or is impossible, residuals within rounding are accepted.
+            // Residuals of rounding are accepted once a further attempt has not helped or is impossible.
             let certified = certified
-                || (attempt > 1 || solved.is_err()) && self.is_exact_to_rounding(&judged, error);
+                || (attempt > 1 || solved.is_err()) && self.is_exact_to_rounding(&candidate, error);
             match solved {
                 Ok(solved) => report.add(&solved),
-                Err(error) if !certified => return Err(failed(self.limited(error, &judged))),
+                Err(error) if !certified => return Err(failed(self.limited(error, &candidate))),
                 Err(ContactError::NotConverged { report: spent, .. }) => report.add(&spent),
                 Err(_) => {}
             }
-            // A KKT point of an indefinite K need not be a minimum, and a solver may not notice.
-            if judged.is_indefinite() {
+            // If K is indefinite, a KKT point need not be a minimum. Only some solvers notice this.
+            if candidate.is_indefinite() {
                 return Err(failed(ContactError::NotDefinite { method: self.solver.name() }));
             }
             if certified {
-                let (judged, refused) = self.of_least_displacement(judged, case)?;
-                if attempt == ATTEMPTS || refused <= asked {
-                    return Ok((judged, report));
+                let (candidate, rejected) = self.of_minimum_displacement(candidate, case)?;
+                if attempt == ATTEMPTS || rejected <= required {
+                    return Ok((candidate, report));
                 }
-                tolerance *= 0.3 * asked / refused;
+                tolerance *= 0.3 * required / rejected;
                 continue;
             }
-            if attempt == ATTEMPTS || judged.kkt.worst().is_nan() {
-                let (method, residuals) = (self.solver.name(), judged.kkt);
-                let error = ContactError::NotCertified { method, tolerance: asked, residuals };
-                return Err(failed(self.limited(error, &judged)));
+            if attempt == ATTEMPTS || candidate.kkt.worst().is_nan() {
+                let (method, residuals) = (self.solver.name(), candidate.kkt);
+                let error = ContactError::NotCertified { method, tolerance: required, residuals };
+                return Err(failed(self.limited(error, &candidate)));
             }
-            tolerance *= 0.3 * asked / judged.kkt.worst();
-            if self.is_rounding(&judged) || judged.kkt.within(MOST_ROUNDING) {
-                before.1 = Some(judged.unbalanced);
-                refined = Some(judged.u);
+            tolerance *= 0.3 * required / candidate.kkt.worst();
+            if self.is_rounding(&candidate) || candidate.kkt.within(MAX_ROUNDING) {
+                before.1 = Some(candidate.unbalanced);
+                refined = Some(candidate.u);
             }
         }
     }
 
-    /// Moves the datum by the rigid part of an answer, if the answer is mostly that.
-    fn move_datum(&mut self, judged: &Judged) -> Result<bool, PetscError> {
-        if judged.rigid_max <= DOMINANT * judged.elastic_max {
+    /// Moves the reference by the rigid part of an answer; returns false if the answer is not mostly rigid.
+    fn move_reference(&mut self, candidate: &Candidate) -> Result<bool, PetscError> {
+        if candidate.rigid_max <= DOMINANT * candidate.elastic_max {
             return Ok(false);
         }
-        let (datum, constraints) = (&mut self.next.datum, &self.problem.constraints);
+        let (reference, constraints) = (&mut self.next.reference, &self.problem.constraints);
         let nodes = &self.problem.body.nodes.points;
-        let motion: Vec<f64> = nodes.iter().flat_map(|&x| judged.rigid.at(x)).collect();
+        let motion: Vec<f64> = nodes.iter().flat_map(|&x| candidate.rigid.at(x)).collect();
         self.c.write(|c| {
-            datum.shift(constraints, c, 1.0);
-            datum.add(constraints, &motion);
-            datum.shift(constraints, c, -1.0);
+            reference.translate(constraints, c, 1.0);
+            reference.add(constraints, &motion);
+            reference.translate(constraints, c, -1.0);
         })?;
         Ok(true)
     }

@@ -1,4 +1,4 @@
-//! Certifies an answer by its displacements alone: residuals and contact forces.
+//! Certifies an answer from its displacements alone: KKT residuals and contact forces.
 
 use super::{Accuracy, ContactStep};
 use crate::{
@@ -7,21 +7,21 @@ use crate::{
     problem::LoadCase,
 };
 
-/// Residuals up to this multiple of the estimated rounding count as rounding.
+/// Residuals are the effect of rounding if they are at most this many times its estimate.
 const ROUNDED: f64 = 10.0;
-/// Larger residuals are accepted only with a tolerance as large, or if the estimated error of u is small.
-pub(super) const MOST_ROUNDING: f64 = 1e-6;
-/// A deformation below this fraction of the datum is rounding.
+/// Residuals of rounding above this are accepted only if the tolerance allows them or their effect on u is small.
+pub(super) const MAX_ROUNDING: f64 = 1e-6;
+/// A deformation below this fraction of the reference motion is rounding.
 const CARRIED: f64 = 1e-14;
-/// If the cosine between u and its elastic forces is below this, K is indefinite.
+/// The cosine between u and its elastic forces is below this only if K is indefinite.
 const NEGATIVE_ENERGY: f64 = -1e-10;
 
-/// An answer with its certificate.
-pub(super) struct Judged {
-    /// The displacements from the datum, m.
+/// A candidate answer and the residuals by the certificate.
+pub(super) struct Candidate {
+    /// The displacements from the reference, m.
     pub(super) u: Vec<f64>,
     pub(super) kkt: Kkt,
-    /// The scales of the residuals: of the run so far, this answer included.
+    /// The scales of the residuals, over the run so far and this answer.
     pub(super) scales: Scales,
     /// The larger of ‖f‖₂ and ‖Ku‖₂, N per metre of thickness.
     pub(super) force: f64,
@@ -30,13 +30,13 @@ pub(super) struct Judged {
     /// f − Ku, N per metre of thickness.
     pub(super) unbalanced: Vec<f64>,
     pub(super) contact: Vec<ContactPoint>,
-    /// The rigid part of u, max |·| of it and of the rest, m.
+    /// The rigid part of u; max |·| of this part and of the rest, m.
     pub(super) rigid: RigidMotion,
     pub(super) rigid_max: f64,
     pub(super) elastic_max: f64,
 }
 
-impl Judged {
+impl Candidate {
     /// Does u show that K is not positive definite?
     pub(super) fn is_indefinite(&self) -> bool {
         self.energy < NEGATIVE_ENERGY
@@ -44,9 +44,8 @@ impl Judged {
 }
 
 impl ContactStep<'_> {
-    /// Certifies u, measured from the datum, by forces summed triangle by triangle, without the assembled K
-    /// of the solvers.
-    pub(super) fn certify(&self, u: Vec<f64>, case: &LoadCase) -> Judged {
+    /// The KKT residuals of u, measured from the reference. Forces are summed by triangles, not from K.
+    pub(super) fn certify(&self, u: Vec<f64>, case: &LoadCase) -> Candidate {
         let problem = self.problem;
         let (body, partition) = (&problem.body, &problem.body.nodes.partition);
         let rigid = RigidMotion::nearest(body, &u);
@@ -67,7 +66,7 @@ impl ContactStep<'_> {
         let scales = self.run_scales(Scales { force, displacement: elastic_max });
         let energy = sums[2] / (scales.force * sums[3].sqrt()).max(f64::MIN_POSITIVE);
         let answer = Answer {
-            rigid: &self.next.datum.field,
+            rigid: &self.next.reference.field,
             elastic: &u,
             unbalanced: &unbalanced,
             prescribed: &case.prescribed,
@@ -78,29 +77,38 @@ impl ContactStep<'_> {
         if !self.covered {
             kkt.stationarity = f64::NAN;
         }
-        Judged { u, kkt, scales, force, energy, unbalanced, contact, rigid, rigid_max, elastic_max }
+        Candidate {
+            u,
+            kkt,
+            scales,
+            force,
+            energy,
+            unbalanced,
+            contact,
+            rigid,
+            rigid_max,
+            elastic_max,
+        }
     }
 
-    /// The scales of an answer. Lower bounds are the scales of the run so far and the rounding of the datum:
-    /// a body that only moves rigidly has no other scale. The displacement scale is at least what the forces
-    /// cause.
+    /// The scales of an answer, at least the scales of the run so far. They include the rounding of the reference
+    /// motion, the only scale of a rigid body. The displacement scale is at least force scale / stiffness.
     pub(super) fn run_scales(&self, answer: Scales) -> Scales {
-        let (datum, run) = (&self.next.datum, self.accepted.scales);
-        let rounding = match datum.is_zero() {
+        let (reference, run) = (&self.next.reference, self.accepted.scales);
+        let rounding = match reference.is_zero() {
             true => 0.0,
-            false => CARRIED * self.problem.body.nodes.partition.max_norm(&datum.field),
+            false => CARRIED * self.problem.body.nodes.partition.max_norm(&reference.field),
         };
         let force = answer.force.max(run.force).max(self.stiffness.scale * rounding);
-        let least = rounding.max(force / self.stiffness.scale);
-        Scales { force, displacement: answer.displacement.max(run.displacement).max(least) }
+        let min = rounding.max(force / self.stiffness.scale);
+        Scales { force, displacement: answer.displacement.max(run.displacement).max(min) }
     }
 
-    /// Adds to an error the tolerance that double precision allows, if the rounding of the internal forces of
-    /// u explains the error.
-    pub(super) fn limited(&self, error: ContactError, judged: &Judged) -> ContactError {
-        let attainable = ROUNDED * self.rounding(judged);
+    /// Adds to an error the tolerance that double precision can reach, if this explains the error.
+    pub(super) fn limited(&self, error: ContactError, candidate: &Candidate) -> ContactError {
+        let attainable = ROUNDED * self.rounding(candidate);
         match attainable > self.problem.tolerance
-            && judged.kkt.within(attainable)
+            && candidate.kkt.within(attainable)
             && attainable < 1.0
         {
             true => ContactError::Limited {
@@ -112,35 +120,34 @@ impl ContactStep<'_> {
         }
     }
 
-    /// Is u the exact answer for a stiffness whose entries differ by ε_machine? Its residuals must be at most
-    /// `MOST_ROUNDING`, or its `error`, relative to the largest displacement, as small as promised. If the
-    /// user asks for a smaller tolerance than the default, rounding is no excuse.
-    pub(super) fn is_exact_to_rounding(&self, judged: &Judged, error: Option<f64>) -> bool {
+    /// Is u exact for a stiffness whose entries are off by ε_machine? In addition, its residuals must be at most
+    /// `MAX_ROUNDING`, or its relative `error` at most the promised one. A tolerance below the default must be met.
+    pub(super) fn is_exact_to_rounding(&self, candidate: &Candidate, error: Option<f64>) -> bool {
         let tolerance = self.problem.tolerance;
         let is_small = |error| error <= Accuracy::promised(tolerance);
         tolerance >= ContactOptions::default().tolerance
-            && self.is_rounding(judged)
-            && (judged.kkt.within(MOST_ROUNDING) || error.is_some_and(is_small))
+            && self.is_rounding(candidate)
+            && (candidate.kkt.within(MAX_ROUNDING) || error.is_some_and(is_small))
     }
 
     /// Are the residuals of u at most the rounding of its internal forces?
-    pub(super) fn is_rounding(&self, judged: &Judged) -> bool {
-        judged.kkt.within(self.rounding(judged))
+    pub(super) fn is_rounding(&self, candidate: &Candidate) -> bool {
+        candidate.kkt.within(self.rounding(candidate))
     }
 
     /// The rounding of the internal forces of u, ε_machine ‖|K||u|‖₂ / F.
-    fn rounding(&self, judged: &Judged) -> f64 {
+    fn rounding(&self, candidate: &Candidate) -> f64 {
         let body = &self.problem.body;
         let elasticity = &self.problem.elasticity;
-        let rounding = elasticity.force_rounding(body, &self.zeta_at_points, &judged.u);
-        body.nodes.partition.norm(&rounding, 2) / judged.scales.force
+        let rounding = elasticity.force_rounding(body, &self.zeta_at_points, &candidate.u);
+        body.nodes.partition.norm(&rounding, 2) / candidate.scales.force
     }
 }
 
-/// Per bound: 1 if a contact force above `least`, N/m, acts on it, else 0.
-pub(crate) fn active_bounds(of: &Constraints, contact: &[ContactPoint], least: f64) -> Vec<f64> {
+/// Per bound: 1 if a contact force above `limit`, N/m, acts on it, else 0.
+pub(crate) fn active_bounds(of: &Constraints, contact: &[ContactPoint], limit: f64) -> Vec<f64> {
     let mut active = vec![0.0; of.bounds.len()];
-    for point in contact.iter().filter(|point| point.active && point.force > least) {
+    for point in contact.iter().filter(|point| point.active && point.force > limit) {
         if let Some(bound) = of.bound_along(point.node, point.normal) {
             active[bound] = 1.0;
         }

@@ -1,4 +1,4 @@
-//! (26) for the solvers: in the unknowns c, with all loads on the free unknowns.
+//! (26) in the form for its solver: in the unknowns c, with all loads on the free unknowns.
 
 use super::ContactStep;
 use crate::{
@@ -7,17 +7,15 @@ use crate::{
     petsc::{PetscError, Vector},
 };
 
-/// Lower bound of the force scale, relative to the forces that prescribed displacements or obstacles cause if
-/// they move their own nodes alone.
+/// The force scale is at least this fraction of the forces if prescribed displacements or obstacles move their own
+/// nodes alone. Smaller forces are rounding.
 const LIFTED: f64 = 1e-2;
 
 impl ContactStep<'_> {
-    /// Replaces c by the solution of (26). The load of the free unknowns is f − K u_D, with the prescribed
-    /// displacements u_D, `lift`.
+    /// Replaces c by the solution of (26) for the load f − K u_D, with u_D = `lift` the prescribed unknowns.
     ///
-    /// A further attempt has two results of the certificate for the present c: the force scale F, and f − Ku,
-    /// `unbalanced`. The load is then K c plus `unbalanced`, so that the rounding of the assembled K has no
-    /// effect.
+    /// The certificate of the previous answer c may give the force scale F and the residual forces
+    /// `unbalanced` = f − Ku. The load is then K c + `unbalanced`, so that rounding of the assembled K cancels.
     pub(super) fn solve_contact(
         &mut self,
         case: &LoadCase,

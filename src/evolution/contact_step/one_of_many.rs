@@ -1,6 +1,6 @@
-//! Rigid motions without resistance by contact forces: (26) then has many answers, with the same forces.
+//! Rigid motions that no contact force resists. (26) then has many answers with the same forces.
 
-use super::{ContactStep, active_bounds, certificate::Judged};
+use super::{ContactStep, active_bounds, certificate::Candidate};
 use crate::{
     contact::{self, ContactPoint, least_motion},
     fem::RigidMotion,
@@ -10,21 +10,21 @@ use crate::{
 use nalgebra::DVector;
 
 impl ContactStep<'_> {
-    /// The combinations of motions along which no contact force above `level` times F does work.
+    /// The rigid motions that only contact constrains and no contact force above `level` times F resists.
     fn unresisted(&self, contact: &[ContactPoint], level: f64, force: f64) -> Vec<DVector<f64>> {
         let active = active_bounds(&self.problem.constraints, contact, level * force);
         let comm = self.problem.body.nodes.partition.comm();
         contact::unconstrained_motions(comm, &self.rigid, &active)
     }
 
-    /// The fraction of F below which a contact force is uncertain. A residual at the tolerance does work up
-    /// to √N times the tolerance on a motion (Cauchy and Schwarz). At a lever of one mesh width, 1/√N of the
-    /// body, this is a force √N times as large.
+    /// Contact forces below this fraction of F may be residuals and do not count. By Cauchy and Schwarz, a residual
+    /// τF works on a rigid motion like a force √N τF. At a lever of one mesh width, 1/√N of the body, this is a
+    /// force N τF.
     fn uncertain(&self) -> f64 {
         self.problem.body.nodes.partition.total() as f64 * self.problem.tolerance
     }
 
-    /// A rigid motion that the active nodes leave unconstrained. Without load (`force` = 0) the body rests.
+    /// A rigid motion that the active nodes leave unconstrained. `None` without load (`force` = 0).
     pub(super) fn unconstrained_motion(
         &self,
         contact: &[ContactPoint],
@@ -35,25 +35,24 @@ impl ContactStep<'_> {
         Some(self.problem.motions.combined(&self.problem.body, first))
     }
 
-    /// Among the answers that differ from a certified one by such a motion, the answer with the minimum
-    /// ∫|u|². It is the same for every solver. If the certificate rejects it, because a neglected force
-    /// matters, the answer stays; the second value is then the largest residual of the rejected answer.
-    /// Collective.
-    pub(super) fn of_least_displacement(
+    /// The answer of minimum ∫|u|² among all that differ from the certified `candidate` by an unresisted motion; it
+    /// does not depend on the solver. Its certificate may fail if a neglected contact force counts or acts across
+    /// an opening gap. Then `candidate` is returned with the residual of the rejected answer, else 0. Collective.
+    pub(super) fn of_minimum_displacement(
         &mut self,
-        judged: Judged,
+        candidate: Candidate,
         case: &LoadCase,
-    ) -> Result<(Judged, f64), PetscError> {
-        let mut refused = 0.0;
+    ) -> Result<(Candidate, f64), PetscError> {
+        let mut rejected = 0.0;
         let problem = self.problem;
-        let tolerance = judged.kkt.worst().max(problem.tolerance);
+        let tolerance = candidate.kkt.worst().max(problem.tolerance);
         for level in [self.uncertain(), problem.tolerance] {
-            let left = self.unresisted(&judged.contact, level, judged.force);
-            if left.is_empty() || judged.force == 0.0 {
+            let left = self.unresisted(&candidate.contact, level, candidate.force);
+            if left.is_empty() || candidate.force == 0.0 {
                 break;
             }
-            let before = self.next.datum.clone();
-            let total = before.total(judged.u.clone());
+            let before = self.next.reference.clone();
+            let total = before.total(candidate.u.clone());
             let amplitudes = problem.motions.amplitudes(&problem.body, &total);
             let (_, bounds) = before.pose(&problem.constraints, case);
             let c: Vec<f64> = self.c.read(|c| bounds.iter().map(|b| c[b.dof]).collect())?;
@@ -62,14 +61,14 @@ impl ContactStep<'_> {
                 break;
             };
             let motion = problem.motions.combined(&problem.body, &further);
-            self.next.datum.add(&problem.constraints, &motion.field(&problem.body));
-            let moved = self.certify(judged.u.clone(), case);
+            self.next.reference.add(&problem.constraints, &motion.field(&problem.body));
+            let moved = self.certify(candidate.u.clone(), case);
             if moved.kkt.within(tolerance) {
                 return Ok((moved, 0.0));
             }
-            refused = moved.kkt.worst();
-            self.next.datum = before;
+            rejected = moved.kkt.worst();
+            self.next.reference = before;
         }
-        Ok((judged, refused))
+        Ok((candidate, rejected))
     }
 }

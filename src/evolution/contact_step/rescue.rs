@@ -1,15 +1,15 @@
-//! Another solver for the steps in which the chosen one stops above the tolerance.
+//! A second solver for steps in which the chosen solver stops short of the tolerance.
 
 use super::ContactStep;
 use crate::evolution::{RunError, Step};
 use std::mem;
 
 impl ContactStep<'_> {
-    /// u_n at `time` for the nodal damage `zeta`, from the solver or, if it stops above the tolerance, from
-    /// its rescuer. The report names the rescuer. Every solve starts from the accepted steps.
+    /// u_n at `time` for the nodal damage `zeta`, from the solver. If it stops short, its rescuer solves the step,
+    /// and the step's report names it. Every solve starts from the accepted steps.
     ///
     /// # Errors
-    /// The solver failed, or neither its answers nor those of its rescuer met the KKT tolerance.
+    /// The solver failed, or neither its answers nor its rescuer's met the KKT tolerance.
     pub fn solve(&mut self, step: usize, time: f64, zeta: &[f64]) -> Result<Step, RunError> {
         let comm = self.problem.body.nodes.partition.comm();
         let solved = self.solve_by_one(step, time, zeta);
@@ -18,14 +18,14 @@ impl ContactStep<'_> {
             return solved;
         };
         mem::swap(&mut self.solver, rescuer);
-        // The warm start of one solver does not fit another one.
+        // The rescuer cannot use the solver's warm start, and after this failure the solver should not either.
         self.accepted.warm_start.clear();
         let rescued = self.solve_by_one(step, time, zeta);
         let name = self.solver.name();
-        self.rescuer.iter_mut().for_each(|asked| mem::swap(&mut self.solver, asked));
+        self.rescuer.iter_mut().for_each(|other| mem::swap(&mut self.solver, other));
         self.next.warm_start.clear();
         match rescued {
-            // If only the rescuer's error says which tolerance rounding allows, return that error.
+            // The first error is reported, unless only the rescuer's error states the limit by rounding.
             Err(RunError::Contact { source: further, .. })
                 if source.is_limited() || !further.is_limited() =>
             {

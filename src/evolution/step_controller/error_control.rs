@@ -29,24 +29,23 @@ pub(super) struct ErrorControl<'a> {
 
 /// The longest step, as a fraction of the run.
 const LONGEST: f64 = 0.05;
-/// The first step is as long as if the present rate of damage lasted for this fraction of the run.
+/// The first step is as long as if its rate of damage lasted for this fraction of the run.
 const HORIZON: f64 = 0.1;
 /// A step within which the loads are not nearly linear in time is halved, down to this fraction of the run.
 /// Shorter steps would not follow a jump either.
 const FOLLOWING: f64 = 1.0 / 2000.0;
-/// A run that needs a shorter step than this fraction of it has failed.
+/// A run has failed if it needs a step shorter than this fraction of the run.
 const SHORTEST: f64 = 1e-12;
 /// Errors are relative to at least this damage.
 const NEGLIGIBLE: f64 = 1e-6;
-/// The most damage that is foreseen. A body that fails does so faster and faster, and early errors grow.
-const FORESEEN: f64 = 0.1;
+/// Maximum damage in a forecast. The damage of a failing body accelerates, and early errors grow with it.
+const MAX_FORECAST: f64 = 0.1;
 /// The steps aim at this fraction of the tolerance, because the error of a step grows in later steps.
 pub(crate) const AIM: f64 = 0.7;
-/// The error of one step may be this fraction of what the errors of the steps before leave of the aim …
+/// One step may add this fraction of the remaining error …
 const SHARE: f64 = 0.25;
-/// … where they leave at least this fraction of it. They may have used it up, if there is less damage than was
-/// foreseen.
-const LEAST: f64 = 1.0 / 16.0;
+/// … which is at least this fraction of the aim. Earlier steps may have used it up.
+const MIN_REST: f64 = 1.0 / 16.0;
 
 impl<'a> ErrorControl<'a> {
     /// From ζ₀ = `initial` at t = 0; `None` if the scene has uniform steps.
@@ -69,7 +68,7 @@ impl<'a> ErrorControl<'a> {
         })
     }
 
-    /// What the accepted steps leave: the next length, the damage, the largest loads sampled.
+    /// The state for a checkpoint: the next length, the damage, the maximum sampled loads.
     pub(super) fn state(&self) -> (f64, [f64; 2], [f64; 2]) {
         let largest = self.load_curve.as_ref().map_or([0.0; 2], |curve| curve.largest);
         (self.next_length, self.damage, largest)
@@ -81,12 +80,12 @@ impl<'a> ErrorControl<'a> {
         self.load_curve.iter_mut().for_each(|curve| curve.largest = largest);
     }
 
-    /// The end and the length, s, of the step from `start`. Within it the loads are nearly linear in time,
-    /// unless they jump. It is `None` at the end of the run.
-    pub(super) fn choose(&mut self, start: f64) -> Option<(f64, f64)> {
+    /// The end and the length, s, of the step from `start`. Within it the loads are nearly linear in time, unless
+    /// they jump. `None` at the end of the run.
+    pub(super) fn next_step(&mut self, start: f64) -> Option<(f64, f64)> {
         loop {
             let rest = self.end - start;
-            // The last two steps are equal rather than one of them small.
+            // The last two steps are equal, so that neither is very short.
             let (time, length) = match rest / self.next_length {
                 _ if start >= self.end => return None,
                 steps if steps <= 1.0 => (self.end, rest),
@@ -112,22 +111,20 @@ impl<'a> ErrorControl<'a> {
         length > SHORTEST * self.end
     }
 
-    /// The largest distance of min ζ from ζ_* at which a run may stop.
+    /// Maximum distance of min ζ from ζ_* at which a run may stop.
     pub(super) fn landing(&self) -> f64 {
         self.tolerance * self.damage[0].max(NEGLIGIBLE)
     }
 
-    /// Accepts a step to ζ_n = `zeta` if `added`, the error that it adds, is at most
-    /// SHARE (AIM · tolerance · D − E) at the worst node and in the mean, and sets the length of the next step.
+    /// Accepts a step to ζ_n = `zeta` and sets the length of the next step. At the worst node and in the mean, the
+    /// error `added` by the step must be at most SHARE (AIM · tolerance · D − E).
     ///
-    /// Here E = `error` is the error of the steps before. D is the damage at the end: the expected one, or else
-    /// the damage so far and what the loads ahead will do from the present `rate` = dζ/dt, 1/s
-    /// ([`Forecast`]).
-    /// Collective.
+    /// Here E = `error` is the error of the steps before. D is the damage at the end: the expected one, or else the
+    /// damage so far plus the [`Forecast`] from the present `rate` = dζ/dt, 1/s. Collective.
     ///
     /// # Errors
     /// The error is too large: the factor by which to shorten the step.
-    pub(super) fn judge(
+    pub(super) fn accept(
         &mut self,
         planned: &PlannedStep,
         zeta: &DVector<f64>,
@@ -139,13 +136,13 @@ impl<'a> ErrorControl<'a> {
         let [error, added, rates] = [error, added, rate].map(|field| self.norms(field));
         let ahead = self.forecast.time_ahead(self.load_curve.as_ref(), planned.time);
         let ratio = |j: usize| {
-            let foreseen = (ahead * rates[j]).clamp(NEGLIGIBLE, FORESEEN);
+            let forecast = (ahead * rates[j]).clamp(NEGLIGIBLE, MAX_FORECAST);
             let reference = match self.expected[j] {
                 expected if expected > 0.0 => damage[j].max(expected),
-                _ => damage[j] + foreseen,
+                _ => damage[j] + forecast,
             };
             let budget = AIM * self.tolerance * reference;
-            added[j] / (SHARE * (budget - error[j]).max(LEAST * budget))
+            added[j] / (SHARE * (budget - error[j]).max(MIN_REST * budget))
         };
         let ratio = ratio(0).max(ratio(1));
         if ratio > 1.0 {
@@ -179,9 +176,9 @@ impl<'a> ErrorControl<'a> {
     }
 }
 
-/// 0.9 (error over the allowed one)^(−1/3): by this factor a step becomes one with the allowed error,
-/// which is of third order in its length, less a margin. It is cut to 32nds: rounding, which differs
-/// with ranks and units, then hardly ever changes steps.
+/// The factor 0.9 (error/allowed error)^(−1/3) from the length of a step to the next. The error of a step is of
+/// third order in its length; 0.9 is a margin. The factor is cut to 32nds: rounding, which differs with ranks and
+/// units, then hardly ever changes steps.
 fn growth(error_ratio: f64) -> f64 {
     (32.0 * 0.9 / error_ratio.max(1e-300).cbrt()).floor() / 32.0
 }

@@ -3,19 +3,19 @@
 use crate::evolution::LoadCurve;
 
 /// The loads of a run in time. Strains are about proportional to the size s of the loads, and the damage source is
-/// about ½ λ_U |ε|². With the rate ζ' at t, the loads ahead do about ζ' ∫_t^T s(τ)² dτ / s(t)² more damage.
+/// about ½ λ_U |ε|². With the rate ζ' at t, the loads ahead add a damage of about ζ' ∫_t^T s(τ)² dτ / s(t)².
 pub(super) struct Forecast {
-    /// Rising times, s, and ∫_t^T s² from each of them to the end, s.
+    /// Increasing times, s, and ∫_t^T s² from each of them to the end, s.
     ahead: Vec<(f64, f64)>,
 }
 
-/// The number of evenly spread times at which loads are sampled, besides those at which they are not smooth.
+/// The number of evenly spread times at which loads are sampled, besides the times at which they are not smooth.
 const TIMES: usize = 200;
-/// The least s² of a load: smaller ones say little about the damage of larger ones.
+/// Minimum s² in a forecast: smaller loads say little about the damage by larger ones.
 const SMALL: f64 = 0.01;
 
 impl Forecast {
-    /// Samples the whole run, which ends at `end`, s; without a curve the loads do not change.
+    /// Samples the whole run, which ends at `end`, s; without a curve the loads are constant.
     pub(super) fn new(curve: Option<&LoadCurve>, end: f64) -> Self {
         let mut times = vec![0.0, end];
         if let Some(curve) = curve {
@@ -35,7 +35,7 @@ impl Forecast {
         Self { ahead }
     }
 
-    /// ∫_t^T s² / s(t)², s: the time in which the present rate would do the damage ahead.
+    /// ∫_t^T s² / s(t)², s: the time in which the present rate would cause the damage ahead.
     pub(super) fn time_ahead(&self, curve: Option<&LoadCurve>, time: f64) -> f64 {
         let next =
             self.ahead.partition_point(|(other, _)| *other <= time).min(self.ahead.len() - 1);

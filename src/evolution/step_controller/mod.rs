@@ -1,4 +1,4 @@
-//! Step control: which steps are made, and whether they are accepted.
+//! Step control: plans steps, and accepts or rejects them.
 //!
 //! Steps are uniform or adaptive. Uniform ones are Euler's (25) or, with the scheme "bdf2", two-step backward
 //! differences with an extrapolated source (Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations
@@ -8,10 +8,9 @@
 //! (M + kκL) ζ_n = M (ζ̃_{n−1} + β (ζ̃_{n−1} − ζ̃_{n−2})) + k b̂_n,
 //! k = k_n (1+ω)/(1+2ω), β = ω²/(1+2ω), b̂_n = b_{n−1} + ω (b_{n−1} − b_{n−2}),
 //!
-//! which is a step (28) of length k from another start with another source. When u_n is known, so is
-//! b_n, and the error of the extrapolation b̂_n is corrected in the next step: ζ̃_n = ζ_n + e_n with
-//! (M + kκL) e_n = k (b_n − b̂_n). Euler's steps (28), and the first one of all, are the same formula
-//! with ω = 0; Euler's have no correction.
+//! which is a step (28) of length k from another start with another source. Once u_n and b_n are known, the next
+//! step corrects the error of the extrapolation b̂_n: ζ̃_n = ζ_n + e_n with (M + kκL) e_n = k (b_n − b̂_n). Euler's
+//! steps (28) and the first step of a run are the same formula with ω = 0. Euler's steps have no correction.
 
 mod error_control;
 mod forecast;
@@ -28,8 +27,8 @@ use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 /// The decision about a step.
-pub(super) enum Verdict {
-    /// It is accepted.
+pub(super) enum Decision {
+    /// The step is accepted.
     Accept(Box<Step>),
     /// The step is rejected and made again, shorter.
     Retry,
@@ -37,18 +36,17 @@ pub(super) enum Verdict {
     Stop(Stop),
 }
 
-/// Plans the steps of a run, and accepts or rejects them. Its memory of the accepted steps changes only with
-/// [`Verdict::Accept`].
+/// Plans the steps of a run, and accepts or rejects them. Its memory changes only with [`Decision::Accept`].
 pub(crate) struct StepController<'a> {
     problem: &'a DiscreteProblem,
     /// Error control of the damage; `None` for uniform steps.
-    chosen: Option<ErrorControl<'a>>,
+    error_control: Option<ErrorControl<'a>>,
     /// Are the steps two-step backward differences? Otherwise they are Euler's.
     two_step: bool,
     memory: StepState,
 }
 
-/// What the controller knows of the accepted steps: a checkpoint keeps it.
+/// The controller's memory of the accepted steps, which checkpoints keep.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct StepState {
     /// k_{n−1}, s; infinite before the first step, so that ω = 0.
@@ -57,36 +55,35 @@ pub(super) struct StepState {
     zeta: DVector<f64>,
     change: DVector<f64>,
     rate: Option<DVector<f64>>,
-    /// By how much that rate of two-step differences has changed since t_{n−2}, 1/s.
+    /// The change of this rate since t_{n−2}, for two-step differences, 1/s.
     rate_change: DVector<f64>,
     /// The damage source at t_{n−1}, and b_{n−1} − b_{n−2}, m²/s.
     source: DamageSource,
     load_change: DVector<f64>,
-    /// Per node, Σ error / rate of the steps: by how much ζ reaches a given value too late, s. An error δζ
-    /// shifts an autonomous evolution by δζ/ζ'.
+    /// Per node: Σ error / rate over the steps, s. This is the delay with which ζ reaches a given value, because an
+    /// error δζ delays an autonomous evolution by δζ/ζ'.
     delay: DVector<f64>,
-    /// The error of ζ̃ from the steps so far. It grows with the damage and, for two-step differences, it
-    /// diffuses.
+    /// The error of ζ̃ from the steps so far. It grows with the damage and, for two-step differences, it diffuses.
     error: DVector<f64>,
     /// The error that the last step adds to ζ, once it is known.
     last_error: Option<DVector<f64>>,
     /// Bounds on ζ̃_{n−1} by the maximum principle, see [`BoundViolation`].
     bounds: (f64, f64),
     violation: BoundViolation,
-    /// The state of the error control where steps are chosen; entered when it is saved.
-    chosen: Option<(f64, [f64; 2], [f64; 2])>,
+    /// The state of the error control for adaptive steps; set only in checkpoints.
+    error_control: Option<(f64, [f64; 2], [f64; 2])>,
 }
 
-/// In a smooth evolution with equal steps the increments of the formula are off by ⅓ k³ζ‴, and those of
-/// the trapezoidal rule by 1/12 k³ζ‴. The first error is this multiple of their difference. It decides the
-/// lengths of the steps; a rule of third order estimates the sum of their errors.
+/// The ratio of the error of a step to its difference from the trapezoidal rule. In a smooth evolution with equal
+/// steps, the increments of the formula are off by ⅓ k³ζ‴, and the trapezoidal rule is off by 1/12 k³ζ‴. This error
+/// controls the lengths of the steps; a rule of third order estimates their accumulated error.
 const TRUNCATION: f64 = 4.0 / 3.0;
 
 impl<'a> StepController<'a> {
     /// After (27), from ζ₀ = `zeta` and its damage source.
     pub(super) fn new(problem: &'a DiscreteProblem, zeta: &[f64], source: DamageSource) -> Self {
         let zeros = DVector::zeros(zeta.len());
-        let chosen = ErrorControl::new(problem, zeta);
+        let error_control = ErrorControl::new(problem, zeta);
         let memory = StepState {
             length: f64::INFINITY,
             zeta: DVector::from_column_slice(zeta),
@@ -100,31 +97,31 @@ impl<'a> StepController<'a> {
             last_error: None,
             bounds: problem.body.vertices.partition.min_max(zeta),
             violation: BoundViolation::default(),
-            chosen: None,
+            error_control: None,
         };
         let bdf2 = problem.scene().time.is_some_and(|grid| grid.scheme == Scheme::Bdf2);
-        Self { problem, two_step: bdf2 || chosen.is_some(), chosen, memory }
+        Self { problem, two_step: bdf2 || error_control.is_some(), error_control, memory }
     }
 
-    /// What it knows of the accepted steps.
+    /// The state for a checkpoint.
     pub(super) fn state(&self) -> StepState {
-        let chosen = self.chosen.as_ref().map(ErrorControl::state);
-        StepState { chosen, ..self.memory.clone() }
+        let error_control = self.error_control.as_ref().map(ErrorControl::state);
+        StepState { error_control, ..self.memory.clone() }
     }
 
     /// Goes back to the state of a checkpoint.
     pub(super) fn set_state(&mut self, state: StepState) {
-        if let (Some(chosen), Some(state)) = (&mut self.chosen, state.chosen) {
-            chosen.set_state(state);
+        if let (Some(error_control), Some(state)) = (&mut self.error_control, state.error_control) {
+            error_control.set_state(state);
         }
         self.memory = state;
     }
 
-    /// The step after the accepted one `last`; `None` at the end of time.
+    /// Plans the step after the accepted step `last`; `None` at the end of the run.
     pub(super) fn plan(&mut self, last: &Step) -> Option<PlannedStep> {
         let (grid, n) = (self.problem.scene().time?, last.record.step + 1);
-        let (time, length) = match (&mut self.chosen, grid.stepping) {
-            (Some(chosen), _) => chosen.choose(last.state.time)?,
+        let (time, length) = match (&mut self.error_control, grid.stepping) {
+            (Some(error_control), _) => error_control.next_step(last.state.time)?,
             (None, Stepping::Uniform { steps }) if n <= steps => {
                 (grid.time(n, steps), grid.end / steps as f64)
             }
@@ -138,7 +135,7 @@ impl<'a> StepController<'a> {
             self.memory.bounds,
             self.problem.body.vertices.partition.min_max(shift.as_slice()),
         );
-        // φ ≤ 0, so b ≤ 0 and b̂_n ≥ (1 + ω) b_{n−1}. What is not a number must stay so.
+        // φ ≤ 0, so b ≤ 0 and b̂_n ≥ (1 + ω) b_{n−1}. NaN must stay NaN.
         let lower = lower + k * ((1.0 + omega) * self.memory.source.min);
         let load = (&self.memory.source.load + omega * &self.memory.load_change)
             .map(|b| if b > 0.0 { 0.0 } else { b });
@@ -150,13 +147,13 @@ impl<'a> StepController<'a> {
     ///
     /// # Errors
     /// The error is too large however short the step is, or the correction e_n has no answer.
-    pub(super) fn judge(
+    pub(super) fn decide(
         &mut self,
         planned: &PlannedStep,
         damage: &DamageUpdate,
         step: Box<Step>,
         damage_step: &mut DamageStep,
-    ) -> Result<Verdict, RunError> {
+    ) -> Result<Decision, RunError> {
         let source = damage_step.source(&step.state);
         let correction = match self.two_step {
             true => damage_step.correction(planned, &source.load - &planned.load)?,
@@ -165,16 +162,16 @@ impl<'a> StepController<'a> {
         let corrected = &damage.zeta + &correction;
         let rate = planned.rate(&corrected);
         if self.two_step {
-            // The rate before the first step is that of its source, which needs no correction.
+            // The rate before the first step follows from its source, without correction.
             let first = || &rate - &correction / planned.k;
             let change = &rate - self.memory.rate.clone().unwrap_or_else(first);
             let increment = &corrected - &self.memory.zeta;
             let trapezoidal = planned.length * (&rate - 0.5 * &change);
             let truncation = TRUNCATION * (trapezoidal - &increment);
             let added = &correction + truncation;
-            if let Some(chosen) = &mut self.chosen
+            if let Some(error_control) = &mut self.error_control
                 && let Err(factor) =
-                    chosen.judge(planned, &damage.zeta, &self.memory.error, &added, &rate)
+                    error_control.accept(planned, &damage.zeta, &self.memory.error, &added, &rate)
             {
                 let shorter = self.retry(planned, factor);
                 return shorter.ok_or_else(|| planned.failed(StepFailure::TooShort));
@@ -200,30 +197,30 @@ impl<'a> StepController<'a> {
         self.memory.rate = Some(rate);
         self.memory.load_change = &source.load - &self.memory.source.load;
         self.memory.source = source;
-        Ok(Verdict::Accept(step))
+        Ok(Decision::Accept(step))
     }
 
-    /// Decides about a step from `last` that reaches ζ_*: the run stops, or a shorter step lands nearer.
-    pub(super) fn judge_stop(
+    /// Decides about a step from `last` that reaches ζ_*: the run stops, or a shorter step ends nearer to ζ_*.
+    pub(super) fn decide_stop(
         &mut self,
         planned: &PlannedStep,
         damage: &DamageUpdate,
         last: &Step,
-    ) -> Verdict {
+    ) -> Decision {
         let (zeta_min, level) = (damage.min_max.0, self.problem.threshold());
         let (time, delays) = if self.two_step {
             let from = self.problem.body.vertices.partition.min_max(self.memory.zeta.as_slice()).0;
             let part = if from > level { (from - level) / (from - zeta_min) } else { 0.0 };
-            // The last ζ that is written counts as well as its correction ζ̃.
-            if let Some(chosen) = &self.chosen
-                && from.max(last.record.zeta_min) - level > chosen.landing()
+            // Both the last written ζ and its correction ζ̃ must be near ζ_*.
+            if let Some(error_control) = &self.error_control
+                && from.max(last.record.zeta_min) - level > error_control.landing()
                 && let Some(shorter) = self.retry(planned, (0.9 * part).max(0.01))
             {
                 return shorter;
             }
             (last.state.time + part * planned.length, 1.0)
         } else {
-            // This step shows the error of the one before.
+            // This step shows the error of the previous step.
             self.add_euler_error(planned, &planned.rate(&damage.zeta));
             (planned.time, 2.0)
         };
@@ -231,18 +228,18 @@ impl<'a> StepController<'a> {
         let delay = self.delay_at_weakest_node(damage.zeta.as_slice());
         let uncertainty = planned.length + delays * delay.abs();
         let least_admissible = planned.bounds.0;
-        Verdict::Stop(Stop { time, zeta_min, least_admissible, uncertainty, from_mesh: None })
+        Decision::Stop(Stop { time, zeta_min, least_admissible, uncertainty, from_mesh: None })
     }
 
     /// Decides about a step whose solves failed: with adaptive steps, a shorter one may succeed.
     ///
     /// # Errors
     /// `failure`, if no shorter step is to be tried.
-    pub(super) fn judge_failure(
+    pub(super) fn decide_failure(
         &mut self,
         planned: &PlannedStep,
         failure: RunError,
-    ) -> Result<Verdict, RunError> {
+    ) -> Result<Decision, RunError> {
         let shorter = match failure {
             RunError::Step { source: StepFailure::TooShort, .. } => None,
             RunError::Contact { .. } | RunError::Step { .. } => self.retry(planned, 0.5),
@@ -251,21 +248,20 @@ impl<'a> StepController<'a> {
         shorter.ok_or(failure)
     }
 
-    /// By how much ζ violated the bounds of its equation.
     pub(crate) fn violation(&self) -> BoundViolation {
         self.memory.violation
     }
 
     /// The estimated error of the last accepted ζ over the damage done, for adaptive steps.
     pub(crate) fn damage_error(&self) -> Option<f64> {
-        let chosen = self.chosen.as_ref()?;
-        Some(self.step_error().map_or(0.0, |error| chosen.relative(&error)))
+        let error_control = self.error_control.as_ref()?;
+        Some(self.step_error().map_or(0.0, |error| error_control.relative(&error)))
     }
 
-    /// Makes the step again, shorter by this factor, if steps are adaptive and not hopelessly short.
-    fn retry(&mut self, planned: &PlannedStep, factor: f64) -> Option<Verdict> {
-        let possible = self.chosen.as_mut()?.shorten(planned.length * factor);
-        possible.then_some(Verdict::Retry)
+    /// Rejects the step for one shorter by `factor`; `None` if steps are uniform or this step would be too short.
+    fn retry(&mut self, planned: &PlannedStep, factor: f64) -> Option<Decision> {
+        let possible = self.error_control.as_mut()?.shorten(planned.length * factor);
+        possible.then_some(Decision::Retry)
     }
 }
 

@@ -1,12 +1,12 @@
-//! The errors that time steps make in ζ, and how they grow.
+//! The errors of ζ from the time steps, and their growth.
 
 use super::{PlannedStep, StepController};
 use crate::model::DamageLaw;
 use nalgebra::DVector;
 
 impl StepController<'_> {
-    /// The estimated error of the last accepted ζ from the time steps, at the nodes. It is `None` before
-    /// the first step. Euler's second step shows the error of the first: before it there is `None`, too.
+    /// The estimated error of the last accepted ζ from the time steps, at the nodes. `None` before the first step,
+    /// and before Euler's second step, which shows the error of the first.
     pub(crate) fn step_error(&self) -> Option<DVector<f64>> {
         Some(&self.memory.error + self.memory.last_error.as_ref()?)
     }
@@ -24,7 +24,7 @@ impl StepController<'_> {
         length * (rate - 0.5 * change - omega / (6.0 * (1.0 + omega)) * curvature)
     }
 
-    /// Adds the error of the Euler step before the one with this `rate`: (28) takes the source at the
+    /// Adds the error of the previous Euler step; `rate` is the rate of this step: (28) takes the source at the
     /// beginning of a step, so the error is ½ k (ζ'_n − ζ'_{n−1}).
     pub(super) fn add_euler_error(&mut self, planned: &PlannedStep, rate: &DVector<f64>) {
         if let Some(before) = &self.memory.rate {
@@ -34,8 +34,7 @@ impl StepController<'_> {
         }
     }
 
-    /// Adds the error of a step of `length` s, in which ζ has this `rate`, to the errors before. These have grown
-    /// by (1 + `length` · g).
+    /// Adds the `error` of a step of `length` s to the earlier errors, which grow by the factor 1 + `length` · g.
     ///
     /// With r = −ζ', an error δζ changes the source φ = −(λ_D (1−ζ)/ζ + ½ λ_U |ε|² − λ_W) by λ_D/ζ² δζ. Under
     /// a given load |ε| is proportional to 1/ζ, which changes φ by 2 (r − λ_D (1−ζ)/ζ + λ_W)/ζ δζ more. The
@@ -60,7 +59,7 @@ impl StepController<'_> {
         self.memory.error += error;
     }
 
-    /// How much too late the node of least `zeta` reaches ζ_*, s. Collective.
+    /// The delay with which the node of minimum `zeta` reaches ζ_*, s. Collective.
     pub(super) fn delay_at_weakest_node(&self, zeta: &[f64]) -> f64 {
         let partition = &self.problem.body.vertices.partition;
         let weakest = (0..partition.owned()).min_by(|&a, &b| zeta[a].total_cmp(&zeta[b]));

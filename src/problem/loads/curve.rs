@@ -7,8 +7,7 @@ use crate::{
 
 /// Loads count as linear in time if they deviate from a straight line by at most this fraction of the largest.
 const DEVIATION: f64 = 0.05;
-/// Loads pass by within a step if their sum deviates from a straight line by more than this fraction of the
-/// largest.
+/// Loads pass by within a step if their sum deviates from a straight line by more than this fraction.
 const PASSING: f64 = 0.5;
 /// Times that differ by less than this fraction of the run count as one.
 const APART: f64 = 1e-9;
@@ -19,8 +18,8 @@ const POINTS: usize = 16;
 /// Number of parts of a boundary searched for pulses and jumps. One pulse may hide another in the same part.
 const BOXES: usize = 4;
 
-/// Times, s, at which a load, a prescribed displacement or a gap of `problem` may not be smooth, and one time
-/// between each two of them. They increase and differ by more than rounding. See [`Expression::breaks`].
+/// Times, s, at which a load, a prescribed displacement or a gap of `problem` may not be smooth, with one time
+/// between each two. They increase and differ by more than rounding. See [`Expression::breaks`].
 fn breaks(problem: &DiscreteProblem, end: f64) -> Vec<f64> {
     let (scene, mesh) = (problem.scene(), problem.mesh());
     let mut breaks = Vec::new();
@@ -87,7 +86,7 @@ impl<'a> LoadCurve<'a> {
         &self.breaks[first..last.max(first)]
     }
 
-    /// Σ|·| of the forces and of the displacements at `time`, relative to the largest sums; 0 if all are 0.
+    /// Σ|·| of the forces and of the displacements at `time`, relative to the maximum sums; 0 if all are 0.
     pub(crate) fn sizes(&self, time: f64) -> [f64; 2] {
         let values = self.problem.loads.sampled_at(time);
         let size = |kind: usize| sum_abs(values[kind].iter().copied()) / self.largest[kind];
@@ -100,8 +99,7 @@ impl<'a> LoadCurve<'a> {
         (0..2).all(|kind| deviations[kind] <= DEVIATION * self.largest[kind])
     }
 
-    /// Deviations of forces and displacements, each mapped by `of`, from straight lines between `start` and `end`:
-    /// max Σ|·| over the sampled times.
+    /// Deviations of `of`(forces) and `of`(displacements) from straight lines in time: max Σ|·| over the samples.
     fn deviations(&mut self, start: f64, end: f64, of: impl Fn(&[f64]) -> Vec<f64>) -> [f64; 2] {
         let [first, last] = [start, end].map(|time| self.sample(time).map(|values| of(&values)));
         let parts = (1..=POINTS).map(|point| point as f64 / (POINTS + 1) as f64);
@@ -137,7 +135,7 @@ impl<'a> LoadCurve<'a> {
     }
 
     /// Do loads come and go within a uniform step? Then the sum of all forces, or of all displacements and gaps,
-    /// deviates from a straight line by more than [`PASSING`] of the largest sum. A load that moves keeps its sum.
+    /// deviates from a straight line by more than [`PASSING`] of the maximum sum. A load that moves keeps its sum.
     pub(crate) fn pass_within_steps(problem: &'a DiscreteProblem) -> bool {
         let Some((grid, steps)) = uniform_steps(problem) else { return false };
         let Some(mut curve) = Self::new(problem) else { return false };
@@ -148,7 +146,7 @@ impl<'a> LoadCurve<'a> {
         })
     }
 
-    /// The forces and displacements at `time`. Updates the largest sums.
+    /// The forces and displacements at `time`. Updates the maximum sums.
     fn sample(&mut self, time: f64) -> [Vec<f64>; 2] {
         let values = self.problem.loads.sampled_at(time);
         for (largest, values) in self.largest.iter_mut().zip(&values) {

@@ -21,7 +21,6 @@ const TIMES: usize = 4;
 /// Maximum number of undivided triangles in which a body force is sampled, and of parts of divided ones.
 const MAX_SAMPLES: usize = 500;
 
-/// A surface load on a part of the boundary.
 #[derive(Debug)]
 pub(super) struct SurfaceForce {
     /// f_N, N/m².
@@ -95,7 +94,6 @@ impl SurfaceForce {
     }
 }
 
-/// A body force.
 #[derive(Debug)]
 pub(super) struct BodyForce {
     /// f_B, N/m³.

@@ -23,8 +23,7 @@ pub(crate) type TrianglePart = (usize, [[f64; 3]; 3]);
 
 /// The fraction of ∫|f| that may be hidden in a peak between the sample points.
 const HIDDEN: f64 = 1e-3;
-/// Ends and corners are sampled this far inside, relative to the size of the part. Then a jump at a node lies in no
-/// part.
+/// Ends and corners are sampled this far inside, relative to the part, so that no part contains a jump at a node.
 const WITHIN: f64 = 1e-7;
 /// Maximum number of bisections of a part.
 const MAX_BISECTIONS: usize = 40;
@@ -37,8 +36,7 @@ const MAX_SLICED: usize = 1000;
 const MAX_SLICES: usize = 200;
 /// The relative error of the integral over slices.
 const DEVIATION_OF_SLICES: f64 = 1e-6;
-/// Samples of the functions in a part, times the measure of the part: ∫|f|, max |f − f₂|, and the highest peak that
-/// may be hidden.
+/// Samples in a part, times the measure of the part: ∫|f|, max |f − f₂|, and the highest possible hidden peak.
 #[derive(Clone, Copy)]
 struct Sampled {
     integral: f64,
@@ -228,7 +226,6 @@ pub(crate) fn triangle_point(points: &[[f64; 2]; 6], at: [f64; 3]) -> [f64; 2] {
     [0, 1].map(|k| points.iter().zip(values).map(|(x, value)| value * x[k]).sum())
 }
 
-/// The six points of each triangle of a body, m.
 pub(crate) fn triangle_points(body: &Body) -> Vec<[[f64; 2]; 6]> {
     let points = &body.nodes.points;
     match body.quadratic_nodes() {

@@ -1,4 +1,4 @@
-//! The rigid motion from which displacements are measured.
+//! The reference configuration of the displacements.
 
 use crate::{
     contact::{Bound, Constraints},
@@ -8,24 +8,23 @@ use serde::{Deserialize, Serialize};
 
 /// A rigid motion of the body, from which displacements are measured.
 ///
-/// A body that falls through a wide gap, or moves with prescribed displacements, deforms by a small part of
-/// its motion. The digits of u in double precision do not suffice for this part. Measured from a rigid motion
-/// near the answer, the deformation has all digits. A rigid motion causes no forces, so (26) holds for the
-/// rest of u, with gaps and prescribed values minus the motion.
+/// A body may fall through a wide gap or follow prescribed displacements. Its deformation is then a small part of
+/// u, for which double precision leaves few digits. Measured from the end of the rigid motion it has all digits. A
+/// rigid motion causes no forces, so (26) holds for the rest of u with gaps and prescribed values less the motion.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub(super) struct Datum {
+pub(super) struct Reference {
     /// Its nodal displacements, m; empty while they are zero.
     pub(super) field: Vec<f64>,
     /// The same in the nodal bases.
     unknowns: Vec<f64>,
 }
 
-impl Datum {
+impl Reference {
     pub(super) fn is_zero(&self) -> bool {
         self.field.is_empty()
     }
 
-    /// The prescribed unknowns and the bounds, measured from here.
+    /// The prescribed unknowns and the bounds, measured from the reference.
     pub(super) fn pose(&self, of: &Constraints, case: &LoadCase) -> (Vec<f64>, Vec<Bound>) {
         let (mut lift, mut bounds) = (case.lift.clone(), case.bounds.clone());
         if !self.is_zero() {
@@ -38,20 +37,19 @@ impl Datum {
         (lift, bounds)
     }
 
-    /// Adds `sign` times the datum to the free unknowns c: with −1 they are measured from here
-    /// instead of from zero, with 1 from zero again.
-    pub(super) fn shift(&self, of: &Constraints, c: &mut [f64], sign: f64) {
+    /// Adds `sign` times the motion to the free unknowns c: −1 changes to the reference, 1 back to zero.
+    pub(super) fn translate(&self, of: &Constraints, c: &mut [f64], sign: f64) {
         let unknowns = c.iter_mut().zip(&self.unknowns).zip(of.bases.fixed());
         unknowns.filter(|(_, fixed)| !**fixed).for_each(|((c, own), _)| *c += sign * own);
     }
 
-    /// u from zero, of displacements measured from here.
+    /// The total displacements, for u measured from the reference.
     pub(super) fn total(&self, mut u: Vec<f64>) -> Vec<f64> {
         u.iter_mut().zip(&self.field).for_each(|(u, own)| *u += own);
         u
     }
 
-    /// Moves on by a rigid motion, in nodal displacements.
+    /// Adds a rigid motion, given by nodal displacements.
     pub(super) fn add(&mut self, of: &Constraints, motion: &[f64]) {
         self.field.resize(motion.len(), 0.0);
         self.field.iter_mut().zip(motion).for_each(|(own, more)| *own += more);
