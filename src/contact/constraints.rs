@@ -174,7 +174,8 @@ impl Constraints {
     /// `values[row]` is u·d of each fixed row. `gaps` has the gaps of all gap rows at this time; it is empty
     /// if no gap depends on time.
     ///
-    /// # Errors Values contradict each other or go through the obstacle, or the obstacles on both sides of a
+    /// # Errors
+    /// Values contradict each other or go through the obstacle, or the obstacles on both sides of a
     /// node overlap.
     pub fn pose(
         &self,

@@ -33,7 +33,8 @@ pub trait ContactSolver {
     /// factor may be that of an earlier K. `warm` is the warm start that the method left in the last solve
     /// (an active set, a parameter), empty at first.
     ///
-    /// # Errors The method stopped above the tolerance, or PETSc failed.
+    /// # Errors
+    /// The method stopped above the tolerance, or PETSc failed.
     fn solve(
         &self,
         problem: &ContactProblem,
@@ -153,7 +154,8 @@ impl Default for ContactOptions {
 
 /// The solver `name` and its variant, the text behind a colon.
 ///
-/// # Errors There is no solver of this name.
+/// # Errors
+/// There is no solver of this name.
 pub fn find(name: &str) -> Result<(&'static SolverEntry, &str), SolverError> {
     let (solver, variant) = name.split_once(':').unwrap_or((name, ""));
     let known = |entry: &&SolverEntry| {

@@ -141,7 +141,8 @@ impl Factor {
 
     /// Makes a loaded factor again, of a matrix with the pattern of this one. Collective.
     ///
-    /// # Errors The pattern differs, or as in [`Self::factorise`].
+    /// # Errors
+    /// The pattern differs, or as in [`Self::factorise`].
     pub(crate) fn remake(&mut self, matrix: &Matrix) -> Result<(), PetscError> {
         if let Some((loaded, history)) = self.take_loaded(matrix)?
             && self.factorise(&loaded)?
@@ -291,7 +292,8 @@ impl Factor {
 
     /// `z` ← E^½ A₀⁻¹ E^½ `r` with the factored matrix A₀: a pair of triangular solves.
     ///
-    /// # Errors Sizes differ, or there is no factor.
+    /// # Errors
+    /// Sizes differ, or there is no factor.
     pub fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
         self.scale(r)?;
         let Self { scaled, substructure: Some((_, Some(factor))), .. } = self else {

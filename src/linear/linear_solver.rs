@@ -58,7 +58,8 @@ const MISSING_FACTOR: i32 = 92;
 impl LinearSolver {
     /// For systems with `owned` unknowns on this rank. Its PETSc options begin with `prefix`.
     ///
-    /// # Errors The memory does not suffice.
+    /// # Errors
+    /// The memory does not suffice.
     pub fn new(
         session: &Session,
         prefix: &str,
@@ -84,7 +85,8 @@ impl LinearSolver {
 
     /// Checks the PETSc options with this prefix before the first factorisation. Collective.
     ///
-    /// # Errors An option names a type that this PETSc lacks.
+    /// # Errors
+    /// An option names a type that this PETSc lacks.
     pub fn check_options(session: &Session, prefix: &str) -> Result<(), PetscError> {
         let mut solver = Self::new(session, prefix, 1, Precision::Full)?;
         let comm = session.comm();
@@ -211,7 +213,8 @@ impl LinearSolver {
     /// Solves from the start `x` until ‖b − A x‖₂ ≤ `limit` on the free unknowns, with the present
     /// preconditioner. Without a preconditioner `x` does not change.
     ///
-    /// # Errors PETSc failed. The report says whether the limit was reached.
+    /// # Errors
+    /// PETSc failed. The report says whether the limit was reached.
     pub fn solve(
         &mut self,
         system: LinearSystem,
@@ -436,7 +439,8 @@ impl LinearSolver {
 
     /// `z` ← P⁻¹ `r` with the present preconditioner.
     ///
-    /// # Errors There is no preconditioner.
+    /// # Errors
+    /// There is no preconditioner.
     pub(crate) fn precondition(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
         match self.chosen {
             Some((_, false)) => self.ksp.precondition(&mut self.factor, r, z),

@@ -402,7 +402,7 @@ fn every_kind_of_factor_gives_the_same_answer() {
     let test_directory = example("square-mild");
     let few = ["--set", "mesh.size=0.0625", "--set", "time.step=0.25"];
     test_directory.run(&[&few[..], &["--out", "one"]].concat());
-    for kind in ["cholesky", "gamg"] {
+    for kind in ["cholesky", "gamg", "jacobi"] {
         let options = ["--", "-elastic_pc_type", kind, "-damage_pc_type", kind];
         let arguments = [&["run", "scene.toml", "--out", kind], &few[..], &options].concat();
         let said = ProgramOutput::of(&mut on_ranks(&test_directory, 3, &arguments));

@@ -34,7 +34,8 @@ impl RigidMotions {
     /// w‖ over p ≥ 0 is 0, with u·ν of the motions in N and the work on them in w. Otherwise the remainder is
     /// a motion that the load drives and contact allows (lemma of Farkas). Collective.
     ///
-    /// # Errors The load drives a motion; the error names it.
+    /// # Errors
+    /// The load drives a motion; the error names it.
     pub fn check(&self, body: &Body, load: &[f64]) -> Result<(), DrivenMotion> {
         if self.all_prevented() {
             return Ok(());
