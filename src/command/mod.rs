@@ -105,6 +105,10 @@ fn cells(accuracy: f64) -> f64 {
     4.0 * (COARSE / accuracy).cbrt().max(1.0)
 }
 
+fn fraction(text: &str) -> Result<f64, &'static str> {
+    text.parse().map_err(|_| "write a number with a decimal point: 0.01 is 1 %")
+}
+
 /// A scene and what overrides parts of it.
 #[derive(Args)]
 pub struct SceneArguments {
@@ -114,9 +118,9 @@ pub struct SceneArguments {
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
     /// Choose order, mesh and time steps so that every figure is within this part of its largest value in
-    /// the run, and u (energy norm) and the damage too, from 1e-5 to 0.5, e.g. 0.01; time.step, time.tolerance and the mesh.size of
-    /// a .geo then have no effect.
-    #[arg(long, value_name = "ERROR")]
+    /// the run, and u (energy norm) and the damage too, from 1e-5 to 0.5, e.g. 0.01; time.step,
+    /// time.tolerance and the mesh.size of a .geo then have no effect.
+    #[arg(long, value_name = "ERROR", value_parser = fraction)]
     accuracy: Option<f64>,
     /// Ask for the accuracy of this figure alone (work, displacement_max, contact_force, zeta_min, zeta_mean,
     /// NAME.force_x … as in summary.json); may be repeated.
@@ -172,6 +176,10 @@ impl SceneArguments {
 /// mesh is to be adapted to it, that of a `.geo` is coarse.
 fn read_mesh(scene: &Scene, adapts: bool) -> Result<Mesh, Failure> {
     let MeshSource { file, parameters } = &scene.mesh;
+    if !file.exists() {
+        let problem = "No such file; mesh.file (relative to the scene) or --mesh names it";
+        return Err(Failure::input(format!("{}: {problem}", file.display())));
+    }
     let (mut parameters, mut order) = (parameters.clone(), scene.order);
     if let Some(accuracy) = scene.accuracy
         && adapts

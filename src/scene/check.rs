@@ -221,7 +221,7 @@ impl Scene {
         let [vx, vy] = mesh.edge_normal(worst).0.map(|component| component + 0.0);
         let how = if cosine < -ALONG { "into the body" } else { "along the boundary" };
         let mend = match wrong.count() == curve.edges.len() {
-            true => "turn it round, so that it points from the body towards the obstacle",
+            true => "it must point from the body towards the obstacle",
             false => "restrict the physical curve to where the body faces the obstacle",
         };
         let problem = format!(

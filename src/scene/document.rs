@@ -141,6 +141,20 @@ impl SceneText {
         (document, tables)
     }
 
+    /// What was meant by the line of the file that has the byte `at`, as far as the line tells.
+    fn hint(&self, at: usize) -> &'static str {
+        let start =
+            self.file.get(..at).and_then(|before| before.rfind('\n')).map_or(0, |end| end + 1);
+        let line = self.file.get(start..).and_then(|text| text.lines().next()).unwrap_or_default();
+        if line.trim_start().starts_with("[boundary]") {
+            "; boundary is a list, each begins with [[boundary]]"
+        } else if line.split_once('=').is_some_and(|(_, value)| !value.contains('"')) {
+            "; expressions and texts stand in quotes"
+        } else {
+            ""
+        }
+    }
+
     /// The value `1,5` in the line of the file that has the byte `at`, if a key of this line has one.
     fn decimal_comma(&self, at: usize) -> Option<Problem> {
         let before = self.file.get(..at)?;
@@ -171,7 +185,10 @@ impl SceneText {
                     .insert(place.start, problem.clone())
                     .is_none()
                     .then_some((place, problem)),
-                None => Some((place, format!("not valid TOML: {}", error.message()))),
+                None => {
+                    let hint = self.hint(place.start);
+                    Some((place, format!("not valid TOML: {}{hint}", error.message())))
+                }
             }
         };
         // Behind an unclosed table, keys seem to be duplicates.

@@ -240,8 +240,13 @@ impl Scene {
                            new NAME` writes one)";
             return Err(SceneError(vec![format!("{}: {problem}", path.display())]));
         }
-        let text = std::fs::read_to_string(path).map_err(|error| {
-            SceneError(vec![format!("{}: the scene cannot be read: {error}", path.display())])
+        let refused = |problem| SceneError(vec![format!("{}: {problem}", path.display())]);
+        let text = std::fs::read(path)
+            .map_err(|error| refused(format!("the scene cannot be read: {error}")))?;
+        let text = String::from_utf8(text).map_err(|error| {
+            let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+            let line = before.iter().filter(|&&byte| byte == b'\n').count() + 1;
+            refused(format!("line {line} is not UTF-8; save the file in this encoding"))
         })?;
         Self::parse(&text, path, overrides)
     }

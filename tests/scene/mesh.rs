@@ -81,7 +81,7 @@ fn values_are_checked_where_they_are_used() {
             "[\"3\", \"-4\"]",
             "[0, 1]",
             "bad.toml:37: boundary.foundation.normal points into the body at (1, 0), where the \
-             outward normal is (0.0000, -1.0000); turn it round, so that it points from the body \
+             outward normal is (0.0000, -1.0000); it must point from the body \
              towards the obstacle",
         ),
     ] {

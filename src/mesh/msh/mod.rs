@@ -130,7 +130,9 @@ fn contents(sections: &[Section], groups_are_entities: bool) -> Result<Contents>
         reader.finish()?;
     }
     match ["Nodes", "Elements"].into_iter().find(|name| all(name).next().is_none()) {
-        Some(missing) => fault(None, format!("there is no ${missing} section")),
+        Some(missing) => {
+            fault(None, format!("there is no ${missing} section: has the .geo a surface?"))
+        }
         None => Ok(contents),
     }
 }
