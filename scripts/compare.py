@@ -28,18 +28,18 @@ TITLES = {
     "fallbacks": "fallbacks", "seconds": "seconds", "times_first": "times first", "kkt": "worst KKT",
     "difference_u": "Δu", "difference_zeta": "Δζ", "difference_pressure": "Δp",
 }
-# The title of a further column, where a solver failed, and its width.
+# The title of an additional column for failed solvers, and its width.
 REASON, WIDTH = "why it failed", 90
 DIFFERENCES = ["difference_u", "difference_zeta", "difference_pressure"]
 KKT = ["kkt_stationarity", "kkt_primal", "kkt_dual", "kkt_complementarity"]
 
 
 class Refused(Exception):
-    """The program ended with this code."""
+    """The program ended with this exit code."""
 
 
 def signorini(*arguments):
-    """Runs the program that runs this script and returns its error, "" if there is none."""
+    """Runs the program that runs this script; returns its error, "" if there is none."""
     ended = subprocess.run([os.environ["SIGNORINI"], *arguments], capture_output=True, text=True)
     lines = ended.stderr.splitlines()
     print(*(line for line in lines if line.startswith("warning")), sep="\n", end="", file=sys.stderr)
@@ -52,12 +52,12 @@ def signorini(*arguments):
 
 
 def compared(scene, arguments):
-    """The rows of a scene: for each solver what its run took, and how its last state differs from that
-    of the smallest residuals."""
+    """The rows of a scene. Per solver: the cost of its run, and the difference of its last state from the state
+    with the smallest residuals."""
     rows, states, mesh = [], [], []
     for solver in arguments.solvers:
         folder = arguments.out / f"{scene.stem}-{solver.replace(':', '-')}"
-        # A run that fails at once leaves an earlier one as it is.
+        # A run that fails at its start does not remove the results of an earlier one.
         (folder / "history.csv").unlink(missing_ok=True)
         error = signorini(
             "run", str(scene), "--solver", solver, "--out", str(folder), *mesh,
@@ -78,8 +78,8 @@ def compared(scene, arguments):
 
 
 def read(folder, error):
-    """What a run took, all steps together, and its last state with the largest |u| and |p| of the run;
-    no state where not even the first solve went well."""
+    """The cost of a run over all steps, its last state, and the largest |u| and |p| of the run. There is no
+    state if the first solve failed."""
     history = read_table(folder / "history.csv") if (folder / "history.csv").exists() else []
     total = {key: int(sum(row[key] for row in history))
              for key in ["iterations", "factorisations", "linear_iterations", "fallbacks"]}
@@ -108,9 +108,9 @@ def read(folder, error):
 
 
 def differences(state, best):
-    """max |u − u_ref| over max |u_ref|, max |ζ − ζ_ref|, max |p − p_ref| over max |p_ref|, where the best
-    state is the reference and its scales are of all steps (of p: of all frames); nothing where the
-    nodes are others. An adapted mesh that is read again has its midpoints in another order."""
+    """max |u − u_ref| over max |u_ref|, max |ζ − ζ_ref|, max |p − p_ref| over max |p_ref|, where the
+    reference is the best state, with its maxima over all steps (for p: all frames). Nothing if the nodes
+    differ: an adapted mesh that is read again has its midpoints in another order."""
     (points, values, _), (others, references, scales) = state, best
     order = other = np.arange(len(points))
     if not np.array_equal(points, others):
@@ -130,8 +130,8 @@ def settings(keys):
 
 
 def cells(row, first):
-    """The cells of a solver, where the first one took `first` seconds; of a solver that failed only the
-    steps before it did."""
+    """The cells of a solver; the first solver took `first` seconds. For a failed solver only the steps before
+    its failure."""
     if row["error"]:
         return [str(row[key]) if key in ("scene", "solver", "steps") else "FAILED" if key == "kkt" else "-"
                 for key in TITLES]
@@ -173,7 +173,7 @@ def arguments_of(prog):
 
 
 def main(prog=None):
-    """Returns the exit code: 2 for bad input, found before anything runs, 1 if a solver failed."""
+    """Returns the exit code: 2 for wrong input, which is found before the first run; 1 if a solver failed."""
     arguments = arguments_of(prog)
     if not arguments.solvers:
         names = subprocess.run([os.environ["SIGNORINI"], "solvers"], capture_output=True, text=True)

@@ -1,7 +1,7 @@
 """Draws the table of `signorini compare`: comparison.py FOLDER
 
-Reads FOLDER/comparison.csv and draws FOLDER/comparison.png: what each solver took on each
-scene, how well it did, and one against the other.
+Reads FOLDER/comparison.csv and draws FOLDER/comparison.png: the cost and the residuals of each solver on
+each scene, and the residuals against the cost.
 """
 
 import sys
@@ -19,7 +19,7 @@ KKT = ["kkt_stationarity", "kkt_primal", "kkt_dual", "kkt_complementarity"]
 
 
 def read(path):
-    """The rows of the table; not a number where a solver failed at once; the worst KKT residual added."""
+    """The rows of the table with the largest KKT residual added; NaN if a solver failed at its start."""
     rows = read_table(path)
     for row in rows:
         row |= {key: np.nan for key in ["seconds", "iterations", "triangular_solves", *KKT] if row[key] == ""}
@@ -28,8 +28,8 @@ def read(path):
 
 
 def bars(axes, rows, value, title, ticks=None):
-    """A group of bars per scene, a bar per solver, on a logarithmic scale; `ticks` names a second
-    column, drawn as ticks over the bars."""
+    """A group of bars per scene with a bar per solver, on a logarithmic scale. `ticks` names a second
+    column, drawn as ticks on the bars."""
     scenes, solvers = names(rows, "scene"), names(rows, "solver")
     width = 0.8 / len(solvers)
     shown = [row[key] for row in rows for key in (value, ticks) if key and row[key] > 0] or [1.0]
@@ -70,7 +70,7 @@ def draw(table):
     bars(work, rows, "triangular_solves", "pairs of triangular solves (bars), iterations (ticks)",
          ticks="iterations")
 
-    # A residual of exactly 0 has no place on a logarithmic scale, nor has a failure a cost.
+    # A logarithmic scale has no place for a residual of exactly 0 or the cost of a failure.
     for row in (row for row in rows if not row["error"] and row["kkt"] > 0):
         marker = MARKERS[scenes.index(row["scene"]) % len(MARKERS)]
         trade.loglog(row["seconds"], row["kkt"], marker, color=colour(solvers.index(row["solver"])),

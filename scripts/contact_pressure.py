@@ -1,4 +1,4 @@
-"""Pictures of Γ_C: pressure and gap along it, and how the pressure evolves."""
+"""Pictures of Γ_C: pressure and gap along it, and the pressure in time."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -23,7 +23,7 @@ def draw_pressure(results, limits, figure=None):
         pressure, gap = curve.pressure / factor, curve.gap
         above.set_title(name, parse_math=False)
         active = pressure > 0.0
-        # Markers shrink where nodes crowd.
+        # Markers are smaller if there are many nodes.
         size = np.clip(180.0 / len(curve.points), 1.5, 5.0)
         for axes, values in ((above, pressure), (below, gap)):
             axes.plot(s, values, color=BLUE, linewidth=1.2, zorder=2)
@@ -64,7 +64,7 @@ def _names(curves):
 
 
 def _scale(axes, largest):
-    """Room from 0 to the largest value; a field that is 0 has no other tick."""
+    """Scales the axis from 0 to the largest value; the axis of a zero field has the tick 0 only."""
     if largest > 0.0:
         axes.set_ylim(-0.08 * largest, 1.08 * largest)
     else:
@@ -102,5 +102,5 @@ def draw_evolution(states, limits):
 
 
 def _between(values):
-    """Bounds of cells around increasing or decreasing values: halfway between neighbours."""
+    """Bounds of cells around monotone values, halfway between neighbours."""
     return np.concatenate((values[:1], 0.5 * (values[1:] + values[:-1]), values[-1:]))

@@ -1,4 +1,4 @@
-"""What the figures share: style, maps with equal aspect, scales that can be read."""
+"""Common parts of the figures: style, maps with equal aspect, readable scales."""
 
 import textwrap
 
@@ -30,7 +30,7 @@ plt.rcParams.update({
 
 
 def canvas(size, figure=None):
-    """An empty figure of `size`, inches: a new one, or `figure` cleared, which keeps its size."""
+    """An empty figure: a new one of `size`, inches, or `figure`, cleared in its own size."""
     if figure is None:
         return plt.figure(figsize=size)
     figure.clear()
@@ -38,7 +38,7 @@ def canvas(size, figure=None):
 
 
 def amplification(size, largest):
-    """1, 2 or 5 times a power of ten that shows `largest` as some 4–10 % of `size`."""
+    """1, 2 or 5 times a power of ten with which `largest` appears as 4–10 % of `size`."""
     if largest <= 0.0:
         return 1.0
     wanted = 0.1 * size / largest
@@ -47,29 +47,29 @@ def amplification(size, largest):
 
 
 def headline(results, text):
-    """The title, what the command line changed in the scene, that the run ended early if it did,
-    and what the figure shows."""
+    """The title of a figure: the scene with its overrides, a note if the run ended early, and the quantity
+    shown."""
     overrides = textwrap.shorten(f"with {results.overrides}", 100, placeholder=" …")
     overrides = overrides.replace("$", r"\$") if results.overrides else ""
     return "\n".join(filter(None, (results.title, overrides, results.ending, text)))
 
 
 def map_size(extent, across):
-    """Inches of an equal-aspect map `across` wide over all; ticks and labels take their part."""
+    """The size, inches, of a map with equal aspect that is `across` wide including ticks and labels."""
     return across, float(np.clip((across - 1.0) * extent[1] / extent[0] + 0.9, 2.2, 8.0))
 
 
 def draw_outline(axes, points, results, **style):
-    """The body's boundary curves, unbroken so that dashes run on from edge to edge; `points` are
-    the places of its nodes."""
+    """Draws the boundary of the body as continuous curves, so that dashes continue from edge to edge. `points` are
+    the positions of the nodes."""
     axes.add_collection(LineCollection(results.outline(points), capstyle="round", **style))
 
 
 def draw_foundation(axes, results, factor=None):
     """The obstacle as a thick line, hatched on its far side.
 
-    Where displacements are amplified by `factor` its distance from Γ_C is too: the body then
-    touches it where the gap is closed and nowhere crosses it.
+    If displacements are amplified by `factor`, the distance from Γ_C is amplified, too. So the body touches the
+    obstacle where the gap is closed, and does not cross it.
     """
     for line in results.foundation(factor):
         # The body is on the left of the line, so the strokes go to the right.
@@ -79,7 +79,7 @@ def draw_foundation(axes, results, factor=None):
 
 
 def frame(axes, points, units):
-    """Equal aspect around `points`, a little air, few ticks."""
+    """Sets equal aspect around `points`, with margins and few ticks."""
     low, high = points.min(axis=0), points.max(axis=0)
     air = 0.05 * max(high - low)
     axes.set_xlim(low[0] - air, high[0] + air)
@@ -92,7 +92,7 @@ def frame(axes, points, units):
 
 
 def draw_colourbar(axes, image, label, extend="neither"):
-    """A bar exactly as high as the map."""
+    """Draws a colour bar as high as the map."""
     bar = axes.figure.colorbar(image, cax=axes.inset_axes([1.03, 0.0, 0.035, 1.0]), extend=extend)
     bar.outline.set_linewidth(0.5)
     bar.formatter.set_useOffset(False)
@@ -100,8 +100,8 @@ def draw_colourbar(axes, image, label, extend="neither"):
 
 
 def stress_unit(largest, units):
-    """The factor and the unit that bring stresses in pascals up to `largest` below a thousand or
-    so; others are shown as they are."""
+    """The factor and the unit for stresses up to `largest`: a multiple of pascal with numbers below about a thousand.
+    Other units stay as they are."""
     if units["stress"] == "Pa":
         for factor, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
             if largest >= 2 * factor:
@@ -110,11 +110,11 @@ def stress_unit(largest, units):
 
 
 def damage_scale(least, largest):
-    """How to show ζ between two values: what turns it into what is shown, its label, colour map and
-    limits. Darker always means more damaged.
+    """How to show ζ between two values: the function that is drawn, its label, colour map and limits. Darker
+    colours always mean more damage.
 
-    Where ζ hardly leaves 1 the loss 1 − ζ, in a power of ten, can be read; ζ cannot. Where ζ is
-    uniform the colours would show the round-off between nodes, unless the limits are apart.
+    If ζ is close to 1, the loss 1 − ζ is shown, in a power of ten. If ζ is uniform, the limits are moved
+    apart, so that the colours do not show rounding errors.
     """
     low, high = 1.0 - largest, 1.0 - least
     uniform = high - low <= 1e-9 * high
@@ -128,14 +128,14 @@ def damage_scale(least, largest):
 
 
 def least_zeta(low):
-    """ζ with as many digits as its distance from 1 needs."""
+    """ζ as text, with enough digits to show its distance from 1."""
     if low >= 1.0:
         return "1"
     return f"{low:.{max(3, 1 - int(np.floor(np.log10(1.0 - low))))}f}"
 
 
 def along(points, units):
-    """A coordinate along a path: x or y if the path follows that axis, else arclength."""
+    """A coordinate along a path: x or y if the path follows this axis, otherwise arc length."""
     unit = units["length"]
     for k, (name, other) in enumerate(("xy", "yx")):
         if np.ptp(points[:, 1 - k]) <= 1e-9 * np.ptp(points[:, k]):

@@ -1,5 +1,4 @@
-"""Triangles of three or six nodes as pictures show them: cut into flat pieces, with their sides as
-polylines."""
+"""Triangles of three or six nodes for pictures: cut into flat pieces, with their sides as polylines."""
 
 import numpy as np
 
@@ -10,8 +9,8 @@ SIDES = np.array([[0, 1, 3], [1, 2, 4], [2, 0, 5]])
 class Pieces:
     """Elements (m, 3) or (m, 6), nodes as VTK numbers them, each cut into `cuts`² flat triangles.
 
-    Of a function that is quadratic on an element, or of its sides, a picture shows an interpolant:
-    the cuts make it exact to a few pixels. Three nodes need none.
+    A picture shows linear interpolants of quadratic functions and curved sides. The cuts make them exact to a
+    few pixels. Triangles of three nodes need no cuts.
     """
 
     def __init__(self, elements):
@@ -35,7 +34,7 @@ class Pieces:
         return values.reshape(-1, *nodal.shape[1:])
 
     def of_cells(self, values):
-        """Values of the elements for their pieces."""
+        """Values of the elements at their pieces."""
         return np.repeat(values, self.cuts**2)
 
     def along(self, edges, nodal):
@@ -45,7 +44,7 @@ class Pieces:
         return np.einsum("sn,kn...->ks...", values, nodal[edges])
 
     def sides(self):
-        """The nodes of all sides, each side once: ends in increasing order, then the middle."""
+        """The nodes of all sides, each side once: ends in increasing order, then the midpoint."""
         sides = sides_of(self.elements)
         _, first = np.unique(np.sort(sides[:, :2], axis=1), axis=0, return_index=True)
         return sides[first]
@@ -59,13 +58,13 @@ class Pieces:
 
 
 def cuts_of(count):
-    """Into how many parts the sides of so many triangles are cut: about 1e5 pieces in all."""
+    """The number of parts per side for `count` triangles; all triangles have about 1e5 pieces."""
     return int(np.clip(np.sqrt(1e5 / count), 2, 12))
 
 
 def functions(barycentric, nodes):
-    """The Lagrange functions of a triangle or an edge, P1 or with so many nodes P2, at points given
-    by their barycentric coordinates (a row each): (points, functions)."""
+    """The Lagrange functions (P1, or P2 for this number of nodes) of a triangle or an edge at points, which are
+    rows of barycentric coordinates: (points, functions)."""
     corners = len(barycentric)
     if nodes == corners:
         return barycentric.T
@@ -95,7 +94,7 @@ def sides_of(elements):
 
 
 def counter_clockwise(points, elements):
-    """The elements, those that are numbered clockwise turned round."""
+    """The elements in counter-clockwise order."""
     a, b, c = (points[elements[:, k], :2] for k in range(3))
     turn = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
     order = [0, 2, 1, 5, 4, 3][:elements.shape[1]]

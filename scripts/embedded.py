@@ -1,5 +1,5 @@
-"""Runs a script that `signorini` carries: python -c EMBEDDED NAME ARGUMENT…, with the sources of
-all its scripts as JSON on standard input. Nothing is written to disk."""
+"""Runs a script embedded in `signorini`: python -c EMBEDDED NAME ARGUMENT…, with the sources of all scripts as
+JSON on standard input. It writes no files of its own."""
 
 import importlib
 import json
@@ -23,7 +23,7 @@ class Sources(MetaPathFinder, InspectLoader):
 
 
 sys.meta_path.insert(0, Sources(json.load(sys.stdin)))
-# Not from the folder in which the person happens to be.
+# Modules in the working directory must not be imported.
 sys.path = [path for path in sys.path if path]
 name = sys.argv.pop(1)
 try:
@@ -32,7 +32,7 @@ try:
 except KeyboardInterrupt:
     code = 130
 except BrokenPipeError:
-    # Whoever reads the output has seen enough.
+    # The reader of the output has closed the pipe.
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     code = 0
 sys.exit(code)

@@ -19,11 +19,11 @@ ALLOWED = (
 
 
 class ExpressionError(Exception):
-    """The text is no expression: said in one line."""
+    """The text is not an expression; the message has one line."""
 
 
 class _Functions(ast.NodeTransformer):
-    """Writes `and` and `or` as functions, which fields have."""
+    """Replaces `and` and `or` by functions, which work for fields, too."""
 
     def visit_BoolOp(self, node):
         self.generic_visit(node)
@@ -43,7 +43,7 @@ class Expression:
     def __init__(self, text, folder=None):
         self.text, self.folder = str(text), folder
         try:
-            # Python writes ^ as **; its ^ would bind more loosely than +. Its `if` is no function.
+            # In Python the power is **, and `if` is not a function.
             text = re.sub(r"\bif\s*\(", "if_(", self.text.strip().replace("^", "**"))
             tree = _Functions().visit(ast.parse(text, mode="eval"))
             names = {*NUMPY_FUNCTIONS, "x", "y", "t", *(["table"] if folder else [])}
@@ -71,7 +71,7 @@ class Expression:
 
 
 def evaluate(expression, points, t, folder):
-    """The values of an expression, or of a number, for pictures; 0 where it is not defined, or is none."""
+    """The values of an expression or a number for pictures; 0 where they are not defined."""
     try:
         values = Expression(expression, folder).at(points, t)
     except (ExpressionError, TypeError, ValueError, ArithmeticError, OSError):

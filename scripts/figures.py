@@ -7,7 +7,7 @@ setting        the body, its boundaries by name, loads and supports (paper, Figu
 deformed       the deformed mesh over the initial outline (Figures 5 and 8)
 stress-damage  von Mises stress and damage (Figures 6 and 9)
 pressure       contact pressure and gap along Γ_C
-damage-history the least and the mean ζ in time, where there is damage to see
+damage-history the minimum and the mean of ζ in time, if there is damage
 force-displacement  the forces on the supports over the largest displacement
 
 and on request: contact-evolution, the pressure on Γ_C in time; damage (without damage: stress) and
@@ -39,11 +39,11 @@ FIGURES = {
     "damage-history": draw_damage_history,
     "force-displacement": draw_force_displacement,
 }
-# Figures of the whole run, whatever time is asked for.
+# Figures of the whole run, for all times.
 OF_ALL_TIMES = ("damage-history", "force-displacement")
-# What pictures are saved as.
+# The file formats of pictures.
 FORMATS = ("png", "svg", "pdf")
-# Frames of the contact evolution, at most.
+# The largest number of frames in the contact evolution.
 EVOLUTION = 400
 
 
@@ -75,7 +75,7 @@ def arguments_of(prog):
 
 
 def save(figure, results, name, formats):
-    """Saves a figure and closes it; without a figure, removes one of an earlier run."""
+    """Saves a figure and closes it. Without a figure, removes the picture of an earlier run."""
     moment = "" if results.is_last else f"_t{results.time:g}"
     if figure is None:
         for ending in FORMATS:
@@ -89,9 +89,9 @@ def save(figure, results, name, formats):
 
 
 def draw(results, limits, arguments):
-    """Everything that is asked for of one run."""
+    """Draws the figures of one run."""
     if arguments.paraview:
-        # Its scales are for all frames.
+        # The scales suit all frames.
         chosen = states(results, evenly(results.frames, FRAMES))
         print(write_script(results, limits_of(chosen, arguments.factor)))
         return
@@ -109,7 +109,7 @@ def draw(results, limits, arguments):
 
 
 def main(prog=None):
-    """Returns the exit code: 2 if something could not be drawn, which is told."""
+    """Returns the exit code: 2 if a figure could not be drawn. A message names it."""
     arguments = arguments_of(prog)
     runs, failed = [], False
     for folder in arguments.folders:

@@ -1,4 +1,4 @@
-"""Pictures of what happens in time, from history.csv."""
+"""Pictures of quantities in time, from history.csv."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -9,7 +9,7 @@ from results import ROUNDING, UNDAMAGED
 
 
 def draw_damage_history(results, _limits=None):
-    """min ζ and mean ζ in time, and the moment ζ_* was reached."""
+    """Draws min ζ and mean ζ in time, and the time at which ζ reached ζ_*."""
     time, least = results.history.get("time"), results.history.get("zeta_min")
     if time is None or least is None or len(time) < 3 or np.nanmin(least) >= 1.0 - UNDAMAGED:
         return None
@@ -31,7 +31,7 @@ def draw_damage_history(results, _limits=None):
 
 
 def draw_force_displacement(results, _limits=None):
-    """The length of the resultant of each supporting boundary over the largest displacement."""
+    """Draws the resultant force of each support over the largest displacement."""
     history = results.history
     supports = [name.removesuffix(".force_x") for name in history if name.endswith(".force_x")]
     forces = {name: np.hypot(history[f"{name}.force_x"], history[f"{name}.force_y"])
@@ -53,7 +53,7 @@ def draw_force_displacement(results, _limits=None):
     return figure
 
 
-# Panels of the figure of all histories: title, columns with their names, whether logarithmic.
+# Panels of the figure of all histories: title, columns with their names, logarithmic or not.
 PANELS = (
     ("largest displacement ({length})", {"displacement_max": ""}, False),
     ("work of the loads ({work})", {"work": ""}, False),
@@ -68,7 +68,7 @@ PANELS = (
 
 
 def draw_histories(results):
-    """What history.csv has of every step, a panel each; none where there are no steps."""
+    """Draws the columns of history.csv in panels; None without time steps."""
     history = results.history
     if len(history.get("time", [])) < 3:
         return None

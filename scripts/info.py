@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Tells what a folder of results holds: scene, program, outcome, errors, frames, files.
+"""Describes a folder of results: scene, program, outcome, errors, frames, files.
 
     signorini info out/lshape
 """
@@ -18,8 +18,8 @@ def row(name, value):
 
 
 def entry(name, value, errors):
-    """The lines of an entry of summary.json; of a table those of its entries. Figures that have an
-    error bar stand with it."""
+    """The lines of an entry of summary.json, or of the entries of a table. Figures are printed with their error
+    bars."""
     if name == "errors.figures":
         return []
     if isinstance(value, dict):
@@ -56,7 +56,7 @@ def description(folder):
 
 
 def main(prog=None):
-    """Returns the exit code: 2 if the folder holds no results."""
+    """Returns the exit code: 2 if the folder contains no results."""
     parser = argparse.ArgumentParser(
         prog=prog, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, metavar="OUT", help="a folder that `run` has written")

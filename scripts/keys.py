@@ -3,9 +3,8 @@
 
     scripts/keys.py geo/scene.schema.json > geo/KEYS.md
 
-The schema has annotations of its own, in words: `values`, what a value may be, with its unit, and
-`absent`, what holds without the key where no one value is the default. What tables of keys cannot say
-stands in scripts/keys.md."""
+The schema has two additional annotations: `values` describes the values and their unit; `absent` describes
+the behaviour without the key if there is no single default. The introduction is scripts/keys.md."""
 
 import json
 import sys
@@ -42,7 +41,7 @@ def is_table(key):
 
 
 def values(key):
-    """What a key may be, in words."""
+    """The values of a key, in words."""
     if "values" in key:
         return key["values"]
     if "enum" in key:
@@ -54,7 +53,7 @@ def values(key):
 
 
 def default(table, name):
-    """What holds where a key of a table is left out."""
+    """The default of a key of a table."""
     if name in table.get("required", []):
         return "**required**"
     key = table["properties"][name]

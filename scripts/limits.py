@@ -1,4 +1,4 @@
-"""Scales that pictures share, so that runs, or the frames of one, can be compared by eye."""
+"""Common scales of pictures, so that one can compare runs, or the frames of a run, by eye."""
 
 from dataclasses import dataclass
 
@@ -12,35 +12,35 @@ class Limits:
     """The scales of one or more states."""
 
     factor: float  # amplification of displacements
-    box: np.ndarray  # (2, 2): corners of what the bodies take up before and after deformation, m
+    box: np.ndarray  # (2, 2): corners of a box around the bodies before and after deformation, m
     stress: float  # the top of the colours, Pa
-    is_cut: bool  # whether some stresses are above it
-    zeta: tuple  # the least and the largest
+    is_cut: bool  # whether some stresses exceed it
+    zeta: tuple  # minimum and maximum
     pressure: float  # the top of the pressures on Γ_C, Pa
     gap: float  # the largest of Γ_C, m
 
     @property
     def damaged(self):
-        """Whether there is damage to see."""
+        """Whether the damage is visible."""
         return self.zeta[0] < 1.0
 
 
 def _exceeded_in(part, values, sizes):
-    """The value that is exceeded in this part of all that has these sizes."""
+    """The value that is exceeded on this part of the total size."""
     order = np.argsort(values)
     below = np.cumsum(sizes[order]) <= (1.0 - part) * sizes.sum()
     return values[order[min(np.count_nonzero(below), len(order) - 1)]]
 
 
 def _stress_top(state):
-    """The von Mises stress that is exceeded in 0.5 % of the area."""
+    """The von Mises stress that is exceeded on 0.5 % of the area."""
     (ax, ay), (bx, by), (cx, cy) = (state.nodes[state.pieces.elements[:, i]].T for i in range(3))
     areas = np.abs((bx - ax) * (cy - ay) - (cx - ax) * (by - ay))
     return _exceeded_in(0.005, state.von_mises, areas)
 
 
 def _pressure_top(state):
-    """The largest contact pressure; where a corner presses, that which is exceeded in 1 % of Γ_C."""
+    """The largest contact pressure; at a peak of a corner, the pressure that is exceeded on 1 % of Γ_C."""
     curves = [curve for curve in state.curves if len(curve.points) > 1]
     if not curves:
         return state.pressure.max()
@@ -51,8 +51,8 @@ def _pressure_top(state):
 
 
 def limits_of(states, factor=None):
-    """The scales that suit all `states`, with an amplification of displacements if it is given."""
-    # Stress is singular at corners: what has little area must not darken all the rest.
+    """Scales for all `states`, with the given amplification of displacements, if any."""
+    # Stress is singular at corners. A peak on a small area must not darken the rest.
     largest = max(state.von_mises.max() for state in states)
     top = max(_stress_top(state) for state in states)
     is_cut = largest > 1.25 * top > 0.0
@@ -70,8 +70,8 @@ def limits_of(states, factor=None):
 
 
 def box_of(states, factor):
-    """Lower left and upper right corner of bodies, as they were and deformed `factor` times, with what
-    is opposite them."""
+    """The lower left and the upper right corner of a box around the bodies, undeformed and deformed `factor` times,
+    and around their obstacles."""
     points = np.vstack([points for state in states for points in (
         state.nodes, state.pieces.at_points(state.nodes + factor * state.displacement),
         *state.foundation(factor))])
@@ -79,7 +79,7 @@ def box_of(states, factor):
 
 
 def _amplification(states):
-    """What shows the displacements and leaves the obstacle, which moves as far, in sight."""
+    """An amplification that shows the displacements and keeps the obstacle, which moves as far, in the picture."""
     largest = max(np.linalg.norm(state.displacement, axis=1).max() for state in states)
     widest = max(np.linalg.norm(s.obstacle - s.contact, axis=2).max(initial=0.0) for s in states)
     return amplification(min(state.size for state in states), max(largest, widest))

@@ -14,7 +14,7 @@ from drawing import (
 def draw_deformed(results, limits):
     """The deformed mesh over the initial outline and the foundation (paper, Figures 5 and 8).
 
-    The obstacle is drawn opposite the nodes of Γ_C, which slide: it seems to slide with them.
+    The obstacle is drawn opposite the nodes of Γ_C. As these slide, the obstacle seems to slide with them.
     """
     pieces = results.pieces
     moved = results.nodes + limits.factor * results.displacement
@@ -22,7 +22,7 @@ def draw_deformed(results, limits):
     width, height = map_size(extent, 7.2)
     figure, axes = plt.subplots(figsize=(width, height + 0.4))
 
-    # Lines must not fill a fine mesh: their width follows the mean edge, in points.
+    # The width of the lines, in points, follows the mean edge, so that they do not fill a fine mesh.
     edge = np.sqrt(extent.prod() / len(pieces.elements)) * 72 * width / extent[0]
     mesh = Triangulation(*pieces.at_points(moved).T, pieces.triangles)
     axes.tripcolor(mesh, np.zeros(len(mesh.x)), cmap=ListedColormap(["#dfe9f3"]), zorder=1,
@@ -46,7 +46,7 @@ def draw_deformed(results, limits):
 def draw_stress_and_damage(results, limits):
     """Von Mises stress beside the damage field, on the initial configuration (Figures 6 and 9).
 
-    An undamaged body has only its stress to show.
+    For an undamaged body only the stress is drawn.
     """
     extent = np.ptp(results.nodes, axis=0)
     if not limits.damaged:
@@ -91,7 +91,7 @@ def draw_state(results, limits, figure=None):
 
 
 def _amplified(results, limits):
-    """How the deformation is shown."""
+    """The amplification in words."""
     largest = np.linalg.norm(results.displacement, axis=1).max()
     largest = results.barred("displacement_max", largest) or f"{largest:.3g}"
     moves = f"displacements × {limits.factor:g} (largest {largest} {results.units['length']})"
@@ -99,7 +99,7 @@ def _amplified(results, limits):
 
 
 def _paint_stress(axes, mesh, results, limits):
-    """Colours for the von Mises stress, with their bar; returns what to say of it."""
+    """Draws the von Mises stress with a colour bar; returns the text for the title."""
     factor, unit = stress_unit(limits.stress, results.units)
     image = axes.tripcolor(
         mesh, facecolors=results.pieces.of_cells(results.von_mises / factor), cmap="viridis",
@@ -113,7 +113,7 @@ def _paint_stress(axes, mesh, results, limits):
 
 
 def _paint_damage(axes, mesh, results, limits):
-    """Colours for ζ, with their bar; returns what to say of it."""
+    """Draws ζ with a colour bar; returns the text for the title."""
     shown, label, colours, (low, high) = damage_scale(*limits.zeta)
     image = axes.tripcolor(
         mesh, results.pieces.at_points(shown(results.zeta)), shading="gouraud", cmap=colours,

@@ -1,4 +1,4 @@
-"""Writes what opens a run in ParaView: paraview_view.py with the scales of the run."""
+"""Writes a script that opens a run in ParaView: paraview_view.py with the scales of the run."""
 
 import pprint
 from importlib.util import find_spec
@@ -18,7 +18,7 @@ def write_script(results, limits):
         "stress": limits.stress,
         "pressure": float(limits.pressure),
     }
-    # Wherever this module comes from, the other one comes from there.
+    # Both modules come from the same place.
     text = find_spec("paraview_view").loader.get_source("paraview_view")
     text = text.replace("RUN = {}", f"RUN = {pprint.pformat(run, sort_dicts=False)}", 1)
     path = results.folder / "open_in_paraview.py"

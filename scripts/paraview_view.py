@@ -2,9 +2,9 @@
 
     paraview --script=open_in_paraview.py
 
-Left the deformed body coloured by its damage 1 - zeta over the initial outline, and, hidden, where
-it is damaged most; right the von Mises stress and the pressure that the foundation exerts. The
-slider of the time goes through the frames. `pvbatch open_in_paraview.py PICTURE` saves a picture.
+The left view shows the deformed body, coloured by its damage 1 - zeta, over the initial outline, and (hidden)
+the most damaged region. The right view shows the von Mises stress and the contact pressure. The time slider
+selects a frame. `pvbatch open_in_paraview.py PICTURE` saves a picture.
 """
 
 import os
@@ -13,15 +13,15 @@ import sys
 from paraview import simple
 from paraview.simple import SetProperties as setup
 
-# What `signorini figures --paraview` found in the run.
+# Values that `signorini figures --paraview` found in the run.
 RUN = {}
 
-# ParaView's window does not tell where the script is, pvbatch does.
+# pvbatch knows the path of the script, ParaView's window does not.
 FOLDER = os.path.dirname(os.path.abspath(__file__)) if "__file__" in globals() else RUN["folder"]
 
 
 def coloured(shown, view, field, name, preset, least, largest, is_inverted=False):
-    """Colours what is shown by a field between two values, with a bar."""
+    """Colours a representation by a field between two values, with a colour bar."""
     simple.ColorBy(shown, field)
     colours = simple.GetColorTransferFunction(field[1])
     colours.ApplyPreset(preset, True)
@@ -33,7 +33,7 @@ def coloured(shown, view, field, name, preset, least, largest, is_inverted=False
     setup(bar, Title=name, ComponentTitle="", TitleColor=[0, 0, 0], LabelColor=[0, 0, 0],
           RangeLabelFormat="%.3g")
     shown.SetScalarBarVisibility(view, True)
-    # Sides of quadratic triangles are drawn curved.
+    # This draws the sides of quadratic triangles as curves.
     setup(shown, NonlinearSubdivisionLevel=2, Ambient=1.0, Diffuse=0.0)
 
 
@@ -69,7 +69,7 @@ def view_of_stress(fields, contact, view):
     setup(arrows, OrientationArray=["POINTS", "pressure_on_body"],
           ScaleArray=["POINTS", "normal_pressure"], GlyphMode="All Points",
           ScaleFactor=0.12 * RUN["size"] / RUN["pressure"])
-    # Thin ones, with their tips on the body.
+    # Thin arrows with their tips on the body.
     setup(arrows.GlyphType, TipRadius=0.03, TipLength=0.15, ShaftRadius=0.008)
     setup(arrows.GlyphTransform, Translate=[-1, 0, 0])
     arrows = simple.Show(arrows, view)
@@ -79,13 +79,13 @@ def view_of_stress(fields, contact, view):
 
 
 def read(name):
-    """The frames that a list in the folder names; none where there is no such list."""
+    """The frames in a list of the folder; None without the list."""
     path = os.path.join(FOLDER, name)
     return simple.PVDReader(registrationName=name, FileName=path) if os.path.exists(path) else None
 
 
 def main():
-    """Builds both views and goes to the last frame, or to the one that was asked for."""
+    """Builds both views and shows the last frame or the given one."""
     if not os.path.exists(os.path.join(FOLDER, "fields.pvd")):
         raise RuntimeError(f"no fields.pvd in {FOLDER}: after moving results, repeat "
                            "`signorini figures --paraview`")

@@ -1,5 +1,5 @@
-"""Reads a result folder: fields.pvd with its frames, history.csv, summary.json, and scene.toml if
-it is there."""
+"""Reads a folder of results: fields.pvd with its frames, history.csv, summary.json, and scene.toml if it
+exists."""
 
 import csv
 import json
@@ -19,13 +19,13 @@ import numpy as np
 from elements import Pieces, counter_clockwise
 from results import ContactCurve, ResultError, Results, without_roundoff
 
-# Opposite a node without any condition beside it.
+# A node without a condition.
 NOWHERE = np.zeros(2), np.zeros(2)
 
 
 @contextmanager
 def whole(path):
-    """Names the file where something in it cannot be read."""
+    """Adds the name of the file to an error of reading it."""
     try:
         yield path
     except (TypeError, ValueError, IndexError, ElementTree.ParseError, zlib.error, meshio.ReadError):
@@ -33,7 +33,7 @@ def whole(path):
 
 
 def read_results(folder, time=None):
-    """Everything a figure needs from a result folder: the frame nearest to `time`, or the last."""
+    """The contents of a folder of results, with the frame nearest to `time` or the last frame."""
     folder, summary = Path(folder), {}
     try:
         with whole(folder / "summary.json") as file:
@@ -85,7 +85,7 @@ def nearest(frames, time):
 
 
 def evenly(frames, most):
-    """At most so many frames at even times, no nearer to each other than the farthest of all."""
+    """At most `count` frames at about equal intervals, which are not shorter than the longest interval of all."""
     times = [time for time, _ in frames]
     if len(times) < 2:
         return frames
@@ -105,7 +105,7 @@ def triangles(fields):
 
 
 def with_fields(results, time, fields):
-    """The results with the state of another frame of the same run."""
+    """The results with another frame of the same run."""
     points, cells = fields.point_data, fields.cell_data
     contact, tangents, obstacle = _foundation(results, time, points["displacement"][:, :2])
     return without_roundoff(replace(
@@ -124,13 +124,13 @@ def with_fields(results, time, fields):
 
 
 def read_frame(path):
-    """A frame: a .vtu file, or the .pvtu list of the pieces that several ranks have written.
+    """A frame: a .vtu file, or the .pvtu list of the pieces of several ranks.
 
-    meshio does not read lists; nodes that pieces share are joined by their numbers.
+    meshio does not read lists. The numbers of the nodes join the pieces.
     """
     with whole(path):
         if path.suffix != ".pvtu":
-            # meshio.read would end the program where it finds a fault.
+            # meshio.read would end the program if it finds a fault.
             return meshio.vtu.read(path)
         sources = [piece.get("Source") for piece in ElementTree.parse(path).findall(".//Piece")]
     pieces = [read_frame(path.parent / source) for source in sources]
@@ -161,11 +161,11 @@ def read_frame(path):
 
 
 def _foundation(results, time, displacement):
-    """The ends of the edges of Γ_C, the directions in which the body slides there, and the obstacle
-    opposite them.
+    """The ends of the edges of Γ_C, the sliding directions of the body there, and the opposite points of the
+    obstacle.
 
-    A node x with the gap g along ν is opposite x + g ν. A corner has two of them and is opposite the
-    x + d with d·ν = g for both; it does not slide. Where boundaries meet smoothly the node has one.
+    A node x with the gap g along ν is opposite the point x + g ν. A corner has two normals and gaps: its opposite
+    point is x + d with d·ν = g for both, and it does not slide.
     """
     displacements = dict(zip(map(tuple, results.nodes.tolist()), displacement))
     conditions = defaultdict(list)
@@ -189,7 +189,7 @@ def _foundation(results, time, displacement):
     for a, b in np.array(edges).reshape(-1, 2, 2):
         normal = np.array([b[1] - a[1], a[0] - b[0]])
         first, second = (opposite(tuple(node), normal) for node in (a.tolist(), b.tolist()))
-        # A node that is prescribed has no gap condition: the obstacle goes on as it is beside it.
+        # A prescribed node has no gap condition; its gap is that of its neighbour.
         found = [first or second or NOWHERE, second or first or NOWHERE]
         ends.append([[node, tangent, node + way] for node, (way, tangent) in zip((a, b), found)])
     return np.array(ends).reshape(-1, 2, 3, 2).transpose(2, 0, 1, 3)
@@ -197,7 +197,7 @@ def _foundation(results, time, displacement):
 
 @cache
 def _contact_rows(path):
-    """The rows of contact.csv by time, with numbers but for the name of the boundary."""
+    """The rows of contact.csv by time. All values are numbers except the name of the boundary."""
     rows = defaultdict(list)
     if path.exists():
         with whole(path), open(path, newline="", encoding="utf-8") as file:
@@ -209,7 +209,7 @@ def _contact_rows(path):
 
 
 def _contact_curves(folder, time):
-    """The connected parts of each contact boundary, whose rows follow each other."""
+    """The connected parts of each contact boundary. The rows of a part are consecutive."""
     rows = _contact_rows(folder / "contact.csv").get(time, [])
     curves = []
     for (name, _), part in groupby(rows, key=lambda row: (row["boundary"], row["part"])):

@@ -27,9 +27,9 @@ from report_page import PAGE, SLIDER
 from results import telling
 from setting import draw_setting
 
-# Frames of the slider, at most.
+# The largest number of frames of the slider.
 FRAMES = 30
-# What summary.json says of the last state: its key, what it is, the kind of its unit.
+# Values of summary.json for the last state: key, name, kind of unit.
 FACTS = (
     ("solver", "contact solver", ""), ("ranks", "ranks", ""), ("nodes", "nodes", ""),
     ("triangles", "triangles", ""), ("steps", "time steps", ""), ("end_time", "last time", "time"),
@@ -48,7 +48,7 @@ ERRORS = {
 
 
 def encoded(figure, dpi=110):
-    """The figure as a PNG in base64; empty without a figure."""
+    """The figure as a PNG in base64; "" without a figure."""
     if figure is None:
         return ""
     with io.BytesIO() as file:
@@ -58,13 +58,13 @@ def encoded(figure, dpi=110):
 
 
 def picture(figure, name):
-    """An element of the page with the figure; empty without a figure."""
+    """An element of the page with the figure; "" without a figure."""
     data = encoded(figure)
     return data and f'<img alt="{name}" src="data:image/png;base64,{data}">'
 
 
 def table(rows):
-    """Rows of cells; what is a number stands right."""
+    """A table of rows of cells; numbers are aligned to the right."""
     def cell(value):
         if isinstance(value, (int, float)) and not isinstance(value, bool):
             return f'<td class="number">{value:.6g}</td>'
@@ -75,7 +75,7 @@ def table(rows):
 
 
 def frame(state, limits):
-    """The pictures of one time, which have the same size at all times."""
+    """The pictures at one time; they have the same size at all times."""
     with plt.rc_context({"savefig.bbox": None}):
         return {
             "moment": state.moment,
@@ -85,18 +85,18 @@ def frame(state, limits):
 
 
 def slider(results):
-    """Pictures of the body and of Γ_C at up to FRAMES times, and what chooses among them."""
+    """Pictures of the body and of Γ_C at up to FRAMES times, with a slider."""
     chosen = states(results, evenly(results.frames, FRAMES))
     if len(chosen) < 2:
         return ""
-    # Forked, because scripts that the program carries cannot be imported anew.
+    # Processes are forked, because they cannot import embedded scripts again.
     with multiprocessing.get_context("fork").Pool() as pool:
         frames = pool.map(partial(frame, limits=limits_of(chosen)), chosen)
     return Template(SLIDER).substitute(last=len(frames) - 1, frames=json.dumps(frames))
 
 
 def facts(results):
-    """What summary.json says of the last state, and the quantities that are asked for by name."""
+    """The values of summary.json for the last state, and the given quantities by name."""
     summary, units, errors = results.summary, results.units, bars(results.summary)
     rows = [(name, barred(summary[key], errors.get(key)) or summary[key],
              html.escape(units.get(kind, "")))
@@ -108,7 +108,7 @@ def facts(results):
 
 
 def timings(summary):
-    """The phases of the run, the longest first, with bars."""
+    """The phases of the run with bars, the longest first."""
     wall = summary.get("wall_seconds") or 1.0
     phases = sorted(summary.get("phases", {}).items(), key=lambda phase: -phase[1])
     rows = [("all", wall, "s", "")]
@@ -171,7 +171,7 @@ def page(results):
 
 
 def main(prog=None):
-    """Returns the exit code: 2 if a folder does not hold what the report needs."""
+    """Returns the exit code: 2 if a folder lacks files for the report."""
     parser = argparse.ArgumentParser(
         prog=prog, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", nargs="+", metavar="OUT", help="result folder")

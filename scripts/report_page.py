@@ -1,6 +1,6 @@
-"""The page that report.py fills in."""
+"""The template of the page of report.py."""
 
-# `$name` and `${name}` are places for string.Template; `$$` is a dollar sign.
+# `$name` and `${name}` are placeholders of string.Template; `$$` is a dollar sign.
 PAGE = """<!DOCTYPE html>
 <html lang="en">
 <head>

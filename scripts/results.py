@@ -1,4 +1,4 @@
-"""A state of a run and its geometry, as pictures need them."""
+"""A state of a run and its geometry, for pictures."""
 
 import argparse
 import csv
@@ -13,14 +13,14 @@ import numpy as np
 from bars import barred, bars
 from elements import Pieces
 
-# Parts of the largest value of a run that only round-off and the solver's tolerance (1e-10) leave.
+# Values below these parts of the maximum of a run are rounding errors (the solver's tolerance is 1e-10).
 ROUNDING = 1e-9
 # ζ closer to 1 than this is undamaged.
 UNDAMAGED = 1e-12
 
 
 def read_table(path):
-    """The rows of a CSV file as dictionaries, with numbers where there are any."""
+    """The rows of a CSV file as dictionaries; numbers are converted."""
     def value(text):
         try:
             return float(text)
@@ -32,7 +32,7 @@ def read_table(path):
 
 
 def write_table(rows, path):
-    """Writes dictionaries as a CSV file, a column for each key in the order of appearance."""
+    """Writes dictionaries as a CSV file with a column per key in the order of appearance."""
     with open(path, "w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, list(dict.fromkeys(key for row in rows for key in row)))
         writer.writeheader()
@@ -40,7 +40,7 @@ def write_table(rows, path):
 
 
 def markdown(header, rows, left=()):
-    """A table in Markdown, with the columns of these numbers to the left and the others to the right."""
+    """A table in Markdown. The columns with these numbers are aligned to the left, the others to the right."""
     rows = [[str(cell) for cell in row] for row in (header, *rows)]
     widths = [max(map(len, column)) for column in zip(*rows)]
     rows.insert(1, ["-" * (width - (k not in left)) + ":" * (k not in left)
@@ -51,13 +51,13 @@ def markdown(header, rows, left=()):
 
 
 class ResultError(Exception):
-    """The folder does not hold what a figure needs: said in one line."""
+    """The folder lacks data for a figure; the message has one line."""
 
 
 @contextmanager
 def telling():
-    """Tells problems with results or with writing beside them in a line; the list has those that
-    were met."""
+    """Prints problems of reading results or writing pictures in one line, and collects them in the returned
+    list."""
     problems = []
     try:
         yield problems
@@ -81,19 +81,19 @@ class ContactCurve:
 
 @dataclass
 class Results:
-    """A state of the body, by default the last accepted one, and what happened on the way to it."""
+    """A state of the body, by default the last accepted one, and the history of the run."""
 
     folder: Path
     summary: dict
-    scene: dict  # the scene as run; empty where the folder does not hold it
+    scene: dict  # the scene as run; empty if the folder lacks it
     history: dict  # column → array
     frames: list  # (time, file) of every frame, in the order of time
     time: float
     nodes: np.ndarray  # (n, 2), m
     pieces: Pieces  # the elements, 3 or 6 nodes each
     contact: np.ndarray = None  # (k, 2, 2): both ends of the edges of Γ_C, m
-    tangents: np.ndarray = None  # (k, 2, 2): along which the body slides there, 0 where it cannot
-    obstacle: np.ndarray = None  # (k, 2, 2): what is opposite them, m
+    tangents: np.ndarray = None  # (k, 2, 2): sliding directions of the body there, 0 if it cannot slide
+    obstacle: np.ndarray = None  # (k, 2, 2): opposite points of the obstacle, m
     curves: list = None  # the ContactCurves of Γ_C
     displacement: np.ndarray = None  # (n, 2), m
     zeta: np.ndarray = None  # (n,)
@@ -107,7 +107,7 @@ class Results:
 
     @property
     def units(self):
-        """The names of the units of length, force, time and stress, and of some made of them."""
+        """The names of the units of length, force, time and stress, and of units derived from them."""
         units = {"length": "m", "force": "N", "time": "s", "stress": "Pa",
                  **self.summary.get("units", {})}
         force, length = units["force"], units["length"]
@@ -122,7 +122,7 @@ class Results:
 
     @property
     def ending(self):
-        """That the run did not reach its end, and when it ended; nothing if it did."""
+        """A note with the time at which the run ended early; "" if it reached its end."""
         stopped = self.summary.get("stopped_at")
         if self.summary.get("error"):
             return f"the run FAILED after t = {self.frames[-1][0]:g} {self.units['time']}"
@@ -131,7 +131,7 @@ class Results:
 
     @property
     def overrides(self):
-        """What the command line put in the place of the scene's keys; nothing if it did not."""
+        """The overrides of the scene's keys on the command line; "" without overrides."""
         words = self.summary.get("provenance", {}).get("command", [])
         words = words[:words.index("--")] if "--" in words else words
         parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
@@ -153,19 +153,19 @@ class Results:
 
     @property
     def active(self):
-        """The number of active nodes, as the history has it; none where it does not."""
+        """The number of active nodes from the history; None if the history lacks it."""
         times = self.history.get("time", [])
         found = np.flatnonzero(np.isclose(times, self.time, rtol=1e-12, atol=0.0))
         return int(self.history["active_nodes"][found[-1]]) if len(found) else None
 
     @property
     def damaged(self):
-        """Whether there is damage to see."""
+        """Whether the damage is visible."""
         return bool((self.zeta != 1.0).any())
 
     @property
     def unloaded(self):
-        """Whether nothing has moved: see `without_roundoff`."""
+        """Whether the body is unloaded: see `without_roundoff`."""
         return not self.displacement.any()
 
     @property
@@ -174,7 +174,7 @@ class Results:
         return float(np.ptp(self.nodes, axis=0).max())
 
     def outline(self, points):
-        """The boundary as polylines as long as possible, from the coordinates of the nodes."""
+        """The boundary as the longest possible polylines, from the coordinates of the nodes."""
         edges = self.pieces.boundary()
         lines = self.pieces.along(edges, points)
         at, joined = {}, []
@@ -185,10 +185,10 @@ class Results:
         return [np.array([at[end] for end in path]) for path in paths(joined)]
 
     def foundation(self, factor=None):
-        """The obstacle as polylines; with a factor, as the body deformed so many times meets it.
+        """The obstacle as polylines, for displacements amplified by `factor`.
 
-        A node of Γ_C touches the obstacle where u·ν = g, so what is opposite it moves to
-        x + factor (g ν + (u·τ) τ): it goes along with the sliding of the body.
+        A node of Γ_C touches the obstacle if u·ν = g. So its opposite point moves to x + factor (g ν + (u·τ) τ): it
+        follows the sliding of the body.
         """
         lines = self.obstacle
         if factor is not None:
@@ -202,10 +202,10 @@ class Results:
 
 
 def paths(edges):
-    """Joins edges (pairs of hashable ends) into paths as long as possible.
+    """Joins edges (pairs of hashable ends) into the longest possible paths.
 
-    The first edge's direction is the path's: where all edges run the same way round,
-    so do the paths. A closed curve ends on the point it starts from.
+    A path has the direction of its first edge. If all edges have the same orientation, so have the paths. A closed
+    curve ends at its first point.
     """
     at = defaultdict(list)
     for k, edge in enumerate(edges):
@@ -232,12 +232,11 @@ def paths(edges):
 
 
 def without_roundoff(results):
-    """The results, with zeros in the place of what is only round-off.
+    """The results with zeros in place of rounding errors.
 
-    Unloaded is a state whose displacements are below the rounding of coordinates, or a billion
-    times smaller than earlier in the run (solvers are exact to about 1e-10). In a loaded one pressures
-    are compared with stresses, stresses with Young's modulus times the displacement over the size
-    of the body, gaps with displacements.
+    A state is unloaded if its displacements are below the rounding of coordinates, or a billion times smaller
+    than earlier in the run (solvers are exact to about 1e-10). In a loaded state pressures are compared with
+    stresses, gaps with displacements, and stresses with Young's modulus times displacement over body size.
     """
     largest = np.linalg.norm(results.displacement, axis=1).max()
     earlier = np.nanmax(results.history.get("displacement_max", [0.0]), initial=0.0)

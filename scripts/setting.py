@@ -16,19 +16,17 @@ from drawing import (
 from expressions import evaluate
 from results import paths
 
-# In parts of the body's size: the longest arrow, and the distances from arrow to arrow and from
-# roller to roller.
+# Relative to the size of the body: the longest arrow, and the distances between arrows and between rollers.
 ARROW, SPACING, ROLLERS = 0.12, 0.05, 0.03
-# How far names are from what they name, inches.
+# The distance of names from their boundaries, inches.
 AWAY = 0.13
 
 
 def draw_setting(results, _limits):
     """The body with its boundaries named, tractions as arrows, supports, and the foundation.
 
-    Clamps are hatched; rollers stand where only one component is prescribed, or u·ν on an axis of
-    symmetry. The legend has the conditions in the scene's words. None where the folder does not
-    hold the scene.
+    Clamps are hatched. Rollers mark boundaries with one prescribed component, and axes of symmetry. The legend
+    lists the conditions with the values of the scene. None if the folder lacks the scene.
     """
     conditions = {b["name"]: b for b in results.scene.get("boundary", [])}
     boundaries = results.summary.get("boundaries")
@@ -38,7 +36,7 @@ def draw_setting(results, _limits):
               for path in paths([tuple(map(tuple, edge)) for edge in edges])]
     width, height = map_size(np.ptp(results.nodes, axis=0), 6.4)
     figure, axes = plt.subplots(figsize=(width, height + 0.7 + 0.2 * len(conditions)))
-    # The body is on the left of its outlines, so those of holes cut them out of the rest.
+    # The body is on the left of its outlines, so the outlines of holes cut them out.
     outlines = Path.make_compound_path(*map(Path, results.outline(results.nodes)))
     axes.add_patch(PathPatch(outlines, facecolor="#edf1f5", edgecolor="none", zorder=0.5))
     draw_outline(axes, results.nodes, results, color=INK, linewidth=0.9, zorder=2)
@@ -71,8 +69,8 @@ def draw_setting(results, _limits):
 
 
 def _loads(results, conditions, curves):
-    """A time with loads, the shown one if it has any, and the tractions then: (n, 2) at the samples
-    of each curve, N/m²."""
+    """A time with loads (the shown time if it has any), and the tractions at this time: (n, 2) at the samples of each
+    curve, N/m²."""
     folder = _folder(results)
 
     def at(time):
@@ -98,7 +96,7 @@ def _loads(results, conditions, curves):
 
 
 def _folder(results):
-    """Where the scene's tables are: beside its mesh."""
+    """The folder of the scene's tables: that of its mesh."""
     return pathlib.Path(results.scene.get("mesh", {}).get("file", "")).parent
 
 
@@ -108,7 +106,7 @@ def _vectors(expressions, points, time, folder):
 
 
 def _samples(line, spacing):
-    """Points along a line, about `spacing` apart, its ends among them, and the outward normals."""
+    """Points along a line at a distance of about `spacing`, including its ends, and the outward normals there."""
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
     s = np.concatenate(([0.0], np.cumsum(steps)))
     at = np.linspace(0.0, s[-1], max(3, 1 + round(s[-1] / spacing)))
@@ -119,7 +117,7 @@ def _samples(line, spacing):
 
 
 def _draw_support(axes, line, condition, size):
-    """Hatching of a clamp, or rollers; returns their outer line, or the boundary's."""
+    """Draws the hatching of a clamp, or rollers; returns the outer line of the drawing."""
     prescribed = condition.get("displacement", ["free", "free"])
     free = [component == "free" for component in prescribed]
     if not any(free):
@@ -139,8 +137,8 @@ def _draw_support(axes, line, condition, size):
 
 
 def _draw_traction(axes, line, arrows, size):
-    """Arrows, m, onto the boundary where they press, from it where they pull; returns where they
-    start or end off it."""
+    """Draws arrows of these lengths, m, towards the boundary for pressing loads and away from it for pulling loads.
+    Returns their ends off the boundary."""
     points, normals = _samples(line, SPACING * size)
     presses = (arrows * normals).sum(axis=1) <= 0.0
     off = points + np.where(presses[:, None], -arrows, arrows)
@@ -156,7 +154,7 @@ def _draw_traction(axes, line, arrows, size):
 
 
 def _draw_body_force(axes, results, time):
-    """An arrow in the middle of the body; returns the force in the scene's words, if any."""
+    """Draws an arrow in the middle of the body; returns the force as written in the scene, if any."""
     force = results.scene.get("body", {}).get("force")
     middle = results.nodes.mean(axis=0, keepdims=True)
     arrow = _vectors(force, middle, time, _folder(results)) if force else np.zeros((1, 2))
@@ -175,8 +173,8 @@ def _opposite(results, line):
 
 
 def _write_name(axes, line, name, condition, others, inch):
-    """The name of a boundary beside its middle, beyond its arrows and the obstacle; returns the
-    corners of a box around it. An inch of the picture is `inch` metres."""
+    """Writes the name of a boundary beside its middle, outside its arrows and the obstacle. Returns the corners of a
+    box around the name. An inch of the picture is `inch` metres."""
     points, normals = _samples(line, spacing=np.inf)
     x, y = normal = normals[1]
     beyond = max(0.0, ((others - points[1]) @ normal).max())
@@ -190,7 +188,7 @@ def _write_name(axes, line, name, condition, others, inch):
 
 
 def _colour(condition):
-    """Supports blue, the foundation dark, loads red, what is free grey."""
+    """The colour of a boundary: supports blue, the foundation dark, loads red, free parts grey."""
     kinds = (("displacement", BLUE), ("symmetry", BLUE), ("gap", INK), ("traction", RED),
              ("pressure", RED))
     return next((colour for kind, colour in kinds if kind in condition), FAINT)

@@ -1,4 +1,4 @@
-//! What the signals SIGINT (Ctrl-C), SIGTERM and SIGXFSZ do.
+//! The handling of the signals SIGINT (Ctrl-C), SIGTERM and SIGXFSZ.
 
 use signal_hook::{
     consts::{SIGINT, SIGTERM, SIGUSR1, SIGUSR2, SIGXFSZ},
@@ -14,13 +14,12 @@ use std::{
 
 /// Whether the next signal ends the process at once.
 static AT_ONCE: LazyLock<Arc<AtomicBool>> = LazyLock::new(|| Arc::new(true.into()));
-/// The signal that has come; 0 for none.
+/// The received signal; 0 for none.
 static RECEIVED: LazyLock<Arc<AtomicUsize>> = LazyLock::new(Arc::default);
 
-/// Lets SIGINT and SIGTERM end the process with the exit codes 130 and 143: at once, or while an
-/// [`Interrupts`] defers them only the second one. On ranks, SIGUSR1 and SIGUSR2 stand for them, because
-/// mpiexec does not forward them as they are. A file-size limit (SIGXFSZ) becomes an error of the
-/// write that exceeds it.
+/// Lets SIGINT and SIGTERM end the process with the exit codes 130 and 143. While an [`Interrupts`] defers
+/// them, only the second signal ends it. On several ranks SIGUSR1 and SIGUSR2 have the same meaning, because
+/// mpiexec sends these instead. A file-size limit (SIGXFSZ) becomes an error of the write that exceeds it.
 ///
 /// # Errors
 /// The system refuses handlers.
@@ -29,7 +28,7 @@ pub fn install() -> io::Result<()> {
     for (signal, meant) in
         [(SIGINT, SIGINT), (SIGTERM, SIGTERM), (SIGUSR1, SIGINT), (SIGUSR2, SIGTERM)]
     {
-        // They act in this order.
+        // The handlers act in this order.
         flag::register_conditional_shutdown(signal, 128 + meant, AT_ONCE.clone())?;
         flag::register_usize(signal, RECEIVED.clone(), meant as usize)?;
         flag::register(signal, AT_ONCE.clone())?;
@@ -37,7 +36,7 @@ pub fn install() -> io::Result<()> {
     Ok(())
 }
 
-/// While this lives, a first signal only tells that work should end soon.
+/// While this exists, a first signal is only recorded, so that the work can end properly.
 #[derive(Debug)]
 pub struct Interrupts(());
 
@@ -54,7 +53,7 @@ impl Interrupts {
     }
 }
 
-/// The signal that has come, if one has.
+/// The received signal, if there is one.
 pub fn received() -> Option<Signal> {
     match RECEIVED.load(Ordering::Relaxed) as i32 {
         0 => None,
@@ -73,7 +72,7 @@ impl Drop for Interrupts {
 pub struct Signal(pub i32);
 
 impl Signal {
-    /// The exit code of a process that it has ended, as shells give it.
+    /// The exit code of a process that this signal has ended, as in shells.
     pub fn exit_code(self) -> u8 {
         (128 + self.0) as u8
     }

@@ -3,10 +3,10 @@
 //!
 //! # The problem
 //!
-//! A body Ω in the plane, per metre of thickness, is clamped on Γ_D, loaded on Γ_N and by a force f_B, and
-//! may touch a rigid foundation at the distance g along the outward normal ν of Γ_C, without friction.
-//! Sought are the displacement u and the damage ζ, 1 where the material is sound and 0 where it is
-//! broken, with σ = ζ𝒜ε(u), −Div σ = f_B, σν = f_N on Γ_N and
+//! A plane body Ω, 1 m thick, is clamped on Γ_D and loaded by f_N on Γ_N and by a body force f_B. It may touch a
+//! rigid foundation at the distance g along the outward normal ν of Γ_C, without friction. The unknowns are
+//! the displacement u and the damage ζ: 1 in sound material, 0 in broken material. They satisfy
+//! σ = ζ𝒜ε(u), −Div σ = f_B, σν = f_N on Γ_N and
 //!
 //! ```text
 //! u·ν ≤ g,   σ_ν ≤ 0,   σ_ν (u·ν − g) = 0,   σ_τ = 0   on Γ_C           (7), (8)
@@ -14,8 +14,8 @@
 //! φ = −(λ_D (1 − ζ)/ζ + ½ λ_U min(|ε|², q*) − λ_W)₊
 //! ```
 //!
-//! On the right and in σ, ζ is cut to [ζ_*, 1]. In weak form, with U the displacements that
-//! take their values on Γ_D and have u·ν ≤ g on Γ_C: u(t) ∈ U and ζ(t) ∈ H¹(Ω) such that
+//! In φ and in σ, ζ is cut to [ζ_*, 1]. Let U be the displacements with the prescribed values on Γ_D and
+//! u·ν ≤ g on Γ_C. The weak form is: find u(t) ∈ U and ζ(t) ∈ H¹(Ω) such that
 //!
 //! ```text
 //! ∫ ζ𝒜ε(u)·ε(v − u) ≥ ∫ f_B·(v − u) + ∫_Γ_N f_N·(v − u)   for all v ∈ U         (20)
@@ -33,10 +33,10 @@
 //! ∫ ζₙ𝒜ε(uₙ)·ε(v − uₙ) ≥ the work of the loads at tₙ on v − uₙ                    (26)
 //! ```
 //!
-//! (27) is (26) at t = 0. A run stops where min ζ reaches ζ_*. Start reading at [`evolution::run`].
+//! (27) is (26) at t = 0. A run stops when min ζ reaches ζ_*. Start reading at [`evolution::run`].
 //!
-//! The modules stand in the order of their dependence: each uses only those above it. There is one exception:
-//! at the end of a run `evolution` calls `estimate`, which enters the estimated errors in the outcome.
+//! The modules below are listed in the order of their dependence: each uses only those above it. There is one
+//! exception: at the end of a run `evolution` calls `estimate`, which adds the estimated errors to the outcome.
 #![deny(unsafe_code)]
 
 pub mod interrupt;

@@ -26,23 +26,23 @@ struct Arguments {
 enum Command {
     /// Solve a scene; results go to out/<scene>/. On several cores: mpiexec -n 4 signorini run SCENE.
     Run(command::RunArguments),
-    /// Write NAME.geo and NAME.toml, a small geometry and scene that run as they are, to start from.
+    /// Write NAME.geo and NAME.toml: a small geometry and scene, which run as they are, as a start.
     New {
-        /// The name, perhaps with a folder.
+        /// The name; it may contain a folder.
         name: PathBuf,
     },
     /// Describe a scene without solving it: mesh, boundaries, loads, support, unknowns, cost. Like
     /// `mesh`, it meshes a .geo whose .msh is missing or older.
     Check(command::SceneArguments),
-    /// Tell what a folder of results holds: scene, program, outcome, errors, frames.
+    /// Describe a folder of results: scene, program, outcome, errors, frames.
     Info(command::ScriptArguments),
     /// Run scenes with every contact solver and compare cost and answers.
     Compare(command::ScriptArguments),
-    /// Draw the figures of runs into their folders; also at other times, as vectors, moving (--help).
+    /// Draw the figures of runs into their folders; also at other times, as vector graphics, animated (--help).
     Figures(command::ScriptArguments),
-    /// Write report.html, one page with all about a run, into its folder.
+    /// Write report.html, a page about a run, into its folder.
     Report(command::ScriptArguments),
-    /// List the contact solvers, a line each: its name, a tab, what it does.
+    /// List the contact solvers, one per line: name, tab, description.
     Solvers,
     /// Print the reference of all keys of a scene, in Markdown.
     Keys {
@@ -56,7 +56,7 @@ enum Command {
         /// The shell.
         shell: clap_complete::Shell,
     },
-    /// Mesh the .geo files of scenes with gmsh, where their .msh is missing or older.
+    /// Mesh the .geo files of scenes with gmsh, if their .msh is missing or older.
     Mesh {
         /// Scene files.
         #[arg(required = true, value_name = "SCENE")]

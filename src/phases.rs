@@ -5,16 +5,16 @@ use std::{cell::RefCell, collections::BTreeMap, time::Instant};
 /// The measurements of one phase.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Phase {
-    /// Times the phase was entered.
+    /// The number of calls.
     pub calls: usize,
-    /// Wall seconds of all calls.
+    /// The wall time of all calls, s.
     pub seconds: f64,
-    /// Bytes that all calls moved between memory and processor, where that is known.
+    /// The bytes that all calls moved between memory and processor; 0 if not known.
     pub bytes: f64,
 }
 
-/// Named phases of a run. A name with a slash (`contact/products`) is a part of the phase before
-/// the slash, which contains its time.
+/// Named phases of a run. A name with a slash (`contact/products`) is a part of the phase before the slash.
+/// The time of the phase includes the times of its parts.
 #[derive(Debug, Default)]
 pub struct Phases(RefCell<BTreeMap<&'static str, Phase>>);
 
@@ -24,8 +24,8 @@ impl Phases {
         self.time_moving(name, 0.0, work)
     }
 
-    /// As [`Self::time`], for work that moves so many `bytes`: every array it goes through counted
-    /// once, as if caches kept nothing from call to call and lost nothing within one.
+    /// As [`Self::time`], for work that moves `bytes`. Every array that the work reads or writes counts once
+    /// per call.
     pub fn time_moving<R>(&self, name: &'static str, bytes: f64, work: impl FnOnce() -> R) -> R {
         let started = Instant::now();
         let result = work();
@@ -43,7 +43,7 @@ impl Phases {
         self.0.borrow().get(name).copied()
     }
 
-    /// The parts of the phase called `whole` by their names; with "" the phases that are no parts.
+    /// The parts of the phase `whole` by their names; for "" the phases that are not parts.
     pub fn parts(&self, whole: &str) -> Vec<(&'static str, Phase)> {
         let phases = self.0.borrow();
         let parts = phases.iter().filter_map(|(name, phase)| {

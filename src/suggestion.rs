@@ -1,7 +1,6 @@
-//! Unknown names in messages.
+//! Suggestions for unknown names in messages.
 
-/// The end of a message about an unknown `name`: which one of the `known` names was perhaps meant,
-/// and all of them.
+/// The end of a message about an unknown `name`: the most similar `known` name, and the list of all.
 pub(crate) fn suggestion(name: &str, known: &[impl AsRef<str>]) -> String {
     let (name, known) = (name.to_lowercase(), Vec::from_iter(known.iter().map(AsRef::as_ref)));
     let likeness = |known: &str| strsim::normalized_damerau_levenshtein(&name, known);

@@ -1,4 +1,4 @@
-//! An accuracy that is asked for: the mesh that has it, and whether the answer does.
+//! Runs with a required accuracy: adapts the mesh before the run, and checks the accuracy after it.
 
 use super::{Failure, screen, task::Task};
 use signorini::{
@@ -10,8 +10,8 @@ use signorini::{
     scene::{Scene, Stepping, rounded},
 };
 
-/// Where the scene asks for an accuracy, a mesh that has it, or the one `made` in the run that goes on,
-/// and steps for it in the scene. Collective.
+/// If the scene requires an accuracy: adapts the mesh, or takes the mesh `made` before a restart, and sets the
+/// time steps of the scene. Collective.
 pub(super) fn adapt(
     session: &Session,
     scene: &mut Scene,
@@ -39,7 +39,7 @@ pub(super) fn adapt(
     Ok(Some(adapted))
 }
 
-/// The error bars that a mesh makes, measured. Where a run for them fails a note says so. Collective.
+/// Measures the error bars from the mesh. If a run for them fails, a note reports it. Collective.
 pub(super) fn measure_bars(
     session: &Session,
     scene: &mut Scene,
@@ -60,7 +60,7 @@ pub(super) fn measure_bars(
     }
 }
 
-/// A signal has ended a run on a mesh that was tried.
+/// A signal has ended a run during the adaptation of the mesh.
 fn interrupted(signal: Signal) -> Failure {
     let message = format!(
         "ended by {signal} before the run began, while meshes were tried for its accuracy or error bars"
@@ -68,8 +68,8 @@ fn interrupted(signal: Signal) -> Failure {
     Failure { code: signal.exit_code(), message: Some(message) }
 }
 
-/// Whether the accuracy that was asked for is reached by the answer, and what is in its way; `None` where
-/// none was asked for.
+/// The closing line on the required accuracy: reached, or the errors that are too large. `None` without a
+/// required accuracy.
 pub(super) fn verdict(task: &Task, outcome: Option<&Outcome>) -> Option<String> {
     let (adapted, scene) = (task.adapted.as_ref()?, task.problem.scene());
     let accuracy = scene.accuracy?;

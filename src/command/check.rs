@@ -1,4 +1,4 @@
-//! `signorini check`: what a scene asks for, before anything is solved.
+//! `signorini check`: describes a scene without solving it.
 
 use super::{Failure, SceneArguments, ranks::require_one_process, read_mesh, screen::row};
 use comfy_table::presets;
@@ -9,7 +9,7 @@ use signorini::{
     scene::{Boundary, Condition, Scene, Stepping, SurfaceLoad, Units},
 };
 
-/// Times at which gaps are looked at, about.
+/// The approximate number of times at which gaps are evaluated.
 const TIMES: usize = 20;
 
 /// `signorini check SCENE`: describes mesh, boundaries, loads, support and cost.
@@ -42,7 +42,7 @@ fn describe_mesh(mesh: &Mesh, Units { length, .. }: &Units) -> String {
     )
 }
 
-/// A table of the parts of the boundary: of those that the scene names, and of what is left free.
+/// A table of the parts of the boundary: those in the scene, and the free rest.
 fn boundaries(scene: &Scene, mesh: &Mesh) -> String {
     let times = scene.sample_times(TIMES);
     let mut free = mesh.boundary_edges();
@@ -53,7 +53,7 @@ fn boundaries(scene: &Scene, mesh: &Mesh) -> String {
             length += edge_length;
             mean = [0, 1].map(|k| mean[k] + normal[k] * edge_length);
         }
-        // Of a closed curve, or of opposite sides, nothing is left.
+        // On a closed curve, or on opposite sides, the mean is 0.
         let straight = mean[0].hypot(mean[1]) / length;
         let [x, y] = mean.map(|sum| sum / (length * straight) + 0.0);
         let normal = match straight {
@@ -81,7 +81,7 @@ fn boundaries(scene: &Scene, mesh: &Mesh) -> String {
     table.lines().map(str::trim_end).collect::<Vec<_>>().join("\n")
 }
 
-/// The conditions on a boundary, in words; gaps are looked at at these times.
+/// The conditions on a boundary in words, with the range of its gap at `times`.
 fn conditions(
     boundary: &Boundary,
     edges: &[[usize; 2]],
@@ -113,7 +113,7 @@ fn conditions(
     boundary.conditions.iter().map(in_words).collect::<Vec<_>>().join(", ")
 }
 
-/// Nodes with a gap condition; the bounds of a node follow each other.
+/// The number of nodes with a gap condition. The bounds of a node are consecutive.
 pub(super) fn contact_nodes(problem: &DiscreteProblem) -> usize {
     problem.constraints.bounds.chunk_by(|a, b| a.node == b.node).count()
 }
@@ -125,7 +125,7 @@ fn unknowns(problem: &DiscreteProblem) -> String {
     format!("{} displacements, {damage} of the damage; {contact} nodes of Γ_C", 2 * nodes)
 }
 
-/// A number with five digits.
+/// A number as text with five digits.
 fn short(value: f64) -> String {
     let rounded: f64 = format!("{value:.4e}").parse().unwrap_or(value);
     match rounded.abs() {
@@ -151,7 +151,7 @@ fn loads(problem: &DiscreteProblem) -> Vec<String> {
     problem.scene().sample_times(1).into_iter().map(line).collect()
 }
 
-/// Which rigid motions there are and what supports the body against them.
+/// The rigid motions of the body and its supports against them.
 fn support(problem: &DiscreteProblem) -> Vec<String> {
     let motions = &problem.motions;
     if motions.all_prevented() {
@@ -161,17 +161,17 @@ fn support(problem: &DiscreteProblem) -> Vec<String> {
     motions.resisted.iter().map(|motion| row("support", by_contact(motion))).collect()
 }
 
-/// What a run takes on one rank, from runs of 300 to 66,000 nodes at both orders: seconds within a factor
-/// of two, memory within a fifth. N nodes take 0.7 μs N (N/4225)^0.27 a step, 50 μs N for all that is done
-/// once, and 8 kB N. Where contact moves a step takes three times as long and, with m contact nodes, another
-/// 0.65 ns m³ (measured on a body of 200 × 1 with m = 800 and 2000).
+/// The approximate time and memory of a run on one rank: time within a factor of two, memory within a fifth.
+/// N nodes take 0.7 μs N (N/4225)^0.27 per step, 50 μs N once, and 8 kB N of memory. If contact moves, a step
+/// takes three times as long, and another 0.65 ns m³ for m contact nodes. The figures are fits to runs with
+/// 300 to 66,000 nodes.
 fn cost(problem: &DiscreteProblem) -> String {
     let scene = problem.scene();
     let (nodes, contact) = (problem.body.nodes.points.len() as f64, contact_nodes(problem) as f64);
     let step = 0.7e-6 * nodes * (nodes / 4225.0).powf(0.27);
     let once = 0.05 + 50e-6 * nodes;
     let megabytes = 50.0 + 8e-3 * nodes;
-    // Twelve steps on the mesh and on one of four times as many triangles.
+    // Twelve steps on the mesh, and twelve on a mesh with four times as many triangles.
     let bars = 12.0 * (step + 4.0 * 1.45 * step) + 2.5 * once;
     let seconds = match scene.time.map(|grid| grid.stepping) {
         _ if scene.accuracy.is_some() => {

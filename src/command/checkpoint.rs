@@ -1,8 +1,8 @@
-//! Checkpoints: the files from which `signorini run --restart` goes on.
+//! Checkpoints: the files with which `signorini run --restart` continues a run.
 //!
-//! Each rank has a file `checkpoint_STEP_RANK`: a line that names the format, the hash of all that
-//! follows, and a [`Checkpoint`]. The first rank writes its file when all others have theirs, and older
-//! ones are removed after that: the latest one of the first rank is complete.
+//! Each rank has a file `checkpoint_STEP_RANK`: a line with the format, the hash of the rest, and a
+//! [`Checkpoint`]. The first rank writes its file after all other ranks; then all ranks remove older files.
+//! So the latest file of the first rank belongs to a complete checkpoint.
 
 use super::{Failure, ranks::agree, recorder::Recorded, task::Task};
 use serde::{Deserialize, Serialize};
@@ -22,29 +22,29 @@ use std::{
 /// The first line of a file.
 const FORMAT: &[u8] = b"signorini checkpoint 2\n";
 
-/// A run between two steps.
+/// The state of a run between two steps.
 #[derive(Serialize, Deserialize)]
 pub struct Checkpoint {
     ranks: usize,
     origin: [u64; 3],
-    /// How the mesh was adapted.
+    /// The adapted mesh and its errors.
     pub adapted: Option<Adapted>,
     pub recorded: Recorded,
     pub run: RunState,
 }
 
-/// Hashes of what the results depend on, to the last bit: see [`DIFFERENCES`].
+/// Hashes of everything on which the results depend; see [`DIFFERENCES`].
 fn origin(task: &Task) -> [u64; 3] {
-    /// Of the program that runs, also where another one has taken its place since.
+    /// The hash of the running program, even if its file has been replaced since.
     static PROGRAM: LazyLock<u64> =
         LazyLock::new(|| fs::read("/proc/self/exe").map_or(0, |file| hash(&file)));
-    // A mesh that cannot be encoded has no hash to differ by.
+    // A mesh that cannot be encoded counts as empty.
     let mesh = postcard::to_stdvec(task.problem.mesh()).unwrap_or_default();
     let scene = format!("{}{:?}", task.as_run, task.petsc);
     [*PROGRAM, hash(&[scene.as_bytes(), &task.tables].concat()), hash(&mesh)]
 }
 
-/// What it means that one of the hashes differs.
+/// Per hash: the message if it differs.
 const DIFFERENCES: [&str; 3] = [
     "another build of the program wrote it",
     "the scene, its tables, --set or PETSc's options are others",
@@ -91,7 +91,7 @@ impl Checkpoint {
         postcard::from_bytes(content).map_err(|_| DIFFERENCES[0].to_owned())
     }
 
-    /// Refuses a checkpoint of another run.
+    /// Checks that this is a checkpoint of the same run.
     pub fn check(&self, task: &Task) -> Result<(), Failure> {
         let mut origins = self.origin.into_iter().zip(origin(task));
         let Some(difference) = origins.position(|(made, own)| made != own) else { return Ok(()) };
@@ -108,7 +108,7 @@ fn refusal(path: &Path, reason: &str) -> Failure {
     ))
 }
 
-/// Writes a checkpoint in the place of the one before. Collective.
+/// Writes a checkpoint that replaces the previous one. Collective.
 pub fn write(task: &Task, recorded: Recorded, run: RunState) -> Result<(), OutputError> {
     let (comm, folder) = (task.problem.body.nodes.partition.comm(), &task.folder);
     let (step, adapted) = (run.last().record.step, task.adapted.clone());
@@ -120,7 +120,7 @@ pub fn write(task: &Task, recorded: Recorded, run: RunState) -> Result<(), Outpu
         let file = [FORMAT, &hash(&content).to_le_bytes(), &content].concat();
         output::write_synced(&path, &file)
     };
-    // The first rank writes last: its file says that all others are complete.
+    // The first rank writes last. Its file shows that the other files are complete.
     let mut written = if comm.is_root() { Ok(()) } else { write() };
     if comm.all(written.is_ok()) && comm.is_root() {
         written = write();
@@ -131,11 +131,11 @@ pub fn write(task: &Task, recorded: Recorded, run: RunState) -> Result<(), Outpu
     written
 }
 
-/// Removes the checkpoints of a rank, but for that of the step to be `kept`.
+/// Removes the checkpoints of a rank except the one of the step `kept`.
 pub fn remove(folder: &Path, rank: usize, kept: Option<usize>) {
     for (step, path) in output::checkpoints(folder, rank) {
         if Some(step) != kept {
-            // One too many is not worth the end of a run.
+            // A file too many is no reason to end the run.
             let _ = fs::remove_file(path);
         }
     }

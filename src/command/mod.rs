@@ -1,4 +1,4 @@
-//! What the subcommands do.
+//! The subcommands. Each has a function that returns a [`Failure`] with an exit code and a message.
 
 mod accuracy;
 mod check;
@@ -32,17 +32,17 @@ use std::{
     path::PathBuf,
 };
 
-/// Why a command failed.
+/// The failure of a command.
 #[derive(Debug)]
 pub struct Failure {
     /// The exit code: 2 for bad input, 1 for a run that ended early.
     pub code: u8,
-    /// What to tell the user; none where a rank has told it for all.
+    /// The message for the user; `None` if another rank reports it.
     pub message: Option<String>,
 }
 
 impl Failure {
-    /// Another rank failed, which tells why.
+    /// Another rank has failed and reports its error.
     const ON_ANOTHER_RANK: Self = Self { code: 1, message: None };
 
     /// The user has to change the input.
@@ -61,27 +61,27 @@ impl Failure {
     }
 }
 
-/// Failures for which the input is not to blame: a solver missed its tolerance, or results could not be written.
+/// Failures that are not caused by the input: a solver missed its tolerance, or results could not be written.
 impl<E: fmt::Display> From<E> for Failure {
     fn from(error: E) -> Self {
         Self { code: 1, message: Some(error.to_string()) }
     }
 }
 
-/// Tells the person at the terminal an error, or what else `kind` names, in one write: what `mpiexec` and
-/// other ranks say meanwhile comes before or after it, never between its words.
+/// Prints an error or another `kind` of message in one write, so that the output of other ranks and of
+/// `mpiexec` cannot interrupt it.
 pub fn tell(kind: &str, text: &str) {
-    // Where nobody can be told any more, the exit code still says it.
+    // If stderr is closed, the exit code still reports the failure.
     let _ = io::stderr().write_all(format!("{kind}: {text}\n").as_bytes());
 }
 
-/// Refuses an unknown solver, which `option` names.
+/// Checks that there is a solver of this name; `option` is the option or key that has it.
 fn check_solver(option: &str, name: &str) -> Result<(), Failure> {
     let found = contact::find(name).map(|_| ());
     found.map_err(|unknown| Failure::input(format!("{option}: {unknown}")))
 }
 
-/// Refuses PETSc options that would end a run only after the results of an earlier run are removed.
+/// Checks PETSc options before the results of an earlier run are removed.
 fn check_petsc(options: &[String]) -> Result<(), Failure> {
     if let Some(word) = options.first().filter(|word| !word.starts_with('-')) {
         let problem = format!("PETSc options begin with a dash, but the first is `{word}`");
@@ -96,9 +96,9 @@ fn check_petsc(options: &[String]) -> Result<(), Failure> {
     }
 }
 
-/// The approximate number of triangles along the body in the first mesh of a `.geo` for an accuracy. Refined sides
-/// stay on the parabolas of this mesh, whose distance from an arc is of fourth order in the length of its sides. So
-/// the number increases for high accuracies.
+/// The approximate number of triangles along the body in the first mesh of a `.geo` for an accuracy. Refined
+/// sides stay on the parabolas of this mesh. The distance of a parabola from an arc is of fourth order in the
+/// length of the side, so high accuracies need more triangles.
 fn cells(accuracy: f64) -> f64 {
     /// Below this accuracy a mesh with four triangles along the body follows arcs too coarsely.
     const COARSE: f64 = 0.01;
@@ -109,7 +109,7 @@ fn fraction(text: &str) -> Result<f64, &'static str> {
     text.parse().map_err(|_| "write a number with a decimal point: 0.01 is 1 %")
 }
 
-/// A scene and what overrides parts of it.
+/// A scene and overrides of its keys.
 #[derive(Args)]
 pub struct SceneArguments {
     /// Scene file (TOML).
@@ -132,7 +132,7 @@ pub struct SceneArguments {
 }
 
 impl SceneArguments {
-    /// Refuses what would silently have no effect.
+    /// Checks that no argument is without effect.
     fn check(&self) -> Result<(), Failure> {
         let is_of_mesh = |set: &&String| set.trim_start().starts_with("mesh.");
         if let (Some(file), Some(set)) = (&self.mesh, self.set.iter().find(is_of_mesh)) {
@@ -145,7 +145,7 @@ impl SceneArguments {
         Ok(())
     }
 
-    /// The scene with its keys overridden, also by `more`.
+    /// The scene with its overrides and those in `more`.
     fn read(&self, more: &[String]) -> Result<Scene, Failure> {
         let accuracy = self.accuracy.map(|error| format!("accuracy={error}"));
         let quoted: Vec<_> = self.accuracy_of.iter().map(|name| format!("'{name}'")).collect();
@@ -172,8 +172,8 @@ impl SceneArguments {
     }
 }
 
-/// The mesh of a scene, which is made where it is not there. Where the scene asks for an accuracy and the
-/// mesh is to be adapted to it, that of a `.geo` is coarse.
+/// The mesh of a scene; gmsh makes it if necessary. If the run will adapt the mesh to an accuracy, the mesh of
+/// a `.geo` is coarse.
 fn read_mesh(scene: &Scene, adapts: bool) -> Result<Mesh, Failure> {
     let MeshSource { file, parameters } = &scene.mesh;
     if !file.exists() {
@@ -185,7 +185,7 @@ fn read_mesh(scene: &Scene, adapts: bool) -> Result<Mesh, Failure> {
         && adapts
         && file.extension().is_none_or(|kind| kind != "msh")
     {
-        // Of order 1, too: bisected sides then follow curved boundaries, as well as the parabolas of this mesh.
+        // Linear elements need order 2, too: their bisected sides then follow the parabolas of this mesh.
         order = Order::Quadratic;
         let usual = mesh::load(file, &parameters, Order::Linear).map_err(Failure::mesh)?;
         let scaling = mesh::scaling_factor(file).map_err(Failure::mesh)?;
@@ -195,7 +195,7 @@ fn read_mesh(scene: &Scene, adapts: bool) -> Result<Mesh, Failure> {
     mesh::load(file, &parameters, order).map_err(Failure::mesh)
 }
 
-/// The reference of all keys of a scene, made of their schema by scripts/keys.py.
+/// The reference of all keys of a scene. scripts/keys.py makes it from their schema.
 const KEYS: &str = include_str!("../../geo/KEYS.md");
 
 /// `signorini keys [--schema]`.

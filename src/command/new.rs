@@ -1,4 +1,4 @@
-//! `signorini new`: a geometry and a scene to start from.
+//! `signorini new`: writes a geometry and a scene as a start.
 
 use super::Failure;
 use signorini::output::{terminal::say, write_whole};
@@ -7,8 +7,8 @@ use std::path::Path;
 const GEOMETRY: &str = include_str!("new.geo");
 const SCENE: &str = include_str!("new.toml");
 
-/// `signorini new NAME`: writes `NAME.geo` and `NAME.toml`, which run as they are. NAME may be that of
-/// one of the two files.
+/// `signorini new NAME`: writes `NAME.geo` and `NAME.toml`, which run as they are. NAME may have the ending of
+/// one of the files.
 pub fn new(name: &Path) -> Result<(), Failure> {
     let file = name.extension().is_some_and(|ending| ending == "toml" || ending == "geo");
     let Some(stem) = (if file { name.file_stem() } else { name.file_name() }) else {

@@ -1,4 +1,4 @@
-//! Where the time of a run went: the closing table of `--profile`.
+//! The times of the phases of a run: the closing table of `--profile`.
 
 use comfy_table::{LineStyle, presets};
 use signorini::{
@@ -7,7 +7,7 @@ use signorini::{
 };
 use std::fs;
 
-/// What no time step can do without: the values of K, a product with K, a pair of triangular solves,
+/// The phases that every time step needs: the values of K, a product with K, a pair of triangular solves,
 /// and the damage.
 const UNAVOIDABLE: [&str; 4] =
     ["stiffness refill", "contact/products", "contact/triangular solves", "damage solve"];
@@ -28,7 +28,7 @@ pub fn table(phases: &Phases, wall: f64) -> Vec<String> {
     table.lines().map(|line| format!(" {}", line.trim_end())).collect()
 }
 
-/// The parts of the phase called `whole`, longest first, and what they leave of its `seconds`.
+/// The parts of the phase `whole`, longest first, and the rest of its `seconds`.
 fn rows(phases: &Phases, whole: &str, seconds: f64) -> Vec<(&'static str, Phase)> {
     let mut rows = phases.parts(whole);
     if !rows.is_empty() {
@@ -39,7 +39,7 @@ fn rows(phases: &Phases, whole: &str, seconds: f64) -> Vec<(&'static str, Phase)
     rows
 }
 
-/// A row of the table with its titles; cells of what was not measured are empty.
+/// A row of the table with its titles. Cells without a measurement are empty.
 fn cells(name: String, phase: Phase, wall: f64) -> [(&'static str, String); 7] {
     let Phase { calls, seconds, bytes } = phase;
     let if_called = |text: String| if calls > 0 { text } else { String::new() };
@@ -55,7 +55,7 @@ fn cells(name: String, phase: Phase, wall: f64) -> [(&'static str, String); 7] {
     ]
 }
 
-/// The share of the unavoidable work in `stepping`, the seconds of `steps` steps, and the peak memory.
+/// The share of the necessary phases in `stepping`, the seconds of `steps` steps, and the peak memory.
 pub fn remarks(phases: &Phases, steps: usize, stepping: f64) -> Vec<String> {
     let mean = |name: &&str| phases.get(name).map(|p| 1e3 * p.seconds / p.calls.max(1) as f64);
     let unavoidable: f64 = UNAVOIDABLE.iter().filter_map(mean).sum();
@@ -71,7 +71,7 @@ pub fn remarks(phases: &Phases, steps: usize, stepping: f64) -> Vec<String> {
     share.into_iter().chain(memory).collect()
 }
 
-/// The most memory this process has used, MB, where Linux tells (proc(5), VmHWM).
+/// The peak memory of this process, MB, from Linux (proc(5), VmHWM).
 fn peak_memory() -> Option<f64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

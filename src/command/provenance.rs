@@ -1,19 +1,19 @@
-//! What made a result: the program, when, where, and what was typed.
+//! The origin of a result: program, date, machine and command line.
 
 use serde_json::{Value, json};
 use std::{env, fs, thread, time::SystemTime};
 
-/// `provenance` of `summary.json`. What the system does not tell is null.
+/// `provenance` of `summary.json`. Unknown values are null.
 pub fn provenance() -> Value {
     let now = humantime::format_rfc3339_seconds(SystemTime::now());
     let arguments = env::args_os().map(|word| word.to_string_lossy().into_owned());
     json!({
         "version": env!("CARGO_PKG_VERSION"),
-        // As `make build` tells of a git checkout (git describe); null where nobody told.
+        // The commit that `make build` found in a git checkout (git describe).
         "commit": option_env!("SIGNORINI_COMMIT").filter(|commit| !commit.is_empty()),
-        // When the run ended, UTC.
+        // The end of the run, UTC.
         "date": now.to_string(),
-        // The command line, word by word, and where it was typed.
+        // The words of the command line, and the folder in which it was run.
         "command": arguments.collect::<Vec<_>>(),
         "directory": env::current_dir().ok(),
         "machine": {
@@ -24,7 +24,7 @@ pub fn provenance() -> Value {
     })
 }
 
-/// The processor's name, where Linux tells (proc(5), cpuinfo).
+/// The name of the processor from Linux (proc(5), cpuinfo).
 fn processor() -> Option<String> {
     let text = fs::read_to_string("/proc/cpuinfo").ok()?;
     let line = text.lines().find(|line| line.starts_with("model name"))?;

@@ -1,5 +1,4 @@
-//! Several ranks fail as one program: they agree that one of them has failed, and all end with one
-//! message and one exit code.
+//! Failures on several ranks: all ranks end with one message and one exit code.
 
 use super::{Failure, tell};
 use signorini::{
@@ -8,13 +7,11 @@ use signorini::{
 };
 use std::time::Duration;
 
-/// How long a rank that has failed waits for the others. Where they know of the failure they come at
-/// once.
+/// The time for which a failed rank waits for the others. If they know of the failure, they arrive at once.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// Agreement on a step of the program (as by Open MPI's MPIX_Comm_agree): all ranks go on with their
-/// values, or all fail. Of the ranks with an error of their own the first reports it, and all end
-/// with its exit code. Collective.
+/// Agreement of the ranks (as by Open MPI's MPIX_Comm_agree): all ranks go on with their values, or all fail.
+/// The first rank with an error reports it, and all ranks end with its exit code. Collective.
 pub fn agree<T>(comm: Communicator, result: Result<T, Failure>) -> Result<T, Failure> {
     if comm.is_serial() {
         return result;
@@ -29,13 +26,13 @@ pub fn agree<T>(comm: Communicator, result: Result<T, Failure>) -> Result<T, Fai
     if comm.rank() == reporter {
         tell("error", failure.message.as_deref().unwrap_or("another rank failed"));
     }
-    // This comes after the report, because mpiexec ends all ranks as soon as one ends with an error.
+    // This follows the report, because mpiexec ends all ranks as soon as one ends with an error.
     let code = comm.broadcast(reporter, f64::from(failure.code)) as u8;
     Err(Failure { code, message: None })
 }
 
-/// A barrier behind a run in which one rank may fail alone, while the others wait for it in some
-/// collective call: after [`PATIENCE`] it then reports its failure and aborts them all. Collective.
+/// A barrier after a run. If one rank fails alone, the others wait for it in a collective call. After
+/// [`PATIENCE`] the failed rank reports its failure and aborts all ranks. Collective.
 pub fn barrier_or_abort(comm: Communicator, failure: Option<&RunError>) {
     if !comm.barrier(failure.map(|_| PATIENCE))
         && let Some(error) = failure
@@ -45,7 +42,7 @@ pub fn barrier_or_abort(comm: Communicator, failure: Option<&RunError>) {
     }
 }
 
-/// Refuses what is not `signorini run` where `mpiexec` has started several processes.
+/// Checks that `mpiexec` has not started several processes, for commands other than `signorini run`.
 pub fn require_one_process() -> Result<(), Failure> {
     if Communicator::launched().is_none_or(|ranks| ranks == 1) {
         return Ok(());

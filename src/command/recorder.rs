@@ -1,4 +1,4 @@
-//! What a run writes and shows.
+//! Writes the results of a run and shows its progress.
 
 use super::{
     accuracy,
@@ -22,37 +22,37 @@ use signorini::{
 };
 use std::{collections::BTreeMap, time::Instant};
 
-/// Frames that are written, about, when the scene does not say how often.
+/// The approximate number of frames if the scene has no `output.every`.
 const FRAMES: usize = 20;
 
-/// Writes and shows the accepted steps. Every rank writes its piece of the fields; the first one also
-/// writes the rest and shows the run.
+/// Writes and shows the accepted steps. Every rank writes its piece of the fields. The first rank writes all
+/// other files and shows the progress.
 pub(super) struct Recorder<'a> {
     task: &'a Task<'a>,
     fields: FieldWriter,
-    /// On the first rank, which shows the run.
+    /// The progress; only the first rank has it.
     bar: Option<Progress>,
-    /// `history.csv`, which the first rank writes.
+    /// `history.csv`; only the first rank writes it.
     history: Table,
     last: Option<Step>,
-    /// Seconds of all accepted steps after n = 0.
+    /// The time of all accepted steps after n = 0, s.
     stepping: f64,
     interrupts: Interrupts,
-    /// When the last checkpoint was written.
+    /// The time of the last checkpoint.
     saved: Instant,
 }
 
-/// What a checkpoint keeps of a recorder.
+/// The state of a recorder in a checkpoint.
 #[derive(Serialize, Deserialize)]
 pub struct Recorded {
     stepping: f64,
     fields: FieldsWritten,
-    /// Bytes of `history.csv`.
+    /// The length of `history.csv`, bytes.
     history: Option<u64>,
 }
 
 impl<'a> Recorder<'a> {
-    /// Shows what is to be solved.
+    /// A recorder for a new run. Shows a description of the task.
     pub(super) fn new(task: &'a Task) -> Result<Self, OutputError> {
         let fields = FieldWriter::new(&task.folder, &task.problem)?;
         let bar = task.problem.body.nodes.partition.comm().is_root().then(|| screen::open(task));
@@ -63,7 +63,7 @@ impl<'a> Recorder<'a> {
         Ok(Self { task, fields, bar, history, last, stepping, interrupts, saved })
     }
 
-    /// Goes on from a checkpoint, and shows that.
+    /// Continues from a checkpoint and shows its time.
     pub(super) fn resume(
         &mut self,
         Checkpoint { recorded, run, .. }: &Checkpoint,
@@ -81,7 +81,7 @@ impl<'a> Recorder<'a> {
         output::remove_partial(&self.task.folder)
     }
 
-    /// Puts the beginning of this run in the place of an earlier run's results.
+    /// Removes the results of an earlier run and writes the scene of this one.
     fn start(&mut self) -> Result<(), OutputError> {
         let Task { folder, as_run, adapted, .. } = self.task;
         output::prepare(folder, &self.task.problem.scene().mesh.file)?;
@@ -93,8 +93,8 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Whether a frame is written of a step. Unless the scene says how often, runs that do not come
-    /// far get additional frames after 1, 2, 4, … steps.
+    /// Whether a step gets a frame. Without `output.every` there are additional frames after 1, 2, 4, … steps,
+    /// for runs that end early.
     fn is_frame(&self, StepRecord { step: n, time, .. }: &StepRecord) -> bool {
         let scene = self.task.problem.scene();
         let Some(grid) = scene.time else { return true };
@@ -117,7 +117,7 @@ impl<'a> Recorder<'a> {
         let comm = self.task.problem.body.nodes.partition.comm();
         if self.last.is_none() {
             let started = if comm.is_root() { self.start() } else { Ok(()) };
-            // No rank writes before the first one has removed what there was.
+            // The other ranks write after the first one has removed the old results.
             if !comm.all(started.is_ok()) {
                 return started;
             }
@@ -132,7 +132,7 @@ impl<'a> Recorder<'a> {
                 true => self.history.add(&[(&step.record, &step.quantities)]),
                 false => Ok(()),
             };
-            // All ranks write the frame together, also where the row could not be written.
+            // This is collective: all ranks write the frame, even if the row could not be written.
             match self.is_frame(&step.record) {
                 true => row.and(self.fields.add(&self.task.problem, &step.state)),
                 false => row,
@@ -142,8 +142,8 @@ impl<'a> Recorder<'a> {
         written
     }
 
-    /// Writes the last accepted state and the summary, also of a run that failed, but for one without
-    /// any accepted state: then the results of an earlier run stay. Shows the result. Collective.
+    /// Writes the last accepted state and the summary and shows the result, also for a failed run. If the run
+    /// has no accepted state, the results of an earlier run stay. Collective.
     pub(super) fn finish(mut self, result: &Result<Outcome, RunError>) -> Result<(), OutputError> {
         let (task, last) = (self.task, self.last.take());
         let written = match &last {
@@ -162,7 +162,7 @@ impl<'a> Recorder<'a> {
         if result.is_ok() {
             checkpoint::remove(&task.folder, task.problem.body.nodes.partition.comm().rank(), None);
         }
-        // The rest is for the first rank alone.
+        // Only the first rank goes on from here.
         let Some(bar) = &self.bar else { return written };
 
         let quantities = task.problem.quantities();
@@ -198,7 +198,7 @@ impl Observer for Recorder<'_> {
     fn accept(&mut self, step: &Step) -> Observed<Next> {
         self.write(step)?;
         let seconds = self.task.problem.scene().output.checkpoint;
-        // The clock of the first rank counts.
+        // The first rank decides by its clock.
         let due = self.bar.is_some() && self.saved.elapsed().as_secs_f64() > seconds;
         Ok(match self.interrupts.received() {
             Some(signal) => Next::End(signal),
@@ -217,8 +217,8 @@ impl Observer for Recorder<'_> {
     }
 }
 
-/// `summary.json` of a run that took `wall` seconds. What tells of the last accepted state is null
-/// where there is none because the first solve failed.
+/// `summary.json` of a run that took `wall` seconds. The values of the last accepted state are null if the
+/// first solve failed.
 fn summary(
     task: &Task,
     last: Option<StepRecord>,
@@ -239,14 +239,14 @@ fn summary(
         "title": scene.title,
         "solver": solver,
         "ranks": partition.comm().size(),
-        // Of the whole body; contact nodes have a gap condition and no prescribed displacement.
+        // Numbers of the whole body. Contact nodes have a gap condition and no prescribed displacement.
         "nodes": partition.total(),
         "triangles": triangles,
         "contact_nodes": contact_nodes,
         // Accepted steps after t = 0, and the last time, s.
         "steps": steps,
         "end_time": last.map(|record| record.time),
-        // When ζ_* was reached, s, and how far off that time may be; null if it was not reached.
+        // The time at which ζ reached ζ_*, s, and its error; null if ζ did not reach it.
         "stopped_at": stopped.map(|stop| stop.time),
         "stopped_uncertainty": stopped.map(|stop| stop.bar()),
         // As in history.csv.
@@ -257,9 +257,9 @@ fn summary(
         "contact_force": last.map(|record| record.contact_force),
         "active_nodes": last.map(|record| record.active_nodes),
         "quantities": quantities.iter().cloned().collect::<BTreeMap<_, _>>(),
-        // The worst of all steps.
+        // The maxima over all steps.
         "kkt": outcome.map(|outcome| outcome.kkt).or(last.map(|record| record.kkt())),
-        // Estimated relative errors of the last state; null where there is none.
+        // Estimated relative errors of the last state.
         "errors": outcome.map(|outcome| &outcome.errors),
         "wall_seconds": wall,
         "seconds_per_step": wall / steps.max(1) as f64,

@@ -1,4 +1,4 @@
-//! `signorini run`: a scene from its file to its results.
+//! `signorini run`: from the file of a scene to its results.
 
 use super::{
     Failure, SOLVERS, SceneArguments,
@@ -40,17 +40,15 @@ pub struct RunArguments {
         "Contact solver [default: the scene's, else {}]:\n{}", SOLVERS[0], summaries()
     ))]
     solver: Option<String>,
-    /// Close with all that was timed (phases, times per call, bytes moved, unavoidable work) and all
-    /// notes, also those that do not bear on the answer.
+    /// Print a closing table of phases (time, time per call, bytes moved) and all notes, also minor ones.
     #[arg(long)]
     profile: bool,
-    /// Measure how far off the mesh puts each figure, by two runs with few steps, on the mesh and on this
-    /// mesh bisected everywhere (`signorini check` says about how long that takes); with --accuracy that is
-    /// done in any case.
+    /// Measure the error of each figure that the mesh causes: two runs with few steps, on the mesh and on
+    /// this mesh bisected everywhere (`signorini check` estimates their time). --accuracy includes it.
     #[arg(long)]
     bars: bool,
-    /// Go on from the last checkpoint of the same run, to the same results bit by bit; from the
-    /// beginning if there is none.
+    /// Continue the same run from its last checkpoint, with the same results bit by bit; without a
+    /// checkpoint start from the beginning.
     #[arg(long)]
     restart: bool,
     /// PETSc options, e.g. -- -tao_monitor -log_view.
@@ -59,26 +57,26 @@ pub struct RunArguments {
 }
 
 impl RunArguments {
-    /// Refuses what would silently have no effect.
+    /// Checks that no argument is without effect.
     fn check(&self) -> Result<(), Failure> {
         self.scene.check()?;
         self.solver.iter().try_for_each(|name| check_solver("--solver", name))?;
         check_petsc(&self.petsc)
     }
 
-    /// The scene as it is to be run.
+    /// The scene with its overrides.
     fn read(&self) -> Result<Scene, Failure> {
         let solver = self.solver.iter().map(|name| format!("contact.solver='{name}'"));
         self.scene.read(&Vec::from_iter(solver))
     }
 
-    /// Where the results go.
+    /// The folder of the results.
     fn folder(&self, scene: &Scene) -> PathBuf {
         self.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name))
     }
 }
 
-/// The mesh of a scene, as the first rank reads it. Collective.
+/// The mesh of a scene. The first rank reads it for all. Collective.
 fn read_shared(comm: Communicator, scene: &Scene) -> Result<Mesh, Failure> {
     let read = if comm.is_root() { read_mesh(scene, true) } else { Ok(Mesh::default()) };
     let mut mesh = agree(comm, read)?;
@@ -88,7 +86,7 @@ fn read_shared(comm: Communicator, scene: &Scene) -> Result<Mesh, Failure> {
     Ok(mesh)
 }
 
-/// Refuses PETSc options that would end the run at its first factorisations. Collective.
+/// Checks the PETSc options that would otherwise fail at the first factorisation. Collective.
 fn check_factors(session: &Session, problem: &DiscreteProblem) -> Result<(), Failure> {
     let mut prefixes = ["elastic_"].into_iter().chain(problem.damage().map(|_| "damage_"));
     prefixes.try_for_each(|prefix| {
@@ -98,7 +96,7 @@ fn check_factors(session: &Session, problem: &DiscreteProblem) -> Result<(), Fai
     })
 }
 
-/// Refuses to write the adapted mesh over one that no run has left.
+/// Checks that the adapted mesh will not replace a mesh of the user.
 fn check_mesh_is_kept(scene: &Scene, folder: &Path) -> Result<(), Failure> {
     let kept = folder.join(output::MESH);
     let whose = match scene.accuracy {
@@ -123,7 +121,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let warns = task.is_ok() && session.comm().is_root();
     let result = task.and_then(|(task, restart)| solve(&task, restart, &session));
     let mut unused = session.unused_options();
-    // PETSc reads it at its end.
+    // PETSc reads this option when it ends.
     unused.retain(|option| !option.starts_with("-options_left"));
     let finalized = session.finalize().map_err(Failure::from);
     if warns && !unused.is_empty() {
@@ -132,7 +130,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     result.and(finalized)
 }
 
-/// A run that begins removes the checkpoint of the one before.
+/// Notes that this run will remove the checkpoint of the previous one.
 fn warn_of_checkpoint(folder: &Path) {
     if let [(step, _), ..] = output::checkpoints(folder, 0)[..] {
         let warning = format!(
@@ -144,8 +142,8 @@ fn warn_of_checkpoint(folder: &Path) {
     }
 }
 
-/// Reads the scene and, where the run goes on, the checkpoint on every rank, and the mesh on the first one
-/// for all. Collective.
+/// Reads the scene and, for a restart, the checkpoint on every rank. The first rank reads the mesh for all.
+/// Collective.
 fn read<'a>(
     arguments: &'a RunArguments,
     session: &Session,

@@ -1,4 +1,4 @@
-//! What a run shows: what is to be solved, a progress bar, and the result in a few lines.
+//! The output of a run at the terminal: its task, a progress bar, and the result in a few lines.
 
 use super::task::Task;
 use signorini::{
@@ -9,10 +9,10 @@ use signorini::{
 };
 use std::io::{self, IsTerminal, Write};
 
-/// The progress bar counts thousandths of [0, T].
+/// The length of the progress bar: it counts thousandths of [0, T].
 const LENGTH: u64 = 1000;
 
-/// Shows what is to be solved, and a progress bar.
+/// Shows the task and a progress bar.
 pub fn open(task: &Task) -> Progress {
     let (scene, partition) = (task.problem.scene(), &task.problem.body.nodes.partition);
     let mut mesh = format!("{} nodes, {} triangles", partition.total(), task.triangles);
@@ -35,7 +35,7 @@ pub fn open(task: &Task) -> Progress {
     progress
 }
 
-/// Shows on a terminal a mesh that was tried for an accuracy, with its errors.
+/// Shows a mesh of the adaptation with its errors, if there is a terminal.
 pub fn adapting(mesh: &Adapted, accuracy: f64) {
     if !io::stderr().is_terminal() {
         return;
@@ -62,8 +62,8 @@ pub fn progress(bar: &mut Progress, record: &StepRecord, end: f64) {
     bar.show((LENGTH as f64 * record.time / end) as u64, message);
 }
 
-/// The end of a run and the quantities of its last accepted state, a line each. `last` is `None` if the first
-/// solve failed.
+/// The closing lines of a run: its end, and the quantities of its last accepted state. `last` is `None` if the
+/// first solve failed.
 pub fn conclusion(
     task: &Task,
     last: Option<StepRecord>,
@@ -114,7 +114,7 @@ pub fn conclusion(
     lines
 }
 
-/// The resultants of the supports, a line each, with the error bars that `bar` knows by name.
+/// Per support: a line with its resultants and their error bars from `bar`.
 fn supports(
     task: &Task,
     quantities: &[(String, f64)],

@@ -1,4 +1,4 @@
-//! `signorini figures`, `report`, `info` and `compare`: Python scripts that the program carries.
+//! `signorini figures`, `report`, `info` and `compare`: Python scripts embedded in the program.
 
 use super::{Failure, ranks::require_one_process};
 use clap::Args;
@@ -17,15 +17,15 @@ macro_rules! scripts {
     };
 }
 
-/// What the scripts import from each other.
+/// The scripts and the modules that they import from each other.
 const SCRIPTS: [(&str, &str); 19] = scripts! {
     "animation" "bars" "compare" "contact_pressure" "drawing" "elements" "expressions" "figures"
     "histories" "info" "limits" "maps" "paraview_script" "paraview_view" "reading" "report"
     "report_page" "results" "setting"
 };
-/// Runs one of them.
+/// The Python program that runs one of them.
 const EMBEDDED: &str = include_str!("../../scripts/embedded.py");
-/// Tells what Python lacks.
+/// The Python program that prints the missing packages.
 const PROBE: &str = "import sys, importlib.util as util\n\
     lacks = [m for m in ('matplotlib', 'meshio', 'tomllib') if not util.find_spec(m)]\n\
     sys.exit(', '.join(lacks) or None)";
@@ -34,28 +34,28 @@ const PROBE: &str = "import sys, importlib.util as util\n\
 #[derive(Args)]
 #[command(disable_help_flag = true)]
 pub struct ScriptArguments {
-    /// What `--help` lists.
+    /// Arguments of the script; `--help` lists them.
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARGUMENT")]
     arguments: Vec<OsString>,
 }
 
-/// Runs the script `name`, which tells itself what is wrong with its input.
+/// Runs the script `name`. The script itself reports problems of its input.
 pub fn script(name: &str, ScriptArguments { arguments }: &ScriptArguments) -> Result<(), Failure> {
     require_one_process()?;
     let python = python()?;
     let mut running = Command::new(&python)
         .args(["-c", EMBEDDED, name])
         .args(arguments)
-        // What a script runs itself.
+        // `compare` runs this program.
         .env("SIGNORINI", env::current_exe().map_err(Failure::from)?)
-        // The sources are UTF-8, and so is what they say.
+        // The sources and their output are UTF-8.
         .env("PYTHONIOENCODING", "utf-8")
         .stdin(Stdio::piped())
         .spawn()
         .map_err(|error| format!("{}: {error}", python.display()))?;
     if let Some(mut input) = running.stdin.take() {
         let sources = serde_json::to_vec(&BTreeMap::from(SCRIPTS)).map_err(Failure::from)?;
-        // A script that has ended early says itself why.
+        // A script that ends early reports the reason itself.
         let _ = input.write_all(&sources);
     }
     match running.wait().map_err(Failure::from)?.code() {
@@ -64,7 +64,7 @@ pub fn script(name: &str, ScriptArguments { arguments }: &ScriptArguments) -> Re
     }
 }
 
-/// The Python of `PYTHON` or, without it, the first of the usual ones that has what the scripts import.
+/// The Python of the variable `PYTHON`; without it, the first usual one that has the packages of the scripts.
 fn python() -> Result<OsString, Failure> {
     let usual = || vec!["/usr/bin/python3".into(), "python3".into()];
     let candidates = env::var_os("PYTHON").map_or_else(usual, |python| vec![python]);

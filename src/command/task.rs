@@ -1,4 +1,4 @@
-//! What a run works on.
+//! The task of a run.
 
 use signorini::{
     estimate::{Adapted, Bar},
@@ -7,29 +7,29 @@ use signorini::{
 };
 use std::{fs::File, path::PathBuf, time::Instant};
 
-/// A run whose input is good.
+/// A run with checked input.
 pub struct Task<'a> {
-    /// This rank's subdomain of it.
+    /// The problem on this rank's subdomain.
     pub problem: DiscreteProblem,
-    /// Triangles of the whole body, and its nodes with a gap condition.
+    /// The numbers of triangles and of nodes with a gap condition of the whole body.
     pub triangles: usize,
     pub contact_nodes: usize,
     /// The name of the contact solver.
     pub solver: String,
-    /// Where the results go.
+    /// The folder of the results.
     pub folder: PathBuf,
-    /// The scene as it is run, as a file.
+    /// The text of the scene file in this folder.
     pub as_run: String,
-    /// What the files of its tables hold.
+    /// The contents of the files of tables.
     pub tables: Vec<u8>,
-    /// The mesh, where it was adapted.
+    /// The adapted mesh, if there is one.
     pub adapted: Option<Adapted>,
-    /// The error bars of the figures that the mesh makes, where they were measured.
+    /// The measured error bars of the figures; empty if they were not measured.
     pub bars: Vec<Bar>,
-    /// Keeps other runs out of the folder.
+    /// The lock of the folder against other runs.
     pub _lock: Option<File>,
     pub petsc: &'a [String],
-    /// Whether the closing table has all that was timed.
+    /// Whether to print the table of phases.
     pub profile: bool,
     pub phases: &'a Phases,
     pub started: Instant,

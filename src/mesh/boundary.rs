@@ -20,15 +20,15 @@ pub struct BoundaryNode {
 pub struct Face {
     /// Outward unit normal.
     pub normal: [f64; 2],
-    /// Tributary length, m: half of each edge that the face stands for.
+    /// Tributary length, m: half the length of each edge of the face.
     pub length: f64,
 }
 
 impl Face {
-    /// Whether the other face continues this one smoothly, at an angle of no more than
-    /// [`CORNER_ANGLE`] between their normals.
+    /// Whether the other face continues this one smoothly: the angle between their normals is at most
+    /// [`CORNER_ANGLE`].
     pub fn continues(&self, other: &Self) -> bool {
-        // Round-off must not decide on a boundary whose edges turn by exactly 30°.
+        // The tolerance protects boundaries whose edges turn by exactly 30° against rounding.
         self.angle(other) <= CORNER_ANGLE + 1e-9
     }
 
@@ -47,12 +47,12 @@ impl Face {
     }
 }
 
-/// The nodes of a set of boundary edges, in increasing order, from the `faces` of the single edges at
-/// their nodes.
+/// The nodes of a set of boundary edges, in increasing order. Each item of `faces` is a node and the face of
+/// one edge at this node.
 ///
-/// A node's normal is the length-weighted mean of its edges' normals; at a corner, where
-/// they differ by more than [`CORNER_ANGLE`], it keeps both. The lengths of all faces add
-/// up to the length of the edges.
+/// A node's normal is the length-weighted mean of its edges' normals. At a corner the normals differ by more
+/// than [`CORNER_ANGLE`], and the node keeps both. The sum of the lengths of all faces is the length of the
+/// edges.
 pub fn boundary_nodes(faces: impl IntoIterator<Item = (usize, Face)>) -> Vec<BoundaryNode> {
     let mut nodes: BTreeMap<usize, Vec<Face>> = BTreeMap::new();
     for (node, own) in faces {

@@ -1,4 +1,4 @@
-//! What can be wrong with a mesh, told to the person at the terminal.
+//! Errors of meshes, as messages for the person at the terminal.
 
 use super::msh::DEGENERATE;
 use crate::interrupt::Signal;
@@ -16,17 +16,17 @@ pub enum MeshError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
-    /// A file is no mesh of a plane body, or gmsh made or would make none of it.
+    /// The file is not the mesh of one plane body, or gmsh cannot make such a mesh from it.
     #[error("{}{place}: {problem}", path.display())]
     File {
         /// The file.
         path: PathBuf,
         /// `:LINE` in a text file, `, byte N in $SECTION` in a binary one, empty if not known.
         place: String,
-        /// What is wrong, and what to do; nodes and elements go by their tags in the file.
+        /// What is wrong, and what to do. Nodes and elements are named by their tags in the file.
         problem: String,
     },
     /// A signal came while gmsh worked.
@@ -45,7 +45,7 @@ pub enum MeshError {
 }
 
 impl MeshError {
-    /// Whether triangles are flat or folded, which another mesh of the same geometry may mend.
+    /// Whether triangles are flat or folded. Another mesh of the same geometry may have none.
     pub(super) fn is_degenerate(&self) -> bool {
         let is_said = |problem: &String| DEGENERATE.iter().any(|what| problem.contains(what));
         matches!(self, Self::File { problem, .. } if is_said(problem))

@@ -1,4 +1,5 @@
-//! Triangulations of a plane body, and where they come from.
+//! Triangulations of a plane body: gmsh makes them ([`load`]), `msh` reads them ([`read`]), and [`Refinement`]
+//! bisects their triangles. The type of this room is [`Mesh`]: nodes, triangles, named curves and surfaces.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -24,17 +25,17 @@ pub use refine::Refinement;
 /// counter-clockwise with positive area.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Mesh {
-    /// Coordinates of the nodes, which are the vertices of the triangles, m.
+    /// Coordinates of the nodes (the vertices of the triangles), m.
     pub nodes: Vec<[f64; 2]>,
     /// Three node indices per triangle, counter-clockwise.
     pub triangles: Vec<[usize; 3]>,
-    /// The physical curves by name; a group without a name goes by its tag.
+    /// The physical curves by name; the tag names a group without a name.
     pub curves: BTreeMap<String, Curve>,
-    /// The triangles of the physical surfaces by name, rising; a group without a name goes by its tag. A
-    /// triangle may be in several.
+    /// The triangles of the physical surfaces by name, in increasing order; the tag names a group without a
+    /// name. A triangle may be in several.
     pub surfaces: BTreeMap<String, Vec<usize>>,
-    /// The midpoints of curved edges, m, by their ends in increasing order; the others are straight.
-    /// Quadratic elements follow them, linear ones do not know them.
+    /// The midpoints of curved edges, m, by their ends in increasing order. All other edges are straight.
+    /// Only quadratic elements use the midpoints.
     pub curved: BTreeMap<[usize; 2], [f64; 2]>,
 }
 
@@ -43,7 +44,7 @@ pub struct Mesh {
 pub struct Curve {
     /// Boundary edges as node pairs, the body on their left: (dy, −dx) points outwards.
     pub edges: Vec<[usize; 2]>,
-    /// How many of the curve's edges lie inside the body (these are not in `edges`).
+    /// The number of the curve's edges inside the body, which are not in `edges`.
     pub interior_edges: usize,
 }
 
@@ -67,7 +68,7 @@ impl Mesh {
         bounds
     }
 
-    /// The edges of one triangle alone, the body on their left.
+    /// The edges of the boundary (those of a single triangle), the body on their left.
     pub fn boundary_edges(&self) -> Vec<[usize; 2]> {
         let sides = sides(&self.triangles);
         let single = sides.chunk_by(|a, b| a.edge == b.edge).filter(|sides| sides.len() == 1);
@@ -92,7 +93,7 @@ fn smallest_angle(corners: [[f64; 2]; 3]) -> f64 {
     let at = |i: usize| {
         let [a, b, c] = [0, 1, 2].map(|k| corners[(i + k) % 3]);
         let (p, q) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
-        // The cosine alone would lose small angles to rounding.
+        // The arc cosine alone would lose small angles to rounding.
         (p[0] * q[1] - p[1] * q[0]).atan2(p[0] * q[0] + p[1] * q[1]).to_degrees()
     };
     at(0).min(at(1)).min(at(2))

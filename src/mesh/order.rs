@@ -4,8 +4,8 @@ use super::{Mesh, extent, sorted};
 
 impl Mesh {
     /// Numbers the nodes along Morton's curve (G. M. Morton, *A computer oriented geodetic data base*, IBM,
-    /// 1966), and the triangles by their least node: what is near in the body is then near in memory.
-    /// (As gmsh numbers 129,000 nodes, filling K takes twice as long.)
+    /// 1966), and the triangles by their first node. Neighbouring nodes are then close in memory, and the
+    /// assembly of large matrices takes half the time.
     pub fn in_morton_order(self) -> Self {
         let low = [0, 1].map(|axis| self.nodes.iter().fold(f64::INFINITY, |x, p| x.min(p[axis])));
         let scale = f64::from(u32::MAX) / extent(&self.nodes);
@@ -39,7 +39,7 @@ impl Mesh {
     }
 }
 
-/// The bits of a number with a zero before each.
+/// The bits of a number with a zero bit before each of them.
 fn spread(number: u32) -> u64 {
     let mut bits = u64::from(number);
     for (shift, mask) in [

@@ -6,17 +6,17 @@
 
 use super::{Mesh, sorted};
 
-/// |d| over the length of an edge: below this it is straight.
+/// Relative offset |d| / length below which an edge is straight.
 const STRAIGHT: f64 = 1e-9;
 
 impl Mesh {
-    /// The midpoint of an edge, m; of a curved one that of its parabola.
+    /// The midpoint of an edge (if curved, of its parabola), m.
     pub fn midpoint(&self, [a, b]: [usize; 2]) -> [f64; 2] {
         let curved = self.curved.get(&sorted([a, b]));
         curved.copied().unwrap_or_else(|| mean(self.nodes[a], self.nodes[b]))
     }
 
-    /// Sets the offset d (m) of an edge's midpoint; the edge is straight if that is only rounding.
+    /// Sets the offset d (m) of an edge's midpoint. The edge is straight if d is only rounding error.
     pub fn set_offset(&mut self, edge: [usize; 2], [dx, dy]: [f64; 2]) {
         let [x, y] = mean(self.nodes[edge[0]], self.nodes[edge[1]]);
         self.set_midpoint(edge, [x + dx, y + dy]);
@@ -31,7 +31,7 @@ impl Mesh {
         }
     }
 
-    /// Sets the midpoint of an edge, which is straight if that is its middle up to rounding.
+    /// Sets the midpoint of an edge. The edge is straight if its offset is only rounding error.
     pub(super) fn set_midpoint(&mut self, [a, b]: [usize; 2], midpoint: [f64; 2]) {
         let [dx, dy] = offset(self.nodes[a], self.nodes[b], midpoint);
         let (_, length) = self.edge_normal([a, b]);
@@ -55,8 +55,8 @@ impl Mesh {
         [[a, b], [b, c], [c, a]].map(|[p, q]| offset(nodes[p], nodes[q], self.midpoint([p, q])))
     }
 
-    /// Whether det ∂x/∂(λ₂, λ₃) of a triangle is above `bound` (m²) at its vertices, the midpoints of
-    /// its sides and the points of the three-point quadrature rule within.
+    /// Whether det ∂x/∂(λ₂, λ₃) of a triangle is above `bound` (m²) at its vertices, at the midpoints of its
+    /// sides and at the points of the three-point quadrature rule inside it.
     pub(super) fn jacobian_exceeds(&self, bound: f64, triangle: [usize; 3]) -> bool {
         // ∂λ_i/∂λ₂ and ∂λ_i/∂λ₃.
         const GRADIENTS: [[f64; 2]; 3] = [[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]];
@@ -75,7 +75,7 @@ impl Mesh {
         let points = [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0]];
         let mut rotated =
             points.into_iter().flat_map(|[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]]);
-        // False of what is not a number, too.
+        // This is false for NaN, too.
         rotated.all(|lambda| determinant(lambda) > bound)
     }
 }

@@ -1,10 +1,10 @@
-//! Structured triangulations of rectangles, made without gmsh.
+//! Structured triangulations of rectangles, without gmsh.
 
 use super::{Curve, Mesh};
 
 impl Mesh {
-    /// The rectangle [0, `width`] × [0, `height`] (m) in `nx` × `ny` equal cells, each cut from
-    /// lower left to upper right; the sides are the curves `left`, `right`, `bottom` and `top`.
+    /// The rectangle [0, `width`] × [0, `height`] (m) in `nx` × `ny` equal cells. A diagonal from lower left
+    /// to upper right cuts each cell. The sides are the curves `left`, `right`, `bottom` and `top`.
     pub fn rectangle(width: f64, height: f64, nx: usize, ny: usize) -> Self {
         let at = |size: f64, i: usize, n: usize| size * i as f64 / n as f64;
         let points = (0..=ny).flat_map(|j| (0..=nx).map(move |i| (i, j)));

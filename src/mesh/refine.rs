@@ -8,21 +8,21 @@
 
 use super::{Mesh, MeshError, Side, sides, twice_area};
 
-/// A mesh that is refined round after round.
+/// A mesh that is refined repeatedly.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Refinement {
     /// The mesh; the first two nodes of each triangle are the ends of its reference edge.
     pub mesh: Mesh,
-    /// For each triangle the one in the mesh before that it is, or lies in.
+    /// Per triangle: the triangle of the previous mesh that is the same or contains it.
     pub parent_of_triangle: Vec<usize>,
-    /// For each new node the ends of the edge that it halves. Nodes keep their numbers, the new
-    /// ones follow.
+    /// Per new node: the ends of the edge that it halves. Old nodes keep their numbers, and new nodes follow
+    /// them.
     pub halved_edges: Vec<[usize; 2]>,
 }
 
 impl Refinement {
-    /// A mesh before its first round. Its nodes and triangles keep their numbers; the nodes of a
-    /// triangle only take turns.
+    /// A mesh before its first refinement. Nodes and triangles keep their numbers; the nodes of a triangle
+    /// may be rotated.
     pub fn start(mut mesh: Mesh) -> Self {
         let mut triangles = std::mem::take(&mut mesh.triangles);
         for triangle in &mut triangles {
@@ -35,23 +35,23 @@ impl Refinement {
         Self { mesh, parent_of_triangle, halved_edges: Vec::new() }
     }
 
-    /// Bisects the triangles that are `marked`, and others as far as the mesh needs it to stay
-    /// conforming; each into four at most.
+    /// Bisects the `marked` triangles, and others as far as the mesh needs it to stay conforming. A triangle
+    /// has at most four parts.
     ///
-    /// The edges of curves are halved with their triangles. Quadratic edges and triangles are
-    /// divided as the images that they are: new nodes lie on them, and parts keep their curvature.
-    /// (The interior edges of a curve are not listed: their number stays.)
+    /// The edges of curves are halved with their triangles. New nodes of quadratic edges and triangles lie
+    /// on their parabolas, and the parts keep the curvature. The number of interior edges of a curve does not
+    /// change, as they are not listed.
     ///
     /// # Errors
-    /// The vertices of a part of a quadratic triangle are not counter-clockwise: its sides curve by a
-    /// good part of its height.
+    /// The vertices of a part of a quadratic triangle are not counter-clockwise, because its sides are too
+    /// curved.
     pub fn refine(&self, marked: &[bool]) -> Result<Self, MeshError> {
         let edges = Edges::of(&self.mesh.triangles);
         let halved = edges.halved_with(marked);
         self.halve(&edges, &halved)
     }
 
-    /// Divides every triangle into four, of half its size, by bisecting it and its halves.
+    /// Divides every triangle into four parts of half its size: bisects the triangle and its halves.
     ///
     /// # Errors
     /// See [`Refinement::refine`].
@@ -60,7 +60,7 @@ impl Refinement {
         self.halve(&edges, &Vec::from_iter(0..edges.ends.len()))
     }
 
-    /// Halves some edges, with every one of them the reference edges of its triangles.
+    /// Halves the edges `halved`. They include the reference edges of all their triangles.
     fn halve(&self, edges: &Edges, halved: &[usize]) -> Result<Self, MeshError> {
         let mut new_node = vec![None; edges.ends.len()];
         for (edge, node) in halved.iter().zip(self.mesh.nodes.len()..) {
@@ -107,13 +107,13 @@ impl Refinement {
     }
 }
 
-/// The nodes of a triangle and the offsets of its sides ab, bc, ca from straight ones.
+/// The nodes of a triangle and the offsets d of its sides ab, bc, ca.
 struct Triangle {
     nodes: [usize; 3],
     offsets: [[f64; 2]; 3],
 }
 
-/// The children of a triangle that is bisected at the node `middle`, or the triangle itself.
+/// The children of a triangle that is bisected at the node `middle`; without one, the triangle itself.
 ///
 /// Halves of ab have the offset d_ab/4. The new side mc is x(λ) between m, λ = (½, ½, 0), and c; its
 /// offset from the straight one is x(¼, ¼, ½) − (m + c)/2 = (d_bc + d_ca)/2 − d_ab/4.
@@ -129,11 +129,11 @@ fn bisected(triangle: Triangle, middle: Option<usize>) -> impl Iterator<Item = T
 
 /// The edges of a triangulation, in increasing order of their ends.
 struct Edges {
-    /// Their ends, these too in increasing order.
+    /// Per edge: its ends in increasing order.
     ends: Vec<[usize; 2]>,
-    /// The triangles on both sides; of a boundary edge one triangle twice.
+    /// Per edge: the triangles on both sides. A boundary edge has its triangle twice.
     triangles: Vec<[usize; 2]>,
-    /// The edges ab, bc, ca of each triangle abc.
+    /// Per triangle abc: its edges ab, bc, ca.
     of_triangle: Vec<[usize; 3]>,
 }
 
@@ -162,8 +162,8 @@ impl Edges {
         self.ends.binary_search(&[a.min(b), a.max(b)]).ok()
     }
 
-    /// The edges to halve, in increasing order: the reference edges of the `marked` triangles, and
-    /// of every triangle that has an edge to halve.
+    /// The edges to halve, in increasing order: the reference edges of the `marked` triangles and of all
+    /// triangles that have an edge to halve.
     fn halved_with(&self, marked: &[bool]) -> Vec<usize> {
         let mut is_halved = vec![false; self.ends.len()];
         let marked = self.of_triangle.iter().zip(marked).filter(|(_, marked)| **marked);

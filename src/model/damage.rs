@@ -13,9 +13,9 @@ pub struct DamageLaw {
     pub lambda_u: f64,
     /// λ_W, 1/s.
     pub lambda_w: f64,
-    /// q*, the largest |ε|² that counts: Ψ_q*(ε) = min(|ε|², q*).
+    /// q*, the upper bound of |ε|² in the source: Ψ_q*(ε) = min(|ε|², q*).
     pub strain_cap: f64,
-    /// ζ_* in (0, 1), the least admissible ζ.
+    /// ζ_* in (0, 1), the smallest admissible ζ.
     pub threshold: f64,
 }
 

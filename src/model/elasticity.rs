@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 
-/// Which plane reduction of three-dimensional elasticity holds.
+/// The plane reduction of three-dimensional elasticity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Plane {

@@ -1,4 +1,4 @@
-//! Γ_C: `contact.csv` with a row per contact node and frame, and lines for ParaView.
+//! Results on Γ_C: `contact.csv` with a row per contact node and frame, and lines for ParaView.
 
 use super::{
     OutputError, Table,
@@ -27,7 +27,7 @@ impl ContactWriter {
         Ok(Self { folder: folder.to_owned(), list, table })
     }
 
-    /// Writes Γ_C at `time`, s, if there is one, its lines as `file`.
+    /// Writes Γ_C at `time`, s, if the body has one; the lines go to `file`.
     ///
     /// # Errors
     /// A file cannot be written.
@@ -46,7 +46,7 @@ impl ContactWriter {
     }
 }
 
-/// The contact nodes as points, each joined with the next one of its part of Γ_C.
+/// The contact nodes as points, with lines between neighbours on Γ_C.
 fn lines(rows: &[ContactRow]) -> String {
     let is_joined = |&[i, j]: &[usize; 2]| {
         (&rows[i].boundary, rows[i].part) == (&rows[j].boundary, rows[j].part)
@@ -56,7 +56,7 @@ fn lines(rows: &[ContactRow]) -> String {
     let scalar = |name, of: fn(&ContactRow) -> f64| {
         DataArray::new(name, REAL, 1, rows.iter().map(of)).element()
     };
-    // On the body, against ν.
+    // The pressure acts on the body, against ν.
     let pressure =
         rows.iter().flat_map(|row| [row.normal_x, row.normal_y, 0.0].map(|n| -row.pressure * n));
     let piece = format!(

@@ -1,4 +1,4 @@
-//! A file that grows and is complete whenever the program is killed.
+//! A growing file that is complete at any time, even if the program is killed.
 
 use super::{OutputError, write_whole};
 use std::{
@@ -8,14 +8,15 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// A file that grows by pieces between a beginning and an ending, and has both at any time; its first
-/// piece creates it. A piece and the ending after it are one write over the ending before.
+/// A file of pieces between a beginning and an ending. The first piece creates the file with both. Each further
+/// piece and a new ending replace the old ending in one write.
 #[derive(Debug)]
 pub(super) struct GrowingFile {
     pub(super) path: PathBuf,
     beginning: String,
     ending: &'static str,
-    /// Bytes before the ending; `None` while there is no file. A restart sets those of its checkpoint.
+    /// The number of bytes before the ending; `None` before the file exists. A restart sets the number of its
+    /// checkpoint.
     pub(super) length: Option<u64>,
     file: Option<File>,
 }
@@ -41,7 +42,7 @@ impl GrowingFile {
         };
         let text = [piece, self.ending.as_bytes()].concat();
         let written = file.write_all_at(&text, length);
-        // A full disk takes a part of the piece: then the file ends as before.
+        // A full disk may take a part of the piece. Then the old ending is written again.
         let length = length + if written.is_ok() { piece.len() as u64 } else { 0 };
         let restored = match &written {
             Ok(()) => Ok(()),

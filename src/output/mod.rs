@@ -1,5 +1,6 @@
-//! What a run leaves behind: `fields.pvd` with its frames, `history.csv`, `summary.json`; and what
-//! the commands share at the terminal.
+//! The results of a run: `fields.pvd` with its frames, `history.csv`, `contact.csv`, `summary.json`; and the
+//! common output at the terminal. [`FieldWriter`] writes frames, [`Table`] rows; other files appear whole
+//! ([`write_whole`]).
 
 mod contact;
 mod growing_file;
@@ -28,7 +29,7 @@ pub struct OutputError {
 }
 
 impl OutputError {
-    /// The file at `path` cannot be written for this reason.
+    /// The file at `path` cannot be written.
     pub fn new(path: &Path, reason: impl ToString) -> Self {
         Self { path: path.to_owned(), reason: reason.to_string() }
     }
@@ -40,26 +41,26 @@ impl OutputError {
 /// The folder cannot be created or written to.
 pub fn create(folder: &Path) -> Result<(), OutputError> {
     fs::create_dir_all(folder).map_err(|e| OutputError::new(folder, e))?;
-    // Whether a folder can be written to shows only by writing.
+    // Only writing shows whether a folder is writable.
     tempfile::tempfile_in(folder).map_err(|e| OutputError::new(folder, e))?;
     Ok(())
 }
 
-/// The scene as it was run. It takes the place of the earlier one, which may be the one that is run.
+/// The scene of the run. It replaces the file of an earlier run, which may be the present scene itself.
 pub const SCENE: &str = "scene.toml";
 
-/// The mesh, where it was adapted.
+/// The adapted mesh.
 pub const MESH: &str = "mesh.msh";
-/// The end of such a file.
+/// The last line of an adapted mesh.
 pub const ADAPTED: &str =
     "$Comments\nAdapted by signorini for the results beside it.\n$EndComments\n";
 
-/// Creates `folder` and keeps other runs out of it while the answer lives (flock(2); where the file
-/// system has no locks it keeps nobody out).
+/// Creates `folder` and locks it against other runs, until the returned file is dropped (flock(2); some file
+/// systems have no locks).
 ///
 /// # Errors
-/// The folder cannot be created or written to, another run has it, or it holds a file of the user's
-/// where one of the run would be written: every run leaves its scene there.
+/// The folder cannot be created or written to, another run has locked it, or it contains a file of the user
+/// with the name of a result. Folders of earlier runs contain their scene.
 pub fn lock(folder: &Path) -> Result<Option<File>, OutputError> {
     create(folder)?;
     let scene = folder.join(SCENE);
@@ -85,17 +86,17 @@ pub fn lock(folder: &Path) -> Result<Option<File>, OutputError> {
     }
 }
 
-/// What a run and its figures leave in a folder besides the frames and the pictures.
+/// The files of a run and its report besides frames and pictures.
 const FILES: &str = "contact.csv contact.pvd fields.pvd history.csv summary.json report.html \
      open_in_paraview.py";
 /// The pictures, in alphabetical order.
 const PICTURES: &str = "contact-evolution damage damage-history deformed force-displacement \
      pressure setting stress stress-damage";
-/// Files that are not complete yet begin with this.
+/// The names of incomplete files begin with this.
 const PARTIAL: &str = ".partial-";
 
-/// Whether `name` is that of a file which a run or its figures leave in a folder: frames are
-/// `fields_NNNN[_R].[p]vtu` and `contact_NNNN.vtu`, pictures `NAME[_tTIME].png`.
+/// Whether `name` is the name of a result or a figure: frames are `fields_NNNN[_R].[p]vtu` and
+/// `contact_NNNN.vtu`, pictures `NAME[_tTIME].png`.
 fn is_result(name: &str) -> bool {
     let (stem, ending) = name.rsplit_once('.').unwrap_or((name, ""));
     let (kind, rest) = stem.split_once('_').unwrap_or((stem, ""));
@@ -119,7 +120,7 @@ pub fn checkpoints(folder: &Path, rank: usize) -> Vec<(usize, PathBuf)> {
     files(folder).into_iter().flatten().filter_map(checkpoint).collect()
 }
 
-/// The names and paths of what a folder holds.
+/// The names and paths of the files in a folder.
 fn files(folder: &Path) -> Result<Vec<(String, PathBuf)>, OutputError> {
     let entries = fs::read_dir(folder).map_err(|e| OutputError::new(folder, e))?.flatten();
     let named =
@@ -133,8 +134,8 @@ fn checkpoint(name: &str) -> Option<(usize, usize)> {
     Some((step.parse().ok()?, rank.parse().ok()?))
 }
 
-/// Removes from `folder` the results of an earlier run, its figures and its files that were never
-/// completed, so that none are mistaken for new; also its adapted mesh, unless it is the `mesh` in use.
+/// Removes the results of an earlier run from `folder`, with its figures, its incomplete files and its adapted
+/// mesh. If the adapted mesh is the `mesh` in use, it stays.
 ///
 /// # Errors
 /// A file cannot be removed.
@@ -146,7 +147,7 @@ pub fn prepare(folder: &Path, mesh: &Path) -> Result<(), OutputError> {
     })
 }
 
-/// Whether a run has left the mesh in `file`.
+/// Whether `file` is the adapted mesh of a run.
 pub fn is_adapted(file: &Path) -> bool {
     fs::read_to_string(file).is_ok_and(|text| text.ends_with(ADAPTED))
 }
@@ -156,7 +157,7 @@ pub fn is_same_file(a: &Path, b: &Path) -> bool {
     matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
-/// Removes from `folder` the files that a run which was killed has not completed.
+/// Removes the incomplete files of a killed run from `folder`.
 ///
 /// # Errors
 /// A file cannot be removed.
@@ -173,13 +174,13 @@ fn remove(folder: &Path, is_old: impl Fn(&str) -> bool) -> Result<(), OutputErro
     old.try_for_each(|(_, path)| fs::remove_file(&path).map_err(|e| OutputError::new(&path, e)))
 }
 
-/// A CSV file that grows by rows, each written at once, so that a run can be followed.
+/// A CSV file that grows by rows. Each row is written at once, so that one can follow the run.
 #[derive(Debug)]
 pub struct Table(GrowingFile);
 
 impl Table {
-    /// The table at `path`, a file from the first rows on: its first columns are the fields of a row like
-    /// `example`, the others are `more`.
+    /// The table at `path`. Its first columns are the fields of a row like `example`, its other columns `more`.
+    /// The first rows create the file.
     ///
     /// # Errors
     /// The names of the columns cannot be written.
@@ -197,12 +198,12 @@ impl Table {
         Ok(Self(GrowingFile::new(path, String::from_utf8_lossy(&header).into_owned(), "")))
     }
 
-    /// Bytes of the file so far; `None` while there is no file.
+    /// The number of bytes of the file; `None` before the file exists.
     pub fn length(&self) -> Option<u64> {
         self.0.length
     }
 
-    /// Goes on after so many bytes of the file that is there.
+    /// Continues the existing file after `length` bytes.
     pub fn resume(&mut self, length: Option<u64>) {
         self.0.length = length;
     }
@@ -217,7 +218,7 @@ impl Table {
     }
 }
 
-/// Rows as text, below the names of their fields if asked for.
+/// Rows as text, with a header of the names of their fields if wanted.
 fn csv_text<T: Serialize>(
     headers: bool,
     rows: impl IntoIterator<Item = T>,
@@ -227,7 +228,7 @@ fn csv_text<T: Serialize>(
     writer.into_inner().map_err(|error| error.into_error().into())
 }
 
-/// Writes a CSV file with a row per element, whole or not at all.
+/// Writes a CSV file with a row per element. It appears complete or not at all.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -235,7 +236,7 @@ pub fn write_table<T: Serialize>(path: &Path, rows: &[T]) -> Result<(), OutputEr
     write_whole(path, &csv_text(true, rows).map_err(|e| OutputError::new(path, e))?)
 }
 
-/// Writes a file whole or not at all: a temporary file beside it is renamed when complete.
+/// Writes a file that appears complete or not at all: a complete temporary file beside it is renamed.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -243,7 +244,7 @@ pub fn write_whole(path: &Path, content: &[u8]) -> Result<(), OutputError> {
     write(path, content, |_| Ok(()))
 }
 
-/// As [`write_whole`], and the disk has the file before it takes the place of another.
+/// As [`write_whole`]; the file is on the disk before it replaces another one.
 ///
 /// # Errors
 /// The file cannot be written.

@@ -1,4 +1,4 @@
-//! What the commands of the program and of the studies share at the terminal.
+//! The common output of all commands at the terminal.
 
 pub use comfy_table::presets::ASCII_MARKDOWN as MARKDOWN;
 
@@ -9,16 +9,16 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Prints to standard output; a reader that has gone (`… | head`) is no reason to panic.
+/// Prints to standard output. It is no error if the reader of a pipe has gone (`… | head`).
 pub fn say(text: &str) {
     let _ = writeln!(io::stdout(), "{text}");
 }
 
-/// A smaller error bar than this part of its figure is shown as this part.
+/// The smallest error bar that is shown, over its figure.
 const LEAST_BAR: f64 = 1e-6;
 
-/// A figure with its error bar, where it has one: `5.3570 ± 0.0004`, or `(1.8139 ± 0.0012)e-2`; the bar has
-/// one digit, or two if the first one is 1. No more than seven digits of the figure are shown.
+/// A figure with its error bar, if it has one: `5.3570 ± 0.0004`, or `(1.8139 ± 0.0012)e-2`. The bar has one
+/// digit, or two if the first one is 1. The figure has at most seven digits.
 pub fn with_bar(value: f64, bar: Option<f64>) -> String {
     let exponent = |number: f64| number.abs().log10().floor() as i32;
     let bar = bar.filter(|bar| *bar > 0.0 && bar.is_finite() && value.is_finite());
@@ -38,8 +38,7 @@ pub fn with_bar(value: f64, bar: Option<f64>) -> String {
     }
 }
 
-/// A progress bar of `length` that looks as indicatif's `template` says; silent when standard error is
-/// no terminal.
+/// A progress bar of `length` after indicatif's `template`. It is silent if standard error is no terminal.
 pub fn progress_bar(template: &str, length: u64) -> ProgressBar {
     let bar = ProgressBar::new(length);
     if let Ok(style) = ProgressStyle::with_template(template) {
@@ -48,10 +47,10 @@ pub fn progress_bar(template: &str, length: u64) -> ProgressBar {
     bar
 }
 
-/// Without a terminal progress is told this often.
+/// The time between two lines of progress without a terminal.
 const BETWEEN_LINES: Duration = Duration::from_secs(5);
 
-/// Progress on standard error: a bar on a terminal, elsewhere a line every few seconds.
+/// Progress on standard error: a bar on a terminal, otherwise a line every few seconds.
 pub struct Progress {
     bar: ProgressBar,
     started: Instant,
@@ -65,7 +64,7 @@ impl Progress {
         Self { bar: progress_bar(template, length), started: now, last_line: now }
     }
 
-    /// Shows how far the work has come, out of the length, and what is to be said of it.
+    /// Shows the `position` of the work on the length, with a message.
     pub fn show(&mut self, position: u64, message: String) {
         if !self.bar.is_hidden() {
             self.bar.set_position(position);
@@ -78,14 +77,14 @@ impl Progress {
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
     }
 }
 
-/// A table of `rows`, whose cells bring the titles of their columns, with numbers to the right in all
-/// columns but the first `names`.
+/// A table of `rows`. Each cell comes with the title of its column. Numbers are aligned to the right in all
+/// columns except the first `names`.
 pub fn table<T: ToString, R: IntoIterator<Item = (T, String)>>(
     style: TableStyle,
     rows: impl IntoIterator<Item = R>,

@@ -1,28 +1,28 @@
-//! VTK's XML files (VTK User's Guide, "VTK File Formats"), with arrays as base64.
-//! They are not compressed: zlib saved a third of the bytes for 80 ms per frame of 66,000 nodes.
+//! VTK's XML files (VTK User's Guide, "VTK File Formats"), with arrays as base64. They are not compressed:
+//! compression would save a third of the bytes and take longer than the writing.
 
 use super::growing_file::GrowingFile;
 use base64::{Engine, engine::general_purpose::STANDARD};
 use num_traits::ToBytes;
 use std::{iter, path::PathBuf};
 
-/// VTK's names of the types of numbers.
+/// VTK's names of the number types.
 pub(super) const REAL: &str = "Float64";
 pub(super) const INTEGER: &str = "Int32";
 const BYTE: &str = "UInt8";
-/// How a list of frames ends.
+/// The ending of a list of frames.
 const LIST_END: &str = "</Collection>\n</VTKFile>\n";
 
-/// A named array with a tuple of numbers per point or cell.
+/// A named array with a tuple of numbers for each point or cell.
 pub(super) struct DataArray {
     /// Type, name and components, as XML attributes.
     attributes: String,
-    /// VTK's header, the number of bytes that follow (64 bits), then the numbers; little-endian.
+    /// VTK's header (the number of the following bytes, 64 bits), then the numbers; little-endian.
     bytes: Vec<u8>,
 }
 
 impl DataArray {
-    /// The array called `name` of tuples of `components` numbers, whose type VTK calls `number_type`.
+    /// The array `name` of tuples of `components` numbers. `number_type` is VTK's name of their type.
     pub(super) fn new<T: ToBytes>(
         name: &str,
         number_type: &str,
@@ -38,7 +38,7 @@ impl DataArray {
         Self { attributes, bytes }
     }
 
-    /// The array with names for its components, which ParaView shows.
+    /// The array with names of its components for ParaView.
     pub(super) fn with_names(mut self, names: &[&str]) -> Self {
         for (component, name) in names.iter().enumerate() {
             self.attributes += &format!(" ComponentName{component}=\"{name}\"");
@@ -59,8 +59,8 @@ impl DataArray {
     }
 }
 
-/// A VTK file whose element `kind` has these `attributes` and a `content` with arrays as [`DataArray`]
-/// encodes them.
+/// A VTK file with an element `kind`, its `attributes` and its `content`. Arrays in the content are encoded by
+/// [`DataArray`].
 pub(super) fn vtk_file(kind: &str, attributes: &str, content: &str) -> String {
     format!(
         "<?xml version=\"1.0\"?>\n\
@@ -70,18 +70,18 @@ pub(super) fn vtk_file(kind: &str, attributes: &str, content: &str) -> String {
     )
 }
 
-/// A list of frames over time for ParaView, a file from the first frame on.
+/// A list of frames over time for ParaView. The first frame creates the file.
 pub(super) fn list_of_frames(path: PathBuf) -> GrowingFile {
     let empty = vtk_file("Collection", "", "");
     GrowingFile::new(path, empty.trim_end_matches(LIST_END).to_owned(), LIST_END)
 }
 
-/// The entry of a list for the frame in `file` of a time, s.
+/// The entry of a list for the frame in `file` at a time, s.
 pub(super) fn entry(time: f64, file: &str) -> String {
     format!("<DataSet timestep=\"{time}\" file=\"{file}\"/>\n")
 }
 
-/// The beginning of `<Piece>`, with `<Points>` and `<Cells>` of one kind with N nodes each.
+/// The beginning of `<Piece>`, with `<Points>` and `<Cells>` of one kind with N nodes.
 pub(super) fn cells_text<const N: usize>(
     points: &[[f64; 2]],
     cells: &[[usize; N]],

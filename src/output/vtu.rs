@@ -25,39 +25,39 @@ use std::{
 /// VTK_TRIANGLE and VTK_QUADRATIC_TRIANGLE (the midpoints of the sides 01, 12, 20 follow the vertices).
 const TRIANGLE: u8 = 5;
 const QUADRATIC_TRIANGLE: u8 = 22;
-/// Digits of the number of a frame, unless there are many.
+/// The usual number of digits in the number of a frame.
 const DIGITS: usize = 4;
-/// Frames may be so many where steps are chosen and the scene says how many of them are written.
+/// The assumed number of frames for adaptive steps with `output.every`.
 const MANY: usize = 999_999;
 
-/// Writes frames `fields_NNNN.vtu` and their list over time, `fields.pvd`. Of several ranks each
-/// writes its piece of a frame, `fields_NNNN_R.vtu`, and the first one the lists:
-/// `fields_NNNN.pvtu` names the pieces, `fields.pvd` the frames.
+/// Writes frames `fields_NNNN.vtu` and their list over time, `fields.pvd`. Each of several ranks writes its
+/// piece of a frame, `fields_NNNN_R.vtu`. The first rank writes the lists: `fields_NNNN.pvtu` names the
+/// pieces, `fields.pvd` the frames.
 ///
-/// A piece has the triangles that its rank owns and all nodes that it knows; a rank without triangles writes none.
+/// A piece has the triangles of its rank and all their nodes. A rank without triangles writes no piece.
 pub struct FieldWriter {
     folder: PathBuf,
-    /// `<Points>` and `<Cells>`, the same in every frame, in the element `<Piece>`.
+    /// The beginning of `<Piece>` with `<Points>` and `<Cells>`, the same in every frame.
     mesh: Arc<str>,
-    /// The ranks that write a piece.
+    /// The ranks that write pieces.
     pieces: Vec<usize>,
-    /// `fields.pvd`, on the first rank.
+    /// `fields.pvd`; only the first rank writes it.
     list: GrowingFile,
-    /// The thread that writes the last frame of a run on one rank, and the entry of the frame in the list.
+    /// On a single rank: the thread that writes the last frame, and the entry of this frame in the list.
     pending: Option<(JoinHandle<Result<(), OutputError>>, String)>,
-    /// Γ_C, on the first rank.
+    /// The files of Γ_C; only the first rank writes them.
     contact: ContactWriter,
     frames: usize,
     last_time: Option<f64>,
     digits: usize,
 }
 
-/// What a checkpoint keeps of the frames written.
+/// The state of the files of frames in a checkpoint.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct FieldsWritten {
     frames: usize,
     last_time: Option<f64>,
-    /// Bytes of `fields.pvd`, `contact.pvd` and `contact.csv`.
+    /// The lengths of `fields.pvd`, `contact.pvd` and `contact.csv`, bytes.
     lengths: [Option<u64>; 3],
 }
 
@@ -82,13 +82,13 @@ impl FieldWriter {
         })
     }
 
-    /// How far the files are written, once they are [complete](Self::complete).
+    /// The state of the files for a checkpoint. Call [`Self::complete`] first.
     pub fn written(&self) -> FieldsWritten {
         let lengths = [self.list.length, self.contact.list.length, self.contact.table.0.length];
         FieldsWritten { frames: self.frames, last_time: self.last_time, lengths }
     }
 
-    /// Goes on after the frames of a checkpoint.
+    /// Continues after the frames of a checkpoint.
     pub fn resume(&mut self, written: &FieldsWritten) {
         (self.frames, self.last_time) = (written.frames, written.last_time);
         let files = [&mut self.list, &mut self.contact.list, &mut self.contact.table.0];
@@ -100,17 +100,17 @@ impl FieldWriter {
         self.last_time
     }
 
-    /// Writes a frame and the lists that name it. On one rank a thread writes it while the run goes on: in a
-    /// run of 100 steps on 66,000 nodes with 20 frames that saves a tenth of the time. Collective.
+    /// Writes a frame and adds it to the lists. On a single rank a thread writes the frame while the run goes
+    /// on, which saves about a tenth of the time of a run of 100 steps. Collective.
     ///
     /// # Errors
-    /// A file cannot be written, of this frame or the one before.
+    /// A file of this frame or of the previous one cannot be written.
     pub fn add(&mut self, problem: &DiscreteProblem, state: &State) -> Result<(), OutputError> {
         self.complete()?;
         let stem = format!("fields_{:0width$}", self.frames, width = self.digits);
         let contact_file = format!("contact_{:0width$}.vtu", self.frames, width = self.digits);
         (self.frames, self.last_time) = (self.frames + 1, Some(state.time));
-        // All ranks collect Γ_C, also where one could not collect its fields.
+        // This is collective: all ranks collect Γ_C, even if one has failed to collect its fields.
         let contact = problem.supports.contact_rows(&problem.body, state);
         let (cells, comm) = (cell_data(problem, state), problem.body.nodes.partition.comm());
         let points = point_data(problem, state);
@@ -138,10 +138,10 @@ impl FieldWriter {
         self.list.add(entry(state.time, &whole).as_bytes())
     }
 
-    /// Waits for the last frame.
+    /// Waits until the last frame is written.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The frame cannot be written.
     pub fn complete(&mut self) -> Result<(), OutputError> {
         let Some((thread, entry)) = self.pending.take() else { return Ok(()) };
         thread.join().unwrap_or_else(|panic| resume_unwind(panic))?;
@@ -159,7 +159,7 @@ fn piece(mesh: &str, points: &[DataArray], cells: &[DataArray]) -> String {
     vtk_file("UnstructuredGrid", "", &piece)
 }
 
-/// Digits that the numbers of all frames have, so that their names sort.
+/// The number of digits in the numbers of all frames, so that their names sort.
 fn digits(scene: &Scene) -> usize {
     let stepping = scene.time.map(|grid| grid.stepping);
     let frames = match (scene.output.every, stepping) {
@@ -170,7 +170,7 @@ fn digits(scene: &Scene) -> usize {
     DIGITS.max(frames.ilog10() as usize + 1)
 }
 
-/// The mesh of this rank.
+/// The mesh of this rank as text.
 fn mesh_text(body: &Body) -> String {
     let own = body.own_triangles;
     match body.elements() {
@@ -181,8 +181,8 @@ fn mesh_text(body: &Body) -> String {
     }
 }
 
-/// The nodal fields. Contact pressure is 0 and the remaining gap NaN off Γ_C; where two gap conditions
-/// meet at a corner, the larger pressure and the smaller gap are shown. Collective.
+/// The nodal fields. Outside Γ_C the contact pressure is 0 and the remaining gap NaN. At a corner with two gap
+/// conditions they are the larger pressure and the smaller gap. Collective.
 fn point_data(problem: &DiscreteProblem, state: &State) -> Result<Vec<DataArray>, PetscError> {
     let partition = &problem.body.nodes.partition;
     let mut pressure = vec![0.0_f64; partition.local()];
@@ -201,15 +201,15 @@ fn point_data(problem: &DiscreteProblem, state: &State) -> Result<Vec<DataArray>
         DataArray::new("gap", REAL, 1, gap.into_iter()),
     ];
     if !partition.comm().is_serial() {
-        // The node's number in the whole body, by which the pieces can be joined.
+        // The number of the node in the whole body, with which readers can join the pieces.
         let numbers = (0..partition.local()).map(|node| partition.global(node, 1, 0));
         arrays.push(DataArray::new("global_node", INTEGER, 1, numbers));
     }
     Ok(arrays)
 }
 
-/// The fields that are constant on each triangle; the stress has the components xx, yy, xy. Of several
-/// materials each triangle has the number: 0, and for the surfaces of the scene 1, 2, … by name.
+/// The fields that are constant on each triangle. The stress has the components xx, yy, xy. If there are
+/// several materials, each triangle has a number: 0, or 1, 2, … for the surfaces of the scene by name.
 fn cell_data(problem: &DiscreteProblem, state: &State) -> Vec<DataArray> {
     let (elasticity, body) = (&problem.elasticity, &problem.body);
     let zeta = problem.zeta_at_points(&state.zeta);
@@ -229,7 +229,7 @@ fn cell_data(problem: &DiscreteProblem, state: &State) -> Vec<DataArray> {
     arrays
 }
 
-/// The list of the files of a frame's pieces, with the arrays `points` and `cells` in each.
+/// The list of the pieces of a frame, each with the arrays `points` and `cells`.
 fn list_of_pieces(
     files: impl Iterator<Item = String>,
     points: &[DataArray],

@@ -1,4 +1,4 @@
-//! Which kernels OpenBLAS uses (<https://github.com/OpenMathLib/OpenBLAS/blob/develop/USAGE.md>).
+//! The choice of OpenBLAS kernels (<https://github.com/OpenMathLib/OpenBLAS/blob/develop/USAGE.md>).
 
 use super::raw;
 use std::{
@@ -8,19 +8,19 @@ use std::{
     ptr,
 };
 
-/// What names the kernels that OpenBLAS is to use; a user's choice stays.
+/// The environment variable that names the kernels for OpenBLAS. The program respects the user's value.
 const CORE_TYPE: &str = "OPENBLAS_CORETYPE";
 
-/// Lets OpenBLAS choose by what the processor can do, where it has taken its oldest kernels because it does
-/// not know the model: on such a one Debian's multiplied matrices at a fifth of the speed, and a
-/// factorisation with 132,000 unknowns took 1.4 times as long. Another BLAS is left as it is.
+/// Chooses the kernels of OpenBLAS by the instructions of the processor. If OpenBLAS does not know the model
+/// of the processor, it takes its oldest kernels: factorisations are about 1.4 times slower then. Another
+/// BLAS library stays as it is.
 ///
 /// # Safety
-/// Nothing uses BLAS meanwhile, or reads the environment but through std.
+/// No other thread uses BLAS, or reads the environment except through std.
 pub(super) unsafe fn choose_kernels() {
     let Some(best) = best_kernels().filter(|_| env::var_os(CORE_TYPE).is_none()) else { return };
-    // SAFETY: the functions are those of OpenBLAS, if it has them, with their types there: what it calls
-    // itself when it is loaded and unloaded. Its name is a static string.
+    // SAFETY: the functions are OpenBLAS's own, with their types there; OpenBLAS calls them itself when it is
+    // loaded and unloaded. The name of its kernels is a static string.
     unsafe {
         let of = |name: &CStr| raw::dlsym(ptr::null_mut(), name.as_ptr());
         let (name, end) = (of(c"openblas_get_corename"), of(c"gotoblas_dynamic_quit"));
@@ -39,7 +39,7 @@ pub(super) unsafe fn choose_kernels() {
     }
 }
 
-/// OpenBLAS' name of the kernels for what this processor can do, if that is more than its oldest need.
+/// OpenBLAS's name of the kernels for this processor; `None` for the oldest ones.
 fn best_kernels() -> Option<&'static str> {
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {

@@ -1,4 +1,4 @@
-//! The ranks that share a run, and what they must know of each other (MPI).
+//! The ranks of a run and the communication between them (MPI).
 
 use super::{raw, session::world};
 use std::{
@@ -8,10 +8,10 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Variables by which the launchers that Open MPI knows tell a process that it is one of several.
+/// Environment variables that the launchers known to Open MPI set in every process they start.
 const LAUNCHERS: [&str; 4] = ["OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"];
 
-/// This rank among all: sums and decisions over the whole body go through it.
+/// This rank and the number of ranks: sums and decisions over the whole body go through it.
 ///
 /// Every reduction is collective: all ranks call it, at the same point of the run, and
 /// all get the same answer to the last bit. A single rank gets its own value back.
@@ -22,7 +22,7 @@ pub struct Communicator {
 }
 
 impl Communicator {
-    /// The only rank, which owns everything.
+    /// A single rank, which owns the whole body.
     pub fn serial() -> Self {
         Self { rank: 0, size: 1 }
     }
@@ -30,7 +30,7 @@ impl Communicator {
     /// The ranks of the world communicator; MPI runs.
     pub(super) fn of_world() -> Self {
         let (mut rank, mut size): (c_int, c_int) = (0, 1);
-        // SAFETY: MPI runs while a session exists, which alone calls this.
+        // SAFETY: only a session calls this, and MPI runs while a session exists.
         unsafe {
             raw::MPI_Comm_rank(world(), &mut rank);
             raw::MPI_Comm_size(world(), &mut size);
@@ -38,7 +38,7 @@ impl Communicator {
         Self { rank: rank as usize, size: size as usize }
     }
 
-    /// The number of ranks that a launcher has started, this one among them, from the environment: known
+    /// The number of ranks that a launcher has started, including this one. It is read from the environment,
     /// before MPI runs. `None` for a process that no launcher started (a singleton).
     pub fn launched() -> Option<usize> {
         LAUNCHERS.iter().find(|name| env::var_os(name).is_some())?;
@@ -84,7 +84,7 @@ impl Communicator {
         self.total(value as f64) as usize
     }
 
-    /// The largest of the ranks' values; NaN counts as −∞.
+    /// The maximum of the ranks' values; NaN counts as −∞.
     pub fn max(self, value: f64) -> f64 {
         if self.is_serial() {
             return value;
@@ -94,16 +94,16 @@ impl Communicator {
         max[0]
     }
 
-    /// The least of the ranks' values; NaN counts as ∞.
+    /// The minimum of the ranks' values; NaN counts as ∞.
     pub fn min(self, value: f64) -> f64 {
         -self.max(-value)
     }
 
-    /// The least of the ranks' values and the first rank that has it (as MPI_MINLOC).
+    /// The minimum of the ranks' values and the first rank that has it (as MPI_MINLOC).
     pub fn min_with_rank(self, value: f64) -> (f64, usize) {
-        let least = self.min(value);
-        let first = self.min(if value == least { self.rank as f64 } else { f64::INFINITY });
-        (least, first as usize)
+        let minimum = self.min(value);
+        let first = self.min(if value == minimum { self.rank as f64 } else { f64::INFINITY });
+        (minimum, first as usize)
     }
 
     /// The value of rank `from` (as MPI_Bcast).
@@ -114,11 +114,11 @@ impl Communicator {
     /// The bytes of rank 0 (MPI_Bcast).
     pub fn broadcast_bytes(self, mut bytes: Vec<u8>) -> Vec<u8> {
         bytes.resize(self.broadcast(0, bytes.len() as f64) as usize, 0);
-        // MPI counts by 32 bits.
+        // MPI's counts have 32 bits.
         for part in bytes.chunks_mut(1 << 30).filter(|_| !self.is_serial()) {
             let (data, count) = (part.as_mut_ptr().cast::<c_void>(), part.len() as c_int);
             let byte = predefined(&raw const raw::ompi_mpi_byte);
-            // SAFETY: MPI runs on several ranks, each of which has so many bytes there.
+            // SAFETY: MPI runs on several ranks, and each of them has `count` bytes at `data`.
             unsafe { raw::MPI_Bcast(data, count, byte, 0, world()) };
         }
         bytes
@@ -146,21 +146,21 @@ impl Communicator {
         all
     }
 
-    /// Waits until all ranks have come here, for at most `patience` if one is given (MPI_Ibarrier).
-    /// False if a rank has not come by then: it waits elsewhere for what this one will not do.
-    pub fn barrier(self, patience: Option<Duration>) -> bool {
+    /// Waits until all ranks have reached this call, at most for the time `limit` (MPI_Ibarrier).
+    /// False if a rank has not reached it by then: it waits in another collective call.
+    pub fn barrier(self, limit: Option<Duration>) -> bool {
         if self.is_serial() {
             return true;
         }
         let started = Instant::now();
         let mut request = ptr::null_mut();
         let mut complete = 0;
-        // SAFETY: MPI runs on several ranks; the request lives until all ranks have come or the run ends.
+        // SAFETY: MPI runs on several ranks; the request lives until it is complete or the run ends.
         unsafe {
             raw::MPI_Ibarrier(world(), &mut request);
             loop {
                 raw::MPI_Test(&mut request, &mut complete, ptr::null_mut());
-                if complete != 0 || patience.is_some_and(|patience| started.elapsed() > patience) {
+                if complete != 0 || limit.is_some_and(|limit| started.elapsed() > limit) {
                     return complete != 0;
                 }
                 std::thread::sleep(Duration::from_millis(1));
@@ -184,8 +184,8 @@ impl Communicator {
         }
         let sent = values.to_vec();
         let (from, to) = (sent.as_ptr().cast::<c_void>(), values.as_mut_ptr().cast::<c_void>());
-        // SAFETY: more ranks than one come from `of_world`; MPI reads its own `count` values and
-        // writes as many. Its error handler ends the run.
+        // SAFETY: only `of_world` makes a communicator of several ranks, so MPI runs. It reads and writes
+        // `values.len()` numbers. Its error handler ends the run.
         unsafe {
             raw::MPI_Allreduce(from, to, values.len() as c_int, double(), operation, world());
         }

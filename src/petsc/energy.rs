@@ -16,7 +16,7 @@ use std::{
     ptr,
 };
 
-/// A symmetric positive definite operator A, and what a solve with it is to do.
+/// A symmetric positive definite operator A, its preconditioner P and a convergence test.
 pub(crate) trait Operator {
     /// `y` ← A `x`, owned entries.
     fn multiply(&mut self, x: &[f64], y: &mut [f64]) -> Result<(), PetscError>;
@@ -24,13 +24,13 @@ pub(crate) trait Operator {
     /// `z` ← P⁻¹ `r`, owned entries.
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<(), PetscError>;
 
-    /// Whether x is good enough, of which the energy xᵀAx is `gained`, and rᵀP⁻¹r, about the energy that is
-    /// missing, is `left`.
+    /// Whether x is accurate enough. `gained` is its energy xᵀAx; `left` is rᵀP⁻¹r, about the energy that is
+    /// missing.
     fn is_enough(&self, gained: f64, left: f64) -> bool;
 }
 
-/// Solves A x = `b` from 0 by conjugate gradients (KSPCG) with the natural norm √(rᵀP⁻¹r), so many iterations
-/// at most; PETSc options begin with `prefix`. `None` if A or P is not positive definite. Collective.
+/// Solves A x = `b` from 0 by conjugate gradients (KSPCG) with the natural norm √(rᵀP⁻¹r) and at most `most`
+/// iterations. PETSc options begin with `estimate_`. `None` if A or P is not positive definite. Collective.
 pub(crate) fn solve_by_energy(
     session: &Session,
     operator: &mut dyn Operator,
@@ -46,8 +46,8 @@ pub(crate) fn solve_by_energy(
     let mut kept = Preconditioned { call: pointer };
     let mut context = Context { preconditioner: &mut kept };
     let mut reason = 0;
-    // SAFETY: fresh handles, then live ones of one layout; what the callbacks point to outlives the solve, in
-    // which alone they run, one at a time.
+    // SAFETY: fresh handles, then live ones of one layout; the callbacks run only during the solve, one at a
+    // time, and their contexts outlive it.
     unsafe {
         let matrix = Handle::new(raw::MatDestroy, |matrix| {
             raw::MatCreateShell(world(), local, local, -1, -1, pointer, matrix)
@@ -80,13 +80,13 @@ pub(crate) fn solve_by_energy(
     Ok(definite.then_some(x))
 }
 
-/// What the callbacks need during a solve.
+/// The context of the callbacks during a solve.
 struct Call<'a> {
     operator: &'a mut dyn Operator,
     b: &'a Vector,
 }
 
-/// The preconditioner of the operator of a call.
+/// P of a call, as the PC type [`kept::NAME`] needs it.
 struct Preconditioned {
     call: *mut c_void,
 }
@@ -137,6 +137,6 @@ unsafe extern "C" fn is_enough(
             false => raw::KSPConvergedReason::KSP_CONVERGED_ITERATING,
         })
     };
-    // SAFETY: PETSc passes where it wants the reason.
+    // SAFETY: PETSc passes a valid pointer for the reason.
     return_code(test().map(|found| unsafe { *reason = found }))
 }

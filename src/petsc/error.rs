@@ -1,4 +1,4 @@
-//! PETSc's error codes with the message PETSc had for them.
+//! PETSc's error codes with PETSc's messages.
 
 use super::raw;
 use std::{
@@ -7,13 +7,13 @@ use std::{
     ffi::{CStr, c_char, c_int, c_void},
 };
 
-/// A call of PETSc or CHOLMOD failed, or was given what does not fit.
+/// A call of PETSc or CHOLMOD failed, or its arguments do not fit.
 #[derive(Debug, Clone, thiserror::Error)]
 #[error("{}{message}", match code { 0 => String::new(), code => format!("PETSc error {code}: ") })]
 pub struct PetscError {
-    /// PETSc's error code (petscerror.h); 0 where PETSc was not asked.
+    /// PETSc's error code (petscerror.h); 0 if our own checks or CHOLMOD found the error.
     pub code: i32,
-    /// What PETSc said where the error arose.
+    /// PETSc's message at the place where the error arose.
     pub message: String,
 }
 
@@ -25,7 +25,7 @@ impl PetscError {
 }
 
 thread_local! {
-    /// The message of the last error; PETSc reports it through the handler, not the code.
+    /// The message of the last error: PETSc passes it to the error handler, and only the code to the caller.
     static MESSAGE: RefCell<String> = const { RefCell::new(String::new()) };
 }
 
@@ -59,8 +59,8 @@ pub(super) fn check(code: raw::PetscErrorCode) -> Result<(), PetscError> {
     }
 }
 
-/// The return code of a function that PETSc calls. PETSc passes it on to the caller of the solver; the
-/// message waits there for [`check`].
+/// The return code of a function that PETSc calls. PETSc passes the code on to the caller of the solver,
+/// where [`check`] adds the message.
 pub(super) fn return_code(result: Result<(), PetscError>) -> raw::PetscErrorCode {
     /// PETSC_ERR_LIB, "error in an external library".
     const LIBRARY: raw::PetscErrorCode = 76;

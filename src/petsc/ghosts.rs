@@ -1,4 +1,4 @@
-//! Values that a rank needs of unknowns which others own
+//! Ghost values: copies of values that other ranks own
 //! (<https://petsc.org/release/manualpages/PetscSF/>).
 
 use super::{
@@ -15,13 +15,13 @@ use std::{ffi::c_void, ptr};
 #[derive(Debug)]
 pub(crate) struct Ghosts {
     handle: Handle<raw::_p_PetscSF>,
-    /// Values of a field: owned ones, then ghosts.
+    /// The number of values of a field: owned ones, then ghosts.
     length: usize,
 }
 
 impl Ghosts {
-    /// For fields of `owned` values followed by ghosts, each given by its owner and its index
-    /// among the owner's values (PetscSFSetGraph). Collective.
+    /// For fields of `owned` values followed by ghosts. Per ghost: its owner, and its index among the
+    /// owner's values (PetscSFSetGraph). Collective.
     pub(crate) fn new(
         _session: &Session,
         owned: usize,
@@ -37,7 +37,7 @@ impl Ghosts {
         let (owned, count) = (owned as i32, ghosts.len() as i32);
         let (leaves, roots) = (leaves.as_mut_ptr(), roots.as_mut_ptr());
         let copy = raw::PetscCopyMode::PETSC_COPY_VALUES;
-        // SAFETY: a fresh handle; both arrays have as many values as there are ghosts and are copied.
+        // SAFETY: a fresh handle; both arrays have `count` values, which PETSc copies.
         unsafe {
             let create = |handle| raw::PetscSFCreate(world(), handle);
             let handle = Handle::new(raw::PetscSFDestroy, create)?;
@@ -54,8 +54,8 @@ impl Ghosts {
         let mut unit = ptr::null_mut();
         let (sf, data) = (self.handle.raw(), field.as_mut_ptr().cast::<c_void>());
         let replace = predefined(&raw const raw::ompi_mpi_op_replace);
-        // SAFETY: the field has `block` numbers for each of the graph's values; owned ones are
-        // read and ghosts written, which are apart. PETSc copies the data type if it keeps it.
+        // SAFETY: the field has `block` numbers per value of the graph. PETSc reads the owned ones and
+        // writes the ghosts, which do not overlap. It copies the data type if it keeps it.
         unsafe {
             raw::MPI_Type_contiguous(block as i32, double(), &mut unit);
             raw::MPI_Type_commit(&mut unit);

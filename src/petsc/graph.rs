@@ -3,9 +3,9 @@
 use super::{Matrix, Pattern, PetscError, Session, check, handle::Handle, raw, session::world};
 use std::{ptr, slice};
 
-/// The rank of each of `nodes` nodes so that all have about as many and few of the pairs of
-/// neighbours that `cells` (their nodes) make are cut (PTScotch, a parallel multilevel method).
-/// Every rank knows the graph and learns the answer. Collective.
+/// Divides `nodes` nodes among the ranks (PTScotch, a parallel multilevel method). All ranks get about the
+/// same number of nodes, and few edges between nodes of one cell are cut. `cells` lists the nodes of each
+/// cell. Every rank passes the whole graph and gets the rank of every node. Collective.
 pub(crate) fn divide(
     session: &Session,
     nodes: usize,
@@ -21,8 +21,8 @@ pub(crate) fn divide(
     let graph = Matrix::with_pattern(session, 1, &pattern, &links)?;
 
     let mut indices = ptr::null();
-    // SAFETY: fresh handles and a live matrix; the gathered set has `nodes` indices, lent until
-    // they are given back.
+    // SAFETY: fresh handles and a live matrix; PETSc lends the `nodes` indices of the gathered set until
+    // they are restored.
     unsafe {
         let create = |handle| raw::MatPartitioningCreate(world(), handle);
         let partitioning = Handle::new(raw::MatPartitioningDestroy, create)?;

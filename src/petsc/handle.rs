@@ -9,19 +9,19 @@ use std::{
 /// The number of PETSc's objects that still have an owner.
 pub(super) static OPEN_HANDLES: AtomicUsize = AtomicUsize::new(0);
 
-/// PETSc's function that gives up one reference to an object and sets the pointer to null.
+/// PETSc's function that releases one reference to an object and sets the pointer to null.
 type Destroy<T> = unsafe extern "C" fn(*mut *mut T) -> raw::PetscErrorCode;
 
-/// A reference to a PETSc object, given up when this is dropped.
+/// A reference to a PETSc object, released on drop.
 #[derive(Debug)]
 pub(super) struct Handle<T> {
     raw: *mut T,
-    /// `None` where the reference is somebody else's.
+    /// `None` if PETSc keeps the reference.
     destroy: Option<Destroy<T>>,
 }
 
 impl<T> Handle<T> {
-    /// The object that `create` makes and `destroy` destroys.
+    /// The object that `create` makes. `destroy` releases it.
     pub(super) fn new(
         destroy: Destroy<T>,
         create: impl FnOnce(*mut *mut T) -> raw::PetscErrorCode,

@@ -1,4 +1,4 @@
-//! The preconditioner of our own among PETSc's, a PC type of its list (PCRegister).
+//! Our kept Cholesky factor as a PC type of PETSc (PCRegister).
 
 use super::{Matrix, PetscError, Vector, check, error::return_code, ksp::NOT_DEFINITE, raw};
 use std::{
@@ -6,39 +6,39 @@ use std::{
     ptr,
 };
 
-/// Its name: `-elastic_pc_type kept`.
+/// The name of the PC type: `-elastic_pc_type kept`.
 pub(crate) const NAME: &CStr = c"kept";
-/// What -ksp_view prints of it.
+/// The description that -ksp_view prints.
 const DESCRIPTION: &CStr = c"Cholesky factor, kept for later matrices";
 
-/// What KSP and TAO call as the PC type [`NAME`], during a call of theirs.
+/// The preconditioner P that KSP and TAO call through the PC type [`NAME`] during a solve.
 pub(crate) trait KeptPreconditioner {
-    /// Makes P of a matrix that is new or has new values; false if it is not positive definite.
+    /// Makes P from a matrix that is new or has new values; false if it is not positive definite.
     fn set_up(&mut self, matrix: &Matrix) -> Result<bool, PetscError>;
 
     /// `z` ← P⁻¹ `r`.
     fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError>;
 }
 
-/// What the functions of the PC type find during a call.
+/// The application context of the PC during a call.
 pub(super) struct Context<'a> {
     pub(super) preconditioner: &'a mut dyn KeptPreconditioner,
 }
 
 impl Context<'_> {
-    /// Makes this the context of a PC; one of another type ignores it.
+    /// Makes this the context of a PC. A PC of another type ignores it.
     ///
     /// # Safety
-    /// The PC is alive, and is used no longer than this lives.
+    /// The PC is alive, and it is not used after this context is dropped.
     pub(super) unsafe fn set(&mut self, pc: raw::PC) -> Result<(), PetscError> {
         // SAFETY: the caller's promise.
         check(unsafe { raw::PCSetApplicationContext(pc, ptr::from_mut(self).cast::<c_void>()) })
     }
 
-    /// That of a PC in a call of its functions.
+    /// The context of a PC in a call of its functions.
     ///
     /// # Safety
-    /// The PC got a context that is alive, to which there is no other reference.
+    /// The context of the PC is alive, and there is no other reference to it.
     unsafe fn of<'a>(pc: raw::PC) -> Result<&'a mut Self, PetscError> {
         let mut context: *mut c_void = ptr::null_mut();
         // SAFETY: the caller's promise.
@@ -55,7 +55,7 @@ pub(super) fn register() -> Result<(), PetscError> {
     check(unsafe { raw::PCRegister(NAME.as_ptr(), Some(create)) })
 }
 
-/// Makes a PC one of this type: PCSHELL with these functions.
+/// Gives a PC this type: PCSHELL with these functions.
 unsafe extern "C" fn create(pc: raw::PC) -> raw::PetscErrorCode {
     let create = || {
         // SAFETY: PETSc passes a live PC.

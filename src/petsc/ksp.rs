@@ -18,43 +18,43 @@ use std::{
 /// PETSC_ERR_MAT_CH_ZRPVT: a pivot of a Cholesky factorisation is not positive.
 pub(super) const NOT_DEFINITE: i32 = 81;
 
-/// A KSP, conjugate gradients unless PETSc options with its prefix choose another type, with the
-/// preconditioner of type [`kept::NAME`] unless they choose one of PETSc's.
+/// A KSP: conjugate gradients with the preconditioner [`kept::NAME`], unless PETSc options with its prefix
+/// choose other types.
 ///
-/// The norm of the residual is that of the free unknowns. It is taken in the convergence test, so that
-/// `-ksp_norm_type` only changes what monitors print.
+/// The convergence test computes the norm of the residual on the free unknowns. So `-ksp_norm_type` changes
+/// only the numbers that monitors print.
 pub(crate) struct Ksp {
     handle: Handle<raw::_p_KSP>,
-    /// The residual of the last test, and a vector that PETSc may need to build it.
+    /// The residual of the last test, and work space for it.
     residual: Vector,
     work: Vector,
-    /// Iterations that PETSc and its options allow (`-ksp_max_it`).
+    /// PETSc's limit of iterations (`-ksp_max_it`).
     most: c_int,
 }
 
 /// A linear system as a KSP solves it from the start 0: A x = b on the unknowns that are not prescribed.
 pub(crate) struct KspProblem<'a> {
-    /// A, of which PETSc's own preconditioners are made.
+    /// A; PETSc's own preconditioners are made from it.
     pub(crate) matrix: &'a Matrix,
-    /// Owned unknowns that stay 0, because the preconditioner's answer is 0 there or because A has no
-    /// other entry in their rows and columns than the diagonal, and b is 0; `None` where no rank has any.
+    /// Owned unknowns that stay 0: b is 0 there, and either P⁻¹r is 0 there or their rows and columns of A
+    /// have only the diagonal entry. `None` if no rank prescribes unknowns.
     pub(crate) prescribed: Option<&'a [usize]>,
-    /// The largest ‖b − A x‖₂ of the free unknowns.
+    /// The largest accepted ‖b − A x‖₂ of the free unknowns.
     pub(crate) limit: f64,
-    /// Iterations allowed; `None` as many as PETSc and its options allow.
+    /// The limit of iterations; `None` for PETSc's limit.
     pub(crate) most: Option<usize>,
 }
 
-/// What a solve took.
+/// The outcome of a solve.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct KspReport {
-    /// Iterations.
+    /// The number of iterations.
     pub(crate) iterations: usize,
     /// ‖b − A x‖₂ of the free unknowns.
     pub(crate) norm: f64,
 }
 
-/// What the convergence test needs during a solve.
+/// The context of the convergence test during a solve.
 struct Test<'a> {
     problem: &'a KspProblem<'a>,
     residual: &'a mut Vector,
@@ -84,7 +84,7 @@ impl Ksp {
         Ok(this)
     }
 
-    /// Sets the type of the preconditioner, and the package of factors, before options have their say.
+    /// Sets the type of the preconditioner and the package of its factor. Options may change both.
     pub(crate) fn set_preconditioner(&self, kind: &CStr, package: &CStr) -> Result<(), PetscError> {
         let pc = self.pc()?;
         // SAFETY: a live handle, strings that live during the calls.
@@ -94,8 +94,8 @@ impl Ksp {
         }
     }
 
-    /// Makes CG test ‖r‖₂ (KSPSetNormType). With PETSc's default norm it would apply the preconditioner once
-    /// more per solve; other types need not know ‖r‖₂.
+    /// Makes CG test ‖r‖₂ (KSPSetNormType). With PETSc's default norm CG would apply the preconditioner once
+    /// more per solve. Other types keep their own norms.
     pub(crate) fn set_residual_norm(&self) -> Result<(), PetscError> {
         let norm = raw::KSPNormType::KSP_NORM_UNPRECONDITIONED;
         // SAFETY: a live handle.
@@ -105,7 +105,7 @@ impl Ksp {
     /// Reads the options (KSPSetFromOptions).
     pub(crate) fn set_from_options(&mut self) -> Result<(), PetscError> {
         let (ksp, unused) = (self.handle.raw(), ptr::null_mut());
-        // SAFETY: a live handle; PETSc takes null for what is not asked.
+        // SAFETY: a live handle; null means that a value is not wanted.
         unsafe {
             check(raw::KSPSetFromOptions(ksp))?;
             check(raw::KSPGetTolerances(ksp, unused, unused, unused, &mut self.most))
@@ -128,8 +128,8 @@ impl Ksp {
         Ok(pc)
     }
 
-    /// Makes the preconditioner of `matrix` (PCSetUp), which keeps a reference to the matrix but not
-    /// to its values; false if it found that the matrix is not positive definite.
+    /// Makes the preconditioner from `matrix` (PCSetUp); false if the matrix is not positive definite.
+    /// PETSc keeps a reference to the matrix, but later values of it do not change the preconditioner.
     pub(crate) fn set_up(
         &self,
         matrix: &Matrix,
@@ -154,7 +154,7 @@ impl Ksp {
 
     /// Whether the factorisation found only positive pivots, as far as the package reports them.
     fn is_definite(&self) -> Result<bool, PetscError> {
-        /// Where MUMPS counts negative pivots, INFOG(12): it makes LDLᵀ and accepts them.
+        /// INFOG(12), the number of negative pivots. MUMPS factorises into LDLᵀ and accepts them.
         const NEGATIVE_PIVOTS: c_int = 12;
         let pc = self.pc()?;
         let mut reason = raw::PCFailedReason::PC_NOERROR;
@@ -165,7 +165,7 @@ impl Ksp {
             if reason != raw::PCFailedReason::PC_NOERROR {
                 return Ok(false);
             }
-            // Other preconditioners than factors leave the name null.
+            // Preconditioners without a factor leave the name null.
             check(raw::PCFactorGetMatSolverType(pc, &mut package))?;
             if !package.is_null() && CStr::from_ptr(package) == c"mumps" {
                 check(raw::PCFactorGetMatrix(pc, &mut factor))?;
@@ -191,8 +191,8 @@ impl Ksp {
         }
     }
 
-    /// Solves for `x` (KSPSolve) with the preconditioner that there is, until the residual of the free
-    /// unknowns is small enough or the type of KSP gives up. [`Self::residual`] is then b − A x.
+    /// Solves for `x` with the present preconditioner (KSPSolve), until the residual of the free unknowns is
+    /// below the limit or PETSc gives up. Afterwards [`Self::residual`] is b − A x.
     pub(crate) fn solve(
         &mut self,
         problem: &KspProblem,
@@ -208,8 +208,8 @@ impl Ksp {
         let a = problem.matrix.raw();
         let most = problem.most.and_then(|most| most.try_into().ok()).unwrap_or(self.most);
         let mut iterations = 0;
-        // SAFETY: live handles of matching layout; what the callbacks point to outlives the solve, in which
-        // alone they run.
+        // SAFETY: live handles of matching layout; the callbacks run only during the solve, and their
+        // contexts outlive it.
         unsafe {
             check(raw::KSPSetOperators(ksp, a, a))?;
             context.set(pc)?;
@@ -221,7 +221,7 @@ impl Ksp {
         let tested = test.norm;
         let norm = match tested {
             Some(norm) => norm,
-            // Types such as preonly test nothing.
+            // Types such as preonly have no convergence test.
             None => {
                 problem.matrix.multiply(x, &mut self.residual)?;
                 self.residual.axpby(1.0, b, -1.0)?;
@@ -231,7 +231,7 @@ impl Ksp {
         Ok(KspReport { iterations: iterations as usize, norm })
     }
 
-    /// b − A x of the last solve on all unknowns.
+    /// b − A x of the last solve, on all unknowns.
     pub(crate) fn residual(&self) -> &Vector {
         &self.residual
     }
@@ -273,6 +273,6 @@ unsafe extern "C" fn is_converged(
             raw::KSPConvergedReason::KSP_CONVERGED_ITERATING
         })
     };
-    // SAFETY: PETSc passes where it wants the reason.
+    // SAFETY: PETSc passes a valid pointer for the reason.
     return_code(test().map(|found| unsafe { *reason = found }))
 }

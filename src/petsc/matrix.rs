@@ -1,4 +1,4 @@
-//! Symmetric sparse matrices whose pattern is given once and whose values are refilled
+//! Symmetric sparse matrices with a fixed pattern, whose values can be refilled
 //! (<https://petsc.org/release/manualpages/Mat/>).
 
 mod entries;
@@ -15,7 +15,7 @@ use super::{
 };
 use std::{ops::Range, ptr, slice};
 
-/// A square sparse matrix, rows distributed by ownership.
+/// A square sparse matrix. Each rank owns a contiguous range of rows.
 pub struct Matrix {
     handle: Handle<raw::_p_Mat>,
     /// The global indices of the owned rows.
@@ -23,8 +23,8 @@ pub struct Matrix {
 }
 
 impl Matrix {
-    /// A symmetric matrix whose rows on this rank, in blocks of so many, have entries as in `pattern`, with
-    /// these values (MatSeqAIJSetPreallocationCSR, MatMPIAIJSetPreallocationCSR).
+    /// A symmetric matrix from the `pattern` and the `values` of this rank's rows; `block` is PETSc's block
+    /// size (MatSeqAIJSetPreallocationCSR, MatMPIAIJSetPreallocationCSR).
     ///
     /// # Errors
     /// There are more or fewer values than entries, a column is outside the matrix, or PETSc fails.
@@ -37,8 +37,8 @@ impl Matrix {
         same_size(index(pattern.entries())? as usize, values.len())?;
         let (local, block) = (index(pattern.starts.len() - 1)?, block as i32);
         let (starts, columns) = (pattern.starts.as_ptr(), pattern.columns.as_ptr());
-        // SAFETY: a fresh handle; the arrays have as many values as the pattern tells, of which PETSc checks
-        // the columns. What is for a matrix of one rank does nothing to one of several, and vice versa.
+        // SAFETY: a fresh handle; the lengths of the arrays fit the pattern, and PETSc checks the columns.
+        // MatSeqAIJ… does nothing to a matrix of several ranks, MatMPIAIJ… nothing to a matrix of one.
         unsafe {
             let handle = Handle::new(raw::MatDestroy, |handle| raw::MatCreate(world(), handle))?;
             let (matrix, values) = (handle.raw(), values.as_ptr());
@@ -50,14 +50,14 @@ impl Matrix {
             for option in [raw::MatOption::MAT_SYMMETRIC, raw::MatOption::MAT_SYMMETRY_ETERNAL] {
                 check(raw::MatSetOption(matrix, option, raw::PetscBool::PETSC_TRUE))?;
             }
-            // Products by pairs of rows with equal columns took 1.5 times as long as by rows.
+            // Inodes (products by groups of rows with equal columns) are slower than products by rows here.
             let inodes = raw::MatOption::MAT_USE_INODES;
             check(raw::MatSetOption(matrix, inodes, raw::PetscBool::PETSC_FALSE))?;
             Self::new(handle)
         }
     }
 
-    /// The rows that this rank owns are told by PETSc (MatGetOwnershipRange).
+    /// Asks PETSc for the owned rows (MatGetOwnershipRange).
     fn new(handle: Handle<raw::_p_Mat>) -> Result<Self, PetscError> {
         let mut rows = 0..0;
         // SAFETY: a live handle.
@@ -65,10 +65,10 @@ impl Matrix {
         Ok(Self { handle, rows })
     }
 
-    /// A matrix that PETSc passes to a callback; its values cannot be set.
+    /// A matrix that PETSc passes to a callback. It is read-only.
     ///
     /// # Safety
-    /// `raw` is a live matrix for as long as it is used.
+    /// `raw` is alive as long as this matrix.
     pub(super) unsafe fn borrowed(raw: raw::Mat) -> Result<Self, PetscError> {
         Self::new(Handle::borrowed(raw))
     }
@@ -89,7 +89,7 @@ impl Matrix {
     /// A copy with its near-null space (MatDuplicate).
     ///
     /// # Errors
-    /// There is no memory for it.
+    /// The memory does not suffice.
     pub fn duplicate(&self) -> Result<Self, PetscError> {
         let values = raw::MatDuplicateOption::MAT_COPY_VALUES;
         let handle = Handle::new(raw::MatDestroy, |copy| {
@@ -138,7 +138,7 @@ impl Matrix {
     /// The owned entries of its diagonal (MatGetDiagonal).
     pub(crate) fn diagonal(&self) -> Result<Vec<f64>, PetscError> {
         let handle = Handle::new(raw::VecDestroy, |diagonal| {
-            // SAFETY: a live handle, a fresh one; the other vector is not asked for.
+            // SAFETY: a live handle and a fresh one; null means that the other vector is not wanted.
             unsafe { raw::MatCreateVecs(self.raw(), ptr::null_mut(), diagonal) }
         })?;
         // SAFETY: live handles of one size.
@@ -167,14 +167,14 @@ impl Matrix {
         let row = |&unknown| self.rows.start + unknown as i32;
         let rows: Vec<i32> = unknowns.iter().map(row).collect();
         let (count, unused) = (rows.len() as i32, ptr::null_mut());
-        // SAFETY: a live handle and `count` global indices; no right-hand side is to be adapted.
+        // SAFETY: a live handle and `count` global indices; null means that no right-hand side is adapted.
         check(unsafe {
             raw::MatZeroRowsColumns(self.raw(), count, rows.as_ptr(), diagonal, unused, unused)
         })
     }
 
-    /// Tells multigrid the fields that the matrix without boundary conditions maps to zero
-    /// (MatSetNearNullSpace). PETSc wants them orthonormal; dependent ones are left out.
+    /// Gives multigrid the fields that the matrix without boundary conditions maps to zero
+    /// (MatSetNearNullSpace). Makes them orthonormal for PETSc and drops dependent ones.
     pub(crate) fn set_near_null_space(&mut self, fields: Vec<Vector>) -> Result<(), PetscError> {
         let mut basis: Vec<Vector> = Vec::new();
         for mut field in fields {
@@ -206,12 +206,12 @@ impl Matrix {
     /// The number of rows of all ranks together (MatGetSize).
     pub(crate) fn size(&self) -> Result<usize, PetscError> {
         let mut rows = 0;
-        // SAFETY: a live handle; the number of columns is not asked for.
+        // SAFETY: a live handle; null means that the number of columns is not wanted.
         check(unsafe { raw::MatGetSize(self.raw(), &mut rows, ptr::null_mut()) })?;
         Ok(rows as usize)
     }
 
-    /// Lends the columns, increasing, and the values of an owned row (MatGetRow).
+    /// Calls `reader` with the columns (increasing) and the values of an owned row (MatGetRow).
     pub(crate) fn read_row<R>(
         &self,
         row: i32,
@@ -233,8 +233,8 @@ impl Matrix {
         }
     }
 
-    /// Bytes that this rank reads and writes in a product: value and column of each entry, 12 bytes;
-    /// the beginning of each row, x and y, 20 bytes.
+    /// Bytes that this rank reads and writes in a product. Per entry: value and column, 12 bytes. Per row: its
+    /// start, x and y, 20 bytes.
     pub fn bytes_per_product(&self) -> f64 {
         12.0 * self.entries() as f64 + 20.0 * self.owned() as f64
     }

@@ -1,9 +1,9 @@
 //! PETSc and MPI, safely.
 //!
 //! `raw` holds the C names one to one (bindgen, an explicit list in `build.rs`). The other files
-//! are small owners above them: every call's error code becomes a [`PetscError`] with PETSc's own
-//! message, every object is destroyed when its owner is dropped, and sizes of arrays are checked here;
-//! those of its own objects PETSc checks. A C name in parentheses has its page under
+//! are small owners above them. The error code of every call becomes a [`PetscError`] with PETSc's own
+//! message. Every object is destroyed when its owner is dropped. This room checks the lengths of arrays;
+//! PETSc checks the sizes of its own objects. A C name in parentheses has its page under
 //! <https://petsc.org/release/manualpages/>.
 //!
 //! All objects live on `PETSC_COMM_WORLD`; sizes and slices are those owned by this rank.

@@ -1,4 +1,4 @@
-//! PETSc's options database, of which a null pointer means the global one. A session exists.
+//! PETSc's options database. A null pointer means the global one. All functions need a session.
 
 use super::{PetscError, Session, check, raw};
 use std::{
@@ -30,16 +30,16 @@ pub(crate) fn set_default_option(name: &str, value: &str) -> Result<(), PetscErr
     let (c_name, value) = (c_string(name)?, c_string(value)?);
     // SAFETY: the strings live during the call.
     check(unsafe { raw::PetscOptionsSetValue(ptr::null_mut(), c_name.as_ptr(), value.as_ptr()) })?;
-    // Now it counts as read: it is not the user's fault if nothing else reads our default.
+    // Now the option counts as read, so that our default never appears among the user's unused options.
     has_option(name).map(drop)
 }
 
 impl Session {
-    /// Options of the database that nothing has read: most likely misspelt (PetscOptionsLeftGet).
+    /// Options that PETSc has not read, most likely misspelt (PetscOptionsLeftGet).
     pub fn unused_options(&self) -> Vec<String> {
         let (mut count, mut names, mut values) = (0, ptr::null_mut(), ptr::null_mut());
         let (mut unused, all) = (Vec::new(), ptr::null_mut());
-        // SAFETY: PETSc fills `count` names that stay valid until they are given back.
+        // SAFETY: PETSc fills `count` names that stay valid until they are restored.
         unsafe {
             if raw::PetscOptionsLeftGet(all, &mut count, &mut names, &mut values) == 0 {
                 for i in 0..count as usize {
@@ -52,7 +52,7 @@ impl Session {
     }
 }
 
-/// A C string of what the user has typed: a NUL in it is an error.
+/// `text` as a C string; an error if it contains a NUL character.
 pub(super) fn c_string(text: &str) -> Result<CString, PetscError> {
     CString::new(text).map_err(|_| PetscError::ours(format!("`{text}` contains a NUL character")))
 }

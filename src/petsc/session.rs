@@ -11,7 +11,7 @@ use std::{
     sync::{Mutex, MutexGuard, PoisonError, atomic::Ordering},
 };
 
-/// PETSc is not thread-safe: whoever holds this lock may call it.
+/// PETSc is not thread-safe: only the thread that has this lock may call it.
 static TURN: Mutex<()> = Mutex::new(());
 
 /// The right to use PETSc; every object of this module is made from it.
@@ -23,15 +23,15 @@ pub struct Session {
 }
 
 impl Session {
-    /// Starts PETSc with `options` (as on a PETSc command line), or waits for one's turn if
-    /// it runs already; then `options` are added to its options database.
+    /// Starts PETSc with `options` (as on a PETSc command line). If PETSc runs already, waits until no other
+    /// session uses it, and adds `options` to its options database.
     ///
     /// # Errors
     /// PETSc or MPI could not be initialised, or rejected an option.
     pub fn start(options: &[String]) -> Result<Self, PetscError> {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-        // CHOLMOD asks OpenMP for 4 threads in loops so short that a third of a factorisation's time
-        // went into waking them, whatever OMP_NUM_THREADS says. A setting of each thread.
+        // CHOLMOD asks OpenMP for 4 threads in very short loops, whatever OMP_NUM_THREADS says. Waking them
+        // would take a third of a factorisation's time. The setting is one of each thread.
         // SAFETY: only sets a parameter.
         unsafe { raw::omp_set_max_active_levels(0) };
         let mut running = raw::PetscBool::PETSC_FALSE;
@@ -56,20 +56,19 @@ impl Session {
     /// Objects made from this session still have an owner, or PETSc fails to finalize.
     pub fn finalize(self) -> Result<(), PetscError> {
         match OPEN_HANDLES.load(Ordering::Relaxed) {
-            // SAFETY: nothing of PETSc is in use any more.
+            // SAFETY: no object of PETSc is in use any more.
             0 => check(unsafe { raw::PetscFinalize() }),
             n => Err(PetscError::ours(format!("{n} PETSc objects outlive their session"))),
         }
     }
 }
 
-/// Lets malloc give large blocks back when they are freed (mallopt(3)). A library below Debian's
-/// PETSc (SuperLU_DIST) switches that off when it is loaded, so that the memory freed by one part of
-/// a run is lost in fragments for the next.
+/// Makes malloc return large blocks to the system when they are freed (mallopt(3)). A library below Debian's
+/// PETSc (SuperLU_DIST) switches this off when it is loaded: then freed memory stays in fragments.
 fn give_memory_back() {
     /// The number of blocks malloc allows by default.
     const BLOCKS: c_int = 65536;
-    /// The largest threshold malloc knows, bytes: smaller arrays come and go with every step.
+    /// The largest threshold that malloc accepts, bytes. Every step allocates and frees smaller arrays.
     const LARGE: c_int = 32 << 20;
     // SAFETY: mallopt only sets parameters of malloc, and before PETSc has threads.
     unsafe {
@@ -80,16 +79,16 @@ fn give_memory_back() {
 }
 
 /// Settings of Open MPI for a process that no launcher started (a singleton). With them it starts no
-/// daemon and opens no network, which is two thirds of the time PETSc takes to start, and makes no
-/// directory of temporary files: all singletons of a user would share one, and one that ends removes
-/// what another has just made.
+/// daemon and opens no network, which takes two thirds of PETSc's start. It makes no directory of
+/// temporary files either: all singletons of a user would share it, and one that ends would remove
+/// the files of another.
 const SINGLETON: [(&str, &str); 3] = [
     ("OMPI_MCA_ess_singleton_isolated", "1"),
     ("OMPI_MCA_pml", "ob1"),
     ("OMPI_MCA_orte_create_session_dirs", "0"),
 ];
 
-/// Sets those variables of the environment that the user has not set, and tells which.
+/// Sets the environment variables that the user has not set, and returns their names.
 fn set_missing(variables: &[(&'static str, &str)]) -> Vec<&'static str> {
     let missing = variables.iter().filter(|(name, _)| env::var_os(name).is_none());
     // SAFETY: PETSc has no threads yet; those of tests read the environment through std.
@@ -99,10 +98,10 @@ fn set_missing(variables: &[(&'static str, &str)]) -> Vec<&'static str> {
 /// Starts PETSc; its errors keep their message for [`check`] instead of printing a trace.
 fn initialize(options: &[String]) -> Result<(), PetscError> {
     give_memory_back();
-    // SAFETY: only a session uses BLAS, and this is the first; as in `set_missing`.
+    // SAFETY: only a session uses BLAS, and this is the first one; as in `set_missing`.
     unsafe { blas::choose_kernels() };
-    // Scotch 7 starts a thread for each core of the machine in every rank: too many by the number of
-    // ranks, and slow because they wait for each other. It reads this whenever it divides a graph.
+    // In every rank, Scotch 7 starts a thread for each core of the machine. They are too many, and slow
+    // because they wait for each other. Scotch reads this variable whenever it divides a graph.
     set_missing(&[("SCOTCH_PTHREAD_NUMBER", "1")]);
     let singleton = Communicator::launched().is_none();
     let temporary = if singleton { set_missing(&SINGLETON) } else { Vec::new() };
@@ -117,7 +116,7 @@ fn initialize(options: &[String]) -> Result<(), PetscError> {
     // SAFETY: argc and argv describe a null-terminated array of strings that is never freed.
     let started =
         check(unsafe { raw::PetscInitialize(&mut count, &mut argv, ptr::null(), ptr::null()) });
-    // The processes that this one starts may be ranks.
+    // This process may start others (gmsh), which must not inherit the settings.
     // SAFETY: as in `set_missing`.
     temporary.into_iter().for_each(|name| unsafe { env::remove_var(name) });
     started?;

@@ -20,40 +20,40 @@ pub(crate) struct BoundedQuadratic {
     tao: Handle<raw::_p_Tao>,
 }
 
-/// What TAO says of a solve; whether it is true is for the KKT residuals to tell.
+/// TAO's own report of a solve. The certificate checks the answer by its KKT residuals.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TaoReport {
     /// Outer iterations.
     pub(crate) iterations: usize,
     /// Iterations of the linear solver inside.
     pub(crate) linear_iterations: usize,
-    /// TaoConvergedReason: positive when TAO believes it has converged.
+    /// TaoConvergedReason: positive if TAO's convergence test was passed.
     pub(crate) reason: i32,
 }
 
-/// What the callbacks need, during a call of TAO.
+/// The context of the callbacks during a solve.
 struct Problem<'a> {
     k: &'a Matrix,
     f: &'a Vector,
 }
 
 impl BoundedQuadratic {
-    /// TAO's `method` (`tron`, `bnls`, …) for problems of one size, with the preconditioner
-    /// of type `kept` unless PETSc options choose another.
+    /// TAO's `method` (`tron`, `bnls`, …), with the preconditioner `kept` unless PETSc options choose
+    /// another.
     ///
-    /// Its Newton systems are solved by Steihaug's conjugate gradients (KSPSTCG), which take the
-    /// whole step unless the trust region cuts it.
+    /// Steihaug's conjugate gradients (KSPSTCG) solve the Newton systems. They take the whole step unless
+    /// the trust region cuts it.
     pub(crate) fn new(_session: &Session, method: &str) -> Result<Self, PetscError> {
         // tron reads the first prefix, the bounded Newton family (bnls, …) the second.
         for prefix in ["-ksp_", "-tao_bnk_ksp_"] {
             set_default_option(&format!("{prefix}type"), "stcg")?;
             set_default_option(&format!("{prefix}norm_type"), "unpreconditioned")?;
         }
-        // Systems of the full size whatever is active, so that a factor fits the next one.
+        // All systems have the full size, whatever the active set, so that a factor can be used again.
         set_default_option("-tao_subset_type", "mask")?;
         let c_method = c_string(method)?;
-        // The quasi-Newton Krylov methods' Hessian is an approximation without entries, which
-        // nothing can factorise; they bring their own preconditioner.
+        // The Hessian of the quasi-Newton Krylov methods is an operator without entries, which cannot be
+        // factorised. They bring their own preconditioner.
         let quasi_newton = method.starts_with("bqnk");
         let (mut ksp, mut pc) = (ptr::null_mut(), ptr::null_mut());
         // SAFETY: a fresh handle, then live ones; the string lives during the calls.
@@ -73,9 +73,8 @@ impl BoundedQuadratic {
         }
     }
 
-    /// Minimises from the start `x` until the gradient is about `limit` in ‖·‖₂, or `most` iterations were made, and leaves the
-    /// minimiser there; bounds may be ±infinite. That TAO did not converge is no error but a negative
-    /// `reason`.
+    /// Minimises from the start `x` until ‖gradient‖₂ is about `limit`, with at most `most` iterations, and
+    /// replaces `x` by the minimiser. Bounds may be ±∞. If TAO does not converge, `reason` is negative.
     pub(crate) fn minimise(
         &mut self,
         k: &Matrix,
@@ -88,15 +87,15 @@ impl BoundedQuadratic {
         for size in [k.owned(), f.owned(), lower.owned(), upper.owned()] {
             same_size(x.owned(), size)?;
         }
-        // TAO has a vector of its own for the gradient.
+        // Null: TAO makes the vector for the gradient itself.
         let (tao, own) = (self.tao.raw(), ptr::null_mut());
         let mut kept = Context { preconditioner };
         let problem = Problem { k, f };
         let context = ptr::from_ref(&problem).cast_mut().cast::<c_void>();
         let (mut iterations, mut linear, mut reason) = (0, 0, 0);
         let (mut ksp, mut pc) = (ptr::null_mut(), ptr::null_mut());
-        // SAFETY: live handles of matching layout; the context outlives the solve, in which
-        // alone the callbacks run.
+        // SAFETY: live handles of matching layout; the callbacks run only during the solve, and their
+        // context outlives it.
         unsafe {
             check(raw::TaoSetSolution(tao, x.raw()))?;
             check(raw::TaoSetVariableBounds(tao, lower.raw(), upper.raw()))?;
@@ -110,7 +109,7 @@ impl BoundedQuadratic {
             if !ksp.is_null() {
                 check(raw::KSPSetTolerances(ksp, 1e-12, 0.5 * limit, f64::MAX, 200))?;
                 check(raw::KSPGetPC(ksp, &mut pc))?;
-                // Options may have asked for another preconditioner, which ignores this.
+                // A preconditioner of another type, chosen by options, ignores this.
                 kept.set(pc)?;
             }
             check(raw::TaoSolve(tao))?;
@@ -140,11 +139,11 @@ unsafe extern "C" fn evaluate(
         gradient.axpby(-1.0, f, 1.0)?;
         Ok(0.5 * (gradient.dot(&x)? - f.dot(&x)?))
     };
-    // SAFETY: PETSc passes where it wants the value.
+    // SAFETY: PETSc passes a valid pointer for the value.
     return_code(evaluate().map(|found| unsafe { *value = found }))
 }
 
-/// The Hessian is K itself, already in place.
+/// The Hessian is K and does not change.
 unsafe extern "C" fn keep_hessian(
     _tao: raw::Tao,
     _x: raw::Vec,

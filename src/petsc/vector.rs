@@ -13,7 +13,7 @@ impl Vector {
     /// A zero vector with `owned` entries on this rank (VecCreateMPI).
     ///
     /// # Errors
-    /// There are too many entries for 32-bit indices, or no memory for them.
+    /// There are too many entries for 32-bit indices, or the memory does not suffice.
     pub fn zeros(_session: &Session, owned: usize) -> Result<Self, PetscError> {
         let local = index(owned)?;
         let handle = Handle::new(raw::VecDestroy, |handle| {
@@ -26,7 +26,7 @@ impl Vector {
     /// A vector that PETSc passes to a callback.
     ///
     /// # Safety
-    /// `raw` is a live vector for as long as it is used.
+    /// `raw` is alive as long as this vector.
     pub(super) unsafe fn borrowed(raw: raw::Vec) -> Result<Self, PetscError> {
         let mut owned = 0;
         // SAFETY: the caller's promise.
@@ -38,13 +38,13 @@ impl Vector {
         self.handle.raw()
     }
 
-    /// Lends the owned entries (VecGetArrayRead).
+    /// Calls `reader` with the owned entries (VecGetArrayRead).
     ///
     /// # Errors
     /// PETSc failed.
     pub fn read<R>(&self, reader: impl FnOnce(&[f64]) -> R) -> Result<R, PetscError> {
         let mut data = ptr::null();
-        // SAFETY: PETSc lends `owned` values until they are given back below.
+        // SAFETY: PETSc lends `owned` values until they are restored below.
         unsafe {
             check(raw::VecGetArrayRead(self.raw(), &mut data))?;
             let result = reader(slice::from_raw_parts(data, self.owned));
@@ -53,13 +53,13 @@ impl Vector {
         }
     }
 
-    /// Lends the owned entries, to be changed (VecGetArray).
+    /// Calls `writer` with the owned entries, which it may change (VecGetArray).
     ///
     /// # Errors
     /// PETSc failed.
     pub fn write<R>(&mut self, writer: impl FnOnce(&mut [f64]) -> R) -> Result<R, PetscError> {
         let mut data = ptr::null_mut();
-        // SAFETY: as in `read`, and `&mut self` keeps other readers away.
+        // SAFETY: as in `read`; `&mut self` excludes other readers.
         unsafe {
             check(raw::VecGetArray(self.raw(), &mut data))?;
             let result = writer(slice::from_raw_parts_mut(data, self.owned));
@@ -71,7 +71,7 @@ impl Vector {
     /// Copies `values` (the owned entries) into the vector.
     ///
     /// # Errors
-    /// Their number is another.
+    /// The number of values differs.
     pub fn set(&mut self, values: &[f64]) -> Result<(), PetscError> {
         same_size(self.owned, values.len())?;
         self.write(|data| data.copy_from_slice(values))
@@ -93,7 +93,7 @@ impl Vector {
         Ok(product)
     }
 
-    /// this ← `a` `x` + `b` this; with `b` = 0 whatever this was (VecAXPBY).
+    /// this ← `a` `x` + `b` this; for `b` = 0 the old values do not matter (VecAXPBY).
     pub(crate) fn axpby(&mut self, a: f64, x: &Self, b: f64) -> Result<(), PetscError> {
         // SAFETY: live handles, distinct by borrowing; PETSc compares their sizes.
         check(unsafe { raw::VecAXPBY(self.raw(), a, b, x.raw()) })
@@ -105,13 +105,13 @@ impl Vector {
     }
 }
 
-/// A number of entries as PETSc's integer.
+/// A number of entries in PETSc's integer type.
 pub(super) fn index(owned: usize) -> Result<i32, PetscError> {
     i32::try_from(owned)
         .map_err(|_| PetscError::ours(format!("{owned} entries exceed 32-bit indices")))
 }
 
-/// Refuses arrays with which PETSc would read or write beyond the end.
+/// An error if an array has not the expected length: PETSc would read or write beyond its end.
 pub(super) fn same_size(expected: usize, found: usize) -> Result<(), PetscError> {
     match expected == found {
         true => Ok(()),

@@ -1,4 +1,4 @@
-//! The conditions on the parts of the boundary, and which of them exclude each other.
+//! The conditions on the parts of the boundary. Some of them exclude each other on the same edge.
 
 use super::expression::Expression;
 use super::schema::{Fault, is_wrong};
@@ -10,15 +10,14 @@ use std::array;
 pub struct Boundary {
     /// The physical curve.
     pub name: String,
-    /// At least one; none contradicts another.
+    /// At least one condition. The conditions do not contradict each other.
     pub conditions: Vec<Condition>,
 }
 
 /// A boundary condition.
 #[derive(Debug, Clone)]
 pub enum Condition {
-    /// Γ_D: the prescribed displacement by component, m; `None` leaves a component free (never
-    /// both).
+    /// Γ_D: the prescribed displacement by component, m. `None` leaves a component free (never both).
     Displacement([Option<Expression>; 2]),
     /// A symmetry axis: u·ν = 0.
     Symmetry,
@@ -31,9 +30,9 @@ pub enum Condition {
 /// A surface load f_N, N/m².
 #[derive(Debug, Clone)]
 pub enum SurfaceLoad {
-    /// By component.
+    /// f_N by component.
     Traction([Expression; 2]),
-    /// The p of −p n, with n the body's outward normal: positive p presses on the body.
+    /// p in f_N = −p n, with n the body's outward normal: positive p presses on the body.
     Pressure(Expression),
 }
 
@@ -49,7 +48,7 @@ impl SurfaceLoad {
         }
     }
 
-    /// The expressions that it is made of.
+    /// The expressions of the load.
     pub fn expressions(&self) -> &[Expression] {
         match self {
             Self::Traction(f) => f,
@@ -61,9 +60,9 @@ impl SurfaceLoad {
 /// A rigid obstacle.
 #[derive(Debug, Clone)]
 pub struct Gap {
-    /// g(x, y, t) along the normal, m; negative where the body at rest would be in the obstacle.
+    /// g(x, y, t) along the normal, m; negative where the undeformed body overlaps the obstacle.
     pub distance: Expression,
-    /// Unit vector towards the obstacle; the body's outward normal when absent.
+    /// Unit vector towards the obstacle; `None` for the body's outward normal.
     pub normal: Option<[f64; 2]>,
 }
 
@@ -85,7 +84,7 @@ impl Boundary {
     }
 }
 
-/// What of the conditions of `a` and `b`, which hold on the same edge, cannot both hold there.
+/// The names of two conditions in `a` and `b` that contradict each other on a common edge.
 pub(super) fn contradiction(a: &[Condition], b: &[Condition]) -> Option<[&'static str; 2]> {
     use Condition::{Displacement, Gap, Load, Symmetry};
     let one_way = |a: &Condition, b: &Condition| match (a, b) {

@@ -1,4 +1,4 @@
-//! What only the mesh can tell: names, and values at the nodes.
+//! Checks of a scene that need the mesh: names, and values at the nodes.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -17,24 +17,27 @@ use crate::{
 /// the body: gmsh places nodes to about 1e-8 of an edge.
 const ALONG: f64 = 1e-6;
 
-/// Evaluations of an expression in space and time before a run, about: less than a second.
+/// The approximate number of evaluations of an expression in space and time before a run. They take less
+/// than a second.
 const EVALUATIONS: usize = 4_000_000;
 
-/// Larger values overflow where they are squared.
+/// The largest admissible value. The squares of larger values overflow.
 const LARGEST: f64 = 1e100;
 
-/// What values must be beside finite: how a message says so, and whether one is.
+/// A condition on finite values: its text in messages, and the test.
 type Rule<'a> = (&'a str, &'a dyn Fn(f64) -> bool);
 
 impl Scene {
-    /// Checks the scene against its mesh: every material of a surface names a physical surface, every
-    /// boundary a physical curve on the boundary of the body, boundaries that share edges do not contradict
-    /// each other, ζ₀ is in (ζ_*, 1] at the nodes, fixed normals point out of the body, and all expressions
-    /// are finite where and when they are used, as far as times are known beforehand (a thousand of them at
-    /// most).
+    /// Checks the scene against its mesh:
+    /// - every material of a surface names a physical surface;
+    /// - every boundary names a physical curve on the boundary of the body;
+    /// - boundaries that share edges do not contradict each other;
+    /// - ζ₀ is in (ζ_*, 1] at the nodes, and fixed normals point out of the body;
+    /// - all expressions are finite at the points and times of their use, at up to a thousand times that are
+    ///   known beforehand.
     ///
     /// # Errors
-    /// All that is wrong, each with its line, key, point and time.
+    /// All problems, each with its line, key, point and time.
     pub fn check_mesh(&self, mesh: &Mesh) -> Result<(), SceneError> {
         let mut problems = Vec::new();
         for boundary in &self.boundaries {
@@ -49,20 +52,19 @@ impl Scene {
         self.text.verdict(problems)
     }
 
-    /// Checks that all expressions are finite at `times`, at the points where they are used:
-    /// midpoints of triangle sides for the body force, Gauss points of edges for tractions, nodes
-    /// for the others.
+    /// Checks that all expressions are finite at `times` and at the points of their use: the midpoints of
+    /// triangle sides for the body force, the Gauss points of edges for tractions, the nodes for the others.
     ///
     /// # Errors
-    /// Those that are not, each with its line, key, point and time.
+    /// The expressions that are not finite, each with its line, key, point and time.
     pub fn check_values(&self, mesh: &Mesh, times: &[f64]) -> Result<(), SceneError> {
         self.text.verdict(self.bad_values(mesh, times))
     }
 
-    /// Checks that the body has all probes, those in `outside` lying outside of it.
+    /// Reports the probes `outside` of the body.
     ///
     /// # Errors
-    /// These, with their lines.
+    /// These probes, with their lines.
     pub fn check_probes(&self, outside: &[&Probe]) -> Result<(), SceneError> {
         let problem = |probe: &&Probe| {
             let (key, [x, y]) = (format!("probe.{}.point", probe.name), probe.point);
@@ -71,10 +73,10 @@ impl Scene {
         self.text.verdict(outside.iter().map(problem).collect())
     }
 
-    /// Checks that the figures for which an accuracy is asked are among the `known` ones.
+    /// Checks that the figures in `accuracy_of` are among the `known` ones.
     ///
     /// # Errors
-    /// The others, with their lines.
+    /// The unknown figures, with their lines.
     pub fn check_figures(&self, known: &[&str]) -> Result<(), SceneError> {
         let unknown = self.accuracy_of.iter().filter(|name| !known.contains(&name.as_str()));
         let problem = |name: &String| {
@@ -151,7 +153,8 @@ impl Scene {
         Err(self.at_name(boundary, &problem))
     }
 
-    /// The surfaces with a material of their own that the mesh does not have, or that share a triangle.
+    /// Problems of surfaces with materials: the mesh does not have the surface, or two surfaces share a
+    /// triangle.
     fn check_surfaces(&self, mesh: &Mesh) -> Vec<Problem> {
         let mut problems = Vec::new();
         let mut taken = BTreeMap::new();
@@ -178,8 +181,7 @@ impl Scene {
         problems
     }
 
-    /// The boundaries that share an edge and cannot both hold there. Shared nodes, where curves
-    /// meet, are the business of the constraints.
+    /// The boundaries that share an edge and contradict each other there. The constraints check shared nodes.
     fn check_shared_edges(&self, mesh: &Mesh) -> Vec<Problem> {
         let edges = |boundary: &Boundary| match mesh.curves.get(&boundary.name) {
             Some(curve) => &curve.edges[..],
@@ -206,8 +208,8 @@ impl Scene {
         problems
     }
 
-    /// Whether the gap's normal, if fixed, points out of the body all along the curve. Elsewhere
-    /// u·n ≤ g would stop the body on the wrong side, or let it sink into the obstacle.
+    /// Checks that a fixed normal of the gap points out of the body all along the curve. Otherwise u·n ≤ g
+    /// would stop the body on the wrong side, or let it enter the obstacle.
     fn check_normal(&self, boundary: &Boundary, curve: &Curve, mesh: &Mesh) -> Option<Problem> {
         let [nx, ny] = boundary.gap()?.normal?;
         let cosine = |&[from, to]: &[usize; 2]| {
@@ -230,9 +232,10 @@ impl Scene {
         Some(self.at_key(&boundary_key(&boundary.name, "normal"), &problem))
     }
 
-    /// Whether the values of `expression` at `points` and `times` are finite and obey the `rule`.
-    /// What does not depend on the points or the times is evaluated once. Where these are too many,
-    /// all points are taken at the first and the last time only, in between a part of them, in turn.
+    /// Whether the values of `expression` at `points` and `times` are finite and obey the `rule`. An
+    /// expression that does not depend on space or time is evaluated at one point or time only. If there are
+    /// too many points and times, all points are used at the first and the last time, and at the times
+    /// between them the points take turns.
     fn check(
         &self,
         key: &str,

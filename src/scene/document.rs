@@ -1,4 +1,4 @@
-//! The TOML document of a scene: the file with the `--set` arguments put in. Every value knows
+//! The TOML document of a scene: the file with the `--set` arguments inserted. Every value knows the place
 //! where it is written.
 
 use std::collections::BTreeMap;
@@ -14,10 +14,10 @@ use toml::de::{DeTable, DeValue};
 use super::error::{MOST_SHOWN, SceneError};
 use crate::suggestion::suggestion;
 
-/// Where something is wrong, and what.
+/// The place of a problem and the message.
 pub(super) type Problem = (Range<usize>, String);
 
-/// The key of what is called `name` in the table at `key`, "" of the table itself.
+/// The full key of `name` in the table at `key`; of the table itself if `name` is "".
 pub(super) fn below(key: &str, name: &str) -> String {
     match (key, name) {
         (key, "") => key.to_owned(),
@@ -26,11 +26,11 @@ pub(super) fn below(key: &str, name: &str) -> String {
     }
 }
 
-/// The place of what concerns the file as a whole.
+/// The place of a problem that concerns the whole file.
 pub(super) const NOWHERE: Range<usize> = Range { start: 1, end: 0 };
 
-/// The text of a scene. A place in it is a range of bytes: those of the file are counted from 0,
-/// those of the n-th `--set` argument from n times the `stride`.
+/// The text of a scene. A place in it is a range of bytes. The bytes of the file are counted from 0, the
+/// bytes of the n-th `--set` argument from n times the `stride`.
 #[derive(Debug, Clone)]
 pub(super) struct SceneText {
     path: PathBuf,
@@ -38,20 +38,20 @@ pub(super) struct SceneText {
     file: String,
     /// The `--set` arguments.
     sets: Vec<String>,
-    /// These as TOML, indented to their places.
+    /// The `--set` arguments as TOML, indented to their places.
     arguments: Vec<String>,
-    /// More bytes than the file or any of the arguments has.
+    /// A number of bytes larger than the length of the file and of each argument.
     stride: usize,
-    /// Where the values that have been read are written, by their keys in full.
+    /// The places of the values that have been read, by their full keys.
     pub(super) places: BTreeMap<String, Range<usize>>,
-    /// The values, and what the files of tables hold: as [`Self::values`] gives them.
+    /// The values and the contents of the files of tables, from [`Self::values`].
     pub(super) document: toml::Table,
     pub(super) tables: Vec<u8>,
 }
 
 impl SceneText {
-    /// The content of the `file` at `path` and the `--set` arguments. A value of these that is no
-    /// TOML is taken for a string, so that shells need no second pair of quotes.
+    /// The content of the `file` at `path` and the `--set` arguments. A value of an argument that is not TOML
+    /// becomes a string, so that shells need no second pair of quotes.
     pub(super) fn new(path: &Path, file: &str, sets: &[String]) -> Self {
         let stride = sets.iter().map(String::len).fold(file.len(), usize::max) + 2;
         let toml = |set: &String| match (DeTable::parse(set), set.split_once('=')) {
@@ -75,22 +75,22 @@ impl SceneText {
         &self.path
     }
 
-    /// Where relative paths begin.
+    /// The folder to which paths are relative.
     pub(super) fn folder(&self) -> &Path {
         self.path.parent().unwrap_or(Path::new(""))
     }
 
-    /// All is well if there are no problems; else they are told in the order of the file.
+    /// An error that lists the `problems` in the order of the file, if there are any.
     pub(super) fn verdict(&self, mut problems: Vec<Problem>) -> Result<(), SceneError> {
         problems.sort_by_key(|(place, _)| (place.start, place.end));
         let mut reports: Vec<String> = Vec::with_capacity(problems.len());
         for (place, message) in &problems {
-            // Those that are only counted need no picture of their lines.
+            // The others are only counted.
             let is_shown = reports.len() < MOST_SHOWN;
             reports.push(if is_shown { self.report(place, message) } else { message.clone() });
         }
         let Some(last) = reports.last_mut() else { return Ok(()) };
-        // What contradicts a line of the file may stand on the command line.
+        // A line of the file may contradict an argument of the command line.
         let of_the_file = |(place, _): &Problem| place.start < self.stride;
         if !self.sets.is_empty() && problems.iter().all(of_the_file) {
             *last += &format!("\n(the file was read with --set {})", self.sets.join(" --set "));
@@ -98,7 +98,7 @@ impl SceneText {
         Err(SceneError(reports))
     }
 
-    /// The message with its place before it and the lines of the file after it, underlined.
+    /// The message after its place, and below it the underlined lines of the file.
     fn report(&self, place: &Range<usize>, message: &str) -> String {
         let problem = format!("{}: {message}", self.in_words(place));
         if *place == NOWHERE || place.start >= self.stride {
@@ -123,13 +123,13 @@ impl SceneText {
         }
     }
 
-    /// Where the value of a key is written.
+    /// The place of the value of a key.
     pub(super) fn place(&self, key: &str) -> Range<usize> {
         self.places.get(key).cloned().unwrap_or(NOWHERE)
     }
 
-    /// The values of a document with full paths of tables, and what these files hold; nothing where one
-    /// is out of the range of its type.
+    /// The values of a document with the full paths of tables, and the contents of these files. The values
+    /// are empty if a number does not fit its type.
     pub(super) fn values(&self, root: &DeValue) -> (toml::Table, Vec<u8>) {
         let root = Spanned::new(NOWHERE, root.clone()).into_deserializer();
         let mut document = toml::Table::deserialize(root).unwrap_or_default();
@@ -141,7 +141,7 @@ impl SceneText {
         (document, tables)
     }
 
-    /// What was meant by the line of the file that has the byte `at`, as far as the line tells.
+    /// Advice for a line that is not TOML. The line contains the byte `at`.
     fn hint(&self, at: usize) -> &'static str {
         let start =
             self.file.get(..at).and_then(|before| before.rfind('\n')).map_or(0, |end| end + 1);
@@ -155,7 +155,7 @@ impl SceneText {
         }
     }
 
-    /// The value `1,5` in the line of the file that has the byte `at`, if a key of this line has one.
+    /// The problem of a decimal comma (`1,5`) in the line that contains the byte `at`.
     fn decimal_comma(&self, at: usize) -> Option<Problem> {
         let before = self.file.get(..at)?;
         let start = before.rfind('\n').map_or(0, |end| end + 1);
@@ -173,14 +173,14 @@ impl SceneText {
         })
     }
 
-    /// Parses the file and puts the `--set` arguments in, in their order.
+    /// Parses the file and inserts the `--set` arguments in their order.
     pub(super) fn parse(&self) -> Result<DeValue<'_>, SceneError> {
         let (root, errors) = DeTable::parse_recoverable(&self.file);
         let mut commas = BTreeMap::new();
         let mut syntax = |error: &toml::de::Error| {
             let place = error.span().unwrap_or(NOWHERE);
             match self.decimal_comma(place.start) {
-                // What else is wrong in this line may come of it.
+                // Other errors in this line may follow from the comma.
                 Some((place, problem)) => commas
                     .insert(place.start, problem.clone())
                     .is_none()
@@ -191,7 +191,7 @@ impl SceneText {
                 }
             }
         };
-        // Behind an unclosed table, keys seem to be duplicates.
+        // After an unclosed table, keys seem to be duplicates.
         let is_duplicate = |error: &toml::de::Error| error.message() == "duplicate key";
         let all = errors.first().is_none_or(is_duplicate);
         let told = errors.iter().filter(|error| all || !is_duplicate(error));
@@ -212,15 +212,15 @@ impl SceneText {
     }
 }
 
-/// Writes the paths of `table("file")` in full, relative ones begin at `folder`, and adds to `tables`
-/// what the files hold.
+/// Replaces the paths in `table("file")` by full ones, relative to `folder`, and appends the contents of the
+/// files to `tables`.
 pub(super) fn complete_paths(value: &mut toml::Value, folder: &Path, tables: &mut Vec<u8>) {
     match value {
         toml::Value::String(text) if text.contains("table") => {
-            // An expression quotes nothing but files.
+            // Only names of files are quoted in an expression.
             let mut full = |part: &str| {
                 let file = folder.join(part);
-                // What is no file may be endless.
+                // Reading a device might never end.
                 match file.is_file().then(|| fs::read(&file)) {
                     Some(Ok(table)) => {
                         tables.extend(table);
@@ -243,8 +243,7 @@ pub(super) fn complete_paths(value: &mut toml::Value, folder: &Path, tables: &mu
     }
 }
 
-/// The length of the number with a decimal comma with which a text begins, like `-1,5e3`; none where it
-/// begins with another value.
+/// The length of a number with a decimal comma at the start of a text, like `-1,5e3`.
 pub(super) fn with_decimal_comma(text: &str) -> Option<usize> {
     let end = text.find(|c: char| !c.is_ascii_alphanumeric() && !"+-.,_".contains(c));
     let number = text[..end.unwrap_or(text.len())].trim_end_matches(',');
@@ -254,7 +253,7 @@ pub(super) fn with_decimal_comma(text: &str) -> Option<usize> {
     (is_number && mended.parse::<f64>().is_ok()).then_some(number.len())
 }
 
-/// What is wrong with a `--set` argument that is no TOML.
+/// The problem of a `--set` argument that is not TOML.
 fn misshapen(argument: &str) -> String {
     let problem = match argument.contains('=') {
         true if argument.contains('\n') => "is more than one line",
@@ -264,9 +263,8 @@ fn misshapen(argument: &str) -> String {
     format!("{problem}; write --set KEY=VALUE, for example --set time.step=0.005")
 }
 
-/// Puts the values that are `given` by an `argument` in the place of those in the table, or in the array of
-/// tables with names, at `key`. Dotted keys reach into both; a table in braces takes the place of the old
-/// one.
+/// Replaces values in the table, or in the array of named tables, at `key` by the values `given` in an
+/// `argument`. Dotted keys reach into both. A table in braces replaces the whole old table.
 fn put_all<'t>(
     old: &mut DeValue<'t>,
     given: DeTable<'t>,
@@ -292,7 +290,7 @@ fn put_all<'t>(
             }
             (there, value) => match (there.is_some(), &mut *old) {
                 (_, DeValue::Table(table)) => {
-                    // The old key would tell where the old value was written.
+                    // The old key has the place of the old value.
                     table.remove(&name);
                     table.insert(name, Spanned::new(place, value));
                 }

@@ -1,11 +1,11 @@
-//! What can be wrong with a scene, said to the person who wrote it.
+//! Errors of scenes, as messages for their authors.
 
-/// More problems than this are counted, not shown.
+/// The largest number of problems that are shown. Further ones are only counted.
 pub(super) const MOST_SHOWN: usize = 20;
 
-/// Why a scene was refused: its problems, at least one. Each tells the file and line (or the `--set`), the
-/// key in full, what is wrong and what to write instead, and shows the line underlined. The first is
-/// displayed as it is, the others after `error: `.
+/// The problems of a scene, at least one. Each names the file and line (or the `--set`), the full key, what
+/// is wrong and what to write instead, and shows the underlined line. In the text the first problem has no
+/// prefix, the others follow `error: `.
 #[derive(Debug, thiserror::Error)]
 #[error("{}", listed(.0))]
 pub struct SceneError(pub Vec<String>);

@@ -1,4 +1,4 @@
-//! Expressions in x, y and t: parsed once, evaluated often.
+//! Expressions in x, y and t, which are parsed once and evaluated often.
 
 mod breaks;
 mod interval;
@@ -19,11 +19,11 @@ use toml::Value;
 /// atan2 if table` (`log` is natural; `min`, `max` and `atan2` take two arguments). Precedence is that
 /// of mathematics: `-x^2` is −(x²), `2^3^2` is 2^(3²), and `t < 1 and x > 2` needs no brackets.
 ///
-/// What is true is 1, what is false 0, and any number but 0 counts as true. `if(c, a, b)` is a where c
-/// is true and b elsewhere; what the other one is there does not matter. `table("file.csv")` is
-/// piecewise linear in t, `table("file.csv", a)` in a, through the two columns of a file; beyond its
-/// ends it is constant, and two rows with the same first number are a jump, at which the second counts.
-/// Nothing hides a NaN but the argument of `if` that is not taken.
+/// A true comparison is 1, a false one 0, and any number except 0 counts as true. `if(c, a, b)` is a where c
+/// is true and b elsewhere; the value of the other one does not matter there. `table("file.csv")` is
+/// piecewise linear in t, `table("file.csv", a)` in a, through the two columns of a file. It is constant
+/// before the first row and after the last. Two rows with the same first number make a jump, at which the
+/// second row counts. A NaN in an argument gives NaN, except in the argument that `if` does not use.
 ///
 /// ```
 /// use signorini::scene::Expression;
@@ -35,10 +35,10 @@ use toml::Value;
 #[derive(Debug, Clone, Deserialize)]
 #[serde(try_from = "Value")]
 pub struct Expression {
-    /// In postfix order: a number or variable is put on a stack, a function or operator takes its
-    /// arguments from there and puts its value in their place.
+    /// Instructions in postfix order. A number or variable is pushed on a stack. A function or operator pops
+    /// its arguments and pushes its value.
     program: Vec<Instruction>,
-    /// The most values that are on the stack at a time.
+    /// The largest number of values on the stack.
     height: usize,
 }
 
@@ -55,7 +55,7 @@ impl TryFrom<Value> for Expression {
     }
 }
 
-/// Why a text is no expression: what is wrong and what to write instead, as its predicate.
+/// The reason why a text is not an expression, and what to write instead.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct ExpressionError(String);
@@ -75,7 +75,7 @@ enum Instruction {
 use Instruction::{Binary, Choose, Compare, Number, Unary, Variable};
 
 impl Instruction {
-    /// How many values it takes from the stack.
+    /// The number of values that it pops from the stack.
     fn takes(&self) -> usize {
         match self {
             Number(_) | Variable(_) => 0,
@@ -87,11 +87,11 @@ impl Instruction {
 }
 
 impl Expression {
-    /// Parses `text`; relative paths of tables begin at `folder`.
+    /// Parses `text`. Paths of tables are relative to `folder`.
     ///
     /// # Errors
-    /// A syntax error with its column, a name or function that is not known, or a table that cannot be
-    /// read, with its file and line.
+    /// A syntax error with its column, an unknown name or function, or a table that cannot be read, with its
+    /// file and line.
     pub fn parse_in(text: &str, folder: &Path) -> Result<Self, ExpressionError> {
         let program = Parser::parse(text, folder).map_err(ExpressionError)?;
         let heights = program.iter().scan(0, |height, instruction| {
@@ -109,7 +109,7 @@ impl Expression {
         Self::parse_in(text, Path::new(""))
     }
 
-    /// The expression that is `value` everywhere.
+    /// The constant expression `value`.
     pub fn constant(value: f64) -> Self {
         Self { program: vec![Number(value)], height: 1 }
     }
@@ -144,7 +144,7 @@ impl Expression {
         stack[0]
     }
 
-    /// The value if the expression names no variable.
+    /// The value, if the expression contains no variable.
     pub fn as_constant(&self) -> Option<f64> {
         match self.program[..] {
             [Number(value)] => Some(value),
@@ -152,12 +152,12 @@ impl Expression {
         }
     }
 
-    /// Whether the expression names t.
+    /// Whether the expression contains t.
     pub fn depends_on_time(&self) -> bool {
         self.program.iter().any(|instruction| matches!(instruction, Variable(2)))
     }
 
-    /// Whether the expression names x or y.
+    /// Whether the expression contains x or y.
     pub fn depends_on_space(&self) -> bool {
         self.program.iter().any(|instruction| matches!(instruction, Variable(0 | 1)))
     }

@@ -1,7 +1,7 @@
-//! Scenes: what to solve, read from a TOML file and checked before anything runs.
+//! Scenes: descriptions of problems, read from TOML files and checked before a run.
 //!
-//! [`Scene::read`] checks everything the file alone can tell; [`Scene::check_mesh`]
-//! checks what needs the mesh. Units are SI throughout.
+//! [`Scene::read`] parses the file and checks it without the mesh; [`Scene::check_mesh`] checks it against the
+//! mesh. The types are [`Scene`], its parts, and [`Expression`], a function of x, y and t. Units are SI.
 
 mod boundary;
 mod check;
@@ -39,43 +39,43 @@ pub struct Scene {
     pub path: PathBuf,
     /// The file's stem: results go to `out/<name>/`.
     pub name: String,
-    /// One line for people; the name when the file has no `title`.
+    /// The title, one line; the name if the file has no `title`.
     pub title: String,
-    /// Where the mesh comes from.
+    /// The source of the mesh.
     pub mesh: MeshSource,
-    /// The undamaged material, but for the `surfaces`.
+    /// The undamaged material outside the `surfaces`.
     pub material: Material,
-    /// The damage law and ζ₀; without it nothing is damaged.
+    /// The damage law and ζ₀; `None` for an elastic body without damage.
     pub damage: Option<Damage>,
-    /// The physical surfaces that are of another material or have another damage law, by name.
+    /// The physical surfaces with another material or another damage law, by name.
     pub surfaces: BTreeMap<String, Surface>,
     /// The order of the displacements.
     pub order: Order,
-    /// The largest relative error of the figures, of u (energy norm) and of the damage: mesh and steps are
-    /// then chosen.
+    /// The largest relative error of the figures, of u (energy norm) and of the damage. If it is given, the
+    /// program chooses mesh and steps.
     pub accuracy: Option<f64>,
-    /// The figures for which it is asked; none: all figures, u and the damage.
+    /// The figures that must have the accuracy; if empty, all figures, u and the damage.
     pub accuracy_of: Vec<String>,
-    /// The time grid; without it there is one static solve at t = 1.
+    /// The time grid; `None` for one static solve at t = 1.
     pub time: Option<TimeGrid>,
     /// Body force f_B, N/m³.
     pub body_force: [Expression; 2],
-    /// How the contact problem is solved.
+    /// Options of the contact solver.
     pub contact: ContactOptions,
-    /// What is written.
+    /// Options of the results.
     pub output: OutputOptions,
-    /// The names of its units.
+    /// The names of the units.
     pub units: Units,
-    /// Points at which every step is observed; each name once.
+    /// Points at which every step is observed, with different names.
     pub probes: Vec<Probe>,
-    /// The conditions on the named parts of the boundary; each name once.
+    /// The conditions on the named parts of the boundary, with different names.
     pub boundaries: Vec<Boundary>,
-    /// What was not taken as it is written.
+    /// Notes on values that the program has changed.
     pub notes: Vec<String>,
     text: SceneText,
 }
 
-/// A mesh file and, for a `.geo`, the constants it is meshed with.
+/// A mesh file and, for a `.geo`, its parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeshSource {
     /// A `.geo` or `.msh` file.
@@ -91,64 +91,64 @@ impl MeshSource {
     }
 }
 
-/// How the material is damaged, and its state at t = 0.
+/// The damage of the material.
 #[derive(Debug, Clone)]
 pub struct Damage {
     /// The damage law.
     pub law: DamageLaw,
     /// ζ₀(x, y) in (ζ_*, 1].
     pub initial: Expression,
-    /// How (28) is integrated.
+    /// The mass matrix in (28).
     pub mass: Mass,
 }
 
-/// What a physical surface is made of.
+/// The material of a physical surface.
 #[derive(Debug, Clone, Copy)]
 pub struct Surface {
     /// Its material.
     pub material: Material,
-    /// Its damage law, where there is damage: its ζ_* is that of all.
+    /// Its damage law, if there is damage. All surfaces have the same ζ_*.
     pub law: Option<DamageLaw>,
 }
 
-/// Whether ζ is in (ζ_*, 1], as ζ₀ must be.
+/// Whether `zeta` is an admissible ζ₀: in (ζ_*, 1].
 fn may_start_at(law: &DamageLaw, zeta: f64) -> bool {
     law.threshold < zeta && zeta <= 1.0
 }
 
-/// The first line of a scene as it was run.
+/// The first line of the scene file in a folder of results.
 pub const AS_RUN: &str = "# As run by signorini; the results stand beside it.";
 
 /// A point of the body at which every step is observed.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Probe {
-    /// The first part of its columns' names.
+    /// Its name, with which the names of its columns begin.
     pub name: String,
-    /// m.
+    /// Its coordinates, m.
     pub point: [f64; 2],
 }
 
-/// What is written while the scene runs.
+/// Options of the results.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OutputOptions {
-    /// Fields are written every so many steps, at least 1.
+    /// The number of steps between two frames, at least 1; `None` for about 20 frames.
     pub every: Option<usize>,
-    /// A checkpoint is written every so many seconds; none if 0.
+    /// The time between two checkpoints, s; 0 for no checkpoints.
     pub checkpoint: f64,
 }
 
-/// Names of the units that a scene is written in. They label results; nothing is converted.
+/// The names of a scene's units. They label the results; the program converts no units.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Units {
-    /// Of lengths and displacements, m unless told otherwise.
+    /// The unit of lengths and displacements, by default m.
     pub length: String,
-    /// Of forces, N unless told otherwise.
+    /// The unit of forces, by default N.
     pub force: String,
-    /// Of time, s unless told otherwise.
+    /// The unit of time, by default s.
     pub time: String,
-    /// Of stresses and pressures: Pa, or force/length² where one of these is told.
+    /// The unit of stresses and pressures: by default Pa, or force/length² if one of these is given.
     pub stress: String,
 }
 
@@ -160,7 +160,7 @@ impl Default for Units {
 }
 
 impl Units {
-    /// Of work per thickness.
+    /// The unit of work per thickness.
     pub fn work(&self) -> String {
         match *self == Self::default() {
             true => "J/m".to_owned(),
@@ -170,18 +170,18 @@ impl Units {
 }
 
 impl Scene {
-    /// All materials by their numbers, that of the scene and those of the surfaces.
+    /// The materials by their numbers: the material of the scene, then those of the surfaces.
     pub fn materials(&self) -> impl Iterator<Item = Material> {
         iter::once(self.material).chain(self.surfaces.values().map(|surface| surface.material))
     }
 
-    /// The damage laws of these materials; none without damage.
+    /// The damage laws of these materials; empty without damage.
     pub fn damage_laws(&self) -> Vec<DamageLaw> {
         let own = self.damage.iter().map(|damage| damage.law);
         own.chain(self.surfaces.values().filter_map(|surface| surface.law)).collect()
     }
 
-    /// The number of the material of each triangle of `mesh`; none where there is only one material.
+    /// Per triangle of `mesh`: the number of its material. Empty if there is only one material.
     pub fn materials_of(&self, mesh: &Mesh) -> Vec<u32> {
         let count = if self.surfaces.is_empty() { 0 } else { mesh.triangles.len() };
         let mut materials = vec![0; count];
@@ -192,9 +192,8 @@ impl Scene {
         materials
     }
 
-    /// The times at which expressions are evaluated and checked before the run, s: all t_n, or some
-    /// `most` (at least 1) evenly chosen ones; a hundred times where steps are chosen; t = 1 where there
-    /// is no time.
+    /// The times at which expressions are evaluated and checked before the run, s: all t_n, or about `most`
+    /// (at least 1) evenly chosen ones. For adaptive steps a hundred times; without a time grid t = 1.
     pub fn sample_times(&self, most: usize) -> Vec<f64> {
         let Some(grid) = self.time else { return vec![1.0] };
         let steps = match grid.stepping {
@@ -205,9 +204,8 @@ impl Scene {
         (0..=parts).map(|i| grid.time(i * steps / parts, steps)).collect()
     }
 
-    /// The scene as it is run, as the text of a file that runs from anywhere: the `--set` arguments are
-    /// put in, the mesh is the one in use, paths of files are full. Also what the files of its tables
-    /// hold.
+    /// The text of a scene file that repeats the run from any folder: the `--set` arguments are inserted, the
+    /// mesh is the one in use, and paths are full. Also the contents of the files of tables.
     pub fn as_run(&self) -> (String, &[u8]) {
         let mut scene = self.text.document.clone();
         scene.insert("title".into(), self.title.clone().into());
@@ -225,15 +223,14 @@ impl Scene {
 
     /// Reads and checks the scene at `path`.
     ///
-    /// `overrides` are `--set` arguments, `time.step=0.005`: a dotted key and a TOML
-    /// value; a value that is not TOML is taken as a string. `boundary.NAME.key=…`
-    /// addresses a boundary by its name. Relative mesh files start at the scene's
-    /// directory, in the file and in `--set` alike.
+    /// `overrides` are `--set` arguments such as `time.step=0.005`: a dotted key and a TOML value. A value
+    /// that is not TOML becomes a string. `boundary.NAME.key=…` addresses a boundary by its name. Mesh files
+    /// are relative to the folder of the scene, in the file and in `--set`.
     ///
     /// # Errors
-    /// The file cannot be read or is no TOML; keys are unknown, missing or of the wrong
-    /// type; values are out of range or contradict others. All problems of a file are told at
-    /// once, each with the line (or the `--set`), the key and what to write instead.
+    /// The file cannot be read or is not TOML; keys are unknown, missing or have the wrong type; values are
+    /// out of range or contradict others. The error lists all problems of a file, each with the line (or the
+    /// `--set`), the key and what to write instead.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
         if path.extension().is_some_and(|ending| ending == "geo" || ending == "msh") {
             let problem = "it is a mesh, and what runs is a scene that names it in [mesh] (`signorini \
@@ -251,10 +248,10 @@ impl Scene {
         Self::parse(&text, path, overrides)
     }
 
-    /// As [`Scene::read`], from the text of a file that would stand at `path`.
+    /// As [`Scene::read`], from the `text` of a scene. Messages name the file `path`.
     ///
     /// # Errors
-    /// As [`Scene::read`], but for the reading itself.
+    /// As [`Scene::read`].
     pub fn parse(text: &str, path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
         let mut text = SceneText::new(path, text, overrides);
         let root = text.parse()?;
@@ -264,7 +261,7 @@ impl Scene {
         let Findings { problems, places, .. } = found;
         text.verdict(problems)?;
         (text.places, text.document, text.tables) = (places, document, tables);
-        // Nothing is missing, or there would be a problem.
+        // Without problems there is a scene.
         let scene = scene.ok_or_else(|| SceneError(Vec::new()))?;
         Ok(Self { text, ..scene })
     }

@@ -1,5 +1,5 @@
-//! What a scene file may hold: its JSON schema, against which a document is checked key by key. What is
-//! wrong with a value is noted and reading goes on, so that all problems of a scene are told at once.
+//! Checks a scene file against the JSON schema of scenes, key by key. The check collects the problems and goes
+//! on, so that one message lists all problems of a scene.
 
 use super::document::{NOWHERE, Problem, SceneText, below, name_of, with_decimal_comma};
 use super::expression::Expression;
@@ -16,30 +16,29 @@ use std::{
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue};
 
-/// The JSON schema of scenes. Besides the words of JSON Schema it says in `values` what a value may be and
-/// in `absent` what holds without it, gives an `example`, and by `format` the kind of an expression.
+/// The JSON schema of scenes. It has four additional words: `values` describes the values in messages, `absent`
+/// the behaviour without the key, `example` a value, and `format` the kind of an expression.
 pub const SCHEMA: &str = include_str!("../../geo/scene.schema.json");
 
 static KEYS: LazyLock<Schema> = LazyLock::new(|| serde_json::from_str(SCHEMA).unwrap_or_default());
 
-/// What contradicts the rest of its table: the key below that of the table, "" for all of it, and what is
-/// wrong with it.
+/// A contradiction within a table: the key below that of the table ("" for the whole table), and the problem.
 pub(super) type Fault = (&'static str, String);
 
-/// A document and what was found in it so far.
+/// A document and its problems.
 pub(super) struct Findings<'t> {
     pub(super) text: &'t SceneText,
-    /// The values, with the defaults of what is left out.
+    /// The values, completed by defaults.
     document: toml::Value,
     pub(super) problems: Vec<Problem>,
-    /// Where the values are written, by their keys in full.
+    /// The places of the values, by their full keys.
     pub(super) places: BTreeMap<String, Range<usize>>,
-    /// The keys of all in which something is wrong.
+    /// The keys of values with problems.
     unsound: BTreeSet<String>,
 }
 
 impl<'t> Findings<'t> {
-    /// Checks the document `root` of `text`, whose values are those of `document`.
+    /// Checks the document of `text`: `root` has the places, `document` the values.
     pub(super) fn check(text: &'t SceneText, root: &DeValue, document: &toml::Table) -> Self {
         let mut document = toml::Value::Table(document.clone());
         complete(&mut document, &KEYS);
@@ -49,7 +48,7 @@ impl<'t> Findings<'t> {
         findings
     }
 
-    /// Notes a problem with the value of a key; the message begins with the key.
+    /// Adds a problem of a key; the message begins with the key.
     pub(super) fn note(&mut self, key: &str, problem: impl Display) {
         let place = self.places.get(key).cloned().unwrap_or(NOWHERE);
         self.problems.push((place, format!("{key} {problem}")));
@@ -66,8 +65,9 @@ impl<'t> Findings<'t> {
                 let value = toml::Value::deserialize(value);
                 let value =
                     value.map_err(|_| "is a number beyond 64 bits; write a smaller one".to_owned());
-                let judged = value.and_then(|value| judge(&value, schema, self.text.folder()));
-                judged.err().into_iter().for_each(|problem| self.note(&key, problem));
+                let checked =
+                    value.and_then(|value| check_value(&value, schema, self.text.folder()));
+                checked.err().into_iter().for_each(|problem| self.note(&key, problem));
             }
         }
         if self.problems.len() > before {
@@ -80,12 +80,12 @@ impl<'t> Findings<'t> {
         let known: Vec<&str> = known.map(String::as_str).collect();
         let mut is_misspelt = false;
         for (name, value) in table {
-            // A table is where its header is.
+            // The place of a table is its header.
             let span = value.span();
             let start = if value.get_ref().is_table() { span.start } else { name.span().start };
             let (key, place, value) =
                 (below(key, name.get_ref()), start..span.end, value.get_ref());
-            // By names of the user's.
+            // The keys of this table are names of the user.
             let named = &schema["additionalProperties"];
             let is_named = named["type"] == "number" || (named.is_object() && value.is_table());
             match schema["properties"].get(&**name.get_ref()) {
@@ -98,7 +98,7 @@ impl<'t> Findings<'t> {
                 }
             }
         }
-        // What the table lacks is what was misspelt.
+        // A misspelt key is probably the missing one.
         let required = schema["required"].as_array().filter(|_| !is_misspelt);
         for name in required.into_iter().flatten().filter_map(Schema::as_str) {
             if !table.contains_key(name) {
@@ -109,7 +109,7 @@ impl<'t> Findings<'t> {
         }
     }
 
-    /// Tables in an array go by their names, which no two may share.
+    /// Checks an array. Its tables are known by their names, which must differ.
     fn check_array(&mut self, key: &str, array: &DeArray, schema: &Schema) {
         let count = array.len() as u64;
         if schema["maxItems"].as_u64().is_some_and(|all| count != all) {
@@ -129,7 +129,7 @@ impl<'t> Findings<'t> {
         }
     }
 
-    /// What `build` makes of the value of a dotted `key`, if there is one and all in it is as the schema says.
+    /// The result of `build` for the value of a dotted `key`, if there is one and the schema allows it.
     pub(super) fn build<K: DeserializeOwned, T>(
         &mut self,
         key: &str,
@@ -139,7 +139,7 @@ impl<'t> Findings<'t> {
         self.build_value(key, value, build)
     }
 
-    /// What `build` makes of the elements of the array at `key`, as [`Self::build`].
+    /// The results of `build` for the elements of the array at `key`; see [`Self::build`].
     pub(super) fn build_all<K: DeserializeOwned, T>(
         &mut self,
         key: &str,
@@ -176,12 +176,12 @@ fn key_of_element(key: &str, i: usize, name: Option<&str>) -> String {
     }
 }
 
-/// What the schema does not know of.
+/// The problem of a value that the schema allows and its type refuses.
 pub(super) fn is_wrong(error: toml::de::Error) -> Fault {
     ("", format!("is wrong: {}", error.message()))
 }
 
-/// Puts the defaults of the schema in for what is left out; whole numbers are also written as 2e4.
+/// Inserts the defaults of the schema for missing keys. Makes integers of whole numbers such as 2e4.
 fn complete(value: &mut toml::Value, schema: &Schema) {
     match value {
         toml::Value::Table(table) => {
@@ -204,17 +204,17 @@ fn complete(value: &mut toml::Value, schema: &Schema) {
     }
 }
 
-/// Whether a text, number or flag is as the schema says; tables of expressions begin at `folder`.
+/// Checks a text, number or flag against the schema. Paths of tables are relative to `folder`.
 ///
 /// # Errors
-/// What is wrong; of several alternatives the last one tells.
-fn judge(value: &toml::Value, schema: &Schema, folder: &Path) -> Result<(), String> {
+/// The problem; if there are several alternatives, the problem of the last one.
+fn check_value(value: &toml::Value, schema: &Schema, folder: &Path) -> Result<(), String> {
     if let Some([other, last]) = schema["anyOf"].as_array().map(Vec::as_slice) {
-        return judge(value, other, folder).or_else(|_| judge(value, last, folder));
+        return check_value(value, other, folder).or_else(|_| check_value(value, last, folder));
     }
     let number = value.as_float().or(value.as_integer().map(|number| number as f64));
     if let Some(kind) = schema["format"].as_str() {
-        return judge_expression(value.as_str(), number, kind, folder);
+        return check_expression(value.as_str(), number, kind, folder);
     }
     let is = |choice: &Schema| match choice.as_str() {
         Some(name) => value.as_str() == Some(name),
@@ -260,8 +260,8 @@ fn is_within(number: f64, schema: &Schema) -> bool {
         && obeys("exclusiveMaximum", f64::lt)
 }
 
-/// Whether a text or number is an expression of this kind, and finite if it is constant.
-fn judge_expression(
+/// Checks that a text or number is an expression of this kind, and finite if it is constant.
+fn check_expression(
     text: Option<&str>,
     number: Option<f64>,
     kind: &str,

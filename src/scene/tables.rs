@@ -1,5 +1,5 @@
-//! The tables of a scene file that stand alone: from keys that are as the schema says to a scene that
-//! makes sense.
+//! Makes a scene from the tables of a document that the schema allows, and checks that the values fit each
+//! other.
 
 use super::boundary::boundary;
 use super::expression::Expression;
@@ -17,10 +17,10 @@ use serde::{Deserialize, de::DeserializeOwned};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// More steps than this are a slip of the pen.
+/// The largest number of steps. A larger number is a mistake in the scene.
 const MOST_STEPS: f64 = 1e9;
 
-/// The scene of a document. What is wrong is noted; none if that is something no scene can do without.
+/// The scene of a document. Problems are added to `found`; `None` if a necessary part has a problem.
 pub(super) fn scene(found: &mut Findings) -> Option<Scene> {
     let (path, folder) = (found.text.path(), found.text.folder());
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -78,7 +78,7 @@ pub(super) fn scene(found: &mut Findings) -> Option<Scene> {
     })
 }
 
-/// The tables of surfaces in a table by their names, each with what it leaves out taken from around it.
+/// The tables of the surfaces in a table, by name. The surrounding table completes each of them.
 fn surfaces<T: DeserializeOwned>(table: toml::Table) -> Result<Vec<(String, T)>, Fault> {
     let (named, own): (Vec<_>, Vec<_>) = table.into_iter().partition(|(_, value)| value.is_table());
     let with_own = |(name, value): (String, toml::Value)| {
@@ -123,7 +123,7 @@ fn contact(options: ContactOptions) -> Result<ContactOptions, Fault> {
     unknown.map_or(Ok(options), |error| Err(("solver", format!("is unknown: {error}"))))
 }
 
-/// Its surfaces are in it, too.
+/// The keys of `[damage]`, which also contains the tables of the surfaces.
 #[derive(Deserialize)]
 struct DamageKeys {
     #[serde(flatten)]
@@ -145,16 +145,16 @@ fn damage(DamageKeys { law, initial, mass }: DamageKeys) -> Result<Damage, Fault
 #[serde(deny_unknown_fields)]
 struct TimeKeys {
     end: f64,
-    /// A number (s) or "auto": chosen by an estimate of the error.
+    /// A number (s) or "auto" for adaptive steps.
     step: toml::Value,
     tolerance: Option<f64>,
     scheme: Option<Scheme>,
 }
 
-/// The error of ζ over the damage done that `step = "auto"` allows unless told otherwise.
+/// The default tolerance of `step = "auto"`: the error of ζ over the damage.
 const STEP_TOLERANCE: f64 = 0.01;
 
-/// The time grid, and what to tell where the step that is written does not divide the end.
+/// The time grid, and a note if the given step does not divide the end.
 fn time(keys: TimeKeys) -> Result<(TimeGrid, Option<String>), Fault> {
     let TimeKeys { end, step, tolerance, scheme } = keys;
     let Ok(length) = step.try_into::<f64>() else {
@@ -184,7 +184,7 @@ fn other_step(grid: TimeGrid, asked: f64) -> Option<String> {
     let Stepping::Uniform { steps } = grid.stepping else { return None };
     let (end, step) = (grid.end, grid.end / steps as f64);
     (asked - step > 1e-6 * step).then(|| {
-        // Six digits: no 0.30000000000000004.
+        // Six digits avoid values such as 0.30000000000000004.
         let step: f64 = format!("{step:.5e}").parse().unwrap_or(step);
         format!(
             "time.step = {asked} s does not divide time.end = {end} s: {steps} steps of {step} s \

@@ -15,14 +15,14 @@ use std::{
     time::SystemTime,
 };
 
-/// What gmsh is told for a further mesh where triangles of the last one are flat. At strong gradings its
-/// default algorithm makes such triangles by chance, MeshAdapt (1) does not, but takes ten times as long.
+/// Options of gmsh for the next attempts after a mesh with flat triangles. For strong gradings its default
+/// algorithm makes flat triangles by chance. MeshAdapt (1) makes none, but takes ten times as long.
 const AGAIN: [&str; 2] = ["Mesh.RandomFactor = 1e-12", "Mesh.Algorithm = 1"];
 
-/// The order of the elements that gmsh makes of a `.geo`.
+/// The order of the elements that gmsh makes from a `.geo`.
 ///
-/// Vertices and triangles are the same; of order 2 gmsh also places midpoints of curved edges, for
-/// six times its time and three times the file.
+/// Vertices and triangles are the same for both. For order 2 gmsh also places the midpoints of curved edges;
+/// it then takes about six times as long.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Order {
     /// Order 1, every edge straight.
@@ -32,7 +32,7 @@ pub enum Order {
     Quadratic,
 }
 
-/// Reads the mesh in [`file()`]; nodes and triangles in an order of their own ([`Mesh::in_morton_order`]).
+/// Reads the mesh from [`file()`] and sorts its nodes and triangles ([`Mesh::in_morton_order`]).
 ///
 /// # Errors
 /// Those of [`file()`] and [`read`].
@@ -44,9 +44,9 @@ pub fn load(
     read(&file(path, parameters, order)?).map(Mesh::in_morton_order)
 }
 
-/// The `.msh` of a mesh: itself, or that which [`mesh_geo`] makes of a `.geo`.
+/// The path of a `.msh`: that of the given file, or of the file that [`mesh_geo`] makes from a `.geo`.
 ///
-/// `parameters` and `order` are for a `.geo` and have no meaning for a `.msh`.
+/// `parameters` and `order` apply to a `.geo` only.
 ///
 /// # Errors
 /// Those of [`mesh_geo`], and any other extension.
@@ -65,10 +65,10 @@ pub fn file(
 
 /// Meshes a `.geo` file and returns the path of the `.msh` beside it.
 ///
-/// Each parameter is set over the `DefineConstant` of its name and appears in the name of the mesh, as
-/// in `bridge-grading3-size0.25.msh`, and so does order 2, as in `hertz.order2.msh`. `size`, in m, also
-/// bounds the length of the edges. A mesh that is not older than its `.geo` and the files this takes in
-/// by `Include` and `Merge` is kept as it is; a new one appears complete or not at all.
+/// Each parameter overrides the `DefineConstant` of its name. The name of the mesh lists the parameters and
+/// order 2, as in `bridge-grading3-size0.25.msh` and `hertz.order2.msh`. `size`, in m, also bounds the length
+/// of the edges. A mesh is made again only if it is older than its `.geo` or the files that this includes
+/// with `Include` or `Merge`. A new mesh file appears complete or not at all.
 ///
 /// # Errors
 /// The `.geo` cannot be read or the `.msh` written, a parameter makes no sense or occurs
@@ -88,7 +88,7 @@ pub fn mesh_geo(
         }
         name.push(format!("-{parameter}{value}"));
     }
-    // No parameter makes such a name: theirs have no point.
+    // No parameter makes such a name, as names of parameters have no point.
     name.push(if order == Order::Quadratic { ".order2.msh" } else { ".msh" });
     let mesh = geo.with_file_name(name);
     let last_change = last_change(geo).map_err(MeshError::io(geo))?;
@@ -106,7 +106,7 @@ pub fn mesh_geo(
             "note: {}: gmsh made flat triangles; meshing again with {option}\n",
             geo.display()
         );
-        // Where nobody can be told any more, the mesh is still made.
+        // If stderr is closed, the mesh is still made.
         let _ = io::stderr().write_all(note.as_bytes());
         bytes = run((geo, None), arguments(parameters), &format!("{last}{option};\n"), "mesh it")?;
     }
@@ -114,8 +114,8 @@ pub fn mesh_geo(
     Ok(mesh)
 }
 
-/// Writes a mesh that appears complete or not at all, with the usual permissions. It is as old as the `.geo`
-/// was read: a change since then is newer.
+/// Writes a file that appears complete or not at all, with the usual permissions. Its time is the time
+/// `read` at which the `.geo` was read, so that a later change of the `.geo` is newer.
 fn write(path: &Path, bytes: &[u8], read: SystemTime) -> io::Result<()> {
     let mut builder = tempfile::Builder::new();
     let builder = builder.permissions(Permissions::from_mode(0o666));
@@ -126,11 +126,11 @@ fn write(path: &Path, bytes: &[u8], read: SystemTime) -> io::Result<()> {
     Ok(())
 }
 
-/// By what gmsh multiplies the lengths of a `.geo` file, `size` among them, when it writes the mesh:
-/// `Mesh.ScalingFactor`, 1 where it is not set.
+/// The factor by which gmsh multiplies all lengths of a `.geo` file, including `size`, when it writes the
+/// mesh: `Mesh.ScalingFactor`, 1 if it is not set.
 ///
 /// # Errors
-/// The `.geo` cannot be read, or sets it to something else than a positive number.
+/// The `.geo` cannot be read, or its factor is not a positive number.
 pub fn scaling_factor(geo: &Path) -> Result<f64, MeshError> {
     const OPTION: &str = "Mesh.ScalingFactor";
     let text = read_text(geo).map_err(MeshError::io(geo))?;
@@ -149,7 +149,7 @@ fn read_text(path: &Path) -> io::Result<String> {
     fs::read(path).map(|bytes| String::from_utf8_lossy(&bytes).into_owned())
 }
 
-/// Why gmsh would misread or silently ignore a parameter of the .geo file `text`, if it would.
+/// The reason why gmsh would misread or silently ignore a parameter of the .geo file `text`.
 fn refusal(text: &str, name: &str, value: f64) -> Option<&'static str> {
     let word = |c: char| c.is_ascii_alphanumeric() || c == '_';
     // An included file may define the parameter.
@@ -166,8 +166,8 @@ fn refusal(text: &str, name: &str, value: f64) -> Option<&'static str> {
     }
 }
 
-/// When the `.geo`, or a file that it takes in by `Include "name"` or `Merge "name"`, directly or
-/// through others, was last changed. Files that are not there are for gmsh to tell.
+/// The time of the last change of the `.geo` and of all files that it includes (`Include "name"`, `Merge
+/// "name"`), directly or through others. gmsh reports missing files.
 fn last_change(geo: &Path) -> io::Result<SystemTime> {
     let mut files = vec![fs::canonicalize(geo)?];
     let mut last = SystemTime::UNIX_EPOCH;
@@ -179,7 +179,7 @@ fn last_change(geo: &Path) -> io::Result<SystemTime> {
         let commands = ["Include", "Merge"].into_iter().flat_map(|word| text.split(word).skip(1));
         let quoted = commands.filter_map(|rest| rest.trim_start().strip_prefix('"'));
         for name in quoted.filter_map(|rest| rest.split('"').next()) {
-            // Names are relative to the file they stand in.
+            // Names are relative to the file that contains them.
             let path = fs::canonicalize(file.with_file_name(name)).ok();
             let new = path.filter(|path| path.is_file() && !files.contains(path));
             files.extend(new);
@@ -192,7 +192,7 @@ fn modified(path: &Path) -> io::Result<SystemTime> {
     fs::metadata(path).and_then(|data| data.modified())
 }
 
-/// Whether the `.geo` file `text` makes the largest length of an edge of the parameter `size`.
+/// Whether the `.geo` file `text` sets the largest length of an edge from the parameter `size`.
 fn bounds_by_size(text: &str) -> bool {
     let values = ["Mesh.MeshSizeMax", "Mesh.CharacteristicLengthMax"].into_iter();
     let mut values = values.flat_map(|option| text.split(option).skip(1));
@@ -201,8 +201,9 @@ fn bounds_by_size(text: &str) -> bool {
     values.any(|rest| rest.split(';').next().is_some_and(of_size))
 }
 
-/// What gmsh reads behind the `.geo` file `text`: that a parameter has not its value there is an error, and the
-/// options -order and -clmax would give way to a Mesh.ElementOrder and a Mesh.MeshSizeMax in the `.geo`.
+/// Commands that gmsh reads after the `.geo` file `text`. They make it an error if the `.geo` has changed a
+/// parameter, and they set the order and the largest size. (Options of the command line would give way to
+/// those in the `.geo`.)
 fn last_words(text: &str, parameters: &BTreeMap<String, f64>, order: Order) -> String {
     let kept = parameters.iter().map(|(name, value)| {
         format!(

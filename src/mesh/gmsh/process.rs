@@ -13,17 +13,17 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// How many different lines of gmsh are shown; it can repeat an error by the hundred.
+/// The number of different lines of gmsh in a message. gmsh can repeat an error hundreds of times.
 const SHOWN: usize = 5;
-/// Seconds that gmsh may take, and the variable of the environment that sets another number.
+/// The time limit of gmsh, s. An environment variable sets another limit.
 const SECONDS: f64 = 600.0;
 const SECONDS_VARIABLE: &str = "SIGNORINI_GMSH_SECONDS";
-/// How often it is looked whether gmsh has ended.
+/// The interval at which the program checks whether gmsh has ended.
 const POLL: Duration = Duration::from_millis(5);
 
-/// Runs gmsh with `arguments` on `input`, or on a mesh with these `bytes` that would stand there, and then on
-/// a file with the text `last`. Returns the bytes of the
-/// MSH 4.1 file that it makes. `task` completes "gmsh could not …" in messages.
+/// Runs gmsh with `arguments` on the file `input` and then on a file with the text `last`. Returns the bytes
+/// of the MSH 4.1 file that gmsh makes. If `bytes` are given, they replace the contents of `input`. `task`
+/// completes "gmsh could not …" in messages.
 ///
 /// # Errors
 /// gmsh is missing, takes too long or reports an error, or a signal came.
@@ -40,17 +40,17 @@ pub fn run(
     let mut command = Command::new("gmsh");
     command.args(["-format", "msh41", "-v", "1"]).args(arguments).arg("-o").arg(&made);
     match bytes {
-        // A copy, since gmsh would also run the options in a file INPUT.opt.
+        // A copy, as gmsh would also run the options in a file INPUT.opt.
         Some(bytes) => {
             let copy = scratch.path().join("old.msh");
             fs::write(&copy, bytes).map_err(MeshError::io(&copy))?;
             command.arg(copy);
         }
-        // "./" keeps a path that begins with a dash from being taken for an option.
+        // Without "./" gmsh would take a path that begins with a dash for an option.
         None => drop(command.arg(Path::new(".").join(input))),
     }
     command.arg(&second);
-    // A file takes what it says, however much: a pipe would have to be read meanwhile.
+    // The messages go to a file, as a pipe could fill up while gmsh works.
     let said = File::create(&log).and_then(|file| Ok([file.try_clone()?, file]));
     let [out, err] = said.map_err(MeshError::io(&log))?;
     let child = command.stdin(Stdio::null()).stdout(out).stderr(err).spawn();
@@ -82,7 +82,7 @@ pub fn run(
     Err(MeshError::file(input, format!("gmsh could not {task}:\n{message}")))
 }
 
-/// Waits for gmsh, which is ended with its time or by a signal to this process.
+/// Waits for gmsh. Ends it after the time limit or on a signal to this process.
 fn wait(mut gmsh: Child, input: &Path, task: &str) -> Result<ExitStatus, MeshError> {
     let (started, interrupts) = (Instant::now(), Interrupts::defer());
     let limit = env::var(SECONDS_VARIABLE).ok().and_then(|text| text.parse().ok());

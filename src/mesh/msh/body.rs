@@ -1,4 +1,4 @@
-//! Turns what a file lists into the mesh of a plane body, or says why it is none.
+//! Makes the mesh of a plane body from the contents of a file.
 
 use super::{
     super::{Curve, Mesh, Side, extent, sides, twice_area},
@@ -9,16 +9,16 @@ use super::{
 use rustc_hash::{FxHashMap as HashMap, FxHashSet as HashSet};
 use std::collections::BTreeMap;
 
-/// Twice the area over the square of the longest side: below this a triangle is a line.
+/// Twice the area over the square of the longest side: below this value a triangle is flat.
 const FLAT: f64 = 1e-10;
-/// What is said of triangles that another mesh of the same geometry may not have.
+/// The messages about triangles that another mesh of the same geometry may not have.
 const FLAT_TRIANGLE: &str = "has no area";
 const FOLDED: &str = "is folded";
 pub const DEGENERATE: [&str; 2] = [FLAT_TRIANGLE, FOLDED];
-/// |z| over the extent of the body: below this a node lies in the plane.
+/// |z| over the extent of the body: below this value a node lies in the plane.
 const PLANAR: f64 = 1e-10;
 
-/// The mesh of the body. Nodes of no triangle, such as the centres of arcs, are left out.
+/// The mesh of the body. It has no nodes without triangles, such as the centres of arcs.
 pub fn mesh(contents: &Contents) -> Result<Mesh> {
     let (elements, surfaces) = triangles(contents);
     if elements.is_empty() {
@@ -62,8 +62,8 @@ fn check_planar(&Node { tag, point: [.., z], at }: &Node, limit: f64) -> Result<
     }
 }
 
-/// The triangles of the body, those of its physical surfaces if there are any, and by name which of
-/// them are in each.
+/// The triangles of the body, and by name those of each physical surface. If there are physical surfaces,
+/// only their triangles make the body.
 fn triangles(contents: &Contents) -> (Vec<&Element<3>>, BTreeMap<String, Vec<usize>>) {
     let grouped = contents.triangles.iter().any(|t| t.group != 0);
     // A triangle is listed once for each of its groups; the first listing counts.
@@ -89,10 +89,10 @@ fn triangles(contents: &Contents) -> (Vec<&Element<3>>, BTreeMap<String, Vec<usi
     (elements, surfaces)
 }
 
-/// The numbers of the body's nodes by their tags.
+/// The indices of the body's nodes by their tags.
 type Index = HashMap<u64, usize>;
 
-/// Numbers the nodes of the triangles `elements` in the order of the file, and finds them there.
+/// Numbers the nodes of the triangles `elements` in the order of the file.
 fn number_nodes<'a>(
     contents: &'a Contents,
     elements: &[&Element<3>],
@@ -121,7 +121,7 @@ fn counter_clockwise(
     let mut triangle = tags.map(|tag| index[&tag]);
     let [a, b, c] = triangle.map(|node| nodes[node]);
     let twice = twice_area(a, b, c);
-    // Huge coordinates overflow the area.
+    // The area of a triangle with huge coordinates overflows.
     if twice.abs() <= flat([a, b, c]) || !twice.is_finite() {
         let problem = format!(
             "triangle {tag} {FLAT_TRIANGLE}: its nodes lie on a line, or squares of its coordinates are \
@@ -135,7 +135,7 @@ fn counter_clockwise(
     Ok(triangle)
 }
 
-/// Twice the area (m²) of a triangle that is a line.
+/// The largest twice the area (m²) of a flat triangle with these vertices.
 fn flat([a, b, c]: [[f64; 2]; 3]) -> f64 {
     let length = |p: [f64; 2], q: [f64; 2]| (q[0] - p[0]).hypot(q[1] - p[1]);
     let longest = length(a, b).max(length(b, c)).max(length(c, a));
@@ -150,8 +150,8 @@ fn missing_node<T>(element: u64, node: u64, at: usize) -> Result<T> {
     fault(at, format!("element {element} refers to node {node}, which $Nodes does not list"))
 }
 
-/// Sets the midpoints of the edges of `elements`, the triangles of `mesh`, which are of second
-/// order, and checks that none of them is folded.
+/// Sets the midpoints of the edges of `elements`, the second-order triangles of `mesh`, and checks that no
+/// triangle is folded.
 fn set_midpoints(
     mesh: &mut Mesh,
     contents: &Contents,

@@ -1,4 +1,4 @@
-//! The sections of a `.msh` file and the numbers in them, whether text or binary.
+//! The sections of a `.msh` file and the numbers in them, text or binary.
 
 use std::{borrow::Cow, fmt::Display, str::FromStr};
 
@@ -11,7 +11,7 @@ pub fn fault<T>(at: impl Into<Option<usize>>, problem: impl Into<String>) -> Res
     Err((at.into(), problem.into()))
 }
 
-/// The error of finding something else, shortened to what fits a terminal.
+/// An error: the file has `found` instead of `what`. Long texts are cut.
 pub fn expected<T>(at: usize, what: &str, found: impl Display) -> Result<T> {
     let mut found: String = found.to_string().trim().escape_debug().collect();
     if found.chars().count() > 40 {
@@ -20,15 +20,15 @@ pub fn expected<T>(at: usize, what: &str, found: impl Display) -> Result<T> {
     fault(at, format!("expected {what}, found `{found}`"))
 }
 
-/// The error of a file that is no mesh file.
+/// The error of a file that is not a mesh file.
 pub fn not_a_mesh<T>(at: impl Into<Option<usize>>) -> Result<T> {
     fault(at, "not a gmsh mesh: it does not begin with $MeshFormat")
 }
 
-/// What stands between the lines `$Name` and `$EndName`.
+/// The part of a file between the lines `$Name` and `$EndName`.
 pub struct Section<'a> {
     pub name: &'a str,
-    /// Where the section begins, at its first line.
+    /// The byte at which the section begins, with its first line.
     pub at: usize,
     /// The file up to the section's last line.
     bytes: &'a [u8],
@@ -70,28 +70,28 @@ impl<'a> Section<'a> {
     }
 }
 
-/// What to do about a file that is not complete.
+/// The advice for an incomplete file.
 const AGAIN: &str = "mesh or copy it again";
 
 fn first_line(bytes: &[u8]) -> &[u8] {
     bytes.split_inclusive(|&b| b == b'\n').next().unwrap_or_default()
 }
 
-/// How many blanks `bytes` begin with.
+/// The number of blanks at the start of `bytes`.
 fn blanks(bytes: &[u8]) -> usize {
     bytes.iter().take_while(|b| b.is_ascii_whitespace()).count()
 }
 
-/// How a file writes its numbers.
+/// The form of the numbers in a file.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Numbers {
-    /// As words between blanks.
+    /// Words between blanks.
     Text,
-    /// Binary; tags and counts are `size_t`s of eight bytes.
+    /// Binary; tags and counts have eight bytes (`size_t`).
     Binary,
 }
 
-/// Reads a section from front to back. No read goes beyond its end: counts need no check.
+/// Reads a section from start to end. No read goes beyond the end of the section, so counts need no check.
 pub struct ByteReader<'a> {
     section: &'a Section<'a>,
     position: usize,
@@ -99,7 +99,7 @@ pub struct ByteReader<'a> {
 }
 
 impl<'a> ByteReader<'a> {
-    /// At the start of `section`.
+    /// A reader at the start of `section`.
     pub fn new(section: &'a Section, numbers: Numbers) -> Self {
         Self { section, position: section.start, numbers }
     }
@@ -109,7 +109,7 @@ impl<'a> ByteReader<'a> {
         self.numbers != Numbers::Text
     }
 
-    /// The byte of the next item, past the blanks of a text file.
+    /// The byte of the next item, after the blanks of a text file.
     pub fn position(&mut self) -> usize {
         if !self.is_binary() {
             self.position += blanks(self.rest());
@@ -121,7 +121,7 @@ impl<'a> ByteReader<'a> {
         &self.section.bytes[self.position..]
     }
 
-    /// Makes sure that the section holds nothing more.
+    /// Checks that the section is read to its end.
     pub fn finish(self) -> Result<()> {
         let rest = self.rest().trim_ascii_start();
         if rest.is_empty() {
@@ -137,7 +137,7 @@ impl<'a> ByteReader<'a> {
         Ok(String::from_utf8_lossy(line.trim_ascii()))
     }
 
-    /// A count on a line of its own, which is text in any file.
+    /// A count on its own line, which is text also in binary files.
     pub fn count_line(&mut self) -> Result<u64> {
         let at = self.position();
         let line = self.line("a count")?;

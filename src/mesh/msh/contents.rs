@@ -1,5 +1,4 @@
-//! The nodes and elements that a `.msh` file lists, before they are known to be a mesh of a plane
-//! body.
+//! The nodes and elements of a `.msh` file, before they are checked to be the mesh of a plane body.
 
 use super::byte_reader::{ByteReader, Result, fault};
 use rustc_hash::FxHashMap as HashMap;
@@ -24,7 +23,7 @@ pub struct Element<const N: usize> {
     pub at: usize,
 }
 
-/// What a file lists, in its order.
+/// The contents of a file in its order.
 #[derive(Default)]
 pub struct Contents {
     /// Names of the physical curves and surfaces by dimension and tag.
@@ -38,7 +37,7 @@ pub struct Contents {
     pub lines: Vec<Element<2>>,
     /// The triangles, once for each of their groups.
     pub triangles: Vec<Element<3>>,
-    /// Tags of the nodes between the vertices of second-order elements, by these in increasing
+    /// Tags of the midpoint nodes of second-order elements, by the vertices of their edges in increasing
     /// order.
     pub midpoints: HashMap<[u64; 2], u64>,
 }
@@ -62,8 +61,8 @@ impl Contents {
         Ok(())
     }
 
-    /// Reads the nodes of the element `tag` of gmsh's `element_type`, which is listed at byte `at`. It is kept once for each of its physical `groups`, a triangle
-    /// without any in group 0.
+    /// Reads the nodes of the element `tag` of gmsh's `element_type`, which is listed at byte `at`. The
+    /// contents get it once for each of its physical `groups`; a triangle without groups gets group 0.
     pub fn read_element(
         &mut self,
         reader: &mut ByteReader,
@@ -109,7 +108,7 @@ impl Contents {
         fault(at, problem)
     }
 
-    /// Reads the nodes between the vertices of the element `tag` of second order, along its `edges`.
+    /// Reads the midpoint nodes of the second-order element `tag`, one for each of its `edges`.
     fn read_midpoints(
         &mut self,
         reader: &mut ByteReader,

@@ -1,5 +1,5 @@
 //! Reads gmsh's `.msh` files of version 4.1, text and binary
-//! (<https://gmsh.info/doc/texinfo/gmsh.html#File-formats>); gmsh converts others.
+//! (<https://gmsh.info/doc/texinfo/gmsh.html#File-formats>). gmsh converts files of other versions.
 
 mod body;
 mod byte_reader;
@@ -17,34 +17,33 @@ use std::{collections::BTreeMap, ffi::OsString, fs, path::Path};
 
 /// Reads a `.msh` file.
 ///
-/// If any triangle belongs to a physical surface, only such triangles make the body. Physical curves of
-/// the same name are one curve, as are physical surfaces. Nodes and triangles keep the order of the
-/// file.
+/// If there are physical surfaces, only their triangles make the body. Physical curves of the same name are
+/// one curve, and so are physical surfaces. Nodes and triangles keep the order of the file.
 ///
-/// A file of another version, or of a machine with another byte order, is converted by gmsh.
+/// gmsh converts a file of another version, or of a machine with another byte order.
 ///
 /// # Errors
-/// The file cannot be read or converted, or it is not the mesh of a plane body; the message says where.
+/// The file cannot be read or converted, or it is not the mesh of a plane body. The message names the place.
 pub fn read(path: &Path) -> std::result::Result<Mesh, MeshError> {
     let bytes = fs::read(path).map_err(MeshError::io(path))?;
     let Some(version) = foreign_version(&bytes) else { return parse(&bytes, path) };
     let converted = converted(path, &bytes, version)?;
     let mesh = sections_of(&converted)
         .and_then(|sections| contents(&sections, version < 4.0))
-        // gmsh drops names that several groups have.
+        // gmsh drops the names that several groups share.
         .and_then(|contents| {
             let sections = sections_of(&bytes).unwrap_or_default();
             Ok(Contents { names: names(&sections)?, ..contents })
         })
         .and_then(|contents| body::mesh(&contents));
-    // Bytes of what gmsh made are no places in the file.
+    // The place in the converted bytes is no place in the file.
     mesh.map_err(|(_, problem)| MeshError::file(path, problem))
 }
 
-/// As [`read`], from the bytes of a file of version 4.1 that would stand at `path`.
+/// As [`read`], from the bytes of a file of version 4.1. Messages name the file `path`.
 ///
 /// # Errors
-/// As [`read`], but for the reading itself.
+/// The bytes are not the mesh of a plane body.
 pub fn parse(bytes: &[u8], path: &Path) -> std::result::Result<Mesh, MeshError> {
     let mut sections = Vec::new();
     let mesh = Section::split(bytes, &mut sections)
@@ -61,13 +60,13 @@ fn sections_of(bytes: &[u8]) -> Result<Vec<Section<'_>>> {
     Section::split(bytes, &mut sections).map(|()| sections)
 }
 
-/// The version of a complete file that gmsh must convert: another one than 4.1, or with binary numbers of
+/// The version of a complete file that gmsh must convert: its version is not 4.1, or its binary numbers have
 /// another byte order.
 fn foreign_version(bytes: &[u8]) -> Option<f64> {
     if bytes.starts_with(b"$NOD") {
         return Some(1.0);
     }
-    // Of another beginning gmsh would run the file as a script.
+    // With another beginning gmsh would run the file as a script.
     if ![&b"$MeshFormat"[..], b"$Comments"].iter().any(|first| bytes.starts_with(first)) {
         return None;
     }
@@ -76,17 +75,17 @@ fn foreign_version(bytes: &[u8]) -> Option<f64> {
     format(header).ok()?.err()
 }
 
-/// What gmsh makes of a file of this version.
+/// The bytes of a file of this version after gmsh has converted it to MSH 4.1.
 ///
-/// In versions before 4 each element names its group itself, and gmsh would put all groups of an entity's
-/// elements on the entity. With its tags switched the groups become the entities.
+/// In versions before 4 each element names its own group, but gmsh would give all groups of an entity's
+/// elements to the entity. If its tags are switched, the groups become the entities.
 fn converted(path: &Path, bytes: &[u8], version: f64) -> std::result::Result<Vec<u8>, MeshError> {
     let switch = (version < 4.0).then_some("-switch_tags");
     let arguments = ["-save", "-save_all", "-bin"].into_iter().chain(switch).map(OsString::from);
     gmsh::run((path, Some(bytes)), arguments, "", "convert it to MSH 4.1")
 }
 
-/// The place of a byte for a message: a line of a text file, a byte of a binary one.
+/// The place of a byte in a message: the line in a text file, the byte in a binary file.
 fn place(byte: usize, bytes: &[u8], sections: &[Section]) -> String {
     // Every binary file holds the four bytes of the integer 1.
     if !bytes.contains(&0) {
@@ -97,7 +96,7 @@ fn place(byte: usize, bytes: &[u8], sections: &[Section]) -> String {
     format!(", byte {byte}{section}")
 }
 
-/// What the sections list, in whatever order they stand. The physical groups are those of the entities, or
+/// The contents of the sections, which may have any order. The physical groups are those of the entities, or
 /// the entities themselves.
 fn contents(sections: &[Section], groups_are_entities: bool) -> Result<Contents> {
     let all = |name| sections.iter().filter(move |section| section.name == name);
@@ -137,8 +136,8 @@ fn contents(sections: &[Section], groups_are_entities: bool) -> Result<Contents>
     }
 }
 
-/// `$MeshFormat`: version, text or binary, size of a number; in a binary file then the integer 1. The form of
-/// the numbers of version 4.1, or of a file that gmsh must convert its version.
+/// Reads `$MeshFormat`: version, text or binary, size of a number; in a binary file then the integer 1.
+/// Returns the form of the numbers of version 4.1, or the version of a file that gmsh must convert.
 fn format(section: &Section) -> Result<std::result::Result<Numbers, f64>> {
     let what = "version, file type and data size";
     let mut reader = ByteReader::new(section, Numbers::Text);

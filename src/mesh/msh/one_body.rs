@@ -1,4 +1,4 @@
-//! Refuses triangles that make more than one body.
+//! Checks that the triangles make one body.
 
 use super::byte_reader::{Result, fault};
 use crate::mesh::{Side, twice_area};
@@ -11,7 +11,7 @@ pub fn check(nodes: &[[f64; 2]], triangles: &[[usize; 3]], sides: &[Side]) -> Re
     if part.iter().all(|&part| part == 0) {
         return Ok(());
     }
-    // Triangles connected through nodes are one piece.
+    // Triangles that are connected through nodes make one piece.
     let mut first = vec![None; nodes.len()];
     let corners = triangles.iter().enumerate().flat_map(|(t, nodes)| nodes.map(|node| (node, t)));
     let meeting = corners.map(|(node, t)| (node, [*first[node].get_or_insert(t), t]));
@@ -31,8 +31,8 @@ pub fn check(nodes: &[[f64; 2]], triangles: &[[usize; 3]], sides: &[Side]) -> Re
     fault(None, problem + ", or solve them one by one")
 }
 
-/// The sets into which `links` join the numbers below `count`, by union–find: the least member of each
-/// number's set.
+/// The sets into which `links` join the numbers below `count` (union–find). Per number: the smallest member
+/// of its set.
 fn components(count: usize, links: impl IntoIterator<Item = [usize; 2]>) -> Vec<usize> {
     let mut parent: Vec<usize> = (0..count).collect();
     for link in links {
@@ -50,7 +50,7 @@ fn components(count: usize, links: impl IntoIterator<Item = [usize; 2]>) -> Vec<
     parent
 }
 
-/// The centroid of the triangles that are `counted`, m.
+/// The centroid of the `counted` triangles, m.
 fn centroid(
     nodes: &[[f64; 2]],
     triangles: &[[usize; 3]],
@@ -66,7 +66,7 @@ fn centroid(
     [sums[1] / sums[0], sums[2] / sums[0]]
 }
 
-/// Coordinates with six digits: no -0.
+/// Coordinates with six digits, and 0 instead of -0.
 fn place(x: [f64; 2]) -> String {
     let [x, y] = x.map(|v| format!("{v:.5e}").parse::<f64>().unwrap_or(v) + 0.0);
     format!("({x}, {y})")

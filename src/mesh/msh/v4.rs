@@ -1,4 +1,4 @@
-//! `$Entities`, `$Nodes` and `$Elements` of MSH 4.1: everything in blocks, one for each entity.
+//! `$Entities`, `$Nodes` and `$Elements` of MSH 4.1, in blocks for each entity.
 
 use super::{
     byte_reader::{ByteReader, Result, expected},
@@ -13,13 +13,13 @@ pub fn entities(reader: &mut ByteReader, contents: &mut Contents) -> Result<()> 
     for (dimension, count) in (0..).zip(counts) {
         for _ in 0..count {
             let tag = reader.int("an entity tag")?;
-            // A point has three coordinates, the others six of their bounding box.
+            // A point has three coordinates, other entities have the six of their bounding box.
             for _ in 0..if dimension == 0 { 3 } else { 6 } {
                 reader.real("a number")?;
             }
             let groups = contents.groups.entry((dimension, tag)).or_default();
             for _ in 0..reader.size("a count")? {
-                // A negative group only says that the curve runs backwards.
+                // The sign of a group is the direction of the curve.
                 groups.push(reader.int("a physical tag")?.saturating_abs());
             }
             let boundary = if dimension == 0 { 0 } else { reader.size("a count")? };
@@ -45,7 +45,7 @@ pub fn nodes(reader: &mut ByteReader, contents: &mut Contents) -> Result<()> {
         }
         for (at, tag) in tags {
             contents.read_node(reader, tag, at)?;
-            // A parametric node adds as many parameters as its entity has dimensions.
+            // A parametric node has one more number per dimension of its entity.
             for _ in 0..if parametric { dimension.clamp(0, 3) } else { 0 } {
                 reader.real("a number")?;
             }
@@ -77,7 +77,7 @@ pub fn elements(reader: &mut ByteReader, contents: &mut Contents) -> Result<()> 
     check_total(start, "elements", announced, found)
 }
 
-/// The numbers of blocks and of items in all of them; the range of their tags is of no use here.
+/// The number of blocks, and the number of items in all blocks. Skips the range of their tags.
 pub fn header(reader: &mut ByteReader) -> Result<(u64, u64)> {
     let counts = (reader.size("a count")?, reader.size("a count")?);
     reader.size("the smallest tag")?;

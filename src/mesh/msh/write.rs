@@ -1,4 +1,4 @@
-//! Writes a mesh as text in MSH 4.1, which gmsh and our reader turn into the same mesh again.
+//! Writes a mesh as text in MSH 4.1. gmsh and our reader read the same mesh from it.
 
 use crate::mesh::{Mesh, sides, sorted};
 use std::collections::BTreeMap;
@@ -8,8 +8,8 @@ const LINES: [u8; 2] = [1, 8];
 const TRIANGLES: [u8; 2] = [2, 9];
 
 impl Mesh {
-    /// The text of an MSH file. Where an edge is curved, all elements are of second order. Each curve is
-    /// an entity, and so is each set of surfaces that triangles have in common.
+    /// The text of an MSH file. If any edge is curved, all elements are of second order. Each curve is an
+    /// entity, and so is each combination of surfaces that triangles belong to.
     pub fn to_msh(&self) -> String {
         let midpoints = if self.curved.is_empty() { Vec::new() } else { self.midpoints() };
         let surfaces: Vec<(&str, Vec<usize>)> = match self.surfaces.is_empty() {
@@ -52,8 +52,8 @@ impl Mesh {
         text + "$EndNodes\n" + &self.elements(&midpoints, &groups, &entities) + "$EndElements\n"
     }
 
-    /// `$Elements` but for its last line. Triangles are listed in their order, in a block as long as they
-    /// are in the same surfaces.
+    /// `$Elements` without its last line. Triangles keep their order. Consecutive triangles of the same
+    /// surfaces make a block.
     fn elements(
         &self,
         midpoints: &[([usize; 2], [f64; 2])],

@@ -1,15 +1,15 @@
-//! The entries that a matrix stores on this rank, read and written in place.
+//! Reading and writing the stored entries of a matrix in place.
 
 use super::{Matrix, Pattern};
 use crate::petsc::{PetscError, Session, check, raw, vector::same_size};
 use std::{ptr, slice};
 
 impl Matrix {
-    /// A matrix yet to be filled, as by [`Self::with_pattern`], and the place of each entry of its pattern
-    /// among those of `read_entries`.
+    /// A matrix without values, otherwise as by [`Self::with_pattern`], and per entry of the pattern its
+    /// index among the entries of `read_entries`.
     ///
     /// # Errors
-    /// As there.
+    /// As [`Self::with_pattern`].
     pub fn with_places(
         session: &Session,
         block: usize,
@@ -25,8 +25,8 @@ impl Matrix {
         Ok((matrix, places))
     }
 
-    /// Replaces the entries that this rank stores, in the order of `read_entries`, by what `writer`
-    /// makes of zeros. Collective.
+    /// Replaces the stored entries of this rank, in the order of `read_entries`. `writer` gets zeros and adds
+    /// to them. Collective.
     ///
     /// # Errors
     /// PETSc failed.
@@ -46,22 +46,22 @@ impl Matrix {
             self.write_block(block, |entries| entries.copy_from_slice(own))?;
         }
         let done = raw::MatAssemblyType::MAT_FINAL_ASSEMBLY;
-        // SAFETY: a live handle. PETSc sees by this that its blocks have changed.
+        // SAFETY: a live handle. The assembly informs PETSc that the blocks have changed.
         unsafe {
             check(raw::MatAssemblyBegin(self.raw(), done))?;
             check(raw::MatAssemblyEnd(self.raw(), done))
         }
     }
 
-    /// Lends the entries of one of `blocks` to `writer` (MatSeqAIJGetArray).
+    /// Calls `writer` with the entries of one of `blocks` (MatSeqAIJGetArray).
     fn write_block(
         &mut self,
         (block, count): (raw::Mat, usize),
         writer: impl FnOnce(&mut [f64]),
     ) -> Result<(), PetscError> {
         let mut data = ptr::null_mut();
-        // SAFETY: a live block, which lends `count` values until they are given back; `&mut self` keeps
-        // other readers away.
+        // SAFETY: a live block, which lends `count` values until they are restored; `&mut self` excludes
+        // other readers.
         unsafe {
             check(raw::MatSeqAIJGetArray(block, &mut data))?;
             writer(if count > 0 { slice::from_raw_parts_mut(data, count) } else { &mut [] });
@@ -69,12 +69,12 @@ impl Matrix {
         }
     }
 
-    /// Copies the entries that this rank stores into `values` (MatSeqAIJGetArrayRead).
+    /// Copies the stored entries of this rank into `values` (MatSeqAIJGetArrayRead).
     pub(crate) fn read_entries(&self, values: &mut Vec<f64>) -> Result<(), PetscError> {
         values.clear();
         for (block, count) in self.blocks()? {
             let mut data = ptr::null();
-            // SAFETY: a live block, which lends `count` values until they are given back.
+            // SAFETY: a live block, which lends `count` values until they are restored.
             unsafe {
                 check(raw::MatSeqAIJGetArrayRead(block, &mut data))?;
                 (count > 0).then(|| values.extend(slice::from_raw_parts(data, count)));
@@ -84,15 +84,15 @@ impl Matrix {
         Ok(())
     }
 
-    /// Replaces the entries that this rank stores by those that [`Self::read_entries`] has copied from a
-    /// matrix of the same pattern. Collective.
+    /// Replaces the stored entries of this rank by `values`, which [`Self::read_entries`] has copied from a
+    /// matrix with the same pattern. Collective.
     pub(crate) fn set_entries(&mut self, values: &[f64]) -> Result<(), PetscError> {
         same_size(self.entries(), values.len())?;
         self.fill(|entries| entries.copy_from_slice(values))
     }
 
-    /// The blocks of this rank's rows, of the columns that it owns and of the others, each with the
-    /// number of its stored entries (MatMPIAIJGetSeqAIJ).
+    /// The blocks of this rank's rows, each with the number of its stored entries (MatMPIAIJGetSeqAIJ). On
+    /// several ranks the first block has the columns that this rank owns, the second the other columns.
     fn blocks(&self) -> Result<Vec<(raw::Mat, usize)>, PetscError> {
         let (mut own, mut others) = (self.raw(), ptr::null_mut());
         let (mut parallel, columns) = (raw::PetscBool::PETSC_FALSE, ptr::null_mut());
@@ -112,14 +112,14 @@ impl Matrix {
         Ok(blocks)
     }
 
-    /// The number of entries that this rank stores; 0 were PETSc not to tell.
+    /// The number of stored entries of this rank; 0 if PETSc fails.
     pub fn entries(&self) -> usize {
         // SAFETY: a live handle.
         unsafe { stored(self.raw()) }.unwrap_or(0)
     }
 }
 
-/// The number of entries that this rank stores of a matrix (MatGetInfo).
+/// The number of entries of a matrix that this rank stores (MatGetInfo).
 ///
 /// # Safety
 /// The matrix is live.

@@ -1,4 +1,4 @@
-//! Where a sparse matrix has entries.
+//! The pattern of a sparse matrix.
 
 /// The positions of the entries in the rows of a rank, in compressed sparse rows (CSR): row i has the global
 /// columns `columns[starts[i]..starts[i + 1]]`, increasing.
@@ -8,8 +8,8 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// Of so many rows, from the row and the global column of each entry, in any order and as often as it
-    /// comes.
+    /// The pattern with `rows` rows from the row and the global column of each entry. The order is free, and
+    /// entries may repeat.
     pub fn new(rows: usize, entries: impl Iterator<Item = (usize, i32)> + Clone) -> Self {
         let mut first = vec![0; rows + 1];
         entries.clone().for_each(|(row, _)| first[row + 1] += 1);
@@ -41,7 +41,7 @@ impl Pattern {
         place.map(|place| start + place)
     }
 
-    /// With a block of 2×2 entries in the place of each entry.
+    /// The pattern in which every entry becomes a block of 2×2 entries.
     pub fn of_blocks(&self) -> Self {
         let (mut starts, mut columns) = (vec![0], Vec::with_capacity(4 * self.entries()));
         for span in self.starts.windows(2) {
@@ -54,7 +54,8 @@ impl Pattern {
         Self { starts, columns }
     }
 
-    /// In [`Self::of_blocks`], where both rows begin of the block of an entry in `row` at `position`.
+    /// The positions in [`Self::of_blocks`] at which the two rows of a block begin. The block belongs to the
+    /// entry in `row` at `position`.
     pub fn rows_of_block(&self, row: usize, position: usize) -> [usize; 2] {
         let [start, end] = [row, row + 1].map(|row| self.starts[row] as usize);
         let first = 2 * (start + position);

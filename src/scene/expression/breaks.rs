@@ -2,17 +2,17 @@
 
 use super::Expression;
 
-/// The parts of a run in which an expression is looked at first. Chosen steps look as closely
-/// themselves: only what is shorter is found here.
+/// The number of parts of a run whose ends are evaluated first. Adaptive steps find longer events themselves;
+/// this search finds the shorter ones.
 const PARTS: usize = 512;
-/// Changes count if they are more than this part of all that happens in a run.
+/// The smallest change that counts, over the whole range of the expression in the run.
 const CHANGE: f64 = 0.05;
-/// Two times nearer than this part of the run are one, at which the expression jumps.
+/// The time between the two sides of a jump, over the time of the run.
 const APART: f64 = 1e-9;
-/// The intervals looked at in one of the parts, at most. A jump takes 60, a smooth pulse about 100.
+/// The largest number of intervals that are bisected in one part. A jump takes 60, a smooth pulse about 100.
 const LOOKS: usize = 400;
 
-/// A time, s, with the bounds of the expression just before and at it.
+/// A time, s, with the bounds of the expression just before it and at it.
 struct Knot {
     time: f64,
     before: [f64; 2],
@@ -23,20 +23,20 @@ struct Knot {
 struct Envelope<'a> {
     expression: &'a Expression,
     space: [[f64; 2]; 2],
-    /// Changes below this do not count.
+    /// The smallest change that counts.
     least: f64,
-    /// The length of a part and the shortest interval, s.
+    /// The length of a part and of the shortest interval, s.
     part: f64,
     apart: f64,
 }
 
 impl Expression {
-    /// Times in (0, `end`), s, rising, between which the bounds of the expression over the box `space`
-    /// are nearly linear in time, as far as shorter intervals than 1/512 of `end` show it: around pulses, at
-    /// jumps (the first time with the new value) and kinks.
+    /// Times in (0, `end`), s, increasing, between which the bounds of the expression over the box `space`
+    /// are nearly linear in time. They are the ends and peaks of pulses shorter than 1/512 of `end`, kinks, and
+    /// jumps (the first time with the new value).
     ///
-    /// An interval [a, b] is bisected while [`Expression::range`] leaves room in it for values beyond those
-    /// at a, b and its middle, or the bounds at the middle are not the mean of those at a and b.
+    /// An interval [a, b] is bisected in two cases: its bounds by [`Expression::range`] exceed the values at
+    /// a, b and the middle, or the bounds at the middle are not the mean of those at a and b.
     pub fn breaks(&self, space: [[f64; 2]; 2], end: f64) -> Vec<f64> {
         if !self.depends_on_time() {
             return Vec::new();
@@ -78,12 +78,13 @@ impl Envelope<'_> {
         Knot { time, before: bounds, bounds }
     }
 
-    /// Whether two bounds differ by more than a part of what counts. Infinite ones tell nothing.
+    /// Whether two bounds differ by more than `part` of the smallest change that counts. Infinite bounds do
+    /// not count.
     fn differ(&self, a: [f64; 2], b: [f64; 2], part: f64) -> bool {
         (0..2).any(|k| (a[k] - b[k]).abs() > part * self.least)
     }
 
-    /// Adds the first knot and those between the two; then the last one, which belongs to what follows.
+    /// Adds the first knot and the knots between the two. The last knot belongs to the next interval.
     fn bisect(&self, first: Knot, last: Knot, looks: &mut usize, found: &mut Vec<Knot>) {
         let length = last.time - first.time;
         let middle = self.knot(0.5 * (first.time + last.time));
@@ -110,7 +111,7 @@ impl Envelope<'_> {
         }
     }
 
-    /// The first time between two at which the bounds are those of the last.
+    /// The first time between two knots at which the bounds are those of the last one.
     fn jump(&self, first: &Knot, last: &Knot) -> Knot {
         let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).abs() + (a[1] - b[1]).abs();
         let (mut from, mut to) = (first.time, last.time);
@@ -127,7 +128,7 @@ impl Envelope<'_> {
         }
     }
 
-    /// The times of those knots within bisected parts that are not on the line between their neighbours.
+    /// The times of the knots in bisected parts that are not on the line between their neighbours.
     fn needed(&self, knots: &[Knot]) -> Vec<f64> {
         let mut times = Vec::new();
         let Some(mut last) = knots.first() else { return times };

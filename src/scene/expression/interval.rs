@@ -1,9 +1,9 @@
 //! Interval arithmetic: bounds on all values that an expression takes in a box of x, y and t.
 //!
 //! The natural interval extension (Moore, Kearfott, Cloud, *Introduction to Interval Analysis*, 2009,
-//! chapter 5): each instruction maps intervals that contain its arguments to one that contains its
-//! values. The bounds are sharp where each variable occurs once, and their excess falls like the size of
-//! the box elsewhere. Rounding is not added.
+//! chapter 5): each instruction maps intervals that contain its arguments to an interval that contains its
+//! values. The bounds are sharp if each variable occurs once; otherwise their excess decreases with the size
+//! of the box. They ignore rounding errors.
 
 use super::{
     Expression,
@@ -20,14 +20,15 @@ pub(super) type Enclosure = fn(fn(f64) -> f64, Interval) -> Interval;
 /// The same for two arguments.
 pub(super) type Enclosure2 = fn(fn(f64, f64) -> f64, Interval, Interval) -> Interval;
 
-/// The bounds of what may be any number.
+/// The bounds of an unknown number.
 const EVERYTHING: Interval = [f64::NEG_INFINITY, f64::INFINITY];
-/// The bounds of a condition that holds in a part of the box.
+/// The bounds of a condition that is true in a part of the box only.
 const UNDECIDED: Interval = [0.0, 1.0];
 
 impl Expression {
-    /// A lower and an upper bound on all values at points of the box `[x, y, t]` where the expression is
-    /// defined, each variable between two numbers; infinite where none is known. Bounds hold up to rounding.
+    /// A lower and an upper bound on all values of the expression in the box `[x, y, t]`, with each variable
+    /// between two numbers. Points where the expression is not defined do not count. Bounds may be infinite.
+    /// They hold up to rounding.
     ///
     /// ```
     /// use signorini::scene::Expression;
@@ -69,7 +70,7 @@ impl Expression {
     }
 }
 
-/// The least interval with all of `values`; all numbers where one of them is none.
+/// The smallest interval with all `values`; all numbers if one of them is NaN.
 fn hull(values: impl IntoIterator<Item = f64>) -> Interval {
     let mut bounds = [f64::INFINITY, f64::NEG_INFINITY];
     for value in values {
@@ -81,12 +82,12 @@ fn hull(values: impl IntoIterator<Item = f64>) -> Interval {
     bounds
 }
 
-/// A function that rises or falls.
+/// A monotone function.
 pub(super) fn monotone(f: fn(f64) -> f64, a: Interval) -> Interval {
     hull(a.map(f))
 }
 
-/// A function that rises from 0 on and is not defined below.
+/// A function that increases from 0 on and is not defined below 0.
 pub(super) fn from_zero(f: fn(f64) -> f64, a: Interval) -> Interval {
     monotone(f, [if a[1] < 0.0 { a[0] } else { a[0].max(0.0) }, a[1]])
 }
@@ -106,7 +107,7 @@ pub(super) fn cosine(f: fn(f64) -> f64, a: Interval) -> Interval {
     wave(f, a, 0.0)
 }
 
-/// A wave between −1 and 1, which are at `peak` + π + 2πk and at `peak` + 2πk.
+/// A wave with the value 1 at `peak` + 2πk and −1 at `peak` + π + 2πk.
 fn wave(f: fn(f64) -> f64, [a, b]: Interval, peak: f64) -> Interval {
     if !(b - a).is_finite() {
         return [-1.0, 1.0];
@@ -122,7 +123,7 @@ pub(super) fn tangent(f: fn(f64) -> f64, a: Interval) -> Interval {
     if from == to { monotone(f, a) } else { EVERYTHING }
 }
 
-/// A function that rises or falls in each argument.
+/// A function that is monotone in each argument.
 pub(super) fn corners(f: fn(f64, f64) -> f64, a: Interval, b: Interval) -> Interval {
     hull([f(a[0], b[0]), f(a[0], b[1]), f(a[1], b[0]), f(a[1], b[1])])
 }
@@ -132,7 +133,7 @@ pub(super) fn quotient(f: fn(f64, f64) -> f64, a: Interval, b: Interval) -> Inte
     if b[0] <= 0.0 && b[1] >= 0.0 { EVERYTHING } else { corners(f, a, b) }
 }
 
-/// a ^ b; below zero a has powers with whole exponents only.
+/// a ^ b; for negative a the exponent must be an integer.
 pub(super) fn power(f: fn(f64, f64) -> f64, a: Interval, b: Interval) -> Interval {
     let whole = b[0] == b[1] && b[0].fract() == 0.0;
     match a {
@@ -144,7 +145,7 @@ pub(super) fn power(f: fn(f64, f64) -> f64, a: Interval, b: Interval) -> Interva
     }
 }
 
-/// atan2(y, x), which jumps where x < 0 = y.
+/// atan2(y, x), which jumps at y = 0 for x < 0.
 pub(super) fn angle(f: fn(f64, f64) -> f64, y: Interval, x: Interval) -> Interval {
     let jumps = x[0] <= 0.0 && y[0] <= 0.0 && y[1] >= 0.0;
     if jumps { [-PI, PI] } else { corners(f, y, x) }
@@ -156,8 +157,8 @@ pub(super) fn logical(f: fn(f64, f64) -> f64, a: Interval, b: Interval) -> Inter
     if mixed { UNDECIDED } else { corners(f, a, b) }
 }
 
-/// A comparison. The corners decide where it is one of order; the other two, `==` and `!=`, do not change
-/// when their arguments are exchanged.
+/// A comparison. The corners of the box decide comparisons of order. `==` and `!=` are symmetric in their
+/// arguments.
 fn compared(holds: fn(&f64, &f64) -> bool, a: Interval, b: Interval) -> Interval {
     let meet = a[0] <= b[1] && b[0] <= a[1] && (a[0] < a[1] || b[0] < b[1]);
     if meet && holds(&0.0, &1.0) == holds(&1.0, &0.0) {

@@ -1,4 +1,4 @@
-//! From the text of an expression to its program.
+//! Parses the text of an expression into its program.
 
 use super::{
     Expression,
@@ -8,7 +8,7 @@ use super::{
 use crate::suggestion::suggestion;
 use std::{f64::consts::PI, path::Path, sync::Arc};
 
-/// All names, and what they stand for.
+/// All names with their instructions.
 const NAMES: [(&str, Instruction); 15] = [
     ("x", Variable(0)),
     ("y", Variable(1)),
@@ -26,9 +26,9 @@ const NAMES: [(&str, Instruction); 15] = [
     ("atan2", Binary(f64::atan2, interval::angle)),
     ("if", Choose),
 ];
-/// What operators do, how strongly they bind, and how strongly an operator in their right operand
-/// must bind at least: `a - b` is taken from the left, `a^b` from the right. (One that begins with
-/// another comes first.)
+/// Per operator: its text, its instruction, its precedence, and the smallest precedence of operators in its
+/// right operand: `a - b - c` groups from the left, `a^b^c` from the right. A longer operator stands before
+/// the shorter one with which it begins.
 const OPERATORS: [(&str, Instruction, u8, u8); 13] = [
     ("or", Binary(|a, b| truth(a, b, |a, b| a != 0.0 || b != 0.0), interval::logical), 1, 2),
     ("and", Binary(|a, b| truth(a, b, |a, b| a != 0.0 && b != 0.0), interval::logical), 2, 3),
@@ -44,27 +44,27 @@ const OPERATORS: [(&str, Instruction, u8, u8); 13] = [
     ("/", Binary(|a, b| a / b, interval::quotient), 5, 6),
     ("^", Binary(f64::powf, interval::power), 6, 6),
 ];
-/// Of the operators only `^` binds stronger than a sign: `-x^2` is −(x²), and `2^-1` is ½.
+/// The precedence of a sign. Only `^` has a higher one: `-x^2` is −(x²), and `2^-1` is ½.
 const SIGN: u8 = 6;
 
-/// Deeper nesting is refused: parsing would exhaust the stack long before it means anything.
+/// The deepest allowed nesting, so that parsing cannot exhaust the stack of the program.
 const DEEPEST: usize = 128;
-/// No program has more values on its stack: in each level of nesting at most two wait, the first two
-/// arguments of `if`.
+/// The largest number of values on the stack of an expression. In each level of nesting at most two values
+/// wait: the first two arguments of `if`.
 pub(super) const HIGHEST: usize = 2 * DEEPEST;
 
 /// Reads a text by precedence climbing.
 pub(super) struct Parser<'a> {
     text: &'a str,
-    /// Where relative paths of tables begin.
+    /// The folder to which paths of tables are relative.
     folder: &'a Path,
-    /// Byte offset of what is read next.
+    /// The byte offset of the next character.
     at: usize,
     depth: usize,
     program: Vec<Instruction>,
 }
 
-/// What was read is in the program; or what is wrong with it.
+/// The outcome of parsing a part of the text; the part is then in the program.
 type Parsed = Result<(), String>;
 
 impl<'a> Parser<'a> {
@@ -88,7 +88,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Signs, atoms, and operators between them that bind as strongly as `least`.
+    /// Parses signs, atoms, and operators between them with at least the precedence `least`.
     fn expression(&mut self, least: u8) -> Parsed {
         self.depth += 1;
         if self.depth > DEEPEST {
@@ -122,7 +122,7 @@ impl<'a> Parser<'a> {
         Ok(())
     }
 
-    /// A number, a name or a bracket.
+    /// Parses a number, a name or a bracket.
     fn atom(&mut self) -> Parsed {
         let first = self.peek();
         let rest = &self.text[self.at..];
@@ -146,7 +146,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// A variable, π, or a function with its arguments.
+    /// Parses a variable, π, or a function with its arguments.
     fn name(&mut self, name: &str) -> Parsed {
         self.at += name.len();
         if name == "table" {
@@ -174,7 +174,7 @@ impl<'a> Parser<'a> {
         Ok(())
     }
 
-    /// A table: `("file")` or `("file", argument)`.
+    /// Parses the rest of a table: `("file")` or `("file", argument)`.
     fn table(&mut self) -> Parsed {
         let usage = "has a table without a file; write table(\"file.csv\"), of t, or \
                      table(\"file.csv\", x)";
@@ -192,7 +192,7 @@ impl<'a> Parser<'a> {
         self.closing_bracket()
     }
 
-    /// Adds an instruction, or its value where its arguments are numbers.
+    /// Adds an instruction, or its value if its arguments are numbers.
     fn push(&mut self, instruction: Instruction) {
         let takes = instruction.takes();
         let first = self.program.len() - takes;
@@ -207,14 +207,14 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// The operator that comes next.
+    /// The next operator.
     fn operator(&mut self) -> Option<&'static (&'static str, Instruction, u8, u8)> {
         self.peek();
         let rest = &self.text[self.at..];
         OPERATORS.iter().find(|(symbol, ..)| rest.starts_with(symbol))
     }
 
-    /// The next character that is not a blank; `at` is moved to it.
+    /// The next character that is not a blank. Moves `at` to it.
     fn peek(&mut self) -> Option<char> {
         let rest = self.text[self.at..].trim_start();
         self.at = self.text.len() - rest.len();
@@ -236,7 +236,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Where the next character stands, counted from 1.
+    /// The column of the next character, counted from 1.
     fn column(&self) -> usize {
         self.text[..self.at].chars().count() + 1
     }
@@ -255,8 +255,7 @@ impl<'a> Parser<'a> {
     }
 }
 
-/// How many bytes at the start of `text` may be a number: digits with an optional point and
-/// exponent.
+/// The length of a number at the start of `text`, bytes: digits with an optional point and exponent.
 fn number_length(text: &str) -> usize {
     let digits = |from: usize| text.bytes().skip(from).take_while(u8::is_ascii_digit).count();
     let mut length = digits(0);

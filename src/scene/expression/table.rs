@@ -1,20 +1,20 @@
-//! Functions given by the points of a file.
+//! Functions given by points in a file.
 
 use std::path::Path;
 
-/// A piecewise linear function through points (a, f), constant beyond the first and the last one.
+/// A piecewise linear function through points (a, f), constant before the first and after the last point.
 #[derive(Debug)]
 pub(super) struct Table {
-    /// The points, by a not falling; at a jump two have the same.
+    /// The points in the order of a. At a jump two points have the same a.
     points: Vec<[f64; 2]>,
 }
 
 impl Table {
-    /// Reads the points from the CSV file at `path`: a and f in each row. The first row may be a header,
-    /// lines that begin with `#` are comments.
+    /// Reads the points from the CSV file at `path`: a and f in each row. The first row may be a header.
+    /// Lines that begin with `#` are comments.
     ///
     /// # Errors
-    /// The file cannot be read, or a row does not hold two finite numbers, or is not in order.
+    /// The file cannot be read, or a row has not two finite numbers or is not in order.
     pub(super) fn read(path: &Path) -> Result<Self, String> {
         let failed =
             |error: &dyn std::fmt::Display| format!("the table {}: {error}", path.display());
@@ -58,7 +58,7 @@ impl Table {
         }
     }
 
-    /// f(a), at a jump the value after it.
+    /// f(a); at a jump the value after it.
     pub(super) fn at(&self, a: f64) -> f64 {
         let next = self.points.partition_point(|[other, _]| *other <= a);
         match (&self.points[..next], &self.points[next..]) {
@@ -69,7 +69,7 @@ impl Table {
         }
     }
 
-    /// Values between which all f(a) of an interval of a lie: those at its ends and of the points in it.
+    /// Values whose range contains all f(a) in an interval: the values at its ends and at the points in it.
     pub(super) fn within(&self, [low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
         // At a jump at the lower end the value after it counts.
         let first = self.points.partition_point(|[a, _]| *a <= low);
@@ -78,7 +78,7 @@ impl Table {
     }
 }
 
-/// Whether a row begins like a number: then it is a bad row and no header.
+/// Whether a row begins like a number. Then it is a wrong row and not a header.
 fn is_like_a_number(row: &csv::StringRecord) -> bool {
     row.get(0)
         .is_some_and(|text| text.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)))
