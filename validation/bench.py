@@ -306,7 +306,7 @@ def report(rows):
     lines, passes = [], []
     for name, case in cases.items():
         ours, frozen = case[OURS], case.get(FROZEN, {}).get("seconds_per_step_over_ours")
-        lines.append([*name, ours["nodes"], number(ours["seconds_per_step"], 1e3),
+        lines.append([*name, round(ours["nodes"]), number(ours["seconds_per_step"], 1e3),
                       *(times(case, program, "seconds_per_step") for program in RIVALS),
                       number(frozen and 1 / frozen), number(ours["floor"], 1e3), number(ours["step_over_floor"]),
                       number(ours["whole_seconds"]), times(case, KEPT, "whole_seconds")])
