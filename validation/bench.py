@@ -35,12 +35,12 @@ from shared import ROOT
 from drawing import BLUE, FAINT, GREEN, INK, RED, plt
 from results import markdown, read_table, write_table
 
-# Largest difference of a competitor's answer from ours to the same discrete problem, and KKT residual of an answer.
+# The largest allowed difference of an answer from ours to the same discrete problem, and the largest KKT residual.
 SAME, TOLERANCE = 1e-6, 1e-10
-# After how many iterations the loop renews a factor that it keeps: what was fastest where contact moves.
+# The number of iterations after which the loop renews its factor: the fastest choice with moving contact.
 KEEP = {"kept": 7, "anew": 0}
-# Instructions of the processor that OpenBLAS has kernels for; Debian's takes the oldest ones on a
-# processor that is younger than itself.
+# Instructions of the processor for which OpenBLAS has kernels. Debian's OpenBLAS takes the oldest kernels on a
+# processor that it does not know.
 KERNELS = {"avx512f": "SkylakeX", "avx2": "Haswell"}
 OURS, FROZEN, KEPT, ANEW = "signorini", "frozen", "FEniCSx, factor kept", "FEniCSx, a factor for every system"
 RIVALS = {KEPT: ("kept", "#8e5aa8"), ANEW: ("anew", "#c9aed6")}
@@ -53,31 +53,31 @@ CASES = {
             ("moves", 1, 136, 1, FEWER), ("moves", 2, 24, 2, ALL), ("moves", 2, 0.01, 3, ALL)],
     True: [("stays", 1, 64, 1, ALL), ("stays", 2, 32, 1, FEWER), ("moves", 1, 16, 1, ALL), ("moves", 2, 0.1, 1, FEWER)],
 }
-# Phases of `--profile` that the floor has, made once in every step.
+# Phases of `--profile` that the floor includes; every step has each once.
 PASSES = ["stiffness refill", "products", "triangular solves", "vectors", "damage source", "damage solve"]
-# What PETSc has in the place of our factors.
+# PETSc's preconditioners in place of our factors.
 PRECONDITIONERS = {
     "ours": [],
     "MUMPS": [word for of in ("elastic", "damage") for word in (
         f"-{of}_pc_type", "cholesky", f"-{of}_pc_factor_mat_solver_type", "mumps")],
     "gamg": [word for of in ("elastic", "damage") for word in (f"-{of}_pc_type", "gamg")],
 }
-# Steps of a run, of one that is to measure size and ranks, and of a loop that factorises always.
+# Steps of a run, of a run for growth and ranks, and of a loop with a new factor for every system.
 STEPS, SHORT, FEW = 100, 10, 20
 
 
 class Failure(Exception):
-    """A program that did not do what it was asked: said in one line."""
+    """A program failed; the message has one line."""
 
 
 class Bench:
-    """Runs the programs; rows of what they took."""
+    """Runs the programs and collects rows of their costs."""
 
     def __init__(self, binary, out):
         self.binary, self.out, self.rows, self.compiled = str(binary), out, [], set()
         self.environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
         out.mkdir(parents=True, exist_ok=True)
-        # The same script measures this machine, alone in a process for each kind of kernels.
+        # The same script measures this machine, in a process for each kind of kernels.
         floor = [sys.executable, __file__, "--floor"]
         flags = Path("/proc/cpuinfo").read_text(encoding="utf-8").split()
         kernels = [{"OPENBLAS_CORETYPE": core} for flag, core in KERNELS.items() if flag in flags][:1]
@@ -85,7 +85,7 @@ class Bench:
         self.speeds = {**(best or [installed])[0], "dgemm as installed": installed["dgemm"]}
 
     def start(self, command, **environment):
-        """Runs a command to its end: its output and wall seconds."""
+        """Runs a command; returns its output and wall seconds."""
         began = time.perf_counter()
         done = subprocess.run(list(map(str, command)), env={**self.environment, **environment}, text=True,
                               cwd=self.out, capture_output=True)
@@ -112,8 +112,8 @@ class Bench:
         return path
 
     def signorini(self, scene, mesh, order, steps=STEPS, ranks=1, frames=True, petsc=()):
-        """A run, about 20 frames written unless told otherwise: its row, its history, and seconds per call of each
-        phase of `--profile`."""
+        """A run with about 20 frames by default: its row, its history, and the seconds per call of each phase of
+        `--profile`."""
         folder = self.out / "run"
         launcher = ["mpiexec", "--allow-run-as-root", "--oversubscribe", "-n", ranks] if ranks != 1 else []
         said, whole = self.start([
@@ -123,7 +123,7 @@ class Bench:
             *([] if frames else ["--set", "output.every=100000"]), "--", *petsc])
         summary = json.loads((folder / "summary.json").read_text())
         history = read_table(folder / "history.csv")
-        # The first step also makes what all others keep.
+        # The first step also makes the factor and other data that all steps use.
         mean = lambda key: sum(row[key] for row in history[2:]) / len(history[2:])
         phases = dict(re.findall(r"^ +([A-Za-z ]+?) +\d+ +[\d.]+ +[\d.]+ % +([\d.]+)", said, re.MULTILINE))
         peak = re.findall(r"peak memory (\d+)", said)
@@ -133,7 +133,7 @@ class Bench:
         return row, history, {name: 1e-3 * float(ms) for name, ms in phases.items()}
 
     def fenicsx(self, scene, mesh, order, method, steps):
-        """The loop, its forms compiled, and its last state."""
+        """Runs the loop with compiled forms; returns its row and its last state."""
         command = [sys.executable, ROOT / "validation" / "fenicsx.py", ROOT / "geo" / f"{scene}.toml", mesh,
                    "--order", order, "--keep", KEEP[method]]
         if (scene, order) not in self.compiled:
@@ -153,7 +153,7 @@ class Bench:
 
 
 def differs(last, history, row):
-    """Why the times of a program do not count, or None: all must solve the same problem."""
+    """The reason why the times of a program do not count, or None: all programs must solve the same problem."""
     if row["kkt"] > TOLERANCE:
         return f"KKT {row['kkt']:.1e}"
     for key in ("zeta_min", "displacement_max", "work"):
@@ -178,7 +178,7 @@ def compare(bench, quick):
                         ours.append(row)
                         phases.append(passes)
                     elif program == FROZEN and contact == "moves" and size >= 1:
-                        # The same body and mesh where contact moves in one step of a hundred.
+                        # The same body and mesh with contact that moves in one of a hundred steps.
                         row = bench.signorini(SCENES[FROZEN][0], mesh, order)[0]
                     elif program in RIVALS and (program == KEPT or turn == 0):
                         few = program == ANEW and contact == "stays"
@@ -199,7 +199,7 @@ def compare(bench, quick):
 
 
 def floor_of(bench, scene, mesh, order, row, phases):
-    """Seconds of the floor, beside those of our own passes."""
+    """The seconds of the floor and those of our passes."""
     said, _ = bench.start([sys.executable, __file__, "--floor", ROOT / "geo" / f"{scene}.toml", mesh, order])
     passes = json.loads(said)
     floor = {f"floor {name}": passes[name] / bench.speeds["copy"] for name in PASSES}
@@ -219,7 +219,7 @@ def growth(bench, quick):
 
 
 def ranks(bench, quick):
-    """Whole runs on several ranks, with each way to precondition."""
+    """Whole runs on several ranks with each preconditioner."""
     for n, petsc in [(128, (1, 2, 4))] if quick else [(512, (1, 2, 4)), (1024, (4,))]:
         answer = None
         for program, options in PRECONDITIONERS.items():
@@ -234,7 +234,7 @@ def ranks(bench, quick):
 
 
 def machine():
-    """Bytes and operations per second of one core: the best of five copies of an array that no cache holds, and
+    """Bytes and operations per second of one core: the best of five copies of an array larger than all caches, and
     of five products of dense matrices."""
     def best(work):
         seconds = []
@@ -249,8 +249,8 @@ def machine():
 
 
 def least_work(scene, mesh, order):
-    """Bytes of each pass of a step; matrices with 8 bytes an entry, 4 for the column of a scalar or of a block of
-    2×2; factors in single precision, read twice for a pair of triangular solves."""
+    """Bytes of each pass of a step. Matrices have 8 bytes per entry and 4 per column of a scalar or a 2×2 block.
+    Factors are in single precision, and a pair of triangular solves reads them twice."""
     from petsc4py import PETSc
 
     from fenicsx import Body, Contact, Damage
@@ -286,12 +286,12 @@ def least_work(scene, mesh, order):
 
 
 def number(value, scale=1.0):
-    """Three digits, nothing where there is no value."""
+    """A number with three digits; "" without a value."""
     return f"{scale * value:.3g}" if isinstance(value, (int, float)) and np.isfinite(value) else ""
 
 
 def exponent(rows, key):
-    """The order of growth with the nodes and the factor, of n = 64 and more."""
+    """The order of growth with the number of nodes, and the factor, for n ≥ 64."""
     rows = [row for row in rows if row["n"] >= 64] or rows
     return np.polyfit(np.log([row["nodes"] for row in rows]), np.log([row[key] for row in rows]), 1)
 

@@ -1,18 +1,18 @@
 #!/usr/bin/python3
 """Error against seconds, whole processes: chart.py [--binary FILE] [--asked] SCENE…
 
-Of each scene of geo/: the paper's method (P1, uniform mesh, uniform steps), meshes graded by the .geo
-in P1 and P2, `--accuracy` from 0.1 to 0.001, the other contact solvers, and the scene as shipped. The
-seconds are those from start to end of the process, gmsh, adaptation and output included, on one core;
-of a run below three seconds the median of three. The error is the larger of those of u (energy norm) and
-of the damage (L²) at the end, relative, against the reference of references.py in out/reference/graded.
+The runs of each scene of geo/ are: the paper's method (P1, uniform mesh, uniform steps), meshes graded by the
+.geo in P1 and P2, `--accuracy` from 0.1 to 0.001, the other contact solvers, and the scene as shipped. The time is
+that of the whole process on one core, with gmsh, adaptation and output. For a run below three seconds it is the
+median of three runs. The error is the larger one of the relative errors of u (energy norm) and of the damage (L²) at
+the end, against the reference of references.py in out/reference/graded.
 
 Writes out/chart/<scene>/chart.csv and draws out/chart/chart.png, a panel per scene. Prints the Pareto front
 of each scene (the runs to which no other is both faster and more accurate) and how many times the seconds of
 `--accuracy` the paper's method takes for some errors.
 
-With --asked only `--accuracy` 0.1, 0.03, 0.01 and 0.003 are run, and the errors are printed over the accuracy asked
-for; exit code 1 if the larger one is above it. (The accuracy is also that of every figure: make promises.)
+With --asked the runs are `--accuracy` 0.1, 0.03, 0.01 and 0.003, and the printed errors are relative to the accuracy;
+exit code 1 if the larger one exceeds it. (`make promises` checks the error of every figure.)
 """
 
 import argparse
@@ -39,7 +39,7 @@ from true_errors import Run, errors
 
 SHORT, PASSES = 3.0, 3
 ENVIRONMENT = {**os.environ, "OMP_NUM_THREADS": "1"}
-# Largest size, m, and how often it is halved, in P1; the grading in P1, those in P2.
+# The largest size, m, and the number of its halvings in P1; the grading in P1, the gradings in P2.
 MESHES = {
     "square-mild": (1 / 16, 4, 4, (4, 32)),
     "square-table1": (1 / 16, 4, 4, (4, 32)),
@@ -63,7 +63,7 @@ KINDS = [
 
 @dataclass(frozen=True)
 class Choice:
-    """What a run is asked for: an accuracy, or mesh, order and steps, or nothing."""
+    """The options of a run: an accuracy, or mesh, order and steps, or nothing."""
 
     series: str
     solver: str = "active-set"
@@ -74,7 +74,7 @@ class Choice:
     step: object = None
 
     def scene(self, shipped):
-        """The shipped scene with this choice."""
+        """The shipped scene with these options."""
         if self.accuracy is None and self.order is None:
             return shipped
         # A mesh of order 1 has straight sides; all scenes here have.
@@ -164,7 +164,7 @@ def line(row):
 
 
 def front(rows):
-    """The runs to which no other is both faster and more accurate, by rising seconds."""
+    """The runs that no other run beats in both time and accuracy, by increasing seconds."""
     best, kept = np.inf, []
     for row in sorted(rows, key=lambda row: (row["seconds"], row["error"])):
         if row["error"] < best:
@@ -174,7 +174,7 @@ def front(rows):
 
 
 def knee(members):
-    """The run of a front farthest below the straight line between its ends, in logarithms."""
+    """The run of a front that is farthest below the straight line between its ends, in logarithms."""
     if len(members) < 3:
         return None
     x, y = np.log([[row["seconds"], row["error"]] for row in members]).T
@@ -183,8 +183,8 @@ def knee(members):
 
 
 def seconds_for(error, rows):
-    """Seconds for an error on the front of `rows`, on straight lines in logarithms, and whether they
-    lie beyond the last run: then on the line fitted to the last four."""
+    """The seconds for an error on the front of `rows`, by linear interpolation of logarithms, and whether they are
+    extrapolated: beyond the last run they are on the line fitted to the last four runs."""
     members = front(rows)
     x, y = np.log([[row["error"], row["seconds"]] for row in members]).T
     if error >= members[-1]["error"]:
@@ -230,7 +230,7 @@ def report(name, rows):
 
 
 def draw_all(tables, picture):
-    """A panel per scene, and one with what the marks mean."""
+    """A panel per scene, and one with the legend."""
     columns = min(3, len(tables))
     rows = -(-(len(tables) + 1) // columns)
     figure, axes = plt.subplots(rows, columns, squeeze=False, figsize=(4.6 * columns, 4.1 * rows))

@@ -42,7 +42,7 @@ from scene import SceneError, of_order, read_scene, solvers, write_scene
 from triangulation import mesh_geometry, read_triangulation
 
 TOLERANCE = {"elastic": 1e-10, "contact": 1e-8, "damage": 1e-8}
-# The same where a traction has a kink in x or y: the program integrates it to about 1e-6.
+# The tolerance for a traction with a kink in x or y, which the program integrates to about 1e-6.
 KINK = re.compile(r"\b(min|max|abs|if)\b")
 KINKED = 2e-6
 COLUMNS = (
@@ -52,7 +52,7 @@ COLUMNS = (
 
 
 class RunError(Exception):
-    """The program did not run, or its output is not as agreed."""
+    """The program failed, or its output has not the expected form."""
 
 
 def static(scene):
@@ -72,7 +72,7 @@ def without_contact(scene, mesh):
         boundary.pop("normal", None)
         if not supported:
             boundary["displacement"] = ["free", "0"] if normal[1] > normal[0] else ["0", "free"]
-    # A boundary that is left with its name alone says nothing.
+    # A boundary with a name only has no condition.
     scene["boundary"] = [b for b in scene["boundary"] if len(b) > 1]
     return scene
 
@@ -85,13 +85,13 @@ def in_few_steps(scene, steps):
 
 
 def program(binary, scene, space, directory, solver=None):
-    """signorini's answers from the files it writes: for each accepted time a frame, by the nodes of `space`, with the
-    contact force and the number of active nodes."""
+    """signorini's answers from its files: per accepted time a frame, with values at the nodes of `space`, the contact
+    force and the number of active nodes."""
     path, out = directory / "scene.toml", directory / "out"
-    shutil.rmtree(out, ignore_errors=True)  # never read the answer to an earlier case
+    shutil.rmtree(out, ignore_errors=True)  # the answer to an earlier case must not be read
     write_scene({**scene, "output": {"every": 1}}, path)
     command = [str(binary), "run", str(path), "--out", str(out)]
-    # Each solver by itself: a rescue would hide that it failed.
+    # No rescue: it would hide the failure of a solver.
     command += ["--solver", solver, "--set", "contact.rescue=false"] if solver else []
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=1800)
@@ -110,7 +110,7 @@ def program(binary, scene, space, directory, solver=None):
 
 
 def differences(exact, answers):
-    """The largest of all times: |Δu| and ΔR over the largest |u| and R of all times, and |Δζ|."""
+    """The largest differences over all times: |Δu| and ΔR relative to the largest |u| and R of all times, and |Δζ|."""
     times, expected = [frame.time for frame, *_ in answers], [state.time for state in exact]
     if len(times) != len(expected) or not np.allclose(times, expected, rtol=1e-9, atol=1e-9):
         raise RunError(f"{len(times)} times up to {times[-1]:g}, FEniCSx's are {len(expected)} "
@@ -123,7 +123,7 @@ def differences(exact, answers):
     for state, (frame, force, active) in zip(exact, answers):
         if state.active != active:
             raise RunError(f"{active} nodes are active at t = {frame.time:g}, FEniCSx's are {state.active}")
-        # np.fmax would hide a value that is missing.
+        # np.fmax would hide a missing value.
         du = np.maximum(du, largest(frame.u.reshape(-1, 2) - state.displacement))
         dzeta = np.maximum(dzeta, max(np.abs(frame.zeta - state.zeta).max(), frame.apart))
         dforce = max(dforce, abs(force - state.contact_force))
@@ -141,8 +141,8 @@ def cases(scene, mesh, arguments):
 
 
 def compare(path, order, arguments):
-    """Rows of the table for one scene with displacements of an order; a mesh made here is of the
-    same. "active" are the least and the most active nodes."""
+    """Rows of the table for one scene with displacements of an order. A mesh made here has the same order. "active" are
+    the smallest and the largest number of active nodes."""
     scene = of_order(read_scene(path), order)
     with tempfile.TemporaryDirectory() as directory:
         directory = Path(directory)

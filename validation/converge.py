@@ -68,12 +68,12 @@ class Fields:
         self.inner[run.cells] = corners.mean(axis=1)[:, None]
 
     def at(self, other):
-        """The values at the nodes of another mesh of the body."""
+        """Interpolates the values at the nodes of another mesh of the body."""
         cell, place = self.run.locate(other.run.points, other.inner)
         return np.einsum("nk,tnkc->tnc", place, self.values[:, self.run.cells[cell]])
 
     def norms(self, values):
-        """Of fields (nodes, 3) on this mesh ‖ε(u)‖, |u|, ‖ζ‖ and |ζ|."""
+        """‖ε(u)‖, |u|, ‖ζ‖ and |ζ| of fields (nodes, 3) on this mesh."""
         corners = values[self.run.cells]
         h = np.einsum("mkc,mkd->mcd", corners, self.gradients)
         u, zeta = h[:, :2], corners[:, :, 2]
@@ -113,7 +113,7 @@ class Study:
                        / f"{self.name}{words}-refined{self.refinements}-k{self.step:g}")
 
     def timed(self, step, scheme):
-        """The scene with uniform steps, a frame at each of the times that are compared."""
+        """The scene with uniform steps and a frame at each compared time."""
         time = {"end": self.end, "step": step, "scheme": scheme}
         every = round(self.end / INTERVALS / step)
         return {**self.scene, "time": time, "output": {"every": every, "checkpoint": 0}}
@@ -153,14 +153,14 @@ class Study:
 
 
 def printed(h, k):
-    """The number of Table 1 for h and k, if there is one."""
+    """The value of Table 1 for h and k, if there is one."""
     j, column = round(np.log2(np.sqrt(2) / h / 4)), [c for c, n in enumerate(STEPS) if abs(k * n - 1) < 1e-6]
     fits = 0 <= j < MESHES and abs(h * 4 * 2**j / np.sqrt(2) - 1) < 1e-6
     return TABLE_1[j][column[0]] if fits and column else None
 
 
 def fit(x, y):
-    """The order p of y ~ x^p by least squares, and the factor; not numbers where x is one point."""
+    """The order p of y ~ x^p by least squares, and the factor; NaN for a single x."""
     if len(set(x)) < 2:
         return np.nan, np.nan
     p, logarithm = np.polyfit(np.log(x), np.log(y), 1)
@@ -180,7 +180,7 @@ def text(rows, cell, title, mesh):
 
 
 def report(rows):
-    """Prints the errors with their orders, and beside those of Table 1."""
+    """Prints the errors with their orders, and those of Table 1."""
     least = [row for row in rows if row["k"] == min(column(rows, "k"))]
     finest = [row for row in rows if row["h"] == min(column(rows, "h"))]
     of_paper = [row for row in rows if row["printed"]]
@@ -202,7 +202,7 @@ def report(rows):
 
 
 def draw_sums(axes, rows):
-    """Table 1's error against h + k with the fitted orders, ours and the printed one."""
+    """Draws the error of Table 1 against h + k with fitted orders: ours and the printed one."""
     of_paper = [row for row in rows if row["printed"]]
     for colour, h in zip(COLOURS, dict.fromkeys(row["h"] for row in rows)):
         label = f"n = {np.sqrt(2.0) / h:.0f}" if of_paper else f"h = {h:.3g}"
@@ -224,7 +224,7 @@ def draw_sums(axes, rows):
 
 
 def draw_orders(axes, rows):
-    """All errors against h at the smallest k."""
+    """Draws all errors against h at the smallest k."""
     least = min(column(rows, "k"))
     rows = [row for row in rows if row["k"] == least]
     h = column(rows, "h")

@@ -1,9 +1,8 @@
-"""The discrete problem of a scene, assembled for the judge of `random_scenes.py`.
+"""The discrete problem of a scene, assembled for the verification by `random_scenes.py`.
 
 Stiffness of P1 or isoparametric P2, loads, prescribed rows, contact rows and the damage
-step (28), written from the method's description alone (README.md, the paper's sections 2 to 4):
-nothing here was taken from the program, so that a fault of its assembly, bases or constraints shows
-as a difference.
+step (28), written from the description of the method alone (README.md, the paper's sections 2 to 4). Nothing
+here is taken from the program, so a fault of its assembly, bases or constraints appears as a difference.
 """
 
 import re
@@ -19,25 +18,24 @@ from expressions import Expression
 from lagrange import SIDES, Lagrange
 from scene import DAMAGE, displacement_order, elasticity, of_material
 
-# Lines at an angle below the first are one; at one below the second rounding may hide that they are two.
+# Lines at an angle below the first value are one line. Below the second value rounding may decide.
 SAME, ALIKE = 1e-8, 1e-4
 # Barycentric coordinates of the points, of equal weights, that integrate the stiffness.
 POINTS = {1: np.full((1, 3), 1 / 3), 2: np.full((3, 3), 1 / 6) + 0.5 * np.eye(3)}
-# Of the nodes of an edge (ends, middle) the share of its length: the integrals of their functions.
+# Per node of an edge (ends, middle): the integral of its function over the length of the edge.
 SHARES = {1: (1 / 2, 1 / 2), 2: (1 / 6, 1 / 6, 4 / 6)}
 # Parts of an edge in which a traction is integrated.
 PARTS = 256
-CORNER = np.pi / 6  # edges further apart meet in a corner
+CORNER = np.pi / 6  # edges at larger angles meet in a corner
 
 
 def varies(texts):
-    """Whether any of some expressions depends on the place."""
+    """Whether any of the expressions depends on x or y."""
     return any(re.search(r"\b[xy]\b", str(text)) for text in texts)
 
 
 class Discrete:
-    """A scene on its triangulation: u at the `points`, which the `elements` number; ζ at the
-    vertices."""
+    """A scene on its triangulation: u at the `points`, which the `elements` refer to; ζ at the vertices."""
 
     def __init__(self, scene, mesh):
         self.scene, self.mesh, self.order = scene, mesh, displacement_order(scene)
@@ -74,8 +72,8 @@ class Discrete:
         self.prescribed = self._prescribed()
 
     def element_stiffness(self, zeta):
-        """Σ_q w_q η_*(ζ)(x_q) Bᵀ D B of each triangle, η_*(ζ) affine between the vertices: of P1
-        that is exact, as ε is constant."""
+        """Σ_q w_q η_*(ζ)(x_q) Bᵀ D B of each triangle, with η_*(ζ) affine between the vertices. For P1 this is exact, as ε
+        is constant."""
         if "damage" in self.scene:
             zeta = np.clip(zeta, self.law["threshold"], 1.0)
         at_points = zeta[self.mesh.triangles] @ POINTS[self.order].T
@@ -132,8 +130,8 @@ class Discrete:
         return q - p + 4 * (1 - 2 * s) * self.space.offsets(edges)
 
     def faces(self, name):
-        """Per node of a curve the (normal, length) it sees: the length-weighted mean of the
-        adjacent edges' outward normals, or one for each side of a corner."""
+        """Per node of a curve: its (normal, length). The normal is the length-weighted mean of the outward normals of the
+        adjacent edges; a corner has one for each side."""
         edges, parts = self.mesh.edges(name), {}
         outward, _ = self.mesh.outward_normals(name)
         for nodes, s, share in zip(self.space.on(edges).T, (0, 1, 0.5), SHARES[self.order]):
@@ -149,8 +147,8 @@ class Discrete:
         return {node: [face[:2] for face in merged(found)] for node, found in parts.items()}
 
     def _contact_faces(self):
-        """(node, normal, length, gaps) of each row: a fixed normal or those of the faces; where
-        curves meet smoothly one row of the mean normal, and the gaps of both."""
+        """Per row: (node, normal, length, gaps). The normal is fixed, or that of a face. Where curves meet smoothly there is
+        one row with the mean normal and the gaps of both."""
         rows = {}
         for boundary in self.boundaries:
             if "gap" not in boundary:
@@ -167,12 +165,12 @@ class Discrete:
                 for n, w, gaps in merged(parts, CORNER)]
 
     def contact_rows(self, t):
-        """u·ν ≤ g at time t, of several gaps the smallest."""
+        """u·ν ≤ g at time t, with the smallest of several gaps."""
         at = lambda node, gaps: min(float(g.at(self.points[[node]], t)[0]) for g in gaps)
         return as_rows([(node, n, at(node, gaps), w) for node, n, w, gaps in self._gaps])
 
     def _prescribed(self):
-        """(node, direction, expression or None for a symmetry's 0)."""
+        """Per row: (node, direction, expression), with None for the 0 of a symmetry axis."""
         rows = []
         for boundary in self.boundaries:
             if boundary.get("symmetry"):
@@ -192,9 +190,8 @@ class Discrete:
         return as_rows([(node, d, value(node, e)) for node, d, e in self.prescribed])
 
     def bad_input(self, times):
-        """A reason why the scene must be refused whatever its loads, or None; then whether either answer
-        will do: a fixed normal points into the body at some of its edges only, or two lines of
-        contact at a node are hardly two."""
+        """A reason why the scene must be refused for all loads, or None; then whether refusing and solving are both right: a
+        fixed normal points into the body at some of its edges only, or two lines of contact at a node are nearly one."""
         some = False
         for boundary in self.boundaries:
             if "gap" not in boundary:
@@ -222,9 +219,9 @@ class Discrete:
         return None, some
 
     def damage_step(self, u, zeta, step):
-        """ζ_n of (28): (M + kκL) ζ_n = M ζ_{n−1} + k b(φ(ε(u_{n−1}), ζ_{n−1})); of P1 with φ at the
-        three vertices of a triangle and then integrated with the same M, of P2 at the points of the
-        stiffness, with the law of its surface; and how much of it may be rounding, where triangles are very thin."""
+        """ζ_n of (28): (M + kκL) ζ_n = M ζ_{n−1} + k b(φ(ε(u_{n−1}), ζ_{n−1})), and the possible rounding error on very thin
+        triangles. P1 evaluates φ at the three vertices of a triangle and integrates it with the same M, P2 at the
+        points of the stiffness. Each surface has its own law."""
         t, law = self.mesh.triangles, self.law
         cap, breeds, strains, least, diffusion = (
             of_material(self.scene, self.mesh, "damage", key, law[key])
@@ -263,8 +260,8 @@ class Discrete:
 
 @dataclass
 class Rows:
-    """Conditions d·u = value (or ≤ value), a row each: node, unit direction, value, and of contact
-    rows the tributary length."""
+    """Conditions d·u = value (or ≤ value). Per row: node, unit direction, value, and for contact rows the
+    tributary length."""
 
     node: np.ndarray
     direction: np.ndarray
@@ -278,13 +275,13 @@ def pair(texts, points, t):
 
 
 def angle(a, b):
-    """The angle between two directions, exact also where it is small."""
+    """The angle between two directions, accurate also for small angles."""
     return np.arctan2(abs(a[0] * b[1] - a[1] * b[0]), a @ b)
 
 
 def merged(parts, largest=CORNER + 1e-9):
-    """Joins (normal, length, gaps) of edges or curves whose normals are at an angle below the largest: of the gaps the
-    smallest counts."""
+    """Joins (normal, length, gaps) of edges or curves with normals at less than the `largest` angle. The smallest gap
+    counts."""
     rows = []
     for normal, length, gaps in parts:
         for k, (n, w, others) in enumerate(rows):

@@ -1,4 +1,4 @@
-"""Scenes with exact answers, by which selfcheck.py checks FEniCSx's side of `make validate` and judge_check.py the
+"""Scenes with exact answers. selfcheck.py checks the FEniCSx code of `make validate` with them, judge_check.py the
 code that verifies random scenes. A problem is (name, mesh, scene, exact u at points (n, 2))."""
 
 from dataclasses import replace
@@ -15,14 +15,14 @@ AXIS, PRESSURE = {"name": "west", "symmetry": True}, {"name": "north", "traction
 
 
 def square(turn=0.0, shape=lambda s, t: (s, t)):
-    """The unit square with its sides, turned."""
+    """The rotated unit square with its sides."""
     rng = np.random.default_rng(5)
     points, node, triangles = bodies.grid(rng, 8, 8, shape)
     return bodies.finish(rng, (points, triangles, bodies.sides(node)), 1.0, turn)
 
 
 def layered():
-    """The unit square of two layers, the upper one a surface `core`."""
+    """The unit square with two layers; the upper one is the surface `core`."""
     mesh = square(shape=lambda s, t: (s, np.where(abs(t - 0.5) < 0.05, 0.5, t)))
     return replace(mesh, surfaces={"core": mesh.nodes[mesh.triangles, 1].mean(1) > 0.5})
 
@@ -51,14 +51,14 @@ def layers(low=80.0, high=20.0):
 
 
 def prescribed(*field, **more):
-    """A body whose whole boundary is moved as a field."""
+    """A body with a displacement field prescribed on its whole boundary."""
     boundary = [{"name": name, "displacement": list(field)} for name in NAMES]
     return {"material": {"young": 80.0, "poisson": 0.25}, "boundary": boundary, **more}
 
 
 def curved():
-    """Isoparametric elements of order 2 have all affine fields, wherever the middles of sides lie,
-    and so does the weak form: the Jacobian's cofactors times ∇φ are of degree 2."""
+    """Isoparametric P2 elements contain all affine fields, wherever the midpoints of sides lie, and the weak form
+    integrates them exactly: the cofactors of the Jacobian times ∇φ have degree 2."""
     mesh = square()
     x, y = mesh.nodes[mesh.triangles[:, SIDES]].mean(axis=2).transpose(2, 0, 1)
     moved = np.stack((x + 0.01 * np.sin(7 * x + 3 * y), y + 0.01 * np.cos(5 * x - 6 * y)), -1)
@@ -68,7 +68,7 @@ def curved():
 
 
 def quadratic():
-    """u = (x² − xy, y²/2), which order 2 has. With ν = ¼ and E = 80 in plane stress
+    """u = (x² − xy, y²/2), which P2 contains. With ν = ¼ and E = 80 in plane stress
     σ_xx = E'(2x − y + y/4), σ_yy = E'(y + (2x − y)/4), σ_xy = −E'·3/8·x, E' = 80·16/15, and
     −div σ = −E'(2, 1 − 1/4 − 3/8)."""
     scale = 80 * 16 / 15
@@ -77,7 +77,7 @@ def quadratic():
 
 
 def problems(order):
-    """Those that elements of an order answer exactly."""
+    """The problems that elements of an order solve exactly."""
     return [pressed(), plane_strain(), layers(), curved(), *([quadratic()] if order == 2 else [])]
 
 

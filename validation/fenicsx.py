@@ -22,7 +22,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-# CHOLMOD otherwise wakes four threads in every supernode, whatever OMP_NUM_THREADS says.
+# Otherwise CHOLMOD would wake four threads in every supernode, whatever OMP_NUM_THREADS says.
 os.environ.setdefault("OMP_THREAD_LIMIT", "1")
 
 import basix
@@ -64,7 +64,7 @@ MIDPOINTS = {
 }
 INTERIOR_POINTS = {"quadrature_degree": 2}
 EDGES = {"quadrature_degree": 39}
-# dolfinx numbers the middles of a triangle's sides as the vertices opposite.
+# dolfinx numbers the midpoints of a triangle's sides like the opposite vertices.
 DOLFINX_ORDER = [0, 1, 2, 4, 5, 3]
 
 
@@ -101,7 +101,7 @@ def form(expression):
 
 
 def cholesky(matrix):
-    """A factor by CHOLMOD, which keeps its analysis when the matrix changes."""
+    """A factor by CHOLMOD; the symbolic analysis is kept when the matrix changes."""
     factor = PETSc.PC().create(PETSc.COMM_SELF)
     factor.setType("cholesky")
     factor.setFactorSolverType("cholmod")
@@ -110,7 +110,7 @@ def cholesky(matrix):
 
 
 def per_triangle(domain, values):
-    """A function that is constant on each triangle, from the values in the order they were given."""
+    """A function that is constant on each triangle, from values in the order of the file."""
     if (values == values[0]).all():
         return fem.Constant(domain, PETSc.ScalarType(values[0]))
     function = fem.Function(fem.FunctionSpace(domain, ("Discontinuous Lagrange", 0)))
@@ -124,7 +124,7 @@ class Body:
     def __init__(self, scene, mesh):
         self.scene, self.mesh, self.order = scene, mesh, displacement_order(scene)
         self.nodes, vertices = Lagrange(mesh, self.order), Lagrange(mesh, 1)
-        # Of a curved body ζ lives on the straight triangles of the vertices.
+        # On a curved body ζ is defined on the straight triangles of the vertices.
         curved = self.nodes.curved()
         domain = self.domain = dolfinx_mesh(self.nodes if curved else vertices)
         self.straight = dolfinx_mesh(vertices) if curved else domain
@@ -158,7 +158,7 @@ class Body:
         )
 
     def _loads(self, w):
-        """The terms of (f, w)_V: body force, and a traction on each boundary that has one."""
+        """The terms of (f, w)_V: the body force and the tractions."""
         x = ufl.SpatialCoordinate(self.domain)
 
         def vector(texts):
@@ -215,7 +215,7 @@ class Body:
         return Bounds(fixed, value[fixed], sign, np.where(sign == 0.0, 0.0, gap))
 
     def _must_be_constrained(self):
-        """Refuses a body that can move rigidly even in full contact: u is not unique."""
+        """An error for a body that can move rigidly even in full contact, as u is not unique."""
         bounds = self.bounds(0.0)
         constrained = bounds.sign != 0.0
         constrained[bounds.fixed] = True
@@ -347,7 +347,7 @@ class Contact:
         return self.y.array.copy()
 
     def solve(self, t, zeta):
-        """The state for the damage ζ; the first guess is the straight line through the last two."""
+        """The state for the damage ζ. The first guess is the linear extrapolation of the last two states."""
         body = self.body
         body.time.value = t
         body.zeta.x.array[body.zeta_dof_of_node] = zeta
@@ -410,7 +410,7 @@ class Contact:
                 self.factorise(free)
                 fresh, rho, p[:] = True, 1.0, 0.0
             z = np.where(free, self.precondition(r), 0.0)
-            # Unknowns that are free now and were not when the factor was made.
+            # Unknowns that are free now and were not free when the factor was made.
             released = free & ~self.factored
             z[released] = r[released] / self.scale
             last, rho = rho, r @ z
@@ -438,7 +438,7 @@ def dolfinx_mesh(nodes):
 
 
 def dof_of_node(space, nodes):
-    """For each of the nodes its (blocked) degree of freedom.
+    """Per node: its (blocked) degree of freedom.
 
     dolfinx reorders twice: nodes and cells when it builds the mesh, unknowns when it builds a
     space. It keeps the order of a cell's vertices.
@@ -465,7 +465,7 @@ def facet_tags(domain, mesh, name):
 
 
 def evolve(scene, mesh, contact=None):
-    """Yields each accepted state of a scene: of a static one that at t = 1, else until the end or ζ_*."""
+    """Yields each accepted state of a scene until its end or ζ_*; the state of a static scene is at t = 1."""
     contact = contact or Contact(Body(scene, mesh))
     body, law = contact.body, {**DAMAGE, **scene.get("damage", {})}
     zeta = Expression(law["initial"]).at(mesh.nodes)
@@ -486,7 +486,7 @@ def evolve(scene, mesh, contact=None):
 
 
 class Fields:
-    """The results in XDMF, which takes fields of the degree of the mesh's coordinates."""
+    """Writes the results in XDMF, which accepts fields of the degree of the mesh."""
 
     def __init__(self, path, body):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -519,7 +519,7 @@ def main():
     fields, every, states = None, -(-arguments.steps // 20), []
     for n, state in enumerate(evolve(scene, mesh, contact)):
         states.append(state)
-        if n == 1:  # the first step makes what the others keep
+        if n == 1:  # the first step makes the factor that all steps use
             contact.counts = dict.fromkeys(contact.counts, 0)
         if arguments.out and n and n % every == 0:
             fields = fields or Fields(arguments.out, contact.body)

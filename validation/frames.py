@@ -1,4 +1,4 @@
-"""The frames that a run of the program wrote, on one rank or several, by the mesh's nodes."""
+"""The frames of a run on one rank or several, at the nodes of the mesh."""
 
 from dataclasses import dataclass
 from xml.etree import ElementTree
@@ -12,9 +12,8 @@ from reading import frames_of
 
 @dataclass
 class Frame:
-    """Time, displacement, ζ at the vertices, remaining gap and pressure; and by how much pieces of
-    several ranks differ at their common nodes, or ζ in the middle of an edge from the mean of its
-    ends."""
+    """Time, displacement, ζ at the vertices, remaining gap and pressure. Also two differences that should be 0: between
+    the pieces of several ranks at common nodes, and between ζ at a midpoint and the mean of the ends."""
 
     time: float
     u: np.ndarray
@@ -25,8 +24,8 @@ class Frame:
 
 
 def read_frames(space, out):
-    """Every frame written, nodes as in the finite element `space` of u; pieces are matched triangle
-    by triangle, as slits have two nodes at one point."""
+    """All frames, with nodes as in the finite element `space` of u. Pieces are matched triangle by triangle, as slits have
+    two nodes at one point."""
     size = np.ptp(space.points, axis=0).max()
     place = {key(space.points[t]): t for t in space.elements}
     if not (out / "fields.pvd").exists():
@@ -42,7 +41,7 @@ def read_frames(space, out):
             field = np.column_stack([data.point_data[name] for name in names])[:, [0, 1, 3, 4, 5]]
             for cell in np.vstack([block.data for block in data.cells]):
                 nodes = place[key(data.points[cell, :2])]
-                # Both lists in the order of their points.
+                # Both lists are sorted by their points.
                 a, b = (order(points) for points in (space.points[nodes], data.points[cell, :2]))
                 if np.abs(space.points[nodes[a]] - data.points[cell[b], :2]).max() > 1e-9 * size:
                     raise ValueError("a middle of a side is not where the mesh has it")

@@ -1,10 +1,9 @@
-"""Judges what a run of the program wrote: right, refused (rightly or not), wrong.
+"""Verifies the results of a run: right, refused (rightly or not), wrong.
 
-Two tests, of which the first needs no other answer: (i) the displacement written keeps the contact
-rows and the prescribed values, and at every node Ku − f is a force that they may exert: zero where
-there are none, in the cone of the touching normals elsewhere; (ii) it is the judge's own answer, in
-the largest displacement and in the energy, up to motions that the problem leaves open. The damage
-written obeys (28) from the frame before.
+There are two tests of the displacement. (i) It satisfies the contact rows and the prescribed values, and Ku − f at
+every node is a force that these conditions can exert: zero without conditions, otherwise in the cone of the touching
+normals. (ii) It equals the solution of `variational.py`, in the largest displacement and in the energy, up to motions
+that the problem leaves open. The damage must satisfy (28) from the previous frame.
 """
 
 import json
@@ -22,12 +21,12 @@ from triangulation import read_triangulation
 from variational import Step, along, without
 
 FORCE = 1e-8  # residual forces, relative to the largest sum of absolute element forces at a node
-LOADS = 2e-6  # the same for tractions that the program integrates to 1e-6: on curved sides, or where they depend on the place
+LOADS = 2e-6  # the same for tractions that the program integrates to 1e-6: on curved sides, or functions of x and y
 PLACE = 1e-8  # violations of gaps, relative to the largest displacement
-TOUCH = 1e-6  # a gap that small, relative to it, may carry a force: u is exact to that
+TOUCH = 1e-6  # at smaller gaps, relative to it, a force is allowed: u has this accuracy
 ANSWER = 1e-6  # displacements, relative
 ENERGY = 1e-4  # strains in the energy norm, relative
-PAST = 0.1  # a load may cross zero: scales fall no lower than this share of the largest so far
+PAST = 0.1  # a load may cross zero: scales are at least this part of the largest ones so far
 TOLERANCE = 1e-10  # KKT tolerance of a run; relative limits are for this and grow with it
 DAMAGE = 1e-8
 EPSILON = np.finfo(float).eps
@@ -35,9 +34,9 @@ EPSILON = np.finfo(float).eps
 
 @dataclass
 class Verdict:
-    """A word; why; the largest relative difference of u found. `right`; `refused rightly`;
-    `either`: refusing is as good; `gave up`: a solver failed on a scene that has no solution;
-    `imprecise`: off by what the residuals allow, untold; `refused wrongly`; `wrong`."""
+    """A word, a reason, and the largest relative difference of u. The words: `right`; `refused rightly`; `either`:
+    solving and refusing are both right; `gave up`: a solver failed on a scene without a solution; `imprecise`: an error
+    within the residuals, without a note; `refused wrongly`; `wrong`."""
 
     word: str
     reason: str
@@ -55,7 +54,7 @@ def judge(folder, code, output):
 
 
 def verdict_on(discrete, out, code, output):
-    """First by the exit code against what the data ask for, then by the frames."""
+    """Compares the exit code with the expectation, then verifies the frames."""
     refusal, either = expectation(discrete)
     said = message(output)
     if code == 2:
@@ -80,8 +79,8 @@ def verdict_on(discrete, out, code, output):
 
 
 def missed(discrete, frames):
-    """What is known of the step that a solver failed at, and whether rounding alone, larger than the
-    tolerance, explains it."""
+    """A description of the step at which a solver failed, and whether rounding errors above the tolerance explain the
+    failure."""
     damaged = "damage" in discrete.scene
     if frames:
         last = frames[-1]
@@ -118,7 +117,7 @@ def initial(discrete):
 
 
 def traits(discrete):
-    """What is unusual about a scene, in words to count by."""
+    """The unusual features of a scene, as words for statistics."""
     rows, words = discrete.contact, []
     prescribed = {node for node, _, _ in discrete.prescribed}
     for node in np.unique(rows.node):
@@ -140,7 +139,7 @@ def traits(discrete):
 
 
 def expectation(discrete):
-    """(reason to refuse the scene or None, whether either will do): by data and by the ranks."""
+    """The reason to refuse the scene, or None, and whether solving and refusing are both right."""
     reason, either = discrete.bad_input(times(discrete.scene))
     if reason:
         return reason, False
@@ -148,7 +147,7 @@ def expectation(discrete):
     worst = None
     values = [discrete.prescribed_rows(t).value for t in times(discrete.scene)]
     size = max(np.abs(value).max(initial=0.0) for value in values)
-    # What the loads would move in a body without shape: prescribed values may all be rounding.
+    # The displacement of the loads alone: all prescribed values may be rounding errors.
     loads = max(np.abs(discrete.load(t)).sum() for t in times(discrete.scene))
     size = max(size, loads / discrete.young.mean())
     for t in times(discrete.scene):
@@ -168,7 +167,7 @@ def expectation(discrete):
 
 
 def judge_frames(discrete, frames, output):
-    """Every frame written: the damage step, then the contact step."""
+    """Verifies every frame: the damage step, then the contact step."""
     worst, scale, before = Verdict("right", ""), (0.0, 0.0), None
     damaged = "damage" in discrete.scene
     start = initial(discrete)
@@ -183,7 +182,7 @@ def judge_frames(discrete, frames, output):
             return Verdict("wrong", f"t = {frame.time:g}: {reason}")
         step = Step(discrete, frame.zeta, frame.time)
         found, scale = judge_step(step, frame.u, scale)
-        if found.word == "moved":  # by little force: right if the program says that it may be
+        if found.word == "moved":  # by a small force: right if the program notes it
             told = re.search(r"exact only to about (\S+) of", output)
             told = "one of many" in output or told and found.difference < 10 * float(told[1])
             found.word = "right" if told else "wrong"
@@ -202,8 +201,8 @@ def judge_frames(discrete, frames, output):
 
 
 def shown(step, frame, scale):
-    """What is wrong with the gap and the pressure written: g − u·ν, the least of a node's rows, and
-    the nodal reaction over the tributary length, where a node has one row and is not prescribed."""
+    """The errors of the written gap and pressure. The gap is the smallest g − u·ν of a node's rows. The pressure is the
+    nodal reaction over the tributary length, at nodes with one row and without prescribed values."""
     rows, (force, length) = step.rows, scale
     slack = np.full(len(frame.gap), np.inf)
     np.minimum.at(slack, rows.node, rows.value - along(rows, frame.u))
@@ -228,7 +227,7 @@ def shown(step, frame, scale):
 
 
 def judge_stop(discrete, frames, out):
-    """A stop at ζ_* must be one; None if it is, or there is none."""
+    """Checks a stop at ζ_*; None if it is right or there is no stop."""
     stopped = json.loads((out / "summary.json").read_text()).get("stopped_at")
     if stopped is None:
         return None
@@ -241,13 +240,13 @@ def judge_stop(discrete, frames, out):
 
 
 def inexact(discrete):
-    """Whether tractions are integrated to 1e-6 only."""
+    """Whether the program integrates tractions to 1e-6 only."""
     tractions = [b["traction"] for b in discrete.boundaries if "traction" in b]
     return bool(tractions) and (discrete.space.curved() or any(map(varies, tractions)))
 
 
 def ease(discrete):
-    """By how much a scene's KKT tolerance is larger than the usual one."""
+    """The KKT tolerance of a scene over the usual one."""
     return discrete.scene.get("contact", {}).get("tolerance", TOLERANCE) / TOLERANCE
 
 
@@ -322,7 +321,7 @@ def judge_step(step, u, scale):
 
 
 def message(output):
-    """The error of a run without its numbers, so that like errors count together."""
+    """The error message of a run without numbers, to count equal errors."""
     lines = [line for line in output.splitlines() if line.startswith("error:")] or ["no error"]
     text = re.sub(r"[-+]?\d[\d.e+-]*", "#", lines[0].replace("scene.toml: ", ""))
     return re.sub(r" \(# times it\)| #(?=,|$)", "", text)[:160]

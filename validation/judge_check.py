@@ -1,5 +1,5 @@
-"""Checks the judge itself, without the program: exact answers pass, planted faults do not, for
-displacements of order 1 and 2.
+"""Checks the verification itself, without the program: exact answers pass, planted faults do not, for P1 and P2
+displacements.
 
 Run: /usr/bin/python3 validation/judge_check.py
 """
@@ -45,7 +45,7 @@ def pressed(order, gap="0.01"):
 
 
 def answers(order):
-    """The exact fields keep every condition and are the judge's own answers; the patch test also turned."""
+    """The exact fields satisfy every condition and are the solutions of `variational.py`; the patch test is also rotated."""
     for problem in exact.problems(order):
         step, field = answer_of(problem, order)
         yield f"{problem[0]}: residuals of the exact field", max(residuals(step, field)[:2]), 1e-14
@@ -59,8 +59,8 @@ def answers(order):
 
 
 def planted(order):
-    """What is not the answer is called wrong: scaled, lifted, through the obstacle, glued, one node
-    off by 1e-5 of the answer, the answer of another gap."""
+    """Wrong answers are called wrong: scaled, lifted, through the obstacle, glued, one node moved by 1e-5 of the answer,
+    the answer for another gap."""
     step, right = pressed(order)
     x = step.discrete.points
     one = np.zeros_like(right)
@@ -125,7 +125,7 @@ def ranks(order):
 
 
 def loose(mesh, corner, order):
-    """How many motions an answer leaves open: sliding, on a flat foundation."""
+    """The number of motions that an answer leaves open: sliding on a flat foundation."""
     step = step_of(mesh, [corner], order, body={"force": ["0", "-1"]})
     step.solve()
     return step.loose.shape[1]
@@ -151,7 +151,7 @@ def damage(order):
 
 
 def materials(order):
-    """The answers of other materials are wrong, and the damage law counts by surface."""
+    """The answers of other materials are wrong, and each surface has its own damage law."""
     step, right = answer_of(exact.layers(), order)
     for name, other in (("layers swapped", (20.0, 80.0)), ("one material", (80.0, 80.0))):
         yield f"planted: {name}", 1.0 - wrong(step, answer_of(exact.layers(*other), order)[1]), 0.5
@@ -167,7 +167,7 @@ def materials(order):
 
 
 def moving(order):
-    """Gaps count at their time; the body is pressed out of an obstacle that it rests in."""
+    """Gaps depend on time; an obstacle that overlaps the undeformed body pushes it out."""
     gap = [{"name": "west", "symmetry": True}, {"name": "south", "gap": "0.02*t - 0.005"},
            {"name": "north", "traction": ["0", "-3"]}]
     early, late = (step_of(square(), gap, order, t) for t in (0.0, 1.0))
@@ -180,7 +180,7 @@ def moving(order):
     yield "pressed without a load", np.abs(step.solve() - right.ravel()).max(), 1e-14
     yield "planted: at rest in the obstacle", 1.0 - wrong(step, 0 * right.ravel()), 0.5
     for low, high, refused in (("-0.001", "-0.001", 1.0), ("-0.001", "0.002", 0.0)):
-        # At the clamped end no gap counts but those that the body's rest enters.
+        # At the clamped end only gaps that the undeformed body violates count.
         scene = {**SCENE, "boundary": plates(low, high)[1:] + [{"name": "end", "symmetry": True}]}
         discrete = Discrete(of_order(scene, order), tip())
         reason = expectation(discrete)[0] or ""
@@ -188,8 +188,7 @@ def moving(order):
 
 
 def curved(order):
-    """On a disc with its middles on the circle the normals are radial, and the answer of its chords is
-    wrong."""
+    """On a disc with midpoints on the circle the normals are radial, and the answer for its chords is wrong."""
     if order == 1:
         return
     mesh = bodies.finish(np.random.default_rng(4), bodies.disc(np.random.default_rng(4)), 1.0, 0.0)

@@ -34,21 +34,21 @@ class Lagrange:
         return np.column_stack([edges, len(self.mesh.nodes) + middle])
 
     def offsets(self, edges):
-        """How far the middles of edges lie from the middles of their chords (k, 2)."""
+        """The offsets of the midpoints of edges from the midpoints of their chords (k, 2)."""
         if self.order == 1:
             return np.zeros((len(edges), 2))
         a, b, middle = self.points[self.on(edges)].transpose(1, 0, 2)
         return middle - 0.5 * (a + b)
 
     def curved(self, edges=None):
-        """Whether some of the edges (all, unless given) are not straight."""
+        """Whether some of the edges (by default of all edges) are curved."""
         if edges is None:
             edges = self.mesh.triangles[:, SIDES].reshape(-1, 2)
         size = np.ptp(self.points, axis=0).max()
         return bool(np.abs(self.offsets(edges)).max(initial=0.0) > 1e-12 * size)
 
     def spread(self, values):
-        """Values at the nodes of a function that is P1 between those at the vertices."""
+        """The values at the nodes of a P1 function given at the vertices."""
         if self.order == 1:
             return values
         spread = np.empty(len(self.points))

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""What `--accuracy` promises, tried on forty bodies that are not shipped: promises.py [--binary FILE] [NAME…]
+"""The promises of `--accuracy`, checked on forty bodies that are not shipped: promises.py [--binary FILE] [NAME…]
 
 Runs the scenes of scenes.py with `--accuracy` 0.1, 0.03 and 0.01 and compares every printed figure of
 the last state with a truth: quadratic elements on a fine mesh that is graded to the corners and to the
@@ -32,7 +32,7 @@ from true_errors import Run, errors
 
 # Sizes of the second truth over those of the first.
 COARSER = 1.6
-# A force below this part of the largest, a damage below this, is rounding.
+# A force below this part of the largest one, or a damage below this, is a rounding error.
 ROUNDING = 1e-9
 # Seconds for a run, on a busy machine.
 LIMIT = 240
@@ -69,7 +69,7 @@ def figures(summary):
 
 
 def scales(out, names):
-    """By figure the largest value of its kind in the run."""
+    """Per figure: the largest value of its kind in the run."""
     rows = read_table(out / "history.csv")
     largest = {n: max(abs((n.startswith("zeta_") or n.endswith(".zeta")) - row[n]) for row in rows) for n in names}
 
@@ -101,8 +101,7 @@ class Truth:
         self.norms = self.errors(other)
 
     def errors(self, run):
-        """Of a run the errors of u in the energy norm and of the damage in L², by name; not those that have no
-        meaning."""
+        """The errors of u in the energy norm and of the damage in L², by name; only those with a meaning."""
         material = table(self.scene)
         values = {**material["material"], **{k[9:]: v for k, v in material.items() if k.startswith("material.")}}
         number = np.zeros(len(self.run.cells), int) if self.run.material is None else self.run.material
@@ -122,7 +121,7 @@ def compare(truth, summary, result, accuracy, seconds):
     force = max(scale for name, scale in truth.scales.items() if "force" in name)
     for name, value in figures(summary).items():
         scale, bar = truth.scales[name], bars.get(name)
-        # Nothing but rounding in the truth: no load does work, no foundation is touched.
+        # The truth contains only rounding errors: no load does work, no foundation is touched.
         if scale <= (ROUNDING * force if "force" in name else ROUNDING * ("zeta" in name)):
             continue
         yield {**head, "figure": name, "value": value, "truth": truth.figures[name],
@@ -135,7 +134,7 @@ def compare(truth, summary, result, accuracy, seconds):
 
 
 def line(rows):
-    """One run on the screen: the largest errors over the accuracy asked for, with the bars where there are."""
+    """One run as text: the largest errors over the required accuracy, with the bars if there are any."""
     first, worst = rows[0], sorted(rows, key=lambda row: -row["error"])[:4]
     bar = lambda row: "" if row["bar"] is None else f" (bar {row['bar'] / row['accuracy']:.2f})"
     shown = ", ".join(f"{row['figure']} {row['error'] / row['accuracy']:.2f}{bar(row)}" for row in worst)
@@ -145,10 +144,10 @@ def line(rows):
 
 
 def bars_of(what, rows):
-    """How often the bars hold, how wide they are, and the worst three."""
+    """The number of bars that hold, their width, and the worst three."""
     rows = [row for row in rows if row["bar"] is not None]
     missed = [row for row in rows if row["error"] > row["bar"] + row["truth_error"]]
-    # Where the truth is exact enough to tell.
+    # Only truths of sufficient accuracy count.
     ratios = [row["bar"] / row["error"] for row in rows if row["error"] > 10 * row["truth_error"]]
     if not rows:
         return [f"{what}: no bars"], 0
@@ -160,7 +159,7 @@ def bars_of(what, rows):
 
 
 def reached_of(what, rows):
-    """In how many runs "reached" is true, and the worst three where it is not."""
+    """The number of runs in which "reached" is true, and the worst three others."""
     runs, over = {}, {}
     for row in rows:
         runs.setdefault((row["scene"], row["accuracy"]), []).append(row)
@@ -175,7 +174,7 @@ def reached_of(what, rows):
 
 
 def summary_of(rows):
-    """What the trial says; and how many bars of figures and promises are broken."""
+    """The summary of the trial, and the number of broken bars and promises."""
     printed = [row for row in rows if row["value"] is not None]
     norms = [row for row in rows if row["value"] is None]
     (bars, missed), (told, over) = bars_of("printed figures", printed), reached_of("printed figures", printed)

@@ -1,8 +1,8 @@
 """Random bodies for `random_scenes.py`: triangulated blocks, wedges, discs, arches, slit blocks,
 and bodies cut from a grid of cells (corners, holes, pinches).
 
-A body is a `Triangulation` whose curves are its sides. Nodes and triangles are numbered at random,
-so that nothing may rest on their order.
+A body is a `Triangulation` whose curves are its sides. Nodes and triangles are numbered at random, so that no
+result can depend on their order.
 """
 
 from dataclasses import replace
@@ -108,8 +108,8 @@ def arch(rng):
 
 
 def slit(rng):
-    """A block cut from the west side (or within): the nodes of the cut are doubled, its tips are
-    not. Sides as of a block, and lips lower and upper."""
+    """A block with a cut from the west side or inside. The nodes of the cut are doubled, except its tips. It has the sides
+    of a block, and lips lower and upper."""
     nx, ny = int(rng.integers(5, 14)), 2 * int(rng.integers(2, 6))
     height = 10 ** rng.uniform(-0.5, 0.3)
     points, node, triangles = grid(rng, nx, ny, lambda s, t: (s, height * (t - 0.5)))
@@ -132,7 +132,7 @@ def slit(rng):
 
 
 def largest_part(triangles):
-    """The most triangles that are connected through edges: one body."""
+    """The largest set of triangles that are connected through edges: one body."""
     sides = np.sort(np.vstack([triangles[:, [k, (k + 1) % 3]] for k in range(3)]), 1)
     owner = np.tile(np.arange(len(triangles)), 3)
     _, edge = np.unique(sides, axis=0, return_inverse=True)
@@ -187,8 +187,8 @@ def finish(rng, body, length, turn):
 
 
 def bent(rng, mesh):
-    """The body of second order: the middles of its sides are left or moved across them, by up to a
-    twentieth of the least height of their triangles: more may fold these."""
+    """The body with second-order sides: their midpoints stay, or move across the side by up to a twentieth of the least
+    height of their triangles. Larger moves may fold triangles."""
     t, x = mesh.triangles, mesh.nodes
     ends = x[t[:, SIDES]]
     chord = ends[:, :, 1] - ends[:, :, 0]
@@ -199,7 +199,7 @@ def bent(rng, mesh):
     height = np.full(edge.max() + 1, np.inf)
     np.minimum.at(height, edge.ravel(), np.repeat(twice_area / length.max(axis=1), 3))
     height *= rng.choice([0.0, 0.01, 0.05]) * rng.uniform(-1, 1, len(height))
-    # Of the two triangles at an edge both must move it to the same place.
+    # Both triangles of an edge must move its midpoint to the same place.
     forward = np.where(t[:, SIDES][:, :, 0] < t[:, SIDES][:, :, 1], 1.0, -1.0)
     across = np.stack([chord[..., 1], -chord[..., 0]], -1) / length[..., None]
     move = (forward * height[edge.reshape(-1, 3)])[..., None] * across
@@ -207,8 +207,8 @@ def bent(rng, mesh):
 
 
 def patched(rng, mesh):
-    """The body with one or two surfaces in it: the triangles on one side of a line, within a disc, or
-    any, some of them no more than touching each other in a node."""
+    """The body with one or two surfaces: the triangles on one side of a line, in a disc, or random ones, which may touch
+    each other in a node only."""
     centre, size = mesh.nodes[mesh.triangles].mean(axis=1), np.ptp(mesh.nodes, axis=0).max()
     surfaces, taken = {}, np.zeros(len(centre), bool)
     for name in ("core", "skin")[:int(rng.integers(1, 3))]:

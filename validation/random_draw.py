@@ -1,9 +1,9 @@
 """Random scenes by kind: a body of `random_bodies`, its conditions and loads, solver and ranks.
 
 Scales are drawn over decades: E from 1e-3 to 1e12 Pa, lengths from 1e-3 to 1e3 m, strains from 1e-9
-to 1e-2, gaps from 1e-6 to 1e9 times the displacement that such a strain means. What the program's
-own stability study keeps regular is drawn here on purpose: tips, slits, pinches, nodes with several
-normals, bodies that nothing or only contact supports, loads that cross zero.
+to 1e-2, gaps from 1e-6 to 1e9 times the displacement that such a strain means. The scenes contain irregular
+features that the stability study avoids: tips, slits, pinches, nodes with several normals, bodies that are
+unsupported or supported by contact only, loads that cross zero.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ import random_bodies as bodies
 from scene import of_order
 from triangulation import Triangulation
 
-# Of a load in time; a static solve is at t = 1, whatever the load is before.
+# Factors of a load in time; a static solve is at t = 1.
 PROFILES = ("1", "t", "cos(pi*t)", "(1 - 2*t)", "sin(2*pi*t)", "(0.2 + t^2)", "(t - 0.5)")
 
 # Parts of the scenes: with quadratic displacements; of these and of the others on a mesh with curved sides;
@@ -132,7 +132,7 @@ class Draw:
         return scene
 
     def damage(self):
-        """A law whose source takes some percent in the time there is, and a field ζ₀."""
+        """A law whose source makes some percent of damage in the time of the run, and a field ζ₀."""
         initial = "1"
         if self.chance(0.7):
             waves = [self.number(-6, 6) / self.length for _ in range(2)]
@@ -226,7 +226,7 @@ def prescribed(d, mesh):
 
 
 def loose(d, mesh):
-    """Supported by contact alone, on some or all sides, and mostly pressed into it."""
+    """Supported by contact alone on some or all sides, and mostly pressed against it."""
     names = list(d.rng.permutation(list(mesh.curves)))
     touching = names[:int(d.rng.integers(1, len(names) + 1))]
     for name in touching:
@@ -241,7 +241,7 @@ def loose(d, mesh):
 
 
 def normals(d, mesh):
-    """Fixed normals at an angle to the body's own, a few into the body."""
+    """Fixed normals at an angle to the body's own; a few point into the body."""
     names = list(d.rng.permutation(list(mesh.curves)))
     d.support(names[0])
     for name in names[1:]:
@@ -269,7 +269,7 @@ OWN = {bodies.block: block, bodies.slit: slit, bodies.wedge: wedge, bodies.disc:
 
 
 def draw(seed, number, solvers):
-    """Scene `number` of a seed, for one of `solvers`: the same however many are drawn."""
+    """Scene `number` of a seed, for one of `solvers`. It does not depend on the number of scenes."""
     rng = np.random.default_rng([seed, number])
     kind = str(rng.choice(list(KINDS)))
     choices, conditions = KINDS[kind]
@@ -283,13 +283,13 @@ def draw(seed, number, solvers):
 
 
 def vector(direction):
-    """As the scene file wants it."""
+    """The vector in the syntax of the scene file."""
     return [repr(float(c)) for c in direction]
 
 
 def vary(case, seed, number, order=None):
     """Adds quadratic displacements, curved sides, several materials, moving and negative gaps to scene `number` of a seed,
-    with the order given, if it is. Drawn from a stream of their own: the scenes of `draw` stay what they are."""
+    with the order given, if it is. They have their own random stream, so the scenes of `draw` do not change."""
     rng = np.random.default_rng([seed, number, 2])
     drawn = 2 if rng.random() < QUADRATIC else 1
     order = order or drawn
@@ -306,7 +306,7 @@ def vary(case, seed, number, order=None):
 
 
 def materials(rng, case):
-    """Stiffness over six decades, any ν, and what the law of damage may have otherwise."""
+    """Stiffness over six decades, any ν, and other constants of the damage law."""
     material, law = case.scene["material"], case.scene.get("damage")
     for name in case.mesh.surfaces:
         material[name] = {"young": material["young"] * 10 ** rng.uniform(-3, 3)}
@@ -321,8 +321,8 @@ def materials(rng, case):
 
 
 def motion(rng, case, timed):
-    """A term that moves an obstacle by a hundredth to five times the scene's typical displacement; without
-    time it stays where it is at t = 1."""
+    """A term that moves an obstacle by a hundredth to five times the typical displacement of the scene. Without time it has
+    its value at t = 1."""
     size = case.move * 10 ** rng.uniform(-2, 0.7)
     profile = str(rng.choice(PROFILES)) if timed else "t"
     return f" {rng.choice(['+', '-'])} {float(size)!r}*{profile}"

@@ -1,11 +1,10 @@
 #!/usr/bin/python3
-"""Judges the program on random scenes: random_scenes.py [--count N] [--seed S] [--order 2] …
+"""Verifies the program on random scenes: random_scenes.py [--count N] [--seed S] [--order 2] …
 
-Each scene (`random_draw`) is run with a drawn solver on one to three ranks, and its answer judged
-by code that shares nothing with the program (`judge`). Displacements of order 2, curved sides, several
-materials and moving gaps are drawn too. Writes out/random/scenes.csv; scenes judged wrong or wrongly refused are kept in
-out/random/failures/ID with what was run, and make the exit code 1. `--again ID` runs a kept one once
-more. (`judge_check` tries the judge itself.)
+Each scene (`random_draw`) is run with a random solver on one to three ranks, and `judge` verifies its answer by code
+that shares nothing with the program. Some scenes have P2 displacements, curved sides, several materials or moving
+gaps. Writes out/random/scenes.csv. Wrong or wrongly refused scenes are kept in out/random/failures/ID and make the
+exit code 1; `--again ID` repeats one of them. (`judge_check` checks the verification itself.)
 """
 
 import argparse
@@ -23,7 +22,7 @@ from collections import Counter
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
-# The judge's matrices are small: threads would only wait for each other.
+# The matrices of the verification are small: threads would only wait for each other.
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", SCOTCH_PTHREAD_NUMBER="1")
 
 from shared import ROOT  # noqa: E402
@@ -34,7 +33,7 @@ from results import write_table  # noqa: E402
 from scene import read_scene, solvers, write_scene  # noqa: E402
 
 LIMIT = 120  # seconds a run may take, on a busy machine
-# Ranks that wait for each other leave the cores to others.
+# Waiting ranks yield their cores.
 ENVIRONMENT = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
                "OMPI_MCA_mpi_yield_when_idle": "1"}
 BAD = ("wrong", "refused wrongly", "no verdict")
@@ -64,10 +63,10 @@ def run(binary, folder, solver, ranks):
 
 
 def examine(folder, binary, solver, ranks):
-    """Runs and judges the scene in a folder; returns the verdict and the seconds of the run."""
+    """Runs and verifies the scene in a folder; returns the verdict and the seconds of the run."""
     started = time.perf_counter()
     code, output = run(binary, folder, solver, ranks)
-    if code == 1 and "MPI_INIT" in output:  # Open MPI did not start: not the program's fault
+    if code == 1 and "MPI_INIT" in output:  # Open MPI did not start, which is no fault of the program
         code, output = run(binary, folder, solver, ranks)
     seconds = time.perf_counter() - started
     try:
@@ -78,13 +77,13 @@ def examine(folder, binary, solver, ranks):
         if verdict.word == "refused wrongly" and advised:
             return follow(folder, binary, solver, ranks, float(advised[1])), seconds
         return verdict, seconds
-    except Exception:  # a fault of the judge must be seen, not end the others
+    except Exception:  # an error of the verification must be visible and not end the other scenes
         return Verdict("no verdict", traceback.format_exc(limit=-2).replace("\n", " | ")), seconds
 
 
 def follow(folder, binary, solver, ranks, tolerance):
-    """Does what the program advised where rounding is larger than the tolerance: the scene once
-    more at the tolerance it named, and a little."""
+    """Follows the program's advice if rounding errors exceed the tolerance: repeats the scene with the advised tolerance and
+    a little more."""
     advised = folder / "advised"
     advised.mkdir(exist_ok=True)
     shutil.copy(folder / "mesh.msh", advised)
@@ -99,7 +98,7 @@ def follow(folder, binary, solver, ranks, tolerance):
 
 
 def one(binary, out, seed, number, solver, order):
-    """Draws, runs and judges scene `number`; keeps its files if it failed."""
+    """Draws, runs and verifies scene `number`; keeps its files if it failed."""
     case = draw(seed, number, solvers(binary))
     case.solver = solver or case.solver
     vary(case, seed, number, order)
@@ -122,7 +121,7 @@ def one(binary, out, seed, number, solver, order):
 
 
 def summarise(rows):
-    """Per kind, solver and number of ranks how many of each verdict; then every reason that a refusal or a failure had."""
+    """The number of each verdict per kind, solver and number of ranks; then the reasons of refusals and failures."""
     words = ("right", "right as advised", "imprecise", "either", "refused rightly", "gave up", *BAD)
     lines = [f"{'':<16}" + "".join(f"{word:>18}" for word in words)]
     for column in ("kind", "solver", "ranks"):

@@ -1,5 +1,5 @@
-"""Reference solutions, kept until the scene or the mesh they belong to changes; and those of the scenes of geo/:
-P2 on meshes graded to every singularity, made without the program's estimates.
+"""Reference solutions, kept until their scene or mesh changes. Those of the scenes of geo/ have P2 elements on meshes
+graded to every singularity, without the program's estimates.
 
 Where u − u(corner) ~ r^α, triangles of size h ~ r^(1 − α/3) share the energy error of P2 evenly; α is near ½
 at the ends of obstacles and re-entrant corners, so the sides are min(LARGEST, STRENGTH r^(5/6)) m
@@ -27,12 +27,12 @@ Physical Curve("top") = {3}; Physical Curve("left") = {4};
 
 
 def size_fields(sizes):
-    """Lines of a .geo that make triangles as small as the smallest of some expressions of gmsh, m."""
+    """Lines of a .geo: the size of triangles is the minimum of some expressions of gmsh, m."""
     first, last = 101, 100 + len(sizes)
     return [*(f'Field[{k}] = MathEval; Field[{k}].F = "{size}";' for k, size in enumerate(sizes, first)),
             f"Field[100] = Min; Field[100].FieldsList = {{{first} : {last}}}; Background Field = 100;",
             *(f"Mesh.MeshSize{option} = 0;" for option in ("ExtendFromBoundary", "FromPoints", "FromCurvature")),
-            # The other algorithms leave triangles without area at such sizes.
+            # The other algorithms of gmsh make flat triangles at such sizes.
             "Mesh.Algorithm = 1;"]
 
 
@@ -46,11 +46,11 @@ class Grading:
     # Near Γ_C and where the damage is steep, as expressions of gmsh.
     near: tuple = ()
     outline: str = None
-    # Of adaptive steps; the damage of the squares depends on them most.
+    # The tolerance of adaptive steps; the damage of the squares depends most on it.
     tolerance: float = 1e-3
 
     def geometry(self, file):
-        """The text of a .geo: the body of another, with this size."""
+        """The text of a .geo: the body of another one, with this size."""
         r = [f"((x - {x})^2 + (y - {y})^2)" for x, y in self.corners]
         sizes = [f"{self.strength} * {square}^(5 / 12) + 3e-7" for square in r]
         sizes += [str(self.largest), *self.near]
@@ -72,8 +72,8 @@ GRADINGS = {
 
 
 def kept(binary, folder, scene, geometry, refinements=0, limit=None):
-    """The results of a scene on the mesh of a .geo text, refined so often: those in `folder`, if they are of this
-    scene and text, else new ones. A run longer than `limit` seconds raises subprocess.TimeoutExpired."""
+    """The results of a scene on the mesh of a .geo text after some refinements. The results in `folder` are used if they
+    belong to this scene and text. A run longer than `limit` seconds raises subprocess.TimeoutExpired."""
     results, file, made_of = folder / "results", folder / "reference.toml", folder / "reference.geo"
     complete = folder / "complete"
     mesh = f"refined{refinements}.msh" if refinements else made_of.name
@@ -95,8 +95,8 @@ def kept(binary, folder, scene, geometry, refinements=0, limit=None):
 
 
 def refine(mesh, count):
-    """The mesh, and `count` meshes beside it, each cutting every triangle of the one before into four by the
-    middles of its sides."""
+    """The mesh and `count` refined meshes in the same folder. Each divides every triangle of the previous one into four by
+    the midpoints of its sides."""
     meshes = [mesh]
     for k in range(1, count + 1):
         meshes.append(mesh.with_name(f"refined{k}.msh"))

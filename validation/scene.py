@@ -1,5 +1,4 @@
-"""Scene files: the same TOML the program reads. Only what a comparison needs is read here; the program
-itself checks whether a scene is well formed.
+"""Reads scene files, as far as a comparison needs them. The program itself checks whether a scene is correct.
 """
 
 import json
@@ -11,7 +10,7 @@ import numpy as np
 
 
 class SceneError(Exception):
-    """Something the user can mend: said in one line, without a traceback."""
+    """An error of the user; the message has one line and no traceback."""
 
 
 def read_scene(path):
@@ -51,7 +50,7 @@ def elasticity(young, poisson, plane="stress"):
     return (e / (1 - nu**2))[..., None, None] * d
 
 
-# What [damage] has where a scene leaves it out.
+# Defaults of [damage].
 DAMAGE = {"lambda_w": 0.0, "strain_cap": 1000.0, "threshold": 0.01, "initial": 1.0, "mass": "consistent"}
 
 
@@ -68,14 +67,14 @@ def of_order(scene, order):
 
 
 def toml(value):
-    """A value in TOML: JSON's strings, numbers, booleans and flat lists, and tables in a line."""
+    """A value in TOML: strings, numbers, booleans and flat lists as in JSON, and inline tables."""
     if isinstance(value, dict):
         return "{ " + ", ".join(f"{key} = {toml(entry)}" for key, entry in value.items()) + " }"
     return json.dumps(value)
 
 
 def write_scene(scene, path):
-    """Writes scalars, lists of scalars, tables and arrays of tables: all that scenes use."""
+    """Writes scalars, lists of scalars, tables and arrays of tables; scenes use nothing else."""
     lines = []
 
     def entries(table):

@@ -1,4 +1,4 @@
-"""Forty bodies that nobody tuned the program on: obstacles between nodes, thin layers, pads, narrow loads,
+"""Forty bodies on which the program was not tuned: obstacles between nodes, thin layers, pads, narrow loads,
 steep damage, pulses in time, pins, notches.
 
 A scene is a row of strings (`Scene`); `texts` makes its .geo and its table, of a truth with quadratic
@@ -36,7 +36,7 @@ PLATE_MM = {"body": "0,0 base 200,0 right 200,100 top 0,100 left"}
 FIXED = "left u 0|0"
 ROLLER = "0.00001+0.5*(x-0.55)^2"
 NARROW = "-0.05*if(abs(x-0.6137)<0.001,1,0)/(2*0.001)"
-# The truths' outlines have corners where the data jump.
+# The outlines of truths have corners where the data jump.
 LOADED = {"body": "0,0 base 1,0 right 1,1 top 0.6147,1 top 0.6127,1 top 0,1 left"}
 BOX = "0.7037,0.59 - 0.7237,0.59 - 0.7237,0.61 - 0.7037,0.61 -"
 BOXED = {"body": SQUARE["body"] + " / " + BOX, "box": BOX}
@@ -180,8 +180,8 @@ class Outline:
 
 
 def fields(scene, points, factor):
-    """The sizes of a truth, times a factor: from a small part of the body's thickness at corners on, growing by 0.2
-    of the distance."""
+    """The sizes of a truth, times a factor: at corners a small part of the body's thickness, increasing by 0.2 of the
+    distance."""
     corners = [tuple(map(float, p.split(","))) for p in points]
     extents = [max(c) - min(c) for c in zip(*corners)]
     # Without time there is one solve.

@@ -1,5 +1,4 @@
-"""Checks the FEniCSx side on its own, without the program: exact solutions and signs, for
-displacements of order 1 and 2.
+"""Checks the FEniCSx code without the program: exact solutions and signs, for P1 and P2 displacements.
 
 Run: /usr/bin/python3 validation/selfcheck.py
 """

@@ -2,8 +2,7 @@
 """Draws the maps of the stability study: stability.py FOLDER [MAP…]
 
 Reads FOLDER/<map>.csv as `signorini-study stability` writes it, and draws FOLDER/<map>.png. A map is a list of
-panels: fields coloured by their verdict, or points and lines, on which × marks what was refused and a red ring what
-was wrong.
+panels: fields coloured by their verdict, or points and lines, with × for refused and a red ring for wrong answers.
 """
 
 import sys
@@ -32,7 +31,7 @@ def name(value):
 
 
 def groups(rows, key):
-    """The rows by their keys, in the order of appearance."""
+    """Groups the rows by their keys, in the order of appearance."""
     found = {}
     for row in rows:
         found.setdefault(key(row), []).append(row)
@@ -45,7 +44,7 @@ def columns(*names):
 
 
 def points(axes, rows, x, y, by, scale="log", line=True, low=FLOOR):
-    """A line with marks for each group; rows without a value are left out."""
+    """A line with marks per group, without rows that lack a value."""
     for k, (key, group) in enumerate(groups(rows, by).items()):
         at = sorted((x(row), max(y(row), low), row["verdict"]) for row in group if "" not in (x(row), y(row)))
         if not at:
@@ -83,7 +82,7 @@ def iterations(row):
 
 
 def solver_order(rows):
-    """Rows of a refusal before solving, `all`, as one of each solver."""
+    """Expands a row of all solvers (`all`: refused before solving) to a row per solver."""
     solvers = [s for s in groups(rows, columns("solver")) if s != "all"]
     return [{**row, "solver": s} for row in rows for s in ([row["solver"]] if row["solver"] != "all" else solvers)]
 

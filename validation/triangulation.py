@@ -1,4 +1,4 @@
-"""Triangulations from gmsh, read by meshio: an independent reader of the same file."""
+"""Triangulations from gmsh, read by meshio independently of the program."""
 
 import contextlib
 import io
@@ -46,12 +46,12 @@ class Triangulation:
 
 
 def edge_keys(edges, nodes):
-    """A number for each edge of a mesh of so many nodes, whichever end comes first."""
+    """A number for each edge of a mesh with `count` nodes, for both orders of its ends."""
     return edges.min(axis=1) * nodes + edges.max(axis=1)
 
 
 def read_triangulation(path):
-    """Vertices in the file's order, without those no triangle uses; all groups of each line.
+    """Vertices in the order of the file, without those of no triangle; all groups of each line.
 
     A line may belong to several groups. The 4.1 format states this per entity, which
     meshio gives as cell sets; the 2.2 format repeats the line with another tag.

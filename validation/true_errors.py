@@ -1,10 +1,9 @@
 """True errors of runs against a finer run: u in the energy norm, the damage in L², at the last time.
 
-Folders of results of either order, with straight or curved sides: integrals are taken at quadrature
-points of the reference, and a run is evaluated there, its elements being found by Newton's method. Where
-a boundary is curved two meshes differ there by the error of their parabolas; a run's element is continued
-up to the reference's. The reference should be quadratic, on a mesh graded geometrically to every corner
-and end of contact, with steps of its own: it shares nothing with the estimates it checks."""
+The runs may be P1 or P2, with straight or curved sides. Integrals are sums over the quadrature points of the
+reference. Newton's method finds the element and the coordinates of these points in the run. At a curved boundary two
+meshes differ by the error of their parabolas; the elements of the run are continued up to the reference. The reference
+should be P2 on a mesh graded geometrically to every corner and end of contact, with its own time steps."""
 
 import json
 from pathlib import Path
@@ -23,8 +22,7 @@ POINTS = np.array([[1 - 2 * b if i == j else b for j in range(3)]
 WEIGHTS = np.repeat([0.109951743655322, 0.223381589678011], 3)
 # Derivatives of the barycentric coordinates in the last two of them.
 SLOPES = np.array([[-1, -1], [1, 0], [0, 1]])
-# Newton's steps, for which sides that are nearly straight need few, and the longest; elements passed on the
-# way to a point.
+# The number of Newton steps, the longest step, and the number of elements on the way to a point.
 NEWTON, STEP, WALK = 12, 0.5, 30
 
 
@@ -40,7 +38,7 @@ class Run:
         self.cells = next(iter(frame.cells_dict.values()))
         self.u = frame.point_data["displacement"][:, :2]
         self.zeta = frame.point_data["zeta"].ravel()
-        # Per element 0, or the number of its surface by name; None where all is one material.
+        # Per element: 0, or the number of its surface by name; None for a single material.
         self.material = frame.cell_data["material"][0].ravel() if "material" in frame.cell_data else None
         vertices = Triangulation(*self.points.T, self.cells[:, :3])
         self.find = vertices.get_trifinder()
@@ -82,7 +80,7 @@ class Run:
             if not lost.any():
                 break
             cell[lost] = self.find(*(points[lost] + part * (inner - points)[lost]).T)
-        # Between a chord and its arc: the element of the nearest middle.
+        # A point between a chord and its arc belongs to the element with the nearest midpoint.
         middles = self.points[self.cells[:, :3]].mean(1)
         for k in np.flatnonzero(cell < 0):
             cell[k] = np.hypot(*(middles - points[k]).T).argmin()
@@ -98,8 +96,8 @@ class Run:
 
 
 def errors(reference, run, d):
-    """Relative errors of u and the damage (None without damage); d for all, or for each element of the
-    reference. Not a number where nothing is deformed."""
+    """The relative errors of u and of the damage (None without damage), for the body or per element of the reference. NaN
+    without deformation."""
     cells = np.repeat(np.arange(len(reference.cells)), len(POINTS))
     barycentric = np.tile(POINTS, (len(reference.cells), 1))
     points, jacobian = reference.mapped(cells, barycentric)

@@ -1,9 +1,9 @@
-"""The contact step (26) solved in the judge's own way: min ½uᵀKu − fᵀu, Du = d, Au ≤ g.
+"""The contact step (26), solved independently of the program: min ½uᵀKu − fᵀu, Du = d, Au ≤ g.
 
-Prescribed rows are eliminated node by node with an orthonormal basis of what they leave, u = lift +
-Zv. An interior-point method then finds the active set, and one linear solve on it, refined, the
-answer. Neither knows of degenerate nodes: parallel, opposite and redundant rows are allowed.
-Whether there is a solution, and only one, is told by the ranks of the rigid motions and by Farkas.
+Prescribed rows are eliminated node by node, with an orthonormal basis of the remaining directions: u = lift + Zv. An
+interior-point method finds the active set, and a refined linear solve on it gives the answer. Parallel, opposite and
+redundant rows are allowed. The ranks of the rigid motions and the lemma of Farkas decide whether a solution exists and
+whether it is unique.
 """
 
 import numpy as np
@@ -33,8 +33,8 @@ class Step:
         self.driven = self._driven()
 
     def _eliminate(self):
-        """u = lift + Z v: per node the least-squares value of its prescribed rows, and an
-        orthonormal basis of the directions they leave."""
+        """u = lift + Z v. Per node: the least-squares value of its prescribed rows, and an orthonormal basis of the remaining
+        directions."""
         n = len(self.f) // 2
         self.lift, at = np.zeros(2 * n), {}
         for k, node in enumerate(self.prescribed.node):
@@ -55,8 +55,7 @@ class Step:
         self.z = coo_matrix((entries, (rows, columns)), (2 * n, count)).tocsc()
 
     def _motions(self):
-        """N: rigid motions of the body that no prescribed row resists; those that no contact row
-        resists either are `free`."""
+        """N: the rigid motions of the body that no prescribed row resists. Those that no contact row resists are `free`."""
         x = self.discrete.points
         y = x - x.mean(0)
         y = y / np.abs(y).max()
@@ -78,8 +77,8 @@ class Step:
         return np.abs(along(self.prescribed, self.lift) - self.prescribed.value).max(initial=0.0)
 
     def _penetration(self):
-        """How far the prescribed values push some node through its obstacles: the least
-        violation of the contact rows at a node over what is free to move there."""
+        """The distance by which prescribed values push a node through its obstacles: the smallest violation of the contact
+        rows at a node over its free displacements."""
         worst = 0.0
         a = self.a.toarray()
         for node in np.unique(self.prescribed.node):
@@ -96,8 +95,8 @@ class Step:
         return worst
 
     def _overlap(self, reach=np.inf):
-        """How much room obstacles on several sides of a node lack: the least s of Av ≤ b + s, |v| no
-        larger than `reach` times the gaps."""
+        """The overlap of obstacles on several sides of a node: the smallest s with Av ≤ b + s and |v| at most `reach` times the
+        gaps."""
         worst, rows = 0.0, self.rows
         for node in np.setdiff1d(rows.node[rows.value < 0.0], self.prescribed.node):
             at = rows.node == node
@@ -111,8 +110,8 @@ class Step:
         return worst
 
     def _driven(self):
-        """How much of the load, relative, no contact force λ ≥ 0 balances (Farkas). Forces 1e11
-        times the load do not count: they would live on the rounding of opposite normals."""
+        """The relative part of the load that no contact force λ ≥ 0 balances (Farkas). Forces of 1e11 times the load do not
+        count, as they would depend on the rounding of opposite normals."""
         size = max(np.abs(self.q).sum(), np.abs(self.f).sum())
         if size == 0.0 or self.n.shape[1] == 0:
             return 0.0
@@ -125,14 +124,14 @@ class Step:
         return left / size
 
     def solve(self):
-        """u, and what tells of its accuracy; needs a step that has a solution."""
+        """u and its accuracy, for a step with a solution."""
         h = (self.z.T @ self.k @ self.z).tocsc()
         self.size = h.diagonal().max(initial=0.0) or 1.0
-        # A load that does no work on the free motions lets as many unknowns be pinned.
+        # If a load does no work on the free motions, as many unknowns can be fixed.
         pins = qr(self.free.T, pivoting=True, mode="economic")[2] if self.free.size else []
         pinned = np.isin(np.arange(len(self.q)), pins[:self.free.shape[1]])
         self.h = h + self.size * diags(pinned * 1.0)
-        # A body that rests in its obstacles is pressed without a load.
+        # A body that overlaps its obstacles is pressed without a load.
         force = max(np.abs(self.q).max(initial=0.0), self.size * (-self.b).max(initial=0.0))
         v, self.active = np.zeros(len(self.q)), np.zeros(len(self.b), bool)
         lam = np.zeros(len(self.b))
@@ -152,9 +151,9 @@ class Step:
         return self.lift + self.z @ v
 
     def _on_active_set(self, q, b, v):
-        """Hv + Aᵀλ = q, Av = b on the active set, near v. A little regularisation lets rows be
-        redundant and motions be free, which stay as they are in v; refinement takes it out
-        again. λ is 0 elsewhere."""
+        """Hv + Aᵀλ = q, Av = b on the active set, near v. A small
+        regularisation allows redundant rows and free motions, which stay as in v; the refinement removes its effect. λ is
+        0 on the other rows."""
         a, n = self.a[self.active] * self.size, len(q)
         small = 1e-10 * self.size
         m = a.shape[0]
@@ -169,7 +168,7 @@ class Step:
         return v, everywhere
 
     def sensitivity(self):
-        """About the largest |u| per ‖force‖₂ while the active set stays: a few power iterations."""
+        """The approximate largest |u| per ‖force‖₂ for this active set, by a few power iterations."""
         force, largest = np.random.default_rng(0).standard_normal(len(self.q)), 0.0
         for _ in range(4):
             force /= max(np.linalg.norm(force), np.finfo(float).tiny)
@@ -221,7 +220,7 @@ def interior_point(h, q, a, b, force, size):
 
 
 def kernel(rows, size):
-    """Orthonormal columns that `rows` (of unit size) do not see."""
+    """Orthonormal columns of the kernel of `rows` (of unit size)."""
     if rows.shape[0] == 0 or size == 0:
         return np.eye(size)
     _, values, vectors = np.linalg.svd(rows)
@@ -234,7 +233,7 @@ def unit(columns):
 
 
 def without(u, motions):
-    """u less its share of some motions, by least squares."""
+    """u without its components of some motions, by least squares."""
     if not motions.size:
         return u
     return u - motions @ np.linalg.lstsq(motions, u, rcond=None)[0]
