@@ -101,8 +101,8 @@ def step_size(rows):
     return [
         ("time of failure over the uniform step (s)", [row for row in rows if row["step"] != ""], points,
          dict(x=columns("step"), y=columns("failure_time"), by=columns("n"), scale="linear")),
-        ("its relative error over all steps, undone ones included", [row for row in rows if row["steps"] > 0], points,
-         dict(x=lambda row: row["steps"] + row["undone"], y=failure_error,
+        ("its relative error over all steps, rejected ones included", [row for row in rows if row["steps"] > 0], points,
+         dict(x=lambda row: row["steps"] + row["rejected"], y=failure_error,
               by=lambda row: (row["n"], "uniform" if row["step"] != "" else "auto"))),
     ]
 

@@ -175,8 +175,7 @@ fn cost(problem: &DiscreteProblem) -> String {
     let bars = 12.0 * (step + 4.0 * 1.45 * step) + 2.5 * once;
     let seconds = match scene.time.map(|grid| grid.stepping) {
         _ if scene.accuracy.is_some() => {
-            return "mesh and steps are chosen by the run for the accuracy that is asked for"
-                .to_owned();
+            return "the run chooses mesh and steps for the required accuracy".to_owned();
         }
         None => format!("{once:.1} s"),
         Some(Stepping::Uniform { steps }) => {

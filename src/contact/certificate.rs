@@ -97,7 +97,7 @@ impl Certificate {
     /// Σ p ν, p ≥ 0, of their normals. If the normals span the rest of the plane, the remainder counts as a
     /// pull (dual). Otherwise its part along the normal is a pull, and its part across is unbalanced. The
     /// residuals are NaN if a condition belongs to no rank.
-    pub fn judge(
+    pub fn residuals(
         &self,
         answer: Answer,
         owned: usize,
@@ -139,8 +139,8 @@ impl Certificate {
             }
         }
         stationarity += free(next, owned) + across;
-        let judged: usize = self.nodes.iter().map(|at| at.fixed.len() + at.gaps.len()).sum();
-        let mut sums = [stationarity, dual, judged as f64];
+        let checked: usize = self.nodes.iter().map(|at| at.fixed.len() + at.gaps.len()).sum();
+        let mut sums = [stationarity, dual, checked as f64];
         comm.sum(&mut sums);
         if sums[2] as usize != self.posed {
             return (Kkt::UNKNOWN, points);

@@ -76,9 +76,9 @@ impl Kkt {
     pub fn missed(&self, tolerance: f64) -> String {
         let missed =
             self.named().into_iter().filter(|(_, value)| value.is_nan() || *value > tolerance);
-        let told =
+        let text =
             |(name, value)| format!("{name} {value:.1e} ({:.1e} times it)", value / tolerance);
-        let missed: Vec<String> = missed.map(told).collect();
+        let missed: Vec<String> = missed.map(text).collect();
         format!("the tolerance {tolerance:.1e} is missed by {}", missed.join(", "))
     }
 

@@ -173,7 +173,7 @@ impl Run<'_> {
                 outcome.accept(*step);
                 self.report(observer)?;
             }
-            Decision::Retry => outcome.undone += 1,
+            Decision::Retry => outcome.rejected += 1,
             Decision::Stop(stop) => {
                 outcome.stopped = Some(stop);
                 return Ok(false);

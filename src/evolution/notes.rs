@@ -83,8 +83,8 @@ impl Outcome {
             (self.fallbacks > 0).then(|| {
                 format!("in {} the contact solver left its fast path", counted(self.fallbacks))
             }),
-            (self.undone > 0)
-                .then(|| format!("{} steps were rejected and tried again, shorter", self.undone)),
+            (self.rejected > 0)
+                .then(|| format!("{} steps were rejected and tried again, shorter", self.rejected)),
             self.adaptive_steps_note(problem, false),
         ];
         remarks.into_iter().flatten().collect()

@@ -22,7 +22,7 @@ pub struct Outcome {
     /// Accepted steps whose damage solve was skipped, because a uniform ζ had no source.
     pub skipped_damage_solves: usize,
     /// Rejected steps, made again shorter.
-    pub undone: usize,
+    pub rejected: usize,
     /// Steps in which the solver that gave the answer left its fast path.
     pub fallbacks: usize,
     /// The number of steps in which another solver gave the answer, and its name.

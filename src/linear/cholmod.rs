@@ -115,7 +115,7 @@ impl Cholmod {
         let (mut view, common) = (a.view(), &mut *self.common);
         let real = raw::CHOLMOD_REAL as i32;
         // SAFETY: live handles; the view describes arrays that live during the call, and x as many values
-        // as the factor tells.
+        // as the factor reports.
         let done = unsafe {
             // CHOLMOD allocates L if it has no memory yet.
             let taken = raw::cholmod_l_change_factor(real, 1, 1, 1, 1, self.factor, common) != 0;
@@ -153,8 +153,8 @@ impl Cholmod {
     /// Frees the values of L and keeps the analysis (cholmod_l_change_factor).
     pub(super) fn free_values(&mut self) -> Result<(), PetscError> {
         let (pattern, common) = (raw::CHOLMOD_PATTERN as i32, &mut *self.common);
-        // SAFETY: live handles; CHOLMOD is told how many values there are, then again how many
-        // there will be.
+        // SAFETY: live handles; CHOLMOD gets the present number of values, then again the number that
+        // L will have.
         let done = unsafe {
             let size = (*self.factor).xsize;
             (*self.factor).xsize = take(&mut self.allocated);
@@ -199,7 +199,7 @@ impl Cholmod {
 
     /// Floating-point operations of a factorisation, and the number of values of L.
     pub(super) fn operations_and_entries(&self) -> [f64; 2] {
-        // SAFETY: an analysed supernodal factor tells how many values it will have.
+        // SAFETY: an analysed supernodal factor knows the number of its values.
         [self.common.fl, unsafe { (*self.factor).xsize } as f64]
     }
 

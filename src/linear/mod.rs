@@ -3,7 +3,7 @@
 //! Every linear system of a run is symmetric positive definite: (M + kκL) ζ = b of the damage step
 //! and K(ζ) u = f of the contact step, with prescribed or penalised unknowns. The factor of one
 //! matrix preconditions conjugate gradients for the next ones, until it costs more iterations than
-//! a new one ([`RefactorisationPolicy`]). Both are asked for through a [`LinearSolver`].
+//! a new one ([`RefactorisationPolicy`]). A [`LinearSolver`] has both.
 //!
 //! - On one rank CHOLMOD computes L Lᵀ = P A Pᵀ. The triangular solves L y = P b and Lᵀ (P x) = y are our own
 //!   ([`Cholesky`]).

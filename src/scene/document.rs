@@ -194,8 +194,8 @@ impl SceneText {
         // After an unclosed table, keys seem to be duplicates.
         let is_duplicate = |error: &toml::de::Error| error.message() == "duplicate key";
         let all = errors.first().is_none_or(is_duplicate);
-        let told = errors.iter().filter(|error| all || !is_duplicate(error));
-        self.verdict(told.filter_map(&mut syntax).collect())?;
+        let reported = errors.iter().filter(|error| all || !is_duplicate(error));
+        self.verdict(reported.filter_map(&mut syntax).collect())?;
         let mut root = DeValue::Table(root.into_inner());
         let mut problems = Vec::new();
         for argument in &self.arguments {

@@ -24,7 +24,7 @@ fn judge(change: impl Fn(&mut [f64], &mut [f64])) -> (Kkt, Vec<ContactPoint>) {
     let gaps = [gap(0, [0.0, 1.0], 0.25), gap(1, [0.0, 1.0], 1.0)];
     let answer =
         Answer { rigid: &[], elastic: &u, unbalanced: &unbalanced, prescribed: &[2.0], gaps: &[] };
-    Certificate::new(&fixed, &gaps).judge(answer, 2, SCALES, Communicator::serial())
+    Certificate::new(&fixed, &gaps).residuals(answer, 2, SCALES, Communicator::serial())
 }
 
 #[test]
@@ -94,7 +94,7 @@ fn a_force_in_the_cone_of_a_corners_normals_is_carried_and_no_other() {
             prescribed: &[],
             gaps: &[],
         };
-        Certificate::new(&[], &gaps).judge(answer, 1, SCALES, Communicator::serial())
+        Certificate::new(&[], &gaps).residuals(answer, 1, SCALES, Communicator::serial())
     };
     for shares in [[3.0, 2.0, 0.0], [0.0, 2.0, 1.0], [0.0, 0.0, 5.0], [4.0, 0.0, 0.0]] {
         let (kkt, points) = judged(force_of(shares));

@@ -38,9 +38,9 @@ fn the_damage_done_is_within_the_tolerance_with_fewer_steps_than_uniform_ones() 
     let rolling = "-160*max(0, 1 - abs(x - 8*t)/2)";
     for load in ["-80*t", "-80*sin(4*t)", rolling] {
         let (steps, outcome) = lshape("time.step=auto", load);
-        let made = outcome.last.record.step + outcome.undone;
+        let made = outcome.last.record.step + outcome.rejected;
         let error = error(&steps, load);
-        println!("{load}: {made} steps, {} undone, error {error:.2e}", outcome.undone);
+        println!("{load}: {made} steps, {} rejected, error {error:.2e}", outcome.rejected);
         assert!(error < 0.01, "{load}: {error}");
         let uniform = lshape(&format!("time.step={}", 1.0 / made as f64), load).0;
         let uniform = self::error(&uniform, load);
@@ -55,7 +55,7 @@ fn a_load_that_closes_the_gap_between_two_steps_is_noticed() {
     let load = "-80*min(1, max(0, 1000*(t - 0.503)))";
     let (steps, outcome) = lshape("time.step=auto", load);
     let [before, after] = [0, steps.len() - 1].map(|n| steps[n].record.active_nodes);
-    assert!(before == 0 && after > 0 && outcome.undone > 0, "{before} {after}");
+    assert!(before == 0 && after > 0 && outcome.rejected > 0, "{before} {after}");
     // Less than half of the steps before, where nothing happens.
     let early = steps.iter().filter(|step| step.state.time < 0.5).count();
     assert!(2 * early < steps.len(), "{early} of {}", steps.len());
@@ -118,7 +118,7 @@ fn a_sound_body_takes_few_steps() {
     let count = |lambda_u: f64, tolerance: f64| {
         let stepping = format!("step = 'auto', tolerance = {tolerance:e}");
         let (_, outcome) = history(&bent(lambda_u, &stepping), SOLVERS[0]);
-        outcome.last.record.step + outcome.undone
+        outcome.last.record.step + outcome.rejected
     };
     // No damage, negligible damage, damage.
     let [none, negligible, some] = [0.0, 1e-6, 10.0].map(|lambda_u| count(lambda_u, 1e-3));
@@ -214,7 +214,7 @@ fn damage_that_begins_in_a_corner_does_not_stop_the_steps() {
         ]";
     let problem = problem(graded, text).unwrap_or_else(|e| panic!("{e}"));
     let (steps, outcome) = history(&problem, SOLVERS[0]);
-    let made = steps.len() + outcome.undone;
+    let made = steps.len() + outcome.rejected;
     assert!(made < 300, "{made} steps");
     assert!(outcome.stopped.is_some(), "it breaks");
 }

@@ -47,7 +47,7 @@ fn second_step(problem: &DiscreteProblem, solver: &str, tries: &[(f64, Vec<f64>,
 }
 
 #[test]
-fn a_step_undone_leaves_no_trace() {
+fn a_rejected_step_leaves_no_trace() {
     for left in ["displacement = [0, 0]", "symmetry = true"] {
         let problem = scene(left);
         // Another contact zone; a stiffness that is not positive definite; none at all.
@@ -112,13 +112,13 @@ const AUTO: &str = "step = 'auto', tolerance = 0.3";
 #[test]
 fn a_chosen_step_whose_contact_fails_is_tried_again_shorter() {
     let (patient, outcome) = history(&released(AUTO, 1000), "penalty-duality");
-    assert_eq!(outcome.undone, 0);
+    assert_eq!(outcome.rejected, 0);
     assert!(patient.iter().any(|step| step.record.iterations > 300), "there is something to fail");
     let (steps, outcome) = history(&released(AUTO, 300), "penalty-duality");
-    assert!(outcome.undone > 0 && steps.len() > patient.len());
+    assert!(outcome.rejected > 0 && steps.len() > patient.len());
     assert!(steps.iter().all(|step| step.record.iterations <= 300));
     for (n, step) in steps.iter().enumerate() {
-        assert_eq!(step.record.step, n, "a step undone is not counted");
+        assert_eq!(step.record.step, n, "a rejected step is not counted");
     }
     // The steps before the first failure are those of the patient run.
     let same =

@@ -186,7 +186,7 @@ impl KeptPreconditioner for TaoPreconditioner<'_> {
         let condensed = rows == k.size()? && factor.analyse(k)? && factor.is_condensed();
         let factored = if condensed { k } else { operator };
         factor.remake(factored)?;
-        // All its solves are asked for about as much.
+        // All its solves need about the same reduction.
         factor.end_solve(None, Reduction { asked: 1.0, reached: 1.0 });
         let prescribed = if condensed { factor.masked(k, operator)? } else { Vec::new() };
         let fits = factor.is_for(rows);

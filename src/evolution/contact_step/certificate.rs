@@ -73,7 +73,8 @@ impl ContactStep<'_> {
             gaps: &case.gaps,
         };
         let comm = partition.comm();
-        let (mut kkt, contact) = problem.certificate.judge(answer, partition.owned(), scales, comm);
+        let (mut kkt, contact) =
+            problem.certificate.residuals(answer, partition.owned(), scales, comm);
         if !self.covered {
             kkt.stationarity = f64::NAN;
         }

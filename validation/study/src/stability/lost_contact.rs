@@ -93,7 +93,8 @@ fn add(
                 let mut unique = others.filter_map(|(_, answer)| answer.as_ref().ok());
                 let other = unique.find(|s| s.unconstrained.is_none()).map(|s| &s.state.u);
                 let other = open.as_ref().or(other);
-                let (row, verdict) = judged(row(solver), &problem, (sweep, value), answer, other);
+                let (row, verdict) =
+                    classified(row(solver), &problem, (sweep, value), answer, other);
                 table.push(row, verdict);
             }
         }
@@ -104,7 +105,7 @@ fn add(
 /// Judges an answer, which is certified: by balance where only contact carries the load, by
 /// `other` (the answer of another solver, or without contact of the linear solve) where there is
 /// but one answer, by its note where there are many.
-fn judged(
+fn classified(
     row: Row,
     problem: &DiscreteProblem,
     (sweep, value): (&Sweep, f64),

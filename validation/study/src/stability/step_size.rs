@@ -64,7 +64,7 @@ fn add(
         });
     let row = row
         .with("steps", last.step)
-        .with("undone", outcome.undone)
+        .with("rejected", outcome.rejected)
         .with("failure_time", time)
         .with("uncertainty", uncertainty)
         // Of the state that was not accepted.

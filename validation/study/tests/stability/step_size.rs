@@ -23,7 +23,7 @@ fn run(set: &[&str]) -> Outcome {
 #[test]
 fn chosen_steps_land_above_the_threshold_within_the_tolerance() {
     let outcome = run(&["time.step=auto", "time.tolerance=1e-3"]);
-    assert!(outcome.stopped.is_some() && outcome.undone > 0, "an overshoot was undone");
+    assert!(outcome.stopped.is_some() && outcome.rejected > 0, "an overshoot was rejected");
     let above = outcome.last.record.zeta_min - 0.01;
     assert!(0.0 < above && above <= 1e-3, "{above}");
 }
@@ -48,5 +48,5 @@ fn chosen_steps_are_fewer_than_uniform_ones_equally_close() {
     let auto = run(&["time.step=auto"]);
     let uniform = run(&["time.step=5e-4"]);
     assert!(off(&auto) < off(&uniform), "{} against {}", off(&auto), off(&uniform));
-    assert!(2 * (auto.last.record.step + auto.undone) < uniform.last.record.step);
+    assert!(2 * (auto.last.record.step + auto.rejected) < uniform.last.record.step);
 }
