@@ -23,7 +23,7 @@ pub use constraints::Constraints;
 pub use error::{Conflict, ConstraintError, ContactError};
 pub use kkt::{Kkt, Scales};
 pub use problem::ContactProblem;
-pub use rigid::{DrivenMotion, RigidMotions};
+pub use rigid::{DrivenMotion, RigidMotions, nonnegative};
 pub(crate) use rigid::{least_motion, rigid_motion_until_contact, unconstrained_motions};
 pub use rows::{Bound, FixedRow, GapRow};
 pub use solvers::{

@@ -1,8 +1,9 @@
 //! Rigid motions: which are prevented, which only contact resists, which the load drives.
 
 use crate::support::{close, difference, distorted, largest, moved, problem, run, square, turn};
+use nalgebra::{DMatrix, DVector};
 use signorini::{
-    contact::{GapRow, RigidMotions, SOLVERS},
+    contact::{GapRow, RigidMotions, SOLVERS, nonnegative},
     evolution::{DiscreteProblem, SetupError},
     fem::{Body, RigidMotion},
     mesh::{Curve, Mesh, Order, Refinement},
@@ -345,4 +346,16 @@ fn of_many_answers_every_solver_gives_the_one_of_least_displacement() {
             others.iter().for_each(|u| assert!(difference(u, first) < 1e-6));
         }
     }
+}
+
+/// Two supports carry a load between them: p ≥ 0 with Aᵀp = b exists. On these rows, orthogonal up to rounding,
+/// nalgebra's singular values err by 3e-4.
+#[test]
+fn a_load_between_two_supports_is_carried() {
+    let near = [-1.000000000002524, -0.8164965809256531];
+    let far = [-0.9999999999962141, 1.2247448713946802];
+    let supports = DMatrix::from_row_slice(2, 2, &[near, far].concat());
+    let load = DVector::from_row_slice(&[-300.0, 9.273418017439675e-10]);
+    let carried = supports.transpose() * nonnegative(&supports, &load);
+    assert!((carried - load).norm() < 1e-11);
 }

@@ -8,6 +8,7 @@ mod until_contact;
 
 pub(crate) use least::least_motion;
 pub use load::DrivenMotion;
+pub use nonnegative::nonnegative;
 pub(crate) use until_contact::{rigid_motion_until_contact, unconstrained_motions};
 
 use super::{Bound, Constraints, FixedRow, GapRow};
