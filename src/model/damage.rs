@@ -29,6 +29,17 @@ impl DamageLaw {
         -rate.max(0.0)
     }
 
+    /// The growth rate g of a small error of ζ under a given load, 1/s: (δζ)′ = g δζ. `rate` is ζ′ = φ.
+    ///
+    /// An error δζ changes φ by λ_D/ζ² δζ. As |ε| is proportional to 1/ζ, it also changes ½ λ_U |ε|², which is
+    /// −φ − λ_D (1−ζ)/ζ + λ_W, by the factor −2 δζ/ζ. The sum of both changes of φ is g δζ.
+    pub fn error_growth(&self, zeta: f64, rate: f64) -> f64 {
+        let zeta = self.truncate(zeta);
+        let internal = self.lambda_d * (1.0 - zeta) / zeta;
+        let external = (self.lambda_w - rate - internal).max(0.0);
+        self.lambda_d / (zeta * zeta) + 2.0 * external / zeta
+    }
+
     /// η_*(ζ): ζ cut to [ζ_*, 1].
     pub fn truncate(&self, zeta: f64) -> f64 {
         zeta.clamp(self.threshold, 1.0)

@@ -1,7 +1,6 @@
 //! The errors of ζ from the time steps, and their growth.
 
 use super::{PlannedStep, StepController};
-use crate::model::DamageLaw;
 use nalgebra::DVector;
 
 impl StepController<'_> {
@@ -34,25 +33,16 @@ impl StepController<'_> {
         }
     }
 
-    /// Adds the `error` of a step of `length` s to the earlier errors, which grow by the factor 1 + `length` · g.
-    ///
-    /// With r = −ζ', an error δζ changes the source φ = −(λ_D (1−ζ)/ζ + ½ λ_U |ε|² − λ_W) by λ_D/ζ² δζ. Under
-    /// a given load |ε| is proportional to 1/ζ, which changes φ by 2 (r − λ_D (1−ζ)/ζ + λ_W)/ζ δζ more. The
-    /// sum of both factors is g.
+    /// Adds the `error` of a step of `length` s to the earlier errors. These grow by the factor 1 + `length` · g
+    /// with g from [`error_growth`](crate::model::DamageLaw::error_growth) of the damage law.
     pub(super) fn add_error(&mut self, length: f64, error: &DVector<f64>, rate: &DVector<f64>) {
         self.memory.delay +=
             error.zip_map(rate, |e, rate| if rate == 0.0 { 0.0 } else { e / rate });
         if let (Some(laws), Some(rate)) = (self.problem.damage(), &self.memory.rate) {
-            let growth = |law: &DamageLaw, zeta: f64, rate: f64| {
-                let zeta = law.truncate(zeta);
-                let internal = law.lambda_d * (1.0 - zeta) / zeta;
-                let external = (law.lambda_w - rate - internal).max(0.0);
-                law.lambda_d / (zeta * zeta) + 2.0 * external / zeta
-            };
             for (i, own) in self.memory.error.iter_mut().enumerate().filter(|(i, _)| rate[*i] < 0.0)
             {
                 // A node may belong to several materials.
-                let of_laws = laws.iter().map(|law| growth(law, self.memory.zeta[i], rate[i]));
+                let of_laws = laws.iter().map(|law| law.error_growth(self.memory.zeta[i], rate[i]));
                 *own *= 1.0 + length * of_laws.fold(0.0, f64::max);
             }
         }
