@@ -18,8 +18,8 @@ pub(super) const ENTRY: SolverEntry = SolverEntry {
     },
 };
 
-/// TAO's types for bounded variables, reached as `tao:TYPE`; some of them stall or err on
-/// contact problems, which their KKT residuals then tell.
+/// TAO's types for bounded variables, reached as `tao:TYPE`. Some of them stall or err on contact problems; the
+/// KKT residuals then show it.
 pub const TAO_TYPES: [&str; 12] = [
     "tron", "bnls", "bntr", "bntl", "gpcg", "blmvm", "bqnls", "bqnktr", "bqnktl", "bqnkls", "bncg",
     "bqpip",
@@ -27,33 +27,32 @@ pub const TAO_TYPES: [&str; 12] = [
 
 /// One of TAO's types on a kept Cholesky factor (`-tao_type` chooses another).
 ///
-/// The problem is put in the units that TAO's absolute tolerances suppose: with s the size of K and U
-/// that of the answer,
+/// TAO's tolerances are absolute, so the problem is scaled by the size s of K and the size U of the answer:
 ///
 /// ```text
 /// x = c/U minimises ½ xᵀ(K/s)x − (f/(sU))ᵀx within the bounds over U.
 /// ```
 ///
-/// Where K is singular, ½ρ|x − c/U|² with the last answer c is added (proximal point method,
-/// Rockafellar, SIAM J. Control Optim. 14, 1976). TAO is called again with the U it found until the
-/// KKT residuals are met, each time from the last answer. What it leaves to the next solve is U.
+/// If K is singular, the term ½ρ|x − c/U|² with the last answer c is added (proximal point method,
+/// Rockafellar, SIAM J. Control Optim. 14, 1976). TAO is called again from the last answer, with the new U, until
+/// the KKT residuals are small enough. The warm start of the next solve is U.
 struct Tao {
     kind: String,
 }
 
-/// Calls of TAO for one contact problem, more where the proximal term slows them; and of these how
-/// many in turn may not halve the residual.
+/// Maximum number of calls of TAO for one contact problem, without and with the proximal term; and the number of
+/// consecutive calls that do not halve the residual after which the method stops.
 const CALLS: usize = 8;
 const PROXIMAL_CALLS: usize = 40;
 const STALLED: usize = 7;
-/// Iterations of a call. After the first one, proximal calls start so near to their answer that more of them
-/// only repeat what rounding leaves of the gradient.
+/// Maximum number of iterations in a call, and in a further call with the proximal term. The latter starts close to
+/// its answer, and more iterations would only repeat rounding errors.
 const ITERATIONS: usize = 200;
 const FURTHER_ITERATIONS: usize = 3;
-/// ρ where contact alone constrains a rigid motion.
+/// ρ if contact alone constrains a rigid motion.
 const PROXIMAL: f64 = 1e-9;
-/// Stands for infinity, in units of U, where the interior-point method cannot bear it; an answer
-/// that touches this box is not stationary, so the residuals reject it.
+/// The interior-point method needs finite bounds. This one, in units of U, replaces infinity. An answer at this
+/// bound is not stationary, so the residuals reject it.
 const BOX: f64 = 1e2;
 /// PETSC_INFINITY.
 const INFINITE: f64 = f64::MAX / 4.0;
@@ -117,15 +116,13 @@ impl ContactSolver for Tao {
         let (proximal, calls) =
             if problem.definite() { (0.0, CALLS) } else { (PROXIMAL, PROXIMAL_CALLS) };
         let stiffness = problem.stiffness.scaled(1.0 / problem.stiffness_scale, proximal)?;
-        // Without loads it is an obstacle that moves the body.
-        let pushed =
-            problem.bounds.iter().map(|bound| bound.nearest(0.0).abs()).fold(0.0, f64::max);
-        let estimate = problem.max_norm(problem.load)? / problem.stiffness_scale;
-        let estimate = estimate.max(problem.comm.max(pushed));
-        let mut unit = warm.first().copied().unwrap_or(estimate);
+        let mut unit = match warm.first() {
+            Some(unit) => *unit,
+            None => first_unit(problem)?,
+        };
         let factor = elastic.factor();
         if self.kind == "bqpip" {
-            // What an interior point method adds to the diagonal is in its operator alone.
+            // Only the operator has the terms that the interior point method adds to the diagonal.
             factor.set_condensed(&stiffness, iter::empty())?;
         }
         let mut tao = BoundedQuadratic::new(problem.session, &self.kind)?;
@@ -169,6 +166,13 @@ impl ContactSolver for Tao {
         );
         Err(ContactError::stopped(&self.method(), report, residuals, detail))
     }
+}
+
+/// The first estimate of U, from the load and from the obstacles that move the body.
+fn first_unit(problem: &ContactProblem) -> Result<f64, PetscError> {
+    let pushed = problem.bounds.iter().map(|bound| bound.nearest(0.0).abs()).fold(0.0, f64::max);
+    let loaded = problem.max_norm(problem.load)? / problem.stiffness_scale;
+    Ok(loaded.max(problem.comm.max(pushed)))
 }
 
 /// The factor inside TAO's methods.

@@ -24,27 +24,12 @@ impl ContactStep<'_> {
         tolerance: f64,
         (known, unbalanced): (Option<f64>, Option<Vec<f64>>),
     ) -> Result<ContactReport, ContactError> {
-        let (body, bases) = (&self.problem.body, &self.problem.constraints.bases);
-        let comm = body.nodes.partition.comm();
-        let internal_force = |mut u: Vec<f64>| {
-            bases.displacement_to_global(&mut u);
-            self.problem.elasticity.internal_force(body, &self.zeta_at_points, &u)
-        };
-        let mut load = case.load.clone();
-        let mut force = body.nodes.partition.norm(&load, 2);
-        if comm.any(lift.iter().any(|&v| v != 0.0)) {
-            let internal = internal_force(lift.to_vec());
-            load.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
-            force = force.max(LIFTED * body.nodes.partition.norm(&load, 2));
-        }
+        let comm = self.problem.body.nodes.partition.comm();
         let admits_zero = |bound: &Bound| bound.nearest(0.0) == 0.0;
         let overlaps = comm.any(!bounds.iter().all(admits_zero));
-        if overlaps {
-            let mut u = vec![0.0; lift.len()];
-            bounds.iter().for_each(|bound| u[bound.dof] = bound.nearest(0.0));
-            force = force.max(LIFTED * body.nodes.partition.norm(&internal_force(u), 2));
-        }
+        let (load, force) = self.load_and_scale(&case.load, lift, overlaps.then_some(bounds));
         let force = known.map_or(force, |known| force.min(known));
+        let bases = &self.problem.constraints.bases;
         let in_unknowns = |mut force: Vec<f64>| {
             bases.force_to_local(&mut force);
             bases.zero_fixed(&mut force);
@@ -78,6 +63,34 @@ impl ContactStep<'_> {
         self.elastic.factor().set_condensed(contact.stiffness, bounded)?;
         let Self { solver, elastic, next, c, .. } = self;
         self.phases.time("contact", || solver.solve(&contact, elastic, &mut next.warm_start, c))
+    }
+
+    /// The load f − K u_D, and its scale F. The scale also counts the forces by which `lift` = u_D, and obstacles
+    /// that overlap the body, move their own nodes alone. Collective.
+    fn load_and_scale(
+        &self,
+        load: &[f64],
+        lift: &[f64],
+        overlapping: Option<&[Bound]>,
+    ) -> (Vec<f64>, f64) {
+        let body = &self.problem.body;
+        let partition = &body.nodes.partition;
+        let internal_force = |mut u: Vec<f64>| {
+            self.problem.constraints.bases.displacement_to_global(&mut u);
+            self.problem.elasticity.internal_force(body, &self.zeta_at_points, &u)
+        };
+        let (mut load, mut scale) = (load.to_vec(), partition.norm(load, 2));
+        if partition.comm().any(lift.iter().any(|&v| v != 0.0)) {
+            let internal = internal_force(lift.to_vec());
+            load.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
+            scale = scale.max(LIFTED * partition.norm(&load, 2));
+        }
+        if let Some(bounds) = overlapping {
+            let mut u = vec![0.0; lift.len()];
+            bounds.iter().for_each(|bound| u[bound.dof] = bound.nearest(0.0));
+            scale = scale.max(LIFTED * partition.norm(&internal_force(u), 2));
+        }
+        (load, scale)
     }
 }
 

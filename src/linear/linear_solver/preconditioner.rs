@@ -1,0 +1,154 @@
+//! The preconditioner of a [`LinearSolver`]: its choice by the size of the matrix and the PETSc options, its
+//! factorisation, and the prescribed unknowns in it.
+
+use super::LinearSolver;
+use crate::{
+    linear::{LinearSystem, Precision, factor::VERY_LARGE},
+    petsc::{Matrix, Pattern, PetscError, Session, Vector, has_option, set_default_option},
+};
+use std::iter;
+
+/// PETSC_ERR_MISSING_FACTOR: PETSc lacks the package, or the package lacks this kind of factor.
+const MISSING_FACTOR: i32 = 92;
+
+impl LinearSolver {
+    /// Checks the PETSc options with this prefix before the first factorisation. Collective.
+    ///
+    /// # Errors
+    /// An option names a type that this PETSc lacks.
+    pub fn check_options(session: &Session, prefix: &str) -> Result<(), PetscError> {
+        let mut solver = Self::new(session, prefix, 1, Precision::Full)?;
+        let comm = session.comm();
+        let own = Pattern::new(1, iter::once((0, comm.rank() as i32)));
+        let identity = Matrix::with_pattern(session, 1, &own, &[1.0])?;
+        let chosen = solver.is_own(&identity);
+        if comm.any(chosen.is_err()) || matches!(chosen, Ok(true)) {
+            return chosen.map(drop);
+        }
+        // PETSc looks for the package of a factor when it factorises.
+        match solver.ksp.set_up(&identity, &mut solver.factor) {
+            Err(error) if error.code == MISSING_FACTOR => Err(error),
+            _ => Ok(()),
+        }
+    }
+
+    /// Is the factor the preconditioner of matrices of this size? The first such matrix decides. Collective.
+    pub(super) fn is_own(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
+        let rows = matrix.size()?;
+        let own = match self.chosen {
+            Some((size, own)) if size == rows => own,
+            _ => self.choose(matrix, rows)?,
+        };
+        self.chosen = Some((rows, own));
+        Ok(own)
+    }
+
+    /// Chooses the factor, or the preconditioner of the PETSc options. If the matrix is too large for the
+    /// factor, a factor of PETSc or multigrid replaces it.
+    fn choose(&mut self, matrix: &Matrix, rows: usize) -> Result<bool, PetscError> {
+        let (prefix, serial) = (&self.prefix, matrix.owned() == rows);
+        let asked = has_option(&format!("-{prefix}pc_type"))?
+            || has_option(&format!("-{prefix}pc_factor_mat_solver_type"))?;
+        let comm = self.factor.comm();
+        if !comm.any(has_option(&format!("-{prefix}ksp_type"))?) {
+            self.ksp.set_residual_norm()?;
+        }
+        // The ranks may have different options.
+        if comm.any(asked) || !self.factor.analyse(matrix)? {
+            // By default CHOLMOD makes LDLᵀ of a small matrix, accepts negative pivots, and prints warnings
+            // to the standard output. MUMPS sometimes estimates too little memory.
+            let options = match serial {
+                true => &[
+                    ("cholmod_final_asis", "0"),
+                    ("cholmod_final_ll", "1"),
+                    ("cholmod_print", "0"),
+                ][..],
+                false => &[("mumps_icntl_14", "100")],
+            };
+            for (option, value) in options {
+                set_default_option(&format!("-{prefix}mat_{option}"), value)?;
+            }
+            let kind = if serial || rows < VERY_LARGE { c"cholesky" } else { c"gamg" };
+            self.ksp.set_preconditioner(kind, if serial { c"cholmod" } else { c"mumps" })?;
+        }
+        self.ksp.set_from_options()?;
+        self.ksp.is_kept()
+    }
+
+    /// Can [`Self::condense`] reduce a system with this matrix to the condensed unknowns? Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub fn is_condensed(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
+        Ok(self.is_own(matrix)? && self.factor.analyse(matrix)? && self.factor.is_condensed())
+    }
+
+    /// Makes a new preconditioner of the system. It returns false if the system is not positive definite.
+    ///
+    /// # Errors
+    /// PETSc or CHOLMOD failed.
+    pub fn factorise(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
+        self.prepared = false;
+        let own = self.is_own(system.matrix)?;
+        self.modify(system)?;
+        let matrix = self.modified.as_ref().unwrap_or(system.matrix);
+        let definite = self.ksp.set_up(matrix, &mut self.factor)?;
+        if !own {
+            self.factor.record(matrix, definite, None)?;
+        }
+        Ok(definite && self.is_ready(system)?)
+    }
+
+    /// Prescribes unknowns in a copy of the matrix. A condensed factor needs no copy: it prescribes them
+    /// itself.
+    pub(super) fn modify(&mut self, system: LinearSystem) -> Result<(), PetscError> {
+        let kept = self.modified.take();
+        let Some(prescribed) = system.prescribed else { return Ok(()) };
+        if self.is_condensed(system.matrix)? {
+            return Ok(());
+        }
+        let mut matrix = match kept {
+            Some(matrix) => matrix,
+            None => system.matrix.duplicate()?,
+        };
+        matrix.copy(system.matrix)?;
+        matrix.zero_rows_columns(prescribed, system.scale)?;
+        self.modified = Some(matrix);
+        Ok(())
+    }
+
+    /// Is there a preconditioner for the system? Prescribes the unknowns of the system in a condensed factor.
+    pub(super) fn is_ready(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
+        let prescribe = || self.prescribe(system.prescribed.unwrap_or(&[]));
+        system.book(|booking| booking.prescription, 0.0, prescribe)
+    }
+
+    /// Makes the preconditioner of a checkpoint again.
+    pub(super) fn remake(&mut self, system: LinearSystem) -> Result<(), PetscError> {
+        if let Some((matrix, history)) = self.factor.take_loaded(system.matrix)? {
+            let loaded = LinearSystem { matrix: &matrix, ..system };
+            if self.factorise(loaded)? {
+                self.factor.keep_history(history);
+            }
+        }
+        Ok(())
+    }
+
+    /// Prescribes unknowns in a condensed factor. It returns false if there is no preconditioner afterwards.
+    /// Collective.
+    pub(crate) fn prescribe(&mut self, unknowns: &[usize]) -> Result<bool, PetscError> {
+        let exists = self.factor.exists();
+        Ok(exists && (!self.factor.is_condensed() || self.factor.prescribe(unknowns)?))
+    }
+
+    /// `z` ← P⁻¹ `r` with the present preconditioner.
+    ///
+    /// # Errors
+    /// There is no preconditioner.
+    pub(crate) fn precondition(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
+        match self.chosen {
+            Some((_, false)) => self.ksp.precondition(&mut self.factor, r, z),
+            _ => self.factor.apply(r, z),
+        }
+    }
+}
