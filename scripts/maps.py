@@ -109,7 +109,8 @@ def _paint_stress(axes, mesh, results, limits):
     draw_colourbar(axes, image, f"von Mises stress ({unit})", extend)
     largest = results.von_mises.max()
     factor, unit = stress_unit(largest, results.units)
-    return f"von Mises stress, largest {largest / factor:.3g} {unit}"
+    rounded = float(f"{largest / factor:.3g}")  # 1220, not 1.22e+03
+    return f"von Mises stress, largest {rounded:g} {unit}"
 
 
 def _paint_damage(axes, mesh, results, limits):
