@@ -35,8 +35,7 @@
 //!
 //! (27) is (26) at t = 0. A run stops when min ζ reaches ζ_*. Start reading at [`evolution::run`].
 //!
-//! The modules below are listed in the order of their dependence: each uses only those above it. There is one
-//! exception: at the end of a run `evolution` calls `estimate`, which adds the estimated errors to the outcome.
+//! The modules below are listed in the order of their dependence: each uses only those above it.
 #![deny(unsafe_code)]
 
 pub mod interrupt;

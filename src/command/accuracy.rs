@@ -2,11 +2,12 @@
 
 use super::{Failure, screen, task::Task};
 use signorini::{
-    estimate::{self, AdaptError, Adapted, Bar, percent},
-    evolution::Outcome,
+    estimate::{self, AdaptError, Adapted},
+    evolution::{Outcome, percent},
     interrupt::{Interrupts, Signal},
     mesh::{Mesh, Order},
     petsc::Session,
+    problem::Bar,
     scene::{Scene, Stepping, rounded},
 };
 
@@ -39,12 +40,13 @@ pub(super) fn adapt(
     Ok(Some(adapted))
 }
 
-/// Measures the error bars from the mesh. If a run for them fails, a note reports it. Collective.
+/// Measures the error bars from the mesh. If a run for them fails, one of the `notes` reports it. Collective.
 pub(super) fn measure_bars(
     session: &Session,
-    scene: &mut Scene,
+    scene: &Scene,
     mesh: &Mesh,
     solver: &str,
+    notes: &mut Vec<String>,
 ) -> Result<Vec<Bar>, Failure> {
     let _interrupts = Interrupts::defer();
     match estimate::measured_bars(session, scene, mesh, solver) {
@@ -53,7 +55,7 @@ pub(super) fn measure_bars(
         Err(error) => match error.signal() {
             Some(signal) => Err(interrupted(signal)),
             None => {
-                scene.notes.push(format!("the error bars could not be measured: {error}"));
+                notes.push(format!("the error bars could not be measured: {error}"));
                 Ok(Vec::new())
             }
         },

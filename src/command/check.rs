@@ -16,7 +16,7 @@ const TIMES: usize = 20;
 pub fn check(arguments: &SceneArguments) -> Result<(), Failure> {
     require_one_process()?;
     arguments.check()?;
-    let scene = arguments.read(&[])?;
+    let (scene, notes) = arguments.read(&[])?;
     let mesh = read_mesh(&scene, false)?;
     scene.check_mesh(&mesh).map_err(Failure::input)?;
     say(&scene.title);
@@ -27,7 +27,7 @@ pub fn check(arguments: &SceneArguments) -> Result<(), Failure> {
     lines.extend(loads(&problem));
     lines.extend(support(&problem));
     lines.push(row("cost", cost(&problem)));
-    lines.extend(problem.notes().into_iter().map(|note| row("note", note)));
+    lines.extend(notes.into_iter().chain(problem.notes()).map(|note| row("note", note)));
     say(&lines.join("\n"));
     Ok(())
 }

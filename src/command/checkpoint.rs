@@ -4,12 +4,12 @@
 //! [`Checkpoint`]. The first rank writes its file after all other ranks; then all ranks remove older files.
 //! So the latest file of the first rank belongs to a complete checkpoint.
 
-use super::{Failure, ranks::agree, recorder::Recorded, task::Task};
+use super::{Failure, ranks::agree, task::Task};
 use serde::{Deserialize, Serialize};
 use signorini::{
     estimate::Adapted,
     evolution::RunState,
-    output::{self, OutputError},
+    output::{self, FieldsWritten, OutputError},
     petsc::Communicator,
 };
 use std::{
@@ -31,6 +31,15 @@ pub struct Checkpoint {
     pub adapted: Option<Adapted>,
     pub recorded: Recorded,
     pub run: RunState,
+}
+
+/// The state of a recorder in a checkpoint.
+#[derive(Serialize, Deserialize)]
+pub struct Recorded {
+    pub stepping: f64,
+    pub fields: FieldsWritten,
+    /// The length of `history.csv`, bytes.
+    pub history: Option<u64>,
 }
 
 /// Hashes of everything on which the results depend; see [`DIFFERENCES`].

@@ -145,8 +145,8 @@ impl SceneArguments {
         Ok(())
     }
 
-    /// The scene with its overrides and those in `more`.
-    fn read(&self, more: &[String]) -> Result<Scene, Failure> {
+    /// The scene with its overrides and those in `more`, and notes for the user.
+    fn read(&self, more: &[String]) -> Result<(Scene, Vec<String>), Failure> {
         let accuracy = self.accuracy.map(|error| format!("accuracy={error}"));
         let quoted: Vec<_> = self.accuracy_of.iter().map(|name| format!("'{name}'")).collect();
         let figures = (!quoted.is_empty()).then(|| format!("accuracy_of=[{}]", quoted.join(",")));
@@ -158,17 +158,18 @@ impl SceneArguments {
                 "accuracy_of has no effect without accuracy; add accuracy = 0.01, say, or --accuracy 0.01",
             ));
         }
+        let mut notes = Vec::new();
         if let Some(file) = &self.mesh {
             let replaced = std::mem::replace(&mut scene.mesh, MeshSource::from_path(file));
             if !replaced.parameters.is_empty() {
                 let unused: Vec<_> = replaced.parameters.into_keys().collect();
-                scene.notes.push(format!(
+                notes.push(format!(
                     "of the scene's [mesh] nothing was used, because of --mesh: not {}",
                     unused.join(", ")
                 ));
             }
         }
-        Ok(scene)
+        Ok((scene, notes))
     }
 }
 

@@ -2,19 +2,18 @@
 
 use super::{
     accuracy,
-    checkpoint::{self, Checkpoint},
+    checkpoint::{self, Checkpoint, Recorded},
     profile,
     provenance::provenance,
     screen,
     task::Task,
 };
-use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use signorini::{
     evolution::{Next, Observed, Observer, Outcome, RunError, RunState, Step, StepRecord},
     interrupt::Interrupts,
     output::{
-        self, FieldWriter, FieldsWritten, OutputError, Table,
+        self, FieldWriter, OutputError, Table,
         terminal::{Progress, say},
         write_whole,
     },
@@ -40,15 +39,6 @@ pub(super) struct Recorder<'a> {
     interrupts: Interrupts,
     /// The time of the last checkpoint.
     saved: Instant,
-}
-
-/// The state of a recorder in a checkpoint.
-#[derive(Serialize, Deserialize)]
-pub struct Recorded {
-    stepping: f64,
-    fields: FieldsWritten,
-    /// The length of `history.csv`, bytes.
-    history: Option<u64>,
 }
 
 impl<'a> Recorder<'a> {
@@ -155,7 +145,7 @@ impl<'a> Recorder<'a> {
         let written = written.and(task.phases.time("output", || self.fields.complete()));
         let outcome = result.as_ref().ok();
         let mut notes = Vec::from_iter(accuracy::verdict(task, outcome));
-        notes.extend(task.problem.notes());
+        notes.extend(task.notes.iter().cloned().chain(task.problem.notes()));
         notes.extend(outcome.iter().flat_map(|outcome| outcome.notes(&task.problem)));
         let mut shown = notes.clone();
         notes.extend(outcome.iter().flat_map(|outcome| outcome.remarks(&task.problem)));

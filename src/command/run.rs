@@ -15,7 +15,8 @@ use super::{
 };
 use clap::Args;
 use signorini::{
-    evolution::{self, Phases, RunError},
+    estimate,
+    evolution::{Phases, RunError},
     linear::LinearSolver,
     mesh::Mesh,
     output,
@@ -64,8 +65,8 @@ impl RunArguments {
         check_petsc(&self.petsc)
     }
 
-    /// The scene with its overrides.
-    fn read(&self) -> Result<Scene, Failure> {
+    /// The scene with its overrides, and notes for the user.
+    fn read(&self) -> Result<(Scene, Vec<String>), Failure> {
         let solver = self.solver.iter().map(|name| format!("contact.solver='{name}'"));
         self.scene.read(&Vec::from_iter(solver))
     }
@@ -151,7 +152,7 @@ fn read<'a>(
     started: Instant,
 ) -> Result<(Task<'a>, Option<Checkpoint>), Failure> {
     let comm = session.comm();
-    let mut scene = agree(comm, arguments.read())?;
+    let (mut scene, mut notes) = agree(comm, arguments.read())?;
     let mesh = phases.time("mesh", || read_shared(comm, &scene))?;
     let solver = scene.contact.solver.clone().unwrap_or(SOLVERS[0].to_owned());
     let folder = arguments.folder(&scene);
@@ -164,7 +165,7 @@ fn read<'a>(
     let adapt = || adapt(session, &mut scene, &mesh, &solver, made);
     let adapted = agree(comm, phases.time("adaptation", adapt))?;
     let mesh = adapted.as_ref().map_or(mesh, |adapted| adapted.mesh.clone());
-    let measure = || measure_bars(session, &mut scene, &mesh, &solver);
+    let measure = || measure_bars(session, &scene, &mesh, &solver, &mut notes);
     let bars = match &adapted {
         Some(adapted) => adapted.bars.clone(),
         None if arguments.bars => agree(comm, phases.time("error bars", measure))?,
@@ -190,6 +191,7 @@ fn read<'a>(
         tables,
         adapted,
         bars,
+        notes,
         _lock: lock,
         petsc: &arguments.petsc,
         profile: arguments.profile,
@@ -210,7 +212,7 @@ fn solve(task: &Task, restart: Option<Checkpoint>, session: &Session) -> Result<
     agree(comm, resumed.map_err(Failure::from))?;
     let saved = restart.map(|checkpoint| checkpoint.run);
     let mut result =
-        evolution::run_from(session, problem, &task.solver, phases, &mut recorder, saved);
+        estimate::run_from(session, problem, &task.solver, phases, &mut recorder, saved);
     if let Ok(outcome) = &mut result {
         outcome.set_bars(problem, &task.bars);
         if let Some(stop) = &mut outcome.stopped {

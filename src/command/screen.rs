@@ -2,8 +2,8 @@
 
 use super::task::Task;
 use signorini::{
-    estimate::{Adapted, percent},
-    evolution::{Outcome, RunError, StepRecord},
+    estimate::Adapted,
+    evolution::{Outcome, RunError, StepRecord, percent},
     output::terminal::{Progress, say, with_bar},
     scene::{Scheme, Stepping, TimeGrid, Units, rounded},
 };

@@ -1,9 +1,9 @@
 //! The task of a run.
 
 use signorini::{
-    estimate::{Adapted, Bar},
+    estimate::Adapted,
     evolution::Phases,
-    problem::DiscreteProblem,
+    problem::{Bar, DiscreteProblem},
 };
 use std::{fs::File, path::PathBuf, time::Instant};
 
@@ -26,6 +26,8 @@ pub struct Task<'a> {
     pub adapted: Option<Adapted>,
     /// The measured error bars of the figures; empty if they were not measured.
     pub bars: Vec<Bar>,
+    /// Notes on the arguments and on the error bars.
+    pub notes: Vec<String>,
     /// The lock of the folder against other runs.
     pub _lock: Option<File>,
     pub petsc: &'a [String],

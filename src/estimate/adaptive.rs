@@ -12,13 +12,12 @@ mod pilot;
 mod round;
 mod sizes;
 
-use super::Bar;
 use crate::{
     evolution::RunError,
     interrupt::Signal,
     mesh::{Mesh, MeshError, Refinement},
     petsc::{PetscError, Session},
-    problem::{DiscreteProblem, LoadCurve, SetupError},
+    problem::{Bar, DiscreteProblem, LoadCurve, SetupError},
     scene::{Scene, Stepping},
 };
 use measurement::Measurement;

@@ -12,12 +12,11 @@
 use super::{
     fine_strains::FineStrains,
     hierarchical::{affine, coefficients, interpolation_error, laplace, mass, values},
-    instants::Instants,
     order_pair::OrderPair,
     quadratic_system::QuadraticSystem,
 };
 use crate::{
-    evolution::{Compliance, DamageStep, Outcome, Phases, RunError, agreed},
+    evolution::{Compliance, DamageStep, Instants, Outcome, Phases, RunError, agreed},
     model::DamageLaw,
     petsc::PetscError,
     problem::{DiscreteProblem, State},

@@ -11,56 +11,85 @@
 //! [`adapted`] makes a mesh for an accuracy ([`Adapted`]). Each round has a run with few steps, estimates and
 //! bisection. A measurement ends the rounds.
 //!
-//! What crosses the door: at the end of a run `evolution` hands over its last state, some earlier states and its
-//! factor of K. It gets the estimates in its [`Outcome`]. `command` requests an adapted mesh and error bars.
-//! Nothing here changes the answer of a run.
+//! What crosses the door: [`run`] calls `evolution`, takes its last state, some earlier states and its factor of K,
+//! and returns the [`Outcome`] with the estimates. `command` requests this, an adapted mesh and error bars. Nothing
+//! here changes the answer of a run.
 
 mod hierarchical;
 mod recovery;
 mod order_pair;
 mod fine_solve;
 mod fine_strains;
-mod instants;
 mod quadratic_system;
 mod damage_error;
 mod error_budget;
-mod figures;
 mod penetration;
-mod unresolved;
 mod adaptive;
 
 pub use adaptive::{AdaptError, Adapted, adapted, measured_bars};
-pub use error_budget::{ErrorBudget, percent};
-pub use figures::Bar;
-pub(crate) use instants::Instants;
 pub use recovery::{EnergyError, RecoveredStrains, strains_at_nodes};
-pub(crate) use unresolved::notes as unresolved_notes;
 
-use crate::evolution::{Compliance, DamageStep, Outcome, RunError, StepController};
+use crate::{
+    evolution::{
+        Callback, ErrorBudget, Observed, Observer, Outcome, Phases, Run, RunError, RunState, Step,
+        all_steps,
+    },
+    fem::RigidMotion,
+    petsc::{PetscError, Session},
+    problem::{Bar, DiscreteProblem},
+};
 use damage_error::damage_error;
 use nalgebra::DVector;
 
 /// The error bar of the time of ζ_* over the estimated delay. A coarse mesh may not show all of the delay.
 const DELAYS: f64 = 1.5;
+/// If max |u| of the last step is below this fraction of its maximum in the run, the body counts as unloaded.
+const UNLOADED: f64 = 0.01;
+/// A deformation below this fraction of the rigid motion counts as rounding.
+const CARRIED: f64 = 1e-11;
+
+/// [`evolution::run`](crate::evolution::run), and at its end the estimates of its errors.
+///
+/// # Errors
+/// See [`RunError`]; every accepted step has been seen by then.
+pub fn run(
+    session: &Session,
+    problem: &DiscreteProblem,
+    solver: &str,
+    phases: &Phases,
+    accepted: &mut dyn FnMut(&Step) -> Observed,
+) -> Result<Outcome, RunError> {
+    run_from(session, problem, solver, phases, &mut Callback(accepted), None)
+}
+
+/// As [`run`], with an `observer` that may keep checkpoints and end the run. It starts from `saved`, if given.
+///
+/// # Errors
+/// See [`RunError`]; every accepted step has been seen by then.
+pub fn run_from(
+    session: &Session,
+    problem: &DiscreteProblem,
+    solver: &str,
+    phases: &Phases,
+    observer: &mut dyn Observer,
+    saved: Option<RunState>,
+) -> Result<Outcome, RunError> {
+    estimated(all_steps(session, problem, solver, phases, observer, saved)?)
+}
 
 /// Estimates the errors of a finished run and enters them in its outcome. Collective.
-pub(crate) fn estimate_run(
-    outcome: &mut Outcome,
-    controller: &StepController,
-    mut damage_step: DamageStep,
-    mut compliance: Compliance,
-    instants: Instants,
-) -> Result<(), RunError> {
+fn estimated(run: Run) -> Result<Outcome, RunError> {
+    let Run { mut damage_step, contact_step, controller, mut outcome, instants } = run;
+    let mut compliance = contact_step.into_compliance()?;
     let (problem, phases) = (damage_step.problem, damage_step.phases);
-    outcome.bound_violation = controller.violation();
-    outcome.damage_error = controller.damage_error();
-    outcome.accuracy = phases.time("accuracy", || compliance.accuracy(outcome))?;
+    outcome.accuracy = phases.time("accuracy", || compliance.accuracy(&outcome))?;
+    outcome.accuracy.energy = phases.time("accuracy", || energy_error(problem, &outcome))?;
     outcome.penetration = phases.time("accuracy", || {
         let states = instants.states.iter().chain([&outcome.last.state]);
         problem.penetration_note(states)
     });
     let mesh = phases.time("mesh error", || {
-        damage_error(problem, &mut damage_step, compliance, instants, outcome)
+        damage_error(problem, &mut damage_step, compliance, instants, &outcome)
     });
     if let (Some(stop), Some(error)) = (&mut outcome.stopped, &mesh) {
         stop.from_mesh = error.delay.map(|delay| DELAYS * delay.abs());
@@ -68,6 +97,34 @@ pub(crate) fn estimate_run(
     outcome.damage_indicators = mesh.as_ref().map_or_else(Vec::new, |mesh| mesh.indicators.clone());
     let steps = controller.step_error().filter(|_| problem.damage().is_some());
     outcome.errors =
-        ErrorBudget::new(problem, outcome, mesh, steps.as_ref().map(DVector::as_slice));
-    Ok(())
+        ErrorBudget::new(problem, &outcome, mesh, steps.as_ref().map(DVector::as_slice));
+    Ok(outcome)
+}
+
+/// The estimated discretisation error of u, relative, in the energy norm: of the last step, or of the step with the
+/// maximum displacement if the last one is unloaded. The small u left then gives a poor estimate. Collective.
+fn energy_error(problem: &DiscreteProblem, outcome: &Outcome) -> Result<f64, PetscError> {
+    let (last, most) = (&outcome.last, outcome.most_displaced());
+    let unloaded = last.record.displacement_max < UNLOADED * most.record.displacement_max;
+    let state = if unloaded { &most.state } else { &last.state };
+    let [rigid, rest] =
+        RigidMotion::nearest(&problem.body, &state.u).max_norms(&problem.body, &state.u);
+    // The strains of a body that only moves rigidly are rounding.
+    if rest > CARRIED * rigid { problem.energy_error(&state.zeta, &state.u) } else { Ok(0.0) }
+}
+
+impl Outcome {
+    /// Sets the error bars: the errors `of_mesh` plus the errors of the time steps. There are none if the run
+    /// stopped at ζ_*, because another mesh stops at another time, or if it has too few steps for an estimate.
+    pub fn set_bars(&mut self, problem: &DiscreteProblem, of_mesh: &[Bar]) {
+        let unknown = problem.damage().is_some() && self.errors.zeta_steps.is_none();
+        if self.stopped.is_some() || unknown {
+            return;
+        }
+        self.bars = of_mesh.to_vec();
+        let [most, mean] = self.errors.zeta_steps.unwrap_or_default();
+        let displacement = self.errors.displacement_steps.unwrap_or(0.0);
+        problem.add_step_errors(&mut self.bars, [most, mean, displacement]);
+        self.errors.figures = self.bars.iter().map(|bar| (bar.name.clone(), bar.bar)).collect();
+    }
 }

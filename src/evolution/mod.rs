@@ -24,12 +24,14 @@
 //! plans each step and accepts or rejects it; steps are uniform or adaptive.
 //!
 //! What crosses the door: `command` starts a run of a [`DiscreteProblem`] with an [`Observer`], which sees every
-//! accepted [`Step`]. At the end `estimate` enters its error estimates in the [`Outcome`].
+//! accepted [`Step`], by way of `estimate`, which enters its error estimates in the [`Outcome`].
 
 mod contact_step;
 mod damage_step;
 mod error;
+mod error_budget;
 mod extrapolation;
+mod instants;
 mod notes;
 mod observer;
 mod outcome;
@@ -43,24 +45,26 @@ pub use contact_step::{Accuracy, ContactStep};
 pub(crate) use contact_step::{Compliance, active_bounds};
 pub(crate) use damage_step::DamageStep;
 pub use error::{RunError, StepFailure};
+pub use error_budget::{ErrorBudget, percent};
 pub use extrapolation::Extrapolation;
+pub(crate) use instants::Instants;
+pub(crate) use observer::Callback;
 pub use observer::{Next, Observed, Observer};
 pub use outcome::{BoundViolation, Outcome, Stop};
 pub use state::{Step, StepRecord};
 pub(crate) use step_controller::{AIM, StepController};
 
 use crate::{
-    estimate::{Instants, estimate_run},
     petsc::{Communicator, Session},
     problem::{LoadCase, LoadCurve},
 };
 use contact_step::ContactState;
-use observer::Callback;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 use step_controller::{Decision, StepState};
 
 /// Solves Problem VP^hk with the contact solver called `solver`; `accepted` is called for every accepted step.
+/// The outcome has no error estimates; [`estimate::run`](crate::estimate::run) adds them.
 ///
 /// # Errors
 /// See [`RunError`]; every accepted step has been seen by then.
@@ -71,44 +75,16 @@ pub fn run(
     phases: &Phases,
     accepted: &mut dyn FnMut(&Step) -> Observed,
 ) -> Result<Outcome, RunError> {
-    run_from(session, problem, solver, phases, &mut Callback(accepted), None)
-}
-
-/// As [`run`], with an `observer` that may keep checkpoints and end the run. It starts from `saved`, if given.
-///
-/// # Errors
-/// See [`RunError`]; every accepted step has been seen by then.
-pub fn run_from(
-    session: &Session,
-    problem: &DiscreteProblem,
-    solver: &str,
-    phases: &Phases,
-    observer: &mut dyn Observer,
-    saved: Option<RunState>,
-) -> Result<Outcome, RunError> {
-    let Run { damage_step, contact_step, controller, mut outcome, instants } =
-        all_steps(session, problem, solver, phases, observer, saved)?;
-    let compliance = contact_step.into_compliance()?;
-    estimate_run(&mut outcome, &controller, damage_step, compliance, instants)?;
-    Ok(outcome)
-}
-
-/// As [`run`], without error estimates.
-///
-/// # Errors
-/// See [`run`].
-pub(crate) fn run_unestimated(
-    session: &Session,
-    problem: &DiscreteProblem,
-    solver: &str,
-    phases: &Phases,
-    accepted: &mut dyn FnMut(&Step) -> Observed,
-) -> Result<Outcome, RunError> {
     let observer = &mut Callback(accepted);
     all_steps(session, problem, solver, phases, observer, None).map(|run| run.outcome)
 }
 
-fn all_steps<'a>(
+/// As [`run`], with an `observer` that may keep checkpoints and end the run. It starts from `saved`, if given.
+/// Everything at the end is returned.
+///
+/// # Errors
+/// See [`run`].
+pub(crate) fn all_steps<'a>(
     session: &'a Session,
     problem: &'a DiscreteProblem,
     solver: &str,
@@ -138,16 +114,18 @@ fn all_steps<'a>(
         }
     }
     while run.step(observer)? {}
+    run.outcome.bound_violation = run.controller.violation();
+    run.outcome.damage_error = run.controller.damage_error();
     Ok(run)
 }
 
 /// A run between two steps.
-struct Run<'a> {
-    damage_step: DamageStep<'a>,
-    contact_step: ContactStep<'a>,
-    controller: StepController<'a>,
-    outcome: Outcome,
-    instants: Instants,
+pub(crate) struct Run<'a> {
+    pub(crate) damage_step: DamageStep<'a>,
+    pub(crate) contact_step: ContactStep<'a>,
+    pub(crate) controller: StepController<'a>,
+    pub(crate) outcome: Outcome,
+    pub(crate) instants: Instants,
 }
 
 impl Run<'_> {

@@ -54,7 +54,7 @@ pub trait Observer {
 }
 
 /// An observer that only calls a function. A deferred signal ends the run.
-pub(super) struct Callback<'a>(pub(super) &'a mut dyn FnMut(&Step) -> Observed);
+pub(crate) struct Callback<'a>(pub(crate) &'a mut dyn FnMut(&Step) -> Observed);
 
 impl Observer for Callback<'_> {
     fn accept(&mut self, step: &Step) -> Observed<Next> {

@@ -1,10 +1,10 @@
 //! The outcome of a run that did not fail.
 
-use super::{Accuracy, DiscreteProblem, Step, StepRecord, damage_step::PlannedStep};
+use super::{Accuracy, ErrorBudget, Step, StepRecord, damage_step::PlannedStep};
 use crate::{
     contact::Kkt,
-    estimate::{Bar, ErrorBudget},
     fem::{Mass, RigidMotion},
+    problem::Bar,
 };
 use serde::{Deserialize, Serialize};
 use std::{mem, rc::Rc};
@@ -54,7 +54,7 @@ pub struct Outcome {
     pub damage_error: Option<f64>,
     /// The steps with the maximum stationarity residual and the maximum displacement before the last step.
     pub(super) least_accurate: Option<Rc<Step>>,
-    pub(super) most_displaced: Option<Rc<Step>>,
+    most_displaced: Option<Rc<Step>>,
 }
 
 /// The stop at ζ_*.
@@ -89,18 +89,11 @@ impl Outcome {
         outcome
     }
 
-    /// Sets the error bars: the errors `of_mesh` plus the errors of the time steps. There are none if the run
-    /// stopped at ζ_*, because another mesh stops at another time, or if it has too few steps for an estimate.
-    pub fn set_bars(&mut self, problem: &DiscreteProblem, of_mesh: &[Bar]) {
-        let unknown = problem.damage().is_some() && self.errors.zeta_steps.is_none();
-        if self.stopped.is_some() || unknown {
-            return;
-        }
-        self.bars = of_mesh.to_vec();
-        let [most, mean] = self.errors.zeta_steps.unwrap_or_default();
-        let displacement = self.errors.displacement_steps.unwrap_or(0.0);
-        problem.add_step_errors(&mut self.bars, [most, mean, displacement]);
-        self.errors.figures = self.bars.iter().map(|bar| (bar.name.clone(), bar.bar)).collect();
+    /// The step with the maximum displacement.
+    pub(crate) fn most_displaced(&self) -> &Step {
+        let of = |step: &Step| step.record.displacement_max;
+        let larger = |before: &&Rc<Step>| of(before) > of(&self.last);
+        self.most_displaced.as_ref().filter(larger).map_or(&self.last, Rc::as_ref)
     }
 
     pub(super) fn accept(&mut self, step: Step) {

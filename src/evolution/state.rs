@@ -71,6 +71,19 @@ pub struct StepRecord {
 }
 
 impl Step {
+    /// The values of all figures, in the order of [`DiscreteProblem::bars`].
+    pub(crate) fn figures(&self) -> Vec<f64> {
+        let record = &self.record;
+        let of_record = [
+            record.work,
+            record.displacement_max,
+            record.contact_force,
+            record.zeta_min,
+            record.zeta_mean,
+        ];
+        [&of_record[..], &self.quantities].concat()
+    }
+
     /// Sets the accuracy of ζ_n; `None` means that the damage solve was skipped, so ζ_n is exact.
     pub(super) fn set_damage_certificate(&mut self, certificate: Option<DamageCertificate>) {
         self.skipped_damage_solve = certificate.is_none();

@@ -7,6 +7,9 @@ use std::{
     ffi::{CStr, c_char, c_int, c_void},
 };
 
+/// PETSC_ERR_MAT_CH_ZRPVT: a pivot of a Cholesky factorisation is not positive.
+pub(super) const NOT_DEFINITE: i32 = 81;
+
 /// A call of PETSc or CHOLMOD failed, or its arguments do not fit.
 #[derive(Debug, Clone, thiserror::Error)]
 #[error("{}{message}", match code { 0 => String::new(), code => format!("PETSc error {code}: ") })]

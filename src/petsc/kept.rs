@@ -1,6 +1,10 @@
 //! Our kept Cholesky factor as a PC type of PETSc (PCRegister).
 
-use super::{Matrix, PetscError, Vector, check, error::return_code, ksp::NOT_DEFINITE, raw};
+use super::{
+    Matrix, PetscError, Vector, check,
+    error::{NOT_DEFINITE, return_code},
+    raw,
+};
 use std::{
     ffi::{CStr, c_void},
     ptr,

@@ -2,7 +2,7 @@
 
 use super::{
     Matrix, PetscError, Session, Vector, check,
-    error::return_code,
+    error::{NOT_DEFINITE, return_code},
     handle::Handle,
     kept,
     kept::{Context, KeptPreconditioner},
@@ -14,9 +14,6 @@ use std::{
     ffi::{CStr, c_int, c_void},
     ptr,
 };
-
-/// PETSC_ERR_MAT_CH_ZRPVT: a pivot of a Cholesky factorisation is not positive.
-pub(super) const NOT_DEFINITE: i32 = 81;
 
 /// A KSP: conjugate gradients with the preconditioner [`kept::NAME`], unless PETSc options with its prefix
 /// choose other types.

@@ -5,7 +5,7 @@ mod forces;
 mod parts;
 
 pub(crate) use curve::LoadCurve;
-pub(crate) use parts::{
+pub(super) use parts::{
     EdgePart, TrianglePart, centroid, edge_parts, triangle_parts, triangle_point,
 };
 

@@ -5,7 +5,7 @@
 //! - [`DiscreteProblem`]: the body, its materials, its supports and the tolerance;
 //! - [`Loads`]: nodal loads, prescribed displacements and gaps as functions of time, integrated so finely that no
 //!   narrow load is overlooked (`LoadCase`: their values at one time);
-//! - [`Supports`] and probes: the printed resultants and values at points;
+//! - [`Supports`] and probes: the printed resultants and values at points; [`Bar`]: the error bar of such a figure;
 //! - [`State`]: time, displacements, damage and contact at one time.
 //!
 //! What crosses the door: `evolution` advances a [`DiscreteProblem`] from [`State`] to [`State`]; `estimate` checks
@@ -13,21 +13,24 @@
 
 mod boundary_conditions;
 mod error;
+mod figures;
 mod load_case;
 mod loads;
+mod notes;
 mod probe;
 mod state;
 mod supports;
+mod unresolved;
 
 pub use error::SetupError;
+pub use figures::{Bar, Dimension};
 pub(crate) use load_case::LoadCase;
+pub(crate) use loads::LoadCurve;
 pub use loads::Loads;
-pub(crate) use loads::{
-    EdgePart, LoadCurve, TrianglePart, centroid, edge_parts, triangle_parts, triangle_point,
-};
 pub(crate) use probe::OBSERVED;
 pub use state::State;
 pub use supports::{ContactRow, Supports};
+pub(crate) use unresolved::unresolved;
 
 use crate::{
     contact::{Certificate, Constraints, RigidMotions},

@@ -12,6 +12,12 @@ use std::{path::Path, sync::Arc};
 use table::Table;
 use toml::Value;
 
+/// The deepest allowed nesting, so that parsing cannot exhaust the stack of the program.
+const DEEPEST: usize = 128;
+/// The largest number of values on the stack of an expression. In each level of nesting at most two values
+/// wait: the first two arguments of `if`.
+const HIGHEST: usize = 2 * DEEPEST;
+
 /// A real function of x, y (m) and t (s), read from a scene.
 ///
 /// Known are the variables `x`, `y`, `t`, the constant `pi`, the operators `+ - * / ^`, the
@@ -119,7 +125,7 @@ impl Expression {
     pub fn eval(&self, x: f64, y: f64, t: f64) -> f64 {
         match self.height {
             ..=8 => self.run::<8>([x, y, t]),
-            _ => self.run::<{ parser::HIGHEST }>([x, y, t]),
+            _ => self.run::<HIGHEST>([x, y, t]),
         }
     }
 

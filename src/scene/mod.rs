@@ -70,8 +70,6 @@ pub struct Scene {
     pub probes: Vec<Probe>,
     /// The conditions on the named parts of the boundary, with different names.
     pub boundaries: Vec<Boundary>,
-    /// Notes on values that the program has changed.
-    pub notes: Vec<String>,
     text: SceneText,
 }
 

@@ -53,7 +53,6 @@ pub(super) fn scene(found: &mut Findings) -> Option<Scene> {
     for (name, law) in laws {
         surfaces.entry(name).or_insert(Surface { material, law: None }).law = Some(law);
     }
-    let (time, note) = time.unzip();
     let degree = degree.unwrap_or(if accuracy.is_some() { 2.0 } else { 1.0 });
     Some(Scene {
         path: path.to_owned(),
@@ -73,7 +72,6 @@ pub(super) fn scene(found: &mut Findings) -> Option<Scene> {
         units: units?,
         boundaries,
         probes,
-        notes: note.flatten().into_iter().collect(),
         text: found.text.clone(),
     })
 }
@@ -154,8 +152,7 @@ struct TimeKeys {
 /// The default tolerance of `step = "auto"`: the error of ζ over the damage.
 const STEP_TOLERANCE: f64 = 0.01;
 
-/// The time grid, and a note if the given step does not divide the end.
-fn time(keys: TimeKeys) -> Result<(TimeGrid, Option<String>), Fault> {
+fn time(keys: TimeKeys) -> Result<TimeGrid, Fault> {
     let TimeKeys { end, step, tolerance, scheme } = keys;
     let Ok(length) = step.try_into::<f64>() else {
         if scheme == Some(Scheme::Euler) {
@@ -163,7 +160,7 @@ fn time(keys: TimeKeys) -> Result<(TimeGrid, Option<String>), Fault> {
         }
         let stepping =
             Stepping::Auto { tolerance: tolerance.unwrap_or(STEP_TOLERANCE), expected: [0.0; 2] };
-        return Ok((TimeGrid { end, stepping, scheme: Scheme::Bdf2 }, None));
+        return Ok(TimeGrid { end, step: None, stepping, scheme: Scheme::Bdf2 });
     };
     if tolerance.is_some() {
         return Err(("tolerance", "has no effect unless step = \"auto\"".to_owned()));
@@ -176,21 +173,7 @@ fn time(keys: TimeKeys) -> Result<(TimeGrid, Option<String>), Fault> {
         return Err(("step", format!("is {length}: more than {MOST_STEPS:e} steps to {end} s")));
     }
     let scheme = scheme.unwrap_or_default();
-    let grid = TimeGrid { scheme, ..TimeGrid::uniform(end, length) };
-    Ok((grid, other_step(grid, length)))
-}
-
-fn other_step(grid: TimeGrid, asked: f64) -> Option<String> {
-    let Stepping::Uniform { steps } = grid.stepping else { return None };
-    let (end, step) = (grid.end, grid.end / steps as f64);
-    (asked - step > 1e-6 * step).then(|| {
-        // Six digits avoid values such as 0.30000000000000004.
-        let step: f64 = format!("{step:.5e}").parse().unwrap_or(step);
-        format!(
-            "time.step = {asked} s does not divide time.end = {end} s: {steps} steps of {step} s \
-             are made"
-        )
-    })
+    Ok(TimeGrid { scheme, ..TimeGrid::uniform(end, length) })
 }
 
 #[derive(Deserialize)]

@@ -7,6 +7,8 @@ use serde::Deserialize;
 pub struct TimeGrid {
     /// T, s.
     pub end: f64,
+    /// The given length of uniform steps, s. They are shorter if it does not divide the end.
+    pub step: Option<f64>,
     /// The division of [0, T].
     pub stepping: Stepping,
     /// The scheme of uniform steps. Adaptive steps always use the two-step scheme.
@@ -49,7 +51,21 @@ impl TimeGrid {
     /// Euler's scheme. A step that divides the end up to rounding is kept.
     pub fn uniform(end: f64, step: f64) -> Self {
         let steps = (end / step - 1e-9).ceil().max(1.0) as usize;
-        Self { end, stepping: Stepping::Uniform { steps }, scheme: Scheme::Euler }
+        Self { end, step: Some(step), stepping: Stepping::Uniform { steps }, scheme: Scheme::Euler }
+    }
+
+    /// A note if the given step does not divide the end.
+    pub(crate) fn note(&self) -> Option<String> {
+        let (Stepping::Uniform { steps }, asked) = (self.stepping, self.step?) else { return None };
+        let (end, step) = (self.end, self.end / steps as f64);
+        (asked - step > 1e-6 * step).then(|| {
+            // Six digits avoid values such as 0.30000000000000004.
+            let step: f64 = format!("{step:.5e}").parse().unwrap_or(step);
+            format!(
+                "time.step = {asked} s does not divide time.end = {end} s: {steps} steps of {step} s \
+                 are made"
+            )
+        })
     }
 
     /// t_n of `steps` equal steps, s. The last one is exactly the end.

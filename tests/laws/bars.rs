@@ -3,10 +3,11 @@
 use crate::support::{run, square};
 use signorini::{
     contact::SOLVERS,
-    estimate::{self, Adapted, Bar},
+    estimate::{self, Adapted},
     evolution::{DiscreteProblem, Outcome},
     mesh::Mesh,
     petsc::Session,
+    problem::Bar,
     scene::Scene,
 };
 use std::path::Path;

@@ -6,7 +6,8 @@ mod common;
 pub use common::{Random, curved_area, square};
 
 use signorini::{
-    evolution::{self, DiscreteProblem, Outcome, Phases, RunError, SetupError, Step},
+    estimate,
+    evolution::{DiscreteProblem, Outcome, Phases, RunError, SetupError, Step},
     mesh::{self, Mesh, Order},
     model::DamageLaw,
     petsc::Session,
@@ -141,7 +142,7 @@ pub fn shipped_names() -> Vec<String> {
 pub fn history(problem: &DiscreteProblem, solver: &str) -> (Vec<Step>, Outcome) {
     let session = Session::start(&[]).unwrap();
     let mut steps = Vec::new();
-    let outcome = evolution::run(&session, problem, solver, &Phases::default(), &mut |step| {
+    let outcome = estimate::run(&session, problem, solver, &Phases::default(), &mut |step| {
         steps.push(step.clone());
         Ok(())
     });
@@ -157,7 +158,7 @@ pub fn run(problem: &DiscreteProblem, solver: &str) -> Outcome {
 /// The outcome or why there is none.
 pub fn try_run(problem: &DiscreteProblem, solver: &str) -> Result<Outcome, RunError> {
     let session = Session::start(&[]).unwrap();
-    evolution::run(&session, problem, solver, &Phases::default(), &mut |_| Ok(()))
+    estimate::run(&session, problem, solver, &Phases::default(), &mut |_| Ok(()))
 }
 
 /// ‖a − b‖ / ‖b‖.

@@ -10,7 +10,6 @@
 //! energy norm: the relative error of the work of a constant load is η².
 
 use super::{
-    super::figures::{Bar, Dimension},
     AdaptError,
     pilot::{INSTANTS, Pilot},
     sizes::areas,
@@ -18,7 +17,7 @@ use super::{
 use crate::{
     mesh::{Mesh, Order, Refinement},
     petsc::Session,
-    problem::DiscreteProblem,
+    problem::{Bar, Dimension, DiscreteProblem},
     scene::Scene,
 };
 

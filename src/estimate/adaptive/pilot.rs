@@ -1,8 +1,8 @@
 //! A run with few time steps, the error of u and the penetration on each triangle, and the figures of all steps.
 
 use crate::{
-    estimate::RecoveredStrains,
-    evolution::{Outcome, Phases, RunError, Step, run, run_unestimated},
+    estimate::{self, RecoveredStrains},
+    evolution::{self, Outcome, Phases, RunError, Step},
     petsc::{PetscError, Session},
     problem::{DiscreteProblem, State},
 };
@@ -57,7 +57,7 @@ impl<'a> Pilot<'a> {
             History { instants, squares: zeros.clone(), depths: zeros, ..History::default() };
         let phases = Phases::default();
         let mut observe = |step: &Step| Ok(history.observe(problem, step)?);
-        let run = if estimated { run } else { run_unestimated };
+        let run = if estimated { estimate::run } else { evolution::run };
         let outcome = run(session, problem, solver, &phases, &mut observe)?;
         if history.last != Some(outcome.last.state.time) {
             history.estimate(problem, &outcome.last.state)?;

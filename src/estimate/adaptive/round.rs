@@ -1,12 +1,10 @@
 //! One round: is its mesh good enough to be measured, and how is the next one refined?
 
-use super::{
-    super::unresolved::unresolved, Adapted, measurement::Measurement, pilot::Pilot,
-    sizes::size_ratios,
-};
+use super::{Adapted, measurement::Measurement, pilot::Pilot, sizes::size_ratios};
 use crate::{
     evolution::AIM as AIM_OF_STEPS,
     mesh::{Mesh, Order, sorted},
+    problem::unresolved,
     scene::Scene,
 };
 use std::collections::HashSet;

@@ -3,12 +3,11 @@
 use super::{ContactStep, active_bounds, displacement};
 use crate::{
     contact::ContactPoint,
-    evolution::{DiscreteProblem, Outcome, State, Step},
-    fem::{RigidMotion, Stiffness},
+    evolution::{DiscreteProblem, Outcome, State},
+    fem::Stiffness,
     linear::{LinearSolver, LinearSystem},
     petsc::{PetscError, Vector},
 };
-use std::rc::Rc;
 
 /// The promised relative error of displacements is the larger of this and `TOLERANCES` times the KKT tolerance.
 const DISPLACEMENT: f64 = 1e-6;
@@ -16,11 +15,6 @@ const TOLERANCES: f64 = 100.0;
 /// A mesh is too coarse if the estimated relative error in the energy norm is larger. The displacement under the
 /// load is then too small by about the square of this error.
 const COARSE: f64 = 0.5;
-/// The last step is used to estimate the discretisation error, unless its max |u| is below this fraction of the
-/// run's.
-const UNLOADED: f64 = 0.01;
-/// A deformation below this fraction of the rigid motion counts as rounding.
-const CARRIED: f64 = 1e-11;
 /// An estimate up to this fraction of the promised error is not repeated for a second step.
 const SAFE: f64 = 0.1;
 
@@ -35,8 +29,8 @@ pub struct Accuracy {
     pub displacement: f64,
     /// The time of this step, s.
     pub time: f64,
-    /// The discretisation error in the energy norm ([`RecoveredStrains`](crate::estimate::RecoveredStrains)) in the
-    /// last step. If it is unloaded: in the step with the maximum displacement.
+    /// The discretisation error in the energy norm in the last step. If it is unloaded: in the
+    /// step with the maximum displacement. Only [`estimate`](crate::estimate) sets it.
     pub energy: f64,
 }
 
@@ -111,23 +105,10 @@ impl Compliance<'_> {
     /// promised error. The kept factor is usually good enough.
     pub(crate) fn accuracy(&mut self, outcome: &Outcome) -> Result<Accuracy, PetscError> {
         let problem = self.problem;
-        let body = &problem.body;
         let last = &outcome.last;
-        let larger =
-            |before: &&Rc<Step>| before.record.displacement_max > last.record.displacement_max;
-        let most = outcome.most_displaced.as_ref().filter(larger).map_or(last, Rc::as_ref);
-        let max = most.record.displacement_max;
-        // The small u left after unloading gives a poor estimate of the discretisation error.
-        let estimated = if last.record.displacement_max < UNLOADED * max { most } else { last };
-        let State { u, zeta, .. } = &estimated.state;
-        let [rigid, rest] = RigidMotion::nearest(body, u).max_norms(body, u);
-        // The strains of a body that only moves rigidly are rounding.
-        let energy = match rest > CARRIED * rigid {
-            true => problem.energy_error(zeta, u)?,
-            false => 0.0,
-        };
+        let max = outcome.most_displaced().record.displacement_max;
         let displacement = self.displacement_error(&last.state, max)?;
-        let mut accuracy = Accuracy { displacement, energy, time: last.state.time };
+        let mut accuracy = Accuracy { displacement, energy: 0.0, time: last.state.time };
         let Some(worst) = &outcome.least_accurate else { return Ok(accuracy) };
         let ratio = worst.record.kkt_stationarity / last.record.kkt_stationarity;
         let expected = displacement * ratio.max(1.0);

@@ -6,9 +6,8 @@
 //! of the box. They ignore rounding errors.
 
 use super::{
-    Expression,
+    Expression, HIGHEST,
     Instruction::{Binary, Choose, Compare, Number, Table, Unary, Variable},
-    parser::HIGHEST,
     truth,
 };
 use std::f64::consts::{FRAC_PI_2, PI, TAU};

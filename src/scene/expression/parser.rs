@@ -1,7 +1,7 @@
 //! Parses the text of an expression into its program.
 
 use super::{
-    Expression,
+    DEEPEST, Expression,
     Instruction::{self, Binary, Choose, Compare, Number, Unary, Variable},
     Table, interval, truth,
 };
@@ -46,12 +46,6 @@ const OPERATORS: [(&str, Instruction, u8, u8); 13] = [
 ];
 /// The precedence of a sign. Only `^` has a higher one: `-x^2` is −(x²), and `2^-1` is ½.
 const SIGN: u8 = 6;
-
-/// The deepest allowed nesting, so that parsing cannot exhaust the stack of the program.
-const DEEPEST: usize = 128;
-/// The largest number of values on the stack of an expression. In each level of nesting at most two values
-/// wait: the first two arguments of `if`.
-pub(super) const HIGHEST: usize = 2 * DEEPEST;
 
 /// Reads a text by precedence climbing.
 pub(super) struct Parser<'a> {

@@ -2,7 +2,8 @@
 
 use crate::StudyError;
 use signorini::{
-    evolution::{self, ContactStep, DiscreteProblem, Outcome, Phases, RunError, SetupError, Step},
+    estimate,
+    evolution::{ContactStep, DiscreteProblem, Outcome, Phases, RunError, SetupError, Step},
     mesh::Mesh,
     petsc::Session,
     scene::Scene,
@@ -61,7 +62,7 @@ pub fn run(
     problem: &DiscreteProblem,
     solver: &str,
 ) -> Result<Outcome, RunError> {
-    evolution::run(session, problem, solver, &Phases::default(), &mut |_| Ok(()))
+    estimate::run(session, problem, solver, &Phases::default(), &mut |_| Ok(()))
 }
 
 /// One static solve, from a first guess of the active nodes if there is one; the inner error

@@ -1,6 +1,6 @@
 //! Some states of a run, kept for the estimates at its end.
 
-use crate::{evolution::Step, problem::State};
+use super::{State, Step};
 use serde::{Deserialize, Serialize};
 
 /// Minimum number of intervals between the kept states; there are at most twice as many. Fewer intervals

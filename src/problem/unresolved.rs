@@ -1,10 +1,10 @@
 //! Data that the nodes do not resolve. Prescribed displacements and the initial damage enter by their values at
 //! nodes, and may vary more between them.
 
+use super::loads::{EdgePart, TrianglePart, centroid, edge_parts, triangle_parts, triangle_point};
 use crate::{
     fem::{GAUSS, POINTS, midpoint, parabola, part_point, six_points},
     mesh::{Curve, Mesh, Order, sorted},
-    problem::{EdgePart, TrianglePart, centroid, edge_parts, triangle_parts, triangle_point},
     scene::{Condition, Expression, Scene},
 };
 use std::collections::HashSet;
@@ -27,7 +27,7 @@ const NOTED: f64 = 0.05;
 /// - edges on which |u_D − Iu_D| exceeds `accuracy` · `displacement`, with Iu_D the nodal interpolation of u_D;
 /// - the longest sides of the triangles with the largest ‖ζ₀ − Iζ₀‖_T in L². The triangles left out have Σ
 ///   ‖ζ₀ − Iζ₀‖²_T ≤ (½ `accuracy` ‖1 − ζ₀‖)².
-pub(super) fn unresolved(
+pub(crate) fn unresolved(
     scene: &Scene,
     mesh: &Mesh,
     accuracy: f64,
@@ -63,7 +63,7 @@ pub(super) fn unresolved(
 }
 
 /// Notes on prescribed displacements and initial damage that vary much between the nodes.
-pub(crate) fn notes(scene: &Scene, mesh: &Mesh) -> Vec<String> {
+pub(super) fn notes(scene: &Scene, mesh: &Mesh) -> Vec<String> {
     let mut notes = Vec::new();
     for boundary in &scene.boundaries {
         let Some(curve) = mesh.curves.get(&boundary.name) else { continue };

@@ -1,10 +1,7 @@
 //! The figures that a run prints, and their error bars.
 
-use crate::{
-    evolution::Step,
-    problem::{DiscreteProblem, OBSERVED},
-    scene::{Expression, Stepping},
-};
+use super::{DiscreteProblem, OBSERVED};
+use crate::scene::{Expression, Stepping};
 use serde::{Deserialize, Serialize};
 
 /// The figures of a [`StepRecord`](crate::evolution::StepRecord) that have an error bar.
@@ -182,20 +179,5 @@ impl DiscreteProblem {
                 _ => displacement * bar.scale,
             };
         }
-    }
-}
-
-impl Step {
-    /// The values of all figures, in the order of [`DiscreteProblem::bars`].
-    pub(crate) fn figures(&self) -> Vec<f64> {
-        let record = &self.record;
-        let of_record = [
-            record.work,
-            record.displacement_max,
-            record.contact_force,
-            record.zeta_min,
-            record.zeta_mean,
-        ];
-        [&of_record[..], &self.quantities].concat()
     }
 }

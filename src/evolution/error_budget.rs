@@ -1,0 +1,98 @@
+//! The error budget of a run: the errors of the mesh, the time steps and the solver.
+
+use super::Stop;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Estimated relative errors of the last accepted state: for u in the energy norm, and for the damage ζ₀ − ζ in L².
+/// They are `None` without damage. The errors of the time steps are also `None` if there are too few steps.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct ErrorBudget {
+    /// The error of u from the mesh.
+    pub displacement_mesh: f64,
+    /// The error of the damage from the mesh; also `None` if the run stopped at ζ_*, where it grows without bound.
+    pub damage_mesh: Option<f64>,
+    /// The error of u from the time steps.
+    pub displacement_steps: Option<f64>,
+    /// The error of the damage from the time steps.
+    pub damage_steps: Option<f64>,
+    /// The error of max |u| from the solver; infinite if the active nodes alone do not support the body.
+    pub solver: f64,
+    /// Per name of a figure: its error bar from mesh and time steps, in its unit. Empty if they are not measured.
+    pub figures: BTreeMap<String, f64>,
+    /// Can the material be damaged?
+    #[serde(skip)]
+    pub can_be_damaged: bool,
+    /// The error of ζ from the time steps, at a node and in the mean.
+    #[serde(skip)]
+    pub(crate) zeta_steps: Option<[f64; 2]>,
+}
+
+/// If the error of the mesh is larger, the advice calls the mesh the limit of the answer.
+const LARGE: f64 = 0.05;
+/// If all errors are below this, there is no advice.
+const NEGLIGIBLE: f64 = 1e-9;
+
+impl ErrorBudget {
+    /// The errors by their causes, and advice on which cause to reduce. For a run that stopped at ζ_*, the error of
+    /// that time replaces the error of the damage.
+    pub fn lines(&self, stopped: Option<&Stop>) -> [String; 4] {
+        let of_damage = |error: Option<f64>| match error {
+            Some(error) => format!("damage {}", percent(error)),
+            None if self.damage_steps.is_some() => "damage not estimated".to_owned(),
+            None => "no damage".to_owned(),
+        };
+        let of_stop = |off: Option<f64>| match off {
+            Some(off) => format!("the time of ζ_* off by up to {off:.1e} s"),
+            None => "the time of ζ_*: not estimated".to_owned(),
+        };
+        let of_u = self.displacement_steps;
+        let (of_mesh, of_steps, mesh, steps) = match (stopped, of_u) {
+            (Some(stop), _) => {
+                let [mesh, steps] = [stop.from_mesh, Some(stop.uncertainty)];
+                let part = |off: Option<f64>| off.map(|off| off / stop.time);
+                (of_stop(mesh), of_stop(steps), part(mesh), part(steps))
+            }
+            (None, Some(u)) => {
+                let steps = format!("u {}, {}", percent(u), of_damage(self.damage_steps));
+                let largest = self.damage_steps.map_or(u, |damage| damage.max(u));
+                (of_damage(self.damage_mesh), steps, self.damage_mesh, Some(largest))
+            }
+            (None, None) => {
+                let steps = if self.can_be_damaged { "not estimated" } else { "none" };
+                (of_damage(self.damage_mesh), steps.to_owned(), self.damage_mesh, None)
+            }
+        };
+        let of_u = if stopped.is_some() { 0.0 } else { self.displacement_mesh };
+        let (mesh, steps_most) = (of_u.max(mesh.unwrap_or(0.0)), steps.unwrap_or(0.0));
+        let (of_solver, solver) = match self.solver.is_finite() {
+            true => (format!("{:.0e}", self.solver), self.solver),
+            false => ("not estimated".to_owned(), 0.0),
+        };
+        let advice = match mesh.max(steps_most) {
+            largest if largest.max(solver) < NEGLIGIBLE => "",
+            largest if solver > largest => "; spend on the solver's tolerance",
+            _ if steps_most > mesh => "; spend on shorter time steps",
+            _ if mesh > LARGE => "; spend on the mesh, which is the limit of this answer",
+            _ => "; spend on the mesh",
+        };
+        [
+            format!("from the mesh: u {} (energy norm)", percent(self.displacement_mesh)),
+            format!("from the mesh: {of_mesh}"),
+            format!("from the time steps: {of_steps}"),
+            format!("from the solver: u {of_solver}{advice}"),
+        ]
+    }
+}
+
+/// An error in percent, with two digits.
+pub fn percent(error: f64) -> String {
+    match 100.0 * error {
+        error if error == 0.0 || !error.is_finite() => format!("{error} %"),
+        error if error < 0.01 => format!("{error:.0e} %"),
+        error => {
+            let decimals = (1.0 - error.log10().floor()).max(0.0) as usize;
+            format!("{error:.decimals$} %")
+        }
+    }
+}

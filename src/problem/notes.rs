@@ -1,0 +1,90 @@
+//! Notes for the user on a problem, before any solve.
+
+use super::{DiscreteProblem, LoadCurve, unresolved};
+use crate::{mesh::Order, model::Plane};
+use std::iter::once;
+
+/// In plane strain, P1 triangles lock if ν is larger (STABILITY.md). P2 triangles only converge more slowly.
+const LOCKING: f64 = 0.45;
+/// A note is given if two moduli differ by a larger factor. The rounding of the stiffer material is then 1e-11 of
+/// the forces in the other one, a tenth of the default tolerance.
+const CONTRAST: f64 = 1e5;
+/// Approximate number of sample times of surface loads.
+const TIMES: usize = 8;
+/// A note is given if a triangle has a smaller angle, degrees.
+const SLIVER: f64 = 1.0;
+
+impl DiscreteProblem {
+    /// Notes for the user before any solve: input that was changed, unconstrained rigid motions, and functions,
+    /// materials or triangles that make the discretisation poor. Collective.
+    pub fn notes(&self) -> Vec<String> {
+        let (scene, linear) = (self.scene(), self.scene().order == Order::Linear);
+        let poisson = scene.materials().map(|material| material.poisson).fold(-1.0, f64::max);
+        let locks = linear && scene.material.plane == Plane::Strain && poisson > LOCKING;
+        let is_curved = self.body.nodes.partition.comm().any(!self.body.mesh.curved.is_empty());
+        let mut notes = Vec::from_iter(scene.time.and_then(|grid| grid.note()));
+        notes.extend(self.motions.free.iter().map(|motion| {
+            format!("nothing prevents or drives {motion}: the answer given has the minimum ∫|u|²")
+        }));
+        let check_units = |contrast| format!("{contrast}; if that is not meant, check their units");
+        notes.extend(self.contrast().map(check_units));
+        notes.extend(unresolved::notes(scene, self.mesh()));
+        notes.extend(self.loads.notes(&scene.sample_times(TIMES)));
+        let others = [
+            LoadCurve::unresolved_step(self).map(|[start, end]| {
+                format!(
+                    "loads, displacements or gaps change within a time step, as from t = {start:.4e} \
+                     to {end:.4e}: shorten time.step, or set it to \"auto\""
+                )
+            }),
+            (scene.damage.is_some() && scene.time.is_none()).then(|| {
+                "[damage] without [time]: in this static solve ζ stays damage.initial".to_owned()
+            }),
+            locks.then(|| {
+                format!(
+                    "linear triangles lock in plane strain with ν = {poisson} > {LOCKING}: displacements \
+                     may be far too small; set discretisation.displacement = 2"
+                )
+            }),
+            (linear && is_curved).then(|| {
+                "curved sides count as straight; discretisation.displacement = 2 follows them".to_owned()
+            }),
+            self.sliver(),
+        ];
+        notes.extend(others.into_iter().flatten());
+        notes
+    }
+
+    /// A note on the ratio of the moduli of the stiffest and the softest material, if it is large.
+    pub(crate) fn contrast(&self) -> Option<String> {
+        let (scene, used) = (self.scene(), self.scene().materials_of(self.mesh()));
+        let names = once("[material]".to_owned())
+            .chain(scene.surfaces.keys().map(|name| format!("[material.{name}]")));
+        let materials = scene.materials().map(|material| material.young).zip(names).zip(0..);
+        let mut materials: Vec<_> =
+            materials.filter(|(_, number)| used.contains(number)).map(|(of, _)| of).collect();
+        materials.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+        let [(low, soft), .., (high, stiff)] = &materials[..] else { return None };
+        let unit = &scene.units.stress;
+        (high / low > CONTRAST).then(|| {
+            format!(
+                "E differs by a factor of {:.0e} between two materials: {high:e} {unit} in {stiff}, \
+                 {low:e} {unit} in {soft}",
+                high / low
+            )
+        })
+    }
+
+    /// A note on the triangle with the smallest angle, if this angle is small.
+    fn sliver(&self) -> Option<String> {
+        let (own, at) = self.body.mesh.smallest_angle();
+        let comm = self.body.nodes.partition.comm();
+        let (angle, rank) = comm.min_with_rank(own);
+        let [x, y] = at.map(|coordinate| comm.broadcast(rank, coordinate));
+        (angle < SLIVER).then(|| {
+            format!(
+                "a triangle at ({x:.4}, {y:.4}) has an angle of {angle:.1e}°: mend the mesh there"
+            )
+        })
+    }
+}
