@@ -8,7 +8,7 @@ const PETSC: &str = "\
     PetscOptionsInsertString|PetscOptionsSetValue|PetscOptionsHasName|\
     PetscOptionsLeftGet|PetscOptionsLeftRestore|\
     MPI_Comm_size|MPI_Comm_rank|MPI_Allreduce|MPI_Bcast|MPI_Type_contiguous|MPI_Type_commit|MPI_Type_free|\
-    MPI_Ibarrier|MPI_Test|MPI_Abort|mallopt|madvise|dlsym|omp_set_max_active_levels|\
+    MPI_Ibarrier|MPI_Test|MPI_Abort|omp_set_max_active_levels|\
     PetscSFCreate|PetscSFDestroy|PetscSFSetGraph|PetscSFBcastBegin|PetscSFBcastEnd|\
     MatPartitioningCreate|MatPartitioningDestroy|MatPartitioningSetType|\
     MatPartitioningSetAdjacency|MatPartitioningSetFromOptions|MatPartitioningApply|\
@@ -56,10 +56,8 @@ fn main() {
         petsc.include_paths.iter().map(|path| format!("-I{}", path.display())).collect();
     flags.extend(mpi_flags.split_whitespace().map(str::to_owned));
     // Debian's MPI is Open MPI, whose constants are the addresses of variables.
-    let variables = "PETSC_COMM_WORLD|M_MMAP_MAX|M_MMAP_THRESHOLD|M_TRIM_THRESHOLD|MADV_HUGEPAGE|\
-                     ompi_mpi_(double|byte)|ompi_mpi_op_(sum|max|replace)";
-    let headers = "#include <petsctao.h>\n#include <petscsf.h>\n#include <malloc.h>\n\
-                   #include <dlfcn.h>\n#include <sys/mman.h>\n\
+    let variables = "PETSC_COMM_WORLD|ompi_mpi_(double|byte)|ompi_mpi_op_(sum|max|replace)";
+    let headers = "#include <petsctao.h>\n#include <petscsf.h>\n\
                    void omp_set_max_active_levels(int);\n\
                    PETSC_EXTERN PetscErrorCode PCCreate_Shell(PC);\n";
     declare("petsc", headers, &flags, PETSC, variables);

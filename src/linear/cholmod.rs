@@ -2,13 +2,8 @@
 //! 2008), with the names of its user guide.
 
 use super::{LowerTriangle, raw};
-use crate::petsc::{PetscError, use_large_pages};
-use std::{
-    ffi::c_void,
-    mem::{MaybeUninit, take},
-    ops::Range,
-    ptr, slice,
-};
+use crate::petsc::PetscError;
+use std::{ffi::c_void, mem::take, ops::Range, ptr, slice};
 
 /// A `cholmod_factor` P A Pᵀ = L Lᵀ with the `cholmod_common` it was made with.
 pub(super) struct Cholmod {
@@ -118,12 +113,8 @@ impl Cholmod {
         // as the factor reports.
         let done = unsafe {
             // CHOLMOD allocates L if it has no memory yet.
-            let taken = raw::cholmod_l_change_factor(real, 1, 1, 1, 1, self.factor, common) != 0;
-            let raw::cholmod_factor { x, xsize, .. } = *self.factor;
-            if taken && !x.is_null() {
-                use_large_pages(slice::from_raw_parts(x.cast::<MaybeUninit<f64>>(), xsize));
-            }
-            taken && raw::cholmod_l_factorize(&mut view, self.factor, common) != 0
+            raw::cholmod_l_change_factor(real, 1, 1, 1, 1, self.factor, common) != 0
+                && raw::cholmod_l_factorize(&mut view, self.factor, common) != 0
         };
         self.check(done)?;
         // SAFETY: a live factor.

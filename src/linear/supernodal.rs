@@ -14,7 +14,6 @@ use super::{
     cholmod::Cholmod,
     tiles::{DiagonalBlock, Number, PANEL_WIDTH, TILE_HEIGHT, Tile, subtract, transposed_product},
 };
-use crate::petsc::use_large_pages;
 use nalgebra::{convert, convert_unchecked};
 use std::mem::take;
 
@@ -190,7 +189,6 @@ impl<T: Number> TriangularSolver for Supernodal<T> {
     fn take_values(&mut self, factor: &mut Cholmod) {
         let count = self.supernodes.iter().map(Supernode::tiles).sum();
         self.tiles = vec![[[T::zero(); TILE_HEIGHT]; PANEL_WIDTH]; count];
-        use_large_pages(&self.tiles);
         let (mut diagonal, mut tiles) = (&mut self.diagonal[..], &mut self.tiles[..]);
         let starts: Vec<usize> = factor.supernodes().map(|(.., start)| start).collect();
         // From the last supernode on: values at the end of the factor can be freed.

@@ -9,7 +9,6 @@
 //! All objects live on `PETSC_COMM_WORLD`; sizes and slices are those owned by this rank.
 #![allow(unsafe_code)]
 
-mod blas;
 mod communicator;
 mod energy;
 mod error;
@@ -20,7 +19,6 @@ mod kept;
 mod ksp;
 mod matrix;
 mod options;
-mod pages;
 mod session;
 mod tao;
 mod vector;
@@ -42,7 +40,6 @@ pub(crate) use graph::divide;
 pub(crate) use kept::KeptPreconditioner;
 pub(crate) use ksp::{Ksp, KspProblem};
 pub(crate) use options::{has_option, set_default_option};
-pub(crate) use pages::use_large_pages;
 pub(crate) use tao::{BoundedQuadratic, TaoReport};
 
 use error::check;

@@ -1,8 +1,8 @@
 //! Starting and ending PETSc (PetscInitialize, PetscFinalize).
 
 use super::{
-    Communicator, PetscError, blas, check, error::keep_message, handle::OPEN_HANDLES, kept,
-    options, options::c_string, raw,
+    Communicator, PetscError, check, error::keep_message, handle::OPEN_HANDLES, kept, options,
+    options::c_string, raw,
 };
 use std::{
     env,
@@ -63,21 +63,6 @@ impl Session {
     }
 }
 
-/// Makes malloc return large blocks to the system when they are freed (mallopt(3)). A library below Debian's
-/// PETSc (SuperLU_DIST) switches this off when it is loaded: then freed memory stays in fragments.
-fn give_memory_back() {
-    /// The number of blocks malloc allows by default.
-    const BLOCKS: c_int = 65536;
-    /// The largest threshold that malloc accepts, bytes. Every step allocates and frees smaller arrays.
-    const LARGE: c_int = 32 << 20;
-    // SAFETY: mallopt only sets parameters of malloc, and before PETSc has threads.
-    unsafe {
-        raw::mallopt(raw::M_MMAP_THRESHOLD as c_int, LARGE);
-        raw::mallopt(raw::M_TRIM_THRESHOLD as c_int, 2 * LARGE);
-        raw::mallopt(raw::M_MMAP_MAX as c_int, BLOCKS);
-    }
-}
-
 /// Settings of Open MPI for a process that no launcher started (a singleton). With them it starts no
 /// daemon and opens no network, which takes two thirds of PETSc's start. It makes no directory of
 /// temporary files either: all singletons of a user would share it, and one that ends would remove
@@ -97,9 +82,6 @@ fn set_missing(variables: &[(&'static str, &str)]) -> Vec<&'static str> {
 
 /// Starts PETSc; its errors keep their message for [`check`] instead of printing a trace.
 fn initialize(options: &[String]) -> Result<(), PetscError> {
-    give_memory_back();
-    // SAFETY: only a session uses BLAS, and this is the first one; as in `set_missing`.
-    unsafe { blas::choose_kernels() };
     // In every rank, Scotch 7 starts a thread for each core of the machine. They are too many, and slow
     // because they wait for each other. Scotch reads this variable whenever it divides a graph.
     set_missing(&[("SCOTCH_PTHREAD_NUMBER", "1")]);
