@@ -1,4 +1,10 @@
-//! The subcommands. Each has a function that returns a [`Failure`] with an exit code and a message.
+//! The subcommands of the program, a file each: `run`, `check`, `new`, `script`; the short ones are here.
+//!
+//! A run reads its arguments and its scene into a [`Task`](task::Task). A `Recorder` observes the steps, writes the
+//! results, keeps checkpoints and shows the progress.
+//!
+//! What crosses the door: `main` calls one function per subcommand. It returns a [`Failure`] with an exit code and
+//! a message for the person at the terminal.
 
 mod accuracy;
 mod check;

@@ -21,7 +21,7 @@ pub(crate) struct PlannedStep {
     pub(crate) start: DVector<f64>,
     /// b_{n−1}, or the extrapolated source of a two-step formula, m²/s.
     pub(crate) load: DVector<f64>,
-    /// The bounds on ζ_n of [`BoundViolation`].
+    /// The bounds on ζ_n of [`BoundViolation`](super::BoundViolation).
     pub(crate) bounds: (f64, f64),
 }
 

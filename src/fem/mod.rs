@@ -1,11 +1,11 @@
-//! Continuous finite elements (22), (23), P1 for ζ and P1 or P2 for u: from laws to matrices and vectors. A
-//! [`Body`] has the nodes and elements. [`Elasticity`] evaluates strains, stresses and internal forces,
-//! [`Stiffness`] assembles K, and [`DamageSystem`] solves (28). [`DamageCertificate`] checks its answer
-//! without its matrices.
+//! Continuous finite elements (22), (23), P1 for ζ and P1 or P2 for u: from laws to matrices and vectors.
 //!
-//! Fields are plain slices over the nodes of this rank's subdomain, owned ones first, then ghosts:
-//! one value per vertex (ζ) or two in turn per node (u_x, u_y). [`Partition`] alone knows which are
-//! owned.
+//! - [`Body`]: the nodes and elements of a mesh, and their division among ranks ([`Partition`], `Subdomain`);
+//! - [`Elasticity`]: strains, stresses and internal forces; [`Stiffness`]: K(ζ), its pattern made once;
+//! - [`DamageSystem`] solves (28), and [`DamageCertificate`] checks the answer without its matrices.
+//!
+//! What crosses the door: fields as plain slices over the nodes of this rank's subdomain, owned ones first, then
+//! ghosts: one value per vertex (ζ) or two in turn per node (u_x, u_y). [`Partition`] alone knows which are owned.
 
 mod element;
 mod triangle;

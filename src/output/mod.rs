@@ -1,6 +1,12 @@
 //! The results of a run: `fields.pvd` with its frames, `history.csv`, `contact.csv`, `summary.json`; and the
-//! common output at the terminal. [`FieldWriter`] writes frames, [`Table`] rows; other files appear whole
-//! ([`write_whole`]).
+//! common output at the terminal.
+//!
+//! - [`FieldWriter`] writes the fields of a state as a frame, one VTU file per rank;
+//! - [`Table`] writes CSV files row by row;
+//! - other files appear whole ([`write_whole`]).
+//!
+//! What crosses the door: `command` hands over a `DiscreteProblem`, its states and the records of its steps. All names
+//! of files in a folder of results are here, and so is the rule which of them a new run removes.
 
 mod contact;
 mod growing_file;

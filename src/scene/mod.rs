@@ -1,7 +1,11 @@
 //! Scenes: descriptions of problems, read from TOML files and checked before a run.
 //!
-//! [`Scene::read`] parses the file and checks it without the mesh; [`Scene::check_mesh`] checks it against the
-//! mesh. The types are [`Scene`], its parts, and [`Expression`], a function of x, y and t. Units are SI.
+//! - [`Scene`] and its parts: what the user asked for, with all defaults;
+//! - [`Expression`]: a function of x, y and t, with bounds on its values in a box;
+//! - [`SceneError`]: all problems of a file at once, each with its line.
+//!
+//! What crosses the door: [`Scene::read`] parses the file and checks it against the JSON schema without the mesh;
+//! [`Scene::check_mesh`] checks it against the mesh. Nothing here knows how a problem is solved. Units are SI.
 
 mod boundary;
 mod check;

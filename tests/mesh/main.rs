@@ -20,7 +20,7 @@ fn boundary_nodes(mesh: &Mesh, edges: &[[usize; 2]]) -> Vec<BoundaryNode> {
 mod boundary;
 mod geometries;
 mod malformed;
-mod order;
+mod numbering;
 mod reader;
 mod refine;
 mod writer;

@@ -65,8 +65,8 @@ impl ContactStep<'_> {
         self.phases.time("contact", || solver.solve(&contact, elastic, &mut next.warm_start, c))
     }
 
-    /// The load f − K u_D, and its scale F. The scale also counts the forces by which `lift` = u_D, and obstacles
-    /// that overlap the body, move their own nodes alone. Collective.
+    /// The load f − K u_D, and its scale F: ‖f‖₂ or, if larger, a fraction of ‖f − K u_D‖₂ or of ‖K v‖₂. u_D is
+    /// `lift`. v moves the nodes that overlap an obstacle out of it and no other node. Collective.
     fn load_and_scale(
         &self,
         load: &[f64],

@@ -4,7 +4,7 @@ mod process;
 
 pub(super) use process::run;
 
-use super::{Mesh, MeshError, parse, read};
+use super::{Mesh, MeshError, Order, parse, read};
 use std::{
     collections::BTreeMap,
     ffi::OsString,
@@ -18,19 +18,6 @@ use std::{
 /// Options of gmsh for the next attempts after a mesh with flat triangles. For strong gradings its default
 /// algorithm makes flat triangles by chance. MeshAdapt (1) makes none, but takes ten times as long.
 const AGAIN: [&str; 2] = ["Mesh.RandomFactor = 1e-12", "Mesh.Algorithm = 1"];
-
-/// The order of the elements that gmsh makes from a `.geo`.
-///
-/// Vertices and triangles are the same for both. For order 2 gmsh also places the midpoints of curved edges;
-/// it then takes about six times as long.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Order {
-    /// Order 1, every edge straight.
-    #[default]
-    Linear,
-    /// Order 2.
-    Quadratic,
-}
 
 /// Reads the mesh from [`file()`] and sorts its nodes and triangles ([`Mesh::in_morton_order`]).
 ///

@@ -27,8 +27,8 @@ pub(super) fn estimate_omega(
     Ok(if omega.is_finite() && omega > 0.0 { omega } else { trial })
 }
 
-/// W^½ B (K + ω BᵀWB)⁻¹ BᵀW^½ on an orthonormal basis of a Krylov space (the Lanczos process,
-/// reorthogonalised twice: Golub and Van Loan, Matrix Computations, ch. 10).
+/// The matrix of W^½ B (K + ω BᵀWB)⁻¹ BᵀW^½ in an orthonormal basis of a Krylov space, by the Lanczos process with
+/// two reorthogonalisations (Golub and Van Loan, Matrix Computations, ch. 10).
 fn penalised_compliance(
     problem: &ContactProblem,
     omega: f64,
