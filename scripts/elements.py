@@ -10,11 +10,13 @@ class Pieces:
     """Elements (m, 3) or (m, 6), nodes as VTK numbers them, each cut into `cuts`² flat triangles.
 
     A picture shows linear interpolants of quadratic functions and curved sides. The cuts make them exact to a
-    few pixels. Triangles of three nodes need no cuts.
+    few pixels. Triangles of three nodes need no cuts. Points with the same of the `numbers` are one node: it is
+    listed again by another piece, or for another material.
     """
 
-    def __init__(self, elements):
+    def __init__(self, elements, numbers=None):
         self.elements = elements
+        self._numbers = np.arange(elements.max() + 1) if numbers is None else numbers
         self.cuts = cuts = 1 if elements.shape[1] == 3 else cuts_of(len(elements))
         # A lattice of points with barycentric coordinates i/cuts, and the triangles between them.
         lattice = [(i, j) for i in range(cuts + 1) for j in range(cuts + 1 - i)]
@@ -33,10 +35,6 @@ class Pieces:
         values = np.einsum("kn,mn...->mk...", self._functions, nodal[self.elements])
         return values.reshape(-1, *nodal.shape[1:])
 
-    def of_cells(self, values):
-        """Values of the elements at their pieces."""
-        return np.repeat(values, self.cuts**2)
-
     def along(self, edges, nodal):
         """A nodal field along edges (k, 2) or (k, 3): (k, cuts + 1) values each."""
         s = np.linspace(0.0, 1.0, self.cuts + 1)
@@ -46,15 +44,18 @@ class Pieces:
     def sides(self):
         """The nodes of all sides, each side once: ends in increasing order, then the midpoint."""
         sides = sides_of(self.elements)
-        _, first = np.unique(np.sort(sides[:, :2], axis=1), axis=0, return_index=True)
+        _, first = np.unique(self._ends(sides), axis=0, return_index=True)
         return sides[first]
 
     def boundary(self):
         """The nodes of the sides that belong to one element, which is on their left."""
         sides = sides_of(self.elements)
-        ends = np.sort(sides[:, :2], axis=1)
-        _, first, count = np.unique(ends, axis=0, return_index=True, return_counts=True)
+        _, first, count = np.unique(
+            self._ends(sides), axis=0, return_index=True, return_counts=True)
         return sides[first[count == 1]]
+
+    def _ends(self, sides):
+        return np.sort(self._numbers[sides[:, :2]], axis=1)
 
 
 def cuts_of(count):

@@ -6,6 +6,7 @@
 setting        the body, its boundaries by name, loads and supports (paper, Figures 2, 4, 7)
 deformed       the deformed mesh over the initial outline (Figures 5 and 8)
 stress-damage  von Mises stress and damage (Figures 6 and 9)
+principal-stresses  tension and compression with their directions
 pressure       contact pressure and gap along Γ_C
 damage-history the minimum and the mean of ζ in time, if there is damage
 force-displacement  the forces on the supports over the largest displacement
@@ -27,6 +28,7 @@ from histories import draw_damage_history, draw_force_displacement
 from limits import box_of, limits_of
 from maps import draw_deformed, draw_stress_and_damage
 from paraview_script import write_script
+from principal import draw_principal
 from reading import evenly, read_results, states
 from results import telling
 from setting import draw_setting
@@ -35,6 +37,7 @@ FIGURES = {
     "setting": draw_setting,
     "deformed": draw_deformed,
     "stress-damage": draw_stress_and_damage,
+    "principal-stresses": draw_principal,
     "pressure": draw_pressure,
     "damage-history": draw_damage_history,
     "force-displacement": draw_force_displacement,

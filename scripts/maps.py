@@ -6,7 +6,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.tri import Triangulation
 
 from drawing import (
-    BLUE, INK, canvas, damage_scale, draw_colourbar, draw_foundation, draw_outline, frame, headline,
+    BLUE, INK, RED, canvas, damage_scale, draw_colourbar, draw_foundation, draw_outline, frame, headline,
     least_zeta, map_size, stress_unit,
 )
 
@@ -102,7 +102,7 @@ def _paint_stress(axes, mesh, results, limits):
     """Draws the von Mises stress with a colour bar; returns the text for the title."""
     factor, unit = stress_unit(limits.stress, results.units)
     image = axes.tripcolor(
-        mesh, facecolors=results.pieces.of_cells(results.von_mises / factor), cmap="viridis",
+        mesh, results.pieces.at_points(results.von_mises / factor), shading="gouraud", cmap="viridis",
         vmin=0.0, vmax=limits.stress / factor or 1.0, rasterized=True,
     )
     extend = "max" if limits.is_cut else "neither"
@@ -110,7 +110,12 @@ def _paint_stress(axes, mesh, results, limits):
     largest = results.von_mises.max()
     factor, unit = stress_unit(largest, results.units)
     rounded = float(f"{largest / factor:.3g}")  # 1220, not 1.22e+03
-    return f"von Mises stress, largest {rounded:g} {unit}"
+    text = f"von Mises stress, largest {rounded:g} {unit}"
+    if not results.singular or not largest:
+        return text
+    at = results.nodes[results.von_mises.argmax()]
+    axes.plot(*at, marker="o", markersize=9, fillstyle="none", color=RED, zorder=5)
+    return f"{text}: singular\n(circle, {results.singular}; it grows as the mesh is refined)"
 
 
 def _paint_damage(axes, mesh, results, limits):

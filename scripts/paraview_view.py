@@ -61,7 +61,7 @@ def view_of_deformation(fields, view):
 def view_of_stress(fields, contact, view):
     """The von Mises stress on the initial configuration, and arrows for the contact pressure."""
     shown = simple.Show(fields, view)
-    coloured(shown, view, ("CELLS", "von_mises"), f"von Mises stress ({RUN['stress_unit']})",
+    coloured(shown, view, ("POINTS", "von_mises"), f"von Mises stress ({RUN['stress_unit']})",
              "Viridis (matplotlib)", 0.0, RUN["stress"] or 1.0)
     if contact is None or not RUN["pressure"]:
         return "von Mises stress"

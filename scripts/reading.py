@@ -55,7 +55,8 @@ def read_results(folder, time=None):
             frames=frames,
             time=chosen[0],
             nodes=fields.points[:, :2],
-            pieces=Pieces(counter_clockwise(fields.points, elements)),
+            pieces=Pieces(counter_clockwise(fields.points, elements),
+                          fields.point_data.get("global_node")),
         )
         return with_fields(results, chosen[0], fields)
     except OSError as error:
@@ -106,7 +107,7 @@ def triangles(fields):
 
 def with_fields(results, time, fields):
     """The results with another frame of the same run."""
-    points, cells = fields.point_data, fields.cell_data
+    points = fields.point_data
     contact, tangents, obstacle = _foundation(results, time, points["displacement"][:, :2])
     return without_roundoff(replace(
         results,
@@ -116,47 +117,33 @@ def with_fields(results, time, fields):
         obstacle=obstacle,
         curves=_contact_curves(results.folder, time),
         displacement=points["displacement"][:, :2],
-        zeta=np.ravel(points["zeta"]),
-        von_mises=np.concatenate([np.ravel(cells["von_mises"][k]) for k in triangles(fields)]),
-        pressure=np.ravel(points["normal_pressure"]),
-        gap=np.ravel(points["gap"]),
+        zeta=points["zeta"],
+        von_mises=points["von_mises"].astype(float),
+        principal=points["principal_stress"].astype(float),
+        direction=points["principal_direction"][:, :2].astype(float),
+        pressure=points["normal_pressure"],
+        gap=points["gap"],
     ))
 
 
 def read_frame(path):
-    """A frame: a .vtu file, or the .pvtu list of the pieces of several ranks.
-
-    meshio does not read lists. The numbers of the nodes join the pieces.
-    """
+    """A frame: a .vtu file, or the .pvtu list of the pieces of several ranks, which meshio does not read. The pieces
+    stand one after the other; nodes of several pieces have one number, `global_node`."""
     with whole(path):
         if path.suffix != ".pvtu":
             # meshio.read would end the program if it finds a fault.
             return meshio.vtu.read(path)
         sources = [piece.get("Source") for piece in ElementTree.parse(path).findall(".//Piece")]
     pieces = [read_frame(path.parent / source) for source in sources]
-    numbers = [np.ravel(piece.point_data["global_node"]) for piece in pieces]
-    _, first, place = np.unique(np.concatenate(numbers), return_index=True, return_inverse=True)
-    starts = np.cumsum([0, *map(len, numbers)])
-
-    def joined(arrays):
-        return np.concatenate(arrays)[first]
-
-    cells = [
-        place[start + block.data]
-        for piece, start in zip(pieces, starts)
-        for block in piece.cells
-    ]
+    starts = np.cumsum([0, *(len(piece.points) for piece in pieces)])
+    cells = [start + piece.cells[0].data for piece, start in zip(pieces, starts)]
     return meshio.Mesh(
-        joined([piece.points for piece in pieces]),
+        np.concatenate([piece.points for piece in pieces]),
         [(pieces[0].cells[0].type, np.concatenate(cells))],
-        point_data={
-            name: joined([piece.point_data[name] for piece in pieces])
-            for name in pieces[0].point_data
-        },
-        cell_data={
-            name: [np.concatenate([block for piece in pieces for block in piece.cell_data[name]])]
-            for name in pieces[0].cell_data
-        },
+        point_data={name: np.concatenate([piece.point_data[name] for piece in pieces])
+                    for name in pieces[0].point_data},
+        cell_data={name: [np.concatenate([piece.cell_data[name][0] for piece in pieces])]
+                   for name in pieces[0].cell_data},
     )
 
 

@@ -23,6 +23,7 @@ from histories import draw_damage_history, draw_force_displacement, draw_histori
 from limits import limits_of
 from maps import draw_deformed, draw_state, draw_stress_and_damage
 from reading import evenly, read_results, states
+from principal import draw_principal
 from report_page import PAGE, SLIDER
 from results import telling
 from setting import draw_setting
@@ -153,6 +154,7 @@ def page(results):
         pictures="".join([
             picture(draw_deformed(results, limits), "deformed mesh"),
             picture(draw_stress_and_damage(results, limits), "stress and damage"),
+            picture(draw_principal(results, limits), "principal stresses"),
             picture(draw_pressure(results, limits), "contact pressure and gap"),
         ]),
         histories="".join([

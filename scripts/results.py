@@ -97,7 +97,9 @@ class Results:
     curves: list = None  # the ContactCurves of Γ_C
     displacement: np.ndarray = None  # (n, 2), m
     zeta: np.ndarray = None  # (n,)
-    von_mises: np.ndarray = None  # (m,), Pa
+    von_mises: np.ndarray = None  # (n,), Pa
+    principal: np.ndarray = None  # (n, 2): σ₁ ≥ σ₂ in the plane, Pa
+    direction: np.ndarray = None  # (n, 2): the unit vector of σ₁
     pressure: np.ndarray = None  # (n,), Pa, −σ_ν
     gap: np.ndarray = None  # (n,), m, NaN off Γ_C
 
@@ -150,6 +152,11 @@ class Results:
     def barred(self, name, value):
         """A figure of the last state with its error bar; None at other times, or without one."""
         return barred(value, bars(self.summary).get(name)) if self.is_last else None
+
+    @property
+    def singular(self):
+        """What makes the largest stress of the last state singular; None if nothing does, and at other times."""
+        return (self.summary.get("largest_stress") or {}).get("singular") if self.is_last else None
 
     @property
     def active(self):
@@ -252,7 +259,7 @@ def without_roundoff(results):
 
     results = replace(results, zeta=zeta, gap=rounded(results.gap, deformation))
     if largest <= deformation:
-        names = ("displacement", "von_mises", "pressure")
+        names = ("displacement", "von_mises", "principal", "pressure")
         zeros = {name: 0.0 * getattr(results, name) for name in names}
         return replace(results, **zeros, curves=rounded_curves(np.inf))
     young = results.scene.get("material", {}).get("young")
@@ -261,5 +268,5 @@ def without_roundoff(results):
     stress = results.von_mises * (not rigid)
     pressures = np.maximum(results.pressure.max(), stress.max())
     noise = ROUNDING * pressures
-    return replace(results, von_mises=stress, pressure=rounded(results.pressure, noise),
-                   curves=rounded_curves(noise))
+    return replace(results, von_mises=stress, principal=results.principal * (not rigid),
+                   pressure=rounded(results.pressure, noise), curves=rounded_curves(noise))

@@ -143,6 +143,8 @@ impl<'a> Recorder<'a> {
             _ => Ok(()),
         };
         let written = written.and(task.phases.time("output", || self.fields.complete()));
+        let peak = last.as_ref().map(|step| self.fields.peak(&task.problem, &step.state));
+        let peak = peak.transpose().unwrap_or_default();
         let outcome = result.as_ref().ok();
         let mut notes = Vec::from_iter(accuracy::verdict(task, outcome));
         notes.extend(task.notes.iter().cloned().chain(task.problem.notes()));
@@ -162,7 +164,8 @@ impl<'a> Recorder<'a> {
             .collect();
         let record = last.map(|step| step.record);
         let wall = task.started.elapsed().as_secs_f64();
-        let summary = summary(task, record, &quantities, result, &notes, wall);
+        let mut summary = summary(task, record, &quantities, result, &notes, wall);
+        summary["largest_stress"] = json!(peak);
         if record.is_some() {
             let path = task.folder.join("summary.json");
             write_whole(&path, format!("{summary:#}\n").as_bytes())?;
@@ -170,7 +173,8 @@ impl<'a> Recorder<'a> {
         if task.profile {
             shown.clone_from(&notes);
         }
-        let mut lines = screen::conclusion(task, record, &quantities, result.as_ref(), &shown);
+        let mut lines =
+            screen::conclusion(task, record, peak, &quantities, result.as_ref(), &shown);
         if task.profile {
             let steps = record.map_or(0, |record| record.step);
             lines.push(String::new());

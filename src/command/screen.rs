@@ -2,7 +2,7 @@
 
 use super::task::Task;
 use signorini::{
-    estimate::Adapted,
+    estimate::{Adapted, Peak},
     evolution::{Outcome, RunError, StepRecord, percent},
     output::terminal::{Progress, say, with_bar},
     scene::{Scheme, Stepping, TimeGrid, Units, rounded},
@@ -67,6 +67,7 @@ pub fn progress(bar: &mut Progress, record: &StepRecord, end: f64) {
 pub fn conclusion(
     task: &Task,
     last: Option<StepRecord>,
+    peak: Option<Peak>,
     quantities: &[(String, f64)],
     result: Result<&Outcome, &RunError>,
     notes: &[String],
@@ -96,6 +97,14 @@ pub fn conclusion(
         row("displacement", format!("largest {displacement} {length}")),
         row("work", format!("{} {}", figure(last.work, "work"), units.work())),
     ];
+    if let Some(Peak { von_mises, at: [x, y], singular }) = peak.filter(|peak| peak.von_mises > 0.0)
+    {
+        let singular = singular.map_or_else(String::new, |place| {
+            format!(": singular at {place}, grows as the mesh is refined")
+        });
+        let stress = format!("largest von Mises {von_mises:.4e} {} at", units.stress);
+        lines.push(row("stress", format!("{stress} ({x:.4}, {y:.4}){singular}")));
+    }
     if task.contact_nodes > 0 {
         let (active, nodes) = (last.active_nodes, task.contact_nodes);
         let sum = figure(last.contact_force, "contact_force");

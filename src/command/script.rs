@@ -18,9 +18,9 @@ macro_rules! scripts {
 }
 
 /// The scripts and the modules that they import from each other.
-const SCRIPTS: [(&str, &str); 19] = scripts! {
+const SCRIPTS: [(&str, &str); 20] = scripts! {
     "animation" "bars" "compare" "contact_pressure" "drawing" "elements" "expressions" "figures"
-    "histories" "info" "limits" "maps" "paraview_script" "paraview_view" "reading" "report"
+    "histories" "info" "limits" "maps" "paraview_script" "paraview_view" "principal" "reading" "report"
     "report_page" "results" "setting"
 };
 /// The Python program that runs one of them.

@@ -3,7 +3,8 @@
 //! A run solves a discrete problem. This room estimates the difference from the exact solution of the scene, and
 //! refines meshes until the difference is within the required accuracy. There are four estimates:
 //!
-//! - [`RecoveredStrains`]: the error of u in the energy norm, per triangle, from strains fitted around each vertex;
+//! - [`RecoveredStrains`]: the error of u in the energy norm, per triangle, from strains fitted around each vertex
+//!   (the same strains give the [`NodalStress`] of pictures);
 //! - the error of the damage: (25) is solved again, for the difference from a much finer mesh;
 //! - [`Bar`]: the error bar of each printed figure, measured by a second run on the mesh bisected everywhere;
 //! - [`ErrorBudget`]: the errors by the mesh, the time steps and the solver.
@@ -16,7 +17,9 @@
 //! here changes the answer of a run.
 
 mod hierarchical;
+mod patches;
 mod recovery;
+mod stress;
 mod order_pair;
 mod fine_solve;
 mod fine_strains;
@@ -28,6 +31,7 @@ mod adaptive;
 
 pub use adaptive::{AdaptError, Adapted, adapted, measured_bars};
 pub use recovery::{EnergyError, RecoveredStrains, strains_at_nodes};
+pub use stress::{NodalStress, Peak, Strained, principal};
 
 use crate::{
     evolution::{

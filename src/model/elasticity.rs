@@ -51,14 +51,22 @@ impl Material {
         )
     }
 
-    /// Von Mises stress of (σ_xx, σ_yy, σ_xy), Pa; in plane strain with the
-    /// out-of-plane σ_zz = ν(σ_xx + σ_yy).
-    pub fn von_mises(&self, stress: &Vector3<f64>) -> f64 {
-        let (x, y, xy) = (stress[0], stress[1], stress[2]);
-        let z = match self.plane {
+    /// σ_zz of (σ_xx, σ_yy, σ_xy), Pa: 0 in plane stress, ν(σ_xx + σ_yy) in plane strain.
+    pub fn out_of_plane(&self, stress: &Vector3<f64>) -> f64 {
+        match self.plane {
             Plane::Stress => 0.0,
-            Plane::Strain => self.poisson * (x + y),
-        };
-        (0.5 * ((x - y).powi(2) + (y - z).powi(2) + (z - x).powi(2)) + 3.0 * xy * xy).sqrt()
+            Plane::Strain => self.poisson * (stress[0] + stress[1]),
+        }
     }
+
+    /// Von Mises stress of (σ_xx, σ_yy, σ_xy), Pa, with [σ_zz](Self::out_of_plane).
+    pub fn von_mises(&self, stress: &Vector3<f64>) -> f64 {
+        let [xx, yy, xy] = *stress.as_ref();
+        von_mises([xx, yy, xy, self.out_of_plane(stress)])
+    }
+}
+
+/// The von Mises stress of (σ_xx, σ_yy, σ_xy, σ_zz), Pa.
+pub fn von_mises([x, y, xy, z]: [f64; 4]) -> f64 {
+    (0.5 * ((x - y).powi(2) + (y - z).powi(2) + (z - x).powi(2)) + 3.0 * xy * xy).sqrt()
 }

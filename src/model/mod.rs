@@ -6,4 +6,4 @@ mod damage;
 mod elasticity;
 
 pub use damage::DamageLaw;
-pub use elasticity::{Material, Plane};
+pub use elasticity::{Material, Plane, von_mises};

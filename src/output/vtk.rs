@@ -8,6 +8,7 @@ use std::{iter, path::PathBuf};
 
 /// VTK's names of the number types.
 pub(super) const REAL: &str = "Float64";
+pub(super) const SINGLE: &str = "Float32";
 pub(super) const INTEGER: &str = "Int32";
 const BYTE: &str = "UInt8";
 /// The ending of a list of frames.
@@ -33,8 +34,11 @@ impl DataArray {
         values.for_each(|value| bytes.extend_from_slice(value.to_le_bytes().as_ref()));
         let length = (bytes.len() - size_of::<u64>()) as u64;
         bytes[..size_of::<u64>()].copy_from_slice(&length.to_le_bytes());
-        let attributes =
-            format!("type=\"{number_type}\" Name=\"{name}\" NumberOfComponents=\"{components}\"");
+        let mut attributes = format!("type=\"{number_type}\" Name=\"{name}\"");
+        // Readers take a scalar without this attribute as a plain list.
+        if components > 1 {
+            attributes += &format!(" NumberOfComponents=\"{components}\"");
+        }
         Self { attributes, bytes }
     }
 

@@ -4,11 +4,13 @@ use super::{
     OutputError,
     contact::ContactWriter,
     growing_file::GrowingFile,
-    vtk::{DataArray, INTEGER, REAL, cells_text, entry, list_of_frames, vtk_file},
+    vtk::{DataArray, INTEGER, REAL, SINGLE, cells_text, entry, list_of_frames, vtk_file},
     write_whole,
 };
 use crate::{
-    fem::{Body, Elements},
+    estimate::{NodalStress, Peak, principal},
+    fem::Elements,
+    model::von_mises,
     petsc::PetscError,
     problem::{DiscreteProblem, State},
     scene::{Scene, Stepping},
@@ -34,11 +36,14 @@ const MANY: usize = 999_999;
 /// piece of a frame, `fields_NNNN_R.vtu`. The first rank writes the lists: `fields_NNNN.pvtu` names the
 /// pieces, `fields.pvd` the frames.
 ///
-/// A piece has the triangles of its rank and all their nodes. A rank without triangles writes no piece.
+/// A piece has the triangles of its rank and all their nodes; a node where materials meet is a point for each of
+/// them. A rank without triangles writes no piece.
 pub struct FieldWriter {
     folder: PathBuf,
     /// The beginning of `<Piece>` with `<Points>` and `<Cells>`, the same in every frame.
     mesh: Arc<str>,
+    /// The points of a frame and their stresses.
+    stress: Arc<NodalStress>,
     /// The ranks that write pieces.
     pieces: Vec<usize>,
     /// `fields.pvd`; only the first rank writes it.
@@ -69,9 +74,11 @@ impl FieldWriter {
     pub fn new(folder: &Path, problem: &DiscreteProblem) -> Result<Self, OutputError> {
         let comm = problem.body.nodes.partition.comm();
         let triangles = comm.gather(&[problem.body.own_triangles as f64]);
+        let stress = NodalStress::new(problem);
         Ok(Self {
             folder: folder.to_owned(),
-            mesh: mesh_text(&problem.body).into(),
+            mesh: mesh_text(problem, &stress).into(),
+            stress: stress.into(),
             pieces: (0..comm.size()).filter(|&rank| triangles[rank] > 0.0).collect(),
             list: list_of_frames(folder.join("fields.pvd")),
             pending: None,
@@ -113,15 +120,22 @@ impl FieldWriter {
         // This is collective: all ranks collect Γ_C, even if one has failed to collect its fields.
         let contact = problem.supports.contact_rows(&problem.body, state);
         let (cells, comm) = (cell_data(problem, state), problem.body.nodes.partition.comm());
-        let points = point_data(problem, state);
-        let points = points.map_err(|e| OutputError::new(Path::new("a frame"), e))?;
+        let failed = |error| OutputError::new(Path::new("a frame"), error);
+        let mut points = point_data(problem, &self.stress, state).map_err(failed)?;
+        let strained = NodalStress::strained(problem, state);
         if comm.is_serial() {
             let (file, mesh) = (format!("{stem}.vtu"), Arc::clone(&self.mesh));
             let (path, entry) = (self.folder.join(&file), entry(state.time, &file));
-            let write = move || write_whole(&path, piece(&mesh, &points, &cells).as_bytes());
+            let nodal = Arc::clone(&self.stress);
+            let write = move || {
+                let stresses = nodal.stresses_of_one_rank(&strained);
+                points.extend(stress_data(&stresses.map_err(|e| OutputError::new(&path, e))?));
+                write_whole(&path, piece(&mesh, &points, &cells).as_bytes())
+            };
             self.pending = Some((thread::spawn(write), entry));
             return self.contact.add(&contact_file, state.time, &contact);
         }
+        points.extend(stress_data(&self.stress.stresses(problem, &strained).map_err(failed)?));
         let piece_file = |rank| format!("{stem}_{rank}.vtu");
         if self.pieces.contains(&comm.rank()) {
             let text = piece(&self.mesh, &points, &cells);
@@ -136,6 +150,14 @@ impl FieldWriter {
         let text = list_of_pieces(files, &points, &cells);
         write_whole(&self.folder.join(&whole), text.as_bytes())?;
         self.list.add(entry(state.time, &whole).as_bytes())
+    }
+
+    /// The largest von Mises stress of a state. Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub fn peak(&self, problem: &DiscreteProblem, state: &State) -> Result<Peak, PetscError> {
+        self.stress.peak(problem, state)
     }
 
     /// Waits until the last frame is written.
@@ -171,19 +193,23 @@ fn digits(scene: &Scene) -> usize {
 }
 
 /// The mesh of this rank as text.
-fn mesh_text(body: &Body) -> String {
-    let own = body.own_triangles;
-    match body.elements() {
-        Elements::Linear(cells) => cells_text(&body.nodes.points, &cells.nodes[..own], TRIANGLE),
-        Elements::Quadratic(cells) => {
-            cells_text(&body.nodes.points, &cells.nodes[..own], QUADRATIC_TRIANGLE)
+fn mesh_text(problem: &DiscreteProblem, stress: &NodalStress) -> String {
+    let places = stress.places();
+    match problem.body.elements() {
+        Elements::Linear(_) => cells_text(&places, stress.cells.as_chunks::<3>().0, TRIANGLE),
+        Elements::Quadratic(_) => {
+            cells_text(&places, stress.cells.as_chunks::<6>().0, QUADRATIC_TRIANGLE)
         }
     }
 }
 
-/// The nodal fields. Outside Γ_C the contact pressure is 0 and the remaining gap NaN. At a corner with two gap
-/// conditions they are the larger pressure and the smaller gap. Collective.
-fn point_data(problem: &DiscreteProblem, state: &State) -> Result<Vec<DataArray>, PetscError> {
+/// The nodal fields of u, ζ and contact. Outside Γ_C the contact pressure is 0 and the remaining gap NaN. At a corner
+/// with two gap conditions they are the larger pressure and the smaller gap. Collective.
+fn point_data(
+    problem: &DiscreteProblem,
+    points: &NodalStress,
+    state: &State,
+) -> Result<Vec<DataArray>, PetscError> {
     let partition = &problem.body.nodes.partition;
     let mut pressure = vec![0.0_f64; partition.local()];
     let mut gap = vec![f64::NAN; partition.local()];
@@ -193,35 +219,52 @@ fn point_data(problem: &DiscreteProblem, state: &State) -> Result<Vec<DataArray>
     }
     partition.update(&mut pressure, 1)?;
     partition.update(&mut gap, 1)?;
-    let displacement = state.u.chunks_exact(2).flat_map(|u| [u[0], u[1], 0.0]);
+    let zeta = problem.body.at_nodes(&state.zeta, 1);
+    let displacement = points.nodes().flat_map(|i| [state.u[2 * i], state.u[2 * i + 1], 0.0]);
+    let scalar = |name, values: &[f64]| {
+        DataArray::new(name, REAL, 1, points.nodes().map(|node| values[node]))
+    };
     let mut arrays = vec![
         DataArray::new("displacement", REAL, 3, displacement),
-        DataArray::new("zeta", REAL, 1, problem.body.at_nodes(&state.zeta, 1).into_iter()),
-        DataArray::new("normal_pressure", REAL, 1, pressure.into_iter()),
-        DataArray::new("gap", REAL, 1, gap.into_iter()),
+        scalar("zeta", &zeta),
+        scalar("normal_pressure", &pressure),
+        scalar("gap", &gap),
     ];
-    if !partition.comm().is_serial() {
-        // The number of the node in the whole body, with which readers can join the pieces.
-        let numbers = (0..partition.local()).map(|node| partition.global(node, 1, 0));
+    if !partition.comm().is_serial() || points.nodes().count() > partition.local() {
+        // The number of the node in the whole body, with which readers can join pieces and materials.
+        let numbers = points.nodes().map(|node| partition.global(node, 1, 0));
         arrays.push(DataArray::new("global_node", INTEGER, 1, numbers));
     }
     Ok(arrays)
 }
 
-/// The fields that are constant on each triangle. The stress has the components xx, yy, xy. If there are
-/// several materials, each triangle has a number: 0, or 1, 2, … for the surfaces of the scene by name.
+/// The nodal stresses (σ_xx, σ_yy, σ_xy, σ_zz), σ₁ ≥ σ₂ in the plane, the direction of σ₁, and von Mises.
+fn stress_data(stresses: &[[f64; 4]]) -> [DataArray; 4] {
+    let single = |value: f64| value as f32;
+    let components = stresses.iter().flat_map(|stress| stress.map(single));
+    let principals = stresses.iter().flat_map(|stress| principal(*stress).0.map(single));
+    let directions = stresses.iter().flat_map(|stress| {
+        let [x, y] = principal(*stress).1;
+        [x, y, 0.0].map(single)
+    });
+    let von_mises = stresses.iter().map(|stress| single(von_mises(*stress)));
+    [
+        DataArray::new("stress", SINGLE, 4, components).with_names(&["xx", "yy", "xy", "zz"]),
+        DataArray::new("principal_stress", SINGLE, 2, principals).with_names(&["1", "2"]),
+        DataArray::new("principal_direction", SINGLE, 3, directions),
+        DataArray::new("von_mises", SINGLE, 1, von_mises),
+    ]
+}
+
+/// The mean stress of each triangle, xx, yy, xy, as the finite elements have it. If there are several materials,
+/// each triangle has a number: 0, or 1, 2, … for the surfaces of the scene by name.
 fn cell_data(problem: &DiscreteProblem, state: &State) -> Vec<DataArray> {
     let (elasticity, body) = (&problem.elasticity, &problem.body);
     let zeta = problem.zeta_at_points(&state.zeta);
-    let mut stress = elasticity.stresses(body, &zeta, &state.u);
-    stress.truncate(body.own_triangles);
-    let von_mises =
-        stress.iter().enumerate().map(|(t, s)| elasticity.material(body, t).von_mises(s));
-    let components = stress.iter().flat_map(|s| [s[0], s[1], s[2]]);
-    let mut arrays = vec![
-        DataArray::new("von_mises", REAL, 1, von_mises),
-        DataArray::new("stress", REAL, 3, components).with_names(&["xx", "yy", "xy"]),
-    ];
+    let stress = elasticity.stresses(body, &zeta, &state.u);
+    let components = stress[..body.own_triangles].iter().flat_map(|s| [s[0], s[1], s[2]]);
+    let mut arrays =
+        vec![DataArray::new("stress_raw", REAL, 3, components).with_names(&["xx", "yy", "xy"])];
     if !problem.scene().surfaces.is_empty() {
         let materials = body.materials[..body.own_triangles].iter().map(|&number| number as i32);
         arrays.push(DataArray::new("material", INTEGER, 1, materials));

@@ -40,5 +40,6 @@ mod rigid;
 mod scales;
 mod shipped_scenes;
 mod step_errors;
+mod stress;
 mod undo;
 mod units;

@@ -1,0 +1,170 @@
+//! Stresses at the nodes, as engineers look at them: continuous within a material.
+
+use super::patches::{ENTRIES, Patches, Update, monomials};
+use crate::{
+    fem::{Elements, for_elements},
+    model::{Material, von_mises},
+    petsc::PetscError,
+    problem::{DiscreteProblem, State},
+};
+use nalgebra::{Matrix3, Vector3};
+use rustc_hash::FxHashMap as HashMap;
+use serde::Serialize;
+
+/// σ = η_*(ζ) 𝒜ε* at the nodes of this rank, with the recovered strains ε*
+/// ([`RecoveredStrains`](super::RecoveredStrains)).
+///
+/// A node where materials meet is several points, one for each material. The first point of each node has the
+/// node's number; the others follow. This value needs neither PETSc nor the problem, so that a thread can use it.
+pub struct NodalStress {
+    patches: Patches,
+    points: Vec<Point>,
+    /// The points of this rank's triangles, each with the nodes of an element of u.
+    pub cells: Vec<usize>,
+    materials: Vec<(Material, Matrix3<f64>)>,
+}
+
+/// A node, as a point of one material.
+struct Point {
+    node: usize,
+    material: usize,
+    at: [f64; 2],
+    /// The vertices whose fits give its strain: itself, or the ends of its side.
+    ends: [usize; 2],
+}
+
+/// What the stresses of a state are made from.
+pub struct Strained {
+    /// ε(u) at the quadrature points.
+    strains: Vec<Vector3<f64>>,
+    /// η_*(ζ) at the nodes.
+    zeta: Vec<f64>,
+}
+
+impl NodalStress {
+    /// The nodes of the body of `problem`. Collective.
+    pub fn new(problem: &DiscreteProblem) -> Self {
+        let body = &problem.body;
+        let unset = |&at: &[f64; 2]| Point { node: 0, material: usize::MAX, at, ends: [0; 2] };
+        let mut points: Vec<Point> = body.nodes.points.iter().map(unset).collect();
+        let mut copies = HashMap::default();
+        let mut cells = Vec::new();
+        let nodes_of = |t: usize| match body.elements() {
+            Elements::Linear(cells) => cells.nodes[t].to_vec(),
+            Elements::Quadratic(cells) => cells.nodes[t].to_vec(),
+        };
+        for (t, vertices) in body.mesh.triangles.iter().enumerate() {
+            let material = body.material(t);
+            for (i, node) in nodes_of(t).into_iter().enumerate() {
+                let ends = [vertices[i % 3], vertices[if i < 3 { i } else { (i + 1) % 3 }]];
+                let point = Point { node, material, at: body.nodes.points[node], ends };
+                let index = match points[node].material {
+                    usize::MAX => node,
+                    first if first == material => node,
+                    _ => *copies.entry((node, material)).or_insert(points.len()),
+                };
+                match points.get_mut(index) {
+                    Some(known) => *known = point,
+                    None => points.push(point),
+                }
+                if t < body.own_triangles {
+                    cells.push(index);
+                }
+            }
+        }
+        let materials = problem.elasticity.materials().map(|m| (*m, m.stiffness())).collect();
+        Self { patches: Patches::new(body), points, cells, materials }
+    }
+
+    /// The node of each point.
+    pub fn nodes(&self) -> impl Iterator<Item = usize> + Clone {
+        self.points.iter().map(|point| point.node)
+    }
+
+    /// The coordinates of the points, m.
+    pub fn places(&self) -> Vec<[f64; 2]> {
+        self.points.iter().map(|point| point.at).collect()
+    }
+
+    /// What the stresses of `state` are made from.
+    pub fn strained(problem: &DiscreteProblem, state: &State) -> Strained {
+        let body = &problem.body;
+        let strains = for_elements!(body, cells => cells.strains(&state.u, |_, strain| strain));
+        let zeta = body.at_nodes(&state.zeta, 1);
+        Strained { strains, zeta: zeta.into_iter().map(|zeta| problem.truncated(zeta)).collect() }
+    }
+
+    /// The stresses (σ_xx, σ_yy, σ_xy, σ_zz) at the points, Pa. Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub fn stresses(
+        &self,
+        problem: &DiscreteProblem,
+        strained: &Strained,
+    ) -> Result<Vec<[f64; 4]>, PetscError> {
+        let partition = &problem.body.vertices.partition;
+        self.evaluate(strained, &mut |fields| partition.update(fields, ENTRIES))
+    }
+
+    /// As [`Self::stresses`], on one rank.
+    ///
+    /// # Errors
+    /// None.
+    pub fn stresses_of_one_rank(&self, strained: &Strained) -> Result<Vec<[f64; 4]>, PetscError> {
+        self.evaluate(strained, &mut |_| Ok(()))
+    }
+
+    fn evaluate(&self, strained: &Strained, update: Update) -> Result<Vec<[f64; 4]>, PetscError> {
+        let fits = self.patches.fits(&strained.strains, update)?;
+        let stress = |point: &Point| {
+            let [x, y] = point.at;
+            let strain = |end: usize| {
+                let [vx, vy] = self.patches.vertices[end];
+                fits[point.material][end].transpose() * monomials([x - vx, y - vy])
+            };
+            let (material, stiffness) = &self.materials[point.material];
+            let strain = 0.5 * (strain(point.ends[0]) + strain(point.ends[1]));
+            let stress = stiffness * strain * strained.zeta[point.node];
+            [stress[0], stress[1], stress[2], material.out_of_plane(&stress)]
+        };
+        Ok(self.points.iter().map(stress).collect())
+    }
+
+    /// The largest von Mises stress of `state`. Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub fn peak(&self, problem: &DiscreteProblem, state: &State) -> Result<Peak, PetscError> {
+        let stresses = self.stresses(problem, &Self::strained(problem, state))?;
+        let all = stresses.iter().map(|stress| von_mises(*stress)).zip(&self.points);
+        let own = all.max_by(|(a, _), (b, _)| a.total_cmp(b));
+        let comm = problem.body.nodes.partition.comm();
+        let (least, rank) = comm.min_with_rank(own.as_ref().map_or(0.0, |(stress, _)| -stress));
+        let at = own.map_or([0.0; 2], |(_, point)| point.at);
+        let at = at.map(|coordinate| comm.broadcast(rank, coordinate));
+        let distance = |[x, y]: [f64; 2]| (x - at[0]).hypot(y - at[1]);
+        let singular = problem.singular_points().into_iter();
+        let near = singular.filter(|point| distance(point.at) <= 1.001 * point.radius);
+        let nearest = near.min_by(|a, b| distance(a.at).total_cmp(&distance(b.at)));
+        Ok(Peak { von_mises: -least, at, singular: nearest.map(|point| point.name) })
+    }
+}
+
+/// The largest von Mises stress of a state.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Peak {
+    /// The stress, Pa.
+    pub von_mises: f64,
+    /// Its place, m.
+    pub at: [f64; 2],
+    /// If the stress is singular there, and so grows as the mesh is refined: what is there.
+    pub singular: Option<String>,
+}
+
+/// The principal stresses σ₁ ≥ σ₂ in the plane, Pa, and the direction of σ₁, a unit vector with x ≥ 0.
+pub fn principal([xx, yy, xy, _]: [f64; 4]) -> ([f64; 2], [f64; 2]) {
+    let (mean, radius) = (0.5 * (xx + yy), (0.5 * (xx - yy)).hypot(xy));
+    let (sine, cosine) = (0.5 * xy.atan2(0.5 * (xx - yy))).sin_cos();
+    ([mean + radius, mean - radius], [cosine, sine])
+}

@@ -1,0 +1,108 @@
+//! Points of the boundary at which stresses are singular: they grow without bound as the mesh is refined.
+//!
+//! In a corner with the interior angle ω, stresses are singular (Williams, J. Appl. Mech. 19, 1952) if
+//!
+//! - ω > 180° and both sides have the same condition;
+//! - one side is clamped and the other one free, and ω > 62° (about, for ν = 0.3 in plane stress);
+//! - one side slides without friction on a support and the other one is free, and ω > 90°.
+
+use super::DiscreteProblem;
+use crate::scene::Condition;
+use std::collections::BTreeMap;
+
+/// A point with singular stresses.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Singular {
+    /// The point, m.
+    pub at: [f64; 2],
+    /// Stresses nearer than this are large because of it: the length of the longest edge there, m.
+    pub radius: f64,
+    /// What it is, as in "the end of `clamp`".
+    pub name: String,
+}
+
+/// The condition on a side of a corner. The order is that of constraint.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Support {
+    Free,
+    Sliding,
+    Clamped,
+}
+
+/// Angles, in degrees, above which stresses are singular. Corners of a polygon with smooth sides turn by less than
+/// `SMOOTH`.
+const SMOOTH: f64 = 10.0;
+const SLIDING: f64 = 90.0 + SMOOTH;
+const CLAMPED: f64 = 62.0;
+
+impl DiscreteProblem {
+    /// The points of the boundary of the whole body with singular stresses.
+    pub fn singular_points(&self) -> Vec<Singular> {
+        let mesh = self.mesh();
+        let mut angles = BTreeMap::<usize, f64>::new();
+        let boundary = mesh.boundary_edges();
+        for edge in &boundary {
+            angles.extend(edge.map(|node| (node, 0.0)));
+        }
+        for triangle in &mesh.triangles {
+            for i in 0..3 {
+                let [a, b, c] = [0, 1, 2].map(|k| mesh.nodes[triangle[(i + k) % 3]]);
+                if let Some(angle) = angles.get_mut(&triangle[i]) {
+                    let [p, q] = [b, c].map(|end| [end[0] - a[0], end[1] - a[1]]);
+                    *angle += (p[0] * q[1] - p[1] * q[0]).atan2(p[0] * q[0] + p[1] * q[1]);
+                }
+            }
+        }
+        let supports = self.supports_of_edges();
+        let mut sides = BTreeMap::<usize, Vec<([usize; 2], Support, Option<&str>)>>::new();
+        for &edge in &boundary {
+            let (support, name) = supports.get(&edge).copied().unwrap_or((Support::Free, None));
+            edge.iter()
+                .for_each(|node| sides.entry(*node).or_default().push((edge, support, name)));
+        }
+        let singular = |(node, sides): (usize, Vec<([usize; 2], Support, Option<&str>)>)| {
+            let angle = angles[&node].to_degrees() / (sides.len() / 2).max(1) as f64;
+            let (_, most, name) = *sides.iter().max_by_key(|(_, support, _)| *support)?;
+            let same = sides.iter().all(|(_, support, _)| *support == most);
+            let is_free = sides.iter().any(|(_, support, _)| *support == Support::Free);
+            let limit = match most {
+                _ if same => 180.0 + SMOOTH,
+                Support::Clamped if is_free => CLAMPED,
+                _ => SLIDING,
+            };
+            let length = |(edge, ..): &([usize; 2], _, _)| mesh.edge_normal(*edge).1;
+            (angle > limit).then(|| Singular {
+                at: mesh.nodes[node],
+                radius: sides.iter().map(length).fold(0.0, f64::max),
+                name: match name.filter(|_| !same) {
+                    Some(name) => format!("the end of `{name}`"),
+                    None => "a re-entrant corner".to_owned(),
+                },
+            })
+        };
+        sides.into_iter().filter_map(singular).collect()
+    }
+
+    /// The supported edges of the boundary, with the names of their curves.
+    fn supports_of_edges(&self) -> BTreeMap<[usize; 2], (Support, Option<&str>)> {
+        let mut supports = BTreeMap::new();
+        for boundary in &self.scene().boundaries {
+            let support = boundary.conditions.iter().map(|condition| match condition {
+                Condition::Displacement([Some(_), Some(_)]) => Support::Clamped,
+                Condition::Displacement(_) | Condition::Symmetry | Condition::Gap(_) => {
+                    Support::Sliding
+                }
+                Condition::Load(_) => Support::Free,
+            });
+            let support = support.max().unwrap_or(Support::Free);
+            let curve = self.mesh().curves.get(&boundary.name);
+            for edge in curve.iter().flat_map(|curve| &curve.edges) {
+                let known = supports.entry(*edge).or_insert((Support::Free, None));
+                if support > known.0 {
+                    *known = (support, Some(&*boundary.name));
+                }
+            }
+        }
+        supports
+    }
+}

@@ -1,0 +1,167 @@
+//! Stresses at the nodes: exact if uniform, of a higher order than the stresses of the triangles elsewhere, and discontinuous where materials meet.
+
+use crate::support::{
+    ORDERS, close, distorted, largest, moved, order, problem, run, square, unstructured,
+};
+use signorini::{
+    contact::SOLVERS,
+    estimate::{NodalStress, principal},
+    evolution::DiscreteProblem,
+    mesh::{Mesh, Order},
+};
+
+const YOUNG: f64 = 50.0;
+const POISSON: f64 = 0.3;
+
+/// Prescribed displacements on all sides of a square, without a load.
+fn prescribed(mesh: Mesh, degree: Order, plane: &str, [x, y]: [&str; 2]) -> DiscreteProblem {
+    let degree = if degree == Order::Linear { 1 } else { 2 };
+    let sides = ["left", "right", "top", "bottom"];
+    let sides = sides.map(|name| format!("{{ name = '{name}', displacement = ['{x}', '{y}'] }}"));
+    let text = format!(
+        "discretisation.displacement = {degree}
+         material = {{ young = {YOUNG}, poisson = {POISSON}, plane = '{plane}' }}
+         boundary = [{}]",
+        sides.join(", ")
+    );
+    problem(mesh, &text).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// The points and their stresses in the solution of a static problem.
+fn stresses(problem: &DiscreteProblem) -> Vec<([f64; 2], [f64; 4])> {
+    let state = run(problem, SOLVERS[0]).last.state;
+    let nodal = NodalStress::new(problem);
+    let stresses = nodal.stresses_of_one_rank(&NodalStress::strained(problem, &state)).unwrap();
+    nodal.places().into_iter().zip(stresses).collect()
+}
+
+#[test]
+fn a_uniform_stress_is_exact_at_every_node_and_sigma_zz_is_that_of_plane_strain() {
+    for order in ORDERS {
+        for (plane, modulus, nu, out) in [
+            ("stress", YOUNG, POISSON, 0.0),
+            ("strain", YOUNG / (1.0 - POISSON * POISSON), POISSON / (1.0 - POISSON), POISSON),
+        ] {
+            for mesh in [square(1), distorted(4), unstructured(0.3)] {
+                let problem = prescribed(mesh, order, plane, ["0.1*x + 0.04*y", "-0.02*y"]);
+                let factor = modulus / (1.0 - nu * nu);
+                let (xx, yy) = (factor * (0.1 - nu * 0.02), factor * (-0.02 + nu * 0.1));
+                let xy = 0.5 * modulus / (1.0 + nu) * 0.04;
+                for (at, found) in stresses(&problem) {
+                    let expected = [xx, yy, xy, out * (xx + yy)];
+                    let off: Vec<f64> = found.iter().zip(expected).map(|(a, b)| a - b).collect();
+                    assert!(largest(&off) < 1e-8, "{found:?}, not {expected:?}, at {at:?}");
+                }
+            }
+        }
+    }
+}
+
+/// σ_xx at the nodes for u = (sin 2x cos 3y, 0). The stresses of the triangles have the order of the degree.
+#[test]
+fn nodal_stresses_converge_faster_than_those_of_the_triangles() {
+    // −div σ = (μ Δ + (λ+μ) ∂xx, (λ+μ) ∂xy) u, plane stress.
+    let mu = 0.5 * YOUNG / (1.0 + POISSON);
+    let lambda = YOUNG * POISSON / (1.0 - POISSON * POISSON);
+    let force = [
+        format!("{}*sin(2*x)*cos(3*y)", mu * 13.0 + 4.0 * (lambda + mu)),
+        format!("{}*cos(2*x)*sin(3*y)", 6.0 * (lambda + mu)),
+    ];
+    let sizes = [0.1, 0.05, 0.025];
+    for degree in [1, 2] {
+        let errors = sizes.map(|size| {
+            let sides = ["left", "right", "top", "bottom"].map(|name| {
+                format!("{{ name = '{name}', displacement = ['sin(2*x)*cos(3*y)', 0] }}")
+            });
+            let text = format!(
+                "discretisation.displacement = {degree}
+                 material = {{ young = {YOUNG}, poisson = {POISSON}, plane = 'stress' }}
+                 body.force = ['{}', '{}']
+                 boundary = [{}]",
+                force[0],
+                force[1],
+                sides.join(", ")
+            );
+            let problem = problem(unstructured(size), &text).unwrap_or_else(|e| panic!("{e}"));
+            let off: Vec<f64> = stresses(&problem)
+                .into_iter()
+                .map(|([x, y], stress)| {
+                    let strain = 2.0 * (2.0 * x).cos() * (3.0 * y).cos();
+                    stress[0] - YOUNG / (1.0 - POISSON * POISSON) * strain
+                })
+                .collect();
+            let mean = (off.iter().map(|e| e * e).sum::<f64>() / off.len() as f64).sqrt();
+            [largest(&off), mean]
+        });
+        let [most, mean] = [0, 1].map(|k| order(&sizes, &errors.map(|errors| errors[k])));
+        println!("P{degree}: largest and mean {errors:?}, orders {most:.2} and {mean:.2}");
+        let degree = f64::from(degree);
+        assert!(
+            mean > degree + 0.6 && most > 0.8 * degree,
+            "P{degree}: {most:.2}, {mean:.2}: {errors:?}"
+        );
+    }
+}
+
+#[test]
+fn where_two_materials_meet_each_has_its_own_stress() {
+    for degree in [1, 2] {
+        let mut mesh = distorted(6);
+        // The interface is straight.
+        mesh = moved(mesh, |[x, y]| [x, if (y - 0.5).abs() < 0.06 { 0.5 } else { y }]);
+        let upper = |t: &usize| mesh.triangles[*t].iter().all(|&node| mesh.nodes[node][1] >= 0.5);
+        mesh.surfaces.insert("upper".to_owned(), (0..mesh.triangles.len()).filter(upper).collect());
+        let text = format!(
+            "discretisation.displacement = {degree}
+             material = {{ young = {YOUNG}, poisson = 0, plane = 'stress', upper.young = 100 }}
+             boundary = [
+                {{ name = 'left', displacement = [0, 'free'] }},
+                {{ name = 'right', displacement = ['0.1', 'free'] }},
+                {{ name = 'bottom', displacement = ['free', 0] }},
+             ]"
+        );
+        // ε_xx = 0.1 everywhere.
+        let problem = problem(mesh, &text).unwrap_or_else(|e| panic!("{e}"));
+        let mut found = stresses(&problem);
+        found.retain(|(at, _)| at[1] == 0.5);
+        assert_eq!(found.len(), 2 * (6 * degree + 1), "every node of the interface twice");
+        for (at, stress) in found {
+            let expected = if (stress[0] - 5.0).abs() < 1.0 { 5.0 } else { 10.0 };
+            assert!((stress[0] - expected).abs() < 1e-8, "{stress:?} at {at:?}");
+        }
+    }
+}
+
+#[test]
+fn principal_stresses_and_the_direction_of_the_larger_one() {
+    // Turned by 30° from (3, -1).
+    let (sine, cosine) = (0.5, 0.75_f64.sqrt());
+    let (xx, yy) = (3.0 * cosine * cosine - sine * sine, 3.0 * sine * sine - cosine * cosine);
+    let ([first, second], [x, y]) = principal([xx, yy, 4.0 * sine * cosine, 0.0]);
+    close(first, 3.0, 1e-14);
+    close(second, -1.0, 1e-14);
+    close(x, cosine, 1e-14);
+    close(y, sine, 1e-14);
+}
+
+/// The ends of a clamp and re-entrant corners are singular; corners that a symmetry axis or a load makes are not.
+#[test]
+fn singular_points_are_those_whose_stresses_grow_as_the_mesh_is_refined() {
+    let named = |boundaries: &str| {
+        let text = format!(
+            "material = {{ young = 1, poisson = 0.3, plane = 'stress' }}\n boundary = [{boundaries}]"
+        );
+        let problem = problem(square(2), &text).unwrap_or_else(|e| panic!("{e}"));
+        problem
+            .singular_points()
+            .into_iter()
+            .map(|point| (point.at, point.name))
+            .collect::<Vec<_>>()
+    };
+    let clamped = named("{ name = 'left', displacement = [0, 0] }");
+    let end = |y: f64| ([0.0, y], "the end of `left`".to_owned());
+    assert_eq!(clamped, [end(0.0), end(1.0)]);
+    let symmetric = "{ name = 'left', symmetry = true }, { name = 'bottom', gap = 0 }, \
+                     { name = 'top', pressure = 1 }";
+    assert_eq!(named(symmetric), []);
+}
