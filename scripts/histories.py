@@ -17,9 +17,10 @@ def draw_damage_history(results, _limits=None):
     axes.plot(time, results.history["zeta_mean"], color=FAINT, linewidth=1.4, label="mean ζ")
     axes.plot(time, least, color=BLUE, linewidth=1.8, label="min ζ")
     stopped = results.summary.get("stopped_at")
+    reached = "collapse" if results.summary.get("stopped_by") == "collapse" else "ζ$_*$ reached"
     if stopped is not None:
         axes.axvline(stopped, color=RED, linewidth=1.0, linestyle=(0, (4, 2)),
-                     label=f"ζ$_*$ reached at t = {stopped:.4g} {results.units['time']}")
+                     label=f"{reached} at t = {stopped:.4g} {results.units['time']}")
         axes.set_ylim(bottom=0.0)
     axes.set_xlim(left=0.0)
     axes.yaxis.set_major_formatter(ScalarFormatter(useOffset=False))

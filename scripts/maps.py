@@ -10,6 +10,9 @@ from drawing import (
     least_zeta, map_size, stress_unit,
 )
 
+# About so many arrows along the boundary.
+ARROWS = 30
+
 
 def draw_deformed(results, limits):
     """The deformed mesh over the initial outline and the foundation (paper, Figures 5 and 8).
@@ -36,11 +39,22 @@ def draw_deformed(results, limits):
         axes, results.nodes, results, color=INK, linewidth=0.9, linestyle=(0, (4, 2)), zorder=3
     )
     draw_foundation(axes, results, limits.factor)
+    _draw_fall(axes, results, moved)
     frame(axes, limits.box, results.units)
     text = f"deformed mesh at {results.moment}, {_amplified(results, limits)}"
     text += "" if results.unloaded else "; dashed: initial outline"
     axes.set_title(headline(results, text))
     return figure
+
+
+def _draw_fall(axes, results, moved):
+    """Arrows of the motion that nothing supports any more, at nodes along the boundary."""
+    outline = np.vstack(results.outline(moved))
+    outline = outline[::max(1, len(outline) // ARROWS)]
+    velocity = results.falling(outline)
+    if velocity is not None:
+        axes.quiver(*outline.T, *(0.12 * results.size * velocity).T, color=RED, angles="xy",
+                    scale_units="xy", scale=1.0, width=0.004, zorder=4)
 
 
 def draw_stress_and_damage(results, limits):

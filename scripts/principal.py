@@ -30,10 +30,11 @@ def draw_principal(results, _limits, figure=None):
     turned = results.direction @ np.array([[0.0, 1.0], [-1.0, 0.0]])
     places = _lattice(results.nodes)
     mesh = Triangulation(*results.pieces.at_points(results.nodes).T, results.pieces.triangles)
+    least_top = 0.05 * max(stress_top(results, tension), stress_top(results, compression))
     for axes, name, stress, direction in (
             (panels[0], "tension", tension, results.direction),
             (panels[1], "compression", compression, turned)):
-        top = stress_top(results, stress) or stress.max() or 1.0
+        top = max(stress_top(results, stress), least_top) or 1.0
         factor, unit = stress_unit(top, results.units)
         image = axes.tripcolor(
             mesh, results.pieces.at_points(stress) / factor, shading="gouraud", cmap="viridis",

@@ -34,7 +34,7 @@ FRAMES = 30
 FACTS = (
     ("solver", "contact solver", ""), ("ranks", "ranks", ""), ("nodes", "nodes", ""),
     ("triangles", "triangles", ""), ("steps", "time steps", ""), ("end_time", "last time", "time"),
-    ("stopped_at", "ζ<sub>*</sub> reached at", "time"), ("zeta_min", "least ζ", ""),
+    ("stopped_by", "stopped by", ""), ("stopped_at", "stopped at", "time"), ("zeta_min", "least ζ", ""),
     ("zeta_mean", "mean ζ", ""), ("displacement_max", "largest displacement", "length"),
     ("work", "work of the loads", "work"), ("contact_force", "sum of contact reactions", "line"),
     ("active_nodes", "active nodes", ""), ("contact_nodes", "contact nodes", ""),

@@ -128,8 +128,24 @@ class Results:
         stopped = self.summary.get("stopped_at")
         if self.summary.get("error"):
             return f"the run FAILED after t = {self.frames[-1][0]:g} {self.units['time']}"
-        at = "" if stopped is None else f"{stopped:.4g} {self.units['time']}"
-        return at and f"stopped: ζ$_*$ reached at t = {at}"
+        if stopped is None:
+            return ""
+        at = f"t = {stopped:.4g} {self.units['time']}"
+        if self.summary.get("stopped_by") == "collapse":
+            motion = self.summary["collapse"]["motion"]
+            return f"stopped at {at}: nothing supports the body against {motion}"
+        return f"stopped: ζ$_*$ reached at {at}"
+
+    def falling(self, points):
+        """The velocities at points of the motion that nothing supports any more, the largest 1; None if the run has not
+        ended with one."""
+        collapse = self.summary.get("collapse")
+        if not collapse or not self.is_last:
+            return None
+        of = collapse["velocity"]
+        turned = (points - of["centre"]) @ np.array([[0.0, 1.0], [-1.0, 0.0]])
+        velocity = np.array(of["translation"]) + of["rotation"] * turned
+        return velocity / np.linalg.norm(velocity, axis=1).max()
 
     @property
     def overrides(self):

@@ -57,6 +57,13 @@ def verdict_on(discrete, out, code, output):
     """Compares the exit code with the expectation, then verifies the frames."""
     refusal, either = expectation(discrete)
     said = message(output)
+    collapse = collapse_of(out) if code == 0 else None
+    if collapse is not None:
+        refusal = None
+        if fault := judge_collapse(discrete, collapse):
+            return Verdict("either" if either else "wrong", fault)
+    if code == 2 and (refusal or "").startswith("driven") and stands(discrete):
+        return Verdict("either" if either else "refused wrongly", f"it stands at first: {said}")
     if code == 2:
         if either:
             return Verdict("either", said)
@@ -76,6 +83,29 @@ def verdict_on(discrete, out, code, output):
         why, excused = missed(discrete, frames)
         return Verdict("either" if excused else "refused wrongly", said + why)
     return judge_stop(discrete, frames, out) or found
+
+
+def collapse_of(out):
+    """The time at which the program says that nothing supports the body any more; None if it does not say so."""
+    summary = json.loads((out / "summary.json").read_text())
+    return summary["stopped_at"] if summary["stopped_by"] == "collapse" else None
+
+
+def judge_collapse(discrete, time):
+    """The fault of the `time` of a collapse, if any: the load must be balanced just before and not just after."""
+    zeta, apart = np.ones(len(discrete.mesh.nodes)), 4e-6 * float(discrete.scene["time"]["end"])
+    before, after = (Step(discrete, zeta, t).driven for t in (time - apart, time + apart))
+    if before > 1e-7 or after < 1e-11:
+        return f"collapse at t = {time:g}: unbalanced {before:.1e} before, {after:.1e} after"
+    return ""
+
+
+def stands(discrete):
+    """Whether the load of a run is balanced for a while."""
+    if "time" not in discrete.scene:
+        return False
+    end, zeta = float(discrete.scene["time"]["end"]), np.ones(len(discrete.mesh.nodes))
+    return all(Step(discrete, zeta, part * end).driven < 1e-11 for part in (0.0, 1e-5, 1e-4))
 
 
 def missed(discrete, frames):
@@ -228,8 +258,9 @@ def shown(step, frame, scale):
 
 def judge_stop(discrete, frames, out):
     """Checks a stop at ζ_*; None if it is right or there is no stop."""
-    stopped = json.loads((out / "summary.json").read_text()).get("stopped_at")
-    if stopped is None:
+    summary = json.loads((out / "summary.json").read_text())
+    stopped = summary["stopped_at"]
+    if summary["stopped_by"] != "damage":
         return None
     last = frames[-1]
     zeta, unsure = discrete.damage_step(last.u, last.zeta, stopped - last.time)

@@ -5,8 +5,8 @@ use comfy_table::presets;
 use signorini::{
     mesh::{Mesh, extent},
     output::terminal::{self, say},
-    problem::DiscreteProblem,
-    scene::{Boundary, Condition, Scene, Stepping, SurfaceLoad, Units},
+    problem::{Collapse, DiscreteProblem},
+    scene::{Boundary, Condition, Scene, Stepping, SurfaceLoad, Units, rounded},
 };
 
 /// The approximate number of times at which gaps are evaluated.
@@ -146,7 +146,7 @@ fn loads(problem: &DiscreteProblem) -> Vec<String> {
         let [x, y] = [sum(|f, _| f[0]), sum(|f, _| f[1])];
         let moment = sum(|f, [x, y]| x * f[1] - y * f[0]);
         let moment = format!("moment about (0, 0) {moment} {force}");
-        row("loads", format!("t = {t}: ({x}, {y}) {force}/{length}, {moment}"))
+        row("loads", format!("t = {}: ({x}, {y}) {force}/{length}, {moment}", rounded(t)))
     };
     problem.scene().sample_times(1).into_iter().map(line).collect()
 }
@@ -158,7 +158,15 @@ fn support(problem: &DiscreteProblem) -> Vec<String> {
         return vec![row("support", "displacements and axes prevent all rigid motions".to_owned())];
     }
     let by_contact = |motion| format!("only contact supports the body against {motion}, one way");
-    motions.resisted.iter().map(|motion| row("support", by_contact(motion))).collect()
+    let stands = problem.collapse.map(|Collapse { time, motion }| {
+        let time = rounded(time);
+        row(
+            "support",
+            format!("stands up to t = {time}; then nothing supports it against {motion}"),
+        )
+    });
+    let resisted = motions.resisted.iter().map(|motion| row("support", by_contact(motion)));
+    resisted.chain(stands).collect()
 }
 
 /// The approximate time and memory of a run on one rank: time within a factor of two, memory within a fifth.

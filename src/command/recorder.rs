@@ -17,6 +17,7 @@ use signorini::{
         terminal::{Progress, say},
         write_whole,
     },
+    problem::COLLAPSE_ACCURACY,
     scene::{Stepping, rounded},
 };
 use std::{collections::BTreeMap, time::Instant};
@@ -225,6 +226,8 @@ fn summary(
     let (scene, partition) = (problem.scene(), &problem.body.nodes.partition);
     let outcome = result.as_ref().ok();
     let stopped = outcome.and_then(|outcome| outcome.stopped);
+    let collapse = problem.collapse.filter(|_| outcome.is_some() && stopped.is_none());
+    let ended = last.map_or(0.0, |record| record.time);
     let steps = last.map_or(0, |record| record.step);
     let seconds = task.phases.parts("").into_iter().map(|(name, phase)| (name, phase.seconds));
     let mut summary = json!({
@@ -240,9 +243,17 @@ fn summary(
         // Accepted steps after t = 0, and the last time, s.
         "steps": steps,
         "end_time": last.map(|record| record.time),
-        // The time at which ζ reached ζ_*, s, and its error; null if ζ did not reach it.
-        "stopped_at": stopped.map(|stop| stop.time),
-        "stopped_uncertainty": stopped.map(|stop| stop.bar()),
+        // Why the run stopped before its end, at which time, s, and the error of this time; null if it did not.
+        "stopped_by": match (stopped, collapse) {
+            (Some(_), _) => Some("damage"),
+            (None, Some(_)) => Some("collapse"),
+            (None, None) => None,
+        },
+        "stopped_at": stopped.map(|stop| stop.time).or(collapse.map(|collapse| collapse.time)),
+        "stopped_uncertainty": stopped.map(|stop| stop.bar()).or(collapse.map(|_| ended * COLLAPSE_ACCURACY)),
+        "collapse": collapse.map(|collapse| {
+            json!({ "motion": collapse.motion.to_string(), "velocity": collapse.motion })
+        }),
         // As in history.csv.
         "zeta_min": last.map(|record| record.zeta_min),
         "zeta_mean": last.map(|record| record.zeta_mean),

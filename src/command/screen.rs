@@ -5,6 +5,7 @@ use signorini::{
     estimate::{Adapted, Peak},
     evolution::{Outcome, RunError, StepRecord, percent},
     output::terminal::{Progress, say, with_bar},
+    problem::Collapse,
     scene::{Scheme, Stepping, TimeGrid, Units, rounded},
 };
 use std::io::{self, IsTerminal, Write};
@@ -73,7 +74,7 @@ pub fn conclusion(
     notes: &[String],
 ) -> Vec<String> {
     let notes = notes.iter().map(|note| row("note", note.clone()));
-    let end = row("end", ending(last, result));
+    let end = row("end", ending(task.problem.collapse, last, result));
     let outcome = result.ok();
     let Some(last) = last else { return [end].into_iter().chain(notes).collect() };
     let bar = |name: &str| outcome.and_then(|of| of.errors.figures.get(name).copied());
@@ -148,7 +149,7 @@ pub fn row(name: &str, value: String) -> String {
 }
 
 fn steps(grid: TimeGrid, unit: &str, can_be_damaged: bool) -> String {
-    let end = grid.end;
+    let end = rounded(grid.end);
     match grid.stepping {
         Stepping::Uniform { steps } => {
             let scheme = if grid.scheme == Scheme::Bdf2 { " (bdf2)" } else { "" };
@@ -164,7 +165,11 @@ fn steps(grid: TimeGrid, unit: &str, can_be_damaged: bool) -> String {
     }
 }
 
-fn ending(last: Option<StepRecord>, result: Result<&Outcome, &RunError>) -> String {
+fn ending(
+    collapse: Option<Collapse>,
+    last: Option<StepRecord>,
+    result: Result<&Outcome, &RunError>,
+) -> String {
     let Some(StepRecord { step, time, .. }) = last else {
         return "FAILED at the first solve; there is no state to save".to_owned();
     };
@@ -182,6 +187,14 @@ fn ending(last: Option<StepRecord>, result: Result<&Outcome, &RunError>) -> Stri
             if stop.from_mesh.is_some() { "" } else { " (the time steps alone)" },
             stop.zeta_min,
         ),
+        Ok(None) if collapse.is_some() => {
+            let motion = collapse.map(|collapse| collapse.motion.to_string()).unwrap_or_default();
+            let time = rounded(collapse.map_or(end, |collapse| collapse.time));
+            format!(
+                "STOPPED at t = {time}: nothing supports the body against {motion} any more; saved is the state \
+                 just before (step {step})"
+            )
+        }
         Ok(None) if step == 0 => format!("solved at t = {end}"),
         Ok(None) => format!("finished at t = {end} after {step} steps"),
     }

@@ -25,21 +25,6 @@ pub(crate) struct LoadCase {
 }
 
 impl DiscreteProblem {
-    /// Checks the data at sampled times ([`sample_times`](crate::scene::Scene::sample_times)), before any output.
-    pub(super) fn check_times(&self) -> Result<(), SetupError> {
-        // Integrating a body force costs as much as the loads of a step, so fewer times are checked.
-        let most = if self.loads.body_force_depends_on_time() { 100 } else { 1000 };
-        let mut times = self.scene.sample_times(most);
-        times.truncate(if self.loads.depend_on_time() { usize::MAX } else { 1 });
-        for time in times {
-            self.posed(time, &self.loads.prescribed_at(time), &self.loads.gaps_at(time))?;
-            if !self.motions.all_prevented() {
-                self.checked_load(time)?;
-            }
-        }
-        Ok(())
-    }
-
     /// Nodal loads at `time`, N per metre of thickness. Rounding, as in sin(pi) = 1.2e-16, counts as zero.
     pub fn load(&self, time: f64) -> Vec<f64> {
         let mut load = self.loads.at(&self.body, time);
@@ -64,7 +49,7 @@ impl DiscreteProblem {
     }
 
     /// The nodal loads at `time`, if they are finite and drive no unconstrained rigid motion. Collective.
-    fn checked_load(&self, time: f64) -> Result<Vec<f64>, SetupError> {
+    pub(super) fn checked_load(&self, time: f64) -> Result<Vec<f64>, SetupError> {
         let load = self.load(time);
         if !self.body.nodes.partition.comm().all(load.iter().all(|f| f.is_finite())) {
             return Err(self.not_finite(time));
@@ -84,7 +69,7 @@ impl DiscreteProblem {
 
     /// The prescribed unknowns and the bounds on the others at `time`. `values` are the values of the prescribed
     /// rows. `gaps` are the gaps of all gap rows, or empty if none depends on time.
-    fn posed(
+    pub(super) fn posed(
         &self,
         time: f64,
         values: &[f64],

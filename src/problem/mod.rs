@@ -12,6 +12,7 @@
 //! how well mesh and steps resolve the functions; `output` writes states. Bad input is a [`SetupError`].
 
 mod boundary_conditions;
+mod collapse;
 mod error;
 mod figures;
 mod load_case;
@@ -23,6 +24,7 @@ mod state;
 mod supports;
 mod unresolved;
 
+pub use collapse::{ACCURACY as COLLAPSE_ACCURACY, Collapse};
 pub use error::SetupError;
 pub use figures::{Bar, Dimension};
 pub(crate) use load_case::LoadCase;
@@ -71,6 +73,8 @@ pub struct DiscreteProblem {
     /// KKT tolerance.
     pub tolerance: f64,
     scene: Scene,
+    /// The collapse at which the run ends early, if the loads drive an unsupported motion.
+    pub collapse: Option<Collapse>,
     /// If `body` is a subdomain: the undivided mesh and the ranks that own its vertices.
     undivided: Option<(Mesh, Vec<usize>)>,
 }
@@ -79,10 +83,11 @@ pub struct DiscreteProblem {
 const SAMPLES: usize = 9;
 
 impl DiscreteProblem {
-    /// Binds `scene` to `mesh` and checks at sampled times that a solution exists.
+    /// Binds `scene` to `mesh` and checks at sampled times that a solution exists. If the body loses its support at
+    /// some time, the scene ends just before.
     ///
     /// # Errors
-    /// The scene does not fit the mesh, contradicts itself, or its load drives a rigid motion.
+    /// The scene does not fit the mesh, contradicts itself, or its load drives a rigid motion from the start.
     pub fn new(scene: Scene, mesh: Mesh) -> Result<Self, SetupError> {
         scene.check_mesh(&mesh)?;
         let mut body = Body::new(mesh, scene.order);
@@ -113,9 +118,9 @@ impl DiscreteProblem {
             body,
             scene,
             undivided: None,
+            collapse: None,
         };
-        problem.check_times()?;
-        Ok(problem)
+        problem.until_collapse()
     }
 
     /// Restricts a problem that every rank has made to this rank's subdomain. Collective.

@@ -29,6 +29,9 @@ enum Support {
     Clamped,
 }
 
+/// A side of a corner: its edge, its support, and the name of the supporting boundary.
+type Side<'a> = ([usize; 2], Support, Option<&'a str>);
+
 /// Angles, in degrees, above which stresses are singular. Corners of a polygon with smooth sides turn by less than
 /// `SMOOTH`.
 const SMOOTH: f64 = 10.0;
@@ -54,13 +57,13 @@ impl DiscreteProblem {
             }
         }
         let supports = self.supports_of_edges();
-        let mut sides = BTreeMap::<usize, Vec<([usize; 2], Support, Option<&str>)>>::new();
+        let mut sides = BTreeMap::<usize, Vec<Side>>::new();
         for &edge in &boundary {
             let (support, name) = supports.get(&edge).copied().unwrap_or((Support::Free, None));
             edge.iter()
                 .for_each(|node| sides.entry(*node).or_default().push((edge, support, name)));
         }
-        let singular = |(node, sides): (usize, Vec<([usize; 2], Support, Option<&str>)>)| {
+        let singular = |(node, sides): (usize, Vec<Side>)| {
             let angle = angles[&node].to_degrees() / (sides.len() / 2).max(1) as f64;
             let (_, most, name) = *sides.iter().max_by_key(|(_, support, _)| *support)?;
             let same = sides.iter().all(|(_, support, _)| *support == most);

@@ -31,7 +31,12 @@ fn every_command_of_the_tutorial_does_what_it_says() {
                         continue;
                     }
                     let (typed, comment) = line.split_once('#').unwrap_or((line, ""));
-                    let words: Vec<&str> = typed.split_whitespace().skip(1).collect();
+                    // Blanks between double quotes do not separate words.
+                    let words = typed.split('"').enumerate().flat_map(|(i, part)| match i % 2 {
+                        0 => part.split_whitespace().collect(),
+                        _ => vec![part],
+                    });
+                    let words: Vec<&str> = words.skip(1).collect();
                     let output = test_directory.say(&words);
                     let code = if comment.contains("refused") { 2 } else { 0 };
                     assert_eq!(output.code, Some(code), "{line}: {output:?}");

@@ -12,6 +12,7 @@ mod bars;
 mod bore;
 mod certificate;
 mod chosen_steps;
+mod collapse;
 mod conditioning;
 mod constraints;
 mod conservation;
