@@ -107,7 +107,7 @@ def triangles(fields):
 
 def with_fields(results, time, fields):
     """The results with another frame of the same run."""
-    points = fields.point_data
+    points, materials = fields.point_data, fields.cell_data.get("material")
     contact, tangents, obstacle = _foundation(results, time, points["displacement"][:, :2])
     return without_roundoff(replace(
         results,
@@ -116,6 +116,7 @@ def with_fields(results, time, fields):
         tangents=tangents,
         obstacle=obstacle,
         curves=_contact_curves(results.folder, time),
+        materials=materials and np.concatenate(materials),
         displacement=points["displacement"][:, :2],
         zeta=points["zeta"],
         von_mises=points["von_mises"].astype(float),

@@ -95,6 +95,7 @@ class Results:
     tangents: np.ndarray = None  # (k, 2, 2): sliding directions of the body there, 0 if it cannot slide
     obstacle: np.ndarray = None  # (k, 2, 2): opposite points of the obstacle, m
     curves: list = None  # the ContactCurves of Γ_C
+    materials: np.ndarray = None  # (m,): the number of the material of each element; None for one
     displacement: np.ndarray = None  # (n, 2), m
     zeta: np.ndarray = None  # (n,)
     von_mises: np.ndarray = None  # (n,), Pa

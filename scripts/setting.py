@@ -6,9 +6,11 @@ import textwrap
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.colors import ListedColormap
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 from matplotlib.patheffects import withTickedStroke
+from matplotlib.tri import Triangulation
 
 from drawing import (
     BLUE, FAINT, GREEN, INK, RED, draw_foundation, draw_outline, frame, headline, map_size,
@@ -18,6 +20,8 @@ from results import paths
 
 # Relative to the size of the body: the longest arrow, and the distances between arrows and between rollers.
 ARROW, SPACING, ROLLERS = 0.12, 0.05, 0.03
+# Light colours of materials.
+MATERIALS = ("#edf1f5", "#f3e3c3", "#d5e8d4", "#e6d5ec", "#f7d4cd", "#cfe3f2")
 # The distance of names from their boundaries, inches.
 AWAY = 0.13
 
@@ -38,7 +42,10 @@ def draw_setting(results, _limits):
     figure, axes = plt.subplots(figsize=(width, height + 0.7 + 0.2 * len(conditions)))
     # The body is on the left of its outlines, so the outlines of holes cut them out.
     outlines = Path.make_compound_path(*map(Path, results.outline(results.nodes)))
-    axes.add_patch(PathPatch(outlines, facecolor="#edf1f5", edgecolor="none", zorder=0.5))
+    if results.materials is None:
+        axes.add_patch(PathPatch(outlines, facecolor="#edf1f5", edgecolor="none", zorder=0.5))
+    else:
+        _draw_materials(axes, results)
     draw_outline(axes, results.nodes, results, color=INK, linewidth=0.9, zorder=2)
     draw_foundation(axes, results)
 
@@ -58,8 +65,7 @@ def draw_setting(results, _limits):
         words = _words(name, condition, units)
         axes.plot([], [], color=_colour(condition), linewidth=4, label=words)
     if body_force:
-        words = f"body force: {body_force} {units['volume']}"
-        axes.plot([], [], color=GREEN, linewidth=4, label=words)
+        axes.plot([], [], color=GREEN, linewidth=4, label=body_force)
     axes.legend(
         loc="upper left", bbox_to_anchor=(0.0, -0.55 / height), fontsize=8.5, handlelength=1
     )
@@ -153,16 +159,34 @@ def _draw_traction(axes, line, arrows, size):
     return off
 
 
+def _draw_materials(axes, results):
+    """Colours the triangles by material, with a legend. Material 0 is that of [material], the others are those of the
+    surfaces by name."""
+    tables = [results.scene.get(table, {}) for table in ("material", "damage")]
+    names = ["material", *sorted({name for table in tables for name, value in table.items()
+                                  if isinstance(value, dict)})]
+    mesh = Triangulation(*results.nodes.T, results.pieces.elements[:, :3])
+    colours = ListedColormap([MATERIALS[k % len(MATERIALS)] for k in range(len(names))])
+    axes.tripcolor(mesh, facecolors=results.materials.astype(float), cmap=colours, vmin=-0.5,
+                   vmax=len(names) - 0.5, zorder=0.5, rasterized=True)
+    for number in np.unique(results.materials):
+        axes.plot([], [], color=colours(int(number)), linewidth=8, label=f"material {names[number]}"
+                  if number else "other material")
+
+
 def _draw_body_force(axes, results, time):
-    """Draws an arrow in the middle of the body; returns the force as written in the scene, if any."""
-    force = results.scene.get("body", {}).get("force")
+    """Draws an arrow in the middle of the body; returns the force or the gravity as written in the scene, if any."""
+    body = results.scene.get("body", {})
+    kind = "gravity" if "gravity" in body else "force"
+    force = body.get(kind)
     middle = results.nodes.mean(axis=0, keepdims=True)
     arrow = _vectors(force, middle, time, _folder(results)) if force else np.zeros((1, 2))
     if arrow.any():
         arrow *= ARROW * results.size / np.linalg.norm(arrow)
         axes.quiver(*middle.T, *arrow.T, color=GREEN, angles="xy", scale_units="xy", scale=1.0,
                     pivot="middle", width=0.006, zorder=4)
-    return _pair(force) if force else None
+    unit = f"{results.units['length']}/s²" if kind == "gravity" else results.units["volume"]
+    return f"{'gravity' if kind == 'gravity' else 'body force'}: {_pair(force)} {unit}" if force else None
 
 
 def _opposite(results, line):

@@ -64,6 +64,7 @@ class Discrete:
         self.dof = np.stack([2 * n, 2 * n + 1], -1).reshape(len(n), -1)
         self.law = {**DAMAGE, **scene.get("damage", {})}
         self.young, poisson = (of_material(scene, mesh, "material", key) for key in ("young", "poisson"))
+        self.density = of_material(scene, mesh, "material", "density", 0.0)
         self.d = elasticity(self.young, poisson, scene["material"].get("plane", "stress"))
         self.element = np.einsum("eqki,ekl,eqlj,eq->eqij", self.b, self.d, self.b, self.weight)
         self.boundaries = scene.get("boundary", [])
@@ -106,7 +107,9 @@ class Discrete:
             for barycentric, weight in zip(*rule):
                 values = functions(barycentric[:, None], self.elements.shape[1])[0]
                 points = np.einsum("n,end->ed", values, x[self.elements])
-                force = pair(self.scene["body"]["force"], points, t) * weight[:, None]
+                body = {"force": ["0", "0"], "gravity": ["0", "0"], **self.scene["body"]}
+                weights = self.density[:, None] * pair(body["gravity"], points, t)
+                force = (pair(body["force"], points, t) + weights) * weight[:, None]
                 for node, value in zip(self.elements.T, values):
                     np.add.at(load, node, value * force)
         for boundary in self.boundaries:

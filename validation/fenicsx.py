@@ -169,6 +169,11 @@ class Body:
         if force is not None:
             rule = MIDPOINTS if self.order == 1 else INTERIOR_POINTS
             yield ufl.dot(force, w) * ufl.dx(metadata=rule)
+        gravity = vector(self.scene.get("body", {}).get("gravity", ["0", "0"]))
+        if gravity is not None:
+            density = of_material(self.scene, self.mesh, "material", "density", 0.0)
+            density = per_triangle(self.domain, density)
+            yield density * ufl.dot(gravity, w) * ufl.dx(metadata={"quadrature_degree": 2})
         for boundary in self.boundaries:
             traction = vector(boundary.get("traction", ["0", "0"]))
             if "pressure" in boundary:

@@ -62,6 +62,8 @@ def verdict_on(discrete, out, code, output):
         refusal = None
         if fault := judge_collapse(discrete, collapse):
             return Verdict("either" if either else "wrong", fault)
+    elif code == 0 and (refusal or "").startswith("driven") and stopped_before(out, refusal):
+        refusal = None
     if code == 2 and (refusal or "").startswith("driven") and stands(discrete):
         return Verdict("either" if either else "refused wrongly", f"it stands at first: {said}")
     if code == 2:
@@ -88,7 +90,13 @@ def verdict_on(discrete, out, code, output):
 def collapse_of(out):
     """The time at which the program says that nothing supports the body any more; None if it does not say so."""
     summary = json.loads((out / "summary.json").read_text())
-    return summary["stopped_at"] if summary["stopped_by"] == "collapse" else None
+    return summary["stopped_at"] if summary.get("stopped_by") == "collapse" else None
+
+
+def stopped_before(out, refusal):
+    """Whether the run stopped at ζ_* before the time of the refusal."""
+    stopped = json.loads((out / "summary.json").read_text())["stopped_at"]
+    return stopped is not None and stopped <= float(refusal.rpartition(" ")[2])
 
 
 def judge_collapse(discrete, time):

@@ -127,6 +127,11 @@ class Draw:
             size = self.stress / self.length * 10 ** self.number(-1, 0.5)
             force = self.rng.standard_normal(2) if self.pressed is None else self.pressed
             scene["body"] = {"force": [f"{float(size * c)!r}*{self.profile()}" for c in force]}
+        if "body" in scene and self.chance(0.3):
+            # As gravity on a body of two densities at least, if it has several materials.
+            gravity = [f"{float(size * c)!r}" for c in force]
+            scene["material"]["density"] = 1.0
+            scene["body"] = {"gravity": gravity}
         scene["output"] = {"every": 1}
         scene["boundary"] = list(self.boundary.values())
         return scene

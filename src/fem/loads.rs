@@ -27,13 +27,13 @@ pub fn part_point(corners: &[[f64; 3]; 3], point: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|k| corners.iter().zip(point).map(|(corner, l)| l * corner[k]).sum())
 }
 
-/// Adds the body force f_i = ∫_Ω f_B·φ_i to the nodal loads, with f_B in N/m³ as a function of the point. The
+/// Adds the body force f_i = ∫_Ω f_B·φ_i to the nodal loads, with f_B in N/m³ as a function of the triangle and the point. The
 /// integration points are the side midpoints for P1, which is exact for affine f_B, and the quadrature points
 /// of the element for P2. A divided triangle has three points in each part.
 pub fn add_body_force(
     body: &Body,
     division: &Division,
-    force: impl Fn([f64; 2]) -> [f64; 2],
+    force: impl Fn(usize, [f64; 2]) -> [f64; 2],
     load: &mut [f64],
 ) {
     let points = &body.nodes.points;
@@ -48,12 +48,19 @@ pub fn add_body_force(
                 if let Some(parts) = parts(t) {
                     let corners = nodes.map(|node| points[node]);
                     let twice = |_| 2.0 * element.area();
-                    in_parts(parts, corners, |l| l, twice, &force, |i, w, f| add(nodes[i], w, f));
+                    in_parts(
+                        parts,
+                        corners,
+                        |l| l,
+                        twice,
+                        |x| force(t, x),
+                        |i, w, f| add(nodes[i], w, f),
+                    );
                     continue;
                 }
                 for side in 0..3 {
                     let (a, b) = (nodes[side], nodes[(side + 1) % 3]);
-                    let f = force(midpoint(points[a], points[b]));
+                    let f = force(t, midpoint(points[a], points[b]));
                     // At the midpoint of a side the functions of its ends are ½, and the third one is 0.
                     [a, b].into_iter().for_each(|node| add(node, element.area() / 6.0, f));
                 }
@@ -66,11 +73,11 @@ pub fn add_body_force(
                 if let Some(parts) = parts(t) {
                     let twice = |l| quadratic_measure(&x, l);
                     let add = |i: usize, w, f| add(nodes[i], w, f);
-                    in_parts(parts, x, quadratic_values, twice, &force, add);
+                    in_parts(parts, x, quadratic_values, twice, |x| force(t, x), add);
                     continue;
                 }
                 for (point, values) in element.points.iter().zip(&values) {
-                    let f = force(weighted(&x, values));
+                    let f = force(t, weighted(&x, values));
                     nodes
                         .iter()
                         .zip(values)

@@ -22,6 +22,8 @@ pub struct Material {
     pub poisson: f64,
     /// Plane stress or plane strain.
     pub plane: Plane,
+    /// The density ρ, kg/m³; its weight is ρ times gravity.
+    pub density: f64,
 }
 
 impl Material {

@@ -103,6 +103,9 @@ impl Scene {
         for (i, force) in self.body_force.iter().enumerate() {
             check(format!("body.force[{i}]"), force, &midpoints, finite);
         }
+        for (i, gravity) in self.gravity.iter().enumerate() {
+            check(format!("body.gravity[{i}]"), gravity, &[[0.0; 2]], finite);
+        }
         for boundary in &self.boundaries {
             let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
             let key = |what: &str| boundary_key(&boundary.name, what);

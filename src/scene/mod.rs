@@ -64,6 +64,8 @@ pub struct Scene {
     pub time: Option<TimeGrid>,
     /// Body force f_B, N/m³.
     pub body_force: [Expression; 2],
+    /// Gravity, m/s², a function of time. With the densities of the materials it is a further body force.
+    pub gravity: [Expression; 2],
     /// Options of the contact solver.
     pub contact: ContactOptions,
     /// Options of the results.

@@ -11,7 +11,7 @@ use crate::{
     contact::{self, ContactOptions},
     fem::Mass,
     mesh::Order,
-    model::DamageLaw,
+    model::{DamageLaw, Material},
 };
 use serde::{Deserialize, de::DeserializeOwned};
 use std::collections::BTreeMap;
@@ -33,6 +33,7 @@ pub(super) fn scene(found: &mut Findings) -> Option<Scene> {
     let degree: Option<f64> = found.build("discretisation.displacement", Ok);
     let time = found.build("time", time);
     let body_force = found.build("body.force", Ok);
+    let gravity: Option<[Expression; 2]> = found.build("body.gravity", uniform);
     let contact = found.build("contact", contact);
     let output = found.build("output", Ok);
     let units = found.build("units", units);
@@ -43,10 +44,15 @@ pub(super) fn scene(found: &mut Findings) -> Option<Scene> {
     {
         found.note(&format!("probe.{name}"), "has the name of a boundary; choose another one");
     }
-    let materials = found.build("material", surfaces).unwrap_or_default();
+    let materials: Vec<(String, Material)> = found.build("material", surfaces).unwrap_or_default();
     let laws = found.build("damage", surfaces).unwrap_or_default();
 
-    let material = material?;
+    let material: Material = material?;
+    let weightless = material.density == 0.0 && materials.iter().all(|(_, of)| of.density == 0.0);
+    let pulls = gravity.iter().flatten().any(|g| g.as_constant() != Some(0.0));
+    if weightless && pulls {
+        found.note("body.gravity", "has no effect without a density; set material.density");
+    }
     let law = damage.as_ref().map(|damage| damage.law);
     let mut surfaces: BTreeMap<String, Surface> =
         materials.into_iter().map(|(name, material)| (name, Surface { material, law })).collect();
@@ -67,6 +73,7 @@ pub(super) fn scene(found: &mut Findings) -> Option<Scene> {
         accuracy_of: accuracy_of.unwrap_or_default(),
         time,
         body_force: body_force?,
+        gravity: gravity?,
         contact: contact?,
         output: output?,
         units: units?,
@@ -85,6 +92,14 @@ fn surfaces<T: DeserializeOwned>(table: toml::Table) -> Result<Vec<(String, T)>,
         Ok((name, all.try_into().map_err(is_wrong)?))
     };
     named.into_iter().map(with_own).collect()
+}
+
+/// Gravity, which is the same everywhere.
+fn uniform(gravity: [Expression; 2]) -> Result<[Expression; 2], Fault> {
+    match gravity.iter().any(Expression::depends_on_space) {
+        true => Err(("", "depends on x or y; write such a force as body.force".to_owned())),
+        false => Ok(gravity),
+    }
 }
 
 #[derive(Deserialize)]

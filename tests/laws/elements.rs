@@ -17,7 +17,7 @@ const YOUNG: f64 = 2.1e5;
 const POISSON: f64 = 0.3;
 
 fn elasticity(plane: Plane) -> Elasticity {
-    Elasticity::new([Material { young: YOUNG, poisson: POISSON, plane }])
+    Elasticity::new([Material { young: YOUNG, poisson: POISSON, plane, density: 0.0 }])
 }
 
 /// Counter-clockwise triangles of all shapes that are not too thin.

@@ -59,7 +59,7 @@ fn affine_body_forces_are_integrated_exactly() {
         add_body_force(
             &body,
             &Division::default(),
-            |[x, y]| [2.0 - x + 3.0 * y, 6.0 * y],
+            |_, [x, y]| [2.0 - x + 3.0 * y, 6.0 * y],
             &mut load,
         );
         let [horizontal, vertical] = moments(&body, &load);
@@ -126,7 +126,12 @@ fn a_pressure_on_a_curved_boundary_has_the_resultant_and_moment_of_its_ends() {
 fn a_uniform_stress_is_in_equilibrium_with_its_traction_on_curved_elements() {
     // u = (ax + by, cx + dy): ∫σ : ε(φ_i) = ∫_∂Ω σν·φ_i, to round-off by both quadratures.
     let body = Body::new(curved(), Order::Quadratic);
-    let elasticity = Elasticity::new([Material { young: 3.0, poisson: 0.3, plane: Plane::Strain }]);
+    let elasticity = Elasticity::new([Material {
+        young: 3.0,
+        poisson: 0.3,
+        plane: Plane::Strain,
+        density: 0.0,
+    }]);
     let u: Vec<f64> = (body.nodes.points.iter())
         .flat_map(|[x, y]| [0.2 * x + 0.7 * y, 0.1 * x - 0.4 * y])
         .collect();
@@ -149,7 +154,7 @@ fn body_forces_on_curved_elements_have_their_resultant() {
     // x and the Jacobian are quadratic: a uniform f is integrated exactly.
     let body = Body::new(curved(), Order::Quadratic);
     let mut load = vec![0.0; 2 * body.nodes.points.len()];
-    add_body_force(&body, &Division::default(), |_| [2.0, -3.0], &mut load);
+    add_body_force(&body, &Division::default(), |_, _| [2.0, -3.0], &mut load);
     let [[x, ..], [y, ..]] = moments(&body, &load);
     let area = curved_area(&body.mesh);
     close(x, 2.0 * area, 1e-14);
@@ -353,4 +358,30 @@ fn the_units_of_a_narrow_load_do_not_matter() {
     let [one, large, small] = [1.0, 1e12, 1e-12].map(force);
     close(large, one, 1e-12);
     close(small, one, 1e-12);
+}
+
+/// Weights ρ A g of two surfaces, ρ = 2 on the lower half and 5 on the upper one, under gravity that turns.
+#[test]
+fn gravity_pulls_on_each_material_by_its_density() {
+    for degree in [1, 2] {
+        let mut mesh = square(4);
+        let upper = |t: &usize| mesh.triangles[*t].iter().all(|&node| mesh.nodes[node][1] >= 0.5);
+        mesh.surfaces.insert("upper".to_owned(), (0..mesh.triangles.len()).filter(upper).collect());
+        let text = format!(
+            "discretisation.displacement = {degree}
+             material = {{ young = 1, poisson = 0, plane = 'stress', density = 2, upper.density = 5 }}
+             time = {{ end = 1, step = 0.5 }}
+             body = {{ force = [0, 1], gravity = ['10*sin(t)', '-10*cos(t)'] }}
+             boundary = [{{ name = 'bottom', displacement = [0, 0] }}]"
+        );
+        let problem = crate::support::problem(mesh, &text).unwrap_or_else(|e| panic!("{e}"));
+        for t in [0.0, 0.5, 1.0_f64] {
+            let [x, y, moment] = resultant(&problem, t);
+            let (gx, gy) = (10.0 * t.sin(), -10.0 * t.cos());
+            close(x, 3.5 * gx, 1e-12);
+            close(y, 3.5 * gy + 1.0, 1e-12);
+            // The weights 1 and 2.5 act at (½, ¼) and (½, ¾), the force 1 at (½, ½).
+            close(moment, 0.5 * y - (0.25 + 2.5 * 0.75) * gx, 1e-12);
+        }
+    }
 }

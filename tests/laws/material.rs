@@ -29,7 +29,7 @@ fn truncation_makes_the_source_constant_outside_the_admissible_interval() {
 #[test]
 fn plane_stress_is_the_papers_tensor() {
     // (Aτ)_αβ = Er/(1−r²) tr(τ) δ_αβ + E/(1+r) τ_αβ, printed in section 4.
-    let material = Material { young: 80.0, poisson: 0.3, plane: Plane::Stress };
+    let material = Material { young: 80.0, poisson: 0.3, plane: Plane::Stress, density: 0.0 };
     let (e, r) = (80.0, 0.3);
     let tau = [0.7, -0.2, 0.4]; // τ_11, τ_22, τ_12
     let sigma = material.stiffness() * Vector3::new(tau[0], tau[1], 2.0 * tau[2]);
@@ -46,7 +46,7 @@ fn plane_stress_is_the_papers_tensor() {
 #[test]
 fn plane_strain_is_three_dimensional_elasticity_with_no_normal_strain() {
     // Hooke's law inverted: ε = ((1+ν)σ − ν tr σ I)/E with σ_zz such that ε_zz = 0.
-    let material = Material { young: 2.0e5, poisson: 0.27, plane: Plane::Strain };
+    let material = Material { young: 2.0e5, poisson: 0.27, plane: Plane::Strain, density: 0.0 };
     let strain = Vector3::new(1e-3, -4e-4, 7e-4);
     let s = material.stiffness() * strain;
     let (e, nu) = (material.young, material.poisson);
@@ -59,8 +59,8 @@ fn plane_strain_is_three_dimensional_elasticity_with_no_normal_strain() {
 
 #[test]
 fn von_mises_of_uniaxial_stress_is_that_stress_and_ignores_pressure() {
-    let sheet = Material { young: 1.0, poisson: 0.3, plane: Plane::Stress };
+    let sheet = Material { young: 1.0, poisson: 0.3, plane: Plane::Stress, density: 0.0 };
     assert!((sheet.von_mises(&Vector3::new(0.0, -3.0, 0.0)) - 3.0).abs() < 1e-15);
-    let prism = Material { young: 1.0, poisson: 0.5 - 1e-12, plane: Plane::Strain };
+    let prism = Material { young: 1.0, poisson: 0.5 - 1e-12, plane: Plane::Strain, density: 0.0 };
     assert!(prism.von_mises(&Vector3::new(-5.0, -5.0, 0.0)) < 1e-10);
 }

@@ -11,7 +11,8 @@ use signorini::{
 
 type Quadratic = Element<6, 3>;
 
-const MATERIAL: Material = Material { young: 2.1e5, poisson: 0.3, plane: Plane::Stress };
+const MATERIAL: Material =
+    Material { young: 2.1e5, poisson: 0.3, plane: Plane::Stress, density: 0.0 };
 
 /// Barycentric coordinates of the three quadrature points.
 const POINTS: [[f64; 3]; 3] = {

@@ -57,6 +57,9 @@ fn with(path: &str, value: Option<&str>) -> Result<Scene, String> {
         if path[..] == ["time", "tolerance"] {
             sets.push("time.step='auto'".to_owned());
         }
+        if path[..] == ["body", "gravity"] {
+            sets.push("material.density=1".to_owned());
+        }
         match value {
             Some(value) => sets.push(format!("{}={value}", path.join("."))),
             None => remove(&mut scene, path),
@@ -127,6 +130,7 @@ fn the_rule_of_a_number_in_words_is_that_of_its_bounds() {
             "positive" => [None, Some(0.0), None, None],
             "positive, at most 1e100" => [None, Some(0.0), Some(1e100), None],
             "at least 0" => [Some(0.0), None, None, None],
+            "at least 0, at most 1e100" => [Some(0.0), None, Some(1e100), None],
             "at least 1e-5" => [Some(1e-5), None, None, Some(1.0)],
             "between 1e-5 and 0.5" => [Some(1e-5), None, Some(0.5), None],
             "between 0 and 1, both excluded" => [None, Some(0.0), None, Some(1.0)],

@@ -29,7 +29,7 @@ fn breaks(problem: &DiscreteProblem, end: f64) -> Vec<f64> {
     };
     let triangles = mesh.triangles.chunks(mesh.triangles.len().div_ceil(BOXES).max(1));
     let boxes: Vec<_> = triangles.map(|t| mesh.bounds(t.iter().flatten())).collect();
-    scene.body_force.iter().for_each(|f| add(f, &boxes));
+    scene.body_force.iter().chain(&scene.gravity).for_each(|f| add(f, &boxes));
     for boundary in &scene.boundaries {
         let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
         let edges = curve.edges.chunks(curve.edges.len().div_ceil(BOXES).max(1));

@@ -98,10 +98,13 @@ impl SurfaceForce {
 pub(super) struct BodyForce {
     /// f_B, N/m³.
     force: [Expression; 2],
+    /// Gravity, m/s², a function of time, and the densities of the materials by their numbers, kg/m³.
+    gravity: [Expression; 2],
+    densities: Vec<f64>,
     /// The parts of the triangles in which it is not resolved.
     division: Division,
-    /// The sample points, m, each with the area that it represents, m².
-    samples: Vec<([f64; 2], f64)>,
+    /// The sample points, m, each with the area that it represents, m², and the density there.
+    samples: Vec<([f64; 2], [f64; 2])>,
     /// The fraction of ∫|f_B| that may be missed.
     pub(super) missed: f64,
 }
@@ -109,10 +112,11 @@ pub(super) struct BodyForce {
 impl BodyForce {
     /// `None` if it is zero. Triangles are divided once, for all times.
     pub(super) fn new(body: &Body, scene: &Scene) -> Option<Self> {
-        let force = scene.body_force.clone();
-        if force.iter().all(|f| f.as_constant() == Some(0.0)) {
+        let (force, gravity) = (scene.body_force.clone(), scene.gravity.clone());
+        if force.iter().chain(&gravity).all(|f| f.as_constant() == Some(0.0)) {
             return None;
         }
+        let densities: Vec<f64> = scene.materials().map(|material| material.density).collect();
         let times = scene.sample_times(TIMES);
         let in_time = force.iter().any(Expression::depends_on_time);
         let (times, more) = if in_time { (&times[..], MORE[0]) } else { (&times[..1], MORE[1]) };
@@ -131,35 +135,47 @@ impl BodyForce {
         for (triangle, part) in &parts {
             division.entry(*triangle).or_default().push(*part);
         }
-        let samples = [whole, parts].iter().flat_map(|parts| samples(&triangles, parts)).collect();
-        Some(Self { force, division, samples, missed })
+        let density = |triangle| densities[body.material(triangle)];
+        let samples = [whole, parts];
+        let samples = samples.iter().flat_map(|parts| self::samples(&triangles, parts, density));
+        let samples = samples.collect();
+        Some(Self { force, gravity, densities, division, samples, missed })
     }
 
     pub(super) fn expressions(&self) -> impl Iterator<Item = &Expression> {
-        self.force.iter()
+        self.force.iter().chain(&self.gravity)
     }
 
     /// Adds the nodal loads at time t.
     pub(super) fn add(&self, body: &Body, t: f64, load: &mut [f64]) {
-        let at = |[x, y]: [f64; 2]| self.force.each_ref().map(|f| f.eval(x, y, t));
+        let gravity = self.gravity.each_ref().map(|g| g.eval(0.0, 0.0, t));
+        let at = |triangle: usize, [x, y]: [f64; 2]| {
+            let density = self.densities[body.material(triangle)];
+            [0, 1].map(|k| self.force[k].eval(x, y, t) + density * gravity[k])
+        };
         add_body_force(body, &self.division, at, load);
     }
 
     /// The forces on some triangles at time t, by component.
     pub(super) fn sample(&self, t: f64, forces: &mut Vec<f64>) {
-        let at = |([x, y], area): &([f64; 2], f64)| {
-            self.force.each_ref().map(|f| area * f.eval(*x, *y, t))
+        let gravity = self.gravity.each_ref().map(|g| g.eval(0.0, 0.0, t));
+        let at = |([x, y], [area, density]): &([f64; 2], [f64; 2])| {
+            [0, 1].map(|k| area * (self.force[k].eval(*x, *y, t) + density * gravity[k]))
         };
         forces.extend(self.samples.iter().flat_map(at));
     }
 }
 
-/// The centroids of evenly spread parts, each with the area that it represents.
-fn samples(triangles: &[[[f64; 2]; 6]], parts: &[TrianglePart]) -> Vec<([f64; 2], f64)> {
+/// The centroids of evenly spread parts, each with the area that it represents and the density of its triangle.
+fn samples(
+    triangles: &[[[f64; 2]; 6]],
+    parts: &[TrianglePart],
+    density: impl Fn(usize) -> f64,
+) -> Vec<([f64; 2], [f64; 2])> {
     let stride = parts.len().div_ceil(MAX_SAMPLES).max(1);
     let sample = |part: &TrianglePart| {
         let (centroid, area) = centroid(triangles, part);
-        (centroid, stride as f64 * area)
+        (centroid, [stride as f64 * area, density(part.0)])
     };
     parts.iter().step_by(stride).map(sample).collect()
 }
