@@ -26,6 +26,9 @@ plt.rcParams.update({
     "axes.spines.top": False,
     "axes.spines.right": False,
     "legend.frameon": False,
+    # TrueType fonts, which journals accept.
+    "pdf.fonttype": 42,
+    "ps.fonttype": 42,
 })
 
 
@@ -109,20 +112,24 @@ def stress_unit(largest, units):
     return 1.0, units["stress"]
 
 
-def damage_scale(least, largest):
-    """How to show ζ between two values: the function that is drawn, its label, colour map and limits. Darker
-    colours always mean more damage.
+# What figures show of the damage: "zeta", "loss", or None to choose.
+DAMAGE = None
 
-    If ζ is close to 1, the loss 1 − ζ is shown, in a power of ten. If ζ is uniform, the limits are moved
-    apart, so that the colours do not show rounding errors.
+
+def damage_scale(least, largest):
+    """How to show ζ between two values: the function that is drawn, its label, colour map and limits. As in all
+    figures, dark colours are low values.
+
+    If ζ is close to 1, the loss 1 − ζ is shown, in a power of ten, unless DAMAGE says otherwise. If ζ is uniform, the
+    limits are moved apart, so that the colours do not show rounding errors.
     """
     low, high = 1.0 - largest, 1.0 - least
     uniform = high - low <= 1e-9 * high
-    if 0.0 < high < 0.1:
+    if 0.0 < high and DAMAGE != "zeta" and (high < 0.1 or DAMAGE == "loss"):
         unit = 10.0 ** np.floor(np.log10(high))
         label = rf"damage  $1 - \zeta$  ($\times 10^{{{np.log10(unit):.0f}}}$)"
         limits = (0.0, 10.0) if uniform else (low / unit, high / unit)
-        return lambda zeta: (1.0 - zeta) / unit, label, "magma_r", limits
+        return lambda zeta: (1.0 - zeta) / unit, label, "magma", limits
     limits = (0.0, 1.0) if uniform else (least, largest)
     return lambda zeta: zeta, r"damage field  $\zeta$", "magma", limits
 

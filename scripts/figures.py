@@ -11,7 +11,9 @@ pressure       contact pressure and gap along Γ_C
 damage-history the minimum and the mean of ζ in time, if there is damage
 force-displacement  the forces on the supports over the largest displacement
 
-and on request: contact-evolution, the pressure on Γ_C in time; damage (without damage: stress) and
+With --line or --along: curves of fields at several times, of one or more runs, with their numbers as CSV.
+
+On request: contact-evolution, the pressure on Γ_C in time; damage (without damage: stress) and
 pressure as animations.
 """
 
@@ -22,10 +24,12 @@ from math import isfinite
 
 import matplotlib.pyplot as plt
 
+import drawing
 from animation import FRAMES, MOVIES, animate
 from contact_pressure import draw_evolution, draw_pressure
 from histories import draw_damage_history, draw_force_displacement
 from limits import box_of, limits_of
+from lines import draw_curves
 from maps import draw_deformed, draw_stress_and_damage
 from paraview_script import write_script
 from principal import draw_principal
@@ -62,6 +66,18 @@ def arguments_of(prog):
         "amplification of displacements (in the paper: 10; default: what shows them)"))
     parser.add_argument("--format", type=lambda text: text.split(","), default=["png"], metavar=(
         "FORMAT"), help="png, svg, pdf, or several with commas (default: png)")
+    parser.add_argument("--line", type=numbers(4), metavar="X0,Y0,X1,Y1", help=(
+        "only curves of fields along this line"))
+    parser.add_argument("--along", metavar="BOUNDARY", help="only curves of fields along a boundary")
+    parser.add_argument("--quantity", type=lambda text: text.split(","), metavar="NAME,…", help=(
+        "fields of --line and --along: zeta, u_x, u_y, stress_xx, stress_yy, stress_xy, stress_zz, stress_1, "
+        "stress_2, von_mises, normal_pressure, gap (default: von_mises)"), default=["von_mises"])
+    parser.add_argument("--times", type=numbers(None), metavar="T,…", help=(
+        "times of the curves, s (default: the last frame)"))
+    parser.add_argument("--no-title", action="store_true", help="without titles, for papers")
+    parser.add_argument("--width", type=float, metavar="INCHES", help="the width of every figure")
+    parser.add_argument("--damage", choices=("zeta", "loss"), help=(
+        "draw ζ, as the paper does, or the loss 1 − ζ (default: ζ if it falls below 0.9)"))
     parser.add_argument("--evolution", action="store_true", help="also contact-evolution")
     parser.add_argument("--animate", nargs="?", const="gif", choices=MOVIES, help=(
         "also animations of damage (or stress) and pressure: gif, or mp4 by ffmpeg (default: gif)"))
@@ -70,11 +86,36 @@ def arguments_of(prog):
     arguments = parser.parse_args()
     if unknown := set(arguments.format) - set(FORMATS):
         parser.error(f"--format: {', '.join(unknown)} is none of {', '.join(FORMATS)}")
+    if arguments.line and arguments.along:
+        parser.error("--line and --along: give one of them")
     if arguments.factor is not None and not arguments.factor > 0.0:
         parser.error("--factor: must be positive")
     if arguments.time is not None and not isfinite(arguments.time):
         parser.error("--time: must be a number")
     return arguments
+
+
+def numbers(count):
+    """A parser of numbers with commas between them, of this count if one is given."""
+    def parse(text):
+        values = [float(word) for word in text.split(",")]
+        if count not in (None, len(values)):
+            raise argparse.ArgumentTypeError(f"needs {count} numbers")
+        return values
+
+    return parse
+
+
+def styled(figure, arguments):
+    """Applies --no-title and --width."""
+    if figure is not None and arguments.no_title:
+        figure.suptitle("")
+        for axes in figure.axes:
+            axes.set_title("")
+    if figure is not None and arguments.width:
+        width, height = figure.get_size_inches()
+        figure.set_size_inches(arguments.width, height * arguments.width / width)
+    return figure
 
 
 def save(figure, results, name, formats):
@@ -101,11 +142,12 @@ def draw(results, limits, arguments):
     last = replace(results, time=results.frames[-1][0])
     for name, figure in FIGURES.items():
         of = last if name in OF_ALL_TIMES else results
-        save(figure(results, limits), of, name, arguments.format)
+        save(styled(figure(results, limits), arguments), of, name, arguments.format)
     if arguments.evolution:
         stride = 1 + len(results.frames) // EVOLUTION
         chosen = states(results, results.frames[::stride])
-        save(draw_evolution(chosen, limits_of(chosen)), last, "contact-evolution", arguments.format)
+        evolution = styled(draw_evolution(chosen, limits_of(chosen)), arguments)
+        save(evolution, last, "contact-evolution", arguments.format)
     if arguments.animate:
         for path in animate(results, arguments.factor, arguments.animate):
             print(path)
@@ -114,6 +156,12 @@ def draw(results, limits, arguments):
 def main(prog=None):
     """Returns the exit code: 2 if a figure could not be drawn. A message names it."""
     arguments = arguments_of(prog)
+    if arguments.line or arguments.along:
+        with telling() as problems:
+            for path in draw_curves(arguments, styled):
+                print(path)
+        return 2 if problems else 0
+    drawing.DAMAGE = arguments.damage
     runs, failed = [], False
     for folder in arguments.folders:
         with telling() as problems:

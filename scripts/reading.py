@@ -16,6 +16,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 
+import signorini_results
 from elements import Pieces, counter_clockwise
 from results import ContactCurve, ResultError, Results, without_roundoff
 
@@ -74,10 +75,8 @@ def read_results(folder, time=None):
 
 def frames_of(folder):
     """(time, file) of each frame that fields.pvd lists, in the order of time."""
-    with whole(folder / "fields.pvd") as file:
-        frames = ElementTree.parse(file).findall(".//DataSet")
-        frames = [(float(frame.get("timestep")), folder / frame.get("file")) for frame in frames]
-    return sorted(frames, key=lambda frame: frame[0])
+    with whole(folder / "fields.pvd"):
+        return signorini_results.frames_of(folder)
 
 
 def nearest(frames, time):
@@ -128,24 +127,9 @@ def with_fields(results, time, fields):
 
 
 def read_frame(path):
-    """A frame: a .vtu file, or the .pvtu list of the pieces of several ranks, which meshio does not read. The pieces
-    stand one after the other; nodes of several pieces have one number, `global_node`."""
+    """A frame of `signorini_results`; an error of reading it names the file."""
     with whole(path):
-        if path.suffix != ".pvtu":
-            # meshio.read would end the program if it finds a fault.
-            return meshio.vtu.read(path)
-        sources = [piece.get("Source") for piece in ElementTree.parse(path).findall(".//Piece")]
-    pieces = [read_frame(path.parent / source) for source in sources]
-    starts = np.cumsum([0, *(len(piece.points) for piece in pieces)])
-    cells = [start + piece.cells[0].data for piece, start in zip(pieces, starts)]
-    return meshio.Mesh(
-        np.concatenate([piece.points for piece in pieces]),
-        [(pieces[0].cells[0].type, np.concatenate(cells))],
-        point_data={name: np.concatenate([piece.point_data[name] for piece in pieces])
-                    for name in pieces[0].point_data},
-        cell_data={name: [np.concatenate([piece.cell_data[name][0] for piece in pieces])]
-                   for name in pieces[0].cell_data},
-    )
+        return signorini_results.read_frame(path)
 
 
 def _foundation(results, time, displacement):

@@ -3,7 +3,6 @@
 import argparse
 import csv
 import sys
-from collections import defaultdict
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 
 from bars import barred, bars
 from elements import Pieces
+from signorini_results import paths
 
 # Values below these parts of the maximum of a run are rounding errors (the solver's tolerance is 1e-10).
 ROUNDING = 1e-9
@@ -223,36 +223,6 @@ class Results:
             lines = self.contact + factor * (self.obstacle - self.contact + sliding)
         lines = np.round(lines, 12)
         return [np.array(path) for path in paths([tuple(map(tuple, l)) for l in lines.tolist()])]
-
-
-def paths(edges):
-    """Joins edges (pairs of hashable ends) into the longest possible paths.
-
-    A path has the direction of its first edge. If all edges have the same orientation, so have the paths. A closed
-    curve ends at its first point.
-    """
-    at = defaultdict(list)
-    for k, edge in enumerate(edges):
-        for end in edge:
-            at[end].append(k)
-    unused = set(range(len(edges)))
-    found = []
-
-    def follow(point):
-        walked = []
-        while following := [k for k in at[point] if k in unused]:
-            unused.discard(following[0])
-            a, b = edges[following[0]]
-            point = b if a == point else a
-            walked.append(point)
-        return walked
-
-    for k, (a, b) in enumerate(edges):
-        if k in unused:
-            unused.discard(k)
-            forward = follow(b)
-            found.append([*reversed(follow(a)), a, b, *forward])
-    return found
 
 
 def without_roundoff(results):

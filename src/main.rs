@@ -38,6 +38,10 @@ enum Command {
     Info(command::ScriptArguments),
     /// Run scenes with every contact solver and compare cost and answers.
     Compare(command::ScriptArguments),
+    /// Run a scene with all combinations of some values, side by side: --set KEY=A,B,C (--help).
+    Study(command::ScriptArguments),
+    /// Print the summaries of runs as a table, aligned or as CSV.
+    Table(command::ScriptArguments),
     /// Draw the figures of runs into their folders; also at other times, as vector graphics, animated (--help).
     Figures(command::ScriptArguments),
     /// Write report.html, a page about a run, into its folder.
@@ -74,6 +78,8 @@ fn main() -> ExitCode {
         Command::Check(arguments) => command::check(&arguments),
         Command::Info(arguments) => command::script("info", &arguments),
         Command::Compare(arguments) => command::script("compare", &arguments),
+        Command::Study(arguments) => command::script("study", &arguments),
+        Command::Table(arguments) => command::script("table", &arguments),
         Command::Figures(arguments) => command::script("figures", &arguments),
         Command::Report(arguments) => command::script("report", &arguments),
         Command::Solvers => command::solvers(),

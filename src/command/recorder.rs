@@ -90,7 +90,7 @@ impl<'a> Recorder<'a> {
         let scene = self.task.problem.scene();
         let Some(grid) = scene.time else { return true };
         match (scene.output.every, grid.stepping) {
-            (Some(every), _) => n.is_multiple_of(every),
+            (Some(every), _) => every > 0 && n.is_multiple_of(every),
             (None, Stepping::Uniform { steps }) => {
                 let every = steps.div_ceil(FRAMES);
                 n.is_multiple_of(every) || (*n < every && n.is_power_of_two())

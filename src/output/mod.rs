@@ -97,7 +97,9 @@ const FILES: &str = "contact.csv contact.pvd fields.pvd history.csv summary.json
      open_in_paraview.py";
 /// The pictures, in alphabetical order.
 const PICTURES: &str = "contact-evolution damage damage-history deformed force-displacement \
-     pressure setting stress stress-damage";
+     pressure principal-stresses setting stress stress-damage";
+/// Curves of fields are `CURVES_….csv` and pictures.
+const CURVES: &str = "curves";
 /// The names of incomplete files begin with this.
 const PARTIAL: &str = ".partial-";
 
@@ -108,6 +110,7 @@ fn is_result(name: &str) -> bool {
     let (kind, rest) = stem.split_once('_').unwrap_or((stem, ""));
     let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
     match ending {
+        "csv" | "png" | "svg" | "pdf" if kind == CURVES => true,
         "vtu" | "pvtu" => ["fields", "contact"].contains(&kind) && rest.split('_').all(is_number),
         "png" | "svg" | "pdf" | "gif" | "mp4" => {
             PICTURES.split(' ').any(|known| known == kind)

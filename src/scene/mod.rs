@@ -137,7 +137,7 @@ pub struct Probe {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OutputOptions {
-    /// The number of steps between two frames, at least 1; `None` for about 20 frames.
+    /// The number of steps between two frames, 0 for no frames; `None` for about 20 frames.
     pub every: Option<usize>,
     /// The time between two checkpoints, s; 0 for no checkpoints.
     pub checkpoint: f64,

@@ -2,6 +2,7 @@
 
 mod accepted;
 mod accuracy;
+mod studies;
 mod test_directory;
 mod tutorial;
 mod check;

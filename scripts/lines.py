@@ -1,0 +1,73 @@
+"""Curves of fields along a line or a boundary, at several times and of several runs, with their numbers as CSV."""
+
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import signorini_results
+from drawing import INK
+from reading import whole
+from results import ResultError, write_table
+
+UNITS = {"zeta": "", "u_x": "length", "u_y": "length", "gap": "length"}
+
+
+def draw_curves(arguments, styled):
+    """Draws a figure for each quantity into the folder of the first run, and writes the numbers of all curves; yields
+    the paths."""
+    runs = [_run(folder) for folder in arguments.folders]
+    where = f"along_{arguments.along}" if arguments.along else "line"
+    folder = runs[0].folder
+    for quantity in arguments.quantity:
+        rows, figure = [], plt.figure(figsize=(6.0, 3.8))
+        axes = figure.add_subplot()
+        for run in runs:
+            for time in arguments.times or [run.times[-1]]:
+                frame = run.frame(time)
+                places, values = _values(frame, arguments, quantity)
+                label = f"t = {frame.time:g}" if len(runs) == 1 else f"{run.folder.name}, t = {frame.time:g}"
+                axes.plot(places, values, label=label, linewidth=1.3)
+                rows += [{"run": run.folder.name, "time": frame.time, "s": s, quantity: value}
+                         for s, value in zip(places, values) if np.isfinite(s)]
+        units = {"length": "m", "time": "s", "stress": "Pa", **runs[0].summary.get("units", {})}
+        unit = units.get(UNITS.get(quantity, "stress"), "")
+        axes.set_xlabel(f"distance along {arguments.along or 'the line'} ({units['length']})")
+        axes.set_ylabel(f"{quantity} ({unit})" if unit else quantity)
+        axes.axhline(0.0, color=INK, linewidth=0.5) if axes.get_ylim()[0] < 0.0 < axes.get_ylim()[1] else None
+        axes.legend()
+        if arguments.line:
+            x0, y0, x1, y1 = arguments.line
+            axes.set_title(f"from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g})")
+        styled(figure, arguments)
+        path = folder / f"curves_{where}_{quantity}.csv"
+        write_table(rows, path)
+        yield path
+        for ending in arguments.format:
+            path = folder / f"curves_{where}_{quantity}.{ending}"
+            figure.savefig(path)
+            yield path
+        plt.close(figure)
+
+
+def _run(folder):
+    """A run with its frames; a problem is an error in one line."""
+    with whole(Path(folder) / "summary.json"):
+        run = signorini_results.load(folder)
+    with whole(Path(folder) / "fields.pvd"):
+        if not run.frames:
+            raise ResultError(f"{folder}: fields.pvd lists no frame")
+    return run
+
+
+def _values(frame, arguments, quantity):
+    try:
+        if arguments.along:
+            known = frame.run.summary["boundaries"]
+            if arguments.along not in known:
+                raise ValueError(f"there is no boundary {arguments.along}; there are {', '.join(known)}")
+            return frame.along(arguments.along, quantity)
+        x0, y0, x1, y1 = arguments.line
+        return frame.line((x0, y0), (x1, y1), quantity)
+    except ValueError as error:
+        raise ResultError(f"{frame.run.folder}: {error}") from None

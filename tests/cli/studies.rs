@@ -1,0 +1,98 @@
+//! `signorini study`, `table`, curves of `figures`, and the Python module that reads results.
+
+use crate::test_directory::TestDirectory;
+use std::process::Command;
+
+/// Whether Python lacks what the scripts import.
+fn lacks(said: &crate::test_directory::ProgramOutput) -> bool {
+    said.err.contains("apt install python3-matplotlib")
+}
+
+#[test]
+fn a_study_runs_all_combinations_once_and_tells_their_figures() {
+    let directory = TestDirectory::new();
+    let words = ["study", "scene.toml", "--set", "material.young=80,160", "--set"];
+    let words = [&words[..], &["boundary.top.traction=[0, -1],[0, -3]", "--out", "out/s"]].concat();
+    let said = directory.say(&words);
+    if lacks(&said) {
+        return;
+    }
+    assert_eq!(said.code, Some(0), "{said:?}");
+    assert!(said.out.starts_with("4 runs, 0 of them complete"), "{}", said.out);
+    let table = directory.read("out/s/study.csv");
+    let rows: Vec<_> = table.lines().map(|line| line.trim_end()).collect();
+    assert_eq!(rows.len(), 5, "{table}");
+    assert!(rows[0].starts_with("run,material.young,boundary.top.traction,end_time"), "{table}");
+    // No frames, but the last state of Γ_C.
+    let folder = "out/s/young=80__traction=_0_-1_";
+    let folder =
+        directory.names("out/s").into_iter().find(|n| n.starts_with("young=80")).expect(folder);
+    let names = directory.names(&format!("out/s/{folder}"));
+    assert!(!names.iter().any(|name| name.starts_with("fields")), "{names:?}");
+    assert_eq!(directory.read(&format!("out/s/{folder}/contact.csv")).lines().count(), 6);
+
+    // Nothing is repeated but what is missing.
+    directory.write(&format!("out/s/{folder}/summary.json"), "{");
+    let again = directory.say(&words);
+    assert!(again.out.starts_with("4 runs, 3 of them complete"), "{}", again.out);
+    assert_eq!(again.out.lines().filter(|line| line.starts_with("4/4")).count(), 1);
+
+    let all = ["table", &format!("out/s/{folder}"), "out/s/nothing"].map(str::to_owned);
+    let words: Vec<_> = all.iter().map(String::as_str).collect();
+    directory.say(&words).fails(2, &["out/s/nothing/summary.json: No such file"]);
+}
+
+#[test]
+fn a_failing_run_of_a_study_is_told_and_the_others_go_on() {
+    let directory = TestDirectory::new();
+    let said = directory.say(&["study", "scene.toml", "--set", "material.poisson=0.3,0.7"]);
+    if lacks(&said) {
+        return;
+    }
+    assert_eq!(said.code, Some(1), "{said:?}");
+    assert!(said.out.contains("material.poisson must be between"), "{}", said.out);
+    assert_eq!(directory.read("out/scene-study/study.csv").lines().count(), 2);
+}
+
+/// Uniform pressure 3 on the unit square: u_y = −3 y/E, σ_yy = −3.
+#[test]
+fn curves_and_the_python_module_give_the_exact_fields() {
+    let directory = TestDirectory::new();
+    directory.run(&["--set", "discretisation.displacement=2"]);
+    let words = ["figures", "out/scene", "--line", "0.5,0,0.5,1.5", "--quantity", "u_y,stress_yy"];
+    let said = directory.say(&[&words[..], &["--times", "0.5,1", "--format", "svg"]].concat());
+    if lacks(&said) {
+        return;
+    }
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let table = directory.read("out/scene/curves_line_stress_yy.csv");
+    let rows: Vec<Vec<&str>> = table.lines().skip(1).map(|row| row.split(',').collect()).collect();
+    assert_eq!(rows.len(), 2 * 401);
+    for row in rows {
+        let [time, s, stress] = [1, 2, 3].map(|i| row[i].trim().parse::<f64>().expect("a number"));
+        match s <= 1.0 {
+            true => assert!((stress + 3.0 * time).abs() < 1e-5, "{row:?}"),
+            false => assert!(stress.is_nan(), "{row:?}"),
+        }
+    }
+    directory
+        .say(&["figures", "out/scene", "--along", "none"])
+        .fails(2, &["there is no boundary none"]);
+
+    let scripts = concat!(env!("CARGO_MANIFEST_DIR"), "/scripts");
+    let program = format!(
+        "import sys; sys.path.insert(0, '{scripts}')\n\
+         from signorini_results import load\n\
+         run = load('out/scene')\n\
+         frame = run.frame(1)\n\
+         along, gap = frame.along('bottom', 'gap')\n\
+         print(along.max(), abs(gap).max() < 1e-9, run.times[-1])\n\
+         s, u = frame.line((0.3, 0), (0.3, 1), 'u_y', 3)\n\
+         print(abs(u[2] - 2*u[1]) < 1e-6*abs(u[2]), u[2] < -3/80, len(run.history['work']))"
+    );
+    let python = std::env::var("PYTHON").unwrap_or("/usr/bin/python3".to_owned());
+    let ran = Command::new(python).args(["-c", &program]).current_dir(directory.path(".")).output();
+    let ran = ran.expect("Python");
+    assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+    assert_eq!(String::from_utf8_lossy(&ran.stdout), "1.0 True 1.0\nTrue True 11\n");
+}
