@@ -1,6 +1,42 @@
 //! **signorini**: an elastic body pressed against a rigid foundation while its
 //! material is damaged.
 //!
+//! # Use it as a library
+//!
+//! The program is a thin layer over this crate. This one reads a scene, runs it and prints its figures:
+//!
+//! ```
+//! use signorini::{
+//!     estimate,
+//!     evolution::{DiscreteProblem, Phases},
+//!     mesh::Mesh,
+//!     petsc::Session,
+//!     scene::Scene,
+//! };
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let text = "mesh.file = 'square.msh'
+//!     material = { young = 1e5, poisson = 0.3, plane = 'stress' }
+//!     time = { end = 1, step = 0.25 }
+//!     boundary = [{ name = 'bottom', gap = 0 }, { name = 'top', pressure = '500*t' }]";
+//! let scene = Scene::parse(text, "square.toml".as_ref(), &[])?;
+//! // Scene::read("file.toml") and mesh::load(&scene.mesh.file, …) read files.
+//! let problem = DiscreteProblem::new(scene, Mesh::rectangle(1.0, 1.0, 8, 8))?;
+//! let session = Session::start(&[])?;
+//! let phases = Phases::default();
+//! let outcome = estimate::run(&session, &problem, "active-set", &phases, &mut |step| {
+//!     println!("t = {}: largest |u| = {}", step.record.time, step.record.displacement_max);
+//!     Ok(())
+//! })?;
+//! let force = outcome.last.record.contact_force;
+//! assert!((force - 500.0).abs() < 1e-6, "contact balances the pressure");
+//! println!("error of u: {:.1} %", 100.0 * outcome.errors.displacement_mesh);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! How to write a contact solver: [`contact::ContactSolver`].
+//!
 //! # The problem
 //!
 //! A plane body Ω, 1 m thick, is clamped on Γ_D and loaded by f_N on Γ_N and by a body force f_B. It may touch a

@@ -132,7 +132,7 @@ fn advice(contrast: &Option<String>) -> String {
 
 impl ContactError {
     /// A method ended above the tolerance.
-    pub(super) fn stopped(
+    pub fn stopped(
         method: &str,
         report: ContactReport,
         residuals: Kkt,

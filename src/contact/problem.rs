@@ -94,7 +94,10 @@ impl ContactProblem<'_> {
     }
 
     /// Kc − f, N.
-    pub(super) fn residual(&self, c: &Vector) -> Result<Vector, PetscError> {
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub fn residual(&self, c: &Vector) -> Result<Vector, PetscError> {
         let mut residual = Vector::zeros(self.session, c.owned())?;
         self.stiffness.multiply(c, &mut residual)?;
         residual.axpby(-1.0, self.load, 1.0)?;
@@ -103,7 +106,10 @@ impl ContactProblem<'_> {
 
     /// The KKT residuals of `c` with the assembled K. (The [`Certificate`](super::Certificate) decides about
     /// an answer.)
-    pub(super) fn residuals(&self, c: &Vector) -> Result<Kkt, PetscError> {
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub fn residuals(&self, c: &Vector) -> Result<Kkt, PetscError> {
         let residual = self.residual(c)?;
         let scales = self.scales_at(c)?;
         residual.read(|r| {

@@ -25,6 +25,60 @@ use serde::Deserialize;
 pub const PREFIX: &str = "elastic_";
 
 /// A method for the contact problem. It keeps nothing between solves.
+///
+/// To write one, implement this trait in a file of `src/contact/solvers` and add it to [`REGISTRY`]: the command
+/// line, `compare` and the tests then know it, and the certificate checks its answers. This one relaxes each unknown
+/// in turn, cut to its bounds (projected Gauss–Seidel), on one rank, for bodies that are held:
+///
+/// ```
+/// use signorini::{
+///     contact::{ContactError, ContactProblem, ContactReport, ContactSolver},
+///     linear::LinearSolver,
+///     petsc::Vector,
+/// };
+///
+/// struct GaussSeidel;
+///
+/// impl ContactSolver for GaussSeidel {
+///     fn name(&self) -> &'static str {
+///         "gauss-seidel"
+///     }
+///
+///     fn solve(
+///         &self,
+///         problem: &ContactProblem,
+///         _elastic: &mut LinearSolver, // solves K x = r by PETSc's KSP, where a method needs it
+///         _warm: &mut Vec<f64>,
+///         c: &mut Vector,
+///     ) -> Result<ContactReport, ContactError> {
+///         let load = problem.load.read(<[f64]>::to_vec)?;
+///         let (mut x, mut report) = (c.read(<[f64]>::to_vec)?, ContactReport::default());
+///         let mut bounds = vec![[f64::NEG_INFINITY, f64::INFINITY]; x.len()];
+///         problem.bounds.iter().for_each(|bound| bounds[bound.dof] = [bound.lower, bound.upper]);
+///         while report.iterations < 100_000 {
+///             report.iterations += 1;
+///             for i in 0..x.len() {
+///                 // Row i of K: r = f_i − Σ K_ij x_j.
+///                 let (r, diagonal) = problem.stiffness.read_row(i as i32, |columns, values| {
+///                     let row = columns.iter().zip(values);
+///                     row.fold((load[i], 0.0), |(r, d), (&j, k)| {
+///                         let j = j as usize;
+///                         (r - k * x[j], if j == i { *k } else { d })
+///                     })
+///                 })?;
+///                 x[i] = (x[i] + r / diagonal).clamp(bounds[i][0], bounds[i][1]);
+///             }
+///             c.set(&x)?;
+///             let residuals = problem.residuals(c)?; // print them to see how a method converges
+///             if residuals.worst() <= problem.tolerance {
+///                 return Ok(report);
+///             }
+///         }
+///         let residuals = problem.residuals(c)?;
+///         Err(ContactError::stopped(self.name(), report, residuals, "too many iterations"))
+///     }
+/// }
+/// ```
 pub trait ContactSolver {
     /// Its name in a scene and for `--solver`.
     fn name(&self) -> &'static str;

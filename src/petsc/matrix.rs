@@ -212,7 +212,10 @@ impl Matrix {
     }
 
     /// Calls `reader` with the columns (increasing) and the values of an owned row (MatGetRow).
-    pub(crate) fn read_row<R>(
+    ///
+    /// # Errors
+    /// The row is not owned.
+    pub fn read_row<R>(
         &self,
         row: i32,
         reader: impl FnOnce(&[i32], &[f64]) -> R,
