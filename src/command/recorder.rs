@@ -20,7 +20,7 @@ use signorini::{
     problem::COLLAPSE_ACCURACY,
     scene::{Stepping, rounded},
 };
-use std::{collections::BTreeMap, time::Instant};
+use std::{collections::BTreeMap, fs, time::Instant};
 
 /// The approximate number of frames if the scene has no `output.every`.
 const FRAMES: usize = 20;
@@ -155,6 +155,7 @@ impl<'a> Recorder<'a> {
         if result.is_ok() {
             checkpoint::remove(&task.folder, task.problem.body.nodes.partition.comm().rank(), None);
         }
+        let memory = task.problem.body.nodes.partition.comm().total(peak_memory());
         // Only the first rank goes on from here.
         let Some(bar) = &self.bar else { return written };
 
@@ -167,6 +168,7 @@ impl<'a> Recorder<'a> {
         let wall = task.started.elapsed().as_secs_f64();
         let mut summary = summary(task, record, &quantities, result, &notes, wall);
         summary["largest_stress"] = json!(peak);
+        summary["peak_megabytes"] = json!(memory);
         if record.is_some() {
             let path = task.folder.join("summary.json");
             write_whole(&path, format!("{summary:#}\n").as_bytes())?;
@@ -183,6 +185,7 @@ impl<'a> Recorder<'a> {
             lines.push(String::new());
             lines.extend(profile::remarks(task.phases, steps, self.stepping));
         }
+        lines.push(screen::row("cost", format!("{wall:.2} s, {memory:.0} MB")));
         bar.finish();
         say(&lines.join("\n"));
         written
@@ -210,6 +213,14 @@ impl Observer for Recorder<'_> {
         self.saved = Instant::now();
         Ok(())
     }
+}
+
+/// The peak memory of this process, MB (proc(5)); 0 where the system does not tell it.
+fn peak_memory() -> f64 {
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    let kilobytes = line.and_then(|line| line.split_whitespace().next()?.parse::<f64>().ok());
+    kilobytes.unwrap_or(0.0) * 1024.0 / 1e6
 }
 
 /// `summary.json` of a run that took `wall` seconds. The values of the last accepted state are null if the

@@ -9,7 +9,7 @@ use super::expression::Expression;
 use super::{Damage, Probe, Scene, may_start_at, rounded};
 use crate::{
     fem::{gauss_points, midpoint},
-    mesh::{Curve, Mesh},
+    mesh::{CORNER_ANGLE, Curve, Mesh},
     suggestion::suggestion,
 };
 
@@ -149,7 +149,10 @@ impl Scene {
             Some(curve) => return Ok(curve),
             None => {
                 let known: Vec<&str> = mesh.curves.keys().map(String::as_str).collect();
-                let suggestion = suggestion(&boundary.name, &known);
+                let suggestion = match known.is_empty() {
+                    true => no_curves(mesh, &boundary.name),
+                    false => suggestion(&boundary.name, &known),
+                };
                 format!("is no physical curve of the mesh{suggestion}")
             }
         };
@@ -282,4 +285,24 @@ impl Scene {
 /// A key of a boundary, in full.
 fn boundary_key(name: &str, key: &str) -> String {
     format!("boundary.{name}.{key}")
+}
+
+/// The end of a message about a mesh without physical curves: how to name them, and the corners between them.
+fn no_curves(mesh: &Mesh, name: &str) -> String {
+    let mut sides = BTreeMap::<usize, Vec<[f64; 2]>>::new();
+    for edge in mesh.boundary_edges() {
+        edge.iter().for_each(|node| sides.entry(*node).or_default().push(mesh.edge_normal(edge).0));
+    }
+    let is_corner = |normals: &[[f64; 2]]| match normals {
+        [a, b] => a[0] * b[0] + a[1] * b[1] < CORNER_ANGLE.cos(),
+        _ => true,
+    };
+    let corners = sides.iter().filter(|(_, normals)| is_corner(normals)).take(12);
+    let corners =
+        corners.map(|(&node, _)| format!("({}, {})", mesh.nodes[node][0], mesh.nodes[node][1]));
+    format!(
+        ", which has none: name each in the .geo, as in Physical Curve(\"{name}\") = {{1}}; the boundary has \
+         corners at {}",
+        corners.collect::<Vec<_>>().join(", ")
+    )
 }

@@ -16,11 +16,27 @@ use std::{
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue};
 
-/// The JSON schema of scenes. It has four additional words: `values` describes the values in messages, `absent`
-/// the behaviour without the key, `example` a value, and `format` the kind of an expression.
+/// The JSON schema of scenes. It has six additional words: `values` describes the values in messages, `absent` the
+/// behaviour without the key, `example` a value, `format` the kind of an expression, `also` other usual names of the
+/// key, and `parameters_in` the table that has the parameters of a geometry.
 pub const SCHEMA: &str = include_str!("../../geo/scene.schema.json");
 
 static KEYS: LazyLock<Schema> = LazyLock::new(|| serde_json::from_str(SCHEMA).unwrap_or_default());
+
+/// The end of a message about a key that is called differently: by the names `also` in use for a key, or as a
+/// parameter in the table `parameters` of this one.
+fn usual_name(schema: &Schema, name: &str, value: &DeValue) -> Option<String> {
+    let is_it = |of: &Schema| {
+        of["also"].as_array().is_some_and(|also| also.iter().any(|other| other == name))
+    };
+    let mut keys = schema["properties"].as_object()?.iter();
+    if let Some((key, _)) = keys.find(|(_, of)| is_it(of)) {
+        return Some(format!("; did you mean `{key}`?"));
+    }
+    let is_number = matches!(value, DeValue::Integer(_) | DeValue::Float(_));
+    let table = schema["parameters_in"].as_str().filter(|_| is_number)?;
+    Some(format!("; did you mean `{table}.{name}`?"))
+}
 
 /// A contradiction within a table: the key below that of the table ("" for the whole table), and the problem.
 pub(super) type Fault = (&'static str, String);
@@ -92,7 +108,10 @@ impl<'t> Findings<'t> {
                 Some(schema) => self.check_value(key, place, value, schema),
                 None if is_named => self.check_value(key, place, value, named),
                 None => {
-                    let suggestion = suggestion(name.get_ref(), &known);
+                    let similar = suggestion(name.get_ref(), &known);
+                    let suggestion = usual_name(schema, name.get_ref(), value)
+                        .filter(|_| !similar.contains("did you mean"))
+                        .unwrap_or(similar);
                     is_misspelt |= suggestion.contains("did you mean");
                     self.problems.push((place, format!("unknown key {key}{suggestion}")));
                 }

@@ -28,7 +28,9 @@ fn results(directory: &TestDirectory, folder: &str) -> BTreeMap<String, String> 
         "summary.json" => {
             let mut summary = directory.summary(folder);
             let entries = summary.as_object_mut().expect("a table");
-            for name in ["wall_seconds", "seconds_per_step", "phases", "provenance"] {
+            for name in
+                ["wall_seconds", "peak_megabytes", "seconds_per_step", "phases", "provenance"]
+            {
                 entries.remove(name);
             }
             summary.to_string()

@@ -7,7 +7,8 @@ use super::{
 use std::collections::BTreeMap;
 
 /// Entries of `summary.json` that tell how long a run took.
-const TIMES: [&str; 4] = ["provenance", "wall_seconds", "seconds_per_step", "phases"];
+const TIMES: [&str; 5] =
+    ["provenance", "wall_seconds", "peak_megabytes", "seconds_per_step", "phases"];
 
 /// The files of a run's folder by name, without what tells seconds.
 pub fn results(test_directory: &TestDirectory, folder: &str) -> BTreeMap<String, Vec<u8>> {
