@@ -28,7 +28,7 @@ export SIGNORINI_COMMIT := $(shell git describe --always --dirty 2>/dev/null)
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
 .PHONY: help deps deps-validate deps-random build mesh run figures test validate random compare \
-    bench stability reference converge chart accuracy promises \
+    bench stability reference converge paper chart accuracy promises \
     fuzz clean
 
 help:
@@ -47,6 +47,7 @@ help:
 	@echo 'make stability  the maps of where methods fail; or MAPS="step-size …"'
 	@echo 'make reference  the reference solution of a scene, unless it is there (minutes); or STUDY=geo/a.toml'
 	@echo 'make converge   errors against it on nested meshes: Table 1, Figure 3; or STUDY=geo/a.toml'
+	@echo 'make paper      the paper'"'"'s Figures 1 to 9 and Table 1 into out/paper (minutes; or ARGS=--quick)'
 	@echo 'make chart      error against seconds: meshes, orders, --accuracy, solvers; or CHART="geo/a.toml …"'
 	@echo 'make accuracy   true errors over the accuracy asked for (minutes); or ACCURACY="geo/a.toml …"'
 	@echo 'make promises   bars and "reached" of --accuracy on bodies that are not shipped (half an hour, once)'
@@ -117,6 +118,9 @@ reference: build
 
 converge: build
 	$(PYTHON) validation/converge.py --binary $(BINARY) $(ARGS) $(STUDY)
+
+paper: build
+	$(PYTHON) validation/paper.py --binary $(BINARY) $(ARGS)
 
 # Whole processes against references of their own, which are kept (minutes); out/chart/chart.png.
 chart: build deps

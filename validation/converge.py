@@ -255,7 +255,13 @@ def draw(rows, path):
     figure.savefig(path)
 
 
-def main():
+def errors_of_table_1(binary):
+    """The rows of the study of the paper's Table 1."""
+    return list(Study(arguments_of(["--binary", str(binary)])).rows())
+
+
+def arguments_of(words=None):
+    """The command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("scene", type=Path, nargs="?", default=ROOT / "geo" / f"{PAPER}.toml")
     parser.add_argument("--binary", type=Path, default=ROOT / "target" / "release" / "signorini")
@@ -265,7 +271,11 @@ def main():
     parser.add_argument("--grading", type=float, help="of the coarsest mesh (default: the scene's)")
     parser.add_argument("--step", type=float, help="of the reference, s (default: T/1000)")
     parser.add_argument("--out", type=Path, help="folder for the table and the figure (default: out/converge/<scene>)")
-    arguments = parser.parse_args()
+    return parser.parse_args(words)
+
+
+def main():
+    arguments = arguments_of()
     study = Study(arguments)
     if arguments.reference:
         print(study.reference())

@@ -1,0 +1,184 @@
+#!/usr/bin/python3
+"""The paper's Figures 1 to 9 and its Table 1 in its layout, into out/paper: displacements × 10, ζ rather than 1 − ζ,
+and a sheet of all of them for a reader who has the paper beside it.
+
+    paper.py [--binary FILE] [--quick]
+
+--quick leaves out Table 1 and Figure 3, whose runs take some minutes. What the paper does not print is listed at the
+end.
+"""
+
+import argparse
+import subprocess
+from pathlib import Path
+
+import numpy as np
+
+from shared import ROOT
+import converge
+import drawing
+from drawing import BLUE, INK, RED, plt
+from limits import limits_of
+from maps import draw_deformed, draw_stress_and_damage
+from reading import read_results
+from results import write_table
+from setting import draw_setting
+
+# Scene, overrides, and the figures of its run: number → drawing.
+RUNS = {
+    "square": (["mesh.size=0.125", "time.end=0.01", "time.step=0.01"], {2: "setting"}),
+    "lshape": ([], {4: "setting", 5: "deformed", 6: "stress"}),
+    "bridge": ([], {7: "setting", 8: "deformed", 9: "stress"}),
+}
+CAPTIONS = {
+    1: "A frictionless contact problem between an elastic body and a rigid obstacle.",
+    2: "Example I: physical setting, and mesh for n = 8.",
+    3: "Example I: the error against h + k, in the norm of Corollary 7.",
+    4: "Example II: contact problem of an L-shaped domain.",
+    5: "Example II: deformed mesh (× 10) and initial configuration.",
+    6: "Example II: von Mises stress and damage at the final time.",
+    7: "Example III: a U-shaped domain.",
+    8: "Example III: deformed mesh (× 10) and initial configuration.",
+    9: "Example III: von Mises stress and damage at the final time.",
+}
+OURS = """\
+What the paper does not print, and what we took (geo/*.toml):
+  Figures 4 and 7 have no dimensions. Ours: the leg of the L is [0, 2] x [0, 4] m, its arm [0, 8] x [4, 6] m, with the
+    obstacle under 6 <= x <= 8; the bridge is [0, 12] x [0, 6] m with the opening [2, 10] x [0, 4] m, its load on
+    4 <= x <= 8 of the top.
+  Table 1: with the printed load of Example I, (-10, -10), the run stops at zeta_*, before T = 1. The errors fit a load
+    of (-5, 0), with all else as printed: geo/square-table1.toml.
+  Table 1 compares with n = 256, k = 1e-4; ours with n = 256 and second-order steps of k = 1e-3.
+  Meshes of Figures 5 and 8 are finer here, and graded towards the corners."""
+
+
+def solved(binary, name, sets, folder):
+    """The results of a scene."""
+    words = [word for text in sets for word in ("--set", text)]
+    subprocess.run([binary, "run", ROOT / "geo" / f"{name}.toml", *words, "--out", folder],
+                   check=True, stdout=subprocess.DEVNULL)
+    return read_results(folder)
+
+
+def draw_sketch():
+    """Figure 1: the body Ω, the parts Γ_D, Γ_N, Γ_C of its boundary, and the gap g to the obstacle."""
+    figure, axes = plt.subplots(figsize=(5.0, 3.6))
+    angle = np.linspace(0.0, 2 * np.pi, 400)
+    radius = 1.0 + 0.08 * np.cos(3 * angle) + 0.05 * np.sin(2 * angle)
+    x, y = 1.5 * radius * np.cos(angle), radius * np.sin(angle)
+    axes.fill(x, y, color="#edf1f5")
+    axes.plot(x, y, color=INK, linewidth=1.0)
+    for low, high, colour, name, place in (
+            (2.2, 4.0, BLUE, r"$\Gamma_D$", (-1.95, 0.2)),
+            (4.2, 5.3, INK, r"$\Gamma_C$", (0.0, -0.72)), (0.2, 1.6, RED, r"$\Gamma_N$", (1.15, 0.85))):
+        part = (angle >= low) & (angle <= high)
+        axes.plot(x[part], y[part], color=colour, linewidth=2.6)
+        axes.text(*place, name, color=colour, fontsize=13)
+    axes.axhline(-1.3, color=INK, linewidth=2.0)
+    axes.fill_between([-2.2, 2.2], -1.3, -1.45, hatch="////", facecolor="none", edgecolor=INK, linewidth=0)
+    axes.annotate("", (-0.35, -1.3), (-0.35, -0.95), arrowprops={"arrowstyle": "<->", "color": INK})
+    axes.text(-0.28, -1.18, "g", fontsize=12)
+    axes.annotate("", (0.45, -1.25), (0.4, -0.9), arrowprops={"arrowstyle": "->", "color": INK})
+    axes.text(0.52, -1.12, r"$\nu$", fontsize=12)
+    for top in (0.55, 0.95, 1.3):
+        k = np.abs(angle - top).argmin()
+        axes.annotate("", (x[k], y[k]), (1.25 * x[k], 1.3 * y[k]),
+                      arrowprops={"arrowstyle": "->", "color": RED})
+    axes.text(1.55, 1.15, r"$\mathbf{f}_N$", color=RED, fontsize=13)
+    axes.text(-0.1, 0.0, r"$\Omega$", fontsize=15)
+    axes.text(1.25, -1.68, "obstacle", fontsize=10)
+    axes.set(xlim=(-2.3, 2.3), ylim=(-1.75, 1.6), aspect="equal")
+    axes.axis("off")
+    return figure
+
+
+def draw_mesh(results):
+    """The setting of Figure 2 has its mesh beside it."""
+    figure, axes = plt.subplots(figsize=(3.6, 3.6))
+    axes.triplot(*results.nodes.T, results.pieces.elements[:, :3], color=INK, linewidth=0.8)
+    axes.set_aspect("equal")
+    axes.axis("off")
+    return figure
+
+
+def written(figure, out, name):
+    """Saves a figure as PNG and PDF; returns the path of the PNG."""
+    for ending in ("pdf", "png"):
+        path = out / f"{name}.{ending}"
+        figure.savefig(path)
+    plt.close(figure)
+    print(path)
+    return path
+
+
+def figures(binary, out):
+    """Draws the figures of the runs; returns the PNGs by number."""
+    drawing.DAMAGE = "zeta"
+    found = {1: [written(draw_sketch(), out, "figure-1")]}
+    for name, (sets, drawn) in RUNS.items():
+        results = solved(binary, name, sets, out / "runs" / name)
+        limits = limits_of([results], 10.0)
+        for number, kind in drawn.items():
+            draw = {"setting": draw_setting, "deformed": draw_deformed, "stress": draw_stress_and_damage}
+            found[number] = [written(draw[kind](results, limits), out, f"figure-{number}")]
+        if name == "square":
+            found[2].append(written(draw_mesh(results), out, "figure-2-mesh"))
+    return found
+
+
+def table_1(rows, out):
+    """Table 1 as CSV and as LaTeX: a row for each n, a column for each k, ours over the printed value in brackets."""
+    rows = [row for row in rows if row["printed"]]
+    write_table([{key: row[key] for key in ("h", "k", "sum", "printed")} for row in rows], out / "table-1.csv")
+    steps = sorted({row["k"] for row in rows}, reverse=True)
+    of = {(row["h"], row["k"]): row for row in rows}
+    lines = [" & ".join(["$n$", *(f"$k = {k:g}$" for k in steps)]) + r" \\ \hline"]
+    for h in dict.fromkeys(row["h"] for row in rows):
+        cells = [f"{of[h, k]['sum']:.4g} ({of[h, k]['sum'] / of[h, k]['printed']:.2f})" for k in steps]
+        lines.append(" & ".join([f"{np.sqrt(2) / h:.0f}", *cells]) + r" \\")
+    text = "\n".join([f"% Errors of Example I, and in brackets their ratios to the printed ones.",
+                      rf"\begin{{tabular}}{{r{'c' * len(steps)}}}", *lines, r"\end{tabular}", ""])
+    (out / "table-1.tex").write_text(text, encoding="utf-8")
+    print(out / "table-1.csv", out / "table-1.tex", sep="\n")
+
+
+def draw_figure_3(rows):
+    figure, axes = plt.subplots(figsize=(5.4, 4.2))
+    converge.draw_sums(axes, rows)
+    axes.legend(fontsize=8)
+    return figure
+
+
+def sheet(found, out):
+    """All figures on one page, with their captions."""
+    numbers = sorted(found)
+    columns = 3
+    lines = -(-len(numbers) // columns)
+    page, grid = plt.subplots(lines, columns, figsize=(16.5, 4.4 * lines), squeeze=False)
+    for axes in grid.flat:
+        axes.axis("off")
+    for axes, number in zip(grid.flat, numbers):
+        axes.imshow(plt.imread(found[number][0]))
+        axes.set_title(f"Figure {number}. {CAPTIONS[number]}", fontsize=8.5, loc="left")
+    written(page, out, "sheet")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--binary", type=Path, default=ROOT / "target" / "release" / "signorini")
+    parser.add_argument("--quick", action="store_true", help="without Table 1 and Figure 3")
+    parser.add_argument("--out", type=Path, default=ROOT / "out" / "paper")
+    arguments = parser.parse_args()
+    out = arguments.out
+    out.mkdir(parents=True, exist_ok=True)
+    found = figures(arguments.binary.resolve(), out)
+    if not arguments.quick:
+        rows = converge.errors_of_table_1(arguments.binary)
+        table_1(rows, out)
+        found[3] = [written(draw_figure_3(rows), out, "figure-3")]
+    sheet(found, out)
+    print(OURS)
+
+
+if __name__ == "__main__":
+    main()
