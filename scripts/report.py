@@ -16,6 +16,7 @@ from functools import partial
 from string import Template
 
 import matplotlib.pyplot as plt
+import numpy as np
 
 from bars import barred, bars
 from contact_pressure import draw_evolution, draw_pressure
@@ -29,7 +30,7 @@ from results import telling
 from setting import draw_setting
 
 # The largest number of frames of the slider.
-FRAMES = 30
+FRAMES = 15
 # Values of summary.json for the last state: key, name, kind of unit.
 FACTS = (
     ("solver", "contact solver", ""), ("ranks", "ranks", ""), ("nodes", "nodes", ""),
@@ -108,6 +109,50 @@ def facts(results):
     return table(rows)
 
 
+def governing(everything, units):
+    """The extreme values of the run, with their places and times."""
+    kinds = (
+        ("largest tension σ₁", "stress", lambda state: state.principal[:, 0], 1.0),
+        ("largest compression −σ₂", "stress", lambda state: -state.principal[:, 1], 1.0),
+        ("largest von Mises stress", "stress", lambda state: state.von_mises, 1.0),
+        ("largest contact pressure", "stress", lambda state: state.pressure, 1.0),
+        ("largest displacement", "length", lambda state: np.linalg.norm(state.displacement, axis=1), 1.0),
+        ("least ζ", "", lambda state: state.zeta, -1.0),
+    )
+    rows = []
+    for name, kind, of, sign in kinds:
+        found = [(sign * (sign * of(state)).max(), state, (sign * of(state)).argmax()) for state in everything]
+        value, state, node = max(found, key=lambda one: sign * one[0])
+        if value == (1.0 if name == "least ζ" else 0.0):
+            continue
+        x, y = state.nodes[node]
+        singular = f"singular: {html.escape(state.singular)}" if kind == "stress" and state.singular else ""
+        rows.append((name, f"{value:.4g}", html.escape(units.get(kind, "")), f"({x:.4g}, {y:.4g})",
+                     f"{state.time:g} {html.escape(units['time'])}", singular))
+    head = "<tr><th></th><th>value</th><th></th><th>at</th><th>time</th><th></th></tr>"
+    return table(rows).replace("<table>", f"<table>{head}")
+
+
+def body(results):
+    """Dimensions, materials, and the resultants of the supports."""
+    units, scene = results.units, results.scene
+    low, high = results.nodes.min(axis=0), results.nodes.max(axis=0)
+    material = scene.get("material", {})
+    rows = [("dimensions", f"{high[0] - low[0]:.4g} × {high[1] - low[1]:.4g} {html.escape(units['length'])}"),
+            ("plane", html.escape(str(material.get("plane", ""))))]
+    surfaces = {name: {**material, **of} for name, of in material.items() if isinstance(of, dict)}
+    for name, of in {"material": material, **surfaces}.items():
+        words = [f"E = {of['young']:g} {units['stress']}", f"ν = {of['poisson']:g}"] if "young" in of else []
+        words += [f"ρ = {of['density']:g}"] if of.get("density") else []
+        rows.append((html.escape(name), html.escape(", ".join(words))))
+    quantities = results.summary.get("quantities", {})
+    for name in dict.fromkeys(key.rpartition(".")[0] for key in quantities if key.endswith(".moment")):
+        x, y, moment = (quantities[f"{name}.{part}"] for part in ("force_x", "force_y", "moment"))
+        rows.append((f"on the body at {html.escape(name)}", html.escape(
+            f"force ({x:.5g}, {y:.5g}) {units['line']}, moment about (0, 0) {moment:.5g} {units['force']}")))
+    return table(rows)
+
+
 def timings(summary):
     """The phases of the run with bars, the longest first."""
     wall = summary.get("wall_seconds") or 1.0
@@ -132,7 +177,7 @@ def provenance(summary):
     return table(rows)
 
 
-def page(results):
+def page(results, arguments):
     """The text of the page."""
     summary, limits = results.summary, limits_of([results])
     scene = results.folder / "scene.toml"
@@ -145,7 +190,10 @@ def page(results):
     ending = error and f"failed: {error}" or results.ending.replace("$_*$", "_*")
     with_overrides = results.overrides and f"with {results.overrides}"
     return Template(PAGE).substitute(
-        title=html.escape(results.title),
+        title=html.escape(arguments.title or results.title),
+        byline=html.escape(" · ".join(filter(None, (arguments.author, arguments.date)))),
+        governing=governing(everything, results.units),
+        body=body(results),
         subtitle=html.escape(with_overrides),
         ending=html.escape(ending),
         facts=facts(results),
@@ -177,12 +225,15 @@ def main(prog=None):
     parser = argparse.ArgumentParser(
         prog=prog, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", nargs="+", metavar="OUT", help="result folder")
-    failed = False
-    for folder in parser.parse_args().folders:
+    parser.add_argument("--title", help="default: that of the scene")
+    parser.add_argument("--author", default="")
+    parser.add_argument("--date", default="")
+    arguments, failed = parser.parse_args(), False
+    for folder in arguments.folders:
         with telling() as problems:
             results = read_results(folder)
             path = results.folder / "report.html"
-            path.write_text(page(results), encoding="utf-8")
+            path.write_text(page(results, arguments), encoding="utf-8")
             print(path)
         failed |= bool(problems)
     return 2 if failed else 0

@@ -27,13 +27,31 @@ PAGE = """<!DOCTYPE html>
   .slider { display: flex; gap: .8rem; align-items: center; margin: .6rem 0; }
   .slider input { flex: 1; }
   .slider output { min-width: 8rem; font-variant-numeric: tabular-nums; }
+  th { border-bottom: 1px solid #d5dae0; color: #66707a; }
+  @media (max-width: 480px) { .pair { grid-template-columns: 1fr; } td.bar { width: 4rem; } }
+  @page { size: A4; margin: 18mm 15mm; }
+  @media print {
+    :root { font-size: 11px; }
+    body { max-width: none; padding: 0; }
+    .slider, .frames { display: none; }
+    .pair { grid-template-columns: 1fr 1fr; }
+    h2 { break-after: avoid; }
+    img, table, .pair { break-inside: avoid; }
+    img { max-height: 105mm; }
+    pre { white-space: pre-wrap; }
+  }
 </style>
 </head>
 <body>
 <h1>$title</h1>
+<p class="quiet">$byline</p>
 <p class="quiet">$subtitle</p>
 <p class="ending">$ending</p>
 <div class="pair"><div class="facts">$facts</div><div>$setting</div></div>
+<h2>Governing values</h2>
+$governing
+<h2>Body, materials, supports</h2>
+$body
 $slider
 <h2>Last state</h2>
 $pictures
@@ -55,13 +73,13 @@ $provenance
 </html>
 """
 
-SLIDER = """<h2>Frames</h2>
+SLIDER = """<h2 class="frames">Frames</h2>
 <div class="slider">
   <button id="play" type="button">play</button>
   <input id="frame" type="range" min="0" max="$last" value="$last" aria-label="frame">
   <output id="time"></output>
 </div>
-<div class="pair">
+<div class="pair frames">
   <img id="state" alt="the body"><img id="pressure" alt="contact pressure and gap">
 </div>
 <script>
