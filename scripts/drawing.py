@@ -114,6 +114,15 @@ def stress_unit(largest, units):
 
 # What figures show of the damage: "zeta", "loss", or None to choose.
 DAMAGE = None
+# Whether maps have contour lines.
+CONTOURS = False
+
+
+def draw_contours(axes, mesh, values, high, low=0.0):
+    """Contour lines of values at the points of a triangulation, if they are asked for."""
+    if CONTOURS and high > low:
+        axes.tricontour(mesh, values, levels=np.linspace(low, high, 9)[1:-1], colors="white",
+                        linewidths=0.6, zorder=2)
 
 
 def damage_scale(least, largest):

@@ -13,7 +13,7 @@ force-displacement  the forces on the supports over the largest displacement
 
 With --line or --along: curves of fields at several times, of one or more runs, with their numbers as CSV.
 
-On request: contact-evolution, the pressure on Γ_C in time; damage (without damage: stress) and
+On request: mesh; contact-evolution, the pressure on Γ_C in time; damage (without damage: stress) and
 pressure as animations.
 """
 
@@ -30,7 +30,7 @@ from contact_pressure import draw_evolution, draw_pressure
 from histories import draw_damage_history, draw_force_displacement
 from limits import box_of, limits_of
 from lines import draw_curves
-from maps import draw_deformed, draw_stress_and_damage
+from maps import draw_deformed, draw_mesh, draw_stress_and_damage
 from paraview_script import write_script
 from principal import draw_principal
 from reading import evenly, read_results, states
@@ -78,6 +78,8 @@ def arguments_of(prog):
     parser.add_argument("--width", type=float, metavar="INCHES", help="the width of every figure")
     parser.add_argument("--damage", choices=("zeta", "loss"), help=(
         "draw ζ, as the paper does, or the loss 1 − ζ (default: ζ if it falls below 0.9)"))
+    parser.add_argument("--contours", action="store_true", help="contour lines of the stress and ζ")
+    parser.add_argument("--mesh", action="store_true", help="also mesh, the undeformed mesh")
     parser.add_argument("--evolution", action="store_true", help="also contact-evolution")
     parser.add_argument("--animate", nargs="?", const="gif", choices=MOVIES, help=(
         "also animations of damage (or stress) and pressure: gif, or mp4 by ffmpeg (default: gif)"))
@@ -143,6 +145,8 @@ def draw(results, limits, arguments):
     for name, figure in FIGURES.items():
         of = last if name in OF_ALL_TIMES else results
         save(styled(figure(results, limits), arguments), of, name, arguments.format)
+    if arguments.mesh:
+        save(styled(draw_mesh(results), arguments), last, "mesh", arguments.format)
     if arguments.evolution:
         stride = 1 + len(results.frames) // EVOLUTION
         chosen = states(results, results.frames[::stride])
@@ -161,7 +165,7 @@ def main(prog=None):
             for path in draw_curves(arguments, styled):
                 print(path)
         return 2 if problems else 0
-    drawing.DAMAGE = arguments.damage
+    drawing.DAMAGE, drawing.CONTOURS = arguments.damage, arguments.contours
     runs, failed = [], False
     for folder in arguments.folders:
         with telling() as problems:

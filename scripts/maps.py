@@ -6,7 +6,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.tri import Triangulation
 
 from drawing import (
-    BLUE, INK, RED, canvas, damage_scale, draw_colourbar, draw_foundation, draw_outline, frame, headline,
+    BLUE, INK, RED, canvas, damage_scale, draw_colourbar, draw_contours, draw_foundation, draw_outline, frame, headline,
     least_zeta, map_size, stress_unit,
 )
 
@@ -44,6 +44,21 @@ def draw_deformed(results, limits):
     text = f"deformed mesh at {results.moment}, {_amplified(results, limits)}"
     text += "" if results.unloaded else "; dashed: initial outline"
     axes.set_title(headline(results, text))
+    return figure
+
+
+def draw_mesh(results):
+    """The undeformed mesh."""
+    extent = np.ptp(results.nodes, axis=0)
+    width, height = map_size(extent, 7.2)
+    figure, axes = plt.subplots(figsize=(width, height + 0.4))
+    sides = results.pieces.along(results.pieces.sides(), results.nodes)
+    sides = np.pad(sides, ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
+    edge = np.sqrt(extent.prod() / len(results.pieces.elements)) * 72 * width / extent[0]
+    axes.plot(*sides.reshape(-1, 2).T, color=BLUE, linewidth=min(0.6, 0.06 * edge))
+    draw_outline(axes, results.nodes, results, color=INK, linewidth=0.9)
+    frame(axes, results.nodes, results.units)
+    axes.set_title(headline(results, f"mesh: {len(results.pieces.elements)} triangles"))
     return figure
 
 
@@ -119,6 +134,7 @@ def _paint_stress(axes, mesh, results, limits):
         mesh, results.pieces.at_points(results.von_mises / factor), shading="gouraud", cmap="viridis",
         vmin=0.0, vmax=limits.stress / factor or 1.0, rasterized=True,
     )
+    draw_contours(axes, mesh, results.pieces.at_points(results.von_mises / factor), limits.stress / factor)
     extend = "max" if limits.is_cut else "neither"
     draw_colourbar(axes, image, f"von Mises stress ({unit})", extend)
     largest = results.von_mises.max()
@@ -139,6 +155,7 @@ def _paint_damage(axes, mesh, results, limits):
         mesh, results.pieces.at_points(shown(results.zeta)), shading="gouraud", cmap=colours,
         vmin=low, vmax=high, rasterized=True,
     )
+    draw_contours(axes, mesh, results.pieces.at_points(shown(results.zeta)), high, low)
     draw_colourbar(axes, image, label)
     least = results.zeta.min()
     return rf"damage, least $\zeta$ = {results.barred('zeta_min', least) or least_zeta(least)}"

@@ -11,6 +11,8 @@ import html
 import io
 import json
 import multiprocessing
+import shutil
+import subprocess
 import sys
 from functools import partial
 from string import Template
@@ -26,7 +28,7 @@ from maps import draw_deformed, draw_state, draw_stress_and_damage
 from reading import evenly, read_results, states
 from principal import draw_principal
 from report_page import PAGE, SLIDER
-from results import telling
+from results import ResultError, telling
 from setting import draw_setting
 
 # The largest number of frames of the slider.
@@ -220,11 +222,27 @@ def page(results, arguments):
     )
 
 
+def printed(page):
+    """Prints the page to a PDF on A4 by Chromium; returns its path."""
+    browser = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if browser is None:
+        raise ResultError("--pdf needs Chromium (Debian: apt install chromium); or print the page yourself")
+    path = page.with_suffix(".pdf")
+    command = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--no-pdf-header-footer",
+               f"--print-to-pdf={path.resolve()}", page.resolve().as_uri()]
+    ended = subprocess.run(command, capture_output=True, text=True)
+    if ended.returncode:
+        raise ResultError(f"{browser} could not print {page}: {ended.stderr.strip().splitlines()[-1:]}")
+    return path
+
+
 def main(prog=None):
     """Returns the exit code: 2 if a folder lacks files for the report."""
     parser = argparse.ArgumentParser(
         prog=prog, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", nargs="+", metavar="OUT", help="result folder")
+    parser.add_argument("--pdf", action="store_true", help=(
+        "also report.pdf, by Chromium (Debian: apt install chromium)"))
     parser.add_argument("--title", help="default: that of the scene")
     parser.add_argument("--author", default="")
     parser.add_argument("--date", default="")
@@ -235,6 +253,8 @@ def main(prog=None):
             path = results.folder / "report.html"
             path.write_text(page(results, arguments), encoding="utf-8")
             print(path)
+            if arguments.pdf:
+                print(printed(path))
         failed |= bool(problems)
     return 2 if failed else 0
 

@@ -124,7 +124,7 @@ impl DiscreteProblem {
         (part > NOTICEABLE).then(|| {
             format!(
                 "|∇u| exceeds {LARGE} in {:.0} % of the body: strains or rotations are too large \
-                 for linear elasticity",
+                 for linear elasticity; if that is not meant, check the units of loads and moduli",
                 100.0 * part
             )
         })

@@ -93,11 +93,11 @@ pub fn lock(folder: &Path) -> Result<Option<File>, OutputError> {
 }
 
 /// The files of a run and its report besides frames and pictures.
-const FILES: &str = "contact.csv contact.pvd fields.pvd history.csv summary.json report.html \
+const FILES: &str = "contact.csv contact.pvd fields.pvd history.csv summary.json report.html report.pdf \
      open_in_paraview.py";
 /// The pictures, in alphabetical order.
 const PICTURES: &str = "contact-evolution damage damage-history deformed force-displacement \
-     pressure principal-stresses setting stress stress-damage";
+     mesh pressure principal-stresses setting stress stress-damage";
 /// Curves of fields are `CURVES_….csv` and pictures.
 const CURVES: &str = "curves";
 /// The names of incomplete files begin with this.

@@ -1,7 +1,10 @@
 //! Notes for the user on a problem, before any solve.
 
 use super::{DiscreteProblem, LoadCurve, unresolved};
-use crate::{mesh::Order, model::Plane};
+use crate::{
+    mesh::{Order, extent},
+    model::Plane,
+};
 use std::iter::once;
 
 /// In plane strain, P1 triangles lock if ν is larger (STABILITY.md). P2 triangles only converge more slowly.
@@ -9,6 +12,8 @@ const LOCKING: f64 = 0.45;
 /// A note is given if two moduli differ by a larger factor. The rounding of the stiffer material is then 1e-11 of
 /// the forces in the other one, a tenth of the default tolerance.
 const CONTRAST: f64 = 1e5;
+/// A note is given if obstacles overlap the body by more than this fraction of its size.
+const OVERLAP: f64 = 1e-9;
 /// Approximate number of sample times of surface loads.
 const TIMES: usize = 8;
 /// A note is given if a triangle has a smaller angle, degrees.
@@ -49,10 +54,26 @@ impl DiscreteProblem {
             (linear && is_curved).then(|| {
                 "curved sides count as straight; discretisation.displacement = 2 follows them".to_owned()
             }),
+            self.overlap(),
             self.sliver(),
         ];
         notes.extend(others.into_iter().flatten());
         notes
+    }
+
+    /// A note on obstacles that overlap the body at the start, as for a press fit. Collective.
+    fn overlap(&self) -> Option<String> {
+        let gaps = self.loads.gaps_at(self.start());
+        let given = self.loads.first_gaps();
+        let least = if gaps.is_empty() { given } else { &gaps }.iter().copied().fold(0.0, f64::min);
+        let least = self.body.nodes.partition.comm().min(least);
+        (least < -OVERLAP * extent(&self.mesh().nodes)).then(|| {
+            format!(
+                "the body starts up to {:.3e} {} inside its foundation (a negative gap, as for a press fit)",
+                -least,
+                self.scene().units.length
+            )
+        })
     }
 
     /// A note on the ratio of the moduli of the stiffest and the softest material, if it is large.

@@ -168,7 +168,8 @@ fn a_curve_must_be_there_and_on_the_boundary() {
 
     mesh.curves.clear();
     let message = verdict("", "", &mesh).expect_err("no curves");
-    assert!(message.ends_with("is no physical curve of the mesh (there are none)"), "{message}");
+    assert!(message.contains("which has none: name each in the .geo"), "{message}");
+    assert!(message.ends_with("corners at (0, 0), (2, 0), (2, 2), (0, 2)"), "{message}");
 }
 
 #[test]

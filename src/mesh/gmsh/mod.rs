@@ -7,8 +7,10 @@ pub(super) use process::run;
 use super::{Mesh, MeshError, Order, parse, read};
 use std::{
     collections::BTreeMap,
+    env,
     ffi::OsString,
     fs::{self, Permissions},
+    hash::{DefaultHasher, Hash, Hasher},
     io::{self, Write},
     os::unix::fs::PermissionsExt,
     path::{Path, PathBuf},
@@ -50,7 +52,7 @@ pub fn file(
     }
 }
 
-/// Meshes a `.geo` file and returns the path of the `.msh` beside it.
+/// Meshes a `.geo` file and returns the path of the `.msh` beside it, or in the user's cache if that folder is read-only.
 ///
 /// Each parameter overrides the `DefineConstant` of its name. The name of the mesh lists the parameters and
 /// order 2, as in `bridge-grading3-size0.25.msh` and `hertz.order2.msh`. `size`, in m, also bounds the length
@@ -79,8 +81,10 @@ pub fn mesh_geo(
     name.push(if order == Order::Quadratic { ".order2.msh" } else { ".msh" });
     let mesh = geo.with_file_name(name);
     let last_change = last_change(geo).map_err(MeshError::io(geo))?;
-    if modified(&mesh).is_ok_and(|meshed| meshed >= last_change) {
-        return Ok(mesh);
+    let cached = cached(&mesh);
+    let is_new = |mesh: &Path| modified(mesh).is_ok_and(|meshed| meshed >= last_change);
+    if let Some(made) = [&mesh, &cached].into_iter().find(|mesh| is_new(mesh)) {
+        return Ok(made.clone());
     }
 
     let last = last_words(&text, parameters, order);
@@ -97,8 +101,32 @@ pub fn mesh_geo(
         let _ = io::stderr().write_all(note.as_bytes());
         bytes = run((geo, None), arguments(parameters), &format!("{last}{option};\n"), "mesh it")?;
     }
-    write(&mesh, &bytes, started).map_err(MeshError::io(&mesh))?;
-    Ok(mesh)
+    match write(&mesh, &bytes, started) {
+        Err(error) if is_read_only(&error) => {
+            let folder = cached.parent().unwrap_or(Path::new("."));
+            fs::create_dir_all(folder).map_err(MeshError::io(folder))?;
+            write(&cached, &bytes, started).map_err(MeshError::io(&cached))?;
+            Ok(cached)
+        }
+        written => written.map_err(MeshError::io(&mesh)).map(|()| mesh),
+    }
+}
+
+fn is_read_only(error: &io::Error) -> bool {
+    matches!(error.kind(), io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem)
+}
+
+/// The path of a mesh whose `.geo` is in a folder without write permission: in the user's cache
+/// (`$XDG_CACHE_HOME` or `~/.cache`), named by the hash of that folder.
+fn cached(mesh: &Path) -> PathBuf {
+    let absolute = std::path::absolute(mesh).unwrap_or_else(|_| mesh.to_owned());
+    let mut hasher = DefaultHasher::new();
+    absolute.hash(&mut hasher);
+    let home = env::var_os("HOME").map_or_else(env::temp_dir, PathBuf::from);
+    let cache = env::var_os("XDG_CACHE_HOME").map_or_else(|| home.join(".cache"), PathBuf::from);
+    let mut name = OsString::from(format!("{:016x}-", hasher.finish()));
+    name.push(mesh.file_name().unwrap_or_default());
+    cache.join("signorini").join(name)
 }
 
 /// Writes a file that appears complete or not at all, with the usual permissions. Its time is the time
