@@ -42,18 +42,19 @@ impl DiscreteProblem {
     /// The points of the boundary of the whole body with singular stresses.
     pub fn singular_points(&self) -> Vec<Singular> {
         let mesh = self.mesh();
-        let mut angles = BTreeMap::<usize, f64>::new();
         let boundary = mesh.boundary_edges();
-        for edge in &boundary {
-            angles.extend(edge.map(|node| (node, 0.0)));
-        }
+        // The interior angle at each node of the boundary; NaN elsewhere.
+        let mut angles = vec![f64::NAN; mesh.nodes.len()];
+        boundary.iter().flatten().for_each(|&node| angles[node] = 0.0);
         for triangle in &mesh.triangles {
             for i in 0..3 {
-                let [a, b, c] = [0, 1, 2].map(|k| mesh.nodes[triangle[(i + k) % 3]]);
-                if let Some(angle) = angles.get_mut(&triangle[i]) {
-                    let [p, q] = [b, c].map(|end| [end[0] - a[0], end[1] - a[1]]);
-                    *angle += (p[0] * q[1] - p[1] * q[0]).atan2(p[0] * q[0] + p[1] * q[1]);
+                if angles[triangle[i]].is_nan() {
+                    continue;
                 }
+                let [a, b, c] = [0, 1, 2].map(|k| mesh.nodes[triangle[(i + k) % 3]]);
+                let [p, q] = [b, c].map(|end| [end[0] - a[0], end[1] - a[1]]);
+                let turn = (p[0] * q[1] - p[1] * q[0]).atan2(p[0] * q[0] + p[1] * q[1]);
+                angles[triangle[i]] += turn;
             }
         }
         let supports = self.supports_of_edges();
@@ -64,7 +65,7 @@ impl DiscreteProblem {
                 .for_each(|node| sides.entry(*node).or_default().push((edge, support, name)));
         }
         let singular = |(node, sides): (usize, Vec<Side>)| {
-            let angle = angles[&node].to_degrees() / (sides.len() / 2).max(1) as f64;
+            let angle = angles[node].to_degrees() / (sides.len() / 2).max(1) as f64;
             let (_, most, name) = *sides.iter().max_by_key(|(_, support, _)| *support)?;
             let same = sides.iter().all(|(_, support, _)| *support == most);
             let is_free = sides.iter().any(|(_, support, _)| *support == Support::Free);
