@@ -29,7 +29,7 @@ impl EnergyError {
 }
 
 /// Strains recovered from nodal u (Zienkiewicz and Zhu, Int. J. Numer. Meth. Eng. 33, 1992:
-/// superconvergent patch recovery), from the fits of [`Patches`]. At a vertex ε* is the value of its fit, and at a
+/// superconvergent patch recovery), from the fits of `Patches`. At a vertex ε* is the value of its fit, and at a
 /// midpoint the mean of the fits of both ends.
 pub struct RecoveredStrains<'a> {
     body: &'a Body,
