@@ -35,7 +35,7 @@ def whole(path):
 
 def read_results(folder, time=None):
     """The contents of a folder of results, with the frame nearest to `time` or the last frame."""
-    folder, summary = Path(folder), {}
+    folder, summary, scene = Path(folder), {}, {}
     try:
         with whole(folder / "summary.json") as file:
             summary = json.loads(file.read_text(encoding="utf-8"))
@@ -64,6 +64,8 @@ def read_results(folder, time=None):
         if failed := summary.get("error"):
             raise ResultError(f"{folder}: nothing to draw, the run failed: {failed}") from None
         what = "" if summary else "; name a folder of results, out/SCENE"
+        if summary and scene.get("output", {}).get("every") == 0:
+            what = "; the run wrote no frames: run its scene.toml with --set output.every=1"
         raise ResultError(f"{error.filename}: {error.strerror}{what}") from None
     except KeyError as error:
         raise ResultError(f"{folder}: the field {error} is missing") from None

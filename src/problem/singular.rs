@@ -4,7 +4,8 @@
 //!
 //! - ω > 180° and both sides have the same condition;
 //! - one side is clamped and the other one free, and ω > 62° (about, for ν = 0.3 in plane stress);
-//! - one side slides without friction on a support and the other one is free, and ω > 90°.
+//! - one side slides without friction on a support and the other one is free, and ω > 90°;
+//! - two materials meet there (Bogy, J. Appl. Mech. 35, 1968; for most pairs of materials).
 
 use super::DiscreteProblem;
 use crate::scene::Condition;
@@ -45,8 +46,10 @@ impl DiscreteProblem {
         let boundary = mesh.boundary_edges();
         // The interior angle at each node of the boundary; NaN elsewhere.
         let mut angles = vec![f64::NAN; mesh.nodes.len()];
+        let materials = self.scene().materials_of(mesh);
+        let mut meeting = BTreeMap::<usize, [u32; 2]>::new();
         boundary.iter().flatten().for_each(|&node| angles[node] = 0.0);
-        for triangle in &mesh.triangles {
+        for (t, triangle) in mesh.triangles.iter().enumerate() {
             for i in 0..3 {
                 if angles[triangle[i]].is_nan() {
                     continue;
@@ -55,6 +58,10 @@ impl DiscreteProblem {
                 let [p, q] = [b, c].map(|end| [end[0] - a[0], end[1] - a[1]]);
                 let turn = (p[0] * q[1] - p[1] * q[0]).atan2(p[0] * q[0] + p[1] * q[1]);
                 angles[triangle[i]] += turn;
+                if let Some(&material) = materials.get(t) {
+                    let range = meeting.entry(triangle[i]).or_insert([material; 2]);
+                    *range = [range[0].min(material), range[1].max(material)];
+                }
             }
         }
         let supports = self.supports_of_edges();
@@ -75,10 +82,12 @@ impl DiscreteProblem {
                 _ => SLIDING,
             };
             let length = |(edge, ..): &([usize; 2], _, _)| mesh.edge_normal(*edge).1;
-            (angle > limit).then(|| Singular {
+            let two_materials = meeting.get(&node).is_some_and(|range| range[0] != range[1]);
+            (angle > limit || two_materials).then(|| Singular {
                 at: mesh.nodes[node],
                 radius: sides.iter().map(length).fold(0.0, f64::max),
                 name: match name.filter(|_| !same) {
+                    _ if two_materials => "the end of an interface of two materials".to_owned(),
                     Some(name) => format!("the end of `{name}`"),
                     None => "a re-entrant corner".to_owned(),
                 },

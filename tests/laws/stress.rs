@@ -164,4 +164,13 @@ fn singular_points_are_those_whose_stresses_grow_as_the_mesh_is_refined() {
     let symmetric = "{ name = 'left', symmetry = true }, { name = 'bottom', gap = 0 }, \
                      { name = 'top', pressure = 1 }";
     assert_eq!(named(symmetric), []);
+
+    let mut mesh = square(2);
+    let upper = |t: &usize| mesh.triangles[*t].iter().all(|&node| mesh.nodes[node][1] >= 0.5);
+    mesh.surfaces.insert("upper".to_owned(), (0..mesh.triangles.len()).filter(upper).collect());
+    let text = "material = { young = 1, poisson = 0.3, plane = 'stress', upper.young = 2 }
+                boundary = [{ name = 'bottom', symmetry = true }]";
+    let points = problem(mesh, text).unwrap_or_else(|e| panic!("{e}")).singular_points();
+    let ends: Vec<_> = points.iter().map(|point| point.at).collect();
+    assert_eq!(ends, [[0.0, 0.5], [1.0, 0.5]]);
 }
