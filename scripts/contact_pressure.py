@@ -31,6 +31,8 @@ def draw_pressure(results, limits, figure=None):
                 axes.scatter(s[nodes], values[nodes], s=size**2, facecolor=face, edgecolor=BLUE,
                              linewidth=0.8, zorder=3)
             axes.axhline(0.0, color=FAINT, linewidth=0.7, zorder=1)
+            for corner in s[_corners(curve.points)]:
+                axes.axvline(corner, color=FAINT, linewidth=0.8, linestyle=(0, (1, 2)), zorder=1)
             axes.margins(x=0.03)
         above.fill_between(s, 0.0, pressure, color=BLUE, alpha=0.12, linewidth=0)
         below.set_xlabel(label)
@@ -51,6 +53,13 @@ def draw_pressure(results, limits, figure=None):
     text = ", ".join(filter(None, (f"contact at {results.moment}", text)))
     figure.suptitle(headline(results, text), fontsize=11)
     return figure
+
+
+def _corners(points):
+    """Where a boundary turns by more than 30° between two edges: dotted lines mark these corners."""
+    edges = np.diff(points, axis=0)
+    angles = np.unwrap(np.arctan2(edges[:, 1], edges[:, 0]))
+    return 1 + np.flatnonzero(np.abs(np.diff(angles)) > np.pi / 6)
 
 
 def _names(curves):

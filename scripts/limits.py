@@ -58,7 +58,6 @@ def limits_of(states, factor=None):
     top = max(stress_top(state, state.von_mises) for state in states)
     is_cut = largest > 1.25 * top > 0.0
     factor = factor or _amplification(states)
-    on_contact = [np.isfinite(state.gap) for state in states]
     return Limits(
         factor=factor,
         box=box_of(states, factor),
@@ -66,7 +65,7 @@ def limits_of(states, factor=None):
         is_cut=bool(is_cut),
         zeta=(min(s.zeta.min() for s in states), max(s.zeta.max() for s in states)),
         pressure=max(_pressure_top(state) for state in states),
-        gap=max(s.gap[on].max(initial=0.0) for s, on in zip(states, on_contact)),
+        gap=max((curve.gap.max() for state in states for curve in state.curves), default=0.0),
     )
 
 

@@ -4,10 +4,12 @@ use super::{Failure, SceneArguments, ranks::require_one_process, read_mesh, scre
 use comfy_table::presets;
 use signorini::{
     mesh::{Mesh, extent},
+    model::{Material, Plane},
     output::terminal::{self, say},
     problem::{Collapse, DiscreteProblem},
     scene::{Boundary, Condition, Scene, Stepping, SurfaceLoad, Units, rounded},
 };
+use std::iter::once;
 
 /// The approximate number of times at which gaps are evaluated.
 const TIMES: usize = 20;
@@ -21,6 +23,7 @@ pub fn check(arguments: &SceneArguments) -> Result<(), Failure> {
     scene.check_mesh(&mesh).map_err(Failure::input)?;
     say(&scene.title);
     say(&row("mesh", describe_mesh(&mesh, &scene.units)));
+    say(&materials(&scene).join("\n"));
     say(&boundaries(&scene, &mesh));
     let problem = DiscreteProblem::new(scene, mesh).map_err(Failure::input)?;
     let mut lines = vec![row("unknowns", unknowns(&problem))];
@@ -40,6 +43,26 @@ fn describe_mesh(mesh: &Mesh, Units { length, .. }: &Units) -> String {
         short(extent(&mesh.nodes)),
         mesh.smallest_angle().0
     )
+}
+
+/// The materials: that of [material], and those of the surfaces by name.
+fn materials(scene: &Scene) -> Vec<String> {
+    let names = once("").chain(scene.surfaces.keys().map(String::as_str));
+    let line = |(material, name): (&Material, &str)| {
+        let plane = if material.plane == Plane::Strain { "plane strain" } else { "plane stress" };
+        let stress = &scene.units.stress;
+        let mut words =
+            format!("E = {} {stress}, ν = {}, {plane}", short(material.young), material.poisson);
+        if material.density > 0.0 {
+            words += &format!(", ρ = {}", short(material.density));
+        }
+        match name {
+            "" => row("material", words),
+            name => row("", format!("{name}: {words}")),
+        }
+    };
+    let all: Vec<_> = scene.materials().collect();
+    all.iter().zip(names).map(line).collect()
 }
 
 /// A table of the parts of the boundary: those in the scene, and the free rest.
