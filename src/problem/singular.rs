@@ -3,12 +3,13 @@
 //! In a corner with the interior angle ω, stresses are singular (Williams, J. Appl. Mech. 19, 1952) if
 //!
 //! - ω > 180° and both sides have the same condition;
+//! - both sides slide without friction and ω > 90°, except on a smooth boundary (the exponent is π/ω − 1);
 //! - one side is clamped and the other one free, and ω > 62° (about, for ν = 0.3 in plane stress);
 //! - one side slides without friction on a support and the other one is free, and ω > 90°;
 //! - two materials meet there (Bogy, J. Appl. Mech. 35, 1968; for most pairs of materials).
 
 use super::DiscreteProblem;
-use crate::scene::Condition;
+use crate::{mesh::CORNER_ANGLE, scene::Condition};
 use std::collections::BTreeMap;
 
 /// A point with singular stresses.
@@ -76,7 +77,10 @@ impl DiscreteProblem {
             let (_, most, name) = *sides.iter().max_by_key(|(_, support, _)| *support)?;
             let same = sides.iter().all(|(_, support, _)| *support == most);
             let is_free = sides.iter().any(|(_, support, _)| *support == Support::Free);
+            let is_smooth = (angle - 180.0).abs() <= CORNER_ANGLE.to_degrees();
             let limit = match most {
+                Support::Sliding if same && is_smooth => f64::INFINITY,
+                Support::Sliding => SLIDING,
                 _ if same => 180.0 + SMOOTH,
                 Support::Clamped if is_free => CLAMPED,
                 _ => SLIDING,
@@ -89,6 +93,9 @@ impl DiscreteProblem {
                 name: match name.filter(|_| !same) {
                     _ if two_materials => "the end of an interface of two materials".to_owned(),
                     Some(name) => format!("the end of `{name}`"),
+                    None if most == Support::Sliding => {
+                        format!("a corner of `{}`", name.unwrap_or_default())
+                    }
                     None => "a re-entrant corner".to_owned(),
                 },
             })

@@ -164,6 +164,12 @@ fn singular_points_are_those_whose_stresses_grow_as_the_mesh_is_refined() {
     let symmetric = "{ name = 'left', symmetry = true }, { name = 'bottom', gap = 0 }, \
                      { name = 'top', pressure = 1 }";
     assert_eq!(named(symmetric), []);
+    // A groove of 135°: two faces without friction.
+    let groove = |[x, y]: [f64; 2]| [x - y, y];
+    let text = "material = { young = 1, poisson = 0.3, plane = 'stress' }
+                boundary = [{ name = 'bottom', gap = 0 }, { name = 'left', gap = 0 }]";
+    let points = problem(moved(square(2), groove), text).unwrap_or_else(|e| panic!("{e}"));
+    assert!(points.singular_points().iter().any(|point| point.at == [0.0, 0.0]));
 
     let mut mesh = square(2);
     let upper = |t: &usize| mesh.triangles[*t].iter().all(|&node| mesh.nodes[node][1] >= 0.5);
