@@ -4,9 +4,10 @@
     signorini study geo/lshape.toml --set material.young=1e5,2e5,4e5 --set mesh.size=0.5,0.25
 
 Each run has a folder below OUT, named by its values; OUT/study.csv is the table. A study that was interrupted goes on:
-runs that are complete are not repeated. Runs write no frames (output.every = 0), unless --frames or a --set asks for
-them; `signorini run OUT/NAME/scene.toml --set output.every=1` makes those of one run. A list is split at commas outside
-brackets and quotes. What follows `--` are other arguments of `run`.
+runs that are complete are not repeated, unless the scene or its files have changed. Runs write no frames
+(output.every = 0), unless --frames or a --set asks for them; those of one run are made by `signorini run
+OUT/NAME/scene.toml --set output.every=1`. A list is split at commas outside brackets and quotes. What follows `--` are
+other arguments of `run`.
 """
 
 import argparse
@@ -20,9 +21,9 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from table import COLUMNS, printed, rows_of, settings_of
+from table import COLUMNS, printed, rows_of
 
-# The end of the line of a study's longest name of a folder.
+# The longest name of a folder.
 LONGEST = 120
 
 
@@ -53,22 +54,37 @@ def name_of(chosen):
     return re.sub(r"[^\w.=+-]", "_", ",".join(parts).replace(",", "__"))[:LONGEST] or "run"
 
 
-def is_complete(folder, chosen):
-    """Whether a run with these values has finished in a folder."""
+def inputs_of(scene):
+    """The scene's file, its mesh or geometry, and its tables; those that exist."""
+    scene = Path(scene)
+    text = scene.read_text(encoding="utf-8") if scene.exists() else ""
+    names = re.findall(r"""["']([^"'()]+\.(?:geo|msh|csv))["']|table\(["']([^"']+)["']""", text)
+    files = [scene, *(scene.parent / name for pair in names for name in pair if name)]
+    return [file for file in files if file.exists()]
+
+
+def command_of(scene, folder, chosen, more):
+    """The arguments of a run with these values."""
+    sets = [word for key, value in chosen for word in ("--set", f"{key}={value}")]
+    return ["run", scene, *sets, "--out", str(folder), *more]
+
+
+def is_complete(folder, command, inputs):
+    """Whether this command has finished in a folder since its inputs were changed last."""
+    path = folder / "summary.json"
     try:
-        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        summary = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return False
-    given = settings_of(summary)
-    return "error" not in summary and all(given.get(key) == value for key, value in chosen)
+    return ("error" not in summary and summary["provenance"]["command"][1:] == command
+            and all(file.stat().st_mtime <= path.stat().st_mtime for file in inputs))
 
 
-def run(scene, folder, chosen, more):
-    """Runs the scene with these values into a folder; returns the error, "" if there is none."""
-    sets = [word for key, value in chosen for word in ("--set", f"{key}={value}")]
-    command = [os.environ["SIGNORINI"], "run", scene, *sets, "--out", str(folder), *more]
+def run(command):
+    """Runs the program; returns the error, "" if there is none."""
     # Each run has a core of its own.
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    command = [os.environ["SIGNORINI"], *command]
     ended = subprocess.run(command, capture_output=True, text=True, env=environment)
     return ended.stderr.strip() if ended.returncode else ""
 
@@ -95,15 +111,18 @@ def main(prog=None):
     chosen = [list(zip(keys, values)) for values in products]
     folders = [out / name_of(of) for of in chosen]
     if len(set(folders)) < len(folders):
-        print("error: two runs would have the same folder; values are given twice", file=sys.stderr)
+        print("error: two runs would have the same folder: a value is given twice, or values differ only in "
+              "signs that are not letters or digits", file=sys.stderr)
         return 2
-    open_runs = [(folder, of + extra) for folder, of in zip(folders, chosen)
-                 if not is_complete(folder, of + extra)]
+    commands = [command_of(arguments.scene, folder, of + extra, more)
+                for folder, of in zip(folders, chosen)]
+    inputs = inputs_of(arguments.scene)
+    open_runs = [(folder, command) for folder, command in zip(folders, commands)
+                 if not is_complete(folder, command, inputs)]
     print(f"{len(chosen)} runs, {len(chosen) - len(open_runs)} of them complete", flush=True)
-    # One run meshes the geometry first, if the runs share it.
     failed, done = {}, len(chosen) - len(open_runs)
     with ThreadPoolExecutor(max(1, arguments.jobs)) as pool:
-        results = pool.map(lambda of: run(arguments.scene, *of, more), open_runs)
+        results = pool.map(lambda of: run(of[1]), open_runs)
         for (folder, _), error in zip(open_runs, results):
             done += 1
             failed.update({folder: error} if error else {})

@@ -128,7 +128,6 @@ class Draw:
             force = self.rng.standard_normal(2) if self.pressed is None else self.pressed
             scene["body"] = {"force": [f"{float(size * c)!r}*{self.profile()}" for c in force]}
         if "body" in scene and self.chance(0.3):
-            # As gravity on a body of two densities at least, if it has several materials.
             gravity = [f"{float(size * c)!r}" for c in force]
             scene["material"]["density"] = 1.0
             scene["body"] = {"gravity": gravity}
@@ -315,6 +314,8 @@ def materials(rng, case):
     material, law = case.scene["material"], case.scene.get("damage")
     for name in case.mesh.surfaces:
         material[name] = {"young": material["young"] * 10 ** rng.uniform(-3, 3)}
+        if "density" in material:
+            material[name]["density"] = float(rng.uniform(0, 5))
         if rng.random() < 0.7:
             material[name]["poisson"] = round(float(rng.uniform(0, 0.45)), 3)
         if law and rng.random() < 0.7:

@@ -17,7 +17,7 @@ use signorini::{
         terminal::{Progress, say},
         write_whole,
     },
-    problem::COLLAPSE_ACCURACY,
+    problem::DiscreteProblem,
     scene::{Stepping, rounded},
 };
 use std::{collections::BTreeMap, fs, time::Instant};
@@ -145,7 +145,10 @@ impl<'a> Recorder<'a> {
         };
         let written = written.and(task.phases.time("output", || self.fields.complete()));
         let peak = last.as_ref().map(|step| self.fields.peak(&task.problem, &step.state));
-        let peak = peak.transpose().unwrap_or_default();
+        let (written, peak) = match peak.transpose() {
+            Ok(peak) => (written, peak),
+            Err(error) => (written.and(Err(error)), None),
+        };
         let outcome = result.as_ref().ok();
         let mut notes = Vec::from_iter(accuracy::verdict(task, outcome));
         notes.extend(task.notes.iter().cloned().chain(task.problem.notes()));
@@ -169,6 +172,7 @@ impl<'a> Recorder<'a> {
         let mut summary = summary(task, record, &quantities, result, &notes, wall);
         summary["largest_stress"] = json!(peak);
         summary["peak_megabytes"] = json!(memory);
+        add_stop(&mut summary, &task.problem, outcome);
         if record.is_some() {
             let path = task.folder.join("summary.json");
             write_whole(&path, format!("{summary:#}\n").as_bytes())?;
@@ -236,9 +240,6 @@ fn summary(
     let Task { problem, triangles, contact_nodes, solver, .. } = task;
     let (scene, partition) = (problem.scene(), &problem.body.nodes.partition);
     let outcome = result.as_ref().ok();
-    let stopped = outcome.and_then(|outcome| outcome.stopped);
-    let collapse = problem.collapse.filter(|_| outcome.is_some() && stopped.is_none());
-    let ended = last.map_or(0.0, |record| record.time);
     let steps = last.map_or(0, |record| record.step);
     let seconds = task.phases.parts("").into_iter().map(|(name, phase)| (name, phase.seconds));
     let mut summary = json!({
@@ -254,17 +255,6 @@ fn summary(
         // Accepted steps after t = 0, and the last time, s.
         "steps": steps,
         "end_time": last.map(|record| record.time),
-        // Why the run stopped before its end, at which time, s, and the error of this time; null if it did not.
-        "stopped_by": match (stopped, collapse) {
-            (Some(_), _) => Some("damage"),
-            (None, Some(_)) => Some("collapse"),
-            (None, None) => None,
-        },
-        "stopped_at": stopped.map(|stop| stop.time).or(collapse.map(|collapse| collapse.time)),
-        "stopped_uncertainty": stopped.map(|stop| stop.bar()).or(collapse.map(|_| ended * COLLAPSE_ACCURACY)),
-        "collapse": collapse.map(|collapse| {
-            json!({ "motion": collapse.motion.to_string(), "velocity": collapse.motion })
-        }),
         // As in history.csv.
         "zeta_min": last.map(|record| record.zeta_min),
         "zeta_mean": last.map(|record| record.zeta_mean),
@@ -289,4 +279,24 @@ fn summary(
         summary["error"] = json!(error.to_string());
     }
     summary
+}
+
+/// Adds to the summary why the run stopped before its end, at which time, s, and the error of this time; null if it
+/// did not.
+fn add_stop(summary: &mut Value, problem: &DiscreteProblem, outcome: Option<&Outcome>) {
+    let stopped = outcome.and_then(|outcome| outcome.stopped);
+    let collapse = problem.collapse.filter(|_| outcome.is_some() && stopped.is_none());
+    let by = match (stopped, collapse) {
+        (Some(_), _) => Some("damage"),
+        (None, Some(_)) => Some("collapse"),
+        (None, None) => None,
+    };
+    summary["stopped_by"] = json!(by);
+    summary["stopped_at"] = json!(stopped.map(|stop| stop.time).or(collapse.map(|of| of.time)));
+    let end = problem.scene().time.map_or(0.0, |grid| grid.end);
+    let uncertainty = stopped.map(|stop| stop.bar()).or(collapse.map(|of| of.time - end));
+    summary["stopped_uncertainty"] = json!(uncertainty);
+    summary["collapse"] = json!(
+        collapse.map(|of| { json!({ "motion": of.motion.to_string(), "velocity": of.motion }) })
+    );
 }

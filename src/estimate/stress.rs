@@ -1,8 +1,8 @@
 //! Stresses at the nodes, as engineers look at them: continuous within a material.
 
-use super::patches::{ENTRIES, Patches, Update, monomials};
+use super::patches::{ENTRIES, Patches, monomials};
 use crate::{
-    fem::{Elements, for_elements},
+    fem::{Elements, Partition, for_elements},
     model::{Material, von_mises},
     petsc::PetscError,
     problem::{DiscreteProblem, State},
@@ -94,29 +94,21 @@ impl NodalStress {
         Strained { strains, zeta: zeta.into_iter().map(|zeta| problem.truncated(zeta)).collect() }
     }
 
-    /// The stresses (σ_xx, σ_yy, σ_xy, σ_zz) at the points, Pa. Collective.
+    /// The stresses (σ_xx, σ_yy, σ_xy, σ_zz) at the points, Pa. `vertices` is the division of the vertices among
+    /// several ranks. Collective.
     ///
     /// # Errors
     /// PETSc failed.
     pub fn stresses(
         &self,
-        problem: &DiscreteProblem,
         strained: &Strained,
+        vertices: Option<&Partition>,
     ) -> Result<Vec<[f64; 4]>, PetscError> {
-        let partition = &problem.body.vertices.partition;
-        self.evaluate(strained, &mut |fields| partition.update(fields, ENTRIES))
-    }
-
-    /// As [`Self::stresses`], on one rank.
-    ///
-    /// # Errors
-    /// None.
-    pub fn stresses_of_one_rank(&self, strained: &Strained) -> Result<Vec<[f64; 4]>, PetscError> {
-        self.evaluate(strained, &mut |_| Ok(()))
-    }
-
-    fn evaluate(&self, strained: &Strained, update: Update) -> Result<Vec<[f64; 4]>, PetscError> {
-        let fits = self.patches.fits(&strained.strains, update)?;
+        let mut update = |fields: &mut [f64]| match vertices {
+            Some(vertices) => vertices.update(fields, ENTRIES),
+            None => Ok(()),
+        };
+        let fits = self.patches.fits(&strained.strains, &mut update)?;
         let stress = |point: &Point| {
             let [x, y] = point.at;
             let strain = |end: usize| {
@@ -136,7 +128,8 @@ impl NodalStress {
     /// # Errors
     /// PETSc failed.
     pub fn peak(&self, problem: &DiscreteProblem, state: &State) -> Result<Peak, PetscError> {
-        let stresses = self.stresses(problem, &Self::strained(problem, state))?;
+        let vertices = &problem.body.vertices.partition;
+        let stresses = self.stresses(&Self::strained(problem, state), Some(vertices))?;
         let all = stresses.iter().map(|stress| von_mises(*stress)).zip(&self.points);
         let own = all.max_by(|(a, _), (b, _)| a.total_cmp(b));
         let comm = problem.body.nodes.partition.comm();

@@ -133,14 +133,16 @@ impl FieldWriter {
             let (path, entry) = (self.folder.join(&file), entry(state.time, &file));
             let nodal = Arc::clone(&self.stress);
             let write = move || {
-                let stresses = nodal.stresses_of_one_rank(&strained);
+                let stresses = nodal.stresses(&strained, None);
                 points.extend(stress_data(&stresses.map_err(|e| OutputError::new(&path, e))?));
                 write_whole(&path, piece(&mesh, &points, &cells).as_bytes())
             };
             self.pending = Some((thread::spawn(write), entry));
             return self.contact.add(&contact_file, state.time, &contact);
         }
-        points.extend(stress_data(&self.stress.stresses(problem, &strained).map_err(failed)?));
+        let vertices = &problem.body.vertices.partition;
+        let stresses = self.stress.stresses(&strained, Some(vertices)).map_err(failed)?;
+        points.extend(stress_data(&stresses));
         let piece_file = |rank| format!("{stem}_{rank}.vtu");
         if self.pieces.contains(&comm.rank()) {
             let text = piece(&self.mesh, &points, &cells);
@@ -161,8 +163,9 @@ impl FieldWriter {
     ///
     /// # Errors
     /// PETSc failed.
-    pub fn peak(&self, problem: &DiscreteProblem, state: &State) -> Result<Peak, PetscError> {
-        self.stress.peak(problem, state)
+    pub fn peak(&self, problem: &DiscreteProblem, state: &State) -> Result<Peak, OutputError> {
+        let peak = self.stress.peak(problem, state);
+        peak.map_err(|error| OutputError::new(Path::new("the largest stress"), error))
     }
 
     /// Waits until the last frame is written.

@@ -12,14 +12,14 @@ use crate::{
 /// The collapse of the body.
 #[derive(Debug, Clone, Copy)]
 pub struct Collapse {
-    /// The time, s. It is known to [`ACCURACY`] of the end time.
+    /// The time, s. The run ends a little before it, and the time is known at least as well as this distance.
     pub time: f64,
     /// The motion that nothing supports any more.
     pub motion: RigidMotion,
 }
 
 /// The run ends this fraction of its end time before the collapse, where contact forces are still unique.
-pub const ACCURACY: f64 = 1e-6;
+const ACCURACY: f64 = 1e-6;
 /// The number of bisections of the interval between two sampled times.
 const BISECTIONS: usize = 40;
 

@@ -24,7 +24,7 @@ mod state;
 mod supports;
 mod unresolved;
 
-pub use collapse::{ACCURACY as COLLAPSE_ACCURACY, Collapse};
+pub use collapse::Collapse;
 pub use error::SetupError;
 pub use figures::{Bar, Dimension};
 pub(crate) use load_case::LoadCase;

@@ -4,12 +4,17 @@
 //!
 //! - ω > 180° and both sides have the same condition;
 //! - both sides slide without friction and ω > 90°, except on a smooth boundary (the exponent is π/ω − 1);
-//! - one side is clamped and the other one free, and ω > 62° (about, for ν = 0.3 in plane stress);
+//! - one side is clamped and the other one free, and sin² ω > 1/(1 + ν) in plane stress, 1 − ν in plane strain, or
+//!   ω > 90° (61° and 57° for ν = 0.3; the exponent 1 in Williams's equation);
 //! - one side slides without friction on a support and the other one is free, and ω > 90°;
 //! - two materials meet there (Bogy, J. Appl. Mech. 35, 1968; for most pairs of materials).
 
 use super::DiscreteProblem;
-use crate::{mesh::CORNER_ANGLE, scene::Condition};
+use crate::{
+    mesh::CORNER_ANGLE,
+    model::{Material, Plane},
+    scene::Condition,
+};
 use std::collections::BTreeMap;
 
 /// A point with singular stresses.
@@ -38,7 +43,15 @@ type Side<'a> = ([usize; 2], Support, Option<&'a str>);
 /// `SMOOTH`.
 const SMOOTH: f64 = 10.0;
 const SLIDING: f64 = 90.0 + SMOOTH;
-const CLAMPED: f64 = 62.0;
+
+/// The angle, in degrees, above which stresses at the end of a clamp are singular.
+fn clamped(Material { poisson, plane, .. }: Material) -> f64 {
+    let square = match plane {
+        Plane::Stress => 1.0 / (1.0 + poisson),
+        Plane::Strain => 1.0 - poisson,
+    };
+    square.min(1.0).sqrt().asin().to_degrees()
+}
 
 impl DiscreteProblem {
     /// The points of the boundary of the whole body with singular stresses.
@@ -47,8 +60,10 @@ impl DiscreteProblem {
         let boundary = mesh.boundary_edges();
         // The interior angle at each node of the boundary; NaN elsewhere.
         let mut angles = vec![f64::NAN; mesh.nodes.len()];
-        let materials = self.scene().materials_of(mesh);
-        let mut meeting = BTreeMap::<usize, [u32; 2]>::new();
+        // The elastic constants of the first triangle at each node of the boundary, and whether others differ.
+        let materials: Vec<Material> = self.scene().materials().collect();
+        let numbers = self.scene().materials_of(mesh);
+        let mut found = BTreeMap::<usize, (Material, bool)>::new();
         boundary.iter().flatten().for_each(|&node| angles[node] = 0.0);
         for (t, triangle) in mesh.triangles.iter().enumerate() {
             for i in 0..3 {
@@ -59,10 +74,9 @@ impl DiscreteProblem {
                 let [p, q] = [b, c].map(|end| [end[0] - a[0], end[1] - a[1]]);
                 let turn = (p[0] * q[1] - p[1] * q[0]).atan2(p[0] * q[0] + p[1] * q[1]);
                 angles[triangle[i]] += turn;
-                if let Some(&material) = materials.get(t) {
-                    let range = meeting.entry(triangle[i]).or_insert([material; 2]);
-                    *range = [range[0].min(material), range[1].max(material)];
-                }
+                let own = materials[numbers.get(t).map_or(0, |&number| number as usize)];
+                let (first, differs) = found.entry(triangle[i]).or_insert((own, false));
+                *differs |= own.stiffness() != first.stiffness();
             }
         }
         let supports = self.supports_of_edges();
@@ -73,6 +87,7 @@ impl DiscreteProblem {
                 .for_each(|node| sides.entry(*node).or_default().push((edge, support, name)));
         }
         let singular = |(node, sides): (usize, Vec<Side>)| {
+            let (material, two_materials) = *found.get(&node)?;
             let angle = angles[node].to_degrees() / (sides.len() / 2).max(1) as f64;
             let (_, most, name) = *sides.iter().max_by_key(|(_, support, _)| *support)?;
             let same = sides.iter().all(|(_, support, _)| *support == most);
@@ -82,11 +97,10 @@ impl DiscreteProblem {
                 Support::Sliding if same && is_smooth => f64::INFINITY,
                 Support::Sliding => SLIDING,
                 _ if same => 180.0 + SMOOTH,
-                Support::Clamped if is_free => CLAMPED,
+                Support::Clamped if is_free => clamped(material),
                 _ => SLIDING,
             };
             let length = |(edge, ..): &([usize; 2], _, _)| mesh.edge_normal(*edge).1;
-            let two_materials = meeting.get(&node).is_some_and(|range| range[0] != range[1]);
             (angle > limit || two_materials).then(|| Singular {
                 at: mesh.nodes[node],
                 radius: sides.iter().map(length).fold(0.0, f64::max),

@@ -37,6 +37,11 @@ fn a_study_runs_all_combinations_once_and_tells_their_figures() {
     assert!(again.out.starts_with("4 runs, 3 of them complete"), "{}", again.out);
     assert_eq!(again.out.lines().filter(|line| line.starts_with("4/4")).count(), 1);
 
+    // A changed scene is run again.
+    directory.write("scene.toml", &(directory.read("scene.toml") + "\n"));
+    let changed = directory.say(&words);
+    assert!(changed.out.starts_with("4 runs, 0 of them complete"), "{}", changed.out);
+
     let all = ["table", &format!("out/s/{folder}"), "out/s/nothing"].map(str::to_owned);
     let words: Vec<_> = all.iter().map(String::as_str).collect();
     directory.say(&words).fails(2, &["out/s/nothing/summary.json: No such file"]);
