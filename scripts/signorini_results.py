@@ -106,6 +106,14 @@ class Frame:
             length += steps.sum()
         return np.array(places[:-1]), np.array(values[:-1])
 
+    def to_gmsh(self, path):
+        """Writes the frame as .msh for gmsh, which takes scalars and vectors only. The gap is left out: it is not a
+        number off Γ_C."""
+        data = {name: values for name, values in self.mesh.point_data.items()
+                if values.shape[1:] in ((), (3,)) and np.isfinite(values).all()}
+        data |= {name: self.field(name) for name in COMPONENTS}
+        meshio.write(path, meshio.Mesh(self.mesh.points, self.mesh.cells, data), file_format="gmsh")
+
     def at(self, points, name):
         """A field at points (k, 2); NaN outside the body. Sides count as straight."""
         points, nodal = np.asarray(points, float), self.field(name)

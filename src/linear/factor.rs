@@ -1,8 +1,14 @@
 //! The Cholesky factor of a matrix, kept as the preconditioner of later ones.
 
-use super::{Condensed, Precision, Reduction, RefactorisationPolicy, substructure::Substructure};
+mod checkpoint;
+
+pub use checkpoint::FactorState;
+
+use super::{
+    Condensed, Precision, Reduction, RefactorisationPolicy, scaling::Scaling,
+    substructure::Substructure,
+};
 use crate::petsc::{Communicator, KeptPreconditioner, Matrix, PetscError, Session, Vector};
-use serde::{Deserialize, Serialize};
 use std::mem::take;
 
 /// A Cholesky factor: CHOLMOD's with our own solves. With several ranks or with contact it uses
@@ -31,24 +37,10 @@ pub struct Factor {
     factorisations: usize,
     /// The values of the last factored matrix. A restart makes the same factor from them.
     values: Vec<f64>,
-    /// The diagonal of this matrix, owned rows.
-    diagonal: Vec<f64>,
-    /// E^½ of the owned unknowns.
-    scaling: Vec<f64>,
-    /// E^½ r.
-    scaled: Vec<f64>,
+    /// E^½.
+    scaling: Scaling,
     /// Was a checkpoint loaded whose factor must still be made?
     loaded: bool,
-}
-
-/// The state of a factor in a checkpoint; see the fields of [`Factor`].
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct FactorState {
-    values: Vec<f64>,
-    precisions: [Precision; 2],
-    policy: Option<RefactorisationPolicy>,
-    applications: usize,
-    factorisations: usize,
 }
 
 /// The assumed cost, in iterations, of making a preconditioner of PETSc: between the costs of MUMPS and gamg.
@@ -70,9 +62,7 @@ impl Factor {
             applications: 0,
             factorisations: 0,
             values: Vec::new(),
-            diagonal: Vec::new(),
-            scaling: Vec::new(),
-            scaled: Vec::new(),
+            scaling: Scaling::default(),
             loaded: false,
         }
     }
@@ -96,58 +86,6 @@ impl Factor {
         if self.comm.any(condensed != self.condensed) {
             (self.condensed, self.substructure) = (condensed, None);
             self.policy = self.policy.take().filter(|_| self.loaded);
-        }
-        Ok(())
-    }
-
-    /// The state for a checkpoint.
-    pub fn state(&self) -> FactorState {
-        FactorState {
-            values: self.values.clone(),
-            precisions: self.precisions,
-            policy: self.policy,
-            applications: self.applications,
-            factorisations: self.factorisations,
-        }
-    }
-
-    /// Restores the state of a checkpoint. The next solve makes the factor.
-    pub fn set_state(&mut self, state: FactorState) {
-        let FactorState { values, precisions, policy, applications, factorisations } = state;
-        self.loaded = policy.is_some();
-        (self.values, self.precisions, self.policy) = (values, precisions, policy);
-        (self.applications, self.factorisations) = (applications, factorisations);
-    }
-
-    /// The matrix of a loaded factor that must still be made, with the pattern of `matrix`, and its history
-    /// for [`Self::keep_history`].
-    pub(super) fn take_loaded(
-        &mut self,
-        matrix: &Matrix,
-    ) -> Result<Option<(Matrix, History)>, PetscError> {
-        if !take(&mut self.loaded) {
-            return Ok(None);
-        }
-        let mut copy = matrix.duplicate()?;
-        copy.set_entries(&self.values)?;
-        let history = History { policy: self.policy.take(), factorisations: self.factorisations };
-        Ok(Some((copy, history)))
-    }
-
-    /// Restores the history of a factor that was made again.
-    pub(super) fn keep_history(&mut self, history: History) {
-        (self.policy, self.factorisations) = (history.policy, history.factorisations);
-    }
-
-    /// Makes a loaded factor again, of a matrix with the pattern of this one. Collective.
-    ///
-    /// # Errors
-    /// The pattern differs, or as in [`Self::factorise`].
-    pub(crate) fn remake(&mut self, matrix: &Matrix) -> Result<(), PetscError> {
-        if let Some((loaded, history)) = self.take_loaded(matrix)?
-            && self.factorise(&loaded)?
-        {
-            self.keep_history(history);
         }
         Ok(())
     }
@@ -240,8 +178,7 @@ impl Factor {
         cost: Option<f64>,
     ) -> Result<(), PetscError> {
         matrix.read_entries(&mut self.values)?;
-        self.diagonal = matrix.diagonal()?;
-        self.scaling = vec![1.0; self.diagonal.len()];
+        self.scaling = Scaling::of_factored(matrix)?;
         let cost = cost.unwrap_or(UNKNOWN_COST);
         self.policy = definite.then(|| RefactorisationPolicy::new(cost));
         self.factorisations += usize::from(definite);
@@ -279,15 +216,9 @@ impl Factor {
         }
     }
 
-    /// Sets E for this matrix. E is 1 where the quotient is not positive.
+    /// Sets E for this matrix.
     pub(crate) fn set_scaling(&mut self, matrix: &Matrix) -> Result<(), PetscError> {
-        let diagonal = matrix.diagonal()?;
-        let root = |(old, new): (&f64, &f64)| match old * new > 0.0 {
-            true => (old / new).sqrt(),
-            false => 1.0,
-        };
-        self.scaling = self.diagonal.iter().zip(&diagonal).map(root).collect();
-        Ok(())
+        self.scaling.set(matrix)
     }
 
     /// `z` ← E^½ A₀⁻¹ E^½ `r` with the factored matrix A₀: a pair of triangular solves.
@@ -295,27 +226,20 @@ impl Factor {
     /// # Errors
     /// Sizes differ, or there is no factor.
     pub fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
-        self.scale(r)?;
-        let Self { scaled, substructure: Some((_, Some(factor))), .. } = self else {
-            return Err(missing());
-        };
+        self.start_application(r)?;
+        let Some((_, Some(factor))) = &mut self.substructure else { return Err(missing()) };
+        let scaled = self.scaling.apply(r)?;
         z.write(|z| factor.apply(scaled, z))?;
-        self.unscale(z)
+        self.scaling.apply_in_place(z)
     }
 
-    /// E^½ r.
-    fn scale(&mut self, r: &Vector) -> Result<(), PetscError> {
+    /// Counts an application to `r`. There must be a factor for vectors of this size.
+    fn start_application(&mut self, r: &Vector) -> Result<(), PetscError> {
         self.applications += 1;
-        if !self.exists() || r.owned() != self.scaling.len() {
-            return Err(missing());
+        match self.exists() && r.owned() == self.scaling.rows() {
+            true => Ok(()),
+            false => Err(missing()),
         }
-        let Self { scaled, scaling, .. } = self;
-        scaled.clear();
-        r.read(|r| scaled.extend(r.iter().zip(&*scaling).map(|(r, e)| e * r)))
-    }
-
-    fn unscale(&self, z: &mut Vector) -> Result<(), PetscError> {
-        z.write(|z| z.iter_mut().zip(&self.scaling).for_each(|(z, e)| *z *= e))
     }
 
     /// The forward elimination of [`Self::apply`]: reduces E^-½ A₀ E^-½ z = `r` to the condensed unknowns.
@@ -324,11 +248,11 @@ impl Factor {
     /// # Errors
     /// As in [`Self::apply`].
     pub(super) fn condense(&mut self, r: &Vector) -> Result<Condensed<'_>, PetscError> {
-        self.scale(r)?;
-        let Self { scaled, scaling, condensed, substructure, .. } = self;
+        self.start_application(r)?;
+        let Self { scaling, condensed: (_, condensed), substructure, .. } = self;
         let Some((_, Some(factor))) = substructure else { return Err(missing()) };
-        let scaling = condensed.1.iter().map(|&i| scaling[i]).collect();
-        Ok(factor.condense(scaled, &condensed.1, scaling))
+        let of_condensed = scaling.of(condensed);
+        Ok(factor.condense(scaling.apply(r)?, condensed, of_condensed))
     }
 
     /// The back substitution: `z` from the last solution for the condensed unknowns. Collective.
@@ -338,7 +262,7 @@ impl Factor {
     pub(super) fn expand(&mut self, z: &mut Vector) -> Result<(), PetscError> {
         let Some(factor) = self.substructure() else { return Err(missing()) };
         z.write(|z| factor.expand(z))?;
-        self.unscale(z)
+        self.scaling.apply_in_place(z)
     }
 
     /// The number of successful factorisations.
@@ -364,12 +288,6 @@ impl Factor {
             policy.solved(iterations.unwrap_or(applications), reduction);
         }
     }
-}
-
-/// The history of a factor in a checkpoint, beside its matrix.
-pub(super) struct History {
-    policy: Option<RefactorisationPolicy>,
-    factorisations: usize,
 }
 
 fn missing() -> PetscError {

@@ -26,6 +26,7 @@ mod linear_solver;
 mod linear_system;
 mod lower_triangle;
 mod refactorisation;
+mod scaling;
 mod schur;
 mod substructure;
 mod supernodal;

@@ -93,11 +93,16 @@ fn curves_and_the_python_module_give_the_exact_fields() {
          along, gap = frame.along('bottom', 'gap')\n\
          print(along.max(), abs(gap).max() < 1e-9, run.times[-1])\n\
          s, u = frame.line((0.3, 0), (0.3, 1), 'u_y', 3)\n\
-         print(abs(u[2] - 2*u[1]) < 1e-6*abs(u[2]), u[2] < -3/80, len(run.history['work']))"
+         print(abs(u[2] - 2*u[1]) < 1e-6*abs(u[2]), u[2] < -3/80, len(run.history['work']))\n\
+         frame.to_gmsh('frame.msh')"
     );
     let python = std::env::var("PYTHON").unwrap_or("/usr/bin/python3".to_owned());
     let ran = Command::new(python).args(["-c", &program]).current_dir(directory.path(".")).output();
     let ran = ran.expect("Python");
     assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
     assert_eq!(String::from_utf8_lossy(&ran.stdout), "1.0 True 1.0\nTrue True 11\n");
+    let frame = directory.path("frame.msh");
+    let read = Command::new("gmsh").arg("-check").arg(frame).output().expect("gmsh").stdout;
+    let read = String::from_utf8_lossy(&read).into_owned();
+    assert!(read.contains("Done checking") && !read.contains("Error"), "{read}");
 }

@@ -3,10 +3,20 @@
 use crate::test_directory::{ProgramOutput, TestDirectory};
 use std::{fs, path::Path};
 
-/// Blocks of the tutorial between fences: what stands behind the opening one, and the content.
-fn blocks(page: &str) -> Vec<(&str, &str)> {
-    let fenced = page.split("\n```").skip(1).step_by(2);
-    fenced.map(|block| block.split_once('\n').expect("a fenced block")).collect()
+/// Blocks of the tutorial between fences: the text before it, what stands behind the opening fence, and the content.
+fn blocks<'a>(page: &'a str) -> Vec<(&'a str, &'a str, &'a str)> {
+    let parts: Vec<&str> = page.split("\n```").collect();
+    let (pairs, _) = parts.as_chunks::<2>();
+    let block = |&[before, fenced]: &[&'a str; 2]| {
+        let (kind, content) = fenced.split_once('\n').expect("a fenced block");
+        (before, kind, content)
+    };
+    pairs.iter().map(block).collect()
+}
+
+/// The last file with this ending that a text names in backticks.
+fn named<'a>(text: &'a str, ending: &str) -> &'a str {
+    text.rsplit('`').skip(1).step_by(2).find(|name| name.ends_with(ending)).expect("a file")
 }
 
 /// The words of a text with a blank between them.
@@ -20,10 +30,9 @@ fn every_command_of_the_tutorial_does_what_it_says() {
     let page = fs::read_to_string(page).expect("the tutorial");
     let test_directory = TestDirectory::new();
     let (mut said, mut commands) = (String::new(), 0);
-    for (kind, content) in blocks(&page) {
+    for (before, kind, content) in blocks(&page) {
         match kind {
-            "geo" => test_directory.write("dam.geo", content),
-            "toml" => test_directory.write("dam.toml", content),
+            "geo" | "toml" => test_directory.write(named(before, kind), content),
             "sh" => {
                 for line in content.lines().filter(|line| line.starts_with("signorini ")) {
                     // Figures have tests of their own.
