@@ -11,6 +11,7 @@ use signorini::{
     evolution::RunState,
     output::{self, FieldsWritten, OutputError},
     petsc::Communicator,
+    scene::AsRun,
 };
 use std::{
     fs,
@@ -49,8 +50,9 @@ fn origin(task: &Task) -> [u64; 3] {
         LazyLock::new(|| fs::read("/proc/self/exe").map_or(0, |file| hash(&file)));
     // A mesh that cannot be encoded counts as empty.
     let mesh = postcard::to_stdvec(task.problem.mesh()).unwrap_or_default();
-    let scene = format!("{}{:?}", task.as_run, task.petsc);
-    [*PROGRAM, hash(&[scene.as_bytes(), &task.tables].concat()), hash(&mesh)]
+    let AsRun { text, tables, .. } = &task.as_run;
+    let scene = format!("{text}{:?}", task.petsc);
+    [*PROGRAM, hash(&[scene.as_bytes(), tables].concat()), hash(&mesh)]
 }
 
 /// Per hash: the message if it differs.

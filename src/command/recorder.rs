@@ -75,8 +75,13 @@ impl<'a> Recorder<'a> {
     /// Removes the results of an earlier run and writes the scene of this one.
     fn start(&mut self) -> Result<(), OutputError> {
         let Task { folder, as_run, adapted, .. } = self.task;
-        output::prepare(folder, &self.task.problem.scene().mesh.file)?;
-        write_whole(&folder.join(output::SCENE), as_run.as_bytes())?;
+        let mesh = self.task.problem.scene().mesh.file.as_path();
+        let copied = as_run.copies.iter().map(|(_, file)| file.as_path());
+        output::prepare(folder, &Vec::from_iter(copied.chain([mesh])))?;
+        write_whole(&folder.join(output::SCENE), as_run.text.as_bytes())?;
+        for (name, file) in &as_run.copies {
+            output::copy(file, &folder.join(name))?;
+        }
         if let Some(mesh) = adapted {
             let text = mesh.mesh.to_msh() + output::ADAPTED;
             write_whole(&folder.join(output::MESH), text.as_bytes())?;

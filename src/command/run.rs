@@ -156,8 +156,7 @@ fn read<'a>(
     let mesh = phases.time("mesh", || read_shared(comm, &scene))?;
     let solver = scene.contact.solver.clone().unwrap_or(SOLVERS[0].to_owned());
     let folder = arguments.folder(&scene);
-    let (as_run, tables) = scene.as_run();
-    let tables = tables.to_vec();
+    let as_run = scene.as_run();
     agree(comm, check_mesh_is_kept(&scene, &folder))?;
     let restart = arguments.restart.then(|| Checkpoint::read(comm, &folder));
     let restart = restart.transpose()?.flatten();
@@ -188,7 +187,6 @@ fn read<'a>(
         solver,
         folder,
         as_run,
-        tables,
         adapted,
         bars,
         notes,

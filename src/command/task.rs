@@ -4,6 +4,7 @@ use signorini::{
     estimate::Adapted,
     evolution::Phases,
     problem::{Bar, DiscreteProblem},
+    scene::AsRun,
 };
 use std::{fs::File, path::PathBuf, time::Instant};
 
@@ -18,10 +19,8 @@ pub struct Task<'a> {
     pub solver: String,
     /// The folder of the results.
     pub folder: PathBuf,
-    /// The text of the scene file in this folder.
-    pub as_run: String,
-    /// The contents of the files of tables.
-    pub tables: Vec<u8>,
+    /// The scene file in this folder.
+    pub as_run: AsRun,
     /// The adapted mesh, if there is one.
     pub adapted: Option<Adapted>,
     /// The measured error bars of the figures; empty if they were not measured.

@@ -21,7 +21,7 @@ mod refine;
 
 pub use boundary::{BoundaryNode, CORNER_ANGLE, Face, boundary_nodes};
 pub use error::MeshError;
-pub use gmsh::{file, load, mesh_geo, scaling_factor};
+pub use gmsh::{file, is_self_contained, load, mesh_geo, scaling_factor};
 pub use msh::{parse, read};
 pub use refine::Refinement;
 

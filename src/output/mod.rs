@@ -16,7 +16,7 @@ mod vtu;
 
 pub use vtu::{FieldWriter, FieldsWritten};
 
-use crate::scene::AS_RUN;
+use crate::scene::AsRun;
 use growing_file::GrowingFile;
 use serde::Serialize;
 use std::{
@@ -71,7 +71,7 @@ pub fn lock(folder: &Path) -> Result<Option<File>, OutputError> {
     create(folder)?;
     let scene = folder.join(SCENE);
     let foreign = match fs::read_to_string(&scene) {
-        Ok(text) if text.starts_with(AS_RUN) => None,
+        Ok(text) if AsRun::is_text(&text) => None,
         Ok(_) => Some(scene),
         Err(_) => {
             files(folder)?.into_iter().find_map(|(name, path)| is_result(&name).then_some(path))
@@ -116,7 +116,7 @@ fn is_result(name: &str) -> bool {
             PICTURES.split(' ').any(|known| known == kind)
                 && (stem == kind || rest.starts_with('t'))
         }
-        _ => FILES.split(' ').any(|known| known == name),
+        _ => AsRun::is_copy(name) || FILES.split(' ').any(|known| known == name),
     }
 }
 
@@ -144,16 +144,31 @@ fn checkpoint(name: &str) -> Option<(usize, usize)> {
 }
 
 /// Removes the results of an earlier run from `folder`, with its figures, its incomplete files and its adapted
-/// mesh. If the adapted mesh is the `mesh` in use, it stays.
+/// mesh. The files `in_use` stay.
 ///
 /// # Errors
 /// A file cannot be removed.
-pub fn prepare(folder: &Path, mesh: &Path) -> Result<(), OutputError> {
-    let kept = folder.join(MESH);
-    let old_mesh = if is_adapted(&kept) && !is_same_file(&kept, mesh) { MESH } else { "" };
+pub fn prepare(folder: &Path, in_use: &[&Path]) -> Result<(), OutputError> {
+    let adapted = is_adapted(&folder.join(MESH));
     remove(folder, |name| {
-        is_result(name) || is_partial(name) || checkpoint(name).is_some() || name == old_mesh
+        let is_old = is_result(name)
+            || is_partial(name)
+            || checkpoint(name).is_some()
+            || (name == MESH && adapted);
+        is_old && !in_use.iter().any(|file| is_same_file(&folder.join(name), file))
     })
+}
+
+/// Copies a file into the results, if it is not there already.
+///
+/// # Errors
+/// It cannot be read or written.
+pub fn copy(from: &Path, to: &Path) -> Result<(), OutputError> {
+    if is_same_file(from, to) {
+        return Ok(());
+    }
+    let content = fs::read(from).map_err(|error| OutputError::new(to, error))?;
+    write_whole(to, &content)
 }
 
 /// Whether `file` is the adapted mesh of a run.

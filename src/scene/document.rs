@@ -11,8 +11,15 @@ use serde::{Deserialize, de::IntoDeserializer};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::as_run::absolute;
 use super::error::{MOST_SHOWN, SceneError};
 use crate::suggestion::suggestion;
+
+/// The tables with expressions.
+pub(super) const EXPRESSIONS: [&str; 3] = ["body", "boundary", "damage"];
+
+/// The full paths and the contents of files of tables.
+pub(super) type Tables = Vec<(String, Vec<u8>)>;
 
 /// The place of a problem and the message.
 pub(super) type Problem = (Range<usize>, String);
@@ -44,9 +51,9 @@ pub(super) struct SceneText {
     stride: usize,
     /// The places of the values that have been read, by their full keys.
     pub(super) places: BTreeMap<String, Range<usize>>,
-    /// The values and the contents of the files of tables, from [`Self::values`].
+    /// The values, and the files of tables, from [`Self::values`].
     pub(super) document: toml::Table,
-    pub(super) tables: Vec<u8>,
+    pub(super) tables: Tables,
 }
 
 impl SceneText {
@@ -128,15 +135,22 @@ impl SceneText {
         self.places.get(key).cloned().unwrap_or(NOWHERE)
     }
 
-    /// The values of a document with the full paths of tables, and the contents of these files. The values
-    /// are empty if a number does not fit its type.
-    pub(super) fn values(&self, root: &DeValue) -> (toml::Table, Vec<u8>) {
+    /// The values of a document with the full paths of tables, and these tables. The values are empty if a number
+    /// does not fit its type.
+    pub(super) fn values(&self, root: &DeValue) -> (toml::Table, Tables) {
         let root = Spanned::new(NOWHERE, root.clone()).into_deserializer();
         let mut document = toml::Table::deserialize(root).unwrap_or_default();
-        let mut tables = Vec::new();
-        for key in ["body", "boundary", "damage"] {
-            let expressions = document.get_mut(key).into_iter();
-            expressions.for_each(|value| complete_paths(value, self.folder(), &mut tables));
+        let mut tables = Tables::new();
+        let mut complete = |name: &str| {
+            let file = self.folder().join(name);
+            // Reading a device might never end.
+            let content = file.is_file().then(|| fs::read(&file).ok()).flatten()?;
+            let path = absolute(&file).to_string_lossy().into_owned();
+            tables.push((path.clone(), content));
+            Some(path)
+        };
+        for key in EXPRESSIONS {
+            document.get_mut(key).into_iter().for_each(|value| map_tables(value, &mut complete));
         }
         (document, tables)
     }
@@ -212,32 +226,19 @@ impl SceneText {
     }
 }
 
-/// Replaces the paths in `table("file")` by full ones, relative to `folder`, and appends the contents of the
-/// files to `tables`.
-pub(super) fn complete_paths(value: &mut toml::Value, folder: &Path, tables: &mut Vec<u8>) {
+/// Replaces the names of files in `table("file")` by those that `map` returns.
+pub(super) fn map_tables(value: &mut toml::Value, map: &mut impl FnMut(&str) -> Option<String>) {
     match value {
         toml::Value::String(text) if text.contains("table") => {
             // Only names of files are quoted in an expression.
-            let mut full = |part: &str| {
-                let file = folder.join(part);
-                // Reading a device might never end.
-                match file.is_file().then(|| fs::read(&file)) {
-                    Some(Ok(table)) => {
-                        tables.extend(table);
-                        std::path::absolute(&file).unwrap_or(file).to_string_lossy().into_owned()
-                    }
-                    _ => part.to_owned(),
-                }
-            };
+            let mut mapped = |part: &str| map(part).unwrap_or_else(|| part.to_owned());
             for quote in ["\"", "'"] {
-                *text = text.split(quote).map(&mut full).collect::<Vec<_>>().join(quote);
+                *text = text.split(quote).map(&mut mapped).collect::<Vec<_>>().join(quote);
             }
         }
-        toml::Value::Array(values) => {
-            values.iter_mut().for_each(|value| complete_paths(value, folder, tables));
-        }
+        toml::Value::Array(values) => values.iter_mut().for_each(|value| map_tables(value, map)),
         toml::Value::Table(table) => {
-            table.iter_mut().for_each(|(_, value)| complete_paths(value, folder, tables));
+            table.iter_mut().for_each(|(_, value)| map_tables(value, map));
         }
         _ => {}
     }

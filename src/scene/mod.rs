@@ -7,6 +7,7 @@
 //! What crosses the door: [`Scene::read`] parses the file and checks it against the JSON schema without the mesh;
 //! [`Scene::check_mesh`] checks it against the mesh. Nothing here knows how a problem is solved. Units are SI.
 
+mod as_run;
 mod boundary;
 mod check;
 mod document;
@@ -20,6 +21,7 @@ use std::collections::BTreeMap;
 use std::iter;
 use std::path::{Path, PathBuf};
 
+pub use as_run::AsRun;
 pub use boundary::{Boundary, Condition, Gap, SurfaceLoad};
 pub use error::SceneError;
 pub use expression::{Expression, ExpressionError};
@@ -120,9 +122,6 @@ fn may_start_at(law: &DamageLaw, zeta: f64) -> bool {
     law.threshold < zeta && zeta <= 1.0
 }
 
-/// The first line of the scene file in a folder of results.
-pub const AS_RUN: &str = "# As run by signorini; the results stand beside it.";
-
 /// A point of the body at which every step is observed.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -206,23 +205,6 @@ impl Scene {
         };
         let parts = steps.min(most.max(1));
         (0..=parts).map(|i| grid.time(i * steps / parts, steps)).collect()
-    }
-
-    /// The text of a scene file that repeats the run from any folder: the `--set` arguments are inserted, the
-    /// mesh is the one in use, and paths are full. Also the contents of the files of tables.
-    pub fn as_run(&self) -> (String, &[u8]) {
-        let mut scene = self.text.document.clone();
-        scene.insert("title".into(), self.title.clone().into());
-        let file = std::path::absolute(&self.mesh.file).unwrap_or(self.mesh.file.clone());
-        let mut mesh = toml::Table::new();
-        mesh.insert("file".into(), file.to_string_lossy().into_owned().into());
-        let mut parameters = self.mesh.parameters.clone();
-        mesh.extend(parameters.remove("size").map(|size| ("size".into(), size.into())));
-        if !parameters.is_empty() {
-            mesh.insert("parameters".into(), parameters.into());
-        }
-        scene.insert("mesh".into(), mesh.into());
-        (format!("{AS_RUN}\n{scene}"), &self.text.tables)
     }
 
     /// Reads and checks the scene at `path`.

@@ -186,7 +186,7 @@ fn frames_are_as_many_as_asked_for() {
         let contact: Vec<_> = files.iter().map(|f| f.replace("fields_", "contact_")).collect();
         let others = ["contact.csv", "contact.pvd", "fields.pvd", "history.csv", "scene.toml"];
         files.extend(contact.into_iter().chain(others.map(str::to_owned)));
-        files.push("summary.json".to_owned());
+        files.extend(["scene.msh", "summary.json"].map(str::to_owned));
         files.sort();
         assert_eq!(test_directory.names("out/scene"), files);
     }

@@ -7,7 +7,7 @@ use std::{
     time::{Duration, SystemTime},
 };
 
-const GEO: &str = r#"
+pub const GEO: &str = r#"
 DefineConstant[ size = 0.5 ];
 Point(1) = {0, 0, 0, size}; Point(2) = {1, 0, 0, size};
 Point(3) = {1, 1, 0, size}; Point(4) = {0, 1, 0, size};

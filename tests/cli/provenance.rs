@@ -1,36 +1,50 @@
 //! Results tell what made them, and can be made again from what they hold.
 
-use crate::test_directory::{TestDirectory, square};
+use crate::{
+    meshes::GEO,
+    test_directory::{TestDirectory, square},
+};
 
 #[test]
 fn the_scene_in_the_results_runs_again_to_the_same_answer() {
     let test_directory = TestDirectory::new();
     test_directory.write("meshes/fine.msh", &square(8));
+    test_directory.write("geo/square.geo", GEO);
     test_directory.write("loads/top.csv", "0, 0\n1, -2\n");
     for (options, overridden) in [
         (vec!["--set", "time.step=0.25", "--set", "boundary.top.traction=[0, '-2*t']"], "-2*t"),
-        (vec!["--set", "boundary.top.traction=[0, 'table(\"loads/top.csv\")']"], "/loads/top.csv"),
-        (vec!["--mesh", "meshes/fine.msh", "--solver", "tao"], "fine.msh"),
+        (
+            vec!["--set", "boundary.top.traction=[0, 'table(\"loads/top.csv\")']"],
+            "scene-table1.csv",
+        ),
+        (vec!["--mesh", "meshes/fine.msh", "--solver", "tao"], "scene.msh"),
+        (vec!["--set", "mesh.file=geo/square.geo", "--set", "mesh.size=0.5"], "scene.geo"),
     ] {
         test_directory.run(&[&options[..], &["--out", "first"]].concat());
         let scene = test_directory.read("first/scene.toml");
         assert!(scene.contains(overridden), "{scene}");
-        // It stands in another folder than the mesh and the scene, and is told another name there.
-        let again = test_directory.say(&["run", "first/scene.toml", "--out", "again"]);
+        let full = test_directory.path(".").display().to_string();
+        assert!(!scene.contains(full.trim_end_matches('.')), "{scene}");
+        // It is moved to a place where nothing else of the first run is.
+        let elsewhere = TestDirectory::new();
+        for name in test_directory.names("first").iter().filter(|name| name.starts_with("scene")) {
+            elsewhere
+                .write(&format!("first/{name}"), &test_directory.read(&format!("first/{name}")));
+        }
+        let again = elsewhere.say(&["run", "first/scene.toml", "--out", "again"]);
         assert_eq!(again.code, Some(0), "{again:?}");
-        let without_seconds = |folder| {
-            let (names, mut rows) = test_directory.history(folder);
+        let without_seconds = |directory: &TestDirectory, folder| {
+            let (names, mut rows) = directory.history(folder);
             let seconds = names.iter().position(|name| name == "seconds").expect("the column");
             rows.iter_mut().for_each(|row| row[seconds] = 0.0);
             rows
         };
         assert_eq!(
-            format!("{:?}", without_seconds("first")),
-            format!("{:?}", without_seconds("again"))
+            format!("{:?}", without_seconds(&test_directory, "first")),
+            format!("{:?}", without_seconds(&elsewhere, "again"))
         );
-        let title = |folder| test_directory.summary(folder)["title"].clone();
-        assert_eq!(title("first"), title("again"));
-        assert_eq!(test_directory.read("again/scene.toml"), scene);
+        assert_eq!(test_directory.summary("first")["title"], elsewhere.summary("again")["title"]);
+        assert_eq!(elsewhere.read("again/scene.toml"), scene);
     }
 }
 

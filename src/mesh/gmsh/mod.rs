@@ -181,6 +181,12 @@ fn refusal(text: &str, name: &str, value: f64) -> Option<&'static str> {
     }
 }
 
+/// Whether no command of a `.geo` reads another file.
+pub fn is_self_contained(geo: &Path) -> bool {
+    let commands = ["Include", "Merge", "ShapeFromFile"];
+    read_text(geo).is_ok_and(|text| !commands.iter().any(|command| text.contains(command)))
+}
+
 /// The time of the last change of the `.geo` and of all files that it includes (`Include "name"`, `Merge
 /// "name"`), directly or through others. gmsh reports missing files.
 fn last_change(geo: &Path) -> io::Result<SystemTime> {
