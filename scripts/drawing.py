@@ -26,6 +26,8 @@ plt.rcParams.update({
     "axes.spines.top": False,
     "axes.spines.right": False,
     "legend.frameon": False,
+    "axes.formatter.limits": (-3, 5),
+    "axes.formatter.use_mathtext": True,
     # TrueType fonts, which journals accept.
     "pdf.fonttype": 42,
     "ps.fonttype": 42,

@@ -1,7 +1,6 @@
 """The picture of the physical setting: boundaries by name, loads and supports (paper, Figures 1, 2,
 4 and 7)."""
 
-import pathlib
 import textwrap
 
 import matplotlib.pyplot as plt
@@ -77,7 +76,7 @@ def draw_setting(results, _limits):
 def _loads(results, conditions, curves):
     """A time with loads (the shown time if it has any), and the tractions at this time: (n, 2) at the samples of each
     curve, N/m²."""
-    folder = _folder(results)
+    folder = results.folder
 
     def at(time):
         forces = []
@@ -99,11 +98,6 @@ def _loads(results, conditions, curves):
     times = [time for time, _ in results.frames]
     time = max(times, key=lambda time: largest(at(time)))
     return time, at(time)
-
-
-def _folder(results):
-    """The folder of the scene's tables: that of its mesh."""
-    return pathlib.Path(results.scene.get("mesh", {}).get("file", "")).parent
 
 
 def _vectors(expressions, points, time, folder):
@@ -180,7 +174,7 @@ def _draw_body_force(axes, results, time):
     kind = "gravity" if "gravity" in body else "force"
     force = body.get(kind)
     middle = results.nodes.mean(axis=0, keepdims=True)
-    arrow = _vectors(force, middle, time, _folder(results)) if force else np.zeros((1, 2))
+    arrow = _vectors(force, middle, time, results.folder) if force else np.zeros((1, 2))
     if arrow.any():
         arrow *= ARROW * results.size / np.linalg.norm(arrow)
         axes.quiver(*middle.T, *arrow.T, color=GREEN, angles="xy", scale_units="xy", scale=1.0,
