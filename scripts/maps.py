@@ -6,7 +6,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.tri import Triangulation
 
 from drawing import (
-    BLUE, INK, RED, canvas, damage_scale, draw_colourbar, draw_contours, draw_foundation, draw_outline, frame, headline,
+    BLUE, INK, RED, canvas, damage_scale, draw_colourbar, draw_values, draw_foundation, draw_outline, frame, headline,
     least_zeta, map_size, stress_unit,
 )
 
@@ -28,8 +28,7 @@ def draw_deformed(results, limits):
     # The width of the lines, in points, follows the mean edge, so that they do not fill a fine mesh.
     edge = np.sqrt(extent.prod() / len(pieces.elements)) * 72 * width / extent[0]
     mesh = Triangulation(*pieces.at_points(moved).T, pieces.triangles)
-    axes.tripcolor(mesh, np.zeros(len(mesh.x)), cmap=ListedColormap(["#dfe9f3"]), zorder=1,
-                   rasterized=True)
+    draw_values(axes, mesh, np.zeros(len(mesh.x)), ListedColormap(["#dfe9f3"]), 0.0, 0.0)
     # One line for all sides, with a break after each.
     sides = np.pad(pieces.along(pieces.sides(), moved), ((0, 0), (0, 1), (0, 0)),
                    constant_values=np.nan)
@@ -130,11 +129,8 @@ def _amplified(results, limits):
 def _paint_stress(axes, mesh, results, limits):
     """Draws the von Mises stress with a colour bar; returns the text for the title."""
     factor, unit = stress_unit(limits.stress, results.units)
-    image = axes.tripcolor(
-        mesh, results.pieces.at_points(results.von_mises / factor), shading="gouraud", cmap="viridis",
-        vmin=0.0, vmax=limits.stress / factor or 1.0, rasterized=True,
-    )
-    draw_contours(axes, mesh, results.pieces.at_points(results.von_mises / factor), limits.stress / factor)
+    stress = results.pieces.at_points(results.von_mises / factor)
+    image = draw_values(axes, mesh, stress, "viridis", 0.0, limits.stress / factor or 1.0)
     extend = "max" if limits.is_cut else "neither"
     draw_colourbar(axes, image, f"von Mises stress ({unit})", extend)
     largest = results.von_mises.max()
@@ -151,11 +147,7 @@ def _paint_stress(axes, mesh, results, limits):
 def _paint_damage(axes, mesh, results, limits):
     """Draws ζ with a colour bar; returns the text for the title."""
     shown, label, colours, (low, high) = damage_scale(*limits.zeta)
-    image = axes.tripcolor(
-        mesh, results.pieces.at_points(shown(results.zeta)), shading="gouraud", cmap=colours,
-        vmin=low, vmax=high, rasterized=True,
-    )
-    draw_contours(axes, mesh, results.pieces.at_points(shown(results.zeta)), high, low)
+    image = draw_values(axes, mesh, results.pieces.at_points(shown(results.zeta)), colours, low, high)
     draw_colourbar(axes, image, label)
     least = results.zeta.min()
     return rf"damage, least $\zeta$ = {results.barred('zeta_min', least) or least_zeta(least)}"

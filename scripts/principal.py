@@ -5,10 +5,11 @@ import numpy as np
 from matplotlib.tri import Triangulation
 
 from drawing import (
-    INK, canvas, draw_colourbar, draw_foundation, draw_outline, frame, headline, map_size,
-    stress_unit,
+    INK, canvas, draw_colourbar, draw_foundation, draw_outline, draw_values, frame, headline,
+    map_size, stress_unit,
 )
 from limits import stress_top
+from results import ROUNDING
 
 # About so many lines along the longer side of the body.
 LINES = 24
@@ -30,15 +31,16 @@ def draw_principal(results, _limits, figure=None):
     turned = results.direction @ np.array([[0.0, 1.0], [-1.0, 0.0]])
     places = _lattice(results.nodes)
     mesh = Triangulation(*results.pieces.at_points(results.nodes).T, results.pieces.triangles)
+    # Rounding errors are no stress.
+    tension, compression = (np.where(stress > ROUNDING * results.von_mises.max(), stress, 0.0)
+                            for stress in (tension, compression))
     least_top = 0.05 * max(stress_top(results, tension), stress_top(results, compression))
     for axes, name, stress, direction in (
             (panels[0], "tension", tension, results.direction),
             (panels[1], "compression", compression, turned)):
         top = max(stress_top(results, stress), least_top) or 1.0
         factor, unit = stress_unit(top, results.units)
-        image = axes.tripcolor(
-            mesh, results.pieces.at_points(stress) / factor, shading="gouraud", cmap="viridis",
-            vmin=0.0, vmax=top / factor, rasterized=True)
+        image = draw_values(axes, mesh, results.pieces.at_points(stress) / factor, "viridis", 0.0, top / factor)
         extend = "max" if stress.max() > top else "neither"
         draw_colourbar(axes, image, f"{name} ({unit})", extend)
         _draw_lines(axes, results.nodes[places], direction[places], stress[places] / top,

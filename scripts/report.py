@@ -32,7 +32,9 @@ from results import ResultError, telling
 from setting import draw_setting
 
 # The largest number of frames of the slider.
-FRAMES = 15
+FRAMES = 10
+# What the processes draw, by name.
+TASKS = {}
 # Values of summary.json for the last state: key, name, kind of unit.
 FACTS = (
     ("solver", "contact solver", ""), ("ranks", "ranks", ""), ("nodes", "nodes", ""),
@@ -52,18 +54,46 @@ ERRORS = {
 
 
 def encoded(figure, dpi=110):
-    """The figure as a PNG in base64; "" without a figure."""
+    """The figure as a PNG in base64, not cropped; "" without a figure."""
     if figure is None:
         return ""
-    with io.BytesIO() as file:
+    with io.BytesIO() as file, plt.rc_context({"savefig.bbox": None}):
         figure.savefig(file, format="png", dpi=dpi)
         plt.close(figure)
         return base64.b64encode(file.getvalue()).decode()
 
 
-def picture(figure, name):
-    """An element of the page with the figure; "" without a figure."""
-    data = encoded(figure)
+def call(task):
+    """The result of a task."""
+    return TASKS[task]()
+
+
+def all_drawn(tasks):
+    """The results of functions by name, which are called in as many processes as there are cores. The processes are
+    forked, because they cannot import embedded scripts again."""
+    TASKS.update(tasks)
+    with multiprocessing.get_context("fork").Pool() as pool:
+        return dict(zip(tasks, pool.map(call, tasks, chunksize=1)))
+
+
+def pictures(results, everything):
+    """Functions that draw the pictures of the page, by name."""
+    limits = limits_of([results])
+    return {
+        "histories": lambda: draw_histories(results),
+        "stress and damage": lambda: draw_stress_and_damage(results, limits),
+        "principal stresses": lambda: draw_principal(results, limits),
+        "evolution of contact": lambda: draw_evolution(everything, limits_of(everything)),
+        "deformed mesh": lambda: draw_deformed(results, limits),
+        "contact pressure and gap": lambda: draw_pressure(results, limits),
+        "the setting": lambda: draw_setting(results, limits),
+        "forces on the supports": lambda: draw_force_displacement(results),
+        "least and mean ζ": lambda: draw_damage_history(results),
+    }
+
+
+def element(name, data):
+    """An element of the page with a picture; "" without a picture."""
     return data and f'<img alt="{name}" src="data:image/png;base64,{data}">'
 
 
@@ -80,22 +110,17 @@ def table(rows):
 
 def frame(state, limits):
     """The pictures at one time; they have the same size at all times."""
-    with plt.rc_context({"savefig.bbox": None}):
-        return {
-            "moment": state.moment,
-            "state": encoded(draw_state(state, limits), dpi=90),
-            "pressure": encoded(draw_pressure(state, limits), dpi=90),
-        }
+    return {
+        "moment": state.moment,
+        "state": encoded(draw_state(state, limits), dpi=90),
+        "pressure": encoded(draw_pressure(state, limits), dpi=90),
+    }
 
 
-def slider(results):
-    """Pictures of the body and of Γ_C at up to FRAMES times, with a slider."""
-    chosen = states(results, evenly(results.frames, FRAMES))
-    if len(chosen) < 2:
+def slider(frames):
+    """Pictures of the body and of Γ_C at several times, with a slider."""
+    if len(frames) < 2:
         return ""
-    # Processes are forked, because they cannot import embedded scripts again.
-    with multiprocessing.get_context("fork").Pool() as pool:
-        frames = pool.map(partial(frame, limits=limits_of(chosen)), chosen)
     return Template(SLIDER).substitute(last=len(frames) - 1, frames=json.dumps(frames))
 
 
@@ -181,9 +206,15 @@ def provenance(summary):
 
 def page(results, arguments):
     """The text of the page."""
-    summary, limits = results.summary, limits_of([results])
+    summary = results.summary
     scene = results.folder / "scene.toml"
     everything = states(results, evenly(results.frames, 400))
+    chosen = [state for _, state in evenly([(state.time, state) for state in everything], FRAMES)]
+    limits = limits_of(chosen)
+    tasks = {state.time: partial(frame, state, limits) for state in chosen}
+    named = pictures(results, everything)
+    drawn = all_drawn({name: lambda draw=draw: encoded(draw()) for name, draw in named.items()} | tasks)
+    elements = {name: element(name, drawn[name]) for name in named}
     errors = summary.get("errors") or {}
     percent = {key: "none" if value is None else f"{100 * value:.2g} %"
                for key, value in errors.items() if key != "figures"}
@@ -199,20 +230,13 @@ def page(results, arguments):
         subtitle=html.escape(with_overrides),
         ending=html.escape(ending),
         facts=facts(results),
-        setting=picture(draw_setting(results, limits), "the setting"),
-        slider=slider(results),
-        pictures="".join([
-            picture(draw_deformed(results, limits), "deformed mesh"),
-            picture(draw_stress_and_damage(results, limits), "stress and damage"),
-            picture(draw_principal(results, limits), "principal stresses"),
-            picture(draw_pressure(results, limits), "contact pressure and gap"),
-        ]),
-        histories="".join([
-            picture(draw_damage_history(results), "least and mean ζ"),
-            picture(draw_force_displacement(results), "forces on the supports"),
-            picture(draw_evolution(everything, limits_of(everything)), "evolution of contact"),
-            picture(draw_histories(results), "histories"),
-        ]) or "One static solve.",
+        setting=elements["the setting"],
+        slider=slider([drawn[time] for time in tasks]),
+        pictures="".join(elements[name] for name in (
+            "deformed mesh", "stress and damage", "principal stresses", "contact pressure and gap")),
+        histories="".join(elements[name] for name in (
+            "least and mean ζ", "forces on the supports", "evolution of contact", "histories"))
+        or "One static solve.",
         errors=table((ERRORS.get(key, key), value) for key, value in percent.items()),
         residuals=table((key, f"{value:.1e}") for key, value in (summary.get("kkt") or {}).items()),
         notes=f"<p>Notes:</p><ul>{''.join(notes)}</ul>" if notes else "",

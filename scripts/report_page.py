@@ -28,7 +28,12 @@ PAGE = """<!DOCTYPE html>
   .slider input { flex: 1; }
   .slider output { min-width: 8rem; font-variant-numeric: tabular-nums; }
   th { border-bottom: 1px solid #d5dae0; color: #66707a; }
-  @media (max-width: 480px) { .pair { grid-template-columns: 1fr; } td.bar { width: 4rem; } }
+  @media (max-width: 480px) {
+    .pair { grid-template-columns: minmax(0, 1fr); }
+    td.bar { width: 4rem; }
+    table { display: block; overflow-x: auto; }
+    code { overflow-wrap: anywhere; }
+  }
   @page { size: A4; margin: 18mm 15mm; }
   @media print {
     :root { font-size: 11px; }
