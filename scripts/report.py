@@ -54,10 +54,10 @@ ERRORS = {
 
 
 def encoded(figure, dpi=110):
-    """The figure as a PNG in base64, not cropped; "" without a figure."""
+    """The figure as a PNG in base64; "" without a figure."""
     if figure is None:
         return ""
-    with io.BytesIO() as file, plt.rc_context({"savefig.bbox": None}):
+    with io.BytesIO() as file:
         figure.savefig(file, format="png", dpi=dpi)
         plt.close(figure)
         return base64.b64encode(file.getvalue()).decode()
@@ -110,11 +110,12 @@ def table(rows):
 
 def frame(state, limits):
     """The pictures at one time; they have the same size at all times."""
-    return {
-        "moment": state.moment,
-        "state": encoded(draw_state(state, limits), dpi=90),
-        "pressure": encoded(draw_pressure(state, limits), dpi=90),
-    }
+    with plt.rc_context({"savefig.bbox": None}):
+        return {
+            "moment": state.moment,
+            "state": encoded(draw_state(state, limits), dpi=90),
+            "pressure": encoded(draw_pressure(state, limits), dpi=90),
+        }
 
 
 def slider(frames):
