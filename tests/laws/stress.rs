@@ -1,7 +1,7 @@
 //! Stresses at the nodes: exact if uniform, of a higher order than the stresses of the triangles elsewhere, and discontinuous where materials meet.
 
 use crate::support::{
-    ORDERS, close, distorted, largest, moved, order, problem, run, square, unstructured,
+    ORDERS, bent, close, distorted, largest, moved, order, problem, run, square, unstructured,
 };
 use signorini::{
     contact::SOLVERS,
@@ -9,6 +9,7 @@ use signorini::{
     evolution::DiscreteProblem,
     mesh::{Mesh, Order},
 };
+use std::f64::consts::FRAC_PI_2;
 
 const YOUNG: f64 = 50.0;
 const POISSON: f64 = 0.3;
@@ -100,6 +101,52 @@ fn nodal_stresses_converge_faster_than_those_of_the_triangles() {
             mean > degree + 0.6 && most > 0.8 * degree,
             "P{degree}: {most:.2}, {mean:.2}: {errors:?}"
         );
+    }
+}
+
+/// A quarter of a ring with radii 1 and 2 under a pressure of 1 in its bore (Lamé): σ_r = (1 − 4/r²)/3 and
+/// σ_θ = (1 + 4/r²)/3.
+#[test]
+fn nodal_stresses_of_a_ring_under_pressure_converge_to_those_of_lame() {
+    let ring = |[x, y]: [f64; 2]| {
+        let (s, c) = (FRAC_PI_2 * y).sin_cos();
+        [(1.0 + x) * c, (1.0 + x) * s]
+    };
+    let sizes = [0.1, 0.05, 0.025];
+    for (degree, fits) in [(1, 1.5), (2, 2.5)] {
+        let errors = sizes.map(|size| {
+            let mesh = unstructured(size);
+            let mesh = if degree == 1 { moved(mesh, ring) } else { bent(&mesh, ring) };
+            let text = format!(
+                "discretisation.displacement = {degree}
+                 material = {{ young = {YOUNG}, poisson = {POISSON}, plane = 'stress' }}
+                 [[boundary]]
+                 name = 'left'
+                 pressure = 1
+                 [[boundary]]
+                 name = 'bottom'
+                 symmetry = true
+                 [[boundary]]
+                 name = 'top'
+                 symmetry = true"
+            );
+            let problem = problem(mesh, &text).unwrap_or_else(|e| panic!("{e}"));
+            let off = |([x, y], stress): ([f64; 2], [f64; 4])| {
+                let square = x * x + y * y;
+                let [radial, hoop] = [-4.0, 4.0].map(|sign| (1.0 + sign / square) / 3.0);
+                let [cc, ss, cs] = [x * x, y * y, x * y].map(|product| product / square);
+                let xx = cc * radial + ss * hoop - stress[0];
+                let yy = ss * radial + cc * hoop - stress[1];
+                largest(&[xx, yy, cs * (radial - hoop) - stress[2]])
+            };
+            let off: Vec<f64> = stresses(&problem).into_iter().map(off).collect();
+            let mean = (off.iter().map(|e| e * e).sum::<f64>() / off.len() as f64).sqrt();
+            [largest(&off), mean]
+        });
+        let [most, mean] = [0, 1].map(|k| order(&sizes, &errors.map(|errors| errors[k])));
+        println!("P{degree}: largest and mean {errors:?}, orders {most:.2} and {mean:.2}");
+        let converges = mean > fits && most > fits - 0.6;
+        assert!(converges, "P{degree}: {most:.2}, {mean:.2}: {errors:?}");
     }
 }
 
