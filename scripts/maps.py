@@ -122,8 +122,10 @@ def _amplified(results, limits):
     """The amplification in words."""
     largest = np.linalg.norm(results.displacement, axis=1).max()
     largest = results.barred("displacement_max", largest) or f"{largest:.3g}"
-    moves = f"displacements × {limits.factor:g} (largest {largest} {results.units['length']})"
-    return "unloaded" if results.unloaded else moves
+    if results.unloaded:
+        return "unloaded"
+    what = "displacements, gaps and the sliding along the foundation" if len(results.contact) else "displacements"
+    return f"{what} × {limits.factor:g} (largest {largest} {results.units['length']})"
 
 
 def _paint_stress(axes, mesh, results, limits):
