@@ -102,15 +102,6 @@ fn check_petsc(options: &[String]) -> Result<(), Failure> {
     }
 }
 
-/// The approximate number of triangles along the body in the first mesh of a `.geo` for an accuracy. Refined
-/// sides stay on the parabolas of this mesh. The distance of a parabola from an arc is of fourth order in the
-/// length of the side, so high accuracies need more triangles.
-fn cells(accuracy: f64) -> f64 {
-    /// Below this accuracy a mesh with four triangles along the body follows arcs too coarsely.
-    const COARSE: f64 = 0.01;
-    4.0 * (COARSE / accuracy).cbrt().max(1.0)
-}
-
 fn fraction(text: &str) -> Result<f64, &'static str> {
     text.parse().map_err(|_| "write a number with a decimal point: 0.01 is 1 %")
 }
@@ -129,8 +120,8 @@ pub struct SceneArguments {
     #[arg(long, value_name = "ERROR", value_parser = fraction)]
     accuracy: Option<f64>,
     /// Ask for the accuracy of this figure alone (work, displacement_max, contact_force, zeta_min, zeta_mean,
-    /// NAME.force_x … as in summary.json); may be repeated.
-    #[arg(long, value_name = "NAME")]
+    /// NAME.force_x … as in summary.json), or of several, with commas.
+    #[arg(long, value_delimiter = ',', value_name = "NAME")]
     accuracy_of: Vec<String>,
     /// Override a key of the scene, e.g. --set time.step=0.005; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -187,19 +178,48 @@ fn read_mesh(scene: &Scene, adapts: bool) -> Result<Mesh, Failure> {
         let problem = "No such file; mesh.file (relative to the scene) or --mesh names it";
         return Err(Failure::input(format!("{}: {problem}", file.display())));
     }
-    let (mut parameters, mut order) = (parameters.clone(), scene.order);
     if let Some(accuracy) = scene.accuracy
         && adapts
         && file.extension().is_none_or(|kind| kind != "msh")
     {
-        // Linear elements need order 2, too: their bisected sides then follow the parabolas of this mesh.
-        order = Order::Quadratic;
-        let usual = mesh::load(file, &parameters, Order::Linear).map_err(Failure::mesh)?;
-        let scaling = mesh::scaling_factor(file).map_err(Failure::mesh)?;
-        parameters
-            .insert("size".to_owned(), mesh::extent(&usual.nodes) / scaling / cells(accuracy));
+        return first_mesh(&scene.mesh, accuracy);
     }
-    mesh::load(file, &parameters, order).map_err(Failure::mesh)
+    mesh::load(file, parameters, scene.order).map_err(Failure::mesh)
+}
+
+/// The mesh of a `.geo` from which the adaptation to an accuracy starts. Its order is 2 also for linear elements, so
+/// that refined sides stay on the arcs through the nodes of this mesh.
+///
+/// Where arcs follow another smooth curve, they meet at a small angle, which stays. Stresses at an angle δ grow like
+/// h^(−δ/π), about. So the mesh becomes finer until these angles are a tenth of the accuracy.
+fn first_mesh(source: &MeshSource, accuracy: f64) -> Result<Mesh, Failure> {
+    /// Triangles along the body.
+    const CELLS: f64 = 4.0;
+    /// Curves with kinks that stay are given up after so many halvings of the size.
+    const HALVINGS: usize = 4;
+    let MeshSource { file, parameters } = source;
+    let usual = mesh::load(file, parameters, Order::Linear).map_err(Failure::mesh)?;
+    let scaling = mesh::scaling_factor(file).map_err(Failure::mesh)?;
+    let largest = mesh::extent(&usual.nodes) / scaling / CELLS;
+    let of_size = |size: f64| {
+        let mut parameters = parameters.clone();
+        parameters.insert("size".to_owned(), size);
+        mesh::load(file, &parameters, Order::Quadratic).map_err(Failure::mesh)
+    };
+    let mut first = of_size(largest)?;
+    for halvings in 1..=HALVINGS {
+        let kink = first.largest_kink();
+        if kink <= 0.1 * accuracy {
+            break;
+        }
+        let finer = of_size(largest * 0.5_f64.powi(halvings as i32))?;
+        // A kink of the geometry itself does not become smaller.
+        if finer.largest_kink() > 0.5 * kink {
+            break;
+        }
+        first = finer;
+    }
+    Ok(first)
 }
 
 /// The reference of all keys of a scene. scripts/keys.py makes it from their schema.

@@ -95,6 +95,8 @@ const PILOT_TOLERANCE: f64 = 0.05;
 /// Maximum number of rounds, and of triangles of a mesh or its measurement.
 const MAX_ROUNDS: usize = 25;
 const MAX_TRIANGLES: usize = 4_000_000;
+/// What is wrong with a figure whose error does not become smaller.
+const STAYS: &str = "stays while the mesh becomes finer, as at a singular point; --accuracy-of NAME,… asks for others";
 
 /// Refines `mesh` until the measured errors in a run of `scene` are at most `accuracy`: the errors of the figures,
 /// of u (energy norm) and of the damage. If the run ends at ζ_*, only the errors of u and of this time count. The
@@ -188,6 +190,8 @@ fn refined(
 ) -> Result<Adapted, AdaptError> {
     let mut refinement = Refinement::start(mesh);
     let mut rounds = 0;
+    // The triangles and the worst error of the rounds that were measured.
+    let mut excesses: Vec<(usize, f64)> = Vec::new();
     loop {
         rounds += 1;
         let mesh = &refinement.mesh;
@@ -208,10 +212,17 @@ fn refined(
         };
         let limit = || "the limit on rounds or triangles is reached".to_owned();
         let exhausted = rounds >= MAX_ROUNDS || 4 * triangles > MAX_TRIANGLES;
-        let short = failed.or(exhausted.then(limit));
         let mut adapted = round.adapted(measured.as_ref(), rounds);
         let errors = measured.as_ref().map(|measured| measured.errors(&scene.accuracy_of));
-        let reached = errors.is_some_and(|errors| errors.iter().all(|e| e.excess(accuracy) <= 1.0));
+        let worst = errors.as_ref().and_then(|errors| errors.first());
+        let excess = worst.map(|worst| worst.excess(accuracy));
+        excesses.extend(excess.map(|excess| (triangles, excess)));
+        let stays = || {
+            let name = &worst?.name;
+            stays(&excesses).then(|| format!("the error of {name} {STAYS}"))
+        };
+        let short = failed.or_else(stays).or(exhausted.then(limit));
+        let reached = excess.is_some_and(|excess| excess <= 1.0);
         let ends = reached || short.is_some();
         adapted.short = short.filter(|_| !reached);
         seen(&adapted);
@@ -221,6 +232,15 @@ fn refined(
         let ratios = round.size_ratios(measured.as_ref());
         refinement = divided(refinement, &ratios)?;
     }
+}
+
+/// Whether the worst error has not become half of what it was with an eighth of the triangles: of first order it would
+/// be about a third.
+fn stays(excesses: &[(usize, f64)]) -> bool {
+    let Some(&(triangles, last)) = excesses.last() else { return false };
+    let before = excesses.iter().filter(|(count, _)| 8 * count <= triangles);
+    let largest = before.map(|(_, excess)| *excess).reduce(f64::max);
+    largest.is_some_and(|largest| last > 0.5 * largest)
 }
 
 /// Makes the steps adaptive: too long steps may reach ζ_* or miss loads. False if they are adaptive already.

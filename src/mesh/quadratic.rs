@@ -4,7 +4,8 @@
 //! offset d = m − (a+b)/2 vanishes if it is straight. A triangle with vertices p_i is the image
 //! x(λ) = Σ_i λ_i p_i + Σ_{i<j} 4λ_iλ_j d_ij of the barycentric coordinates λ.
 
-use super::{Mesh, sorted};
+use super::{CORNER_ANGLE, Mesh, sorted};
+use std::collections::BTreeMap;
 
 /// Relative offset |d| / length below which an edge is straight.
 const STRAIGHT: f64 = 1e-9;
@@ -40,6 +41,31 @@ impl Mesh {
         } else {
             self.curved.remove(&sorted([a, b]));
         }
+    }
+
+    /// The largest angle between neighbouring curved edges of the boundary, as arcs of circles, that is no corner of
+    /// it, rad. It is zero for circles, and falls with the third power of the length of the edges for other curves.
+    pub fn largest_kink(&self) -> f64 {
+        // The directions in which the boundary arrives at a node and leaves it.
+        let (mut arriving, mut leaving) = (BTreeMap::new(), BTreeMap::new());
+        for [a, b] in self.boundary_edges() {
+            if !self.curved.contains_key(&sorted([a, b])) {
+                continue;
+            }
+            let (p, q) = (self.nodes[a], self.nodes[b]);
+            let (chord, d) = ([q[0] - p[0], q[1] - p[1]], offset(p, q, self.midpoint([a, b])));
+            // The arc with sagitta d over the chord begins and ends at the angle 2 atan(2|d|/|chord|) to it.
+            let outward = 2.0 * (chord[0] * d[1] - chord[1] * d[0]).atan2(0.5 * dot(chord, chord));
+            let direction = chord[1].atan2(chord[0]);
+            leaving.insert(a, direction + outward);
+            arriving.insert(b, direction - outward);
+        }
+        let kinks = leaving.into_iter().filter_map(|(node, angle)| {
+            let turn = angle - arriving.get(&node)?;
+            let turn = turn.sin().atan2(turn.cos()).abs();
+            (turn < CORNER_ANGLE).then_some(turn)
+        });
+        kinks.fold(0.0, f64::max)
     }
 
     /// Whether any side of a triangle is curved.
@@ -78,6 +104,10 @@ impl Mesh {
         // This is false for NaN, too.
         rotated.all(|lambda| determinant(lambda) > bound)
     }
+}
+
+fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
 }
 
 fn mean(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {

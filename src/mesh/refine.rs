@@ -38,8 +38,8 @@ impl Refinement {
     /// Bisects the `marked` triangles, and others as far as the mesh needs it to stay conforming. A triangle
     /// has at most four parts.
     ///
-    /// The edges of curves are halved with their triangles. New nodes of quadratic edges and triangles lie
-    /// on their parabolas, and the parts keep the curvature. The number of interior edges of a curve does not
+    /// The edges of curves are halved with their triangles. The halves of a curved edge lie on the circle through
+    /// its ends and its midpoint, so that refined arcs of circles stay on them. The number of interior edges of a curve does not
     /// change, as they are not listed.
     ///
     /// # Errors
@@ -77,8 +77,12 @@ impl Refinement {
             };
             curve.edges = curve.edges.iter().flat_map(halves).collect();
         }
-        for ends in &halved_edges {
-            mesh.curved.remove(ends);
+        for (&[a, b], middle) in halved_edges.iter().zip(self.mesh.nodes.len()..) {
+            if mesh.curved.remove(&[a, b]).is_some() {
+                let [p, m, q] = [a, middle, b].map(|node| mesh.nodes[node]);
+                mesh.set_offset([a, middle], arc_offset(p, m, q));
+                mesh.set_offset([middle, b], arc_offset(q, m, p));
+            }
         }
         let mut parent_of_triangle = Vec::new();
         for (parent, &nodes) in self.mesh.triangles.iter().enumerate() {
@@ -111,6 +115,17 @@ impl Refinement {
 struct Triangle {
     nodes: [usize; 3],
     offsets: [[f64; 2]; 3],
+}
+
+/// The offset of the midpoint of the arc from a to m, on the circle through a, m and b, m.
+///
+/// The chord am is seen from b at the angle θ. So the sagitta of its arc is |am|/2 tan(θ/2).
+fn arc_offset(a: [f64; 2], m: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    let [q, r, chord] =
+        [[a, b], [m, b], [m, a]].map(|[to, from]| [to[0] - from[0], to[1] - from[1]]);
+    let (cross, dot) = (q[0] * r[1] - q[1] * r[0], q[0] * r[0] + q[1] * r[1]);
+    let tangent = cross / (q[0].hypot(q[1]) * r[0].hypot(r[1]) + dot);
+    [0.5 * tangent * chord[1], -0.5 * tangent * chord[0]]
 }
 
 /// The children of a triangle that is bisected at the node `middle`; without one, the triangle itself.

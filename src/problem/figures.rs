@@ -16,6 +16,9 @@ const MIN_SCALE: f64 = 1e-3;
 /// The scale of a moment is at least this fraction of the maximum force times the body's radius of gyration. A
 /// moment is small about any point near the line of its force.
 const MIN_MOMENT_SCALE: f64 = 0.1;
+/// The scale of a stress is at least this fraction of the mean stress of the body, about √(E ‖u‖²/|Ω|). A stress at a
+/// free corner is zero.
+const MIN_STRESS_SCALE: f64 = 0.1;
 /// The relative error of the integral of a body force that varies in space. Both meshes of a measurement may
 /// have the same error, which the measurement then misses.
 const BODY_FORCE: f64 = 1e-4;
@@ -104,14 +107,17 @@ impl DiscreteProblem {
         self.figures().into_iter().zip(errors.iter().zip(scales)).map(bar).collect()
     }
 
-    /// The scale of each figure, from the `largest` [sizes](Self::figure_sizes) of a run: the maximum of its group.
-    pub(crate) fn figure_scales(&self, largest: &[f64]) -> Vec<f64> {
+    /// The scale of each figure, from the `largest` [sizes](Self::figure_sizes) and the largest ‖u‖² (`energy`, N m per
+    /// metre of thickness) of a run: the maximum of its group.
+    pub(crate) fn figure_scales(&self, largest: &[f64], energy: f64) -> Vec<f64> {
         let figures = self.figures();
         let most = |is_like: &dyn Fn(&Figure) -> bool| {
             let like = figures.iter().zip(largest).filter(|(figure, _)| is_like(figure));
             like.map(|(_, value)| *value).fold(0.0, f64::max)
         };
         let lever = self.body.radius_of_gyration();
+        let young = self.scene().materials().map(|material| material.young);
+        let mean_stress = (young.fold(f64::INFINITY, f64::min) * energy / self.body.area).sqrt();
         let scale = |figure: &Figure| {
             let own = most(&|other| other.group == figure.group);
             let alike = match figure.dimension {
@@ -119,6 +125,7 @@ impl DiscreteProblem {
                 Dimension::Moment => {
                     MIN_MOMENT_SCALE * lever * most(&|other| other.dimension == Dimension::Force)
                 }
+                Dimension::Stress => MIN_STRESS_SCALE * mean_stress,
                 dimension => MIN_SCALE * most(&|other| other.dimension == dimension),
             };
             own.max(alike)

@@ -98,7 +98,7 @@ impl<'a> Pilot<'a> {
 
     /// The scales of the figures.
     pub(super) fn scales(&self) -> Vec<f64> {
-        self.problem.figure_scales(&self.history.sizes)
+        self.problem.figure_scales(&self.history.sizes, self.history.energy)
     }
 
     /// The figures at `time`, s, affine between the steps.
