@@ -5,7 +5,7 @@ use crate::{
     fem::{Elements, Partition, for_elements},
     model::{Material, von_mises},
     petsc::PetscError,
-    problem::{DiscreteProblem, State},
+    problem::{DiscreteProblem, Singular, State},
 };
 use nalgebra::{Matrix3, Vector3};
 use rustc_hash::FxHashMap as HashMap;
@@ -140,7 +140,14 @@ impl NodalStress {
         let singular = problem.singular_points().into_iter();
         let near = singular.filter(|point| distance(point.at) <= 1.001 * point.radius);
         let nearest = near.min_by(|a, b| distance(a.at).total_cmp(&distance(b.at)));
-        Ok(Peak { von_mises: -least, at, singular: nearest.map(|point| point.name) })
+        // A singular stress is large at its point itself.
+        let there = |point: &Singular| {
+            let here = |(_, at): &(_, &Point)| at.at == point.at;
+            let own = stresses.iter().zip(&self.points).filter(here);
+            comm.max(own.map(|(stress, _)| von_mises(*stress)).fold(0.0, f64::max))
+        };
+        let singular = nearest.filter(|point| there(point) >= -0.5 * least);
+        Ok(Peak { von_mises: -least, at, singular: singular.map(|point| point.name) })
     }
 }
 

@@ -43,6 +43,16 @@ impl Mesh {
         }
     }
 
+    /// The direction in which the edge from node a to node b, as the arc of a circle, leaves a. It is not normalised.
+    pub fn direction(&self, a: usize, b: usize) -> [f64; 2] {
+        let (p, q) = (self.nodes[a], self.nodes[b]);
+        let (chord, d) = ([q[0] - p[0], q[1] - p[1]], offset(p, q, self.midpoint([a, b])));
+        // The arc with sagitta d over the chord begins at the angle 2 atan(2|d|/|chord|) to it.
+        let (square, cross) = (dot(chord, chord), chord[0] * d[1] - chord[1] * d[0]);
+        let (sin, cos) = (2.0 * (2.0 * cross).atan2(square)).sin_cos();
+        [cos * chord[0] - sin * chord[1], sin * chord[0] + cos * chord[1]]
+    }
+
     /// The largest angle between neighbouring curved edges of the boundary, as arcs of circles, that is no corner of
     /// it, rad. It is zero for circles, and falls with the third power of the length of the edges for other curves.
     pub fn largest_kink(&self) -> f64 {
@@ -52,17 +62,12 @@ impl Mesh {
             if !self.curved.contains_key(&sorted([a, b])) {
                 continue;
             }
-            let (p, q) = (self.nodes[a], self.nodes[b]);
-            let (chord, d) = ([q[0] - p[0], q[1] - p[1]], offset(p, q, self.midpoint([a, b])));
-            // The arc with sagitta d over the chord begins and ends at the angle 2 atan(2|d|/|chord|) to it.
-            let outward = 2.0 * (chord[0] * d[1] - chord[1] * d[0]).atan2(0.5 * dot(chord, chord));
-            let direction = chord[1].atan2(chord[0]);
-            leaving.insert(a, direction + outward);
-            arriving.insert(b, direction - outward);
+            leaving.insert(a, self.direction(a, b));
+            arriving.insert(b, self.direction(b, a).map(|component| -component));
         }
-        let kinks = leaving.into_iter().filter_map(|(node, angle)| {
-            let turn = angle - arriving.get(&node)?;
-            let turn = turn.sin().atan2(turn.cos()).abs();
+        let kinks = leaving.into_iter().filter_map(|(node, [x, y])| {
+            let [before_x, before_y] = *arriving.get(&node)?;
+            let turn = (before_x * y - before_y * x).atan2(before_x * x + before_y * y).abs();
             (turn < CORNER_ANGLE).then_some(turn)
         });
         kinks.fold(0.0, f64::max)

@@ -7,7 +7,8 @@
 //! - one side is clamped and the other one free, and sin² ω > 1/(1 + ν) in plane stress, 1 − ν in plane strain, or
 //!   ω > 90° (61° and 57° for ν = 0.3; the exponent 1 in Williams's equation);
 //! - one side slides without friction on a support and the other one is free, and ω > 90°;
-//! - two materials meet there (Bogy, J. Appl. Mech. 35, 1968; for most pairs of materials).
+//! - two materials meet there (Bogy, J. Appl. Mech. 35, 1968; for most pairs of materials), except at a right angle
+//!   to a support without friction.
 
 use super::DiscreteProblem;
 use crate::{
@@ -60,23 +61,25 @@ impl DiscreteProblem {
         let boundary = mesh.boundary_edges();
         // The interior angle at each node of the boundary; NaN elsewhere.
         let mut angles = vec![f64::NAN; mesh.nodes.len()];
-        // The elastic constants of the first triangle at each node of the boundary, and whether others differ.
+        // At each node of the boundary: the elastic constants of the first triangle, and the angle in which they hold.
         let materials: Vec<Material> = self.scene().materials().collect();
         let numbers = self.scene().materials_of(mesh);
-        let mut found = BTreeMap::<usize, (Material, bool)>::new();
+        let mut found = BTreeMap::<usize, (Material, f64)>::new();
         boundary.iter().flatten().for_each(|&node| angles[node] = 0.0);
         for (t, triangle) in mesh.triangles.iter().enumerate() {
             for i in 0..3 {
                 if angles[triangle[i]].is_nan() {
                     continue;
                 }
-                let [a, b, c] = [0, 1, 2].map(|k| mesh.nodes[triangle[(i + k) % 3]]);
-                let [p, q] = [b, c].map(|end| [end[0] - a[0], end[1] - a[1]]);
+                let [a, b, c] = [0, 1, 2].map(|k| triangle[(i + k) % 3]);
+                let [p, q] = [b, c].map(|end| mesh.direction(a, end));
                 let turn = (p[0] * q[1] - p[1] * q[0]).atan2(p[0] * q[0] + p[1] * q[1]);
                 angles[triangle[i]] += turn;
                 let own = materials[numbers.get(t).map_or(0, |&number| number as usize)];
-                let (first, differs) = found.entry(triangle[i]).or_insert((own, false));
-                *differs |= own.stiffness() != first.stiffness();
+                let (first, of_first) = found.entry(triangle[i]).or_insert((own, 0.0));
+                if own.stiffness() == first.stiffness() {
+                    *of_first += turn;
+                }
             }
         }
         let supports = self.supports_of_edges();
@@ -87,11 +90,15 @@ impl DiscreteProblem {
                 .for_each(|node| sides.entry(*node).or_default().push((edge, support, name)));
         }
         let singular = |(node, sides): (usize, Vec<Side>)| {
-            let (material, two_materials) = *found.get(&node)?;
+            let (material, of_first) = *found.get(&node)?;
+            let of_first = of_first.to_degrees() / (sides.len() / 2).max(1) as f64;
             let angle = angles[node].to_degrees() / (sides.len() / 2).max(1) as f64;
             let (_, most, name) = *sides.iter().max_by_key(|(_, support, _)| *support)?;
             let same = sides.iter().all(|(_, support, _)| *support == most);
             let is_free = sides.iter().any(|(_, support, _)| *support == Support::Free);
+            // An interface at a right angle to a smooth frictionless support continues in its mirror image.
+            let mirrored = same && most == Support::Sliding && (of_first - 90.0).abs() <= SMOOTH;
+            let two_materials = of_first < angle - SMOOTH && !mirrored;
             let is_smooth = (angle - 180.0).abs() <= CORNER_ANGLE.to_degrees();
             let limit = match most {
                 Support::Sliding if same && is_smooth => f64::INFINITY,
