@@ -33,11 +33,14 @@ def _exceeded_in(part, values, sizes):
 
 
 def stress_top(state, stress):
-    """The value of a stress at the nodes that is exceeded on 0.5 % of the area."""
+    """The top of the colours for a stress at the nodes: the largest, or if that is a peak, the stress that is exceeded
+    on 0.5 % of the area. Singular stresses are peaks, and so are those above four times this."""
     (ax, ay), (bx, by), (cx, cy) = (state.nodes[state.pieces.elements[:, i]].T for i in range(3))
     areas = np.abs((bx - ax) * (cy - ay) - (cx - ax) * (by - ay))
     means = stress[state.pieces.elements[:, :3]].mean(axis=1)
-    return _exceeded_in(0.005, means, areas)
+    top, largest = _exceeded_in(0.005, means, areas), stress.max()
+    singular = (state.summary.get("largest_stress") or {}).get("singular")
+    return top if largest > (1.25 if singular else 4.0) * top > 0.0 else largest
 
 
 def _pressure_top(state):
@@ -53,16 +56,15 @@ def _pressure_top(state):
 
 def limits_of(states, factor=None):
     """Scales for all `states`, with the given amplification of displacements, if any."""
-    # Stress is singular at corners. A peak on a small area must not darken the rest.
+    # A peak on a small area must not darken the rest.
     largest = max(state.von_mises.max() for state in states)
     top = max(stress_top(state, state.von_mises) for state in states)
-    is_cut = largest > 1.25 * top > 0.0
     factor = factor or _amplification(states)
     return Limits(
         factor=factor,
         box=box_of(states, factor),
-        stress=float(top if is_cut else largest),
-        is_cut=bool(is_cut),
+        stress=float(top),
+        is_cut=bool(largest > top),
         zeta=(min(s.zeta.min() for s in states), max(s.zeta.max() for s in states)),
         pressure=max(_pressure_top(state) for state in states),
         gap=max((curve.gap.max() for state in states for curve in state.curves), default=0.0),
