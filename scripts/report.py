@@ -154,7 +154,9 @@ def governing(everything, units):
         if value == (1.0 if name == "least ζ" else 0.0):
             continue
         x, y = state.nodes[node]
-        singular = f"singular: {html.escape(state.singular)}" if kind == "stress" and state.singular else ""
+        largest = state.summary.get("largest_stress") or {}
+        is_there = kind == "stress" and state.singular and np.allclose(largest["at"], (x, y), atol=1e-9 * state.size)
+        singular = f"singular: {html.escape(state.singular)}" if is_there else ""
         rows.append((name, f"{value:.4g}", html.escape(units.get(kind, "")), f"({x:.4g}, {y:.4g})",
                      f"{state.time:g} {html.escape(units['time'])}", singular))
     head = "<tr><th></th><th>value</th><th></th><th>at</th><th>time</th><th></th></tr>"
@@ -217,8 +219,8 @@ def page(results, arguments):
     drawn = all_drawn({name: lambda draw=draw: encoded(draw()) for name, draw in named.items()} | tasks)
     elements = {name: element(name, drawn[name]) for name in named}
     errors = summary.get("errors") or {}
-    percent = {key: "none" if value is None else f"{100 * value:.2g} %"
-               for key, value in errors.items() if key != "figures"}
+    percent = {key: f"{100 * value:.2g} %"
+               for key, value in errors.items() if key != "figures" and value is not None}
     notes = [f"<li>{html.escape(note)}</li>" for note in summary.get("notes", [])]
     error = summary.get("error")
     ending = error and f"failed: {error}" or results.ending.replace("$_*$", "_*")

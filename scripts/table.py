@@ -79,7 +79,7 @@ def printed(rows, as_csv):
 
 
 def main(prog=None):
-    """Returns the exit code: 2 if a folder has no results."""
+    """Returns the exit code: 2 if a folder has no results or a column no value; the other rows are printed."""
     parser = argparse.ArgumentParser(
         prog=prog, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", nargs="+", metavar="OUT", help="folders of results")
@@ -87,12 +87,24 @@ def main(prog=None):
         "NAME,…"), help="names in summary.json, with points: quantities.clamp.force_y, errors.solver")
     parser.add_argument("--csv", action="store_true", help="as CSV with all digits")
     arguments = parser.parse_args()
-    try:
-        printed(rows_of(arguments.folders, arguments.columns), arguments.csv)
-    except ValueError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    return 0
+    folders, problems = [], []
+    for folder in arguments.folders:
+        try:
+            summary_of(folder)
+            folders.append(folder)
+        except ValueError as error:
+            problems.append(str(error))
+    rows = rows_of(folders, arguments.columns)
+    if folders:
+        printed(rows, arguments.csv)
+    if folders and arguments.columns is not COLUMNS:
+        known = sorted({name for folder in folders for name in summary_of(folder)})
+        problems += [f"no summary has {name}; there are {', '.join(known)}" for name in arguments.columns
+                     if name.split(".")[0] not in known
+                     or name.startswith("quantities.") and all(row[name] is None for row in rows)]
+    for problem in problems:
+        print(f"error: {problem}", file=sys.stderr)
+    return 2 if problems else 0
 
 
 if __name__ == "__main__":

@@ -34,10 +34,13 @@ class Run:
         self.summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
         self.frames = frames_of(folder)
         frame = read_frame(self.frames[-1][1])
-        self.points = frame.points[:, :2]
-        self.cells = next(iter(frame.cells_dict.values()))
-        self.u = frame.point_data["displacement"][:, :2]
-        self.zeta = frame.point_data["zeta"].ravel()
+        # A node where materials meet is several points.
+        numbers = frame.point_data.get("global_node", np.arange(len(frame.points)))
+        _, first, node = np.unique(numbers, return_index=True, return_inverse=True)
+        self.points = frame.points[first, :2]
+        self.cells = node[next(iter(frame.cells_dict.values()))]
+        self.u = frame.point_data["displacement"][first, :2]
+        self.zeta = frame.point_data["zeta"][first].ravel()
         # Per element: 0, or the number of its surface by name; None for a single material.
         self.material = frame.cell_data["material"][0].ravel() if "material" in frame.cell_data else None
         vertices = Triangulation(*self.points.T, self.cells[:, :3])
