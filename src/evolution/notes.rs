@@ -3,6 +3,7 @@
 use super::{Accuracy, DiscreteProblem, Outcome, percent};
 use crate::{
     fem::for_elements,
+    mesh::extent,
     scene::{Stepping, rounded},
 };
 
@@ -48,7 +49,12 @@ impl Outcome {
             }),
             self.penetration.clone(),
         ];
+        let (moved, size) = (self.last.record.displacement_max, extent(&problem.mesh().nodes));
         let of_model = [
+            (moved > size).then(|| {
+                let times = moved / size;
+                format!("the largest displacement is {times:.1} times the body; check units, gaps and loads")
+            }),
             problem.large_gradients(&self.last.state.u),
             self.rescued.as_ref().map(|(steps, solver)| {
                 let steps = counted(*steps);
@@ -56,8 +62,9 @@ impl Outcome {
             }),
             self.adaptive_steps_note(problem, true),
         ];
-        let notes = of_residuals.into_iter().flatten().chain(accuracy.notes(problem.tolerance));
-        notes.chain(of_model.into_iter().flatten()).collect()
+        // Wrong units cause the other problems, too.
+        let notes = of_model.into_iter().chain(of_residuals).flatten();
+        notes.chain(accuracy.notes(problem.tolerance)).collect()
     }
 
     /// Remarks on how the run of `problem` went; none is a warning.

@@ -42,6 +42,9 @@ impl DiscreteProblem {
                      to {end:.4e}: shorten time.step, or set it to \"auto\""
                 )
             }),
+            (scene.materials().any(|material| material.density > 0.0)
+                && scene.gravity.iter().all(|g| g.as_constant() == Some(0.0)))
+            .then(|| "material.density has no effect without body.gravity".to_owned()),
             (scene.damage.is_some() && scene.time.is_none()).then(|| {
                 "[damage] without [time]: in this static solve ζ stays damage.initial".to_owned()
             }),

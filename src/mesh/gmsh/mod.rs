@@ -69,6 +69,14 @@ pub fn mesh_geo(
 ) -> Result<PathBuf, MeshError> {
     let started = SystemTime::now();
     let text = read_text(geo).map_err(MeshError::io(geo))?;
+    // gmsh 4.8 drops the others silently.
+    if !text.ends_with('\n')
+        && text.lines().last().is_some_and(|last| last.matches(';').count() > 1)
+    {
+        let problem = "its last line does not end with a newline, so that gmsh reads only the first command \
+                       there; add the newline";
+        return Err(MeshError::file(geo, problem));
+    }
     let mut name = geo.file_stem().unwrap_or_default().to_owned();
     for (parameter, &value) in parameters {
         if let Some(reason) = refusal(&text, parameter, value) {

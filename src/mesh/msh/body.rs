@@ -22,8 +22,8 @@ const PLANAR: f64 = 1e-10;
 pub fn mesh(contents: &Contents) -> Result<Mesh> {
     let (elements, surfaces) = triangles(contents);
     if elements.is_empty() {
-        let none = "there are no triangles; mesh with `gmsh -2`, and give the body a Physical \
-                    Surface if there are physical groups at all";
+        let none = "there are no triangles: with physical groups gmsh writes these alone, so name the body in the \
+                    .geo, as in `Physical Surface(\"body\") = {1};` (and mesh with `gmsh -2`)";
         return fault(None, none);
     }
     let (index, listed) = number_nodes(contents, &elements)?;
