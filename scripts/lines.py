@@ -23,9 +23,11 @@ def draw_curves(arguments, styled):
         rows, figure = [], plt.figure(figsize=(6.0, 3.8))
         axes = figure.add_subplot()
         for run in runs:
-            for time in arguments.times or [run.times[-1]]:
-                frame = run.frame(time)
+            frames = {frame.time: frame for frame in map(run.frame, arguments.times or [None])}
+            for frame in frames.values():
                 places, values = _values(frame, arguments, quantity)
+                if np.isnan(values).all():
+                    raise ResultError(f"{run.folder}: {quantity} has no value on this line; is it outside the body?")
                 label = f"t = {frame.time:g}" if len(runs) == 1 else f"{run.folder.name}, t = {frame.time:g}"
                 axes.plot(places, values, label=label, linewidth=1.3)
                 rows += [{"run": run.folder.name, "time": frame.time, "s": s, quantity: value}

@@ -115,8 +115,8 @@ class Results:
                  **self.summary.get("units", {})}
         force, length = units["force"], units["length"]
         work = "J/m" if (force, length) == ("N", "m") else f"{force}·{length}/{length}"
-        return {**units, "work": work, "line": f"{force}/{length}", "area": f"{force}/{length}²",
-                "volume": f"{force}/{length}³"}
+        area = units["stress"] if units["stress"] != "Pa" else f"{force}/{length}²"
+        return {**units, "work": work, "line": f"{force}/{length}", "area": area, "volume": f"{force}/{length}³"}
 
     @property
     def moment(self):

@@ -161,8 +161,18 @@ impl SceneText {
             self.file.get(..at).and_then(|before| before.rfind('\n')).map_or(0, |end| end + 1);
         let line = self.file.get(start..).and_then(|text| text.lines().next()).unwrap_or_default();
         if line.trim_start().starts_with("[boundary]") {
-            "; boundary is a list, each begins with [[boundary]]"
-        } else if line.split_once('=').is_some_and(|(_, value)| !value.contains('"')) {
+            return "; boundary is a list, each begins with [[boundary]]";
+        }
+        let Some((_, value)) = line.split_once('=') else { return "" };
+        // Without texts in quotes.
+        let bare: String = value.split('"').step_by(2).collect();
+        let digit = |c: Option<char>| c.is_some_and(|c| c.is_ascii_digit());
+        let is_open = |(at, _): (usize, &str)| {
+            !digit(bare[..at].chars().next_back()) || !digit(bare[at + 1..].chars().next())
+        };
+        if bare.match_indices('.').any(is_open) {
+            "; a number has digits before and after its point, as in 0.5"
+        } else if bare.contains(|c: char| c.is_alphabetic() || "*/^".contains(c)) {
             "; expressions and texts stand in quotes"
         } else {
             ""
