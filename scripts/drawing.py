@@ -44,12 +44,13 @@ def canvas(size, figure=None):
 
 
 def amplification(size, largest):
-    """1, 2 or 5 times a power of ten with which `largest` appears as 4–10 % of `size`."""
-    if largest <= 0.0:
+    """1, 2 or 5 times a power of ten with which `largest` appears as 4–10 % of `size`; 1 if it is visible anyway, above
+    2 %."""
+    wanted = 0.1 * size / largest if largest > 0.0 else 1.0
+    if wanted < 5.0:
         return 1.0
-    wanted = 0.1 * size / largest
     power = 10.0 ** np.floor(np.log10(wanted))
-    return max(1.0, power * max(m for m in (1, 2, 5) if m * power <= wanted * (1 + 1e-12)))
+    return power * max(m for m in (1, 2, 5) if m * power <= wanted * (1 + 1e-12))
 
 
 def headline(results, text):

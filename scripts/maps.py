@@ -124,8 +124,9 @@ def _amplified(results, limits):
     largest = results.barred("displacement_max", largest) or f"{largest:.3g}"
     if results.unloaded:
         return "unloaded"
-    what = "displacements, gaps and the sliding along the foundation" if len(results.contact) else "displacements"
-    return f"{what} × {limits.factor:g} (largest {largest} {results.units['length']})"
+    what = "displacements and gaps" if len(results.contact) else "displacements"
+    scale = "to scale" if limits.factor == 1.0 else f"× {limits.factor:g}"
+    return f"{what} {scale} (largest {largest} {results.units['length']})"
 
 
 def _paint_stress(axes, mesh, results, limits):
