@@ -75,6 +75,7 @@
 #![deny(unsafe_code)]
 
 pub mod interrupt;
+pub mod memory;
 pub mod phases;
 mod suggestion;
 pub mod petsc;

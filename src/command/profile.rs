@@ -2,10 +2,10 @@
 
 use comfy_table::{LineStyle, presets};
 use signorini::{
+    memory,
     output::terminal,
     phases::{Phase, Phases},
 };
-use std::fs;
 
 /// The phases that every time step needs: the values of K, a product with K, a pair of triangular solves,
 /// and the damage.
@@ -67,14 +67,6 @@ pub fn remarks(phases: &Phases, steps: usize, stepping: f64) -> Vec<String> {
             100.0 * unavoidable / step
         )
     });
-    let memory = peak_memory().map(|mb| format!(" peak memory {mb:.0} MB"));
-    share.into_iter().chain(memory).collect()
-}
-
-/// The peak memory of this process, MB, from Linux (proc(5), VmHWM).
-fn peak_memory() -> Option<f64> {
-    let status = fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-    let kilobytes: f64 = line.split_whitespace().next()?.parse().ok()?;
-    Some(1.024e-3 * kilobytes)
+    let memory = format!(" peak memory {:.0} MB", 1e-6 * memory::peak());
+    share.into_iter().chain([memory]).collect()
 }

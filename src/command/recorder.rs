@@ -12,6 +12,7 @@ use serde_json::{Value, json};
 use signorini::{
     evolution::{Next, Observed, Observer, Outcome, RunError, RunState, Step, StepRecord},
     interrupt::Interrupts,
+    memory,
     output::{
         self, FieldWriter, OutputError, Table,
         terminal::{Progress, say},
@@ -20,7 +21,7 @@ use signorini::{
     problem::DiscreteProblem,
     scene::{Stepping, rounded},
 };
-use std::{collections::BTreeMap, fs, time::Instant};
+use std::{collections::BTreeMap, time::Instant};
 
 /// The approximate number of frames if the scene has no `output.every`.
 const FRAMES: usize = 20;
@@ -163,7 +164,7 @@ impl<'a> Recorder<'a> {
         if result.is_ok() {
             checkpoint::remove(&task.folder, task.problem.body.nodes.partition.comm().rank(), None);
         }
-        let memory = task.problem.body.nodes.partition.comm().total(peak_memory());
+        let memory = task.problem.body.nodes.partition.comm().total(1e-6 * memory::peak());
         // Only the first rank goes on from here.
         let Some(bar) = &self.bar else { return written };
 
@@ -222,14 +223,6 @@ impl Observer for Recorder<'_> {
         self.saved = Instant::now();
         Ok(())
     }
-}
-
-/// The peak memory of this process, MB (proc(5)); 0 where the system does not tell it.
-fn peak_memory() -> f64 {
-    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-    let kilobytes = line.and_then(|line| line.split_whitespace().next()?.parse::<f64>().ok());
-    kilobytes.unwrap_or(0.0) * 1024.0 / 1e6
 }
 
 /// `summary.json` of a run that took `wall` seconds. The values of the last accepted state are null if the

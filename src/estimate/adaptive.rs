@@ -15,6 +15,7 @@ mod sizes;
 use crate::{
     evolution::RunError,
     interrupt::Signal,
+    memory,
     mesh::{Mesh, MeshError, Refinement},
     petsc::{PetscError, Session},
     problem::{Bar, DiscreteProblem, LoadCurve, SetupError},
@@ -74,6 +75,18 @@ pub enum AdaptError {
         triangles: usize,
         /// The failure of the run.
         source: RunError,
+    },
+    /// The next mesh does not fit into the memory.
+    #[error(
+        "a mesh of {triangles} triangles would need about {needed:.1} GB of memory, and there are {there:.1} GB"
+    )]
+    Memory {
+        /// The triangles of the mesh.
+        triangles: usize,
+        /// GB.
+        needed: f64,
+        /// GB.
+        there: f64,
     },
     /// PETSc failed.
     #[error(transparent)]
@@ -190,6 +203,8 @@ fn refined(
 ) -> Result<Adapted, AdaptError> {
     let mut refinement = Refinement::start(mesh);
     let mut rounds = 0;
+    // The most triangles of a run so far.
+    let mut most = 0;
     // The triangles and the worst error of the rounds that were measured.
     let mut excesses: Vec<(usize, f64)> = Vec::new();
     loop {
@@ -203,7 +218,11 @@ fn refined(
             continue;
         }
         let round = Round::new(&scene, mesh, pilot, accuracy);
-        let measure = || Measurement::new(session, &scene, mesh, &round.pilot, solver, rounds);
+        most = most.max(triangles);
+        let measure = || {
+            check_memory(session, most, 4 * triangles)?;
+            Measurement::new(session, &scene, mesh, &round.pilot, solver, rounds)
+        };
         let (measured, failed) = match round.is_enough().then(measure) {
             Some(Ok(measured)) => (Some(measured), None),
             Some(Err(error)) if error.signal().is_some() => return Err(error),
@@ -230,7 +249,9 @@ fn refined(
             return Ok(adapted);
         }
         let ratios = round.size_ratios(measured.as_ref());
+        most = most.max(if measured.is_some() { 4 * triangles } else { 0 });
         refinement = divided(refinement, &ratios)?;
+        check_memory(session, most, refinement.mesh.triangles.len())?;
     }
 }
 
@@ -241,6 +262,21 @@ fn stays(excesses: &[(usize, f64)]) -> bool {
     let before = excesses.iter().filter(|(count, _)| 8 * count <= triangles);
     let largest = before.map(|(_, excess)| *excess).reduce(f64::max);
     largest.is_some_and(|largest| last > 0.5 * largest)
+}
+
+/// Checks that a run on so many triangles fits into the memory, by the peak of the runs up to `solved` triangles.
+/// Collective.
+fn check_memory(session: &Session, solved: usize, triangles: usize) -> Result<(), AdaptError> {
+    /// Below this number most memory is that of the libraries.
+    const MANY: usize = 20_000;
+    let comm = session.comm();
+    let peak = 1e-9 * comm.total(memory::peak());
+    let (needed, there) =
+        (peak * triangles as f64 / solved as f64, peak + 1e-9 * comm.min(memory::available()));
+    match solved >= MANY && needed > there {
+        true => Err(AdaptError::Memory { triangles, needed, there }),
+        false => Ok(()),
+    }
 }
 
 /// Makes the steps adaptive: too long steps may reach ζ_* or miss loads. False if they are adaptive already.
