@@ -132,9 +132,15 @@ def facts(results):
              html.escape(units.get(kind, "")))
             for key, name, kind in FACTS if summary.get(key) is not None]
     named = summary.get("quantities", {})
-    rows += [(html.escape(name), barred(value, errors.get(name)) or value, "")
+    rows += [(html.escape(name), barred(value, errors.get(name)) or value, html.escape(unit_of(name, units)))
              for name, value in named.items()]
     return table(rows)
+
+
+def unit_of(quantity, units):
+    """The unit of a quantity like `clamp.force_x` or `probe.stress_xx`."""
+    kinds = {"force": units["line"], "moment": units["force"], "u": units["length"], "zeta": ""}
+    return kinds.get(quantity.rpartition(".")[2].split("_")[0], units["stress"])
 
 
 def governing(everything, units):

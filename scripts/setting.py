@@ -59,6 +59,9 @@ def draw_setting(results, _limits):
         beyond = np.vstack([outer, tails, *_opposite(results, line)])
         places += [tails, _write_name(axes, line, name, condition, beyond, size / (width - 1.0))]
     body_force = _draw_body_force(axes, results, time)
+    for probe in results.scene.get("probe", []):
+        axes.plot(*probe["point"], marker="+", color=INK, zorder=4)
+        axes.annotate(probe["name"], probe["point"], xytext=(4, 4), textcoords="offset points", fontsize=8)
     frame(axes, np.vstack(places), units)
     for name, condition in conditions.items():
         words = _words(name, condition, units)
