@@ -104,3 +104,54 @@ fn figures_asked_for_are_those_of_the_scene() {
     let alone = ["run", "scene.toml", "--accuracy-of", "work"];
     test_directory.say(&alone).fails(2, &["accuracy_of has no effect without accuracy"]);
 }
+
+/// A clamped square that is pushed at its left side.
+const PUSHED: &str = "
+    mesh.file = 'square.msh'
+    material = { young = 80, poisson = 0.3, plane = 'stress' }
+    boundary = [{ name = 'bottom', displacement = [0, 0] }, { name = 'left', traction = [1, 0] }]";
+
+#[test]
+fn a_stress_that_is_zero_needs_no_finer_mesh_and_a_singular_one_is_told() {
+    let directory = TestDirectory::new();
+    for (corner, told) in [
+        ("[1, 1]", "accuracy 0.02 reached"),
+        ("[0, 0]", "the error of corner.stress_yy stays while the mesh becomes finer"),
+    ] {
+        let probe = format!("probe = [{{ name = 'corner', point = {corner} }}]");
+        directory.write("scene.toml", &format!("{PUSHED}\n{probe}"));
+        let said = directory.run(&["--accuracy", "0.02"]);
+        assert!(said.out.contains(told), "{corner}: {}", said.out);
+        let triangles = directory.summary("out/scene")["triangles"].as_u64().unwrap();
+        assert!(triangles < 20_000, "{corner}: {triangles} triangles");
+    }
+}
+
+/// A quarter of a ring with radii 1 and 2 under a pressure of 1 in its bore: at the bore Lamé's displacement is
+/// (p/E) ((1 + 4)/(4 − 1) + ν), plane stress.
+#[test]
+fn error_bars_hold_on_curved_sides() {
+    let directory = TestDirectory::new();
+    let ring = "DefineConstant[ size = 0.2 ];
+        Point(1) = {0, 0, 0}; Point(2) = {1, 0, 0, size}; Point(3) = {2, 0, 0, size};
+        Point(4) = {0, 2, 0, size}; Point(5) = {0, 1, 0, size};
+        Line(1) = {2, 3}; Circle(2) = {3, 1, 4}; Line(3) = {4, 5}; Circle(4) = {5, 1, 2};
+        Curve Loop(1) = {1:4}; Plane Surface(1) = {1};
+        Physical Surface(\"ring\") = {1};
+        Physical Curve(\"axes\") = {1, 3}; Physical Curve(\"bore\") = {4};\n";
+    directory.write("ring.geo", ring);
+    directory.write(
+        "scene.toml",
+        "mesh.file = 'ring.geo'
+         material = { young = 50, poisson = 0.3, plane = 'stress' }
+         boundary = [{ name = 'axes', symmetry = true }, { name = 'bore', pressure = 1 }]",
+    );
+    let exact = (5.0 / 3.0 + 0.3) / 50.0;
+    for accuracy in ["0.05", "0.01", "0.002"] {
+        directory.run(&["--accuracy", accuracy]);
+        let summary = directory.summary("out/scene");
+        let found = summary["displacement_max"].as_f64().unwrap();
+        let bar = summary["errors"]["figures"]["displacement_max"].as_f64().unwrap();
+        assert!((found - exact).abs() <= bar, "{accuracy}: {found} ± {bar}, not {exact}");
+    }
+}
