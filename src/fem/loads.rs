@@ -27,9 +27,9 @@ pub fn part_point(corners: &[[f64; 3]; 3], point: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|k| corners.iter().zip(point).map(|(corner, l)| l * corner[k]).sum())
 }
 
-/// Adds the body force f_i = ∫_Ω f_B·φ_i to the nodal loads, with f_B in N/m³ as a function of the triangle and the point. The
-/// integration points are the side midpoints for P1, which is exact for affine f_B, and the quadrature points
-/// of the element for P2. A divided triangle has three points in each part.
+/// Adds the body force f_i = ∫_Ω f_B·φ_i to the nodal loads, with f_B in N/m³ as a function of the triangle and the
+/// point. The integration points are the side midpoints for P1, which is exact for affine f_B, and the quadrature
+/// points of the element for P2. A divided triangle has three points in each part.
 pub fn add_body_force(
     body: &Body,
     division: &Division,

@@ -39,8 +39,8 @@ impl Refinement {
     /// has at most four parts.
     ///
     /// The edges of curves are halved with their triangles. The halves of a curved edge lie on the circle through
-    /// its ends and its midpoint, so that refined arcs of circles stay on them. The number of interior edges of a curve does not
-    /// change, as they are not listed.
+    /// its ends and its midpoint, so that refined arcs of circles stay on them. The number of interior edges of a
+    /// curve does not change, as they are not listed.
     ///
     /// # Errors
     /// The vertices of a part of a quadratic triangle are not counter-clockwise, because its sides are too
@@ -117,7 +117,7 @@ struct Triangle {
     offsets: [[f64; 2]; 3],
 }
 
-/// The offset of the midpoint of the arc from a to m, on the circle through a, m and b, m.
+/// The offset of the midpoint of the arc from a to m, on the circle through a, m and b.
 ///
 /// The chord am is seen from b at the angle θ. So the sagitta of its arc is |am|/2 tan(θ/2).
 fn arc_offset(a: [f64; 2], m: [f64; 2], b: [f64; 2]) -> [f64; 2] {

@@ -107,8 +107,9 @@ impl FieldWriter {
         self.last_time
     }
 
-    /// Writes a frame and adds it to the lists; with `output.every` = 0 that of Γ_C alone. On a single rank a thread writes the frame while the run goes
-    /// on, which saves about a tenth of the time of a run of 100 steps. Collective.
+    /// Writes a frame and adds it to the lists; with `output.every` = 0 that of Γ_C alone. On a single rank a
+    /// thread writes the frame while the run goes on, which saves about a tenth of the time of a run of 100 steps.
+    /// Collective.
     ///
     /// # Errors
     /// A file of this frame or of the previous one cannot be written.

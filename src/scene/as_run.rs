@@ -36,8 +36,8 @@ impl AsRun {
 }
 
 impl Scene {
-    /// The scene file that repeats the run. Copies of tables and of the mesh or its geometry stand beside it. A geometry
-    /// that reads other files keeps its full path; so does a mesh file if the run writes no frames.
+    /// The scene file that repeats the run. Copies of tables and of the mesh or its geometry stand beside it. A
+    /// geometry that reads other files keeps its full path; so does a mesh file if the run writes no frames.
     pub fn as_run(&self) -> AsRun {
         let mut scene = self.text.document.clone();
         let mut copies = Vec::new();

@@ -1,4 +1,5 @@
-//! Stresses at the nodes: exact if uniform, of a higher order than the stresses of the triangles elsewhere, and discontinuous where materials meet.
+//! Stresses at the nodes: exact if uniform, of a higher order than the stresses of the triangles elsewhere, and
+//! discontinuous where materials meet.
 
 use crate::support::{
     ORDERS, bent, close, distorted, largest, moved, order, problem, run, square, unstructured,

@@ -52,7 +52,8 @@ pub fn file(
     }
 }
 
-/// Meshes a `.geo` file and returns the path of the `.msh` beside it, or in the user's cache if that folder is read-only.
+/// Meshes a `.geo` file and returns the path of the `.msh` beside it, or in the user's cache if that folder is
+/// read-only.
 ///
 /// Each parameter overrides the `DefineConstant` of its name. The name of the mesh lists the parameters and
 /// order 2, as in `bridge-grading3-size0.25.msh` and `hertz.order2.msh`. `size`, in m, also bounds the length
