@@ -111,11 +111,6 @@ impl Loads {
         self.prescribed.iter().map(|row| row.as_ref().map_or(0.0, value)).collect()
     }
 
-    /// The gaps of all gap rows at the first solve, m.
-    pub(super) fn first_gaps(&self) -> &[f64] {
-        &self.gaps
-    }
-
     /// The gaps of all gap rows at time t, m; empty if no gap depends on time.
     pub fn gaps_at(&self, t: f64) -> Vec<f64> {
         let mut gaps = if self.moving.is_empty() { Vec::new() } else { self.gaps.clone() };

@@ -4,6 +4,7 @@ use super::{DiscreteProblem, LoadCurve, unresolved};
 use crate::{
     mesh::{Order, extent},
     model::Plane,
+    scene::{Boundary, Gap},
 };
 use std::iter::once;
 
@@ -64,15 +65,25 @@ impl DiscreteProblem {
         notes
     }
 
-    /// A note on obstacles that overlap the body at the start, as for a press fit. Collective.
+    /// A note on the foundation that overlaps the body most at the start, as for a press fit.
     fn overlap(&self) -> Option<String> {
-        let gaps = self.loads.gaps_at(self.start());
-        let given = self.loads.first_gaps();
-        let least = if gaps.is_empty() { given } else { &gaps }.iter().copied().fold(0.0, f64::min);
-        let least = self.body.nodes.partition.comm().min(least);
-        (least < -OVERLAP * extent(&self.mesh().nodes)).then(|| {
+        let mesh = self.mesh();
+        let least_gap = |boundary: &Boundary| {
+            let Gap { distance, .. } = boundary.gap()?;
+            let edges = mesh.curves.get(&boundary.name).into_iter().flat_map(|curve| &curve.edges);
+            let gaps = edges.flatten().map(|&node| {
+                let [x, y] = mesh.nodes[node];
+                distance.eval(x, y, self.start())
+            });
+            Some(gaps.fold(0.0, f64::min))
+        };
+        let boundaries = self.scene().boundaries.iter();
+        let gaps = boundaries.filter_map(|boundary| Some((least_gap(boundary)?, &boundary.name)));
+        let (least, name) = gaps.min_by(|(a, _), (b, _)| a.total_cmp(b))?;
+        (least < -OVERLAP * extent(&mesh.nodes)).then(|| {
             format!(
-                "the body starts up to {:.3e} {} inside its foundation (a negative gap, as for a press fit)",
+                "the body starts up to {:.3e} {} inside the foundation of `{name}` (a negative gap, as for a \
+                 press fit)",
                 -least,
                 self.scene().units.length
             )

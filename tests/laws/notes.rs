@@ -107,6 +107,12 @@ fn what_the_nodes_miss_of_a_displacement_or_the_initial_damage_is_noted() {
 }
 
 #[test]
+fn a_foundation_that_overlaps_the_body_is_named() {
+    let [note] = &pressed(-0.05, "-1").unwrap().notes()[..] else { panic!("one note") };
+    assert!(note.contains("up to 5.000e-2 m inside the foundation of `bottom`"), "{note}");
+}
+
+#[test]
 fn curved_sides_that_order_1_does_not_follow_are_noted() {
     for (order, told) in [(1, true), (2, false)] {
         let text = format!(
