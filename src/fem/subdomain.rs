@@ -89,7 +89,7 @@ impl LocalNodes {
             Some([a?, b?]).filter(|[a, b]| a.min(b) < &self.partition.owned())
         };
         let edges = undivided.edges.iter().filter_map(local).collect();
-        Curve { edges, interior_edges: undivided.interior_edges }
+        Curve { edges, other_edges: undivided.other_edges }
     }
 
     /// The nodes of the subdomain as [`Nodes`].

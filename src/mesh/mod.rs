@@ -63,8 +63,8 @@ pub struct Mesh {
 pub struct Curve {
     /// Boundary edges as node pairs, the body on their left: (dy, −dx) points outwards.
     pub edges: Vec<[usize; 2]>,
-    /// The number of the curve's edges inside the body, which are not in `edges`.
-    pub interior_edges: usize,
+    /// The number of the curve's edges inside or outside the body, which are not in `edges`.
+    pub other_edges: usize,
 }
 
 impl Mesh {

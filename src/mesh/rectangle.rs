@@ -18,7 +18,7 @@ impl Mesh {
                 [[a, b, c], [a, c, d]]
             })
             .collect();
-        let curve = |edges: Vec<[usize; 2]>| Curve { edges, interior_edges: 0 };
+        let curve = |edges: Vec<[usize; 2]>| Curve { edges, other_edges: 0 };
         let sides = [
             ("bottom", curve((0..nx).map(|i| [node(i, 0), node(i + 1, 0)]).collect())),
             ("right", curve((0..ny).map(|j| [node(nx, j), node(nx, j + 1)]).collect())),

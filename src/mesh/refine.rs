@@ -39,7 +39,7 @@ impl Refinement {
     /// has at most four parts.
     ///
     /// The edges of curves are halved with their triangles. The halves of a curved edge lie on the circle through
-    /// its ends and its midpoint, so that refined arcs of circles stay on them. The number of interior edges of a
+    /// its ends and its midpoint, so that refined arcs of circles stay on them. The number of other edges of a
     /// curve does not change, as they are not listed.
     ///
     /// # Errors

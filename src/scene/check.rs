@@ -139,9 +139,9 @@ impl Scene {
 
     fn curve<'m>(&self, boundary: &Boundary, mesh: &'m Mesh) -> Result<&'m Curve, Problem> {
         let problem = match mesh.curves.get(&boundary.name) {
-            Some(Curve { interior_edges: inside @ 1.., .. }) => format!(
-                "has {inside} edges inside the body; a physical curve used as a boundary must lie \
-                 on it"
+            Some(Curve { other_edges: others @ 1.., .. }) => format!(
+                "has {others} edges inside or outside the body; a physical curve used as a boundary must lie \
+                 on it, and its surface in a Physical Surface"
             ),
             Some(curve) if curve.edges.is_empty() => {
                 "has no edges in the mesh; mesh the physical curve".to_owned()

@@ -51,7 +51,7 @@ fn disc(n: usize, uneven: f64, curves: usize) -> Mesh {
     let arc = |k: usize| {
         let edges =
             (k * n / curves..(k + 1) * n / curves).map(|i| [node(rings, i), node(rings, i + 1)]);
-        (format!("rim{k}"), Curve { edges: edges.collect(), interior_edges: 0 })
+        (format!("rim{k}"), Curve { edges: edges.collect(), other_edges: 0 })
     };
     Mesh {
         nodes: std::iter::once(centre)

@@ -45,7 +45,7 @@ fn footed(foot: [f64; 2], load: [f64; 2]) -> Mesh {
         let middle = |e: &&[usize; 2]| 0.5 * (mesh.nodes[e[0]][0] + mesh.nodes[e[1]][0]);
         let within = |e: &&[usize; 2]| from < middle(e) && middle(e) < to;
         let edges = mesh.curves[whole].edges.iter().filter(within).copied().collect();
-        mesh.curves.insert(name.into(), Curve { edges, interior_edges: 0 });
+        mesh.curves.insert(name.into(), Curve { edges, other_edges: 0 });
     }
     mesh
 }
@@ -238,7 +238,7 @@ fn discs() -> [Mesh; 2] {
     let mesh = Mesh {
         nodes: std::iter::once([3.0, 2.0]).chain((0..corners).map(point)).collect(),
         triangles: edges.iter().map(|&[a, b]| [0, a, b]).collect(),
-        curves: BTreeMap::from([("rim".to_owned(), Curve { edges, interior_edges: 0 })]),
+        curves: BTreeMap::from([("rim".to_owned(), Curve { edges, other_edges: 0 })]),
         ..Mesh::default()
     };
     let mut round = mesh.clone();

@@ -86,7 +86,7 @@ fn wedge(angle: f64, slope: f64, gap: f64) -> DiscreteProblem {
             }
         }
     }
-    let curve = |edges: Vec<[usize; 2]>| Curve { edges, interior_edges: 0 };
+    let curve = |edges: Vec<[usize; 2]>| Curve { edges, other_edges: 0 };
     let lower = (0..n).map(|i| [first(i), first(i + 1)]).collect();
     let upper = (0..n).map(|i| [first(i + 1) + i + 1, first(i) + i]).collect();
     let end = (0..n).map(|j| [first(n) + j, first(n) + j + 1]).collect();

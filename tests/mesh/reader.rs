@@ -62,7 +62,7 @@ fn check_plate(mesh: &Mesh) {
     for (name, length) in lengths {
         close(curve_length(mesh, name), length);
         let interior = if name == "left square" { 2 } else { 0 };
-        assert_eq!(mesh.curves[name].interior_edges, interior, "{name}");
+        assert_eq!(mesh.curves[name].other_edges, interior, "{name}");
     }
     // The normals point out of the body.
     for (name, normal) in [("bottom", [0.0, -1.0]), ("top", [0.0, 1.0]), ("77", [1.0, 0.0])] {
@@ -194,7 +194,7 @@ fn tags_orientation_and_unused_nodes() {
         assert_eq!(mesh.curves["ground floor"].edges.len(), 1);
         close(curve_length(&mesh, "ground floor"), 1.0);
         assert_eq!(mesh.curves["8"].edges.len(), 1);
-        assert_eq!(mesh.curves["8"].interior_edges, 1);
+        assert_eq!(mesh.curves["8"].other_edges, 1);
     }
     let mesh = read_bytes(square(1, "4.1")).unwrap();
     assert_eq!(mesh.nodes, [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);

@@ -43,7 +43,7 @@ fn a_refined_mesh_is_conforming_and_covers_the_same_body() {
         check_laws(mesh, 1.75, 8.0, 1);
         for (name, curve) in &coarse.curves {
             close(curve_length(mesh, name), length(&coarse, &curve.edges));
-            assert_eq!(mesh.curves[name].interior_edges, curve.interior_edges);
+            assert_eq!(mesh.curves[name].other_edges, curve.other_edges);
         }
         let mut parts = vec![0; before.triangles.len()];
         let mut areas = vec![0.0; before.triangles.len()];

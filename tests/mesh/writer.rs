@@ -10,7 +10,7 @@ fn what_is_written_is_read_back_number_by_number() {
         let mesh = Refinement::start(read(&fixture(name)).unwrap());
         let marked: Vec<bool> = (0..mesh.mesh.triangles.len()).map(|t| t % 3 == 0).collect();
         let mut mesh = mesh.refine(&marked).unwrap().mesh;
-        mesh.curves.values_mut().for_each(|curve| curve.interior_edges = 0);
+        mesh.curves.values_mut().for_each(|curve| curve.other_edges = 0);
         let text = mesh.to_msh();
         assert_eq!(read_bytes(&text).unwrap(), mesh, "{name}");
 

@@ -47,7 +47,7 @@ pub fn mesh(contents: &Contents) -> Result<Mesh> {
         return fault(second.at, problem);
     }
     one_body::check(&nodes, &triangles, &sides)?;
-    let curves = curves(contents, &index, &sides)?;
+    let curves = curves(contents, &index, &sides);
     let mut mesh = Mesh { nodes, triangles, curves, surfaces, ..Mesh::default() };
     if !contents.midpoints.is_empty() {
         set_midpoints(&mut mesh, contents, &elements, &index, limit)?;
@@ -190,32 +190,26 @@ fn set_midpoints(
 }
 
 /// The physical curves, each edge once.
-fn curves(contents: &Contents, index: &Index, sides: &[Side]) -> Result<BTreeMap<String, Curve>> {
+fn curves(contents: &Contents, index: &Index, sides: &[Side]) -> BTreeMap<String, Curve> {
     let mut curves = BTreeMap::<String, Curve>::new();
     let mut seen = HashSet::default();
     for line in &contents.lines {
         let name = contents.name(1, line.group);
-        let mut edge = line.nodes.map(|tag| index.get(&tag).copied().unwrap_or(usize::MAX));
+        let mut nodes = line.nodes;
+        nodes.sort_unstable();
+        if !seen.insert((name.clone(), nodes)) {
+            continue;
+        }
+        let mut edge = nodes.map(|tag| index.get(&tag).copied().unwrap_or(usize::MAX));
         edge.sort_unstable();
-        let sides = &sides[sides.partition_point(|side| side.edge < edge)..];
-        let Some(side) = sides.first().filter(|side| side.edge == edge) else {
-            let [a, b] = line.nodes;
-            let problem = format!(
-                "line {} of the physical curve `{name}`, nodes {a} and {b}, is no edge of any \
-                 triangle of the body; does its surface belong to a Physical Surface?",
-                line.tag
-            );
-            return fault(line.at, problem);
-        };
-        let is_inner = sides.get(1).is_some_and(|other| other.edge == edge);
-        if seen.insert((name.clone(), edge)) {
-            let curve = curves.entry(name).or_default();
-            match side.on_left {
-                _ if is_inner => curve.interior_edges += 1,
-                true => curve.edges.push(edge),
-                false => curve.edges.push([edge[1], edge[0]]),
-            }
+        let first = sides.partition_point(|side| side.edge < edge);
+        let around = sides[first..].iter().take_while(|side| side.edge == edge);
+        let curve = curves.entry(name).or_default();
+        match around.collect::<Vec<_>>()[..] {
+            [side] if side.on_left => curve.edges.push(edge),
+            [_] => curve.edges.push([edge[1], edge[0]]),
+            _ => curve.other_edges += 1,
         }
     }
-    Ok(curves)
+    curves
 }
