@@ -261,6 +261,11 @@ fn check_value(value: &toml::Value, schema: &Schema, folder: &Path) -> Result<()
         toml::Value::String(text) if with_decimal_comma(text) == Some(text.len()) => {
             format!(", but is {value}: write a decimal point")
         }
+        toml::Value::String(text)
+            if text.contains(',') && text.split(',').all(|part| part.parse::<f64>().is_ok()) =>
+        {
+            format!(", but is {value}: `signorini study` runs several values")
+        }
         value => format!(", but is {value}"),
     };
     if holds { Ok(()) } else { Err(format!("must be {wanted}{found}")) }
