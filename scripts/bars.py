@@ -4,6 +4,8 @@ from decimal import ROUND_CEILING, Decimal
 
 # A bar that is a smaller part of its figure is below the rounding of its digits.
 ROUNDING = 1e-15
+# The smallest bar that is shown, over its figure.
+LEAST_BAR = 1e-6
 
 
 def bars(summary):
@@ -18,6 +20,7 @@ def barred(value, bar):
     without a bar."""
     if bar is None or bar <= ROUNDING * abs(value):
         return None
+    bar = max(bar, LEAST_BAR * abs(value))
     value, bar = Decimal(repr(float(value))), Decimal(repr(float(bar)))
     first = bar.adjusted()
     last = first - (bar.scaleb(-first) < 3)

@@ -6,9 +6,10 @@ use signorini::{
     evolution::{Outcome, percent},
     interrupt::{Interrupts, Signal},
     mesh::{Mesh, Order},
+    output::terminal::with_bar,
     petsc::Session,
     problem::Bar,
-    scene::{Scene, Stepping, rounded},
+    scene::{Scene, Stepping},
 };
 
 /// If the scene requires an accuracy: adapts the mesh, or takes the mesh `made` before a restart, and sets the
@@ -31,7 +32,7 @@ pub(super) fn adapt(
     let adapt = || estimate::adapted(session, scene, mesh.clone(), solver, accuracy, &mut show);
     let adapted = made.map_or_else(adapt, Ok);
     let adapted = adapted.map_err(|error| match error {
-        AdaptError::Setup(_) => Failure::input(error),
+        AdaptError::Setup(_) | AdaptError::Overturns { .. } => Failure::input(error),
         error => error.signal().map_or_else(|| (&error).into(), interrupted),
     })?;
     if let Some(grid) = &mut scene.time {
@@ -70,6 +71,30 @@ fn interrupted(signal: Signal) -> Failure {
     Failure { code: signal.exit_code(), message: Some(message) }
 }
 
+/// The tolerance of the time steps with which all figures would be exact enough, if these steps miss the required
+/// accuracy and the mesh leaves them a part of it.
+pub(super) fn shorter_steps(task: &Task, outcome: &Outcome) -> Option<f64> {
+    /// The errors of a run with the new tolerance are to be this fraction of the accuracy. They are not quite
+    /// proportional to the tolerance.
+    const AIM: f64 = 0.8;
+    let (adapted, accuracy) = (task.adapted.as_ref()?, task.problem.scene().accuracy?);
+    let bars = task.bars.iter().zip(&outcome.bars).filter(|(bar, _)| is_asked(task, &bar.name));
+    let factor = bars.map(|(of_mesh, of_both)| match of_both.relative() {
+        error if error > accuracy => {
+            (AIM * accuracy - of_mesh.relative()) / (error - of_mesh.relative())
+        }
+        _ => 1.0,
+    });
+    let factor = factor.fold(1.0, f64::min);
+    (0.0 < factor && factor < 1.0).then_some(factor * adapted.steps)
+}
+
+/// Whether the accuracy is required for this figure.
+fn is_asked(task: &Task, name: &str) -> bool {
+    let asked = &task.problem.scene().accuracy_of;
+    asked.is_empty() || asked.iter().any(|known| known == name)
+}
+
 /// The closing line on the required accuracy: reached, or the errors that are too large. `None` without a
 /// required accuracy.
 pub(super) fn verdict(task: &Task, outcome: Option<&Outcome>) -> Option<String> {
@@ -87,14 +112,11 @@ pub(super) fn verdict(task: &Task, outcome: Option<&Outcome>) -> Option<String> 
     let Some(outcome) = outcome else { return Some(format!("{asked}: {mesh}")) };
     if let Some(stop) = outcome.stopped {
         return Some(format!(
-            "{asked}: the run stops at ζ_*, at {} ± {:.1e} s; figures at such a stop have no bars: {mesh}",
-            rounded(stop.time),
-            stop.bar()
+            "{asked}: the run stops at ζ_*, at {} s; figures at such a stop have no bars: {mesh}",
+            with_bar(stop.time, Some(stop.bar()))
         ));
     }
-    let is_asked =
-        |name: &str| scene.accuracy_of.is_empty() || scene.accuracy_of.iter().any(|n| n == name);
-    let bars = outcome.bars.iter().filter(|bar| is_asked(&bar.name));
+    let bars = outcome.bars.iter().filter(|bar| is_asked(task, &bar.name));
     let bars = bars.map(|bar| (bar.name.clone(), bar.relative()));
     let norms = scene.accuracy_of.is_empty().then_some(&adapted.worst).into_iter().flatten();
     let worst = bars.chain(norms.cloned()).max_by(|a, b| a.1.total_cmp(&b.1));

@@ -2,24 +2,24 @@
 
 use super::{
     Failure, SOLVERS, SceneArguments,
-    accuracy::{adapt, measure_bars},
+    accuracy::{adapt, measure_bars, shorter_steps},
     check::contact_nodes,
     check_petsc, check_solver,
     checkpoint::Checkpoint,
     ranks::{agree, barrier_or_abort},
     read_mesh,
     recorder::Recorder,
-    summaries,
+    screen, summaries,
     task::Task,
     tell,
 };
 use clap::Args;
 use signorini::{
     estimate,
-    evolution::{Phases, RunError},
+    evolution::{Outcome, Phases, RunError},
     linear::LinearSolver,
     mesh::Mesh,
-    output,
+    output::{self, terminal::say},
     petsc::{Communicator, Session},
     problem::DiscreteProblem,
     scene::Scene,
@@ -120,7 +120,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let task =
         agree(session.comm(), checked).and_then(|()| read(arguments, &session, &phases, started));
     let warns = task.is_ok() && session.comm().is_root();
-    let result = task.and_then(|(task, restart)| solve(&task, restart, &session));
+    let result = task.and_then(|(task, restart)| solve(task, restart, &session));
     let mut unused = session.unused_options();
     // PETSc reads this option when it ends.
     unused.retain(|option| !option.starts_with("-options_left"));
@@ -199,11 +199,41 @@ fn read<'a>(
     Ok((task, restart))
 }
 
-/// Solves and writes the results. Collective.
-fn solve(task: &Task, restart: Option<Checkpoint>, session: &Session) -> Result<(), Failure> {
+/// Solves and writes the results. If the time steps alone miss the required accuracy, the run is repeated with shorter
+/// ones. Collective.
+fn solve(
+    mut task: Task,
+    mut restart: Option<Checkpoint>,
+    session: &Session,
+) -> Result<(), Failure> {
+    let checked = restart.as_ref().map_or(Ok(()), |checkpoint| checkpoint.check(&task));
+    agree(session.comm(), checked)?;
+    let mut shortened = false;
+    loop {
+        let (recorder, result) = solve_once(&task, restart.take(), session)?;
+        let steps = result.as_ref().ok().and_then(|outcome| shorter_steps(&task, outcome));
+        let Some(steps) = steps.filter(|_| !shortened) else {
+            return finish(recorder, result, session.comm());
+        };
+        drop(recorder);
+        if session.comm().is_root() {
+            say(&screen::row(
+                "again",
+                "with shorter time steps, which the accuracy needs".to_owned(),
+            ));
+        }
+        task.shorten_steps(steps);
+        shortened = true;
+    }
+}
+
+/// A run of the task. Collective.
+fn solve_once<'a>(
+    task: &'a Task,
+    restart: Option<Checkpoint>,
+    session: &Session,
+) -> Result<(Recorder<'a>, Result<Outcome, RunError>), Failure> {
     let comm = session.comm();
-    let checked = restart.as_ref().map_or(Ok(()), |checkpoint| checkpoint.check(task));
-    agree(comm, checked)?;
     let mut recorder = agree(comm, Recorder::new(task).map_err(Failure::input))?;
     let (problem, phases) = (&task.problem, task.phases);
     let resumed = restart.as_ref().map_or(Ok(()), |checkpoint| recorder.resume(checkpoint));
@@ -218,6 +248,15 @@ fn solve(task: &Task, restart: Option<Checkpoint>, session: &Session) -> Result<
             stop.from_mesh = [stop.from_mesh, measured].into_iter().flatten().reduce(f64::max);
         }
     }
+    Ok((recorder, result))
+}
+
+/// Writes the last results and shows how the run ended. Collective.
+fn finish(
+    recorder: Recorder,
+    result: Result<Outcome, RunError>,
+    comm: Communicator,
+) -> Result<(), Failure> {
     barrier_or_abort(comm, result.as_ref().err());
     let written = recorder.finish(&result);
     let ended = match result {

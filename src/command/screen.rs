@@ -160,7 +160,7 @@ fn steps(grid: TimeGrid, unit: &str, can_be_damaged: bool) -> String {
             format!("to t = {end} in steps that follow the loads")
         }
         Stepping::Auto { tolerance, .. } => {
-            format!("to t = {end} in steps chosen for an error of ζ of {tolerance:e}")
+            format!("to t = {end} in steps chosen for an error of ζ of {tolerance:.0e}")
         }
     }
 }
@@ -180,12 +180,9 @@ fn ending(
         }
         Err(_) => format!("FAILED after t = {end}; the state there is saved"),
         Ok(Some(stop)) => format!(
-            "STOPPED at t = {} ± {:.1e}{}: min ζ = {:.4} there reaches ζ_*; \
-             saved is the state before, t = {end} (step {step})",
-            rounded(stop.time),
-            stop.bar(),
+            "STOPPED at t = {}{}: min ζ reaches ζ_* there; saved is the state before, t = {end} (step {step})",
+            with_bar(stop.time, Some(stop.bar())),
             if stop.from_mesh.is_some() { "" } else { " (the time steps alone)" },
-            stop.zeta_min,
         ),
         Ok(None) if collapse.is_some() => {
             let motion = collapse.map(|collapse| collapse.motion.to_string()).unwrap_or_default();

@@ -35,3 +35,11 @@ pub struct Task<'a> {
     pub phases: &'a Phases,
     pub started: Instant,
 }
+
+impl Task<'_> {
+    /// Sets the tolerance of the time steps for the required accuracy.
+    pub fn shorten_steps(&mut self, tolerance: f64) {
+        self.adapted.iter_mut().for_each(|adapted| adapted.steps = tolerance);
+        self.problem.set_step_tolerance(tolerance);
+    }
+}

@@ -18,8 +18,8 @@ use crate::{
     memory,
     mesh::{Mesh, MeshError, Refinement},
     petsc::{PetscError, Session},
-    problem::{Bar, DiscreteProblem, LoadCurve, SetupError},
-    scene::{Scene, Stepping},
+    problem::{Bar, Collapse, DiscreteProblem, LoadCurve, SetupError},
+    scene::{Scene, Stepping, rounded},
 };
 use measurement::Measurement;
 use pilot::{INSTANTS, Pilot};
@@ -75,6 +75,16 @@ pub enum AdaptError {
         triangles: usize,
         /// The failure of the run.
         source: RunError,
+    },
+    /// The run ends where the body turns over.
+    #[error(
+        "the body turns over at t = {}: just before, the contact shrinks to a point, and displacements and \
+         stresses grow as the mesh is refined; set an earlier time.end",
+        rounded(*.time)
+    )]
+    Overturns {
+        /// The time, s.
+        time: f64,
     },
     /// The next mesh does not fit into the memory.
     #[error(
@@ -143,7 +153,8 @@ pub fn adapted(
     }
 }
 
-/// A scene with its few uniform steps, or with adaptive ones if loads or gaps pass by within a step.
+/// A scene with its few uniform steps, or with adaptive ones if loads or gaps pass by within a step. An error if the
+/// body turns over.
 fn with_passing_loads(
     session: &Session,
     mut scene: Scene,
@@ -151,6 +162,10 @@ fn with_passing_loads(
     accuracy: f64,
 ) -> Result<Scene, AdaptError> {
     let problem = DiscreteProblem::new(scene.clone(), mesh.clone())?.restrict(session)?;
+    let overturns = problem.collapse.filter(|collapse| collapse.motion.is_rotation());
+    if let Some(Collapse { time, .. }) = overturns {
+        return Err(AdaptError::Overturns { time });
+    }
     if LoadCurve::pass_within_steps(&problem) {
         make_steps_adaptive(&mut scene, accuracy);
     }

@@ -49,6 +49,12 @@ impl RigidMotion {
         sum
     }
 
+    /// Whether it is no translation.
+    pub fn is_rotation(&self) -> bool {
+        let [ax, ay] = self.translation;
+        self.rotation.abs() * self.radius > NEGLIGIBLE * ax.hypot(ay)
+    }
+
     /// The displacement at a point, m.
     pub fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let ([ax, ay], [cx, cy]) = (self.translation, self.centre);
@@ -92,14 +98,14 @@ pub fn resultant(body: &Body, force: impl Fn(usize) -> [f64; 2]) -> [f64; 3] {
     sums
 }
 
-/// The name of a motion leaves out components that move the body less than this, relative.
+/// Components that move the body less than this, relative, do not count.
 const NEGLIGIBLE: f64 = 1e-6;
 
 impl fmt::Display for RigidMotion {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let [ax, ay] = self.translation;
         let length = ax.hypot(ay);
-        if self.rotation.abs() * self.radius > NEGLIGIBLE * length {
+        if self.is_rotation() {
             // The point at rest: a + θ e_z × (x − x̄) = 0. Rounded before it is printed: no -0.0000.
             let [x, y] = self.centre;
             let at_rest = [x - ay / self.rotation, y + ax / self.rotation];

@@ -42,7 +42,7 @@ use crate::{
     mesh::{Mesh, Order},
     model::DamageLaw,
     petsc::{PetscError, Session},
-    scene::Scene,
+    scene::{Scene, Stepping, TimeGrid},
 };
 use boundary_conditions::BoundaryConditions;
 use probe::Probes;
@@ -258,5 +258,14 @@ impl DiscreteProblem {
     /// The scene.
     pub fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// Sets the tolerance of steps that are chosen by their error.
+    pub fn set_step_tolerance(&mut self, of_steps: f64) {
+        if let Some(TimeGrid { stepping: Stepping::Auto { tolerance, .. }, .. }) =
+            &mut self.scene.time
+        {
+            *tolerance = of_steps;
+        }
     }
 }

@@ -4,8 +4,8 @@
 //!
 //! - ω > 180° and both sides have the same condition;
 //! - both sides slide without friction and ω > 90°, except on a smooth boundary (the exponent is π/ω − 1);
-//! - one side is clamped and the other one free, and sin² ω > 1/(1 + ν) in plane stress, 1 − ν in plane strain, or
-//!   ω > 90° (61° and 57° for ν = 0.3; the exponent 1 in Williams's equation);
+//! - one side is clamped and the other one free, as open contact is, and sin² ω > 1/(1 + ν) in plane stress, 1 − ν
+//!   in plane strain, or ω > 90° (61° and 57° for ν = 0.3; the exponent 1 in Williams's equation);
 //! - one side slides without friction on a support and the other one is free, and ω > 90°;
 //! - two materials meet there (Bogy, J. Appl. Mech. 35, 1968; for most pairs of materials), except at a right angle
 //!   to a support without friction.
@@ -33,8 +33,16 @@ pub struct Singular {
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Support {
     Free,
+    /// Sliding where the contact is closed, and free where it is open.
+    Contact,
     Sliding,
     Clamped,
+}
+
+impl Support {
+    fn slides(self) -> bool {
+        matches!(self, Self::Contact | Self::Sliding)
+    }
 }
 
 /// A side of a corner: its edge, its support, and the name of the supporting boundary.
@@ -94,17 +102,18 @@ impl DiscreteProblem {
             let of_first = of_first.to_degrees() / (sides.len() / 2).max(1) as f64;
             let angle = angles[node].to_degrees() / (sides.len() / 2).max(1) as f64;
             let (_, most, name) = *sides.iter().max_by_key(|(_, support, _)| *support)?;
-            let same = sides.iter().all(|(_, support, _)| *support == most);
-            let is_free = sides.iter().any(|(_, support, _)| *support == Support::Free);
+            let is_same = |other: Support| other == most || (other.slides() && most.slides());
+            let same = sides.iter().all(|(_, support, _)| is_same(*support));
+            let is_free = sides.iter().any(|(_, support, _)| *support <= Support::Contact);
             // An interface at a right angle to a smooth frictionless support continues in its mirror image.
-            let mirrored = same && most == Support::Sliding && (of_first - 90.0).abs() <= SMOOTH;
+            let mirrored = same && most.slides() && (of_first - 90.0).abs() <= SMOOTH;
             let two_materials = of_first < angle - SMOOTH && !mirrored;
             let is_smooth = (angle - 180.0).abs() <= CORNER_ANGLE.to_degrees();
             let limit = match most {
-                Support::Sliding if same && is_smooth => f64::INFINITY,
-                Support::Sliding => SLIDING,
+                _ if same && most.slides() && is_smooth => f64::INFINITY,
+                _ if most.slides() => SLIDING,
                 _ if same => 180.0 + SMOOTH,
-                Support::Clamped if is_free => clamped(material),
+                _ if is_free => clamped(material),
                 _ => SLIDING,
             };
             let length = |(edge, ..): &([usize; 2], _, _)| mesh.edge_normal(*edge).1;
@@ -114,7 +123,7 @@ impl DiscreteProblem {
                 name: match name.filter(|_| !same) {
                     _ if two_materials => "the end of an interface of two materials".to_owned(),
                     Some(name) => format!("the end of `{name}`"),
-                    None if most == Support::Sliding => {
+                    None if most.slides() => {
                         format!("a corner of `{}`", name.unwrap_or_default())
                     }
                     None => "a re-entrant corner".to_owned(),
@@ -130,9 +139,8 @@ impl DiscreteProblem {
         for boundary in &self.scene().boundaries {
             let support = boundary.conditions.iter().map(|condition| match condition {
                 Condition::Displacement([Some(_), Some(_)]) => Support::Clamped,
-                Condition::Displacement(_) | Condition::Symmetry | Condition::Gap(_) => {
-                    Support::Sliding
-                }
+                Condition::Displacement(_) | Condition::Symmetry => Support::Sliding,
+                Condition::Gap(_) => Support::Contact,
                 Condition::Load(_) => Support::Free,
             });
             let support = support.max().unwrap_or(Support::Free);

@@ -155,3 +155,53 @@ fn error_bars_hold_on_curved_sides() {
         assert!((found - exact).abs() <= bar, "{accuracy}: {found} ± {bar}, not {exact}");
     }
 }
+
+/// A homogeneous bar in tension with λ_D = 0 and ½ λ_U |ε|² = 1.09 t²: ζ′ = −(1.09 t² − 0.05)₊. The first time
+/// steps are too long for these accuracies.
+#[test]
+fn time_steps_become_shorter_until_the_accuracy_is_reached() {
+    let directory = TestDirectory::new();
+    directory.write(
+        "scene.toml",
+        "mesh.file = 'square.msh'
+         material = { young = 1000, poisson = 0.3, plane = 'stress' }
+         damage = { diffusion = 1e-3, lambda_d = 0, lambda_u = 2e6, lambda_w = 0.05 }
+         time = { end = 1, step = 0.1 }
+         boundary = [{ name = 'left', symmetry = true }, { name = 'bottom', symmetry = true },
+                     { name = 'top', displacement = ['free', '1e-3*t'] }]",
+    );
+    let start = (0.05_f64 / 1.09).sqrt();
+    let exact = 1.0 - 1.09 / 3.0 * (1.0 - start.powi(3)) + 0.05 * (1.0 - start);
+    for accuracy in ["0.001", "0.0003"] {
+        let said = directory.run(&["--accuracy", accuracy]);
+        assert!(said.out.contains(&format!("accuracy {accuracy} reached")), "{}", said.out);
+        assert!(said.out.contains("again         with shorter time steps"), "{}", said.out);
+        let found = directory.summary("out/scene")["zeta_min"].as_f64().unwrap();
+        let accuracy: f64 = accuracy.parse().unwrap();
+        assert!(
+            (found - exact).abs() < accuracy * (1.0 - exact),
+            "{accuracy}: {found}, not {exact}"
+        );
+    }
+}
+
+/// A block under a load with the eccentricity t, which leaves it at t = ½.
+#[test]
+fn no_accuracy_is_promised_where_the_body_turns_over() {
+    let directory = TestDirectory::new();
+    directory.write(
+        "scene.toml",
+        "mesh.file = 'square.msh'
+         material = { young = 1000, poisson = 0.3, plane = 'stress' }
+         time = { end = 1, step = 0.1 }
+         boundary = [{ name = 'bottom', gap = 0 },
+                     { name = 'top', traction = [0, '-1 - 12*t*(x - 0.5)'] }]",
+    );
+    let refused = ["run", "scene.toml", "--accuracy", "0.1"];
+    directory.say(&refused).fails(2, &["turns over at t = 0.5", "set an earlier time.end"]);
+    let said = directory.run(&["--bars"]);
+    assert!(said.out.contains("the error bars could not be measured"), "{}", said.out);
+    assert!(said.out.contains("just before the body turns over, the contact shrinks to a point"));
+    let said = directory.run(&["--accuracy", "0.1", "--set", "time.end=0.4"]);
+    assert!(said.out.contains("accuracy 0.1 reached"), "{}", said.out);
+}

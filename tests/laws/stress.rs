@@ -209,6 +209,13 @@ fn singular_points_are_those_whose_stresses_grow_as_the_mesh_is_refined() {
     let clamped = named("{ name = 'left', displacement = [0, 0] }");
     let end = |y: f64| ([0.0, y], "the end of `left`".to_owned());
     assert_eq!(clamped, [end(0.0), end(1.0)]);
+    // A gap may open, and then the corner is free.
+    assert_eq!(
+        named("{ name = 'left', displacement = [0, 0] }, { name = 'bottom', gap = 1 }"),
+        clamped
+    );
+    let axis = "{ name = 'left', displacement = [0, 0] }, { name = 'bottom', symmetry = true }";
+    assert_eq!(named(axis), [end(1.0)]);
     let symmetric = "{ name = 'left', symmetry = true }, { name = 'bottom', gap = 0 }, \
                      { name = 'top', pressure = 1 }";
     assert_eq!(named(symmetric), []);
