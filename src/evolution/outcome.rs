@@ -171,8 +171,9 @@ impl BoundViolation {
         let sides: Vec<String> = sides.map(|(side, by)| format!("{side} by {by:.1e}")).collect();
         let cure = match mass {
             Mass::Consistent if self.k * slowest < 1.0 => {
-                "κk is too small against h² for the consistent mass; set damage.mass = \
-                 \"lumped\" (for meshes without obtuse angles), or refine the mesh there"
+                "in a step the damage diffuses less far than a triangle is wide (κk < h²), where the consistent \
+                 mass overshoots; set damage.mass = \"lumped\" (for meshes without obtuse angles), or refine the \
+                 mesh there"
             }
             Mass::Lumped => "the mesh has obtuse angles, for which the lumped mass fails",
             Mass::Consistent => {

@@ -43,6 +43,7 @@ impl DiscreteProblem {
                      to {end:.4e}: shorten time.step, or set it to \"auto\""
                 )
             }),
+            scene.units.contradiction(),
             (scene.materials().any(|material| material.density > 0.0)
                 && scene.gravity.iter().all(|g| g.as_constant() == Some(0.0)))
             .then(|| "material.density has no effect without body.gravity".to_owned()),

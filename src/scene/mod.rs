@@ -16,6 +16,7 @@ mod expression;
 mod schema;
 mod tables;
 mod time;
+mod units;
 
 use std::collections::BTreeMap;
 use std::iter;
@@ -27,6 +28,7 @@ pub use error::SceneError;
 pub use expression::{Expression, ExpressionError};
 pub use schema::SCHEMA;
 pub use time::{Scheme, Stepping, TimeGrid, rounded};
+pub use units::Units;
 
 use crate::{
     contact::ContactOptions,
@@ -140,36 +142,6 @@ pub struct OutputOptions {
     pub every: Option<usize>,
     /// The time between two checkpoints, s; 0 for no checkpoints.
     pub checkpoint: f64,
-}
-
-/// The names of a scene's units. They label the results; the program converts no units.
-#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
-pub struct Units {
-    /// The unit of lengths and displacements, by default m.
-    pub length: String,
-    /// The unit of forces, by default N.
-    pub force: String,
-    /// The unit of time, by default s.
-    pub time: String,
-    /// The unit of stresses and pressures: by default Pa, or force/length² if one of these is given.
-    pub stress: String,
-}
-
-impl Default for Units {
-    fn default() -> Self {
-        let [length, force, time, stress] = ["m", "N", "s", "Pa"].map(str::to_owned);
-        Self { length, force, time, stress }
-    }
-}
-
-impl Units {
-    /// The unit of work per thickness.
-    pub fn work(&self) -> String {
-        match *self == Self::default() {
-            true => "J/m".to_owned(),
-            false => format!("{0}·{1}/{1}", self.force, self.length),
-        }
-    }
 }
 
 impl Scene {

@@ -107,6 +107,25 @@ fn what_the_nodes_miss_of_a_displacement_or_the_initial_damage_is_noted() {
 }
 
 #[test]
+fn an_answer_without_any_motion_is_noted() {
+    let problem = pressed(1.0, "0").unwrap();
+    let notes = run(&problem, SOLVERS[0]).notes(&problem);
+    assert!(notes.len() == 1 && notes[0].starts_with("nothing moves at the end"), "{notes:?}");
+}
+
+#[test]
+fn units_that_contradict_each_other_are_noted() {
+    for (stress, told) in [("MPa", false), ("N/mm²", false), ("GPa", true), ("psi", true)] {
+        let text = format!(
+            "units = {{ length = 'mm', force = 'N', stress = '{stress}' }}\n{MATERIAL}
+             boundary = [{{ name = 'left', displacement = [0, 0] }}]"
+        );
+        let notes = problem(square(2), &text).unwrap_or_else(|e| panic!("{e}")).notes();
+        assert_eq!(notes.iter().any(|note| note.contains("N/mm² is")), told, "{notes:?}");
+    }
+}
+
+#[test]
 fn a_foundation_that_overlaps_the_body_is_named() {
     let [note] = &pressed(-0.05, "-1").unwrap().notes()[..] else { panic!("one note") };
     assert!(note.contains("up to 5.000e-2 m inside the foundation of `bottom`"), "{note}");

@@ -6,7 +6,7 @@ use std::{
     env,
     ffi::OsString,
     fs::{self, File},
-    io,
+    io::{self, Write},
     path::Path,
     process::{Child, Command, ExitStatus, Stdio},
     thread::sleep,
@@ -20,6 +20,8 @@ const SECONDS: f64 = 600.0;
 const SECONDS_VARIABLE: &str = "SIGNORINI_GMSH_SECONDS";
 /// The interval at which the program checks whether gmsh has ended.
 const POLL: Duration = Duration::from_millis(5);
+/// After this time a message says that gmsh is at work.
+const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Runs gmsh with `arguments` on the file `input` and then on a file with the text `last`. Returns the bytes
 /// of the MSH 4.1 file that gmsh makes. If `bytes` are given, they replace the contents of `input`. `task`
@@ -87,9 +89,17 @@ fn wait(mut gmsh: Child, input: &Path, task: &str) -> Result<ExitStatus, MeshErr
     let (started, interrupts) = (Instant::now(), Interrupts::defer());
     let limit = env::var(SECONDS_VARIABLE).ok().and_then(|text| text.parse().ok());
     let limit = limit.unwrap_or(SECONDS);
+    let mut told = false;
     loop {
         if let Some(status) = gmsh.try_wait().map_err(MeshError::io(Path::new("gmsh")))? {
             return Ok(status);
+        }
+        if !told && started.elapsed() > PATIENCE {
+            let note =
+                format!("note: {}: gmsh is at work; a larger size is quicker\n", input.display());
+            // If stderr is closed, gmsh still works.
+            let _ = io::stderr().write_all(note.as_bytes());
+            told = true;
         }
         let late = started.elapsed().as_secs_f64() > limit;
         let signal = interrupts.received();
