@@ -58,7 +58,7 @@ fn origin(task: &Task) -> [u64; 3] {
 /// Per hash: the message if it differs.
 const DIFFERENCES: [&str; 3] = [
     "another build of the program wrote it",
-    "the scene, its tables, --set or PETSc's options are others",
+    "the scene, its tables, --set, --solver or PETSc's options are others",
     "the mesh is another",
 ];
 

@@ -33,6 +33,7 @@ use signorini::{
     scene::{MeshSource, SCHEMA, Scene},
 };
 use std::{
+    collections::BTreeSet,
     fmt,
     io::{self, Write},
     path::PathBuf,
@@ -128,6 +129,14 @@ pub struct SceneArguments {
     set: Vec<String>,
 }
 
+/// Keys without effect if an accuracy is required.
+const CHOSEN: [&str; 3] = ["mesh.size", "time.step", "time.tolerance"];
+
+/// The key of a `--set` argument.
+fn key_of(set: &str) -> &str {
+    set.split('=').next().unwrap_or_default().trim()
+}
+
 impl SceneArguments {
     /// Checks that no argument is without effect.
     fn check(&self) -> Result<(), Failure> {
@@ -139,7 +148,11 @@ impl SceneArguments {
                 file.display()
             )));
         }
-        Ok(())
+        let mut keys = BTreeSet::new();
+        match self.set.iter().find(|set| !keys.insert(key_of(set))) {
+            Some(again) => Err(Failure::input(format!("--set {again}: its key is given twice"))),
+            None => Ok(()),
+        }
     }
 
     /// The scene with its overrides and those in `more`, and notes for the user.
@@ -155,7 +168,11 @@ impl SceneArguments {
                 "accuracy_of has no effect without accuracy; add accuracy = 0.01, say, or --accuracy 0.01",
             ));
         }
-        let mut notes = Vec::new();
+        let is_chosen = |set: &&String| CHOSEN.contains(&key_of(set));
+        let unused = self.set.iter().filter(|_| scene.accuracy.is_some()).find(is_chosen);
+        let mut notes = Vec::from_iter(unused.map(|set| {
+            format!("--set {set} has no effect: the accuracy chooses the mesh and the time steps")
+        }));
         if let Some(file) = &self.mesh {
             let replaced = std::mem::replace(&mut scene.mesh, MeshSource::from_path(file));
             if !replaced.parameters.is_empty() {

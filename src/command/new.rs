@@ -15,6 +15,12 @@ pub fn new(name: &Path) -> Result<(), Failure> {
         let name = name.display();
         return Err(Failure::input(format!("{name} is no name; write, say, `signorini new dam`")));
     };
+    if let Some(folder) =
+        name.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.is_dir())
+    {
+        let folder = folder.display();
+        return Err(Failure::input(format!("there is no folder {folder}; make it first")));
+    }
     let [geometry, scene] = [".geo", ".toml"].map(|extension| {
         let mut file = stem.to_owned();
         file.push(extension);
@@ -29,10 +35,22 @@ pub fn new(name: &Path) -> Result<(), Failure> {
     for (path, text) in [(&geometry, GEOMETRY), (&scene, &text)] {
         write_whole(path, text.as_bytes()).map_err(Failure::input)?;
     }
-    let (geometry, scene, name) = (geometry.display(), scene.display(), stem.display());
+    let results = Path::new("out").join(stem);
+    let [word, folder] = [&scene, &results].map(|path| quoted(path));
     say(&format!(
-        "{geometry} and {scene} are written; next:\n  signorini check {scene}\n  signorini run {scene}\n  \
-         signorini figures out/{name}"
+        "{} and {} are written; next:\n  signorini check {word}\n  signorini run {word}\n  \
+         signorini figures {folder}",
+        geometry.display(),
+        scene.display()
     ));
     Ok(())
+}
+
+/// A path as a word of a shell.
+fn quoted(path: &Path) -> String {
+    let text = path.display().to_string();
+    match text.chars().all(|c| c.is_alphanumeric() || "/._-+".contains(c)) {
+        true => text,
+        false => format!("'{}'", text.replace('\'', r"'\''")),
+    }
 }

@@ -116,6 +116,10 @@ fn arguments() {
         (&["--mesh", "scene.toml"], &["scene.toml: a mesh is a .msh file or a .geo file"]),
         (&["--mesh", "square.geo", "--set", "mesh.size=1"], &["--set mesh.size=1 has no effect"]),
         (
+            &["--set", "time.end=1", "--set", "time.end = 2"],
+            &["--set time.end = 2: its key is given twice"],
+        ),
+        (
             &["--", "-tao_type", "none"],
             &["-tao_type: `none` is none of TAO's types", "tron", "bqpip"],
         ),

@@ -131,7 +131,7 @@ fn what_is_no_checkpoint_of_this_run_is_refused() {
     };
     restart(
         &["--set", "material.young=81"],
-        "the scene, its tables, --set or PETSc's options are others",
+        "the scene, its tables, --set, --solver or PETSc's options are others",
     );
     let mesh = directory.read("square.msh");
     directory.write("square.msh", &mesh.replace("0.25 0.25 0\n", "0.26 0.25 0\n"));

@@ -57,6 +57,8 @@ fn a_failing_run_of_a_study_is_told_and_the_others_go_on() {
     assert_eq!(said.code, Some(1), "{said:?}");
     assert!(said.out.contains("material.poisson must be between"), "{}", said.out);
     assert_eq!(directory.read("out/scene-study/study.csv").lines().count(), 2);
+    let twice = ["study", "scene.toml", "--set", "time.end=1", "--set", "time.end=2"];
+    directory.say(&twice).fails(2, &["--set time.end is given twice"]);
 }
 
 /// Uniform pressure 3 on the unit square: u_y = −3 y/E, σ_yy = −3.

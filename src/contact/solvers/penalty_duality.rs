@@ -126,7 +126,7 @@ impl FixedPoint<'_> {
         let tolerance = problem.tolerance;
         let detail = format!(
             "the tolerance {tolerance:.1e} is missed by contact pressures {missed:.1e} ({:.1e} times what it \
-             allows them) (ω = {omega:.3e} Pa/m)",
+             allows them) (ω = {omega:.3e})",
             missed / (EXACT * tolerance)
         );
         Err(ContactError::stopped(ENTRY.name, *report, Kkt::UNKNOWN, detail))
