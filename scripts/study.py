@@ -106,7 +106,9 @@ def main(prog=None):
     arguments, more = parser.parse_args(words[:cut]), words[cut + 1:]
     keys = [key for key, _ in arguments.set]
     if twice := next((key for key in keys if keys.count(key) > 1), None):
-        parser.error(f"--set {twice} is given twice; write all its values after one: {twice}=A,B,…")
+        print(f"error: --set {twice} is given twice; write all its values after one: {twice}=A,B,…",
+              file=sys.stderr)
+        return 2
     extra = [] if arguments.frames or "output.every" in keys else [("output.every", "0")]
     out = arguments.out or Path("out") / f"{Path(arguments.scene).stem}-study"
     products = itertools.product(*(values for _, values in arguments.set))
