@@ -71,10 +71,10 @@ impl ErrorBudget {
         };
         let advice = match mesh.max(steps_most) {
             largest if largest.max(solver) < NEGLIGIBLE => "",
-            largest if solver > largest => "; spend on the solver's tolerance",
-            _ if steps_most > mesh => "; spend on shorter time steps",
-            _ if mesh > LARGE => "; spend on the mesh, which is the limit of this answer",
-            _ => "; spend on the mesh",
+            largest if solver > largest => "; to improve: the solver's tolerance",
+            _ if steps_most > mesh => "; to improve: shorter time steps",
+            _ if mesh > LARGE => "; to improve: the mesh, which is too coarse",
+            _ => "; to improve: the mesh",
         };
         [
             format!("from the mesh: u {} (energy norm)", percent(self.displacement_mesh)),

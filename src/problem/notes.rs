@@ -30,7 +30,7 @@ impl DiscreteProblem {
         let is_curved = self.body.nodes.partition.comm().any(!self.body.mesh.curved.is_empty());
         let mut notes = Vec::from_iter(scene.time.and_then(|grid| grid.note()));
         notes.extend(self.motions.free.iter().map(|motion| {
-            format!("nothing prevents or drives {motion}: the answer given has the minimum ∫|u|²")
+            format!("nothing prevents or drives {motion}: the answer given is the one with the least ∫|u|²")
         }));
         let check_units = |contrast| format!("{contrast}; if that is not meant, check their units");
         notes.extend(self.contrast().map(check_units));
