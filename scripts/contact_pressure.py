@@ -3,7 +3,7 @@
 import matplotlib.pyplot as plt
 import numpy as np
 
-from drawing import BLUE, FAINT, along, canvas, draw_colourbar, headline, stress_unit
+from drawing import BLUE, FAINT, along, canvas, draw_colourbar, headline, stress_unit, wide
 
 
 def draw_pressure(results, limits, figure=None):
@@ -11,7 +11,8 @@ def draw_pressure(results, limits, figure=None):
     curves = results.curves
     if not curves:
         return None
-    figure = canvas((max(7.2, min(3.8 * len(curves), 14.0)), 4.6), figure)
+    width = wide(max(7.2, min(3.8 * len(curves), 14.0)))
+    figure = canvas((width, np.clip(0.64 * width, 3.4, 4.6)), figure)
     rows = figure.subplots(
         2, len(curves), squeeze=False, sharex="col", sharey="row",
         gridspec_kw={"height_ratios": (2.2, 1)},
@@ -51,7 +52,7 @@ def draw_pressure(results, limits, figure=None):
         text += f"; the pressure goes up to {largest / factor:.3g} {unit}"
     text = "unloaded" if results.unloaded else "" if results.active is None else text
     text = ", ".join(filter(None, (f"contact at {results.moment}", text)))
-    figure.suptitle(headline(results, text), fontsize=11)
+    figure.suptitle(headline(results, text))
     return figure
 
 
@@ -88,7 +89,7 @@ def draw_evolution(states, limits):
     if not curves or len(states) < 3:
         return None
     figure, rows = plt.subplots(
-        len(curves), 1, figsize=(7.2, 1.2 + min(2.8 * len(curves), 8.0)), squeeze=False, sharex=True
+        len(curves), 1, figsize=(wide(7.2), 1.2 + min(2.8 * len(curves), 8.0)), squeeze=False, sharex=True
     )
     factor, unit = stress_unit(limits.pressure, first.units)
     times = np.array([state.time for state in states])
@@ -98,7 +99,7 @@ def draw_evolution(states, limits):
         axes.set_title(name, parse_math=False)
         image = axes.pcolormesh(
             _between(times), _between(s), np.ma.masked_where(pressure <= 0.0, pressure),
-            cmap="viridis_r", vmin=0.0, vmax=limits.pressure / factor or 1.0, rasterized=True,
+            cmap="viridis", vmin=0.0, vmax=limits.pressure / factor or 1.0, rasterized=True,
         )
         draw_colourbar(axes, image, f"contact pressure ({unit})")
         axes.set_ylabel(label)
@@ -106,7 +107,7 @@ def draw_evolution(states, limits):
             axes.spines[side].set_visible(True)
     rows[-1, 0].set_xlabel(f"time t ({first.units['time']})")
     text = f"contact pressure on $\\Gamma_C$ in {len(states)} frames; white: open"
-    figure.suptitle(headline(last, text), fontsize=11)
+    figure.suptitle(headline(last, text))
     return figure
 
 

@@ -22,6 +22,7 @@ plt.rcParams.update({
     "savefig.pad_inches": 0.1,
     "font.size": 10,
     "axes.titlesize": 10.5,
+    "figure.titlesize": 11,
     "axes.edgecolor": INK,
     "axes.linewidth": 0.7,
     "axes.spines.top": False,
@@ -33,6 +34,32 @@ plt.rcParams.update({
     "pdf.fonttype": 42,
     "ps.fonttype": 42,
 })
+
+
+# The width of every figure, inches, or None for widths of their own.
+WIDTH = None
+
+
+def set_width(inches):
+    """Makes every figure so wide, with fonts that suit it."""
+    global WIDTH
+    WIDTH = inches
+    size = 8 if inches < 5.0 else 9 if inches < 8.0 else 10
+    plt.rcParams.update({"font.size": size, "axes.titlesize": size, "figure.titlesize": size + 0.5})
+
+
+def wide(inches):
+    """The width of a figure that is by itself so wide."""
+    return WIDTH or inches
+
+
+def panels_of(extent):
+    """A figure with two maps of a body of this extent, side by side if there is room, and their axes."""
+    if extent[0] < 2.5 * extent[1] and wide(11.8) >= 6.5:
+        width, height = map_size(extent, 0.5 * wide(11.8) - 0.9)
+        return (2 * (width + 0.9), height + 0.5), (1, 2)
+    width, height = map_size(extent, wide(8.9) - 0.9)
+    return (width + 0.9, 2 * height + 0.5), (2, 1)
 
 
 def canvas(size, figure=None):
@@ -58,12 +85,14 @@ def headline(results, text):
     shown."""
     overrides = textwrap.shorten(f"with {results.overrides}", 100, placeholder=" …")
     overrides = overrides.replace("$", r"\$") if results.overrides else ""
-    return "\n".join(filter(None, (results.title, overrides, results.ending, text)))
+    lines = filter(None, (results.title, overrides, results.ending, *text.split("\n")))
+    return "\n".join(textwrap.fill(line, int(14 * WIDTH)) if WIDTH else line for line in lines)
 
 
 def map_size(extent, across):
     """The size, inches, of a map with equal aspect that is `across` wide including ticks and labels."""
-    return across, float(np.clip((across - 1.0) * extent[1] / extent[0] + 0.9, 2.2, 8.0))
+    least, most = (1.6, 1.2 * WIDTH) if WIDTH else (2.2, 8.0)
+    return across, float(np.clip((across - 1.0) * extent[1] / extent[0] + 0.9, least, most))
 
 
 def draw_outline(axes, points, results, **style):
@@ -98,12 +127,22 @@ def frame(axes, points, units):
     axes.set_ylabel(f"y ({units['length']})")
 
 
-def draw_colourbar(axes, image, label, extend="neither"):
-    """Draws a colour bar as high as the map."""
+def draw_colourbar(axes, image, label, extend="neither", flat=False):
+    """Draws a colour bar as high as the map. Beside a flat body there is no room for the label, which is below it."""
     bar = axes.figure.colorbar(image, cax=axes.inset_axes([1.03, 0.0, 0.035, 1.0]), extend=extend)
     bar.outline.set_linewidth(0.5)
     bar.formatter.set_useOffset(False)
-    bar.set_label(label)
+    if flat:
+        axes.annotate(label, (1.08, 0.0), (0.0, -2.4 * plt.rcParams["font.size"]), xycoords="axes fraction",
+                      textcoords="offset points", ha="right", va="top", fontsize="small")
+    else:
+        bar.set_label(label)
+
+
+def is_flat(results):
+    """Whether the body is much wider than high."""
+    width, height = np.ptp(results.nodes, axis=0)
+    return height < 0.3 * width
 
 
 def stress_unit(largest, units):

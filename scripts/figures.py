@@ -18,9 +18,10 @@ pressure as animations.
 """
 
 import argparse
+import os
 import sys
 from dataclasses import replace
-from math import isfinite
+from math import inf, isfinite
 
 import matplotlib.pyplot as plt
 
@@ -59,7 +60,7 @@ def arguments_of(prog):
     parser = argparse.ArgumentParser(
         prog=prog, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", nargs="+", metavar="OUT", help=(
-        "result folder; several have the same colours, axes of pressure and amplification"))
+        "result folder; several with the same units have the same colours, axes of pressure and amplification"))
     parser.add_argument("--time", type=float, metavar="T", help=(
         "draw the frame nearest to this time, s (default: the last)"))
     parser.add_argument("--factor", type=float, metavar="F", help=(
@@ -71,7 +72,7 @@ def arguments_of(prog):
     parser.add_argument("--along", metavar="BOUNDARY", help="only curves of fields along a boundary")
     parser.add_argument("--quantity", type=lambda text: text.split(","), metavar="NAME,…", help=(
         "fields of --line and --along: zeta, u_x, u_y, stress_xx, stress_yy, stress_xy, stress_zz, stress_1, "
-        "stress_2, von_mises, normal_pressure, gap (default: von_mises)"), default=["von_mises"])
+        "stress_2, von_mises, normal_pressure, gap (default: von_mises)"))
     parser.add_argument("--times", type=numbers(None), metavar="T,…", help=(
         "times of the curves, s (default: the last frame)"))
     parser.add_argument("--no-title", action="store_true", help="without titles, for papers")
@@ -90,8 +91,11 @@ def arguments_of(prog):
         parser.error(f"--format: {', '.join(unknown)} is none of {', '.join(FORMATS)}")
     if arguments.line and arguments.along:
         parser.error("--line and --along: give one of them")
-    if arguments.factor is not None and not arguments.factor > 0.0:
-        parser.error("--factor: must be positive")
+    if (arguments.times or arguments.quantity) and not (arguments.line or arguments.along):
+        parser.error("--times and --quantity are for curves: give --line or --along, too; --time is for pictures")
+    for name in ("factor", "width"):
+        if getattr(arguments, name) is not None and not 0.0 < getattr(arguments, name) < inf:
+            parser.error(f"--{name}: must be positive")
     if arguments.time is not None and not isfinite(arguments.time):
         parser.error("--time: must be a number")
     return arguments
@@ -109,15 +113,20 @@ def numbers(count):
 
 
 def styled(figure, arguments):
-    """Applies --no-title and --width."""
+    """Applies --no-title."""
     if figure is not None and arguments.no_title:
         figure.suptitle("")
         for axes in figure.axes:
             axes.set_title("")
-    if figure is not None and arguments.width:
-        width, height = figure.get_size_inches()
-        figure.set_size_inches(arguments.width, height * arguments.width / width)
     return figure
+
+
+def tell(path):
+    """Prints a path. A reader that has left, as `head` does, is no error."""
+    try:
+        print(path, flush=True)
+    except BrokenPipeError:
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")
 
 
 def save(figure, results, name, formats):
@@ -130,7 +139,7 @@ def save(figure, results, name, formats):
     for ending in formats:
         path = results.folder / f"{name}{moment}.{ending}"
         figure.savefig(path)
-        print(path)
+        tell(path)
     plt.close(figure)
 
 
@@ -139,7 +148,7 @@ def draw(results, limits, arguments):
     if arguments.paraview:
         # The scales suit all frames.
         chosen = states(results, evenly(results.frames, FRAMES))
-        print(write_script(results, limits_of(chosen, arguments.factor)))
+        tell(write_script(results, limits_of(chosen, arguments.factor)))
         return
     last = replace(results, time=results.frames[-1][0])
     for name, figure in FIGURES.items():
@@ -154,16 +163,20 @@ def draw(results, limits, arguments):
         save(evolution, last, "contact-evolution", arguments.format)
     if arguments.animate:
         for path in animate(results, arguments.factor, arguments.animate):
-            print(path)
+            tell(path)
 
 
 def main(prog=None):
     """Returns the exit code: 2 if a figure could not be drawn. A message names it."""
     arguments = arguments_of(prog)
+    if arguments.width:
+        drawing.set_width(arguments.width)
+    # The table of a study stands beside its folders.
+    arguments.folders = [folder for folder in arguments.folders if not os.path.isfile(folder)] or arguments.folders
     if arguments.line or arguments.along:
         with telling() as problems:
             for path in draw_curves(arguments, styled):
-                print(path)
+                tell(path)
         return 2 if problems else 0
     drawing.DAMAGE, drawing.CONTOURS = arguments.damage, arguments.contours
     runs, failed = [], False
@@ -175,9 +188,10 @@ def main(prog=None):
                 print(f"{folder}: the last frame is at t = {last:g}, before {arguments.time:g}: it is drawn",
                       file=sys.stderr)
         failed |= bool(problems)
-    shared = runs and limits_of(runs, arguments.factor)
     for results in runs:
         with telling() as problems:
+            # Only numbers in the same units can have a common scale.
+            shared = limits_of([run for run in runs if run.units == results.units], arguments.factor)
             draw(results, replace(shared, box=box_of([results], shared.factor)), arguments)
         failed |= bool(problems)
     return 2 if failed else 0

@@ -1,10 +1,12 @@
 """Pictures of quantities in time, from history.csv."""
 
+from itertools import cycle
+
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import ScalarFormatter
 
-from drawing import BLUE, FAINT, RED, headline
+from drawing import BLUE, FAINT, RED, headline, wide
 from results import ROUNDING, UNDAMAGED
 
 
@@ -13,7 +15,7 @@ def draw_damage_history(results, _limits=None):
     time, least = results.history.get("time"), results.history.get("zeta_min")
     if time is None or least is None or len(time) < 3 or np.nanmin(least) >= 1.0 - UNDAMAGED:
         return None
-    figure, axes = plt.subplots(figsize=(6.4, 3.8))
+    figure, axes = plt.subplots(figsize=(wide(6.4), max(2.8, 0.6 * wide(6.4))))
     axes.plot(time, results.history["zeta_mean"], color=FAINT, linewidth=1.4, label="mean ζ")
     axes.plot(time, least, color=BLUE, linewidth=1.8, label="min ζ")
     stopped = results.summary.get("stopped_at")
@@ -32,26 +34,39 @@ def draw_damage_history(results, _limits=None):
 
 
 def draw_force_displacement(results, _limits=None):
-    """Draws the resultant force of each support over the largest displacement."""
+    """Draws the force of each support over the largest displacement: its component along the direction that it has
+    where it is largest."""
     history = results.history
     supports = [name.removesuffix(".force_x") for name in history if name.endswith(".force_x")]
-    forces = {name: np.hypot(history[f"{name}.force_x"], history[f"{name}.force_y"])
-              for name in supports}
+    forces = {name: _along_largest(history[f"{name}.force_x"], history[f"{name}.force_y"]) for name in supports}
     largest = max((np.nanmax(force, initial=0.0) for force in forces.values()), default=0.0)
     if largest <= 0.0 or len(history["time"]) < 3:
         return None
-    figure, axes = plt.subplots(figsize=(6.4, 3.8))
-    for name, force in forces.items():
-        if np.nanmax(force) > ROUNDING * largest:
-            axes.plot(history["displacement_max"], force, linewidth=1.6,
-                      label=name.replace("$", r"\$"))
+    figure, axes = plt.subplots(figsize=(wide(6.4), max(2.8, 0.6 * wide(6.4))))
+    shown = {name: force for name, force in forces.items() if np.nanmax(force) > ROUNDING * largest}
+    # Dashes show a curve under another one.
+    for (name, force), dashes in zip(shown.items(), cycle(("-", (0, (4, 3)), (0, (1, 2))))):
+        axes.plot(history["displacement_max"], force, linewidth=1.6, linestyle=dashes,
+                  label=name.replace("$", r"\$"))
     axes.set_xlim(left=0.0)
-    axes.set_ylim(bottom=0.0)
+    if min(map(np.nanmin, shown.values())) < -ROUNDING * largest:
+        axes.axhline(0.0, color=FAINT, linewidth=0.7)
+    else:
+        axes.set_ylim(bottom=0.0)
     axes.set_xlabel("largest displacement ({length})".format(**results.units))
     axes.set_ylabel("force on the support ({line})".format(**results.units))
     axes.set_title(headline(results, ""))
     axes.legend(loc="best")
     return figure
+
+
+def _along_largest(x, y):
+    """The component of forces along the direction of the largest one."""
+    size = np.hypot(x, y)
+    if not np.nanmax(size, initial=0.0) > 0.0:
+        return size
+    k = np.nanargmax(size)
+    return (x * x[k] + y * y[k]) / size[k]
 
 
 # Panels of the figure of all histories: title, columns with their names, logarithmic or not.

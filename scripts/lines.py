@@ -1,12 +1,13 @@
 """Curves of fields along a line or a boundary, at several times and of several runs, with their numbers as CSV."""
 
+import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 
 import signorini_results
-from drawing import INK
+from drawing import INK, wide
 from reading import whole
 from results import ResultError, write_table
 
@@ -19,25 +20,33 @@ def draw_curves(arguments, styled):
     runs = [_run(folder) for folder in arguments.folders]
     where = f"along_{arguments.along}" if arguments.along else "line"
     folder = runs[0].folder
-    for quantity in arguments.quantity:
-        rows, figure = [], plt.figure(figsize=(6.0, 3.8))
+    for quantity in arguments.quantity or ["von_mises"]:
+        rows, figure = [], plt.figure(figsize=(wide(6.0), max(2.8, 0.63 * wide(6.0))))
         axes = figure.add_subplot()
-        for run in runs:
+        units = {"length": "m", "time": "s", "stress": "Pa", **runs[0].summary.get("units", {})}
+        for run, name in zip(runs, _differences([run.folder.name for run in runs])):
             frames = {frame.time: frame for frame in map(run.frame, arguments.times or [None])}
+            if missing := [f"{time:g}" for time in arguments.times or [] if not np.isclose(time, list(frames)).any()]:
+                print(f"{run.folder}: no frame at t = {', '.join(missing)}: the nearest are drawn", file=sys.stderr)
             for frame in frames.values():
                 places, values = _values(frame, arguments, quantity)
                 if np.isnan(values).all():
                     raise ResultError(f"{run.folder}: {quantity} has no value on this line; is it outside the body?")
-                label = f"t = {frame.time:g}" if len(runs) == 1 else f"{run.folder.name}, t = {frame.time:g}"
+                label = f"t = {frame.time:g} {units['time']}"
+                label = label if len(runs) == 1 else f"{name}, {label}"
                 axes.plot(places, values, label=label, linewidth=1.3)
                 rows += [{"run": run.folder.name, "time": frame.time, "s": s, quantity: value}
                          for s, value in zip(places, values) if np.isfinite(s)]
-        units = {"length": "m", "time": "s", "stress": "Pa", **runs[0].summary.get("units", {})}
         unit = units.get(UNITS.get(quantity, "stress"), "")
         axes.set_xlabel(f"distance along {arguments.along or 'the line'} ({units['length']})")
-        axes.set_ylabel(f"{quantity} ({unit})" if unit else quantity)
+        words = quantity.replace("_", " ").replace("mises", "Mises stress")
+        axes.set_ylabel(f"{words} ({unit})" if unit else words)
         axes.axhline(0.0, color=INK, linewidth=0.5) if axes.get_ylim()[0] < 0.0 < axes.get_ylim()[1] else None
-        axes.legend()
+        labels = axes.get_legend_handles_labels()[1]
+        if len(labels) > 6 or max(map(len, labels)) > 5 * wide(6.0):
+            axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.18), fontsize="small")
+        else:
+            axes.legend()
         if arguments.line:
             x0, y0, x1, y1 = arguments.line
             axes.set_title(f"from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g})")
@@ -52,10 +61,19 @@ def draw_curves(arguments, styled):
         plt.close(figure)
 
 
+def _differences(names):
+    """The parts, between double underscores, in which names of folders differ; whole names if they do not."""
+    parts = [name.split("__") for name in names]
+    common = set(parts[0]).intersection(*parts[1:]) if len(names) > 1 else ()
+    return ["__".join(part for part in of if part not in common) or name for of, name in zip(parts, names)]
+
+
 def _run(folder):
     """A run with its frames; a problem is an error in one line."""
     with whole(Path(folder) / "summary.json"):
         run = signorini_results.load(folder)
+    if not (run.folder / "fields.pvd").exists():
+        raise ResultError(f"{folder}: the run wrote no frames: run its scene.toml with --set output.every=1")
     with whole(Path(folder) / "fields.pvd"):
         if not run.frames:
             raise ResultError(f"{folder}: fields.pvd lists no frame")

@@ -6,8 +6,8 @@ from matplotlib.colors import ListedColormap
 from matplotlib.tri import Triangulation
 
 from drawing import (
-    BLUE, INK, RED, canvas, damage_scale, draw_colourbar, draw_values, draw_foundation, draw_outline, frame, headline,
-    least_zeta, map_size, stress_unit,
+    BLUE, INK, RED, canvas, damage_scale, draw_colourbar, draw_values, draw_foundation, draw_outline, frame, headline, is_flat,
+    least_zeta, map_size, panels_of, stress_unit, wide,
 )
 
 # About so many arrows along the boundary.
@@ -22,7 +22,7 @@ def draw_deformed(results, limits):
     pieces = results.pieces
     moved = results.nodes + limits.factor * results.displacement
     extent = np.ptp(limits.box, axis=0)
-    width, height = map_size(extent, 7.2)
+    width, height = map_size(extent, wide(7.2))
     figure, axes = plt.subplots(figsize=(width, height + 0.4))
 
     # The width of the lines, in points, follows the mean edge, so that they do not fill a fine mesh.
@@ -49,7 +49,7 @@ def draw_deformed(results, limits):
 def draw_mesh(results):
     """The undeformed mesh."""
     extent = np.ptp(results.nodes, axis=0)
-    width, height = map_size(extent, 7.2)
+    width, height = map_size(extent, wide(7.2))
     figure, axes = plt.subplots(figsize=(width, height + 0.4))
     sides = results.pieces.along(results.pieces.sides(), results.nodes)
     sides = np.pad(sides, ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
@@ -78,14 +78,11 @@ def draw_stress_and_damage(results, limits):
     """
     extent = np.ptp(results.nodes, axis=0)
     if not limits.damaged:
-        width, height = map_size(extent, 6.0)
+        width, height = map_size(extent, wide(6.9) - 0.9)
         figure, left = plt.subplots(figsize=(width + 0.9, height + 0.5))
-    elif extent[0] < 2.5 * extent[1]:
-        width, height = map_size(extent, 5.0)
-        figure, (left, right) = plt.subplots(1, 2, figsize=(2 * (width + 0.9), height + 0.5))
     else:
-        width, height = map_size(extent, 8.0)
-        figure, (left, right) = plt.subplots(2, 1, figsize=(width, 2 * height + 0.5))
+        size, shape = panels_of(extent)
+        figure, (left, right) = plt.subplots(*shape, figsize=size)
     mesh = Triangulation(*results.pieces.at_points(results.nodes).T, results.pieces.triangles)
     left.set_title(_paint_stress(left, mesh, results, limits))
     if limits.damaged:
@@ -94,7 +91,7 @@ def draw_stress_and_damage(results, limits):
         draw_outline(axes, results.nodes, results, color=INK, linewidth=0.7)
         draw_foundation(axes, results)
         frame(axes, results.nodes, results.units)
-    figure.suptitle(headline(results, f"{results.moment}"), fontsize=11.5)
+    figure.suptitle(headline(results, f"{results.moment}"))
     return figure
 
 
@@ -135,7 +132,7 @@ def _paint_stress(axes, mesh, results, limits):
     stress = results.pieces.at_points(results.von_mises / factor)
     image = draw_values(axes, mesh, stress, "viridis", 0.0, limits.stress / factor or 1.0)
     extend = "max" if limits.is_cut else "neither"
-    draw_colourbar(axes, image, f"von Mises stress ({unit})", extend)
+    draw_colourbar(axes, image, f"von Mises stress ({unit})", extend, is_flat(results))
     largest = results.von_mises.max()
     factor, unit = stress_unit(largest, results.units)
     rounded = float(f"{largest / factor:.3g}")  # 1220, not 1.22e+03
@@ -151,6 +148,6 @@ def _paint_damage(axes, mesh, results, limits):
     """Draws ζ with a colour bar; returns the text for the title."""
     shown, label, colours, (low, high) = damage_scale(*limits.zeta)
     image = draw_values(axes, mesh, results.pieces.at_points(shown(results.zeta)), colours, low, high)
-    draw_colourbar(axes, image, label)
+    draw_colourbar(axes, image, label, flat=is_flat(results))
     least = results.zeta.min()
     return rf"damage, least $\zeta$ = {results.barred('zeta_min', least) or least_zeta(least)}"

@@ -8,11 +8,11 @@ import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
-from matplotlib.patheffects import withTickedStroke
+from matplotlib.patheffects import withStroke, withTickedStroke
 from matplotlib.tri import Triangulation
 
 from drawing import (
-    BLUE, FAINT, GREEN, INK, RED, draw_foundation, draw_outline, frame, headline, map_size,
+    BLUE, FAINT, GREEN, INK, RED, draw_foundation, draw_outline, frame, headline, map_size, wide,
 )
 from expressions import evaluate
 from results import paths
@@ -37,7 +37,7 @@ def draw_setting(results, _limits):
         return None
     curves = [(name, np.array(path)) for name, edges in boundaries.items()
               for path in paths([tuple(map(tuple, edge)) for edge in edges])]
-    width, height = map_size(np.ptp(results.nodes, axis=0), 6.4)
+    width, height = map_size(np.ptp(results.nodes, axis=0), wide(6.4))
     figure, axes = plt.subplots(figsize=(width, height + 0.7 + 0.2 * len(conditions)))
     # The body is on the left of its outlines, so the outlines of holes cut them out.
     outlines = Path.make_compound_path(*map(Path, results.outline(results.nodes)))
@@ -61,7 +61,8 @@ def draw_setting(results, _limits):
     body_force = _draw_body_force(axes, results, time)
     for probe in results.scene.get("probe", []):
         axes.plot(*probe["point"], marker="+", color=INK, zorder=4)
-        axes.annotate(probe["name"], probe["point"], xytext=(4, 4), textcoords="offset points", fontsize=8)
+        axes.annotate(probe["name"], probe["point"], xytext=(4, 4), textcoords="offset points", fontsize="small",
+                      path_effects=[withStroke(linewidth=2.5, foreground="white")], zorder=4.5)
     frame(axes, np.vstack(places), units)
     for name, condition in conditions.items():
         words = _words(name, condition, units)
@@ -69,7 +70,7 @@ def draw_setting(results, _limits):
     if body_force:
         axes.plot([], [], color=GREEN, linewidth=4, label=body_force)
     axes.legend(
-        loc="upper left", bbox_to_anchor=(0.0, -0.55 / height), fontsize=8.5, handlelength=1
+        loc="upper left", bbox_to_anchor=(0.0, -0.55 / height), fontsize="small", handlelength=1
     )
     loads = f"; loads at t = {time:g} {units['time']}" if largest or body_force else ""
     axes.set_title(headline(results, f"setting{loads}"))
@@ -228,7 +229,7 @@ def _words(name, condition, units):
     }
     parts = [say(condition[key]) for key, say in words.items()
              if condition.get(key, False) is not False]
-    return textwrap.fill(f"{name}: {', '.join(parts)}".replace("$", r"\$"), 90)
+    return textwrap.fill(f"{name}: {', '.join(parts)}".replace("$", r"\$"), int(14 * wide(6.4)))
 
 
 def _pair(components):

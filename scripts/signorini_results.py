@@ -115,9 +115,10 @@ class Frame:
         meshio.write(path, meshio.Mesh(self.mesh.points, self.mesh.cells, data), file_format="gmsh")
 
     def at(self, points, name):
-        """A field at points (k, 2); NaN outside the body. Sides count as straight."""
-        points, nodal = np.asarray(points, float), self.field(name)
-        found = np.full(len(points), np.nan)
+        """A field at a point or at points (k, 2); NaN outside the body. Sides count as straight."""
+        places, nodal = np.asarray(points, float), self.field(name)
+        points, columns = places.reshape(-1, 2), nodal.reshape(len(nodal), -1)
+        found = np.full((len(points), columns.shape[1]), np.nan)
         step = max(1, AT_ONCE // len(self.elements))
         for first in range(0, len(points), step):
             some = slice(first, first + step)
@@ -126,17 +127,17 @@ class Frame:
             best = least.argmax(axis=1)
             rows = np.arange(len(best))
             l = barycentric[rows, best]
-            values = nodal[self.elements[best]]
+            values = columns[self.elements[best]]
             if self.elements.shape[1] == 6:
                 middles = 4 * l[:, [0, 1, 2]] * l[:, [1, 2, 0]]
                 weights = np.hstack((l * (2 * l - 1), middles))
             else:
                 weights = l
             # The gap is NaN at nodes off Γ_C, which do not count on a side along it.
-            values = np.where(np.abs(weights) <= -OUTSIDE, 0.0, values)
+            values = np.where(np.abs(weights)[..., None] <= -OUTSIDE, 0.0, values)
             inside = least[rows, best] >= OUTSIDE
-            found[some] = np.where(inside, (weights * values).sum(axis=1), np.nan)
-        return found
+            found[some] = np.where(inside[:, None], (weights[..., None] * values).sum(axis=1), np.nan)
+        return found.reshape(places.shape[:-1] + nodal.shape[1:])
 
     def _barycentric(self, points):
         """(points, triangles, 3)."""

@@ -88,7 +88,8 @@ def main(prog=None):
     parser.add_argument("--csv", action="store_true", help="as CSV with all digits")
     arguments = parser.parse_args()
     folders, problems = [], []
-    for folder in arguments.folders:
+    # The table of a study stands beside its folders.
+    for folder in [folder for folder in arguments.folders if not Path(folder).is_file()]:
         try:
             summary_of(folder)
             folders.append(folder)
