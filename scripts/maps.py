@@ -110,7 +110,7 @@ def draw_state(results, limits, figure=None):
     )
     draw_foundation(axes, results, limits.factor)
     frame(axes, limits.box, results.units)
-    text = f"{results.moment}: {shown}; {_amplified(results, limits)}"
+    text = f"{results.moment}: {shown}\n{_amplified(results, limits)}"
     axes.set_title(headline(results, text))
     return figure
 

@@ -85,6 +85,17 @@ fn curves_and_the_python_module_give_the_exact_fields() {
     directory
         .say(&["figures", "out/scene", "--along", "none"])
         .fails(2, &["there is no boundary none"]);
+    let alone = ["figures", "out/scene", "--times", "1"];
+    assert_eq!(directory.say(&alone).code, Some(2));
+    // A column of a journal, without the margins that are cut off.
+    let column = ["figures", "out/scene", "study.csv", "--width", "3.5"];
+    directory.write("study.csv", "");
+    assert_eq!(directory.say(&column).code, Some(0));
+    for picture in ["setting", "stress-damage", "principal-stresses", "pressure"] {
+        let file = std::fs::read(directory.path(&format!("out/scene/{picture}.png"))).expect("PNG");
+        let width = u32::from_be_bytes(file[16..20].try_into().unwrap());
+        assert!((400..=600).contains(&width), "{picture}: {width} pixels of 1/160 inch");
+    }
 
     let scripts = concat!(env!("CARGO_MANIFEST_DIR"), "/scripts");
     let program = format!(
@@ -96,13 +107,14 @@ fn curves_and_the_python_module_give_the_exact_fields() {
          print(along.max(), abs(gap).max() < 1e-9, run.times[-1])\n\
          s, u = frame.line((0.3, 0), (0.3, 1), 'u_y', 3)\n\
          print(abs(u[2] - 2*u[1]) < 1e-6*abs(u[2]), u[2] < -3/80, len(run.history['work']))\n\
+         print(frame.at((0.3, 1), 'u_y') == u[2], frame.at((0.3, 1), 'displacement').shape)\n\
          frame.to_gmsh('frame.msh')"
     );
     let python = std::env::var("PYTHON").unwrap_or("/usr/bin/python3".to_owned());
     let ran = Command::new(python).args(["-c", &program]).current_dir(directory.path(".")).output();
     let ran = ran.expect("Python");
     assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
-    assert_eq!(String::from_utf8_lossy(&ran.stdout), "1.0 True 1.0\nTrue True 11\n");
+    assert_eq!(String::from_utf8_lossy(&ran.stdout), "1.0 True 1.0\nTrue True 11\nTrue (3,)\n");
     let frame = directory.path("frame.msh");
     let read = Command::new("gmsh").arg("-check").arg(frame).output().expect("gmsh").stdout;
     let read = String::from_utf8_lossy(&read).into_owned();
