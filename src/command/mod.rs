@@ -212,7 +212,7 @@ fn read_mesh(scene: &Scene, adapts: bool) -> Result<Mesh, Failure> {
 fn first_mesh(source: &MeshSource, accuracy: f64) -> Result<Mesh, Failure> {
     /// Triangles along the body.
     const CELLS: f64 = 4.0;
-    /// Curves with kinks that stay are given up after so many halvings of the size.
+    /// The size is halved at most this many times, as some curves keep their kinks.
     const HALVINGS: usize = 4;
     let MeshSource { file, parameters } = source;
     let usual = mesh::load(file, parameters, Order::Linear).map_err(Failure::mesh)?;

@@ -162,8 +162,7 @@ fn with_passing_loads(
     accuracy: f64,
 ) -> Result<Scene, AdaptError> {
     let problem = DiscreteProblem::new(scene.clone(), mesh.clone())?.restrict(session)?;
-    let overturns = problem.collapse.filter(|collapse| collapse.motion.is_rotation());
-    if let Some(Collapse { time, .. }) = overturns {
+    if let Some(Collapse { time, .. }) = problem.collapse_on_a_point() {
         return Err(AdaptError::Overturns { time });
     }
     if LoadCurve::pass_within_steps(&problem) {
@@ -279,8 +278,8 @@ fn stays(excesses: &[(usize, f64)]) -> bool {
     largest.is_some_and(|largest| last > 0.5 * largest)
 }
 
-/// Checks that a run on so many triangles fits into the memory, by the peak of the runs up to `solved` triangles.
-/// Collective.
+/// Checks that a run on `triangles` fits into the memory. Runs on up to `solved` triangles have needed the peak memory
+/// of this process so far, and the need grows in proportion. Collective.
 fn check_memory(session: &Session, solved: usize, triangles: usize) -> Result<(), AdaptError> {
     /// Below this number most memory is that of the libraries.
     const MANY: usize = 20_000;

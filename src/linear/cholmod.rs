@@ -127,7 +127,7 @@ impl Cholmod {
     /// Frees the values of L except about the first `length` (cholmod_l_realloc).
     pub(super) fn truncate_values(&mut self, length: usize) {
         if self.allocated >= length + FREED {
-            // SAFETY: a live factor with so many values in its block of memory.
+            // SAFETY: the factor is live, and its block of memory holds `allocated` values, more than `length`.
             unsafe {
                 let (l, size) = (&mut *self.factor, size_of::<f64>());
                 l.x = raw::cholmod_l_realloc(

@@ -59,7 +59,7 @@ impl DiscreteProblem {
             (linear && is_curved).then(|| {
                 "curved sides count as straight; discretisation.displacement = 2 follows them".to_owned()
             }),
-            self.collapse.filter(|collapse| collapse.motion.is_rotation()).map(|_| {
+            self.collapse_on_a_point().map(|_| {
                 "just before the body turns over, the contact shrinks to a point: displacements and stresses at \
                  the end grow as the mesh is refined"
                     .to_owned()

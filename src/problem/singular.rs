@@ -67,29 +67,7 @@ impl DiscreteProblem {
     pub fn singular_points(&self) -> Vec<Singular> {
         let mesh = self.mesh();
         let boundary = mesh.boundary_edges();
-        // The interior angle at each node of the boundary; NaN elsewhere.
-        let mut angles = vec![f64::NAN; mesh.nodes.len()];
-        // At each node of the boundary: the elastic constants of the first triangle, and the angle in which they hold.
-        let materials: Vec<Material> = self.scene().materials().collect();
-        let numbers = self.scene().materials_of(mesh);
-        let mut found = BTreeMap::<usize, (Material, f64)>::new();
-        boundary.iter().flatten().for_each(|&node| angles[node] = 0.0);
-        for (t, triangle) in mesh.triangles.iter().enumerate() {
-            for i in 0..3 {
-                if angles[triangle[i]].is_nan() {
-                    continue;
-                }
-                let [a, b, c] = [0, 1, 2].map(|k| triangle[(i + k) % 3]);
-                let [p, q] = [b, c].map(|end| mesh.direction(a, end));
-                let turn = (p[0] * q[1] - p[1] * q[0]).atan2(p[0] * q[0] + p[1] * q[1]);
-                angles[triangle[i]] += turn;
-                let own = materials[numbers.get(t).map_or(0, |&number| number as usize)];
-                let (first, of_first) = found.entry(triangle[i]).or_insert((own, 0.0));
-                if own.stiffness() == first.stiffness() {
-                    *of_first += turn;
-                }
-            }
-        }
+        let (angles, found) = self.corner_angles(&boundary);
         let supports = self.supports_of_edges();
         let mut sides = BTreeMap::<usize, Vec<Side>>::new();
         for &edge in &boundary {
@@ -131,6 +109,37 @@ impl DiscreteProblem {
             })
         };
         sides.into_iter().filter_map(singular).collect()
+    }
+
+    /// The interior angle at each node of the `boundary`, rad, NaN elsewhere; and at these nodes the elastic constants of
+    /// the first triangle with the angle in which they hold.
+    fn corner_angles(
+        &self,
+        boundary: &[[usize; 2]],
+    ) -> (Vec<f64>, BTreeMap<usize, (Material, f64)>) {
+        let mesh = self.mesh();
+        let mut angles = vec![f64::NAN; mesh.nodes.len()];
+        let materials: Vec<Material> = self.scene().materials().collect();
+        let numbers = self.scene().materials_of(mesh);
+        let mut found = BTreeMap::<usize, (Material, f64)>::new();
+        boundary.iter().flatten().for_each(|&node| angles[node] = 0.0);
+        for (t, triangle) in mesh.triangles.iter().enumerate() {
+            for i in 0..3 {
+                if angles[triangle[i]].is_nan() {
+                    continue;
+                }
+                let [a, b, c] = [0, 1, 2].map(|k| triangle[(i + k) % 3]);
+                let [p, q] = [b, c].map(|end| mesh.direction(a, end));
+                let turn = (p[0] * q[1] - p[1] * q[0]).atan2(p[0] * q[0] + p[1] * q[1]);
+                angles[triangle[i]] += turn;
+                let own = materials[numbers.get(t).map_or(0, |&number| number as usize)];
+                let (first, of_first) = found.entry(triangle[i]).or_insert((own, 0.0));
+                if own.stiffness() == first.stiffness() {
+                    *of_first += turn;
+                }
+            }
+        }
+        (angles, found)
     }
 
     /// The supported edges of the boundary, with the names of their curves.

@@ -204,4 +204,24 @@ fn no_accuracy_is_promised_where_the_body_turns_over() {
     assert!(said.out.contains("just before the body turns over, the contact shrinks to a point"));
     let said = directory.run(&["--accuracy", "0.1", "--set", "time.end=0.4"]);
     assert!(said.out.contains("accuracy 0.1 reached"), "{}", said.out);
+    // A disc that begins to turn in its bearing keeps its contact.
+    let disc = "DefineConstant[ size = 0.1 ];
+        Point(1) = {0, 0, 0}; Point(2) = {1, 0, 0, size}; Point(3) = {0, 1, 0, size};
+        Point(4) = {-1, 0, 0, size}; Point(5) = {0, -1, 0, size};
+        Circle(1) = {2, 1, 3}; Circle(2) = {3, 1, 4}; Circle(3) = {4, 1, 5}; Circle(4) = {5, 1, 2};
+        Curve Loop(1) = {1:4}; Plane Surface(1) = {1}; Physical Surface(\"disc\") = {1};
+        Physical Curve(\"bearing\") = {3, 4}; Physical Curve(\"rim\") = {1, 2};\n";
+    directory.write("disc.geo", disc);
+    directory.write(
+        "scene.toml",
+        "mesh.file = 'disc.geo'
+         material = { young = 1000, poisson = 0.3, plane = 'stress' }
+         body.force = [0, -1]
+         time = { end = 1, step = 0.1 }
+         boundary = [{ name = 'bearing', gap = 0 },
+                     { name = 'rim', traction = ['-0.1*max(0, t-0.5)*y', '0.1*max(0, t-0.5)*x'] }]",
+    );
+    let said = directory.run(&["--accuracy", "0.05"]);
+    assert!(said.out.contains("against the rotation about"), "{}", said.out);
+    assert!(said.out.contains("accuracy 0.05 reached"), "{}", said.out);
 }

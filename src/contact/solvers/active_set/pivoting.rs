@@ -17,7 +17,7 @@ pub(super) struct AtBounds {
 }
 
 impl AtBounds {
-    /// Of the displacements `c` with the contact forces `p`. Collective.
+    /// Takes the unknowns at the bounds from the displacements `c`, and keeps the contact forces `p`. Collective.
     pub(super) fn new(
         problem: &ContactProblem,
         c: &Vector,
