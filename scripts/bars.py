@@ -14,12 +14,20 @@ def bars(summary):
     return {name: bar for name, bar in figures.items() if bar is not None}
 
 
+def short(number):
+    """Two digits, as `1.6e-2`."""
+    mantissa, exponent = f"{number:.1e}".split("e")
+    return f"{mantissa}e{int(exponent)}"
+
+
 def barred(value, bar):
     """`5.3570 ± 0.0005`: the bar rounded up to its first digit, or to its second where the first is 1
     or 2, and the value to the same; `(1.4016 ± 0.0003)e-7` where decimals would be many. None
     without a bar."""
     if bar is None or bar <= ROUNDING * abs(value):
         return None
+    if bar > abs(value) > 0:
+        return f"{short(value)} ± {short(bar)}"
     bar = max(bar, LEAST_BAR * abs(value))
     value, bar = Decimal(repr(float(value))), Decimal(repr(float(bar)))
     first = bar.adjusted()

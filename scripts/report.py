@@ -160,7 +160,7 @@ def governing(everything, units):
         if value == (1.0 if name == "least ζ" else 0.0):
             continue
         x, y = state.nodes[node]
-        largest = state.summary.get("largest_stress") or {}
+        largest = (state.summary.get("extremes") or {}).get("von_mises_max") or {}
         is_there = kind == "stress" and state.singular and np.allclose(largest["at"], (x, y), atol=1e-9 * state.size)
         singular = f"singular: {html.escape(state.singular)}" if is_there else ""
         rows.append((name, f"{value:.4g}", html.escape(units.get(kind, "")), f"({x:.4g}, {y:.4g})",

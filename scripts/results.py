@@ -173,7 +173,8 @@ class Results:
     @property
     def singular(self):
         """What makes the largest stress of the last state singular; None if nothing does, and at other times."""
-        return (self.summary.get("largest_stress") or {}).get("singular") if self.is_last else None
+        largest = (self.summary.get("extremes") or {}).get("von_mises_max") or {}
+        return largest.get("singular") if self.is_last else None
 
     @property
     def active(self):

@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 COLUMNS = ("end_time", "stopped_by", "stopped_at", "zeta_min", "displacement_max", "work",
-           "contact_force", "largest_stress.von_mises", "wall_seconds")
+           "contact_force", "von_mises_max", "wall_seconds")
 
 
 def summary_of(folder):

@@ -2,13 +2,11 @@
 
 use super::{Failure, screen, task::Task};
 use signorini::{
-    estimate::{self, AdaptError, Adapted},
+    estimate::{self, AdaptError, Adapted, Measured},
     evolution::{Outcome, percent},
     interrupt::{Interrupts, Signal},
     mesh::{Mesh, Order},
-    output::terminal::with_bar,
     petsc::Session,
-    problem::Bar,
     scene::{Scene, Stepping},
 };
 
@@ -41,23 +39,23 @@ pub(super) fn adapt(
     Ok(Some(adapted))
 }
 
-/// Measures the error bars from the mesh. If a run for them fails, one of the `notes` reports it. Collective.
-pub(super) fn measure_bars(
+/// Measures the errors from the mesh. If a run for them fails, one of the `notes` reports it. Collective.
+pub(super) fn measure_errors(
     session: &Session,
     scene: &Scene,
     mesh: &Mesh,
     solver: &str,
     notes: &mut Vec<String>,
-) -> Result<Vec<Bar>, Failure> {
+) -> Result<Measured, Failure> {
     let _interrupts = Interrupts::defer();
-    match estimate::measured_bars(session, scene, mesh, solver) {
-        Ok(bars) => Ok(bars),
+    match estimate::measured_errors(session, scene, mesh, solver) {
+        Ok(measured) => Ok(measured),
         Err(AdaptError::Setup(error)) => Err(Failure::input(error)),
         Err(error) => match error.signal() {
             Some(signal) => Err(interrupted(signal)),
             None => {
                 notes.push(format!("the error bars could not be measured: {error}"));
-                Ok(Vec::new())
+                Ok(Measured::default())
             }
         },
     }
@@ -71,22 +69,25 @@ fn interrupted(signal: Signal) -> Failure {
     Failure { code: signal.exit_code(), message: Some(message) }
 }
 
-/// The tolerance of the time steps with which all figures would be exact enough, if these steps miss the required
-/// accuracy and the mesh leaves them a part of it.
+/// The ratio by which to reduce the tolerance of the time steps, so that all figures become exact enough, if these steps
+/// miss the required accuracy and the mesh leaves them a part of it. At most ½, as both runs are compared.
 pub(super) fn shorter_steps(task: &Task, outcome: &Outcome) -> Option<f64> {
     /// The errors of a run with the new tolerance are to be this fraction of the accuracy. They are not quite
     /// proportional to the tolerance.
     const AIM: f64 = 0.8;
-    let (adapted, accuracy) = (task.adapted.as_ref()?, task.problem.scene().accuracy?);
-    let bars = task.bars.iter().zip(&outcome.bars).filter(|(bar, _)| is_asked(task, &bar.name));
-    let factor = bars.map(|(of_mesh, of_both)| match of_both.relative() {
-        error if error > accuracy => {
-            (AIM * accuracy - of_mesh.relative()) / (error - of_mesh.relative())
-        }
+    let accuracy = task.problem.scene().accuracy?;
+    let bars = task.measured.bars.iter().zip(&outcome.bars);
+    let bars = bars.filter(|(bar, _)| is_asked(task, &bar.name));
+    let bars = bars.map(|(of_mesh, of_both)| [of_mesh.relative(), of_both.relative()]);
+    let of_stop = outcome.stopped.map(|stop| {
+        [stop.from_mesh.unwrap_or(0.0), stop.bar()].map(|bar| bar / stop.time)
+    });
+    let factor = bars.chain(of_stop).map(|[of_mesh, of_both]| match of_both {
+        error if error > accuracy => (AIM * accuracy - of_mesh) / (error - of_mesh),
         _ => 1.0,
     });
     let factor = factor.fold(1.0, f64::min);
-    (0.0 < factor && factor < 1.0).then_some(factor * adapted.steps)
+    (0.0 < factor && factor < 1.0).then_some(factor.min(0.5))
 }
 
 /// Whether the accuracy is required for this figure.
@@ -110,23 +111,19 @@ pub(super) fn verdict(task: &Task, outcome: Option<&Outcome>) -> Option<String> 
         names => format!("accuracy {accuracy} of {}", names.join(", ")),
     };
     let Some(outcome) = outcome else { return Some(format!("{asked}: {mesh}")) };
-    if let Some(stop) = outcome.stopped {
-        return Some(format!(
-            "{asked}: the run stops at ζ_*, at {} s; figures at such a stop have no bars: {mesh}",
-            with_bar(stop.time, Some(stop.bar()))
-        ));
-    }
     let bars = outcome.bars.iter().filter(|bar| is_asked(task, &bar.name));
     let bars = bars.map(|bar| (bar.name.clone(), bar.relative()));
     let norms = scene.accuracy_of.is_empty().then_some(&adapted.worst).into_iter().flatten();
-    let worst = bars.chain(norms.cloned()).max_by(|a, b| a.1.total_cmp(&b.1));
+    let of_stop = outcome.stopped.map(|stop| ("stopped_at".to_owned(), stop.bar() / stop.time));
+    let worst = bars.chain(norms.cloned()).chain(of_stop).max_by(|a, b| a.1.total_cmp(&b.1));
     let missed = worst.filter(|(_, error)| *error > accuracy).map(|(name, error)| {
         let unit = if error.is_finite() { percent(error) } else { "?".to_owned() };
         format!("{name} is exact to {unit} only")
     });
     let reasons: Vec<String> = missed.into_iter().chain(adapted.short.clone()).collect();
+    let of_time = if outcome.stopped.is_some() { " in the time of ζ_*" } else { "" };
     Some(match reasons.is_empty() {
-        true => format!("{asked} reached: {mesh}"),
+        true => format!("{asked} reached{of_time}: {mesh}"),
         false => format!("{asked} NOT reached ({}): {mesh}", reasons.join("; ")),
     })
 }

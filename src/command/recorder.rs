@@ -10,6 +10,7 @@ use super::{
 };
 use serde_json::{Value, json};
 use signorini::{
+    estimate::Extremes,
     evolution::{Next, Observed, Observer, Outcome, RunError, RunState, Step, StepRecord},
     interrupt::Interrupts,
     memory,
@@ -150,9 +151,10 @@ impl<'a> Recorder<'a> {
             _ => Ok(()),
         };
         let written = written.and(task.phases.time("output", || self.fields.complete()));
-        let peak = last.as_ref().map(|step| self.fields.peak(&task.problem, &step.state));
-        let (written, peak) = match peak.transpose() {
-            Ok(peak) => (written, peak),
+        let extremes =
+            last.as_ref().map(|step| self.fields.extremes(&task.problem, &step.state, &task.measured));
+        let (written, extremes) = match extremes.transpose() {
+            Ok(extremes) => (written, extremes),
             Err(error) => (written.and(Err(error)), None),
         };
         let outcome = result.as_ref().ok();
@@ -176,7 +178,7 @@ impl<'a> Recorder<'a> {
         let record = last.map(|step| step.record);
         let wall = task.started.elapsed().as_secs_f64();
         let mut summary = summary(task, record, &quantities, result, &notes, wall);
-        summary["largest_stress"] = json!(peak);
+        add_extremes(&mut summary, extremes.as_ref());
         summary["peak_megabytes"] = json!(memory);
         add_stop(&mut summary, &task.problem, outcome);
         if record.is_some() {
@@ -187,7 +189,7 @@ impl<'a> Recorder<'a> {
             shown.clone_from(&notes);
         }
         let mut lines =
-            screen::conclusion(task, record, peak, &quantities, result.as_ref(), &shown);
+            screen::conclusion(task, record, extremes.as_ref(), &quantities, result.as_ref(), &shown);
         if task.profile {
             let steps = record.map_or(0, |record| record.step);
             lines.push(String::new());
@@ -277,6 +279,18 @@ fn summary(
         summary["error"] = json!(error.to_string());
     }
     summary
+}
+
+/// Adds to the summary the largest stresses and pressure with their places, and the length of contact, m.
+fn add_extremes(summary: &mut Value, extremes: Option<&Extremes>) {
+    let Some(extremes) = extremes else { return };
+    for extreme in &extremes.of_points {
+        summary[extreme.name] = json!(extreme.value);
+        summary["extremes"][extreme.name] = json!(extreme);
+    }
+    if extremes.of_points.len() > 3 {
+        summary["contact_length"] = json!(extremes.contact_length);
+    }
 }
 
 /// Adds to the summary why the run stopped before its end, at which time, s, and the error of this time; null if it

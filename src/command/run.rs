@@ -2,7 +2,7 @@
 
 use super::{
     Failure, SOLVERS, SceneArguments,
-    accuracy::{adapt, measure_bars, shorter_steps},
+    accuracy::{adapt, measure_errors, shorter_steps},
     check::contact_nodes,
     check_petsc, check_solver,
     checkpoint::Checkpoint,
@@ -15,7 +15,7 @@ use super::{
 };
 use clap::Args;
 use signorini::{
-    estimate,
+    estimate::{self, Measured},
     evolution::{Outcome, Phases, RunError},
     linear::LinearSolver,
     mesh::Mesh,
@@ -164,11 +164,11 @@ fn read<'a>(
     let adapt = || adapt(session, &mut scene, &mesh, &solver, made);
     let adapted = agree(comm, phases.time("adaptation", adapt))?;
     let mesh = adapted.as_ref().map_or(mesh, |adapted| adapted.mesh.clone());
-    let measure = || measure_bars(session, &scene, &mesh, &solver, &mut notes);
-    let bars = match &adapted {
-        Some(adapted) => adapted.bars.clone(),
+    let measure = || measure_errors(session, &scene, &mesh, &solver, &mut notes);
+    let measured = match &adapted {
+        Some(adapted) => adapted.measured.clone(),
         None if arguments.bars => agree(comm, phases.time("error bars", measure))?,
-        None => Vec::new(),
+        None => Measured::default(),
     };
     let problem = phases.time("discrete problem", || DiscreteProblem::new(scene, mesh));
     let problem = agree(comm, problem.map_err(Failure::input))?;
@@ -188,7 +188,7 @@ fn read<'a>(
         folder,
         as_run,
         adapted,
-        bars,
+        measured,
         notes,
         _lock: lock,
         petsc: &arguments.petsc,
@@ -208,22 +208,26 @@ fn solve(
 ) -> Result<(), Failure> {
     let checked = restart.as_ref().map_or(Ok(()), |checkpoint| checkpoint.check(&task));
     agree(session.comm(), checked)?;
-    let mut shortened = false;
+    // The run with longer steps.
+    let mut longer: Option<Outcome> = None;
     loop {
-        let (recorder, result) = solve_once(&task, restart.take(), session)?;
-        let steps = result.as_ref().ok().and_then(|outcome| shorter_steps(&task, outcome));
-        let Some(steps) = steps.filter(|_| !shortened) else {
-            return finish(recorder, result, session.comm());
-        };
-        drop(recorder);
-        if session.comm().is_root() {
-            say(&screen::row(
-                "again",
-                "with shorter time steps, which the accuracy needs".to_owned(),
-            ));
+        let (recorder, mut result) = solve_once(&task, restart.take(), session)?;
+        if let (Ok(outcome), Some(longer)) = (&mut result, &longer) {
+            outcome.measure_steps(&task.problem, longer, &task.measured)?;
         }
-        task.shorten_steps(steps);
-        shortened = true;
+        let ratio = result.as_ref().ok().and_then(|outcome| shorter_steps(&task, outcome));
+        match (result, ratio) {
+            (Ok(outcome), Some(ratio)) if longer.is_none() => {
+                drop(recorder);
+                if session.comm().is_root() {
+                    let text = "with shorter time steps, which the accuracy needs";
+                    say(&screen::row("again", text.to_owned()));
+                }
+                task.shorten_steps(ratio);
+                longer = Some(outcome);
+            }
+            (result, _) => return finish(recorder, result, session.comm()),
+        }
     }
 }
 
@@ -242,11 +246,7 @@ fn solve_once<'a>(
     let mut result =
         estimate::run_from(session, problem, &task.solver, phases, &mut recorder, saved);
     if let Ok(outcome) = &mut result {
-        outcome.set_bars(problem, &task.bars);
-        if let Some(stop) = &mut outcome.stopped {
-            let measured = task.adapted.as_ref().and_then(|adapted| adapted.stop_error);
-            stop.from_mesh = [stop.from_mesh, measured].into_iter().flatten().reduce(f64::max);
-        }
+        outcome.set_bars(problem, &task.measured);
     }
     Ok((recorder, result))
 }

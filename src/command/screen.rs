@@ -2,13 +2,13 @@
 
 use super::task::Task;
 use signorini::{
-    estimate::{Adapted, Peak},
-    evolution::{Outcome, RunError, StepRecord, percent},
+    estimate::{Adapted, Extreme, Extremes},
+    evolution::{Outcome, RunError, StepRecord, Stop, percent},
     output::terminal::{Progress, say, with_bar},
     problem::Collapse,
     scene::{Scheme, Stepping, TimeGrid, Units, rounded},
 };
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, Write};
 
 /// The length of the progress bar: it counts thousandths of [0, T].
 const LENGTH: u64 = 1000;
@@ -36,11 +36,8 @@ pub fn open(task: &Task) -> Progress {
     progress
 }
 
-/// Shows a mesh of the adaptation with its errors, if there is a terminal.
+/// Shows a mesh of the adaptation with its errors.
 pub fn adapting(mesh: &Adapted, accuracy: f64) {
-    if !io::stderr().is_terminal() {
-        return;
-    }
     let (rounds, triangles, unknowns) = (mesh.rounds, mesh.mesh.triangles.len(), mesh.unknowns);
     let errors = [("error of u", Some(mesh.error)), ("damage", mesh.damage_error)]
         .into_iter()
@@ -68,7 +65,7 @@ pub fn progress(bar: &mut Progress, record: &StepRecord, end: f64) {
 pub fn conclusion(
     task: &Task,
     last: Option<StepRecord>,
-    peak: Option<Peak>,
+    extremes: Option<&Extremes>,
     quantities: &[(String, f64)],
     result: Result<&Outcome, &RunError>,
     notes: &[String],
@@ -98,19 +95,17 @@ pub fn conclusion(
         row("displacement", format!("largest {displacement} {length}")),
         row("work", format!("{} {}", figure(last.work, "work"), units.work())),
     ];
-    if let Some(Peak { von_mises, at: [x, y], singular }) = peak.filter(|peak| peak.von_mises > 0.0)
-    {
-        let singular = singular.map_or_else(String::new, |place| {
-            format!(": singular at {place}, grows as the mesh is refined")
-        });
-        let stress = format!("largest von Mises {von_mises:.4e} {} at", units.stress);
-        lines.push(row("stress", format!("{stress} ({x:.4}, {y:.4}){singular}")));
-    }
+    lines.extend(extremes.into_iter().flat_map(|of| stresses(of, &units.stress, &bar)));
     if task.contact_nodes > 0 {
         let (active, nodes) = (last.active_nodes, task.contact_nodes);
         let sum = figure(last.contact_force, "contact_force");
         let contact = format!("{active} of {nodes} nodes active, force {sum} {force}/{length}");
         lines.push(row("contact", contact));
+    }
+    if let Some((extremes, pressure)) = extremes.and_then(|of| Some((of, of.of_points.get(3)?))) {
+        let along = figure(extremes.contact_length, "contact_length");
+        let largest = extreme(pressure, &units.stress, &bar);
+        lines.push(row("", format!("length {along} {length}, largest pressure {largest}")));
     }
     lines.extend(supports(task, quantities, &bar));
     if let Some(outcome) = outcome {
@@ -122,6 +117,35 @@ pub fn conclusion(
     lines.extend(notes);
     lines.push(row("results", task.folder.display().to_string()));
     lines
+}
+
+/// The lines of the extreme stresses.
+fn stresses(
+    extremes: &Extremes,
+    unit: &str,
+    bar: &dyn Fn(&str) -> Option<f64>,
+) -> Vec<String> {
+    let [von_mises, most, least, ..] = &extremes.of_points[..] else { return Vec::new() };
+    if von_mises.value == 0.0 {
+        return Vec::new();
+    }
+    let lines = [("stress", "largest von Mises", von_mises), ("", "largest σ₁", most)];
+    let lines = lines.into_iter().chain([("", "smallest σ₂", least)]);
+    lines.map(|(name, what, of)| row(name, format!("{what} {}", extreme(of, unit, bar)))).collect()
+}
+
+/// An extreme with its place: with its bar, or with two digits if it is singular.
+fn extreme(
+    Extreme { name, value, at: [x, y], singular }: &Extreme,
+    unit: &str,
+    bar: &dyn Fn(&str) -> Option<f64>,
+) -> String {
+    let (value, singular) = match (singular, bar(name)) {
+        (Some(place), _) => (format!("{value:.1e}"), format!(": singular, {place}")),
+        (None, Some(bar)) => (with_bar(*value, Some(bar)), String::new()),
+        (None, None) => (format!("{value:.4e}"), String::new()),
+    };
+    format!("{value} {unit} at ({x:.4}, {y:.4}){singular}")
 }
 
 /// Per support: a line with its resultants and their error bars from `bar`.
@@ -165,6 +189,21 @@ fn steps(grid: TimeGrid, unit: &str, can_be_damaged: bool) -> String {
     }
 }
 
+/// The time of ζ_* with its error bar.
+fn stop_time(stop: &Stop) -> String {
+    let time = rounded(stop.time);
+    match (stop.from_mesh, stop.uncertainty) {
+        (_, steps) if !(steps < stop.time) => {
+            format!("{time} (its error is unknown: ζ hardly falls there, or the time steps are too long)")
+        }
+        (Some(mesh), _) if !(stop.bar() < stop.time) => {
+            format!("{time} (its error is unknown: with a finer mesh the time may differ by {mesh:.1e})")
+        }
+        (Some(_), _) => with_bar(stop.time, Some(stop.bar())),
+        (None, steps) => format!("{} (the time steps alone)", with_bar(stop.time, Some(steps))),
+    }
+}
+
 fn ending(
     collapse: Option<Collapse>,
     last: Option<StepRecord>,
@@ -180,9 +219,8 @@ fn ending(
         }
         Err(_) => format!("FAILED after t = {end}; the state there is saved"),
         Ok(Some(stop)) => format!(
-            "STOPPED at t = {}{}: min ζ reaches ζ_* there; saved is the state before, t = {end} (step {step})",
-            with_bar(stop.time, Some(stop.bar())),
-            if stop.from_mesh.is_some() { "" } else { " (the time steps alone)" },
+            "STOPPED at t = {}: min ζ reaches ζ_* there; saved is the state before, t = {end} (step {step})",
+            stop_time(&stop),
         ),
         Ok(None) if collapse.is_some() => {
             let motion = collapse.map(|collapse| collapse.motion.to_string()).unwrap_or_default();

@@ -1,9 +1,9 @@
 //! The task of a run.
 
 use signorini::{
-    estimate::Adapted,
+    estimate::{Adapted, Measured},
     evolution::Phases,
-    problem::{Bar, DiscreteProblem},
+    problem::DiscreteProblem,
     scene::AsRun,
 };
 use std::{fs::File, path::PathBuf, time::Instant};
@@ -23,8 +23,8 @@ pub struct Task<'a> {
     pub as_run: AsRun,
     /// The adapted mesh, if there is one.
     pub adapted: Option<Adapted>,
-    /// The measured error bars of the figures; empty if they were not measured.
-    pub bars: Vec<Bar>,
+    /// The measured errors of the mesh; empty if they were not measured.
+    pub measured: Measured,
     /// Notes on the arguments and on the error bars.
     pub notes: Vec<String>,
     /// The lock of the folder against other runs.
@@ -37,9 +37,11 @@ pub struct Task<'a> {
 }
 
 impl Task<'_> {
-    /// Sets the tolerance of the time steps for the required accuracy.
-    pub fn shorten_steps(&mut self, tolerance: f64) {
-        self.adapted.iter_mut().for_each(|adapted| adapted.steps = tolerance);
-        self.problem.set_step_tolerance(tolerance);
+    /// Multiplies the tolerance of the time steps by `ratio`.
+    pub fn shorten_steps(&mut self, ratio: f64) {
+        if let Some(adapted) = &mut self.adapted {
+            adapted.steps *= ratio;
+            self.problem.set_step_tolerance(adapted.steps);
+        }
     }
 }

@@ -7,6 +7,7 @@
 //! An estimate misses details finer than the mesh, so a [`Measurement`] ends the rounds: the same steps on the mesh
 //! bisected everywhere. If a figure then changes by more than its share of the accuracy, the rounds go on.
 
+mod finer;
 mod measurement;
 mod pilot;
 mod round;
@@ -25,7 +26,8 @@ use measurement::Measurement;
 use pilot::{INSTANTS, Pilot};
 use round::Round;
 use serde::{Deserialize, Serialize};
-use sizes::divided;
+use std::collections::{BTreeMap, BTreeSet};
+use sizes::{divided, sharpened};
 
 /// A mesh that was adapted to a scene.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -42,16 +44,25 @@ pub struct Adapted {
     pub damage_error: Option<f64>,
     /// The damage at the end of the run with few steps, max (ζ₀ − ζ) and its mean; 0 if the run stops at ζ_*.
     pub damage: [f64; 2],
-    /// The error of the time of ζ_* from the mesh, s, once it is measured.
-    pub stop_error: Option<f64>,
     /// The tolerance of the time steps that keeps the error of ζ within the accuracy.
     pub steps: f64,
-    /// The error bars of the figures from the mesh, once they are measured.
-    pub bars: Vec<Bar>,
+    /// The measured errors of the figures from the mesh.
+    pub measured: Measured,
     /// The maximum measured relative error and its name, once it is measured.
     pub worst: Option<(String, f64)>,
     /// The reason why the accuracy was not reached, if it was not.
     pub short: Option<String>,
+}
+
+/// The errors from the mesh, as measured on a finer one; empty if they are not measured.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct Measured {
+    /// The error bars of the figures; empty if the run ends at ζ_*.
+    pub bars: Vec<Bar>,
+    /// The names of the extremes that grow as the mesh is refined. They have no bars.
+    pub grows: Vec<String>,
+    /// The error bar of the time of ζ_*, s.
+    pub stop: Option<f64>,
 }
 
 /// Errors that prevent an adapted mesh.
@@ -171,17 +182,17 @@ fn with_passing_loads(
     Ok(scene)
 }
 
-/// The error bars of the figures of `scene` from `mesh`, measured by two runs with few steps: on the mesh and on
-/// the mesh bisected everywhere. Empty if the run ends at ζ_*. Collective.
+/// The errors of the figures of `scene` from `mesh`, measured by two runs with few steps: on the mesh and on
+/// the mesh bisected everywhere. Collective.
 ///
 /// # Errors
 /// See [`AdaptError`].
-pub fn measured_bars(
+pub fn measured_errors(
     session: &Session,
     scene: &Scene,
     mesh: &Mesh,
     solver: &str,
-) -> Result<Vec<Bar>, AdaptError> {
+) -> Result<Measured, AdaptError> {
     let mut few = scene.clone();
     let steps = scene.time.map_or(0, |grid| match grid.stepping {
         Stepping::Uniform { steps } => steps.min(INSTANTS),
@@ -194,7 +205,7 @@ pub fn measured_bars(
     let problem = DiscreteProblem::new(few.clone(), mesh.clone())?.restrict(session)?;
     let pilot = Pilot::run(session, &problem, solver, triangles, false)
         .map_err(|source| AdaptError::Run { rounds, triangles, source })?;
-    Ok(Measurement::new(session, &few, &mesh, &pilot, solver, rounds)?.bars)
+    Ok(Measurement::new(session, &few, &mesh, &pilot, solver, rounds)?.result())
 }
 
 /// Checks that the figures for which `scene` requires an accuracy exist.
@@ -219,8 +230,10 @@ fn refined(
     let mut rounds = 0;
     // The most triangles of a run so far.
     let mut most = 0;
-    // The triangles and the worst error of the rounds that were measured.
-    let mut excesses: Vec<(usize, f64)> = Vec::new();
+    // The triangles and the errors over the required ones of the rounds that were measured.
+    let mut excesses: Vec<(usize, BTreeMap<String, f64>)> = Vec::new();
+    // The extremes whose errors stay while the mesh becomes finer.
+    let mut grows = BTreeSet::new();
     loop {
         rounds += 1;
         let mesh = &refinement.mesh;
@@ -233,11 +246,18 @@ fn refined(
         }
         let round = Round::new(&scene, mesh, pilot, accuracy);
         most = most.max(triangles);
-        let measure = || {
+        let mut measure = || {
             check_memory(session, most, 4 * triangles)?;
-            Measurement::new(session, &scene, mesh, &round.pilot, solver, rounds)
+            let mut measured = Measurement::new(session, &scene, mesh, &round.pilot, solver, rounds)?;
+            let errors = measured.errors(&[]).into_iter();
+            let errors = errors.map(|error| (error.excess(accuracy), error.name));
+            excesses.push((triangles, errors.map(|(excess, name)| (name, excess)).collect()));
+            let stay = problem.extremes().into_iter().filter(|name| stays(&excesses, name));
+            grows.extend(stay.map(str::to_owned));
+            measured.leave_out(&grows);
+            Ok::<_, AdaptError>(measured)
         };
-        let (measured, failed) = match round.is_enough().then(measure) {
+        let (measured, failed) = match round.is_enough().then(&mut measure) {
             Some(Ok(measured)) => (Some(measured), None),
             Some(Err(error)) if error.signal().is_some() => return Err(error),
             Some(Err(error)) => (None, Some(error.to_string())),
@@ -249,10 +269,9 @@ fn refined(
         let errors = measured.as_ref().map(|measured| measured.errors(&scene.accuracy_of));
         let worst = errors.as_ref().and_then(|errors| errors.first());
         let excess = worst.map(|worst| worst.excess(accuracy));
-        excesses.extend(excess.map(|excess| (triangles, excess)));
         let stays = || {
             let name = &worst?.name;
-            stays(&excesses).then(|| format!("the error of {name} {STAYS}"))
+            stays(&excesses, name).then(|| format!("the error of {name} {STAYS}"))
         };
         let short = failed.or_else(stays).or(exhausted.then(limit));
         let reached = excess.is_some_and(|excess| excess <= 1.0);
@@ -262,20 +281,25 @@ fn refined(
         if ends {
             return Ok(adapted);
         }
-        let ratios = round.size_ratios(measured.as_ref());
+        let (ratios, levels) = (round.size_ratios(measured.as_ref()), round.levels());
         most = most.max(if measured.is_some() { 4 * triangles } else { 0 });
-        refinement = divided(refinement, &ratios)?;
+        refinement = sharpened(divided(refinement, &ratios)?, &levels)?;
         check_memory(session, most, refinement.mesh.triangles.len())?;
     }
 }
 
-/// Whether the worst error has not become half of what it was with an eighth of the triangles: of first order it would
-/// be about a third.
-fn stays(excesses: &[(usize, f64)]) -> bool {
-    let Some(&(triangles, last)) = excesses.last() else { return false };
-    let before = excesses.iter().filter(|(count, _)| 8 * count <= triangles);
-    let largest = before.map(|(_, excess)| *excess).reduce(f64::max);
-    largest.is_some_and(|largest| last > 0.5 * largest)
+/// Whether the error of `name` is too large and has not become half of what it was with an eighth of the triangles, or
+/// three measurements before, each of which reduced the triangles that cause it. Of first order it would be a third.
+fn stays(excesses: &[(usize, BTreeMap<String, f64>)], name: &str) -> bool {
+    /// Measurements between two errors that are compared.
+    const ROUNDS: usize = 3;
+    let [earlier @ .., (triangles, last)] = excesses else { return false };
+    let Some(last) = last.get(name).filter(|excess| **excess > 1.0) else { return false };
+    let before = earlier.iter().enumerate().filter(|(i, (count, _))| {
+        8 * count <= *triangles || i + ROUNDS < excesses.len()
+    });
+    let largest = before.filter_map(|(_, (_, excess))| excess.get(name).copied()).reduce(f64::max);
+    largest.is_some_and(|largest| *last > 0.5 * largest)
 }
 
 /// Checks that a run on `triangles` fits into the memory. Runs on up to `solved` triangles have needed the peak memory

@@ -1,27 +1,22 @@
 //! The error that the mesh makes in the damage.
 //!
-//! Let z be the damage on a much finer mesh, and ζ the damage of the run. Their difference e = z − ζ is sought as a
-//! quadratic function. Equation (25) for z, less its residual for ζ, reads
+//! Let z be the damage on a much finer mesh, ζ the damage of the run, and e = z − ζ. The mesh causes e in two ways. The
+//! run has the damage source of its own strains, not of the strains on a finer mesh; for these, recovered strains ε*
+//! stand ([`RecoveredStrains`]), enlarged by the energy that the run misses, ‖ε*‖² (1 + η²). At the vertices e follows
+//! from
 //!
-//! (e_n − e_{n−1}, w) + k (κ∇e_n, ∇w) = k (φ* − ζ′, w) − k (κ∇ζ_n, ∇w) for all quadratic w.
+//! (M + kκL) e_n = M e_{n−1} + k b, b_i = ∫ (φ(|ε*|² (1 + η²)(ζ/z)², z) − φ(|ε|², ζ)) λ_i,
 //!
-//! It is solved in five to ten long steps between states of the run, by conjugate gradients in the hierarchical
-//! basis. The source φ* of z comes from the strains of a much finer mesh ([`FineStrains`]) at the same ζ. Strains
-//! under the same stress are proportional to 1/ζ, so φ* = φ((ζ/z)² |ε*|², z).
+//! in five to ten long steps between states of the run. (Under the same stress strains are proportional to 1/ζ.) Between
+//! the vertices z is curved: there the error of interpolation follows from recovered gradients of ζ.
 
-use super::{
-    fine_strains::FineStrains,
-    hierarchical::{affine, coefficients, interpolation_error, laplace, mass, values},
-    order_pair::OrderPair,
-    quadratic_system::QuadraticSystem,
-};
+use super::{hierarchical::interpolation_error, recovery::RecoveredStrains, strains_at_nodes};
 use crate::{
-    evolution::{Compliance, DamageStep, Instants, Outcome, Phases, RunError, agreed},
+    evolution::{DamageStep, Instants, Outcome, RunError, agreed},
     model::DamageLaw,
-    petsc::PetscError,
     problem::{DiscreteProblem, State},
 };
-use nalgebra::{Matrix6, Vector3, Vector6};
+use nalgebra::Vector3;
 
 /// The estimated error that the mesh makes in the damage.
 pub(super) struct DamageError {
@@ -36,12 +31,10 @@ pub(super) struct DamageError {
     pub(super) delay: Option<f64>,
 }
 
-/// The error that the mesh makes in the last damage. `None` without damage, and if the active nodes of a state
-/// alone do not support the body. Collective.
+/// The error that the mesh makes in the last damage. `None` without damage. Collective.
 pub(super) fn damage_error(
     problem: &DiscreteProblem,
     damage_step: &mut DamageStep,
-    compliance: Compliance,
     mut instants: Instants,
     outcome: &Outcome,
 ) -> Option<DamageError> {
@@ -50,212 +43,97 @@ pub(super) fn damage_error(
     let undamaged = comm.all(last.zeta == problem.initial_damage());
     let laws = problem.damage().filter(|_| !undamaged)?;
     instants.end(last);
-    let stopped = outcome.stopped.is_some();
     instants.falling.extend(outcome.stopped.map(|stop| (stop.time, problem.threshold())));
-    let error = error_at_end(problem, damage_step, compliance, laws, &instants, stopped);
-    agreed(comm, error).ok().flatten()
+    let followed = follow(problem, damage_step, laws, &instants);
+    let (change, delay) = agreed(comm, followed).ok()?;
+    at_end(problem, last, change, delay)
 }
 
-/// Follows e from the first instant to the last. The run may have `stopped` at ζ_*.
-fn error_at_end(
+/// Follows e at the vertices from the first state to the last. Returns it with the delay.
+fn follow(
     problem: &DiscreteProblem,
     damage_step: &mut DamageStep,
-    compliance: Compliance,
     laws: &[DamageLaw],
     instants: &Instants,
-    stopped: bool,
-) -> Result<Option<DamageError>, RunError> {
-    let [first, .., last] = &instants.states[..] else { return Ok(None) };
-    let (session, phases) = (damage_step.session, Phases::default());
-    let comm = problem.body.nodes.partition.comm();
-    let other = agreed(comm, problem.of_other_order())?.restrict_as(session, problem)?;
-    let pair = OrderPair::new(session, problem, &other, compliance, last, &phases)?;
-    let fine = pair.problems()[1];
-    let Some(nodes) = fine.body.quadratic_nodes() else { return Ok(None) };
-    let mut strains = FineStrains::new(pair, stopped);
-    let mut error = ZetaError::new(problem, laws, fine, nodes, &first.zeta)?;
-    let (initial, mut delay) = (error.field.clone(), None);
-    let mut before: Option<Sources> = None;
+) -> Result<(Vec<f64>, Option<f64>), RunError> {
+    let vertices = &problem.body.vertices.partition;
+    let mut error = vec![0.0; problem.body.mesh.nodes.len()];
+    let (mut delay, mut before): (_, Option<(f64, Vec<f64>)>) = (None, None);
     for state in &instants.states {
-        let Some(strains) = strains.squared(state)? else { return Ok(None) };
-        let load = damage_step.source(state).load.as_slice().to_vec();
-        let mut now = Sources { state, load, fine: error.source(state, &strains) };
-        if let Some(before) = &before {
-            error.advance(damage_step, before, &now)?;
-            now.fine = error.source(state, &strains);
+        let mut load = source_error(problem, laws, state, &error)?;
+        if let Some((time, earlier)) = &before {
+            let mean: Vec<f64> = load.iter().zip(earlier).map(|(a, b)| 0.5 * (a + b)).collect();
+            damage_step.system(state.time - time)?.advance(&mean, &mut error)?;
+            vertices.update(&mut error, 1)?;
+            load = source_error(problem, laws, state, &error)?;
         }
-        before = Some(now);
-        let minimum = error.minimum(state);
+        before = Some((state.time, load));
+        let z: Vec<f64> = state.zeta.iter().zip(&error).map(|(zeta, e)| zeta + e).collect();
+        let minimum = vertices.min_max(&z).0;
         if minimum > problem.threshold() {
             delay = instants.delay(state.time, minimum).or(delay);
         }
     }
-    Ok(error.at_end(&initial, last, delay))
+    Ok((error, delay))
 }
 
-/// A state of the run with the load b of its own source, m²/s, and the source φ* of z.
-struct Sources<'s> {
-    state: &'s State,
-    load: Vec<f64>,
-    fine: Vec<Vector6<f64>>,
+/// b_i in `state` with e at the vertices, m²/s, by the midpoints of the sides, which integrate quadratic functions.
+fn source_error(
+    problem: &DiscreteProblem,
+    laws: &[DamageLaw],
+    state: &State,
+    error: &[f64],
+) -> Result<Vec<f64>, RunError> {
+    let body = &problem.body;
+    let recovered = RecoveredStrains::new(body, &state.u)?;
+    let zeta = problem.zeta_at_points(&state.zeta);
+    let missing = recovered.energy_error(&problem.elasticity, &zeta, &state.u).relative().powi(2);
+    // ε_ij ε_ij, from (ε_xx, ε_yy, 2ε_xy).
+    let square = |e: Vector3<f64>| e[0] * e[0] + e[1] * e[1] + 0.5 * e[2] * e[2];
+    let mut load = vec![0.0; error.len()];
+    for (t, strains) in strains_at_nodes(body, &state.u).enumerate() {
+        let (nodes, law) = (body.mesh.triangles[t], &laws[body.material(t)]);
+        let difference = recovered.difference(t);
+        for side in 0..3 {
+            let ends = [nodes[side], nodes[(side + 1) % 3]];
+            let [zeta, e] = [&state.zeta[..], error].map(|of| 0.5 * (of[ends[0]] + of[ends[1]]));
+            let z = law.truncate(zeta + e);
+            let finer = square(strains[3 + side] + difference[3 + side]) * (1.0 + missing);
+            let change = law.source(finer * (law.truncate(zeta) / z).powi(2), z)
+                - law.source(square(strains[3 + side]), zeta);
+            ends.iter().for_each(|&end| load[end] += body.triangles[t].area() / 6.0 * change);
+        }
+    }
+    Ok(load)
 }
 
-/// Steps whose lengths differ by less than this factor share a preconditioner.
-const ALIKE: f64 = 1.7;
-
-/// e = z − ζ at an instant.
-struct ZetaError<'a> {
-    problem: &'a DiscreteProblem,
-    /// The damage laws of the materials by their numbers.
-    laws: &'a [DamageLaw],
-    /// κL of each triangle, m²/s.
-    diffusions: Vec<Matrix6<f64>>,
-    /// The problem in P2, the six nodes of each of its triangles, and its node at each vertex.
-    fine: &'a DiscreteProblem,
-    nodes: &'a [[usize; 6]],
-    node_of_vertex: Vec<usize>,
-    /// The coefficients of e in the hierarchical basis, by the nodes of P2.
-    field: Vec<f64>,
-    /// The length of the step for which the preconditioner was made, s.
-    preconditioned: f64,
-}
-
-impl<'a> ZetaError<'a> {
-    /// At the start, where ζ interpolates ζ₀.
-    fn new(
-        problem: &'a DiscreteProblem,
-        laws: &'a [DamageLaw],
-        fine: &'a DiscreteProblem,
-        nodes: &'a [[usize; 6]],
-        initial: &[f64],
-    ) -> Result<Self, PetscError> {
-        let mut field = vec![0.0; fine.body.nodes.points.len()];
-        for (nodes, heights) in nodes.iter().zip(interpolation_error(&problem.body, initial)?) {
-            nodes[3..].iter().zip(heights).for_each(|(&node, height)| field[node] = height);
-        }
-        let node_of_vertex = fine.body.node_of_vertex();
-        let (body, kappa) = (&problem.body, problem.diffusions());
-        let diffusion = |(t, triangle)| kappa[body.material(t)] * laplace(triangle);
-        let diffusions = body.triangles.iter().enumerate().map(diffusion).collect();
-        Ok(Self {
-            problem,
-            laws,
-            diffusions,
-            fine,
-            nodes,
-            node_of_vertex,
-            field,
-            preconditioned: 0.0,
-        })
+/// The estimate from e at the vertices and the error of interpolation of the last damage. With the heights h of the
+/// bubbles on the sides, a triangle has the squared error of interpolation 4/45 |T| (Σh² + (Σh)²). Collective.
+fn at_end(
+    problem: &DiscreteProblem,
+    last: &State,
+    change: Vec<f64>,
+    delay: Option<f64>,
+) -> Option<DamageError> {
+    let body = &problem.body;
+    let comm = body.vertices.partition.comm();
+    let start = problem.initial_damage();
+    let heights = interpolation_error(body, &last.zeta).ok();
+    let heights = if comm.all(heights.is_some()) { heights? } else { return None };
+    let (mut sums, mut indicators) = ([0.0; 2], Vec::with_capacity(body.own_triangles));
+    for (t, nodes) in body.mesh.triangles.iter().enumerate().take(body.own_triangles) {
+        let mass = body.triangles[t].mass();
+        let square = |v: Vector3<f64>| v.dot(&(mass * v));
+        let error = Vector3::from(nodes.map(|node| change[node]));
+        let damage = Vector3::from(nodes.map(|node| start[node] - last.zeta[node])) - error;
+        let (squares, sum) = heights[t].iter().fold((0.0, 0.0), |(q, s), h| (q + h * h, s + h));
+        let bubbles = 4.0 / 45.0 * body.triangles[t].area() * (squares + sum * sum);
+        sums[0] += square(error) + bubbles;
+        sums[1] += square(damage);
+        indicators.push(bubbles);
     }
-
-    /// From one state to the next, with the mean of their sources φ*.
-    fn advance(
-        &mut self,
-        damage_step: &mut DamageStep,
-        before: &Sources,
-        now: &Sources,
-    ) -> Result<(), RunError> {
-        let (body, k) = (&self.problem.body, now.state.time - before.state.time);
-        let skipped = self.skipped_rates(before, now)?;
-        let mut load = vec![0.0; self.field.len()];
-        let mut matrices = Vec::with_capacity(body.triangles.len());
-        for (t, triangle) in body.triangles.iter().enumerate() {
-            let vertices = body.mesh.triangles[t];
-            let (mass, diffusion) = (mass(triangle), self.diffusions[t]);
-            let source = coefficients(0.5 * (before.fine[t] + now.fine[t]));
-            let [zeta, zeta_before, skipped] = [&now.state.zeta, &before.state.zeta, &skipped]
-                .map(|field| affine(vertices.map(|i| field[i])));
-            let rate = (zeta - zeta_before) / k - skipped;
-            let mut of_triangle = mass * (source - rate) - diffusion * (zeta + self.on(t));
-            // At the vertices the skipped rates balance the residual of ζ exactly.
-            let excess = triangle.area() / 3.0 * skipped - mass * skipped;
-            (0..3).for_each(|i| of_triangle[i] += excess[i]);
-            let nodes = self.nodes[t].iter().zip(&of_triangle);
-            nodes.for_each(|(&node, of_node)| load[node] += k * of_node);
-            matrices.push(mass + k * diffusion);
-        }
-        if !(self.preconditioned / ALIKE..=self.preconditioned * ALIKE).contains(&k) {
-            self.preconditioned = k;
-        }
-        let session = damage_step.session;
-        let linear = (damage_step.system(self.preconditioned)?, self.preconditioned);
-        let owned = &self.node_of_vertex[..body.vertices.partition.owned()];
-        let mut system = QuadraticSystem::new(&self.fine.body, self.nodes, matrices, owned, linear);
-        let change = system.solve(session, &load)?;
-        self.field.iter_mut().zip(change).for_each(|(e, change)| *e += change);
-        Ok(())
-    }
-
-    /// The rates that a long step misses. The run makes many steps between two states, whose sources differ from
-    /// the mean b of both states. At vertex i the rate is (M ζ′ + κL ζ_n − b)_i over the weight of i. Collective.
-    fn skipped_rates(&self, before: &Sources, now: &Sources) -> Result<Vec<f64>, PetscError> {
-        let (body, k) = (&self.problem.body, now.state.time - before.state.time);
-        let loads = now.load.iter().zip(&before.load);
-        let mut rates: Vec<f64> = loads.map(|(b, before)| -0.5 * (b + before)).collect();
-        for (t, (nodes, triangle)) in body.mesh.triangles.iter().zip(&body.triangles).enumerate() {
-            let [now, before] =
-                [now, before].map(|sources| Vector3::from(nodes.map(|i| sources.state.zeta[i])));
-            let diffusion = self.diffusions[t].fixed_view::<3, 3>(0, 0);
-            let residual = self.problem.mass().of(triangle) * (now - before) / k + diffusion * now;
-            nodes.iter().zip(&residual).for_each(|(&node, of_node)| rates[node] += of_node);
-        }
-        rates.iter_mut().zip(&body.vertices.weights).for_each(|(rate, weight)| *rate /= weight);
-        body.vertices.partition.update(&mut rates, 1)?;
-        Ok(rates)
-    }
-
-    /// The coefficients of e on triangle `t`.
-    fn on(&self, t: usize) -> Vector6<f64> {
-        self.nodes[t].map(|node| self.field[node]).into()
-    }
-
-    /// e at the vertices.
-    fn at_vertices(&self) -> Vec<f64> {
-        self.node_of_vertex.iter().map(|&node| self.field[node]).collect()
-    }
-
-    /// min z at the vertices. Collective.
-    fn minimum(&self, state: &State) -> f64 {
-        let z = state.zeta.iter().zip(self.at_vertices()).map(|(zeta, e)| zeta + e);
-        self.problem.body.vertices.partition.min_max(&z.collect::<Vec<_>>()).0
-    }
-
-    /// φ* of `state` at the vertices and midpoints of each triangle, 1/s, with |ε*|² = `strain_squared`.
-    fn source(&self, state: &State, strain_squared: &[Vector6<f64>]) -> Vec<Vector6<f64>> {
-        let body = &self.problem.body;
-        let of_triangle = |(t, nodes): (usize, &[usize; 3])| {
-            let law = &self.laws[body.material(t)];
-            let zeta = affine(nodes.map(|node| state.zeta[node]));
-            let (zeta, z) = (values(zeta), values(zeta + self.on(t)));
-            Vector6::from_fn(|i, _| {
-                let (zeta, z) = (law.truncate(zeta[i]), law.truncate(z[i]));
-                law.source((zeta / z).powi(2) * strain_squared[t][i], z)
-            })
-        };
-        body.mesh.triangles.iter().enumerate().map(of_triangle).collect()
-    }
-
-    /// The error in the `last` state, from the `initial` e. Collective.
-    fn at_end(self, initial: &[f64], last: &State, delay: Option<f64>) -> Option<DamageError> {
-        let body = &self.problem.body;
-        let start = self.problem.initial_damage();
-        let (mut sums, mut indicators) = ([0.0; 2], Vec::with_capacity(body.own_triangles));
-        for (t, nodes) in body.mesh.triangles.iter().enumerate().take(body.own_triangles) {
-            let mass = mass(&body.triangles[t]);
-            let square = |v: Vector6<f64>| v.dot(&(mass * v));
-            let error = self.on(t);
-            // ζ₀ − z.
-            let mut damage = affine(nodes.map(|node| start[node] - last.zeta[node])) - error;
-            (3..6).for_each(|i| damage[i] += initial[self.nodes[t][i]]);
-            let bubbles = error - affine([error[0], error[1], error[2]]);
-            sums[0] += square(error);
-            sums[1] += square(damage);
-            indicators.push(square(bubbles));
-        }
-        body.vertices.partition.comm().sum(&mut sums);
-        indicators.iter_mut().for_each(|square| *square /= sums[1]);
-        let (relative, change) = ((sums[0] / sums[1]).sqrt(), self.at_vertices());
-        relative.is_finite().then_some(DamageError { relative, change, indicators, delay })
-    }
+    comm.sum(&mut sums);
+    indicators.iter_mut().for_each(|square| *square /= sums[1]);
+    let relative = (sums[0] / sums[1]).sqrt();
+    relative.is_finite().then_some(DamageError { relative, change, indicators, delay })
 }

@@ -9,7 +9,7 @@ use crate::{
     fem::{Body, Triangle},
     petsc::PetscError,
 };
-use nalgebra::{Matrix6, SMatrix, Vector6};
+use nalgebra::{Matrix6, SMatrix};
 
 /// The vertices of each side, in the order of the midpoints.
 const SIDES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
@@ -21,19 +21,6 @@ pub(super) fn coefficients<const N: usize>(mut values: SMatrix<f64, 6, N>) -> SM
         values.set_row(3 + side, &(values.row(3 + side) - mean));
     }
     values
-}
-
-/// The values of a function at the vertices and midpoints from its coefficients.
-pub(super) fn values(mut coefficients: Vector6<f64>) -> Vector6<f64> {
-    for (side, [i, j]) in SIDES.into_iter().enumerate() {
-        coefficients[3 + side] += 0.5 * (coefficients[i] + coefficients[j]);
-    }
-    coefficients
-}
-
-/// The coefficients of an affine function from its values at the vertices.
-pub(super) fn affine([a, b, c]: [f64; 3]) -> Vector6<f64> {
-    Vector6::new(a, b, c, 0.0, 0.0, 0.0)
 }
 
 /// The mass matrix, m²: ∫ λ_i λ_j = |T|/12 (1 + δ_ij), ∫ w_e w_f = 4/45 |T| (1 + δ_ef), and ∫ λ_i w_e is
@@ -48,28 +35,6 @@ pub(super) fn mass(triangle: &Triangle) -> Matrix6<f64> {
             (_, ..3) => end(j, i - 3) / 15.0,
             _ => twice_if(i == j) * 4.0 / 45.0,
         })
-}
-
-/// The Laplace matrix ∫ ∇v·∇w, from L_ij = ∫ ∇λ_i·∇λ_j and ∇w_ab = 4(λ_a∇λ_b + λ_b∇λ_a).
-pub(super) fn laplace(triangle: &Triangle) -> Matrix6<f64> {
-    let (vertices, mass) = (triangle.laplace(), triangle.mass() / triangle.area());
-    let terms = |side: usize| {
-        let [a, b] = SIDES[side];
-        [[a, b], [b, a]]
-    };
-    let affine_bubble = |i: usize, side: usize| {
-        4.0 / 3.0 * SIDES[side].map(|j| vertices[(i, j)]).iter().sum::<f64>()
-    };
-    let bubbles = |e: usize, f: usize| -> f64 {
-        let pairs = terms(e).into_iter().flat_map(|p| terms(f).map(|q| (p, q)));
-        pairs.map(|([i, k], [j, l])| 16.0 * mass[(i, j)] * vertices[(k, l)]).sum()
-    };
-    Matrix6::from_fn(|i, j| match (i, j) {
-        (..3, ..3) => vertices[(i, j)],
-        (..3, _) => affine_bubble(i, j - 3),
-        (_, ..3) => affine_bubble(j, i - 3),
-        _ => bubbles(i - 3, j - 3),
-    })
 }
 
 /// The heights of the bubbles on the sides of each triangle, from the nodal values of a smooth function z

@@ -37,7 +37,7 @@ pub struct RecoveredStrains<'a> {
     strains: Vec<Vector3<f64>>,
     per_triangle: usize,
     /// Per material: the fits of the vertices.
-    fits: Vec<Vec<Fit>>,
+    pub(super) fits: Vec<Vec<Fit>>,
 }
 
 impl<'a> RecoveredStrains<'a> {
@@ -46,8 +46,16 @@ impl<'a> RecoveredStrains<'a> {
     /// # Errors
     /// PETSc failed.
     pub fn new(body: &'a Body, u: &[f64]) -> Result<Self, PetscError> {
-        let patches = Patches::new(body);
         let strains = for_elements!(body, cells => cells.strains(u, |_, strain| strain));
+        Self::on(&Patches::new(body), body, strains)
+    }
+
+    /// Recovers the `strains` at the quadrature points of `body`. Collective.
+    pub(super) fn on(
+        patches: &Patches,
+        body: &'a Body,
+        strains: Vec<Vector3<f64>>,
+    ) -> Result<Self, PetscError> {
         let mut update = |fields: &mut [f64]| body.vertices.partition.update(fields, ENTRIES);
         let fits = patches.fits(&strains, &mut update)?;
         Ok(Self { body, strains, per_triangle: patches.per_triangle, fits })
@@ -75,7 +83,7 @@ impl<'a> RecoveredStrains<'a> {
 
     /// ε* − ε(u) on triangle `t`, at the vertices and the midpoints of the sides 01, 12, 20. (ε(u) is affine
     /// between the quadrature points, except on curved triangles.)
-    fn difference(&self, t: usize) -> [Vector3<f64>; 6] {
+    pub(super) fn difference(&self, t: usize) -> [Vector3<f64>; 6] {
         let (body, triangle) = (self.body, self.body.mesh.triangles[t]);
         let fits = &self.fits[body.material(t)];
         let strains = &self.strains[self.per_triangle * t..self.per_triangle * (t + 1)];

@@ -1,15 +1,14 @@
 //! Stresses at the nodes, as engineers look at them: continuous within a material.
 
-use super::patches::{ENTRIES, Patches, monomials};
+use super::patches::{ENTRIES, Fit, Patches, monomials};
 use crate::{
     fem::{Elements, Partition, for_elements},
-    model::{Material, von_mises},
+    model::Material,
     petsc::PetscError,
-    problem::{DiscreteProblem, Singular, State},
+    problem::{DiscreteProblem, State},
 };
 use nalgebra::{Matrix3, Vector3};
 use rustc_hash::FxHashMap as HashMap;
-use serde::Serialize;
 
 /// σ = η_*(ζ) 𝒜ε* at the nodes of this rank, with the recovered strains ε*
 /// ([`RecoveredStrains`](super::RecoveredStrains)).
@@ -17,7 +16,7 @@ use serde::Serialize;
 /// A node where materials meet is several points, one for each material. The first point of each node has the
 /// node's number; the others follow. This value needs neither PETSc nor the problem, so that a thread can use it.
 pub struct NodalStress {
-    patches: Patches,
+    pub(super) patches: Patches,
     points: Vec<Point>,
     /// The points of this rank's triangles, each with the nodes of an element of u.
     pub cells: Vec<usize>,
@@ -36,9 +35,9 @@ struct Point {
 /// What the stresses of a state are made from.
 pub struct Strained {
     /// ε(u) at the quadrature points.
-    strains: Vec<Vector3<f64>>,
+    pub(super) strains: Vec<Vector3<f64>>,
     /// η_*(ζ) at the nodes.
-    zeta: Vec<f64>,
+    pub(super) zeta: Vec<f64>,
 }
 
 impl NodalStress {
@@ -109,6 +108,11 @@ impl NodalStress {
             None => Ok(()),
         };
         let fits = self.patches.fits(&strained.strains, &mut update)?;
+        Ok(self.by_fits(&fits, &strained.zeta))
+    }
+
+    /// As [`Self::stresses`], with the fits of the strains and η_*(ζ) at the nodes.
+    pub(super) fn by_fits(&self, fits: &[Vec<Fit>], zeta: &[f64]) -> Vec<[f64; 4]> {
         let stress = |point: &Point| {
             let [x, y] = point.at;
             let strain = |end: usize| {
@@ -117,49 +121,11 @@ impl NodalStress {
             };
             let (material, stiffness) = &self.materials[point.material];
             let strain = 0.5 * (strain(point.ends[0]) + strain(point.ends[1]));
-            let stress = stiffness * strain * strained.zeta[point.node];
+            let stress = stiffness * strain * zeta[point.node];
             [stress[0], stress[1], stress[2], material.out_of_plane(&stress)]
         };
-        Ok(self.points.iter().map(stress).collect())
+        self.points.iter().map(stress).collect()
     }
-
-    /// The largest von Mises stress of `state`. Collective.
-    ///
-    /// # Errors
-    /// PETSc failed.
-    pub fn peak(&self, problem: &DiscreteProblem, state: &State) -> Result<Peak, PetscError> {
-        let vertices = &problem.body.vertices.partition;
-        let stresses = self.stresses(&Self::strained(problem, state), Some(vertices))?;
-        let all = stresses.iter().map(|stress| von_mises(*stress)).zip(&self.points);
-        let own = all.max_by(|(a, _), (b, _)| a.total_cmp(b));
-        let comm = problem.body.nodes.partition.comm();
-        let (least, rank) = comm.min_with_rank(own.as_ref().map_or(0.0, |(stress, _)| -stress));
-        let at = own.map_or([0.0; 2], |(_, point)| point.at);
-        let at = at.map(|coordinate| comm.broadcast(rank, coordinate));
-        let distance = |[x, y]: [f64; 2]| (x - at[0]).hypot(y - at[1]);
-        let singular = problem.singular_points().into_iter();
-        let near = singular.filter(|point| distance(point.at) <= 1.001 * point.radius);
-        let nearest = near.min_by(|a, b| distance(a.at).total_cmp(&distance(b.at)));
-        // A singular stress is large at its point itself.
-        let there = |point: &Singular| {
-            let here = |(_, at): &(_, &Point)| at.at == point.at;
-            let own = stresses.iter().zip(&self.points).filter(here);
-            comm.max(own.map(|(stress, _)| von_mises(*stress)).fold(0.0, f64::max))
-        };
-        let singular = nearest.filter(|point| there(point) >= -0.5 * least);
-        Ok(Peak { von_mises: -least, at, singular: singular.map(|point| point.name) })
-    }
-}
-
-/// The largest von Mises stress of a state.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Peak {
-    /// The stress, Pa.
-    pub von_mises: f64,
-    /// Its place, m.
-    pub at: [f64; 2],
-    /// If the stress is singular there, and so grows as the mesh is refined: what is there.
-    pub singular: Option<String>,
 }
 
 /// The principal stresses σ₁ ≥ σ₂ in the plane, Pa, and the direction of σ₁, a unit vector with x ≥ 0.

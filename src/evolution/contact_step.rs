@@ -14,8 +14,7 @@ mod one_of_many;
 mod rescue;
 
 pub use accuracy::Accuracy;
-pub(crate) use accuracy::Compliance;
-pub(crate) use certificate::active_bounds;
+use certificate::active_bounds;
 
 use super::{
     DiscreteProblem, LoadCase, Phases, RunError, State, Step, StepFailure, StepRecord, agreed,

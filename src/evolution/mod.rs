@@ -42,7 +42,6 @@ pub use crate::contact::ContactPoint;
 pub use crate::phases::Phases;
 pub use crate::problem::{ContactRow, DiscreteProblem, Loads, SetupError, State, Supports};
 pub use contact_step::{Accuracy, ContactStep};
-pub(crate) use contact_step::{Compliance, active_bounds};
 pub(crate) use damage_step::DamageStep;
 pub use error::{RunError, StepFailure};
 pub use error_budget::{ErrorBudget, percent};
@@ -115,6 +114,7 @@ pub(crate) fn all_steps<'a>(
     }
     while run.step(observer)? {}
     run.outcome.bound_violation = run.controller.violation();
+    run.outcome.ungrown = run.controller.ungrown();
     run.outcome.damage_error = run.controller.damage_error();
     Ok(run)
 }

@@ -49,6 +49,9 @@ pub struct Outcome {
     /// in P1. Empty if the error of the damage is not estimated.
     #[serde(skip)]
     pub damage_indicators: Vec<f64>,
+    /// The error of the time steps had it not grown, over the estimated one.
+    #[serde(skip)]
+    pub(crate) ungrown: f64,
     /// Estimated error of the last ζ over the damage done, for adaptive steps.
     #[serde(skip)]
     pub damage_error: Option<f64>,
@@ -66,8 +69,8 @@ pub struct Stop {
     pub zeta_min: f64,
     /// The smallest ζ that the sources so far allow. If it is above ζ_*, the stop is too early.
     pub least_admissible: f64,
-    /// The error bar of the time from the steps, s: the length of the last step plus the estimated delay of all
-    /// steps, which Euler's steps count twice.
+    /// The error bar of the time from the steps, s: the length of the last step, or with adaptive steps the error of the
+    /// interpolation in it, plus the delay by the estimated error of ζ, which Euler's steps count twice.
     pub uncertainty: f64,
     /// The error bar of the time from the mesh, s: 1.5 times the estimated delay, because a coarse mesh may not
     /// show all of it. After adaptation it is at least the measured error. `None` if it is not estimated.

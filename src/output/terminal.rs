@@ -24,6 +24,9 @@ pub fn with_bar(value: f64, bar: Option<f64>) -> String {
     let exponent = |number: f64| number.abs().log10().floor() as i32;
     let bar = bar.filter(|bar| *bar > 0.0 && bar.is_finite() && value.is_finite());
     let Some(bar) = bar else { return format!("{value:.6e}") };
+    if bar > value.abs() && value != 0.0 {
+        return format!("{value:.1e} ± {bar:.1e}");
+    }
     let of_both = exponent(value.abs().max(bar));
     let bar = bar.max(LEAST_BAR * value.abs());
     let last = exponent(bar) - i32::from(bar / 10_f64.powi(exponent(bar)) < 3.0);

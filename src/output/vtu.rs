@@ -8,7 +8,7 @@ use super::{
     write_whole,
 };
 use crate::{
-    estimate::{NodalStress, Peak, principal},
+    estimate::{Extremes, Measured, NodalStress, principal},
     fem::Elements,
     model::von_mises,
     petsc::PetscError,
@@ -160,13 +160,18 @@ impl FieldWriter {
         self.list.add(entry(state.time, &whole).as_bytes())
     }
 
-    /// The largest von Mises stress of a state. Collective.
+    /// The extremes of a state, with those that `measured` saw growing. Collective.
     ///
     /// # Errors
     /// PETSc failed.
-    pub fn peak(&self, problem: &DiscreteProblem, state: &State) -> Result<Peak, OutputError> {
-        let peak = self.stress.peak(problem, state);
-        peak.map_err(|error| OutputError::new(Path::new("the largest stress"), error))
+    pub fn extremes(
+        &self,
+        problem: &DiscreteProblem,
+        state: &State,
+        measured: &Measured,
+    ) -> Result<Extremes, OutputError> {
+        let extremes = Extremes::of(problem, state, &self.stress, measured);
+        extremes.map_err(|error| OutputError::new(Path::new("the largest stress"), error))
     }
 
     /// Waits until the last frame is written.

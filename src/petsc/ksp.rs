@@ -172,22 +172,6 @@ impl Ksp {
         Ok(negative == 0)
     }
 
-    /// `z` ← P⁻¹ `r` (PCApply).
-    pub(crate) fn precondition(
-        &self,
-        kept: &mut dyn KeptPreconditioner,
-        r: &Vector,
-        z: &mut Vector,
-    ) -> Result<(), PetscError> {
-        let pc = self.pc()?;
-        let mut context = Context { preconditioner: kept };
-        // SAFETY: live handles, distinct by borrowing; the context outlives the call.
-        unsafe {
-            context.set(pc)?;
-            check(raw::PCApply(pc, r.raw(), z.raw()))
-        }
-    }
-
     /// Solves for `x` with the present preconditioner (KSPSolve), until the residual of the free unknowns is
     /// below the limit or PETSc gives up. Afterwards [`Self::residual`] is b − A x.
     pub(crate) fn solve(

@@ -10,7 +10,6 @@
 #![allow(unsafe_code)]
 
 mod communicator;
-mod energy;
 mod error;
 mod ghosts;
 mod graph;
@@ -34,7 +33,6 @@ pub use matrix::{Matrix, Pattern};
 pub use session::Session;
 pub use vector::Vector;
 
-pub(crate) use energy::{Operator, solve_by_energy};
 pub(crate) use ghosts::Ghosts;
 pub(crate) use graph::divide;
 pub(crate) use kept::KeptPreconditioner;

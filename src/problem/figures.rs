@@ -6,6 +6,15 @@ use serde::{Deserialize, Serialize};
 
 /// The figures of a [`StepRecord`](crate::evolution::StepRecord) that have an error bar.
 const OF_RECORD: [&str; 5] = ["work", "displacement_max", "contact_force", "zeta_min", "zeta_mean"];
+/// The extremes of a state that have an error bar: stresses, the largest contact pressure, Pa, and the length of
+/// contact, m. Bodies without Γ_C have the first three.
+const EXTREMES: [(&str, Dimension, usize); 5] = [
+    ("von_mises_max", Dimension::Stress, usize::MAX),
+    ("principal_max", Dimension::Stress, usize::MAX),
+    ("principal_min", Dimension::Stress, usize::MAX),
+    ("pressure_max", Dimension::Stress, usize::MAX - 1),
+    ("contact_length", Dimension::ContactLength, usize::MAX - 2),
+];
 /// The groups of the supports' forces and moments, and the first of two groups per probe.
 const FORCES: usize = 5;
 const MOMENTS: usize = 6;
@@ -43,6 +52,8 @@ pub enum Dimension {
     Damage,
     /// Pa.
     Stress,
+    /// m, along Γ_C.
+    ContactLength,
 }
 
 struct Figure {
@@ -93,7 +104,15 @@ impl DiscreteProblem {
             }
         });
         let figure = |(name, dimension, group)| Figure { name, dimension, group };
-        of_record.chain(quantities).map(figure).collect()
+        let extremes = EXTREMES.into_iter().take(self.extremes().len());
+        let extremes = extremes.map(|(name, dimension, group)| (name.to_owned(), dimension, group));
+        of_record.chain(quantities).chain(extremes).map(figure).collect()
+    }
+
+    /// The names of the extremes of a state.
+    pub(crate) fn extremes(&self) -> Vec<&'static str> {
+        let count = if self.has_contact() { EXTREMES.len() } else { 3 };
+        EXTREMES[..count].iter().map(|(name, ..)| *name).collect()
     }
 
     pub(crate) fn figure_names(&self) -> Vec<String> {
@@ -175,14 +194,14 @@ impl DiscreteProblem {
         let [most, mean, displacement] = of_steps.map(|e| if uniform { 2.0 * e } else { e });
         let varies = self.scene().body_force.iter().any(Expression::depends_on_space);
         let forces = if varies { BODY_FORCE } else { 0.0 };
-        for (bar, figure) in bars.iter_mut().zip(self.figures()) {
-            let of_zeta = figure.dimension == Dimension::Damage;
+        for bar in bars {
+            let of_zeta = bar.dimension == Dimension::Damage;
             bar.bar += (self.tolerance + if of_zeta { 0.0 } else { forces }) * bar.scale;
-            bar.bar += match (figure.dimension, figure.group) {
-                (Dimension::Damage, 4) => mean,
-                (Dimension::Damage, _) => most,
+            bar.bar += match bar.dimension {
+                Dimension::Damage if bar.name == "zeta_mean" => mean,
+                Dimension::Damage => most,
                 // σ = ζ𝒜ε(u).
-                (Dimension::Stress, _) => (displacement + most) * bar.scale,
+                Dimension::Stress => (displacement + most) * bar.scale,
                 _ => displacement * bar.scale,
             };
         }

@@ -39,7 +39,7 @@ pub(crate) use unresolved::unresolved;
 use crate::{
     contact::{Certificate, Constraints, RigidMotions},
     fem::{Body, Elasticity, Mass, Subdomain},
-    mesh::{Mesh, Order},
+    mesh::Mesh,
     model::DamageLaw,
     petsc::{PetscError, Session},
     scene::{Scene, Stepping, TimeGrid},
@@ -147,30 +147,6 @@ impl DiscreteProblem {
             undivided: Some((self.body.mesh, owners)),
             ..self
         })
-    }
-
-    /// The same scene on the same undivided mesh with displacements of the other order.
-    ///
-    /// # Errors
-    /// The scene contradicts itself at the nodes of the other order.
-    pub(crate) fn of_other_order(&self) -> Result<Self, SetupError> {
-        let mut scene = self.scene.clone();
-        scene.order = match scene.order {
-            Order::Linear => Order::Quadratic,
-            Order::Quadratic => Order::Linear,
-        };
-        Self::new(scene, self.mesh().clone())
-    }
-
-    /// Restricts a problem on the mesh of `other` to the triangles that this rank has there. Collective.
-    ///
-    /// # Errors
-    /// PETSc failed.
-    pub(crate) fn restrict_as(self, session: &Session, other: &Self) -> Result<Self, PetscError> {
-        match &other.undivided {
-            Some((_, owners)) => self.divide(session, owners.clone()),
-            None => Ok(self),
-        }
     }
 
     /// Is there a Γ_C?

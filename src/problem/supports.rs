@@ -18,6 +18,8 @@ pub struct Supports {
     prescribed: BTreeMap<usize, Vec<Prescribed>>,
     /// Per node of Γ_C: its place on each of its edges on Γ_C.
     contact: BTreeMap<usize, Vec<Place>>,
+    /// Per name of a boundary and connected part of it on Γ_C: its length, m.
+    lengths: BTreeMap<(String, usize), f64>,
 }
 
 /// A boundary that prescribes the displacement of a node.
@@ -92,7 +94,7 @@ impl Supports {
                 }
             }
             if boundary.gap().is_some() {
-                supports.add_contact(number, body, &edges);
+                supports.add_contact((number, &boundary.name), body, &edges);
             }
             if prescribed.is_some() || boundary.gap().is_some() {
                 supports.names.push(boundary.name.clone());
@@ -101,7 +103,7 @@ impl Supports {
         supports
     }
 
-    fn add_contact(&mut self, boundary: usize, body: &Body, edges: &[Edge]) {
+    fn add_contact(&mut self, (boundary, name): (usize, &str), body: &Body, edges: &[Edge]) {
         let points = &body.nodes.points;
         let distance =
             |a: usize, b: usize| (points[a][0] - points[b][0]).hypot(points[a][1] - points[b][1]);
@@ -123,6 +125,7 @@ impl Supports {
                 }
                 start = end;
             }
+            self.lengths.insert((name.to_owned(), part), start);
         }
     }
 
@@ -131,6 +134,7 @@ impl Supports {
         let (prescribed, contact) = (self.prescribed.iter(), self.contact.iter());
         Self {
             names: self.names.clone(),
+            lengths: self.lengths.clone(),
             prescribed: prescribed.filter_map(|(n, of)| Some((own(n)?, of.clone()))).collect(),
             contact: contact.filter_map(|(n, of)| Some((own(n)?, of.clone()))).collect(),
         }
@@ -214,6 +218,28 @@ impl Supports {
                 }
             })
             .collect()
+    }
+}
+
+impl Supports {
+    /// The length of contact by the `rows` of Γ_C, m, and the nodes on both sides of each of its ends, which lies
+    /// between them. Next to a node without a row, which has a prescribed displacement, contact goes on up to it.
+    pub(crate) fn contact_length(&self, rows: &[ContactRow]) -> (f64, Vec<[[f64; 2]; 2]>) {
+        let (mut length, mut ends) = (0.0, Vec::new());
+        for part in rows.chunk_by(|a, b| (&a.boundary, a.part) == (&b.boundary, b.part)) {
+            let [first, .., last] = part else { continue };
+            let whole = self.lengths.get(&(first.boundary.clone(), first.part));
+            length += f64::from(first.active) * first.arc_length;
+            length += f64::from(last.active) * whole.map_or(0.0, |all| all - last.arc_length);
+            for pair in part.windows(2) {
+                let [a, b] = [&pair[0], &pair[1]];
+                length += 0.5 * f64::from(a.active + b.active) * (b.arc_length - a.arc_length);
+                if a.active != b.active {
+                    ends.push([[a.x, a.y], [b.x, b.y]]);
+                }
+            }
+        }
+        (length, ends)
     }
 }
 

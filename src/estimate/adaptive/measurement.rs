@@ -1,28 +1,37 @@
-//! The measured errors of figures: the same few steps on the mesh bisected everywhere.
+//! The measured errors of figures: the same few steps on the mesh bisected everywhere, and more often at points.
 //!
 //! This halves the size of all triangles, and an error of order p falls by 2^p. The figure F changes by
-//! F(h/2) − F(h) = (1 − 2^−p) e(h). So its error e(h) is twice the change for p = 1, and at most 2½ times the
-//! change for p ≥ 0.74. The change at one time may be zero by chance, so the bar of a figure is
+//! F(h/2) − F(h) = (1 − 2^−p) e(h). So its error e(h) is twice the change for p = 1, and at most c times the
+//! change, with c = 2½ for p ≥ 0.74 in P2 and c = 4 for p ≥ 0.41 in P1. The change at one time may be zero by chance,
+//! so the bar of a figure is
 //!
-//! 2½ max(|ΔF(T)|, (mean over t of ΔF(t)²)^½).
+//! c max(|ΔF(T)|, (mean over t of ΔF(t)²)^½).
+//!
+//! Extremes and probes may lie at singular points, where p is small. There the triangles become h/16: for p ≥ 0.2 the
+//! error is again at most 2½ times the change. The length of contact is known up to half of the edge at each end.
 //!
 //! A figure that depends on u has at least the bar η²/10 of its scale, with η the relative error of u in the
 //! energy norm: the relative error of the work of a constant load is η².
 
 use super::{
-    AdaptError,
+    AdaptError, Measured,
+    finer::{Finer, size_at, touching},
     pilot::{INSTANTS, Pilot},
     sizes::areas,
 };
 use crate::{
-    mesh::{Mesh, Order, Refinement},
+    estimate::Extreme,
+    mesh::{Mesh, Order},
     petsc::Session,
     problem::{Bar, Dimension, DiscreteProblem},
     scene::Scene,
 };
+use std::collections::BTreeSet;
 
-/// Maximum of error over change, for figures of about first order or better.
-const ERROR_OVER_CHANGE: f64 = 2.5;
+/// Maximum of error over change, for P1 and P2.
+const ERROR_OVER_CHANGE: [f64; 2] = [4.0, 2.5];
+/// Triangles at points are h/2^this.
+const LEVELS: usize = 4;
 /// Error over change of the damage in L². No signs cancel there, and adapted meshes reach second order.
 const FIELD_ERROR_OVER_CHANGE: f64 = 4.0 / 3.0;
 
@@ -31,8 +40,10 @@ const GOOD_PART: f64 = 0.5;
 /// … and no others, if they cause more than this fraction of the whole change.
 const MOST: f64 = 0.5;
 
-/// The fraction of the accuracy of a figure that the mesh may use; the time steps use the rest.
+/// The fraction of the accuracy of a figure, and of the time of ζ_*, that the mesh may use; the time steps use the
+/// rest.
 const SHARE: f64 = 0.97;
+const SHARE_OF_STOP: f64 = 0.7;
 
 /// A measured error.
 pub(super) struct MeasuredError {
@@ -50,11 +61,23 @@ impl MeasuredError {
     }
 }
 
+/// The cause of the error of a figure.
+pub(super) enum Cause {
+    /// These triangles.
+    Triangles(Vec<bool>),
+    /// The errors of u, of which near ones count more: the figure is u at this point (0) or a derivative of it (1).
+    Around([f64; 2], i32),
+    /// All errors.
+    Everything,
+}
+
 /// The errors of a run, from its changes when the mesh is bisected.
 #[derive(Default)]
 pub(super) struct Measurement {
     /// The error bars of the figures; empty if the run ends at ζ_*.
     pub(super) bars: Vec<Bar>,
+    /// The extremes that grow as the mesh is refined. They have no bars.
+    pub(super) grows: Vec<String>,
     /// The error of ζ at the end over the damage, in L².
     pub(super) damage: f64,
     /// The relative error of u: the estimate on the bisected mesh at the worst time. Without damage, the error by
@@ -62,8 +85,8 @@ pub(super) struct Measurement {
     pub(super) displacement: f64,
     /// The error of ‖u‖² over its maximum value.
     pub(super) energy: f64,
-    /// The relative error of the time of ζ_*; infinite if only one of the two runs reaches it.
-    pub(super) stop: f64,
+    /// The error of the time of ζ_*, s, and this time; the error is infinite if only one of the two runs reaches it.
+    pub(super) stop: Option<[f64; 2]>,
     /// Per triangle of the mesh: its share of the squared relative error of u, from the estimates on its parts, and
     /// the maximum penetration at their edges, m.
     pub(super) shares: Vec<f64>,
@@ -71,13 +94,19 @@ pub(super) struct Measurement {
     /// Per triangle: the change of the reactions on its edges, N per metre of thickness, and max |Δζ| there.
     reactions: Vec<f64>,
     zeta: Vec<f64>,
+    /// Per triangle: does it touch an end of contact?
+    at_ends: Vec<bool>,
+    /// The extremes on the finer mesh.
+    extremes: Vec<Extreme>,
+    /// The name and the place of each probe, m.
+    probes: Vec<(String, [f64; 2])>,
 }
 
 impl Measurement {
-    /// Compares the run `coarse` of `scene` on `mesh` with the same run on the bisected mesh. Collective.
+    /// Compares the run `coarse` of `scene` on `mesh` with the same run on the finer mesh. Collective.
     ///
     /// # Errors
-    /// A triangle cannot be bisected, or the run on the bisected mesh fails.
+    /// A triangle cannot be bisected, or the run on the finer mesh fails.
     pub(super) fn new(
         session: &Session,
         scene: &Scene,
@@ -86,16 +115,19 @@ impl Measurement {
         solver: &str,
         rounds: usize,
     ) -> Result<Self, AdaptError> {
-        let halved = Refinement::start(mesh.clone()).refine_everywhere()?;
-        let triangles = halved.mesh.triangles.len();
-        let problem =
-            DiscreteProblem::new(scene.clone(), halved.mesh.clone())?.restrict(session)?;
+        let points = coarse.points();
+        let finer = Finer::new(mesh, &points, LEVELS)?;
+        let triangles = finer.mesh.triangles.len();
+        let problem = DiscreteProblem::new(scene.clone(), finer.mesh.clone())?.restrict(session)?;
         let fine = Pilot::run(session, &problem, solver, triangles, false);
         let fine = fine.map_err(|source| AdaptError::Run { rounds, triangles, source })?;
+        let order = scene.order as usize;
         let stop = match [coarse.stop(), fine.stop()] {
-            [None, None] => 0.0,
-            [Some(before), Some(now)] => ERROR_OVER_CHANGE * (now - before).abs() / now,
-            _ => f64::INFINITY,
+            [None, None] => None,
+            [Some(before), Some(now)] => {
+                Some([ERROR_OVER_CHANGE[order] * (now - before).abs(), now])
+            }
+            [time, other] => time.or(other).map(|time| [f64::INFINITY, time]),
         };
         let (displacement, of_parts) = fine.relative();
         let displacement = displacement.max(change_of_u(coarse, &fine));
@@ -103,38 +135,68 @@ impl Measurement {
         let growth = if scene.order == Order::Quadratic { 16.0 } else { 4.0 };
         let count = mesh.triangles.len();
         let (mut shares, mut depths) = (vec![0.0; count], vec![0.0_f64; count]);
-        let parts = halved.parent_of_triangle.iter().zip(of_parts).zip(fine.depths());
+        let parts = finer.parents.iter().zip(of_parts).zip(fine.depths());
         for ((&parent, share), depth) in parts {
             shares[parent] += growth * share;
             depths[parent] = depths[parent].max(*depth);
         }
-        let [before, now] = [coarse, &fine].map(|run| run.energies());
-        let energy = match now[1] {
-            0.0 => 0.0,
-            largest => ERROR_OVER_CHANGE * (now[0] - before[0]).abs() / largest,
-        };
-        let mut measured = Self { displacement, energy, stop, shares, depths, ..Self::default() };
-        if coarse.stop().or(fine.stop()).is_none() {
-            measured.bars = bars(coarse, &fine, coarse.relative().0.powi(2));
-            (measured.damage, measured.zeta) = damage(mesh, &halved, coarse, &fine);
-            measured.reactions = coarse.reactions().iter().map(|force| -force).collect();
-            for (&parent, force) in halved.parent_of_triangle.iter().zip(fine.reactions()) {
-                measured.reactions[parent] += force;
-            }
+        let mut measured = Self { displacement, stop, shares, depths, ..Self::default() };
+        if stop.is_none() {
+            measured.compare(mesh, &finer, coarse, &fine);
         }
         Ok(measured)
+    }
+
+    /// Compares the figures of runs that do not reach ζ_*. Collective.
+    fn compare(&mut self, mesh: &Mesh, finer: &Finer, coarse: &Pilot, fine: &Pilot) {
+        let scene = coarse.problem.scene();
+        let factor = ERROR_OVER_CHANGE[scene.order as usize];
+        let [before, now] = [coarse, fine].map(|run| run.energies());
+        self.energy = match now[1] {
+            0.0 => 0.0,
+            largest => factor * (now[0] - before[0]).abs() / largest,
+        };
+        (self.damage, self.zeta) = damage(mesh, finer, coarse, fine);
+        self.reactions = coarse.reactions().iter().map(|force| -force).collect();
+        for (&parent, force) in finer.parents.iter().zip(fine.reactions()) {
+            self.reactions[parent] += force;
+        }
+        let ends = coarse.extremes().ends.as_flattened();
+        self.at_ends = touching(mesh, ends);
+        let probes = scene.probes.iter();
+        self.probes = probes.map(|probe| (probe.name.clone(), probe.point)).collect();
+        let extremes = fine.extremes();
+        let named = extremes.named(&coarse.problem.singular_points());
+        let grows = named.iter().zip(extremes.grow(|at| size_at(mesh, at)));
+        let grows = grows.filter(|(extreme, grows)| *grows || extreme.singular.is_some());
+        self.grows = grows.map(|(extreme, _)| extreme.name.to_owned()).collect();
+        self.extremes = named.clone();
+        if std::env::var("DBG").is_ok() { for (a,b) in coarse.extremes().of_points.iter().zip(&named) { eprintln!("DBG {} {:.4e} {:?} -> {:.4e} {:?} {:?}", a.name, a.value, a.at, b.value, b.at, b.singular); } eprintln!("DBG {} {:?} -> {} {:?}", coarse.extremes().contact_length, coarse.extremes().ends, fine.extremes().contact_length, fine.extremes().ends);} 
+        self.bars = bars(coarse, fine, factor);
+        self.bars.retain(|bar| !self.grows.contains(&bar.name));
+    }
+
+    /// Leaves out these figures, whose errors stay while the mesh becomes finer.
+    pub(super) fn leave_out(&mut self, names: &BTreeSet<String>) {
+        self.bars.retain(|bar| !names.contains(&bar.name));
+        self.grows.extend(names.iter().cloned());
+    }
+
+    /// The errors of a run on the mesh.
+    pub(super) fn result(&self) -> Measured {
+        let stop = self.stop.map(|[error, _]| error).filter(|error| error.is_finite());
+        Measured { bars: self.bars.clone(), grows: self.grows.clone(), stop }
     }
 
     /// The measured errors of the figures and norms in `names`, or of all: the figures, u, its energy, the damage
     /// and the time of ζ_*. The largest error over its share comes first.
     pub(super) fn errors(&self, names: &[String]) -> Vec<MeasuredError> {
         let norms = [
-            ("damage", self.damage),
-            ("displacement", self.displacement),
-            ("energy", self.energy),
-            ("stopped_at", self.stop),
+            ("damage", self.damage, 1.0),
+            ("displacement", self.displacement, 1.0),
+            ("energy", self.energy, 1.0),
+            ("stopped_at", self.stop.map_or(0.0, |[error, time]| error / time), SHARE_OF_STOP),
         ];
-        let norms = norms.map(|(name, error)| (name, error, 1.0));
         let figures = self.bars.iter().map(|bar| (bar.name.as_str(), bar.relative(), SHARE));
         let is_named = |name: &str| names.is_empty() || names.iter().any(|other| other == name);
         let errors = figures.chain(norms).filter(|(name, ..)| is_named(name));
@@ -151,15 +213,24 @@ impl Measurement {
         bars.map(Bar::relative).fold(0.0, f64::max)
     }
 
-    /// Per triangle: does it cause most of the change of the figure `name`? For min ζ and ζ at a point, ζ changes
-    /// there by a large part of its maximum change. For forces and moments, the contact reactions do so, in few
-    /// triangles. `None` if the whole mesh causes the change.
-    pub(super) fn places(&self, name: &str) -> Option<Vec<bool>> {
-        let bar = self.bars.iter().find(|bar| bar.name == name)?;
-        let changes = match bar.dimension {
-            Dimension::Damage if name != "zeta_mean" => &self.zeta,
-            Dimension::Force | Dimension::Moment => &self.reactions,
-            _ => return None,
+    /// The cause of the error of the figure `name`. For min ζ and ζ at a point, ζ changes in some triangles by a large
+    /// part of its maximum change. For forces and moments, the contact reactions may do so, in few triangles.
+    pub(super) fn cause(&self, name: &str) -> Cause {
+        let Some(bar) = self.bars.iter().find(|bar| bar.name == name) else {
+            return Cause::Everything;
+        };
+        let of_probe = |(probe, _): &&(String, _)| {
+            name.strip_prefix(probe).is_some_and(|quantity| quantity.starts_with('.'))
+        };
+        let at_probe = self.probes.iter().find(of_probe).map(|(_, at)| *at);
+        let at = self.extremes.iter().find(|extreme| extreme.name == name).map(|of| of.at);
+        let changes = match (bar.dimension, at_probe.or(at)) {
+            (Dimension::Stress, Some(at)) => return Cause::Around(at, 1),
+            (Dimension::Length, Some(at)) => return Cause::Around(at, 0),
+            (Dimension::ContactLength, _) => return Cause::Triangles(self.at_ends.clone()),
+            (Dimension::Damage, _) if name != "zeta_mean" => &self.zeta,
+            (Dimension::Force | Dimension::Moment, _) => &self.reactions,
+            _ => return Cause::Everything,
         };
         let largest = changes.iter().fold(0.0_f64, |most, change| most.max(change.abs()));
         let here: Vec<bool> = changes.iter().map(|c| c.abs() > GOOD_PART * largest).collect();
@@ -168,7 +239,10 @@ impl Measurement {
         let of_marked: f64 =
             changes.iter().zip(&here).filter(|(_, here)| **here).map(|(c, _)| c).sum();
         let few = marked <= here.len() / 4 && of_marked.abs() > MOST * change.abs();
-        (largest > 0.0 && (bar.dimension == Dimension::Damage || few)).then_some(here)
+        match largest > 0.0 && (bar.dimension == Dimension::Damage || few) {
+            true => Cause::Triangles(here),
+            false => Cause::Everything,
+        }
     }
 }
 
@@ -188,8 +262,9 @@ fn change_of_u(coarse: &Pilot, fine: &Pilot) -> f64 {
     if square > 0.0 { (4.0 / 3.0 * square).sqrt() } else { 0.0 }
 }
 
-/// The error bars of the figures on the mesh of `coarse`, with η² = `square`.
-fn bars(coarse: &Pilot, fine: &Pilot, square: f64) -> Vec<Bar> {
+/// The error bars of the figures on the mesh of `coarse`: `factor` times their changes. Extremes move from place to
+/// place, so only their change at the end counts.
+fn bars(coarse: &Pilot, fine: &Pilot, factor: f64) -> Vec<Bar> {
     let end = coarse.outcome.last.state.time;
     let times: Vec<f64> = (0..=INSTANTS).map(|i| end * i as f64 / INSTANTS as f64).collect();
     let changes: Vec<Vec<f64>> = (times.iter())
@@ -198,31 +273,41 @@ fn bars(coarse: &Pilot, fine: &Pilot, square: f64) -> Vec<Bar> {
             pair.map(|(before, now)| now - before).collect()
         })
         .collect();
-    let error = |i: usize| {
+    let change = |i: usize| {
         let squares: f64 = changes.iter().map(|change| change[i] * change[i]).sum();
-        let change = (squares / changes.len() as f64).sqrt().max(changes[INSTANTS][i].abs());
-        ERROR_OVER_CHANGE * change
+        (squares / changes.len() as f64).sqrt().max(changes[INSTANTS][i].abs())
     };
-    let scales = fine.scales();
-    let errors: Vec<f64> = (0..scales.len()).map(error).collect();
-    let mut bars = coarse.problem.bars(&errors, &scales);
-    let of_u = |bar: &&mut Bar| {
-        matches!(bar.dimension, Dimension::Work | Dimension::Length | Dimension::Stress)
-    };
-    bars.iter_mut().filter(of_u).for_each(|bar| bar.bar = bar.bar.max(0.1 * square * bar.scale));
+    let mut errors: Vec<f64> = (0..changes[0].len()).map(change).collect();
+    let [before, now] = [coarse, fine].map(|run| run.extremes().values(run.problem));
+    errors.extend(now.iter().zip(before).map(|(now, before)| (now - before).abs()));
+    errors.iter_mut().for_each(|error| *error *= factor);
+    let mut bars = coarse.problem.bars(&errors, &fine.scales());
+    // η².
+    let square = coarse.relative().0.powi(2);
+    for bar in &mut bars {
+        bar.bar = match bar.dimension {
+            Dimension::Work | Dimension::Length | Dimension::Stress => {
+                bar.bar.max(0.1 * square * bar.scale)
+            }
+            // A change within the open parts is no error beyond them.
+            Dimension::ContactLength => {
+                let open = coarse.open() * bar.scale;
+                open + (bar.bar - factor * open).max(0.0)
+            }
+            _ => bar.bar,
+        };
+    }
     bars
 }
 
 /// The final error ‖ζ_h − ζ_{h/2}‖ / ‖1 − ζ_{h/2}‖, and max |ζ_h − ζ_{h/2}| per triangle. Collective.
-fn damage(mesh: &Mesh, halved: &Refinement, coarse: &Pilot, fine: &Pilot) -> (f64, Vec<f64>) {
-    let mut before = at_vertices(mesh, &coarse.zeta());
-    let middles = halved.halved_edges.iter().map(|&[a, b]| 0.5 * (before[a] + before[b]));
-    before.extend(middles.collect::<Vec<f64>>());
+fn damage(mesh: &Mesh, finer: &Finer, coarse: &Pilot, fine: &Pilot) -> (f64, Vec<f64>) {
+    let before = finer.interpolated(at_vertices(mesh, &coarse.zeta()));
     let mut changes = vec![0.0_f64; mesh.triangles.len()];
-    let mesh = &halved.mesh;
+    let mesh = &finer.mesh;
     let now = at_vertices(mesh, &fine.zeta());
     let mut sums = [0.0; 2];
-    let parts = mesh.triangles.iter().zip(&halved.parent_of_triangle).zip(areas(mesh));
+    let parts = mesh.triangles.iter().zip(&finer.parents).zip(areas(mesh));
     for ((nodes, &parent), area) in parts {
         for &node in nodes {
             let change = now[node] - before[node];

@@ -1,11 +1,12 @@
 //! A run with few time steps, the error of u and the penetration on each triangle, and the figures of all steps.
 
 use crate::{
-    estimate::{self, RecoveredStrains},
+    estimate::{self, Extremes, NodalStress, RecoveredStrains},
     evolution::{self, Outcome, Phases, RunError, Step},
     petsc::{PetscError, Session},
     problem::{DiscreteProblem, State},
 };
+use std::cmp::Ordering;
 
 /// Number of steps of the run, and of evenly spread times at which its errors are estimated.
 pub(super) const INSTANTS: usize = 12;
@@ -13,6 +14,8 @@ pub(super) const INSTANTS: usize = 12;
 const FEW: usize = 3;
 /// Errors at the end are relative to at least this fraction of the maximum ‖u‖².
 const MIN_ENERGY: f64 = 1e-4;
+/// Between these times, errors are estimated where max |u| exceeds its maximum at them by this factor: a short pulse.
+const LARGER: f64 = 1.5;
 
 /// A run with few steps, and its errors on each triangle of the undivided mesh.
 pub(super) struct Pilot<'a> {
@@ -22,8 +25,10 @@ pub(super) struct Pilot<'a> {
 }
 
 /// The figures and the estimated errors of the steps of a run.
-#[derive(Default)]
 struct History {
+    stress: NodalStress,
+    /// The extremes at the last time at which errors are estimated.
+    extremes: Extremes,
     /// The number of times at which errors are estimated, and the last such time so far, s.
     instants: usize,
     last: Option<f64>,
@@ -37,9 +42,11 @@ struct History {
     end: (Vec<f64>, f64, f64),
     /// The maximum penetration at an edge of each triangle at any time, m.
     depths: Vec<f64>,
-    /// The times of all steps, s, with their figures, and the maximum size of each figure.
+    /// The times of all steps, s, with their figures, except the extremes.
     figures: Vec<(f64, Vec<f64>)>,
+    /// The maximum size of each figure, and of each extreme at the times at which errors are estimated.
     sizes: Vec<f64>,
+    sizes_of_extremes: Vec<f64>,
 }
 
 impl<'a> Pilot<'a> {
@@ -51,10 +58,7 @@ impl<'a> Pilot<'a> {
         triangles: usize,
         estimated: bool,
     ) -> Result<Self, RunError> {
-        let zeros = vec![0.0; triangles];
-        let instants = if estimated { INSTANTS } else { FEW };
-        let mut history =
-            History { instants, squares: zeros.clone(), depths: zeros, ..History::default() };
+        let mut history = History::new(problem, if estimated { INSTANTS } else { FEW }, triangles);
         let phases = Phases::default();
         let mut observe = |step: &Step| Ok(history.observe(problem, step)?);
         let run = if estimated { estimate::run } else { evolution::run };
@@ -98,16 +102,55 @@ impl<'a> Pilot<'a> {
 
     /// The scales of the figures.
     pub(super) fn scales(&self) -> Vec<f64> {
-        self.problem.figure_scales(&self.history.sizes, self.history.energy)
+        let History { sizes, sizes_of_extremes, energy, .. } = &self.history;
+        self.problem.figure_scales(&[&sizes[..], sizes_of_extremes].concat(), *energy)
     }
 
-    /// The figures at `time`, s, affine between the steps.
+    /// The figures at `time`, s, affine between the steps, except the extremes.
     pub(super) fn figures_at(&self, time: f64) -> Vec<f64> {
         let figures = &self.history.figures;
         let after = figures.partition_point(|(t, _)| *t < time).min(figures.len() - 1);
         let [(t0, before), (t1, next)] = [&figures[after.saturating_sub(1)], &figures[after]];
         let part = if t1 > t0 { ((time - t0) / (t1 - t0)).clamp(0.0, 1.0) } else { 1.0 };
         before.iter().zip(next).map(|(a, b)| (1.0 - part) * a + part * b).collect()
+    }
+
+    /// The extremes at the end.
+    pub(super) fn extremes(&self) -> &Extremes {
+        &self.history.extremes
+    }
+
+    /// The part of Γ_C on which the ends of contact may lie: half of an edge for each end, over the largest length of
+    /// contact.
+    pub(super) fn open(&self) -> f64 {
+        let half = |[[ax, ay], [bx, by]]: &[[f64; 2]; 2]| 0.5 * (bx - ax).hypot(by - ay);
+        let open: f64 = self.extremes().ends.iter().map(half).sum();
+        if open > 0.0 { open / self.history.sizes_of_extremes[4] } else { 0.0 }
+    }
+
+    /// The points at which a finer mesh may change figures: probes, extremes that are not known to be singular, and min
+    /// ζ; at ζ_* min ζ alone. Collective.
+    pub(super) fn points(&self) -> Vec<[f64; 2]> {
+        let mut points = Vec::from_iter(self.problem.damage().map(|_| self.weakest()));
+        if self.stop().is_none() {
+            points.extend(self.problem.scene().probes.iter().map(|probe| probe.point));
+            let extremes = self.extremes().named(&self.problem.singular_points());
+            let finite = extremes.iter().filter(|extreme| extreme.singular.is_none());
+            points.extend(finite.map(|extreme| extreme.at));
+        }
+        points.sort_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
+        points.dedup();
+        points
+    }
+
+    /// The place of min ζ at the end, m. Collective.
+    fn weakest(&self) -> [f64; 2] {
+        let (body, zeta) = (&self.problem.body, &self.outcome.last.state.zeta);
+        let own = 0..body.vertices.partition.owned();
+        let weakest = own.min_by(|&a, &b| zeta[a].total_cmp(&zeta[b]));
+        let comm = body.vertices.partition.comm();
+        let (_, rank) = comm.min_with_rank(weakest.map_or(f64::INFINITY, |i| zeta[i]));
+        weakest.map_or([0.0; 2], |i| body.mesh.nodes[i]).map(|x| comm.broadcast(rank, x))
     }
 
     /// ζ at the end at the vertices of each triangle of the undivided mesh. Collective.
@@ -142,17 +185,34 @@ impl<'a> Pilot<'a> {
 }
 
 impl History {
+    fn new(problem: &DiscreteProblem, instants: usize, triangles: usize) -> Self {
+        Self {
+            stress: NodalStress::new(problem),
+            extremes: Extremes::none(problem.body.nodes.partition.comm()),
+            instants,
+            last: None,
+            squares: vec![0.0; triangles],
+            worst: 0.0,
+            energy: 0.0,
+            displacement: 0.0,
+            end: Default::default(),
+            depths: vec![0.0; triangles],
+            figures: Vec::new(),
+            sizes: Vec::new(),
+            sizes_of_extremes: Vec::new(),
+        }
+    }
+
     /// Records an accepted step. Collective.
     fn observe(&mut self, problem: &DiscreteProblem, step: &Step) -> Result<(), PetscError> {
         let time = step.state.time;
         let figures = step.figures();
-        let sizes = problem.figure_sizes(&figures);
-        self.sizes.resize(sizes.len(), 0.0);
-        self.sizes.iter_mut().zip(sizes).for_each(|(most, size)| *most = most.max(size));
+        enlarge(&mut self.sizes, problem.figure_sizes(&figures));
         self.figures.push((time, figures));
         let end = problem.scene().time.map_or(1.0, |grid| grid.end);
         let part = |time: f64| (self.instants as f64 * time / end + 1e-9).floor();
-        match self.last.is_none_or(|before| part(time) > part(before)) {
+        let is_larger = step.record.displacement_max > LARGER * self.displacement;
+        match is_larger || self.last.is_none_or(|before| part(time) > part(before)) {
             true => self.estimate(problem, &step.state),
             false => Ok(()),
         }
@@ -168,7 +228,12 @@ impl History {
             *deepest = deepest.max(penetration.depth);
         }
         let zeta = problem.zeta_at_points(&state.zeta);
-        let recovered = RecoveredStrains::new(body, &state.u)?;
+        let strained = NodalStress::strained(problem, state);
+        let recovered = RecoveredStrains::on(&self.stress.patches, body, strained.strains)?;
+        let stresses = self.stress.by_fits(&recovered.fits, &strained.zeta);
+        let extremes = Extremes::new(problem, state, &self.stress, &stresses);
+        enlarge(&mut self.sizes_of_extremes, extremes.values(problem));
+        self.extremes = extremes;
         let error = recovered.energy_error(&problem.elasticity, &zeta, &state.u);
         let squares = gathered(problem, &error.squares, self.squares.len());
         self.squares.iter_mut().zip(&squares).for_each(|(max, square)| *max = max.max(*square));
@@ -177,6 +242,12 @@ impl History {
         self.energy = self.energy.max(error.energy);
         Ok(())
     }
+}
+
+/// The larger ones of two lists of sizes, of which the first may be empty.
+fn enlarge(largest: &mut Vec<f64>, values: Vec<f64>) {
+    largest.resize(values.len(), 0.0);
+    largest.iter_mut().zip(values).for_each(|(most, value)| *most = most.max(value.abs()));
 }
 
 /// Values of this rank's triangles for all `count` triangles of the undivided mesh. Collective.

@@ -1,13 +1,19 @@
 //! One round: is its mesh good enough to be measured, and how is the next one refined?
 
-use super::{Adapted, measurement::Measurement, pilot::Pilot, sizes::size_ratios};
+use super::{
+    Adapted, Measured,
+    finer::touching,
+    measurement::{Cause, Measurement},
+    pilot::Pilot,
+    sizes::{MIN_RATIO, influences, size_ratios},
+};
 use crate::{
     evolution::AIM as AIM_OF_STEPS,
     mesh::{Mesh, Order, sorted},
     problem::unresolved,
     scene::Scene,
 };
-use std::collections::HashSet;
+use std::{collections::HashSet, mem::take};
 
 /// A mesh is refined for this fraction of the required accuracy …
 const AIM: f64 = 0.7;
@@ -24,6 +30,8 @@ const MIN_GOAL: f64 = 0.25;
 const ROUGH: f64 = 0.1;
 /// Allowed penetration between the nodes, as a fraction of the accuracy times the maximum displacement.
 const PENETRATION: f64 = 0.5;
+/// The fraction of the squared error of u that the triangles at singular points may cause.
+const OF_SINGULAR: f64 = 0.1;
 /// The size of a triangle is multiplied by this where data of the scene are not resolved …
 const HALF: f64 = 0.5;
 /// … and by this where the body penetrates the foundation.
@@ -43,15 +51,27 @@ pub(super) struct Round<'a> {
     unresolved: HashSet<[usize; 2]>,
     /// The allowed penetration between the nodes, m.
     deepest: f64,
+    /// The length of Γ_C on which the end of contact is not known, over the allowed one.
+    open: f64,
+    /// The singular points of the boundary with the errors of the triangles there, m_T.
+    singular: Vec<([f64; 2], f64)>,
 }
 
 impl<'a> Round<'a> {
     pub(super) fn new(scene: &'a Scene, mesh: &'a Mesh, pilot: Pilot<'a>, accuracy: f64) -> Self {
-        let (error, shares) = pilot.relative();
+        let (error, mut shares) = pilot.relative();
+        let singular = pilot.problem.singular_points().into_iter().map(|point| {
+            let here = shares.iter_mut().zip(touching(mesh, &[point.at]));
+            let here = here.filter(|(_, touches)| *touches).map(|(share, _)| take(share));
+            (point.at, here.sum())
+        });
+        let singular = singular.collect();
         let displacement = pilot.displacement();
         Self {
             unresolved: unresolved(scene, mesh, accuracy, displacement),
             deepest: PENETRATION * accuracy * displacement,
+            open: pilot.open() / accuracy,
+            singular,
             damage_error: pilot.outcome.errors.damage_mesh,
             scene,
             mesh,
@@ -68,13 +88,13 @@ impl<'a> Round<'a> {
         let named = !self.scene.accuracy_of.is_empty();
         let wanted = if named { self.accuracy.max(ROUGH) } else { self.accuracy };
         self.error.max(self.damage_error.unwrap_or(0.0)) <= ENOUGH * wanted
+            && (named || self.open <= ENOUGH)
             && self.unresolved.is_empty()
             && self.pilot.depths().iter().all(|&depth| depth <= self.deepest)
     }
 
     /// The mesh with its errors.
     pub(super) fn adapted(&self, measured: Option<&Measurement>, rounds: usize) -> Adapted {
-        let stop_error = measured.zip(self.pilot.stop()).map(|(m, time)| m.stop * time);
         let worst = |measured: &Measurement| {
             let errors = measured.errors(&self.scene.accuracy_of).into_iter();
             errors.map(|error| (error.name, error.relative)).next()
@@ -96,8 +116,7 @@ impl<'a> Round<'a> {
                 }
                 _ => MAX_SHARE_OF_STEPS * self.accuracy,
             },
-            stop_error: stop_error.filter(|error| error.is_finite()),
-            bars: measured.map_or_else(Vec::new, |measured| measured.bars.clone()),
+            measured: measured.map_or_else(Measured::default, Measurement::result),
             worst: measured.and_then(worst),
             short: None,
         }
@@ -107,6 +126,7 @@ impl<'a> Round<'a> {
     /// error of a figure, these become smaller; the error is of first order in their size. Any other error requires
     /// smaller errors of u and the damage.
     pub(super) fn size_ratios(&self, measured: Option<&Measurement>) -> Vec<f64> {
+        let order = if self.scene.order == Order::Quadratic { 2 } else { 1 };
         let (mut shares, mut depths) = (self.shares.clone(), self.pilot.depths().to_vec());
         let mut sizes = vec![1.0_f64; shares.len()];
         let mut smaller = 1.0_f64;
@@ -117,23 +137,32 @@ impl<'a> Round<'a> {
             let errors = measured.errors(&self.scene.accuracy_of);
             for error in errors.iter().filter(|error| error.excess(self.accuracy) > 1.0) {
                 let goal = (AIM / error.excess(self.accuracy)).max(MIN_GOAL);
-                let Some(places) = measured.places(&error.name) else {
+                match measured.cause(&error.name) {
+                    Cause::Triangles(here) => {
+                        let here = sizes.iter_mut().zip(here).filter(|(_, here)| *here);
+                        here.for_each(|(size, _)| *size = size.min(goal));
+                    }
+                    Cause::Around(point, derivative) => {
+                        let shares = influences(self.mesh, &shares, order, point, derivative);
+                        let all: f64 = shares.iter().sum();
+                        let ratios = size_ratios(&shares, order, (goal * all).sqrt());
+                        let sizes = sizes.iter_mut().zip(ratios);
+                        sizes.for_each(|(size, ratio)| *size = size.min(ratio));
+                    }
                     // Errors of figures are products of two errors of fields.
-                    let is_figure = measured.bars.iter().any(|bar| bar.name == error.name);
-                    smaller = smaller.min(if is_figure { goal.sqrt() } else { goal });
-                    continue;
-                };
-                let here = sizes.iter_mut().zip(places).filter(|(_, here)| *here);
-                here.for_each(|(size, _)| *size = size.min(goal));
+                    Cause::Everything => {
+                        let is_figure = measured.bars.iter().any(|bar| bar.name == error.name);
+                        smaller = smaller.min(if is_figure { goal.sqrt() } else { goal });
+                    }
+                }
             }
         }
         let of_u = self.accuracy_of_u().min(if smaller < 1.0 { smaller * self.error } else { 1.0 });
-        let order = if self.scene.order == Order::Quadratic { 2.0 } else { 1.0 };
         let mut ratios = size_ratios(&shares, order, AIM * of_u);
         if self.damage_error.is_some() {
             let shares = self.pilot.gathered(&self.pilot.outcome.damage_indicators);
             let aim = INTERPOLATION * AIM * smaller * self.accuracy;
-            let others = size_ratios(&shares, 2.0, aim);
+            let others = size_ratios(&shares, 2, aim);
             ratios.iter_mut().zip(others).for_each(|(ratio, other)| *ratio = ratio.min(other));
         }
         for (t, &[a, b, c]) in self.mesh.triangles.iter().enumerate() {
@@ -145,13 +174,26 @@ impl<'a> Round<'a> {
                 sizes[t] = QUARTER;
             }
         }
+        if self.open > ENOUGH {
+            let here = touching(self.mesh, self.pilot.extremes().ends.as_flattened());
+            let here = sizes.iter_mut().zip(here).filter(|(_, touches)| *touches);
+            here.for_each(|(size, _)| *size = size.min((AIM / self.open).max(MIN_RATIO)));
+        }
         let mut ratios: Vec<f64> =
             ratios.iter().zip(sizes).map(|(ratio, size)| ratio.min(size)).collect();
         // If no estimate shows which triangles are too large, all become smaller.
-        if smaller < 1.0 && ratios.iter().all(|&ratio| ratio == 1.0) {
-            ratios.fill(smaller);
+        if measured.is_some() && ratios.iter().all(|&ratio| ratio == 1.0) {
+            ratios.fill(smaller.min(HALF));
         }
         ratios
+    }
+
+    /// How often to halve the triangles at singular points. There the squared error falls like h: the exponent of a crack
+    /// is ½. Together they may cause a tenth of the error.
+    pub(super) fn levels(&self) -> Vec<([f64; 2], usize)> {
+        let aim = (AIM * self.accuracy_of_u()).powi(2) * OF_SINGULAR / self.singular.len() as f64;
+        let levels = |share: f64| (share / aim).log2().ceil().max(0.0) as usize;
+        self.singular.iter().map(|&(point, share)| (point, levels(share))).collect()
     }
 
     /// The accuracy of u that the next mesh needs: a damage with too large an error needs a better u.

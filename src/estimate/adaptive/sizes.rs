@@ -3,17 +3,19 @@
 //! If the size of a triangle is multiplied by r, its error falls like r^p, with p the order, and 1/r² triangles
 //! replace it. The minimum number of triangles for a given squared error Σ r_T^2p m_T has r_T ~ m_T^(−1/(2p+2)).
 
+use super::finer::touching;
 use crate::mesh::{Mesh, MeshError, Refinement, twice_area};
 
 /// Minimum factor by which the size of a triangle is multiplied in a round.
-const MIN_RATIO: f64 = 0.125;
+pub(super) const MIN_RATIO: f64 = 0.125;
 /// Triangles are bisected while they are larger than this many times their wanted area; see [`oversize`].
 const OVERSIZE: f64 = 1.5;
 /// Slightly below 1, so that triangles equal to the median up to rounding are bisected as well.
 const TIES: f64 = 1.0 - 1e-9;
 
 /// The factors for the sizes of the triangles, so that the squared relative error Σ m_T (`shares`) becomes `aim`².
-pub(super) fn size_ratios(shares: &[f64], order: f64, aim: f64) -> Vec<f64> {
+pub(super) fn size_ratios(shares: &[f64], order: i32, aim: f64) -> Vec<f64> {
+    let order = f64::from(order);
     let exponent = 1.0 / (2.0 * order + 2.0);
     let ratio = |factor: f64, share: f64| match share {
         0.0 => 1.0,
@@ -34,6 +36,28 @@ pub(super) fn size_ratios(shares: &[f64], order: f64, aim: f64) -> Vec<f64> {
     shares.iter().map(|&share| ratio(low, share).max(MIN_RATIO)).collect()
 }
 
+/// The influences of the errors of u, from the shares m_T of their square, on u at `point` (`derivative` 0) or on a
+/// derivative there (1).
+///
+/// The error of the figure is the sum over the triangles of the products of two errors in the energy norm: that of u,
+/// m_T^½, and that of the displacements G under a force or a force dipole at the point. G's strains fall like
+/// r^(−1−derivative), so its error on a triangle of size h is about h^(p+1)/r^(p+1+derivative), with r ≥ h.
+pub(super) fn influences(
+    mesh: &Mesh,
+    shares: &[f64],
+    order: i32,
+    [x, y]: [f64; 2],
+    derivative: i32,
+) -> Vec<f64> {
+    let influence = |((nodes, share), area): ((&[usize; 3], &f64), f64)| {
+        let size = (2.0 * area).sqrt();
+        let near = nodes.map(|node| (mesh.nodes[node][0] - x).hypot(mesh.nodes[node][1] - y));
+        let distance = near.into_iter().fold(f64::INFINITY, f64::min).max(size);
+        share.sqrt() * size.powi(order + 1) / distance.powi(order + 1 + derivative)
+    };
+    mesh.triangles.iter().zip(shares).zip(areas(mesh)).map(influence).collect()
+}
+
 /// Bisects the triangles until they are as small as `ratios` say.
 pub(super) fn divided(mut refinement: Refinement, ratios: &[f64]) -> Result<Refinement, MeshError> {
     let (areas, oversize) = (areas(&refinement.mesh), oversize(ratios));
@@ -48,6 +72,21 @@ pub(super) fn divided(mut refinement: Refinement, ratios: &[f64]) -> Result<Refi
         refinement = refinement.refine(&marked)?;
         wanted = refinement.parent_of_triangle.iter().map(|&parent| wanted[parent]).collect();
     }
+}
+
+/// Halves the triangles that touch a point `levels` times, for each point.
+pub(super) fn sharpened(
+    mut refinement: Refinement,
+    points: &[([f64; 2], usize)],
+) -> Result<Refinement, MeshError> {
+    let most = points.iter().map(|(_, levels)| *levels).max().unwrap_or(0);
+    // Two bisections halve the size.
+    for bisections in 0..2 * most {
+        let left = points.iter().filter(|(_, levels)| bisections < 2 * levels);
+        let left: Vec<[f64; 2]> = left.map(|(point, _)| *point).collect();
+        refinement = refinement.refine(&touching(&refinement.mesh, &left))?;
+    }
+    Ok(refinement)
 }
 
 /// [`OVERSIZE`], or less if no triangle would be bisected, because a mesh that misses the accuracy must change.

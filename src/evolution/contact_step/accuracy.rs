@@ -70,12 +70,10 @@ impl Accuracy {
 
 /// Displacements caused by small forces at a state of a run, with the active nodes fixed.
 pub(crate) struct Compliance<'a> {
-    pub(crate) problem: &'a DiscreteProblem,
-    /// K, until only its factor is kept.
-    stiffness: Option<Stiffness>,
-    /// The fixed unknowns; is the factor positive definite with them?
+    problem: &'a DiscreteProblem,
+    stiffness: Stiffness,
+    /// The fixed unknowns.
     active: Vec<usize>,
-    supported: bool,
     solver: LinearSolver,
     rhs: Vector,
     answer: Vector,
@@ -89,9 +87,8 @@ impl<'a> ContactStep<'a> {
         solver.factor().set_condensed(&stiffness.matrix, bounded)?;
         Ok(Compliance {
             problem,
-            stiffness: Some(stiffness),
+            stiffness,
             active: Vec::new(),
-            supported: false,
             solver,
             rhs: load,
             answer: c,
@@ -139,43 +136,22 @@ impl Compliance<'_> {
     }
 
     /// Sets the nodal damage and the active nodes of a state. Collective.
-    pub(crate) fn set(&mut self, zeta: &[f64], contact: &[ContactPoint]) -> Result<(), PetscError> {
+    fn set(&mut self, zeta: &[f64], contact: &[ContactPoint]) -> Result<(), PetscError> {
         let DiscreteProblem { body, elasticity, constraints, .. } = self.problem;
         let flags = active_bounds(constraints, contact, 0.0);
         let active = constraints.bounds.iter().zip(flags).filter(|(_, active)| *active > 0.0);
         self.active = active.map(|(bound, _)| bound.dof).collect();
-        match &mut self.stiffness {
-            Some(stiffness) => {
-                let zeta = self.problem.zeta_at_points(zeta);
-                stiffness.refill(body, elasticity, &constraints.bases, &zeta)?;
-            }
-            None => self.supported = self.solver.prescribe(&self.active)?,
-        }
-        Ok(())
+        let zeta = self.problem.zeta_at_points(zeta);
+        self.stiffness.refill(body, elasticity, &constraints.bases, &zeta)
     }
 
-    /// Frees K, a large part of the memory, and keeps its factor, if need be a new one at `state`. Collective.
-    pub(crate) fn keep_factor(&mut self, state: &State) -> Result<(), PetscError> {
-        if !self.solver.factor().exists() {
-            self.set(&state.zeta, &state.contact)?;
-            if let Some(stiffness) = &self.stiffness {
-                self.solver.factorise(system(self.problem, stiffness, &self.active))?;
-            }
-        }
-        if let Some(stiffness) = self.stiffness.take() {
-            // The factor may belong to another matrix, such as TAO's scaled K.
-            self.solver.factor().set_scaling(&stiffness.matrix)?;
-        }
-        Ok(())
-    }
-
-    /// K(ζ)⁻¹ times nodal `forces`, N per metre of thickness, with the active nodes fixed: to one digit or more, or
-    /// after [`Self::keep_factor`] only by the factor. `None` if these nodes do not support the body. Collective.
-    pub(crate) fn displacement(
+    /// K(ζ)⁻¹ times nodal `forces`, N per metre of thickness, with the active nodes fixed: to one digit or
+    /// more. `None` if these nodes do not support the body. Collective.
+    fn displacement(
         &mut self,
         mut forces: Vec<f64>,
     ) -> Result<Option<Vec<f64>>, PetscError> {
-        let Self { problem, stiffness, active, supported, solver, rhs, answer } = self;
+        let Self { problem, stiffness, active, solver, rhs, answer } = self;
         let bases = &problem.constraints.bases;
         bases.force_to_local(&mut forces);
         bases.zero_fixed(&mut forces);
@@ -183,19 +159,9 @@ impl Compliance<'_> {
         rhs.set(&forces[..rhs.owned()])?;
         answer.write(|u| u.fill(0.0))?;
         let norm = rhs.norm()?;
-        let solved = match stiffness {
-            Some(stiffness) => {
-                // With an old factor, the error may have one digit less than the residual.
-                let system = system(problem, stiffness, active);
-                solver.solve_renewing(system, rhs, answer, 0.01 * norm)?.converged
-            }
-            None if norm > 0.0 && *supported => {
-                solver.precondition(rhs, answer)?;
-                answer.write(|u| active.iter().for_each(|&dof| u[dof] = 0.0))?;
-                true
-            }
-            None => norm == 0.0,
-        };
+        // With an old factor, the error may have one digit less than the residual.
+        let system = system(problem, stiffness, active);
+        let solved = solver.solve_renewing(system, rhs, answer, 0.01 * norm)?.converged;
         solved.then(|| displacement(problem, vec![0.0; forces.len()], answer)).transpose()
     }
 }

@@ -60,11 +60,10 @@ pub(super) struct StepState {
     /// The damage source at t_{n−1}, and b_{n−1} − b_{n−2}, m²/s.
     source: DamageSource,
     load_change: DVector<f64>,
-    /// Per node: Σ error / rate over the steps, s. This is the delay with which ζ reaches a given value, because an
-    /// error δζ delays an autonomous evolution by δζ/ζ'.
-    delay: DVector<f64>,
     /// The error of ζ̃ from the steps so far. It grows with the damage and, for two-step differences, it diffuses.
     error: DVector<f64>,
+    /// The sum of the absolute errors of the steps, without growth and diffusion.
+    added: DVector<f64>,
     /// The error that the last step adds to ζ, once it is known.
     last_error: Option<DVector<f64>>,
     /// Bounds on ζ̃_{n−1} by the maximum principle, see [`BoundViolation`].
@@ -92,7 +91,7 @@ impl<'a> StepController<'a> {
             rate_change: zeros.clone(),
             source,
             load_change: zeros.clone(),
-            delay: zeros.clone(),
+            added: zeros.clone(),
             error: zeros,
             last_error: None,
             bounds: problem.body.vertices.partition.min_max(zeta),
@@ -177,7 +176,7 @@ impl<'a> StepController<'a> {
                 return shorter.ok_or_else(|| planned.failed(StepFailure::TooShort));
             }
             let error = self.integrated(planned.length, &rate, &change) - increment;
-            self.add_error(planned.length, &error, &rate);
+            self.add_error(planned.length, &error);
             damage_step.diffuse(planned, &mut self.memory.error)?;
             self.memory.rate_change = change;
         } else {
@@ -208,7 +207,8 @@ impl<'a> StepController<'a> {
         last: &Step,
     ) -> Decision {
         let (zeta_min, level) = (damage.min_max.0, self.problem.threshold());
-        let (time, delays) = if self.two_step {
+        let rate = planned.rate(&damage.zeta);
+        let (time, errors) = if self.two_step {
             let from = self.problem.body.vertices.partition.min_max(self.memory.zeta.as_slice()).0;
             let part = if from > level { (from - level) / (from - zeta_min) } else { 0.0 };
             // Both the last written ζ and its correction ζ̃ must be near ζ_*.
@@ -221,12 +221,17 @@ impl<'a> StepController<'a> {
             (last.state.time + part * planned.length, 1.0)
         } else {
             // This step shows the error of the previous step.
-            self.add_euler_error(planned, &planned.rate(&damage.zeta));
+            self.add_euler_error(planned, &rate);
             (planned.time, 2.0)
         };
         self.memory.violation.observe(planned, damage.min_max, time);
-        let delay = self.delay_at_weakest_node(damage.zeta.as_slice());
-        let uncertainty = planned.length + delays * delay.abs();
+        let [error, rate, before] = self.at_weakest_node(&damage.zeta, &rate);
+        // An error δζ delays the stop by δζ/ζ′. The time is interpolated with a constant rate.
+        let of_step = match self.error_control {
+            Some(_) => (0.5 * ((rate - before) / rate).abs()).min(1.0),
+            None => 1.0,
+        };
+        let uncertainty = of_step * planned.length + errors * (error / rate).abs();
         let least_admissible = planned.bounds.0;
         Decision::Stop(Stop { time, zeta_min, least_admissible, uncertainty, from_mesh: None })
     }

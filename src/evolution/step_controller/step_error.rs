@@ -28,16 +28,14 @@ impl StepController<'_> {
     pub(super) fn add_euler_error(&mut self, planned: &PlannedStep, rate: &DVector<f64>) {
         if let Some(before) = &self.memory.rate {
             let error = 0.5 * planned.k * (rate - before);
-            self.add_error(planned.length, &error, &(0.5 * (rate + before)));
+            self.add_error(planned.length, &error);
             self.memory.last_error = Some(error);
         }
     }
 
     /// Adds the `error` of a step of `length` s to the earlier errors. These grow by the factor 1 + `length` · g
     /// with g from [`error_growth`](crate::model::DamageLaw::error_growth) of the damage law.
-    pub(super) fn add_error(&mut self, length: f64, error: &DVector<f64>, rate: &DVector<f64>) {
-        self.memory.delay +=
-            error.zip_map(rate, |e, rate| if rate == 0.0 { 0.0 } else { e / rate });
+    pub(super) fn add_error(&mut self, length: f64, error: &DVector<f64>) {
         if let (Some(laws), Some(rate)) = (self.problem.damage(), &self.memory.rate) {
             for (i, own) in self.memory.error.iter_mut().enumerate().filter(|(i, _)| rate[*i] < 0.0)
             {
@@ -47,13 +45,25 @@ impl StepController<'_> {
             }
         }
         self.memory.error += error;
+        self.memory.added += error.abs();
     }
 
-    /// The delay with which the node of minimum `zeta` reaches ζ_*, s. Collective.
-    pub(super) fn delay_at_weakest_node(&self, zeta: &[f64]) -> f64 {
+    /// The error of the steps had it not grown, over the estimated one: at most 1. Collective.
+    pub(crate) fn ungrown(&self) -> f64 {
+        let partition = &self.problem.body.vertices.partition;
+        let [added, error] = [&self.memory.added, &self.memory.error]
+            .map(|field| partition.comm().max(field.rows(0, partition.owned()).amax()));
+        if added < error { added / error } else { 1.0 }
+    }
+
+    /// At the node of minimum `zeta`: the error of ζ̃, and ζ′ in this step (`rate`) and in the one before, 1/s.
+    /// Collective.
+    pub(super) fn at_weakest_node(&self, zeta: &DVector<f64>, rate: &DVector<f64>) -> [f64; 3] {
         let partition = &self.problem.body.vertices.partition;
         let weakest = (0..partition.owned()).min_by(|&a, &b| zeta[a].total_cmp(&zeta[b]));
         let (_, rank) = partition.comm().min_with_rank(weakest.map_or(f64::INFINITY, |i| zeta[i]));
-        partition.comm().broadcast(rank, weakest.map_or(0.0, |i| self.memory.delay[i]))
+        let before = self.memory.rate.as_ref().unwrap_or(rate);
+        let values = weakest.map_or([0.0; 3], |i| [self.memory.error[i], rate[i], before[i]]);
+        values.map(|value| partition.comm().broadcast(rank, value))
     }
 }

@@ -4,7 +4,7 @@
 use super::LinearSolver;
 use crate::{
     linear::{LinearSystem, Precision, factor::VERY_LARGE},
-    petsc::{Matrix, Pattern, PetscError, Session, Vector, has_option, set_default_option},
+    petsc::{Matrix, Pattern, PetscError, Session, has_option, set_default_option},
 };
 use std::iter;
 
@@ -139,16 +139,5 @@ impl LinearSolver {
     pub(crate) fn prescribe(&mut self, unknowns: &[usize]) -> Result<bool, PetscError> {
         let exists = self.factor.exists();
         Ok(exists && (!self.factor.is_condensed() || self.factor.prescribe(unknowns)?))
-    }
-
-    /// `z` ← P⁻¹ `r` with the present preconditioner.
-    ///
-    /// # Errors
-    /// There is no preconditioner.
-    pub(crate) fn precondition(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
-        match self.chosen {
-            Some((_, false)) => self.ksp.precondition(&mut self.factor, r, z),
-            _ => self.factor.apply(r, z),
-        }
     }
 }

@@ -1,0 +1,154 @@
+//! Extreme stresses and contact pressures of a state, and the length of contact.
+
+use super::{Measured, NodalStress, principal};
+use crate::{
+    model::von_mises,
+    petsc::{Communicator, PetscError},
+    problem::{DiscreteProblem, Singular, State},
+};
+use serde::Serialize;
+
+/// An extreme of a state.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Extreme {
+    /// Its name, as in `summary.json`.
+    #[serde(skip)]
+    pub name: &'static str,
+    /// Its value, Pa.
+    pub value: f64,
+    /// Its place, m.
+    pub at: [f64; 2],
+    /// If the stress is singular there, and so grows as the mesh is refined: the reason.
+    pub singular: Option<String>,
+}
+
+impl Extreme {
+    fn distance(&self, [x, y]: [f64; 2]) -> f64 {
+        (x - self.at[0]).hypot(y - self.at[1])
+    }
+}
+
+/// The extremes of a state, with the values at all points of this rank.
+#[derive(Clone)]
+pub struct Extremes {
+    comm: Communicator,
+    /// The extremes of stresses and pressures.
+    pub of_points: Vec<Extreme>,
+    /// Per extreme: values with their places, whose largest one is the extreme or its opposite.
+    fields: Vec<Vec<(f64, [f64; 2])>>,
+    /// The length of contact, m: of Γ_C at the active nodes.
+    pub contact_length: f64,
+    /// Each end of contact lies between an active node and the next one: their places, m.
+    pub(super) ends: Vec<[[f64; 2]; 2]>,
+}
+
+impl Extremes {
+    /// Of no state.
+    pub(super) fn none(comm: Communicator) -> Self {
+        Self { comm, of_points: vec![], fields: vec![], contact_length: 0.0, ends: vec![] }
+    }
+
+    /// The extremes of `state` with `stresses` at the points of `nodal`. Collective.
+    pub(super) fn new(
+        problem: &DiscreteProblem,
+        state: &State,
+        nodal: &NodalStress,
+        stresses: &[[f64; 4]],
+    ) -> Self {
+        let comm = problem.body.nodes.partition.comm();
+        let of = |value: fn([f64; 4]) -> f64| -> Vec<_> {
+            stresses.iter().map(|stress| value(*stress)).zip(nodal.places()).collect()
+        };
+        let rows = problem.supports.contact_rows(&problem.body, state);
+        let fields = vec![
+            of(von_mises),
+            of(|stress| principal(stress).0[0]),
+            of(|stress| -principal(stress).0[1]),
+            rows.iter().map(|row| (row.pressure, [row.x, row.y])).collect(),
+        ];
+        let names = problem.extremes().into_iter().zip(&fields);
+        let of_points = names.map(|(name, values)| {
+            let own = values.iter().max_by(|a, b| a.0.total_cmp(&b.0)).copied();
+            let (least, rank) = comm.min_with_rank(own.map_or(f64::INFINITY, |(value, _)| -value));
+            let at = own.map_or([0.0; 2], |(_, at)| at).map(|x| comm.broadcast(rank, x));
+            let value = if name == "principal_min" { least } else { -least };
+            Extreme { name, value, at, singular: None }
+        });
+        let of_points = of_points.collect();
+        let (contact_length, ends) = problem.supports.contact_length(&rows);
+        Self { comm, of_points, fields, contact_length, ends }
+    }
+
+    /// The extremes of `state` at the points of `nodal`. They name singular points and, if they were `measured`, say
+    /// which grow as the mesh is refined. Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub fn of(
+        problem: &DiscreteProblem,
+        state: &State,
+        nodal: &NodalStress,
+        measured: &Measured,
+    ) -> Result<Self, PetscError> {
+        let vertices = &problem.body.vertices.partition;
+        let stresses = nodal.stresses(&NodalStress::strained(problem, state), Some(vertices))?;
+        let mut extremes = Self::new(problem, state, nodal, &stresses);
+        extremes.of_points = extremes.named(&problem.singular_points());
+        for extreme in &mut extremes.of_points {
+            let grows = measured.grows.iter().any(|name| name == extreme.name);
+            extreme.singular = match extreme.singular.take() {
+                Some(place) => Some(format!("at {place}, grows as the mesh is refined")),
+                None => grows.then(|| "grows as the mesh is refined".to_owned()),
+            };
+        }
+        Ok(extremes)
+    }
+
+    /// All values, in the order of [`DiscreteProblem::extremes`].
+    pub(super) fn values(&self, problem: &DiscreteProblem) -> Vec<f64> {
+        let values = self.of_points.iter().map(|extreme| extreme.value);
+        values.chain([self.contact_length]).take(problem.extremes().len()).collect()
+    }
+
+    /// The extremes of stresses and pressures with the names of the singular `points` of the boundary near which they are,
+    /// within three edges. A singular stress is large at its point itself, if it is known there. Collective.
+    pub(super) fn named(&self, points: &[Singular]) -> Vec<Extreme> {
+        const EDGES: f64 = 3.001;
+        let named = |(i, extreme): (usize, &Extreme)| {
+            let near =
+                points.iter().filter(|point| extreme.distance(point.at) <= EDGES * point.radius);
+            let nearest =
+                near.min_by(|a, b| extreme.distance(a.at).total_cmp(&extreme.distance(b.at)));
+            // The von Mises stress, as other stresses may be negative at the point, or the pressure.
+            let field = &self.fields[if i < 3 { 0 } else { i }];
+            let there = |point: &&Singular| {
+                let own = field.iter().filter(|(_, at)| *at == point.at).map(|(value, _)| *value);
+                let there = self.comm.max(own.fold(f64::NEG_INFINITY, f64::max));
+                there >= 0.5 * extreme.value.abs() || there == f64::NEG_INFINITY
+            };
+            let singular = nearest.filter(there).map(|point| point.name.clone());
+            Extreme { singular, ..extreme.clone() }
+        };
+        self.of_points.iter().enumerate().map(named).collect()
+    }
+
+    /// Per extreme: does it grow like a singular stress? The mesh is to be fine around its place, finer than the `size`, m,
+    /// of triangles before. M_k is the largest value farther away than size/2^k, k = 1, 2, 3. A power r^(λ−1) with λ < 1 has increasing differences, and a
+    /// smooth field halves them with every k. Collective.
+    pub(super) fn grow(&self, size: impl Fn([f64; 2]) -> f64) -> Vec<bool> {
+        /// The ratio of the last difference to the one before above which the extreme grows; 1 for ln r.
+        const GROWS: f64 = 0.85;
+        /// Smaller differences than this fraction of the extreme are rounding, or a weak singularity (λ > 0.97).
+        const SEEN: f64 = 0.02;
+        let grows = |(extreme, field): (&Extreme, &Vec<(f64, [f64; 2])>)| {
+            let size = size(extreme.at);
+            let [a, b, c] = [0.5, 0.25, 0.125].map(|part| {
+                let far = |at: [f64; 2]| extreme.distance(at) >= 0.999 * part * size;
+                let values = field.iter().filter(|(_, at)| far(*at)).map(|(value, _)| *value);
+                self.comm.max(values.fold(0.0, f64::max))
+            });
+            c - b > SEEN * c && c - b > GROWS * (b - a)
+        };
+        self.of_points.iter().zip(&self.fields).map(grows).collect()
+    }
+}
