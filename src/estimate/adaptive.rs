@@ -281,7 +281,8 @@ fn refined(
         if ends {
             return Ok(adapted);
         }
-        let (ratios, levels) = (round.size_ratios(measured.as_ref()), round.levels());
+        let measured = measured.as_ref();
+        let (ratios, levels) = (round.size_ratios(measured), round.levels(measured));
         most = most.max(if measured.is_some() { 4 * triangles } else { 0 });
         refinement = sharpened(divided(refinement, &ratios)?, &levels)?;
         check_memory(session, most, refinement.mesh.triangles.len())?;

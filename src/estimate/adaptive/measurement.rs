@@ -15,7 +15,7 @@
 
 use super::{
     AdaptError, Measured,
-    finer::{Finer, size_at, touching},
+    finer::{Finer, size_at},
     pilot::{INSTANTS, Pilot},
     sizes::areas,
 };
@@ -65,6 +65,8 @@ impl MeasuredError {
 pub(super) enum Cause {
     /// These triangles.
     Triangles(Vec<bool>),
+    /// The triangles at the ends of contact.
+    Ends,
     /// The errors of u, of which near ones count more: the figure is u at this point (0) or a derivative of it (1).
     Around([f64; 2], i32),
     /// All errors.
@@ -94,8 +96,6 @@ pub(super) struct Measurement {
     /// Per triangle: the change of the reactions on its edges, N per metre of thickness, and max |Δζ| there.
     reactions: Vec<f64>,
     zeta: Vec<f64>,
-    /// Per triangle: does it touch an end of contact?
-    at_ends: Vec<bool>,
     /// The extremes on the finer mesh.
     extremes: Vec<Extreme>,
     /// The name and the place of each probe, m.
@@ -161,8 +161,6 @@ impl Measurement {
         for (&parent, force) in finer.parents.iter().zip(fine.reactions()) {
             self.reactions[parent] += force;
         }
-        let ends = coarse.extremes().ends.as_flattened();
-        self.at_ends = touching(mesh, ends);
         let probes = scene.probes.iter();
         self.probes = probes.map(|probe| (probe.name.clone(), probe.point)).collect();
         let extremes = fine.extremes();
@@ -227,7 +225,7 @@ impl Measurement {
         let changes = match (bar.dimension, at_probe.or(at)) {
             (Dimension::Stress, Some(at)) => return Cause::Around(at, 1),
             (Dimension::Length, Some(at)) => return Cause::Around(at, 0),
-            (Dimension::ContactLength, _) => return Cause::Triangles(self.at_ends.clone()),
+            (Dimension::ContactLength, _) => return Cause::Ends,
             (Dimension::Damage, _) if name != "zeta_mean" => &self.zeta,
             (Dimension::Force | Dimension::Moment, _) => &self.reactions,
             _ => return Cause::Everything,

@@ -5,7 +5,7 @@ use super::{
     finer::touching,
     measurement::{Cause, Measurement},
     pilot::Pilot,
-    sizes::{MIN_RATIO, influences, size_ratios},
+    sizes::{influences, size_ratios},
 };
 use crate::{
     evolution::AIM as AIM_OF_STEPS,
@@ -30,6 +30,8 @@ const MIN_GOAL: f64 = 0.25;
 const ROUGH: f64 = 0.1;
 /// Allowed penetration between the nodes, as a fraction of the accuracy times the maximum displacement.
 const PENETRATION: f64 = 0.5;
+/// A refined mesh leaves the ends of contact open by this fraction of the accuracy of their length.
+const OPEN: f64 = 0.35;
 /// The fraction of the squared error of u that the triangles at singular points may cause.
 const OF_SINGULAR: f64 = 0.1;
 /// The size of a triangle is multiplied by this where data of the scene are not resolved …
@@ -140,8 +142,9 @@ impl<'a> Round<'a> {
                 match measured.cause(&error.name) {
                     Cause::Triangles(here) => {
                         let here = sizes.iter_mut().zip(here).filter(|(_, here)| *here);
-                        here.for_each(|(size, _)| *size = size.min(goal));
+                        here.for_each(|(size, _)| *size = size.min(goal.min(HALF)));
                     }
+                    Cause::Ends => {}
                     Cause::Around(point, derivative) => {
                         let shares = influences(self.mesh, &shares, order, point, derivative);
                         let all: f64 = shares.iter().sum();
@@ -174,26 +177,31 @@ impl<'a> Round<'a> {
                 sizes[t] = QUARTER;
             }
         }
-        if self.open > ENOUGH {
-            let here = touching(self.mesh, self.pilot.extremes().ends.as_flattened());
-            let here = sizes.iter_mut().zip(here).filter(|(_, touches)| *touches);
-            here.for_each(|(size, _)| *size = size.min((AIM / self.open).max(MIN_RATIO)));
-        }
         let mut ratios: Vec<f64> =
             ratios.iter().zip(sizes).map(|(ratio, size)| ratio.min(size)).collect();
         // If no estimate shows which triangles are too large, all become smaller.
-        if measured.is_some() && ratios.iter().all(|&ratio| ratio == 1.0) {
+        let none = ratios.iter().all(|&ratio| ratio == 1.0) && self.levels(measured).is_empty();
+        if measured.is_some() && none {
             ratios.fill(smaller.min(HALF));
         }
         ratios
     }
 
-    /// How often to halve the triangles at singular points. There the squared error falls like h: the exponent of a crack
-    /// is ½. Together they may cause a tenth of the error.
-    pub(super) fn levels(&self) -> Vec<([f64; 2], usize)> {
+    /// How often to halve the triangles at some points. At singular points the squared error falls like h, as at a crack;
+    /// together they may cause a tenth of it. The ends of contact are known up to half of an edge.
+    pub(super) fn levels(&self, measured: Option<&Measurement>) -> Vec<([f64; 2], usize)> {
+        let halvings = |excess: f64| excess.log2().ceil().max(0.0) as usize;
         let aim = (AIM * self.accuracy_of_u()).powi(2) * OF_SINGULAR / self.singular.len() as f64;
-        let levels = |share: f64| (share / aim).log2().ceil().max(0.0) as usize;
-        self.singular.iter().map(|&(point, share)| (point, levels(share))).collect()
+        let singular = self.singular.iter().map(|&(point, share)| (point, halvings(share / aim)));
+        let errors = measured.map_or_else(Vec::new, |of| of.errors(&self.scene.accuracy_of));
+        let of_length = errors.iter().find(|error| error.name == "contact_length");
+        let excess = of_length.map_or(0.0, |error| error.excess(self.accuracy));
+        // A mesh that is far too coarse does not know the ends.
+        let is_known = self.error < 2.0 * self.accuracy;
+        let open = if is_known { self.open } else { 0.0 };
+        let at_ends = halvings(open / OPEN).max(if excess > 1.0 { 2 } else { 0 });
+        let ends = self.pilot.extremes().ends.as_flattened().iter().map(|&end| (end, at_ends));
+        singular.chain(ends).filter(|(_, levels)| *levels > 0).collect()
     }
 
     /// The accuracy of u that the next mesh needs: a damage with too large an error needs a better u.

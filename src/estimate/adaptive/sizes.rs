@@ -7,10 +7,11 @@ use super::finer::touching;
 use crate::mesh::{Mesh, MeshError, Refinement, twice_area};
 
 /// Minimum factor by which the size of a triangle is multiplied in a round.
-pub(super) const MIN_RATIO: f64 = 0.125;
+const MIN_RATIO: f64 = 0.125;
 /// Triangles are bisected while they are larger than this many times their wanted area; see [`oversize`].
 const OVERSIZE: f64 = 1.5;
-/// Slightly below 1, so that triangles equal to the median up to rounding are bisected as well.
+/// Slightly below 1: triangles equal to the median up to rounding are bisected as well, and those that are small enough
+/// up to rounding are not. So meshes do not depend on units.
 const TIES: f64 = 1.0 - 1e-9;
 
 /// The factors for the sizes of the triangles, so that the squared relative error Σ m_T (`shares`) becomes `aim`².
@@ -33,7 +34,8 @@ pub(super) fn size_ratios(shares: &[f64], order: i32, aim: f64) -> Vec<f64> {
             low = middle;
         }
     }
-    shares.iter().map(|&share| ratio(low, share).max(MIN_RATIO)).collect()
+    let cut = |ratio: f64| if ratio > TIES { 1.0 } else { ratio.max(MIN_RATIO) };
+    shares.iter().map(|&share| cut(ratio(low, share))).collect()
 }
 
 /// The influences of the errors of u, from the shares m_T of their square, on u at `point` (`derivative` 0) or on a
