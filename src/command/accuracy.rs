@@ -96,6 +96,13 @@ fn is_asked(task: &Task, name: &str) -> bool {
     asked.is_empty() || asked.iter().any(|known| known == name)
 }
 
+/// A note on error bars that are missing because only the runs that measure them reach ζ_*.
+pub(super) fn missing_bars(task: &Task, outcome: &Outcome) -> Option<String> {
+    (task.measured.stop.is_some() && outcome.stopped.is_none()).then(|| {
+        "no error bars: with few time steps, or on a finer mesh, the run stops at ζ_*".to_owned()
+    })
+}
+
 /// The closing line on the required accuracy: reached, or the errors that are too large. `None` without a
 /// required accuracy.
 pub(super) fn verdict(task: &Task, outcome: Option<&Outcome>) -> Option<String> {

@@ -2,7 +2,7 @@
 
 use super::task::Task;
 use signorini::{
-    estimate::{Adapted, Extreme, Extremes},
+    estimate::{Adapted, Extreme, Extremes, GROWS},
     evolution::{Outcome, RunError, StepRecord, Stop, percent},
     output::terminal::{Progress, say, with_bar},
     problem::Collapse,
@@ -129,9 +129,18 @@ fn stresses(
     if von_mises.value == 0.0 {
         return Vec::new();
     }
-    let lines = [("stress", "largest von Mises", von_mises), ("", "largest σ₁", most)];
-    let lines = lines.into_iter().chain([("", "smallest σ₂", least)]);
-    lines.map(|(name, what, of)| row(name, format!("{what} {}", extreme(of, unit, bar)))).collect()
+    let largest = extreme(von_mises, unit, bar);
+    let grows = match von_mises.singular.as_deref() {
+        Some(place) if place != GROWS => format!(" at {place}, grows as the mesh is refined"),
+        Some(_) => ", grows as the mesh is refined".to_owned(),
+        None => String::new(),
+    };
+    let [most, least] = [most, least].map(|of| extreme(of, unit, bar));
+    vec![
+        row("stress", format!("largest von Mises {largest}{grows}")),
+        row("", format!("largest σ₁ {most}")),
+        row("", format!("smallest σ₂ {least}")),
+    ]
 }
 
 /// An extreme with its place: with its bar, or with two digits if it is singular.
@@ -141,9 +150,9 @@ fn extreme(
     bar: &dyn Fn(&str) -> Option<f64>,
 ) -> String {
     let (value, singular) = match (singular, bar(name)) {
-        (Some(place), _) => (format!("{value:.1e}"), format!(": singular, {place}")),
-        (None, Some(bar)) => (with_bar(*value, Some(bar)), String::new()),
-        (None, None) => (format!("{value:.4e}"), String::new()),
+        (Some(_), _) => (format!("{value:.1e}"), ": singular"),
+        (None, Some(bar)) => (with_bar(*value, Some(bar)), ""),
+        (None, None) => (format!("{value:.4e}"), ""),
     };
     format!("{value} {unit} at ({x:.4}, {y:.4}){singular}")
 }

@@ -129,6 +129,10 @@ const PILOT_TOLERANCE: f64 = 0.05;
 /// Maximum number of rounds, and of triangles of a mesh or its measurement.
 const MAX_ROUNDS: usize = 25;
 const MAX_TRIANGLES: usize = 4_000_000;
+/// Number of measurements after which an extreme alone causes no more rounds …
+const MEASUREMENTS: usize = 4;
+/// … and what the user can do.
+const SLOW: &str = "falls slowly; --accuracy-of asks for it alone";
 /// What is wrong with a figure whose error does not become smaller.
 const STAYS: &str = "stays while the mesh becomes finer, as at a singular point; --accuracy-of NAME,… asks for others";
 
@@ -199,13 +203,17 @@ pub fn measured_errors(
         Stepping::Auto { .. } => INSTANTS,
     });
     few.time.iter_mut().for_each(|grid| grid.stepping = Stepping::Uniform { steps });
-    let few = with_passing_loads(session, few, mesh, PILOT_TOLERANCE)?;
+    let mut few = with_passing_loads(session, few, mesh, PILOT_TOLERANCE)?;
     let mesh = Refinement::start(mesh.clone()).mesh;
     let (rounds, triangles) = (1, mesh.triangles.len());
-    let problem = DiscreteProblem::new(few.clone(), mesh.clone())?.restrict(session)?;
-    let pilot = Pilot::run(session, &problem, solver, triangles, false)
-        .map_err(|source| AdaptError::Run { rounds, triangles, source })?;
-    Ok(Measurement::new(session, &few, &mesh, &pilot, solver, rounds)?.result())
+    loop {
+        let problem = DiscreteProblem::new(few.clone(), mesh.clone())?.restrict(session)?;
+        let pilot = Pilot::run(session, &problem, solver, triangles, false)
+            .map_err(|source| AdaptError::Run { rounds, triangles, source })?;
+        if pilot.stop().is_none() || !make_steps_adaptive(&mut few, PILOT_TOLERANCE) {
+            return Ok(Measurement::new(session, &few, &mesh, &pilot, solver, rounds)?.result());
+        }
+    }
 }
 
 /// Checks that the figures for which `scene` requires an accuracy exist.
@@ -273,7 +281,16 @@ fn refined(
             let name = &worst?.name;
             stays(&excesses, name).then(|| format!("the error of {name} {STAYS}"))
         };
-        let short = failed.or_else(stays).or(exhausted.then(limit));
+        // Stresses at an end of contact converge slowly.
+        let slow = || {
+            let is_extreme = |name: &str| problem.extremes().contains(&name);
+            let mut missed = errors.iter().flatten().filter(|error| error.excess(accuracy) > 1.0);
+            let are_slow = scene.accuracy_of.is_empty()
+                && excesses.len() >= MEASUREMENTS
+                && missed.all(|error| is_extreme(&error.name));
+            are_slow.then(|| Some(format!("the error of {} {SLOW}", worst?.name))).flatten()
+        };
+        let short = failed.or_else(stays).or_else(slow).or(exhausted.then(limit));
         let reached = excess.is_some_and(|excess| excess <= 1.0);
         let ends = reached || short.is_some();
         adapted.short = short.filter(|_| !reached);
@@ -290,17 +307,16 @@ fn refined(
 }
 
 /// Whether the error of `name` is too large and has not become half of what it was with an eighth of the triangles, or
-/// three measurements before, each of which reduced the triangles that cause it. Of first order it would be a third.
+/// two measurements before, each of which reduced the triangles that cause it. Of first order it would be a third.
 fn stays(excesses: &[(usize, BTreeMap<String, f64>)], name: &str) -> bool {
     /// Measurements between two errors that are compared.
-    const ROUNDS: usize = 3;
+    const ROUNDS: usize = 2;
     let [earlier @ .., (triangles, last)] = excesses else { return false };
     let Some(last) = last.get(name).filter(|excess| **excess > 1.0) else { return false };
-    let before = earlier.iter().enumerate().filter(|(i, (count, _))| {
-        8 * count <= *triangles || i + ROUNDS < excesses.len()
-    });
-    let largest = before.filter_map(|(_, (_, excess))| excess.get(name).copied()).reduce(f64::max);
-    largest.is_some_and(|largest| *last > 0.5 * largest)
+    let much_coarser = earlier.iter().filter(|(count, _)| 8 * count <= *triangles);
+    let some_before = earlier.len().checked_sub(ROUNDS).map(|i| &earlier[i]);
+    let before = much_coarser.chain(some_before).filter_map(|(_, excess)| excess.get(name));
+    before.copied().reduce(f64::max).is_some_and(|largest| *last > 0.5 * largest)
 }
 
 /// Checks that a run on `triangles` fits into the memory. Runs on up to `solved` triangles have needed the peak memory

@@ -8,6 +8,9 @@ use crate::{
 };
 use serde::Serialize;
 
+/// The reason of a singular stress that only the measurement on a finer mesh shows.
+pub const GROWS: &str = "grows with refinement";
+
 /// An extreme of a state.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Extreme {
@@ -95,11 +98,9 @@ impl Extremes {
         let mut extremes = Self::new(problem, state, nodal, &stresses);
         extremes.of_points = extremes.named(&problem.singular_points());
         for extreme in &mut extremes.of_points {
-            let grows = measured.grows.iter().any(|name| name == extreme.name);
-            extreme.singular = match extreme.singular.take() {
-                Some(place) => Some(format!("at {place}, grows as the mesh is refined")),
-                None => grows.then(|| "grows as the mesh is refined".to_owned()),
-            };
+            if measured.grows.iter().any(|name| name == extreme.name) {
+                extreme.singular.get_or_insert_with(|| GROWS.to_owned());
+            }
         }
         Ok(extremes)
     }
@@ -137,7 +138,7 @@ impl Extremes {
     /// smooth field halves them with every k. Collective.
     pub(super) fn grow(&self, size: impl Fn([f64; 2]) -> f64) -> Vec<bool> {
         /// The ratio of the last difference to the one before above which the extreme grows; 1 for ln r.
-        const GROWS: f64 = 0.85;
+        const INCREASING: f64 = 0.85;
         /// Smaller differences than this fraction of the extreme are rounding, or a weak singularity (λ > 0.97).
         const SEEN: f64 = 0.02;
         let grows = |(extreme, field): (&Extreme, &Vec<(f64, [f64; 2])>)| {
@@ -147,7 +148,7 @@ impl Extremes {
                 let values = field.iter().filter(|(_, at)| far(*at)).map(|(value, _)| *value);
                 self.comm.max(values.fold(0.0, f64::max))
             });
-            c - b > SEEN * c && c - b > GROWS * (b - a)
+            c - b > SEEN * c && c - b > INCREASING * (b - a)
         };
         self.of_points.iter().zip(&self.fields).map(grows).collect()
     }

@@ -28,7 +28,7 @@ mod adaptive;
 
 pub use adaptive::{AdaptError, Adapted, Measured, adapted, measured_errors};
 pub use recovery::{EnergyError, RecoveredStrains, strains_at_nodes};
-pub use extremes::{Extreme, Extremes};
+pub use extremes::{Extreme, Extremes, GROWS};
 pub use stress::{NodalStress, Strained, principal};
 
 use crate::{

@@ -31,6 +31,8 @@ const MIN_STRESS_SCALE: f64 = 0.1;
 /// The relative error of the integral of a body force that varies in space. Both meshes of a measurement may
 /// have the same error, which the measurement then misses.
 const BODY_FORCE: f64 = 1e-4;
+/// The error of uniform time steps over its estimate.
+const UNIFORM: f64 = 2.5;
 /// A damage below this is negligible.
 const NEGLIGIBLE_DAMAGE: f64 = 1e-6;
 
@@ -186,12 +188,12 @@ impl DiscreteProblem {
     /// Adds to the error bars the solver's tolerance and the errors of body-force integrals and time steps.
     ///
     /// The steps change ζ by at most `most` at a node and by `mean` on average, and so u by `displacement`
-    /// (relative, energy norm): u depends on the past only through ζ. A few uniform steps may show only half of
-    /// their error, which is therefore doubled.
+    /// (relative, energy norm): u depends on the past only through ζ. The error of uniform steps is multiplied:
+    /// few of them, or loads of infinite slope, show less than half of it.
     pub(crate) fn add_step_errors(&self, bars: &mut [Bar], of_steps: [f64; 3]) {
         let grid = self.scene().time.map(|grid| grid.stepping);
         let uniform = matches!(grid, Some(Stepping::Uniform { .. }));
-        let [most, mean, displacement] = of_steps.map(|e| if uniform { 2.0 * e } else { e });
+        let [most, mean, displacement] = of_steps.map(|e| if uniform { UNIFORM * e } else { e });
         let varies = self.scene().body_force.iter().any(Expression::depends_on_space);
         let forces = if varies { BODY_FORCE } else { 0.0 };
         for bar in bars {

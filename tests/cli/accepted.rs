@@ -7,7 +7,7 @@ use std::process::Stdio;
 
 const KEYS: &str = "quantities provenance scene title solver ranks nodes triangles steps end_time stopped_at \
     stopped_uncertainty zeta_min zeta_mean displacement_max work contact_force active_nodes \
-    boundaries contact_nodes errors kkt largest_stress peak_megabytes stopped_by collapse wall_seconds seconds_per_step phases units notes";
+    boundaries contact_nodes contact_length von_mises_max principal_max principal_min pressure_max extremes errors kkt peak_megabytes stopped_by collapse wall_seconds seconds_per_step phases units notes";
 const COLUMNS: &str = "step time zeta_min zeta_mean displacement_max work contact_force active_nodes iterations \
     linear_iterations factorisations fallbacks contraction kkt_stationarity kkt_primal \
     kkt_dual kkt_complementarity zeta_residual zeta_error seconds left.force_x left.force_y \
