@@ -79,9 +79,9 @@ pub(super) fn shorter_steps(task: &Task, outcome: &Outcome) -> Option<f64> {
     let bars = task.measured.bars.iter().zip(&outcome.bars);
     let bars = bars.filter(|(bar, _)| is_asked(task, &bar.name));
     let bars = bars.map(|(of_mesh, of_both)| [of_mesh.relative(), of_both.relative()]);
-    let of_stop = outcome.stopped.map(|stop| {
-        [stop.from_mesh.unwrap_or(0.0), stop.bar()].map(|bar| bar / stop.time)
-    });
+    let of_stop = outcome
+        .stopped
+        .map(|stop| [stop.from_mesh.unwrap_or(0.0), stop.bar()].map(|bar| bar / stop.time));
     let factor = bars.chain(of_stop).map(|[of_mesh, of_both]| match of_both {
         error if error > accuracy => (AIM * accuracy - of_mesh) / (error - of_mesh),
         _ => 1.0,

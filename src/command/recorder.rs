@@ -151,8 +151,9 @@ impl<'a> Recorder<'a> {
             _ => Ok(()),
         };
         let written = written.and(task.phases.time("output", || self.fields.complete()));
-        let extremes =
-            last.as_ref().map(|step| self.fields.extremes(&task.problem, &step.state, &task.measured));
+        let extremes = last
+            .as_ref()
+            .map(|step| self.fields.extremes(&task.problem, &step.state, &task.measured));
         let (written, extremes) = match extremes.transpose() {
             Ok(extremes) => (written, extremes),
             Err(error) => (written.and(Err(error)), None),
@@ -189,8 +190,14 @@ impl<'a> Recorder<'a> {
         if task.profile {
             shown.clone_from(&notes);
         }
-        let mut lines =
-            screen::conclusion(task, record, extremes.as_ref(), &quantities, result.as_ref(), &shown);
+        let mut lines = screen::conclusion(
+            task,
+            record,
+            extremes.as_ref(),
+            &quantities,
+            result.as_ref(),
+            &shown,
+        );
         if task.profile {
             let steps = record.map_or(0, |record| record.step);
             lines.push(String::new());

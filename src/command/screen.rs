@@ -120,11 +120,7 @@ pub fn conclusion(
 }
 
 /// The lines of the extreme stresses.
-fn stresses(
-    extremes: &Extremes,
-    unit: &str,
-    bar: &dyn Fn(&str) -> Option<f64>,
-) -> Vec<String> {
+fn stresses(extremes: &Extremes, unit: &str, bar: &dyn Fn(&str) -> Option<f64>) -> Vec<String> {
     let [von_mises, most, least, ..] = &extremes.of_points[..] else { return Vec::new() };
     if von_mises.value == 0.0 {
         return Vec::new();
@@ -203,10 +199,14 @@ fn stop_time(stop: &Stop) -> String {
     let time = rounded(stop.time);
     match (stop.from_mesh, stop.uncertainty) {
         (_, steps) if !(steps < stop.time) => {
-            format!("{time} (its error is unknown: ζ hardly falls there, or the time steps are too long)")
+            format!(
+                "{time} (its error is unknown: ζ hardly falls there, or the time steps are too long)"
+            )
         }
         (Some(mesh), _) if !(stop.bar() < stop.time) => {
-            format!("{time} (its error is unknown: with a finer mesh the time may differ by {mesh:.1e})")
+            format!(
+                "{time} (its error is unknown: with a finer mesh the time may differ by {mesh:.1e})"
+            )
         }
         (Some(_), _) => with_bar(stop.time, Some(stop.bar())),
         (None, steps) => format!("{} (the time steps alone)", with_bar(stop.time, Some(steps))),

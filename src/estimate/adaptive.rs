@@ -26,8 +26,8 @@ use measurement::Measurement;
 use pilot::{INSTANTS, Pilot};
 use round::Round;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
 use sizes::{divided, sharpened};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A mesh that was adapted to a scene.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -256,7 +256,8 @@ fn refined(
         most = most.max(triangles);
         let mut measure = || {
             check_memory(session, most, 4 * triangles)?;
-            let mut measured = Measurement::new(session, &scene, mesh, &round.pilot, solver, rounds)?;
+            let mut measured =
+                Measurement::new(session, &scene, mesh, &round.pilot, solver, rounds)?;
             let errors = measured.errors(&[]).into_iter();
             let errors = errors.map(|error| (error.excess(accuracy), error.name));
             excesses.push((triangles, errors.map(|(excess, name)| (name, excess)).collect()));

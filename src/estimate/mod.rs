@@ -27,8 +27,8 @@ mod penetration;
 mod adaptive;
 
 pub use adaptive::{AdaptError, Adapted, Measured, adapted, measured_errors};
-pub use recovery::{EnergyError, RecoveredStrains, strains_at_nodes};
 pub use extremes::{Extreme, Extremes, GROWS};
+pub use recovery::{EnergyError, RecoveredStrains, strains_at_nodes};
 pub use stress::{NodalStress, Strained, principal};
 
 use crate::{
@@ -90,9 +90,8 @@ fn estimated(run: Run) -> Result<Outcome, RunError> {
         let states = instants.states.iter().chain([&outcome.last.state]);
         problem.penetration_note(states)
     });
-    let mesh = phases.time("mesh error", || {
-        damage_error(problem, &mut damage_step, instants, &outcome)
-    });
+    let mesh =
+        phases.time("mesh error", || damage_error(problem, &mut damage_step, instants, &outcome));
     if let (Some(stop), Some(error)) = (&mut outcome.stopped, &mesh) {
         stop.from_mesh = error.delay.map(|delay| DELAYS * delay.abs());
     }

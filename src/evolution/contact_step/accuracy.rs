@@ -85,14 +85,7 @@ impl<'a> ContactStep<'a> {
         let Self { problem, stiffness, elastic: mut solver, load, c, .. } = self;
         let bounded = problem.constraints.bounds.iter().map(|bound| bound.dof);
         solver.factor().set_condensed(&stiffness.matrix, bounded)?;
-        Ok(Compliance {
-            problem,
-            stiffness,
-            active: Vec::new(),
-            solver,
-            rhs: load,
-            answer: c,
-        })
+        Ok(Compliance { problem, stiffness, active: Vec::new(), solver, rhs: load, answer: c })
     }
 }
 
@@ -147,10 +140,7 @@ impl Compliance<'_> {
 
     /// K(ζ)⁻¹ times nodal `forces`, N per metre of thickness, with the active nodes fixed: to one digit or
     /// more. `None` if these nodes do not support the body. Collective.
-    fn displacement(
-        &mut self,
-        mut forces: Vec<f64>,
-    ) -> Result<Option<Vec<f64>>, PetscError> {
+    fn displacement(&mut self, mut forces: Vec<f64>) -> Result<Option<Vec<f64>>, PetscError> {
         let Self { problem, stiffness, active, solver, rhs, answer } = self;
         let bases = &problem.constraints.bases;
         bases.force_to_local(&mut forces);

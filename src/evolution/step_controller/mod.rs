@@ -62,6 +62,9 @@ pub(super) struct StepState {
     load_change: DVector<f64>,
     /// The error of ζ̃ from the steps so far. It grows with the damage and, for two-step differences, it diffuses.
     error: DVector<f64>,
+    /// Per node: Σ error / rate over the steps, s. This is the delay with which ζ reaches a given value, because an
+    /// error δζ delays an autonomous evolution by δζ/ζ'.
+    delay: DVector<f64>,
     /// The sum of the absolute errors of the steps, without growth and diffusion.
     added: DVector<f64>,
     /// The error that the last step adds to ζ, once it is known.
@@ -78,6 +81,10 @@ pub(super) struct StepState {
 /// controls the lengths of the steps; a rule of third order estimates their accumulated error.
 const TRUNCATION: f64 = 4.0 / 3.0;
 
+/// The error bar of a delay over the sum of the delays of all steps, and over the delay by the estimated error of ζ.
+const DELAY: f64 = 3.0;
+const GROWN: f64 = 1.5;
+
 impl<'a> StepController<'a> {
     /// After (27), from ζ₀ = `zeta` and its damage source.
     pub(super) fn new(problem: &'a DiscreteProblem, zeta: &[f64], source: DamageSource) -> Self {
@@ -91,6 +98,7 @@ impl<'a> StepController<'a> {
             rate_change: zeros.clone(),
             source,
             load_change: zeros.clone(),
+            delay: zeros.clone(),
             added: zeros.clone(),
             error: zeros,
             last_error: None,
@@ -176,7 +184,7 @@ impl<'a> StepController<'a> {
                 return shorter.ok_or_else(|| planned.failed(StepFailure::TooShort));
             }
             let error = self.integrated(planned.length, &rate, &change) - increment;
-            self.add_error(planned.length, &error);
+            self.add_error(planned.length, &error, &corrected, &rate);
             damage_step.diffuse(planned, &mut self.memory.error)?;
             self.memory.rate_change = change;
         } else {
@@ -225,13 +233,16 @@ impl<'a> StepController<'a> {
             (planned.time, 2.0)
         };
         self.memory.violation.observe(planned, damage.min_max, time);
-        let [error, rate, before] = self.at_weakest_node(&damage.zeta, &rate);
-        // An error δζ delays the stop by δζ/ζ′. The time is interpolated with a constant rate.
+        let [error, delay, rate, before] = self.at_weakest_node(&damage.zeta, &rate);
+        // An error δζ delays the stop by δζ/ζ′, if strains are proportional to 1/ζ. The sum of the delays of all steps
+        // holds for constant loads and strains alike, but only roughly for loads that change.
+        let delay = (DELAY * delay.abs()).min(GROWN * (error / rate).abs());
+        // The time is interpolated with a constant rate.
         let of_step = match self.error_control {
             Some(_) => (0.5 * ((rate - before) / rate).abs()).min(1.0),
             None => 1.0,
         };
-        let uncertainty = of_step * planned.length + errors * (error / rate).abs();
+        let uncertainty = of_step * planned.length + errors * delay;
         let least_admissible = planned.bounds.0;
         Decision::Stop(Stop { time, zeta_min, least_admissible, uncertainty, from_mesh: None })
     }

@@ -28,20 +28,35 @@ impl StepController<'_> {
     pub(super) fn add_euler_error(&mut self, planned: &PlannedStep, rate: &DVector<f64>) {
         if let Some(before) = &self.memory.rate {
             let error = 0.5 * planned.k * (rate - before);
-            self.add_error(planned.length, &error);
+            let (zeta, mean) = (self.memory.zeta.clone(), 0.5 * (rate + before));
+            self.add_error(planned.length, &error, &zeta, &mean);
             self.memory.last_error = Some(error);
         }
     }
 
-    /// Adds the `error` of a step of `length` s to the earlier errors. These grow by the factor 1 + `length` · g
-    /// with g from [`error_growth`](crate::model::DamageLaw::error_growth) of the damage law.
-    pub(super) fn add_error(&mut self, length: f64, error: &DVector<f64>) {
-        if let (Some(laws), Some(rate)) = (self.problem.damage(), &self.memory.rate) {
-            for (i, own) in self.memory.error.iter_mut().enumerate().filter(|(i, _)| rate[*i] < 0.0)
-            {
-                // A node may belong to several materials.
-                let of_laws = laws.iter().map(|law| law.error_growth(self.memory.zeta[i], rate[i]));
-                *own *= 1.0 + length * of_laws.fold(0.0, f64::max);
+    /// Adds the `error` of a step of `length` s to `zeta` with the mean `rate`. Earlier errors grow by the factor
+    /// exp(∫g), with g from [`error_growth`](crate::model::DamageLaw::error_growth) of the damage law, by the trapezoidal
+    /// rule.
+    pub(super) fn add_error(
+        &mut self,
+        length: f64,
+        error: &DVector<f64>,
+        zeta: &DVector<f64>,
+        rate: &DVector<f64>,
+    ) {
+        let delay = error.zip_map(rate, |e, rate| if rate == 0.0 { 0.0 } else { e / rate });
+        self.memory.delay += delay;
+        if let (Some(laws), Some(before)) = (self.problem.damage(), &self.memory.rate) {
+            // A node may belong to several materials.
+            let growth = |zeta: f64, rate: f64| {
+                let of_laws = laws.iter().map(|law| law.error_growth(zeta, rate.min(0.0)));
+                of_laws.fold(0.0, f64::max)
+            };
+            for (i, own) in self.memory.error.iter_mut().enumerate() {
+                if before[i] < 0.0 || rate[i] < 0.0 {
+                    let start = growth(self.memory.zeta[i], before[i]);
+                    *own *= (0.5 * length * (start + growth(zeta[i], rate[i]))).exp();
+                }
             }
         }
         self.memory.error += error;
@@ -56,14 +71,15 @@ impl StepController<'_> {
         if added < error { added / error } else { 1.0 }
     }
 
-    /// At the node of minimum `zeta`: the error of ζ̃, and ζ′ in this step (`rate`) and in the one before, 1/s.
+    /// At the node of minimum `zeta`: the error of ζ̃, the delay, s, and ζ′ in this step (`rate`) and in the one before, 1/s.
     /// Collective.
-    pub(super) fn at_weakest_node(&self, zeta: &DVector<f64>, rate: &DVector<f64>) -> [f64; 3] {
+    pub(super) fn at_weakest_node(&self, zeta: &DVector<f64>, rate: &DVector<f64>) -> [f64; 4] {
         let partition = &self.problem.body.vertices.partition;
         let weakest = (0..partition.owned()).min_by(|&a, &b| zeta[a].total_cmp(&zeta[b]));
         let (_, rank) = partition.comm().min_with_rank(weakest.map_or(f64::INFINITY, |i| zeta[i]));
         let before = self.memory.rate.as_ref().unwrap_or(rate);
-        let values = weakest.map_or([0.0; 3], |i| [self.memory.error[i], rate[i], before[i]]);
+        let values = |i: usize| [self.memory.error[i], self.memory.delay[i], rate[i], before[i]];
+        let values = weakest.map_or([0.0; 4], values);
         values.map(|value| partition.comm().broadcast(rank, value))
     }
 }
