@@ -133,6 +133,18 @@ impl Extremes {
         self.of_points.iter().enumerate().map(named).collect()
     }
 
+    /// The singular points at which the stress is not small: a finer mesh may show their peaks. Collective.
+    pub(super) fn stressed(&self, points: &[Singular]) -> Vec<[f64; 2]> {
+        /// Smaller stresses than this fraction of the largest are small.
+        const SMALL: f64 = 0.2;
+        let [field, ..] = &self.fields[..] else { return Vec::new() };
+        let is_stressed = |point: &&Singular| {
+            let own = field.iter().filter(|(_, at)| *at == point.at).map(|(value, _)| *value);
+            self.comm.max(own.fold(0.0, f64::max)) > SMALL * self.of_points[0].value
+        };
+        points.iter().filter(is_stressed).map(|point| point.at).collect()
+    }
+
     /// Per extreme: does it grow like a singular stress? The mesh is to be fine around its place, finer than the `size`, m,
     /// of triangles before. M_k is the largest value farther away than size/2^k, k = 1, 2, 3. A power r^(λ−1) with λ < 1 has increasing differences, and a
     /// smooth field halves them with every k. Collective.

@@ -223,18 +223,24 @@ impl Supports {
 
 impl Supports {
     /// The length of contact by the `rows` of Γ_C, m, and the nodes on both sides of each of its ends, which lies
-    /// between them. Next to a node without a row, which has a prescribed displacement, contact goes on up to it.
+    /// between them. Next to a node without a row, which has a prescribed displacement, contact goes on up to it. At the
+    /// end of Γ_C a light pressure may hide a short open part.
     pub(crate) fn contact_length(&self, rows: &[ContactRow]) -> (f64, Vec<[[f64; 2]; 2]>) {
+        /// Smaller pressures than this fraction of the largest are light.
+        const LIGHT: f64 = 0.05;
         let (mut length, mut ends) = (0.0, Vec::new());
         for part in rows.chunk_by(|a, b| (&a.boundary, a.part) == (&b.boundary, b.part)) {
             let [first, .., last] = part else { continue };
             let whole = self.lengths.get(&(first.boundary.clone(), first.part));
             length += f64::from(first.active) * first.arc_length;
             length += f64::from(last.active) * whole.map_or(0.0, |all| all - last.arc_length);
-            for pair in part.windows(2) {
+            let largest = part.iter().fold(0.0, |most, row| f64::max(most, row.pressure));
+            for (i, pair) in part.windows(2).enumerate() {
                 let [a, b] = [&pair[0], &pair[1]];
                 length += 0.5 * f64::from(a.active + b.active) * (b.arc_length - a.arc_length);
-                if a.active != b.active {
+                let is_light = |row: &ContactRow| row.pressure < LIGHT * largest;
+                let at_end = (i == 0 && is_light(a)) || (i + 2 == part.len() && is_light(b));
+                if a.active != b.active || (a.active == 1 && at_end) {
                     ends.push([[a.x, a.y], [b.x, b.y]]);
                 }
             }

@@ -128,15 +128,17 @@ impl<'a> Pilot<'a> {
         if open > 0.0 { open / self.history.sizes_of_extremes[4] } else { 0.0 }
     }
 
-    /// The points at which a finer mesh may change figures: probes, extremes that are not known to be singular, and min
-    /// ζ; at ζ_* min ζ alone. Collective.
+    /// The points at which a finer mesh may change figures: probes, extremes, singular points, and min ζ; at ζ_* min ζ
+    /// alone. Collective.
     pub(super) fn points(&self) -> Vec<[f64; 2]> {
         let mut points = Vec::from_iter(self.problem.damage().map(|_| self.weakest()));
         if self.stop().is_none() {
             points.extend(self.problem.scene().probes.iter().map(|probe| probe.point));
-            let extremes = self.extremes().named(&self.problem.singular_points());
+            let singular = self.problem.singular_points();
+            let extremes = self.extremes().named(&singular);
             let finite = extremes.iter().filter(|extreme| extreme.singular.is_none());
             points.extend(finite.map(|extreme| extreme.at));
+            points.extend(self.extremes().stressed(&singular));
         }
         points.sort_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
         points.dedup();
