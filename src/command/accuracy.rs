@@ -7,8 +7,11 @@ use signorini::{
     interrupt::{Interrupts, Signal},
     mesh::{Mesh, Order},
     petsc::Session,
+    problem::{Bar, Dimension},
     scene::{Scene, Stepping},
 };
+
+use std::time::Instant;
 
 /// If the scene requires an accuracy: adapts the mesh, or takes the mesh `made` before a restart, and sets the
 /// time steps of the scene. Collective.
@@ -21,9 +24,14 @@ pub(super) fn adapt(
 ) -> Result<Option<Adapted>, Failure> {
     let Some(accuracy) = scene.accuracy else { return Ok(None) };
     let is_root = session.comm().is_root();
+    let (started, mut is_first) = (Instant::now(), true);
     let mut show = |mesh: &Adapted| {
         if is_root {
             screen::adapting(mesh, accuracy);
+            if is_first {
+                screen::expected(mesh, accuracy, started.elapsed().as_secs_f64());
+            }
+            is_first = false;
         }
     };
     let _interrupts = Interrupts::defer();
@@ -129,8 +137,12 @@ pub(super) fn verdict(task: &Task, outcome: Option<&Outcome>) -> Option<String> 
     });
     let reasons: Vec<String> = missed.into_iter().chain(adapted.short.clone()).collect();
     let of_time = if outcome.stopped.is_some() { " in the time of ζ_*" } else { "" };
+    let at_probe = |bar: &&Bar| bar.dimension == Dimension::Stress && bar.name.contains('.');
+    let stresses = outcome.bars.iter().find(at_probe).map_or_else(String::new, |bar| {
+        format!(" (stresses at probes: of {:.1e} {})", bar.scale, scene.units.stress)
+    });
     Some(match reasons.is_empty() {
-        true => format!("{asked} reached{of_time}: {mesh}"),
+        true => format!("{asked} reached{of_time}{stresses}: {mesh}"),
         false => format!("{asked} NOT reached ({}): {mesh}", reasons.join("; ")),
     })
 }

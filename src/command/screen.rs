@@ -51,6 +51,17 @@ pub fn adapting(mesh: &Adapted, accuracy: f64) {
     let _ = writeln!(io::stderr(), "{}", row("adapting", text));
 }
 
+/// Shows what the rounds to come may need, after the first one has taken `seconds`. The error of quadratic elements on
+/// adapted meshes falls like 1/unknowns. The rounds to come take about fifteen times as long as the run on the last
+/// mesh, and 11 kB for each of its unknowns.
+pub fn expected(mesh: &Adapted, accuracy: f64, seconds: f64) {
+    let growth = (mesh.error.max(mesh.damage_error.unwrap_or(0.0)) / accuracy).max(1.0);
+    let unknowns = growth * mesh.unknowns as f64;
+    let (seconds, megabytes) = (15.0 * growth * seconds, 50.0 + 0.011 * unknowns);
+    let text = format!("roughly {unknowns:.0e} unknowns, {seconds:.0e} s, {megabytes:.0} MB");
+    let _ = writeln!(io::stderr(), "{}", row("expected", text));
+}
+
 /// Shows an accepted step of a run to t = `end`.
 pub fn progress(bar: &mut Progress, record: &StepRecord, end: f64) {
     let message = format!(

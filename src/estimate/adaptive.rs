@@ -7,16 +7,17 @@
 //! An estimate misses details finer than the mesh, so a [`Measurement`] ends the rounds: the same steps on the mesh
 //! bisected everywhere. If a figure then changes by more than its share of the accuracy, the rounds go on.
 
+mod changes;
 mod finer;
 mod measurement;
 mod pilot;
+mod progress;
 mod round;
 mod sizes;
 
 use crate::{
     evolution::RunError,
     interrupt::Signal,
-    memory,
     mesh::{Mesh, MeshError, Refinement},
     petsc::{PetscError, Session},
     problem::{Bar, Collapse, DiscreteProblem, LoadCurve, SetupError},
@@ -24,10 +25,10 @@ use crate::{
 };
 use measurement::Measurement;
 use pilot::{INSTANTS, Pilot};
+use progress::Progress;
 use round::Round;
 use serde::{Deserialize, Serialize};
 use sizes::{divided, sharpened};
-use std::collections::{BTreeMap, BTreeSet};
 
 /// A mesh that was adapted to a scene.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -129,13 +130,6 @@ const PILOT_TOLERANCE: f64 = 0.05;
 /// Maximum number of rounds, and of triangles of a mesh or its measurement.
 const MAX_ROUNDS: usize = 25;
 const MAX_TRIANGLES: usize = 4_000_000;
-/// Number of measurements after which an extreme alone causes no more rounds …
-const MEASUREMENTS: usize = 4;
-/// … and what the user can do.
-const SLOW: &str = "falls slowly; --accuracy-of asks for it alone";
-/// What is wrong with a figure whose error does not become smaller.
-const STAYS: &str = "stays while the mesh becomes finer, as at a singular point; --accuracy-of NAME,… asks for others";
-
 /// Refines `mesh` until the measured errors in a run of `scene` are at most `accuracy`: the errors of the figures,
 /// of u (energy norm) and of the damage. If the run ends at ζ_*, only the errors of u and of this time count. The
 /// caller controls the errors of the time steps. `seen` is called with each mesh and its errors. If a run on a
@@ -236,12 +230,7 @@ fn refined(
 ) -> Result<Adapted, AdaptError> {
     let mut refinement = Refinement::start(mesh);
     let mut rounds = 0;
-    // The most triangles of a run so far.
-    let mut most = 0;
-    // The triangles and the errors over the required ones of the rounds that were measured.
-    let mut excesses: Vec<(usize, BTreeMap<String, f64>)> = Vec::new();
-    // The extremes whose errors stay while the mesh becomes finer.
-    let mut grows = BTreeSet::new();
+    let mut progress = Progress::new(session, accuracy);
     loop {
         rounds += 1;
         let mesh = &refinement.mesh;
@@ -253,85 +242,34 @@ fn refined(
             continue;
         }
         let round = Round::new(&scene, mesh, pilot, accuracy);
-        most = most.max(triangles);
-        let mut measure = || {
-            check_memory(session, most, 4 * triangles)?;
-            let mut measured =
-                Measurement::new(session, &scene, mesh, &round.pilot, solver, rounds)?;
-            let errors = measured.errors(&[]).into_iter();
-            let errors = errors.map(|error| (error.excess(accuracy), error.name));
-            excesses.push((triangles, errors.map(|(excess, name)| (name, excess)).collect()));
-            let stay = problem.extremes().into_iter().filter(|name| stays(&excesses, name));
-            grows.extend(stay.map(str::to_owned));
-            measured.leave_out(&grows);
-            Ok::<_, AdaptError>(measured)
+        progress.estimated(triangles, round.estimate());
+        let measure = || {
+            progress.check_memory(4 * triangles)?;
+            Measurement::new(session, &scene, mesh, &round.pilot, solver, rounds)
         };
-        let (measured, failed) = match round.is_enough().then(&mut measure) {
-            Some(Ok(measured)) => (Some(measured), None),
+        let (measured, failed) = match round.is_enough().then(measure) {
+            Some(Ok(measured)) => (Some(progress.measured(triangles, measured)), None),
             Some(Err(error)) if error.signal().is_some() => return Err(error),
             Some(Err(error)) => (None, Some(error.to_string())),
             None => (None, None),
         };
-        let limit = || "the limit on rounds or triangles is reached".to_owned();
+        let measured = measured.as_ref();
+        let errors = measured.map_or_else(Vec::new, |of| of.errors(&scene.accuracy_of));
         let exhausted = rounds >= MAX_ROUNDS || 4 * triangles > MAX_TRIANGLES;
-        let mut adapted = round.adapted(measured.as_ref(), rounds);
-        let errors = measured.as_ref().map(|measured| measured.errors(&scene.accuracy_of));
-        let worst = errors.as_ref().and_then(|errors| errors.first());
-        let excess = worst.map(|worst| worst.excess(accuracy));
-        let stays = || {
-            let name = &worst?.name;
-            stays(&excesses, name).then(|| format!("the error of {name} {STAYS}"))
-        };
-        // Stresses at an end of contact converge slowly.
-        let slow = || {
-            let is_extreme = |name: &str| problem.extremes().contains(&name);
-            let mut missed = errors.iter().flatten().filter(|error| error.excess(accuracy) > 1.0);
-            let are_slow = scene.accuracy_of.is_empty()
-                && excesses.len() >= MEASUREMENTS
-                && missed.all(|error| is_extreme(&error.name));
-            are_slow.then(|| Some(format!("the error of {} {SLOW}", worst?.name))).flatten()
-        };
-        let short = failed.or_else(stays).or_else(slow).or(exhausted.then(limit));
-        let reached = excess.is_some_and(|excess| excess <= 1.0);
+        let limit = || "the limit on rounds or triangles is reached".to_owned();
+        let is_named = !scene.accuracy_of.is_empty();
+        let short = failed.or_else(|| progress.stuck(&errors, is_named));
+        let short = short.or(exhausted.then(limit));
+        let reached = errors.first().is_some_and(|worst| worst.excess(accuracy) <= 1.0);
         let ends = reached || short.is_some();
-        adapted.short = short.filter(|_| !reached);
+        let adapted = round.adapted(measured, rounds, short.filter(|_| !reached));
         seen(&adapted);
         if ends {
             return Ok(adapted);
         }
-        let measured = measured.as_ref();
         let (ratios, levels) = (round.size_ratios(measured), round.levels(measured));
-        most = most.max(if measured.is_some() { 4 * triangles } else { 0 });
         refinement = sharpened(divided(refinement, &ratios)?, &levels)?;
-        check_memory(session, most, refinement.mesh.triangles.len())?;
-    }
-}
-
-/// Whether the error of `name` is too large and has not become half of what it was with an eighth of the triangles, or
-/// two measurements before, each of which reduced the triangles that cause it. Of first order it would be a third.
-fn stays(excesses: &[(usize, BTreeMap<String, f64>)], name: &str) -> bool {
-    /// Measurements between two errors that are compared.
-    const ROUNDS: usize = 2;
-    let [earlier @ .., (triangles, last)] = excesses else { return false };
-    let Some(last) = last.get(name).filter(|excess| **excess > 1.0) else { return false };
-    let much_coarser = earlier.iter().filter(|(count, _)| 8 * count <= *triangles);
-    let some_before = earlier.len().checked_sub(ROUNDS).map(|i| &earlier[i]);
-    let before = much_coarser.chain(some_before).filter_map(|(_, excess)| excess.get(name));
-    before.copied().reduce(f64::max).is_some_and(|largest| *last > 0.5 * largest)
-}
-
-/// Checks that a run on `triangles` fits into the memory. Runs on up to `solved` triangles have needed the peak memory
-/// of this process so far, and the need grows in proportion. Collective.
-fn check_memory(session: &Session, solved: usize, triangles: usize) -> Result<(), AdaptError> {
-    /// Below this number most memory is that of the libraries.
-    const MANY: usize = 20_000;
-    let comm = session.comm();
-    let peak = 1e-9 * comm.total(memory::peak());
-    let (needed, there) =
-        (peak * triangles as f64 / solved as f64, peak + 1e-9 * comm.min(memory::available()));
-    match solved >= MANY && needed > there {
-        true => Err(AdaptError::Memory { triangles, needed, there }),
-        false => Ok(()),
+        progress.check_memory(refinement.mesh.triangles.len())?;
     }
 }
 

@@ -89,14 +89,24 @@ impl<'a> Round<'a> {
         // For some figures alone, the estimates only have to be reliable.
         let named = !self.scene.accuracy_of.is_empty();
         let wanted = if named { self.accuracy.max(ROUGH) } else { self.accuracy };
-        self.error.max(self.damage_error.unwrap_or(0.0)) <= ENOUGH * wanted
+        self.estimate() <= ENOUGH * wanted
             && (named || self.open <= ENOUGH)
             && self.unresolved.is_empty()
             && self.pilot.depths().iter().all(|&depth| depth <= self.deepest)
     }
 
+    /// The larger one of the estimated errors.
+    pub(super) fn estimate(&self) -> f64 {
+        self.error.max(self.damage_error.unwrap_or(0.0))
+    }
+
     /// The mesh with its errors.
-    pub(super) fn adapted(&self, measured: Option<&Measurement>, rounds: usize) -> Adapted {
+    pub(super) fn adapted(
+        &self,
+        measured: Option<&Measurement>,
+        rounds: usize,
+        short: Option<String>,
+    ) -> Adapted {
         let worst = |measured: &Measurement| {
             let errors = measured.errors(&self.scene.accuracy_of).into_iter();
             errors.map(|error| (error.name, error.relative)).next()
@@ -120,7 +130,7 @@ impl<'a> Round<'a> {
             },
             measured: measured.map_or_else(Measured::default, Measurement::result),
             worst: measured.and_then(worst),
-            short: None,
+            short,
         }
     }
 

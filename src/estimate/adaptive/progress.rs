@@ -1,0 +1,111 @@
+//! Progress of the rounds: is it worth to go on?
+
+use super::{
+    AdaptError,
+    measurement::{MeasuredError, Measurement},
+};
+use crate::{memory, petsc::Session};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Number of measurements after which an extreme alone causes no more rounds. Stresses at an end of contact converge
+/// slowly.
+const MEASUREMENTS: usize = 4;
+/// Number of measurements between two errors that are compared.
+const BETWEEN: usize = 2;
+
+/// The errors of the rounds so far, over the errors that the accuracy allows.
+pub(super) struct Progress<'a> {
+    session: &'a Session,
+    accuracy: f64,
+    /// The most triangles of a run.
+    most: usize,
+    /// Per round: the triangles and the estimated error.
+    estimates: Vec<(usize, f64)>,
+    /// Per measurement: the triangles and the measured errors.
+    excesses: Vec<(usize, BTreeMap<String, f64>)>,
+    /// The extremes whose errors stay while the mesh becomes finer.
+    grows: BTreeSet<String>,
+}
+
+impl<'a> Progress<'a> {
+    pub(super) fn new(session: &'a Session, accuracy: f64) -> Self {
+        let (estimates, excesses, grows) = Default::default();
+        Self { session, accuracy, most: 0, estimates, excesses, grows }
+    }
+
+    /// Adds a round on `triangles` with its estimated error.
+    pub(super) fn estimated(&mut self, triangles: usize, error: f64) {
+        self.most = self.most.max(triangles);
+        self.estimates.push((triangles, error / self.accuracy));
+    }
+
+    /// Adds a measurement of a round on `triangles`. Extremes whose errors stay grow as the mesh is refined.
+    pub(super) fn measured(&mut self, triangles: usize, mut measured: Measurement) -> Measurement {
+        self.most = self.most.max(4 * triangles);
+        let errors = measured.errors(&[]).into_iter();
+        let errors = errors.map(|error| (error.excess(self.accuracy), error.name));
+        self.excesses.push((triangles, errors.map(|(excess, name)| (name, excess)).collect()));
+        let stay = measured.extremes().filter(|name| self.stays(name)).map(str::to_owned);
+        let stay: Vec<String> = stay.collect();
+        self.grows.extend(stay);
+        measured.leave_out(&self.grows);
+        measured
+    }
+
+    /// Why no more rounds can reach the accuracy: some figure's error stays or falls slowly. `is_named`: the accuracy is
+    /// required for some figures only.
+    pub(super) fn stuck(&self, errors: &[MeasuredError], is_named: bool) -> Option<String> {
+        let is_missed = |error: &&MeasuredError| error.excess(self.accuracy) > 1.0;
+        let mut missed = errors.iter().filter(is_missed);
+        let Some(worst) = errors.first().filter(is_missed) else { return self.not_of_the_mesh() };
+        let name = &worst.name;
+        if self.stays(name) {
+            return Some(format!(
+                "the error of {name} stays while the mesh becomes finer, as at a singular point; \
+                 --accuracy-of NAME,… asks for others"
+            ));
+        }
+        let is_slow = !is_named && self.excesses.len() >= MEASUREMENTS;
+        (is_slow && missed.all(|error| error.is_extreme)).then(|| {
+            format!("the error of {name} falls slowly; --accuracy-of {name} asks for it alone")
+        })
+    }
+
+    /// Whether the error of `name` is too large and has not become half of what it was with an eighth of the triangles,
+    /// or two measurements before, each of which reduced the triangles that cause it. Of first order it would be a
+    /// third.
+    fn stays(&self, name: &str) -> bool {
+        let [earlier @ .., (triangles, last)] = &self.excesses[..] else { return false };
+        let Some(last) = last.get(name).filter(|excess| **excess > 1.0) else { return false };
+        let much_coarser = earlier.iter().filter(|(count, _)| 8 * count <= *triangles);
+        let some_before = earlier.len().checked_sub(BETWEEN).map(|i| &earlier[i]);
+        let before = much_coarser.chain(some_before).filter_map(|(_, excess)| excess.get(name));
+        before.copied().reduce(f64::max).is_some_and(|largest| *last > 0.5 * largest)
+    }
+
+    /// Whether the estimated error has not become half of what it was with a sixty-fourth of the triangles.
+    fn not_of_the_mesh(&self) -> Option<String> {
+        let (triangles, last) = *self.estimates.last().filter(|(_, excess)| *excess > 1.0)?;
+        let before = self.estimates.iter().filter(|(count, _)| 64 * count <= triangles);
+        let largest = before.map(|(_, excess)| *excess).reduce(f64::max)?;
+        (last > 0.5 * largest).then(|| {
+            "the estimated error does not fall as the mesh becomes finer: rounding or the time steps cause it"
+                .to_owned()
+        })
+    }
+
+    /// Checks that a run on `triangles` fits into the memory. Earlier runs have needed the peak memory of this process,
+    /// and the need grows in proportion. Collective.
+    pub(super) fn check_memory(&self, triangles: usize) -> Result<(), AdaptError> {
+        /// Below this number most memory is that of the libraries.
+        const MANY: usize = 20_000;
+        let comm = self.session.comm();
+        let peak = 1e-9 * comm.total(memory::peak());
+        let needed = peak * triangles as f64 / self.most as f64;
+        let there = peak + 1e-9 * comm.min(memory::available());
+        match self.most >= MANY && needed > there {
+            true => Err(AdaptError::Memory { triangles, needed, there }),
+            false => Ok(()),
+        }
+    }
+}
