@@ -1,22 +1,22 @@
-//! Points of the boundary at which stresses are singular: they grow without bound as the mesh is refined.
+//! Points with singular stresses: they grow without bound as the mesh is refined.
 //!
-//! In a corner with the interior angle ω, stresses are singular (Williams, J. Appl. Mech. 19, 1952) if
+//! There sectors of materials meet. Near such a point u = r^λ (U, V) and σ = r^(λ−1) (σ_rr, σ_rθ, σ_θθ), with functions of
+//! the angle θ (Williams, J. Appl. Mech. 19, 1952; Bogy, J. Appl. Mech. 35, 1968). With σ_θθ = d (ε_θθ + ν ε_rr) and
+//! E = d (1 − ν²), Hooke's law and equilibrium are the system z′ = A(λ) z for z = (U, V, σ_rθ, σ_θθ):
+//! U′ = (1 − λ) V + σ_rθ/μ, V′ = −(1 + νλ) U + σ_θθ/d, σ_rθ′ = −λ²E U + (1 − νλ) σ_θθ, σ_θθ′ = −(1 + λ) σ_rθ.
 //!
-//! - ω > 180° and both sides have the same condition;
-//! - both sides slide without friction and ω > 90°, except on a smooth boundary (the exponent is π/ω − 1);
-//! - one side is clamped and the other one free, as open contact is, and sin² ω > 1/(1 + ν) in plane stress, 1 − ν
-//!   in plane strain, or ω > 90° (61° and 57° for ν = 0.3; the exponent 1 in Williams's equation);
-//! - one side slides without friction on a support and the other one is free, and ω > 90°;
-//! - two materials meet there (Bogy, J. Appl. Mech. 35, 1968; for most pairs of materials), except at a right angle
-//!   to a support without friction.
+//! z is continuous at interfaces. Sectors with the angles α₁, α₂, … transfer it by T = … exp(α₂A₂) exp(α₁A₁). The sides
+//! have conditions B z = 0 and C z = 0, so that det(B; CT) = 0. Inside the body z returns to itself: det(T − I) = 0.
 
 use super::DiscreteProblem;
 use crate::{
-    mesh::CORNER_ANGLE,
-    model::{Material, Plane},
-    scene::Condition,
+    mesh::{CORNER_ANGLE, Mesh},
+    scene::{Boundary, Condition},
 };
+use nalgebra::{Complex, Matrix2x4, Matrix3, Matrix4};
+use rustc_hash::FxHashMap as HashMap;
 use std::collections::BTreeMap;
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// A point with singular stresses.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,135 +29,243 @@ pub struct Singular {
     pub name: String,
 }
 
-/// The condition on a side of a corner. The order is that of constraint.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Support {
-    Free,
-    /// Sliding where the contact is closed, and free where it is open.
-    Contact,
-    Sliding,
-    Clamped,
+/// A condition on an edge, and its boundary.
+type Support<'a> = (&'a Condition, &'a Boundary);
+
+/// Bounds of Re λ and |Im λ|. Above 0.975 a bisection raises the stress by less than 2 %; λ = 0 is a rigid motion.
+const LAMBDA: [f64; 3] = [0.03, 0.975, 1.5];
+/// Number of parts of each side of this rectangle.
+const PARTS: usize = 48;
+/// A line that turns by less than this angle at a node, rad, is straight; by more than the other one, it has a corner.
+const STRAIGHT: f64 = PI / 90.0;
+const CORNER: f64 = PI / 3.0 + 0.01;
+
+/// Are stresses singular where sectors (stiffness and angle, rad) meet, with conditions on two sides, or inside the body?
+/// Along half the border of the rectangle the argument of the determinant changes by π times the number of its roots.
+fn is_singular(sectors: &[(Matrix3<f64>, f64)], sides: Option<[Matrix2x4<f64>; 2]>) -> bool {
+    let unit: f64 = sectors.iter().map(|(stiffness, _)| stiffness[(2, 2)]).sum();
+    let determinant = |l: Complex<f64>| {
+        let transfer = sectors.iter().fold(Matrix4::identity(), |transfer, (stiffness, angle)| {
+            let [d, nu_d, mu] = [(0, 0), (0, 1), (2, 2)].map(|entry| stiffness[entry] / unit);
+            let (nu, [o, i]) = (nu_d / d, [0.0, 1.0].map(Complex::from));
+            let columns = [
+                [o, -i - l * nu, -l * l * d * (1.0 - nu * nu), o],
+                [i - l, o, o, o],
+                [i / mu, o, o, -i - l],
+                [o, i / d, i - l * nu, o],
+            ];
+            (Matrix4::from(columns) * Complex::from(*angle)).exp() * transfer
+        });
+        let Some(sides) = sides else { return (transfer - Matrix4::identity()).determinant() };
+        let [first, last] = sides.map(|side| side.map(Complex::from));
+        let mut rows = Matrix4::zeros();
+        rows.fixed_rows_mut::<2>(0).copy_from(&first);
+        rows.fixed_rows_mut::<2>(2).copy_from(&(last * transfer));
+        rows.determinant()
+    };
+    let ([least, largest, height], last) = (LAMBDA, 3 * PARTS);
+    let values = (0..=last).map(|i| {
+        let s = if i == last { 1.0 } else { (i % PARTS) as f64 / PARTS as f64 };
+        determinant(match i / PARTS {
+            0 => Complex::new(largest, height * s * s),
+            1 => Complex::new(largest + (least - largest) * s, height),
+            _ => Complex::new(least, height * (1.0 - s).powi(2)),
+        })
+    });
+    let values: Vec<_> = values.collect();
+    values.windows(2).map(|pair| (pair[1] * pair[0].conj()).arg()).sum::<f64>() > FRAC_PI_2
 }
 
-impl Support {
-    fn slides(self) -> bool {
-        matches!(self, Self::Contact | Self::Sliding)
+/// The rank of a support in the order of constraint, and the possible conditions on its side, which leaves its node at an
+/// `angle`, rad. Contact slides where it is closed, and is free where it is open.
+fn conditions(support: Option<&Support>, angle: f64) -> (u8, Vec<Matrix2x4<f64>>) {
+    let sliding = |direction: Option<[f64; 2]>| {
+        let (sine, cosine) = direction.map_or(FRAC_PI_2, |[x, y]| y.atan2(x) - angle).sin_cos();
+        Matrix2x4::new(cosine, sine, 0.0, 0.0, 0.0, 0.0, -sine, cosine)
+    };
+    let free = Matrix2x4::new(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
+    match support.map(|(condition, _)| condition) {
+        None | Some(Condition::Load(_)) => (0, vec![free]),
+        Some(Condition::Gap(gap)) => (1, vec![free, sliding(gap.normal)]),
+        Some(Condition::Symmetry) => (2, vec![sliding(None)]),
+        Some(Condition::Displacement([Some(_), None])) => (2, vec![sliding(Some([1.0, 0.0]))]),
+        Some(Condition::Displacement([None, _])) => (2, vec![sliding(Some([0.0, 1.0]))]),
+        Some(Condition::Displacement(_)) => (3, vec![Matrix2x4::identity()]),
     }
 }
 
-/// A side of a corner: its edge, its support, and the name of the supporting boundary.
-type Side<'a> = ([usize; 2], Support, Option<&'a str>);
+/// The lines of a mesh: the boundary and the interfaces of materials.
+struct Lines<'a> {
+    mesh: &'a Mesh,
+    /// By the side ab of a triangle abc with a on a line: the node c and the stiffness.
+    next: HashMap<[usize; 2], (usize, Matrix3<f64>)>,
+    /// Per node on a line: the other ends of its edges on lines.
+    ends: BTreeMap<usize, Vec<usize>>,
+}
 
-/// Angles, in degrees, above which stresses are singular. Corners of a polygon with smooth sides turn by less than
-/// `SMOOTH`.
-const SMOOTH: f64 = 10.0;
-const SLIDING: f64 = 90.0 + SMOOTH;
+impl Lines<'_> {
+    /// The angle, rad, at which the chord ab leaves a.
+    fn chord(&self, a: usize, b: usize) -> f64 {
+        let [x, y] = self.mesh.direction(a, b);
+        y.atan2(x)
+    }
 
-/// The angle, in degrees, above which stresses at the end of a clamp are singular.
-fn clamped(Material { poisson, plane, .. }: Material) -> f64 {
-    let square = match plane {
-        Plane::Stress => 1.0 / (1.0 + poisson),
-        Plane::Strain => 1.0 - poisson,
-    };
-    square.min(1.0).sqrt().asin().to_degrees()
+    /// The share |ab|/(|ab| + |bc|) of the edge ab in the turn at b of the line abc, rad; `None` at a corner or a fork.
+    fn turn(&self, a: usize, b: usize) -> Option<f64> {
+        let &[p, q] = &self.ends[&b][..] else { return None };
+        let c = if p == a { q } else { p };
+        let turn = wrapped(self.chord(b, c) - self.chord(b, a) - PI);
+        let [ab, bc] = [a, c].map(|end| self.mesh.edge_normal([b, end]).1);
+        (turn.abs() <= CORNER).then_some(turn * ab / (ab + bc))
+    }
+
+    /// The angle, rad, at which a curve with the chord ab leaves a: exact for circles. If b is a corner, the turn at a counts.
+    fn tangent(&self, a: usize, b: usize) -> f64 {
+        let is_line = self.ends[&a].contains(&b);
+        let turn = || self.turn(a, b).or_else(|| Some(-self.turn(b, a)?));
+        self.chord(a, b) - Some(is_line).filter(|is| *is).and_then(|_| turn()).unwrap_or(0.0)
+    }
+
+    /// Is a line smooth at a node? A curve turns by as much at the neighbours, so that its tangents do not turn.
+    fn is_smooth(&self, node: usize, straight: f64) -> bool {
+        let &[p, q] = &self.ends[&node][..] else { return false };
+        let chords = wrapped(self.chord(node, p) - self.chord(node, q) - PI);
+        let tangents = wrapped(self.tangent(node, p) - self.tangent(node, q) - PI);
+        let is_curve = tangents * chords.signum() <= 0.4 * chords.abs();
+        chords.abs() <= straight + 1e-9 || (is_curve && chords.abs() <= CORNER)
+    }
+
+    /// The sectors counter-clockwise from the edge to `first`, and the end of the last edge.
+    fn around(&self, node: usize, first: usize) -> (Vec<(Matrix3<f64>, f64)>, usize) {
+        let (mut sectors, mut end) = (Vec::<(Matrix3<f64>, f64)>::new(), first);
+        while let Some(&(next, stiffness)) = self.next.get(&[node, end]) {
+            let turn = wrapped(self.tangent(node, next) - self.tangent(node, end));
+            match sectors.last_mut() {
+                Some((last, angle)) if *last == stiffness => *angle += turn,
+                _ => sectors.push((stiffness, turn)),
+            }
+            end = next;
+            if end == first {
+                break;
+            }
+        }
+        (sectors, end)
+    }
+}
+
+/// An angle between −π and π, rad.
+fn wrapped(angle: f64) -> f64 {
+    (angle + PI).rem_euclid(TAU) - PI
 }
 
 impl DiscreteProblem {
-    /// The points of the boundary of the whole body with singular stresses.
+    /// The points of the whole body with singular stresses.
     pub fn singular_points(&self) -> Vec<Singular> {
-        let mesh = self.mesh();
-        let boundary = mesh.boundary_edges();
-        let (angles, found) = self.corner_angles(&boundary);
-        let supports = self.supports_of_edges();
-        let mut sides = BTreeMap::<usize, Vec<Side>>::new();
-        for &edge in &boundary {
-            let (support, name) = supports.get(&edge).copied().unwrap_or((Support::Free, None));
-            edge.iter()
-                .for_each(|node| sides.entry(*node).or_default().push((edge, support, name)));
-        }
-        let singular = |(node, sides): (usize, Vec<Side>)| {
-            let (material, of_first) = *found.get(&node)?;
-            let of_first = of_first.to_degrees() / (sides.len() / 2).max(1) as f64;
-            let angle = angles[node].to_degrees() / (sides.len() / 2).max(1) as f64;
-            let (_, most, name) = *sides.iter().max_by_key(|(_, support, _)| *support)?;
-            let is_same = |other: Support| other == most || (other.slides() && most.slides());
-            let same = sides.iter().all(|(_, support, _)| is_same(*support));
-            let is_free = sides.iter().any(|(_, support, _)| *support <= Support::Contact);
-            // An interface at a right angle to a smooth frictionless support continues in its mirror image.
-            let mirrored = same && most.slides() && (of_first - 90.0).abs() <= SMOOTH;
-            let two_materials = of_first < angle - SMOOTH && !mirrored;
-            let is_smooth = (angle - 180.0).abs() <= CORNER_ANGLE.to_degrees();
-            let limit = match most {
-                _ if same && most.slides() && is_smooth => f64::INFINITY,
-                _ if most.slides() => SLIDING,
-                _ if same => 180.0 + SMOOTH,
-                _ if is_free => clamped(material),
-                _ => SLIDING,
-            };
-            let length = |(edge, ..): &([usize; 2], _, _)| mesh.edge_normal(*edge).1;
-            (angle > limit || two_materials).then(|| Singular {
-                at: mesh.nodes[node],
-                radius: sides.iter().map(length).fold(0.0, f64::max),
-                name: match name.filter(|_| !same) {
-                    _ if two_materials => "the end of an interface of two materials".to_owned(),
-                    Some(name) => format!("the end of `{name}`"),
-                    None if most.slides() => {
-                        format!("a corner of `{}`", name.unwrap_or_default())
-                    }
-                    None => "a re-entrant corner".to_owned(),
-                },
-            })
-        };
-        sides.into_iter().filter_map(singular).collect()
+        let (lines, supports) = (self.lines(), self.supports_of_edges());
+        let is_side = |edge: [usize; 2]| lines.next.contains_key(&edge);
+        let wedges = lines.ends.iter().flat_map(|(&node, ends)| {
+            let is_first = move |end: &usize| is_side([node, *end]) && !is_side([*end, node]);
+            let is_inside = ends.iter().all(|&end| is_side([node, end]) && is_side([end, node]));
+            let first = ends.iter().copied().filter(is_first);
+            first.chain(is_inside.then_some(ends[0])).map(move |first| [node, first])
+        });
+        wedges.filter_map(|edge| self.singular(&lines, &supports, edge)).collect()
     }
 
-    /// The interior angle at each node of the `boundary`, rad, NaN elsewhere; and at these nodes the elastic constants of
-    /// the first triangle with the angle in which they hold.
-    fn corner_angles(
-        &self,
-        boundary: &[[usize; 2]],
-    ) -> (Vec<f64>, BTreeMap<usize, (Material, f64)>) {
-        let mesh = self.mesh();
-        let mut angles = vec![f64::NAN; mesh.nodes.len()];
-        let materials: Vec<Material> = self.scene().materials().collect();
+    /// The lines of the mesh.
+    fn lines(&self) -> Lines<'_> {
+        let (mesh, mut next, mut ends) = (self.mesh(), HashMap::default(), BTreeMap::new());
+        let stiffness: Vec<_> = self.scene().materials().map(|of| of.stiffness()).collect();
         let numbers = self.scene().materials_of(mesh);
-        let mut found = BTreeMap::<usize, (Material, f64)>::new();
-        boundary.iter().flatten().for_each(|&node| angles[node] = 0.0);
-        for (t, triangle) in mesh.triangles.iter().enumerate() {
-            for i in 0..3 {
-                if angles[triangle[i]].is_nan() {
-                    continue;
-                }
-                let [a, b, c] = [0, 1, 2].map(|k| triangle[(i + k) % 3]);
-                let [p, q] = [b, c].map(|end| mesh.direction(a, end));
-                let turn = (p[0] * q[1] - p[1] * q[0]).atan2(p[0] * q[0] + p[1] * q[1]);
-                angles[triangle[i]] += turn;
-                let own = materials[numbers.get(t).map_or(0, |&number| number as usize)];
-                let (first, of_first) = found.entry(triangle[i]).or_insert((own, 0.0));
-                if own.stiffness() == first.stiffness() {
-                    *of_first += turn;
-                }
+        let mut on_line = vec![false; mesh.nodes.len()];
+        mesh.boundary_edges().iter().flatten().for_each(|&node| on_line[node] = true);
+        let mut first = vec![None; mesh.nodes.len()];
+        for (triangle, own) in mesh.triangles.iter().zip(&numbers) {
+            triangle.iter().for_each(|&p| on_line[p] |= first[p].get_or_insert(own) != &own);
+        }
+        for (t, &[a, b, c]) in mesh.triangles.iter().enumerate() {
+            let own = stiffness[numbers.get(t).map_or(0, |&number| number as usize)];
+            let sides =
+                [[a, b, c], [b, c, a], [c, a, b]].into_iter().filter(|side| on_line[side[0]]);
+            next.extend(sides.map(|[p, q, r]| ([p, q], (r, own))));
+        }
+        for (&[a, b], (_, own)) in next.iter().filter(|(edge, _)| on_line[edge[1]]) {
+            if next.get(&[b, a]).is_none_or(|(_, other)| a < b && own != other) {
+                ends.entry(a).or_insert_with(Vec::new).push(b);
+                ends.entry(b).or_insert_with(Vec::new).push(a);
             }
         }
-        (angles, found)
+        Lines { mesh, next, ends }
     }
 
-    /// The supported edges of the boundary, with the names of their curves.
-    fn supports_of_edges(&self) -> BTreeMap<[usize; 2], (Support, Option<&str>)> {
+    /// The singular point of the sectors at a node counter-clockwise from the edge to `first`.
+    fn singular(
+        &self,
+        lines: &Lines,
+        supports: &BTreeMap<[usize; 2], Support>,
+        [node, first]: [usize; 2],
+    ) -> Option<Singular> {
+        let (mut sectors, last) = lines.around(node, first);
+        let sides = [[node, first], [last, node]].map(|edge| supports.get(&edge));
+        let [(a, of_a), (b, of_b)] = [(sides[0], first), (sides[1], last)]
+            .map(|(side, end)| conditions(side, lines.tangent(node, end)));
+        let (is_inside, slides) = (first == last, a.min(b) > 0 && a.max(b) < 3);
+        let [p, q] = [&of_a, &of_b].map(|of| of[of.len() - 1]);
+        let is_same = a == b && (p - q).norm().min((p + q).norm()) < 0.1;
+        // The contact joins normals.
+        let is_smooth = lines.is_smooth(node, if slides { CORNER_ANGLE } else { STRAIGHT });
+        let jumps = is_smooth && a == 1 && b == 1 && self.gap_jumps([last, node, first], sides);
+        if is_smooth && is_same && !jumps {
+            return None;
+        }
+        if is_smooth {
+            sectors.iter_mut().for_each(|(_, angle)| *angle = PI);
+        }
+        let mut cases = of_a.iter().flat_map(|a| of_b.iter().map(|b| [*a, *b]));
+        let of = sides[usize::from(b > a)].map_or("", |(_, boundary)| &*boundary.name);
+        let lengths = lines.ends[&node].iter().map(|&end| lines.mesh.edge_normal([node, end]).1);
+        let name = match sectors.len() {
+            _ if is_inside => "a corner of an inclusion".to_owned(),
+            2.. => "the end of an interface of two materials".to_owned(),
+            _ if jumps => format!("a jump of the gap of `{of}`"),
+            _ if slides => format!("a corner of `{of}`"),
+            _ if a != b => format!("the end of `{of}`"),
+            _ => "a re-entrant corner".to_owned(),
+        };
+        let is_singular = cases.any(|sides| is_singular(&sectors, (!is_inside).then_some(sides)));
+        let (at, radius) = (lines.mesh.nodes[node], lengths.fold(0.0, f64::max));
+        is_singular.then_some(Singular { at, radius, name })
+    }
+
+    /// Does the gap jump between the middles of the edges pq and qr of Γ_C, at the start or the end of the run? Bisection
+    /// follows the larger change of the gap. A jump does not vanish.
+    fn gap_jumps(&self, nodes: [usize; 3], [after, before]: [Option<&Support>; 2]) -> bool {
+        let [p, q, r] = nodes.map(|node| self.mesh().nodes[node]);
+        let gap = |s: f64, t: f64| {
+            let (end, side) = if s < 0.0 { (p, before) } else { (r, after) };
+            let [x, y] = [0, 1].map(|i| q[i] + 0.5 * s.abs() * (end[i] - q[i]));
+            side.and_then(|side| side.1.gap()).map_or(0.0, |gap| gap.distance.eval(x, y, t))
+        };
+        self.scene().sample_times(1).into_iter().any(|t| {
+            let change = |[a, b]: [f64; 2]| (gap(a, t) - gap(b, t)).abs();
+            let part = (0..50).fold([-1.0, 1.0], |[low, high], _| {
+                let halves = [[low, 0.5 * (low + high)], [0.5 * (low + high), high]];
+                halves[usize::from(change(halves[1]) > change(halves[0]))]
+            });
+            change(part) > 1e-9 * (p[0] - r[0]).hypot(p[1] - r[1])
+        })
+    }
+
+    /// The supported edges of the boundary, each with its support of the highest rank.
+    fn supports_of_edges(&self) -> BTreeMap<[usize; 2], Support<'_>> {
         let mut supports = BTreeMap::new();
         for boundary in &self.scene().boundaries {
-            let support = boundary.conditions.iter().map(|condition| match condition {
-                Condition::Displacement([Some(_), Some(_)]) => Support::Clamped,
-                Condition::Displacement(_) | Condition::Symmetry => Support::Sliding,
-                Condition::Gap(_) => Support::Contact,
-                Condition::Load(_) => Support::Free,
-            });
-            let support = support.max().unwrap_or(Support::Free);
             let curve = self.mesh().curves.get(&boundary.name);
             for edge in curve.iter().flat_map(|curve| &curve.edges) {
-                let known = supports.entry(*edge).or_insert((Support::Free, None));
-                if support > known.0 {
-                    *known = (support, Some(&*boundary.name));
+                for condition in &boundary.conditions {
+                    let (new, rank) = ((condition, boundary), |of| conditions(Some(of), 0.0).0);
+                    let known = supports.entry(*edge).or_insert(new);
+                    *known = if rank(&new) > rank(known) { new } else { *known };
                 }
             }
         }

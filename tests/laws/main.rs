@@ -40,6 +40,7 @@ mod rescue;
 mod rigid;
 mod scales;
 mod shipped_scenes;
+mod singular;
 mod step_errors;
 mod stress;
 mod undo;
