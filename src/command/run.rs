@@ -62,6 +62,12 @@ impl RunArguments {
     fn check(&self) -> Result<(), Failure> {
         self.scene.check()?;
         self.solver.iter().try_for_each(|name| check_solver("--solver", name))?;
+        let is_root = |out: &PathBuf| out.canonicalize().is_ok_and(|out| out.parent().is_none());
+        if self.out.iter().any(is_root) {
+            let problem =
+                "--out: the results cannot go into the root folder; choose another folder";
+            return Err(Failure::input(problem));
+        }
         check_petsc(&self.petsc)
     }
 

@@ -170,6 +170,16 @@ fn folders_nobody_can_write_to() {
 }
 
 #[test]
+fn the_root_folder_for_the_results() {
+    // A test that fails must not write there, even as root: the load has an unknown name.
+    let scene = ["run", "scene.toml", "--set", "boundary.top.traction=[0, 's']", "--out"];
+    for root in ["/", "/../", "//"] {
+        let said = TestDirectory::new().say(&[&scene[..], &[root]].concat());
+        said.fails(2, &["--out: the results cannot go into the root folder"]);
+    }
+}
+
+#[test]
 fn gmsh_missing_or_failing() {
     let test_directory = changed("square.msh", "square.geo");
     test_directory.write("square.geo", "Point(1) = {0, 0, 0};\nLine(1) = {1, ;\n");

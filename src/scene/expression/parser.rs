@@ -3,7 +3,7 @@
 use super::{
     DEEPEST, Expression,
     Instruction::{self, Binary, Choose, Compare, Number, Unary, Variable},
-    Table, interval, truth,
+    LONGEST, Table, interval, truth,
 };
 use crate::suggestion::suggestion;
 use std::{f64::consts::PI, path::Path, sync::Arc};
@@ -64,6 +64,12 @@ type Parsed = Result<(), String>;
 impl<'a> Parser<'a> {
     /// The program of `text`.
     pub(super) fn parse(text: &'a str, folder: &'a Path) -> Result<Vec<Instruction>, String> {
+        if text.len() > LONGEST {
+            let length = text.len();
+            return Err(format!(
+                "is {length} bytes long, and {LONGEST} are allowed; shorten it, or use table(\"file.csv\")"
+            ));
+        }
         let mut parser = Self { text, folder, at: 0, depth: 0, program: Vec::new() };
         parser.whole()?;
         Ok(parser.program)
