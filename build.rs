@@ -8,7 +8,7 @@ const PETSC: &str = "\
     PetscOptionsInsertString|PetscOptionsSetValue|PetscOptionsHasName|\
     PetscOptionsLeftGet|PetscOptionsLeftRestore|\
     MPI_Comm_size|MPI_Comm_rank|MPI_Allreduce|MPI_Bcast|MPI_Type_contiguous|MPI_Type_commit|MPI_Type_free|\
-    MPI_Ibarrier|MPI_Test|MPI_Abort|omp_set_max_active_levels|\
+    MPI_Ibarrier|MPI_Test|MPI_Abort|omp_set_max_active_levels|mallopt|dtrsm_|\
     PetscSFCreate|PetscSFDestroy|PetscSFSetGraph|PetscSFBcastBegin|PetscSFBcastEnd|\
     MatPartitioningCreate|MatPartitioningDestroy|MatPartitioningSetType|\
     MatPartitioningSetAdjacency|MatPartitioningSetFromOptions|MatPartitioningApply|\
@@ -44,6 +44,7 @@ fn main() {
     println!("cargo:rustc-link-lib=mpi");
     println!("cargo:rustc-link-lib=cholmod");
     println!("cargo:rustc-link-lib=gomp");
+    println!("cargo:rustc-link-lib=blas");
 
     let mpi_flags = Command::new("mpicc")
         .arg("--showme:compile")
@@ -55,9 +56,12 @@ fn main() {
         petsc.include_paths.iter().map(|path| format!("-I{}", path.display())).collect();
     flags.extend(mpi_flags.split_whitespace().map(str::to_owned));
     // Debian's MPI is Open MPI, whose constants are the addresses of variables.
-    let variables = "PETSC_COMM_WORLD|ompi_mpi_(double|byte)|ompi_mpi_op_(sum|max|replace)";
-    let headers = "#include <petsctao.h>\n#include <petscsf.h>\n\
+    let variables =
+        "PETSC_COMM_WORLD|M_ARENA_MAX|ompi_mpi_(double|byte)|ompi_mpi_op_(sum|max|replace)";
+    let headers = "#include <petsctao.h>\n#include <petscsf.h>\n#include <malloc.h>\n\
                    void omp_set_max_active_levels(int);\n\
+                   void dtrsm_(const char *, const char *, const char *, const char *, const int *, const int *,\
+                   const double *, const double *, const int *, double *, const int *);\n\
                    PETSC_EXTERN PetscErrorCode PCCreate_Shell(PC);\n";
     declare("petsc", headers, &flags, PETSC, variables);
     let variables = "CHOLMOD_(LONG|REAL|DOUBLE|SUPERNODAL|GIVEN|NATURAL|PATTERN|OUT_OF_MEMORY|TOO_LARGE|\

@@ -2,20 +2,24 @@
 
 use signal_hook::{
     consts::{SIGINT, SIGTERM, SIGUSR1, SIGUSR2, SIGXFSZ},
-    flag,
+    flag, low_level,
 };
 use std::{
-    io,
+    io::{self, Write},
     sync::{
-        Arc, LazyLock,
+        Arc, LazyLock, Once,
         atomic::{AtomicBool, AtomicUsize, Ordering},
     },
+    thread::{self, sleep},
+    time::Duration,
 };
 
 /// Whether the next signal ends the process at once.
 static AT_ONCE: LazyLock<Arc<AtomicBool>> = LazyLock::new(|| Arc::new(true.into()));
 /// The received signal; 0 for none.
 static RECEIVED: LazyLock<Arc<AtomicUsize>> = LazyLock::new(Arc::default);
+/// The start of [`watch`].
+static WATCH: Once = Once::new();
 
 /// Lets SIGINT and SIGTERM end the process with the exit codes 130 and 143. While an [`Interrupts`] defers
 /// them, only the second signal ends it. On several ranks SIGUSR1 and SIGUSR2 have the same meaning, because
@@ -36,6 +40,18 @@ pub fn install() -> io::Result<()> {
     Ok(())
 }
 
+/// Ends the process 7 s after a signal, if it has not ended by itself: a factorisation can take minutes.
+fn watch() {
+    while received().is_none() {
+        sleep(Duration::from_millis(200));
+    }
+    sleep(Duration::from_secs(7));
+    let signal = Signal(RECEIVED.load(Ordering::Relaxed) as i32);
+    let state = "within a long computation; --restart goes on from the last checkpoint, if any";
+    let _ = writeln!(io::stderr(), "error: ended by {signal} {state}");
+    low_level::exit(signal.exit_code().into());
+}
+
 /// While this exists, a first signal is only recorded, so that the work can end properly.
 #[derive(Debug)]
 pub struct Interrupts(());
@@ -44,12 +60,9 @@ impl Interrupts {
     /// Defers signals from now on.
     pub fn defer() -> Self {
         AT_ONCE.store(RECEIVED.load(Ordering::Relaxed) != 0, Ordering::Relaxed);
+        // Without the thread a second signal ends the process.
+        WATCH.call_once(|| drop(thread::Builder::new().stack_size(1 << 16).spawn(watch)));
         Self(())
-    }
-
-    /// As [`received`].
-    pub fn received(&self) -> Option<Signal> {
-        received()
     }
 }
 

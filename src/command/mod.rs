@@ -28,7 +28,8 @@ use clap::Args;
 use ranks::require_one_process;
 use signorini::{
     contact::{self, REGISTRY, SOLVERS, TAO_TYPES, summaries},
-    mesh::{self, Mesh, MeshError, Order},
+    interrupt::{Signal, received},
+    mesh::{self, Mesh, Order},
     output::terminal::say,
     scene::{MeshSource, SCHEMA, Scene},
 };
@@ -52,26 +53,16 @@ impl Failure {
     /// Another rank has failed and reports its error.
     const ON_ANOTHER_RANK: Self = Self { code: 1, message: None };
 
-    /// The user has to change the input.
+    /// The user has to change the input, or a signal has ended the work on it.
     fn input(error: impl fmt::Display) -> Self {
-        Self { code: 2, message: Some(error.to_string()) }
-    }
-
-    /// There is no mesh.
-    fn mesh(error: MeshError) -> Self {
-        match error {
-            MeshError::Interrupted(signal) => {
-                Self { code: signal.exit_code(), message: Some(error.to_string()) }
-            }
-            _ => Self::input(error),
-        }
+        Self { code: received().map_or(2, Signal::exit_code), ..Self::from(error) }
     }
 }
 
 /// Failures that are not caused by the input: a solver missed its tolerance, or results could not be written.
 impl<E: fmt::Display> From<E> for Failure {
     fn from(error: E) -> Self {
-        Self { code: 1, message: Some(error.to_string()) }
+        Self { code: received().map_or(1, Signal::exit_code), message: Some(error.to_string()) }
     }
 }
 
@@ -201,7 +192,7 @@ fn read_mesh(scene: &Scene, adapts: bool) -> Result<Mesh, Failure> {
     {
         return first_mesh(&scene.mesh, accuracy);
     }
-    mesh::load(file, parameters, scene.order).map_err(Failure::mesh)
+    mesh::load(file, parameters, scene.order).map_err(Failure::input)
 }
 
 /// The mesh of a `.geo` from which the adaptation to an accuracy starts. Its order is 2 also for linear elements, so
@@ -215,13 +206,13 @@ fn first_mesh(source: &MeshSource, accuracy: f64) -> Result<Mesh, Failure> {
     /// The size is halved at most this many times, as some curves keep their kinks.
     const HALVINGS: usize = 4;
     let MeshSource { file, parameters } = source;
-    let usual = mesh::load(file, parameters, Order::Linear).map_err(Failure::mesh)?;
-    let scaling = mesh::scaling_factor(file).map_err(Failure::mesh)?;
+    let usual = mesh::load(file, parameters, Order::Linear).map_err(Failure::input)?;
+    let scaling = mesh::scaling_factor(file).map_err(Failure::input)?;
     let largest = mesh::extent(&usual.nodes) / scaling / CELLS;
     let of_size = |size: f64| {
         let mut parameters = parameters.clone();
         parameters.insert("size".to_owned(), size);
-        mesh::load(file, &parameters, Order::Quadratic).map_err(Failure::mesh)
+        mesh::load(file, &parameters, Order::Quadratic).map_err(Failure::input)
     };
     let mut first = of_size(largest)?;
     for halvings in 1..=HALVINGS {

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use signorini::{
     estimate::Extremes,
     evolution::{Next, Observed, Observer, Outcome, RunError, RunState, Step, StepRecord},
-    interrupt::Interrupts,
+    interrupt::{Interrupts, received},
     memory,
     output::{
         self, FieldWriter, OutputError, Table,
@@ -39,7 +39,7 @@ pub(super) struct Recorder<'a> {
     last: Option<Step>,
     /// The time of all accepted steps after n = 0, s.
     stepping: f64,
-    interrupts: Interrupts,
+    _interrupts: Interrupts,
     /// The time of the last checkpoint.
     saved: Instant,
 }
@@ -49,11 +49,11 @@ impl<'a> Recorder<'a> {
     pub(super) fn new(task: &'a Task) -> Result<Self, OutputError> {
         let fields = FieldWriter::new(&task.folder, &task.problem)?;
         let bar = task.problem.body.nodes.partition.comm().is_root().then(|| screen::open(task));
-        let (interrupts, saved) = (Interrupts::defer(), Instant::now());
+        let (_interrupts, saved) = (Interrupts::defer(), Instant::now());
         let (path, columns) = (task.folder.join("history.csv"), task.problem.quantities());
         let history = Table::new(path, &StepRecord::default(), &columns)?;
         let (last, stepping) = Default::default();
-        Ok(Self { task, fields, bar, history, last, stepping, interrupts, saved })
+        Ok(Self { task, fields, bar, history, last, stepping, _interrupts, saved })
     }
 
     /// Continues from a checkpoint and shows its time.
@@ -218,7 +218,7 @@ impl Observer for Recorder<'_> {
         let seconds = self.task.problem.scene().output.checkpoint;
         // The first rank decides by its clock.
         let due = self.bar.is_some() && self.saved.elapsed().as_secs_f64() > seconds;
-        Ok(match self.interrupts.received() {
+        Ok(match received() {
             Some(signal) => Next::End(signal),
             None if due && seconds > 0.0 => Next::Checkpoint,
             None => Next::Step,

@@ -213,9 +213,10 @@ impl Constraints {
             };
             let Ok(place) = bounds.binary_search_by_key(&dof, |bound| bound.dof) else { continue };
             let Bound { lower, upper, .. } = &mut bounds[place];
-            match b > 0.0 {
-                true => *upper = upper.min(room / b),
-                false => *lower = lower.max(room / b),
+            if b > 0.0 {
+                *upper = upper.min(room / b)
+            } else {
+                *lower = lower.max(room / b)
             }
             let depth = *lower - *upper;
             if depth > 0.0 && depth > ROUNDING * extent(coordinates) {
@@ -271,10 +272,7 @@ fn parallel(basis: &[[f64; 2]], normal: [f64; 2]) -> Result<Option<usize>, Confl
 
 /// `line` or its opposite, whichever `normal` nearly is.
 fn along(line: [f64; 2], normal: [f64; 2]) -> [f64; 2] {
-    match line[0] * normal[0] + line[1] * normal[1] >= 0.0 {
-        true => line,
-        false => line.map(|v| -v),
-    }
+    if line[0] * normal[0] + line[1] * normal[1] >= 0.0 { line } else { line.map(|v| -v) }
 }
 
 fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {

@@ -98,18 +98,6 @@ pub enum AdaptError {
         /// The time, s.
         time: f64,
     },
-    /// The next mesh does not fit into the memory.
-    #[error(
-        "a mesh of {triangles} triangles would need about {needed:.1} GB of memory, and there are {there:.1} GB"
-    )]
-    Memory {
-        /// The triangles of the mesh.
-        triangles: usize,
-        /// GB.
-        needed: f64,
-        /// GB.
-        there: f64,
-    },
     /// PETSc failed.
     #[error(transparent)]
     Petsc(#[from] PetscError),

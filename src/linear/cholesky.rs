@@ -5,7 +5,8 @@ use super::{
     cholmod::Cholmod,
     supernodal::{Supernodal, TriangularSolver},
 };
-use crate::petsc::PetscError;
+use crate::memory;
+use crate::petsc::{Communicator, PetscError};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -98,6 +99,13 @@ impl Cholesky {
         let load = &load[..self.interior];
         let residual: f64 = a.multiply(&x).iter().zip(load).map(|(ax, b)| (b - ax).powi(2)).sum();
         residual <= LARGEST_RESIDUAL * LARGEST_RESIDUAL * load.iter().map(|b| b * b).sum::<f64>()
+    }
+
+    /// Checks that there is memory for the values of L: Linux may kill a process that takes more. Collective.
+    pub(super) fn check_memory(&self, comm: Communicator) -> Result<(), PetscError> {
+        let [_, entries] = self.factor.operations_and_entries();
+        let needed = 8.0 * comm.total(entries) / comm.size() as f64;
+        PetscError::if_short(comm.max(needed - memory::available()), "for a Cholesky factor")
     }
 
     /// L₂₂ of a factor that has values.

@@ -2,7 +2,9 @@
 //! 2008), with the names of its user guide.
 
 use super::{LowerTriangle, raw};
+use crate::memory::{REMEDY, available};
 use crate::petsc::PetscError;
+use signal_hook::{consts::SIGTERM, low_level};
 use std::{ffi::c_void, mem::take, ops::Range, ptr, slice};
 
 /// A `cholmod_factor` P A Pᵀ = L Lᵀ with the `cholmod_common` it was made with.
@@ -16,10 +18,6 @@ pub(super) struct Cholmod {
 /// CHOLMOD tries another order above this number of operations per entry of L (`cholmod_analyze` in its user
 /// guide).
 const MUCH_WORK: f64 = 500.0;
-
-/// Advice for a matrix without a factor.
-const REMEDY: &str = ": take larger triangles, or multigrid in its place (-- -elastic_pc_type gamg \
-                      -damage_pc_type gamg)";
 
 /// Values are freed in blocks of 32 MB; this is the number of values.
 const FREED: usize = 1 << 22;
@@ -64,6 +62,11 @@ impl Cholmod {
                 false => raw::cholmod_l_camd(&mut view, none, 0, sets, place, common),
             }
         };
+        if done == 0 && dissected && available() > 100.0 * view.nzmax as f64 {
+            // METIS has enough memory. It takes SIGTERM for an error of its own.
+            let _ = low_level::raise(SIGTERM);
+            return Err(PetscError::ours("ended by SIGTERM while METIS worked"));
+        }
         self.check(done != 0)?;
         order.retain(|&row| (row as usize) < size - interface);
         order.extend((size - interface) as i64..size as i64);
@@ -198,12 +201,12 @@ impl Cholmod {
     fn check(&self, done: bool) -> Result<(), PetscError> {
         let message = || match self.common.status {
             raw::CHOLMOD_OUT_OF_MEMORY => {
-                format!("there is not enough memory for a Cholesky factor{REMEDY}")
+                format!("there is not enough memory for a Cholesky factor; {REMEDY}")
             }
             // The matrix is valid, so the order is not: METIS has 32-bit indices, and cholmod_l_metis does
             // not check whether it failed.
             raw::CHOLMOD_TOO_LARGE | raw::CHOLMOD_INVALID => {
-                format!("the mesh is too large for a Cholesky factor (32-bit indices){REMEDY}")
+                format!("the mesh is too large for a Cholesky factor (32-bit indices); {REMEDY}")
             }
             status => format!("CHOLMOD failed with status {status}"),
         };

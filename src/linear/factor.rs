@@ -236,10 +236,7 @@ impl Factor {
     /// Counts an application to `r`. There must be a factor for vectors of this size.
     fn start_application(&mut self, r: &Vector) -> Result<(), PetscError> {
         self.applications += 1;
-        match self.exists() && r.owned() == self.scaling.rows() {
-            true => Ok(()),
-            false => Err(missing()),
-        }
+        if self.exists() && r.owned() == self.scaling.rows() { Ok(()) } else { Err(missing()) }
     }
 
     /// The forward elimination of [`Self::apply`]: reduces E^-½ A₀ E^-½ z = `r` to the condensed unknowns.

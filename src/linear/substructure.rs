@@ -74,6 +74,7 @@ impl Substructure {
         let Blocks { local: mut a, .. } = division.blocks(matrix)?;
         a.push_coupled(near, 1.0);
         let local = Cholesky::analyse(&mut a, None, near, precision)?;
+        local.check_memory(comm)?;
         let last = interior as i64..(interior + near) as i64;
         let in_place = local.order()[interior..].iter().copied().eq(last);
         let schur = SchurComplement::new(comm, of_schur);

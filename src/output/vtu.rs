@@ -138,7 +138,8 @@ impl FieldWriter {
                 points.extend(stress_data(&stresses.map_err(|e| OutputError::new(&path, e))?));
                 write_whole(&path, piece(&mesh, &points, &cells).as_bytes())
             };
-            self.pending = Some((thread::spawn(write), entry));
+            let thread = thread::Builder::new().spawn(write);
+            self.pending = Some((thread.unwrap_or_else(|_| crate::memory::end_process()), entry));
             return self.contact.add(&contact_file, state.time, &contact);
         }
         let vertices = &problem.body.vertices.partition;

@@ -1,6 +1,7 @@
 //! PETSc's error codes with PETSc's messages.
 
 use super::raw;
+use crate::memory::{REMEDY, end_process};
 use std::{
     borrow::Cow,
     cell::RefCell,
@@ -24,6 +25,12 @@ impl PetscError {
     /// An error that our own checks or CHOLMOD found, not PETSc.
     pub(crate) fn ours(message: impl Into<String>) -> Self {
         Self { code: 0, message: message.into() }
+    }
+
+    /// An error if bytes of memory are `missing` for a purpose.
+    pub(crate) fn if_short(missing: f64, purpose: &str) -> Result<(), Self> {
+        let short = format!("not enough memory {purpose}: {:.0} MB are missing", 1e-6 * missing);
+        if missing > 0.0 { Err(Self::ours(format!("there is {short}; {REMEDY}"))) } else { Ok(()) }
     }
 }
 
@@ -49,6 +56,9 @@ pub(super) unsafe extern "C" fn keep_message(
             // SAFETY: PETSc passes NUL-terminated strings that live during this call.
             false => unsafe { CStr::from_ptr(p) }.to_string_lossy(),
         };
+        if text(function).contains("Malloc") {
+            end_process();
+        }
         MESSAGE.set(format!("{} (in {})", text(message).trim_end(), text(function)));
     }
     code

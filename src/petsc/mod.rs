@@ -9,6 +9,7 @@
 //! All objects live on `PETSC_COMM_WORLD`; sizes and slices are those owned by this rank.
 #![allow(unsafe_code)]
 
+mod allocator;
 mod communicator;
 mod error;
 mod ghosts;

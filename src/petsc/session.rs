@@ -4,15 +4,20 @@ use super::{
     Communicator, PetscError, check, error::keep_message, handle::OPEN_HANDLES, kept, options,
     options::c_string, raw,
 };
+use crate::memory::address_space;
 use std::{
     env,
-    ffi::{CString, c_char, c_int},
+    ffi::{CStr, CString, c_char, c_int},
     ptr,
     sync::{Mutex, MutexGuard, PoisonError, atomic::Ordering},
 };
 
 /// PETSc is not thread-safe: only the thread that has this lock may call it.
 static TURN: Mutex<()> = Mutex::new(());
+
+/// The address space of OpenBLAS's buffer (BUFFER_SIZE in its common_x86_64.h) and a lower bound of MPI's, bytes.
+const BUFFER: f64 = 134.3e6;
+const MPI: f64 = 30e6;
 
 /// The right to use PETSc; every object of this module is made from it.
 ///
@@ -34,11 +39,20 @@ impl Session {
         // would take a third of a factorisation's time. The setting is one of each thread.
         // SAFETY: only sets a parameter.
         unsafe { raw::omp_set_max_active_levels(0) };
+        // Each thread would reserve 64 MB of address space for a heap of its own.
+        // SAFETY: only sets a parameter.
+        unsafe { raw::mallopt(raw::M_ARENA_MAX, 1) };
         let mut running = raw::PetscBool::PETSC_FALSE;
         // SAFETY: PetscInitialized may be called at any time.
         check(unsafe { raw::PetscInitialized(&mut running) })?;
         if running == raw::PetscBool::PETSC_FALSE {
+            PetscError::if_short(BUFFER + MPI - address_space(), "to start (ulimit -v)")?;
             initialize(options)?;
+            PetscError::if_short(BUFFER - address_space(), "to start (ulimit -v)")?;
+            let [l, n] = [c"L", c"N"].map(CStr::as_ptr);
+            // OpenBLAS keeps the buffer of its first call. A call that gets no buffer would try again for ever.
+            // SAFETY: the arrays have one entry.
+            unsafe { raw::dtrsm_(l, l, n, n, &1, &1, &1.0, &1.0, &1, &mut 1.0, &1) };
         } else if !options.is_empty() {
             options::insert(options)?;
         }

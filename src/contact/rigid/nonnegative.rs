@@ -38,10 +38,7 @@ pub fn nonnegative(a: &DMatrix<f64>, b: &DVector<f64>) -> DVector<f64> {
                 break;
             }
             // Go towards z until the first p_i vanishes, and drop it.
-            let reach = |(&i, &v): (&usize, &f64)| match v <= 0.0 {
-                true => p[i] / (p[i] - v),
-                false => 1.0,
-            };
+            let reach = |(&i, &v): (&usize, &f64)| if v <= 0.0 { p[i] / (p[i] - v) } else { 1.0 };
             let step = positive.iter().zip(z.iter()).map(reach).fold(1.0, f64::min);
             positive.iter().zip(z.iter()).for_each(|(&i, &v)| p[i] += step * (v - p[i]));
             positive.retain(|&i| p[i] > 1e-14 * p.amax().max(f64::MIN_POSITIVE));

@@ -4,7 +4,10 @@ use super::{
     AdaptError,
     measurement::{MeasuredError, Measurement},
 };
-use crate::{memory, petsc::Session};
+use crate::{
+    memory,
+    petsc::{PetscError, Session},
+};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Number of measurements after which an extreme alone causes no more rounds. Stresses at an end of contact converge
@@ -100,12 +103,9 @@ impl<'a> Progress<'a> {
         /// Below this number most memory is that of the libraries.
         const MANY: usize = 20_000;
         let comm = self.session.comm();
-        let peak = 1e-9 * comm.total(memory::peak());
-        let needed = peak * triangles as f64 / self.most as f64;
-        let there = peak + 1e-9 * comm.min(memory::available());
-        match self.most >= MANY && needed > there {
-            true => Err(AdaptError::Memory { triangles, needed, there }),
-            false => Ok(()),
-        }
+        let growth = (triangles as f64 / self.most as f64 - 1.0) * comm.total(memory::peak());
+        let missing = growth - comm.total(memory::available());
+        let missing = if self.most >= MANY { missing } else { 0.0 };
+        Ok(PetscError::if_short(missing, &format!("for a mesh of {triangles} triangles"))?)
     }
 }

@@ -1,6 +1,7 @@
 //! Runs the gmsh command line.
 
-use crate::{interrupt::Interrupts, mesh::MeshError};
+use crate::interrupt::{Interrupts, received};
+use crate::mesh::MeshError;
 use std::{
     collections::HashSet,
     env,
@@ -77,16 +78,13 @@ pub fn run(
     }
     let mut seen = HashSet::new();
     let lines: Vec<&str> = said.lines().filter(|line| seen.insert(*line)).take(SHOWN).collect();
-    let message = match lines.is_empty() {
-        true => format!("no message, {status}"),
-        false => lines.join("\n"),
-    };
+    let message = if lines.is_empty() { format!("no message, {status}") } else { lines.join("\n") };
     Err(MeshError::file(input, format!("gmsh could not {task}:\n{message}")))
 }
 
 /// Waits for gmsh. Ends it after the time limit or on a signal to this process.
 fn wait(mut gmsh: Child, input: &Path, task: &str) -> Result<ExitStatus, MeshError> {
-    let (started, interrupts) = (Instant::now(), Interrupts::defer());
+    let (started, _interrupts) = (Instant::now(), Interrupts::defer());
     let limit = env::var(SECONDS_VARIABLE).ok().and_then(|text| text.parse().ok());
     let limit = limit.unwrap_or(SECONDS);
     let mut told = false;
@@ -102,7 +100,7 @@ fn wait(mut gmsh: Child, input: &Path, task: &str) -> Result<ExitStatus, MeshErr
             told = true;
         }
         let late = started.elapsed().as_secs_f64() > limit;
-        let signal = interrupts.received();
+        let signal = received();
         if late || signal.is_some() {
             // It may have ended by itself just now.
             let _ = gmsh.kill();
