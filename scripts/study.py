@@ -80,10 +80,10 @@ def is_complete(folder, command, inputs):
             and all(file.stat().st_mtime <= path.stat().st_mtime for file in inputs))
 
 
-def run(command):
-    """Runs the program; returns the error, "" if there is none."""
+def run(command, runs):
+    """Runs the program beside `runs` - 1 others; returns the error, "" if there is none."""
     # Each run has a core of its own.
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "SIGNORINI_RUNS": str(runs)}
     command = [os.environ["SIGNORINI"], *command]
     ended = subprocess.run(command, capture_output=True, text=True, env=environment)
     return ended.stderr.strip() if ended.returncode else ""
@@ -125,9 +125,12 @@ def main(prog=None):
                  if not is_complete(folder, command, inputs)]
     print(f"{len(chosen)} runs, {len(chosen) - len(open_runs)} of them complete", flush=True)
     failed, done = {}, len(chosen) - len(open_runs)
-    with ThreadPoolExecutor(max(1, arguments.jobs)) as pool:
-        results = pool.map(lambda of: run(of[1]), open_runs)
-        for (folder, _), error in zip(open_runs, results):
+    jobs = max(1, min(arguments.jobs, len(open_runs)))
+    with ThreadPoolExecutor(jobs) as pool:
+        results = pool.map(lambda of: run(of[1], jobs), open_runs)
+        for (folder, command), error in zip(open_runs, results):
+            # The memory may suffice for this run alone, after the others.
+            error = run(command, 1) if "not enough memory" in error and jobs > 1 else error
             done += 1
             failed.update({folder: error} if error else {})
             print(f"{done}/{len(chosen)} {folder.name}{': ' + error if error else ''}", flush=True)

@@ -209,12 +209,12 @@ fn steps(grid: TimeGrid, unit: &str, can_be_damaged: bool) -> String {
 fn stop_time(stop: &Stop) -> String {
     let time = rounded(stop.time);
     match (stop.from_mesh, stop.uncertainty) {
-        (_, steps) if !(steps < stop.time) => {
+        (_, steps) if steps >= stop.time || steps.is_nan() => {
             format!(
                 "{time} (its error is unknown: ζ hardly falls there, or the time steps are too long)"
             )
         }
-        (Some(mesh), _) if !(stop.bar() < stop.time) => {
+        (Some(mesh), _) if stop.bar() >= stop.time => {
             format!(
                 "{time} (its error is unknown: with a finer mesh the time may differ by {mesh:.1e})"
             )

