@@ -6,7 +6,7 @@
 //! - [`RecoveredStrains`]: the error of u in the energy norm, per triangle, from strains fitted around each vertex
 //!   (the same strains give the [`NodalStress`] of pictures);
 //! - the error of the damage, from the damage source of these strains and from recovered gradients of ζ;
-//! - [`Bar`]: the error bar of each printed figure, measured by a second run on the mesh bisected everywhere;
+//! - [`Measured`]: the error bar of each printed figure, measured by a second run on a finer mesh;
 //! - [`ErrorBudget`]: the errors by the mesh, the time steps and the solver.
 //!
 //! [`adapted`] makes a mesh for an accuracy ([`Adapted`]). Each round has a run with few steps, estimates and
