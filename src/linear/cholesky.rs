@@ -101,10 +101,10 @@ impl Cholesky {
         residual <= LARGEST_RESIDUAL * LARGEST_RESIDUAL * load.iter().map(|b| b * b).sum::<f64>()
     }
 
-    /// Checks that there is memory for the values of L: Linux may kill a process that takes more. Collective.
+    /// Checks that there is memory for L, 32 MB of it perhaps in malloc's pool: Linux may kill for more. Collective.
     pub(super) fn check_memory(&self, comm: Communicator) -> Result<(), PetscError> {
         let [_, entries] = self.factor.operations_and_entries();
-        let needed = 8.0 * comm.total(entries) / comm.size() as f64;
+        let needed = 8.0 * comm.total(entries) / comm.size() as f64 - 33.6e6;
         PetscError::if_short(comm.max(needed - memory::available()), "for a Cholesky factor")
     }
 

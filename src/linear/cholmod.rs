@@ -62,11 +62,6 @@ impl Cholmod {
                 false => raw::cholmod_l_camd(&mut view, none, 0, sets, place, common),
             }
         };
-        if done == 0 && dissected && available() > 100.0 * view.nzmax as f64 {
-            // METIS has enough memory. It takes SIGTERM for an error of its own.
-            let _ = low_level::raise(SIGTERM);
-            return Err(PetscError::ours("ended by SIGTERM while METIS worked"));
-        }
         self.check(done != 0)?;
         order.retain(|&row| (row as usize) < size - interface);
         order.extend((size - interface) as i64..size as i64);
@@ -83,6 +78,11 @@ impl Cholmod {
         // many entries as there are rows.
         this.factor =
             unsafe { raw::cholmod_l_analyze_p(&mut view, order.as_mut_ptr(), none, 0, common) };
+        if common.status == raw::CHOLMOD_INVALID && available() > 100.0 * view.nzmax as f64 {
+            // METIS made the order. It had enough memory, but takes SIGTERM for an error of its own.
+            let _ = low_level::raise(SIGTERM);
+            return Err(PetscError::ours("ended by SIGTERM while METIS worked"));
+        }
         this.analysed()
     }
 

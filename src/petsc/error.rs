@@ -29,7 +29,7 @@ impl PetscError {
 
     /// An error if bytes of memory are `missing` for a purpose.
     pub(crate) fn if_short(missing: f64, purpose: &str) -> Result<(), Self> {
-        let short = format!("not enough memory {purpose}: {:.0} MB are missing", 1e-6 * missing);
+        let short = format!("not enough memory {purpose}: over {:.0} MB missing", 1e-6 * missing);
         if missing > 0.0 { Err(Self::ours(format!("there is {short}; {REMEDY}"))) } else { Ok(()) }
     }
 }
