@@ -168,22 +168,7 @@ impl Measurement {
         let grows = named.iter().zip(extremes.grow(|at| size_at(mesh, at)));
         let grows = grows.filter(|(extreme, grows)| *grows || extreme.singular.is_some());
         self.grows = grows.map(|(extreme, _)| extreme.name.to_owned()).collect();
-        self.extremes = named.clone();
-        if std::env::var("DBG").is_ok() {
-            for (a, b) in coarse.extremes().of_points.iter().zip(&named) {
-                eprintln!(
-                    "DBG {} {:.4e} {:?} -> {:.4e} {:?} {:?}",
-                    a.name, a.value, a.at, b.value, b.at, b.singular
-                );
-            }
-            eprintln!(
-                "DBG {} {:?} -> {} {:?}",
-                coarse.extremes().contact_length,
-                coarse.extremes().ends,
-                fine.extremes().contact_length,
-                fine.extremes().ends
-            );
-        }
+        self.extremes = named;
         self.bars = bars(coarse, fine, factor);
         self.bars.retain(|bar| !self.grows.contains(&bar.name));
     }
