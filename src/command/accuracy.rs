@@ -94,8 +94,14 @@ pub(super) fn shorter_steps(task: &Task, outcome: &Outcome) -> Option<f64> {
         error if error > accuracy => (AIM * accuracy - of_mesh) / (error - of_mesh),
         _ => 1.0,
     });
-    let factor = factor.fold(1.0, f64::min);
+    let limit = if is_unconfirmed_stop(task, outcome) { 0.5 } else { 1.0 };
+    let factor = factor.fold(limit, f64::min);
     (0.0 < factor && factor < 1.0).then_some(factor.min(0.5))
+}
+
+/// Whether the run stops at ζ_*, but the runs that measure the errors of the mesh do not: the time steps may cause the stop.
+fn is_unconfirmed_stop(task: &Task, outcome: &Outcome) -> bool {
+    outcome.stopped.is_some() && task.measured.stop.is_none()
 }
 
 /// Whether the accuracy is required for this figure.
@@ -135,7 +141,10 @@ pub(super) fn verdict(task: &Task, outcome: Option<&Outcome>) -> Option<String> 
         let unit = if error.is_finite() { percent(error) } else { "?".to_owned() };
         format!("{name} is exact to {unit} only")
     });
-    let reasons: Vec<String> = missed.into_iter().chain(adapted.short.clone()).collect();
+    let unconfirmed = "only this run stops at ζ_*, not the runs that measure its errors".to_owned();
+    let unconfirmed = is_unconfirmed_stop(task, outcome).then_some(unconfirmed);
+    let reasons = missed.into_iter().chain(adapted.short.clone()).chain(unconfirmed);
+    let reasons: Vec<String> = reasons.collect();
     let of_time = if outcome.stopped.is_some() { " in the time of ζ_*" } else { "" };
     let at_probe = |bar: &&Bar| bar.dimension == Dimension::Stress && bar.name.contains('.');
     let stresses = outcome.bars.iter().find(at_probe).map_or_else(String::new, |bar| {

@@ -30,7 +30,8 @@ impl ErrorBudget {
             can_be_damaged: problem.damage().is_some(),
             zeta_steps: steps.map(|error| {
                 let (low, high) = problem.body.vertices.partition.min_max(error);
-                [high.max(-low), problem.body.mean(error).abs()]
+                // 0 < ζ ≤ 1 bounds every error of ζ.
+                [high.max(-low), problem.body.mean(error).abs()].map(|error| error.min(1.0))
             }),
         }
     }

@@ -150,7 +150,7 @@ impl Outcome {
     ) -> Result<(), PetscError> {
         let [before, now] = [longer, &*self].map(|run| run.last.record.step as f64);
         let ratio = (before / now).powi(2);
-        if ratio >= 1.0 {
+        if ratio >= 1.0 || longer.stopped.is_some() != self.stopped.is_some() {
             return Ok(());
         }
         let factor = (2.0 * ratio / (1.0 - ratio)).max(0.5);

@@ -186,6 +186,32 @@ fn time_steps_become_shorter_until_the_accuracy_is_reached() {
     }
 }
 
+/// A homogeneous bar under a short pulse: ½ λ_U ∫|ε|² dt = 4e5 · 1.09 · 9e-4 · 0.002 (π/2)^½, so that ζ(1) = 0.01643 is
+/// just above ζ_* = 0.01. Long steps stop at ζ_*, and a stop by their error alone is not "reached".
+#[test]
+fn a_stop_by_the_error_of_the_steps_is_not_reached() {
+    let directory = TestDirectory::new();
+    directory.write(
+        "scene.toml",
+        "mesh.file = 'square.msh'
+         material = { young = 1e6, poisson = 0.3, plane = 'stress' }
+         damage = { diffusion = 0.1, lambda_d = 0, lambda_u = 8e5, lambda_w = 0 }
+         time = { end = 1, step = 'auto' }
+         boundary = [{ name = 'left', symmetry = true }, { name = 'bottom', symmetry = true },
+                     { name = 'top', displacement = ['free', '3e-2*exp(-((t-0.4)/0.002)^2)'] }]",
+    );
+    for accuracy in ["0.1", "0.03", "0.01"] {
+        let said = directory.run(&["--accuracy", accuracy]);
+        let summary = directory.summary("out/scene");
+        let survives = summary["stopped_at"].is_null();
+        assert!(survives || said.out.contains("NOT reached (only this run stops"), "{}", said.out);
+        if let (true, Some(bar)) = (survives, summary["errors"]["figures"]["zeta_min"].as_f64()) {
+            let error = (summary["zeta_min"].as_f64().unwrap() - 0.01643).abs();
+            assert!(error <= bar, "{accuracy}: {error} exceeds {bar}");
+        }
+    }
+}
+
 /// A block under a load with the eccentricity t, which leaves it at t = ½.
 #[test]
 fn no_accuracy_is_promised_where_the_body_turns_over() {
