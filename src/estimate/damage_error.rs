@@ -1,22 +1,22 @@
 //! The error that the mesh makes in the damage.
 //!
-//! Let z be the damage on a much finer mesh, ζ the damage of the run, and e = z − ζ. The mesh causes e in two ways. The
-//! run has the damage source of its own strains, not of the strains on a finer mesh; for these, recovered strains ε*
-//! stand ([`RecoveredStrains`]), enlarged by the energy that the run misses, ‖ε*‖² (1 + η²). At the vertices e follows
-//! from
+//! Let z be the damage on a much finer mesh and ζ the damage of the run. The mesh causes z − ζ in two ways. The run has
+//! the damage source b of its own strains, not of the strains on a finer mesh. For these, recovered strains ε* stand
+//! ([`RecoveredStrains`]), enlarged by the energy that the run misses, ‖ε*‖² (1 + η²). In the state of largest
+//! displacement,
 //!
-//! (M + kκL) e_n = M e_{n−1} + k b, b_i = ∫ (φ(|ε*|² (1 + η²)(ζ/z)², z) − φ(|ε|², ζ)) λ_i,
+//! (M + tκL) d = t b, (M + tκL) e = t δb, δb_i = ∫ (φ(|ε*|² (1 + η²), ζ) − φ(|ε|², ζ)) λ_i
 //!
-//! in five to ten long steps between states of the run. (Under the same stress strains are proportional to 1/ζ.) Between
+//! are the damage by b during the time t of the run, and its error. At the vertices z − ζ is e ‖ζ₀ − ζ‖/‖d‖. Between
 //! the vertices z is curved: there the error of interpolation follows from recovered gradients of ζ.
 
 use super::{hierarchical::interpolation_error, recovery::RecoveredStrains, strains_at_nodes};
 use crate::{
-    evolution::{DamageStep, Instants, Outcome, RunError, agreed},
+    evolution::{DamageStep, Outcome, RunError, agreed},
     model::DamageLaw,
     problem::{DiscreteProblem, State},
 };
-use nalgebra::Vector3;
+use nalgebra::{DVector, Vector3};
 
 /// The estimated error that the mesh makes in the damage.
 pub(super) struct DamageError {
@@ -26,81 +26,78 @@ pub(super) struct DamageError {
     pub(super) change: Vec<f64>,
     /// See [`Outcome::damage_indicators`].
     pub(super) indicators: Vec<f64>,
-    /// The delay, s, with which the run reaches the minimum of z. It is taken at the last state at which min ζ and
-    /// min z still fall; `None` if there is no such state.
-    pub(super) delay: Option<f64>,
+    /// The delay, s, with which the run reaches the minimum of z.
+    pub(super) delay: f64,
 }
 
 /// The error that the mesh makes in the last damage. `None` without damage. Collective.
 pub(super) fn damage_error(
     problem: &DiscreteProblem,
     damage_step: &mut DamageStep,
-    mut instants: Instants,
     outcome: &Outcome,
 ) -> Option<DamageError> {
     let comm = problem.body.nodes.partition.comm();
     let last = &outcome.last.state;
     let undamaged = comm.all(last.zeta == problem.initial_damage());
     let laws = problem.damage().filter(|_| !undamaged)?;
-    instants.end(last);
-    instants.falling.extend(outcome.stopped.map(|stop| (stop.time, problem.threshold())));
-    let followed = follow(problem, damage_step, laws, &instants);
-    let (change, delay) = agreed(comm, followed).ok()?;
+    let changes = changes(problem, damage_step, laws, outcome);
+    let (change, delay) = agreed(comm, changes).ok()?;
     at_end(problem, last, change, delay)
 }
 
-/// Follows e at the vertices from the first state to the last. Returns it with the delay.
-fn follow(
+/// z − ζ at the vertices, and the delay at the vertex of minimum ζ.
+fn changes(
     problem: &DiscreteProblem,
     damage_step: &mut DamageStep,
     laws: &[DamageLaw],
-    instants: &Instants,
-) -> Result<(Vec<f64>, Option<f64>), RunError> {
+    outcome: &Outcome,
+) -> Result<(Vec<f64>, f64), RunError> {
     let vertices = &problem.body.vertices.partition;
-    let mut error = vec![0.0; problem.body.mesh.nodes.len()];
-    let (mut delay, mut before): (_, Option<(f64, Vec<f64>)>) = (None, None);
-    for state in &instants.states {
-        let mut load = source_error(problem, laws, state, &error)?;
-        if let Some((time, earlier)) = &before {
-            let mean: Vec<f64> = load.iter().zip(earlier).map(|(a, b)| 0.5 * (a + b)).collect();
-            damage_step.system(state.time - time)?.advance(&mean, &mut error)?;
-            vertices.update(&mut error, 1)?;
-            load = source_error(problem, laws, state, &error)?;
-        }
-        before = Some((state.time, load));
-        let z: Vec<f64> = state.zeta.iter().zip(&error).map(|(zeta, e)| zeta + e).collect();
-        let minimum = vertices.min_max(&z).0;
-        if minimum > problem.threshold() {
-            delay = instants.delay(state.time, minimum).or(delay);
-        }
-    }
-    Ok((error, delay))
+    let (last, state) = (&outcome.last.state, &outcome.most_displaced().state);
+    let loads = [damage_step.source(state).load, source_error(problem, laws, state)?];
+    let system = damage_step.system(last.time)?;
+    let mut spread = |load: DVector<f64>| -> Result<_, RunError> {
+        let mut field = DVector::zeros(load.len());
+        system.advance(load.as_slice(), field.as_mut_slice())?;
+        vertices.update(field.as_mut_slice(), 1)?;
+        Ok(field)
+    };
+    let [d, e] = loads.map(&mut spread);
+    let (d, e) = (d?, e?);
+    let initial = problem.initial_damage();
+    let done = |i: usize| initial[i] - last.zeta[i];
+    let norm = |values: &dyn Fn(usize) -> f64| {
+        let weights = problem.body.vertices.weights.iter().enumerate().take(vertices.owned());
+        vertices.comm().total(weights.map(|(i, weight)| weight * values(i).powi(2)).sum()).sqrt()
+    };
+    let scale = norm(&done) / norm(&|i| d[i]);
+    let weakest = (0..vertices.owned()).min_by(|&a, &b| last.zeta[a].total_cmp(&last.zeta[b]));
+    let delay = weakest.map_or(0.0, |i| last.time * (done(i) / d[i]) * (e[i] / d[i]));
+    let (_, rank) = vertices.comm().min_with_rank(weakest.map_or(f64::INFINITY, |i| last.zeta[i]));
+    Ok(((scale * e).as_slice().to_vec(), vertices.comm().broadcast(rank, delay)))
 }
 
-/// b_i in `state` with e at the vertices, m²/s, by the midpoints of the sides, which integrate quadratic functions.
+/// δb_i in `state`, m²/s, by the midpoints of the sides, which integrate quadratic functions.
 fn source_error(
     problem: &DiscreteProblem,
     laws: &[DamageLaw],
     state: &State,
-    error: &[f64],
-) -> Result<Vec<f64>, RunError> {
+) -> Result<DVector<f64>, RunError> {
     let body = &problem.body;
     let recovered = RecoveredStrains::new(body, &state.u)?;
     let zeta = problem.zeta_at_points(&state.zeta);
     let missing = recovered.energy_error(&problem.elasticity, &zeta, &state.u).relative().powi(2);
     // ε_ij ε_ij, from (ε_xx, ε_yy, 2ε_xy).
     let square = |e: Vector3<f64>| e[0] * e[0] + e[1] * e[1] + 0.5 * e[2] * e[2];
-    let mut load = vec![0.0; error.len()];
+    let mut load = DVector::zeros(state.zeta.len());
     for (t, strains) in strains_at_nodes(body, &state.u).enumerate() {
         let (nodes, law) = (body.mesh.triangles[t], &laws[body.material(t)]);
         let difference = recovered.difference(t);
         for side in 0..3 {
             let ends = [nodes[side], nodes[(side + 1) % 3]];
-            let [zeta, e] = [&state.zeta[..], error].map(|of| 0.5 * (of[ends[0]] + of[ends[1]]));
-            let z = law.truncate(zeta + e);
+            let zeta = 0.5 * (state.zeta[ends[0]] + state.zeta[ends[1]]);
             let finer = square(strains[3 + side] + difference[3 + side]) * (1.0 + missing);
-            let change = law.source(finer * (law.truncate(zeta) / z).powi(2), z)
-                - law.source(square(strains[3 + side]), zeta);
+            let change = law.source(finer, zeta) - law.source(square(strains[3 + side]), zeta);
             ends.iter().for_each(|&end| load[end] += body.triangles[t].area() / 6.0 * change);
         }
     }
@@ -113,7 +110,7 @@ fn at_end(
     problem: &DiscreteProblem,
     last: &State,
     change: Vec<f64>,
-    delay: Option<f64>,
+    delay: f64,
 ) -> Option<DamageError> {
     let body = &problem.body;
     let comm = body.vertices.partition.comm();

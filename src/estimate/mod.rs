@@ -81,19 +81,17 @@ pub fn run_from(
 
 /// Estimates the errors of a finished run and enters them in its outcome. Collective.
 fn estimated(run: Run) -> Result<Outcome, RunError> {
-    let Run { mut damage_step, contact_step, controller, mut outcome, instants } = run;
+    let Run { mut damage_step, contact_step, controller, mut outcome } = run;
     let mut compliance = contact_step.into_compliance()?;
     let (problem, phases) = (damage_step.problem, damage_step.phases);
     outcome.accuracy = phases.time("accuracy", || compliance.accuracy(&outcome))?;
     outcome.accuracy.energy = phases.time("accuracy", || energy_error(problem, &outcome))?;
     outcome.penetration = phases.time("accuracy", || {
-        let states = instants.states.iter().chain([&outcome.last.state]);
-        problem.penetration_note(states)
+        problem.penetration_note(&[&outcome.most_displaced().state, &outcome.last.state])
     });
-    let mesh =
-        phases.time("mesh error", || damage_error(problem, &mut damage_step, instants, &outcome));
+    let mesh = phases.time("mesh error", || damage_error(problem, &mut damage_step, &outcome));
     if let (Some(stop), Some(error)) = (&mut outcome.stopped, &mesh) {
-        stop.from_mesh = error.delay.map(|delay| DELAYS * delay.abs());
+        stop.from_mesh = Some(DELAYS * error.delay.abs());
     }
     outcome.damage_indicators = mesh.as_ref().map_or_else(Vec::new, |mesh| mesh.indicators.clone());
     let steps = controller.step_error().filter(|_| problem.damage().is_some());

@@ -155,10 +155,7 @@ impl DiscreteProblem {
     }
 
     /// A note on contact between the nodes in some states of a run, if there is much. Collective.
-    pub(super) fn penetration_note<'s>(
-        &self,
-        states: impl Iterator<Item = &'s State>,
-    ) -> Option<String> {
+    pub(super) fn penetration_note(&self, states: &[&State]) -> Option<String> {
         if !self.has_contact() {
             return None;
         }

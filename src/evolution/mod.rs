@@ -31,7 +31,6 @@ mod damage_step;
 mod error;
 mod error_budget;
 mod extrapolation;
-mod instants;
 mod notes;
 mod observer;
 mod outcome;
@@ -46,7 +45,6 @@ pub(crate) use damage_step::DamageStep;
 pub use error::{RunError, StepFailure};
 pub use error_budget::{ErrorBudget, percent};
 pub use extrapolation::Extrapolation;
-pub(crate) use instants::Instants;
 pub(crate) use observer::Callback;
 pub use observer::{Next, Observed, Observer};
 pub use outcome::{BoundViolation, Outcome, Stop};
@@ -102,14 +100,14 @@ pub(crate) fn all_steps<'a>(
         source = damage_step.source(&first.state);
     }
     let controller = StepController::new(problem, &zeta, source);
-    let (outcome, instants) = (Outcome::new(first), Instants::new());
-    let mut run = Run { damage_step, contact_step, controller, outcome, instants };
+    let outcome = Outcome::new(first);
+    let mut run = Run { damage_step, contact_step, controller, outcome };
     match saved {
         None => run.report(observer)?,
         Some(saved) => {
             run.contact_step.set_state(saved.contact);
             run.controller.set_state(saved.controller);
-            (run.outcome, run.instants) = (saved.outcome, saved.instants);
+            run.outcome = saved.outcome;
         }
     }
     while run.step(observer)? {}
@@ -125,7 +123,6 @@ pub(crate) struct Run<'a> {
     pub(crate) contact_step: ContactStep<'a>,
     pub(crate) controller: StepController<'a>,
     pub(crate) outcome: Outcome,
-    pub(crate) instants: Instants,
 }
 
 impl Run<'_> {
@@ -163,7 +160,6 @@ impl Run<'_> {
     /// Reports the last accepted step to the observer. Then the run goes on, keeps a checkpoint or ends, as the
     /// observers of all ranks decide. Collective.
     fn report(&mut self, observer: &mut dyn Observer) -> Result<(), RunError> {
-        self.instants.observe(&self.outcome.last);
         let comm = self.damage_step.problem.body.nodes.partition.comm();
         let wanted = observer.accept(&self.outcome.last).map_err(RunError::Observer);
         let next = Next::of_urgency(comm.max(agreed(comm, wanted)?.urgency()));
@@ -173,7 +169,6 @@ impl Run<'_> {
                     contact: self.contact_step.state(),
                     controller: self.controller.state(),
                     outcome: self.outcome.clone(),
-                    instants: self.instants.clone(),
                 })
             });
             agreed(comm, kept.map_err(RunError::Observer))?;
@@ -188,7 +183,6 @@ pub struct RunState {
     contact: ContactState,
     controller: StepState,
     outcome: Outcome,
-    instants: Instants,
 }
 
 impl RunState {
