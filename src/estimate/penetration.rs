@@ -59,28 +59,6 @@ impl DiscreteProblem {
         all.as_chunks().0.iter().map(penetration).collect()
     }
 
-    /// The normal reactions on the edges of Γ_C of each of the `count` triangles of the undivided mesh, N per metre
-    /// of thickness: a node divides its reaction equally among its edges. Collective.
-    pub(super) fn reactions(&self, state: &State, count: usize) -> Vec<f64> {
-        let curves = self.scene().boundaries.iter().filter(|boundary| boundary.gap().is_some());
-        let curves = curves.filter_map(|boundary| self.body.mesh.curves.get(&boundary.name));
-        let sides: Vec<_> = curves.flat_map(|curve| self.sides(&curve.edges)).collect();
-        let nodes = |edge: &Edge| edge.ends.into_iter().chain(edge.middle);
-        let mut edges_of_node: HashMap<usize, Vec<usize>> = HashMap::new();
-        for (triangle, edge) in &sides {
-            nodes(edge).for_each(|node| edges_of_node.entry(node).or_default().push(*triangle));
-        }
-        let mut reactions = vec![0.0; count];
-        for point in &state.contact {
-            let Some(triangles) = edges_of_node.get(&point.node) else { continue };
-            for &triangle in triangles {
-                reactions[triangle] += point.force / triangles.len() as f64;
-            }
-        }
-        self.body.nodes.partition.comm().sum(&mut reactions);
-        reactions
-    }
-
     /// The triangle of each of these edges in the undivided mesh, and the nodes of u on the edge.
     fn sides(&self, edges: &[[usize; 2]]) -> Vec<(usize, Edge)> {
         let body = &self.body;

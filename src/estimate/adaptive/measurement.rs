@@ -20,7 +20,6 @@ use super::{
     pilot::Pilot,
 };
 use crate::{
-    estimate::Extreme,
     mesh::{Mesh, Order},
     petsc::Session,
     problem::{Bar, Dimension, DiscreteProblem},
@@ -32,11 +31,6 @@ use std::collections::BTreeSet;
 const ERROR_OVER_CHANGE: [f64; 2] = [4.0, 2.5];
 /// Triangles at points are h/2^this.
 const LEVELS: usize = 4;
-
-/// Triangles whose change is above this fraction of the largest are refined for a figure …
-const GOOD_PART: f64 = 0.5;
-/// … and no others, if they cause more than this fraction of the whole change.
-const MOST: f64 = 0.5;
 
 /// The fraction of the accuracy of a figure, and of the time of ζ_*, that the mesh may use; the time steps use the
 /// rest.
@@ -63,11 +57,13 @@ impl MeasuredError {
 
 /// The cause of the error of a figure.
 pub(super) enum Cause {
-    /// These triangles.
-    Triangles(Vec<bool>),
     /// The triangles at the ends of contact.
     Ends,
-    /// The errors of u, of which near ones count more: the figure is u at this point (0) or a derivative of it (1).
+    /// The triangles in which ζ changes.
+    Damage,
+    /// All errors, and those at the ends of contact and at singular points most.
+    Reactions,
+    /// The errors of u, of which near ones count more: the figure is u at this point (0) or follows from its derivatives (1).
     Around([f64; 2], i32),
     /// All errors.
     Everything,
@@ -93,13 +89,12 @@ pub(super) struct Measurement {
     /// the maximum penetration at their edges, m.
     pub(super) shares: Vec<f64>,
     pub(super) depths: Vec<f64>,
-    /// Per triangle: the change of the reactions on its edges, N per metre of thickness, and max |Δζ| there.
-    reactions: Vec<f64>,
-    zeta: Vec<f64>,
-    /// The extremes on the finer mesh.
-    extremes: Vec<Extreme>,
-    /// The name and the place of each probe, m.
-    probes: Vec<(String, [f64; 2])>,
+    /// Per triangle: max |Δζ|.
+    pub(super) zeta: Vec<f64>,
+    /// The names of the extremes.
+    extremes: Vec<&'static str>,
+    /// The names of figures at points, or of probes, with these points, m.
+    places: Vec<(String, [f64; 2])>,
 }
 
 impl Measurement {
@@ -157,25 +152,22 @@ impl Measurement {
             largest => factor * (now[0] - before[0]).abs() / largest,
         };
         (self.damage, self.zeta) = damage(mesh, finer, coarse, fine);
-        self.reactions = coarse.reactions().iter().map(|force| -force).collect();
-        for (&parent, force) in finer.parents.iter().zip(fine.reactions()) {
-            self.reactions[parent] += force;
-        }
-        let probes = scene.probes.iter();
-        self.probes = probes.map(|probe| (probe.name.clone(), probe.point)).collect();
         let extremes = fine.extremes();
         let named = extremes.named(&coarse.problem.singular_points());
+        let probes = scene.probes.iter().map(|probe| (probe.name.clone(), probe.point));
+        let of_extremes = named.iter().map(|extreme| (extreme.name.to_owned(), extreme.at));
+        self.places = probes.chain(of_extremes).collect();
+        self.extremes = coarse.problem.extremes();
         let grows = named.iter().zip(extremes.grow(|at| size_at(mesh, at)));
         let grows = grows.filter(|(extreme, grows)| *grows || extreme.singular.is_some());
         self.grows = grows.map(|(extreme, _)| extreme.name.to_owned()).collect();
-        self.extremes = named;
         self.bars = bars(coarse, fine, factor);
         self.bars.retain(|bar| !self.grows.contains(&bar.name));
     }
 
     /// The names of the extremes.
-    pub(super) fn extremes(&self) -> impl Iterator<Item = &'static str> {
-        self.extremes.iter().map(|extreme| extreme.name).chain(["contact_length"])
+    pub(super) fn extremes(&self) -> &[&'static str] {
+        &self.extremes
     }
 
     /// Leaves out these figures, whose errors stay while the mesh becomes finer.
@@ -204,7 +196,7 @@ impl Measurement {
         let errors = figures.chain(norms).filter(|(name, ..)| is_named(name));
         let mut errors: Vec<_> = errors
             .map(|(name, relative, share)| {
-                let is_extreme = self.extremes().any(|extreme| extreme == name);
+                let is_extreme = self.extremes.contains(&name);
                 MeasuredError { name: name.to_owned(), relative, share, is_extreme }
             })
             .collect();
@@ -218,35 +210,21 @@ impl Measurement {
         bars.map(Bar::relative).fold(0.0, f64::max)
     }
 
-    /// The cause of the error of the figure `name`. For min ζ and ζ at a point, ζ changes in some triangles by a large
-    /// part of its maximum change. For forces and moments, the contact reactions may do so, in few triangles.
+    /// The cause of the error of the figure `name`.
     pub(super) fn cause(&self, name: &str) -> Cause {
         let Some(bar) = self.bars.iter().find(|bar| bar.name == name) else {
             return Cause::Everything;
         };
-        let of_probe = |(probe, _): &&(String, _)| {
-            name.strip_prefix(probe).is_some_and(|quantity| quantity.starts_with('.'))
+        let is_here = |(place, _): &&(String, _)| {
+            name.strip_prefix(place).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
         };
-        let at_probe = self.probes.iter().find(of_probe).map(|(_, at)| *at);
-        let at = self.extremes.iter().find(|extreme| extreme.name == name).map(|of| of.at);
-        let changes = match (bar.dimension, at_probe.or(at)) {
-            (Dimension::Stress, Some(at)) => return Cause::Around(at, 1),
-            (Dimension::Length, Some(at)) => return Cause::Around(at, 0),
-            (Dimension::ContactLength, _) => return Cause::Ends,
-            (Dimension::Damage, _) if name != "zeta_mean" => &self.zeta,
-            (Dimension::Force | Dimension::Moment, _) => &self.reactions,
-            _ => return Cause::Everything,
-        };
-        let largest = changes.iter().fold(0.0_f64, |most, change| most.max(change.abs()));
-        let here: Vec<bool> = changes.iter().map(|c| c.abs() > GOOD_PART * largest).collect();
-        let marked = here.iter().filter(|&&here| here).count();
-        let change: f64 = changes.iter().sum();
-        let of_marked: f64 =
-            changes.iter().zip(&here).filter(|(_, here)| **here).map(|(c, _)| c).sum();
-        let few = marked <= here.len() / 4 && of_marked.abs() > MOST * change.abs();
-        match largest > 0.0 && (bar.dimension == Dimension::Damage || few) {
-            true => Cause::Triangles(here),
-            false => Cause::Everything,
+        match (bar.dimension, self.places.iter().find(is_here)) {
+            (Dimension::ContactLength, _) => Cause::Ends,
+            (Dimension::Damage, _) if name != "zeta_mean" => Cause::Damage,
+            (Dimension::Force | Dimension::Moment, _) => Cause::Reactions,
+            (Dimension::Length, Some((_, at))) => Cause::Around(*at, 0),
+            (_, Some((_, at))) => Cause::Around(*at, 1),
+            _ => Cause::Everything,
         }
     }
 }

@@ -162,11 +162,6 @@ impl<'a> Pilot<'a> {
         [0, 1, 2].map(|i| self.gathered(&own(i)))
     }
 
-    /// The normal reactions at the end on the edges of each triangle. Collective.
-    pub(super) fn reactions(&self) -> Vec<f64> {
-        self.problem.reactions(&self.outcome.last.state, self.history.squares.len())
-    }
-
     /// Values of this rank's triangles for all triangles of the undivided mesh. Collective.
     pub(super) fn gathered(&self, own: &[f64]) -> Vec<f64> {
         gathered(self.problem, own, self.history.squares.len())

@@ -34,6 +34,8 @@ const PENETRATION: f64 = 0.5;
 const OPEN: f64 = 0.35;
 /// The fraction of the squared error of u that the triangles at singular points may cause.
 const OF_SINGULAR: f64 = 0.1;
+/// For the error of ζ at a point, the triangles are refined in which ζ changes by this fraction of its largest change.
+const GOOD_PART: f64 = 0.5;
 /// The size of a triangle is multiplied by this where data of the scene are not resolved …
 const HALF: f64 = 0.5;
 /// … and by this where the body penetrates the foundation.
@@ -150,11 +152,15 @@ impl<'a> Round<'a> {
             for error in errors.iter().filter(|error| error.excess(self.accuracy) > 1.0) {
                 let goal = (AIM / error.excess(self.accuracy)).max(MIN_GOAL);
                 match measured.cause(&error.name) {
-                    Cause::Triangles(here) => {
-                        let here = sizes.iter_mut().zip(here).filter(|(_, here)| *here);
+                    Cause::Ends => {}
+                    Cause::Damage => {
+                        let largest = measured.zeta.iter().copied().fold(0.0, f64::max);
+                        let here = sizes.iter_mut().zip(&measured.zeta);
+                        let here = here.filter(|(_, change)| **change > GOOD_PART * largest);
                         here.for_each(|(size, _)| *size = size.min(goal.min(HALF)));
                     }
-                    Cause::Ends => {}
+                    Cause::Reactions
+                        if !self.singular.is_empty() || !self.pilot.extremes().ends.is_empty() => {}
                     Cause::Around(point, derivative) => {
                         let shares = influences(self.mesh, &shares, order, point, derivative);
                         let all: f64 = shares.iter().sum();
@@ -163,7 +169,7 @@ impl<'a> Round<'a> {
                         sizes.for_each(|(size, ratio)| *size = size.min(ratio));
                     }
                     // Errors of figures are products of two errors of fields.
-                    Cause::Everything => {
+                    Cause::Everything | Cause::Reactions => {
                         let is_figure = measured.bars.iter().any(|bar| bar.name == error.name);
                         smaller = smaller.min(if is_figure { goal.sqrt() } else { goal });
                     }
@@ -201,15 +207,25 @@ impl<'a> Round<'a> {
     /// together they may cause a tenth of it. The ends of contact are known up to half of an edge.
     pub(super) fn levels(&self, measured: Option<&Measurement>) -> Vec<([f64; 2], usize)> {
         let halvings = |excess: f64| excess.log2().ceil().max(0.0) as usize;
-        let aim = (AIM * self.accuracy_of_u()).powi(2) * OF_SINGULAR / self.singular.len() as f64;
-        let singular = self.singular.iter().map(|&(point, share)| (point, halvings(share / aim)));
         let errors = measured.map_or_else(Vec::new, |of| of.errors(&self.scene.accuracy_of));
-        let of_length = errors.iter().find(|error| error.name == "contact_length");
-        let excess = of_length.map_or(0.0, |error| error.excess(self.accuracy));
+        let (mut of_reactions, mut of_length) = (0, 0);
+        let missed = errors.iter().map(|error| (error.excess(self.accuracy), error));
+        for (excess, error) in missed.filter(|(excess, _)| *excess > 1.0) {
+            match measured.map(|of| of.cause(&error.name)) {
+                Some(Cause::Ends) => of_length = 2,
+                Some(Cause::Reactions) => of_reactions = of_reactions.max(halvings(excess / AIM)),
+                _ => {}
+            }
+        }
+        let aim = (AIM * self.accuracy_of_u()).powi(2) * OF_SINGULAR / self.singular.len() as f64;
+        let singular = self
+            .singular
+            .iter()
+            .map(|&(point, share)| (point, halvings(share / aim).max(of_reactions)));
         // A mesh that is far too coarse does not know the ends.
         let is_known = self.error < 2.0 * self.accuracy;
         let open = if is_known { self.open } else { 0.0 };
-        let at_ends = halvings(open / OPEN).max(if excess > 1.0 { 2 } else { 0 });
+        let at_ends = halvings(open / OPEN).max(of_length).max(of_reactions);
         let ends = self.pilot.extremes().ends.as_flattened().iter().map(|&end| (end, at_ends));
         singular.chain(ends).filter(|(_, levels)| *levels > 0).collect()
     }
