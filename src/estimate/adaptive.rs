@@ -24,7 +24,7 @@ use crate::{
     scene::{Scene, Stepping, rounded},
 };
 use measurement::Measurement;
-use pilot::{INSTANTS, Pilot};
+use pilot::{FEW, INSTANTS, Pilot};
 use progress::Progress;
 use round::Round;
 use serde::{Deserialize, Serialize};
@@ -41,7 +41,7 @@ pub struct Adapted {
     pub rounds: usize,
     /// The estimated relative error of u on it, in the energy norm, at the worst time.
     pub error: f64,
-    /// The estimated relative error of the damage at the end.
+    /// The relative error of the damage at the end: the measured one, or that of its interpolation before.
     pub damage_error: Option<f64>,
     /// The damage at the end of the run with few steps, max (ζ₀ − ζ) and its mean; 0 if the run stops at ζ_*.
     pub damage: [f64; 2],
@@ -64,6 +64,8 @@ pub struct Measured {
     pub grows: Vec<String>,
     /// The error bar of the time of ζ_*, s.
     pub stop: Option<f64>,
+    /// The relative error of the damage ζ₀ − ζ in L² at the end; `None` without damage.
+    pub damage: Option<f64>,
 }
 
 /// Errors that prevent an adapted mesh.
@@ -190,7 +192,7 @@ pub fn measured_errors(
     let (rounds, triangles) = (1, mesh.triangles.len());
     loop {
         let problem = DiscreteProblem::new(few.clone(), mesh.clone())?.restrict(session)?;
-        let pilot = Pilot::run(session, &problem, solver, triangles, false)
+        let pilot = Pilot::run(session, &problem, solver, triangles, FEW)
             .map_err(|source| AdaptError::Run { rounds, triangles, source })?;
         if pilot.stop().is_none() || !make_steps_adaptive(&mut few, PILOT_TOLERANCE) {
             return Ok(Measurement::new(session, &few, &mesh, &pilot, solver, rounds)?.result());
@@ -224,12 +226,12 @@ fn refined(
         let mesh = &refinement.mesh;
         let triangles = mesh.triangles.len();
         let problem = DiscreteProblem::new(scene.clone(), mesh.clone())?.restrict(session)?;
-        let pilot = Pilot::run(session, &problem, solver, triangles, true)
+        let pilot = Pilot::run(session, &problem, solver, triangles, INSTANTS)
             .map_err(|source| AdaptError::Run { rounds, triangles, source })?;
         if pilot.stop().is_some() && make_steps_adaptive(&mut scene, accuracy) {
             continue;
         }
-        let round = Round::new(&scene, mesh, pilot, accuracy);
+        let round = Round::new(&scene, mesh, pilot, accuracy)?;
         progress.estimated(triangles, round.estimate());
         let measure = || {
             progress.check_memory(4 * triangles)?;

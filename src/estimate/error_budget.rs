@@ -1,6 +1,6 @@
 //! The computation of the error budget.
 
-use super::{RecoveredStrains, damage_error::DamageError};
+use super::RecoveredStrains;
 use crate::{
     evolution::{ErrorBudget, Outcome},
     petsc::PetscError,
@@ -9,20 +9,13 @@ use crate::{
 use std::collections::BTreeMap;
 
 impl ErrorBudget {
-    /// The budget of the last accepted state, from the estimated errors `mesh` and `steps` of its ζ. Collective.
-    pub(super) fn new(
-        problem: &DiscreteProblem,
-        outcome: &Outcome,
-        mesh: Option<DamageError>,
-        steps: Option<&[f64]>,
-    ) -> Self {
+    /// The budget of the last accepted state, from the estimated error `steps` of its ζ. Collective.
+    pub(super) fn new(problem: &DiscreteProblem, outcome: &Outcome, steps: Option<&[f64]>) -> Self {
         let (accuracy, state) = (&outcome.accuracy, &outcome.last.state);
-        let mesh = mesh.filter(|_| outcome.stopped.is_none());
         let caused = |error: &[f64]| problem.displacement_error_of(error, state);
-        let by_damage = mesh.as_ref().map_or(0.0, |error| caused(&error.change));
         Self {
-            displacement_mesh: accuracy.energy.hypot(by_damage),
-            damage_mesh: mesh.map(|error| error.relative),
+            displacement_mesh: accuracy.energy,
+            damage_mesh: None,
             displacement_steps: steps.map(caused),
             damage_steps: steps.and_then(|error| problem.relative_to_damage(error, state)),
             solver: accuracy.displacement,

@@ -5,7 +5,7 @@
 //!
 //! - [`RecoveredStrains`]: the error of u in the energy norm, per triangle, from strains fitted around each vertex
 //!   (the same strains give the [`NodalStress`] of pictures);
-//! - the error of the damage, from the damage source of these strains and from recovered gradients of ζ;
+//! - the interpolation error of the damage, per triangle, from recovered gradients of ζ;
 //! - [`Measured`]: the error bar of each printed figure, measured by a second run on a finer mesh;
 //! - [`ErrorBudget`]: the errors by the mesh, the time steps and the solver.
 //!
@@ -21,14 +21,14 @@ mod patches;
 mod recovery;
 mod stress;
 mod extremes;
-mod damage_error;
+mod damage_interpolation;
 mod error_budget;
 mod penetration;
 mod adaptive;
 
 pub use adaptive::{AdaptError, Adapted, Measured, adapted, measured_errors};
 pub use extremes::{Extreme, Extremes, GROWS};
-pub use recovery::{EnergyError, RecoveredStrains, strains_at_nodes};
+pub use recovery::{EnergyError, RecoveredStrains};
 pub use stress::{NodalStress, Strained, principal};
 
 use crate::{
@@ -40,11 +40,8 @@ use crate::{
     petsc::{PetscError, Session},
     problem::DiscreteProblem,
 };
-use damage_error::damage_error;
 use nalgebra::DVector;
 
-/// The error bar of the time of ζ_* over the estimated delay. A coarse mesh may not show all of the delay.
-const DELAYS: f64 = 1.5;
 /// If max |u| of the last step is below this fraction of its maximum in the run, the body counts as unloaded.
 const UNLOADED: f64 = 0.01;
 /// A deformation below this fraction of the rigid motion counts as rounding.
@@ -81,7 +78,7 @@ pub fn run_from(
 
 /// Estimates the errors of a finished run and enters them in its outcome. Collective.
 fn estimated(run: Run) -> Result<Outcome, RunError> {
-    let Run { mut damage_step, contact_step, controller, mut outcome } = run;
+    let Run { damage_step, contact_step, controller, mut outcome } = run;
     let mut compliance = contact_step.into_compliance()?;
     let (problem, phases) = (damage_step.problem, damage_step.phases);
     outcome.accuracy = phases.time("accuracy", || compliance.accuracy(&outcome))?;
@@ -89,14 +86,8 @@ fn estimated(run: Run) -> Result<Outcome, RunError> {
     outcome.penetration = phases.time("accuracy", || {
         problem.penetration_note(&[&outcome.most_displaced().state, &outcome.last.state])
     });
-    let mesh = phases.time("mesh error", || damage_error(problem, &mut damage_step, &outcome));
-    if let (Some(stop), Some(error)) = (&mut outcome.stopped, &mesh) {
-        stop.from_mesh = Some(DELAYS * error.delay.abs());
-    }
-    outcome.damage_indicators = mesh.as_ref().map_or_else(Vec::new, |mesh| mesh.indicators.clone());
     let steps = controller.step_error().filter(|_| problem.damage().is_some());
-    outcome.errors =
-        ErrorBudget::new(problem, &outcome, mesh, steps.as_ref().map(DVector::as_slice));
+    outcome.errors = ErrorBudget::new(problem, &outcome, steps.as_ref().map(DVector::as_slice));
     Ok(outcome)
 }
 
@@ -119,9 +110,10 @@ impl Outcome {
     pub fn set_bars(&mut self, problem: &DiscreteProblem, measured: &Measured) {
         let unknown = problem.damage().is_some() && self.errors.zeta_steps.is_none();
         if let Some(stop) = &mut self.stopped {
-            stop.from_mesh = measured.stop.or(stop.from_mesh);
+            stop.from_mesh = measured.stop;
             return;
         }
+        self.errors.damage_mesh = measured.damage;
         if unknown {
             return;
         }

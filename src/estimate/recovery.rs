@@ -105,17 +105,6 @@ impl<'a> RecoveredStrains<'a> {
     }
 }
 
-/// The strains of nodal u at the vertices and the midpoints of the sides 01, 12, 20 of each triangle.
-pub fn strains_at_nodes(body: &Body, u: &[f64]) -> impl Iterator<Item = [Vector3<f64>; 6]> {
-    (0..body.triangles.len()).map(move |t| {
-        let [a, b, c] = for_elements!(body, cells => {
-            let local = cells.gather(t, u);
-            at_vertices(&cells.elements[t].points.map(|point| point.strain(&local)))
-        });
-        [a, b, c, 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)]
-    })
-}
-
 /// A function at the vertices from its values at the quadrature points of a triangle, constant or
 /// affine between them: an affine f has the values f(x_q) = Σf/6 + f_q/2, so f_q = 2 f(x_q) − Σf/3.
 fn at_vertices(points: &[Vector3<f64>]) -> [Vector3<f64>; 3] {

@@ -10,7 +10,8 @@ use std::collections::BTreeMap;
 pub struct ErrorBudget {
     /// The error of u from the mesh.
     pub displacement_mesh: f64,
-    /// The error of the damage from the mesh; also `None` if the run stopped at ζ_*, where it grows without bound.
+    /// The error of the damage from the mesh; `None` if it is not measured, and if the run stopped at ζ_*, where it grows
+    /// without bound.
     pub damage_mesh: Option<f64>,
     /// The error of u from the time steps.
     pub displacement_steps: Option<f64>,
@@ -39,12 +40,12 @@ impl ErrorBudget {
     pub fn lines(&self, stopped: Option<&Stop>) -> [String; 4] {
         let of_damage = |error: Option<f64>| match error {
             Some(error) => format!("damage {}", percent(error)),
-            None if self.damage_steps.is_some() => "damage not estimated".to_owned(),
+            None if self.can_be_damaged => "damage not measured (see --bars)".to_owned(),
             None => "no damage".to_owned(),
         };
         let of_stop = |off: Option<f64>| match off {
             Some(off) => format!("the time of ζ_* off by up to {off:.1e} s"),
-            None => "the time of ζ_*: not estimated".to_owned(),
+            None => "the time of ζ_* not measured (see --bars)".to_owned(),
         };
         let of_u = self.displacement_steps;
         let (of_mesh, of_steps, mesh, steps) = match (stopped, of_u) {

@@ -45,10 +45,6 @@ pub struct Outcome {
     /// A note on contact between the nodes.
     #[serde(skip)]
     pub(crate) penetration: Option<String>,
-    /// Per triangle of this rank: ‖z − Iz‖²_T / ‖ζ₀ − z‖², with z the last damage in P2 and Iz its interpolation
-    /// in P1. Empty if the error of the damage is not estimated.
-    #[serde(skip)]
-    pub damage_indicators: Vec<f64>,
     /// The error of the time steps had it not grown, over the estimated one.
     #[serde(skip)]
     pub(crate) ungrown: f64,
@@ -72,8 +68,7 @@ pub struct Stop {
     /// The error bar of the time from the steps, s: the length of the last step, or with adaptive steps the error of the
     /// interpolation in it, plus the delay by the estimated error of ζ, which Euler's steps count twice.
     pub uncertainty: f64,
-    /// The error bar of the time from the mesh, s: 1.5 times the estimated delay, because a coarse mesh may not
-    /// show all of it. After adaptation it is at least the measured error. `None` if it is not estimated.
+    /// The measured error bar of the time from the mesh, s; `None` if it is not measured.
     pub from_mesh: Option<f64>,
 }
 

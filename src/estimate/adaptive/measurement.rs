@@ -17,7 +17,7 @@ use super::{
     AdaptError, Measured,
     changes::{bars, change_of_u, damage},
     finer::{Finer, size_at},
-    pilot::Pilot,
+    pilot::{FEW, Pilot},
 };
 use crate::{
     mesh::{Mesh, Order},
@@ -89,7 +89,7 @@ pub(super) struct Measurement {
     /// the maximum penetration at their edges, m.
     pub(super) shares: Vec<f64>,
     pub(super) depths: Vec<f64>,
-    /// Per triangle: max |Δζ|.
+    /// Per triangle: max |Δζ|; empty without damage.
     pub(super) zeta: Vec<f64>,
     /// The names of the extremes.
     extremes: Vec<&'static str>,
@@ -114,7 +114,7 @@ impl Measurement {
         let finer = Finer::new(mesh, &points, LEVELS)?;
         let triangles = finer.mesh.triangles.len();
         let problem = DiscreteProblem::new(scene.clone(), finer.mesh.clone())?.restrict(session)?;
-        let fine = Pilot::run(session, &problem, solver, triangles, false);
+        let fine = Pilot::run(session, &problem, solver, triangles, FEW);
         let fine = fine.map_err(|source| AdaptError::Run { rounds, triangles, source })?;
         let order = scene.order as usize;
         let stop = match [coarse.stop(), fine.stop()] {
@@ -151,7 +151,9 @@ impl Measurement {
             0.0 => 0.0,
             largest => factor * (now[0] - before[0]).abs() / largest,
         };
-        (self.damage, self.zeta) = damage(mesh, finer, coarse, fine);
+        if coarse.problem.damage().is_some() {
+            (self.damage, self.zeta) = damage(mesh, finer, coarse, fine);
+        }
         let extremes = fine.extremes();
         let named = extremes.named(&coarse.problem.singular_points());
         let probes = scene.probes.iter().map(|probe| (probe.name.clone(), probe.point));
@@ -179,7 +181,8 @@ impl Measurement {
     /// The errors of a run on the mesh.
     pub(super) fn result(&self) -> Measured {
         let stop = self.stop.map(|[error, _]| error).filter(|error| error.is_finite());
-        Measured { bars: self.bars.clone(), grows: self.grows.clone(), stop }
+        let damage = (!self.zeta.is_empty()).then_some(self.damage);
+        Measured { bars: self.bars.clone(), grows: self.grows.clone(), stop, damage }
     }
 
     /// The measured errors of the figures and norms in `names`, or of all: the figures, u, its energy, the damage

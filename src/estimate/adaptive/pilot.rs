@@ -1,7 +1,9 @@
 //! A run with few time steps, the error of u and the penetration on each triangle, and the figures of all steps.
 
 use crate::{
-    estimate::{self, Extremes, NodalStress, RecoveredStrains},
+    estimate::{
+        Extremes, NodalStress, RecoveredStrains, damage_interpolation::interpolation_shares,
+    },
     evolution::{self, Outcome, Phases, RunError, Step},
     petsc::{PetscError, Session},
     problem::{DiscreteProblem, State},
@@ -11,7 +13,7 @@ use std::cmp::Ordering;
 /// Number of steps of the run, and of evenly spread times at which its errors are estimated.
 pub(super) const INSTANTS: usize = 12;
 /// Number of these times in a run that is only compared with another.
-const FEW: usize = 3;
+pub(super) const FEW: usize = 3;
 /// Errors at the end are relative to at least this fraction of the maximum ‖u‖².
 const MIN_ENERGY: f64 = 1e-4;
 /// Between these times, errors are estimated where max |u| exceeds its maximum at them by this factor: a short pulse.
@@ -50,19 +52,18 @@ struct History {
 }
 
 impl<'a> Pilot<'a> {
-    /// Runs `problem` on a mesh of `triangles` triangles, with estimates at its end if `estimated`. Collective.
+    /// Runs `problem` on a mesh of `triangles` triangles, with estimates at about `instants` times. Collective.
     pub(super) fn run(
         session: &Session,
         problem: &'a DiscreteProblem,
         solver: &str,
         triangles: usize,
-        estimated: bool,
+        instants: usize,
     ) -> Result<Self, RunError> {
-        let mut history = History::new(problem, if estimated { INSTANTS } else { FEW }, triangles);
+        let mut history = History::new(problem, instants, triangles);
         let phases = Phases::default();
         let mut observe = |step: &Step| Ok(history.observe(problem, step)?);
-        let run = if estimated { estimate::run } else { evolution::run };
-        let outcome = run(session, problem, solver, &phases, &mut observe)?;
+        let outcome = evolution::run(session, problem, solver, &phases, &mut observe)?;
         if history.last != Some(outcome.last.state.time) {
             history.estimate(problem, &outcome.last.state)?;
         }
@@ -143,6 +144,14 @@ impl<'a> Pilot<'a> {
         points.sort_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
         points.dedup();
         points
+    }
+
+    /// The shares of the triangles in the squared interpolation error of the damage at the end, zeros if ζ_* was reached.
+    /// Collective.
+    pub(super) fn damage_shares(&self) -> Result<Vec<f64>, PetscError> {
+        let shares = interpolation_shares(self.problem, &self.outcome.last.state)?;
+        let stops = self.stop().is_some();
+        Ok(self.gathered(&if stops { vec![0.0; shares.len()] } else { shares }))
     }
 
     /// The place of min ζ at the end, m. Collective.

@@ -10,6 +10,7 @@ use super::{
 use crate::{
     evolution::AIM as AIM_OF_STEPS,
     mesh::{Mesh, Order, sorted},
+    petsc::PetscError,
     problem::unresolved,
     scene::Scene,
 };
@@ -47,10 +48,10 @@ pub(super) struct Round<'a> {
     mesh: &'a Mesh,
     pub(super) pilot: Pilot<'a>,
     accuracy: f64,
-    /// The estimated relative error of u at the worst time, its shares, and the error of the damage.
+    /// The estimated relative error of u at the worst time and its shares; the shares of the damage's error.
     error: f64,
     shares: Vec<f64>,
-    damage_error: Option<f64>,
+    of_damage: Vec<f64>,
     /// Edges on which a function of the scene is not resolved.
     unresolved: HashSet<[usize; 2]>,
     /// The allowed penetration between the nodes, m.
@@ -62,7 +63,12 @@ pub(super) struct Round<'a> {
 }
 
 impl<'a> Round<'a> {
-    pub(super) fn new(scene: &'a Scene, mesh: &'a Mesh, pilot: Pilot<'a>, accuracy: f64) -> Self {
+    pub(super) fn new(
+        scene: &'a Scene,
+        mesh: &'a Mesh,
+        pilot: Pilot<'a>,
+        accuracy: f64,
+    ) -> Result<Self, PetscError> {
         let (error, mut shares) = pilot.relative();
         let singular = pilot.problem.singular_points().into_iter().map(|point| {
             let here = shares.iter_mut().zip(touching(mesh, &[point.at]));
@@ -71,19 +77,20 @@ impl<'a> Round<'a> {
         });
         let singular = singular.collect();
         let displacement = pilot.displacement();
-        Self {
+        let of_damage = pilot.damage_shares()?;
+        Ok(Self {
             unresolved: unresolved(scene, mesh, accuracy, displacement),
             deepest: PENETRATION * accuracy * displacement,
             open: pilot.open() / accuracy,
             singular,
-            damage_error: pilot.outcome.errors.damage_mesh,
+            of_damage,
             scene,
             mesh,
             pilot,
             accuracy,
             error,
             shares,
-        }
+        })
     }
 
     /// Is the mesh good enough for a measurement? Its estimates must be small and the data of the scene resolved.
@@ -97,9 +104,14 @@ impl<'a> Round<'a> {
             && self.pilot.depths().iter().all(|&depth| depth <= self.deepest)
     }
 
+    /// The interpolation error of the damage at the end, relative, in L².
+    fn damage_error(&self) -> f64 {
+        self.of_damage.iter().sum::<f64>().sqrt()
+    }
+
     /// The larger one of the estimated errors.
     pub(super) fn estimate(&self) -> f64 {
-        self.error.max(self.damage_error.unwrap_or(0.0))
+        self.error.max(self.damage_error())
     }
 
     /// The mesh with its errors.
@@ -118,7 +130,11 @@ impl<'a> Round<'a> {
             unknowns: 2 * self.pilot.problem.body.nodes.partition.total(),
             rounds,
             error: self.error,
-            damage_error: self.damage_error,
+            damage_error: self
+                .pilot
+                .problem
+                .damage()
+                .map(|_| measured.map_or(self.damage_error(), |of| of.damage)),
             damage: self.pilot.damage(),
             steps: match measured {
                 Some(measured) if self.pilot.stop().is_none() => {
@@ -176,14 +192,12 @@ impl<'a> Round<'a> {
                 }
             }
         }
-        let of_u = self.accuracy_of_u().min(if smaller < 1.0 { smaller * self.error } else { 1.0 });
+        let of_u = if smaller < 1.0 { smaller * self.error } else { self.accuracy };
+        let of_u = of_u.min(self.accuracy);
         let mut ratios = size_ratios(&shares, order, AIM * of_u);
-        if self.damage_error.is_some() {
-            let shares = self.pilot.gathered(&self.pilot.outcome.damage_indicators);
-            let aim = INTERPOLATION * AIM * smaller * self.accuracy;
-            let others = size_ratios(&shares, 2, aim);
-            ratios.iter_mut().zip(others).for_each(|(ratio, other)| *ratio = ratio.min(other));
-        }
+        let aim = INTERPOLATION * AIM * smaller * self.accuracy;
+        let others = size_ratios(&self.of_damage, 2, aim);
+        ratios.iter_mut().zip(others).for_each(|(ratio, other)| *ratio = ratio.min(other));
         for (t, &[a, b, c]) in self.mesh.triangles.iter().enumerate() {
             let mut sides = [[a, b], [b, c], [c, a]].into_iter();
             if sides.any(|side| self.unresolved.contains(&sorted(side))) {
@@ -217,7 +231,7 @@ impl<'a> Round<'a> {
                 _ => {}
             }
         }
-        let aim = (AIM * self.accuracy_of_u()).powi(2) * OF_SINGULAR / self.singular.len() as f64;
+        let aim = (AIM * self.accuracy).powi(2) * OF_SINGULAR / self.singular.len() as f64;
         let singular = self
             .singular
             .iter()
@@ -228,15 +242,5 @@ impl<'a> Round<'a> {
         let at_ends = halvings(open / OPEN).max(of_length).max(of_reactions);
         let ends = self.pilot.extremes().ends.as_flattened().iter().map(|&end| (end, at_ends));
         singular.chain(ends).filter(|(_, levels)| *levels > 0).collect()
-    }
-
-    /// The accuracy of u that the next mesh needs: a damage with too large an error needs a better u.
-    fn accuracy_of_u(&self) -> f64 {
-        match self.damage_error {
-            Some(of_damage) if of_damage > ENOUGH * self.accuracy => {
-                self.accuracy.min(self.error * self.accuracy / of_damage)
-            }
-            _ => self.accuracy,
-        }
     }
 }
