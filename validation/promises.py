@@ -63,7 +63,7 @@ def run(binary, path, out, accuracy):
 def figures(summary):
     """The printed figures by name."""
     names = ["work", "displacement_max", "contact_force"]
-    names += ["zeta_min", "zeta_mean"] if summary["errors"]["damage_mesh"] is not None else []
+    names += ["zeta_min", "zeta_mean"] if summary["errors"]["damage_steps"] is not None else []
     others = {k: v for k, v in summary["quantities"].items() if not k.endswith(".moment")}
     return {**{name: summary[name] for name in names}, **others}
 

@@ -26,9 +26,11 @@ impl Refinement {
     pub fn start(mut mesh: Mesh) -> Self {
         let mut triangles = std::mem::take(&mut mesh.triangles);
         for triangle in &mut triangles {
-            let length = |i: &usize| mesh.edge_normal([triangle[*i], triangle[(i + 1) % 3]]).1;
-            let longest = (0..3).max_by(|i, j| length(i).total_cmp(&length(j)));
-            triangle.rotate_left(longest.unwrap_or(0));
+            let sides = [0, 1, 2].map(|i| mesh.edge_normal([triangle[i], triangle[(i + 1) % 3]]).1);
+            let longest = sides.into_iter().fold(0.0, f64::max);
+            // The first of equal sides, up to rounding, so that meshes do not depend on units.
+            let first = sides.iter().position(|side| *side >= (1.0 - 1e-9) * longest);
+            triangle.rotate_left(first.unwrap_or(0));
         }
         let parent_of_triangle = (0..triangles.len()).collect();
         mesh.triangles = triangles;

@@ -192,3 +192,19 @@ fn a_refined_disc_stays_round_and_its_area_is_of_fourth_order() {
         assert!((3.8..4.2).contains(&order), "{errors:?}");
     }
 }
+
+/// Equilateral triangles: their sides are equal up to rounding, which differs with the unit.
+#[test]
+fn equal_sides_are_bisected_alike_in_all_units() {
+    let equilateral = |unit: f64| {
+        let mut mesh = Mesh::rectangle(4.0, 4.0, 4, 4);
+        for [x, y] in &mut mesh.nodes {
+            [*x, *y] = [unit * (*x - 0.5 * *y), unit * (*y * 0.75_f64.sqrt())];
+        }
+        random_rounds(mesh, 4, 3).pop().unwrap().1.mesh.triangles
+    };
+    let metres = equilateral(1.0);
+    for unit in [1e3, 1.0 / 3.0, 7e-3, 39.3701] {
+        assert_eq!(equilateral(unit), metres, "{unit}");
+    }
+}
