@@ -119,7 +119,7 @@ pub(super) fn missing_bars(task: &Task, outcome: &Outcome) -> Option<String> {
 
 /// The closing line on the required accuracy: reached, or the errors that are too large. `None` without a
 /// required accuracy.
-pub(super) fn verdict(task: &Task, outcome: Option<&Outcome>) -> Option<String> {
+pub(super) fn accuracy_note(task: &Task, outcome: Option<&Outcome>) -> Option<String> {
     let (adapted, scene) = (task.adapted.as_ref()?, task.problem.scene());
     let accuracy = scene.accuracy?;
     let (triangles, rounds) = (adapted.mesh.triangles.len(), adapted.rounds);

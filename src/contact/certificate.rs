@@ -51,7 +51,7 @@ pub struct Answer<'a> {
     pub rigid: &'a [f64],
     /// The rest of u, which causes the forces, m.
     pub elastic: &'a [f64],
-    /// f − Ku, N per metre of thickness: the forces that supports and obstacles must carry.
+    /// f − Ku, N per metre of thickness: the forces that supports and obstacles must react.
     pub unbalanced: &'a [f64],
     /// The values of the prescribed rows, m.
     pub prescribed: &'a [f64],
@@ -93,10 +93,10 @@ impl Certificate {
 
     /// The residuals of an answer at the nodes `0..owned`, and its gap conditions. Collective.
     ///
-    /// Prescribed directions carry their part of f − Ku at a node. Gap conditions carry the part in the cone
-    /// Σ p ν, p ≥ 0, of their normals. If the normals span the rest of the plane, the remainder counts as a
-    /// pull (dual). Otherwise its part along the normal is a pull, and its part across is unbalanced. The
-    /// residuals are NaN if a condition belongs to no rank.
+    /// Reactions balance f − Ku at a node: those of prescribed directions its part along them, and those of gap
+    /// conditions the part in the cone Σ p ν, p ≥ 0, of their normals. If the normals span the rest of the plane, the
+    /// remainder counts as tension (dual). Otherwise its normal part is tension, and its tangential part is unbalanced.
+    /// The residuals are NaN if a condition belongs to no rank.
     pub fn residuals(
         &self,
         answer: Answer,
@@ -105,7 +105,7 @@ impl Certificate {
         comm: Communicator,
     ) -> (Kkt, Vec<ContactPoint>) {
         let mut points = Vec::new();
-        let (mut stationarity, mut across, mut dual) = (0.0, 0.0, 0.0);
+        let (mut stationarity, mut tangential, mut dual) = (0.0, 0.0, 0.0);
         let (mut primal, mut complementarity) = (0.0_f64, 0.0_f64);
         // Σ |f − Ku|² over nodes without conditions.
         let free = |from: usize, to: usize| {
@@ -117,10 +117,10 @@ impl Certificate {
             next = at.node + 1;
             primal = worse(primal, at.prescribed_error(answer, scales));
             let left = at.gaps_left(answer);
-            let carried = at.carry(vector(answer.unbalanced, at.node), &left);
-            dual += carried.pull;
-            across += carried.across;
-            for (((gap, number), left), force) in at.gaps.iter().zip(&left).zip(carried.forces) {
+            let reaction = at.react(vector(answer.unbalanced, at.node), &left);
+            dual += reaction.tension;
+            tangential += reaction.tangential;
+            for (((gap, number), left), force) in at.gaps.iter().zip(&left).zip(reaction.forces) {
                 let width = gap.gap_of(*number, answer.gaps).abs();
                 let counts = force.is_some() || -left > ROUNDING * width;
                 let depth = if !counts || *left >= 0.0 { 0.0 } else { -left };
@@ -138,7 +138,7 @@ impl Certificate {
                 });
             }
         }
-        stationarity += free(next, owned) + across;
+        stationarity += free(next, owned) + tangential;
         let checked: usize = self.nodes.iter().map(|at| at.fixed.len() + at.gaps.len()).sum();
         let mut sums = [stationarity, dual, checked as f64];
         comm.sum(&mut sums);
@@ -155,14 +155,14 @@ impl Certificate {
     }
 }
 
-/// How a node carries f − Ku.
-struct Carried {
+/// The reactions of a node that balance f − Ku.
+struct NodalReaction {
     /// p of each gap condition; `None` where the normal displacement is prescribed.
     forces: Vec<Option<f64>>,
     /// |·|² of the part against the normals.
-    pull: f64,
+    tension: f64,
     /// |·|² of the unbalanced part.
-    across: f64,
+    tangential: f64,
 }
 
 impl Conditions {
@@ -197,9 +197,9 @@ impl Conditions {
         self.gaps.iter().map(left).collect()
     }
 
-    /// Splits `force` among the conditions, whose gaps have `left`.
-    fn carry(&self, force: Vector2<f64>, left: &[f64]) -> Carried {
-        // Prescribed directions carry all forces along them.
+    /// The reactions of the conditions, whose gaps have `left`, to `force`.
+    fn react(&self, force: Vector2<f64>, left: &[f64]) -> NodalReaction {
+        // Prescribed directions react all forces along them.
         let free: Vec<Vector2<f64>> = match self.fixed.split_first() {
             None => vec![Vector2::x(), Vector2::y()],
             Some(((d, _), others)) if others.iter().all(|(e, _)| d.perp(e).abs() <= ALONG) => {
@@ -224,7 +224,11 @@ impl Conditions {
                 }
             }
         };
-        Carried { forces, pull: along.norm_squared(), across: (rest - along).norm_squared() }
+        NodalReaction {
+            forces,
+            tension: along.norm_squared(),
+            tangential: (rest - along).norm_squared(),
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::{Bound, Kkt, Scales};
 use crate::{
-    linear::{Booking, LinearSystem},
+    linear::{LinearSystem, PhaseNames},
     petsc::{Communicator, Matrix, PetscError, Session, Vector},
     phases::Phases,
 };
@@ -42,7 +42,7 @@ pub struct ContactProblem<'a> {
 impl ContactProblem<'_> {
     /// K c = f on all unknowns.
     pub(super) fn system(&self) -> LinearSystem<'_> {
-        let booking = Booking {
+        let phase_names = PhaseNames {
             phases: self.phases,
             factorisation: "contact/factorisation",
             prescription: "contact/Schur complement",
@@ -51,7 +51,7 @@ impl ContactProblem<'_> {
         };
         LinearSystem {
             scale: self.stiffness_scale,
-            booking: Some(booking),
+            phase_names: Some(phase_names),
             ..LinearSystem::of(self.stiffness)
         }
     }

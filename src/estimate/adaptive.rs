@@ -10,7 +10,7 @@
 mod changes;
 mod finer;
 mod measurement;
-mod pilot;
+mod few_step_run;
 mod progress;
 mod round;
 mod sizes;
@@ -23,8 +23,8 @@ use crate::{
     problem::{Bar, Collapse, DiscreteProblem, LoadCurve, SetupError},
     scene::{Scene, Stepping, rounded},
 };
+use few_step_run::{FEW, FewStepRun, INSTANTS};
 use measurement::Measurement;
-use pilot::{FEW, INSTANTS, Pilot};
 use progress::Progress;
 use round::Round;
 use serde::{Deserialize, Serialize};
@@ -116,7 +116,7 @@ impl AdaptError {
 }
 
 /// The tolerance of the time steps of the runs with few steps.
-const PILOT_TOLERANCE: f64 = 0.05;
+const FEW_STEP_TOLERANCE: f64 = 0.05;
 /// Maximum number of rounds, and of triangles of a mesh or its measurement.
 const MAX_ROUNDS: usize = 25;
 const MAX_TRIANGLES: usize = 4_000_000;
@@ -187,15 +187,15 @@ pub fn measured_errors(
         Stepping::Auto { .. } => INSTANTS,
     });
     few.time.iter_mut().for_each(|grid| grid.stepping = Stepping::Uniform { steps });
-    let mut few = with_passing_loads(session, few, mesh, PILOT_TOLERANCE)?;
+    let mut few = with_passing_loads(session, few, mesh, FEW_STEP_TOLERANCE)?;
     let mesh = Refinement::start(mesh.clone()).mesh;
     let (rounds, triangles) = (1, mesh.triangles.len());
     loop {
         let problem = DiscreteProblem::new(few.clone(), mesh.clone())?.restrict(session)?;
-        let pilot = Pilot::run(session, &problem, solver, triangles, FEW)
+        let run = FewStepRun::run(session, &problem, solver, triangles, FEW)
             .map_err(|source| AdaptError::Run { rounds, triangles, source })?;
-        if pilot.stop().is_none() || !make_steps_adaptive(&mut few, PILOT_TOLERANCE) {
-            return Ok(Measurement::new(session, &few, &mesh, &pilot, solver, rounds)?.result());
+        if run.stop().is_none() || !make_steps_adaptive(&mut few, FEW_STEP_TOLERANCE) {
+            return Ok(Measurement::new(session, &few, &mesh, &run, solver, rounds)?.result());
         }
     }
 }
@@ -226,16 +226,16 @@ fn refined(
         let mesh = &refinement.mesh;
         let triangles = mesh.triangles.len();
         let problem = DiscreteProblem::new(scene.clone(), mesh.clone())?.restrict(session)?;
-        let pilot = Pilot::run(session, &problem, solver, triangles, INSTANTS)
+        let run = FewStepRun::run(session, &problem, solver, triangles, INSTANTS)
             .map_err(|source| AdaptError::Run { rounds, triangles, source })?;
-        if pilot.stop().is_some() && make_steps_adaptive(&mut scene, accuracy) {
+        if run.stop().is_some() && make_steps_adaptive(&mut scene, accuracy) {
             continue;
         }
-        let round = Round::new(&scene, mesh, pilot, accuracy)?;
+        let round = Round::new(&scene, mesh, run, accuracy)?;
         progress.estimated(triangles, round.estimate());
         let measure = || {
             progress.check_memory(4 * triangles)?;
-            Measurement::new(session, &scene, mesh, &round.pilot, solver, rounds)
+            Measurement::new(session, &scene, mesh, &round.run, solver, rounds)
         };
         let (measured, failed) = match round.is_enough().then(measure) {
             Some(Ok(measured)) => (Some(progress.measured(triangles, measured)), None),
@@ -268,6 +268,6 @@ fn make_steps_adaptive(scene: &mut Scene, accuracy: f64) -> bool {
     let Some(grid) = &mut scene.time else { return false };
     let uniform = matches!(grid.stepping, Stepping::Uniform { .. });
     grid.stepping =
-        Stepping::Auto { tolerance: PILOT_TOLERANCE.min(2.0 * accuracy), expected: [0.0; 2] };
+        Stepping::Auto { tolerance: FEW_STEP_TOLERANCE.min(2.0 * accuracy), expected: [0.0; 2] };
     uniform
 }

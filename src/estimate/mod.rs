@@ -45,7 +45,7 @@ use nalgebra::DVector;
 /// If max |u| of the last step is below this fraction of its maximum in the run, the body counts as unloaded.
 const UNLOADED: f64 = 0.01;
 /// A deformation below this fraction of the rigid motion counts as rounding.
-const CARRIED: f64 = 1e-11;
+const RIGID_ROUNDING: f64 = 1e-11;
 
 /// [`evolution::run`](crate::evolution::run), and at its end the estimates of its errors.
 ///
@@ -79,9 +79,9 @@ pub fn run_from(
 /// Estimates the errors of a finished run and enters them in its outcome. Collective.
 fn estimated(run: Run) -> Result<Outcome, RunError> {
     let Run { damage_step, contact_step, controller, mut outcome } = run;
-    let mut compliance = contact_step.into_compliance()?;
+    let mut fixed_contact = contact_step.into_fixed_contact()?;
     let (problem, phases) = (damage_step.problem, damage_step.phases);
-    outcome.accuracy = phases.time("accuracy", || compliance.accuracy(&outcome))?;
+    outcome.accuracy = phases.time("accuracy", || fixed_contact.accuracy(&outcome))?;
     outcome.accuracy.energy = phases.time("accuracy", || energy_error(problem, &outcome))?;
     outcome.penetration = phases.time("accuracy", || {
         problem.penetration_note(&[&outcome.most_displaced().state, &outcome.last.state])
@@ -100,7 +100,11 @@ fn energy_error(problem: &DiscreteProblem, outcome: &Outcome) -> Result<f64, Pet
     let [rigid, rest] =
         RigidMotion::nearest(&problem.body, &state.u).max_norms(&problem.body, &state.u);
     // The strains of a body that only moves rigidly are rounding.
-    if rest > CARRIED * rigid { problem.energy_error(&state.zeta, &state.u) } else { Ok(0.0) }
+    if rest > RIGID_ROUNDING * rigid {
+        problem.energy_error(&state.zeta, &state.u)
+    } else {
+        Ok(0.0)
+    }
 }
 
 impl Outcome {

@@ -50,8 +50,8 @@ pub struct ContactStep<'a> {
     load: Vector,
     c: Vector,
     /// The memory from which every solve starts, and its update in case the step is accepted.
-    accepted: Memory,
-    next: Memory,
+    accepted: AcceptedState,
+    next: AcceptedState,
     /// c of the accepted steps.
     extrapolation: Extrapolation,
     /// Does every rank know all triangles around its own nodes?
@@ -62,7 +62,7 @@ pub struct ContactStep<'a> {
 
 /// The data that an accepted step passes to the next one.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-struct Memory {
+struct AcceptedState {
     /// The reference configuration of the displacements.
     reference: Reference,
     /// The maximum scales of residuals so far.
@@ -76,7 +76,7 @@ struct Memory {
 /// The contact steps' part of a checkpoint.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct ContactState {
-    accepted: Memory,
+    accepted: AcceptedState,
     extrapolation: Extrapolation,
     factor: FactorState,
 }
@@ -108,7 +108,7 @@ impl<'a> ContactStep<'a> {
         let (solver, rescuer) = contact::solvers(solver, bounded, options)?;
         // A preconditioner needs only single precision, which halves the bytes to read.
         let precision = Precision::Preconditioner;
-        let memory = Memory {
+        let memory = AcceptedState {
             reference: Reference::default(),
             scales: Scales { force: MIN_LOAD * problem.largest_load, displacement: 0.0 },
             active: vec![0.0; constraints.bounds.len()],
@@ -207,7 +207,7 @@ impl<'a> ContactStep<'a> {
         let (problem, comm) = (self.problem, self.problem.body.nodes.partition.comm());
         let constraints = &problem.constraints;
         self.next = self.accepted.clone();
-        let Memory { reference, active, .. } = &mut self.next;
+        let AcceptedState { reference, active, .. } = &mut self.next;
         let unloaded = comm.all(case.load.iter().chain(&case.lift).all(|&value| value == 0.0));
         if unloaded {
             *reference = Reference::default();

@@ -10,7 +10,7 @@ use rustc_hash::FxHashMap as HashMap;
 
 /// The triangles that are integrated in parts, by their index in the undivided mesh. Per part: the
 /// barycentric coordinates of its corners.
-pub type Division = HashMap<usize, Vec<[[f64; 3]; 3]>>;
+pub type TriangleParts = HashMap<usize, Vec<[[f64; 3]; 3]>>;
 
 /// The midpoint of the side from `p` to `q`: where [`add_body_force`] takes f_B for P1.
 pub fn midpoint(p: [f64; 2], q: [f64; 2]) -> [f64; 2] {
@@ -32,12 +32,12 @@ pub fn part_point(corners: &[[f64; 3]; 3], point: [f64; 3]) -> [f64; 3] {
 /// points of the element for P2. A divided triangle has three points in each part.
 pub fn add_body_force(
     body: &Body,
-    division: &Division,
+    parts_of_triangles: &TriangleParts,
     force: impl Fn(usize, [f64; 2]) -> [f64; 2],
     load: &mut [f64],
 ) {
     let points = &body.nodes.points;
-    let parts = |t: usize| division.get(&body.global_triangles[t]);
+    let parts = |t: usize| parts_of_triangles.get(&body.global_triangles[t]);
     let mut add = |node: usize, weight: f64, f: [f64; 2]| {
         load[2 * node] += weight * f[0];
         load[2 * node + 1] += weight * f[1];

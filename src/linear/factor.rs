@@ -96,18 +96,22 @@ impl Factor {
     }
 
     /// The condensed unknowns that are coupled with others in `k` but not in `operator`.
-    pub(crate) fn masked(&self, k: &Matrix, operator: &Matrix) -> Result<Vec<usize>, PetscError> {
-        let mut masked = Vec::new();
+    pub(crate) fn prescribed_in(
+        &self,
+        k: &Matrix,
+        operator: &Matrix,
+    ) -> Result<Vec<usize>, PetscError> {
+        let mut prescribed_in = Vec::new();
         for &unknown in &self.condensed.1 {
             let row = k.rows().start + unknown as i32;
             let coupled = |columns: &[i32], values: &[f64]| {
                 columns.iter().zip(values).any(|(column, value)| *column != row && *value != 0.0)
             };
             if k.read_row(row, coupled)? && !operator.read_row(row, coupled)? {
-                masked.push(unknown);
+                prescribed_in.push(unknown);
             }
         }
-        Ok(masked)
+        Ok(prescribed_in)
     }
 
     /// Analyses the matrix. It returns false if the matrix or its interface is too large for a factor.

@@ -2,7 +2,7 @@
 
 mod preconditioner;
 
-use super::{Booking, Condensed, Factor, LinearSystem, Precision, Reduction};
+use super::{Condensed, Factor, LinearSystem, PhaseNames, Precision, Reduction};
 use crate::petsc::{KeptPreconditioner, Ksp, KspProblem, Matrix, PetscError, Session, Vector};
 use std::mem::take;
 
@@ -172,7 +172,7 @@ impl LinearSolver {
     pub fn prepare(&mut self, system: LinearSystem, limit: f64) -> Result<usize, PetscError> {
         let due = self.factor.iteration_limit(self.asked(limit)).is_none();
         if due {
-            system.book(|booking| booking.factorisation, 0.0, || self.factorise(system))?;
+            system.book(|phase_names| phase_names.factorisation, 0.0, || self.factorise(system))?;
         }
         Ok(usize::from(due))
     }
@@ -188,7 +188,7 @@ impl LinearSolver {
         }
         let (bytes, residual) = (0.5 * self.factor.bytes_per_application(), &self.residual);
         let factor = &mut self.factor;
-        let name = |booking: &Booking| booking.triangular_solves;
+        let name = |phase_names: &PhaseNames| phase_names.triangular_solves;
         system.book(name, bytes, || factor.condense(residual)).map(Some)
     }
 
@@ -205,7 +205,7 @@ impl LinearSolver {
     ) -> Result<(), PetscError> {
         let (bytes, d) = (0.5 * self.factor.bytes_per_application(), &mut self.expanded);
         let expand = || self.factor.expand(d);
-        system.book(|booking| booking.triangular_solves, bytes, expand)?;
+        system.book(|phase_names| phase_names.triangular_solves, bytes, expand)?;
         self.prepared = !moved;
         if moved {
             self.iterations += 1;
@@ -239,7 +239,11 @@ impl LinearSolver {
         }
         if !report.converged {
             report.factorisations += 1;
-            if system.book(|booking| booking.factorisation, 0.0, || self.factorise(system))? {
+            if system.book(
+                |phase_names| phase_names.factorisation,
+                0.0,
+                || self.factorise(system),
+            )? {
                 self.iterate(system, x, (limit, None), &mut report)?;
             }
         }
@@ -330,6 +334,6 @@ impl KeptPreconditioner for Booked<'_> {
         }
         let bytes = self.factor.bytes_per_application();
         let apply = || self.factor.apply(r, z);
-        self.system.book(|booking| booking.triangular_solves, bytes, apply)
+        self.system.book(|phase_names| phase_names.triangular_solves, bytes, apply)
     }
 }

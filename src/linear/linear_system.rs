@@ -16,12 +16,12 @@ pub struct LinearSystem<'a> {
     /// matrix.
     pub scale: f64,
     /// The phases to which the parts of a solve book their time.
-    pub booking: Option<Booking<'a>>,
+    pub phase_names: Option<PhaseNames<'a>>,
 }
 
 /// The names of the phases of a solve.
 #[derive(Clone, Copy)]
-pub struct Booking<'a> {
+pub struct PhaseNames<'a> {
     /// The record of phases.
     pub phases: &'a Phases,
     /// A new factor.
@@ -37,24 +37,24 @@ pub struct Booking<'a> {
 impl<'a> LinearSystem<'a> {
     /// A x = b.
     pub fn of(matrix: &'a Matrix) -> Self {
-        Self { matrix, prescribed: None, scale: 1.0, booking: None }
+        Self { matrix, prescribed: None, scale: 1.0, phase_names: None }
     }
 
     /// `y` ← A `x`.
     pub(super) fn multiply(self, x: &Vector, y: &mut Vector) -> Result<(), PetscError> {
         let bytes = self.matrix.bytes_per_product();
-        self.book(|booking| booking.product, bytes, || self.matrix.multiply(x, y))
+        self.book(|phase_names| phase_names.product, bytes, || self.matrix.multiply(x, y))
     }
 
     /// Does `work`, which reads and writes `bytes`, and books its time under a name.
     pub(super) fn book<R>(
         self,
-        name: impl FnOnce(&Booking) -> &'static str,
+        name: impl FnOnce(&PhaseNames) -> &'static str,
         bytes: f64,
         work: impl FnOnce() -> R,
     ) -> R {
-        match self.booking {
-            Some(booking) => booking.phases.time_moving(name(&booking), bytes, work),
+        match self.phase_names {
+            Some(phase_names) => phase_names.phases.time_moving(name(&phase_names), bytes, work),
             None => work(),
         }
     }

@@ -40,7 +40,7 @@ mod raw {
 pub use cholesky::{Cholesky, Precision};
 pub use factor::{Factor, FactorState};
 pub use linear_solver::{LinearSolver, SolveReport};
-pub use linear_system::{Booking, LinearSystem};
+pub use linear_system::{LinearSystem, PhaseNames};
 pub use lower_triangle::LowerTriangle;
 pub use refactorisation::{Reduction, RefactorisationPolicy};
 pub use schur::Condensed;

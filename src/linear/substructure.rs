@@ -24,7 +24,7 @@ use std::iter;
 /// The factor of a matrix whose unknowns are divided among the ranks.
 pub(super) struct Substructure {
     comm: Communicator,
-    division: Division,
+    division: RankDivision,
     /// The factor of the interior and the neighbouring interface.
     local: Cholesky,
     /// S.
@@ -35,7 +35,7 @@ pub(super) struct Substructure {
 
 /// The unknowns of a rank. Their *places* are those of a vector of three parts: the interior of the
 /// rank, the interface next to it, the interface of all ranks.
-struct Division {
+struct RankDivision {
     /// Per owned unknown: its place, in the first or the third part.
     places: Vec<usize>,
     /// Global indices of all ranks' unknowns of Γ, increasing.
@@ -69,7 +69,7 @@ impl Substructure {
         condensed: &[usize],
         [precision, of_schur]: [Precision; 2],
     ) -> Result<Option<Self>, PetscError> {
-        let Some(division) = Division::of(comm, matrix, condensed)? else { return Ok(None) };
+        let Some(division) = RankDivision::of(comm, matrix, condensed)? else { return Ok(None) };
         let (interior, near) = (division.interior, division.near.len());
         let Blocks { local: mut a, .. } = division.blocks(matrix)?;
         a.push_coupled(near, 1.0);
@@ -149,7 +149,7 @@ impl Substructure {
     /// Eliminates the interior from A x = `r`. Collective.
     fn eliminate(&mut self, r: &[f64]) {
         let shared = self.division.shared();
-        let Division { places, near, .. } = &self.division;
+        let RankDivision { places, near, .. } = &self.division;
         let [b, _] = &mut self.vectors;
         b[shared..].fill(0.0);
         places.iter().zip(r).for_each(|(&place, r)| b[place] = *r);
@@ -178,7 +178,7 @@ impl Substructure {
     /// `z` ← the solution for the last x of the interface. Collective.
     pub(super) fn expand(&mut self, z: &mut [f64]) {
         let Self { division, local, vectors, .. } = self;
-        let Division { places, near, .. } = &*division;
+        let RankDivision { places, near, .. } = &*division;
         let (x_local, x_shared) = vectors[1].split_at_mut(division.shared());
         let interface: Vec<f64> = near.iter().map(|&i| x_shared[i]).collect();
         local.backward(&interface, x_local);
@@ -186,7 +186,7 @@ impl Substructure {
     }
 }
 
-impl Division {
+impl RankDivision {
     /// Where the third part of the places begins.
     fn shared(&self) -> usize {
         self.interior + self.near.len()

@@ -8,11 +8,11 @@ use crate::{
 
 #[derive(Debug, Clone, Default)]
 pub(super) struct Probes {
-    places: Vec<Place>,
+    places: Vec<ProbeLocation>,
 }
 
 #[derive(Debug, Clone)]
-struct Place {
+struct ProbeLocation {
     location: Location,
     /// The triangle on this rank; `None` if another rank owns it.
     triangle: Option<usize>,
@@ -32,7 +32,7 @@ impl Probes {
         for probe in &scene.probes {
             match Location::of(probe.point, body) {
                 Some(location) => {
-                    places.push(Place { location, triangle: Some(location.triangle) });
+                    places.push(ProbeLocation { location, triangle: Some(location.triangle) });
                 }
                 None => outside.push(probe),
             }
@@ -43,7 +43,7 @@ impl Probes {
 
     /// The probes in the triangles that a rank owns.
     pub(super) fn restrict(&self, subdomain: &Subdomain) -> Self {
-        let local = |place: &Place| Place {
+        let local = |place: &ProbeLocation| ProbeLocation {
             triangle: subdomain.own_triangle(place.location.triangle),
             ..*place
         };
@@ -52,7 +52,7 @@ impl Probes {
 
     /// The quantities at all probes; 0 at probes of other ranks. The stress is σ = η_*(ζ) 𝒜ε(u) at the point.
     pub(super) fn values(&self, problem: &DiscreteProblem, state: &State) -> Vec<f64> {
-        let values = |Place { location, triangle }: &Place| {
+        let values = |ProbeLocation { location, triangle }: &ProbeLocation| {
             let Some(t) = *triangle else { return [0.0; OBSERVED.len()] };
             let at = location.values(&problem.body, t, &state.u, &state.zeta);
             let (elasticity, body) = (&problem.elasticity, &problem.body);

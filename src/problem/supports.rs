@@ -17,7 +17,7 @@ pub struct Supports {
     /// Per node with a prescribed displacement: the boundaries that prescribe it.
     prescribed: BTreeMap<usize, Vec<Prescribed>>,
     /// Per node of Γ_C: its place on each of its edges on Γ_C.
-    contact: BTreeMap<usize, Vec<Place>>,
+    contact: BTreeMap<usize, Vec<ContactPlace>>,
     /// Per name of a boundary and connected part of it on Γ_C: its length, m.
     lengths: BTreeMap<(String, usize), f64>,
 }
@@ -32,7 +32,7 @@ struct Prescribed {
 
 /// Where a node of Γ_C lies.
 #[derive(Debug, Clone, Copy)]
-struct Place {
+struct ContactPlace {
     boundary: usize,
     /// The number of the connected part of the boundary, from 0.
     part: usize,
@@ -120,7 +120,7 @@ impl Supports {
                         _ if node == b => end,
                         _ => start + half,
                     };
-                    let place = Place { boundary, part, arc_length, normal: face.normal };
+                    let place = ContactPlace { boundary, part, arc_length, normal: face.normal };
                     self.contact.entry(node).or_default().push(place);
                 }
                 start = end;
@@ -141,9 +141,10 @@ impl Supports {
     }
 
     /// The place of a contact point. On several boundaries, the one with the nearest normal exerts the force.
-    fn place(&self, point: &ContactPoint) -> Option<Place> {
-        let along =
-            |place: &&Place| point.normal[0] * place.normal[0] + point.normal[1] * place.normal[1];
+    fn place(&self, point: &ContactPoint) -> Option<ContactPlace> {
+        let along = |place: &&ContactPlace| {
+            point.normal[0] * place.normal[0] + point.normal[1] * place.normal[1]
+        };
         let places = self.contact.get(&point.node)?.iter();
         places.rev().max_by(|a, b| along(a).total_cmp(&along(b))).copied()
     }

@@ -1,7 +1,7 @@
 //! The conditions on the parts of the boundary. Some of them exclude each other on the same edge.
 
 use super::expression::Expression;
-use super::schema::{Fault, is_wrong};
+use super::schema::{Diagnostic, is_wrong};
 use serde::Deserialize;
 use std::array;
 
@@ -116,7 +116,7 @@ pub(super) struct BoundaryKeys {
     pressure: Option<Expression>,
 }
 
-pub(super) fn boundary(keys: BoundaryKeys) -> Result<Boundary, Fault> {
+pub(super) fn boundary(keys: BoundaryKeys) -> Result<Boundary, Diagnostic> {
     let BoundaryKeys { name, displacement, symmetry, gap, normal, traction, pressure } = keys;
     let prescribed = |value: toml::Value| match value.as_str() {
         Some("free") => Ok(None),
@@ -154,7 +154,7 @@ pub(super) fn boundary(keys: BoundaryKeys) -> Result<Boundary, Fault> {
 }
 
 /// A constant direction, scaled to length 1.
-fn unit_vector(direction: [Expression; 2]) -> Result<[f64; 2], Fault> {
+fn unit_vector(direction: [Expression; 2]) -> Result<[f64; 2], Diagnostic> {
     let [x, y] = direction.map(|component| component.eval(0.0, 0.0, 0.0));
     let length = x.hypot(y);
     match length > 0.0 && length.is_finite() {

@@ -49,7 +49,7 @@ impl Scene {
         problems.extend(self.check_shared_edges(mesh));
         problems.extend(self.check_surfaces(mesh));
         problems.extend(self.bad_values(mesh, &self.sample_times(1000)));
-        self.text.verdict(problems)
+        self.text.refuse(problems)
     }
 
     /// Checks that all expressions are finite at `times` and at the points of their use: the midpoints of
@@ -58,7 +58,7 @@ impl Scene {
     /// # Errors
     /// The expressions that are not finite, each with its line, key, point and time.
     pub fn check_values(&self, mesh: &Mesh, times: &[f64]) -> Result<(), SceneError> {
-        self.text.verdict(self.bad_values(mesh, times))
+        self.text.refuse(self.bad_values(mesh, times))
     }
 
     /// Reports the probes `outside` of the body.
@@ -70,7 +70,7 @@ impl Scene {
             let (key, [x, y]) = (format!("probe.{}.point", probe.name), probe.point);
             self.at_key(&key, &format!("({x}, {y}) lies outside the body; move it into the body"))
         };
-        self.text.verdict(outside.iter().map(problem).collect())
+        self.text.refuse(outside.iter().map(problem).collect())
     }
 
     /// Checks that the figures in `accuracy_of` are among the `known` ones.
@@ -83,7 +83,7 @@ impl Scene {
             let suggestion = suggestion(name, known);
             self.at_key("accuracy_of", &format!("names `{name}`, which is no figure{suggestion}"))
         };
-        self.text.verdict(unknown.map(problem).collect())
+        self.text.refuse(unknown.map(problem).collect())
     }
 
     fn bad_values(&self, mesh: &Mesh, times: &[f64]) -> Vec<Problem> {

@@ -88,7 +88,7 @@ impl SceneText {
     }
 
     /// An error that lists the `problems` in the order of the file, if there are any.
-    pub(super) fn verdict(&self, mut problems: Vec<Problem>) -> Result<(), SceneError> {
+    pub(super) fn refuse(&self, mut problems: Vec<Problem>) -> Result<(), SceneError> {
         problems.sort_by_key(|(place, _)| (place.start, place.end));
         let mut reports: Vec<String> = Vec::with_capacity(problems.len());
         for (place, message) in &problems {
@@ -219,7 +219,7 @@ impl SceneText {
         let is_duplicate = |error: &toml::de::Error| error.message() == "duplicate key";
         let all = errors.first().is_none_or(is_duplicate);
         let reported = errors.iter().filter(|error| all || !is_duplicate(error));
-        self.verdict(reported.filter_map(&mut syntax).collect())?;
+        self.refuse(reported.filter_map(&mut syntax).collect())?;
         let mut root = DeValue::Table(root.into_inner());
         let mut problems = Vec::new();
         for argument in &self.arguments {
@@ -232,7 +232,7 @@ impl SceneText {
             let start = argument.len() - argument.trim_start_matches(' ').len();
             problems.extend(put.err().map(|problem| (start..start, problem)));
         }
-        self.verdict(problems).map(|()| root)
+        self.refuse(problems).map(|()| root)
     }
 }
 

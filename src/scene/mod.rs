@@ -37,7 +37,7 @@ use crate::{
     model::{DamageLaw, Material},
 };
 use document::SceneText;
-use schema::Findings;
+use schema::Diagnostics;
 use serde::Deserialize;
 
 /// A problem to solve, as described by a scene file.
@@ -214,10 +214,10 @@ impl Scene {
         let mut text = SceneText::new(path, text, overrides);
         let root = text.parse()?;
         let (document, tables) = text.values(&root);
-        let mut found = Findings::check(&text, &root, &document);
+        let mut found = Diagnostics::check(&text, &root, &document);
         let scene = tables::scene(&mut found);
-        let Findings { problems, places, .. } = found;
-        text.verdict(problems)?;
+        let Diagnostics { problems, places, .. } = found;
+        text.refuse(problems)?;
         (text.places, text.document, text.tables) = (places, document, tables);
         // Without problems there is a scene.
         let scene = scene.ok_or_else(|| SceneError(Vec::new()))?;

@@ -39,10 +39,10 @@ fn usual_name(schema: &Schema, name: &str, value: &DeValue) -> Option<String> {
 }
 
 /// A contradiction within a table: the key below that of the table ("" for the whole table), and the problem.
-pub(super) type Fault = (&'static str, String);
+pub(super) type Diagnostic = (&'static str, String);
 
 /// A document and its problems.
-pub(super) struct Findings<'t> {
+pub(super) struct Diagnostics<'t> {
     pub(super) text: &'t SceneText,
     /// The values, completed by defaults.
     document: toml::Value,
@@ -53,7 +53,7 @@ pub(super) struct Findings<'t> {
     unsound: BTreeSet<String>,
 }
 
-impl<'t> Findings<'t> {
+impl<'t> Diagnostics<'t> {
     /// Checks the document of `text`: `root` has the places, `document` the values.
     pub(super) fn check(text: &'t SceneText, root: &DeValue, document: &toml::Table) -> Self {
         let mut document = toml::Value::Table(document.clone());
@@ -152,7 +152,7 @@ impl<'t> Findings<'t> {
     pub(super) fn build<K: DeserializeOwned, T>(
         &mut self,
         key: &str,
-        build: impl FnOnce(K) -> Result<T, Fault>,
+        build: impl FnOnce(K) -> Result<T, Diagnostic>,
     ) -> Option<T> {
         let value = key.split('.').try_fold(&self.document, |table, name| table.get(name))?.clone();
         self.build_value(key, value, build)
@@ -162,7 +162,7 @@ impl<'t> Findings<'t> {
     pub(super) fn build_all<K: DeserializeOwned, T>(
         &mut self,
         key: &str,
-        build: impl Fn(K) -> Result<T, Fault>,
+        build: impl Fn(K) -> Result<T, Diagnostic>,
     ) -> Vec<T> {
         let elements = self.document.get(key).and_then(toml::Value::as_array).cloned();
         let mut built = Vec::new();
@@ -177,7 +177,7 @@ impl<'t> Findings<'t> {
         &mut self,
         key: &str,
         value: toml::Value,
-        build: impl FnOnce(K) -> Result<T, Fault>,
+        build: impl FnOnce(K) -> Result<T, Diagnostic>,
     ) -> Option<T> {
         if self.unsound.contains(key) {
             return None;
@@ -196,7 +196,7 @@ fn key_of_element(key: &str, i: usize, name: Option<&str>) -> String {
 }
 
 /// The problem of a value that the schema allows and its type refuses.
-pub(super) fn is_wrong(error: toml::de::Error) -> Fault {
+pub(super) fn is_wrong(error: toml::de::Error) -> Diagnostic {
     ("", format!("is wrong: {}", error.message()))
 }
 

@@ -3,7 +3,7 @@
 
 use super::boundary::boundary;
 use super::expression::Expression;
-use super::schema::{Fault, Findings, is_wrong};
+use super::schema::{Diagnostic, Diagnostics, is_wrong};
 use super::{
     Damage, MeshSource, Probe, Scene, Scheme, Stepping, Surface, TimeGrid, Units, may_start_at,
 };
@@ -21,7 +21,7 @@ use std::path::Path;
 const MOST_STEPS: f64 = 1e9;
 
 /// The scene of a document. Problems are added to `found`; `None` if a necessary part has a problem.
-pub(super) fn scene(found: &mut Findings) -> Option<Scene> {
+pub(super) fn scene(found: &mut Diagnostics) -> Option<Scene> {
     let (path, folder) = (found.text.path(), found.text.folder());
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let title = found.build("title", Ok);
@@ -84,7 +84,7 @@ pub(super) fn scene(found: &mut Findings) -> Option<Scene> {
 }
 
 /// The tables of the surfaces in a table, by name. The surrounding table completes each of them.
-fn surfaces<T: DeserializeOwned>(table: toml::Table) -> Result<Vec<(String, T)>, Fault> {
+fn surfaces<T: DeserializeOwned>(table: toml::Table) -> Result<Vec<(String, T)>, Diagnostic> {
     let (named, own): (Vec<_>, Vec<_>) = table.into_iter().partition(|(_, value)| value.is_table());
     let with_own = |(name, value): (String, toml::Value)| {
         let mut all: toml::Table = own.iter().cloned().collect();
@@ -95,7 +95,7 @@ fn surfaces<T: DeserializeOwned>(table: toml::Table) -> Result<Vec<(String, T)>,
 }
 
 /// Gravity, which is the same everywhere.
-fn uniform(gravity: [Expression; 2]) -> Result<[Expression; 2], Fault> {
+fn uniform(gravity: [Expression; 2]) -> Result<[Expression; 2], Diagnostic> {
     match gravity.iter().any(Expression::depends_on_space) {
         true => Err(("", "depends on x or y; write such a force as body.force".to_owned())),
         false => Ok(gravity),
@@ -110,7 +110,10 @@ struct MeshKeys {
     parameters: Option<BTreeMap<String, f64>>,
 }
 
-fn mesh(MeshKeys { file, size, parameters }: MeshKeys, folder: &Path) -> Result<MeshSource, Fault> {
+fn mesh(
+    MeshKeys { file, size, parameters }: MeshKeys,
+    folder: &Path,
+) -> Result<MeshSource, Diagnostic> {
     let extension = Path::new(&file).extension();
     if !extension.is_some_and(|extension| extension == "geo" || extension == "msh") {
         return Err(("file", "must be a .geo or .msh file".to_owned()));
@@ -131,7 +134,7 @@ fn mesh(MeshKeys { file, size, parameters }: MeshKeys, folder: &Path) -> Result<
     Ok(MeshSource { file: folder.join(file), parameters })
 }
 
-fn contact(options: ContactOptions) -> Result<ContactOptions, Fault> {
+fn contact(options: ContactOptions) -> Result<ContactOptions, Diagnostic> {
     let unknown = options.solver.as_ref().and_then(|name| contact::find(name).err());
     unknown.map_or(Ok(options), |error| Err(("solver", format!("is unknown: {error}"))))
 }
@@ -145,7 +148,7 @@ struct DamageKeys {
     mass: Mass,
 }
 
-fn damage(DamageKeys { law, initial, mass }: DamageKeys) -> Result<Damage, Fault> {
+fn damage(DamageKeys { law, initial, mass }: DamageKeys) -> Result<Damage, Diagnostic> {
     match initial.as_constant() {
         Some(value) if !may_start_at(&law, value) => {
             Err(("initial", format!("must be in ({}, 1], but is {value}", law.threshold)))
@@ -167,7 +170,7 @@ struct TimeKeys {
 /// The default tolerance of `step = "auto"`: the error of ζ over the damage.
 const STEP_TOLERANCE: f64 = 0.01;
 
-fn time(keys: TimeKeys) -> Result<TimeGrid, Fault> {
+fn time(keys: TimeKeys) -> Result<TimeGrid, Diagnostic> {
     let TimeKeys { end, step, tolerance, scheme } = keys;
     let Ok(length) = step.try_into::<f64>() else {
         if scheme == Some(Scheme::Euler) {
@@ -200,7 +203,7 @@ struct UnitKeys {
     stress: Option<String>,
 }
 
-fn units(UnitKeys { length, force, time, stress }: UnitKeys) -> Result<Units, Fault> {
+fn units(UnitKeys { length, force, time, stress }: UnitKeys) -> Result<Units, Diagnostic> {
     let si = Units::default();
     let is_si = length.is_none() && force.is_none();
     let (length, force) = (length.unwrap_or(si.length), force.unwrap_or(si.force));
@@ -208,7 +211,7 @@ fn units(UnitKeys { length, force, time, stress }: UnitKeys) -> Result<Units, Fa
     Ok(Units { stress: stress.unwrap_or(derived), length, force, time })
 }
 
-fn probe(probe: Probe) -> Result<Probe, Fault> {
+fn probe(probe: Probe) -> Result<Probe, Diagnostic> {
     match probe.name.trim().is_empty() {
         true => Err(("name", "is empty; its columns begin with it".to_owned())),
         false => Ok(probe),

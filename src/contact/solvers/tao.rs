@@ -192,7 +192,7 @@ impl KeptPreconditioner for TaoPreconditioner<'_> {
         factor.remake(factored)?;
         // All its solves need about the same reduction.
         factor.end_solve(None, Reduction { asked: 1.0, reached: 1.0 });
-        let prescribed = if condensed { factor.masked(k, operator)? } else { Vec::new() };
+        let prescribed = if condensed { factor.prescribed_in(k, operator)? } else { Vec::new() };
         let fits = factor.is_for(rows);
         let usable = fits
             && factor.iteration_limit(1.0).is_some()

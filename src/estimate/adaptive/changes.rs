@@ -1,8 +1,8 @@
 //! Changes of figures and fields between a mesh and a finer one.
 
 use super::{
+    few_step_run::{FewStepRun, INSTANTS},
     finer::Finer,
-    pilot::{INSTANTS, Pilot},
     sizes::areas,
 };
 use crate::{
@@ -17,7 +17,7 @@ const FIELD_ERROR_OVER_CHANGE: f64 = 4.0 / 3.0;
 ///
 /// The minima over nested spaces obey ½‖u_h − u_{h/2}‖² ≤ J(u_h) − J(u_{h/2}), with equality if no contact opens or
 /// closes. For order 1, ‖u_h − u‖² is 4/3 of ‖u_h − u_{h/2}‖².
-pub(super) fn change_of_u(coarse: &Pilot, fine: &Pilot) -> f64 {
+pub(super) fn change_of_u(coarse: &FewStepRun, fine: &FewStepRun) -> f64 {
     if coarse.problem.damage().is_some() {
         return 0.0;
     }
@@ -31,7 +31,7 @@ pub(super) fn change_of_u(coarse: &Pilot, fine: &Pilot) -> f64 {
 
 /// The error bars of the figures on the mesh of `coarse`: `factor` times their changes. Extremes move from place to
 /// place, so only their change at the end counts.
-pub(super) fn bars(coarse: &Pilot, fine: &Pilot, factor: f64) -> Vec<Bar> {
+pub(super) fn bars(coarse: &FewStepRun, fine: &FewStepRun, factor: f64) -> Vec<Bar> {
     let end = coarse.outcome.last.state.time;
     let times: Vec<f64> = (0..=INSTANTS).map(|i| end * i as f64 / INSTANTS as f64).collect();
     let changes: Vec<Vec<f64>> = (times.iter())
@@ -68,7 +68,12 @@ pub(super) fn bars(coarse: &Pilot, fine: &Pilot, factor: f64) -> Vec<Bar> {
 }
 
 /// The final error ‖ζ_h − ζ_{h/2}‖ / ‖1 − ζ_{h/2}‖, and max |ζ_h − ζ_{h/2}| per triangle. Collective.
-pub(super) fn damage(mesh: &Mesh, finer: &Finer, coarse: &Pilot, fine: &Pilot) -> (f64, Vec<f64>) {
+pub(super) fn damage(
+    mesh: &Mesh,
+    finer: &Finer,
+    coarse: &FewStepRun,
+    fine: &FewStepRun,
+) -> (f64, Vec<f64>) {
     let before = finer.interpolated(at_vertices(mesh, &coarse.zeta()));
     let mut changes = vec![0.0_f64; mesh.triangles.len()];
     let mesh = &finer.mesh;

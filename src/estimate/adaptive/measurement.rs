@@ -16,8 +16,8 @@
 use super::{
     AdaptError, Measured,
     changes::{bars, change_of_u, damage},
+    few_step_run::{FEW, FewStepRun},
     finer::{Finer, size_at},
-    pilot::{FEW, Pilot},
 };
 use crate::{
     mesh::{Mesh, Order},
@@ -106,7 +106,7 @@ impl Measurement {
         session: &Session,
         scene: &Scene,
         mesh: &Mesh,
-        coarse: &Pilot,
+        coarse: &FewStepRun,
         solver: &str,
         rounds: usize,
     ) -> Result<Self, AdaptError> {
@@ -114,7 +114,7 @@ impl Measurement {
         let finer = Finer::new(mesh, &points, LEVELS)?;
         let triangles = finer.mesh.triangles.len();
         let problem = DiscreteProblem::new(scene.clone(), finer.mesh.clone())?.restrict(session)?;
-        let fine = Pilot::run(session, &problem, solver, triangles, FEW);
+        let fine = FewStepRun::run(session, &problem, solver, triangles, FEW);
         let fine = fine.map_err(|source| AdaptError::Run { rounds, triangles, source })?;
         let order = scene.order as usize;
         let stop = match [coarse.stop(), fine.stop()] {
@@ -143,7 +143,7 @@ impl Measurement {
     }
 
     /// Compares the figures of runs that do not reach ζ_*. Collective.
-    fn compare(&mut self, mesh: &Mesh, finer: &Finer, coarse: &Pilot, fine: &Pilot) {
+    fn compare(&mut self, mesh: &Mesh, finer: &Finer, coarse: &FewStepRun, fine: &FewStepRun) {
         let scene = coarse.problem.scene();
         let factor = ERROR_OVER_CHANGE[scene.order as usize];
         let [before, now] = [coarse, fine].map(|run| run.energies());

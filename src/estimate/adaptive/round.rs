@@ -2,9 +2,9 @@
 
 use super::{
     Adapted, Measured,
+    few_step_run::FewStepRun,
     finer::touching,
     measurement::{Cause, Measurement},
-    pilot::Pilot,
     sizes::{influences, size_ratios},
 };
 use crate::{
@@ -46,7 +46,7 @@ const QUARTER: f64 = 0.25;
 pub(super) struct Round<'a> {
     scene: &'a Scene,
     mesh: &'a Mesh,
-    pub(super) pilot: Pilot<'a>,
+    pub(super) run: FewStepRun<'a>,
     accuracy: f64,
     /// The estimated relative error of u at the worst time and its shares; the shares of the damage's error.
     error: f64,
@@ -66,27 +66,27 @@ impl<'a> Round<'a> {
     pub(super) fn new(
         scene: &'a Scene,
         mesh: &'a Mesh,
-        pilot: Pilot<'a>,
+        run: FewStepRun<'a>,
         accuracy: f64,
     ) -> Result<Self, PetscError> {
-        let (error, mut shares) = pilot.relative();
-        let singular = pilot.problem.singular_points().into_iter().map(|point| {
+        let (error, mut shares) = run.relative();
+        let singular = run.problem.singular_points().into_iter().map(|point| {
             let here = shares.iter_mut().zip(touching(mesh, &[point.at]));
             let here = here.filter(|(_, touches)| *touches).map(|(share, _)| take(share));
             (point.at, here.sum())
         });
         let singular = singular.collect();
-        let displacement = pilot.displacement();
-        let of_damage = pilot.damage_shares()?;
+        let displacement = run.displacement();
+        let of_damage = run.damage_shares()?;
         Ok(Self {
             unresolved: unresolved(scene, mesh, accuracy, displacement),
             deepest: PENETRATION * accuracy * displacement,
-            open: pilot.open() / accuracy,
+            open: run.open() / accuracy,
             singular,
             of_damage,
             scene,
             mesh,
-            pilot,
+            run,
             accuracy,
             error,
             shares,
@@ -101,7 +101,7 @@ impl<'a> Round<'a> {
         self.estimate() <= ENOUGH * wanted
             && (named || self.open <= ENOUGH)
             && self.unresolved.is_empty()
-            && self.pilot.depths().iter().all(|&depth| depth <= self.deepest)
+            && self.run.depths().iter().all(|&depth| depth <= self.deepest)
     }
 
     /// The interpolation error of the damage at the end, relative, in L².
@@ -127,17 +127,17 @@ impl<'a> Round<'a> {
         };
         Adapted {
             mesh: self.mesh.clone().in_morton_order(),
-            unknowns: 2 * self.pilot.problem.body.nodes.partition.total(),
+            unknowns: 2 * self.run.problem.body.nodes.partition.total(),
             rounds,
             error: self.error,
             damage_error: self
-                .pilot
+                .run
                 .problem
                 .damage()
                 .map(|_| measured.map_or(self.damage_error(), |of| of.damage)),
-            damage: self.pilot.damage(),
+            damage: self.run.damage(),
             steps: match measured {
-                Some(measured) if self.pilot.stop().is_none() => {
+                Some(measured) if self.run.stop().is_none() => {
                     let left = (self.accuracy - measured.of_zeta()).max(0.0) / AIM_OF_STEPS;
                     left.clamp(
                         MIN_SHARE_OF_STEPS * self.accuracy,
@@ -157,7 +157,7 @@ impl<'a> Round<'a> {
     /// smaller errors of u and the damage.
     pub(super) fn size_ratios(&self, measured: Option<&Measurement>) -> Vec<f64> {
         let order = if self.scene.order == Order::Quadratic { 2 } else { 1 };
-        let (mut shares, mut depths) = (self.shares.clone(), self.pilot.depths().to_vec());
+        let (mut shares, mut depths) = (self.shares.clone(), self.run.depths().to_vec());
         let mut sizes = vec![1.0_f64; shares.len()];
         let mut smaller = 1.0_f64;
         if let Some(measured) = measured {
@@ -176,7 +176,7 @@ impl<'a> Round<'a> {
                         here.for_each(|(size, _)| *size = size.min(goal.min(HALF)));
                     }
                     Cause::Reactions
-                        if !self.singular.is_empty() || !self.pilot.extremes().ends.is_empty() => {}
+                        if !self.singular.is_empty() || !self.run.extremes().ends.is_empty() => {}
                     Cause::Around(point, derivative) => {
                         let shares = influences(self.mesh, &shares, order, point, derivative);
                         let all: f64 = shares.iter().sum();
@@ -240,7 +240,7 @@ impl<'a> Round<'a> {
         let is_known = self.error < 2.0 * self.accuracy;
         let open = if is_known { self.open } else { 0.0 };
         let at_ends = halvings(open / OPEN).max(of_length).max(of_reactions);
-        let ends = self.pilot.extremes().ends.as_flattened().iter().map(|&end| (end, at_ends));
+        let ends = self.run.extremes().ends.as_flattened().iter().map(|&end| (end, at_ends));
         singular.chain(ends).filter(|(_, levels)| *levels > 0).collect()
     }
 }

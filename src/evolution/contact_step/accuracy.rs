@@ -69,7 +69,7 @@ impl Accuracy {
 }
 
 /// Displacements caused by small forces at a state of a run, with the active nodes fixed.
-pub(crate) struct Compliance<'a> {
+pub(crate) struct FixedContact<'a> {
     problem: &'a DiscreteProblem,
     stiffness: Stiffness,
     /// The fixed unknowns.
@@ -80,16 +80,16 @@ pub(crate) struct Compliance<'a> {
 }
 
 impl<'a> ContactStep<'a> {
-    /// The compliance, with the factor of the last solve.
-    pub(crate) fn into_compliance(self) -> Result<Compliance<'a>, PetscError> {
+    /// The fixed_contact, with the factor of the last solve.
+    pub(crate) fn into_fixed_contact(self) -> Result<FixedContact<'a>, PetscError> {
         let Self { problem, stiffness, elastic: mut solver, load, c, .. } = self;
         let bounded = problem.constraints.bounds.iter().map(|bound| bound.dof);
         solver.factor().set_condensed(&stiffness.matrix, bounded)?;
-        Ok(Compliance { problem, stiffness, active: Vec::new(), solver, rhs: load, answer: c })
+        Ok(FixedContact { problem, stiffness, active: Vec::new(), solver, rhs: load, answer: c })
     }
 }
 
-impl Compliance<'_> {
+impl FixedContact<'_> {
     /// Estimates the errors of the last step of a run, relative to the maximum displacement. The step with the
     /// maximum stationarity residual follows if the first error times the ratio of the residuals comes near the
     /// promised error. The kept factor is usually good enough.

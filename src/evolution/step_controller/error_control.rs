@@ -112,7 +112,7 @@ impl<'a> ErrorControl<'a> {
     }
 
     /// Maximum distance of min ζ from ζ_* at which a run may stop.
-    pub(super) fn landing(&self) -> f64 {
+    pub(super) fn stop_distance(&self) -> f64 {
         self.tolerance * self.damage[0].max(NEGLIGIBLE)
     }
 

@@ -222,7 +222,7 @@ impl<'a> StepController<'a> {
             let part = if from > level { (from - level) / (from - zeta_min) } else { 0.0 };
             // Both the last written ζ and its correction ζ̃ must be near ζ_*.
             if let Some(error_control) = &self.error_control
-                && from.max(last.record.zeta_min) - level > error_control.landing()
+                && from.max(last.record.zeta_min) - level > error_control.stop_distance()
                 && let Some(shorter) = self.retry(planned, (0.9 * part).max(0.01))
             {
                 return shorter;

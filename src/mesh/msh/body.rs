@@ -2,7 +2,7 @@
 
 use super::{
     super::{Curve, Mesh, Side, extent, sides, twice_area},
-    byte_reader::{Result, fault},
+    byte_reader::{Result, error_at},
     contents::{Contents, Element, Node},
     one_body,
 };
@@ -24,7 +24,7 @@ pub fn mesh(contents: &Contents) -> Result<Mesh> {
     if elements.is_empty() {
         let none = "there are no triangles: with physical groups gmsh writes these alone, so name the body in the \
                     .geo, as in `Physical Surface(\"body\") = {1};` (and mesh with `gmsh -2`)";
-        return fault(None, none);
+        return error_at(None, none);
     }
     let (index, listed) = number_nodes(contents, &elements)?;
     let nodes: Vec<[f64; 2]> = listed.iter().map(|node| [node.point[0], node.point[1]]).collect();
@@ -44,7 +44,7 @@ pub fn mesh(contents: &Contents) -> Result<Mesh> {
              itself",
             first.tag, second.tag
         );
-        return fault(second.at, problem);
+        return error_at(second.at, problem);
     }
     one_body::check(&nodes, &triangles, &sides)?;
     let curves = curves(contents, &index, &sides);
@@ -57,7 +57,9 @@ pub fn mesh(contents: &Contents) -> Result<Mesh> {
 
 fn check_planar(&Node { tag, point: [.., z], at }: &Node, limit: f64) -> Result<()> {
     match z.abs() > limit {
-        true => fault(at, format!("node {tag} has z = {z}: the body must lie in the plane z = 0")),
+        true => {
+            error_at(at, format!("node {tag} has z = {z}: the body must lie in the plane z = 0"))
+        }
         false => Ok(()),
     }
 }
@@ -127,7 +129,7 @@ fn counter_clockwise(
             "triangle {tag} {FLAT_TRIANGLE}: its nodes lie on a line, or squares of its coordinates are \
              beyond double precision; mend the mesh there"
         );
-        return fault(at, problem);
+        return error_at(at, problem);
     }
     if twice < 0.0 {
         triangle.swap(1, 2);
@@ -143,11 +145,11 @@ fn flat([a, b, c]: [[f64; 2]; 3]) -> f64 {
 }
 
 fn listed_twice<T>(node: &Node) -> Result<T> {
-    fault(node.at, format!("node {} is listed twice", node.tag))
+    error_at(node.at, format!("node {} is listed twice", node.tag))
 }
 
 fn missing_node<T>(element: u64, node: u64, at: usize) -> Result<T> {
-    fault(at, format!("element {element} refers to node {node}, which $Nodes does not list"))
+    error_at(at, format!("element {element} refers to node {node}, which $Nodes does not list"))
 }
 
 /// Sets the midpoints of the edges of `elements`, the second-order triangles of `mesh`, and checks that no
@@ -168,7 +170,10 @@ fn set_midpoints(
     for &&Element { tag, nodes: [a, b, c], at, .. } in elements {
         for [a, b] in [[a, b], [b, c], [c, a]] {
             let Some(midpoint) = contents.midpoints.get(&[a.min(b), a.max(b)]) else {
-                return fault(at, format!("triangle {tag} is of order 1, others are of order 2"));
+                return error_at(
+                    at,
+                    format!("triangle {tag} is of order 1, others are of order 2"),
+                );
             };
             let Some(node) = listed.get(midpoint) else { return missing_node(tag, *midpoint, at) };
             check_planar(node, limit)?;
@@ -183,7 +188,7 @@ fn set_midpoints(
                 "curved triangle {tag} {FOLDED}: a midpoint of its edges lies too far off; mesh \
                  finer there, or mend it"
             );
-            return fault(element.at, problem);
+            return error_at(element.at, problem);
         }
     }
     Ok(())

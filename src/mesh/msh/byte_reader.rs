@@ -7,7 +7,7 @@ use std::{borrow::Cow, fmt::Display, str::FromStr};
 pub type Result<T> = std::result::Result<T, (Option<usize>, String)>;
 
 /// The error of `problem` at a byte of the file, or without one in the file as a whole.
-pub fn fault<T>(at: impl Into<Option<usize>>, problem: impl Into<String>) -> Result<T> {
+pub fn error_at<T>(at: impl Into<Option<usize>>, problem: impl Into<String>) -> Result<T> {
     Err((at.into(), problem.into()))
 }
 
@@ -17,12 +17,12 @@ pub fn expected<T>(at: usize, what: &str, found: impl Display) -> Result<T> {
     if found.chars().count() > 40 {
         found = found.chars().take(40).chain(['…']).collect();
     }
-    fault(at, format!("expected {what}, found `{found}`"))
+    error_at(at, format!("expected {what}, found `{found}`"))
 }
 
 /// The error of a file that is not a mesh file.
 pub fn not_a_mesh<T>(at: impl Into<Option<usize>>) -> Result<T> {
-    fault(at, "not a gmsh mesh: it does not begin with $MeshFormat")
+    error_at(at, "not a gmsh mesh: it does not begin with $MeshFormat")
 }
 
 /// The part of a file between the lines `$Name` and `$EndName`.
@@ -63,7 +63,7 @@ impl<'a> Section<'a> {
             sections.push(Self { name, at, bytes: &bytes[..end.unwrap_or(bytes.len())], start });
             let Some(end) = end else {
                 let cut = format!("the file ends inside ${name}: it was cut off; {AGAIN}");
-                return fault(bytes.len(), cut);
+                return error_at(bytes.len(), cut);
             };
             at = end + last.len();
         }
@@ -182,7 +182,7 @@ impl<'a> ByteReader<'a> {
             let problem = format!(
                 "expected {what}, but ${section} ends here: it lists less than it announces; {AGAIN}"
             );
-            return fault(self.position, problem);
+            return error_at(self.position, problem);
         };
         self.position += count;
         Ok(bytes)

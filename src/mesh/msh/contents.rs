@@ -1,6 +1,6 @@
 //! The nodes and elements of a `.msh` file, before they are checked to be the mesh of a plane body.
 
-use super::byte_reader::{ByteReader, Result, fault};
+use super::byte_reader::{ByteReader, Result, error_at};
 use rustc_hash::FxHashMap as HashMap;
 use std::collections::BTreeMap;
 
@@ -55,7 +55,7 @@ impl Contents {
             *coordinate = reader.real("a number")?;
         }
         if point.iter().any(|x| !x.is_finite()) {
-            return fault(at, format!("a coordinate of node {tag} is not a finite number"));
+            return error_at(at, format!("a coordinate of node {tag} is not a finite number"));
         }
         self.nodes.push(Node { tag, point, at });
         Ok(())
@@ -105,7 +105,7 @@ impl Contents {
              order 1 and 2 are supported: mesh with `gmsh -2`, without Recombine and with \
              Mesh.ElementOrder = 1 or 2"
         );
-        fault(at, problem)
+        error_at(at, problem)
     }
 
     /// Reads the midpoint nodes of the second-order element `tag`, one for each of its `edges`.
@@ -124,7 +124,7 @@ impl Contents {
                     "element {tag} has node {node} between nodes {a} and {b}, where another \
                      element has node {first}: the mesh has a gap there, mend it"
                 );
-                return fault(at, problem);
+                return error_at(at, problem);
             }
         }
         Ok(())

@@ -11,7 +11,7 @@ mod write;
 pub(super) use body::DEGENERATE;
 
 use super::{Mesh, MeshError, gmsh};
-use byte_reader::{ByteReader, Numbers, Result, Section, expected, fault, not_a_mesh};
+use byte_reader::{ByteReader, Numbers, Result, Section, error_at, expected, not_a_mesh};
 use contents::Contents;
 use std::{collections::BTreeMap, ffi::OsString, fs, path::Path};
 
@@ -102,7 +102,7 @@ fn contents(sections: &[Section], groups_are_entities: bool) -> Result<Contents>
     let all = |name| sections.iter().filter(move |section| section.name == name);
     let Some(header) = all("MeshFormat").next() else {
         return if sections.is_empty() {
-            fault(None, "the file is empty")
+            error_at(None, "the file is empty")
         } else {
             not_a_mesh(None)
         };
@@ -121,7 +121,7 @@ fn contents(sections: &[Section], groups_are_entities: bool) -> Result<Contents>
             "PartitionedEntities" => {
                 let whole = "the mesh is partitioned; write it whole: mesh without -part, or \
                              without Mesh.NbPartitions in the .geo";
-                return fault(section.at, whole);
+                return error_at(section.at, whole);
             }
             _ => continue,
         };
@@ -130,7 +130,7 @@ fn contents(sections: &[Section], groups_are_entities: bool) -> Result<Contents>
     }
     match ["Nodes", "Elements"].into_iter().find(|name| all(name).next().is_none()) {
         Some(missing) => {
-            fault(None, format!("there is no ${missing} section: has the .geo a surface?"))
+            error_at(None, format!("there is no ${missing} section: has the .geo a surface?"))
         }
         None => Ok(contents),
     }

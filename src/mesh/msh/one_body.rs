@@ -1,6 +1,6 @@
 //! Checks that the triangles make one body.
 
-use super::byte_reader::{Result, fault};
+use super::byte_reader::{Result, error_at};
 use crate::mesh::{Side, twice_area};
 
 /// Checks that the triangles are one body: connected through their `sides`.
@@ -28,7 +28,7 @@ pub fn check(nodes: &[[f64; 2]], triangles: &[[usize; 3]], sides: &[Side]) -> Re
         let at = hinge.map_or_else(String::new, |&(node, _)| place(nodes[node]));
         format!("parts of the mesh meet in a single node only, at {at}; join them along an edge")
     };
-    fault(None, problem + ", or solve them one by one")
+    error_at(None, problem + ", or solve them one by one")
 }
 
 /// The sets into which `links` join the numbers below `count` (union–find). Per number: the smallest member

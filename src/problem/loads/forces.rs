@@ -4,7 +4,7 @@ use super::parts::{
     EdgePart, Parts, TrianglePart, WHOLE, centroid, edge_parts, triangle_parts, triangle_points,
 };
 use crate::{
-    fem::{Body, Division, Edge, GAUSS, Subdomain, add_body_force, add_traction, parabola},
+    fem::{Body, Edge, GAUSS, Subdomain, TriangleParts, add_body_force, add_traction, parabola},
     problem::boundary_conditions::Traction,
     scene::{Expression, Scene, SurfaceLoad},
 };
@@ -102,7 +102,7 @@ pub(super) struct BodyForce {
     gravity: [Expression; 2],
     densities: Vec<f64>,
     /// The parts of the triangles in which it is not resolved.
-    division: Division,
+    parts_of_triangles: TriangleParts,
     /// The sample points, m, each with the area that it represents, m², and the density there.
     samples: Vec<([f64; 2], [f64; 2])>,
     /// The fraction of ∫|f_B| that may be missed.
@@ -131,15 +131,15 @@ impl BodyForce {
             }
         };
         let (whole, parts): (Vec<_>, Vec<_>) = parts.into_iter().partition(|part| part.1 == WHOLE);
-        let mut division = Division::default();
+        let mut parts_of_triangles = TriangleParts::default();
         for (triangle, part) in &parts {
-            division.entry(*triangle).or_default().push(*part);
+            parts_of_triangles.entry(*triangle).or_default().push(*part);
         }
         let density = |triangle| densities[body.material(triangle)];
         let samples = [whole, parts];
         let samples = samples.iter().flat_map(|parts| self::samples(&triangles, parts, density));
         let samples = samples.collect();
-        Some(Self { force, gravity, densities, division, samples, missed })
+        Some(Self { force, gravity, densities, parts_of_triangles, samples, missed })
     }
 
     pub(super) fn expressions(&self) -> impl Iterator<Item = &Expression> {
@@ -153,7 +153,7 @@ impl BodyForce {
             let density = self.densities[body.material(triangle)];
             [0, 1].map(|k| self.force[k].eval(x, y, t) + density * gravity[k])
         };
-        add_body_force(body, &self.division, at, load);
+        add_body_force(body, &self.parts_of_triangles, at, load);
     }
 
     /// The forces on some triangles at time t, by component.

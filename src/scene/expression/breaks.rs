@@ -10,7 +10,7 @@ const CHANGE: f64 = 0.05;
 /// The time between the two sides of a jump, over the time of the run.
 const APART: f64 = 1e-9;
 /// The largest number of intervals that are bisected in one part. A jump takes 60, a smooth pulse about 100.
-const LOOKS: usize = 400;
+const MAX_BISECTIONS: usize = 400;
 
 /// A time, s, with the bounds of the expression just before it and at it.
 struct Knot {
@@ -57,8 +57,8 @@ impl Expression {
         let mut found = Vec::new();
         for knot in knots {
             if let Some(last) = found.pop() {
-                let mut looks = LOOKS;
-                envelope.bisect(last, knot, &mut looks, &mut found);
+                let mut bisections_left = MAX_BISECTIONS;
+                envelope.bisect(last, knot, &mut bisections_left, &mut found);
             } else {
                 found.push(knot);
             }
@@ -85,7 +85,7 @@ impl Envelope<'_> {
     }
 
     /// Adds the first knot and the knots between the two. The last knot belongs to the next interval.
-    fn bisect(&self, first: Knot, last: Knot, looks: &mut usize, found: &mut Vec<Knot>) {
+    fn bisect(&self, first: Knot, last: Knot, bisections_left: &mut usize, found: &mut Vec<Knot>) {
         let length = last.time - first.time;
         let middle = self.knot(0.5 * (first.time + last.time));
         let [low, high] = self.within([first.time, last.time]);
@@ -95,13 +95,13 @@ impl Envelope<'_> {
         });
         let mean = [0, 1].map(|k| 0.5 * (first.bounds[k] + last.bounds[k]));
         let quiet = !self.differ([low, high], shown, 1.0) && !self.differ(mean, middle.bounds, 1.0);
-        if quiet || *looks == 0 {
+        if quiet || *bisections_left == 0 {
             found.extend([first, last]);
         } else if length > self.apart {
-            *looks -= 1;
-            self.bisect(first, middle, looks, found);
+            *bisections_left -= 1;
+            self.bisect(first, middle, bisections_left, found);
             if let Some(middle) = found.pop() {
-                self.bisect(middle, last, looks, found);
+                self.bisect(middle, last, bisections_left, found);
             }
         } else if self.differ(first.bounds, last.bounds, 1.0) {
             let jump = self.jump(&first, &last);

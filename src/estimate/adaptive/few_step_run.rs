@@ -20,7 +20,7 @@ const MIN_ENERGY: f64 = 1e-4;
 const LARGER: f64 = 1.5;
 
 /// A run with few steps, and its errors on each triangle of the undivided mesh.
-pub(super) struct Pilot<'a> {
+pub(super) struct FewStepRun<'a> {
     pub(super) problem: &'a DiscreteProblem,
     pub(super) outcome: Outcome,
     history: History,
@@ -51,7 +51,7 @@ struct History {
     sizes_of_extremes: Vec<f64>,
 }
 
-impl<'a> Pilot<'a> {
+impl<'a> FewStepRun<'a> {
     /// Runs `problem` on a mesh of `triangles` triangles, with estimates at about `instants` times. Collective.
     pub(super) fn run(
         session: &Session,
