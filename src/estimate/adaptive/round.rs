@@ -18,29 +18,21 @@ use std::{collections::HashSet, mem::take};
 
 /// A mesh is refined for this fraction of the required accuracy …
 const AIM: f64 = 0.7;
-/// … and good enough if its estimates are at most this fraction of it.
+/// … and good enough for a measurement if its estimates are at most this fraction of it.
 const ENOUGH: f64 = 0.8;
-/// The fraction of the damage's error that its interpolation may take.
-const INTERPOLATION: f64 = 0.7;
+/// If measured errors are too large, a round reduces the estimated errors by at most this factor: excesses on coarse meshes
+/// are often far too large.
+const MIN_GOAL: f64 = 0.25;
 /// The time steps may use the part of the accuracy that the mesh leaves, but at most and at least these fractions.
 const MAX_SHARE_OF_STEPS: f64 = 0.5;
 const MIN_SHARE_OF_STEPS: f64 = 0.04;
-/// If measured errors are too large, a round reduces the estimated errors by at most this factor.
-const MIN_GOAL: f64 = 0.25;
 /// If the accuracy is required for some figures only, these are measured once all estimates are this small.
 const ROUGH: f64 = 0.1;
-/// Allowed penetration between the nodes, as a fraction of the accuracy times the maximum displacement.
-const PENETRATION: f64 = 0.5;
-/// A refined mesh leaves the ends of contact open by this fraction of the accuracy of their length.
-const OPEN: f64 = 0.35;
 /// The fraction of the squared error of u that the triangles at singular points may cause.
 const OF_SINGULAR: f64 = 0.1;
-/// For the error of ζ at a point, the triangles are refined in which ζ changes by this fraction of its largest change.
-const GOOD_PART: f64 = 0.5;
-/// The size of a triangle is multiplied by this where data of the scene are not resolved …
+/// The size of a triangle is multiplied by this where the data of the scene or the contact are not resolved. For the error
+/// of ζ at a point: where ζ changes by more than this fraction of its largest change.
 const HALF: f64 = 0.5;
-/// … and by this where the body penetrates the foundation.
-const QUARTER: f64 = 0.25;
 
 /// A mesh and a run with few steps on it.
 pub(super) struct Round<'a> {
@@ -80,7 +72,7 @@ impl<'a> Round<'a> {
         let of_damage = run.damage_shares()?;
         Ok(Self {
             unresolved: unresolved(scene, mesh, accuracy, displacement),
-            deepest: PENETRATION * accuracy * displacement,
+            deepest: accuracy * displacement,
             open: run.open() / accuracy,
             singular,
             of_damage,
@@ -172,7 +164,7 @@ impl<'a> Round<'a> {
                     Cause::Damage => {
                         let largest = measured.zeta.iter().copied().fold(0.0, f64::max);
                         let here = sizes.iter_mut().zip(&measured.zeta);
-                        let here = here.filter(|(_, change)| **change > GOOD_PART * largest);
+                        let here = here.filter(|(_, change)| **change > HALF * largest);
                         here.for_each(|(size, _)| *size = size.min(goal.min(HALF)));
                     }
                     Cause::Reactions
@@ -195,7 +187,7 @@ impl<'a> Round<'a> {
         let of_u = if smaller < 1.0 { smaller * self.error } else { self.accuracy };
         let of_u = of_u.min(self.accuracy);
         let mut ratios = size_ratios(&shares, order, AIM * of_u);
-        let aim = INTERPOLATION * AIM * smaller * self.accuracy;
+        let aim = AIM * AIM * smaller * self.accuracy;
         let others = size_ratios(&self.of_damage, 2, aim);
         ratios.iter_mut().zip(others).for_each(|(ratio, other)| *ratio = ratio.min(other));
         for (t, &[a, b, c]) in self.mesh.triangles.iter().enumerate() {
@@ -204,7 +196,7 @@ impl<'a> Round<'a> {
                 sizes[t] = sizes[t].min(HALF);
             }
             if depths[t] > self.deepest {
-                sizes[t] = QUARTER;
+                sizes[t] = sizes[t].min(HALF);
             }
         }
         let mut ratios: Vec<f64> =
@@ -239,7 +231,7 @@ impl<'a> Round<'a> {
         // A mesh that is far too coarse does not know the ends.
         let is_known = self.error < 2.0 * self.accuracy;
         let open = if is_known { self.open } else { 0.0 };
-        let at_ends = halvings(open / OPEN).max(of_length).max(of_reactions);
+        let at_ends = halvings(open / AIM).max(of_length).max(of_reactions);
         let ends = self.run.extremes().ends.as_flattened().iter().map(|&end| (end, at_ends));
         singular.chain(ends).filter(|(_, levels)| *levels > 0).collect()
     }
