@@ -347,6 +347,35 @@ fn signals_end_ranks_with_their_state_and_a_restart_goes_on() {
     assert!(test_directory.read("said").contains("restart       from step"));
 }
 
+/// Open MPI ends all ranks if one dies.
+#[test]
+fn a_rank_that_is_killed_ends_the_others_and_leaves_a_restart() {
+    let directory = TestDirectory::new();
+    let long = ["run", "scene.toml", "--set", "time.step=1e-3", "--set", "output.checkpoint=0.1"];
+    let mut run = on_ranks(&directory, 2, &long);
+    let mut run = run.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("mpiexec starts");
+    let has_checkpoint = || {
+        directory.path("out/scene").exists()
+            && directory.names("out/scene").iter().any(|file| file.starts_with("checkpoint_"))
+    };
+    let started = Instant::now();
+    while !has_checkpoint() {
+        assert!(started.elapsed() < Duration::from_secs(60), "no checkpoint appears");
+        sleep(Duration::from_millis(5));
+    }
+    let ranks = Command::new("pgrep").args(["-P", &run.id().to_string()]).output().expect("pgrep");
+    let ranks = String::from_utf8_lossy(&ranks.stdout).into_owned();
+    let last = ranks.lines().last().expect("a rank");
+    assert!(Command::new("kill").args(["-s", "KILL", last]).status().expect("kill").success());
+    let killed = Instant::now();
+    assert!(!run.wait().expect("it ends").success());
+    assert!(killed.elapsed() < Duration::from_secs(20), "the other rank lives on");
+    let restart = [&long[..], &["--restart"]].concat();
+    let said = ProgramOutput::of(&mut on_ranks(&directory, 2, &restart));
+    assert!(said.code == Some(0) && said.out.contains("restart       from step"), "{said:?}");
+    assert_eq!(directory.summary("out/scene")["steps"], 1000);
+}
+
 /// One message, whatever `mpiexec` adds of its own.
 #[track_caller]
 fn one_message(said: &ProgramOutput, code: i32, fragment: &str) {
