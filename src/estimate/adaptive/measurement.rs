@@ -55,18 +55,23 @@ impl MeasuredError {
     }
 }
 
-/// The cause of the error of a figure.
+/// The cause of an error.
 pub(super) enum Cause {
     /// The triangles at the ends of contact.
     Ends,
-    /// The triangles in which ζ changes.
-    Damage,
-    /// All errors, and those at the ends of contact and at singular points most.
+    /// Triangles in which ζ changes: the maximum change in each triangle.
+    Change(Vec<f64>),
+    /// The triangles at the ends of contact and at singular points.
     Reactions,
     /// The errors of u, of which near ones count more: the figure is u at this point (0) or follows from its derivatives (1).
     Around([f64; 2], i32),
-    /// All errors.
-    Everything,
+    /// The errors of u and ζ everywhere, to this power.
+    Fields(f64),
+}
+
+impl Cause {
+    /// The errors of figures are products of two errors of fields.
+    pub(super) const FIGURE: Self = Self::Fields(0.5);
 }
 
 /// The errors of a run, from its changes when the mesh is bisected.
@@ -90,7 +95,7 @@ pub(super) struct Measurement {
     pub(super) shares: Vec<f64>,
     pub(super) depths: Vec<f64>,
     /// Per triangle: max |Δζ|; empty without damage.
-    pub(super) zeta: Vec<f64>,
+    zeta: Vec<f64>,
     /// The names of the extremes.
     extremes: Vec<&'static str>,
     /// The names of figures at points, or of probes, with these points, m.
@@ -216,18 +221,18 @@ impl Measurement {
     /// The cause of the error of the figure `name`.
     pub(super) fn cause(&self, name: &str) -> Cause {
         let Some(bar) = self.bars.iter().find(|bar| bar.name == name) else {
-            return Cause::Everything;
+            return Cause::Fields(1.0);
         };
         let is_here = |(place, _): &&(String, _)| {
             name.strip_prefix(place).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
         };
         match (bar.dimension, self.places.iter().find(is_here)) {
             (Dimension::ContactLength, _) => Cause::Ends,
-            (Dimension::Damage, _) if name != "zeta_mean" => Cause::Damage,
+            (Dimension::Damage, _) if name != "zeta_mean" => Cause::Change(self.zeta.clone()),
             (Dimension::Force | Dimension::Moment, _) => Cause::Reactions,
             (Dimension::Length, Some((_, at))) => Cause::Around(*at, 0),
             (_, Some((_, at))) => Cause::Around(*at, 1),
-            _ => Cause::Everything,
+            _ => Cause::FIGURE,
         }
     }
 }

@@ -144,63 +144,63 @@ impl<'a> Round<'a> {
         }
     }
 
+    /// The measured errors that miss the accuracy, over the allowed ones, with their causes.
+    fn missed(&self, measured: Option<&Measurement>) -> Vec<(f64, Cause)> {
+        let Some(measured) = measured else { return Vec::new() };
+        let has_points = !self.singular.is_empty() || !self.run.extremes().ends.is_empty();
+        let errors = measured.errors(&self.scene.accuracy_of).into_iter();
+        let errors = errors.map(|error| (error.excess(self.accuracy), measured.cause(&error.name)));
+        let with_points = |(excess, cause)| match cause {
+            Cause::Reactions if !has_points => (excess, Cause::FIGURE),
+            cause => (excess, cause),
+        };
+        errors.filter(|(excess, _)| *excess > 1.0).map(with_points).collect()
+    }
+
     /// The factors by which to multiply the sizes of the triangles for the next mesh. If a few triangles cause the
     /// error of a figure, these become smaller; the error is of first order in their size. Any other error requires
     /// smaller errors of u and the damage.
     pub(super) fn size_ratios(&self, measured: Option<&Measurement>) -> Vec<f64> {
         let order = if self.scene.order == Order::Quadratic { 2 } else { 1 };
         let (mut shares, mut depths) = (self.shares.clone(), self.run.depths().to_vec());
-        let mut sizes = vec![1.0_f64; shares.len()];
-        let mut smaller = 1.0_f64;
         if let Some(measured) = measured {
             let larger = |(own, of_parts): (&mut f64, &f64)| *own = own.max(*of_parts);
             shares.iter_mut().zip(&measured.shares).for_each(larger);
             depths.iter_mut().zip(&measured.depths).for_each(larger);
-            let errors = measured.errors(&self.scene.accuracy_of);
-            for error in errors.iter().filter(|error| error.excess(self.accuracy) > 1.0) {
-                let goal = (AIM / error.excess(self.accuracy)).max(MIN_GOAL);
-                match measured.cause(&error.name) {
-                    Cause::Ends => {}
-                    Cause::Damage => {
-                        let largest = measured.zeta.iter().copied().fold(0.0, f64::max);
-                        let here = sizes.iter_mut().zip(&measured.zeta);
-                        let here = here.filter(|(_, change)| **change > HALF * largest);
-                        here.for_each(|(size, _)| *size = size.min(goal.min(HALF)));
-                    }
-                    Cause::Reactions
-                        if !self.singular.is_empty() || !self.run.extremes().ends.is_empty() => {}
-                    Cause::Around(point, derivative) => {
-                        let shares = influences(self.mesh, &shares, order, point, derivative);
-                        let all: f64 = shares.iter().sum();
-                        let ratios = size_ratios(&shares, order, (goal * all).sqrt());
-                        let sizes = sizes.iter_mut().zip(ratios);
-                        sizes.for_each(|(size, ratio)| *size = size.min(ratio));
-                    }
-                    // Errors of figures are products of two errors of fields.
-                    Cause::Everything | Cause::Reactions => {
-                        let is_figure = measured.bars.iter().any(|bar| bar.name == error.name);
-                        smaller = smaller.min(if is_figure { goal.sqrt() } else { goal });
-                    }
+        }
+        let (mut ratios, mut smaller) = (vec![1.0_f64; shares.len()], 1.0_f64);
+        let take_smaller = |ratios: &mut [f64], others: Vec<f64>| {
+            ratios.iter_mut().zip(others).for_each(|(ratio, other)| *ratio = ratio.min(other));
+        };
+        for (excess, cause) in self.missed(measured) {
+            let goal = (AIM / excess).max(MIN_GOAL);
+            match cause {
+                Cause::Ends | Cause::Reactions => {}
+                Cause::Change(zeta) => {
+                    let largest = zeta.iter().copied().fold(0.0, f64::max);
+                    let size = |change| if change > HALF * largest { goal.min(HALF) } else { 1.0 };
+                    take_smaller(&mut ratios, zeta.into_iter().map(size).collect());
                 }
+                Cause::Around(point, derivative) => {
+                    let shares = influences(self.mesh, &shares, order, point, derivative);
+                    let all: f64 = shares.iter().sum();
+                    take_smaller(&mut ratios, size_ratios(&shares, order, (goal * all).sqrt()));
+                }
+                Cause::Fields(power) => smaller = smaller.min(goal.powf(power)),
             }
         }
         let of_u = if smaller < 1.0 { smaller * self.error } else { self.accuracy };
-        let of_u = of_u.min(self.accuracy);
-        let mut ratios = size_ratios(&shares, order, AIM * of_u);
-        let aim = AIM * AIM * smaller * self.accuracy;
-        let others = size_ratios(&self.of_damage, 2, aim);
-        ratios.iter_mut().zip(others).for_each(|(ratio, other)| *ratio = ratio.min(other));
-        for (t, &[a, b, c]) in self.mesh.triangles.iter().enumerate() {
+        take_smaller(&mut ratios, size_ratios(&shares, order, AIM * of_u.min(self.accuracy)));
+        let of_damage = AIM * AIM * smaller * self.accuracy;
+        take_smaller(&mut ratios, size_ratios(&self.of_damage, 2, of_damage));
+        for ((ratio, &[a, b, c]), depth) in ratios.iter_mut().zip(&self.mesh.triangles).zip(depths)
+        {
             let mut sides = [[a, b], [b, c], [c, a]].into_iter();
-            if sides.any(|side| self.unresolved.contains(&sorted(side))) {
-                sizes[t] = sizes[t].min(HALF);
-            }
-            if depths[t] > self.deepest {
-                sizes[t] = sizes[t].min(HALF);
+            let is_unresolved = sides.any(|side| self.unresolved.contains(&sorted(side)));
+            if is_unresolved || depth > self.deepest {
+                *ratio = ratio.min(HALF);
             }
         }
-        let mut ratios: Vec<f64> =
-            ratios.iter().zip(sizes).map(|(ratio, size)| ratio.min(size)).collect();
         // If no estimate shows which triangles are too large, all become smaller.
         let none = ratios.iter().all(|&ratio| ratio == 1.0) && self.levels(measured).is_empty();
         if measured.is_some() && none {
@@ -213,21 +213,17 @@ impl<'a> Round<'a> {
     /// together they may cause a tenth of it. The ends of contact are known up to half of an edge.
     pub(super) fn levels(&self, measured: Option<&Measurement>) -> Vec<([f64; 2], usize)> {
         let halvings = |excess: f64| excess.log2().ceil().max(0.0) as usize;
-        let errors = measured.map_or_else(Vec::new, |of| of.errors(&self.scene.accuracy_of));
         let (mut of_reactions, mut of_length) = (0, 0);
-        let missed = errors.iter().map(|error| (error.excess(self.accuracy), error));
-        for (excess, error) in missed.filter(|(excess, _)| *excess > 1.0) {
-            match measured.map(|of| of.cause(&error.name)) {
-                Some(Cause::Ends) => of_length = 2,
-                Some(Cause::Reactions) => of_reactions = of_reactions.max(halvings(excess / AIM)),
+        for (excess, cause) in self.missed(measured) {
+            match cause {
+                Cause::Ends => of_length = 2,
+                Cause::Reactions => of_reactions = of_reactions.max(halvings(excess / AIM)),
                 _ => {}
             }
         }
         let aim = (AIM * self.accuracy).powi(2) * OF_SINGULAR / self.singular.len() as f64;
-        let singular = self
-            .singular
-            .iter()
-            .map(|&(point, share)| (point, halvings(share / aim).max(of_reactions)));
+        let singular = self.singular.iter();
+        let singular = singular.map(|(at, share)| (*at, halvings(share / aim).max(of_reactions)));
         // A mesh that is far too coarse does not know the ends.
         let is_known = self.error < 2.0 * self.accuracy;
         let open = if is_known { self.open } else { 0.0 };
