@@ -117,6 +117,20 @@ pub(super) fn missing_bars(task: &Task, outcome: &Outcome) -> Option<String> {
     })
 }
 
+/// A note on curved edges of the adapted mesh that meet at an angle. The error bars do not contain the error of a smooth curve
+/// that they only follow roughly.
+pub(super) fn kink_note(task: &Task) -> Option<String> {
+    let (mesh, accuracy) = (&task.adapted.as_ref()?.mesh, task.problem.scene().accuracy?);
+    let ([x, y], angle) = mesh.largest_kink();
+    (angle > 0.1 * accuracy).then(|| {
+        format!(
+            "curved edges meet at ({x:.4}, {y:.4}) at an angle of {:.1}°: if the curve is smooth there, the bars do not \
+             contain the error of its shape; set smaller sizes there in the .geo",
+            angle.to_degrees()
+        )
+    })
+}
+
 /// The closing line on the required accuracy: reached, or the errors that are too large. `None` without a
 /// required accuracy.
 pub(super) fn accuracy_note(task: &Task, outcome: Option<&Outcome>) -> Option<String> {

@@ -214,18 +214,17 @@ fn first_mesh(source: &MeshSource, accuracy: f64) -> Result<Mesh, Failure> {
         parameters.insert("size".to_owned(), size);
         mesh::load(file, &parameters, Order::Quadratic).map_err(Failure::input)
     };
-    let mut first = of_size(largest)?;
-    for halvings in 1..=HALVINGS {
-        let kink = first.largest_kink();
-        if kink <= 0.1 * accuracy {
-            break;
+    let halved = |times: usize| of_size(largest * 0.5_f64.powi(times as i32));
+    let is_rough = |mesh: &Mesh| mesh.largest_kink().1 > 0.1 * accuracy;
+    let mut first = halved(0)?;
+    // A corner of the geometry itself stays on the finest mesh.
+    if is_rough(&first) && halved(HALVINGS)?.largest_kink().1 < 0.5 * first.largest_kink().1 {
+        let mut halvings = 1..=HALVINGS;
+        while is_rough(&first)
+            && let Some(times) = halvings.next()
+        {
+            first = halved(times)?;
         }
-        let finer = of_size(largest * 0.5_f64.powi(halvings as i32))?;
-        // A kink of the geometry itself does not become smaller.
-        if finer.largest_kink() > 0.5 * kink {
-            break;
-        }
-        first = finer;
     }
     Ok(first)
 }

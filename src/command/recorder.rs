@@ -160,6 +160,7 @@ impl<'a> Recorder<'a> {
         };
         let outcome = result.as_ref().ok();
         let mut notes = Vec::from_iter(accuracy::accuracy_note(task, outcome));
+        notes.extend(accuracy::kink_note(task));
         notes.extend(outcome.and_then(|outcome| accuracy::missing_bars(task, outcome)));
         notes.extend(task.notes.iter().cloned().chain(task.problem.notes()));
         notes.extend(outcome.iter().flat_map(|outcome| outcome.notes(&task.problem)));

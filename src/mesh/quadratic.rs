@@ -4,7 +4,7 @@
 //! offset d = m − (a+b)/2 vanishes if it is straight. A triangle with vertices p_i is the image
 //! x(λ) = Σ_i λ_i p_i + Σ_{i<j} 4λ_iλ_j d_ij of the barycentric coordinates λ.
 
-use super::{CORNER_ANGLE, Mesh, sorted};
+use super::{Mesh, sorted};
 use std::collections::BTreeMap;
 
 /// Relative offset |d| / length below which an edge is straight.
@@ -53,9 +53,9 @@ impl Mesh {
         [cos * chord[0] - sin * chord[1], sin * chord[0] + cos * chord[1]]
     }
 
-    /// The largest angle between neighbouring curved edges of the boundary, as arcs of circles, that is no corner of
-    /// it, rad. It is zero for circles, and falls with the third power of the length of the edges for other curves.
-    pub fn largest_kink(&self) -> f64 {
+    /// The node at which two curved edges of the boundary meet at the largest angle as arcs of circles, and this angle, rad.
+    /// It is zero on circles, and falls with the third power of the length of the edges on other smooth curves.
+    pub fn largest_kink(&self) -> ([f64; 2], f64) {
         // The directions in which the boundary arrives at a node and leaves it.
         let (mut arriving, mut leaving) = (BTreeMap::new(), BTreeMap::new());
         for [a, b] in self.boundary_edges() {
@@ -68,9 +68,9 @@ impl Mesh {
         let kinks = leaving.into_iter().filter_map(|(node, [x, y])| {
             let [before_x, before_y] = *arriving.get(&node)?;
             let turn = (before_x * y - before_y * x).atan2(before_x * x + before_y * y).abs();
-            (turn < CORNER_ANGLE).then_some(turn)
+            Some((self.nodes[node], turn))
         });
-        kinks.fold(0.0, f64::max)
+        kinks.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default()
     }
 
     /// Whether any side of a triangle is curved.

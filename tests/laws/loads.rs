@@ -6,7 +6,7 @@ use crate::support::{
 use signorini::{
     contact::SOLVERS,
     evolution::DiscreteProblem,
-    fem::{Body, Division, Edge, Elasticity, add_body_force, add_traction, parabola},
+    fem::{Body, Edge, Elasticity, TriangleParts, add_body_force, add_traction, parabola},
     mesh::{Mesh, Order},
     model::{Material, Plane},
 };
@@ -58,7 +58,7 @@ fn affine_body_forces_are_integrated_exactly() {
         let mut load = vec![0.0; 2 * body.nodes.points.len()];
         add_body_force(
             &body,
-            &Division::default(),
+            &TriangleParts::default(),
             |_, [x, y]| [2.0 - x + 3.0 * y, 6.0 * y],
             &mut load,
         );
@@ -154,7 +154,7 @@ fn body_forces_on_curved_elements_have_their_resultant() {
     // x and the Jacobian are quadratic: a uniform f is integrated exactly.
     let body = Body::new(curved(), Order::Quadratic);
     let mut load = vec![0.0; 2 * body.nodes.points.len()];
-    add_body_force(&body, &Division::default(), |_, _| [2.0, -3.0], &mut load);
+    add_body_force(&body, &TriangleParts::default(), |_, _| [2.0, -3.0], &mut load);
     let [[x, ..], [y, ..]] = moments(&body, &load);
     let area = curved_area(&body.mesh);
     close(x, 2.0 * area, 1e-14);
