@@ -1,6 +1,6 @@
 //! Runs with a required accuracy: adapts the mesh before the run, and checks the accuracy after it.
 
-use super::{Failure, screen, task::Task};
+use super::{Failure, KINK, screen, task::Task};
 use signorini::{
     estimate::{self, AdaptError, Adapted, Measured},
     evolution::{Outcome, percent},
@@ -122,7 +122,7 @@ pub(super) fn missing_bars(task: &Task, outcome: &Outcome) -> Option<String> {
 pub(super) fn kink_note(task: &Task) -> Option<String> {
     let (mesh, accuracy) = (&task.adapted.as_ref()?.mesh, task.problem.scene().accuracy?);
     let ([x, y], angle) = mesh.largest_kink();
-    (angle > 0.1 * accuracy).then(|| {
+    (angle > KINK * accuracy).then(|| {
         format!(
             "curved edges meet at ({x:.4}, {y:.4}) at an angle of {:.1}°: if the curve is smooth there, the bars do not \
              contain the error of its shape; set smaller sizes there in the .geo",

@@ -195,6 +195,9 @@ fn read_mesh(scene: &Scene, adapts: bool) -> Result<Mesh, Failure> {
     mesh::load(file, parameters, scene.order).map_err(Failure::input)
 }
 
+/// The largest angle, rad, at which arcs along a smooth curve may meet, over the accuracy.
+const KINK: f64 = 0.1;
+
 /// The mesh of a `.geo` from which the adaptation to an accuracy starts. Its order is 2 also for linear elements, so
 /// that refined sides stay on the arcs through the nodes of this mesh.
 ///
@@ -215,15 +218,14 @@ fn first_mesh(source: &MeshSource, accuracy: f64) -> Result<Mesh, Failure> {
         mesh::load(file, &parameters, Order::Quadratic).map_err(Failure::input)
     };
     let halved = |times: usize| of_size(largest * 0.5_f64.powi(times as i32));
-    let is_rough = |mesh: &Mesh| mesh.largest_kink().1 > 0.1 * accuracy;
+    let is_rough = |mesh: &Mesh| mesh.largest_kink().1 > KINK * accuracy;
     let mut first = halved(0)?;
     // A corner of the geometry itself stays on the finest mesh.
     if is_rough(&first) && halved(HALVINGS)?.largest_kink().1 < 0.5 * first.largest_kink().1 {
-        let mut halvings = 1..=HALVINGS;
-        while is_rough(&first)
-            && let Some(times) = halvings.next()
-        {
-            first = halved(times)?;
+        for times in 1..=HALVINGS {
+            if is_rough(&first) {
+                first = halved(times)?;
+            }
         }
     }
     Ok(first)
