@@ -3,6 +3,7 @@
 use super::{Failure, SceneArguments, ranks::require_one_process, read_mesh, screen::row};
 use comfy_table::presets;
 use signorini::{
+    estimate::INSTANTS,
     mesh::{Mesh, extent},
     model::{Material, Plane},
     output::terminal::{self, say},
@@ -202,8 +203,8 @@ fn cost(problem: &DiscreteProblem) -> String {
     let step = 0.7e-6 * nodes * (nodes / 4225.0).powf(0.27);
     let once = 0.05 + 50e-6 * nodes;
     let megabytes = 50.0 + 8e-3 * nodes;
-    // Twelve steps on the mesh, and twelve on a mesh with four times as many triangles.
-    let bars = 12.0 * (step + 4.0 * 1.45 * step) + 2.5 * once;
+    // As many steps on the mesh as on a mesh with four times as many triangles.
+    let bars = INSTANTS as f64 * (step + 4.0 * 1.45 * step) + 2.5 * once;
     let seconds = match scene.time.map(|grid| grid.stepping) {
         _ if scene.accuracy.is_some() => {
             return "the run chooses mesh and steps for the required accuracy".to_owned();

@@ -159,11 +159,7 @@ impl<'a> Recorder<'a> {
             Err(error) => (written.and(Err(error)), None),
         };
         let outcome = result.as_ref().ok();
-        let mut notes = Vec::from_iter(accuracy::accuracy_note(task, outcome));
-        notes.extend(accuracy::kink_note(task));
-        notes.extend(outcome.and_then(|outcome| accuracy::missing_bars(task, outcome)));
-        notes.extend(task.notes.iter().cloned().chain(task.problem.notes()));
-        notes.extend(outcome.iter().flat_map(|outcome| outcome.notes(&task.problem)));
+        let mut notes = notes(task, outcome);
         let mut shown = notes.clone();
         notes.extend(outcome.iter().flat_map(|outcome| outcome.remarks(&task.problem)));
         if result.is_ok() {
@@ -173,12 +169,9 @@ impl<'a> Recorder<'a> {
         // Only the first rank goes on from here.
         let Some(bar) = &self.bar else { return written };
 
-        let quantities = task.problem.quantities();
-        let quantities: Vec<(String, f64)> = last
-            .iter()
-            .flat_map(|step| quantities.iter().cloned().zip(step.quantities.clone()))
-            .collect();
-        let record = last.map(|step| step.record);
+        let record = last.as_ref().map(|step| step.record);
+        let quantities = last.into_iter().flat_map(|step| step.quantities);
+        let quantities: Vec<_> = task.problem.quantities().into_iter().zip(quantities).collect();
         let wall = task.started.elapsed().as_secs_f64();
         let mut summary = summary(task, record, &quantities, result, &notes, wall);
         add_extremes(&mut summary, extremes.as_ref());
@@ -288,6 +281,18 @@ fn summary(
         summary["error"] = json!(error.to_string());
     }
     summary
+}
+
+/// The notes on a run, except remarks. Collective.
+fn notes(task: &Task, outcome: Option<&Outcome>) -> Vec<String> {
+    let of_accuracy = [
+        accuracy::accuracy_note(task, outcome),
+        accuracy::kink_note(task),
+        outcome.and_then(|outcome| accuracy::missing_bars(task, outcome)),
+    ];
+    let of_task = task.notes.iter().cloned().chain(task.problem.notes());
+    let of_run = outcome.into_iter().flat_map(|outcome| outcome.notes(&task.problem));
+    of_accuracy.into_iter().flatten().chain(of_task).chain(of_run).collect()
 }
 
 /// Adds to the summary the largest stresses and pressure with their places, and the length of contact, m.

@@ -51,7 +51,7 @@ pub struct Answer<'a> {
     pub rigid: &'a [f64],
     /// The rest of u, which causes the forces, m.
     pub elastic: &'a [f64],
-    /// f − Ku, N per metre of thickness: the forces that supports and obstacles must react.
+    /// f − Ku, N per metre of thickness: the forces that supports and obstacles must balance.
     pub unbalanced: &'a [f64],
     /// The values of the prescribed rows, m.
     pub prescribed: &'a [f64],
@@ -199,7 +199,7 @@ impl Conditions {
 
     /// The reactions of the conditions, whose gaps have `left`, to `force`.
     fn react(&self, force: Vector2<f64>, left: &[f64]) -> NodalReaction {
-        // Prescribed directions react all forces along them.
+        // Reactions of prescribed directions balance all forces along them.
         let free: Vec<Vector2<f64>> = match self.fixed.split_first() {
             None => vec![Vector2::x(), Vector2::y()],
             Some(((d, _), others)) if others.iter().all(|(e, _)| d.perp(e).abs() <= ALONG) => {

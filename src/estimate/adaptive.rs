@@ -23,7 +23,8 @@ use crate::{
     problem::{Bar, Collapse, DiscreteProblem, LoadCurve, SetupError},
     scene::{Scene, Stepping, rounded},
 };
-use few_step_run::{FEW, FewStepRun, INSTANTS};
+pub use few_step_run::INSTANTS;
+use few_step_run::{FEW, FewStepRun};
 use measurement::Measurement;
 use progress::Progress;
 use round::Round;

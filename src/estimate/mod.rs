@@ -26,7 +26,7 @@ mod error_budget;
 mod penetration;
 mod adaptive;
 
-pub use adaptive::{AdaptError, Adapted, Measured, adapted, measured_errors};
+pub use adaptive::{AdaptError, Adapted, INSTANTS, Measured, adapted, measured_errors};
 pub use extremes::{Extreme, Extremes, GROWS};
 pub use recovery::{EnergyError, RecoveredStrains};
 pub use stress::{NodalStress, Strained, principal};

@@ -38,11 +38,13 @@ impl ErrorBudget {
     /// The errors by their causes, and advice on which cause to reduce. For a run that stopped at ζ_*, the error of
     /// that time replaces the error of the damage.
     pub fn lines(&self, stopped: Option<&Stop>) -> [String; 4] {
-        let of_damage = |error: Option<f64>| match error {
+        let of_damage = |error: Option<f64>, missing: &str| match error {
             Some(error) => format!("damage {}", percent(error)),
-            None if self.can_be_damaged => "damage not measured (see --bars)".to_owned(),
-            None => "no damage".to_owned(),
+            None => missing.to_owned(),
         };
+        let missing =
+            if self.can_be_damaged { "damage not measured (see --bars)" } else { "no damage" };
+        let damage_mesh = of_damage(self.damage_mesh, missing);
         let of_stop = |off: Option<f64>| match off {
             Some(off) => format!("the time of ζ_* off by up to {off:.1e} s"),
             None => "the time of ζ_* not measured (see --bars)".to_owned(),
@@ -55,13 +57,14 @@ impl ErrorBudget {
                 (of_stop(mesh), of_stop(steps), part(mesh), part(steps))
             }
             (None, Some(u)) => {
-                let steps = format!("u {}, {}", percent(u), of_damage(self.damage_steps));
+                let steps =
+                    format!("u {}, {}", percent(u), of_damage(self.damage_steps, "no damage"));
                 let largest = self.damage_steps.map_or(u, |damage| damage.max(u));
-                (of_damage(self.damage_mesh), steps, self.damage_mesh, Some(largest))
+                (damage_mesh, steps, self.damage_mesh, Some(largest))
             }
             (None, None) => {
                 let steps = if self.can_be_damaged { "not estimated" } else { "none" };
-                (of_damage(self.damage_mesh), steps.to_owned(), self.damage_mesh, None)
+                (damage_mesh, steps.to_owned(), self.damage_mesh, None)
             }
         };
         let of_u = if stopped.is_some() { 0.0 } else { self.displacement_mesh };

@@ -1,6 +1,6 @@
 //! Continuous finite elements (22), (23), P1 for ζ and P1 or P2 for u: from laws to matrices and vectors.
 //!
-//! - [`Body`]: the nodes and elements of a mesh, and their parts_of_triangles among ranks ([`Partition`], `Subdomain`);
+//! - [`Body`]: the nodes and elements of a mesh, and their division among ranks ([`Partition`], `Subdomain`);
 //! - [`Elasticity`]: strains, stresses and internal forces; [`Stiffness`]: K(ζ), its pattern made once;
 //! - [`DamageSystem`] solves (28), and [`DamageCertificate`] checks the answer without its matrices.
 //!

@@ -101,17 +101,17 @@ impl Factor {
         k: &Matrix,
         operator: &Matrix,
     ) -> Result<Vec<usize>, PetscError> {
-        let mut prescribed_in = Vec::new();
+        let mut prescribed = Vec::new();
         for &unknown in &self.condensed.1 {
             let row = k.rows().start + unknown as i32;
             let coupled = |columns: &[i32], values: &[f64]| {
                 columns.iter().zip(values).any(|(column, value)| *column != row && *value != 0.0)
             };
             if k.read_row(row, coupled)? && !operator.read_row(row, coupled)? {
-                prescribed_in.push(unknown);
+                prescribed.push(unknown);
             }
         }
-        Ok(prescribed_in)
+        Ok(prescribed)
     }
 
     /// Analyses the matrix. It returns false if the matrix or its interface is too large for a factor.

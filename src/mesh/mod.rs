@@ -24,6 +24,7 @@ pub use error::MeshError;
 pub use gmsh::{file, is_self_contained, load, mesh_geo, scaling_factor};
 pub use msh::{parse, read};
 pub use refine::Refinement;
+pub(crate) use refine::TIES;
 
 /// The order of finite elements: of the displacements, and of the elements that gmsh makes from a `.geo`.
 ///

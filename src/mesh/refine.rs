@@ -8,6 +8,9 @@
 
 use super::{Mesh, MeshError, Side, sides, twice_area};
 
+/// Slightly below 1: sizes whose ratio is between this and 1 are equal up to rounding. So meshes do not depend on units.
+pub(crate) const TIES: f64 = 1.0 - 1e-9;
+
 /// A mesh that is refined repeatedly.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Refinement {
@@ -29,7 +32,7 @@ impl Refinement {
             let sides = [0, 1, 2].map(|i| mesh.edge_normal([triangle[i], triangle[(i + 1) % 3]]).1);
             let longest = sides.into_iter().fold(0.0, f64::max);
             // The first of equal sides, up to rounding, so that meshes do not depend on units.
-            let first = sides.iter().position(|side| *side >= (1.0 - 1e-9) * longest);
+            let first = sides.iter().position(|side| *side >= TIES * longest);
             triangle.rotate_left(first.unwrap_or(0));
         }
         let parent_of_triangle = (0..triangles.len()).collect();

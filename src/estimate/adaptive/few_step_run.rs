@@ -11,7 +11,7 @@ use crate::{
 use std::cmp::Ordering;
 
 /// Number of steps of the run, and of evenly spread times at which its errors are estimated.
-pub(super) const INSTANTS: usize = 8;
+pub const INSTANTS: usize = 8;
 /// Number of these times in a run that is only compared with another.
 pub(super) const FEW: usize = 3;
 /// Errors at the end are relative to at least this fraction of the maximum ‖u‖².

@@ -4,15 +4,12 @@
 //! replace it. The minimum number of triangles for a given squared error Σ r_T^2p m_T has r_T ~ m_T^(−1/(2p+2)).
 
 use super::finer::touching;
-use crate::mesh::{Mesh, MeshError, Refinement, twice_area};
+use crate::mesh::{Mesh, MeshError, Refinement, TIES, twice_area};
 
 /// Minimum factor by which the size of a triangle is multiplied in a round.
 const MIN_RATIO: f64 = 0.125;
 /// Triangles are bisected while they are larger than this many times their wanted area; see [`oversize`].
 const OVERSIZE: f64 = 1.5;
-/// Slightly below 1: triangles equal to the median up to rounding are bisected as well, and those that are small enough
-/// up to rounding are not. So meshes do not depend on units.
-const TIES: f64 = 1.0 - 1e-9;
 
 /// The factors for the sizes of the triangles, so that the squared relative error Σ m_T (`shares`) becomes `aim`².
 pub(super) fn size_ratios(shares: &[f64], order: i32, aim: f64) -> Vec<f64> {

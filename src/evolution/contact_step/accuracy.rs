@@ -80,7 +80,7 @@ pub(crate) struct FixedContact<'a> {
 }
 
 impl<'a> ContactStep<'a> {
-    /// The fixed_contact, with the factor of the last solve.
+    /// The solver with the contact of a state kept fixed, with the factor of the last solve.
     pub(crate) fn into_fixed_contact(self) -> Result<FixedContact<'a>, PetscError> {
         let Self { problem, stiffness, elastic: mut solver, load, c, .. } = self;
         let bounded = problem.constraints.bounds.iter().map(|bound| bound.dof);
