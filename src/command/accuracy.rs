@@ -122,7 +122,7 @@ pub(super) fn missing_bars(task: &Task, outcome: &Outcome) -> Option<String> {
 pub(super) fn kink_note(task: &Task) -> Option<String> {
     let (mesh, accuracy) = (&task.adapted.as_ref()?.mesh, task.problem.scene().accuracy?);
     let ([x, y], angle) = mesh.largest_kink();
-    (angle > KINK * accuracy).then(|| {
+    (angle > 2.0 * KINK * accuracy).then(|| {
         format!(
             "curved edges meet at ({x:.4}, {y:.4}) at an angle of {:.1}°: if the curve is smooth there, the bars do not \
              contain the error of its shape; set smaller sizes there in the .geo",

@@ -29,7 +29,7 @@ use ranks::require_one_process;
 use signorini::{
     contact::{self, REGISTRY, SOLVERS, TAO_TYPES, summaries},
     interrupt::{Signal, received},
-    mesh::{self, Mesh, Order},
+    mesh::{self, Kink, Mesh, Order},
     output::terminal::say,
     scene::{MeshSource, SCHEMA, Scene},
 };
@@ -195,38 +195,38 @@ fn read_mesh(scene: &Scene, adapts: bool) -> Result<Mesh, Failure> {
     mesh::load(file, parameters, scene.order).map_err(Failure::input)
 }
 
-/// The largest angle, rad, at which arcs along a smooth curve may meet, over the accuracy.
+/// The angle, rad, at which arcs along a smooth curve may meet, over the accuracy. A note tells twice as large ones.
 const KINK: f64 = 0.1;
 
 /// The mesh of a `.geo` from which the adaptation to an accuracy starts. Its order is 2 also for linear elements, so
 /// that refined sides stay on the arcs through the nodes of this mesh.
 ///
 /// Where arcs follow another smooth curve, they meet at a small angle, which stays. Stresses at an angle δ grow like
-/// h^(−δ/π), about. So the mesh becomes finer until these angles are a tenth of the accuracy.
+/// h^(−δ/π), about. So the mesh becomes finer there until these angles are a tenth of the accuracy; they fall like h³.
 fn first_mesh(source: &MeshSource, accuracy: f64) -> Result<Mesh, Failure> {
     /// Triangles along the body.
     const CELLS: f64 = 4.0;
-    /// The size is halved at most this many times, as some curves keep their kinks.
-    const HALVINGS: usize = 4;
+    /// Meshes that are graded towards angles, as the third power holds for small ones, and corners stay.
+    const GRADINGS: usize = 4;
     let MeshSource { file, parameters } = source;
     let usual = mesh::load(file, parameters, Order::Linear).map_err(Failure::input)?;
     let scaling = mesh::scaling_factor(file).map_err(Failure::input)?;
-    let largest = mesh::extent(&usual.nodes) / scaling / CELLS;
-    let of_size = |size: f64| {
-        let mut parameters = parameters.clone();
-        parameters.insert("size".to_owned(), size);
-        mesh::load(file, &parameters, Order::Quadratic).map_err(Failure::input)
-    };
-    let halved = |times: usize| of_size(largest * 0.5_f64.powi(times as i32));
-    let is_rough = |mesh: &Mesh| mesh.largest_kink().1 > KINK * accuracy;
-    let mut first = halved(0)?;
-    // A corner of the geometry itself stays on the finest mesh.
-    if is_rough(&first) && halved(HALVINGS)?.largest_kink().1 < 0.5 * first.largest_kink().1 {
-        for times in 1..=HALVINGS {
-            if is_rough(&first) {
-                first = halved(times)?;
-            }
+    let mut parameters = parameters.clone();
+    parameters.insert("size".to_owned(), mesh::extent(&usual.nodes) / scaling / CELLS);
+    let mut first = mesh::load(file, &parameters, Order::Quadratic).map_err(Failure::input)?;
+    for _ in 0..GRADINGS {
+        let rough = |kink: &Kink| kink.angle > KINK * accuracy;
+        let kinks = Vec::from_iter(first.kinks().into_iter().filter(rough));
+        if kinks.is_empty() {
+            break;
         }
+        let mut sizes = first.sizes();
+        for kink in kinks {
+            let aim = 0.5 * KINK * accuracy;
+            sizes[kink.node] = kink.length * (aim / kink.angle).cbrt().max(0.25);
+        }
+        first = mesh::load_graded(file, &parameters, Order::Quadratic, (&first, &sizes))
+            .map_err(Failure::input)?;
     }
     Ok(first)
 }

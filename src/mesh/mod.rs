@@ -21,8 +21,9 @@ mod refine;
 
 pub use boundary::{BoundaryNode, CORNER_ANGLE, Face, boundary_nodes};
 pub use error::MeshError;
-pub use gmsh::{file, is_self_contained, load, mesh_geo, scaling_factor};
+pub use gmsh::{file, is_self_contained, load, load_graded, mesh_geo, scaling_factor};
 pub use msh::{parse, read};
+pub use quadratic::Kink;
 pub use refine::Refinement;
 pub(crate) use refine::TIES;
 
@@ -92,11 +93,21 @@ impl Mesh {
     pub fn boundary_edges(&self) -> Vec<[usize; 2]> {
         let sides = sides(&self.triangles);
         let single = sides.chunk_by(|a, b| a.edge == b.edge).filter(|sides| sides.len() == 1);
-        let directed = |sides: &[Side]| {
-            let [p, q] = sides[0].edge;
-            if sides[0].on_left { [p, q] } else { [q, p] }
-        };
-        single.map(directed).collect()
+        single.map(|sides| sides[0].directed()).collect()
+    }
+
+    /// Per node the mean length of the sides of its triangles, m.
+    pub fn sizes(&self) -> Vec<f64> {
+        let mut sums = vec![(0.0, 0.0); self.nodes.len()];
+        for &[a, b, c] in &self.triangles {
+            for [p, q] in [[a, b], [b, c], [c, a]] {
+                let (_, length) = self.edge_normal([p, q]);
+                for node in [p, q] {
+                    sums[node] = (sums[node].0 + length, sums[node].1 + 1.0);
+                }
+            }
+        }
+        sums.into_iter().map(|(sum, count)| sum / count).collect()
     }
 
     /// The smallest angle of all triangles, degrees, and a corner of its triangle, m.
@@ -127,6 +138,14 @@ struct Side {
     /// Whether the triangle lies on the left of the way from the first end to the second.
     on_left: bool,
     triangle: usize,
+}
+
+impl Side {
+    /// The ends, the triangle on the left.
+    fn directed(&self) -> [usize; 2] {
+        let [p, q] = self.edge;
+        if self.on_left { [p, q] } else { [q, p] }
+    }
 }
 
 /// The sides of all edges, sorted: a boundary edge has one, an inner edge one on the right and one

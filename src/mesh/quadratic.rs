@@ -4,11 +4,20 @@
 //! offset d = m − (a+b)/2 vanishes if it is straight. A triangle with vertices p_i is the image
 //! x(λ) = Σ_i λ_i p_i + Σ_{i<j} 4λ_iλ_j d_ij of the barycentric coordinates λ.
 
-use super::{Mesh, sorted};
+use super::{Mesh, Side, sides, sorted};
 use std::collections::BTreeMap;
 
 /// Relative offset |d| / length below which an edge is straight.
 const STRAIGHT: f64 = 1e-9;
+
+/// A node at which two curved edges of a line meet at an angle.
+pub struct Kink {
+    pub node: usize,
+    /// The angle, rad.
+    pub angle: f64,
+    /// The length of the shorter of both edges, m.
+    pub length: f64,
+}
 
 impl Mesh {
     /// The midpoint of an edge (if curved, of its parabola), m.
@@ -53,24 +62,54 @@ impl Mesh {
         [cos * chord[0] - sin * chord[1], sin * chord[0] + cos * chord[1]]
     }
 
-    /// The node at which two curved edges of the boundary meet at the largest angle as arcs of circles, and this angle, rad.
-    /// It is zero on circles, and falls with the third power of the length of the edges on other smooth curves.
-    pub fn largest_kink(&self) -> ([f64; 2], f64) {
-        // The directions in which the boundary arrives at a node and leaves it.
+    /// The nodes at which two curved edges of the boundary, or of the line between two surfaces, meet at an angle as arcs of
+    /// circles, and these angles, rad. They are zero on circles, and fall with the third power of the length of the edges on
+    /// other smooth curves.
+    pub fn kinks(&self) -> Vec<Kink> {
+        let surfaces = self.surface_combinations();
+        // By node and by the surfaces on the left and on the right: the directions in which the line arrives and leaves.
         let (mut arriving, mut leaving) = (BTreeMap::new(), BTreeMap::new());
-        for [a, b] in self.boundary_edges() {
-            if !self.curved.contains_key(&sorted([a, b])) {
+        for both in sides(&self.triangles).chunk_by(|a, b| a.edge == b.edge) {
+            let of = |side: &Side| surfaces[side.triangle];
+            let is_line = both.len() == 1 || of(&both[0]) != of(&both[1]);
+            if !is_line || !self.curved.contains_key(&both[0].edge) {
                 continue;
             }
-            leaving.insert(a, self.direction(a, b));
-            arriving.insert(b, self.direction(b, a).map(|component| -component));
+            for (side, other) in both.iter().zip([both.get(1), both.first()]) {
+                let [a, b] = side.directed();
+                let between = (of(side), other.map(of));
+                let (_, length) = self.edge_normal([a, b]);
+                leaving.insert((a, between), (self.direction(a, b), length));
+                let direction = self.direction(b, a).map(|component| -component);
+                arriving.insert((b, between), (direction, length));
+            }
         }
-        let kinks = leaving.into_iter().filter_map(|(node, [x, y])| {
-            let [before_x, before_y] = *arriving.get(&node)?;
-            let turn = (before_x * y - before_y * x).atan2(before_x * x + before_y * y).abs();
-            Some((self.nodes[node], turn))
-        });
-        kinks.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default()
+        let kink = |(place, ([x, y], after)): (&(usize, _), &([f64; 2], f64))| {
+            let ([before_x, before_y], before) = arriving.get(place)?;
+            let turn = (before_x * y - before_y * x).atan2(before_x * x + before_y * y);
+            Some(Kink { node: place.0, angle: turn.abs(), length: before.min(*after) })
+        };
+        leaving.iter().filter_map(kink).collect()
+    }
+
+    /// The largest of the angles of [`Mesh::kinks`] and the coordinates of its node.
+    pub fn largest_kink(&self) -> ([f64; 2], f64) {
+        let largest = self.kinks().into_iter().max_by(|a, b| a.angle.total_cmp(&b.angle));
+        largest.map(|kink| (self.nodes[kink.node], kink.angle)).unwrap_or_default()
+    }
+
+    /// Per triangle a number that is the same for all triangles of the same surfaces.
+    fn surface_combinations(&self) -> Vec<usize> {
+        let mut combinations = vec![0; self.triangles.len()];
+        for triangles in self.surfaces.values() {
+            let next = combinations.iter().max().map_or(0, |largest| largest + 1);
+            let mut renamed = BTreeMap::new();
+            for &triangle in triangles {
+                let fresh = next + renamed.len();
+                combinations[triangle] = *renamed.entry(combinations[triangle]).or_insert(fresh);
+            }
+        }
+        combinations
     }
 
     /// Whether any side of a triangle is curved.

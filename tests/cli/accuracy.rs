@@ -172,7 +172,8 @@ fn write_bar(directory: &TestDirectory, damage: &str, top: &str) {
     );
 }
 
-/// A plate of 4 × 2 with an elliptic hole of 1 × 0.2 under its weight of 1 per area: the support carries its area.
+/// A plate of 4 × 2 with an elliptic hole of 1 × 0.2, or with an inclusion that is twice as dense, under its weight of 1 per
+/// area: the support carries it. gmsh's coarse mesh alone has an ellipse whose area is 1 % too large.
 #[test]
 fn first_meshes_follow_an_ellipse() {
     let directory = TestDirectory::new();
@@ -181,22 +182,29 @@ fn first_meshes_follow_an_ellipse() {
         Line(1) = {1,2}; Line(2) = {2,3}; Line(3) = {3,4}; Line(4) = {4,1};
         Point(5) = {2,1,0}; Point(6) = {2.1,1,0}; Point(7) = {2,1.5,0}; Point(8) = {1.9,1,0}; Point(9) = {2,0.5,0};
         Ellipse(5) = {6,5,7,7}; Ellipse(6) = {7,5,7,8}; Ellipse(7) = {8,5,7,9}; Ellipse(8) = {9,5,7,6};
-        Curve Loop(1) = {1:4}; Curve Loop(2) = {5:8}; Plane Surface(1) = {1,2};
-        Physical Curve(\"base\") = {1}; Physical Surface(\"body\") = {1};
+        Curve Loop(1) = {1:4}; Curve Loop(2) = {5:8}; Plane Surface(1) = {1,2}; Plane Surface(2) = {2};
+        Physical Curve(\"base\") = {1}; Physical Surface(\"plate\") = {1};
         Mesh.MeshSizeMax = size;\n";
-    directory.write("plate.geo", geometry);
-    let scene = "mesh.file = 'plate.geo'
-                 material = { young = 1000, poisson = 0.3, plane = 'stress' }
-                 body = { force = [0, -1] }
-                 boundary = [{ name = 'base', displacement = [0, 0] }]";
-    directory.write("scene.toml", scene);
-    let hole = 0.5 * 0.1 * std::f64::consts::PI;
-    let said = directory.run(&["--accuracy", "0.1"]);
-    let quantities = &directory.summary("out/scene")["quantities"];
-    let found = 8.0 - quantities["base.force_y"].as_f64().unwrap();
-    println!("{found} of {hole}\n{}", said.out);
-    assert!((found - hole).abs() < 1e-3 * hole, "{found} is not {hole}");
-    assert!(said.out.contains("curved edges meet at (2.0000, "), "{}", said.out);
+    directory.write("hole.geo", geometry);
+    directory.write("inclusion.geo", &format!("{geometry}Physical Surface(\"core\") = {{2}};\n"));
+    let ellipse = 0.5 * 0.1 * std::f64::consts::PI;
+    let materials = [("hole", "", -ellipse), ("inclusion", "core.density = 2", ellipse)];
+    for (file, core, more) in materials {
+        let scene = format!(
+            "mesh.file = '{file}.geo'
+             body = {{ gravity = [0, -1] }}
+             boundary = [{{ name = 'base', displacement = [0, 0] }}]
+             [material]
+             young = 1000\npoisson = 0.3\nplane = 'stress'\ndensity = 1\n{core}"
+        );
+        directory.write("scene.toml", &scene);
+        let said = directory.run(&["--accuracy", "0.1"]);
+        let quantities = &directory.summary("out/scene")["quantities"];
+        let found = quantities["base.force_y"].as_f64().unwrap() - 8.0;
+        println!("{found} of {more}\n{}", said.out);
+        assert!((found - more).abs() < 1e-3 * ellipse, "{file}: {found} is not {more}");
+        assert!(!said.out.contains("curved edges meet"), "{}", said.out);
+    }
 }
 
 /// A homogeneous bar in tension with λ_D = 0 and ½ λ_U |ε|² = 1.09 t²: ζ′ = −(1.09 t² − 0.05)₊. The first time

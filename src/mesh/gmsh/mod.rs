@@ -33,6 +33,36 @@ pub fn load(
     read(&file(path, parameters, order)?).map(Mesh::in_morton_order)
 }
 
+/// Meshes a `.geo` file with edges about as long as `sizes`, m, which belong to the nodes of another mesh of this file. The
+/// mesh is not kept.
+///
+/// # Errors
+/// Those of [`mesh_geo`].
+pub fn load_graded(
+    geo: &Path,
+    parameters: &BTreeMap<String, f64>,
+    order: Order,
+    (mesh, sizes): (&Mesh, &[f64]),
+) -> Result<Mesh, MeshError> {
+    let text = read_text(geo).map_err(MeshError::io(geo))?;
+    let factor = scaling_factor(geo)?;
+    let mut last = last_words(&text, parameters, order);
+    last.push_str("View \"sizes\" {\n");
+    for nodes in &mesh.triangles {
+        let corners = nodes.map(|node| mesh.nodes[node].map(|x| x / factor));
+        let [[a, b], [c, d], [e, f]] = corners;
+        let [p, q, r] = nodes.map(|node| sizes[node] / factor);
+        last.push_str(&format!(
+            "ST({a:e},{b:e},0,{c:e},{d:e},0,{e:e},{f:e},0){{{p:e},{q:e},{r:e}}};\n"
+        ));
+    }
+    last.push_str(
+        "};\nsizes = newf;\nField[sizes] = PostView;\nField[sizes].ViewIndex = PostProcessing.NbViews - 1;\n\
+         Background Field = sizes;\n",
+    );
+    parse(&meshed(geo, parameters, &last)?, geo).map(Mesh::in_morton_order)
+}
+
 /// The path of a `.msh`: that of the given file, or of the file that [`mesh_geo`] makes from a `.geo`.
 ///
 /// `parameters` and `order` apply to a `.geo` only.
@@ -96,10 +126,28 @@ pub fn mesh_geo(
         return Ok(made.clone());
     }
 
-    let last = last_words(&text, parameters, order);
-    let mut bytes = run((geo, None), arguments(parameters), &last, "mesh it")?;
+    let bytes = meshed(geo, parameters, &last_words(&text, parameters, order))?;
+    match write(&mesh, &bytes, started) {
+        Err(error) if is_read_only(&error) => {
+            let folder = cached.parent().unwrap_or(Path::new("."));
+            fs::create_dir_all(folder).map_err(MeshError::io(folder))?;
+            write(&cached, &bytes, started).map_err(MeshError::io(&cached))?;
+            Ok(cached)
+        }
+        written => written.map_err(MeshError::io(&mesh)).map(|()| mesh),
+    }
+}
+
+/// The MSH file that gmsh makes from a `.geo` and the commands `last`, without flat triangles if one of the options
+/// [`AGAIN`] avoids them.
+fn meshed(
+    geo: &Path,
+    parameters: &BTreeMap<String, f64>,
+    last: &str,
+) -> Result<Vec<u8>, MeshError> {
+    let mut bytes = run((geo, None), arguments(parameters), last, "mesh it")?;
     for option in AGAIN {
-        if !parse(&bytes, &mesh).is_err_and(|error| error.is_degenerate()) {
+        if !parse(&bytes, geo).is_err_and(|error| error.is_degenerate()) {
             break;
         }
         let note = format!(
@@ -110,15 +158,7 @@ pub fn mesh_geo(
         let _ = io::stderr().write_all(note.as_bytes());
         bytes = run((geo, None), arguments(parameters), &format!("{last}{option};\n"), "mesh it")?;
     }
-    match write(&mesh, &bytes, started) {
-        Err(error) if is_read_only(&error) => {
-            let folder = cached.parent().unwrap_or(Path::new("."));
-            fs::create_dir_all(folder).map_err(MeshError::io(folder))?;
-            write(&cached, &bytes, started).map_err(MeshError::io(&cached))?;
-            Ok(cached)
-        }
-        written => written.map_err(MeshError::io(&mesh)).map(|()| mesh),
-    }
+    Ok(bytes)
 }
 
 fn is_read_only(error: &io::Error) -> bool {
