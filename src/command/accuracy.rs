@@ -152,8 +152,12 @@ pub(super) fn accuracy_note(task: &Task, outcome: Option<&Outcome>) -> Option<St
     let of_stop = outcome.stopped.map(|stop| ("stopped_at".to_owned(), stop.bar() / stop.time));
     let worst = bars.chain(norms.cloned()).chain(of_stop).max_by(|a, b| a.1.total_cmp(&b.1));
     let missed = worst.filter(|(_, error)| *error > accuracy).map(|(name, error)| {
-        let unit = if error.is_finite() { percent(error) } else { "?".to_owned() };
-        format!("{name} is exact to {unit} only")
+        let error = match percent(error) {
+            _ if !error.is_finite() => "?".to_owned(),
+            same if same == percent(accuracy) => format!("{:.3e}", error),
+            percent => percent,
+        };
+        format!("{name} is exact to {error} only")
     });
     let unconfirmed = "only this run stops at ζ_*, not the runs that measure its errors".to_owned();
     let unconfirmed = is_unconfirmed_stop(task, outcome).then_some(unconfirmed);

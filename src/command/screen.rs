@@ -8,7 +8,10 @@ use signorini::{
     problem::Collapse,
     scene::{Scheme, Stepping, TimeGrid, Units, rounded},
 };
-use std::io::{self, Write};
+use std::{
+    collections::BTreeMap,
+    io::{self, Write},
+};
 
 /// The length of the progress bar: it counts thousandths of [0, T].
 const LENGTH: u64 = 1000;
@@ -85,10 +88,10 @@ pub fn conclusion(
     let end = row("end", ending(task.problem.collapse, last, result));
     let outcome = result.ok();
     let Some(last) = last else { return [end].into_iter().chain(notes).collect() };
-    let bar = |name: &str| outcome.and_then(|of| of.errors.figures.get(name).copied());
-    let figure = |value: f64, name: &str| with_bar(value, bar(name));
-    let zeta = |value: f64, name: &str| match (bar("zeta_min"), bar("zeta_mean")) {
-        (None, None) => format!("{value:.6}"),
+    let shown = Shown::new(task, outcome);
+    let figure = |value: f64, name: &str| shown.figure(value, name, 6);
+    let zeta = |value: f64, name: &str| match (shown.bar("zeta_min"), shown.bar("zeta_mean")) {
+        (None, None) => format!("{value:.*}", shown.digits(6)),
         _ => figure(value, name),
     };
     let damage = match (last.zeta_min, last.zeta_mean) {
@@ -106,7 +109,7 @@ pub fn conclusion(
         row("displacement", format!("largest {displacement} {length}")),
         row("work", format!("{} {}", figure(last.work, "work"), units.work())),
     ];
-    lines.extend(extremes.into_iter().flat_map(|of| stresses(of, &units.stress, &bar)));
+    lines.extend(extremes.into_iter().flat_map(|of| stresses(of, &units.stress, &shown)));
     if task.contact_nodes > 0 {
         let (active, nodes) = (last.active_nodes, task.contact_nodes);
         let sum = figure(last.contact_force, "contact_force");
@@ -115,10 +118,10 @@ pub fn conclusion(
     }
     if let Some((extremes, pressure)) = extremes.and_then(|of| Some((of, of.of_points.get(3)?))) {
         let along = figure(extremes.contact_length, "contact_length");
-        let largest = extreme(pressure, &units.stress, &bar);
+        let largest = extreme(pressure, &units.stress, &shown);
         lines.push(row("", format!("length {along} {length}, largest pressure {largest}")));
     }
-    lines.extend(supports(task, quantities, &bar));
+    lines.extend(supports(task, quantities, &shown));
     if let Some(outcome) = outcome {
         let names = ["errors", "", "", ""].into_iter();
         let errors = names.zip(outcome.errors.lines(outcome.stopped.as_ref()));
@@ -130,19 +133,52 @@ pub fn conclusion(
     lines
 }
 
+/// How figures are shown.
+struct Shown<'a> {
+    bars: Option<&'a BTreeMap<String, f64>>,
+    /// Whether the errors were measured.
+    is_measured: bool,
+}
+
+impl<'a> Shown<'a> {
+    fn new(task: &Task, outcome: Option<&'a Outcome>) -> Self {
+        let measured = &task.measured;
+        let is_measured =
+            task.adapted.is_some() || !measured.bars.is_empty() || measured.stop.is_some();
+        Self { bars: outcome.map(|of| &of.errors.figures), is_measured }
+    }
+
+    fn bar(&self, name: &str) -> Option<f64> {
+        self.bars?.get(name).copied()
+    }
+
+    /// The decimals of a figure without a bar: `usual` ones, or two if the measurement of the errors gave none for it.
+    fn digits(&self, usual: usize) -> usize {
+        if self.is_measured { 2 } else { usual }
+    }
+
+    /// A figure with its bar or, without one, with its [`Shown::digits`].
+    fn figure(&self, value: f64, name: &str, usual: usize) -> String {
+        match self.bar(name) {
+            None => format!("{value:.*e}", self.digits(usual)),
+            bar => with_bar(value, bar),
+        }
+    }
+}
+
 /// The lines of the extreme stresses.
-fn stresses(extremes: &Extremes, unit: &str, bar: &dyn Fn(&str) -> Option<f64>) -> Vec<String> {
+fn stresses(extremes: &Extremes, unit: &str, shown: &Shown) -> Vec<String> {
     let [von_mises, most, least, ..] = &extremes.of_points[..] else { return Vec::new() };
     if von_mises.value == 0.0 {
         return Vec::new();
     }
-    let largest = extreme(von_mises, unit, bar);
+    let largest = extreme(von_mises, unit, shown);
     let grows = match von_mises.singular.as_deref() {
         Some(place) if place != GROWS => format!(" at {place}, grows as the mesh is refined"),
         Some(_) => ", grows as the mesh is refined".to_owned(),
         None => String::new(),
     };
-    let [most, least] = [most, least].map(|of| extreme(of, unit, bar));
+    let [most, least] = [most, least].map(|of| extreme(of, unit, shown));
     vec![
         row("stress", format!("largest von Mises {largest}{grows}")),
         row("", format!("largest σ₁ {most}")),
@@ -154,29 +190,21 @@ fn stresses(extremes: &Extremes, unit: &str, bar: &dyn Fn(&str) -> Option<f64>) 
 fn extreme(
     Extreme { name, value, at: [x, y], singular }: &Extreme,
     unit: &str,
-    bar: &dyn Fn(&str) -> Option<f64>,
+    shown: &Shown,
 ) -> String {
-    let (value, singular) = match (singular, bar(name)) {
-        (Some(_), _) => (format!("{value:.1e}"), ": singular"),
-        (None, Some(bar)) => (with_bar(*value, Some(bar)), ""),
-        (None, None) => (format!("{value:.4e}"), ""),
+    let (value, singular) = match singular {
+        Some(_) => (format!("{value:.1e}"), ": singular"),
+        None => (shown.figure(*value, name, 4), ""),
     };
     format!("{value} {unit} at ({x:.4}, {y:.4}){singular}")
 }
 
-/// Per support: a line with its resultants and their error bars from `bar`.
-fn supports(
-    task: &Task,
-    quantities: &[(String, f64)],
-    bar: &dyn Fn(&str) -> Option<f64>,
-) -> Vec<String> {
+/// Per support: a line with its resultants and their error bars.
+fn supports(task: &Task, quantities: &[(String, f64)], shown: &Shown) -> Vec<String> {
     let Units { length, force, .. } = &task.problem.scene().units;
     // Resultants come first, three for each support.
     let line = |(name, of): (&String, &[(String, f64)])| {
-        let figure = |i: usize, part: &str| match bar(&format!("{name}.{part}")) {
-            None => format!("{:.4e}", of[i].1),
-            bar => with_bar(of[i].1, bar),
-        };
+        let figure = |i: usize, part: &str| shown.figure(of[i].1, &format!("{name}.{part}"), 4);
         let [x, y, moment] = [figure(0, "force_x"), figure(1, "force_y"), figure(2, "moment")];
         let resultant = format!("force ({x}, {y}) {force}/{length}");
         row("support", format!("{name}: {resultant}, moment {moment} {force}"))

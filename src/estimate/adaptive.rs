@@ -258,10 +258,31 @@ fn refined(
         if ends {
             return Ok(adapted);
         }
-        let (ratios, levels) = (round.size_ratios(measured), round.levels(measured));
-        refinement = sharpened(divided(refinement, &ratios)?, &levels)?;
+        refinement = finer(&refinement, &round, measured)?;
         progress.check_memory(refinement.mesh.triangles.len())?;
     }
+}
+
+/// The mesh of the next round. After a measurement it has at least 1.3 times as many triangles, if smaller goals for the errors
+/// of the figures give them: a mesh that is hardly finer is not worth its measurement.
+fn finer(
+    refinement: &Refinement,
+    round: &Round,
+    measured: Option<&Measurement>,
+) -> Result<Refinement, MeshError> {
+    const GROWTH: f64 = 1.3;
+    const GOALS: [f64; 5] = [1.0, 0.7, 0.5, 0.35, 0.25];
+    let enough = measured.map_or(0.0, |_| GROWTH * refinement.mesh.triangles.len() as f64);
+    let levels = round.levels(measured);
+    let mut next = refinement.clone();
+    for goal in GOALS {
+        next = divided(refinement.clone(), &round.size_ratios(measured, goal))?;
+        next = sharpened(next, &levels)?;
+        if next.mesh.triangles.len() as f64 >= enough {
+            break;
+        }
+    }
+    Ok(next)
 }
 
 /// Makes the steps adaptive: too long steps may reach ζ_* or miss loads. False if they are adaptive already.

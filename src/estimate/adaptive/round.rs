@@ -159,8 +159,8 @@ impl<'a> Round<'a> {
 
     /// The factors by which to multiply the sizes of the triangles for the next mesh. If a few triangles cause the
     /// error of a figure, these become smaller; the error is of first order in their size. Any other error requires
-    /// smaller errors of u and the damage.
-    pub(super) fn size_ratios(&self, measured: Option<&Measurement>) -> Vec<f64> {
+    /// smaller errors of u and the damage. The errors of the figures are to become `goal` times the usual aim.
+    pub(super) fn size_ratios(&self, measured: Option<&Measurement>, goal: f64) -> Vec<f64> {
         let order = if self.scene.order == Order::Quadratic { 2 } else { 1 };
         let (mut shares, mut depths) = (self.shares.clone(), self.run.depths().to_vec());
         if let Some(measured) = measured {
@@ -173,7 +173,7 @@ impl<'a> Round<'a> {
             ratios.iter_mut().zip(others).for_each(|(ratio, other)| *ratio = ratio.min(other));
         };
         for (excess, cause) in self.missed(measured) {
-            let goal = (AIM / excess).max(MIN_GOAL);
+            let goal = (goal * AIM / excess).max(MIN_GOAL);
             match cause {
                 Cause::Ends | Cause::Reactions => {}
                 Cause::Change(zeta) => {
