@@ -164,8 +164,7 @@ fn read<'a>(
     let folder = arguments.folder(&scene);
     let as_run = scene.as_run();
     agree(comm, check_mesh_is_kept(&scene, &folder))?;
-    let lock = if comm.is_root() { output::lock(&folder) } else { Ok(None) };
-    let lock = agree(comm, lock.map_err(Failure::input))?;
+    agree(comm, output::check_is_writable(&folder).map_err(Failure::input))?;
     let restart = arguments.restart.then(|| Checkpoint::read(comm, &folder));
     let restart = restart.transpose()?.flatten();
     let made = restart.as_ref().and_then(|checkpoint| checkpoint.adapted.clone());
@@ -183,6 +182,8 @@ fn read<'a>(
     let problem = phases.time("partition", || problem.restrict(session));
     let problem = agree(comm, problem.map_err(Failure::from))?;
     check_factors(session, &problem)?;
+    let lock = if comm.is_root() { output::lock(&folder) } else { Ok(None) };
+    let lock = agree(comm, lock.map_err(Failure::input))?;
     if !arguments.restart && comm.is_root() {
         warn_of_checkpoint(&folder);
     }

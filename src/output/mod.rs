@@ -52,6 +52,16 @@ pub fn create(folder: &Path) -> Result<(), OutputError> {
     Ok(())
 }
 
+/// Checks that `folder` or the existing folder in which it would be created can be written to.
+///
+/// # Errors
+/// It cannot.
+pub fn check_is_writable(folder: &Path) -> Result<(), OutputError> {
+    let absolute = std::path::absolute(folder).map_err(|e| OutputError::new(folder, e))?;
+    let existing = absolute.ancestors().find(|path| path.exists()).unwrap_or(folder);
+    tempfile::tempfile_in(existing).map_err(|e| OutputError::new(folder, e)).map(drop)
+}
+
 /// The scene of the run. It replaces the file of an earlier run, which may be the present scene itself.
 pub const SCENE: &str = "scene.toml";
 
