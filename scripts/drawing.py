@@ -1,6 +1,19 @@
 """Common parts of the figures: style, maps with equal aspect, readable scales."""
 
+import os
+import resource
+import sys
 import textwrap
+
+# Address space in bytes that the packages and a small picture take. OpenBLAS waits for ever when it gets no buffer.
+NEEDED = 320 << 20
+LIMIT, _ = resource.getrlimit(resource.RLIMIT_AS)
+if LIMIT != resource.RLIM_INFINITY:
+    if LIMIT < NEEDED:
+        sys.exit(f"error: pictures need at least {NEEDED >> 20} MiB of memory, but the limit (ulimit -v) is "
+                 f"{LIMIT >> 20} MiB; raise it")
+    # Each thread would reserve a stack and a buffer.
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import matplotlib
 
@@ -12,6 +25,10 @@ from matplotlib.collections import LineCollection, TriMesh
 from matplotlib.colors import Normalize
 from matplotlib.patheffects import withTickedStroke
 from matplotlib.ticker import MaxNLocator
+
+if LIMIT != resource.RLIM_INFINITY:
+    # OpenBLAS keeps the buffer that it allocates here, before the results take the memory.
+    np.ones((64, 64)) @ np.ones((64, 64))
 
 INK, FAINT, BLUE, RED, GREEN = "#22262b", "#9aa3ad", "#2f6db3", "#c0392b", "#3d8f5a"
 

@@ -23,8 +23,7 @@ import sys
 from dataclasses import replace
 from math import inf, isfinite
 
-import matplotlib.pyplot as plt
-
+# This module comes first: it checks the memory before numpy is imported.
 import drawing
 from animation import FRAMES, MOVIES, animate
 from contact_pressure import draw_evolution, draw_pressure
@@ -140,7 +139,7 @@ def save(figure, results, name, formats):
         path = results.folder / f"{name}{moment}.{ending}"
         figure.savefig(path)
         tell(path)
-    plt.close(figure)
+    drawing.plt.close(figure)
 
 
 def draw(results, limits, arguments):

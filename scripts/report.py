@@ -14,12 +14,12 @@ import multiprocessing
 import shutil
 import subprocess
 import sys
+from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
 from functools import partial
 from string import Template
 
-import matplotlib.pyplot as plt
-import numpy as np
-
+# This module comes first: it checks the memory before numpy is imported.
+from drawing import np, plt
 from bars import barred, bars
 from contact_pressure import draw_evolution, draw_pressure
 from histories import draw_damage_history, draw_force_displacement, draw_histories
@@ -70,10 +70,13 @@ def call(task):
 
 def all_drawn(tasks):
     """The results of functions by name, which are called in as many processes as there are cores. The processes are
-    forked, because they cannot import embedded scripts again."""
+    forked, because they cannot import embedded scripts again. A process that ends early lacks memory."""
     TASKS.update(tasks)
-    with multiprocessing.get_context("fork").Pool() as pool:
-        return dict(zip(tasks, pool.map(call, tasks, chunksize=1)))
+    try:
+        with ProcessPoolExecutor(mp_context=multiprocessing.get_context("fork")) as pool:
+            return dict(zip(tasks, pool.map(call, tasks)))
+    except BrokenExecutor:
+        raise MemoryError from None
 
 
 def pictures(results, everything):

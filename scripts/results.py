@@ -63,6 +63,8 @@ def telling():
         yield problems
     except ResultError as error:
         problems.append(str(error))
+    except MemoryError:
+        sys.exit("error: not enough memory for these results; raise the limit (ulimit -v), or choose fewer folders")
     except OSError as error:
         problems.append(f"{error.filename or 'output'}: {error.strerror}")
     for problem in problems:
