@@ -192,6 +192,8 @@ def main(prog=None):
     print(table(rows))
     print("Δ: largest differences from the answer with the smallest residuals; "
           "times first: over the seconds of the scene's first solver")
+    # Runs that fail at their start make no folder.
+    arguments.out.mkdir(parents=True, exist_ok=True)
     path = arguments.out / "comparison.csv"
     write_table(rows, path)
     print(f"written to {path}")

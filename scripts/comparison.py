@@ -90,5 +90,7 @@ if __name__ == "__main__":
     if len(sys.argv) != 2:
         sys.exit(__doc__)
     table = Path(sys.argv[1]) / "comparison.csv"
+    if not table.exists():
+        sys.exit(f"error: {table} is missing; run `signorini compare` first")
     draw(table).savefig(table.with_suffix(".png"))
     print(table.with_suffix(".png"))
