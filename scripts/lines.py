@@ -11,6 +11,8 @@ from drawing import INK, wide
 from reading import whole
 from results import ResultError, write_table
 
+# Quantities that exist on contact boundaries alone.
+CONTACT = ("normal_pressure", "gap")
 UNITS = {"zeta": "", "u_x": "length", "u_y": "length", "gap": "length"}
 
 
@@ -30,8 +32,12 @@ def draw_curves(arguments, styled):
                 print(f"{run.folder}: no frame at t = {', '.join(missing)}: the nearest are drawn", file=sys.stderr)
             for frame in frames.values():
                 places, values = _values(frame, arguments, quantity)
-                if np.isnan(values).all():
-                    raise ResultError(f"{run.folder}: {quantity} has no value on this line; is it outside the body?")
+                if quantity == "normal_pressure":
+                    # Off the contact boundaries frames contain 0.
+                    values[np.isnan(_values(frame, arguments, "gap")[1])] = np.nan
+                if np.isfinite(values).sum() < 2:
+                    why = "name a contact boundary: --along NAME" if quantity in CONTACT else "is it outside the body?"
+                    raise ResultError(f"{run.folder}: {quantity} has no values along this line; {why}")
                 label = f"t = {frame.time:g} {units['time']}"
                 label = label if len(runs) == 1 else f"{name}, {label}"
                 axes.plot(places, values, label=label, linewidth=1.3)
