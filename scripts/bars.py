@@ -20,6 +20,11 @@ def short(number):
     return f"{mantissa}e{int(exponent)}"
 
 
+def three_digits(number):
+    """A figure without a bar: 1220, not 1.22e+03."""
+    return f"{float(f'{number:.3g}'):g}"
+
+
 def barred(value, bar):
     """`5.3570 ± 0.0005`: the bar rounded up to its first digit, or to its second where the first is 1
     or 2, and the value to the same; `(1.4016 ± 0.0003)e-7` where decimals would be many. None

@@ -3,6 +3,7 @@
 import matplotlib.pyplot as plt
 import numpy as np
 
+from bars import three_digits
 from drawing import BLUE, FAINT, along, canvas, draw_colourbar, headline, stress_unit, wide
 
 
@@ -48,8 +49,7 @@ def draw_pressure(results, limits, figure=None):
     text = f"{results.active} of {results.summary.get('contact_nodes', '?')} nodes active"
     largest = results.pressure.max()
     if largest > limits.pressure > 0.0:
-        factor, unit = stress_unit(largest, results.units)
-        text += f"; the pressure goes up to {largest / factor:.3g} {unit}"
+        text += f"; the pressure goes up to {three_digits(largest / factor)} {unit}"
     text = "unloaded" if results.unloaded else "" if results.active is None else text
     text = ", ".join(filter(None, (f"contact at {results.moment}", text)))
     figure.suptitle(headline(results, text))

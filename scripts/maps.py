@@ -5,6 +5,7 @@ import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.tri import Triangulation
 
+from bars import three_digits
 from drawing import (
     BLUE, INK, RED, canvas, damage_scale, draw_colourbar, draw_values, draw_foundation, draw_outline, frame, headline, is_flat,
     least_zeta, map_size, panels_of, stress_unit, wide,
@@ -118,7 +119,7 @@ def draw_state(results, limits, figure=None):
 def _amplified(results, limits):
     """The amplification in words."""
     largest = np.linalg.norm(results.displacement, axis=1).max()
-    largest = results.barred("displacement_max", largest) or f"{largest:.3g}"
+    largest = results.barred("displacement_max", largest) or three_digits(largest)
     if results.unloaded:
         return "unloaded"
     what = "displacements and gaps" if len(results.contact) else "displacements"
@@ -134,9 +135,7 @@ def _paint_stress(axes, mesh, results, limits):
     extend = "max" if limits.is_cut else "neither"
     draw_colourbar(axes, image, f"von Mises stress ({unit})", extend, is_flat(results))
     largest = results.von_mises.max()
-    factor, unit = stress_unit(largest, results.units)
-    rounded = float(f"{largest / factor:.3g}")  # 1220, not 1.22e+03
-    text = f"von Mises stress, largest {rounded:g} {unit}"
+    text = f"von Mises stress, largest {three_digits(largest / factor)} {unit}"
     if not results.singular or not largest:
         return text
     at = results.nodes[results.von_mises.argmax()]

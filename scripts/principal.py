@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.path import Path
 from matplotlib.tri import Triangulation
 
+from bars import three_digits
 from drawing import (
     INK, canvas, draw_colourbar, draw_foundation, draw_outline, draw_values, frame, headline, is_flat,
     panels_of, stress_unit,
@@ -42,13 +43,12 @@ def draw_principal(results, _limits, figure=None):
         image = draw_values(axes, mesh, results.pieces.at_points(stress) / factor, "viridis", 0.0, top / factor)
         extend = "max" if stress.max() > top else "neither"
         draw_colourbar(axes, image, f"{name} ({unit})", extend, is_flat(results))
+        largest = three_digits(stress.max() / factor)
+        axes.set_title(f"{name}, largest {largest} {unit}" if stress.any() else f"no {name}")
         _draw_lines(axes, results, direction[places], stress[places] / top, longest, places)
         draw_outline(axes, results.nodes, results, color=INK, linewidth=0.7)
         draw_foundation(axes, results)
         frame(axes, results.nodes, results.units)
-        own_factor, own_unit = stress_unit(stress.max(), results.units)
-        largest = f"{float(f'{stress.max() / own_factor:.3g}'):g} {own_unit}"
-        axes.set_title(f"{name}, largest {largest}" if stress.any() else f"no {name}")
     figure.suptitle(headline(results, f"principal stresses at {results.moment}"))
     return figure
 
