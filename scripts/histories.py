@@ -22,7 +22,7 @@ def draw_damage_history(results, _limits=None):
     reached = "collapse" if results.summary.get("stopped_by") == "collapse" else "ζ$_*$ reached"
     if stopped is not None:
         axes.axvline(stopped, color=RED, linewidth=1.0, linestyle=(0, (4, 2)),
-                     label=f"{reached} at t = {stopped:.4g} {results.units['time']}")
+                     label=f"{reached} at t = {results.stopping_time} {results.units['time']}")
         axes.set_ylim(bottom=0.0)
     axes.set_xlim(left=0.0)
     axes.yaxis.set_major_formatter(ScalarFormatter(useOffset=False))

@@ -20,7 +20,7 @@ from string import Template
 
 # This module comes first: it checks the memory before numpy is imported.
 from drawing import np, plt
-from bars import barred, bars
+from bars import barred, bars, three_digits
 from contact_pressure import draw_evolution, draw_pressure
 from histories import draw_damage_history, draw_force_displacement, draw_histories
 from limits import limits_of
@@ -131,13 +131,17 @@ def slider(frames):
 def facts(results):
     """The values of summary.json for the last state, and the given quantities by name."""
     summary, units, errors = results.summary, results.units, bars(results.summary)
-    rows = [(name, barred(summary[key], errors.get(key)) or summary[key],
-             html.escape(units.get(kind, "")))
+    stopped = summary.get("stopped_at") is not None
+
+    def text(name, value):
+        rounded = three_digits(value) if stopped and isinstance(value, float) else value
+        return barred(value, errors.get(name)) or rounded
+
+    rows = [(name, text(key, summary[key]), html.escape(units.get(kind, "")))
             for key, name, kind in FACTS if summary.get(key) is not None]
     named = summary.get("quantities", {})
-    rows += [(html.escape(name), barred(value, errors.get(name)) or value, html.escape(unit_of(name, units)))
-             for name, value in named.items()]
-    return table(rows)
+    return table(rows + [(html.escape(name), text(name, value), html.escape(unit_of(name, units)))
+                         for name, value in named.items()])
 
 
 def unit_of(quantity, units):

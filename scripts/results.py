@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bars import barred, bars
+from bars import barred, bars, three_digits
 from elements import Pieces
 from signorini_results import paths
 
@@ -122,8 +122,14 @@ class Results:
 
     @property
     def moment(self):
-        """The time of the state, for titles."""
-        return f"t = {self.time:g} {self.units['time']}"
+        """The time of the state, for titles. The last state before a stop has a computed time, which is not exact."""
+        is_exact = self.summary.get("stopped_at") is None or not self.is_last
+        return f"t = {f'{self.time:g}' if is_exact else three_digits(self.time)} {self.units['time']}"
+
+    @property
+    def stopping_time(self):
+        """The time at which the run stopped, s, as text."""
+        return self.barred("stopped_at", self.summary["stopped_at"]) or three_digits(self.summary["stopped_at"])
 
     @property
     def ending(self):
@@ -133,7 +139,7 @@ class Results:
             return f"the run FAILED after t = {self.frames[-1][0]:g} {self.units['time']}"
         if stopped is None:
             return ""
-        at = f"t = {stopped:.4g} {self.units['time']}"
+        at = f"t = {self.stopping_time} {self.units['time']}"
         if self.summary.get("stopped_by") == "collapse":
             motion = self.summary["collapse"]["motion"]
             return f"stopped at {at}: nothing supports the body against {motion}"
