@@ -174,6 +174,8 @@ def stress_unit(largest, units):
 
 # What figures show of the damage: "zeta", "loss", or None to choose.
 DAMAGE = None
+# The column of history.csv over which forces are drawn, or None to choose.
+ABSCISSA = None
 # Whether maps have contour lines.
 CONTOURS = False
 

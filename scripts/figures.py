@@ -9,7 +9,7 @@ stress-damage  von Mises stress and damage (Figures 6 and 9)
 principal-stresses  tension and compression with their directions
 pressure       contact pressure and gap along Γ_C
 damage-history the minimum and the mean of ζ in time, if there is damage
-force-displacement  the forces on the supports over the largest displacement
+force-displacement  the forces on the supports over the largest displacement, or over time if this does not grow
 
 With --line or --along: curves of fields at several times, of one or more runs, with their numbers as CSV.
 
@@ -78,6 +78,8 @@ def arguments_of(prog):
     parser.add_argument("--width", type=float, metavar="INCHES", help="the width of every figure")
     parser.add_argument("--damage", choices=("zeta", "loss"), help=(
         "draw ζ, as the paper does, or the loss 1 − ζ (default: ζ if it falls below 0.9)"))
+    parser.add_argument("--abscissa", metavar="COLUMN", help=(
+        "column of history.csv over which force-displacement draws the forces: time, displacement_max, work, …"))
     parser.add_argument("--contours", action="store_true", help="contour lines of the stress and ζ")
     parser.add_argument("--mesh", action="store_true", help="also mesh, the undeformed mesh")
     parser.add_argument("--evolution", action="store_true", help="also contact-evolution")
@@ -177,7 +179,7 @@ def main(prog=None):
             for path in draw_curves(arguments, styled):
                 tell(path)
         return 2 if problems else 0
-    drawing.DAMAGE, drawing.CONTOURS = arguments.damage, arguments.contours
+    drawing.DAMAGE, drawing.CONTOURS, drawing.ABSCISSA = arguments.damage, arguments.contours, arguments.abscissa
     runs, failed = [], False
     for folder in arguments.folders:
         with telling() as problems:

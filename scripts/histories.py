@@ -6,8 +6,14 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import ScalarFormatter
 
+import drawing
 from drawing import BLUE, FAINT, RED, headline, wide
-from results import ROUNDING, UNDAMAGED
+from results import ROUNDING, UNDAMAGED, ResultError
+
+
+# Names of abscissas; others are columns of history.csv.
+NAMES = {"time": "time t ({time})", "displacement_max": "largest displacement ({length})",
+         "work": "work of the loads ({work})"}
 
 
 def draw_damage_history(results, _limits=None):
@@ -34,26 +40,33 @@ def draw_damage_history(results, _limits=None):
 
 
 def draw_force_displacement(results, _limits=None):
-    """Draws the force of each support over the largest displacement: its component along the direction that it has
-    where it is largest."""
+    """Draws the force of each support, its component along the direction that it has where it is largest, over the
+    column ABSCISSA. By default this is the largest displacement if it grows in all steps, else the time."""
     history = results.history
     supports = [name.removesuffix(".force_x") for name in history if name.endswith(".force_x")]
     forces = {name: _along_largest(history[f"{name}.force_x"], history[f"{name}.force_y"]) for name in supports}
     largest = max((np.nanmax(force, initial=0.0) for force in forces.values()), default=0.0)
     if largest <= 0.0 or len(history["time"]) < 3:
         return None
+    if drawing.ABSCISSA not in (None, *history):
+        raise ResultError(f"history.csv has no column {drawing.ABSCISSA}; it has {', '.join(history)}")
+    reached = history["displacement_max"]
+    # Over displacements that start near their end the curves would be short.
+    grows = (np.diff(reached) >= -ROUNDING * reached.max()).all() and reached[0] < 0.5 * reached[-1]
+    abscissa = drawing.ABSCISSA or ("displacement_max" if grows else "time")
     figure, axes = plt.subplots(figsize=(wide(6.4), max(2.8, 0.6 * wide(6.4))))
     shown = {name: force for name, force in forces.items() if np.nanmax(force) > ROUNDING * largest}
     # Dashes show a curve under another one.
     for (name, force), dashes in zip(shown.items(), cycle(("-", (0, (4, 3)), (0, (1, 2))))):
-        axes.plot(history["displacement_max"], force, linewidth=1.6, linestyle=dashes,
+        axes.plot(history[abscissa], force, linewidth=1.6, linestyle=dashes,
                   label=name.replace("$", r"\$"))
-    axes.set_xlim(left=0.0)
+    if np.nanmin(history[abscissa]) >= 0.0:
+        axes.set_xlim(left=0.0)
     if min(map(np.nanmin, shown.values())) < -ROUNDING * largest:
         axes.axhline(0.0, color=FAINT, linewidth=0.7)
     else:
         axes.set_ylim(bottom=0.0)
-    axes.set_xlabel("largest displacement ({length})".format(**results.units))
+    axes.set_xlabel(NAMES.get(abscissa, abscissa).format(**results.units))
     axes.set_ylabel("force on the support ({line})".format(**results.units))
     axes.set_title(headline(results, ""))
     axes.legend(loc="best")
