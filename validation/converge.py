@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from shared import ROOT
-from drawing import FAINT, INK, plt
+from drawing import FAINT, INK, MaxNLocator, plt
 from reading import read_frame
 from references import kept, refine
 from results import markdown, write_table
@@ -237,21 +237,28 @@ def draw_orders(axes, rows):
     axes.set_title(f"all errors at k = {least:g}, largest over time", loc="left")
 
 
+def finish(axes):
+    """Draws the legend, the grid, and at least three ticks on each logarithmic axis."""
+    for axis in (axes.xaxis, axes.yaxis):
+        low, high = axis.get_view_interval()
+        powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)))
+        tried = [np.outer(powers, of).ravel() for of in ([1], [1, 2, 5], range(1, 10))]
+        tried = [ticks[(low <= ticks) & (ticks <= high)] for ticks in [*tried, MaxNLocator(5).tick_values(low, high)]]
+        ticks = next((ticks for ticks in tried if len(ticks) > 2), tried[-1])
+        axis.set_ticks([], minor=True)
+        axis.set_ticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.grid(color=FAINT, alpha=0.3, linewidth=0.5)
+    axes.set_axisbelow(True)
+    axes.legend(fontsize="small")
+
+
 def draw(rows, path):
     """Both figures side by side."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.8))
     draw_sums(left, rows)
     draw_orders(right, rows)
-    for axes in (left, right):
-        low, high = axes.get_xlim()
-        powers = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))))
-        ticks = [m * 10.0**power for power in powers for m in (1, 2, 5)]
-        ticks = [tick for tick in ticks if low <= tick <= high]
-        axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
-        axes.set_xticks([], minor=True)
-        axes.grid(which="both", color=FAINT, alpha=0.3, linewidth=0.5)
-        axes.set_axisbelow(True)
-        axes.legend()
+    finish(left)
+    finish(right)
     figure.savefig(path)
 
 

@@ -145,7 +145,7 @@ def table_1(rows, out):
 def draw_figure_3(rows):
     figure, axes = plt.subplots(figsize=(5.4, 4.2))
     converge.draw_sums(axes, rows)
-    axes.legend(fontsize=8)
+    converge.finish(axes)
     return figure
 
 
