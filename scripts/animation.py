@@ -4,6 +4,7 @@ import matplotlib.pyplot as plt
 from matplotlib.animation import FFMpegWriter, PillowWriter
 
 from contact_pressure import draw_pressure
+from drawing import wrap_titles
 from limits import limits_of
 from maps import draw_state
 from reading import evenly, states
@@ -40,7 +41,7 @@ def animate(results, factor, kind):
         # Frames must all have the size of the figure.
         with plt.rc_context({"savefig.bbox": None}), movie.saving(figure, path, dpi=110):
             for state in chosen:
-                draw(state, limits, figure)
+                wrap_titles(draw(state, limits, figure))
                 movie.grab_frame()
         plt.close(figure)
         yield path

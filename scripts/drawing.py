@@ -102,8 +102,21 @@ def headline(results, text):
     shown."""
     overrides = textwrap.shorten(f"with {results.overrides}", 100, placeholder=" …")
     overrides = overrides.replace("$", r"\$") if results.overrides else ""
-    lines = filter(None, (results.title, overrides, results.ending, *text.split("\n")))
-    return "\n".join(textwrap.fill(line, int(14 * WIDTH)) if WIDTH else line for line in lines)
+    return "\n".join(filter(None, (results.title, overrides, results.ending, text)))
+
+
+def wrap_titles(figure):
+    """Breaks the lines of titles that are wider than their axes, and of the title above all axes."""
+    figure.get_layout_engine().execute(figure)
+    boxes = [axes.get_window_extent() for axes in figure.axes]
+    whole = max(box.x1 for box in boxes) - min(box.x0 for box in boxes)
+    titles = [(axes.title, box.width) for axes, box in zip(figure.axes, boxes)]
+    for title, room in [*titles, *([(figure._suptitle, whole)] if figure._suptitle else [])]:
+        width = title.get_window_extent().width
+        if width > room:
+            lines = title.get_text().split("\n")
+            letters = int(max(map(len, lines)) * max(room, 2.2 * figure.dpi) / width)
+            title.set_text("\n".join(textwrap.fill(line, letters) for line in lines))
 
 
 def map_size(extent, across):

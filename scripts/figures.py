@@ -114,11 +114,13 @@ def numbers(count):
 
 
 def styled(figure, arguments):
-    """Applies --no-title."""
+    """Applies --no-title, or fits the titles."""
     if figure is not None and arguments.no_title:
         figure.suptitle("")
         for axes in figure.axes:
             axes.set_title("")
+    elif figure is not None:
+        drawing.wrap_titles(figure)
     return figure
 
 

@@ -19,7 +19,7 @@ from functools import partial
 from string import Template
 
 # This module comes first: it checks the memory before numpy is imported.
-from drawing import np, plt
+from drawing import np, plt, wrap_titles
 from bars import barred, bars, three_digits
 from contact_pressure import draw_evolution, draw_pressure
 from histories import draw_damage_history, draw_force_displacement, draw_histories
@@ -57,6 +57,7 @@ def encoded(figure, dpi=110):
     """The figure as a PNG in base64; "" without a figure."""
     if figure is None:
         return ""
+    wrap_titles(figure)
     with io.BytesIO() as file:
         figure.savefig(file, format="png", dpi=dpi)
         plt.close(figure)

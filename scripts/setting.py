@@ -2,6 +2,7 @@
 4 and 7)."""
 
 import textwrap
+from dataclasses import replace
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -72,7 +73,7 @@ def draw_setting(results, _limits):
     axes.legend(
         loc="upper left", bbox_to_anchor=(0.0, -0.55 / height), fontsize="small", handlelength=1
     )
-    loads = f"; loads at t = {time:g} {units['time']}" if largest or body_force else ""
+    loads = f"; loads at {replace(results, time=time).moment}" if largest or body_force else ""
     axes.set_title(headline(results, f"setting{loads}"))
     return figure
 
