@@ -25,6 +25,7 @@ from matplotlib.collections import LineCollection, TriMesh
 from matplotlib.colors import Normalize
 from matplotlib.patheffects import withTickedStroke
 from matplotlib.ticker import MaxNLocator
+from matplotlib.tri import Triangulation
 
 if LIMIT != resource.RLIM_INFINITY:
     # OpenBLAS keeps the buffer that it allocates here, before the results take the memory.
@@ -191,6 +192,26 @@ DAMAGE = None
 ABSCISSA = None
 # Whether maps have contour lines.
 CONTOURS = False
+# The smallest and the largest stress of the colours, Pa, or None to choose.
+RANGE = None
+
+
+def mesh_of(results, points):
+    """The flat pieces of the shown elements, for these positions of the nodes."""
+    hidden = np.repeat(~results.shown, results.pieces.cuts**2)
+    return Triangulation(*results.pieces.at_points(points).T, results.pieces.triangles, hidden)
+
+
+def draw_stress(axes, mesh, results, stress, name, top):
+    """Colours the body by a stress from 0 to `top`, or in RANGE, with a colour bar. Returns the factor and the unit of
+    the numbers, and the top."""
+    low, top = RANGE or (0.0, top)
+    factor, unit = stress_unit(top, results.units)
+    image = draw_values(axes, mesh, results.pieces.at_points(stress) / factor, "viridis", low / factor,
+                        top / factor or 1.0)
+    extend = {(0, 1): "max", (1, 0): "min", (1, 1): "both"}.get((stress.min() < low, stress.max() > top), "neither")
+    draw_colourbar(axes, image, f"{name} ({unit})", extend, is_flat(results))
+    return factor, unit, top
 
 
 def draw_values(axes, mesh, values, colours, low, high):

@@ -80,6 +80,9 @@ def arguments_of(prog):
         "draw ζ, as the paper does, or the loss 1 − ζ (default: ζ if it falls below 0.9)"))
     parser.add_argument("--abscissa", metavar="COLUMN", help=(
         "column of history.csv over which force-displacement draws the forces: time, displacement_max, work, …"))
+    parser.add_argument("--range", type=numbers(2), metavar="A,B", help="stresses between which the colours of maps go, Pa")
+    parser.add_argument("--material", metavar="NAME", help=(
+        "maps of one material only: the name of a surface, or material for the others"))
     parser.add_argument("--contours", action="store_true", help="contour lines of the stress and ζ")
     parser.add_argument("--mesh", action="store_true", help="also mesh, the undeformed mesh")
     parser.add_argument("--evolution", action="store_true", help="also contact-evolution")
@@ -97,6 +100,8 @@ def arguments_of(prog):
     for name in ("factor", "width"):
         if getattr(arguments, name) is not None and not 0.0 < getattr(arguments, name) < inf:
             parser.error(f"--{name}: must be positive")
+    if arguments.range and not 0.0 <= arguments.range[0] < arguments.range[1] < inf:
+        parser.error("--range: needs 0 <= A < B")
     if arguments.time is not None and not isfinite(arguments.time):
         parser.error("--time: must be a number")
     return arguments
@@ -182,10 +187,11 @@ def main(prog=None):
                 tell(path)
         return 2 if problems else 0
     drawing.DAMAGE, drawing.CONTOURS, drawing.ABSCISSA = arguments.damage, arguments.contours, arguments.abscissa
+    drawing.RANGE = arguments.range
     runs, failed = [], False
     for folder in arguments.folders:
         with telling() as problems:
-            runs.append(read_results(folder, arguments.time))
+            runs.append(read_results(folder, arguments.time, arguments.material))
             last = runs[-1].frames[-1][0]
             if arguments.time is not None and arguments.time > last:
                 print(f"{folder}: the last frame is at t = {last:g}, before {arguments.time:g}: it is drawn",

@@ -14,7 +14,6 @@ class Limits:
     factor: float  # amplification of displacements
     box: np.ndarray  # (2, 2): corners of a box around the bodies before and after deformation, m
     stress: float  # the top of the colours, Pa
-    is_cut: bool  # whether some stresses exceed it
     zeta: tuple  # minimum and maximum
     pressure: float  # the top of the pressures on Γ_C, Pa
     gap: float  # the largest of Γ_C, m
@@ -36,7 +35,7 @@ def stress_top(state, stress):
     """The top of the colours for a stress at the nodes: the largest, or if that is a peak, the stress that is exceeded
     on 0.5 % of the area. Singular stresses are peaks, and so are those above four times this."""
     (ax, ay), (bx, by), (cx, cy) = (state.nodes[state.pieces.elements[:, i]].T for i in range(3))
-    areas = np.abs((bx - ax) * (cy - ay) - (cx - ax) * (by - ay))
+    areas = np.abs((bx - ax) * (cy - ay) - (cx - ax) * (by - ay)) * state.shown
     means = stress[state.pieces.elements[:, :3]].mean(axis=1)
     top, largest = _exceeded_in(0.005, means, areas), stress.max()
     singular = state.singular
@@ -57,14 +56,12 @@ def _pressure_top(state):
 def limits_of(states, factor=None):
     """Scales for all `states`, with the given amplification of displacements, if any."""
     # A peak on a small area must not darken the rest.
-    largest = max(state.von_mises.max() for state in states)
     top = max(stress_top(state, state.von_mises) for state in states)
     factor = factor or _amplification(states)
     return Limits(
         factor=factor,
         box=box_of(states, factor),
         stress=float(top),
-        is_cut=bool(largest > top),
         zeta=(min(s.zeta.min() for s in states), max(s.zeta.max() for s in states)),
         pressure=max(_pressure_top(state) for state in states),
         gap=max((curve.gap.max() for state in states for curve in state.curves), default=0.0),

@@ -7,8 +7,8 @@ from matplotlib.tri import Triangulation
 
 from bars import three_digits
 from drawing import (
-    BLUE, INK, RED, canvas, damage_scale, draw_colourbar, draw_values, draw_foundation, draw_outline, frame, headline, is_flat,
-    least_zeta, map_size, panels_of, stress_unit, wide,
+    BLUE, INK, RED, canvas, damage_scale, draw_colourbar, draw_foundation, draw_outline, draw_stress, draw_values,
+    frame, headline, is_flat, least_zeta, map_size, mesh_of, panels_of, wide,
 )
 
 # About so many arrows along the boundary.
@@ -84,7 +84,7 @@ def draw_stress_and_damage(results, limits):
     else:
         size, shape = panels_of(extent)
         figure, (left, right) = plt.subplots(*shape, figsize=size)
-    mesh = Triangulation(*results.pieces.at_points(results.nodes).T, results.pieces.triangles)
+    mesh = mesh_of(results, results.nodes)
     left.set_title(_paint_stress(left, mesh, results, limits))
     if limits.damaged:
         right.set_title(_paint_damage(right, mesh, results, limits))
@@ -92,7 +92,7 @@ def draw_stress_and_damage(results, limits):
         draw_outline(axes, results.nodes, results, color=INK, linewidth=0.7)
         draw_foundation(axes, results)
         frame(axes, results.nodes, results.units)
-    figure.suptitle(headline(results, f"{results.moment}"))
+    figure.suptitle(headline(results, results.part))
     return figure
 
 
@@ -102,7 +102,7 @@ def draw_state(results, limits, figure=None):
     figure = canvas((width, height + 0.4), figure)
     axes = figure.add_subplot()
     moved = results.nodes + limits.factor * results.displacement
-    mesh = Triangulation(*results.pieces.at_points(moved).T, results.pieces.triangles)
+    mesh = mesh_of(results, moved)
     paint = _paint_damage if limits.damaged else _paint_stress
     shown = paint(axes, mesh, results, limits)
     draw_outline(axes, moved, results, color=INK, linewidth=0.7)
@@ -111,7 +111,7 @@ def draw_state(results, limits, figure=None):
     )
     draw_foundation(axes, results, limits.factor)
     frame(axes, limits.box, results.units)
-    text = f"{results.moment}: {shown}\n{_amplified(results, limits)}"
+    text = f"{results.part}: {shown}\n{_amplified(results, limits)}"
     axes.set_title(headline(results, text))
     return figure
 
@@ -129,11 +129,7 @@ def _amplified(results, limits):
 
 def _paint_stress(axes, mesh, results, limits):
     """Draws the von Mises stress with a colour bar; returns the text for the title."""
-    factor, unit = stress_unit(limits.stress, results.units)
-    stress = results.pieces.at_points(results.von_mises / factor)
-    image = draw_values(axes, mesh, stress, "viridis", 0.0, limits.stress / factor or 1.0)
-    extend = "max" if limits.is_cut else "neither"
-    draw_colourbar(axes, image, f"von Mises stress ({unit})", extend, is_flat(results))
+    factor, unit, _ = draw_stress(axes, mesh, results, results.von_mises, "von Mises stress", limits.stress)
     largest = results.von_mises.max()
     text = f"von Mises stress, largest {three_digits(largest / factor)} {unit}"
     if not results.singular or not largest:

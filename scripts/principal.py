@@ -2,13 +2,9 @@
 
 import numpy as np
 from matplotlib.path import Path
-from matplotlib.tri import Triangulation
 
 from bars import three_digits
-from drawing import (
-    INK, canvas, draw_colourbar, draw_foundation, draw_outline, draw_values, frame, headline, is_flat,
-    panels_of, stress_unit,
-)
+from drawing import INK, canvas, draw_foundation, draw_outline, draw_stress, frame, headline, mesh_of, panels_of
 from limits import stress_top
 from results import ROUNDING
 
@@ -29,8 +25,9 @@ def draw_principal(results, _limits, figure=None):
     compression = np.maximum(-results.principal[:, 1], 0.0)
     turned = results.direction @ np.array([[0.0, 1.0], [-1.0, 0.0]])
     longest = extent.max() / min(LINES, DENSITY * (size[0] / shape[1] - 1.5))
-    places = _lattice(results.nodes, longest)
-    mesh = Triangulation(*results.pieces.at_points(results.nodes).T, results.pieces.triangles)
+    stressed = np.flatnonzero(results.von_mises)
+    places = stressed[_lattice(results.nodes[stressed], longest)]
+    mesh = mesh_of(results, results.nodes)
     # Rounding errors are no stress.
     tension, compression = (np.where(stress > ROUNDING * results.von_mises.max(), stress, 0.0)
                             for stress in (tension, compression))
@@ -39,17 +36,14 @@ def draw_principal(results, _limits, figure=None):
             (panels[0], "tension", tension, results.direction),
             (panels[1], "compression", compression, turned)):
         top = max(stress_top(results, stress), least_top) or 1.0
-        factor, unit = stress_unit(top, results.units)
-        image = draw_values(axes, mesh, results.pieces.at_points(stress) / factor, "viridis", 0.0, top / factor)
-        extend = "max" if stress.max() > top else "neither"
-        draw_colourbar(axes, image, f"{name} ({unit})", extend, is_flat(results))
+        factor, unit, top = draw_stress(axes, mesh, results, stress, name, top)
         largest = three_digits(stress.max() / factor)
         axes.set_title(f"{name}, largest {largest} {unit}" if stress.any() else f"no {name}")
         _draw_lines(axes, results, direction[places], stress[places] / top, longest, places)
         draw_outline(axes, results.nodes, results, color=INK, linewidth=0.7)
         draw_foundation(axes, results)
         frame(axes, results.nodes, results.units)
-    figure.suptitle(headline(results, f"principal stresses at {results.moment}"))
+    figure.suptitle(headline(results, f"principal stresses at {results.part}"))
     return figure
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 import signorini_results
 from elements import Pieces, counter_clockwise
-from results import ContactCurve, ResultError, Results, without_roundoff
+from results import ContactCurve, ResultError, Results, of_material, without_roundoff
 
 # A node without a condition.
 NOWHERE = np.zeros(2), np.zeros(2)
@@ -33,8 +33,9 @@ def whole(path):
         raise ResultError(f"{path}: it is damaged or cut off; run the scene again") from None
 
 
-def read_results(folder, time=None):
-    """The contents of a folder of results, with the frame nearest to `time` or the last frame."""
+def read_results(folder, time=None, material=None):
+    """The contents of a folder of results, with the frame nearest to `time` or the last frame; of one material only, if
+    it is named."""
     folder, summary, scene = Path(folder), {}, {}
     try:
         with whole(folder / "summary.json") as file:
@@ -55,6 +56,7 @@ def read_results(folder, time=None):
             history={c: np.array([_number(r[c]) for r in rows]) for c in (rows or [{}])[0]},
             frames=frames,
             time=chosen[0],
+            material=material,
             nodes=fields.points[:, :2],
             pieces=Pieces(counter_clockwise(fields.points, elements),
                           fields.point_data.get("global_node")),
@@ -110,7 +112,7 @@ def with_fields(results, time, fields):
     """The results with another frame of the same run."""
     points, materials = fields.point_data, fields.cell_data.get("material")
     contact, tangents, obstacle = _foundation(results, time, points["displacement"][:, :2])
-    return without_roundoff(replace(
+    return of_material(without_roundoff(replace(
         results,
         time=time,
         contact=contact,
@@ -125,7 +127,7 @@ def with_fields(results, time, fields):
         direction=points["principal_direction"][:, :2].astype(float),
         pressure=points["normal_pressure"],
         gap=points["gap"],
-    ))
+    )))
 
 
 def read_frame(path):

@@ -98,6 +98,7 @@ class Results:
     obstacle: np.ndarray = None  # (k, 2, 2): opposite points of the obstacle, m
     curves: list = None  # the ContactCurves of Γ_C
     materials: np.ndarray = None  # (m,): the number of the material of each element; None for one
+    material: str = None  # the name of the material that maps show; None for all
     displacement: np.ndarray = None  # (n, 2), m
     zeta: np.ndarray = None  # (n,)
     von_mises: np.ndarray = None  # (n,), Pa
@@ -125,6 +126,11 @@ class Results:
         """The time of the state, for titles. The last state before a stop has a computed time, which is not exact."""
         is_exact = self.summary.get("stopped_at") is None or not self.is_last
         return f"t = {f'{self.time:g}' if is_exact else three_digits(self.time)} {self.units['time']}"
+
+    @property
+    def part(self):
+        """The time of the state and the shown material, for titles of maps."""
+        return f"{self.moment}, {self.material} only" if self.material else self.moment
 
     @property
     def stopping_time(self):
@@ -155,6 +161,24 @@ class Results:
         turned = (points - of["centre"]) @ np.array([[0.0, 1.0], [-1.0, 0.0]])
         velocity = np.array(of["translation"]) + of["rotation"] * turned
         return velocity / np.linalg.norm(velocity, axis=1).max()
+
+    @property
+    def material_names(self):
+        """The names of materials in the order of their numbers: the general one, and those of surfaces."""
+        tables = [self.scene.get(table, {}) for table in ("material", "damage")]
+        return ["material", *sorted({name for table in tables for name, of in table.items() if isinstance(of, dict)})]
+
+    @property
+    def shown(self):
+        """Per element: do maps show it?"""
+        if self.material is None:
+            return np.full(len(self.pieces.elements), True)
+        names = [] if self.materials is None else self.material_names
+        shown = self.materials == names.index(self.material) if self.material in names else np.array(False)
+        if not shown.any():
+            raise ResultError(f"{self.folder}: no triangle has the material {self.material}; "
+                              f"the scene has {', '.join(names) or 'one material'}")
+        return shown
 
     @property
     def overrides(self):
@@ -232,6 +256,17 @@ class Results:
             lines = self.contact + factor * (self.obstacle - self.contact + sliding)
         lines = np.round(lines, 12)
         return [np.array(path) for path in paths([tuple(map(tuple, l)) for l in lines.tolist()])]
+
+
+def of_material(results):
+    """The results with values outside the chosen material that do not enter the scales of maps, without error bars."""
+    if results.material is None:
+        return results
+    inside = np.isin(np.arange(len(results.nodes)), results.pieces.elements[results.shown])
+    return replace(
+        results, summary={**results.summary, "errors": None, "extremes": None},
+        zeta=np.where(inside, results.zeta, results.zeta[inside].max()), von_mises=results.von_mises * inside,
+        principal=results.principal * inside[:, None])
 
 
 def without_roundoff(results):

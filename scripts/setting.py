@@ -159,11 +159,8 @@ def _draw_traction(axes, line, arrows, size):
 
 
 def _draw_materials(axes, results):
-    """Colours the triangles by material, with a legend. Material 0 is that of [material], the others are those of the
-    surfaces by name."""
-    tables = [results.scene.get(table, {}) for table in ("material", "damage")]
-    names = ["material", *sorted({name for table in tables for name, value in table.items()
-                                  if isinstance(value, dict)})]
+    """Colours the triangles by material, with a legend."""
+    names = results.material_names
     mesh = Triangulation(*results.nodes.T, results.pieces.elements[:, :3])
     colours = ListedColormap([MATERIALS[k % len(MATERIALS)] for k in range(len(names))])
     axes.tripcolor(mesh, facecolors=results.materials.astype(float), cmap=colours, vmin=-0.5,
