@@ -63,8 +63,7 @@ def compared(scene, arguments):
             "run", str(scene), "--solver", solver, "--out", str(folder), *mesh,
             *settings(["contact.rescue=false", *arguments.set]), "--", *arguments.petsc)
         row, state = read(folder, error)
-        rows.append({"scene": scene.stem, "solver": solver, **row, **dict.fromkeys(DIFFERENCES),
-                     "error": error})
+        rows.append({"scene": scene.stem, "solver": solver, **row, **dict.fromkeys(DIFFERENCES), "error": error})
         states.append(state)
         asks = tomllib.loads((folder / "scene.toml").read_text(encoding="utf-8")) if state else {}
         if not mesh and "accuracy" in asks:
@@ -86,8 +85,7 @@ def read(folder, error):
     active = [row["active_nodes"] for row in history]
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8")) if history else {}
     if not history:
-        taken = ["contact_changes", "iterations", "factorisations", "triangular_solves", "fallbacks",
-                 "seconds", *KKT]
+        taken = ["contact_changes", "iterations", "factorisations", "triangular_solves", "fallbacks", "seconds", *KKT]
         return {"steps": 0, **dict.fromkeys(taken)}, None
     row = {
         "steps": int(history[-1]["step"]),
@@ -117,8 +115,7 @@ def differences(state, best):
         order, other = np.lexsort(points.T), np.lexsort(others.T)
     if len(order) != len(other) or not np.array_equal(points[order], others[other]):
         return 3 * [np.nan]
-    return [np.max(np.abs(a[order] - b[other])) / scale
-            for a, b, scale in zip(values, references, scales)]
+    return [np.max(np.abs(a[order] - b[other])) / scale for a, b, scale in zip(values, references, scales)]
 
 
 def worst(row):
@@ -181,8 +178,7 @@ def main(prog=None):
     try:
         for scene in arguments.scenes:
             for solver in arguments.solvers:
-                signorini("check", str(scene),
-                          *settings([*arguments.set, f"contact.solver='{solver}'"]))
+                signorini("check", str(scene), *settings([*arguments.set, f"contact.solver='{solver}'"]))
         rows = [row for scene in arguments.scenes for row in compared(scene, arguments)]
     except Refused as refused:
         return refused.args[0]

@@ -67,8 +67,7 @@ def draw(table):
     scenes, solvers = names(rows, "scene"), names(rows, "solver")
     bars(seconds, rows, "seconds", "time in the contact solver, all steps (s)")
     bars(kkt, rows, "kkt", "worst relative KKT residual of all steps")
-    bars(work, rows, "triangular_solves", "pairs of triangular solves (bars), iterations (ticks)",
-         ticks="iterations")
+    bars(work, rows, "triangular_solves", "pairs of triangular solves (bars), iterations (ticks)", ticks="iterations")
 
     # A logarithmic scale has no place for a residual of exactly 0 or the cost of a failure.
     for row in (row for row in rows if not row["error"] and row["kkt"] > 0):

@@ -221,8 +221,7 @@ def draw_values(axes, mesh, values, colours, low, high):
     image.set_array(values)
     axes.add_collection(image, autolim=False)
     if CONTOURS and high > low:
-        axes.tricontour(mesh, values, levels=np.linspace(low, high, 9)[1:-1], colors="white",
-                        linewidths=0.6, zorder=2)
+        axes.tricontour(mesh, values, levels=np.linspace(low, high, 9)[1:-1], colors="white", linewidths=0.6, zorder=2)
     return image
 
 

@@ -21,10 +21,8 @@ class Pieces:
         # A lattice of points with barycentric coordinates i/cuts, and the triangles between them.
         lattice = [(i, j) for i in range(cuts + 1) for j in range(cuts + 1 - i)]
         number = {point: k for k, point in enumerate(lattice)}
-        upright = [(number[i, j], number[i + 1, j], number[i, j + 1])
-                   for i, j in lattice if i + j < cuts]
-        between = [(number[i + 1, j], number[i + 1, j + 1], number[i, j + 1])
-                   for i, j in lattice if i + j < cuts - 1]
+        upright = [(number[i, j], number[i + 1, j], number[i, j + 1]) for i, j in lattice if i + j < cuts]
+        between = [(number[i + 1, j], number[i + 1, j + 1], number[i, j + 1]) for i, j in lattice if i + j < cuts - 1]
         b, c = np.array(lattice, float).T / cuts
         self._functions = functions(np.stack((1 - b - c, b, c)), elements.shape[1])
         first = len(lattice) * np.arange(len(elements))[:, None, None]
@@ -50,8 +48,7 @@ class Pieces:
     def boundary(self):
         """The nodes of the sides that belong to one element, which is on their left."""
         sides = sides_of(self.elements)
-        _, first, count = np.unique(
-            self._ends(sides), axis=0, return_index=True, return_counts=True)
+        _, first, count = np.unique(self._ends(sides), axis=0, return_index=True, return_counts=True)
         return sides[first[count == 1]]
 
     def _ends(self, sides):
@@ -90,8 +87,7 @@ def derivatives(barycentric, nodes):
 
 def sides_of(elements):
     """The sides of all elements, (3m, 2) or (3m, 3), with the element on their left."""
-    return elements[:, SIDES[:, :elements.shape[1] // 3 + 1]].swapaxes(0, 1).reshape(
-        3 * len(elements), -1)
+    return elements[:, SIDES[:, :elements.shape[1] // 3 + 1]].swapaxes(0, 1).reshape(3 * len(elements), -1)
 
 
 def counter_clockwise(points, elements):

@@ -58,8 +58,7 @@ def draw_force_displacement(results, _limits=None):
     shown = {name: force for name, force in forces.items() if np.nanmax(force) > ROUNDING * largest}
     # Dashes show a curve under another one.
     for (name, force), dashes in zip(shown.items(), cycle(("-", (0, (4, 3)), (0, (1, 2))))):
-        axes.plot(history[abscissa], force, linewidth=1.6, linestyle=dashes,
-                  label=name.replace("$", r"\$"))
+        axes.plot(history[abscissa], force, linewidth=1.6, linestyle=dashes, label=name.replace("$", r"\$"))
     if np.nanmin(history[abscissa]) >= 0.0:
         axes.set_xlim(left=0.0)
     if min(map(np.nanmin, shown.values())) < -ROUNDING * largest:
@@ -101,8 +100,7 @@ def draw_histories(results):
     history = results.history
     if len(history.get("time", [])) < 3:
         return None
-    panels = [(title, {k: v for k, v in columns.items() if k in history}, is_log)
-              for title, columns, is_log in PANELS]
+    panels = [(title, {k: v for k, v in columns.items() if k in history}, is_log) for title, columns, is_log in PANELS]
     panels = [panel for panel in panels if any(np.nanmax(history[k]) > 0.0 for k in panel[1])]
     rows = (len(panels) + 1) // 2
     figure, grid = plt.subplots(rows, 2, figsize=(9.6, 2.1 * rows), sharex=True, squeeze=False)

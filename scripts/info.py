@@ -27,8 +27,7 @@ def entry(name, value, errors):
     if isinstance(value, list):
         # Others than notes are for figures.
         words = [word for word in value if isinstance(word, str)]
-        return [row(name, " ".join(words))] if name.endswith("command") else [
-            row(name, word) for word in words]
+        return [row(name, " ".join(words))] if name.endswith("command") else [row(name, word) for word in words]
     bar = errors.get(name.removeprefix("quantities."))
     text = value if isinstance(value, str) else bar and barred(value, bar) or json.dumps(value)
     return [] if value is None else [row(name, text)]
@@ -39,12 +38,10 @@ def description(folder):
     if not isinstance(summary, dict) or "steps" not in summary:
         raise ValueError("it tells of no run")
     errors = bars(summary)
-    lines = [line for name in summary if name != "phases"
-             for line in entry(name, summary[name], errors)]
+    lines = [line for name in summary if name != "phases" for line in entry(name, summary[name], errors)]
     frames = []
     if (folder / "fields.pvd").exists():
-        frames = re.findall('timestep="(.*?)".*?file="(.*?)"',
-                            (folder / "fields.pvd").read_text(encoding="utf-8"))
+        frames = re.findall('timestep="(.*?)".*?file="(.*?)"', (folder / "fields.pvd").read_text(encoding="utf-8"))
     times = [time for time, file in frames if (folder / file).exists()]
     if len(frames) > 1 and times:
         first, last = (f"{float(time):.10g}" for time in (times[0], times[-1]))
@@ -67,8 +64,7 @@ def main(prog=None):
         raise
     except (OSError, ValueError) as error:
         problem = error.strerror if isinstance(error, OSError) else error
-        print(f"error: {folder / 'summary.json'}: {problem}; name a folder of results, out/SCENE",
-              file=sys.stderr)
+        print(f"error: {folder / 'summary.json'}: {problem}; name a folder of results, out/SCENE", file=sys.stderr)
         return 2
     return 0
 

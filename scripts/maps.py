@@ -31,13 +31,10 @@ def draw_deformed(results, limits):
     mesh = Triangulation(*pieces.at_points(moved).T, pieces.triangles)
     draw_values(axes, mesh, np.zeros(len(mesh.x)), ListedColormap(["#dfe9f3"]), 0.0, 0.0)
     # One line for all sides, with a break after each.
-    sides = np.pad(pieces.along(pieces.sides(), moved), ((0, 0), (0, 1), (0, 0)),
-                   constant_values=np.nan)
+    sides = np.pad(pieces.along(pieces.sides(), moved), ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
     axes.plot(*sides.reshape(-1, 2).T, color=BLUE, linewidth=min(0.6, 0.06 * edge), zorder=2)
     draw_outline(axes, moved, results, color=BLUE, linewidth=1.0, zorder=2.5)
-    draw_outline(
-        axes, results.nodes, results, color=INK, linewidth=0.9, linestyle=(0, (4, 2)), zorder=3
-    )
+    draw_outline(axes, results.nodes, results, color=INK, linewidth=0.9, linestyle=(0, (4, 2)), zorder=3)
     draw_foundation(axes, results, limits.factor)
     _draw_fall(axes, results, moved)
     frame(axes, limits.box, results.units)
@@ -106,9 +103,7 @@ def draw_state(results, limits, figure=None):
     paint = _paint_damage if limits.damaged else _paint_stress
     shown = paint(axes, mesh, results, limits)
     draw_outline(axes, moved, results, color=INK, linewidth=0.7)
-    draw_outline(
-        axes, results.nodes, results, color=INK, linewidth=0.6, linestyle=(0, (4, 2)), zorder=0
-    )
+    draw_outline(axes, results.nodes, results, color=INK, linewidth=0.6, linestyle=(0, (4, 2)), zorder=0)
     draw_foundation(axes, results, limits.factor)
     frame(axes, limits.box, results.units)
     text = f"{results.part}: {shown}\n{_amplified(results, limits)}"

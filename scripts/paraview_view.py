@@ -30,8 +30,7 @@ def coloured(shown, view, field, name, preset, least, largest, is_inverted=False
     colours.RescaleTransferFunction(least, largest)
     colours.AutomaticRescaleRangeMode = "Never"
     bar = simple.GetScalarBar(colours, view)
-    setup(bar, Title=name, ComponentTitle="", TitleColor=[0, 0, 0], LabelColor=[0, 0, 0],
-          RangeLabelFormat="%.3g")
+    setup(bar, Title=name, ComponentTitle="", TitleColor=[0, 0, 0], LabelColor=[0, 0, 0], RangeLabelFormat="%.3g")
     shown.SetScalarBarVisibility(view, True)
     # This draws the sides of quadratic triangles as curves.
     setup(shown, NonlinearSubdivisionLevel=2, Ambient=1.0, Diffuse=0.0)
@@ -73,8 +72,7 @@ def view_of_stress(fields, contact, view):
     setup(arrows.GlyphType, TipRadius=0.03, TipLength=0.15, ShaftRadius=0.008)
     setup(arrows.GlyphTransform, Translate=[-1, 0, 0])
     arrows = simple.Show(arrows, view)
-    setup(arrows, ColorArrayName=["POINTS", ""],
-          AmbientColor=[0.75, 0.2, 0.15], DiffuseColor=[0.75, 0.2, 0.15])
+    setup(arrows, ColorArrayName=["POINTS", ""], AmbientColor=[0.75, 0.2, 0.15], DiffuseColor=[0.75, 0.2, 0.15])
     return "von Mises stress, contact pressure"
 
 
@@ -87,8 +85,7 @@ def read(name):
 def main():
     """Builds both views and shows the last frame or the given one."""
     if not os.path.exists(os.path.join(FOLDER, "fields.pvd")):
-        raise RuntimeError(f"no fields.pvd in {FOLDER}: after moving results, repeat "
-                           "`signorini figures --paraview`")
+        raise RuntimeError(f"no fields.pvd in {FOLDER}: after moving results, repeat " "`signorini figures --paraview`")
     simple.RemoveViewsAndLayouts()
     fields, contact = read("fields.pvd"), read("contact.pvd")
     left, right = (simple.CreateView("RenderView") for _ in range(2))
@@ -103,8 +100,7 @@ def main():
     for view, title in zip((left, right), titles):
         setup(view, UseColorPaletteForBackground=False, Background=[1, 1, 1], InteractionMode="2D",
                  OrientationAxesVisibility=False)
-        time = simple.AnnotateTimeFilter(
-            Input=fields, Format=title + ", t = {time:g} " + RUN["time_unit"])
+        time = simple.AnnotateTimeFilter(Input=fields, Format=title + ", t = {time:g} " + RUN["time_unit"])
         time = simple.Show(time, view)
         setup(time, Color=[0, 0, 0], WindowLocation="Upper Center")
         simple.ResetCamera(view)

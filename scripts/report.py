@@ -213,10 +213,8 @@ def provenance(summary):
     """Version, date, machine and command line."""
     made = summary.get("provenance", {})
     machine = made.get("machine", {})
-    rows = [(key, html.escape(str(made[key]))) for key in ("version", "date", "directory")
-            if made.get(key)]
-    rows += [(key, html.escape(str(machine[key]))) for key in ("host", "processor", "cores")
-             if machine.get(key)]
+    rows = [(key, html.escape(str(made[key]))) for key in ("version", "date", "directory") if made.get(key)]
+    rows += [(key, html.escape(str(machine[key]))) for key in ("host", "processor", "cores") if machine.get(key)]
     rows += [("command", f"<code>{html.escape(' '.join(made.get('command', [])))}</code>")]
     return table(rows)
 
@@ -233,8 +231,7 @@ def page(results, arguments):
     drawn = all_drawn({name: lambda draw=draw: encoded(draw()) for name, draw in named.items()} | tasks)
     elements = {name: element(name, drawn[name]) for name in named}
     errors = summary.get("errors") or {}
-    percent = {key: f"{100 * value:.2g} %"
-               for key, value in errors.items() if key != "figures" and value is not None}
+    percent = {key: f"{100 * value:.2g} %" for key, value in errors.items() if key != "figures" and value is not None}
     notes = [f"<li>{html.escape(note)}</li>" for note in summary.get("notes", [])]
     error = summary.get("error")
     ending = error and f"failed: {error}" or results.ending.replace("$_*$", "_*")

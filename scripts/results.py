@@ -43,8 +43,7 @@ def markdown(header, rows, left=()):
     """A table in Markdown. The columns with these numbers are aligned to the left, the others to the right."""
     rows = [[str(cell) for cell in row] for row in (header, *rows)]
     widths = [max(map(len, column)) for column in zip(*rows)]
-    rows.insert(1, ["-" * (width - (k not in left)) + ":" * (k not in left)
-                    for k, width in enumerate(widths)])
+    rows.insert(1, ["-" * (width - (k not in left)) + ":" * (k not in left) for k, width in enumerate(widths)])
     return "\n".join("| " + " | ".join(
         cell.ljust(width) if k in left else cell.rjust(width)
         for k, (cell, width) in enumerate(zip(row, widths))) + " |" for row in rows)
@@ -114,8 +113,7 @@ class Results:
     @property
     def units(self):
         """The names of the units of length, force, time and stress, and of units derived from them."""
-        units = {"length": "m", "force": "N", "time": "s", "stress": "Pa",
-                 **self.summary.get("units", {})}
+        units = {"length": "m", "force": "N", "time": "s", "stress": "Pa", **self.summary.get("units", {})}
         force, length = units["force"], units["length"]
         work = "J/m" if (force, length) == ("N", "m") else f"{force}·{length}/{length}"
         area = units["stress"] if units["stress"] != "Pa" else f"{force}/{length}²"

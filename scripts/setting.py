@@ -70,9 +70,7 @@ def draw_setting(results, _limits):
         axes.plot([], [], color=_colour(condition), linewidth=4, label=words)
     if body_force:
         axes.plot([], [], color=GREEN, linewidth=4, label=body_force)
-    axes.legend(
-        loc="upper left", bbox_to_anchor=(0.0, -0.55 / height), fontsize="small", handlelength=1
-    )
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.55 / height), fontsize="small", handlelength=1)
     loads = f"; loads at {replace(results, time=time).moment}" if largest or body_force else ""
     axes.set_title(headline(results, f"setting{loads}"))
     return figure
@@ -133,8 +131,7 @@ def _draw_support(axes, line, condition, size):
         points, normals = _samples(line, ROLLERS * size)
         radius = 0.35 * ROLLERS * size
         for point in points + radius * normals:
-            axes.add_patch(plt.Circle(
-                point, radius, facecolor="white", edgecolor=BLUE, linewidth=0.9, zorder=1.8))
+            axes.add_patch(plt.Circle(point, radius, facecolor="white", edgecolor=BLUE, linewidth=0.9, zorder=1.8))
         outer = points + 2.2 * radius * normals
         axes.plot(*outer.T, color=BLUE, linewidth=1.2, zorder=1.8)
         return outer
@@ -201,16 +198,14 @@ def _write_name(axes, line, name, condition, others, inch):
     place = points[1] + (beyond + AWAY * inch) * normal
     across = "center" if abs(x) < 0.4 else "left" if x > 0.0 else "right"
     upright = "center" if abs(y) < 0.4 else "bottom" if y > 0.0 else "top"
-    axes.text(*place, name, color=_colour(condition), ha=across, va=upright, zorder=5,
-              parse_math=False)
+    axes.text(*place, name, color=_colour(condition), ha=across, va=upright, zorder=5, parse_math=False)
     # A letter is about 0.09 inches wide.
     return np.array([place, place + (0.09 * len(name) * inch * np.sign(x) * (abs(x) >= 0.4), 0.0)])
 
 
 def _colour(condition):
     """The colour of a boundary: supports blue, the foundation dark, loads red, free parts grey."""
-    kinds = (("displacement", BLUE), ("symmetry", BLUE), ("gap", INK), ("traction", RED),
-             ("pressure", RED))
+    kinds = (("displacement", BLUE), ("symmetry", BLUE), ("gap", INK), ("traction", RED), ("pressure", RED))
     return next((colour for kind, colour in kinds if kind in condition), FAINT)
 
 
@@ -225,8 +220,7 @@ def _words(name, condition, units):
         "traction": lambda force: f"traction {_pair(force)} {area}",
         "pressure": lambda pressure: f"pressure {pressure} {area}",
     }
-    parts = [say(condition[key]) for key, say in words.items()
-             if condition.get(key, False) is not False]
+    parts = [say(condition[key]) for key, say in words.items() if condition.get(key, False) is not False]
     return textwrap.fill(f"{name}: {', '.join(parts)}".replace("$", r"\$"), int(14 * wide(6.4)))
 
 

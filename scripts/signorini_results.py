@@ -148,8 +148,7 @@ class Frame:
             return p[..., 0] * q[..., 1] - p[..., 1] * q[..., 0]
 
         twice = cross(b - a, c - a)
-        return np.stack((cross(b - x, c - x), cross(c - x, a - x), cross(a - x, b - x)), -1) / (
-            twice[:, None])
+        return np.stack((cross(b - x, c - x), cross(c - x, a - x), cross(a - x, b - x)), -1) / (twice[:, None])
 
 
 def frames_of(folder):

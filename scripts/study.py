@@ -106,8 +106,7 @@ def main(prog=None):
     arguments, more = parser.parse_args(words[:cut]), words[cut + 1:]
     keys = [key for key, _ in arguments.set]
     if twice := next((key for key in keys if keys.count(key) > 1), None):
-        print(f"error: --set {twice} is given twice; write all its values after one: {twice}=A,B,…",
-              file=sys.stderr)
+        print(f"error: --set {twice} is given twice; write all its values after one: {twice}=A,B,…", file=sys.stderr)
         return 2
     extra = [] if arguments.frames or "output.every" in keys else [("output.every", "0")]
     out = arguments.out or Path("out") / f"{Path(arguments.scene).stem}-study"
@@ -118,8 +117,7 @@ def main(prog=None):
         print("error: two runs would have the same folder: a value is given twice, or values differ only in "
               "signs that are not letters or digits", file=sys.stderr)
         return 2
-    commands = [command_of(arguments.scene, folder, of + extra, more)
-                for folder, of in zip(folders, chosen)]
+    commands = [command_of(arguments.scene, folder, of + extra, more) for folder, of in zip(folders, chosen)]
     inputs = inputs_of(arguments.scene)
     open_runs = [(folder, command) for folder, command in zip(folders, commands)
                  if not is_complete(folder, command, inputs)]
@@ -134,8 +132,7 @@ def main(prog=None):
             done += 1
             failed.update({folder: error} if error else {})
             print(f"{done}/{len(chosen)} {folder.name}{': ' + error if error else ''}", flush=True)
-    rows = rows_of([folder for folder in folders if (folder / "summary.json").exists()],
-                   arguments.columns)
+    rows = rows_of([folder for folder in folders if (folder / "summary.json").exists()], arguments.columns)
     if rows:
         printed(rows, False)
         with open(out / "study.csv", "w", newline="", encoding="utf-8") as file:

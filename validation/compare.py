@@ -164,8 +164,7 @@ def compare(path, order, arguments):
                        str(len(exact) - 1),
                        "–".join(str(a) for a in dict.fromkeys((active[0], active[-1]))))
                 try:
-                    errors = differences(
-                        exact, program(arguments.binary, derived, space, directory, solver))
+                    errors = differences(exact, program(arguments.binary, derived, space, directory, solver))
                 except RunError as error:
                     yield False, (*row, "–", "–", "–", f"{tolerance:.0e}", f"FAILED: {error}")
                     continue
@@ -179,8 +178,7 @@ def main():
     parser.add_argument("scenes", nargs="+", type=Path, metavar="SCENE")
     parser.add_argument("--binary", type=Path, default=Path("target/release/signorini"))
     parser.add_argument("--solvers", nargs="+", help="contact solvers [default: all]")
-    parser.add_argument("--orders", nargs="+", type=int, choices=[1, 2], default=[1, 2],
-                        help="of the displacements")
+    parser.add_argument("--orders", nargs="+", type=int, choices=[1, 2], default=[1, 2], help="of the displacements")
     parser.add_argument("--steps", type=int, default=20, help="time steps of the damage case")
     arguments = parser.parse_args()
     arguments.binary = arguments.binary.resolve()

@@ -57,8 +57,7 @@ class Fields:
     def __init__(self, folder):
         self.run = run = Run(folder)
         frames = (read_frame(path).point_data for _, path in run.frames)
-        self.values = np.array([np.column_stack([frame["displacement"][:, :2], frame["zeta"]])
-                                for frame in frames])
+        self.values = np.array([np.column_stack([frame["displacement"][:, :2], frame["zeta"]]) for frame in frames])
         corners = run.points[run.cells]
         self.edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
         every, middle = np.arange(len(run.cells)), np.full((len(run.cells), 3), 1 / 3)
@@ -135,8 +134,7 @@ class Study:
                     scene = {**self.timed(self.end / count, "euler"), "mesh": {"file": str(mesh)}}
                     write_scene(scene, path)
                     out = Path(folder) / "out"
-                    subprocess.run([self.binary, "run", path, "--out", out], check=True,
-                                   stdout=subprocess.DEVNULL)
+                    subprocess.run([self.binary, "run", path, "--out", out], check=True, stdout=subprocess.DEVNULL)
                     yield self.row(exact, size, Fields(out), self.end / count)
 
     def row(self, exact, size, fields, k):
@@ -215,12 +213,10 @@ def draw_sums(axes, rows):
             x = column(of, "h_plus_k")
             order, factor = fit(x, column(of, name))
             ends = np.array([x.min(), x.max()])
-            axes.loglog(ends, factor * ends**order, color=INK, lw=1, ls=style,
-                        label=f"fit, {whose}: order {order:.2f}")
+            axes.loglog(ends, factor * ends**order, color=INK, lw=1, ls=style, label=f"fit, {whose}: order {order:.2f}")
     axes.set(xlabel="h + k", ylabel="largest ‖ε(Δu)‖ + ‖Δζ‖ over time")
     title = "error against h + k on each mesh"
-    axes.set_title(f"Figure 3: {title}\n(dots: ours; crosses: the paper's Table 1)" if of_paper else title,
-                   loc="left")
+    axes.set_title(f"Figure 3: {title}\n(dots: ours; crosses: the paper's Table 1)" if of_paper else title, loc="left")
 
 
 def draw_orders(axes, rows):

@@ -52,8 +52,7 @@ class Discrete:
         local = derivatives(POINTS[self.order].T, self.elements.shape[1])
         straight = np.einsum("qnk,ekd->eqnd", local, self.gradient)
         offsets = self.space.offsets(t[:, SIDES].reshape(-1, 2)).reshape(-1, 3, 2)
-        jacobian = np.eye(2) + np.einsum(
-            "emi,eqmj->eqij", offsets[:, :straight.shape[2] - 3], straight[:, :, 3:])
+        jacobian = np.eye(2) + np.einsum("emi,eqmj->eqij", offsets[:, :straight.shape[2] - 3], straight[:, :, 3:])
         gradient = np.einsum("eqnj,eqjd->eqnd", straight, np.linalg.inv(jacobian))
         self.weight = (self.area / len(local))[:, None] * np.linalg.det(jacobian)
         # (ε_xx, ε_yy, 2ε_xy) = B u_e there.
@@ -83,8 +82,7 @@ class Discrete:
     def stiffness(self, zeta):
         """K(ζ), the sum over the triangles."""
         k = self.element_stiffness(zeta)
-        rows, columns = (np.broadcast_to(v, k.shape) for v in
-                         (self.dof[:, :, None], self.dof[:, None, :]))
+        rows, columns = (np.broadcast_to(v, k.shape) for v in (self.dof[:, :, None], self.dof[:, None, :]))
         n = 2 * len(self.points)
         return coo_matrix((k.ravel(), (rows.ravel(), columns.ravel())), (n, n)).tocsc()
 
@@ -164,8 +162,7 @@ class Discrete:
                 if fixed is not None:
                     faces = [(fixed, sum(length for _, length in faces))]
                 rows.setdefault(node, []).extend((n, w, [gap]) for n, w in faces)
-        return [(node, n, w, gaps) for node, parts in sorted(rows.items())
-                for n, w, gaps in merged(parts, CORNER)]
+        return [(node, n, w, gaps) for node, parts in sorted(rows.items()) for n, w, gaps in merged(parts, CORNER)]
 
     def contact_rows(self, t):
         """u·ν ≤ g at time t, with the smallest of several gaps."""
@@ -177,8 +174,7 @@ class Discrete:
         rows = []
         for boundary in self.boundaries:
             if boundary.get("symmetry"):
-                rows += [(node, n, None) for node, faces in self.faces(boundary["name"]).items()
-                         for n, _ in faces]
+                rows += [(node, n, None) for node, faces in self.faces(boundary["name"]).items() for n, _ in faces]
             for axis, text in enumerate(boundary.get("displacement", [])):
                 if str(text).strip() != "free":
                     value, d = Expression(text), np.eye(2)[axis]
@@ -241,8 +237,7 @@ class Discrete:
             local = np.eye(3) / 3
         mass = self.area[:, None, None] * local
         laplace = np.einsum("eik,ejk,e->eij", self.gradient, self.gradient, self.area * diffusion)
-        rows, columns = (np.broadcast_to(v, mass.shape).ravel() for v in
-                         (t[:, :, None], t[:, None, :]))
+        rows, columns = (np.broadcast_to(v, mass.shape).ravel() for v in (t[:, :, None], t[:, None, :]))
         n = len(zeta)
         assemble = lambda v: coo_matrix((v.ravel(), (rows, columns)), (n, n)).tocsc()
         m, l = assemble(mass), assemble(laplace)

@@ -148,14 +148,11 @@ class Body:
 
     def elasticity(self, strain):
         """A ε: the paper's plane-stress tensor (section 4), or plane strain."""
-        young, poisson = (of_material(self.scene, self.mesh, "material", key)
-                          for key in ("young", "poisson"))
+        young, poisson = (of_material(self.scene, self.mesh, "material", key) for key in ("young", "poisson"))
         if self.scene["material"].get("plane", "stress") == "strain":
             young, poisson = young / (1 - poisson**2), poisson / (1 - poisson)
         young, poisson = (per_triangle(self.domain, values) for values in (young, poisson))
-        return young / (1 + poisson) * (
-            poisson / (1 - poisson) * ufl.tr(strain) * ufl.Identity(2) + strain
-        )
+        return young / (1 + poisson) * (poisson / (1 - poisson) * ufl.tr(strain) * ufl.Identity(2) + strain)
 
     def _loads(self, w):
         """The terms of (f, w)_V: the body force and the tractions."""
@@ -212,8 +209,7 @@ class Body:
                         value[k] = 0.0
                     else:
                         sign[k] = s
-                        gap[k] = np.minimum(gap[k], Expression(boundary["gap"]).at(
-                            self.nodes.points[members], t))
+                        gap[k] = np.minimum(gap[k], Expression(boundary["gap"]).at(self.nodes.points[members], t))
         fixed = np.flatnonzero(np.isfinite(value))
         # A node on both Γ_D and Γ_C keeps its prescribed value.
         sign[fixed] = 0.0
@@ -240,9 +236,7 @@ class Body:
         if "normal" in boundary:
             normals, curved = np.broadcast_to(boundary_direction(boundary), normals.shape), False
         if curved or (np.abs(normals).max(axis=1) < 1 - 1e-9).any():
-            raise SceneError(
-                f"boundary '{name}': this check knows only contact and symmetry along x or y"
-            )
+            raise SceneError(f"boundary '{name}': this check knows only contact and symmetry along x or y")
         component = np.abs(normals).argmax(axis=1)
         sign = np.sign(normals[np.arange(len(normals)), component])
         for c, s in sorted(set(zip(component, sign))):
@@ -281,17 +275,14 @@ class Damage:
             source = fem.FunctionSpace(domain, ("Discontinuous Lagrange", 1))
             points = source.element.interpolation_points()
         else:
-            source = fem.FunctionSpace(domain, ufl.FiniteElement(
-                "Quadrature", ufl.triangle, 2, quad_scheme="default"))
+            source = fem.FunctionSpace(domain, ufl.FiniteElement("Quadrature", ufl.triangle, 2, quad_scheme="default"))
             points, _ = basix.make_quadrature(basix.CellType.triangle, 2)
         self.source = fem.Function(source)
-        self.source_at_points = fem.Expression(
-            self.phi(ufl.sym(ufl.grad(body.u)), body.zeta), points, jit_params=JIT)
+        self.source_at_points = fem.Expression(self.phi(ufl.sym(ufl.grad(body.u)), body.zeta), points, jit_params=JIT)
         # The cells of the body's own mesh, in the order of the straight ones.
         place = np.argsort(body.domain.topology.original_cell_index)
         self.cells = place[domain.topology.original_cell_index].astype(np.int32)
-        self.right_side = form(
-            (self.zeta + k * self.source) * xi * ufl.dx(metadata=INTERIOR_POINTS))
+        self.right_side = form((self.zeta + k * self.source) * xi * ufl.dx(metadata=INTERIOR_POINTS))
 
     def phi(self, strain, zeta):
         """The source φ of section 4, with the truncations q* and η_*."""
@@ -379,8 +370,7 @@ class Contact:
             reaction = self.product(u) - f
             self.force = max(self.force, np.abs(reaction).max())
             pressure, penetration = -s * reaction, s * u - gap
-            following = (s != 0) & np.where(
-                active, pressure >= -SIGN * self.force, penetration > SIGN * self.size)
+            following = (s != 0) & np.where(active, pressure >= -SIGN * self.force, penetration > SIGN * self.size)
             if (following == active).all():
                 break
             active = following
@@ -450,8 +440,7 @@ def dof_of_node(space, nodes):
     """
     elements = nodes.elements[space.mesh.topology.original_cell_index]
     dof = np.empty(len(nodes.points), np.int64)
-    dof[elements[:, DOLFINX_ORDER[:elements.shape[1]]]] = (
-        space.dofmap.list.array.reshape(elements.shape))
+    dof[elements[:, DOLFINX_ORDER[:elements.shape[1]]]] = (space.dofmap.list.array.reshape(elements.shape))
     return dof
 
 

@@ -101,8 +101,7 @@ def opposite(order):
     """A tip between two plates with gaps of 0.001. Both rows are obeyed, and the force of the touching
     plate is a pressure."""
     material = {"young": 1.0, "poisson": 0.3}
-    step = step_of(tip(), plates("0.001", "0.001"), order, material=material,
-                   body={"force": ["0.01", "0.003"]})
+    step = step_of(tip(), plates("0.001", "0.001"), order, material=material, body={"force": ["0.01", "0.003"]})
     own = step.solve()
     yield "wedge between plates: residuals", max(residuals(step, own)[:2]), 1e-12
     yield "wedge: the upper plate is obeyed", abs((along(step.rows, own) - 0.001).max()), 1e-15

@@ -82,8 +82,7 @@ def draw_sketch():
     axes.text(0.52, -1.12, r"$\nu$", fontsize=12)
     for top in (0.55, 0.95, 1.3):
         k = np.abs(angle - top).argmin()
-        axes.annotate("", (x[k], y[k]), (1.25 * x[k], 1.3 * y[k]),
-                      arrowprops={"arrowstyle": "->", "color": RED})
+        axes.annotate("", (x[k], y[k]), (1.25 * x[k], 1.3 * y[k]), arrowprops={"arrowstyle": "->", "color": RED})
     axes.text(1.55, 1.15, r"$\mathbf{f}_N$", color=RED, fontsize=13)
     axes.text(-0.1, 0.0, r"$\Omega$", fontsize=15)
     axes.text(1.25, -1.68, "obstacle", fontsize=10)

@@ -39,8 +39,7 @@ def chain(nodes):
 
 def sides(node):
     """The four sides of a grid."""
-    return {"south": chain(node[:, 0]), "east": chain(node[-1]), "north": chain(node[:, -1]),
-            "west": chain(node[0])}
+    return {"south": chain(node[:, 0]), "east": chain(node[-1]), "north": chain(node[:, -1]), "west": chain(node[0])}
 
 
 def block(rng, n=None):
@@ -78,8 +77,7 @@ def disc(rng):
     n, rings = int(rng.integers(15, 48)), int(rng.integers(2, 7))
     start = -0.5 * np.pi - rng.uniform(0.3, 1.2)
     turn = lambda s: start + 2 * np.pi * s
-    points, node, triangles = grid(
-        rng, n, rings, lambda s, t: (t * np.cos(turn(s)), t * np.sin(turn(s))))
+    points, node, triangles = grid(rng, n, rings, lambda s, t: (t * np.cos(turn(s)), t * np.sin(turn(s))))
     triangles = np.where(np.isin(triangles, node[:, 0]), node[0, 0], triangles)
     for j in range(rings + 1):
         triangles[triangles == node[-1, j]] = node[0, j]

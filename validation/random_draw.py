@@ -85,8 +85,7 @@ class Draw:
         if way == 2:
             self.put(name, symmetry=True)
         else:
-            self.put(name, displacement=[["0", "0"], ["0", "0"], None, ["0", "free"],
-                                         ["free", "0"], [value, "0"]][way])
+            self.put(name, displacement=[["0", "0"], ["0", "0"], None, ["0", "free"], ["free", "0"], [value, "0"]][way])
 
     def traction(self, name, mesh):
         """Mostly pressing along the curve's mean normal; also along any direction, or one that

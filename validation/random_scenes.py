@@ -47,8 +47,7 @@ def run(binary, folder, solver, ranks):
     (folder / "command").write_text(" ".join(command) + "\n")
     output = folder / "log"
     with open(output, "w") as log:
-        process = subprocess.Popen(command, cwd=folder, stdout=log, stderr=log, env=ENVIRONMENT,
-                                   start_new_session=True)
+        process = subprocess.Popen(command, cwd=folder, stdout=log, stderr=log, env=ENVIRONMENT, start_new_session=True)
         try:
             code = process.wait(LIMIT)
         except subprocess.TimeoutExpired:
@@ -159,8 +158,7 @@ def main():
     numbers = range(arguments.first, arguments.first + arguments.count)
     rows = []
     with ProcessPoolExecutor(arguments.jobs) as pool:
-        runs = [pool.submit(one, binary, out, arguments.seed, n, arguments.solver, arguments.order)
-                for n in numbers]
+        runs = [pool.submit(one, binary, out, arguments.seed, n, arguments.solver, arguments.order) for n in numbers]
         for done in as_completed(runs):
             rows.append(done.result())
     rows.sort(key=lambda row: int(row["id"].split("-")[1]))

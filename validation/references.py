@@ -78,8 +78,7 @@ def kept(binary, folder, scene, geometry, refinements=0, limit=None):
     complete = folder / "complete"
     mesh = f"refined{refinements}.msh" if refinements else made_of.name
     scene = {**scene, "mesh": {"file": mesh}}
-    if complete.exists() and read_scene(file) == scene and (
-            made_of.read_text(encoding="utf-8") == geometry):
+    if complete.exists() and read_scene(file) == scene and (made_of.read_text(encoding="utf-8") == geometry):
         return results
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
@@ -88,8 +87,7 @@ def kept(binary, folder, scene, geometry, refinements=0, limit=None):
     if refinements:
         subprocess.run(["gmsh", "-2", "-v", "1", made_of, "-o", folder / "reference.msh"], check=True)
         refine(folder / "reference.msh", refinements)
-    subprocess.run([binary, "run", file, "--out", results], check=True, timeout=limit,
-                   stdout=subprocess.DEVNULL)
+    subprocess.run([binary, "run", file, "--out", results], check=True, timeout=limit, stdout=subprocess.DEVNULL)
     complete.touch()
     return results
 
@@ -100,8 +98,7 @@ def refine(mesh, count):
     meshes = [mesh]
     for k in range(1, count + 1):
         meshes.append(mesh.with_name(f"refined{k}.msh"))
-        subprocess.run(["gmsh", meshes[-2], "-refine", "-v", "1", "-format", "msh41", "-o", meshes[-1]],
-                       check=True)
+        subprocess.run(["gmsh", meshes[-2], "-refine", "-v", "1", "-format", "msh41", "-o", meshes[-1]], check=True)
     return meshes
 
 

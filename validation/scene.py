@@ -93,9 +93,7 @@ def write_scene(scene, path):
 
 
 def _is_table(value):
-    return isinstance(value, dict) or (
-        isinstance(value, list) and bool(value) and isinstance(value[0], dict)
-    )
+    return isinstance(value, dict) or (isinstance(value, list) and bool(value) and isinstance(value[0], dict))
 
 
 def solvers(binary):

@@ -105,8 +105,7 @@ def mesh_geometry(geometry, table, target, order=1):
     numbers = dict(table.get("parameters", {}))
     if "size" in table:
         numbers["size"] = table["size"]
-    command = ["gmsh", "-2", str(geometry), "-o", str(target), "-v", "2",
-               "-order", str(order)]
+    command = ["gmsh", "-2", str(geometry), "-o", str(target), "-v", "2", "-order", str(order)]
     for name, value in numbers.items():
         command += ["-setnumber", name, str(value)]
     try:

@@ -44,8 +44,7 @@ class Step:
             basis = np.eye(2)
             if node in at:
                 d = self.prescribed.direction[at[node]]
-                self.lift[2 * node:2 * node + 2] = (
-                    np.linalg.pinv(d, rcond=1e-8) @ self.prescribed.value[at[node]])
+                self.lift[2 * node:2 * node + 2] = (np.linalg.pinv(d, rcond=1e-8) @ self.prescribed.value[at[node]])
                 basis = null_space(d, rcond=1e-8)
             for vector in basis.T:
                 rows += [2 * node, 2 * node + 1]
@@ -157,8 +156,7 @@ class Step:
         a, n = self.a[self.active] * self.size, len(q)
         small = 1e-10 * self.size
         m = a.shape[0]
-        factor = splu(bmat([[self.h + small * identity(n), a.T],
-                            [a, -small * identity(m)]]).tocsc())
+        factor = splu(bmat([[self.h + small * identity(n), a.T], [a, -small * identity(m)]]).tocsc())
         lam = np.zeros(m)
         for _ in range(10):
             step = factor.solve(np.r_[q - self.h @ v - a.T @ lam, self.size * b - a @ v])
