@@ -31,6 +31,9 @@ TITLES = {
 # The title of an additional column for failed solvers, and its width.
 REASON, WIDTH = "why it failed", 90
 DIFFERENCES = ["difference_u", "difference_zeta", "difference_pressure"]
+# Sums over all steps, and their columns in history.csv.
+TOTALS = {"iterations": "iterations", "factorisations": "factorisations",
+          "triangular_solves": "linear_iterations", "fallbacks": "fallbacks"}
 KKT = ["kkt_stationarity", "kkt_primal", "kkt_dual", "kkt_complementarity"]
 
 
@@ -80,20 +83,14 @@ def read(folder, error):
     """The cost of a run over all steps, its last state, and the largest |u| and |p| of the run. There is no
     state if the first solve failed."""
     history = read_table(folder / "history.csv") if (folder / "history.csv").exists() else []
-    total = {key: int(sum(row[key] for row in history))
-             for key in ["iterations", "factorisations", "linear_iterations", "fallbacks"]}
-    active = [row["active_nodes"] for row in history]
-    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8")) if history else {}
     if not history:
-        taken = ["contact_changes", "iterations", "factorisations", "triangular_solves", "fallbacks", "seconds", *KKT]
-        return {"steps": 0, **dict.fromkeys(taken)}, None
+        return {"steps": 0, **dict.fromkeys(["contact_changes", *TOTALS, "seconds", *KKT])}, None
+    active = [row["active_nodes"] for row in history]
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     row = {
         "steps": int(history[-1]["step"]),
         "contact_changes": sum(a != b for a, b in zip(active, active[1:])),
-        "iterations": total["iterations"],
-        "factorisations": total["factorisations"],
-        "triangular_solves": total["linear_iterations"],
-        "fallbacks": total["fallbacks"],
+        **{name: int(sum(row[key] for row in history)) for name, key in TOTALS.items()},
         "seconds": summary.get("phases", {}).get("contact", 0.0),
         **{key: max(row[key] for row in history) for key in KKT},
     }

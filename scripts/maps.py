@@ -26,13 +26,9 @@ def draw_deformed(results, limits):
     width, height = map_size(extent, wide(7.2))
     figure, axes = plt.subplots(figsize=(width, height + 0.4))
 
-    # The width of the lines, in points, follows the mean edge, so that they do not fill a fine mesh.
-    edge = np.sqrt(extent.prod() / len(pieces.elements)) * 72 * width / extent[0]
     mesh = Triangulation(*pieces.at_points(moved).T, pieces.triangles)
     draw_values(axes, mesh, np.zeros(len(mesh.x)), ListedColormap(["#dfe9f3"]), 0.0, 0.0)
-    # One line for all sides, with a break after each.
-    sides = np.pad(pieces.along(pieces.sides(), moved), ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
-    axes.plot(*sides.reshape(-1, 2).T, color=BLUE, linewidth=min(0.6, 0.06 * edge), zorder=2)
+    _draw_sides(axes, pieces, moved, width / extent[0])
     draw_outline(axes, moved, results, color=BLUE, linewidth=1.0, zorder=2.5)
     draw_outline(axes, results.nodes, results, color=INK, linewidth=0.9, linestyle=(0, (4, 2)), zorder=3)
     draw_foundation(axes, results, limits.factor)
@@ -49,14 +45,19 @@ def draw_mesh(results):
     extent = np.ptp(results.nodes, axis=0)
     width, height = map_size(extent, wide(7.2))
     figure, axes = plt.subplots(figsize=(width, height + 0.4))
-    sides = results.pieces.along(results.pieces.sides(), results.nodes)
-    sides = np.pad(sides, ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
-    edge = np.sqrt(extent.prod() / len(results.pieces.elements)) * 72 * width / extent[0]
-    axes.plot(*sides.reshape(-1, 2).T, color=BLUE, linewidth=min(0.6, 0.06 * edge))
+    _draw_sides(axes, results.pieces, results.nodes, width / extent[0])
     draw_outline(axes, results.nodes, results, color=INK, linewidth=0.9)
     frame(axes, results.nodes, results.units)
     axes.set_title(headline(results, f"mesh: {len(results.pieces.elements)} triangles"))
     return figure
+
+
+def _draw_sides(axes, pieces, points, scale):
+    """The sides of all elements as one line with a break after each. Its width follows the mean edge, so that it does not
+    fill a fine mesh; a metre is `scale` inches long."""
+    sides = np.pad(pieces.along(pieces.sides(), points), ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
+    edge = 72 * scale * np.sqrt(np.ptp(points, axis=0).prod() / len(pieces.elements))
+    axes.plot(*sides.reshape(-1, 2).T, color=BLUE, linewidth=min(0.6, 0.06 * edge), zorder=2)
 
 
 def _draw_fall(axes, results, moved):

@@ -212,9 +212,9 @@ def timings(summary):
 def provenance(summary):
     """Version, date, machine and command line."""
     made = summary.get("provenance", {})
-    machine = made.get("machine", {})
-    rows = [(key, html.escape(str(made[key]))) for key in ("version", "date", "directory") if made.get(key)]
-    rows += [(key, html.escape(str(machine[key]))) for key in ("host", "processor", "cores") if machine.get(key)]
+    made = {**made, **made.get("machine", {})}
+    names = ("version", "date", "directory", "host", "processor", "cores")
+    rows = [(key, html.escape(str(made[key]))) for key in names if made.get(key)]
     rows += [("command", f"<code>{html.escape(' '.join(made.get('command', [])))}</code>")]
     return table(rows)
 

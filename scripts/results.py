@@ -1,6 +1,5 @@
 """A state of a run and its geometry, for pictures."""
 
-import argparse
 import csv
 import sys
 from contextlib import contextmanager
@@ -12,6 +11,7 @@ import numpy as np
 from bars import barred, bars, three_digits
 from elements import Pieces
 from signorini_results import paths
+from table import option_of, write_table  # noqa: F401
 
 # Values below these parts of the maximum of a run are rounding errors (the solver's tolerance is 1e-10).
 ROUNDING = 1e-9
@@ -29,14 +29,6 @@ def read_table(path):
 
     with open(path, newline="", encoding="utf-8") as file:
         return [{key: value(text) for key, text in row.items()} for row in csv.DictReader(file)]
-
-
-def write_table(rows, path):
-    """Writes dictionaries as a CSV file with a column per key in the order of appearance."""
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(dict.fromkeys(key for row in rows for key in row)))
-        writer.writeheader()
-        writer.writerows(rows)
 
 
 def markdown(header, rows, left=()):
@@ -181,15 +173,9 @@ class Results:
     @property
     def overrides(self):
         """The overrides of the scene's keys on the command line; "" without overrides."""
-        words = self.summary.get("provenance", {}).get("command", [])
-        words = words[:words.index("--")] if "--" in words else words
-        parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
-        parser.add_argument("--set", action="append", default=[])
-        names = ("mesh", "solver", "accuracy")
-        for name in names:
-            parser.add_argument(f"--{name}")
-        given = vars(parser.parse_known_args(words)[0])
-        return ", ".join(given["set"] + [f"{name} {given[name]}" for name in names if given[name]])
+        others = [f"{name} {value}" for name in ("mesh", "solver", "accuracy")
+                  for value in option_of(self.summary, name)[-1:]]
+        return ", ".join(option_of(self.summary, "set") + others)
 
     @property
     def is_last(self):

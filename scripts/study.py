@@ -11,7 +11,6 @@ other arguments of `run`.
 """
 
 import argparse
-import csv
 import itertools
 import json
 import os
@@ -21,7 +20,7 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from table import COLUMNS, printed, rows_of
+from table import COLUMNS, printed, rows_of, write_table
 
 # The longest name of a folder.
 LONGEST = 120
@@ -135,10 +134,7 @@ def main(prog=None):
     rows = rows_of([folder for folder in folders if (folder / "summary.json").exists()], arguments.columns)
     if rows:
         printed(rows, False)
-        with open(out / "study.csv", "w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, list(dict.fromkeys(name for row in rows for name in row)))
-            writer.writeheader()
-            writer.writerows(rows)
+        write_table(rows, out / "study.csv")
         print(out / "study.csv")
     return 1 if failed else 0
 

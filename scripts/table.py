@@ -26,13 +26,18 @@ def summary_of(folder):
         raise ValueError(f"{path}: it is damaged or cut off; run the scene again") from None
 
 
-def settings_of(summary):
-    """KEY → value of the `--set` arguments of a run."""
+def option_of(summary, name):
+    """The values of an option in the command of a run."""
     words = summary.get("provenance", {}).get("command", [])
     words = words[:words.index("--")] if "--" in words else words
-    given = [words[k + 1] for k in range(len(words) - 1) if words[k] == "--set"]
-    given += [word.removeprefix("--set=") for word in words if word.startswith("--set=")]
-    return dict((part.strip() for part in text.split("=", 1)) for text in given if "=" in text)
+    option = f"--{name}"
+    return [following if word == option else word.partition("=")[2] for word, following in zip(words, [*words[1:], ""])
+            if word == option or word.startswith(f"{option}=")]
+
+
+def settings_of(summary):
+    """KEY → value of the `--set` arguments of a run."""
+    return dict((part.strip() for part in text.split("=", 1)) for text in option_of(summary, "set") if "=" in text)
 
 
 def value_of(summary, name):
@@ -63,14 +68,25 @@ def text_of(value):
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
+def write_rows(rows, file):
+    """Writes dictionaries as CSV with a column per key in the order of appearance."""
+    writer = csv.DictWriter(file, list(dict.fromkeys(key for row in rows for key in row)))
+    writer.writeheader()
+    writer.writerows(rows)
+
+
+def write_table(rows, path):
+    """Writes dictionaries as a CSV file."""
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        write_rows(rows, file)
+
+
 def printed(rows, as_csv):
     """Prints rows as CSV with all digits, or aligned. Columns without any value are left out there."""
-    names = list(dict.fromkeys(name for row in rows for name in row))
     if as_csv:
-        writer = csv.DictWriter(sys.stdout, names)
-        writer.writeheader()
-        writer.writerows(rows)
+        write_rows(rows, sys.stdout)
         return
+    names = list(dict.fromkeys(name for row in rows for name in row))
     names = [name for name in names if any(row.get(name) not in (None, "") for row in rows)]
     lines = [names] + [[text_of(row.get(name)) for name in names] for row in rows]
     widths = [max(map(len, column)) for column in zip(*lines)]

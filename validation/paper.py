@@ -19,7 +19,7 @@ import converge
 import drawing
 from drawing import BLUE, INK, RED, plt
 from limits import limits_of
-from maps import draw_deformed, draw_stress_and_damage
+from maps import draw_deformed, draw_mesh, draw_stress_and_damage
 from reading import read_results
 from results import write_table
 from setting import draw_setting
@@ -87,15 +87,6 @@ def draw_sketch():
     axes.text(-0.1, 0.0, r"$\Omega$", fontsize=15)
     axes.text(1.25, -1.68, "obstacle", fontsize=10)
     axes.set(xlim=(-2.3, 2.3), ylim=(-1.75, 1.6), aspect="equal")
-    axes.axis("off")
-    return figure
-
-
-def draw_mesh(results):
-    """The setting of Figure 2 has its mesh beside it."""
-    figure, axes = plt.subplots(figsize=(3.6, 3.6))
-    axes.triplot(*results.nodes.T, results.pieces.elements[:, :3], color=INK, linewidth=0.8)
-    axes.set_aspect("equal")
     axes.axis("off")
     return figure
 

@@ -75,25 +75,18 @@ def toml(value):
 
 def write_scene(scene, path):
     """Writes scalars, lists of scalars, tables and arrays of tables; scenes use nothing else."""
-    lines = []
-
-    def entries(table):
-        lines.extend(f"{key} = {toml(value)}" for key, value in table.items())
-
-    entries({k: v for k, v in scene.items() if not _is_table(v)})
+    top, tables = {}, []
     for name, value in scene.items():
         if isinstance(value, dict):
-            lines.append(f"\n[{name}]")
-            entries(value)
-        elif _is_table(value):
-            for table in value:
-                lines.append(f"\n[[{name}]]")
-                entries(table)
+            tables.append((f"\n[{name}]", value))
+        elif isinstance(value, list) and value and isinstance(value[0], dict):
+            tables += [(f"\n[[{name}]]", table) for table in value]
+        else:
+            top[name] = value
+    lines = [f"{key} = {toml(value)}" for key, value in top.items()]
+    for head, table in tables:
+        lines += [head, *(f"{key} = {toml(value)}" for key, value in table.items())]
     Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def _is_table(value):
-    return isinstance(value, dict) or (isinstance(value, list) and bool(value) and isinstance(value[0], dict))
 
 
 def solvers(binary):
