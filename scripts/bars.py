@@ -26,9 +26,8 @@ def three_digits(number):
 
 
 def barred(value, bar):
-    """`5.3570 ± 0.0005`: the bar rounded up to its first digit, or to its second where the first is 1
-    or 2, and the value to the same; `(1.4016 ± 0.0003)e-7` where decimals would be many. None
-    without a bar."""
+    """`5.3570 ± 0.0005`: the bar rounded up to its first digit, or to its second where the first is 1 or 2, and the
+    value to the same; `(1.4016 ± 0.0003)e-7` where decimals would be many. None without a bar."""
     if bar is None or bar <= ROUNDING * abs(value):
         return None
     if bar > abs(value) > 0:

@@ -62,9 +62,9 @@ def compared(scene, arguments):
         folder = arguments.out / f"{scene.stem}-{solver.replace(':', '-')}"
         # A run that fails at its start does not remove the results of an earlier one.
         (folder / "history.csv").unlink(missing_ok=True)
-        error = signorini(
-            "run", str(scene), "--solver", solver, "--out", str(folder), *mesh,
-            *settings(["contact.rescue=false", *arguments.set]), "--", *arguments.petsc)
+        sets = settings(["contact.rescue=false", *arguments.set])
+        words = ["run", str(scene), "--solver", solver, "--out", str(folder)]
+        error = signorini(*words, *mesh, *sets, "--", *arguments.petsc)
         row, state = read(folder, error)
         rows.append({"scene": scene.stem, "solver": solver, **row, **dict.fromkeys(DIFFERENCES), "error": error})
         states.append(state)

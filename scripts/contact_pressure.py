@@ -14,10 +14,8 @@ def draw_pressure(results, limits, figure=None):
         return None
     width = wide(max(7.2, min(3.8 * len(curves), 14.0)))
     figure = canvas((width, np.clip(0.64 * width, 3.4, 4.6)), figure)
-    rows = figure.subplots(
-        2, len(curves), squeeze=False, sharex="col", sharey="row",
-        gridspec_kw={"height_ratios": (2.2, 1)},
-    )
+    rows = figure.subplots(2, len(curves), squeeze=False, sharex="col", sharey="row",
+                           gridspec_kw={"height_ratios": (2.2, 1)})
     figure.set_constrained_layout_pads(wspace=0.08)
     factor, unit = stress_unit(limits.pressure, results.units)
     for curve, name, (above, below) in zip(curves, _names(curves), rows.T):
@@ -88,19 +86,17 @@ def draw_evolution(states, limits):
     curves = first.curves
     if not curves or len(states) < 3:
         return None
-    figure, rows = plt.subplots(
-        len(curves), 1, figsize=(wide(7.2), 1.2 + min(2.8 * len(curves), 8.0)), squeeze=False, sharex=True
-    )
+    size = wide(7.2), 1.2 + min(2.8 * len(curves), 8.0)
+    figure, rows = plt.subplots(len(curves), 1, figsize=size, squeeze=False, sharex=True)
     factor, unit = stress_unit(limits.pressure, first.units)
     times = np.array([state.time for state in states])
     for k, (curve, name, axes) in enumerate(zip(curves, _names(curves), rows[:, 0])):
         s, label = along(curve.points, first.units)
         pressure = np.array([state.curves[k].pressure for state in states]).T / factor
         axes.set_title(name, parse_math=False)
-        image = axes.pcolormesh(
-            _between(times), _between(s), np.ma.masked_where(pressure <= 0.0, pressure),
-            cmap="viridis", vmin=0.0, vmax=limits.pressure / factor or 1.0, rasterized=True,
-        )
+        shown = np.ma.masked_where(pressure <= 0.0, pressure)
+        image = axes.pcolormesh(_between(times), _between(s), shown, cmap="viridis", vmin=0.0,
+                                vmax=limits.pressure / factor or 1.0, rasterized=True)
         draw_colourbar(axes, image, f"contact pressure ({unit})")
         axes.set_ylabel(label)
         for side in ("top", "right"):

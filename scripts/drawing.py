@@ -99,8 +99,7 @@ def amplification(size, largest):
 
 
 def headline(results, text):
-    """The title of a figure: the scene with its overrides, a note if the run ended early, and the quantity
-    shown."""
+    """The title of a figure: the scene with its overrides, a note if the run ended early, and the quantity shown."""
     overrides = textwrap.shorten(f"with {results.overrides}", 100, placeholder=" …")
     overrides = overrides.replace("$", r"\$") if results.overrides else ""
     return "\n".join(filter(None, (results.title, overrides, results.ending, text)))

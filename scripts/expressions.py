@@ -6,15 +6,13 @@ import re
 import numpy as np
 
 NUMPY_FUNCTIONS = {
-    "pi": np.pi, "sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt,
-    "exp": np.exp, "log": np.log, "abs": np.abs,
-    "min": np.minimum, "max": np.maximum, "atan2": np.arctan2,
-    "if_": np.where, "And": np.logical_and, "Or": np.logical_or,
+    "pi": np.pi, "sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt, "exp": np.exp, "log": np.log,
+    "abs": np.abs, "min": np.minimum, "max": np.maximum, "atan2": np.arctan2, "if_": np.where,
+    "And": np.logical_and, "Or": np.logical_or,
 }
 ALLOWED = (
-    ast.Expression, ast.BinOp, ast.UnaryOp, ast.Call, ast.Name, ast.Load, ast.Constant,
-    ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.USub, ast.UAdd,
-    ast.Compare, ast.Lt, ast.LtE, ast.Gt, ast.GtE,
+    ast.Expression, ast.BinOp, ast.UnaryOp, ast.Call, ast.Name, ast.Load, ast.Constant, ast.Add, ast.Sub, ast.Mult,
+    ast.Div, ast.Pow, ast.USub, ast.UAdd, ast.Compare, ast.Lt, ast.LtE, ast.Gt, ast.GtE,
 )
 
 

@@ -72,8 +72,7 @@ def box_of(states, factor):
     """The lower left and the upper right corner of a box around the bodies, undeformed and deformed `factor` times,
     and around their obstacles."""
     points = np.vstack([points for state in states for points in (
-        state.nodes, state.pieces.at_points(state.nodes + factor * state.displacement),
-        *state.foundation(factor))])
+        state.nodes, state.pieces.at_points(state.nodes + factor * state.displacement), *state.foundation(factor))])
     return np.array([points.min(axis=0), points.max(axis=0)])
 
 

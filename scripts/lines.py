@@ -11,8 +11,6 @@ from drawing import INK, wide
 from reading import whole
 from results import ResultError, write_table
 
-# Quantities that exist on contact boundaries alone.
-CONTACT = ("normal_pressure", "gap")
 UNITS = {"zeta": "", "u_x": "length", "u_y": "length", "gap": "length"}
 
 
@@ -36,7 +34,8 @@ def draw_curves(arguments, styled):
                     # Off the contact boundaries frames contain 0.
                     values[np.isnan(_values(frame, arguments, "gap")[1])] = np.nan
                 if np.isfinite(values).sum() < 2:
-                    why = "name a contact boundary: --along NAME" if quantity in CONTACT else "is it outside the body?"
+                    contact = quantity in ("normal_pressure", "gap")
+                    why = "name a contact boundary: --along NAME" if contact else "is it outside the body?"
                     raise ResultError(f"{run.folder}: {quantity} has no values along this line; {why}")
                 label = f"t = {frame.time:g} {units['time']}"
                 label = label if len(runs) == 1 else f"{name}, {label}"

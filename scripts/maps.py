@@ -53,8 +53,8 @@ def draw_mesh(results):
 
 
 def _draw_sides(axes, pieces, points, scale):
-    """The sides of all elements as one line with a break after each. Its width follows the mean edge, so that it does not
-    fill a fine mesh; a metre is `scale` inches long."""
+    """Draws the sides of all elements as one line with breaks. Its width follows the mean edge, so that it does not fill
+    a fine mesh; a metre is `scale` inches long."""
     sides = np.pad(pieces.along(pieces.sides(), points), ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
     edge = 72 * scale * np.sqrt(np.ptp(points, axis=0).prod() / len(pieces.elements))
     axes.plot(*sides.reshape(-1, 2).T, color=BLUE, linewidth=min(0.6, 0.06 * edge), zorder=2)

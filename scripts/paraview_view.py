@@ -65,9 +65,8 @@ def view_of_stress(fields, contact, view):
     if contact is None or not RUN["pressure"]:
         return "von Mises stress"
     arrows = simple.Glyph(registrationName="contact pressure", Input=contact, GlyphType="Arrow")
-    setup(arrows, OrientationArray=["POINTS", "pressure_on_body"],
-          ScaleArray=["POINTS", "normal_pressure"], GlyphMode="All Points",
-          ScaleFactor=0.12 * RUN["size"] / RUN["pressure"])
+    setup(arrows, OrientationArray=["POINTS", "pressure_on_body"], ScaleArray=["POINTS", "normal_pressure"],
+          GlyphMode="All Points", ScaleFactor=0.12 * RUN["size"] / RUN["pressure"])
     # Thin arrows with their tips on the body.
     setup(arrows.GlyphType, TipRadius=0.03, TipLength=0.15, ShaftRadius=0.008)
     setup(arrows.GlyphTransform, Translate=[-1, 0, 0])

@@ -49,18 +49,10 @@ def read_results(folder, time=None, material=None):
         chosen = frames[-1 if time is None else nearest(frames, time)]
         fields = read_frame(chosen[1])
         elements = np.vstack([fields.cells[k].data for k in triangles(fields)])
-        results = Results(
-            folder=folder,
-            summary=summary,
-            scene=scene,
-            history={c: np.array([_number(r[c]) for r in rows]) for c in (rows or [{}])[0]},
-            frames=frames,
-            time=chosen[0],
-            material=material,
-            nodes=fields.points[:, :2],
-            pieces=Pieces(counter_clockwise(fields.points, elements),
-                          fields.point_data.get("global_node")),
-        )
+        history = {c: np.array([_number(r[c]) for r in rows]) for c in (rows or [{}])[0]}
+        pieces = Pieces(counter_clockwise(fields.points, elements), fields.point_data.get("global_node"))
+        results = Results(folder, summary, scene, history, frames, chosen[0], fields.points[:, :2], pieces,
+                          material=material)
         return with_fields(results, chosen[0], fields)
     except OSError as error:
         if failed := summary.get("error"):
@@ -113,11 +105,7 @@ def with_fields(results, time, fields):
     points, materials = fields.point_data, fields.cell_data.get("material")
     contact, tangents, obstacle = _foundation(results, time, points["displacement"][:, :2])
     return of_material(without_roundoff(replace(
-        results,
-        time=time,
-        contact=contact,
-        tangents=tangents,
-        obstacle=obstacle,
+        results, time=time, contact=contact, tangents=tangents, obstacle=obstacle,
         curves=_contact_curves(results.folder, time),
         materials=materials and np.concatenate(materials),
         displacement=points["displacement"][:, :2],
@@ -137,11 +125,10 @@ def read_frame(path):
 
 
 def _foundation(results, time, displacement):
-    """The ends of the edges of Γ_C, the sliding directions of the body there, and the opposite points of the
-    obstacle.
+    """The ends of the edges of Γ_C, the sliding directions of the body there, and the opposite points of the obstacle.
 
-    A node x with the gap g along ν is opposite the point x + g ν. A corner has two normals and gaps: its opposite
-    point is x + d with d·ν = g for both, and it does not slide.
+    A node x with the gap g along ν is opposite the point x + g ν. A corner has two normals and gaps: its opposite point
+    is x + d with d·ν = g for both, and it does not slide.
     """
     displacements = dict(zip(map(tuple, results.nodes.tolist()), displacement))
     conditions = defaultdict(list)

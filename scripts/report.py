@@ -115,11 +115,8 @@ def table(rows):
 def frame(state, limits):
     """The pictures at one time; they have the same size at all times."""
     with plt.rc_context({"savefig.bbox": None}):
-        return {
-            "moment": state.moment,
-            "state": encoded(draw_state(state, limits), dpi=90),
-            "pressure": encoded(draw_pressure(state, limits), dpi=90),
-        }
+        drawn = {"state": draw_state(state, limits), "pressure": draw_pressure(state, limits)}
+        return {"moment": state.moment, **{name: encoded(figure, dpi=90) for name, figure in drawn.items()}}
 
 
 def slider(frames):

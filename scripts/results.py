@@ -47,8 +47,7 @@ class ResultError(Exception):
 
 @contextmanager
 def telling():
-    """Prints problems of reading results or writing pictures in one line, and collects them in the returned
-    list."""
+    """Prints problems of reading results or writing pictures in one line, and collects them in the returned list."""
     problems = []
     try:
         yield problems
@@ -198,11 +197,6 @@ class Results:
         times = self.history.get("time", [])
         found = np.flatnonzero(np.isclose(times, self.time, rtol=1e-12, atol=0.0))
         return int(self.history["active_nodes"][found[-1]]) if len(found) else None
-
-    @property
-    def damaged(self):
-        """Whether the damage is visible."""
-        return bool((self.zeta != 1.0).any())
 
     @property
     def unloaded(self):

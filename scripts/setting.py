@@ -12,9 +12,7 @@ from matplotlib.path import Path
 from matplotlib.patheffects import withStroke, withTickedStroke
 from matplotlib.tri import Triangulation
 
-from drawing import (
-    BLUE, FAINT, GREEN, INK, RED, draw_foundation, draw_outline, frame, headline, map_size, wide,
-)
+from drawing import BLUE, FAINT, GREEN, INK, RED, draw_foundation, draw_outline, frame, headline, map_size, wide
 from expressions import evaluate
 from results import paths
 

@@ -21,9 +21,8 @@ import numpy as np
 # Names of components: the array of a frame, and the column in it.
 COMPONENTS = {
     "u_x": ("displacement", 0), "u_y": ("displacement", 1),
-    "stress_xx": ("stress", 0), "stress_yy": ("stress", 1), "stress_xy": ("stress", 2),
-    "stress_zz": ("stress", 3), "stress_1": ("principal_stress", 0),
-    "stress_2": ("principal_stress", 1),
+    "stress_xx": ("stress", 0), "stress_yy": ("stress", 1), "stress_xy": ("stress", 2), "stress_zz": ("stress", 3),
+    "stress_1": ("principal_stress", 0), "stress_2": ("principal_stress", 1),
 }
 # A point is in a triangle if its barycentric coordinates are not smaller.
 OUTSIDE = -1e-9

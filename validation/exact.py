@@ -68,9 +68,8 @@ def curved():
 
 
 def quadratic():
-    """u = (x² − xy, y²/2), which P2 contains. With ν = ¼ and E = 80 in plane stress
-    σ_xx = E'(2x − y + y/4), σ_yy = E'(y + (2x − y)/4), σ_xy = −E'·3/8·x, E' = 80·16/15, and
-    −div σ = −E'(2, 1 − 1/4 − 3/8)."""
+    """u = (x² − xy, y²/2), which P2 contains. With ν = ¼ and E = 80 in plane stress σ_xx = E'(2x − y + y/4), σ_yy =
+    E'(y + (2x − y)/4), σ_xy = −E'·3/8·x, E' = 80·16/15, and −div σ = −E'(2, 1 − 1/4 − 3/8)."""
     scale = 80 * 16 / 15
     scene = prescribed("x^2 - x*y", "0.5*y^2", body={"force": [repr(-2 * scale), repr(-0.375 * scale)]})
     return "quadratic field", square(), scene, lambda x, y: (x**2 - x * y, 0.5 * y**2)

@@ -225,8 +225,7 @@ def patched(rng, mesh):
 
 
 def write_msh(mesh, path):
-    """MSH 4.1, text: numbers as Python prints them, which reads back exactly. Each physical group is
-    an entity."""
+    """MSH 4.1, text: numbers as Python prints them, which reads back exactly. Each physical group is an entity."""
     space = Lagrange(mesh, 1 if mesh.middles is None else 2)
     line, triangle = (1, 2) if mesh.middles is None else (8, 9)
     # Surface 1 is the rest of the body.

@@ -150,9 +150,8 @@ class Step:
         return self.lift + self.z @ v
 
     def _on_active_set(self, q, b, v):
-        """Hv + Aᵀλ = q, Av = b on the active set, near v. A small
-        regularisation allows redundant rows and free motions, which stay as in v; the refinement removes its effect. λ is
-        0 on the other rows."""
+        """Hv + Aᵀλ = q, Av = b on the active set, near v. A small regularisation allows redundant rows and free
+        motions, which stay as in v; the refinement removes its effect. λ is 0 on the other rows."""
         a, n = self.a[self.active] * self.size, len(q)
         small = 1e-10 * self.size
         m = a.shape[0]
@@ -178,9 +177,8 @@ class Step:
 
 
 def interior_point(h, q, a, b, force, size):
-    """About v, and the active set, of Hv + Aᵀλ = q, s = b − Av ≥ 0, λ ≥ 0, λᵀs = 0 by Mehrotra's
-    predictor and corrector: (H + AᵀDA) dv = …, D = λ/s, in which no pinning loses digits of a
-    thin body."""
+    """About v, and the active set, of Hv + Aᵀλ = q, s = b − Av ≥ 0, λ ≥ 0, λᵀs = 0 by Mehrotra's predictor and
+    corrector: (H + AᵀDA) dv = …, D = λ/s, in which no pinning loses digits of a thin body."""
     m = len(b)
     if m == 0:
         return np.zeros(len(q)), np.zeros(0, bool)
