@@ -116,7 +116,10 @@ def wrap_titles(figure):
         if width > room:
             lines = title.get_text().split("\n")
             letters = int(max(map(len, lines)) * max(room, 2.2 * figure.dpi) / width)
-            title.set_text("\n".join(textwrap.fill(line, letters) for line in lines))
+            # The parts of a line are about equally long.
+            parts = [max(1, -(-len(line) // letters)) for line in lines]
+            rooms = [min(letters, len(line) // part + 8) for line, part in zip(lines, parts)]
+            title.set_text("\n".join(map(textwrap.fill, lines, rooms)))
 
 
 def map_size(extent, across):

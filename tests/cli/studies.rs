@@ -85,6 +85,14 @@ fn curves_and_the_python_module_give_the_exact_fields() {
     directory
         .say(&["figures", "out/scene", "--along", "none"])
         .fails(2, &["there is no boundary none"]);
+    // Γ_C is the bottom.
+    let inside =
+        ["figures", "out/scene", "--line", "0.5,0.5,0.5,1", "--quantity", "normal_pressure"];
+    directory.say(&inside).fails(2, &["normal_pressure has no values along this line"]);
+    let abscissa = ["figures", "out/scene", "--abscissa", "none"];
+    directory.say(&abscissa).fails(2, &["history.csv has no column none; it has step, time"]);
+    let material = ["figures", "out/scene", "--material", "none"];
+    directory.say(&material).fails(2, &["no triangle has the material none"]);
     let alone = ["figures", "out/scene", "--times", "1"];
     assert_eq!(directory.say(&alone).code, Some(2));
     // A column of a journal, without the margins that are cut off.
