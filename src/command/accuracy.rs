@@ -47,16 +47,18 @@ pub(super) fn adapt(
     Ok(Some(adapted))
 }
 
-/// Measures the errors from the mesh. If a run for them fails, one of the `notes` reports it. Collective.
+/// Measures the errors from the mesh, in runs with few steps or with the error `of_steps` of ζ. If such a run fails, one of
+/// the `notes` reports it. Collective.
 pub(super) fn measure_errors(
     session: &Session,
     scene: &Scene,
     mesh: &Mesh,
     solver: &str,
+    of_steps: Option<f64>,
     notes: &mut Vec<String>,
 ) -> Result<Measured, Failure> {
     let _interrupts = Interrupts::defer();
-    match estimate::measured_errors(session, scene, mesh, solver) {
+    match estimate::measured_errors(session, scene, mesh, solver, of_steps) {
         Ok(measured) => Ok(measured),
         Err(AdaptError::Setup(error)) => Err(Failure::input(error)),
         Err(error) => match error.signal() {
@@ -67,6 +69,26 @@ pub(super) fn measure_errors(
             }
         },
     }
+}
+
+/// If the run stops at ζ_*, but not the runs with few steps that measured its errors: measures the time of ζ_* with steps
+/// whose error is half of ζ_*. Collective.
+pub(super) fn confirm_stop(
+    session: &Session,
+    task: &mut Task,
+    outcome: &Outcome,
+) -> Result<(), Failure> {
+    let Some(adapted) = task.adapted.as_ref().filter(|_| is_unconfirmed_stop(task, outcome)) else {
+        return Ok(());
+    };
+    let scene = task.problem.scene();
+    let of_steps = scene.damage.as_ref().map(|damage| 0.5 * damage.law.threshold);
+    let (mesh, solver, notes) = (&adapted.mesh, &task.solver, &mut task.notes);
+    let measured = measure_errors(session, scene, mesh, solver, of_steps, notes)?;
+    if measured.stop.is_some() {
+        task.measured = measured;
+    }
+    Ok(())
 }
 
 /// A signal has ended a run during the adaptation of the mesh.
@@ -154,7 +176,7 @@ pub(super) fn accuracy_note(task: &Task, outcome: Option<&Outcome>) -> Option<St
     let missed = worst.filter(|(_, error)| *error > accuracy).map(|(name, error)| {
         let error = match percent(error) {
             _ if !error.is_finite() => "?".to_owned(),
-            same if same == percent(accuracy) => format!("{:.3e}", error),
+            same if same == percent(accuracy) => format!("{:.4} %", 100.0 * error),
             percent => percent,
         };
         format!("{name} is exact to {error} only")

@@ -2,7 +2,7 @@
 
 use super::{
     Failure, SOLVERS, SceneArguments,
-    accuracy::{adapt, measure_errors, shorter_steps},
+    accuracy::{adapt, confirm_stop, measure_errors, shorter_steps},
     check::contact_nodes,
     check_petsc, check_solver,
     checkpoint::Checkpoint,
@@ -171,7 +171,7 @@ fn read<'a>(
     let adapt = || adapt(session, &mut scene, &mesh, &solver, made);
     let adapted = agree(comm, phases.time("adaptation", adapt))?;
     let mesh = adapted.as_ref().map_or(mesh, |adapted| adapted.mesh.clone());
-    let measure = || measure_errors(session, &scene, &mesh, &solver, &mut notes);
+    let measure = || measure_errors(session, &scene, &mesh, &solver, None, &mut notes);
     let measured = match &adapted {
         Some(adapted) => adapted.measured.clone(),
         None if arguments.bars => agree(comm, phases.time("error bars", measure))?,
@@ -230,6 +230,7 @@ fn solve(
                     let text = "with shorter time steps, which the accuracy needs";
                     say(&screen::row("again", text.to_owned()));
                 }
+                confirm_stop(session, &mut task, &outcome)?;
                 task.shorten_steps(ratio);
                 longer = Some(outcome);
             }

@@ -6,6 +6,14 @@
 //!
 //! An estimate misses details finer than the mesh, so a [`Measurement`] ends the rounds: the same steps on the mesh
 //! bisected everywhere. If a figure then changes by more than its share of the accuracy, the rounds go on.
+//!
+//! - In: a scene with an accuracy, and a coarse mesh of its body ([`adapted`]); or any mesh ([`measured_errors`]).
+//! - Out: the mesh of the last round with the measured errors of the figures on it ([`Adapted`], [`Measured`]), or
+//!   the reason why no mesh reaches the accuracy.
+//! - Caller: the command `run`, before the run itself.
+//!
+//! A round is a [`FewStepRun`], a [`Round`] that judges it, and perhaps a [`Measurement`]; [`Progress`] ends the rounds;
+//! `sizes` turns errors into the sizes of triangles.
 
 mod changes;
 mod finer;
@@ -171,8 +179,8 @@ fn with_passing_loads(
     Ok(scene)
 }
 
-/// The errors of the figures of `scene` from `mesh`, measured by two runs with few steps: on the mesh and on
-/// the mesh bisected everywhere. Collective.
+/// The errors of the figures of `scene` from `mesh`, measured by two runs: on the mesh and on the mesh bisected
+/// everywhere. Their steps are few, or chosen for the error `of_steps` of ζ. Collective.
 ///
 /// # Errors
 /// See [`AdaptError`].
@@ -181,21 +189,27 @@ pub fn measured_errors(
     scene: &Scene,
     mesh: &Mesh,
     solver: &str,
+    of_steps: Option<f64>,
 ) -> Result<Measured, AdaptError> {
     let mut few = scene.clone();
-    let steps = scene.time.map_or(0, |grid| match grid.stepping {
-        Stepping::Uniform { steps } => steps.min(INSTANTS),
-        Stepping::Auto { .. } => INSTANTS,
-    });
-    few.time.iter_mut().for_each(|grid| grid.stepping = Stepping::Uniform { steps });
-    let mut few = with_passing_loads(session, few, mesh, FEW_STEP_TOLERANCE)?;
+    for grid in &mut few.time {
+        grid.stepping = match (of_steps, grid.stepping) {
+            (Some(tolerance), _) => Stepping::Auto { tolerance, expected: [0.0; 2] },
+            (None, Stepping::Uniform { steps }) => Stepping::Uniform { steps: steps.min(INSTANTS) },
+            (None, Stepping::Auto { .. }) => Stepping::Uniform { steps: INSTANTS },
+        };
+    }
+    if of_steps.is_none() {
+        few = with_passing_loads(session, few, mesh, FEW_STEP_TOLERANCE)?;
+    }
     let mesh = Refinement::start(mesh.clone()).mesh;
     let (rounds, triangles) = (1, mesh.triangles.len());
     loop {
         let problem = DiscreteProblem::new(few.clone(), mesh.clone())?.restrict(session)?;
         let run = FewStepRun::run(session, &problem, solver, triangles, FEW)
             .map_err(|source| AdaptError::Run { rounds, triangles, source })?;
-        if run.stop().is_none() || !make_steps_adaptive(&mut few, FEW_STEP_TOLERANCE) {
+        let repeats = of_steps.is_none() && run.stop().is_some();
+        if !repeats || !make_steps_adaptive(&mut few, FEW_STEP_TOLERANCE) {
             return Ok(Measurement::new(session, &few, &mesh, &run, solver, rounds)?.result());
         }
     }

@@ -132,7 +132,8 @@ impl Outcome {
     /// second order: with r the square of the ratio of the numbers of steps, the error of a figure F is r/(1 − r) times
     /// the change of F; twice this counts, and at least half of the change. Where this is less than the estimate, it
     /// takes its place, as far down as the part of the estimate that did not grow in later steps. The estimated growth
-    /// assumes strains proportional to 1/ζ, which prescribed displacements prevent. Collective.
+    /// assumes strains proportional to 1/ζ, which prescribed displacements prevent. If a load makes ζ fall without bound, the
+    /// error of the time of ζ_* is of first order. Collective.
     ///
     /// # Errors
     /// PETSc failed.
@@ -149,7 +150,8 @@ impl Outcome {
         }
         let factor = (2.0 * ratio / (1.0 - ratio)).max(0.5);
         if let (Some(stop), Some(other)) = (&mut self.stopped, longer.stopped) {
-            let measured = factor * (stop.time - other.time).abs();
+            let first_order = before / (now - before);
+            let measured = factor.max(first_order) * (stop.time - other.time).abs();
             stop.uncertainty = stop.uncertainty.min(measured.max(self.ungrown * stop.uncertainty));
         }
         let nodal = NodalStress::new(problem);

@@ -1,4 +1,14 @@
 //! The Cholesky factor of a matrix, kept as the preconditioner of later ones.
+//!
+//! - In: the matrices of one kind, K(ζ) or M + kκL, one after the other, and once the unknowns that may be
+//!   prescribed ([`Factor::set_condensed`]).
+//! - Out: z = B r with a symmetric positive definite B near A⁻¹ ([`Factor::apply`]); the two halves of an
+//!   exact solve, between which a contact solver chooses the prescribed unknowns ([`Condensed`]); and the
+//!   number of iterations after which a new factor costs less than the old one.
+//! - Callers: [`LinearSolver`](super::LinearSolver), which has one and lets KSP apply it, and TAO's Newton steps.
+//!
+//! It calls the [`Substructure`] of its matrices, which calls a [`Cholesky`](super::Cholesky) factor for the interior
+//! of the rank and a [`SchurComplement`](super::schur::SchurComplement) for the interface.
 
 mod checkpoint;
 

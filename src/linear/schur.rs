@@ -1,4 +1,9 @@
 //! The dense Schur complement of the unknowns that are eliminated last.
+//!
+//! - In: S, from the substructure; prescribed unknowns and penalties, from a contact solver.
+//! - Out: the unknowns of Γ and, where they are prescribed, the forces that hold them.
+//! - Callers: [`Substructure`](super::substructure::Substructure), and the active-set and penalty-duality solvers by
+//!   way of [`Condensed`]. They solve with S for many prescribed sets, and only S is factorised anew for them.
 
 use super::{Cholesky, LowerTriangle, Precision};
 use crate::petsc::{Communicator, PetscError};

@@ -10,6 +10,10 @@
 //! A_II x_I = b_I − A_IΓ x_Γ                  by each rank for its own interior (sums over ranks).
 //! ```
 //!
+//! - In: a matrix, right-hand sides, and prescribed unknowns of Γ.
+//! - Out: solutions, or first S and the condensed right-hand side and then, after the solve on Γ, the interior.
+//! - Caller: [`Factor`](super::Factor) alone.
+//!
 //! A rank factorises its interior together with the neighbouring part of Γ, with c 1 in place of A_ΓΓ. The
 //! last block of this factor gives the rank's part of S: L_Γ L_Γᵀ = c 1 − A_ΓI A_II⁻¹ A_IΓ.
 

@@ -248,6 +248,31 @@ fn a_stop_by_the_error_of_the_steps_is_not_reached() {
     }
 }
 
+/// A homogeneous bar under the load p t with λ_D = 0: ζ′ = −½ λ_U 1.09 (p t/(E ζ))², ζ³ = 1 − ½ λ_U 1.09 (p/E)² t³. The
+/// first runs, with eight steps, pass the time of ζ_*.
+#[test]
+fn a_stop_between_few_steps_is_reached_with_a_bar_that_holds() {
+    let directory = TestDirectory::new();
+    directory.write(
+        "scene.toml",
+        "mesh.file = 'square.msh'
+         material = { young = 1000, poisson = 0.3, plane = 'stress' }
+         damage = { diffusion = 1e-3, lambda_d = 0, lambda_u = 800, threshold = 0.01 }
+         time = { end = 1, step = 0.1 }
+         boundary = [{ name = 'left', symmetry = true }, { name = 'bottom', symmetry = true },
+                     { name = 'top', traction = [0, '60*t'] }]",
+    );
+    let exact = ((1.0 - 1e-6) / (0.5 * 800.0 * 1.09 * 0.06_f64.powi(2))).cbrt();
+    for accuracy in ["0.1", "0.01"] {
+        let said = directory.run(&["--accuracy", accuracy]);
+        assert!(said.out.contains("reached in the time of ζ_*"), "{}", said.out);
+        let summary = directory.summary("out/scene");
+        let [time, bar] =
+            ["stopped_at", "stopped_uncertainty"].map(|key| summary[key].as_f64().unwrap());
+        assert!((time - exact).abs() <= bar, "{accuracy}: {time} ± {bar}, not {exact}");
+    }
+}
+
 /// A block under a load with the eccentricity t, which leaves it at t = ½.
 #[test]
 fn no_accuracy_is_promised_where_the_body_turns_over() {

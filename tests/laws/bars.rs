@@ -63,7 +63,7 @@ fn a_figure_on_a_given_mesh_is_off_by_no_more_than_its_bar_which_is_no_idle_one(
         for n in [4, 8, 16] {
             let found = figures(&solved(scene.clone(), square(n)));
             let session = Session::start(&[]).unwrap();
-            let bars = estimate::measured_errors(&session, &scene, &square(n), SOLVERS[0]);
+            let bars = estimate::measured_errors(&session, &scene, &square(n), SOLVERS[0], None);
             let bars = bars.unwrap_or_else(|error| panic!("{error}"));
             let names = ["work", "displacement_max", "contact_force"];
             for ((name, found), exact) in names.iter().zip(found).zip(exact) {

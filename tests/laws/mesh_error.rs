@@ -15,7 +15,7 @@ fn measured(text: &str, n: usize) -> Measured {
     let text = format!("mesh.file = 'square.msh'\n{text}");
     let scene = Scene::parse(&text, Path::new("law.toml"), &[]).unwrap();
     let session = Session::start(&[]).unwrap();
-    estimate::measured_errors(&session, &scene, &square(n), SOLVERS[0]).unwrap()
+    estimate::measured_errors(&session, &scene, &square(n), SOLVERS[0], None).unwrap()
 }
 
 /// A sheared square on a foundation.
