@@ -34,7 +34,8 @@ const PETSC: &str = "\
 /// Everything the `linear` module calls.
 const CHOLMOD: &str = "\
     cholmod_l_start|cholmod_l_finish|cholmod_l_analyze|cholmod_l_analyze_p|cholmod_l_factorize|\
-    cholmod_l_camd|cholmod_l_metis|cholmod_l_change_factor|cholmod_l_free_factor|cholmod_l_realloc";
+    cholmod_l_camd|cholmod_l_metis|cholmod_l_change_factor|cholmod_l_free_factor|cholmod_l_realloc|\
+    dpotrf_|dpotrs_";
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
@@ -44,6 +45,7 @@ fn main() {
     println!("cargo:rustc-link-lib=mpi");
     println!("cargo:rustc-link-lib=cholmod");
     println!("cargo:rustc-link-lib=gomp");
+    println!("cargo:rustc-link-lib=lapack");
     println!("cargo:rustc-link-lib=blas");
 
     let mpi_flags = Command::new("mpicc")
@@ -66,7 +68,11 @@ fn main() {
     declare("petsc", headers, &flags, PETSC, variables);
     let variables = "CHOLMOD_(LONG|REAL|DOUBLE|SUPERNODAL|GIVEN|NATURAL|PATTERN|OUT_OF_MEMORY|TOO_LARGE|\
                      INVALID)";
-    declare("cholmod", "#include <suitesparse/cholmod.h>\n", &[], CHOLMOD, variables);
+    let headers = "#include <suitesparse/cholmod.h>\n\
+                   void dpotrf_(const char *, const int *, double *, const int *, int *);\n\
+                   void dpotrs_(const char *, const int *, const int *, const double *, const int *, double *,\
+                   const int *, int *);\n";
+    declare("cholmod", headers, &[], CHOLMOD, variables);
 }
 
 /// Writes the Rust declarations of some C functions and variables to `OUT_DIR/name.rs`.

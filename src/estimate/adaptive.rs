@@ -192,7 +192,7 @@ pub fn measured_errors(
     of_steps: Option<f64>,
 ) -> Result<Measured, AdaptError> {
     let mut few = scene.clone();
-    for grid in &mut few.time {
+    if let Some(grid) = &mut few.time {
         grid.stepping = match (of_steps, grid.stepping) {
             (Some(tolerance), _) => Stepping::Auto { tolerance, expected: [0.0; 2] },
             (None, Stepping::Uniform { steps }) => Stepping::Uniform { steps: steps.min(INSTANTS) },

@@ -39,26 +39,21 @@ const LARGEST_RESIDUAL: f64 = 0.3;
 /// The cost of a factorisation in bytes that a solve reads in the same time: per floating-point operation,
 /// and per entry of L (assembly, copies). They fit measured times within 10 % on one processor, for 4,000 to
 /// 530,000 unknowns.
-const BYTES_PER_OPERATION: f64 = 0.8;
+pub(super) const BYTES_PER_OPERATION: f64 = 0.8;
 const BYTES_PER_ENTRY: f64 = 200.0;
 
 impl Cholesky {
-    /// Orders and analyses `a`, in the given `order` (the row of A of each row of L) or a fill-reducing one.
-    /// The last `interface` rows are the last in the order too; [`Self::solve`] leaves them out.
+    /// Orders and analyses `a`. The last `interface` rows are the last in the order too; [`Self::solve`] leaves them out.
     ///
     /// # Errors
     /// There is no memory for it.
     pub fn analyse(
         a: &mut LowerTriangle,
-        order: Option<Vec<i64>>,
         interface: usize,
         precision: Precision,
     ) -> Result<Self, PetscError> {
         let interior = a.size() - interface;
-        let factor = match order {
-            Some(order) => Cholmod::analyse(a, order)?,
-            None => Cholmod::ordered(a, interface)?,
-        };
+        let factor = Cholmod::ordered(a, interface)?;
         let solver: Box<dyn TriangularSolver> = match precision {
             Precision::Preconditioner => Box::new(Supernodal::<f32>::new(&factor, interior)),
             Precision::Full => Box::new(Supernodal::<f64>::new(&factor, interior)),

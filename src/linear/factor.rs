@@ -31,8 +31,8 @@ use std::mem::take;
 /// the part (ζ − ζ₀)/ζ₀ of such forces would remain.
 pub struct Factor {
     comm: Communicator,
-    /// The precisions of the two factors of a substructure.
-    precisions: [Precision; 2],
+    /// The precision of the factor of a substructure.
+    precision: Precision,
     /// The number of rows of the matrices to condense, and the owned unknowns that [`Self::prescribe`] may
     /// prescribe.
     condensed: (usize, Vec<usize>),
@@ -65,7 +65,7 @@ impl Factor {
     pub fn new(session: &Session, precision: Precision) -> Self {
         Self {
             comm: session.comm(),
-            precisions: [precision; 2],
+            precision,
             condensed: (0, Vec::new()),
             substructure: None,
             policy: None,
@@ -142,13 +142,7 @@ impl Factor {
             _ => {
                 let (of_rows, condensed) = &self.condensed;
                 let last = if *of_rows == rows { &condensed[..] } else { &[] };
-                let [precision, mut of_schur] = self.precisions;
-                if self.comm.any(!last.is_empty()) {
-                    // A condensed S determines contact forces.
-                    of_schur = Precision::Full;
-                }
-                let precisions = [precision, of_schur];
-                Substructure::new(self.comm, matrix, last, precisions)?.map(Box::new)
+                Substructure::new(self.comm, matrix, last, self.precision)?.map(Box::new)
             }
         };
         let possible = substructure.is_some();
@@ -179,7 +173,8 @@ impl Factor {
         let work = comm.max(factor.work());
         // An iteration reads the factor and the entries of the matrix with their columns.
         let iteration = comm.max(factor.bytes() + 12.0 * entries);
-        self.precisions = factor.precisions();
+        // A restart needs the same precision.
+        self.precision = factor.precision();
         self.record(matrix, definite, Some(work / iteration.max(1.0)))?;
         Ok(definite)
     }
@@ -216,10 +211,7 @@ impl Factor {
     /// There is no memory for it.
     pub(crate) fn prescribe(&mut self, prescribed: &[usize]) -> Result<bool, PetscError> {
         let Some(factor) = self.substructure() else { return Ok(true) };
-        let definite = factor.prescribe(prescribed)?;
-        // A restart needs the same precision.
-        self.precisions = factor.precisions();
-        Ok(definite)
+        factor.prescribe(prescribed)
     }
 
     /// Bytes that an application reads on this rank; 0 if unknown.

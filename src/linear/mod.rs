@@ -16,11 +16,13 @@
 //! get the small problem of the unknowns that may be prescribed ([`Condensed`]). They solve it by their own
 //! methods.
 //!
-//! Unsafe code is where CHOLMOD is called, in `cholmod.rs`.
+//! Unsafe code is where CHOLMOD and LAPACK are called, in `cholmod.rs` and `dense.rs`.
 
 mod cholesky;
 #[allow(unsafe_code)]
 mod cholmod;
+#[allow(unsafe_code)]
+mod dense;
 mod factor;
 mod linear_solver;
 mod linear_system;

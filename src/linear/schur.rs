@@ -5,7 +5,7 @@
 //! - Callers: [`Substructure`](super::substructure::Substructure), and the active-set and penalty-duality solvers by
 //!   way of [`Condensed`]. They solve with S for many prescribed sets, and only S is factorised anew for them.
 
-use super::{Cholesky, LowerTriangle, Precision};
+use super::dense::DenseCholesky;
 use crate::petsc::{Communicator, PetscError};
 use nalgebra::{DMatrix, DVectorView, DVectorViewMut};
 use std::iter;
@@ -16,19 +16,15 @@ use std::iter;
 /// S_D = S + D,   (S_D)_FF x_F = b_F − (S_D)_FF̄ x_F̄,   x_F̄ given.
 /// ```
 ///
-/// In the factored matrix prescribed unknowns have the rows and columns of a scaled identity. All ranks have
-/// the same factor.
+/// All ranks have the same factor.
 pub(super) struct SchurComplement {
     comm: Communicator,
-    /// The precision of the first factor.
-    precision: Precision,
     /// S; without rows if Γ is empty.
     matrix: DMatrix<f64>,
-    /// The size of its entries.
-    scale: f64,
-    /// The factor of S_D, and the changes that made S_D.
-    factor: Option<Cholesky>,
+    /// The factor of (S_D)_FF, the changes that made S_D, and F.
+    factor: Option<DenseCholesky>,
     changes: Option<Changes>,
+    free: Vec<usize>,
 }
 
 /// The changes that make S_D of S.
@@ -42,14 +38,13 @@ struct Changes {
 
 impl SchurComplement {
     /// A complement without values.
-    pub(super) fn new(comm: Communicator, precision: Precision) -> Self {
-        let matrix = DMatrix::zeros(0, 0);
-        Self { comm, precision, matrix, scale: 1.0, factor: None, changes: None }
+    pub(super) fn new(comm: Communicator) -> Self {
+        Self { comm, matrix: DMatrix::zeros(0, 0), factor: None, changes: None, free: Vec::new() }
     }
 
-    /// Replaces S, whose entries have about the size `scale`, and discards the factor.
-    pub(super) fn set(&mut self, matrix: DMatrix<f64>, scale: f64) {
-        (self.matrix, self.scale, self.changes) = (matrix, scale, None);
+    /// Replaces S and discards the factor.
+    pub(super) fn set(&mut self, matrix: DMatrix<f64>) {
+        (self.matrix, self.changes) = (matrix, None);
     }
 
     /// Prescribes owned unknowns and adds to their diagonal entries of S. It returns false if the rest is not
@@ -68,45 +63,39 @@ impl SchurComplement {
         if size == 0 || self.changes.as_ref() == Some(&changes) {
             return Ok(true);
         }
-        let definite = self.factorise(&changes)?;
+        self.factorise(&changes);
+        let definite = self.comm.all(self.factor.is_some());
         self.changes = definite.then_some(changes);
         Ok(definite)
     }
 
-    /// Factorises S_D, in its own order: it is dense.
-    fn factorise(&mut self, changes: &Changes) -> Result<bool, PetscError> {
-        let (size, prescribed) = (self.matrix.nrows(), |i: usize| changes.prescribed[i] != 0.0);
-        let mut lower = LowerTriangle::default();
-        for (j, column) in self.matrix.column_iter().enumerate() {
-            let diagonal = column[j] + changes.added[j];
-            lower.push(j, if prescribed(j) { self.scale } else { diagonal });
-            for i in j + 1..size {
-                lower.push(i, if prescribed(i) || prescribed(j) { 0.0 } else { column[i] });
+    /// Factorises (S_D)_FF.
+    fn factorise(&mut self, changes: &Changes) {
+        let is_free = |i: &usize| changes.prescribed[*i] == 0.0;
+        self.free = (0..self.matrix.nrows()).filter(is_free).collect();
+        let mut lower = DMatrix::zeros(self.free.len(), self.free.len());
+        for (column, &j) in self.free.iter().enumerate() {
+            let (mut to, from) = (lower.column_mut(column), self.matrix.column(j));
+            for (row, &i) in self.free.iter().enumerate().skip(column) {
+                to[row] = from[i];
             }
-            lower.end_column();
+            to[column] += changes.added[j];
         }
-        let factor = match &mut self.factor {
-            Some(factor) => factor,
-            none => {
-                let (mut pattern, order) = (LowerTriangle::default(), (0..size as i64).collect());
-                pattern.push_coupled(size, 1.0);
-                none.insert(Cholesky::analyse(&mut pattern, Some(order), 0, self.precision)?)
-            }
-        };
-        let definite = factor.factorise(&mut lower)?.is_some();
-        Ok(self.comm.all(definite))
+        self.factor = DenseCholesky::new(lower);
     }
 
     /// As [`Self::solve`], but prescribed unknowns keep their values in `x`; `b` becomes b − S_D x.
     fn solve_prescribed(&mut self, b: &mut [f64], x: &mut [f64]) {
-        let Some(changes) = self.changes.clone() else { return };
-        let unknowns = || x.iter().zip(&changes.prescribed);
-        let given: Vec<f64> = unknowns().map(|(x, prescribed)| x * prescribed).collect();
-        self.subtract_product(&given, b);
-        let mut free = b.to_vec();
-        self.solve(&mut free, x);
-        self.subtract_product(x, b);
+        let Some(Changes { prescribed, .. }) = &self.changes else { return };
+        let given: Vec<f64> =
+            x.iter().zip(prescribed).map(|(x, prescribed)| x * prescribed).collect();
+        let mut reduced = b.to_vec();
+        if given.iter().any(|&x| x != 0.0) {
+            self.subtract_product(&given, &mut reduced);
+        }
+        self.solve(&reduced, x);
         x.iter_mut().zip(given).for_each(|(x, given)| *x += given);
+        self.subtract_product(x, b);
     }
 
     /// `b` ← `b` − S_D `x`.
@@ -117,27 +106,23 @@ impl SchurComplement {
         b.iter_mut().zip(added).zip(x.iter()).for_each(|((b, d), x)| *b -= d * x);
     }
 
-    /// `x` ← the solution for `b`, with 0 on prescribed unknowns; `b` is changed.
-    pub(super) fn solve(&mut self, b: &mut [f64], x: &mut [f64]) {
-        let (Some(factor), Some(changes)) = (&mut self.factor, &self.changes) else { return };
-        let prescribed = b.iter_mut().zip(&changes.prescribed).filter(|(_, p)| **p != 0.0);
-        prescribed.for_each(|(b, _)| *b = 0.0);
-        factor.solve(b, x);
+    /// `x` ← the solution for `b`, with 0 on prescribed unknowns.
+    pub(super) fn solve(&self, b: &[f64], x: &mut [f64]) {
+        let Some(factor) = &self.factor else { return };
+        let mut of_free: Vec<f64> = self.free.iter().map(|&i| b[i]).collect();
+        factor.solve(&mut of_free);
+        x.fill(0.0);
+        self.free.iter().zip(of_free).for_each(|(&i, value)| x[i] = value);
     }
 
-    /// The precision of the factor.
-    pub(super) fn precision(&self) -> Precision {
-        self.factor.as_ref().map_or(self.precision, Cholesky::precision)
-    }
-
-    /// The time of a factorisation, as the number of bytes that solves read in this time.
-    pub(super) fn work(&self) -> f64 {
-        self.factor.as_ref().map_or(0.0, Cholesky::work)
+    /// Floating-point operations of a factorisation without prescribed unknowns: n³/3.
+    pub(super) fn operations(&self) -> f64 {
+        (self.matrix.nrows() as f64).powi(3) / 3.0
     }
 
     /// Bytes that a solve reads.
     pub(super) fn bytes(&self) -> f64 {
-        self.factor.as_ref().map_or(0.0, Cholesky::bytes)
+        8.0 * (self.matrix.nrows() as f64).powi(2)
     }
 }
 
@@ -202,7 +187,7 @@ impl Condensed<'_> {
         own.iter().zip(&*scaling).zip(p).for_each(|((&i, e), p)| forces[i] = -e * p);
         schur.comm.sum(&mut forces);
         forces.iter_mut().zip(*b).for_each(|(force, b)| *force += b);
-        schur.solve(&mut forces, x);
+        schur.solve(&forces, x);
         Ok(Some(own.iter().zip(&*scaling).map(|(&i, e)| e * x[i]).collect()))
     }
 }

@@ -19,6 +19,7 @@
 
 use super::{
     Cholesky, LowerTriangle, Precision,
+    cholesky::BYTES_PER_OPERATION,
     schur::{Condensed, SchurComplement},
 };
 use crate::petsc::{Communicator, Matrix, PetscError};
@@ -65,23 +66,22 @@ struct Blocks {
 const LARGEST_INTERFACE: usize = 6000;
 
 impl Substructure {
-    /// Divides, orders and analyses the unknowns of a matrix. Γ contains the owned unknowns `condensed`. The
-    /// second precision is for S. `None` if Γ is too large. Collective.
+    /// Divides, orders and analyses the unknowns of a matrix. Γ contains the owned unknowns `condensed`. `None` if Γ is too large. Collective.
     pub(super) fn new(
         comm: Communicator,
         matrix: &Matrix,
         condensed: &[usize],
-        [precision, of_schur]: [Precision; 2],
+        precision: Precision,
     ) -> Result<Option<Self>, PetscError> {
         let Some(division) = RankDivision::of(comm, matrix, condensed)? else { return Ok(None) };
         let (interior, near) = (division.interior, division.near.len());
         let Blocks { local: mut a, .. } = division.blocks(matrix)?;
         a.push_coupled(near, 1.0);
-        let local = Cholesky::analyse(&mut a, None, near, precision)?;
+        let local = Cholesky::analyse(&mut a, near, precision)?;
         local.check_memory(comm)?;
         let last = interior as i64..(interior + near) as i64;
         let in_place = local.order()[interior..].iter().copied().eq(last);
-        let schur = SchurComplement::new(comm, of_schur);
+        let schur = SchurComplement::new(comm);
         let length = interior + near + division.interface.len();
         let vectors = [vec![0.0; length], vec![0.0; length]];
         let this = Self { comm, division, local, schur, vectors };
@@ -90,12 +90,12 @@ impl Substructure {
 
     /// The time of a factorisation on this rank, as the number of bytes that solves read in this time.
     pub(super) fn work(&self) -> f64 {
-        self.local.work() + self.schur.work()
+        self.local.work() + BYTES_PER_OPERATION * self.schur.operations()
     }
 
-    /// The precisions of both factors.
-    pub(super) fn precisions(&self) -> [Precision; 2] {
-        [self.local.precision(), self.schur.precision()]
+    /// The precision of the factor of the interior.
+    pub(super) fn precision(&self) -> Precision {
+        self.local.precision()
     }
 
     /// Bytes that a solve reads on this rank.
@@ -126,7 +126,7 @@ impl Substructure {
             schur[(column, column)] -= c;
         }
         self.comm.sum(schur.as_mut_slice());
-        self.schur.set(schur, scale);
+        self.schur.set(schur);
         Ok(true)
     }
 
@@ -146,7 +146,7 @@ impl Substructure {
         self.eliminate(r);
         let shared = self.division.shared();
         let [b, x] = &mut self.vectors;
-        self.schur.solve(&mut b[shared..], &mut x[shared..]);
+        self.schur.solve(&b[shared..], &mut x[shared..]);
         self.expand(z);
     }
 

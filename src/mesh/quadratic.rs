@@ -12,6 +12,7 @@ const STRAIGHT: f64 = 1e-9;
 
 /// A node at which two curved edges of a line meet at an angle.
 pub struct Kink {
+    /// The index of the node.
     pub node: usize,
     /// The angle, rad.
     pub angle: f64,

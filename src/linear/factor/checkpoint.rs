@@ -12,7 +12,7 @@ use std::mem::take;
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct FactorState {
     values: Vec<f64>,
-    precisions: [Precision; 2],
+    precision: Precision,
     policy: Option<RefactorisationPolicy>,
     applications: usize,
     factorisations: usize,
@@ -29,7 +29,7 @@ impl Factor {
     pub fn state(&self) -> FactorState {
         FactorState {
             values: self.values.clone(),
-            precisions: self.precisions,
+            precision: self.precision,
             policy: self.policy,
             applications: self.applications,
             factorisations: self.factorisations,
@@ -38,9 +38,9 @@ impl Factor {
 
     /// Restores the state of a checkpoint. The next solve makes the factor.
     pub fn set_state(&mut self, state: FactorState) {
-        let FactorState { values, precisions, policy, applications, factorisations } = state;
+        let FactorState { values, precision, policy, applications, factorisations } = state;
         self.loaded = policy.is_some();
-        (self.values, self.precisions, self.policy) = (values, precisions, policy);
+        (self.values, self.precision, self.policy) = (values, precision, policy);
         (self.applications, self.factorisations) = (applications, factorisations);
     }
 
