@@ -63,12 +63,7 @@ impl ContactStep<'_> {
                 return Err(failed(ContactError::NotDefinite { method: self.solver.name() }));
             }
             if certified {
-                let (candidate, rejected) = self.of_minimum_displacement(candidate, case)?;
-                if attempt == ATTEMPTS || rejected <= required {
-                    return Ok((candidate, report));
-                }
-                tolerance *= 0.3 * required / rejected;
-                continue;
+                return Ok((self.of_minimum_displacement(candidate, case)?, report));
             }
             if attempt == ATTEMPTS || candidate.kkt.worst().is_nan() {
                 let (method, residuals) = (self.solver.name(), candidate.kkt);
