@@ -45,10 +45,8 @@ struct Tao {
 const CALLS: usize = 8;
 const PROXIMAL_CALLS: usize = 40;
 const STALLED: usize = 7;
-/// Maximum number of iterations in a call, and in a further call with the proximal term. The latter starts close to
-/// its answer, and more iterations would only repeat rounding errors.
+/// Maximum number of iterations in a call.
 const ITERATIONS: usize = 200;
-const FURTHER_ITERATIONS: usize = 3;
 /// ρ if contact alone constrains a rigid motion.
 const PROXIMAL: f64 = 1e-9;
 /// The interior-point method needs finite bounds. This one, in units of U, replaces infinity. An answer at this
@@ -68,7 +66,7 @@ impl Tao {
         &self,
         problem: &ContactProblem,
         (tao, kept): (&mut BoundedQuadratic, &mut TaoPreconditioner),
-        (proximal, most): (f64, usize),
+        proximal: f64,
         unit: f64,
         c: &mut Vector,
     ) -> Result<TaoReport, ContactError> {
@@ -91,7 +89,7 @@ impl Tao {
         let lower = limits(-infinite, |bound| bound.lower)?;
         let upper = limits(infinite, |bound| bound.upper)?;
         let mut x = vector(start.iter().map(|c| c / unit).collect())?;
-        let goal = (problem.linear_residual() / force, most);
+        let goal = (problem.linear_residual() / force, ITERATIONS);
         let bounds = [&lower, &upper];
         let answer = tao.minimise(kept.k, &load, bounds, &mut x, goal, kept);
         let method = self.method();
@@ -130,11 +128,10 @@ impl ContactSolver for Tao {
         let mut report = ContactReport::default();
         let (mut reason, mut residuals) = (0, Kkt::default());
         let (mut best, mut stalled) = (f64::INFINITY, 0);
-        for call in 0..calls {
-            let most = if call > 0 && proximal > 0.0 { FURTHER_ITERATIONS } else { ITERATIONS };
+        for _ in 0..calls {
             let factorisations = kept.factor.factorisations();
             let call = (&mut tao, &mut kept);
-            let answer = self.minimise(problem, call, (proximal, most), unit, c)?;
+            let answer = self.minimise(problem, call, proximal, unit, c)?;
             report.iterations += answer.iterations;
             report.linear_iterations += answer.linear_iterations;
             report.factorisations += kept.factor.factorisations() - factorisations;
