@@ -3,7 +3,7 @@
 use crate::{
     contact::{Bound, ContactProblem, ContactReport, rigid_motion_until_contact},
     linear::Condensed,
-    petsc::{Communicator, PetscError, Vector},
+    petsc::{PetscError, Vector},
 };
 
 /// The answer for a guess of the active set, at the bounds of this rank.
@@ -104,20 +104,18 @@ impl<'p> Pivoting<'p> {
         answer: &AtBounds,
         fallbacks: &mut usize,
     ) -> Result<bool, PetscError> {
-        let (comm, violating) = (self.problem.comm, self.violating(active, answer));
-        let count = comm.count(violating.len());
-        if count == 0 {
+        let violating = self.violating(active, answer);
+        if self.problem.comm.count(violating.len()) == 0 {
             return Ok(false);
         }
-        let deepest = self.locally_deepest(&violating)?;
-        let chosen = match self.primal_pivots {
-            0 => self.ascend(active, &violating, answer).unwrap_or_else(|| deepest.clone()),
-            _ => deepest.clone(),
+        let leaving = match self.primal_pivots {
+            0 => self.ascend(active, &violating, answer),
+            _ => None,
         };
+        let chosen = leaving.map_or_else(|| self.locally_deepest(&violating), Ok)?;
         *fallbacks += usize::from(self.primal_pivots == 1);
         self.primal_pivots = self.primal_pivots.saturating_sub(1);
-        let choices = [&chosen, &deepest, last(comm, &violating)];
-        Ok(choices.into_iter().any(|chosen| self.change(active, chosen, answer)))
+        Ok(self.change(active, &chosen, answer))
     }
 
     /// Moves p̄ towards the forces of the active set. Returns the indices that leave the set, or `None` if p̄
@@ -245,11 +243,4 @@ pub(super) fn constrain_rigid_motions(
 ) -> bool {
     let motions = (problem.rigid, problem.work);
     rigid_motion_until_contact(problem.comm, motions, problem.bounds, c, active, true).1
-}
-
-/// The last `violating` index of all ranks; empty on the other ranks.
-fn last<T>(comm: Communicator, violating: &[T]) -> &[T] {
-    let owner = if violating.is_empty() { -1.0 } else { comm.rank() as f64 };
-    let is_owner = comm.max(owner) == comm.rank() as f64;
-    if is_owner { &violating[violating.len().saturating_sub(1)..] } else { &[] }
 }
