@@ -222,7 +222,7 @@ impl<'a> ContactStep<'a> {
             let (_, bounds) = reference.pose(constraints, case);
             let (motions, mut active) = ((&self.rigid, &case.work), active.clone());
             let c: Vec<f64> = self.c.read(|c| bounds.iter().map(|b| c[b.dof]).collect())?;
-            let (amplitudes, _) =
+            let amplitudes =
                 contact::rigid_motion_until_contact(comm, motions, &bounds, &c, &mut active, false);
             reference.add(
                 constraints,

@@ -29,8 +29,7 @@ pub(crate) fn unconstrained_motions(
 /// Moves the body as the load drives it, with fixed u·ν at the `active` bounds, until it reaches a further
 /// bound. This bound becomes active. The function repeats this until no rigid motion remains. `c` is the
 /// start at the bounds, `rigid` has u·ν of the motions there, a column each, and `work` the load's work on
-/// them. Returns the amplitude of each motion, m, and whether the active bounds then constrain all motions.
-/// Collective.
+/// them. Returns the amplitude of each motion, m. Collective.
 ///
 /// If the load drives none of the remaining motions, the body stays; with `undriven` it takes any of them.
 pub(crate) fn rigid_motion_until_contact(
@@ -40,16 +39,16 @@ pub(crate) fn rigid_motion_until_contact(
     c: &[f64],
     active: &mut [f64],
     undriven: bool,
-) -> (DVector<f64>, bool) {
+) -> DVector<f64> {
     let mut amplitudes = DVector::zeros(rigid.ncols());
     loop {
         let left = unconstrained_motions(comm, rigid, active);
-        let Some(any) = left.first() else { return (amplitudes, true) };
+        let Some(any) = left.first() else { return amplitudes };
         let driven = left.iter().map(|m| m * m.dot(work)).sum::<DVector<f64>>();
         let motion = match driven.amax() > ROUNDING * work.amax() {
             true => driven.normalize(),
             false if undriven => any.normalize(),
-            false => return (amplitudes, false),
+            false => return amplitudes,
         };
         let (speed, gone) = (rigid * &motion, rigid * &amplitudes);
         let fastest = comm.max(speed.iter().fold(0.0, |m: f64, v| m.max(v.abs())));
@@ -66,7 +65,7 @@ pub(crate) fn rigid_motion_until_contact(
             .min_by(|a, b| a.1.total_cmp(&b.1));
         let (distance, rank) = comm.min_with_rank(nearest.map_or(f64::INFINITY, |(_, d)| d));
         if distance == f64::INFINITY {
-            return (amplitudes, false);
+            return amplitudes;
         }
         amplitudes += distance * motion;
         if let Some((i, _)) = nearest.filter(|_| rank == comm.rank()) {

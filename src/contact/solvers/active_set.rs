@@ -133,9 +133,7 @@ fn first_guess(
             *side = 0.0;
         }
     }
-    if !constrain_rigid_motions(problem, active, &c) {
-        active.fill(1.0);
-    }
+    constrain_rigid_motions(problem, active, &c);
     Ok(())
 }
 

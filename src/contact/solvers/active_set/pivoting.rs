@@ -149,7 +149,7 @@ impl<'p> Pivoting<'p> {
     fn change(&self, active: &mut [f64], chosen: &[Violation], answer: &AtBounds) -> bool {
         let old = active.to_vec();
         chosen.iter().for_each(|one| active[one.index] = one.side);
-        support(self.problem, active, &old, &answer.c);
+        constrain_rigid_motions(self.problem, active, &answer.c);
         self.problem.comm.any(*active != old[..])
     }
 
@@ -224,23 +224,9 @@ pub(super) fn pivot_condensed(
     Ok(())
 }
 
-/// As [`constrain_rigid_motions`]. If it finds no bound, all indices of the `old` active set stay.
-pub(super) fn support(problem: &ContactProblem, active: &mut [f64], old: &[f64], c: &[f64]) {
-    if !constrain_rigid_motions(problem, active, c) {
-        for (new, old) in active.iter_mut().zip(old) {
-            *new = if *new == 0.0 { *old } else { *new };
-        }
-    }
-}
-
 /// If the active set leaves a rigid motion unconstrained, moves the body as the load drives it, from c at the
-/// bounds, to a further bound. It returns false if there is no such bound: the load is balanced, and rounding
-/// drives the motion. Collective.
-pub(super) fn constrain_rigid_motions(
-    problem: &ContactProblem,
-    active: &mut [f64],
-    c: &[f64],
-) -> bool {
+/// bounds, and adds the bounds that it reaches. Collective.
+pub(super) fn constrain_rigid_motions(problem: &ContactProblem, active: &mut [f64], c: &[f64]) {
     let motions = (problem.rigid, problem.work);
-    rigid_motion_until_contact(problem.comm, motions, problem.bounds, c, active, true).1
+    rigid_motion_until_contact(problem.comm, motions, problem.bounds, c, active, true);
 }
