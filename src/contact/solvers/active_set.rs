@@ -89,29 +89,36 @@ impl ActiveSet {
         answer(problem, elastic, c)
     }
 
-    /// The same, after finding the active set of the condensed problem.
+    /// The same, after finding the active set of the condensed problem. If none is found there, all unknowns decide.
     fn solve_condensed(
         &self,
         problem: &ContactProblem,
         elastic: &mut LinearSolver,
-        active: &mut Vec<f64>,
+        active: &mut [f64],
         c: &mut Vector,
         report: &mut ContactReport,
     ) -> Result<AtBounds, ContactError> {
-        let mut prescribed = prescribe(problem, active, c)?;
+        let prescribed = prescribe(problem, active, c)?;
         let (system, limit) = (problem.system_with(&prescribed), problem.linear_residual());
         if elastic.start(system, problem.load, c, limit)? {
             return answer(problem, elastic, c);
         }
-        let (start, before) = (AtBounds::new(problem, c, Vec::new())?, active.clone());
+        let (start, before) = (AtBounds::new(problem, c, Vec::new())?, active.to_vec());
         report.factorisations += elastic.prepare(system, limit)?;
-        if let Some(mut condensed) = elastic.condense(system)? {
-            pivot_condensed(problem, active, &start, &mut condensed, report)?;
-            let moved = problem.comm.any(*active != before);
-            prescribed = values(problem, active).into_iter().map(|(dof, _)| dof).collect();
-            elastic.expand(problem.system_with(&prescribed), moved, c)?;
+        let found = match elastic.condense(system)? {
+            Some(mut condensed) => {
+                pivot_condensed(problem, active, &start, &mut condensed, report)?
+            }
+            None => false,
+        };
+        if !found {
+            return self.solve_whole(problem, elastic, active, c, report);
         }
-        let solve = elastic.finish(problem.system_with(&prescribed), c, limit)?;
+        let moved = problem.comm.any(*active != before);
+        let prescribed: Vec<_> = values(problem, active).into_iter().map(|(dof, _)| dof).collect();
+        let system = problem.system_with(&prescribed);
+        elastic.expand(system, moved, c)?;
+        let solve = elastic.finish(system, c, limit)?;
         report.add_solve(self.name, solve)?;
         answer(problem, elastic, c)
     }

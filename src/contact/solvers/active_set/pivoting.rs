@@ -197,31 +197,25 @@ impl<'p> Pivoting<'p> {
 }
 
 /// Updates the active set in the small problem of the bounded unknowns, from `start`, until its answer is
-/// admissible. Collective.
+/// admissible. Returns false if it stops before: at a set that leaves the small problem singular. Collective.
 pub(super) fn pivot_condensed(
     problem: &ContactProblem,
-    active: &mut Vec<f64>,
+    active: &mut [f64],
     start: &AtBounds,
     condensed: &mut Condensed,
     report: &mut ContactReport,
-) -> Result<(), PetscError> {
-    let changes = |active: &[f64]| start.changes(problem, active);
-    let (mut best, mut pivoting) = (active.clone(), Pivoting::new(problem));
+) -> Result<bool, PetscError> {
+    let mut pivoting = Pivoting::new(problem);
     for _ in 0..pivoting.limit() {
-        let Some([x, p]) = condensed.solve(&changes(active))? else { break };
-        best.clone_from(active);
+        let Some([x, p]) = condensed.solve(&start.changes(problem, active))? else { break };
         report.iterations += 1;
         let c = start.c.iter().zip(x).map(|(c, x)| c + x).collect();
         let answer = AtBounds { c, p, displacement: start.displacement };
         if !pivoting.pivot(active, &answer, &mut report.fallbacks)? {
-            break;
+            return Ok(true);
         }
     }
-    if problem.comm.any(*active != best) {
-        active.clone_from(&best);
-        condensed.solve(&changes(active))?;
-    }
-    Ok(())
+    Ok(false)
 }
 
 /// If the active set leaves a rigid motion unconstrained, moves the body as the load drives it, from c at the
