@@ -87,12 +87,6 @@ impl ContactProblem<'_> {
         v.read(|v| self.bounds.iter().map(|bound| v[bound.dof]).collect())
     }
 
-    /// The scales for an iterate c: a larger displacement raises them.
-    pub(super) fn scales_at(&self, c: &Vector) -> Result<Scales, PetscError> {
-        let displacement = self.scales.displacement.max(self.max_norm(c)?);
-        Ok(Scales { displacement, ..self.scales })
-    }
-
     /// Kc − f, N.
     ///
     /// # Errors
@@ -104,36 +98,19 @@ impl ContactProblem<'_> {
         Ok(residual)
     }
 
-    /// The KKT residuals of `c` with the assembled K. (The [`Certificate`](super::Certificate) decides about
-    /// an answer.)
+    /// The KKT residuals of `c` with the assembled K; a larger displacement raises their scale. (The
+    /// [`Certificate`](super::Certificate) decides about an answer.) Collective.
     ///
     /// # Errors
     /// PETSc failed.
     pub fn residuals(&self, c: &Vector) -> Result<Kkt, PetscError> {
-        let residual = self.residual(c)?;
-        let scales = self.scales_at(c)?;
-        residual.read(|r| {
-            c.read(|c| {
-                let at_bound = |bound: &Bound| (-r[bound.dof], c[bound.dof]);
-                let mut free = r.to_vec();
-                self.bounds.iter().for_each(|bound| free[bound.dof] = 0.0);
-                let free = free.iter().map(|r| r * r).sum();
-                self.kkt(free, self.bounds.iter().map(at_bound), scales)
-            })
-        })?
-    }
-
-    /// The KKT residuals, from Σ r² over the unbounded unknowns of this rank, `free`, N², and from p and c of
-    /// each bound, `bounded`. Collective.
-    pub(super) fn kkt(
-        &self,
-        free: f64,
-        bounded: impl Iterator<Item = (f64, f64)>,
-        scales: Scales,
-    ) -> Kkt {
+        let mut residual = self.residual(c)?;
+        let displacement = self.scales.displacement.max(self.max_norm(c)?);
+        let scales = Scales { displacement, ..self.scales };
         let (mut primal, mut pull, mut complementarity) = (0.0_f64, 0.0, 0.0_f64);
-        for (bound, (p, c)) in self.bounds.iter().zip(bounded) {
-            let (above, below) = (bound.upper - c, c - bound.lower);
+        let at_bounds = self.at_bounds(&residual)?.into_iter().zip(self.at_bounds(c)?);
+        for (bound, (r, c)) in self.bounds.iter().zip(at_bounds) {
+            let (p, above, below) = (-r, bound.upper - c, c - bound.lower);
             primal = primal.max(-above.min(below));
             complementarity = complementarity.max(scales.natural(p, above));
             match bound.lower.is_finite() {
@@ -141,13 +118,17 @@ impl ContactProblem<'_> {
                 false => pull += p.min(0.0).powi(2),
             }
         }
+        let free = residual.write(|r| {
+            self.bounds.iter().for_each(|bound| r[bound.dof] = 0.0);
+            r.iter().map(|r| r * r).sum()
+        })?;
         let mut sums = [free, pull];
         self.comm.sum(&mut sums);
-        Kkt {
+        Ok(Kkt {
             stationarity: scales.of_force(sums[0].sqrt()),
             primal: scales.of_displacement(self.comm.max(primal)),
             dual: scales.of_force(sums[1].sqrt()),
             complementarity: self.comm.max(complementarity),
-        }
+        })
     }
 }

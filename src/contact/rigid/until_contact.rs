@@ -51,7 +51,7 @@ pub(crate) fn rigid_motion_until_contact(
             false => return amplitudes,
         };
         let (speed, gone) = (rigid * &motion, rigid * &amplitudes);
-        let fastest = comm.max(speed.iter().fold(0.0, |m: f64, v| m.max(v.abs())));
+        let fastest = comm.max(speed.amax());
         let distance = |i: usize| {
             let bound = &bounds[i];
             let value = if speed[i] > 0.0 { bound.upper } else { bound.lower };
