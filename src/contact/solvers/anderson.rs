@@ -29,30 +29,22 @@ impl Anderson {
         Self { weights, history: Vec::new(), comm }
     }
 
-    /// The next iterate from `q` and its image T(q).
+    /// The next iterate from `q` and its image T(q): the image minus the combination of differences that minimises
+    /// the residual.
     pub fn next(&mut self, q: &[f64], image: Vec<f64>) -> Vec<f64> {
         let residual: Vec<f64> = image.iter().zip(q).map(|(t, q)| t - q).collect();
+        let (mut next, w) = (image.clone(), &self.weights);
+        let target = DVector::from_fn(w.len(), |i, _| residual[i] * w[i]);
         self.history.push((image, residual));
         if self.history.len() > DEPTH + 1 {
             self.history.remove(0);
         }
-        self.mix()
-    }
-
-    /// T(q_k) minus the combination of differences that minimises the residual.
-    fn mix(&self) -> Vec<f64> {
-        let Some(((image, residual), earlier)) = self.history.split_last() else {
-            return Vec::new();
-        };
-        let mut next = image.clone();
-        if earlier.is_empty() {
+        if self.history.len() == 1 {
             return next;
         }
-        let w = &self.weights;
-        let differences = DMatrix::from_fn(w.len(), earlier.len(), |i, j| {
+        let differences = DMatrix::from_fn(w.len(), self.history.len() - 1, |i, j| {
             (self.history[j + 1].1[i] - self.history[j].1[i]) * w[i]
         });
-        let target = DVector::from_fn(w.len(), |i, _| residual[i] * w[i]);
         let (differences, target) = self.condensed(differences, target);
         let svd = differences.svd(true, true);
         let cut = RANK * svd.singular_values.max();
