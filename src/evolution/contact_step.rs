@@ -21,14 +21,14 @@ use super::{
     extrapolation::Extrapolation,
 };
 use crate::{
-    contact::{self, BoxedSolver, Scales},
+    contact::{self, Bound, BoxedSolver, Scales},
     fem::Stiffness,
     linear::{FactorState, LinearSolver, Precision},
     petsc::{PetscError, Session, Vector},
 };
 use certificate::Candidate;
 use minimisation::displacement;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use reference::Reference;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
@@ -219,16 +219,25 @@ impl<'a> ContactStep<'a> {
             self.c.set(&c)
         })?;
         if !unloaded && !contact::unconstrained_motions(comm, &self.rigid, active).is_empty() {
-            let (_, bounds) = reference.pose(constraints, case);
             let (motions, mut active) = ((&self.rigid, &case.work), active.clone());
-            let c: Vec<f64> = self.c.read(|c| bounds.iter().map(|b| c[b.dof]).collect())?;
+            let (bounds, c) = self.at_bounds(case)?;
             let amplitudes =
                 contact::rigid_motion_until_contact(comm, motions, &bounds, &c, &mut active, false);
-            reference.add(
-                constraints,
-                &problem.motions.combined(&problem.body, &amplitudes).field(&problem.body),
-            );
+            self.move_rigidly(&amplitudes);
         }
         Ok(())
+    }
+
+    /// The bounds, measured from the reference, and c there.
+    fn at_bounds(&self, case: &LoadCase) -> Result<(Vec<Bound>, Vec<f64>), PetscError> {
+        let (_, bounds) = self.next.reference.pose(&self.problem.constraints, case);
+        let c = self.c.read(|c| bounds.iter().map(|b| c[b.dof]).collect())?;
+        Ok((bounds, c))
+    }
+
+    /// Adds the motions that contact alone constrains, with these amplitudes, to the reference.
+    fn move_rigidly(&mut self, amplitudes: &DVector<f64>) {
+        let DiscreteProblem { motions, body, constraints, .. } = self.problem;
+        self.next.reference.add(constraints, &motions.combined(body, amplitudes).field(body));
     }
 }

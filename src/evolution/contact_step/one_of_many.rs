@@ -50,14 +50,12 @@ impl ContactStep<'_> {
         let before = self.next.reference.clone();
         let total = before.total(candidate.u.clone());
         let amplitudes = problem.motions.amplitudes(&problem.body, &total);
-        let (_, bounds) = before.pose(&problem.constraints, case);
-        let c: Vec<f64> = self.c.read(|c| bounds.iter().map(|b| c[b.dof]).collect())?;
+        let (bounds, c) = self.at_bounds(case)?;
         let (comm, motions) = (problem.body.nodes.partition.comm(), (&self.rigid, &left[..]));
         let Some(further) = least_motion(comm, motions, &amplitudes, &bounds, &c) else {
             return Ok(candidate);
         };
-        let motion = problem.motions.combined(&problem.body, &further);
-        self.next.reference.add(&problem.constraints, &motion.field(&problem.body));
+        self.move_rigidly(&further);
         let moved = self.certify(candidate.u.clone(), case);
         if moved.kkt.within(candidate.kkt.worst().max(problem.tolerance)) {
             return Ok(moved);
