@@ -93,8 +93,7 @@ impl DamageStep<'_> {
         let partition = &problem.body.vertices.partition;
         let (start, load) = (planned.start.as_slice(), planned.load.as_slice());
         let (mut zeta, min_max) = (planned.start.clone(), partition.min_max(start));
-        let stays = min_max.0 == min_max.1 && self.is_zero(load);
-        if stays || problem.damage().is_none() {
+        if min_max.0 == min_max.1 && self.is_zero(load) {
             return Ok(DamageUpdate { zeta, min_max, certificate: None });
         }
         let system = self.system(planned.k)?;
@@ -132,8 +131,7 @@ impl DamageStep<'_> {
         load: DVector<f64>,
     ) -> Result<DVector<f64>, RunError> {
         let (partition, phases) = (&self.problem.body.vertices.partition, self.phases);
-        let zero = self.is_zero(load.as_slice());
-        if zero || self.problem.damage().is_none() {
+        if self.is_zero(load.as_slice()) {
             return Ok(DVector::zeros(load.len()));
         }
         let system = self.system(planned.k)?;
@@ -152,8 +150,7 @@ impl DamageStep<'_> {
         error: &mut DVector<f64>,
     ) -> Result<(), RunError> {
         let (partition, phases) = (&self.problem.body.vertices.partition, self.phases);
-        let zero = self.is_zero(error.as_slice());
-        if zero || self.problem.damage().is_none() {
+        if self.is_zero(error.as_slice()) {
             return Ok(());
         }
         let (mut left, no_source) = (error.clone(), vec![0.0; error.len()]);
@@ -165,7 +162,7 @@ impl DamageStep<'_> {
         Ok(())
     }
 
-    /// Is a source load zero on all ranks? Collective.
+    /// Is a source load zero on all ranks, as always without a damage law? Collective.
     fn is_zero(&self, load: &[f64]) -> bool {
         self.problem.body.vertices.partition.comm().all(load.iter().all(|&b| b == 0.0))
     }
