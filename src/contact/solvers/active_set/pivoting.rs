@@ -9,11 +9,11 @@ use crate::{
 /// The answer for a guess of the active set, at the bounds of this rank.
 pub(super) struct AtBounds {
     /// c, m.
-    pub(super) c: Vec<f64>,
+    c: Vec<f64>,
     /// p, N.
     p: Vec<f64>,
     /// The largest displacement of the body, m.
-    pub(super) displacement: f64,
+    displacement: f64,
 }
 
 impl AtBounds {
@@ -28,7 +28,7 @@ impl AtBounds {
     }
 
     /// The change of each active unknown to its bound; `None` for the others.
-    pub(super) fn changes(&self, problem: &ContactProblem, active: &[f64]) -> Vec<Option<f64>> {
+    fn changes(&self, problem: &ContactProblem, active: &[f64]) -> Vec<Option<f64>> {
         let sides = problem.bounds.iter().zip(active).zip(&self.c);
         sides.map(|((bound, side), c)| Some(bound.at(*side)? - c)).collect()
     }
@@ -95,9 +95,9 @@ impl<'p> Pivoting<'p> {
         self.primal_pivots + FAST > PRIMAL_PIVOTS
     }
 
-    /// Updates the active set from its answer. It returns false if the answer is admissible or the set does
-    /// not change: the remaining violations are rounding, and the certificate decides. It counts the change
-    /// to the dual problem in `fallbacks`. Collective.
+    /// Updates the active set from its answer, and adds bounds that support the body. It returns false if the
+    /// answer is admissible or the set does not change: the remaining violations are rounding, and the
+    /// certificate decides. It counts the change to the dual problem in `fallbacks`. Collective.
     pub(super) fn pivot(
         &mut self,
         active: &mut [f64],
@@ -115,7 +115,10 @@ impl<'p> Pivoting<'p> {
         let chosen = leaving.map_or_else(|| self.locally_deepest(&violating), Ok)?;
         *fallbacks += usize::from(self.primal_pivots == 1);
         self.primal_pivots = self.primal_pivots.saturating_sub(1);
-        Ok(self.change(active, &chosen, answer))
+        let old = active.to_vec();
+        chosen.iter().for_each(|one| active[one.index] = one.side);
+        constrain_rigid_motions(self.problem, active, &answer.c);
+        Ok(self.problem.comm.any(*active != old[..]))
     }
 
     /// Moves p̄ towards the forces of the active set. Returns the indices that leave the set, or `None` if p̄
@@ -142,15 +145,6 @@ impl<'p> Pivoting<'p> {
         forces.iter_mut().zip(&new).for_each(|(p, new)| *p = (*p + first * (new - *p)).max(0.0));
         leaving.iter().for_each(|one| forces[one.index] = 0.0);
         Some(leaving)
-    }
-
-    /// Gives the `chosen` indices their sides, and adds bounds that support the body. Has the active set
-    /// changed? Collective.
-    fn change(&self, active: &mut [f64], chosen: &[Violation], answer: &AtBounds) -> bool {
-        let old = active.to_vec();
-        chosen.iter().for_each(|one| active[one.index] = one.side);
-        constrain_rigid_motions(self.problem, active, &answer.c);
-        self.problem.comm.any(*active != old[..])
     }
 
     /// The `violating` indices with a pulling force, and those beyond their bounds that K couples to no
