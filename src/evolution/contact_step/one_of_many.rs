@@ -10,17 +10,18 @@ use crate::{
 use nalgebra::DVector;
 
 impl ContactStep<'_> {
-    /// The rigid motions that only contact constrains and no contact force resists.
-    ///
-    /// Contact forces below N τ F may be residuals and do not count, with the number N of nodes and the tolerance τ.
-    /// By Cauchy and Schwarz, a residual τF works on a rigid motion like a force √N τF. At a lever of one mesh width,
-    /// 1/√N of the body, this is a force N τF.
-    fn unresisted(&self, contact: &[ContactPoint], force: f64) -> Vec<DVector<f64>> {
-        let problem = self.problem;
-        let partition = &problem.body.nodes.partition;
-        let limit = partition.total() as f64 * problem.tolerance * force;
-        let active = active_bounds(&problem.constraints, contact, limit);
-        contact::unconstrained_motions(partition.comm(), &self.rigid, &active)
+    /// The rigid motions that only contact constrains and no contact force above `level` times F resists.
+    fn unresisted(&self, contact: &[ContactPoint], level: f64, force: f64) -> Vec<DVector<f64>> {
+        let active = active_bounds(&self.problem.constraints, contact, level * force);
+        let comm = self.problem.body.nodes.partition.comm();
+        contact::unconstrained_motions(comm, &self.rigid, &active)
+    }
+
+    /// Contact forces below this fraction of F may be residuals and do not count. By Cauchy and Schwarz, a residual
+    /// τF works on a rigid motion like a force √N τF. At a lever of one mesh width, 1/√N of the body, this is a
+    /// force N τF.
+    fn uncertain(&self) -> f64 {
+        self.problem.body.nodes.partition.total() as f64 * self.problem.tolerance
     }
 
     /// A rigid motion that the active nodes leave unconstrained. `None` without load (`force` = 0).
@@ -29,38 +30,41 @@ impl ContactStep<'_> {
         contact: &[ContactPoint],
         force: f64,
     ) -> Option<RigidMotion> {
-        let motions = self.unresisted(contact, force);
+        let motions = self.unresisted(contact, self.uncertain(), force);
         let first = motions.first().filter(|_| force > 0.0)?;
         Some(self.problem.motions.combined(&self.problem.body, first))
     }
 
     /// The answer of minimum ∫|u|² among all that differ from the certified `candidate` by an unresisted motion; it
-    /// does not depend on the solver. If its certificate fails, because a neglected contact force counts or acts
-    /// across an opening gap, `candidate` is returned. Collective.
+    /// does not depend on the solver. Its certificate fails if a neglected contact force counts or acts across an
+    /// opening gap. Then fewer forces are neglected, or `candidate` is returned. Collective.
     pub(super) fn of_minimum_displacement(
         &mut self,
         candidate: Candidate,
         case: &LoadCase,
     ) -> Result<Candidate, PetscError> {
         let problem = self.problem;
-        let left = self.unresisted(&candidate.contact, candidate.force);
-        if left.is_empty() || candidate.force == 0.0 {
-            return Ok(candidate);
+        let tolerance = candidate.kkt.worst().max(problem.tolerance);
+        for level in [self.uncertain(), problem.tolerance] {
+            let left = self.unresisted(&candidate.contact, level, candidate.force);
+            if left.is_empty() || candidate.force == 0.0 {
+                break;
+            }
+            let before = self.next.reference.clone();
+            let total = before.total(candidate.u.clone());
+            let amplitudes = problem.motions.amplitudes(&problem.body, &total);
+            let (bounds, c) = self.at_bounds(case)?;
+            let (comm, motions) = (problem.body.nodes.partition.comm(), (&self.rigid, &left[..]));
+            let Some(further) = least_motion(comm, motions, &amplitudes, &bounds, &c) else {
+                break;
+            };
+            self.move_rigidly(&further);
+            let moved = self.certify(candidate.u.clone(), case);
+            if moved.kkt.within(tolerance) {
+                return Ok(moved);
+            }
+            self.next.reference = before;
         }
-        let before = self.next.reference.clone();
-        let total = before.total(candidate.u.clone());
-        let amplitudes = problem.motions.amplitudes(&problem.body, &total);
-        let (bounds, c) = self.at_bounds(case)?;
-        let (comm, motions) = (problem.body.nodes.partition.comm(), (&self.rigid, &left[..]));
-        let Some(further) = least_motion(comm, motions, &amplitudes, &bounds, &c) else {
-            return Ok(candidate);
-        };
-        self.move_rigidly(&further);
-        let moved = self.certify(candidate.u.clone(), case);
-        if moved.kkt.within(candidate.kkt.worst().max(problem.tolerance)) {
-            return Ok(moved);
-        }
-        self.next.reference = before;
         Ok(candidate)
     }
 }
