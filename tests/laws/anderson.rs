@@ -18,3 +18,10 @@ fn solves_an_affine_map_in_as_many_steps_as_unknowns() {
     let error = (image - DVector::from_row_slice(&q)).norm();
     assert!(error < 1e-12, "residual {error}");
 }
+
+#[test]
+fn an_overshoot_restarts_from_the_mean() {
+    let mut anderson = Anderson::new(Communicator::serial(), [1.0].into_iter());
+    assert_eq!(anderson.next(&[0.0], vec![1e-3]), vec![1e-3]);
+    assert_eq!(anderson.next(&[1.0], vec![3.0]), vec![2.0]);
+}

@@ -5,17 +5,23 @@ use nalgebra::{DMatrix, DVector};
 
 /// Anderson's mixing of the last few iterates (J. ACM 12, 1965; Walker and Ni, SIAM J. Numer.
 /// Anal. 49, 2011, type II), in a weighted norm.
+///
+/// The map of a contact law is piecewise affine, so mixing can overshoot when the active set changes. If the
+/// residual exceeds ten times the minimum so far, the method drops its history and continues from the mean of
+/// q and T(q). For a nonexpansive map this step does not move away from a fixed point.
 pub struct Anderson {
     /// Square roots of the norm's weights.
     weights: Vec<f64>,
     /// (T(q), T(q) − q) of the last iterates, oldest first.
     history: Vec<(Vec<f64>, Vec<f64>)>,
+    best: f64,
     /// The ranks among which q is divided.
     comm: Communicator,
 }
 
 /// The number of mixed iterates; more did not save iterations.
 const DEPTH: usize = 10;
+const OVERSHOOT: f64 = 10.0;
 /// Differences of iterates smaller than this, relative to the largest, are rounding.
 const RANK: f64 = 1e-10;
 /// Nearly equal residuals (a free body that drifts towards its foundation) would be extrapolated too far.
@@ -26,25 +32,40 @@ impl Anderson {
     /// The norm is (Σ w_i q_i²)^½ over all ranks.
     pub fn new(comm: Communicator, weights: impl Iterator<Item = f64>) -> Self {
         let weights = weights.map(f64::sqrt).collect();
-        Self { weights, history: Vec::new(), comm }
+        Self { weights, history: Vec::new(), best: f64::INFINITY, comm }
     }
 
-    /// The next iterate from `q` and its image T(q): the image minus the combination of differences that minimises
-    /// the residual.
+    /// The next iterate from `q` and its image T(q).
     pub fn next(&mut self, q: &[f64], image: Vec<f64>) -> Vec<f64> {
         let residual: Vec<f64> = image.iter().zip(q).map(|(t, q)| t - q).collect();
-        let (mut next, w) = (image.clone(), &self.weights);
-        let target = DVector::from_fn(w.len(), |i, _| residual[i] * w[i]);
+        let norm = self.norm(&residual);
+        if norm.is_nan() || norm > OVERSHOOT * self.best {
+            self.history.clear();
+            self.best = norm;
+            return image.iter().zip(q).map(|(t, q)| 0.5 * (t + q)).collect();
+        }
+        self.best = self.best.min(norm);
         self.history.push((image, residual));
         if self.history.len() > DEPTH + 1 {
             self.history.remove(0);
         }
-        if self.history.len() == 1 {
+        self.mix()
+    }
+
+    /// T(q_k) minus the combination of differences that minimises the residual.
+    fn mix(&self) -> Vec<f64> {
+        let Some(((image, residual), earlier)) = self.history.split_last() else {
+            return Vec::new();
+        };
+        let mut next = image.clone();
+        if earlier.is_empty() {
             return next;
         }
-        let differences = DMatrix::from_fn(w.len(), self.history.len() - 1, |i, j| {
+        let w = &self.weights;
+        let differences = DMatrix::from_fn(w.len(), earlier.len(), |i, j| {
             (self.history[j + 1].1[i] - self.history[j].1[i]) * w[i]
         });
+        let target = DVector::from_fn(w.len(), |i, _| residual[i] * w[i]);
         let (differences, target) = self.condensed(differences, target);
         let svd = differences.svd(true, true);
         let cut = RANK * svd.singular_values.max();
@@ -78,5 +99,10 @@ impl Anderson {
         )
         .transpose();
         (all.columns(0, columns - 1).into_owned(), all.column(columns - 1).into_owned())
+    }
+
+    fn norm(&self, v: &[f64]) -> f64 {
+        let squares = v.iter().zip(&self.weights).map(|(v, w)| (v * w).powi(2)).sum::<f64>();
+        self.comm.total(squares).sqrt()
     }
 }
