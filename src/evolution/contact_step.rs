@@ -4,6 +4,16 @@
 //!
 //! The unknowns c are the displacements in the nodal bases, in which every condition concerns one unknown. They are
 //! measured from a rigid [`Reference`] motion.
+//!
+//! - In: the time, the nodal damage and the load case there; the state of the last accepted step.
+//! - Out: a [`Step`] whose KKT residuals the certificate has found within the tolerance, or a [`RunError`] that names
+//!   the step and its reason.
+//! - Callers: the loop over the steps in `evolution`, which then accepts the step or tries a shorter one.
+//!
+//! The way of one step: [`ContactStep::solve`] lets the chosen solver try, then perhaps the rescuer (`rescue`). A try
+//! starts from the extrapolated accepted steps (`start`), solves (`minimisation`), has the answer certified
+//! (`certificate`), and repeats from a moved reference or to a smaller tolerance where rounding is the reason
+//! (`attempts`). Of many answers it returns the one of least displacement (`one_of_many`).
 
 mod accuracy;
 mod attempts;
