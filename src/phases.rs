@@ -5,8 +5,8 @@ use std::{cell::RefCell, collections::BTreeMap, time::Instant};
 /// The measurements of one phase.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Phase {
-    /// The number of calls.
-    pub calls: usize,
+    /// The number of calls; a forward and a backward solve alone are half a call each.
+    pub calls: f64,
     /// The wall time of all calls, s.
     pub seconds: f64,
     /// The bytes that all calls moved between memory and processor; 0 if not known.
@@ -21,18 +21,23 @@ pub struct Phases(RefCell<BTreeMap<&'static str, Phase>>);
 impl Phases {
     /// Runs `work` and adds its wall time to the phase `name`.
     pub fn time<R>(&self, name: &'static str, work: impl FnOnce() -> R) -> R {
-        self.time_moving(name, 0.0, work)
+        self.time_moving(name, (1.0, 0.0), work)
     }
 
-    /// As [`Self::time`], for work that moves `bytes`. Every array that the work reads or writes counts once
-    /// per call.
-    pub fn time_moving<R>(&self, name: &'static str, bytes: f64, work: impl FnOnce() -> R) -> R {
+    /// As [`Self::time`], for work that is this part of a call and moves these bytes. Every array that the work reads or
+    /// writes counts once per call.
+    pub fn time_moving<R>(
+        &self,
+        name: &'static str,
+        (call, bytes): (f64, f64),
+        work: impl FnOnce() -> R,
+    ) -> R {
         let started = Instant::now();
         let result = work();
         let seconds = started.elapsed().as_secs_f64();
         let mut phases = self.0.borrow_mut();
         let phase = phases.entry(name).or_default();
-        phase.calls += 1;
+        phase.calls += call;
         phase.seconds += seconds;
         phase.bytes += bytes;
         result

@@ -42,22 +42,22 @@ fn rows(phases: &Phases, whole: &str, seconds: f64) -> Vec<(&'static str, Phase)
 /// A row of the table with its titles. Cells without a measurement are empty.
 fn cells(name: String, phase: Phase, wall: f64) -> [(&'static str, String); 7] {
     let Phase { calls, seconds, bytes } = phase;
-    let if_called = |text: String| if calls > 0 { text } else { String::new() };
+    let if_called = |text: String| if calls > 0.0 { text } else { String::new() };
     let if_moved = |text: String| if bytes > 0.0 { text } else { String::new() };
     [
         ("phase", name),
         ("calls", if_called(calls.to_string())),
         ("seconds", format!("{seconds:.3}")),
         ("share", format!("{:.1} %", 100.0 * seconds / wall)),
-        ("ms per call", if_called(format!("{:.3}", 1e3 * seconds / calls as f64))),
-        ("MB per call", if_moved(format!("{:.1}", 1e-6 * bytes / calls as f64))),
+        ("ms per call", if_called(format!("{:.3}", 1e3 * seconds / calls))),
+        ("MB per call", if_moved(format!("{:.1}", 1e-6 * bytes / calls))),
         ("GB/s", if_moved(format!("{:.1}", 1e-9 * bytes / seconds))),
     ]
 }
 
 /// The share of the necessary phases in `stepping`, the seconds of `steps` steps, and the peak memory.
 pub fn remarks(phases: &Phases, steps: usize, stepping: f64) -> Vec<String> {
-    let mean = |name: &&str| phases.get(name).map(|p| 1e3 * p.seconds / p.calls.max(1) as f64);
+    let mean = |name: &&str| phases.get(name).map(|p| 1e3 * p.seconds / p.calls.max(1.0));
     let unavoidable: f64 = UNAVOIDABLE.iter().filter_map(mean).sum();
     let step = 1e3 * stepping / steps as f64;
     let share = (steps > 0).then(|| {

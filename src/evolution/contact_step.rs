@@ -158,7 +158,7 @@ impl<'a> ContactStep<'a> {
         if comm.any(zeta_at_points != self.zeta_at_points) {
             let (body, bases) = (&problem.body, &problem.constraints.bases);
             let bytes = self.stiffness.bytes_per_refill(body);
-            phases.time_moving("stiffness refill", bytes, || {
+            phases.time_moving("stiffness refill", (1.0, bytes), || {
                 self.stiffness.refill(body, &problem.elasticity, bases, &zeta_at_points)
             })?;
             self.zeta_at_points = zeta_at_points;

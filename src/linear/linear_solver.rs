@@ -172,7 +172,11 @@ impl LinearSolver {
     pub fn prepare(&mut self, system: LinearSystem, limit: f64) -> Result<usize, PetscError> {
         let due = self.factor.iteration_limit(self.asked(limit)).is_none();
         if due {
-            system.book(|phase_names| phase_names.factorisation, 0.0, || self.factorise(system))?;
+            system.book(
+                |phase_names| phase_names.factorisation,
+                (1.0, 0.0),
+                || self.factorise(system),
+            )?;
         }
         Ok(usize::from(due))
     }
@@ -189,7 +193,7 @@ impl LinearSolver {
         let (bytes, residual) = (0.5 * self.factor.bytes_per_application(), &self.residual);
         let factor = &mut self.factor;
         let name = |phase_names: &PhaseNames| phase_names.triangular_solves;
-        system.book(name, bytes, || factor.condense(residual)).map(Some)
+        system.book(name, (0.5, bytes), || factor.condense(residual)).map(Some)
     }
 
     /// Back substitution: `x` ← `x` + d from the last solution for the condensed unknowns. If no prescribed
@@ -205,7 +209,7 @@ impl LinearSolver {
     ) -> Result<(), PetscError> {
         let (bytes, d) = (0.5 * self.factor.bytes_per_application(), &mut self.expanded);
         let expand = || self.factor.expand(d);
-        system.book(|phase_names| phase_names.triangular_solves, bytes, expand)?;
+        system.book(|phase_names| phase_names.triangular_solves, (0.5, bytes), expand)?;
         self.prepared = !moved;
         if moved {
             self.iterations += 1;
@@ -241,7 +245,7 @@ impl LinearSolver {
             report.factorisations += 1;
             if system.book(
                 |phase_names| phase_names.factorisation,
-                0.0,
+                (1.0, 0.0),
                 || self.factorise(system),
             )? {
                 self.iterate(system, x, (limit, None), &mut report)?;
@@ -334,6 +338,6 @@ impl KeptPreconditioner for Booked<'_> {
         }
         let bytes = self.factor.bytes_per_application();
         let apply = || self.factor.apply(r, z);
-        self.system.book(|phase_names| phase_names.triangular_solves, bytes, apply)
+        self.system.book(|phase_names| phase_names.triangular_solves, (1.0, bytes), apply)
     }
 }

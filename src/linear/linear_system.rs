@@ -43,18 +43,18 @@ impl<'a> LinearSystem<'a> {
     /// `y` ← A `x`.
     pub(super) fn multiply(self, x: &Vector, y: &mut Vector) -> Result<(), PetscError> {
         let bytes = self.matrix.bytes_per_product();
-        self.book(|phase_names| phase_names.product, bytes, || self.matrix.multiply(x, y))
+        self.book(|phase_names| phase_names.product, (1.0, bytes), || self.matrix.multiply(x, y))
     }
 
-    /// Does `work`, which reads and writes `bytes`, and books its time under a name.
+    /// Does `work`, which is this part of a call and reads and writes these bytes, and books its time under a name.
     pub(super) fn book<R>(
         self,
         name: impl FnOnce(&PhaseNames) -> &'static str,
-        bytes: f64,
+        moved: (f64, f64),
         work: impl FnOnce() -> R,
     ) -> R {
         match self.phase_names {
-            Some(phase_names) => phase_names.phases.time_moving(name(&phase_names), bytes, work),
+            Some(phase_names) => phase_names.phases.time_moving(name(&phase_names), moved, work),
             None => work(),
         }
     }

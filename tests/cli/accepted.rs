@@ -271,6 +271,22 @@ fn profile() {
     assert!(!test_directory.run(&[]).out.contains("GB/s"), "only when asked for");
 }
 
+/// An iteration is a pair of triangular solves: the table counts as many as `history.csv`.
+#[test]
+fn the_profile_counts_the_pairs_of_triangular_solves() {
+    let test_directory = TestDirectory::new();
+    for mesh in [&[][..], &["--set", "boundary.top.traction=[0, '-1 - sin(6*t)']"]] {
+        let said = test_directory.run(&[mesh, &["--profile"]].concat());
+        let line =
+            said.out.lines().map(str::trim).find(|line| line.starts_with("triangular solves"));
+        let calls = line.and_then(|line| line.split_whitespace().nth(2)).expect("calls").to_owned();
+        let (names, rows) = test_directory.history("out/scene");
+        let column = names.iter().position(|name| name == "linear_iterations").unwrap();
+        let counted: f64 = rows.iter().map(|row| row[column]).sum();
+        assert_eq!(calls, counted.to_string(), "{}", said.out);
+    }
+}
+
 #[test]
 fn a_process_alone_needs_no_directory_of_temporary_files() {
     // Open MPI's is common to all processes of a user, who would make and remove it at the same time.

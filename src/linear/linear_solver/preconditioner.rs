@@ -120,7 +120,7 @@ impl LinearSolver {
     /// Is there a preconditioner for the system? Prescribes the unknowns of the system in a condensed factor.
     pub(super) fn is_ready(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
         let prescribe = || self.prescribe(system.prescribed.unwrap_or(&[]));
-        system.book(|phase_names| phase_names.prescription, 0.0, prescribe)
+        system.book(|phase_names| phase_names.prescription, (1.0, 0.0), prescribe)
     }
 
     /// Makes the preconditioner of a checkpoint again.
