@@ -6,7 +6,7 @@ use signorini::{
     evolution::{Outcome, RunError, StepRecord, Stop, percent},
     output::terminal::{Progress, say, with_bar},
     problem::Collapse,
-    scene::{Scheme, Stepping, TimeGrid, Units, rounded},
+    scene::{Probe, Scheme, Stepping, TimeGrid, Units, rounded},
 };
 use std::{
     collections::BTreeMap,
@@ -122,6 +122,7 @@ pub fn conclusion(
         lines.push(row("", format!("length {along} {length}, largest pressure {largest}")));
     }
     lines.extend(supports(task, quantities, &shown));
+    lines.extend(probes(task, quantities, &shown));
     if let Some(outcome) = outcome {
         let names = ["errors", "", "", ""].into_iter();
         let errors = names.zip(outcome.errors.lines(outcome.stopped.as_ref()));
@@ -210,6 +211,27 @@ fn supports(task: &Task, quantities: &[(String, f64)], shown: &Shown) -> Vec<Str
         row("support", format!("{name}: {resultant}, moment {moment} {force}"))
     };
     task.problem.supports.names.iter().zip(quantities.chunks_exact(3)).map(line).collect()
+}
+
+/// Per probe: a line with its displacement, von Mises stress and damage, and their error bars.
+fn probes(task: &Task, quantities: &[(String, f64)], shown: &Shown) -> Vec<String> {
+    let scene = task.problem.scene();
+    let Units { length, stress, .. } = &scene.units;
+    let line = |probe: &Probe| {
+        let figure = |part: &str| {
+            let name = format!("{}.{part}", probe.name);
+            let value = quantities.iter().find(|(other, _)| *other == name);
+            value.map_or_else(String::new, |(_, value)| shown.figure(*value, &name, 4))
+        };
+        let [x, y, von_mises] = ["u_x", "u_y", "von_mises"].map(figure);
+        let zeta = match scene.damage {
+            Some(_) => format!(", ζ {}", figure("zeta")),
+            None => String::new(),
+        };
+        let values = format!("u ({x}, {y}) {length}, von Mises {von_mises} {stress}{zeta}");
+        row("probe", format!("{}: {values}", probe.name))
+    };
+    scene.probes.iter().map(line).collect()
 }
 
 pub fn row(name: &str, value: String) -> String {
