@@ -30,8 +30,13 @@ pub(super) fn change_of_u(coarse: &FewStepRun, fine: &FewStepRun) -> f64 {
 }
 
 /// The error bars of the figures on the mesh of `coarse`: `factor` times their changes. Extremes move from place to
-/// place, so only their change at the end counts.
-pub(super) fn bars(coarse: &FewStepRun, fine: &FewStepRun, factor: f64) -> Vec<Bar> {
+/// place, so only their change at the end counts; those that `grows` names have no bars.
+pub(super) fn bars(
+    coarse: &FewStepRun,
+    fine: &FewStepRun,
+    factor: f64,
+    grows: &[String],
+) -> Vec<Bar> {
     let end = coarse.outcome.last.state.time;
     let times: Vec<f64> = (0..=INSTANTS).map(|i| end * i as f64 / INSTANTS as f64).collect();
     let changes: Vec<Vec<f64>> = (times.iter())
@@ -48,7 +53,8 @@ pub(super) fn bars(coarse: &FewStepRun, fine: &FewStepRun, factor: f64) -> Vec<B
     let [before, now] = [coarse, fine].map(|run| run.extremes().values(run.problem));
     errors.extend(now.iter().zip(before).map(|(now, before)| (now - before).abs()));
     errors.iter_mut().for_each(|error| *error *= factor);
-    let mut bars = coarse.problem.bars(&errors, &fine.scales());
+    let mut bars = coarse.problem.bars(&errors, &fine.scales(grows));
+    bars.retain(|bar| !grows.contains(&bar.name));
     // η².
     let square = coarse.relative().0.powi(2);
     for bar in &mut bars {

@@ -101,10 +101,16 @@ impl<'a> FewStepRun<'a> {
         [self.history.end.2, self.history.energy]
     }
 
-    /// The scales of the figures.
-    pub(super) fn scales(&self) -> Vec<f64> {
+    /// The scales of the figures. An extreme that `grows` is no scale of the others.
+    pub(super) fn scales(&self, grows: &[String]) -> Vec<f64> {
         let History { sizes, sizes_of_extremes, energy, .. } = &self.history;
-        self.problem.figure_scales(&[&sizes[..], sizes_of_extremes].concat(), *energy)
+        let names = self.problem.extremes();
+        let of_extremes = names
+            .iter()
+            .zip(sizes_of_extremes)
+            .map(|(name, &size)| if grows.iter().any(|grown| grown == name) { 0.0 } else { size });
+        let sizes = Vec::from_iter(sizes.iter().copied().chain(of_extremes));
+        self.problem.figure_scales(&sizes, *energy)
     }
 
     /// The figures at `time`, s, affine between the steps, except the extremes.

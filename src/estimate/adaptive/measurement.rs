@@ -168,8 +168,7 @@ impl Measurement {
         let grows = named.iter().zip(extremes.grow(|at| size_at(mesh, at)));
         let grows = grows.filter(|(extreme, grows)| *grows || extreme.singular.is_some());
         self.grows = grows.map(|(extreme, _)| extreme.name.to_owned()).collect();
-        self.bars = bars(coarse, fine, factor);
-        self.bars.retain(|bar| !self.grows.contains(&bar.name));
+        self.bars = bars(coarse, fine, factor, &self.grows);
     }
 
     /// The names of the extremes.
