@@ -176,7 +176,7 @@ pub(super) fn accuracy_note(task: &Task, outcome: Option<&Outcome>) -> Option<St
     let missed = worst.filter(|(_, error)| *error > accuracy).map(|(name, error)| {
         let error = match percent(error) {
             _ if !error.is_finite() => "?".to_owned(),
-            same if same == percent(accuracy) => format!("{:.4} %", 100.0 * error),
+            same if same == percent(accuracy) => format!("{:.3} %", 100.0 * error),
             percent => percent,
         };
         format!("{name} is exact to {error} only")
