@@ -15,8 +15,7 @@ def draw_pressure(results, limits, figure=None):
     width = wide(max(7.2, min(3.8 * len(curves), 14.0)))
     figure = canvas((width, np.clip(0.64 * width, 3.4, 4.6)), figure)
     rows = figure.subplots(2, len(curves), squeeze=False, sharex="col", sharey="row",
-                           gridspec_kw={"height_ratios": (2.2, 1)})
-    figure.set_constrained_layout_pads(wspace=0.08)
+                           gridspec_kw={"height_ratios": (2.2, 1), "wspace": 0.08})
     factor, unit = stress_unit(limits.pressure, results.units)
     for curve, name, (above, below) in zip(curves, _names(curves), rows.T):
         s, label = along(curve.points, results.units)

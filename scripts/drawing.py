@@ -81,9 +81,12 @@ def panels_of(extent):
 
 
 def canvas(size, figure=None):
-    """An empty figure: a new one of `size`, inches, or `figure`, cleared in its own size."""
+    """An empty figure: a new one of `size`, inches; `figure`, cleared in its own size; or a part of the pages that
+    `figure` stands for."""
     if figure is None:
         return plt.figure(figsize=size)
+    if hasattr(figure, "panel"):
+        return figure.panel(*size)
     figure.clear()
     return figure
 
@@ -106,12 +109,16 @@ def headline(results, text):
 
 
 def wrap_titles(figure):
-    """Breaks the lines of titles that are wider than their axes, and of the title above all axes."""
+    """Breaks the lines of titles that are wider than their axes, and of the titles above all axes of a figure or
+    subfigure."""
     figure.get_layout_engine().execute(figure)
-    boxes = [axes.get_window_extent() for axes in figure.axes]
-    whole = max(box.x1 for box in boxes) - min(box.x0 for box in boxes)
-    titles = [(axes.title, box.width) for axes, box in zip(figure.axes, boxes)]
-    for title, room in [*titles, *([(figure._suptitle, whole)] if figure._suptitle else [])]:
+    titles = []
+    for part in figure.subfigs or [figure]:
+        boxes = [axes.get_window_extent() for axes in part.axes]
+        whole = max(box.x1 for box in boxes) - min(box.x0 for box in boxes)
+        titles += [(axes.title, box.width) for axes, box in zip(part.axes, boxes)]
+        titles += [(part._suptitle, whole)] if part._suptitle else []
+    for title, room in titles:
         width = title.get_window_extent().width
         if width > room:
             lines = title.get_text().split("\n")

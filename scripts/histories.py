@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.ticker import ScalarFormatter
 
 import drawing
-from drawing import BLUE, FAINT, RED, headline, wide
+from drawing import BLUE, FAINT, RED, canvas, headline, wide
 from results import ROUNDING, UNDAMAGED, ResultError
 
 
@@ -16,12 +16,13 @@ NAMES = {"time": "time t ({time})", "displacement_max": "largest displacement ({
          "work": "work of the loads ({work})"}
 
 
-def draw_damage_history(results, _limits=None):
+def draw_damage_history(results, _limits=None, figure=None):
     """Draws min ζ and mean ζ in time, and the time at which ζ reached ζ_*."""
     time, least = results.history.get("time"), results.history.get("zeta_min")
     if time is None or least is None or len(time) < 3 or np.nanmin(least) >= 1.0 - UNDAMAGED:
         return None
-    figure, axes = plt.subplots(figsize=(wide(6.4), max(2.8, 0.6 * wide(6.4))))
+    figure = canvas((wide(6.4), max(2.8, 0.6 * wide(6.4))), figure)
+    axes = figure.add_subplot()
     axes.plot(time, results.history["zeta_mean"], color=FAINT, linewidth=1.4, label="mean ζ")
     axes.plot(time, least, color=BLUE, linewidth=1.8, label="min ζ")
     stopped = results.summary.get("stopped_at")
@@ -39,7 +40,7 @@ def draw_damage_history(results, _limits=None):
     return figure
 
 
-def draw_force_displacement(results, _limits=None):
+def draw_force_displacement(results, _limits=None, figure=None):
     """Draws the force of each support, its component along the direction that it has where it is largest, over the
     column ABSCISSA. By default this is the largest displacement if it grows in all steps, else the time."""
     history = results.history
@@ -54,7 +55,8 @@ def draw_force_displacement(results, _limits=None):
     # Over displacements that start near their end the curves would be short.
     grows = (np.diff(reached) >= -ROUNDING * reached.max()).all() and reached[0] < 0.5 * reached[-1]
     abscissa = drawing.ABSCISSA or ("displacement_max" if grows else "time")
-    figure, axes = plt.subplots(figsize=(wide(6.4), max(2.8, 0.6 * wide(6.4))))
+    figure = canvas((wide(6.4), max(2.8, 0.6 * wide(6.4))), figure)
+    axes = figure.add_subplot()
     shown = {name: force for name, force in forces.items() if np.nanmax(force) > ROUNDING * largest}
     # Dashes show a curve under another one.
     for (name, force), dashes in zip(shown.items(), cycle(("-", (0, (4, 3)), (0, (1, 2))))):
@@ -65,6 +67,7 @@ def draw_force_displacement(results, _limits=None):
         axes.axhline(0.0, color=FAINT, linewidth=0.7)
     else:
         axes.set_ylim(bottom=0.0)
+    axes.locator_params("x", nbins=5)
     axes.set_xlabel(NAMES.get(abscissa, abscissa).format(**results.units))
     axes.set_ylabel("force on the support ({line})".format(**results.units))
     axes.set_title(headline(results, ""))

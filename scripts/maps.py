@@ -15,7 +15,7 @@ from drawing import (
 ARROWS = 30
 
 
-def draw_deformed(results, limits):
+def draw_deformed(results, limits, figure=None):
     """The deformed mesh over the initial outline and the foundation (paper, Figures 5 and 8).
 
     The obstacle is drawn opposite the nodes of Γ_C. As these slide, the obstacle seems to slide with them.
@@ -24,8 +24,8 @@ def draw_deformed(results, limits):
     moved = results.nodes + limits.factor * results.displacement
     extent = np.ptp(limits.box, axis=0)
     width, height = map_size(extent, wide(7.2))
-    figure, axes = plt.subplots(figsize=(width, height + 0.4))
-
+    figure = canvas((width, height + 0.4), figure)
+    axes = figure.add_subplot()
     mesh = Triangulation(*pieces.at_points(moved).T, pieces.triangles)
     draw_values(axes, mesh, np.zeros(len(mesh.x)), ListedColormap(["#dfe9f3"]), 0.0, 0.0)
     _draw_sides(axes, pieces, moved, width / extent[0])
@@ -70,22 +70,20 @@ def _draw_fall(axes, results, moved):
                     scale_units="xy", scale=1.0, width=0.004, zorder=4)
 
 
-def draw_stress_and_damage(results, limits):
+def draw_stress_and_damage(results, limits, figure=None):
     """Von Mises stress beside the damage field, on the initial configuration (Figures 6 and 9).
 
     For an undamaged body only the stress is drawn.
     """
     extent = np.ptp(results.nodes, axis=0)
+    size, shape = panels_of(extent)
     if not limits.damaged:
         width, height = map_size(extent, wide(6.9) - 0.9)
-        figure, left = plt.subplots(figsize=(width + 0.9, height + 0.5))
-    else:
-        size, shape = panels_of(extent)
-        figure, (left, right) = plt.subplots(*shape, figsize=size)
-    mesh = mesh_of(results, results.nodes)
-    left.set_title(_paint_stress(left, mesh, results, limits))
-    if limits.damaged:
-        right.set_title(_paint_damage(right, mesh, results, limits))
+        size, shape = (width + 0.9, height + 0.5), (1, 1)
+    figure, mesh = canvas(size, figure), mesh_of(results, results.nodes)
+    panels = figure.subplots(*shape, squeeze=False).flat
+    for axes, paint in zip(panels, (_paint_stress, _paint_damage)):
+        axes.set_title(paint(axes, mesh, results, limits))
     for axes in figure.axes:
         draw_outline(axes, results.nodes, results, color=INK, linewidth=0.7)
         draw_foundation(axes, results)

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """Writes a run's report.html: one page with its pictures, a slider over its frames, histories,
-error budget, scene and timings, which needs no other file and no network.
+error budget, scene and timings, which needs no other file and no network. With --pdf also report.pdf.
 
     signorini report out/lshape
 """
@@ -11,15 +11,14 @@ import html
 import io
 import json
 import multiprocessing
-import shutil
-import subprocess
 import sys
 from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
 from functools import partial
 from string import Template
 
 # This module comes first: it checks the memory before numpy is imported.
-from drawing import np, plt, wrap_titles
+import drawing
+from drawing import RED, headline, np, plt, wrap_titles
 from bars import barred, bars, three_digits
 from contact_pressure import draw_evolution, draw_pressure
 from histories import draw_damage_history, draw_force_displacement, draw_histories
@@ -28,11 +27,15 @@ from maps import draw_deformed, draw_state, draw_stress_and_damage
 from reading import evenly, read_results, states
 from principal import draw_principal
 from report_page import PAGE, SLIDER
-from results import ResultError, telling
+from report_pdf import FULL, HIGHEST, SPACE, write_pages
+from results import telling
 from setting import draw_setting
+from table import text_of
 
 # The largest number of frames of the slider.
 FRAMES = 10
+# The limits of the model, for the head of the report.
+MODEL = "Limits of the model: two dimensions, small strains, no inertia; one body, a rigid foundation without friction."
 # What the processes draw, by name.
 TASKS = {}
 # Values of summary.json for the last state: key, name, kind of unit.
@@ -84,15 +87,15 @@ def pictures(results, everything):
     """Functions that draw the pictures of the page, by name."""
     limits = limits_of([results])
     return {
-        "histories": lambda: draw_histories(results),
-        "stress and damage": lambda: draw_stress_and_damage(results, limits),
-        "principal stresses": lambda: draw_principal(results, limits),
+        "histories": partial(draw_histories, results),
+        "stress and damage": partial(draw_stress_and_damage, results, limits),
+        "principal stresses": partial(draw_principal, results, limits),
         "evolution of contact": lambda: draw_evolution(everything, limits_of(everything)),
-        "deformed mesh": lambda: draw_deformed(results, limits),
-        "contact pressure and gap": lambda: draw_pressure(results, limits),
-        "the setting": lambda: draw_setting(results, limits),
-        "forces on the supports": lambda: draw_force_displacement(results),
-        "least and mean ζ": lambda: draw_damage_history(results),
+        "deformed mesh": partial(draw_deformed, results, limits),
+        "contact pressure and gap": partial(draw_pressure, results, limits),
+        "the setting": partial(draw_setting, results, limits),
+        "forces on the supports": partial(draw_force_displacement, results, limits),
+        "least and mean ζ": partial(draw_damage_history, results, limits),
     }
 
 
@@ -101,15 +104,15 @@ def element(name, data):
     return data and f'<img alt="{name}" src="data:image/png;base64,{data}">'
 
 
-def table(rows):
+def table(rows, head=()):
     """A table of rows of cells; numbers are aligned to the right."""
     def cell(value):
-        if isinstance(value, (int, float)) and not isinstance(value, bool):
-            return f'<td class="number">{value:.6g}</td>'
-        return f"<td>{value}</td>"
+        kind = ' class="number"' if isinstance(value, (int, float)) and not isinstance(value, bool) else ""
+        return f"<td{kind}>{html.escape(text_of(value))}</td>"
 
-    rows = (f"<tr>{''.join(map(cell, row))}</tr>" for row in rows)
-    return f"<table>{''.join(rows)}</table>"
+    lines = [map("<th>{}</th>".format, head)] * bool(head) + [map(cell, row) for row in rows]
+    lines = "".join(f"<tr>{''.join(line)}</tr>" for line in lines)
+    return f"<table>{lines}</table>"
 
 
 def frame(state, limits):
@@ -135,11 +138,10 @@ def facts(results):
         rounded = three_digits(value) if stopped and isinstance(value, float) else value
         return barred(value, errors.get(name)) or rounded
 
-    rows = [(name, text(key, summary[key]), html.escape(units.get(kind, "")))
+    rows = [(name, text(key, summary[key]), units.get(kind, ""))
             for key, name, kind in FACTS if summary.get(key) is not None]
-    named = summary.get("quantities", {})
-    return table(rows + [(html.escape(name), text(name, value), html.escape(unit_of(name, units)))
-                         for name, value in named.items()])
+    return rows + [(name, text(name, value), unit_of(name, units))
+                   for name, value in summary.get("quantities", {}).items()]
 
 
 def unit_of(quantity, units):
@@ -151,15 +153,16 @@ def unit_of(quantity, units):
 def governing(everything, units):
     """The extreme values of the run, with their places and times."""
     kinds = (
-        ("largest tension σ₁", "stress", lambda state: state.principal[:, 0], 1.0),
-        ("largest compression −σ₂", "stress", lambda state: -state.principal[:, 1], 1.0),
-        ("largest von Mises stress", "stress", lambda state: state.von_mises, 1.0),
-        ("largest contact pressure", "stress", lambda state: state.pressure, 1.0),
-        ("largest displacement", "length", lambda state: np.linalg.norm(state.displacement, axis=1), 1.0),
-        ("least ζ", "", lambda state: state.zeta, -1.0),
+        ("largest tension σ₁", "principal_max", "stress", lambda state: state.principal[:, 0], 1.0),
+        ("largest compression −σ₂", "principal_min", "stress", lambda state: -state.principal[:, 1], 1.0),
+        ("largest von Mises stress", "von_mises_max", "stress", lambda state: state.von_mises, 1.0),
+        ("largest contact pressure", "pressure_max", "stress", lambda state: state.pressure, 1.0),
+        ("largest displacement", "displacement_max", "length",
+         lambda state: np.linalg.norm(state.displacement, axis=1), 1.0),
+        ("least ζ", "zeta_min", "", lambda state: state.zeta, -1.0),
     )
     rows = []
-    for name, kind, of, sign in kinds:
+    for name, key, kind, of, sign in kinds:
         found = [(sign * (sign * of(state)).max(), state, (sign * of(state)).argmax()) for state in everything]
         value, state, node = max(found, key=lambda one: sign * one[0])
         if value == (1.0 if name == "least ζ" else 0.0):
@@ -167,11 +170,9 @@ def governing(everything, units):
         x, y = state.nodes[node]
         largest = (state.summary.get("extremes") or {}).get("von_mises_max") or {}
         is_there = kind == "stress" and state.singular and np.allclose(largest["at"], (x, y), atol=1e-9 * state.size)
-        singular = f"singular: {html.escape(state.singular)}" if is_there else ""
-        rows.append((name, f"{value:.4g}", html.escape(units.get(kind, "")), f"({x:.4g}, {y:.4g})",
-                     f"{state.time:g} {html.escape(units['time'])}", singular))
-    head = "<tr><th></th><th>value</th><th></th><th>at</th><th>time</th><th></th></tr>"
-    return table(rows).replace("<table>", f"<table>{head}")
+        rows.append((name, state.barred(key, value) or f"{value:.4g}", units.get(kind, ""), f"({x:.4g}, {y:.4g})",
+                     f"{state.time:g} {units['time']}", f"singular: {state.singular}" if is_there else ""))
+    return rows
 
 
 def body(results):
@@ -179,68 +180,71 @@ def body(results):
     units, scene = results.units, results.scene
     low, high = results.nodes.min(axis=0), results.nodes.max(axis=0)
     material = scene.get("material", {})
-    rows = [("dimensions", f"{high[0] - low[0]:.4g} × {high[1] - low[1]:.4g} {html.escape(units['length'])}"),
-            ("plane", html.escape(str(material.get("plane", ""))))]
+    rows = [("dimensions", f"{high[0] - low[0]:.4g} × {high[1] - low[1]:.4g} {units['length']}"),
+            ("plane", str(material.get("plane", "")))]
     surfaces = {name: {**material, **of} for name, of in material.items() if isinstance(of, dict)}
     for name, of in {"material": material, **surfaces}.items():
         words = [f"E = {of['young']:g} {units['stress']}", f"ν = {of['poisson']:g}"] if "young" in of else []
-        words += [f"ρ = {of['density']:g}"] if of.get("density") else []
-        rows.append((html.escape(name), html.escape(", ".join(words))))
+        rows.append((name, ", ".join(words + ([f"ρ = {of['density']:g}"] if of.get("density") else []))))
     quantities = results.summary.get("quantities", {})
     for name in dict.fromkeys(key.rpartition(".")[0] for key in quantities if key.endswith(".moment")):
         x, y, moment = (quantities[f"{name}.{part}"] for part in ("force_x", "force_y", "moment"))
-        rows.append((f"on the body at {html.escape(name)}", html.escape(
-            f"force ({x:.5g}, {y:.5g}) {units['line']}, moment about (0, 0) {moment:.5g} {units['force']}")))
-    return table(rows)
+        rows.append((f"on the body at {name}", f"force ({x:.5g}, {y:.5g}) {units['line']}, "
+                     f"moment about (0, 0) {moment:.5g} {units['force']}"))
+    return rows
 
 
 def timings(summary):
     """The phases of the run with bars, the longest first."""
     wall = summary.get("wall_seconds") or 1.0
     phases = sorted(summary.get("phases", {}).items(), key=lambda phase: -phase[1])
-    rows = [("all", wall, "s", "")]
-    for name, seconds in phases:
-        if seconds >= 1e-3 * wall:
-            bar = f'<td class="bar"><div style="width: {100 * seconds / wall:.1f}%"></div></td>'
-            rows.append((html.escape(name), float(f"{seconds:.3g}"), "s", bar))
-    return table(rows).replace("<td><td", "<td").replace("</td></td>", "</td>")
+    return [("all", wall, "s")] + [(name, float(f"{seconds:.3g}"), "s", round(40 * seconds / wall) * "■")
+                                   for name, seconds in phases if seconds >= 1e-3 * wall]
 
 
 def provenance(summary):
     """Version, date, machine and command line."""
     made = summary.get("provenance", {})
-    made = {**made, **made.get("machine", {})}
-    names = ("version", "date", "directory", "host", "processor", "cores")
-    rows = [(key, html.escape(str(made[key]))) for key in names if made.get(key)]
-    rows += [("command", f"<code>{html.escape(' '.join(made.get('command', [])))}</code>")]
-    return table(rows)
+    made = {**made, **made.get("machine", {}), "command": " ".join(made.get("command", []))}
+    names = ("version", "date", "directory", "host", "processor", "cores", "command")
+    return [(key, str(made[key])) for key in names if made.get(key)]
 
 
-def page(results, arguments):
+def head_of(results, arguments):
+    """Title, byline, overrides, and how the run ended."""
+    error = results.summary.get("error")
+    return (arguments.title or results.title, " · ".join(filter(None, (arguments.author, arguments.date))),
+            results.overrides and f"with {results.overrides}",
+            error and f"failed: {error}" or results.ending.replace("$_*$", "_*"))
+
+
+def errors_of(summary):
+    """The estimated relative errors."""
+    errors = {key: value for key, value in (summary.get("errors") or {}).items() if isinstance(value, float)}
+    return [(ERRORS.get(key, key), f"{100 * value:.2g} %") for key, value in errors.items()]
+
+
+def page(results, arguments, everything):
     """The text of the page."""
     summary = results.summary
     scene = results.folder / "scene.toml"
-    everything = states(results, evenly(results.frames, 400))
     chosen = [state for _, state in evenly([(state.time, state) for state in everything], FRAMES)]
     limits = limits_of(chosen)
     tasks = {state.time: partial(frame, state, limits) for state in chosen}
     named = pictures(results, everything)
     drawn = all_drawn({name: lambda draw=draw: encoded(draw()) for name, draw in named.items()} | tasks)
     elements = {name: element(name, drawn[name]) for name in named}
-    errors = summary.get("errors") or {}
-    percent = {key: f"{100 * value:.2g} %" for key, value in errors.items() if key != "figures" and value is not None}
     notes = [f"<li>{html.escape(note)}</li>" for note in summary.get("notes", [])]
-    error = summary.get("error")
-    ending = error and f"failed: {error}" or results.ending.replace("$_*$", "_*")
-    with_overrides = results.overrides and f"with {results.overrides}"
+    title, byline, subtitle, ending = map(html.escape, head_of(results, arguments))
     return Template(PAGE).substitute(
-        title=html.escape(arguments.title or results.title),
-        byline=html.escape(" · ".join(filter(None, (arguments.author, arguments.date)))),
-        governing=governing(everything, results.units),
-        body=body(results),
-        subtitle=html.escape(with_overrides),
-        ending=html.escape(ending),
-        facts=facts(results),
+        title=title,
+        byline=byline,
+        model=MODEL,
+        governing=table(governing(everything, results.units), head=("", "value", "", "at", "time", "")),
+        body=table(body(results)),
+        subtitle=subtitle,
+        ending=ending,
+        facts=table(facts(results)),
         setting=elements["the setting"],
         slider=slider([drawn[time] for time in tasks]),
         pictures="".join(elements[name] for name in (
@@ -248,27 +252,43 @@ def page(results, arguments):
         histories="".join(elements[name] for name in (
             "least and mean ζ", "forces on the supports", "evolution of contact", "histories"))
         or "One static solve.",
-        errors=table((ERRORS.get(key, key), value) for key, value in percent.items()),
+        errors=table(errors_of(summary)),
         residuals=table((key, f"{value:.1e}") for key, value in (summary.get("kkt") or {}).items()),
         notes=f"<p>Notes:</p><ul>{''.join(notes)}</ul>" if notes else "",
         scene=html.escape(scene.read_text(encoding="utf-8") if scene.exists() else "not kept"),
-        timings=timings(summary),
-        provenance=provenance(summary),
+        timings=table(timings(summary)),
+        provenance=table(provenance(summary)),
     )
 
 
-def printed(page):
-    """Prints the page to a PDF on A4 by Chromium; returns its path."""
-    browser = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if browser is None:
-        raise ResultError("--pdf needs Chromium (Debian: apt install chromium); or print the page yourself")
-    path = page.with_suffix(".pdf")
-    command = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--no-pdf-header-footer",
-               f"--print-to-pdf={path.resolve()}", page.resolve().as_uri()]
-    ended = subprocess.run(command, capture_output=True, text=True)
-    if ended.returncode:
-        raise ResultError(f"{browser} could not print {page}: {ended.stderr.strip().splitlines()[-1:]}")
-    return path
+def write_pdf(path, results, arguments, everything):
+    """Writes two pages: the setting and the governing values; maps and curves."""
+    title, byline, subtitle, ending = head_of(results, arguments)
+    draw, summary = pictures(results, everything), results.summary
+
+    def fill(pages):
+        pages.text(title, size=14, weight="bold")
+        pages.text("\n".join(filter(None, (byline, subtitle, MODEL))))
+        pages.text(ending, color=RED, weight="bold")
+        pages.table("Last state", facts(results))
+        drawing.set_width(pages.room)
+        draw["the setting"](figure=pages)
+        pages.table("Governing values", governing(everything, results.units))
+        pages.table("Body, materials, supports", body(results))
+        pages.table("Estimated relative errors", errors_of(summary))
+        pages.table("Made by", provenance(summary)[:-1])
+        pages.text("\n".join(f"Note: {note}" for note in summary.get("notes", [])))
+        pages.end()
+        pages.start(HIGHEST)
+        for name in ("deformed mesh", "contact pressure and gap", "stress and damage", "principal stresses",
+                     "forces on the supports", "least and mean ζ"):
+            drawing.set_width(FULL if "stress" in name else 0.5 * (FULL - SPACE))
+            draw[name](figure=pages)
+
+    try:
+        write_pages(path, headline(results, ""), fill)
+    finally:
+        drawing.WIDTH = None
 
 
 def main(prog=None):
@@ -276,8 +296,7 @@ def main(prog=None):
     parser = argparse.ArgumentParser(
         prog=prog, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", nargs="+", metavar="OUT", help="result folder")
-    parser.add_argument("--pdf", action="store_true", help=(
-        "also report.pdf, by Chromium (Debian: apt install chromium)"))
+    parser.add_argument("--pdf", action="store_true", help="also report.pdf: two pages with values, maps and curves")
     parser.add_argument("--title", help="default: that of the scene")
     parser.add_argument("--author", default="")
     parser.add_argument("--date", default="")
@@ -285,11 +304,13 @@ def main(prog=None):
     for folder in arguments.folders:
         with telling() as problems:
             results = read_results(folder)
+            everything = states(results, evenly(results.frames, 400))
             path = results.folder / "report.html"
-            path.write_text(page(results, arguments), encoding="utf-8")
+            path.write_text(page(results, arguments, everything), encoding="utf-8")
             print(path)
             if arguments.pdf:
-                print(printed(path))
+                write_pdf(path.with_suffix(".pdf"), results, arguments, everything)
+                print(path.with_suffix(".pdf"))
         failed |= bool(problems)
     return 2 if failed else 0
 

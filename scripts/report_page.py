@@ -21,8 +21,6 @@ PAGE = """<!DOCTYPE html>
            font-weight: normal; }
   td.number { text-align: right; font-variant-numeric: tabular-nums; }
   .facts td:nth-child(2) { text-align: right; font-variant-numeric: tabular-nums; }
-  td.bar { width: 16rem; }
-  td.bar div { background: #2f6db3; height: .7rem; margin-top: .4rem; }
   pre { background: #f4f6f8; padding: .8rem; overflow-x: auto; font-size: 13px; }
   .slider { display: flex; gap: .8rem; align-items: center; margin: .6rem 0; }
   .slider input { flex: 1; }
@@ -30,20 +28,7 @@ PAGE = """<!DOCTYPE html>
   th { border-bottom: 1px solid #d5dae0; color: #66707a; }
   @media (max-width: 480px) {
     .pair { grid-template-columns: minmax(0, 1fr); }
-    td.bar { width: 4rem; }
     table { display: block; overflow-x: auto; }
-    code { overflow-wrap: anywhere; }
-  }
-  @page { size: A4; margin: 18mm 15mm; }
-  @media print {
-    :root { font-size: 11px; }
-    body { max-width: none; padding: 0; }
-    .slider, .frames { display: none; }
-    .pair { grid-template-columns: 1fr 1fr; }
-    h2 { break-after: avoid; }
-    img, table, .pair { break-inside: avoid; }
-    img { max-height: 105mm; }
-    pre { white-space: pre-wrap; }
   }
 </style>
 </head>
@@ -52,6 +37,7 @@ PAGE = """<!DOCTYPE html>
 <p class="quiet">$byline</p>
 <p class="quiet">$subtitle</p>
 <p class="ending">$ending</p>
+<p>$model</p>
 <div class="pair"><div class="facts">$facts</div><div>$setting</div></div>
 <h2>Governing values</h2>
 $governing

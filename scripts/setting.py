@@ -4,15 +4,16 @@
 import textwrap
 from dataclasses import replace
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.colors import ListedColormap
-from matplotlib.patches import PathPatch
+from matplotlib.patches import Circle, PathPatch
 from matplotlib.path import Path
 from matplotlib.patheffects import withStroke, withTickedStroke
 from matplotlib.tri import Triangulation
 
-from drawing import BLUE, FAINT, GREEN, INK, RED, draw_foundation, draw_outline, frame, headline, map_size, wide
+from drawing import (
+    BLUE, FAINT, GREEN, INK, RED, canvas, draw_foundation, draw_outline, frame, headline, map_size, wide,
+)
 from expressions import evaluate
 from results import paths
 
@@ -24,7 +25,7 @@ MATERIALS = ("#edf1f5", "#f3e3c3", "#d5e8d4", "#e6d5ec", "#f7d4cd", "#cfe3f2")
 AWAY = 0.13
 
 
-def draw_setting(results, _limits):
+def draw_setting(results, _limits, figure=None):
     """The body with its boundaries named, tractions as arrows, supports, and the foundation.
 
     Clamps are hatched. Rollers mark boundaries with one prescribed component, and axes of symmetry. The legend
@@ -37,7 +38,8 @@ def draw_setting(results, _limits):
     curves = [(name, np.array(path)) for name, edges in boundaries.items()
               for path in paths([tuple(map(tuple, edge)) for edge in edges])]
     width, height = map_size(np.ptp(results.nodes, axis=0), wide(6.4))
-    figure, axes = plt.subplots(figsize=(width, height + 0.7 + 0.2 * len(conditions)))
+    figure = canvas((width, height + 0.7 + 0.2 * len(conditions)), figure)
+    axes = figure.add_subplot()
     # The body is on the left of its outlines, so the outlines of holes cut them out.
     outlines = Path.make_compound_path(*map(Path, results.outline(results.nodes)))
     if results.materials is None:
@@ -129,7 +131,7 @@ def _draw_support(axes, line, condition, size):
         points, normals = _samples(line, ROLLERS * size)
         radius = 0.35 * ROLLERS * size
         for point in points + radius * normals:
-            axes.add_patch(plt.Circle(point, radius, facecolor="white", edgecolor=BLUE, linewidth=0.9, zorder=1.8))
+            axes.add_patch(Circle(point, radius, facecolor="white", edgecolor=BLUE, linewidth=0.9, zorder=1.8))
         outer = points + 2.2 * radius * normals
         axes.plot(*outer.T, color=BLUE, linewidth=1.2, zorder=1.8)
         return outer

@@ -17,8 +17,11 @@ fn figures_and_a_report_are_drawn_far_from_the_scripts() {
     }
     assert_eq!(test_directory.say(&["figures", "nothing"]).code, Some(2));
 
-    assert_eq!(test_directory.say(&["report", "out/scene"]).code, Some(0));
+    assert_eq!(test_directory.say(&["report", "out/scene", "--pdf"]).code, Some(0));
+    let pdf = std::fs::read(test_directory.path("out/scene/report.pdf")).expect("a PDF");
+    assert!(pdf.starts_with(b"%PDF") && pdf.len() > 20_000);
     let page = test_directory.read("out/scene/report.html");
+    assert!(page.contains("small strains") && page.contains("without friction"), "no limits of the model");
     assert!(page.contains("data:image/png;base64,") && page.contains("[[boundary]]"));
     let outside = ["src=\"http", "href=", "<link", "@import", "$title"];
     assert!(outside.iter().all(|word| !page.contains(word)), "the page is not whole");
