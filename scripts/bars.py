@@ -1,4 +1,4 @@
-"""Figures with their error bars, `errors.figures` of summary.json, as text."""
+"""Figures with their error bars as text."""
 
 from decimal import ROUND_CEILING, Decimal
 
@@ -6,12 +6,6 @@ from decimal import ROUND_CEILING, Decimal
 ROUNDING = 1e-15
 # The smallest bar that is shown, over its figure.
 LEAST_BAR = 1e-6
-
-
-def bars(summary):
-    """The error bars of a run by the names of figures; empty where none were estimated."""
-    figures = (summary.get("errors") or {}).get("figures") or {}
-    return {name: bar for name, bar in figures.items() if bar is not None}
 
 
 def short(number):

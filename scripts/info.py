@@ -10,7 +10,8 @@ import re
 import sys
 from pathlib import Path
 
-from bars import barred, bars
+from bars import barred
+from signorini_summaries import bars
 
 
 def row(name, value):

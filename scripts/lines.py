@@ -10,6 +10,7 @@ import signorini_results
 from drawing import INK, wide
 from reading import whole
 from results import ResultError, write_table
+from signorini_summaries import units_of
 
 UNITS = {"zeta": "", "u_x": "length", "u_y": "length", "gap": "length"}
 
@@ -23,7 +24,7 @@ def draw_curves(arguments, styled):
     for quantity in arguments.quantity or ["von_mises"]:
         rows, figure = [], plt.figure(figsize=(wide(6.0), max(2.8, 0.63 * wide(6.0))))
         axes = figure.add_subplot()
-        units = {"length": "m", "time": "s", "stress": "Pa", **runs[0].summary.get("units", {})}
+        units = units_of(runs[0].summary)
         for run, name in zip(runs, _differences([run.folder.name for run in runs])):
             frames = {frame.time: frame for frame in map(run.frame, arguments.times or [None])}
             if missing := [f"{time:g}" for time in arguments.times or [] if not np.isclose(time, list(frames)).any()]:

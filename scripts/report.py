@@ -19,7 +19,7 @@ from string import Template
 # This module comes first: it checks the memory before numpy is imported.
 import drawing
 from drawing import RED, headline, np, plt, wrap_titles
-from bars import barred, bars, three_digits
+from bars import barred, three_digits
 from contact_pressure import draw_evolution, draw_pressure
 from histories import draw_damage_history, draw_force_displacement, draw_histories
 from limits import limits_of
@@ -30,6 +30,7 @@ from report_page import PAGE, SLIDER
 from report_pdf import FULL, HIGHEST, SPACE, write_pages
 from results import telling
 from setting import draw_setting
+from signorini_summaries import bars, unit_of
 from table import text_of
 
 # The largest number of frames of the slider.
@@ -38,15 +39,13 @@ FRAMES = 10
 MODEL = "Limits of the model: two dimensions, small strains, no inertia; one body, a rigid foundation without friction."
 # What the processes draw, by name.
 TASKS = {}
-# Values of summary.json for the last state: key, name, kind of unit.
-FACTS = (
-    ("solver", "contact solver", ""), ("ranks", "ranks", ""), ("nodes", "nodes", ""),
-    ("triangles", "triangles", ""), ("steps", "time steps", ""), ("end_time", "last time", "time"),
-    ("stopped_by", "stopped by", ""), ("stopped_at", "stopped at", "time"), ("zeta_min", "least ζ", ""),
-    ("zeta_mean", "mean ζ", ""), ("displacement_max", "largest displacement", "length"),
-    ("work", "work of the loads", "work"), ("contact_force", "sum of contact reactions", "line"),
-    ("active_nodes", "active nodes", ""), ("contact_nodes", "contact nodes", ""),
-)
+# Values of summary.json for the last state, with their names.
+FACTS = {
+    "solver": "contact solver", "ranks": "ranks", "nodes": "nodes", "triangles": "triangles", "steps": "time steps",
+    "end_time": "last time", "stopped_by": "stopped by", "stopped_at": "stopped at", "zeta_min": "least ζ",
+    "zeta_mean": "mean ζ", "displacement_max": "largest displacement", "work": "work of the loads",
+    "contact_force": "sum of contact reactions", "active_nodes": "active nodes", "contact_nodes": "contact nodes",
+}
 ERRORS = {
     "displacement_mesh": "u, from the mesh (energy norm)",
     "damage_mesh": "damage, from the mesh (L²)",
@@ -138,16 +137,10 @@ def facts(results):
         rounded = three_digits(value) if stopped and isinstance(value, float) else value
         return barred(value, errors.get(name)) or rounded
 
-    rows = [(name, text(key, summary[key]), units.get(kind, ""))
-            for key, name, kind in FACTS if summary.get(key) is not None]
-    return rows + [(name, text(name, value), unit_of(name, units))
+    rows = [(name, text(key, summary[key]), unit_of(key, units))
+            for key, name in FACTS.items() if summary.get(key) is not None]
+    return rows + [(name, text(name, value), unit_of(f"quantities.{name}", units))
                    for name, value in summary.get("quantities", {}).items()]
-
-
-def unit_of(quantity, units):
-    """The unit of a quantity like `clamp.force_x` or `probe.stress_xx`."""
-    kinds = {"force": units["line"], "moment": units["force"], "u": units["length"], "zeta": ""}
-    return kinds.get(quantity.rpartition(".")[2].split("_")[0], units["stress"])
 
 
 def governing(everything, units):

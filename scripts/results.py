@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from bars import barred, bars, three_digits
+from bars import barred, three_digits
 from elements import Pieces
 from signorini_results import paths
-from table import option_of, write_table  # noqa: F401
+from signorini_summaries import bars, option_of, units_of
+from table import write_table  # noqa: F401
 
 # Values below these parts of the maximum of a run are rounding errors (the solver's tolerance is 1e-10).
 ROUNDING = 1e-9
@@ -103,12 +104,7 @@ class Results:
 
     @property
     def units(self):
-        """The names of the units of length, force, time and stress, and of units derived from them."""
-        units = {"length": "m", "force": "N", "time": "s", "stress": "Pa", **self.summary.get("units", {})}
-        force, length = units["force"], units["length"]
-        work = "J/m" if (force, length) == ("N", "m") else f"{force}·{length}/{length}"
-        area = units["stress"] if units["stress"] != "Pa" else f"{force}/{length}²"
-        return {**units, "work": work, "line": f"{force}/{length}", "area": area, "volume": f"{force}/{length}³"}
+        return units_of(self.summary)
 
     @property
     def moment(self):

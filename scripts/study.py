@@ -12,7 +12,6 @@ other arguments of `run`.
 
 import argparse
 import itertools
-import json
 import os
 import re
 import subprocess
@@ -20,7 +19,8 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from table import COLUMNS, printed, rows_of, write_table
+from signorini_summaries import COLUMNS, rows_of, summary_of
+from table import printed, refused, write_table
 
 # The longest name of a folder.
 LONGEST = 120
@@ -70,13 +70,20 @@ def command_of(scene, folder, chosen, more):
 
 def is_complete(folder, command, inputs):
     """Whether this command has finished in a folder since its inputs were changed last."""
-    path = folder / "summary.json"
     try:
-        summary = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        summary = summary_of(folder)
+    except ValueError:
         return False
+    written = (folder / "summary.json").stat().st_mtime
     return ("error" not in summary and summary["provenance"]["command"][1:] == command
-            and all(file.stat().st_mtime <= path.stat().st_mtime for file in inputs))
+            and all(file.stat().st_mtime <= written for file in inputs))
+
+
+def outcome(folder, error):
+    """The summary of a run of the study, or only its error if the run was refused."""
+    summary = summary_of(folder) if (folder / "summary.json").exists() else {}
+    lines = [line.removeprefix("error: ") for line in error.splitlines() if line.startswith("error")]
+    return summary if not error or "error" in summary else {"error": " ".join(lines) or error}
 
 
 def run(command, runs):
@@ -131,12 +138,14 @@ def main(prog=None):
             done += 1
             failed.update({folder: error} if error else {})
             print(f"{done}/{len(chosen)} {folder.name}{': ' + error if error else ''}", flush=True)
-    rows = rows_of([folder for folder in folders if (folder / "summary.json").exists()], arguments.columns)
-    if rows:
-        printed(rows, False)
-        write_table(rows, out / "study.csv")
-        print(out / "study.csv")
-    return 1 if failed else 0
+    summaries = [outcome(folder, failed.get(folder, "")) for folder in folders]
+    rows, units = rows_of(folders, summaries, arguments.columns, list(map(dict, chosen)))
+    printed(rows, units)
+    out.mkdir(parents=True, exist_ok=True)
+    write_table(rows, out / "study.csv", units)
+    print(out / "study.csv")
+    is_refused = refused(arguments.columns, list(filter(None, summaries)))
+    return 1 if failed else 2 if is_refused else 0
 
 
 if __name__ == "__main__":

@@ -18,10 +18,11 @@ macro_rules! scripts {
 }
 
 /// The scripts and the modules that they import from each other.
-const SCRIPTS: [(&str, &str); 25] = scripts! {
+const SCRIPTS: [(&str, &str); 26] = scripts! {
     "animation" "bars" "compare" "contact_pressure" "drawing" "elements" "expressions" "figures"
     "histories" "info" "limits" "lines" "maps" "paraview_script" "paraview_view" "principal" "reading" "report"
-    "report_page" "report_pdf" "results" "setting" "signorini_results" "study" "table"
+    "report_page" "report_pdf" "results" "setting"
+    "signorini_results" "signorini_summaries" "study" "table"
 };
 /// The Python program that runs one of them.
 const EMBEDDED: &str = include_str!("../../scripts/embedded.py");

@@ -21,7 +21,10 @@ fn figures_and_a_report_are_drawn_far_from_the_scripts() {
     let pdf = std::fs::read(test_directory.path("out/scene/report.pdf")).expect("a PDF");
     assert!(pdf.starts_with(b"%PDF") && pdf.len() > 20_000);
     let page = test_directory.read("out/scene/report.html");
-    assert!(page.contains("small strains") && page.contains("without friction"), "no limits of the model");
+    assert!(
+        page.contains("small strains") && page.contains("without friction"),
+        "no limits of the model"
+    );
     assert!(page.contains("data:image/png;base64,") && page.contains("[[boundary]]"));
     let outside = ["src=\"http", "href=", "<link", "@import", "$title"];
     assert!(outside.iter().all(|word| !page.contains(word)), "the page is not whole");

@@ -48,6 +48,36 @@ fn a_study_runs_all_combinations_once_and_tells_their_figures() {
 }
 
 #[test]
+fn tables_have_units_bars_and_singular_flags() {
+    let directory = TestDirectory::new();
+    directory.run(&[]);
+    let mut summary = directory.summary("out/scene");
+    summary["work"] = 5.35702.into();
+    summary["von_mises_max"] = 23153.0.into();
+    summary["errors"]["figures"] = serde_json::json!({ "work": 0.00041 });
+    summary["extremes"]["von_mises_max"]["singular"] = "a corner".into();
+    summary["notes"] = serde_json::json!(["accuracy 0.05 NOT reached (work is exact to 6 % only)"]);
+    directory.write("out/scene/summary.json", &summary.to_string());
+    let words = ["table", "out/scene", "--columns", "work,von_mises_max,errors.solver"];
+    let said = directory.say(&words);
+    if lacks(&said) {
+        return;
+    }
+    assert_eq!(said.code, Some(0), "{said:?}");
+    for text in ["work (J/m)", "5.3570 ± 0.0005", "23153 singular", "reached", " no ", "finished"]
+    {
+        assert!(said.out.contains(text), "no `{text}` in {}", said.out);
+    }
+    let csv = directory.say(&[&words[..], &["--csv"]].concat());
+    let head = "run,work (J/m),work.bar (J/m),von_mises_max (Pa),von_mises_max.singular,\
+                errors.solver,reached,status";
+    assert_eq!(csv.out.lines().next(), Some(head));
+    assert!(csv.out.contains("scene,5.35702,0.00041,23153.0,a corner,"), "{}", csv.out);
+    let unknown = ["table", "out/scene", "--columns", "errors.solvr"];
+    directory.say(&unknown).fails(2, &["no summary has errors.solvr; there are errors."]);
+}
+
+#[test]
 fn a_failing_run_of_a_study_is_told_and_the_others_go_on() {
     let directory = TestDirectory::new();
     let said = directory.say(&["study", "scene.toml", "--set", "material.poisson=0.3,0.7"]);
@@ -56,7 +86,12 @@ fn a_failing_run_of_a_study_is_told_and_the_others_go_on() {
     }
     assert_eq!(said.code, Some(1), "{said:?}");
     assert!(said.out.contains("material.poisson must be between"), "{}", said.out);
-    assert_eq!(directory.read("out/scene-study/study.csv").lines().count(), 2);
+    // The failed run keeps its row, and the varied value its column.
+    let table = directory.read("out/scene-study/study.csv");
+    let rows: Vec<&str> = table.lines().collect();
+    assert!(rows.len() == 3 && rows[0].starts_with("run,material.poisson,end_time (s)"), "{table}");
+    assert!(rows[1].contains(",0.3,") && rows[1].contains(",finished,"), "{table}");
+    assert!(rows[2].contains(",0.7,") && rows[2].contains(",failed,"), "{table}");
     let twice = ["study", "scene.toml", "--set", "time.end=1", "--set", "time.end=2"];
     directory.say(&twice).fails(2, &["--set time.end is given twice"]);
 }

@@ -1,0 +1,127 @@
+"""Reads summary.json of runs: figures with their error bars and units, as rows of a table."""
+
+import json
+import re
+from pathlib import Path
+
+# The columns of a table, by default.
+COLUMNS = ("end_time", "stopped_by", "stopped_at", "zeta_min", "displacement_max", "work",
+           "contact_force", "von_mises_max", "wall_seconds")
+# Kinds of units by names of values; "s" and "MB" do not depend on the scene.
+UNITS = {
+    "end_time": "time", "stopped_at": "time", "displacement_max": "length", "contact_length": "length", "work": "work",
+    "contact_force": "line", "von_mises_max": "stress", "principal_max": "stress", "principal_min": "stress",
+    "pressure_max": "stress", "wall_seconds": "s", "seconds_per_step": "s", "peak_megabytes": "MB",
+}
+
+
+def summary_of(folder):
+    """summary.json of a folder, or a ValueError with the reason."""
+    path = Path(folder) / "summary.json"
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ValueError(f"{path}: {error.strerror}; name folders of results") from None
+    except ValueError:
+        raise ValueError(f"{path}: it is damaged or cut off; run the scene again") from None
+
+
+def option_of(summary, name):
+    """The values of an option in the command of a run."""
+    words = summary.get("provenance", {}).get("command", [])
+    words = words[:words.index("--")] if "--" in words else words
+    option = f"--{name}"
+    return [following if word == option else word.partition("=")[2] for word, following in zip(words, [*words[1:], ""])
+            if word == option or word.startswith(f"{option}=")]
+
+
+def settings_of(summary):
+    """KEY → value of the `--set` arguments of a run."""
+    return dict((part.strip() for part in text.split("=", 1)) for text in option_of(summary, "set") if "=" in text)
+
+
+def value_of(summary, name):
+    """A value by its full name, or a KeyError. Names of quantities contain points."""
+    if name in summary:
+        return summary[name]
+    first, _, rest = name.partition(".")
+    if not isinstance(summary.get(first), dict):
+        raise KeyError(name)
+    return value_of(summary[first], rest)
+
+
+def bars(summary):
+    """The error bars of a run by the names of figures; empty without estimates."""
+    figures = (summary.get("errors") or {}).get("figures") or {}
+    return {name: bar for name, bar in figures.items() if bar is not None}
+
+
+def units_of(summary):
+    """The names of the units of length, force, time and stress, and of units derived from them."""
+    units = {"length": "m", "force": "N", "time": "s", "stress": "Pa", **summary.get("units", {})}
+    force, length = units["force"], units["length"]
+    work = "J/m" if (force, length) == ("N", "m") else f"{force}·{length}/{length}"
+    area = units["stress"] if units["stress"] != "Pa" else f"{force}/{length}²"
+    return {**units, "work": work, "line": f"{force}/{length}", "area": area, "volume": f"{force}/{length}³"}
+
+
+def unit_of(name, units):
+    """The unit of a value of the summary; "" without a unit."""
+    figure = name.removeprefix("errors.figures.").removeprefix("quantities.")
+    if figure in UNITS:
+        return units.get(UNITS[figure], UNITS[figure])
+    kinds = {"force": "line", "moment": "force", "u": "length", "zeta": ""}
+    kind = kinds.get(figure.rpartition(".")[2].split("_")[0], "stress") if figure != name else ""
+    return units.get(kind, "")
+
+
+def rows_of(folders, summaries, columns, settings=None):
+    """A row for each folder, and the units of columns.
+
+    A row has the name of the folder, the settings in which the runs differ, and per column the value, its error bar
+    NAME.bar and the reason NAME.singular, if a run has them. `reached` tells whether the run has the accuracy asked
+    for, `status` whether it finished, stopped early or failed.
+    """
+    settings = settings or [settings_of(summary) for summary in summaries]
+    names = list(dict.fromkeys(name for of in settings for name in of))
+    names = [n for n in names if len({of.get(n) for of in settings}) > 1]
+    rows, units = [], {}
+    for folder, summary, of in zip(folders, summaries, settings):
+        row = {"run": Path(folder).name, **{name: of.get(name) for name in names}}
+        for name in columns:
+            try:
+                row[name] = value_of(summary, name)
+            except KeyError:
+                row[name] = None
+            of_extreme = (summary.get("extremes") or {}).get(name) or {}
+            row[f"{name}.bar"] = bars(summary).get(name.removeprefix("quantities."))
+            row[f"{name}.singular"] = of_extreme.get("singular")
+            if summary and (unit := unit_of(name, units_of(summary))):
+                units.setdefault(name, {})[unit] = units.setdefault(f"{name}.bar", {})[unit] = None
+        asked = [re.match("accuracy .*?(NOT )?reached", note) for note in summary.get("notes", [])]
+        row["reached"] = next(("no" if found[1] else "yes" for found in asked if found), None)
+        error = summary.get("error")
+        row["status"] = "failed" if error else "stopped" if summary.get("stopped_by") else "finished"
+        rows.append({**row, "error": error})
+    optional = {key for row in rows for key in row if key.endswith((".bar", ".singular")) or key in ("reached", "error")}
+    empty = {key for key in optional if all(row[key] is None for row in rows)}
+    rows = [{key: value for key, value in row.items() if key not in empty} for row in rows]
+    return rows, {name: " or ".join(of) for name, of in units.items()}
+
+
+def unknown(columns, summaries):
+    """Messages about names that no summary has."""
+    for name in columns:
+        first, *below = name.split(".")
+        known = [summary for summary in summaries if name in _names(summary)]
+        if not known and name != "error":
+            tables = [summary.get(first) for summary in summaries if below and isinstance(summary.get(first), dict)]
+            there = {f"{first}.{key}" for table in tables for key in table}
+            there = there or {key for summary in summaries for key in summary}
+            yield f"no summary has {name}; there are {', '.join(sorted(there))}"
+
+
+def _names(table, prefix=""):
+    """The full names of all values."""
+    return {name for key, value in table.items()
+            for name in (f"{prefix}{key}", *(_names(value, f"{prefix}{key}.") if isinstance(value, dict) else ()))}
