@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from signorini_results import functions
+
 # Nodes of the sides: both ends and, of triangles of six nodes, the middle.
 SIDES = np.array([[0, 1, 3], [1, 2, 4], [2, 0, 5]])
 
@@ -58,31 +60,6 @@ class Pieces:
 def cuts_of(count):
     """The number of parts per side for `count` triangles; all triangles have about 1e5 pieces."""
     return int(np.clip(np.sqrt(1e5 / count), 2, 12))
-
-
-def functions(barycentric, nodes):
-    """The Lagrange functions (P1, or P2 for this number of nodes) of a triangle or an edge at points, which are
-    rows of barycentric coordinates: (points, functions)."""
-    corners = len(barycentric)
-    if nodes == corners:
-        return barycentric.T
-    middles = [barycentric[k] * barycentric[(k + 1) % corners] for k in range(nodes - corners)]
-    return np.vstack([barycentric * (2 * barycentric - 1), 4 * np.array(middles)]).T
-
-
-def derivatives(barycentric, nodes):
-    """∂φ_n/∂λ_k of the functions of a triangle, P1 or with 6 nodes P2, at points as in `functions`:
-    (points, functions, 3)."""
-    points = barycentric.T
-    found = np.zeros((len(points), nodes, 3))
-    if nodes == 3:
-        found[:] = np.eye(3)
-        return found
-    for i in range(3):
-        j = (i + 1) % 3
-        found[:, i, i] = 4 * points[:, i] - 1
-        found[:, 3 + i, i], found[:, 3 + i, j] = 4 * points[:, j], 4 * points[:, i]
-    return found
 
 
 def sides_of(elements):

@@ -71,7 +71,7 @@ def arguments_of(prog):
     parser.add_argument("--along", metavar="BOUNDARY", help="only curves of fields along a boundary")
     parser.add_argument("--quantity", type=lambda text: text.split(","), metavar="NAME,…", help=(
         "fields of --line and --along: zeta, u_x, u_y, stress_xx, stress_yy, stress_xy, stress_zz, stress_1, "
-        "stress_2, von_mises, normal_pressure, gap (default: von_mises)"))
+        "stress_2, strain_xx, strain_yy, strain_xy, von_mises, normal_pressure, gap (default: von_mises)"))
     parser.add_argument("--times", type=numbers(None), metavar="T,…", help=(
         "times of the curves, s (default: the last frame)"))
     parser.add_argument("--no-title", action="store_true", help="without titles, for papers")

@@ -12,7 +12,7 @@ from reading import whole
 from results import ResultError, write_table
 from signorini_summaries import units_of
 
-UNITS = {"zeta": "", "u_x": "length", "u_y": "length", "gap": "length"}
+UNITS = {"zeta": "", "u_x": "length", "u_y": "length", "gap": "length", **dict.fromkeys(signorini_results.STRAINS, "")}
 
 
 def draw_curves(arguments, styled):

@@ -1,16 +1,20 @@
-"""Reads the results of a run. It needs numpy and meshio, and can be copied beside a script of your own:
+"""Runs scenes and reads their results. It needs numpy and meshio; matplotlib to find points, pandas for tables.
 
-    from signorini_results import load
-    run = load("out/lshape")
-    run.summary["work"], run.times, run.history["contact_force"]
-    frame = run.frame(0.5)                       # the frame nearest to t = 0.5; without a time the last one
-    frame.field("zeta"), frame.field("stress_yy")
+    from signorini_results import load, run, table
+    result = load("out/lshape")                  # or run("geo/lshape.toml", "--bars", mesh={"size": 0.5})
+    result.summary["work"], result.times, result.history["contact_force"]
+    frame = result.frame(0.5)                    # the frame nearest to t = 0.5; without a time the last one
+    frame.field("zeta"), frame.field("stress_yy"), frame.at((3, 5), "strain_xx"), frame.gradient((3, 5), "zeta")
     along, zeta = frame.line((0, 5), (8, 5), "zeta")
     along, pressure = frame.along("foundation", "normal_pressure")
+    table(["out/lshape", "out/beam"], ["work", "quantities.clamp.force_y"])
 """
 
 import csv
 import json
+import os
+import shutil
+import subprocess
 import xml.etree.ElementTree as ElementTree
 from functools import cached_property
 from pathlib import Path
@@ -24,6 +28,8 @@ COMPONENTS = {
     "stress_xx": ("stress", 0), "stress_yy": ("stress", 1), "stress_xy": ("stress", 2), "stress_zz": ("stress", 3),
     "stress_1": ("principal_stress", 0), "stress_2": ("principal_stress", 1),
 }
+# Names of strains, ½(∂u_i/∂x_j + ∂u_j/∂x_i), and the indices i, j.
+STRAINS = {"strain_xx": (0, 0), "strain_yy": (1, 1), "strain_xy": (0, 1)}
 # A point is in a triangle if its barycentric coordinates are not smaller.
 OUTSIDE = -1e-9
 # The largest number of pairs of points and triangles that are tried at once.
@@ -33,6 +39,57 @@ AT_ONCE = 4_000_000
 def load(folder):
     """The results in a folder."""
     return Run(folder)
+
+
+def run(scene, *options, out=None, **overrides):
+    """Runs a scene into `out` (default: out/SCENE) and returns its results; a RuntimeError if the run fails.
+
+    `options` are those of `signorini run`. Overrides are keys of the scene: `material={"young": 2e5}`, or with points
+    `**{"material.young": 2e5}`. The program is the variable SIGNORINI, `signorini` in the path, or that of a clone.
+    """
+    clones = (Path(__file__).resolve().parents[1], Path())
+    places = [os.environ.get("SIGNORINI", "signorini"), *(str(clone / "target/release/signorini") for clone in clones)]
+    program = next(filter(None, map(shutil.which, places)), None)
+    if program is None:
+        raise RuntimeError("the program signorini was not found; put it into PATH, or set SIGNORINI to its path")
+    out = Path(out or Path("out") / Path(scene).stem)
+    sets = [word for key, value in _keys(overrides) for word in ("--set", f"{key}={value}")]
+    command = [program, "run", str(scene), "--out", str(out), *sets, *options]
+    ended = subprocess.run(command, capture_output=True, text=True)
+    if ended.returncode:
+        raise RuntimeError(ended.stderr.strip().removeprefix("error: "))
+    return load(out)
+
+
+def _keys(overrides, prefix=""):
+    """(key with points, value in TOML) of nested tables."""
+    for key, value in overrides.items():
+        if isinstance(value, dict):
+            yield from _keys(value, f"{prefix}{key}.")
+        else:
+            # Strings, numbers and lists in JSON are the same in TOML.
+            yield f"{prefix}{key}", json.dumps(value, ensure_ascii=False, default=lambda array: array.tolist())
+
+
+def table(folders, columns=None):
+    """A pandas frame with a row per folder: the settings in which the runs differ, and columns of summary.json with
+    their bars, as `signorini table` prints them. Its `attrs["units"]` are the units by column."""
+    import pandas
+
+    from signorini_summaries import COLUMNS, rows_of, summary_of, unknown
+
+    summaries, columns = [summary_of(folder) for folder in folders], list(columns or COLUMNS)
+    if columns != list(COLUMNS) and (problems := list(unknown(columns, summaries))):
+        raise ValueError("; ".join(problems))
+    rows, units = rows_of(folders, summaries, columns)
+    frame = pandas.DataFrame(rows)
+    for name in frame:
+        try:
+            frame[name] = pandas.to_numeric(frame[name])
+        except (TypeError, ValueError):
+            pass
+    frame.attrs["units"] = units
+    return frame
 
 
 class Run:
@@ -114,40 +171,86 @@ class Frame:
         meshio.write(path, meshio.Mesh(self.mesh.points, self.mesh.cells, data), file_format="gmsh")
 
     def at(self, points, name):
-        """A field at a point or at points (k, 2); NaN outside the body. Sides count as straight."""
+        """A field, or a strain, at a point or at points (k, 2); NaN outside the body. Sides count as straight. Strains
+        jump between triangles: on a side they are those of one of its triangles."""
+        if name in STRAINS:
+            i, j = STRAINS[name]
+            slopes = self.gradient(points, "displacement")
+            return 0.5 * (slopes[..., i, j] + slopes[..., j, i])
         places, nodal = np.asarray(points, float), self.field(name)
-        points, columns = places.reshape(-1, 2), nodal.reshape(len(nodal), -1)
-        found = np.full((len(points), columns.shape[1]), np.nan)
-        step = max(1, AT_ONCE // len(self.elements))
-        for first in range(0, len(points), step):
-            some = slice(first, first + step)
-            barycentric = self._barycentric(points[some])
-            least = barycentric.min(axis=2)
-            best = least.argmax(axis=1)
-            rows = np.arange(len(best))
-            l = barycentric[rows, best]
-            values = columns[self.elements[best]]
-            if self.elements.shape[1] == 6:
-                middles = 4 * l[:, [0, 1, 2]] * l[:, [1, 2, 0]]
-                weights = np.hstack((l * (2 * l - 1), middles))
-            else:
-                weights = l
-            # The gap is NaN at nodes off Γ_C, which do not count on a side along it.
-            values = np.where(np.abs(weights)[..., None] <= -OUTSIDE, 0.0, values)
-            inside = least[rows, best] >= OUTSIDE
-            found[some] = np.where(inside[:, None], (weights[..., None] * values).sum(axis=1), np.nan)
-        return found.reshape(places.shape[:-1] + nodal.shape[1:])
+        triangles, barycentric = self.locate(places.reshape(-1, 2))
+        weights, values = functions(barycentric.T, self.elements.shape[1]), nodal[self.elements[triangles]]
+        # The gap is NaN at nodes off Γ_C, which do not count on a side along it.
+        values[np.abs(weights) <= -OUTSIDE] = 0.0
+        return np.einsum("kn,kn...->k...", weights, values).reshape(places.shape[:-1] + nodal.shape[1:])
 
-    def _barycentric(self, points):
-        """(points, triangles, 3)."""
-        a, b, c = (self.points[self.elements[:, k]] for k in range(3))
-        x = points[:, None, :]
+    def gradient(self, points, name):
+        """The gradient of a field at a point or at points (k, 2): ∂/∂x and ∂/∂y in the last axis; see `at`."""
+        places, nodal = np.asarray(points, float), self.field(name)
+        triangles, barycentric = self.locate(places.reshape(-1, 2))
+        a, b, c = (self.points[self.elements[triangles, k]] for k in range(3))
+        # ∇λ of a corner is normal to the opposite side and ends with it in twice the area.
+        sides = np.stack((c - b, a - c, b - a), axis=1)
+        normals = sides[..., ::-1] * (-1.0, 1.0) / _cross(b - a, c - a)[:, None, None]
+        slopes = derivatives(barycentric.T, self.elements.shape[1]) @ normals
+        slopes[np.isnan(barycentric).any(axis=1)] = np.nan
+        found = np.einsum("kn...,knd->k...d", nodal[self.elements[triangles]], slopes)
+        return found.reshape(places.shape[:-1] + nodal.shape[1:] + (2,))
 
-        def cross(p, q):
-            return p[..., 0] * q[..., 1] - p[..., 1] * q[..., 0]
+    def locate(self, points):
+        """The triangles of points (k, 2), and the barycentric coordinates there, (k, 3), NaN outside the body."""
+        finder, outer = self._finder
+        found = finder(*points.T)
+        # By rounding, points on the boundary may be outside; their triangles are at the boundary.
+        lost = np.flatnonzero(found < 0)
+        for some in np.array_split(lost, 1 + len(lost) * len(outer) // AT_ONCE):
+            found[some] = outer[self._barycentric(points[some, None], outer).min(axis=2).argmax(axis=1)]
+        barycentric = self._barycentric(points, found)
+        return found, np.where(barycentric.min(axis=1, keepdims=True) >= OUTSIDE, barycentric, np.nan)
 
-        twice = cross(b - a, c - a)
-        return np.stack((cross(b - x, c - x), cross(c - x, a - x), cross(a - x, b - x)), -1) / (twice[:, None])
+    @cached_property
+    def _finder(self):
+        """A function that finds the triangles of points, and the triangles at the boundary."""
+        from matplotlib.tri import Triangulation
+
+        # A node of several ranks or materials is listed several times.
+        points, number = np.unique(self.points, axis=0, return_inverse=True)
+        mesh = Triangulation(*points.T, number.reshape(-1)[self.elements[:, :3]])
+        return mesh.get_trifinder(), np.flatnonzero((mesh.neighbors < 0).any(axis=1))
+
+    def _barycentric(self, x, triangles):
+        a, b, c = (self.points[self.elements[triangles, k]] for k in range(3))
+        parts = _cross(b - x, c - x), _cross(c - x, a - x), _cross(a - x, b - x)
+        return np.stack(parts, axis=-1) / _cross(b - a, c - a)[..., None]
+
+
+def _cross(p, q):
+    return p[..., 0] * q[..., 1] - p[..., 1] * q[..., 0]
+
+
+def functions(barycentric, nodes):
+    """The Lagrange functions (P1, or P2 for this number of nodes) of a triangle or an edge at points, which are
+    rows of barycentric coordinates: (points, functions)."""
+    corners = len(barycentric)
+    if nodes == corners:
+        return barycentric.T
+    middles = [barycentric[k] * barycentric[(k + 1) % corners] for k in range(nodes - corners)]
+    return np.vstack([barycentric * (2 * barycentric - 1), 4 * np.array(middles)]).T
+
+
+def derivatives(barycentric, nodes):
+    """∂φ_n/∂λ_k of the functions of a triangle, P1 or with 6 nodes P2, at points as in `functions`:
+    (points, functions, 3)."""
+    points = barycentric.T
+    found = np.zeros((len(points), nodes, 3))
+    if nodes == 3:
+        found[:] = np.eye(3)
+        return found
+    for i in range(3):
+        j = (i + 1) % 3
+        found[:, i, i] = 4 * points[:, i] - 1
+        found[:, 3 + i, i], found[:, 3 + i, j] = 4 * points[:, j], 4 * points[:, i]
+    return found
 
 
 def frames_of(folder):

@@ -13,7 +13,7 @@ from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import splu
 
 import shared  # noqa: F401
-from elements import derivatives, functions
+from signorini_results import derivatives, functions
 from expressions import Expression
 from lagrange import SIDES, Lagrange
 from scene import DAMAGE, displacement_order, elasticity, of_material

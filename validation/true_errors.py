@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.tri import Triangulation
 
 import shared  # noqa: F401
-from elements import derivatives, functions
+from signorini_results import derivatives, functions
 from reading import frames_of, read_frame
 
 # Barycentric points and weights of the rule of degree 4 with six points.

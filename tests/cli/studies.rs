@@ -143,21 +143,30 @@ fn curves_and_the_python_module_give_the_exact_fields() {
     let scripts = concat!(env!("CARGO_MANIFEST_DIR"), "/scripts");
     let program = format!(
         "import sys; sys.path.insert(0, '{scripts}')\n\
-         from signorini_results import load\n\
-         run = load('out/scene')\n\
-         frame = run.frame(1)\n\
+         from signorini_results import load, run\n\
+         results = load('out/scene')\n\
+         frame = results.frame(1)\n\
          along, gap = frame.along('bottom', 'gap')\n\
-         print(along.max(), abs(gap).max() < 1e-9, run.times[-1])\n\
+         print(along.max(), abs(gap).max() < 1e-9, results.times[-1])\n\
          s, u = frame.line((0.3, 0), (0.3, 1), 'u_y', 3)\n\
-         print(abs(u[2] - 2*u[1]) < 1e-6*abs(u[2]), u[2] < -3/80, len(run.history['work']))\n\
+         print(abs(u[2] - 2*u[1]) < 1e-6*abs(u[2]), u[2] < -3/80, len(results.history['work']))\n\
          print(frame.at((0.3, 1), 'u_y') == u[2], frame.at((0.3, 1), 'displacement').shape)\n\
+         strain = frame.at([(0.3, 0.4), (1, 1), (2, 0)], 'strain_yy')\n\
+         print(abs(strain[:2]/u[2] - 1).max() < 1e-5, strain[2], frame.gradient((0.3, 0), 'zeta').shape)\n\
+         again = run('scene.toml', out='out/stiff', material={{'young': 160}})\n\
+         print(again.summary['displacement_max'] < results.summary['displacement_max'])\n\
          frame.to_gmsh('frame.msh')"
     );
     let python = std::env::var("PYTHON").unwrap_or("/usr/bin/python3".to_owned());
-    let ran = Command::new(python).args(["-c", &program]).current_dir(directory.path(".")).output();
+    let mut command = Command::new(python);
+    let command = command.args(["-c", &program]).current_dir(directory.path("."));
+    let ran = command.env("SIGNORINI", env!("CARGO_BIN_EXE_signorini")).output();
     let ran = ran.expect("Python");
     assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
-    assert_eq!(String::from_utf8_lossy(&ran.stdout), "1.0 True 1.0\nTrue True 11\nTrue (3,)\n");
+    assert_eq!(
+        String::from_utf8_lossy(&ran.stdout),
+        "1.0 True 1.0\nTrue True 11\nTrue (3,)\nTrue nan (2,)\nTrue\n"
+    );
     let frame = directory.path("frame.msh");
     let read = Command::new("gmsh").arg("-check").arg(frame).output().expect("gmsh").stdout;
     let read = String::from_utf8_lossy(&read).into_owned();
