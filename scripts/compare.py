@@ -18,8 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
-from reading import frames_of, read_frame
+from reading import read_frame
 from results import markdown, read_table, write_table
+from signorini_results import frames_of
 
 # Titles of the printed table; the others are shown in comparison.csv alone.
 TITLES = {

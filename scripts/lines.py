@@ -1,14 +1,13 @@
 """Curves of fields along a line or a boundary, at several times and of several runs, with their numbers as CSV."""
 
 import sys
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 
 import signorini_results
 from drawing import INK, wide
-from reading import whole
+from reading import open_run
 from results import ResultError, write_table
 from signorini_summaries import units_of
 
@@ -18,7 +17,7 @@ UNITS = {"zeta": "", "u_x": "length", "u_y": "length", "gap": "length", **dict.f
 def draw_curves(arguments, styled):
     """Draws a figure for each quantity into the folder of the first run, and writes the numbers of all curves; yields
     the paths."""
-    runs = [_run(folder) for folder in arguments.folders]
+    runs = [open_run(folder) for folder in arguments.folders]
     where = f"along_{arguments.along}" if arguments.along else "line"
     folder = runs[0].folder
     for quantity in arguments.quantity or ["von_mises"]:
@@ -72,18 +71,6 @@ def _differences(names):
     parts = [name.split("__") for name in names]
     common = set(parts[0]).intersection(*parts[1:]) if len(names) > 1 else ()
     return ["__".join(part for part in of if part not in common) or name for of, name in zip(parts, names)]
-
-
-def _run(folder):
-    """A run with its frames; a problem is an error in one line."""
-    with whole(Path(folder) / "summary.json"):
-        run = signorini_results.load(folder)
-    if not (run.folder / "fields.pvd").exists():
-        raise ResultError(f"{folder}: the run wrote no frames: run its scene.toml with --set output.every=1")
-    with whole(Path(folder) / "fields.pvd"):
-        if not run.frames:
-            raise ResultError(f"{folder}: fields.pvd lists no frame")
-    return run
 
 
 def _values(frame, arguments, quantity):

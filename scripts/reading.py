@@ -1,8 +1,6 @@
 """Reads a folder of results: fields.pvd with its frames, history.csv, summary.json, and scene.toml if it
 exists."""
 
-import csv
-import json
 import tomllib
 import xml.etree.ElementTree as ElementTree
 import zlib
@@ -18,7 +16,7 @@ import numpy as np
 
 import signorini_results
 from elements import Pieces, counter_clockwise
-from results import ContactCurve, ResultError, Results, of_material, without_roundoff
+from results import ContactCurve, ResultError, Results, of_material, read_table, without_roundoff
 
 # A node without a condition.
 NOWHERE = np.zeros(2), np.zeros(2)
@@ -33,46 +31,45 @@ def whole(path):
         raise ResultError(f"{path}: it is damaged or cut off; run the scene again") from None
 
 
-def read_results(folder, time=None, material=None):
-    """The contents of a folder of results, with the frame nearest to `time` or the last frame; of one material only, if
-    it is named."""
-    folder, summary, scene = Path(folder), {}, {}
+def open_run(folder):
+    """A run of `signorini_results` with at least one frame; a problem is an error in one line."""
+    folder, summary = Path(folder), {}
     try:
-        with whole(folder / "summary.json") as file:
-            summary = json.loads(file.read_text(encoding="utf-8"))
-        path = folder / "history.csv"
-        with whole(path), open(path, newline="", encoding="utf-8") as file:
-            rows = list(csv.DictReader(file))
-        with whole(folder / "scene.toml") as file:
-            scene = tomllib.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
-        frames = frames_of(folder)
-        chosen = frames[-1 if time is None else nearest(frames, time)]
-        fields = read_frame(chosen[1])
-        elements = np.vstack([fields.cells[k].data for k in triangles(fields)])
-        history = {c: np.array([_number(r[c]) for r in rows]) for c in (rows or [{}])[0]}
-        pieces = Pieces(counter_clockwise(fields.points, elements), fields.point_data.get("global_node"))
-        results = Results(folder, summary, scene, history, frames, chosen[0], fields.points[:, :2], pieces,
-                          material=material)
-        return with_fields(results, chosen[0], fields)
+        with whole(folder / "summary.json"):
+            run = signorini_results.load(folder)
+        summary = run.summary
+        # Properties read their files at first use.
+        for name, read in (("history.csv", "history"), ("fields.pvd", "frames")):
+            with whole(folder / name) as path:
+                if not getattr(run, read):
+                    raise ResultError(f"{path}: it is empty")
+        return run
     except OSError as error:
         if failed := summary.get("error"):
             raise ResultError(f"{folder}: nothing to draw, the run failed: {failed}") from None
-        what = "" if summary else "; name a folder of results, out/SCENE"
-        if summary and scene.get("output", {}).get("every") == 0:
-            what = "; the run wrote no frames: run its scene.toml with --set output.every=1"
+        what = "; the run wrote no frames: run its scene.toml with --set output.every=1"
+        what = what if summary else "; name a folder of results, out/SCENE"
         raise ResultError(f"{error.filename}: {error.strerror}{what}") from None
+
+
+def read_results(folder, time=None, material=None):
+    """The contents of a folder of results, with the frame nearest to `time` or the last frame; of one material only, if
+    it is named."""
+    run = open_run(folder)
+    with whole(run.folder / "scene.toml") as file:
+        scene = tomllib.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+    chosen = run.frames[-1 if time is None else nearest(run.frames, time)]
+    fields = read_frame(chosen[1])
+    try:
+        elements = np.vstack([block.data for block in fields.cells if block.type in ("triangle", "triangle6")])
+        pieces = Pieces(counter_clockwise(fields.points, elements), fields.point_data.get("global_node"))
+        results = Results(run.folder, run.summary, scene, run.history, run.frames, chosen[0], fields.points[:, :2],
+                          pieces, material=material)
+        return with_fields(results, chosen[0], fields)
     except KeyError as error:
         raise ResultError(f"{folder}: the field {error} is missing") from None
-    except IndexError:
-        raise ResultError(f"{folder}: fields.pvd lists no frame") from None
     except ValueError as error:
         raise ResultError(f"{folder}: {error}") from None
-
-
-def frames_of(folder):
-    """(time, file) of each frame that fields.pvd lists, in the order of time."""
-    with whole(folder / "fields.pvd"):
-        return signorini_results.frames_of(folder)
 
 
 def nearest(frames, time):
@@ -93,11 +90,6 @@ def evenly(frames, most):
 def states(results, frames):
     """The results at some of their frames."""
     return [with_fields(results, time, read_frame(path)) for time, path in frames]
-
-
-def triangles(fields):
-    """Which blocks of cells are triangles."""
-    return [k for k, block in enumerate(fields.cells) if block.type in ("triangle", "triangle6")]
 
 
 def with_fields(results, time, fields):
@@ -163,11 +155,9 @@ def _contact_rows(path):
     """The rows of contact.csv by time. All values are numbers except the name of the boundary."""
     rows = defaultdict(list)
     if path.exists():
-        with whole(path), open(path, newline="", encoding="utf-8") as file:
-            for row in csv.DictReader(file):
-                name = row.pop("boundary")
-                row = {key: float(value) for key, value in row.items()}
-                rows[row["time"]].append({**row, "boundary": name})
+        with whole(path):
+            for row in read_table(path, texts=("boundary",)):
+                rows[row["time"]].append(row)
     return rows
 
 
@@ -179,7 +169,3 @@ def _contact_curves(folder, time):
         x, y, gap, pressure = np.array([[row[key] for key in ("x", "y", "gap", "pressure")] for row in part]).T
         curves.append(ContactCurve(name, np.column_stack((x, y)), gap, pressure))
     return curves
-
-
-def _number(text):
-    return float(text) if text else np.nan

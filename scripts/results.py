@@ -20,16 +20,16 @@ ROUNDING = 1e-9
 UNDAMAGED = 1e-12
 
 
-def read_table(path):
-    """The rows of a CSV file as dictionaries; numbers are converted."""
-    def value(text):
+def read_table(path, texts=()):
+    """The rows of a CSV file as dictionaries; numbers are converted, except in the columns `texts`."""
+    def value(key, text):
         try:
-            return float(text)
+            return text if key in texts else float(text)
         except ValueError:
             return text
 
     with open(path, newline="", encoding="utf-8") as file:
-        return [{key: value(text) for key, text in row.items()} for row in csv.DictReader(file)]
+        return [{key: value(key, text) for key, text in row.items()} for row in csv.DictReader(file)]
 
 
 def markdown(header, rows, left=()):

@@ -103,8 +103,9 @@ class Run:
     def history(self):
         """Column of history.csv → array; a missing number is NaN."""
         with open(self.folder / "history.csv", newline="", encoding="utf-8") as file:
-            rows = list(csv.DictReader(file))
-        return {name: np.array([float(row[name] or "nan") for row in rows]) for name in rows[0]}
+            names, *rows = csv.reader(file)
+        values = np.array([[float(text or "nan") for text in row] for row in rows])
+        return dict(zip(names, values.reshape(-1, len(names)).T))
 
     @cached_property
     def frames(self):
@@ -182,7 +183,9 @@ class Frame:
         weights, values = functions(barycentric.T, self.elements.shape[1]), nodal[self.elements[triangles]]
         # The gap is NaN at nodes off Γ_C, which do not count on a side along it.
         values[np.abs(weights) <= -OUTSIDE] = 0.0
-        return np.einsum("kn,kn...->k...", weights, values).reshape(places.shape[:-1] + nodal.shape[1:])
+        # Not by einsum: a point has the same value alone as among others.
+        found = (weights[..., None] * values.reshape(*weights.shape, -1)).sum(axis=1)
+        return found.reshape(places.shape[:-1] + nodal.shape[1:])
 
     def gradient(self, points, name):
         """The gradient of a field at a point or at points (k, 2): ∂/∂x and ∂/∂y in the last axis; see `at`."""

@@ -1,13 +1,11 @@
 """The frames of a run on one rank or several, at the nodes of the mesh."""
 
 from dataclasses import dataclass
-from xml.etree import ElementTree
 
-import meshio
 import numpy as np
 
 import shared  # noqa: F401
-from reading import frames_of
+from signorini_results import frames_of, read_frame
 
 
 @dataclass
@@ -32,23 +30,20 @@ def read_frames(space, out):
         return []
     frames = []
     for time, path in frames_of(out):
-        pieces = [path]
-        if pieces[0].suffix == ".pvtu":
-            pieces = [out / p.get("Source") for p in ElementTree.parse(pieces[0]).iter("Piece")]
-        values, apart, seen = np.full((len(space.points), 5), np.nan), 0.0, 0
-        for data in map(meshio.read, pieces):
-            names = ("displacement", "zeta", "gap", "normal_pressure")
-            field = np.column_stack([data.point_data[name] for name in names])[:, [0, 1, 3, 4, 5]]
-            for cell in np.vstack([block.data for block in data.cells]):
-                nodes = place[key(data.points[cell, :2])]
-                # Both lists are sorted by their points.
-                a, b = (order(points) for points in (space.points[nodes], data.points[cell, :2]))
-                if np.abs(space.points[nodes[a]] - data.points[cell[b], :2]).max() > 1e-9 * size:
-                    raise ValueError("a middle of a side is not where the mesh has it")
-                old, new = values[nodes[a]], field[cell[b]]
-                apart = max(apart, np.nanmax(np.abs(old - new), initial=0.0))
-                values[nodes[a]] = new
-                seen += 1
+        # The pieces of several ranks stand one after the other, each with its own nodes.
+        data, values, apart, seen = read_frame(path), np.full((len(space.points), 5), np.nan), 0.0, 0
+        names = ("displacement", "zeta", "gap", "normal_pressure")
+        field = np.column_stack([data.point_data[name] for name in names])[:, [0, 1, 3, 4, 5]]
+        for cell in np.vstack([block.data for block in data.cells]):
+            nodes = place[key(data.points[cell, :2])]
+            # Both lists are sorted by their points.
+            a, b = (order(points) for points in (space.points[nodes], data.points[cell, :2]))
+            if np.abs(space.points[nodes[a]] - data.points[cell[b], :2]).max() > 1e-9 * size:
+                raise ValueError("a middle of a side is not where the mesh has it")
+            old, new = values[nodes[a]], field[cell[b]]
+            apart = max(apart, np.nanmax(np.abs(old - new), initial=0.0))
+            values[nodes[a]] = new
+            seen += 1
         values[:] = values if seen == len(space.elements) else np.nan
         u, (zeta, gap, pressure) = values[:, :2].ravel(), values[:, 2:].T
         vertices = zeta[:len(space.mesh.nodes)]

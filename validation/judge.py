@@ -57,13 +57,14 @@ def verdict_on(discrete, out, code, output):
     """Compares the exit code with the expectation, then verifies the frames."""
     refusal, either = expectation(discrete)
     said = message(output)
-    collapse = collapse_of(out) if code == 0 else None
-    if collapse is not None:
+    summary = json.loads((out / "summary.json").read_text()) if code == 0 else {}
+    stopped = summary.get("stopped_at")
+    if summary.get("stopped_by") == "collapse":
         refusal = None
-        if fault := judge_collapse(discrete, collapse):
+        if fault := judge_collapse(discrete, stopped):
             return Verdict("either" if either else "wrong", fault)
-    elif code == 0 and (refusal or "").startswith("driven") and stopped_before(out, refusal):
-        refusal = None
+    elif stopped is not None and (refusal or "").startswith("driven") and stopped <= float(refusal.rpartition(" ")[2]):
+        refusal = None  # it stopped at ζ_* before
     if code == 2 and (refusal or "").startswith("driven") and stands(discrete):
         return Verdict("either" if either else "refused wrongly", f"it stands at first: {said}")
     if code == 2:
@@ -84,19 +85,7 @@ def verdict_on(discrete, out, code, output):
     if code == 1:
         why, excused = missed(discrete, frames)
         return Verdict("either" if excused else "refused wrongly", said + why)
-    return judge_stop(discrete, frames, out) or found
-
-
-def collapse_of(out):
-    """The time at which the program says that nothing supports the body any more; None if it does not say so."""
-    summary = json.loads((out / "summary.json").read_text())
-    return summary["stopped_at"] if summary.get("stopped_by") == "collapse" else None
-
-
-def stopped_before(out, refusal):
-    """Whether the run stopped at ζ_* before the time of the refusal."""
-    stopped = json.loads((out / "summary.json").read_text())["stopped_at"]
-    return stopped is not None and stopped <= float(refusal.rpartition(" ")[2])
+    return judge_stop(discrete, frames, summary) or found
 
 
 def judge_collapse(discrete, time):
@@ -264,13 +253,11 @@ def shown(step, frame, scale):
     return ""
 
 
-def judge_stop(discrete, frames, out):
+def judge_stop(discrete, frames, summary):
     """Checks a stop at ζ_*; None if it is right or there is no stop."""
-    summary = json.loads((out / "summary.json").read_text())
-    stopped = summary["stopped_at"]
     if summary["stopped_by"] != "damage":
         return None
-    last = frames[-1]
+    stopped, last = summary["stopped_at"], frames[-1]
     zeta, unsure = discrete.damage_step(last.u, last.zeta, stopped - last.time)
     least = zeta.min()
     if least <= discrete.law["threshold"] + DAMAGE + unsure:

@@ -11,6 +11,8 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+import shared  # noqa: F401
+from elements import counter_clockwise
 from lagrange import SIDES, Lagrange
 from triangulation import Triangulation, edge_keys
 
@@ -177,10 +179,7 @@ def finish(rng, body, length, turn):
     c, s = np.cos(turn), np.sin(turn)
     nodes = np.empty((len(used), 2))
     nodes[number[used]] = length * points[used] @ np.array([[c, s], [-s, c]])
-    triangles = number[triangles][rng.permutation(len(triangles))]
-    a, b = (nodes[triangles[:, k]] - nodes[triangles[:, 0]] for k in (1, 2))
-    clockwise = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0] < 0
-    triangles[clockwise] = triangles[clockwise][:, [0, 2, 1]]
+    triangles = counter_clockwise(nodes, number[triangles][rng.permutation(len(triangles))])
     return Triangulation(nodes, triangles, {name: number[edges] for name, edges in lines.items()})
 
 

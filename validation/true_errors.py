@@ -5,15 +5,12 @@ reference. Newton's method finds the element and the coordinates of these points
 meshes differ by the error of their parabolas; the elements of the run are continued up to the reference. The reference
 should be P2 on a mesh graded geometrically to every corner and end of contact, with its own time steps."""
 
-import json
-from pathlib import Path
-
 import numpy as np
 from matplotlib.tri import Triangulation
 
 import shared  # noqa: F401
-from signorini_results import derivatives, functions
-from reading import frames_of, read_frame
+import signorini_results
+from signorini_results import derivatives, functions, read_frame
 
 # Barycentric points and weights of the rule of degree 4 with six points.
 NEAR, FAR = 0.816847572980459, 0.108103018168070
@@ -26,13 +23,11 @@ SLOPES = np.array([[-1, -1], [1, 0], [0, 1]])
 NEWTON, STEP, WALK = 12, 0.5, 30
 
 
-class Run:
+class Run(signorini_results.Run):
     """A run at its last frame."""
 
     def __init__(self, folder):
-        folder = Path(folder)
-        self.summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-        self.frames = frames_of(folder)
+        super().__init__(folder)
         frame = read_frame(self.frames[-1][1])
         # A node where materials meet is several points.
         numbers = frame.point_data.get("global_node", np.arange(len(frame.points)))
