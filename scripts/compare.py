@@ -8,7 +8,6 @@ the mesh that the first solver adapts. The results of a run are in OUT/SCENE-SOL
 OUT/comparison.csv. What follows `--` are PETSc options."""
 
 import argparse
-import json
 import os
 import subprocess
 import sys
@@ -19,8 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from reading import read_frame
-from results import markdown, read_table, write_table
-from signorini_results import frames_of
+from results import markdown, write_table
+from signorini_results import load
 
 # Titles of the printed table; the others are shown in comparison.csv alone.
 TITLES = {
@@ -83,21 +82,20 @@ def compared(scene, arguments):
 def read(folder, error):
     """The cost of a run over all steps, its last state, and the largest |u| and |p| of the run. There is no
     state if the first solve failed."""
-    history = read_table(folder / "history.csv") if (folder / "history.csv").exists() else []
-    if not history:
+    run = load(folder) if (folder / "history.csv").exists() else None
+    if run is None or not len(run.history["step"]):
         return {"steps": 0, **dict.fromkeys(["contact_changes", *TOTALS, "seconds", *KKT])}, None
-    active = [row["active_nodes"] for row in history]
-    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    history = run.history
     row = {
-        "steps": int(history[-1]["step"]),
-        "contact_changes": sum(a != b for a, b in zip(active, active[1:])),
-        **{name: int(sum(row[key] for row in history)) for name, key in TOTALS.items()},
-        "seconds": summary.get("phases", {}).get("contact", 0.0),
-        **{key: max(row[key] for row in history) for key in KKT},
+        "steps": int(history["step"][-1]),
+        "contact_changes": np.count_nonzero(np.diff(history["active_nodes"])),
+        **{name: int(history[key].sum()) for name, key in TOTALS.items()},
+        "seconds": run.summary.get("phases", {}).get("contact", 0.0),
+        **{key: history[key].max() for key in KKT},
     }
-    meshes = [read_frame(path) for _, path in frames_of(folder)]
+    meshes = [read_frame(path) for _, path in run.frames]
     frames = [mesh.point_data for mesh in meshes]
-    scales = [max(row["displacement_max"] for row in history), 1.0,
+    scales = [history["displacement_max"].max(), 1.0,
               max(np.max(np.abs(frame["normal_pressure"])) for frame in frames)]
     values = [frames[-1][name] for name in ["displacement", "zeta", "normal_pressure"]]
     return row, (meshes[-1].points, values, [scale or 1.0 for scale in scales])

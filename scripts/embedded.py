@@ -1,5 +1,5 @@
-"""Runs a script embedded in `signorini`: python -c EMBEDDED NAME ARGUMENT…, with the sources of all scripts as
-JSON on standard input. It writes no files of its own."""
+"""Runs a script embedded in `signorini`: python -c EMBEDDED NAME ARGUMENT…, with the sources of all scripts and the
+template of the report as JSON on standard input. It writes no files of its own."""
 
 import importlib
 import json
@@ -20,6 +20,9 @@ class Sources(MetaPathFinder, InspectLoader):
 
     def get_source(self, name):
         return self.sources[name]
+
+    def get_data(self, path):
+        return self.sources[path].encode()
 
 
 sys.meta_path.insert(0, Sources(json.load(sys.stdin)))

@@ -11,9 +11,11 @@ import html
 import io
 import json
 import multiprocessing
+import os
 import sys
 from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
 from functools import partial
+from importlib.util import find_spec
 from string import Template
 
 # This module comes first: it checks the memory before numpy is imported.
@@ -21,15 +23,13 @@ import drawing
 from drawing import RED, headline, np, plt, wrap_titles
 from bars import barred, three_digits
 from contact_pressure import draw_evolution, draw_pressure
-from histories import draw_damage_history, draw_force_displacement, draw_histories
+from figures import FIGURES
+from histories import draw_histories
 from limits import limits_of
-from maps import draw_deformed, draw_state, draw_stress_and_damage
+from maps import draw_state
 from reading import evenly, read_results, states
-from principal import draw_principal
-from report_page import PAGE, SLIDER
 from report_pdf import FULL, HIGHEST, SPACE, write_pages
 from results import telling
-from setting import draw_setting
 from signorini_summaries import bars, unit_of
 from table import text_of
 
@@ -85,17 +85,9 @@ def all_drawn(tasks):
 def pictures(results, everything):
     """Functions that draw the pictures of the page, by name."""
     limits = limits_of([results])
-    return {
-        "histories": partial(draw_histories, results),
-        "stress and damage": partial(draw_stress_and_damage, results, limits),
-        "principal stresses": partial(draw_principal, results, limits),
-        "evolution of contact": lambda: draw_evolution(everything, limits_of(everything)),
-        "deformed mesh": partial(draw_deformed, results, limits),
-        "contact pressure and gap": partial(draw_pressure, results, limits),
-        "the setting": partial(draw_setting, results, limits),
-        "forces on the supports": partial(draw_force_displacement, results, limits),
-        "least and mean ζ": partial(draw_damage_history, results, limits),
-    }
+    return {**{name: partial(draw, results, limits) for name, draw in FIGURES.items()},
+            "histories": partial(draw_histories, results),
+            "contact-evolution": lambda: draw_evolution(everything, limits_of(everything))}
 
 
 def element(name, data):
@@ -125,7 +117,14 @@ def slider(frames):
     """Pictures of the body and of Γ_C at several times, with a slider."""
     if len(frames) < 2:
         return ""
-    return Template(SLIDER).substitute(last=len(frames) - 1, frames=json.dumps(frames))
+    return template()[1].substitute(last=len(frames) - 1, frames=json.dumps(frames))
+
+
+def template():
+    """The templates of the page and of its slider, from report.html beside the scripts or embedded."""
+    spec = find_spec("report_pdf")
+    path = os.path.join(os.path.dirname(spec.origin or ""), "report.html")
+    return [Template(text) for text in spec.loader.get_data(path).decode().split("<!-- slider -->\n")]
 
 
 def facts(results):
@@ -229,7 +228,7 @@ def page(results, arguments, everything):
     elements = {name: element(name, drawn[name]) for name in named}
     notes = [f"<li>{html.escape(note)}</li>" for note in summary.get("notes", [])]
     title, byline, subtitle, ending = map(html.escape, head_of(results, arguments))
-    return Template(PAGE).substitute(
+    return template()[0].substitute(
         title=title,
         byline=byline,
         model=MODEL,
@@ -238,12 +237,12 @@ def page(results, arguments, everything):
         subtitle=subtitle,
         ending=ending,
         facts=table(facts(results)),
-        setting=elements["the setting"],
+        setting=elements["setting"],
         slider=slider([drawn[time] for time in tasks]),
         pictures="".join(elements[name] for name in (
-            "deformed mesh", "stress and damage", "principal stresses", "contact pressure and gap")),
+            "deformed", "stress-damage", "principal-stresses", "pressure")),
         histories="".join(elements[name] for name in (
-            "least and mean ζ", "forces on the supports", "evolution of contact", "histories"))
+            "damage-history", "force-displacement", "contact-evolution", "histories"))
         or "One static solve.",
         errors=table(errors_of(summary)),
         residuals=table((key, f"{value:.1e}") for key, value in (summary.get("kkt") or {}).items()),
@@ -265,7 +264,7 @@ def write_pdf(path, results, arguments, everything):
         pages.text(ending, color=RED, weight="bold")
         pages.table("Last state", facts(results))
         drawing.set_width(pages.room)
-        draw["the setting"](figure=pages)
+        draw["setting"](figure=pages)
         pages.table("Governing values", governing(everything, results.units))
         pages.table("Body, materials, supports", body(results))
         pages.table("Estimated relative errors", errors_of(summary))
@@ -273,8 +272,8 @@ def write_pdf(path, results, arguments, everything):
         pages.text("\n".join(f"Note: {note}" for note in summary.get("notes", [])))
         pages.end()
         pages.start(HIGHEST)
-        for name in ("deformed mesh", "contact pressure and gap", "stress and damage", "principal stresses",
-                     "forces on the supports", "least and mean ζ"):
+        for name in ("deformed", "pressure", "stress-damage", "principal-stresses", "force-displacement",
+                     "damage-history"):
             drawing.set_width(FULL if "stress" in name else 0.5 * (FULL - SPACE))
             draw[name](figure=pages)
 

@@ -40,14 +40,12 @@ def settings_of(summary):
     return dict((part.strip() for part in text.split("=", 1)) for text in option_of(summary, "set") if "=" in text)
 
 
-def value_of(summary, name):
-    """A value by its full name, or a KeyError. Names of quantities contain points."""
+def value_of(summary, name, absent=None):
+    """A value by its full name, or `absent`. Names of quantities contain points."""
     if name in summary:
         return summary[name]
     first, _, rest = name.partition(".")
-    if not isinstance(summary.get(first), dict):
-        raise KeyError(name)
-    return value_of(summary[first], rest)
+    return value_of(summary[first], rest, absent) if isinstance(summary.get(first), dict) else absent
 
 
 def bars(summary):
@@ -89,13 +87,9 @@ def rows_of(folders, summaries, columns, settings=None):
     for folder, summary, of in zip(folders, summaries, settings):
         row = {"run": Path(folder).name, **{name: of.get(name) for name in names}}
         for name in columns:
-            try:
-                row[name] = value_of(summary, name)
-            except KeyError:
-                row[name] = None
-            of_extreme = (summary.get("extremes") or {}).get(name) or {}
+            row[name] = value_of(summary, name)
             row[f"{name}.bar"] = bars(summary).get(name.removeprefix("quantities."))
-            row[f"{name}.singular"] = of_extreme.get("singular")
+            row[f"{name}.singular"] = value_of(summary, f"extremes.{name}.singular")
             if summary and (unit := unit_of(name, units_of(summary))):
                 units.setdefault(name, {})[unit] = units.setdefault(f"{name}.bar", {})[unit] = None
         asked = [re.match("accuracy .*?(NOT )?reached", note) for note in summary.get("notes", [])]
@@ -112,16 +106,10 @@ def rows_of(folders, summaries, columns, settings=None):
 def unknown(columns, summaries):
     """Messages about names that no summary has."""
     for name in columns:
-        first, *below = name.split(".")
-        known = [summary for summary in summaries if name in _names(summary)]
-        if not known and name != "error":
-            tables = [summary.get(first) for summary in summaries if below and isinstance(summary.get(first), dict)]
-            there = {f"{first}.{key}" for table in tables for key in table}
-            there = there or {key for summary in summaries for key in summary}
-            yield f"no summary has {name}; there are {', '.join(sorted(there))}"
-
-
-def _names(table, prefix=""):
-    """The full names of all values."""
-    return {name for key, value in table.items()
-            for name in (f"{prefix}{key}", *(_names(value, f"{prefix}{key}.") if isinstance(value, dict) else ()))}
+        if name == "error" or any(value_of(summary, name, ...) is not ... for summary in summaries):
+            continue
+        first, point, _ = name.partition(".")
+        tables = [summary[first] for summary in summaries if point and isinstance(summary.get(first), dict)]
+        there = {f"{first}.{key}" for table in tables for key in table}
+        there = there or {key for summary in summaries for key in summary}
+        yield f"no summary has {name}; there are {', '.join(sorted(there))}"

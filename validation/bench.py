@@ -31,7 +31,7 @@ from statistics import median
 
 import numpy as np
 
-from shared import ROOT
+from shared import ROOT, parser_of
 from drawing import BLUE, FAINT, GREEN, INK, RED, plt
 from results import markdown, read_table, write_table
 
@@ -372,10 +372,8 @@ def draw(rows, picture):
 
 def main():
     parts = {"compare": compare, "growth": growth, "ranks": ranks}
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = parser_of(__doc__, "bench")
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(parts)}")
-    parser.add_argument("--binary", type=Path, default=ROOT / "target" / "release" / "signorini")
-    parser.add_argument("--out", type=Path, default=Path("out/bench"))
     parser.add_argument("--quick", action="store_true", help="small meshes, one round")
     parser.add_argument("--floor", nargs="*", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
@@ -384,7 +382,7 @@ def main():
         return
     if unknown := set(arguments.parts) - set(parts):
         parser.error(f"there is no part {', '.join(unknown)}; there are {', '.join(parts)}")
-    bench = Bench(arguments.binary.resolve(), arguments.out.resolve())
+    bench = Bench(arguments.binary, arguments.out.resolve())
     try:
         for part in arguments.parts or parts:
             parts[part](bench, arguments.quick)

@@ -15,7 +15,6 @@ With --asked the runs are `--accuracy` 0.1, 0.03, 0.01 and 0.003, and the printe
 exit code 1 if the larger one exceeds it. (`make promises` checks the error of every figure.)
 """
 
-import argparse
 import itertools
 import os
 import shutil
@@ -31,7 +30,7 @@ import numpy as np
 from matplotlib.ticker import FuncFormatter
 
 import references
-from shared import ROOT
+from shared import ROOT, parser_of
 from drawing import BLUE, FAINT, GREEN, INK, RED, plt
 from results import write_table
 from scene import elasticity, read_scene, write_scene
@@ -123,7 +122,7 @@ class Study:
     """The runs of one scene and their rows."""
 
     def __init__(self, binary, path, folder):
-        self.binary, self.folder = Path(binary).resolve(), folder
+        self.binary, self.folder = binary, folder
         self.shipped = read_scene(path)
         self.name = Path(path).stem
         shutil.copy(Path(path).parent / self.shipped["mesh"]["file"], folder)
@@ -246,8 +245,7 @@ def draw_all(tables, picture):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--binary", type=Path, default=ROOT / "target" / "release" / "signorini")
+    parser = parser_of(__doc__)
     parser.add_argument("--asked", action="store_true", help="the accuracy asked for against the true error")
     parser.add_argument("scenes", nargs="+", type=Path)
     arguments = parser.parse_args()

@@ -10,7 +10,6 @@ times. On nested meshes of a polygon the norms of differences are exact. Prints 
 converge.csv and converge.png into out/converge/<scene>.
 """
 
-import argparse
 import subprocess
 import sys
 import tempfile
@@ -18,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shared import ROOT
+from shared import ROOT, parser_of
 from drawing import FAINT, INK, MaxNLocator, plt
 from reading import read_frame
 from references import kept, refine
@@ -87,7 +86,7 @@ class Study:
 
     def __init__(self, arguments):
         path = arguments.scene
-        self.binary, self.name, self.refinements = arguments.binary.resolve(), path.stem, arguments.refinements
+        self.binary, self.name, self.refinements = arguments.binary, path.stem, arguments.refinements
         scene = read_scene(path)
         if "time" not in scene:
             sys.exit(f"{path}: orders of convergence need a scene with [time]")
@@ -265,9 +264,8 @@ def errors_of_table_1(binary):
 
 def arguments_of(words=None):
     """The command line."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = parser_of(__doc__)
     parser.add_argument("scene", type=Path, nargs="?", default=ROOT / "geo" / f"{PAPER}.toml")
-    parser.add_argument("--binary", type=Path, default=ROOT / "target" / "release" / "signorini")
     parser.add_argument("--reference", action="store_true", help="only make the reference")
     parser.add_argument("--refinements", type=int, default=6, help="of the coarsest mesh for the reference")
     parser.add_argument("--size", type=float, help="of the coarsest mesh, m (default: 8 times the scene's)")

@@ -8,13 +8,12 @@ and a sheet of all of them for a reader who has the paper beside it.
 end.
 """
 
-import argparse
 import subprocess
 from pathlib import Path
 
 import numpy as np
 
-from shared import ROOT
+from shared import ROOT, parser_of
 import converge
 import drawing
 from drawing import BLUE, INK, RED, plt
@@ -154,14 +153,12 @@ def sheet(found, out):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--binary", type=Path, default=ROOT / "target" / "release" / "signorini")
+    parser = parser_of(__doc__, "paper")
     parser.add_argument("--quick", action="store_true", help="without Table 1 and Figure 3")
-    parser.add_argument("--out", type=Path, default=ROOT / "out" / "paper")
     arguments = parser.parse_args()
     out = arguments.out
     out.mkdir(parents=True, exist_ok=True)
-    found = figures(arguments.binary.resolve(), out)
+    found = figures(arguments.binary, out)
     if not arguments.quick:
         rows = converge.errors_of_table_1(arguments.binary)
         table_1(rows, out)

@@ -12,7 +12,6 @@ An error counts relative to the figure's scale, the largest value in the truth's
 figure of each run. Exit code 1 if a bar or a "reached" does not hold.
 """
 
-import argparse
 import json
 import subprocess
 import sys
@@ -23,7 +22,7 @@ from statistics import median
 
 import numpy as np
 
-from shared import ROOT
+from shared import ROOT, parser_of
 from references import kept
 from results import read_table, write_table
 from scene import SceneError, elasticity
@@ -194,14 +193,12 @@ def trial(binary, truth, accuracy):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--binary", type=Path, default=ROOT / "target" / "release" / "signorini")
-    parser.add_argument("--out", type=Path, default=ROOT / "out" / "promises")
+    parser = parser_of(__doc__, "promises")
     parser.add_argument("--truth", type=Path, default=ROOT / "out" / "promises" / "truth")
     parser.add_argument("--accuracy", type=float, nargs="+", default=[0.1, 0.03, 0.01])
     parser.add_argument("names", nargs="*", help="of scenes, if not all")
     arguments = parser.parse_args()
-    binary, rows = arguments.binary.resolve(), []
+    binary, rows = arguments.binary, []
     arguments.out.mkdir(parents=True, exist_ok=True)
     failed = 0
     for scene in (s for s in scenes() if s.name in arguments.names or not arguments.names):

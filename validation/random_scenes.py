@@ -7,7 +7,6 @@ gaps. Writes out/random/scenes.csv. Wrong or wrongly refused scenes are kept in 
 exit code 1; `--again ID` repeats one of them. (`judge_check` checks the verification itself.)
 """
 
-import argparse
 import json
 import os
 import re
@@ -25,7 +24,7 @@ from pathlib import Path
 # The matrices of the verification are small: threads would only wait for each other.
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", SCOTCH_PTHREAD_NUMBER="1")
 
-from shared import ROOT  # noqa: E402
+from shared import ROOT, parser_of  # noqa: E402
 from judge import Verdict, judge  # noqa: E402
 from random_bodies import write_msh  # noqa: E402
 from random_draw import draw, vary  # noqa: E402
@@ -136,18 +135,16 @@ def summarise(rows):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = parser_of(__doc__, "random")
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--first", type=int, default=0, help="number of the first scene")
     parser.add_argument("--solver", help="this one instead of the one drawn")
     parser.add_argument("--order", type=int, choices=[1, 2], help="of the displacements (default: drawn)")
-    parser.add_argument("--binary", type=Path, default=ROOT / "target" / "release" / "signorini")
-    parser.add_argument("--out", type=Path, default=ROOT / "out" / "random")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--again", help="run a kept scene once more")
     arguments = parser.parse_args()
-    binary, out = arguments.binary.resolve(), arguments.out.resolve()
+    binary, out = arguments.binary, arguments.out.resolve()
     if arguments.again:
         folder = out / "failures" / arguments.again
         row = json.loads((folder / "verdict.json").read_text())

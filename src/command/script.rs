@@ -18,12 +18,13 @@ macro_rules! scripts {
 }
 
 /// The scripts and the modules that they import from each other.
-const SCRIPTS: [(&str, &str); 26] = scripts! {
+const SCRIPTS: [(&str, &str); 25] = scripts! {
     "animation" "bars" "compare" "contact_pressure" "drawing" "elements" "expressions" "figures"
     "histories" "info" "limits" "lines" "maps" "paraview_script" "paraview_view" "principal" "reading" "report"
-    "report_page" "report_pdf" "results" "setting"
-    "signorini_results" "signorini_summaries" "study" "table"
+    "report_pdf" "results" "setting" "signorini_results" "signorini_summaries" "study" "table"
 };
+/// The template of the report, for `report`.
+const REPORT: (&str, &str) = ("report.html", include_str!("../../scripts/report.html"));
 /// The Python program that runs one of them.
 const EMBEDDED: &str = include_str!("../../scripts/embedded.py");
 /// The Python program that prints the missing packages.
@@ -55,7 +56,8 @@ pub fn script(name: &str, ScriptArguments { arguments }: &ScriptArguments) -> Re
         .spawn()
         .map_err(|error| format!("{}: {error}", python.display()))?;
     if let Some(mut input) = running.stdin.take() {
-        let sources = serde_json::to_vec(&BTreeMap::from(SCRIPTS)).map_err(Failure::from)?;
+        let sources: BTreeMap<_, _> = SCRIPTS.into_iter().chain([REPORT]).collect();
+        let sources = serde_json::to_vec(&sources).map_err(Failure::from)?;
         // A script that ends early reports the reason itself.
         let _ = input.write_all(&sources);
     }
