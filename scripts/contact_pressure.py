@@ -62,12 +62,9 @@ def _corners(points):
 
 def _names(curves):
     """The name of each curve's boundary, numbered where the boundary has several parts."""
-    names, seen = [curve.name for curve in curves], {}
-    for k, name in enumerate(names):
-        seen[name] = seen.get(name, 0) + 1
-        if (count := sum(curve.name == name for curve in curves)) > 1:
-            names[k] = f"{name} ({seen[name]} of {count})"
-    return names
+    names = [curve.name for curve in curves]
+    return [name if names.count(name) == 1 else f"{name} ({names[:k + 1].count(name)} of {names.count(name)})"
+            for k, name in enumerate(names)]
 
 
 def _scale(axes, largest):

@@ -28,7 +28,7 @@ from histories import draw_histories
 from limits import limits_of
 from maps import draw_state
 from reading import evenly, read_results, states
-from report_pdf import FULL, HIGHEST, SPACE, write_pages
+from report_pdf import FULL, HIGHEST, SPACE, pages_of
 from results import telling
 from signorini_summaries import bars, unit_of
 from table import text_of
@@ -257,8 +257,7 @@ def write_pdf(path, results, arguments, everything):
     """Writes two pages: the setting and the governing values; maps and curves."""
     title, byline, subtitle, ending = head_of(results, arguments)
     draw, summary = pictures(results, everything), results.summary
-
-    def fill(pages):
+    with pages_of(path, headline(results, "")) as pages:
         pages.text(title, size=14, weight="bold")
         pages.text("\n".join(filter(None, (byline, subtitle, MODEL))))
         pages.text(ending, color=RED, weight="bold")
@@ -276,11 +275,6 @@ def write_pdf(path, results, arguments, everything):
                      "damage-history"):
             drawing.set_width(FULL if "stress" in name else 0.5 * (FULL - SPACE))
             draw[name](figure=pages)
-
-    try:
-        write_pages(path, headline(results, ""), fill)
-    finally:
-        drawing.WIDTH = None
 
 
 def main(prog=None):

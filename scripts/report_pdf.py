@@ -1,6 +1,7 @@
 """The pages of report.pdf: text as text, pictures as vector graphics."""
 
 import textwrap
+from contextlib import contextmanager
 from itertools import zip_longest
 
 from matplotlib.backends.backend_pdf import PdfPages
@@ -94,10 +95,12 @@ def width_of(text):
     return TextPath((0, 0), text.replace("$", r"\$"), size=SIZE).get_extents().width / 72 if text.strip() else 0.0
 
 
-def write_pages(path, head, fill):
-    """Writes pages to a PDF; `fill` puts the blocks on them. Titles of pictures are without `head`."""
+@contextmanager
+def pages_of(path, head):
+    """Pages for a PDF. The titles of pictures are written without `head`; their widths are set for the pages."""
     style = {"savefig.bbox": None, "figure.constrained_layout.w_pad": 0.02, "figure.constrained_layout.h_pad": 0.02}
     with PdfPages(path) as pdf, plt.rc_context(style):
         pages = Pages(pdf, head)
-        fill(pages)
+        yield pages
         pages.end()
+    drawing.WIDTH = None

@@ -130,8 +130,7 @@ class Frame:
         self.run, self.time = run, time
         self.mesh = read_frame(path)
         self.points = self.mesh.points[:, :2]
-        blocks = [block.data for block in self.mesh.cells if block.type in ("triangle", "triangle6")]
-        self.elements = np.vstack(blocks)
+        self.elements = np.vstack([block.data for block in self.mesh.cells if block.type in ("triangle", "triangle6")])
 
     def field(self, name):
         """A point field of the frame, or a component: u_x, stress_yy, stress_1, …"""

@@ -35,11 +35,6 @@ def option_of(summary, name):
             if word == option or word.startswith(f"{option}=")]
 
 
-def settings_of(summary):
-    """KEY → value of the `--set` arguments of a run."""
-    return dict((part.strip() for part in text.split("=", 1)) for text in option_of(summary, "set") if "=" in text)
-
-
 def value_of(summary, name, absent=None):
     """A value by its full name, or `absent`. Names of quantities contain points."""
     if name in summary:
@@ -80,7 +75,8 @@ def rows_of(folders, summaries, columns, settings=None):
     NAME.bar and the reason NAME.singular, if a run has them. `reached` tells whether the run has the accuracy asked
     for, `status` whether it finished, stopped early or failed.
     """
-    settings = settings or [settings_of(summary) for summary in summaries]
+    settings = settings or [dict(map(str.strip, text.split("=", 1)) for text in option_of(summary, "set") if "=" in text)
+                            for summary in summaries]
     names = list(dict.fromkeys(name for of in settings for name in of))
     names = [n for n in names if len({of.get(n) for of in settings}) > 1]
     rows, units = [], {}

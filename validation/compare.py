@@ -18,7 +18,6 @@ The bodies must be supported: a scene whose solution is not unique cannot be com
 Exit code 1 if any case fails.
 """
 
-import argparse
 import copy
 import itertools
 import re
@@ -34,7 +33,7 @@ try:
     from fenicsx import ContactError, evolve
 except ImportError as error:
     sys.exit(f"{error}: the comparison needs FEniCSx; run `make deps-validate`")
-import shared  # noqa: F401
+from shared import parser_of
 from lagrange import Lagrange
 from frames import read_frames
 from results import ResultError, read_table
@@ -174,14 +173,12 @@ def compare(path, order, arguments):
 
 
 def main():
-    parser = argparse.ArgumentParser(description="Compare signorini with FEniCSx.")
+    parser = parser_of(__doc__)
     parser.add_argument("scenes", nargs="+", type=Path, metavar="SCENE")
-    parser.add_argument("--binary", type=Path, default=Path("target/release/signorini"))
     parser.add_argument("--solvers", nargs="+", help="contact solvers [default: all]")
     parser.add_argument("--orders", nargs="+", type=int, choices=[1, 2], default=[1, 2], help="of the displacements")
     parser.add_argument("--steps", type=int, default=20, help="time steps of the damage case")
     arguments = parser.parse_args()
-    arguments.binary = arguments.binary.resolve()
     if not arguments.binary.is_file():
         sys.exit(f"{arguments.binary} does not exist: build it first, or name it with --binary")
     arguments.solvers = arguments.solvers or solvers(arguments.binary)

@@ -16,7 +16,7 @@ import shared  # noqa: F401
 from signorini_results import derivatives, functions
 from expressions import Expression
 from lagrange import SIDES, Lagrange
-from scene import DAMAGE, displacement_order, elasticity, of_material
+from scene import DAMAGE, direction_of, displacement_order, elasticity, of_material
 
 # Lines at an angle below the first value are one line. Below the second value rounding may decide.
 SAME, ALIKE = 1e-8, 1e-4
@@ -81,10 +81,7 @@ class Discrete:
 
     def stiffness(self, zeta):
         """K(ζ), the sum over the triangles."""
-        k = self.element_stiffness(zeta)
-        rows, columns = (np.broadcast_to(v, k.shape) for v in (self.dof[:, :, None], self.dof[:, None, :]))
-        n = 2 * len(self.points)
-        return coo_matrix((k.ravel(), (rows.ravel(), columns.ravel())), (n, n)).tocsc()
+        return assembled(self.element_stiffness(zeta), self.dof, 2 * len(self.points))
 
     def element_sizes(self, zeta, u):
         """Per unknown Σ_T |f_T| and Σ_T |K_T||u_T|: the scales of forces and of their rounding."""
@@ -154,10 +151,7 @@ class Discrete:
         for boundary in self.boundaries:
             if "gap" not in boundary:
                 continue
-            gap, fixed = Expression(boundary["gap"]), boundary.get("normal")
-            if fixed is not None:
-                fixed = np.array([float(Expression(c)(0.0, 0.0, 0.0)) for c in fixed])
-                fixed = fixed / np.linalg.norm(fixed)
+            gap, fixed = Expression(boundary["gap"]), direction_of(boundary)
             for node, faces in self.faces(boundary["name"]).items():
                 if fixed is not None:
                     faces = [(fixed, sum(length for _, length in faces))]
@@ -200,8 +194,7 @@ class Discrete:
             if not all(np.isfinite(gap.at(points, t)).all() for t in times):
                 return "gap not finite", False
             if "normal" in boundary:
-                n = np.array([float(Expression(c)(0.0, 0.0, 0.0)) for c in boundary["normal"]])
-                cosine = self.mesh.outward_normals(boundary["name"])[0] @ n / np.linalg.norm(n)
+                cosine = self.mesh.outward_normals(boundary["name"])[0] @ direction_of(boundary)
                 if (cosine < -1e-6).all():
                     return "normal into the body", False
                 some |= bool((cosine < 1e-6).any())
@@ -237,10 +230,8 @@ class Discrete:
             local = np.eye(3) / 3
         mass = self.area[:, None, None] * local
         laplace = np.einsum("eik,ejk,e->eij", self.gradient, self.gradient, self.area * diffusion)
-        rows, columns = (np.broadcast_to(v, mass.shape).ravel() for v in (t[:, :, None], t[:, None, :]))
         n = len(zeta)
-        assemble = lambda v: coo_matrix((v.ravel(), (rows, columns)), (n, n)).tocsc()
-        m, l = assemble(mass), assemble(laplace)
+        m, l = assembled(mass, t, n), assembled(laplace, t, n)
         right = m @ zeta
         if self.order == 1:
             np.add.at(right, t, step * np.einsum("eij,ej->ei", mass, phi))
@@ -265,6 +256,12 @@ class Rows:
     direction: np.ndarray
     value: np.ndarray
     weight: np.ndarray
+
+
+def assembled(blocks, dof, size):
+    """The sum of the matrices of triangles (m, k, k) with unknowns (m, k)."""
+    rows, columns = (np.broadcast_to(v, blocks.shape).ravel() for v in (dof[:, :, None], dof[:, None, :]))
+    return coo_matrix((blocks.ravel(), (rows, columns)), (size, size)).tocsc()
 
 
 def pair(texts, points, t):

@@ -37,7 +37,7 @@ from petsc4py import PETSc
 import shared  # noqa: F401
 from expressions import Expression
 from lagrange import Lagrange
-from scene import DAMAGE, SceneError, displacement_order, of_material, of_order, read_scene
+from scene import DAMAGE, SceneError, direction_of, displacement_order, of_material, of_order, read_scene
 from triangulation import edge_keys, read_triangulation
 
 logging.disable(logging.INFO)  # the form compiler reports each of its builds
@@ -168,8 +168,7 @@ class Body:
             yield ufl.dot(force, w) * ufl.dx(metadata=rule)
         gravity = vector(self.scene.get("body", {}).get("gravity", ["0", "0"]))
         if gravity is not None:
-            density = of_material(self.scene, self.mesh, "material", "density", 0.0)
-            density = per_triangle(self.domain, density)
+            density = per_triangle(self.domain, of_material(self.scene, self.mesh, "material", "density", 0.0))
             yield density * ufl.dot(gravity, w) * ufl.dx(metadata={"quadrature_degree": 2})
         for boundary in self.boundaries:
             traction = vector(boundary.get("traction", ["0", "0"]))
@@ -234,7 +233,7 @@ class Body:
         normals, _ = self.mesh.outward_normals(name)
         curved = self.nodes.curved(edges)
         if "normal" in boundary:
-            normals, curved = np.broadcast_to(boundary_direction(boundary), normals.shape), False
+            normals, curved = np.broadcast_to(direction_of(boundary), normals.shape), False
         if curved or (np.abs(normals).max(axis=1) < 1 - 1e-9).any():
             raise SceneError(f"boundary '{name}': this check knows only contact and symmetry along x or y")
         component = np.abs(normals).argmax(axis=1)
@@ -252,19 +251,15 @@ class Damage:
         self.law = {**DAMAGE, **body.scene["damage"]}
         domain = body.straight
         k = fem.Constant(domain, PETSc.ScalarType(step))
-        def constant(key, domain):
+        for key in ("diffusion", "lambda_d", "lambda_u", "lambda_w", "strain_cap"):
             values = of_material(body.scene, body.mesh, "damage", key, DAMAGE.get(key))
-            return per_triangle(domain, values)
-
-        kappa = constant("diffusion", domain)
-        for key in ("lambda_d", "lambda_u", "lambda_w", "strain_cap"):
-            self.law[key] = constant(key, body.domain)
+            self.law[key] = per_triangle(domain if key == "diffusion" else body.domain, values)
         space = fem.FunctionSpace(domain, ("Lagrange", 1))
         self.dof_of_node = dof_of_node(space, Lagrange(body.mesh, 1))
         self.zeta = fem.Function(space)
         zeta, xi = ufl.TrialFunction(space), ufl.TestFunction(space)
         self.matrix = fem.petsc.assemble_matrix(
-            form((zeta * xi + k * kappa * ufl.dot(ufl.grad(zeta), ufl.grad(xi))) * ufl.dx)
+            form((zeta * xi + k * self.law["diffusion"] * ufl.dot(ufl.grad(zeta), ufl.grad(xi))) * ufl.dx)
         )
         self.matrix.assemble()
         self.factor = cholesky(self.matrix)
@@ -416,12 +411,6 @@ class Contact:
             iterations += 1
         self.counts["iterations"] += iterations
         return u
-
-
-def boundary_direction(boundary):
-    """The obstacle's fixed direction as a unit vector."""
-    direction = np.array([float(Expression(s)(0.0, 0.0, 0.0)) for s in boundary["normal"]])
-    return direction / np.linalg.norm(direction)
 
 
 def dolfinx_mesh(nodes):

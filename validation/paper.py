@@ -9,7 +9,6 @@ end.
 """
 
 import subprocess
-from pathlib import Path
 
 import numpy as np
 

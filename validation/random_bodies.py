@@ -12,7 +12,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 import shared  # noqa: F401
-from elements import counter_clockwise
+from elements import Pieces, counter_clockwise
 from lagrange import SIDES, Lagrange
 from triangulation import Triangulation, edge_keys
 
@@ -156,10 +156,7 @@ def cells(rng):
     points, _, triangles = grid(rng, nx, ny, lambda s, t: (s * shape[0] + tilt * t, t * shape[1]))
     cell = np.stack(np.divmod(np.arange(nx * ny), ny), 1) // r
     triangles = largest_part(triangles[np.repeat(keep[cell[:, 0], cell[:, 1]], 2)])
-    pairs = np.vstack([triangles[:, [k, (k + 1) % 3]] for k in range(3)])
-    keys = edge_keys(pairs, len(points))
-    _, first, count = np.unique(keys, return_index=True, return_counts=True)
-    edges = pairs[first[count == 1]]
+    edges = Pieces(triangles).boundary()
     d = points[edges[:, 1]] - points[edges[:, 0]]
     facing = np.round(2 / np.pi * np.arctan2(-d[:, 0], d[:, 1])).astype(int) % 4
     split = points[edges].mean(1) @ rng.uniform(-1, 1, 2) > rng.uniform(-1, 1)

@@ -104,6 +104,12 @@ class Draw:
         if not {"displacement", "symmetry"} & set(self.boundary.get(name, {})):
             self.put(name, traction=force)
 
+    def tractions(self, names, mesh, p):
+        """Tractions on some of the curves, each with probability p."""
+        for name in names:
+            if self.chance(p):
+                self.traction(name, mesh)
+
     def normal(self, mesh, name, tilt):
         """The curve's mean outward normal, turned by an angle."""
         n = mesh.outward_normals(name)[0].mean(0)
@@ -153,9 +159,7 @@ def block(d, mesh):
     d.gap("south")
     if d.chance(0.8):
         d.support(str(d.rng.choice(["west", "east"])))
-    for name in ("north", "east", "west"):
-        if d.chance(0.6):
-            d.traction(name, mesh)
+    d.tractions(("north", "east", "west"), mesh, 0.6)
 
 
 def wedge(d, mesh):
@@ -170,8 +174,7 @@ def wedge(d, mesh):
     for name, side in (("lower", -1), ("upper", 1)):
         if d.chance(0.9):
             d.gap(name, side * across if plates else None)
-        if d.chance(0.3):
-            d.traction(name, mesh)
+        d.tractions([name], mesh, 0.3)
 
 
 def slit(d, mesh):
@@ -180,9 +183,7 @@ def slit(d, mesh):
     for name in ("lip_low", "lip_high"):
         if d.chance(0.85):
             d.gap(name)
-    for name in ("south", "north", "west"):
-        if name not in d.boundary and d.chance(0.6):
-            d.traction(name, mesh)
+    d.tractions([name for name in ("south", "north", "west") if name not in d.boundary], mesh, 0.6)
 
 
 def cells(d, mesh):
@@ -195,8 +196,7 @@ def cells(d, mesh):
             d.support(name)
         elif way < 0.6:
             d.gap(name)
-        if d.chance(0.4):
-            d.traction(name, mesh)
+        d.tractions([name], mesh, 0.4)
 
 
 def rounded(d, mesh):
@@ -238,9 +238,7 @@ def loose(d, mesh):
         pressed = sum(d.normal(mesh, name, 0.0) for name in touching)
         if np.linalg.norm(pressed) > 0.1:  # opposite sides leave only rounding
             d.pressed = pressed
-    for name in names:
-        if d.chance(0.4 if d.pressed is None else 0.1):
-            d.traction(name, mesh)
+    d.tractions(names, mesh, 0.4 if d.pressed is None else 0.1)
 
 
 def normals(d, mesh):
@@ -251,8 +249,7 @@ def normals(d, mesh):
         if d.chance(0.7):
             tilt = d.number(-1.2, 1.2) if d.chance(0.8) else np.pi + d.number(-0.5, 0.5)
             d.gap(name, d.normal(mesh, name, tilt))
-        if d.chance(0.4):
-            d.traction(name, mesh)
+        d.tractions([name], mesh, 0.4)
 
 
 # Kind: bodies to choose from, and its conditions.

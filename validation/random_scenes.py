@@ -24,7 +24,7 @@ from pathlib import Path
 # The matrices of the verification are small: threads would only wait for each other.
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", SCOTCH_PTHREAD_NUMBER="1")
 
-from shared import ROOT, parser_of  # noqa: E402
+from shared import parser_of  # noqa: E402
 from judge import Verdict, judge  # noqa: E402
 from random_bodies import write_msh  # noqa: E402
 from random_draw import draw, vary  # noqa: E402

@@ -8,6 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+import shared  # noqa: F401
+from expressions import Expression
+
 
 class SceneError(Exception):
     """An error of the user; the message has one line and no traceback."""
@@ -48,6 +51,14 @@ def elasticity(young, poisson, plane="stress"):
     d[..., 0, 1] = d[..., 1, 0] = nu
     d[..., 2, 2] = 0.5 * (1 - nu)
     return (e / (1 - nu**2))[..., None, None] * d
+
+
+def direction_of(boundary):
+    """The fixed normal of a contact boundary as a unit vector; None without one."""
+    if "normal" not in boundary:
+        return None
+    direction = np.array([float(Expression(text)(0.0, 0.0, 0.0)) for text in boundary["normal"]])
+    return direction / np.linalg.norm(direction)
 
 
 # Defaults of [damage].
