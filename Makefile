@@ -157,4 +157,5 @@ fuzz: deps
 	done
 
 clean:
-	rm -rf target out geo/*.msh scripts/__pycache__ scripts/*/__pycache__ validation/__pycache__
+	rm -rf target out geo/*.msh scripts/__pycache__ scripts/*/__pycache__ validation/__pycache__ scripts/build \
+	    scripts/*.egg-info

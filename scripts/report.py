@@ -20,7 +20,7 @@ from string import Template
 
 # This module comes first: it checks the memory before numpy is imported.
 import drawing
-from drawing import RED, headline, np, plt, wrap_titles
+from drawing import RED, headline, least_zeta, np, plt, wrap_titles
 from bars import barred, three_digits
 from contact_pressure import draw_evolution, draw_pressure
 from figures import FIGURES
@@ -30,7 +30,7 @@ from maps import draw_state
 from reading import evenly, read_results, states
 from report_pdf import FULL, HIGHEST, SPACE, pages_of
 from results import telling
-from signorini_summaries import bars, unit_of
+from signorini_summaries import bars, unit_of, value_of
 from table import text_of
 
 # The largest number of frames of the slider.
@@ -130,11 +130,10 @@ def template():
 def facts(results):
     """The values of summary.json for the last state, and the given quantities by name."""
     summary, units, errors = results.summary, results.units, bars(results.summary)
-    stopped = summary.get("stopped_at") is not None
 
     def text(name, value):
-        rounded = three_digits(value) if stopped and isinstance(value, float) else value
-        return barred(value, errors.get(name)) or rounded
+        is_rounded = summary.get("stopped_at") is not None and isinstance(value, float)
+        return barred(value, errors.get(name)) or (three_digits(value) if is_rounded else value)
 
     rows = [(name, text(key, summary[key]), unit_of(key, units))
             for key, name in FACTS.items() if summary.get(key) is not None]
@@ -160,10 +159,11 @@ def governing(everything, units):
         if value == (1.0 if name == "least ζ" else 0.0):
             continue
         x, y = state.nodes[node]
-        largest = (state.summary.get("extremes") or {}).get("von_mises_max") or {}
-        is_there = kind == "stress" and state.singular and np.allclose(largest["at"], (x, y), atol=1e-9 * state.size)
-        rows.append((name, state.barred(key, value) or f"{value:.4g}", units.get(kind, ""), f"({x:.4g}, {y:.4g})",
-                     f"{state.time:g} {units['time']}", f"singular: {state.singular}" if is_there else ""))
+        extreme = (value_of(state.summary, f"extremes.{key}") if state.is_last else None) or {}
+        is_there = extreme.get("singular") and np.allclose(extreme["at"], (x, y), atol=1e-9 * state.size)
+        text = state.barred(key, value) or (least_zeta(value) if key == "zeta_min" else f"{value:.4g}")
+        rows.append((name, text, units.get(kind, ""), f"({x:.4g}, {y:.4g})", f"{state.time:g} {units['time']}",
+                     f"singular: {extreme['singular']}" if is_there else ""))
     return rows
 
 
@@ -218,8 +218,7 @@ def errors_of(summary):
 
 def page(results, arguments, everything):
     """The text of the page."""
-    summary = results.summary
-    scene = results.folder / "scene.toml"
+    summary, scene = results.summary, results.folder / "scene.toml"
     chosen = [state for _, state in evenly([(state.time, state) for state in everything], FRAMES)]
     limits = limits_of(chosen)
     tasks = {state.time: partial(frame, state, limits) for state in chosen}

@@ -99,8 +99,10 @@ def width_of(text):
 def pages_of(path, head):
     """Pages for a PDF. The titles of pictures are written without `head`; their widths are set for the pages."""
     style = {"savefig.bbox": None, "figure.constrained_layout.w_pad": 0.02, "figure.constrained_layout.h_pad": 0.02}
-    with PdfPages(path) as pdf, plt.rc_context(style):
-        pages = Pages(pdf, head)
-        yield pages
-        pages.end()
-    drawing.WIDTH = None
+    try:
+        with PdfPages(path) as pdf, plt.rc_context(style):
+            pages = Pages(pdf, head)
+            yield pages
+            pages.end()
+    finally:
+        drawing.WIDTH = None
