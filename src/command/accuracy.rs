@@ -1,11 +1,11 @@
 //! Runs with a required accuracy: adapts the mesh before the run, and checks the accuracy after it.
 
-use super::{Failure, KINK, screen, task::Task};
+use super::{Failure, kinks, screen, task::Task};
 use signorini::{
     estimate::{self, AdaptError, Adapted, Measured},
     evolution::{Outcome, percent},
     interrupt::{Interrupts, Signal},
-    mesh::{Mesh, Order},
+    mesh::{CORNER_ANGLE, Kink, Mesh, Order},
     petsc::Session,
     problem::{Bar, Dimension},
     scene::{Scene, Stepping},
@@ -142,15 +142,17 @@ pub(super) fn missing_bars(task: &Task, outcome: &Outcome) -> Option<String> {
 /// A note on curved edges of the adapted mesh that meet at an angle. The error bars do not contain the error of a smooth curve
 /// that they only follow roughly.
 pub(super) fn kink_note(task: &Task) -> Option<String> {
-    let (mesh, accuracy) = (&task.adapted.as_ref()?.mesh, task.problem.scene().accuracy?);
-    let ([x, y], angle) = mesh.largest_kink();
-    (angle > 2.0 * KINK * accuracy).then(|| {
-        format!(
-            "curved edges meet at ({x:.4}, {y:.4}) at an angle of {:.1}°: if the curve is smooth there, the bars do not \
-             contain the error of its shape; set smaller sizes there in the .geo",
-            angle.to_degrees()
-        )
-    })
+    let (mesh, scene) = (&task.adapted.as_ref()?.mesh, task.problem.scene());
+    let kinks = kinks(scene, mesh, scene.accuracy?).into_iter();
+    let may_be_smooth = |kink: &Kink| !kink.is_mirrored && kink.angle < CORNER_ANGLE;
+    let kinks = kinks.filter(|(allowed, kink)| may_be_smooth(kink) && kink.angle > 2.0 * allowed);
+    let (_, kink) = kinks.max_by(|(a, p), (b, q)| (p.angle / a).total_cmp(&(q.angle / b)))?;
+    let [x, y] = mesh.nodes[kink.node];
+    Some(format!(
+        "curved edges meet at ({x:.4}, {y:.4}) at an angle of {:.1e}°: if the curve is smooth there, the bars do not \
+         contain the error of its shape; set smaller sizes there in the .geo",
+        kink.angle.to_degrees()
+    ))
 }
 
 /// The closing line on the required accuracy: reached, or the errors that are too large. `None` without a

@@ -29,12 +29,12 @@ use ranks::require_one_process;
 use signorini::{
     contact::{self, REGISTRY, SOLVERS, TAO_TYPES, summaries},
     interrupt::{Signal, received},
-    mesh::{self, Kink, Mesh, Order},
+    mesh::{self, CORNER_ANGLE, Kink, Mesh, MeshError, Order},
     output::terminal::say,
     scene::{MeshSource, SCHEMA, Scene},
 };
 use std::{
-    collections::BTreeSet,
+    collections::{BTreeSet, HashSet},
     fmt,
     io::{self, Write},
     path::PathBuf,
@@ -190,7 +190,7 @@ fn read_mesh(scene: &Scene, adapts: bool) -> Result<Mesh, Failure> {
         && adapts
         && file.extension().is_none_or(|kind| kind != "msh")
     {
-        return first_mesh(&scene.mesh, accuracy);
+        return first_mesh(scene, accuracy);
     }
     mesh::load(file, parameters, scene.order).map_err(Failure::input)
 }
@@ -198,35 +198,54 @@ fn read_mesh(scene: &Scene, adapts: bool) -> Result<Mesh, Failure> {
 /// The angle, rad, at which arcs along a smooth curve may meet, over the accuracy. A note tells twice as large ones.
 const KINK: f64 = 0.1;
 
+/// The angles at which arcs meet along the curves of a mesh, and the allowed ones. Contact presses on a small part of a
+/// curve, where it may turn by a hundredth only: the angles must be much smaller there.
+fn kinks(scene: &Scene, mesh: &Mesh, accuracy: f64) -> Vec<(f64, Kink)> {
+    const IN_CONTACT: f64 = 0.03;
+    let contact = scene.boundaries.iter().filter(|boundary| boundary.gap().is_some());
+    let edges = contact.filter_map(|boundary| mesh.curves.get(&boundary.name));
+    let touching: HashSet<usize> = edges.flat_map(|curve| curve.edges.concat()).collect();
+    let part = |kink: &Kink| if touching.contains(&kink.node) { IN_CONTACT } else { 1.0 };
+    let allowed = |kink: Kink| (KINK * accuracy * part(&kink), kink);
+    mesh.kinks().into_iter().map(allowed).collect()
+}
+
 /// The mesh of a `.geo` from which the adaptation to an accuracy starts. Its order is 2 also for linear elements, so
 /// that refined sides stay on the arcs through the nodes of this mesh.
 ///
 /// Where arcs follow another smooth curve, they meet at a small angle, which stays. Stresses at an angle δ grow like
 /// h^(−δ/π), about. So the mesh becomes finer there until these angles are a tenth of the accuracy; they fall like h³.
-fn first_mesh(source: &MeshSource, accuracy: f64) -> Result<Mesh, Failure> {
+fn first_mesh(scene: &Scene, accuracy: f64) -> Result<Mesh, Failure> {
     /// Triangles along the body.
     const CELLS: f64 = 4.0;
-    /// Meshes that are graded towards angles, as the third power holds for small ones, and corners stay.
-    const GRADINGS: usize = 4;
-    let MeshSource { file, parameters } = source;
+    /// Meshes that are graded towards angles, as the third power holds for small ones, corners stay, and gmsh may fail.
+    const GRADINGS: usize = 6;
+    let MeshSource { file, parameters } = &scene.mesh;
     let usual = mesh::load(file, parameters, Order::Linear).map_err(Failure::input)?;
     let scaling = mesh::scaling_factor(file).map_err(Failure::input)?;
     let mut parameters = parameters.clone();
     parameters.insert("size".to_owned(), mesh::extent(&usual.nodes) / scaling / CELLS);
     let mut first = mesh::load(file, &parameters, Order::Quadratic).map_err(Failure::input)?;
-    for _ in 0..GRADINGS {
-        let rough = |kink: &Kink| kink.angle > KINK * accuracy;
-        let kinks = Vec::from_iter(first.kinks().into_iter().filter(rough));
+    for grading in 0..GRADINGS {
+        // The end of a slender ellipse is no corner, though it looks like one on the first meshes.
+        let is_corner = |kink: &Kink| grading >= 2 && kink.angle > CORNER_ANGLE;
+        let is_rough = |(allowed, kink): &(f64, Kink)| kink.angle > *allowed && !is_corner(kink);
+        let kinks = kinks(scene, &first, accuracy).into_iter().filter(is_rough);
+        let kinks = Vec::from_iter(kinks);
         if kinks.is_empty() {
             break;
         }
         let mut sizes = first.sizes();
-        for kink in kinks {
-            let aim = 0.5 * KINK * accuracy;
-            sizes[kink.node] = kink.length * (aim / kink.angle).cbrt().max(0.25);
+        for (allowed, kink) in kinks {
+            sizes[kink.node] = kink.length * (0.5 * allowed / kink.angle).cbrt().max(0.25);
         }
-        first = mesh::load_graded(file, &parameters, Order::Quadratic, (&first, &sizes))
-            .map_err(Failure::input)?;
+        first.limit_gradient(&mut sizes);
+        let sizes = (&first, &sizes[..]);
+        first = match mesh::load_graded(file, &parameters, Order::Quadratic, sizes) {
+            Ok(finer) => finer,
+            Err(MeshError::File { .. }) => break,
+            Err(error) => return Err(Failure::input(error)),
+        };
     }
     Ok(first)
 }

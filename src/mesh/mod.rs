@@ -110,6 +110,16 @@ impl Mesh {
         sums.into_iter().map(|(sum, count)| sum / count).collect()
     }
 
+    /// Reduces the sizes of nodes, m, to those of their neighbours and a third of the distance.
+    pub fn limit_gradient(&self, sizes: &mut [f64]) {
+        for &[a, b, c] in &self.triangles {
+            for [p, q] in [[a, b], [b, c], [c, a], [b, a], [c, b], [a, c]] {
+                let (_, length) = self.edge_normal([p, q]);
+                sizes[q] = sizes[q].min(sizes[p] + length / 3.0);
+            }
+        }
+    }
+
     /// The smallest angle of all triangles, degrees, and a corner of its triangle, m.
     pub fn smallest_angle(&self) -> (f64, [f64; 2]) {
         let corners = self.triangles.iter().map(|triangle| triangle.map(|node| self.nodes[node]));

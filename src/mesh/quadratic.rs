@@ -5,10 +5,12 @@
 //! x(λ) = Σ_i λ_i p_i + Σ_{i<j} 4λ_iλ_j d_ij of the barycentric coordinates λ.
 
 use super::{Mesh, Side, sides, sorted};
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, f64::consts::FRAC_PI_2};
 
 /// Relative offset |d| / length below which an edge is straight.
 const STRAIGHT: f64 = 1e-9;
+/// A curve that meets a straight line at an angle this close to 90°, rad, twice, may go on as its mirror image.
+const MIRRORED: f64 = 1.0;
 
 /// A node at which two curved edges of a line meet at an angle.
 pub struct Kink {
@@ -18,6 +20,8 @@ pub struct Kink {
     pub angle: f64,
     /// The length of the shorter of both edges, m.
     pub length: f64,
+    /// Whether the line ends there at a straight one, nearly at a right angle. The angle is that to its mirror image.
+    pub is_mirrored: bool,
 }
 
 impl Mesh {
@@ -73,30 +77,37 @@ impl Mesh {
         for both in sides(&self.triangles).chunk_by(|a, b| a.edge == b.edge) {
             let of = |side: &Side| surfaces[side.triangle];
             let is_line = both.len() == 1 || of(&both[0]) != of(&both[1]);
-            if !is_line || !self.curved.contains_key(&both[0].edge) {
+            if !is_line {
                 continue;
             }
+            let is_curved = self.curved.contains_key(&both[0].edge);
             for (side, other) in both.iter().zip([both.get(1), both.first()]) {
                 let [a, b] = side.directed();
                 let between = (of(side), other.map(of));
                 let (_, length) = self.edge_normal([a, b]);
-                leaving.insert((a, between), (self.direction(a, b), length));
+                leaving.insert((a, between), (self.direction(a, b), length, is_curved));
                 let direction = self.direction(b, a).map(|component| -component);
-                arriving.insert((b, between), (direction, length));
+                arriving.insert((b, between), (direction, length, is_curved));
             }
         }
-        let kink = |(place, ([x, y], after)): (&(usize, _), &([f64; 2], f64))| {
-            let ([before_x, before_y], before) = arriving.get(place)?;
-            let turn = (before_x * y - before_y * x).atan2(before_x * x + before_y * y);
-            Some(Kink { node: place.0, angle: turn.abs(), length: before.min(*after) })
+        let kink = |(place, ([x, y], after, is_curved)): (&(usize, _), &([f64; 2], f64, bool))| {
+            let ([before_x, before_y], before, was_curved) = arriving.get(place)?;
+            let turn = (before_x * y - before_y * x).atan2(before_x * x + before_y * y).abs();
+            let angle = match (was_curved, is_curved) {
+                (true, true) => turn,
+                (false, false) => return None,
+                _ => 2.0 * (turn - FRAC_PI_2).abs(),
+            };
+            let is_mirrored = was_curved != is_curved;
+            let is_corner = is_mirrored && angle > MIRRORED;
+            (!is_corner).then_some(Kink {
+                node: place.0,
+                angle,
+                length: before.min(*after),
+                is_mirrored,
+            })
         };
         leaving.iter().filter_map(kink).collect()
-    }
-
-    /// The largest of the angles of [`Mesh::kinks`] and the coordinates of its node.
-    pub fn largest_kink(&self) -> ([f64; 2], f64) {
-        let largest = self.kinks().into_iter().max_by(|a, b| a.angle.total_cmp(&b.angle));
-        largest.map(|kink| (self.nodes[kink.node], kink.angle)).unwrap_or_default()
     }
 
     /// Per triangle a number that is the same for all triangles of the same surfaces.

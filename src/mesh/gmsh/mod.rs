@@ -37,7 +37,7 @@ pub fn load(
 /// mesh is not kept.
 ///
 /// # Errors
-/// Those of [`mesh_geo`].
+/// Those of [`mesh_geo`]; flat triangles are an error too.
 pub fn load_graded(
     geo: &Path,
     parameters: &BTreeMap<String, f64>,
@@ -60,7 +60,8 @@ pub fn load_graded(
         "};\nsizes = newf;\nField[sizes] = PostView;\nField[sizes].ViewIndex = PostProcessing.NbViews - 1;\n\
          Background Field = sizes;\n",
     );
-    parse(&meshed(geo, parameters, &last)?, geo).map(Mesh::in_morton_order)
+    let bytes = run((geo, None), arguments(parameters), &last, "mesh it")?;
+    parse(&bytes, geo).map(Mesh::in_morton_order)
 }
 
 /// The path of a `.msh`: that of the given file, or of the file that [`mesh_geo`] makes from a `.geo`.
