@@ -161,7 +161,7 @@ def frame(axes, points, units):
     axes.set_xlim(low[0] - air, high[0] + air)
     axes.set_ylim(low[1] - air, high[1] + air)
     axes.set_aspect("equal")
-    axes.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
+    axes.xaxis.set_major_locator(MaxNLocator(5 if WIDTH else 6, steps=[1, 2, 5, 10]))
     axes.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
     axes.set_xlabel(f"x ({units['length']})")
     axes.set_ylabel(f"y ({units['length']})")
