@@ -132,11 +132,18 @@ fn is_asked(task: &Task, name: &str) -> bool {
     asked.is_empty() || asked.iter().any(|known| known == name)
 }
 
-/// A note on error bars that are missing because only the runs that measure them reach ζ_*.
+/// A note on error bars that are missing although the errors from the mesh were measured.
 pub(super) fn missing_bars(task: &Task, outcome: &Outcome) -> Option<String> {
-    (task.measured.stop.is_some() && outcome.stopped.is_none()).then(|| {
-        "no error bars: with few time steps, or on a finer mesh, the run stops at ζ_*".to_owned()
-    })
+    let (measured, stops) = (&task.measured, outcome.stopped.is_some());
+    let reason = match (measured.stop, measured.bars.is_empty()) {
+        _ if stops || !outcome.bars.is_empty() => return None,
+        (Some(_), _) => "with few time steps, or on a finer mesh, the run stops at ζ_*",
+        (None, false) => {
+            "the damage begins with the last time steps, or there is only one; take shorter steps"
+        }
+        (None, true) => return None,
+    };
+    Some(format!("no error bars: {reason}"))
 }
 
 /// A note on curved edges of the adapted mesh that meet at an angle. The error bars do not contain the error of a smooth curve

@@ -33,12 +33,13 @@ pub use stress::{NodalStress, Strained, principal};
 
 use crate::{
     evolution::{
-        Callback, ErrorBudget, Observed, Observer, Outcome, Phases, Run, RunError, RunState, Step,
-        all_steps,
+        Callback, DamageStep, ErrorBudget, Observed, Observer, Outcome, Phases, Run, RunError,
+        RunState, Step, all_steps,
     },
     fem::RigidMotion,
     petsc::{PetscError, Session},
     problem::DiscreteProblem,
+    scene::{Stepping, TimeGrid},
 };
 use nalgebra::DVector;
 
@@ -76,6 +77,28 @@ pub fn run_from(
     estimated(all_steps(session, problem, solver, phases, observer, saved)?)
 }
 
+/// Whether the damage of a run with equal steps begins with its last ones: one more step would do far more damage than all
+/// before. The differences of the steps say nothing of their error then. Collective.
+fn begins_at_the_end(damage_step: &DamageStep, outcome: &Outcome) -> bool {
+    const FAR_MORE: f64 = 5.0;
+    let (problem, state) = (damage_step.problem, &outcome.last.state);
+    let Some(TimeGrid { end, stepping: Stepping::Uniform { steps }, .. }) = problem.scene().time
+    else {
+        return false;
+    };
+    let vertices = &problem.body.vertices;
+    let largest = |values: &mut dyn Iterator<Item = f64>| {
+        let own = values.take(vertices.partition.owned());
+        vertices.partition.comm().max(own.fold(0.0, f64::max))
+    };
+    let load = damage_step.source(state).load;
+    let rates = load.iter().zip(&vertices.weights).map(|(load, weight)| -load / weight);
+    let next = end / steps as f64 * largest(&mut { rates });
+    let initial = problem.initial_damage();
+    let done = largest(&mut initial.iter().zip(&state.zeta).map(|(from, zeta)| from - zeta));
+    next > FAR_MORE * done && next > f64::EPSILON
+}
+
 /// Estimates the errors of a finished run and enters them in its outcome. Collective.
 fn estimated(run: Run) -> Result<Outcome, RunError> {
     let Run { damage_step, contact_step, controller, mut outcome } = run;
@@ -86,7 +109,8 @@ fn estimated(run: Run) -> Result<Outcome, RunError> {
     outcome.penetration = phases.time("accuracy", || {
         problem.penetration_note(&[&outcome.most_displaced().state, &outcome.last.state])
     });
-    let steps = controller.step_error().filter(|_| problem.damage().is_some());
+    let is_known = problem.damage().is_some() && !begins_at_the_end(&damage_step, &outcome);
+    let steps = controller.step_error().filter(|_| is_known);
     outcome.errors = ErrorBudget::new(problem, &outcome, steps.as_ref().map(DVector::as_slice));
     Ok(outcome)
 }

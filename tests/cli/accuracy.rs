@@ -273,6 +273,28 @@ fn a_stop_between_few_steps_is_reached_with_a_bar_that_holds() {
     }
 }
 
+/// A bar that the foundation reaches at 0.95 of its time: |ε| = 0.02 (t − 0.95), ½ λ_U |ε|² is about 1 at the end. Steps of
+/// 0.05 and 0.04 do not show the damage that has begun.
+#[test]
+fn there_are_no_bars_where_the_damage_begins_with_the_last_step() {
+    let directory = TestDirectory::new();
+    directory.write(
+        "scene.toml",
+        "mesh.file = 'square.msh'
+         material = { young = 1e9, poisson = 0.3, plane = 'stress' }
+         damage = { diffusion = 0.1, lambda_d = 1, lambda_u = 4e6 }
+         time = { end = 1, step = 0.05 }
+         boundary = [{ name = 'left', symmetry = true }, { name = 'top', displacement = ['free', 0] },
+                     { name = 'bottom', gap = '0.019 - 0.02*t' }]",
+    );
+    for (step, is_known) in [("0.05", false), ("0.04", false), ("0.01", true)] {
+        let said = directory.run(&["--bars", "--set", &format!("time.step={step}")]);
+        let figures = &directory.summary("out/scene")["errors"]["figures"];
+        assert_eq!(!figures["zeta_min"].is_null(), is_known, "{}", said.out);
+        assert_eq!(!said.out.contains("the damage begins with the last"), is_known, "{}", said.out);
+    }
+}
+
 /// A block under a load with the eccentricity t, which leaves it at t = ½.
 #[test]
 fn no_accuracy_is_promised_where_the_body_turns_over() {
