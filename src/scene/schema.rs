@@ -76,6 +76,9 @@ impl<'t> Diagnostics<'t> {
         match (value, schema["type"].as_str()) {
             (DeValue::Table(table), Some("object")) => self.check_table(&key, table, schema),
             (DeValue::Array(array), Some("array")) => self.check_array(&key, array, schema),
+            (DeValue::Table(_), Some("array")) => {
+                self.note(&key, format!("is a list, each begins with [[{key}]]"));
+            }
             _ => {
                 let value = Spanned::new(NOWHERE, value.clone()).into_deserializer();
                 let value = toml::Value::deserialize(value);
