@@ -230,17 +230,15 @@ fn first_mesh(scene: &Scene, accuracy: f64) -> Result<Mesh, Failure> {
         // The end of a slender ellipse is no corner, though it looks like one on the first meshes.
         let is_corner = |kink: &Kink| grading >= 2 && kink.angle > CORNER_ANGLE;
         let is_rough = |(allowed, kink): &(f64, Kink)| kink.angle > *allowed && !is_corner(kink);
-        let kinks = kinks(scene, &first, accuracy).into_iter().filter(is_rough);
-        let kinks = Vec::from_iter(kinks);
-        if kinks.is_empty() {
+        let rough = kinks(scene, &first, accuracy).into_iter().filter(is_rough);
+        let size = |(allowed, kink): (f64, Kink)| {
+            (kink.node, kink.length * (0.5 * allowed / kink.angle).cbrt().max(0.25))
+        };
+        let wanted = Vec::from_iter(rough.map(size));
+        if wanted.is_empty() {
             break;
         }
-        let mut sizes = first.sizes();
-        for (allowed, kink) in kinks {
-            sizes[kink.node] = kink.length * (0.5 * allowed / kink.angle).cbrt().max(0.25);
-        }
-        first.limit_gradient(&mut sizes);
-        let sizes = (&first, &sizes[..]);
+        let sizes = (&first, &first.graded_sizes(wanted)[..]);
         first = match mesh::load_graded(file, &parameters, Order::Quadratic, sizes) {
             Ok(finer) => finer,
             Err(MeshError::File { .. }) => break,

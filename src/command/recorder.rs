@@ -184,14 +184,8 @@ impl<'a> Recorder<'a> {
         if task.profile {
             shown.clone_from(&notes);
         }
-        let mut lines = screen::conclusion(
-            task,
-            record,
-            extremes.as_ref(),
-            &quantities,
-            result.as_ref(),
-            &shown,
-        );
+        let (extremes, result) = (extremes.as_ref(), result.as_ref());
+        let mut lines = screen::conclusion(task, record, extremes, &quantities, result, &shown);
         if task.profile {
             let steps = record.map_or(0, |record| record.step);
             lines.push(String::new());

@@ -66,7 +66,8 @@ struct Blocks {
 const LARGEST_INTERFACE: usize = 6000;
 
 impl Substructure {
-    /// Divides, orders and analyses the unknowns of a matrix. Γ contains the owned unknowns `condensed`. `None` if Γ is too large. Collective.
+    /// Divides, orders and analyses the unknowns of a matrix. Γ contains the owned unknowns `condensed`. `None` if Γ is
+    /// too large. Collective.
     pub(super) fn new(
         comm: Communicator,
         matrix: &Matrix,

@@ -96,28 +96,25 @@ impl Mesh {
         single.map(|sides| sides[0].directed()).collect()
     }
 
-    /// Per node the mean length of the sides of its triangles, m.
-    pub fn sizes(&self) -> Vec<f64> {
+    /// The sizes of the triangles at the nodes of a mesh, m, that has `wanted` ones at some of these: elsewhere the mean length
+    /// of the sides, but at most the size at a neighbour and a third of the distance.
+    pub fn graded_sizes(&self, wanted: impl IntoIterator<Item = (usize, f64)>) -> Vec<f64> {
+        let sides = || self.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
         let mut sums = vec![(0.0, 0.0); self.nodes.len()];
-        for &[a, b, c] in &self.triangles {
-            for [p, q] in [[a, b], [b, c], [c, a]] {
-                let (_, length) = self.edge_normal([p, q]);
-                for node in [p, q] {
-                    sums[node] = (sums[node].0 + length, sums[node].1 + 1.0);
-                }
+        for ends in sides() {
+            let (_, length) = self.edge_normal(ends);
+            for node in ends {
+                sums[node] = (sums[node].0 + length, sums[node].1 + 1.0);
             }
         }
-        sums.into_iter().map(|(sum, count)| sum / count).collect()
-    }
-
-    /// Reduces the sizes of nodes, m, to those of their neighbours and a third of the distance.
-    pub fn limit_gradient(&self, sizes: &mut [f64]) {
-        for &[a, b, c] in &self.triangles {
-            for [p, q] in [[a, b], [b, c], [c, a], [b, a], [c, b], [a, c]] {
-                let (_, length) = self.edge_normal([p, q]);
-                sizes[q] = sizes[q].min(sizes[p] + length / 3.0);
-            }
+        let mut sizes: Vec<f64> = sums.into_iter().map(|(sum, count)| sum / count).collect();
+        wanted.into_iter().for_each(|(node, size)| sizes[node] = size);
+        for [p, q] in sides() {
+            let third = self.edge_normal([p, q]).1 / 3.0;
+            sizes[q] = sizes[q].min(sizes[p] + third);
+            sizes[p] = sizes[p].min(sizes[q] + third);
         }
+        sizes
     }
 
     /// The smallest angle of all triangles, degrees, and a corner of its triangle, m.

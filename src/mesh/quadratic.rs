@@ -9,7 +9,8 @@ use std::{collections::BTreeMap, f64::consts::FRAC_PI_2};
 
 /// Relative offset |d| / length below which an edge is straight.
 const STRAIGHT: f64 = 1e-9;
-/// A curve that meets a straight line at an angle this close to 90°, rad, twice, may go on as its mirror image.
+/// A curve that meets a straight line nearly at a right angle may go on as its mirror image, if it meets this image at most
+/// at this angle, rad.
 const MIRRORED: f64 = 1.0;
 
 /// A node at which two curved edges of a line meet at an angle.

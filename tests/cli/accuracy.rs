@@ -157,17 +157,17 @@ fn error_bars_hold_on_curved_sides() {
     }
 }
 
-/// Writes the scene of a homogeneous square bar whose top moves by `top`: |ε|² = 1.09 `top`².
-fn write_bar(directory: &TestDirectory, damage: &str, top: &str) {
+/// Writes the scene of a homogeneous square bar on two symmetric sides, with this condition at its top.
+fn write_bar(directory: &TestDirectory, young: f64, damage: &str, top: &str) {
     directory.write(
         "scene.toml",
         &format!(
             "mesh.file = 'square.msh'
-             material = {{ young = 1000, poisson = 0.3, plane = 'stress' }}
-             damage = {damage}
+             material = {{ young = {young}, poisson = 0.3, plane = 'stress' }}
+             damage = {{ {damage} }}
              time = {{ end = 1, step = 0.1 }}
              boundary = [{{ name = 'left', symmetry = true }}, {{ name = 'bottom', symmetry = true }},
-                         {{ name = 'top', displacement = ['free', '{top}'] }}]"
+                         {{ name = 'top', {top} }}]"
         ),
     );
 }
@@ -212,8 +212,8 @@ fn first_meshes_follow_an_ellipse() {
 #[test]
 fn time_steps_become_shorter_until_the_accuracy_is_reached() {
     let directory = TestDirectory::new();
-    let damage = "{ diffusion = 1e-3, lambda_d = 0, lambda_u = 2e6, lambda_w = 0.05 }";
-    write_bar(&directory, damage, "1e-3*t");
+    let damage = "diffusion = 1e-3, lambda_d = 0, lambda_u = 2e6, lambda_w = 0.05";
+    write_bar(&directory, 1000.0, damage, "displacement = ['free', '1e-3*t']");
     let start = (0.05_f64 / 1.09).sqrt();
     let exact = 1.0 - 1.09 / 3.0 * (1.0 - start.powi(3)) + 0.05 * (1.0 - start);
     for accuracy in ["0.001", "0.0003"] {
@@ -234,8 +234,13 @@ fn time_steps_become_shorter_until_the_accuracy_is_reached() {
 #[test]
 fn a_stop_by_the_error_of_the_steps_is_not_reached() {
     let directory = TestDirectory::new();
-    let damage = "{ diffusion = 0.1, lambda_d = 0, lambda_u = 8e5, lambda_w = 0 }";
-    write_bar(&directory, damage, "3e-2*exp(-((t-0.4)/0.002)^2)");
+    let damage = "diffusion = 0.1, lambda_d = 0, lambda_u = 8e5, lambda_w = 0";
+    write_bar(
+        &directory,
+        1000.0,
+        damage,
+        "displacement = ['free', '3e-2*exp(-((t-0.4)/0.002)^2)']",
+    );
     for accuracy in ["0.1", "0.03", "0.01"] {
         let said = directory.run(&["--accuracy", accuracy]);
         let summary = directory.summary("out/scene");
@@ -253,15 +258,8 @@ fn a_stop_by_the_error_of_the_steps_is_not_reached() {
 #[test]
 fn a_stop_between_few_steps_is_reached_with_a_bar_that_holds() {
     let directory = TestDirectory::new();
-    directory.write(
-        "scene.toml",
-        "mesh.file = 'square.msh'
-         material = { young = 1000, poisson = 0.3, plane = 'stress' }
-         damage = { diffusion = 1e-3, lambda_d = 0, lambda_u = 800, threshold = 0.01 }
-         time = { end = 1, step = 0.1 }
-         boundary = [{ name = 'left', symmetry = true }, { name = 'bottom', symmetry = true },
-                     { name = 'top', traction = [0, '60*t'] }]",
-    );
+    let damage = "diffusion = 1e-3, lambda_d = 0, lambda_u = 800, threshold = 0.01";
+    write_bar(&directory, 1000.0, damage, "traction = [0, '60*t']");
     let exact = ((1.0 - 1e-6) / (0.5 * 800.0 * 1.09 * 0.06_f64.powi(2))).cbrt();
     for accuracy in ["0.1", "0.01"] {
         let said = directory.run(&["--accuracy", accuracy]);
@@ -278,15 +276,8 @@ fn a_stop_between_few_steps_is_reached_with_a_bar_that_holds() {
 #[test]
 fn there_are_no_bars_where_the_damage_begins_with_the_last_step() {
     let directory = TestDirectory::new();
-    directory.write(
-        "scene.toml",
-        "mesh.file = 'square.msh'
-         material = { young = 1e9, poisson = 0.3, plane = 'stress' }
-         damage = { diffusion = 0.1, lambda_d = 1, lambda_u = 4e6 }
-         time = { end = 1, step = 0.05 }
-         boundary = [{ name = 'left', symmetry = true }, { name = 'top', displacement = ['free', 0] },
-                     { name = 'bottom', gap = '0.019 - 0.02*t' }]",
-    );
+    let damage = "diffusion = 0.1, lambda_d = 1, lambda_u = 4e6";
+    write_bar(&directory, 1e9, damage, "gap = '0.019 - 0.02*t'");
     for (step, is_known) in [("0.05", false), ("0.04", false), ("0.01", true)] {
         let said = directory.run(&["--bars", "--set", &format!("time.step={step}")]);
         let figures = &directory.summary("out/scene")["errors"]["figures"];
