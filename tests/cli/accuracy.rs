@@ -207,6 +207,35 @@ fn first_meshes_follow_an_ellipse() {
     }
 }
 
+/// Half of an ellipse with the half axes 12 and 36 mm, on its tip: the contact is that of a cylinder with the radius R = a²/b
+/// under twice the force, half of its length (4 F R (1 − ν²)/(π E))^½ (Hertz). Arcs that meet at an angle of a few degrees had
+/// made it three times too short.
+#[test]
+fn the_contact_of_an_ellipse_is_that_of_hertz() {
+    let directory = TestDirectory::new();
+    let geometry = "DefineConstant[ size = 4 ];
+        Point(1) = {0,0,0,size}; Point(2) = {0,-36,0,size}; Point(3) = {12,0,0,size};
+        Ellipse(1) = {2,1,2,3}; Line(2) = {3,1}; Line(3) = {1,2};
+        Curve Loop(1) = {1:3}; Plane Surface(1) = {1}; Physical Surface(\"half\") = {1};
+        Physical Curve(\"skin\") = {1}; Physical Curve(\"top\") = {2}; Physical Curve(\"axis\") = {3};\n";
+    directory.write("half.geo", geometry);
+    directory.write(
+        "scene.toml",
+        "mesh.file = 'half.geo'
+         material = { young = 210e3, poisson = 0.3, plane = 'strain' }
+         units = { length = 'mm', force = 'N', stress = 'MPa' }
+         boundary = [{ name = 'axis', symmetry = true }, { name = 'top', pressure = 10 },
+                     { name = 'skin', gap = 'y + 36', normal = [0, -1] }]",
+    );
+    let force = 2.0 * 12.0 * 10.0;
+    let hertz = (4.0 * force * 4.0 * 0.91 / (std::f64::consts::PI * 210e3)).sqrt();
+    for accuracy in [0.1, 0.03] {
+        directory.run(&["--accuracy", &accuracy.to_string()]);
+        let found = directory.summary("out/scene")["contact_length"].as_f64().unwrap();
+        assert!((found - hertz).abs() < accuracy * hertz, "{accuracy}: {found} is not {hertz}");
+    }
+}
+
 /// A homogeneous bar in tension with λ_D = 0 and ½ λ_U |ε|² = 1.09 t²: ζ′ = −(1.09 t² − 0.05)₊. The first time
 /// steps are too long for these accuracies.
 #[test]
