@@ -54,7 +54,7 @@ CASES = {
     True: [("stays", 1, 64, 1, ALL), ("stays", 2, 32, 1, FEWER), ("moves", 1, 16, 1, ALL), ("moves", 2, 0.1, 1, FEWER)],
 }
 # Phases of `--profile` that the floor includes; every step has each once.
-PASSES = ["stiffness refill", "products", "triangular solves", "vectors", "damage source", "damage solve"]
+PASSES = ["stiffness", "products", "triangular solves", "vectors", "damage source", "damage solve"]
 # PETSc's preconditioners in place of our factors.
 PRECONDITIONERS = {
     "ours": [],
@@ -274,7 +274,7 @@ def least_work(scene, mesh, order):
     unknowns, vertices = len(contact.u), len(body.mesh.nodes)
     elements = 4 * body.nodes.elements.size
     return {
-        "stiffness refill": 8 * entries + elements + 8 * unknowns + 8 * vertices,
+        "stiffness": 8 * entries + elements + 8 * unknowns + 8 * vertices,
         "products": 9 * entries + 16 * unknowns,
         "triangular solves": 8 * factor + 32 * unknowns,
         # u ← u + αp, r ← r − αq, rᵀz, p ← z + βp.

@@ -10,7 +10,7 @@ use signorini::{
 /// The phases that every time step needs: the values of K, a product with K, a pair of triangular solves,
 /// and the damage.
 const UNAVOIDABLE: [&str; 4] =
-    ["stiffness refill", "contact/products", "contact/triangular solves", "damage solve"];
+    ["stiffness", "contact/products", "contact/triangular solves", "damage solve"];
 
 /// The table of phases and their parts, longest first, for a run of `wall` seconds.
 pub fn table(phases: &Phases, wall: f64) -> Vec<String> {

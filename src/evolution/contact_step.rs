@@ -156,11 +156,10 @@ impl<'a> ContactStep<'a> {
         let (comm, zeta_at_points) =
             (problem.body.nodes.partition.comm(), problem.zeta_at_points(zeta));
         if comm.any(zeta_at_points != self.zeta_at_points) {
-            let (body, bases) = (&problem.body, &problem.constraints.bases);
-            let bytes = self.stiffness.bytes_per_refill(body);
-            phases.time_moving("stiffness refill", (1.0, bytes), || {
-                self.stiffness.refill(body, &problem.elasticity, bases, &zeta_at_points)
-            })?;
+            let bytes = self.stiffness.bytes();
+            phases.time_moving("stiffness", (1.0, bytes), || {
+                self.stiffness.set_damage(&problem.body, &problem.elasticity, &zeta_at_points)
+            });
             self.zeta_at_points = zeta_at_points;
         }
         let case = agreed(comm, phases.time("loads", || problem.load_case(time)))?;

@@ -1,7 +1,7 @@
 //! Continuous finite elements (22), (23), P1 for ζ and P1 or P2 for u: from laws to matrices and vectors.
 //!
 //! - [`Body`]: the nodes and elements of a mesh, and their division among ranks ([`Partition`], `Subdomain`);
-//! - [`Elasticity`]: strains, stresses and internal forces; [`Stiffness`]: K(ζ), its pattern made once;
+//! - [`Elasticity`]: strains, stresses and internal forces; [`Stiffness`]: K(ζ), by elements or by entries;
 //! - [`DamageSystem`] solves (28), and [`DamageCertificate`] checks the answer without its matrices.
 //!
 //! What crosses the door: fields as plain slices over the nodes of this rank's subdomain, owned ones first, then

@@ -46,8 +46,14 @@ impl NodalBases {
     }
 
     fn add(&mut self, node: usize, directions: Matrix2<f64>, inverse: Matrix2<f64>) {
-        self.place[node] = self.bases.len() as u32;
-        self.bases.push((node, directions, inverse));
+        let basis = (node, directions, inverse);
+        match self.bases.get_mut(self.place[node] as usize) {
+            Some(earlier) => *earlier = basis,
+            None => {
+                self.place[node] = self.bases.len() as u32;
+                self.bases.push(basis);
+            }
+        }
     }
 
     /// Fixes unknown `dof` (2·node + component).

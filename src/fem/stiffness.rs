@@ -1,19 +1,33 @@
-//! The damaged elastic operator (ζ Aε(u), ε(v)) of (26) as a matrix for solvers.
+//! The damaged elastic operator (ζ Aε(u), ε(v)) of (26) for solvers: products by elements, entries for factors.
 
-use super::{Body, Cells, Elasticity, NodalBases, for_elements};
-use crate::petsc::{Matrix, Pattern, PetscError, Session, Vector};
-use nalgebra::{Matrix2, Matrix3};
+mod groups;
+
+use super::{Body, Cells, Elasticity, Elements, NodalBases, Nodes, for_elements};
+use crate::petsc::{Matrix, Operator, Pattern, PetscError, Session, Vector};
+use groups::{ElementSums, Groups};
+use nalgebra::Matrix2;
+use std::{cell::RefCell, iter::zip, rc::Rc};
 
 /// The stiffness matrix K_ij = Σ_q w_q ζ_q Aε(φ_i) : ε(φ_j) over the quadrature points q of the
-/// elements, in the unknowns of [`NodalBases`]. The pattern is made once, values are refilled.
+/// elements, in the unknowns of [`NodalBases`].
 ///
-/// K consists of 2×2 blocks, one for each pair of nodes with a common triangle. A refill adds the blocks of
-/// each element to the stored entries.
+/// Products and the diagonal are sums over the elements. The entries are written where they are read: for
+/// factors and for preconditioners of PETSc.
 pub struct Stiffness {
     /// K, symmetric; rows and columns of fixed unknowns have only a diagonal.
     pub matrix: Matrix,
     /// Mean diagonal entry of the undamaged K, N/m: the scale of the matrix.
     pub scale: f64,
+    operator: Rc<RefCell<ElementOperator>>,
+}
+
+/// K in the unknowns of nodal bases, from the elements.
+struct ElementOperator {
+    sums: Box<dyn ElementSums>,
+    nodes: Rc<Nodes>,
+    bases: NodalBases,
+    /// The diagonal entry of fixed unknowns.
+    scale: f64,
     /// Per element and pair of its nodes (i, j): the places of both rows of K_ij among the stored entries.
     /// `NOWHERE` if another rank owns the row, or if i ≠ j and one of the unknowns is fixed.
     places: Vec<[u32; 2]>,
@@ -27,7 +41,7 @@ const NOWHERE: [u32; 2] = [u32::MAX; 2];
 const ENTRIES: [[usize; 2]; 4] = [[0, 0], [0, 1], [1, 0], [1, 1]];
 
 impl Stiffness {
-    /// Blocks and pattern; the values are those of the undamaged body.
+    /// Elements and pattern; the values are those of the undamaged body.
     ///
     /// # Errors
     /// PETSc failed.
@@ -67,81 +81,108 @@ impl Stiffness {
         of_fixed.sort_unstable();
         of_fixed.dedup();
 
-        let mut stiffness = Self { matrix, scale: 0.0, places, fixed: of_fixed };
+        let mut operator = ElementOperator {
+            sums: match body.elements() {
+                Elements::Linear(cells) => Box::new(Groups::new(cells)),
+                Elements::Quadratic(cells) => Box::new(Groups::new(cells)),
+            },
+            nodes: Rc::clone(&body.nodes),
+            bases: bases.clone(),
+            scale: 0.0,
+            places,
+            fixed: of_fixed,
+        };
         let sound = body.at_points(&vec![1.0; body.mesh.nodes.len()]);
-        stiffness.refill(body, elasticity, bases, &sound)?;
-        let diagonal = stiffness.matrix.diagonal()?;
-        let free = || diagonal.iter().zip(fixed).filter(|(_, fixed)| !**fixed);
-        let trace = partition.comm().total(free().map(|(entry, _)| entry).sum());
-        let free = partition.comm().count(free().count());
-        let young = || elasticity.materials().map(|material| material.young).fold(0.0, f64::max);
-        stiffness.scale = if trace > 0.0 { trace / free as f64 } else { young() };
-        stiffness.refill(body, elasticity, bases, &sound)?;
-        Ok(stiffness)
+        operator.sums.set(body, elasticity, &sound);
+        operator.scale = operator.mean_diagonal().unwrap_or_else(|| {
+            elasticity.materials().map(|material| material.young).fold(0.0, f64::max)
+        });
+        let (scale, operator) = (operator.scale, Rc::new(RefCell::new(operator)));
+        matrix.set_operator(Rc::clone(&operator) as Rc<dyn Operator>)?;
+        Ok(Self { matrix, scale, operator })
     }
 
-    /// Bytes that a refill reads and writes: nodes, points, places and ζ of each element once; K is written,
-    /// read and written again.
-    pub fn bytes_per_refill(&self, body: &Body) -> f64 {
-        let elements = for_elements!(body, cells => {
-            let points = cells.elements.iter().map(|element| 8 * element.points.len()).sum::<usize>();
-            size_of_val(cells.nodes) + size_of_val(cells.elements) + points
-        });
-        (elements + size_of_val(&self.places[..])) as f64 + 24.0 * self.matrix.entries() as f64
+    /// Bytes that [`Self::set_damage`] reads and writes: the elements, and ζ.
+    pub fn bytes(&self) -> f64 {
+        self.operator.bytes()
     }
 
     /// K(ζ) from the values of ζ at the quadrature points, [`Body::at_points`]. (For P1, where strains
     /// are constant, this is exact.) All else as it was made of.
-    ///
-    /// # Errors
-    /// PETSc failed.
-    pub fn refill(
-        &mut self,
-        body: &Body,
-        elasticity: &Elasticity,
-        bases: &NodalBases,
-        zeta: &[f64],
-    ) -> Result<(), PetscError> {
-        let Self { matrix, scale, places, fixed } = self;
-        matrix.fill(|entries| {
-            for_elements!(body, cells => {
-                let d = |t| elasticity.d(body, t);
-                add_blocks(&cells, d, bases, zeta.as_chunks().0, places, entries);
-            });
-            for &(place, on_diagonal) in &*fixed {
-                entries[place as usize] = if on_diagonal { *scale } else { 0.0 };
-            }
-        })
+    pub fn set_damage(&mut self, body: &Body, elasticity: &Elasticity, zeta: &[f64]) {
+        self.operator.borrow_mut().sums.set(body, elasticity, zeta);
+        self.matrix.set_changed();
     }
 }
 
-/// Adds the blocks D_i⁻ᵀ K_ij D_j⁻¹ of all elements, in the unknowns of `bases`, to the entries of K at
-/// their places; `d` is the matrix of A in an element.
-fn add_blocks<'a, const N: usize, const Q: usize>(
-    cells: &Cells<N, Q>,
-    d: impl Fn(usize) -> &'a Matrix3<f64>,
-    bases: &NodalBases,
-    zeta: &[[f64; Q]],
-    places: &[[u32; 2]],
-    entries: &mut [f64],
-) {
-    let elements = cells.nodes.iter().zip(cells.elements).zip(zeta);
-    for (t, (((nodes, element), zeta), places)) in
-        elements.zip(places.chunks_exact(N * N)).enumerate()
-    {
-        let (d, inverses) = (d(t), nodes.map(|node| bases.inverse(node)));
-        let rotated = inverses.iter().any(Option::is_some);
-        for (i, j) in (0..N).flat_map(|i| (0..=i).map(move |j| (i, j))) {
-            let mut block = element.stiffness(d, zeta, i, j);
-            if rotated {
-                block = inverses[i].map_or(block, |inverse| inverse.transpose() * block);
-                block = inverses[j].map_or(block, |inverse| block * inverse);
+impl ElementOperator {
+    /// The diagonal entries of the owned unknowns; D⁻ᵀ K_ii D⁻¹ with the bases D.
+    fn diagonal(&self) -> Vec<f64> {
+        let mut blocks = vec![[0.0; 3]; self.nodes.points.len()];
+        self.sums.add_diagonal(&mut blocks);
+        let of_node = |(node, [xx, xy, yy]): (usize, [f64; 3])| match self.bases.inverse(node) {
+            None => [xx, yy],
+            Some(inverse) => {
+                let block = inverse.transpose() * Matrix2::new(xx, xy, xy, yy) * inverse;
+                [block[(0, 0)], block[(1, 1)]]
             }
-            add(entries, places[i * N + j], &block);
-            if i != j {
-                add(entries, places[j * N + i], &block.transpose());
+        };
+        let owned = blocks.into_iter().take(self.nodes.partition.owned()).enumerate();
+        let mut diagonal: Vec<f64> = owned.flat_map(of_node).collect();
+        let fixed = zip(&mut diagonal, self.bases.fixed()).filter(|(_, fixed)| **fixed);
+        fixed.for_each(|(entry, _)| *entry = self.scale);
+        diagonal
+    }
+
+    /// The mean diagonal entry of the free unknowns of all ranks. `None` if it is not positive. Collective.
+    fn mean_diagonal(&self) -> Option<f64> {
+        let (diagonal, comm) = (self.diagonal(), self.nodes.partition.comm());
+        let free = || zip(&diagonal, self.bases.fixed()).filter(|(_, fixed)| !**fixed);
+        let trace = comm.total(free().map(|(entry, _)| entry).sum());
+        let count = comm.count(free().count());
+        (trace > 0.0).then(|| trace / count as f64)
+    }
+}
+
+impl Operator for RefCell<ElementOperator> {
+    fn multiply(&self, x: &[f64], y: &mut [f64]) -> Result<(), PetscError> {
+        let ElementOperator { sums, nodes, bases, scale, .. } = &*self.borrow();
+        let mut u = x.to_vec();
+        bases.zero_fixed(&mut u);
+        let mut u = nodes.partition.field(u, 2)?;
+        bases.displacement_to_global(&mut u);
+        let mut force = vec![0.0; u.len()];
+        sums.add_forces(&u, &mut force);
+        bases.force_to_local(&mut force);
+        y.copy_from_slice(&force[..y.len()]);
+        let fixed = zip(zip(y, x), bases.fixed()).filter(|(_, fixed)| **fixed);
+        fixed.for_each(|((y, x), _)| *y = scale * x);
+        Ok(())
+    }
+
+    fn diagonal(&self) -> Vec<f64> {
+        self.borrow().diagonal()
+    }
+
+    fn write(&self, entries: &mut [f64]) {
+        let ElementOperator { sums, bases, scale, places, fixed, .. } = &*self.borrow();
+        sums.for_blocks(&mut |[upper, lower], nodes, mut block| {
+            let [of_i, of_j] = nodes.map(|node| bases.inverse(node));
+            block = of_i.map_or(block, |inverse| inverse.transpose() * block);
+            block = of_j.map_or(block, |inverse| block * inverse);
+            add(entries, places[upper], &block);
+            if upper != lower {
+                add(entries, places[lower], &block.transpose());
             }
-        }
+        });
+        fixed.iter().for_each(|&(place, on_diagonal)| {
+            entries[place as usize] = if on_diagonal { *scale } else { 0.0 };
+        });
+    }
+
+    fn bytes(&self) -> f64 {
+        let ElementOperator { sums, nodes, .. } = &*self.borrow();
+        (sums.bytes() + 4 * size_of_val(&nodes.points[..])) as f64
     }
 }
 

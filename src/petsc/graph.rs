@@ -26,7 +26,7 @@ pub(crate) fn divide(
     unsafe {
         let create = |handle| raw::MatPartitioningCreate(world(), handle);
         let partitioning = Handle::new(raw::MatPartitioningDestroy, create)?;
-        check(raw::MatPartitioningSetAdjacency(partitioning.raw(), graph.raw()))?;
+        check(raw::MatPartitioningSetAdjacency(partitioning.raw(), graph.stored()))?;
         check(raw::MatPartitioningSetType(partitioning.raw(), c"ptscotch".as_ptr()))?;
         check(raw::MatPartitioningSetFromOptions(partitioning.raw()))?;
         let apply = |handle| raw::MatPartitioningApply(partitioning.raw(), handle);

@@ -134,11 +134,12 @@ impl Ksp {
     ) -> Result<bool, PetscError> {
         let (ksp, pc) = (self.handle.raw(), self.pc()?);
         let mut context = Context { preconditioner: kept };
+        let stored = matrix.assembled()?;
         // SAFETY: live handles; the context outlives the set-up. Without PCSetReusePreconditioner the
         // next solve would factorise again when the values of the matrix have changed.
         unsafe {
             check(raw::PCSetReusePreconditioner(pc, raw::PetscBool::PETSC_FALSE))?;
-            check(raw::KSPSetOperators(ksp, matrix.raw(), matrix.raw()))?;
+            check(raw::KSPSetOperators(ksp, matrix.product(), stored))?;
             context.set(pc)?;
             match check(raw::PCSetUp(pc)) {
                 Err(error) if error.code == NOT_DEFINITE => return Ok(false),
@@ -182,17 +183,19 @@ impl Ksp {
         x: &mut Vector,
     ) -> Result<KspReport, PetscError> {
         let (ksp, pc) = (self.handle.raw(), self.pc()?);
+        // Some of PETSc's preconditioners read the entries in every application.
+        let matrix = problem.matrix;
+        let stored = if self.is_kept()? { matrix.stored() } else { matrix.assembled()? };
         let mut context = Context { preconditioner: kept };
         let Self { residual, work, .. } = self;
         let mut test = Test { problem, residual, work, norm: None };
         let pointer = ptr::from_mut(&mut test).cast::<c_void>();
-        let a = problem.matrix.raw();
         let most = problem.most.and_then(|most| most.try_into().ok()).unwrap_or(self.most);
         let mut iterations = 0;
         // SAFETY: live handles of matching layout; the callbacks run only during the solve, and their
         // contexts outlive it.
         unsafe {
-            check(raw::KSPSetOperators(ksp, a, a))?;
+            check(raw::KSPSetOperators(ksp, matrix.product(), stored))?;
             context.set(pc)?;
             check(raw::KSPSetTolerances(ksp, 1e-14, 0.0, f64::MAX, most))?;
             check(raw::KSPSetConvergenceTest(ksp, Some(is_converged), pointer, None))?;

@@ -2,8 +2,10 @@
 //! (<https://petsc.org/release/manualpages/Mat/>).
 
 mod entries;
+mod operator;
 mod pattern;
 
+pub use operator::Operator;
 pub use pattern::Pattern;
 
 use super::{
@@ -13,6 +15,7 @@ use super::{
     session::world,
     vector::{index, same_size},
 };
+use operator::Shell;
 use std::{ops::Range, ptr, slice};
 
 /// A square sparse matrix. Each rank owns a contiguous range of rows.
@@ -20,6 +23,8 @@ pub struct Matrix {
     handle: Handle<raw::_p_Mat>,
     /// The global indices of the owned rows.
     rows: Range<i32>,
+    /// What multiplies in place of the entries.
+    shell: Option<Shell>,
 }
 
 impl Matrix {
@@ -62,7 +67,7 @@ impl Matrix {
         let mut rows = 0..0;
         // SAFETY: a live handle.
         check(unsafe { raw::MatGetOwnershipRange(handle.raw(), &mut rows.start, &mut rows.end) })?;
-        Ok(Self { handle, rows })
+        Ok(Self { handle, rows, shell: None })
     }
 
     /// A matrix that PETSc passes to a callback. It is read-only.
@@ -73,7 +78,8 @@ impl Matrix {
         Self::new(Handle::borrowed(raw))
     }
 
-    pub(super) fn raw(&self) -> raw::Mat {
+    /// The stored matrix; with an operator its entries may be those of an earlier state.
+    pub(super) fn stored(&self) -> raw::Mat {
         self.handle.raw()
     }
 
@@ -83,7 +89,7 @@ impl Matrix {
     /// Sizes differ.
     pub fn multiply(&self, x: &Vector, y: &mut Vector) -> Result<(), PetscError> {
         // SAFETY: live handles, `x` and `y` distinct by borrowing; PETSc compares their sizes.
-        check(unsafe { raw::MatMult(self.raw(), x.raw(), y.raw()) })
+        check(unsafe { raw::MatMult(self.product(), x.raw(), y.raw()) })
     }
 
     /// A copy with its near-null space (MatDuplicate).
@@ -92,14 +98,15 @@ impl Matrix {
     /// The memory does not suffice.
     pub fn duplicate(&self) -> Result<Self, PetscError> {
         let values = raw::MatDuplicateOption::MAT_COPY_VALUES;
+        let matrix = self.assembled()?;
         let handle = Handle::new(raw::MatDestroy, |copy| {
             // SAFETY: a live handle, a fresh one.
-            unsafe { raw::MatDuplicate(self.raw(), values, copy) }
+            unsafe { raw::MatDuplicate(matrix, values, copy) }
         })?;
         let mut space = ptr::null_mut();
         // SAFETY: live handles; PETSc keeps a reference to the space.
         unsafe {
-            check(raw::MatGetNearNullSpace(self.raw(), &mut space))?;
+            check(raw::MatGetNearNullSpace(self.stored(), &mut space))?;
             if !space.is_null() {
                 check(raw::MatSetNearNullSpace(handle.raw(), space))?;
             }
@@ -112,8 +119,8 @@ impl Matrix {
         let copy = self.duplicate()?;
         // SAFETY: a live handle of our own.
         unsafe {
-            check(raw::MatScale(copy.raw(), factor))?;
-            check(raw::MatShift(copy.raw(), shift))?;
+            check(raw::MatScale(copy.stored(), factor))?;
+            check(raw::MatShift(copy.stored(), shift))?;
         }
         Ok(copy)
     }
@@ -125,24 +132,27 @@ impl Matrix {
     pub fn copy(&mut self, other: &Self) -> Result<(), PetscError> {
         let pattern = raw::MatStructure::SAME_NONZERO_PATTERN;
         // SAFETY: live handles, distinct by borrowing; PETSc compares their sizes and patterns.
-        check(unsafe { raw::MatCopy(other.raw(), self.raw(), pattern) })
+        check(unsafe { raw::MatCopy(other.assembled()?, self.stored(), pattern) })
     }
 
     /// this ← this + `factor` · `other`, which has the same pattern (MatAXPY).
     pub(crate) fn add(&mut self, factor: f64, other: &Self) -> Result<(), PetscError> {
         let pattern = raw::MatStructure::SAME_NONZERO_PATTERN;
         // SAFETY: live handles, distinct by borrowing; PETSc compares their sizes and patterns.
-        check(unsafe { raw::MatAXPY(self.raw(), factor, other.raw(), pattern) })
+        check(unsafe { raw::MatAXPY(self.stored(), factor, other.assembled()?, pattern) })
     }
 
     /// The owned entries of its diagonal (MatGetDiagonal).
     pub(crate) fn diagonal(&self) -> Result<Vec<f64>, PetscError> {
+        if let Some(operator) = self.operator() {
+            return Ok(operator.diagonal());
+        }
         let handle = Handle::new(raw::VecDestroy, |diagonal| {
             // SAFETY: a live handle and a fresh one; null means that the other vector is not wanted.
-            unsafe { raw::MatCreateVecs(self.raw(), ptr::null_mut(), diagonal) }
+            unsafe { raw::MatCreateVecs(self.stored(), ptr::null_mut(), diagonal) }
         })?;
         // SAFETY: live handles of one size.
-        check(unsafe { raw::MatGetDiagonal(self.raw(), handle.raw()) })?;
+        check(unsafe { raw::MatGetDiagonal(self.stored(), handle.raw()) })?;
         // SAFETY: the vector lives as long as its handle.
         unsafe { Vector::borrowed(handle.raw()) }?.read(<[f64]>::to_vec)
     }
@@ -151,7 +161,7 @@ impl Matrix {
     pub(crate) fn add_diagonal(&mut self, diagonal: &Vector) -> Result<(), PetscError> {
         let add = raw::InsertMode::ADD_VALUES;
         // SAFETY: live handles; PETSc compares their sizes.
-        check(unsafe { raw::MatDiagonalSet(self.raw(), diagonal.raw(), add) })
+        check(unsafe { raw::MatDiagonalSet(self.stored(), diagonal.raw(), add) })
     }
 
     /// Replaces the rows and columns of some owned unknowns by `diagonal` on the diagonal, as for
@@ -169,7 +179,7 @@ impl Matrix {
         let (count, unused) = (rows.len() as i32, ptr::null_mut());
         // SAFETY: a live handle and `count` global indices; null means that no right-hand side is adapted.
         check(unsafe {
-            raw::MatZeroRowsColumns(self.raw(), count, rows.as_ptr(), diagonal, unused, unused)
+            raw::MatZeroRowsColumns(self.stored(), count, rows.as_ptr(), diagonal, unused, unused)
         })
     }
 
@@ -195,7 +205,7 @@ impl Matrix {
             unsafe { raw::MatNullSpaceCreate(world(), constant, count, vectors.as_ptr(), space) }
         })?;
         // SAFETY: live handles; PETSc keeps a reference to the space.
-        check(unsafe { raw::MatSetNearNullSpace(self.raw(), space.raw()) })
+        check(unsafe { raw::MatSetNearNullSpace(self.stored(), space.raw()) })
     }
 
     /// The global indices of the owned rows.
@@ -207,11 +217,12 @@ impl Matrix {
     pub(crate) fn size(&self) -> Result<usize, PetscError> {
         let mut rows = 0;
         // SAFETY: a live handle; null means that the number of columns is not wanted.
-        check(unsafe { raw::MatGetSize(self.raw(), &mut rows, ptr::null_mut()) })?;
+        check(unsafe { raw::MatGetSize(self.stored(), &mut rows, ptr::null_mut()) })?;
         Ok(rows as usize)
     }
 
-    /// Calls `reader` with the columns (increasing) and the values of an owned row (MatGetRow).
+    /// Calls `reader` with the columns (increasing) and the values of an owned row (MatGetRow). The first call
+    /// after a change of the matrix is collective.
     ///
     /// # Errors
     /// The row is not owned.
@@ -220,10 +231,28 @@ impl Matrix {
         row: i32,
         reader: impl FnOnce(&[i32], &[f64]) -> R,
     ) -> Result<R, PetscError> {
+        self.assembled()?;
+        self.read_stored(row, reader)
+    }
+
+    /// Calls `reader` with the columns (increasing) of the stored entries of an owned row.
+    pub(crate) fn read_columns<R>(
+        &self,
+        row: i32,
+        reader: impl FnOnce(&[i32]) -> R,
+    ) -> Result<R, PetscError> {
+        self.read_stored(row, |columns, _| reader(columns))
+    }
+
+    fn read_stored<R>(
+        &self,
+        row: i32,
+        reader: impl FnOnce(&[i32], &[f64]) -> R,
+    ) -> Result<R, PetscError> {
         let (mut count, mut columns, mut values) = (0, ptr::null(), ptr::null());
         // SAFETY: a live handle; PETSc checks the row and lends `count` entries of it.
         unsafe {
-            check(raw::MatGetRow(self.raw(), row, &mut count, &mut columns, &mut values))?;
+            check(raw::MatGetRow(self.stored(), row, &mut count, &mut columns, &mut values))?;
             let result = match count as usize {
                 0 => reader(&[], &[]),
                 count => reader(
@@ -231,15 +260,16 @@ impl Matrix {
                     slice::from_raw_parts(values, count),
                 ),
             };
-            check(raw::MatRestoreRow(self.raw(), row, &mut count, &mut columns, &mut values))?;
+            check(raw::MatRestoreRow(self.stored(), row, &mut count, &mut columns, &mut values))?;
             Ok(result)
         }
     }
 
-    /// Bytes that this rank reads and writes in a product. Per entry: value and column, 12 bytes. Per row: its
-    /// start, x and y, 20 bytes.
+    /// Bytes that this rank reads and writes in a product. Of a stored matrix, per entry: value and column, 12
+    /// bytes; per row: its start, x and y, 20 bytes.
     pub fn bytes_per_product(&self) -> f64 {
-        12.0 * self.entries() as f64 + 20.0 * self.owned() as f64
+        let stored = || 12.0 * self.entries() as f64 + 20.0 * self.owned() as f64;
+        self.operator().map_or_else(stored, Operator::bytes)
     }
 
     /// Number of rows this rank owns.

@@ -30,7 +30,7 @@ mod raw {
 
 pub use communicator::Communicator;
 pub use error::PetscError;
-pub use matrix::{Matrix, Pattern};
+pub use matrix::{Matrix, Operator, Pattern};
 pub use session::Session;
 pub use vector::Vector;
 

@@ -93,6 +93,7 @@ impl BoundedQuadratic {
         let problem = Problem { k, f };
         let context = ptr::from_ref(&problem).cast_mut().cast::<c_void>();
         let (mut iterations, mut linear, mut reason) = (0, 0, 0);
+        let hessian = k.assembled()?;
         let (mut ksp, mut pc) = (ptr::null_mut(), ptr::null_mut());
         // SAFETY: live handles of matching layout; the callbacks run only during the solve, and their
         // context outlives it.
@@ -100,7 +101,7 @@ impl BoundedQuadratic {
             check(raw::TaoSetSolution(tao, x.raw()))?;
             check(raw::TaoSetVariableBounds(tao, lower.raw(), upper.raw()))?;
             check(raw::TaoSetObjectiveAndGradient(tao, own, Some(evaluate), context))?;
-            check(raw::TaoSetHessian(tao, k.raw(), k.raw(), Some(keep_hessian), context))?;
+            check(raw::TaoSetHessian(tao, hessian, hessian, Some(keep_hessian), context))?;
             check(raw::TaoSetTolerances(tao, limit, 1e-13, 0.0))?;
             if !has_option("-tao_max_it")? {
                 check(raw::TaoSetMaximumIterations(tao, most as i32))?;

@@ -122,20 +122,20 @@ impl FixedContact<'_> {
         let internal = problem.elasticity.internal_force(&problem.body, &zeta, &state.u);
         let mut residual = problem.motions.balanced(&problem.body, problem.load(state.time));
         residual.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
-        self.set(&state.zeta, &state.contact)?;
+        self.set(&state.zeta, &state.contact);
         let correction = self.displacement(residual)?;
         let max_norm = |u: Vec<f64>| problem.body.nodes.partition.max_norm(&u) / max;
         Ok(correction.map_or(f64::INFINITY, max_norm))
     }
 
     /// Sets the nodal damage and the active nodes of a state. Collective.
-    fn set(&mut self, zeta: &[f64], contact: &[ContactPoint]) -> Result<(), PetscError> {
+    fn set(&mut self, zeta: &[f64], contact: &[ContactPoint]) {
         let DiscreteProblem { body, elasticity, constraints, .. } = self.problem;
         let flags = active_bounds(constraints, contact, 0.0);
         let active = constraints.bounds.iter().zip(flags).filter(|(_, active)| *active > 0.0);
         self.active = active.map(|(bound, _)| bound.dof).collect();
         let zeta = self.problem.zeta_at_points(zeta);
-        self.stiffness.refill(body, elasticity, &constraints.bases, &zeta)
+        self.stiffness.set_damage(body, elasticity, &zeta);
     }
 
     /// K(ζ)⁻¹ times nodal `forces`, N per metre of thickness, with the active nodes fixed: to one digit or

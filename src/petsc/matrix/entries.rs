@@ -31,6 +31,11 @@ impl Matrix {
     /// # Errors
     /// PETSc failed.
     pub fn fill(&mut self, writer: impl FnOnce(&mut [f64])) -> Result<(), PetscError> {
+        self.write(writer)
+    }
+
+    /// As [`Self::fill`]. Entries that an operator writes late are no change of the matrix.
+    pub(super) fn write(&self, writer: impl FnOnce(&mut [f64])) -> Result<(), PetscError> {
         let blocks = self.blocks()?;
         if let [block] = blocks[..] {
             return self.write_block(block, |entries| {
@@ -48,20 +53,20 @@ impl Matrix {
         let done = raw::MatAssemblyType::MAT_FINAL_ASSEMBLY;
         // SAFETY: a live handle. The assembly informs PETSc that the blocks have changed.
         unsafe {
-            check(raw::MatAssemblyBegin(self.raw(), done))?;
-            check(raw::MatAssemblyEnd(self.raw(), done))
+            check(raw::MatAssemblyBegin(self.stored(), done))?;
+            check(raw::MatAssemblyEnd(self.stored(), done))
         }
     }
 
     /// Calls `writer` with the entries of one of `blocks` (MatSeqAIJGetArray).
     fn write_block(
-        &mut self,
+        &self,
         (block, count): (raw::Mat, usize),
         writer: impl FnOnce(&mut [f64]),
     ) -> Result<(), PetscError> {
         let mut data = ptr::null_mut();
-        // SAFETY: a live block, which lends `count` values until they are restored; `&mut self` excludes
-        // other readers.
+        // SAFETY: a live block, which lends `count` values until they are restored. Readers borrow them only
+        // within their own calls.
         unsafe {
             check(raw::MatSeqAIJGetArray(block, &mut data))?;
             writer(if count > 0 { slice::from_raw_parts_mut(data, count) } else { &mut [] });
@@ -72,6 +77,7 @@ impl Matrix {
     /// Copies the stored entries of this rank into `values` (MatSeqAIJGetArrayRead).
     pub(crate) fn read_entries(&self, values: &mut Vec<f64>) -> Result<(), PetscError> {
         values.clear();
+        self.assembled()?;
         for (block, count) in self.blocks()? {
             let mut data = ptr::null();
             // SAFETY: a live block, which lends `count` values until they are restored.
@@ -94,14 +100,14 @@ impl Matrix {
     /// The blocks of this rank's rows, each with the number of its stored entries (MatMPIAIJGetSeqAIJ). On
     /// several ranks the first block has the columns that this rank owns, the second the other columns.
     fn blocks(&self) -> Result<Vec<(raw::Mat, usize)>, PetscError> {
-        let (mut own, mut others) = (self.raw(), ptr::null_mut());
+        let (mut own, mut others) = (self.stored(), ptr::null_mut());
         let (mut parallel, columns) = (raw::PetscBool::PETSC_FALSE, ptr::null_mut());
-        let (object, kind) = (self.raw().cast(), c"mpiaij".as_ptr());
+        let (object, kind) = (self.stored().cast(), c"mpiaij".as_ptr());
         // SAFETY: a live handle, which keeps its blocks.
         unsafe {
             check(raw::PetscObjectTypeCompare(object, kind, &mut parallel))?;
             if parallel == raw::PetscBool::PETSC_TRUE {
-                check(raw::MatMPIAIJGetSeqAIJ(self.raw(), &mut own, &mut others, columns))?;
+                check(raw::MatMPIAIJGetSeqAIJ(self.stored(), &mut own, &mut others, columns))?;
             }
         }
         let mut blocks = Vec::new();
@@ -115,7 +121,7 @@ impl Matrix {
     /// The number of stored entries of this rank; 0 if PETSc fails.
     pub fn entries(&self) -> usize {
         // SAFETY: a live handle.
-        unsafe { stored(self.raw()) }.unwrap_or(0)
+        unsafe { stored(self.stored()) }.unwrap_or(0)
     }
 }
 

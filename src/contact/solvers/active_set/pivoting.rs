@@ -159,7 +159,9 @@ impl<'p> Pivoting<'p> {
                 other.is_ok_and(|i| violating[i].depth > (1.0 + EQUAL) * one.depth)
             };
             let pulls = one.side == 0.0;
-            if pulls || !stiffness.read_row(row(one), |columns, _| columns.iter().any(is_deeper))? {
+            if pulls
+                || !stiffness.read_columns(row(one), |columns| columns.iter().any(is_deeper))?
+            {
                 deepest.push(*one);
             }
         }

@@ -1,0 +1,175 @@
+//! The sums over elements that K(ζ) consists of, for eight elements at a time in the lanes of the processor.
+
+use crate::fem::{Body, Cells, Elasticity, Element};
+use nalgebra::Matrix2;
+use std::{array::from_fn, iter::zip};
+use wide::f64x8;
+
+/// Elements of a group.
+pub(super) const LANES: usize = 8;
+
+/// Sums over the elements of a body, in displacements without nodal bases. For an isotropic A with the Lamé
+/// constants λ = D_12 and μ = D_33, a quadrature point q of weight w contributes the stress
+///
+/// ```text
+/// w σ = w ζ_q (λ tr ε I + 2μ ε),   ε = ½(∇u + ∇uᵀ).
+/// ```
+pub(super) trait ElementSums {
+    /// Takes ζ at the quadrature points.
+    fn set(&mut self, body: &Body, elasticity: &Elasticity, zeta: &[f64]);
+
+    /// Adds the internal forces of `u` to `force`.
+    fn add_forces(&self, u: &[f64], force: &mut [f64]);
+
+    /// Adds K_xx, K_xy and K_yy of each node with itself.
+    fn add_diagonal(&self, diagonal: &mut [[f64; 3]]);
+
+    /// Calls `add` for the pairs of nodes (i, j), j ≤ i, of every element: the numbers of (i, j) and of (j, i) among
+    /// all pairs, the nodes, and K_ij.
+    fn for_blocks(&self, add: &mut dyn FnMut([usize; 2], [usize; 2], Matrix2<f64>));
+
+    /// The memory of these data, bytes.
+    fn bytes(&self) -> usize;
+}
+
+/// The elements of a body, [`LANES`] in a group.
+pub(super) struct Groups<const N: usize, const Q: usize> {
+    groups: Vec<Group<N, Q>>,
+    elements: usize,
+}
+
+/// Elements with N nodes and Q quadrature points. Lanes without an element have zeros.
+struct Group<const N: usize, const Q: usize> {
+    nodes: [[u32; LANES]; N],
+    points: [Point<N>; Q],
+}
+
+struct Point<const N: usize> {
+    gradients: [[f64x8; 2]; N],
+    weight: f64x8,
+    /// w ζ λ and w ζ μ.
+    lambda: f64x8,
+    mu: f64x8,
+}
+
+impl<const N: usize, const Q: usize> Groups<N, Q> {
+    /// The elements, with ζ = 0.
+    pub(super) fn new(cells: Cells<N, Q>) -> Self {
+        let group = |(nodes, elements): (&[[usize; N]], &[Element<N, Q>])| Group {
+            nodes: from_fn(|i| from_fn(|lane| nodes.get(lane).map_or(0, |nodes| nodes[i] as u32))),
+            points: from_fn(|q| {
+                let lanes = |of: &dyn Fn(&Element<N, Q>) -> f64| -> f64x8 {
+                    f64x8::from(from_fn(|lane| elements.get(lane).map_or(0.0, of)))
+                };
+                let gradient =
+                    |i: usize, axis: usize| lanes(&|element| element.points[q].gradients[i][axis]);
+                Point {
+                    gradients: from_fn(|i| from_fn(|axis| gradient(i, axis))),
+                    weight: lanes(&|element| element.points[q].weight),
+                    lambda: f64x8::ZERO,
+                    mu: f64x8::ZERO,
+                }
+            }),
+        };
+        let groups = zip(cells.nodes.chunks(LANES), cells.elements.chunks(LANES)).map(group);
+        Self { groups: groups.collect(), elements: cells.elements.len() }
+    }
+}
+
+impl<const N: usize, const Q: usize> ElementSums for Groups<N, Q> {
+    fn set(&mut self, body: &Body, elasticity: &Elasticity, zeta: &[f64]) {
+        let zeta = zeta.as_chunks::<Q>().0.chunks(LANES);
+        for (g, (group, zeta)) in zip(&mut self.groups, zeta).enumerate() {
+            for (q, point) in group.points.iter_mut().enumerate() {
+                let [mut lambda, mut mu] = [[0.0; LANES]; 2];
+                for (lane, zeta) in zeta.iter().enumerate() {
+                    let d = elasticity.d(body, LANES * g + lane);
+                    (lambda[lane], mu[lane]) = (zeta[q] * d[(0, 1)], zeta[q] * d[(2, 2)]);
+                }
+                point.lambda = point.weight * f64x8::from(lambda);
+                point.mu = point.weight * f64x8::from(mu);
+            }
+        }
+    }
+
+    fn add_forces(&self, u: &[f64], force: &mut [f64]) {
+        let (u, force) = (u.as_chunks::<2>().0, force.as_chunks_mut::<2>().0);
+        for Group { nodes, points } in &self.groups {
+            let u: [[f64x8; 2]; N] = from_fn(|i| {
+                let of_nodes = nodes[i].map(|node| u[node as usize]);
+                from_fn(|axis| f64x8::from(of_nodes.map(|u| u[axis])))
+            });
+            let mut forces = [[f64x8::ZERO; 2]; N];
+            for Point { gradients, lambda, mu, .. } in points {
+                let [mut xx, mut yy, mut xy] = [f64x8::ZERO; 3];
+                for ([dx, dy], [ux, uy]) in zip(gradients, &u) {
+                    (xx, yy, xy) = (xx + *dx * *ux, yy + *dy * *uy, xy + (*dy * *ux + *dx * *uy));
+                }
+                let (pressure, twice) = (*lambda * (xx + yy), *mu + *mu);
+                let (xx, yy, xy) = (pressure + twice * xx, pressure + twice * yy, *mu * xy);
+                for ([fx, fy], [dx, dy]) in zip(&mut forces, gradients) {
+                    (*fx, *fy) = (*fx + (*dx * xx + *dy * xy), *fy + (*dy * yy + *dx * xy));
+                }
+            }
+            for (nodes, forces) in zip(nodes, forces) {
+                let [fx, fy] = forces.map(f64x8::to_array);
+                for (lane, &node) in nodes.iter().enumerate() {
+                    let [x, y] = force[node as usize];
+                    force[node as usize] = [x + fx[lane], y + fy[lane]];
+                }
+            }
+        }
+    }
+
+    fn add_diagonal(&self, diagonal: &mut [[f64; 3]]) {
+        for group in &self.groups {
+            for (i, nodes) in group.nodes.iter().enumerate() {
+                let [xx, xy, _, yy] = group.block(i, i).map(f64x8::to_array);
+                for (lane, &node) in nodes.iter().enumerate() {
+                    let sums = &mut diagonal[node as usize];
+                    *sums = [sums[0] + xx[lane], sums[1] + xy[lane], sums[2] + yy[lane]];
+                }
+            }
+        }
+    }
+
+    fn for_blocks(&self, add: &mut dyn FnMut([usize; 2], [usize; 2], Matrix2<f64>)) {
+        for (g, group) in self.groups.iter().enumerate() {
+            for (i, j) in (0..N).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+                let [xx, xy, yx, yy] = group.block(i, j).map(f64x8::to_array);
+                for lane in 0..LANES.min(self.elements - LANES * g) {
+                    let pair = |i, j| N * (N * (LANES * g + lane) + i) + j;
+                    let nodes = [i, j].map(|i| group.nodes[i][lane] as usize);
+                    let block = Matrix2::new(xx[lane], xy[lane], yx[lane], yy[lane]);
+                    add([pair(i, j), pair(j, i)], nodes, block);
+                }
+            }
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        size_of_val(&self.groups[..])
+    }
+}
+
+impl<const N: usize, const Q: usize> Group<N, Q> {
+    /// K_ij of the elements, (xx, xy, yx, yy): Σ_q w ζ (λ ∇φ_i ∇φ_jᵀ + μ ∇φ_j ∇φ_iᵀ + μ ∇φ_i·∇φ_j I).
+    #[inline(always)]
+    fn block(&self, i: usize, j: usize) -> [f64x8; 4] {
+        let mut sums = [f64x8::ZERO; 4];
+        for Point { gradients, lambda, mu, .. } in &self.points {
+            let ([x, y], [p, q]) = (gradients[i], gradients[j]);
+            let (xp, xq, yp, yq) = (x * p, x * q, y * p, y * q);
+            let both = *mu * (xp + yq);
+            let sum = *lambda + *mu;
+            let terms = [
+                sum * xp + both,
+                *lambda * xq + *mu * yp,
+                *lambda * yp + *mu * xq,
+                sum * yq + both,
+            ];
+            sums = from_fn(|k| sums[k] + terms[k]);
+        }
+        sums
+    }
+}
