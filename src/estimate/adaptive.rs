@@ -144,7 +144,7 @@ pub fn adapted(
     accuracy: f64,
     seen: &mut dyn FnMut(&Adapted),
 ) -> Result<Adapted, AdaptError> {
-    let mut few = scene.clone();
+    let mut few = roughly_solved(scene, accuracy);
     few.time.iter_mut().for_each(|grid| grid.stepping = Stepping::Uniform { steps: INSTANTS });
     let scene = with_passing_loads(session, few, &mesh, accuracy)?;
     check_figures(&scene, &mesh)?;
@@ -159,6 +159,15 @@ pub fn adapted(
         (Err(error), Some(before)) => Ok(Adapted { short: Some(error.to_string()), ..before }),
         (refined, _) => refined,
     }
+}
+
+/// A scene whose contact solves are exact enough to see errors of this `accuracy`.
+fn roughly_solved(scene: &Scene, accuracy: f64) -> Scene {
+    /// The error of a solve over the accuracy. A change between two meshes has two or three digits that count.
+    const SOLVED: f64 = 1e-4;
+    let mut scene = scene.clone();
+    scene.contact.tolerance = scene.contact.tolerance.max(SOLVED * accuracy);
+    scene
 }
 
 /// A scene with its few uniform steps, or with adaptive ones if loads or gaps pass by within a step. An error if the
@@ -191,7 +200,7 @@ pub fn measured_errors(
     solver: &str,
     of_steps: Option<f64>,
 ) -> Result<Measured, AdaptError> {
-    let mut few = scene.clone();
+    let mut few = roughly_solved(scene, of_steps.unwrap_or(FEW_STEP_TOLERANCE));
     if let Some(grid) = &mut few.time {
         grid.stepping = match (of_steps, grid.stepping) {
             (Some(tolerance), _) => Stepping::Auto { tolerance, expected: [0.0; 2] },
