@@ -15,6 +15,7 @@ pub fn provenance() -> Value {
         "date": now.to_string(),
         // The words of the command line, and the folder in which it was run.
         "command": arguments.collect::<Vec<_>>(),
+        "libraries": libraries(),
         "directory": env::current_dir().ok(),
         "machine": {
             "host": fs::read_to_string("/proc/sys/kernel/hostname").ok().map(|n| n.trim().to_owned()),
@@ -22,6 +23,19 @@ pub fn provenance() -> Value {
             "cores": thread::available_parallelism().ok(),
         },
     })
+}
+
+/// The files of PETSc, of its factors and of BLAS that this process has loaded, from Linux (proc(5), maps). Their
+/// names end with their versions.
+fn libraries() -> Vec<String> {
+    const NAMES: [&str; 5] = ["libpetsc", "libcholmod", "libdmumps", "libopenblas", "libblas"];
+    let maps = fs::read_to_string("/proc/self/maps").unwrap_or_default();
+    let files = maps.lines().filter_map(|line| line.rsplit_once('/').map(|(_, file)| file));
+    let mut files: Vec<_> =
+        files.filter(|file| NAMES.iter().any(|name| file.starts_with(name))).collect();
+    files.sort_unstable();
+    files.dedup();
+    files.into_iter().map(str::to_owned).collect()
 }
 
 /// The name of the processor from Linux (proc(5), cpuinfo).

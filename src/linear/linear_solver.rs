@@ -154,14 +154,7 @@ impl LinearSolver {
     }
 
     fn set_norm(&mut self, system: LinearSystem) -> Result<(), PetscError> {
-        self.norm = match system.prescribed {
-            None => self.residual.norm()?,
-            Some(prescribed) => {
-                self.correction.axpby(1.0, &self.residual, 0.0)?;
-                self.correction.write(|r| prescribed.iter().for_each(|&i| r[i] = 0.0))?;
-                self.correction.norm()?
-            }
-        };
+        self.norm = self.residual.free_norm(system.prescribed)?;
         Ok(())
     }
 

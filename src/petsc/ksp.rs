@@ -209,7 +209,7 @@ impl Ksp {
             None => {
                 problem.matrix.multiply(x, &mut self.residual)?;
                 self.residual.axpby(1.0, b, -1.0)?;
-                free_norm(&self.residual, &mut self.work, problem.prescribed)?
+                self.residual.free_norm(problem.prescribed)?
             }
         };
         Ok(KspReport { iterations: iterations as usize, norm })
@@ -219,18 +219,6 @@ impl Ksp {
     pub(crate) fn residual(&self) -> &Vector {
         &self.residual
     }
-}
-
-/// ‖r‖₂ of the unknowns that are not `prescribed`. Collective.
-fn free_norm(
-    r: &Vector,
-    work: &mut Vector,
-    prescribed: Option<&[usize]>,
-) -> Result<f64, PetscError> {
-    let Some(prescribed) = prescribed else { return r.norm() };
-    work.axpby(1.0, r, 0.0)?;
-    work.write(|r| prescribed.iter().for_each(|&i| r[i] = 0.0))?;
-    work.norm()
 }
 
 unsafe extern "C" fn is_converged(
@@ -246,7 +234,7 @@ unsafe extern "C" fn is_converged(
     let mut test = || {
         // SAFETY: a KSP that is solving; two vectors of the layout of its own.
         check(unsafe { raw::KSPBuildResidual(ksp, work.raw(), residual.raw(), &mut built) })?;
-        let found = *norm.insert(free_norm(residual, work, problem.prescribed)?);
+        let found = *norm.insert(residual.free_norm(problem.prescribed)?);
         Ok(if found <= problem.limit {
             raw::KSPConvergedReason::KSP_CONVERGED_ATOL
         } else if !found.is_finite() {

@@ -1,7 +1,7 @@
 //! Vectors distributed by owned entries (<https://petsc.org/release/manualpages/Vec/>).
 
-use super::{PetscError, Session, check, handle::Handle, raw, session::world};
-use std::{ptr, slice};
+use super::{Communicator, PetscError, Session, check, handle::Handle, raw, session::world};
+use std::{mem, ptr, slice};
 
 /// A PETSc vector; this rank owns a contiguous part of it.
 pub struct Vector {
@@ -85,6 +85,18 @@ impl Vector {
         Ok(norm)
     }
 
+    /// ‖·‖₂ over all ranks, without the entries of the owned unknowns that are `prescribed` (increasing); `None` if
+    /// no rank prescribes any.
+    pub(crate) fn free_norm(&self, prescribed: Option<&[usize]>) -> Result<f64, PetscError> {
+        let Some(prescribed) = prescribed else { return self.norm() };
+        let squares = self.read(|v| {
+            let mut start = 0;
+            let mut before = |end: usize| squares(&v[mem::replace(&mut start, end + 1)..end]);
+            prescribed.iter().map(|&unknown| before(unknown)).sum::<f64>() + before(v.len())
+        })?;
+        Ok(Communicator::of_world().total(squares).sqrt())
+    }
+
     /// Inner product over all ranks (VecDot).
     pub(crate) fn dot(&self, other: &Self) -> Result<f64, PetscError> {
         let mut product = 0.0;
@@ -103,6 +115,16 @@ impl Vector {
     pub fn owned(&self) -> usize {
         self.owned
     }
+}
+
+/// Σ v_i², in eight sums that the processor adds at a time.
+fn squares(v: &[f64]) -> f64 {
+    let (groups, rest) = v.as_chunks::<8>();
+    let mut sums = [0.0; 8];
+    for group in groups {
+        sums.iter_mut().zip(group).for_each(|(sum, v)| *sum += v * v);
+    }
+    sums.iter().sum::<f64>() + rest.iter().map(|v| v * v).sum::<f64>()
 }
 
 /// A number of entries in PETSc's integer type.
