@@ -99,11 +99,8 @@ pub(super) fn notes(scene: &Scene, mesh: &Mesh) -> Vec<String> {
 
 /// The components of prescribed displacements that depend on the place.
 fn displacements(conditions: &[Condition]) -> impl Iterator<Item = &Expression> {
-    let components = conditions.iter().filter_map(|condition| match condition {
-        Condition::Displacement(components) => Some(components),
-        _ => None,
-    });
-    components.flatten().flatten().filter(|u| u.depends_on_space())
+    let prescribed = conditions.iter().filter(|of| matches!(of, Condition::Displacement(_)));
+    prescribed.flat_map(Condition::expressions).flatten().filter(|u| u.depends_on_space())
 }
 
 /// Per edge of a curve: max |u_D − Iu_D| at some times, m. Then the maximum |u_D| of all edges, m.

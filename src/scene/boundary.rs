@@ -27,6 +27,29 @@ pub enum Condition {
     Load(SurfaceLoad),
 }
 
+impl Condition {
+    /// Its key in a scene.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Displacement(_) => "displacement",
+            Self::Symmetry => "symmetry",
+            Self::Gap(_) => "gap",
+            Self::Load(SurfaceLoad::Traction(_)) => "traction",
+            Self::Load(SurfaceLoad::Pressure(_)) => "pressure",
+        }
+    }
+
+    /// The expressions of its components; `None` for a free component.
+    pub fn expressions(&self) -> Vec<Option<&Expression>> {
+        match self {
+            Self::Displacement(u) => u.iter().map(Option::as_ref).collect(),
+            Self::Symmetry => Vec::new(),
+            Self::Gap(gap) => vec![Some(&gap.distance)],
+            Self::Load(load) => load.expressions().iter().map(Some).collect(),
+        }
+    }
+}
+
 /// A surface load f_N, N/m².
 #[derive(Debug, Clone)]
 pub enum SurfaceLoad {
@@ -85,19 +108,16 @@ impl Boundary {
 }
 
 /// The names of two conditions in `a` and `b` that contradict each other on a common edge.
-pub(super) fn contradiction(a: &[Condition], b: &[Condition]) -> Option<[&'static str; 2]> {
+pub(super) fn contradiction(a: &[Condition], b: &[Condition]) -> Option<[String; 2]> {
     use Condition::{Displacement, Gap, Load, Symmetry};
     let one_way = |a: &Condition, b: &Condition| match (a, b) {
-        (Displacement(_), Gap(_)) => Some(["a displacement", "a gap"]),
-        (Displacement(_), Symmetry) => Some(["a displacement", "a symmetry"]),
-        (Displacement([Some(_), Some(_)]), Load(load)) => {
-            let load = match load {
-                SurfaceLoad::Traction(_) => "a traction",
-                SurfaceLoad::Pressure(_) => "a pressure",
-            };
-            Some(["both displacements prescribed (no component is \"free\")", load])
+        (Displacement(_), Gap(_) | Symmetry) | (Symmetry, Gap(_)) => {
+            Some([a, b].map(|of| format!("a {}", of.name())))
         }
-        (Symmetry, Gap(_)) => Some(["a symmetry", "a gap"]),
+        (Displacement([Some(_), Some(_)]), Load(_)) => {
+            let both = "both displacements prescribed (no component is \"free\")".to_owned();
+            Some([both, format!("a {}", b.name())])
+        }
         _ => None,
     };
     let mut pairs = a.iter().flat_map(|a| b.iter().map(move |b| (a, b)));

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::boundary::{Boundary, Condition, SurfaceLoad, contradiction};
+use super::boundary::{Boundary, Condition, contradiction};
 use super::document::{NOWHERE, Problem};
 use super::error::SceneError;
 use super::expression::Expression;
@@ -88,50 +88,33 @@ impl Scene {
 
     fn bad_values(&self, mesh: &Mesh, times: &[f64]) -> Vec<Problem> {
         let mut problems = Vec::new();
-        let mut check = |key: String, expression, points: &[[f64; 2]], rule: Rule| {
-            problems.extend(self.check(&key, expression, points, times, rule));
+        let mut check = |key: &str, of: &[Option<&Expression>], points: &[[f64; 2]], rule: Rule| {
+            for (i, f) in of.iter().enumerate().filter_map(|(i, f)| Some((i, (*f)?))) {
+                let key = if of.len() > 1 { format!("{key}[{i}]") } else { key.to_owned() };
+                problems.extend(self.check(&key, f, points, times, rule));
+            }
         };
         let finite: Rule = ("", &|_| true);
         if let Some(Damage { initial, law, .. }) = &self.damage {
             let rule = format!("; it must be in ({}, 1]", law.threshold);
             let rule: Rule = (&rule, &|zeta| may_start_at(law, zeta));
-            check("damage.initial".into(), initial, &mesh.nodes, rule);
+            check("damage.initial", &[Some(initial)], &mesh.nodes, rule);
         }
         let at = |[p, q]: [usize; 2]| [mesh.nodes[p], mesh.nodes[q]];
         let sides = mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
         let midpoints: Vec<_> = sides.map(at).map(|[p, q]| midpoint(p, q)).collect();
-        for (i, force) in self.body_force.iter().enumerate() {
-            check(format!("body.force[{i}]"), force, &midpoints, finite);
-        }
-        for (i, gravity) in self.gravity.iter().enumerate() {
-            check(format!("body.gravity[{i}]"), gravity, &[[0.0; 2]], finite);
-        }
+        check("body.force", &self.body_force.each_ref().map(Some), &midpoints, finite);
+        check("body.gravity", &self.gravity.each_ref().map(Some), &[[0.0; 2]], finite);
         for boundary in &self.boundaries {
             let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
-            let key = |what: &str| boundary_key(&boundary.name, what);
             let edges = || curve.edges.iter().copied().map(at);
             let nodes: Vec<_> = edges().flatten().collect();
             let gauss_points: Vec<_> = edges().flat_map(|[p, q]| gauss_points(p, q)).collect();
             for condition in &boundary.conditions {
-                match condition {
-                    Condition::Displacement(u) => {
-                        for (i, u) in
-                            u.iter().enumerate().filter_map(|(i, u)| Some((i, u.as_ref()?)))
-                        {
-                            check(key(&format!("displacement[{i}]")), u, &nodes, finite);
-                        }
-                    }
-                    Condition::Load(SurfaceLoad::Traction(f)) => {
-                        for (i, f) in f.iter().enumerate() {
-                            check(key(&format!("traction[{i}]")), f, &gauss_points, finite);
-                        }
-                    }
-                    Condition::Load(SurfaceLoad::Pressure(p)) => {
-                        check(key("pressure"), p, &gauss_points, finite);
-                    }
-                    Condition::Gap(gap) => check(key("gap"), &gap.distance, &nodes, finite),
-                    Condition::Symmetry => {}
-                }
+                let is_load = matches!(condition, Condition::Load(_));
+                let points = if is_load { &gauss_points } else { &nodes };
+                let key = boundary_key(&boundary.name, condition.name());
+                check(&key, &condition.expressions(), points, finite);
             }
         }
         problems

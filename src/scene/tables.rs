@@ -1,7 +1,7 @@
 //! Makes a scene from the tables of a document that the schema allows, and checks that the values fit each
 //! other.
 
-use super::boundary::boundary;
+use super::boundary::{Boundary, boundary};
 use super::expression::Expression;
 use super::schema::{Diagnostic, Diagnostics, is_wrong};
 use super::{
@@ -38,12 +38,7 @@ pub(super) fn scene(found: &mut Diagnostics) -> Option<Scene> {
     let output = found.build("output", Ok);
     let units = found.build("units", units);
     let boundaries = found.build_all("boundary", boundary);
-    let probes = found.build_all("probe", probe);
-    if let Some(Probe { name, .. }) =
-        probes.iter().find(|probe| boundaries.iter().any(|other| other.name == probe.name))
-    {
-        found.note(&format!("probe.{name}"), "has the name of a boundary; choose another one");
-    }
+    let probes = found.build_all("probe", |of| probe(of, &boundaries));
     let materials: Vec<(String, Material)> = found.build("material", surfaces).unwrap_or_default();
     let laws = found.build("damage", surfaces).unwrap_or_default();
 
@@ -211,7 +206,10 @@ fn units(UnitKeys { length, force, time, stress }: UnitKeys) -> Result<Units, Di
     Ok(Units { stress: stress.unwrap_or(derived), length, force, time })
 }
 
-fn probe(probe: Probe) -> Result<Probe, Diagnostic> {
+fn probe(probe: Probe, boundaries: &[Boundary]) -> Result<Probe, Diagnostic> {
+    if boundaries.iter().any(|other| other.name == probe.name) {
+        return Err(("", "has the name of a boundary; choose another one".to_owned()));
+    }
     match probe.name.trim().is_empty() {
         true => Err(("name", "is empty; its columns begin with it".to_owned())),
         false => Ok(probe),

@@ -34,14 +34,8 @@ fn breaks(problem: &DiscreteProblem, end: f64) -> Vec<f64> {
         let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
         let edges = curve.edges.chunks(curve.edges.len().div_ceil(BOXES).max(1));
         let boxes: Vec<_> = edges.map(|edges| mesh.bounds(edges.iter().flatten())).collect();
-        for condition in &boundary.conditions {
-            match condition {
-                Condition::Displacement(u) => u.iter().flatten().for_each(|u| add(u, &boxes)),
-                Condition::Load(load) => load.expressions().iter().for_each(|f| add(f, &boxes)),
-                Condition::Gap(gap) => add(&gap.distance, &boxes),
-                Condition::Symmetry => {}
-            }
-        }
+        let of_conditions = boundary.conditions.iter().flat_map(Condition::expressions);
+        of_conditions.flatten().for_each(|f| add(f, &boxes));
     }
     breaks.retain(|t| 0.0 < *t && *t < end);
     breaks.sort_by(f64::total_cmp);
