@@ -18,9 +18,6 @@ use crate::suggestion::suggestion;
 /// The tables with expressions.
 pub(super) const EXPRESSIONS: [&str; 3] = ["body", "boundary", "damage"];
 
-/// The full paths and the contents of files of tables.
-pub(super) type Tables = Vec<(String, Vec<u8>)>;
-
 /// The place of a problem and the message.
 pub(super) type Problem = (Range<usize>, String);
 
@@ -38,9 +35,9 @@ pub(super) const NOWHERE: Range<usize> = Range { start: 1, end: 0 };
 
 /// The text of a scene. A place in it is a range of bytes. The bytes of the file are counted from 0, the
 /// bytes of the n-th `--set` argument from n times the `stride`.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct SceneText {
-    path: PathBuf,
+    pub(super) path: PathBuf,
     /// The content of the file.
     file: String,
     /// The `--set` arguments.
@@ -51,9 +48,9 @@ pub(super) struct SceneText {
     stride: usize,
     /// The places of the values that have been read, by their full keys.
     pub(super) places: BTreeMap<String, Range<usize>>,
-    /// The values, and the files of tables, from [`Self::values`].
+    /// The values, and the full paths and contents of the files of tables, from [`Self::values`].
     pub(super) document: toml::Table,
-    pub(super) tables: Tables,
+    pub(super) tables: Vec<(String, Vec<u8>)>,
 }
 
 impl SceneText {
@@ -72,14 +69,8 @@ impl SceneText {
             sets: sets.to_vec(),
             arguments: sets.iter().enumerate().map(indented).collect(),
             stride,
-            places: BTreeMap::new(),
-            document: toml::Table::new(),
-            tables: Vec::new(),
+            ..Self::default()
         }
-    }
-
-    pub(super) fn path(&self) -> &Path {
-        &self.path
     }
 
     /// The folder to which paths are relative.
@@ -90,12 +81,12 @@ impl SceneText {
     /// An error that lists the `problems` in the order of the file, if there are any.
     pub(super) fn refuse(&self, mut problems: Vec<Problem>) -> Result<(), SceneError> {
         problems.sort_by_key(|(place, _)| (place.start, place.end));
-        let mut reports: Vec<String> = Vec::with_capacity(problems.len());
-        for (place, message) in &problems {
-            // The others are only counted.
-            let is_shown = reports.len() < MOST_SHOWN;
-            reports.push(if is_shown { self.report(place, message) } else { message.clone() });
-        }
+        // The others are only counted.
+        let report = |(n, (place, message)): (usize, &Problem)| match n < MOST_SHOWN {
+            true => self.report(place, message),
+            false => message.clone(),
+        };
+        let mut reports: Vec<String> = problems.iter().enumerate().map(report).collect();
         let Some(last) = reports.last_mut() else { return Ok(()) };
         // A line of the file may contradict an argument of the command line.
         let of_the_file = |(place, _): &Problem| place.start < self.stride;
@@ -137,10 +128,10 @@ impl SceneText {
 
     /// The values of a document with the full paths of tables, and these tables. The values are empty if a number
     /// does not fit its type.
-    pub(super) fn values(&self, root: &DeValue) -> (toml::Table, Tables) {
+    pub(super) fn values(&self, root: &DeValue) -> (toml::Table, Vec<(String, Vec<u8>)>) {
         let root = Spanned::new(NOWHERE, root.clone()).into_deserializer();
         let mut document = toml::Table::deserialize(root).unwrap_or_default();
-        let mut tables = Tables::new();
+        let mut tables = Vec::new();
         let mut complete = |name: &str| {
             let file = self.folder().join(name);
             // Reading a device might never end.
@@ -155,22 +146,23 @@ impl SceneText {
         (document, tables)
     }
 
+    /// The line that contains the byte `at`, and its first byte.
+    fn line(&self, at: usize) -> Option<(usize, &str)> {
+        let start = self.file.get(..at)?.rfind('\n').map_or(0, |end| end + 1);
+        Some((start, self.file[start..].lines().next()?))
+    }
+
     /// Advice for a line that is not TOML. The line contains the byte `at`.
     fn hint(&self, at: usize) -> &'static str {
-        let start =
-            self.file.get(..at).and_then(|before| before.rfind('\n')).map_or(0, |end| end + 1);
-        let line = self.file.get(start..).and_then(|text| text.lines().next()).unwrap_or_default();
+        let (_, line) = self.line(at).unwrap_or_default();
         if line.trim_start().starts_with("[boundary]") {
             return "; boundary is a list, each begins with [[boundary]]";
         }
         let Some((_, value)) = line.split_once('=') else { return "" };
-        // Without texts in quotes.
-        let bare: String = value.split('"').step_by(2).collect();
-        let digit = |c: Option<char>| c.is_some_and(|c| c.is_ascii_digit());
-        let is_open = |(at, _): (usize, &str)| {
-            !digit(bare[..at].chars().next_back()) || !digit(bare[at + 1..].chars().next())
-        };
-        if bare.match_indices('.').any(is_open) {
+        // Without texts in quotes, between blanks.
+        let bare = format!(" {} ", value.split('"').step_by(2).collect::<String>());
+        let is_open = |c: &[u8]| c[1] == b'.' && !(c[0].is_ascii_digit() && c[2].is_ascii_digit());
+        if bare.as_bytes().windows(3).any(is_open) {
             "; a number has digits before and after its point, as in 0.5"
         } else if bare.contains(|c: char| c.is_alphabetic() || "*/^".contains(c)) {
             "; expressions and texts stand in quotes"
@@ -181,14 +173,11 @@ impl SceneText {
 
     /// The problem of a decimal comma (`1,5`) in the line that contains the byte `at`.
     fn decimal_comma(&self, at: usize) -> Option<Problem> {
-        let before = self.file.get(..at)?;
-        let start = before.rfind('\n').map_or(0, |end| end + 1);
-        let line = self.file[start..].lines().next()?;
+        let (start, line) = self.line(at)?;
         line.match_indices('=').find_map(|(equals, _)| {
             let value = line[equals + 1..].trim_start();
             let length = with_decimal_comma(value)?;
-            let key = line[..equals].trim_end();
-            let key = &key[key.rfind(['{', ',', ' ']).map_or(0, |end| end + 1)..];
+            let key = line[..equals].trim_end().rsplit(['{', ',', ' ']).next()?;
             let from = start + line.len() - value.len();
             let number = &value[..length];
             let mended = number.replace(',', ".");
@@ -200,36 +189,34 @@ impl SceneText {
     /// Parses the file and inserts the `--set` arguments in their order.
     pub(super) fn parse(&self) -> Result<DeValue<'_>, SceneError> {
         let (root, errors) = DeTable::parse_recoverable(&self.file);
-        let mut commas = BTreeMap::new();
-        let mut syntax = |error: &toml::de::Error| {
+        let syntax = |error: &toml::de::Error| {
             let place = error.span().unwrap_or(NOWHERE);
-            match self.decimal_comma(place.start) {
-                // Other errors in this line may follow from the comma.
-                Some((place, problem)) => commas
-                    .insert(place.start, problem.clone())
-                    .is_none()
-                    .then_some((place, problem)),
-                None => {
-                    let hint = self.hint(place.start);
-                    Some((place, format!("not valid TOML: {}{hint}", error.message())))
-                }
-            }
+            self.decimal_comma(place.start).unwrap_or_else(|| {
+                let hint = self.hint(place.start);
+                (place, format!("not valid TOML: {}{hint}", error.message()))
+            })
         };
         // After an unclosed table, keys seem to be duplicates.
         let is_duplicate = |error: &toml::de::Error| error.message() == "duplicate key";
         let all = errors.first().is_none_or(is_duplicate);
         let reported = errors.iter().filter(|error| all || !is_duplicate(error));
-        self.refuse(reported.filter_map(&mut syntax).collect())?;
+        let mut problems: Vec<Problem> = reported.map(syntax).collect();
+        // Several errors in a line may follow from one comma.
+        problems.dedup();
+        self.refuse(problems)?;
         let mut root = DeValue::Table(root.into_inner());
         let mut problems = Vec::new();
-        for argument in &self.arguments {
+        for (start, argument) in (1..).map(|n| n * self.stride).zip(&self.arguments) {
             let put = match DeTable::parse(argument) {
                 Ok(given) if argument.contains('=') && !argument.contains('\n') => {
                     put_all(&mut root, given.into_inner(), "", argument)
                 }
-                _ => Err(misshapen(argument)),
+                _ => {
+                    Err("is no key, `=` and value in one line; write --set KEY=VALUE, as in --set \
+                          time.step=0.005 (quote odd names: boundary.\"left side\".gap=0)"
+                        .to_owned())
+                }
             };
-            let start = argument.len() - argument.trim_start_matches(' ').len();
             problems.extend(put.err().map(|problem| (start..start, problem)));
         }
         self.refuse(problems).map(|()| root)
@@ -241,9 +228,9 @@ pub(super) fn map_tables(value: &mut toml::Value, map: &mut impl FnMut(&str) -> 
     match value {
         toml::Value::String(text) if text.contains("table") => {
             // Only names of files are quoted in an expression.
-            let mut mapped = |part: &str| map(part).unwrap_or_else(|| part.to_owned());
             for quote in ["\"", "'"] {
-                *text = text.split(quote).map(&mut mapped).collect::<Vec<_>>().join(quote);
+                let parts = text.split(quote).map(|part| map(part).unwrap_or_else(|| part.into()));
+                *text = parts.collect::<Vec<String>>().join(quote);
             }
         }
         toml::Value::Array(values) => values.iter_mut().for_each(|value| map_tables(value, map)),
@@ -262,16 +249,6 @@ pub(super) fn with_decimal_comma(text: &str) -> Option<usize> {
     let is_number = whole.parse::<i64>().is_ok() && rest.starts_with(|c: char| c.is_ascii_digit());
     let mended = format!("{whole}.{rest}");
     (is_number && mended.parse::<f64>().is_ok()).then_some(number.len())
-}
-
-/// The problem of a `--set` argument that is not TOML.
-fn misshapen(argument: &str) -> String {
-    let problem = match argument.contains('=') {
-        true if argument.contains('\n') => "is more than one line",
-        true => "the key is no dotted TOML key (quote odd names: boundary.\"left side\".gap=0)",
-        false => "has no `=`",
-    };
-    format!("{problem}; write --set KEY=VALUE, for example --set time.step=0.005")
 }
 
 /// Replaces values in the table, or in the array of named tables, at `key` by the values `given` in an

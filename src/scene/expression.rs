@@ -54,12 +54,7 @@ impl TryFrom<Value> for Expression {
     type Error = ExpressionError;
 
     fn try_from(written: Value) -> Result<Self, ExpressionError> {
-        match written {
-            Value::String(text) => Self::parse(&text),
-            Value::Float(value) => Ok(Self::constant(value)),
-            Value::Integer(value) => Ok(Self::constant(value as f64)),
-            _ => Err(ExpressionError("must be a number or an expression in quotes".to_owned())),
-        }
+        Self::from_toml(&written, Path::new(""))
     }
 }
 
@@ -107,6 +102,16 @@ impl Expression {
             Some(*height)
         });
         Ok(Self { height: heights.max().unwrap_or(0), program })
+    }
+
+    /// The expression in a scene: a number, or a text as for [`Expression::parse_in`].
+    pub(super) fn from_toml(written: &Value, folder: &Path) -> Result<Self, ExpressionError> {
+        match written {
+            Value::String(text) => Self::parse_in(text, folder),
+            Value::Float(value) => Ok(Self::constant(*value)),
+            Value::Integer(value) => Ok(Self::constant(*value as f64)),
+            _ => Err(ExpressionError("must be a number or an expression in quotes".to_owned())),
+        }
     }
 
     /// As [`Expression::parse_in`], in the working directory.

@@ -23,19 +23,21 @@ pub const SCHEMA: &str = include_str!("../../geo/scene.schema.json");
 
 static KEYS: LazyLock<Schema> = LazyLock::new(|| serde_json::from_str(SCHEMA).unwrap_or_default());
 
-/// The end of a message about a key that is called differently: by the names `also` in use for a key, or as a
-/// parameter in the table `parameters` of this one.
-fn usual_name(schema: &Schema, name: &str, value: &DeValue) -> Option<String> {
-    let is_it = |of: &Schema| {
-        of["also"].as_array().is_some_and(|also| also.iter().any(|other| other == name))
-    };
-    let mut keys = schema["properties"].as_object()?.iter();
-    if let Some((key, _)) = keys.find(|(_, of)| is_it(of)) {
-        return Some(format!("; did you mean `{key}`?"));
-    }
+/// The end of a message about an unknown key: the most similar key, the key with this name `also` in use, or the table
+/// of parameters in which a number may stand.
+fn known_as(schema: &Schema, name: &str, value: &DeValue) -> String {
+    let keys = || schema["properties"].as_object().into_iter().flatten();
+    let similar = suggestion(name, &keys().map(|(key, _)| key).collect::<Vec<_>>());
+    let is_also =
+        |of: &Schema| of["also"].as_array().is_some_and(|also| also.contains(&name.into()));
     let is_number = matches!(value, DeValue::Integer(_) | DeValue::Float(_));
-    let table = schema["parameters_in"].as_str().filter(|_| is_number)?;
-    Some(format!("; did you mean `{table}.{name}`?"))
+    let table = schema["parameters_in"].as_str().filter(|_| is_number);
+    match (keys().find(|(_, of)| is_also(of)), table) {
+        _ if similar.contains("did you mean") => similar,
+        (Some((key, _)), _) => format!("; did you mean `{key}`?"),
+        (None, Some(table)) => format!("; did you mean `{table}.{name}`?"),
+        (None, None) => similar,
+    }
 }
 
 /// A contradiction within a table: the key below that of the table ("" for the whole table), and the problem.
@@ -66,8 +68,12 @@ impl<'t> Diagnostics<'t> {
 
     /// Adds a problem of a key; the message begins with the key.
     pub(super) fn note(&mut self, key: &str, problem: impl Display) {
-        let place = self.places.get(key).cloned().unwrap_or(NOWHERE);
-        self.problems.push((place, format!("{key} {problem}")));
+        self.note_at(key, format!("{key} {problem}"));
+    }
+
+    /// Adds a problem at the place of a key.
+    fn note_at(&mut self, key: &str, problem: String) {
+        self.problems.push((self.places.get(key).cloned().unwrap_or(NOWHERE), problem));
     }
 
     fn check_value(&mut self, key: String, place: Range<usize>, value: &DeValue, schema: &Schema) {
@@ -81,11 +87,9 @@ impl<'t> Diagnostics<'t> {
             }
             _ => {
                 let value = Spanned::new(NOWHERE, value.clone()).into_deserializer();
-                let value = toml::Value::deserialize(value);
-                let value =
-                    value.map_err(|_| "is a number beyond 64 bits; write a smaller one".to_owned());
-                let checked =
-                    value.and_then(|value| check_value(&value, schema, self.text.folder()));
+                let checked = toml::Value::deserialize(value)
+                    .map_err(|_| "is a number beyond 64 bits; write a smaller one".to_owned())
+                    .and_then(|value| check_value(&value, schema, self.text.folder()));
                 checked.err().into_iter().for_each(|problem| self.note(&key, problem));
             }
         }
@@ -95,8 +99,6 @@ impl<'t> Diagnostics<'t> {
     }
 
     fn check_table(&mut self, key: &str, table: &DeTable, schema: &Schema) {
-        let known = schema["properties"].as_object().into_iter().flat_map(|keys| keys.keys());
-        let known: Vec<&str> = known.map(String::as_str).collect();
         let mut is_misspelt = false;
         for (name, value) in table {
             // The place of a table is its header.
@@ -111,10 +113,7 @@ impl<'t> Diagnostics<'t> {
                 Some(schema) => self.check_value(key, place, value, schema),
                 None if is_named => self.check_value(key, place, value, named),
                 None => {
-                    let similar = suggestion(name.get_ref(), &known);
-                    let suggestion = usual_name(schema, name.get_ref(), value)
-                        .filter(|_| !similar.contains("did you mean"))
-                        .unwrap_or(similar);
+                    let suggestion = known_as(schema, name.get_ref(), value);
                     is_misspelt |= suggestion.contains("did you mean");
                     self.problems.push((place, format!("unknown key {key}{suggestion}")));
                 }
@@ -124,9 +123,7 @@ impl<'t> Diagnostics<'t> {
         let required = schema["required"].as_array().filter(|_| !is_misspelt);
         for name in required.into_iter().flatten().filter_map(Schema::as_str) {
             if !table.contains_key(name) {
-                let place = self.places.get(key).cloned().unwrap_or(NOWHERE);
-                let missing = format!("{} is required but missing", below(key, name));
-                self.problems.push((place, missing));
+                self.note_at(key, format!("{} is required but missing", below(key, name)));
             }
         }
     }
@@ -236,7 +233,7 @@ fn check_value(value: &toml::Value, schema: &Schema, folder: &Path) -> Result<()
     }
     let number = value.as_float().or(value.as_integer().map(|number| number as f64));
     if let Some(kind) = schema["format"].as_str() {
-        return check_expression(value.as_str(), number, kind, folder);
+        return check_expression(value, kind, folder);
     }
     let is = |choice: &Schema| match choice.as_str() {
         Some(name) => value.as_str() == Some(name),
@@ -287,18 +284,9 @@ fn is_within(number: f64, schema: &Schema) -> bool {
         && obeys("exclusiveMaximum", f64::lt)
 }
 
-/// Checks that a text or number is an expression of this kind, and finite if it is constant.
-fn check_expression(
-    text: Option<&str>,
-    number: Option<f64>,
-    kind: &str,
-    folder: &Path,
-) -> Result<(), String> {
-    let expression = match (text, number) {
-        (Some(text), _) => Expression::parse_in(text, folder).map_err(|error| error.to_string())?,
-        (_, Some(number)) => Expression::constant(number),
-        _ => return Err("must be a number or an expression in quotes".to_owned()),
-    };
+/// Checks that a value is an expression of this kind, and finite if it is constant.
+fn check_expression(value: &toml::Value, kind: &str, folder: &Path) -> Result<(), String> {
+    let expression = Expression::from_toml(value, folder).map_err(|error| error.to_string())?;
     match expression.as_constant() {
         Some(value) if !value.is_finite() => Err(format!("must be finite, but is {value}")),
         None if kind == "constant" => Err("must be a constant, without x, y and t".to_owned()),

@@ -22,7 +22,7 @@ const MOST_STEPS: f64 = 1e9;
 
 /// The scene of a document. Problems are added to `found`; `None` if a necessary part has a problem.
 pub(super) fn scene(found: &mut Diagnostics) -> Option<Scene> {
-    let (path, folder) = (found.text.path(), found.text.folder());
+    let (path, folder) = (&found.text.path, found.text.folder());
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let title = found.build("title", Ok);
     let mesh = found.build("mesh", |keys| mesh(keys, folder));

@@ -108,7 +108,7 @@ fn arguments() {
     let test_directory = TestDirectory::new();
     for (arguments, fragments) in [
         (&["--solver", "simplex"][..], &["--solver: ", "`simplex`", "active-set", "tao"][..]),
-        (&["--set", "time.step"], &["--set time.step: has no `=`"]),
+        (&["--set", "time.step"], &["--set time.step: is no key, `=` and value"]),
         (&["--set", "time.stp=1"], &["--set time.stp=1: unknown key time.stp", "`step`"]),
         (&["--set", "time.step=0"], &["--set time.step=0: time.step must be positive"]),
         (&["--set", "boundary.topp.gap=0"], &["unknown key boundary.topp", "`top`"]),
