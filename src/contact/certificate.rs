@@ -3,7 +3,7 @@
 //! This code shares nothing with the solvers: no nodal basis, no bound on an unknown, no mask of prescribed
 //! unknowns. A fault in any of these makes u wrong, and the certificate shows it.
 
-use super::{FixedRow, GapRow, Kkt, Scales, kkt::worse};
+use super::{Kkt, Row, Scales, kkt::worse};
 use crate::{fem::Subdomain, petsc::Communicator};
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
@@ -24,7 +24,7 @@ struct Conditions {
     /// Directions d in which u·d is prescribed, and the numbers of these rows.
     fixed: Vec<(Vector2<f64>, usize)>,
     /// The gap conditions and the numbers of these rows.
-    gaps: Vec<(GapRow, usize)>,
+    gaps: Vec<(Row, usize)>,
 }
 
 /// A gap condition at a node, with its gap and reaction.
@@ -53,10 +53,8 @@ pub struct Answer<'a> {
     pub elastic: &'a [f64],
     /// f − Ku, N per metre of thickness: the forces that supports and obstacles must balance.
     pub unbalanced: &'a [f64],
-    /// The values of the prescribed rows, m.
-    pub prescribed: &'a [f64],
-    /// The gaps of all gap rows at this time, m; empty if no gap depends on time.
-    pub gaps: &'a [f64],
+    /// The values of all rows at this time, m.
+    pub values: &'a [f64],
 }
 
 /// A normal lies in the span of the prescribed directions if its part outside is below this.
@@ -66,23 +64,24 @@ const ROUNDING: f64 = 1e-12;
 
 impl Certificate {
     /// The certificate of the undivided body, from its rows.
-    pub fn new(fixed: &[FixedRow], gaps: &[GapRow]) -> Self {
+    pub fn new(rows: &[Row]) -> Self {
         let mut nodes = BTreeMap::<usize, Conditions>::new();
-        for (number, row) in fixed.iter().enumerate() {
-            nodes.entry(row.node).or_default().fixed.push((row.direction.into(), number));
-        }
-        for (number, gap) in gaps.iter().enumerate() {
-            nodes.entry(gap.node).or_default().gaps.push((*gap, number));
+        for (number, row) in rows.iter().enumerate() {
+            let at = nodes.entry(row.node).or_default();
+            match row.is_gap() {
+                true => at.gaps.push((*row, number)),
+                false => at.fixed.push((row.direction.into(), number)),
+            }
         }
         let nodes = nodes.into_iter().map(|(node, at)| Conditions { node, ..at }).collect();
-        Self { nodes, posed: fixed.len() + gaps.len() }
+        Self { nodes, posed: rows.len() }
     }
 
     /// The conditions at the nodes that a rank owns.
     pub fn restrict(&self, subdomain: &Subdomain) -> Self {
         let local = |at: &Conditions| {
             let node = subdomain.owned(at.node)?;
-            let gaps = at.gaps.iter().map(|&(gap, number)| (GapRow { node, ..gap }, number));
+            let gaps = at.gaps.iter().map(|&(gap, number)| (Row { node, ..gap }, number));
             let gaps = gaps.collect();
             Some(Conditions { node, gaps, fixed: at.fixed.clone() })
         };
@@ -121,7 +120,7 @@ impl Certificate {
             dual += reaction.tension;
             tangential += reaction.tangential;
             for (((gap, number), left), force) in at.gaps.iter().zip(&left).zip(reaction.forces) {
-                let width = gap.gap_of(*number, answer.gaps).abs();
+                let width = answer.values[*number].abs();
                 let counts = force.is_some() || -left > ROUNDING * width;
                 let depth = if !counts || *left >= 0.0 { 0.0 } else { -left };
                 primal = worse(primal, scales.of_displacement(depth));
@@ -130,9 +129,9 @@ impl Certificate {
                 let active = force > 0.0 && force * scales.displacement > left * scales.force;
                 points.push(ContactPoint {
                     node: at.node,
-                    normal: gap.normal,
+                    normal: gap.direction,
                     force,
-                    pressure: if active { force / gap.tributary_length } else { 0.0 },
+                    pressure: gap.tributary_length.filter(|_| active).map_or(0.0, |l| force / l),
                     gap: *left,
                     active,
                 });
@@ -171,7 +170,7 @@ impl Conditions {
     /// within their rounding counts as zero.
     fn prescribed_error(&self, answer: Answer, scales: Scales) -> f64 {
         let error = |(direction, row): &(Vector2<f64>, usize)| {
-            let value = answer.prescribed[*row];
+            let value = answer.values[*row];
             let rigid = direction.dot(&self.rigid(answer));
             let off = (value - rigid) - direction.dot(&vector(answer.elastic, self.node));
             let rounding = ROUNDING * value.abs().max(rigid.abs());
@@ -190,9 +189,9 @@ impl Conditions {
     /// g − u·ν of each gap condition. The rigid part is subtracted first: it is as large as a large gap.
     fn gaps_left(&self, answer: Answer) -> Vec<f64> {
         let (rigid, elastic) = (self.rigid(answer), vector(answer.elastic, self.node));
-        let left = |(gap, number): &(GapRow, usize)| {
-            let normal = Vector2::from(gap.normal);
-            (gap.gap_of(*number, answer.gaps) - normal.dot(&rigid)) - normal.dot(&elastic)
+        let left = |(gap, number): &(Row, usize)| {
+            let normal = Vector2::from(gap.direction);
+            (answer.values[*number] - normal.dot(&rigid)) - normal.dot(&elastic)
         };
         self.gaps.iter().map(left).collect()
     }
@@ -209,7 +208,8 @@ impl Conditions {
         };
         let project = |v: Vector2<f64>| free.iter().map(|t| t * t.dot(&v)).sum::<Vector2<f64>>();
         let force = project(force);
-        let normals: Vec<_> = self.gaps.iter().map(|(gap, _)| project(gap.normal.into())).collect();
+        let normals: Vec<_> =
+            self.gaps.iter().map(|(gap, _)| project(gap.direction.into())).collect();
         let bears = |i: &usize| normals[*i].norm() > ALONG;
         let bearing: Vec<usize> = (0..normals.len()).filter(bears).collect();
         let (multipliers, rest) = cone(force, &normals, &bearing, left);

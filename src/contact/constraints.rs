@@ -1,6 +1,6 @@
 //! From directions and values at nodes to nodal bases, prescribed unknowns and bounds.
 
-use super::{Bound, Conflict, ConstraintError, FixedRow, GapRow};
+use super::{Bound, Conflict, ConstraintError, Row};
 use crate::{
     fem::{NodalBases, Subdomain},
     mesh::extent,
@@ -16,28 +16,26 @@ pub struct Constraints {
     /// The bounded unknowns in increasing order, each with its first gap condition. [`Self::pose`] adds the
     /// others.
     pub bounds: Vec<Bound>,
-    /// The numbers of these conditions among all gap rows.
+    /// The numbers of the rows of these conditions.
     first: Vec<usize>,
-    /// Unknowns with the value of a fixed row: (dof, row).
+    /// Prescribed unknowns, each with the number of its row.
     prescribed: Vec<(usize, usize)>,
-    /// Fixed rows in directions that other rows prescribe already, with their numbers.
-    implied: Vec<(FixedRow, usize)>,
+    /// Rows in directions that other rows prescribe already, with their numbers.
+    implied: Vec<(Row, usize)>,
     further: Vec<FurtherGap>,
+    /// The number of all rows that prescribe a displacement; they come first.
+    prescribed_rows: usize,
 }
 
 /// A gap condition without an unknown of its own, u·ν = u_D·ν + b c ≤ g. Here u_D is the part of u from the
 /// prescribed unknowns of the node.
 #[derive(Debug, Clone, Copy)]
 struct FurtherGap {
-    row: GapRow,
-    /// Its number among all gap rows.
+    row: Row,
     number: usize,
     /// The unknown c, which has a bound from another gap condition, and b; `None` if u·ν is prescribed.
     bounded: Option<(usize, f64)>,
 }
-
-/// The numbers of the fixed rows of a node, and its gap rows with theirs.
-type AtNode<'a> = (Vec<usize>, Vec<(usize, &'a mut GapRow)>);
 
 /// Directions whose lines are closer than this angle, rad, are one direction.
 const PARALLEL: f64 = 1e-8;
@@ -49,23 +47,20 @@ pub(super) const DEPENDENT: f64 = 1e-4;
 const ROUNDING: f64 = 1e-12;
 
 impl Constraints {
-    /// Combines all rows node by node; gap rows must be joined ([`GapRow::joined`]). Error messages need the
-    /// `coordinates`, m. Gaps along one line get exactly this line as their normal, so that rounding makes no
-    /// contradiction.
+    /// Combines all rows node by node: the prescribed ones, then the joined gaps ([`Row::joined`]). Error messages need
+    /// the `coordinates`, m. Gaps along one line get exactly this line as their normal, so that rounding makes no
+    /// contradiction. The bounds get the `values` of their rows.
     ///
     /// # Errors
     /// Directions at a node are nearly dependent, or too many for its two unknowns.
     pub fn new(
         coordinates: &[[f64; 2]],
-        fixed: &[FixedRow],
-        gaps: &mut [GapRow],
+        rows: &mut [Row],
+        values: &[f64],
     ) -> Result<Self, ConstraintError> {
-        let mut nodes: BTreeMap<usize, AtNode> = BTreeMap::new();
-        for (number, row) in fixed.iter().enumerate() {
-            nodes.entry(row.node).or_default().0.push(number);
-        }
-        for (number, gap) in gaps.iter_mut().enumerate() {
-            nodes.entry(gap.node).or_default().1.push((number, gap));
+        let mut nodes: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (number, row) in rows.iter().enumerate() {
+            nodes.entry(row.node).or_default().push(number);
         }
         let mut constraints = Self {
             bases: NodalBases::identity(coordinates.len()),
@@ -74,13 +69,16 @@ impl Constraints {
             prescribed: Vec::new(),
             implied: Vec::new(),
             further: Vec::new(),
+            prescribed_rows: rows.partition_point(|row| !row.is_gap()),
         };
-        for (node, (numbers, gaps)) in nodes {
+        for (node, numbers) in nodes {
+            let (fixed, gaps) = numbers.split_at(numbers.partition_point(|&n| !rows[n].is_gap()));
             let error = |conflict| ConstraintError { at: coordinates[node], conflict };
             // The basis of a node: its prescribed directions, then the independent normals of its gaps.
-            let mut basis = constraints.prescribe(node, &numbers, fixed);
+            let mut basis = constraints.prescribe(fixed, rows);
             let prescribed = basis.len();
-            for gap in gaps {
+            for &number in gaps {
+                let gap = (number, &mut rows[number], values[number]);
                 constraints.add_gap(gap, &mut basis, prescribed).map_err(error)?;
             }
             constraints.set_basis(node, &basis).map_err(error)?;
@@ -89,16 +87,16 @@ impl Constraints {
     }
 
     /// Prescribes unknowns of a node in the first independent directions, and returns these.
-    fn prescribe(&mut self, node: usize, numbers: &[usize], fixed: &[FixedRow]) -> Vec<[f64; 2]> {
+    fn prescribe(&mut self, numbers: &[usize], rows: &[Row]) -> Vec<[f64; 2]> {
         let mut basis: Vec<[f64; 2]> = Vec::new();
         for &number in numbers {
-            let (d, dof) = (fixed[number].direction, 2 * node + basis.len());
+            let (d, dof) = (rows[number].direction, 2 * rows[number].node + basis.len());
             if basis.len() < 2 && basis.iter().all(|b| cross(*b, d).abs() > PARALLEL) {
                 self.prescribed.push((dof, number));
                 self.bases.fix(dof);
                 basis.push(d);
             } else {
-                self.implied.push((fixed[number], number));
+                self.implied.push((rows[number], number));
             }
         }
         basis
@@ -108,36 +106,36 @@ impl Constraints {
     /// against an earlier normal (a node between two plates) bounds the same unknown.
     fn add_gap(
         &mut self,
-        (number, gap): (usize, &mut GapRow),
+        (number, gap, value): (usize, &mut Row, f64),
         basis: &mut Vec<[f64; 2]>,
         prescribed: usize,
     ) -> Result<(), Conflict> {
         // If the displacement is prescribed, the gap needs no unknown.
-        let line = if prescribed == 2 { None } else { parallel(basis, gap.normal)? };
+        let line = if prescribed == 2 { None } else { parallel(basis, gap.direction)? };
         if let Some(line) = line {
-            gap.normal = along(basis[line], gap.normal);
+            gap.direction = along(basis[line], gap.direction);
         }
-        let dof = |line: usize| 2 * gap.node + line;
+        let (normal, dof) = (gap.direction, |line: usize| 2 * gap.node + line);
         let bounded = match line {
             _ if prescribed == 2 => None,
             Some(line) if line < prescribed => None,
-            Some(line) => Some((dof(line), if basis[line] == gap.normal { 1.0 } else { -1.0 })),
+            Some(line) => Some((dof(line), if basis[line] == normal { 1.0 } else { -1.0 })),
             None if basis.len() < 2 => {
                 self.bounds.push(Bound {
                     dof: dof(basis.len()),
                     node: gap.node,
-                    normal: gap.normal,
+                    normal,
                     lower: f64::NEG_INFINITY,
-                    upper: gap.gap,
-                    tributary_length: gap.tributary_length,
+                    upper: value,
+                    tributary_length: gap.tributary_length.unwrap_or(0.0),
                 });
                 self.first.push(number);
-                basis.push(gap.normal);
+                basis.push(normal);
                 return Ok(());
             }
             None if prescribed == 0 => return Err(Conflict::TooMany),
             // ν = a d + b n with the prescribed direction d, by Cramer's rule.
-            None => Some((dof(1), cross(basis[0], gap.normal) / cross(basis[0], basis[1]))),
+            None => Some((dof(1), cross(basis[0], normal) / cross(basis[0], basis[1]))),
         };
         self.further.push(FurtherGap { row: *gap, number, bounded });
         Ok(())
@@ -170,9 +168,8 @@ impl Constraints {
         at_node.min_by(|i, j| off(i).total_cmp(&off(j)))
     }
 
-    /// The prescribed unknowns c_D, m (0 elsewhere; two entries per node), and the bounds on the others.
-    /// `values[row]` is u·d of each fixed row. `gaps` has the gaps of all gap rows at this time; it is empty
-    /// if no gap depends on time.
+    /// The prescribed unknowns c_D, m (0 elsewhere; two entries per node), and the bounds on the others, from the
+    /// `values` of all rows.
     ///
     /// # Errors
     /// Values contradict each other or go through the obstacle, or the obstacles on both sides of a
@@ -180,7 +177,6 @@ impl Constraints {
     pub fn pose(
         &self,
         values: &[f64],
-        gaps: &[f64],
         coordinates: &[[f64; 2]],
     ) -> Result<(Vec<f64>, Vec<Bound>), ConstraintError> {
         let mut lift = vec![0.0; 2 * coordinates.len()];
@@ -191,8 +187,9 @@ impl Constraints {
             u.x * x + u.y * y
         };
         let error = |node: usize, conflict| ConstraintError { at: coordinates[node], conflict };
-        let largest = || values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-        for &(FixedRow { node, direction }, number) in &self.implied {
+        let prescribed = &values[..self.prescribed_rows];
+        let largest = || prescribed.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        for &(Row { node, direction, .. }, number) in &self.implied {
             let values = [along(node, direction), values[number]];
             if (values[0] - values[1]).abs() > ROUNDING * largest() {
                 return Err(error(node, Conflict::Contradicts { values, direction }));
@@ -200,10 +197,10 @@ impl Constraints {
         }
         let mut bounds = self.bounds.clone();
         for (bound, number) in bounds.iter_mut().zip(&self.first) {
-            bound.upper = gaps.get(*number).copied().unwrap_or(bound.upper);
+            bound.upper = values[*number];
         }
         for &FurtherGap { row, number, bounded } in &self.further {
-            let room = row.gap_of(number, gaps) - along(row.node, row.normal);
+            let room = values[number] - along(row.node, row.direction);
             let Some((dof, b)) = bounded else {
                 let depth = -room;
                 if depth > 0.0 && depth > ROUNDING * largest().max(extent(coordinates)) {
@@ -242,11 +239,10 @@ impl Constraints {
         let (bounds, first) = bounds.into_iter().unzip();
         let prescribed =
             |&(dof, row): &(usize, usize)| Some((renumbered(dof, subdomain.local(dof / 2)?), row));
-        let implied = |&(row, number): &(FixedRow, usize)| {
-            Some((FixedRow { node: owned(row.node)?, ..row }, number))
-        };
+        let implied =
+            |&(row, number): &(Row, usize)| Some((Row { node: owned(row.node)?, ..row }, number));
         let further = |&FurtherGap { row, number, bounded }: &FurtherGap| {
-            let row = GapRow { node: owned(row.node)?, ..row };
+            let row = Row { node: owned(row.node)?, ..row };
             let bounded = bounded.map(|(dof, b)| (renumbered(dof, row.node), b));
             Some(FurtherGap { row, number, bounded })
         };
@@ -257,6 +253,7 @@ impl Constraints {
             prescribed: self.prescribed.iter().filter_map(prescribed).collect(),
             implied: self.implied.iter().filter_map(implied).collect(),
             further: self.further.iter().filter_map(further).collect(),
+            prescribed_rows: self.prescribed_rows,
         }
     }
 }

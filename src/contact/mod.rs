@@ -25,7 +25,7 @@ pub use kkt::{Kkt, Scales};
 pub use problem::ContactProblem;
 pub use rigid::{DrivenMotion, RigidMotions, nonnegative};
 pub(crate) use rigid::{least_motion, rigid_motion_until_contact, unconstrained_motions};
-pub use rows::{Bound, FixedRow, GapRow};
+pub use rows::{Bound, Row};
 pub use solvers::{
     Anderson, BoxedSolver, ContactOptions, ContactReport, ContactSolver, PREFIX as ELASTIC,
     PenaltyOptions, REGISTRY, SOLVERS, SolverEntry, SolverError, TAO_TYPES, find, solvers,

@@ -3,56 +3,47 @@
 use crate::mesh::Face;
 use std::collections::BTreeMap;
 
-/// u·d is prescribed at a node (a displacement component, or 0 across a symmetry axis).
+/// A condition on the displacement of a node, with a value that may depend on time: u·d is prescribed (a component, or
+/// 0 across a symmetry axis), or at a node of Γ_C u·d is at most the gap, with d = ν.
 #[derive(Debug, Clone, Copy)]
-pub struct FixedRow {
+pub struct Row {
     /// The node.
     pub node: usize,
     /// d, a unit vector.
     pub direction: [f64; 2],
+    /// The node's tributary length of Γ_C, m; `None` where u·d is prescribed.
+    pub tributary_length: Option<f64>,
 }
 
-/// u·ν ≤ g at a node of Γ_C.
-#[derive(Debug, Clone, Copy)]
-pub struct GapRow {
-    /// The node.
-    pub node: usize,
-    /// ν, a unit vector.
-    pub normal: [f64; 2],
-    /// g, m, negative if body and obstacle overlap. If the gap depends on time, its value in the first solve.
-    pub gap: f64,
-    /// The node's tributary length of Γ_C, m.
-    pub tributary_length: f64,
-}
+impl Row {
+    /// Is it the condition of a gap?
+    pub fn is_gap(&self) -> bool {
+        self.tributary_length.is_some()
+    }
 
-impl GapRow {
-    /// Joins rows by node. The rows of one smooth boundary become one row with the mean normal, the sum of
-    /// the lengths and the smallest gap. At a corner both rows stay. Returns with each row the `T` of its
-    /// parts.
-    pub fn joined<T>(rows: impl IntoIterator<Item = (Self, T)>) -> (Vec<Self>, Vec<Vec<T>>) {
-        let mut nodes: BTreeMap<usize, Vec<(Self, Vec<T>)>> = BTreeMap::new();
-        for (new, of_new) in rows {
-            let rows = nodes.entry(new.node).or_default();
-            match rows.iter_mut().find(|(row, _)| row.face().continues(&new.face())) {
-                None => rows.push((new, vec![of_new])),
-                Some((row, of_row)) => {
-                    let Face { normal, length } = row.face().joined(&new.face());
-                    let gap = row.gap.min(new.gap);
-                    *row = Self { normal, gap, tributary_length: length, ..*row };
-                    of_row.push(of_new);
+    /// Joins the gap conditions `faces` node by node. Those of one smooth boundary become one condition with the mean
+    /// normal and the sum of the lengths. At a corner both stay. Returns with each the `T` of its parts.
+    pub fn joined<T>(
+        faces: impl IntoIterator<Item = (usize, Face, T)>,
+    ) -> impl Iterator<Item = (Self, Vec<T>)> {
+        let mut nodes: BTreeMap<usize, Vec<(Face, Vec<T>)>> = BTreeMap::new();
+        for (node, new, of_new) in faces {
+            let faces = nodes.entry(node).or_default();
+            match faces.iter_mut().find(|(face, _)| face.continues(&new)) {
+                None => faces.push((new, vec![of_new])),
+                Some((face, of_face)) => {
+                    *face = face.joined(&new);
+                    of_face.push(of_new);
                 }
             }
         }
-        nodes.into_values().flatten().unzip()
-    }
-
-    /// Its gap, m: its own one, or if gaps depend on time, the entry `number` of all gaps at this time.
-    pub(super) fn gap_of(&self, number: usize, gaps: &[f64]) -> f64 {
-        gaps.get(number).copied().unwrap_or(self.gap)
-    }
-
-    fn face(&self) -> Face {
-        Face { normal: self.normal, length: self.tributary_length }
+        let row = |node, Face { normal: direction, length }| {
+            let tributary_length = Some(length);
+            Self { node, direction, tributary_length }
+        };
+        nodes.into_iter().flat_map(move |(node, faces)| {
+            faces.into_iter().map(move |(face, of_face)| (row(node, face), of_face))
+        })
     }
 }
 

@@ -91,7 +91,7 @@ pub(crate) fn all_steps<'a>(
 ) -> Result<Run<'a>, RunError> {
     let damage_step = DamageStep { session, problem, phases, system: None };
     let mut contact_step = ContactStep::new(session, problem, solver, phases)?;
-    let (zeta, start) = (problem.initial_damage(), problem.start());
+    let (zeta, start) = (problem.initial_damage(), problem.scene().start());
     let (mut first, mut source) = Default::default();
     if saved.is_none() {
         // (27): u_0 from ζ_0.

@@ -1,7 +1,7 @@
 //! The conditions of a scene on the named parts of the boundary, node by node and edge by edge.
 
 use crate::{
-    contact::{FixedRow, GapRow, RigidMotions},
+    contact::{RigidMotions, Row},
     fem::{Body, Edge, normal_error},
     mesh::{BoundaryNode, Face, boundary_nodes, extent},
     scene::{Boundary, Condition, Expression, Gap, Scene, SurfaceLoad},
@@ -14,36 +14,39 @@ const ZERO_GAP: f64 = 1e-12;
 /// The conditions of all boundaries.
 #[derive(Debug, Default)]
 pub(super) struct BoundaryConditions {
-    /// Prescribed components and symmetry axes as rows u·d = value.
-    pub(super) fixed: Vec<FixedRow>,
-    /// Per row: the point and the expression of its value; `None` on a symmetry axis, where the value is 0.
-    pub(super) prescribed: Vec<Option<([f64; 2], Expression)>>,
-    /// The gap conditions u·ν ≤ g at the nodes of Γ_C, joined where boundaries meet smoothly.
-    pub(super) gaps: Vec<GapRow>,
-    pub(super) moving: Vec<MovingGap>,
+    /// The prescribed displacements, then the gaps, joined where boundaries meet smoothly.
+    pub(super) rows: Vec<Row>,
+    /// Per row: its value.
+    pub(super) values: Vec<RowValue>,
+    /// The names of the boundaries that support the body, and per row of a prescribed displacement the number of its
+    /// boundary among them.
+    pub(super) supports: Vec<String>,
+    pub(super) prescribed_by: Vec<usize>,
     /// The surface loads of Γ_N.
     pub(super) tractions: Vec<Traction>,
     /// Per node: the largest possible angle between the mesh normal and the exact normal, rad.
     normal_errors: Vec<f64>,
 }
 
-/// A gap that depends on time.
+/// The value of a row as a function of time.
 #[derive(Debug, Clone)]
-pub(super) struct MovingGap {
-    /// The number of its row.
-    pub(super) number: usize,
+pub(super) struct RowValue {
     /// The node, m.
-    pub(super) point: [f64; 2],
-    /// The distances, m; the gap is their minimum.
-    pub(super) distances: Vec<Expression>,
+    point: [f64; 2],
+    /// The value is their minimum, m; 0 if there are none, on a symmetry axis.
+    of: Vec<Expression>,
 }
 
-impl MovingGap {
-    /// g at time t, m; NaN if any distance is NaN.
+impl RowValue {
+    /// The value at time t, m; NaN if any expression is NaN.
     pub(super) fn at(&self, t: f64) -> f64 {
         let [x, y] = self.point;
-        let distances = self.distances.iter().map(|g| g.eval(x, y, t));
-        distances.fold(f64::INFINITY, |min, g| if min.is_nan() || g >= min { min } else { g })
+        let values = self.of.iter().map(|f| f.eval(x, y, t));
+        values.reduce(|min, f| if min.is_nan() || f >= min { min } else { f }).unwrap_or(0.0)
+    }
+
+    pub(super) fn depends_on_time(&self) -> bool {
+        self.of.iter().any(Expression::depends_on_time)
     }
 }
 
@@ -61,7 +64,6 @@ impl BoundaryConditions {
         let (mesh, points) = (&body.mesh, &body.nodes.points);
         let mut conditions = Self { normal_errors: vec![0.0; points.len()], ..Self::default() };
         let mut gaps = Vec::new();
-        let start = if scene.time.is_some() { 0.0 } else { 1.0 };
         let rounding = ZERO_GAP * extent(points);
         for boundary in &scene.boundaries {
             let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
@@ -74,76 +76,72 @@ impl BoundaryConditions {
                 *largest = largest.max(normal_error);
                 let Some(gap) = boundary.gap() else { continue };
                 let [x, y] = points[node.node];
-                let distance = match gap.distance.eval(x, y, start) {
-                    g if g.abs() <= rounding && !gap.distance.depends_on_time() => g.max(0.0),
-                    g => g,
+                let distance = match gap.distance.eval(x, y, scene.start()) {
+                    _ if gap.distance.depends_on_time() => gap.distance.clone(),
+                    g => Expression::constant(if g.abs() <= rounding { g.max(0.0) } else { g }),
                 };
-                gaps.extend(gap_rows(gap, distance, &node).map(|row| (row, &gap.distance)));
+                let faces = faces(gap, &node).into_iter();
+                gaps.extend(faces.map(|face| (node.node, face, distance.clone())));
+            }
+            if boundary.conditions.iter().any(|of| !matches!(of, Condition::Load(_))) {
+                conditions.supports.push(boundary.name.clone());
             }
             conditions.tractions.extend(
                 boundary.loads().map(|f| Traction { edges: edges.clone(), force: f.clone() }),
             );
         }
-        let (gaps, distances) = GapRow::joined(gaps);
-        let moving = distances.into_iter().enumerate().map(|(number, distances)| MovingGap {
-            number,
-            point: points[gaps[number].node],
-            distances: distances.into_iter().cloned().collect(),
-        });
-        let moves = |gap: &MovingGap| gap.distances.iter().any(Expression::depends_on_time);
-        conditions.moving = moving.filter(moves).collect();
-        Self { gaps, ..conditions }
+        Row::joined(gaps).for_each(|(row, distances)| conditions.add(row, points, distances));
+        conditions
+    }
+
+    fn add(&mut self, row: Row, points: &[[f64; 2]], of: Vec<Expression>) {
+        self.rows.push(row);
+        self.values.push(RowValue { point: points[row.node], of });
+    }
+
+    /// The values of all rows at time t, m.
+    pub(super) fn values_at(&self, t: f64) -> Vec<f64> {
+        self.values.iter().map(|value| value.at(t)).collect()
     }
 
     /// Finds the rigid motions that the conditions do not prevent. If the normal of an axis or a gap is orthogonal
     /// to a free motion up to rounding, it becomes exactly orthogonal.
     pub(super) fn resolve_motions(&mut self, body: &Body) -> RigidMotions {
-        let motions = RigidMotions::new(body, &self.fixed, &self.gaps, &self.normal_errors);
-        let axes = self.fixed.iter_mut().zip(&self.prescribed);
-        for (row, _) in axes.filter(|(_, value)| value.is_none()) {
+        let motions = RigidMotions::new(body, &self.rows, &self.normal_errors);
+        let rows = self.rows.iter_mut().zip(&self.values);
+        for (row, _) in rows.filter(|(row, value)| row.is_gap() || value.of.is_empty()) {
             row.direction =
                 motions.tangential(body, row.node, row.direction, self.normal_errors[row.node]);
-        }
-        for row in &mut self.gaps {
-            row.normal =
-                motions.tangential(body, row.node, row.normal, self.normal_errors[row.node]);
         }
         motions
     }
 
     fn add_fixed_rows(&mut self, boundary: &Boundary, points: &[[f64; 2]], at: &BoundaryNode) {
-        let node = at.node;
+        let row = |direction| Row { node: at.node, direction, tributary_length: None };
         for condition in &boundary.conditions {
             if let Condition::Displacement(components) = condition {
                 for (component, direction) in components.iter().zip([[1.0, 0.0], [0.0, 1.0]]) {
                     let Some(value) = component else { continue };
-                    self.fixed.push(FixedRow { node, direction });
-                    self.prescribed.push(Some((points[node], value.clone())));
+                    self.add(row(direction), points, vec![value.clone()]);
+                    self.prescribed_by.push(self.supports.len());
                 }
             }
             if let Condition::Symmetry = condition {
                 for face in &at.faces {
-                    self.fixed.push(FixedRow { node, direction: face.normal });
-                    self.prescribed.push(None);
+                    self.add(row(face.normal), points, Vec::new());
+                    self.prescribed_by.push(self.supports.len());
                 }
             }
         }
     }
 }
 
-/// The rows of a gap of width `distance`, m, at a node.
-fn gap_rows(gap: &Gap, distance: f64, at: &BoundaryNode) -> impl Iterator<Item = GapRow> {
-    let faces = match gap.normal {
+/// The faces of a gap at a node: in the fixed direction of the gap, or along the boundary's normals.
+fn faces(gap: &Gap, at: &BoundaryNode) -> Vec<Face> {
+    match gap.normal {
         Some(normal) => {
             vec![Face { normal, length: at.faces.iter().map(|face| face.length).sum() }]
         }
         None => at.faces.clone(),
-    };
-    let node = at.node;
-    faces.into_iter().map(move |Face { normal, length }| GapRow {
-        node,
-        normal,
-        gap: distance,
-        tributary_length: length,
-    })
+    }
 }

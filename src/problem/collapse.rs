@@ -79,7 +79,7 @@ impl DiscreteProblem {
     }
 
     fn check_time(&self, time: f64) -> Result<(), SetupError> {
-        self.posed(time, &self.loads.prescribed_at(time), &self.loads.gaps_at(time))?;
+        self.posed(time, &self.loads.values_at(time))?;
         if self.motions.all_prevented() {
             return Ok(());
         }

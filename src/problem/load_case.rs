@@ -15,13 +15,11 @@ pub(crate) struct LoadCase {
     /// Nodal loads f, N per metre of thickness, and their work on the motions that contact resists.
     pub(crate) load: Vec<f64>,
     pub(crate) work: DVector<f64>,
-    /// The values of the prescribed rows, m, and the unknowns prescribed by them, 0 elsewhere.
-    pub(crate) prescribed: Vec<f64>,
+    /// The values of all rows, m, and the unknowns prescribed by them, 0 elsewhere.
+    pub(crate) values: Vec<f64>,
     pub(crate) lift: Vec<f64>,
     /// The bounds on the other unknowns.
     pub(crate) bounds: Vec<Bound>,
-    /// The gaps of all gap rows, m; empty if none depends on time.
-    pub(crate) gaps: Vec<f64>,
 }
 
 impl DiscreteProblem {
@@ -42,10 +40,9 @@ impl DiscreteProblem {
     pub(crate) fn load_case(&self, time: f64) -> Result<LoadCase, SetupError> {
         let load = self.motions.balanced(&self.body, self.checked_load(time)?);
         let work = self.motions.work(&self.body, |i| [load[2 * i], load[2 * i + 1]]);
-        let prescribed = self.loads.prescribed_at(time);
-        let gaps = self.loads.gaps_at(time);
-        let (lift, bounds) = self.posed(time, &prescribed, &gaps)?;
-        Ok(LoadCase { time, load, work, prescribed, lift, bounds, gaps })
+        let values = self.loads.values_at(time);
+        let (lift, bounds) = self.posed(time, &values)?;
+        Ok(LoadCase { time, load, work, values, lift, bounds })
     }
 
     /// The nodal loads at `time`, if they are finite and drive no unconstrained rigid motion. Collective.
@@ -67,19 +64,17 @@ impl DiscreteProblem {
         }
     }
 
-    /// The prescribed unknowns and the bounds on the others at `time`. `values` are the values of the prescribed
-    /// rows. `gaps` are the gaps of all gap rows, or empty if none depends on time.
+    /// The prescribed unknowns and the bounds on the others at `time`, from the values of all rows.
     pub(super) fn posed(
         &self,
         time: f64,
         values: &[f64],
-        gaps: &[f64],
     ) -> Result<(Vec<f64>, Vec<Bound>), SetupError> {
-        if !values.iter().chain(gaps).all(|value| value.is_finite()) {
+        if !values.iter().all(|value| value.is_finite()) {
             return Err(self.not_finite(time));
         }
         let (scene, time) = (self.scene.path.clone(), self.scene.time.map(|_| time));
         let constraint = |source| SetupError::Constraint { scene, time, source };
-        self.constraints.pose(values, gaps, &self.body.nodes.points).map_err(constraint)
+        self.constraints.pose(values, &self.body.nodes.points).map_err(constraint)
     }
 }

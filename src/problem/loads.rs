@@ -9,7 +9,7 @@ pub(super) use parts::{
     EdgePart, TrianglePart, centroid, edge_parts, triangle_parts, triangle_point,
 };
 
-use super::boundary_conditions::{BoundaryConditions, MovingGap};
+use super::boundary_conditions::{BoundaryConditions, RowValue};
 use crate::{
     fem::{Body, Subdomain},
     scene::{Expression, Scene},
@@ -19,38 +19,43 @@ use forces::{BodyForce, SurfaceForce};
 /// The user gets a note if more than this fraction of the integral of a load may be missed.
 const NOTED: f64 = 0.05;
 
-/// The nodal loads, the values of the fixed rows and the gaps, as functions of time.
+/// The nodal loads and the values of all rows, as functions of time.
 #[derive(Debug)]
 pub struct Loads {
     /// f_B, if it is not zero.
     body_force: Option<BodyForce>,
     surface_forces: Vec<SurfaceForce>,
-    /// Per fixed row: the point and the expression of the component; `None` for the 0 of a symmetry axis.
-    prescribed: Vec<Option<([f64; 2], Expression)>>,
-    /// The gaps of all gap rows at the first solve, m, and the gaps that depend on time.
-    gaps: Vec<f64>,
-    moving: Vec<MovingGap>,
+    /// Per row: its value.
+    values: Vec<RowValue>,
+    /// Per row: the gap at the first solve, m; 0 for a prescribed displacement.
+    first_gaps: Vec<f64>,
     /// The nodal loads, if they do not depend on time.
     constant: Option<Vec<f64>>,
 }
 
 impl Loads {
-    /// The loads on `body`, and the values of its fixed rows.
-    pub(super) fn new(body: &Body, scene: &Scene, conditions: BoundaryConditions) -> Self {
-        let BoundaryConditions { tractions, prescribed, gaps, moving, .. } = conditions;
-        let gaps = gaps.iter().map(|row| row.gap).collect();
+    /// The loads on `body`, and the values of its rows, which are `first` in the first solve.
+    pub(super) fn new(
+        body: &Body,
+        scene: &Scene,
+        conditions: BoundaryConditions,
+        first: &[f64],
+    ) -> Self {
+        let BoundaryConditions { tractions, values, rows, .. } = conditions;
+        let first = rows.iter().zip(first);
+        let first_gaps = first.map(|(row, gap)| if row.is_gap() { *gap } else { 0.0 }).collect();
         let body_force = BodyForce::new(body, scene);
         let surface_forces = tractions.into_iter().map(|load| SurfaceForce::new(body, load));
         let surface_forces = surface_forces.collect();
         let constant = None;
-        let mut loads = Self { body_force, surface_forces, prescribed, gaps, moving, constant };
+        let mut loads = Self { body_force, surface_forces, values, first_gaps, constant };
         if !loads.forces().any(Expression::depends_on_time) {
             loads.constant = Some(loads.assemble(body, 0.0));
         }
         loads
     }
 
-    /// The loads on the subdomain of a rank. Every rank keeps all fixed rows.
+    /// The loads on the subdomain of a rank. Every rank keeps all rows.
     pub(super) fn restrict(self, subdomain: &Subdomain) -> Self {
         let local = |force: SurfaceForce| force.restrict(subdomain);
         Self {
@@ -88,10 +93,7 @@ impl Loads {
 
     /// Does a load, a prescribed displacement or a gap depend on time?
     pub fn depend_on_time(&self) -> bool {
-        let mut prescribed = self.prescribed.iter().flatten().map(|(_, expression)| expression);
-        self.constant.is_none()
-            || !self.moving.is_empty()
-            || prescribed.any(Expression::depends_on_time)
+        self.constant.is_none() || self.values.iter().any(RowValue::depends_on_time)
     }
 
     /// Does the body force depend on time?
@@ -105,17 +107,9 @@ impl Loads {
         self.constant.clone().unwrap_or_else(|| self.assemble(body, t))
     }
 
-    /// u·d of each fixed row at time t, m.
-    pub fn prescribed_at(&self, t: f64) -> Vec<f64> {
-        let value = |([x, y], u): &([f64; 2], Expression)| u.eval(*x, *y, t);
-        self.prescribed.iter().map(|row| row.as_ref().map_or(0.0, value)).collect()
-    }
-
-    /// The gaps of all gap rows at time t, m; empty if no gap depends on time.
-    pub fn gaps_at(&self, t: f64) -> Vec<f64> {
-        let mut gaps = if self.moving.is_empty() { Vec::new() } else { self.gaps.clone() };
-        self.moving.iter().for_each(|gap| gaps[gap.number] = gap.at(t));
-        gaps
+    /// The values of all rows at time t, m: prescribed displacements u·d, and gaps.
+    pub fn values_at(&self, t: f64) -> Vec<f64> {
+        self.values.iter().map(|value| value.at(t)).collect()
     }
 
     /// Samples at time t: forces on loaded edges and some triangles, N per metre of thickness; prescribed
@@ -125,9 +119,8 @@ impl Loads {
         let mut forces = Vec::new();
         self.surface_forces.iter().for_each(|force| force.sample(t, &mut forces));
         self.body_force.iter().for_each(|force| force.sample(t, &mut forces));
-        let mut displacements = self.prescribed_at(t);
-        displacements.extend(self.moving.iter().map(|gap| gap.at(t) - self.gaps[gap.number]));
-        [forces, displacements]
+        let values = self.values.iter().zip(&self.first_gaps);
+        [forces, values.map(|(value, gap)| value.at(t) - gap).collect()]
     }
 
     fn assemble(&self, body: &Body, t: f64) -> Vec<f64> {

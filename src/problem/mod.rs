@@ -94,14 +94,15 @@ impl DiscreteProblem {
         body.materials = scene.materials_of(&body.mesh);
         let mut conditions = BoundaryConditions::new(&scene, &body);
         let motions = conditions.resolve_motions(&body);
-        let (fixed, gaps) = (&conditions.fixed, &mut conditions.gaps);
+        let first = conditions.values_at(scene.start());
         let mut constraints =
-            Constraints::new(&body.nodes.points, fixed, gaps).map_err(|source| {
-                SetupError::Constraint { scene: scene.path.clone(), time: None, source }
-            })?;
+            Constraints::new(&body.nodes.points, &mut conditions.rows, &first).map_err(
+                |source| SetupError::Constraint { scene: scene.path.clone(), time: None, source },
+            )?;
         motions.pin_free(&body, &mut constraints);
-        let certificate = Certificate::new(fixed, gaps);
-        let loads = Loads::new(&body, &scene, conditions);
+        let certificate = Certificate::new(&conditions.rows);
+        let supports = Supports::new(&scene, &body, &conditions);
+        let loads = Loads::new(&body, &scene, conditions, &first);
         let norms = (scene.sample_times(SAMPLES).into_iter())
             .map(|time| body.nodes.partition.norm(&loads.at(&body, time), 2));
         let problem = Self {
@@ -112,7 +113,7 @@ impl DiscreteProblem {
             constraints,
             motions,
             loads,
-            supports: Supports::new(&scene, &body),
+            supports,
             probes: Probes::new(&scene, &body)?,
             tolerance: scene.contact.tolerance,
             body,
@@ -152,11 +153,6 @@ impl DiscreteProblem {
     /// Is there a Γ_C?
     pub fn has_contact(&self) -> bool {
         self.scene.boundaries.iter().any(|boundary| boundary.gap().is_some())
-    }
-
-    /// The time of the first solve, s: 0, or 1 for a static problem.
-    pub fn start(&self) -> f64 {
-        if self.scene.time.is_some() { 0.0 } else { 1.0 }
     }
 
     /// The damage law of each material, by its number; `None` if the damage does not evolve.

@@ -79,7 +79,7 @@ impl DiscreteProblem {
             let edges = mesh.curves.get(&boundary.name).into_iter().flat_map(|curve| &curve.edges);
             let gaps = edges.flatten().map(|&node| {
                 let [x, y] = mesh.nodes[node];
-                distance.eval(x, y, self.start())
+                distance.eval(x, y, self.scene().start())
             });
             Some(gaps.fold(0.0, f64::min))
         };

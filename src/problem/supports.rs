@@ -1,10 +1,10 @@
 //! The boundaries that support the body: the forces they exert, and Γ_C as a line.
 
-use super::State;
+use super::{State, boundary_conditions::BoundaryConditions};
 use crate::{
     contact::ContactPoint,
     fem::{Body, Edge, Subdomain},
-    scene::{Condition, Scene},
+    scene::{Boundary, Scene},
 };
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -14,7 +14,7 @@ use std::collections::{BTreeMap, BTreeSet};
 pub struct Supports {
     /// Their names, in the order of the scene.
     pub names: Vec<String>,
-    /// Per node with a prescribed displacement: the boundaries that prescribe it.
+    /// Per node with a prescribed displacement: its prescribed directions.
     prescribed: BTreeMap<usize, Vec<Prescribed>>,
     /// Per node of Γ_C: its place on each of its edges on Γ_C.
     contact: BTreeMap<usize, Vec<ContactPlace>>,
@@ -22,13 +22,8 @@ pub struct Supports {
     lengths: BTreeMap<(String, usize), f64>,
 }
 
-/// A boundary that prescribes the displacement of a node.
-#[derive(Debug, Clone, Copy)]
-struct Prescribed {
-    boundary: usize,
-    /// The unit vector of the component that it prescribes; `None`: both.
-    direction: Option<[f64; 2]>,
-}
+/// A force on the body, or a direction in which its displacement is prescribed, with the number of the boundary.
+type Prescribed = (usize, [f64; 2]);
 
 /// Where a node of Γ_C lies.
 #[derive(Debug, Clone, Copy)]
@@ -70,34 +65,16 @@ pub struct ContactRow {
 }
 
 impl Supports {
-    /// The supports of `scene` on the undivided `body`.
-    pub(super) fn new(scene: &Scene, body: &Body) -> Self {
-        let mut supports = Self::default();
-        for boundary in &scene.boundaries {
-            let Some(curve) = body.mesh.curves.get(&boundary.name) else { continue };
-            let edges = body.edges(&curve.edges);
-            let number = supports.names.len();
-            let is_prescribed =
-                |of: &&Condition| matches!(of, Condition::Displacement(_) | Condition::Symmetry);
-            let prescribed = boundary.conditions.iter().find(is_prescribed);
-            for (node, face) in edges.iter().flat_map(|edge| edge.faces(&body.nodes.points)) {
-                let direction = match prescribed {
-                    Some(Condition::Symmetry) => Some(face.normal),
-                    Some(Condition::Displacement([Some(_), None])) => Some([1.0, 0.0]),
-                    Some(Condition::Displacement([None, Some(_)])) => Some([0.0, 1.0]),
-                    Some(_) => None,
-                    None => break,
-                };
-                let of_node = supports.prescribed.entry(node).or_default();
-                if of_node.last().is_none_or(|last| last.boundary != number) {
-                    of_node.push(Prescribed { boundary: number, direction });
-                }
-            }
-            if boundary.gap().is_some() {
-                supports.add_contact((number, &boundary.name), body, &edges);
-            }
-            if prescribed.is_some() || boundary.gap().is_some() {
-                supports.names.push(boundary.name.clone());
+    /// The supports of `scene` on the undivided `body`, with its `conditions`.
+    pub(super) fn new(scene: &Scene, body: &Body, conditions: &BoundaryConditions) -> Self {
+        let mut supports = Self { names: conditions.supports.clone(), ..Self::default() };
+        for (row, boundary) in conditions.rows.iter().zip(&conditions.prescribed_by) {
+            supports.prescribed.entry(row.node).or_default().push((*boundary, row.direction));
+        }
+        for Boundary { name, .. } in scene.boundaries.iter().filter(|of| of.gap().is_some()) {
+            let number = supports.names.iter().position(|other| other == name);
+            if let (Some(number), Some(curve)) = (number, body.mesh.curves.get(name)) {
+                supports.add_contact((number, name), body, &body.edges(&curve.edges));
             }
         }
         supports
@@ -250,22 +227,20 @@ impl Supports {
     }
 }
 
-/// Divides the force F at a node, N/m, between the boundaries that prescribe its displacement. If two of them
-/// prescribe the components along d and e, they exert αd and βe with F = αd + βe. Otherwise one exerts F.
-fn parts(prescribed: &[Prescribed], force: [f64; 2]) -> Vec<(usize, [f64; 2])> {
+/// Divides the force F at a node, N/m, between the boundaries that prescribe its displacement. If two directions d and
+/// e are prescribed, their boundaries exert αd and βe with F = αd + βe; a boundary that prescribes both exerts F.
+/// Otherwise one exerts F.
+fn parts(prescribed: &[Prescribed], force: [f64; 2]) -> Vec<Prescribed> {
     /// Directions are parallel if the sine of the angle between them is at most this.
     const SINE: f64 = 1e-6;
     let cross = |[a, b]: [f64; 2], [c, d]: [f64; 2]| a * d - b * c;
-    let first = prescribed.iter().find(|of| of.direction.is_none()).unwrap_or(&prescribed[0]);
-    let other = |d: [f64; 2]| {
-        let directions = prescribed.iter().filter_map(|of| Some((of.boundary, of.direction?)));
-        directions.map(move |(other, e)| (d, other, e)).find(|&(d, _, e)| cross(d, e).abs() > SINE)
-    };
-    match first.direction.and_then(other) {
-        None => vec![(first.boundary, force)],
-        Some((d, other, e)) => {
+    let pairs = prescribed.iter().flat_map(|a| prescribed.iter().map(move |b| (*a, *b)));
+    let mut pairs = pairs.filter(|((_, d), (_, e))| cross(*d, *e).abs() > SINE);
+    match pairs.clone().find(|(a, b)| a.0 == b.0).or_else(|| pairs.next()) {
+        None => vec![(prescribed[0].0, force)],
+        Some(((first, d), (other, e))) => {
             let (along_d, along_e) = (cross(force, e) / cross(d, e), cross(d, force) / cross(d, e));
-            vec![(first.boundary, d.map(|d| along_d * d)), (other, e.map(|e| along_e * e))]
+            vec![(first, d.map(|d| along_d * d)), (other, e.map(|e| along_e * e))]
         }
     }
 }

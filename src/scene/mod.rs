@@ -167,6 +167,11 @@ impl Scene {
         materials
     }
 
+    /// The time of the first solve, s: 0, or 1 for a static problem.
+    pub fn start(&self) -> f64 {
+        if self.time.is_some() { 0.0 } else { 1.0 }
+    }
+
     /// The times at which expressions are evaluated and checked before the run, s: all t_n, or about `most`
     /// (at least 1) evenly chosen ones. For adaptive steps a hundred times; without a time grid t = 1.
     pub fn sample_times(&self, most: usize) -> Vec<f64> {

@@ -4,15 +4,15 @@
 use crate::support::{close, close_to, difference, problem, run, square, try_run};
 use nalgebra::Matrix2;
 use signorini::{
-    contact::{Answer, Certificate, ContactPoint, FixedRow, GapRow, Kkt, SOLVERS, Scales},
+    contact::{Answer, Certificate, ContactPoint, Kkt, Row, SOLVERS, Scales},
     evolution::DiscreteProblem,
     petsc::Communicator,
 };
 
 const SCALES: Scales = Scales { force: 10.0, displacement: 2.0 };
 
-fn gap(node: usize, normal: [f64; 2], gap: f64) -> GapRow {
-    GapRow { node, normal, gap, tributary_length: 1.0 }
+fn gap(node: usize, direction: [f64; 2]) -> Row {
+    Row { node, direction, tributary_length: Some(1.0) }
 }
 
 /// Judges u and f − Ku at two nodes: u_x of node 0 is prescribed (2), node 0 presses with 6 at its
@@ -20,11 +20,11 @@ fn gap(node: usize, normal: [f64; 2], gap: f64) -> GapRow {
 fn judge(change: impl Fn(&mut [f64], &mut [f64])) -> (Kkt, Vec<ContactPoint>) {
     let (mut unbalanced, mut u) = (vec![0.0, 6.0, 0.0, 0.0], vec![2.0, 0.25, -1.0, 0.5]);
     change(&mut unbalanced, &mut u);
-    let fixed = [FixedRow { node: 0, direction: [1.0, 0.0] }];
-    let gaps = [gap(0, [0.0, 1.0], 0.25), gap(1, [0.0, 1.0], 1.0)];
-    let answer =
-        Answer { rigid: &[], elastic: &u, unbalanced: &unbalanced, prescribed: &[2.0], gaps: &[] };
-    Certificate::new(&fixed, &gaps).residuals(answer, 2, SCALES, Communicator::serial())
+    let fixed = Row { node: 0, direction: [1.0, 0.0], tributary_length: None };
+    let rows = [fixed, gap(0, [0.0, 1.0]), gap(1, [0.0, 1.0])];
+    let values = &[2.0, 0.25, 1.0];
+    let answer = Answer { rigid: &[], elastic: &u, unbalanced: &unbalanced, values };
+    Certificate::new(&rows).residuals(answer, 2, SCALES, Communicator::serial())
 }
 
 #[test]
@@ -86,15 +86,10 @@ fn a_force_in_the_cone_of_a_corners_normals_is_carried_and_no_other() {
         [along(0), along(1)]
     };
     let judged = |force: [f64; 2]| {
-        let gaps = normals.map(|normal| gap(0, normal, 0.0));
-        let answer = Answer {
-            rigid: &[],
-            elastic: &[0.0, 0.0],
-            unbalanced: &force,
-            prescribed: &[],
-            gaps: &[],
-        };
-        Certificate::new(&[], &gaps).residuals(answer, 1, SCALES, Communicator::serial())
+        let gaps = normals.map(|normal| gap(0, normal));
+        let answer =
+            Answer { rigid: &[], elastic: &[0.0, 0.0], unbalanced: &force, values: &[0.0; 3] };
+        Certificate::new(&gaps).residuals(answer, 1, SCALES, Communicator::serial())
     };
     for shares in [[3.0, 2.0, 0.0], [0.0, 2.0, 1.0], [0.0, 0.0, 5.0], [4.0, 0.0, 0.0]] {
         let (kkt, points) = judged(force_of(shares));
@@ -143,8 +138,8 @@ fn a_fault_in_bases_or_bounds_cannot_certify_itself() {
             ("a bound is forgotten", &|s| {
                 s.constraints.bounds.retain(|bound| bound.node != node);
             }),
-            ("a gap is mistaken", &|s| {
-                s.constraints.bounds.iter_mut().for_each(|b| b.upper *= 1.5)
+            ("bounds are on the tangential displacements", &|s| {
+                s.constraints.bounds.iter_mut().for_each(|bound| bound.dof ^= 1);
             }),
             ("a free unknown is taken for a prescribed one", &|s| {
                 s.constraints.bases.fix(2 * node + 1);

@@ -2,9 +2,9 @@
 
 use crate::support::{problem, run, square};
 use signorini::{
-    contact::{Conflict, ConstraintError, Constraints, FixedRow, GapRow, SOLVERS},
+    contact::{Conflict, ConstraintError, Constraints, Row, SOLVERS},
     evolution::SetupError,
-    mesh::Mesh,
+    mesh::{Face, Mesh},
 };
 
 const MATERIAL: &str = "material = { young = 100, poisson = 0.3, plane = 'stress' }";
@@ -126,14 +126,22 @@ fn contradictory_values_at_a_common_node_are_an_error() {
     }
 }
 
+/// Conditions at node 0.
+fn prescribed(direction: [f64; 2]) -> Row {
+    Row { node: 0, direction, tributary_length: None }
+}
+
+fn gap(direction: [f64; 2]) -> Row {
+    Row { node: 0, direction, tributary_length: Some(1.0) }
+}
+
 #[test]
 fn a_node_between_two_plates_has_one_unknown_with_two_bounds() {
-    let gap = |normal, gap| GapRow { node: 0, normal, gap, tributary_length: 1.0 };
     let limits = |angle: f64, lower: f64, upper: f64| {
         let n = [angle.sin(), -angle.cos()];
-        let (origin, mut rows) = ([[0.0, 0.0]], [gap(n, upper), gap(n.map(|v| -v), lower)]);
-        let constraints = Constraints::new(&origin, &[], &mut rows).unwrap();
-        let (_, bounds) = constraints.pose(&[], &[], &origin).unwrap();
+        let (origin, mut rows) = ([[0.0, 0.0]], [gap(n), gap(n.map(|v| -v))]);
+        let constraints = Constraints::new(&origin, &mut rows, &[upper, lower]).unwrap();
+        let (_, bounds) = constraints.pose(&[upper, lower], &origin).unwrap();
         let [bound] = &bounds[..] else { panic!("{constraints:?}") };
         assert_eq!((bound.normal, bound.lower, bound.upper), (n, -lower, upper));
         bound.is_equality()
@@ -145,8 +153,8 @@ fn a_node_between_two_plates_has_one_unknown_with_two_bounds() {
     // Tilted by less than coordinates can tell they are parallel, by a little more nobody can say,
     // beyond that they are two conditions.
     let tilted = |tilt: f64| {
-        let mut rows = [gap([0.0, -1.0], 0.1), gap([tilt.sin(), tilt.cos()], 0.1)];
-        Constraints::new(&[[3.0, 4.0]], &[], &mut rows)
+        let mut rows = [gap([0.0, -1.0]), gap([tilt.sin(), tilt.cos()])];
+        Constraints::new(&[[3.0, 4.0]], &mut rows, &[0.1, 0.1])
     };
     assert_eq!(tilted(1e-12).unwrap().bounds.len(), 1);
     match tilted(1e-6).unwrap_err() {
@@ -164,16 +172,10 @@ fn two_normals_at_a_node_with_a_prescribed_direction_bound_its_other_unknown() {
     // u_x = v is prescribed; u_y is kept by (0.6, −0.8)·u ≤ 0.2 from below and by
     // (0.8, 0.6)·u ≤ 0.1 from above.
     let origin = [[0.0, 0.0]];
-    let mut rows = [([0.6, -0.8], 0.2), ([0.8, 0.6], 0.1)].map(|(normal, gap)| GapRow {
-        node: 0,
-        normal,
-        gap,
-        tributary_length: 1.0,
-    });
-    let fixed = [FixedRow { node: 0, direction: [1.0, 0.0] }];
-    let constraints = Constraints::new(&origin, &fixed, &mut rows).unwrap();
+    let mut rows = [prescribed([1.0, 0.0]), gap([0.6, -0.8]), gap([0.8, 0.6])];
+    let constraints = Constraints::new(&origin, &mut rows, &[0.0, 0.2, 0.1]).unwrap();
     for v in [-0.3, 0.0, 0.15] {
-        let (_, bounds) = constraints.pose(&[v], &[], &origin).unwrap();
+        let (_, bounds) = constraints.pose(&[v, 0.2, 0.1], &origin).unwrap();
         let [bound] = &bounds[..] else { panic!("{bounds:?}") };
         // The unknown is the first row's normal displacement.
         let u_y = |c: f64| (0.6 * v - c) / 0.8;
@@ -182,7 +184,7 @@ fn two_normals_at_a_node_with_a_prescribed_direction_bound_its_other_unknown() {
     }
     // Carried further there is no room between them.
     assert!(matches!(
-        constraints.pose(&[0.5], &[], &origin),
+        constraints.pose(&[0.5, 0.2, 0.1], &origin),
         Err(ConstraintError { at: [0.0, 0.0], conflict: Conflict::NoRoom(_) })
     ));
 }
@@ -193,12 +195,12 @@ fn gaps_of_one_smooth_boundary_become_one_bound_and_those_of_a_corner_two() {
     // smaller gap, above it both.
     for (half, bounds) in [(0.2_f64, 1), (0.3, 2)] {
         let normal = |side: f64| [side * half.sin(), -half.cos()];
-        let rows = [
-            GapRow { node: 0, normal: normal(-1.0), gap: 0.1, tributary_length: 2.0 },
-            GapRow { node: 0, normal: normal(1.0), gap: 0.2, tributary_length: 2.0 },
-        ];
-        let (mut rows, _) = GapRow::joined(rows.map(|row| (row, ())));
-        let constraints = Constraints::new(&[[0.0, 0.0]], &[], &mut rows).unwrap();
+        let face = |side, gap: f64| (0, Face { normal: normal(side), length: 2.0 }, gap);
+        let (mut rows, gaps): (Vec<Row>, Vec<Vec<f64>>) =
+            Row::joined([face(-1.0, 0.1), face(1.0, 0.2)]).unzip();
+        assert_eq!(gaps.concat(), [0.1, 0.2]);
+        let smallest: Vec<f64> = gaps.iter().map(|gaps| gaps[0]).collect();
+        let constraints = Constraints::new(&[[0.0, 0.0]], &mut rows, &smallest).unwrap();
         assert_eq!(constraints.bounds.len(), bounds);
         let gaps: Vec<f64> = constraints.bounds.iter().map(|b| b.upper).collect();
         let tributary_length: f64 = constraints.bounds.iter().map(|b| b.tributary_length).sum();
@@ -222,24 +224,23 @@ fn gaps_of_one_smooth_boundary_become_one_bound_and_those_of_a_corner_two() {
 
 #[test]
 fn a_third_gap_or_a_gap_along_a_prescribed_direction_takes_no_unknown() {
-    let gap = |normal, gap| GapRow { node: 0, normal, gap, tributary_length: 1.0 };
-    let prescribed = |direction| FixedRow { node: 0, direction };
     let origin = [[0.0, 0.0]];
-    let mut three = [gap([0.0, -1.0], 0.0), gap([1.0, 0.0], 0.0), gap([-0.6, 0.8], 0.0)];
-    let refused = Constraints::new(&origin, &[], &mut three).unwrap_err();
+    let mut three = [gap([0.0, -1.0]), gap([1.0, 0.0]), gap([-0.6, 0.8])];
+    let refused = Constraints::new(&origin, &mut three, &[0.0; 3]).unwrap_err();
     assert!(matches!(refused.conflict, Conflict::TooMany));
     // Prescribed along the normal: no bound, but the value is checked against the gap.
     let constraints =
-        Constraints::new(&origin, &[prescribed([0.0, -1.0])], &mut [gap([0.0, -1.0], 0.1)])
+        Constraints::new(&origin, &mut [prescribed([0.0, -1.0]), gap([0.0, -1.0])], &[0.0, 0.1])
             .unwrap();
     assert!(constraints.bounds.is_empty());
-    assert!(constraints.pose(&[0.1], &[], &origin).is_ok());
-    assert!(constraints.pose(&[0.11], &[], &origin).is_err());
+    assert!(constraints.pose(&[0.1, 0.1], &origin).is_ok());
+    assert!(constraints.pose(&[0.11, 0.1], &origin).is_err());
     // Prescribed the other way round, the same gap is on the other side.
     let constraints =
-        Constraints::new(&origin, &[prescribed([0.0, 1.0])], &mut [gap([0.0, -1.0], 0.1)]).unwrap();
-    assert!(constraints.pose(&[-0.11], &[], &origin).is_err());
-    assert!(constraints.pose(&[0.11], &[], &origin).is_ok());
+        Constraints::new(&origin, &mut [prescribed([0.0, 1.0]), gap([0.0, -1.0])], &[0.0, 0.1])
+            .unwrap();
+    assert!(constraints.pose(&[-0.11, 0.1], &origin).is_err());
+    assert!(constraints.pose(&[0.11, 0.1], &origin).is_ok());
 }
 
 #[test]

@@ -11,7 +11,7 @@ pub use load::DrivenMotion;
 pub use nonnegative::nonnegative;
 pub(crate) use until_contact::{rigid_motion_until_contact, unconstrained_motions};
 
-use super::{Bound, Constraints, FixedRow, GapRow};
+use super::{Bound, Constraints, Row};
 use crate::fem::{Body, RigidMotion, resultant};
 use nalgebra::{DMatrix, DVector};
 
@@ -39,18 +39,21 @@ const PREVENTED: f64 = 1e-14;
 const TURN: f64 = 1e-3;
 
 impl RigidMotions {
-    /// From the fixed rows and the joined gap conditions. `normal_errors` bounds the angle between the
+    /// From the rows of a body, with joined gap conditions. `normal_errors` bounds the angle between the
     /// normals of mesh and geometry at each node, rad. A motion u along a curved boundary is free although
     /// |u·ν| may be this angle times |u|.
     ///
     /// Prescribed displacements are rows r·v = 0 for the coordinates v of a motion ([`RigidMotion::new`]).
     /// They allow the null space of Σ r rᵀ. The free motions in it are also in the null space of u·ν at the
     /// gap conditions.
-    pub fn new(body: &Body, fixed: &[FixedRow], gaps: &[GapRow], normal_errors: &[f64]) -> Self {
+    pub fn new(body: &Body, rows: &[Row], normal_errors: &[f64]) -> Self {
         let points = &body.nodes.points;
         let ([cx, cy], radius) = (body.centroid, body.radius_of_gyration());
         let mut gram = DMatrix::zeros(3, 3);
-        for &FixedRow { node, direction: d } in fixed {
+        let of = |row: &Row| (row.node, row.direction);
+        let axes: Vec<_> = rows.iter().filter(|row| !row.is_gap()).map(of).collect();
+        let normals: Vec<_> = rows.iter().filter(|row| row.is_gap()).map(of).collect();
+        for &(node, d) in &axes {
             let [x, y] = points[node];
             let turn = ((x - cx) * d[1] - (y - cy) * d[0]) / radius;
             // An axis is exact, the normal of a polygon is not.
@@ -59,14 +62,13 @@ impl RigidMotions {
             let row = DVector::from_row_slice(&[d[0], d[1], turn]) * weight;
             gram.ger(1.0, &row, &row, 1.0);
         }
-        let basis = null_space(gram, PREVENTED * fixed.len() as f64);
+        let basis = null_space(gram, PREVENTED * axes.len() as f64);
         if basis.is_empty() {
             let (free, free_errors, resisted) = Default::default();
-            return Self { free, free_errors, resisted, normal: DMatrix::zeros(gaps.len(), 0) };
+            return Self { free, free_errors, resisted, normal: DMatrix::zeros(normals.len(), 0) };
         }
         let motion = |v: &DVector<f64>| RigidMotion::new(body, [v[0], v[1], v[2]]);
         let left: Vec<_> = basis.iter().map(motion).collect();
-        let normals: Vec<_> = gaps.iter().map(|gap| (gap.node, gap.normal)).collect();
         let contact = normal_displacements(points, &left, &normals);
         let eigen = (contact.transpose() * &contact).symmetric_eigen();
         let (mut free, mut resisted) = (Vec::new(), Vec::new());
@@ -82,7 +84,6 @@ impl RigidMotions {
                 false => free.push(motion),
             }
         }
-        let axes = fixed.iter().map(|row| (row.node, row.direction));
         let conditions: Vec<_> = normals.iter().copied().chain(axes).collect();
         let errors = normal_displacements(points, &free, &conditions);
         let free_errors = errors.column_iter().map(|column| column.amax()).collect();

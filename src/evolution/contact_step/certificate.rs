@@ -69,8 +69,7 @@ impl ContactStep<'_> {
             rigid: &self.next.reference.field,
             elastic: &u,
             unbalanced: &unbalanced,
-            prescribed: &case.prescribed,
-            gaps: &case.gaps,
+            values: &case.values,
         };
         let comm = partition.comm();
         let (mut kkt, contact) =

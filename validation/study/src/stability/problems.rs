@@ -81,7 +81,7 @@ pub fn solve(
     if let Some(guess) = guess {
         contact_step.set_warm_start(guess);
     }
-    match contact_step.solve(0, problem.start(), &problem.initial_damage()) {
+    match contact_step.solve(0, problem.scene().start(), &problem.initial_damage()) {
         Ok(step) => Ok(Ok(step)),
         Err(failure @ RunError::Contact { .. }) => Ok(Err(failure)),
         Err(other) => Err(other.into()),
