@@ -78,6 +78,7 @@ pub mod interrupt;
 pub mod memory;
 pub mod phases;
 mod suggestion;
+mod whole_file;
 pub mod petsc;
 pub mod linear;
 pub mod mesh;

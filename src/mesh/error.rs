@@ -1,6 +1,5 @@
 //! Errors of meshes, as messages for the person at the terminal.
 
-use super::msh::DEGENERATE;
 use crate::interrupt::Signal;
 use std::{
     io,
@@ -45,12 +44,6 @@ pub enum MeshError {
 }
 
 impl MeshError {
-    /// Whether triangles are flat or folded. Another mesh of the same geometry may have none.
-    pub(super) fn is_degenerate(&self) -> bool {
-        let is_said = |problem: &String| DEGENERATE.iter().any(|what| problem.contains(what));
-        matches!(self, Self::File { problem, .. } if is_said(problem))
-    }
-
     pub(super) fn io(path: &Path) -> impl FnOnce(io::Error) -> Self {
         |source| Self::Io { path: path.to_owned(), source }
     }

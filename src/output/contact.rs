@@ -9,8 +9,8 @@ use super::{
 use crate::problem::ContactRow;
 use std::path::{Path, PathBuf};
 
-/// VTK_LINE.
-const LINE: u8 = 3;
+/// VTK_LINE, with its number of nodes.
+const LINE: (u8, usize) = (3, 2);
 
 /// Writes Γ_C in every frame, `contact_NNNN.vtu`, and all frames into `contact.csv`.
 pub(super) struct ContactWriter {
@@ -51,7 +51,8 @@ fn lines(rows: &[ContactRow]) -> String {
     let is_joined = |&[i, j]: &[usize; 2]| {
         (&rows[i].boundary, rows[i].part) == (&rows[j].boundary, rows[j].part)
     };
-    let joined: Vec<_> = (1..rows.len()).map(|i| [i - 1, i]).filter(is_joined).collect();
+    let joined: Vec<usize> =
+        (1..rows.len()).map(|i| [i - 1, i]).filter(is_joined).flatten().collect();
     let points: Vec<_> = rows.iter().map(|row| [row.x, row.y]).collect();
     let scalar = |name, of: fn(&ContactRow) -> f64| {
         DataArray::new(name, REAL, 1, rows.iter().map(of)).element()

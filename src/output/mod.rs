@@ -16,13 +16,14 @@ mod vtu;
 
 pub use vtu::{FieldWriter, FieldsWritten};
 
-use crate::scene::AsRun;
+use crate::{
+    scene::AsRun,
+    whole_file::{self, PARTIAL},
+};
 use growing_file::GrowingFile;
 use serde::Serialize;
 use std::{
-    fs::{self, File, Permissions, TryLockError},
-    io::{self, Write},
-    os::unix::fs::PermissionsExt,
+    fs::{self, File, TryLockError},
     path::{Path, PathBuf},
 };
 
@@ -110,9 +111,6 @@ const PICTURES: &str = "contact-evolution damage damage-history deformed force-d
      mesh pressure principal-stresses setting stress stress-damage";
 /// Curves of fields are `CURVES_….csv` and pictures.
 const CURVES: &str = "curves";
-/// The names of incomplete files begin with this.
-const PARTIAL: &str = ".partial-";
-
 /// Whether `name` is the name of a result or a figure: frames are `fields_NNNN[_R].[p]vtu` and
 /// `contact_NNNN.vtu`, pictures `NAME[_tTIME].png`.
 fn is_result(name: &str) -> bool {
@@ -275,7 +273,7 @@ pub fn write_table<T: Serialize>(path: &Path, rows: &[T]) -> Result<(), OutputEr
 /// # Errors
 /// The file cannot be written.
 pub fn write_whole(path: &Path, content: &[u8]) -> Result<(), OutputError> {
-    write(path, content, |_| Ok(()))
+    whole_file::write(path, content, |_| Ok(())).map_err(|e| OutputError::new(path, e))
 }
 
 /// As [`write_whole`]; the file is on the disk before it replaces another one.
@@ -283,23 +281,5 @@ pub fn write_whole(path: &Path, content: &[u8]) -> Result<(), OutputError> {
 /// # Errors
 /// The file cannot be written.
 pub fn write_synced(path: &Path, content: &[u8]) -> Result<(), OutputError> {
-    write(path, content, File::sync_all)
-}
-
-fn write(
-    path: &Path,
-    content: &[u8],
-    complete: impl FnOnce(&File) -> io::Result<()>,
-) -> Result<(), OutputError> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let written = tempfile::Builder::new()
-        .prefix(PARTIAL)
-        .permissions(Permissions::from_mode(0o644))
-        .tempfile_in(folder)
-        .and_then(|mut file| {
-            file.write_all(content)?;
-            complete(file.as_file())?;
-            Ok(file.persist(path)?)
-        });
-    written.map(|_| ()).map_err(|e| OutputError::new(path, e))
+    whole_file::write(path, content, File::sync_all).map_err(|e| OutputError::new(path, e))
 }

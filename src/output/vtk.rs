@@ -85,21 +85,22 @@ pub(super) fn entry(time: f64, file: &str) -> String {
     format!("<DataSet timestep=\"{time}\" file=\"{file}\"/>\n")
 }
 
-/// The beginning of `<Piece>`, with `<Points>` and `<Cells>` of one kind with N nodes.
-pub(super) fn cells_text<const N: usize>(
+/// The beginning of `<Piece>`, with `<Points>` and `<Cells>` of one `kind`, which have this number of `nodes` each.
+pub(super) fn cells_text(
     points: &[[f64; 2]],
-    cells: &[[usize; N]],
-    kind: u8,
+    nodes: &[usize],
+    (kind, of_cell): (u8, usize),
 ) -> String {
     let coordinates = points.iter().flat_map(|&[x, y]| [x, y, 0.0]);
-    let nodes = cells.as_flattened().iter().map(|&node| node as i32);
-    let offsets = (1..=cells.len()).map(|cell| (N * cell) as i32);
-    let types = iter::repeat_n(kind, cells.len());
+    let cells = nodes.len() / of_cell;
+    let offsets = (1..=cells).map(|cell| (of_cell * cell) as i32);
+    let types = iter::repeat_n(kind, cells);
+    let nodes = nodes.iter().map(|&node| node as i32);
     format!(
         "<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n\
          <Points>\n{}</Points>\n<Cells>\n{}{}{}</Cells>\n",
         points.len(),
-        cells.len(),
+        cells,
         DataArray::new("Points", REAL, 3, coordinates).element(),
         DataArray::new("connectivity", INTEGER, 1, nodes).element(),
         DataArray::new("offsets", INTEGER, 1, offsets).element(),

@@ -24,9 +24,10 @@ use std::{
     thread::{self, JoinHandle},
 };
 
-/// VTK_TRIANGLE and VTK_QUADRATIC_TRIANGLE (the midpoints of the sides 01, 12, 20 follow the vertices).
-const TRIANGLE: u8 = 5;
-const QUADRATIC_TRIANGLE: u8 = 22;
+/// VTK_TRIANGLE and VTK_QUADRATIC_TRIANGLE (the midpoints of the sides 01, 12, 20 follow the vertices), with the number of
+/// nodes.
+const TRIANGLE: (u8, usize) = (5, 3);
+const QUADRATIC_TRIANGLE: (u8, usize) = (22, 6);
 /// The usual number of digits in the number of a frame.
 const DIGITS: usize = 4;
 /// The assumed number of frames for adaptive steps with `output.every`.
@@ -75,9 +76,13 @@ impl FieldWriter {
         let comm = problem.body.nodes.partition.comm();
         let triangles = comm.gather(&[problem.body.own_triangles as f64]);
         let stress = NodalStress::new(problem);
+        let kind = match problem.body.elements() {
+            Elements::Linear(_) => TRIANGLE,
+            Elements::Quadratic(_) => QUADRATIC_TRIANGLE,
+        };
         Ok(Self {
             folder: folder.to_owned(),
-            mesh: mesh_text(problem, &stress).into(),
+            mesh: cells_text(&stress.places(), &stress.cells, kind).into(),
             stress: stress.into(),
             pieces: (0..comm.size()).filter(|&rank| triangles[rank] > 0.0).collect(),
             list: list_of_frames(folder.join("fields.pvd")),
@@ -115,8 +120,8 @@ impl FieldWriter {
     /// A file of this frame or of the previous one cannot be written.
     pub fn add(&mut self, problem: &DiscreteProblem, state: &State) -> Result<(), OutputError> {
         self.complete()?;
-        let stem = format!("fields_{:0width$}", self.frames, width = self.digits);
-        let contact_file = format!("contact_{:0width$}.vtu", self.frames, width = self.digits);
+        let number = format!("{:0width$}", self.frames, width = self.digits);
+        let (stem, contact_file) = (format!("fields_{number}"), format!("contact_{number}.vtu"));
         (self.frames, self.last_time) = (self.frames + 1, Some(state.time));
         // This is collective: all ranks collect Γ_C, even if one has failed to collect its fields.
         let contact = problem.supports.contact_rows(&problem.body, state);
@@ -207,17 +212,6 @@ fn digits(scene: &Scene) -> usize {
     DIGITS.max(frames.ilog10() as usize + 1)
 }
 
-/// The mesh of this rank as text.
-fn mesh_text(problem: &DiscreteProblem, stress: &NodalStress) -> String {
-    let places = stress.places();
-    match problem.body.elements() {
-        Elements::Linear(_) => cells_text(&places, stress.cells.as_chunks::<3>().0, TRIANGLE),
-        Elements::Quadratic(_) => {
-            cells_text(&places, stress.cells.as_chunks::<6>().0, QUADRATIC_TRIANGLE)
-        }
-    }
-}
-
 /// The nodal fields of u, ζ and contact. Outside Γ_C the contact pressure is 0 and the remaining gap NaN. At a corner
 /// with two gap conditions they are the larger pressure and the smaller gap. Collective.
 fn point_data(
@@ -293,8 +287,8 @@ fn list_of_pieces(
     points: &[DataArray],
     cells: &[DataArray],
 ) -> String {
-    let points: String = points.iter().map(DataArray::declaration).collect();
-    let cells: String = cells.iter().map(DataArray::declaration).collect();
+    let [points, cells] =
+        [points, cells].map(|arrays| arrays.iter().map(DataArray::declaration).collect::<String>());
     let coordinates = DataArray::new::<f64>("Points", REAL, 3, iter::empty()).declaration();
     let files: String = files.map(|file| format!("<Piece Source=\"{file}\"/>\n")).collect();
     let pieces = format!(

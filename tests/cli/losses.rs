@@ -2,7 +2,7 @@
 
 use crate::{
     failing::LATE,
-    test_directory::{ProgramOutput, SCENE, TestDirectory, msh, square},
+    test_directory::{ProgramOutput, SCENE, TestDirectory},
 };
 use std::{
     fs::{self, File, Permissions},
@@ -104,28 +104,6 @@ fn many_frames_have_names_that_sort() {
     // As many as before where they are few.
     directory.say(&["run", "scene.toml", "--set", LATE]);
     assert_eq!(directory.frames("out/scene")[0].1, "fields_0000.vtu");
-}
-
-#[test]
-fn gmsh_meshes_again_where_it_made_a_flat_triangle() {
-    let directory = TestDirectory::new();
-    // The first mesh has a flat triangle. The last argument names the file with the options.
-    let corners = ["1 0 0 0", "2 1 0 0", "3 2 0 0"];
-    directory.write("bin/flat.msh", &msh(&corners, &["1 2 5 1 2 3"]));
-    directory.write("bin/good.msh", &square(4));
-    let script = "#!/bin/sh\nfor last; do :; done\nflat=flat\n\
-                  grep -q RandomFactor \"$last\" && flat=good\n\
-                  while [ \"$1\" != -o ]; do shift; done\ncp \"${0%/*}/$flat.msh\" \"$2\"\n";
-    directory.write("bin/gmsh", script);
-    fs::set_permissions(directory.path("bin/gmsh"), Permissions::from_mode(0o755)).expect("mine");
-    directory.write("square.geo", "// empty");
-    directory.write("scene.toml", &SCENE.replace("square.msh", "square.geo"));
-    let path = format!("{}:/usr/bin:/bin", directory.path("bin").display());
-    let said = ProgramOutput::of(directory.command(&["run", "scene.toml"]).env("PATH", &path));
-    assert_eq!(said.code, Some(0), "{said:?}");
-    let note = "note: ./square.geo: gmsh made flat triangles; meshing again with Mesh.RandomFactor";
-    assert!(said.err.contains(&note.replace("./", "")), "{said:?}");
-    assert_eq!(directory.read("square.msh"), square(4));
 }
 
 #[test]

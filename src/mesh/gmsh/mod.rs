@@ -5,21 +5,14 @@ mod process;
 pub(super) use process::run;
 
 use super::{Mesh, MeshError, Order, parse, read};
+use crate::whole_file;
 use std::{
     collections::BTreeMap,
-    env,
     ffi::OsString,
-    fs::{self, Permissions},
-    hash::{DefaultHasher, Hash, Hasher},
-    io::{self, Write},
-    os::unix::fs::PermissionsExt,
+    fs, io,
     path::{Path, PathBuf},
     time::SystemTime,
 };
-
-/// Options of gmsh for the next attempts after a mesh with flat triangles. For strong gradings its default
-/// algorithm makes flat triangles by chance. MeshAdapt (1) makes none, but takes ten times as long.
-const AGAIN: [&str; 2] = ["Mesh.RandomFactor = 1e-12", "Mesh.Algorithm = 1"];
 
 /// Reads the mesh from [`file()`] and sorts its nodes and triangles ([`Mesh::in_morton_order`]).
 ///
@@ -37,7 +30,7 @@ pub fn load(
 /// mesh is not kept.
 ///
 /// # Errors
-/// Those of [`mesh_geo`]; flat triangles are an error too.
+/// Those of [`mesh_geo`] and [`read`].
 pub fn load_graded(
     geo: &Path,
     parameters: &BTreeMap<String, f64>,
@@ -83,8 +76,7 @@ pub fn file(
     }
 }
 
-/// Meshes a `.geo` file and returns the path of the `.msh` beside it, or in the user's cache if that folder is
-/// read-only.
+/// Meshes a `.geo` file and returns the path of the `.msh` beside it.
 ///
 /// Each parameter overrides the `DefineConstant` of its name. The name of the mesh lists the parameters and
 /// order 2, as in `bridge-grading3-size0.25.msh` and `hertz.order2.msh`. `size`, in m, also bounds the length
@@ -121,74 +113,18 @@ pub fn mesh_geo(
     name.push(if order == Order::Quadratic { ".order2.msh" } else { ".msh" });
     let mesh = geo.with_file_name(name);
     let last_change = last_change(geo).map_err(MeshError::io(geo))?;
-    let cached = cached(&mesh);
-    let is_new = |mesh: &Path| modified(mesh).is_ok_and(|meshed| meshed >= last_change);
-    if let Some(made) = [&mesh, &cached].into_iter().find(|mesh| is_new(mesh)) {
-        return Ok(made.clone());
+    if modified(&mesh).is_ok_and(|meshed| meshed >= last_change) {
+        return Ok(mesh);
     }
-
-    let bytes = meshed(geo, parameters, &last_words(&text, parameters, order))?;
-    match write(&mesh, &bytes, started) {
-        Err(error) if is_read_only(&error) => {
-            let folder = cached.parent().unwrap_or(Path::new("."));
-            fs::create_dir_all(folder).map_err(MeshError::io(folder))?;
-            write(&cached, &bytes, started).map_err(MeshError::io(&cached))?;
-            Ok(cached)
-        }
-        written => written.map_err(MeshError::io(&mesh)).map(|()| mesh),
-    }
-}
-
-/// The MSH file that gmsh makes from a `.geo` and the commands `last`, without flat triangles if one of the options
-/// [`AGAIN`] avoids them.
-fn meshed(
-    geo: &Path,
-    parameters: &BTreeMap<String, f64>,
-    last: &str,
-) -> Result<Vec<u8>, MeshError> {
-    let mut bytes = run((geo, None), arguments(parameters), last, "mesh it")?;
-    for option in AGAIN {
-        if !parse(&bytes, geo).is_err_and(|error| error.is_degenerate()) {
-            break;
-        }
-        let note = format!(
-            "note: {}: gmsh made flat triangles; meshing again with {option}\n",
-            geo.display()
-        );
-        // If stderr is closed, the mesh is still made.
-        let _ = io::stderr().write_all(note.as_bytes());
-        bytes = run((geo, None), arguments(parameters), &format!("{last}{option};\n"), "mesh it")?;
-    }
-    Ok(bytes)
-}
-
-fn is_read_only(error: &io::Error) -> bool {
-    matches!(error.kind(), io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem)
-}
-
-/// The path of a mesh whose `.geo` is in a folder without write permission: in the user's cache
-/// (`$XDG_CACHE_HOME` or `~/.cache`), named by the hash of that folder.
-fn cached(mesh: &Path) -> PathBuf {
-    let absolute = std::path::absolute(mesh).unwrap_or_else(|_| mesh.to_owned());
-    let mut hasher = DefaultHasher::new();
-    absolute.hash(&mut hasher);
-    let home = env::var_os("HOME").map_or_else(env::temp_dir, PathBuf::from);
-    let cache = env::var_os("XDG_CACHE_HOME").map_or_else(|| home.join(".cache"), PathBuf::from);
-    let mut name = OsString::from(format!("{:016x}-", hasher.finish()));
-    name.push(mesh.file_name().unwrap_or_default());
-    cache.join("signorini").join(name)
-}
-
-/// Writes a file that appears complete or not at all, with the usual permissions. Its time is the time
-/// `read` at which the `.geo` was read, so that a later change of the `.geo` is newer.
-fn write(path: &Path, bytes: &[u8], read: SystemTime) -> io::Result<()> {
-    let mut builder = tempfile::Builder::new();
-    let builder = builder.permissions(Permissions::from_mode(0o666));
-    let mut file = builder.tempfile_in(path.with_file_name("."))?;
-    file.write_all(bytes)?;
-    file.as_file().set_modified(read)?;
-    file.persist(path)?;
-    Ok(())
+    let last = last_words(&text, parameters, order);
+    let bytes = run((geo, None), arguments(parameters), &last, "mesh it")?;
+    // A later change of the .geo is newer.
+    whole_file::write(&mesh, &bytes, |file| file.set_modified(started)).map_err(|error| {
+        let problem =
+            format!("cannot be written: {error}; copy the .geo into a folder where you may write");
+        MeshError::file(&mesh, problem)
+    })?;
+    Ok(mesh)
 }
 
 /// The factor by which gmsh multiplies all lengths of a `.geo` file, including `size`, when it writes the

@@ -11,10 +11,6 @@ use std::collections::BTreeMap;
 
 /// Twice the area over the square of the longest side: below this value a triangle is flat.
 const FLAT: f64 = 1e-10;
-/// The messages about triangles that another mesh of the same geometry may not have.
-const FLAT_TRIANGLE: &str = "has no area";
-const FOLDED: &str = "is folded";
-pub const DEGENERATE: [&str; 2] = [FLAT_TRIANGLE, FOLDED];
 /// |z| over the extent of the body: below this value a node lies in the plane.
 const PLANAR: f64 = 1e-10;
 
@@ -126,8 +122,8 @@ fn counter_clockwise(
     // The area of a triangle with huge coordinates overflows.
     if twice.abs() <= flat([a, b, c]) || !twice.is_finite() {
         let problem = format!(
-            "triangle {tag} {FLAT_TRIANGLE}: its nodes lie on a line, or squares of its coordinates are \
-             beyond double precision; mend the mesh there"
+            "triangle {tag} has no area: its nodes lie on a line, or squares of its coordinates are \
+             beyond double precision; mend the mesh there, or try Mesh.Algorithm = 1 in the .geo"
         );
         return error_at(at, problem);
     }
@@ -185,7 +181,7 @@ fn set_midpoints(
         if mesh.is_curved(triangle) && !mesh.jacobian_exceeds(bound, triangle) {
             let tag = element.tag;
             let problem = format!(
-                "curved triangle {tag} {FOLDED}: a midpoint of its edges lies too far off; mesh \
+                "curved triangle {tag} is folded: a midpoint of its edges lies too far off; mesh \
                  finer there, or mend it"
             );
             return error_at(element.at, problem);

@@ -8,8 +8,6 @@ mod one_body;
 mod v4;
 mod write;
 
-pub(super) use body::DEGENERATE;
-
 use super::{Mesh, MeshError, gmsh};
 use byte_reader::{ByteReader, Numbers, Result, Section, error_at, expected, not_a_mesh};
 use contents::Contents;
