@@ -78,17 +78,6 @@ impl Mesh {
         ([dy / length, -dx / length], length)
     }
 
-    /// The bounds of x and of y of these nodes, m.
-    pub fn bounds<'a>(&self, nodes: impl Iterator<Item = &'a usize>) -> [[f64; 2]; 2] {
-        let mut bounds = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
-        for &node in nodes {
-            for (bounds, x) in bounds.iter_mut().zip(self.nodes[node]) {
-                *bounds = [bounds[0].min(x), bounds[1].max(x)];
-            }
-        }
-        bounds
-    }
-
     /// The edges of the boundary (those of a single triangle), the body on their left.
     pub fn boundary_edges(&self) -> Vec<[usize; 2]> {
         let sides = sides(&self.triangles);
@@ -175,13 +164,21 @@ pub fn sorted([a, b]: [usize; 2]) -> [usize; 2] {
     [a.min(b), a.max(b)]
 }
 
+/// The bounds of x and of y of `points`, m.
+pub fn bounds<'a>(points: impl IntoIterator<Item = &'a [f64; 2]>) -> [[f64; 2]; 2] {
+    let mut bounds = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+    for point in points {
+        for (bounds, x) in bounds.iter_mut().zip(point) {
+            *bounds = [bounds[0].min(*x), bounds[1].max(*x)];
+        }
+    }
+    bounds
+}
+
 /// The longer side of the box around `points`, m.
 pub fn extent(points: &[[f64; 2]]) -> f64 {
-    let side = |axis: usize| {
-        let low = points.iter().fold(f64::INFINITY, |low, point| low.min(point[axis]));
-        points.iter().fold(f64::NEG_INFINITY, |high, point| high.max(point[axis])) - low
-    };
-    side(0).max(side(1)).max(0.0)
+    let [x, y] = bounds(points).map(|[low, high]| high - low);
+    x.max(y).max(0.0)
 }
 
 /// Twice the signed area of the triangle abc, m², positive when counter-clockwise.

@@ -1,13 +1,13 @@
 //! The order of nodes and triangles.
 
-use super::{Mesh, extent, sorted};
+use super::{Mesh, bounds, extent, sorted};
 
 impl Mesh {
     /// Numbers the nodes along Morton's curve (G. M. Morton, *A computer oriented geodetic data base*, IBM,
     /// 1966), and the triangles by their first node. Neighbouring nodes are then close in memory, and the
     /// assembly of large matrices takes half the time.
     pub fn in_morton_order(self) -> Self {
-        let low = [0, 1].map(|axis| self.nodes.iter().fold(f64::INFINITY, |x, p| x.min(p[axis])));
+        let low = bounds(&self.nodes).map(|[low, _]| low);
         let scale = f64::from(u32::MAX) / extent(&self.nodes);
         let key = |&node: &usize| {
             let [x, y] = [0, 1].map(|axis| ((self.nodes[node][axis] - low[axis]) * scale) as u32);

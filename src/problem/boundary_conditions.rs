@@ -99,11 +99,6 @@ impl BoundaryConditions {
         self.values.push(RowValue { point: points[row.node], of });
     }
 
-    /// The values of all rows at time t, m.
-    pub(super) fn values_at(&self, t: f64) -> Vec<f64> {
-        self.values.iter().map(|value| value.at(t)).collect()
-    }
-
     /// Finds the rigid motions that the conditions do not prevent. If the normal of an axis or a gap is orthogonal
     /// to a free motion up to rounding, it becomes exactly orthogonal.
     pub(super) fn resolve_motions(&mut self, body: &Body) -> RigidMotions {

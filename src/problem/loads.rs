@@ -5,16 +5,16 @@ mod forces;
 mod parts;
 
 pub(crate) use curve::LoadCurve;
-pub(super) use parts::{
-    EdgePart, TrianglePart, centroid, edge_parts, triangle_parts, triangle_point,
-};
+pub(super) use parts::{centroid, edge_parts, triangle_parts, triangle_point};
 
 use super::boundary_conditions::{BoundaryConditions, RowValue};
 use crate::{
+    contact::Row,
     fem::{Body, Subdomain},
     scene::{Expression, Scene},
 };
 use forces::{BodyForce, SurfaceForce};
+use std::mem::take;
 
 /// The user gets a note if more than this fraction of the integral of a load may be missed.
 const NOTED: f64 = 0.05;
@@ -34,16 +34,14 @@ pub struct Loads {
 }
 
 impl Loads {
-    /// The loads on `body`, and the values of its rows, which are `first` in the first solve.
-    pub(super) fn new(
-        body: &Body,
-        scene: &Scene,
-        conditions: BoundaryConditions,
-        first: &[f64],
-    ) -> Self {
-        let BoundaryConditions { tractions, values, rows, .. } = conditions;
-        let first = rows.iter().zip(first);
-        let first_gaps = first.map(|(row, gap)| if row.is_gap() { *gap } else { 0.0 }).collect();
+    /// Takes the loads on `body` and the values of its rows from the `conditions`.
+    pub(super) fn new(body: &Body, scene: &Scene, conditions: &mut BoundaryConditions) -> Self {
+        let (tractions, values) = (take(&mut conditions.tractions), take(&mut conditions.values));
+        let first = |(row, value): (&Row, &RowValue)| match row.is_gap() {
+            true => value.at(scene.start()),
+            false => 0.0,
+        };
+        let first_gaps = conditions.rows.iter().zip(&values).map(first).collect();
         let body_force = BodyForce::new(body, scene);
         let surface_forces = tractions.into_iter().map(|load| SurfaceForce::new(body, load));
         let surface_forces = surface_forces.collect();

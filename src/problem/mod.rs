@@ -94,15 +94,15 @@ impl DiscreteProblem {
         body.materials = scene.materials_of(&body.mesh);
         let mut conditions = BoundaryConditions::new(&scene, &body);
         let motions = conditions.resolve_motions(&body);
-        let first = conditions.values_at(scene.start());
+        let loads = Loads::new(&body, &scene, &mut conditions);
+        let (points, values) = (&body.nodes.points, loads.values_at(scene.start()));
         let mut constraints =
-            Constraints::new(&body.nodes.points, &mut conditions.rows, &first).map_err(
-                |source| SetupError::Constraint { scene: scene.path.clone(), time: None, source },
-            )?;
+            Constraints::new(points, &mut conditions.rows, &values).map_err(|source| {
+                SetupError::Constraint { scene: scene.path.clone(), time: None, source }
+            })?;
         motions.pin_free(&body, &mut constraints);
         let certificate = Certificate::new(&conditions.rows);
         let supports = Supports::new(&scene, &body, &conditions);
-        let loads = Loads::new(&body, &scene, conditions, &first);
         let norms = (scene.sample_times(SAMPLES).into_iter())
             .map(|time| body.nodes.partition.norm(&loads.at(&body, time), 2));
         let problem = Self {

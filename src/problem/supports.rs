@@ -7,7 +7,10 @@ use crate::{
     scene::{Boundary, Scene},
 };
 use serde::Serialize;
-use std::collections::{BTreeMap, BTreeSet};
+use std::{
+    cmp::Ordering,
+    collections::{BTreeMap, BTreeSet},
+};
 
 /// The boundaries with prescribed displacements or a gap, and the nodes of this rank on them.
 #[derive(Debug, Clone, Default)]
@@ -175,10 +178,7 @@ impl Supports {
         let own: Vec<[f64; 10]> = state.contact.iter().filter_map(row).collect();
         let all = body.nodes.partition.comm().gather(own.as_flattened());
         let mut rows: Vec<[f64; 10]> = all.as_chunks().0.to_vec();
-        rows.sort_by(|a, b| {
-            let by = |i: usize| a[i].total_cmp(&b[i]);
-            by(0).then(by(1)).then(by(2))
-        });
+        rows.sort_by(|a, b| a[..3].partial_cmp(&b[..3]).unwrap_or(Ordering::Equal));
         rows.into_iter()
             .map(|[boundary, part, arc_length, x, y, normal_x, normal_y, gap, pressure, active]| {
                 ContactRow {
@@ -197,9 +197,7 @@ impl Supports {
             })
             .collect()
     }
-}
 
-impl Supports {
     /// The length of contact by the `rows` of Γ_C, m, and the nodes on both sides of each of its ends, which lies
     /// between them. Next to a node without a row, which has a prescribed displacement, contact goes on up to it. At the
     /// end of Γ_C a light pressure may hide a short open part.

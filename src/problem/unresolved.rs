@@ -1,7 +1,7 @@
 //! Data that the nodes do not resolve. Prescribed displacements and the initial damage enter by their values at
 //! nodes, and may vary more between them.
 
-use super::loads::{EdgePart, TrianglePart, centroid, edge_parts, triangle_parts, triangle_point};
+use super::loads::{centroid, edge_parts, triangle_parts, triangle_point};
 use crate::{
     fem::{GAUSS, POINTS, midpoint, parabola, part_point, six_points},
     mesh::{Curve, Mesh, Order, sorted},
@@ -36,12 +36,13 @@ pub(crate) fn unresolved(
     let mut found = HashSet::new();
     for boundary in &scene.boundaries {
         let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
-        let shortest = SHORTEST * length(mesh, curve);
+        let length = |edge: &[usize; 2]| mesh.edge_normal(*edge).1;
+        let shortest = SHORTEST * curve.edges.iter().map(length).sum::<f64>();
         for u in displacements(&boundary.conditions) {
             let missed = missed_displacements(scene, mesh, curve, u).0;
             let edges = curve.edges.iter().zip(missed);
             let lost = edges.filter(|(edge, missed)| {
-                *missed > accuracy * displacement && mesh.edge_normal(**edge).1 > shortest
+                *missed > accuracy * displacement && length(edge) > shortest
             });
             found.extend(lost.map(|(edge, _)| sorted(*edge)));
         }
@@ -74,7 +75,7 @@ pub(super) fn notes(scene: &Scene, mesh: &Mesh) -> Vec<String> {
             let Some((missed, edge)) = worst.filter(|worst| worst.0 > NOTED * largest) else {
                 continue;
             };
-            let [x, y] = place(mesh, *edge, 0.5);
+            let [x, y] = mesh.midpoint(*edge);
             notes.push(format!(
                 "the displacement of boundary \"{}\" varies within the mesh's edges near ({x:.4}, {y:.4}): \
                  up to {missed:.1e} {} of it is missed, of {largest:.1e} at most; refine there",
@@ -124,8 +125,7 @@ fn missed_displacements(
             u.eval(x, y, t)
         };
         for (edge, [from, to]) in edge_parts(&lines, std::slice::from_ref(u), t, DEVIATION).parts {
-            let part: EdgePart = (edge, [from, to]);
-            let [a, m, b] = [0.0, 0.5, 1.0].map(|s| at(part.0, s));
+            let [a, m, b] = [0.0, 0.5, 1.0].map(|s| at(edge, s));
             let middle = if scene.order == Order::Linear { 0.5 * (a + b) } else { m };
             for s in [GAUSS[0], 0.5, GAUSS[1]].map(|s| from + s * (to - from)) {
                 let (value, [shown]) = (at(edge, s), parabola([[a], [middle], [b]], s));
@@ -161,7 +161,7 @@ fn missed_damage(scene: &Scene, mesh: &Mesh) -> Option<MissedDamage> {
     let mut found = MissedDamage { squares, square: 0.0, missed: 0.0, integral: 0.0, shown: 0.0 };
     let f = (std::slice::from_ref(initial), 1.0);
     for part in triangle_parts(&triangles, f, &[0.0], [DEVIATION, MAX_ADDED]).parts {
-        let (triangle, corners): TrianglePart = part;
+        let (triangle, corners) = part;
         let points = &triangles[triangle];
         let [a, b, c] = [points[0], points[1], points[2]].map(at);
         let weight = centroid(&triangles, &part).1 / 3.0;
@@ -183,13 +183,4 @@ fn longest_side(mesh: &Mesh, triangle: usize) -> Option<[usize; 2]> {
     let [a, b, c] = mesh.triangles[triangle];
     let sides = [[a, b], [b, c], [c, a]].into_iter().map(sorted);
     sides.max_by(|p, q| mesh.edge_normal(*p).1.total_cmp(&mesh.edge_normal(*q).1))
-}
-
-fn length(mesh: &Mesh, curve: &Curve) -> f64 {
-    curve.edges.iter().map(|&edge| mesh.edge_normal(edge).1).sum()
-}
-
-/// The point x(s) of an edge, 0 ≤ s ≤ 1, m.
-fn place(mesh: &Mesh, [a, b]: [usize; 2], s: f64) -> [f64; 2] {
-    parabola([mesh.nodes[a], mesh.midpoint([a, b]), mesh.nodes[b]], s)
 }

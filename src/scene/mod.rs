@@ -195,12 +195,12 @@ impl Scene {
     /// out of range or contradict others. The error lists all problems of a file, each with the line (or the
     /// `--set`), the key and what to write instead.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
+        let refused = |problem| SceneError(vec![format!("{}: {problem}", path.display())]);
         if path.extension().is_some_and(|ending| ending == "geo" || ending == "msh") {
             let problem = "it is a mesh, and what runs is a scene that names it in [mesh] (`signorini \
                            new NAME` writes one)";
-            return Err(SceneError(vec![format!("{}: {problem}", path.display())]));
+            return Err(refused(problem.to_owned()));
         }
-        let refused = |problem| SceneError(vec![format!("{}: {problem}", path.display())]);
         let text = std::fs::read(path)
             .map_err(|error| refused(format!("the scene cannot be read: {error}")))?;
         let text = String::from_utf8(text).map_err(|error| {

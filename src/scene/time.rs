@@ -59,11 +59,9 @@ impl TimeGrid {
         let (Stepping::Uniform { steps }, asked) = (self.stepping, self.step?) else { return None };
         let (end, step) = (self.end, self.end / steps as f64);
         (asked - step > 1e-6 * step).then(|| {
-            // Six digits avoid values such as 0.30000000000000004.
-            let step: f64 = format!("{step:.5e}").parse().unwrap_or(step);
             format!(
-                "time.step = {asked} s does not divide time.end = {end} s: {steps} steps of {step} s \
-                 are made"
+                "time.step = {asked} s does not divide time.end = {end} s: {steps} steps of {} s are made",
+                rounded(step)
             )
         })
     }

@@ -82,36 +82,23 @@ fn blanks(bytes: &[u8]) -> usize {
     bytes.iter().take_while(|b| b.is_ascii_whitespace()).count()
 }
 
-/// The form of the numbers in a file.
-#[derive(Clone, Copy, PartialEq)]
-pub enum Numbers {
-    /// Words between blanks.
-    Text,
-    /// Binary; tags and counts have eight bytes (`size_t`).
-    Binary,
-}
-
 /// Reads a section from start to end. No read goes beyond the end of the section, so counts need no check.
 pub struct ByteReader<'a> {
     section: &'a Section<'a>,
     position: usize,
-    pub numbers: Numbers,
+    /// Are numbers binary, tags and counts with eight bytes (`size_t`)? Otherwise they are words between blanks.
+    pub is_binary: bool,
 }
 
 impl<'a> ByteReader<'a> {
     /// A reader at the start of `section`.
-    pub fn new(section: &'a Section, numbers: Numbers) -> Self {
-        Self { section, position: section.start, numbers }
-    }
-
-    /// Whether numbers are binary.
-    fn is_binary(&self) -> bool {
-        self.numbers != Numbers::Text
+    pub fn new(section: &'a Section, is_binary: bool) -> Self {
+        Self { section, position: section.start, is_binary }
     }
 
     /// The byte of the next item, after the blanks of a text file.
     pub fn position(&mut self) -> usize {
-        if !self.is_binary() {
+        if !self.is_binary {
             self.position += blanks(self.rest());
         }
         self.position
@@ -166,7 +153,7 @@ impl<'a> ByteReader<'a> {
         from_bytes: fn([u8; N]) -> T,
     ) -> Result<T> {
         let at = self.position();
-        if self.is_binary() {
+        if self.is_binary {
             let bytes = self.take(what, N)?;
             return Ok(from_bytes(std::array::from_fn(|i| bytes[i])));
         }

@@ -9,7 +9,7 @@ mod v4;
 mod write;
 
 use super::{Mesh, MeshError, gmsh};
-use byte_reader::{ByteReader, Numbers, Result, Section, error_at, expected, not_a_mesh};
+use byte_reader::{ByteReader, Result, Section, error_at, expected, not_a_mesh};
 use contents::Contents;
 use std::{collections::BTreeMap, ffi::OsString, fs, path::Path};
 
@@ -105,13 +105,14 @@ fn contents(sections: &[Section], groups_are_entities: bool) -> Result<Contents>
             not_a_mesh(None)
         };
     };
-    let numbers = format(header)?.or_else(|version| expected(header.at, "version 4.1", version))?;
+    let is_binary =
+        format(header)?.or_else(|version| expected(header.at, "version 4.1", version))?;
     let names = names(sections)?;
     let mut contents = Contents { names, groups_are_entities, ..Contents::default() };
     // The elements need the groups of their entities.
     let others = sections.iter().filter(|section| section.name != "Entities");
     for section in all("Entities").chain(others) {
-        let mut reader = ByteReader::new(section, numbers);
+        let mut reader = ByteReader::new(section, is_binary);
         let read = match section.name {
             "Entities" => v4::entities,
             "Nodes" => v4::nodes,
@@ -135,24 +136,24 @@ fn contents(sections: &[Section], groups_are_entities: bool) -> Result<Contents>
 }
 
 /// Reads `$MeshFormat`: version, text or binary, size of a number; in a binary file then the integer 1.
-/// Returns the form of the numbers of version 4.1, or the version of a file that gmsh must convert.
-fn format(section: &Section) -> Result<std::result::Result<Numbers, f64>> {
+/// Returns whether the numbers of version 4.1 are binary, or the version of a file that gmsh must convert.
+fn format(section: &Section) -> Result<std::result::Result<bool, f64>> {
     let what = "version, file type and data size";
-    let mut reader = ByteReader::new(section, Numbers::Text);
+    let mut reader = ByteReader::new(section, false);
     let version = reader.real("a version such as 4.1")?;
     let at = reader.position();
     let (file_type, size) = (reader.int(what)?, reader.int(what)?);
     match file_type {
         _ if version != 4.1 => return Ok(Err(version)),
-        0 => return Ok(Ok(Numbers::Text)),
+        0 => return Ok(Ok(false)),
         1 if size == 8 => reader.line(what)?,
         1 => return expected(at, "numbers of 8 bytes", size),
         other => return expected(at, "file type 0 (text) or 1 (binary)", other),
     };
-    reader.numbers = Numbers::Binary;
+    reader.is_binary = true;
     let at = reader.position();
     match reader.int("the number 1")? {
-        1 => Ok(Ok(Numbers::Binary)),
+        1 => Ok(Ok(true)),
         other if other.swap_bytes() == 1 => Ok(Err(version)),
         other => expected(at, "the number 1", other),
     }
@@ -163,7 +164,7 @@ fn format(section: &Section) -> Result<std::result::Result<Numbers, f64>> {
 fn names(sections: &[Section]) -> Result<BTreeMap<(i32, i32), String>> {
     let (mut names, what) = (BTreeMap::new(), "dimension, tag and \"name\"");
     for section in sections.iter().filter(|section| section.name == "PhysicalNames") {
-        let mut reader = ByteReader::new(section, Numbers::Text);
+        let mut reader = ByteReader::new(section, false);
         for _ in 0..reader.count_line()? {
             let at = reader.position();
             let (dimension, tag) = (reader.int(what)?, reader.int(what)?);

@@ -1,6 +1,7 @@
 //! Loads, prescribed displacements and gaps as functions of time, for the choice of steps.
 
 use crate::{
+    mesh::bounds,
     problem::DiscreteProblem,
     scene::{Condition, Expression, Stepping, TimeGrid},
 };
@@ -28,12 +29,13 @@ fn breaks(problem: &DiscreteProblem, end: f64) -> Vec<f64> {
         breaks.extend(boxes.iter().flat_map(|space| f.breaks(*space, end)));
     };
     let triangles = mesh.triangles.chunks(mesh.triangles.len().div_ceil(BOXES).max(1));
-    let boxes: Vec<_> = triangles.map(|t| mesh.bounds(t.iter().flatten())).collect();
+    let at = |node: &usize| &mesh.nodes[*node];
+    let boxes: Vec<_> = triangles.map(|t| bounds(t.iter().flatten().map(at))).collect();
     scene.body_force.iter().chain(&scene.gravity).for_each(|f| add(f, &boxes));
     for boundary in &scene.boundaries {
         let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
         let edges = curve.edges.chunks(curve.edges.len().div_ceil(BOXES).max(1));
-        let boxes: Vec<_> = edges.map(|edges| mesh.bounds(edges.iter().flatten())).collect();
+        let boxes: Vec<_> = edges.map(|edges| bounds(edges.iter().flatten().map(at))).collect();
         let of_conditions = boundary.conditions.iter().flat_map(Condition::expressions);
         of_conditions.flatten().for_each(|f| add(f, &boxes));
     }

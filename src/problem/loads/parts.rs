@@ -12,7 +12,7 @@
 
 use crate::{
     fem::{Body, GAUSS, POINTS, parabola, part_point, quadratic_values, six_points},
-    mesh::twice_area,
+    mesh::{bounds, twice_area},
     scene::Expression,
 };
 
@@ -260,14 +260,9 @@ fn sampled<const N: usize, const S: usize, const Q: usize>(
     interpolated: impl Fn([f64; N]) -> [f64; Q],
     measure: f64,
 ) -> Sampled {
-    let mut space = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
     let controls = sides
         .map(|[p, q, m]| [0, 1].map(|k| 2.0 * nodes[m][k] - 0.5 * (nodes[p][k] + nodes[q][k])));
-    for point in nodes.iter().chain(&controls) {
-        for (bounds, x) in space.iter_mut().zip(point) {
-            *bounds = [bounds[0].min(*x), bounds[1].max(*x)];
-        }
-    }
+    let space = bounds(nodes.iter().chain(&controls));
     let mut found = Sampled { integral: 0.0, deviation: 0.0, hidden: 0.0 };
     let period = [times.first(), times.last()].map(|t| t.copied().unwrap_or(0.0));
     for f in f.iter().filter(|f| f.as_constant() != Some(zero)) {

@@ -70,7 +70,7 @@ impl Expression {
 }
 
 /// The smallest interval with all `values`; all numbers if one of them is NaN.
-fn hull(values: impl IntoIterator<Item = f64>) -> Interval {
+pub(super) fn hull(values: impl IntoIterator<Item = f64>) -> Interval {
     let mut bounds = [f64::INFINITY, f64::NEG_INFINITY];
     for value in values {
         if value.is_nan() {
