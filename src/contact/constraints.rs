@@ -47,8 +47,8 @@ pub(super) const DEPENDENT: f64 = 1e-4;
 const ROUNDING: f64 = 1e-12;
 
 impl Constraints {
-    /// Combines all rows node by node: the prescribed ones, then the joined gaps ([`Row::joined`]). Error messages need
-    /// the `coordinates`, m. Gaps along one line get exactly this line as their normal, so that rounding makes no
+    /// Combines all rows node by node: the prescribed ones, then the gaps, joined where boundaries meet smoothly. Error
+    /// messages need the `coordinates`, m. Gaps along one line get exactly this line as their normal, so that rounding makes no
     /// contradiction. The bounds get the `values` of their rows.
     ///
     /// # Errors

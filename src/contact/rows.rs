@@ -1,8 +1,5 @@
 //! Displacement conditions at nodes, as posed and as bounds on unknowns.
 
-use crate::mesh::Face;
-use std::collections::BTreeMap;
-
 /// A condition on the displacement of a node, with a value that may depend on time: u·d is prescribed (a component, or
 /// 0 across a symmetry axis), or at a node of Γ_C u·d is at most the gap, with d = ν.
 #[derive(Debug, Clone, Copy)]
@@ -19,31 +16,6 @@ impl Row {
     /// Is it the condition of a gap?
     pub fn is_gap(&self) -> bool {
         self.tributary_length.is_some()
-    }
-
-    /// Joins the gap conditions `faces` node by node. Those of one smooth boundary become one condition with the mean
-    /// normal and the sum of the lengths. At a corner both stay. Returns with each the `T` of its parts.
-    pub fn joined<T>(
-        faces: impl IntoIterator<Item = (usize, Face, T)>,
-    ) -> impl Iterator<Item = (Self, Vec<T>)> {
-        let mut nodes: BTreeMap<usize, Vec<(Face, Vec<T>)>> = BTreeMap::new();
-        for (node, new, of_new) in faces {
-            let faces = nodes.entry(node).or_default();
-            match faces.iter_mut().find(|(face, _)| face.continues(&new)) {
-                None => faces.push((new, vec![of_new])),
-                Some((face, of_face)) => {
-                    *face = face.joined(&new);
-                    of_face.push(of_new);
-                }
-            }
-        }
-        let row = |node, Face { normal: direction, length }| {
-            let tributary_length = Some(length);
-            Self { node, direction, tributary_length }
-        };
-        nodes.into_iter().flat_map(move |(node, faces)| {
-            faces.into_iter().map(move |(face, of_face)| (row(node, face), of_face))
-        })
     }
 }
 

@@ -54,13 +54,28 @@ impl Face {
 /// than [`CORNER_ANGLE`], and the node keeps both. The sum of the lengths of all faces is the length of the
 /// edges.
 pub fn boundary_nodes(faces: impl IntoIterator<Item = (usize, Face)>) -> Vec<BoundaryNode> {
-    let mut nodes: BTreeMap<usize, Vec<Face>> = BTreeMap::new();
-    for (node, own) in faces {
+    let nodes = joined_faces(faces.into_iter().map(|(node, face)| (node, face, ())));
+    let node = |(node, faces): (usize, Vec<(Face, Vec<()>)>)| BoundaryNode {
+        node,
+        faces: faces.into_iter().map(|(face, _)| face).collect(),
+    };
+    nodes.into_iter().map(node).collect()
+}
+
+/// Joins the `faces` of each node that continue each other smoothly. Each face gets the `T` of its parts.
+pub fn joined_faces<T>(
+    faces: impl IntoIterator<Item = (usize, Face, T)>,
+) -> BTreeMap<usize, Vec<(Face, Vec<T>)>> {
+    let mut nodes: BTreeMap<usize, Vec<(Face, Vec<T>)>> = BTreeMap::new();
+    for (node, own, of_own) in faces {
         let faces = nodes.entry(node).or_default();
-        match faces.iter_mut().find(|face| face.continues(&own)) {
-            Some(face) => *face = face.joined(&own),
-            None => faces.push(own),
+        match faces.iter_mut().find(|(face, _)| face.continues(&own)) {
+            Some((face, of_face)) => {
+                *face = face.joined(&own);
+                of_face.push(of_own);
+            }
+            None => faces.push((own, vec![of_own])),
         }
     }
-    nodes.into_iter().map(|(node, faces)| BoundaryNode { node, faces }).collect()
+    nodes
 }

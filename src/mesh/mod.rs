@@ -19,7 +19,7 @@ mod quadratic;
 mod rectangle;
 mod refine;
 
-pub use boundary::{BoundaryNode, CORNER_ANGLE, Face, boundary_nodes};
+pub use boundary::{BoundaryNode, CORNER_ANGLE, Face, boundary_nodes, joined_faces};
 pub use error::MeshError;
 pub use gmsh::{file, is_self_contained, load, load_graded, mesh_geo, scaling_factor};
 pub use msh::{parse, read};

@@ -3,7 +3,7 @@
 use crate::{
     contact::{RigidMotions, Row},
     fem::{Body, Edge, normal_error},
-    mesh::{BoundaryNode, Face, boundary_nodes, extent},
+    mesh::{BoundaryNode, Face, boundary_nodes, extent, joined_faces},
     scene::{Boundary, Condition, Expression, Gap, Scene, SurfaceLoad},
 };
 
@@ -90,7 +90,12 @@ impl BoundaryConditions {
                 boundary.loads().map(|f| Traction { edges: edges.clone(), force: f.clone() }),
             );
         }
-        Row::joined(gaps).for_each(|(row, distances)| conditions.add(row, points, distances));
+        for (node, faces) in joined_faces(gaps) {
+            for (Face { normal: direction, length }, distances) in faces {
+                let row = Row { node, direction, tributary_length: Some(length) };
+                conditions.add(row, points, distances);
+            }
+        }
         conditions
     }
 

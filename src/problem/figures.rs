@@ -1,24 +1,18 @@
 //! The figures that a run prints, and their error bars.
 
-use super::{DiscreteProblem, OBSERVED};
+use super::DiscreteProblem;
 use crate::scene::{Expression, Stepping};
 use serde::{Deserialize, Serialize};
 
 /// The figures of a [`StepRecord`](crate::evolution::StepRecord) that have an error bar.
 const OF_RECORD: [&str; 5] = ["work", "displacement_max", "contact_force", "zeta_min", "zeta_mean"];
 /// The extremes of a state that have an error bar: stresses, the largest contact pressure, Pa, and the length of
-/// contact, m. Bodies without Γ_C have the first three.
-const EXTREMES: [(&str, Dimension, usize); 5] = [
-    ("von_mises_max", Dimension::Stress, usize::MAX),
-    ("principal_max", Dimension::Stress, usize::MAX),
-    ("principal_min", Dimension::Stress, usize::MAX),
-    ("pressure_max", Dimension::Stress, usize::MAX - 1),
-    ("contact_length", Dimension::ContactLength, usize::MAX - 2),
-];
-/// The groups of the supports' forces and moments, and the first of two groups per probe.
-const FORCES: usize = 5;
-const MOMENTS: usize = 6;
-const FIRST_PROBE: usize = 7;
+/// contact, m. Bodies without Γ_C have the first three, which are a group.
+const EXTREMES: [&str; 5] =
+    ["von_mises_max", "principal_max", "principal_min", "pressure_max", "contact_length"];
+/// The groups of the supports' forces and moments.
+const FORCES: &str = "forces";
+const MOMENTS: &str = "moments";
 /// The scale of a figure is at least this fraction of the largest figure of its dimension. Otherwise a force that
 /// is zero by symmetry would have no relative error.
 const MIN_SCALE: f64 = 1e-3;
@@ -62,7 +56,7 @@ struct Figure {
     name: String,
     dimension: Dimension,
     /// Figures of one group share a scale: the components of a force, of a displacement, of a stress.
-    group: usize,
+    group: String,
 }
 
 /// The error bar of a figure of the last state.
@@ -87,34 +81,33 @@ impl Bar {
 
 impl DiscreteProblem {
     fn figures(&self) -> Vec<Figure> {
-        use Dimension::{Damage, Force, Length, Moment, Stress, Work};
-        let dimensions = [Work, Length, Force, Damage, Damage];
-        let of_record = OF_RECORD.iter().zip(dimensions).enumerate();
-        let of_record =
-            of_record.map(|(group, (&name, dimension))| (name.to_owned(), dimension, group));
-        let supports = 3 * self.supports.names.len();
-        let quantities = self.quantities().into_iter().enumerate().map(|(i, name)| {
-            let probe = i.saturating_sub(supports);
-            let first = FIRST_PROBE + 2 * (probe / OBSERVED.len());
-            match (i < supports, i % 3, probe % OBSERVED.len()) {
-                (true, 2, _) => (name, Moment, MOMENTS),
-                (true, ..) => (name, Force, FORCES),
-                (false, _, 0 | 1) => (name, Length, first),
+        use Dimension::{ContactLength, Damage, Force, Length, Moment, Stress, Work};
+        let figure = |name: String| {
+            let (of, kind) = name.rsplit_once('.').unwrap_or(("", &name));
+            let (dimension, group) = match kind {
+                "work" => (Work, name.clone()),
+                "displacement_max" => (Length, name.clone()),
+                "contact_force" => (Force, name.clone()),
+                "force_x" | "force_y" => (Force, FORCES.to_owned()),
+                "moment" => (Moment, MOMENTS.to_owned()),
+                "u_x" | "u_y" => (Length, format!("u of {of}")),
                 // The scale of a damage at a point is the maximum damage of the body.
-                (false, _, 2) => (name, Damage, 3),
-                _ => (name, Stress, first + 1),
-            }
-        });
-        let figure = |(name, dimension, group)| Figure { name, dimension, group };
-        let extremes = EXTREMES.into_iter().take(self.extremes().len());
-        let extremes = extremes.map(|(name, dimension, group)| (name.to_owned(), dimension, group));
-        of_record.chain(quantities).chain(extremes).map(figure).collect()
+                "zeta" => (Damage, "zeta_min".to_owned()),
+                "zeta_min" | "zeta_mean" => (Damage, name.clone()),
+                "pressure_max" => (Stress, name.clone()),
+                "contact_length" => (ContactLength, name.clone()),
+                _ => (Stress, format!("stress of {of}")),
+            };
+            Figure { dimension, group, name }
+        };
+        let of_record = OF_RECORD.map(str::to_owned).into_iter();
+        let extremes = self.extremes().into_iter().map(str::to_owned);
+        of_record.chain(self.quantities()).chain(extremes).map(figure).collect()
     }
 
     /// The names of the extremes of a state.
     pub(crate) fn extremes(&self) -> Vec<&'static str> {
-        let count = if self.has_contact() { EXTREMES.len() } else { 3 };
-        EXTREMES[..count].iter().map(|(name, ..)| *name).collect()
+        EXTREMES[..if self.has_contact() { 5 } else { 3 }].to_vec()
     }
 
     pub(crate) fn figure_names(&self) -> Vec<String> {
@@ -158,7 +151,7 @@ impl DiscreteProblem {
     /// its group, and a moment also with the maximum force times the body's radius of gyration.
     pub(crate) fn without_rounding(&self, mut values: Vec<f64>) -> Vec<f64> {
         let figures = &self.figures()[OF_RECORD.len()..];
-        let most = |group: usize| {
+        let most = |group: &str| {
             let alike = figures.iter().zip(&values).filter(|(figure, _)| figure.group == group);
             alike.fold(0.0_f64, |most, (_, value)| most.max(value.abs()))
         };
@@ -166,7 +159,7 @@ impl DiscreteProblem {
         let rounding = figures.iter().map(|figure| match figure.dimension {
             Dimension::Damage => 0.0,
             Dimension::Moment => SHOWN_AS_ZERO * most(MOMENTS).max(lever * most(FORCES)),
-            _ => SHOWN_AS_ZERO * most(figure.group),
+            _ => SHOWN_AS_ZERO * most(&figure.group),
         });
         let rounding: Vec<f64> = rounding.collect();
         for (value, rounding) in values.iter_mut().zip(rounding) {

@@ -4,7 +4,7 @@ use crate::support::{problem, run, square};
 use signorini::{
     contact::{Conflict, ConstraintError, Constraints, Row, SOLVERS},
     evolution::SetupError,
-    mesh::{Face, Mesh},
+    mesh::{Face, Mesh, joined_faces},
 };
 
 const MATERIAL: &str = "material = { young = 100, poisson = 0.3, plane = 'stress' }";
@@ -196,8 +196,12 @@ fn gaps_of_one_smooth_boundary_become_one_bound_and_those_of_a_corner_two() {
     for (half, bounds) in [(0.2_f64, 1), (0.3, 2)] {
         let normal = |side: f64| [side * half.sin(), -half.cos()];
         let face = |side, gap: f64| (0, Face { normal: normal(side), length: 2.0 }, gap);
-        let (mut rows, gaps): (Vec<Row>, Vec<Vec<f64>>) =
-            Row::joined([face(-1.0, 0.1), face(1.0, 0.2)]).unzip();
+        let joined = joined_faces([face(-1.0, 0.1), face(1.0, 0.2)]).remove(&0).unwrap();
+        let row = |(face, gaps): (Face, Vec<f64>)| {
+            let tributary_length = Some(face.length);
+            (Row { node: 0, direction: face.normal, tributary_length }, gaps)
+        };
+        let (mut rows, gaps): (Vec<Row>, Vec<Vec<f64>>) = joined.into_iter().map(row).unzip();
         assert_eq!(gaps.concat(), [0.1, 0.2]);
         let smallest: Vec<f64> = gaps.iter().map(|gaps| gaps[0]).collect();
         let constraints = Constraints::new(&[[0.0, 0.0]], &mut rows, &smallest).unwrap();

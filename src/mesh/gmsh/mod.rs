@@ -230,9 +230,6 @@ fn arguments(parameters: &BTreeMap<String, f64>) -> Vec<OsString> {
     let mut arguments: Vec<String> = ["-2", "-nt", "1"].map(str::to_owned).into();
     for (name, value) in parameters {
         arguments.extend(["-setnumber".to_owned(), name.clone(), value.to_string()]);
-        if name == "size" {
-            arguments.extend(["-clmax".to_owned(), value.to_string()]);
-        }
     }
     arguments.into_iter().map(OsString::from).collect()
 }

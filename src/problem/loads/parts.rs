@@ -85,24 +85,18 @@ fn bisected<P: Copy>(
     let mut open: Vec<(P, Sampled)> = parts.map(|part| (part, sample(part))).collect();
     for _ in 0..MAX_BISECTIONS {
         let total = open.iter().fold(integral, |sum, (_, sampled)| sum + sampled.integral);
-        let mut coarse = Vec::new();
-        for (part, sampled) in open {
-            if sampled.deviation > deviation * total || sampled.hidden > HIDDEN * total {
-                coarse.push((part, sampled));
-            } else {
-                integral += sampled.integral;
-                done.push((part, sampled));
-            }
-        }
+        let is_coarse = |(_, sampled): &(P, Sampled)| {
+            sampled.deviation > deviation * total || sampled.hidden > HIDDEN * total
+        };
+        let (coarse, fine): (Vec<_>, Vec<_>) = open.into_iter().partition(is_coarse);
+        integral = fine.iter().fold(integral, |sum, (_, sampled)| sum + sampled.integral);
+        done.extend(fine);
         if (done.len() + 2 * coarse.len()) as f64 > most {
             done.extend(coarse);
             return done;
         }
         let parts = coarse.into_iter().flat_map(|(part, _)| halves(part));
         open = parts.map(|part| (part, sample(part))).collect();
-        if open.is_empty() {
-            return done;
-        }
     }
     done.extend(open);
     done
