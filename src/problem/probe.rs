@@ -6,17 +6,9 @@ use crate::{
     scene::Scene,
 };
 
-#[derive(Debug, Clone, Default)]
-pub(super) struct Probes {
-    places: Vec<ProbeLocation>,
-}
-
-#[derive(Debug, Clone)]
-struct ProbeLocation {
-    location: Location,
-    /// The triangle on this rank; `None` if another rank owns it.
-    triangle: Option<usize>,
-}
+/// The places of the probes, each with its triangle on this rank; `None` if another rank owns it.
+#[derive(Debug)]
+pub(super) struct Probes(Vec<(Location, Option<usize>)>);
 
 /// The quantities at each probe: displacement, m; damage; stress, Pa.
 pub(crate) const OBSERVED: [&str; 7] =
@@ -31,28 +23,23 @@ impl Probes {
         let (mut places, mut outside) = (Vec::new(), Vec::new());
         for probe in &scene.probes {
             match Location::of(probe.point, body) {
-                Some(location) => {
-                    places.push(ProbeLocation { location, triangle: Some(location.triangle) });
-                }
+                Some(location) => places.push((location, Some(location.triangle))),
                 None => outside.push(probe),
             }
         }
         scene.check_probes(&outside)?;
-        Ok(Self { places })
+        Ok(Self(places))
     }
 
     /// The probes in the triangles that a rank owns.
     pub(super) fn restrict(&self, subdomain: &Subdomain) -> Self {
-        let local = |place: &ProbeLocation| ProbeLocation {
-            triangle: subdomain.own_triangle(place.location.triangle),
-            ..*place
-        };
-        Self { places: self.places.iter().map(local).collect() }
+        let local = |&(place, _): &(Location, _)| (place, subdomain.own_triangle(place.triangle));
+        Self(self.0.iter().map(local).collect())
     }
 
     /// The quantities at all probes; 0 at probes of other ranks. The stress is σ = η_*(ζ) 𝒜ε(u) at the point.
     pub(super) fn values(&self, problem: &DiscreteProblem, state: &State) -> Vec<f64> {
-        let values = |ProbeLocation { location, triangle }: &ProbeLocation| {
+        let values = |(location, triangle): &(Location, Option<usize>)| {
             let Some(t) = *triangle else { return [0.0; OBSERVED.len()] };
             let at = location.values(&problem.body, t, &state.u, &state.zeta);
             let (elasticity, body) = (&problem.elasticity, &problem.body);
@@ -60,6 +47,6 @@ impl Probes {
             let von_mises = elasticity.material(body, t).von_mises(&stress);
             [at.u[0], at.u[1], at.zeta, stress[0], stress[1], stress[2], von_mises]
         };
-        self.places.iter().flat_map(values).collect()
+        self.0.iter().flat_map(values).collect()
     }
 }

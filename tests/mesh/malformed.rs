@@ -76,14 +76,14 @@ fn a_mesh_runs_nothing() {
 fn elements_nobody_can_use() {
     for (name, fragments) in [
         ("quadrangles", &["is of gmsh's type 3 (quadrangle)", "Recombine"][..]),
-        ("tetrahedra", &["(tetrahedron)", "gmsh -2"]),
+        ("tetrahedra", &["(solid)", "gmsh -2"]),
     ] {
         complains(fs::read(fixture(name)).unwrap(), fragments);
     }
     let unknown = text(&NODES, &["7 99 1 1 2 3"]);
     complains(unknown, &["x.msh:28: element 7 is of gmsh's type 99 (unknown)"]);
     let cubic = text(&NODES, &["7 21 1 1 2 3"]);
-    complains(cubic, &["type 21 (triangle of higher order)", "Mesh.ElementOrder = 1 or 2"]);
+    complains(cubic, &["type 21 (line or triangle of higher order)", "Mesh.ElementOrder = 1 or 2"]);
 }
 
 #[test]

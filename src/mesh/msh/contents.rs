@@ -92,12 +92,9 @@ impl Contents {
             }
             // A point.
             15 => return node_tags::<1>(reader).map(drop),
-            3 => "quadrangle",
-            4 => "tetrahedron",
-            26..=28 => "line of higher order",
-            20..=25 => "triangle of higher order",
-            10 | 16 | 36 | 37 => "quadrangle of higher order",
-            5..=7 | 11..=14 | 17..=19 | 29 => "solid",
+            3 | 10 | 16 | 36 | 37 => "quadrangle",
+            20..=28 => "line or triangle of higher order",
+            4..=7 | 11..=14 | 17..=19 | 29 => "solid",
             _ => "unknown",
         };
         let problem = format!(

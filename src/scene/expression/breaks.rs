@@ -107,7 +107,8 @@ impl Envelope<'_> {
             let part = (knot.time - last.time) / (next.time - last.time);
             let line = [0, 1].map(|k| (1.0 - part) * last.bounds[k] + part * next.bounds[k]);
             if self.differ(knot.bounds, line, 0.5) {
-                let jumps = next.time - knot.time <= f64::EPSILON * next.time;
+                let jumps = next.time - knot.time <= f64::EPSILON * next.time
+                    && self.differ(knot.bounds, next.bounds, 0.5);
                 times.push(if jumps { next.time } else { knot.time });
                 last = knot;
             }

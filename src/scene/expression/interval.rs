@@ -96,18 +96,8 @@ pub(super) fn absolute(f: fn(f64) -> f64, [a, b]: Interval) -> Interval {
     hull([f(a), f(b), f(0.0_f64.clamp(a, b))])
 }
 
-/// sin.
-pub(super) fn sine(f: fn(f64) -> f64, a: Interval) -> Interval {
-    wave(f, a, FRAC_PI_2)
-}
-
-/// cos.
-pub(super) fn cosine(f: fn(f64) -> f64, a: Interval) -> Interval {
-    wave(f, a, 0.0)
-}
-
 /// A wave with the value 1 at `peak` + 2πk and −1 at `peak` + π + 2πk.
-fn wave(f: fn(f64) -> f64, [a, b]: Interval, peak: f64) -> Interval {
+pub(super) fn wave(f: fn(f64) -> f64, [a, b]: Interval, peak: f64) -> Interval {
     if !(b - a).is_finite() {
         return [-1.0, 1.0];
     }

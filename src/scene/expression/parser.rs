@@ -6,7 +6,11 @@ use super::{
     LONGEST, Table, interval, truth,
 };
 use crate::suggestion::suggestion;
-use std::{f64::consts::PI, path::Path, sync::Arc};
+use std::{
+    f64::consts::{FRAC_PI_2, PI},
+    path::Path,
+    sync::Arc,
+};
 
 /// All names with their instructions.
 const NAMES: [(&str, Instruction); 15] = [
@@ -14,8 +18,8 @@ const NAMES: [(&str, Instruction); 15] = [
     ("y", Variable(1)),
     ("t", Variable(2)),
     ("pi", Number(PI)),
-    ("sin", Unary(f64::sin, interval::sine)),
-    ("cos", Unary(f64::cos, interval::cosine)),
+    ("sin", Unary(f64::sin, |f, a| interval::wave(f, a, FRAC_PI_2))),
+    ("cos", Unary(f64::cos, |f, a| interval::wave(f, a, 0.0))),
     ("tan", Unary(f64::tan, interval::tangent)),
     ("sqrt", Unary(f64::sqrt, interval::from_zero)),
     ("exp", Unary(f64::exp, interval::monotone)),
