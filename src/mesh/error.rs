@@ -31,16 +31,9 @@ pub enum MeshError {
     /// A signal came while gmsh worked.
     #[error("{0} while gmsh worked")]
     Interrupted(Signal),
-    /// The sides of a triangle are so curved that its parts would fold over each other.
-    #[error(
-        "the triangle at ({x}, {y}) is too curved to be refined; start from a finer mesh there"
-    )]
-    TooCurved {
-        /// A vertex of the triangle, m.
-        x: f64,
-        /// Its other coordinate, m.
-        y: f64,
-    },
+    /// The sides of a triangle with this vertex, m, are so curved that its parts would fold over each other.
+    #[error("the triangle at ({}, {}) is too curved; start from a finer mesh there", .0[0], .0[1])]
+    TooCurved([f64; 2]),
 }
 
 impl MeshError {

@@ -72,11 +72,11 @@ impl Mesh {
     /// circles, and these angles, rad. They are zero on circles, and fall with the third power of the length of the edges on
     /// other smooth curves.
     pub fn kinks(&self) -> Vec<Kink> {
-        let surfaces = self.surface_combinations();
+        let surfaces = self.surfaces_of_triangles();
         // By node and by the surfaces on the left and on the right: the directions in which the line arrives and leaves.
         let (mut arriving, mut leaving) = (BTreeMap::new(), BTreeMap::new());
         for both in sides(&self.triangles).chunk_by(|a, b| a.edge == b.edge) {
-            let of = |side: &Side| surfaces[side.triangle];
+            let of = |side: &Side| &surfaces[side.triangle];
             let is_line = both.len() == 1 || of(&both[0]) != of(&both[1]);
             if !is_line {
                 continue;
@@ -111,18 +111,13 @@ impl Mesh {
         leaving.iter().filter_map(kink).collect()
     }
 
-    /// Per triangle a number that is the same for all triangles of the same surfaces.
-    fn surface_combinations(&self) -> Vec<usize> {
-        let mut combinations = vec![0; self.triangles.len()];
-        for triangles in self.surfaces.values() {
-            let next = combinations.iter().max().map_or(0, |largest| largest + 1);
-            let mut renamed = BTreeMap::new();
-            for &triangle in triangles {
-                let fresh = next + renamed.len();
-                combinations[triangle] = *renamed.entry(combinations[triangle]).or_insert(fresh);
-            }
+    /// Per triangle: the numbers of its surfaces.
+    fn surfaces_of_triangles(&self) -> Vec<Vec<usize>> {
+        let mut surfaces = vec![Vec::new(); self.triangles.len()];
+        for (number, triangles) in self.surfaces.values().enumerate() {
+            triangles.iter().for_each(|&triangle| surfaces[triangle].push(number));
         }
-        combinations
+        surfaces
     }
 
     /// Whether any side of a triangle is curved.

@@ -102,7 +102,7 @@ impl Refinement {
                         mesh.add_offsets(nodes, offsets);
                         let [a, b, c] = nodes.map(|node| mesh.nodes[node]);
                         if twice_area(a, b, c) <= 0.0 {
-                            return Err(MeshError::TooCurved { x: a[0], y: a[1] });
+                            return Err(MeshError::TooCurved(a));
                         }
                     }
                 }

@@ -162,7 +162,7 @@ fn a_triangle_too_curved_to_be_refined_is_an_error() {
     mesh.set_offset([1, 2], [-0.6, -0.3]);
     let halves = Refinement::start(mesh).refine(&[true]).unwrap();
     let message = halves.refine(&[true, true]).unwrap_err().to_string();
-    assert!(message.contains("too curved to be refined"), "{message}");
+    assert!(message.contains("is too curved; start from a finer mesh"), "{message}");
 }
 
 #[test]
