@@ -129,14 +129,7 @@ impl DiscreteProblem {
     /// # Errors
     /// PETSc cannot divide the mesh.
     pub fn restrict(self, session: &Session) -> Result<Self, PetscError> {
-        match Subdomain::owners(session, &self.body.mesh)? {
-            Some(owners) => self.divide(session, owners),
-            None => Ok(self),
-        }
-    }
-
-    /// Restricts the problem to this rank's subdomain, from the owners of all vertices.
-    fn divide(self, session: &Session, owners: Vec<usize>) -> Result<Self, PetscError> {
+        let Some(owners) = Subdomain::owners(session, &self.body.mesh)? else { return Ok(self) };
         let subdomain = Subdomain::new(session, &self.body, &owners)?;
         Ok(Self {
             constraints: self.constraints.restrict(&subdomain),
