@@ -47,9 +47,9 @@ pub(super) const DEPENDENT: f64 = 1e-4;
 const ROUNDING: f64 = 1e-12;
 
 impl Constraints {
-    /// Combines all rows node by node: the prescribed ones, then the gaps, joined where boundaries meet smoothly. Error
-    /// messages need the `coordinates`, m. Gaps along one line get exactly this line as their normal, so that rounding makes no
-    /// contradiction. The bounds get the `values` of their rows.
+    /// Combines all rows node by node: the prescribed ones, then the gaps, joined where boundaries meet smoothly.
+    /// Error messages need the `coordinates`, m. Gaps along one line get exactly this line as their normal, so
+    /// that rounding makes no contradiction. The bounds get the `values` of their rows.
     ///
     /// # Errors
     /// Directions at a node are nearly dependent, or too many for its two unknowns.
