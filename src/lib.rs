@@ -90,3 +90,7 @@ pub mod problem;
 pub mod evolution;
 pub mod estimate;
 pub mod output;
+
+/// Relative rounding of a sum over the nodes of a mesh: √n ε for n = 2²⁴ terms, as rounding errors have random signs
+/// (Higham, Accuracy and Stability of Numerical Algorithms, ch. 2). Smaller differences are not seen.
+pub(crate) const ROUNDING: f64 = 4096.0 * f64::EPSILON;

@@ -3,7 +3,7 @@
 use super::{Failure, kinks, screen, task::Task};
 use signorini::{
     estimate::{self, AdaptError, Adapted, Measured},
-    evolution::{Outcome, percent},
+    evolution::{AIM, Outcome, percent},
     interrupt::{Interrupts, Signal},
     mesh::{CORNER_ANGLE, Kink, Mesh, Order},
     petsc::Session,
@@ -102,9 +102,6 @@ fn interrupted(signal: Signal) -> Failure {
 /// The ratio by which to reduce the tolerance of the time steps, so that all figures become exact enough, if these steps
 /// miss the required accuracy and the mesh leaves them a part of it. At most ½, as both runs are compared.
 pub(super) fn shorter_steps(task: &Task, outcome: &Outcome) -> Option<f64> {
-    /// The errors of a run with the new tolerance are to be this fraction of the accuracy. They are not quite
-    /// proportional to the tolerance.
-    const AIM: f64 = 0.8;
     let accuracy = task.problem.scene().accuracy?;
     let bars = task.measured.bars.iter().zip(&outcome.bars);
     let bars = bars.filter(|(bar, _)| is_asked(task, &bar.name));

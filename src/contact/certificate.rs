@@ -4,7 +4,7 @@
 //! unknowns. A fault in any of these makes u wrong, and the certificate shows it.
 
 use super::{Kkt, Row, Scales, kkt::worse};
-use crate::{fem::Subdomain, petsc::Communicator};
+use crate::{ROUNDING, fem::Subdomain, petsc::Communicator};
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -59,8 +59,6 @@ pub struct Answer<'a> {
 
 /// A normal lies in the span of the prescribed directions if its part outside is below this.
 const ALONG: f64 = 1e-6;
-/// Relative difference below which two prescribed values count as equal.
-const ROUNDING: f64 = 1e-12;
 
 impl Certificate {
     /// The certificate of the undivided body, from its rows.
@@ -242,7 +240,7 @@ fn cone(
     left: &[f64],
 ) -> (Vec<f64>, Vector2<f64>) {
     let mut best = (vec![0.0; normals.len()], force, 0.0);
-    let rounding = 1e-12 * force.norm();
+    let rounding = ROUNDING * force.norm();
     let mut offer = |multipliers: &[(usize, f64)]| {
         let carried: Vector2<f64> = multipliers.iter().map(|&(i, p)| normals[i] * p).sum();
         let rest = force - carried;

@@ -2,6 +2,7 @@
 
 use super::{Bound, Conflict, ConstraintError, Row};
 use crate::{
+    ROUNDING,
     fem::{NodalBases, Subdomain},
     mesh::extent,
 };
@@ -42,9 +43,6 @@ const PARALLEL: f64 = 1e-8;
 /// Directions closer than this angle, rad, that are not one direction, are refused: their basis at a node
 /// loses too many digits. Contact solves reach the default tolerance down to this angle.
 pub(super) const DEPENDENT: f64 = 1e-4;
-/// Rounding of coordinates and expressions: relative difference of prescribed values, and missing gap over
-/// the body's size, that are accepted.
-const ROUNDING: f64 = 1e-12;
 
 impl Constraints {
     /// Combines all rows node by node: the prescribed ones, then the gaps, joined where boundaries meet smoothly.

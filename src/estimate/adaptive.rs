@@ -271,8 +271,7 @@ fn refined(
         let errors = measured.map_or_else(Vec::new, |of| of.errors(&scene.accuracy_of));
         let exhausted = rounds >= MAX_ROUNDS || 4 * triangles > MAX_TRIANGLES;
         let limit = || "the limit on rounds or triangles is reached".to_owned();
-        let is_named = !scene.accuracy_of.is_empty();
-        let short = failed.or_else(|| progress.stuck(&errors, is_named));
+        let short = failed.or_else(|| progress.stuck(&errors));
         let short = short.or(exhausted.then(limit));
         let reached = errors.first().is_some_and(|worst| worst.excess(accuracy) <= 1.0);
         let ends = reached || short.is_some();
@@ -281,31 +280,10 @@ fn refined(
         if ends {
             return Ok(adapted);
         }
-        refinement = finer(&refinement, &round, measured)?;
+        let (ratios, levels) = (round.size_ratios(measured), round.levels(measured));
+        refinement = sharpened(divided(refinement, &ratios)?, &levels)?;
         progress.check_memory(refinement.mesh.triangles.len())?;
     }
-}
-
-/// The mesh of the next round. After a measurement it has at least 1.3 times as many triangles, if smaller goals for the errors
-/// of the figures give them: a mesh that is hardly finer is not worth its measurement.
-fn finer(
-    refinement: &Refinement,
-    round: &Round,
-    measured: Option<&Measurement>,
-) -> Result<Refinement, MeshError> {
-    const GROWTH: f64 = 1.3;
-    const GOALS: [f64; 5] = [1.0, 0.7, 0.5, 0.35, 0.25];
-    let enough = measured.map_or(0.0, |_| GROWTH * refinement.mesh.triangles.len() as f64);
-    let levels = round.levels(measured);
-    let mut next = refinement.clone();
-    for goal in GOALS {
-        next = divided(refinement.clone(), &round.size_ratios(measured, goal))?;
-        next = sharpened(next, &levels)?;
-        if next.mesh.triangles.len() as f64 >= enough {
-            break;
-        }
-    }
-    Ok(next)
 }
 
 /// Makes the steps adaptive: too long steps may reach ζ_* or miss loads. False if they are adaptive already.

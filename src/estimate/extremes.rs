@@ -7,6 +7,7 @@ use crate::{
     problem::{DiscreteProblem, Singular, State},
 };
 use serde::Serialize;
+use std::f64::consts::FRAC_1_SQRT_2;
 
 /// The reason of a singular stress that only the measurement on a finer mesh shows.
 pub const GROWS: &str = "grows with refinement";
@@ -149,8 +150,9 @@ impl Extremes {
     /// of triangles before. M_k is the largest value farther away than size/2^k, k = 1, 2, 3. A power r^(λ−1) with λ < 1 has increasing differences, and a
     /// smooth field halves them with every k. Collective.
     pub(super) fn grow(&self, size: impl Fn([f64; 2]) -> f64) -> Vec<bool> {
-        /// The ratio of the last difference to the one before above which the extreme grows; 1 for ln r.
-        const INCREASING: f64 = 0.85;
+        /// The ratio of the last difference to the one before above which the extreme grows: halfway between that of
+        /// r^½, as at an end of contact, and 1 for ln r.
+        const INCREASING: f64 = 0.5 * (1.0 + FRAC_1_SQRT_2);
         /// Smaller differences than this fraction of the extreme are rounding, or a weak singularity (λ > 0.97).
         const SEEN: f64 = 0.02;
         let grows = |(extreme, field): (&Extreme, &Vec<(f64, [f64; 2])>)| {

@@ -32,6 +32,7 @@ pub use recovery::{EnergyError, RecoveredStrains};
 pub use stress::{NodalStress, Strained, principal};
 
 use crate::{
+    ROUNDING,
     evolution::{
         Callback, DamageStep, ErrorBudget, Observed, Observer, Outcome, Phases, Run, RunError,
         RunState, Step, all_steps,
@@ -45,8 +46,6 @@ use nalgebra::DVector;
 
 /// If max |u| of the last step is below this fraction of its maximum in the run, the body counts as unloaded.
 const UNLOADED: f64 = 0.01;
-/// A deformation below this fraction of the rigid motion counts as rounding.
-const RIGID_ROUNDING: f64 = 1e-11;
 
 /// [`evolution::run`](crate::evolution::run), and at its end the estimates of its errors.
 ///
@@ -124,11 +123,7 @@ fn energy_error(problem: &DiscreteProblem, outcome: &Outcome) -> Result<f64, Pet
     let [rigid, rest] =
         RigidMotion::nearest(&problem.body, &state.u).max_norms(&problem.body, &state.u);
     // The strains of a body that only moves rigidly are rounding.
-    if rest > RIGID_ROUNDING * rigid {
-        problem.energy_error(&state.zeta, &state.u)
-    } else {
-        Ok(0.0)
-    }
+    if rest > ROUNDING * rigid { problem.energy_error(&state.zeta, &state.u) } else { Ok(0.0) }
 }
 
 impl Outcome {

@@ -1,6 +1,7 @@
 //! Polynomials fitted to the strains around each vertex.
 
 use crate::{
+    ROUNDING,
     fem::{Body, Cells, POINTS, for_elements, quadratic_values},
     petsc::PetscError,
 };
@@ -8,8 +9,6 @@ use nalgebra::{Matrix6x3, SMatrix, SVector, Vector3, Vector6};
 
 /// Triangles needed to fit at a vertex; with fewer, the fits of its neighbours are averaged.
 const ENOUGH: usize = 4;
-/// This fraction of its trace is added to the diagonal of a normal matrix. It makes the fit unique.
-const REGULARISATION: f64 = 1e-13;
 
 /// A strain (ε_xx, ε_yy, 2ε_xy) as a polynomial about a vertex: the coefficients of 1, x, y, x², xy, y² (rows).
 pub(super) type Fit = Matrix6x3<f64>;
@@ -180,8 +179,9 @@ fn fit<const N: usize>(
         normal += row * row.transpose();
         rhs += row * strain.transpose();
     }
-    let trace = normal.trace();
-    (0..N).for_each(|i| normal[(i, i)] += REGULARISATION * trace);
+    // This makes the fit unique.
+    let rounding = ROUNDING * normal.trace();
+    (0..N).for_each(|i| normal[(i, i)] += rounding);
     let mut fit = Fit::zeros();
     let Some(factor) = normal.cholesky() else { return fit };
     let found = factor.solve(&rhs);

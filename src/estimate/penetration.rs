@@ -7,7 +7,7 @@
 use crate::{
     fem::{Edge, Elements, parabola},
     mesh::sorted,
-    problem::{DiscreteProblem, State},
+    problem::{DiscreteProblem, NOTED, State},
     scene::Gap,
 };
 use std::collections::HashMap;
@@ -16,8 +16,6 @@ use std::collections::HashMap;
 const RESOLVED: f64 = 1e-3;
 /// … except at peaks of the foundation that are narrower than this fraction of an edge.
 const NARROWEST: f64 = 1e-5;
-/// A penetration above this fraction of the maximum displacement is noted.
-const NOTED: f64 = 0.05;
 
 /// The penetration of the foundation between the nodes of an edge.
 #[derive(Debug, Clone, Copy)]

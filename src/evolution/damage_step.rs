@@ -64,8 +64,9 @@ pub(crate) struct DamageUpdate {
     pub(crate) certificate: Option<DamageCertificate>,
 }
 
-/// Maximum accepted [`DamageCertificate::balance`] of a step, relative to max |ζ|: far above rounding.
-const MAX_BALANCE: f64 = 1e-10;
+/// Maximum accepted [`DamageCertificate::balance`] of a step, relative to max |ζ|: far above rounding. A violation of
+/// the bounds on ζ counts above it.
+pub(super) const MAX_BALANCE: f64 = 1e-10;
 
 impl DamageStep<'_> {
     /// The damage source of a state.

@@ -29,8 +29,6 @@ pub struct ErrorBudget {
     pub(crate) zeta_steps: Option<[f64; 2]>,
 }
 
-/// If the error of the mesh is larger, the advice calls the mesh the limit of the answer.
-const LARGE: f64 = 0.05;
 /// If all errors are below this, there is no advice.
 const NEGLIGIBLE: f64 = 1e-9;
 
@@ -77,7 +75,6 @@ impl ErrorBudget {
             largest if largest.max(solver) < NEGLIGIBLE => "",
             largest if solver > largest => "; to improve: the solver's tolerance",
             _ if steps_most > mesh => "; to improve: shorter time steps",
-            _ if mesh > LARGE => "; to improve: the mesh, which is too coarse",
             _ => "; to improve: the mesh",
         };
         [

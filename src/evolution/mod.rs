@@ -49,7 +49,8 @@ pub(crate) use observer::Callback;
 pub use observer::{Next, Observed, Observer};
 pub use outcome::{BoundViolation, Outcome, Stop};
 pub use state::{Step, StepRecord};
-pub(crate) use step_controller::{AIM, StepController};
+pub use step_controller::AIM;
+pub(crate) use step_controller::StepController;
 
 use crate::{
     petsc::{Communicator, Session},

@@ -1,6 +1,9 @@
 //! The outcome of a run that did not fail.
 
-use super::{Accuracy, ErrorBudget, Step, StepRecord, damage_step::PlannedStep};
+use super::{
+    Accuracy, ErrorBudget, Step, StepRecord,
+    damage_step::{MAX_BALANCE, PlannedStep},
+};
 use crate::{
     contact::Kkt,
     fem::{Mass, RigidMotion},
@@ -144,15 +147,12 @@ pub struct BoundViolation {
     pub k: f64,
 }
 
-/// A violation of ζ counts above this, which is far above the error of the linear solver.
-const COUNTED: f64 = 1e-10;
-
 impl BoundViolation {
     /// Compares min ζ_n and max ζ_n with the bounds of the step, which ends at `time`.
     pub(super) fn observe(&mut self, planned: &PlannedStep, (min, max): (f64, f64), time: f64) {
         let (lower, upper) = planned.bounds;
         let (above, below) = (max - upper, lower - min);
-        if above.max(below) > COUNTED {
+        if above.max(below) > MAX_BALANCE {
             self.above = self.above.max(above);
             self.below = self.below.max(below);
             if self.first.is_none() {
@@ -165,7 +165,7 @@ impl BoundViolation {
     pub fn note(&self, mass: Mass, slowest: f64) -> Option<String> {
         let (step, time) = self.first?;
         let sides = [("above", self.above), ("below", self.below)].into_iter();
-        let sides = sides.filter(|(_, by)| *by > COUNTED);
+        let sides = sides.filter(|(_, by)| *by > MAX_BALANCE);
         let sides: Vec<String> = sides.map(|(side, by)| format!("{side} by {by:.1e}")).collect();
         let cure = match mass {
             Mass::Consistent if self.k * slowest < 1.0 => {

@@ -1,15 +1,12 @@
 //! The conditions of a scene on the named parts of the boundary, node by node and edge by edge.
 
 use crate::{
+    ROUNDING,
     contact::{RigidMotions, Row},
     fem::{Body, Edge, normal_error},
     mesh::{BoundaryNode, Face, boundary_nodes, extent, joined_faces},
     scene::{Boundary, Condition, Expression, Gap, Scene, SurfaceLoad},
 };
-
-/// A constant gap below this fraction of the body's size counts as zero. The mesh generator rounds the nodes of
-/// curved boundaries, and differences like `0.3-0.1*3` are rounded as well.
-const ZERO_GAP: f64 = 1e-12;
 
 /// The conditions of all boundaries.
 #[derive(Debug, Default)]
@@ -64,7 +61,8 @@ impl BoundaryConditions {
         let (mesh, points) = (&body.mesh, &body.nodes.points);
         let mut conditions = Self { normal_errors: vec![0.0; points.len()], ..Self::default() };
         let mut gaps = Vec::new();
-        let rounding = ZERO_GAP * extent(points);
+        // A smaller constant gap counts as zero: nodes of curves and differences like `0.3-0.1*3` are rounded.
+        let rounding = ROUNDING * extent(points);
         for boundary in &scene.boundaries {
             let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
             let edges = body.edges(&curve.edges);

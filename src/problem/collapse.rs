@@ -5,6 +5,7 @@
 
 use super::{DiscreteProblem, SetupError};
 use crate::{
+    ROUNDING,
     fem::RigidMotion,
     scene::{Stepping, TimeGrid},
 };
@@ -20,8 +21,6 @@ pub struct Collapse {
 
 /// The run ends this fraction of its end time before the collapse, where contact forces are still unique.
 const ACCURACY: f64 = 1e-6;
-/// The number of bisections of the interval between two sampled times.
-const BISECTIONS: usize = 40;
 
 impl DiscreteProblem {
     /// Checks the data at sampled times ([`sample_times`](crate::scene::Scene::sample_times)), before any output.
@@ -94,7 +93,7 @@ impl DiscreteProblem {
     ) -> Result<Collapse, SetupError> {
         let mut first = None;
         let end = self.scene.time.map_or(0.0, |grid| grid.end);
-        for _ in 0..BISECTIONS {
+        while time - supported > ROUNDING * end {
             let middle = 0.5 * (supported + time);
             match self.checked_load(middle) {
                 Ok(_) => supported = middle,

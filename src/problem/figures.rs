@@ -16,19 +16,17 @@ const MOMENTS: &str = "moments";
 /// The scale of a figure is at least this fraction of the largest figure of its dimension. Otherwise a force that
 /// is zero by symmetry would have no relative error.
 const MIN_SCALE: f64 = 1e-3;
-/// The scale of a moment is at least this fraction of the maximum force times the body's radius of gyration. A
-/// moment is small about any point near the line of its force.
-const MIN_MOMENT_SCALE: f64 = 0.1;
-/// The scale of a stress is at least this fraction of the mean stress of the body, about √(E ‖u‖²/|Ω|). A stress at a
-/// free corner is zero.
-const MIN_STRESS_SCALE: f64 = 0.1;
+/// The scale of a moment is at least this fraction of the maximum force times the body's radius of gyration: a moment is
+/// small about any point near the line of its force. The scale of a stress is at least this fraction of the mean stress
+/// of the body, about √(E ‖u‖²/|Ω|): a stress at a free corner is zero.
+const MIN_PART: f64 = 0.1;
 /// The relative error of the integral of a body force that varies in space. Both meshes of a measurement may
 /// have the same error, which the measurement then misses.
 const BODY_FORCE: f64 = 1e-4;
 /// The error of uniform time steps over its estimate.
 const UNIFORM: f64 = 2.5;
 /// A damage below this is negligible.
-const NEGLIGIBLE_DAMAGE: f64 = 1e-6;
+pub(crate) const NEGLIGIBLE_DAMAGE: f64 = 1e-6;
 
 /// A quantity below this fraction of the largest of its group is rounding, and shown as zero.
 const SHOWN_AS_ZERO: f64 = 1e-9;
@@ -137,9 +135,9 @@ impl DiscreteProblem {
             let alike = match figure.dimension {
                 Dimension::Damage => return own.max(NEGLIGIBLE_DAMAGE),
                 Dimension::Moment => {
-                    MIN_MOMENT_SCALE * lever * most(&|other| other.dimension == Dimension::Force)
+                    MIN_PART * lever * most(&|other| other.dimension == Dimension::Force)
                 }
-                Dimension::Stress => MIN_STRESS_SCALE * mean_stress,
+                Dimension::Stress => MIN_PART * mean_stress,
                 dimension => MIN_SCALE * most(&|other| other.dimension == dimension),
             };
             own.max(alike)

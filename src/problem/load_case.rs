@@ -1,11 +1,8 @@
 //! The loads, prescribed displacements and gaps at one time.
 
 use super::{DiscreteProblem, SetupError};
-use crate::contact::Bound;
+use crate::{ROUNDING, contact::Bound};
 use nalgebra::DVector;
-
-/// A load below this fraction of the maximum load of the run counts as zero (rounding).
-const ZERO_LOAD: f64 = 1e-14;
 
 /// The data of the contact problem (26) at one time.
 #[derive(Debug)]
@@ -26,7 +23,7 @@ impl DiscreteProblem {
     /// Nodal loads at `time`, N per metre of thickness. Rounding, as in sin(pi) = 1.2e-16, counts as zero.
     pub fn load(&self, time: f64) -> Vec<f64> {
         let mut load = self.loads.at(&self.body, time);
-        if self.body.nodes.partition.norm(&load, 2) <= ZERO_LOAD * self.largest_load {
+        if self.body.nodes.partition.norm(&load, 2) <= ROUNDING * self.largest_load {
             load.fill(0.0);
         }
         load

@@ -7,7 +7,10 @@ mod parts;
 pub(crate) use curve::LoadCurve;
 pub(super) use parts::{centroid, edge_parts, triangle_parts, triangle_point};
 
-use super::boundary_conditions::{BoundaryConditions, RowValue};
+use super::{
+    boundary_conditions::{BoundaryConditions, RowValue},
+    notes::NOTED,
+};
 use crate::{
     contact::Row,
     fem::{Body, Subdomain},
@@ -15,9 +18,6 @@ use crate::{
 };
 use forces::{BodyForce, SurfaceForce};
 use std::mem::take;
-
-/// The user gets a note if more than this fraction of the integral of a load may be missed.
-const NOTED: f64 = 0.05;
 
 /// The nodal loads and the values of all rows, as functions of time.
 #[derive(Debug)]

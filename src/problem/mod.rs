@@ -26,10 +26,12 @@ mod unresolved;
 
 pub use collapse::Collapse;
 pub use error::SetupError;
+pub(crate) use figures::NEGLIGIBLE_DAMAGE;
 pub use figures::{Bar, Dimension};
 pub(crate) use load_case::LoadCase;
 pub(crate) use loads::LoadCurve;
 pub use loads::Loads;
+pub(crate) use notes::NOTED;
 pub(crate) use probe::OBSERVED;
 pub use singular::Singular;
 pub use state::State;

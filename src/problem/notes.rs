@@ -15,8 +15,10 @@ const LOCKING: f64 = 0.45;
 const CONTRAST: f64 = 1e5;
 /// A note is given if obstacles overlap the body by more than this fraction of its size.
 const OVERLAP: f64 = 1e-9;
-/// Approximate number of sample times of surface loads.
-const TIMES: usize = 8;
+/// A note is given if more than this fraction of a load, a displacement or a damage is missed.
+pub(crate) const NOTED: f64 = 0.05;
+/// Approximate number of sample times of surface loads and prescribed displacements.
+pub(super) const TIMES: usize = 8;
 /// A note is given if a triangle has a smaller angle, degrees.
 const SLIVER: f64 = 1.0;
 

@@ -1,7 +1,10 @@
 //! Data that the nodes do not resolve. Prescribed displacements and the initial damage enter by their values at
 //! nodes, and may vary more between them.
 
-use super::loads::{centroid, edge_parts, triangle_parts, triangle_point};
+use super::{
+    loads::{centroid, edge_parts, triangle_parts, triangle_point},
+    notes::{NOTED, TIMES},
+};
 use crate::{
     fem::{GAUSS, POINTS, midpoint, parabola, part_point, six_points},
     mesh::{Curve, Mesh, Order, sorted},
@@ -9,8 +12,6 @@ use crate::{
 };
 use std::collections::HashSet;
 
-/// The approximate number of times at which prescribed displacements are sampled.
-const TIMES: usize = 8;
 /// The fraction of the accuracy that the interpolation of the initial damage may take.
 const SHARE: f64 = 0.5;
 /// An edge shorter than this fraction of its curve is not halved: the displacement must jump there.
@@ -18,8 +19,6 @@ const SHORTEST: f64 = 1e-4;
 /// Allowed relative error of the integrals, and the number of triangle parts that may be added for it.
 const DEVIATION: f64 = 1e-5;
 const MAX_ADDED: f64 = 100_000.0;
-/// An error above this fraction of the whole is noted.
-const NOTED: f64 = 0.05;
 
 /// The edges that must be halved for a relative `accuracy`, by their ends in increasing order. The maximum |u| is
 /// `displacement`, m. There are two kinds:

@@ -1,15 +1,14 @@
 //! Checks whether a load drives a rigid motion without support.
 
 use super::{RigidMotions, nonnegative::nonnegative};
-use crate::fem::{Body, RigidMotion, resultant};
+use crate::{
+    ROUNDING,
+    fem::{Body, RigidMotion, resultant},
+};
 use nalgebra::DVector;
 
-/// Relative to Σ|f|: work of a load on a free motion up to this is rounding.
-const BALANCED: f64 = 1e-9;
-/// The same for a motion that contact forces balance.
-const REMAINDER: f64 = 1e-8;
-/// Relative to Σ|f|: a smaller component of the resultant is shown as zero.
-const ROUNDING: f64 = 1e-12;
+/// Relative to Σ|f|: work of a load on a motion without support up to this is rounding.
+const BALANCED: f64 = 1e-8;
 
 /// The load does work on a rigid motion without support.
 #[derive(Debug, Clone, thiserror::Error)]
@@ -46,6 +45,7 @@ impl RigidMotions {
         let total = partition.comm().total(own.sum());
         let driven = |motion| {
             let [fx, fy, moment] = sums;
+            // A smaller component is shown as zero.
             let force = [fx, fy].map(|f| if f.abs() > ROUNDING * total { f } else { 0.0 });
             Err(DrivenMotion { motion, force, moment })
         };
@@ -56,7 +56,7 @@ impl RigidMotions {
         }
         let work = self.work(body, |i| forces[i]);
         let remainder = &work - self.normal.transpose() * nonnegative(&self.normal, &work);
-        if remainder.norm() > REMAINDER * total {
+        if remainder.norm() > BALANCED * total {
             return driven(self.combined(body, &remainder.normalize()));
         }
         Ok(())

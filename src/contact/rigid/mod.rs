@@ -31,12 +31,10 @@ pub struct RigidMotions {
 
 /// Relative squares of motions below this count as zero, that is motions below 3e-5. They lie between the
 /// accuracy of gmsh's circles, 1e-8, and a motion that one node in a thousand stops, 1e-3.
-const ROUNDING: f64 = 1e-9;
+const UNRESISTED: f64 = 1e-9;
 /// Relative squares of motions above this are prevented. Below it they are rounding of the Gram matrix and
 /// its eigenvalues. A clamp of 1e-6 of the body's length prevents its rotation.
 const PREVENTED: f64 = 1e-14;
-/// Normals turn by at most this angle, rad, to become perpendicular to free motions.
-const TURN: f64 = 1e-3;
 
 impl RigidMotions {
     /// From the rows of a body, with joined gap conditions. `normal_errors` bounds the angle between the
@@ -57,7 +55,7 @@ impl RigidMotions {
             let [x, y] = points[node];
             let turn = ((x - cx) * d[1] - (y - cy) * d[0]) / radius;
             // An axis is exact, the normal of a polygon is not.
-            let uncertain = ROUNDING + normal_errors[node].powi(2);
+            let uncertain = UNRESISTED + normal_errors[node].powi(2);
             let weight = if d.contains(&0.0) { 1.0 } else { (PREVENTED / uncertain).sqrt() };
             let row = DVector::from_row_slice(&[d[0], d[1], turn]) * weight;
             gram.ger(1.0, &row, &row, 1.0);
@@ -77,9 +75,9 @@ impl RigidMotions {
             let motion = motion(&v);
             let tangential = |&(node, [nx, ny]): &(usize, [f64; 2])| {
                 let [x, y] = motion.at(points[node]);
-                (x * nx + y * ny).abs() <= ROUNDING.sqrt() + normal_errors[node] * x.hypot(y)
+                (x * nx + y * ny).abs() <= UNRESISTED.sqrt() + normal_errors[node] * x.hypot(y)
             };
-            match *value > ROUNDING * normals.len() as f64 && !normals.iter().all(tangential) {
+            match *value > UNRESISTED * normals.len() as f64 && !normals.iter().all(tangential) {
                 true => resisted.push(motion),
                 false => free.push(motion),
             }
@@ -120,7 +118,7 @@ impl RigidMotions {
         self.free.iter().fold(normal, |[nx, ny], motion| {
             let [x, y] = motion.at(body.nodes.points[node]);
             let (along, speed) = (x * nx + y * ny, x.hypot(y));
-            if along.abs() <= 1e-14 || along.abs() > TURN.max(error) * speed {
+            if along.abs() <= 1e-14 || along.abs() > UNRESISTED.sqrt() + error * speed {
                 return [nx, ny];
             }
             let [nx, ny] = [nx - along / speed * (x / speed), ny - along / speed * (y / speed)];

@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// A row is dependent if its part outside the span of the others is below this, relative.
+/// A row is dependent if its part outside the span of the others is below this, relative; and a gradient is zero below
+/// it. Larger values leave motions that contact does not resist.
 const RANK: f64 = 1e-13;
 
 /// The p ≥ 0 that minimises ‖Aᵀp − b‖ (Lawson and Hanson, Solving Least Squares Problems, ch. 23). A has few
@@ -11,7 +12,7 @@ pub fn nonnegative(a: &DMatrix<f64>, b: &DVector<f64>) -> DVector<f64> {
     let rows = a.nrows();
     let mut p = DVector::zeros(rows);
     let mut positive: Vec<usize> = Vec::new();
-    let cut = 1e-13 * b.norm() * a.amax();
+    let cut = RANK * b.norm() * a.amax();
     for _ in 0..10 * (rows + 1) {
         let gradient = a * (b - a.transpose() * &p);
         let entering = (0..rows)

@@ -1,11 +1,8 @@
 //! The rigid motion of a body that contact alone constrains, until contact stops it.
 
 use super::null_space;
-use crate::{contact::Bound, petsc::Communicator};
+use crate::{ROUNDING, contact::Bound, petsc::Communicator};
 use nalgebra::{DMatrix, DVector};
-
-/// Work on a motion below this fraction of the load's work on all motions is rounding.
-const ROUNDING: f64 = 1e-12;
 
 /// The orthonormal combinations of rigid motions that the `active` bounds allow: the null space of the rows
 /// of `rigid` at active bounds. `rigid` has u·ν at the bounds, a column per motion. The entry of `active` is

@@ -24,6 +24,7 @@ const DEPTH: usize = 10;
 const OVERSHOOT: f64 = 10.0;
 /// Differences of iterates smaller than this, relative to the largest, are rounding.
 const RANK: f64 = 1e-10;
+
 /// Nearly equal residuals (a free body that drifts towards its foundation) would be extrapolated too far.
 /// Beyond this multiple of a difference the method takes the plain step.
 const FARTHEST: f64 = 1e6;

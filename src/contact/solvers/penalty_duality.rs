@@ -5,6 +5,7 @@ mod omega;
 
 use super::{Anderson, ContactReport, ContactSolver, SolverEntry};
 use crate::{
+    ROUNDING,
     contact::{Bound, ContactError, ContactProblem, Kkt},
     linear::{Condensed, LinearSolver, LinearSystem},
     petsc::{Matrix, Vector},
@@ -56,9 +57,6 @@ struct FixedPoint<'a> {
 /// Step 1: Bu for ω and q.
 type Response<'a> = &'a mut dyn FnMut(f64, &[f64]) -> Result<Vec<f64>, ContactError>;
 
-/// The iteration has diverged if the residual of the contact law exceeds this multiple of the first residual
-/// and of the load.
-const DIVERGED: f64 = 1e12;
 /// The residual of the contact law is at most this fraction of the tolerance.
 const EXACT: f64 = 0.1;
 /// The largest number of small problems for one contact problem.
@@ -118,7 +116,8 @@ impl FixedPoint<'_> {
                 report.contraction = Some((missed / first).powf(1.0 / steps));
             }
             steps += 1.0;
-            if !missed.is_finite() || missed > DIVERGED * first.max(1.0) {
+            // It has diverged if the first residual and the load are rounding beside it.
+            if !missed.is_finite() || ROUNDING * missed > first.max(1.0) {
                 break;
             }
             q = if self.options.accelerate { anderson.next(&q, image) } else { image };

@@ -40,10 +40,8 @@ struct Tao {
     kind: String,
 }
 
-/// Maximum number of calls of TAO for one contact problem, without and with the proximal term; and the number of
-/// consecutive calls that do not halve the residual after which the method stops.
-const CALLS: usize = 8;
-const PROXIMAL_CALLS: usize = 40;
+/// Maximum number of calls of TAO for one contact problem, and of consecutive calls that do not halve the residual.
+const CALLS: usize = 40;
 const STALLED: usize = 7;
 /// Maximum number of iterations in a call.
 const ITERATIONS: usize = 200;
@@ -111,8 +109,7 @@ impl ContactSolver for Tao {
         warm: &mut Vec<f64>,
         c: &mut Vector,
     ) -> Result<ContactReport, ContactError> {
-        let (proximal, calls) =
-            if problem.definite() { (0.0, CALLS) } else { (PROXIMAL, PROXIMAL_CALLS) };
+        let proximal = if problem.definite() { 0.0 } else { PROXIMAL };
         let stiffness = problem.stiffness.scaled(1.0 / problem.stiffness_scale, proximal)?;
         let mut unit = match warm.first() {
             Some(unit) => *unit,
@@ -128,7 +125,7 @@ impl ContactSolver for Tao {
         let mut report = ContactReport::default();
         let (mut reason, mut residuals) = (0, Kkt::default());
         let (mut best, mut stalled) = (f64::INFINITY, 0);
-        for _ in 0..calls {
+        for _ in 0..CALLS {
             let factorisations = kept.factor.factorisations();
             let call = (&mut tao, &mut kept);
             let answer = self.minimise(problem, call, proximal, unit, c)?;

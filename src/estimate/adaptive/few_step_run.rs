@@ -2,7 +2,8 @@
 
 use crate::{
     estimate::{
-        Extremes, NodalStress, RecoveredStrains, damage_interpolation::interpolation_shares,
+        Extremes, NodalStress, RecoveredStrains, UNLOADED,
+        damage_interpolation::interpolation_shares,
     },
     evolution::{self, Outcome, Phases, RunError, Step},
     petsc::{PetscError, Session},
@@ -14,8 +15,6 @@ use std::cmp::Ordering;
 pub const INSTANTS: usize = 8;
 /// Number of these times in a run that is only compared with another.
 pub(super) const FEW: usize = 3;
-/// Errors at the end are relative to at least this fraction of the maximum ‖u‖².
-const MIN_ENERGY: f64 = 1e-4;
 /// Between these times, errors are estimated where max |u| exceeds its maximum at them by this factor: a short pulse.
 const LARGER: f64 = 1.5;
 
@@ -189,7 +188,7 @@ impl<'a> FewStepRun<'a> {
             return (0.0, vec![0.0; squares.len()]);
         }
         // After unloading, the remaining deformation need not be exact.
-        let of_last = of_last.max(MIN_ENERGY * energy);
+        let of_last = of_last.max(UNLOADED.powi(2) * energy);
         let share = |(max, end): (&f64, &f64)| (max / energy).max(end / of_last);
         let shares = squares.iter().zip(last).map(share).collect();
         ((worst / energy).max(error / of_last).sqrt(), shares)

@@ -20,6 +20,7 @@ use super::{
     finer::{Finer, size_at},
 };
 use crate::{
+    evolution::AIM,
     mesh::{Mesh, Order},
     petsc::Session,
     problem::{Bar, Dimension, DiscreteProblem},
@@ -32,10 +33,8 @@ const ERROR_OVER_CHANGE: [f64; 2] = [4.0, 2.5];
 /// Triangles at points are h/2^this.
 const LEVELS: usize = 4;
 
-/// The fraction of the accuracy of a figure, and of the time of ζ_*, that the mesh may use; the time steps use the
-/// rest.
+/// The fraction of the accuracy of a figure that the mesh may use; the time steps use the rest.
 const SHARE: f64 = 0.97;
-const SHARE_OF_STOP: f64 = 0.7;
 
 /// A measured error.
 pub(super) struct MeasuredError {
@@ -44,8 +43,6 @@ pub(super) struct MeasuredError {
     pub(super) relative: f64,
     /// The fraction of the accuracy that it may use.
     share: f64,
-    /// Is it the error of an extreme?
-    pub(super) is_extreme: bool,
 }
 
 impl MeasuredError {
@@ -196,25 +193,22 @@ impl Measurement {
             ("damage", self.damage, 1.0),
             ("displacement", self.displacement, 1.0),
             ("energy", self.energy, 1.0),
-            ("stopped_at", self.stop.map_or(0.0, |[error, time]| error / time), SHARE_OF_STOP),
+            ("stopped_at", self.stop.map_or(0.0, |[error, time]| error / time), AIM),
         ];
         let figures = self.bars.iter().map(|bar| (bar.name.as_str(), bar.relative(), SHARE));
         let is_named = |name: &str| names.is_empty() || names.iter().any(|other| other == name);
         let errors = figures.chain(norms).filter(|(name, ..)| is_named(name));
         let mut errors: Vec<_> = errors
-            .map(|(name, relative, share)| {
-                let is_extreme = self.extremes.contains(&name);
-                MeasuredError { name: name.to_owned(), relative, share, is_extreme }
-            })
+            .map(|(name, relative, share)| MeasuredError { name: name.to_owned(), relative, share })
             .collect();
         errors.sort_by(|a, b| (b.relative / b.share).total_cmp(&(a.relative / a.share)));
         errors
     }
 
-    /// The maximum relative error of the figures of ζ; the time steps change these most.
-    pub(super) fn of_zeta(&self) -> f64 {
+    /// The part of `accuracy` that the mesh leaves to the time steps. These change the figures of ζ most.
+    pub(super) fn left_to_steps(&self, accuracy: f64) -> f64 {
         let bars = self.bars.iter().filter(|bar| bar.dimension == Dimension::Damage);
-        bars.map(Bar::relative).fold(0.0, f64::max)
+        accuracy - bars.map(Bar::relative).fold(0.0, f64::max).min(SHARE * accuracy)
     }
 
     /// The cause of the error of the figure `name`.

@@ -10,9 +10,6 @@ use crate::{
 };
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Number of measurements after which an extreme alone causes no more rounds. Stresses at an end of contact converge
-/// slowly.
-const MEASUREMENTS: usize = 4;
 /// Number of measurements between two errors that are compared.
 const BETWEEN: usize = 2;
 
@@ -59,22 +56,16 @@ impl<'a> Progress<'a> {
         measured
     }
 
-    /// Why no more rounds can reach the accuracy: some figure's error stays or falls slowly. `is_named`: the accuracy is
-    /// required for some figures only.
-    pub(super) fn stuck(&self, errors: &[MeasuredError], is_named: bool) -> Option<String> {
+    /// Why no more rounds can reach the accuracy, if the largest error stays.
+    pub(super) fn stuck(&self, errors: &[MeasuredError]) -> Option<String> {
         let is_missed = |error: &&MeasuredError| error.excess(self.accuracy) > 1.0;
-        let mut missed = errors.iter().filter(is_missed);
         let Some(worst) = errors.first().filter(is_missed) else { return self.not_of_the_mesh() };
-        let name = &worst.name;
-        if self.stays(name) {
-            return Some(format!(
-                "the error of {name} stays while the mesh becomes finer, as at a singular point; \
-                 --accuracy-of NAME,… asks for others"
-            ));
-        }
-        let is_slow = !is_named && self.excesses.len() >= MEASUREMENTS;
-        (is_slow && missed.all(|error| error.is_extreme)).then(|| {
-            format!("the error of {name} falls slowly; --accuracy-of {name} asks for it alone")
+        self.stays(&worst.name).then(|| {
+            format!(
+                "the error of {} stays while the mesh becomes finer, as at a singular point; \
+                 --accuracy-of NAME,… asks for others",
+                worst.name
+            )
         })
     }
 

@@ -5,10 +5,10 @@ use super::{
     few_step_run::FewStepRun,
     finer::touching,
     measurement::{Cause, Measurement},
-    sizes::{influences, size_ratios},
+    sizes::{MIN_RATIO, influences, size_ratios},
 };
 use crate::{
-    evolution::AIM as AIM_OF_STEPS,
+    evolution::AIM,
     mesh::{Mesh, Order, sorted},
     petsc::PetscError,
     problem::unresolved,
@@ -16,18 +16,10 @@ use crate::{
 };
 use std::{collections::HashSet, mem::take};
 
-/// A mesh is refined for this fraction of the required accuracy …
-const AIM: f64 = 0.7;
-/// … and good enough for a measurement if its estimates are at most this fraction of it.
+/// A mesh is good enough for a measurement if its estimates are at most this fraction of the required accuracy.
 const ENOUGH: f64 = 0.8;
-/// If measured errors are too large, a round reduces the estimated errors by at most this factor: excesses on coarse meshes
-/// are often far too large.
-const MIN_GOAL: f64 = 0.25;
-/// The time steps may use the part of the accuracy that the mesh leaves, but at most and at least these fractions.
+/// The time steps may use the part of the accuracy that the mesh leaves, but at most this fraction.
 const MAX_SHARE_OF_STEPS: f64 = 0.5;
-const MIN_SHARE_OF_STEPS: f64 = 0.04;
-/// If the accuracy is required for some figures only, these are measured once all estimates are this small.
-const ROUGH: f64 = 0.1;
 /// The fraction of the squared error of u that the triangles at singular points may cause.
 const OF_SINGULAR: f64 = 0.1;
 /// The size of a triangle is multiplied by this where the data of the scene or the contact are not resolved. For the error
@@ -87,9 +79,9 @@ impl<'a> Round<'a> {
 
     /// Is the mesh good enough for a measurement? Its estimates must be small and the data of the scene resolved.
     pub(super) fn is_enough(&self) -> bool {
-        // For some figures alone, the estimates only have to be reliable.
+        // The errors of figures are products of two estimated errors, see [`Cause::FIGURE`].
         let named = !self.scene.accuracy_of.is_empty();
-        let wanted = if named { self.accuracy.max(ROUGH) } else { self.accuracy };
+        let wanted = if named { self.accuracy.sqrt() } else { self.accuracy };
         self.estimate() <= ENOUGH * wanted
             && (named || self.open <= ENOUGH)
             && self.unresolved.is_empty()
@@ -130,11 +122,8 @@ impl<'a> Round<'a> {
             damage: self.run.damage(),
             steps: match measured {
                 Some(measured) if self.run.stop().is_none() => {
-                    let left = (self.accuracy - measured.of_zeta()).max(0.0) / AIM_OF_STEPS;
-                    left.clamp(
-                        MIN_SHARE_OF_STEPS * self.accuracy,
-                        MAX_SHARE_OF_STEPS * self.accuracy,
-                    )
+                    let left = measured.left_to_steps(self.accuracy) / AIM;
+                    left.min(MAX_SHARE_OF_STEPS * self.accuracy)
                 }
                 _ => MAX_SHARE_OF_STEPS * self.accuracy,
             },
@@ -159,8 +148,8 @@ impl<'a> Round<'a> {
 
     /// The factors by which to multiply the sizes of the triangles for the next mesh. If a few triangles cause the
     /// error of a figure, these become smaller; the error is of first order in their size. Any other error requires
-    /// smaller errors of u and the damage. The errors of the figures are to become `goal` times the usual aim.
-    pub(super) fn size_ratios(&self, measured: Option<&Measurement>, goal: f64) -> Vec<f64> {
+    /// smaller errors of u and the damage.
+    pub(super) fn size_ratios(&self, measured: Option<&Measurement>) -> Vec<f64> {
         let order = if self.scene.order == Order::Quadratic { 2 } else { 1 };
         let (mut shares, mut depths) = (self.shares.clone(), self.run.depths().to_vec());
         if let Some(measured) = measured {
@@ -173,7 +162,7 @@ impl<'a> Round<'a> {
             ratios.iter_mut().zip(others).for_each(|(ratio, other)| *ratio = ratio.min(other));
         };
         for (excess, cause) in self.missed(measured) {
-            let goal = (goal * AIM / excess).max(MIN_GOAL);
+            let goal = (AIM / excess).max(MIN_RATIO);
             match cause {
                 Cause::Ends | Cause::Reactions => {}
                 Cause::Change(zeta) => {

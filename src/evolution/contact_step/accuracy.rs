@@ -10,13 +10,12 @@ use crate::{
 };
 
 /// The promised relative error of displacements is the larger of this and `TOLERANCES` times the KKT tolerance.
-const DISPLACEMENT: f64 = 1e-6;
+/// Residuals of rounding above it are accepted only if the tolerance allows them or their effect on u is small.
+pub(super) const MAX_ROUNDING: f64 = 1e-6;
 const TOLERANCES: f64 = 100.0;
 /// A mesh is too coarse if the estimated relative error in the energy norm is larger. The displacement under the
 /// load is then too small by about the square of this error.
 const COARSE: f64 = 0.5;
-/// An estimate up to this fraction of the promised error is not repeated for a second step.
-const SAFE: f64 = 0.1;
 
 /// Estimated errors of an answer, relative.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -37,7 +36,7 @@ pub struct Accuracy {
 impl Accuracy {
     /// The promised relative error of displacements at a KKT tolerance.
     pub fn promised(tolerance: f64) -> f64 {
-        DISPLACEMENT.max(TOLERANCES * tolerance)
+        MAX_ROUNDING.max(TOLERANCES * tolerance)
     }
 
     /// Notes for the user on these errors at a KKT tolerance; none if they are small.
@@ -102,7 +101,7 @@ impl FixedContact<'_> {
         let Some(worst) = &outcome.least_accurate else { return Ok(accuracy) };
         let ratio = worst.record.kkt_stationarity / last.record.kkt_stationarity;
         let expected = displacement * ratio.max(1.0);
-        if expected <= SAFE * Accuracy::promised(problem.tolerance) {
+        if expected <= Accuracy::promised(problem.tolerance) {
             return Ok(accuracy);
         }
         let displacement = self.displacement_error(&worst.state, max)?;

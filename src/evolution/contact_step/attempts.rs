@@ -1,9 +1,7 @@
 //! Repeats the contact solve until the answer is certified.
 
 use super::{
-    ContactStep,
-    certificate::{Candidate, MAX_ROUNDING},
-    minimisation::displacement,
+    ContactStep, accuracy::MAX_ROUNDING, certificate::Candidate, minimisation::displacement,
 };
 use crate::{
     contact::{ContactError, ContactReport},
@@ -13,10 +11,9 @@ use crate::{
 
 /// Maximum number of solves for one answer, each to a smaller tolerance or from another reference.
 const ATTEMPTS: usize = 3;
-/// An answer is mostly rigid if its rigid part is more than this many times the rest.
+/// An answer is mostly rigid if its rigid part is more than this many times the rest. A reference other than zero is then
+/// renewed, even if the answer is certified.
 const DOMINANT: f64 = 10.0;
-/// Above this ratio a reference other than zero is renewed, even if the answer is certified.
-const FAR: f64 = 1e3;
 
 impl ContactStep<'_> {
     /// Solves until the answer is certified, each time to a smaller tolerance or from another reference. The
@@ -41,12 +38,11 @@ impl ContactStep<'_> {
             let u = displacement(problem, lift, &self.c)?;
             let candidate = self.phases.time("certificate", || self.certify(u, case));
             let certified = candidate.kkt.within(required);
-            let far =
-                !self.next.reference.is_zero() && candidate.rigid_max > FAR * candidate.elastic_max;
             // The change by a solve for the residual forces is the error of the answer before.
             let error = refined.take().map(|before| self.difference(&candidate.u, &before));
             before = (Some(candidate.scales.force), None);
-            if (far || !certified) && attempt < ATTEMPTS && self.move_reference(&candidate)? {
+            let moved = !self.next.reference.is_zero();
+            if (moved || !certified) && attempt < ATTEMPTS && self.move_reference(&candidate)? {
                 continue;
             }
             // Residuals of rounding are accepted once a further attempt has not helped or is impossible.

@@ -1,7 +1,8 @@
 //! Certifies an answer from its displacements alone: KKT residuals and contact forces.
 
-use super::{Accuracy, ContactStep};
+use super::{Accuracy, ContactStep, accuracy::MAX_ROUNDING};
 use crate::{
+    ROUNDING,
     contact::{Answer, Constraints, ContactError, ContactOptions, ContactPoint, Kkt, Scales},
     fem::RigidMotion,
     problem::LoadCase,
@@ -9,10 +10,6 @@ use crate::{
 
 /// Residuals are the effect of rounding if they are at most this many times its estimate.
 const ROUNDED: f64 = 10.0;
-/// Residuals of rounding above this are accepted only if the tolerance allows them or their effect on u is small.
-pub(super) const MAX_ROUNDING: f64 = 1e-6;
-/// A deformation below this fraction of the reference motion is rounding.
-const RIGID_ROUNDING: f64 = 1e-14;
 /// The cosine between u and its elastic forces is below this only if K is indefinite.
 const NEGATIVE_ENERGY: f64 = -1e-10;
 
@@ -97,7 +94,7 @@ impl ContactStep<'_> {
         let (reference, run) = (&self.next.reference, self.accepted.scales);
         let rounding = match reference.is_zero() {
             true => 0.0,
-            false => RIGID_ROUNDING * self.problem.body.nodes.partition.max_norm(&reference.field),
+            false => ROUNDING * self.problem.body.nodes.partition.max_norm(&reference.field),
         };
         let force = answer.force.max(run.force).max(self.stiffness.scale * rounding);
         let min = rounding.max(force / self.stiffness.scale);

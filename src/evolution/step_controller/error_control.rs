@@ -2,8 +2,10 @@
 
 use super::{PlannedStep, forecast::Forecast};
 use crate::{
+    ROUNDING,
     evolution::{DiscreteProblem, LoadCurve},
     fem::Body,
+    problem::NEGLIGIBLE_DAMAGE,
     scene::Stepping,
 };
 use nalgebra::DVector;
@@ -29,19 +31,14 @@ pub(super) struct ErrorControl<'a> {
 
 /// The longest step, as a fraction of the run.
 const LONGEST: f64 = 0.05;
-/// The first step is as long as if its rate of damage lasted for this fraction of the run.
-const HORIZON: f64 = 0.1;
 /// A step within which the loads are not nearly linear in time is halved, down to this fraction of the run.
 /// Shorter steps would not follow a jump either.
 const FOLLOWING: f64 = 1.0 / 2000.0;
-/// A run has failed if it needs a step shorter than this fraction of the run.
-const SHORTEST: f64 = 1e-12;
-/// Errors are relative to at least this damage.
-const NEGLIGIBLE: f64 = 1e-6;
 /// Maximum damage in a forecast. The damage of a failing body accelerates, and early errors grow with it.
 const MAX_FORECAST: f64 = 0.1;
-/// The steps aim at this fraction of the tolerance, because the error of a step grows in later steps.
-pub(crate) const AIM: f64 = 0.7;
+/// Meshes and time steps aim at this fraction of the allowed error: a mesh may miss its aim, and the error of a step grows
+/// in later steps.
+pub const AIM: f64 = 0.7;
 /// One step may add this fraction of the remaining error …
 const SHARE: f64 = 0.25;
 /// … which is at least this fraction of the aim. Earlier steps may have used it up.
@@ -52,8 +49,8 @@ impl<'a> ErrorControl<'a> {
     pub(super) fn new(problem: &'a DiscreteProblem, initial: &[f64]) -> Option<Self> {
         let grid = problem.scene().time?;
         let Stepping::Auto { tolerance, expected } = grid.stepping else { return None };
-        // The error of the first step is at most half of its damage at its last rate.
-        let first_length = 2.0 * SHARE * tolerance * HORIZON * grid.end;
+        // The error of the first step is at most half of its damage at its last rate, which lasts for the run.
+        let first_length = 2.0 * SHARE * tolerance * grid.end;
         let load_curve = LoadCurve::new(problem);
         Some(Self {
             body: &problem.body,
@@ -108,12 +105,12 @@ impl<'a> ErrorControl<'a> {
     /// Makes the next step `length` s long; false if that is so short that the run has failed.
     pub(super) fn shorten(&mut self, length: f64) -> bool {
         self.next_length = length;
-        length > SHORTEST * self.end
+        length > ROUNDING * self.end
     }
 
     /// Maximum distance of min ζ from ζ_* at which a run may stop.
     pub(super) fn stop_distance(&self) -> f64 {
-        self.tolerance * self.damage[0].max(NEGLIGIBLE)
+        self.tolerance * self.damage[0].max(NEGLIGIBLE_DAMAGE)
     }
 
     /// Accepts a step to ζ_n = `zeta` and sets the length of the next step. At the worst node and in the mean, the
@@ -136,7 +133,7 @@ impl<'a> ErrorControl<'a> {
         let [error, added, rates] = [error, added, rate].map(|field| self.norms(field));
         let ahead = self.forecast.time_ahead(self.load_curve.as_ref(), planned.time);
         let ratio = |j: usize| {
-            let forecast = (ahead * rates[j]).clamp(NEGLIGIBLE, MAX_FORECAST);
+            let forecast = (ahead * rates[j]).clamp(NEGLIGIBLE_DAMAGE, MAX_FORECAST);
             let reference = match self.expected[j] {
                 expected if expected > 0.0 => damage[j].max(expected),
                 _ => damage[j] + forecast,
@@ -156,7 +153,7 @@ impl<'a> ErrorControl<'a> {
     /// An error of the last accepted ζ over the damage done. Collective.
     pub(super) fn relative(&self, error: &DVector<f64>) -> f64 {
         let error = self.norms(error);
-        let relative = |j: usize| error[j] / self.damage[j].max(NEGLIGIBLE);
+        let relative = |j: usize| error[j] / self.damage[j].max(NEGLIGIBLE_DAMAGE);
         relative(0).max(relative(1))
     }
 

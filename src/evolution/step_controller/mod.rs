@@ -21,7 +21,7 @@ use super::{
     damage_step::{DamageSource, DamageStep, DamageUpdate, PlannedStep},
 };
 use crate::scene::{Scheme, Stepping};
-pub(crate) use error_control::AIM;
+pub use error_control::AIM;
 use error_control::ErrorControl;
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};

@@ -64,8 +64,6 @@ pub(super) struct Pivoting<'p> {
 
 /// The number of updates before the dual problem. Slender strips need about 5 (STABILITY.md).
 const PRIMAL_PIVOTS: usize = 20;
-/// The number of updates for which the condensed problem is solved first.
-const FAST: usize = 5;
 /// Relative difference below which two depths count as equal.
 const EQUAL: f64 = 1e-6;
 
@@ -90,9 +88,9 @@ impl<'p> Pivoting<'p> {
         30 + PRIMAL_PIVOTS + 5 * self.problem.bound_count()
     }
 
-    /// True while fewer than `FAST` updates were made.
+    /// True before the dual problem: the condensed problem is solved first.
     pub(super) fn is_fast(&self) -> bool {
-        self.primal_pivots + FAST > PRIMAL_PIVOTS
+        self.primal_pivots > 0
     }
 
     /// Updates the active set from its answer, and adds bounds that support the body. It returns false if the
