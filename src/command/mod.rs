@@ -17,6 +17,7 @@ mod recorder;
 mod run;
 mod screen;
 mod script;
+mod summary;
 mod task;
 
 pub use check::check;

@@ -12,8 +12,14 @@ use signorini::{
 const UNAVOIDABLE: [&str; 4] =
     ["stiffness", "contact/products", "contact/triangular solves", "damage solve"];
 
+/// The table of a run of `wall` seconds, and remarks on its `steps`, which took `stepping` seconds.
+pub fn lines(phases: &Phases, wall: f64, steps: usize, stepping: f64) -> Vec<String> {
+    let blank = || vec![String::new()];
+    [blank(), table(phases, wall), blank(), remarks(phases, steps, stepping)].concat()
+}
+
 /// The table of phases and their parts, longest first, for a run of `wall` seconds.
-pub fn table(phases: &Phases, wall: f64) -> Vec<String> {
+fn table(phases: &Phases, wall: f64) -> Vec<String> {
     let mut lines = Vec::new();
     for (name, phase) in rows(phases, "", wall) {
         lines.push((name.to_owned(), phase));
@@ -56,7 +62,7 @@ fn cells(name: String, phase: Phase, wall: f64) -> [(&'static str, String); 7] {
 }
 
 /// The share of the necessary phases in `stepping`, the seconds of `steps` steps, and the peak memory.
-pub fn remarks(phases: &Phases, steps: usize, stepping: f64) -> Vec<String> {
+fn remarks(phases: &Phases, steps: usize, stepping: f64) -> Vec<String> {
     let mean = |name: &&str| phases.get(name).map(|p| 1e3 * p.seconds / p.calls.max(1.0));
     let unavoidable: f64 = UNAVOIDABLE.iter().filter_map(mean).sum();
     let step = 1e3 * stepping / steps as f64;

@@ -3,14 +3,11 @@
 use super::{
     accuracy,
     checkpoint::{self, Checkpoint, Recorded},
-    profile,
-    provenance::provenance,
-    screen,
+    profile, screen,
+    summary::summary,
     task::Task,
 };
-use serde_json::{Value, json};
 use signorini::{
-    estimate::Extremes,
     evolution::{Next, Observed, Observer, Outcome, RunError, RunState, Step, StepRecord},
     interrupt::{Interrupts, received},
     memory,
@@ -19,10 +16,9 @@ use signorini::{
         terminal::{Progress, say},
         write_whole,
     },
-    problem::DiscreteProblem,
     scene::{Stepping, rounded},
 };
-use std::{collections::BTreeMap, time::Instant};
+use std::time::Instant;
 
 /// The approximate number of frames if the scene has no `output.every`.
 const FRAMES: usize = 20;
@@ -160,7 +156,7 @@ impl<'a> Recorder<'a> {
         };
         let outcome = result.as_ref().ok();
         let mut notes = notes(task, outcome);
-        let mut shown = notes.clone();
+        let warnings = notes.len();
         notes.extend(outcome.iter().flat_map(|outcome| outcome.remarks(&task.problem)));
         if result.is_ok() {
             checkpoint::remove(&task.folder, task.problem.body.nodes.partition.comm().rank(), None);
@@ -173,25 +169,18 @@ impl<'a> Recorder<'a> {
         let quantities = last.into_iter().flat_map(|step| step.quantities);
         let quantities: Vec<_> = task.problem.quantities().into_iter().zip(quantities).collect();
         let wall = task.started.elapsed().as_secs_f64();
-        let mut summary = summary(task, record, &quantities, result, &notes, wall);
-        add_extremes(&mut summary, extremes.as_ref());
-        summary["peak_megabytes"] = json!(memory);
-        add_stop(&mut summary, &task.problem, outcome);
+        let (extremes, result) = (extremes.as_ref(), result.as_ref());
         if record.is_some() {
+            let summary =
+                summary(task, record, &quantities, extremes, result, &notes, [wall, memory]);
             let path = task.folder.join("summary.json");
             write_whole(&path, format!("{summary:#}\n").as_bytes())?;
         }
-        if task.profile {
-            shown.clone_from(&notes);
-        }
-        let (extremes, result) = (extremes.as_ref(), result.as_ref());
-        let mut lines = screen::conclusion(task, record, extremes, &quantities, result, &shown);
+        let shown = if task.profile { &notes } else { &notes[..warnings] };
+        let mut lines = screen::conclusion(task, record, extremes, &quantities, result, shown);
         if task.profile {
             let steps = record.map_or(0, |record| record.step);
-            lines.push(String::new());
-            lines.extend(profile::table(task.phases, wall));
-            lines.push(String::new());
-            lines.extend(profile::remarks(task.phases, steps, self.stepping));
+            lines.extend(profile::lines(task.phases, wall, steps, self.stepping));
         }
         lines.push(screen::row("cost", format!("{wall:.2} s, {memory:.0} MB")));
         bar.finish();
@@ -223,60 +212,6 @@ impl Observer for Recorder<'_> {
     }
 }
 
-/// `summary.json` of a run that took `wall` seconds. The values of the last accepted state are null if the
-/// first solve failed.
-fn summary(
-    task: &Task,
-    last: Option<StepRecord>,
-    quantities: &[(String, f64)],
-    result: &Result<Outcome, RunError>,
-    notes: &[String],
-    wall: f64,
-) -> Value {
-    let Task { problem, triangles, contact_nodes, solver, .. } = task;
-    let (scene, partition) = (problem.scene(), &problem.body.nodes.partition);
-    let outcome = result.as_ref().ok();
-    let steps = last.map_or(0, |record| record.step);
-    let seconds = task.phases.parts("").into_iter().map(|(name, phase)| (name, phase.seconds));
-    let mut summary = json!({
-        "provenance": provenance(),
-        "scene": scene.name,
-        "title": scene.title,
-        "solver": solver,
-        "ranks": partition.comm().size(),
-        // Numbers of the whole body. Contact nodes have a gap condition and no prescribed displacement.
-        "nodes": partition.total(),
-        "triangles": triangles,
-        "contact_nodes": contact_nodes,
-        // Accepted steps after t = 0, and the last time, s.
-        "steps": steps,
-        "end_time": last.map(|record| record.time),
-        // As in history.csv.
-        "zeta_min": last.map(|record| record.zeta_min),
-        "zeta_mean": last.map(|record| record.zeta_mean),
-        "displacement_max": last.map(|record| record.displacement_max),
-        "work": last.map(|record| record.work),
-        "contact_force": last.map(|record| record.contact_force),
-        "active_nodes": last.map(|record| record.active_nodes),
-        "quantities": quantities.iter().cloned().collect::<BTreeMap<_, _>>(),
-        // The maxima over all steps.
-        "kkt": outcome.map(|outcome| outcome.kkt).or(last.map(|record| record.kkt())),
-        // Estimated relative errors of the last state.
-        "errors": outcome.map(|outcome| &outcome.errors),
-        "wall_seconds": wall,
-        "seconds_per_step": wall / steps.max(1) as f64,
-        "phases": seconds.collect::<BTreeMap<_, _>>(),
-        // The named curves of the mesh as segments [[x, y], [x, y]], m, the body on their left.
-        "boundaries": problem.boundaries(),
-        "units": scene.units,
-        "notes": notes,
-    });
-    if let Err(error) = result {
-        summary["error"] = json!(error.to_string());
-    }
-    summary
-}
-
 /// The notes on a run, except remarks. Collective.
 fn notes(task: &Task, outcome: Option<&Outcome>) -> Vec<String> {
     let of_accuracy = [
@@ -287,36 +222,4 @@ fn notes(task: &Task, outcome: Option<&Outcome>) -> Vec<String> {
     let of_task = task.notes.iter().cloned().chain(task.problem.notes());
     let of_run = outcome.into_iter().flat_map(|outcome| outcome.notes(&task.problem));
     of_accuracy.into_iter().flatten().chain(of_task).chain(of_run).collect()
-}
-
-/// Adds to the summary the largest stresses and pressure with their places, and the length of contact, m.
-fn add_extremes(summary: &mut Value, extremes: Option<&Extremes>) {
-    let Some(extremes) = extremes else { return };
-    for extreme in &extremes.of_points {
-        summary[extreme.name] = json!(extreme.value);
-        summary["extremes"][extreme.name] = json!(extreme);
-    }
-    if extremes.of_points.len() > 3 {
-        summary["contact_length"] = json!(extremes.contact_length);
-    }
-}
-
-/// Adds to the summary why the run stopped before its end, at which time, s, and the error of this time; null if it
-/// did not.
-fn add_stop(summary: &mut Value, problem: &DiscreteProblem, outcome: Option<&Outcome>) {
-    let stopped = outcome.and_then(|outcome| outcome.stopped);
-    let collapse = problem.collapse.filter(|_| outcome.is_some() && stopped.is_none());
-    let by = match (stopped, collapse) {
-        (Some(_), _) => Some("damage"),
-        (None, Some(_)) => Some("collapse"),
-        (None, None) => None,
-    };
-    summary["stopped_by"] = json!(by);
-    summary["stopped_at"] = json!(stopped.map(|stop| stop.time).or(collapse.map(|of| of.time)));
-    let end = problem.scene().time.map_or(0.0, |grid| grid.end);
-    let uncertainty = stopped.map(|stop| stop.bar()).or(collapse.map(|of| of.time - end));
-    summary["stopped_uncertainty"] = json!(uncertainty);
-    summary["collapse"] = json!(
-        collapse.map(|of| { json!({ "motion": of.motion.to_string(), "velocity": of.motion }) })
-    );
 }

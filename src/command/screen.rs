@@ -29,9 +29,8 @@ pub fn open(task: &Task) -> Progress {
         _ => task.solver.clone(),
     };
     let mut lines = vec![scene.title.clone(), row("mesh", mesh), row("solver", solver)];
-    let can_be_damaged = task.problem.damage().is_some();
-    lines
-        .extend(scene.time.map(|grid| row("time", steps(grid, &scene.units.time, can_be_damaged))));
+    let steps = |grid| steps(grid, &scene.units.time, task.problem.damage().is_some());
+    lines.extend(scene.time.map(|grid| row("time", steps(grid))));
     say(&lines.join("\n"));
 
     let mut progress = Progress::new("{bar:20} {wide_msg} {elapsed}, {eta} left", LENGTH);
@@ -96,8 +95,8 @@ pub fn conclusion(
     };
     let damage = match (last.zeta_min, last.zeta_mean) {
         (1.0, _) => "none".to_owned(),
-        (least, mean) => {
-            format!("min ζ {}, mean ζ {}", zeta(least, "zeta_min"), zeta(mean, "zeta_mean"))
+        (min, mean) => {
+            format!("min ζ {}, mean ζ {}", zeta(min, "zeta_min"), zeta(mean, "zeta_mean"))
         }
     };
     let units = &task.problem.scene().units;
@@ -260,14 +259,10 @@ fn stop_time(stop: &Stop) -> String {
     let time = rounded(stop.time);
     match (stop.from_mesh, stop.uncertainty) {
         (_, steps) if steps >= stop.time || steps.is_nan() => {
-            format!(
-                "{time} (its error is unknown: ζ hardly falls there, or the time steps are too long)"
-            )
+            format!("{time} (error unknown: ζ hardly falls there, or the time steps are too long)")
         }
         (Some(mesh), _) if stop.bar() >= stop.time => {
-            format!(
-                "{time} (its error is unknown: with a finer mesh the time may differ by {mesh:.1e})"
-            )
+            format!("{time} (error unknown: with a finer mesh the time may differ by {mesh:.1e})")
         }
         (Some(_), _) => with_bar(stop.time, Some(stop.bar())),
         (None, steps) => format!("{} (the time steps alone)", with_bar(stop.time, Some(steps))),
@@ -283,24 +278,21 @@ fn ending(
         return "FAILED at the first solve; there is no state to save".to_owned();
     };
     let end = rounded(time);
-    match result.map(|outcome| outcome.stopped) {
-        Err(RunError::Interrupted(_)) => {
+    match (result.map(|outcome| outcome.stopped), collapse) {
+        (Err(RunError::Interrupted(_)), _) => {
             format!("interrupted after t = {end}; the state there is saved, --restart goes on")
         }
-        Err(_) => format!("FAILED after t = {end}; the state there is saved"),
-        Ok(Some(stop)) => format!(
+        (Err(_), _) => format!("FAILED after t = {end}; the state there is saved"),
+        (Ok(Some(stop)), _) => format!(
             "STOPPED at t = {}: min ζ reaches ζ_* there; saved is the state before, t = {end} (step {step})",
             stop_time(&stop),
         ),
-        Ok(None) if collapse.is_some() => {
-            let motion = collapse.map(|collapse| collapse.motion.to_string()).unwrap_or_default();
-            let time = rounded(collapse.map_or(end, |collapse| collapse.time));
-            format!(
-                "STOPPED at t = {time}: nothing supports the body against {motion} any more; saved is the state \
-                 just before (step {step})"
-            )
-        }
-        Ok(None) if step == 0 => format!("solved at t = {end}"),
-        Ok(None) => format!("finished at t = {end} after {step} steps"),
+        (Ok(None), Some(Collapse { time, motion })) => format!(
+            "STOPPED at t = {}: nothing supports the body against {motion} any more; saved is the state just before \
+             (step {step})",
+            rounded(time)
+        ),
+        (Ok(None), None) if step == 0 => format!("solved at t = {end}"),
+        (Ok(None), None) => format!("finished at t = {end} after {step} steps"),
     }
 }

@@ -1,0 +1,89 @@
+//! `summary.json`: what a run has found, and what it cost.
+
+use super::{provenance::provenance, task::Task};
+use serde_json::{Value, json};
+use signorini::{
+    estimate::Extremes,
+    evolution::{Outcome, RunError, StepRecord},
+    problem::DiscreteProblem,
+};
+use std::collections::BTreeMap;
+
+/// `summary.json` of a run that took `wall` seconds and `memory` MB.
+pub(super) fn summary(
+    task: &Task,
+    last: Option<StepRecord>,
+    quantities: &[(String, f64)],
+    extremes: Option<&Extremes>,
+    result: Result<&Outcome, &RunError>,
+    notes: &[String],
+    [wall, memory]: [f64; 2],
+) -> Value {
+    let Task { problem, triangles, contact_nodes, solver, .. } = task;
+    let (scene, partition) = (problem.scene(), &problem.body.nodes.partition);
+    let outcome = result.ok();
+    let steps = last.map_or(0, |record| record.step);
+    let seconds = task.phases.parts("").into_iter().map(|(name, phase)| (name, phase.seconds));
+    let mut summary = json!({
+        "provenance": provenance(),
+        "scene": scene.name,
+        "title": scene.title,
+        "solver": solver,
+        "ranks": partition.comm().size(),
+        // Numbers of the whole body. Contact nodes have a gap condition and no prescribed displacement.
+        "nodes": partition.total(),
+        "triangles": triangles,
+        "contact_nodes": contact_nodes,
+        // Accepted steps after t = 0, and the last time, s.
+        "steps": steps,
+        "end_time": last.map(|record| record.time),
+        // As in history.csv.
+        "zeta_min": last.map(|record| record.zeta_min),
+        "zeta_mean": last.map(|record| record.zeta_mean),
+        "displacement_max": last.map(|record| record.displacement_max),
+        "work": last.map(|record| record.work),
+        "contact_force": last.map(|record| record.contact_force),
+        "active_nodes": last.map(|record| record.active_nodes),
+        "quantities": quantities.iter().cloned().collect::<BTreeMap<_, _>>(),
+        // The maxima over all steps.
+        "kkt": outcome.map(|outcome| outcome.kkt).or(last.map(|record| record.kkt())),
+        // Estimated relative errors of the last state.
+        "errors": outcome.map(|outcome| &outcome.errors),
+        "wall_seconds": wall,
+        "seconds_per_step": wall / steps.max(1) as f64,
+        "phases": seconds.collect::<BTreeMap<_, _>>(),
+        // The named curves of the mesh as segments [[x, y], [x, y]], m, the body on their left.
+        "boundaries": problem.boundaries(),
+        "units": scene.units,
+        "notes": notes,
+    });
+    if let Err(error) = result {
+        summary["error"] = json!(error.to_string());
+    }
+    for extreme in extremes.iter().flat_map(|of| &of.of_points) {
+        summary[extreme.name] = json!(extreme.value);
+        summary["extremes"][extreme.name] = json!(extreme);
+    }
+    if let Some(extremes) = extremes.filter(|of| of.of_points.len() > 3) {
+        summary["contact_length"] = json!(extremes.contact_length);
+    }
+    summary["peak_megabytes"] = json!(memory);
+    add_stop(&mut summary, problem, outcome);
+    summary
+}
+
+/// Adds to the summary why the run stopped before its end, at which time, s, and the error of this time; null if it
+/// did not.
+fn add_stop(summary: &mut Value, problem: &DiscreteProblem, outcome: Option<&Outcome>) {
+    let stopped = outcome.and_then(|outcome| outcome.stopped);
+    let collapse = problem.collapse.filter(|_| outcome.is_some() && stopped.is_none());
+    let end = problem.scene().time.map_or(0.0, |grid| grid.end);
+    let stop = stopped.map(|stop| ("damage", stop.time, stop.bar()));
+    let stop = stop.or(collapse.map(|of| ("collapse", of.time, of.time - end)));
+    summary["stopped_by"] = json!(stop.map(|(by, ..)| by));
+    summary["stopped_at"] = json!(stop.map(|(_, time, _)| time));
+    summary["stopped_uncertainty"] = json!(stop.map(|(.., off)| off));
+    summary["collapse"] = json!(
+        collapse.map(|of| { json!({ "motion": of.motion.to_string(), "velocity": of.motion }) })
+    );
+}
