@@ -18,10 +18,9 @@ use std::{collections::HashSet, mem::take};
 
 /// A mesh is good enough for a measurement if its estimates are at most this fraction of the required accuracy.
 const ENOUGH: f64 = 0.8;
-/// The time steps may use the part of the accuracy that the mesh leaves, but at most this fraction.
+/// The time steps may use the part of the accuracy that the mesh leaves, but at most this fraction: their true error may
+/// be twice the estimated one.
 const MAX_SHARE_OF_STEPS: f64 = 0.5;
-/// The fraction of the squared error of u that the triangles at singular points may cause.
-const OF_SINGULAR: f64 = 0.1;
 /// The size of a triangle is multiplied by this where the data of the scene or the contact are not resolved. For the error
 /// of ζ at a point: where ζ changes by more than this fraction of its largest change.
 const HALF: f64 = 0.5;
@@ -109,6 +108,7 @@ impl<'a> Round<'a> {
             let errors = measured.errors(&self.scene.accuracy_of).into_iter();
             errors.map(|error| (error.name, error.relative)).next()
         };
+        let of_steps = MAX_SHARE_OF_STEPS * self.accuracy;
         Adapted {
             mesh: self.mesh.clone().in_morton_order(),
             unknowns: 2 * self.run.problem.body.nodes.partition.total(),
@@ -122,10 +122,9 @@ impl<'a> Round<'a> {
             damage: self.run.damage(),
             steps: match measured {
                 Some(measured) if self.run.stop().is_none() => {
-                    let left = measured.left_to_steps(self.accuracy) / AIM;
-                    left.min(MAX_SHARE_OF_STEPS * self.accuracy)
+                    (measured.left_to_steps(self.accuracy) / AIM).min(of_steps)
                 }
-                _ => MAX_SHARE_OF_STEPS * self.accuracy,
+                _ => of_steps,
             },
             measured: measured.map_or_else(Measured::default, Measurement::result),
             worst: measured.and_then(worst),
@@ -199,7 +198,7 @@ impl<'a> Round<'a> {
     }
 
     /// How often to halve the triangles at some points. At singular points the squared error falls like h, as at a crack;
-    /// together they may cause a tenth of it. The ends of contact are known up to half of an edge.
+    /// together they may cause the part that the others leave. The ends of contact are known up to half of an edge.
     pub(super) fn levels(&self, measured: Option<&Measurement>) -> Vec<([f64; 2], usize)> {
         let halvings = |excess: f64| excess.log2().ceil().max(0.0) as usize;
         let (mut of_reactions, mut of_length) = (0, 0);
@@ -210,7 +209,8 @@ impl<'a> Round<'a> {
                 _ => {}
             }
         }
-        let aim = (AIM * self.accuracy).powi(2) * OF_SINGULAR / self.singular.len() as f64;
+        let left = (ENOUGH * ENOUGH - AIM * AIM) * self.accuracy.powi(2);
+        let aim = left / self.singular.len() as f64;
         let singular = self.singular.iter();
         let singular = singular.map(|(at, share)| (*at, halvings(share / aim).max(of_reactions)));
         // A mesh that is far too coarse does not know the ends.
