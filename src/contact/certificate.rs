@@ -156,9 +156,9 @@ impl Certificate {
 struct NodalReaction {
     /// p of each gap condition; `None` where the normal displacement is prescribed.
     forces: Vec<Option<f64>>,
-    /// |·|² of the part against the normals.
+    /// The square of the part that pulls along the normals, which no contact force balances.
     tension: f64,
-    /// |·|² of the unbalanced part.
+    /// The square of the unbalanced part across the normals.
     tangential: f64,
 }
 

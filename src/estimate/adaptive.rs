@@ -44,7 +44,7 @@ use sizes::{divided, sharpened};
 pub struct Adapted {
     /// The mesh.
     pub mesh: Mesh,
-    /// Displacement components at its nodes.
+    /// The number of unknown displacement components on it.
     pub unknowns: usize,
     /// The number of rounds so far, with the round of this mesh.
     pub rounds: usize,

@@ -14,7 +14,7 @@ pub(super) struct Scaling {
 }
 
 impl Scaling {
-    /// E = 1 for the factored matrix itself.
+    /// The scaling of the factored matrix itself, E = 1.
     pub(super) fn of_factored(matrix: &Matrix) -> Result<Self, PetscError> {
         let factored = matrix.diagonal()?;
         Ok(Self { root: vec![1.0; factored.len()], factored, scaled: Vec::new() })

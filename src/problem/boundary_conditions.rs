@@ -28,7 +28,7 @@ pub(super) struct BoundaryConditions {
 /// The value of a row as a function of time.
 #[derive(Debug, Clone)]
 pub(super) struct RowValue {
-    /// The node, m.
+    /// The place of its node, m.
     point: [f64; 2],
     /// The value is their minimum, m; 0 if there are none, on a symmetry axis.
     of: Vec<Expression>,

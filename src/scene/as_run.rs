@@ -17,7 +17,7 @@ pub struct AsRun {
     pub text: String,
     /// The names of the files that it expects beside it, and the files to copy there.
     pub copies: Vec<(String, PathBuf)>,
-    /// The contents of the files of tables.
+    /// The contents of all files with tables, one after the other.
     pub tables: Vec<u8>,
 }
 

@@ -98,6 +98,7 @@ impl<'t> Diagnostics<'t> {
         }
     }
 
+    /// Notes unknown and missing keys of the table `key`, and checks its values against their schemas.
     fn check_table(&mut self, key: &str, table: &DeTable, schema: &Schema) {
         let mut is_misspelt = false;
         for (name, value) in table {

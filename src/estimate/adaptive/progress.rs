@@ -17,7 +17,7 @@ const BETWEEN: usize = 2;
 pub(super) struct Progress<'a> {
     session: &'a Session,
     accuracy: f64,
-    /// The most triangles of a run.
+    /// The largest number of triangles of a run so far.
     most: usize,
     /// Per round: the triangles and the estimated error.
     estimates: Vec<(usize, f64)>,

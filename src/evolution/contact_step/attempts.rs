@@ -26,11 +26,13 @@ impl ContactStep<'_> {
         let (problem, required) = (self.problem, self.problem.tolerance);
         let failed = |source| RunError::contact(problem, step, case.time, source);
         let (mut tolerance, mut attempt, mut refined) = (required, 0, None::<Vec<f64>>);
-        let (mut before, mut report) = ((None, None), ContactReport::default());
+        let (mut force_scale, mut unbalanced) = (None, None);
+        let mut report = ContactReport::default();
         loop {
             attempt += 1;
             let (lift, bounds) = self.next.reference.pose(&problem.constraints, case);
-            let solved = match self.solve_contact(case, &lift, &bounds, tolerance, before) {
+            let known = (force_scale, unbalanced.take());
+            let solved = match self.solve_contact(case, &lift, &bounds, tolerance, known) {
                 // All ranks know that the method stopped short. Any other error may concern one rank only.
                 Err(error) if !error.stopped_short() => return Err(failed(error)),
                 solved => solved,
@@ -40,7 +42,7 @@ impl ContactStep<'_> {
             let certified = candidate.kkt.within(required);
             // The change by a solve for the residual forces is the error of the answer before.
             let error = refined.take().map(|before| self.difference(&candidate.u, &before));
-            before = (Some(candidate.scales.force), None);
+            force_scale = Some(candidate.scales.force);
             let moved = !self.next.reference.is_zero();
             if (moved || !certified) && attempt < ATTEMPTS && self.move_reference(&candidate)? {
                 continue;
@@ -68,7 +70,7 @@ impl ContactStep<'_> {
             }
             tolerance *= 0.3 * required / candidate.kkt.worst();
             if self.is_rounding(&candidate) || candidate.kkt.within(MAX_ROUNDING) {
-                before.1 = Some(candidate.unbalanced);
+                unbalanced = Some(candidate.unbalanced);
                 refined = Some(candidate.u);
             }
         }

@@ -14,7 +14,7 @@ const LIFTED: f64 = 1e-2;
 impl ContactStep<'_> {
     /// Replaces c by the solution of (26) for the load f − K u_D, with u_D = `lift` the prescribed unknowns.
     ///
-    /// The certificate of the previous answer c may give the force scale F and the residual forces
+    /// The certificate of the previous answer c may give the force scale F, `known_scale`, and the residual forces
     /// `unbalanced` = f − Ku. The load is then K c + `unbalanced`, so that rounding of the assembled K cancels.
     pub(super) fn solve_contact(
         &mut self,
@@ -22,13 +22,13 @@ impl ContactStep<'_> {
         lift: &[f64],
         bounds: &[Bound],
         tolerance: f64,
-        (known, unbalanced): (Option<f64>, Option<Vec<f64>>),
+        (known_scale, unbalanced): (Option<f64>, Option<Vec<f64>>),
     ) -> Result<ContactReport, ContactError> {
         let comm = self.problem.body.nodes.partition.comm();
         let admits_zero = |bound: &Bound| bound.nearest(0.0) == 0.0;
         let overlaps = comm.any(!bounds.iter().all(admits_zero));
         let (load, force) = self.load_and_scale(&case.load, lift, overlaps.then_some(bounds));
-        let force = known.map_or(force, |known| force.min(known));
+        let force = known_scale.map_or(force, |known| force.min(known));
         let bases = &self.problem.constraints.bases;
         let in_unknowns = |mut force: Vec<f64>| {
             bases.force_to_local(&mut force);

@@ -215,26 +215,28 @@ impl<'a> StepController<'a> {
         damage: &DamageUpdate,
         last: &Step,
     ) -> Decision {
-        let (zeta_min, level) = (damage.min_max.0, self.problem.threshold());
+        let (zeta_min, threshold) = (damage.min_max.0, self.problem.threshold());
         let rate = planned.rate(&damage.zeta);
         let time = if self.two_step {
             let from = self.problem.body.vertices.partition.min_max(self.memory.zeta.as_slice()).0;
-            let part = if from > level { (from - level) / (from - zeta_min) } else { 0.0 };
+            // The fraction of the step after which ζ falls to ζ_*.
+            let fraction =
+                if from > threshold { (from - threshold) / (from - zeta_min) } else { 0.0 };
             // Both the last written ζ and its correction ζ̃ must be near ζ_*.
             if let Some(error_control) = &self.error_control
-                && from.max(last.record.zeta_min) - level > error_control.stop_distance()
-                && let Some(shorter) = self.retry(planned, (0.9 * part).max(0.01))
+                && from.max(last.record.zeta_min) - threshold > error_control.stop_distance()
+                && let Some(shorter) = self.retry(planned, (0.9 * fraction).max(0.01))
             {
                 return shorter;
             }
-            last.state.time + part * planned.length
+            last.state.time + fraction * planned.length
         } else {
             // This step shows the error of the previous step.
             self.add_euler_error(planned, &rate);
             planned.time
         };
         self.memory.violation.observe(planned, damage.min_max, time);
-        let [error, delay, rate, before] = self.at_weakest_node(&damage.zeta, &rate);
+        let [error, delay, rate, rate_before] = self.at_weakest_node(&damage.zeta, &rate);
         // An error δζ delays the stop by δζ/ζ′, if strains are proportional to 1/ζ. The sum of the delays of all steps
         // holds for constant loads and strains alike, but only roughly for loads that change. Euler's steps are too
         // long for the growth of errors near ζ_*.
@@ -244,7 +246,7 @@ impl<'a> StepController<'a> {
         };
         // The time is interpolated with a constant rate.
         let of_step = match self.error_control {
-            Some(_) => (0.5 * ((rate - before) / rate).abs()).min(1.0),
+            Some(_) => (0.5 * ((rate - rate_before) / rate).abs()).min(1.0),
             None => 1.0,
         };
         let uncertainty = of_step * planned.length + delay;

@@ -91,7 +91,7 @@ pub(super) fn from_zero(f: fn(f64) -> f64, a: Interval) -> Interval {
     monotone(f, [if a[1] < 0.0 { a[0] } else { a[0].max(0.0) }, a[1]])
 }
 
-/// abs.
+/// The range of abs, which is `f`.
 pub(super) fn absolute(f: fn(f64) -> f64, [a, b]: Interval) -> Interval {
     hull([f(a), f(b), f(0.0_f64.clamp(a, b))])
 }
