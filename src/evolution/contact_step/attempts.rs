@@ -9,7 +9,8 @@ use crate::{
     petsc::PetscError,
 };
 
-/// Maximum number of solves for one answer, each to a smaller tolerance or from another reference.
+/// Maximum number of solves for one answer, each to a smaller tolerance or from another reference. With one,
+/// some bodies have no answer; with twice as many nothing changes.
 const ATTEMPTS: usize = 3;
 /// An answer is mostly rigid if its rigid part is more than this many times the rest. A reference other than zero is then
 /// renewed, even if the answer is certified.
