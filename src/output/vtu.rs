@@ -124,7 +124,7 @@ impl FieldWriter {
         let (stem, contact_file) = (format!("fields_{number}"), format!("contact_{number}.vtu"));
         (self.frames, self.last_time) = (self.frames + 1, Some(state.time));
         // This is collective: all ranks collect Γ_C, even if one has failed to collect its fields.
-        let contact = problem.supports.contact_rows(&problem.body, state);
+        let (contact, pressures) = problem.supports.contact(&problem.body, state);
         if problem.scene().output.every == Some(0) {
             let is_root = problem.body.nodes.partition.comm().is_root();
             let rows = if is_root { &contact[..] } else { &[] };
@@ -132,7 +132,7 @@ impl FieldWriter {
         }
         let (cells, comm) = (cell_data(problem, state), problem.body.nodes.partition.comm());
         let failed = |error| OutputError::new(Path::new("a frame"), error);
-        let mut points = point_data(problem, &self.stress, state).map_err(failed)?;
+        let mut points = point_data(problem, &self.stress, state, &pressures).map_err(failed)?;
         let strained = NodalStress::strained(problem, state);
         if comm.is_serial() {
             let (file, mesh) = (format!("{stem}.vtu"), Arc::clone(&self.mesh));
@@ -212,18 +212,20 @@ fn digits(scene: &Scene) -> usize {
     DIGITS.max(frames.ilog10() as usize + 1)
 }
 
-/// The nodal fields of u, ζ and contact. Outside Γ_C the contact pressure is 0 and the remaining gap NaN. At a corner
-/// with two gap conditions they are the larger pressure and the smaller gap. Collective.
+/// The nodal fields of u, ζ and contact, with the `pressures` at nodes of Γ_C. Outside Γ_C the contact pressure is 0
+/// and the remaining gap NaN. At a corner with two gap conditions they are the larger pressure and the smaller gap.
+/// Collective.
 fn point_data(
     problem: &DiscreteProblem,
     points: &NodalStress,
     state: &State,
+    pressures: &[(usize, f64)],
 ) -> Result<Vec<DataArray>, PetscError> {
     let partition = &problem.body.nodes.partition;
     let mut pressure = vec![0.0_f64; partition.local()];
     let mut gap = vec![f64::NAN; partition.local()];
+    pressures.iter().for_each(|(node, value)| pressure[*node] = *value);
     for point in &state.contact {
-        pressure[point.node] = pressure[point.node].max(point.pressure);
         gap[point.node] = gap[point.node].min(point.gap);
     }
     partition.update(&mut pressure, 1)?;

@@ -13,6 +13,7 @@
 
 mod boundary_conditions;
 mod collapse;
+mod contact_line;
 mod error;
 mod figures;
 mod load_case;
@@ -25,6 +26,8 @@ mod supports;
 mod unresolved;
 
 pub use collapse::Collapse;
+use contact_line::ContactLine;
+pub use contact_line::ContactRow;
 pub use error::SetupError;
 pub(crate) use figures::NEGLIGIBLE_DAMAGE;
 pub use figures::{Bar, Dimension};
@@ -35,7 +38,7 @@ pub(crate) use notes::NOTED;
 pub(crate) use probe::OBSERVED;
 pub use singular::Singular;
 pub use state::State;
-pub use supports::{ContactRow, Supports};
+pub use supports::Supports;
 pub(crate) use unresolved::unresolved;
 
 use crate::{

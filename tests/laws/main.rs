@@ -17,6 +17,7 @@ mod conditioning;
 mod constraints;
 mod conservation;
 mod contact;
+mod contact_pressure;
 mod damage;
 mod elements;
 mod extrapolation;

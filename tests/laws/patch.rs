@@ -251,6 +251,11 @@ fn an_affine_pressure_is_exact_at_the_vertices_and_midpoints_of_any_foundation()
                     let [x, _] = turn(-angle, points[point.node]);
                     close_to(point.pressure, p + c * x, 1e-9);
                 }
+                // Beside the clamped corner a midpoint has half of the pressure of a vertex without a reaction.
+                for row in &problem.supports.contact_rows(&problem.body, &state)[1..] {
+                    let [x, _] = turn(-angle, [row.x, row.y]);
+                    close_to(row.pressure, p + c * x, 1e-9);
+                }
             }
         }
     }

@@ -1,0 +1,279 @@
+//! Γ_C as a line: the places of its nodes, the pressure along it, and the length of contact.
+//!
+//! The pressure is continuous along each part of Γ_C and linear between its vertices, also with quadratic elements. A
+//! vertex has the pressure F/ℓ, where ℓ is half of the length of its edges and F its reaction with its shares of the
+//! reactions of the midsides. So the area under the pressure is the force. On an edge of length L with the ends a and
+//! b and the reaction R of its midside, the share of a is
+//!
+//! R/2 + L/6 (p_a − p_b),   at least 0 and at most R,
+//!
+//! with the quotients p of the reactions of a and b alone by ∫φ. A pressure that is linear in the arc length keeps its
+//! values. A vertex with a prescribed displacement has shares of midsides only: its own reaction is not of contact.
+
+use super::State;
+use crate::{
+    contact::ContactPoint,
+    fem::{Body, Edge},
+    mesh::Face,
+};
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Γ_C of the whole body, and the places of this rank's nodes on it.
+#[derive(Debug, Clone, Default)]
+pub(super) struct ContactLine {
+    /// Part by part with the body on the left.
+    stations: Vec<Station>,
+    /// Per node: its station and its face on each of its edges.
+    places: BTreeMap<usize, Vec<(usize, Face)>>,
+}
+
+/// A vertex or the middle of an edge, on one part of a boundary. A corner is two stations, and so is the vertex at
+/// which a closed part begins and ends.
+#[derive(Debug, Clone)]
+struct Station {
+    boundary: usize,
+    name: String,
+    /// The number of the connected part of the boundary, from 0.
+    part: usize,
+    /// The length of the part up to here, m.
+    arc_length: f64,
+    /// Half of the length of the edges of a vertex, m; 0 in the middle of an edge.
+    length: f64,
+}
+
+/// A row of `contact.csv`: a gap condition at a node of Γ_C, its remaining gap and its pressure.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct ContactRow {
+    /// t, s.
+    pub time: f64,
+    /// The boundary.
+    pub boundary: String,
+    /// The number of the connected part of the boundary, from 0.
+    pub part: usize,
+    /// The length of the part up to the node, m, with the body on the left.
+    pub arc_length: f64,
+    /// The node, m.
+    pub x: f64,
+    /// See `x`.
+    pub y: f64,
+    /// ν, towards the obstacle.
+    pub normal_x: f64,
+    /// See `normal_x`.
+    pub normal_y: f64,
+    /// The remaining gap g − u·ν, m.
+    pub gap: f64,
+    /// Pa, positive in compression.
+    pub pressure: f64,
+    /// 1 if the node is active, else 0.
+    pub active: u8,
+}
+
+/// The reaction at a station and more of its row, as the ranks exchange it: station, x, y, ν_x, ν_y, gap, reaction
+/// (N per metre of thickness), reaction over ∫φ (Pa), active.
+type Reaction = [f64; 9];
+
+impl ContactLine {
+    /// Adds the boundary `name` with the number `boundary`, whose obstacle has this `normal` if it is given.
+    pub(super) fn add(
+        &mut self,
+        (boundary, name): (usize, &str),
+        normal: Option<[f64; 2]>,
+        points: &[[f64; 2]],
+        edges: &[Edge],
+    ) {
+        let distance =
+            |a: usize, b: usize| (points[a][0] - points[b][0]).hypot(points[a][1] - points[b][1]);
+        let face = |face: Face| Face { normal: normal.unwrap_or(face.normal), ..face };
+        for (part, edges) in connected(edges).iter().enumerate() {
+            let station = |arc_length: f64, length: f64| Station {
+                boundary,
+                name: name.to_owned(),
+                part,
+                arc_length,
+                length,
+            };
+            let (mut start, mut last) = (0.0, None::<Face>);
+            for edge in edges {
+                let faces: Vec<_> = edge.faces(points).map(|(n, f)| (n, face(f))).collect();
+                let [a, b] = edge.ends;
+                let to_middle = edge.middle.map(|middle| distance(a, middle));
+                let length = match edge.middle {
+                    Some(middle) => distance(a, middle) + distance(middle, b),
+                    None => distance(a, b),
+                };
+                match self.stations.last_mut() {
+                    Some(before) if last.is_some_and(|last| last.continues(&faces[0].1)) => {
+                        before.length += 0.5 * length;
+                    }
+                    _ => self.stations.push(station(start, 0.5 * length)),
+                }
+                let first = self.stations.len() - 1;
+                self.stations.extend(to_middle.map(|half| station(start + half, 0.0)));
+                self.stations.push(station(start + length, 0.5 * length));
+                let numbers = [first, self.stations.len() - 1, first + 1];
+                for ((node, face), number) in faces.iter().zip(numbers) {
+                    self.places.entry(*node).or_default().push((number, *face));
+                }
+                (start, last) = (start + length, Some(faces[1].1));
+            }
+        }
+    }
+
+    /// The line with the places of a rank's nodes, to which `own` gives new numbers.
+    pub(super) fn restrict(&self, own: impl Fn(&usize) -> Option<usize>) -> Self {
+        let places = self.places.iter().filter_map(|(n, of)| Some((own(n)?, of.clone())));
+        Self { stations: self.stations.clone(), places: places.collect() }
+    }
+
+    /// The stations of a contact point, each with its share of the force: all faces that the normal of the point
+    /// continues, by their lengths.
+    fn shares(&self, point: &ContactPoint) -> Vec<(usize, f64)> {
+        let Some(all) = self.places.get(&point.node) else { return Vec::new() };
+        let own = Face { normal: point.normal, length: 0.0 };
+        let mut near: Vec<_> = all.iter().filter(|(_, face)| face.continues(&own)).collect();
+        if near.is_empty() {
+            near.extend(all.iter().min_by(|a, b| a.1.angle(&own).total_cmp(&b.1.angle(&own))));
+        }
+        let total: f64 = near.iter().map(|(_, face)| face.length).sum();
+        let mut shares = BTreeMap::new();
+        for (station, face) in near {
+            *shares.entry(*station).or_insert(0.0) += face.length / total;
+        }
+        shares.into_iter().collect()
+    }
+
+    /// The boundaries of a contact point, each with its share of the force.
+    pub(super) fn boundaries(&self, point: &ContactPoint) -> impl Iterator<Item = (usize, f64)> {
+        let shares = self.shares(point).into_iter();
+        shares.map(|(station, share)| (self.stations[station].boundary, share))
+    }
+
+    /// The rows in a state, on every rank, and the pressures at this rank's nodes. Collective.
+    pub(super) fn rows(&self, body: &Body, state: &State) -> (Vec<ContactRow>, Vec<(usize, f64)>) {
+        let reactions = |point: &ContactPoint| {
+            let ContactPoint { node, normal, force, pressure, gap, active } = *point;
+            // No -0.
+            let ([x, y], [nx, ny]) = (body.nodes.points[node], normal.map(|n| n + 0.0));
+            let force = if active { force } else { 0.0 };
+            let active = f64::from(u8::from(active));
+            let of = move |(station, share)| {
+                [station as f64, x, y, nx, ny, gap, share * force, pressure, active]
+            };
+            self.shares(point).into_iter().map(of)
+        };
+        let own: Vec<Reaction> = state.contact.iter().flat_map(reactions).collect();
+        let all = body.nodes.partition.comm().gather(own.as_flattened());
+        let mut all: Vec<Reaction> = all.as_chunks().0.to_vec();
+        all.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let pressures = self.pressures(&all);
+        let row = |&[number, x, y, normal_x, normal_y, gap, _, _, active]: &Reaction| {
+            let Station { name, part, arc_length, .. } = &self.stations[number as usize];
+            ContactRow {
+                time: state.time,
+                boundary: name.clone(),
+                part: *part,
+                arc_length: *arc_length,
+                x,
+                y,
+                normal_x,
+                normal_y,
+                gap,
+                pressure: pressures[number as usize],
+                active: active as u8,
+            }
+        };
+        let nodal = |(node, places): (&usize, &Vec<(usize, Face)>)| {
+            let largest = places.iter().map(|(station, _)| pressures[*station]);
+            (*node, largest.fold(0.0, f64::max))
+        };
+        (all.iter().map(row).collect(), self.places.iter().map(nodal).collect())
+    }
+
+    /// The pressure at each station, Pa.
+    fn pressures(&self, reactions: &[Reaction]) -> Vec<f64> {
+        let stations = &self.stations;
+        let (mut forces, mut nodal) = (vec![0.0; stations.len()], vec![None; stations.len()]);
+        for &[number, .., force, pressure, _] in reactions {
+            forces[number as usize] += force;
+            nodal[number as usize] = Some(pressure);
+        }
+        let middles = || (0..stations.len()).filter(|&i| stations[i].length == 0.0);
+        let of_ends = |i: usize| {
+            let (a, b) = (i - 1, i + 1);
+            (a, b, stations[b].arc_length - stations[a].arc_length)
+        };
+        for i in middles() {
+            let (a, b, length) = of_ends(i);
+            // At a node with a prescribed displacement the pressure follows from the other two.
+            let third =
+                |other: Option<f64>| (3.0 * forces[i] / length - other.unwrap_or(0.0)).max(0.0);
+            let p = [
+                nodal[a].unwrap_or_else(|| third(nodal[b])),
+                nodal[b].unwrap_or_else(|| third(nodal[a])),
+            ];
+            let share = (0.5 * forces[i] + length / 6.0 * (p[0] - p[1])).clamp(0.0, forces[i]);
+            forces[a] += share;
+            forces[b] += forces[i] - share;
+        }
+        let of_vertex = |(force, station): (f64, &Station)| match station.length {
+            0.0 => 0.0,
+            length => force / length,
+        };
+        let mut pressures: Vec<f64> = forces.into_iter().zip(stations).map(of_vertex).collect();
+        for i in middles() {
+            let (a, b, length) = of_ends(i);
+            let part = (stations[i].arc_length - stations[a].arc_length) / length;
+            pressures[i] = (1.0 - part) * pressures[a] + part * pressures[b];
+        }
+        pressures
+    }
+
+    /// The length of contact by the `rows` of Γ_C, m, and the nodes on both sides of each of its ends, which lies
+    /// between them. Next to a node without a row, which has a prescribed displacement, contact goes on up to it. At the
+    /// end of Γ_C a light pressure may hide a short open part.
+    pub(super) fn length(&self, rows: &[ContactRow]) -> (f64, Vec<[[f64; 2]; 2]>) {
+        /// Smaller pressures than this fraction of the largest are light.
+        const LIGHT: f64 = 0.05;
+        let (mut length, mut ends) = (0.0, Vec::new());
+        for part in rows.chunk_by(|a, b| (&a.boundary, a.part) == (&b.boundary, b.part)) {
+            let [first, .., last] = part else { continue };
+            let is_here = |of: &&Station| (&of.name, of.part) == (&first.boundary, first.part);
+            let whole = self.stations.iter().rfind(is_here).map(|end| end.arc_length);
+            length += f64::from(first.active) * first.arc_length;
+            length += f64::from(last.active) * whole.map_or(0.0, |all| all - last.arc_length);
+            let largest = part.iter().fold(0.0, |most, row| f64::max(most, row.pressure));
+            for (i, pair) in part.windows(2).enumerate() {
+                let [a, b] = [&pair[0], &pair[1]];
+                length += 0.5 * f64::from(a.active + b.active) * (b.arc_length - a.arc_length);
+                let is_light = |row: &ContactRow| row.pressure < LIGHT * largest;
+                let at_end = (i == 0 && is_light(a)) || (i + 2 == part.len() && is_light(b));
+                if a.active != b.active || (a.active == 1 && at_end) {
+                    ends.push([[a.x, a.y], [b.x, b.y]]);
+                }
+            }
+        }
+        (length, ends)
+    }
+}
+
+/// The connected parts of a curve, each with its edges in order. The body is on the left of all edges.
+fn connected(edges: &[Edge]) -> Vec<Vec<Edge>> {
+    let mut after: BTreeMap<usize, Edge> = edges.iter().map(|edge| (edge.ends[0], *edge)).collect();
+    let ends: BTreeSet<usize> = edges.iter().map(|edge| edge.ends[1]).collect();
+    let open = edges.iter().filter(|edge| !ends.contains(&edge.ends[0]));
+    // Closed parts begin at their first edge.
+    let mut parts = Vec::new();
+    for first in open.chain(edges) {
+        let mut part = Vec::new();
+        let mut node = first.ends[0];
+        while let Some(edge) = after.remove(&node) {
+            node = edge.ends[1];
+            part.push(edge);
+        }
+        if !part.is_empty() {
+            parts.push(part);
+        }
+    }
+    parts
+}

@@ -1,0 +1,140 @@
+//! The contact pressure as a field on Γ_C: uniform and linear pressures keep their values, the area under it is the
+//! force of each foundation, and Hertz's profile converges.
+
+use crate::support::{
+    close_to, distorted, moved, problem, run, shipped, shipped_with, square, turn,
+};
+use signorini::{
+    contact::SOLVERS,
+    evolution::{ContactRow, DiscreteProblem, State},
+    mesh::Mesh,
+};
+use std::f64::consts::PI;
+
+/// The rows of Γ_C by boundary and part.
+fn parts(problem: &DiscreteProblem, state: &State) -> Vec<Vec<ContactRow>> {
+    let rows = problem.supports.contact_rows(&problem.body, state);
+    let parts = rows.chunk_by(|a, b| (&a.boundary, a.part) == (&b.boundary, b.part));
+    parts.map(<[ContactRow]>::to_vec).collect()
+}
+
+/// The area under the pressure along a part.
+fn area(rows: &[ContactRow]) -> f64 {
+    let pairs = rows.windows(2);
+    pairs.map(|p| 0.5 * (p[0].pressure + p[1].pressure) * (p[1].arc_length - p[0].arc_length)).sum()
+}
+
+/// `mesh` whose bottom is two curves, "near" the left and "far" from it.
+fn divided(mut mesh: Mesh, at: f64) -> Mesh {
+    let bottom = mesh.curves.remove("bottom").unwrap();
+    for (name, is_near) in [("near", true), ("far", false)] {
+        let mut part = bottom.clone();
+        part.edges
+            .retain(|edge| edge.iter().all(|&node| mesh.nodes[node][0] < at + 1e-9) == is_near);
+        mesh.curves.insert(name.to_owned(), part);
+    }
+    mesh
+}
+
+#[test]
+fn a_uniform_pressure_keeps_its_value_at_every_node_and_where_foundations_meet() {
+    for (degree, angle) in [(1, 0.0), (2, 0.0), (1, 0.4), (2, 0.4)] {
+        let [down, aside] = [turn(angle, [0.0, -3.0]), turn(angle, [-2.0, 0.0])];
+        let text = format!(
+            "contact.tolerance = 1e-12
+             discretisation.displacement = {degree}
+             material = {{ young = 200, poisson = 0.3, plane = 'stress' }}
+             boundary = [{{ name = 'left', gap = 0 }}, {{ name = 'near', gap = 0 }},
+                         {{ name = 'far', gap = 0 }}, {{ name = 'top', traction = {down:?} }},
+                         {{ name = 'right', traction = {aside:?} }}]"
+        );
+        let mut mesh = moved(distorted(6), |x| turn(angle, x));
+        let joint = square(6).nodes.iter().position(|x| (x[0] - 0.5).abs() < 1e-9 && x[1] == 0.0);
+        let joint = joint.unwrap();
+        mesh =
+            moved(divided(moved(mesh, |x| turn(-angle, x)), distorted(6).nodes[joint][0]), |x| {
+                turn(angle, x)
+            });
+        for solver in SOLVERS {
+            let problem = problem(mesh.clone(), &text).unwrap_or_else(|e| panic!("{e}"));
+            let state = run(&problem, solver).last.state;
+            let parts = parts(&problem, &state);
+            let nodes: Vec<usize> = parts.iter().map(Vec::len).collect();
+            assert_eq!(nodes, [6 * degree + 1, 3 * degree + 1, 3 * degree + 1]);
+            for row in parts.iter().flatten() {
+                let pressure = if row.boundary == "left" { 2.0 } else { 3.0 };
+                close_to(row.pressure, pressure, 1e-9);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_area_under_the_pressure_is_the_force_of_each_foundation() {
+    // The load leaves a part of the bottom open, and presses on a node where two foundations meet.
+    for degree in [1, 2] {
+        for load in ["-4*if(x < 0.5, 1, -0.9)", "-4*if(x < 0.1, 1, 0)", "-x", "-4*(x - 0.3)"] {
+            let text = format!(
+                "discretisation.displacement = {degree}
+                 material = {{ young = 200, poisson = 0.3, plane = 'strain' }}
+                 boundary = [{{ name = 'left', symmetry = true }}, {{ name = 'near', gap = '0.001*x*x' }},
+                             {{ name = 'far', gap = '0.001*x*x' }}, {{ name = 'right', symmetry = true }},
+                             {{ name = 'top', traction = [0, '{load}'] }}]"
+            );
+            let problem = problem(divided(square(8), 0.5), &text).unwrap_or_else(|e| panic!("{e}"));
+            let last = run(&problem, SOLVERS[0]).last;
+            let quantities: Vec<_> = problem.quantities();
+            for part in parts(&problem, &last.state) {
+                let name = format!("{}.force_y", part[0].boundary);
+                let force = last.quantities[quantities.iter().position(|n| *n == name).unwrap()];
+                let wrong = (area(&part) - force).abs() / last.record.contact_force;
+                assert!(wrong < 1e-9, "P{degree}, {load}: {name} {force}, area {}", area(&part));
+                assert!(part.iter().all(|row| row.pressure >= 0.0));
+            }
+        }
+    }
+    // On curved edges, with one end on an axis.
+    let problem = shipped("hertz", &["discretisation.displacement=2", "mesh.size=0.008"]);
+    let last = run(&problem, SOLVERS[0]).last;
+    close_to(area(&parts(&problem, &last.state)[0]), last.record.contact_force, 1e-9);
+}
+
+/// The L²(Γ_C) distance of the pressure from Hertz's ellipse over the ellipse, and the largest edge over the half-width.
+fn distance_from_hertz(size: f64, degree: u8) -> [f64; 2] {
+    let (force, radius, e) = (35e6, 0.05, 70e9 / (1.0 - 0.3 * 0.3));
+    let half_width = (4.0_f64 * force * radius / (PI * e)).sqrt();
+    let peak = (force * e / (PI * radius)).sqrt();
+    let sets = [format!("mesh.size={size}"), format!("discretisation.displacement={degree}")];
+    let growth = format!("{} * (sqrt", 25.0 * size);
+    let sets = [&sets[0], &sets[1], "mesh.parameters.grading=25"];
+    let problem = shipped_with("hertz", &sets, ["0.2 * (sqrt", &growth]);
+    let rows = parts(&problem, &run(&problem, SOLVERS[0]).last.state).concat();
+    let (mut square, mut whole, mut longest) = (0.0, 0.0, 0.0_f64);
+    for pair in rows.windows(2) {
+        let length = pair[1].arc_length - pair[0].arc_length;
+        for row in pair {
+            let theory = peak * (1.0 - (row.x / half_width).powi(2)).max(0.0).sqrt();
+            square += length * (row.pressure - theory).powi(2);
+            whole += length * theory.powi(2);
+            // The theory is of a half-space, and R/a = 9.
+            assert!(row.pressure < 1.02 * peak, "{row:?}");
+        }
+        if pair[0].active == 1 {
+            longest = longest.max(length * f64::from(degree) / half_width);
+        }
+    }
+    [(square / whole).sqrt(), longest]
+}
+
+#[test]
+fn the_profile_of_hertz_converges_at_first_order() {
+    // At the end of contact p ~ √r; the error of an edge there is √h on a length h, so h in L².
+    for (degree, sizes) in [(1, [0.016, 0.0113, 0.008, 0.004]), (2, [0.032, 0.0226, 0.016, 0.008])]
+    {
+        for size in sizes {
+            let [distance, edge] = distance_from_hertz(size, degree);
+            println!("P{degree}, size {size}: {distance:.5}, edge {edge:.4} of the half-width");
+            assert!(distance < 0.5 * edge, "P{degree}, {size}: {distance} for {edge}");
+        }
+    }
+}
