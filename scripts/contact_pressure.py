@@ -21,7 +21,7 @@ def draw_pressure(results, limits, figure=None):
         s, label = along(curve.points, results.units)
         pressure, gap = curve.pressure / factor, curve.gap
         above.set_title(name, parse_math=False)
-        active = pressure > 0.0
+        active = curve.active & (pressure > 0.0)
         # Markers are smaller if there are many nodes.
         size = np.clip(180.0 / len(curve.points), 1.5, 5.0)
         for axes, values in ((above, pressure), (below, gap)):

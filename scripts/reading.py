@@ -166,6 +166,7 @@ def _contact_curves(folder, time):
     rows = _contact_rows(folder / "contact.csv").get(time, [])
     curves = []
     for (name, _), part in groupby(rows, key=lambda row: (row["boundary"], row["part"])):
-        x, y, gap, pressure = np.array([[row[key] for key in ("x", "y", "gap", "pressure")] for row in part]).T
-        curves.append(ContactCurve(name, np.column_stack((x, y)), gap, pressure))
+        columns = ("x", "y", "gap", "pressure", "active")
+        x, y, gap, pressure, active = np.array([[row[key] for key in columns] for row in part]).T
+        curves.append(ContactCurve(name, np.column_stack((x, y)), gap, pressure, active > 0.0))
     return curves

@@ -137,8 +137,10 @@ def facts(results):
 
     rows = [(name, text(key, summary[key]), unit_of(key, units))
             for key, name in FACTS.items() if summary.get(key) is not None]
+    # The extremes in each of several materials.
+    inside = {name: of["value"] for name, of in (summary.get("extremes") or {}).items() if "." in name}
     return rows + [(name, text(name, value), unit_of(f"quantities.{name}", units))
-                   for name, value in summary.get("quantities", {}).items()]
+                   for name, value in {**summary.get("quantities", {}), **inside}.items()]
 
 
 def governing(everything, units):

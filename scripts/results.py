@@ -70,6 +70,7 @@ class ContactCurve:
     points: np.ndarray  # (n, 2): the nodes along it, m
     gap: np.ndarray  # (n,), m
     pressure: np.ndarray  # (n,), Pa
+    active: np.ndarray  # (n,): in contact?
 
 
 @dataclass

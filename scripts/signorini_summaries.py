@@ -61,10 +61,12 @@ def units_of(summary):
 def unit_of(name, units):
     """The unit of a value of the summary; "" without a unit."""
     figure = name.removeprefix("errors.figures.").removeprefix("quantities.")
-    if figure in UNITS:
-        return units.get(UNITS[figure], UNITS[figure])
-    kinds = {"force": "line", "moment": "force", "u": "length", "zeta": ""}
-    kind = kinds.get(figure.rpartition(".")[2].split("_")[0], "stress") if figure != name else ""
+    last = figure.rpartition(".")[2]
+    if last in UNITS:
+        return units.get(UNITS[last], UNITS[last])
+    lengths = dict.fromkeys(("u", "contact", "peak", "acts"), "length")
+    kinds = {"force": "line", "moment": "force", "zeta": "", **lengths}
+    kind = kinds.get(last.split("_")[0], "stress") if figure != name else ""
     return units.get(kind, "")
 
 

@@ -192,7 +192,9 @@ pub(super) fn accuracy_note(task: &Task, outcome: Option<&Outcome>) -> Option<St
     let reasons = missed.into_iter().chain(adapted.short.clone()).chain(unconfirmed);
     let reasons: Vec<String> = reasons.collect();
     let of_time = if outcome.stopped.is_some() { " in the time of ζ_*" } else { "" };
-    let at_probe = |bar: &&Bar| bar.dimension == Dimension::Stress && bar.name.contains('.');
+    let quantities = task.problem.quantities();
+    let at_probe =
+        |bar: &&Bar| bar.dimension == Dimension::Stress && quantities.contains(&bar.name);
     let stresses = outcome.bars.iter().find(at_probe).map_or_else(String::new, |bar| {
         format!(" (stresses at probes: of {:.1e} {})", bar.scale, scene.units.stress)
     });

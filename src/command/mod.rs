@@ -9,6 +9,7 @@
 mod accuracy;
 mod check;
 mod checkpoint;
+mod extremes;
 mod new;
 mod profile;
 mod provenance;

@@ -16,6 +16,7 @@ use signorini::{
         terminal::{Progress, say},
         write_whole,
     },
+    problem::DiscreteProblem,
     scene::{Stepping, rounded},
 };
 use std::time::Instant;
@@ -46,7 +47,7 @@ impl<'a> Recorder<'a> {
         let fields = FieldWriter::new(&task.folder, &task.problem)?;
         let bar = task.problem.body.nodes.partition.comm().is_root().then(|| screen::open(task));
         let (_interrupts, saved) = (Interrupts::defer(), Instant::now());
-        let (path, columns) = (task.folder.join("history.csv"), task.problem.quantities());
+        let (path, columns) = (task.folder.join("history.csv"), columns(&task.problem));
         let history = Table::new(path, &StepRecord::default(), &columns)?;
         let (last, stepping) = Default::default();
         Ok(Self { task, fields, bar, history, last, stepping, _interrupts, saved })
@@ -122,8 +123,9 @@ impl<'a> Recorder<'a> {
         let written = self.task.phases.time("output", || {
             let end = self.task.problem.scene().time.map_or(1.0, |grid| grid.end);
             self.bar.iter_mut().for_each(|bar| screen::progress(bar, &step.record, end));
+            let contact = self.task.problem.contact_figures(&step.state);
             let row = match comm.is_root() {
-                true => self.history.add(&[(&step.record, &step.quantities)]),
+                true => self.history.add(&[(&step.record, &step.quantities, contact)]),
                 false => Ok(()),
             };
             // This is collective: all ranks write the frame, even if the row could not be written.
@@ -154,6 +156,10 @@ impl<'a> Recorder<'a> {
             Ok(extremes) => (written, extremes),
             Err(error) => (written.and(Err(error)), None),
         };
+        let quantities = last.iter().flat_map(|step| {
+            [&step.quantities[..], &task.problem.contact_figures(&step.state)].concat()
+        });
+        let quantities: Vec<_> = columns(&task.problem).into_iter().zip(quantities).collect();
         let outcome = result.as_ref().ok();
         let mut notes = notes(task, outcome);
         let warnings = notes.len();
@@ -166,8 +172,6 @@ impl<'a> Recorder<'a> {
         let Some(bar) = &self.bar else { return written };
 
         let record = last.as_ref().map(|step| step.record);
-        let quantities = last.into_iter().flat_map(|step| step.quantities);
-        let quantities: Vec<_> = task.problem.quantities().into_iter().zip(quantities).collect();
         let wall = task.started.elapsed().as_secs_f64();
         let (extremes, result) = (extremes.as_ref(), result.as_ref());
         if record.is_some() {
@@ -210,6 +214,11 @@ impl Observer for Recorder<'_> {
         self.saved = Instant::now();
         Ok(())
     }
+}
+
+/// The columns of `history.csv` after the record of a step.
+fn columns(problem: &DiscreteProblem) -> Vec<String> {
+    [problem.quantities(), problem.contact_columns()].concat()
 }
 
 /// The notes on a run, except remarks. Collective.

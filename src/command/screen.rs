@@ -1,8 +1,8 @@
 //! The output of a run at the terminal: its task, a progress bar, and the result in a few lines.
 
-use super::task::Task;
+use super::{extremes, task::Task};
 use signorini::{
-    estimate::{Adapted, Extreme, Extremes, GROWS},
+    estimate::{Adapted, Extremes},
     evolution::{Outcome, RunError, StepRecord, Stop, percent},
     output::terminal::{Progress, say, with_bar},
     problem::Collapse,
@@ -108,18 +108,14 @@ pub fn conclusion(
         row("displacement", format!("largest {displacement} {length}")),
         row("work", format!("{} {}", figure(last.work, "work"), units.work())),
     ];
-    lines.extend(extremes.into_iter().flat_map(|of| stresses(of, &units.stress, &shown)));
+    lines.extend(extremes.into_iter().flat_map(|of| extremes::stresses(of, units, &shown)));
     if task.contact_nodes > 0 {
         let (active, nodes) = (last.active_nodes, task.contact_nodes);
         let sum = figure(last.contact_force, "contact_force");
         let contact = format!("{active} of {nodes} nodes active, force {sum} {force}/{length}");
         lines.push(row("contact", contact));
     }
-    if let Some((extremes, pressure)) = extremes.and_then(|of| Some((of, of.of_points.get(3)?))) {
-        let along = figure(extremes.contact_length, "contact_length");
-        let largest = extreme(pressure, &units.stress, &shown);
-        lines.push(row("", format!("length {along} {length}, largest pressure {largest}")));
-    }
+    lines.extend(extremes.into_iter().flat_map(|of| extremes::contact(of, units, &shown)));
     lines.extend(supports(task, quantities, &shown));
     lines.extend(probes(task, quantities, &shown));
     if let Some(outcome) = outcome {
@@ -134,7 +130,7 @@ pub fn conclusion(
 }
 
 /// How figures are shown.
-struct Shown<'a> {
+pub(super) struct Shown<'a> {
     bars: Option<&'a BTreeMap<String, f64>>,
     /// Whether the errors were measured.
     is_measured: bool,
@@ -158,45 +154,12 @@ impl<'a> Shown<'a> {
     }
 
     /// A figure with its bar or, without one, with its [`Shown::digits`].
-    fn figure(&self, value: f64, name: &str, usual: usize) -> String {
+    pub(super) fn figure(&self, value: f64, name: &str, usual: usize) -> String {
         match self.bar(name) {
             None => format!("{value:.*e}", self.digits(usual)),
             bar => with_bar(value, bar),
         }
     }
-}
-
-/// The lines of the extreme stresses.
-fn stresses(extremes: &Extremes, unit: &str, shown: &Shown) -> Vec<String> {
-    let [von_mises, most, least, ..] = &extremes.of_points[..] else { return Vec::new() };
-    if von_mises.value == 0.0 {
-        return Vec::new();
-    }
-    let largest = extreme(von_mises, unit, shown);
-    let grows = match von_mises.singular.as_deref() {
-        Some(place) if place != GROWS => format!(" at {place}, grows as the mesh is refined"),
-        Some(_) => ", grows as the mesh is refined".to_owned(),
-        None => String::new(),
-    };
-    let [most, least] = [most, least].map(|of| extreme(of, unit, shown));
-    vec![
-        row("stress", format!("largest von Mises {largest}{grows}")),
-        row("", format!("largest σ₁ {most}")),
-        row("", format!("smallest σ₂ {least}")),
-    ]
-}
-
-/// An extreme with its place: with its bar, or with two digits if it is singular.
-fn extreme(
-    Extreme { name, value, at: [x, y], singular }: &Extreme,
-    unit: &str,
-    shown: &Shown,
-) -> String {
-    let (value, singular) = match singular {
-        Some(_) => (format!("{value:.1e}"), ": singular"),
-        None => (shown.figure(*value, name, 4), ""),
-    };
-    format!("{value} {unit} at ({x:.4}, {y:.4}){singular}")
 }
 
 /// Per support: a line with its resultants and their error bars.
@@ -206,7 +169,15 @@ fn supports(task: &Task, quantities: &[(String, f64)], shown: &Shown) -> Vec<Str
     let line = |(name, of): (&String, &[(String, f64)])| {
         let figure = |i: usize, part: &str| shown.figure(of[i].1, &format!("{name}.{part}"), 4);
         let [x, y, moment] = [figure(0, "force_x"), figure(1, "force_y"), figure(2, "moment")];
-        let resultant = format!("force ({x}, {y}) {force}/{length}");
+        let [start, end, at] = ["contact_start_x", "contact_end_x", "acts_at_x"]
+            .map(|of| extremes::place(quantities, &format!("{name}.{of}")));
+        let contact = match (start, end, at) {
+            (Some(start), Some(end), Some(at)) => {
+                format!(" at {at}, contact from {start} to {end}")
+            }
+            _ => String::new(),
+        };
+        let resultant = format!("force ({x}, {y}) {force}/{length}{contact}");
         row("support", format!("{name}: {resultant}, moment {moment} {force}"))
     };
     task.problem.supports.names.iter().zip(quantities.chunks_exact(3)).map(line).collect()

@@ -61,11 +61,11 @@ pub(super) fn summary(
         summary["error"] = json!(error.to_string());
     }
     for extreme in extremes.iter().flat_map(|of| &of.of_points) {
-        summary[extreme.name] = json!(extreme.value);
-        summary["extremes"][extreme.name] = json!(extreme);
+        summary[&extreme.name] = json!(extreme.value);
+        summary["extremes"][&extreme.name] = json!(extreme);
     }
-    if let Some(extremes) = extremes.filter(|of| of.of_points.len() > 3) {
-        summary["contact_length"] = json!(extremes.contact_length);
+    for (name, length) in extremes.iter().flat_map(|of| &of.contact_lengths) {
+        summary[name] = json!(length);
     }
     summary["peak_megabytes"] = json!(memory);
     add_stop(&mut summary, problem, outcome);

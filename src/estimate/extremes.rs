@@ -1,10 +1,10 @@
 //! Extreme stresses and contact pressures of a state, and the length of contact.
 
-use super::{Measured, NodalStress, principal};
+use super::{Measured, NodalStress, principal, stress::Point};
 use crate::{
     model::von_mises,
     petsc::{Communicator, PetscError},
-    problem::{DiscreteProblem, Singular, State},
+    problem::{ContactRow, DiscreteProblem, Singular, State, rows_of, whole_and_parts},
 };
 use serde::Serialize;
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -17,7 +17,7 @@ pub const GROWS: &str = "grows with refinement";
 pub struct Extreme {
     /// Its name, as in `summary.json`.
     #[serde(skip)]
-    pub name: &'static str,
+    pub name: String,
     /// Its value, Pa.
     pub value: f64,
     /// Its place, m.
@@ -40,8 +40,8 @@ pub struct Extremes {
     pub of_points: Vec<Extreme>,
     /// Per extreme: values with their places, whose largest one is the extreme or its opposite.
     fields: Vec<Vec<(f64, [f64; 2])>>,
-    /// The length of contact, m: of Γ_C at the active nodes.
-    pub contact_length: f64,
+    /// The length of contact, m, of Γ_C at the active nodes, and of each of several foundations, with their names.
+    pub contact_lengths: Vec<(String, f64)>,
     /// Each end of contact lies between an active node and the next one: their places, m.
     pub(super) ends: Vec<[[f64; 2]; 2]>,
 }
@@ -49,7 +49,7 @@ pub struct Extremes {
 impl Extremes {
     /// Of no state.
     pub(super) fn none(comm: Communicator) -> Self {
-        Self { comm, of_points: vec![], fields: vec![], contact_length: 0.0, ends: vec![] }
+        Self { comm, of_points: vec![], fields: vec![], contact_lengths: vec![], ends: vec![] }
     }
 
     /// The extremes of `state` with `stresses` at the points of `nodal`. Collective.
@@ -60,27 +60,36 @@ impl Extremes {
         stresses: &[[f64; 4]],
     ) -> Self {
         let comm = problem.body.nodes.partition.comm();
-        let of = |value: fn([f64; 4]) -> f64| -> Vec<_> {
-            stresses.iter().map(|stress| value(*stress)).zip(nodal.places()).collect()
-        };
-        let rows = problem.supports.contact_rows(&problem.body, state);
-        let fields = vec![
-            of(von_mises),
-            of(|stress| principal(stress).0[0]),
-            of(|stress| -principal(stress).0[1]),
-            rows.iter().map(|row| (row.pressure, [row.x, row.y])).collect(),
-        ];
-        let names = problem.extremes().into_iter().zip(&fields);
-        let of_points = names.map(|(name, values)| {
+        let values: [fn([f64; 4]) -> f64; 3] =
+            [von_mises, |stress| principal(stress).0[0], |stress| -principal(stress).0[1]];
+        let mut fields = Vec::new();
+        for of in whole_and_parts(&problem.materials) {
+            let is_own = |point: &Point| of.is_none_or(|(own, _)| *own == point.material);
+            let points = stresses.iter().zip(&nodal.points).filter(|(_, point)| is_own(point));
+            let field = |value: fn([f64; 4]) -> f64| -> Vec<_> {
+                points.clone().map(|(stress, point)| (value(*stress), point.at)).collect()
+            };
+            fields.extend(values.map(field));
+        }
+        let (rows, _) = problem.supports.contact.rows(&problem.body, state);
+        let foundations = whole_and_parts(&problem.foundations).filter(|_| problem.has_contact());
+        let rows_of: Vec<_> =
+            foundations.map(|of| of.map_or(&rows[..], |of| rows_of(&rows, of))).collect();
+        let pressure = |row: &ContactRow| (row.pressure, [row.x, row.y]);
+        fields.extend(rows_of.iter().map(|rows| rows.iter().map(pressure).collect::<Vec<_>>()));
+        let mut names = problem.extremes().into_iter();
+        let of_points = names.by_ref().take(fields.len()).zip(&fields).map(|(name, values)| {
             let own = values.iter().max_by(|a, b| a.0.total_cmp(&b.0)).copied();
             let (least, rank) = comm.min_with_rank(own.map_or(f64::INFINITY, |(value, _)| -value));
             let at = own.map_or([0.0; 2], |(_, at)| at).map(|x| comm.broadcast(rank, x));
-            let value = if name == "principal_min" { least } else { -least };
+            let value = if name.ends_with("principal_min") { least } else { -least };
             Extreme { name, value, at, singular: None }
         });
         let of_points = of_points.collect();
-        let (contact_length, ends) = problem.supports.contact_length(&rows);
-        Self { comm, of_points, fields, contact_length, ends }
+        let lengths = rows_of.into_iter().map(|rows| problem.supports.contact.length(rows).0);
+        let contact_lengths = names.zip(lengths).collect();
+        let (_, ends) = problem.supports.contact.length(&rows);
+        Self { comm, of_points, fields, contact_lengths, ends }
     }
 
     /// The extremes of `state` at the points of `nodal`. They name singular points and, if they were `measured`, say
@@ -99,7 +108,7 @@ impl Extremes {
         let mut extremes = Self::new(problem, state, nodal, &stresses);
         extremes.of_points = extremes.named(&problem.singular_points());
         for extreme in &mut extremes.of_points {
-            if measured.grows.iter().any(|name| name == extreme.name) {
+            if measured.grows.contains(&extreme.name) {
                 extreme.singular.get_or_insert_with(|| GROWS.to_owned());
             }
         }
@@ -107,9 +116,9 @@ impl Extremes {
     }
 
     /// All values, in the order of [`DiscreteProblem::extremes`].
-    pub(super) fn values(&self, problem: &DiscreteProblem) -> Vec<f64> {
+    pub(super) fn values(&self) -> Vec<f64> {
         let values = self.of_points.iter().map(|extreme| extreme.value);
-        values.chain([self.contact_length]).take(problem.extremes().len()).collect()
+        values.chain(self.contact_lengths.iter().map(|(_, length)| *length)).collect()
     }
 
     /// The extremes of stresses and pressures with the names of the singular `points` of the boundary near which they are,
@@ -122,7 +131,8 @@ impl Extremes {
             let nearest =
                 near.min_by(|a, b| extreme.distance(a.at).total_cmp(&extreme.distance(b.at)));
             // The von Mises stress, as other stresses may be negative at the point, or the pressure.
-            let field = &self.fields[if i < 3 { 0 } else { i }];
+            let is_pressure = extreme.name.ends_with("pressure_max");
+            let field = &self.fields[if is_pressure { i } else { i - i % 3 }];
             let there = |point: &&Singular| {
                 let own = field.iter().filter(|(_, at)| *at == point.at).map(|(value, _)| *value);
                 let there = self.comm.max(own.fold(f64::NEG_INFINITY, f64::max));

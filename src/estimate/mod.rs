@@ -176,7 +176,7 @@ impl Outcome {
         let nodal = NodalStress::new(problem);
         let figures = |step: &Step| {
             let extremes = Extremes::of(problem, &step.state, &nodal, measured)?;
-            Ok([step.figures(), extremes.values(problem)].concat())
+            Ok([step.figures(), extremes.values()].concat())
         };
         let (before, now) = (figures(&longer.last)?, figures(&self.last)?);
         let names = problem.figure_names();

@@ -17,17 +17,17 @@ use rustc_hash::FxHashMap as HashMap;
 /// node's number; the others follow. This value needs neither PETSc nor the problem, so that a thread can use it.
 pub struct NodalStress {
     pub(super) patches: Patches,
-    points: Vec<Point>,
+    pub(super) points: Vec<Point>,
     /// The points of this rank's triangles, each with the nodes of an element of u.
     pub cells: Vec<usize>,
     materials: Vec<(Material, Matrix3<f64>)>,
 }
 
 /// A node, as a point of one material.
-struct Point {
+pub(super) struct Point {
     node: usize,
-    material: usize,
-    at: [f64; 2],
+    pub(super) material: usize,
+    pub(super) at: [f64; 2],
     /// The vertices whose fits give its strain: itself, or the ends of its side.
     ends: [usize; 2],
 }

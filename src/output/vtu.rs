@@ -124,7 +124,7 @@ impl FieldWriter {
         let (stem, contact_file) = (format!("fields_{number}"), format!("contact_{number}.vtu"));
         (self.frames, self.last_time) = (self.frames + 1, Some(state.time));
         // This is collective: all ranks collect Γ_C, even if one has failed to collect its fields.
-        let (contact, pressures) = problem.supports.contact(&problem.body, state);
+        let (contact, pressures) = problem.supports.contact.rows(&problem.body, state);
         if problem.scene().output.every == Some(0) {
             let is_root = problem.body.nodes.partition.comm().is_root();
             let rows = if is_root { &contact[..] } else { &[] };

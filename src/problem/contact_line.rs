@@ -8,7 +8,7 @@
 //! R/2 + L/6 (p_a − p_b),   at least 0 and at most R,
 //!
 //! with the quotients p of the reactions of a and b alone by ∫φ. A pressure that is linear in the arc length keeps its
-//! values. A vertex with a prescribed displacement has shares of midsides only: its own reaction is not of contact.
+//! values. The reaction of a vertex with a prescribed displacement is not of contact: the edge is shared in halves.
 
 use super::State;
 use crate::{
@@ -21,9 +21,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Γ_C of the whole body, and the places of this rank's nodes on it.
 #[derive(Debug, Clone, Default)]
-pub(super) struct ContactLine {
+pub struct ContactLine {
     /// Part by part with the body on the left.
-    stations: Vec<Station>,
+    pub(super) stations: Vec<Station>,
     /// Per node: its station and its face on each of its edges.
     places: BTreeMap<usize, Vec<(usize, Face)>>,
 }
@@ -31,15 +31,12 @@ pub(super) struct ContactLine {
 /// A vertex or the middle of an edge, on one part of a boundary. A corner is two stations, and so is the vertex at
 /// which a closed part begins and ends.
 #[derive(Debug, Clone)]
-struct Station {
-    boundary: usize,
-    name: String,
-    /// The number of the connected part of the boundary, from 0.
-    part: usize,
-    /// The length of the part up to here, m.
-    arc_length: f64,
+pub(super) struct Station {
+    pub(super) boundary: usize,
     /// Half of the length of the edges of a vertex, m; 0 in the middle of an edge.
     length: f64,
+    /// Its row, without the state.
+    row: ContactRow,
 }
 
 /// A row of `contact.csv`: a gap condition at a node of Γ_C, its remaining gap and its pressure.
@@ -67,11 +64,14 @@ pub struct ContactRow {
     pub pressure: f64,
     /// 1 if the node is active, else 0.
     pub active: u8,
+    /// The reaction, N per metre of thickness; not in the file.
+    #[serde(skip)]
+    pub force: f64,
 }
 
-/// The reaction at a station and more of its row, as the ranks exchange it: station, x, y, ν_x, ν_y, gap, reaction
-/// (N per metre of thickness), reaction over ∫φ (Pa), active.
-type Reaction = [f64; 9];
+/// The reaction at a station, as the ranks exchange it: station, ν_x, ν_y, gap, reaction (N per metre of thickness),
+/// reaction over ∫φ (Pa), active.
+type Reaction = [f64; 7];
 
 impl ContactLine {
     /// Adds the boundary `name` with the number `boundary`, whose obstacle has this `normal` if it is given.
@@ -86,31 +86,34 @@ impl ContactLine {
             |a: usize, b: usize| (points[a][0] - points[b][0]).hypot(points[a][1] - points[b][1]);
         let face = |face: Face| Face { normal: normal.unwrap_or(face.normal), ..face };
         for (part, edges) in connected(edges).iter().enumerate() {
-            let station = |arc_length: f64, length: f64| Station {
-                boundary,
-                name: name.to_owned(),
-                part,
-                arc_length,
-                length,
+            let station = |node: usize, arc_length: f64, length: f64| {
+                let ([x, y], boundary_name) = (points[node], name.to_owned());
+                let row = ContactRow {
+                    boundary: boundary_name,
+                    part,
+                    arc_length,
+                    x,
+                    y,
+                    ..ContactRow::default()
+                };
+                Station { boundary, length, row }
             };
             let (mut start, mut last) = (0.0, None::<Face>);
             for edge in edges {
                 let faces: Vec<_> = edge.faces(points).map(|(n, f)| (n, face(f))).collect();
                 let [a, b] = edge.ends;
-                let to_middle = edge.middle.map(|middle| distance(a, middle));
-                let length = match edge.middle {
-                    Some(middle) => distance(a, middle) + distance(middle, b),
-                    None => distance(a, b),
-                };
+                let middle = edge.middle.unwrap_or(b);
+                let half = distance(a, middle);
+                let length = half + distance(middle, b);
                 match self.stations.last_mut() {
                     Some(before) if last.is_some_and(|last| last.continues(&faces[0].1)) => {
                         before.length += 0.5 * length;
                     }
-                    _ => self.stations.push(station(start, 0.5 * length)),
+                    _ => self.stations.push(station(a, start, 0.5 * length)),
                 }
                 let first = self.stations.len() - 1;
-                self.stations.extend(to_middle.map(|half| station(start + half, 0.0)));
-                self.stations.push(station(start + length, 0.5 * length));
+                self.stations.extend(edge.middle.map(|m| station(m, start + half, 0.0)));
+                self.stations.push(station(b, start + length, 0.5 * length));
                 let numbers = [first, self.stations.len() - 1, first + 1];
                 for ((node, face), number) in faces.iter().zip(numbers) {
                     self.places.entry(*node).or_default().push((number, *face));
@@ -128,7 +131,7 @@ impl ContactLine {
 
     /// The stations of a contact point, each with its share of the force: all faces that the normal of the point
     /// continues, by their lengths.
-    fn shares(&self, point: &ContactPoint) -> Vec<(usize, f64)> {
+    pub(super) fn shares(&self, point: &ContactPoint) -> Vec<(usize, f64)> {
         let Some(all) = self.places.get(&point.node) else { return Vec::new() };
         let own = Face { normal: point.normal, length: 0.0 };
         let mut near: Vec<_> = all.iter().filter(|(_, face)| face.continues(&own)).collect();
@@ -143,22 +146,17 @@ impl ContactLine {
         shares.into_iter().collect()
     }
 
-    /// The boundaries of a contact point, each with its share of the force.
-    pub(super) fn boundaries(&self, point: &ContactPoint) -> impl Iterator<Item = (usize, f64)> {
-        let shares = self.shares(point).into_iter();
-        shares.map(|(station, share)| (self.stations[station].boundary, share))
-    }
-
-    /// The rows in a state, on every rank, and the pressures at this rank's nodes. Collective.
-    pub(super) fn rows(&self, body: &Body, state: &State) -> (Vec<ContactRow>, Vec<(usize, f64)>) {
+    /// The rows in a state, boundary by boundary and along each, on every rank; and the pressures at this rank's nodes of
+    /// Γ_C, Pa. Collective.
+    pub fn rows(&self, body: &Body, state: &State) -> (Vec<ContactRow>, Vec<(usize, f64)>) {
         let reactions = |point: &ContactPoint| {
-            let ContactPoint { node, normal, force, pressure, gap, active } = *point;
+            let ContactPoint { normal, force, pressure, gap, active, .. } = *point;
             // No -0.
-            let ([x, y], [nx, ny]) = (body.nodes.points[node], normal.map(|n| n + 0.0));
+            let [nx, ny] = normal.map(|n| n + 0.0);
             let force = if active { force } else { 0.0 };
             let active = f64::from(u8::from(active));
             let of = move |(station, share)| {
-                [station as f64, x, y, nx, ny, gap, share * force, pressure, active]
+                [station as f64, nx, ny, gap, share * force, pressure, active]
             };
             self.shares(point).into_iter().map(of)
         };
@@ -167,21 +165,11 @@ impl ContactLine {
         let mut all: Vec<Reaction> = all.as_chunks().0.to_vec();
         all.sort_by(|a, b| a[0].total_cmp(&b[0]));
         let pressures = self.pressures(&all);
-        let row = |&[number, x, y, normal_x, normal_y, gap, _, _, active]: &Reaction| {
-            let Station { name, part, arc_length, .. } = &self.stations[number as usize];
-            ContactRow {
-                time: state.time,
-                boundary: name.clone(),
-                part: *part,
-                arc_length: *arc_length,
-                x,
-                y,
-                normal_x,
-                normal_y,
-                gap,
-                pressure: pressures[number as usize],
-                active: active as u8,
-            }
+        let row = |&[number, normal_x, normal_y, gap, force, _, active]: &Reaction| {
+            let (station, time) = (number as usize, state.time);
+            let (pressure, active) = (pressures[station], active as u8);
+            let row = self.stations[station].row.clone();
+            ContactRow { time, normal_x, normal_y, gap, pressure, active, force, ..row }
         };
         let nodal = |(node, places): (&usize, &Vec<(usize, Face)>)| {
             let largest = places.iter().map(|(station, _)| pressures[*station]);
@@ -199,47 +187,39 @@ impl ContactLine {
             nodal[number as usize] = Some(pressure);
         }
         let middles = || (0..stations.len()).filter(|&i| stations[i].length == 0.0);
-        let of_ends = |i: usize| {
-            let (a, b) = (i - 1, i + 1);
-            (a, b, stations[b].arc_length - stations[a].arc_length)
-        };
+        let arc = |i: usize| stations[i].row.arc_length;
         for i in middles() {
-            let (a, b, length) = of_ends(i);
-            // At a node with a prescribed displacement the pressure follows from the other two.
-            let third =
-                |other: Option<f64>| (3.0 * forces[i] / length - other.unwrap_or(0.0)).max(0.0);
-            let p = [
-                nodal[a].unwrap_or_else(|| third(nodal[b])),
-                nodal[b].unwrap_or_else(|| third(nodal[a])),
-            ];
-            let share = (0.5 * forces[i] + length / 6.0 * (p[0] - p[1])).clamp(0.0, forces[i]);
+            let (a, b, length) = (i - 1, i + 1, arc(i + 1) - arc(i - 1));
+            let [p, q] =
+                [nodal[a].or(nodal[b]), nodal[b].or(nodal[a])].map(Option::unwrap_or_default);
+            let share = 0.5 * forces[i] + length / 6.0 * (p - q);
+            let share = share.clamp(0.0, forces[i]);
             forces[a] += share;
             forces[b] += forces[i] - share;
         }
-        let of_vertex = |(force, station): (f64, &Station)| match station.length {
-            0.0 => 0.0,
-            length => force / length,
-        };
-        let mut pressures: Vec<f64> = forces.into_iter().zip(stations).map(of_vertex).collect();
+        let vertices = stations.iter().zip(&mut forces).filter(|(of, _)| of.length > 0.0);
+        vertices.for_each(|(of, force)| *force /= of.length);
         for i in middles() {
-            let (a, b, length) = of_ends(i);
-            let part = (stations[i].arc_length - stations[a].arc_length) / length;
-            pressures[i] = (1.0 - part) * pressures[a] + part * pressures[b];
+            let (a, b) = (i - 1, i + 1);
+            let part = (arc(i) - arc(a)) / (arc(b) - arc(a));
+            forces[i] = (1.0 - part) * forces[a] + part * forces[b];
         }
-        pressures
+        forces
     }
 
     /// The length of contact by the `rows` of Γ_C, m, and the nodes on both sides of each of its ends, which lies
     /// between them. Next to a node without a row, which has a prescribed displacement, contact goes on up to it. At the
     /// end of Γ_C a light pressure may hide a short open part.
-    pub(super) fn length(&self, rows: &[ContactRow]) -> (f64, Vec<[[f64; 2]; 2]>) {
+    pub fn length(&self, rows: &[ContactRow]) -> (f64, Vec<[[f64; 2]; 2]>) {
         /// Smaller pressures than this fraction of the largest are light.
         const LIGHT: f64 = 0.05;
         let (mut length, mut ends) = (0.0, Vec::new());
         for part in rows.chunk_by(|a, b| (&a.boundary, a.part) == (&b.boundary, b.part)) {
             let [first, .., last] = part else { continue };
-            let is_here = |of: &&Station| (&of.name, of.part) == (&first.boundary, first.part);
-            let whole = self.stations.iter().rfind(is_here).map(|end| end.arc_length);
+            let rows = self.stations.iter().map(|station| &station.row);
+            let is_here =
+                |of: &&ContactRow| (&of.boundary, of.part) == (&first.boundary, first.part);
+            let whole = rows.rev().find(is_here).map(|end| end.arc_length);
             length += f64::from(first.active) * first.arc_length;
             length += f64::from(last.active) * whole.map_or(0.0, |all| all - last.arc_length);
             let largest = part.iter().fold(0.0, |most, row| f64::max(most, row.pressure));

@@ -3,13 +3,14 @@
 use super::DiscreteProblem;
 use crate::scene::{Expression, Stepping};
 use serde::{Deserialize, Serialize};
+use std::iter;
 
 /// The figures of a [`StepRecord`](crate::evolution::StepRecord) that have an error bar.
 const OF_RECORD: [&str; 5] = ["work", "displacement_max", "contact_force", "zeta_min", "zeta_mean"];
-/// The extremes of a state that have an error bar: stresses, the largest contact pressure, Pa, and the length of
-/// contact, m. Bodies without Γ_C have the first three, which are a group.
-const EXTREMES: [&str; 5] =
-    ["von_mises_max", "principal_max", "principal_min", "pressure_max", "contact_length"];
+/// The extreme stresses of the body, and of each of several materials; and the extremes on Γ_C, of the whole and of
+/// each of several foundations: the largest contact pressure, Pa, and the length of contact, m.
+const STRESSES: [&str; 3] = ["von_mises_max", "principal_max", "principal_min"];
+const CONTACT: [&str; 2] = ["pressure_max", "contact_length"];
 /// The groups of the supports' forces and moments.
 const FORCES: &str = "forces";
 const MOMENTS: &str = "moments";
@@ -77,6 +78,12 @@ impl Bar {
     }
 }
 
+/// `None` for the whole, and each of the `parts` if there are several.
+pub(crate) fn whole_and_parts<T>(parts: &[T]) -> impl Iterator<Item = Option<&T>> {
+    let several = if parts.len() > 1 { parts } else { &[] };
+    iter::once(None).chain(several.iter().map(Some))
+}
+
 impl DiscreteProblem {
     fn figures(&self) -> Vec<Figure> {
         use Dimension::{ContactLength, Damage, Force, Length, Moment, Stress, Work};
@@ -92,20 +99,27 @@ impl DiscreteProblem {
                 // The scale of a damage at a point is the maximum damage of the body.
                 "zeta" => (Damage, "zeta_min".to_owned()),
                 "zeta_min" | "zeta_mean" => (Damage, name.clone()),
-                "pressure_max" => (Stress, name.clone()),
-                "contact_length" => (ContactLength, name.clone()),
+                "pressure_max" => (Stress, kind.to_owned()),
+                "contact_length" => (ContactLength, kind.to_owned()),
                 _ => (Stress, format!("stress of {of}")),
             };
             Figure { dimension, group, name }
         };
         let of_record = OF_RECORD.map(str::to_owned).into_iter();
-        let extremes = self.extremes().into_iter().map(str::to_owned);
-        of_record.chain(self.quantities()).chain(extremes).map(figure).collect()
+        of_record.chain(self.quantities()).chain(self.extremes()).map(figure).collect()
     }
 
-    /// The names of the extremes of a state.
-    pub(crate) fn extremes(&self) -> Vec<&'static str> {
-        EXTREMES[..if self.has_contact() { 5 } else { 3 }].to_vec()
+    /// The names of the extremes of a state. With several materials or foundations each has its own too.
+    pub(crate) fn extremes(&self) -> Vec<String> {
+        let named = |of: Option<&String>, name: &str| match of {
+            Some(of) => format!("{of}.{name}"),
+            None => name.to_owned(),
+        };
+        let materials = whole_and_parts(&self.materials).map(|of| of.map(|(_, name)| name));
+        let stresses = materials.flat_map(|of| STRESSES.map(|name| named(of, name)));
+        let of_contact = CONTACT.iter().filter(|_| self.has_contact());
+        let foundations = |name| whole_and_parts(&self.foundations).map(move |of| named(of, name));
+        stresses.chain(of_contact.flat_map(|name| foundations(name))).collect()
     }
 
     pub(crate) fn figure_names(&self) -> Vec<String> {

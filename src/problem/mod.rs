@@ -13,6 +13,7 @@
 
 mod boundary_conditions;
 mod collapse;
+mod contact_figures;
 mod contact_line;
 mod error;
 mod figures;
@@ -26,11 +27,11 @@ mod supports;
 mod unresolved;
 
 pub use collapse::Collapse;
-use contact_line::ContactLine;
-pub use contact_line::ContactRow;
+pub(crate) use contact_figures::rows_of;
+pub use contact_line::{ContactLine, ContactRow};
 pub use error::SetupError;
-pub(crate) use figures::NEGLIGIBLE_DAMAGE;
 pub use figures::{Bar, Dimension};
+pub(crate) use figures::{NEGLIGIBLE_DAMAGE, whole_and_parts};
 pub(crate) use load_case::LoadCase;
 pub(crate) use loads::LoadCurve;
 pub use loads::Loads;
@@ -77,6 +78,9 @@ pub struct DiscreteProblem {
     pub(crate) largest_load: f64,
     /// KKT tolerance.
     pub tolerance: f64,
+    /// The numbers and names of the materials of the body, and the names of the foundations.
+    pub(crate) materials: Vec<(usize, String)>,
+    pub(crate) foundations: Vec<String>,
     scene: Scene,
     /// The collapse at which the run ends early, if the loads drive an unsupported motion.
     pub collapse: Option<Collapse>,
@@ -110,6 +114,7 @@ impl DiscreteProblem {
         let supports = Supports::new(&scene, &body, &conditions);
         let norms = (scene.sample_times(SAMPLES).into_iter())
             .map(|time| body.nodes.partition.norm(&loads.at(&body, time), 2));
+        let foundations = scene.boundaries.iter().filter(|boundary| boundary.gap().is_some());
         let problem = Self {
             largest_load: norms.filter(|norm| norm.is_finite()).fold(0.0, f64::max),
             certificate,
@@ -121,6 +126,8 @@ impl DiscreteProblem {
             supports,
             probes: Probes::new(&scene, &body)?,
             tolerance: scene.contact.tolerance,
+            materials: scene.materials_in(&body.materials),
+            foundations: foundations.map(|boundary| boundary.name.clone()).collect(),
             body,
             scene,
             undivided: None,
@@ -150,7 +157,7 @@ impl DiscreteProblem {
 
     /// Is there a Γ_C?
     pub fn has_contact(&self) -> bool {
-        self.scene.boundaries.iter().any(|boundary| boundary.gap().is_some())
+        !self.foundations.is_empty()
     }
 
     /// The damage law of each material, by its number; `None` if the damage does not evolve.

@@ -1,6 +1,6 @@
 //! The boundaries that support the body and the forces they exert.
 
-use super::{ContactLine, ContactRow, State, boundary_conditions::BoundaryConditions};
+use super::{ContactLine, boundary_conditions::BoundaryConditions};
 use crate::{
     contact::ContactPoint,
     fem::{Body, Subdomain},
@@ -16,7 +16,7 @@ pub struct Supports {
     /// Per node with a prescribed displacement: its prescribed directions.
     prescribed: BTreeMap<usize, Vec<Prescribed>>,
     /// Γ_C.
-    line: ContactLine,
+    pub contact: ContactLine,
 }
 
 /// A force on the body, or a direction in which its displacement is prescribed, with the number of the boundary.
@@ -34,7 +34,7 @@ impl Supports {
             let curve = body.mesh.curves.get(name);
             if let (Some(gap), Some(number), Some(curve)) = (boundary.gap(), number, curve) {
                 let edges = body.edges(&curve.edges);
-                supports.line.add((number, name), gap.normal, &body.nodes.points, &edges);
+                supports.contact.add((number, name), gap.normal, &body.nodes.points, &edges);
             }
         }
         supports
@@ -46,27 +46,8 @@ impl Supports {
         Self {
             names: self.names.clone(),
             prescribed: prescribed.filter_map(|(n, of)| Some((own(n)?, of.clone()))).collect(),
-            line: self.line.restrict(own),
+            contact: self.contact.restrict(own),
         }
-    }
-
-    /// The rows of Γ_C in a state, boundary by boundary and along each; every rank gets all rows. Collective.
-    pub fn contact_rows(&self, body: &Body, state: &State) -> Vec<ContactRow> {
-        self.line.rows(body, state).0
-    }
-
-    /// As [`Self::contact_rows`], with the pressure at this rank's nodes of Γ_C, Pa. Collective.
-    pub(crate) fn contact(
-        &self,
-        body: &Body,
-        state: &State,
-    ) -> (Vec<ContactRow>, Vec<(usize, f64)>) {
-        self.line.rows(body, state)
-    }
-
-    /// The length of contact: see [`ContactLine::length`].
-    pub(crate) fn contact_length(&self, rows: &[ContactRow]) -> (f64, Vec<[[f64; 2]; 2]>) {
-        self.line.length(rows)
     }
 
     /// Per boundary: (F_x, F_y, M), this rank's part, with F = Σ R_i, N per metre of thickness, and M = Σ x_i × R_i
@@ -92,7 +73,8 @@ impl Supports {
             .collect();
         for point in contact {
             let force = point.normal.map(|n| -point.force * n);
-            for (boundary, share) in self.line.boundaries(point) {
+            for (station, share) in self.contact.shares(point) {
+                let boundary = self.contact.stations[station].boundary;
                 add(boundary, point.node, force.map(|f| share * f));
             }
             if let Some([x, y]) = rest.get_mut(&point.node) {

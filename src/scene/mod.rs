@@ -172,6 +172,13 @@ impl Scene {
         if self.time.is_some() { 0.0 } else { 1.0 }
     }
 
+    /// The numbers and names of the materials with these `numbers`; 0 is `material`.
+    pub(crate) fn materials_in(&self, numbers: &[u32]) -> Vec<(usize, String)> {
+        let names = iter::once("material").chain(self.surfaces.keys().map(String::as_str));
+        let found = names.enumerate().filter(|(number, _)| numbers.contains(&(*number as u32)));
+        found.map(|(number, name)| (number, name.to_owned())).collect()
+    }
+
     /// The times at which expressions are evaluated and checked before the run, s: all t_n, or about `most`
     /// (at least 1) evenly chosen ones. For adaptive steps a hundred times; without a time grid t = 1.
     pub fn sample_times(&self, most: usize) -> Vec<f64> {

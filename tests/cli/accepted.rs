@@ -11,7 +11,9 @@ const KEYS: &str = "quantities provenance scene title solver ranks nodes triangl
 const COLUMNS: &str = "step time zeta_min zeta_mean displacement_max work contact_force active_nodes iterations \
     linear_iterations factorisations fallbacks contraction kkt_stationarity kkt_primal \
     kkt_dual kkt_complementarity zeta_residual zeta_error seconds left.force_x left.force_y \
-    left.moment bottom.force_x bottom.force_y bottom.moment";
+    left.moment bottom.force_x bottom.force_y bottom.moment bottom.contact_length \
+    bottom.pressure_max bottom.contact_start_x bottom.contact_start_y bottom.contact_end_x \
+    bottom.contact_end_y bottom.peak_x bottom.peak_y bottom.acts_at_x bottom.acts_at_y";
 
 fn keys(value: &Value) -> Vec<&str> {
     let mut keys: Vec<&str> = value.as_object().expect("an object").keys().map(|k| &**k).collect();

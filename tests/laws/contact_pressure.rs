@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 
 /// The rows of Γ_C by boundary and part.
 fn parts(problem: &DiscreteProblem, state: &State) -> Vec<Vec<ContactRow>> {
-    let rows = problem.supports.contact_rows(&problem.body, state);
+    let rows = problem.supports.contact.rows(&problem.body, state).0;
     let parts = rows.chunk_by(|a, b| (&a.boundary, a.part) == (&b.boundary, b.part));
     parts.map(<[ContactRow]>::to_vec).collect()
 }
@@ -137,4 +137,41 @@ fn the_profile_of_hertz_converges_at_first_order() {
             assert!(distance < 0.5 * edge, "P{degree}, {size}: {distance} for {edge}");
         }
     }
+}
+
+#[test]
+fn a_foundation_has_its_length_its_ends_and_its_line_of_action() {
+    // Uniform pressure 3 on two halves: each one carries it in its middle.
+    let text = "contact.tolerance = 1e-12
+                material = { young = 200, poisson = 0.3, plane = 'stress' }
+                boundary = [{ name = 'left', symmetry = true }, { name = 'near', gap = 0 },
+                            { name = 'far', gap = 0 }, { name = 'top', traction = [0, -3] }]";
+    let flat = problem(divided(square(6), 0.5), text).unwrap_or_else(|e| panic!("{e}"));
+    let state = run(&flat, SOLVERS[0]).last.state;
+    let found = flat.contact_columns().into_iter().zip(flat.contact_figures(&state));
+    for (name, value) in found.filter(|(name, _)| !name.contains("peak")) {
+        let (of, figure) = name.split_once('.').unwrap();
+        let start = if of == "near" { 0.0 } else { 0.5 };
+        let expected = match figure {
+            "contact_length" => 0.5,
+            "pressure_max" => 3.0,
+            "contact_start_x" => start,
+            "contact_end_x" => start + 0.5,
+            "acts_at_x" => start + 0.25,
+            _ => 0.0,
+        };
+        assert!((value - expected).abs() < 1e-9, "{name} is {value}");
+    }
+    // On a curved foundation too, the force at this point has the moment of the reactions.
+    let round = shipped("hertz", &[]);
+    let last = run(&round, SOLVERS[0]).last;
+    let names = [round.quantities(), round.contact_columns()].concat();
+    let values = [last.quantities, round.contact_figures(&last.state)].concat();
+    let value = |name: &str| {
+        values[names.iter().position(|other| *other == format!("foundation.{name}")).unwrap()]
+    };
+    let moment = value("acts_at_x") * value("force_y") - value("acts_at_y") * value("force_x");
+    close_to(moment, value("moment"), 1e-9);
+    assert!((value("contact_length") - value("contact_end_x")).abs() < 2e-4);
+    assert!(value("contact_start_x").abs() < 1e-12 && value("peak_x") < 1e-3);
 }

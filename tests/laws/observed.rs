@@ -122,7 +122,7 @@ fn rounding_is_shown_as_zero() {
     for solver in SOLVERS {
         let problem = problem(distorted(8), text).unwrap_or_else(|e| panic!("{e}"));
         let last = run(&problem, solver).last;
-        let rows = problem.supports.contact_rows(&problem.body, &last.state);
+        let rows = problem.supports.contact.rows(&problem.body, &last.state).0;
         let open: Vec<_> = rows.iter().filter(|row| row.active == 0).collect();
         assert!(!open.is_empty() && open.len() < rows.len(), "{solver}");
         assert!(open.iter().all(|row| row.pressure == 0.0), "{solver}: {open:?}");
@@ -152,7 +152,7 @@ fn the_contact_boundary_is_a_line() {
                             { name = 'right', traction = [-2, 0] }]";
     let problem = problem(distorted(6), text).unwrap_or_else(|e| panic!("{e}"));
     let state = run(&problem, "active-set").last.state;
-    let rows = problem.supports.contact_rows(&problem.body, &state);
+    let rows = problem.supports.contact.rows(&problem.body, &state).0;
     for (name, pressure) in [("left", 2.0), ("bottom", 3.0)] {
         let rows: Vec<_> = rows.iter().filter(|row| row.boundary == name).collect();
         assert_eq!(rows.len(), 7);

@@ -50,7 +50,7 @@ pub(super) fn bars(
         (squares / changes.len() as f64).sqrt().max(changes[INSTANTS][i].abs())
     };
     let mut errors: Vec<f64> = (0..changes[0].len()).map(change).collect();
-    let [before, now] = [coarse, fine].map(|run| run.extremes().values(run.problem));
+    let [before, now] = [coarse, fine].map(|run| run.extremes().values());
     errors.extend(now.iter().zip(before).map(|(now, before)| (now - before).abs()));
     errors.iter_mut().for_each(|error| *error *= factor);
     let mut bars = coarse.problem.bars(&errors, &fine.scales(grows));

@@ -131,7 +131,8 @@ impl<'a> FewStepRun<'a> {
     pub(super) fn open(&self) -> f64 {
         let half = |[[ax, ay], [bx, by]]: &[[f64; 2]; 2]| 0.5 * (bx - ax).hypot(by - ay);
         let open: f64 = self.extremes().ends.iter().map(half).sum();
-        if open > 0.0 { open / self.history.sizes_of_extremes[4] } else { 0.0 }
+        let length = self.extremes().of_points.len();
+        if open > 0.0 { open / self.history.sizes_of_extremes[length] } else { 0.0 }
     }
 
     /// The points at which a finer mesh may change figures: probes, extremes, singular points, and min ζ; at ζ_* min ζ
@@ -243,7 +244,7 @@ impl History {
         let recovered = RecoveredStrains::on(&self.stress.patches, body, strained.strains)?;
         let stresses = self.stress.by_fits(&recovered.fits, &strained.zeta);
         let extremes = Extremes::new(problem, state, &self.stress, &stresses);
-        enlarge(&mut self.sizes_of_extremes, extremes.values(problem));
+        enlarge(&mut self.sizes_of_extremes, extremes.values());
         self.extremes = extremes;
         let error = recovered.energy_error(&problem.elasticity, &zeta, &state.u);
         let squares = gathered(problem, &error.squares, self.squares.len());

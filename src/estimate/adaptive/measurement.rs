@@ -96,7 +96,7 @@ pub(super) struct Measurement {
     /// Per triangle: max |Δζ|; empty without damage.
     zeta: Vec<f64>,
     /// The names of the extremes.
-    extremes: Vec<&'static str>,
+    extremes: Vec<String>,
     /// The names of figures at points, or of probes, with these points, m.
     places: Vec<(String, [f64; 2])>,
 }
@@ -161,17 +161,18 @@ impl Measurement {
         let extremes = fine.extremes();
         let named = extremes.named(&coarse.problem.singular_points());
         let probes = scene.probes.iter().map(|probe| (probe.name.clone(), probe.point));
-        let of_extremes = named.iter().map(|extreme| (extreme.name.to_owned(), extreme.at));
-        self.places = probes.chain(of_extremes).collect();
+        let of_extremes = named.iter().map(|extreme| (extreme.name.clone(), extreme.at));
+        // A material may have the name of a probe.
+        self.places = of_extremes.chain(probes).collect();
         self.extremes = coarse.problem.extremes();
         let grows = named.iter().zip(extremes.grow(|at| size_at(mesh, at)));
         let grows = grows.filter(|(extreme, grows)| *grows || extreme.singular.is_some());
-        self.grows = grows.map(|(extreme, _)| extreme.name.to_owned()).collect();
+        self.grows = grows.map(|(extreme, _)| extreme.name.clone()).collect();
         self.bars = bars(coarse, fine, factor, &self.grows);
     }
 
     /// The names of the extremes.
-    pub(super) fn extremes(&self) -> &[&'static str] {
+    pub(super) fn extremes(&self) -> &[String] {
         &self.extremes
     }
 

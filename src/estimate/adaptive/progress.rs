@@ -46,12 +46,8 @@ impl<'a> Progress<'a> {
         let errors = measured.errors(&[]).into_iter();
         let errors = errors.map(|error| (error.excess(self.accuracy), error.name));
         self.excesses.push((triangles, errors.map(|(excess, name)| (name, excess)).collect()));
-        let stay = measured
-            .extremes()
-            .iter()
-            .filter(|name| self.stays(name))
-            .map(|name| (*name).to_owned());
-        let stay: Vec<String> = stay.collect();
+        let stay = measured.extremes().iter().filter(|name| self.stays(name));
+        let stay: Vec<String> = stay.cloned().collect();
         self.grows.extend(stay);
         measured.leave_out(&self.grows);
         measured
