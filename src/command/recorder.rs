@@ -17,7 +17,7 @@ use signorini::{
         write_whole,
     },
     problem::DiscreteProblem,
-    scene::{Stepping, rounded},
+    scene::{APART, Stepping, rounded},
 };
 use std::time::Instant;
 
@@ -88,13 +88,16 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Whether a step gets a frame. Without `output.every` there are additional frames after 1, 2, 4, … steps,
+    /// Whether a step gets a frame. Without `output.every` and `output.times` there are additional frames after 1, 2, 4, … steps,
     /// for runs that end early.
     fn is_frame(&self, StepRecord { step: n, time, .. }: &StepRecord) -> bool {
         let scene = self.task.problem.scene();
         let Some(grid) = scene.time else { return true };
+        let (times, apart) = (&scene.output.times, APART * grid.end);
+        let is_asked = times.iter().any(|asked| (asked - time).abs() <= apart);
         match (scene.output.every, grid.stepping) {
-            (Some(every), _) => every > 0 && n.is_multiple_of(every),
+            (None, _) if !times.is_empty() => is_asked,
+            (Some(every), _) => is_asked || (every > 0 && n.is_multiple_of(every)),
             (None, Stepping::Uniform { steps }) => {
                 let every = steps.div_ceil(FRAMES);
                 n.is_multiple_of(every) || (*n < every && n.is_power_of_two())

@@ -27,7 +27,7 @@ pub use boundary::{Boundary, Condition, Gap, SurfaceLoad};
 pub use error::SceneError;
 pub use expression::{Expression, ExpressionError};
 pub use schema::SCHEMA;
-pub use time::{Scheme, Stepping, TimeGrid, rounded};
+pub use time::{APART, Scheme, Stepping, TimeGrid, rounded};
 pub use units::Units;
 
 use crate::{
@@ -135,11 +135,14 @@ pub struct Probe {
 }
 
 /// Options of the results.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OutputOptions {
     /// The number of steps between two frames, 0 for no frames; `None` for about 20 frames.
     pub every: Option<usize>,
+    /// Times of frames, s, at which steps end.
+    #[serde(default)]
+    pub times: Vec<f64>,
     /// The time between two checkpoints, s; 0 for no checkpoints.
     pub checkpoint: f64,
 }

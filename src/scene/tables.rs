@@ -5,7 +5,8 @@ use super::boundary::{Boundary, boundary};
 use super::expression::Expression;
 use super::schema::{Diagnostic, Diagnostics, is_wrong};
 use super::{
-    Damage, MeshSource, Probe, Scene, Scheme, Stepping, Surface, TimeGrid, Units, may_start_at,
+    Damage, MeshSource, OutputOptions, Probe, Scene, Scheme, Stepping, Surface, TimeGrid, Units,
+    may_start_at,
 };
 use crate::{
     contact::{self, ContactOptions},
@@ -43,6 +44,13 @@ pub(super) fn scene(found: &mut Diagnostics) -> Option<Scene> {
     let laws = found.build("damage", surfaces).unwrap_or_default();
 
     let material: Material = material?;
+    let times = output.iter().flat_map(|output: &OutputOptions| &output.times);
+    let is_missed =
+        |at: &&f64| !time.is_some_and(|grid: TimeGrid| grid.reaches(**at, accuracy.is_some()));
+    if let Some(at) = times.clone().find(is_missed) {
+        let cure = "set time.step = \"auto\", or times of steps";
+        found.note("output.times", format!("has t = {at} s, at which no step ends; {cure}"));
+    }
     let weightless = material.density == 0.0 && materials.iter().all(|(_, of)| of.density == 0.0);
     let pulls = gravity.iter().flatten().any(|g| g.as_constant() != Some(0.0));
     if weightless && pulls {

@@ -2,6 +2,9 @@
 
 use serde::Deserialize;
 
+/// Times that differ by less than this fraction of the run count as one.
+pub const APART: f64 = 1e-9;
+
 /// The time of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimeGrid {
@@ -52,6 +55,15 @@ impl TimeGrid {
     pub fn uniform(end: f64, step: f64) -> Self {
         let steps = (end / step - 1e-9).ceil().max(1.0) as usize;
         Self { end, step: Some(step), stepping: Stepping::Uniform { steps }, scheme: Scheme::Euler }
+    }
+
+    /// Can a step end at `time`? With an accuracy the program chooses the steps.
+    pub(super) fn reaches(&self, time: f64, is_accurate: bool) -> bool {
+        let steps = match self.stepping {
+            Stepping::Uniform { steps } if !is_accurate => time / self.end * steps as f64,
+            _ => 0.0,
+        };
+        time <= self.end && (steps - steps.round()).abs() <= APART * steps
     }
 
     /// A note if the given step does not divide the end.

@@ -217,6 +217,28 @@ fn chosen_steps_have_about_twenty_frames() {
 }
 
 #[test]
+fn frames_are_at_the_times_asked_for() {
+    let test_directory = TestDirectory::new();
+    let times = [0.123, 0.5, 0.777];
+    let set = ["--set", "output.times=[0.777, 0.123, 0.5]", "--set"];
+    for step in ["time.step=auto", "accuracy=0.05", "time.step=0.001"] {
+        test_directory.run(&[&set[..], &[step]].concat());
+        let frames = test_directory.frames("out/scene");
+        let found: Vec<f64> = frames.iter().map(|(time, _)| *time).collect();
+        assert_eq!(found.len(), 4, "{found:?}");
+        for (found, time) in found.iter().zip(times.into_iter().chain([1.0])) {
+            // The n-th of equal steps has the rounding of n/1000.
+            let is_there =
+                if step.ends_with("1") { (found - time).abs() < 1e-12 } else { *found == time };
+            assert!(is_there, "{step}: {found} for {time}");
+        }
+        let (columns, rows) = test_directory.history("out/scene");
+        let column = columns.iter().position(|name| name == "time").expect("times");
+        assert!(found.iter().all(|time| rows.iter().any(|row| row[column] == *time)));
+    }
+}
+
+#[test]
 fn what_others_put_into_the_folder_stays_but_figures_of_an_earlier_run() {
     let test_directory = TestDirectory::new();
     let others =

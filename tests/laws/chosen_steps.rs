@@ -50,6 +50,26 @@ fn the_damage_done_is_within_the_tolerance_with_fewer_steps_than_uniform_ones() 
 }
 
 #[test]
+fn steps_end_at_the_times_of_output_and_are_no_more_than_these_take() {
+    let run = |sets: &[&str]| {
+        let plain = ["discretisation.displacement=1", "mesh.parameters.grading=1", "mesh.size=1"];
+        history(&shipped("lshape", &[&plain[..], &["time.step=auto"], sets].concat()), SOLVERS[0])
+    };
+    let (free, _) = run(&[]);
+    let (steps, outcome) = run(&["output.times=[0.9, 0.1234, 0.12341]"]);
+    for time in [0.1234, 0.12341, 0.9, 1.0] {
+        assert!(steps.iter().any(|step| step.state.time == time), "{time}");
+    }
+    let lengths = steps.windows(2).map(|pair| pair[1].state.time - pair[0].state.time);
+    assert!(lengths.fold(1.0, f64::min) > 0.9e-5);
+    // Two times that are near need a short step, after which the steps double: 1e-5 · 2¹² = 0.04.
+    println!("{} steps, {} with times, {} rejected", free.len(), steps.len(), outcome.rejected);
+    assert!(steps.len() <= free.len() + 2 * 3 + 12);
+    let differ = (done(&steps)[0] / done(&free)[0] - 1.0).abs();
+    assert!(differ < 0.01, "{differ}");
+}
+
+#[test]
 fn a_load_that_closes_the_gap_between_two_steps_is_noticed() {
     // Nothing for half of the run, then all at once: the body falls on the foundation.
     let load = "-80*min(1, max(0, 1000*(t - 0.503)))";

@@ -6,7 +6,7 @@ use crate::{
     evolution::{DiscreteProblem, LoadCurve},
     fem::Body,
     problem::NEGLIGIBLE_DAMAGE,
-    scene::Stepping,
+    scene::{APART, Stepping},
 };
 use nalgebra::DVector;
 
@@ -16,8 +16,9 @@ pub(super) struct ErrorControl<'a> {
     tolerance: f64,
     /// The damage expected at the end, as in [`Stepping::Auto`].
     expected: [f64; 2],
-    /// T, s.
+    /// T and the times at which steps end besides T, s.
     end: f64,
+    times: &'a [f64],
     /// The loads in time; `None` if they are constant.
     load_curve: Option<LoadCurve<'a>>,
     forecast: Forecast,
@@ -59,6 +60,7 @@ impl<'a> ErrorControl<'a> {
             tolerance,
             expected,
             end: grid.end,
+            times: &problem.scene().output.times,
             forecast: Forecast::new(load_curve.as_ref(), grid.end),
             load_curve,
             next_length: first_length.min(LONGEST * grid.end),
@@ -82,12 +84,15 @@ impl<'a> ErrorControl<'a> {
     /// The end and the length, s, of the step from `start`. Within it the loads are nearly linear in time, unless
     /// they jump. `None` at the end of the run.
     pub(super) fn next_step(&mut self, start: f64) -> Option<(f64, f64)> {
+        let apart = APART * self.end;
+        let is_ahead = |time: &f64| start + apart < *time && *time < self.end - apart;
+        let target = self.times.iter().copied().filter(is_ahead).fold(self.end, f64::min);
         loop {
-            let rest = self.end - start;
-            // The last two steps are equal, so that neither is very short.
+            let rest = target - start;
+            // The last two steps to a target are equal, so that neither is very short.
             let (time, length) = match rest / self.next_length {
                 _ if start >= self.end => return None,
-                steps if steps <= 1.0 => (self.end, rest),
+                steps if steps <= 1.0 => (target, rest),
                 steps if steps < 2.0 => (start + 0.5 * rest, 0.5 * rest),
                 _ => (start + self.next_length, self.next_length),
             };

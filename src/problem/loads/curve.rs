@@ -3,15 +3,13 @@
 use crate::{
     mesh::bounds,
     problem::DiscreteProblem,
-    scene::{Condition, Expression, Stepping, TimeGrid},
+    scene::{APART, Condition, Expression, Stepping, TimeGrid},
 };
 
 /// Loads count as linear in time if they deviate from a straight line by at most this fraction of the largest.
 const DEVIATION: f64 = 0.05;
 /// Loads pass by within a step if their sum deviates from a straight line by more than this fraction.
 const PASSING: f64 = 0.5;
-/// Times that differ by less than this fraction of the run count as one.
-const APART: f64 = 1e-9;
 /// Number of uniform steps sampled for the note about loads within a step.
 const STEPS: usize = 50;
 /// Number of times sampled within a step.
