@@ -5,7 +5,7 @@ use super::{
     few_step_run::FewStepRun,
     finer::touching,
     measurement::{Cause, Measurement},
-    sizes::{MIN_RATIO, influences, size_ratios},
+    sizes::{influences, size_ratios},
 };
 use crate::{
     evolution::AIM,
@@ -19,6 +19,9 @@ use std::{collections::HashSet, mem::take};
 /// A mesh is good enough for a measurement if its estimates are at most this fraction of the required accuracy.
 /// With half of it accuracies are missed, as it is below [`AIM`]; with twice, meshes have up to twice as many triangles.
 const ENOUGH: f64 = 0.8;
+/// If measured errors are too large, a round reduces the estimated errors by at most this factor: excesses on coarse meshes
+/// are often far too large.
+const MIN_GOAL: f64 = 0.25;
 /// The time steps may use the part of the accuracy that the mesh leaves, but at most this fraction: their true error may
 /// be twice the estimated one. Half of it takes up to a third more steps.
 const MAX_SHARE_OF_STEPS: f64 = 0.5;
@@ -163,7 +166,7 @@ impl<'a> Round<'a> {
             ratios.iter_mut().zip(others).for_each(|(ratio, other)| *ratio = ratio.min(other));
         };
         for (excess, cause) in self.missed(measured) {
-            let goal = (AIM / excess).max(MIN_RATIO);
+            let goal = (AIM / excess).max(MIN_GOAL);
             match cause {
                 Cause::Ends | Cause::Reactions => {}
                 Cause::Change(zeta) => {

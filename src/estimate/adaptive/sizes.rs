@@ -5,13 +5,11 @@
 
 use super::finer::touching;
 use crate::mesh::{Mesh, MeshError, Refinement, TIES, twice_area};
-use std::f64::consts::SQRT_2;
 
-/// Minimum factor by which a round multiplies the size of a triangle or an error: coarse meshes overestimate errors.
-pub(super) const MIN_RATIO: f64 = 0.25;
-/// Triangles are bisected while they are larger than this many times their wanted area; see [`oversize`]. Bisection
-/// halves areas, so they end between 1/√2 and √2 times the wanted ones.
-const OVERSIZE: f64 = SQRT_2;
+/// Minimum factor by which the size of a triangle is multiplied in a round.
+const MIN_RATIO: f64 = 0.125;
+/// Triangles are bisected while they are larger than this many times their wanted area; see [`oversize`].
+const OVERSIZE: f64 = 1.5;
 
 /// The factors for the sizes of the triangles, so that the squared relative error Σ m_T (`shares`) becomes `aim`².
 pub(super) fn size_ratios(shares: &[f64], order: i32, aim: f64) -> Vec<f64> {
