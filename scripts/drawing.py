@@ -54,6 +54,8 @@ plt.rcParams.update({
 })
 
 
+# The least number of letters in a line of a title.
+SHORTEST = 12
 # The width of every figure, inches, or None for widths of their own.
 WIDTH = None
 
@@ -109,29 +111,35 @@ def headline(results, text):
 
 
 def wrap_titles(figure):
-    """Breaks the lines of titles that are wider than their axes, and of the titles above all axes of a figure or
-    subfigure."""
-    figure.get_layout_engine().execute(figure)
-    titles = []
-    for part in figure.subfigs or [figure]:
-        boxes = [axes.get_window_extent() for axes in part.axes]
-        whole = max(box.x1 for box in boxes) - min(box.x0 for box in boxes)
-        titles += [(axes.title, box.width) for axes, box in zip(part.axes, boxes)]
-        titles += [(part._suptitle, whole)] if part._suptitle else []
-    for title, room in titles:
-        width = title.get_window_extent().width
-        if width > room:
-            lines = title.get_text().split("\n")
-            letters = int(max(map(len, lines)) * max(room, 2.2 * figure.dpi) / width)
-            # The parts of a line are about equally long.
-            parts = [max(1, -(-len(line) // letters)) for line in lines]
-            rooms = [min(letters, len(line) // part + 8) for line, part in zip(lines, parts)]
-            title.set_text("\n".join(map(textwrap.fill, lines, rooms)))
+    """Breaks the lines of titles that are wider than their axes, first of the titles above all axes of a figure or
+    subfigure: these make the axes smaller."""
+    for of_axes in (False, True):
+        figure.get_layout_engine().execute(figure)
+        for part in figure.subfigs or [figure]:
+            for axes in part.axes:
+                axes.apply_aspect()
+            boxes = [axes.get_window_extent() for axes in part.axes]
+            if of_axes:
+                for axes, box in zip(part.axes, boxes):
+                    _wrap(axes.title, box.width)
+            elif part._suptitle:
+                _wrap(part._suptitle, max(box.x1 for box in boxes) - min(box.x0 for box in boxes))
+
+
+def _wrap(title, room):
+    """Breaks the lines of a title into parts that are about equally long, until it is not wider than `room`, pixels."""
+    lines = title.get_text().split("\n")
+    letters = max(map(len, lines))
+    while (width := title.get_window_extent().width) > room and letters > SHORTEST:
+        letters = min(letters - 1, int(letters * room / width) + 1)
+        parts = [max(1, -(-len(line) // letters)) for line in lines]
+        rooms = [min(letters, len(line) // part + 8) for line, part in zip(lines, parts)]
+        title.set_text("\n".join(textwrap.fill(line, room, break_long_words=False) for line, room in zip(lines, rooms)))
 
 
 def map_size(extent, across):
     """The size, inches, of a map with equal aspect that is `across` wide including ticks and labels."""
-    least, most = (1.6, 1.2 * WIDTH) if WIDTH else (2.2, 8.0)
+    least, most = (1.4, 1.2 * WIDTH) if WIDTH else (2.2, 8.0)
     return across, float(np.clip((across - 1.0) * extent[1] / extent[0] + 0.9, least, most))
 
 

@@ -19,6 +19,7 @@ pressure as animations.
 
 import argparse
 import os
+import re
 import sys
 from dataclasses import replace
 from math import inf, isfinite
@@ -90,6 +91,8 @@ def arguments_of(prog):
         "also animations of damage (or stress) and pressure: gif, or mp4 by ffmpeg (default: gif)"))
     parser.add_argument("--paraview", action="store_true", help=(
         "only write open_in_paraview.py, for `paraview --script=OUT/open_in_paraview.py`"))
+    # Not only single numbers: a list that starts with a negative number is no option either.
+    parser._negative_number_matcher = re.compile(r"-[\d.]")
     arguments = parser.parse_args()
     if unknown := set(arguments.format) - set(FORMATS):
         parser.error(f"--format: {', '.join(unknown)} is none of {', '.join(FORMATS)}")

@@ -38,7 +38,7 @@ def stress_top(state, stress):
     areas = np.abs((bx - ax) * (cy - ay) - (cx - ax) * (by - ay)) * state.shown
     means = stress[state.pieces.elements[:, :3]].mean(axis=1)
     top, largest = _exceeded_in(0.005, means, areas), stress.max()
-    return top if largest > (1.25 if state.singular else 4.0) * top > 0.0 else largest
+    return top if largest > (1.25 if state.singular() else 4.0) * top > 0.0 else largest
 
 
 def _pressure_top(state):

@@ -35,7 +35,7 @@ def draw_curves(arguments, styled):
                     values[np.isnan(_values(frame, arguments, "gap")[1])] = np.nan
                 if np.isfinite(values).sum() < 2:
                     contact = quantity in ("normal_pressure", "gap")
-                    why = "name a contact boundary: --along NAME" if contact else "is it outside the body?"
+                    why = "only contact boundaries have it: use --along NAME" if contact else "is it outside the body?"
                     raise ResultError(f"{run.folder}: {quantity} has no values along this line; {why}")
                 label = f"t = {frame.time:g} {units['time']}"
                 label = label if len(runs) == 1 else f"{name}, {label}"

@@ -88,7 +88,9 @@ def draw_stress_and_damage(results, limits, figure=None):
         draw_outline(axes, results.nodes, results, color=INK, linewidth=0.7)
         draw_foundation(axes, results)
         frame(axes, results.nodes, results.units)
-    figure.suptitle(headline(results, results.part))
+    cause = results.singular()
+    text = f"{results.part}; circle: {cause}, the stress grows as the mesh is refined" if cause else results.part
+    figure.suptitle(headline(results, text))
     return figure
 
 
@@ -126,11 +128,11 @@ def _paint_stress(axes, mesh, results, limits):
     factor, unit, _ = draw_stress(axes, mesh, results, results.von_mises, "von Mises stress", limits.stress)
     largest = results.von_mises.max()
     text = f"von Mises stress, largest {three_digits(largest / factor)} {unit}"
-    if not results.singular or not largest:
+    if not results.singular() or not largest:
         return text
     at = results.nodes[results.von_mises.argmax()]
     axes.plot(*at, marker="o", markersize=9, fillstyle="none", color=RED, zorder=5)
-    return f"{text}: singular\n(circle, {results.singular}; it grows as the mesh is refined)"
+    return f"{text}: singular (circle)"
 
 
 def _paint_damage(axes, mesh, results, limits):

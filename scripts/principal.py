@@ -3,6 +3,7 @@
 import numpy as np
 from matplotlib.path import Path
 
+import signorini_results
 from bars import three_digits
 from drawing import INK, canvas, draw_foundation, draw_outline, draw_stress, frame, headline, mesh_of, panels_of
 from limits import stress_top
@@ -20,26 +21,23 @@ def draw_principal(results, _limits, figure=None):
     extent = np.ptp(results.nodes, axis=0)
     size, shape = panels_of(extent)
     figure = canvas(size, figure)
-    panels = figure.subplots(*shape)
-    tension = np.maximum(results.principal[:, 0], 0.0)
-    compression = np.maximum(-results.principal[:, 1], 0.0)
-    turned = results.direction @ np.array([[0.0, 1.0], [-1.0, 0.0]])
-    longest = extent.max() / min(LINES, DENSITY * (size[0] / shape[1] - 1.5))
-    stressed = np.flatnonzero(results.von_mises)
-    places = stressed[_lattice(results.nodes[stressed], longest)]
-    mesh = mesh_of(results, results.nodes)
     # Rounding errors are no stress.
-    tension, compression = (np.where(stress > ROUNDING * results.von_mises.max(), stress, 0.0)
-                            for stress in (tension, compression))
-    least_top = 0.05 * max(stress_top(results, tension), stress_top(results, compression))
-    for axes, name, stress, direction in (
-            (panels[0], "tension", tension, results.direction),
-            (panels[1], "compression", compression, turned)):
-        top = max(stress_top(results, stress), least_top) or 1.0
+    noise = ROUNDING * results.von_mises.max()
+    longest = extent.max() / min(LINES, DENSITY * (size[0] / shape[1] - 1.5))
+    places, values, directions = _principal_at(results, longest)
+    panels = [(name, key, np.where(stress > noise, stress, 0.0), np.maximum(of, 0.0), along) for
+              name, key, stress, of, along in (
+                  ("tension", "principal_max", results.principal[:, 0], values[:, 1], directions[:, :, 1]),
+                  ("compression", "principal_min", -results.principal[:, 1], -values[:, 0], directions[:, :, 0]))]
+    mesh = mesh_of(results, results.nodes)
+    least_top = 0.05 * max(stress_top(results, stress) for _, _, stress, _, _ in panels)
+    for axes, (name, key, stress, of, along) in zip(figure.subplots(*shape), panels):
+        top = max(stress_top(results, stress), least_top)
         factor, unit, top = draw_stress(axes, mesh, results, stress, name, top)
         largest = three_digits(stress.max() / factor)
-        axes.set_title(f"{name}, largest {largest} {unit}" if stress.any() else f"no {name}")
-        _draw_lines(axes, results, direction[places], stress[places] / top, longest, places)
+        singular = ": singular" if results.singular(key) else ""
+        axes.set_title(f"{name}, largest {largest} {unit}{singular}" if stress.any() else f"no {name}")
+        _draw_lines(axes, results, places, longest * np.minimum(of / top, 1.0)[:, None] * along)
         draw_outline(axes, results.nodes, results, color=INK, linewidth=0.7)
         draw_foundation(axes, results)
         frame(axes, results.nodes, results.units)
@@ -47,22 +45,25 @@ def draw_principal(results, _limits, figure=None):
     return figure
 
 
-def _lattice(points, size):
-    """For each cell of this size of a lattice with points in it: the index of the point nearest to its middle."""
-    scaled = (points - points.min(axis=0)) / size
-    cells = np.floor(scaled)
-    distance = np.linalg.norm(scaled - cells - 0.5, axis=1)
-    order = np.lexsort((distance, cells[:, 1], cells[:, 0]))
-    _, first = np.unique(cells[order], axis=0, return_index=True)
-    return order[first]
+def _principal_at(results, spacing):
+    """The points of a regular lattice in the shown part of the body, and the eigenvalues and eigenvectors of the
+    stresses there, in increasing order."""
+    low, extent = results.nodes.min(axis=0), np.ptp(results.nodes, axis=0)
+    counts = np.maximum(1, np.round(extent / spacing).astype(int))
+    steps = (low[k] + (np.arange(count) + 0.5) * extent[k] / count for k, count in enumerate(counts))
+    points = np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 2)
+    state = signorini_results.load(results.folder).frame(results.time)
+    triangles, barycentric = state.locate(points)
+    points = points[results.shown[triangles] & np.isfinite(barycentric[:, 0])]
+    return points, *np.linalg.eigh(state.at(points, "stress")[:, [[0, 2], [2, 1]]])
 
 
-def _draw_lines(axes, results, directions, lengths, longest, places):
-    """Lines centred at nodes, within the body. White under dark lines keeps them visible on all colours."""
-    points, body = results.nodes[places], Path.make_compound_path(*map(Path, results.outline(results.nodes)))
-    half = 0.45 * longest * directions * np.minimum(lengths, 1.0)[:, None]
-    shown = lengths > 0.1
-    ends = np.stack((points - half, points + half, np.full_like(points, np.nan)), axis=1)[shown]
-    for colour, width in (("white", 2.0), (INK, 0.9)):
+def _draw_lines(axes, results, points, lines):
+    """Lines centred at points, within the body. White under dark lines keeps them visible on all colours."""
+    body = Path.make_compound_path(*map(Path, results.outline(results.nodes)))
+    lengths = np.linalg.norm(lines, axis=1)
+    points, half = (of[lengths > 0.1 * lengths.max(initial=0.0)] for of in (points, 0.45 * lines))
+    ends = np.stack((points - half, points + half, np.full_like(points, np.nan)), axis=1)
+    for colour, width in (("white", 1.8), (INK, 0.8)):
         axes.plot(*ends.reshape(-1, 2).T, color=colour, linewidth=width, zorder=3, solid_capstyle="round",
                   clip_path=(body, axes.transData))

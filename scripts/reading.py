@@ -104,7 +104,6 @@ def with_fields(results, time, fields):
         zeta=points["zeta"],
         von_mises=points["von_mises"].astype(float),
         principal=points["principal_stress"].astype(float),
-        direction=points["principal_direction"][:, :2].astype(float),
         pressure=points["normal_pressure"],
         gap=points["gap"],
     )))

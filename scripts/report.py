@@ -176,10 +176,8 @@ def body(results):
     material = scene.get("material", {})
     rows = [("dimensions", f"{high[0] - low[0]:.4g} × {high[1] - low[1]:.4g} {units['length']}"),
             ("plane", str(material.get("plane", "")))]
-    surfaces = {name: {**material, **of} for name, of in material.items() if isinstance(of, dict)}
-    for name, of in {"material": material, **surfaces}.items():
-        words = [f"E = {of['young']:g} {units['stress']}", f"ν = {of['poisson']:g}"] if "young" in of else []
-        rows.append((name, ", ".join(words + ([f"ρ = {of['density']:g}"] if of.get("density") else []))))
+    surfaces = [name for name, of in material.items() if isinstance(of, dict)]
+    rows += [(name, results.elasticity(name)) for name in ("material", *surfaces)]
     quantities = results.summary.get("quantities", {})
     for name in dict.fromkeys(key.rpartition(".")[0] for key in quantities if key.endswith(".moment")):
         x, y, moment = (quantities[f"{name}.{part}"] for part in ("force_x", "force_y", "moment"))

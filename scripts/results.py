@@ -95,7 +95,6 @@ class Results:
     zeta: np.ndarray = None  # (n,)
     von_mises: np.ndarray = None  # (n,), Pa
     principal: np.ndarray = None  # (n, 2): σ₁ ≥ σ₂ in the plane, Pa
-    direction: np.ndarray = None  # (n, 2): the unit vector of σ₁
     pressure: np.ndarray = None  # (n,), Pa, −σ_ν
     gap: np.ndarray = None  # (n,), m, NaN off Γ_C
 
@@ -154,6 +153,13 @@ class Results:
         tables = [self.scene.get(table, {}) for table in ("material", "damage")]
         return ["material", *sorted({name for table in tables for name, of in table.items() if isinstance(of, dict)})]
 
+    def elasticity(self, name="material"):
+        """The elastic constants of a material, in words."""
+        general = self.scene.get("material", {})
+        of = {**general, **general.get(name, {})}
+        words = [f"E = {of['young']:g} {self.units['stress']}", f"ν = {of['poisson']:g}"] if "young" in of else []
+        return ", ".join(words + ([f"ρ = {of['density']:g}"] if of.get("density") else []))
+
     @property
     def shown(self):
         """Per element: do maps show it?"""
@@ -182,10 +188,9 @@ class Results:
         """A figure of the last state with its error bar; None at other times, or without one."""
         return barred(value, bars(self.summary).get(name)) if self.is_last else None
 
-    @property
-    def singular(self):
-        """What makes the largest stress of the last state singular; None if nothing does, and at other times."""
-        largest = (self.summary.get("extremes") or {}).get("von_mises_max") or {}
+    def singular(self, name="von_mises_max"):
+        """What makes an extreme stress of the last state singular; None if nothing does, and at other times."""
+        largest = (self.summary.get("extremes") or {}).get(name) or {}
         return largest.get("singular") if self.is_last else None
 
     @property

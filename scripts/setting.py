@@ -163,8 +163,8 @@ def _draw_materials(axes, results):
     axes.tripcolor(mesh, facecolors=results.materials.astype(float), cmap=colours, vmin=-0.5,
                    vmax=len(names) - 0.5, zorder=0.5, rasterized=True)
     for number in np.unique(results.materials):
-        axes.plot([], [], color=colours(int(number)), linewidth=8, label=f"material {names[number]}"
-                  if number else "other material")
+        name = names[number]
+        axes.plot([], [], color=colours(int(number)), linewidth=8, label=f"{name}: {results.elasticity(name)}")
 
 
 def _draw_body_force(axes, results, time):

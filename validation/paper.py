@@ -67,21 +67,24 @@ def draw_sketch():
     axes.fill(x, y, color="#edf1f5")
     axes.plot(x, y, color=INK, linewidth=1.0)
     for low, high, colour, name, place in (
-            (2.2, 4.0, BLUE, r"$\Gamma_D$", (-1.95, 0.2)),
-            (4.2, 5.3, INK, r"$\Gamma_C$", (0.0, -0.72)), (0.2, 1.6, RED, r"$\Gamma_N$", (1.15, 0.85))):
+            (2.2, 4.0, BLUE, r"$\Gamma_D$", (-1.7, 0.2)),
+            (4.2, 5.3, INK, r"$\Gamma_C$", (0.0, -0.72)), (0.2, 1.6, RED, r"$\Gamma_N$", (0.85, 0.45))):
         part = (angle >= low) & (angle <= high)
         axes.plot(x[part], y[part], color=colour, linewidth=2.6)
         axes.text(*place, name, color=colour, fontsize=13)
     axes.axhline(-1.3, color=INK, linewidth=2.0)
     axes.fill_between([-2.2, 2.2], -1.3, -1.45, hatch="////", facecolor="none", edgecolor=INK, linewidth=0)
-    axes.annotate("", (-0.35, -1.3), (-0.35, -0.95), arrowprops={"arrowstyle": "<->", "color": INK})
-    axes.text(-0.28, -1.18, "g", fontsize=12)
-    axes.annotate("", (0.45, -1.25), (0.4, -0.9), arrowprops={"arrowstyle": "->", "color": INK})
-    axes.text(0.52, -1.12, r"$\nu$", fontsize=12)
+    k, j = (np.abs(angle - place).argmin() for place in (4.45, 4.95))
+    gap, arrow = ({"arrowstyle": style, "color": INK, "shrinkA": 0, "shrinkB": 0} for style in ("<->", "->"))
+    axes.annotate("", (x[k], -1.3), (x[k], y[k]), arrowprops=gap)
+    axes.text(x[k] + 0.07, -1.2, "g", fontsize=12)
+    normal = np.array([y[j + 1] - y[j - 1], x[j - 1] - x[j + 1]])
+    axes.annotate("", (x[j], y[j]) + 0.3 * normal / np.hypot(*normal), (x[j], y[j]), arrowprops=arrow)
+    axes.text(x[j] + 0.12, y[j] - 0.25, r"$\nu$", fontsize=12)
     for top in (0.55, 0.95, 1.3):
         k = np.abs(angle - top).argmin()
         axes.annotate("", (x[k], y[k]), (1.25 * x[k], 1.3 * y[k]), arrowprops={"arrowstyle": "->", "color": RED})
-    axes.text(1.55, 1.15, r"$\mathbf{f}_N$", color=RED, fontsize=13)
+    axes.text(1.1, 1.0, r"$\mathbf{f}_N$", color=RED, fontsize=13)
     axes.text(-0.1, 0.0, r"$\Omega$", fontsize=15)
     axes.text(1.25, -1.68, "obstacle", fontsize=10)
     axes.set(xlim=(-2.3, 2.3), ylim=(-1.75, 1.6), aspect="equal")
@@ -91,6 +94,7 @@ def draw_sketch():
 
 def written(figure, out, name):
     """Saves a figure as PNG and PDF; returns the path of the PNG."""
+    drawing.wrap_titles(figure)
     for ending in ("pdf", "png"):
         path = out / f"{name}.{ending}"
         figure.savefig(path)
@@ -139,14 +143,13 @@ def draw_figure_3(rows):
 
 def sheet(found, out):
     """All figures on one page, with their captions."""
-    numbers = sorted(found)
-    columns = 3
-    lines = -(-len(numbers) // columns)
-    page, grid = plt.subplots(lines, columns, figsize=(16.5, 4.4 * lines), squeeze=False)
-    for axes in grid.flat:
+    pictures = [(number, path) for number in sorted(found) for path in found[number]]
+    columns = 3 if len(pictures) % 3 == 0 else 5
+    lines = -(-len(pictures) // columns)
+    page, grid = plt.subplots(lines, columns, figsize=(5.5 * columns, 4.4 * lines), squeeze=False)
+    for axes, (number, path) in zip(grid.flat, pictures):
         axes.axis("off")
-    for axes, number in zip(grid.flat, numbers):
-        axes.imshow(plt.imread(found[number][0]))
+        axes.imshow(plt.imread(path))
         axes.set_title(f"Figure {number}. {CAPTIONS[number]}", fontsize=8.5, loc="left")
     written(page, out, "sheet")
 
