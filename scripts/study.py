@@ -1,22 +1,31 @@
 #!/usr/bin/python3
-"""Runs a scene with all combinations of some values, as many runs at once as there are cores, and prints their table.
+"""Runs a scene with all combinations of some values, as many runs at once as this process has cores, and prints their
+table.
 
     signorini study geo/lshape.toml --set material.young=1e5,2e5,4e5 --set mesh.size=0.5,0.25
+    signorini study geo/lshape.toml --cases cases.csv
 
-Each run has a folder below OUT, named by its values; OUT/study.csv is the table. A study that was interrupted goes on:
-runs that are complete are not repeated, unless the scene or its files have changed. Runs write no frames
-(output.every = 0), unless --frames or a --set asks for them; those of one run are made by `signorini run
-OUT/NAME/scene.toml --set output.every=1`. A list is split at commas outside brackets and quotes. What follows `--` are
-other arguments of `run`.
+Each row of cases.csv is a run; the columns are keys, and an empty cell leaves a key as it is. Each run has a folder
+below OUT, named by its values; OUT/study.csv is the table. A study that was interrupted goes on: runs that are complete
+are not repeated, unless the scene or its files have changed. Studies with the same OUT, also on several machines,
+divide the runs: each waits at its end for those that another has started. Runs write no frames (output.every = 0),
+unless --frames or a --set asks for them; those of one run are made by `signorini run OUT/NAME/scene.toml --set
+output.every=1`. A list is split at commas outside brackets and quotes. What follows `--` are other arguments of `run`.
 """
 
 import argparse
+import csv
+import errno
+import fcntl
 import itertools
 import os
 import re
 import subprocess
 import sys
+import time
+import zlib
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from signorini_summaries import COLUMNS, rows_of, summary_of
@@ -47,10 +56,23 @@ def values_of(text):
     return key.strip(), [part.strip() for part in [*found, part]]
 
 
+def cases_of(path):
+    """The keys and, for each row of a CSV file, the keys with their values; empty cells are left out."""
+    try:
+        with open(path, newline="", encoding="utf-8-sig") as file:
+            head, *rows = ([cell.strip() for cell in row] for row in csv.reader(file) if any(row))
+        return head, [[(key, value) for key, value in zip(head, row, strict=True) if value] for row in rows]
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or (
+            "needs a head with keys, and as many cells in each row; put values with commas in quotes")
+        raise argparse.ArgumentTypeError(f"{path}: {reason}") from None
+
+
 def name_of(chosen):
-    """The name of a run's folder from its values."""
+    """The name of a run's folder from its values. A name that would be too long ends with a checksum."""
     parts = [f"{key.rpartition('.')[2]}={value}" for key, value in chosen]
-    return re.sub(r"[^\w.=+-]", "_", ",".join(parts).replace(",", "__"))[:LONGEST] or "run"
+    name = re.sub(r"[^\w.=+-]", "_", ",".join(parts).replace(",", "__")) or "run"
+    return name if len(name) <= LONGEST else f"{name[:LONGEST - 9]}-{zlib.crc32(str(chosen).encode()):08x}"
 
 
 def inputs_of(scene):
@@ -86,6 +108,20 @@ def outcome(folder, error):
     return summary if not error or "error" in summary else {"error": " ".join(lines) or error}
 
 
+@contextmanager
+def claim(locks, folder):
+    """Locks a run against other studies until its end, or that of the process; false if another study has it. Where the
+    file system has no locks, all runs are free."""
+    place, is_free = zlib.crc32(folder.name.encode()), True
+    try:
+        fcntl.lockf(locks, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, place)
+    except OSError as error:
+        is_free = error.errno not in (errno.EAGAIN, errno.EACCES)
+    yield is_free
+    with suppress(OSError):
+        fcntl.lockf(locks, fcntl.LOCK_UN, 1, place)
+
+
 def run(command, runs):
     """Runs the program beside `runs` - 1 others; returns the error, "" if there is none."""
     # Each run has a core of its own.
@@ -95,6 +131,35 @@ def run(command, runs):
     return ended.stderr.strip() if ended.returncode else ""
 
 
+def run_all(out, everything, inputs, jobs):
+    """Runs commands in their folders, except those that are complete; returns the errors by folder."""
+    open_runs = [of for of in everything if not is_complete(*of, inputs)]
+    done, failed, jobs = len(everything) - len(open_runs), {}, max(1, min(jobs, len(open_runs)))
+    print(f"{len(everything)} runs, {done} of them complete", flush=True)
+    out.mkdir(parents=True, exist_ok=True)
+
+    def attempt(of):
+        with claim(locks, of[0]) as is_free:
+            return None if not is_free else "" if is_complete(*of, inputs) else run(of[1], jobs)
+
+    with open(out / ".locks", "wb") as locks:
+        while open_runs:
+            later = {}
+            with ThreadPoolExecutor(jobs) as pool:
+                for k, error in enumerate(pool.map(attempt, open_runs)):
+                    # Another study has it, or the memory may suffice for it alone, after the others.
+                    if error is None or jobs > 1 and "not enough memory" in error:
+                        later[k] = error
+                        continue
+                    done, folder = done + 1, open_runs[k][0]
+                    failed.update({folder: error} if error else {})
+                    print(f"{done}/{len(everything)} {folder.name}{': ' + error if error else ''}", flush=True)
+            jobs = 1 if any(later.values()) else jobs
+            time.sleep(len(later) == len(open_runs))
+            open_runs = [open_runs[k] for k in later]
+    return failed
+
+
 def main(prog=None):
     """Returns the exit code: 1 if a run failed, 2 if its input is bad."""
     parser = argparse.ArgumentParser(
@@ -102,46 +167,37 @@ def main(prog=None):
     parser.add_argument("scene", metavar="SCENE")
     parser.add_argument("--set", action="append", type=values_of, default=[], metavar="KEY=A,B,…",
                         help="values of a key; may be repeated")
+    parser.add_argument("--cases", type=cases_of, default=([], [[]]), metavar="FILE.csv", help=(
+        "a run for each row; with --set, one for each row and value"))
     parser.add_argument("--out", type=Path, metavar="DIR", help="default: out/SCENE-study")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="runs at once")
+    parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help=(
+        "runs at once (default: the cores that this process may use)"))
     parser.add_argument("--frames", action="store_true", help="with frames, as `run` writes them")
     parser.add_argument("--columns", type=lambda text: text.split(","), default=COLUMNS, metavar=(
         "NAME,…"), help="of the table, as for `signorini table`")
     words = sys.argv[1:]
     cut = words.index("--") if "--" in words else len(words)
     arguments, more = parser.parse_args(words[:cut]), words[cut + 1:]
+    head, cases = arguments.cases
     keys = [key for key, _ in arguments.set]
-    if twice := next((key for key in keys if keys.count(key) > 1), None):
-        print(f"error: --set {twice} is given twice; write all its values after one: {twice}=A,B,…", file=sys.stderr)
+    if twice := next((key for key in head + keys if (head + keys).count(key) > 1), None):
+        print(f"error: --set {twice} is given twice; write all its values after one: {twice}=A,B,… or in a column of "
+              "--cases", file=sys.stderr)
         return 2
-    extra = [] if arguments.frames or "output.every" in keys else [("output.every", "0")]
+    extra = [] if arguments.frames or "output.every" in head + keys else [("output.every", "0")]
     out = arguments.out or Path("out") / f"{Path(arguments.scene).stem}-study"
-    products = itertools.product(*(values for _, values in arguments.set))
-    chosen = [list(zip(keys, values)) for values in products]
+    products = [list(zip(keys, values)) for values in itertools.product(*(values for _, values in arguments.set))]
+    chosen = [case + product for case in cases for product in products]
     folders = [out / name_of(of) for of in chosen]
     if len(set(folders)) < len(folders):
         print("error: two runs would have the same folder: a value is given twice, or values differ only in "
               "signs that are not letters or digits", file=sys.stderr)
         return 2
     commands = [command_of(arguments.scene, folder, of + extra, more) for folder, of in zip(folders, chosen)]
-    inputs = inputs_of(arguments.scene)
-    open_runs = [(folder, command) for folder, command in zip(folders, commands)
-                 if not is_complete(folder, command, inputs)]
-    print(f"{len(chosen)} runs, {len(chosen) - len(open_runs)} of them complete", flush=True)
-    failed, done = {}, len(chosen) - len(open_runs)
-    jobs = max(1, min(arguments.jobs, len(open_runs)))
-    with ThreadPoolExecutor(jobs) as pool:
-        results = pool.map(lambda of: run(of[1], jobs), open_runs)
-        for (folder, command), error in zip(open_runs, results):
-            # The memory may suffice for this run alone, after the others.
-            error = run(command, 1) if "not enough memory" in error and jobs > 1 else error
-            done += 1
-            failed.update({folder: error} if error else {})
-            print(f"{done}/{len(chosen)} {folder.name}{': ' + error if error else ''}", flush=True)
+    failed = run_all(out, list(zip(folders, commands)), inputs_of(arguments.scene), arguments.jobs)
     summaries = [outcome(folder, failed.get(folder, "")) for folder in folders]
     rows, units = rows_of(folders, summaries, arguments.columns, list(map(dict, chosen)))
     printed(rows, units)
-    out.mkdir(parents=True, exist_ok=True)
     write_table(rows, out / "study.csv", units)
     print(out / "study.csv")
     is_refused = refused(arguments.columns, list(filter(None, summaries)))
