@@ -6,8 +6,9 @@
 The coarsest mesh (8 times as coarse as the scene's) is refined by the midpoints of all sides. The reference is P1
 by `bdf2` on the last refinement, kept in out/reference/nested/; --reference makes it alone. The runs are P1 by
 Euler's scheme on the coarsest mesh and up to four refinements, k = T/50 … T/1000. All are compared at 51
-times. On nested meshes of a polygon the norms of differences are exact. Prints the errors, and writes
-converge.csv and converge.png into out/converge/<scene>.
+times. On nested meshes of a polygon the norms of differences are exact. Along curved sides the new nodes are on the
+curve; there the coarse fields are continued to the fine mesh. Prints the errors, and writes converge.csv, run by run,
+and converge.png into out/converge/<scene>. A study that was interrupted goes on.
 """
 
 import subprocess
@@ -20,9 +21,9 @@ import numpy as np
 from shared import ROOT, parser_of
 from drawing import FAINT, INK, MaxNLocator, plt
 from reading import read_frame
-from references import kept, refine
-from results import markdown, write_table
-from scene import read_scene, write_scene
+from references import geometry_of, kept, nested
+from results import markdown, read_table, write_table
+from scene import SceneError, read_scene, write_scene
 from true_errors import Run
 
 INTERVALS, MESHES, COARSER = 50, 5, 8
@@ -89,21 +90,20 @@ class Study:
         self.binary, self.name, self.refinements = arguments.binary, path.stem, arguments.refinements
         scene = read_scene(path)
         if "time" not in scene:
-            sys.exit(f"{path}: orders of convergence need a scene with [time]")
+            raise SceneError(f"{path}: orders of convergence need a scene with [time]")
         self.end = float(scene["time"]["end"])
         self.step = arguments.step or self.end / 1000
         every = self.end / INTERVALS / self.step
         if not (every > 0.5 and abs(every - round(every)) < 1e-6):
             sys.exit(f"--step: must divide {self.end / INTERVALS:g} s, but is {self.step:g}")
-        file = path.parent / scene["mesh"]["file"]
-        if file.suffix != ".geo":
-            sys.exit(f"{path}: the meshes are made from a .geo, but mesh.file is {file.name}")
+        file, _ = geometry_of(path, scene)
         parameters = dict(scene["mesh"].get("parameters", {}))
         if size := arguments.size or COARSER * scene["mesh"].get("size", 0):
             parameters["size"] = size
         if arguments.grading:
             parameters["grading"] = arguments.grading
         lines = [f"{name} = {value};" for name, value in parameters.items()]
+        # The text, not an Include: a changed geometry needs another reference.
         self.geometry = "\n".join([*lines, file.read_text(encoding="utf-8")])
         self.scene = {key: scene[key] for key in scene if key not in ("accuracy", "discretisation")}
         words = "".join(f"-{name}{value:g}" for name, value in parameters.items())
@@ -121,25 +121,32 @@ class Study:
         return kept(self.binary, self.folder, self.timed(self.step, "bdf2"), self.geometry, self.refinements)
 
     def rows(self):
-        """A row for each run, mesh by mesh."""
-        exact = Fields(self.reference())
+        """A row for each run, mesh by mesh. They are kept beside the reference until the study is complete."""
+        exact, file = Fields(self.reference()), self.folder / "rows.csv"
         size = np.max([exact.norms(values) for values in exact.values], axis=0)
-        if self.step > 1.001 * self.end / STEPS[0] or not self.refinements:
-            sys.exit("no mesh and step of the study is coarser than this reference")
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "scene.toml"
-            for mesh in refine(self.folder / "reference.msh", min(self.refinements - 1, MESHES - 1)):
-                for count in (count for count in STEPS if self.end / count > 0.999 * self.step):
-                    scene = {**self.timed(self.end / count, "euler"), "mesh": {"file": str(mesh)}}
-                    write_scene(scene, path)
-                    out = Path(folder) / "out"
-                    subprocess.run([self.binary, "run", path, "--out", out], check=True, stdout=subprocess.DEVNULL)
-                    yield self.row(exact, size, Fields(out), self.end / count)
+        meshes = nested(self.folder, self.refinements)[:-1][:MESHES]
+        runs = [(mesh, count) for mesh in meshes for count in STEPS if self.end / count > 0.999 * self.step]
+        if not runs:
+            raise SceneError("no mesh and step of the study is coarser than this reference")
+        rows = read_table(file) if file.exists() else []
+        print(f"{len(runs)} runs, {len(rows)} of them complete", file=sys.stderr)
+        yield from rows
+        for n, (mesh, count) in enumerate(runs[len(rows):], len(rows) + 1):
+            with tempfile.TemporaryDirectory() as folder:
+                path, out = Path(folder) / "scene.toml", Path(folder) / "out"
+                write_scene({**self.timed(self.end / count, "euler"), "mesh": {"file": str(mesh)}}, path)
+                subprocess.run([self.binary, "run", path, "--out", out], check=True, stdout=subprocess.DEVNULL)
+                rows.append(self.row(exact, size, Fields(out), self.end / count))
+            print(f"{n}/{len(runs)} {rows[-1]['nodes']} nodes, k = {rows[-1]['k']:g}: {rows[-1]['sum']:.4g}",
+                  file=sys.stderr, flush=True)
+            write_table(rows, file)
+            yield rows[-1]
+        file.unlink()
 
     def row(self, exact, size, fields, k):
         """The errors of a run: the largest over time."""
         if len(fields.values) != len(exact.values):
-            sys.exit(f"{self.name}: the run stops at ζ_*; choose a scene that reaches its end")
+            raise SceneError(f"{self.name}: the run stops at ζ_*; choose a scene that reaches its end")
         found = [exact.norms(ours - theirs) for ours, theirs in zip(fields.at(exact), exact.values)]
         nodal = [fields.norms(ours - theirs)[1] for ours, theirs in zip(fields.values, exact.at(fields))]
         worst, h = np.max(found, axis=0), fields.edges.max()
@@ -277,15 +284,20 @@ def arguments_of(words=None):
 
 def main():
     arguments = arguments_of()
-    study = Study(arguments)
-    if arguments.reference:
-        print(study.reference())
-        return
-    rows = list(study.rows())
+    try:
+        study = Study(arguments)
+        if arguments.reference:
+            print(study.reference())
+            return
+        out = arguments.out or ROOT / "out" / "converge" / study.name
+        out.mkdir(parents=True, exist_ok=True)
+        rows = []
+        for row in study.rows():
+            rows.append(row)
+            write_table(rows, out / "converge.csv")
+    except (SceneError, subprocess.CalledProcessError) as error:
+        sys.exit(f"error: {error}")
     report(rows)
-    out = arguments.out or ROOT / "out" / "converge" / study.name
-    out.mkdir(parents=True, exist_ok=True)
-    write_table(rows, out / "converge.csv")
     print(out / "converge.csv")
     if len({row["h"] for row in rows}) > 1:
         draw(rows, out / "converge.png")

@@ -485,7 +485,7 @@ class Fields:
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scene", type=Path)
     parser.add_argument("mesh", type=Path)
     parser.add_argument("--steps", type=int, default=10)

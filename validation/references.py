@@ -1,5 +1,5 @@
 """Reference solutions, kept until their scene or mesh changes. Those of the scenes of geo/ have P2 elements on meshes
-graded to every singularity, without the program's estimates.
+graded to every singularity, without the program's estimates. So are those of other scenes, to the ends of all curves.
 
 Where u − u(corner) ~ r^α, triangles of size h ~ r^(1 − α/3) share the energy error of P2 evenly; α is near ½
 at the ends of obstacles and re-entrant corners, so the sides are min(LARGEST, STRENGTH r^(5/6)) m
@@ -9,10 +9,14 @@ solves on it with adaptive steps.
 
 import shutil
 import subprocess
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from scene import read_scene, write_scene
+import numpy as np
+
+from scene import SceneError, read_scene, write_scene
+from shared import ROOT
 
 # square.geo makes a structured mesh: its outline, and its curves by their names.
 SQUARE = """
@@ -48,13 +52,15 @@ class Grading:
     outline: str = None
     # The tolerance of adaptive steps; the damage of the squares depends most on it.
     tolerance: float = 1e-3
+    # Lines before these sizes: the fields that they use.
+    fields: tuple = ()
 
     def geometry(self, file):
         """The text of a .geo: the body of another one, with this size."""
-        r = [f"((x - {x})^2 + (y - {y})^2)" for x, y in self.corners]
+        r = [f"((x - ({x}))^2 + (y - ({y}))^2)" for x, y in self.corners]
         sizes = [f"{self.strength} * {square}^(5 / 12) + 3e-7" for square in r]
         sizes += [str(self.largest), *self.near]
-        return "\n".join([self.outline or f'Include "{file.resolve()}";', *size_fields(sizes), ""])
+        return "\n".join([self.outline or f'Include "{file.resolve()}";', *self.fields, *size_fields(sizes), ""])
 
 
 LSHAPE = [(2, 4), (6, 4), (8, 4), (0, 0), (2, 0), (0, 6), (8, 6)]
@@ -71,43 +77,87 @@ GRADINGS = {
 }
 
 
+def geometry_of(path, scene):
+    """The .geo of a scene, and a text that sets its parameters and includes it; a SceneError if it has none."""
+    file = path.parent / scene["mesh"]["file"]
+    if file.suffix != ".geo":
+        raise SceneError(f"{path}: the meshes are made from a .geo, but mesh.file is {file.name}")
+    return file, [f"{name} = {value};" for name, value in scene["mesh"].get("parameters", {}).items()]
+
+
+def grading_of(file, parameters, scene):
+    """The size of a reference's triangles for any body: graded to the ends of all its curves, and smaller near Γ_C."""
+    if "Transfinite" in file.read_text(encoding="utf-8"):
+        raise SceneError(f"{file}: a reference needs a graded mesh, but Transfinite prescribes the nodes; leave it out")
+    with tempfile.TemporaryDirectory() as folder:
+        geometry, mesh = Path(folder) / "curves.geo", Path(folder) / "curves.msh"
+        geometry.write_text("\n".join([*parameters, f'Include "{file.resolve()}";', ""]), encoding="utf-8")
+        subprocess.run(["gmsh", "-1", "-save_all", "-v", "1", geometry, "-o", mesh], check=True)
+        text = mesh.read_text(encoding="utf-8")
+    # MSH 4.1. A point: its number, x, y, z, …; a curve: its number, a box, n, n physical curves, 2, its ends.
+    names, entities = ([line.split() for line in text.partition(f"${name}\n")[2].partition("$End")[0].splitlines()]
+                       for name in ("PhysicalNames", "Entities"))
+    count = int(entities[0][0])
+    points, curves = entities[1:1 + count], entities[1 + count:1 + count + int(entities[0][1])]
+    ends = {end.lstrip("-") for curve in curves for end in curve[9 + int(curve[7]):]}
+    corners = [(float(x), float(y)) for point, x, y, *_ in points if point in ends]
+    gaps = {boundary["name"] for boundary in scene["boundary"] if "gap" in boundary}
+    numbers = {number for dimension, number, name in names[1:] if dimension == "1" and name.strip('"') in gaps}
+    contact = [curve[0] for curve in curves if numbers & set(curve[8:8 + int(curve[7])])]
+    size = float(np.ptp([[float(x) for x in curve[k:k + 2]] for curve in curves for k in (1, 4)], axis=0).max())
+    fields = ("Field[1] = Distance; Field[1].NumPointsPerCurve = 200;",
+              f"Field[1].CurvesList = {{{', '.join(contact)}}};")
+    near = (f"{size / 400} + 0.2 * F1",)
+    return Grading(corners, 0.04 * size ** (1 / 6), size / 50, near if contact else (),
+                   fields=(*parameters, *fields) if contact else parameters)
+
+
 def kept(binary, folder, scene, geometry, refinements=0, limit=None):
     """The results of a scene on the mesh of a .geo text after some refinements. The results in `folder` are used if they
     belong to this scene and text. A run longer than `limit` seconds raises subprocess.TimeoutExpired."""
     results, file, made_of = folder / "results", folder / "reference.toml", folder / "reference.geo"
     complete = folder / "complete"
-    mesh = f"refined{refinements}.msh" if refinements else made_of.name
-    scene = {**scene, "mesh": {"file": mesh}}
-    if complete.exists() and read_scene(file) == scene and (made_of.read_text(encoding="utf-8") == geometry):
+    scene = {**scene, "mesh": {"file": str(nested(folder, refinements)[-1].name if refinements else made_of.name)}}
+    same = file.exists() and read_scene(file) == scene and made_of.read_text(encoding="utf-8") == geometry
+    if complete.exists() and same:
         return results
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    write_scene(scene, file)
-    made_of.write_text(geometry, encoding="utf-8")
-    if refinements:
-        subprocess.run(["gmsh", "-2", "-v", "1", made_of, "-o", folder / "reference.msh"], check=True)
-        refine(folder / "reference.msh", refinements)
-    subprocess.run([binary, "run", file, "--out", results], check=True, timeout=limit, stdout=subprocess.DEVNULL)
+    if not same:
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        made_of.write_text(geometry, encoding="utf-8")
+        if refinements:
+            refine(folder, refinements)
+        write_scene(scene, file)
+    command, options = [binary, "run", file, "--out", results], {"timeout": limit, "stdout": subprocess.DEVNULL}
+    # An interrupted run goes on, unless it was that of another program.
+    goes_on = any(results.glob("checkpoint*"))
+    if not goes_on or subprocess.run([*command, "--restart"], **options).returncode:
+        subprocess.run(command, check=True, **options)
     complete.touch()
     return results
 
 
-def refine(mesh, count):
-    """The mesh and `count` refined meshes in the same folder. Each divides every triangle of the previous one into four by
-    the midpoints of its sides."""
-    meshes = [mesh]
-    for k in range(1, count + 1):
-        meshes.append(mesh.with_name(f"refined{k}.msh"))
-        subprocess.run(["gmsh", meshes[-2], "-refine", "-v", "1", "-format", "msh41", "-o", meshes[-1]], check=True)
-    return meshes
+def nested(folder, count):
+    """The files of the coarsest mesh and of its refinements."""
+    return [folder / "reference.msh", *(folder / f"refined{k}.msh" for k in range(1, count + 1))]
+
+
+def refine(folder, count):
+    """Meshes reference.geo, and refines the mesh `count` times: every triangle into four by the midpoints of its sides.
+    Midpoints of curved sides are on the curve."""
+    saves = [f'Save "{mesh.name}";' for mesh in nested(folder, count)]
+    script = folder / "refine.geo"
+    script.write_text("\n".join(['Include "reference.geo";', "Mesh 2;", "\nRefineMesh;\n".join(saves), ""]))
+    subprocess.run(["gmsh", script, "-v", "1", "-"], check=True)
 
 
 def graded(binary, path, folder):
-    """The reference of a scene of geo/."""
+    """The reference of a scene."""
     path = Path(path)
     scene = read_scene(path)
-    file = path.parent / scene["mesh"]["file"]
-    grading = GRADINGS[file.name]
+    file, parameters = geometry_of(path, scene)
+    shipped = GRADINGS.get(file.name) if file.resolve().parent == ROOT / "geo" else None
+    grading = shipped or grading_of(file, parameters, scene)
     scene = {key: value for key, value in scene.items() if key != "accuracy"}
     scene["discretisation"] = {"displacement": 2}
     if "time" in scene:

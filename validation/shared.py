@@ -11,7 +11,7 @@ sys.path.append(str(ROOT / "scripts"))
 
 def parser_of(doc, out=None):
     """A parser of a command line with --binary, and with --out below out/ if it has a default."""
-    parser = argparse.ArgumentParser(description=doc.splitlines()[0])
+    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--binary", type=lambda text: Path(text).resolve(), default=ROOT / "target/release/signorini")
     if out:
         parser.add_argument("--out", type=Path, default=ROOT / "out" / out)
