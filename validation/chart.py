@@ -1,21 +1,23 @@
 #!/usr/bin/python3
-"""Error against seconds, whole processes: chart.py [--binary FILE] [--asked] SCENE…
+"""Error against seconds, whole processes: chart.py [--binary FILE] [--asked] [--quick] SCENE…
 
-The runs of each scene of geo/ are: the paper's method (P1, uniform mesh, uniform steps), meshes graded by the
-.geo in P1 and P2, `--accuracy` from 0.1 to 0.001, the other contact solvers, and the scene as shipped. The time is
-that of the whole process on one core, with gmsh, adaptation and output. For a run below three seconds it is the
-median of three runs. The error is the larger one of the relative errors of u (energy norm) and of the damage (L²) at
-the end, against the reference of references.py in out/reference/graded.
+The runs of a scene are: P1 on uniform meshes with uniform steps by the paper's method, `penalty-duality:plain`, by the
+other contact solvers and in FEniCSx; meshes graded by the .geo in P1 and P2; `--accuracy` from 0.1 to 0.001; and the
+scene as it is. The time is that of the whole process on one core, with gmsh, adaptation and output; FEniCSx gets the
+mesh. For a run below three seconds it is the median of three runs. The error is the larger one of the relative errors
+of u (energy norm) and of the damage (L²) at the end, against the reference of references.py in out/reference/graded.
+FEniCSx solves the same discrete problem: it has our error, if the work of its loads agrees to 1e-6.
 
 Writes out/chart/<scene>/chart.csv and draws out/chart/chart.png, a panel per scene. Prints the Pareto front
 of each scene (the runs to which no other is both faster and more accurate) and how many times the seconds of
-`--accuracy` the paper's method takes for some errors.
+`--accuracy` uniform meshes and steps take for some errors.
 
 With --asked the runs are `--accuracy` 0.1, 0.03, 0.01 and 0.003, and the printed errors are relative to the accuracy;
 exit code 1 if the larger one exceeds it. (`make promises` checks the error of every figure.)
 """
 
 import itertools
+import json
 import os
 import shutil
 import subprocess
@@ -33,7 +35,7 @@ import references
 from shared import ROOT, parser_of
 from drawing import BLUE, FAINT, GREEN, INK, RED, plt
 from results import write_table
-from scene import elasticity, read_scene, write_scene
+from scene import SceneError, elasticity, read_scene, write_scene
 from true_errors import Run, errors
 
 SHORT, PASSES = 3.0, 3
@@ -48,13 +50,16 @@ MESHES = {
 }
 ASKED = (0.1, 0.03, 0.01, 0.003)
 # Label, series, solver and style of the panels; drawn in this order.
+PLAIN, FENICSX = "penalty-duality:plain", "FEniCSx"
 KINDS = [
-    ("the paper's method: P1, uniform mesh and steps", "P1 uniform", "active-set", BLUE, "o"),
+    ("P1, uniform mesh and steps: active-set", "P1 uniform", "active-set", BLUE, "o"),
     ("the same by tao", "P1 uniform", "tao", GREEN, "o"),
     ("the same by penalty-duality", "P1 uniform", "penalty-duality", "#d08a1d", "o"),
+    ("the same by the paper's method (:plain)", "P1 uniform", PLAIN, INK, "x"),
+    ("the same in FEniCSx", "P1 uniform", FENICSX, "#8e5aa8", "s"),
     ("P1, graded mesh", "P1 graded", "active-set", "#4fa3a5", "^"),
     ("P2, graded mesh", "P2 graded", "active-set", "#7a6a3a", "v"),
-    ("--accuracy 0.1 … 0.001", "accuracy", "active-set", RED, "D"),
+    ("--accuracy", "accuracy", "active-set", RED, "D"),
     ("the same by tao", "accuracy", "tao", GREEN, "D"),
     ("the same by penalty-duality", "accuracy", "penalty-duality", "#d08a1d", "D"),
 ]
@@ -76,18 +81,19 @@ class Choice:
         """The shipped scene with these options."""
         if self.accuracy is None and self.order is None:
             return shipped
-        # A mesh of order 1 has straight sides; all scenes here have.
         scene = {key: shipped[key] for key in shipped if key not in ("accuracy", "discretisation")}
-        scene["mesh"] = {"file": shipped["mesh"]["file"]}
+        parameters = {name: of for name, of in shipped["mesh"].get("parameters", {}).items() if name != "grading"}
+        scene["mesh"] = {"file": shipped["mesh"]["file"], "parameters": parameters}
         if self.accuracy is not None:
             return {"accuracy": self.accuracy, **scene}
         scene["discretisation"] = {"displacement": self.order}
-        scene["time"] = {**shipped["time"], "step": self.step}
+        scene["mesh"]["size"] = self.size
+        if self.step:
+            scene["time"] = {**shipped["time"], "step": self.step}
         if self.step == "auto":
             scene["time"]["tolerance"] = 0.03
-        scene["mesh"]["size"] = self.size
         if self.grading != 1:
-            scene["mesh"]["parameters"] = {"grading": self.grading}
+            parameters["grading"] = self.grading
         return scene
 
     def __str__(self):
@@ -97,22 +103,28 @@ class Choice:
         return ", ".join(parts + [self.solver] * (self.solver != "active-set"))
 
 
-def choices(name):
-    """The runs of a scene."""
-    largest, halvings, linear, quadratic = MESHES[name]
-    sizes = [largest / 2**k for k in range(halvings + 1)]
+def choices(study, quick):
+    """The runs of a scene; without the finest meshes if it has to be quick."""
+    end, file = study.shipped.get("time", {}).get("end"), study.folder / study.shipped["mesh"]["file"]
+    extent = float(np.ptp(study.reference.points, axis=0).max())
+    largest, halvings, linear, quadratic = MESHES.get(study.name, (extent / 16, 4, 32, (32, 1024)))
+    is_graded = "grading" in file.read_text(encoding="utf-8")
+    sizes = [largest / 2**k for k in range(halvings + 1 - 2 * quick)]
+    steps, step, auto = ((0.05 * end, 0.01 * end, 0.002 * end), 0.01 * end, "auto") if end else ((None,), None, None)
     yield Choice("as shipped")
-    for size, step in itertools.product(sizes, (0.05, 0.01, 0.002)):
+    for size, k in itertools.product(sizes, steps):
         # Small steps where they are cheap.
-        if step >= 0.01 or size >= largest / 4:
-            yield Choice("P1 uniform", order=1, size=size, step=step)
-    for solver, size in itertools.product(("tao", "penalty-duality"), sizes[:3]):
-        yield Choice("P1 uniform", solver, order=1, size=size, step=0.01)
-    for size in sizes[:4]:
-        yield Choice("P1 graded", order=1, size=size, grading=linear, step=0.01)
-    for grading, size in itertools.product(quadratic, [2 * largest, *sizes[:3]]):
-        yield Choice("P2 graded", order=2, size=size, grading=grading, step="auto")
-    for accuracy in (0.1, 0.03, 0.01, 0.003, 0.001):
+        if k is None or k >= step or size >= largest / 4:
+            yield Choice("P1 uniform", order=1, size=size, step=k)
+        if end and k == step and size in sizes[:3]:
+            yield Choice("P1 uniform", FENICSX, order=1, size=size, step=k)
+    for solver, size in itertools.product((PLAIN, "tao", "penalty-duality"), sizes[:3]):
+        yield Choice("P1 uniform", solver, order=1, size=size, step=step)
+    for size in sizes[:4] * is_graded:
+        yield Choice("P1 graded", order=1, size=size, grading=linear, step=step)
+    for grading, size in itertools.product(quadratic, [2 * largest, *sizes[:3]] * is_graded):
+        yield Choice("P2 graded", order=2, size=size, grading=grading, step=auto)
+    for accuracy in (0.1, 0.03, 0.01, 0.003, 0.001)[:5 - quick]:
         yield Choice("accuracy", accuracy=accuracy)
     for solver in ("tao", "penalty-duality"):
         yield Choice("accuracy", solver, accuracy=0.01)
@@ -122,38 +134,70 @@ class Study:
     """The runs of one scene and their rows."""
 
     def __init__(self, binary, path, folder):
-        self.binary, self.folder = binary, folder
-        self.shipped = read_scene(path)
-        self.name = Path(path).stem
-        shutil.copy(Path(path).parent / self.shipped["mesh"]["file"], folder)
-        kept = references.graded(self.binary, path, ROOT / "out" / "reference" / "graded" / self.name)
-        self.reference = Run(kept)
-        material = self.shipped["material"]
-        self.stiffness = elasticity(material["young"], material["poisson"], material["plane"])
-        self.rows = []
+        self.binary, self.folder, self.name, self.rows = binary, folder, Path(path).stem, []
+        self.shipped = scene = read_scene(path)
+        file, _ = references.geometry_of(path, scene)
+        shutil.copy(file, folder)
+        self.reference = Run(references.graded(self.binary, path, ROOT / "out" / "reference" / "graded" / self.name))
+        if self.reference.summary["stopped_by"]:
+            raise SceneError(f"{path}: the run stops before its end, at which runs are compared; choose a smaller time.end")
+        # Materials are numbered by name; 0 is the general one.
+        names = sorted({name for key in ("material", "damage") for name, of in scene.get(key, {}).items()
+                        if isinstance(of, dict)})
+        materials = [{**scene["material"], **scene["material"].get(name, {})} for name in ("", *names)]
+        young, poisson = (np.array([of[key] for of in materials]) for key in ("young", "poisson"))
+        number = 0 if self.reference.material is None else self.reference.material.astype(int)
+        self.stiffness = elasticity(young, poisson, scene["material"].get("plane", "stress"))[number]
 
     def run(self, choice):
         """Adds the row of a run, or reports why it failed."""
-        path, out, times = self.folder / f"{self.name}.toml", self.folder / "out", []
-        write_scene(choice.scene(self.shipped), path)
-        command = [str(self.binary), "run", path, "--out", out, "--solver", choice.solver]
-        while len(times) < (PASSES if not times or times[0] < SHORT else 1):
-            for mesh in self.folder.glob("*.msh"):
-                mesh.unlink()
-            started = time.perf_counter()
-            done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT)
-            times.append(time.perf_counter() - started)
-            if done.returncode != 0:
-                print(f"{self.name}, {choice}: {done.stderr.strip()}", file=sys.stderr, flush=True)
-                return
-        run = Run(out)
-        u, damage = errors(self.reference, run, self.stiffness)
-        damage = damage or 0.0
-        row = {"run": str(choice), "series": choice.series, "solver": choice.solver,
-               "accuracy": choice.accuracy, "nodes": run.summary["nodes"], "steps": run.summary["steps"],
-               "seconds": median(times), "u": u, "damage": damage, "error": max(u, damage)}
+        try:
+            write_scene(choice.scene(self.shipped), self.folder / f"{self.name}.toml")
+            row = self.in_fenicsx(choice) if choice.solver == FENICSX else self.by_us(choice)
+        except SceneError as error:
+            print(f"{self.name}, {choice}: {error}", file=sys.stderr, flush=True)
+            return
         self.rows.append(row)
         print(f"{self.name}: {line(row)}", flush=True)
+
+    def by_us(self, choice):
+        """The row of a run of signorini."""
+        out = self.folder / "out"
+        command = [self.binary, "run", self.folder / f"{self.name}.toml", "--out", out, "--solver", choice.solver]
+        seconds, _ = self.timed(command, self.folder.glob)
+        self.last = run = Run(out)
+        u, damage = errors(self.reference, run, self.stiffness)
+        damage = damage or 0.0
+        return {"run": str(choice), "series": choice.series, "solver": choice.solver,
+                "accuracy": choice.accuracy, "nodes": run.summary["nodes"], "steps": run.summary["steps"],
+                "seconds": seconds, "u": u, "damage": damage, "error": max(u, damage)}
+
+    def in_fenicsx(self, choice):
+        """The row of FEniCSx on the mesh of the last run, which has solved the same discrete problem."""
+        mesh, steps = next(self.folder.glob("*.msh")), round(self.shipped["time"]["end"] / choice.step)
+        command = [sys.executable, ROOT / "validation" / "fenicsx.py", self.folder / f"{self.name}.toml", mesh,
+                   "--keep", 7, "--out", self.folder / "loop"]
+        if not any(row["solver"] == FENICSX for row in self.rows):
+            # Compiles the forms.
+            self.timed([*command, "--steps", 1])
+        seconds, said = self.timed([*command, "--steps", steps])
+        ours, theirs = self.last.summary["work"], json.loads(said.strip().splitlines()[-1])["work"]
+        if abs(theirs - ours) > 1e-6 * abs(ours):
+            raise SceneError(f"the work of the loads is {theirs}, but {ours} by signorini: another answer")
+        return {**self.rows[-1], "run": str(choice), "solver": FENICSX, "seconds": seconds}
+
+    def timed(self, command, meshes=lambda _: ()):
+        """The median seconds of a command, each time without the listed meshes, and its output."""
+        times = []
+        while len(times) < (PASSES if not times or times[0] < SHORT else 1):
+            for mesh in meshes("*.msh"):
+                mesh.unlink()
+            started = time.perf_counter()
+            done = subprocess.run(list(map(str, command)), capture_output=True, text=True, env=ENVIRONMENT)
+            times.append(time.perf_counter() - started)
+            if done.returncode:
+                raise SceneError((done.stderr.strip() or "it failed").splitlines()[-1])
+        return median(times), done.stdout
 
 
 def line(row):
@@ -220,16 +264,16 @@ def report(name, rows):
     print(f"\n{name}: the front, and the scene as shipped")
     for row in members + [row for row in rows if row["series"] == "as shipped"]:
         print(f"  {line(row)}{'   (knee)' if row is bend else ''}")
-    paper, asked = ([row for row in rows if row["series"] == series and row["solver"] == "active-set"]
+    uniform, asked = ([row for row in rows if row["series"] == series and row["solver"] == "active-set"]
                     for series in ("P1 uniform", "accuracy"))
     for error in ASKED:
-        (long, beyond), (short, _) = seconds_for(error, paper), seconds_for(error, asked)
-        print(f"  {100 * error:g} %: the paper's method {long:.3g} s{' (extrapolated)' if beyond else ''}, "
+        (long, beyond), (short, _) = seconds_for(error, uniform), seconds_for(error, asked)
+        print(f"  {100 * error:g} %: uniform P1 {long:.3g} s{' (extrapolated)' if beyond else ''}, "
               f"--accuracy {short:.3g} s: {long / short:.3g} times")
 
 
-def draw_all(tables, picture):
-    """A panel per scene, and one with the legend."""
+def draw_all(tables, origin, picture):
+    """A panel per scene, and one with the legend and the origin of the numbers."""
     columns = min(3, len(tables))
     rows = -(-(len(tables) + 1) // columns)
     figure, axes = plt.subplots(rows, columns, squeeze=False, figsize=(4.6 * columns, 4.1 * rows))
@@ -239,24 +283,34 @@ def draw_all(tables, picture):
         report(name, table)
     for axis in axes[len(tables):]:
         axis.axis("off")
-    axes[len(tables)].legend(*axes[0].get_legend_handles_labels(), loc="center", fontsize=9.5)
-    figure.savefig(picture)
+    axes[len(tables)].legend(*axes[0].get_legend_handles_labels(), loc="center", fontsize=9.5, title=origin, title_fontsize=9)
+    figure.savefig(picture, dpi=100)
     print(f"\n{picture}")
 
 
 def main():
+    """Returns the exit code: 1 if a scene cannot be measured, or with --asked if an error exceeds its accuracy."""
     parser = parser_of(__doc__)
     parser.add_argument("--asked", action="store_true", help="the accuracy asked for against the true error")
-    parser.add_argument("scenes", nargs="+", type=Path)
+    parser.add_argument("--quick", action="store_true", help="without the finest meshes")
+    parser.add_argument("scenes", nargs="+", type=Path, metavar="SCENE")
     arguments = parser.parse_args()
-    tables, out = {}, ROOT / "out" / "chart"
+    tables, out, failed = {}, ROOT / "out" / "chart", False
     for path in arguments.scenes:
         with tempfile.TemporaryDirectory() as folder:
-            study = Study(arguments.binary, path, Path(folder))
+            try:
+                study = Study(arguments.binary, path, Path(folder))
+            except (SceneError, subprocess.CalledProcessError) as error:
+                failed = True
+                print(f"error: {error}", file=sys.stderr)
+                continue
             asked = (Choice("accuracy", accuracy=accuracy) for accuracy in ASKED)
-            for choice in asked if arguments.asked else choices(study.name):
+            for choice in asked if arguments.asked else choices(study, arguments.quick):
                 study.run(choice)
-            tables[study.name] = study.rows
+            tables[study.name], made = study.rows, study.last.summary["provenance"]
+        if not arguments.asked:
+            (out / study.name).mkdir(parents=True, exist_ok=True)
+            write_table(study.rows, out / study.name / "chart.csv")
     if arguments.asked:
         print("true error over the accuracy")
         for name, rows in tables.items():
@@ -264,12 +318,11 @@ def main():
                 u, damage, larger = (row[key] / row["accuracy"] for key in ("u", "damage", "error"))
                 print(f"{name}, {row['accuracy']}: {larger:.2f} (u {u:.2f}, damage {damage:.2f}), "
                       f"{2 * row['nodes']} unknowns, {row['seconds']:.2f} s")
-        sys.exit(any(row["error"] > row["accuracy"] for rows in tables.values() for row in rows))
-    for name, rows in tables.items():
-        (out / name).mkdir(parents=True, exist_ok=True)
-        write_table(rows, out / name / "chart.csv")
-    draw_all(tables, out / "chart.png")
+        return failed or any(row["error"] > row["accuracy"] for rows in tables.values() for row in rows)
+    if tables:
+        draw_all(tables, f"{made['date'][:10]}, signorini {made['version']}", out / "chart.png")
+    return failed
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
