@@ -15,7 +15,7 @@ ranks    whole runs on 1, 2 and 4 ranks with our factors (one rank: growth), wit
 k = 0.01. A step is the mean of all but the first, which makes what the others keep. Programs take turns,
 because the machine may be shared: a row has the medians over the rounds, ratios are taken round by round.
 All use the same meshes, tolerance and one thread each. A program whose answer differs from ours by more than 1e-6
-is left out. Writes OUT/bench.csv, prints the tables of SPEED.md and draws OUT/bench.png.
+is left out. Writes OUT/bench.csv and prints the tables of SPEED.md.
 """
 
 import argparse
@@ -32,7 +32,6 @@ from statistics import median
 import numpy as np
 
 from shared import ROOT, parser_of
-from drawing import BLUE, FAINT, GREEN, INK, RED, plt
 from results import markdown, read_table, write_table
 
 # The largest allowed difference of an answer from ours to the same discrete problem, and the largest KKT residual.
@@ -43,7 +42,7 @@ KEEP = {"kept": 7, "anew": 0}
 # processor that it does not know.
 KERNELS = {"avx512f": "SkylakeX", "avx2": "Haswell"}
 OURS, FROZEN, KEPT, ANEW = "signorini", "frozen", "FEniCSx, factor kept", "FEniCSx, a factor for every system"
-RIVALS = {KEPT: ("kept", "#8e5aa8"), ANEW: ("anew", "#c9aed6")}
+RIVALS = {KEPT: "kept", ANEW: "anew"}
 # Scene and .geo, order, cells along the contact or accuracy, rounds, programs.
 SCENES = {"stays": ("square-mild", "square"), "moves": ("lshape-rolling", "lshape"), FROZEN: ("lshape", "lshape")}
 ALL, FEWER = (OURS, KEPT, ANEW, FROZEN), (OURS, KEPT)
@@ -182,7 +181,7 @@ def compare(bench, quick):
                         row = bench.signorini(SCENES[FROZEN][0], mesh, order)[0]
                     elif program in RIVALS and (program == KEPT or turn == 0):
                         few = program == ANEW and contact == "stays"
-                        row, last = bench.fenicsx(scene, mesh, order, RIVALS[program][0], FEW if few else STEPS)
+                        row, last = bench.fenicsx(scene, mesh, order, RIVALS[program], FEW if few else STEPS)
                         if wrong := differs(last, history, row):
                             raise Failure(wrong)
                     else:
@@ -329,45 +328,6 @@ def report(rows):
     if grown := [row for row in rows if row["part"] == "growth"]:
         print("\nfrom n = 64 " + ", ".join(f"{name} grows like N^{exponent(grown, key)[0]:.2f}" for name, key in (
             ("a step", "seconds_per_step"), ("a whole run", "whole_seconds"), ("memory", "peak_mb"))))
-    return cases, grown
-
-
-def draw(rows, picture):
-    """Multiples of our time, in groups, and growth."""
-    cases, grown = report(rows)
-    figure = plt.figure(figsize=(15, 12))
-    grid = figure.add_gridspec(3, 2, height_ratios=[1.3, 1.3, 1])
-    titles = {"seconds_per_step": "a step", "whole_seconds": "the whole process, files written"}
-    for place, (key, title) in enumerate(titles.items() if cases else ()):
-        axes = figure.add_subplot(grid[place, :])
-        at = np.arange(len(cases))
-        axes.bar(at - 0.25, 1.0, 0.24, color=BLUE, label="signorini")
-        for k, (program, (_, colour)) in enumerate(RIVALS.items()):
-            heights = [case.get(program, {}).get(f"{key}_over_ours", np.nan) for case in cases.values()]
-            bars = axes.bar(at + 0.25 * k, heights, 0.24, color=colour, label=program)
-            axes.bar_label(bars, [number(h) for h in heights], fontsize=6.5, padding=1)
-        if key == "seconds_per_step":
-            floor = [1 / case[OURS]["step_over_floor"] for case in cases.values()]
-            axes.hlines(floor, at - 0.37, at - 0.13, color=RED, lw=2,
-                        label="floor: bytes over copy, operations over dgemm")
-        axes.set_xticks(at, [f"contact {contact}\nP{order}, {mesh}\nours: {number(case[OURS][key])} s"
-                             for (contact, order, mesh), case in cases.items()], fontsize=7.5)
-        axes.set(yscale="log", ylabel="times ours", title=title)
-        axes.set_ylim(top=2 * axes.get_ylim()[1])
-        axes.legend(fontsize=8, ncols=3, loc="upper left")
-    growing = (("seconds_per_step", 1e3, "ms per step"), ("peak_mb", 1.0, "peak memory, MB"))
-    for place, (key, scale, label) in enumerate(growing if grown else ()):
-        axes, (power, start) = figure.add_subplot(grid[2, place]), exponent(grown, key)
-        nodes = np.array([row["nodes"] for row in grown])
-        axes.loglog(2 * nodes, [scale * row[key] for row in grown], "o-", color=GREEN, ms=5, lw=1.2)
-        axes.loglog(2 * nodes, scale * np.exp(start) * nodes**power, ":", color=INK, lw=1, label=f"N^{power:.2f}")
-        axes.set(xlabel="unknowns", ylabel=label, title="signorini, contact stays")
-        axes.legend(fontsize=8)
-    for axes in figure.axes:
-        axes.grid(axis="y", color=FAINT, alpha=0.35, linewidth=0.6)
-        axes.set_axisbelow(True)
-    figure.savefig(picture)
-    print(picture)
 
 
 def main():
@@ -393,7 +353,7 @@ def main():
             shutil.rmtree(bench.out / folder, ignore_errors=True)
         if bench.rows:
             write_table(bench.rows, bench.out / "bench.csv")
-    draw(bench.rows, bench.out / "bench.png")
+    report(bench.rows)
 
 
 if __name__ == "__main__":

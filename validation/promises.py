@@ -25,8 +25,8 @@ import numpy as np
 from shared import ROOT, parser_of
 from references import kept
 from results import read_table, write_table
-from scene import SceneError, elasticity
-from scenes import scenes, table, texts, write
+from scene import SceneError
+from scenes import scenes, texts, write
 from true_errors import Run, errors
 
 # Sizes of the second truth over those of the first.
@@ -101,13 +101,8 @@ class Truth:
 
     def errors(self, run):
         """The errors of u in the energy norm and of the damage in L², by name; only those with a meaning."""
-        material = table(self.scene)
-        values = {**material["material"], **{k[9:]: v for k, v in material.items() if k.startswith("material.")}}
-        number = np.zeros(len(self.run.cells), int) if self.run.material is None else self.run.material
-        others = [values, *(values[name] for name in sorted(k for k, v in values.items() if isinstance(v, dict)))]
-        d = np.array([elasticity(of["young"], of["poisson"], values["plane"]) for of in others])[number]
         with np.errstate(invalid="ignore", divide="ignore"):
-            found = zip(("u", "damage"), errors(self.run, run, d))
+            found = zip(("u", "damage"), errors(self.run, run))
         return {name: error for name, error in found if error is not None and error < 1e3}
 
 

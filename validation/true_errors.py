@@ -10,6 +10,7 @@ from matplotlib.tri import Triangulation
 
 import shared  # noqa: F401
 import signorini_results
+from scene import elasticity, read_scene
 from signorini_results import derivatives, functions, read_frame
 
 # Barycentric points and weights of the rule of degree 4 with six points.
@@ -42,6 +43,17 @@ class Run(signorini_results.Run):
         self.find = vertices.get_trifinder()
         # Opposite each vertex.
         self.neighbours = vertices.neighbors[:, [1, 2, 0]]
+
+    @property
+    def stiffness(self):
+        """D of the paper's σ = 𝒜ε per element, or for all of them: (…, 3, 3)."""
+        scene = read_scene(self.folder / "scene.toml")
+        names = sorted({name for table in ("material", "damage") for name, of in scene.get(table, {}).items()
+                        if isinstance(of, dict)})
+        materials = [{**scene["material"], **scene["material"].get(name, {})} for name in ("", *names)]
+        young, poisson = (np.array([of[key] for of in materials], float) for key in ("young", "poisson"))
+        number = 0 if self.material is None else self.material.astype(int)
+        return elasticity(young, poisson, scene["material"].get("plane", "stress"))[number]
 
     def mapped(self, cell, l):
         """Points of elements (n) at barycentric coordinates (n, 3), and ∂x/∂(l₁, l₂)."""
@@ -93,7 +105,7 @@ class Run(signorini_results.Run):
         return cell, l
 
 
-def errors(reference, run, d):
+def errors(reference, run):
     """The relative errors of u and of the damage (None without damage), for the body or per element of the reference. NaN
     without deformation."""
     cells = np.repeat(np.arange(len(reference.cells)), len(POINTS))
@@ -104,7 +116,7 @@ def errors(reference, run, d):
     inner = points.reshape(-1, len(POINTS), 2).mean(1).repeat(len(POINTS), axis=0)
     other, other_zeta = run.at(*run.locate(points, inner))
 
-    d = np.broadcast_to(d, (len(reference.cells), 3, 3))[cells]
+    d = np.broadcast_to(reference.stiffness, (len(reference.cells), 3, 3))[cells]
 
     def energy(e):
         return (weight * zeta * np.einsum("ni,nij,nj->n", e, d, e)).sum()
