@@ -127,7 +127,7 @@ paper: build
 	$(PYTHON) validation/paper.py --binary $(BINARY) $(ARGS)
 
 # Whole processes against references of their own, which are kept (minutes); out/chart/chart.png.
-chart: build deps
+chart: build deps-validate
 	$(PYTHON) validation/chart.py --binary $(BINARY) $(ARGS) $(CHART)
 
 accuracy: build

@@ -4,8 +4,8 @@
 The runs of a scene are: P1 on uniform meshes with uniform steps by the paper's method, `penalty-duality:plain`, by the
 other contact solvers and in FEniCSx; meshes graded by the .geo in P1 and P2; `--accuracy` from 0.1 to 0.001; and the
 scene as it is. The time is that of the processor for the whole process on one core, with gmsh, adaptation and output;
-FEniCSx gets the mesh. For a run below three seconds it is the median of three runs. The error is the larger one of the relative errors
-of u (energy norm) and of the damage (L²) at the end, against the reference of references.py in out/reference/graded.
+FEniCSx gets the mesh. For a run below three seconds it is the median of three runs. The error is the larger one of the
+relative errors of u (energy norm) and of the damage (L²) at the end, against the reference of references.py.
 FEniCSx solves the same discrete problem: it has our error, if the work of its loads agrees to 1e-6.
 
 Writes out/chart/<scene>/chart.csv and draws out/chart/chart.png, a panel per scene. Prints the Pareto front
@@ -28,11 +28,11 @@ from pathlib import Path
 from statistics import median
 
 import numpy as np
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 import references
 from shared import ROOT, parser_of
-from drawing import BLUE, FAINT, GREEN, INK, RED, plt
+from converge import finish
+from drawing import BLUE, GREEN, INK, RED, plt
 from results import write_table
 from scene import SceneError, read_scene, write_scene
 from true_errors import Run, errors
@@ -140,7 +140,7 @@ class Study:
         shutil.copy(file, folder)
         self.reference = Run(references.graded(self.binary, path, ROOT / "out" / "reference" / "graded" / self.name))
         if self.reference.summary["stopped_by"]:
-            raise SceneError(f"{path}: the run stops before its end, at which runs are compared; choose a smaller time.end")
+            raise SceneError(f"{path}: the run stops before its end, where errors are taken; choose a smaller time.end")
 
     def run(self, choice):
         """Adds the row of a run, or reports why it failed."""
@@ -235,12 +235,7 @@ def draw(axes, name, rows):
                       label="as shipped", zorder=5)
     axes.set(xscale="log", yscale="log", title=name, xlabel="processor seconds of the whole process",
              ylabel="larger error of u and of the damage (%)")
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axis.set_minor_formatter(NullFormatter())
-    axes.grid(which="both", color=FAINT, alpha=0.3, linewidth=0.5)
-    axes.set_axisbelow(True)
+    finish(axes)
 
 
 def report(name, rows):

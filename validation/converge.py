@@ -100,8 +100,6 @@ class Study:
         parameters = dict(scene["mesh"].get("parameters", {}))
         if size := arguments.size or COARSER * scene["mesh"].get("size", 0):
             parameters["size"] = size
-        if arguments.grading:
-            parameters["grading"] = arguments.grading
         lines = [f"{name} = {value};" for name, value in parameters.items()]
         # The text, not an Include: a changed geometry needs another reference.
         self.geometry = "\n".join([*lines, file.read_text(encoding="utf-8")])
@@ -240,7 +238,7 @@ def draw_orders(axes, rows):
 
 
 def finish(axes):
-    """Draws the legend, the grid, and at least three ticks on each logarithmic axis."""
+    """Draws the grid, and at least three ticks on each logarithmic axis."""
     for axis in (axes.xaxis, axes.yaxis):
         low, high = axis.get_view_interval()
         powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)))
@@ -251,16 +249,15 @@ def finish(axes):
         axis.set_ticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.grid(color=FAINT, alpha=0.3, linewidth=0.5)
     axes.set_axisbelow(True)
-    axes.legend(fontsize="small")
 
 
 def draw(rows, path):
     """Both figures side by side."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.8))
-    draw_sums(left, rows)
-    draw_orders(right, rows)
-    finish(left)
-    finish(right)
+    figure, panels = plt.subplots(1, 2, figsize=(11, 4.8))
+    for axes, draw_errors in zip(panels, (draw_sums, draw_orders)):
+        draw_errors(axes, rows)
+        finish(axes)
+        axes.legend(fontsize="small")
     figure.savefig(path)
 
 
@@ -276,7 +273,6 @@ def arguments_of(words=None):
     parser.add_argument("--reference", action="store_true", help="only make the reference")
     parser.add_argument("--refinements", type=int, default=6, help="of the coarsest mesh for the reference")
     parser.add_argument("--size", type=float, help="of the coarsest mesh, m (default: 8 times the scene's)")
-    parser.add_argument("--grading", type=float, help="of the coarsest mesh (default: the scene's)")
     parser.add_argument("--step", type=float, help="of the reference, s (default: T/1000)")
     parser.add_argument("--out", type=Path, help="folder for the table and the figure (default: out/converge/<scene>)")
     return parser.parse_args(words)
