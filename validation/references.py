@@ -7,6 +7,7 @@ long, r being the distance to the nearest corner, and smaller near Γ_C where co
 solves on it with adaptive steps.
 """
 
+import re
 import shutil
 import subprocess
 import tempfile
@@ -55,12 +56,13 @@ class Grading:
     # Lines before these sizes: the fields that they use.
     fields: tuple = ()
 
-    def geometry(self, file):
-        """The text of a .geo: the body of another one, with this size."""
+    def geometry(self, file, parameters=()):
+        """The text of a .geo: the body of another one with its parameters, with this size."""
         r = [f"((x - ({x}))^2 + (y - ({y}))^2)" for x, y in self.corners]
         sizes = [f"{self.strength} * {square}^(5 / 12) + 3e-7" for square in r]
         sizes += [str(self.largest), *self.near]
-        return "\n".join([self.outline or f'Include "{file.resolve()}";', *self.fields, *size_fields(sizes), ""])
+        body = self.outline or f'Include "{file.resolve()}";'
+        return "\n".join([*parameters, body, *self.fields, *size_fields(sizes), ""])
 
 
 LSHAPE = [(2, 4), (6, 4), (8, 4), (0, 0), (2, 0), (0, 6), (8, 6)]
@@ -78,7 +80,7 @@ GRADINGS = {
 
 
 def geometry_of(path, scene):
-    """The .geo of a scene, and a text that sets its parameters and includes it; a SceneError if it has none."""
+    """The .geo of a scene and lines that set its parameters; a SceneError if it has none."""
     file = path.parent / scene["mesh"]["file"]
     if file.suffix != ".geo":
         raise SceneError(f"{path}: the meshes are made from a .geo, but mesh.file is {file.name}")
@@ -95,21 +97,18 @@ def grading_of(file, parameters, scene):
         subprocess.run(["gmsh", "-1", "-save_all", "-v", "1", geometry, "-o", mesh], check=True)
         text = mesh.read_text(encoding="utf-8")
     # MSH 4.1. A point: its number, x, y, z, …; a curve: its number, a box, n, n physical curves, 2, its ends.
-    names, entities = ([line.split() for line in text.partition(f"${name}\n")[2].partition("$End")[0].splitlines()]
-                       for name in ("PhysicalNames", "Entities"))
-    count = int(entities[0][0])
-    points, curves = entities[1:1 + count], entities[1 + count:1 + count + int(entities[0][1])]
+    lines = [line.split() for line in text.partition("$Entities\n")[2].partition("$End")[0].splitlines()]
+    count, all_curves = map(int, lines[0][:2])
+    points, curves = lines[1:1 + count], lines[1 + count:1 + count + all_curves]
     ends = {end.lstrip("-") for curve in curves for end in curve[9 + int(curve[7]):]}
     corners = [(float(x), float(y)) for point, x, y, *_ in points if point in ends]
-    gaps = {boundary["name"] for boundary in scene["boundary"] if "gap" in boundary}
-    numbers = {number for dimension, number, name in names[1:] if dimension == "1" and name.strip('"') in gaps}
-    contact = [curve[0] for curve in curves if numbers & set(curve[8:8 + int(curve[7])])]
+    gaps = [boundary["name"] for boundary in scene["boundary"] if "gap" in boundary]
+    numbers = {number for number, name in re.findall(r'^1 (\d+) "(.*)"', text, re.MULTILINE) if name in gaps}
+    contact = ", ".join(curve[0] for curve in curves if numbers & set(curve[8:8 + int(curve[7])]))
     size = float(np.ptp([[float(x) for x in curve[k:k + 2]] for curve in curves for k in (1, 4)], axis=0).max())
-    fields = ("Field[1] = Distance; Field[1].NumPointsPerCurve = 200;",
-              f"Field[1].CurvesList = {{{', '.join(contact)}}};")
-    near = (f"{size / 400} + 0.2 * F1",)
-    return Grading(corners, 0.04 * size ** (1 / 6), size / 50, near if contact else (),
-                   fields=(*parameters, *fields) if contact else parameters)
+    distance = f"Field[99] = Distance; Field[99].NumPointsPerCurve = 200; Field[99].CurvesList = {{{contact}}};"
+    near, fields = ((f"{size / 400} + 0.2 * F99",), (distance,)) if contact else ((), ())
+    return Grading(corners, 0.04 * size ** (1 / 6), size / 50, near, fields=fields)
 
 
 def kept(binary, folder, scene, geometry, refinements=0, limit=None):
@@ -117,7 +116,7 @@ def kept(binary, folder, scene, geometry, refinements=0, limit=None):
     belong to this scene and text. A run longer than `limit` seconds raises subprocess.TimeoutExpired."""
     results, file, made_of = folder / "results", folder / "reference.toml", folder / "reference.geo"
     complete = folder / "complete"
-    scene = {**scene, "mesh": {"file": str(nested(folder, refinements)[-1].name if refinements else made_of.name)}}
+    scene = {**scene, "mesh": {"file": f"refined{refinements}.msh" if refinements else made_of.name}}
     same = file.exists() and read_scene(file) == scene and made_of.read_text(encoding="utf-8") == geometry
     if complete.exists() and same:
         return results
@@ -163,4 +162,4 @@ def graded(binary, path, folder):
     if "time" in scene:
         scene["time"] = {**scene["time"], "step": "auto", "tolerance": grading.tolerance}
     scene["output"] = {"every": 1000000}
-    return kept(binary, Path(folder), scene, grading.geometry(file))
+    return kept(binary, Path(folder), scene, grading.geometry(file, () if shipped else parameters))
