@@ -96,29 +96,6 @@ fn a_failing_run_of_a_study_is_told_and_the_others_go_on() {
     directory.say(&twice).fails(2, &["--set time.end is given twice"]);
 }
 
-#[test]
-fn a_study_takes_cases_from_a_file_and_divides_them_with_another_study() {
-    let directory = TestDirectory::new();
-    directory.write("cases.csv", "material.young,time.step\n80,0.5\n160,\n\n240,0.25\n");
-    let words = ["study", "scene.toml", "--cases", "cases.csv", "--jobs", "1"];
-    let both = std::thread::scope(|scope| {
-        [(); 2].map(|()| scope.spawn(|| directory.say(&words))).map(|study| study.join())
-    });
-    for study in both {
-        let said = study.expect("a study");
-        if lacks(&said) {
-            return;
-        }
-        assert_eq!(said.code, Some(0), "{said:?}");
-        assert!(said.out.contains("3/3 "), "{}", said.out);
-    }
-    let table = directory.read("out/scene-study/study.csv");
-    let rows: Vec<&str> = table.lines().collect();
-    assert!(rows.len() == 4 && rows[2].starts_with("young=160,160,,"), "{table}");
-    directory.write("cases.csv", "material.young,time.step\n80\n");
-    directory.say(&words).fails(2, &["cases.csv: needs a head with keys"]);
-}
-
 /// Uniform pressure 3 on the unit square: u_y = −3 y/E, σ_yy = −3.
 #[test]
 fn curves_and_the_python_module_give_the_exact_fields() {
