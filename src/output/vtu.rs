@@ -191,6 +191,13 @@ impl FieldWriter {
     }
 }
 
+/// A run that is given up leaves no thread that writes into the folder of the next one.
+impl Drop for FieldWriter {
+    fn drop(&mut self) {
+        self.pending.take().map(|(thread, _)| thread.join());
+    }
+}
+
 /// The file of a piece with these fields.
 fn piece(mesh: &str, points: &[DataArray], cells: &[DataArray]) -> String {
     let [points, cells] =

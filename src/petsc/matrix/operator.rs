@@ -34,6 +34,9 @@ pub(super) struct Shell {
     stale: Cell<bool>,
 }
 
+/// A product as PETSc calls it: A, x, y.
+type Product = unsafe extern "C" fn(raw::Mat, raw::Vec, raw::Vec) -> raw::PetscErrorCode;
+
 impl Matrix {
     /// Takes products and the diagonal from this operator, and entries too when they are read.
     ///
@@ -49,12 +52,8 @@ impl Matrix {
             let handle = Handle::new(raw::MatDestroy, |handle| {
                 raw::MatCreateShell(world(), rows, rows, -1, -1, context, handle)
             })?;
-            let function: unsafe extern "C" fn(_, _, _) -> _ = multiply;
-            check(raw::MatShellSetOperation(
-                handle.raw(),
-                product,
-                transmute(function as *const ()),
-            ))?;
+            let function = Some(transmute::<Product, unsafe extern "C" fn()>(multiply));
+            check(raw::MatShellSetOperation(handle.raw(), product, function))?;
             for option in [raw::MatOption::MAT_SYMMETRIC, raw::MatOption::MAT_SYMMETRY_ETERNAL] {
                 check(raw::MatSetOption(handle.raw(), option, raw::PetscBool::PETSC_TRUE))?;
             }
