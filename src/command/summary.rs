@@ -60,16 +60,21 @@ pub(super) fn summary(
     if let Err(error) = result {
         summary["error"] = json!(error.to_string());
     }
-    for extreme in extremes.iter().flat_map(|of| &of.of_points) {
-        summary[&extreme.name] = json!(extreme.value);
-        summary["extremes"][&extreme.name] = json!(extreme);
-    }
-    for (name, length) in extremes.iter().flat_map(|of| &of.contact_lengths) {
-        summary[name] = json!(length);
-    }
+    extremes.iter().for_each(|extremes| add_extremes(&mut summary, extremes));
     summary["peak_megabytes"] = json!(memory);
     add_stop(&mut summary, problem, outcome);
     summary
+}
+
+/// Adds to the summary the extreme stresses and pressures with their places, and the lengths of contact, m.
+fn add_extremes(summary: &mut Value, extremes: &Extremes) {
+    for extreme in &extremes.of_points {
+        summary[&extreme.name] = json!(extreme.value);
+        summary["extremes"][&extreme.name] = json!(extreme);
+    }
+    for (name, length) in &extremes.contact_lengths {
+        summary[name] = json!(length);
+    }
 }
 
 /// Adds to the summary why the run stopped before its end, at which time, s, and the error of this time; null if it

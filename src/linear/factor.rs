@@ -11,6 +11,7 @@
 //! of the rank and a [`SchurComplement`](super::schur::SchurComplement) for the interface.
 
 mod checkpoint;
+mod condensed;
 
 pub use checkpoint::FactorState;
 
@@ -82,48 +83,6 @@ impl Factor {
         self.comm
     }
 
-    /// Condenses factors of matrices of this size: these owned unknowns may be prescribed. A change of these
-    /// unknowns discards the factor. Collective.
-    ///
-    /// # Errors
-    /// PETSc failed.
-    pub fn set_condensed(
-        &mut self,
-        matrix: &Matrix,
-        unknowns: impl Iterator<Item = usize>,
-    ) -> Result<(), PetscError> {
-        let condensed = (matrix.size()?, unknowns.collect());
-        if self.comm.any(condensed != self.condensed) {
-            (self.condensed, self.substructure) = (condensed, None);
-            self.policy = self.policy.take().filter(|_| self.loaded);
-        }
-        Ok(())
-    }
-
-    /// Is the factor for matrices with this number of rows?
-    pub(crate) fn is_for(&self, rows: usize) -> bool {
-        self.substructure.as_ref().is_some_and(|(size, _)| *size == rows)
-    }
-
-    /// The condensed unknowns that are coupled with others in `k` but not in `operator`.
-    pub(crate) fn prescribed_in(
-        &self,
-        k: &Matrix,
-        operator: &Matrix,
-    ) -> Result<Vec<usize>, PetscError> {
-        let mut prescribed = Vec::new();
-        for &unknown in &self.condensed.1 {
-            let row = k.rows().start + unknown as i32;
-            let coupled = |columns: &[i32], values: &[f64]| {
-                columns.iter().zip(values).any(|(column, value)| *column != row && *value != 0.0)
-            };
-            if k.read_row(row, coupled)? && !operator.read_row(row, coupled)? {
-                prescribed.push(unknown);
-            }
-        }
-        Ok(prescribed)
-    }
-
     /// Analyses the matrix. It returns false if the matrix or its interface is too large for a factor.
     /// Collective.
     ///
@@ -192,26 +151,6 @@ impl Factor {
         self.policy = definite.then(|| RefactorisationPolicy::new(cost));
         self.factorisations += usize::from(definite);
         Ok(())
-    }
-
-    /// Does the factor have condensed unknowns?
-    pub(crate) fn is_condensed(&self) -> bool {
-        match &self.substructure {
-            Some((rows, Some(_))) => {
-                *rows == self.condensed.0 && self.comm.any(!self.condensed.1.is_empty())
-            }
-            _ => false,
-        }
-    }
-
-    /// Prescribes some of the condensed unknowns of the factored matrix. It returns false if the rest is not
-    /// positive definite. Collective.
-    ///
-    /// # Errors
-    /// There is no memory for it.
-    pub(crate) fn prescribe(&mut self, prescribed: &[usize]) -> Result<bool, PetscError> {
-        let Some(factor) = self.substructure() else { return Ok(true) };
-        factor.prescribe(prescribed)
     }
 
     /// Bytes that an application reads on this rank; 0 if unknown.

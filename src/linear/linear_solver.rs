@@ -3,7 +3,8 @@
 mod preconditioner;
 
 use super::{Condensed, Factor, LinearSystem, PhaseNames, Precision, Reduction};
-use crate::petsc::{KeptPreconditioner, Ksp, KspProblem, Matrix, PetscError, Session, Vector};
+use crate::petsc::{Ksp, KspProblem, Matrix, PetscError, Session, Vector};
+use preconditioner::Booked;
 use std::mem::take;
 
 /// A KSP, by default conjugate gradients with a [`Factor`] of this matrix or of an earlier one. PETSc options
@@ -139,7 +140,7 @@ impl LinearSolver {
         (self.prepared, self.iterations) = (false, 0);
         system.multiply(x, &mut self.residual)?;
         self.residual.axpby(1.0, b, -1.0)?;
-        self.set_norm(system)?;
+        self.norm = self.residual.free_norm(system.prescribed)?;
         self.first_norm = self.norm;
         if self.norm > limit && self.factor.exists() && self.is_own(system.matrix)? {
             self.factor.set_scaling(system.matrix)?;
@@ -153,11 +154,6 @@ impl LinearSolver {
         self.norm.is_finite() && self.norm <= limit
     }
 
-    fn set_norm(&mut self, system: LinearSystem) -> Result<(), PetscError> {
-        self.norm = self.residual.free_norm(system.prescribed)?;
-        Ok(())
-    }
-
     /// Makes a new factor if one is due for a solve to `limit`. Returns the number of factorisations.
     ///
     /// # Errors
@@ -165,11 +161,7 @@ impl LinearSolver {
     pub fn prepare(&mut self, system: LinearSystem, limit: f64) -> Result<usize, PetscError> {
         let due = self.factor.iteration_limit(self.asked(limit)).is_none();
         if due {
-            system.book(
-                |phase_names| phase_names.factorisation,
-                (1.0, 0.0),
-                || self.factorise(system),
-            )?;
+            self.factorise(system)?;
         }
         Ok(usize::from(due))
     }
@@ -209,7 +201,7 @@ impl LinearSolver {
             x.axpby(1.0, &self.expanded, 1.0)?;
             system.multiply(&self.expanded, &mut self.correction)?;
             self.residual.axpby(-1.0, &self.correction, 1.0)?;
-            self.set_norm(system)?;
+            self.norm = self.residual.free_norm(system.prescribed)?;
         }
         Ok(())
     }
@@ -236,11 +228,7 @@ impl LinearSolver {
         }
         if !report.converged {
             report.factorisations += 1;
-            if system.book(
-                |phase_names| phase_names.factorisation,
-                (1.0, 0.0),
-                || self.factorise(system),
-            )? {
+            if self.factorise(system)? {
                 self.iterate(system, x, (limit, None), &mut report)?;
             }
         }
@@ -308,29 +296,5 @@ impl LinearSolver {
     /// b − A x of the last solve. On prescribed unknowns these are the forces that prescribe them.
     pub fn residual(&self) -> &Vector {
         &self.residual
-    }
-}
-
-/// The factor during a solve; its time is booked.
-struct Booked<'a> {
-    factor: &'a mut Factor,
-    /// P⁻¹ r of the first residual, if it is known.
-    first: Option<&'a Vector>,
-    system: LinearSystem<'a>,
-}
-
-impl KeptPreconditioner for Booked<'_> {
-    /// The linear solver decides when to factorise.
-    fn set_up(&mut self, _matrix: &Matrix) -> Result<bool, PetscError> {
-        Ok(self.factor.exists())
-    }
-
-    fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
-        if let Some(first) = self.first.take() {
-            return z.axpby(1.0, first, 0.0);
-        }
-        let bytes = self.factor.bytes_per_application();
-        let apply = || self.factor.apply(r, z);
-        self.system.book(|phase_names| phase_names.triangular_solves, (1.0, bytes), apply)
     }
 }

@@ -17,7 +17,7 @@ mod vtu;
 pub use vtu::{FieldWriter, FieldsWritten};
 
 use crate::{
-    scene::AsRun,
+    scene::{AsRun, Scene, Stepping},
     whole_file::{self, PARTIAL},
 };
 use growing_file::GrowingFile;
@@ -204,6 +204,17 @@ fn is_partial(name: &str) -> bool {
 fn remove(folder: &Path, is_old: impl Fn(&str) -> bool) -> Result<(), OutputError> {
     let mut old = files(folder)?.into_iter().filter(|(name, _)| is_old(name));
     old.try_for_each(|(_, path)| fs::remove_file(&path).map_err(|e| OutputError::new(&path, e)))
+}
+
+/// The number of digits in the numbers of all frames, so that their names sort: four, or more for more frames.
+fn digits(scene: &Scene) -> usize {
+    let stepping = scene.time.map(|grid| grid.stepping);
+    let frames = match (scene.output.every, stepping) {
+        (Some(every @ 1..), Some(Stepping::Uniform { steps })) => steps / every + 2,
+        (Some(1..), Some(Stepping::Auto { .. })) => 999_999,
+        _ => 1,
+    };
+    4.max(frames.ilog10() as usize + 1)
 }
 
 /// A CSV file that grows by rows. Each row is written at once, so that one can follow the run.

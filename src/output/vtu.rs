@@ -3,6 +3,7 @@
 use super::{
     OutputError,
     contact::ContactWriter,
+    digits,
     growing_file::GrowingFile,
     vtk::{DataArray, INTEGER, REAL, SINGLE, cells_text, entry, list_of_frames, vtk_file},
     write_whole,
@@ -13,7 +14,6 @@ use crate::{
     model::von_mises,
     petsc::PetscError,
     problem::{DiscreteProblem, State},
-    scene::{Scene, Stepping},
 };
 use serde::{Deserialize, Serialize};
 use std::{
@@ -28,10 +28,6 @@ use std::{
 /// nodes.
 const TRIANGLE: (u8, usize) = (5, 3);
 const QUADRATIC_TRIANGLE: (u8, usize) = (22, 6);
-/// The usual number of digits in the number of a frame.
-const DIGITS: usize = 4;
-/// The assumed number of frames for adaptive steps with `output.every`.
-const MANY: usize = 999_999;
 
 /// Writes frames `fields_NNNN.vtu` and their list over time, `fields.pvd`. Each of several ranks writes its
 /// piece of a frame, `fields_NNNN_R.vtu`. The first rank writes the lists: `fields_NNNN.pvtu` names the
@@ -206,17 +202,6 @@ fn piece(mesh: &str, points: &[DataArray], cells: &[DataArray]) -> String {
         "{mesh}<PointData>\n{points}</PointData>\n<CellData>\n{cells}</CellData>\n</Piece>\n"
     );
     vtk_file("UnstructuredGrid", "", &piece)
-}
-
-/// The number of digits in the numbers of all frames, so that their names sort.
-fn digits(scene: &Scene) -> usize {
-    let stepping = scene.time.map(|grid| grid.stepping);
-    let frames = match (scene.output.every, stepping) {
-        (Some(every @ 1..), Some(Stepping::Uniform { steps })) => steps / every + 2,
-        (Some(1..), Some(Stepping::Auto { .. })) => MANY,
-        _ => 1,
-    };
-    DIGITS.max(frames.ilog10() as usize + 1)
 }
 
 /// The nodal fields of u, ζ and contact, with the `pressures` at nodes of Γ_C. Outside Γ_C the contact pressure is 0

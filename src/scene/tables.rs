@@ -44,13 +44,7 @@ pub(super) fn scene(found: &mut Diagnostics) -> Option<Scene> {
     let laws = found.build("damage", surfaces).unwrap_or_default();
 
     let material: Material = material?;
-    let times = output.iter().flat_map(|output: &OutputOptions| &output.times);
-    let is_missed =
-        |at: &&f64| !time.is_some_and(|grid: TimeGrid| grid.reaches(**at, accuracy.is_some()));
-    if let Some(at) = times.clone().find(is_missed) {
-        let cure = "set time.step = \"auto\", or times of steps";
-        found.note("output.times", format!("has t = {at} s, at which no step ends; {cure}"));
-    }
+    check_times(found, output.as_ref(), time, accuracy.is_some());
     let weightless = material.density == 0.0 && materials.iter().all(|(_, of)| of.density == 0.0);
     let pulls = gravity.iter().flatten().any(|g| g.as_constant() != Some(0.0));
     if weightless && pulls {
@@ -84,6 +78,20 @@ pub(super) fn scene(found: &mut Diagnostics) -> Option<Scene> {
         probes,
         text: found.text.clone(),
     })
+}
+
+/// Notes a time of `output.times` at which no step ends.
+fn check_times(
+    found: &mut Diagnostics,
+    output: Option<&OutputOptions>,
+    time: Option<TimeGrid>,
+    accurate: bool,
+) {
+    let is_missed = |at: &&f64| !time.is_some_and(|grid| grid.reaches(**at, accurate));
+    if let Some(at) = output.and_then(|output| output.times.iter().find(is_missed)) {
+        let cure = "set time.step = \"auto\", or times of steps";
+        found.note("output.times", format!("has t = {at} s, at which no step ends; {cure}"));
+    }
 }
 
 /// The tables of the surfaces in a table, by name. The surrounding table completes each of them.

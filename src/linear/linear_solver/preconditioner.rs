@@ -3,8 +3,11 @@
 
 use super::LinearSolver;
 use crate::{
-    linear::{LinearSystem, Precision, factor::VERY_LARGE},
-    petsc::{Matrix, Pattern, PetscError, Session, has_option, set_default_option},
+    linear::{Factor, LinearSystem, Precision, factor::VERY_LARGE},
+    petsc::{
+        KeptPreconditioner, Matrix, Pattern, PetscError, Session, Vector, has_option,
+        set_default_option,
+    },
 };
 use std::iter;
 
@@ -88,6 +91,11 @@ impl LinearSolver {
     /// # Errors
     /// PETSc or CHOLMOD failed.
     pub fn factorise(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
+        let set_up = || self.set_up(system);
+        system.book(|phase_names| phase_names.factorisation, (1.0, 0.0), set_up)
+    }
+
+    fn set_up(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
         self.prepared = false;
         let own = self.is_own(system.matrix)?;
         self.modify(system)?;
@@ -139,5 +147,29 @@ impl LinearSolver {
     pub(crate) fn prescribe(&mut self, unknowns: &[usize]) -> Result<bool, PetscError> {
         let exists = self.factor.exists();
         Ok(exists && (!self.factor.is_condensed() || self.factor.prescribe(unknowns)?))
+    }
+}
+
+/// The factor during a solve; its time is booked.
+pub(super) struct Booked<'a> {
+    pub(super) factor: &'a mut Factor,
+    /// P⁻¹ r of the first residual, if it is known.
+    pub(super) first: Option<&'a Vector>,
+    pub(super) system: LinearSystem<'a>,
+}
+
+impl KeptPreconditioner for Booked<'_> {
+    /// The linear solver decides when to factorise.
+    fn set_up(&mut self, _matrix: &Matrix) -> Result<bool, PetscError> {
+        Ok(self.factor.exists())
+    }
+
+    fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
+        if let Some(first) = self.first.take() {
+            return z.axpby(1.0, first, 0.0);
+        }
+        let bytes = self.factor.bytes_per_application();
+        let apply = || self.factor.apply(r, z);
+        self.system.book(|phase_names| phase_names.triangular_solves, (1.0, bytes), apply)
     }
 }
