@@ -6,6 +6,9 @@
 //! PETSc checks the sizes of its own objects. A C name in parentheses has its page under
 //! <https://petsc.org/release/manualpages/>.
 //!
+//! The crate petsc-rs is not used: it has no TAO, and calls itself a work in progress whose wrappers may be incorrect
+//! (its README).
+//!
 //! All objects live on `PETSC_COMM_WORLD`; sizes and slices are those owned by this rank.
 #![allow(unsafe_code)]
 
