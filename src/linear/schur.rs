@@ -84,7 +84,7 @@ impl SchurComplement {
         self.factor = DenseCholesky::new(lower);
     }
 
-    /// As [`Self::solve`], but prescribed unknowns keep their values in `x`; `b` becomes b − S_D x.
+    /// As [`Self::solve`] without D, but prescribed unknowns keep their values in `x`; `b` becomes b − S x.
     fn solve_prescribed(&mut self, b: &mut [f64], x: &mut [f64]) {
         let Some(Changes { prescribed, .. }) = &self.changes else { return };
         let given: Vec<f64> =
@@ -98,12 +98,10 @@ impl SchurComplement {
         self.subtract_product(x, b);
     }
 
-    /// `b` ← `b` − S_D `x`.
+    /// `b` ← `b` − S `x`.
     fn subtract_product(&self, x: &[f64], b: &mut [f64]) {
         let (x, rows) = (DVectorView::from_slice(x, x.len()), b.len());
         DVectorViewMut::from_slice(b, rows).gemv(-1.0, &self.matrix, &x, 1.0);
-        let Some(Changes { added, .. }) = &self.changes else { return };
-        b.iter_mut().zip(added).zip(x.iter()).for_each(|((b, d), x)| *b -= d * x);
     }
 
     /// `x` ← the solution for `b`, with 0 on prescribed unknowns.
