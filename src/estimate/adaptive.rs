@@ -37,7 +37,6 @@ use measurement::Measurement;
 use progress::Progress;
 use round::Round;
 use serde::{Deserialize, Serialize};
-use sizes::{divided, sharpened};
 
 /// A mesh that was adapted to a scene.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -280,8 +279,7 @@ fn refined(
         if ends {
             return Ok(adapted);
         }
-        let (ratios, levels) = (round.size_ratios(measured), round.levels(measured));
-        refinement = sharpened(divided(refinement, &ratios)?, &levels)?;
+        refinement = round.refined(&refinement, measured)?;
         progress.check_memory(refinement.mesh.triangles.len())?;
     }
 }

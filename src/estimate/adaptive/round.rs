@@ -5,11 +5,11 @@ use super::{
     few_step_run::FewStepRun,
     finer::touching,
     measurement::{Cause, Measurement},
-    sizes::{influences, size_ratios},
+    sizes::{divided, influences, sharpened, size_ratios},
 };
 use crate::{
     evolution::AIM,
-    mesh::{Mesh, Order, sorted},
+    mesh::{Mesh, MeshError, Order, Refinement, sorted},
     petsc::PetscError,
     problem::unresolved,
     scene::Scene,
@@ -150,10 +150,32 @@ impl<'a> Round<'a> {
         errors.filter(|(excess, _)| *excess > 1.0).map(with_points).collect()
     }
 
+    /// The mesh of the next round. After a measurement it has at least 1.3 times as many triangles, if smaller goals for
+    /// the errors of the figures give them: a mesh that is hardly finer is not worth its measurement.
+    pub(super) fn refined(
+        &self,
+        refinement: &Refinement,
+        measured: Option<&Measurement>,
+    ) -> Result<Refinement, MeshError> {
+        const GROWTH: f64 = 1.3;
+        const GOALS: [f64; 5] = [1.0, 0.7, 0.5, 0.35, 0.25];
+        let enough = measured.map_or(0.0, |_| GROWTH * self.mesh.triangles.len() as f64);
+        let levels = self.levels(measured);
+        let mut next = refinement.clone();
+        for goal in GOALS {
+            next = divided(refinement.clone(), &self.size_ratios(measured, goal))?;
+            next = sharpened(next, &levels)?;
+            if next.mesh.triangles.len() as f64 >= enough {
+                break;
+            }
+        }
+        Ok(next)
+    }
+
     /// The factors by which to multiply the sizes of the triangles for the next mesh. If a few triangles cause the
     /// error of a figure, these become smaller; the error is of first order in their size. Any other error requires
-    /// smaller errors of u and the damage.
-    pub(super) fn size_ratios(&self, measured: Option<&Measurement>) -> Vec<f64> {
+    /// smaller errors of u and the damage. The errors of the figures are to become `goal` times the usual aim.
+    fn size_ratios(&self, measured: Option<&Measurement>, goal: f64) -> Vec<f64> {
         let order = if self.scene.order == Order::Quadratic { 2 } else { 1 };
         let (mut shares, mut depths) = (self.shares.clone(), self.run.depths().to_vec());
         if let Some(measured) = measured {
@@ -166,7 +188,7 @@ impl<'a> Round<'a> {
             ratios.iter_mut().zip(others).for_each(|(ratio, other)| *ratio = ratio.min(other));
         };
         for (excess, cause) in self.missed(measured) {
-            let goal = (AIM / excess).max(MIN_GOAL);
+            let goal = (goal * AIM / excess).max(MIN_GOAL);
             match cause {
                 Cause::Ends | Cause::Reactions => {}
                 Cause::Change(zeta) => {
@@ -204,7 +226,7 @@ impl<'a> Round<'a> {
 
     /// How often to halve the triangles at some points. At singular points the squared error falls like h, as at a crack;
     /// together they may cause the part that the others leave. The ends of contact are known up to half of an edge.
-    pub(super) fn levels(&self, measured: Option<&Measurement>) -> Vec<([f64; 2], usize)> {
+    fn levels(&self, measured: Option<&Measurement>) -> Vec<([f64; 2], usize)> {
         let halvings = |excess: f64| excess.log2().ceil().max(0.0) as usize;
         let (mut of_reactions, mut of_length) = (0, 0);
         for (excess, cause) in self.missed(measured) {
