@@ -87,7 +87,7 @@ def rows_of(folders, summaries, columns, settings=None):
         for name in columns:
             row[name] = value_of(summary, name)
             row[f"{name}.bar"] = bars(summary).get(name.removeprefix("quantities."))
-            row[f"{name}.singular"] = value_of(summary, f"extremes.{name}.singular")
+            row[f"{name}.singular"] = ((summary.get("extremes") or {}).get(name) or {}).get("singular")
             if summary and (unit := unit_of(name, units_of(summary))):
                 units.setdefault(name, {})[unit] = units.setdefault(f"{name}.bar", {})[unit] = None
         asked = [re.match("accuracy .*?(NOT )?reached", note) for note in summary.get("notes", [])]

@@ -27,7 +27,8 @@ impl DiscreteProblem {
             let [start, end] = [first, active.next_back().or(first)].map(at);
             let pressure = peak.map_or(0.0, |row| row.pressure);
             let length = self.supports.contact.length(rows).0;
-            let acts_at = point_of_action(rows, [0, 1].map(|k| 0.5 * (start[k] + end[k])));
+            let middle = [0, 1].map(|k| 0.5 * (start[k] + end[k]));
+            let acts_at = point_of_action(rows, middle, self.tolerance);
             [[length, pressure], start, end, at(peak), acts_at].into_iter().flatten()
         };
         self.foundations.iter().flat_map(figures).collect()
@@ -40,13 +41,18 @@ pub(crate) fn rows_of<'a>(rows: &'a [ContactRow], name: &str) -> &'a [ContactRow
     foundations.find(|rows| rows[0].boundary == name).unwrap_or_default()
 }
 
-/// The point nearest to (x, y) on the line of action of Σ R, with the forces R = −pν at the nodes.
-fn point_of_action(rows: &[ContactRow], [x, y]: [f64; 2]) -> [f64; 2] {
+/// The point nearest to (x, y) on the line of action of Σ R, with the forces R = −pν at the nodes. NaN if they cancel.
+fn point_of_action(rows: &[ContactRow], [x, y]: [f64; 2], tolerance: f64) -> [f64; 2] {
     let [mut fx, mut fy, mut moment] = [0.0; 3];
+    let all: f64 = rows.iter().map(|row| row.force).sum();
     for row in rows {
         let [rx, ry] = [-row.force * row.normal_x, -row.force * row.normal_y];
         (fx, fy) = (fx + rx, fy + ry);
         moment += (row.x - x) * ry - (row.y - y) * rx;
+    }
+    // Each reaction may be off by the tolerance of the contact step.
+    if fx.hypot(fy) <= rows.len() as f64 * tolerance * all {
+        return [f64::NAN; 2];
     }
     // F at (x, y) + s (F_y, −F_x) has the moment of the forces.
     let s = moment / (fx * fx + fy * fy);

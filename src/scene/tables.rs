@@ -87,10 +87,16 @@ fn check_times(
     time: Option<TimeGrid>,
     accurate: bool,
 ) {
-    let is_missed = |at: &&f64| !time.is_some_and(|grid| grid.reaches(**at, accurate));
-    if let Some(at) = output.and_then(|output| output.times.iter().find(is_missed)) {
-        let cure = "set time.step = \"auto\", or times of steps";
-        found.note("output.times", format!("has t = {at} s, at which no step ends; {cure}"));
+    let missed = |&at: &f64| match time {
+        None => Some("a scene without [time] has one state, which is written".to_owned()),
+        Some(grid) if at > grid.end => Some(format!("has t = {at} s, after time.end")),
+        Some(grid) if grid.reaches(at, accurate) => None,
+        Some(_) => Some(format!(
+            "has t = {at} s, at which no step ends; set time.step = \"auto\", or times of steps"
+        )),
+    };
+    if let Some(text) = output.and_then(|output| output.times.iter().find_map(missed)) {
+        found.note("output.times", text);
     }
 }
 
