@@ -143,7 +143,7 @@ pub fn adapted(
     accuracy: f64,
     seen: &mut dyn FnMut(&Adapted),
 ) -> Result<Adapted, AdaptError> {
-    let mut few = roughly_solved(scene, accuracy);
+    let mut few = scene.clone();
     few.time.iter_mut().for_each(|grid| grid.stepping = Stepping::Uniform { steps: INSTANTS });
     let scene = with_passing_loads(session, few, &mesh, accuracy)?;
     check_figures(&scene, &mesh)?;
@@ -158,15 +158,6 @@ pub fn adapted(
         (Err(error), Some(before)) => Ok(Adapted { short: Some(error.to_string()), ..before }),
         (refined, _) => refined,
     }
-}
-
-/// A scene whose contact solves are exact enough to see errors of this `accuracy`.
-fn roughly_solved(scene: &Scene, accuracy: f64) -> Scene {
-    /// The error of a solve over the accuracy. A change between two meshes has two or three digits that count.
-    const SOLVED: f64 = 1e-4;
-    let mut scene = scene.clone();
-    scene.contact.tolerance = scene.contact.tolerance.max(SOLVED * accuracy);
-    scene
 }
 
 /// A scene with its few uniform steps, or with adaptive ones if loads or gaps pass by within a step. An error if the
@@ -199,7 +190,7 @@ pub fn measured_errors(
     solver: &str,
     of_steps: Option<f64>,
 ) -> Result<Measured, AdaptError> {
-    let mut few = roughly_solved(scene, of_steps.unwrap_or(FEW_STEP_TOLERANCE));
+    let mut few = scene.clone();
     if let Some(grid) = &mut few.time {
         grid.stepping = match (of_steps, grid.stepping) {
             (Some(tolerance), _) => Stepping::Auto { tolerance, expected: [0.0; 2] },
