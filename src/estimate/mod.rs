@@ -77,7 +77,8 @@ pub fn run_from(
 }
 
 /// Whether the damage of a run with equal steps begins with its last ones: one more step would do far more damage than all
-/// before. The differences of the steps say nothing of their error then. Collective.
+/// before. The differences of the steps say nothing of their error then. Means are compared, as diffusion does not change
+/// them: at a singular point the source alone is far larger than what it does. Collective.
 fn begins_at_the_end(damage_step: &DamageStep, outcome: &Outcome) -> bool {
     const FAR_MORE: f64 = 5.0;
     let (problem, state) = (damage_step.problem, &outcome.last.state);
@@ -86,15 +87,11 @@ fn begins_at_the_end(damage_step: &DamageStep, outcome: &Outcome) -> bool {
         return false;
     };
     let vertices = &problem.body.vertices;
-    let largest = |values: &mut dyn Iterator<Item = f64>| {
-        let own = values.take(vertices.partition.owned());
-        vertices.partition.comm().max(own.fold(0.0, f64::max))
-    };
-    let load = damage_step.source(state).load;
-    let rates = load.iter().zip(&vertices.weights).map(|(load, weight)| -load / weight);
-    let next = end / steps as f64 * largest(&mut { rates });
-    let initial = problem.initial_damage();
-    let done = largest(&mut initial.iter().zip(&state.zeta).map(|(from, zeta)| from - zeta));
+    let owned = vertices.partition.owned();
+    let source: f64 = damage_step.source(state).load.iter().take(owned).sum();
+    let mean_rate = -vertices.partition.comm().total(source) / problem.body.area;
+    let next = mean_rate * end / steps as f64;
+    let done = problem.body.mean(&problem.initial_damage()) - problem.body.mean(&state.zeta);
     next > FAR_MORE * done && next > f64::EPSILON
 }
 

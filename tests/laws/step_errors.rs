@@ -1,7 +1,7 @@
 //! The estimated error of the time steps is the true one where that is known: in a body with the same
 //! strain everywhere ζ is uniform and obeys an ordinary differential equation.
 
-use crate::support::{distorted, history, problem};
+use crate::support::{distorted, history, problem, run, shipped};
 use signorini::{contact::SOLVERS, evolution::DiscreteProblem};
 
 /// A square with these laws of damage and supports, in uniform two-step backward differences.
@@ -80,4 +80,20 @@ fn errors_that_add_up_or_grow_are_estimated() {
         let ratio = estimated_over_true(&uniform(damage, &boundary), exact);
         assert!(expected.contains(&ratio), "{damage}: {ratio}");
     }
+}
+
+/// At the singular end of its contact the source is far larger than the damage that diffusion leaves there.
+#[test]
+fn the_error_is_known_where_a_singular_point_drives_the_damage() {
+    let [coarse, fine] =
+        ["time.step=0.02", "time.step=0.0025"].map(|step| shipped("lshape", &[step]));
+    let estimated = run(&coarse, SOLVERS[0]);
+    let exact = run(&fine, SOLVERS[0]).last.state.zeta;
+    let norm = |values: &mut dyn Iterator<Item = f64>| -> f64 {
+        coarse.body.vertices.weights.iter().zip(values).map(|(w, v)| w * v * v).sum::<f64>().sqrt()
+    };
+    let error = norm(&mut estimated.last.state.zeta.iter().zip(&exact).map(|(a, b)| a - b));
+    let ratio =
+        estimated.errors.damage_steps.unwrap() * norm(&mut exact.iter().map(|z| 1.0 - z)) / error;
+    assert!((0.7..1.5).contains(&ratio), "estimated over true: {ratio:.2}");
 }
