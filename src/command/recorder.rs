@@ -88,8 +88,8 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Whether a step gets a frame. Without `output.every` and `output.times` there are additional frames after 1, 2, 4, … steps,
-    /// for runs that end early.
+    /// Whether a step gets a frame. Without `output.every` and `output.times` there are additional frames after 1, 2,
+    /// 4, … steps, for runs that end early.
     fn is_frame(&self, StepRecord { step: n, time, .. }: &StepRecord) -> bool {
         let scene = self.task.problem.scene();
         let Some(grid) = scene.time else { return true };

@@ -5,7 +5,7 @@ mod entries;
 mod operator;
 mod pattern;
 
-pub use operator::Operator;
+pub(crate) use operator::Operator;
 pub use pattern::Pattern;
 
 use super::{

@@ -33,7 +33,7 @@ mod raw {
 
 pub use communicator::Communicator;
 pub use error::PetscError;
-pub use matrix::{Matrix, Operator, Pattern};
+pub use matrix::{Matrix, Pattern};
 pub use session::Session;
 pub use vector::Vector;
 
@@ -41,6 +41,7 @@ pub(crate) use ghosts::Ghosts;
 pub(crate) use graph::divide;
 pub(crate) use kept::KeptPreconditioner;
 pub(crate) use ksp::{Ksp, KspProblem};
+pub(crate) use matrix::Operator;
 pub(crate) use options::{has_option, set_default_option};
 pub(crate) use tao::{BoundedQuadratic, TaoReport};
 

@@ -27,14 +27,6 @@ impl Matrix {
 
     /// Replaces the stored entries of this rank, in the order of `read_entries`. `writer` gets zeros and adds
     /// to them. Collective.
-    ///
-    /// # Errors
-    /// PETSc failed.
-    pub fn fill(&mut self, writer: impl FnOnce(&mut [f64])) -> Result<(), PetscError> {
-        self.write(writer)
-    }
-
-    /// As [`Self::fill`]. Entries that an operator writes late are no change of the matrix.
     pub(super) fn write(&self, writer: impl FnOnce(&mut [f64])) -> Result<(), PetscError> {
         let blocks = self.blocks()?;
         if let [block] = blocks[..] {
@@ -94,7 +86,7 @@ impl Matrix {
     /// matrix with the same pattern. Collective.
     pub(crate) fn set_entries(&mut self, values: &[f64]) -> Result<(), PetscError> {
         same_size(self.entries(), values.len())?;
-        self.fill(|entries| entries.copy_from_slice(values))
+        self.write(|entries| entries.copy_from_slice(values))
     }
 
     /// The blocks of this rank's rows, each with the number of its stored entries (MatMPIAIJGetSeqAIJ). On

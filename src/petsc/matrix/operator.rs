@@ -8,7 +8,7 @@ use crate::petsc::{
 use std::{cell::Cell, ffi::c_void, mem::transmute, ptr, rc::Rc};
 
 /// A symmetric matrix A that is known by its products.
-pub trait Operator {
+pub(crate) trait Operator {
     /// `y` ← A `x` on the owned unknowns. Collective.
     ///
     /// # Errors
@@ -18,7 +18,7 @@ pub trait Operator {
     /// The owned entries of the diagonal of A.
     fn diagonal(&self) -> Vec<f64>;
 
-    /// Adds the stored entries of this rank to zeros, in the order of [`Matrix::fill`].
+    /// Adds the stored entries of this rank to zeros, in the order of [`Matrix::read_entries`].
     fn write(&self, entries: &mut [f64]);
 
     /// Bytes that a product reads and writes on this rank.
