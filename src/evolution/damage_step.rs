@@ -3,6 +3,7 @@
 use super::{DiscreteProblem, Phases, RunError, State, StepFailure};
 use crate::{
     fem::{self, DamageCertificate, DamageSystem},
+    linear::FactorState,
     petsc::{PetscError, Session},
 };
 use nalgebra::DVector;
@@ -42,8 +43,10 @@ pub(crate) struct DamageStep<'a> {
     pub(crate) session: &'a Session,
     pub(crate) problem: &'a DiscreteProblem,
     pub(crate) phases: &'a Phases,
-    /// k and M + kκL, factorised by the first step that needs it.
+    /// k and M + kκL, made by the first step that needs it.
     pub(crate) system: Option<(f64, DamageSystem)>,
+    /// The factor of a checkpoint for that system.
+    pub(crate) loaded: Option<FactorState>,
 }
 
 /// The damage source φ(ε(u), ζ) of a state; zero without a damage law.
@@ -168,18 +171,28 @@ impl DamageStep<'_> {
         self.problem.body.vertices.partition.comm().all(load.iter().all(|&b| b == 0.0))
     }
 
-    /// The damage system of a step of `k` s, factorised.
-    pub(crate) fn system(&mut self, k: f64) -> Result<&mut DamageSystem, PetscError> {
+    /// The state of the factor for a checkpoint, if there is one.
+    pub(crate) fn factor_state(&mut self) -> Option<FactorState> {
+        self.system.as_mut().map(|(_, system)| system.factor().state()).or(self.loaded.clone())
+    }
+
+    /// The damage system of a step of `k` s.
+    fn system(&mut self, k: f64) -> Result<&mut DamageSystem, PetscError> {
         let (session, problem, phases) = (self.session, self.problem, self.phases);
         let system = match self.system.take() {
             Some((factorised, system)) if factorised == k => system,
             Some((_, mut system)) => {
-                phases.time("damage factor", || system.set_step(k))?;
+                phases.time("damage matrix", || system.set_step(k))?;
                 system
             }
-            None => phases.time("damage factor", || {
-                DamageSystem::new(session, &problem.body, problem.mass(), &problem.diffusions(), k)
-            })?,
+            None => {
+                let (body, mass, diffusions) =
+                    (&problem.body, problem.mass(), problem.diffusions());
+                let new = || DamageSystem::new(session, body, mass, &diffusions, k);
+                let mut system = phases.time("damage matrix", new)?;
+                self.loaded.take().into_iter().for_each(|state| system.factor().set_state(state));
+                system
+            }
         };
         Ok(&mut self.system.insert((k, system)).1)
     }

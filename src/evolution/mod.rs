@@ -53,6 +53,7 @@ pub use step_controller::AIM;
 pub(crate) use step_controller::StepController;
 
 use crate::{
+    linear::FactorState,
     petsc::{Communicator, Session},
     problem::{LoadCase, LoadCurve},
 };
@@ -90,7 +91,7 @@ pub(crate) fn all_steps<'a>(
     observer: &mut dyn Observer,
     saved: Option<RunState>,
 ) -> Result<Run<'a>, RunError> {
-    let damage_step = DamageStep { session, problem, phases, system: None };
+    let damage_step = DamageStep { session, problem, phases, system: None, loaded: None };
     let mut contact_step = ContactStep::new(session, problem, solver, phases)?;
     let (zeta, start) = (problem.initial_damage(), problem.scene().start());
     let (mut first, mut source) = Default::default();
@@ -107,6 +108,7 @@ pub(crate) fn all_steps<'a>(
         None => run.report(observer)?,
         Some(saved) => {
             run.contact_step.set_state(saved.contact);
+            run.damage_step.loaded = saved.damage_factor;
             run.controller.set_state(saved.controller);
             run.outcome = saved.outcome;
         }
@@ -168,6 +170,7 @@ impl Run<'_> {
             let kept = self.damage_step.phases.time("checkpoint", || {
                 observer.keep(RunState {
                     contact: self.contact_step.state(),
+                    damage_factor: self.damage_step.factor_state(),
                     controller: self.controller.state(),
                     outcome: self.outcome.clone(),
                 })
@@ -178,10 +181,11 @@ impl Run<'_> {
     }
 }
 
-/// A checkpoint: all that determines the next steps, to the last bit. (A restart makes the damage system again.)
+/// A checkpoint: all that determines the next steps, to the last bit.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct RunState {
     contact: ContactState,
+    damage_factor: Option<FactorState>,
     controller: StepState,
     outcome: Outcome,
 }

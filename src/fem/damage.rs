@@ -2,7 +2,7 @@
 
 use super::{Body, Nodes, Triangle, body::at_quadratic_points, element::POINTS};
 use crate::{
-    linear::{LinearSolver, LinearSystem, Precision},
+    linear::{Factor, LinearSolver, LinearSystem, Precision},
     mesh::Order,
     model::DamageLaw,
     petsc::{Matrix, Pattern, PetscError, Session, Vector},
@@ -72,7 +72,7 @@ pub fn source_load(body: &Body, mass: Mass, source: &[[f64; 3]]) -> Vec<f64> {
     load
 }
 
-/// The matrix M + kκL of (28) with its factor, made anew for each step length k. With several materials L is
+/// The matrix M + kκL of (28), with the factor of this or of an earlier step length k. With several materials L is
 /// Σ_T κ_T/κ L_T, where κ belongs to the first material.
 pub struct DamageSystem {
     mass: Matrix,
@@ -93,7 +93,7 @@ pub struct DamageSystem {
 }
 
 impl DamageSystem {
-    /// Assembles and factorises for the diffusions κ of the materials (m²/s) and step k (s).
+    /// Assembles for the diffusions κ of the materials (m²/s) and step k (s).
     ///
     /// # Errors
     /// PETSc failed.
@@ -148,16 +148,20 @@ impl DamageSystem {
         Ok(system)
     }
 
-    /// Refills and factorises the matrix for another step length k, s. If the matrix is not positive
-    /// definite, the solves fail later.
+    /// Refills the matrix for another step length k, s.
     ///
     /// # Errors
-    /// PETSc or CHOLMOD failed.
+    /// PETSc failed.
     pub fn set_step(&mut self, step: f64) -> Result<(), PetscError> {
         self.matrix.copy(&self.mass)?;
         self.matrix.add(step * self.diffusion, &self.laplace)?;
         self.step = step;
-        self.solver.factorise(LinearSystem::of(&self.matrix)).map(drop)
+        Ok(())
+    }
+
+    /// The factor, which a checkpoint keeps.
+    pub(crate) fn factor(&mut self) -> &mut Factor {
+        self.solver.factor()
     }
 
     /// (28): replaces ζ_{n−1} by the solution ζ_n of (M + kκL) ζ_n = M ζ_{n−1} + k b for the source
@@ -188,7 +192,7 @@ impl DamageSystem {
         self.rhs.write(|rhs| rhs.iter_mut().zip(weights).for_each(|(r, a)| *r -= a * mean))?;
         self.unknown.write(|x| x.iter_mut().for_each(|x| *x -= mean))?;
         let system = LinearSystem::of(&self.matrix);
-        let solve = self.solver.solve(system, &self.rhs, &mut self.unknown, limit)?;
+        let solve = self.solver.solve_renewing(system, &self.rhs, &mut self.unknown, limit)?;
         let rest = self.unknown.read(|x| partition.dot(weights, x, 1))? / area;
         self.unknown.write(|x| x.iter_mut().for_each(|x| *x += mean - rest))?;
         Ok(solve.converged)
