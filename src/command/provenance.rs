@@ -3,8 +3,8 @@
 use serde_json::{Value, json};
 use std::{env, fs, thread, time::SystemTime};
 
-/// `provenance` of `summary.json`. Unknown values are null.
-pub fn provenance() -> Value {
+/// `provenance` of `summary.json` of a run whose mesh this version of gmsh made. Unknown values are null.
+pub fn provenance(gmsh: Option<&str>) -> Value {
     let now = humantime::format_rfc3339_seconds(SystemTime::now());
     let arguments = env::args_os().map(|word| word.to_string_lossy().into_owned());
     json!({
@@ -16,6 +16,7 @@ pub fn provenance() -> Value {
         // The words of the command line, and the folder in which it was run.
         "command": arguments.collect::<Vec<_>>(),
         "libraries": libraries(),
+        "gmsh": gmsh,
         "directory": env::current_dir().ok(),
         "machine": {
             "host": fs::read_to_string("/proc/sys/kernel/hostname").ok().map(|n| n.trim().to_owned()),

@@ -25,7 +25,7 @@ pub(super) fn summary(
     let steps = last.map_or(0, |record| record.step);
     let seconds = task.phases.parts("").into_iter().map(|(name, phase)| (name, phase.seconds));
     let mut summary = json!({
-        "provenance": provenance(),
+        "provenance": provenance(problem.mesh().gmsh.as_deref()),
         "scene": scene.name,
         "title": scene.title,
         "solver": solver,

@@ -186,6 +186,7 @@ impl Subdomain {
             // The elements know their curvature, the body its materials.
             curved: BTreeMap::new(),
             surfaces: BTreeMap::new(),
+            gmsh: part.gmsh.clone(),
         };
         let elements = undivided.quadratic.as_ref().zip(quadratic.as_ref());
         let elements = elements.map(|(undivided, nodes)| QuadraticElements {

@@ -58,6 +58,8 @@ pub struct Mesh {
     /// The midpoints of curved edges, m, by their ends in increasing order. All other edges are straight.
     /// Only quadratic elements use the midpoints.
     pub curved: BTreeMap<[usize; 2], [f64; 2]>,
+    /// The version of gmsh that made the mesh, if this program ran gmsh.
+    pub gmsh: Option<String>,
 }
 
 /// One physical curve: the edges of the triangulation that lie on it.

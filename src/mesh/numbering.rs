@@ -35,6 +35,7 @@ impl Mesh {
             curves,
             surfaces,
             curved: self.curved.iter().map(|(&ends, &at)| (sorted(edge(ends)), at)).collect(),
+            gmsh: self.gmsh,
         }
     }
 }

@@ -207,6 +207,8 @@ fn second_order_adds_midpoints_and_changes_nothing_else() {
     assert!(folder.path().join("hertz.msh").exists());
     assert!(folder.path().join("hertz.order2.msh").exists());
     assert!(linear.curved.is_empty());
+    let version = linear.gmsh.as_deref().expect("gmsh writes its version");
+    assert!(version.split('.').all(|number| number.parse::<u32>().is_ok()), "{version}");
     let arcs = ["foundation", "side"].into_iter().flat_map(|name| &linear.curves[name].edges);
     assert_eq!(quadratic.curved.len(), arcs.clone().count());
     for edge in arcs {

@@ -44,6 +44,7 @@ fn sorted(mesh: Mesh) -> Mesh {
         curves: mesh.curves.iter().map(curve).collect(),
         curved: mesh.curved.iter().map(midpoint).collect(),
         triangles,
+        gmsh: mesh.gmsh,
     }
 }
 

@@ -24,8 +24,12 @@ const POLL: Duration = Duration::from_millis(5);
 /// After this time a message says that gmsh is at work.
 const PATIENCE: Duration = Duration::from_secs(5);
 
+/// The command that writes gmsh's version, as [`Mesh::gmsh`](crate::mesh::Mesh::gmsh) has it.
+const VERSION: &str =
+    "Printf(\"gmsh %g.%g.%g\", GMSH_MAJOR_VERSION, GMSH_MINOR_VERSION, GMSH_PATCH_VERSION)";
+
 /// Runs gmsh with `arguments` on the file `input` and then on a file with the text `last`. Returns the bytes
-/// of the MSH 4.1 file that gmsh makes. If `bytes` are given, they replace the contents of `input`. `task`
+/// of the MSH 4.1 file that gmsh makes, with gmsh's version as a comment at its end. If `bytes` are given, they replace the contents of `input`. `task`
 /// completes "gmsh could not …" in messages.
 ///
 /// # Errors
@@ -37,8 +41,9 @@ pub fn run(
     task: &str,
 ) -> Result<Vec<u8>, MeshError> {
     let scratch = tempfile::tempdir().map_err(MeshError::io(&env::temp_dir()))?;
-    let [made, second, log] =
-        ["made.msh", "second.geo", "log"].map(|name| scratch.path().join(name));
+    let [made, second, version, log] =
+        ["made.msh", "second.geo", "version", "log"].map(|name| scratch.path().join(name));
+    let last = format!("{last}{VERSION} > \"{}\";\n", version.display());
     fs::write(&second, last).map_err(MeshError::io(&second))?;
     let mut command = Command::new("gmsh");
     command.args(["-format", "msh41", "-v", "1"]).args(arguments).arg("-o").arg(&made);
@@ -74,7 +79,9 @@ pub fn run(
     // gmsh can report errors and still exit with success.
     let is_error = |line: &str| line.trim_start().starts_with("Error");
     if status.success() && made.exists() && !said.lines().any(is_error) {
-        return fs::read(&made).map_err(MeshError::io(&made));
+        let [mesh, version] =
+            [made, version].map(|file| fs::read(&file).map_err(MeshError::io(&file)));
+        return Ok([&mesh?, &b"$Comments\n"[..], &version?, b"$EndComments\n"].concat());
     }
     let mut seen = HashSet::new();
     let lines: Vec<&str> = said.lines().filter(|line| seen.insert(*line)).take(SHOWN).collect();

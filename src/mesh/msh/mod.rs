@@ -47,10 +47,17 @@ pub fn parse(bytes: &[u8], path: &Path) -> std::result::Result<Mesh, MeshError> 
     let mesh = Section::split(bytes, &mut sections)
         .and_then(|()| contents(&sections, false))
         .and_then(|contents| body::mesh(&contents));
-    mesh.map_err(|(at, problem)| {
+    let gmsh = sections.iter().filter(|section| section.name == "Comments").find_map(version);
+    mesh.map(|mesh| Mesh { gmsh, ..mesh }).map_err(|(at, problem)| {
         let place = at.map_or_else(String::new, |at| place(at, bytes, &sections));
         MeshError::File { path: path.to_owned(), place, problem }
     })
+}
+
+/// The version of gmsh in a comment `gmsh 4.8.4`.
+fn version(comment: &Section) -> Option<String> {
+    let line = ByteReader::new(comment, false).line("a comment").ok()?;
+    line.strip_prefix("gmsh ").map(str::to_owned)
 }
 
 fn sections_of(bytes: &[u8]) -> Result<Vec<Section<'_>>> {

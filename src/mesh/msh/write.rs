@@ -49,7 +49,11 @@ impl Mesh {
         (1..=count).for_each(|tag| text += &format!("{tag}\n"));
         let points = self.nodes.iter().chain(midpoints.iter().map(|(_, point)| point));
         points.for_each(|[x, y]| text += &format!("{x} {y} 0\n"));
-        text + "$EndNodes\n" + &self.elements(&midpoints, &groups, &entities) + "$EndElements\n"
+        let gmsh =
+            self.gmsh.iter().map(|version| format!("$Comments\ngmsh {version}\n$EndComments\n"));
+        text +=
+            &format!("$EndNodes\n{}$EndElements\n", self.elements(&midpoints, &groups, &entities));
+        text + &gmsh.collect::<String>()
     }
 
     /// `$Elements` without its last line. Triangles keep their order. Consecutive triangles of the same
