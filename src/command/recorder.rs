@@ -47,8 +47,8 @@ impl<'a> Recorder<'a> {
         let fields = FieldWriter::new(&task.folder, &task.problem)?;
         let bar = task.problem.body.nodes.partition.comm().is_root().then(|| screen::open(task));
         let (_interrupts, saved) = (Interrupts::defer(), Instant::now());
-        let (path, columns) = (task.folder.join("history.csv"), columns(&task.problem));
-        let history = Table::new(path, &StepRecord::default(), &columns)?;
+        let more = [columns(&task.problem), vec!["seconds".to_owned()]].concat();
+        let history = Table::new(task.folder.join("history.csv"), &StepRecord::default(), &more)?;
         let (last, stepping) = Default::default();
         Ok(Self { task, fields, bar, history, last, stepping, _interrupts, saved })
     }
@@ -128,7 +128,10 @@ impl<'a> Recorder<'a> {
             self.bar.iter_mut().for_each(|bar| screen::progress(bar, &step.record, end));
             let contact = self.task.problem.contact_figures(&step.state);
             let row = match comm.is_root() {
-                true => self.history.add(&[(&step.record, &step.quantities, contact)]),
+                true => {
+                    let seconds = step.record.seconds;
+                    self.history.add(&[(&step.record, &step.quantities, contact, seconds)])
+                }
                 false => Ok(()),
             };
             // This is collective: all ranks write the frame, even if the row could not be written.
@@ -219,7 +222,7 @@ impl Observer for Recorder<'_> {
     }
 }
 
-/// The columns of `history.csv` after the record of a step.
+/// The columns of `history.csv` between the record of a step and its seconds.
 fn columns(problem: &DiscreteProblem) -> Vec<String> {
     [problem.quantities(), problem.contact_columns()].concat()
 }

@@ -18,13 +18,13 @@ pub struct ConstraintError {
 pub enum Conflict {
     /// A prescribed displacement goes through the obstacle; the depth, m.
     #[error(
-        "the prescribed displacement goes {0:.3e} m through the obstacle: a node that is both \
+        "the prescribed displacement goes {0:.3e} through the obstacle: a node that is both \
          prescribed and in contact keeps its prescribed value, which must respect the gap"
     )]
     Penetrates(f64),
     /// Two prescribed values contradict each other.
     #[error(
-        "two boundaries prescribe different displacements: {} and {} m along ({:.3}, {:.3})",
+        "two boundaries prescribe different displacements: {} and {} along ({:.3}, {:.3})",
         values[0], values[1], direction[0], direction[1]
     )]
     Contradicts {
@@ -35,7 +35,7 @@ pub enum Conflict {
     },
     /// Two obstacles overlap at a node; by how much, m.
     #[error(
-        "the obstacles on both sides leave no room: the node would have to be {0:.3e} m inside one \
+        "the obstacles on both sides leave no room: the node would have to be {0:.3e} inside one \
          of them; widen a gap or change the displacement prescribed there"
     )]
     NoRoom(f64),

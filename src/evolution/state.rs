@@ -66,7 +66,8 @@ pub struct StepRecord {
     pub zeta_residual: f64,
     /// Upper bound of the error of ζ that this residual allows.
     pub zeta_error: f64,
-    /// Wall time of the step, s.
+    /// Wall time of the step, s: the last column.
+    #[serde(skip)]
     pub seconds: f64,
 }
 

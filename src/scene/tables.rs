@@ -89,10 +89,10 @@ fn check_times(
 ) {
     let missed = |&at: &f64| match time {
         None => Some("a scene without [time] has one state, which is written".to_owned()),
-        Some(grid) if at > grid.end => Some(format!("has t = {at} s, after time.end")),
+        Some(grid) if at > grid.end => Some(format!("has t = {at}, after time.end")),
         Some(grid) if grid.reaches(at, accurate) => None,
         Some(_) => Some(format!(
-            "has t = {at} s, at which no step ends; set time.step = \"auto\", or times of steps"
+            "has t = {at}, at which no step ends; set time.step = \"auto\", or times of steps"
         )),
     };
     if let Some(text) = output.and_then(|output| output.times.iter().find_map(missed)) {
@@ -201,11 +201,11 @@ fn time(keys: TimeKeys) -> Result<TimeGrid, Diagnostic> {
         return Err(("tolerance", "has no effect unless step = \"auto\"".to_owned()));
     }
     if length > end {
-        let problem = format!("must be positive and at most the end, {end} s, but is {length}");
+        let problem = format!("must be positive and at most the end, {end}, but is {length}");
         return Err(("step", problem));
     }
     if end / length > MOST_STEPS {
-        return Err(("step", format!("is {length}: more than {MOST_STEPS:e} steps to {end} s")));
+        return Err(("step", format!("is {length}: more than {MOST_STEPS:e} steps to {end}")));
     }
     let scheme = scheme.unwrap_or_default();
     Ok(TimeGrid { scheme, ..TimeGrid::uniform(end, length) })

@@ -72,7 +72,7 @@ impl TimeGrid {
         let (end, step) = (self.end, self.end / steps as f64);
         (asked - step > 1e-6 * step).then(|| {
             format!(
-                "time.step = {asked} s does not divide time.end = {end} s: {steps} steps of {} s are made",
+                "time.step = {asked} does not divide time.end = {end}: {steps} steps of {} are made",
                 rounded(step)
             )
         })

@@ -10,10 +10,10 @@ const KEYS: &str = "quantities provenance scene title solver ranks nodes triangl
     boundaries contact_nodes contact_length von_mises_max principal_max principal_min pressure_max extremes errors kkt peak_megabytes stopped_by collapse wall_seconds seconds_per_step phases units notes";
 const COLUMNS: &str = "step time zeta_min zeta_mean displacement_max work contact_force active_nodes iterations \
     linear_iterations factorisations fallbacks contraction kkt_stationarity kkt_primal \
-    kkt_dual kkt_complementarity zeta_residual zeta_error seconds left.force_x left.force_y \
+    kkt_dual kkt_complementarity zeta_residual zeta_error left.force_x left.force_y \
     left.moment bottom.force_x bottom.force_y bottom.moment bottom.contact_length \
     bottom.pressure_max bottom.contact_start_x bottom.contact_start_y bottom.contact_end_x \
-    bottom.contact_end_y bottom.peak_x bottom.peak_y bottom.acts_at_x bottom.acts_at_y";
+    bottom.contact_end_y bottom.peak_x bottom.peak_y bottom.acts_at_x bottom.acts_at_y seconds";
 
 fn keys(value: &Value) -> Vec<&str> {
     let mut keys: Vec<&str> = value.as_object().expect("an object").keys().map(|k| &**k).collect();
@@ -232,7 +232,7 @@ fn a_body_balanced_on_one_point_is_noted() {
 #[test]
 fn a_step_that_does_not_divide_the_end_is_noted() {
     let test_directory = TestDirectory::new();
-    let note = "time.step = 0.3 s does not divide time.end = 1 s: 4 steps of 0.25 s are made";
+    let note = "time.step = 0.3 does not divide time.end = 1: 4 steps of 0.25 are made";
     let said = test_directory.run(&["--set", "time.step=0.3"]);
     assert!(said.out.contains(note), "{said:?}");
     assert!(said.out.contains("time          4 steps of 0.25 s to t = 1"), "{said:?}");

@@ -38,8 +38,8 @@ fn results(directory: &TestDirectory, folder: &str) -> BTreeMap<String, String> 
         }
         "history.csv" => {
             let (names, mut rows) = directory.history(folder);
-            let seconds = names.iter().position(|name| name == "seconds").expect("the column");
-            rows.iter_mut().for_each(|row| row[seconds] = 0.0);
+            assert_eq!(names.last().map(String::as_str), Some("seconds"));
+            rows.iter_mut().for_each(|row| row.truncate(row.len() - 1));
             format!("{rows:?}")
         }
         file => directory.read(&format!("{folder}/{file}")),

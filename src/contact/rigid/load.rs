@@ -13,8 +13,8 @@ const BALANCED: f64 = 1e-8;
 /// The load does work on a rigid motion without support.
 #[derive(Debug, Clone, thiserror::Error)]
 #[error(
-    "nothing supports the body against {motion}, and the load drives it (resultant ({:.4e}, {:.4e}) N/m, \
-     moment about its centre {moment:.4e} N): support it by a `displacement`, a `symmetry` axis or a \
+    "nothing supports the body against {motion}, and the load drives it (resultant ({:.4e}, {:.4e}), \
+     moment about its centre {moment:.4e}): support it by a `displacement`, a `symmetry` axis or a \
      `gap`, or balance the load",
     force[0], force[1]
 )]
