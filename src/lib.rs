@@ -91,6 +91,11 @@ pub mod evolution;
 pub mod estimate;
 pub mod output;
 
+/// The program in the README compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 /// Relative rounding of a sum over the nodes of a mesh: √n ε for n = 2²⁴ terms, as rounding errors have random signs
 /// (Higham, Accuracy and Stability of Numerical Algorithms, ch. 2). Smaller differences are not seen.
 pub(crate) const ROUNDING: f64 = 4096.0 * f64::EPSILON;
