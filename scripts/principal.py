@@ -37,7 +37,7 @@ def draw_principal(results, _limits, figure=None):
         largest = three_digits(stress.max() / factor)
         singular = ": singular" if results.singular(key) else ""
         axes.set_title(f"{name}, largest {largest} {unit}{singular}" if stress.any() else f"no {name}")
-        _draw_lines(axes, results, places, longest * np.minimum(of / top, 1.0)[:, None] * along)
+        _draw_lines(axes, results, places, longest, np.minimum(of / top, 1.0)[:, None] * along)
         draw_outline(axes, results.nodes, results, color=INK, linewidth=0.7)
         draw_foundation(axes, results)
         frame(axes, results.nodes, results.units)
@@ -58,11 +58,11 @@ def _principal_at(results, spacing):
     return points, *np.linalg.eigh(state.at(points, "stress")[:, [[0, 2], [2, 1]]])
 
 
-def _draw_lines(axes, results, points, lines):
-    """Lines centred at points, within the body. White under dark lines keeps them visible on all colours."""
+def _draw_lines(axes, results, points, longest, lines):
+    """Lines centred at points, within the body, as fractions of the longest. White under dark lines keeps them visible."""
     body = Path.make_compound_path(*map(Path, results.outline(results.nodes)))
-    lengths = np.linalg.norm(lines, axis=1)
-    points, half = (of[lengths > 0.1 * lengths.max(initial=0.0)] for of in (points, 0.45 * lines))
+    are_seen = np.linalg.norm(lines, axis=1) > 0.1
+    points, half = points[are_seen], 0.45 * longest * lines[are_seen]
     ends = np.stack((points - half, points + half, np.full_like(points, np.nan)), axis=1)
     for colour, width in (("white", 1.8), (INK, 0.8)):
         axes.plot(*ends.reshape(-1, 2).T, color=colour, linewidth=width, zorder=3, solid_capstyle="round",
