@@ -59,7 +59,7 @@ def _principal_at(results, spacing):
 
 
 def _draw_lines(axes, results, points, longest, lines):
-    """Lines centred at points, within the body, as fractions of the longest. White under dark lines keeps them visible."""
+    """Lines centred at points, within the body, as fractions of the longest. White under dark ones keeps them visible."""
     body = Path.make_compound_path(*map(Path, results.outline(results.nodes)))
     are_seen = np.linalg.norm(lines, axis=1) > 0.1
     points, half = points[are_seen], 0.45 * longest * lines[are_seen]
