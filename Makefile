@@ -91,7 +91,9 @@ test: deps
 	cargo clippy --locked --all-targets -- -D warnings
 	RUSTDOCFLAGS='-D warnings' cargo doc --locked --no-deps
 	$(PYTHON) -m compileall -q scripts validation
-	@{ cargo test --locked --no-fail-fast 2>&1; echo $$? >target/tests.code; } | tee target/tests.log
+	@{ cargo test --locked --no-fail-fast \
+	    --config "target.'cfg(unix)'.runner = ['$(CURDIR)/scripts/run_tests.sh']" 2>&1; \
+	    echo $$? >target/tests.code; } | tee target/tests.log
 	@awk '/^test result/ { passed += $$4; failed += $$6 } END { print passed + 0 " passed, " failed + 0 " failed" }' \
 	    target/tests.log; exit $$(cat target/tests.code)
 

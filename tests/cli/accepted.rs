@@ -1,31 +1,9 @@
 //! Runs that go well: exit code 0, what is said, and the files.
 
-use crate::test_directory::{ProgramOutput, SCENE, TestDirectory, square};
+use crate::test_directory::{ProgramOutput, TestDirectory, square};
 use serde_json::Value;
 use signorini::contact::{REGISTRY, SOLVERS};
 use std::process::Stdio;
-
-const KEYS: &str = "quantities provenance scene title solver ranks nodes triangles steps end_time stopped_at \
-    stopped_uncertainty zeta_min zeta_mean displacement_max work contact_force active_nodes \
-    boundaries contact_nodes contact_length von_mises_max principal_max principal_min pressure_max extremes errors kkt peak_megabytes stopped_by collapse wall_seconds seconds_per_step phases units notes";
-const COLUMNS: &str = "step time zeta_min zeta_mean displacement_max work contact_force active_nodes iterations \
-    linear_iterations factorisations fallbacks contraction kkt_stationarity kkt_primal \
-    kkt_dual kkt_complementarity zeta_residual zeta_error left.force_x left.force_y \
-    left.moment bottom.force_x bottom.force_y bottom.moment bottom.contact_length \
-    bottom.pressure_max bottom.contact_start_x bottom.contact_start_y bottom.contact_end_x \
-    bottom.contact_end_y bottom.peak_x bottom.peak_y bottom.acts_at_x bottom.acts_at_y seconds";
-
-fn keys(value: &Value) -> Vec<&str> {
-    let mut keys: Vec<&str> = value.as_object().expect("an object").keys().map(|k| &**k).collect();
-    keys.sort_unstable();
-    keys
-}
-
-fn sorted(names: &str) -> Vec<&str> {
-    let mut names: Vec<&str> = names.split(' ').collect();
-    names.sort_unstable();
-    names
-}
 
 fn number(value: &Value) -> f64 {
     value.as_f64().expect("a number")
@@ -43,10 +21,8 @@ fn summary() {
     assert!(said.out.lines().all(|line| line.trim_end() == line), "blanks at line ends");
 
     let summary = test_directory.summary("out/scene");
-    assert_eq!(keys(&summary), sorted(KEYS));
-    let kkt = &summary["kkt"];
-    assert_eq!(keys(kkt), sorted("stationarity primal dual complementarity"));
-    assert!(kkt.as_object().expect("an object").values().all(|v| number(v) <= 1e-10));
+    let kkt = summary["kkt"].as_object().expect("an object");
+    assert!(kkt.len() == 4 && kkt.values().all(|v| number(v) <= 1e-10));
     assert_eq!(summary["scene"], "scene");
     assert_eq!(summary["title"], "Pressed square");
     assert_eq!(summary["solver"], "active-set");
@@ -74,7 +50,6 @@ fn history() {
     let test_directory = TestDirectory::new();
     test_directory.run(&[]);
     let (names, rows) = test_directory.history("out/scene");
-    assert_eq!(names.join(" "), COLUMNS);
     assert_eq!(rows.len(), 11);
     let column = |name: &str| names.iter().position(|n| n == name).expect("a column");
     for (n, row) in rows.iter().enumerate() {
@@ -102,7 +77,7 @@ fn stopped_at_the_threshold() {
     assert!(0.0 < end && end < stopped && stopped < 1.0);
     assert!((stopped - end - 0.1).abs() < 1e-12, "one step after the state kept");
     assert!(number(&summary["zeta_min"]) > 0.01, "the state kept is admissible");
-    assert_eq!(keys(&summary), sorted(KEYS), "no error");
+    assert!(summary["error"].is_null());
     let (_, rows) = test_directory.history("out/scene");
     assert_eq!(rows.len() as u64, summary["steps"].as_u64().expect("a number") + 1);
     assert_eq!(test_directory.frames("out/scene").last().expect("frames").0, end);
@@ -214,22 +189,6 @@ fn unused_petsc_options_are_told() {
 }
 
 #[test]
-fn a_body_balanced_on_one_point_is_noted() {
-    let test_directory = TestDirectory::new();
-    let scene = SCENE
-        .replace("young = 80", "young = 8e4")
-        .replace("[[boundary]]\nname = \"left\"\nsymmetry = true\n", "")
-        .replace("gap = \"0\"", "gap = \"(x - 0.5)^2\"");
-    test_directory.write("scene.toml", &scene);
-    let said = test_directory.run(&[]);
-    let note = "in 10 steps, at t = 0.1 first and t = 1 last, no active contact node supports the body \
-                against the rotation about";
-    assert_eq!(said.out.matches(note).count(), 1, "{said:?}");
-    let notes = test_directory.summary("out/scene")["notes"].to_string();
-    assert_eq!(notes.matches(note).count(), 1, "{notes}");
-}
-
-#[test]
 fn a_step_that_does_not_divide_the_end_is_noted() {
     let test_directory = TestDirectory::new();
     let note = "time.step = 0.3 does not divide time.end = 1: 4 steps of 0.25 are made";
@@ -254,39 +213,29 @@ fn shells_complete_commands_and_options() {
     }
 }
 
+/// An iteration is a pair of triangular solves: the table counts as many as `history.csv`.
 #[test]
-fn profile() {
-    let test_directory = TestDirectory::new();
-    let out = test_directory.run(&["--profile"]).out;
+fn the_profile_has_the_parts_of_a_step_and_counts_the_pairs_of_triangular_solves() {
+    let directory = TestDirectory::new();
+    let out =
+        directory.run(&["--profile", "--set", "boundary.top.traction=[0, '-1 - sin(6*t)']"]).out;
     for fragment in ["ms per call", "GB/s", "unavoidable work", "peak memory"] {
         assert!(out.contains(fragment), "no `{fragment}` in: {out}");
     }
+    let row = |name: &str| -> Vec<&str> {
+        let line = out.lines().map(str::trim).find(|line| line.starts_with(name));
+        line.unwrap_or_else(|| panic!("no `{name}` in: {out}")).split_whitespace().collect()
+    };
     // Seconds are the first number with a point behind the name.
     let seconds = |name: &str| -> f64 {
-        let line = out.lines().map(str::trim).find(|line| line.starts_with(name));
-        let row = line.unwrap_or_else(|| panic!("no `{name}` in: {out}"));
-        let number = row.split_whitespace().find(|word| word.contains('.'));
+        let number = row(name).into_iter().find(|word| word.contains('.'));
         number.and_then(|word| word.parse().ok()).expect("seconds")
     };
     let parts = ["factorisation", "triangular solves", "products"].map(seconds);
     assert!(parts.iter().sum::<f64>() <= seconds("contact  ") + 2e-3, "{parts:?}: {out}");
-    assert!(!test_directory.run(&[]).out.contains("GB/s"), "only when asked for");
-}
-
-/// An iteration is a pair of triangular solves: the table counts as many as `history.csv`.
-#[test]
-fn the_profile_counts_the_pairs_of_triangular_solves() {
-    let test_directory = TestDirectory::new();
-    for mesh in [&[][..], &["--set", "boundary.top.traction=[0, '-1 - sin(6*t)']"]] {
-        let said = test_directory.run(&[mesh, &["--profile"]].concat());
-        let line =
-            said.out.lines().map(str::trim).find(|line| line.starts_with("triangular solves"));
-        let calls = line.and_then(|line| line.split_whitespace().nth(2)).expect("calls").to_owned();
-        let (names, rows) = test_directory.history("out/scene");
-        let column = names.iter().position(|name| name == "linear_iterations").unwrap();
-        let counted: f64 = rows.iter().map(|row| row[column]).sum();
-        assert_eq!(calls, counted.to_string(), "{}", said.out);
-    }
+    let counted: f64 = directory.column("out/scene", "linear_iterations").iter().sum();
+    assert_eq!(row("triangular solves")[2], counted.to_string(), "{out}");
+    assert!(!directory.run(&[]).out.contains("GB/s"), "only when asked for");
 }
 
 #[test]

@@ -2,45 +2,24 @@
 
 use crate::{
     failing::LATE,
-    test_directory::{ProgramOutput, SCENE, TestDirectory},
+    test_directory::{ProgramOutput, SCENE, TestDirectory, signal, start, wait_until},
 };
 use std::{
     fs::{self, File, Permissions},
     os::unix::{fs::PermissionsExt, process::ExitStatusExt},
-    process::{Child, Command, Stdio},
+    process::Command,
     thread::sleep,
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 /// So many steps that the run lasts until it is ended.
 pub const ENDLESS: [&str; 4] = ["run", "scene.toml", "--set", "time.step=1e-6"];
 
-/// Waits for a file of a run that lives.
-#[track_caller]
-pub fn wait_for(directory: &TestDirectory, file: &str) {
-    let started = Instant::now();
-    while !directory.path(file).exists() {
-        assert!(started.elapsed() < Duration::from_secs(60), "{file} does not appear");
-        sleep(Duration::from_millis(5));
-    }
-}
-
-/// Starts the program without a reader of what it says.
-fn start(command: &mut Command) -> Child {
-    command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program starts")
-}
-
-/// Sends a signal (kill(1)).
-pub fn signal(child: &Child, name: &str) {
-    let status = Command::new("kill").args(["-s", name, &child.id().to_string()]).status();
-    assert!(status.expect("kill").success());
-}
-
 #[test]
 fn a_folder_has_one_run_at_a_time() {
     let directory = TestDirectory::new();
     let mut first = start(&mut directory.command(&ENDLESS));
-    wait_for(&directory, "out/scene/fields.pvd");
+    wait_until("a frame", || directory.path("out/scene/fields.pvd").exists());
     directory.say(&["run", "scene.toml"]).fails(2, &["out/scene: another run writes there"]);
     first.kill().expect("it lives");
     assert_eq!(first.wait().expect("it ends").signal(), Some(9));
@@ -122,13 +101,9 @@ fn gmsh_hangs() {
 
     fs::remove_file(directory.path("bin/gmsh.started")).expect("gmsh was started");
     let mut child = start(directory.command(&["run", "geo/scene.toml"]).env("PATH", &path));
-    let started = Instant::now();
-    while directory.names("bin").len() < 2 {
-        assert!(started.elapsed() < Duration::from_secs(60), "gmsh is not started");
-        sleep(Duration::from_millis(5));
-    }
+    wait_until("gmsh", || directory.names("bin").len() == 2);
     sleep(Duration::from_millis(50));
-    signal(&child, "TERM");
+    signal(child.id(), "TERM");
     assert_eq!(child.wait().expect("it ends").code(), Some(143));
     assert_eq!(directory.names("geo"), ["scene.toml", "square.geo"]);
 }

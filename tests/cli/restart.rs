@@ -1,62 +1,18 @@
 //! Checkpoints and restarts: the same results bit by bit, whenever a run ends and however.
 
 use crate::{
-    losses::{ENDLESS, signal, wait_for},
-    test_directory::{ProgramOutput, TestDirectory},
+    losses::ENDLESS,
+    test_directory::{ProgramOutput, TestDirectory, signal, start, wait_until},
 };
-use std::{
-    collections::BTreeMap,
-    fs,
-    process::{Child, Stdio},
-    thread::sleep,
-    time::{Duration, Instant},
-};
+use std::{fs, process::Child};
 
 /// A run of some seconds …
 const LONG: [&str; 2] = ["--set", "time.step=2e-3"];
 /// … with a checkpoint after every step, or nearly so.
 const OFTEN: [&str; 4] = ["--set", "output.checkpoint=1e-9", "--set", "output.every=50"];
 
-fn start(directory: &TestDirectory, out: &str, arguments: &[&str]) -> Child {
-    let arguments = [&["run", "scene.toml", "--out", out], arguments].concat();
-    let mut command = directory.command(&arguments);
-    command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program starts")
-}
-
-/// The content of all files, without what tells how long the run took and when it was.
-fn results(directory: &TestDirectory, folder: &str) -> BTreeMap<String, String> {
-    let content = |name: &String| match name.as_str() {
-        "summary.json" => {
-            let mut summary = directory.summary(folder);
-            let entries = summary.as_object_mut().expect("a table");
-            for name in
-                ["wall_seconds", "peak_megabytes", "seconds_per_step", "phases", "provenance"]
-            {
-                entries.remove(name);
-            }
-            summary.to_string()
-        }
-        "history.csv" => {
-            let (names, mut rows) = directory.history(folder);
-            assert_eq!(names.last().map(String::as_str), Some("seconds"));
-            rows.iter_mut().for_each(|row| row.truncate(row.len() - 1));
-            format!("{rows:?}")
-        }
-        file => directory.read(&format!("{folder}/{file}")),
-    };
-    directory.names(folder).into_iter().map(|name| (name.clone(), content(&name))).collect()
-}
-
-/// Waits until a run that lives has a checkpoint behind the `step`.
-#[track_caller]
-fn wait_for_step(directory: &TestDirectory, folder: &str, step: usize) {
-    wait_for(directory, folder);
-    let started = Instant::now();
-    let steps = |name: &String| name.strip_prefix("checkpoint_")?.split('_').next()?.parse().ok();
-    while directory.names(folder).iter().filter_map(steps).max() < Some(step) {
-        assert!(started.elapsed() < Duration::from_secs(60), "step {step} is not reached");
-        sleep(Duration::from_millis(2));
-    }
+fn started(directory: &TestDirectory, out: &str, arguments: &[&str]) -> Child {
+    start(&mut directory.command(&[&["run", "scene.toml", "--out", out], arguments].concat()))
 }
 
 #[test]
@@ -72,21 +28,21 @@ fn a_killed_run_goes_on_as_if_it_had_not_been() {
         let directory = TestDirectory::new();
         let arguments = [&OFTEN[..], &choice.concat()].concat();
         directory.run(&[&arguments[..], &["--out", "whole"]].concat());
-        let expected = results(&directory, "whole");
+        let expected = directory.results("whole");
         assert!(expected.keys().all(|name| !name.starts_with("checkpoint")), "it is of no use now");
 
-        let mut run = start(&directory, "killed", &arguments);
+        let mut run = started(&directory, "killed", &arguments);
         for step in [60, 110] {
-            wait_for_step(&directory, "killed", step);
+            wait_until("a checkpoint", || directory.has_checkpoint("killed", step));
             run.kill().expect("it lives");
             run.wait().expect("it ends");
             directory.frames("killed").iter().for_each(|(_, file)| {
                 assert!(directory.path(&format!("killed/{file}")).exists(), "{file}");
             });
-            run = start(&directory, "killed", &[&arguments[..], &["--restart"]].concat());
+            run = started(&directory, "killed", &[&arguments[..], &["--restart"]].concat());
         }
         assert_eq!(run.wait().expect("it ends").code(), Some(0));
-        assert!(results(&directory, "killed") == expected, "{choice:?}");
+        assert!(directory.results("killed") == expected, "{choice:?}");
     }
 }
 
@@ -98,8 +54,8 @@ fn a_signal_ends_a_run_behind_a_step() {
         let errors = out.try_clone().expect("mine");
         let mut command = directory.command(&ENDLESS);
         let mut run = command.stdout(out).stderr(errors).spawn().expect("the program starts");
-        wait_for(&directory, "out/scene/fields.pvd");
-        signal(&run, name);
+        wait_until("a frame", || directory.path("out/scene/fields.pvd").exists());
+        signal(run.id(), name);
         assert_eq!(run.wait().expect("it ends").code(), Some(code));
         let said = directory.read("said");
         assert!(said.contains(&format!("error: ended by SIG{name}; --restart goes on")), "{said}");
@@ -118,9 +74,9 @@ fn what_is_no_checkpoint_of_this_run_is_refused() {
     let directory = TestDirectory::new();
     // There is none: the run begins.
     directory.run(&["--set", "time.end=0.1", "--restart"]);
-    let mut run = start(&directory, "out", &[&LONG[..], &OFTEN].concat());
-    wait_for_step(&directory, "out", 10);
-    signal(&run, "TERM");
+    let mut run = started(&directory, "out", &[&LONG[..], &OFTEN].concat());
+    wait_until("a checkpoint", || directory.has_checkpoint("out", 10));
+    signal(run.id(), "TERM");
     run.wait().expect("it ends");
     let file = directory.names("out").into_iter().find(|name| name.starts_with("checkpoint"));
     let path = directory.path(&format!("out/{}", file.expect("a checkpoint")));

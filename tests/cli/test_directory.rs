@@ -4,7 +4,9 @@ use std::{
     collections::BTreeMap,
     fs,
     path::{Path, PathBuf},
-    process::{Command, Stdio},
+    process::{Child, Command, Stdio},
+    thread::sleep,
+    time::{Duration, Instant},
 };
 use tempfile::TempDir;
 
@@ -13,6 +15,10 @@ mod msh41;
 
 /// A square pressed on its foundation: a scene that takes ten quick steps.
 pub const SCENE: &str = include_str!("scene.toml");
+
+/// Entries of `summary.json` that depend on the clock and the machine.
+const CLOCK: [&str; 5] =
+    ["provenance", "wall_seconds", "peak_megabytes", "seconds_per_step", "phases"];
 
 /// A temporary folder that holds `scene.toml` and `square.msh`.
 pub struct TestDirectory(TempDir);
@@ -62,6 +68,45 @@ impl TestDirectory {
         let rows =
             rows.into_iter().map(|r| r.iter().map(|v| v.unwrap_or(f64::NAN)).collect()).collect();
         (names, rows)
+    }
+
+    /// A column of `history.csv`.
+    #[track_caller]
+    pub fn column(&self, folder: &str, name: &str) -> Vec<f64> {
+        let (names, rows) = self.history(folder);
+        let column = names.iter().position(|other| other == name).expect("the column");
+        rows.iter().map(|row| row[column]).collect()
+    }
+
+    /// The files of a run's folder by name, without the entries that depend on the clock and the machine.
+    pub fn results(&self, folder: &str) -> BTreeMap<String, Vec<u8>> {
+        let content = |name: String| {
+            let bytes = match &name[..] {
+                "summary.json" => {
+                    let mut summary = self.summary(folder);
+                    let entries = summary.as_object_mut().expect("an object");
+                    CLOCK.iter().for_each(|key| assert!(entries.remove(*key).is_some(), "{key}"));
+                    summary.to_string().into_bytes()
+                }
+                "history.csv" => {
+                    let (names, mut rows) = self.history(folder);
+                    assert_eq!(names.last().map(String::as_str), Some("seconds"));
+                    rows.iter_mut().for_each(|row| row.truncate(row.len() - 1));
+                    format!("{rows:?}").into_bytes()
+                }
+                _ => fs::read(self.path(&format!("{folder}/{name}"))).expect("readable"),
+            };
+            (name, bytes)
+        };
+        self.names(folder).into_iter().map(content).collect()
+    }
+
+    /// True if the folder has a checkpoint of a step from `step` on.
+    pub fn has_checkpoint(&self, folder: &str, step: usize) -> bool {
+        let steps =
+            |name: &String| name.strip_prefix("checkpoint_")?.split('_').next()?.parse().ok();
+        self.path(folder).exists()
+            && self.names(folder).iter().filter_map(steps).max() >= Some(step)
     }
 
     /// Times and files in `fields.pvd`.
@@ -114,6 +159,12 @@ impl TestDirectory {
         ProgramOutput::of(&mut self.command(arguments))
     }
 
+    /// The output of a command that draws or reads results by Python; `None` where Python lacks its packages.
+    pub fn say_python(&self, arguments: &[&str]) -> Option<ProgramOutput> {
+        let said = self.say(arguments);
+        (!said.err.contains("apt install python3-matplotlib")).then_some(said)
+    }
+
     /// Runs the scene, which must go well.
     #[track_caller]
     pub fn run(&self, arguments: &[&str]) -> ProgramOutput {
@@ -145,6 +196,32 @@ impl ProgramOutput {
             assert!(self.err.contains(fragment), "`{fragment}` is not in: {}", self.err);
         }
     }
+}
+
+/// Starts a run whose output nobody reads.
+pub fn start(command: &mut Command) -> Child {
+    command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program starts")
+}
+
+/// Waits for a condition of a run that lives.
+#[track_caller]
+pub fn wait_until(what: &str, is_met: impl Fn() -> bool) {
+    let started = Instant::now();
+    while !is_met() {
+        assert!(started.elapsed() < Duration::from_secs(60), "{what}: this does not come");
+        sleep(Duration::from_millis(2));
+    }
+}
+
+/// Sends a signal (kill(1)).
+pub fn signal(process: u32, name: &str) {
+    let status = Command::new("kill").args(["-s", name, &process.to_string()]).status();
+    assert!(status.expect("kill").success());
+}
+
+/// Each key as an argument of `--set`.
+pub fn sets<'a>(keys: &[&'a str]) -> Vec<&'a str> {
+    keys.iter().flat_map(|key| ["--set", *key]).collect()
 }
 
 /// The unit square in n × n cells of two triangles, sides and body named.

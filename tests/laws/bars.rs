@@ -56,10 +56,10 @@ fn bar(bars: &[Bar], name: &str) -> f64 {
 fn a_figure_on_a_given_mesh_is_off_by_no_more_than_its_bar_which_is_no_idle_one() {
     // The corner of the clamp on the foundation makes figures converge slowly, in both orders.
     let mut idle = Vec::new();
+    let exact = adapted(&block(2, "", "0", "-5"), square(4), 1e-3).mesh;
+    let exact = figures(&solved(block(2, "", "0", "-5"), exact));
     for order in [1, 2] {
         let scene = block(order, "", "0", "-5");
-        let exact = adapted(&block(2, "", "0", "-5"), square(4), 1e-3).mesh;
-        let exact = figures(&solved(block(2, "", "0", "-5"), exact));
         for n in [4, 8, 16] {
             let found = figures(&solved(scene.clone(), square(n)));
             let session = Session::start(&[]).unwrap();
@@ -118,7 +118,7 @@ fn a_foundation_with_a_kink_between_the_nodes_is_found() {
         let found = solved(wedge(), adapted(&wedge(), square(4), accuracy).mesh);
         found.last.record.contact_force
     };
-    let exact = force(0.003);
+    let exact = force(0.01);
     assert!(exact > 1e-3, "the wedge carries {exact}");
     assert!((force(0.1) - exact).abs() < 0.1 * exact);
 }
@@ -132,7 +132,7 @@ fn contact_between_the_nodes_is_found_and_noted() {
     let problem = DiscreteProblem::new(roller(), square(10)).unwrap();
     let notes = given.notes(&problem).join("\n");
     assert!(notes.contains("between its nodes boundary \"bottom\""), "{notes}");
-    let exact = figures(&solved(roller(), adapted(&roller(), square(10), 3e-3).mesh));
+    let exact = figures(&solved(roller(), adapted(&roller(), square(10), 0.01).mesh));
     assert!(exact[2] > 0.25 * 0.05, "the roller carries {}", exact[2]);
     for accuracy in [0.1, 0.03] {
         let found = solved(roller(), adapted(&roller(), square(10), accuracy).mesh);

@@ -1,6 +1,6 @@
-//! Discs in bores, which turn freely, and loads that are rounding or whose time does not come.
+//! Discs in bores, which turn freely, and gaps that are rounding.
 
-use crate::support::{close, difference, moved, problem, run, square, turn};
+use crate::support::{difference, moved, problem, run, square, turn};
 use signorini::{
     contact::SOLVERS,
     evolution::{DiscreteProblem, SetupError},
@@ -108,20 +108,6 @@ fn a_keyway_or_a_flat_stops_the_disc() {
     mesh.nodes[rim][0] += 0.01;
     let problem = bounded(mesh, "{ name = 'rim0', gap = 0 }").unwrap_or_else(|e| panic!("{e}"));
     assert_eq!((problem.motions.free.len(), problem.motions.resisted.len()), (0, 3));
-}
-
-#[test]
-fn without_time_only_the_time_of_the_one_solve_is_judged() {
-    // At t = 0 this would lift the body, and the traction be infinite.
-    let scene = |time: &str| {
-        let text = format!(
-            "{MATERIAL}\n{time}\nbody = {{ force = [0, '0.001*(1 - 2*t)'] }}
-             boundary = [{{ name = 'bottom', gap = 0 }}, {{ name = 'top', traction = [0, '-1/t'] }}]"
-        );
-        problem(square(3), &text)
-    };
-    close(run(&scene("").unwrap(), SOLVERS[0]).last.record.contact_force, 1.001, 1e-12);
-    assert!(matches!(scene("time = { end = 1, step = 0.5 }"), Err(SetupError::Scene(_))));
 }
 
 #[test]

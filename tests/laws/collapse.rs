@@ -106,17 +106,3 @@ fn a_body_that_widens_upwards_turns_over_its_base_and_others_stand() {
     let standing = scene(mesh(), "0.01", &top("traction = [0, '-1 - t*(x - 1)']"));
     assert!(standing.collapse.is_none());
 }
-
-#[test]
-fn a_body_without_support_from_the_start_is_an_error() {
-    for load in ["traction = ['t', -1]", "traction = ['1 - t', -1]", "pressure = 't - 0.5'"] {
-        let text = format!(
-            "material = {{ young = 1e5, poisson = 0.2, plane = 'strain' }}
-             time = {{ end = 1, step = 0.1 }}
-             boundary = [{{ name = 'bottom', gap = 0 }}, {{ name = 'top', {load} }}]"
-        );
-        let found = problem(Mesh::rectangle(1.0, 1.0, 2, 2), &text).map(|problem| problem.collapse);
-        let error = found.unwrap_err().to_string();
-        assert!(error.contains("nothing supports the body"), "{error}");
-    }
-}

@@ -1,12 +1,10 @@
 //! The damage equation where its solution is known.
 
-use crate::support::{
-    Random, close, close_to, distorted, history, order, problem, run, shipped, square,
-};
+use crate::support::{Random, close, close_to, distorted, history, order, problem, run, square};
 use signorini::{
     contact::SOLVERS,
     evolution::{DiscreteProblem, Outcome, Step, Stop},
-    fem::{self, Body, DamageCertificate, DamageSystem, Mass, source_load},
+    fem::{Body, DamageCertificate, DamageSystem, Mass},
     mesh::{Mesh, Order},
     petsc::Session,
 };
@@ -255,27 +253,6 @@ fn the_time_at_which_damage_reaches_its_threshold_is_of_second_order_too() {
     let order = order(&counts.map(|n| 1.0 / n), &errors);
     println!("errors {errors:?}: order {order:.3}");
     assert!(order > 1.7, "{order}: {errors:?}");
-}
-
-#[test]
-fn the_loss_of_damage_is_the_integral_of_the_source() {
-    // Testing (28) with 1: ∫ζ_n − ∫ζ_{n−1} = k ∫φ_{n−1}, with the damage far from uniform.
-    let quadratic = "discretisation.displacement=2";
-    for set in ["damage.mass=consistent", "damage.mass=lumped", quadratic] {
-        let problem = shipped("square-mild", &["mesh.size=0.125", "time.step=0.1", set]);
-        let (law, k) = (problem.damage().unwrap(), 0.1);
-        let (steps, _) = history(&problem, SOLVERS[0]);
-        assert_eq!(steps.len(), 11);
-        for pair in steps.windows(2) {
-            let (before, after) = (&pair[0], &pair[1]);
-            let strain = problem.elasticity.strain_squared(&problem.body, &before.state.u);
-            let phi = fem::source(&problem.body, law, &strain, &before.state.zeta);
-            let source: f64 = source_load(&problem.body, problem.mass(), &phi).iter().sum();
-            assert!(source < -1e-3);
-            // The square's area is 1.
-            close(after.record.zeta_mean - before.record.zeta_mean, k * source, 1e-13);
-        }
-    }
 }
 
 #[test]

@@ -7,10 +7,17 @@ use std::f64::consts::PI;
 /// a(u, u)^½ of the fine answers below.
 const ENERGY_NORM: f64 = 127.60;
 
+/// The force on the whole disc, N per metre of thickness, and its radius, m.
+const FORCE: f64 = 35e6;
+const RADIUS: f64 = 0.05;
+
+/// a = √(4FR/(πE*)) and p₀ = √(FE*/(πR)) of p(x) = p₀ √(1 − x²/a²), E* = E/(1−ν²): the plane is rigid.
+fn theory(e: f64) -> [f64; 2] {
+    [(4.0 * FORCE * RADIUS / (PI * e)).sqrt(), (FORCE * e / (PI * RADIUS)).sqrt()]
+}
+
 #[test]
 fn a_disc_on_a_plane_has_the_pressure_of_hertz() {
-    // a = √(4FR/(πE*)), p₀ = √(FE*/(πR)), p(x) = p₀ √(1 − x²/a²), E* = E/(1−ν²): the
-    // plane is rigid. F = 35 kN per mm of the whole disc.
     // The quadratic elements have larger triangles.
     let scenes = [
         &["discretisation.displacement=1"][..],
@@ -19,16 +26,13 @@ fn a_disc_on_a_plane_has_the_pressure_of_hertz() {
     for sets in scenes {
         let problem = shipped("hertz", sets);
         let material = problem.scene().material;
-        let (force, radius) = (35e6, 0.05);
-        let e = material.young / (1.0 - material.poisson * material.poisson);
-        let half_width = (4.0 * force * radius / (PI * e)).sqrt();
-        let peak = (force * e / (PI * radius)).sqrt();
+        let [half_width, peak] = theory(material.young / (1.0 - material.poisson.powi(2)));
         assert!((half_width - 5.382e-3).abs() < 1e-6 && (peak - 4140e6).abs() < 1e6);
 
         for solver in SOLVERS {
             let last = run(&problem, solver).last;
             // Vertical equilibrium of the half that is modelled.
-            close_to(last.record.contact_force, 0.5 * force, 1e-9);
+            close_to(last.record.contact_force, 0.5 * FORCE, 1e-9);
 
             let mut points: Vec<_> = (last.state.contact.iter())
                 .map(|point| (problem.body.nodes.points[point.node][0], point))
@@ -60,33 +64,55 @@ fn a_disc_on_a_plane_has_the_pressure_of_hertz() {
     }
 }
 
-/// The energy ½a(u, u) − f(u), N m per metre of thickness, and the estimated relative error of u, on a
-/// mesh of which all edges are proportional to `size`.
-fn energy(size: f64, degree: u8) -> [f64; 2] {
+/// An answer on a mesh of which all edges are proportional to `size`: the energy ½a(u, u) − f(u), N m per metre of thickness;
+/// the estimated relative error of u; the L²(Γ_C) distance of the pressure from Hertz's ellipse over the ellipse; the largest
+/// edge in contact over the half-width.
+fn answer(size: f64, degree: u8) -> [f64; 4] {
     let sets = [format!("mesh.size={size}"), format!("discretisation.displacement={degree}")];
     let growth = format!("{} * (sqrt", 25.0 * size);
     let sets = [&sets[0], &sets[1], "mesh.parameters.grading=25"];
     let problem = shipped_with("hertz", &sets, ["0.2 * (sqrt", &growth]);
     let outcome = run(&problem, SOLVERS[0]);
-    let (body, u) = (&problem.body, &outcome.last.state.u);
-    let zeta = problem.zeta_at_points(&outcome.last.state.zeta);
-    let energies: f64 = problem.elasticity.energies(body, &zeta, u).iter().sum();
+    let (body, state) = (&problem.body, &outcome.last.state);
+    let zeta = problem.zeta_at_points(&state.zeta);
+    let energies: f64 = problem.elasticity.energies(body, &zeta, &state.u).iter().sum();
     let load = problem.loads.at(body, 1.0);
-    let work: f64 = load.iter().zip(u).map(|(f, u)| f * u).sum();
-    [0.5 * energies - work, outcome.errors.displacement_mesh]
+    let work: f64 = load.iter().zip(&state.u).map(|(f, u)| f * u).sum();
+
+    let [half_width, peak] = theory(70e9 / (1.0 - 0.3 * 0.3));
+    let (mut square, mut whole, mut longest) = (0.0, 0.0, 0.0_f64);
+    for pair in problem.supports.contact.rows(body, state).0.windows(2) {
+        let length = pair[1].arc_length - pair[0].arc_length;
+        for row in pair {
+            let theory = peak * (1.0 - (row.x / half_width).powi(2)).max(0.0).sqrt();
+            square += length * (row.pressure - theory).powi(2);
+            whole += length * theory.powi(2);
+            // The theory is of a half-space, and R/a = 9.
+            assert!(row.pressure < 1.02 * peak, "{row:?}");
+        }
+        if pair[0].active == 1 {
+            longest = longest.max(length * f64::from(degree) / half_width);
+        }
+    }
+    [0.5 * energies - work, outcome.errors.displacement_mesh, (square / whole).sqrt(), longest]
 }
 
 #[test]
 fn the_disc_converges_with_the_order_of_the_element_on_its_curved_boundary() {
     // The energy of u_h exceeds that of u by ½‖u − u_h‖², but for what contact adds at its edge.
-    let [fine, _] = energy(0.004, 2);
+    let [fine, ..] = answer(0.004, 2);
     for (degree, sizes) in [(1, [0.016, 0.008, 0.004]), (2, [0.016, 0.0113, 0.008])] {
         let errors = sizes.map(|size| {
-            let [energy, estimate] = energy(size, degree);
+            let [energy, estimate, distance, edge] = answer(size, degree);
             let error = (2.0 * (energy - fine)).sqrt() / ENERGY_NORM;
+            println!(
+                "P{degree}, size {size}: {estimate:.2e} estimated, {error:.2e} true; \
+                 pressure {distance:.5}, edge {edge:.4}"
+            );
             let ratio = estimate / error;
-            println!("P{degree}, size {size}: {estimate:.2e} estimated, {error:.2e} true");
             assert!((0.7..1.4).contains(&ratio), "P{degree}, size {size}: {ratio:.3}");
+            // At the end of contact p ~ √r; the error of an edge there is √h on a length h, so h in L².
+            assert!(distance < 0.5 * edge, "P{degree}, {size}: {distance} for {edge}");
             error
         });
         let order = order(&sizes, &errors);

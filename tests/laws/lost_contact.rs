@@ -33,13 +33,6 @@ fn reaction(problem: &DiscreteProblem, outcome: &Outcome) -> [f64; 2] {
 }
 
 #[test]
-fn a_free_body_pulled_off_is_refused_with_the_motion_and_the_resultant() {
-    let refusal = standing("0", "0.25").unwrap_err().to_string();
-    assert!(refusal.contains("the vertical translation"), "{refusal}");
-    assert!(refusal.contains("resultant (0.0000e0, 2.5000e-1) N/m"), "{refusal}");
-}
-
-#[test]
 fn a_resultant_within_the_foot_stands_and_one_beyond_its_edge_is_refused() {
     for e in [0.0, 0.3, 0.5 - 1e-6, 0.5, -0.5] {
         assert!(eccentric("0", e).is_ok(), "{e}");

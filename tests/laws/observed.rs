@@ -141,25 +141,3 @@ fn a_probe_outside_the_body_is_refused() {
     let error = problem(distorted(6), text).expect_err("outside").to_string();
     assert!(error.contains("probe.far.point (0.5, 1.2) lies outside the body"), "{error}");
 }
-
-#[test]
-fn the_contact_boundary_is_a_line() {
-    // Around a corner of Γ_C the arc length goes on; its rows know their forces' boundary.
-    let text = "contact.tolerance = 1e-12
-                material = { young = 200, poisson = 0.3, plane = 'stress' }
-                boundary = [{ name = 'left', gap = 0.0 }, { name = 'bottom', gap = 0.0 },
-                            { name = 'top', traction = [0, -3] },
-                            { name = 'right', traction = [-2, 0] }]";
-    let problem = problem(distorted(6), text).unwrap_or_else(|e| panic!("{e}"));
-    let state = run(&problem, "active-set").last.state;
-    let rows = problem.supports.contact.rows(&problem.body, &state).0;
-    for (name, pressure) in [("left", 2.0), ("bottom", 3.0)] {
-        let rows: Vec<_> = rows.iter().filter(|row| row.boundary == name).collect();
-        assert_eq!(rows.len(), 7);
-        for row in &rows {
-            let along = if name == "left" { 1.0 - row.y } else { row.x };
-            close(row.arc_length, along, 1e-12);
-            close(row.pressure, pressure, 1e-9);
-        }
-    }
-}

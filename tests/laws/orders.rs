@@ -160,16 +160,9 @@ fn check(meshes: [Mesh; 3], plane: &str, d: f64, degree: u8) {
 
 #[test]
 fn displacements_converge_with_the_degree_in_h1_and_one_more_in_l2() {
-    for plane in ["stress", "strain"] {
-        check([8, 16, 32].map(distorted), plane, 0.0, 1);
-        check([6, 12, 24].map(distorted), plane, 0.0, 2);
-    }
-}
-
-#[test]
-fn orders_hold_on_the_meshes_of_gmsh_and_with_damage_that_varies() {
-    for plane in ["stress", "strain"] {
-        check([0.1, 0.05, 0.025].map(unstructured), plane, 0.6, 1);
-        check([0.2, 0.1, 0.05].map(unstructured), plane, 0.6, 2);
-    }
+    check([8, 16, 32].map(distorted), "stress", 0.0, 1);
+    check([6, 12, 24].map(distorted), "strain", 0.0, 2);
+    // With damage that varies.
+    check([0.1, 0.05, 0.025].map(unstructured), "strain", 0.6, 1);
+    check([0.2, 0.1, 0.05].map(unstructured), "stress", 0.6, 2);
 }

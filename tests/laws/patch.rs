@@ -95,18 +95,6 @@ fn uniform_pressure_on_a_foundation() {
 }
 
 #[test]
-fn stress_is_the_pressure_along_the_load_and_nothing_else() {
-    for (_, mesh) in meshes() {
-        let problem = pressed(mesh, 0.0, Plane::Stress, 3.0, "");
-        let u = run(&problem, SOLVERS[0]).last.state.u;
-        let undamaged = vec![1.0; u.len() * problem.body.triangles.len()];
-        for s in problem.elasticity.stresses(&problem.body, &undamaged, &u) {
-            assert!((s[1] + 3.0).abs().max(s[0].abs()).max(s[2].abs()) < 1e-10, "{s}");
-        }
-    }
-}
-
-#[test]
 fn uniform_damage_softens_the_whole_patch() {
     // ζ = ½: twice the displacement under the same pressure.
     let damage = "damage = { diffusion = 1, lambda_d = 0, lambda_u = 1, lambda_w = 0, \

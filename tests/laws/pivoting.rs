@@ -149,23 +149,21 @@ fn pivots_on_the_deepest_end_where_block_pivots_cycle() {
 /// force that wanders: long stretches of it go from one to the other in a step.
 #[test]
 fn a_slender_body_between_walls_takes_few_iterations_a_step() {
-    for n in [200, 400] {
-        let text = "material = { young = 1e8, poisson = 0.3, plane = 'strain' }
-            contact.rescue = false
-            contact.tolerance = 1e-8
-            time = { end = 1, step = 0.05 }
-            body.force = [0, '9*sin(2*pi*(x/100 - 2*t))']
-            boundary = [
-                { name = 'left', displacement = [0, 'free'] },
-                { name = 'bottom', gap = '0.024*(0.43*(1 - t) + sin(pi*x/50 - 11.5*t))' },
-                { name = 'top', gap = '0.024*(0.43*(1 - t) - sin(pi*x/50 - 11.5*t))' },
-            ]";
-        let problem = problem(Mesh::rectangle(100.0, 1.0, n, 2), text).unwrap();
-        let (steps, _) = history(&problem, SOLVERS[0]);
-        let iterations: Vec<usize> = steps[1..].iter().map(|step| step.report.iterations).collect();
-        let (mean, most) = (iterations.iter().sum::<usize>() / 20, iterations.iter().max());
-        assert!(mean <= 60 && most <= Some(&100), "n = {n}: {iterations:?}");
-    }
+    let text = "material = { young = 1e8, poisson = 0.3, plane = 'strain' }
+        contact.rescue = false
+        contact.tolerance = 1e-8
+        time = { end = 1, step = 0.05 }
+        body.force = [0, '9*sin(2*pi*(x/100 - 2*t))']
+        boundary = [
+            { name = 'left', displacement = [0, 'free'] },
+            { name = 'bottom', gap = '0.024*(0.43*(1 - t) + sin(pi*x/50 - 11.5*t))' },
+            { name = 'top', gap = '0.024*(0.43*(1 - t) - sin(pi*x/50 - 11.5*t))' },
+        ]";
+    let problem = problem(Mesh::rectangle(100.0, 1.0, 300, 2), text).unwrap();
+    let (steps, _) = history(&problem, SOLVERS[0]);
+    let iterations: Vec<usize> = steps[1..].iter().map(|step| step.report.iterations).collect();
+    let (mean, most) = (iterations.iter().sum::<usize>() / 20, iterations.iter().max());
+    assert!(mean <= 60 && most <= Some(&100), "{iterations:?}");
 }
 
 /// A beam of three nodes that bends but is supported by nothing: (1, 1, 1) and (−1, 0, 1) are free of

@@ -105,7 +105,7 @@ fn mesh() -> Mesh {
 fn the_pressure_under_a_punch_comes_at_the_rate_of_smooth_solutions() {
     let exact = HalfPlane::new();
     let (mut unknowns, mut strains, mut pressures) = (Vec::new(), Vec::new(), Vec::new());
-    for accuracy in [0.03, 0.01, 3e-3, 1e-3] {
+    for accuracy in [0.03, 0.01, 3e-3] {
         let session = Session::start(&[]).unwrap();
         let found =
             estimate::adapted(&session, &exact.scene(), mesh(), SOLVERS[0], accuracy, &mut |_| {});

@@ -86,6 +86,13 @@ pub fn bent(mesh: &Mesh, place: impl Fn([f64; 2]) -> [f64; 2]) -> Mesh {
     bent
 }
 
+/// A square of which all edges are parabolas.
+pub fn curved() -> Mesh {
+    bent(&distorted(4), |[x, y]| {
+        [x + 0.3 * y + 0.1 * (2.0 * y).sin(), y - 0.2 * x * y + 0.1 * x * x]
+    })
+}
+
 /// x turned by `angle` about the origin.
 pub fn turn(angle: f64, [x, y]: [f64; 2]) -> [f64; 2] {
     let (s, c) = angle.sin_cos();

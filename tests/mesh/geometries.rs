@@ -78,41 +78,40 @@ fn diagonals_of_the_square() {
     assert_eq!([slopes(0.0), slopes(1.0), slopes(2.0)], [16.0, -16.0, 0.0]);
 }
 
-#[test]
-fn lshape() {
-    let uniform = mesh("lshape", [("size", 0.25), ("grading", 1.0)]);
-    assert_eq!(node_count(&uniform, "foundation"), 9);
-    let graded = mesh("lshape", [("size", 0.25), ("grading", 8.0)]);
+/// A body of this size, area and perimeter, with curves of these lengths, whose edges are shorter by the grading at these
+/// points.
+fn check_graded(
+    name: &str,
+    size: f64,
+    [area, perimeter]: [f64; 2],
+    lengths: [(&str, f64); 3],
+    points: &[[f64; 2]],
+) -> Mesh {
+    let uniform = mesh(name, [("size", size), ("grading", 1.0)]);
+    let foundation = curve_length(&uniform, "foundation");
+    assert_eq!(node_count(&uniform, "foundation") as f64, 1.0 + foundation / size);
+    let graded = mesh(name, [("size", size), ("grading", 8.0)]);
     for mesh in [&uniform, &graded] {
-        check_laws(mesh, 24.0, 28.0, 0);
-        for (name, length) in [("clamp", 2.0), ("foundation", 2.0), ("load", 8.0)] {
-            close(curve_length(mesh, name), length);
-        }
+        check_laws(mesh, area, perimeter, 0);
+        lengths.iter().for_each(|(curve, length)| close(curve_length(mesh, curve), *length));
         assert!(smallest_angle(mesh) > 25.0);
     }
-    for point in [[2.0, 4.0], [6.0, 4.0], [8.0, 4.0], [0.0, 0.0], [2.0, 0.0]] {
-        let edge = edge_at(&graded, point) * 8.0 / 0.25;
+    for point in points {
+        let edge = edge_at(&graded, *point) * 8.0 / size;
         assert!((0.6..1.6).contains(&edge), "{edge} at {point:?}");
     }
-    assert!(edge_at(&graded, [8.0, 6.0]) > 0.2);
+    graded
 }
 
 #[test]
-fn beam() {
-    let uniform = mesh("beam", [("size", 0.125), ("grading", 1.0)]);
-    assert_eq!(node_count(&uniform, "foundation"), 65);
-    let graded = mesh("beam", [("size", 0.125), ("grading", 8.0)]);
-    for mesh in [&uniform, &graded] {
-        check_laws(mesh, 4.0, 17.0, 0);
-        for (name, length) in [("clamp", 1.0), ("foundation", 8.0), ("load", 8.0)] {
-            close(curve_length(mesh, name), length);
-        }
-        assert!(smallest_angle(mesh) > 25.0);
-    }
-    for point in [[0.0, 0.0], [8.0, 0.0], [8.0, 0.5], [0.0, 0.5]] {
-        let edge = edge_at(&graded, point) * 8.0 / 0.125;
-        assert!((0.6..1.6).contains(&edge), "{edge} at {point:?}");
-    }
+fn lshape_and_beam() {
+    let lengths = [("clamp", 2.0), ("foundation", 2.0), ("load", 8.0)];
+    let points = [[2.0, 4.0], [6.0, 4.0], [8.0, 4.0], [0.0, 0.0], [2.0, 0.0]];
+    let graded = check_graded("lshape", 0.25, [24.0, 28.0], lengths, &points);
+    assert!(edge_at(&graded, [8.0, 6.0]) > 0.2);
+    let lengths = [("clamp", 1.0), ("foundation", 8.0), ("load", 8.0)];
+    let points = [[0.0, 0.0], [8.0, 0.0], [8.0, 0.5], [0.0, 0.5]];
+    check_graded("beam", 0.125, [4.0, 17.0], lengths, &points);
 }
 
 /// Nodes by their coordinates, rounded to 10⁻⁹ m, and triangles as sorted triples of these.

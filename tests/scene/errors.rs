@@ -4,11 +4,17 @@ use std::path::Path;
 
 use signorini::scene::Scene;
 
-use crate::BASE;
+use crate::{BASE, mesh::square};
 
 fn refusal(text: &str) -> String {
-    match Scene::parse(text, Path::new("bad.toml"), &[]) {
-        Ok(_) => panic!("this was accepted:\n{text}"),
+    refusal_with(text, &[])
+}
+
+/// The same with arguments of `--set`.
+fn refusal_with(text: &str, sets: &[String]) -> String {
+    let scene = Scene::parse(text, Path::new("bad.toml"), sets);
+    match scene.and_then(|scene| scene.check_mesh(&square())) {
+        Ok(()) => panic!("this was accepted:\n{text}\n{sets:?}"),
         Err(error) => error.to_string(),
     }
 }
@@ -34,14 +40,21 @@ fn a_decimal_comma_is_one_problem() {
 fn every_rule_names_file_line_and_key() {
     let rows = include_str!("refused.txt").lines().filter(|row| !row.starts_with('#'));
     for row in rows {
-        let [old, new, message] = row.split(" => ").collect::<Vec<_>>()[..] else {
-            panic!("no row: {row}")
+        let (refusal, message) = match row.split(" => ").collect::<Vec<_>>()[..] {
+            [old, new, message] => {
+                let [old, new] = [old, new].map(|text| text.replace("\\n", "\n"));
+                assert!(BASE.contains(&old), "the base scene has no `{old}`");
+                let refusal = refusal(&BASE.replacen(&old, &new, 1));
+                let is_line = |line: &str| line.contains(" | ") && line.ends_with('^');
+                assert!(refusal.lines().any(is_line), "{refusal}");
+                (refusal, message)
+            }
+            [set, message] => {
+                let set = set.strip_prefix("--set ").expect("an argument");
+                (refusal_with(BASE, &["time.step=0.02".to_owned(), set.to_owned()]), message)
+            }
+            _ => panic!("no row: {row}"),
         };
-        let [old, new] = [old, new].map(|text| text.replace("\\n", "\n"));
-        assert!(BASE.contains(&old), "the base scene has no `{old}`");
-        let refusal = refusal(&BASE.replacen(&old, &new, 1));
-        let is_line = |line: &str| line.contains(" | ") && line.ends_with('^');
-        assert!(refusal.lines().any(is_line), "{refusal}");
         for fragment in message.split(" & ") {
             let place = format!("bad.toml:{fragment}");
             let expected = if fragment.starts_with(char::is_numeric) { &place } else { fragment };

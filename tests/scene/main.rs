@@ -113,35 +113,29 @@ fn what_is_left_out_has_a_default() {
         material = { young = 1, poisson = 0, plane = 'strain' }
         boundary = [{ name = 'b', displacement = ['free', 2], traction = ['x', 0] }]
     ";
-    let scene = Scene::parse(text, Path::new("dir/tiny.toml"), &[]).expect("complete");
+    let parse = |sets: &[String]| Scene::parse(text, Path::new("dir/tiny.toml"), sets);
+    let scene = parse(&[]).expect("complete");
     assert_eq!((scene.name.as_str(), scene.title.as_str()), ("tiny", "tiny"));
     assert_eq!(scene.mesh, MeshSource::from_path("dir/m.msh"));
     assert!(scene.damage.is_none() && scene.time.is_none());
     assert!(scene.body_force.iter().all(|f| f.as_constant() == Some(0.0)));
     assert_eq!((scene.contact.solver, scene.contact.tolerance), (None, 1e-10));
     assert_eq!(scene.output.every, None);
-    assert_eq!(scene.units, Units::default());
+    assert_eq!((&scene.units, scene.order), (&Units::default(), Order::Linear));
     let [Condition::Displacement([None, Some(y)]), Condition::Load(_)] =
         &scene.boundaries[0].conditions[..]
     else {
         panic!("a displacement, free in x, and a traction")
     };
     assert_eq!(y.as_constant(), Some(2.0));
-}
-
-#[test]
-fn the_damage_law_has_the_constants_of_the_paper_unless_told_otherwise() {
-    let text = "
-        mesh.file = 'm.msh'
-        material = { young = 1, poisson = 0, plane = 'strain' }
-        damage = { diffusion = 1, lambda_d = 0.5, lambda_u = 2 }
-        boundary = [{ name = 'b', displacement = [0, 0] }]
-    ";
-    let damage = Scene::parse(text, Path::new("tiny.toml"), &[]).expect("complete").damage;
-    let damage = damage.expect("given");
+    // The damage law has the constants of the paper.
+    let damage = "damage={ diffusion = 1, lambda_d = 0.5, lambda_u = 2 }".to_owned();
+    let order = "discretisation.displacement=2".to_owned();
+    let scene = parse(&[damage, order]).expect("complete");
+    let damage = scene.damage.expect("given");
     let law = damage.law;
     assert_eq!((law.lambda_w, law.strain_cap, law.threshold), (0.0, 1000.0, 0.01));
-    assert_eq!(damage.initial.as_constant(), Some(1.0));
+    assert_eq!((damage.initial.as_constant(), scene.order), (Some(1.0), Order::Quadratic));
 }
 
 #[test]
@@ -199,16 +193,5 @@ fn the_time_grid_is_uniform_and_not_coarser_than_asked() {
         assert_eq!(grid.stepping, Stepping::Uniform { steps }, "{end} by {step}");
         assert!(end / steps as f64 <= step * (1.0 + 1e-8));
         assert_eq!(grid.end, end);
-    }
-}
-
-#[test]
-fn displacements_are_of_order_one_unless_the_scene_says_two() {
-    let order = |sets: &[String]| {
-        Scene::parse(BASE, Path::new("base.toml"), sets).unwrap_or_else(|e| panic!("{e}")).order
-    };
-    assert_eq!(order(&[]), Order::Linear);
-    for (value, expected) in [("1", Order::Linear), ("2", Order::Quadratic)] {
-        assert_eq!(order(&[format!("discretisation.displacement={value}")]), expected);
     }
 }
